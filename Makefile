@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: Apache-2.0
+# All that is made lies inside this folder: .venv/ (Python environment), build/ (compiler output), and what demo writes.
+SHELL := /bin/bash
+.SHELLFLAGS := -eu -o pipefail -c
+.DELETE_ON_ERROR:
+.DEFAULT_GOAL := help
+MAKEFLAGS += --no-builtin-rules
+
+PYTHON      ?=
+VENV        ?= .venv
+JOBS        ?= $(shell nproc)
+EXTRAS      ?= test lint interop
+PYTEST_ARGS ?=
+DEMO_ARGS   ?=
+
+BIN := $(VENV)/bin
+export PATH := $(abspath $(BIN)):$(PATH)
+export CMAKE_BUILD_PARALLEL_LEVEL := $(JOBS)
+export PIP_DISABLE_PIP_VERSION_CHECK := 1
+# The wheels' bootstrapper marks its environment: the mark of another environment must not reach this one.
+unexport PYTHONPATH PYTHONHOME _ROS_WHEELS_BOOTSTRAP_COMPLETE
+
+# Stamps. A PYTHON named on the command line has one of its own, so that naming another one is noticed.
+ENVIRONMENT := $(VENV)/.hpccd-environment$(if $(PYTHON),-$(notdir $(PYTHON)))
+INSTALLED   := $(VENV)/.hpccd-installed
+
+# What the installed package is made of.
+SOURCES := $(sort $(shell find CMakeLists.txt setup.py package.xml cmake config msg srv scripts hpccd_ros hpccd_core \
+  \( -name __pycache__ -o -path hpccd_core/tests -o -path hpccd_core/bench -o -path hpccd_core/fuzz \) -prune \
+  -o -type f -print))
+
+.PHONY: help venv demo test test-core test-python lint format pin clean distclean FORCE
+
+help: ## Show this list
+	@echo "hpccd: continuous collision detection of deforming triangle meshes, as a ROS 2 node."
+	@echo "New here? make demo"
+	@echo
+	@sed -nE 's/^([a-z-]+):.*## (.*)/  make \1|\2/p' $(MAKEFILE_LIST) | column -t -s '|'
+	@echo
+	@echo "Variables, e.g. make test PYTEST_ARGS='-k replay':"
+	@echo "  PYTHON=python3.12   which Python for .venv: 3.11 or 3.12 (default: the first found)"
+	@echo "  VENV=.venv          where the environment lies"
+	@echo "  JOBS=4              compile jobs (default: all cores)"
+	@echo "  CMAKE_ARGS=...      passed on to CMake"
+	@echo "  PYTEST_ARGS=...     passed on to pytest      DEMO_ARGS=...  passed on to hpccd demo"
+	@echo "  HPCCD_DATA=folder   scenes with ground truth; without it the tests that need them are skipped"
+
+venv: $(INSTALLED) ## Create .venv, build and install the package (again, where sources have changed)
+
+demo: venv ## Node, publisher and recorder as processes over DDS; leaves a recording and a picture
+	$(BIN)/hpccd demo $(DEMO_ARGS)
+
+test: test-core test-python ## Pass all tests
+
+test-core: $(ENVIRONMENT) ## Only the C++ tests of the core
+	@$(call run_core_tests,build/core-tests,-DCMAKE_BUILD_TYPE=Release)
+
+test-python: venv ## Only the Python tests: core against oracles, node over DDS, recordings
+	$(BIN)/pytest $(PYTEST_ARGS)
+
+lint: $(ENVIRONMENT) ## Check the style: ruff, clang-format
+	$(BIN)/ruff check .
+	@git ls-files -z '*.h' '*.cpp' '*.cu' | xargs -0r $(BIN)/clang-format --dry-run --Werror
+
+format: $(ENVIRONMENT) ## Mend the style where a tool can
+	$(BIN)/ruff check --fix .
+	@git ls-files -z '*.h' '*.cpp' '*.cu' | xargs -0r $(BIN)/clang-format -i
+
+pin: $(ENVIRONMENT) ## Write the versions now in .venv to requirements/
+	@version=$$($(BIN)/python -c 'import sys; print("%d.%d" % sys.version_info[:2])'); \
+	  $(BIN)/python scripts/pin.py > requirements/constraints-$$version.txt
+
+clean: ## Remove compiler output and caches; keep .venv
+	rm -rf build dist hpccd.egg-info .pytest_cache .ruff_cache .hypothesis
+	find . -path ./$(VENV) -prune -o -name __pycache__ -prune -exec rm -rf {} +
+
+distclean: clean ## Remove .venv too
+	rm -rf $(VENV)
+
+# GoogleTest comes as source in a wheel, so that the tests need no system package and are the same everywhere.
+define run_core_tests
+cmake -S hpccd_core -B $(1) -G Ninja -DHPCCD_BUILD_TESTS=ON -DGTest_DIR="$(CURDIR)/cmake/gtest" \
+  -DHPCCD_GTEST_SOURCE="$(abspath $(VENV))/src/gtest_vendor" \
+  -DPython3_EXECUTABLE="$(abspath $(BIN))/python" $(2) $(CMAKE_ARGS) > $(1).log 2>&1 || { cat $(1).log; exit 1; }; \
+cmake --build $(1) && ctest --test-dir $(1) --output-on-failure --no-tests=error
+endef
+
+$(ENVIRONMENT): pyproject.toml scripts/create_venv.sh scripts/requirements.py $(wildcard requirements/*.txt)
+	@PYTHON="$(PYTHON)" bash scripts/create_venv.sh $(VENV) $(EXTRAS)
+	@touch $@
+
+$(INSTALLED): $(ENVIRONMENT) $(SOURCES) build/sources.txt
+	@echo "hpccd: building, and installing into $(VENV)"
+	@flock $(VENV) $(BIN)/python -m pip install --quiet --no-build-isolation --no-deps .
+	@touch $@
+
+# Changes when a source file appears or disappears, which no time stamp of another file tells.
+build/sources.txt: FORCE
+	@mkdir -p $(@D)
+	@printf '%s\n' $(SOURCES) | cmp -s - $@ || printf '%s\n' $(SOURCES) > $@
+FORCE:

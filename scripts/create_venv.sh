@@ -1,0 +1,57 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+# create_venv.sh FOLDER EXTRA...: a virtual environment with all that building, running and testing needs.
+# PYTHON in the environment: which Python; empty: that of FOLDER if it exists, else the first suitable one.
+set -euo pipefail
+
+venv=$1
+shift
+here=$(cd "$(dirname "$0")/.." && pwd)
+
+fail() {
+  printf 'hpccd: %s\n' "$@" >&2
+  exit 1
+}
+
+version_of() { "$1" -c 'import sys; print("%d.%d" % sys.version_info[:2])' 2>/dev/null || true; }
+
+suitable() { case "$(version_of "$1")" in 3.11 | 3.12) true ;; *) false ;; esac; }
+
+# The ROS 2 Jazzy wheels exist for these two Python versions.
+find_python() {
+  local name
+  for name in python3 python3.12 python3.11; do
+    if suitable "$name"; then
+      command -v "$name"
+      return
+    fi
+  done
+  fail "no Python 3.11 or 3.12 found." \
+    "Remedy on Debian 12 or Ubuntu 24.04: sudo apt install python3 python3-venv" \
+    "or name one: make venv PYTHON=/path/to/python3.12"
+}
+
+python=${PYTHON:-}
+if [ -n "$python" ] && ! suitable "$python"; then
+  fail "PYTHON=$python is $(version_of "$python" | sed 's/^$/not a Python/'); 3.11 or 3.12 is needed (the ROS 2 Jazzy wheels exist for these)."
+fi
+command -v g++ >/dev/null || fail "g++ not found. Remedy: sudo apt install g++"
+
+if [ -x "$venv/bin/python" ] && suitable "$venv/bin/python" &&
+  { [ -z "$python" ] || [ "$(version_of "$python")" = "$(version_of "$venv/bin/python")" ]; }; then
+  echo "hpccd: bringing $venv up to date"
+else
+  [ -n "$python" ] || python=$(find_python)
+  "$python" -c 'import ensurepip, venv' 2>/dev/null || fail \
+    "$python cannot create virtual environments (module ensurepip is missing)." \
+    "Remedy on Debian and Ubuntu: sudo apt install python$(version_of "$python")-venv"
+  echo "hpccd: creating $venv with Python $(version_of "$python"); about 350 MB come from the package index"
+  "$python" -m venv --clear "$venv"
+fi
+
+PIP_CONSTRAINT=$here/requirements/constraints-$(version_of "$venv/bin/python").txt
+export PIP_CONSTRAINT
+"$venv/bin/python" "$here/scripts/requirements.py" "$@" >"$venv/requirements.txt"
+"$venv/bin/python" -m pip install --quiet --requirement "$venv/requirements.txt" || fail \
+  "installing the requirements failed (see above)." \
+  "They come from the Python package index: is there a network, or a mirror (PIP_INDEX_URL)?"
