@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Why a frame did not take part in a detection, and how often.
+
+The unit is one vertex message of one mesh, so that the counts add up:
+received + lost in the middleware = answered + dropped + still waiting.
+"""
+
+import threading
+from collections.abc import Callable
+from enum import StrEnum
+
+
+class Reason(StrEnum):
+    """Why a message was refused (it is wrong) or dropped (it is right, but could not be used)."""
+
+    UNKNOWN_MESH = "unknown_mesh"  # not in parameter `meshes`
+    MALFORMED = "malformed"  # lengths that do not fit each other; both or neither vertex array; missing field
+    UNSUPPORTED_TYPE = "unsupported_type"  # PointCloud2 field that is neither FLOAT32 nor FLOAT64
+    BIG_ENDIAN = "big_endian"
+    NOT_FINITE = "not_finite"  # NaN or infinity
+    TOO_LARGE = "too_large"  # above max_vertices or max_faces
+    INDEX_RANGE = "index_range"  # a face names a vertex that does not exist
+    BAD_TOPOLOGY = "bad_topology"  # refused by the core, e.g. a face that names a vertex twice
+    TOPOLOGY_CONFLICT = "topology_conflict"  # same version, other content
+    OLD_TOPOLOGY = "old_topology"
+    NO_TOPOLOGY = "no_topology"  # the topology that the frame names has not come (in time)
+    WRONG_COUNT = "wrong_vertex_count"
+    FRAME_ID = "frame_id"
+    BACKWARD = "stamp_backward"
+    REPEATED = "stamp_repeated"
+    LATE = "late"  # its stamp was already answered (or given up) when it came
+    INCOMPLETE = "incomplete"  # another mesh had no frame for this stamp
+    STATIC_MISSING = "static_missing"  # the vertices of a static mesh have not come
+    RESTART = "restart"  # was waiting when the stream started anew
+    OVERLOAD = "overload"  # a newer frame took its place before the detection got to it
+    MIDDLEWARE = "middleware"  # never arrived: gap in the publisher's sequence numbers
+    DETECTION_FAILED = "detection_failed"
+    STOPPED = "stopped"  # was waiting when the node was deactivated
+
+
+Listener = Callable[[str, Reason, str], None]
+
+
+class DropCounter:
+    """Counts by mesh and reason; may be used from several threads.
+
+    ``listener(mesh, reason, text)`` is called outside the lock for each count that comes with a text.
+    """
+
+    def __init__(self, listener: Listener | None = None) -> None:
+        self._lock = threading.Lock()
+        self._counts: dict[tuple[str, Reason], int] = {}
+        self._total = 0
+        self._listener = listener
+
+    def count(self, mesh: str, reason: Reason, text: str = "", n: int = 1) -> None:
+        """Add ``n`` drops of ``mesh`` for ``reason``; ``text`` says what was wrong and what to do."""
+        with self._lock:
+            key = (mesh, reason)
+            self._counts[key] = self._counts.get(key, 0) + n
+            self._total += n
+        if text and self._listener is not None:
+            self._listener(mesh, reason, text)
+
+    @property
+    def total(self) -> int:
+        """All drops since the start."""
+        return self._total
+
+    def by_reason(self) -> dict[Reason, int]:
+        """Reason -> count, summed over the meshes."""
+        sums: dict[Reason, int] = {}
+        for (_, reason), n in self.by_mesh_and_reason().items():
+            sums[reason] = sums.get(reason, 0) + n
+        return sums
+
+    def by_mesh_and_reason(self) -> dict[tuple[str, Reason], int]:
+        """(mesh, reason) -> count: a copy."""
+        with self._lock:
+            return dict(self._counts)

@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Read a mesh file: vertices and triangles as they are numbered in the file, optionally placed by a pose."""
+
+from pathlib import Path
+
+import numpy as np
+
+FORMATS = (".obj", ".ply", ".stl")
+
+
+class MeshFileError(ValueError):
+    """A mesh file that cannot be used; the text names it and the remedy."""
+
+
+def load_mesh(path: str) -> tuple[np.ndarray, np.ndarray]:
+    """(vertices (n,3) float64, faces (F,3) uint32) of an OBJ, PLY or STL file, in the file's own numbering.
+
+    STL repeats the corners of each triangle; equal ones (bit for bit) become one vertex, in order of first use.
+    Polygons become triangle fans. Raises MeshFileError: trimesh missing, no such file, other format, no triangles.
+    """
+    file = Path(path).expanduser()
+    if file.suffix.lower() not in FORMATS:
+        raise MeshFileError(f"{file}: format {file.suffix or '(none)'!r}; use one of {', '.join(FORMATS)}")
+    if not file.is_file():
+        raise MeshFileError(f"{file}: no such file (relative paths start from {Path.cwd()})")
+    try:
+        import trimesh
+    except ImportError as error:
+        raise MeshFileError(f"{file}: reading mesh files needs trimesh; install it with: pip install 'hpccd[meshes]' "
+                            "(or pip install trimesh)") from error
+    try:
+        # process=False: trimesh would otherwise merge and reorder vertices, and the publisher's numbering is the file's.
+        options = {"maintain_order": True, "skip_materials": True} if file.suffix.lower() == ".obj" else {}
+        mesh = trimesh.load(file, force="mesh", process=False, **options)
+    except Exception as error:  # trimesh raises whatever its parsers meet
+        raise MeshFileError(f"{file}: cannot be read: {error}") from error
+    vertices, faces = np.asarray(mesh.vertices, np.float64), np.asarray(mesh.faces)
+    if len(faces) == 0:
+        raise MeshFileError(f"{file}: has no triangles")
+    if file.suffix.lower() == ".stl":
+        vertices, faces = _join_equal(vertices, faces)
+    if not np.isfinite(vertices).all():
+        raise MeshFileError(f"{file}: has a coordinate that is NaN or infinite")
+    return vertices, faces.astype(np.uint32)
+
+
+def place(vertices: np.ndarray, pose: list[float]) -> np.ndarray:
+    """Rotate by the quaternion x y z w, then translate by x y z (pose: 3 + 4 numbers).
+
+    Raises MeshFileError: not 7 numbers, not finite, quaternion not of unit length within 1e-3.
+    """
+    values = np.asarray(pose, np.float64)
+    if values.shape != (7,) or not np.isfinite(values).all():
+        raise MeshFileError(f"pose: needs 7 finite numbers (x y z, quaternion x y z w), got {pose}")
+    shift, quaternion = values[:3], values[3:]
+    length = np.linalg.norm(quaternion)
+    if abs(length - 1.0) > 1e-3:
+        raise MeshFileError(f"pose: the quaternion {pose[3:]} has length {length:.4g}; it must be 1")
+    x, y, z, w = quaternion / length
+    if x == y == z == 0.0:  # no rotation: the file's coordinates stay as they are, bit for bit
+        return vertices + shift if shift.any() else vertices
+    rotation = np.array([
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]])
+    return vertices @ rotation.T + shift
+
+
+def _join_equal(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    # + 0.0 makes -0.0 equal to 0.0 in the comparison.
+    _, first, inverse = np.unique(vertices + 0.0, axis=0, return_index=True, return_inverse=True)
+    order = np.argsort(first)
+    rank = np.empty_like(order)
+    rank[order] = np.arange(len(order))
+    return vertices[first[order]], rank[inverse.reshape(-1)][faces]

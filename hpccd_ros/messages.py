@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the node knows of a message once it is checked: plain records of numpy arrays, no ROS."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class MeshSettings:
+    """How a mesh takes part in the scene (parameters ``mesh.NAME.*``)."""
+
+    name: str
+    static: bool = False
+    self_collision: bool = True
+
+
+@dataclass(frozen=True, eq=False)
+class Topology:
+    """Triangles of one mesh: ``faces`` (F,3) uint32, all below ``n_vertices``."""
+
+    version: int
+    n_vertices: int
+    faces: np.ndarray
+
+    def same_content(self, other: "Topology") -> bool:
+        """Equal but for the version."""
+        return self.n_vertices == other.n_vertices and np.array_equal(self.faces, other.faces)
+
+
+@dataclass(frozen=True, eq=False)
+class MeshFrame:
+    """One vertex message of one mesh.
+
+    ``stamp`` ns, end of the step. ``version``: of the topology it belongs to; None (PointCloud2 has none): the
+    one in force. ``step``: the publisher's number, None where it gives none. ``vertices`` (n,3) float32 or
+    float64, finite. ``received``: time.monotonic() at its arrival. ``topology``: set by the assembler.
+    """
+
+    stamp: int
+    vertices: np.ndarray
+    version: int | None = None
+    step: int | None = None
+    frame_id: str = ""
+    received: float = 0.0
+    topology: Topology | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class SceneFrame:
+    """Positions of all meshes at one time, in the order of the scene (parameter ``meshes``).
+
+    ``fresh``: meshes whose message is used for the first time here. ``received``: of the last message needed.
+    """
+
+    stamp: int
+    step: int | None
+    frame_id: str
+    topologies: tuple[Topology, ...]
+    vertices: tuple[np.ndarray, ...]
+    fresh: tuple[str, ...]
+    received: float
+
+    def same_scene(self, other: "SceneFrame") -> bool:
+        """True if a motion from one to the other exists: the same topology of every mesh."""
+        return all(a is b for a, b in zip(self.topologies, other.topologies, strict=True))
