@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """ROS messages <-> numpy arrays, without copies where the bytes allow it. The only place that knows both.
 
-Array fields are never assigned from numpy: rclpy's setter would walk it element by element (123 ms for 5 MB of
-float32), while ``array.array`` filled from the buffer takes 0.5 ms.
+Array fields are never assigned from numpy: rclpy's setter would walk it element by element (123 ms for 5 MB
+of float32), while ``array.array`` filled from the buffer takes 0.5 ms.
 """
 
 from array import array
@@ -10,14 +10,19 @@ from dataclasses import dataclass
 
 import numpy as np
 from builtin_interfaces.msg import Time
+from hpccd.msg import ContactArray, MeshTopology, MeshVertices
 from sensor_msgs.msg import PointCloud2, PointField
 
-from hpccd.msg import ContactArray, MeshTopology, MeshVertices
 from hpccd_ros.drops import Reason
 from hpccd_ros.messages import Topology
 
 _NS = 1_000_000_000
-_CODES = {np.dtype(np.float32): "f", np.dtype(np.float64): "d", np.dtype(np.uint32): "I", np.dtype(np.uint8): "B"}
+_CODES = {
+    np.dtype(np.float32): "f",
+    np.dtype(np.float64): "d",
+    np.dtype(np.uint32): "I",
+    np.dtype(np.uint8): "B",
+}
 _FIELD_TYPES = {PointField.FLOAT32: np.dtype(np.float32), PointField.FLOAT64: np.dtype(np.float64)}
 
 
@@ -62,8 +67,10 @@ def topology_from_message(message: MeshTopology, max_vertices: int, max_faces: i
     _limit("faces", len(flat) // 3, "max_faces", max_faces)
     _limit("n_vertices", message.n_vertices, "max_vertices", max_vertices)
     if len(flat) and (highest := int(flat.max())) >= message.n_vertices:
-        raise InvalidMessageError(Reason.INDEX_RANGE, f"face {int(flat.argmax()) // 3} names vertex {highest}, "
-                                  f"n_vertices is {message.n_vertices}")
+        raise InvalidMessageError(
+            Reason.INDEX_RANGE,
+            f"face {int(flat.argmax()) // 3} names vertex {highest}, n_vertices is {message.n_vertices}",
+        )
     return Topology(message.version, message.n_vertices, flat.reshape(-1, 3))
 
 
@@ -75,10 +82,14 @@ def vertices_from_message(message: MeshVertices, max_vertices: int) -> np.ndarra
     single, double = message.vertices_f32, message.vertices_f64
     if bool(len(single)) == bool(len(double)):
         which = "both are filled" if len(single) else "both are empty"
-        raise InvalidMessageError(Reason.MALFORMED, f"fill exactly one of vertices_f32 and vertices_f64; {which}")
+        raise InvalidMessageError(
+            Reason.MALFORMED, f"fill exactly one of vertices_f32 and vertices_f64; {which}"
+        )
     flat = np.frombuffer(single, np.float32) if len(single) else np.frombuffer(double, np.float64)
     if len(flat) % 3:
-        raise InvalidMessageError(Reason.MALFORMED, f"vertices has {len(flat)} coordinates, not a multiple of 3")
+        raise InvalidMessageError(
+            Reason.MALFORMED, f"vertices has {len(flat)} coordinates, not a multiple of 3"
+        )
     _limit("vertices", len(flat) // 3, "max_vertices", max_vertices)
     return _finite(flat.reshape(-1, 3))
 
@@ -86,14 +97,16 @@ def vertices_from_message(message: MeshVertices, max_vertices: int) -> np.ndarra
 def vertices_from_cloud(cloud: PointCloud2, max_vertices: int) -> np.ndarray:
     """(n,3) float32 or float64 from the fields x, y, z of a PointCloud2, n = width * height.
 
-    A view where x, y, z fill the points without a gap, else a copy. Fields may come in any order, with padding
-    within points and rows; x, y, z of both types become float64 (exactly).
-    Raises InvalidMessageError: big-endian, fields missing or of another type or out of bounds, too little data,
-    too large, NaN or infinity.
+    A view where x, y, z fill the points without a gap, else a copy. Fields may come in any order, with
+    padding within points and rows; x, y, z of both types become float64 (exactly).
+    Raises InvalidMessageError: big-endian, fields missing or of another type or out of bounds, too little
+    data, too large, NaN or infinity.
     """
     if cloud.is_bigendian:
-        raise InvalidMessageError(Reason.BIG_ENDIAN, "big-endian clouds are not supported; swap the bytes and set "
-                                  "is_bigendian to false")
+        raise InvalidMessageError(
+            Reason.BIG_ENDIAN,
+            "big-endian clouds are not supported; swap the bytes and set is_bigendian to false",
+        )
     offsets, types = zip(*(_cloud_field(cloud, axis) for axis in "xyz"), strict=True)
     count = cloud.width * cloud.height
     _limit("width * height", count, "max_vertices", max_vertices)
@@ -101,19 +114,29 @@ def vertices_from_cloud(cloud: PointCloud2, max_vertices: int) -> np.ndarray:
     # A cloud of one row may leave row_step at 0: there is no second row to step to.
     row_step = cloud.row_step if cloud.height > 1 else max(cloud.row_step, row_bytes)
     if row_step < row_bytes:
-        raise InvalidMessageError(Reason.MALFORMED, f"row_step {row_step} is less than width * point_step = {row_bytes}")
+        raise InvalidMessageError(
+            Reason.MALFORMED, f"row_step {row_step} is less than width * point_step = {row_bytes}"
+        )
     needed = row_step * (cloud.height - 1) + row_bytes if count else 0
     if len(cloud.data) < needed:
-        raise InvalidMessageError(Reason.MALFORMED, f"data has {len(cloud.data)} bytes, {cloud.height} rows of "
-                                  f"{cloud.width} points need {needed}")
+        raise InvalidMessageError(
+            Reason.MALFORMED,
+            f"data has {len(cloud.data)} bytes, {cloud.height} rows of {cloud.width} points need {needed}",
+        )
     if count == 0:
         raise InvalidMessageError(Reason.MALFORMED, "the cloud has no points")
     data = np.frombuffer(cloud.data, np.uint8, needed)
     size = types[0].itemsize
-    if len(set(types)) == 1 and offsets == (0, size, 2 * size) and cloud.point_step == 3 * size and (
-            row_step == row_bytes or cloud.height == 1):
+    if (
+        len(set(types)) == 1
+        and offsets == (0, size, 2 * size)
+        and cloud.point_step == 3 * size
+        and (row_step == row_bytes or cloud.height == 1)
+    ):
         return _finite(data.view(types[0]).reshape(-1, 3))
-    point = np.dtype({"names": list("xyz"), "formats": types, "offsets": offsets, "itemsize": cloud.point_step})
+    point = np.dtype(
+        {"names": list("xyz"), "formats": types, "offsets": offsets, "itemsize": cloud.point_step}
+    )
     rows = np.ndarray((cloud.height, cloud.width), point, data, strides=(row_step, cloud.point_step))
     points = np.empty((cloud.height, cloud.width, 3), np.result_type(*types))
     for axis, name in enumerate("xyz"):
@@ -124,32 +147,45 @@ def vertices_from_cloud(cloud: PointCloud2, max_vertices: int) -> np.ndarray:
 def _cloud_field(cloud: PointCloud2, axis: str) -> tuple[int, np.dtype]:
     field = next((f for f in cloud.fields if f.name == axis), None)
     if field is None:
-        raise InvalidMessageError(Reason.MALFORMED, f"no field {axis!r}; the cloud has "
-                                  f"{', '.join(f.name for f in cloud.fields) or 'none'}")
+        raise InvalidMessageError(
+            Reason.MALFORMED,
+            f"no field {axis!r}; the cloud has {', '.join(f.name for f in cloud.fields) or 'none'}",
+        )
     if field.datatype not in _FIELD_TYPES or field.count > 1:
-        raise InvalidMessageError(Reason.UNSUPPORTED_TYPE, f"field {axis!r} has datatype {field.datatype} and count "
-                                  f"{field.count}; use FLOAT32 (7) or FLOAT64 (8) and count 1")
+        raise InvalidMessageError(
+            Reason.UNSUPPORTED_TYPE,
+            f"field {axis!r} has datatype {field.datatype} and count "
+            f"{field.count}; use FLOAT32 (7) or FLOAT64 (8) and count 1",
+        )
     kind = _FIELD_TYPES[field.datatype]
     if field.offset + kind.itemsize > cloud.point_step:
-        raise InvalidMessageError(Reason.MALFORMED, f"field {axis!r} ends at byte {field.offset + kind.itemsize}, "
-                                  f"point_step is {cloud.point_step}")
+        raise InvalidMessageError(
+            Reason.MALFORMED,
+            f"field {axis!r} ends at byte {field.offset + kind.itemsize}, point_step is {cloud.point_step}",
+        )
     return field.offset, kind
 
 
 def _limit(what: str, size: int, parameter: str, limit: int) -> None:
     if size > limit:
-        raise InvalidMessageError(Reason.TOO_LARGE, f"{what} is {size}, above the limit {limit} (parameter {parameter})")
+        raise InvalidMessageError(
+            Reason.TOO_LARGE, f"{what} is {size}, above the limit {limit} (parameter {parameter})"
+        )
 
 
 def _finite(vertices: np.ndarray) -> np.ndarray:
     finite = np.isfinite(vertices)
     if not finite.all():
         bad = int(np.flatnonzero(~finite.all(axis=1))[0])
-        raise InvalidMessageError(Reason.NOT_FINITE, f"vertex {bad} is {vertices[bad].tolist()}; coordinates must be finite")
+        raise InvalidMessageError(
+            Reason.NOT_FINITE, f"vertex {bad} is {vertices[bad].tolist()}; coordinates must be finite"
+        )
     return vertices
 
 
-def topology_message(faces: np.ndarray, n_vertices: int, *, version: int = 0, stamp_ns: int = 0) -> MeshTopology:
+def topology_message(
+    faces: np.ndarray, n_vertices: int, *, version: int = 0, stamp_ns: int = 0
+) -> MeshTopology:
     """faces: (F,3) integers, indices of the mesh's own vertices."""
     message = MeshTopology(version=version, n_vertices=n_vertices)
     message.header.stamp = ns_to_stamp(stamp_ns)
@@ -157,8 +193,9 @@ def topology_message(faces: np.ndarray, n_vertices: int, *, version: int = 0, st
     return message
 
 
-def vertices_message(vertices: np.ndarray, stamp_ns: int, *, step: int = 0, topology_version: int = 0,
-                     frame_id: str = "") -> MeshVertices:
+def vertices_message(
+    vertices: np.ndarray, stamp_ns: int, *, step: int = 0, topology_version: int = 0, frame_id: str = ""
+) -> MeshVertices:
     """vertices: (n,3) float32 or float64, sent in that precision. stamp_ns: end of the step."""
     message = MeshVertices(step=step, topology_version=topology_version)
     message.header.stamp = ns_to_stamp(stamp_ns)
@@ -186,22 +223,34 @@ class Layout:
     @classmethod
     def of(cls, mesh_names: tuple[str, ...], topologies: tuple[Topology, ...]) -> "Layout":
         """Meshes concatenated in the order given, as hpccd_core.Scene does."""
-        return cls(tuple(mesh_names),
-                   np.cumsum([0] + [t.n_vertices for t in topologies], dtype=np.int64),
-                   np.cumsum([0] + [len(t.faces) for t in topologies], dtype=np.int64))
+        return cls(
+            tuple(mesh_names),
+            np.cumsum([0] + [t.n_vertices for t in topologies], dtype=np.int64),
+            np.cumsum([0] + [len(t.faces) for t in topologies], dtype=np.int64),
+        )
 
 
-def fill_contacts(message: ContactArray, contacts, layout: Layout, *, max_contacts: int = 0) -> None:
+def fill_contacts(
+    message: ContactArray,
+    contacts,
+    layout: Layout,
+    *,
+    max_contacts: int = 0,
+    outputs: tuple[str, ...] = ("points", "normals"),
+) -> None:
     """Write the core's ``Contacts`` into ``message`` (all but header, start, step, accuracy, backend, drops).
 
     max_contacts: 0: all; else only that many of the earliest, still in canonical order (of equal times those
     first in it); ``total``, ``first_toc`` and ``hash`` are of all contacts found.
+    outputs: which of points and normals to send, where the core has computed them.
     """
     n_vf, n_ee = len(contacts.vf), len(contacts.ee)
     total = n_vf + n_ee
     toc = np.concatenate([contacts.vf_toc, contacts.ee_toc])
     vf, ee = contacts.vf, contacts.ee
-    points, normals = (v if v is not None and len(v) == total else None for v in (contacts.points, contacts.normals))
+    points, normals = (
+        v if v is not None and len(v) == total else None for v in (contacts.points, contacts.normals)
+    )
     truncated = 0 < max_contacts < total
     if truncated:
         keep = _earliest(toc, max_contacts)
@@ -215,7 +264,10 @@ def fill_contacts(message: ContactArray, contacts, layout: Layout, *, max_contac
     kind = np.zeros(count, np.uint8)
     kind[n_vf:] = ContactArray.EDGE_EDGE
     mesh_a, mesh_b = np.empty(count, np.uint32), np.empty(count, np.uint32)
-    side_a, side_b = np.full((count, 2), ContactArray.NONE, np.uint32), np.full((count, 2), ContactArray.NONE, np.uint32)
+    side_a, side_b = (
+        np.full((count, 2), ContactArray.NONE, np.uint32),
+        np.full((count, 2), ContactArray.NONE, np.uint32),
+    )
     mesh_a[:n_vf], side_a[:n_vf, 0] = _localise(vf[:, 0], layout.vertex_offsets)
     mesh_b[:n_vf], side_b[:n_vf, 0] = _localise(vf[:, 1], layout.face_offsets)
     mesh_a[n_vf:], side_a[n_vf:] = _localise(ee[:, 0:2], layout.vertex_offsets)
@@ -225,9 +277,9 @@ def fill_contacts(message: ContactArray, contacts, layout: Layout, *, max_contac
     message.kind, message.mesh_a, message.mesh_b = to_field(kind), to_field(mesh_a), to_field(mesh_b)
     message.features_a, message.features_b = to_field(side_a), to_field(side_b)
     message.toc = to_field(toc)
-    if points is not None:
+    if points is not None and "points" in outputs:
         message.points = to_field(points)
-    if normals is not None:
+    if normals is not None and "normals" in outputs:
         message.normals = to_field(normals)
     message.first_toc = float(contacts.first_toc)
     message.total, message.truncated, message.hash = total, truncated, int(contacts.hash)
@@ -273,10 +325,17 @@ def read_contacts(message: ContactArray, layout: Layout) -> SceneContacts:
     side_b = np.frombuffer(message.features_b, np.uint32).reshape(-1, 2)
     toc = np.frombuffer(message.toc, np.float64)
     vertices, faces = layout.vertex_offsets, layout.face_offsets
-    vf = np.stack([side_a[:n_vf, 0] + vertices[mesh_a[:n_vf]], side_b[:n_vf, 0] + faces[mesh_b[:n_vf]]], axis=1)
-    ee = np.concatenate([side_a[n_vf:] + vertices[mesh_a[n_vf:], None],
-                         side_b[n_vf:] + vertices[mesh_b[n_vf:], None]], axis=1)
+    vf = np.stack(
+        [side_a[:n_vf, 0] + vertices[mesh_a[:n_vf]], side_b[:n_vf, 0] + faces[mesh_b[:n_vf]]], axis=1
+    )
+    ee = np.concatenate(
+        [side_a[n_vf:] + vertices[mesh_a[n_vf:], None], side_b[n_vf:] + vertices[mesh_b[n_vf:], None]], axis=1
+    )
     return SceneContacts(
-        vf.astype(np.uint32), toc[:n_vf], ee.astype(np.uint32), toc[n_vf:],
+        vf.astype(np.uint32),
+        toc[:n_vf],
+        ee.astype(np.uint32),
+        toc[n_vf:],
         np.frombuffer(message.points, np.float64).reshape(-1, 3),
-        np.frombuffer(message.normals, np.float64).reshape(-1, 3))
+        np.frombuffer(message.normals, np.float64).reshape(-1, 3),
+    )

@@ -40,8 +40,13 @@ class SceneBuilder:
         """One topology for each mesh, in order. Raises what the core raises."""
         scene = hc.Scene()
         for mesh, topology in zip(self.meshes, topologies, strict=True):
-            scene.add_mesh(mesh.name, topology.faces, n_vertices=topology.n_vertices,
-                           self_collision=mesh.self_collision, static=mesh.static)
+            scene.add_mesh(
+                mesh.name,
+                topology.faces,
+                n_vertices=topology.n_vertices,
+                self_collision=mesh.self_collision,
+                static=mesh.static,
+            )
         for a, b in self.ignored_pairs:
             scene.ignore_pair(a, b)
         return scene
@@ -51,7 +56,9 @@ class SceneBuilder:
 
         One float64 mesh makes the whole float64, which holds the others' float32 exactly.
         """
-        parts = [static_of.vertices[i] if mesh.static else frame.vertices[i] for i, mesh in enumerate(self.meshes)]
+        parts = [
+            static_of.vertices[i] if mesh.static else frame.vertices[i] for i, mesh in enumerate(self.meshes)
+        ]
         return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
 
@@ -68,8 +75,14 @@ def refusal(options: Options) -> str | None:
 
 def make_detector(scene: hc.Scene, options: Options) -> hc.Detector:
     """Detector with these options. Raises what the core raises."""
-    return hc.Detector(scene, accuracy=options.accuracy, backend=options.backend, threads=options.threads,
-                       report=options.report, outputs=options.outputs)
+    return hc.Detector(
+        scene,
+        accuracy=options.accuracy,
+        backend=options.backend,
+        threads=options.threads,
+        report=options.report,
+        outputs=options.outputs,
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,16 +100,24 @@ class Detection:
 
 
 class DetectionThread(threading.Thread):
-    """Takes scene frames from ``mailbox`` and hands each detection to ``on_detection``, until the box is closed.
+    """Takes scene frames from ``mailbox``, hands detections to ``on_detection``, until the box is closed.
 
-    The motion goes from the last frame taken to the new one, so where frames were dropped between them no time is
-    left unwatched. The first frame, and the first after a change of topology, is only a start: ``on_first``.
-    ``options()`` is read before each frame; a change makes a new detector.
+    The motion goes from the last frame taken to the new one, so where frames were dropped between them no
+    time is left unwatched. The first frame, and the first after a change of topology, is only a start:
+    ``on_first``. ``options()`` is read before each frame; a change makes a new detector.
     """
 
-    def __init__(self, builder: SceneBuilder, mailbox: Mailbox[SceneFrame], drops: DropCounter, *,
-                 options: Callable[[], Options], on_detection: Callable[[Detection], None],
-                 on_first: Callable[[SceneFrame], None], on_failure: Callable[[SceneFrame, Exception], None]) -> None:
+    def __init__(
+        self,
+        builder: SceneBuilder,
+        mailbox: Mailbox[SceneFrame],
+        drops: DropCounter,
+        *,
+        options: Callable[[], Options],
+        on_detection: Callable[[Detection], None],
+        on_first: Callable[[SceneFrame], None],
+        on_failure: Callable[[SceneFrame, Exception], None],
+    ) -> None:
         super().__init__(name="detection", daemon=True)
         self._builder = builder
         self._mailbox = mailbox
@@ -111,9 +132,11 @@ class DetectionThread(threading.Thread):
         self._detector: hc.Detector | None = None
         self._detector_options: Options | None = None
         self._start: SceneFrame | None = None
+        self.working_on: SceneFrame | None = None
 
     def run(self) -> None:
         while (frame := self._mailbox.take()) is not None:
+            self.working_on = frame
             start, self._start = self._start, frame
             try:
                 if start is None or not start.same_scene(frame) or frame.stamp <= start.stamp:
@@ -124,6 +147,7 @@ class DetectionThread(threading.Thread):
                 for mesh in frame.fresh:
                     self._drops.count(mesh, Reason.DETECTION_FAILED)
                 self._on_failure(frame, error)
+            self.working_on = None
 
     def _detect(self, start: SceneFrame, end: SceneFrame) -> Detection:
         if self._scene_of is None or not self._scene_of.same_scene(end):
@@ -135,7 +159,17 @@ class DetectionThread(threading.Thread):
             self._detector = make_detector(self._scene, options)
             self._detector_options = options
         began = time.perf_counter()
-        contacts = self._detector.detect(self._builder.concatenate(start, end), self._builder.concatenate(end, end))
+        contacts = self._detector.detect(
+            self._builder.concatenate(start, end), self._builder.concatenate(end, end)
+        )
         detect_ms = 1e3 * (time.perf_counter() - began)
-        return Detection(start, end, contacts, self._layout, options, detect_ms,
-                         dict(self._detector.profile), dict(self._detector.stats))
+        return Detection(
+            start,
+            end,
+            contacts,
+            self._layout,
+            options,
+            detect_ms,
+            dict(self._detector.profile),
+            dict(self._detector.stats),
+        )

@@ -49,9 +49,15 @@ class Metrics:
             self.first_frames += 1
             self.answered += messages
 
-    def detected(self, messages: int, latency_ms: float, detect_ms: float, profile: Mapping[str, float],
-                 last: Mapping[str, object]) -> None:
-        """One step was answered. latency_ms: from the arrival of its last message to the published contacts."""
+    def detected(
+        self,
+        messages: int,
+        latency_ms: float,
+        detect_ms: float,
+        profile: Mapping[str, float],
+        last: Mapping[str, object],
+    ) -> None:
+        """One step was answered. latency_ms: from the arrival of its last message to its contacts sent."""
         with self._lock:
             self.detections += 1
             self.answered += messages
@@ -73,10 +79,16 @@ class Metrics:
         """A consistent copy of all of it."""
         with self._lock:
             return {
-                "received": dict(self.received), "answered": self.answered, "detections": self.detections,
-                "first_frames": self.first_frames, "failures": self.failures, "failing": self._failing,
-                "last_failure": self.last_failure, "last": dict(self.last),
-                "latency_ms": list(self._latency_ms), "detect_ms": list(self._detect_ms),
+                "received": dict(self.received),
+                "answered": self.answered,
+                "detections": self.detections,
+                "first_frames": self.first_frames,
+                "failures": self.failures,
+                "failing": self._failing,
+                "last_failure": self.last_failure,
+                "last": dict(self.last),
+                "latency_ms": list(self._latency_ms),
+                "detect_ms": list(self._detect_ms),
                 "transport_ms": list(self._transport_ms),
                 "stages": {stage: float(np.mean(values)) for stage, values in self._stages.items()},
             }
@@ -108,12 +120,26 @@ class Reporter:
         self._topologies_refused = 0
         self._failures = 0
 
-    def report(self, stamp: Time, *, state: str, waiting: int, restarts: int, last_refusal: str,
-               links: Mapping[str, int], warnings: list[str], service: Mapping[str, int]) -> DiagnosticArray:
-        """Message of four statuses: frames, detection, service, process."""
+    def report(
+        self,
+        stamp: Time,
+        *,
+        state: str,
+        waiting: int,
+        restarts: int,
+        static_taken: int,
+        last_refusal: str,
+        links: Mapping[str, int],
+        warnings: list[str],
+        service: Mapping[str, int],
+    ) -> DiagnosticArray:
+        """static_taken: accepted messages of static meshes, which count as answered.
+
+        Message of four statuses: frames, detection, service, process."""
         now = time.monotonic()
         period, self._time = max(now - self._time, 1e-9), now
         data = self._metrics.snapshot()
+        data["answered"] += static_taken
         out = DiagnosticArray()
         out.header.stamp = stamp
         out.status = [
@@ -124,8 +150,16 @@ class Reporter:
         ]
         return out
 
-    def _frames(self, data: dict, period: float, waiting: int, restarts: int, last_refusal: str,
-                links: Mapping[str, int], warnings: list[str]) -> DiagnosticStatus:
+    def _frames(
+        self,
+        data: dict,
+        period: float,
+        waiting: int,
+        restarts: int,
+        last_refusal: str,
+        links: Mapping[str, int],
+        warnings: list[str],
+    ) -> DiagnosticStatus:
         dropped, topologies_refused = self._drops.total, self._refused.total
         new = dropped - self._dropped
         new_topologies = topologies_refused - self._topologies_refused
@@ -134,8 +168,14 @@ class Reporter:
             values[f"received.{mesh}"] = count
             values[f"rate_hz.{mesh}"] = f"{(count - self._received.get(mesh, 0)) / period:.2f}"
         came = sum(data["received"].values()) - sum(self._received.values())
-        values |= {"received": sum(data["received"].values()), "answered": data["answered"], "waiting": waiting,
-                   "dropped": dropped, "restarts": restarts, "topologies_refused": topologies_refused}
+        values |= {
+            "received": sum(data["received"].values()),
+            "answered": data["answered"],
+            "waiting": waiting,
+            "dropped": dropped,
+            "restarts": restarts,
+            "topologies_refused": topologies_refused,
+        }
         for reason, count in sorted(self._drops.by_reason().items()):
             values[f"dropped.{reason}"] = count
         for (mesh, reason), count in sorted(self._drops.by_mesh_and_reason().items()):
@@ -146,7 +186,11 @@ class Reporter:
         for stage, text in percentiles(data["transport_ms"]).items():
             values[f"transport_ms.{stage}"] = text
         values["last_refusal"] = last_refusal
-        self._received, self._dropped, self._topologies_refused = data["received"], dropped, topologies_refused
+        self._received, self._dropped, self._topologies_refused = (
+            data["received"],
+            dropped,
+            topologies_refused,
+        )
         notes = list(warnings)
         if new:
             notes.insert(0, f"{new} frames dropped")
@@ -155,14 +199,20 @@ class Reporter:
         if notes:
             return self._status("frames", DiagnosticStatus.WARN, "; ".join(notes), values)
         if not came:
-            return self._status("frames", DiagnosticStatus.STALE, f"no frames in the last {period:.1f} s", values)
+            return self._status(
+                "frames", DiagnosticStatus.STALE, f"no frames in the last {period:.1f} s", values
+            )
         return self._status("frames", DiagnosticStatus.OK, f"{came / period:.1f} frames a second", values)
 
     def _detection(self, data: dict, period: float, state: str) -> DiagnosticStatus:
         rate = (data["detections"] - self._detections) / period
         self._detections = data["detections"]
-        values: dict[str, object] = {"rate_hz": f"{rate:.2f}", "detections": data["detections"],
-                                     "first_frames": data["first_frames"], "failures": data["failures"]}
+        values: dict[str, object] = {
+            "rate_hz": f"{rate:.2f}",
+            "detections": data["detections"],
+            "first_frames": data["first_frames"],
+            "failures": data["failures"],
+        }
         for kind in ("latency_ms", "detect_ms"):
             for name, text in percentiles(data[kind]).items():
                 values[f"{kind}.{name}"] = text
@@ -171,13 +221,23 @@ class Reporter:
         values |= data["last"]
         values["last_failure"] = data["last_failure"]
         if data["failing"]:
-            return self._status("detection", DiagnosticStatus.ERROR, f"failed: {data['last_failure']}", values)
-        return self._status("detection", DiagnosticStatus.OK, f"{rate:.1f} detections a second ({state})", values)
+            return self._status(
+                "detection", DiagnosticStatus.ERROR, f"failed: {data['last_failure']}", values
+            )
+        return self._status(
+            "detection", DiagnosticStatus.OK, f"{rate:.1f} detections a second ({state})", values
+        )
 
-    def _status(self, part: str, level: bytes, message: str, values: Mapping[str, object]) -> DiagnosticStatus:
+    def _status(
+        self, part: str, level: bytes, message: str, values: Mapping[str, object]
+    ) -> DiagnosticStatus:
         return DiagnosticStatus(
-            level=level, name=f"{self._node_name}: {part}", message=message, hardware_id="hpccd",
-            values=[KeyValue(key=key, value=str(value)) for key, value in values.items()])
+            level=level,
+            name=f"{self._node_name}: {part}",
+            message=message,
+            hardware_id="hpccd",
+            values=[KeyValue(key=key, value=str(value)) for key, value in values.items()],
+        )
 
 
 def _memory() -> dict[str, str]:

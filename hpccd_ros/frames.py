@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""From single mesh frames to frames of the whole scene: versions, order of stamps, matching. No ROS, no threads.
+"""From frames of single meshes to frames of the scene: versions, order, matching. No ROS, no threads.
 
 Rules, in the order in which they are applied to a vertex message:
 
@@ -47,15 +47,27 @@ class FrameAssembler:
     meshes: in the order of the scene; at least one must not be static.
     drops: counts vertex messages that are not used. refused: counts topologies that are not taken.
     max_pending: bound on the frames a mesh that wait for a topology or for other meshes.
-    restart_after: increasing stamps in a row, all before the last accepted one, that make a restart; 0: never.
+    restart_after: increasing stamps in a row, all before the last accepted one, that make a restart; 0:
+    never.
     tolerance: None: stamps must be equal; else the largest difference in ns to the first deforming mesh.
     frame_id: what all messages must carry; "": what the first one carries.
     on_restart: called with a text when the stream starts anew.
+
+    Counters: ``restarts``; ``static_taken``: accepted messages of static meshes.
     """
 
-    def __init__(self, meshes: list[MeshSettings], drops: DropCounter, refused: DropCounter, *,
-                 max_pending: int = 8, restart_after: int = 5, tolerance: int | None = None,
-                 frame_id: str = "", on_restart: Callable[[str], None] = lambda text: None) -> None:
+    def __init__(
+        self,
+        meshes: list[MeshSettings],
+        drops: DropCounter,
+        refused: DropCounter,
+        *,
+        max_pending: int = 8,
+        restart_after: int = 5,
+        tolerance: int | None = None,
+        frame_id: str = "",
+        on_restart: Callable[[str], None] = lambda text: None,
+    ) -> None:
         deforming = [m.name for m in meshes if not m.static]
         if not deforming:
             raise ValueError("meshes: at least one mesh must not be static, or nothing ever moves")
@@ -69,9 +81,13 @@ class FrameAssembler:
         self._frame_id = frame_id
         self._on_restart = on_restart
         self.restarts = 0
+        self.static_taken = 0
+        self._completed = 0
         self._matcher: Matcher = (
-            ExactMatcher(deforming, drops, max_pending) if tolerance is None
-            else NearestMatcher(deforming, drops, max_pending, tolerance))
+            ExactMatcher(deforming, drops, max_pending)
+            if tolerance is None
+            else NearestMatcher(deforming, drops, max_pending, tolerance)
+        )
 
     @property
     def waiting(self) -> int:
@@ -102,12 +118,19 @@ class FrameAssembler:
                 if topology.same_content(current):
                     return []
                 if not new_publisher:
-                    self._refused.count(mesh, Reason.TOPOLOGY_CONFLICT, f"version {topology.version} is in force "
-                                        "with other content; count the version up with each change")
+                    self._refused.count(
+                        mesh,
+                        Reason.TOPOLOGY_CONFLICT,
+                        f"version {topology.version} is in force "
+                        "with other content; count the version up with each change",
+                    )
                     return []
             elif topology.version < current.version and not new_publisher:
-                self._refused.count(mesh, Reason.OLD_TOPOLOGY,
-                                    f"version {topology.version} is older than {current.version}, now in force")
+                self._refused.count(
+                    mesh,
+                    Reason.OLD_TOPOLOGY,
+                    f"version {topology.version} is older than {current.version}, now in force",
+                )
                 return []
         state.topology = topology
         state.static_frame = None
@@ -120,7 +143,7 @@ class FrameAssembler:
         return [] if state is None else self._route(state, frame, new_publisher)
 
     def clear(self, reason: Reason) -> None:
-        """Forget all frames (not the topologies and static positions); what waits is counted as ``reason``."""
+        """Forget all frames (not topologies and static positions); what waits is counted as ``reason``."""
         self._matcher.clear(reason)
         for state in self._meshes.values():
             for _ in state.early:
@@ -132,8 +155,9 @@ class FrameAssembler:
     def _state(self, mesh: str, counter: DropCounter) -> _MeshState | None:
         state = self._meshes.get(mesh)
         if state is None:
-            counter.count(mesh, Reason.UNKNOWN_MESH,
-                          f"no such mesh; parameter meshes has {', '.join(self._meshes)}")
+            counter.count(
+                mesh, Reason.UNKNOWN_MESH, f"no such mesh; parameter meshes has {', '.join(self._meshes)}"
+            )
         return state
 
     def _route(self, state: _MeshState, frame: MeshFrame, new_publisher: bool) -> list[SceneFrame]:
@@ -143,12 +167,20 @@ class FrameAssembler:
             self._hold(state, frame)
             return []
         if frame.version is not None and frame.version < topology.version:
-            self._drops.count(mesh, Reason.OLD_TOPOLOGY, f"vertices belong to topology version {frame.version}, "
-                              f"version {topology.version} is in force")
+            self._drops.count(
+                mesh,
+                Reason.OLD_TOPOLOGY,
+                f"vertices belong to topology version {frame.version}, "
+                f"version {topology.version} is in force",
+            )
             return []
         if len(frame.vertices) != topology.n_vertices:
-            self._drops.count(mesh, Reason.WRONG_COUNT, f"{len(frame.vertices)} vertices, topology version "
-                              f"{topology.version} has {topology.n_vertices}")
+            self._drops.count(
+                mesh,
+                Reason.WRONG_COUNT,
+                f"{len(frame.vertices)} vertices, topology version "
+                f"{topology.version} has {topology.n_vertices}",
+            )
             return []
         if not self._fits_frame_id(mesh, frame.frame_id):
             return []
@@ -167,8 +199,12 @@ class FrameAssembler:
         if len(state.early) > state.max_early:
             lost = state.early.popleft()
             version = "" if lost.version is None else f" version {lost.version}"
-            self._drops.count(mesh, Reason.NO_TOPOLOGY, f"topology{version} has not come; publish it on "
-                              f"meshes/{mesh}/topology (reliable, transient local) before the vertices")
+            self._drops.count(
+                mesh,
+                Reason.NO_TOPOLOGY,
+                f"topology{version} has not come; publish it on "
+                f"meshes/{mesh}/topology (reliable, transient local) before the vertices",
+            )
 
     def _fits_frame_id(self, mesh: str, frame_id: str) -> bool:
         if not frame_id or frame_id == self._frame_id:
@@ -176,14 +212,19 @@ class FrameAssembler:
         if not self._frame_id:
             self._frame_id = frame_id
             return True
-        self._drops.count(mesh, Reason.FRAME_ID, f"frame_id {frame_id!r}, the scene is in {self._frame_id!r}; "
-                          "publish all meshes in one coordinate frame")
+        self._drops.count(
+            mesh,
+            Reason.FRAME_ID,
+            f"frame_id {frame_id!r}, the scene is in {self._frame_id!r}; "
+            "publish all meshes in one coordinate frame",
+        )
         return False
 
     def _take_static(self, state: _MeshState, frame: MeshFrame) -> list[SceneFrame]:
         known = state.static_frame
         if known is None or not np.array_equal(known.vertices, frame.vertices):
             state.static_frame = frame
+        self.static_taken += 1
         return []
 
     def _in_order(self, state: _MeshState, frame: MeshFrame, new_publisher: bool) -> bool:
@@ -191,18 +232,25 @@ class FrameAssembler:
         if last is None or frame.stamp > last:
             return True
         if frame.stamp == last and not new_publisher:
-            self._drops.count(mesh, Reason.REPEATED, f"stamp {frame.stamp} ns came before; "
-                              "each frame needs a later stamp than the one before")
+            self._drops.count(
+                mesh,
+                Reason.REPEATED,
+                f"stamp {frame.stamp} ns came before; each frame needs a later stamp than the one before",
+            )
             return False
         state.backward_run = state.backward_run + 1 if frame.stamp > state.last_backward else 1
         state.last_backward = frame.stamp
         enough = self.restart_after > 0 and state.backward_run >= self.restart_after
         if not (new_publisher or enough):
-            self._drops.count(mesh, Reason.BACKWARD, f"stamp {frame.stamp} ns is before the last one, {last} ns")
+            self._drops.count(
+                mesh, Reason.BACKWARD, f"stamp {frame.stamp} ns is before the last one, {last} ns"
+            )
             return False
         self.restarts += 1
         self.clear(Reason.RESTART)
-        self._on_restart(f"mesh {mesh} goes on from stamp {frame.stamp} ns after {last} ns: taken as a restart")
+        self._on_restart(
+            f"mesh {mesh} goes on from stamp {frame.stamp} ns after {last} ns: taken as a restart"
+        )
         return True
 
     def _complete(self, match: Match) -> list[SceneFrame]:
@@ -211,13 +259,25 @@ class FrameAssembler:
             frame = state.static_frame if state.settings.static else match.frames[name]
             if frame is None:
                 for fresh in match.fresh:
-                    self._drops.count(fresh, Reason.STATIC_MISSING, f"static mesh {name} has no positions yet; "
-                                      f"publish them once or give a file (parameter mesh.{name}.file)")
+                    self._drops.count(
+                        fresh,
+                        Reason.STATIC_MISSING,
+                        f"static mesh {name} has no positions yet; "
+                        f"publish them once or give a file (parameter mesh.{name}.file)",
+                    )
                 return []
             frames.append(frame)
         moving = [match.frames[n] for n in self._meshes if n in match.frames]
-        step = next((f.step for f in moving if f.step is not None), None)
-        return [SceneFrame(
-            stamp=match.stamp, step=step, frame_id=self._frame_id,
-            topologies=tuple(f.topology for f in frames), vertices=tuple(f.vertices for f in frames),
-            fresh=match.fresh, received=max(f.received for f in moving))]
+        step = next((f.step for f in moving if f.step is not None), self._completed)
+        self._completed += 1
+        return [
+            SceneFrame(
+                stamp=match.stamp,
+                step=step,
+                frame_id=self._frame_id,
+                topologies=tuple(f.topology for f in frames),
+                vertices=tuple(f.vertices for f in frames),
+                fresh=match.fresh,
+                received=max(f.received for f in moving),
+            )
+        ]

@@ -47,5 +47,7 @@ class Mailbox(Generic[T]):
             self._changed.notify_all()
             return left
 
-    def __len__(self) -> int:
-        return len(self._items)
+    def items(self) -> list[T]:
+        """What is in the box: a copy."""
+        with self._changed:
+            return list(self._items)

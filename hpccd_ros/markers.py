@@ -13,12 +13,20 @@ _EDGE_EDGE = ColorRGBA(r=0.0, g=0.45, b=0.70, a=1.0)
 _NORMAL_LENGTH = 10.0  # in point diameters
 
 
-def contact_markers(points: np.ndarray, normals: np.ndarray, n_vertex_face: int, *, stamp: Time, frame_id: str,
-                    size: float, limit: int) -> MarkerArray:
-    """Three markers, always all of them so that old ones disappear: vertex-face, edge-edge (points), normals (lines).
+def contact_markers(
+    points: np.ndarray,
+    normals: np.ndarray,
+    n_vertex_face: int,
+    *,
+    stamp: Time,
+    frame_id: str,
+    size: float,
+    limit: int,
+) -> MarkerArray:
+    """Always three markers, so that old ones disappear: vertex-face, edge-edge (points), normals (lines).
 
-    points, normals: (N,3), the first ``n_vertex_face`` of vertex-face contacts. limit: most contacts drawn, taken
-    evenly from the whole list.
+    points, normals: (N,3), the first ``n_vertex_face`` of vertex-face contacts. limit: most contacts drawn,
+    taken evenly from the whole list.
     """
     chosen = np.arange(len(points))
     if len(points) > limit:
@@ -27,16 +35,35 @@ def contact_markers(points: np.ndarray, normals: np.ndarray, n_vertex_face: int,
     at = points[chosen]
     tips = at + _NORMAL_LENGTH * size * normals[chosen]
     lines = np.stack([at, tips], axis=1).reshape(-1, 3)
-    spheres = [_marker(i, name, Marker.POINTS, stamp, frame_id, size, colour, at[mask])
-               for i, (name, colour, mask) in enumerate(
-                   [("vertex_face", _VERTEX_FACE, is_vf), ("edge_edge", _EDGE_EDGE, ~is_vf)])]
-    normal = _marker(2, "normals", Marker.LINE_LIST, stamp, frame_id, 0.2 * size, ColorRGBA(r=0.3, g=0.3, b=0.3, a=1.0),
-                     lines)
+    spheres = [
+        _marker(i, name, Marker.POINTS, stamp, frame_id, size, colour, at[mask])
+        for i, (name, colour, mask) in enumerate(
+            [("vertex_face", _VERTEX_FACE, is_vf), ("edge_edge", _EDGE_EDGE, ~is_vf)]
+        )
+    ]
+    normal = _marker(
+        2,
+        "normals",
+        Marker.LINE_LIST,
+        stamp,
+        frame_id,
+        0.2 * size,
+        ColorRGBA(r=0.3, g=0.3, b=0.3, a=1.0),
+        lines,
+    )
     return MarkerArray(markers=[*spheres, normal])
 
 
-def _marker(identity: int, namespace: str, kind: int, stamp: Time, frame_id: str, size: float, colour: ColorRGBA,
-            points: np.ndarray) -> Marker:
+def _marker(
+    identity: int,
+    namespace: str,
+    kind: int,
+    stamp: Time,
+    frame_id: str,
+    size: float,
+    colour: ColorRGBA,
+    points: np.ndarray,
+) -> Marker:
     # An empty list of points is an error in RViz: delete the marker instead.
     marker = Marker(ns=namespace, id=identity, type=kind, action=Marker.ADD if len(points) else Marker.DELETE)
     marker.header.stamp = stamp

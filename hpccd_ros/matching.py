@@ -123,9 +123,12 @@ class NearestMatcher:
             nearest = {m: self._nearest(m, stamp) for m in self._others}
             far = [m for m, f in nearest.items() if abs(f.stamp - stamp) > self._tolerance]
             if far:
-                self._drops.count(self._reference, Reason.INCOMPLETE,
-                                  f"stamp {stamp} ns has no frame of {', '.join(far)} within the tolerance "
-                                  f"of {self._tolerance} ns (parameter stamp_tolerance)")
+                self._drops.count(
+                    self._reference,
+                    Reason.INCOMPLETE,
+                    f"stamp {stamp} ns has no frame of {', '.join(far)} within the tolerance "
+                    f"of {self._tolerance} ns (parameter stamp_tolerance)",
+                )
                 continue
             fresh = [self._reference] + [m for m, f in nearest.items() if id(f) not in self._used]
             self._used.update(map(id, nearest.values()))

@@ -15,8 +15,9 @@ class MeshFileError(ValueError):
 def load_mesh(path: str) -> tuple[np.ndarray, np.ndarray]:
     """(vertices (n,3) float64, faces (F,3) uint32) of an OBJ, PLY or STL file, in the file's own numbering.
 
-    STL repeats the corners of each triangle; equal ones (bit for bit) become one vertex, in order of first use.
-    Polygons become triangle fans. Raises MeshFileError: trimesh missing, no such file, other format, no triangles.
+    STL repeats the corners of each triangle; equal ones (bit for bit) become one vertex, in order of first
+    use. Polygons become triangle fans. Raises MeshFileError: trimesh missing, no such file, other format, no
+    triangles.
     """
     file = Path(path).expanduser()
     if file.suffix.lower() not in FORMATS:
@@ -26,10 +27,13 @@ def load_mesh(path: str) -> tuple[np.ndarray, np.ndarray]:
     try:
         import trimesh
     except ImportError as error:
-        raise MeshFileError(f"{file}: reading mesh files needs trimesh; install it with: pip install 'hpccd[meshes]' "
-                            "(or pip install trimesh)") from error
+        raise MeshFileError(
+            f"{file}: reading mesh files needs trimesh; install it with: pip install 'hpccd[meshes]' "
+            "(or pip install trimesh)"
+        ) from error
     try:
-        # process=False: trimesh would otherwise merge and reorder vertices, and the publisher's numbering is the file's.
+        # process=False: trimesh would merge and reorder vertices, and publishers number them as the file
+        # does.
         options = {"maintain_order": True, "skip_materials": True} if file.suffix.lower() == ".obj" else {}
         mesh = trimesh.load(file, force="mesh", process=False, **options)
     except Exception as error:  # trimesh raises whatever its parsers meet
@@ -59,10 +63,13 @@ def place(vertices: np.ndarray, pose: list[float]) -> np.ndarray:
     x, y, z, w = quaternion / length
     if x == y == z == 0.0:  # no rotation: the file's coordinates stay as they are, bit for bit
         return vertices + shift if shift.any() else vertices
-    rotation = np.array([
-        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]])
+    rotation = np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )
     return vertices @ rotation.T + shift
 
 

@@ -32,9 +32,9 @@ class Topology:
 class MeshFrame:
     """One vertex message of one mesh.
 
-    ``stamp`` ns, end of the step. ``version``: of the topology it belongs to; None (PointCloud2 has none): the
-    one in force. ``step``: the publisher's number, None where it gives none. ``vertices`` (n,3) float32 or
-    float64, finite. ``received``: time.monotonic() at its arrival. ``topology``: set by the assembler.
+    ``stamp`` ns, end of the step. ``version``: of the topology it belongs to; None (PointCloud2 has none):
+    the one in force. ``step``: the publisher's number, None where it gives none. ``vertices`` (n,3) float32
+    or float64, finite. ``received``: time.monotonic() at its arrival. ``topology``: set by the assembler.
     """
 
     stamp: int
@@ -50,11 +50,12 @@ class MeshFrame:
 class SceneFrame:
     """Positions of all meshes at one time, in the order of the scene (parameter ``meshes``).
 
+    ``step``: of the first mesh that gives one, else a running number of complete frames.
     ``fresh``: meshes whose message is used for the first time here. ``received``: of the last message needed.
     """
 
     stamp: int
-    step: int | None
+    step: int
     frame_id: str
     topologies: tuple[Topology, ...]
     vertices: tuple[np.ndarray, ...]

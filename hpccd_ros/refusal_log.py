@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tell of refused messages in the log, without flooding it: a publisher in error repeats it at its full rate."""
+"""Log refused messages without flooding the log: a publisher in error repeats it at its full rate."""
 
 import time
 from collections.abc import Callable
@@ -8,10 +8,11 @@ from hpccd_ros.drops import Reason
 
 
 class RefusalLog:
-    """Hands on the first text of each (mesh, reason), then one every ``period`` s with how many came between."""
+    """Hands on the first text of each (mesh, reason), then one every ``period`` s."""
 
-    def __init__(self, warn: Callable[[str], None], period: float = 10.0,
-                 clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(
+        self, warn: Callable[[str], None], period: float = 10.0, clock: Callable[[], float] = time.monotonic
+    ) -> None:
         self._warn = warn
         self._period = period
         self._clock = clock

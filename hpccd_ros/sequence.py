@@ -5,19 +5,25 @@
 class SequenceWatch:
     """Follows the publication sequence numbers that come with the messages of one topic.
 
-    A reader's history that is overwritten before the node gets to it is no "lost message" to DDS: only the gap in
-    these numbers shows it.
+    A reader's history that is overwritten before the node gets to it is no "lost message" to DDS: only the
+    gap in these numbers shows it.
     """
 
     def __init__(self) -> None:
         self._last: int | None = None
+        self._seen_any = False
+
+    def new_publisher(self) -> None:
+        """A publisher came: its numbers have nothing to do with those before."""
+        self._last = None
 
     def next(self, number: int) -> tuple[int, bool]:
-        """(messages missing before this one, whether it comes from a new publisher).
+        """(messages missing before this one, whether it is the first of another publisher).
 
         A number that does not grow means another publisher, which counts from the start.
         """
         last, self._last = self._last, number
+        first, self._seen_any = not self._seen_any, True
         if last is None:
-            return 0, False
+            return 0, not first
         return (number - last - 1, False) if number > last else (0, True)

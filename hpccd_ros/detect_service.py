@@ -1,0 +1,215 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Service ``~/detect``: two snapshots in, contacts out; computed outside of the executor."""
+
+import math
+import threading
+from collections import Counter
+from collections.abc import Callable
+from concurrent.futures import CancelledError, ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from hpccd.msg import ContactArray, MeshVertices
+from hpccd.srv import Detect
+from rclpy.clock import Clock, ClockType
+from rclpy.node import Node
+from rclpy.task import Future
+
+from hpccd_ros import convert
+from hpccd_ros.detection import CORE_ERRORS, Options, SceneBuilder, make_detector
+from hpccd_ros.messages import MeshSettings, Topology
+
+
+class RequestError(ValueError):
+    """A request that cannot be answered; the text says what to mend."""
+
+
+@dataclass(frozen=True)
+class NodeScene:
+    """What the node itself knows at the time of a request: its meshes and the topologies in force."""
+
+    meshes: dict[str, MeshSettings]
+    ignored_pairs: tuple[tuple[str, str], ...]
+    topologies: dict[str, Topology | None]
+
+
+class DetectService:
+    """Answers ``detect_jobs`` requests at a time; ``detect_waiting`` more may wait, the rest is refused.
+
+    The core cannot be interrupted: after its time limit a request is answered, but its computation goes on
+    and holds its place until it ends.
+    scene: what the node knows, asked in the executor at each request; a text instead: why it cannot answer
+    now.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        settings: dict[str, Any],
+        options: Callable[[], Options],
+        scene: Callable[[], NodeScene | str],
+    ) -> None:
+        self._node = node
+        self._settings = settings
+        self._options = options
+        self._scene = scene
+        self._capacity = settings["detect_jobs"] + settings["detect_waiting"]
+        self._pool = ThreadPoolExecutor(settings["detect_jobs"], thread_name_prefix="detect")
+        self._lock = threading.Lock()
+        self._open = 0
+        self.counts: Counter = Counter(answered=0, refused=0, busy=0, timed_out=0, failed=0, open=0)
+        self._service = node.create_service(Detect, "~/detect", self._answer)
+
+    def close(self) -> None:
+        self._node.destroy_service(self._service)
+        self._pool.shutdown(wait=False, cancel_futures=True)
+
+    async def _answer(self, request: Detect.Request, response: Detect.Response) -> Detect.Response:
+        try:
+            limit = self._time_limit(request)
+            scene = self._scene()
+            if isinstance(scene, str):
+                raise RequestError(scene)
+        except RequestError as error:
+            return self._refuse(response, "refused", str(error))
+        if not self._enter():
+            return self._refuse(
+                response,
+                "busy",
+                f"busy: {self._capacity} requests are being computed or wait "
+                "(parameters detect_jobs, detect_waiting); try again later",
+            )
+        settled = Future(executor=self._node.executor)
+
+        def settle(_: Any = None) -> None:
+            if not settled.done():
+                settled.set_result(None)
+            if (executor := self._node.executor) is not None:
+                executor.wake()  # a task that awaits is only looked at when the executor wakes up
+
+        job = self._pool.submit(self._compute, request, scene, self._options())
+        job.add_done_callback(self._leave)
+        job.add_done_callback(settle)
+        timer = self._node.create_timer(limit, settle, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        await settled
+        self._node.destroy_timer(timer)
+        if not job.done():
+            job.cancel()
+            return self._refuse(
+                response,
+                "timed_out",
+                f"time limit of {limit:g} s passed before the answer was ready; "
+                "ask for less (report first), or set a longer time_limit",
+            )
+        try:
+            response.contacts = job.result()
+        except RequestError as error:
+            return self._refuse(response, "refused", str(error))
+        except (*CORE_ERRORS, CancelledError) as error:
+            return self._refuse(response, "failed", f"{type(error).__name__}: {error}")
+        response.success = True
+        response.message = f"{response.contacts.total} contacts"
+        self.counts["answered"] += 1
+        return response
+
+    def _refuse(self, response: Detect.Response, kind: str, text: str) -> Detect.Response:
+        self.counts[kind] += 1
+        response.success, response.message = False, text
+        return response
+
+    def _enter(self) -> bool:
+        with self._lock:
+            if self._open >= self._capacity:
+                return False
+            self._open += 1
+            self.counts["open"] = self._open
+            return True
+
+    def _leave(self, _: Any) -> None:
+        with self._lock:
+            self._open -= 1
+            self.counts["open"] = self._open
+
+    def _time_limit(self, request: Detect.Request) -> float:
+        limit = request.time_limit or self._settings["detect_time_limit"]
+        if not (math.isfinite(limit) and limit > 0):
+            raise RequestError(
+                f"time_limit: {request.time_limit} must be positive and finite, or 0 for the node's default"
+            )
+        return limit
+
+    def _compute(self, request: Detect.Request, scene: NodeScene, options: Options) -> ContactArray:
+        names = list(request.mesh_names) or list(scene.meshes)
+        if not names:
+            raise RequestError("mesh_names: empty, and the node has no meshes of its own")
+        if len(set(names)) != len(names):
+            raise RequestError(f"mesh_names: names must differ, got {', '.join(names)}")
+        for field in ("topologies", "start", "end"):
+            given = len(getattr(request, field))
+            if given != len(names) and not (field == "topologies" and given == 0):
+                raise RequestError(f"{field}: {given} entries for {len(names)} meshes ({', '.join(names)})")
+        topologies = tuple(self._topology(request, scene, i, name) for i, name in enumerate(names))
+        start = self._vertices("start", names, request.start, topologies)
+        end = self._vertices("end", names, request.end, topologies)
+        options = replace(
+            options, accuracy=request.accuracy or options.accuracy, report=request.report or "all"
+        )
+        builder = SceneBuilder(
+            tuple(scene.meshes.get(name, MeshSettings(name)) for name in names),
+            tuple(pair for pair in scene.ignored_pairs if set(pair) <= set(names)),
+        )
+        detector = make_detector(builder.build(topologies), options)
+        contacts = detector.detect(start, end)
+        message = ContactArray(accuracy=options.accuracy, backend=options.backend)
+        message.header = request.end[0].header
+        message.start = request.start[0].header.stamp
+        message.step = request.end[0].step
+        convert.fill_contacts(
+            message,
+            contacts,
+            convert.Layout.of(tuple(names), topologies),
+            max_contacts=self._settings["max_contacts"],
+            outputs=options.outputs,
+        )
+        return message
+
+    def _topology(self, request: Detect.Request, scene: NodeScene, index: int, name: str) -> Topology:
+        if request.topologies:
+            try:
+                return convert.topology_from_message(
+                    request.topologies[index], self._settings["max_vertices"], self._settings["max_faces"]
+                )
+            except convert.InvalidMessageError as error:
+                raise RequestError(f"topologies[{index}] ({name}): {error}") from error
+        if name not in scene.meshes:
+            raise RequestError(
+                f"mesh_names: unknown mesh {name!r}; the node has "
+                f"{', '.join(scene.meshes) or 'none'}, or send topologies"
+            )
+        topology = scene.topologies[name]
+        if topology is None:
+            raise RequestError(f"mesh {name}: the node has no topology yet; publish it or send topologies")
+        return topology
+
+    def _vertices(
+        self, field: str, names: list[str], messages: list[MeshVertices], topologies: tuple[Topology, ...]
+    ) -> np.ndarray:
+        parts = []
+        for i, (name, message, topology) in enumerate(zip(names, messages, topologies, strict=True)):
+            where = f"{field}[{i}] ({name})"
+            try:
+                vertices = convert.vertices_from_message(message, self._settings["max_vertices"])
+            except convert.InvalidMessageError as error:
+                raise RequestError(f"{where}: {error}") from error
+            if message.topology_version != topology.version:
+                raise RequestError(
+                    f"{where}: topology_version {message.topology_version}, the topology has version "
+                    f"{topology.version}"
+                )
+            if len(vertices) != topology.n_vertices:
+                raise RequestError(
+                    f"{where}: {len(vertices)} vertices, the topology has {topology.n_vertices}"
+                )
+            parts.append(vertices)
+        return parts[0] if len(parts) == 1 else np.concatenate(parts)

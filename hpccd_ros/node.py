@@ -1,0 +1,371 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The node: life cycle and wiring. ``python -m hpccd_ros.node --ros-args --params-file FILE``"""
+
+import signal
+import sys
+import time
+from collections import Counter
+from typing import Any
+
+import numpy as np
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
+from hpccd.msg import ContactArray
+from rclpy.clock import Clock, ClockType
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from visualization_msgs.msg import MarkerArray
+
+import hpccd_core as hc
+from hpccd_ros import _env, convert, detection, parameters, qos
+from hpccd_ros.detect_service import DetectService, NodeScene
+from hpccd_ros.detection import CORE_ERRORS, Detection, DetectionThread, Options, SceneBuilder
+from hpccd_ros.diagnostics import Metrics, Reporter
+from hpccd_ros.drops import DropCounter, Reason
+from hpccd_ros.frames import FrameAssembler
+from hpccd_ros.mailbox import Mailbox
+from hpccd_ros.markers import contact_markers
+from hpccd_ros.mesh_file import MeshFileError, load_mesh, place
+from hpccd_ros.messages import MeshFrame, MeshSettings, SceneFrame, Topology
+from hpccd_ros.parameters import ParameterError
+from hpccd_ros.refusal_log import RefusalLog
+from hpccd_ros.streams import MeshStream
+from hpccd_ros.unknown_meshes import UnknownMeshWatch
+
+
+class HpccdNode(LifecycleNode):
+    """Streams of vertices in, contacts out.
+
+    Configured: parameters checked, mesh files read, publishers and service there. Active: subscribed,
+    detecting.
+    Raises ParameterError for parameters that it cannot start with.
+    """
+
+    def __init__(self) -> None:
+        super().__init__("hpccd")
+        self._settings, self._mesh_settings = parameters.declare(self)
+        for name in parameters.unknown_overrides(self):
+            self.get_logger().warning(
+                f"parameter {name} is unknown and has no effect; see the README's table"
+            )
+        self._meshes = {
+            name: MeshSettings(name, row["static"], row["self_collision"])
+            for name, row in self._mesh_settings.items()
+        }
+        self._ignored_pairs = tuple(parameters.ignored_pairs(self._settings))
+        self._options = _options(self._settings)
+        if why := detection.refusal(self._options):
+            raise ParameterError(why)
+        parameters.watch(self, self._settings, self._check_change, self._apply_change)
+
+        self._log = RefusalLog(self.get_logger().warning)
+        self._drops = DropCounter(self._log)
+        self._refused = DropCounter(self._log)
+        self._metrics = Metrics()
+        self._links: Counter = Counter()
+        self._reporter = Reporter(self.get_fully_qualified_name(), self._metrics, self._drops, self._refused)
+        self._assembler: FrameAssembler | None = None
+        self._service: DetectService | None = None
+        self._streams: list[MeshStream] = []
+        self._unknown: UnknownMeshWatch | None = None
+        self._mailbox: Mailbox[SceneFrame] | None = None
+        self._thread: DetectionThread | None = None
+        self._markers_after = 0.0
+
+    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Read mesh files, create publishers, service and diagnostics."""
+        settings = self._settings
+        try:
+            self._assembler = self._make_assembler() if self._meshes else None
+        except (MeshFileError, ValueError) as error:
+            self.get_logger().error(f"cannot configure: {error}")
+            return TransitionCallbackReturn.FAILURE
+        self._contacts = self.create_publisher(ContactArray, "contacts", qos.CONTACTS)
+        self._markers = self.create_publisher(MarkerArray, "markers", qos.MARKERS)
+        self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", qos.DIAGNOSTICS)
+        # Steady time: diagnostics go on while simulated time stands still.
+        self._timer = self.create_timer(
+            settings["diagnostics_period"], self._report, clock=Clock(clock_type=ClockType.STEADY_TIME)
+        )
+        self._service = DetectService(self, settings, lambda: self._options, self._scene_for_service)
+        return TransitionCallbackReturn.SUCCESS
+
+    def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Start the detection thread and subscribe."""
+        settings = self._settings
+        if self._assembler is not None:
+            self._mailbox = Mailbox(settings["frame_queue"])
+            self._thread = DetectionThread(
+                SceneBuilder(tuple(self._meshes.values()), self._ignored_pairs),
+                self._mailbox,
+                self._drops,
+                options=lambda: self._options,
+                on_detection=self._publish,
+                on_first=lambda frame: self._metrics.first_frame(len(frame.fresh)),
+                on_failure=self._failed,
+            )
+            self._thread.start()
+            self._streams = [
+                MeshStream(
+                    self,
+                    name,
+                    row["input"],
+                    settings,
+                    assembler=self._assembler,
+                    drops=self._drops,
+                    refused=self._refused,
+                    metrics=self._metrics,
+                    links=self._links,
+                    on_frames=self._queue,
+                    check_topology=_core_refusal,
+                )
+                for name, row in self._mesh_settings.items()
+            ]
+        self._unknown = UnknownMeshWatch(
+            self,
+            list(self._meshes),
+            self._drops,
+            self._metrics.frame_received,
+            settings["count_unknown_meshes"],
+        )
+        self.get_logger().info(
+            f"active: meshes {', '.join(self._meshes) or 'none (service only)'}; "
+            f"accuracy {self._options.accuracy}, backend {self._options.backend}, "
+            f"contacts on {self._contacts.topic_name}"
+        )
+        return TransitionCallbackReturn.SUCCESS
+
+    def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Unsubscribe and end the detection thread; frames that still waited are counted as dropped."""
+        self._stop()
+        return TransitionCallbackReturn.SUCCESS
+
+    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Back to unconfigured: topologies and positions are forgotten."""
+        self._release()
+        return TransitionCallbackReturn.SUCCESS
+
+    def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """End for good, from any state."""
+        self._stop()
+        self._release()
+        return TransitionCallbackReturn.SUCCESS
+
+    def close(self) -> None:
+        """End threads before the node is destroyed; needs no valid context."""
+        self._stop()
+        if self._service is not None:
+            self._service.close()
+            self._service = None
+
+    @property
+    def state(self) -> str:
+        """Label of the life-cycle state."""
+        return self._state_machine.current_state[1]
+
+    def _stop(self) -> None:
+        for stream in self._streams:
+            stream.close()
+        self._streams = []
+        if self._unknown is not None:
+            self._unknown.close()
+            self._unknown = None
+        if self._mailbox is not None:
+            for frame in self._mailbox.close():
+                self._count_dropped(frame, Reason.STOPPED)
+            self._thread.join()
+            self._assembler.clear(Reason.STOPPED)
+            self._mailbox = self._thread = None
+
+    def _release(self) -> None:
+        if self._service is not None:
+            self._service.close()
+            self._service = None
+            self.destroy_timer(self._timer)
+            for publisher in (self._contacts, self._markers, self._diagnostics):
+                self.destroy_publisher(publisher)
+        self._assembler = None
+
+    def _make_assembler(self) -> FrameAssembler:
+        settings = self._settings
+        tolerance = round(settings["stamp_tolerance"] * 1e9) if settings["stamp_match"] == "nearest" else None
+        assembler = FrameAssembler(
+            list(self._meshes.values()),
+            self._drops,
+            self._refused,
+            max_pending=settings["pending_frames"],
+            restart_after=settings["restart_after"],
+            tolerance=tolerance,
+            frame_id=settings["frame_id"],
+            on_restart=self.get_logger().warning,
+        )
+        for name, row in self._mesh_settings.items():
+            if not row["file"]:
+                continue
+            vertices, faces = load_mesh(row["file"])
+            topology = Topology(0, len(vertices), faces)
+            if why := _core_refusal(topology):
+                raise MeshFileError(f"mesh.{name}.file {row['file']}: {why}")
+            assembler.set_topology(name, topology)
+            if row["static"]:
+                assembler.add(name, MeshFrame(0, place(vertices, row["pose"]), version=0))
+        return assembler
+
+    def _scene_for_service(self) -> NodeScene | str:
+        if self.state != "active":
+            return f"the node is {self.state}; activate it first"
+        topologies = {name: self._assembler.topology(name) for name in self._meshes}
+        return NodeScene(self._meshes, self._ignored_pairs, topologies)
+
+    def _check_change(self, wanted: dict[str, Any]) -> str | None:
+        options = _options(wanted)
+        return None if options == self._options else detection.refusal(options)
+
+    def _apply_change(self) -> None:
+        self._options = _options(self._settings)
+        if self._assembler is not None:
+            self._assembler.restart_after = self._settings["restart_after"]
+
+    def _queue(self, frames: list[SceneFrame]) -> None:
+        for frame in frames:
+            for lost in self._mailbox.put(frame):
+                self._count_dropped(lost, Reason.OVERLOAD)
+
+    def _count_dropped(self, frame: SceneFrame, reason: Reason) -> None:
+        for mesh in frame.fresh:
+            self._drops.count(mesh, reason)
+
+    def _publish(self, found: Detection) -> None:
+        """Called by the detection thread."""
+        settings, end = self._settings, found.end
+        message = ContactArray(step=end.step, accuracy=found.options.accuracy, backend=found.options.backend)
+        message.header.stamp = convert.ns_to_stamp(end.stamp)
+        message.header.frame_id = end.frame_id
+        message.start = convert.ns_to_stamp(found.start.stamp)
+        convert.fill_contacts(
+            message,
+            found.contacts,
+            found.layout,
+            max_contacts=settings["max_contacts"],
+            outputs=tuple(settings["outputs"]),
+        )
+        message.dropped_frames = self._drops.total
+        self._contacts.publish(message)
+        now = time.monotonic()
+        self._metrics.detected(
+            len(end.fresh),
+            1e3 * (now - end.received),
+            found.detect_ms,
+            found.profile,
+            {
+                "accuracy": found.options.accuracy,
+                "backend": found.options.backend,
+                "threads": found.options.threads,
+                "contacts": message.total,
+                "first_toc": message.first_toc,
+                "step": end.step,
+                **{f"core.{name}": value for name, value in found.stats.items()},
+            },
+        )
+        if settings["markers"] and now >= self._markers_after:
+            self._markers_after = now + 1.0 / settings["markers_rate"]
+            self._markers.publish(
+                contact_markers(
+                    np.asarray(found.contacts.points),
+                    np.asarray(found.contacts.normals),
+                    len(found.contacts.vf),
+                    stamp=message.header.stamp,
+                    frame_id=end.frame_id,
+                    size=settings["markers_size"],
+                    limit=settings["markers_max"],
+                )
+            )
+
+    def _failed(self, frame: SceneFrame, error: Exception) -> None:
+        """Called by the detection thread."""
+        if not self.context.ok():
+            return  # shutting down: the publisher is gone, nothing failed
+        self._metrics.failed(f"{type(error).__name__}: {error}")
+        self._log("scene", Reason.DETECTION_FAILED, f"step that ends at {frame.stamp} ns: {error}")
+
+    def _report(self) -> None:
+        waiting = self._assembler.waiting if self._assembler else 0
+        if self._mailbox is not None:
+            held = [*self._mailbox.items(), self._thread.working_on]
+            waiting += sum(len(frame.fresh) for frame in held if frame is not None)
+        warnings = [
+            line for part in (*self._streams, self._unknown) if part is not None for line in part.warnings()
+        ]
+        self._diagnostics.publish(
+            self._reporter.report(
+                self.get_clock().now().to_msg(),
+                state=self.state,
+                waiting=waiting,
+                restarts=self._assembler.restarts if self._assembler else 0,
+                static_taken=self._assembler.static_taken if self._assembler else 0,
+                last_refusal=self._log.last,
+                links=self._links,
+                warnings=warnings,
+                service=self._service.counts,
+            )
+        )
+
+
+def _options(settings: dict[str, Any]) -> Options:
+    outputs = set(settings["outputs"])
+    if settings["markers"]:
+        outputs |= {"points", "normals"}
+    return Options(
+        settings["accuracy"],
+        settings["backend"],
+        settings["threads"],
+        settings["report"],
+        tuple(name for name in parameters.OUTPUTS if name in outputs),
+    )
+
+
+def _core_refusal(topology: Topology) -> str | None:
+    """Why the core cannot take this topology, in its own words, or None."""
+    try:
+        hc.Scene().add_mesh("mesh", topology.faces, n_vertices=topology.n_vertices)
+    except CORE_ERRORS as error:
+        return str(error)
+    return None
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run the node until SIGINT or SIGTERM.
+
+    Returns the exit status: 0 ended as told, 1 could not be configured, 2 wrong parameters.
+    """
+    _env.prepare()
+    # rclpy's handlers shut the context down for both signals and then call this one: no KeyboardInterrupt
+    # that could hit in the middle of a callback or of the clean-up.
+    signal.signal(signal.SIGINT, lambda number, frame: None)
+    rclpy.init(args=argv)
+    try:
+        node = HpccdNode()
+    except ParameterError as error:
+        print(f"hpccd: {error}", file=sys.stderr)
+        rclpy.try_shutdown()
+        return 2
+    executor = SingleThreadedExecutor()
+    executor.add_node(node)
+    try:
+        if node.get_parameter("autostart").value:
+            for transition in (node.trigger_configure, node.trigger_activate):
+                if transition() != TransitionCallbackReturn.SUCCESS:
+                    return 1
+        executor.spin()
+    except ExternalShutdownException:
+        pass
+    finally:
+        node.close()
+        executor.shutdown(timeout_sec=1.0)
+        node.destroy_node()
+        rclpy.try_shutdown()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

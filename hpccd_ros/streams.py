@@ -1,0 +1,162 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Subscriptions of the meshes: each message is checked, turned into arrays and handed to the assembler."""
+
+import time
+from collections import Counter
+from collections.abc import Callable
+from typing import Any
+
+from hpccd.msg import MeshTopology, MeshVertices
+from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.node import Node
+from rclpy.subscription import Subscription
+from sensor_msgs.msg import PointCloud2
+
+from hpccd_ros import convert, qos
+from hpccd_ros.convert import InvalidMessageError
+from hpccd_ros.diagnostics import Metrics
+from hpccd_ros.drops import DropCounter, Reason
+from hpccd_ros.frames import FrameAssembler
+from hpccd_ros.messages import MeshFrame, SceneFrame, Topology
+from hpccd_ros.sequence import SequenceWatch
+
+
+def link_events(
+    node: Node, topic: str, links: Counter, on_matched: Callable[[], None] = lambda: None
+) -> SubscriptionEventCallbacks:
+    """Count and log what the middleware reports of a subscription; ``on_matched``: a publisher came."""
+
+    def incompatible(event: Any) -> None:
+        links[f"qos_incompatible.{topic}"] += event.total_count_change
+        node.get_logger().warning(
+            f"{topic}: a publisher offers an incompatible QoS (policy {event.last_policy_kind}) and is "
+            "not heard; see parameter input_reliability"
+        )
+
+    def lost(event: Any) -> None:
+        links[f"message_lost.{topic}"] += event.total_count_change
+
+    def matched(event: Any) -> None:
+        if event.current_count_change > 0:
+            on_matched()
+
+    return SubscriptionEventCallbacks(incompatible_qos=incompatible, message_lost=lost, matched=matched)
+
+
+class MeshStream:
+    """The topology and vertex subscriptions of one mesh, from construction until ``close``.
+
+    on_frames: takes the scene frames that a message completes.
+    check_topology: why the core refuses a topology, or None.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        mesh: str,
+        kind: str,
+        settings: dict[str, Any],
+        *,
+        assembler: FrameAssembler,
+        drops: DropCounter,
+        refused: DropCounter,
+        metrics: Metrics,
+        links: Counter,
+        on_frames: Callable[[list[SceneFrame]], None],
+        check_topology: Callable[[Topology], str | None],
+    ) -> None:
+        self._node = node
+        self._mesh = mesh
+        self._settings = settings
+        self._assembler = assembler
+        self._drops = drops
+        self._refused = refused
+        self._metrics = metrics
+        self._on_frames = on_frames
+        self._check_topology = check_topology
+        self._topology_numbers = SequenceWatch()
+        self._vertex_numbers = SequenceWatch()
+        message, callback = {
+            "vertices": (MeshVertices, self._on_vertices),
+            "points": (PointCloud2, self._on_cloud),
+        }[kind]
+        topology_topic, vertex_topic = f"meshes/{mesh}/topology", f"meshes/{mesh}/{kind}"
+        self._subscriptions: list[Subscription] = [
+            node.create_subscription(
+                MeshTopology,
+                topology_topic,
+                self._on_topology,
+                qos.TOPOLOGY,
+                event_callbacks=link_events(
+                    node, topology_topic, links, self._topology_numbers.new_publisher
+                ),
+            ),
+            node.create_subscription(
+                message,
+                vertex_topic,
+                callback,
+                qos.vertices(settings["input_reliability"], settings["input_depth"]),
+                event_callbacks=link_events(node, vertex_topic, links, self._vertex_numbers.new_publisher),
+            ),
+        ]
+        self._vertex_topic = self._subscriptions[1].topic_name
+
+    def close(self) -> None:
+        for subscription in self._subscriptions:
+            self._node.destroy_subscription(subscription)
+        self._subscriptions.clear()
+
+    def warnings(self) -> list[str]:
+        """What is odd about the publishers of the mesh."""
+        publishers = self._node.count_publishers(self._vertex_topic)
+        return [f"{publishers} publishers on {self._vertex_topic}"] if publishers > 1 else []
+
+    def _on_topology(self, message: MeshTopology, info: dict[str, Any]) -> None:
+        _, new_publisher = self._topology_numbers.next(info["publication_sequence_number"])
+        try:
+            topology = convert.topology_from_message(
+                message, self._settings["max_vertices"], self._settings["max_faces"]
+            )
+        except InvalidMessageError as error:
+            self._refused.count(self._mesh, error.reason, str(error))
+            return
+        if why := self._check_topology(topology):
+            self._refused.count(self._mesh, Reason.BAD_TOPOLOGY, why)
+            return
+        self._on_frames(self._assembler.set_topology(self._mesh, topology, new_publisher))
+
+    def _on_vertices(self, message: MeshVertices, info: dict[str, Any]) -> None:
+        self._take(message, info, convert.vertices_from_message, message.topology_version, message.step)
+
+    def _on_cloud(self, message: PointCloud2, info: dict[str, Any]) -> None:
+        self._take(message, info, convert.vertices_from_cloud, None, None)
+
+    def _take(
+        self, message: Any, info: dict[str, Any], read: Callable, version: int | None, step: int | None
+    ) -> None:
+        received = time.monotonic()
+        transport = (info["received_timestamp"] - info["source_timestamp"]) * 1e-6
+        self._metrics.frame_received(self._mesh, transport if transport >= 0 else None)
+        missing, new_publisher = self._vertex_numbers.next(info["publication_sequence_number"])
+        # Numbers of several publishers interleave: their gaps mean nothing.
+        if missing and self._node.count_publishers(self._vertex_topic) <= 1:
+            self._drops.count(
+                self._mesh,
+                Reason.MIDDLEWARE,
+                f"{missing} messages lost before the node could read them; see parameter input_depth",
+                missing,
+            )
+        try:
+            vertices = read(message, self._settings["max_vertices"])
+        except InvalidMessageError as error:
+            self._drops.count(self._mesh, error.reason, str(error))
+            return
+        frame = MeshFrame(
+            convert.stamp_to_ns(message.header.stamp),
+            vertices,
+            version,
+            step,
+            message.header.frame_id,
+            received,
+        )
+        self._on_frames(self._assembler.add(self._mesh, frame, new_publisher))
