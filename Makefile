@@ -12,6 +12,7 @@ JOBS        ?= $(shell nproc)
 EXTRAS      ?= test lint interop
 PYTEST_ARGS ?=
 DEMO_ARGS   ?=
+FUZZ_ARGS   ?= --seconds 60
 
 BIN := $(VENV)/bin
 export PATH := $(abspath $(BIN)):$(PATH)
@@ -26,10 +27,9 @@ INSTALLED   := $(VENV)/.hpccd-installed
 
 # What the installed package is made of.
 SOURCES := $(sort $(shell find CMakeLists.txt setup.py package.xml cmake config msg srv scripts hpccd_ros hpccd_core \
-  \( -name __pycache__ -o -path hpccd_core/tests -o -path hpccd_core/bench -o -path hpccd_core/fuzz \) -prune \
-  -o -type f -print))
+  \( -name __pycache__ -o -path hpccd_core/tests \) -prune -o -type f -print))
 
-.PHONY: help venv demo test test-core test-python lint format pin clean distclean FORCE
+.PHONY: help venv demo test test-core test-python sanitize fuzz lint format pin clean distclean FORCE
 
 help: ## Show this list
 	@echo "hpccd: continuous collision detection of deforming triangle meshes, as a ROS 2 node."
@@ -58,6 +58,13 @@ test-core: $(ENVIRONMENT) ## Only the C++ tests of the core
 test-python: venv ## Only the Python tests: core against oracles, node over DDS, recordings
 	$(BIN)/pytest $(PYTEST_ARGS)
 
+sanitize: $(ENVIRONMENT) ## C++ tests under AddressSanitizer + UndefinedBehaviorSanitizer, then ThreadSanitizer
+	@$(call run_core_tests,build/core-asan,$(call sanitized,address$(comma)undefined -fno-sanitize-recover=all))
+	@$(call run_core_tests,build/core-tsan,$(call sanitized,thread))
+
+fuzz: venv ## Compare the core with the exact oracle on random and degenerate queries (FUZZ_ARGS=--help)
+	$(BIN)/python -m hpccd_core.fuzz $(FUZZ_ARGS)
+
 lint: $(ENVIRONMENT) ## Check the style: ruff, clang-format
 	$(BIN)/ruff check .
 	@git ls-files -z '*.h' '*.cpp' '*.cu' | xargs -0r $(BIN)/clang-format --dry-run --Werror
@@ -77,11 +84,15 @@ clean: ## Remove compiler output and caches; keep .venv
 distclean: clean ## Remove .venv too
 	rm -rf $(VENV)
 
+comma := ,
+sanitized = -DCMAKE_BUILD_TYPE=RelWithDebInfo -DCMAKE_CXX_FLAGS="-fsanitize=$(1) -fno-omit-frame-pointer"
+
 # GoogleTest comes as source in a wheel, so that the tests need no system package and are the same everywhere.
 define run_core_tests
+mkdir -p build; . $(VENV)/build.env; \
 cmake -S hpccd_core -B $(1) -G Ninja -DHPCCD_BUILD_TESTS=ON -DGTest_DIR="$(CURDIR)/cmake/gtest" \
   -DHPCCD_GTEST_SOURCE="$(abspath $(VENV))/src/gtest_vendor" \
-  -DPython3_EXECUTABLE="$(abspath $(BIN))/python" $(2) $(CMAKE_ARGS) > $(1).log 2>&1 || { cat $(1).log; exit 1; }; \
+  -DPython3_EXECUTABLE="$(abspath $(BIN))/python" $(2) $${CMAKE_ARGS:-} > $(1).log 2>&1 || { cat $(1).log; exit 1; }; \
 cmake --build $(1) && ctest --test-dir $(1) --output-on-failure --no-tests=error
 endef
 
@@ -91,7 +102,7 @@ $(ENVIRONMENT): pyproject.toml scripts/create_venv.sh scripts/requirements.py $(
 
 $(INSTALLED): $(ENVIRONMENT) $(SOURCES) build/sources.txt
 	@echo "hpccd: building, and installing into $(VENV)"
-	@flock $(VENV) $(BIN)/python -m pip install --quiet --no-build-isolation --no-deps .
+	@. $(VENV)/build.env; flock $(VENV) $(BIN)/python -m pip install --quiet --no-build-isolation --no-deps .
 	@touch $@
 
 # Changes when a source file appears or disappears, which no time stamp of another file tells.

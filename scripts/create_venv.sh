@@ -31,6 +31,29 @@ find_python() {
     "or name one: make venv PYTHON=/path/to/python3.12"
 }
 
+include_folder() { "$venv/bin/python" -c 'import sysconfig; print(sysconfig.get_path("include"))'; }
+
+has_headers() { [ -f "$(include_folder)/Python.h" ]; }
+
+fetch_headers() {
+  local folder=$1 version package
+  version=$(version_of "$venv/bin/python")
+  package=libpython$version-dev
+  local include=$folder/usr/include
+  if [ ! -f "$include/python$version/Python.h" ]; then
+    echo "hpccd: Python.h is not installed; unpacking the package $package in $folder"
+    mkdir -p "$folder"
+    (cd "$folder" && apt-get download --quiet=2 "$package" && dpkg-deb --extract "$package"_*.deb .) || fail \
+      "Python.h is missing ($(include_folder)), and $package could not be downloaded." \
+      "Remedy on Debian and Ubuntu: sudo apt install python$version-dev"
+  fi
+  include=$(cd "$include" && pwd)
+  cat >"$venv/build.env" <<EOF
+export CPATH="$include\${CPATH:+:\$CPATH}"
+export CMAKE_ARGS="-DPython3_INCLUDE_DIR=$include/python$version -DPython_INCLUDE_DIR=$include/python$version \${CMAKE_ARGS:-}"
+EOF
+}
+
 python=${PYTHON:-}
 if [ -n "$python" ] && ! suitable "$python"; then
   fail "PYTHON=$python is $(version_of "$python" | sed 's/^$/not a Python/'); 3.11 or 3.12 is needed (the ROS 2 Jazzy wheels exist for these)."
@@ -45,8 +68,15 @@ else
   "$python" -c 'import ensurepip, venv' 2>/dev/null || fail \
     "$python cannot create virtual environments (module ensurepip is missing)." \
     "Remedy on Debian and Ubuntu: sudo apt install python$(version_of "$python")-venv"
-  echo "hpccd: creating $venv with Python $(version_of "$python"); about 350 MB come from the package index"
+  echo "hpccd: creating $venv with Python $(version_of "$python"); the package index is needed, 800 MB of disk, and one to three minutes"
   "$python" -m venv --clear "$venv"
+fi
+
+# Debian and Ubuntu keep Python.h in a package of its own; without root it can still be unpacked in here.
+# build.env is read by the Makefile before anything is compiled.
+: >"$venv/build.env"
+if ! has_headers; then
+  fetch_headers "$venv/python-headers"
 fi
 
 PIP_CONSTRAINT=$here/requirements/constraints-$(version_of "$venv/bin/python").txt
