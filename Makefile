@@ -22,7 +22,7 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 unexport PYTHONPATH PYTHONHOME _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
 # Stamps. A PYTHON named on the command line has one of its own, so that naming another one is noticed.
-ENVIRONMENT := $(VENV)/.hpccd-environment$(if $(PYTHON),-$(notdir $(PYTHON)))
+ENVIRONMENT := $(VENV)/.hpccd-environment$(if $(PYTHON),-$(subst /,-,$(PYTHON)))
 INSTALLED   := $(VENV)/.hpccd-installed
 
 # What the installed package is made of.

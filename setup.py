@@ -31,8 +31,8 @@ def ros_prefix() -> Path:
             if (folder / "share" / "ament_cmake_core" / "cmake").is_dir():
                 return folder
     raise SystemExit(
-        "hpccd: the ROS 2 build wheels (ros-jazzy-ament-cmake, ...) are not installed in this Python environment. "
-        "Run `make venv`, or `pip install .` without --no-build-isolation."
+        "hpccd: the ROS 2 build wheels (ros-jazzy-ament-cmake, ...) are not installed in this environment. "
+        "Remedy: `make venv`, or `pip install .` without --no-build-isolation."
     )
 
 
@@ -42,7 +42,7 @@ def tool(name: str) -> str | None:
 
 
 class FreshPythonFiles(build_py):
-    """Copy the Python sources into an empty folder, so that a module deleted from the sources is not installed."""
+    """Copy the Python sources into an empty folder: a module deleted there must not be installed."""
 
     def run(self):
         shutil.rmtree(self.build_lib, ignore_errors=True)
@@ -127,7 +127,7 @@ class NoEditable(Command):
         pass
 
     def run(self):
-        raise SystemExit("hpccd: editable installs are not supported. Use `make venv`: it rebuilds what has changed.")
+        raise SystemExit("hpccd: editable installs are not supported. Remedy: `make venv` rebuilds.")
 
 
 class BinaryDistribution(Distribution):

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""ROS 2 side of hpccd: the node, the recorder, the replay and the `hpccd` command. The core is `hpccd_core`."""
+"""ROS 2 side of hpccd: node, recorder, replay and the `hpccd` command. The core is `hpccd_core`."""

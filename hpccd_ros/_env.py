@@ -19,12 +19,16 @@ _MALLOC = (
 )
 
 # Any of these says that the user has chosen a transport or a profile: ours would override it.
-_DDS_CHOICES = ("FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE", "FASTDDS_BUILTIN_TRANSPORTS")
+_DDS_CHOICES = (
+    "FASTRTPS_DEFAULT_PROFILES_FILE",
+    "FASTDDS_DEFAULT_PROFILES_FILE",
+    "FASTDDS_BUILTIN_TRANSPORTS",
+)
 _DDS_FILES = ("DEFAULT_FASTRTPS_PROFILES.xml", "DEFAULT_FASTDDS_PROFILES.xml")
 
 
 def prepare() -> None:
-    """Make package shares findable, choose the DDS profile, keep freed memory; safe to call more than once."""
+    """Make package shares findable, choose the DDS profile, keep freed memory. Safe to call again."""
     _find_shares_of_wheels()
     _choose_dds_profile()
     _keep_freed_memory()

@@ -56,16 +56,17 @@ EOF
 
 python=${PYTHON:-}
 if [ -n "$python" ] && ! suitable "$python"; then
-  fail "PYTHON=$python is $(version_of "$python" | sed 's/^$/not a Python/'); 3.11 or 3.12 is needed (the ROS 2 Jazzy wheels exist for these)."
+  found=$(version_of "$python")
+  fail "PYTHON=$python is ${found:+Python }${found:-no Python}; 3.11 or 3.12 is needed (the ROS 2 Jazzy wheels exist for these)."
 fi
 command -v g++ >/dev/null || fail "g++ not found. Remedy: sudo apt install g++"
 
-if [ -x "$venv/bin/python" ] && suitable "$venv/bin/python" &&
+if suitable "$venv/bin/python" && "$venv/bin/python" -m pip --version >/dev/null 2>&1 &&
   { [ -z "$python" ] || [ "$(version_of "$python")" = "$(version_of "$venv/bin/python")" ]; }; then
   echo "hpccd: bringing $venv up to date"
 else
   [ -n "$python" ] || python=$(find_python)
-  "$python" -c 'import ensurepip, venv' 2>/dev/null || fail \
+  "$python" -c 'from ensurepip import bootstrap; import venv' 2>/dev/null || fail \
     "$python cannot create virtual environments (module ensurepip is missing)." \
     "Remedy on Debian and Ubuntu: sudo apt install python$(version_of "$python")-venv"
   echo "hpccd: creating $venv with Python $(version_of "$python"); the package index is needed, 800 MB of disk, and one to three minutes"
