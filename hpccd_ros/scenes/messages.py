@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A scene as the ROS messages that play it: what is sent, in which order, with which stamps and versions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from . import cdr
+from .scene import Frame, Scene
+
+TOPOLOGY_TYPE = "hpccd/msg/MeshTopology"
+VERTICES_TYPE = "hpccd/msg/MeshVertices"
+
+
+def topology_topic(mesh: str) -> str:
+    """Relative name of the topic with a mesh's faces."""
+    return f"meshes/{mesh}/topology"
+
+
+def vertices_topic(mesh: str) -> str:
+    """Relative name of the topic with a mesh's vertices."""
+    return f"meshes/{mesh}/vertices"
+
+
+@dataclass(frozen=True)
+class Message:
+    topic: str
+    stamp_ns: int
+    data: bytes  # CDR
+
+
+class Player:
+    """Turns frames into messages and counts topology versions on over repetitions of the scene.
+
+    Each repetition begins with a new version of each topology, so that no receiver takes the jump from the
+    last frame back to the first for a motion.
+    """
+
+    def __init__(self, scene: Scene, frame_id: str = "world"):
+        self._scene, self._frame_id = scene, frame_id
+        self._base = {mesh.name: -1 for mesh in scene.meshes}
+        self._version = dict(self._base)
+        self._step = 0
+
+    def messages(self, frame: Frame, stamp_ns: int) -> Iterator[Message]:
+        """Messages of one frame, stamped `stamp_ns`: topologies that change, then vertices of every mesh."""
+        for mesh in self._scene.meshes:
+            change = frame.topologies.get(mesh.name)
+            if frame.index == 0:
+                self._base[mesh.name] = self._version[mesh.name] + 1
+                faces, n_vertices, version = mesh.faces, mesh.n_vertices, 0
+            elif change:
+                faces, n_vertices, version = change.faces, change.n_vertices, change.version
+            else:
+                continue
+            self._version[mesh.name] = self._base[mesh.name] + version
+            data = cdr.topology(stamp_ns, self._frame_id, self._version[mesh.name], faces, n_vertices)
+            yield Message(topology_topic(mesh.name), stamp_ns, data)
+        for mesh, xyz in zip(self._scene.meshes, frame, strict=True):
+            data = cdr.vertices(stamp_ns, self._frame_id, self._version[mesh.name], self._step, xyz)
+            yield Message(vertices_topic(mesh.name), stamp_ns, data)
+        self._step += 1
+
+
+def node_parameters(scene: Scene) -> dict[str, object]:
+    """Parameters that make an hpccd node listen to this scene, by their full names."""
+    parameters: dict[str, object] = {"meshes": scene.mesh_names}
+    for mesh in scene.meshes:
+        parameters[f"mesh.{mesh.name}.static"] = mesh.static
+        parameters[f"mesh.{mesh.name}.self_collision"] = mesh.self_collision
+    return parameters

@@ -1,0 +1,20 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Progress on stderr, so that a wait of seconds is explained; silent where nobody looks."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable, Iterator
+
+
+def track(items: Iterable, description: str, show: bool, total: int | None = None) -> Iterator:
+    """The items, with a rich progress bar on stderr if `show` and stderr is a terminal."""
+    if not (show and sys.stderr.isatty()):
+        yield from items
+        return
+    from rich.console import Console
+    from rich.progress import track as rich_track
+
+    yield from rich_track(
+        items, description=description, total=total, console=Console(stderr=True), transient=True
+    )

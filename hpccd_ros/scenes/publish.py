@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Play a scene over DDS, as a simulation would stream it."""
+
+from __future__ import annotations
+
+import itertools
+import signal
+import sys
+import time
+
+import rclpy
+from hpccd.msg import MeshTopology, MeshVertices
+from rclpy.duration import Duration
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.signals import SignalHandlerOptions
+
+from hpccd_ros import _env
+
+from .messages import Player, topology_topic, vertices_topic
+from .progress import track
+from .scene import Scene
+
+LATCHED = QoSProfile(
+    depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
+)
+STREAM = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.VOLATILE)
+
+
+def publish(
+    scene: Scene,
+    rate: float,
+    loop: bool = False,
+    wait: float = 10.0,
+    ros_args: list[str] | None = None,
+    progress: bool = False,
+) -> int:
+    """Publish all frames at `rate` Hz (over and over if `loop`); return how many. SIGINT and SIGTERM end it.
+
+    Before the first frame, waits up to `wait` seconds until every mesh's vertices have a subscriber.
+    """
+    stop = []
+    previous = {
+        s: signal.signal(s, lambda number, _: stop.append(number)) for s in (signal.SIGINT, signal.SIGTERM)
+    }
+    _env.prepare()
+    rclpy.init(
+        args=["--ros-args", *ros_args] if ros_args else None, signal_handler_options=SignalHandlerOptions.NO
+    )
+    node = rclpy.create_node("hpccd_scene", start_parameter_services=False)
+    try:
+        publishers = {}
+        for mesh in scene.mesh_names:
+            name = topology_topic(mesh)
+            publishers[name] = node.create_publisher(MeshTopology, name, LATCHED)
+            name = vertices_topic(mesh)
+            publishers[name] = node.create_publisher(MeshVertices, name, STREAM)
+        listened = [publishers[vertices_topic(mesh)] for mesh in scene.mesh_names]
+        if not _await_listeners(listened, wait, stop):
+            print("no subscriber for every mesh yet: publishing all the same", file=sys.stderr, flush=True)
+        count = _play(node, scene, publishers, rate, loop, stop, progress)
+        for publisher in publishers.values():
+            # What is still on its way must not be cut off by the end of this process.
+            publisher.wait_for_all_acked(Duration(seconds=2.0))
+        return count
+    finally:
+        node.destroy_node()
+        rclpy.try_shutdown()
+        for number, handler in previous.items():
+            signal.signal(number, handler)
+
+
+def _await_listeners(publishers, wait, stop) -> bool:
+    deadline = time.monotonic() + wait
+    while not stop and not (ready := all(p.get_subscription_count() for p in publishers)):
+        if time.monotonic() >= deadline:
+            return False
+        time.sleep(0.02)
+    return bool(stop) or ready
+
+
+def _play(node, scene, publishers, rate, loop, stop, progress) -> int:
+    player = Player(scene)
+    begin_ns, begin = node.get_clock().now().nanoseconds, time.monotonic()
+    count = 0
+    for _ in itertools.count() if loop else range(1):
+        for frame in track(scene.frames(), f"publishing {scene.name}", progress, scene.n_frames):
+            # Stamps keep the rate exactly, whenever this process is woken.
+            stamp = begin_ns + round(count * 1e9 / rate)
+            messages = list(player.messages(frame, stamp))
+            delay = begin + count / rate - time.monotonic()
+            if delay > 0 and not stop:
+                time.sleep(delay)
+            if stop:
+                return count
+            for message in messages:
+                publishers[message.topic].publish(message.data)
+            count += 1
+    return count
