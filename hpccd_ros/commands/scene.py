@@ -74,7 +74,8 @@ def run(args) -> int:
     try:
         _write(scene, args)
     except FileExistsError as error:
-        raise UserError(f"{error.filename or error}: not overwritten; remove it or name another") from error
+        exists = f"{error.filename} exists and is not overwritten; remove it or name another"
+        raise UserError(exists if error.filename else str(error)) from error
     except (OSError, LookupError) as error:
         raise UserError(str(error)) from error
     if args.publish:

@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The `hpccd` command: `hpccd <command> --help`.
+
+Each command is a module `hpccd_ros.commands.<command>` with `configure(parser)` and `run(args) -> exit status`. Only
+the module of the command that was asked for is imported: `hpccd --help` needs neither ROS nor the core.
+"""
+
+import argparse
+import importlib
+import importlib.util
+import sys
+
+from hpccd_ros.errors import UserError
+
+COMMANDS = {
+    "demo": "see it work: node, moving scene and recorder as separate processes, then a picture",
+    "record": "record the meshes and contacts of a running node into an MCAP file",
+    "replay": "compute a recording again and verify its contacts, or play it over DDS",
+    "view": "draw recorded frames: shaded meshes with their contacts",
+    "doctor": "check a recording; save what is readable of one that was cut off",
+    "scene": "generate, play or draw a deforming scene",
+    "bench": "measure speed and latency on this machine",
+    "info": "what is installed here: versions, backends, processor",
+}
+
+EPILOG = """\
+a first tour:
+  hpccd demo                        records a cloth on a spinning ball and draws its worst frame
+  hpccd replay hpccd-demo/demo.mcap computes it again and compares every contact
+  hpccd info                        backends that can be used on this machine
+  hpccd <command> --help            options and examples of one command
+
+exit status: 0 done, 1 a check failed, 2 wrong use or unusable input, 130 interrupted
+"""
+
+
+def main(argv=None) -> int:
+    """Run the command line `argv` (default: that of the process) and return the exit status."""
+    argv = sys.argv[1:] if argv is None else list(argv)
+    parser = argparse.ArgumentParser(
+        prog="hpccd",
+        description="Continuous collision detection of deforming triangle meshes, at home in ROS 2.",
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    subparsers = parser.add_subparsers(dest="command", metavar="<command>", required=True)
+    asked = next((word for word in argv if not word.startswith("-")), None)
+    run = None
+    for name, summary in COMMANDS.items():
+        if importlib.util.find_spec(f"hpccd_ros.commands.{name}") is None:
+            continue
+        subparser = subparsers.add_parser(
+            name, help=summary, formatter_class=argparse.RawDescriptionHelpFormatter
+        )
+        if name == asked:
+            module = importlib.import_module(f"hpccd_ros.commands.{name}")
+            subparser.description = module.__doc__
+            module.configure(subparser)
+            run = module.run
+    args = parser.parse_args(argv)
+    try:
+        return run(args) or 0
+    except UserError as error:
+        print(f"hpccd {args.command}: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print(f"hpccd {args.command}: interrupted", file=sys.stderr)
+        return 130
+    except BrokenPipeError:
+        # The reader of our output (`| head`) has gone: nothing left to say, and nothing to say it to.
+        sys.stderr.close()
+        return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,46 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Record what goes into a running node (mesh topologies, vertices, points) and what comes out of it (contacts),
+exactly as it goes over the wire, with the node's parameters beside it.
+
+  hpccd record                          the node /hpccd, into ./hpccd-<date>.mcap, until Ctrl-C
+  hpccd record -o run.mcap --node /arm/hpccd --duration 60
+  hpccd record -o run --split-size 512 --compression zstd
+                                        a folder run/ in the layout of rosbag2, a new file each 512 MB
+
+The files play with `ros2 bag play`, open in Foxglove, and `hpccd replay` verifies them. Ctrl-C (SIGINT) and
+SIGTERM finish the file. Killed otherwise, it keeps all but the last half second (--flush): `hpccd doctor`.
+A node whose topics are remapped: give the same remappings here, after --ros-args.
+"""
+
+from hpccd_ros.errors import UserError
+
+
+def configure(parser):
+    parser.add_argument("-o", "--output", metavar="PATH", help="file NAME.mcap, or folder for a split recording")
+    parser.add_argument("--node", default="/hpccd", help="full name of the node to record (default: %(default)s)")
+    parser.add_argument("--topic", action="append", default=[], metavar="NAME=TYPE",
+                        help="record this topic too, for example /tf=tf2_msgs/msg/TFMessage; may be repeated")
+    parser.add_argument("--compression", choices=("none", "lz4", "zstd"), default="none",
+                        help="lz4: about half the writing speed; zstd: smaller, a fifth (default: %(default)s)")
+    parser.add_argument("--split-size", type=float, default=0, metavar="MB", help="new file after so many megabytes")
+    parser.add_argument("--split-time", type=float, default=0, metavar="S", help="new file after so many seconds")
+    parser.add_argument("--flush", type=float, default=0.5, metavar="S",
+                        help="most seconds of messages that a kill can cost (default: %(default)s)")
+    parser.add_argument("--depth", type=int, default=50, metavar="N",
+                        help="messages a topic that may wait for the disk (default: %(default)s)")
+    parser.add_argument("--duration", type=float, default=0, metavar="S", help="end after so many seconds")
+    parser.add_argument("--frames", type=int, default=0, metavar="N", help="end after so many contact messages")
+    parser.add_argument("--wait", type=float, default=10, metavar="S",
+                        help="how long to wait for the node to appear (default: %(default)s)")
+    parser.add_argument("--ros-args", nargs="...", default=[], help="remappings and the like, as for any ROS program")
+
+
+def run(args) -> int:
+    for name in ("split_size", "split_time", "flush", "duration", "wait", "frames"):
+        if getattr(args, name) < 0:
+            raise UserError(f"--{name.replace('_', '-')} {getattr(args, name)}: must not be negative")
+    if args.depth < 1:
+        raise UserError(f"--depth {args.depth}: must be at least 1")
+    from hpccd_ros import recorder
+
+    return recorder.main(args)

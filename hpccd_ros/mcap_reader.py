@@ -1,0 +1,178 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Read recordings: one MCAP file, or a folder of them as rosbag2 and `hpccd record` write."""
+
+import contextlib
+import dataclasses
+import heapq
+import json
+import struct
+from collections.abc import Iterator
+from pathlib import Path
+
+import zstandard
+from mcap.exceptions import McapError
+from mcap.reader import SeekingReader
+from mcap.stream_reader import CRCValidationError
+from mcap.writer import MCAP0_MAGIC
+
+from hpccd_ros.errors import UserError
+from hpccd_ros.mcap_bag import HPCCD_RECORD
+
+# What reading torn or flipped bytes can raise: the MCAP reader, its decompressors (lz4: RuntimeError), text that is
+# no UTF-8 (a ValueError), an index that names channels which are not there, a nonsensical decompressed size.
+DAMAGE = (
+    McapError, CRCValidationError, struct.error, zstandard.ZstdError, RuntimeError, ValueError, KeyError, OverflowError,
+    MemoryError, EOFError,
+)  # fmt: skip
+
+
+class RecordingError(UserError, ValueError):
+    """A recording cannot be read, or not used for what was asked; the text names the file and the remedy."""
+
+
+@dataclasses.dataclass(frozen=True)
+class RecordedTopic:
+    name: str
+    type_name: str  # "pkg/msg/Name"
+    definition: str  # text of the recorded schema
+    type_hash: str  # "RIHS01_...", or "" where the recorder did not store it
+    offered_qos: str  # rosbag2 YAML, or ""
+    count: int
+
+
+@dataclasses.dataclass(frozen=True)
+class RecordedMessage:
+    topic: str
+    log_time: int  # ns since the epoch, when the recorder received it
+    publish_time: int  # ns since the epoch, when it was sent
+    data: bytes  # CDR, with its 4-byte header
+
+
+class Recording:
+    """A finished recording. Use as a context manager.
+
+    path: an `.mcap` file or a folder of them.
+    Raises RecordingError where it does not exist, is no MCAP file, is cut off, or holds no ROS 2 messages.
+
+    topics: dict topic name -> RecordedTopic.
+    info: what `hpccd record` stored beside the messages (dict), or None in a recording of another recorder.
+    """
+
+    def __init__(self, path):
+        self.path = Path(path)
+        self.files = _mcap_files(self.path)
+        self._stack = contextlib.ExitStack()
+        self.topics: dict[str, RecordedTopic] = {}
+        self.info: dict | None = None
+        try:
+            self._readers = [self._open(file) for file in self.files]
+        except BaseException:
+            self._stack.close()
+            raise
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self._stack.close()
+
+    @property
+    def message_count(self) -> int:
+        return sum(topic.count for topic in self.topics.values())
+
+    def messages(self, topics=None) -> Iterator[RecordedMessage]:
+        """Messages in the order in which they were received, over all files. `topics`: only these names."""
+        streams = [self._read(file, reader, topics) for file, reader in zip(self.files, self._readers, strict=True)]
+        yield from heapq.merge(*streams, key=lambda message: message.log_time)
+
+    def _open(self, path):
+        check_ends(path)
+        stream = self._stack.enter_context(open(path, "rb"))
+        with _explained(path):
+            reader = SeekingReader(stream, validate_crcs=True)
+            header = reader.get_header()
+            summary = reader.get_summary()
+        if header.profile != "ros2":
+            raise RecordingError(f"{path} has MCAP profile {header.profile!r}: only ros2 recordings can be used")
+        if summary is None or summary.statistics is None:
+            raise RecordingError(f"{path} has no summary section: rewrite it with `hpccd doctor {path} --recover OUT`")
+        for channel_id, channel in summary.channels.items():
+            schema = summary.schemas.get(channel.schema_id)
+            if channel.message_encoding != "cdr" or schema is None:
+                raise RecordingError(
+                    f"{path}: topic {channel.topic} has encoding {channel.message_encoding!r} and "
+                    f"{'no' if schema is None else 'a'} schema; ROS 2 recordings hold cdr with a schema"
+                )
+            self._add_topic(channel, schema, summary.statistics.channel_message_counts.get(channel_id, 0))
+        with _explained(path):
+            for record in reader.iter_metadata():
+                if record.name == HPCCD_RECORD and self.info is None:
+                    self.info = json.loads(record.metadata["json"])
+        return reader
+
+    def _add_topic(self, channel, schema, count):
+        known = self.topics.get(channel.topic)
+        topic = RecordedTopic(
+            name=channel.topic,
+            type_name=schema.name,
+            definition=schema.data.decode(errors="replace") if schema.encoding == "ros2msg" else "",
+            type_hash=channel.metadata.get("topic_type_hash", ""),
+            offered_qos=channel.metadata.get("offered_qos_profiles", ""),
+            count=count + (known.count if known else 0),
+        )
+        if known and known.type_name != topic.type_name:
+            raise RecordingError(
+                f"{self.path}: topic {topic.name} changes its type from {known.type_name} to {topic.type_name}"
+            )
+        self.topics[topic.name] = topic
+
+    def _read(self, path, reader, topics):
+        with _explained(path):
+            for _, channel, message in reader.iter_messages(topics=topics, log_time_order=True):
+                yield RecordedMessage(channel.topic, message.log_time, message.publish_time, message.data)
+
+
+def _mcap_files(path: Path) -> list[Path]:
+    if path.is_dir():
+        files = sorted(path.glob("*.mcap"), key=_split_number)
+        if not files:
+            raise RecordingError(f"the folder {path} holds no .mcap file")
+        return files
+    if not path.exists():
+        raise RecordingError(f"{path} does not exist")
+    return [path]
+
+
+def _split_number(path: Path):
+    number = path.stem.rpartition("_")[2]
+    return (int(number) if number.isdigit() else -1, path.name)
+
+
+def check_ends(path: Path) -> None:
+    """Raise RecordingError where `path` does not begin as an MCAP file, or does not end as a finished one."""
+    with open(path, "rb") as stream:
+        begin = stream.read(len(MCAP0_MAGIC))
+        size = stream.seek(0, 2)
+        stream.seek(max(0, size - len(MCAP0_MAGIC)))
+        end = stream.read()
+    if size == 0:
+        raise RecordingError(f"{path} is empty")
+    if begin != MCAP0_MAGIC:
+        raise RecordingError(f"{path} is not an MCAP file (it begins with {begin!r})")
+    if size < 2 * len(MCAP0_MAGIC) or end != MCAP0_MAGIC:
+        raise RecordingError(
+            f"{path} is cut off: its recorder was killed, still writes, or the copy is incomplete. "
+            f"`hpccd doctor {path} --recover OUT.mcap` saves everything that can be read"
+        )
+
+
+@contextlib.contextmanager
+def _explained(path):
+    """Turn what the MCAP library and its decompressors raise on damaged bytes into one clear error."""
+    try:
+        yield
+    except DAMAGE as error:
+        raise RecordingError(
+            f"{path} is damaged ({type(error).__name__}: {error}). "
+            f"`hpccd doctor {path} --recover OUT.mcap` saves everything that can be read"
+        ) from error

@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Read all parameters of a running node over its parameter services."""
+
+import time
+
+import rclpy
+from rcl_interfaces.srv import GetParameters, ListParameters
+from rclpy.parameter import parameter_value_to_python
+
+from hpccd_ros.errors import UserError
+
+
+def fetch(node, remote: str, wait: float) -> dict:
+    """{name: value} of all parameters of the node with the full name `remote`, asked through `node`.
+
+    Raises UserError naming the nodes that are there if `remote` does not answer within `wait` seconds.
+    """
+    deadline = time.monotonic() + wait
+    names = _call(node, ListParameters, f"{remote}/list_parameters", ListParameters.Request(), deadline, remote)
+    request = GetParameters.Request(names=names.result.names)
+    values = _call(node, GetParameters, f"{remote}/get_parameters", request, deadline, remote)
+    pairs = zip(request.names, values.values, strict=True)
+    return {name: _plain(parameter_value_to_python(value)) for name, value in pairs}
+
+
+def _call(node, service, name, request, deadline, remote):
+    client = node.create_client(service, name)
+    try:
+        while not client.service_is_ready():
+            if time.monotonic() > deadline:
+                raise UserError(f"no node {remote} found{_nodes(node)}: start it, name another with --node, or --wait")
+            rclpy.spin_once(node, timeout_sec=0.05)
+        future = client.call_async(request)
+        rclpy.spin_until_future_complete(node, future, timeout_sec=max(1.0, deadline - time.monotonic()))
+        if not future.done():
+            raise UserError(f"the node {remote} does not answer the call of {name}")
+        return future.result()
+    finally:
+        node.destroy_client(client)
+
+
+def _nodes(node) -> str:
+    own = (node.get_name(), node.get_namespace())
+    others = sorted({f"{ns.rstrip('/')}/{name}" for name, ns in node.get_node_names_and_namespaces()
+                     if (name, ns) != own})
+    return f" (there are: {', '.join(others)})" if others else " (no other node is running)"
+
+
+def _plain(value):
+    # Array parameters arrive as array.array or tuples: JSON and comparison want lists.
+    return value if value is None or isinstance(value, (bool, int, float, str)) else list(value)

@@ -1,0 +1,157 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The picture of one step: shaded meshes, contacts as points coloured by their time, and the step in its context."""
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
+
+from hpccd_ros.picture.camera import Camera
+from hpccd_ros.picture.raster import rasterize
+from hpccd_ros.picture.shading import shade
+
+BACKGROUND = "#10141c"
+INK = "#e8ecf4"
+FAINT = "#8a93a6"
+# Calm colours that leave yellow to red to the contacts.
+MESH_COLOURS = ("#5f87b8", "#c9ced8", "#6f9f91", "#9886b5", "#8fa3b8", "#a0937d")
+TOC_COLOURS = colormaps["plasma_r"]
+SUPERSAMPLING = 2
+LIGHT = np.array([0.35, -0.55, 1.25])
+
+
+@dataclasses.dataclass
+class Step:
+    """What is drawn. Vertices and faces of each mesh at the end of the step; contacts at their points (N,3)."""
+
+    meshes: list[tuple[str, np.ndarray, np.ndarray]]
+    points: np.ndarray
+    toc: np.ndarray
+    n_vertex_face: int
+    title: str
+    facts: list[str]
+
+
+@dataclasses.dataclass
+class History:
+    """Contacts and milliseconds of every frame of a recording, and which one is drawn."""
+
+    frames: np.ndarray
+    contacts: np.ndarray
+    milliseconds: np.ndarray | None
+    marked: int
+
+
+def draw(step: Step, path, history: History | None = None, *, azimuth=-60.0, elevation=26.0, size=(1280, 860)):
+    """Write the picture of `step` to `path` (PNG, or another format that matplotlib writes, by its suffix)."""
+    image, camera, depth = render(step.meshes, size, azimuth, elevation)
+    figure = Figure(figsize=(16, 9), dpi=120, facecolor=BACKGROUND)
+    FigureCanvasAgg(figure)
+    axes = figure.add_axes((0.0, 0.13, 0.80, 0.77))
+    _draw_scene(axes, image, camera, depth, step)
+    _write_title(figure, step)
+    _draw_times(figure.add_axes((0.845, 0.30, 0.10, 0.52)), step)
+    if history is not None:
+        _draw_history(figure.add_axes((0.045, 0.055, 0.90, 0.085)), history)
+    figure.savefig(Path(path), facecolor=BACKGROUND)
+
+
+def render(meshes, size, azimuth, elevation):
+    """(image (h,w,4) sRGB with alpha, camera, depth (h,w)) of meshes [(name, vertices, faces)]."""
+    vertices = np.concatenate([np.asarray(v, dtype=np.float64) for _, v, _ in meshes])
+    offsets = np.cumsum([0] + [len(v) for _, v, _ in meshes])
+    faces = np.concatenate([np.asarray(f, dtype=np.int64) + o for (_, _, f), o in zip(meshes, offsets, strict=False)])
+    owner = np.repeat(np.arange(len(meshes)), [len(f) for _, _, f in meshes])
+    colours = np.array([_linear(to_rgb(MESH_COLOURS[i % len(MESH_COLOURS)])) for i in range(len(meshes))])[owner]
+    large = (size[0] * SUPERSAMPLING, size[1] * SUPERSAMPLING)
+    camera = Camera(vertices, large, azimuth, elevation)
+    buffers = rasterize(camera.project(vertices)[faces], large)
+    light = LIGHT @ np.array([[np.cos(np.radians(azimuth + 60)), np.sin(np.radians(azimuth + 60)), 0],
+                              [-np.sin(np.radians(azimuth + 60)), np.cos(np.radians(azimuth + 60)), 0], [0, 0, 1]])
+    linear = shade(buffers, camera, vertices, faces, colours, light)
+    alpha = (buffers.triangle >= 0).astype(np.float64)[..., None]
+    linear = np.concatenate([linear, alpha], axis=2)
+    h, w = size[1], size[0]
+    linear = linear.reshape(h, SUPERSAMPLING, w, SUPERSAMPLING, 4).mean(axis=(1, 3))
+    alpha = linear[..., 3:]
+    rgb = _srgb(np.clip(linear[..., :3] / np.maximum(alpha, 1e-9), 0, 1))
+    return np.concatenate([rgb, alpha], axis=2), camera, buffers.depth
+
+
+def _draw_scene(axes, image, camera, depth, step):
+    axes.imshow(image, extent=(0, image.shape[1], image.shape[0], 0), interpolation="lanczos")
+    axes.set_axis_off()
+    if not len(step.points):
+        return
+    seen = camera.project(step.points)
+    column = np.clip(seen[:, 0].astype(int), 0, depth.shape[1] - 1)
+    row = np.clip(seen[:, 1].astype(int), 0, depth.shape[0] - 1)
+    span = np.ptp(depth[np.isfinite(depth)])
+    hidden = seen[:, 2] > depth[row, column] + 0.01 * span
+    x, y = seen[:, 0] / SUPERSAMPLING, seen[:, 1] / SUPERSAMPLING
+    size = float(np.clip(9000 / len(x), 3.0, 60.0))
+    late_first = np.argsort(-step.toc, kind="stable")
+    for these, alpha, scale in ((hidden, 0.28, 0.5), (~hidden, 1.0, 1.0)):
+        index = late_first[these[late_first]]
+        colours = TOC_COLOURS(step.toc[index])
+        if scale == 1.0:
+            axes.scatter(x[index], y[index], s=size * 5, c=colours, alpha=0.10, linewidths=0)
+        axes.scatter(x[index], y[index], s=size * scale, c=colours, alpha=alpha, linewidths=0)
+
+
+def _write_title(figure, step):
+    figure.text(0.03, 0.945, step.title, color=INK, fontsize=21, fontweight="bold", va="center")
+    figure.text(0.03, 0.905, "   ·   ".join(step.facts), color=FAINT, fontsize=11.5, va="center")
+
+
+def _draw_times(axes, step):
+    edges = np.linspace(0, 1, 41)
+    vf, ee = step.toc[: step.n_vertex_face], step.toc[step.n_vertex_face :]
+    counts = np.histogram(np.concatenate([vf, ee]), edges)[0]
+    middle = (edges[1:] + edges[:-1]) / 2
+    axes.barh(middle, counts, height=0.9 / 40, color=TOC_COLOURS(middle))
+    axes.set_ylim(0, 1)
+    axes.set_facecolor(BACKGROUND)
+    axes.set_title("time of contact", color=INK, fontsize=12, pad=12)
+    axes.yaxis.tick_right()
+    axes.set_yticks([0, 0.25, 0.5, 0.75, 1], ["0  start", "¼", "½", "¾", "1  end"])
+    axes.set_xlabel("contacts", color=FAINT, fontsize=9)
+    _style(axes)
+
+
+def _draw_history(axes, history):
+    axes.set_facecolor(BACKGROUND)
+    axes.fill_between(history.frames, history.contacts, step="mid", color="#e0668c", alpha=0.35, linewidth=0)
+    axes.step(history.frames, history.contacts, where="mid", color="#e0668c", linewidth=1.2)
+    axes.axvline(history.marked, color=INK, linewidth=1, alpha=0.8)
+    axes.set_xlim(history.frames[0], history.frames[-1])
+    axes.set_ylim(0, max(1, history.contacts.max() * 1.1))
+    axes.set_ylabel("contacts", color="#e0668c", fontsize=9)
+    axes.set_xlabel("frame", color=FAINT, fontsize=9, labelpad=1)
+    _style(axes)
+    if history.milliseconds is not None:
+        times = axes.twinx()
+        times.plot(history.frames, history.milliseconds, color="#7fd1e0", linewidth=1.2)
+        times.set_ylim(0, np.nanmax(history.milliseconds) * 1.15)
+        times.set_ylabel("ms a frame", color="#7fd1e0", fontsize=9)
+        _style(times)
+
+
+def _style(axes):
+    axes.tick_params(colors=FAINT, labelsize=9, length=3)
+    for side, spine in axes.spines.items():
+        spine.set_visible(side in ("bottom",))
+        spine.set_color(FAINT)
+
+
+def _linear(srgb):
+    c = np.asarray(srgb, dtype=np.float64)
+    return np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4)
+
+
+def _srgb(linear):
+    return np.where(linear <= 0.0031308, linear * 12.92, 1.055 * np.maximum(linear, 0) ** (1 / 2.4) - 0.055)

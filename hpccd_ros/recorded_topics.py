@@ -1,0 +1,47 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which topics a recording of a node holds, and the quality of service to ask of each."""
+
+import dataclasses
+
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+
+TOPOLOGY = "hpccd/msg/MeshTopology"
+VERTICES = "hpccd/msg/MeshVertices"
+POINTS = "sensor_msgs/msg/PointCloud2"
+CONTACTS = "hpccd/msg/ContactArray"
+
+
+@dataclasses.dataclass(frozen=True)
+class Wanted:
+    """A topic to record: `name` relative or absolute, `type_name` "pkg/msg/Name", `latched`: transient local."""
+
+    name: str
+    type_name: str
+    latched: bool = False
+
+
+def of_node(parameters: dict) -> list[Wanted]:
+    """The topics of a node with these parameters, inputs before outputs."""
+    wanted = []
+    for mesh in parameters["meshes"]:
+        clouds = parameters.get(f"mesh.{mesh}.input") == "points"
+        wanted.append(Wanted(f"meshes/{mesh}/topology", TOPOLOGY, latched=True))
+        wanted.append(Wanted(f"meshes/{mesh}/{'points' if clouds else 'vertices'}", POINTS if clouds else VERTICES))
+    return [*wanted, Wanted("contacts", CONTACTS)]
+
+
+def subscription_qos(node, topic: str, latched: bool, depth: int) -> QoSProfile:
+    """What to ask of the publishers of `topic` (resolved name), so that all that others receive is received here.
+
+    A reader that asks for more than a writer offers is not served at all. So ask for what is offered by those
+    publishers that are there, else for what other readers of the topic ask, else for reliable delivery.
+    """
+    offers = [p.qos_profile.reliability for p in node.get_publishers_info_by_topic(topic)]
+    asked = [s.qos_profile.reliability for s in node.get_subscriptions_info_by_topic(topic)]
+    best_effort = ReliabilityPolicy.BEST_EFFORT in (offers or asked)
+    return QoSProfile(
+        history=HistoryPolicy.KEEP_LAST,
+        depth=depth,
+        reliability=ReliabilityPolicy.BEST_EFFORT if best_effort else ReliabilityPolicy.RELIABLE,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
+    )

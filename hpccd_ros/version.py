@@ -1,0 +1,12 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The version of the installed package; pyproject.toml is the one place that states it."""
+
+from importlib.metadata import PackageNotFoundError, version
+
+
+def package_version() -> str:
+    """Version of the installed distribution, or "not installed" where the code runs from a bare checkout."""
+    try:
+        return version("hpccd")
+    except PackageNotFoundError:
+        return "not installed"
