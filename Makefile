@@ -20,6 +20,11 @@ export CMAKE_BUILD_PARALLEL_LEVEL := $(JOBS)
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 # The wheels' bootstrapper marks its environment: the mark of another environment must not reach this one.
 unexport PYTHONPATH PYTHONHOME _ROS_WHEELS_BOOTSTRAP_COMPLETE
+# A ROS installation sourced in this shell must not mix with the wheels, which hold one RMW implementation only.
+unexport AMENT_PREFIX_PATH CMAKE_PREFIX_PATH COLCON_PREFIX_PATH RMW_IMPLEMENTATION
+ifdef ROS_DISTRO
+unexport LD_LIBRARY_PATH
+endif
 
 # Stamps. A PYTHON named on the command line has one of its own, so that naming another one is noticed.
 ENVIRONMENT := $(VENV)/.hpccd-environment$(if $(PYTHON),-$(subst /,-,$(PYTHON)))

@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The files that describe the package agree with each other."""
+
+import re
+import tomllib
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+
+import pytest
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
+
+ROOT = Path(__file__).resolve().parents[2]
+PYPROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
+SPDX = "SPDX-License-Identifier: Apache-2.0"
+INSTALLED_EXTRAS = ("test", "lint", "interop")
+
+
+def test_one_version():
+    cmake = re.search(r"project\(hpccd VERSION (\S+)", (ROOT / "CMakeLists.txt").read_text()).group(1)
+    xml = ElementTree.parse(ROOT / "package.xml").findtext("version")
+    changelog = re.search(r"^(\d+\.\d+\.\d+) \(", (ROOT / "CHANGELOG.rst").read_text(), re.MULTILINE).group(1)
+    assert {cmake, xml, changelog} == {PYPROJECT["project"]["version"]}
+
+
+@pytest.mark.parametrize("python", ["3.11", "3.12"])
+def test_each_requirement_is_pinned_to_a_version_that_it_allows(python):
+    lines = (ROOT / "requirements" / f"constraints-{python}.txt").read_text().splitlines()
+    pins = {}
+    for line in lines:
+        if not line.startswith("#"):
+            name, version = line.split("==")
+            pins[canonicalize_name(name)] = version
+    extras = PYPROJECT["project"]["optional-dependencies"]
+    required = PYPROJECT["build-system"]["requires"] + PYPROJECT["project"]["dependencies"]
+    for text in required + [line for extra in INSTALLED_EXTRAS for line in extras[extra]]:
+        requirement = Requirement(text)
+        name = canonicalize_name(requirement.name)
+        assert name in pins, f"{text} is not pinned for Python {python}: make pin"
+        assert requirement.specifier.contains(pins[name]), f"{text} excludes the pin {pins[name]}: make pin"
+
+
+def test_run_time_requirements_are_there_at_build_time_with_the_same_version():
+    """The interfaces are generated against the message packages that are used at run time."""
+    build = {Requirement(text).name: text for text in PYPROJECT["build-system"]["requires"]}
+    for text in PYPROJECT["project"]["dependencies"]:
+        if text.startswith("ros-jazzy-"):
+            assert build[Requirement(text).name] == text
+
+
+def test_each_source_file_names_its_licence():
+    suffixes = {".py", ".h", ".cpp", ".cu", ".sh", ".cmake", ".msg", ".srv", ".yaml"}
+    folders = ("hpccd_core", "hpccd_ros", "msg", "srv", "cmake", "scripts", "config", "test")
+    missing = []
+    for folder in folders:
+        for file in (ROOT / folder).rglob("*"):
+            if file.suffix in suffixes and SPDX not in file.read_text()[:300]:
+                missing.append(str(file.relative_to(ROOT)))
+    assert missing == []
