@@ -1,0 +1,287 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Messages <-> numpy: views where possible, each kind of bad message refused with its reason."""
+
+import math
+from array import array
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from sensor_msgs.msg import PointCloud2, PointField
+
+from hpccd.msg import ContactArray, MeshTopology, MeshVertices
+from hpccd_ros import convert
+from hpccd_ros.convert import InvalidMessageError, Layout
+from hpccd_ros.drops import Reason
+
+POINTS = np.arange(12, dtype=np.float32).reshape(4, 3) * 0.5
+
+
+def cloud(points, *, names="xyz", offsets=None, step=None, kinds=None, height=1, row_pad=0, big=False):
+    """PointCloud2 of (n,3) points; one datatype an axis; extra bytes are filled with 0xAB."""
+    kinds = kinds or [PointField.FLOAT32] * 3
+    types = [np.dtype({PointField.FLOAT32: "f4", PointField.FLOAT64: "f8"}.get(k, "i4")) for k in kinds]
+    offsets = offsets or np.cumsum([0, *(t.itemsize for t in types[:2])]).tolist()
+    step = step or max(o + t.itemsize for o, t in zip(offsets, types, strict=True))
+    width = len(points) // height
+    row_step = width * step + row_pad
+    data = np.full((height, row_step), 0xAB, np.uint8)
+    for i, point in enumerate(points):
+        row, column = divmod(i, width)
+        for axis in range(3):
+            raw = np.frombuffer(np.asarray(point[axis], types[axis]).tobytes(), np.uint8)
+            at = column * step + offsets[axis]
+            data[row, at : at + len(raw)] = raw
+    message = PointCloud2(height=height, width=width, point_step=step, row_step=row_step, is_bigendian=big)
+    message.fields = [
+        PointField(name=n, offset=o, datatype=k, count=1) for n, o, k in zip(names, offsets, kinds, strict=True)
+    ]
+    message.data = array("B", data.tobytes())
+    return message
+
+
+def refused(reason, read, *args):
+    with pytest.raises(InvalidMessageError) as caught:
+        read(*args)
+    assert caught.value.reason == reason
+    return str(caught.value)
+
+
+def test_stamps():
+    for ns in (0, 1, 999_999_999, 1_000_000_000, 1_700_000_000_123_456_789, -1):
+        assert convert.stamp_to_ns(convert.ns_to_stamp(ns)) == ns
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64, np.uint32, np.uint8])
+def test_array_fields(dtype):
+    values = np.arange(24).astype(dtype).reshape(4, 6)
+    field = convert.to_field(values[:, ::2])
+    assert np.array_equal(np.frombuffer(field, dtype), values[:, ::2].ravel())
+    assert len(convert.to_field(values[:0])) == 0
+
+
+def test_topology_is_a_view():
+    faces = np.array([[0, 1, 2], [2, 1, 3]])
+    message = convert.topology_message(faces, 5, version=7)
+    topology = convert.topology_from_message(message, 100, 100)
+    assert (topology.version, topology.n_vertices) == (7, 5)
+    assert topology.faces.dtype == np.uint32 and np.array_equal(topology.faces, faces)
+    assert np.shares_memory(topology.faces, np.frombuffer(message.faces, np.uint32))
+
+
+def test_bad_topologies():
+    def message(faces, n):
+        return MeshTopology(n_vertices=n, faces=array("I", faces))
+
+    text = refused(Reason.INDEX_RANGE, convert.topology_from_message, message([0, 1, 2, 0, 2, 3], 3), 100, 100)
+    assert "face 1 names vertex 3" in text
+    refused(Reason.MALFORMED, convert.topology_from_message, message([0, 1], 3), 100, 100)
+    refused(Reason.TOO_LARGE, convert.topology_from_message, message([0, 1, 2] * 3, 3), 100, 2)
+    refused(Reason.TOO_LARGE, convert.topology_from_message, message([0, 1, 2], 101), 100, 2)
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_vertices_are_a_view(dtype):
+    points = POINTS.astype(dtype)
+    message = convert.vertices_message(points, 5, step=3)
+    vertices = convert.vertices_from_message(message, 100)
+    assert vertices.dtype == dtype and np.array_equal(vertices, points)
+    field = message.vertices_f32 if dtype == np.float32 else message.vertices_f64
+    assert np.shares_memory(vertices, np.frombuffer(field, dtype))
+
+
+def test_vertices_of_another_type_are_not_sent():
+    with pytest.raises(TypeError, match="use float32 or float64"):
+        convert.vertices_message(np.zeros((3, 3), np.int32), 0)
+
+
+def test_bad_vertices():
+    read = convert.vertices_from_message
+    refused(Reason.MALFORMED, read, MeshVertices(), 100)
+    both = MeshVertices(vertices_f32=array("f", [0] * 3), vertices_f64=array("d", [0] * 3))
+    refused(Reason.MALFORMED, read, both, 100)
+    refused(Reason.MALFORMED, read, MeshVertices(vertices_f32=array("f", [0] * 4)), 100)
+    refused(Reason.TOO_LARGE, read, convert.vertices_message(POINTS, 0), 3)
+    for bad in (math.nan, math.inf, -math.inf):
+        for dtype in (np.float32, np.float64):
+            points = POINTS.astype(dtype)
+            points[2, 1] = bad
+            assert "vertex 2" in refused(Reason.NOT_FINITE, read, convert.vertices_message(points, 0), 100)
+
+
+def test_largest_finite_values_are_finite():
+    points = np.full((4, 3), np.finfo(np.float64).max)
+    assert np.array_equal(convert.vertices_from_message(convert.vertices_message(points, 0), 9), points)
+
+
+F32, F64 = PointField.FLOAT32, PointField.FLOAT64
+
+
+@pytest.mark.parametrize(
+    "layout",
+    [
+        {},
+        {"kinds": [F64] * 3},
+        {"offsets": [0, 4, 8], "step": 16},
+        {"names": "zxy"},
+        {"offsets": [8, 4, 0]},
+        {"offsets": [1, 6, 11], "step": 17},
+        {"kinds": [F32, F64, F32]},
+        {"height": 2},
+        {"height": 2, "row_pad": 5},
+        {"row_pad": 7},
+        {"kinds": [F64] * 3, "offsets": [16, 0, 8], "step": 32, "height": 2, "row_pad": 8},
+    ],
+    ids=str,
+)
+def test_cloud_layouts(layout):
+    names = layout.get("names", "xyz")
+    points = POINTS[:, ["xyz".index(n) for n in names]]
+    message = cloud(points, **layout)
+    got = convert.vertices_from_cloud(message, 100)
+    assert np.array_equal(got, POINTS)
+    assert got.flags.c_contiguous and got.flags.aligned
+    assert got.dtype == (np.float64 if F64 in layout.get("kinds", []) else np.float32)
+
+
+def test_dense_cloud_is_a_view():
+    message = cloud(POINTS)
+    assert np.shares_memory(convert.vertices_from_cloud(message, 100), np.frombuffer(message.data, np.uint8))
+
+
+def test_cloud_of_one_row_may_leave_row_step_empty():
+    message = cloud(POINTS)
+    message.row_step = 0
+    assert np.array_equal(convert.vertices_from_cloud(message, 100), POINTS)
+
+
+@given(st.data())
+@settings(max_examples=60, deadline=None)
+def test_any_cloud_layout(data):
+    kinds = data.draw(st.lists(st.sampled_from([F32, F64]), min_size=3, max_size=3))
+    sizes = [4 if k == F32 else 8 for k in kinds]
+    order = data.draw(st.permutations(range(3)))
+    gaps = data.draw(st.lists(st.integers(0, 5), min_size=4, max_size=4))
+    offsets, at = [0, 0, 0], 0
+    for axis, gap in zip(order, gaps, strict=False):
+        at += gap
+        offsets[axis] = at
+        at += sizes[axis]
+    message = cloud(
+        POINTS, kinds=kinds, offsets=offsets, step=at + gaps[3],
+        height=data.draw(st.sampled_from([1, 2, 4])), row_pad=data.draw(st.integers(0, 9)),
+    )  # fmt: skip
+    assert np.array_equal(convert.vertices_from_cloud(message, 100), POINTS)
+
+
+def test_bad_clouds():
+    read = convert.vertices_from_cloud
+    assert "swap the bytes" in refused(Reason.BIG_ENDIAN, read, cloud(POINTS, big=True), 100)
+    assert "'z'" in refused(Reason.MALFORMED, read, cloud(POINTS, names="xyw"), 100)
+    integers = cloud(POINTS, kinds=[F32, PointField.INT32, F32])
+    assert "'y'" in refused(Reason.UNSUPPORTED_TYPE, read, integers, 100)
+    several = cloud(POINTS)
+    several.fields[0].count = 3
+    refused(Reason.UNSUPPORTED_TYPE, read, several, 100)
+    outside = cloud(POINTS)
+    outside.fields[2].offset = 9
+    assert "point_step is 12" in refused(Reason.MALFORMED, read, outside, 100)
+    short = cloud(POINTS)
+    short.data = short.data[:-1]
+    assert "need 48" in refused(Reason.MALFORMED, read, short, 100)
+    overlapping = cloud(POINTS, height=2)
+    overlapping.row_step = 20
+    refused(Reason.MALFORMED, read, overlapping, 100)
+    refused(Reason.MALFORMED, read, PointCloud2(fields=cloud(POINTS).fields, point_step=12), 100)
+    refused(Reason.TOO_LARGE, read, cloud(POINTS), 3)
+    bad = POINTS.copy()
+    bad[3, 0] = math.nan
+    refused(Reason.NOT_FINITE, read, cloud(bad), 100)
+
+
+def test_cloud_that_claims_to_be_huge():
+    message = cloud(POINTS)
+    message.width = message.height = 2**32 - 1
+    refused(Reason.TOO_LARGE, convert.vertices_from_cloud, message, 100)
+
+
+LAYOUT = Layout(("cloth", "ball", "floor"), np.array([0, 10, 14, 20]), np.array([0, 8, 12, 20]))
+
+
+def contacts(vf, ee, vf_toc, ee_toc):
+    n = len(vf) + len(ee)
+    return SimpleNamespace(
+        vf=np.array(vf, np.uint32).reshape(-1, 2),
+        ee=np.array(ee, np.uint32).reshape(-1, 4),
+        vf_toc=np.array(vf_toc, np.float64),
+        ee_toc=np.array(ee_toc, np.float64),
+        points=np.arange(3.0 * n).reshape(-1, 3),
+        normals=-np.arange(3.0 * n).reshape(-1, 3),
+        first_toc=min([*vf_toc, *ee_toc], default=math.inf),
+        hash=2**64 - 3,
+    )
+
+
+SAMPLE = contacts(
+    [[3, 9], [12, 0], [19, 11]], [[1, 2, 10, 13], [4, 5, 6, 7], [11, 12, 15, 19]], [0.5, 0.25, 0.5], [0.5, 0.0, 1.0]
+)
+
+
+def filled(found, layout=LAYOUT, **options):
+    message = ContactArray()
+    convert.fill_contacts(message, found, layout, **options)
+    return message
+
+
+def test_contacts_in_local_indices():
+    message = filled(SAMPLE)
+    none = ContactArray.NONE
+    assert message.mesh_names == ["cloth", "ball", "floor"]
+    assert list(message.kind) == [0, 0, 0, 1, 1, 1]
+    assert list(message.mesh_a) == [0, 1, 2, 0, 0, 1]
+    assert list(message.mesh_b) == [1, 0, 1, 1, 0, 2]
+    assert list(message.features_a) == [3, none, 2, none, 5, none, 1, 2, 4, 5, 1, 2]
+    assert list(message.features_b) == [1, none, 0, none, 3, none, 0, 3, 6, 7, 1, 5]
+    assert (message.first_toc, message.total, message.truncated, message.hash) == (0.0, 6, False, 2**64 - 3)
+
+
+def test_contacts_read_back():
+    for found, layout in [
+        (SAMPLE, LAYOUT),
+        (contacts([], [], [], []), LAYOUT),
+        (SAMPLE, Layout(("all",), np.array([0, 20]), np.array([0, 20]))),
+    ]:
+        back = convert.read_contacts(filled(found, layout), layout)
+        for name in ("vf", "vf_toc", "ee", "ee_toc", "points", "normals"):
+            value = getattr(back, name)
+            assert np.array_equal(value, getattr(found, name)), name
+            assert value.dtype == getattr(found, name).dtype
+
+
+def test_no_contacts():
+    message = filled(contacts([], [], [], []))
+    assert (message.total, message.first_toc, len(message.toc)) == (0, math.inf, 0)
+
+
+@pytest.mark.parametrize("limit", range(1, 8))
+def test_truncation_keeps_the_earliest_in_canonical_order(limit):
+    message = filled(SAMPLE, max_contacts=limit)
+    toc = np.concatenate([SAMPLE.vf_toc, SAMPLE.ee_toc])
+    expected = np.sort(np.argsort(toc, kind="stable")[:limit])
+    assert list(message.toc) == toc[expected].tolist()
+    assert np.array_equal(np.frombuffer(message.points).reshape(-1, 3), SAMPLE.points[expected])
+    assert message.total == 6 and message.truncated == (limit < 6)
+    assert message.first_toc == 0.0 and message.hash == SAMPLE.hash
+    back = convert.read_contacts(message, LAYOUT)
+    assert np.array_equal(back.vf, SAMPLE.vf[expected[expected < 3]])
+    assert np.array_equal(back.ee, SAMPLE.ee[expected[expected >= 3] - 3])
+
+
+def test_outputs_not_asked_for_are_not_sent():
+    message = filled(SAMPLE, outputs=("normals",))
+    assert len(message.points) == 0 and len(message.normals) == 18
+    nothing = SimpleNamespace(**{**vars(SAMPLE), "points": None, "normals": np.empty((0, 3))})
+    message = filled(nothing)
+    assert len(message.points) == 0 and len(message.normals) == 0

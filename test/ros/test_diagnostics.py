@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What is said on /diagnostics, and the markers."""
+
+import numpy as np
+from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import DiagnosticStatus
+from visualization_msgs.msg import Marker
+
+from hpccd_ros.diagnostics import Metrics, Reporter, percentiles
+from hpccd_ros.drops import DropCounter, Reason
+from hpccd_ros.markers import contact_markers
+
+
+class Fixture:
+    def __init__(self):
+        self.metrics, self.drops, self.refused = Metrics(), DropCounter(), DropCounter()
+        self.reporter = Reporter("/hpccd", self.metrics, self.drops, self.refused)
+
+    def report(self, **changes):
+        given = {"state": "active", "waiting": 0, "restarts": 0, "static_taken": 0, "last_refusal": ""}
+        given |= {"links": {}, "warnings": [], "service": {}} | changes
+        message = self.reporter.report(Time(sec=3), **given)
+        assert message.header.stamp.sec == 3
+        return {s.name: (s.level, s.message, {v.key: v.value for v in s.values}) for s in message.status}
+
+
+def test_quiet_node_is_stale():
+    level, text, _ = Fixture().report()["/hpccd: frames"]
+    assert level == DiagnosticStatus.STALE and "no frames" in text
+
+
+def test_frames_and_detections():
+    node = Fixture()
+    for _ in range(3):
+        node.metrics.frame_received("cloth", 2.0)
+    node.metrics.first_frame(1)
+    node.metrics.detected(2, 8.0, 5.0, {"bvh": 1.0, "total": 4.0}, {"backend": "cpu"})
+    report = node.report()
+    level, _, values = report["/hpccd: frames"]
+    assert level == DiagnosticStatus.OK
+    assert values["received"] == values["answered"] == "3" and values["dropped"] == "0"
+    assert float(values["rate_hz.cloth"]) > 0
+    assert values["transport_ms.p50"] == "2.00"
+    level, _, values = report["/hpccd: detection"]
+    assert level == DiagnosticStatus.OK
+    assert (values["detections"], values["first_frames"], values["backend"]) == ("1", "1", "cpu")
+    assert values["latency_ms.p99"] == "8.00" and values["detect_ms.max"] == "5.00"
+    assert values["stage_ms.bvh"] == "1.000"
+    assert float(report["/hpccd: process"][2]["memory_mb"]) > 1
+
+
+def test_drops_warn_once_and_stay_counted():
+    node = Fixture()
+    node.drops.count("cloth", Reason.OVERLOAD, n=4)
+    node.drops.count("ball", Reason.NOT_FINITE, "vertex 1 is nan")
+    node.refused.count("ball", Reason.OLD_TOPOLOGY, "version 1")
+    level, text, values = node.report(last_refusal="ball: version 1")["/hpccd: frames"]
+    assert level == DiagnosticStatus.WARN and "5 frames dropped" in text and "1 topologies refused" in text
+    assert values["dropped"] == "5" and values["dropped.overload"] == "4"
+    assert values["dropped.ball.not_finite"] == "1" and values["topologies_refused.ball.old_topology"] == "1"
+    assert values["last_refusal"] == "ball: version 1"
+    level, _, values = node.report()["/hpccd: frames"]
+    assert level == DiagnosticStatus.STALE and values["dropped"] == "5"
+
+
+def test_failure_is_an_error_until_the_next_success():
+    node = Fixture()
+    node.metrics.failed("MemoryError: 3 GB")
+    level, text, values = node.report()["/hpccd: detection"]
+    assert level == DiagnosticStatus.ERROR and "3 GB" in text and values["failures"] == "1"
+    node.metrics.detected(1, 1.0, 1.0, {}, {})
+    assert node.report()["/hpccd: detection"][0] == DiagnosticStatus.OK
+
+
+def test_warnings_are_told():
+    level, text, values = Fixture().report(warnings=["2 publishers on /x"], links={"message_lost.x": 3})[
+        "/hpccd: frames"
+    ]
+    assert level == DiagnosticStatus.WARN and "2 publishers" in text and values["message_lost.x"] == "3"
+
+
+def test_percentiles():
+    assert percentiles([]) == {}
+    assert percentiles(list(range(101))) == {"p50": "50.00", "p95": "95.00", "p99": "99.00", "max": "100.00"}
+
+
+def markers(n, n_vf, limit):
+    points, normals = np.arange(3.0 * n).reshape(n, 3), np.tile([0.0, 0.0, 1.0], (n, 1))
+    out = contact_markers(
+        points, normals, n_vf, stamp=Time(sec=1), frame_id="world", size=0.1, limit=limit
+    ).markers
+    assert [m.ns for m in out] == ["vertex_face", "edge_edge", "normals"]
+    assert len({(m.ns, m.id) for m in out}) == 3 and all(m.header.frame_id == "world" for m in out)
+    return out
+
+
+def test_markers_hold_every_contact():
+    vertex_face, edge_edge, normals = markers(5, 2, 100)
+    assert [(p.x, p.y, p.z) for p in vertex_face.points] == [(0, 1, 2), (3, 4, 5)]
+    assert len(edge_edge.points) == 3 and len(normals.points) == 10
+    assert normals.points[1].z - normals.points[0].z == 1.0
+
+
+def test_markers_are_thinned_out_evenly():
+    vertex_face, edge_edge, _ = markers(1000, 500, 100)
+    assert len(vertex_face.points) == len(edge_edge.points) == 50
+
+
+def test_no_contacts_delete_the_markers():
+    assert all(m.action == Marker.DELETE for m in markers(0, 0, 10))

@@ -1,0 +1,293 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Rules of the assembler, one test a rule. No ROS."""
+
+import numpy as np
+import pytest
+
+from hpccd_ros.drops import DropCounter, Reason
+from hpccd_ros.frames import FrameAssembler
+from hpccd_ros.messages import MeshFrame, MeshSettings, Topology
+
+FACES = np.array([[0, 1, 2]], np.uint32)
+
+
+def topology(version=0, n_vertices=3, faces=FACES):
+    return Topology(version, n_vertices, faces)
+
+
+def frame(stamp, version=0, n=3, value=0.0, step=None, frame_id=""):
+    return MeshFrame(stamp, np.full((n, 3), value, np.float32), version, step, frame_id, received=float(stamp))
+
+
+class Scene:
+    """An assembler with its counters."""
+
+    def __init__(self, *meshes, **options):
+        self.drops, self.refused = DropCounter(), DropCounter()
+        self.restart_texts = []
+        meshes = [m if isinstance(m, MeshSettings) else MeshSettings(m) for m in meshes]
+        self.assembler = FrameAssembler(
+            meshes, self.drops, self.refused, on_restart=self.restart_texts.append, **options
+        )
+        self.sent = 0
+
+    def topologies(self, *names):
+        for name in names:
+            assert self.assembler.set_topology(name, topology()) == []
+        return self
+
+    def add(self, mesh, *args, new_publisher=False, **kwargs):
+        self.sent += 1
+        return self.assembler.add(mesh, frame(*args, **kwargs), new_publisher)
+
+    def dropped(self):
+        return {str(reason): n for reason, n in self.drops.by_reason().items()}
+
+
+def test_one_mesh_each_message_is_a_frame():
+    scene = Scene("cloth").topologies("cloth")
+    (first,) = scene.add("cloth", 10, value=1.0, step=7, frame_id="world")
+    (second,) = scene.add("cloth", 20, value=2.0, step=8)
+    assert (first.stamp, first.step, first.frame_id) == (10, 7, "world")
+    assert (second.stamp, second.step, second.frame_id) == (20, 8, "world")
+    assert first.vertices[0][0, 0] == 1.0 and second.received == 20.0
+    assert first.same_scene(second)
+    assert scene.drops.total == 0
+
+
+def test_frames_without_a_step_are_numbered():
+    scene = Scene("cloth").topologies("cloth")
+    assert [scene.add("cloth", stamp, step=None)[0].step for stamp in (1, 2, 3)] == [0, 1, 2]
+
+
+def test_two_meshes_are_joined_by_stamp_in_the_order_of_the_scene():
+    scene = Scene("cloth", "ball").topologies("ball", "cloth")
+    assert scene.add("ball", 10, value=2.0) == []
+    assert scene.add("ball", 20, value=4.0) == []
+    (first,) = scene.add("cloth", 10, value=1.0)
+    (second,) = scene.add("cloth", 20, value=3.0)
+    assert [v[0, 0] for v in first.vertices] == [1.0, 2.0]
+    assert [v[0, 0] for v in second.vertices] == [3.0, 4.0]
+    assert first.fresh == ("cloth", "ball")
+    assert scene.drops.total == 0 and scene.assembler.waiting == 0
+
+
+def test_incomplete_frames_before_a_complete_one_are_counted():
+    scene = Scene("cloth", "ball").topologies("cloth", "ball")
+    for stamp in (1, 2, 3):
+        scene.add("cloth", stamp)
+    (complete,) = scene.add("ball", 3)
+    assert complete.stamp == 3
+    assert scene.dropped() == {"incomplete": 2}
+    assert scene.add("ball", 4) == [] and scene.assembler.waiting == 1
+
+
+def test_waiting_frames_are_bounded_and_what_comes_too_late_is_counted():
+    scene = Scene("cloth", "ball", max_pending=3).topologies("cloth", "ball")
+    for stamp in range(1, 6):
+        scene.add("cloth", stamp)
+    assert scene.assembler.waiting == 3
+    assert scene.dropped() == {"incomplete": 2}
+    assert scene.add("ball", 2) == []
+    assert scene.dropped() == {"incomplete": 2, "late": 1}
+    assert [f.stamp for f in scene.add("ball", 3)] == [3]
+
+
+def test_static_mesh_keeps_its_positions():
+    scene = Scene("cloth", MeshSettings("floor", static=True)).topologies("cloth", "floor")
+    assert scene.add("cloth", 1) == []
+    assert scene.dropped() == {"static_missing": 1}
+    assert scene.add("floor", 5, value=9.0) == []
+    (complete,) = scene.add("cloth", 2)
+    assert complete.vertices[1][0, 0] == 9.0
+    assert complete.fresh == ("cloth",)
+    assert scene.assembler.static_taken == 1
+
+
+def test_unknown_mesh():
+    scene = Scene("cloth").topologies("cloth")
+    assert scene.add("ghost", 1) == []
+    assert scene.assembler.set_topology("ghost", topology()) == []
+    assert scene.dropped() == {"unknown_mesh": 1}
+    assert scene.refused.by_reason() == {Reason.UNKNOWN_MESH: 1}
+
+
+def test_wrong_vertex_count():
+    scene = Scene("cloth").topologies("cloth")
+    assert scene.add("cloth", 1, n=4) == []
+    assert scene.dropped() == {"wrong_vertex_count": 1}
+    assert len(scene.add("cloth", 1)) == 1, "a refused frame must not use up its stamp"
+
+
+def test_vertices_before_their_topology_wait_for_it():
+    scene = Scene("cloth", max_pending=2)
+    for stamp in (1, 2, 3):
+        assert scene.add("cloth", stamp) == []
+    assert scene.dropped() == {"no_topology": 1}
+    frames = scene.assembler.set_topology("cloth", topology())
+    assert [f.stamp for f in frames] == [2, 3]
+
+
+def test_topology_change_in_mid_stream():
+    scene = Scene("cloth").topologies("cloth")
+    (before,) = scene.add("cloth", 1)
+    assert scene.add("cloth", 2, version=1, n=4) == [], "waits for topology 1"
+    (after,) = scene.assembler.set_topology("cloth", topology(1, 4))
+    assert after.stamp == 2 and len(after.vertices[0]) == 4
+    assert not before.same_scene(after)
+    assert scene.add("cloth", 3, version=0) == []
+    assert scene.dropped() == {"old_topology": 1}
+
+
+def test_old_and_conflicting_topologies_are_refused():
+    scene = Scene("cloth")
+    scene.assembler.set_topology("cloth", topology(5))
+    scene.assembler.set_topology("cloth", topology(4))
+    scene.assembler.set_topology("cloth", topology(5, 9))
+    assert scene.assembler.topology("cloth").n_vertices == 3
+    assert scene.refused.by_reason() == {Reason.OLD_TOPOLOGY: 1, Reason.TOPOLOGY_CONFLICT: 1}
+
+
+def test_repeated_topology_changes_nothing():
+    scene = Scene("cloth").topologies("cloth")
+    (before,) = scene.add("cloth", 1)
+    scene.assembler.set_topology("cloth", topology())
+    (after,) = scene.add("cloth", 2)
+    assert before.same_scene(after) and scene.refused.total == 0
+
+
+def test_new_publisher_may_count_versions_from_the_start():
+    scene = Scene("cloth")
+    scene.assembler.set_topology("cloth", topology(5))
+    scene.assembler.set_topology("cloth", topology(0), new_publisher=True)
+    assert len(scene.add("cloth", 1, version=0)) == 1
+
+
+def test_backward_and_repeated_stamps():
+    scene = Scene("cloth").topologies("cloth")
+    assert len(scene.add("cloth", 100)) == 1
+    assert scene.add("cloth", 50) == []
+    assert scene.add("cloth", 100) == []
+    assert len(scene.add("cloth", 101)) == 1
+    assert scene.dropped() == {"stamp_backward": 1, "stamp_repeated": 1}
+    assert scene.assembler.restarts == 0
+
+
+def test_stream_that_goes_on_from_an_earlier_time_is_a_restart():
+    scene = Scene("cloth", restart_after=3).topologies("cloth")
+    scene.add("cloth", 100)
+    assert [len(scene.add("cloth", stamp)) for stamp in (1, 2, 3, 4)] == [0, 0, 1, 1]
+    assert scene.dropped() == {"stamp_backward": 2}
+    assert scene.assembler.restarts == 1 and len(scene.restart_texts) == 1
+
+
+def test_scattered_backward_stamps_are_no_restart():
+    scene = Scene("cloth", restart_after=3).topologies("cloth")
+    scene.add("cloth", 100)
+    for stamp in (5, 4, 3, 2, 1):
+        scene.add("cloth", stamp)
+    for stamp in (101, 10, 102, 11, 103, 12):
+        scene.add("cloth", stamp)
+    assert scene.assembler.restarts == 0
+    assert scene.dropped() == {"stamp_backward": 8}
+
+
+def test_no_restart_where_it_is_switched_off():
+    scene = Scene("cloth", restart_after=0).topologies("cloth")
+    scene.add("cloth", 100)
+    assert not any(scene.add("cloth", stamp) for stamp in range(1, 50))
+    assert scene.dropped() == {"stamp_backward": 49}
+
+
+def test_new_publisher_with_earlier_stamps_is_a_restart_at_once():
+    scene = Scene("cloth", "ball").topologies("cloth", "ball")
+    scene.add("cloth", 100)
+    scene.add("cloth", 1, new_publisher=True)
+    assert scene.dropped() == {"restart": 1}, "the frame that waited belongs to the old time"
+    assert [f.stamp for f in scene.add("ball", 1)] == [1]
+
+
+def test_meshes_in_different_frames():
+    scene = Scene("cloth", "ball").topologies("cloth", "ball")
+    scene.add("cloth", 1, frame_id="world")
+    assert scene.add("ball", 1, frame_id="camera") == []
+    assert scene.dropped() == {"frame_id": 1}
+    assert len(scene.add("ball", 1, frame_id="")) == 1, "an empty frame_id fits all"
+
+
+def test_demanded_frame_id():
+    scene = Scene("cloth", frame_id="world").topologies("cloth")
+    assert scene.add("cloth", 1, frame_id="odom") == []
+    (complete,) = scene.add("cloth", 2, frame_id="world")
+    assert complete.frame_id == "world"
+    assert scene.dropped() == {"frame_id": 1}
+
+
+def test_nearest_stamps_with_a_slower_mesh():
+    scene = Scene("fast", "slow", tolerance=60).topologies("fast", "slow")
+    out = []
+    for stamp in range(0, 400, 20):
+        out += scene.add("fast", stamp, value=stamp)
+        if stamp % 100 == 0:
+            out += scene.add("slow", stamp + 5, value=stamp + 5)
+    assert [f.stamp for f in out] == list(range(0, 301, 20)), "later ones wait: a nearer slow frame may come"
+    for f in out:
+        nearest = min(range(5, 400, 100), key=lambda s: abs(s - f.stamp))
+        assert f.vertices[1][0, 0] == nearest
+    used = sum(len(f.fresh) for f in out)
+    assert used + scene.drops.total + scene.assembler.waiting == scene.sent
+
+
+def test_nearest_stamps_outside_of_the_tolerance():
+    scene = Scene("a", "b", tolerance=3).topologies("a", "b")
+    scene.add("a", 100)
+    assert scene.add("b", 110) == []
+    assert scene.dropped() == {"incomplete": 1}
+    scene.add("a", 109)
+    assert scene.assembler.waiting == 0
+
+
+def test_nearest_waiting_is_bounded():
+    scene = Scene("a", "b", tolerance=3, max_pending=4).topologies("a", "b")
+    for stamp in range(20):
+        scene.add("a", stamp)
+    assert scene.assembler.waiting == 4
+    assert scene.dropped() == {"incomplete": 16}
+    for stamp in range(100, 120):
+        scene.add("b", stamp)
+    assert scene.assembler.waiting <= 8
+
+
+@pytest.mark.parametrize("tolerance", [None, 4])
+def test_no_message_is_unaccounted_for(tolerance):
+    rng = np.random.default_rng(3)
+    scene = Scene("a", "b", MeshSettings("floor", static=True), tolerance=tolerance, restart_after=4)
+    used = 0
+    for i in range(5000):
+        mesh = rng.choice(["a", "b", "a", "b", "floor", "ghost"])
+        stamp = i // 8 + int(rng.integers(-2, 3))  # now and then backward, repeated, late
+        n, version = int(rng.choice([3, 3, 3, 4])), int(rng.choice([3, 3, 3, 2, 4]))
+        new_publisher = bool(rng.random() < 0.01)
+        frames = scene.add(mesh, stamp, n=n, version=version, new_publisher=new_publisher)
+        used += sum(len(f.fresh) for f in frames)
+        if rng.random() < 0.02:
+            new = topology(int(rng.integers(0, 4)), int(rng.choice([3, 3, 4])))
+            for f in scene.assembler.set_topology(rng.choice(["a", "b", "floor"]), new):
+                used += len(f.fresh)
+    accounted = used + scene.drops.total + scene.assembler.waiting + scene.assembler.static_taken
+    assert accounted == scene.sent
+    assert used > 50
+    assert {"wrong_vertex_count", "old_topology", "stamp_backward"} <= scene.dropped().keys()
+    scene.assembler.clear(Reason.STOPPED)
+    assert scene.assembler.waiting == 0
+    assert used + scene.drops.total + scene.assembler.static_taken == scene.sent
+
+
+def test_scene_that_cannot_move_is_refused():
+    with pytest.raises(ValueError, match="at least one mesh must not be static"):
+        Scene(MeshSettings("floor", static=True))
+
+
+def test_names_must_differ():
+    with pytest.raises(ValueError, match="names must differ"):
+        Scene("a", "a")

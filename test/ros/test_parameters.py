@@ -1,0 +1,159 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The parameter table: descriptors, checks with reasons, the shipped configuration."""
+
+from pathlib import Path
+
+import pytest
+import rclpy
+import yaml
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+from hpccd_ros import parameters
+from hpccd_ros.parameters import MESH_ROWS, NODE_ROWS, ParameterError
+
+CONFIG = Path(__file__).resolve().parents[2] / "config"
+
+
+@pytest.fixture
+def node_with():
+    """Makes nodes with the parameter overrides given, in a context of their own."""
+    context = rclpy.Context()
+    rclpy.init(context=context)
+    nodes = []
+
+    def make(**overrides):
+        values = [Parameter(name.replace("__", "."), value=value) for name, value in overrides.items()]
+        nodes.append(Node("parameters_test", context=context, parameter_overrides=values))
+        return nodes[-1]
+
+    yield make
+    for node in nodes:
+        node.destroy_node()
+    rclpy.shutdown(context=context)
+
+
+@pytest.mark.parametrize("row", [*NODE_ROWS, *MESH_ROWS], ids=lambda row: row.name)
+def test_each_row_is_sound(row):
+    assert parameters.refusal(row, row.default) is None
+    assert row.text and not row.text.endswith(".")
+    described = parameters.descriptor(row)
+    assert described.read_only == (not row.changeable)
+    if row.span is not None:
+        assert parameters.refusal(row, row.span[1] + 1) is not None
+        assert parameters.refusal(row, row.span[0] - 1) is not None
+    if row.choices:
+        value = ["nonsense"] if row.kind == "string[]" else "nonsense"
+        assert "nonsense" in parameters.refusal(row, value)
+
+
+def test_defaults(node_with):
+    settings, meshes = parameters.declare(node_with())
+    assert settings == {row.name: row.default for row in NODE_ROWS}
+    assert meshes == {}
+
+
+def test_overrides_reach_the_settings(node_with):
+    node = node_with(meshes=["cloth", "floor"], mesh__floor__static=True, outputs=["points"], threads=3)
+    settings, meshes = parameters.declare(node)
+    assert settings["meshes"] == ["cloth", "floor"] and settings["threads"] == 3
+    assert settings["outputs"] == ["points"]
+    assert meshes["floor"]["static"] and not meshes["cloth"]["static"]
+    assert node.describe_parameter("mesh.floor.static").read_only
+
+
+@pytest.mark.parametrize(
+    "overrides, text",
+    [
+        ({"meshes": ["a b"]}, "meshes: 'a b' cannot be part of a topic name"),
+        ({"meshes": ["a", "a"]}, "names must differ"),
+        ({"meshes": ["a", "b"], "ignored_pairs": ["a:c"]}, "ignored_pairs: 'a:c'"),
+        ({"meshes": ["a", "b"], "ignored_pairs": ["a"]}, "ignored_pairs: 'a'"),
+        ({"accuracy": "sloppy"}, "accuracy: 'sloppy' is none of fast, balanced"),
+        ({"outputs": ["points", "colours"]}, "outputs: 'colours' is none of"),
+        ({"threads": -1}, "threads"),
+        ({"threads": "many"}, "threads"),
+        ({"stamp_tolerance": 1}, "stamp_tolerance"),
+        ({"meshes": ["a"], "mesh__a__input": "clouds"}, "mesh.a.input: 'clouds' is none of vertices, points"),
+    ],
+)
+def test_bad_values_are_named(node_with, overrides, text):
+    with pytest.raises(ParameterError) as caught:
+        parameters.declare(node_with(**overrides))
+    assert text in str(caught.value)
+
+
+def test_unknown_parameters_are_noticed(node_with):
+    node = node_with(acuracy="exact", meshes=["a"], mesh__b__static=True)
+    parameters.declare(node)
+    assert parameters.unknown_overrides(node) == ["acuracy", "mesh.b.static"]
+
+
+def test_changes_at_run_time(node_with):
+    node = node_with(meshes=["a"])
+    settings, _ = parameters.declare(node)
+    changes = []
+    parameters.watch(
+        node,
+        settings,
+        lambda wanted: "exact is not built" if wanted["accuracy"] == "exact" else None,
+        lambda: changes.append(dict(settings)),
+    )
+
+    def change(name, value):
+        (result,) = node.set_parameters([Parameter(name, value=value)])
+        return result
+
+    assert change("max_contacts", 5).successful and settings["max_contacts"] == 5
+    assert change("outputs", ["normals"]).successful and settings["outputs"] == ["normals"]
+    assert change("outputs", [""]).successful and settings["outputs"] == []
+    refusals = {
+        "accuracy": ("exact", "exact is not built"),
+        "report": ("some", "report: 'some' is none of"),
+        "frame_queue": (4, "read-only"),
+        "threads": (-4, "range"),
+    }
+    for name, (value, reason) in refusals.items():
+        result = change(name, value)
+        assert not result.successful and reason in result.reason
+    assert len(changes) == 3
+    assert settings["accuracy"] == "balanced" and settings["threads"] == 0
+
+
+@pytest.mark.parametrize("path", sorted(CONFIG.glob("*.yaml")), ids=lambda path: path.stem)
+def test_shipped_configurations(path, node_with):
+    ((name, body),) = yaml.safe_load(path.read_text()).items()
+    assert name == "/**"
+
+    def flat(tree, prefix=""):
+        for key, value in tree.items():
+            if isinstance(value, dict):
+                yield from flat(value, f"{prefix}{key}.")
+            else:
+                yield f"{prefix}{key}", value
+
+    values = {key: value for key, value in flat(body["ros__parameters"]) if value != []}
+    node = node_with(**{key.replace(".", "__"): value for key, value in values.items()})
+    settings, meshes = parameters.declare(node)
+    assert parameters.unknown_overrides(node) == []
+    for key, value in values.items():
+        if not key.startswith("mesh."):
+            assert settings[key] == (value if value != [""] else [])
+
+
+def test_default_configuration_shows_every_parameter_and_its_default():
+    text = (CONFIG / "hpccd.yaml").read_text()
+    values = yaml.safe_load(text)["/**"]["ros__parameters"]
+    for row in NODE_ROWS:
+        if row.name != "meshes":
+            assert parameters.normalise(row, values[row.name]) == row.default, row.name
+    for row in MESH_ROWS:
+        assert parameters.normalise(row, values["mesh"]["cloth"][row.name]) == row.default, row.name
+
+
+def test_table_names_every_parameter():
+    table = parameters.markdown_table()
+    for row in NODE_ROWS:
+        assert f"| `{row.name}` |" in table
+    for row in MESH_ROWS:
+        assert f"| `mesh.NAME.{row.name}` |" in table

@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Lost messages and new publishers from sequence numbers; the log of refusals."""
+
+from hpccd_ros.drops import Reason
+from hpccd_ros.refusal_log import RefusalLog
+from hpccd_ros.sequence import SequenceWatch
+
+
+def test_gaps_are_losses():
+    watch = SequenceWatch()
+    assert [watch.next(n) for n in (4, 5, 8, 9)] == [(0, False), (0, False), (2, False), (0, False)]
+
+
+def test_a_number_that_does_not_grow_is_a_new_publisher():
+    watch = SequenceWatch()
+    assert [watch.next(n) for n in (7, 1, 2, 2)] == [(0, False), (0, True), (0, False), (0, True)]
+
+
+def test_a_publisher_that_came_is_no_loss():
+    watch = SequenceWatch()
+    watch.new_publisher()
+    assert watch.next(1) == (0, False), "the first publisher of all is not another one"
+    watch.new_publisher()
+    assert watch.next(50) == (0, True)
+
+
+def test_refusals_do_not_flood_the_log():
+    now, lines = [0.0], []
+    log = RefusalLog(lines.append, period=10.0, clock=lambda: now[0])
+    for _ in range(5):
+        log("cloth", Reason.NOT_FINITE, "vertex 3 is nan")
+    log("cloth", Reason.LATE, "stamp 4")
+    now[0] = 11.0
+    log("cloth", Reason.NOT_FINITE, "vertex 4 is nan")
+    assert lines == [
+        "cloth: not_finite: vertex 3 is nan",
+        "cloth: late: stamp 4",
+        "cloth: not_finite: vertex 4 is nan (4 more of these in between)",
+    ]
+    assert log.last == "cloth: not_finite: vertex 4 is nan"
