@@ -1,0 +1,15 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Continuous collision detection of deforming triangle meshes, with contacts that can be proven.
+
+    scene = Scene(); scene.add_mesh("cloth", faces)
+    contacts = Detector(scene).detect(vertices_t0, vertices_t1)
+"""
+
+from . import _find_core  # noqa: F401  (lets a source checkout use the installed extension modules)
+from ._core import InvalidArgument
+from .contacts import Contacts
+from .detector import Detector, backends
+from .elementary import test_edge_edge, test_vertex_face
+from .scene import Scene
+
+__all__ = ["Contacts", "Detector", "InvalidArgument", "Scene", "backends", "test_edge_edge", "test_vertex_face"]

@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Checks of arguments, each with an error that names the argument and the remedy."""
+
+import operator
+
+import numpy as np
+
+
+def choice(name, value, choices):
+    """The value, if it is one of the choices."""
+    if not isinstance(value, str):
+        raise TypeError(f"{name}: expected a string, got {type(value).__name__}; use one of {', '.join(choices)}")
+    if value not in choices:
+        raise ValueError(f"{name}: {value!r} is not known; use one of {', '.join(choices)}")
+    return value
+
+
+def whole_number(name, value, low, high):
+    """The value as int, if it lies in [low, high]."""
+    if isinstance(value, bool):
+        raise TypeError(f"{name}: expected an integer, got bool")
+    try:
+        number = operator.index(value)
+    except TypeError:
+        raise TypeError(f"{name}: expected an integer, got {type(value).__name__}") from None
+    if not low <= number <= high:
+        raise ValueError(f"{name}: must lie in [{low}, {high}], got {number}")
+    return number
+
+
+def faces(value):
+    """(F, 3) integers -> (F, 3) uint32, C-contiguous."""
+    array = np.asarray(value)
+    if array.size == 0 and array.ndim in (1, 2):
+        return np.empty((0, 3), np.uint32)
+    if array.dtype.kind not in "iu":
+        raise TypeError(f"faces: expected integers, got dtype {array.dtype}; convert with faces.astype(numpy.uint32)")
+    if array.ndim != 2 or array.shape[1] != 3:
+        raise ValueError(f"faces: expected shape (F, 3), got {array.shape}")
+    for bad, what in ((array < 0, "is negative"), (array > 0xFFFFFFFE, "is beyond 2**32 - 2")):
+        if bad.any():
+            row, column = np.argwhere(bad)[0]
+            raise ValueError(
+                f"faces[{row}, {column}] is {array[row, column]}, which {what}; indices count this mesh's vertices from 0"
+            )
+    return np.ascontiguousarray(array, np.uint32)
+
+
+def vertices(name, value, n_vertices):
+    """(V, 3) float32 or float64; C-contiguous arrays are taken without a copy."""
+    array = np.asarray(value)
+    if array.dtype not in (np.float32, np.float64):
+        raise TypeError(
+            f"{name}: expected float32 or float64, got dtype {array.dtype}; convert with {name}.astype(numpy.float64)"
+        )
+    if array.shape != (n_vertices, 3):
+        raise ValueError(
+            f"{name}: expected shape ({n_vertices}, 3), one row a vertex of the scene's meshes in the order added, "
+            f"got {array.shape}"
+        )
+    return np.require(array, array.dtype.newbyteorder("="), ["C", "A"])
+
+
+def queries(value):
+    """(Q, 8, 3) float64: four points at t=0, then the same at t=1; finite."""
+    array = np.asarray(value)
+    if array.dtype not in (np.float32, np.float64):
+        raise TypeError(
+            f"queries: expected float32 or float64, got dtype {array.dtype}; convert with queries.astype(numpy.float64)"
+        )
+    if array.ndim != 3 or array.shape[1:] != (8, 3):
+        raise ValueError(f"queries: expected shape (Q, 8, 3), four points at t=0 and the same at t=1, got {array.shape}")
+    array = np.ascontiguousarray(array, np.float64)
+    # Beyond 1e150 intermediate results could overflow; NaN fails the comparison too.
+    good = np.abs(array) <= 1e150
+    if not good.all():
+        where = tuple(np.argwhere(~good)[0])
+        x = array[where]
+        remedy = "scale the query down" if np.isfinite(x) else "all coordinates must be finite"
+        raise ValueError(f"queries[{', '.join(map(str, where))}] is {x}; {remedy}")
+    return array

@@ -1,0 +1,43 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The contacts of one motion step."""
+
+import dataclasses
+
+import numpy as np
+
+
+@dataclasses.dataclass(frozen=True)
+class Contacts:
+    """Contacts in canonical order: vertex-face by (vertex, face), then edge-edge by (a0, a1, b0, b1).
+
+    vf: (N, 2) uint32, vertex and face, scene-wide indices. vf_toc: (N,) float64, times of contact in [0, 1].
+    ee: (M, 4) uint32, a0<a1, b0<b1, (a0,a1)<(b0,b1), vertex indices. ee_toc: (M,) float64.
+    points, normals: (N+M, 3) float64, vertex-face first; empty (0, 3) unless asked for in the detector's outputs.
+    Normals have length one and point from the face to the side the vertex comes from, or from edge a to the side that
+    edge b comes from; zero where degenerate features define none.
+    first_toc: the earliest time, +inf where nothing touches.
+    hash: 64-bit, the same for the same contacts on any backend and any number of threads.
+    """
+
+    vf: np.ndarray
+    vf_toc: np.ndarray
+    ee: np.ndarray
+    ee_toc: np.ndarray
+    points: np.ndarray
+    normals: np.ndarray
+    first_toc: float
+    hash: int
+
+    def __len__(self):
+        return len(self.vf) + len(self.ee)
+
+    def __repr__(self):
+        return f"Contacts({len(self.vf)} vertex-face, {len(self.ee)} edge-edge, first at {self.first_toc:.6g})"
+
+    @classmethod
+    def none(cls):
+        """No contacts at all."""
+        empty = np.empty
+        return cls(
+            empty((0, 2), np.uint32), empty(0), empty((0, 4), np.uint32), empty(0), empty((0, 3)), empty((0, 3)), np.inf, 0
+        )

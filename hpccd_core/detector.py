@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The detector: motion of a scene in, contacts out."""
+
+import numpy as np
+
+from . import _core, arguments
+from .contacts import Contacts
+from .scene import ACCURACIES, Scene
+
+
+def backends():
+    """The backends usable with this build on this machine, e.g. ["cpu"] or ["cpu", "gpu", "hybrid"]."""
+    return ["cpu"]
+
+
+class Detector:
+    """Finds every contact of a scene's straight-line motion from one set of positions to the next.
+
+    accuracy: "fast", "balanced", "conservative" or "exact"; backend: "auto", "cpu", "hybrid" or "gpu"; threads: 0 for
+    all cores; report: "all" contacts, those at the earliest time only ("first"), or one contact ("any"); outputs: any
+    of "points", "normals"; simd: "auto", "scalar", "avx2" or "avx512" (the result is the same).
+    The scene is copied: meshes added to it later do not reach this detector.
+    """
+
+    def __init__(self, scene, *, accuracy="exact", backend="auto", threads=0, report="all", outputs=(), simd="auto"):
+        if not isinstance(scene, Scene):
+            raise TypeError(f"scene: expected hpccd_core.Scene, got {type(scene).__name__}")
+        self.accuracy = arguments.choice("accuracy", accuracy, ACCURACIES)
+        self.report = arguments.choice("report", report, ("all", "first", "any"))
+        arguments.choice("backend", backend, ("auto", "cpu", "hybrid", "gpu"))
+        if backend != "auto" and backend not in backends():
+            raise ValueError(f"backend: {backend!r} is not usable here; use one of {', '.join(['auto', *backends()])}")
+        self.backend = "cpu"
+        outputs = (outputs,) if isinstance(outputs, str) else tuple(outputs)
+        for output in outputs:
+            arguments.choice("outputs", output, ("points", "normals"))
+        threads = arguments.whole_number("threads", threads, 0, 1024)
+        simd = arguments.choice("simd", simd, ("auto", "scalar", "avx2", "avx512"))
+        self.n_vertices = scene.n_vertices
+        self._core = _core.Detector(
+            scene._core,
+            getattr(_core.Accuracy, accuracy),
+            getattr(_core.Backend, self.backend),
+            getattr(_core.Report, report),
+            getattr(_core.Simd, simd),
+            threads,
+            "points" in outputs,
+            "normals" in outputs,
+        )
+        self._last = None
+
+    def detect(self, vertices_t0, vertices_t1):
+        """Contacts of the motion from vertices_t0 to vertices_t1, each (V, 3) float32 or float64.
+
+        C-contiguous arrays are read in place. Raises TypeError for a wrong dtype, ValueError for a wrong shape or a
+        coordinate that is NaN, infinite or beyond 1e150.
+        """
+        vertices_t0 = arguments.vertices("vertices_t0", vertices_t0, self.n_vertices)
+        vertices_t1 = arguments.vertices("vertices_t1", vertices_t1, self.n_vertices)
+        if vertices_t0.dtype != vertices_t1.dtype:  # widening a float32 is exact
+            vertices_t0, vertices_t1 = vertices_t0.astype(np.float64), vertices_t1.astype(np.float64)
+        return Contacts(**self._core.detect(vertices_t0, vertices_t1))
+
+    def step(self, vertices):
+        """Streaming: the end of the last step is the start of this one. The first call returns no contacts."""
+        vertices = arguments.vertices("vertices", vertices, self.n_vertices)
+        last = self._last
+        if last is None and not np.isfinite(vertices).all():
+            row, column = np.argwhere(~np.isfinite(vertices))[0]
+            raise ValueError(f"vertices[{row}, {column}] is {vertices[row, column]}; all coordinates must be finite")
+        contacts = Contacts.none() if last is None else self.detect(last, vertices)
+        self._last = vertices.copy()
+        return contacts
+
+    def reset(self):
+        """Forget the last positions: the next step() starts anew."""
+        self._last = None
+
+    @property
+    def threads(self):
+        """Threads in use."""
+        return self._core.threads
+
+    @property
+    def simd(self):
+        """The instruction set in use."""
+        return self._core.simd
+
+    @property
+    def profile(self):
+        """Stage name -> ms of the last call, with "total" and the remainder "other"."""
+        return self._core.profile()
+
+    @property
+    def stats(self):
+        """Counts of the last call: candidate pairs, survivors of each filter, contacts, bytes used, ..."""
+        return self._core.stats()

@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: Apache-2.0
+// The public C++ interface: Scene, Options, Detector, Contacts. Nothing here prints or aborts: errors are thrown.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <map>
+#include <memory>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace hpccd {
+
+// A mistake of the caller: the text names the argument and the remedy.
+class InvalidArgument : public std::invalid_argument {
+ public:
+  using std::invalid_argument::invalid_argument;
+};
+
+enum class Accuracy : std::uint8_t { fast, balanced, conservative, exact };
+enum class Backend : std::uint8_t { automatic, cpu, hybrid, gpu };
+enum class Report : std::uint8_t { all, first, any };
+enum class Simd : std::uint8_t { automatic, scalar, avx2, avx512 };
+
+struct MeshOptions {
+  bool self_collision = true;
+  bool is_static = false;  // promised not to move; pairs of two static meshes are never tested
+};
+
+// Meshes with their topology, and which pairs of them matter. Vertices of all meshes are concatenated in the order added.
+class Scene {
+ public:
+  // faces: 3 indices a triangle into this mesh's own vertices [0, n_vertices). Returns the mesh's number.
+  std::uint32_t add_mesh(std::string name, std::span<const std::uint32_t> faces, std::uint32_t n_vertices,
+                         MeshOptions options);
+  void ignore_pair(std::uint32_t mesh_a, std::uint32_t mesh_b);
+  void set_accuracy(std::uint32_t mesh_a, std::uint32_t mesh_b, Accuracy accuracy);
+
+  struct Mesh {
+    std::string name;
+    MeshOptions options;
+    std::uint32_t first_vertex, n_vertices, first_face, n_faces;
+  };
+  const std::vector<Mesh>& meshes() const { return meshes_; }
+  // Scene-wide vertex indices of each triangle.
+  const std::vector<std::array<std::uint32_t, 3>>& faces() const { return faces_; }
+  std::uint32_t n_vertices() const { return n_vertices_; }
+  bool pair_enabled(std::uint32_t mesh_a, std::uint32_t mesh_b) const;
+  Accuracy pair_accuracy(std::uint32_t mesh_a, std::uint32_t mesh_b, Accuracy otherwise) const;
+
+ private:
+  using Pair = std::pair<std::uint32_t, std::uint32_t>;
+  static Pair ordered(std::uint32_t a, std::uint32_t b) { return a < b ? Pair{a, b} : Pair{b, a}; }
+  std::vector<Mesh> meshes_;
+  std::vector<std::array<std::uint32_t, 3>> faces_;
+  std::uint32_t n_vertices_ = 0;
+  std::map<Pair, bool> ignored_;
+  std::map<Pair, Accuracy> accuracy_;
+};
+
+struct Options {
+  Accuracy accuracy = Accuracy::exact;
+  Backend backend = Backend::automatic;
+  Report report = Report::all;
+  Simd simd = Simd::automatic;
+  int threads = 0;  // 0: all cores
+  bool points = false;
+  bool normals = false;
+};
+
+// Contacts of one motion step in canonical order: vertex-face by (vertex, face), then edge-edge by (a0, a1, b0, b1).
+struct Contacts {
+  std::vector<std::array<std::uint32_t, 2>> vf;
+  std::vector<double> vf_toc;
+  std::vector<std::array<std::uint32_t, 4>> ee;
+  std::vector<double> ee_toc;
+  std::vector<std::array<double, 3>> points, normals;  // vf first, then ee; empty unless asked for
+  double first_toc = std::numeric_limits<double>::infinity();
+  std::uint64_t hash = 0;
+};
+
+// Positions of all vertices at one time: n rows of x y z without gaps, float or double.
+struct Positions {
+  const void* data = nullptr;
+  std::size_t n = 0;
+  bool is_double = true;
+};
+
+class Detector {
+ public:
+  Detector(std::shared_ptr<const Scene> scene, Options options);
+  ~Detector();
+  Detector(const Detector&) = delete;
+  Detector& operator=(const Detector&) = delete;
+
+  // Contacts of the straight-line motion from t0 to t1 (Kim et al. 2009, section 3.1).
+  Contacts detect(Positions vertices_t0, Positions vertices_t1);
+
+  std::map<std::string, double> profile() const;        // stage -> ms of the last call
+  std::map<std::string, std::uint64_t> stats() const;   // counts of the last call
+  const Options& options() const;                       // with "automatic" resolved
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+// One elementary query: rows v f0 f1 f2 (vertex-face) or a0 a1 b0 b1 (edge-edge) at t=0, then the same at t=1.
+using Query = std::array<double, 24>;
+void test_vertex_face(std::span<const Query> queries, Accuracy accuracy, Simd simd, bool* hit, double* toc);
+void test_edge_edge(std::span<const Query> queries, Accuracy accuracy, Simd simd, bool* hit, double* toc);
+
+// The instruction sets usable on this machine, best last.
+std::vector<Simd> simd_levels();
+
+}  // namespace hpccd

@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Meshes, and which pairs of them matter."""
+
+from . import _core, arguments
+
+ACCURACIES = ("fast", "balanced", "conservative", "exact")
+
+
+class Scene:
+    """Triangle meshes with fixed topology; their vertices are concatenated in the order added.
+
+    Model only what the scene requires: ``self_collision=False`` for bodies that keep their shape, ``static=True`` for
+    meshes that never move, :meth:`ignore_pair` for pairs that cannot or may touch.
+    """
+
+    def __init__(self):
+        self._core = _core.Scene()
+        self._ids = {}
+
+    def add_mesh(self, name, faces, *, n_vertices=None, self_collision=True, static=False):
+        """Add a mesh and return its number.
+
+        name: unique string. faces: (F, 3) integers, indices into this mesh's own vertices. n_vertices: how many
+        vertices the mesh has; by default the largest index + 1; give it where trailing vertices are in no face (such
+        vertices are tested against faces too). self_collision: whether contacts within the mesh matter. static: a
+        promise that the mesh does not move during a step; pairs of static meshes are never tested.
+
+        Raises TypeError or ValueError naming the argument, also where an index is out of range.
+        """
+        if not isinstance(name, str):
+            raise TypeError(f"name: expected a string, got {type(name).__name__}")
+        if not name:
+            raise ValueError("name: must not be empty")
+        faces = arguments.faces(faces)
+        used = int(faces.max()) + 1 if faces.size else 0
+        n_vertices = used if n_vertices is None else arguments.whole_number("n_vertices", n_vertices, 0, 2**32 - 2)
+        number = self._core.add_mesh(name, faces, n_vertices, bool(self_collision), bool(static))
+        self._ids[name] = number
+        return number
+
+    def ignore_pair(self, mesh_a, mesh_b):
+        """Never report contacts between these two meshes (names or numbers); the same mesh twice: within it."""
+        self._core.ignore_pair(self._number("mesh_a", mesh_a), self._number("mesh_b", mesh_b))
+
+    def set_accuracy(self, mesh_a, mesh_b, accuracy):
+        """Test this pair of meshes (names or numbers) at another accuracy than the detector's."""
+        accuracy = arguments.choice("accuracy", accuracy, ACCURACIES)
+        self._core.set_accuracy(
+            self._number("mesh_a", mesh_a), self._number("mesh_b", mesh_b), getattr(_core.Accuracy, accuracy)
+        )
+
+    def _number(self, name, mesh):
+        if isinstance(mesh, str):
+            if mesh not in self._ids:
+                raise ValueError(f"{name}: no mesh is named {mesh!r}; the scene has {', '.join(self._ids) or 'none'}")
+            return self._ids[mesh]
+        if not self._ids:
+            raise ValueError(f"{name}: the scene has no mesh yet; add_mesh comes first")
+        return arguments.whole_number(name, mesh, 0, len(self._ids) - 1)
+
+    @property
+    def n_vertices(self):
+        """Vertices of all meshes together."""
+        return self._core.n_vertices
+
+    @property
+    def n_faces(self):
+        """Triangles of all meshes together."""
+        return self._core.n_faces
+
+    @property
+    def mesh_names(self):
+        """Names in the order added."""
+        return list(self._ids)
+
+    def vertex_offset(self, mesh):
+        """The scene-wide index of the mesh's first vertex."""
+        return self._core.meshes[self._number("mesh", mesh)][1]
+
+    def face_offset(self, mesh):
+        """The scene-wide index of the mesh's first face."""
+        return self._core.meshes[self._number("mesh", mesh)][3]
+
+    def __repr__(self):
+        return f"Scene({', '.join(self._ids)}: {self.n_vertices} vertices, {self.n_faces} faces)"

@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: Apache-2.0
+// pybind11 only, no logic: arguments were checked in Python. The interpreter lock is released during work.
+#include <pybind11/numpy.h>
+#include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
+
+#include "base/simd.h"
+#include "hpccd/hpccd.h"
+
+namespace py = pybind11;
+using namespace hpccd;
+
+namespace {
+
+template <class T>
+using Array = py::array_t<T, py::array::c_style>;
+
+// A numpy array that owns the moved vector: no copy.
+template <class T, class Row>
+py::array hand_over(std::vector<Row>&& rows, py::ssize_t columns) {
+  auto* owner = new std::vector<Row>(std::move(rows));
+  py::capsule free(owner, [](void* p) { delete static_cast<std::vector<Row>*>(p); });
+  std::vector<py::ssize_t> shape{static_cast<py::ssize_t>(owner->size())};
+  if (columns > 1) shape.push_back(columns);
+  return py::array_t<T>(shape, reinterpret_cast<const T*>(owner->data()), free);
+}
+
+Positions positions(const py::array& a) {
+  return {a.data(), static_cast<std::size_t>(a.shape(0)), py::isinstance<py::array_t<double>>(a)};
+}
+
+py::dict to_dict(Contacts&& c) {
+  py::dict d;
+  d["vf"] = hand_over<std::uint32_t>(std::move(c.vf), 2);
+  d["vf_toc"] = hand_over<double>(std::move(c.vf_toc), 1);
+  d["ee"] = hand_over<std::uint32_t>(std::move(c.ee), 4);
+  d["ee_toc"] = hand_over<double>(std::move(c.ee_toc), 1);
+  d["points"] = hand_over<double>(std::move(c.points), 3);
+  d["normals"] = hand_over<double>(std::move(c.normals), 3);
+  d["first_toc"] = c.first_toc;
+  d["hash"] = c.hash;
+  return d;
+}
+
+template <auto test>
+py::tuple run_queries(const Array<double>& queries, Accuracy accuracy, Simd simd) {
+  const auto n = static_cast<std::size_t>(queries.shape(0));
+  py::array_t<bool> hit(static_cast<py::ssize_t>(n));
+  py::array_t<double> toc(static_cast<py::ssize_t>(n));
+  const std::span<const Query> view(reinterpret_cast<const Query*>(queries.data()), n);
+  bool* h = hit.mutable_data();
+  double* t = toc.mutable_data();
+  {
+    py::gil_scoped_release release;
+    test(view, accuracy, simd, h, t);
+  }
+  return py::make_tuple(hit, toc);
+}
+
+}  // namespace
+
+PYBIND11_MODULE(_core, m) {
+  py::register_exception<InvalidArgument>(m, "InvalidArgument", PyExc_ValueError);
+  py::enum_<Accuracy>(m, "Accuracy")
+      .value("fast", Accuracy::fast)
+      .value("balanced", Accuracy::balanced)
+      .value("conservative", Accuracy::conservative)
+      .value("exact", Accuracy::exact);
+  py::enum_<Backend>(m, "Backend")
+      .value("auto", Backend::automatic)
+      .value("cpu", Backend::cpu)
+      .value("hybrid", Backend::hybrid)
+      .value("gpu", Backend::gpu);
+  py::enum_<Report>(m, "Report").value("all", Report::all).value("first", Report::first).value("any", Report::any);
+  py::enum_<Simd>(m, "Simd")
+      .value("auto", Simd::automatic)
+      .value("scalar", Simd::scalar)
+      .value("avx2", Simd::avx2)
+      .value("avx512", Simd::avx512);
+
+  py::class_<Scene, std::shared_ptr<Scene>>(m, "Scene")
+      .def(py::init<>())
+      .def("add_mesh",
+           [](Scene& s, const std::string& name, const Array<std::uint32_t>& faces, std::uint32_t n_vertices,
+              bool self_collision, bool is_static) {
+             return s.add_mesh(name, {faces.data(), static_cast<std::size_t>(faces.size())}, n_vertices,
+                               {self_collision, is_static});
+           })
+      .def("ignore_pair", &Scene::ignore_pair)
+      .def("set_accuracy", &Scene::set_accuracy)
+      .def_property_readonly("n_vertices", &Scene::n_vertices)
+      .def_property_readonly("n_faces", [](const Scene& s) { return s.faces().size(); })
+      .def_property_readonly("meshes", [](const Scene& s) {
+        py::list l;
+        for (const auto& mesh : s.meshes())
+          l.append(py::make_tuple(mesh.name, mesh.first_vertex, mesh.n_vertices, mesh.first_face, mesh.n_faces));
+        return l;
+      });
+
+  py::class_<Detector>(m, "Detector")
+      .def(py::init([](std::shared_ptr<Scene> scene, Accuracy accuracy, Backend backend, Report report, Simd simd,
+                       int threads, bool points, bool normals) {
+        // A copy: what is added to the caller's scene later does not reach this detector.
+        return std::make_unique<Detector>(std::make_shared<const Scene>(*scene),
+                                          Options{accuracy, backend, report, simd, threads, points, normals});
+      }))
+      .def("detect",
+           [](Detector& d, const py::array& t0, const py::array& t1) {
+             const Positions a = positions(t0), b = positions(t1);
+             Contacts c;
+             {
+               py::gil_scoped_release release;
+               c = d.detect(a, b);
+             }
+             return to_dict(std::move(c));
+           })
+      .def("profile", &Detector::profile)
+      .def("stats", &Detector::stats)
+      .def_property_readonly("threads", [](const Detector& d) { return d.options().threads; })
+      .def_property_readonly("simd", [](const Detector& d) { return name_of(d.options().simd); });
+
+  m.def("test_vertex_face", &run_queries<&test_vertex_face>);
+  m.def("test_edge_edge", &run_queries<&test_edge_edge>);
+  m.def("simd_levels", [] {
+    std::vector<std::string> names;
+    for (Simd s : simd_levels()) names.push_back(name_of(s));
+    return names;
+  });
+}

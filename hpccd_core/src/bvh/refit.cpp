@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "bvh/tree.h"
+
+namespace hpccd {
+namespace {
+
+Box leaf_bounds(Tree& tree, const LeafRange& leaf, const std::vector<Box>& vertex_boxes) {
+  Box whole;
+  for (std::uint32_t s = leaf.first_face; s < leaf.end_face; ++s) {
+    Box b = vertex_boxes[tree.face_corners[0][s]];
+    b.include(vertex_boxes[tree.face_corners[1][s]]);
+    b.include(vertex_boxes[tree.face_corners[2][s]]);
+    tree.face_boxes.set(s, b);
+    whole.include(b);
+  }
+  for (std::uint32_t s = leaf.first_edge; s < leaf.end_edge; ++s) {
+    Box b = vertex_boxes[tree.edge_ends[0][s]];
+    b.include(vertex_boxes[tree.edge_ends[1][s]]);
+    tree.edge_boxes.set(s, b);  // inside its triangle's box
+  }
+  for (std::uint32_t s = leaf.first_vertex; s < leaf.end_vertex; ++s) {
+    const Box& b = vertex_boxes[tree.vertex_of_slot[s]];
+    tree.vertex_boxes.set(s, b);
+    whole.include(b);  // a lone vertex has no triangle
+  }
+  return whole;
+}
+
+}  // namespace
+
+void refit(Tree& tree, const std::vector<Box>& vertex_boxes, ThreadPool& pool) {
+  parallel_for(pool, tree.leaves.size(), 64, [&](std::size_t begin, std::size_t end, int) {
+    for (std::size_t i = begin; i < end; ++i)
+      tree.nodes[tree.leaf_nodes[i]].box = leaf_bounds(tree, tree.leaves[i], vertex_boxes);
+  });
+  for (std::size_t i = tree.nodes.size(); i-- > 0;) {
+    Node& node = tree.nodes[i];
+    if (!node.children) continue;
+    node.box = tree.nodes[node.children].box;
+    node.box.include(tree.nodes[node.children + 1].box);
+  }
+}
+
+std::size_t Tree::bytes() const {
+  const std::size_t faces = face_of_slot.capacity(), edges = edge_of_slot.capacity(), vertices = vertex_of_slot.capacity();
+  return nodes.capacity() * sizeof(Node) + leaves.capacity() * (sizeof(LeafRange) + 4) + faces * (16 + sizeof(Box)) +
+         edges * (12 + sizeof(Box)) + vertices * (4 + sizeof(Box));
+}
+
+double relative_area(const Tree& tree) {
+  if (tree.nodes.empty()) return 0;
+  double sum = 0;
+  for (const Node& n : tree.nodes) sum += n.box.half_area();
+  const double root = tree.nodes[0].box.half_area();
+  return root > 0 ? sum / root : 0;
+}
+
+}  // namespace hpccd

@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: Apache-2.0
+// From what the threads found to the public result: canonical order, hash, earliest time, points and normals.
+#pragma once
+
+#include "base/parallel.h"
+#include "elementary/batch.h"
+#include "traverse/worker.h"
+
+namespace hpccd {
+
+struct Outputs {
+  bool points, normals;
+};
+
+// Takes what the workers found. Features are numbered so that their pairs sort into the canonical order.
+Contacts collect_contacts(std::vector<Worker>& workers, const Geometry& geometry, Report report, Outputs outputs,
+                          ThreadPool& pool);
+
+}  // namespace hpccd

@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+// Elementary tests on a batch of candidate pairs, in the lanes of one instruction set. The sets give the same bits.
+#pragma once
+
+#include <cstdint>
+
+#include "elementary/motion.h"
+#include "hpccd/hpccd.h"
+
+namespace hpccd {
+
+// One vertex at both ends of the step: one cache line.
+struct alignas(64) VertexRow {
+  double t0[4], t1[4];  // x y z and padding
+};
+
+struct Geometry {
+  const VertexRow* vertices;
+  const std::array<std::uint32_t, 2>* edges;
+  const std::array<std::uint32_t, 3>* faces;
+};
+
+inline constexpr std::uint32_t batch_capacity = 1024;
+
+// Where the pairs of the batch went; every pair is in exactly one place.
+struct BatchCounts {
+  std::uint64_t tested = 0;        // pairs that came in
+  std::uint64_t coplanarity = 0;   // rejected by the sign test on the cubic
+  std::uint64_t projection = 0;    // rejected because they stay outside in a projection
+  std::uint64_t roots = 0;         // rejected at the roots of the cubic
+  std::uint64_t contacts = 0;      // proven contacts
+  std::uint64_t undecided = 0;     // handed to the tier's last resort
+};
+
+struct BatchResult {
+  std::uint32_t n_contacts = 0, n_undecided = 0;
+  std::uint32_t contact[batch_capacity];    // positions in the batch
+  std::uint32_t undecided[batch_capacity];
+  double toc[batch_capacity], delta[batch_capacity];
+  BatchCounts counts;                       // accumulates over batches
+};
+
+// first/second: vertex and face, or two edges. n <= batch_capacity.
+using BatchTest = void (*)(const Geometry&, Kind, const std::uint32_t* first, const std::uint32_t* second,
+                           std::uint32_t n, BatchResult&);
+
+// Never Simd::automatic.
+BatchTest batch_test(Simd simd);
+
+}  // namespace hpccd

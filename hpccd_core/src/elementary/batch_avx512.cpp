@@ -1,0 +1,7 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "base/lanes.h"
+#define HPCCD_ISA avx512
+namespace hpccd::HPCCD_ISA {
+using Real = Lanes<double, 8>;
+}
+#include "elementary/batch.inl"

@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a tier does with a query that the error bounds could not decide.
+#pragma once
+
+#include <optional>
+
+#include "elementary/motion.h"
+#include "hpccd/hpccd.h"
+
+namespace hpccd {
+
+// q[0..3] as in motion.h. The time of contact, or nothing.
+std::optional<double> last_resort(Accuracy accuracy, Kind kind, const Vec3<double> q_t0[4], const Vec3<double> q_t1[4]);
+
+}  // namespace hpccd

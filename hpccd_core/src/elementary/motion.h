@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+// The one configuration behind both elementary tests: a connecting vector p and two spanning vectors a, b, each
+// moving on a straight line. The features can only touch while p lies in the plane of a and b, at p = alpha a + beta b.
+//   vertex-face: p = v - f0, a = f1 - f0, b = f2 - f0; inside where alpha >= 0, beta >= 0, alpha + beta <= 1
+//   edge-edge:   p = b0 - a0, a = a1 - a0, b = b1 - b0; inside where 0 <= alpha <= 1, -1 <= beta <= 0
+#pragma once
+
+#include "base/vec3.h"
+
+namespace hpccd {
+
+enum class Kind : unsigned char { vertex_face, edge_edge };
+
+template <class R>
+struct Motion {
+  Vec3<R> p0, a0, b0;  // at t = 0
+  Vec3<R> p1, a1, b1;  // at t = 1
+};
+
+// q[0..3] in the order of the public queries: v f0 f1 f2, or a0 a1 b0 b1.
+template <Kind kind, class R>
+HPCCD_HD Motion<R> motion_of(const Vec3<R> q_t0[4], const Vec3<R> q_t1[4]) {
+  if constexpr (kind == Kind::vertex_face)
+    return {q_t0[0] - q_t0[1], q_t0[2] - q_t0[1], q_t0[3] - q_t0[1],
+            q_t1[0] - q_t1[1], q_t1[2] - q_t1[1], q_t1[3] - q_t1[1]};
+  else
+    return {q_t0[2] - q_t0[0], q_t0[1] - q_t0[0], q_t0[3] - q_t0[2],
+            q_t1[2] - q_t1[0], q_t1[1] - q_t1[0], q_t1[3] - q_t1[2]};
+}
+
+// Largest coordinates of p, a and b over the motion: the scale of every error bound.
+template <class R>
+struct Magnitudes {
+  R p, a, b;
+};
+
+template <class R>
+HPCCD_HD Magnitudes<R> magnitudes(const Motion<R>& m) {
+  return {greater(max_norm(m.p0), max_norm(m.p1)), greater(max_norm(m.a0), max_norm(m.a1)),
+          greater(max_norm(m.b0), max_norm(m.b1))};
+}
+
+// Whether products of four magnitudes neither overflow nor lose bits to underflow, so that the relative error bounds
+// hold. The limits leave room for degree-4 terms of doubles: (2^-240)^4 = 2^-960, far above the smallest normal.
+// Written so that NaN says no.
+template <class R>
+HPCCD_HD typename RealTraits<R>::Mask in_range(const Magnitudes<R>& m) {
+  const R low(sizeof(typename RealTraits<R>::Scalar) == 8 ? 5.7e-73 : 4.7e-10);   // 2^-240, 2^-31
+  const R high(sizeof(typename RealTraits<R>::Scalar) == 8 ? 1.7e72 : 2.1e9);     // 2^240, 2^31
+  const R least = lesser(lesser(m.p, m.a), m.b);
+  const R most = greater(greater(m.p, m.a), m.b);
+  return least >= low && most <= high;
+}
+
+}  // namespace hpccd

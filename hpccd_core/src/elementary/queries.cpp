@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+// Single queries through the same batches and last resorts as whole scenes.
+#include <algorithm>
+#include <memory>
+#include <vector>
+
+#include "base/simd.h"
+#include "elementary/batch.h"
+#include "elementary/last_resort.h"
+
+namespace hpccd {
+namespace {
+
+Vec3<double> point(const Query& q, int row) { return {q[3 * row], q[3 * row + 1], q[3 * row + 2]}; }
+
+void test_queries(Kind kind, std::span<const Query> queries, Accuracy accuracy, Simd simd, bool* hit, double* toc) {
+  const BatchTest test = batch_test(resolve(simd));
+  auto result = std::make_unique<BatchResult>();
+  std::vector<VertexRow> rows(4 * batch_capacity);
+  std::vector<std::array<std::uint32_t, 2>> edges(2 * batch_capacity);
+  std::vector<std::array<std::uint32_t, 3>> faces(batch_capacity);
+  std::vector<std::uint32_t> first(batch_capacity), second(batch_capacity);
+  for (std::uint32_t i = 0; i < batch_capacity; ++i) {
+    edges[2 * i] = {4 * i, 4 * i + 1};
+    edges[2 * i + 1] = {4 * i + 2, 4 * i + 3};
+    faces[i] = {4 * i + 1, 4 * i + 2, 4 * i + 3};
+    first[i] = kind == Kind::vertex_face ? 4 * i : 2 * i;
+    second[i] = kind == Kind::vertex_face ? i : 2 * i + 1;
+  }
+  const Geometry geometry{rows.data(), edges.data(), faces.data()};
+  for (std::size_t begin = 0; begin < queries.size(); begin += batch_capacity) {
+    const auto n = static_cast<std::uint32_t>(std::min<std::size_t>(queries.size() - begin, batch_capacity));
+    for (std::uint32_t i = 0; i < n; ++i)
+      for (int row = 0; row < 4; ++row)
+        for (int k = 0; k < 3; ++k) {
+          rows[4 * i + row].t0[k] = queries[begin + i][3 * row + k];
+          rows[4 * i + row].t1[k] = queries[begin + i][12 + 3 * row + k];
+        }
+    test(geometry, kind, first.data(), second.data(), n, *result);
+    std::fill_n(hit + begin, n, false);
+    std::fill_n(toc + begin, n, std::numeric_limits<double>::infinity());
+    for (std::uint32_t i = 0; i < result->n_contacts; ++i) {
+      const std::size_t at = begin + result->contact[i];
+      hit[at] = true;
+      toc[at] = accuracy == Accuracy::conservative ? std::max(0.0, result->toc[i] - result->delta[i]) : result->toc[i];
+    }
+    for (std::uint32_t i = 0; i < result->n_undecided; ++i) {
+      const std::size_t at = begin + result->undecided[i];
+      const Query& q = queries[at];
+      const Vec3<double> q_t0[4] = {point(q, 0), point(q, 1), point(q, 2), point(q, 3)};
+      const Vec3<double> q_t1[4] = {point(q, 4), point(q, 5), point(q, 6), point(q, 7)};
+      if (const auto t = last_resort(accuracy, kind, q_t0, q_t1)) hit[at] = true, toc[at] = *t;
+    }
+  }
+}
+
+}  // namespace
+
+void test_vertex_face(std::span<const Query> queries, Accuracy accuracy, Simd simd, bool* hit, double* toc) {
+  test_queries(Kind::vertex_face, queries, accuracy, simd, hit, toc);
+}
+
+void test_edge_edge(std::span<const Query> queries, Accuracy accuracy, Simd simd, bool* hit, double* toc) {
+  test_queries(Kind::edge_edge, queries, accuracy, simd, hit, toc);
+}
+
+}  // namespace hpccd

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+// The features of a scene, each assigned to one representative triangle so that every pair of features is tested once
+// (Kim et al. 2009, section 6; Curtis et al. 2008).
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "hpccd/hpccd.h"
+
+namespace hpccd {
+
+struct Features {
+  std::vector<std::array<std::uint32_t, 2>> edges;  // v0 < v1, in lexicographic order: an edge's number is its rank
+  std::vector<std::array<std::uint32_t, 3>> faces;
+  // What carries features through the hierarchy: all triangles, then the vertices that are in no triangle.
+  std::vector<std::uint32_t> lone_vertices;
+  std::vector<std::uint32_t> mesh_of_carrier;
+  // What carrier c represents: edges owned_edges[first_edge[c] .. first_edge[c+1]), vertices likewise.
+  std::vector<std::uint32_t> first_edge, owned_edges, first_vertex, owned_vertices;
+  std::uint32_t n_vertices = 0;
+
+  std::size_t bytes() const {
+    return edges.capacity() * sizeof(edges[0]) + faces.capacity() * sizeof(faces[0]) +
+           4 * (lone_vertices.capacity() + mesh_of_carrier.capacity() + first_edge.capacity() +
+                owned_edges.capacity() + first_vertex.capacity() + owned_vertices.capacity());
+  }
+  std::uint32_t n_faces() const { return static_cast<std::uint32_t>(faces.size()); }
+  std::uint32_t n_carriers() const { return static_cast<std::uint32_t>(mesh_of_carrier.size()); }
+};
+
+Features features_of(const Scene& scene);
+
+}  // namespace hpccd

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+// Candidate feature pairs of two leaves: boxes overlap and no vertex is shared.
+#pragma once
+
+#include "bvh/tree.h"
+
+namespace hpccd {
+
+struct CandidateBuffer {
+  // One pair of leaves adds at most (3 * leaf_size)^2 pairs of edges and 2 * 3 * leaf_size * leaf_size vertex-face.
+  static constexpr std::uint32_t capacity = 2048;
+  static constexpr std::uint32_t most_per_call = 9 * Tree::leaf_size * Tree::leaf_size;
+  std::uint32_t n = 0;
+  // Room for a full vector store beyond the last pair.
+  std::uint32_t first[capacity + Tree::load_width], second[capacity + Tree::load_width];
+};
+
+// Edges a, b with a < b to `edge_edge`, vertex and face to `vertex_face`. a == b: pairs within one leaf.
+using LeafPairs = void (*)(const Tree& tree, const LeafRange& a, const LeafRange& b, CandidateBuffer& edge_edge,
+                           CandidateBuffer& vertex_face);
+
+LeafPairs leaf_pairs(Simd simd);
+
+}  // namespace hpccd

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "traverse/tasks.h"
+
+namespace hpccd {
+
+PairRules::PairRules(const Scene& scene, Accuracy accuracy) : n_(scene.meshes().size()), default_(accuracy) {
+  enabled_.resize(n_ * n_);
+  accuracy_.resize(n_ * n_);
+  bool all_default = true;
+  for (std::uint32_t a = 0; a < n_; ++a)
+    for (std::uint32_t b = 0; b < n_; ++b) {
+      enabled_[a * n_ + b] = scene.pair_enabled(a, b);
+      accuracy_[a * n_ + b] = scene.pair_accuracy(a, b, accuracy);
+      all_enabled_ = all_enabled_ && enabled_[a * n_ + b];
+      all_default = all_default && accuracy_[a * n_ + b] == accuracy;
+    }
+  if (all_default) accuracy_.clear();
+}
+
+std::vector<NodePair> traversal_tasks(const Tree& tree, const PairRules& rules, std::size_t enough) {
+  std::vector<NodePair> level, next;
+  if (tree.nodes.empty()) return level;
+  level.push_back({0, 0});
+  for (bool progress = true; progress && level.size() < enough;) {
+    progress = false;
+    next.clear();
+    for (const NodePair& p : level) {
+      const Node &a = tree.nodes[p.a], &b = tree.nodes[p.b];
+      if (!rules.enabled(a, b) || !a.box.overlaps(b.box)) continue;
+      if (is_leaf_pair(tree.nodes, p)) {
+        next.push_back(p);
+        continue;
+      }
+      refine(tree.nodes, p, [&](NodePair q) { next.push_back(q); });
+      progress = true;
+    }
+    level.swap(next);
+  }
+  return level;
+}
+
+}  // namespace hpccd

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+// The traversal cut into independent tasks: pairs of nodes (or one node with itself) split until there are enough to
+// keep every thread busy. The list depends on the tree only, never on the number of threads.
+#pragma once
+
+#include <vector>
+
+#include "bvh/tree.h"
+#include "hpccd/hpccd.h"
+
+namespace hpccd {
+
+struct NodePair {
+  std::uint32_t a, b;  // a == b: pairs within the subtree
+};
+
+// What the scene says of two meshes, looked up once per call.
+class PairRules {
+ public:
+  PairRules(const Scene& scene, Accuracy accuracy);
+  bool enabled(const Node& a, const Node& b) const {
+    if (all_enabled_ || a.mesh == mixed_meshes || b.mesh == mixed_meshes) return true;
+    return enabled_[a.mesh * n_ + b.mesh];
+  }
+  Accuracy accuracy(const Node& a, const Node& b) const {
+    return accuracy_.empty() ? default_ : accuracy_[a.mesh * n_ + b.mesh];
+  }
+
+ private:
+  std::size_t n_;
+  bool all_enabled_ = true;
+  Accuracy default_;
+  std::vector<char> enabled_;
+  std::vector<Accuracy> accuracy_;
+};
+
+// The pairs that follow from one whose boxes overlap and which is not two leaves.
+template <class Push>
+void refine(const std::vector<Node>& nodes, NodePair p, Push&& push) {
+  const Node &a = nodes[p.a], &b = nodes[p.b];
+  if (p.a == p.b) {
+    push(NodePair{a.children, a.children});
+    push(NodePair{a.children + 1, a.children + 1});
+    push(NodePair{a.children, a.children + 1});
+    return;
+  }
+  // The larger node gives way; equal ones go down together.
+  const bool split_a = a.children && (!b.children || a.carriers * 2 > b.carriers);
+  const bool split_b = b.children && (!a.children || b.carriers * 2 > a.carriers);
+  if (split_a && split_b) {
+    for (std::uint32_t i = 0; i < 2; ++i)
+      for (std::uint32_t j = 0; j < 2; ++j) push(NodePair{a.children + i, b.children + j});
+  } else if (split_a) {
+    for (std::uint32_t i = 0; i < 2; ++i) push(NodePair{a.children + i, p.b});
+  } else {
+    for (std::uint32_t j = 0; j < 2; ++j) push(NodePair{p.a, b.children + j});
+  }
+}
+
+inline bool is_leaf_pair(const std::vector<Node>& nodes, NodePair p) {
+  return !nodes[p.a].children && !nodes[p.b].children;
+}
+
+std::vector<NodePair> traversal_tasks(const Tree& tree, const PairRules& rules, std::size_t enough);
+
+}  // namespace hpccd

@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "traverse/traverse.h"
+
+#include <algorithm>
+
+namespace hpccd {
+namespace {
+
+void walk(const Tree& tree, const PairRules& rules, NodePair start, std::vector<NodePair>& stack, Worker& worker) {
+  stack.push_back(start);
+  while (!stack.empty()) {
+    const NodePair p = stack.back();
+    stack.pop_back();
+    const Node &a = tree.nodes[p.a], &b = tree.nodes[p.b];
+    ++worker.node_pairs;
+    if (!rules.enabled(a, b) || !a.box.overlaps(b.box)) continue;
+    if (is_leaf_pair(tree.nodes, p))
+      worker.leaf_pair(tree, tree.leaves[a.leaf], tree.leaves[b.leaf], rules.accuracy(a, b));
+    else
+      refine(tree.nodes, p, [&](NodePair q) { stack.push_back(q); });
+  }
+}
+
+// The task with the lowest number that holds a contact decides, so the answer does not depend on the threads.
+void keep_first_of_task(Worker& worker, std::size_t task, std::atomic<std::size_t>& found) {
+  if (worker.vertex_face.empty() && worker.edge_edge.empty()) return;
+  std::size_t before = found.load();
+  while (task < before && !found.compare_exchange_weak(before, task)) {
+  }
+}
+
+Found least(const std::vector<Found>& found) {
+  return *std::min_element(found.begin(), found.end(), [](const Found& a, const Found& b) {
+    return std::pair{a.first, a.second} < std::pair{b.first, b.second};
+  });
+}
+
+void traverse_any(const Tree& tree, const PairRules& rules, Search& search, ThreadPool& pool,
+                  std::vector<Worker>& workers, const std::vector<NodePair>& tasks) {
+  std::atomic<std::size_t> next{0}, found{tasks.size()};
+  pool.run([&](int thread) {
+    Worker& worker = workers[thread];
+    worker.begin(search);
+    std::vector<NodePair> stack;
+    std::vector<Found> best_vf, best_ee;
+    std::size_t best = tasks.size();
+    for (;;) {
+      const std::size_t task = next.fetch_add(1);
+      if (task >= tasks.size() || task > found.load()) break;
+      walk(tree, rules, tasks[task], stack, worker);
+      worker.flush();
+      keep_first_of_task(worker, task, found);
+      if (task < best && !(worker.vertex_face.empty() && worker.edge_edge.empty())) {
+        best = task;
+        best_vf.swap(worker.vertex_face);
+        best_ee.swap(worker.edge_edge);
+      }
+      worker.vertex_face.clear();
+      worker.edge_edge.clear();
+    }
+    if (best < tasks.size()) {
+      // One contact: the first in canonical order of the task's own.
+      if (!best_vf.empty())
+        worker.vertex_face = {least(best_vf)};
+      else
+        worker.edge_edge = {least(best_ee)};
+    }
+    worker.best_task = best;
+  });
+  for (Worker& w : workers)
+    if (w.best_task != found.load()) w.vertex_face.clear(), w.edge_edge.clear();
+}
+
+}  // namespace
+
+void traverse(const Tree& tree, const PairRules& rules, Search& search, ThreadPool& pool, std::vector<Worker>& workers) {
+  // Small enough that the last tasks to end leave no thread idle for long, at 16 threads too.
+  constexpr std::size_t enough = 4096;
+  const std::vector<NodePair> tasks = traversal_tasks(tree, rules, enough);
+  if (search.report == Report::any) return traverse_any(tree, rules, search, pool, workers, tasks);
+  std::atomic<std::size_t> next{0};
+  pool.run([&](int thread) {
+    Worker& worker = workers[thread];
+    worker.begin(search);
+    std::vector<NodePair> stack;
+    constexpr std::size_t grain = 4;
+    for (;;) {
+      const std::size_t begin = next.fetch_add(grain, std::memory_order_relaxed);
+      if (begin >= tasks.size()) break;
+      for (std::size_t i = begin; i < std::min(begin + grain, tasks.size()); ++i)
+        walk(tree, rules, tasks[i], stack, worker);
+    }
+    worker.flush();
+  });
+}
+
+}  // namespace hpccd

@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "traverse/worker.h"
+
+#include <algorithm>
+#include <chrono>
+
+#include "elementary/last_resort.h"
+
+namespace hpccd {
+namespace {
+
+Vec3<double> vec(const double* x) { return {x[0], x[1], x[2]}; }
+
+}  // namespace
+
+void Worker::begin(Search& search) {
+  search_ = &search;
+  vertex_face.clear();
+  edge_edge.clear();
+  counts[0] = counts[1] = {};
+  node_pairs = leaf_pairs = 0;
+  elementary_seconds = 0;
+  if (!result_) result_ = std::make_unique<BatchResult>();
+}
+
+void Worker::leaf_pair(const Tree& tree, const LeafRange& a, const LeafRange& b, Accuracy accuracy) {
+  auto& waiting = waiting_[static_cast<int>(accuracy)];
+  if (!waiting) waiting = std::make_unique<Waiting>();
+  ++leaf_pairs;
+  search_->leaf_pairs(tree, a, b, waiting->edge_edge, waiting->vertex_face);
+  drain(waiting->edge_edge, Kind::edge_edge, accuracy, batch_capacity);
+  drain(waiting->vertex_face, Kind::vertex_face, accuracy, batch_capacity);
+}
+
+void Worker::flush() {
+  for (int i = 0; i < 4; ++i)
+    if (waiting_[i]) {
+      drain(waiting_[i]->edge_edge, Kind::edge_edge, static_cast<Accuracy>(i), 1);
+      drain(waiting_[i]->vertex_face, Kind::vertex_face, static_cast<Accuracy>(i), 1);
+    }
+}
+
+std::size_t Worker::bytes() const {
+  std::size_t b = (vertex_face.capacity() + edge_edge.capacity()) * sizeof(Found) + sizeof(BatchResult);
+  for (const auto& w : waiting_) b += w ? sizeof(Waiting) : 0;
+  return b;
+}
+
+void Worker::drain(CandidateBuffer& buffer, Kind kind, Accuracy accuracy, std::uint32_t keep_below) {
+  static_assert(batch_capacity - 1 + CandidateBuffer::most_per_call <= CandidateBuffer::capacity);
+  if (buffer.n < keep_below) return;
+  const auto start = std::chrono::steady_clock::now();
+  std::uint32_t done = 0;
+  while (buffer.n - done >= keep_below && done < buffer.n) {
+    const std::uint32_t n = std::min(buffer.n - done, batch_capacity);
+    test(buffer.first + done, buffer.second + done, n, kind, accuracy);
+    done += n;
+  }
+  std::copy(buffer.first + done, buffer.first + buffer.n, buffer.first);
+  std::copy(buffer.second + done, buffer.second + buffer.n, buffer.second);
+  buffer.n -= done;
+  elementary_seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+void Worker::test(const std::uint32_t* first, const std::uint32_t* second, std::uint32_t n, Kind kind,
+                  Accuracy accuracy) {
+  BatchResult& r = *result_;
+  BatchCounts& count = counts[kind == Kind::edge_edge];
+  r.counts = count;
+  search_->batch_test(search_->geometry, kind, first, second, n, r);
+  count = r.counts;
+  for (std::uint32_t i = 0; i < r.n_contacts; ++i) {
+    // "conservative" promises never to be late.
+    const double toc = accuracy == Accuracy::conservative ? std::max(0.0, r.toc[i] - r.delta[i]) : r.toc[i];
+    report(kind, first[r.contact[i]], second[r.contact[i]], toc);
+  }
+  for (std::uint32_t i = 0; i < r.n_undecided; ++i) {
+    const std::uint32_t a = first[r.undecided[i]], b = second[r.undecided[i]];
+    const Geometry& g = search_->geometry;
+    std::uint32_t v[4];
+    if (kind == Kind::vertex_face)
+      v[0] = a, v[1] = g.faces[b][0], v[2] = g.faces[b][1], v[3] = g.faces[b][2];
+    else
+      v[0] = g.edges[a][0], v[1] = g.edges[a][1], v[2] = g.edges[b][0], v[3] = g.edges[b][1];
+    Vec3<double> q_t0[4], q_t1[4];
+    for (int k = 0; k < 4; ++k) q_t0[k] = vec(g.vertices[v[k]].t0), q_t1[k] = vec(g.vertices[v[k]].t1);
+    if (const auto toc = last_resort(accuracy, kind, q_t0, q_t1)) report(kind, a, b, *toc);
+  }
+}
+
+void Worker::report(Kind kind, std::uint32_t first, std::uint32_t second, double toc) {
+  if (search_->report == Report::first) {
+    double best = search_->earliest.load(std::memory_order_relaxed);
+    if (toc > best + simultaneous) return;
+    while (toc < best && !search_->earliest.compare_exchange_weak(best, toc, std::memory_order_relaxed)) {
+    }
+  }
+  (kind == Kind::vertex_face ? vertex_face : edge_edge).push_back({first, second, toc});
+}
+
+}  // namespace hpccd

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+// What one thread carries through the traversal: candidates wait in small buffers until a batch is full, are tested,
+// and only contacts stay. Candidates are never all kept.
+#pragma once
+
+#include <atomic>
+#include <memory>
+#include <vector>
+
+#include "elementary/batch.h"
+#include "traverse/leaf_pairs.h"
+
+namespace hpccd {
+
+// A contact of features `first` and `second`: vertex and face, or edges a < b.
+struct Found {
+  std::uint32_t first, second;
+  double toc;
+};
+
+// What all threads share during one call.
+struct Search {
+  Geometry geometry;
+  BatchTest batch_test;
+  LeafPairs leaf_pairs;
+  Report report;
+  std::atomic<double> earliest;  // best time so far, where report is first
+};
+
+// Contacts within this of the earliest count as simultaneous: the accuracy promised for times of contact.
+inline constexpr double simultaneous = 1e-12;
+
+class Worker {
+ public:
+  void begin(Search& search);
+  // Candidates of two leaves whose boxes overlap, to be tested at `accuracy`.
+  void leaf_pair(const Tree& tree, const LeafRange& a, const LeafRange& b, Accuracy accuracy);
+  void flush();  // tests what waits
+  std::size_t bytes() const;
+
+  std::vector<Found> vertex_face, edge_edge;
+  BatchCounts counts[2];                 // vertex-face, edge-edge
+  std::uint64_t node_pairs = 0, leaf_pairs = 0;
+  double elementary_seconds = 0;
+  std::size_t best_task = 0;             // where report is any: the task these contacts come from
+
+ private:
+  struct Waiting {
+    CandidateBuffer edge_edge, vertex_face;
+  };
+  void drain(CandidateBuffer& buffer, Kind kind, Accuracy accuracy, std::uint32_t keep_below);
+  void test(const std::uint32_t* first, const std::uint32_t* second, std::uint32_t n, Kind kind, Accuracy accuracy);
+  void report(Kind kind, std::uint32_t first, std::uint32_t second, double toc);
+
+  Search* search_ = nullptr;
+  std::unique_ptr<Waiting> waiting_[4];  // by accuracy
+  std::unique_ptr<BatchResult> result_;
+};
+
+}  // namespace hpccd
