@@ -70,7 +70,8 @@ class CMakeBuild(build_ext):
             f"-DCMAKE_PROJECT_INCLUDE={HERE / 'cmake' / 'pypi_ros.cmake'}",
             f"-DCMAKE_INSTALL_PREFIX={stage}",
             f"-DCMAKE_INSTALL_RPATH={RPATH}",
-            f"-DPython3_EXECUTABLE={sys.executable}", f"-DPYTHON_EXECUTABLE={sys.executable}",
+            # rosidl asks for Python3, pybind11 for Python.
+            f"-DPython3_EXECUTABLE={sys.executable}", f"-DPython_EXECUTABLE={sys.executable}",
             *shlex.split(os.environ.get("CMAKE_ARGS", "")),
         ]  # fmt: skip
         subprocess.check_call(configure, env=env)
