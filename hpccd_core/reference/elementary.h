@@ -10,7 +10,8 @@ namespace hpccd::reference {
 // Four points at t=0, then the same four at t=1.
 using Query = std::array<std::array<double, 3>, 8>;
 
-// Points: vertex, then the face's three corners. The earliest time of contact, rounded down to a double, if any.
+// Points: vertex, then the face's three corners. The earliest time of contact, rounded down to a double, if
+// any.
 std::optional<double> vertex_face(const Query& query);
 
 // Points: the first edge's two ends, then the second's.

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
+
 #include "elementary.h"
 #include "polynomial.h"
 
-#include <array>
-
 namespace hpccd::reference {
 
-// The four points' motion as polynomials of degree one. All coordinates are multiplied by one power of two that
-// makes them integers, which changes neither contacts nor times.
+// The four points' motion as polynomials of degree one. All coordinates are multiplied by one power of two
+// that makes them integers, which changes neither contacts nor times.
 std::array<Vector, 4> motion(const Query& query);
 
 }  // namespace hpccd::reference

@@ -6,8 +6,8 @@
 namespace hpccd::reference {
 
 std::optional<double> vertex_face(const Query& query) {
-    const auto [v, f0, f1, f2] = motion(query);
-    return origin_in_triangle(f0 - v, f1 - v, f2 - v);
+  const auto [v, f0, f1, f2] = motion(query);
+  return origin_in_triangle(f0 - v, f1 - v, f2 - v);
 }
 
 }  // namespace hpccd::reference

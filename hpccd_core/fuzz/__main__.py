@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Command line of the fuzzer."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from .differential import Batch, Tally, add_batch, batches, new_tallies
+
+ACCURACIES = ("fast", "balanced", "conservative", "exact")
+
+
+def main(arguments: list[str] | None = None) -> int:
+    a = _parser().parse_args(arguments)
+    console = Console()
+    tallies = new_tallies()
+    source = _replayed(a.replay) if a.replay else batches(a.seed, a.batch)
+    goal = None if a.replay else a.count or a.seconds
+    done, start = 0, time.monotonic()
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=console, transient=True) as progress:
+        bar = progress.add_task("fuzzing", total=goal)
+        try:
+            for batch in source:
+                add_batch(tallies, batch, a.accuracy, a.threads)
+                done += len(batch.queries)
+                seconds = time.monotonic() - start
+                broken = sum(t.broken for t in tallies.values())
+                text = f"{done:,} queries, {done / seconds:,.0f}/s, {broken} broken promises, last: {batch.generator}"
+                progress.update(bar, completed=done if a.count else seconds, description=text)
+                if goal is not None and (done if a.count else seconds) >= goal:
+                    break
+        except KeyboardInterrupt:
+            console.print("Stopped early; what was done:")
+    console.print(_table(tallies))
+    source_text = f"replay of {a.replay}" if a.replay else f"seed {a.seed}, batches of {a.batch}"
+    console.print(f"{done:,} queries in {time.monotonic() - start:.1f} s, {source_text}.")
+    failing = {key: t.failing for key, t in tallies.items() if t.failing}
+    if not failing:
+        return 0
+    a.save.parent.mkdir(parents=True, exist_ok=True)
+    np.savez_compressed(a.save, **{"|".join(key): np.concatenate(q) for key, q in failing.items()})
+    console.print(f"Failing queries: {a.save}. Again: python -m hpccd_core.fuzz --replay {a.save}")
+    return 1
+
+
+def _parser() -> argparse.ArgumentParser:
+    p = argparse.ArgumentParser(
+        prog="python -m hpccd_core.fuzz",
+        description="Compare the elementary tests with the exact oracle on degenerate queries. Exit status 1 where "
+        "exact differs (time of contact: by more than 1e-12) or conservative misses a contact or reports it late; "
+        "fast and balanced make no such promise and are only counted.",
+    )
+    length = p.add_mutually_exclusive_group()
+    length.add_argument("--seconds", type=float, default=60.0, help="how long (default 60)")
+    length.add_argument("--count", type=int, help="how many queries instead")
+    p.add_argument("--seed", type=int, default=0, help="the same seed and batch give the same queries")
+    p.add_argument("--batch", type=int, default=10_000, help="queries in a batch (default 10000)")
+    p.add_argument(
+        "--accuracy", type=_accuracies, default=ACCURACIES, help="comma-separated (default: " + ",".join(ACCURACIES) + ")"
+    )
+    p.add_argument("--threads", type=int, default=0, help="threads of the oracle, 0 = all cores")
+    p.add_argument("--save", type=Path, default=Path("fuzz-failures.npz"), help="file for failing queries")
+    p.add_argument("--replay", type=Path, help="run the queries of such a file and no others")
+    return p
+
+
+def _accuracies(text: str) -> tuple[str, ...]:
+    names = tuple(text.split(","))
+    unknown = set(names) - set(ACCURACIES)
+    if unknown:
+        raise argparse.ArgumentTypeError(f"{', '.join(sorted(unknown))}: choose from {', '.join(ACCURACIES)}")
+    return names
+
+
+def _replayed(path: Path):
+    with np.load(path) as file:
+        for key in file.files:
+            yield Batch(kind=key.split("|")[1], generator=key, queries=file[key])
+
+
+def _table(tallies: dict[tuple[str, str], Tally]) -> Table:
+    table = Table(title="Elementary tests against the exact oracle")
+    for column in ("accuracy", "kind"):
+        table.add_column(column)
+    for column in ("queries", "contacts", "missed", "invented", "worst toc error", "latest by", "broken promises"):
+        table.add_column(column, justify="right")
+    for (accuracy, kind), t in sorted(tallies.items()):
+        counts = (f"{t.queries:,}", f"{t.hits:,}", f"{t.missed:,}", f"{t.invented:,}")
+        promise = f"{t.broken:,}" if accuracy in ("exact", "conservative") else "none made"
+        table.add_row(accuracy, kind, *counts, f"{t.worst_toc_error:.1e}", f"{t.latest:.1e}", promise)
+    return table
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What may happen to a degenerate query on its way to the tests: permutation, shift, scale, rounding, one ulp."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .generators import VERTEX_FACE
+
+
+def disturb(rng: np.random.Generator, q: np.ndarray, kind: str) -> np.ndarray:
+    """Apply a random choice of the functions below, each query its own. q: (n,8,3) float64; returns the same shape."""
+    q = permute(rng, q, kind)
+    for change, share in ((uneven, 0.1), (rotate, 0.1), (offset, 0.3), (scale, 0.4), (single, 0.15), (one_ulp, 0.3)):
+        chosen = rng.random(len(q)) < share
+        q[chosen] = change(rng, q[chosen])
+    return q
+
+
+def permute(rng: np.random.Generator, q: np.ndarray, kind: str) -> np.ndarray:
+    """Another order of the triangle's corners, or of the edges and their ends; the answer stays."""
+    n = len(q)
+    if kind == VERTEX_FACE:
+        corners = rng.permuted(np.tile([1, 2, 3], (n, 1)), axis=1)
+        order = np.concatenate([np.zeros((n, 1), dtype=int), corners], axis=1)
+    else:
+        first, second = rng.permuted(np.tile([0, 1], (n, 1)), axis=1), rng.permuted(np.tile([2, 3], (n, 1)), axis=1)
+        swap = rng.random((n, 1)) < 0.5
+        order = np.where(swap, np.hstack([second, first]), np.hstack([first, second]))
+    return np.take_along_axis(q, np.hstack([order, order + 4])[:, :, None], axis=1)
+
+
+def uneven(rng: np.random.Generator, q: np.ndarray) -> np.ndarray:
+    """Shrink two of the four points' coordinates, or motion against size, by a power of two: huge beside tiny."""
+    q = q.copy()
+    factor = 2.0 ** -rng.integers(1, 45, size=(len(q), 1, 1))
+    points = rng.random(len(q)) < 0.5
+    q[np.ix_(points, [2, 3, 6, 7])] *= factor[points]
+    q[~points, 4:] = q[~points, :4] + factor[~points] * (q[~points, 4:] - q[~points, :4])
+    return q
+
+
+def rotate(rng: np.random.Generator, q: np.ndarray) -> np.ndarray:
+    """A random rotation: exact degeneracies become ones up to rounding."""
+    m = rng.normal(size=(len(q), 3, 3))
+    return q @ np.linalg.qr(m)[0]
+
+
+def offset(rng: np.random.Generator, q: np.ndarray) -> np.ndarray:
+    """Shift all points far away: by a power of two (exact for small integers) or any value, up to 1e12 times."""
+    exact = 2.0 ** rng.integers(0, 40, size=(len(q), 1, 3)) * rng.integers(-1, 2, size=(len(q), 1, 3))
+    rounded = 10.0 ** rng.uniform(-3, 12, size=(len(q), 1, 1)) * rng.uniform(-1, 1, size=(len(q), 1, 3))
+    return q + np.where(rng.random((len(q), 1, 1)) < 0.5, exact, rounded)
+
+
+def scale(rng: np.random.Generator, q: np.ndarray) -> np.ndarray:
+    """Scales 1e-30 to 1e30, by a power of two (exact) or of ten (rounded); a few down to denormal numbers."""
+    exponent = rng.uniform(-30, 30, size=(len(q), 1, 1))
+    exact = np.exp2(np.round(exponent * np.log2(10)))
+    factor = np.where(rng.random((len(q), 1, 1)) < 0.6, exact, 10.0**exponent)
+    denormal = rng.random((len(q), 1, 1)) < 0.05
+    return np.where(denormal, q * np.exp2(-1070.0), q * factor)
+
+
+def single(rng: np.random.Generator, q: np.ndarray) -> np.ndarray:
+    """Values that float32 holds."""
+    with np.errstate(over="ignore", under="ignore"):
+        rounded = q.astype(np.float32).astype(np.float64)
+    return np.where(np.isfinite(rounded), rounded, q)
+
+
+def one_ulp(rng: np.random.Generator, q: np.ndarray) -> np.ndarray:
+    """Move one to three coordinates to a neighbouring double."""
+    q = q.copy()
+    rows = np.arange(len(q))
+    for _ in range(3):
+        point, axis = rng.integers(0, 8, size=len(q)), rng.integers(0, 3, size=len(q))
+        towards = np.where(rng.random(len(q)) < 0.5, -np.inf, np.inf)
+        moved = np.nextafter(q[rows, point, axis], towards)
+        # Stepping away from 0 gives the smallest denormal number; now and then is enough, in each case it is exact.
+        leave = (q[rows, point, axis] == 0) & (rng.random(len(q)) < 0.8) | (rng.random(len(q)) < 0.3)
+        q[rows, point, axis] = np.where(leave, q[rows, point, axis], moved)
+    return q
