@@ -35,6 +35,7 @@ class BagWriter:
     path: ends in `.mcap`: one file, which `ros2 bag play` opens alone. Otherwise a folder, made here, with
     `NAME_0.mcap`, `NAME_1.mcap`, ... and `metadata.yaml`.
     info: JSON-able dict, stored with each file for the replay (see `mcap_reader.Recording.info`).
+    attachments: (name, bytes) of files that a replay needs, stored with each file too.
     compression: "none", "lz4" or "zstd", a chunk at a time.
     chunk_size: bytes of messages after which a chunk is closed, indexed and handed to the system.
     flush_interval: seconds after which an open chunk is closed all the same. A process killed at any moment
@@ -44,7 +45,7 @@ class BagWriter:
     Raises ValueError for options that do not fit each other, FileExistsError rather than overwrite a recording.
     """
 
-    def __init__(self, path, *, info=None, compression="none", chunk_size=1 << 20, flush_interval=0.5,
+    def __init__(self, path, *, info=None, attachments=(), compression="none", chunk_size=1 << 20, flush_interval=0.5,
                  max_bytes=0, max_seconds=0.0):
         self.path = Path(path)
         self.single_file = self.path.suffix == ".mcap"
@@ -60,6 +61,7 @@ class BagWriter:
         if not self.single_file:
             self.path.mkdir()
         self._info = json.dumps(info or {}, sort_keys=True)
+        self._attachments = list(attachments)
         self._options = {"compression": COMPRESSIONS[compression], "chunk_size": chunk_size}
         self._flush_interval = flush_interval
         self._limits = (max_bytes, int(max_seconds * 1e9))
@@ -125,6 +127,9 @@ class BagWriter:
         self._writer.start(profile="ros2", library=f"hpccd {package_version()}")
         # First, so that even a file cut off later can be replayed.
         self._writer.add_metadata(HPCCD_RECORD, {"json": self._info})
+        for name, data in self._attachments:
+            now = time.time_ns()
+            self._writer.add_attachment(now, now, name, "application/octet-stream", data)
         self._file = {"path": str(path), "count": 0, "start": 0, "end": 0, "bytes": 0, "topics": {}}
         self._files.append(self._file)
         self._channels: dict[str, int] = {}

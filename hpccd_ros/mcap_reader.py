@@ -45,6 +45,7 @@ class RecordedMessage:
     topic: str
     log_time: int  # ns since the epoch, when the recorder received it
     publish_time: int  # ns since the epoch, when it was sent
+    sequence: int  # the publisher's number, 0 where the recorder did not store it
     data: bytes  # CDR, with its 4-byte header
 
 
@@ -56,6 +57,7 @@ class Recording:
 
     topics: dict topic name -> RecordedTopic.
     info: what `hpccd record` stored beside the messages (dict), or None in a recording of another recorder.
+    attachments: name -> bytes of the files that it stored, such as mesh files.
     """
 
     def __init__(self, path):
@@ -64,6 +66,7 @@ class Recording:
         self._stack = contextlib.ExitStack()
         self.topics: dict[str, RecordedTopic] = {}
         self.info: dict | None = None
+        self.attachments: dict[str, bytes] = {}
         try:
             self._readers = [self._open(file) for file in self.files]
         except BaseException:
@@ -108,6 +111,8 @@ class Recording:
             for record in reader.iter_metadata():
                 if record.name == HPCCD_RECORD and self.info is None:
                     self.info = json.loads(record.metadata["json"])
+            if not self.attachments:
+                self.attachments = {a.name: a.data for a in reader.iter_attachments()}
         return reader
 
     def _add_topic(self, channel, schema, count):
@@ -129,7 +134,9 @@ class Recording:
     def _read(self, path, reader, topics):
         with _explained(path):
             for _, channel, message in reader.iter_messages(topics=topics, log_time_order=True):
-                yield RecordedMessage(channel.topic, message.log_time, message.publish_time, message.data)
+                yield RecordedMessage(
+                    channel.topic, message.log_time, message.publish_time, message.sequence, message.data
+                )
 
 
 def _mcap_files(path: Path) -> list[Path]:

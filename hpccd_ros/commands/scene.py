@@ -33,6 +33,8 @@ def configure(parser):
     play.add_argument("--loop", action="store_true", help="over and over, until Ctrl-C")
     play.add_argument("--wait", type=float, default=10.0, metavar="S",
                       help="how long to wait for a subscriber before the first frame (default: %(default)s)")
+    play.add_argument("--subscribers", type=int, default=1, metavar="N",
+                      help="how many to wait for: 2 for a node and a recorder (default: %(default)s)")
     play.add_argument("--ros-args", nargs="...", default=[],
                       help="remappings and the like, as for any ROS program")
     files = parser.add_argument_group("write a file (existing files are not overwritten, but for pictures)")
@@ -81,7 +83,8 @@ def run(args) -> int:
     if args.publish:
         from hpccd_ros.scenes.publish import publish
 
-        count = publish(scene, args.rate, args.loop, args.wait, args.ros_args, progress=True)
+        count = publish(scene, args.rate, args.loop, args.wait, args.ros_args, progress=True,
+                        subscribers=args.subscribers)
         print(f"published {count} frames", flush=True)
     return 0
 

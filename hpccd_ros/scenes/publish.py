@@ -33,10 +33,11 @@ def publish(
     wait: float = 10.0,
     ros_args: list[str] | None = None,
     progress: bool = False,
+    subscribers: int = 1,
 ) -> int:
     """Publish all frames at `rate` Hz (over and over if `loop`); return how many. SIGINT and SIGTERM end it.
 
-    Before the first frame, waits up to `wait` seconds until every mesh's vertices have a subscriber.
+    Before the first frame, waits up to `wait` seconds until every mesh's vertices have `subscribers`.
     """
     stop = []
     previous = {
@@ -55,8 +56,9 @@ def publish(
             name = vertices_topic(mesh)
             publishers[name] = node.create_publisher(MeshVertices, name, STREAM)
         listened = [publishers[vertices_topic(mesh)] for mesh in scene.mesh_names]
-        if not _await_listeners(listened, wait, stop):
-            print("no subscriber for every mesh yet: publishing all the same", file=sys.stderr, flush=True)
+        if not _await_listeners(listened, subscribers, wait, stop):
+            text = f"not every mesh has {subscribers} subscriber(s) yet: publishing all the same"
+            print(text, file=sys.stderr, flush=True)
         count = _play(node, scene, publishers, rate, loop, stop, progress)
         for publisher in publishers.values():
             # What is still on its way must not be cut off by the end of this process.
@@ -69,9 +71,9 @@ def publish(
             signal.signal(number, handler)
 
 
-def _await_listeners(publishers, wait, stop) -> bool:
+def _await_listeners(publishers, wanted, wait, stop) -> bool:
     deadline = time.monotonic() + wait
-    while not stop and not (ready := all(p.get_subscription_count() for p in publishers)):
+    while not stop and not (ready := all(p.get_subscription_count() >= wanted for p in publishers)):
         if time.monotonic() >= deadline:
             return False
         time.sleep(0.02)

@@ -1,0 +1,126 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Play recorded messages over DDS: the very bytes, with the recorded quality of service, in their rhythm."""
+
+import signal
+import time
+
+import rclpy
+import yaml
+from rclpy.duration import Duration
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.signals import SignalHandlerOptions
+
+from hpccd_ros import _env, replay_setup
+from hpccd_ros.errors import UserError
+from hpccd_ros.mcap_decode import message_class
+from hpccd_ros.mcap_reader import RecordedTopic, Recording, RecordingError
+
+# Reliable readers that are late now and then must still find what they missed.
+DEPTH = 20
+
+
+def main(args) -> int:
+    """Play as the options of `hpccd replay --publish` say."""
+    stop = []
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda received, frame: stop.append(received))
+    with Recording(args.file) as recording:
+        topics = _topics(recording, args)
+        _env.prepare()
+        rclpy.init(args=["--ros-args", *args.ros_args] if args.ros_args else None,
+                   signal_handler_options=SignalHandlerOptions.NO)
+        node = rclpy.create_node("hpccd_replay", start_parameter_services=False)
+        try:
+            publishers = {topic.name: _publisher(node, topic) for topic in topics}
+            _await_subscribers(node, publishers, args.wait, stop)
+            count = _play(recording, publishers, args, stop)
+            for publisher in publishers.values():
+                publisher.wait_for_all_acked(Duration(seconds=2.0))
+        finally:
+            node.destroy_node()
+            rclpy.try_shutdown()
+    print(f"published {count} messages on {len(topics)} topics{' until told to stop' if stop else ''}", flush=True)
+    return 0
+
+
+def _topics(recording, args) -> list[RecordedTopic]:
+    if args.all:
+        return list(recording.topics.values())
+    roles = replay_setup.of_recording(recording, args.params).roles
+    return [topic for name, topic in recording.topics.items() if name in roles]
+
+
+def _publisher(node, topic):
+    try:
+        return node.create_publisher(message_class(topic.type_name), topic.name, _qos(topic))
+    except LookupError as error:
+        raise RecordingError(f"topic {topic.name} cannot be played: {error}") from error
+
+
+def _qos(topic) -> QoSProfile:
+    """The recorded reliability and durability where all its publishers agreed, else reliable and volatile."""
+    offers = yaml.safe_load(topic.offered_qos) or [] if topic.offered_qos else []
+    # rosbag2 before version 9 wrote the numbers of the enumeration: 1 reliable, 2 best effort; 1 transient local.
+    best_effort = offers and all(offer["reliability"] in ("best_effort", 2) for offer in offers)
+    latched = offers and all(offer["durability"] in ("transient_local", 1) for offer in offers)
+    return QoSProfile(
+        history=HistoryPolicy.KEEP_LAST,
+        depth=1 if latched else DEPTH,
+        reliability=ReliabilityPolicy.BEST_EFFORT if best_effort else ReliabilityPolicy.RELIABLE,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
+    )
+
+
+def _await_subscribers(node, publishers, wait, stop) -> None:
+    deadline = time.monotonic() + wait
+    while not stop:
+        alone = [name for name, publisher in publishers.items() if publisher.get_subscription_count() == 0]
+        if not alone:
+            return
+        if time.monotonic() > deadline:
+            raise UserError(f"nobody subscribes to {', '.join(alone)}: start a node for these meshes first, or --wait")
+        time.sleep(0.05)
+
+
+def _play(recording, publishers, args, stop) -> int:
+    count, first, began, last_frame = 0, None, 0.0, None
+    latched = {}
+    for message in recording.messages(list(publishers)):
+        first = message.log_time if first is None else first
+        at = (message.log_time - first) * 1e-9
+        if at < args.begin:
+            # What is latched (topologies) is in force at the beginning, whenever it was sent.
+            if publishers[message.topic].qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL:
+                latched[message.topic] = message
+            continue
+        if stop or at > args.end:
+            break
+        for earlier in latched.values():
+            publishers[earlier.topic].publish(earlier.data)
+            count += 1
+        latched.clear()
+        began = began or time.monotonic()
+        if args.step:
+            # One frame: all messages published at about the same time, as meshes of one step are.
+            if last_frame is None or message.log_time - last_frame > 2_000_000:
+                if not _next_wanted(f"{at:.3f} s"):
+                    break
+            last_frame = message.log_time
+        elif args.rate:
+            _sleep(began + (at - args.begin) / args.rate, stop)
+        publishers[message.topic].publish(message.data)
+        count += 1
+    return count
+
+
+def _next_wanted(where) -> bool:
+    try:
+        input(f"{where}: Enter plays the next frame, Ctrl-D ends ")
+    except EOFError:
+        return False
+    return True
+
+
+def _sleep(until, stop) -> None:
+    while not stop and (left := until - time.monotonic()) > 0:
+        time.sleep(min(left, 0.1))

@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Where a recorded answer of the node and the contacts computed again differ first, in words."""
+
+import numpy as np
+
+from hpccd_ros import convert
+from hpccd_ros.convert import Layout
+
+
+def difference(recorded, contacts, layout: Layout, any_one: bool = False) -> str | None:
+    """None where `recorded` (ContactArray) holds just what `contacts` (of the core) would be sent as.
+
+    Compared bit for bit: pairs, times, their order, totals, first time and hash. Points and normals are derived
+    from these and not compared. any_one: the node stopped at the first contact found (report "any"), which depends
+    on the timing of its threads: only whether there is one can be compared.
+    """
+    total = len(contacts.vf) + len(contacts.ee)
+    if any_one:
+        return None if bool(recorded.total) == bool(total) else _count(recorded.total, total)
+    if problem := _malformed(recorded, layout):
+        return f"the recorded answer is malformed: {problem}"
+    count = len(recorded.kind)
+    expected = type(recorded)()
+    convert.fill_contacts(expected, contacts, layout, max_contacts=count if recorded.truncated else 0, outputs=())
+    then, now = convert.read_contacts(recorded, layout), convert.read_contacts(expected, layout)
+    for kind, describe in (("vf", _vertex_face), ("ee", _edge_edge)):
+        first = _first_difference(
+            getattr(then, kind), getattr(then, kind + "_toc"), getattr(now, kind), getattr(now, kind + "_toc")
+        )
+        if first is not None:
+            return _explain(first, then, now, kind, lambda row, d=describe: d(row, layout))
+    if recorded.total != total:
+        return _count(recorded.total, total)
+    if recorded.first_toc != contacts.first_toc:
+        return f"first time of contact: recorded {recorded.first_toc!r}, now {contacts.first_toc!r}"
+    if recorded.hash != contacts.hash:
+        where = "among the contacts that max_contacts cut off" if recorded.truncated else "although all contacts are equal"
+        return f"hash {recorded.hash:#018x} was recorded, now it is {contacts.hash:#018x}, {where}"
+    return None
+
+
+def _count(recorded, now):
+    return f"{recorded:,} contacts were recorded, now there are {now:,}"
+
+
+def _malformed(message, layout) -> str | None:
+    count = len(message.kind)
+    sizes = {"mesh_a": 1, "mesh_b": 1, "features_a": 2, "features_b": 2, "toc": 1}
+    for name, per_contact in sizes.items():
+        if len(getattr(message, name)) != count * per_contact:
+            return f"{name} has {len(getattr(message, name))} entries for {count} contacts"
+    if list(message.mesh_names) != list(layout.mesh_names):
+        return f"its meshes are {list(message.mesh_names)}, those of the recording {list(layout.mesh_names)}"
+    kind = np.frombuffer(message.kind, np.uint8)
+    if (kind > message.EDGE_EDGE).any() or (np.diff(kind.astype(np.int16)) < 0).any():
+        return "kind is not a run of vertex-face followed by a run of edge-edge"
+    for name in ("mesh_a", "mesh_b"):
+        if count and max(getattr(message, name)) >= len(layout.mesh_names):
+            return f"{name} names mesh {max(getattr(message, name))} of {len(layout.mesh_names)}"
+    return None
+
+
+def _first_difference(rows, toc, other_rows, other_toc) -> int | None:
+    common = min(len(rows), len(other_rows))
+    unequal = (rows[:common] != other_rows[:common]).any(axis=1) | (toc[:common] != other_toc[:common])
+    if unequal.any():
+        return int(np.argmax(unequal))
+    return None if len(rows) == len(other_rows) else common
+
+
+def _explain(index, then, now, kind, describe) -> str:
+    rows, toc = getattr(then, kind), getattr(then, kind + "_toc")
+    other, other_toc = getattr(now, kind), getattr(now, kind + "_toc")
+    if index < len(rows) and index < len(other) and tuple(rows[index]) == tuple(other[index]):
+        return f"{describe(rows[index])}: recorded at t = {float(toc[index])!r}, now at t = {float(other_toc[index])!r}"
+    # Rows are sorted: of two different ones at the same place, the smaller is missing on the other side.
+    if index >= len(other) or (index < len(rows) and tuple(rows[index]) < tuple(other[index])):
+        return f"{describe(rows[index])}: recorded at t = {float(toc[index])!r}, now not found"
+    return f"{describe(other[index])}: found now at t = {float(other_toc[index])!r}, not recorded"
+
+
+def _vertex_face(row, layout) -> str:
+    vertex, face = _local(row[0], layout.vertex_offsets, layout), _local(row[1], layout.face_offsets, layout)
+    return f"vertex {vertex} - face {face}"
+
+
+def _edge_edge(row, layout) -> str:
+    a, b, c, d = (_local(v, layout.vertex_offsets, layout) for v in row)
+    return f"edge ({a}, {b}) - edge ({c}, {d})"
+
+
+def _local(index, offsets, layout) -> str:
+    mesh = min(int(np.searchsorted(offsets, index, side="right")) - 1, len(layout.mesh_names) - 1)
+    return f"{layout.mesh_names[mesh]}:{int(index) - int(offsets[mesh])}"

@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: Apache-2.0
+"""From recorded messages to frames of the scene, by the node's own rules (convert.py, frames.py)."""
+
+from collections import OrderedDict
+
+from hpccd_ros import convert
+from hpccd_ros.convert import InvalidMessageError
+from hpccd_ros.drops import DropCounter
+from hpccd_ros.frames import FrameAssembler
+from hpccd_ros.mcap_decode import make_decoder
+from hpccd_ros.messages import MeshFrame, SceneFrame
+from hpccd_ros.replay_setup import ReplaySetup
+from hpccd_ros.sequence import SequenceWatch
+
+
+class FrameSource:
+    """Assembles frames of the scene from recorded messages.
+
+    drops, refused: what could not be used and why, counted as in the node.
+    """
+
+    def __init__(self, setup: ReplaySetup, topics):
+        settings = setup.settings
+        self._setup = setup
+        self.drops = DropCounter()
+        self.refused = DropCounter()
+        self._decoders = {name: make_decoder(topics[name]) for name in setup.roles if name in topics}
+        self._watches = {name: SequenceWatch() for name in setup.roles}
+        self._assembler = FrameAssembler(
+            list(setup.mesh_settings),
+            self.drops,
+            self.refused,
+            # Messages of several topics may have reached the recorder in another order than the node.
+            max_pending=4 * settings["pending_frames"],
+            restart_after=settings["restart_after"],
+            tolerance=round(settings["stamp_tolerance"] * 1e9) if settings["stamp_match"] == "nearest" else None,
+            frame_id=settings["frame_id"],
+        )
+        for mesh, (topology, frame) in setup.files.items():
+            self._assembler.set_topology(mesh, topology)
+            if frame is not None:
+                self._assembler.add(mesh, frame)
+
+    @property
+    def topics(self) -> list[str]:
+        return list(self._decoders)
+
+    def take(self, message) -> list[SceneFrame]:
+        """Frames that this recorded message completes."""
+        mesh, kind = self._setup.roles[message.topic]
+        decoded = self._decoders[message.topic](message)
+        watch = self._watches[message.topic]
+        _, new_publisher = watch.next(message.sequence) if message.sequence else (0, False)
+        settings = self._setup.settings
+        if kind == "topology":
+            try:
+                topology = convert.topology_from_message(decoded, settings["max_vertices"], settings["max_faces"])
+            except InvalidMessageError as error:
+                self.refused.count(mesh, error.reason, str(error))
+                return []
+            return self._assembler.set_topology(mesh, topology, new_publisher)
+        try:
+            if kind == "vertices":
+                vertices = convert.vertices_from_message(decoded, settings["max_vertices"])
+                version, step = decoded.topology_version, decoded.step
+            else:
+                vertices = convert.vertices_from_cloud(decoded, settings["max_vertices"])
+                version = step = None
+        except InvalidMessageError as error:
+            self.drops.count(mesh, error.reason, str(error))
+            return []
+        header = decoded.header
+        frame = MeshFrame(convert.stamp_to_ns(header.stamp), vertices, version, step, header.frame_id)
+        return self._assembler.add(mesh, frame, new_publisher)
+
+
+class FrameWindow:
+    """The last frames, by stamp: answers name the two frames between which they were found."""
+
+    def __init__(self, capacity: int):
+        self._capacity = capacity
+        self._frames: OrderedDict[int, SceneFrame] = OrderedDict()
+        self.first: int | None = None  # stamp of the very first frame
+
+    def put(self, frame: SceneFrame) -> None:
+        if self.first is None:
+            self.first = frame.stamp
+        self._frames.pop(frame.stamp, None)  # after a restart of the stream, a stamp may come again
+        self._frames[frame.stamp] = frame
+        if len(self._frames) > self._capacity:
+            self._frames.popitem(last=False)
+
+    def get(self, stamp: int) -> SceneFrame | None:
+        return self._frames.get(stamp)
+
+
