@@ -9,7 +9,7 @@
 namespace hpccd {
 
 // A time of contact is accepted only where it is known this well; the contract promises 1e-12.
-inline constexpr double toc_radius_limit = 2e-13;
+inline constexpr double toc_radius_limit = 9e-13;
 
 template <class R>
 struct Outcome {
@@ -51,7 +51,7 @@ HPCCD_HD Outcome<R> many_roots_test(const Motion<R>& m) {
   using Mask = typename RealTraits<R>::Mask;
   const Magnitudes<R> size = magnitudes(m);
   const Cubic<R> f = coplanarity(m);
-  const R error = coplanarity_error(size).value;
+  const CubicError<R> error = coplanarity_error(size);
   const TurningPoints<R> turn = turning_points(f);
   const Pieces<R> first = subdivide(f, turn.first);
   const Pieces<R> second = subdivide(first.right, (turn.second - turn.first) / (R(1) - turn.first));
@@ -60,12 +60,12 @@ HPCCD_HD Outcome<R> many_roots_test(const Motion<R>& m) {
   Mask open = in_range(size);  // neither a contact found nor undecided in an earlier piece
   Outcome<R> out{R(1) < R(0), R(1) < R(0), R(0), R(0)};
   for (int i = 0; i < 3; ++i) {
-    const Mask one = open && certainly_one_root(piece[i], error);
-    const Mask empty = open && certainly_no_root(piece[i], error);
+    const Mask one = open && certainly_one_root(piece[i], error.subdivided);
+    const Mask empty = open && certainly_no_root(piece[i], error.subdivided);
     Mask passed = empty;
     if (any(one)) {
       const R sign = select(piece[i].c0 < R(0), R(-1), R(1));
-      const Outcome<R> o = piece_with_one_root<kind>(m, size, f, error, bound[i], bound[i + 1], sign, one);
+      const Outcome<R> o = piece_with_one_root<kind>(m, size, f, error.value, bound[i], bound[i + 1], sign, one);
       out.contact = out.contact || o.contact;
       out.toc = select(o.contact, o.toc, out.toc);
       out.delta = select(o.contact, o.delta, out.delta);

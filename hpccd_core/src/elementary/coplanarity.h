@@ -21,7 +21,8 @@ struct Cubic {
 template <class R>
 struct CubicError {
   R coefficient;  // of c0, c3, and of the true Bernstein coefficients k1/3, k2/3
-  R value;        // of value(f, t), and of Bernstein coefficients after subdivision
+  R value;        // of value(f, t)
+  R subdivided;   // of Bernstein coefficients after subdivision
 };
 
 template <class R>
@@ -39,11 +40,11 @@ HPCCD_HD Cubic<R> coplanarity(const Motion<R>& m) {
 template <class R>
 HPCCD_HD CubicError<R> coplanarity_error(const Magnitudes<R>& m) {
   const R scale = m.p * m.a * m.b;
-  // value: coefficients weighted by (1-t)^3 + t^3 <= 1 and (1-t)t <= 1/4, 48 u M + 174/4 u M, plus the 9 roundings of
-  // the evaluation on terms that sum up to at most 10.5 M: below 200 u M.
+  // value: with x = t (1-t) <= 1/4 the coefficients' errors weigh 48 (1-3x) + 174 x <= 56 u M; the evaluation has at
+  // most 9 roundings on terms whose magnitudes sum up to 6 M: 54 u M. Together 110 u M.
   // Two subdivisions: 64 u M, 12 u M for thirds of k1 and k2, two times three interpolations with 4 roundings of 6 M:
   // 220 u M; the second split point is rounded by 3 u, where |f'| <= 36 M: 328 u M in all.
-  return {R(64 * half_ulp<R>()) * scale, R(400 * half_ulp<R>()) * scale};
+  return {R(64 * half_ulp<R>()) * scale, R(112 * half_ulp<R>()) * scale, R(400 * half_ulp<R>()) * scale};
 }
 
 template <class R>

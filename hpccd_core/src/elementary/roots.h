@@ -94,7 +94,7 @@ HPCCD_HD Root<R> bracketed_root(const Cubic<R>& f, R error, R low, R high, R sig
   }
   t = lesser(greater(t, begin), end);
   const R flat = magnitude(slope(f, t));
-  R delta = R(8) * eps + R(2.5) * error / flat;
+  R delta = R(8) * eps + R(2.1) * error / flat;
   const R left = greater(t - delta, begin), right = lesser(t + delta, end);
   const Mask left_sure = left <= begin || sign * value(f, left) > error;
   const Mask right_sure = right >= end || sign * value(f, right) < R(0) - error;
