@@ -72,11 +72,11 @@ fuzz: venv ## Compare the core with the exact oracle on random and degenerate qu
 
 lint: $(ENVIRONMENT) ## Check the style: ruff, clang-format
 	$(BIN)/ruff check .
-	@git ls-files -z '*.h' '*.cpp' '*.cu' | xargs -0r $(BIN)/clang-format --dry-run --Werror
+	@git ls-files -z '*.h' '*.cpp' '*.inl' '*.cu' | xargs -0r $(BIN)/clang-format --dry-run --Werror
 
 format: $(ENVIRONMENT) ## Mend the style where a tool can
 	$(BIN)/ruff check --fix .
-	@git ls-files -z '*.h' '*.cpp' '*.cu' | xargs -0r $(BIN)/clang-format -i
+	@git ls-files -z '*.h' '*.cpp' '*.inl' '*.cu' | xargs -0r $(BIN)/clang-format -i
 
 pin: $(ENVIRONMENT) ## Write the versions now in .venv to requirements/
 	@version=$$($(BIN)/python -c 'import sys; print("%d.%d" % sys.version_info[:2])'); \
