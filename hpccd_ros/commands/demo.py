@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: Apache-2.0
+"""See it work, in about half a minute: starts the node, a publisher that streams a moving scene, and a recorder,
+as separate processes over DDS; shows the contacts as they come; verifies the recording; draws its worst frame.
+
+  hpccd demo                                a small cloth falls on a ball that then spins
+  hpccd demo --scene n-body-like-lr --rate 10
+  hpccd demo --scene cloth-ball-like --rate 5 --out big
+  hpccd demo --small --out bags/demo        the few hundred kilobytes that the tests replay
+
+Leaves DIR/demo.mcap and DIR/demo.png (a run replaces those of the run before), and the logs of the processes.
+Uses a DDS domain of its own unless ROS_DOMAIN_ID is set. Ctrl-C ends all processes.
+"""
+
+from hpccd_ros.errors import UserError
+
+
+def configure(parser):
+    parser.add_argument("--out", default="hpccd-demo", metavar="DIR", help="folder for the results (default: %(default)s)")
+    parser.add_argument("--scene", default="cloth-drop", metavar="NAME", help="see `hpccd scene --list` (default: %(default)s)")
+    parser.add_argument("--size", type=float, default=1.0, metavar="X",
+                        help="factor on the number of triangles (default: %(default)s)")
+    parser.add_argument("--frames", type=int, metavar="N", help="number of frames (default: the scene's own)")
+    parser.add_argument("--rate", type=float, default=15.0, metavar="HZ", help="frames a second (default: %(default)s)")
+    parser.add_argument("--accuracy", default="balanced", metavar="TIER", help="of the node (default: %(default)s)")
+    parser.add_argument("--threads", type=int, default=0, metavar="N", help="of the node; 0: all cores (default)")
+    parser.add_argument("--compression", choices=("none", "lz4", "zstd"), default="none",
+                        help="of the recording (default: %(default)s)")
+    parser.add_argument("--small", action="store_true", help="a coarse mesh, compressed")
+
+
+def run(args) -> int:
+    if not 0 < args.rate <= 1000:
+        raise UserError(f"--rate {args.rate}: must be above 0, at most 1000 Hz")
+    if args.threads < 0:
+        raise UserError(f"--threads {args.threads}: must not be negative")
+    if args.small:
+        args.size, args.compression = 0.15, "zstd"
+    from hpccd_ros.demo import run as demo
+
+    return demo.main(args)

@@ -1,0 +1,34 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Draw recorded steps into picture files: shaded meshes, contacts as points coloured by their time in the step.
+
+  hpccd view run.mcap                       the step with most contacts, into run.png
+  hpccd view run.mcap --step 30 -o frame.png
+  hpccd view run.mcap --every 1 -o frames   a sequence frames/000000.png, ... of every step, for a film
+
+Needs no display and no graphics driver.
+"""
+
+from hpccd_ros.errors import UserError
+
+
+def configure(parser):
+    parser.add_argument("file", metavar="FILE", help="recording: an .mcap file, or a folder of them")
+    parser.add_argument("-o", "--output", metavar="PATH", help="picture (.png, .jpg, .pdf), or folder with --every")
+    which = parser.add_mutually_exclusive_group()
+    which.add_argument("--step", type=int, metavar="N", help="step number (default: the one with most contacts)")
+    which.add_argument("--every", type=int, metavar="K", help="each K-th step, into a folder")
+    parser.add_argument("--azimuth", type=float, default=-60.0, metavar="DEG",
+                        help="from where to look, around z (default: %(default)s)")
+    parser.add_argument("--elevation", type=float, default=26.0, metavar="DEG", help="and from how high (default: %(default)s)")
+    parser.add_argument("--title", help="default: the name of the file")
+    parser.add_argument("--params", metavar="YAML", help="node parameters, instead of those in the recording")
+
+
+def run(args) -> int:
+    if args.every is not None and args.every < 1:
+        raise UserError(f"--every {args.every}: must be at least 1")
+    if not -89.9 <= args.elevation <= 89.9:
+        raise UserError(f"--elevation {args.elevation}: must lie between -89.9 and 89.9 degrees")
+    from hpccd_ros.picture import view
+
+    return view.main(args)

@@ -1,0 +1,157 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The demo: start the processes, show how it goes, verify the recording, draw its worst frame."""
+
+import os
+import shutil
+import signal
+import sys
+import time
+from pathlib import Path
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+
+from hpccd_ros import replay_setup, scenes
+from hpccd_ros.demo.children import Children
+from hpccd_ros.errors import UserError
+from hpccd_ros.mcap_reader import Recording
+from hpccd_ros.replay import Replay
+from hpccd_ros.scenes import files
+
+# What a run leaves behind, and the next one replaces.
+RECORDING, PICTURE, PARAMETERS = "demo.mcap", "demo.png", "node.yaml"
+LOGS = ("node.log", "recorder.log", "publisher.log")
+
+
+def main(args) -> int:
+    """Run the demo as the options of `hpccd demo` say."""
+    signal.signal(signal.SIGTERM, _interrupt)
+    folder = Path(args.out)
+    folder.mkdir(parents=True, exist_ok=True)
+    for name in (RECORDING, PICTURE, PARAMETERS, *LOGS):
+        (folder / name).unlink(missing_ok=True)
+    if "ROS_DOMAIN_ID" not in os.environ:
+        # A domain of its own: neither the nodes that run here already nor a second demo can mix with it.
+        os.environ["ROS_DOMAIN_ID"] = str(1 + os.getpid() % 100)
+    console = Console(highlight=False)
+    scene = _scene(args)
+    say = console.print
+    say(f"[bold]scene[/]      {scene.title}\n           "
+        + ", ".join(f"{m.name} {len(m.faces):,} triangles" for m in scene.meshes)
+        + f"; {scene.n_frames} frames at {args.rate:g} a second")
+    files.write_parameters(scene, folder / PARAMETERS)
+    _stream(args, scene, folder, console)
+    worst = _verify_and_draw(args, folder, console)
+    _last_words(folder, console, worst)
+    return 0
+
+
+def _interrupt(number, frame):
+    raise KeyboardInterrupt
+
+
+def _scene(args):
+    try:
+        return scenes.make(args.scene, size=args.size, frames=args.frames, progress=True)
+    except ValueError as error:
+        raise UserError(f"{error}; `hpccd scene --list` names them") from error
+
+
+def _stream(args, scene, folder, console):
+    # Imported here: ROS reads the domain when it is first used.
+    from hpccd_ros.demo.monitor import Monitor
+
+    with Monitor() as monitor, Children(folder) as children:
+        monitor.listen(1.0)
+        if monitor.nodes_called("/hpccd"):
+            raise UserError(f"a node /hpccd runs already in DDS domain {os.environ['ROS_DOMAIN_ID']}: end it, or set "
+                            "another ROS_DOMAIN_ID")
+        node = children.start(
+            "node", "hpccd_ros.node", "--ros-args", "--params-file", str(folder / PARAMETERS),
+            "-p", f"accuracy:={args.accuracy}", "-p", f"threads:={args.threads}", "-p", "diagnostics_period:=0.25",
+        )  # fmt: skip
+        recorder = children.start(
+            "recorder", "hpccd_ros.cli", "record", "-o", str(folder / RECORDING), "--compression", args.compression,
+            "--wait", "60",
+        )  # fmt: skip
+        children.wait(lambda: recorder.said("recording "), "the recorder did not hear the node", 60.0)
+        publisher = children.start(
+            "publisher", "hpccd_ros.cli", "scene", args.scene, "--size", str(args.size), "--frames",
+            str(scene.n_frames), "--publish", "--rate", str(args.rate), "--subscribers", "2", "--wait", "30",
+        )  # fmt: skip
+        console.print(f"[bold]processes[/]  node {node.process.pid}, recorder {recorder.process.pid}, publisher "
+                      f"{publisher.process.pid}, over DDS (domain {os.environ['ROS_DOMAIN_ID']})")
+        _watch(monitor, children, publisher, scene.n_frames, console)
+        for child in (recorder, node):
+            if children.end(child) != 0:
+                children.check()
+        if monitor.answers == 0:
+            raise UserError(f"the node answered nothing; see the logs in {folder}")
+        core = "" if monitor.core_ms is None else f", {monitor.core_ms:.1f} ms a frame in the core (median)"
+        console.print(f"[bold]answers[/]    {monitor.answers} of {scene.n_frames - 1} steps, {monitor.dropped} frames "
+                      f"dropped{core}")
+
+
+def _watch(monitor, children, publisher, frames, console):
+    """Show the answers as they come, until the publisher has ended and the last answer is there."""
+    progress = Progress(
+        TextColumn("          "), BarColumn(bar_width=28), MofNCompleteColumn(), TextColumn("steps"),
+        TextColumn("{task.fields[said]}"), console=console, transient=True, disable=not console.is_terminal,
+    )  # fmt: skip
+    steps = frames - 1
+    shown = -1
+    with progress:
+        bar = progress.add_task("steps", total=steps, said="")
+        while publisher.running or (monitor.answers < steps and time.monotonic() - monitor.heard < 3.0):
+            monitor.listen(0.1)
+            children.check()
+            said = _state(monitor)
+            progress.update(bar, completed=monitor.answers, said=said)
+            if not console.is_terminal and monitor.answers // 10 > shown:
+                shown = monitor.answers // 10
+                console.print(f"           frame {monitor.step:4}: {said}")
+    children.check()
+
+
+def _state(monitor) -> str:
+    first = f"first at t = {monitor.first_toc:.3f}" if monitor.contacts else "nothing touches"
+    core = "" if monitor.core_ms is None else f", {monitor.core_ms:.1f} ms a frame"
+    return f"{monitor.contacts:,} contacts, {first}{core}, {monitor.dropped} dropped"
+
+
+def _verify_and_draw(args, folder, console):
+    from hpccd_ros.picture.of_recording import History, draw_step
+
+    history, worst = History(), None
+    with Recording(folder / RECORDING) as recording:
+        replay = Replay(recording, replay_setup.of_recording(recording), threads=args.threads, outputs=("points",))
+        for step in replay.steps():
+            if step.contacts is None:
+                continue
+            history.add(step)
+            if worst is None or step.total > worst.total:
+                worst = step
+    if replay.diverged:
+        raise UserError(f"the recording computes to other contacts than the node sent: {replay.first_divergence.difference}")
+    console.print(f"[bold]verified[/]   {replay.verified} recorded answers, computed again from the file: all equal")
+    console.print("[bold]picture[/]    rendering the frame with most contacts ...")
+    draw_step(worst, folder / PICTURE, history, title=args.scene)
+    return worst
+
+
+def _last_words(folder, console, worst):
+    program = Path(sys.prefix) / "bin" / "hpccd"
+    command = os.path.relpath(program) if program.is_file() else "python -m hpccd_ros.cli"
+    if shutil.which("hpccd") and "VIRTUAL_ENV" in os.environ:
+        command = "hpccd"
+    recording, picture = folder / RECORDING, folder / PICTURE
+    console.print(f"""
+[bold green]done[/]       worst frame: step {worst.step}, {worst.total:,} contacts
+           recording  {recording}  ({recording.stat().st_size / 1e6:.1f} MB; Foxglove and `ros2 bag play` open it)
+           picture    {picture}
+
+try next
+  {command} replay {recording}            compute it again, compare every contact
+  {command} view {recording} --step 30    draw another frame
+  {command} scene --list                          more scenes: {command} demo --scene n-body-like-lr
+  {command} --help                                all commands""", markup=True, soft_wrap=True)

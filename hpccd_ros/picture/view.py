@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`hpccd view`: which steps of a recording to draw, and where to put the pictures."""
+
+from pathlib import Path
+
+from hpccd_ros import replay_setup
+from hpccd_ros.errors import UserError
+from hpccd_ros.mcap_reader import Recording
+from hpccd_ros.picture.of_recording import History, draw_step
+from hpccd_ros.replay import Replay
+
+
+def main(args) -> int:
+    """Draw as the options of `hpccd view` say."""
+    source = Path(args.file)
+    title = args.title or source.stem
+    view = {"azimuth": args.azimuth, "elevation": args.elevation}
+    with Recording(source) as recording:
+        setup = replay_setup.of_recording(recording, args.params)
+        steps = (s for s in Replay(recording, setup, outputs=("points",)).steps() if s.contacts is not None)
+        if args.every is None:
+            target = Path(args.output or source.with_suffix(".png").name)
+            _draw_one(args, steps, target, title, view)
+        else:
+            target = Path(args.output or f"{source.stem}-frames")
+            target.mkdir(parents=True, exist_ok=True)
+            _draw_many(args, steps, target, title, view)
+    return 0
+
+
+def _draw_one(args, steps, target, title, view):
+    history, chosen = History(), None
+    for step in steps:
+        history.add(step)
+        if args.step is None:
+            chosen = step if chosen is None or step.total > chosen.total else chosen
+        elif step.step == args.step:
+            chosen = step
+    if chosen is None:
+        there = f"it has {min(history.steps)} to {max(history.steps)}" if history.steps else "it has none"
+        raise UserError(f"{args.file}: no step {'' if args.step is None else args.step}: {there}")
+    try:
+        draw_step(chosen, target, history, title=title, **view)
+    except (OSError, ValueError) as error:  # ValueError: a suffix that matplotlib cannot write
+        raise UserError(f"--output {target}: {error}") from error
+    print(f"{target}: step {chosen.step}, {chosen.total:,} contacts")
+
+
+def _draw_many(args, steps, folder, title, view):
+    count = 0
+    for number, step in enumerate(steps):
+        if number % args.every == 0:
+            draw_step(step, folder / f"{step.step:06}.png", title=title, **view)
+            count += 1
+            print(f"\r{count} pictures in {folder}", end="", flush=True)
+    print()
