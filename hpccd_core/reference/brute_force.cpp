@@ -51,14 +51,6 @@ Query query_of(const Scene& scene, const A& a, const B& b) {
   return query;
 }
 
-std::vector<std::uint32_t> vertices_in_faces(const std::vector<Face>& faces) {
-  std::vector<std::uint32_t> vertices;
-  for (const Face& face : faces) vertices.insert(vertices.end(), face.begin(), face.end());
-  std::sort(vertices.begin(), vertices.end());
-  vertices.erase(std::unique(vertices.begin(), vertices.end()), vertices.end());
-  return vertices;
-}
-
 std::vector<Edge> edges_of(const std::vector<Face>& faces) {
   std::vector<Edge> edges;
   for (const Face& f : faces)
@@ -89,11 +81,10 @@ Contacts brute_force(const Scene& scene, unsigned threads) {
   };
   Contacts contacts;
 
-  const std::vector<std::uint32_t> vertices = vertices_in_faces(scene.faces);
   const std::vector<Box> face_boxes = boxes_of(scene, scene.faces);
-  std::vector<std::vector<Hit>> faces_hit(vertices.size());
-  parallel_for(vertices.size(), threads, [&](std::size_t i) {
-    const std::array<std::uint32_t, 1> vertex{vertices[i]};
+  std::vector<std::vector<Hit>> faces_hit(scene.vertices_t0.size());
+  parallel_for(faces_hit.size(), threads, [&](std::size_t i) {
+    const std::array<std::uint32_t, 1> vertex{static_cast<std::uint32_t>(i)};
     const Box box = swept_box(scene, vertex);
     for (std::size_t f = 0; f < scene.faces.size(); ++f) {
       const Face& face = scene.faces[f];
@@ -102,9 +93,9 @@ Contacts brute_force(const Scene& scene, unsigned threads) {
       if (const auto toc = vertex_face(query_of(scene, vertex, face))) faces_hit[i].push_back({f, *toc});
     }
   });
-  for (std::size_t i = 0; i < vertices.size(); ++i)
+  for (std::size_t i = 0; i < faces_hit.size(); ++i)
     for (const Hit& hit : faces_hit[i]) {
-      contacts.vf.push_back({vertices[i], static_cast<std::uint32_t>(hit.partner)});
+      contacts.vf.push_back({static_cast<std::uint32_t>(i), static_cast<std::uint32_t>(hit.partner)});
       contacts.vf_toc.push_back(hit.toc);
     }
 

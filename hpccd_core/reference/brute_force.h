@@ -26,7 +26,7 @@ struct Contacts {
   std::vector<double> ee_toc;
 };
 
-// Every vertex that belongs to a face against every face, every edge against every other, unless they share a
+// Every vertex, in a face or not, against every face, every edge against every other, unless they share a
 // vertex or their meshes are not to be tested. Both lists in lexicographic order.
 Contacts brute_force(const Scene& scene, unsigned threads);
 
