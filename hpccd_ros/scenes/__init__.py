@@ -39,7 +39,7 @@ def _cloth_ball(name, title, size, frames, seed, progress):
 
 
 def _cloth_drop(name, title, size, frames, seed, progress):
-    setup = cloth.Setup(cells=54, spin_from=0.7, spin=6.0, drag=3.0)
+    setup = cloth.Setup(cells=54, spin_from=0.8, drag=8.0, ball_mesh_radius=0.4994)
     return cloth_ball.make(name, title, setup, 5_832, 1_280, size, frames, seed, progress)
 
 

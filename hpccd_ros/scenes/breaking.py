@@ -203,7 +203,8 @@ def make(name: str, title: str, size: float, frames: int, seed: int, show_progre
     def vertices(version: int, index: int):
         _, point, owner = topology(version)
         moved = statue.points[point].copy()
-        off = owner >= 0
+        # A piece is free from its release frame on, and so has moved in the frames after it.
+        off = (owner >= 0) & (release[owner] < index)
         body = owner[off]
         moved[off] = motion["positions"][index][body] + rotate(
             motion["orientations"][index][body], moved[off] - home[body]

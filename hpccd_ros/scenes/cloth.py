@@ -25,16 +25,17 @@ class Setup:
     cells: int  # cells along a side of the simulated grid
     side: float = 2.4
     ball_radius: float = 0.5
+    ball_mesh_radius: float = 0.5  # a little less hides the ball's corners under a coarse cloth
     drop_height: float = 0.05  # cloth above the top of the ball in frame 0
     ground: float = -0.5  # the ball lies on it
     frame_period: float = 1 / 30
     steps_per_frame: int = 30
-    friction: float = 0.6
-    spin: float = 5.0  # rad/s about z, reached at spin_from + spin_ramp
+    friction: float = 2.0  # high: the ball takes the cloth along, and the ground holds its hem
+    spin: float = 8.0  # rad/s about z, reached at spin_from + spin_ramp
     spin_from: float = 1.0
     spin_ramp: float = 0.4
     offset: tuple[float, float] = (0.06, -0.03)  # of the cloth's centre: the folds fall unevenly
-    drag: float = 4.0  # 1/s; the air holds the hem back, so that the cloth winds round the ball
+    drag: float = 10.0  # 1/s; the air holds back what hangs free, so that it winds round the ball
 
     def ball_angle(self, time: float) -> float:
         """Angle of the ball (rad) `time` seconds after frame 0: at rest, then ramping up, then steady."""

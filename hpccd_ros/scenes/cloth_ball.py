@@ -36,7 +36,7 @@ def make(
         )["grids"]
 
     ball, ball_faces = shapes.icosphere(max(2, round((ball_triangles * size / 20) ** 0.5)))
-    ball = ball * setup.ball_radius
+    ball = ball * setup.ball_mesh_radius
     _, cloth_faces = shapes.sheet(cells, cells)
     axis = np.array([0.0, 0.0, 1.0])
 

@@ -16,6 +16,7 @@ FRAME_PERIOD = 1 / 60
 BODIES = 60
 DISH_DEPTH = 0.12  # of the dish z = DISH_DEPTH * (x^2 + y^2), 1/m
 DISH_HALF_WIDTH = 2.2
+OVERLAP = 0.93  # spheres are so much smaller than what they stand for: touching meshes overlap by some percent
 
 
 @dataclass(frozen=True)
@@ -74,10 +75,11 @@ def _simulate(frames: int, seed: int, kinds: list[Shape], show_progress: bool):
     scale = 0.2 + 0.1 * random.random_sample(BODIES)
     # A loose stack of layers of 4 x 4, close enough to touch in the first frames.
     slot = np.arange(BODIES)
-    lattice = np.stack([slot % 4 - 1.5, slot // 4 % 4 - 1.5, slot // 16], axis=1) * (0.56, 0.56, 0.54)
-    position = lattice + 0.1 * (random.random_sample((BODIES, 3)) - 0.5) + (0, 0, 0.55)
+    lattice = np.stack([slot % 4 - 1.5, slot // 4 % 4 - 1.5, slot // 16], axis=1) * (0.5, 0.5, 0.48)
+    position = lattice + 0.1 * (random.random_sample((BODIES, 3)) - 0.5) + (0, 0, 0.5)
     spheres = [kinds[b % len(kinds)].spheres * scale[b] for b in range(BODIES)]
     every = np.concatenate(spheres)
+    every[:, 3] *= OVERLAP
     bodies = rigid.Bodies(
         position=position,
         velocity=0.8 * (random.random_sample((BODIES, 3)) - 0.5) + (0, 0, -1.0),

@@ -13,17 +13,17 @@ FRAME_PERIOD = 1 / 30
 
 
 def two_triangles(name: str, title: str, frames: int) -> Scene:
-    """A triangle falls through another at constant speed, from z = 0.25 to z = -0.25.
+    """A triangle falls at constant speed until its corner (0, 0), 0.25 above another one, is 0.28 below it.
 
-    Its corner (0, 0) starts 0.25 above the inside of the lower triangle, so that there is exactly one
-    vertex-face contact in the whole motion, half-way.
+    There is exactly one vertex-face contact in the whole motion, when 25/53 of it are done; then the two edges
+    beside the corner never touch an edge of the larger triangle, whose inside they cross.
     """
     lower = np.array([(-1, -1, 0), (2, -1, 0), (-1, 2, 0)], dtype=np.float32)
     upper = np.array([(0, 0, 0), (0.5, 0, 0.5), (0, 0.5, 0.5)])
     faces = np.array([[0, 1, 2]], dtype=np.uint32)
 
     def frame(index: int) -> Frame:
-        height = 0.25 - 0.5 * index / (frames - 1)
+        height = 0.25 - 0.53 * index / (frames - 1)
         return Frame([lower, upper + (0, 0, height)], index, index * FRAME_PERIOD)
 
     meshes = (Mesh("lower", faces, 3), Mesh("upper", faces, 3))

@@ -1,0 +1,22 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A cache folder and a DDS domain of their own for the tests: they neither use nor fill the user's."""
+
+import os
+
+import pytest
+
+# Domains 0..101 are safe on Linux whatever the ephemeral port range is.
+os.environ.setdefault("ROS_DOMAIN_ID", str(1 + os.getpid() % 100))
+
+
+@pytest.fixture(scope="session", autouse=True)
+def scene_cache(tmp_path_factory):
+    """The cache folder of this session: each motion is simulated once."""
+    folder = tmp_path_factory.mktemp("cache")
+    before = os.environ.get("XDG_CACHE_HOME")
+    os.environ["XDG_CACHE_HOME"] = str(folder)
+    yield folder / "hpccd" / "scenes"
+    if before is None:
+        del os.environ["XDG_CACHE_HOME"]
+    else:
+        os.environ["XDG_CACHE_HOME"] = before

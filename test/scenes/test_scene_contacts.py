@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The detector finds in each scene what its title promises."""
+
+import numpy as np
+import pytest
+
+from hpccd_ros import scenes
+
+hpccd_core = pytest.importorskip("hpccd_core")
+
+
+def contacts_of_steps(scene, steps):
+    """{k: contacts of the step from frame k-1 to k}."""
+    found = {}
+    for k in steps:
+        frame = scene.frame(k)
+        before = frame.stacked_start() if frame.topologies else scene.frame(k - 1).stacked()
+        detector = hpccd_core.Detector(scenes.core_scene(scene, k), accuracy="balanced")
+        found[k] = detector.detect(before, frame.stacked())
+    return found
+
+
+def counts(found):
+    return {k: len(c.vf) + len(c.ee) for k, c in found.items()}
+
+
+def test_two_triangles_have_one_contact_at_the_time_told():
+    scene = scenes.make("two-triangles")
+    found = contacts_of_steps(scene, range(1, 11))
+    assert [k for k, c in found.items() if len(c.vf) + len(c.ee)] == [5]
+    # Vertex 3 (the upper triangle's corner) and face 0 (the lower triangle); 0.25 below the start, at 0.053 a frame.
+    assert found[5].vf.tolist() == [[3, 0]] and len(found[5].ee) == 0
+    assert found[5].vf_toc[0] == pytest.approx(0.25 / 0.053 - 4, abs=1e-6)
+
+
+def test_folding_strip_meets_itself_from_some_frame_on():
+    found = counts(contacts_of_steps(scenes.make("folding-strip"), [10, 30, 45, 54]))
+    assert found[10] == found[30] == 0
+    assert found[45] > 50 and found[54] > 500
+
+
+def test_cloth_drop_lands_then_folds():
+    scene = scenes.make("cloth-drop")
+    found = contacts_of_steps(scene, [4, 40, 60, 89])
+    n_cloth = scene.meshes[0].n_vertices
+    # First the cloth and the ball, which does not collide with itself, then ever more of the cloth with itself.
+    assert 0 < counts(found)[4] < 50
+    assert all(((c.ee < n_cloth).any(axis=1)).all() for c in found.values())
+    assert all(count > 500 for k, count in counts(found).items() if k >= 40)
+
+
+def test_cloth_ball_is_in_deep_self_contact():
+    found = counts(contacts_of_steps(scenes.make("cloth-ball-like"), [50, 80]))
+    assert min(found.values()) > 20_000
+
+
+@pytest.mark.parametrize("name", ["n-body-like-lr", "n-body-like-hr"])
+def test_bodies_touch_in_every_step(name):
+    scene = scenes.make(name)
+    found = contacts_of_steps(scene, [1, *range(5, len(scene), 10)])
+    assert min(counts(found).values()) > 20
+    # Rigid with rigid, rigid with deforming, with the ground: all three meshes take part.
+    ends = np.cumsum([mesh.n_vertices for mesh in scene.meshes])
+    meshes = np.concatenate([np.searchsorted(ends, c.ee, side="right")[:, [0, 2]] for c in found.values()])
+    assert {tuple(sorted(pair)) for pair in np.unique(meshes, axis=0).tolist()} >= {(0, 0), (0, 1), (0, 2), (1, 1), (1, 2)}
+
+
+def test_breaking_pieces_collide():
+    scene = scenes.make("breaking-like", size=0.1)
+    changes = [frame.index for frame in scene.frames() if frame.topologies]
+    found = counts(contacts_of_steps(scene, [3, *changes, 40]))
+    assert found[3] == 0, "nothing is hit yet"
+    assert all(found[k] > 500 for k in changes[1:]), "walls of a fresh crack touch"
+    assert found[40] > 1000, "debris lies in a heap"
+
+
+@pytest.mark.parametrize(("name", "steps"), [("cloth-ball-like", [48, 80]), ("n-body-like-hr", [24, 48])])
+def test_contacts_grow_like_the_triangles(name, steps):
+    """The same motion, meshed four times as finely, has about four times the contacts."""
+    few, many = (counts(contacts_of_steps(scenes.make(name, size=size), steps)) for size in (0.25, 1.0))
+    ratio = sum(many.values()) / sum(few.values())
+    assert 2.5 < ratio < 6.5

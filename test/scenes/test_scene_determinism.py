@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The same numbers on every run and machine."""
+
+import os
+import platform
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scene_digest import digest
+
+import hpccd_ros
+from hpccd_ros import scenes
+from hpccd_ros.scenes.exactmath import sincos
+
+# A changed hash here means that every recording and benchmark made before shows another motion.
+# Frames are cut short, but for the breaking scene as far as its first changes of topology.
+GOLDEN = {
+    "two-triangles:1:11": "42c0cb49e4f6b9f2",
+    "folding-strip:1:61": "fc81eb21a325e8f8",
+    "cloth-drop:1:40": "eccbd4543214b5ed",
+    "cloth-ball-like:1:12": "82563df63a280ff6",
+    "breaking-like:0.25:10": "f06d008007208b9f",
+    "n-body-like-lr:1:20": "5a98a9ecb6ac7509",
+    "n-body-like-hr:1:4": "4c92229e8d72e92b",
+}
+
+
+def make(word):
+    name, size, frames = word.split(":")
+    return scenes.make(name, float(size), int(frames))
+
+
+@pytest.mark.parametrize("word", GOLDEN)
+def test_golden_hash(word):
+    assert digest(make(word)) == GOLDEN[word]
+
+
+@pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="names x86 instruction sets")
+def test_instruction_sets_do_not_change_the_numbers(tmp_path):
+    """Without AVX-512, AVX2 and FMA numpy runs other loops, as on an older machine: the bits must not differ."""
+    features = np.show_config(mode="dicts")["SIMD Extensions"].get("found", [])
+    environment = {
+        **os.environ,
+        "XDG_CACHE_HOME": str(tmp_path),
+        "NPY_DISABLE_CPU_FEATURES": " ".join(features),
+        "PYTHONPATH": str(Path(hpccd_ros.__file__).parents[1]),
+    }
+    words = ["folding-strip:1:61", "cloth-drop:1:40", "breaking-like:0.25:10", "n-body-like-lr:1:20"]
+    program = Path(__file__).with_name("scene_digest.py")
+    result = subprocess.run(
+        [sys.executable, program, *words], env=environment, capture_output=True, text=True, timeout=300
+    )
+    assert result.returncode == 0, result.stderr
+    assert result.stdout.split() == [GOLDEN[word] for word in words]
+
+
+@pytest.mark.parametrize("name", [n for n in scenes.names() if n not in ("two-triangles", "folding-strip")])
+def test_more_frames_continue_the_same_motion(name):
+    """A motion must not depend on how much of it is asked for, nor on the order in which frames are asked for."""
+    short, long = scenes.make(name, size=0.25, frames=7), scenes.make(name, size=0.25, frames=10)
+    for index in (6, 2, 5):
+        for a, b in zip(short.frame(index), long.frame(index), strict=True):
+            np.testing.assert_array_equal(a, b)
+
+
+@pytest.mark.parametrize("name", ["cloth-drop", "breaking-like", "n-body-like-lr"])
+def test_seed_changes_the_motion(name):
+    a, b = (scenes.make(name, size=0.25, frames=12, seed=seed).frame(11).stacked() for seed in (0, 1))
+    assert a.shape != b.shape or np.abs(a - b).max() > 1e-4
+
+
+def test_sincos_is_accurate_and_exact_at_quarter_turns():
+    angles = np.concatenate([np.linspace(-50, 50, 100_001), np.linspace(-1e5, 1e5, 1001)])
+    s, c = sincos(angles)
+    assert np.abs(s - np.sin(angles)).max() < 1e-14
+    assert np.abs(c - np.cos(angles)).max() < 1e-14
+    assert sincos(0.0) == (0.0, 1.0)
