@@ -82,14 +82,10 @@ def vertices_from_message(message: MeshVertices, max_vertices: int) -> np.ndarra
     single, double = message.vertices_f32, message.vertices_f64
     if bool(len(single)) == bool(len(double)):
         which = "both are filled" if len(single) else "both are empty"
-        raise InvalidMessageError(
-            Reason.MALFORMED, f"fill exactly one of vertices_f32 and vertices_f64; {which}"
-        )
+        raise InvalidMessageError(Reason.MALFORMED, f"fill exactly one of vertices_f32 and vertices_f64; {which}")
     flat = np.frombuffer(single, np.float32) if len(single) else np.frombuffer(double, np.float64)
     if len(flat) % 3:
-        raise InvalidMessageError(
-            Reason.MALFORMED, f"vertices has {len(flat)} coordinates, not a multiple of 3"
-        )
+        raise InvalidMessageError(Reason.MALFORMED, f"vertices has {len(flat)} coordinates, not a multiple of 3")
     _limit("vertices", len(flat) // 3, "max_vertices", max_vertices)
     return _finite(flat.reshape(-1, 3))
 
@@ -134,9 +130,7 @@ def vertices_from_cloud(cloud: PointCloud2, max_vertices: int) -> np.ndarray:
         and (row_step == row_bytes or cloud.height == 1)
     ):
         return _finite(data.view(types[0]).reshape(-1, 3))
-    point = np.dtype(
-        {"names": list("xyz"), "formats": types, "offsets": offsets, "itemsize": cloud.point_step}
-    )
+    point = np.dtype({"names": list("xyz"), "formats": types, "offsets": offsets, "itemsize": cloud.point_step})
     rows = np.ndarray((cloud.height, cloud.width), point, data, strides=(row_step, cloud.point_step))
     points = np.empty((cloud.height, cloud.width, 3), np.result_type(*types))
     for axis, name in enumerate("xyz"):
@@ -183,9 +177,7 @@ def _finite(vertices: np.ndarray) -> np.ndarray:
     return vertices
 
 
-def topology_message(
-    faces: np.ndarray, n_vertices: int, *, version: int = 0, stamp_ns: int = 0
-) -> MeshTopology:
+def topology_message(faces: np.ndarray, n_vertices: int, *, version: int = 0, stamp_ns: int = 0) -> MeshTopology:
     """faces: (F,3) integers, indices of the mesh's own vertices."""
     message = MeshTopology(version=version, n_vertices=n_vertices)
     message.header.stamp = ns_to_stamp(stamp_ns)
@@ -248,9 +240,7 @@ def fill_contacts(
     total = n_vf + n_ee
     toc = np.concatenate([contacts.vf_toc, contacts.ee_toc])
     vf, ee = contacts.vf, contacts.ee
-    points, normals = (
-        v if v is not None and len(v) == total else None for v in (contacts.points, contacts.normals)
-    )
+    points, normals = (v if v is not None and len(v) == total else None for v in (contacts.points, contacts.normals))
     truncated = 0 < max_contacts < total
     if truncated:
         keep = _earliest(toc, max_contacts)
@@ -325,9 +315,7 @@ def read_contacts(message: ContactArray, layout: Layout) -> SceneContacts:
     side_b = np.frombuffer(message.features_b, np.uint32).reshape(-1, 2)
     toc = np.frombuffer(message.toc, np.float64)
     vertices, faces = layout.vertex_offsets, layout.face_offsets
-    vf = np.stack(
-        [side_a[:n_vf, 0] + vertices[mesh_a[:n_vf]], side_b[:n_vf, 0] + faces[mesh_b[:n_vf]]], axis=1
-    )
+    vf = np.stack([side_a[:n_vf, 0] + vertices[mesh_a[:n_vf]], side_b[:n_vf, 0] + faces[mesh_b[:n_vf]]], axis=1)
     ee = np.concatenate(
         [side_a[n_vf:] + vertices[mesh_a[n_vf:], None], side_b[n_vf:] + vertices[mesh_b[n_vf:], None]], axis=1
     )

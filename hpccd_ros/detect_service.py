@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from hpccd.msg import ContactArray, MeshVertices
 from hpccd.srv import Detect
+from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.task import Future
@@ -59,7 +60,9 @@ class DetectService:
         self._lock = threading.Lock()
         self._open = 0
         self.counts: Counter = Counter(answered=0, refused=0, busy=0, timed_out=0, failed=0, open=0)
-        self._service = node.create_service(Detect, "~/detect", self._answer)
+        # A callback that awaits occupies its group until it ends: in the node's own group it would stop everything.
+        self._group = ReentrantCallbackGroup()
+        self._service = node.create_service(Detect, "~/detect", self._answer, callback_group=self._group)
 
     def close(self) -> None:
         self._node.destroy_service(self._service)
@@ -91,7 +94,8 @@ class DetectService:
         job = self._pool.submit(self._compute, request, scene, self._options())
         job.add_done_callback(self._leave)
         job.add_done_callback(settle)
-        timer = self._node.create_timer(limit, settle, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        timer = self._node.create_timer(limit, settle, callback_group=self._group, clock=steady)
         await settled
         self._node.destroy_timer(timer)
         if not job.done():
@@ -152,16 +156,14 @@ class DetectService:
         topologies = tuple(self._topology(request, scene, i, name) for i, name in enumerate(names))
         start = self._vertices("start", names, request.start, topologies)
         end = self._vertices("end", names, request.end, topologies)
-        options = replace(
-            options, accuracy=request.accuracy or options.accuracy, report=request.report or "all"
-        )
+        options = replace(options, accuracy=request.accuracy or options.accuracy, report=request.report or "all")
         builder = SceneBuilder(
             tuple(scene.meshes.get(name, MeshSettings(name)) for name in names),
             tuple(pair for pair in scene.ignored_pairs if set(pair) <= set(names)),
         )
         detector = make_detector(builder.build(topologies), options)
         contacts = detector.detect(start, end)
-        message = ContactArray(accuracy=options.accuracy, backend=options.backend)
+        message = ContactArray(accuracy=options.accuracy, backend=detector.backend)
         message.header = request.end[0].header
         message.start = request.start[0].header.stamp
         message.step = request.end[0].step
@@ -204,12 +206,9 @@ class DetectService:
                 raise RequestError(f"{where}: {error}") from error
             if message.topology_version != topology.version:
                 raise RequestError(
-                    f"{where}: topology_version {message.topology_version}, the topology has version "
-                    f"{topology.version}"
+                    f"{where}: topology_version {message.topology_version}, the topology has version {topology.version}"
                 )
             if len(vertices) != topology.n_vertices:
-                raise RequestError(
-                    f"{where}: {len(vertices)} vertices, the topology has {topology.n_vertices}"
-                )
+                raise RequestError(f"{where}: {len(vertices)} vertices, the topology has {topology.n_vertices}")
             parts.append(vertices)
         return parts[0] if len(parts) == 1 else np.concatenate(parts)

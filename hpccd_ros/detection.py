@@ -11,7 +11,7 @@ import numpy as np
 import hpccd_core as hc
 from hpccd_ros.convert import Layout
 from hpccd_ros.drops import DropCounter, Reason
-from hpccd_ros.mailbox import Mailbox
+from hpccd_ros.frame_queue import FrameQueue
 from hpccd_ros.messages import MeshSettings, SceneFrame, Topology
 
 # What the core raises for bad input, options that are not built, and lack of memory or of a device.
@@ -56,9 +56,7 @@ class SceneBuilder:
 
         One float64 mesh makes the whole float64, which holds the others' float32 exactly.
         """
-        parts = [
-            static_of.vertices[i] if mesh.static else frame.vertices[i] for i, mesh in enumerate(self.meshes)
-        ]
+        parts = [static_of.vertices[i] if mesh.static else frame.vertices[i] for i, mesh in enumerate(self.meshes)]
         return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
 
@@ -87,20 +85,25 @@ def make_detector(scene: hc.Scene, options: Options) -> hc.Detector:
 
 @dataclass(frozen=True, eq=False)
 class Detection:
-    """The contacts of one step and how they were found. ``detect_ms``: the core's call, wall time."""
+    """The contacts of one step and how they were found.
+
+    ``backend``, ``threads``: what was used. ``detect_ms``: wall time of the core's call.
+    """
 
     start: SceneFrame
     end: SceneFrame
     contacts: hc.Contacts
     layout: Layout
     options: Options
+    backend: str
+    threads: int
     detect_ms: float
     profile: dict[str, float] = field(default_factory=dict)
     stats: dict[str, float] = field(default_factory=dict)
 
 
 class DetectionThread(threading.Thread):
-    """Takes scene frames from ``mailbox``, hands detections to ``on_detection``, until the box is closed.
+    """Takes scene frames from ``queue``, hands detections to ``on_detection``, until it is closed.
 
     The motion goes from the last frame taken to the new one, so where frames were dropped between them no
     time is left unwatched. The first frame, and the first after a change of topology, is only a start:
@@ -110,7 +113,7 @@ class DetectionThread(threading.Thread):
     def __init__(
         self,
         builder: SceneBuilder,
-        mailbox: Mailbox[SceneFrame],
+        queue: FrameQueue,
         drops: DropCounter,
         *,
         options: Callable[[], Options],
@@ -120,7 +123,7 @@ class DetectionThread(threading.Thread):
     ) -> None:
         super().__init__(name="detection", daemon=True)
         self._builder = builder
-        self._mailbox = mailbox
+        self._queue = queue
         self._drops = drops
         self._options = options
         self._on_detection = on_detection
@@ -135,11 +138,11 @@ class DetectionThread(threading.Thread):
         self.working_on: SceneFrame | None = None
 
     def run(self) -> None:
-        while (frame := self._mailbox.take()) is not None:
-            self.working_on = frame
+        while (item := self._queue.take()) is not None:
+            frame = self.working_on = item.frame
             start, self._start = self._start, frame
             try:
-                if start is None or not start.same_scene(frame) or frame.stamp <= start.stamp:
+                if item.first:
                     self._on_first(frame)
                 else:
                     self._on_detection(self._detect(start, frame))
@@ -159,9 +162,7 @@ class DetectionThread(threading.Thread):
             self._detector = make_detector(self._scene, options)
             self._detector_options = options
         began = time.perf_counter()
-        contacts = self._detector.detect(
-            self._builder.concatenate(start, end), self._builder.concatenate(end, end)
-        )
+        contacts = self._detector.detect(self._builder.concatenate(start, end), self._builder.concatenate(end, end))
         detect_ms = 1e3 * (time.perf_counter() - began)
         return Detection(
             start,
@@ -169,6 +170,8 @@ class DetectionThread(threading.Thread):
             contacts,
             self._layout,
             options,
+            self._detector.backend,
+            self._detector.threads,
             detect_ms,
             dict(self._detector.profile),
             dict(self._detector.stats),

@@ -199,9 +199,7 @@ class Reporter:
         if notes:
             return self._status("frames", DiagnosticStatus.WARN, "; ".join(notes), values)
         if not came:
-            return self._status(
-                "frames", DiagnosticStatus.STALE, f"no frames in the last {period:.1f} s", values
-            )
+            return self._status("frames", DiagnosticStatus.STALE, f"no frames in the last {period:.1f} s", values)
         return self._status("frames", DiagnosticStatus.OK, f"{came / period:.1f} frames a second", values)
 
     def _detection(self, data: dict, period: float, state: str) -> DiagnosticStatus:
@@ -221,16 +219,10 @@ class Reporter:
         values |= data["last"]
         values["last_failure"] = data["last_failure"]
         if data["failing"]:
-            return self._status(
-                "detection", DiagnosticStatus.ERROR, f"failed: {data['last_failure']}", values
-            )
-        return self._status(
-            "detection", DiagnosticStatus.OK, f"{rate:.1f} detections a second ({state})", values
-        )
+            return self._status("detection", DiagnosticStatus.ERROR, f"failed: {data['last_failure']}", values)
+        return self._status("detection", DiagnosticStatus.OK, f"{rate:.1f} detections a second ({state})", values)
 
-    def _status(
-        self, part: str, level: bytes, message: str, values: Mapping[str, object]
-    ) -> DiagnosticStatus:
+    def _status(self, part: str, level: bytes, message: str, values: Mapping[str, object]) -> DiagnosticStatus:
         return DiagnosticStatus(
             level=level,
             name=f"{self._node_name}: {part}",

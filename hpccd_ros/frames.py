@@ -155,9 +155,7 @@ class FrameAssembler:
     def _state(self, mesh: str, counter: DropCounter) -> _MeshState | None:
         state = self._meshes.get(mesh)
         if state is None:
-            counter.count(
-                mesh, Reason.UNKNOWN_MESH, f"no such mesh; parameter meshes has {', '.join(self._meshes)}"
-            )
+            counter.count(mesh, Reason.UNKNOWN_MESH, f"no such mesh; parameter meshes has {', '.join(self._meshes)}")
         return state
 
     def _route(self, state: _MeshState, frame: MeshFrame, new_publisher: bool) -> list[SceneFrame]:
@@ -170,16 +168,14 @@ class FrameAssembler:
             self._drops.count(
                 mesh,
                 Reason.OLD_TOPOLOGY,
-                f"vertices belong to topology version {frame.version}, "
-                f"version {topology.version} is in force",
+                f"vertices belong to topology version {frame.version}, version {topology.version} is in force",
             )
             return []
         if len(frame.vertices) != topology.n_vertices:
             self._drops.count(
                 mesh,
                 Reason.WRONG_COUNT,
-                f"{len(frame.vertices)} vertices, topology version "
-                f"{topology.version} has {topology.n_vertices}",
+                f"{len(frame.vertices)} vertices, topology version {topology.version} has {topology.n_vertices}",
             )
             return []
         if not self._fits_frame_id(mesh, frame.frame_id):
@@ -215,8 +211,7 @@ class FrameAssembler:
         self._drops.count(
             mesh,
             Reason.FRAME_ID,
-            f"frame_id {frame_id!r}, the scene is in {self._frame_id!r}; "
-            "publish all meshes in one coordinate frame",
+            f"frame_id {frame_id!r}, the scene is in {self._frame_id!r}; publish all meshes in one coordinate frame",
         )
         return False
 
@@ -242,15 +237,11 @@ class FrameAssembler:
         state.last_backward = frame.stamp
         enough = self.restart_after > 0 and state.backward_run >= self.restart_after
         if not (new_publisher or enough):
-            self._drops.count(
-                mesh, Reason.BACKWARD, f"stamp {frame.stamp} ns is before the last one, {last} ns"
-            )
+            self._drops.count(mesh, Reason.BACKWARD, f"stamp {frame.stamp} ns is before the last one, {last} ns")
             return False
         self.restarts += 1
         self.clear(Reason.RESTART)
-        self._on_restart(
-            f"mesh {mesh} goes on from stamp {frame.stamp} ns after {last} ns: taken as a restart"
-        )
+        self._on_restart(f"mesh {mesh} goes on from stamp {frame.stamp} ns after {last} ns: taken as a restart")
         return True
 
     def _complete(self, match: Match) -> list[SceneFrame]:

@@ -22,8 +22,8 @@ from hpccd_ros.detect_service import DetectService, NodeScene
 from hpccd_ros.detection import CORE_ERRORS, Detection, DetectionThread, Options, SceneBuilder
 from hpccd_ros.diagnostics import Metrics, Reporter
 from hpccd_ros.drops import DropCounter, Reason
+from hpccd_ros.frame_queue import FrameQueue
 from hpccd_ros.frames import FrameAssembler
-from hpccd_ros.mailbox import Mailbox
 from hpccd_ros.markers import contact_markers
 from hpccd_ros.mesh_file import MeshFileError, load_mesh, place
 from hpccd_ros.messages import MeshFrame, MeshSettings, SceneFrame, Topology
@@ -45,12 +45,9 @@ class HpccdNode(LifecycleNode):
         super().__init__("hpccd")
         self._settings, self._mesh_settings = parameters.declare(self)
         for name in parameters.unknown_overrides(self):
-            self.get_logger().warning(
-                f"parameter {name} is unknown and has no effect; see the README's table"
-            )
+            self.get_logger().warning(f"parameter {name} is unknown and has no effect; see the README's table")
         self._meshes = {
-            name: MeshSettings(name, row["static"], row["self_collision"])
-            for name, row in self._mesh_settings.items()
+            name: MeshSettings(name, row["static"], row["self_collision"]) for name, row in self._mesh_settings.items()
         }
         self._ignored_pairs = tuple(parameters.ignored_pairs(self._settings))
         self._options = _options(self._settings)
@@ -68,7 +65,7 @@ class HpccdNode(LifecycleNode):
         self._service: DetectService | None = None
         self._streams: list[MeshStream] = []
         self._unknown: UnknownMeshWatch | None = None
-        self._mailbox: Mailbox[SceneFrame] | None = None
+        self._queue: FrameQueue | None = None
         self._thread: DetectionThread | None = None
         self._markers_after = 0.0
 
@@ -94,10 +91,10 @@ class HpccdNode(LifecycleNode):
         """Start the detection thread and subscribe."""
         settings = self._settings
         if self._assembler is not None:
-            self._mailbox = Mailbox(settings["frame_queue"])
+            self._queue = FrameQueue(settings["frame_queue"])
             self._thread = DetectionThread(
                 SceneBuilder(tuple(self._meshes.values()), self._ignored_pairs),
-                self._mailbox,
+                self._queue,
                 self._drops,
                 options=lambda: self._options,
                 on_detection=self._publish,
@@ -116,7 +113,7 @@ class HpccdNode(LifecycleNode):
                     refused=self._refused,
                     metrics=self._metrics,
                     links=self._links,
-                    on_frames=self._queue,
+                    on_frames=self._enqueue,
                     check_topology=_core_refusal,
                 )
                 for name, row in self._mesh_settings.items()
@@ -170,12 +167,12 @@ class HpccdNode(LifecycleNode):
         if self._unknown is not None:
             self._unknown.close()
             self._unknown = None
-        if self._mailbox is not None:
-            for frame in self._mailbox.close():
+        if self._queue is not None:
+            for frame in self._queue.close():
                 self._count_dropped(frame, Reason.STOPPED)
             self._thread.join()
             self._assembler.clear(Reason.STOPPED)
-            self._mailbox = self._thread = None
+            self._queue = self._thread = None
 
     def _release(self) -> None:
         if self._service is not None:
@@ -226,9 +223,9 @@ class HpccdNode(LifecycleNode):
         if self._assembler is not None:
             self._assembler.restart_after = self._settings["restart_after"]
 
-    def _queue(self, frames: list[SceneFrame]) -> None:
+    def _enqueue(self, frames: list[SceneFrame]) -> None:
         for frame in frames:
-            for lost in self._mailbox.put(frame):
+            for lost in self._queue.put(frame):
                 self._count_dropped(lost, Reason.OVERLOAD)
 
     def _count_dropped(self, frame: SceneFrame, reason: Reason) -> None:
@@ -238,7 +235,7 @@ class HpccdNode(LifecycleNode):
     def _publish(self, found: Detection) -> None:
         """Called by the detection thread."""
         settings, end = self._settings, found.end
-        message = ContactArray(step=end.step, accuracy=found.options.accuracy, backend=found.options.backend)
+        message = ContactArray(step=end.step, accuracy=found.options.accuracy, backend=found.backend)
         message.header.stamp = convert.ns_to_stamp(end.stamp)
         message.header.frame_id = end.frame_id
         message.start = convert.ns_to_stamp(found.start.stamp)
@@ -259,8 +256,8 @@ class HpccdNode(LifecycleNode):
             found.profile,
             {
                 "accuracy": found.options.accuracy,
-                "backend": found.options.backend,
-                "threads": found.options.threads,
+                "backend": found.backend,
+                "threads": found.threads,
                 "contacts": message.total,
                 "first_toc": message.first_toc,
                 "step": end.step,
@@ -290,12 +287,10 @@ class HpccdNode(LifecycleNode):
 
     def _report(self) -> None:
         waiting = self._assembler.waiting if self._assembler else 0
-        if self._mailbox is not None:
-            held = [*self._mailbox.items(), self._thread.working_on]
+        if self._queue is not None:
+            held = [*self._queue.frames(), self._thread.working_on]
             waiting += sum(len(frame.fresh) for frame in held if frame is not None)
-        warnings = [
-            line for part in (*self._streams, self._unknown) if part is not None for line in part.warnings()
-        ]
+        warnings = [line for part in (*self._streams, self._unknown) if part is not None for line in part.warnings()]
         self._diagnostics.publish(
             self._reporter.report(
                 self.get_clock().now().to_msg(),

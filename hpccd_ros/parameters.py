@@ -72,9 +72,7 @@ NODE_ROWS = (
         "Pairs of meshes that are never tested against each other, each as NAME:NAME",
     ),
     Row("autostart", "bool", True, "Configure and activate at once; false: wait for the life-cycle services"),
-    Row(
-        "accuracy", "string", "balanced", "Tier of the elementary tests", choices=ACCURACIES, changeable=True
-    ),
+    Row("accuracy", "string", "balanced", "Tier of the elementary tests", choices=ACCURACIES, changeable=True),
     Row("backend", "string", "auto", "Where the core runs", choices=BACKENDS, changeable=True),
     Row("threads", "int", 0, "Threads of the core; 0: all cores", span=(0, 1024), changeable=True),
     Row(
@@ -119,8 +117,7 @@ NODE_ROWS = (
         "stamp_match",
         "string",
         "exact",
-        "How frames of several meshes are joined: equal stamps, or nearest to those of "
-        "the first deforming mesh",
+        "How frames of several meshes are joined: equal stamps, or nearest to those of the first deforming mesh",
         choices=("exact", "nearest"),
     ),
     Row(
@@ -144,11 +141,16 @@ NODE_ROWS = (
         "input_reliability",
         "string",
         "reliable",
-        "QoS of the vertex subscriptions; best_effort also accepts best-effort "
-        "publishers, and may lose large messages",
+        "QoS of the vertex subscriptions; best_effort also accepts best-effort publishers, and may lose large messages",
         choices=("reliable", "best_effort"),
     ),
-    Row("input_depth", "int", 4, "QoS history depth of the vertex subscriptions", span=(1, 1000)),
+    Row(
+        "input_depth",
+        "int",
+        10,
+        "QoS history depth of the vertex subscriptions: messages that may come at once without loss",
+        span=(1, 1000),
+    ),
     Row("max_vertices", "int", 5_000_000, "Largest mesh accepted", unit="vertices", span=(1, 1_000_000_000)),
     Row("max_faces", "int", 10_000_000, "Largest mesh accepted", unit="triangles", span=(1, 1_000_000_000)),
     Row(
@@ -225,8 +227,7 @@ MESH_ROWS = (
         "file",
         "string",
         "",
-        "Mesh file (OBJ, PLY, STL; needs trimesh) with the topology, version 0, and for a static "
-        "mesh the positions",
+        "Mesh file (OBJ, PLY, STL; needs trimesh) with the topology, version 0, and for a static mesh the positions",
     ),
     Row(
         "pose",
@@ -256,9 +257,7 @@ def refusal(row: Row, value: Any) -> str | None:
 
 def descriptor(row: Row) -> ParameterDescriptor:
     """What ``describe_parameters`` shows."""
-    out = ParameterDescriptor(
-        name=row.name, type=_TYPES[row.kind], description=row.text, read_only=not row.changeable
-    )
+    out = ParameterDescriptor(name=row.name, type=_TYPES[row.kind], description=row.text, read_only=not row.changeable)
     if row.unit:
         out.description += f" [{row.unit}]"
     if row.choices:
@@ -266,9 +265,7 @@ def descriptor(row: Row) -> ParameterDescriptor:
     if row.span is not None and row.kind == "int":
         out.integer_range = [IntegerRange(from_value=int(row.span[0]), to_value=int(row.span[1]), step=1)]
     elif row.span is not None:
-        out.floating_point_range = [
-            FloatingPointRange(from_value=row.span[0], to_value=row.span[1], step=0.0)
-        ]
+        out.floating_point_range = [FloatingPointRange(from_value=row.span[0], to_value=row.span[1], step=0.0)]
     return out
 
 
@@ -288,8 +285,7 @@ def declare(node: Node) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
         raise ParameterError(f"meshes: names must differ, got {', '.join(names)}")
     ignored_pairs(settings)
     meshes = {
-        name: {row.name: _declare_one(node, row, f"mesh.{name}.{row.name}") for row in MESH_ROWS}
-        for name in names
+        name: {row.name: _declare_one(node, row, f"mesh.{name}.{row.name}") for row in MESH_ROWS} for name in names
     }
     return settings, meshes
 
@@ -336,9 +332,7 @@ def normalise(row: Row, value: Any) -> Any:
 def unknown_overrides(node: Node) -> list[str]:
     """Parameters given on the command line or in a file that the node does not have: usually misspelt."""
     given = getattr(node, "_parameter_overrides", {})  # rclpy has no public list of what was given
-    return sorted(
-        name for name in given if not node.has_parameter(name) and not name.startswith("qos_overrides.")
-    )
+    return sorted(name for name in given if not node.has_parameter(name) and not name.startswith("qos_overrides."))
 
 
 def watch(
@@ -388,9 +382,7 @@ def markdown_table() -> str:
     ]
     named = [(row.name, row) for row in NODE_ROWS] + [(f"mesh.NAME.{row.name}", row) for row in MESH_ROWS]
     for name, row in named:
-        default = (
-            f"`{str(row.default).lower()}`" if row.kind == "bool" else f"`{row.default!r}`".replace("'", '"')
-        )
+        default = f"`{str(row.default).lower()}`" if row.kind == "bool" else f"`{row.default!r}`".replace("'", '"')
         lines.append(
             f"| `{name}` | {row.kind} | {default} | {_allowed(row)} | {row.unit} | "
             f"{'changeable' if row.changeable else 'read-only'} | {row.text} |"

@@ -7,11 +7,15 @@ class SequenceWatch:
 
     A reader's history that is overwritten before the node gets to it is no "lost message" to DDS: only the
     gap in these numbers shows it.
+
+    ``before_first``: messages that publishers numbered before the first one that was read here: written
+    before this reader was known to them, or lost; the numbers cannot tell.
     """
 
     def __init__(self) -> None:
         self._last: int | None = None
         self._seen_any = False
+        self.before_first = 0
 
     def new_publisher(self) -> None:
         """A publisher came: its numbers have nothing to do with those before."""
@@ -25,5 +29,6 @@ class SequenceWatch:
         last, self._last = self._last, number
         first, self._seen_any = not self._seen_any, True
         if last is None:
+            self.before_first += number - 1
             return 0, not first
         return (number - last - 1, False) if number > last else (0, True)

@@ -72,6 +72,7 @@ class MeshStream:
         self._drops = drops
         self._refused = refused
         self._metrics = metrics
+        self._links = links
         self._on_frames = on_frames
         self._check_topology = check_topology
         self._topology_numbers = SequenceWatch()
@@ -87,9 +88,7 @@ class MeshStream:
                 topology_topic,
                 self._on_topology,
                 qos.TOPOLOGY,
-                event_callbacks=link_events(
-                    node, topology_topic, links, self._topology_numbers.new_publisher
-                ),
+                event_callbacks=link_events(node, topology_topic, links, self._topology_numbers.new_publisher),
             ),
             node.create_subscription(
                 message,
@@ -131,13 +130,12 @@ class MeshStream:
     def _on_cloud(self, message: PointCloud2, info: dict[str, Any]) -> None:
         self._take(message, info, convert.vertices_from_cloud, None, None)
 
-    def _take(
-        self, message: Any, info: dict[str, Any], read: Callable, version: int | None, step: int | None
-    ) -> None:
+    def _take(self, message: Any, info: dict[str, Any], read: Callable, version: int | None, step: int | None) -> None:
         received = time.monotonic()
         transport = (info["received_timestamp"] - info["source_timestamp"]) * 1e-6
         self._metrics.frame_received(self._mesh, transport if transport >= 0 else None)
         missing, new_publisher = self._vertex_numbers.next(info["publication_sequence_number"])
+        self._links[f"before_first.{self._mesh}"] = self._vertex_numbers.before_first
         # Numbers of several publishers interleave: their gaps mean nothing.
         if missing and self._node.count_publishers(self._vertex_topic) <= 1:
             self._drops.count(

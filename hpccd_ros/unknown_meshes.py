@@ -59,11 +59,7 @@ class UnknownMeshWatch:
 
     def _look(self) -> None:
         for topic, types in self._node.get_topic_names_and_types():
-            if (
-                topic in self._topics
-                or not topic.startswith(self._prefix)
-                or len(self._topics) >= _MOST_TOPICS
-            ):
+            if topic in self._topics or not topic.startswith(self._prefix) or len(self._topics) >= _MOST_TOPICS:
                 continue
             mesh, _, kind = topic.removeprefix(self._prefix).rpartition("/")
             if kind not in _TYPES or mesh in self._known or not self._node.count_publishers(topic):
@@ -81,6 +77,4 @@ class UnknownMeshWatch:
             self._drops.count(mesh, Reason.UNKNOWN_MESH)
 
         # Best effort is compatible with every publisher.
-        return self._node.create_subscription(
-            message, topic, count, qos.vertices("best_effort", 10), raw=True
-        )
+        return self._node.create_subscription(message, topic, count, qos.vertices("best_effort", 10), raw=True)

@@ -7,11 +7,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from hpccd.msg import ContactArray, MeshTopology, MeshVertices
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from sensor_msgs.msg import PointCloud2, PointField
 
-from hpccd.msg import ContactArray, MeshTopology, MeshVertices
 from hpccd_ros import convert
 from hpccd_ros.convert import InvalidMessageError, Layout
 from hpccd_ros.drops import Reason

@@ -86,9 +86,7 @@ def test_percentiles():
 
 def markers(n, n_vf, limit):
     points, normals = np.arange(3.0 * n).reshape(n, 3), np.tile([0.0, 0.0, 1.0], (n, 1))
-    out = contact_markers(
-        points, normals, n_vf, stamp=Time(sec=1), frame_id="world", size=0.1, limit=limit
-    ).markers
+    out = contact_markers(points, normals, n_vf, stamp=Time(sec=1), frame_id="world", size=0.1, limit=limit).markers
     assert [m.ns for m in out] == ["vertex_face", "edge_edge", "normals"]
     assert len({(m.ns, m.id) for m in out}) == 3 and all(m.header.frame_id == "world" for m in out)
     return out

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Mesh files keep the numbering of the file, which is what publishers send vertices in."""
+"""Mesh files keep the numbering of the file, in which publishers send vertices."""
 
 import builtins
 
@@ -29,7 +29,13 @@ def test_obj(tmp_path):
 
 def test_obj_with_texture_and_normals_is_not_split(tmp_path):
     path = tmp_path / "m.obj"
-    lines = [f"v {x} {y} {z}" for x, y, z in VERTICES] + ["vt 0 0", "vt 1 0", "vt 1 1", "vn 0 0 1", "vn 0 1 0"]
+    lines = [f"v {x} {y} {z}" for x, y, z in VERTICES] + [
+        "vt 0 0",
+        "vt 1 0",
+        "vt 1 1",
+        "vn 0 0 1",
+        "vn 0 1 0",
+    ]
     lines += ["f 3/1/1 2/2/2 1/3/1", "f 5/3/2 6/1/1 3/2/2", "f 2/1/1 6/2/2 1/1/1"]
     path.write_text("\n".join(lines) + "\n")
     vertices, faces = load_mesh(str(path))

@@ -22,6 +22,7 @@ def test_a_publisher_that_came_is_no_loss():
     assert watch.next(1) == (0, False), "the first publisher of all is not another one"
     watch.new_publisher()
     assert watch.next(50) == (0, True)
+    assert watch.before_first == 49
 
 
 def test_refusals_do_not_flood_the_log():

@@ -1,0 +1,174 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Start the node as a plain process and talk to it over DDS from this one."""
+
+import itertools
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import rclpy
+import yaml
+from diagnostic_msgs.msg import DiagnosticArray
+from hpccd.msg import ContactArray, MeshTopology, MeshVertices
+from hpccd.srv import Detect
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.qos import HistoryPolicy, QoSProfile
+
+import hpccd_core as hc
+import hpccd_ros
+from hpccd_ros import _env, convert, qos
+
+# Long enough for a loaded machine; reached only by tests that fail.
+PATIENCE = 60.0
+
+_numbers = itertools.count()
+
+
+class NodeProcess:
+    """``python -m hpccd_ros.node`` in a namespace of its own, and a peer in this process.
+
+    parameters: nested as in YAML, meshes included. remaps: further ``from:=to`` rules.
+    """
+
+    def __init__(self, folder: Path, parameters: dict[str, Any], *, remaps: tuple[str, ...] = (), wait: bool = True):
+        self.namespace = f"/t{os.getpid()}_{next(_numbers)}"
+        values = {"diagnostics_period": 0.1, **parameters}
+        file = folder / f"parameters{self.namespace[1:]}.yaml"
+        file.write_text(yaml.safe_dump({"/**": {"ros__parameters": values}}))
+        rules = (f"__ns:={self.namespace}", f"/diagnostics:={self.namespace}/diagnostics", *remaps)
+        command = [sys.executable, "-m", "hpccd_ros.node", "--ros-args", "--params-file", str(file)]
+        for rule in rules:
+            command += ["-r", rule]
+        self._output = (folder / f"output{self.namespace[1:]}.txt").open("w+")
+        # The module is found from the current folder: the node under test is the one that is imported here.
+        root = Path(hpccd_ros.__file__).resolve().parents[1]
+        self.process = subprocess.Popen(command, cwd=root, stdout=self._output, stderr=subprocess.STDOUT)
+        self.peer = Peer(self.namespace)
+        if wait:
+            try:
+                self.wait_until(lambda: self.peer.statuses, "diagnostics of the node")
+            except BaseException:
+                self.close()
+                raise
+
+    def output(self) -> str:
+        self._output.flush()
+        return Path(self._output.name).read_text()
+
+    def wait_until(self, condition: Callable[[], Any], what: str) -> Any:
+        """Spin until ``condition()`` is true; its value. Fails with the output of the node."""
+        deadline = time.monotonic() + PATIENCE
+        while not (value := condition()):
+            if self.process.poll() is not None:
+                raise AssertionError(f"node ended with {self.process.returncode}, waiting for {what}\n{self.output()}")
+            if time.monotonic() > deadline:
+                raise AssertionError(f"no {what} within {PATIENCE} s\n{self.peer.statuses}\n{self.output()}")
+            self.peer.executor.spin_once(timeout_sec=0.05)
+        return value
+
+    def contacts(self, count: int) -> list[ContactArray]:
+        """Wait for ``count`` messages in all."""
+        self.wait_until(lambda: len(self.peer.received) >= count, f"{count} contact messages")
+        return self.peer.received
+
+    def frames_status(self, **expected: Any) -> dict[str, str]:
+        """Wait until the status `frames` holds these values ("__" stands for a dot in a name)."""
+        wanted = {key.replace("__", "."): str(value) for key, value in expected.items()}
+
+        def matches():
+            values = self.peer.statuses.get("frames", (None, "", {}))[2]
+            return values if wanted.items() <= values.items() else None
+
+        return self.wait_until(matches, f"frames status with {wanted}")
+
+    def stop(self, number: signal.Signals = signal.SIGINT) -> int:
+        """Send a signal and wait for the end; the exit status."""
+        self.process.send_signal(number)
+        return self.process.wait(timeout=PATIENCE)
+
+    def close(self) -> None:
+        if self.process.poll() is None:
+            self.process.kill()
+            self.process.wait()
+        self.peer.close()
+        self._output.close()
+
+
+class Peer:
+    """A node in this process, in a context of its own: publishes meshes, reads contacts and diagnostics."""
+
+    def __init__(self, namespace: str):
+        _env.prepare()
+        self.context = rclpy.Context()
+        rclpy.init(context=self.context)
+        self.node = Node("peer", namespace=namespace, context=self.context)
+        self.executor = SingleThreadedExecutor(context=self.context)
+        self.executor.add_node(self.node)
+        self.received: list[ContactArray] = []
+        self.statuses: dict[str, tuple[bytes, str, dict[str, str]]] = {}
+        deep = QoSProfile(depth=1000, history=HistoryPolicy.KEEP_LAST)
+        self.node.create_subscription(ContactArray, "contacts", self.received.append, deep)
+        self.node.create_subscription(DiagnosticArray, "diagnostics", self._on_diagnostics, 10)
+        self._publishers: dict[str, Any] = {}
+
+    def _on_diagnostics(self, message: DiagnosticArray) -> None:
+        for status in message.status:
+            values = {v.key: v.value for v in status.values}
+            self.statuses[status.name.rpartition(": ")[2]] = (status.level, status.message, values)
+
+    def publisher(self, kind: type, topic: str, profile: QoSProfile | None = None) -> Any:
+        """A publisher that the node (or another reader) is known to listen to."""
+        if topic not in self._publishers:
+            publisher = self.node.create_publisher(kind, topic, profile or qos.vertices("reliable", 100))
+            deadline = time.monotonic() + PATIENCE
+            while not publisher.get_subscription_count():
+                assert time.monotonic() < deadline, f"nobody listens to {topic}"
+                self.executor.spin_once(timeout_sec=0.02)
+            self._publishers[topic] = publisher
+        return self._publishers[topic]
+
+    def forget_publisher(self, topic: str) -> None:
+        self.node.destroy_publisher(self._publishers.pop(topic))
+
+    def topology(self, mesh: str, faces: np.ndarray, n_vertices: int, version: int = 0) -> None:
+        publisher = self.publisher(MeshTopology, f"meshes/{mesh}/topology", qos.TOPOLOGY)
+        publisher.publish(convert.topology_message(faces, n_vertices, version=version))
+
+    def vertices(self, mesh: str, vertices: np.ndarray, stamp: int, **fields: Any) -> None:
+        publisher = self.publisher(MeshVertices, f"meshes/{mesh}/vertices")
+        publisher.publish(convert.vertices_message(vertices, stamp, **fields))
+
+    def client(self) -> Any:
+        """A client of ~/detect that is connected."""
+        client = self.node.create_client(Detect, "hpccd/detect")
+        assert client.wait_for_service(timeout_sec=PATIENCE)
+        return client
+
+    def close(self) -> None:
+        self.executor.shutdown()
+        self.node.destroy_node()
+        rclpy.shutdown(context=self.context)
+
+
+def assert_same_contacts(message: ContactArray, t0: np.ndarray, t1: np.ndarray, scene: hc.Scene, **options: Any) -> int:
+    """Contacts equal those of the core called directly on the same positions; their number."""
+    expected = hc.Detector(scene, **{"accuracy": "balanced", **options}).detect(t0, t1)
+    names = tuple(message.mesh_names)
+    vertex_offsets = [scene.vertex_offset(name) for name in names] + [scene.n_vertices]
+    face_offsets = [scene.face_offset(name) for name in names] + [scene.n_faces]
+    layout = convert.Layout(names, np.array(vertex_offsets), np.array(face_offsets))
+    got = convert.read_contacts(message, layout)
+    for name in ("vf", "ee", "vf_toc", "ee_toc"):
+        assert np.array_equal(getattr(got, name), getattr(expected, name)), name
+    assert message.hash == expected.hash
+    assert message.first_toc == expected.first_toc
+    assert message.total == len(expected.vf) + len(expected.ee)
+    assert not message.truncated
+    return message.total

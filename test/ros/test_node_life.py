@@ -1,0 +1,170 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Start, life cycle, run-time parameters, signals: how the node begins and ends."""
+
+import signal
+import threading
+
+import pytest
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState, GetState
+from node_process import PATIENCE, assert_same_contacts
+from rcl_interfaces.srv import SetParameters
+from rclpy.parameter import Parameter
+from waving_sheet import scene_of, sheet_faces, sheet_positions
+
+from hpccd_ros import convert
+
+N = 8
+FACES = sheet_faces(N)
+
+
+def call(node, kind, name, request):
+    client = node.peer.node.create_client(kind, f"hpccd/{name}")
+    node.wait_until(client.service_is_ready, f"service {name}")
+    future = client.call_async(request)
+    node.wait_until(future.done, f"answer of {name}")
+    return future.result()
+
+
+def change_state(node, transition):
+    return call(node, ChangeState, "change_state", ChangeState.Request(transition=Transition(id=transition))).success
+
+
+def set_parameter(node, name, value):
+    request = SetParameters.Request(parameters=[Parameter(name, value=value).to_parameter_msg()])
+    return call(node, SetParameters, "set_parameters", request).results[0]
+
+
+def stream(node, steps, start=0):
+    for k in steps:
+        node.peer.vertices("cloth", sheet_positions(N, k), start + k)
+        node.contacts(max(0, k))
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=["SIGINT", "SIGTERM"])
+@pytest.mark.parametrize("busy", [False, True], ids=["idle", "streaming"])
+def test_signals_end_the_node_cleanly(start_node, number, busy):
+    node = start_node({"meshes": ["cloth"]})
+    end = threading.Event()
+    if busy:
+        n = 60
+        node.peer.topology("cloth", sheet_faces(n), n * n)
+        frames = [sheet_positions(n, k) for k in range(4)]
+
+        def publish():
+            k = 0
+            while not end.is_set():
+                node.peer.vertices("cloth", frames[k % 4], k)
+                k += 1
+                end.wait(0.005)
+
+        publisher = threading.Thread(target=publish)
+        node.peer.vertices("cloth", frames[3], 0)
+        publisher.start()
+        node.contacts(3)
+    status = node.stop(number)
+    if busy:
+        end.set()
+        publisher.join(PATIENCE)
+    output = node.output()
+    assert status == 0, output
+    assert "Traceback" not in output and "rror" not in output, output
+
+
+def test_second_signal_changes_nothing(start_node):
+    node = start_node({"meshes": ["cloth"]})
+    node.process.send_signal(signal.SIGTERM)
+    assert node.stop(signal.SIGINT) == 0
+    assert "Traceback" not in node.output()
+
+
+@pytest.mark.parametrize(
+    "parameters, status, text",
+    [
+        ({"meshes": ["cloth"], "accuracy": "sloppy"}, 2, "accuracy: 'sloppy' is none of"),
+        ({"meshes": ["cloth"], "threads": -1}, 2, "threads"),
+        ({"meshes": ["cloth"], "threads": "all"}, 2, "threads"),
+        ({"meshes": ["a/b"]}, 2, "'a/b' cannot be part of a topic name"),
+        ({"meshes": ["cloth"], "backend": "gpu"}, 2, "gpu"),
+        (
+            {"meshes": ["cloth"], "mesh": {"cloth": {"file": "/nowhere/cloth.obj"}}},
+            1,
+            "/nowhere/cloth.obj: no such file",
+        ),
+        ({"meshes": ["cloth"], "mesh": {"cloth": {"static": True}}}, 1, "at least one mesh must not be static"),
+    ],
+    ids=["choice", "range", "type", "name", "backend", "file", "static"],
+)
+def test_start_that_cannot_work_says_why(start_node, parameters, status, text):
+    if parameters.get("backend") == "gpu":
+        import hpccd_core
+
+        if "gpu" in hpccd_core.backends():
+            pytest.skip("this machine has a GPU")
+    node = start_node(parameters, wait=False)
+    assert node.process.wait(timeout=PATIENCE) == status
+    assert text in node.output() and "Traceback" not in node.output()
+
+
+def test_misspelt_parameter_is_told(start_node):
+    node = start_node({"meshes": ["cloth"], "acuracy": "balanced"})
+    assert "parameter acuracy is unknown" in node.output()
+
+
+def test_life_cycle(start_node):
+    node = start_node({"meshes": ["cloth"], "autostart": False}, wait=False)
+
+    def state():
+        return call(node, GetState, "get_state", GetState.Request()).current_state.label
+
+    assert state() == "unconfigured"
+    assert change_state(node, Transition.TRANSITION_CONFIGURE)
+    node.wait_until(lambda: node.peer.statuses, "diagnostics")
+    assert state() == "inactive"
+    assert change_state(node, Transition.TRANSITION_ACTIVATE)
+    node.peer.topology("cloth", FACES, N * N)
+    stream(node, range(3))
+    node.frames_status(answered=3)
+    assert change_state(node, Transition.TRANSITION_DEACTIVATE)
+    node.peer.vertices("cloth", sheet_positions(N, 3), 3)  # nobody listens
+    assert change_state(node, Transition.TRANSITION_ACTIVATE)
+    # The topology is still known; the last positions are not, as what happened since was not seen.
+    node.peer.forget_publisher("meshes/cloth/vertices")
+    for k in (4, 5):
+        node.peer.vertices("cloth", sheet_positions(N, k), k)
+        node.frames_status(answered=k)
+    message = node.contacts(3)[2]
+    assert convert.stamp_to_ns(message.start) == 4
+    assert_same_contacts(message, sheet_positions(N, 4), sheet_positions(N, 5), scene_of(cloth=FACES))
+    assert change_state(node, Transition.TRANSITION_DEACTIVATE)
+    assert change_state(node, Transition.TRANSITION_CLEANUP)
+    assert state() == "unconfigured"
+    assert change_state(node, Transition.TRANSITION_CONFIGURE)
+    assert change_state(node, Transition.TRANSITION_ACTIVATE)
+    assert change_state(node, Transition.TRANSITION_ACTIVE_SHUTDOWN)
+    assert state() == "finalized"
+    assert node.stop() == 0
+
+
+def test_options_change_at_run_time(start_node):
+    node = start_node({"meshes": ["cloth"]})
+    node.peer.topology("cloth", FACES, N * N)
+    scene = scene_of(cloth=FACES)
+    stream(node, range(2))
+    assert set_parameter(node, "report", "first").successful
+    assert set_parameter(node, "outputs", ["normals"]).successful
+    stream(node, [2])
+    message = node.contacts(2)[1]
+    assert_same_contacts(message, sheet_positions(N, 1), sheet_positions(N, 2), scene, report="first")
+    assert len(message.normals) == 3 * len(message.toc) and len(message.points) == 0
+    for name, value, reason in [
+        ("accuracy", "sloppy", "is none of"),
+        ("frame_queue", 7, "read-only"),
+        ("max_contacts", -1, "range"),
+        ("threads", "four", "type"),
+    ]:
+        result = set_parameter(node, name, value)
+        assert not result.successful and reason in result.reason, (name, result.reason)
+    assert set_parameter(node, "report", "all").successful
+    stream(node, [3])
+    assert_same_contacts(node.contacts(3)[2], sheet_positions(N, 2), sheet_positions(N, 3), scene)

@@ -1,0 +1,173 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Bad input is counted, diagnosed, and the node goes on: one test for each kind."""
+
+import math
+
+import numpy as np
+import pytest
+from hpccd.msg import MeshTopology, MeshVertices
+from node_process import assert_same_contacts
+from waving_sheet import scene_of, sheet_faces, sheet_positions
+
+from hpccd_ros import convert, qos
+
+N = 8
+FACES = sheet_faces(N)
+GOOD = sheet_positions(N, 0)
+
+
+def vertices(**fields):
+    message = convert.vertices_message(GOOD, 50)
+    for name, value in fields.items():
+        setattr(message, name, value)
+    return message
+
+
+def not_finite(value, dtype):
+    points = GOOD.astype(dtype)
+    points[7, 2] = value
+    return convert.vertices_message(points, 50)
+
+
+BAD_VERTICES = {
+    "shape": (vertices(vertices_f32=convert.to_field(GOOD.ravel()[:-1])), "malformed", "not a multiple of 3"),
+    "no dtype": (vertices(vertices_f32=convert.to_field(GOOD[:0])), "malformed", "both are empty"),
+    "two dtypes": (
+        vertices(vertices_f64=convert.to_field(GOOD.astype(float))),
+        "malformed",
+        "both are filled",
+    ),
+    "count": (convert.vertices_message(GOOD[:-1], 50), "wrong_vertex_count", "63 vertices"),
+    "nan": (not_finite(math.nan, np.float32), "not_finite", "vertex 7"),
+    "inf": (not_finite(-math.inf, np.float64), "not_finite", "vertex 7"),
+    "old version": (vertices(topology_version=2), "old_topology", "version 2"),
+    "backward": (convert.vertices_message(GOOD, 9), "stamp_backward", "before the last one"),
+    "repeated": (convert.vertices_message(GOOD, 11), "stamp_repeated", "came before"),
+    "frame": (convert.vertices_message(GOOD, 50, frame_id="elsewhere"), "frame_id", "'elsewhere'"),
+    "size": (convert.vertices_message(np.zeros((101, 3), np.float32), 50), "too_large", "max_vertices"),
+}
+
+
+@pytest.fixture
+def streaming(start_node):
+    """A node that has answered one step, and a check that it goes on as if nothing had been."""
+    node = start_node({"meshes": ["cloth"], "max_vertices": 100, "restart_after": 0})
+    node.peer.topology("cloth", FACES, N * N, version=3)
+
+    def send(step):
+        node.peer.vertices("cloth", sheet_positions(N, step), 10 + step, topology_version=3, frame_id="world")
+
+    def goes_on():
+        before = len(node.peer.received)
+        send(2)
+        message = node.contacts(before + 1)[before]
+        assert convert.stamp_to_ns(message.start) == 11, "the refused frame is not a start either"
+        expected = sheet_positions(N, 1), sheet_positions(N, 2)
+        assert_same_contacts(message, *expected, scene_of(cloth=FACES))
+        return message
+
+    send(0)
+    send(1)
+    node.contacts(1)
+    return node, goes_on
+
+
+@pytest.mark.parametrize("kind", BAD_VERTICES)
+def test_bad_vertices(streaming, kind):
+    node, goes_on = streaming
+    message, reason, text = BAD_VERTICES[kind]
+    if kind != "old version":
+        message.topology_version = 3
+    node.peer.publisher(MeshVertices, "meshes/cloth/vertices").publish(message)
+    values = node.frames_status(dropped=1, **{f"dropped__cloth__{reason}": 1})
+    assert text in values["last_refusal"]
+    answer = goes_on()
+    assert answer.dropped_frames == 1
+    node.frames_status(received=4, answered=3, dropped=1, waiting=0)
+    node.wait_until(lambda: text in node.output(), "line in the log")
+
+
+def bad_topology(faces, n_vertices=N * N, version=4):
+    message = MeshTopology(version=version, n_vertices=n_vertices)
+    message.faces = convert.to_field(np.array(faces, np.uint32))
+    return message
+
+
+@pytest.mark.parametrize(
+    "message, reason, text",
+    [
+        (bad_topology([0, 1, 64]), "index_range", "face 0 names vertex 64"),
+        (bad_topology([0, 1, 2, 3]), "malformed", "not a multiple of 3"),
+        (bad_topology([0, 1, 2], version=2), "old_topology", "version 2 is older than 3"),
+        (bad_topology([0, 1, 2], version=3), "topology_conflict", "count the version up"),
+        (bad_topology([0, 1, 2], n_vertices=101), "too_large", "max_vertices"),
+    ],
+    ids=["index", "shape", "old", "conflict", "size"],
+)
+def test_bad_topology(streaming, message, reason, text):
+    node, goes_on = streaming
+    node.peer.publisher(MeshTopology, "meshes/cloth/topology").publish(message)
+    values = node.frames_status(topologies_refused=1, **{f"topologies_refused__cloth__{reason}": 1})
+    assert text in values["last_refusal"]
+    goes_on()
+
+
+def test_frames_of_an_unknown_mesh(streaming):
+    node, goes_on = streaming
+    publisher = node.peer.publisher(MeshVertices, "meshes/clot/vertices")  # waits until the node listens
+    for k in range(3):
+        publisher.publish(convert.vertices_message(GOOD, k))
+    node.frames_status(dropped__clot__unknown_mesh=3, received__clot=3)
+    warning = node.wait_until(lambda: "clot/vertices" in node.peer.statuses["frames"][1], "warning")
+    assert warning
+    goes_on()
+
+
+def test_vertices_without_a_topology(start_node):
+    node = start_node({"meshes": ["cloth"], "pending_frames": 2})
+    for k in range(5):
+        node.peer.vertices("cloth", GOOD, k)
+    values = node.frames_status(received=5, waiting=2, dropped__cloth__no_topology=3)
+    assert "meshes/cloth/topology" in values["last_refusal"]
+
+
+def test_incompatible_qos_is_told(start_node):
+    node = start_node({"meshes": ["cloth"]})
+    node.peer.node.create_publisher(MeshVertices, "meshes/cloth/vertices", qos.vertices("best_effort", 1))
+    node.wait_until(
+        lambda: node.peer.statuses["frames"][2].get("qos_incompatible.meshes/cloth/vertices") == "1",
+        "QoS incompatibility in the diagnostics",
+    )
+    assert "input_reliability" in node.output()
+
+
+def test_restarted_publisher_is_heard_at_once(start_node):
+    node = start_node({"meshes": ["cloth"]})
+    node.peer.topology("cloth", FACES, N * N, version=7)
+    for k in range(3):
+        node.peer.vertices("cloth", sheet_positions(N, k), 1000 + k, topology_version=7)
+        node.contacts(k)
+    node.peer.forget_publisher("meshes/cloth/vertices")
+    node.peer.forget_publisher("meshes/cloth/topology")
+    node.peer.topology("cloth", FACES, N * N, version=1)
+    for k in range(3):
+        node.peer.vertices("cloth", sheet_positions(N, k), 10 + k, topology_version=1)
+        node.contacts(2 + k)
+    message = node.contacts(4)[2]
+    assert convert.stamp_to_ns(message.start) == 10
+    node.frames_status(restarts=1, received=6, answered=6, dropped=0)
+
+
+def test_failure_of_the_core_is_counted_and_the_node_goes_on(start_node):
+    """Finite, but beyond what the core computes with."""
+    node = start_node({"meshes": ["cloth"]})
+    node.peer.topology("cloth", FACES, N * N)
+    for k in range(5):
+        scale = 1e200 if k == 1 else 1.0
+        node.peer.vertices("cloth", scale * sheet_positions(N, k, dtype=np.float64), k)
+        node.frames_status(received=k + 1, waiting=0)
+    # The far frame ends one step and starts the next.
+    node.frames_status(answered=3, dropped=2, dropped__cloth__detection_failed=2)
+    message = node.contacts(2)[0]
+    assert convert.stamp_to_ns(message.start) == 2
+    assert "1e150" in node.peer.statuses["detection"][2]["last_failure"]

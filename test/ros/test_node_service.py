@@ -1,0 +1,178 @@
+# SPDX-License-Identifier: Apache-2.0
+"""~/detect: two snapshots in, contacts out, for several clients at once."""
+
+import math
+
+import numpy as np
+import pytest
+from hpccd.srv import Detect
+from node_process import assert_same_contacts
+from waving_sheet import scene_of, sheet_faces, sheet_positions
+
+import hpccd_core as hc
+from hpccd_ros import convert
+
+N = 16
+FACES = sheet_faces(N)
+
+
+def request(step=0, *, n=N, names=("cloth",), topologies=True, dtype=np.float32, **fields):
+    out = Detect.Request(mesh_names=list(names), **fields)
+    if topologies:
+        out.topologies = [convert.topology_message(sheet_faces(n), n * n) for _ in names]
+    for i, _ in enumerate(names):
+        for target, k in ((out.start, step), (out.end, step + 1)):
+            positions = sheet_positions(n, k + 2 * i, offset=0.003 * i, dtype=dtype)
+            target.append(convert.vertices_message(positions, k, step=k, frame_id="lab"))
+    return out
+
+
+def ask(node, *requests):
+    """Answers to requests that are all under way at the same time, each from a client of its own."""
+    clients = [node.peer.client() for _ in requests]
+    futures = [client.call_async(r) for client, r in zip(clients, requests, strict=True)]
+    node.wait_until(lambda: all(f.done() for f in futures), f"{len(futures)} answers")
+    return [f.result() for f in futures]
+
+
+@pytest.fixture
+def node(start_node):
+    return start_node({"meshes": ["cloth"], "detect_jobs": 2, "detect_waiting": 8})
+
+
+def test_without_any_stream(node):
+    (answer,) = ask(node, request(dtype=np.float64))
+    assert answer.success and answer.message.endswith("contacts"), answer.message
+    start, end = (sheet_positions(N, k, dtype=np.float64) for k in (0, 1))
+    assert assert_same_contacts(answer.contacts, start, end, scene_of(cloth=FACES)) > 100
+    header = answer.contacts.header
+    assert (header.frame_id, convert.stamp_to_ns(header.stamp), answer.contacts.step) == ("lab", 1, 1)
+    assert convert.stamp_to_ns(answer.contacts.start) == 0
+
+
+def test_meshes_that_the_node_does_not_have(node):
+    (answer,) = ask(node, request(names=("left", "right")))
+    assert answer.success, answer.message
+    frames = [np.concatenate([sheet_positions(N, k), sheet_positions(N, k + 2, offset=0.003)]) for k in (0, 1)]
+    assert assert_same_contacts(answer.contacts, *frames, scene_of(left=FACES, right=FACES)) > 100
+    assert list(answer.contacts.mesh_names) == ["left", "right"]
+
+
+def test_topology_of_the_stream_is_used(node):
+    (answer,) = ask(node, request(topologies=False))
+    assert not answer.success and "no topology yet" in answer.message
+    node.peer.topology("cloth", FACES, N * N)
+    (answer,) = ask(node, request(topologies=False))
+    if not answer.success:  # the topology came after the request
+        node.wait_until(lambda: ask(node, request(topologies=False))[0].success, "topology")
+        (answer,) = ask(node, request(topologies=False))
+    assert_same_contacts(answer.contacts, sheet_positions(N, 0), sheet_positions(N, 1), scene_of(cloth=FACES))
+
+
+def test_several_clients_at_once(node):
+    answers = ask(node, *(request(step) for step in range(6)))
+    for step, answer in enumerate(answers):
+        assert answer.success, answer.message
+        frames = sheet_positions(N, step), sheet_positions(N, step + 1)
+        assert_same_contacts(answer.contacts, *frames, scene_of(cloth=FACES))
+    node.wait_until(lambda: node.peer.statuses["service"][2]["answered"] == "6", "count of answers")
+
+
+def test_options_of_the_request(node):
+    (answer,) = ask(node, request(accuracy="balanced", report="first"))
+    frames = sheet_positions(N, 0), sheet_positions(N, 1)
+    assert_same_contacts(answer.contacts, *frames, scene_of(cloth=FACES), report="first")
+
+
+def changed(change, **options):
+    out = request(**options)
+    change(out)
+    return out
+
+
+def cut_end(r):
+    r.end = []
+
+
+def cut_vertices(r):
+    r.end[0].vertices_f32 = r.end[0].vertices_f32[:-3]
+
+
+def put_nan(r):
+    r.start[0].vertices_f32[5] = math.nan
+
+
+def other_version(r):
+    r.start[0].topology_version = 4
+
+
+def bad_index(r):
+    r.topologies[0].faces[0] = N * N
+
+
+@pytest.mark.parametrize(
+    "bad, text",
+    [
+        (request(names=("ghost",), topologies=False), "unknown mesh 'ghost'"),
+        (request(names=("a", "a")), "names must differ"),
+        (changed(cut_end), "end: 0 entries for 1 meshes"),
+        (changed(cut_vertices), "end[0] (cloth): 255 vertices, the topology has 256"),
+        (changed(put_nan), "start[0] (cloth): vertex 1 is"),
+        (changed(other_version), "start[0] (cloth): topology_version 4"),
+        (changed(bad_index), "topologies[0] (cloth): face 0 names vertex 256"),
+        (request(accuracy="sloppy"), "accuracy"),
+        (request(report="some"), "report"),
+        (request(time_limit=-1.0), "time_limit"),
+        (request(time_limit=math.nan), "time_limit"),
+    ],
+    ids=["mesh", "names", "count", "vertices", "nan", "version", "index", "accuracy", "report", "limit", "nan-limit"],
+)
+def test_bad_requests_are_refused_with_a_reason(node, bad, text):
+    refused, good = ask(node, bad, request())
+    assert not refused.success and text in refused.message, refused.message
+    assert len(refused.contacts.toc) == 0
+    assert good.success, "the node goes on"
+
+
+LARGE = 300  # a million contacts in this step: far longer to compute than small requests and steps take
+
+
+def test_busy_node_refuses_at_once(start_node):
+    node = start_node({"meshes": ["cloth"], "detect_jobs": 1, "detect_waiting": 0})
+    answers = ask(node, *(request(2, n=LARGE) for _ in range(4)))
+    messages = [a.message for a in answers]
+    assert sum(a.success for a in answers) >= 1, messages
+    assert sum(m.startswith("busy: 1 requests") for m in messages) >= 1, messages
+    assert all(a.success or a.message.startswith("busy") for a in answers)
+    (later,) = ask(node, request())
+    assert later.success, "a place is free again"
+
+
+def test_time_limit(node):
+    late, good = ask(node, request(2, n=LARGE, time_limit=0.001), request())
+    assert not late.success and "time limit of 0.001 s" in late.message
+    assert good.success
+    node.wait_until(lambda: node.peer.statuses["service"][2]["open"] == "0", "end of the late computation")
+    assert node.peer.statuses["service"][2]["timed_out"] == "1"
+
+
+def test_stream_goes_on_while_requests_are_computed(node):
+    node.peer.topology("cloth", FACES, N * N)
+    clients = [node.peer.client() for _ in range(2)]
+    futures = [client.call_async(request(2, n=LARGE)) for client in clients]
+    for k in range(5):
+        node.peer.vertices("cloth", sheet_positions(N, k), k)
+        node.contacts(k)
+    assert not all(f.done() for f in futures), "the steps of the stream did not wait for the requests"
+    node.wait_until(lambda: all(f.done() for f in futures), "answers")
+    assert all(f.result().success for f in futures)
+    for k, message in enumerate(node.contacts(4), start=1):
+        assert_same_contacts(message, sheet_positions(N, k - 1), sheet_positions(N, k), scene_of(cloth=FACES))
+
+
+def test_outputs_of_the_node_are_sent(start_node):
+    node = start_node({"meshes": ["cloth"], "outputs": ["points"], "max_contacts": 50})
+    (answer,) = ask(node, request())
+    full = hc.Detector(scene_of(cloth=FACES), accuracy="balanced").detect(sheet_positions(N, 0), sheet_positions(N, 1))
+    assert answer.contacts.truncated and answer.contacts.total == len(full)
+    assert len(answer.contacts.points) == 150 and len(answer.contacts.normals) == 0
