@@ -122,7 +122,7 @@ class BagWriter:
 
     def _open_file(self):
         path = self.path if self.single_file else self.path / f"{self.path.name}_{len(self._files)}.mcap"
-        self._stream = open(path, "xb")  # noqa: SIM115 (closed by _close_file)
+        self._stream = open(path, "xb")
         self._writer = Writer(self._stream, **self._options)
         self._writer.start(profile="ros2", library=f"hpccd {package_version()}")
         # First, so that even a file cut off later can be replayed.

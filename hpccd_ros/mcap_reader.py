@@ -62,7 +62,7 @@ class Recording:
 
     def __init__(self, path):
         self.path = Path(path)
-        self.files = _mcap_files(self.path)
+        self.files = recording_files(self.path)
         self._stack = contextlib.ExitStack()
         self.topics: dict[str, RecordedTopic] = {}
         self.info: dict | None = None
@@ -139,7 +139,8 @@ class Recording:
                 )
 
 
-def _mcap_files(path: Path) -> list[Path]:
+def recording_files(path: Path) -> list[Path]:
+    """The .mcap files of a recording, in order. Raises RecordingError where there is none."""
     if path.is_dir():
         files = sorted(path.glob("*.mcap"), key=_split_number)
         if not files:

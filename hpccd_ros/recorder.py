@@ -15,6 +15,7 @@ from hpccd_ros import _env, mcap_qos, node_parameters, recorded_topics
 from hpccd_ros.errors import UserError
 from hpccd_ros.mcap_bag import BagWriter, Topic
 from hpccd_ros.mcap_decode import message_class
+from hpccd_ros.mesh_attachment import attachment_name
 from hpccd_ros.recorded_topics import Wanted
 from hpccd_ros.version import package_version
 
@@ -115,8 +116,8 @@ def _record(node, target, args, stop) -> int:
         "topics": {node.resolve_topic_name(topic.name): topic.name for topic in wanted},
     }
     try:
-        bag = BagWriter(target, info=info, compression=args.compression, flush_interval=args.flush,
-                        max_bytes=int(args.split_size * 1e6), max_seconds=args.split_time)
+        bag = BagWriter(target, info=info, attachments=_mesh_files(parameters), compression=args.compression,
+                        flush_interval=args.flush, max_bytes=int(args.split_size * 1e6), max_seconds=args.split_time)
     except (ValueError, OSError) as error:
         raise UserError(str(error)) from error
     try:
@@ -187,6 +188,21 @@ def _report(bag, recorder):
     files = bag.file_paths
     where = str(files[0]) if len(files) == 1 else f"{len(files)} files in {bag.path}"
     print(f"recorded {bag.message_count} messages, {bag.size / 1e6:.2f} MB: {where}", flush=True)
+
+
+def _mesh_files(parameters) -> list[tuple[str, bytes]]:
+    """The mesh files that the node was given: without them a replay elsewhere could not rebuild its scene."""
+    found = []
+    for mesh in parameters["meshes"]:
+        path = parameters.get(f"mesh.{mesh}.file")
+        if not path:
+            continue
+        try:
+            found.append((attachment_name(mesh, path), Path(path).expanduser().read_bytes()))
+        except OSError as error:
+            print(f"mesh file {path} is not in the recording ({error.strerror}): a replay will need it at that place",
+                  file=sys.stderr, flush=True)
+    return found
 
 
 def _extra(text) -> Wanted:

@@ -146,7 +146,7 @@ class Replay:
             try:
                 self._scene = self._builder.build(end.topologies)
             except CORE_ERRORS as error:
-                raise RecordingError(f"frame with stamp {end.stamp} ns: the core refuses its meshes: {error}") from error
+                raise RecordingError(f"frame with stamp {end.stamp} ns: the core refuses it: {error}") from error
             self._layout = Layout.of(tuple(m.name for m in self._builder.meshes), end.topologies)
             self._scene_of, self._detector = end, None
         accuracy = self._accuracy or (step.recorded.accuracy if step.recorded is not None else "")

@@ -34,7 +34,7 @@ def difference(recorded, contacts, layout: Layout, any_one: bool = False) -> str
     if recorded.first_toc != contacts.first_toc:
         return f"first time of contact: recorded {recorded.first_toc!r}, now {contacts.first_toc!r}"
     if recorded.hash != contacts.hash:
-        where = "among the contacts that max_contacts cut off" if recorded.truncated else "although all contacts are equal"
+        where = "among the contacts that were cut off" if recorded.truncated else "although all contacts are equal"
         return f"hash {recorded.hash:#018x} was recorded, now it is {contacts.hash:#018x}, {where}"
     return None
 

@@ -96,7 +96,8 @@ class Summary:
 
     def print(self, args, recording, replay) -> None:
         wall = time.perf_counter() - self.began
-        print(f"{recording.path}: {replay.frames:,} frames, {self.computed:,} steps computed, {self.contacts:,} contacts")
+        print(f"{recording.path}: {replay.frames:,} frames, {self.computed:,} steps computed, "
+              f"{self.contacts:,} contacts")
         if self.computed:
             print(f"  {wall:.2f} s ({self.milliseconds / self.computed:.2f} ms a step in the core) for "
                   f"{self.seconds_recorded:.2f} s of motion; {args.threads or os.cpu_count()} threads")

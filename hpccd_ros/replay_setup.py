@@ -11,6 +11,7 @@ from hpccd_ros import parameters as table
 from hpccd_ros.detection import Options, SceneBuilder
 from hpccd_ros.errors import UserError
 from hpccd_ros.mcap_reader import Recording, RecordingError
+from hpccd_ros.mesh_attachment import attachment_name
 from hpccd_ros.mesh_file import MeshFileError, load_mesh, place
 from hpccd_ros.messages import MeshFrame, MeshSettings, Topology
 
@@ -76,11 +77,6 @@ def of_recording(recording: Recording, parameter_file: str | None = None) -> Rep
             f"{', '.join(recording.topics) or 'none'}"
         )
     return ReplaySetup(settings, meshes, roles, contacts, _files(recording, meshes))
-
-
-def attachment_name(mesh: str, path: str) -> str:
-    """Name under which the recorder stores the file of a mesh; the suffix tells its format."""
-    return f"mesh/{mesh}/{Path(path).name}"
 
 
 def _files(recording, meshes):

@@ -19,7 +19,8 @@ def configure(parser):
     which.add_argument("--every", type=int, metavar="K", help="each K-th step, into a folder")
     parser.add_argument("--azimuth", type=float, default=-60.0, metavar="DEG",
                         help="from where to look, around z (default: %(default)s)")
-    parser.add_argument("--elevation", type=float, default=26.0, metavar="DEG", help="and from how high (default: %(default)s)")
+    parser.add_argument("--elevation", type=float, default=26.0, metavar="DEG",
+                        help="and from how high (default: %(default)s)")
     parser.add_argument("--title", help="default: the name of the file")
     parser.add_argument("--params", metavar="YAML", help="node parameters, instead of those in the recording")
 

@@ -33,7 +33,7 @@ def main(args) -> int:
     if "ROS_DOMAIN_ID" not in os.environ:
         # A domain of its own: neither the nodes that run here already nor a second demo can mix with it.
         os.environ["ROS_DOMAIN_ID"] = str(1 + os.getpid() % 100)
-    console = Console(highlight=False)
+    console = Console(highlight=False, soft_wrap=True)
     scene = _scene(args)
     say = console.print
     say(f"[bold]scene[/]      {scene.title}\n           "
@@ -41,7 +41,7 @@ def main(args) -> int:
         + f"; {scene.n_frames} frames at {args.rate:g} a second")
     files.write_parameters(scene, folder / PARAMETERS)
     _stream(args, scene, folder, console)
-    worst = _verify_and_draw(args, folder, console)
+    worst = _verify_and_draw(args, scene, folder, console)
     _last_words(folder, console, worst)
     return 0
 
@@ -68,7 +68,8 @@ def _stream(args, scene, folder, console):
                             "another ROS_DOMAIN_ID")
         node = children.start(
             "node", "hpccd_ros.node", "--ros-args", "--params-file", str(folder / PARAMETERS),
-            "-p", f"accuracy:={args.accuracy}", "-p", f"threads:={args.threads}", "-p", "diagnostics_period:=0.25",
+            "-p", f"threads:={args.threads}", "-p", "diagnostics_period:=0.25",
+            *(["-p", f"accuracy:={args.accuracy}"] if args.accuracy else []),
         )  # fmt: skip
         recorder = children.start(
             "recorder", "hpccd_ros.cli", "record", "-o", str(folder / RECORDING), "--compression", args.compression,
@@ -119,7 +120,7 @@ def _state(monitor) -> str:
     return f"{monitor.contacts:,} contacts, {first}{core}, {monitor.dropped} dropped"
 
 
-def _verify_and_draw(args, folder, console):
+def _verify_and_draw(args, scene, folder, console):
     from hpccd_ros.picture.of_recording import History, draw_step
 
     history, worst = History(), None
@@ -132,10 +133,11 @@ def _verify_and_draw(args, folder, console):
             if worst is None or step.total > worst.total:
                 worst = step
     if replay.diverged:
-        raise UserError(f"the recording computes to other contacts than the node sent: {replay.first_divergence.difference}")
+        raise UserError("computed again from the recording, the contacts differ from those that the node sent: "
+                        f"{replay.first_divergence.difference}")
     console.print(f"[bold]verified[/]   {replay.verified} recorded answers, computed again from the file: all equal")
     console.print("[bold]picture[/]    rendering the frame with most contacts ...")
-    draw_step(worst, folder / PICTURE, history, title=args.scene)
+    draw_step(worst, folder / PICTURE, history, title=scene.title)
     return worst
 
 

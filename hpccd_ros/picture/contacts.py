@@ -5,9 +5,8 @@ import dataclasses
 from pathlib import Path
 
 import numpy as np
-from matplotlib import colormaps
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.colors import to_rgb
+from matplotlib.colors import LinearSegmentedColormap, to_rgb
 from matplotlib.figure import Figure
 
 from hpccd_ros.picture.camera import Camera
@@ -17,18 +16,24 @@ from hpccd_ros.picture.shading import shade
 BACKGROUND = "#10141c"
 INK = "#e8ecf4"
 FAINT = "#8a93a6"
-# Calm colours that leave yellow to red to the contacts.
-MESH_COLOURS = ("#5f87b8", "#c9ced8", "#6f9f91", "#9886b5", "#8fa3b8", "#a0937d")
-TOC_COLOURS = colormaps["plasma_r"]
+# Calm colours that leave yellow, red and violet to the contacts.
+MESH_COLOURS = ("#56759f", "#c3c9d4", "#5f8f83", "#7f8aa8", "#8fa3b8", "#a0937d")
+# From the start of the step to its end; light enough at both ends to be seen on any of the above.
+TOC_COLOURS = LinearSegmentedColormap.from_list("toc", ["#fff38a", "#ffb52e", "#ff5f45", "#f03fa0", "#b46bff"])
 SUPERSAMPLING = 2
+TINT = 0.62
 LIGHT = np.array([0.35, -0.55, 1.25])
 
 
 @dataclasses.dataclass
 class Step:
-    """What is drawn. Vertices and faces of each mesh at the end of the step; contacts at their points (N,3)."""
+    """What is drawn. Vertices and faces of each mesh in the middle of the step; contacts at their points (N,3).
+
+    touched: (V,) earliest time of contact of each vertex, all meshes one after the other; inf where it has none.
+    """
 
     meshes: list[tuple[str, np.ndarray, np.ndarray]]
+    touched: np.ndarray
     points: np.ndarray
     toc: np.ndarray
     n_vertex_face: int
@@ -48,7 +53,7 @@ class History:
 
 def draw(step: Step, path, history: History | None = None, *, azimuth=-60.0, elevation=26.0, size=(1280, 860)):
     """Write the picture of `step` to `path` (PNG, or another format that matplotlib writes, by its suffix)."""
-    image, camera, depth = render(step.meshes, size, azimuth, elevation)
+    image, camera, depth = render(step.meshes, step.touched, size, azimuth, elevation)
     figure = Figure(figsize=(16, 9), dpi=120, facecolor=BACKGROUND)
     FigureCanvasAgg(figure)
     axes = figure.add_axes((0.0, 0.13, 0.80, 0.77))
@@ -60,13 +65,15 @@ def draw(step: Step, path, history: History | None = None, *, azimuth=-60.0, ele
     figure.savefig(Path(path), facecolor=BACKGROUND)
 
 
-def render(meshes, size, azimuth, elevation):
+def render(meshes, touched, size, azimuth, elevation):
     """(image (h,w,4) sRGB with alpha, camera, depth (h,w)) of meshes [(name, vertices, faces)]."""
     vertices = np.concatenate([np.asarray(v, dtype=np.float64) for _, v, _ in meshes])
     offsets = np.cumsum([0] + [len(v) for _, v, _ in meshes])
     faces = np.concatenate([np.asarray(f, dtype=np.int64) + o for (_, _, f), o in zip(meshes, offsets, strict=False)])
-    owner = np.repeat(np.arange(len(meshes)), [len(f) for _, _, f in meshes])
+    owner = np.repeat(np.arange(len(meshes)), np.diff(offsets))
     colours = np.array([_linear(to_rgb(MESH_COLOURS[i % len(MESH_COLOURS)])) for i in range(len(meshes))])[owner]
+    glow, weight = _glow(touched, faces)
+    colours = (1 - TINT * weight[:, None]) * colours + TINT * glow
     large = (size[0] * SUPERSAMPLING, size[1] * SUPERSAMPLING)
     camera = Camera(vertices, large, azimuth, elevation)
     buffers = rasterize(camera.project(vertices)[faces], large)
@@ -82,6 +89,22 @@ def render(meshes, size, azimuth, elevation):
     return np.concatenate([rgb, alpha], axis=2), camera, buffers.depth
 
 
+def _glow(touched, faces):
+    """(V,3) colour times weight, and (V,) weight 0..1 of a tint around the contacts, so that contacts between layers
+    show on the outside of the layers. Spread twice over the edges, or single vertices would make stars."""
+    contact = np.isfinite(touched)
+    values = np.zeros((len(touched), 4))
+    values[contact, :3] = _linear(TOC_COLOURS(touched[contact])[:, :3])
+    values[contact, 3] = 1.0
+    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    a, b = np.concatenate([edges, edges[:, ::-1]]).T
+    degree = np.maximum(np.bincount(a, minlength=len(touched)), 1)[:, None]
+    for _ in range(2):
+        around = np.stack([np.bincount(a, values[b, k], minlength=len(touched)) for k in range(4)], axis=1) / degree
+        values = 0.5 * (values + around)
+    return values[:, :3], values[:, 3]
+
+
 def _draw_scene(axes, image, camera, depth, step):
     axes.imshow(image, extent=(0, image.shape[1], image.shape[0], 0), interpolation="lanczos")
     axes.set_axis_off()
@@ -93,13 +116,15 @@ def _draw_scene(axes, image, camera, depth, step):
     span = np.ptp(depth[np.isfinite(depth)])
     hidden = seen[:, 2] > depth[row, column] + 0.01 * span
     x, y = seen[:, 0] / SUPERSAMPLING, seen[:, 1] / SUPERSAMPLING
-    size = float(np.clip(9000 / len(x), 3.0, 60.0))
+    size = float(np.clip(7000 / len(x), 2.5, 40.0))
     late_first = np.argsort(-step.toc, kind="stable")
-    for these, alpha, scale in ((hidden, 0.28, 0.5), (~hidden, 1.0, 1.0)):
-        index = late_first[these[late_first]]
+    for index, alpha, scale in (
+        (late_first[hidden[late_first]], 0.45, 0.5),
+        (late_first[~hidden[late_first]], 1.0, 1.0),
+    ):
         colours = TOC_COLOURS(step.toc[index])
         if scale == 1.0:
-            axes.scatter(x[index], y[index], s=size * 5, c=colours, alpha=0.10, linewidths=0)
+            axes.scatter(x[index], y[index], s=size * 6, c=colours, alpha=0.12, linewidths=0)
         axes.scatter(x[index], y[index], s=size * scale, c=colours, alpha=alpha, linewidths=0)
 
 
@@ -120,6 +145,8 @@ def _draw_times(axes, step):
     axes.yaxis.tick_right()
     axes.set_yticks([0, 0.25, 0.5, 0.75, 1], ["0  start", "¼", "½", "¾", "1  end"])
     axes.set_xlabel("contacts", color=FAINT, fontsize=9)
+    note = "surfaces in the middle of the step,\nfaint points lie behind them"
+    axes.text(0.5, -0.19, note, transform=axes.transAxes, ha="center", va="top", color=FAINT, fontsize=8.5)
     _style(axes)
 
 
@@ -131,7 +158,7 @@ def _draw_history(axes, history):
     axes.set_xlim(history.frames[0], history.frames[-1])
     axes.set_ylim(0, max(1, history.contacts.max() * 1.1))
     axes.set_ylabel("contacts", color="#e0668c", fontsize=9)
-    axes.set_xlabel("frame", color=FAINT, fontsize=9, labelpad=1)
+    axes.set_xlabel("step", color=FAINT, fontsize=9, labelpad=1)
     _style(axes)
     if history.milliseconds is not None:
         times = axes.twinx()

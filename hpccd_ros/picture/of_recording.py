@@ -21,24 +21,30 @@ class History:
 
 def draw_step(step: Step, path, history: History | None = None, *, title: str, **view) -> None:
     """Write a picture of `step`, which was computed with outputs=("points",). view: azimuth, elevation, size."""
-    found, frame = step.contacts, step.end_frame
+    found, start, end = step.contacts, step.start_frame, step.end_frame
+    # In the middle of the step, so that contacts at any time of it lie close to the surfaces.
     meshes = [
-        (name, vertices, topology.faces)
-        for name, vertices, topology in zip(step.layout.mesh_names, frame.vertices, frame.topologies, strict=True)
+        (name, 0.5 * (np.asarray(v0, np.float64) + v1), topology.faces)
+        for name, v0, v1, topology in zip(
+            step.layout.mesh_names, start.vertices, end.vertices, end.topologies, strict=True
+        )
     ]
     triangles = sum(len(faces) for _, _, faces in meshes)
     accuracy = f"accuracy {step.recorded.accuracy}" if step.recorded is not None else None
     first = f"first at t = {found.first_toc:.4f}" if step.total else None
+    of = f" of {max(history.steps)}" if history is not None else ""
     facts = [
+        title,
         f"{triangles:,} triangles", f"{len(found.vf):,} vertex-face", f"{len(found.ee):,} edge-edge", first,
         f"{step.milliseconds:.1f} ms", accuracy, f"hash {found.hash:016x}",
     ]  # fmt: skip
     drawn = picture.Step(
         meshes,
+        _touched(found, meshes, step.layout.vertex_offsets),
         np.asarray(found.points),
         np.concatenate([found.vf_toc, found.ee_toc]),
         len(found.vf),
-        f"{title}: {step.total:,} contacts in step {step.step}",
+        f"{step.total:,} contact{'' if step.total == 1 else 's'} in step {step.step}" + of,
         [fact for fact in facts if fact],
     )
     context = None
@@ -47,3 +53,16 @@ def draw_step(step: Step, path, history: History | None = None, *, title: str, *
             np.array(history.steps), np.array(history.contacts), np.array(history.milliseconds), step.step
         )
     picture.draw(drawn, path, context, **view)
+
+
+def _touched(found, meshes, offsets):
+    """(V,) earliest time of contact of each vertex: its own, that of an edge it ends, or of a face around it."""
+    faces = np.concatenate([np.asarray(f, np.int64) + o for (_, _, f), o in zip(meshes, offsets, strict=False)])
+    earliest = np.full(offsets[-1], np.inf)
+    for vertices, toc in (
+        (found.vf[:, :1], found.vf_toc),
+        (faces[found.vf[:, 1]], found.vf_toc),
+        (found.ee, found.ee_toc),
+    ):
+        np.minimum.at(earliest, vertices, toc[:, None])
+    return earliest

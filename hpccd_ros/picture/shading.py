@@ -25,7 +25,7 @@ def vertex_normals(vertices, faces):
 def shade(buffers, camera, vertices, faces, colours, light):
     """(height, width, 3) linear colours of what `buffers` see, 0 where they see nothing.
 
-    colours: (F,3) linear. light: direction towards the key light.
+    colours: (V,3) linear. light: direction towards the key light.
     """
     vertices = vertices.astype(np.float32)
     seen = buffers.triangle >= 0
@@ -49,7 +49,7 @@ def shade(buffers, camera, vertices, faces, colours, light):
     sky = 0.34 + 0.18 * normal[:, 2] + 0.10 * rim
     sun = 0.80 * np.clip(normal @ light, 0, 1) * lit
     energy = (sky * crease)[:, None] * SKY + (sun * (0.45 + 0.55 * crease))[:, None] * SUN
-    base = colours.astype(np.float32)[triangle] * np.where(back, np.float32(0.72), np.float32(1.0))[:, None]
+    base = _interpolate(colours, faces, triangle, weights) * np.where(back, np.float32(0.72), np.float32(1.0))[:, None]
     image = np.zeros((*buffers.depth.shape, 3), dtype=np.float32)
     image[seen] = base * energy + (0.10 * gloss * lit)[:, None]
     return image
