@@ -16,7 +16,7 @@ struct Detector::Impl {
         workers(static_cast<std::size_t>(pool.size())) {
     options.simd = resolve(o.simd);
     options.threads = pool.size();
-    search.batch_test = batch_test(options.simd);
+    for (int a = 0; a < 4; ++a) search.batch_test[a] = batch_test(options.simd, static_cast<Accuracy>(a));
     search.leaf_pairs = leaf_pairs(options.simd);
     search.report = o.report;
   }
@@ -95,7 +95,7 @@ Contacts Detector::detect(Positions t0, Positions t1) {
   d.motion.take(t0, t1, d.pool);
   d.profiler.mark("bounds");
   d.update_tree();
-  d.search.geometry = {d.motion.rows.data(), d.features.edges.data(), d.features.faces.data()};
+  d.search.geometry = {d.motion.rows.data(), d.features.edges.data(), d.features.faces.data(), d.motion.map.scale};
   d.search.earliest = std::numeric_limits<double>::infinity();
   traverse(d.tree, d.rules, d.search, d.pool, d.workers);
   double elementary = 0;

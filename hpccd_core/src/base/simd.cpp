@@ -10,15 +10,18 @@ namespace hpccd {
 
 namespace scalar {
 void run(const Geometry&, Kind, const std::uint32_t*, const std::uint32_t*, std::uint32_t, BatchResult&);
+void run_fast(const Geometry&, Kind, const std::uint32_t*, const std::uint32_t*, std::uint32_t, BatchResult&);
 void leaf_pairs(const Tree&, const LeafRange&, const LeafRange&, CandidateBuffer&, CandidateBuffer&);
 }  // namespace scalar
 #if defined(HPCCD_X86)
 namespace avx2 {
 void run(const Geometry&, Kind, const std::uint32_t*, const std::uint32_t*, std::uint32_t, BatchResult&);
+void run_fast(const Geometry&, Kind, const std::uint32_t*, const std::uint32_t*, std::uint32_t, BatchResult&);
 void leaf_pairs(const Tree&, const LeafRange&, const LeafRange&, CandidateBuffer&, CandidateBuffer&);
 }  // namespace avx2
 namespace avx512 {
 void run(const Geometry&, Kind, const std::uint32_t*, const std::uint32_t*, std::uint32_t, BatchResult&);
+void run_fast(const Geometry&, Kind, const std::uint32_t*, const std::uint32_t*, std::uint32_t, BatchResult&);
 void leaf_pairs(const Tree&, const LeafRange&, const LeafRange&, CandidateBuffer&, CandidateBuffer&);
 }  // namespace avx512
 #endif
@@ -52,13 +55,14 @@ Simd resolve(Simd wanted) {
   return wanted;
 }
 
-BatchTest batch_test(Simd simd) {
+BatchTest batch_test(Simd simd, Accuracy accuracy) {
+  const bool fast = accuracy == Accuracy::fast;
 #if defined(HPCCD_X86)
-  if (simd == Simd::avx512) return avx512::run;
-  if (simd == Simd::avx2) return avx2::run;
+  if (simd == Simd::avx512) return fast ? avx512::run_fast : avx512::run;
+  if (simd == Simd::avx2) return fast ? avx2::run_fast : avx2::run;
 #endif
   (void)simd;
-  return scalar::run;
+  return fast ? scalar::run_fast : scalar::run;
 }
 
 LeafPairs leaf_pairs(Simd simd) {

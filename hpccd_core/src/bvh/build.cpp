@@ -184,20 +184,25 @@ class Builder {
       if (const auto c = tree_.nodes[i].children)
         tree_.nodes[i].carriers = tree_.nodes[c].carriers + tree_.nodes[c + 1].carriers;
 
+    // Room behind the last slot, so that a full vector can be loaded anywhere.
     const auto pad = Tree::load_width;
+    const auto n_faces = tree_.face_of_slot.size(), n_edges = tree_.edge_of_slot.size(),
+               n_vertices = tree_.vertex_of_slot.size();
     for (int k = 0; k < 3; ++k) {
-      tree_.face_corners[k].assign(tree_.face_of_slot.size() + pad, 0);
-      for (std::size_t s = 0; s < tree_.face_of_slot.size(); ++s)
+      tree_.face_corners[k].assign(n_faces + pad, 0);
+      for (std::size_t s = 0; s < n_faces; ++s)
         tree_.face_corners[k][s] = features_.faces[tree_.face_of_slot[s]][k];
     }
     for (int k = 0; k < 2; ++k) {
-      tree_.edge_ends[k].assign(tree_.edge_of_slot.size() + pad, 0);
-      for (std::size_t s = 0; s < tree_.edge_of_slot.size(); ++s)
-        tree_.edge_ends[k][s] = features_.edges[tree_.edge_of_slot[s]][k];
+      tree_.edge_ends[k].assign(n_edges + pad, 0);
+      for (std::size_t s = 0; s < n_edges; ++s) tree_.edge_ends[k][s] = features_.edges[tree_.edge_of_slot[s]][k];
     }
-    tree_.face_boxes.resize(tree_.face_of_slot.size() + pad);
-    tree_.edge_boxes.resize(tree_.edge_of_slot.size() + pad);
-    tree_.vertex_boxes.resize(tree_.vertex_of_slot.size() + pad);
+    tree_.face_of_slot.resize(n_faces + pad);
+    tree_.edge_of_slot.resize(n_edges + pad);
+    tree_.vertex_of_slot.resize(n_vertices + pad);
+    tree_.face_boxes.resize(n_faces + pad);
+    tree_.edge_boxes.resize(n_edges + pad);
+    tree_.vertex_boxes.resize(n_vertices + pad);
   }
 
   Tree& tree_;

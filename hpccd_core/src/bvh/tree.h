@@ -22,7 +22,7 @@ struct Node {
   std::uint32_t carriers = 0;  // in the whole subtree
 };
 
-// Boxes of features in the order of the leaves. Arrays end with room for one full vector load.
+// Boxes of features in the order of the leaves.
 struct BoxArrays {
   std::vector<float> low[3], high[3];
   void resize(std::size_t n) {
@@ -44,7 +44,7 @@ struct Tree {
   std::vector<Node> nodes;             // breadth first: children come after their parents
   std::vector<LeafRange> leaves;
   std::vector<std::uint32_t> leaf_nodes;
-  // Slots: features in the order of the leaves.
+  // Slots: features in the order of the leaves; each array ends with load_width slots of padding.
   std::vector<std::uint32_t> face_of_slot, edge_of_slot, vertex_of_slot;
   std::vector<std::uint32_t> face_corners[3], edge_ends[2];  // vertex numbers by slot
   BoxArrays face_boxes, edge_boxes, vertex_boxes;

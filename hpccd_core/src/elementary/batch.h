@@ -18,6 +18,7 @@ struct Geometry {
   const VertexRow* vertices;
   const std::array<std::uint32_t, 2>* edges;
   const std::array<std::uint32_t, 3>* faces;
+  double scale = 1;  // power of two that brings the scene to about one; only single precision needs it
 };
 
 inline constexpr std::uint32_t batch_capacity = 1024;
@@ -44,7 +45,7 @@ struct BatchResult {
 using BatchTest = void (*)(const Geometry&, Kind, const std::uint32_t* first, const std::uint32_t* second,
                            std::uint32_t n, BatchResult&);
 
-// Never Simd::automatic.
-BatchTest batch_test(Simd simd);
+// Never Simd::automatic. "fast" has a test of its own; the other tiers share one and differ in their last resort.
+BatchTest batch_test(Simd simd, Accuracy accuracy);
 
 }  // namespace hpccd

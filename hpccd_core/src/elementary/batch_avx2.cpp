@@ -2,6 +2,7 @@
 #include "base/lanes.h"
 #define HPCCD_ISA avx2
 namespace hpccd::HPCCD_ISA {
-using Real = Lanes<double, 4>;
+using Double = Lanes<double, 4>;
+using Single = Lanes<float, 8>;
 }
 #include "elementary/batch.inl"

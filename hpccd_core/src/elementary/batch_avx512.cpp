@@ -2,6 +2,7 @@
 #include "base/lanes.h"
 #define HPCCD_ISA avx512
 namespace hpccd::HPCCD_ISA {
-using Real = Lanes<double, 8>;
+using Double = Lanes<double, 8>;
+using Single = Lanes<float, 16>;
 }
 #include "elementary/batch.inl"

@@ -2,6 +2,7 @@
 #include "base/lanes.h"
 #define HPCCD_ISA scalar
 namespace hpccd::HPCCD_ISA {
-using Real = double;
+using Double = double;
+using Single = float;
 }
 #include "elementary/batch.inl"

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "elementary/coplanarity.h"
+#include "elementary/policy.h"
 
 namespace hpccd {
 
@@ -32,7 +33,7 @@ HPCCD_HD void require_between(Verdict<R>& all, R x, R n, R error) {
 //
 // Bounds: interpolated coordinates carry 4 roundings, a component of a cross product two products of 10: 20 u MM; it
 // moves by at most 8 MM per unit of time. What is left of 24 u and 9 delta covers the roundings of sums.
-template <Kind kind, class R>
+template <Kind kind, class Policy, class R>
 HPCCD_HD Verdict<R> inside(const Motion<R>& m, const Magnitudes<R>& size, R t, R delta) {
   const Vec3<R> p = interpolate(m.p0, m.p1, t), a = interpolate(m.a0, m.a1, t), b = interpolate(m.b0, m.b1, t);
   const Vec3<R> ab = cross(a, b), pb = cross(p, b), ap = cross(a, p);
@@ -44,9 +45,10 @@ HPCCD_HD Verdict<R> inside(const Motion<R>& m, const Magnitudes<R>& size, R t, R
   const R signed_n = component(ab);
   const R sign = select(signed_n < R(0), R(-1), R(1));
   const R n = sign * signed_n, alpha = sign * component(pb), beta = sign * component(ap);
-  const R relative = R(24 * half_ulp<R>()) + R(9) * delta;
+  const R relative = Policy::borders_inside ? R(-24 * Policy::bound * half_ulp<R>())
+                                            : R(24 * half_ulp<R>()) + R(9) * delta;
   const R e_n = relative * size.a * size.b, e_alpha = relative * size.p * size.b, e_beta = relative * size.a * size.p;
-  Verdict<R> v{n > e_n, R(1) < R(0)};
+  Verdict<R> v{n > magnitude(e_n), R(1) < R(0)};
   if constexpr (kind == Kind::vertex_face) {
     require_between(v, alpha, n, e_n + e_alpha);
     require_between(v, beta, n, e_n + e_beta);
@@ -55,6 +57,7 @@ HPCCD_HD Verdict<R> inside(const Motion<R>& m, const Magnitudes<R>& size, R t, R
     require_between(v, alpha, n, e_n + e_alpha);
     require_between(v, R(0) - beta, n, e_n + e_beta);
   }
+  if constexpr (Policy::borders_inside) v.no = n > magnitude(e_n) && !v.yes;
   return v;
 }
 

@@ -8,7 +8,8 @@ namespace hpccd {
 
 std::optional<double> last_resort(Accuracy accuracy, Kind kind, const Vec3<double> q_t0[4],
                                   const Vec3<double> q_t1[4]) {
-  if (accuracy != Accuracy::balanced) return exact::earliest_contact(kind, q_t0, q_t1);
+  if (accuracy == Accuracy::conservative || accuracy == Accuracy::exact)
+    return exact::earliest_contact(kind, q_t0, q_t1);
   const tolerant::Answer a =
       kind == Kind::vertex_face
           ? tolerant::decide<Kind::vertex_face>(motion_of<Kind::vertex_face>(q_t0, q_t1))

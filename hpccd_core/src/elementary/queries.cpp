@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Single queries through the same batches and last resorts as whole scenes.
 #include <algorithm>
+#include <cmath>
 #include <memory>
 #include <vector>
 
@@ -13,8 +14,16 @@ namespace {
 
 Vec3<double> point(const Query& q, int row) { return {q[3 * row], q[3 * row + 1], q[3 * row + 2]}; }
 
+// Brings the largest coordinate to about one.
+double power_of_two_scale(std::span<const Query> queries) {
+  double most = 0;
+  for (const Query& q : queries)
+    for (double x : q) most = std::max(most, std::fabs(x));
+  return most > 0 ? std::ldexp(1.0, -std::clamp(std::ilogb(most), -1000, 1000)) : 1;
+}
+
 void test_queries(Kind kind, std::span<const Query> queries, Accuracy accuracy, Simd simd, bool* hit, double* toc) {
-  const BatchTest test = batch_test(resolve(simd));
+  const BatchTest test = batch_test(resolve(simd), accuracy);
   auto result = std::make_unique<BatchResult>();
   std::vector<VertexRow> rows(4 * batch_capacity);
   std::vector<std::array<std::uint32_t, 2>> edges(2 * batch_capacity);
@@ -27,7 +36,7 @@ void test_queries(Kind kind, std::span<const Query> queries, Accuracy accuracy, 
     first[i] = kind == Kind::vertex_face ? 4 * i : 2 * i;
     second[i] = kind == Kind::vertex_face ? i : 2 * i + 1;
   }
-  const Geometry geometry{rows.data(), edges.data(), faces.data()};
+  Geometry geometry{rows.data(), edges.data(), faces.data()};
   for (std::size_t begin = 0; begin < queries.size(); begin += batch_capacity) {
     const auto n = static_cast<std::uint32_t>(std::min<std::size_t>(queries.size() - begin, batch_capacity));
     for (std::uint32_t i = 0; i < n; ++i)
@@ -36,6 +45,7 @@ void test_queries(Kind kind, std::span<const Query> queries, Accuracy accuracy, 
           rows[4 * i + row].t0[k] = queries[begin + i][3 * row + k];
           rows[4 * i + row].t1[k] = queries[begin + i][12 + 3 * row + k];
         }
+    geometry.scale = power_of_two_scale(queries.subspan(begin, n));
     test(geometry, kind, first.data(), second.data(), n, *result);
     std::fill_n(hit + begin, n, false);
     std::fill_n(toc + begin, n, std::numeric_limits<double>::infinity());

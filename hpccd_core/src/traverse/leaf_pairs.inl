@@ -89,27 +89,42 @@ HPCCD_HD unsigned lanes_in(std::uint32_t i, std::uint32_t begin, std::uint32_t e
   return m;
 }
 
+// Appends the pairs of `number` with those of the 16 features from `others` on that are in m.
+template <bool ascending>
+HPCCD_HD void append(CandidateBuffer& out, std::uint32_t number, const std::uint32_t* others, unsigned m) {
+#if defined(__AVX512F__)
+  const __m512i x = _mm512_set1_epi32(static_cast<int>(number)), y = _mm512_loadu_si512(others);
+  const auto lanes = static_cast<__mmask16>(m);
+  _mm512_storeu_si512(out.first + out.n, _mm512_maskz_compress_epi32(lanes, ascending ? _mm512_min_epu32(x, y) : x));
+  _mm512_storeu_si512(out.second + out.n, _mm512_maskz_compress_epi32(lanes, ascending ? _mm512_max_epu32(x, y) : y));
+  out.n += static_cast<unsigned>(__builtin_popcount(m));
+#else
+  for (; m; m &= m - 1) {
+    const std::uint32_t other = others[__builtin_ctz(m)];
+    const bool swapped = ascending && other < number;
+    out.first[out.n] = swapped ? other : number;
+    out.second[out.n++] = swapped ? number : other;
+  }
+#endif
+}
+
 HPCCD_HD void edge_pairs(const Tree& tree, const LeafRange& a, const LeafRange& b, bool same, const Box& box_b,
                          CandidateBuffer& out) {
   const Boxes boxes = pointers(tree.edge_boxes);
   const std::uint32_t *end0 = tree.edge_ends[0].data(), *end1 = tree.edge_ends[1].data();
   const std::uint32_t* edge = tree.edge_of_slot.data();
-  for (std::uint32_t s = a.first_edge; s < a.end_edge; ++s) {
-    const Box box = box_at(boxes, s);
-    if (!overlap(box, box_b)) continue;
-    const std::uint32_t v0 = end0[s], v1 = end1[s], number = edge[s];
-    const std::uint32_t begin = same ? s + 1 : b.first_edge;
-    for (std::uint32_t i = begin; i < b.end_edge; i += 16) {
-      unsigned m = overlapping(boxes, i, box) & lanes_in(i, begin, b.end_edge);
-      if (!m) continue;
-      m &= ~(equal(end0, i, v0) | equal(end0, i, v1) | equal(end1, i, v0) | equal(end1, i, v1));
-      for (; m; m &= m - 1) {
-        const std::uint32_t other = edge[i + static_cast<unsigned>(__builtin_ctz(m))];
-        out.first[out.n] = number < other ? number : other;
-        out.second[out.n++] = number < other ? other : number;
+  for (std::uint32_t group = a.first_edge; group < a.end_edge; group += 16)
+    for (unsigned near = overlapping(boxes, group, box_b) & lanes_in(group, group, a.end_edge); near; near &= near - 1) {
+      const std::uint32_t s = group + static_cast<unsigned>(__builtin_ctz(near));
+      const Box box = box_at(boxes, s);
+      const std::uint32_t v0 = end0[s], v1 = end1[s];
+      const std::uint32_t begin = same ? s + 1 : b.first_edge;
+      for (std::uint32_t i = begin; i < b.end_edge; i += 16) {
+        unsigned m = overlapping(boxes, i, box) & lanes_in(i, begin, b.end_edge);
+        m &= ~(equal(end0, i, v0) | equal(end0, i, v1) | equal(end1, i, v0) | equal(end1, i, v1));
+        append<true>(out, edge[s], edge + i, m);
       }
     }
-  }
 }
 
 // Vertices of a against faces of b.
@@ -120,20 +135,18 @@ HPCCD_HD void vertex_face_pairs(const Tree& tree, const LeafRange& a, const Leaf
   const std::uint32_t* face = tree.face_of_slot.data();
   const std::uint32_t *c0 = tree.face_corners[0].data(), *c1 = tree.face_corners[1].data(),
                       *c2 = tree.face_corners[2].data();
-  for (std::uint32_t s = a.first_vertex; s < a.end_vertex; ++s) {
-    const Box box = box_at(vertex_boxes, s);
-    if (!overlap(box, box_b)) continue;
-    const std::uint32_t v = vertex[s];
-    for (std::uint32_t i = b.first_face; i < b.end_face; i += 16) {
-      unsigned m = overlapping(boxes, i, box) & lanes_in(i, i, b.end_face);
-      if (!m) continue;
-      m &= ~(equal(c0, i, v) | equal(c1, i, v) | equal(c2, i, v));
-      for (; m; m &= m - 1) {
-        out.first[out.n] = v;
-        out.second[out.n++] = face[i + static_cast<unsigned>(__builtin_ctz(m))];
+  for (std::uint32_t group = a.first_vertex; group < a.end_vertex; group += 16)
+    for (unsigned near = overlapping(vertex_boxes, group, box_b) & lanes_in(group, group, a.end_vertex); near;
+         near &= near - 1) {
+      const std::uint32_t s = group + static_cast<unsigned>(__builtin_ctz(near));
+      const Box box = box_at(vertex_boxes, s);
+      const std::uint32_t v = vertex[s];
+      for (std::uint32_t i = b.first_face; i < b.end_face; i += 16) {
+        unsigned m = overlapping(boxes, i, box) & lanes_in(i, i, b.end_face);
+        m &= ~(equal(c0, i, v) | equal(c1, i, v) | equal(c2, i, v));
+        append<false>(out, v, face + i, m);
       }
     }
-  }
 }
 
 }  // namespace

@@ -67,7 +67,7 @@ void Worker::test(const std::uint32_t* first, const std::uint32_t* second, std::
   BatchResult& r = *result_;
   BatchCounts& count = counts[kind == Kind::edge_edge];
   r.counts = count;
-  search_->batch_test(search_->geometry, kind, first, second, n, r);
+  search_->batch_test[static_cast<int>(accuracy)](search_->geometry, kind, first, second, n, r);
   count = r.counts;
   for (std::uint32_t i = 0; i < r.n_contacts; ++i) {
     // "conservative" promises never to be late.

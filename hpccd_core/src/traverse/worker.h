@@ -21,7 +21,7 @@ struct Found {
 // What all threads share during one call.
 struct Search {
   Geometry geometry;
-  BatchTest batch_test;
+  BatchTest batch_test[4];  // by accuracy
   LeafPairs leaf_pairs;
   Report report;
   std::atomic<double> earliest;  // best time so far, where report is first

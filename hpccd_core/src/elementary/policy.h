@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+// How sure an answer of the floating-point tests must be.
+#pragma once
+
+namespace hpccd {
+
+// By the bounds of worst-case rounding. A time of contact is accepted only where it is known to 9e-13: the contract
+// promises 1e-12.
+struct Proven {
+  static constexpr double bound = 1, toc_radius = 9e-13;
+  static constexpr bool borders_inside = false, trust_roots = false;
+};
+
+// By typical rounding, a sixteenth of the bounds; borders count as inside and a time is taken as it comes: for the tier
+// that promises nothing.
+struct Likely {
+  static constexpr double bound = 1.0 / 16, toc_radius = 1;
+  static constexpr bool borders_inside = true, trust_roots = true;
+};
+
+}  // namespace hpccd
