@@ -13,7 +13,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from .differential import Batch, Tally, add_batch, batches, new_tallies
+from .differential import Batch, Tally, add_batch, batches, new_tallies, usable_simd
 
 ACCURACIES = ("fast", "balanced", "conservative", "exact")
 
@@ -21,6 +21,7 @@ ACCURACIES = ("fast", "balanced", "conservative", "exact")
 def main(arguments: list[str] | None = None) -> int:
     a = _parser().parse_args(arguments)
     console = Console()
+    simd = usable_simd()
     tallies = new_tallies()
     source = _replayed(a.replay) if a.replay else batches(a.seed, a.batch)
     goal = None if a.replay else a.count or a.seconds
@@ -30,7 +31,7 @@ def main(arguments: list[str] | None = None) -> int:
         bar = progress.add_task("fuzzing", total=goal)
         try:
             for batch in source:
-                add_batch(tallies, batch, a.accuracy, a.threads)
+                add_batch(tallies, batch, a.accuracy, simd=simd, threads=a.threads)
                 done += len(batch.queries)
                 seconds = time.monotonic() - start
                 broken = sum(t.broken for t in tallies.values())
@@ -42,7 +43,8 @@ def main(arguments: list[str] | None = None) -> int:
             console.print("Stopped early; what was done:")
     console.print(_table(tallies))
     source_text = f"replay of {a.replay}" if a.replay else f"seed {a.seed}, batches of {a.batch}"
-    console.print(f"{done:,} queries in {time.monotonic() - start:.1f} s, {source_text}.")
+    seconds = time.monotonic() - start
+    console.print(f"{done:,} queries in {seconds:.1f} s, {source_text}, instruction sets: {', '.join(simd)}.")
     failing = {key: t.failing for key, t in tallies.items() if t.failing}
     if not failing:
         return 0
@@ -56,17 +58,16 @@ def _parser() -> argparse.ArgumentParser:
     p = argparse.ArgumentParser(
         prog="python -m hpccd_core.fuzz",
         description="Compare the elementary tests with the exact oracle on degenerate queries. Exit status 1 where "
-        "exact differs (time of contact: by more than 1e-12) or conservative misses a contact or reports it late; "
-        "fast and balanced make no such promise and are only counted.",
+        "exact differs (time of contact: by more than 1e-12), where conservative misses a contact or reports it late, "
+        "or where an instruction set's answer differs; fast and balanced promise no more and are only counted.",
     )
     length = p.add_mutually_exclusive_group()
     length.add_argument("--seconds", type=float, default=60.0, help="how long (default 60)")
     length.add_argument("--count", type=int, help="how many queries instead")
     p.add_argument("--seed", type=int, default=0, help="the same seed and batch give the same queries")
     p.add_argument("--batch", type=int, default=10_000, help="queries in a batch (default 10000)")
-    p.add_argument(
-        "--accuracy", type=_accuracies, default=ACCURACIES, help="comma-separated (default: " + ",".join(ACCURACIES) + ")"
-    )
+    tiers = ",".join(ACCURACIES)
+    p.add_argument("--accuracy", type=_accuracies, default=ACCURACIES, help=f"comma-separated (default: {tiers})")
     p.add_argument("--threads", type=int, default=0, help="threads of the oracle, 0 = all cores")
     p.add_argument("--save", type=Path, default=Path("fuzz-failures.npz"), help="file for failing queries")
     p.add_argument("--replay", type=Path, help="run the queries of such a file and no others")
@@ -89,14 +90,15 @@ def _replayed(path: Path):
 
 def _table(tallies: dict[tuple[str, str], Tally]) -> Table:
     table = Table(title="Elementary tests against the exact oracle")
-    for column in ("accuracy", "kind"):
-        table.add_column(column)
-    for column in ("queries", "contacts", "missed", "invented", "worst toc error", "latest by", "broken promises"):
-        table.add_column(column, justify="right")
+    for column in ("tier", "kind"):
+        table.add_column(column, no_wrap=True)
+    for column in ("queries", "contacts", "missed", "invented", "toc error", "latest by", "uneven", "broken"):
+        table.add_column(column, justify="right", no_wrap=True)
     for (accuracy, kind), t in sorted(tallies.items()):
-        counts = (f"{t.queries:,}", f"{t.hits:,}", f"{t.missed:,}", f"{t.invented:,}")
-        promise = f"{t.broken:,}" if accuracy in ("exact", "conservative") else "none made"
-        table.add_row(accuracy, kind, *counts, f"{t.worst_toc_error:.1e}", f"{t.latest:.1e}", promise)
+        counts = (t.queries, t.hits, t.missed, t.invented)
+        errors = (f"{t.worst_toc_error:.0e}", f"{t.latest:.0e}")
+        abbreviated = "".join(word[0].upper() for word in kind.split("-"))
+        table.add_row(accuracy, abbreviated, *(f"{n:,}" for n in counts), *errors, str(t.uneven), str(t.broken))
     return table
 
 

@@ -15,6 +15,8 @@ from hpccd_core import reference
 from .disturbances import disturb
 from .generators import EDGE_EDGE, GENERATORS, VERTEX_FACE
 
+Answers = tuple[np.ndarray, np.ndarray]  # hit (Q,) bool, toc (Q,) float64
+
 ORACLE = {VERTEX_FACE: reference.vertex_face, EDGE_EDGE: reference.edge_edge}
 CORE = {VERTEX_FACE: hc.test_vertex_face, EDGE_EDGE: hc.test_edge_edge}
 
@@ -33,19 +35,23 @@ class Batch:
 
 @dataclass(frozen=True)
 class Disagreement:
-    """How one tier's answers differ from the oracle's: masks over the queries, and toc - true toc (NaN without both)."""
+    """How one tier's answers differ from the oracle's, for each query; late: toc - true toc, NaN without both."""
 
     missed: np.ndarray
     invented: np.ndarray
     late: np.ndarray
+    uneven: np.ndarray  # instruction sets that should agree to the bit do not
 
     def broken_promises(self, accuracy: str) -> np.ndarray:
-        """Mask of the queries at which the tier does not do what its name promises; fast and balanced promise none."""
+        """Mask of the queries at which the tier does not do what its name promises.
+
+        fast and balanced promise nothing but the same answer from all instruction sets.
+        """
         if accuracy == "exact":
-            return self.missed | self.invented | (np.abs(self.late) > TOC_TOLERANCE)
+            return self.uneven | self.missed | self.invented | (np.abs(self.late) > TOC_TOLERANCE)
         if accuracy == "conservative":
-            return self.missed | (self.late > 0)
-        return np.isnan(self.late) & ~np.isnan(self.late)
+            return self.uneven | self.missed | (self.late > 0)
+        return self.uneven
 
 
 @dataclass
@@ -56,6 +62,7 @@ class Tally:
     hits: int = 0
     missed: int = 0
     invented: int = 0
+    uneven: int = 0
     broken: int = 0
     worst_toc_error: float = 0.0
     latest: float = 0.0
@@ -66,6 +73,7 @@ class Tally:
         self.hits += int(hit.sum())
         self.missed += int(difference.missed.sum())
         self.invented += int(difference.invented.sum())
+        self.uneven += int(difference.uneven.sum())
         both = difference.late[~np.isnan(difference.late)]
         self.worst_toc_error = max(self.worst_toc_error, np.abs(both).max(initial=0.0))
         self.latest = max(self.latest, both.max(initial=0.0))
@@ -86,23 +94,49 @@ def batches(seed: int, size: int) -> Iterator[Batch]:
         number += 1
 
 
-def compare(kind: str, queries: np.ndarray, accuracy: str, truth: tuple[np.ndarray, np.ndarray]) -> Disagreement:
-    """Ask one tier. Raises AssertionError where its answer is not one at all: NaN, or a time outside [0,1]."""
+def compare(kind: str, queries: np.ndarray, accuracy: str, simd: Sequence[str], truth: Answers) -> Disagreement:
+    """Ask one tier on each instruction set; the first one's answers are compared with the truth.
+
+    Raises AssertionError where an answer is not one at all: NaN, or a time outside [0,1].
+    """
     true_hit, true_toc = truth
-    hit, toc = CORE[kind](queries, accuracy=accuracy)
+    (hit, toc), *others = (CORE[kind](queries, accuracy=accuracy, simd=s) for s in simd)
     if not ((toc[hit] >= 0) & (toc[hit] <= 1)).all():
         raise AssertionError(f"{accuracy} {kind}: time of contact outside [0,1]: {toc[hit][:5]}")
-    late = np.where(hit & true_hit, toc, np.nan) - np.where(hit & true_hit, true_toc, np.nan)
-    return Disagreement(missed=true_hit & ~hit, invented=hit & ~true_hit, late=late)
+    uneven = np.zeros(len(queries), bool)
+    for other_hit, other_toc in others:
+        uneven |= (other_hit != hit) | (hit & (other_toc != toc))
+    both = hit & true_hit
+    late = np.where(both, toc, np.nan) - np.where(both, true_toc, np.nan)
+    return Disagreement(missed=true_hit & ~hit, invented=hit & ~true_hit, late=late, uneven=uneven)
 
 
-def add_batch(tallies: dict[tuple[str, str], Tally], batch: Batch, accuracies: Sequence[str], threads: int) -> None:
-    """Ask the oracle and each tier, and add what comes out to tallies[accuracy, kind]."""
+def add_batch(
+    tallies: dict[tuple[str, str], Tally],
+    batch: Batch,
+    accuracies: Sequence[str],
+    *,
+    simd: Sequence[str] = ("auto",),
+    threads: int = 0,
+) -> None:
+    """Ask the oracle (on so many threads) and each tier, and add what comes out to tallies[accuracy, kind]."""
     truth = ORACLE[batch.kind](batch.queries, threads)
     for accuracy in accuracies:
-        difference = compare(batch.kind, batch.queries, accuracy, truth)
+        difference = compare(batch.kind, batch.queries, accuracy, simd, truth)
         tallies[accuracy, batch.kind].add(batch.queries, truth[0], difference, accuracy)
 
 
 def new_tallies() -> dict[tuple[str, str], Tally]:
     return defaultdict(Tally)
+
+
+def usable_simd() -> list[str]:
+    """The instruction sets of this machine and build, the default first."""
+    usable = []
+    for simd in ("auto", "scalar", "avx2", "avx512"):
+        try:
+            hc.test_vertex_face(np.empty((0, 8, 3)), simd=simd)
+        except ValueError:
+            continue
+        usable.append(simd)
+    return usable

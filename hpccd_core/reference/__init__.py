@@ -68,7 +68,8 @@ def brute_force(
     (F,3) integers, indices into its own vertices. n_vertices: for each mesh, by default one more than its largest
     index. Not tested: features that share a vertex, meshes in `no_self_collision` against themselves, `static` ones
     against themselves and each other, and `ignored_pairs` (all by position in faces_per_mesh). Vertices that belong to
-    no face are tested against faces too. Raises ValueError where shapes or counts do not fit together.
+    no face are tested against faces too; an edge from a vertex to itself is none. Raises ValueError where shapes or
+    counts do not fit together.
     """
     faces_per_mesh = [np.asarray(f, dtype=np.int64).reshape(-1, 3) for f in faces_per_mesh]
     if n_vertices is None:

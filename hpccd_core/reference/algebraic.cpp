@@ -13,8 +13,7 @@ int sign(const Integer& x) { return x.sign(); }
 // 2^(k degree) p(n/2^k): an integer with the sign of p there.
 Integer scaled_value(const Polynomial& p, const Integer& n, unsigned k) {
   Integer value = 0;
-  for (int i = p.degree(); i >= 0; --i)
-    value = value * n + (p[i] << (k * static_cast<unsigned>(p.degree() - i)));
+  for (int i = p.degree(); i >= 0; --i) value = value * n + (p[i] << (k * static_cast<unsigned>(p.degree() - i)));
   return value;
 }
 

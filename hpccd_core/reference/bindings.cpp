@@ -64,22 +64,18 @@ py::dict brute_force(const Array<double>& vertices_t0, const Array<double>& vert
   }
   py::dict result;
   result["vf"] = columns(contacts.vf);
-  result["vf_toc"] =
-      py::array_t<double>(static_cast<py::ssize_t>(contacts.vf_toc.size()), contacts.vf_toc.data());
+  result["vf_toc"] = py::array_t<double>(static_cast<py::ssize_t>(contacts.vf_toc.size()), contacts.vf_toc.data());
   result["ee"] = columns(contacts.ee);
-  result["ee_toc"] =
-      py::array_t<double>(static_cast<py::ssize_t>(contacts.ee_toc.size()), contacts.ee_toc.data());
+  result["ee_toc"] = py::array_t<double>(static_cast<py::ssize_t>(contacts.ee_toc.size()), contacts.ee_toc.data());
   return result;
 }
 
 }  // namespace
 
 PYBIND11_MODULE(_reference, m) {
-  m.def("vertex_face", [](const Array<double>& queries, unsigned threads) {
-    return run(queries, threads, reference::vertex_face);
-  });
-  m.def("edge_edge", [](const Array<double>& queries, unsigned threads) {
-    return run(queries, threads, reference::edge_edge);
-  });
+  m.def("vertex_face",
+        [](const Array<double>& queries, unsigned threads) { return run(queries, threads, reference::vertex_face); });
+  m.def("edge_edge",
+        [](const Array<double>& queries, unsigned threads) { return run(queries, threads, reference::edge_edge); });
   m.def("brute_force", &brute_force);
 }

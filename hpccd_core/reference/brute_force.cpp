@@ -55,7 +55,7 @@ std::vector<Edge> edges_of(const std::vector<Face>& faces) {
   std::vector<Edge> edges;
   for (const Face& f : faces)
     for (const Edge e : {Edge{f[0], f[1]}, Edge{f[1], f[2]}, Edge{f[2], f[0]}})
-      edges.push_back({std::min(e[0], e[1]), std::max(e[0], e[1])});
+      if (e[0] != e[1]) edges.push_back({std::min(e[0], e[1]), std::max(e[0], e[1])});
   std::sort(edges.begin(), edges.end());
   edges.erase(std::unique(edges.begin(), edges.end()), edges.end());
   return edges;
@@ -88,8 +88,7 @@ Contacts brute_force(const Scene& scene, unsigned threads) {
     const Box box = swept_box(scene, vertex);
     for (std::size_t f = 0; f < scene.faces.size(); ++f) {
       const Face& face = scene.faces[f];
-      if (disjoint(box, face_boxes[f]) || share_a_vertex(vertex, face) || !asked_for(vertex[0], face[0]))
-        continue;
+      if (disjoint(box, face_boxes[f]) || share_a_vertex(vertex, face) || !asked_for(vertex[0], face[0])) continue;
       if (const auto toc = vertex_face(query_of(scene, vertex, face))) faces_hit[i].push_back({f, *toc});
     }
   });

@@ -26,8 +26,7 @@ std::array<Vector, 4> motion(const Query& query) {
     for (double x : point) lowest = std::min(lowest, odd_mantissa(x).second);
   const auto to_integer = [&](double x) {
     const auto [mantissa, exponent] = odd_mantissa(x);
-    return mantissa == 0 ? Integer(0)
-                         : Integer(Integer(mantissa) << static_cast<unsigned>(exponent - lowest));
+    return mantissa == 0 ? Integer(0) : Integer(Integer(mantissa) << static_cast<unsigned>(exponent - lowest));
   };
   std::array<Vector, 4> points;
   for (std::size_t i = 0; i < 4; ++i)

@@ -8,9 +8,7 @@
 namespace hpccd::reference {
 namespace {
 
-bool vanishes(const Vector& v, Root& t) {
-  return t.sign_of(v[0]) == 0 && t.sign_of(v[1]) == 0 && t.sign_of(v[2]) == 0;
-}
+bool vanishes(const Vector& v, Root& t) { return t.sign_of(v[0]) == 0 && t.sign_of(v[1]) == 0 && t.sign_of(v[2]) == 0; }
 
 // a and b on one line with the origin and not on the same side of it; an end at the origin counts.
 bool segment_contains_origin(const Vector& a, const Vector& b, Root& t) {
@@ -29,8 +27,7 @@ bool triangle_contains_origin(const Vector& a, const Vector& b, const Vector& c,
     return t.sign_of(u[axis]) * side >= 0 && t.sign_of(v[axis]) * side >= 0 && t.sign_of(w[axis]) * side >= 0;
   }
   // No area: the triangle is the union of its edges.
-  return segment_contains_origin(a, b, t) || segment_contains_origin(b, c, t) ||
-         segment_contains_origin(c, a, t);
+  return segment_contains_origin(a, b, t) || segment_contains_origin(b, c, t) || segment_contains_origin(c, a, t);
 }
 
 template <class Predicate>

@@ -1,0 +1,115 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Small deforming scenes: enough of everything to go wrong, small enough for brute force."""
+
+import dataclasses
+
+import numpy as np
+
+import hpccd_core as hc
+from hpccd_core import reference
+
+
+@dataclasses.dataclass
+class Meshes:
+    """faces: for each mesh (F,3), its own indices; vertices_t0, vertices_t1: (V,3), all meshes one after the other."""
+
+    faces: list
+    vertices_t0: np.ndarray
+    vertices_t1: np.ndarray
+    n_vertices: list
+
+    def scene(self, *, no_self_collision=(), static=(), ignored_pairs=()):
+        scene = hc.Scene()
+        for i, (faces, n) in enumerate(zip(self.faces, self.n_vertices, strict=True)):
+            scene.add_mesh(
+                f"mesh{i}", faces, n_vertices=n, self_collision=i not in no_self_collision, static=i in static
+            )
+        for a, b in ignored_pairs:
+            scene.ignore_pair(f"mesh{a}", f"mesh{b}")
+        return scene
+
+    def truth(self, **options):
+        return reference.brute_force(
+            self.vertices_t0, self.vertices_t1, self.faces, n_vertices=self.n_vertices, **options
+        )
+
+
+def sheet(n):
+    """Faces of a square sheet of n x n vertices."""
+    i = np.arange(n * n).reshape(n, n)
+    a, b, c, d = i[:-1, :-1].ravel(), i[1:, :-1].ravel(), i[:-1, 1:].ravel(), i[1:, 1:].ravel()
+    return np.concatenate([np.stack([a, b, d], axis=1), np.stack([a, d, c], axis=1)])
+
+
+def crumpled_sheet(rng, n=9):
+    """A sheet that passes through itself within the step."""
+    flat = np.stack([*np.meshgrid(np.arange(n), np.arange(n)), np.zeros((n, n))], axis=2).reshape(-1, 3).astype(float)
+    return sheet(n), flat + rng.normal(0, 0.3, flat.shape), flat + rng.normal(0, 1.2, flat.shape)
+
+
+def lattice_sheet(rng, n=7):
+    """A sheet on a coarse lattice: coincident vertices, flat triangles, coplanar motion."""
+    flat = np.stack([*np.meshgrid(np.arange(n), np.arange(n)), np.zeros((n, n))], axis=2).reshape(-1, 3)
+    return sheet(n), flat + rng.integers(-1, 2, flat.shape), flat // 2 + rng.integers(-1, 2, flat.shape)
+
+
+def soup(rng, n_faces=40):
+    """Triangles with random corners among few vertices; some name a vertex twice."""
+    n = n_faces // 2
+    return rng.integers(0, n, (n_faces, 3)), *rng.integers(-3, 4, (2, n, 3))
+
+
+def tetrahedron(rng):
+    """A body with a motion longer than itself."""
+    faces = np.array([[0, 1, 2], [0, 3, 1], [1, 3, 2], [0, 2, 3]])
+    body = rng.normal(0, 1, (4, 3))
+    return faces, body + rng.normal(0, 2, 3), body + rng.normal(0, 2, 3)
+
+
+def combine(*meshes):
+    return Meshes(
+        faces=[m[0] for m in meshes],
+        vertices_t0=np.concatenate([m[1] for m in meshes]).astype(float),
+        vertices_t1=np.concatenate([m[2] for m in meshes]).astype(float),
+        n_vertices=[len(m[1]) for m in meshes],
+    )
+
+
+def single_mesh(rng):
+    return combine(crumpled_sheet(rng))
+
+
+def lattice(rng):
+    return combine(lattice_sheet(rng))
+
+
+def triangle_soup(rng):
+    return combine(soup(rng))
+
+
+def many_meshes(rng):
+    return combine(crumpled_sheet(rng, 6), lattice_sheet(rng, 5), tetrahedron(rng), tetrahedron(rng), soup(rng, 16))
+
+
+def lone_vertices(rng):
+    """Particles, which are in no face, among bodies."""
+    particles = np.empty((0, 3), int), *rng.normal(0, 2, (2, 40, 3))
+    return combine(crumpled_sheet(rng, 5), particles, tetrahedron(rng))
+
+
+def huge_and_tiny(rng):
+    """A body 2^40 times as large as the others and far away bodies as small."""
+    small = combine(crumpled_sheet(rng, 5), tetrahedron(rng))
+    faces, start, end = tetrahedron(rng)
+    tiny = [faces, start * 2.0**-40 + 1, end * 2.0**-40 + 1]
+    return combine(
+        *[
+            (small.faces[i], small.vertices_t0[rows], small.vertices_t1[rows])
+            for i, rows in enumerate((slice(0, 25), slice(25, 29)))
+        ],
+        (faces, start * 2.0**40, end * 2.0**40),
+        tiny,
+    )
+
+
+ALL = (single_mesh, lattice, triangle_soup, many_meshes, lone_vertices, huge_and_tiny)

@@ -1,0 +1,123 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The oracle itself: against distances computed another way, and by symmetries that hold whatever it does."""
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from hpccd_core import reference
+from hpccd_core.fuzz.generators import EDGE_EDGE, GENERATORS, VERTEX_FACE
+
+ORACLE = {VERTEX_FACE: reference.vertex_face, EDGE_EDGE: reference.edge_edge}
+# Their coordinates are small integers: features that do not touch stay far apart compared with rounding.
+INTEGER_GENERATORS = ("lattice", "still", "on_line", "parallel_at_root", "thin", "meeting", "chosen_roots")
+
+
+def _point_segment(p, a, b):
+    d = b - a
+    length = (d * d).sum(-1)
+    s = np.clip(((p - a) * d).sum(-1) / np.where(length > 0, length, 1), 0, 1)
+    return np.linalg.norm(p - a - s[..., None] * d, axis=-1)
+
+
+def _point_triangle(p, a, b, c):
+    normal = np.cross(b - a, c - a)
+    area = np.linalg.norm(normal, axis=-1)
+    flat = area < 1e-9
+    normal = normal / np.where(flat, 1, area)[..., None]
+    height = ((p - a) * normal).sum(-1)
+    foot = p - height[..., None] * normal
+    sides = [(np.cross(y - x, foot - x) * normal).sum(-1) >= 0 for x, y in ((a, b), (b, c), (c, a))]
+    border = np.min([_point_segment(p, a, b), _point_segment(p, b, c), _point_segment(p, c, a)], axis=0)
+    return np.where(~flat & np.all(sides, axis=0), np.abs(height), border)
+
+
+def _segment_segment(a0, a1, b0, b1):
+    u, v, w = a1 - a0, b1 - b0, b0 - a0
+    normal = np.cross(u, v)
+    area = (normal * normal).sum(-1)
+    flat = area < 1e-18
+    s, t = ((np.cross(w, x) * normal).sum(-1) / np.where(flat, 1, area) for x in (v, u))
+    inner = ~flat & (s >= 0) & (s <= 1) & (t >= 0) & (t <= 1)
+    ends = np.min(
+        [
+            _point_segment(a0, b0, b1), _point_segment(a1, b0, b1),
+            _point_segment(b0, a0, a1), _point_segment(b1, a0, a1),
+        ],
+        axis=0,
+    )  # fmt: skip
+    return np.where(inner, np.abs((w * normal).sum(-1)) / np.sqrt(np.where(flat, 1, area)), ends)
+
+
+DISTANCE = {VERTEX_FACE: _point_triangle, EDGE_EDGE: _segment_segment}
+
+
+def _distance_at(kind, queries, t):
+    points = (1 - t)[..., None, None] * queries[:, :4] + t[..., None, None] * queries[:, 4:]
+    return DISTANCE[kind](*np.moveaxis(points, -2, 0))
+
+
+@pytest.mark.parametrize("kind", GENERATORS)
+@pytest.mark.parametrize("generator", INTEGER_GENERATORS)
+def test_distance_is_zero_at_toc_and_not_before(kind, generator):
+    queries = GENERATORS[kind][generator](np.random.default_rng(11), 3000)
+    hit, toc = ORACLE[kind](queries)
+    assert hit.any() and not hit.all()
+    assert _distance_at(kind, queries, np.where(hit, toc, 0))[hit].max() < 1e-12
+
+    fractions = {i / n for n in (1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 100) for i in range(n + 1)}
+    times = np.array(sorted(fractions))[:, None] + np.zeros(len(queries))
+    touching = _distance_at(kind, queries, times) < 1e-13
+    assert not (touching & (times < toc - 1e-9)).any()
+
+
+@pytest.mark.parametrize("kind", GENERATORS)
+def test_reversed_time_and_swapped_axes_change_no_answer(kind):
+    for generator in GENERATORS[kind].values():
+        queries = generator(np.random.default_rng(5), 300)
+        hit, toc = ORACLE[kind](queries)
+        assert np.array_equal(hit, ORACLE[kind](np.roll(queries, 4, axis=1))[0])
+        for same in (queries[:, :, ::-1], -queries, 2.0**-400 * queries):
+            same_hit, same_toc = ORACLE[kind](same)
+            assert np.array_equal(hit, same_hit)
+            assert np.array_equal(toc, same_toc)
+
+
+def test_toc_is_rounded_down():
+    # The vertex falls from height n to n - d through a still triangle: contact at n/d.
+    for n, d in ((1, 3), (2, 3), (1, 10), (7, 11), (3, 4), (1, 1), (0, 5)):
+        triangle = [[-1, -1, 0], [2, -1, 0], [-1, 2, 0]]
+        hit, toc = reference.vertex_face(np.array([[[0, 0, n], *triangle, [0, 0, n - d], *triangle]]))
+        assert hit[0]
+        assert Fraction(toc[0]) <= Fraction(n, d) < Fraction(np.nextafter(toc[0], 2))
+
+
+def test_published_queries(data_folder):
+    with np.load(data_folder / "queries.npz") as file:
+        names = [name.removesuffix("|q") for name in file.files if name.endswith("|q")]
+        assert names
+        for name in names:
+            kind = name.split("|")[1]
+            hit, _ = ORACLE[kind](file[name + "|q"])
+            assert np.array_equal(hit, file[name + "|hit"]), name
+
+
+@pytest.mark.parametrize("scene", ["cloth-ball", "n-body", "cloth-funnel"])
+def test_sample_of_published_contacts(data_folder, scene):
+    rng = np.random.default_rng(0)
+    with np.load(data_folder / f"{scene}.npz") as d:
+        both = np.concatenate([d["vertices_t0"][None], d["vertices_t1"][None]]).astype(float)
+        for kind, name in ((VERTEX_FACE, "vf"), (EDGE_EDGE, "ee")):
+            rows = rng.permutation(len(d[name]))[:1000]
+            pairs, true_toc = d[name][rows], d[name + "_toc"][rows]
+            points = pairs if kind == EDGE_EDGE else np.hstack([pairs[:, :1], d["faces"][pairs[:, 1]]])
+            hit, toc = ORACLE[kind](np.hstack([both[0][points], both[1][points]]))
+            assert hit.all()
+            np.testing.assert_allclose(toc, true_toc, rtol=0, atol=1e-15)
+
+
+@pytest.mark.parametrize("bad", [np.zeros((3, 8)), np.zeros((1, 4, 3)), np.full((1, 8, 3), np.nan)])
+def test_bad_queries_are_refused(bad):
+    with pytest.raises(ValueError, match="queries"):
+        reference.vertex_face(bad)
