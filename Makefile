@@ -40,7 +40,7 @@ help: ## Show this list
 	@echo "hpccd: continuous collision detection of deforming triangle meshes, as a ROS 2 node."
 	@echo "New here? make demo"
 	@echo
-	@sed -nE 's/^([a-z-]+):.*## (.*)/  make \1|\2/p' $(MAKEFILE_LIST) | column -t -s '|'
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
 	@echo
 	@echo "Variables, e.g. make test PYTEST_ARGS='-k replay':"
 	@echo "  PYTHON=python3.12   which Python for .venv: 3.11 or 3.12 (default: the first found)"
@@ -53,7 +53,7 @@ help: ## Show this list
 venv: $(INSTALLED) ## Create .venv, build and install the package (again, where sources have changed)
 
 demo: venv ## Node, publisher and recorder as processes over DDS; leaves a recording and a picture
-	$(BIN)/hpccd demo $(DEMO_ARGS)
+	@$(BIN)/hpccd demo $(DEMO_ARGS)
 
 test: test-core test-python ## Pass all tests
 
@@ -107,7 +107,7 @@ $(ENVIRONMENT): pyproject.toml scripts/create_venv.sh scripts/requirements.py $(
 	@touch $@
 
 $(INSTALLED): $(ENVIRONMENT) $(SOURCES) build/sources.txt
-	@echo "hpccd: building, and installing into $(VENV)"
+	@echo "hpccd: building, and installing into $(VENV) (a minute or two the first time)"
 	@. $(VENV)/build.env; flock $(VENV) $(BIN)/python -m pip install --quiet --no-build-isolation --no-deps .
 	@touch $@
 
