@@ -148,12 +148,16 @@ def test_busy_node_refuses_at_once(start_node):
     assert later.success, "a place is free again"
 
 
+def counts_of(node):
+    values = node.peer.statuses["service"][2]
+    return values["open"], values["timed_out"]
+
+
 def test_time_limit(node):
     late, good = ask(node, request(2, n=LARGE, time_limit=0.001), request())
     assert not late.success and "time limit of 0.001 s" in late.message
     assert good.success
-    node.wait_until(lambda: node.peer.statuses["service"][2]["open"] == "0", "end of the late computation")
-    assert node.peer.statuses["service"][2]["timed_out"] == "1"
+    node.wait_until(lambda: counts_of(node) == ("0", "1"), "end of the late computation, counted")
 
 
 def test_stream_goes_on_while_requests_are_computed(node):
