@@ -137,8 +137,8 @@ def _described_in_summary(path):
     try:
         with open(path, "rb") as stream:
             summary = SeekingReader(stream).get_summary()
-    except (*DAMAGE, OSError):  # OSError: a file shorter than a footer; such a file is what this module is for
-        summary = None
+    except DAMAGE:
+        summary = None  # what this module is for
     return (dict(summary.schemas), dict(summary.channels)) if summary else ({}, {})
 
 

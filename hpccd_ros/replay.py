@@ -17,6 +17,9 @@ from hpccd_ros.replay_setup import ReplaySetup
 
 # Frames kept for answers that come after them; at least as many as can wait in the node.
 WINDOW = 64
+# Frames for which an answer waits that was written before its own; far less than the window, which must still hold
+# the frames of the answers behind it.
+PATIENCE = 16
 
 
 @dataclasses.dataclass
@@ -107,7 +110,7 @@ class Replay:
             while waiting:
                 came, answer = waiting[0]
                 step = self._step_of(answer, window)
-                if step.missing and self.frames < came + capacity:
+                if step.missing and not step.before_recording and self.frames < came + PATIENCE:
                     break
                 waiting.pop(0)
                 yield step

@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Files are what rosbag2 and independent readers expect."""
+
+import pytest
+import yaml
+from bag_tools import STRING, read_by_mcap_ros2, read_by_rosbags, text_message, typestore, write_texts
+from mcap.reader import make_reader
+from rosbags.rosbag2 import Reader
+
+from hpccd_ros import mcap_qos, mcap_schema
+from hpccd_ros.mcap_bag import BagWriter, Topic
+from hpccd_ros.mcap_reader import Recording
+
+TEXTS = [f"{k:05}" + "x" * 400 for k in range(500)]
+
+
+@pytest.mark.parametrize("compression", ["none", "lz4", "zstd"])
+@pytest.mark.parametrize("chunk_size", [1000, 1 << 20])
+def test_independent_readers_find_every_message(tmp_path, compression, chunk_size):
+    path = tmp_path / "bag.mcap"
+    write_texts(path, TEXTS, compression=compression, chunk_size=chunk_size)
+    assert [m.data for *_, m in read_by_rosbags(path)] == TEXTS
+    assert [m.data for *_, m in read_by_mcap_ros2(path)] == TEXTS
+
+
+@pytest.mark.parametrize("limits", [{"max_bytes": 40_000}, {"max_seconds": 0.1}])
+def test_split_recordings(tmp_path, limits):
+    path = tmp_path / "bag"
+    writer = BagWriter(path, chunk_size=5000, **limits)
+    writer.add_topic(Topic("/latched", STRING, [], latched=True))
+    writer.add_topic(Topic("/text", STRING, []))
+    writer.write("/latched", text_message("in force"), 10**18, 10**18)
+    for number, text in enumerate(TEXTS):
+        writer.write("/text", text_message(text), 10**18 + number * 10**6, 10**18 + number * 10**6)
+    writer.close()
+
+    assert len(writer.file_paths) > 3
+    for file in writer.file_paths:
+        first = read_by_rosbags(file)[0]
+        assert (first[0], first[3].data) == ("/latched", "in force"), "each file is complete alone"
+    if "max_bytes" in limits:
+        assert max(file.stat().st_size for file in writer.file_paths) < 2 * limits["max_bytes"]
+    with Reader(path) as reader:  # needs metadata.yaml
+        assert reader.message_count == len(TEXTS) + len(writer.file_paths)
+    assert [m.data for topic, *_, m in read_by_rosbags(path) if topic == "/text"] == TEXTS
+    with Recording(path) as recording:
+        assert recording.files == writer.file_paths
+        assert recording.topics["/text"].count == len(TEXTS)
+        times = [m.log_time for m in recording.messages()]
+    assert times == sorted(times)
+
+
+def test_metadata_for_rosbag2(tmp_path):
+    path = tmp_path / "bag.mcap"
+    writer = BagWriter(path)
+    qos = [{"history": "keep_last", "depth": 3, "reliability": "reliable", "durability": "transient_local",
+            "deadline": mcap_qos.INFINITE, "lifespan": mcap_qos.INFINITE, "liveliness": "automatic",
+            "liveliness_lease_duration": mcap_qos.INFINITE, "avoid_ros_namespace_conventions": False}]  # fmt: skip
+    writer.add_topic(Topic("/contacts", "hpccd/msg/ContactArray", qos))
+    writer.close()
+    with open(path, "rb") as stream:
+        reader = make_reader(stream)
+        assert reader.get_header().profile == "ros2"
+        summary = reader.get_summary()
+        (channel,) = summary.channels.values()
+        assert summary.schemas[channel.schema_id].encoding == "ros2msg"
+        assert channel.message_encoding == "cdr"
+        assert yaml.safe_load(channel.metadata["offered_qos_profiles"]) == qos
+        assert channel.metadata["topic_type_hash"] == typestore().hash_rihs01("hpccd/msg/ContactArray")
+        records = {record.name: record.metadata for record in reader.iter_metadata()}
+    bag = yaml.safe_load(records["rosbag2"]["serialized_metadata"])
+    assert bag["version"] == 9
+    assert bag["topics_with_message_count"][0]["topic_metadata"]["type"] == "hpccd/msg/ContactArray"
+
+
+def test_definitions_hold_every_nested_type():
+    text = mcap_schema.definition_text("hpccd/msg/ContactArray")
+    assert text.count(mcap_schema.SEPARATOR) == 2
+    assert "MSG: std_msgs/Header\n" in text and "MSG: builtin_interfaces/Time\n" in text
+
+
+def test_unknown_type_is_refused_before_anything_is_written(tmp_path):
+    writer = BagWriter(tmp_path / "bag.mcap")
+    with pytest.raises(LookupError, match="nowhere_msgs/msg/Nothing not found"):
+        writer.add_topic(Topic("/x", "nowhere_msgs/msg/Nothing", []))
+    writer.close()
+    with Recording(tmp_path / "bag.mcap") as recording:
+        assert not recording.topics
+
+
+def test_recordings_are_not_overwritten(tmp_path):
+    path = tmp_path / "bag.mcap"
+    write_texts(path, TEXTS[:3])
+    before = path.read_bytes()
+    with pytest.raises(FileExistsError, match="not overwritten"):
+        BagWriter(path)
+    assert path.read_bytes() == before
+
+
+def test_a_single_file_cannot_be_split(tmp_path):
+    with pytest.raises(ValueError, match="give a folder"):
+        BagWriter(tmp_path / "bag.mcap", max_bytes=1000)
+
+
+def test_unknown_compression(tmp_path):
+    with pytest.raises(ValueError, match="'bzip2' is none of none, lz4, zstd"):
+        BagWriter(tmp_path / "bag.mcap", compression="bzip2")

@@ -1,0 +1,219 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A replay finds the recorded contacts again, and says where they differ if they do."""
+
+import csv
+import re
+
+import numpy as np
+import pytest
+from bag_tools import rewrite
+
+from hpccd_ros import replay_setup
+from hpccd_ros.mcap_bag import BagWriter, Topic
+from hpccd_ros.mcap_reader import Recording, RecordingError
+from hpccd_ros.replay import Replay
+
+ANSWER = 60  # one of the 89 answers, with contacts of both kinds
+
+
+def _replay(path, **options):
+    with Recording(path) as recording:
+        replay = Replay(recording, replay_setup.of_recording(recording), **options)
+        return replay, list(replay.steps())
+
+
+def _changed_answer(source, target, change, answer=ANSWER):
+    """Copy with one answer changed in place by `change(decoded)`."""
+
+    def edit(index, message, decoded):
+        if message.topic == "/contacts" and index == answer:
+            change(decoded)
+        return decoded
+
+    rewrite(source, target, edit)
+    return target
+
+
+@pytest.mark.parametrize("threads", [1, 2, 4])
+def test_the_recording_of_the_repository_is_verified(small_bag, threads):
+    replay, steps = _replay(small_bag, threads=threads, backend="cpu")
+    assert (replay.verified, replay.diverged, replay.unverified) == (89, 0, 0)
+    assert replay.frames == 90 and len(steps) == replay.recorded_answers == 89
+    assert sum(step.total for step in steps) == sum(step.recorded.total for step in steps) == 10_213
+    assert [step.step for step in steps] == list(range(1, 90))
+
+
+def test_an_unchanged_copy_is_verified(small_bag, tmp_path):
+    rewrite(small_bag, tmp_path / "copy.mcap")
+    replay, _ = _replay(tmp_path / "copy.mcap")
+    assert (replay.verified, replay.diverged) == (89, 0)
+
+
+def _first_edge_edge(decoded):
+    return int(np.argmax(decoded.kind == 1))
+
+
+def _later(decoded, index):
+    toc = decoded.toc.copy()
+    toc[index] = np.nextafter(toc[index], 2)
+    _set("toc", toc)(decoded)
+
+
+def _other_vertex(decoded):
+    features = decoded.features_a.copy()
+    features[0] += 1
+    _set("features_a", features)(decoded)
+
+
+def _remove_last(decoded):
+    for name, per_contact in (("kind", 1), ("mesh_a", 1), ("mesh_b", 1), ("features_a", 2), ("features_b", 2), ("toc", 1)):
+        _set(name, getattr(decoded, name)[:-per_contact])(decoded)
+
+
+def _set(name, value):
+    return lambda decoded: object.__setattr__(decoded, name, value)
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        (lambda d: _later(d, 0), r"vertex (cloth|ball):\d+ - face (cloth|ball):\d+: recorded at t = .*, now at t = "),
+        (lambda d: _later(d, _first_edge_edge(d)), r"edge \(.*\) - edge \(.*\): recorded at t = .*, now at t = "),
+        (_other_vertex, r"vertex .* - face .*: (recorded at t = .*, now not found|found now at t = .*, not recorded)"),
+        (_remove_last, r"edge .* found now at t = .*, not recorded"),
+        (_set("hash", 12345), r"hash 0x0000000000003039 was recorded, now it is .*although all contacts are equal"),
+        (_set("total", 7), r"7 contacts were recorded, now there are"),
+        (_set("first_toc", 0.5), r"first time of contact: recorded 0\.5, now"),
+        (_set("toc", np.zeros(3)), r"malformed: toc has 3 entries"),
+        (_set("mesh_names", ["cloth", "sphere"]), r"malformed: its meshes are"),
+        (_set("mesh_a", np.full(1, 9, np.uint32)), r"malformed: mesh_a has 1 entries"),
+    ],
+)
+def test_a_changed_answer_diverges_and_is_named(small_bag, tmp_path, change, says):
+    path = _changed_answer(small_bag, tmp_path / "changed.mcap", change)
+    replay, steps = _replay(path)
+    assert (replay.verified, replay.diverged) == (88, 1)
+    assert replay.first_divergence is steps[ANSWER]
+    assert replay.first_divergence.step == ANSWER + 1
+    assert np.all(np.array([bool(s.difference) for s in steps]) == (np.arange(89) == ANSWER))
+    assert re.search(says, steps[ANSWER].difference), steps[ANSWER].difference
+
+
+def test_a_changed_vertex_diverges(small_bag, tmp_path):
+    def edit(index, message, decoded):
+        if message.topic == "/meshes/cloth/vertices" and index == 50:
+            vertices = decoded.vertices_f32.copy()
+            vertices[2::3] += np.float32(0.01)
+            _set("vertices_f32", vertices)(decoded)
+        return decoded
+
+    rewrite(small_bag, tmp_path / "changed.mcap", edit)
+    replay, _ = _replay(tmp_path / "changed.mcap")
+    assert replay.diverged == 2  # the step into the changed frame, and the one out of it
+    assert replay.first_divergence.step == 50
+
+
+def test_answers_without_their_frames_are_not_called_verified(small_bag, tmp_path):
+    def edit(index, message, decoded):
+        lost = message.topic == "/meshes/ball/vertices" and index == 40
+        return None if lost else decoded
+
+    rewrite(small_bag, tmp_path / "gap.mcap", edit)
+    replay, steps = _replay(tmp_path / "gap.mcap")
+    assert (replay.verified, replay.diverged, replay.unverified) == (87, 0, 2)
+    assert "no frame of all meshes at its end" in steps[39].missing
+    assert "no frame of all meshes at its start" in steps[40].missing
+
+
+def test_frames_that_the_node_dropped(small_bag, tmp_path):
+    """Under overload the node answers from the last frame that it took to the latest: some frames have no answer."""
+
+    def edit(index, message, decoded):
+        return None if message.topic == "/contacts" and index % 3 else decoded
+
+    rewrite(small_bag, tmp_path / "dropped.mcap", edit)
+    replay, _ = _replay(tmp_path / "dropped.mcap")
+    assert (replay.verified, replay.diverged, replay.unverified) == (30, 0, 0)
+
+
+def test_a_recording_that_began_in_the_middle(small_bag, tmp_path):
+    def edit(index, message, decoded):
+        return None if message.topic.endswith("vertices") and index < 20 else decoded
+
+    rewrite(small_bag, tmp_path / "middle.mcap", edit)
+    replay, steps = _replay(tmp_path / "middle.mcap")
+    assert (replay.verified, replay.diverged, replay.unverified) == (69, 0, 0)
+    assert sum(step.before_recording for step in steps) == 20
+
+
+def test_answers_before_their_frames(small_bag, tmp_path):
+    """The recorder may take the answer of a fast node before the vertices that it belongs to."""
+    with Recording(small_bag) as recording:
+        writer = BagWriter(tmp_path / "early.mcap", info=recording.info)
+        for topic in recording.topics.values():
+            writer.add_topic(Topic(topic.name, topic.type_name, []))
+        for message in recording.messages():
+            early = 500_000_000 if message.topic == "/contacts" else 0
+            writer.write(message.topic, message.data, message.log_time - early, message.publish_time, message.sequence)
+        writer.close()
+    replay, _ = _replay(tmp_path / "early.mcap")
+    assert (replay.verified, replay.diverged, replay.unverified) == (89, 0, 0)
+
+
+def test_without_contacts_every_step_is_computed(small_bag, tmp_path):
+    rewrite(small_bag, tmp_path / "meshes.mcap",
+            lambda index, message, decoded: None if message.topic == "/contacts" else decoded)
+    replay, steps = _replay(tmp_path / "meshes.mcap", accuracy="exact")
+    _, recorded = _replay(small_bag)
+    assert [s.contacts.hash for s in steps] == [s.recorded.hash for s in recorded]
+    assert replay.verified == 0
+
+
+def test_recording_of_another_recorder_needs_parameters(small_bag, tmp_path, hpccd):
+    path = tmp_path / "foreign.mcap"
+    rewrite(small_bag, path, info={})
+    with Recording(path) as recording, pytest.raises(RecordingError, match="--params"):
+        replay_setup.of_recording(recording)
+    (tmp_path / "node.yaml").write_text(
+        "/**:\n  ros__parameters:\n    meshes: [cloth, ball]\n    mesh: {ball: {self_collision: false}}\n"
+    )
+    assert hpccd("replay", path, "--params", "node.yaml").returncode == 0
+    (tmp_path / "other.yaml").write_text("/**:\n  ros__parameters:\n    meshes: [shirt]\n")
+    wrong = hpccd("replay", path, "--params", "other.yaml")
+    assert wrong.returncode == 2 and "holds no vertices of the meshes shirt" in wrong.stderr
+    (tmp_path / "bad.yaml").write_text("- a list")
+    bad = hpccd("replay", path, "--params", "bad.yaml")
+    assert bad.returncode == 2 and "no ROS parameter file" in bad.stderr
+
+
+def test_wrong_scene_parameters_diverge(small_bag, tmp_path):
+    rewrite(small_bag, tmp_path / "x.mcap", info={"parameters": {"meshes": ["cloth", "ball"],
+                                                                  "ignored_pairs": ["cloth:ball"]}})
+    replay, _ = _replay(tmp_path / "x.mcap")
+    assert replay.diverged > 50 and "now not found" in replay.first_divergence.difference
+
+
+def test_replay_command(hpccd, small_bag, tmp_path):
+    done = hpccd("replay", small_bag, "--csv", "steps.csv")
+    assert done.returncode == 0, done.stderr
+    assert "VERIFIED: 89 answers are equal in every contact, time and hash (accuracy exact)" in done.stdout
+    rows = list(csv.DictReader((tmp_path / "steps.csv").open()))
+    assert len(rows) == 89 and {row["result"] for row in rows} == {"equal"}
+    assert all(row["hash"] == row["recorded_hash"] for row in rows)
+    again = hpccd("replay", small_bag, "--csv", "steps.csv")
+    assert again.returncode == 2 and "not overwritten" in again.stderr
+
+    path = _changed_answer(small_bag, tmp_path / "changed.mcap", lambda d: _later(d, 0))
+    changed = hpccd("replay", path)
+    assert changed.returncode == 1
+    assert "DIVERGED: 1 of 89 answers differ, first in step 61" in changed.stdout
+    assert "vertex " in changed.stdout and "now at t = " in changed.stdout
+
+
+def test_replay_of_unusable_files(hpccd, small_bag, tmp_path):
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes(small_bag.read_bytes()[:200_000])
+    for path, says in ((cut, "cut off"), (tmp_path / "none.mcap", "does not exist"), (__file__, "is not an MCAP file")):
+        done = hpccd("replay", path)
+        assert done.returncode == 2, done.stdout
+        assert says in done.stderr and done.stderr.count("\n") == 1 and "Traceback" not in done.stderr
