@@ -33,8 +33,8 @@ class Message:
 class Player:
     """Turns frames into messages and counts topology versions on over repetitions of the scene.
 
-    Each repetition begins with a new version of each topology, so that no receiver takes the jump from the
-    last frame back to the first for a motion.
+    Each repetition begins with a new version of each moving mesh's topology, so that no receiver takes the jump
+    from the last frame back to the first for a motion.
     """
 
     def __init__(self, scene: Scene, frame_id: str = "world"):
@@ -44,10 +44,10 @@ class Player:
         self._step = 0
 
     def messages(self, frame: Frame, stamp_ns: int) -> Iterator[Message]:
-        """Messages of one frame, stamped `stamp_ns`: topologies that change, then vertices of every mesh."""
+        """Messages of one frame, stamped `stamp_ns`: topologies that change, then vertices, static meshes first."""
         for mesh in self._scene.meshes:
             change = frame.topologies.get(mesh.name)
-            if frame.index == 0:
+            if frame.index == 0 and not (mesh.static and self._step):
                 self._base[mesh.name] = self._version[mesh.name] + 1
                 faces, n_vertices, version = mesh.faces, mesh.n_vertices, 0
             elif change:
@@ -57,7 +57,8 @@ class Player:
             self._version[mesh.name] = self._base[mesh.name] + version
             data = cdr.topology(stamp_ns, self._frame_id, self._version[mesh.name], faces, n_vertices)
             yield Message(topology_topic(mesh.name), stamp_ns, data)
-        for mesh, xyz in zip(self._scene.meshes, frame, strict=True):
+        meshes = zip(self._scene.meshes, frame, strict=True)
+        for mesh, xyz in sorted(meshes, key=lambda pair: not pair[0].static):
             data = cdr.vertices(stamp_ns, self._frame_id, self._version[mesh.name], self._step, xyz)
             yield Message(vertices_topic(mesh.name), stamp_ns, data)
         self._step += 1

@@ -6,6 +6,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+
 from .scene import Scene
 
 
@@ -35,8 +37,9 @@ def save(
     FigureCanvasAgg(figure)
     for panel, index in enumerate(indices):
         frame = scene.frame(index)
-        parts = zip(scene.mesh_names, frame, scene.faces(index), strict=True)
-        image, _, _ = render(list(parts), size, azimuth, elevation)
+        parts = list(zip(scene.mesh_names, frame, scene.faces(index), strict=True))
+        untouched = np.full(sum(map(len, frame)), np.nan)
+        image, _, _ = render(parts, untouched, size, azimuth, elevation)
         axes = figure.add_subplot(rows, columns, panel + 1)
         axes.imshow(image)
         axes.set_axis_off()

@@ -23,6 +23,8 @@ from .scene import Scene
 LATCHED = QoSProfile(
     depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
 )
+# Seconds between the static meshes and the first frame.
+SETTLE = 0.2
 STREAM = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.VOLATILE)
 
 
@@ -82,6 +84,8 @@ def _await_listeners(publishers, wanted, wait, stop) -> bool:
 
 def _play(node, scene, publishers, rate, loop, stop, progress) -> int:
     player = Player(scene)
+    moving = [mesh.name for mesh in scene.meshes if not mesh.static]
+    first_moving = vertices_topic(moving[0]) if len(moving) < len(scene.meshes) else None
     begin_ns, begin = node.get_clock().now().nanoseconds, time.monotonic()
     count = 0
     for _ in itertools.count() if loop else range(1):
@@ -89,12 +93,20 @@ def _play(node, scene, publishers, rate, loop, stop, progress) -> int:
             # Stamps keep the rate exactly, whenever this process is woken.
             stamp = begin_ns + round(count * 1e9 / rate)
             messages = list(player.messages(frame, stamp))
-            delay = begin + count / rate - time.monotonic()
-            if delay > 0 and not stop:
-                time.sleep(delay)
+            _sleep_until(begin + count / rate, stop)
             if stop:
                 return count
             for message in messages:
+                if count == 0 and message.topic == first_moving:
+                    # Nothing orders topics among one another: let the ground arrive before what falls on it.
+                    _sleep_until(time.monotonic() + SETTLE, stop)
+                    begin += SETTLE
                 publishers[message.topic].publish(message.data)
             count += 1
     return count
+
+
+def _sleep_until(instant, stop) -> None:
+    # In short pieces: a sleep goes on after a signal, and at a low rate Ctrl-C would be answered late.
+    while not stop and (left := instant - time.monotonic()) > 0:
+        time.sleep(min(left, 0.1))

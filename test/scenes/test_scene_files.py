@@ -1,0 +1,131 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Scenes written to files, read back by others' readers."""
+
+import numpy as np
+import pytest
+import yaml
+from rosbags.highlevel import AnyReader
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+from hpccd_ros import mcap_schema, scenes
+from hpccd_ros.mcap_reader import Recording
+from hpccd_ros.scenes import cdr, files, messages
+
+
+@pytest.fixture(scope="module")
+def breaking():
+    return scenes.make("breaking-like", size=1 / 64, frames=14)
+
+
+@pytest.fixture(scope="module")
+def typestore():
+    """An independent implementation of CDR that knows our two messages."""
+    store = get_typestore(Stores.ROS2_JAZZY)
+    for name in (messages.TOPOLOGY_TYPE, messages.VERTICES_TYPE):
+        text = mcap_schema.definition_text(name).split(mcap_schema.SEPARATOR)[0]
+        store.register(get_types_from_msg(text, name))
+    return store
+
+
+@pytest.mark.parametrize("frame_id", ["", "a", "abc", "abcd", "world", "côté"])
+@pytest.mark.parametrize("count", [0, 1, 2, 5])
+def test_cdr_is_that_of_an_independent_writer(typestore, frame_id, count):
+    faces = np.arange(3 * count, dtype=np.uint32).reshape(-1, 3)
+    xyz = np.linspace(-1, 1, 3 * count, dtype=np.float32).reshape(-1, 3)
+    for data, name in (
+        (cdr.topology(5_000_000_007, frame_id, 3, faces, 3 * count), messages.TOPOLOGY_TYPE),
+        (cdr.vertices(5_000_000_007, frame_id, 3, 2**40, xyz), messages.VERTICES_TYPE),
+    ):
+        message = typestore.deserialize_cdr(data, name)
+        assert bytes(typestore.serialize_cdr(message, name)) == data
+        assert (message.header.stamp.sec, message.header.stamp.nanosec) == (5, 7)
+        assert message.header.frame_id == frame_id
+        if name == messages.TOPOLOGY_TYPE:
+            assert (message.version, message.n_vertices) == (3, 3 * count)
+            np.testing.assert_array_equal(message.faces, faces.ravel())
+        else:
+            assert (message.topology_version, message.step) == (3, 2**40)
+            np.testing.assert_array_equal(message.vertices_f32, xyz.ravel())
+            assert len(message.vertices_f64) == 0
+
+
+def test_cdr_takes_float32_only():
+    with pytest.raises(TypeError, match="xyz has dtype float64"):
+        cdr.vertices(0, "", 0, 0, np.zeros((1, 3)))
+
+
+def test_mcap_holds_every_frame_for_independent_readers(breaking, tmp_path):
+    path = tmp_path / "breaking.mcap"
+    files.write_mcap(breaking, path, rate=50.0)
+    faces, vertices = {}, {}
+    with AnyReader([path]) as reader:
+        for connection, time, raw in reader.messages():
+            message = reader.deserialize(raw, connection.msgtype)
+            stamp = message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
+            assert stamp == time
+            _, _, mesh, kind = connection.topic.split("/")
+            if kind == "topology":
+                faces.setdefault(mesh, {})[message.version] = (stamp, message.faces.reshape(-1, 3))
+            else:
+                row = (stamp, message.topology_version, message.step, message.vertices_f32.reshape(-1, 3))
+                vertices.setdefault(mesh, []).append(row)
+    assert set(vertices) == set(breaking.mesh_names)
+    for m, mesh in enumerate(breaking.mesh_names):
+        assert len(vertices[mesh]) == len(breaking)
+        for frame, (stamp, version, step, xyz) in zip(breaking.frames(), vertices[mesh], strict=True):
+            assert stamp == 10**9 + frame.index * 20_000_000
+            assert step == frame.index
+            np.testing.assert_array_equal(xyz, frame[m])
+            assert faces[mesh][version][0] <= stamp
+            np.testing.assert_array_equal(faces[mesh][version][1], breaking.faces(frame.index)[m])
+
+
+def test_mcap_is_the_same_file_each_time_and_names_its_scene(tmp_path):
+    scene = scenes.make("two-triangles")
+    # Of one name, which the bag's metadata hold.
+    first, second = (tmp_path / folder / "scene.mcap" for folder in "ab")
+    for path in (first, second):
+        files.write_mcap(scene, path, rate=30.0)
+    assert first.read_bytes() == second.read_bytes()
+    with Recording(first) as recording:
+        assert recording.info["scene"] == "two-triangles"
+        assert recording.info["parameters"]["meshes"] == ["lower", "upper"]
+        assert recording.message_count == 2 + 2 * 11
+
+
+def test_npz_holds_frames_by_topology_version(breaking, tmp_path):
+    files.write_npz(breaking, tmp_path / "breaking.npz")
+    with np.load(tmp_path / "breaking.npz") as archive:
+        assert archive["meshes"].tolist() == breaking.mesh_names
+        versions = sorted(int(key.split("/")[1]) for key in archive.files if key.endswith("/faces") and "statue" in key)
+        assert versions == list(range(len(versions))) and len(versions) > 3
+        frame = 0
+        for version in versions:
+            assert archive[f"statue/{version}/first_frame"] == frame
+            for vertices in archive[f"statue/{version}/vertices"]:
+                np.testing.assert_array_equal(vertices, breaking.frame(frame)[0])
+                np.testing.assert_array_equal(archive[f"statue/{version}/faces"], breaking.faces(frame)[0])
+                frame += 1
+        assert frame == len(breaking) == len(archive["boulder/0/vertices"])
+
+
+def test_step_file_is_one_scene_wide_motion(breaking, tmp_path):
+    index = next(frame.index for frame in breaking.frames() if frame.topologies)
+    files.write_step(breaking, index, tmp_path / "step.npz")
+    with np.load(tmp_path / "step.npz") as archive:
+        frame = breaking.frame(index)
+        np.testing.assert_array_equal(archive["vertices_t1"], frame.stacked())
+        np.testing.assert_array_equal(archive["vertices_t0"], frame.stacked_start())
+        parts = breaking.faces(index)
+        assert len(archive["faces"]) == sum(map(len, parts))
+        assert archive["faces"].max() < len(archive["vertices_t0"])
+        last = archive["faces"][-len(parts[-1]) :].astype(np.int64) - (len(frame[0]) + len(frame[1]))
+        np.testing.assert_array_equal(last, parts[-1])
+
+
+def test_parameter_file_names_the_meshes(breaking, tmp_path):
+    files.write_parameters(breaking, tmp_path / "node.yaml")
+    tree = yaml.safe_load((tmp_path / "node.yaml").read_text())["/**"]["ros__parameters"]
+    assert tree["meshes"] == ["statue", "boulder", "ground"]
+    assert tree["mesh"]["ground"] == {"static": True, "self_collision": False}
+    assert tree["mesh"]["statue"] == {"static": False, "self_collision": True}
