@@ -28,6 +28,22 @@ def whole_number(name, value, low, high):
     return number
 
 
+def separation(accuracy, minimum_separation, tolerance):
+    """Both lengths as floats: finite, not negative, tolerance above zero; a separation needs accuracy conservative."""
+    lengths = []
+    for name, value in (("minimum_separation", minimum_separation), ("tolerance", tolerance)):
+        if isinstance(value, bool) or not isinstance(value, (int, float, np.floating, np.integer)):
+            raise TypeError(f"{name}: expected a number, got {type(value).__name__}")
+        if not np.isfinite(value) or value < 0:
+            raise ValueError(f"{name}: must be finite and not negative, got {value}")
+        lengths.append(float(value))
+    if lengths[0] > 0 and accuracy != "conservative":
+        raise ValueError('minimum_separation: only accuracy="conservative" has one; use that accuracy, or 0')
+    if lengths[1] == 0:
+        raise ValueError("tolerance: must be above zero, else the search has no end")
+    return lengths
+
+
 def faces(value):
     """(F, 3) integers -> (F, 3) uint32, C-contiguous."""
     array = np.asarray(value)

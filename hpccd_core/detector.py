@@ -19,10 +19,25 @@ class Detector:
     accuracy: "fast", "balanced", "conservative" or "exact"; backend: "auto", "cpu", "hybrid" or "gpu"; threads: 0 for
     all cores; report: "all" contacts, those at the earliest time only ("first"), or one contact ("any"); outputs: any
     of "points", "normals"; simd: "auto", "scalar", "avx2" or "avx512" (the result is the same).
+    minimum_separation, tolerance ("conservative" only, in units of the coordinates): report every pair that comes within
+    minimum_separation, measured along each axis, no later than it does so; pairs that miss it by up to tolerance may be
+    reported too. Without a separation "conservative" reports exactly the true contacts, at a time never late.
     The scene is copied: meshes added to it later do not reach this detector.
     """
 
-    def __init__(self, scene, *, accuracy="exact", backend="auto", threads=0, report="all", outputs=(), simd="auto"):
+    def __init__(
+        self,
+        scene,
+        *,
+        accuracy="exact",
+        backend="auto",
+        threads=0,
+        report="all",
+        outputs=(),
+        simd="auto",
+        minimum_separation=0.0,
+        tolerance=1e-6,
+    ):
         if not isinstance(scene, Scene):
             raise TypeError(f"scene: expected hpccd_core.Scene, got {type(scene).__name__}")
         self.accuracy = arguments.choice("accuracy", accuracy, ACCURACIES)
@@ -36,6 +51,7 @@ class Detector:
             arguments.choice("outputs", output, ("points", "normals"))
         threads = arguments.whole_number("threads", threads, 0, 1024)
         simd = arguments.choice("simd", simd, ("auto", "scalar", "avx2", "avx512"))
+        lengths = arguments.separation(accuracy, minimum_separation, tolerance)
         self.n_vertices = scene.n_vertices
         self._core = _core.Detector(
             scene._core,
@@ -46,6 +62,7 @@ class Detector:
             threads,
             "points" in outputs,
             "normals" in outputs,
+            *lengths,
         )
         self._last = None
 

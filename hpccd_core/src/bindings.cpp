@@ -43,7 +43,8 @@ py::dict to_dict(Contacts&& c) {
 }
 
 template <auto test>
-py::tuple run_queries(const Array<double>& queries, Accuracy accuracy, Simd simd) {
+py::tuple run_queries(const Array<double>& queries, Accuracy accuracy, Simd simd, double separation,
+                     double tolerance) {
   const auto n = static_cast<std::size_t>(queries.shape(0));
   py::array_t<bool> hit(static_cast<py::ssize_t>(n));
   py::array_t<double> toc(static_cast<py::ssize_t>(n));
@@ -52,7 +53,10 @@ py::tuple run_queries(const Array<double>& queries, Accuracy accuracy, Simd simd
   double* t = toc.mutable_data();
   {
     py::gil_scoped_release release;
-    test(view, accuracy, simd, h, t);
+    Options options;
+    options.accuracy = accuracy, options.simd = simd;
+    options.minimum_separation = separation, options.tolerance = tolerance;
+    test(view, options, h, t);
   }
   return py::make_tuple(hit, toc);
 }
@@ -99,10 +103,11 @@ PYBIND11_MODULE(_core, m) {
 
   py::class_<Detector>(m, "Detector")
       .def(py::init([](std::shared_ptr<Scene> scene, Accuracy accuracy, Backend backend, Report report, Simd simd,
-                       int threads, bool points, bool normals) {
+                       int threads, bool points, bool normals, double separation, double tolerance) {
         // A copy: what is added to the caller's scene later does not reach this detector.
         return std::make_unique<Detector>(std::make_shared<const Scene>(*scene),
-                                          Options{accuracy, backend, report, simd, threads, points, normals});
+                                          Options{accuracy, backend, report, simd, threads, points, normals,
+                                                  separation, tolerance});
       }))
       .def("detect",
            [](Detector& d, const py::array& t0, const py::array& t1) {

@@ -19,6 +19,8 @@ struct Detector::Impl {
     for (int a = 0; a < 4; ++a) search.batch_test[a] = batch_test(options.simd, static_cast<Accuracy>(a));
     search.leaf_pairs = leaf_pairs(options.simd);
     search.report = o.report;
+    search.limits = {o.minimum_separation, o.tolerance};
+    if (o.minimum_separation > 0) search.batch_test[static_cast<int>(Accuracy::conservative)] = all_undecided;
   }
 
   std::shared_ptr<const Scene> scene;
@@ -92,7 +94,7 @@ Contacts Detector::detect(Positions t0, Positions t1) {
   if (t0.is_double != t1.is_double)
     throw InvalidArgument("vertices_t0, vertices_t1: must both be float32 or both be float64");
   d.profiler.begin();
-  d.motion.take(t0, t1, d.pool);
+  d.motion.take(t0, t1, d.options.minimum_separation, d.pool);
   d.profiler.mark("bounds");
   d.update_tree();
   d.search.geometry = {d.motion.rows.data(), d.features.edges.data(), d.features.faces.data(), d.motion.map.scale};

@@ -70,6 +70,10 @@ struct Options {
   int threads = 0;  // 0: all cores
   bool points = false;
   bool normals = false;
+  // "conservative" only, in units of the coordinates: report pairs that come within minimum_separation, and pairs that
+  // do so only by up to tolerance more as well.
+  double minimum_separation = 0;
+  double tolerance = 1e-6;
 };
 
 // Contacts of one motion step in canonical order: vertex-face by (vertex, face), then edge-edge by (a0, a1, b0, b1).
@@ -109,10 +113,11 @@ class Detector {
   std::unique_ptr<Impl> impl_;
 };
 
-// One elementary query: rows v f0 f1 f2 (vertex-face) or a0 a1 b0 b1 (edge-edge) at t=0, then the same at t=1.
+// Elementary queries one by one; of the options only accuracy, simd, minimum_separation and tolerance matter.
+// One query: rows v f0 f1 f2 (vertex-face) or a0 a1 b0 b1 (edge-edge) at t=0, then the same at t=1.
 using Query = std::array<double, 24>;
-void test_vertex_face(std::span<const Query> queries, Accuracy accuracy, Simd simd, bool* hit, double* toc);
-void test_edge_edge(std::span<const Query> queries, Accuracy accuracy, Simd simd, bool* hit, double* toc);
+void test_vertex_face(std::span<const Query> queries, const Options& options, bool* hit, double* toc);
+void test_edge_edge(std::span<const Query> queries, const Options& options, bool* hit, double* toc);
 
 // The instruction sets usable on this machine, best last.
 std::vector<Simd> simd_levels();

@@ -44,21 +44,21 @@ template <class Real>
 }
 
 template <class Real>
-void copy_motion(const Real* t0, const Real* t1, const CoordinateMap& map, std::size_t begin, std::size_t end,
+void copy_motion(const Real* t0, const Real* t1, const CoordinateMap& map, double margin, std::size_t begin, std::size_t end,
                  VertexRow* rows, Box* boxes) {
   for (std::size_t i = begin; i < end; ++i)
     for (int k = 0; k < 3; ++k) {
       const double a = t0[3 * i + k], b = t1[3 * i + k];
       rows[i].t0[k] = a;
       rows[i].t1[k] = b;
-      const float x = map(a, k), y = map(b, k);
-      boxes[i].low[k] = x < y ? x : y;
-      boxes[i].high[k] = x < y ? y : x;
+      boxes[i].low[k] = map((a < b ? a : b) - margin, k);
+      boxes[i].high[k] = map((a < b ? b : a) + margin, k);
     }
 }
 
 template <class Real>
-void take_positions(MotionBounds& m, const Real* t0, const Real* t1, std::size_t n, ThreadPool& pool) {
+void take_positions(MotionBounds& m, const Real* t0, const Real* t1, std::size_t n, double separation,
+                    ThreadPool& pool) {
   constexpr std::size_t grain = 8192;
   std::vector<Extent> extents((n + grain - 1) / grain * 2);
   parallel_for(pool, extents.size(), 1, [&](std::size_t from, std::size_t to, int) {
@@ -80,20 +80,26 @@ void take_positions(MotionBounds& m, const Real* t0, const Real* t1, std::size_t
     report_bad("vertices_t1", t1, n);
   }
   if (n > 0) m.map = CoordinateMap::around(whole.low, whole.high);
+  // Half the separation to each side, and what rounding x - margin and x + margin can lose.
+  double most = 0;
+  for (int k = 0; k < 3 && n > 0; ++k) most = std::max({most, std::fabs(whole.low[k]), std::fabs(whole.high[k])});
+  const double margin = separation > 0 ? 0.5 * separation + 4.5e-16 * (most + separation) : 0;
   m.rows.resize(n);
   m.boxes.resize(n);
   parallel_for(pool, n, grain, [&](std::size_t begin, std::size_t end, int) {
-    copy_motion(t0, t1, m.map, begin, end, m.rows.data(), m.boxes.data());
+    copy_motion(t0, t1, m.map, margin, begin, end, m.rows.data(), m.boxes.data());
   });
 }
 
 }  // namespace
 
-void MotionBounds::take(Positions t0, Positions t1, ThreadPool& pool) {
+void MotionBounds::take(Positions t0, Positions t1, double separation, ThreadPool& pool) {
   if (t0.is_double)
-    take_positions(*this, static_cast<const double*>(t0.data), static_cast<const double*>(t1.data), t0.n, pool);
+    take_positions(*this, static_cast<const double*>(t0.data), static_cast<const double*>(t1.data), t0.n, separation,
+                   pool);
   else
-    take_positions(*this, static_cast<const float*>(t0.data), static_cast<const float*>(t1.data), t0.n, pool);
+    take_positions(*this, static_cast<const float*>(t0.data), static_cast<const float*>(t1.data), t0.n, separation,
+                   pool);
 }
 
 }  // namespace hpccd

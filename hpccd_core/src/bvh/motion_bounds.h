@@ -18,8 +18,9 @@ struct MotionBounds {
   std::vector<Box> boxes;
   CoordinateMap map;
 
+  // Boxes of features that come within `separation` of each other, along each axis, overlap too.
   // Throws InvalidArgument where a coordinate is not finite or too large.
-  void take(Positions vertices_t0, Positions vertices_t1, ThreadPool& pool);
+  void take(Positions vertices_t0, Positions vertices_t1, double separation, ThreadPool& pool);
 };
 
 }  // namespace hpccd

@@ -48,4 +48,8 @@ using BatchTest = void (*)(const Geometry&, Kind, const std::uint32_t* first, co
 // Never Simd::automatic. "fast" has a test of its own; the other tiers share one and differ in their last resort.
 BatchTest batch_test(Simd simd, Accuracy accuracy);
 
+// Leaves every pair to the last resort: no filter of this file holds for features that merely come near each other.
+void all_undecided(const Geometry&, Kind, const std::uint32_t* first, const std::uint32_t* second, std::uint32_t n,
+                   BatchResult&);
+
 }  // namespace hpccd

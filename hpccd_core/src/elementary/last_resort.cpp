@@ -1,21 +1,48 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "elementary/last_resort.h"
 
+#include "elementary/batch.h"
 #include "elementary/exact/contact.h"
 #include "elementary/tolerant.h"
 
 namespace hpccd {
+namespace {
 
-std::optional<double> last_resort(Accuracy accuracy, Kind kind, const Vec3<double> q_t0[4],
-                                  const Vec3<double> q_t1[4]) {
-  if (accuracy == Accuracy::conservative || accuracy == Accuracy::exact)
-    return exact::earliest_contact(kind, q_t0, q_t1);
-  const tolerant::Answer a =
-      kind == Kind::vertex_face
-          ? tolerant::decide<Kind::vertex_face>(motion_of<Kind::vertex_face>(q_t0, q_t1))
-          : tolerant::decide<Kind::edge_edge>(motion_of<Kind::edge_edge>(q_t0, q_t1));
+using Points = const Vec3<double>*;
+
+template <Kind kind>
+std::optional<double> tolerant_contact(Points q_t0, Points q_t1) {
+  const tolerant::Answer a = tolerant::decide<kind>(motion_of<kind>(q_t0, q_t1));
   if (!a.contact) return std::nullopt;
   return a.toc;
+}
+
+std::optional<double> within_separation(const inclusion::Limits& limits, Kind kind, Points q_t0, Points q_t1) {
+  const Motion<double> m = kind == Kind::vertex_face ? motion_of<Kind::vertex_face>(q_t0, q_t1)
+                                                     : motion_of<Kind::edge_edge>(q_t0, q_t1);
+  return inclusion::earliest_within(kind, m, limits);
+}
+
+}  // namespace
+
+std::optional<double> last_resort(Accuracy accuracy, const inclusion::Limits& limits, Kind kind, Points q_t0,
+                                  Points q_t1) {
+  if (accuracy == Accuracy::conservative && limits.separation > 0)
+    return within_separation(limits, kind, q_t0, q_t1);
+  // Without a separation the exact answer is conservative too, and cheaper than a search that has to give up somewhere.
+  if (accuracy == Accuracy::conservative || accuracy == Accuracy::exact)
+    return exact::earliest_contact(kind, q_t0, q_t1);
+  return kind == Kind::vertex_face ? tolerant_contact<Kind::vertex_face>(q_t0, q_t1)
+                                   : tolerant_contact<Kind::edge_edge>(q_t0, q_t1);
+}
+
+void all_undecided(const Geometry&, Kind, const std::uint32_t*, const std::uint32_t*, std::uint32_t n,
+                   BatchResult& result) {
+  result.n_contacts = 0;
+  result.n_undecided = n;
+  for (std::uint32_t i = 0; i < n; ++i) result.undecided[i] = i;
+  result.counts.tested += n;
+  result.counts.undecided += n;
 }
 
 }  // namespace hpccd

@@ -4,12 +4,14 @@
 
 #include <optional>
 
+#include "elementary/inclusion.h"
 #include "elementary/motion.h"
 #include "hpccd/hpccd.h"
 
 namespace hpccd {
 
-// q[0..3] as in motion.h. The time of contact, or nothing.
-std::optional<double> last_resort(Accuracy accuracy, Kind kind, const Vec3<double> q_t0[4], const Vec3<double> q_t1[4]);
+// q[0..3] as in motion.h; the limits matter to "conservative" only. The time of contact, or nothing.
+std::optional<double> last_resort(Accuracy accuracy, const inclusion::Limits& limits, Kind kind,
+                                  const Vec3<double> q_t0[4], const Vec3<double> q_t1[4]);
 
 }  // namespace hpccd

@@ -22,8 +22,12 @@ double power_of_two_scale(std::span<const Query> queries) {
   return most > 0 ? std::ldexp(1.0, -std::clamp(std::ilogb(most), -1000, 1000)) : 1;
 }
 
-void test_queries(Kind kind, std::span<const Query> queries, Accuracy accuracy, Simd simd, bool* hit, double* toc) {
-  const BatchTest test = batch_test(resolve(simd), accuracy);
+void test_queries(Kind kind, std::span<const Query> queries, const Options& options, bool* hit, double* toc) {
+  const Accuracy accuracy = options.accuracy;
+  const BatchTest test = accuracy == Accuracy::conservative && options.minimum_separation > 0
+                             ? all_undecided
+                             : batch_test(resolve(options.simd), accuracy);
+  const inclusion::Limits limits{options.minimum_separation, options.tolerance};
   auto result = std::make_unique<BatchResult>();
   std::vector<VertexRow> rows(4 * batch_capacity);
   std::vector<std::array<std::uint32_t, 2>> edges(2 * batch_capacity);
@@ -59,19 +63,19 @@ void test_queries(Kind kind, std::span<const Query> queries, Accuracy accuracy, 
       const Query& q = queries[at];
       const Vec3<double> q_t0[4] = {point(q, 0), point(q, 1), point(q, 2), point(q, 3)};
       const Vec3<double> q_t1[4] = {point(q, 4), point(q, 5), point(q, 6), point(q, 7)};
-      if (const auto t = last_resort(accuracy, kind, q_t0, q_t1)) hit[at] = true, toc[at] = *t;
+      if (const auto t = last_resort(accuracy, limits, kind, q_t0, q_t1)) hit[at] = true, toc[at] = *t;
     }
   }
 }
 
 }  // namespace
 
-void test_vertex_face(std::span<const Query> queries, Accuracy accuracy, Simd simd, bool* hit, double* toc) {
-  test_queries(Kind::vertex_face, queries, accuracy, simd, hit, toc);
+void test_vertex_face(std::span<const Query> queries, const Options& options, bool* hit, double* toc) {
+  test_queries(Kind::vertex_face, queries, options, hit, toc);
 }
 
-void test_edge_edge(std::span<const Query> queries, Accuracy accuracy, Simd simd, bool* hit, double* toc) {
-  test_queries(Kind::edge_edge, queries, accuracy, simd, hit, toc);
+void test_edge_edge(std::span<const Query> queries, const Options& options, bool* hit, double* toc) {
+  test_queries(Kind::edge_edge, queries, options, hit, toc);
 }
 
 }  // namespace hpccd

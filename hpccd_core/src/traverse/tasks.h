@@ -18,13 +18,16 @@ struct NodePair {
 class PairRules {
  public:
   PairRules(const Scene& scene, Accuracy accuracy);
-  bool enabled(const Node& a, const Node& b) const {
-    if (all_enabled_ || a.mesh == mixed_meshes || b.mesh == mixed_meshes) return true;
-    return enabled_[a.mesh * n_ + b.mesh];
+  // Meshes by number, or mixed_meshes: then some of their pairs may be enabled.
+  bool enabled(std::uint32_t mesh_a, std::uint32_t mesh_b) const {
+    if (all_enabled_ || mesh_a == mixed_meshes || mesh_b == mixed_meshes) return true;
+    return enabled_[mesh_a * n_ + mesh_b];
   }
-  Accuracy accuracy(const Node& a, const Node& b) const {
-    return accuracy_.empty() ? default_ : accuracy_[a.mesh * n_ + b.mesh];
+  bool enabled(const Node& a, const Node& b) const { return enabled(a.mesh, b.mesh); }
+  Accuracy accuracy(std::uint32_t mesh_a, std::uint32_t mesh_b) const {
+    return accuracy_.empty() ? default_ : accuracy_[mesh_a * n_ + mesh_b];
   }
+  Accuracy accuracy(const Node& a, const Node& b) const { return accuracy(a.mesh, b.mesh); }
 
  private:
   std::size_t n_;

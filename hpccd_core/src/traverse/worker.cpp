@@ -20,16 +20,15 @@ void Worker::begin(Search& search) {
   counts[0] = counts[1] = {};
   node_pairs = leaf_pairs = 0;
   elementary_seconds = 0;
+  for (auto& w : waiting_)  // what an exception left behind
+    if (w) w->edge_edge.n = w->vertex_face.n = 0;
   if (!result_) result_ = std::make_unique<BatchResult>();
 }
 
 void Worker::leaf_pair(const Tree& tree, const LeafRange& a, const LeafRange& b, Accuracy accuracy) {
-  auto& waiting = waiting_[static_cast<int>(accuracy)];
-  if (!waiting) waiting = std::make_unique<Waiting>();
-  ++leaf_pairs;
-  search_->leaf_pairs(tree, a, b, waiting->edge_edge, waiting->vertex_face);
-  drain(waiting->edge_edge, Kind::edge_edge, accuracy, batch_capacity);
-  drain(waiting->vertex_face, Kind::vertex_face, accuracy, batch_capacity);
+  candidates(accuracy, [&](CandidateBuffer& edge_edge, CandidateBuffer& vertex_face) {
+    search_->leaf_pairs(tree, a, b, edge_edge, vertex_face);
+  });
 }
 
 void Worker::flush() {
@@ -84,7 +83,7 @@ void Worker::test(const std::uint32_t* first, const std::uint32_t* second, std::
       v[0] = g.edges[a][0], v[1] = g.edges[a][1], v[2] = g.edges[b][0], v[3] = g.edges[b][1];
     Vec3<double> q_t0[4], q_t1[4];
     for (int k = 0; k < 4; ++k) q_t0[k] = vec(g.vertices[v[k]].t0), q_t1[k] = vec(g.vertices[v[k]].t1);
-    if (const auto toc = last_resort(accuracy, kind, q_t0, q_t1)) report(kind, a, b, *toc);
+    if (const auto toc = last_resort(accuracy, search_->limits, kind, q_t0, q_t1)) report(kind, a, b, *toc);
   }
 }
 

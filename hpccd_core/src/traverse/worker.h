@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "elementary/batch.h"
+#include "elementary/inclusion.h"
 #include "traverse/leaf_pairs.h"
 
 namespace hpccd {
@@ -24,6 +25,7 @@ struct Search {
   BatchTest batch_test[4];  // by accuracy
   LeafPairs leaf_pairs;
   Report report;
+  inclusion::Limits limits;
   std::atomic<double> earliest;  // best time so far, where report is first
 };
 
@@ -35,6 +37,16 @@ class Worker {
   void begin(Search& search);
   // Candidates of two leaves whose boxes overlap, to be tested at `accuracy`.
   void leaf_pair(const Tree& tree, const LeafRange& a, const LeafRange& b, Accuracy accuracy);
+  // The same from any source: add(edge_edge, vertex_face) appends at most CandidateBuffer::most_per_call pairs to each.
+  template <class Add>
+  void candidates(Accuracy accuracy, Add&& add) {
+    ++leaf_pairs;
+    Waiting& waiting = waiting_at(accuracy);
+    add(waiting.edge_edge, waiting.vertex_face);
+    if (waiting.edge_edge.n >= batch_capacity) drain(waiting.edge_edge, Kind::edge_edge, accuracy, batch_capacity);
+    if (waiting.vertex_face.n >= batch_capacity)
+      drain(waiting.vertex_face, Kind::vertex_face, accuracy, batch_capacity);
+  }
   void flush();  // tests what waits
   std::size_t bytes() const;
 
@@ -48,6 +60,11 @@ class Worker {
   struct Waiting {
     CandidateBuffer edge_edge, vertex_face;
   };
+  Waiting& waiting_at(Accuracy accuracy) {
+    auto& waiting = waiting_[static_cast<int>(accuracy)];
+    if (!waiting) waiting = std::make_unique<Waiting>();
+    return *waiting;
+  }
   void drain(CandidateBuffer& buffer, Kind kind, Accuracy accuracy, std::uint32_t keep_below);
   void test(const std::uint32_t* first, const std::uint32_t* second, std::uint32_t n, Kind kind, Accuracy accuracy);
   void report(Kind kind, std::uint32_t first, std::uint32_t second, double toc);
