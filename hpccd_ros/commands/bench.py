@@ -1,0 +1,42 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Measure speed, scaling, memory and accuracy on this machine; print tables, write JSON, CSV and pictures.
+
+  hpccd bench cpu n-body-like-lr            ms a frame and where they go, in under a minute
+  hpccd bench cpu data --peer ipctk         side by side with ipctk
+  hpccd bench scaling                       speed-up against threads, for each method
+  hpccd bench accuracy                      what each tier costs, and where it errs
+  hpccd bench <benchmark> --help            scenes, options and examples of one benchmark
+
+Every benchmark takes generated scenes (`hpccd scene --list`), the files of the folder HPCCD_DATA, or any recording of
+`hpccd record`. Variants run in turn on the same steps; close other programs first: the result says how busy they were.
+"""
+
+import argparse
+import importlib
+import importlib.util
+
+BENCHMARKS = {
+    "cpu": "ms a frame of each scene (Table 1), its components, and a peer beside it",
+    "scaling": "speed-up over one thread against threads (Fig. 6 and 7), for each method",
+    "methods": "the methods and instruction sets compared: time, and equality of the results",
+    "size": "how time and memory grow with the number of triangles",
+    "memory": "peak memory and bytes per triangle",
+    "options": "what each way to model less saves",
+    "accuracy": "the tiers: time, wrong answers, error of times; sweeps of scale and offset",
+}
+
+
+def configure(parser):
+    subparsers = parser.add_subparsers(dest="benchmark", metavar="<benchmark>", required=True)
+    for name, summary in BENCHMARKS.items():
+        if importlib.util.find_spec(f"hpccd_ros.bench.{name}") is None:
+            continue
+        subparser = subparsers.add_parser(name, help=summary, formatter_class=argparse.RawDescriptionHelpFormatter)
+        module = importlib.import_module(f"hpccd_ros.bench.{name}")
+        subparser.description = module.__doc__
+        module.configure(subparser)
+        subparser.set_defaults(run_benchmark=module.run)
+
+
+def run(args) -> int:
+    return args.run_benchmark(args)
