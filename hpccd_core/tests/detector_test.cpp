@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: Apache-2.0
+// The public C++ interface; the same contacts on any number of threads is also what the sanitizers are run on.
+#include <gtest/gtest.h>
+
+#include <thread>
+
+#include "grid_scene.h"
+
+namespace hpccd {
+namespace {
+
+constexpr std::uint32_t side = 25;
+
+Contacts detect(std::shared_ptr<const Scene> scene, Options options) {
+  options.backend = Backend::cpu;
+  Detector detector(std::move(scene), options);
+  const auto start = test::sheet_positions(side, 0), end = test::sheet_positions(side, 1);
+  return detector.detect(test::view(start), test::view(end));
+}
+
+// Every pair tested by itself: what the hierarchy and the traversal must find again.
+Contacts detect_pair_by_pair(const Scene& scene) {
+  const auto start = test::sheet_positions(side, 0), end = test::sheet_positions(side, 1);
+  std::vector<Query> queries;
+  std::vector<std::array<std::uint32_t, 2>> pairs;
+  for (std::uint32_t vertex = 0; vertex < scene.n_vertices(); ++vertex)
+    for (std::uint32_t face = 0; face < scene.faces().size(); ++face) {
+      const auto& [a, b, c] = scene.faces()[face];
+      if (vertex == a || vertex == b || vertex == c) continue;
+      Query query;
+      auto value = query.begin();
+      for (const auto& positions : {start, end})
+        for (std::uint32_t corner : {vertex, a, b, c})
+          value = std::copy_n(positions.begin() + 3 * corner, 3, value);
+      queries.push_back(query);
+      pairs.push_back({vertex, face});
+    }
+  const auto hit = std::make_unique<bool[]>(queries.size());
+  std::vector<double> toc(queries.size());
+  Options options;
+  options.simd = Simd::scalar;
+  test_vertex_face(queries, options, hit.get(), toc.data());
+  Contacts contacts;
+  for (std::size_t i = 0; i < pairs.size(); ++i)
+    if (hit[i]) contacts.vf.push_back(pairs[i]), contacts.vf_toc.push_back(toc[i]);
+  return contacts;
+}
+
+void expect_equal(const Contacts& a, const Contacts& b) {
+  EXPECT_EQ(a.vf, b.vf);
+  EXPECT_EQ(a.ee, b.ee);
+  EXPECT_EQ(a.vf_toc, b.vf_toc);
+  EXPECT_EQ(a.ee_toc, b.ee_toc);
+  EXPECT_EQ(a.hash, b.hash);
+}
+
+TEST(Detector, FindsWhatTestingEachPairFinds) {
+  const auto scene = test::two_sheets(side);
+  const Contacts found = detect(scene, {}), expected = detect_pair_by_pair(*scene);
+  ASSERT_GT(expected.vf.size(), 100u);
+  EXPECT_EQ(found.vf, expected.vf);
+  ASSERT_EQ(found.vf_toc.size(), expected.vf_toc.size());
+  for (std::size_t i = 0; i < expected.vf_toc.size(); ++i) EXPECT_NEAR(found.vf_toc[i], expected.vf_toc[i], 1e-12);
+}
+
+TEST(Detector, SameContactsOnAnyNumberOfThreads) {
+  for (Accuracy accuracy : {Accuracy::fast, Accuracy::balanced, Accuracy::exact}) {
+    const Contacts alone = detect(test::two_sheets(side), {.accuracy = accuracy, .threads = 1});
+    ASSERT_GT(alone.vf.size() + alone.ee.size(), 500u);
+    for (int threads : {2, 3, 8})
+      expect_equal(alone, detect(test::two_sheets(side), {.accuracy = accuracy, .threads = threads}));
+  }
+}
+
+TEST(Detector, DetectorsOfOneSceneWorkSideBySide) {
+  const auto scene = test::two_sheets(side);
+  const Contacts expected = detect(scene, {.threads = 1});
+  std::vector<Contacts> found(3);
+  std::vector<std::thread> threads;
+  for (Contacts& contacts : found) threads.emplace_back([&] { contacts = detect(scene, {.threads = 2}); });
+  for (std::thread& thread : threads) thread.join();
+  for (const Contacts& contacts : found) expect_equal(expected, contacts);
+}
+
+TEST(Detector, RefusesPositionsThatDoNotFitTheScene) {
+  Detector detector(test::two_sheets(side), {.backend = Backend::cpu});
+  const auto right = test::sheet_positions(side, 0), too_few = std::vector(right.begin(), right.begin() + 6);
+  EXPECT_THROW(detector.detect(test::view(right), test::view(too_few)), InvalidArgument);
+  auto not_finite = right;
+  not_finite[7] = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THROW(detector.detect(test::view(right), test::view(not_finite)), InvalidArgument);
+  EXPECT_NO_THROW(detector.detect(test::view(right), test::view(right)));
+}
+
+}  // namespace
+}  // namespace hpccd

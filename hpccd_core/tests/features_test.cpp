@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "scene/features.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <set>
+
+#include "grid_scene.h"
+
+namespace hpccd {
+namespace {
+
+constexpr std::uint32_t side = 9, lone = 2;
+
+TEST(Features, EdgesAreUniqueOrderedAndThoseOfTheTriangles) {
+  const auto scene = test::two_sheets(side, lone);
+  const Features features = features_of(*scene);
+  std::set<std::array<std::uint32_t, 2>> expected;
+  for (const auto& face : scene->faces())
+    for (int k = 0; k < 3; ++k) {
+      const auto [low, high] = std::minmax(face[k], face[(k + 1) % 3]);
+      expected.insert({low, high});
+    }
+  EXPECT_EQ(features.edges, (std::vector<std::array<std::uint32_t, 2>>(expected.begin(), expected.end())));
+}
+
+// "Each feature assigned to one triangle" (Kim et al. 2009, section 6) is what makes every pair tested once.
+TEST(Features, EachFeatureIsRepresentedOnceByATriangleThatHasIt) {
+  const auto scene = test::two_sheets(side, lone);
+  const Features features = features_of(*scene);
+  std::vector<int> edge_owners(features.edges.size()), vertex_owners(scene->n_vertices());
+  for (std::uint32_t carrier = 0; carrier < features.n_carriers(); ++carrier) {
+    const bool is_face = carrier < features.n_faces();
+    for (auto i = features.first_edge[carrier]; i < features.first_edge[carrier + 1]; ++i) {
+      const std::uint32_t edge = features.owned_edges[i];
+      ++edge_owners[edge];
+      ASSERT_TRUE(is_face);
+      for (std::uint32_t end : features.edges[edge])
+        EXPECT_EQ(std::ranges::count(features.faces[carrier], end), 1) << "edge " << edge << ", face " << carrier;
+    }
+    for (auto i = features.first_vertex[carrier]; i < features.first_vertex[carrier + 1]; ++i) {
+      const std::uint32_t vertex = features.owned_vertices[i];
+      ++vertex_owners[vertex];
+      if (is_face) {
+        EXPECT_EQ(std::ranges::count(features.faces[carrier], vertex), 1);
+      } else {
+        EXPECT_EQ(features.lone_vertices[carrier - features.n_faces()], vertex);
+      }
+    }
+  }
+  EXPECT_EQ(edge_owners, std::vector<int>(features.edges.size(), 1));
+  EXPECT_EQ(vertex_owners, std::vector<int>(scene->n_vertices(), 1));
+  EXPECT_EQ(features.lone_vertices.size(), lone * test::sheets);
+}
+
+}  // namespace
+}  // namespace hpccd

@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "bvh/tree.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "bvh/motion_bounds.h"
+#include "grid_scene.h"
+
+namespace hpccd {
+namespace {
+
+constexpr std::uint32_t side = 17, lone = 3;
+
+bool contains(const Box& outer, const Box& inner) {
+  for (int k = 0; k < 3; ++k)
+    if (inner.low[k] < outer.low[k] || inner.high[k] > outer.high[k]) return false;
+  return true;
+}
+
+struct TreeTest : testing::Test {
+  std::shared_ptr<const Scene> scene = test::two_sheets(side, lone);
+  Features features = features_of(*scene);
+  ThreadPool pool{2};
+  MotionBounds motion;
+  Tree tree;
+
+  void take(double t0, double t1) {
+    const auto start = test::sheet_positions(side, t0, lone), end = test::sheet_positions(side, t1, lone);
+    motion.take(test::view(start), test::view(end), pool);
+  }
+
+  // Each node's box holds its children's; each leaf's box holds the motion of all vertices of its features.
+  void expect_bounds() const {
+    for (const Node& node : tree.nodes)
+      if (node.children) {
+        for (std::uint32_t child : {node.children, node.children + 1})
+          EXPECT_TRUE(contains(node.box, tree.nodes[child].box));
+      } else {
+        const LeafRange& leaf = tree.leaves[node.leaf];
+        for (auto slot = leaf.first_face; slot < leaf.end_face; ++slot)
+          for (std::uint32_t vertex : features.faces[tree.face_of_slot[slot]])
+            EXPECT_TRUE(contains(node.box, motion.boxes[vertex]));
+        for (auto slot = leaf.first_edge; slot < leaf.end_edge; ++slot)
+          for (std::uint32_t vertex : features.edges[tree.edge_of_slot[slot]])
+            EXPECT_TRUE(contains(node.box, motion.boxes[vertex]));
+        for (auto slot = leaf.first_vertex; slot < leaf.end_vertex; ++slot)
+          EXPECT_TRUE(contains(node.box, motion.boxes[tree.vertex_of_slot[slot]]));
+      }
+  }
+};
+
+TEST_F(TreeTest, EachFeatureLiesInOneLeaf) {
+  take(0, 0.3);
+  build(tree, *scene, features, motion.boxes, pool);
+  std::vector<int> faces(features.n_faces()), edges(features.edges.size()), vertices(features.n_vertices);
+  for (const LeafRange& leaf : tree.leaves) {
+    for (auto slot = leaf.first_face; slot < leaf.end_face; ++slot) ++faces[tree.face_of_slot[slot]];
+    for (auto slot = leaf.first_edge; slot < leaf.end_edge; ++slot) ++edges[tree.edge_of_slot[slot]];
+    for (auto slot = leaf.first_vertex; slot < leaf.end_vertex; ++slot) ++vertices[tree.vertex_of_slot[slot]];
+  }
+  EXPECT_EQ(std::ranges::count(faces, 1), static_cast<std::ptrdiff_t>(faces.size()));
+  EXPECT_EQ(std::ranges::count(edges, 1), static_cast<std::ptrdiff_t>(edges.size()));
+  EXPECT_EQ(std::ranges::count(vertices, 1), static_cast<std::ptrdiff_t>(vertices.size()));
+}
+
+TEST_F(TreeTest, BoxesBoundTheMotionAfterBuild) {
+  take(0, 0.3);
+  build(tree, *scene, features, motion.boxes, pool);
+  expect_bounds();
+}
+
+TEST_F(TreeTest, BoxesBoundTheMotionAfterRefit) {
+  take(0, 0.3);
+  build(tree, *scene, features, motion.boxes, pool);
+  take(0.3, 1);
+  refit(tree, motion.boxes, pool);
+  expect_bounds();
+}
+
+TEST_F(TreeTest, RefitToTheSameMotionChangesNothing) {
+  take(0, 0.3);
+  build(tree, *scene, features, motion.boxes, pool);
+  const std::vector<Node> built = tree.nodes;
+  refit(tree, motion.boxes, pool);
+  for (std::size_t i = 0; i < built.size(); ++i) {
+    EXPECT_TRUE(contains(tree.nodes[i].box, built[i].box)) << "node " << i;
+    EXPECT_TRUE(contains(built[i].box, tree.nodes[i].box)) << "node " << i;
+  }
+}
+
+}  // namespace
+}  // namespace hpccd
