@@ -28,7 +28,7 @@ struct TreeTest : testing::Test {
 
   void take(double t0, double t1) {
     const auto start = test::sheet_positions(side, t0, lone), end = test::sheet_positions(side, t1, lone);
-    motion.take(test::view(start), test::view(end), pool);
+    motion.take(test::view(start), test::view(end), 0, pool);
   }
 
   // Each node's box holds its children's; each leaf's box holds the motion of all vertices of its features.
