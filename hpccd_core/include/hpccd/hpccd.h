@@ -92,6 +92,7 @@ struct Positions {
   const void* data = nullptr;
   std::size_t n = 0;
   bool is_double = true;
+  bool on_device = false;  // data is in a GPU's memory
 };
 
 class Detector {

@@ -4,9 +4,10 @@
 // implies map(x) <= map(y)), which is all that culling needs to be safe.
 #pragma once
 
-#include <cmath>
+#include <math.h>
 
-#include "bvh/box.h"
+#include "base/hd.h"
+#include "base/real.h"
 
 namespace hpccd {
 
@@ -15,18 +16,19 @@ struct CoordinateMap {
   double scale = 1;
 
   // Maps the given ranges to about [-1, 1].
-  static CoordinateMap around(const double low[3], const double high[3]) {
+  HPCCD_HD static CoordinateMap around(const double low[3], const double high[3]) {
     CoordinateMap m;
     double extent = 0;
     for (int k = 0; k < 3; ++k) {
       m.center[k] = 0.5 * low[k] + 0.5 * high[k];
-      extent = std::max(extent, 0.5 * high[k] - 0.5 * low[k]);
+      extent = greater(0.5 * high[k] - 0.5 * low[k], extent);
     }
-    if (extent > 0) m.scale = std::ldexp(1.0, -std::clamp(std::ilogb(extent), -1000, 1000));
+    const int exponent = extent > 0 ? ilogb(extent) : 0;
+    if (extent > 0) m.scale = ldexp(1.0, exponent < -1000 ? 1000 : exponent > 1000 ? -1000 : -exponent);
     return m;
   }
 
-  float operator()(double x, int k) const { return static_cast<float>((x - center[k]) * scale); }
+  HPCCD_HD float operator()(double x, int k) const { return static_cast<float>((x - center[k]) * scale); }
 
   bool operator==(const CoordinateMap&) const = default;
 };

@@ -2,33 +2,13 @@
 #include "contacts/canonical.h"
 
 #include <algorithm>
-#include <cstring>
 
 #include "contacts/geometry.h"
+#include "contacts/hash.h"
 #include "contacts/order.h"
 
 namespace hpccd {
 namespace {
-
-// Finaliser of MurmurHash3 (public domain constants): every input bit reaches every output bit.
-std::uint64_t mix(std::uint64_t x) {
-  x ^= x >> 33, x *= 0xff51afd7ed558ccdULL;
-  x ^= x >> 33, x *= 0xc4ceb9fe1a85ec53ULL;
-  return x ^ (x >> 33);
-}
-
-std::uint64_t bits_of(double x) {
-  std::uint64_t b;
-  std::memcpy(&b, &x, sizeof b);
-  return b;
-}
-
-// A sum over contacts: the same in any order, so that threads and devices can each add their part.
-std::uint64_t hash_of(Kind kind, std::uint64_t a, std::uint64_t b, double toc) {
-  return mix(mix(mix(a + (kind == Kind::edge_edge ? 0x9e3779b97f4a7c15ULL : 1)) ^ b) ^ bits_of(toc));
-}
-
-std::uint64_t pack(std::uint32_t high, std::uint32_t low) { return (std::uint64_t{high} << 32) | low; }
 
 std::vector<Found> take(std::vector<Worker>& workers, std::vector<Found> Worker::*list, ThreadPool& pool) {
   std::vector<const std::vector<Found>*> lists;

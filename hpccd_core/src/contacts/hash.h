@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+// The hash of a set of contacts: a sum over contacts, the same in any order, so that threads and devices can each add
+// their part.
+#pragma once
+
+#include <cstdint>
+#include <cstring>
+
+#include "base/hd.h"
+#include "elementary/motion.h"
+
+namespace hpccd {
+
+// Finaliser of MurmurHash3 (public domain constants): every input bit reaches every output bit.
+HPCCD_HD std::uint64_t mix(std::uint64_t x) {
+  x ^= x >> 33, x *= 0xff51afd7ed558ccdULL;
+  x ^= x >> 33, x *= 0xc4ceb9fe1a85ec53ULL;
+  return x ^ (x >> 33);
+}
+
+HPCCD_HD std::uint64_t bits_of(double x) {
+  std::uint64_t b;
+  memcpy(&b, &x, sizeof b);
+  return b;
+}
+
+// a, b: vertex and face, or both edges, each as first vertex << 32 | second vertex.
+HPCCD_HD std::uint64_t hash_of(Kind kind, std::uint64_t a, std::uint64_t b, double toc) {
+  return mix(mix(mix(a + (kind == Kind::edge_edge ? 0x9e3779b97f4a7c15ULL : 1)) ^ b) ^ bits_of(toc));
+}
+
+HPCCD_HD std::uint64_t pack(std::uint32_t high, std::uint32_t low) { return (std::uint64_t{high} << 32) | low; }
+
+}  // namespace hpccd

@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+// bvh/motion_bounds.cpp on the device: extent of the scene, then rows and boxes of the vertices. Same arithmetic.
+#pragma once
+
+#include "bvh/coordinate_map.h"
+#include "gpu/frame.cuh"
+
+namespace hpccd::gpu {
+
+// Bits of a double whose order as integers is the order of the numbers.
+__device__ inline u64 ordered_bits(double x) {
+  const u64 b = static_cast<u64>(__double_as_longlong(x));
+  return b >> 63 ? ~b : b | (u64{1} << 63);
+}
+__device__ inline double from_ordered_bits(u64 b) {
+  return __longlong_as_double(static_cast<long long>(b >> 63 ? b & ~(u64{1} << 63) : ~b));
+}
+
+// Beyond this, differences and squares of coordinates could overflow in the error bounds (motion_bounds.h).
+inline constexpr double largest_usable = 1e150;
+
+template <class T>
+__global__ void extent_kernel(Frame<T> f) {
+  double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
+  bool bad = false;
+  const u32 stride = gridDim.x * blockDim.x;
+  for (u32 i = blockIdx.x * blockDim.x + threadIdx.x; i < f.n_vertices; i += stride)
+    for (int k = 0; k < 3; ++k) {
+      const double a = f.given_t0[3 * static_cast<u64>(i) + k], b = f.given_t1[3 * static_cast<u64>(i) + k];
+      bad = bad || !(fabs(a) <= largest_usable) || !(fabs(b) <= largest_usable);
+      low[k] = fmin(low[k], fmin(a, b));
+      high[k] = fmax(high[k], fmax(a, b));
+    }
+  for (int k = 0; k < 3; ++k)
+    for (int d = 16; d > 0; d /= 2) {
+      low[k] = fmin(low[k], __shfl_xor_sync(all_lanes, low[k], d));
+      high[k] = fmax(high[k], __shfl_xor_sync(all_lanes, high[k], d));
+    }
+  __shared__ double part[32][6];
+  const u32 warp = threadIdx.x / 32, n_warps = blockDim.x / 32;
+  if (lane_number() == 0)
+    for (int k = 0; k < 3; ++k) part[warp][k] = low[k], part[warp][3 + k] = high[k];
+  if (bad) atomicAdd(&f.counters->bad, u64{1});
+  __syncthreads();
+  if (threadIdx.x >= 3) return;
+  const u32 k = threadIdx.x;
+  for (u32 w = 0; w < n_warps; ++w) low[0] = fmin(w ? low[0] : INFINITY, part[w][k]), high[0] = fmax(w ? high[0] : -INFINITY, part[w][3 + k]);
+  atomicMax(&f.counters->extent_low[k], ~ordered_bits(low[0]));
+  atomicMax(&f.counters->extent_high[k], ordered_bits(high[0]));
+}
+
+__device__ inline void set_row(Row<float>& r, const float* a, const float* b) {
+  r.t0 = {a[0], a[1], a[2], 0}, r.t1 = {b[0], b[1], b[2], 0};
+}
+__device__ inline void set_row(Row<double>& r, const double* a, const double* b) {
+  r.t0[0] = {a[0], a[1]}, r.t0[1] = {a[2], 0}, r.t1[0] = {b[0], b[1]}, r.t1[1] = {b[2], 0};
+}
+
+template <class T>
+__global__ void rows_kernel(Frame<T> f) {
+  const u32 i = blockIdx.x * blockDim.x + threadIdx.x;
+  if (i >= f.n_vertices) return;
+  double low[3], high[3];
+  for (int k = 0; k < 3; ++k) {
+    low[k] = from_ordered_bits(~f.counters->extent_low[k]);
+    high[k] = from_ordered_bits(f.counters->extent_high[k]);
+  }
+  const CoordinateMap map = CoordinateMap::around(low, high);
+  T a[3], b[3];
+  DeviceBox box;
+  for (int k = 0; k < 3; ++k) {
+    a[k] = f.given_t0[3 * static_cast<u64>(i) + k], b[k] = f.given_t1[3 * static_cast<u64>(i) + k];
+    const float x = map(a[k], k), y = map(b[k], k);
+    box.low[k] = x < y ? x : y;
+    box.high[k] = x < y ? y : x;
+  }
+  box.tag_low = box.tag_high = 0;
+  set_row(f.rows[i], a, b);
+  store_box(&f.vertex_boxes[i], box);
+}
+
+}  // namespace hpccd::gpu

@@ -1,0 +1,225 @@
+// SPDX-License-Identifier: Apache-2.0
+// Candidate pairs of features (traverse/leaf_pairs.inl) and the first filter on them, in one kernel: candidates wait in
+// shared memory until a warp is full, and only those that pass the sign test reach device memory (a third of them on
+// cloth-ball, a fifth on n-body).
+#pragma once
+
+#include "bvh/tree.h"
+#include "elementary/certified.h"
+#include "gpu/frame.cuh"
+
+namespace hpccd::gpu {
+
+inline constexpr u32 candidate_warps = 4;
+static_assert(3 * Tree::leaf_size <= 32, "a lane for each feature of a leaf");
+
+struct CandidateSpace {
+  // Features of the two leaves that overlap the other leaf, and their numbers.
+  DeviceBox box[2][3 * Tree::leaf_size];
+  u32 number[2][3 * Tree::leaf_size];
+  u32 corner2[Tree::leaf_size];
+  // Candidates: the vertices that p, a and b lead from and to, and the features.
+  uint4 vertices[64];
+  uint2 features[64];
+  uint2 survivors[2][96];
+};
+
+// Edges of a leaf that overlap `other`, one after the other in list `side`.
+template <class T>
+__device__ u32 stage_edges(const Frame<T>& f, const DeviceLeaf& l, const DeviceBox& other, CandidateSpace& s, u32 side) {
+  const u32 lane = lane_number(), slot = l.first_edge + lane;
+  DeviceBox b;
+  bool near = lane < (l.counts >> 8 & 0xFF);
+  if (near) {
+    b = load_box(&f.edge_boxes[slot]);
+    near = overlap(b, other);
+  }
+  const u32 mask = __ballot_sync(all_lanes, near), at = __popc(mask & ((1u << lane) - 1));
+  if (near) {
+    s.box[side][at] = b;
+    s.number[side][at] = __ldg(&f.edge_of_slot[slot]);
+  }
+  return __popc(mask);
+}
+
+template <class T>
+__device__ u32 stage_vertices(const Frame<T>& f, const DeviceLeaf& l, const DeviceBox& other, CandidateSpace& s) {
+  const u32 lane = lane_number();
+  DeviceBox b;
+  u32 v = 0;
+  bool near = lane < l.counts >> 16;
+  if (near) {
+    v = __ldg(&f.vertex_of_slot[l.first_vertex + lane]);
+    b = load_box(&f.vertex_boxes[v]);
+    near = overlap(b, other);
+  }
+  const u32 mask = __ballot_sync(all_lanes, near), at = __popc(mask & ((1u << lane) - 1));
+  if (near) {
+    b.tag_low = v;
+    s.box[0][at] = b;
+  }
+  return __popc(mask);
+}
+
+template <class T>
+__device__ u32 stage_faces(const Frame<T>& f, const DeviceLeaf& l, const DeviceBox& other, CandidateSpace& s) {
+  const u32 lane = lane_number(), slot = l.first_face + lane;
+  DeviceBox b;
+  bool near = lane < (l.counts & 0xFF);
+  if (near) {
+    b = load_box(&f.face_boxes[slot]);
+    near = overlap(b, other);
+  }
+  const u32 mask = __ballot_sync(all_lanes, near), at = __popc(mask & ((1u << lane) - 1));
+  if (near) {
+    s.box[1][at] = b;
+    s.corner2[at] = __ldg(&f.face_corner2[slot]);
+    s.number[1][at] = __ldg(&f.face_of_slot[slot]);
+  }
+  return __popc(mask);
+}
+
+// What a warp carries along.
+struct CandidateState {
+  u32 n = 0, n_survivors[2] = {0, 0};
+  u32 tested[2] = {0, 0};
+};
+
+template <class T>
+__device__ void flush_survivors(const Frame<T>& f, CandidateSpace& s, u32 kind, u32 n) {
+  __syncwarp();
+  u64 base = 0;
+  if (lane_number() == 0) base = atomicAdd(&f.counters->survivors[kind], static_cast<u64>(n));
+  base = __shfl_sync(all_lanes, base, 0);
+  for (u32 i = lane_number(); i < n; i += 32)
+    if (base + i < f.survivors[kind].capacity) f.survivors[kind].pairs[base + i] = s.survivors[kind][i];
+  __syncwarp();
+}
+
+// The first filter on the last up to 32 candidates. One piece of code for both kinds: they differ in where b starts.
+template <class T>
+__device__ __noinline__ void filter_candidates(const Frame<T>& f, CandidateSpace& s, CandidateState& state) {
+  __syncwarp();
+  const u32 lane = lane_number(), n = state.n < 32 ? state.n : 32;
+  state.n -= n;
+  bool survives = false, edges = false;
+  uint2 features{0, 0};
+  if (lane < n) {
+    const uint4 v = s.vertices[state.n + lane];
+    features = s.features[state.n + lane];
+    edges = features.y & kind_bit;
+    features.y &= ~kind_bit;
+    const Ends from = load_row(f.rows, v.x), p = load_row(f.rows, v.y), a = load_row(f.rows, v.z), b = load_row(f.rows, v.w);
+    const Vec3<double> b_from0 = edges ? p.t0 : from.t0, b_from1 = edges ? p.t1 : from.t1;
+    const Motion<double> m{p.t0 - from.t0, a.t0 - from.t0, b.t0 - b_from0, p.t1 - from.t1, a.t1 - from.t1, b.t1 - b_from1};
+    survives = !coplanarity_filter<Proven>(m).none;
+  }
+  for (u32 kind = 0; kind < 2; ++kind) {
+    const bool mine = edges == (kind == 1);
+    state.tested[kind] += __popc(__ballot_sync(all_lanes, lane < n && mine));
+    const u32 mask = __ballot_sync(all_lanes, survives && mine);
+    if (survives && mine) s.survivors[kind][state.n_survivors[kind] + __popc(mask & ((1u << lane) - 1))] = features;
+    state.n_survivors[kind] += __popc(mask);
+    if (state.n_survivors[kind] >= 64) {
+      flush_survivors(f, s, kind, state.n_survivors[kind]);
+      state.n_survivors[kind] = 0;
+    }
+  }
+  __syncwarp();
+}
+
+template <class T>
+__device__ void push_candidates(const Frame<T>& f, CandidateSpace& s, CandidateState& state, bool wanted, uint4 vertices,
+                                uint2 features) {
+  const u32 mask = __ballot_sync(all_lanes, wanted);
+  if (!mask) return;
+  const u32 at = state.n + __popc(mask & ((1u << lane_number()) - 1));
+  if (wanted) {
+    s.vertices[at] = vertices;
+    s.features[at] = features;
+  }
+  state.n += __popc(mask);
+  if (state.n >= 32) filter_candidates(f, s, state);
+}
+
+// i / n for i < 1024 and n <= 32: exact, since the error i (magic n - 65536) / (65536 n) stays below 1 / n.
+__device__ inline u32 magic_of(u32 n) { return (65536 + n - 1) / n; }
+
+template <class T>
+__device__ void edge_candidates(const Frame<T>& f, CandidateSpace& s, CandidateState& state, u32 na, u32 nb, bool same) {
+  if (na == 0 || nb == 0) return;
+  const u32 total = na * nb, magic = magic_of(nb), side = same ? 0 : 1;
+  for (u32 base = 0; base < total; base += 32) {
+    const u32 c = base + lane_number(), i = c * magic >> 16, j = c - i * nb;
+    bool wanted = c < total && (!same || i < j);
+    uint4 v{0, 0, 0, 0};
+    uint2 numbers{0, 0};
+    if (wanted) {
+      const DeviceBox &a = s.box[0][i], &b = s.box[side][j];
+      wanted = overlap(a, b) && a.tag_low != b.tag_low && a.tag_low != b.tag_high && a.tag_high != b.tag_low &&
+               a.tag_high != b.tag_high;
+      const u32 x = s.number[0][i], y = s.number[side][j];
+      const DeviceBox &lower = x < y ? a : b, &upper = x < y ? b : a;
+      v = {lower.tag_low, upper.tag_low, lower.tag_high, upper.tag_high};
+      numbers = {x < y ? x : y, (x < y ? y : x) | kind_bit};
+    }
+    push_candidates(f, s, state, wanted, v, numbers);
+  }
+}
+
+template <class T>
+__device__ void vertex_face_candidates(const Frame<T>& f, CandidateSpace& s, CandidateState& state, const DeviceLeaf& a,
+                                       const DeviceLeaf& b, const DeviceBox& box_a, const DeviceBox& box_b) {
+  const u32 n_vertices = stage_vertices(f, a, box_b, s), n_faces = n_vertices ? stage_faces(f, b, box_a, s) : 0;
+  __syncwarp();
+  if (n_faces == 0) return;
+  const u32 total = n_vertices * n_faces, magic = magic_of(n_faces);
+  for (u32 base = 0; base < total; base += 32) {
+    const u32 c = base + lane_number(), i = c * magic >> 16, j = c - i * n_faces;
+    bool wanted = c < total;
+    uint4 v{0, 0, 0, 0};
+    uint2 numbers{0, 0};
+    if (wanted) {
+      const DeviceBox &vertex = s.box[0][i], &face = s.box[1][j];
+      v = {face.tag_low, vertex.tag_low, face.tag_high, s.corner2[j]};
+      wanted = overlap(vertex, face) && v.y != v.x && v.y != v.z && v.y != v.w;
+      numbers = {v.y, s.number[1][j]};
+    }
+    push_candidates(f, s, state, wanted, v, numbers);
+  }
+  __syncwarp();
+}
+
+template <class T>
+__global__ __launch_bounds__(32 * candidate_warps) void candidates_kernel(const __grid_constant__ Frame<T> f) {
+  __shared__ CandidateSpace spaces[candidate_warps];
+  CandidateSpace& s = spaces[threadIdx.x / 32];
+  CandidateState state;
+  constexpr u32 grain = 8;
+  const u64 all = f.counters->leaf_pairs < f.leaf_pairs.capacity ? f.counters->leaf_pairs : f.leaf_pairs.capacity;
+  const u64 from = all * f.segment / f.n_segments, to = all * (f.segment + 1) / f.n_segments;
+  for (;;) {
+    u64 begin = 0;
+    if (lane_number() == 0) begin = from + atomicAdd(&f.counters->next_leaf_pair, static_cast<u64>(grain));
+    begin = __shfl_sync(all_lanes, begin, 0);
+    if (begin >= to) break;
+    for (u64 k = begin; k < begin + grain && k < to; ++k) {
+      const uint2 pair = f.leaf_pairs.pairs[k];
+      const bool same = pair.x == pair.y;
+      const DeviceLeaf a = f.leaves[pair.x], b = f.leaves[pair.y];
+      const DeviceBox box_a = load_box(&f.leaf_boxes[pair.x]), box_b = load_box(&f.leaf_boxes[pair.y]);
+      const u32 na = stage_edges(f, a, box_b, s, 0), nb = same ? na : stage_edges(f, b, box_a, s, 1);
+      __syncwarp();
+      edge_candidates(f, s, state, na, nb, same);
+      __syncwarp();
+      vertex_face_candidates(f, s, state, a, b, box_a, box_b);
+      if (!same) vertex_face_candidates(f, s, state, b, a, box_b, box_a);
+    }
+  }
+  if (state.n > 0) filter_candidates(f, s, state);
+  for (u32 kind = 0; kind < 2; ++kind)
+    if (state.n_survivors[kind] > 0) flush_survivors(f, s, kind, state.n_survivors[kind]);
+  if (lane_number() < 2) atomicAdd(&f.counters->candidates[lane_number()], static_cast<u64>(state.tested[lane_number()]));
+}
+
+}  // namespace hpccd::gpu

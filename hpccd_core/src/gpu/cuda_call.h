@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cuda_runtime.h>
+
+#include "gpu/device.h"
+
+namespace hpccd::gpu {
+
+// Every CUDA call goes through here; throws Error with the call's own words.
+void check(cudaError_t result, const char* what);
+inline void check_launch(const char* kernel) { check(cudaGetLastError(), kernel); }
+
+}  // namespace hpccd::gpu

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <atomic>
+
+#include "gpu/cuda_call.h"
+
+#ifndef HPCCD_CUDA_ARCHITECTURES_TEXT
+#define HPCCD_CUDA_ARCHITECTURES_TEXT "default architecture"
+#endif
+
+namespace hpccd::gpu {
+namespace {
+
+std::atomic<int> calls_until_failure{0};
+
+__global__ void probe(int* answer) { *answer = 42; }
+
+// Whether code of this build runs there: an older chip than the build's architectures says no only at a launch.
+std::string why_unusable(int device) {
+  cudaFuncAttributes attributes;
+  cudaError_t e = cudaSetDevice(device);
+  if (e == cudaSuccess) e = cudaFuncGetAttributes(&attributes, probe);
+  if (e == cudaSuccess) return "";
+  cudaGetLastError();
+  return cudaGetErrorString(e);
+}
+
+Status look() {
+  Status s;
+  s.compiled = true;
+  const int version = CUDART_VERSION;
+  s.toolkit = "CUDA " + std::to_string(version / 1000) + "." + std::to_string(version % 1000 / 10) + ", " +
+              HPCCD_CUDA_ARCHITECTURES_TEXT;
+  int n = 0;
+  if (const cudaError_t e = cudaGetDeviceCount(&n); e != cudaSuccess) {
+    cudaGetLastError();
+    s.reason = cudaGetErrorString(e);
+    return s;
+  }
+  if (n == 0) s.reason = "no CUDA device";
+  for (int i = 0; i < n; ++i) {
+    cudaDeviceProp p;
+    if (cudaGetDeviceProperties(&p, i) != cudaSuccess) continue;
+    if (const std::string why = why_unusable(i); !why.empty()) {
+      s.reason = std::string(p.name) + ": " + why;
+      continue;
+    }
+    s.devices.push_back({p.name, i, p.major, p.minor, p.multiProcessorCount, p.totalGlobalMem});
+  }
+  if (!s.devices.empty()) s.reason.clear();
+  return s;
+}
+
+}  // namespace
+
+const Status& status() {
+  static const Status s = look();
+  return s;
+}
+
+void fail_after(int checked_calls) { calls_until_failure = checked_calls; }
+
+void check(cudaError_t result, const char* what) {
+  if (calls_until_failure.load(std::memory_order_relaxed) > 0 && calls_until_failure.fetch_sub(1) == 1)
+    throw Error(std::string(what) + ": failure asked for by a test");
+  if (result == cudaSuccess) return;
+  cudaGetLastError();  // not sticky errors: the next call starts clean
+  throw Error(std::string(what) + ": " + cudaGetErrorString(result));
+}
+
+}  // namespace hpccd::gpu

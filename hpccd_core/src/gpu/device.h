@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+// Which GPUs there are, or why none is usable. Compiled with and without CUDA.
+#pragma once
+
+#include <cstddef>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace hpccd::gpu {
+
+struct Device {
+  std::string name;
+  int number = 0, major = 0, minor = 0, multiprocessors = 0;
+  std::size_t memory = 0;  // bytes
+};
+
+struct Status {
+  bool compiled = false;          // this build holds CUDA code
+  std::string toolkit;            // which version, and for which architectures
+  std::vector<Device> devices;    // the ones that run this build's code
+  std::string reason;             // why there are none; empty where there are
+};
+
+// Looked up once. Never throws: a machine without GPU is an answer, not an error.
+const Status& status();
+
+// A failed CUDA call or a full device memory. The frame it belongs to can be finished on the CPU.
+class Error : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+// For tests: lets the n-th of the next checked CUDA calls fail (1: the next one; 0: none).
+void fail_after(int checked_calls);
+
+}  // namespace hpccd::gpu

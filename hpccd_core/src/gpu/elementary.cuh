@@ -1,0 +1,139 @@
+// SPDX-License-Identifier: Apache-2.0
+// The later filters and the elementary tests (elementary/batch.inl), a thread a pair, each stage over the compacted
+// survivors of the one before.
+#pragma once
+
+#include "elementary/certified.h"
+#include "elementary/tolerant.h"
+#include "gpu/frame.cuh"
+
+namespace hpccd::gpu {
+
+// How many entries of a list are really there.
+__device__ inline u64 length(u64 counted, u64 capacity) { return counted < capacity ? counted : capacity; }
+
+// f(pair or nothing) for each pair of a list, whole warps at a time.
+template <class Function>
+__device__ void for_pairs(const PairList& list, u64 counted, Function&& function) {
+  const u64 n = length(counted, list.capacity), stride = static_cast<u64>(gridDim.x) * blockDim.x;
+  const u64 first = static_cast<u64>(blockIdx.x) * blockDim.x + threadIdx.x;
+  for (u64 i = first; i - lane_number() < n; i += stride) {
+    const bool valid = i < n;
+    function(valid, valid ? list.pairs[i] : uint2{0, 0});
+  }
+}
+
+template <Kind kind, class T>
+__global__ __launch_bounds__(128) void projection_kernel(const __grid_constant__ Frame<T> f) {
+  constexpr u32 k = kind == Kind::edge_edge;
+  for_pairs(f.survivors[k], f.counters->survivors[k], [&](bool valid, uint2 pair) {
+    bool one = false, many = false;
+    if (valid) {
+      const Motion<double> m = load_motion<kind>(f.rows, vertices_of<kind>(f, pair.x, pair.y));
+      const Magnitudes<double> size = magnitudes(m);
+      const bool usable = in_range(size);
+      const bool passes = !(certainly_outside<kind>(m, size) && usable);
+      const bool single = certainly_one_root(coplanarity(m), error_of<Proven>(size).coefficient) && usable;
+      one = passes && single;
+      many = passes && !single;
+    }
+    const u64 at_one = warp_append(&f.counters->single[k], one), at_many = warp_append(&f.counters->many[k], many);
+    if (one && at_one < f.single[k].capacity) f.single[k].pairs[at_one] = pair;
+    if (many && at_many < f.many[k].capacity) f.many[k].pairs[at_many] = pair;
+  });
+}
+
+template <class T>
+__device__ void append_found(const Frame<T>& f, Kind kind, bool wanted, uint2 pair, double toc) {
+  const u64 at = warp_append(&f.counters->found_all, wanted);
+  if (wanted && at < f.found_capacity) {
+    f.found_keys[at] = key_of(f.key_shift, f.kind_shift, kind, pair.x, pair.y);
+    f.found_tocs[at] = toc;
+  }
+}
+
+template <Kind kind, bool single, class T>
+__global__ __launch_bounds__(128) void roots_kernel(const __grid_constant__ Frame<T> f) {
+  constexpr u32 k = kind == Kind::edge_edge;
+  const PairList& list = single ? f.single[k] : f.many[k];
+  u32 proven = 0, doubtful = 0;
+  for_pairs(list, single ? f.counters->single[k] : f.counters->many[k], [&](bool valid, uint2 pair) {
+    bool contact = false, undecided = false;
+    double toc = 0;
+    if (valid) {
+      const uint4 v = vertices_of<kind>(f, pair.x, pair.y);
+      const Motion<double> m = load_motion<kind>(f.rows, v);
+      const Outcome<double> o = single ? single_root_test<kind, Proven>(m) : many_roots_test<kind, Proven>(m);
+      contact = o.contact;
+      undecided = !o.contact && !o.none;
+      // "conservative" promises never to be late.
+      toc = accuracy_of(f, v) == Accuracy::conservative ? greater(o.toc - o.delta, 0.0) : o.toc;
+    }
+    append_found(f, kind, contact, pair, toc);
+    const u64 at = warp_append(&f.counters->undecided, undecided);
+    if (undecided && at < f.undecided_capacity)
+      f.undecided[at] = key_of(f.key_shift, f.kind_shift, kind, pair.x, pair.y);
+    proven += contact;
+    doubtful += undecided;
+  });
+  proven = __reduce_add_sync(all_lanes, proven);
+  doubtful = __reduce_add_sync(all_lanes, doubtful);
+  if (lane_number() != 0) return;
+  if (proven) {
+    atomicAdd(&f.counters->proven[k], static_cast<u64>(proven));
+    atomicAdd(&f.counters->found[k], static_cast<u64>(proven));
+  }
+  if (doubtful) atomicAdd(&f.counters->undecided_of[k], static_cast<u64>(doubtful));
+}
+
+// Clears the lists of one segment for the next; remembers how long they were and how long they had to be.
+template <class T>
+__global__ void end_segment_kernel(Frame<T> f) {
+  Counters& c = *f.counters;
+  c.next_leaf_pair = 0;
+  for (int k = 0; k < 2; ++k) {
+    c.most_survivors = c.survivors[k] > c.most_survivors ? c.survivors[k] : c.most_survivors;
+    c.most_single = c.single[k] > c.most_single ? c.single[k] : c.most_single;
+    c.most_many = c.many[k] > c.most_many ? c.many[k] : c.most_many;
+    c.all_survivors[k] += c.survivors[k];
+    c.all_single[k] += c.single[k];
+    c.all_many[k] += c.many[k];
+    c.survivors[k] = c.single[k] = c.many[k] = 0;
+  }
+}
+
+// The tier's last resort for what the error bounds left open: here where double precision is enough, else on the host.
+template <class T>
+__global__ __launch_bounds__(64) void last_resort_kernel(const __grid_constant__ Frame<T> f) {
+  const u64 n = length(f.counters->undecided, f.undecided_capacity), stride = static_cast<u64>(gridDim.x) * blockDim.x;
+  for (u64 i = static_cast<u64>(blockIdx.x) * blockDim.x + threadIdx.x; i - lane_number() < n; i += stride) {
+    bool contact = false, host = false;
+    double toc = 0;
+    u64 key = 0;
+    uint2 pair{0, 0};
+    Kind kind = Kind::vertex_face;
+    if (i < n) {
+      key = f.undecided[i];
+      kind = key >> f.kind_shift ? Kind::edge_edge : Kind::vertex_face;
+      const u64 features = key & ((u64{1} << f.kind_shift) - 1);
+      pair = {static_cast<u32>(features >> f.key_shift), static_cast<u32>(features & ((u64{1} << f.key_shift) - 1))};
+      const uint4 v = kind == Kind::edge_edge ? vertices_of<Kind::edge_edge>(f, pair.x, pair.y)
+                                              : vertices_of<Kind::vertex_face>(f, pair.x, pair.y);
+      const Accuracy accuracy = accuracy_of(f, v);
+      host = accuracy == Accuracy::exact || accuracy == Accuracy::conservative;
+      if (!host) {
+        const tolerant::Answer a =
+            kind == Kind::edge_edge ? tolerant::decide<Kind::edge_edge>(load_motion<Kind::edge_edge>(f.rows, v))
+                                    : tolerant::decide<Kind::vertex_face>(load_motion<Kind::vertex_face>(f.rows, v));
+        contact = a.contact;
+        toc = a.toc;
+      }
+    }
+    append_found(f, kind, contact, pair, toc);
+    if (contact) atomicAdd(&f.counters->found[kind == Kind::edge_edge], u64{1});
+    const u64 at = warp_append(&f.counters->to_host, host);
+    if (host && at < f.to_host_capacity) f.to_host[at] = key;
+  }
+}
+
+}  // namespace hpccd::gpu

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+// Device and page-locked memory. Buffers only grow, so frames of a settled scene allocate nothing.
+#pragma once
+
+#include <cstddef>
+#include <utility>
+
+#include "gpu/cuda_call.h"
+
+namespace hpccd::gpu {
+
+struct DeviceMemory {
+  static cudaError_t allocate(void** p, std::size_t bytes) { return cudaMalloc(p, bytes); }
+  static void release(void* p) { cudaFree(p); }
+  static constexpr const char* name = "cudaMalloc";
+};
+
+struct PinnedMemory {
+  static cudaError_t allocate(void** p, std::size_t bytes) { return cudaHostAlloc(p, bytes, cudaHostAllocPortable); }
+  static void release(void* p) { cudaFreeHost(p); }
+  static constexpr const char* name = "cudaHostAlloc";
+};
+
+template <class T, class Memory>
+class Buffer {
+ public:
+  Buffer() = default;
+  ~Buffer() { release(); }
+  Buffer(const Buffer&) = delete;
+  Buffer& operator=(const Buffer&) = delete;
+
+  // Room for n; what was inside is lost where it grows.
+  void reserve(std::size_t n) {
+    if (n <= size_) return;
+    release();
+    void* p = nullptr;
+    check(Memory::allocate(&p, n * sizeof(T)), Memory::name);
+    data_ = static_cast<T*>(p);
+    size_ = n;
+  }
+  T* data() const { return data_; }
+  std::size_t size() const { return size_; }
+  std::size_t bytes() const { return size_ * sizeof(T); }
+
+ private:
+  void release() {
+    if (data_) Memory::release(data_);
+    data_ = nullptr;
+    size_ = 0;
+  }
+  T* data_ = nullptr;
+  std::size_t size_ = 0;
+};
+
+template <class T>
+using DeviceBuffer = Buffer<T, DeviceMemory>;
+template <class T>
+using PinnedBuffer = Buffer<T, PinnedMemory>;
+
+}  // namespace hpccd::gpu

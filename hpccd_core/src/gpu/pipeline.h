@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+// A whole frame on one GPU: bounds, refit, traversal, filters, elementary tests, sorted contacts. Only positions go in
+// and only contacts come out. What neither the device nor the tier's error bounds can decide comes back as well.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "bvh/tree.h"
+#include "elementary/motion.h"
+#include "hpccd/hpccd.h"
+#include "scene/features.h"
+
+namespace hpccd::gpu {
+
+// A pair for the exact last resort on the CPU.
+struct Undecided {
+  std::uint32_t first, second;
+  Kind kind;
+};
+
+// What a frame found, in page-locked memory that stays valid until the next frame.
+struct FrameResult {
+  std::uint64_t n_vf = 0, n_ee = 0;
+  const std::array<std::uint32_t, 2>* vf = nullptr;  // in canonical order
+  const std::array<std::uint32_t, 4>* ee = nullptr;
+  const double* toc = nullptr;                       // vertex-face, then edge-edge
+  std::uint64_t hash = 0;
+};
+
+class Pipeline {
+ public:
+  // Throws Error where the device has not enough memory or the scene has too many features for 31-bit numbers.
+  static std::unique_ptr<Pipeline> create(const Scene& scene, const Features& features, Accuracy accuracy, int device,
+                                          bool time_stages);
+  virtual ~Pipeline() = default;
+
+  // The tree whose boxes are refitted in every frame.
+  virtual void set_tree(const Tree& tree) = 0;
+
+  // All work up to the undecided pairs; host arrays may be changed by the caller after finish() only.
+  // Returns false where a coordinate is not finite or too large.
+  virtual bool run(Positions t0, Positions t1, ThreadPool& pool) = 0;
+  // After run(): the pairs left for the CPU. Sorting goes on meanwhile.
+  virtual const std::vector<Undecided>& undecided() const = 0;
+  virtual FrameResult finish() = 0;
+  // Positions that live on the device, as host arrays.
+  virtual Positions download(Positions on_device, int which) = 0;
+
+  virtual double relative_area() const = 0;  // of the refitted tree, as in tree.h
+  virtual std::map<std::string, std::uint64_t> stats() const = 0;
+  virtual std::map<std::string, double> stages() const = 0;  // device ms by stage, where asked for
+};
+
+}  // namespace hpccd::gpu

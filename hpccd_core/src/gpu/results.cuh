@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+// Sorted contacts as the caller sees them, written straight into page-locked host memory, and their hash.
+#pragma once
+
+#include "contacts/hash.h"
+#include "gpu/frame.cuh"
+
+namespace hpccd::gpu {
+
+__global__ void number_kernel(u32* numbers, u32 n) {
+  const u32 i = blockIdx.x * blockDim.x + threadIdx.x;
+  if (i < n) numbers[i] = i;
+}
+
+template <class T>
+__global__ void results_kernel(Frame<T> f, const u64* keys, const u32* order, u32 n, u32 n_vf, uint2* vf, uint4* ee,
+                               double* toc) {
+  u64 hash = 0;
+  for (u32 i = blockIdx.x * blockDim.x + threadIdx.x; i < n; i += gridDim.x * blockDim.x) {
+    const u64 key = keys[i], features = key & ((u64{1} << f.kind_shift) - 1);
+    const u32 first = static_cast<u32>(features >> f.key_shift);
+    const u32 second = static_cast<u32>(features & ((u64{1} << f.key_shift) - 1));
+    const double t = f.found_tocs[order[i]];
+    toc[i] = t;
+    if (i < n_vf) {
+      vf[i] = {first, second};
+      hash += hash_of(Kind::vertex_face, first, second, t);
+    } else {
+      const uint2 a = f.edges[first], b = f.edges[second];
+      ee[i - n_vf] = {a.x, a.y, b.x, b.y};
+      hash += hash_of(Kind::edge_edge, pack(a.x, a.y), pack(b.x, b.y), t);
+    }
+  }
+  for (int d = 16; d > 0; d /= 2) hash += __shfl_xor_sync(all_lanes, hash, d);
+  if (lane_number() == 0 && hash) atomicAdd(&f.counters->hash, hash);
+}
+
+}  // namespace hpccd::gpu

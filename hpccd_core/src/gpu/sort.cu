@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+// Apart from the other kernels: CUB's headers take longer to compile than all of these.
+#include "gpu/sort.h"
+
+#include <cub/device/device_radix_sort.cuh>
+
+#include "gpu/cuda_call.h"
+
+namespace hpccd::gpu {
+
+std::size_t sort_workspace(int n, int key_bits) {
+  std::size_t bytes = 0;
+  const unsigned long long* keys = nullptr;
+  const std::uint32_t* values = nullptr;
+  check(cub::DeviceRadixSort::SortPairs(nullptr, bytes, keys, const_cast<unsigned long long*>(keys), values,
+                                        const_cast<std::uint32_t*>(values), n, 0, key_bits),
+        "cub::DeviceRadixSort (size)");
+  return bytes;
+}
+
+void sort_pairs(void* workspace, std::size_t workspace_bytes, const unsigned long long* keys,
+                unsigned long long* sorted_keys, const std::uint32_t* values, std::uint32_t* sorted_values, int n,
+                int key_bits, cudaStream_t stream) {
+  check(cub::DeviceRadixSort::SortPairs(workspace, workspace_bytes, keys, sorted_keys, values, sorted_values, n, 0,
+                                        key_bits, stream),
+        "cub::DeviceRadixSort");
+}
+
+}  // namespace hpccd::gpu

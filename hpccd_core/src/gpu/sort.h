@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cuda_runtime.h>
+
+#include <cstddef>
+#include <cstdint>
+
+namespace hpccd::gpu {
+
+// Device memory that sorting n keys needs.
+std::size_t sort_workspace(int n, int key_bits);
+
+// Keys ascending by their lowest key_bits bits, values along with them.
+void sort_pairs(void* workspace, std::size_t workspace_bytes, const unsigned long long* keys,
+                unsigned long long* sorted_keys, const std::uint32_t* values, std::uint32_t* sorted_values, int n,
+                int key_bits, cudaStream_t stream);
+
+}  // namespace hpccd::gpu
