@@ -100,7 +100,9 @@ INSTANTIATE_TEST_SUITE_P(Kinds, Elementary,
                          ::testing::Combine(::testing::Values(Kind::vertex_face, Kind::edge_edge), ::testing::Bool()));
 
 // The triangle x, y >= 0, x + y <= 1 rises from z = 0 to 1; the vertex waits at height 0.5 + gap beside or above it.
-Motion<double> rising(double gap) { return {{0.25, 0.25, 2 + gap}, {1, 0, 0}, {0, 1, 0}, {0.25, 0.25, 1 + gap}, {1, 0, 0}, {0, 1, 0}}; }
+Motion<double> rising(double gap) {
+  return {{0.25, 0.25, 2 + gap}, {1, 0, 0}, {0, 1, 0}, {0.25, 0.25, 1 + gap}, {1, 0, 0}, {0, 1, 0}};
+}
 
 TEST(Inclusion, ReportsWhatComesWithinTheSeparationAndNoLater) {
   const inclusion::Limits limits{0.5, 1e-6, 100000};

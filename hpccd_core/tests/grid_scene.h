@@ -40,8 +40,7 @@ inline std::vector<double> sheet_positions(std::uint32_t side, double t, std::ui
       const double x = (i % side) + 0.31 * sheet, y = (i / side) + 0.17 * sheet;
       positions.insert(positions.end(), {x, y, height + 0.1 * std::sin(0.9 * x + 0.7 * y + 2 * t)});
     }
-    for (std::uint32_t i = 0; i < lone; ++i)
-      positions.insert(positions.end(), {0.37 + i, 0.41 + i, 0.5 - t});
+    for (std::uint32_t i = 0; i < lone; ++i) positions.insert(positions.end(), {0.37 + i, 0.41 + i, 0.5 - t});
   }
   return positions;
 }
