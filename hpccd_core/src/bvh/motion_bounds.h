@@ -5,6 +5,8 @@
 #include <vector>
 
 #include "base/parallel.h"
+#include "bvh/box.h"
+#include "bvh/box.h"
 #include "bvh/coordinate_map.h"
 #include "elementary/batch.h"
 

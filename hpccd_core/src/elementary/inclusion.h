@@ -10,6 +10,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
 #include <queue>
 #include <vector>
@@ -58,6 +59,20 @@ inline Gap gap_over(const Motion<double>& m, const Domain& d) {
   return g;
 }
 
+inline double coordinate(const Vec3<double>& v, int axis) { return axis == 0 ? v.x : axis == 1 ? v.y : v.z; }
+
+inline Interval Domain::*widest_variable(const Motion<double>& m, const Domain& d, int axis) {
+  const auto change = [&](const Vec3<double>& v0, const Vec3<double>& v1) {
+    return std::fabs(coordinate(v1, axis) - coordinate(v0, axis));
+  };
+  const auto size = [&](const Vec3<double>& v0, const Vec3<double>& v1) {
+    return std::max(std::fabs(coordinate(v0, axis)), std::fabs(coordinate(v1, axis)));
+  };
+  const double t = (d.t.high - d.t.low) * (change(m.p0, m.p1) + change(m.a0, m.a1) + change(m.b0, m.b1));
+  const double x = (d.x.high - d.x.low) * size(m.a0, m.a1), y = (d.y.high - d.y.low) * size(m.b0, m.b1);
+  return t >= x && t >= y ? &Domain::t : x >= y ? &Domain::x : &Domain::y;
+}
+
 inline std::optional<double> earliest_within(Kind kind, const Motion<double>& m, const Limits& limits) {
   const Magnitudes<double> size = magnitudes(m);
   // p, x a and y b carry at most 8 roundings each, their sum 2 more.
@@ -79,22 +94,22 @@ inline std::optional<double> earliest_within(Kind kind, const Motion<double>& m,
     if (boxes >= limits.max_boxes) return d.t.low;
     open.pop();
     const Gap g = gap_over(m, d);
-    bool known = true;
-    for (const Interval& i : g.axis)
-      known = known && i.low >= -(reach + limits.tolerance) && i.high <= reach + limits.tolerance;
-    if (known) return d.t.low;
-    // Halve the variable that spreads the gap most.
-    const auto spread = [&](Vec3<double> v0, Vec3<double> v1) { return std::max(max_norm(v0), max_norm(v1)); };
-    const double dt = (d.t.high - d.t.low) * (max_norm(m.p1 - m.p0) + max_norm(m.a1 - m.a0) + max_norm(m.b1 - m.b0));
-    const double dx = (d.x.high - d.x.low) * spread(m.a0, m.a1), dy = (d.y.high - d.y.low) * spread(m.b0, m.b1);
-    Interval Domain::*widest = dt >= dx && dt >= dy ? &Domain::t : dx >= dy ? &Domain::x : &Domain::y;
-    const Interval whole = d.*widest;
+    // The axis along which the gap reaches out furthest says what to halve: the variable that spreads it most there.
+    double furthest = 0;
+    int axis = -1;
+    for (int k = 0; k < 3; ++k) {
+      const double excess = std::max(g.axis[k].high, -g.axis[k].low) - (reach + limits.tolerance);
+      if (excess > furthest) furthest = excess, axis = k;
+    }
+    if (axis < 0) return d.t.low;
+    Interval Domain::*const set = widest_variable(m, d, axis);
+    const Interval whole = d.*set;
     const double middle = whole.low + 0.5 * (whole.high - whole.low);
     if (!(middle > whole.low && middle < whole.high)) return d.t.low;  // as fine as doubles go
     Domain half = d;
-    half.*widest = {whole.low, middle};
+    half.*set = {whole.low, middle};
     consider(half);
-    half.*widest = {middle, whole.high};
+    half.*set = {middle, whole.high};
     consider(half);
   }
   return std::nullopt;
