@@ -7,6 +7,8 @@ from . import _core, arguments
 from .contacts import Contacts
 from .scene import ACCURACIES, Scene
 
+METHODS = ("default", "published", "naive", "front")
+
 
 def backends():
     """The backends usable with this build on this machine, e.g. ["cpu"] or ["cpu", "gpu", "hybrid"]."""
@@ -19,9 +21,18 @@ class Detector:
     accuracy: "fast", "balanced", "conservative" or "exact"; backend: "auto", "cpu", "hybrid" or "gpu"; threads: 0 for
     all cores; report: "all" contacts, those at the earliest time only ("first"), or one contact ("any"); outputs: any
     of "points", "normals"; simd: "auto", "scalar", "avx2" or "avx512" (the result is the same).
-    minimum_separation, tolerance ("conservative" only, in units of the coordinates): report every pair that comes within
+    minimum_separation, tolerance ("conservative" only, in coordinate units): report every pair that comes within
     minimum_separation, measured along each axis, no later than it does so; pairs that miss it by up to tolerance may be
     reported too. Without a separation "conservative" reports exactly the true contacts, at a time never late.
+    method: how CPUs find the pairs to test. Contacts, their order and hash are the same with each, "all" or "first";
+    "any" (one contact, whichever comes first) is offered by "default" only.
+        "default": blocks of eight triangles, boxes compared in SIMD lanes, independent tasks.
+        "published": Kim et al. 2009, sections 3.3, 4 and 6: inter-CD task units, reassigned between threads without
+            locks in the main loop, on a hierarchy that is restructured lazily where it culls badly.
+        "naive": their section 3.2, the baseline of Fig. 7: pairs shared among threads, reconstruction behind locks.
+        "front": Tang et al. 2009, with which section 6.3 compares: the front of the traversal is kept from step to
+            step. Costs memory: 8 bytes for each pair of nodes where the last traversal ended.
+    restructure: of "published" and "naive", whether they restructure; False only to measure what it brings.
     The scene is copied: meshes added to it later do not reach this detector.
     """
 
@@ -37,6 +48,8 @@ class Detector:
         simd="auto",
         minimum_separation=0.0,
         tolerance=1e-6,
+        method="default",
+        restructure=True,
     ):
         if not isinstance(scene, Scene):
             raise TypeError(f"scene: expected hpccd_core.Scene, got {type(scene).__name__}")
@@ -51,6 +64,11 @@ class Detector:
             arguments.choice("outputs", output, ("points", "normals"))
         threads = arguments.whole_number("threads", threads, 0, 1024)
         simd = arguments.choice("simd", simd, ("auto", "scalar", "avx2", "avx512"))
+        self.method = arguments.choice("method", method, METHODS)
+        if method != "default" and report == "any":
+            raise ValueError(
+                f"report: 'any' is not offered by method {method!r}; use method='default', or report='all' or 'first'"
+            )
         lengths = arguments.separation(accuracy, minimum_separation, tolerance)
         self.n_vertices = scene.n_vertices
         self._core = _core.Detector(
@@ -63,6 +81,8 @@ class Detector:
             "points" in outputs,
             "normals" in outputs,
             *lengths,
+            getattr(_core.Method, method),
+            bool(restructure),
         )
         self._last = None
 

@@ -76,6 +76,11 @@ PYBIND11_MODULE(_core, m) {
       .value("hybrid", Backend::hybrid)
       .value("gpu", Backend::gpu);
   py::enum_<Report>(m, "Report").value("all", Report::all).value("first", Report::first).value("any", Report::any);
+  py::enum_<Method>(m, "Method")
+      .value("default", Method::standard)
+      .value("published", Method::published)
+      .value("naive", Method::naive)
+      .value("front", Method::front);
   py::enum_<Simd>(m, "Simd")
       .value("auto", Simd::automatic)
       .value("scalar", Simd::scalar)
@@ -103,11 +108,12 @@ PYBIND11_MODULE(_core, m) {
 
   py::class_<Detector>(m, "Detector")
       .def(py::init([](std::shared_ptr<Scene> scene, Accuracy accuracy, Backend backend, Report report, Simd simd,
-                       int threads, bool points, bool normals, double separation, double tolerance) {
+                       int threads, bool points, bool normals, double separation, double tolerance, Method method,
+                       bool restructure) {
         // A copy: what is added to the caller's scene later does not reach this detector.
         return std::make_unique<Detector>(std::make_shared<const Scene>(*scene),
                                           Options{accuracy, backend, report, simd, threads, points, normals,
-                                                  separation, tolerance});
+                                                  separation, tolerance, method, restructure});
       }))
       .def("detect",
            [](Detector& d, const py::array& t0, const py::array& t1) {

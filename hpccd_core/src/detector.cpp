@@ -5,6 +5,7 @@
 #include "bvh/motion_bounds.h"
 #include "bvh/tree.h"
 #include "contacts/canonical.h"
+#include "paper/method.h"
 #include "scene/features.h"
 #include "traverse/traverse.h"
 
@@ -21,6 +22,7 @@ struct Detector::Impl {
     search.report = o.report;
     search.limits = {o.minimum_separation, o.tolerance};
     if (o.minimum_separation > 0) search.batch_test[static_cast<int>(Accuracy::conservative)] = all_undecided;
+    engine = paper::engine_of(options, {features, rules, pool});
   }
 
   std::shared_ptr<const Scene> scene;
@@ -32,6 +34,7 @@ struct Detector::Impl {
   Search search;
   MotionBounds motion;
   Tree tree;
+  std::unique_ptr<paper::MethodEngine> engine;  // of a published method; none for the default traversal
   Profiler profiler;
   std::map<std::string, std::uint64_t> stats;
 
@@ -50,6 +53,22 @@ struct Detector::Impl {
       build(tree, *scene, features, motion.boxes, pool);
       profiler.mark("build");
     }
+  }
+
+  void find_contacts() {
+    search.geometry = {motion.rows.data(), features.edges.data(), features.faces.data(), motion.map.scale};
+    search.earliest = std::numeric_limits<double>::infinity();
+    if (engine) {
+      engine->update(motion.boxes, profiler);
+      engine->traverse(motion.boxes, search, workers);
+    } else {
+      update_tree();
+      traverse(tree, rules, search, pool, workers);
+    }
+    double elementary = 0;
+    for (const Worker& w : workers) elementary += 1e3 * w.elementary_seconds;
+    // Tests run inside the traversal; their share of the wall-clock time is their share of the threads' time.
+    profiler.mark_split("traverse", "elementary", elementary / pool.size());
   }
 
   void count(const Contacts& contacts) {
@@ -77,7 +96,8 @@ struct Detector::Impl {
     stats["ee_contacts"] = contacts.ee.size();
     stats["triangles"] = features.n_faces();
     stats["bytes"] = bytes + motion.rows.capacity() * sizeof(VertexRow) + motion.boxes.capacity() * sizeof(Box) +
-                     tree.bytes() + features.bytes();
+                     tree.bytes() + features.bytes() + (engine ? engine->bytes() : 0);
+    if (engine) engine->count(stats);
   }
 };
 
@@ -96,14 +116,7 @@ Contacts Detector::detect(Positions t0, Positions t1) {
   d.profiler.begin();
   d.motion.take(t0, t1, d.options.minimum_separation, d.pool);
   d.profiler.mark("bounds");
-  d.update_tree();
-  d.search.geometry = {d.motion.rows.data(), d.features.edges.data(), d.features.faces.data(), d.motion.map.scale};
-  d.search.earliest = std::numeric_limits<double>::infinity();
-  traverse(d.tree, d.rules, d.search, d.pool, d.workers);
-  double elementary = 0;
-  for (const Worker& w : d.workers) elementary += 1e3 * w.elementary_seconds;
-  // Tests run inside the traversal; their share of the wall-clock time is their share of the threads' time.
-  d.profiler.mark_split("traverse", "elementary", elementary / d.pool.size());
+  d.find_contacts();
   Contacts contacts =
       collect_contacts(d.workers, d.search.geometry, d.options.report, {d.options.points, d.options.normals}, d.pool);
   d.profiler.mark("contacts");

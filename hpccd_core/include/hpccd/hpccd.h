@@ -24,6 +24,8 @@ class InvalidArgument : public std::invalid_argument {
 enum class Accuracy : std::uint8_t { fast, balanced, conservative, exact };
 enum class Backend : std::uint8_t { automatic, cpu, hybrid, gpu };
 enum class Report : std::uint8_t { all, first, any };
+// How CPUs find the candidates: by the default traversal, or as published (Kim et al. 2009; Tang et al. 2009).
+enum class Method : std::uint8_t { standard, published, naive, front };
 enum class Simd : std::uint8_t { automatic, scalar, avx2, avx512 };
 
 struct MeshOptions {
@@ -74,6 +76,8 @@ struct Options {
   // do so only by up to tolerance more as well.
   double minimum_separation = 0;
   double tolerance = 1e-6;
+  Method method = Method::standard;
+  bool restructure = true;  // of `published` and `naive`: whether nodes that cull badly are split anew
 };
 
 // Contacts of one motion step in canonical order: vertex-face by (vertex, face), then edge-edge by (a0, a1, b0, b1).

@@ -1,0 +1,13 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "base/parallel.h"
+#include "paper/hierarchy.h"
+
+namespace hpccd::paper {
+
+// The hierarchy of the first step, split down to single triangles: on one thread until there are enough subtrees, then
+// each thread takes subtrees. (Later steps refit, and split again where section 6 asks for it: upkeep.h.)
+void build(Hierarchy& h, const Features& features, const std::vector<Box>& vertex_boxes, ThreadPool& pool);
+
+}  // namespace hpccd::paper

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+// The front of the traversal tree (Tang et al. 2009): the pairs of nodes at which the last traversal ended, because the
+// boxes do not overlap or both nodes are leaves. The next traversal starts from there: it goes down where boxes overlap
+// that did not, and up where pairs have come apart.
+#pragma once
+
+#include <vector>
+
+#include "paper/ancestry.h"
+#include "paper/visit.h"
+
+namespace hpccd::paper {
+
+// A piece of the front, in the depth-first order of the traversal tree: what lies below one pair lies together.
+using FrontSegment = std::vector<Pair>;
+
+struct FrontCounts {
+  std::uint64_t descended = 0, ascended = 0;  // pairs left downwards, and pairs that replaced pairs below them
+};
+
+// The front after this step's bounds, of one segment; what overlaps and cannot be refined is tested on the way.
+class FrontUpdate {
+ public:
+  FrontUpdate(const Scenery& scenery, const Ancestry& ancestry, Worker& worker, FrontCounts& counts)
+      : s_(scenery), ancestry_(ancestry), worker_(worker), counts_(counts) {}
+
+  std::vector<FrontSegment> operator()(const FrontSegment& segment);
+
+ private:
+  void descend(Pair p);
+  Pair climb(Pair p);
+  void keep(Pair p);
+
+  const Scenery& s_;
+  const Ancestry& ancestry_;
+  Worker& worker_;
+  FrontCounts& counts_;
+  std::vector<Pair> stack_;
+  std::vector<FrontSegment> kept_;
+};
+
+// Joins the segments of a front in order. Where two threads replaced the halves of one run by the same pair, one stays.
+std::vector<FrontSegment> joined(std::vector<std::vector<FrontSegment>>&& pieces);
+
+}  // namespace hpccd::paper

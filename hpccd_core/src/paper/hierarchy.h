@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+// The binary hierarchy of Kim et al. 2009, sections 3.1 and 3.2: all meshes merged, AABBs of the motion, one triangle
+// (or vertex that is in no triangle) a leaf. It can be split lazily: a node may have its box and its triangles, but no
+// children yet.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "bvh/box.h"
+#include "scene/features.h"
+
+namespace hpccd::paper {
+
+using NodeIndex = std::uint32_t;
+inline constexpr NodeIndex no_node = 0xFFFFFFFFu;
+
+struct Node {
+  Box box;
+  std::uint32_t begin = 0, count = 0;  // its carriers: order[begin, begin + count)
+  std::uint32_t mesh = 0;              // mixed_meshes where there are several
+  std::uint32_t examined = 0;          // step in which its children were last made sure of (see upkeep.h)
+  float culling_when_split = 0;        // see culling_inefficiency
+  bool is_split = false;               // its children exist
+  bool is_leaf() const { return count == 1; }
+};
+
+struct Pair {
+  NodeIndex a, b;  // a == b: pairs within the subtree
+  bool operator==(const Pair&) const = default;
+};
+
+// Nodes in depth-first order. A subtree over m carriers has 2m - 1 nodes in one piece, whatever its shape: splitting a
+// node anew touches nothing outside the piece, which is what keeps tasks over disjoint subtrees free of locks.
+class Hierarchy {
+ public:
+  std::vector<Node> nodes;           // [0] is the root; empty where there is nothing to carry
+  std::vector<std::uint32_t> order;  // carriers, so that each subtree's lie together
+  std::vector<Box> carrier_boxes;    // by carrier, at the current step
+
+  static NodeIndex left(NodeIndex n) { return n + 1; }
+  NodeIndex right(NodeIndex n) const { return n + 2 * nodes[n + 1].count; }
+
+  // One node over everything, not split. `carrier_boxes` must be current, here and in split.
+  void start(const Features& features);
+
+  // Gives a node two new children that are not split themselves: by median of the triangles' centres along the widest
+  // axis (section 6); where the node holds several meshes, by median of the meshes, so that below, each node has one.
+  void split(NodeIndex n, const Features& features);
+
+  std::size_t bytes() const;
+
+ private:
+  std::uint32_t split_meshes(const Node& node, const Features& features);
+  void make_child(NodeIndex n, std::uint32_t begin, std::uint32_t count, const Features& features);
+};
+
+// Surface of the children over that of the node (Larsson and Akenine-Möller 2006 compare the same sizes): about 1 where
+// the children share the node's space, 2 where both fill it. Surface instead of volume, which flat cloth has none of.
+float culling_inefficiency(const Hierarchy& h, NodeIndex split_node);
+
+}  // namespace hpccd::paper

@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "paper/method.h"
+
+namespace hpccd::paper {
+
+std::unique_ptr<MethodEngine> engine_of(const Options& options, const Context& context) {
+  if (options.method == Method::standard) return nullptr;
+  // One contact of many is a matter of order, and the order is the method's: it could not be the default's answer.
+  if (options.report == Report::any)
+    throw InvalidArgument(
+        "report: 'any' is offered by method 'default' only; use method 'default', or report 'all' or 'first'");
+  if (options.method == Method::front) return front_based(context);
+  return options.method == Method::naive ? naive(context, options.restructure)
+                                         : published(context, options.restructure);
+}
+
+}  // namespace hpccd::paper

@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "paper/refit.h"
+
+#include "paper/breadth_first.h"
+
+namespace hpccd::paper {
+namespace {
+
+Box carrier_box(std::uint32_t c, const Features& features, const std::vector<Box>& vertex_boxes) {
+  if (c >= features.n_faces()) return vertex_boxes[features.lone_vertices[c - features.n_faces()]];
+  const auto& corners = features.faces[c];
+  Box b = vertex_boxes[corners[0]];
+  b.include(vertex_boxes[corners[1]]);
+  b.include(vertex_boxes[corners[2]]);
+  return b;
+}
+
+class Refit {
+ public:
+  Refit(Hierarchy& h, const Features& features, const std::vector<Box>& vertex_boxes)
+      : h_(h), features_(features), vertex_boxes_(vertex_boxes) {}
+
+  void subtree(NodeIndex n) {
+    if (!h_.nodes[n].is_split) return carriers(h_.nodes[n]);
+    subtree(Hierarchy::left(n));
+    subtree(h_.right(n));
+    from_children(n);
+  }
+
+  void from_children(NodeIndex n) {
+    h_.nodes[n].box = h_.nodes[Hierarchy::left(n)].box;
+    h_.nodes[n].box.include(h_.nodes[h_.right(n)].box);
+  }
+
+ private:
+  // A leaf, or a node that nothing has needed the children of: what lies below it is not valid.
+  void carriers(Node& node) {
+    node.box = {};
+    for (std::uint32_t i = node.begin; i < node.begin + node.count; ++i) {
+      const std::uint32_t c = h_.order[i];
+      h_.carrier_boxes[c] = carrier_box(c, features_, vertex_boxes_);
+      node.box.include(h_.carrier_boxes[c]);
+    }
+  }
+
+  Hierarchy& h_;
+  const Features& features_;
+  const std::vector<Box>& vertex_boxes_;
+};
+
+}  // namespace
+
+void refit(Hierarchy& h, const Features& features, const std::vector<Box>& vertex_boxes, ThreadPool& pool) {
+  const auto k = static_cast<std::size_t>(pool.size());
+  const BreadthFirstFront front = breadth_first_front(h, 2 * k, [&](NodeIndex n) { return h.nodes[n].is_split; });
+  Refit refit(h, features, vertex_boxes);
+  parallel_for(pool, front.low.size(), 1, [&](std::size_t begin, std::size_t end, int) {
+    for (std::size_t i = begin; i < end; ++i) refit.subtree(front.low[i]);
+  });
+  for (auto level = front.high.rbegin(); level != front.high.rend(); ++level)
+    for (NodeIndex n : *level) refit.from_children(n);
+}
+
+void bound_carriers(Hierarchy& h, const Features& features, const std::vector<Box>& vertex_boxes, ThreadPool& pool) {
+  h.carrier_boxes.resize(features.n_carriers());
+  parallel_for(pool, features.n_carriers(), 4096, [&](std::size_t begin, std::size_t end, int) {
+    for (std::size_t c = begin; c < end; ++c)
+      h.carrier_boxes[c] = carrier_box(static_cast<std::uint32_t>(c), features, vertex_boxes);
+  });
+}
+
+}  // namespace hpccd::paper

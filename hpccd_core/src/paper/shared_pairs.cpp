@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "paper/shared_pairs.h"
+
+#include <algorithm>
+
+namespace hpccd::paper {
+
+void SharedPairs::begin(int threads) {
+  pairs_.clear();
+  threads_ = threads;
+  redistributions_ = 0;
+  waiting_ = 0;
+  size_ = 0;
+}
+
+void SharedPairs::give(PairQueue& own) {
+  {
+    std::lock_guard lock(mutex_);
+    ++redistributions_;
+    for (std::size_t half = own.size() / 2; half > 0; --half) {
+      pairs_.push_back(own.front());
+      own.pop_front();
+    }
+    size_ = pairs_.size();
+  }
+  changed_.notify_all();
+}
+
+bool SharedPairs::take(PairQueue& own) {
+  std::unique_lock lock(mutex_);
+  ++waiting_;
+  if (waiting_ == threads_) changed_.notify_all();
+  changed_.wait(lock, [&] { return !pairs_.empty() || waiting_ == threads_; });
+  if (pairs_.empty()) return false;  // stays counted as waiting: so do all others
+  // A share for every thread that waits.
+  const std::size_t share =
+      (pairs_.size() + static_cast<std::size_t>(waiting_) - 1) / static_cast<std::size_t>(waiting_);
+  for (std::size_t i = 0; i < share; ++i) {
+    own.push_back(pairs_.front());
+    pairs_.pop_front();
+  }
+  size_ = pairs_.size();
+  --waiting_;
+  return true;
+}
+
+void SharedPairs::leave() {
+  {
+    std::lock_guard lock(mutex_);
+    --threads_;
+  }
+  changed_.notify_all();
+}
+
+}  // namespace hpccd::paper
