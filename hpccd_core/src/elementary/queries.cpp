@@ -14,11 +14,11 @@ namespace {
 
 Vec3<double> point(const Query& q, int row) { return {q[3 * row], q[3 * row + 1], q[3 * row + 2]}; }
 
-// Brings the largest coordinate to about one.
-double power_of_two_scale(std::span<const Query> queries) {
+// The power of two that brings the query's largest coordinate to about one: what single precision needs. Each query has
+// its own, so that no answer depends on the queries beside it.
+double power_of_two_scale(const Query& q) {
   double most = 0;
-  for (const Query& q : queries)
-    for (double x : q) most = std::max(most, std::fabs(x));
+  for (double x : q) most = std::max(most, std::fabs(x));
   return most > 0 ? std::ldexp(1.0, -std::clamp(std::ilogb(most), -1000, 1000)) : 1;
 }
 
@@ -40,16 +40,18 @@ void test_queries(Kind kind, std::span<const Query> queries, const Options& opti
     first[i] = kind == Kind::vertex_face ? 4 * i : 2 * i;
     second[i] = kind == Kind::vertex_face ? i : 2 * i + 1;
   }
-  Geometry geometry{rows.data(), edges.data(), faces.data()};
+  const Geometry geometry{rows.data(), edges.data(), faces.data()};
   for (std::size_t begin = 0; begin < queries.size(); begin += batch_capacity) {
     const auto n = static_cast<std::uint32_t>(std::min<std::size_t>(queries.size() - begin, batch_capacity));
-    for (std::uint32_t i = 0; i < n; ++i)
+    for (std::uint32_t i = 0; i < n; ++i) {
+      const Query& q = queries[begin + i];
+      const double scale = accuracy == Accuracy::fast ? power_of_two_scale(q) : 1;
       for (int row = 0; row < 4; ++row)
         for (int k = 0; k < 3; ++k) {
-          rows[4 * i + row].t0[k] = queries[begin + i][3 * row + k];
-          rows[4 * i + row].t1[k] = queries[begin + i][12 + 3 * row + k];
+          rows[4 * i + row].t0[k] = scale * q[3 * row + k];
+          rows[4 * i + row].t1[k] = scale * q[12 + 3 * row + k];
         }
-    geometry.scale = power_of_two_scale(queries.subspan(begin, n));
+    }
     test(geometry, kind, first.data(), second.data(), n, *result);
     std::fill_n(hit + begin, n, false);
     std::fill_n(toc + begin, n, std::numeric_limits<double>::infinity());
