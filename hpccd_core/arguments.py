@@ -5,6 +5,8 @@ import operator
 
 import numpy as np
 
+LARGEST_COORDINATE = 1e150  # largest_coordinate in src/bvh/motion_bounds.h
+
 
 def choice(name, value, choices):
     """The value, if it is one of the choices."""
@@ -46,7 +48,7 @@ def separation(accuracy, minimum_separation, tolerance):
 
 def faces(value):
     """(F, 3) integers -> (F, 3) uint32, C-contiguous."""
-    array = np.asarray(value)
+    array = _array("faces", value)
     if array.size == 0 and array.ndim in (1, 2):
         return np.empty((0, 3), np.uint32)
     if array.dtype.kind not in "iu":
@@ -57,15 +59,27 @@ def faces(value):
         if bad.any():
             row, column = np.argwhere(bad)[0]
             raise ValueError(
-                f"faces[{row}, {column}] is {array[row, column]}, which {what}; indices count this mesh's vertices from 0"
+                f"faces[{row}, {column}] is {array[row, column]}, which {what}; "
+                "indices count this mesh's vertices from 0"
             )
     return np.ascontiguousarray(array, np.uint32)
 
 
+def output_names(value):
+    """A tuple of output names from one name or several."""
+    if isinstance(value, str):
+        value = (value,)
+    try:
+        names = tuple(value)
+    except TypeError:
+        raise TypeError(f"outputs: expected names of outputs, got {type(value).__name__}") from None
+    return tuple(choice("outputs", name, ("points", "normals")) for name in names)
+
+
 def vertices(name, value, n_vertices):
     """(V, 3) float32 or float64; C-contiguous arrays are taken without a copy."""
-    array = np.asarray(value)
-    if array.dtype not in (np.float32, np.float64):
+    array = _array(name, value)
+    if array.dtype.newbyteorder("=") not in (np.float32, np.float64):
         raise TypeError(
             f"{name}: expected float32 or float64, got dtype {array.dtype}; convert with {name}.astype(numpy.float64)"
         )
@@ -77,21 +91,33 @@ def vertices(name, value, n_vertices):
     return np.require(array, array.dtype.newbyteorder("="), ["C", "A"])
 
 
+def usable(name, array):
+    """Raises ValueError where a coordinate is NaN, infinite, or so large that intermediate results could overflow."""
+    good = np.abs(array) <= LARGEST_COORDINATE  # false for NaN too
+    if good.all():
+        return
+    where = tuple(np.argwhere(~good)[0])
+    remedy = "scale the coordinates down" if np.isfinite(array[where]) else "all coordinates must be finite"
+    raise ValueError(f"{name}[{', '.join(map(str, where))}] is {array[where]}; {remedy}")
+
+
 def queries(value):
     """(Q, 8, 3) float64: four points at t=0, then the same at t=1; finite."""
-    array = np.asarray(value)
-    if array.dtype not in (np.float32, np.float64):
+    array = _array("queries", value)
+    if array.dtype.newbyteorder("=") not in (np.float32, np.float64):
         raise TypeError(
             f"queries: expected float32 or float64, got dtype {array.dtype}; convert with queries.astype(numpy.float64)"
         )
     if array.ndim != 3 or array.shape[1:] != (8, 3):
-        raise ValueError(f"queries: expected shape (Q, 8, 3), four points at t=0 and the same at t=1, got {array.shape}")
+        expected = "(Q, 8, 3), four points at t=0 and the same at t=1"
+        raise ValueError(f"queries: expected shape {expected}, got {array.shape}")
     array = np.ascontiguousarray(array, np.float64)
-    # Beyond 1e150 intermediate results could overflow; NaN fails the comparison too.
-    good = np.abs(array) <= 1e150
-    if not good.all():
-        where = tuple(np.argwhere(~good)[0])
-        x = array[where]
-        remedy = "scale the query down" if np.isfinite(x) else "all coordinates must be finite"
-        raise ValueError(f"queries[{', '.join(map(str, where))}] is {x}; {remedy}")
+    usable("queries", array)
     return array
+
+
+def _array(name, value):
+    try:
+        return np.asarray(value)
+    except ValueError as error:  # rows of different lengths
+        raise ValueError(f"{name}: not a rectangular array ({error}); give every row the same length") from None

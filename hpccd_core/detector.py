@@ -59,9 +59,7 @@ class Detector:
         if backend != "auto" and backend not in backends():
             raise ValueError(f"backend: {backend!r} is not usable here; use one of {', '.join(['auto', *backends()])}")
         self.backend = "cpu"
-        outputs = (outputs,) if isinstance(outputs, str) else tuple(outputs)
-        for output in outputs:
-            arguments.choice("outputs", output, ("points", "normals"))
+        outputs = arguments.output_names(outputs)
         threads = arguments.whole_number("threads", threads, 0, 1024)
         simd = arguments.choice("simd", simd, ("auto", "scalar", "avx2", "avx512"))
         self.method = arguments.choice("method", method, METHODS)
@@ -102,9 +100,8 @@ class Detector:
         """Streaming: the end of the last step is the start of this one. The first call returns no contacts."""
         vertices = arguments.vertices("vertices", vertices, self.n_vertices)
         last = self._last
-        if last is None and not np.isfinite(vertices).all():
-            row, column = np.argwhere(~np.isfinite(vertices))[0]
-            raise ValueError(f"vertices[{row}, {column}] is {vertices[row, column]}; all coordinates must be finite")
+        if last is None:  # later ones are checked when they are used
+            arguments.usable("vertices", vertices)
         contacts = Contacts.none() if last is None else self.detect(last, vertices)
         self._last = vertices.copy()
         return contacts
