@@ -9,6 +9,7 @@ import time
 from pathlib import Path
 
 import numpy as np
+from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
@@ -42,6 +43,10 @@ def main(arguments: list[str] | None = None) -> int:
         except KeyboardInterrupt:
             console.print("Stopped early; what was done:")
     console.print(_table(tallies))
+    console.print(
+        "toc err: largest error of a time of contact; late: latest beyond the true one; uneven: an instruction set "
+        "differs;\nbroken: promises of exact and conservative, and agreement of instruction sets."
+    )
     source_text = f"replay of {a.replay}" if a.replay else f"seed {a.seed}, batches of {a.batch}"
     seconds = time.monotonic() - start
     console.print(f"{done:,} queries in {seconds:.1f} s, {source_text}, instruction sets: {', '.join(simd)}.")
@@ -89,16 +94,16 @@ def _replayed(path: Path):
 
 
 def _table(tallies: dict[tuple[str, str], Tally]) -> Table:
-    table = Table(title="Elementary tests against the exact oracle")
-    for column in ("tier", "kind"):
+    table = Table(title="Elementary tests against the exact oracle", box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
+    for column in ("tier", ""):
         table.add_column(column, no_wrap=True)
-    for column in ("queries", "contacts", "missed", "invented", "toc error", "latest by", "uneven", "broken"):
+    for column in ("queries", "contacts", "missed", "invented", "toc err", "late", "uneven", "broken"):
         table.add_column(column, justify="right", no_wrap=True)
     for (accuracy, kind), t in sorted(tallies.items()):
         counts = (t.queries, t.hits, t.missed, t.invented)
-        errors = (f"{t.worst_toc_error:.0e}", f"{t.latest:.0e}")
+        errors = (f"{t.worst_toc_error:.0e}", f"{t.latest:.0e}" if t.latest else "0")
         abbreviated = "".join(word[0].upper() for word in kind.split("-"))
-        table.add_row(accuracy, abbreviated, *(f"{n:,}" for n in counts), *errors, str(t.uneven), str(t.broken))
+        table.add_row(accuracy, abbreviated, *(f"{n:,}" for n in counts), *errors, f"{t.uneven:,}", f"{t.broken:,}")
     return table
 
 

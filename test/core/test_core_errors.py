@@ -1,0 +1,251 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Each mistake gets an error that names the argument and says what to do; the detector goes on afterwards."""
+
+import numpy as np
+import pytest
+
+import hpccd_core as hc
+
+FACES = np.array([[0, 1, 2], [1, 3, 2]], np.uint32)
+VERTICES = np.random.default_rng(0).normal(size=(4, 3))
+
+
+@pytest.fixture
+def scene():
+    scene = hc.Scene()
+    scene.add_mesh("cloth", FACES)
+    return scene
+
+
+@pytest.fixture
+def detector(scene):
+    return hc.Detector(scene)
+
+
+def changed(vertices, row, column, value):
+    vertices = vertices.copy()
+    vertices[row, column] = value
+    return vertices
+
+
+@pytest.mark.parametrize(
+    ("faces", "error", "text"),
+    [
+        ([[0.0, 1.0, 2.0]], TypeError, r"faces.*integers.*float64.*astype"),
+        ([["a", "b", "c"]], TypeError, r"faces.*integers"),
+        ([[True, False, True]], TypeError, r"faces.*integers.*bool"),
+        ([0, 1, 2], ValueError, r"faces.*\(F, 3\).*\(3,\)"),
+        ([[0, 1]], ValueError, r"faces.*\(F, 3\).*\(1, 2\)"),
+        ([[[0, 1, 2]]], ValueError, r"faces.*\(F, 3\).*\(1, 1, 3\)"),
+        ([[0, 1, 2], [0, -1, 2]], ValueError, r"faces\[1, 1\] is -1"),
+        ([[0, 1, 2**32 - 1]], ValueError, r"faces\[0, 2\] is 4294967295"),
+        ([[0, 1, 2**40]], ValueError, r"faces\[0, 2\] is 1099511627776"),
+    ],
+)
+def test_faces(faces, error, text):
+    with pytest.raises(error, match=text):
+        hc.Scene().add_mesh("cloth", np.array(faces))
+
+
+def test_ragged_faces():
+    with pytest.raises((TypeError, ValueError), match="faces"):
+        hc.Scene().add_mesh("cloth", [[0, 1, 2], [0, 1]])
+
+
+def test_face_index_beyond_n_vertices():
+    with pytest.raises(ValueError, match=r"faces\[1, 1\] is 3.*'cloth' has 3 vertices"):
+        hc.Scene().add_mesh("cloth", FACES, n_vertices=3)
+
+
+@pytest.mark.parametrize(
+    ("n_vertices", "error"),
+    [(-1, ValueError), (2**32, ValueError), (4.0, TypeError), ("4", TypeError), (True, TypeError)],
+)
+def test_n_vertices(n_vertices, error):
+    with pytest.raises(error, match="n_vertices"):
+        hc.Scene().add_mesh("cloth", FACES, n_vertices=n_vertices)
+
+
+def test_more_vertices_than_indices_can_name():
+    scene = hc.Scene()
+    scene.add_mesh("first", np.empty((0, 3), int), n_vertices=2**32 - 2)
+    with pytest.raises(ValueError, match="n_vertices"):
+        scene.add_mesh("second", np.empty((0, 3), int), n_vertices=2)
+
+
+@pytest.mark.parametrize(("name", "error"), [("", ValueError), (3, TypeError), (None, TypeError), (b"a", TypeError)])
+def test_mesh_name(name, error):
+    with pytest.raises(error, match="name"):
+        hc.Scene().add_mesh(name, FACES)
+
+
+def test_mesh_name_twice(scene):
+    with pytest.raises(ValueError, match="name.*'cloth'.*another"):
+        scene.add_mesh("cloth", FACES)
+
+
+def test_a_refused_mesh_leaves_the_scene_as_it_was(scene):
+    with pytest.raises(ValueError):
+        scene.add_mesh("ball", [[0, 1, 9]], n_vertices=3)
+    assert scene.mesh_names == ["cloth"] and scene.n_vertices == 4 and scene.n_faces == 2
+    scene.add_mesh("ball", [[0, 1, 2]])
+    assert scene.vertex_offset("ball") == 4
+
+
+@pytest.mark.parametrize(
+    ("pair", "error", "text"),
+    [
+        (("cloth", "floor"), ValueError, r"mesh_b.*'floor'.*cloth"),
+        (("floor", "cloth"), ValueError, r"mesh_a.*'floor'.*cloth"),
+        ((0, 1), ValueError, r"mesh_b.*\[0, 0\].*1"),
+        ((-1, 0), ValueError, r"mesh_a"),
+        ((0, 0.0), TypeError, r"mesh_b"),
+        ((None, 0), TypeError, r"mesh_a"),
+    ],
+)
+def test_pairs_of_meshes(scene, pair, error, text):
+    with pytest.raises(error, match=text):
+        scene.ignore_pair(*pair)
+    with pytest.raises(error, match=text):
+        scene.set_accuracy(*pair, "exact")
+
+
+def test_pairs_in_an_empty_scene():
+    with pytest.raises(ValueError, match="add_mesh"):
+        hc.Scene().ignore_pair(0, 0)
+
+
+def test_accuracy_of_a_pair(scene):
+    with pytest.raises(ValueError, match="accuracy.*'precise'.*exact"):
+        scene.set_accuracy("cloth", "cloth", "precise")
+
+
+def test_offset_of_an_unknown_mesh(scene):
+    for offset in (scene.vertex_offset, scene.face_offset):
+        with pytest.raises(ValueError, match="'floor'.*cloth"):
+            offset("floor")
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "error"),
+    [
+        ("accuracy", "precise", ValueError),
+        ("accuracy", None, TypeError),
+        ("backend", "cuda", ValueError),
+        ("backend", 0, TypeError),
+        ("report", "last", ValueError),
+        ("report", True, TypeError),
+        ("simd", "sse2", ValueError),
+        ("threads", -1, ValueError),
+        ("threads", 10**9, ValueError),
+        ("threads", 2.0, TypeError),
+        ("threads", "all", TypeError),
+        ("outputs", ("colours",), ValueError),
+        ("outputs", (1,), TypeError),
+        ("outputs", 1, TypeError),
+    ],
+)
+def test_options_of_a_detector(scene, option, value, error):
+    with pytest.raises(error, match=option):
+        hc.Detector(scene, **{option: value})
+
+
+def test_choices_are_listed(scene):
+    with pytest.raises(ValueError, match="fast, balanced, conservative, exact"):
+        hc.Detector(scene, accuracy="precise")
+
+
+def test_unusable_backend_is_refused(scene):
+    unusable = {"hybrid", "gpu"} - set(hc.backends())
+    for backend in unusable:
+        with pytest.raises(ValueError, match=f"backend.*'{backend}'.*cpu"):
+            hc.Detector(scene, backend=backend)
+
+
+@pytest.mark.parametrize("not_a_scene", [None, "cloth", FACES])
+def test_scene_of_a_detector(not_a_scene):
+    with pytest.raises(TypeError, match="scene.*Scene"):
+        hc.Detector(not_a_scene)
+
+
+@pytest.mark.parametrize("argument", [0, 1])
+@pytest.mark.parametrize(
+    ("bad", "error", "text"),
+    [
+        (VERTICES[:3], ValueError, r"\(4, 3\).*\(3, 3\)"),
+        (np.concatenate([VERTICES, VERTICES]), ValueError, r"\(4, 3\).*\(8, 3\)"),
+        (VERTICES.ravel(), ValueError, r"\(4, 3\).*\(12,\)"),
+        (VERTICES.T, ValueError, r"\(4, 3\).*\(3, 4\)"),
+        (VERTICES[None], ValueError, r"\(4, 3\).*\(1, 4, 3\)"),
+        (VERTICES.astype(int), TypeError, r"float32 or float64.*int64.*astype"),
+        (VERTICES.astype(np.float16), TypeError, r"float32 or float64.*float16"),
+        (VERTICES.astype(complex), TypeError, r"float32 or float64.*complex"),
+        (None, TypeError, r"float32 or float64"),
+        (changed(VERTICES, 2, 1, np.nan), ValueError, r"\[2, 1\] is NaN"),
+        (changed(VERTICES, 3, 0, np.inf), ValueError, r"\[3, 0\] is infinite"),
+        (changed(VERTICES, 0, 2, -np.inf), ValueError, r"\[0, 2\] is infinite"),
+        (changed(VERTICES.astype(np.float32), 1, 2, np.nan), ValueError, r"\[1, 2\] is NaN"),
+        (changed(VERTICES, 1, 1, 1e200), ValueError, r"\[1, 1\].*scale"),
+    ],
+)
+def test_vertices(detector, argument, bad, error, text):
+    arguments = [VERTICES, VERTICES + 1]
+    if isinstance(bad, np.ndarray) and bad.dtype == np.float32:
+        arguments = [a.astype(np.float32) for a in arguments]
+    good = detector.detect(*arguments)
+    arguments[argument] = bad
+    with pytest.raises(error, match=f"vertices_t{argument}.*{text}"):
+        detector.detect(*arguments)
+    arguments[argument] = [VERTICES, VERTICES + 1][argument].astype(arguments[1 - argument].dtype)
+    assert detector.detect(*arguments).hash == good.hash, "goes on as before"
+
+
+@pytest.mark.parametrize(
+    ("bad", "error", "text"),
+    [
+        (VERTICES[:3], ValueError, r"vertices.*\(4, 3\).*\(3, 3\)"),
+        (VERTICES.astype(int), TypeError, r"vertices.*float32 or float64"),
+        (changed(VERTICES, 2, 1, np.nan), ValueError, r"vertices.*\[2, 1\]"),
+        (changed(VERTICES, 2, 1, np.inf), ValueError, r"vertices.*\[2, 1\]"),
+        (changed(VERTICES, 2, 1, 1e200), ValueError, r"vertices.*\[2, 1\]"),
+    ],
+)
+def test_a_refused_step_does_not_count(detector, bad, error, text):
+    with pytest.raises(error, match=text):
+        detector.step(bad)
+    assert len(detector.step(VERTICES)) == 0
+    with pytest.raises(error, match=text):
+        detector.step(bad)
+    moved = VERTICES[::-1].copy()
+    assert detector.step(moved).hash == detector.detect(VERTICES, moved).hash
+
+
+@pytest.mark.parametrize("test", [hc.test_vertex_face, hc.test_edge_edge])
+@pytest.mark.parametrize(
+    ("bad", "error", "text"),
+    [
+        (np.zeros((8, 3)), ValueError, r"queries.*\(Q, 8, 3\).*\(8, 3\)"),
+        (np.zeros((1, 4, 6)), ValueError, r"queries.*\(Q, 8, 3\).*\(1, 4, 6\)"),
+        (np.zeros((1, 8, 3), int), TypeError, r"queries.*float32 or float64.*int64"),
+        (np.full((2, 8, 3), np.nan), ValueError, r"queries\[0, 0, 0\] is nan.*finite"),
+        (np.full((2, 8, 3), np.inf), ValueError, r"queries\[0, 0, 0\] is inf.*finite"),
+        (np.full((2, 8, 3), 1e300), ValueError, r"queries\[0, 0, 0\].*scale"),
+    ],
+)
+def test_queries(test, bad, error, text):
+    with pytest.raises(error, match=text):
+        test(bad)
+
+
+@pytest.mark.parametrize("test", [hc.test_vertex_face, hc.test_edge_edge])
+def test_options_of_queries(test):
+    with pytest.raises(ValueError, match="accuracy.*'precise'.*exact"):
+        test(np.zeros((1, 8, 3)), accuracy="precise")
+    with pytest.raises(ValueError, match="simd.*'sse2'.*scalar"):
+        test(np.zeros((1, 8, 3)), simd="sse2")
+
+
+def test_errors_have_one_kind_to_catch(detector):
+    with pytest.raises(hc.InvalidArgument):
+        detector.detect(changed(VERTICES, 0, 0, np.nan), VERTICES)
+    assert issubclass(hc.InvalidArgument, ValueError)
