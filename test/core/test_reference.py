@@ -5,6 +5,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from distances import distance_at
 
 from hpccd_core import reference
 from hpccd_core.fuzz.generators import EDGE_EDGE, GENERATORS, VERTEX_FACE
@@ -14,61 +15,17 @@ ORACLE = {VERTEX_FACE: reference.vertex_face, EDGE_EDGE: reference.edge_edge}
 INTEGER_GENERATORS = ("lattice", "still", "on_line", "parallel_at_root", "thin", "meeting", "chosen_roots")
 
 
-def _point_segment(p, a, b):
-    d = b - a
-    length = (d * d).sum(-1)
-    s = np.clip(((p - a) * d).sum(-1) / np.where(length > 0, length, 1), 0, 1)
-    return np.linalg.norm(p - a - s[..., None] * d, axis=-1)
-
-
-def _point_triangle(p, a, b, c):
-    normal = np.cross(b - a, c - a)
-    area = np.linalg.norm(normal, axis=-1)
-    flat = area < 1e-9
-    normal = normal / np.where(flat, 1, area)[..., None]
-    height = ((p - a) * normal).sum(-1)
-    foot = p - height[..., None] * normal
-    sides = [(np.cross(y - x, foot - x) * normal).sum(-1) >= 0 for x, y in ((a, b), (b, c), (c, a))]
-    border = np.min([_point_segment(p, a, b), _point_segment(p, b, c), _point_segment(p, c, a)], axis=0)
-    return np.where(~flat & np.all(sides, axis=0), np.abs(height), border)
-
-
-def _segment_segment(a0, a1, b0, b1):
-    u, v, w = a1 - a0, b1 - b0, b0 - a0
-    normal = np.cross(u, v)
-    area = (normal * normal).sum(-1)
-    flat = area < 1e-18
-    s, t = ((np.cross(w, x) * normal).sum(-1) / np.where(flat, 1, area) for x in (v, u))
-    inner = ~flat & (s >= 0) & (s <= 1) & (t >= 0) & (t <= 1)
-    ends = np.min(
-        [
-            _point_segment(a0, b0, b1), _point_segment(a1, b0, b1),
-            _point_segment(b0, a0, a1), _point_segment(b1, a0, a1),
-        ],
-        axis=0,
-    )  # fmt: skip
-    return np.where(inner, np.abs((w * normal).sum(-1)) / np.sqrt(np.where(flat, 1, area)), ends)
-
-
-DISTANCE = {VERTEX_FACE: _point_triangle, EDGE_EDGE: _segment_segment}
-
-
-def _distance_at(kind, queries, t):
-    points = (1 - t)[..., None, None] * queries[:, :4] + t[..., None, None] * queries[:, 4:]
-    return DISTANCE[kind](*np.moveaxis(points, -2, 0))
-
-
 @pytest.mark.parametrize("kind", GENERATORS)
 @pytest.mark.parametrize("generator", INTEGER_GENERATORS)
 def test_distance_is_zero_at_toc_and_not_before(kind, generator):
     queries = GENERATORS[kind][generator](np.random.default_rng(11), 3000)
     hit, toc = ORACLE[kind](queries)
     assert hit.any() and not hit.all()
-    assert _distance_at(kind, queries, np.where(hit, toc, 0))[hit].max() < 1e-12
+    assert distance_at(kind, queries, np.where(hit, toc, 0))[hit].max() < 1e-12
 
     fractions = {i / n for n in (1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 100) for i in range(n + 1)}
     times = np.array(sorted(fractions))[:, None] + np.zeros(len(queries))
-    touching = _distance_at(kind, queries, times) < 1e-13
+    touching = distance_at(kind, queries, times) < 1e-13
     assert not (touching & (times < toc - 1e-9)).any()
 
 
