@@ -8,8 +8,8 @@
 from . import _find_core  # noqa: F401  (lets a source checkout use the installed extension modules)
 from ._core import InvalidArgument
 from .contacts import Contacts
-from .detector import Detector, backends
+from .detector import Detector, backends, gpu_status
 from .elementary import test_edge_edge, test_vertex_face
 from .scene import Scene
 
-__all__ = ["Contacts", "Detector", "InvalidArgument", "Scene", "backends", "test_edge_edge", "test_vertex_face"]
+__all__ = ["Contacts", "Detector", "InvalidArgument", "Scene", "backends", "gpu_status", "test_edge_edge", "test_vertex_face"]

@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from . import _core, arguments
+from . import _core, arguments, device_arrays
 from .contacts import Contacts
 from .scene import ACCURACIES, Scene
 
@@ -12,7 +12,14 @@ METHODS = ("default", "published", "naive", "front")
 
 def backends():
     """The backends usable with this build on this machine, e.g. ["cpu"] or ["cpu", "gpu", "hybrid"]."""
-    return ["cpu"]
+    return ["cpu", "gpu"] if gpu_status()["devices"] else ["cpu"]
+
+
+def gpu_status():
+    """What this build and machine can do with GPUs: dict with "compiled" (bool), "toolkit" (str: CUDA version and
+    architectures), "devices" (list of dicts: name, number, major, minor, multiprocessors, memory in bytes) and "reason"
+    (str: why there are none; empty where there are)."""
+    return _core.gpu_status()
 
 
 class Detector:
@@ -57,8 +64,10 @@ class Detector:
         self.report = arguments.choice("report", report, ("all", "first", "any"))
         arguments.choice("backend", backend, ("auto", "cpu", "hybrid", "gpu"))
         if backend != "auto" and backend not in backends():
-            raise ValueError(f"backend: {backend!r} is not usable here; use one of {', '.join(['auto', *backends()])}")
-        self.backend = "cpu"
+            why = gpu_status()["reason"] or "it is not part of this build"
+            usable = ", ".join(["auto", *backends()])
+            raise ValueError(f"backend: {backend!r} is not usable here ({why}); use one of {usable}")
+        self._backend = backend
         outputs = arguments.output_names(outputs)
         threads = arguments.whole_number("threads", threads, 0, 1024)
         simd = arguments.choice("simd", simd, ("auto", "scalar", "avx2", "avx512"))
@@ -72,7 +81,7 @@ class Detector:
         self._core = _core.Detector(
             scene._core,
             getattr(_core.Accuracy, accuracy),
-            getattr(_core.Backend, self.backend),
+            getattr(_core.Backend, backend),
             getattr(_core.Report, report),
             getattr(_core.Simd, simd),
             threads,
@@ -87,14 +96,29 @@ class Detector:
     def detect(self, vertices_t0, vertices_t1):
         """Contacts of the motion from vertices_t0 to vertices_t1, each (V, 3) float32 or float64.
 
-        C-contiguous arrays are read in place. Raises TypeError for a wrong dtype, ValueError for a wrong shape or a
+        C-contiguous arrays are read in place. Arrays in a GPU's memory (CUDA array interface or DLPack: CuPy, PyTorch,
+        Warp; C-contiguous, backend "gpu" or "auto") are used there without a copy. Raises TypeError for a wrong dtype, ValueError for a wrong shape or a
         coordinate that is NaN, infinite or beyond 1e150.
         """
+        on_device = [device_arrays.is_on_device(v) for v in (vertices_t0, vertices_t1)]
+        if all(on_device):
+            return self._detect_on_device(vertices_t0, vertices_t1)
+        if any(on_device):
+            raise TypeError("vertices_t0, vertices_t1: one is a device array, the other is not; give both in one place")
         vertices_t0 = arguments.vertices("vertices_t0", vertices_t0, self.n_vertices)
         vertices_t1 = arguments.vertices("vertices_t1", vertices_t1, self.n_vertices)
         if vertices_t0.dtype != vertices_t1.dtype:  # widening a float32 is exact
             vertices_t0, vertices_t1 = vertices_t0.astype(np.float64), vertices_t1.astype(np.float64)
         return Contacts(**self._core.detect(vertices_t0, vertices_t1))
+
+    def _detect_on_device(self, vertices_t0, vertices_t1):
+        first = device_arrays.positions("vertices_t0", vertices_t0, self.n_vertices)
+        second = device_arrays.positions("vertices_t1", vertices_t1, self.n_vertices)
+        if first.is_double != second.is_double:
+            raise TypeError("vertices_t0, vertices_t1: device arrays must both be float32 or both be float64")
+        return Contacts(
+            **self._core.detect_on_device(first.pointer, second.pointer, self.n_vertices, first.is_double)
+        )
 
     def step(self, vertices):
         """Streaming: the end of the last step is the start of this one. The first call returns no contacts."""
@@ -109,6 +133,16 @@ class Detector:
     def reset(self):
         """Forget the last positions: the next step() starts anew."""
         self._last = None
+
+    @property
+    def backend(self):
+        """Where frames are computed; for "auto" and after failures of the GPU: where the last one was."""
+        return self._backend if self._backend == "cpu" else self._core.last_backend
+
+    @property
+    def last_gpu_error(self):
+        """Why frames meant for the GPU were computed on the CPU (stats["gpu_fallbacks"] counts them); or empty."""
+        return self._core.last_gpu_error
 
     @property
     def threads(self):

@@ -5,10 +5,12 @@
 #include <pybind11/stl.h>
 
 #include "base/simd.h"
+#include "gpu/device.h"
 #include "hpccd/hpccd.h"
 
 namespace py = pybind11;
 using namespace hpccd;
+using namespace py::literals;
 
 namespace {
 
@@ -125,13 +127,35 @@ PYBIND11_MODULE(_core, m) {
              }
              return to_dict(std::move(c));
            })
+      .def("detect_on_device",
+           [](Detector& d, std::uintptr_t t0, std::uintptr_t t1, std::size_t n, bool is_double) {
+             Contacts c;
+             {
+               py::gil_scoped_release release;
+               c = d.detect({reinterpret_cast<const void*>(t0), n, is_double, true},
+                            {reinterpret_cast<const void*>(t1), n, is_double, true});
+             }
+             return to_dict(std::move(c));
+           })
       .def("profile", &Detector::profile)
       .def("stats", &Detector::stats)
+      .def_property_readonly("last_backend",
+                             [](const Detector& d) { return d.last_backend() == Backend::gpu ? "gpu" : "cpu"; })
+      .def_property_readonly("last_gpu_error", &Detector::last_gpu_error)
       .def_property_readonly("threads", [](const Detector& d) { return d.options().threads; })
       .def_property_readonly("simd", [](const Detector& d) { return name_of(d.options().simd); });
 
   m.def("test_vertex_face", &run_queries<&test_vertex_face>);
   m.def("test_edge_edge", &run_queries<&test_edge_edge>);
+  m.def("gpu_status", [] {
+    const gpu::Status& s = gpu::status();
+    py::list devices;
+    for (const gpu::Device& x : s.devices)
+      devices.append(py::dict("name"_a = x.name, "number"_a = x.number, "major"_a = x.major, "minor"_a = x.minor,
+                              "multiprocessors"_a = x.multiprocessors, "memory"_a = x.memory));
+    return py::dict("compiled"_a = s.compiled, "toolkit"_a = s.toolkit, "devices"_a = devices, "reason"_a = s.reason);
+  });
+  m.def("gpu_fail_after", &gpu::fail_after);  // for tests
   m.def("simd_levels", [] {
     std::vector<std::string> names;
     for (Simd s : simd_levels()) names.push_back(name_of(s));

@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <optional>
+
 #include "base/parallel.h"
 #include "base/profiler.h"
 #include "base/simd.h"
 #include "bvh/motion_bounds.h"
 #include "bvh/tree.h"
 #include "contacts/canonical.h"
+#include "gpu/frames.h"
 #include "paper/method.h"
 #include "scene/features.h"
 #include "traverse/traverse.h"
@@ -23,6 +26,12 @@ struct Detector::Impl {
     search.limits = {o.minimum_separation, o.tolerance};
     if (o.minimum_separation > 0) search.batch_test[static_cast<int>(Accuracy::conservative)] = all_undecided;
     engine = paper::engine_of(options, {features, rules, pool});
+    const bool wanted = o.backend == Backend::gpu || o.backend == Backend::automatic;
+    if (const std::string why = gpu::unsupported(o); o.backend == Backend::gpu && !why.empty()) throw InvalidArgument(why);
+    if (wanted && gpu::unsupported(o).empty() && !gpu::status().devices.empty())
+      gpu = std::make_unique<gpu::Frames>(*scene, features, options, pool);
+    else if (o.backend == Backend::gpu)
+      throw InvalidArgument("backend: \"gpu\" is not usable here: " + gpu::status().reason);
   }
 
   std::shared_ptr<const Scene> scene;
@@ -35,8 +44,47 @@ struct Detector::Impl {
   MotionBounds motion;
   Tree tree;
   std::unique_ptr<paper::MethodEngine> engine;  // of a published method; none for the default traversal
+  std::unique_ptr<gpu::Frames> gpu;             // where the backend is "gpu", or may become it
+  // "auto": the first frames go to both in turn, the rest to the faster. The first of each warms up.
+  struct Trial {
+    int frames = 0;
+    double best_ms = std::numeric_limits<double>::infinity();
+  } trial[2];  // CPU, GPU
+  bool last_on_gpu = false;
   Profiler profiler;
   std::map<std::string, std::uint64_t> stats;
+
+  bool next_on_gpu(bool given_on_device) const {
+    constexpr int frames_each = 3;
+    if (!gpu || gpu->gave_up()) return false;
+    if (options.backend == Backend::gpu || given_on_device) return true;
+    if (trial[1].frames < frames_each) return trial[1].frames < trial[0].frames;
+    return trial[1].best_ms < trial[0].best_ms;
+  }
+
+  void note_time(bool on_gpu) {
+    last_on_gpu = on_gpu;
+    ++trial[on_gpu].frames;
+    trial[on_gpu].best_ms = std::min(trial[on_gpu].best_ms, profiler.stages().at("total"));
+  }
+
+  std::optional<Contacts> frame_on_gpu(Positions t0, Positions t1) {
+    const auto build_tree = [this](Positions a, Positions b) -> const Tree& {
+      motion.take(a, b, 0, pool);
+      build(tree, *scene, features, motion.boxes, pool);
+      return tree;
+    };
+    return gpu->detect(t0, t1, build_tree, profiler);
+  }
+
+  void count_gpu(const Contacts& contacts) {
+    stats = gpu->stats();
+    stats["vf_contacts"] = contacts.vf.size();
+    stats["ee_contacts"] = contacts.ee.size();
+    stats["triangles"] = features.n_faces();
+    stats["bytes"] = motion.rows.capacity() * sizeof(VertexRow) + motion.boxes.capacity() * sizeof(Box) + tree.bytes() +
+                     features.bytes();
+  }
 
   // A tree that fits the motion of this step: refitted, or built anew where refitting has lost too much.
   void update_tree() {
@@ -98,6 +146,7 @@ struct Detector::Impl {
     stats["bytes"] = bytes + motion.rows.capacity() * sizeof(VertexRow) + motion.boxes.capacity() * sizeof(Box) +
                      tree.bytes() + features.bytes() + (engine ? engine->bytes() : 0);
     if (engine) engine->count(stats);
+    if (gpu) stats["gpu_fallbacks"] = gpu->fallbacks();
   }
 };
 
@@ -113,7 +162,20 @@ Contacts Detector::detect(Positions t0, Positions t1) {
                           " vertices, but " + std::to_string(t0.n) + " and " + std::to_string(t1.n) + " were given");
   if (t0.is_double != t1.is_double)
     throw InvalidArgument("vertices_t0, vertices_t1: must both be float32 or both be float64");
+  if ((t0.on_device || t1.on_device) && !d.gpu)
+    throw InvalidArgument("vertices_t0, vertices_t1: are in a GPU's memory, which this detector does not use; copy them "
+                          "to the host, or use backend=\"gpu\"");
   d.profiler.begin();
+  if (d.next_on_gpu(t0.on_device || t1.on_device)) {
+    if (auto contacts = d.frame_on_gpu(t0, t1)) {
+      d.count_gpu(*contacts);
+      d.profiler.end();
+      d.note_time(true);
+      return std::move(*contacts);
+    }
+    d.profiler.mark("gpu_failed");
+  }
+  if (d.gpu) t0 = d.gpu->on_host(t0, 0), t1 = d.gpu->on_host(t1, 1);
   d.motion.take(t0, t1, d.options.minimum_separation, d.pool);
   d.profiler.mark("bounds");
   d.find_contacts();
@@ -122,11 +184,19 @@ Contacts Detector::detect(Positions t0, Positions t1) {
   d.profiler.mark("contacts");
   d.count(contacts);
   d.profiler.end();
+  d.note_time(false);
   return contacts;
 }
 
-std::map<std::string, double> Detector::profile() const { return impl_->profiler.stages(); }
+std::map<std::string, double> Detector::profile() const {
+  auto stages = impl_->profiler.stages();
+  if (impl_->gpu && impl_->last_on_gpu)
+    for (const auto& [name, ms] : impl_->gpu->stages()) stages["gpu/" + name] = ms;
+  return stages;
+}
 std::map<std::string, std::uint64_t> Detector::stats() const { return impl_->stats; }
 const Options& Detector::options() const { return impl_->options; }
+Backend Detector::last_backend() const { return impl_->last_on_gpu ? Backend::gpu : Backend::cpu; }
+std::string Detector::last_gpu_error() const { return impl_->gpu ? impl_->gpu->last_error() : std::string(); }
 
 }  // namespace hpccd

@@ -112,6 +112,8 @@ class Detector {
   std::map<std::string, double> profile() const;        // stage -> ms of the last call
   std::map<std::string, std::uint64_t> stats() const;   // counts of the last call
   const Options& options() const;                       // with "automatic" resolved
+  Backend last_backend() const;                         // where the last frame was computed
+  std::string last_gpu_error() const;                   // why a frame meant for the GPU was computed on the CPU
 
  private:
   struct Impl;

@@ -27,6 +27,7 @@ struct CubicError {
 
 template <class R>
 HPCCD_HD constexpr double half_ulp() {
+  if constexpr (requires { RealTraits<R>::half_ulp; }) return RealTraits<R>::half_ulp;
   return sizeof(typename RealTraits<R>::Scalar) == 8 ? 1.1102230246251565e-16 : 5.9604644775390625e-08;
 }
 

@@ -3,6 +3,7 @@
 
 #include "elementary/batch.h"
 #include "elementary/exact/contact.h"
+#include "elementary/extended.h"
 #include "elementary/tolerant.h"
 
 namespace hpccd {
@@ -15,6 +16,15 @@ std::optional<double> tolerant_contact(Points q_t0, Points q_t1) {
   const tolerant::Answer a = tolerant::decide<kind>(motion_of<kind>(q_t0, q_t1));
   if (!a.contact) return std::nullopt;
   return a.toc;
+}
+
+// 106 bits first: they decide nearly all that double precision does not, several times faster, and to the same bits.
+template <Kind kind>
+std::optional<double> exact_contact(Points q_t0, Points q_t1) {
+  const extended::Answer a = extended::decide<kind>(q_t0, q_t1);
+  if (a.contact) return a.toc;
+  if (a.none) return std::nullopt;
+  return exact::earliest_contact(kind, q_t0, q_t1);
 }
 
 std::optional<double> within_separation(const inclusion::Limits& limits, Kind kind, Points q_t0, Points q_t1) {
@@ -31,7 +41,8 @@ std::optional<double> last_resort(Accuracy accuracy, const inclusion::Limits& li
     return within_separation(limits, kind, q_t0, q_t1);
   // Without a separation the exact answer is conservative too, and cheaper than a search that has to give up somewhere.
   if (accuracy == Accuracy::conservative || accuracy == Accuracy::exact)
-    return exact::earliest_contact(kind, q_t0, q_t1);
+    return kind == Kind::vertex_face ? exact_contact<Kind::vertex_face>(q_t0, q_t1)
+                                     : exact_contact<Kind::edge_edge>(q_t0, q_t1);
   return kind == Kind::vertex_face ? tolerant_contact<Kind::vertex_face>(q_t0, q_t1)
                                    : tolerant_contact<Kind::edge_edge>(q_t0, q_t1);
 }

@@ -45,11 +45,13 @@ HPCCD_HD Magnitudes<R> magnitudes(const Motion<R>& m) {
 // Written so that NaN says no.
 template <class R>
 HPCCD_HD typename RealTraits<R>::Mask in_range(const Magnitudes<R>& m) {
-  const R low(sizeof(typename RealTraits<R>::Scalar) == 8 ? 5.7e-73 : 4.7e-10);   // 2^-240, 2^-31
-  const R high(sizeof(typename RealTraits<R>::Scalar) == 8 ? 1.7e72 : 2.1e9);     // 2^240, 2^31
+  using Traits = RealTraits<R>;
+  double low = sizeof(typename Traits::Scalar) == 8 ? 5.7e-73 : 4.7e-10;  // 2^-240, 2^-31
+  double high = sizeof(typename Traits::Scalar) == 8 ? 1.7e72 : 2.1e9;    // 2^240, 2^31
+  if constexpr (requires { Traits::least_usable; }) low = Traits::least_usable, high = Traits::most_usable;
   const R least = lesser(lesser(m.p, m.a), m.b);
   const R most = greater(greater(m.p, m.a), m.b);
-  return least >= low && most <= high;
+  return least >= R(low) && most <= R(high);
 }
 
 }  // namespace hpccd

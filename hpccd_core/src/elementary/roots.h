@@ -23,7 +23,9 @@ struct Pieces {
 // de Casteljau at t.
 template <class R>
 HPCCD_HD Pieces<R> subdivide(const Cubic<R>& f, R t) {
-  const R s = R(1) - t, third(1.0 / 3.0);
+  const R s = R(1) - t;
+  R third(1.0 / 3.0);
+  if constexpr (requires { RealTraits<R>::half_ulp; }) third = R(1) / R(3);  // more than a double's bits
   const R b0 = f.c0, b1 = third * f.k1, b2 = third * f.k2, b3 = f.c3;
   const R m01 = s * b0 + t * b1, m12 = s * b1 + t * b2, m23 = s * b2 + t * b3;
   const R l2 = s * m01 + t * m12, r1 = s * m12 + t * m23;

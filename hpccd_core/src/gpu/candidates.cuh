@@ -191,7 +191,7 @@ __device__ void vertex_face_candidates(const Frame<T>& f, CandidateSpace& s, Can
 }
 
 template <class T>
-__global__ __launch_bounds__(32 * candidate_warps) void candidates_kernel(const __grid_constant__ Frame<T> f) {
+__global__ __launch_bounds__(32 * candidate_warps, 5) void candidates_kernel(const __grid_constant__ Frame<T> f) {
   __shared__ CandidateSpace spaces[candidate_warps];
   CandidateSpace& s = spaces[threadIdx.x / 32];
   CandidateState state;

@@ -4,6 +4,7 @@
 #pragma once
 
 #include "elementary/certified.h"
+#include "elementary/extended.h"
 #include "elementary/tolerant.h"
 #include "gpu/frame.cuh"
 
@@ -76,8 +77,10 @@ __global__ __launch_bounds__(128) void roots_kernel(const __grid_constant__ Fram
     proven += contact;
     doubtful += undecided;
   });
-  proven = __reduce_add_sync(all_lanes, proven);
-  doubtful = __reduce_add_sync(all_lanes, doubtful);
+  for (int d = 16; d > 0; d /= 2) {
+    proven += __shfl_xor_sync(all_lanes, proven, d);
+    doubtful += __shfl_xor_sync(all_lanes, doubtful, d);
+  }
   if (lane_number() != 0) return;
   if (proven) {
     atomicAdd(&f.counters->proven[k], static_cast<u64>(proven));
@@ -104,7 +107,7 @@ __global__ void end_segment_kernel(Frame<T> f) {
 
 // The tier's last resort for what the error bounds left open: here where double precision is enough, else on the host.
 template <class T>
-__global__ __launch_bounds__(64) void last_resort_kernel(const __grid_constant__ Frame<T> f) {
+__global__ __launch_bounds__(32) void last_resort_kernel(const __grid_constant__ Frame<T> f) {
   const u64 n = length(f.counters->undecided, f.undecided_capacity), stride = static_cast<u64>(gridDim.x) * blockDim.x;
   for (u64 i = static_cast<u64>(blockIdx.x) * blockDim.x + threadIdx.x; i - lane_number() < n; i += stride) {
     bool contact = false, host = false;
@@ -120,8 +123,15 @@ __global__ __launch_bounds__(64) void last_resort_kernel(const __grid_constant__
       const uint4 v = kind == Kind::edge_edge ? vertices_of<Kind::edge_edge>(f, pair.x, pair.y)
                                               : vertices_of<Kind::vertex_face>(f, pair.x, pair.y);
       const Accuracy accuracy = accuracy_of(f, v);
-      host = accuracy == Accuracy::exact || accuracy == Accuracy::conservative;
-      if (!host) {
+      if (accuracy == Accuracy::exact || accuracy == Accuracy::conservative) {
+        const Ends r[4] = {load_row(f.rows, v.x), load_row(f.rows, v.y), load_row(f.rows, v.z), load_row(f.rows, v.w)};
+        const Vec3<double> q0[4] = {r[0].t0, r[1].t0, r[2].t0, r[3].t0}, q1[4] = {r[0].t1, r[1].t1, r[2].t1, r[3].t1};
+        const extended::Answer a = kind == Kind::edge_edge ? extended::decide<Kind::edge_edge>(q0, q1)
+                                                           : extended::decide<Kind::vertex_face>(q0, q1);
+        contact = a.contact;
+        host = !a.contact && !a.none;
+        toc = a.toc;
+      } else {
         const tolerant::Answer a =
             kind == Kind::edge_edge ? tolerant::decide<Kind::edge_edge>(load_motion<Kind::edge_edge>(f.rows, v))
                                     : tolerant::decide<Kind::vertex_face>(load_motion<Kind::vertex_face>(f.rows, v));

@@ -179,7 +179,7 @@ class DevicePipeline : public Pipeline {
   std::size_t device_bytes() const;
   void reserve_found(std::size_t n);
   template <class T>
-  const T* bring(Positions p, int which, ThreadPool& pool);
+  void bring(Positions t0, Positions t1, const T* given[2], ThreadPool& pool);
   template <class T>
   Frame<T> frame(Positions t0, Positions t1, ThreadPool& pool);
   template <class T>
@@ -191,8 +191,9 @@ class DevicePipeline : public Pipeline {
   bool grow_overflowed();
   template <class Kernel, class T>
   void persistent(Kernel kernel, unsigned threads, const Frame<T>& f, const char* name) {
-    int blocks = 0;
-    check(cudaOccupancyMaxActiveBlocksPerMultiprocessor(&blocks, kernel, static_cast<int>(threads), 0), name);
+    int& blocks = occupancy_[reinterpret_cast<const void*>(kernel)];
+    if (blocks == 0)
+      check(cudaOccupancyMaxActiveBlocksPerMultiprocessor(&blocks, kernel, static_cast<int>(threads), 0), name);
     kernel<<<static_cast<unsigned>(std::max(blocks, 1) * multiprocessors_), threads, 0, stream_>>>(f);
     check_launch(name);
   }
@@ -236,6 +237,7 @@ class DevicePipeline : public Pipeline {
   static constexpr std::size_t most_listed = std::size_t{1} << 26;
   u32 n_segments_ = 1;
   u64 passes_ = 0;
+  std::map<const void*, int> occupancy_;  // blocks of a kernel on one multiprocessor
   std::vector<Undecided> undecided_;
   std::vector<unsigned char> downloaded_[2];
 };
@@ -331,20 +333,32 @@ void DevicePipeline::reserve_found(std::size_t n) {
   order_.reserve(n);  // last: its size says that all of these are there
 }
 
-// The caller's positions on the device. Pageable memory would be copied by the driver in one thread, so all threads of
-// the pool bring it to page-locked memory.
+// The caller's positions on the device, by way of page-locked memory: the driver's own way from pageable memory takes one
+// thread 100 us a megabyte. Waking the pool costs as much as copying half a megabyte.
 template <class T>
-const T* DevicePipeline::bring(Positions p, int which, ThreadPool& pool) {
-  if (p.on_device) return static_cast<const T*>(p.data);
-  const std::size_t n = 3 * p.n, bytes = n * sizeof(T);
-  staging_[which].reserve(std::max<std::size_t>((bytes + 7) / 8, 1));
-  given_[which].reserve(std::max<std::size_t>((bytes + 7) / 8, 1));
-  char* to = reinterpret_cast<char*>(staging_[which].data());
-  const char* from = static_cast<const char*>(p.data);
-  parallel_for(pool, bytes, std::size_t{1} << 16,
-               [&](std::size_t begin, std::size_t end, int) { std::memcpy(to + begin, from + begin, end - begin); });
-  if (bytes) check(cudaMemcpyAsync(given_[which].data(), to, bytes, cudaMemcpyHostToDevice, stream_), "cudaMemcpyAsync");
-  return reinterpret_cast<const T*>(given_[which].data());
+void DevicePipeline::bring(Positions t0, Positions t1, const T* given[2], ThreadPool& pool) {
+  const Positions ends[2] = {t0, t1};
+  const std::size_t bytes = 3 * t0.n * sizeof(T), words = std::max<std::size_t>((bytes + 7) / 8, 1);
+  char* to[2] = {nullptr, nullptr};
+  for (int i = 0; i < 2; ++i) {
+    given[i] = static_cast<const T*>(ends[i].data);
+    if (ends[i].on_device) continue;
+    staging_[i].reserve(words);
+    given_[i].reserve(words);
+    to[i] = reinterpret_cast<char*>(staging_[i].data());
+    given[i] = reinterpret_cast<const T*>(given_[i].data());
+  }
+  const auto copy = [&](std::size_t begin, std::size_t end, int) {
+    for (int i = 0; i < 2; ++i)
+      if (to[i]) std::memcpy(to[i] + begin, static_cast<const char*>(ends[i].data) + begin, end - begin);
+  };
+  if (bytes < (std::size_t{1} << 19))
+    copy(0, bytes, 0);
+  else
+    parallel_for(pool, bytes, std::size_t{1} << 16, copy);
+  for (int i = 0; i < 2; ++i)
+    if (to[i] && bytes)
+      check(cudaMemcpyAsync(given_[i].data(), to[i], bytes, cudaMemcpyHostToDevice, stream_), "cudaMemcpyAsync");
 }
 
 template <class T>
@@ -365,7 +379,9 @@ Frame<T> DevicePipeline::frame(Positions t0, Positions t1, ThreadPool& pool) {
   f.leaves = leaves_.data(), f.vertex_of_slot = vertex_of_slot_.data(), f.edge_of_slot = edge_of_slot_.data();
   f.face_of_slot = face_of_slot_.data(), f.edge_boxes = edge_boxes_.data(), f.face_boxes = face_boxes_.data();
   f.face_corner2 = face_corner2_.data();
-  f.given_t0 = bring<T>(t0, 0, pool), f.given_t1 = bring<T>(t1, 1, pool);
+  const T* given[2];
+  bring(t0, t1, given, pool);
+  f.given_t0 = given[0], f.given_t1 = given[1];
   f.rows = reinterpret_cast<Row<T>*>(rows_.data()), f.vertex_boxes = vertex_boxes_.data();
   f.counters = counters_.data();
   return f;
@@ -408,7 +424,7 @@ void DevicePipeline::launch(Frame<T>& f) {
     end_segment_kernel<<<1, 1, 0, stream_>>>(f);
     check_launch("end_segment_kernel");
   }
-  last_resort_kernel<<<static_cast<unsigned>(multiprocessors_), 64, 0, stream_>>>(f);
+  last_resort_kernel<<<static_cast<unsigned>(2 * multiprocessors_), 32, 0, stream_>>>(f);
   check_launch("last_resort_kernel");
   timer_.mark("last_resort", stream_);
 }

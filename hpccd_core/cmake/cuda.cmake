@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: Apache-2.0
+# Finds nvcc and compiles the CUDA sources with it into objects. Not CMake's own CUDA language: that fails at configure
+# time where nvcc comes from wheels, and a build without CUDA must always work.
+set(HPCCD_CUDA "AUTO" CACHE STRING "CUDA backends: AUTO (where nvcc works), ON (required), OFF")
+set_property(CACHE HPCCD_CUDA PROPERTY STRINGS AUTO ON OFF)
+# Machine code for Hopper; any other GPU since Turing compiles the portable code when it first runs.
+set(HPCCD_CUDA_ARCHITECTURES "90;75-virtual" CACHE STRING "e.g. 87 (Jetson Orin), 90, or 75-virtual for portable code")
+
+# Sets hpccd_cuda_objects and hpccd_cuda_libraries, both empty where there is no CUDA.
+function(hpccd_find_cuda)
+  set(hpccd_cuda_objects "" PARENT_SCOPE)
+  set(hpccd_cuda_libraries "" PARENT_SCOPE)
+  if(HPCCD_CUDA STREQUAL "OFF")
+    message(STATUS "CUDA: off")
+    return()
+  endif()
+
+  # The nvidia-cuda-nvcc wheel puts the compiler beside the Python packages.
+  execute_process(COMMAND ${Python3_EXECUTABLE} -c
+    "import sys; print(';'.join(p + '/nvidia/cu13/bin' for p in sys.path if p))"
+    OUTPUT_VARIABLE wheels OUTPUT_STRIP_TRAILING_WHITESPACE)
+  find_program(HPCCD_NVCC nvcc HINTS ENV CUDA_HOME PATH_SUFFIXES bin PATHS ${wheels} /usr/local/cuda/bin)
+  set(problem "")
+  if(NOT HPCCD_NVCC)
+    set(problem "no nvcc on the PATH, in /usr/local/cuda/bin or from the nvidia-cuda-nvcc wheel")
+  else()
+    get_filename_component(nvcc_real "${HPCCD_NVCC}" REALPATH)
+    get_filename_component(toolkit "${nvcc_real}/../.." ABSOLUTE)
+    file(GLOB runtime "${toolkit}/lib64/libcudart_static.a" "${toolkit}/lib/libcudart_static.a"
+      "${toolkit}/targets/*/lib/libcudart_static.a")
+    if(NOT runtime)
+      set(problem "nvcc is in ${toolkit}, but libcudart_static.a is not: install nvidia-cuda-runtime of the same version")
+    else()
+      list(GET runtime 0 runtime)
+    endif()
+  endif()
+
+  set(flags -std=c++20 -O3 --fmad=false --expt-relaxed-constexpr -ccbin "${CMAKE_CXX_COMPILER}"
+    -Xcompiler "-fPIC,-ffp-contract=off,-fvisibility=hidden")
+  set(shown "")
+  foreach(architecture IN LISTS HPCCD_CUDA_ARCHITECTURES)
+    if(architecture MATCHES "^([0-9]+a?)-virtual$")
+      list(APPEND flags -gencode "arch=compute_${CMAKE_MATCH_1},code=compute_${CMAKE_MATCH_1}")
+      list(APPEND shown "PTX ${CMAKE_MATCH_1}")
+    elseif(architecture MATCHES "^([0-9]+a?)$")
+      list(APPEND flags -gencode "arch=compute_${architecture},code=sm_${architecture}")
+      list(APPEND shown "sm_${architecture}")
+    else()
+      message(FATAL_ERROR "HPCCD_CUDA_ARCHITECTURES: '${architecture}' is not like 90 or 75-virtual")
+    endif()
+  endforeach()
+  string(REPLACE ";" ", " shown "${shown}")
+
+  if(NOT problem)
+    # The whole way once: a compiler whose parts do not fit together fails here, not in the middle of the build.
+    set(probe "${CMAKE_CURRENT_BINARY_DIR}/cuda_probe")
+    file(WRITE "${probe}.cu" "#include <cub/device/device_radix_sort.cuh>\n__global__ void k() {}\nvoid f() { k<<<1, 1>>>(); }\n")
+    execute_process(COMMAND "${HPCCD_NVCC}" ${flags} -c "${probe}.cu" -o "${probe}.o"
+      RESULT_VARIABLE failed OUTPUT_VARIABLE said ERROR_VARIABLE said)
+    if(failed)
+      set(problem "${HPCCD_NVCC} does not compile a small program:\n${said}")
+    endif()
+  endif()
+  if(problem)
+    if(HPCCD_CUDA STREQUAL "ON")
+      message(FATAL_ERROR "CUDA: ${problem}")
+    endif()
+    message(STATUS "CUDA: none, the GPU backends are left out (${problem})")
+    return()
+  endif()
+  message(STATUS "CUDA: ${HPCCD_NVCC}, for ${shown}")
+
+  file(GLOB headers CONFIGURE_DEPENDS "${CMAKE_CURRENT_SOURCE_DIR}/src/*/*.h" "${CMAKE_CURRENT_SOURCE_DIR}/src/*/*.cuh"
+    "${CMAKE_CURRENT_SOURCE_DIR}/include/hpccd/*.h")
+  foreach(source pipeline device sort)
+    set(object "${CMAKE_CURRENT_BINARY_DIR}/gpu_${source}.o")
+    add_custom_command(OUTPUT "${object}"
+      COMMAND "${HPCCD_NVCC}" ${flags} "-DHPCCD_CUDA_ARCHITECTURES_TEXT=\"${shown}\""
+        -I "${CMAKE_CURRENT_SOURCE_DIR}/src" -I "${CMAKE_CURRENT_SOURCE_DIR}/include"
+        -c "${CMAKE_CURRENT_SOURCE_DIR}/src/gpu/${source}.cu" -o "${object}"
+      DEPENDS "${CMAKE_CURRENT_SOURCE_DIR}/src/gpu/${source}.cu" ${headers}
+      COMMENT "Building CUDA object gpu/${source}.cu" VERBATIM)
+    list(APPEND objects "${object}")
+  endforeach()
+  set(hpccd_cuda_objects "${objects}" PARENT_SCOPE)
+  set(hpccd_cuda_libraries "${runtime};${CMAKE_DL_LIBS};rt" PARENT_SCOPE)
+endfunction()

@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Positions that live in a GPU's memory: CUDA array interface (CuPy, PyTorch, Numba, Warp) or DLPack."""
+
+import ctypes
+import typing
+
+
+class DevicePositions(typing.NamedTuple):
+    """A C-contiguous (V, 3) array on the device."""
+
+    pointer: int
+    is_double: bool
+
+
+def is_on_device(value):
+    """Whether the array lies in the memory of a CUDA device."""
+    if getattr(value, "__cuda_array_interface__", None) is not None:
+        return True
+    device = getattr(value, "__dlpack_device__", None)
+    return device is not None and int(device()[0]) == 2  # kDLCUDA
+
+
+def positions(name, value, n_vertices):
+    """The array's place and type. Raises TypeError or ValueError naming the argument."""
+    interface = getattr(value, "__cuda_array_interface__", None)
+    if interface is not None:
+        shape, strides, kind = tuple(interface["shape"]), interface.get("strides"), interface["typestr"]
+        pointer = interface["data"][0]
+    else:
+        shape, strides, kind, pointer = _from_dlpack(name, value)
+    if kind not in ("<f4", "<f8"):
+        raise TypeError(f"{name}: expected float32 or float64 on the device, got type {kind}")
+    if shape != (n_vertices, 3):
+        raise ValueError(f"{name}: expected shape ({n_vertices}, 3), one row a vertex of the scene's meshes, got {shape}")
+    size = int(kind[2])
+    if strides is not None and n_vertices and tuple(strides) != (3 * size, size):
+        raise ValueError(f"{name}: device arrays must be C-contiguous, got strides {tuple(strides)} bytes; copy it first")
+    return DevicePositions(int(pointer or 0), size == 8)
+
+
+class _Tensor(ctypes.Structure):
+    # DLTensor of dlpack.h, at the start of DLManagedTensor.
+    _fields_ = [
+        ("data", ctypes.c_void_p),
+        ("device_type", ctypes.c_int32),
+        ("device_id", ctypes.c_int32),
+        ("ndim", ctypes.c_int32),
+        ("code", ctypes.c_uint8),
+        ("bits", ctypes.c_uint8),
+        ("lanes", ctypes.c_uint16),
+        ("shape", ctypes.POINTER(ctypes.c_int64)),
+        ("strides", ctypes.POINTER(ctypes.c_int64)),
+        ("byte_offset", ctypes.c_uint64),
+    ]
+
+
+def _from_dlpack(name, value):
+    # Stream 1 is the legacy default stream: the producer's work is done before ours starts there. The capsule stays
+    # unconsumed, so the producer's own destructor frees it; the caller keeps the array itself alive.
+    capsule = value.__dlpack__(stream=1)
+    get = ctypes.pythonapi.PyCapsule_GetPointer
+    get.restype, get.argtypes = ctypes.c_void_p, [ctypes.py_object, ctypes.c_char_p]
+    tensor = ctypes.cast(get(capsule, b"dltensor"), ctypes.POINTER(_Tensor)).contents
+    if tensor.lanes != 1 or tensor.code != 2:
+        raise TypeError(f"{name}: expected float32 or float64 on the device")
+    size = tensor.bits // 8
+    shape = tuple(tensor.shape[i] for i in range(tensor.ndim))
+    strides = tuple(tensor.strides[i] * size for i in range(tensor.ndim)) if tensor.strides else None
+    return shape, strides, f"<f{size}", (tensor.data or 0) + tensor.byte_offset
