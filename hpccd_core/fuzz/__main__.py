@@ -16,17 +16,18 @@ from rich.table import Table
 
 from .differential import Batch, Tally, add_batch, batches, new_tallies, usable_simd
 
+SECONDS_BETWEEN_LINES = 30
 ACCURACIES = ("fast", "balanced", "conservative", "exact")
 
 
 def main(arguments: list[str] | None = None) -> int:
     a = _parser().parse_args(arguments)
-    console = Console()
+    console = Console(width=None if sys.stdout.isatty() else 120)
     simd = usable_simd()
     tallies = new_tallies()
     source = _replayed(a.replay) if a.replay else batches(a.seed, a.batch)
     goal = None if a.replay else a.count or a.seconds
-    done, start = 0, time.monotonic()
+    done, reported, start = 0, 0.0, time.monotonic()
     columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
     with Progress(*columns, console=console, transient=True) as progress:
         bar = progress.add_task("fuzzing", total=goal)
@@ -38,6 +39,9 @@ def main(arguments: list[str] | None = None) -> int:
                 broken = sum(t.broken for t in tallies.values())
                 text = f"{done:,} queries, {done / seconds:,.0f}/s, {broken} broken promises, last: {batch.generator}"
                 progress.update(bar, completed=done if a.count else seconds, description=text)
+                if not console.is_terminal and seconds > reported + SECONDS_BETWEEN_LINES:
+                    console.print(text)  # the bar shows on terminals only
+                    reported = seconds
                 if goal is not None and (done if a.count else seconds) >= goal:
                     break
         except KeyboardInterrupt:
