@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Positions that already live on the device."""
+
+import numpy as np
+import pytest
+import scenes
+
+import hpccd_core as hc
+
+
+@pytest.mark.parametrize("dtype", (np.float32, np.float64))
+@pytest.mark.parametrize("library", ("cupy", "torch"))
+def test_same_contacts_as_from_the_host(library, dtype):
+    module = pytest.importorskip(library)
+    scene, t0, t1 = scenes.join([scenes.lattice(np.random.default_rng(3), 20)])
+    t0, t1 = t0.astype(dtype), t1.astype(dtype)
+    expected = hc.Detector(scene, backend="cpu").detect(t0, t1).hash
+    to_device = module.asarray if library == "cupy" else lambda a: module.from_numpy(a).cuda()
+    detector = hc.Detector(scene, backend="gpu")
+    for _ in range(2):
+        assert detector.detect(to_device(t0), to_device(t1)).hash == expected
+    assert detector.stats["gpu_fallbacks"] == 0
+
+
+class _OnlyDlpack:
+    def __init__(self, array):
+        self.array = array
+
+    def __dlpack__(self, **options):
+        return self.array.__dlpack__(**options)
+
+    def __dlpack_device__(self):
+        return self.array.__dlpack_device__()
+
+
+def test_dlpack():
+    cupy = pytest.importorskip("cupy")
+    scene, t0, t1 = scenes.join([scenes.crumpled(np.random.default_rng(4), 12)])
+    expected = hc.Detector(scene, backend="cpu").detect(t0, t1).hash
+    given = [_OnlyDlpack(cupy.asarray(t)) for t in (t0, t1)]
+    assert hc.Detector(scene, backend="gpu").detect(*given).hash == expected
+
+
+def test_mistakes_are_named():
+    cupy = pytest.importorskip("cupy")
+    scene, t0, t1 = scenes.join([scenes.crumpled(np.random.default_rng(5), 8)])
+    d0, d1 = cupy.asarray(t0), cupy.asarray(t1)
+    detector = hc.Detector(scene, backend="gpu")
+    with pytest.raises(TypeError, match="one is a device array"):
+        detector.detect(d0, t1)
+    with pytest.raises(ValueError, match="vertices_t1: expected shape"):
+        detector.detect(d0, d1[1:])
+    with pytest.raises(ValueError, match="C-contiguous"):
+        detector.detect(d0, cupy.asfortranarray(d1))
+    with pytest.raises(TypeError, match="vertices_t0: expected float32 or float64"):
+        detector.detect(d0.astype("i4"), d1)
+    with pytest.raises(ValueError, match="copy them to the host"):
+        hc.Detector(scene, backend="cpu").detect(d0, d1)

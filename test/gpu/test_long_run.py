@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Many frames in a row: memory settles, auto picks a backend, the moving scene stays equal."""
+
+import ctypes
+import resource
+
+import numpy as np
+import scenes
+
+import hpccd_core as hc
+
+
+def free_device_memory():
+    # The driver is loaded, as the detector uses it.
+    cuda = ctypes.CDLL("libcuda.so.1")
+    context = ctypes.c_void_p()
+    assert cuda.cuDevicePrimaryCtxRetain(ctypes.byref(context), 0) == 0
+    assert cuda.cuCtxPushCurrent_v2(context) == 0
+    free, total = ctypes.c_size_t(), ctypes.c_size_t()
+    assert cuda.cuMemGetInfo_v2(ctypes.byref(free), ctypes.byref(total)) == 0
+    cuda.cuCtxPopCurrent_v2(ctypes.byref(context))
+    cuda.cuDevicePrimaryCtxRelease_v2(0)
+    return free.value
+
+
+def test_a_thousand_frames_do_not_grow():
+    scene, t0, t1 = scenes.join([scenes.crumpled(np.random.default_rng(1), 40)])
+    detector = hc.Detector(scene, backend="gpu", accuracy="exact", threads=2)
+    hashes = set()
+    for i in range(1100):
+        if i == 100:
+            device, host = free_device_memory(), resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+        hashes.add(detector.detect(t0, t1).hash)
+    assert len(hashes) == 1
+    assert detector.stats["gpu_fallbacks"] == 0
+    assert free_device_memory() == device
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - host < 2000  # KiB
+
+
+def test_a_moving_scene_stays_equal():
+    rng = np.random.default_rng(2)
+    scene, v, _ = scenes.join([scenes.crumpled(rng, 30)])
+    cpu, gpu = hc.Detector(scene, backend="cpu"), hc.Detector(scene, backend="gpu")
+    for _ in range(40):  # far enough that trees wear out and are built anew
+        w = v + rng.normal(0, 0.8, v.shape)
+        assert cpu.detect(v, w).hash == gpu.detect(v, w).hash
+        v = w
+    assert gpu.stats["gpu_fallbacks"] == 0
+
+
+def test_auto_picks_after_a_few_frames():
+    scene, t0, t1 = scenes.join([scenes.crumpled(np.random.default_rng(3), 60)])
+    detector = hc.Detector(scene, backend="auto")
+    hashes, used = set(), []
+    for _ in range(10):
+        hashes.add(detector.detect(t0, t1).hash)
+        used.append(detector.backend)
+    assert len(hashes) == 1
+    assert {"cpu", "gpu"} == set(used[:6]) and len(set(used[6:])) == 1
