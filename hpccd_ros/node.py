@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The node: life cycle and wiring. ``python -m hpccd_ros.node --ros-args --params-file FILE``"""
 
-import signal
 import sys
 import time
 from collections import Counter
@@ -14,10 +13,12 @@ from hpccd.msg import ContactArray
 from rclpy.clock import Clock, ClockType
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from rclpy.signals import SignalHandlerOptions
+from rclpy.task import Future
 from visualization_msgs.msg import MarkerArray
 
 import hpccd_core as hc
-from hpccd_ros import _env, convert, detection, parameters, qos
+from hpccd_ros import _env, convert, detection, parameters, qos, stop_signals
 from hpccd_ros.detect_service import DetectService, NodeScene
 from hpccd_ros.detection import CORE_ERRORS, Detection, DetectionThread, Options, SceneBuilder
 from hpccd_ros.diagnostics import Metrics, Reporter
@@ -333,11 +334,10 @@ def main(argv: list[str] | None = None) -> int:
 
     Returns the exit status: 0 ended as told, 1 could not be configured, 2 wrong parameters.
     """
+    stop = Future()
+    stop_signals.watch(lambda: stop.set_result(None))
     _env.prepare()
-    # rclpy's handlers shut the context down for both signals and then call this one: no KeyboardInterrupt
-    # that could hit in the middle of a callback or of the clean-up.
-    signal.signal(signal.SIGINT, lambda number, frame: None)
-    rclpy.init(args=argv)
+    rclpy.init(args=argv, signal_handler_options=SignalHandlerOptions.NO)
     try:
         node = HpccdNode()
     except ParameterError as error:
@@ -346,15 +346,12 @@ def main(argv: list[str] | None = None) -> int:
         return 2
     executor = SingleThreadedExecutor()
     executor.add_node(node)
-    # rclpy's signal handler may wake the executor before it has shut the context down (seen in 1 of 6 ends of a node
-    # without timers): without another reason to wake up it would then wait forever.
-    node.create_timer(0.2, lambda: None, clock=Clock(clock_type=ClockType.STEADY_TIME))
     try:
         if node.get_parameter("autostart").value:
             for transition in (node.trigger_configure, node.trigger_activate):
                 if transition() != TransitionCallbackReturn.SUCCESS:
                     return 1
-        executor.spin()
+        executor.spin_until_future_complete(stop)
     except ExternalShutdownException:
         pass
     finally:

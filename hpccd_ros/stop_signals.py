@@ -1,0 +1,33 @@
+# SPDX-License-Identifier: Apache-2.0
+"""SIGINT and SIGTERM as an event that ends the main loop, instead of an interruption at any place.
+
+rclpy's own handlers shut the context down while callbacks run: in one of ten ends the executor then failed on the
+invalid context, or waited forever. Blocking the signals for a thread that waits for them is no way either: threads
+that libraries made at import would take them.
+"""
+
+import os
+import signal
+import threading
+from collections.abc import Callable
+
+
+def watch(on_stop: Callable[[], None]) -> None:
+    """Call ``on_stop`` once, from a thread of its own, at the first SIGINT or SIGTERM; later ones do nothing.
+
+    Call from the main thread, with rclpy's handlers off.
+    """
+    reader, writer = os.pipe()
+    os.set_blocking(writer, False)
+    # Python's handlers run only when the main thread is back from the wait of the executor; the byte is written at once.
+    signal.set_wakeup_fd(writer, warn_on_full_buffer=False)
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda number, frame: None)
+
+    def wait() -> None:
+        stops = {int(signal.SIGINT), int(signal.SIGTERM)}
+        while os.read(reader, 1)[0] not in stops:
+            pass
+        on_stop()
+
+    threading.Thread(target=wait, name="signals", daemon=True).start()
