@@ -31,10 +31,10 @@ def positions(name, value, n_vertices):
     if kind not in ("<f4", "<f8"):
         raise TypeError(f"{name}: expected float32 or float64 on the device, got type {kind}")
     if shape != (n_vertices, 3):
-        raise ValueError(f"{name}: expected shape ({n_vertices}, 3), one row a vertex of the scene's meshes, got {shape}")
+        raise ValueError(f"{name}: expected shape ({n_vertices}, 3), one row a vertex of the scene, got {shape}")
     size = int(kind[2])
     if strides is not None and n_vertices and tuple(strides) != (3 * size, size):
-        raise ValueError(f"{name}: device arrays must be C-contiguous, got strides {tuple(strides)} bytes; copy it first")
+        raise ValueError(f"{name}: must be C-contiguous on the device, got strides {tuple(strides)} bytes; copy it first")
     return DevicePositions(int(pointer or 0), size == 8)
 
 

@@ -98,7 +98,7 @@ __device__ void flush_survivors(const Frame<T>& f, CandidateSpace& s, u32 kind, 
 
 // The first filter on the last up to 32 candidates. One piece of code for both kinds: they differ in where b starts.
 template <class T>
-__device__ __noinline__ void filter_candidates(const Frame<T>& f, CandidateSpace& s, CandidateState& state) {
+__device__ __forceinline__ void filter_candidates(const Frame<T>& f, CandidateSpace& s, CandidateState& state) {
   __syncwarp();
   const u32 lane = lane_number(), n = state.n < 32 ? state.n : 32;
   state.n -= n;
@@ -114,6 +114,7 @@ __device__ __noinline__ void filter_candidates(const Frame<T>& f, CandidateSpace
     const Motion<double> m{p.t0 - from.t0, a.t0 - from.t0, b.t0 - b_from0, p.t1 - from.t1, a.t1 - from.t1, b.t1 - b_from1};
     survives = !coplanarity_filter<Proven>(m).none;
   }
+#pragma unroll
   for (u32 kind = 0; kind < 2; ++kind) {
     const bool mine = edges == (kind == 1);
     state.tested[kind] += __popc(__ballot_sync(all_lanes, lane < n && mine));
@@ -128,66 +129,78 @@ __device__ __noinline__ void filter_candidates(const Frame<T>& f, CandidateSpace
   __syncwarp();
 }
 
-template <class T>
-__device__ void push_candidates(const Frame<T>& f, CandidateSpace& s, CandidateState& state, bool wanted, uint4 vertices,
-                                uint2 features) {
-  const u32 mask = __ballot_sync(all_lanes, wanted);
-  if (!mask) return;
-  const u32 at = state.n + __popc(mask & ((1u << lane_number()) - 1));
-  if (wanted) {
-    s.vertices[at] = vertices;
-    s.features[at] = features;
-  }
-  state.n += __popc(mask);
-  if (state.n >= 32) filter_candidates(f, s, state);
-}
+struct Candidate {
+  bool wanted;
+  uint4 vertices;
+  uint2 features;
+};
 
 // i / n for i < 1024 and n <= 32: exact, since the error i (magic n - 65536) / (65536 n) stays below 1 / n.
 __device__ inline u32 magic_of(u32 n) { return (65536 + n - 1) / n; }
 
-template <class T>
-__device__ void edge_candidates(const Frame<T>& f, CandidateSpace& s, CandidateState& state, u32 na, u32 nb, bool same) {
-  if (na == 0 || nb == 0) return;
-  const u32 total = na * nb, magic = magic_of(nb), side = same ? 0 : 1;
-  for (u32 base = 0; base < total; base += 32) {
-    const u32 c = base + lane_number(), i = c * magic >> 16, j = c - i * nb;
-    bool wanted = c < total && (!same || i < j);
-    uint4 v{0, 0, 0, 0};
-    uint2 numbers{0, 0};
-    if (wanted) {
-      const DeviceBox &a = s.box[0][i], &b = s.box[side][j];
-      wanted = overlap(a, b) && a.tag_low != b.tag_low && a.tag_low != b.tag_high && a.tag_high != b.tag_low &&
-               a.tag_high != b.tag_high;
-      const u32 x = s.number[0][i], y = s.number[side][j];
-      const DeviceBox &lower = x < y ? a : b, &upper = x < y ? b : a;
-      v = {lower.tag_low, upper.tag_low, lower.tag_high, upper.tag_high};
-      numbers = {x < y ? x : y, (x < y ? y : x) | kind_bit};
-    }
-    push_candidates(f, s, state, wanted, v, numbers);
-  }
+__device__ __forceinline__ Candidate edge_pair(const CandidateSpace& s, u32 i, u32 j, bool same, bool valid) {
+  Candidate c{valid && (!same || i < j), {0, 0, 0, 0}, {0, 0}};
+  if (!c.wanted) return c;
+  const u32 side = same ? 0 : 1;
+  const DeviceBox &a = s.box[0][i], &b = s.box[side][j];
+  c.wanted = overlap(a, b) && a.tag_low != b.tag_low && a.tag_low != b.tag_high && a.tag_high != b.tag_low &&
+             a.tag_high != b.tag_high;
+  const u32 x = s.number[0][i], y = s.number[side][j];
+  const DeviceBox &lower = x < y ? a : b, &upper = x < y ? b : a;
+  c.vertices = {lower.tag_low, upper.tag_low, lower.tag_high, upper.tag_high};
+  c.features = {x < y ? x : y, (x < y ? y : x) | kind_bit};
+  return c;
 }
 
+__device__ __forceinline__ Candidate vertex_face_pair(const CandidateSpace& s, u32 i, u32 j, bool valid) {
+  Candidate c{valid, {0, 0, 0, 0}, {0, 0}};
+  if (!valid) return c;
+  const DeviceBox &vertex = s.box[0][i], &face = s.box[1][j];
+  c.vertices = {face.tag_low, vertex.tag_low, face.tag_high, s.corner2[j]};
+  c.wanted = overlap(vertex, face) && vertex.tag_low != c.vertices.x && vertex.tag_low != c.vertices.z &&
+             vertex.tag_low != c.vertices.w;
+  c.features = {vertex.tag_low, s.number[1][j]};
+  return c;
+}
+
+// Phases of a pair of leaves: edges, vertices of the first, vertices of the second. The filter stands in one place in
+// the innermost loop: called as a function it costs 30 million spills on n-body, repeated it overflows the code cache.
 template <class T>
-__device__ void vertex_face_candidates(const Frame<T>& f, CandidateSpace& s, CandidateState& state, const DeviceLeaf& a,
-                                       const DeviceLeaf& b, const DeviceBox& box_a, const DeviceBox& box_b) {
-  const u32 n_vertices = stage_vertices(f, a, box_b, s), n_faces = n_vertices ? stage_faces(f, b, box_a, s) : 0;
-  __syncwarp();
-  if (n_faces == 0) return;
-  const u32 total = n_vertices * n_faces, magic = magic_of(n_faces);
-  for (u32 base = 0; base < total; base += 32) {
-    const u32 c = base + lane_number(), i = c * magic >> 16, j = c - i * n_faces;
-    bool wanted = c < total;
-    uint4 v{0, 0, 0, 0};
-    uint2 numbers{0, 0};
-    if (wanted) {
-      const DeviceBox &vertex = s.box[0][i], &face = s.box[1][j];
-      v = {face.tag_low, vertex.tag_low, face.tag_high, s.corner2[j]};
-      wanted = overlap(vertex, face) && v.y != v.x && v.y != v.z && v.y != v.w;
-      numbers = {v.y, s.number[1][j]};
+__device__ __forceinline__ void leaf_pair_candidates(const Frame<T>& f, CandidateSpace& s, CandidateState& state, uint2 pair) {
+  const bool same = pair.x == pair.y;
+  const u32 n_phases = same ? 2 : 3;
+#pragma unroll 1
+  for (u32 phase = 0; phase < n_phases; ++phase) {
+    u32 n_first, n_second;
+    {
+      const u32 x = phase == 2 ? pair.y : pair.x, y = phase == 2 ? pair.x : pair.y;
+      const DeviceLeaf a = f.leaves[x], b = f.leaves[y];
+      const DeviceBox box_a = load_box(&f.leaf_boxes[x]), box_b = load_box(&f.leaf_boxes[y]);
+      if (phase == 0) {
+        n_first = stage_edges(f, a, box_b, s, 0);
+        n_second = same ? n_first : stage_edges(f, b, box_a, s, 1);
+      } else {
+        n_first = stage_vertices(f, a, box_b, s);
+        n_second = n_first ? stage_faces(f, b, box_a, s) : 0;
+      }
     }
-    push_candidates(f, s, state, wanted, v, numbers);
+    __syncwarp();
+    const u32 total = n_first * n_second, magic = magic_of(n_second ? n_second : 1);
+#pragma unroll 1
+    for (u32 base = 0; base < total; base += 32) {
+      const u32 c = base + lane_number(), i = c * magic >> 16, j = c - i * n_second;
+      const Candidate pushed = phase == 0 ? edge_pair(s, i, j, same, c < total) : vertex_face_pair(s, i, j, c < total);
+      const u32 mask = __ballot_sync(all_lanes, pushed.wanted);
+      const u32 at = state.n + __popc(mask & ((1u << lane_number()) - 1));
+      if (pushed.wanted) {
+        s.vertices[at] = pushed.vertices;
+        s.features[at] = pushed.features;
+      }
+      state.n += __popc(mask);
+      if (state.n >= 32) filter_candidates(f, s, state);
+    }
+    __syncwarp();
   }
-  __syncwarp();
 }
 
 template <class T>
@@ -198,28 +211,20 @@ __global__ __launch_bounds__(32 * candidate_warps, 5) void candidates_kernel(con
   constexpr u32 grain = 8;
   const u64 all = f.counters->leaf_pairs < f.leaf_pairs.capacity ? f.counters->leaf_pairs : f.leaf_pairs.capacity;
   const u64 from = all * f.segment / f.n_segments, to = all * (f.segment + 1) / f.n_segments;
+#pragma unroll 1
   for (;;) {
     u64 begin = 0;
     if (lane_number() == 0) begin = from + atomicAdd(&f.counters->next_leaf_pair, static_cast<u64>(grain));
     begin = __shfl_sync(all_lanes, begin, 0);
     if (begin >= to) break;
-    for (u64 k = begin; k < begin + grain && k < to; ++k) {
-      const uint2 pair = f.leaf_pairs.pairs[k];
-      const bool same = pair.x == pair.y;
-      const DeviceLeaf a = f.leaves[pair.x], b = f.leaves[pair.y];
-      const DeviceBox box_a = load_box(&f.leaf_boxes[pair.x]), box_b = load_box(&f.leaf_boxes[pair.y]);
-      const u32 na = stage_edges(f, a, box_b, s, 0), nb = same ? na : stage_edges(f, b, box_a, s, 1);
-      __syncwarp();
-      edge_candidates(f, s, state, na, nb, same);
-      __syncwarp();
-      vertex_face_candidates(f, s, state, a, b, box_a, box_b);
-      if (!same) vertex_face_candidates(f, s, state, b, a, box_b, box_a);
-    }
+#pragma unroll 1
+    for (u64 k = begin; k < begin + grain && k < to; ++k) leaf_pair_candidates(f, s, state, f.leaf_pairs.pairs[k]);
   }
   if (state.n > 0) filter_candidates(f, s, state);
   for (u32 kind = 0; kind < 2; ++kind)
     if (state.n_survivors[kind] > 0) flush_survivors(f, s, kind, state.n_survivors[kind]);
-  if (lane_number() < 2) atomicAdd(&f.counters->candidates[lane_number()], static_cast<u64>(state.tested[lane_number()]));
+  if (lane_number() == 0)
+    for (u32 kind = 0; kind < 2; ++kind) atomicAdd(&f.counters->candidates[kind], static_cast<u64>(state.tested[kind]));
 }
 
 }  // namespace hpccd::gpu

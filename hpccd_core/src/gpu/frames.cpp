@@ -120,7 +120,7 @@ Contacts Frames::frame(Positions t0, Positions t1, const Build& build, Profiler&
   if (!undecided.empty() || options_.points || options_.normals) h0 = on_host(t0, 0), h1 = on_host(t1, 1);
   exact_[0].clear(), exact_[1].clear();
   std::vector<std::optional<double>> toc(undecided.size());
-  parallel_for(pool_, undecided.size(), 4, [&](std::size_t begin, std::size_t end, int) {
+  parallel_for(pool_, undecided.size(), 1, [&](std::size_t begin, std::size_t end, int) {
     for (std::size_t i = begin; i < end; ++i) {
       const Undecided& u = undecided[i];
       std::uint32_t v[4];
