@@ -26,15 +26,17 @@ ifdef ROS_DISTRO
 unexport LD_LIBRARY_PATH
 endif
 
-# Stamps. A PYTHON named on the command line has one of its own, so that naming another one is noticed.
-ENVIRONMENT := $(VENV)/.hpccd-environment$(if $(PYTHON),-$(subst /,-,$(PYTHON)))
+# Stamps. PYTHON or EXTRAS named on the command line have one of their own, so that naming others is noticed.
+space := $(subst ,, )
+ENVIRONMENT := $(VENV)/.hpccd-environment$(if $(PYTHON),-$(subst /,-,$(PYTHON)))$(if \
+  $(filter-out file,$(origin EXTRAS)),-$(subst $(space),+,$(EXTRAS)))
 INSTALLED   := $(VENV)/.hpccd-installed
 
 # What the installed package is made of.
 SOURCES := $(sort $(shell find CMakeLists.txt setup.py package.xml cmake config msg srv scripts hpccd_ros hpccd_core \
   \( -name __pycache__ -o -path hpccd_core/tests \) -prune -o -type f -print))
 
-.PHONY: help venv demo test test-core test-python sanitize fuzz lint format pin clean distclean FORCE
+.PHONY: help venv demo test test-core test-python test-gpu sanitize fuzz lint format pin clean distclean FORCE
 
 help: ## Show this list
 	@echo "hpccd: continuous collision detection of deforming triangle meshes, as a ROS 2 node."
@@ -62,6 +64,11 @@ test-core: $(ENVIRONMENT) ## Only the C++ tests of the core
 
 test-python: venv ## Only the Python tests: core against oracles, node over DDS, recordings
 	$(BIN)/pytest $(PYTEST_ARGS)
+
+test-gpu: venv ## Only the tests of the GPU backends, on a machine with an NVIDIA GPU
+	@$(BIN)/python -c 'import sys, hpccd_core as hc; "gpu" in hc.backends() or sys.exit(sys.argv[1])' \
+	  "hpccd: no GPU backend here. Is there an NVIDIA GPU? Without a CUDA toolkit: make venv EXTRAS='test cuda'"
+	$(BIN)/pytest test/gpu $(PYTEST_ARGS)
 
 sanitize: $(ENVIRONMENT) ## C++ tests under AddressSanitizer + UndefinedBehaviorSanitizer, then ThreadSanitizer
 	@$(call run_core_tests,build/core-asan,-DCMAKE_BUILD_TYPE=RelWithDebInfo -DHPCCD_SANITIZE=address$(comma)undefined)
@@ -96,7 +103,7 @@ export UBSAN_OPTIONS := halt_on_error=1:print_stacktrace=1
 # GoogleTest comes as source in a wheel, so that the tests need no system package and are the same everywhere.
 define run_core_tests
 mkdir -p build; . $(VENV)/build.env; \
-cmake -S hpccd_core -B $(1) -G Ninja -DHPCCD_BUILD_TESTS=ON -DGTest_DIR="$(CURDIR)/cmake/gtest" \
+cmake -S hpccd_core -B $(1) -G Ninja -DHPCCD_BUILD_TESTS=ON -DHPCCD_CUDA=OFF -DGTest_DIR="$(CURDIR)/cmake/gtest" \
   -DHPCCD_GTEST_SOURCE="$(abspath $(VENV))/src/gtest_vendor" \
   -DPython3_EXECUTABLE="$(abspath $(BIN))/python" -DPython_EXECUTABLE="$(abspath $(BIN))/python" $(2) $${CMAKE_ARGS:-} > $(1).log 2>&1 || { cat $(1).log; exit 1; }; \
 cmake --build $(1) --target hpccd_core_tests && ctest --test-dir $(1) --output-on-failure --no-tests=error
