@@ -12,4 +12,13 @@ from .detector import Detector, backends, gpu_status
 from .elementary import test_edge_edge, test_vertex_face
 from .scene import Scene
 
-__all__ = ["Contacts", "Detector", "InvalidArgument", "Scene", "backends", "gpu_status", "test_edge_edge", "test_vertex_face"]
+__all__ = [
+    "Contacts",
+    "Detector",
+    "InvalidArgument",
+    "Scene",
+    "backends",
+    "gpu_status",
+    "test_edge_edge",
+    "test_vertex_face",
+]

@@ -17,6 +17,7 @@ import importlib.util
 
 BENCHMARKS = {
     "cpu": "ms a frame of each scene (Table 1), its components, and a peer beside it",
+    "gpu": "the GPU backend: ms a frame with transfers, device time by stage, floors",
     "scaling": "speed-up over one thread against threads (Fig. 6 and 7), for each method",
     "methods": "the methods and instruction sets compared: time, and equality of the results",
     "size": "how time and memory grow with the number of triangles",

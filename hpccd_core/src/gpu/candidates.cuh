@@ -204,7 +204,7 @@ __device__ __forceinline__ void leaf_pair_candidates(const Frame<T>& f, Candidat
 }
 
 template <class T>
-__global__ __launch_bounds__(32 * candidate_warps, 5) void candidates_kernel(const __grid_constant__ Frame<T> f) {
+__global__ __launch_bounds__(32 * candidate_warps, 6) void candidates_kernel(const __grid_constant__ Frame<T> f) {
   __shared__ CandidateSpace spaces[candidate_warps];
   CandidateSpace& s = spaces[threadIdx.x / 32];
   CandidateState state;

@@ -1,0 +1,123 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The GPU backend beside the CPU: ms a frame with all transfers (host arrays in, host arrays out), device time by stage,
+and the two floors, bytes over bandwidth and operations over rate. Needs a machine with a usable GPU.
+
+  hpccd bench gpu data                      the scene files of HPCCD_DATA, balanced and exact
+  hpccd bench gpu cloth-ball --repeat 100
+
+Contacts of both backends are compared; a difference, or a frame that the device left to the CPU, fails the command.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+
+import hpccd_core as hc
+from hpccd_ros.errors import UserError
+
+from . import common, table
+from .timing import times
+
+TIERS = ("balanced", "exact")
+# Double-precision operations of a pair in each stage, counted in the source: differences, cross products, bounds.
+OPERATIONS = {"candidates": 170, "survivors": 400, "roots": 1500}
+
+
+def configure(parser):
+    common.configure(parser, default=("data",), steps=1, rounds=50)
+    common.threads_option(parser)
+    parser.add_argument("--pcie", type=float, default=53.0, metavar="GB/s", help="host link (default: %(default)s, H100)")
+    parser.add_argument("--memory", type=float, default=2800.0, metavar="GB/s",
+                        help="device memory (default: %(default)s, H100)")  # fmt: skip
+    parser.add_argument("--rate", type=float, default=16.0, metavar="T/s",
+                        help="10^12 double-precision operations a second, not fused (default: %(default)s, H100)")
+
+
+def run(args) -> int:
+    if "gpu" not in hc.backends():
+        raise UserError(f"no usable GPU: {hc.gpu_status()['reason']}")
+    report, sources = common.begin(args, "gpu")
+    report.note("floors: PCIe bytes of positions and contacts; device bytes of the lists that stages hand on; operations "
+                "counted from the source for each pair of each stage; rates are options")
+    for source in sources:
+        step = source.step(0)
+        for accuracy in TIERS:
+            _measure(report, args, source.name, step, accuracy)
+    table.show(
+        "ms a frame, host arrays in and out",
+        ["scene", "accuracy", "triangles", "contacts", "CPU", "GPU median", "p95", "best", "PCIe floor", "memory floor",
+         "arithmetic floor"],
+        [[r["scene"], r["accuracy"], r["triangles"], r["contacts"], r["cpu_median_ms"], r["median_ms"], r["p95_ms"],
+          r["best_ms"], r["floor_pcie_ms"], r["floor_memory_ms"], r["floor_arithmetic_ms"]] for r in report.rows],
+    )  # fmt: skip
+    stages = list(dict.fromkeys(s for r in report.rows for s in r["stages_ms"]))
+    table.show(
+        "where the time goes, ms (gpu/...: device time, measured in calls of their own)",
+        ["stage", *(f"{r['scene']} {r['accuracy']}" for r in report.rows)],
+        [[stage, *(r["stages_ms"].get(stage) for r in report.rows)] for stage in stages],
+    )
+    return common.end(args, report)
+
+
+def _timed(detector, step, repeat):
+    detector.detect(step.vertices_t0, step.vertices_t1)
+    ms = []
+    for _ in range(repeat):
+        start = time.perf_counter()
+        contacts = detector.detect(step.vertices_t0, step.vertices_t1)
+        ms.append(1e3 * (time.perf_counter() - start))
+    return times(ms), contacts
+
+
+def _stages(scene, options, step):
+    """Device time by stage: events cost time themselves, so these frames are not the ones that count."""
+    os.environ["HPCCD_GPU_STAGES"] = "1"
+    try:
+        detector = hc.Detector(scene, backend="gpu", **options)
+        for _ in range(20):
+            detector.detect(step.vertices_t0, step.vertices_t1)
+        return {name: ms for name, ms in detector.profile.items() if name.startswith("gpu/")}
+    finally:
+        del os.environ["HPCCD_GPU_STAGES"]
+
+
+def _measure(report, args, name, step, accuracy):
+    options = {"accuracy": accuracy, "threads": args.threads}
+    scene = step.scene()
+    on_cpu, expected = _timed(hc.Detector(scene, backend="cpu", **options), step, max(1, args.repeat // 5))
+    detector = hc.Detector(scene, backend="gpu", **options)
+    on_gpu, contacts = _timed(detector, step, args.repeat)
+    stats, profile = detector.stats, detector.profile
+    if contacts.hash != expected.hash:
+        report.failure(f"{name}, {accuracy}: contacts of GPU and CPU differ")
+    if stats["gpu_fallbacks"]:
+        report.failure(f"{name}, {accuracy}: {stats['gpu_fallbacks']} frames left to the CPU: {detector.last_gpu_error}")
+    report.add(
+        scene=name,
+        accuracy=accuracy,
+        triangles=step.triangles,
+        contacts=len(contacts),
+        cpu_median_ms=on_cpu.median,
+        **on_gpu.as_row(),
+        **_floors(args, step, stats, contacts),
+        stages_ms={**profile, **_stages(scene, options, step)},
+        stats=stats,
+    )
+
+
+def _floors(args, step, stats, contacts):
+    total = {key: sum(stats[f"{kind}_{key}"] for kind in ("vf", "ee"))
+             for key in ("candidates", "rejected_coplanarity", "rejected_projection")}  # fmt: skip
+    survivors = total["candidates"] - total["rejected_coplanarity"]
+    roots = survivors - total["rejected_projection"]
+    pcie = step.vertices_t0.nbytes + step.vertices_t1.nbytes + 16 * len(contacts.vf) + 24 * len(contacts.ee)
+    # Each list is written once and read once; 8 bytes a pair.
+    memory = 16 * (stats["leaf_pairs"] + survivors + roots) + 32 * len(contacts)
+    work = {"candidates": total["candidates"], "survivors": survivors, "roots": roots}
+    operations = sum(OPERATIONS[stage] * n for stage, n in work.items())
+    return {
+        "floor_pcie_ms": pcie / args.pcie / 1e6,
+        "floor_memory_ms": memory / args.memory / 1e6,
+        "floor_arithmetic_ms": operations / args.rate / 1e9,
+    }
