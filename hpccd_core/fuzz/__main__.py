@@ -14,7 +14,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from .differential import Batch, Tally, add_batch, batches, new_tallies, usable_simd
+from .differential import SIMD, Batch, Tally, add_batch, batches, new_tallies, usable_simd
 
 SECONDS_BETWEEN_LINES = 30
 ACCURACIES = ("fast", "balanced", "conservative", "exact")
@@ -23,7 +23,7 @@ ACCURACIES = ("fast", "balanced", "conservative", "exact")
 def main(arguments: list[str] | None = None) -> int:
     a = _parser().parse_args(arguments)
     console = Console(width=None if sys.stdout.isatty() else 120)
-    simd = usable_simd()
+    simd = usable_simd() if a.simd == "all" else [a.simd]
     tallies = new_tallies()
     source = _replayed(a.replay) if a.replay else batches(a.seed, a.batch)
     goal = None if a.replay else a.count or a.seconds
@@ -77,6 +77,7 @@ def _parser() -> argparse.ArgumentParser:
     p.add_argument("--batch", type=int, default=10_000, help="queries in a batch (default 10000)")
     tiers = ",".join(ACCURACIES)
     p.add_argument("--accuracy", type=_accuracies, default=ACCURACIES, help=f"comma-separated (default: {tiers})")
+    p.add_argument("--simd", choices=("all", "auto", *SIMD), default="all", help="default: all that are usable")
     p.add_argument("--threads", type=int, default=0, help="threads of the oracle, 0 = all cores")
     p.add_argument("--save", type=Path, default=Path("fuzz-failures.npz"), help="file for failing queries")
     p.add_argument("--replay", type=Path, help="run the queries of such a file and no others")

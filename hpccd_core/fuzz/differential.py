@@ -20,6 +20,8 @@ Answers = tuple[np.ndarray, np.ndarray]  # hit (Q,) bool, toc (Q,) float64
 ORACLE = {VERTEX_FACE: reference.vertex_face, EDGE_EDGE: reference.edge_edge}
 CORE = {VERTEX_FACE: hc.test_vertex_face, EDGE_EDGE: hc.test_edge_edge}
 
+SIMD = ("scalar", "avx2", "avx512")
+
 # Promised to be within this of the true time of contact (`exact`).
 TOC_TOLERANCE = 1e-12
 
@@ -132,8 +134,11 @@ def new_tallies() -> dict[tuple[str, str], Tally]:
 
 def usable_simd() -> list[str]:
     """The instruction sets of this machine and build, the default first."""
-    usable = []
-    for simd in ("auto", "scalar", "avx2", "avx512"):
+    default = hc.Detector(hc.Scene()).simd
+    usable = [default]
+    for simd in SIMD:
+        if simd == default:
+            continue
         try:
             hc.test_vertex_face(np.empty((0, 8, 3)), simd=simd)
         except ValueError:
