@@ -19,7 +19,7 @@ def watch(on_stop: Callable[[], None]) -> None:
     """
     reader, writer = os.pipe()
     os.set_blocking(writer, False)
-    # Python's handlers run only when the main thread is back from the wait of the executor; the byte is written at once.
+    # Python's handlers run only when the main thread is back from the executor's wait; the byte is written at once.
     signal.set_wakeup_fd(writer, warn_on_full_buffer=False)
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda number, frame: None)
