@@ -91,6 +91,10 @@ class Children:
                 child.process.kill()
         return child.process.wait()
 
+    def forget(self, child: Child) -> None:
+        """Leave a child that has ended out of `check`."""
+        self._all.remove(child)
+
 
 def _die_with_parent():
     # Runs in the child before exec: even if the parent is killed, nothing is left behind. Linux only.

@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Node, recorder and publisher as processes over DDS, in a namespace of their own."""
+
+from pathlib import Path
+
+from hpccd_ros import scenes
+from hpccd_ros.scenes import files
+
+# Long enough for a loaded machine; reached only by tests that fail.
+PATIENCE = 90.0
+
+
+class Live:
+    """`children`: starts the processes. `scene`, `size`, `frames`: what is published."""
+
+    def __init__(self, children, namespace, folder: Path, scene="cloth-drop", size=0.1, frames=30):
+        self._children = children
+        self._namespace = namespace
+        self._remap = ("--ros-args", "-r", f"__ns:={namespace}")
+        self._folder = folder
+        self._scene = [scene, "--size", str(size), "--frames", str(frames)]
+        self.parameters = folder / f"node{namespace[1:]}.yaml"
+        files.write_parameters(scenes.make(scene, size=size, frames=frames), self.parameters)
+
+    def node(self, *parameters: str):
+        # Queues that hold the whole scene: these tests are not about what a loaded machine drops.
+        parameters = ("frame_queue:=1000", "input_depth:=1000", *parameters)
+        extra = [word for parameter in parameters for word in ("-p", parameter)]
+        child = self._children.start(
+            "node", "hpccd_ros.node", *self._remap, "--params-file", str(self.parameters), *extra
+        )
+        self._children.wait(lambda: child.said("active: meshes"), "the node was not active", PATIENCE)
+        return child
+
+    def recorder(self, path, *options: str):
+        name = f"recorder-{Path(path).name}"
+        child = self._children.start(
+            name, "hpccd_ros.cli", "record", "-o", str(path), "--node", f"{self._namespace}/hpccd", "--wait", "60",
+            *options,
+        )  # fmt: skip
+        self._children.wait(lambda: child.said("recording "), "the recorder did not hear the node", PATIENCE)
+        return child
+
+    def publisher(self, *options: str, subscribers: int = 2):
+        """Start publishing the scene; --loop and the like as options."""
+        return self._children.start(
+            "publisher", "hpccd_ros.cli", "scene", *self._scene, "--publish", "--rate", "40", "--subscribers",
+            str(subscribers), "--wait", "60", *options, *self._remap,
+        )  # fmt: skip
+
+    def play(self, path, *options: str):
+        """Start publishing a recording."""
+        return self._children.start(
+            "player", "hpccd_ros.cli", "replay", str(path), "--publish", "--wait", "60", *options
+        )
+
+    def kill(self, child):
+        """SIGKILL, and forget it: its end is no error."""
+        child.process.kill()
+        child.process.wait()
+        self._children.forget(child)
+
+    def wait_for(self, child):
+        """Wait until a process has ended by itself, without an error."""
+        self._children.wait(lambda: not child.running, f"the {child.name} did not end", PATIENCE)
+        self._children.check()
+
+    def end(self, child) -> str:
+        """End a process with SIGINT; its output. Fails where it did not end well."""
+        status = self._children.end(child)
+        assert status == 0, f"{child.name} ended with {status}:\n{child.last_words()}"
+        return child.last_words()

@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`hpccd` teaches: every command has its help, wrong use is answered in one line, and help is quick."""
+
+import json
+import subprocess
+import sys
+
+import pytest
+from conftest import ROOT
+
+from hpccd_ros import cli
+
+
+@pytest.mark.parametrize("command", [c for c in cli.COMMANDS if (ROOT / f"hpccd_ros/commands/{c}.py").exists()])
+def test_every_command_has_help_with_examples(command, capsys):
+    with pytest.raises(SystemExit) as ended:
+        cli.main([command, "--help"])
+    assert ended.value.code == 0
+    shown = capsys.readouterr().out
+    assert f"hpccd {command}" in shown.split("options:")[0], "an example before the options"
+
+
+def test_the_list_of_commands(capsys):
+    with pytest.raises(SystemExit):
+        cli.main(["--help"])
+    shown = capsys.readouterr().out
+    assert all(f"    {command} " in shown for command in ("demo", "record", "replay", "view", "doctor", "scene", "info"))
+
+
+def test_help_imports_neither_ros_nor_the_core():
+    code = (
+        "import sys; from hpccd_ros import cli\n"
+        "try: cli.main(['--help'])\n"
+        "except SystemExit: pass\n"
+        "heavy = [m for m in ('rclpy', 'hpccd_core', 'numpy', 'matplotlib', 'mcap') if m in sys.modules]\n"
+        "sys.exit(str(heavy) if heavy else 0)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (["record", "--depth", "0"], "--depth 0: must be at least 1"),
+        (["record", "--split-size", "-1"], "--split-size -1.0: must not be negative"),
+        (["record", "--node", "hpccd"], "full name"),
+        (["replay", "x.mcap", "--threads", "-1"], "--threads -1: must not be negative"),
+        (["replay", "x.mcap", "--publish", "--from", "5", "--to", "2"], "--to not before --from"),
+        (["view", "x.mcap", "--every", "0"], "--every 0: must be at least 1"),
+        (["view", "x.mcap"], "x.mcap does not exist"),
+        (["doctor", "x.mcap"], "x.mcap does not exist"),
+        (["doctor", "x.mcap", "--compression", "lz4"], "--compression belongs to --recover"),
+        (["demo", "--rate", "0"], "--rate 0.0: must be above 0"),
+        (["demo", "--scene", "nothing"], "unknown scene 'nothing'"),
+    ],
+)
+def test_wrong_use_is_answered_in_one_line(hpccd, arguments, says):
+    done = hpccd(*arguments)
+    assert done.returncode == 2
+    assert says in done.stderr and done.stderr.startswith(f"hpccd {arguments[0]}: ")
+    assert done.stderr.count("\n") == 1
+
+
+def test_unknown_command(hpccd):
+    done = hpccd("rekord")
+    assert done.returncode == 2 and "invalid choice: 'rekord'" in done.stderr
+
+
+def test_info(hpccd):
+    done = hpccd("info", "--json")
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert "cpu" in found["backends"] and "exact" in found["accuracies"]
+    assert found["packages"]["mcap"] and found["cores"] >= 1

@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The demo as a newcomer runs it: it ends by itself, leaves what it says, and nothing that runs on."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from conftest import ROOT
+from matplotlib.image import imread
+
+SMALL = ["demo", "--size", "0.1", "--frames", "40", "--rate", "40"]
+
+
+@pytest.fixture
+def demo_domain(monkeypatch):
+    """The demo refuses a domain in which a node /hpccd runs: it gets to choose its own, as for a user."""
+    monkeypatch.delenv("ROS_DOMAIN_ID", raising=False)
+
+
+def _running_from(folder):
+    """Command lines of the processes that work in `folder`."""
+    found = []
+    for process in Path("/proc").glob("[0-9]*"):
+        try:
+            if process.joinpath("cwd").resolve() == folder.resolve():
+                found.append(process.joinpath("cmdline").read_bytes().replace(b"\0", b" ").decode())
+        except OSError:
+            continue  # ended meanwhile, or not ours to look at
+    return found
+
+
+def test_demo(hpccd, tmp_path, demo_domain):
+    done = hpccd(*SMALL)
+    assert done.returncode == 0, done.stdout + done.stderr
+    for part in ("of 39 steps", "frames dropped", "ms a frame", "all equal", "worst frame: step", "try next"):
+        assert part in done.stdout
+    assert "hpccd-demo/demo.mcap" in done.stdout and "hpccd-demo/demo.png" in done.stdout
+    picture = imread(tmp_path / "hpccd-demo" / "demo.png")
+    assert picture.shape[:2] == (1080, 1920)
+    assert hpccd("replay", "hpccd-demo/demo.mcap").returncode == 0
+    again = hpccd("view", "hpccd-demo/demo.mcap", "--step", "30", "-o", "other.png")
+    assert again.returncode == 0 and "other.png: step 30" in again.stdout
+    missing = hpccd("view", "hpccd-demo/demo.mcap", "--step", "300")
+    assert missing.returncode == 2 and "it has 1 to 39" in missing.stderr
+    assert not _running_from(tmp_path)
+
+
+def test_demo_can_be_run_again(hpccd, tmp_path, demo_domain):
+    """A run replaces what the run before left, and touches nothing else in the folder."""
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "demo.mcap").write_text("from the run before")
+    (tmp_path / "out" / "thesis.txt").write_text("mine")
+    assert hpccd(*SMALL, "--out", "out").returncode == 0
+    assert (tmp_path / "out" / "thesis.txt").read_text() == "mine"
+    assert hpccd("replay", "out/demo.mcap").returncode == 0
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
+def test_interrupted_demo_leaves_no_process(tmp_path, demo_domain, number):
+    process = subprocess.Popen(
+        [sys.executable, "-m", "hpccd_ros.cli", "demo", "--size", "0.1", "--rate", "5"], cwd=tmp_path,
+        stdout=subprocess.PIPE, text=True, env={**os.environ, "PYTHONPATH": str(ROOT)},
+    )  # fmt: skip
+    for line in process.stdout:
+        if line.startswith("processes"):
+            break
+    assert len(_running_from(tmp_path)) >= 3
+    process.send_signal(number)
+    assert process.wait(60) == (-9 if number == signal.SIGKILL else 130)
+    deadline = time.monotonic() + 60
+    while _running_from(tmp_path):
+        assert time.monotonic() < deadline, _running_from(tmp_path)
+        time.sleep(0.1)
+
+
+def test_a_child_that_fails_is_quoted(hpccd, demo_domain):
+    done = hpccd(*SMALL, "--accuracy", "perfect")
+    assert done.returncode == 2
+    assert "the node ended with status 2" in done.stderr and "'perfect' is none of" in done.stderr

@@ -1,0 +1,92 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The pictures show what is there: the nearest surface in each pixel, contacts where they project to."""
+
+import numpy as np
+import pytest
+
+from hpccd_ros.picture import contacts
+from hpccd_ros.picture.camera import Camera
+from hpccd_ros.picture.raster import rasterize
+from hpccd_ros.picture.shading import blur, vertex_normals
+
+
+def _nearest_by_hand(corners, x, y):
+    """(triangle, depth) seen at a place of the picture, by solving for the barycentric weights of each triangle."""
+    best = (-1, np.inf)
+    for number, (a, b, c) in enumerate(corners):
+        matrix = np.array([b[:2] - a[:2], c[:2] - a[:2]]).T
+        if abs(np.linalg.det(matrix)) < 1e-12:
+            continue
+        u, v = np.linalg.solve(matrix, np.array([x, y]) - a[:2])
+        if u >= 0 and v >= 0 and u + v <= 1:
+            depth = 1 / ((1 - u - v) / a[2] + u / b[2] + v / c[2])
+            if depth < best[1]:
+                best = (number, depth)
+    return best
+
+
+def test_rasterizer_finds_the_nearest_triangle():
+    generator = np.random.default_rng(7)
+    size = (40, 30)
+    corners = generator.uniform((-10, -10, 1), (50, 40, 9), size=(60, 3, 3))
+    corners[:5, 2] = corners[:5, 1]  # degenerate: seen nowhere
+    buffers = rasterize(corners, size)
+    for row in range(size[1]):
+        for column in range(size[0]):
+            triangle, depth = _nearest_by_hand(corners, column + 0.5, row + 0.5)
+            assert buffers.triangle[row, column] == triangle
+            assert buffers.depth[row, column] == pytest.approx(depth, rel=1e-5)
+
+
+def test_weights_interpolate_in_space():
+    """A textured plane seen at a slant: the interpolated point must project back to its own pixel."""
+    points = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0.0]])
+    faces = np.array([[0, 1, 2], [0, 2, 3]])
+    camera = Camera(points, (64, 48), elevation=15)
+    buffers = rasterize(camera.project(points)[faces], (64, 48))
+    rows, columns = np.nonzero(buffers.triangle >= 0)
+    assert len(rows) > 200
+    u, v = buffers.weights[rows, columns].T.astype(np.float64)
+    corners = points[faces[buffers.triangle[rows, columns]]]
+    position = (1 - u - v)[:, None] * corners[:, 0] + u[:, None] * corners[:, 1] + v[:, None] * corners[:, 2]
+    seen = camera.project(position)
+    assert np.allclose(seen[:, 0], columns + 0.5, atol=0.01) and np.allclose(seen[:, 1], rows + 0.5, atol=0.01)
+
+
+@pytest.mark.parametrize("elevation", [-80, 0, 26, 89])
+def test_camera_has_all_points_in_view(elevation):
+    points = np.random.default_rng(8).normal(size=(500, 3)) * (5, 1, 0.2) + (100, -3, 7)
+    x, y, depth = Camera(points, (320, 200), elevation=elevation).project(points).T
+    assert (depth > 0).all() and (x >= 0).all() and (x <= 320).all() and (y >= 0).all() and (y <= 200).all()
+    assert min(x.min(), 320 - x.max(), y.min(), 200 - y.max()) < 20, "and the picture is filled"
+
+
+def test_normals_and_blur():
+    vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [5, 5, 5.0]])
+    normals = vertex_normals(vertices, np.array([[0, 1, 2]]))
+    assert np.allclose(normals, [[0, 0, 1]] * 3 + [[0, 0, 0]])
+    image = np.zeros((40, 50), np.float32)
+    image[20, 25] = 1
+    spread = blur(image, 3)
+    assert spread.sum() == pytest.approx(1, rel=1e-5) and spread.argmax() == image.argmax() and spread.max() < 0.1
+
+
+@pytest.mark.parametrize("count", [0, 1, 300])
+def test_contacts_are_drawn_where_they_are(tmp_path, count):
+    """The picture with contacts differs from that without, and just around the places of the contacts."""
+    points = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0.0]])
+    faces = np.array([[0, 1, 2], [0, 2, 3]])
+    generator = np.random.default_rng(9)
+    places = generator.uniform(-0.2, 0.2, size=(count, 3)) * (1, 1, 0)
+    step = contacts.Step([("plane", points, faces)], np.full(4, np.inf), places, generator.uniform(size=count), count,
+                         "title", ["fact"])
+    image, camera, depth = contacts.render(step.meshes, step.touched, (320, 200), -60, 26)
+    assert image.shape == (200, 320, 4) and np.isfinite(image).all() and 0 <= image.min() and image.max() <= 1
+    assert (image[..., 3] > 0.5).mean() > 0.2
+    contacts.draw(step, tmp_path / "picture.png", contacts.History(np.arange(5), np.arange(5), None, 3))
+    from matplotlib.image import imread
+
+    drawn = imread(tmp_path / "picture.png")[..., :3]
+    bright = np.abs(drawn - drawn.mean(axis=2, keepdims=True)).max(axis=2) > 0.25  # saturated colours: contacts
+    scene_part = bright[140:900, :1500]
+    assert scene_part.any() == (count > 0)
