@@ -21,8 +21,8 @@ from hpccd_ros.mcap_bag import HPCCD_RECORD
 # What reading torn or flipped bytes can raise: the MCAP reader, its decompressors (lz4: RuntimeError), text that is
 # no UTF-8 (a ValueError), an index that names channels which are not there, nonsensical sizes and places (OSError).
 DAMAGE = (
-    McapError, CRCValidationError, struct.error, zstandard.ZstdError, RuntimeError, ValueError, KeyError, OverflowError, OSError,
-    MemoryError, EOFError,
+    McapError, CRCValidationError, struct.error, zstandard.ZstdError, RuntimeError, ValueError, KeyError,
+    OverflowError, OSError, MemoryError, EOFError,
 )  # fmt: skip
 
 

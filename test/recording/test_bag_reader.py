@@ -36,7 +36,8 @@ def test_folder_without_recordings(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("content", "message"), [(b"", "is empty"), (b"SQLite format 3\0", "is not an MCAP file"), (b"\x89MCAP", "not an MCAP")]
+    ("content", "message"),
+    [(b"", "is empty"), (b"SQLite format 3\0", "is not an MCAP file"), (b"\x89MCAP", "is not an MCAP file")],
 )
 def test_foreign_files(tmp_path, content, message):
     (tmp_path / "x.mcap").write_bytes(content)

@@ -66,7 +66,8 @@ def _other_vertex(decoded):
 
 
 def _remove_last(decoded):
-    for name, per_contact in (("kind", 1), ("mesh_a", 1), ("mesh_b", 1), ("features_a", 2), ("features_b", 2), ("toc", 1)):
+    sizes = {"kind": 1, "mesh_a": 1, "mesh_b": 1, "features_a": 2, "features_b": 2, "toc": 1}
+    for name, per_contact in sizes.items():
         _set(name, getattr(decoded, name)[:-per_contact])(decoded)
 
 
