@@ -157,3 +157,7 @@ def test_table_names_every_parameter():
         assert f"| `{row.name}` |" in table
     for row in MESH_ROWS:
         assert f"| `mesh.NAME.{row.name}` |" in table
+
+
+def test_readme_shows_the_table():
+    assert parameters.markdown_table() in (CONFIG.parent / "README.md").read_text()
