@@ -34,7 +34,7 @@ def positions(name, value, n_vertices):
         raise ValueError(f"{name}: expected shape ({n_vertices}, 3), one row a vertex of the scene, got {shape}")
     size = int(kind[2])
     if strides is not None and n_vertices and tuple(strides) != (3 * size, size):
-        raise ValueError(f"{name}: must be C-contiguous on the device, got strides {tuple(strides)} bytes; copy it first")
+        raise ValueError(f"{name}: must be C-contiguous, got strides {tuple(strides)} bytes; copy it first")
     return DevicePositions(int(pointer or 0), size == 8)
 
 
