@@ -23,7 +23,8 @@ class Scene:
         name: unique string. faces: (F, 3) integers, indices into this mesh's own vertices. n_vertices: how many
         vertices the mesh has; by default the largest index + 1; give it where trailing vertices are in no face (such
         vertices are tested against faces too). self_collision: whether contacts within the mesh matter. static: a
-        promise that the mesh does not move during a step; pairs of static meshes are never tested.
+        promise that the mesh does not move during a step (detect() refuses one that does); pairs of static meshes are
+        never tested.
 
         Raises TypeError or ValueError naming the argument, also where an index is out of range.
         """

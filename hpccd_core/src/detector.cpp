@@ -10,6 +10,7 @@
 #include "gpu/frames.h"
 #include "paper/method.h"
 #include "scene/features.h"
+#include "scene/static_promise.h"
 #include "traverse/traverse.h"
 
 namespace hpccd {
@@ -166,6 +167,7 @@ Contacts Detector::detect(Positions t0, Positions t1) {
     throw InvalidArgument("vertices_t0, vertices_t1: are in a GPU's memory, which this detector does not use; copy them "
                           "to the host, or use backend=\"gpu\"");
   d.profiler.begin();
+  if (!t0.on_device && !t1.on_device) require_static_meshes_rest(*d.scene, t0, t1);
   if (d.next_on_gpu(t0.on_device || t1.on_device)) {
     if (auto contacts = d.frame_on_gpu(t0, t1)) {
       d.count_gpu(*contacts);

@@ -249,3 +249,18 @@ def test_errors_have_one_kind_to_catch(detector):
     with pytest.raises(hc.InvalidArgument):
         detector.detect(changed(VERTICES, 0, 0, np.nan), VERTICES)
     assert issubclass(hc.InvalidArgument, ValueError)
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_static_mesh_that_moves(dtype):
+    scene = hc.Scene()
+    scene.add_mesh("cloth", [[0, 1, 2]])
+    scene.add_mesh("floor", [[0, 1, 2]], static=True)
+    detector = hc.Detector(scene)
+    start = np.zeros((6, 3), dtype)
+    end = start.copy()
+    end[1] = 1
+    detector.detect(start, end)  # the cloth may move
+    end[4, 2] = 1
+    with pytest.raises(ValueError, match=r"vertices_t1\[4\].*'floor'.*static"):
+        detector.detect(start, end)
