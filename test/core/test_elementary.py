@@ -118,6 +118,20 @@ def test_denormal_and_huge_coordinates(kind, exponent):
     assert_promise_kept(kind, "conservative", queries * 2.0**exponent)
 
 
+@PROMISING
+@pytest.mark.parametrize("scale", [2.0**51, 2.0**76, 2.0**100])
+def test_smallest_number_beside_large_ones(accuracy, scale):
+    """Off by the smallest number at the start, which must not vanish when the rest is brought to integers."""
+    start = [[-1, -1, 0], [-1, -1, 0], [1, -1, 1], [-1, 0, -1]]
+    corner = scale * np.array([[*start, [1, 0, 0], [1, -1, 0], [-1, 0, 0], [1, 1, -1]]], float)
+    corner[0, 0, 2] = 5e-324
+    assert_promise_kept(VERTEX_FACE, accuracy, corner)
+    start = [[0, -1, 0], [0, 1, 0], [0, 2, 3], [0, -1, 0]]
+    ends = scale * np.array([[*start, [-1, 0, -3], [0, -1, -2], [0, -1, -3], [-1, 0, -4]]], float)
+    ends[0, 0, 0] = 1e-323
+    assert_promise_kept(EDGE_EDGE, accuracy, ends)
+
+
 @KINDS
 @pytest.mark.parametrize("accuracy", ACCURACIES)
 def test_every_tier_answers_with_a_time_in_the_unit_interval(kind, accuracy):

@@ -69,7 +69,8 @@ HPCCD_HD bool certainly_touch_at_start(const Motion<DoubleDouble>& m) {
   std::int64_t v[9];
   for (int i = 0; i < 9; ++i) {
     const double scaled = scalbn(given[i].high, 40 - exponent);
-    if (floor(scaled) != scaled) return false;
+    // The smallest numbers vanish beside the largest ones.
+    if (floor(scaled) != scaled || (scaled == 0 && given[i].high != 0)) return false;
     v[i] = static_cast<std::int64_t>(scaled);
   }
   const auto cross = [&](int a, int b, Wide out[3]) {
