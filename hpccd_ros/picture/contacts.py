@@ -39,6 +39,7 @@ class Step:
     n_vertex_face: int
     title: str
     facts: list[str]
+    scene: str = ""  # name, at the right of the title
 
 
 @dataclasses.dataclass
@@ -130,6 +131,7 @@ def _draw_scene(axes, image, camera, depth, step):
 
 def _write_title(figure, step):
     figure.text(0.03, 0.945, step.title, color=INK, fontsize=21, fontweight="bold", va="center")
+    figure.text(0.97, 0.945, step.scene, color=INK, fontsize=14, va="center", ha="right")
     figure.text(0.03, 0.905, "   ·   ".join(step.facts), color=FAINT, fontsize=11.5, va="center")
 
 

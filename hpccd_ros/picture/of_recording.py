@@ -34,7 +34,6 @@ def draw_step(step: Step, path, history: History | None = None, *, title: str, *
     first = f"first at t = {found.first_toc:.4f}" if step.total else None
     of = f" of {max(history.steps)}" if history is not None else ""
     facts = [
-        title,
         f"{triangles:,} triangles", f"{len(found.vf):,} vertex-face", f"{len(found.ee):,} edge-edge", first,
         f"{step.milliseconds:.1f} ms", accuracy, f"hash {found.hash:016x}",
     ]  # fmt: skip
@@ -46,6 +45,7 @@ def draw_step(step: Step, path, history: History | None = None, *, title: str, *
         len(found.vf),
         f"{step.total:,} contact{'' if step.total == 1 else 's'} in step {step.step}" + of,
         [fact for fact in facts if fact],
+        title,
     )
     context = None
     if history is not None and len(history.steps) > 1:
