@@ -27,7 +27,8 @@ class Detector:
 
     accuracy: "fast", "balanced", "conservative" or "exact"; backend: "auto", "cpu", "hybrid" or "gpu"; threads: 0 for
     all cores; report: "all" contacts, those at the earliest time only ("first"), or one contact ("any"); outputs: any
-    of "points", "normals"; simd: "auto", "scalar", "avx2" or "avx512" (the result is the same).
+    of "points", "normals"; simd: "auto", "scalar", "avx2" or "avx512" (the result is the same). On the GPU "fast" is
+    computed as "balanced", and "any" gives the first contact in canonical order.
     minimum_separation, tolerance ("conservative" only, in coordinate units): report every pair that comes within
     minimum_separation, measured along each axis, no later than it does so; pairs that miss it by up to tolerance may be
     reported too. Without a separation "conservative" reports exactly the true contacts, at a time never late.
