@@ -97,6 +97,11 @@ TEST(Methods, OneContactOfManyIsRefused) {
     EXPECT_THROW(Detector(test::swarm_scene(true), {.report = Report::any, .method = method}), InvalidArgument);
 }
 
+TEST(Methods, GpusAreRefused) {
+  for (Method method : methods)
+    EXPECT_THROW(Detector(test::swarm_scene(true), {.backend = Backend::gpu, .method = method}), InvalidArgument);
+}
+
 TEST(Methods, PublishedRestructuresAndReassigns) {
   Detector detector(
       test::swarm_scene(false),

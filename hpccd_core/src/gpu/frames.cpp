@@ -74,6 +74,8 @@ void reduce(Contacts& c, Report report) {
 
 std::string unsupported(const Options& options) {
   if (options.minimum_separation > 0) return "minimum_separation: not on the GPU; use backend=\"cpu\"";
+  if (options.method != Method::standard)
+    return "method: the published methods run on CPUs; use backend=\"cpu\", or method=\"default\"";
   return "";
 }
 
