@@ -39,5 +39,12 @@ class Contacts:
         """No contacts at all."""
         empty = np.empty
         return cls(
-            empty((0, 2), np.uint32), empty(0), empty((0, 4), np.uint32), empty(0), empty((0, 3)), empty((0, 3)), np.inf, 0
+            vf=empty((0, 2), np.uint32),
+            vf_toc=empty(0),
+            ee=empty((0, 4), np.uint32),
+            ee_toc=empty(0),
+            points=empty((0, 3)),
+            normals=empty((0, 3)),
+            first_toc=np.inf,
+            hash=0,
         )

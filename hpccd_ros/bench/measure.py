@@ -166,6 +166,8 @@ def disagreements(series: Sequence[Series]) -> list[str]:
     for step in sorted({step for one in series for step in one.by_step}):
         seen = {one.name: one.hashes().get(step, set()) for one in series}
         if len(set().union(*seen.values())) > 1:
-            text = ", ".join(f"{name} {'/'.join(f'{h:#018x}' for h in sorted(hashes))}" for name, hashes in seen.items())
+            text = ", ".join(
+                f"{name} {'/'.join(f'{h:#018x}' for h in sorted(hashes))}" for name, hashes in seen.items()
+            )
             said.append(f"step {step}: {text}")
     return said

@@ -21,7 +21,7 @@ from .steps import Step
 
 NOTE = (
     "ipctk: swept-box broad phase with its fastest method (LBVH) plus the narrow phase for the earliest time only; "
-    "conversion to float64 and making its CollisionMesh not timed, its log off; same steps, same number of threads, all "
+    "conversion to float64 and making its CollisionMesh not timed, its log off; same steps and number of threads, all "
     "triangles as one mesh for both"
 )
 
