@@ -6,7 +6,6 @@
 
 #include "base/parallel.h"
 #include "bvh/box.h"
-#include "bvh/box.h"
 #include "bvh/coordinate_map.h"
 #include "elementary/batch.h"
 
