@@ -17,7 +17,11 @@ namespace hpccd {
 
 struct Detector::Impl {
   Impl(std::shared_ptr<const Scene> s, Options o)
-      : scene(std::move(s)), options(o), features(features_of(*scene)), rules(*scene, o.accuracy), pool(o.threads),
+      : scene(std::move(s)),
+        options(o),
+        features(features_of(*scene)),
+        rules(*scene, o.accuracy),
+        pool(o.threads),
         workers(static_cast<std::size_t>(pool.size())) {
     options.simd = resolve(o.simd);
     options.threads = pool.size();
@@ -28,7 +32,8 @@ struct Detector::Impl {
     if (o.minimum_separation > 0) search.batch_test[static_cast<int>(Accuracy::conservative)] = all_undecided;
     engine = paper::engine_of(options, {features, rules, pool});
     const bool wanted = o.backend == Backend::gpu || o.backend == Backend::automatic;
-    if (const std::string why = gpu::unsupported(o); o.backend == Backend::gpu && !why.empty()) throw InvalidArgument(why);
+    if (const std::string why = gpu::unsupported(o); o.backend == Backend::gpu && !why.empty())
+      throw InvalidArgument(why);
     if (wanted && gpu::unsupported(o).empty() && !gpu::status().devices.empty())
       gpu = std::make_unique<gpu::Frames>(*scene, features, options, pool);
     else if (o.backend == Backend::gpu)
@@ -42,6 +47,7 @@ struct Detector::Impl {
   ThreadPool pool;
   std::vector<Worker> workers;
   Search search;
+  ContactOrder order;
   MotionBounds motion;
   Tree tree;
   std::unique_ptr<paper::MethodEngine> engine;  // of a published method; none for the default traversal
@@ -98,7 +104,7 @@ struct Detector::Impl {
     }
     refit(tree, motion.boxes, pool);
     profiler.mark("refit");
-    if (relative_area(tree) > worn_out * tree.area_when_built) {
+    if (relative_area(tree, pool) > worn_out * tree.area_when_built) {
       build(tree, *scene, features, motion.boxes, pool);
       profiler.mark("build");
     }
@@ -139,6 +145,7 @@ struct Detector::Impl {
       }
       bytes += sizeof(Worker) + w.bytes();
     }
+    bytes += order.bytes();
     stats["node_pairs"] = node_pairs;
     stats["leaf_pairs"] = leaf_pairs;
     stats["vf_contacts"] = contacts.vf.size();
@@ -164,8 +171,9 @@ Contacts Detector::detect(Positions t0, Positions t1) {
   if (t0.is_double != t1.is_double)
     throw InvalidArgument("vertices_t0, vertices_t1: must both be float32 or both be float64");
   if ((t0.on_device || t1.on_device) && !d.gpu)
-    throw InvalidArgument("vertices_t0, vertices_t1: are in a GPU's memory, which this detector does not use; copy them "
-                          "to the host, or use backend=\"gpu\"");
+    throw InvalidArgument(
+        "vertices_t0, vertices_t1: are in a GPU's memory, which this detector does not use; copy them "
+        "to the host, or use backend=\"gpu\"");
   d.profiler.begin();
   if (!t0.on_device && !t1.on_device) require_static_meshes_rest(*d.scene, t0, t1);
   if (d.next_on_gpu(t0.on_device || t1.on_device)) {
@@ -181,8 +189,8 @@ Contacts Detector::detect(Positions t0, Positions t1) {
   d.motion.take(t0, t1, d.options.minimum_separation, d.pool);
   d.profiler.mark("bounds");
   d.find_contacts();
-  Contacts contacts =
-      collect_contacts(d.workers, d.search.geometry, d.options.report, {d.options.points, d.options.normals}, d.pool);
+  Contacts contacts = collect_contacts(d.workers, d.search.geometry, d.options.report,
+                                       {d.options.points, d.options.normals}, d.order, d.pool);
   d.profiler.mark("contacts");
   d.count(contacts);
   d.profiler.end();

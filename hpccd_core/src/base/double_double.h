@@ -53,9 +53,13 @@ HPCCD_HD DoubleDouble operator/(DoubleDouble a, DoubleDouble b) {
   return detail::fast_two_sum(t, rest / b.high);
 }
 
-HPCCD_HD bool operator<(DoubleDouble a, DoubleDouble b) { return a.high < b.high || (a.high == b.high && a.low < b.low); }
+HPCCD_HD bool operator<(DoubleDouble a, DoubleDouble b) {
+  return a.high < b.high || (a.high == b.high && a.low < b.low);
+}
 HPCCD_HD bool operator>(DoubleDouble a, DoubleDouble b) { return b < a; }
-HPCCD_HD bool operator<=(DoubleDouble a, DoubleDouble b) { return a.high < b.high || (a.high == b.high && a.low <= b.low); }
+HPCCD_HD bool operator<=(DoubleDouble a, DoubleDouble b) {
+  return a.high < b.high || (a.high == b.high && a.low <= b.low);
+}
 HPCCD_HD bool operator>=(DoubleDouble a, DoubleDouble b) { return b <= a; }
 
 HPCCD_HD DoubleDouble select(bool m, DoubleDouble a, DoubleDouble b) { return m ? a : b; }
@@ -73,8 +77,8 @@ struct RealTraits<DoubleDouble> {
   using Scalar = DoubleDouble;
   using Mask = bool;
   static constexpr int width = 1;
-  static constexpr double half_ulp = 1.9721522630525295e-31;                       // 2^-102
-  static constexpr double least_usable = 6.3e-61, most_usable = 1.7e72;            // 2^-200, 2^240
+  static constexpr double half_ulp = 1.9721522630525295e-31;             // 2^-102
+  static constexpr double least_usable = 6.3e-61, most_usable = 1.7e72;  // 2^-200, 2^240
 };
 
 }  // namespace hpccd

@@ -73,7 +73,8 @@ HPCCD_HD bool any(LaneMask<T, W> m) {
 template <class T, int W>
 HPCCD_HD Lanes<T, W> square_root(Lanes<T, W> x) {
 #if defined(__AVX512F__)
-  if constexpr (sizeof(x.v) == 64 && sizeof(T) == 8) return Lanes<T, W>((typename Lanes<T, W>::Vec)_mm512_sqrt_pd((__m512d)x.v));
+  if constexpr (sizeof(x.v) == 64 && sizeof(T) == 8)
+    return Lanes<T, W>((typename Lanes<T, W>::Vec)_mm512_sqrt_pd((__m512d)x.v));
 #endif
   Lanes<T, W> r;
   for (int i = 0; i < W; ++i) r.v[i] = square_root(x.v[i]);

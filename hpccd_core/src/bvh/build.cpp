@@ -37,9 +37,7 @@ void split(const std::vector<Centroid>& centroids, std::uint32_t* order, std::ui
   });
 }
 
-Centroid centroid_of(const Box& b) {
-  return {{b.low[0] + b.high[0], b.low[1] + b.high[1], b.low[2] + b.high[2]}};
-}
+Centroid centroid_of(const Box& b) { return {{b.low[0] + b.high[0], b.low[1] + b.high[1], b.low[2] + b.high[2]}}; }
 
 class Builder {
  public:
@@ -50,6 +48,7 @@ class Builder {
   void run() {
     carriers_of_mesh();
     split_meshes();
+    tree_.level_begin = {0};
     while (!level_.empty()) split_level();
     lay_out_slots();
   }
@@ -71,8 +70,7 @@ class Builder {
     });
     centroids_.resize(n);
     parallel_for(pool_, n, 4096, [&](std::size_t begin, std::size_t end, int) {
-      for (std::size_t c = begin; c < end; ++c)
-        centroids_[c] = centroid_of(carrier_box(static_cast<std::uint32_t>(c)));
+      for (std::size_t c = begin; c < end; ++c) centroids_[c] = centroid_of(carrier_box(static_cast<std::uint32_t>(c)));
     });
   }
 
@@ -134,6 +132,7 @@ class Builder {
   }
 
   void split_level() {
+    tree_.level_begin.push_back(static_cast<std::uint32_t>(tree_.nodes.size()));
     parallel_for(pool_, level_.size(), 1, [&](std::size_t begin, std::size_t end, int) {
       for (std::size_t i = begin; i < end; ++i) {
         const std::uint32_t n = level_[i].end - level_[i].begin;
@@ -156,7 +155,8 @@ class Builder {
 
   void lay_out_slots() {
     // Leaves in the order of their carriers: neighbours in space are neighbours in memory.
-    std::sort(leaf_ranges_.begin(), leaf_ranges_.end(), [](const Range& a, const Range& b) { return a.begin < b.begin; });
+    std::sort(leaf_ranges_.begin(), leaf_ranges_.end(),
+              [](const Range& a, const Range& b) { return a.begin < b.begin; });
     for (const Range& r : leaf_ranges_) {
       LeafRange leaf{};
       leaf.first_face = static_cast<std::uint32_t>(tree_.face_of_slot.size());
@@ -190,8 +190,7 @@ class Builder {
                n_vertices = tree_.vertex_of_slot.size();
     for (int k = 0; k < 3; ++k) {
       tree_.face_corners[k].assign(n_faces + pad, 0);
-      for (std::size_t s = 0; s < n_faces; ++s)
-        tree_.face_corners[k][s] = features_.faces[tree_.face_of_slot[s]][k];
+      for (std::size_t s = 0; s < n_faces; ++s) tree_.face_corners[k][s] = features_.faces[tree_.face_of_slot[s]][k];
     }
     for (int k = 0; k < 2; ++k) {
       tree_.edge_ends[k].assign(n_edges + pad, 0);
@@ -222,7 +221,7 @@ void build(Tree& tree, const Scene& scene, const Features& features, const std::
   tree = {};
   Builder(tree, scene, features, vertex_boxes, pool).run();
   refit(tree, vertex_boxes, pool);
-  tree.area_when_built = relative_area(tree);
+  tree.area_when_built = relative_area(tree, pool);
 }
 
 }  // namespace hpccd

@@ -44,8 +44,8 @@ template <class Real>
 }
 
 template <class Real>
-void copy_motion(const Real* t0, const Real* t1, const CoordinateMap& map, double margin, std::size_t begin, std::size_t end,
-                 VertexRow* rows, Box* boxes) {
+void copy_motion(const Real* t0, const Real* t1, const CoordinateMap& map, double margin, std::size_t begin,
+                 std::size_t end, VertexRow* rows, Box* boxes) {
   for (std::size_t i = begin; i < end; ++i)
     for (int k = 0; k < 3; ++k) {
       const double a = t0[3 * i + k], b = t1[3 * i + k];
@@ -59,7 +59,7 @@ void copy_motion(const Real* t0, const Real* t1, const CoordinateMap& map, doubl
 template <class Real>
 void take_positions(MotionBounds& m, const Real* t0, const Real* t1, std::size_t n, double separation,
                     ThreadPool& pool) {
-  constexpr std::size_t grain = 8192;
+  constexpr std::size_t grain = 1024;
   std::vector<Extent> extents((n + grain - 1) / grain * 2);
   parallel_for(pool, extents.size(), 1, [&](std::size_t from, std::size_t to, int) {
     for (std::size_t i = from; i < to; ++i) {

@@ -42,6 +42,9 @@ struct Tree {
   static constexpr std::uint32_t load_width = 16;  // boxes are compared 16 at a time
 
   std::vector<Node> nodes;             // breadth first: children come after their parents
+  // nodes[level_begin[i] .. level_begin[i + 1]) have their children on the next level; on the first, which joins whole
+  // meshes, also on the same one.
+  std::vector<std::uint32_t> level_begin;
   std::vector<LeafRange> leaves;
   std::vector<std::uint32_t> leaf_nodes;
   // Slots: features in the order of the leaves; each array ends with load_width slots of padding.
@@ -61,6 +64,6 @@ void build(Tree& tree, const Scene& scene, const Features& features, const std::
 void refit(Tree& tree, const std::vector<Box>& vertex_boxes, ThreadPool& pool);
 
 // Sum of the nodes' areas over the root's: what traversal pays grows with it.
-double relative_area(const Tree& tree);
+double relative_area(const Tree& tree, ThreadPool& pool);
 
 }  // namespace hpccd

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "base/parallel.h"
+#include "contacts/order.h"
 #include "elementary/batch.h"
 #include "traverse/worker.h"
 
@@ -12,8 +13,9 @@ struct Outputs {
   bool points, normals;
 };
 
-// Takes what the workers found. Features are numbered so that their pairs sort into the canonical order.
+// Takes what the workers found. Features are numbered so that their pairs sort into the canonical order. `order` keeps
+// its memory from call to call.
 Contacts collect_contacts(std::vector<Worker>& workers, const Geometry& geometry, Report report, Outputs outputs,
-                          ThreadPool& pool);
+                          ContactOrder& order, ThreadPool& pool);
 
 }  // namespace hpccd

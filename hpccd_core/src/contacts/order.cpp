@@ -5,33 +5,58 @@
 
 namespace hpccd {
 
-std::vector<Found> sorted(const std::vector<const std::vector<Found>*>& lists, ThreadPool& pool) {
+void ContactOrder::add_lists(const std::vector<Worker>& workers, std::vector<Found> Worker::* found, ThreadPool& pool) {
   std::size_t n = 0;
-  std::uint32_t most = 0;
-  for (const auto* list : lists) {
-    n += list->size();
-    for (const Found& f : *list) most = std::max(most, f.first);
-  }
-  // Buckets by the first feature, about 256 contacts each, then each bucket on its own.
-  const std::size_t n_buckets = std::clamp<std::size_t>(n / 256, 1, 4096);
-  const double per_feature = static_cast<double>(n_buckets) / (static_cast<double>(most) + 1);
-  const auto bucket_of = [&](const Found& f) { return static_cast<std::size_t>(f.first * per_feature); };
-  std::vector<std::size_t> begin(n_buckets + 1, 0);
-  for (const auto* list : lists)
-    for (const Found& f : *list) ++begin[bucket_of(f) + 1];
-  for (std::size_t b = 0; b < n_buckets; ++b) begin[b + 1] += begin[b];
-  std::vector<Found> all(n);
-  std::vector<std::size_t> next(begin.begin(), begin.end() - 1);
-  for (const auto* list : lists)
-    for (const Found& f : *list) all[next[bucket_of(f)]++] = f;
-  parallel_for(pool, n_buckets, 16, [&](std::size_t from, std::size_t to, int) {
-    for (std::size_t b = from; b < to; ++b)
-      std::sort(all.begin() + static_cast<std::ptrdiff_t>(begin[b]),
-                all.begin() + static_cast<std::ptrdiff_t>(begin[b + 1]), [](const Found& x, const Found& y) {
-                  return x.first < y.first || (x.first == y.first && x.second < y.second);
-                });
+  for (const Worker& w : workers) n += (w.*found).size();
+  if (n == 0) return;
+  std::vector<std::uint32_t> highest(workers.size(), 0);
+  parallel_for(pool, workers.size(), 1, [&](std::size_t begin, std::size_t end, int) {
+    for (std::size_t i = begin; i < end; ++i)
+      for (const Found& f : workers[i].*found) highest[i] = std::max(highest[i], f.first);
   });
-  return all;
+  const double features = static_cast<double>(*std::max_element(highest.begin(), highest.end())) + 1;
+  const std::size_t n_buckets = std::clamp<std::size_t>(n / 128, 1, 2048);
+  for (const Worker& w : workers)
+    lists_.push_back({&(w.*found), begin_.size(), n_buckets, static_cast<double>(n_buckets) / features, {}});
+  begin_.resize(begin_.size() + n_buckets);
+}
+
+void ContactOrder::count(const std::vector<Worker>& workers, ThreadPool& pool) {
+  lists_.clear();
+  begin_.clear();
+  add_lists(workers, &Worker::vertex_face, pool);
+  add_lists(workers, &Worker::edge_edge, pool);
+  parallel_for(pool, lists_.size(), 1, [&](std::size_t begin, std::size_t end, int) {
+    for (std::size_t i = begin; i < end; ++i) {
+      List& list = lists_[i];
+      list.next.assign(list.n_buckets, 0);
+      for (const Found& f : *list.found) ++list.next[list.bucket_of(f)];
+    }
+  });
+  std::size_t at = 0;
+  for (std::size_t i = 0; i < lists_.size(); i += workers.size())
+    for (std::size_t b = 0; b < lists_[i].n_buckets; ++b) {
+      begin_[lists_[i].first_bucket + b] = at;
+      for (std::size_t w = 0; w < workers.size(); ++w) {
+        const std::size_t n = lists_[i + w].next[b];
+        lists_[i + w].next[b] = at;
+        at += n;
+      }
+    }
+  begin_.push_back(at);
+  if (all_.size() < at) all_.resize(at);
+}
+
+void ContactOrder::scatter(std::size_t i) {
+  List& list = lists_[i];
+  for (const Found& f : *list.found) all_[list.next[list.bucket_of(f)]++] = f;
+}
+
+void ContactOrder::sort(std::size_t bucket) {
+  std::sort(all_.begin() + static_cast<std::ptrdiff_t>(begin(bucket)),
+            all_.begin() + static_cast<std::ptrdiff_t>(end(bucket)), [](const Found& x, const Found& y) {
+              return x.first < y.first || (x.first == y.first && x.second < y.second);
+            });
 }
 
 }  // namespace hpccd

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Sorting of found contacts by their feature pair. No pair is found twice, so the order is unique.
+// Found contacts in the order of their feature pairs, vertex-face before edge-edge, in buckets that threads can sort on
+// their own. No pair is found twice, so the order is unique.
 #pragma once
 
 #include <vector>
@@ -9,7 +10,42 @@
 
 namespace hpccd {
 
-// All lists joined, in ascending order of (first, second).
-std::vector<Found> sorted(const std::vector<const std::vector<Found>*>& lists, ThreadPool& pool);
+class ContactOrder {
+ public:
+  // Distributes what the workers found. `meanwhile(i)`, for each i < n_meanwhile, runs beside it.
+  template <class Job>
+  void take(const std::vector<Worker>& workers, ThreadPool& pool, std::size_t n_meanwhile, Job&& meanwhile) {
+    count(workers, pool);
+    parallel_for(pool, lists_.size() + n_meanwhile, 1, [&](std::size_t begin, std::size_t end, int) {
+      for (std::size_t i = begin; i < end; ++i) i < lists_.size() ? scatter(i) : meanwhile(i - lists_.size());
+    });
+  }
+
+  std::size_t buckets() const { return begin_.size() - 1; }
+  // Where the bucket's contacts stand among all.
+  std::size_t begin(std::size_t bucket) const { return begin_[bucket]; }
+  std::size_t end(std::size_t bucket) const { return begin_[bucket + 1]; }
+  void sort(std::size_t bucket);
+  const Found& operator[](std::size_t i) const { return all_[i]; }
+
+  std::size_t bytes() const { return all_.capacity() * sizeof(Found); }
+
+ private:
+  struct List {
+    const std::vector<Found>* found;
+    std::size_t first_bucket, n_buckets;
+    double buckets_per_feature;
+    std::vector<std::size_t> next;  // by bucket: how many, then where the next one goes
+    std::size_t bucket_of(const Found& f) const { return static_cast<std::size_t>(f.first * buckets_per_feature); }
+  };
+
+  void count(const std::vector<Worker>& workers, ThreadPool& pool);
+  void add_lists(const std::vector<Worker>& workers, std::vector<Found> Worker::* found, ThreadPool& pool);
+  void scatter(std::size_t list);
+
+  std::vector<List> lists_;
+  std::vector<std::size_t> begin_;
+  std::vector<Found> all_;
+};
 
 }  // namespace hpccd

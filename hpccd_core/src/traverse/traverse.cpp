@@ -3,11 +3,14 @@
 
 #include <algorithm>
 
+#include "traverse/pair_pool.h"
+
 namespace hpccd {
 namespace {
 
-void walk(const Tree& tree, const PairRules& rules, NodePair start, std::vector<NodePair>& stack, Worker& worker) {
-  stack.push_back(start);
+// `between` is called between two pairs and may take from the stack.
+template <class Between>
+void walk(const Tree& tree, const PairRules& rules, std::vector<NodePair>& stack, Worker& worker, Between&& between) {
   while (!stack.empty()) {
     const NodePair p = stack.back();
     stack.pop_back();
@@ -18,6 +21,7 @@ void walk(const Tree& tree, const PairRules& rules, NodePair start, std::vector<
       worker.leaf_pair(tree, tree.leaves[a.leaf], tree.leaves[b.leaf], rules.accuracy(a, b));
     else
       refine(tree.nodes, p, [&](NodePair q) { stack.push_back(q); });
+    between();
   }
 }
 
@@ -36,7 +40,10 @@ Found least(const std::vector<Found>& found) {
 }
 
 void traverse_any(const Tree& tree, const PairRules& rules, Search& search, ThreadPool& pool,
-                  std::vector<Worker>& workers, const std::vector<NodePair>& tasks) {
+                  std::vector<Worker>& workers) {
+  // Which contact is reported depends on the list, so it must not depend on the threads.
+  constexpr std::size_t enough = 4096;
+  const std::vector<NodePair> tasks = traversal_tasks(tree, rules, enough);
   std::atomic<std::size_t> next{0}, found{tasks.size()};
   pool.run([&](int thread) {
     Worker& worker = workers[thread];
@@ -47,7 +54,8 @@ void traverse_any(const Tree& tree, const PairRules& rules, Search& search, Thre
     for (;;) {
       const std::size_t task = next.fetch_add(1);
       if (task >= tasks.size() || task > found.load()) break;
-      walk(tree, rules, tasks[task], stack, worker);
+      stack.push_back(tasks[task]);
+      walk(tree, rules, stack, worker, [] {});
       worker.flush();
       keep_first_of_task(worker, task, found);
       if (task < best && !(worker.vertex_face.empty() && worker.edge_edge.empty())) {
@@ -73,23 +81,21 @@ void traverse_any(const Tree& tree, const PairRules& rules, Search& search, Thre
 
 }  // namespace
 
-void traverse(const Tree& tree, const PairRules& rules, Search& search, ThreadPool& pool, std::vector<Worker>& workers) {
-  // Small enough that the last tasks to end leave no thread idle for long, at 16 threads too.
-  constexpr std::size_t enough = 4096;
-  const std::vector<NodePair> tasks = traversal_tasks(tree, rules, enough);
-  if (search.report == Report::any) return traverse_any(tree, rules, search, pool, workers, tasks);
-  std::atomic<std::size_t> next{0};
-  pool.run([&](int thread) {
+void traverse(const Tree& tree, const PairRules& rules, Search& search, ThreadPool& pool,
+              std::vector<Worker>& workers) {
+  if (search.report == Report::any) return traverse_any(tree, rules, search, pool, workers);
+  for (Worker& w : workers) w.begin(search);
+  // Enough for the threads to begin with; making 4096 instead took 0.9 of the 4.6 ms of a scene of 18 K triangles.
+  constexpr std::size_t enough = 128;
+  PairPool pairs(tree, traversal_tasks(tree, rules, enough), pool.size());
+  pool.share([&](int thread) {
     Worker& worker = workers[thread];
-    worker.begin(search);
+    BusyThread busy(pairs, thread);
     std::vector<NodePair> stack;
-    constexpr std::size_t grain = 4;
-    for (;;) {
-      const std::size_t begin = next.fetch_add(grain, std::memory_order_relaxed);
-      if (begin >= tasks.size()) break;
-      for (std::size_t i = begin; i < std::min(begin + grain, tasks.size()); ++i)
-        walk(tree, rules, tasks[i], stack, worker);
-    }
+    while (busy.next(stack))
+      walk(tree, rules, stack, worker, [&] {
+        if (pairs.wanted()) pairs.give(stack);
+      });
     worker.flush();
   });
 }

@@ -32,7 +32,8 @@ struct Search {
 // Contacts within this of the earliest count as simultaneous: the accuracy promised for times of contact.
 inline constexpr double simultaneous = 1e-12;
 
-class Worker {
+// Aligned: counters of two threads on one cache line cost a fifth of a small scene's traversal.
+class alignas(128) Worker {
  public:
   void begin(Search& search);
   // Candidates of two leaves whose boxes overlap, to be tested at `accuracy`.
@@ -51,10 +52,10 @@ class Worker {
   std::size_t bytes() const;
 
   std::vector<Found> vertex_face, edge_edge;
-  BatchCounts counts[2];                 // vertex-face, edge-edge
+  BatchCounts counts[2];  // vertex-face, edge-edge
   std::uint64_t node_pairs = 0, leaf_pairs = 0;
   double elementary_seconds = 0;
-  std::size_t best_task = 0;             // where report is any: the task these contacts come from
+  std::size_t best_task = 0;  // where report is any: the task these contacts come from
 
  private:
   struct Waiting {

@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: Apache-2.0
+// Node pairs that wait for a thread. Threads walk depth first with a stack of their own; one that has run dry says so,
+// and the others give away the older half of their stacks, which holds the larger subtrees. So the list to begin with
+// can be short (making it is serial work), and no thread stays idle while another has something to share.
+#pragma once
+
+#include <atomic>
+#include <mutex>
+#include <vector>
+
+#include "traverse/tasks.h"
+
+namespace hpccd {
+
+class PairPool {
+ public:
+  // Each thread begins with the pairs that lie in its part of the leaves, which it has refitted (parallel_for).
+  PairPool(const Tree& tree, const std::vector<NodePair>& pairs, int threads);
+
+  // True while some thread has nothing to do.
+  bool wanted() const { return hungry_.load(std::memory_order_relaxed) > 0; }
+
+  // Takes the older half of a stack that holds work worth moving.
+  void give(std::vector<NodePair>& stack);
+
+  // Puts a pair on the empty stack; waits for one where others may still give. False: everything is done. The caller
+  // counts as busy until it asks again.
+  bool take(int thread, std::vector<NodePair>& stack);
+
+  // After an exception: all others stop.
+  void abandon() { abandoned_ = true; }
+
+ private:
+  bool take_one(int thread, std::vector<NodePair>& stack);
+
+  const Tree& tree_;
+  std::mutex mutex_;
+  std::vector<std::vector<NodePair>> lists_;  // of each thread, then those given away
+  std::atomic<std::size_t> waiting_pairs_;
+  std::atomic<int> busy_{0}, hungry_{0};
+  std::atomic<bool> abandoned_{false};
+
+  friend class BusyThread;
+};
+
+// One thread's part in the work, whichever way it ends.
+class BusyThread {
+ public:
+  BusyThread(PairPool& pool, int thread) : pool_(pool), thread_(thread) {}
+  ~BusyThread() {
+    if (busy_) pool_.abandon(), --pool_.busy_;
+  }
+  BusyThread(const BusyThread&) = delete;
+  BusyThread& operator=(const BusyThread&) = delete;
+
+  // As PairPool::take.
+  bool next(std::vector<NodePair>& stack) {
+    if (busy_) --pool_.busy_;
+    return busy_ = pool_.take(thread_, stack);
+  }
+
+ private:
+  PairPool& pool_;
+  const int thread_;
+  bool busy_ = false;
+};
+
+}  // namespace hpccd
