@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <optional>
+#include <utility>
 
 #include "base/parallel.h"
 #include "base/profiler.h"
@@ -10,7 +11,7 @@
 #include "gpu/frames.h"
 #include "paper/method.h"
 #include "scene/features.h"
-#include "scene/static_promise.h"
+#include "scene/static_meshes.h"
 #include "traverse/traverse.h"
 
 namespace hpccd {
@@ -50,6 +51,7 @@ struct Detector::Impl {
   ContactOrder order;
   MotionBounds motion;
   Tree tree;
+  bool tree_fits_motion = false;                // its bounds are those of the last motion taken
   std::unique_ptr<paper::MethodEngine> engine;  // of a published method; none for the default traversal
   std::unique_ptr<gpu::Frames> gpu;             // where the backend is "gpu", or may become it
   // "auto": the first frames go to both in turn, the rest to the faster. The first of each warms up.
@@ -77,8 +79,10 @@ struct Detector::Impl {
 
   std::optional<Contacts> frame_on_gpu(Positions t0, Positions t1) {
     const auto build_tree = [this](Positions a, Positions b) -> const Tree& {
-      motion.take(a, b, 0, pool);
+      tree_fits_motion = false;
+      motion.take(*scene, a, b, 0, pool);
       build(tree, *scene, features, motion.boxes, pool);
+      tree_fits_motion = true;
       return tree;
     };
     return gpu->detect(t0, t1, build_tree, profiler);
@@ -89,12 +93,11 @@ struct Detector::Impl {
     stats["vf_contacts"] = contacts.vf.size();
     stats["ee_contacts"] = contacts.ee.size();
     stats["triangles"] = features.n_faces();
-    stats["bytes"] = motion.rows.capacity() * sizeof(VertexRow) + motion.boxes.capacity() * sizeof(Box) + tree.bytes() +
-                     features.bytes();
+    stats["bytes"] = motion.bytes() + tree.bytes() + features.bytes();
   }
 
   // A tree that fits the motion of this step: refitted, or built anew where refitting has lost too much.
-  void update_tree() {
+  void update_tree(bool tree_followed) {
     // Traversal visits node pairs about in proportion to the nodes' area; half as much again costs more than a build.
     constexpr double worn_out = 1.5;
     if (tree.nodes.empty()) {
@@ -102,7 +105,7 @@ struct Detector::Impl {
       profiler.mark("build");
       return;
     }
-    refit(tree, motion.boxes, pool);
+    refit(tree, motion.boxes, tree_followed ? motion.resting : std::vector<char>(), pool);
     profiler.mark("refit");
     if (relative_area(tree, pool) > worn_out * tree.area_when_built) {
       build(tree, *scene, features, motion.boxes, pool);
@@ -110,14 +113,18 @@ struct Detector::Impl {
     }
   }
 
-  void find_contacts() {
+  void find_contacts(Positions t0, Positions t1) {
+    const bool tree_followed = std::exchange(tree_fits_motion, false);
+    motion.take(*scene, t0, t1, options.minimum_separation, pool);
+    profiler.mark("bounds");
     search.geometry = {motion.rows.data(), features.edges.data(), features.faces.data(), motion.map.scale};
     search.earliest = std::numeric_limits<double>::infinity();
     if (engine) {
       engine->update(motion.boxes, profiler);
       engine->traverse(motion.boxes, search, workers);
     } else {
-      update_tree();
+      update_tree(tree_followed);
+      tree_fits_motion = true;
       traverse(tree, rules, search, pool, workers);
     }
     double elementary = 0;
@@ -151,8 +158,7 @@ struct Detector::Impl {
     stats["vf_contacts"] = contacts.vf.size();
     stats["ee_contacts"] = contacts.ee.size();
     stats["triangles"] = features.n_faces();
-    stats["bytes"] = bytes + motion.rows.capacity() * sizeof(VertexRow) + motion.boxes.capacity() * sizeof(Box) +
-                     tree.bytes() + features.bytes() + (engine ? engine->bytes() : 0);
+    stats["bytes"] = bytes + motion.bytes() + tree.bytes() + features.bytes() + (engine ? engine->bytes() : 0);
     if (engine) engine->count(stats);
     if (gpu) stats["gpu_fallbacks"] = gpu->fallbacks();
   }
@@ -175,8 +181,8 @@ Contacts Detector::detect(Positions t0, Positions t1) {
         "vertices_t0, vertices_t1: are in a GPU's memory, which this detector does not use; copy them "
         "to the host, or use backend=\"gpu\"");
   d.profiler.begin();
-  if (!t0.on_device && !t1.on_device) require_static_meshes_rest(*d.scene, t0, t1);
   if (d.next_on_gpu(t0.on_device || t1.on_device)) {
+    if (!t0.on_device && !t1.on_device) require_static_meshes_rest(*d.scene, t0, t1);
     if (auto contacts = d.frame_on_gpu(t0, t1)) {
       d.count_gpu(*contacts);
       d.profiler.end();
@@ -186,9 +192,7 @@ Contacts Detector::detect(Positions t0, Positions t1) {
     d.profiler.mark("gpu_failed");
   }
   if (d.gpu) t0 = d.gpu->on_host(t0, 0), t1 = d.gpu->on_host(t1, 1);
-  d.motion.take(t0, t1, d.options.minimum_separation, d.pool);
-  d.profiler.mark("bounds");
-  d.find_contacts();
+  d.find_contacts(t0, t1);
   Contacts contacts = collect_contacts(d.workers, d.search.geometry, d.options.report,
                                        {d.options.points, d.options.normals}, d.order, d.pool);
   d.profiler.mark("contacts");

@@ -75,7 +75,7 @@ TEST_F(TreeTest, BoxesBoundTheMotionAfterRefit) {
   take(0, 0.3);
   build(tree, *scene, features, motion.boxes, pool);
   take(0.3, 1);
-  refit(tree, motion.boxes, pool);
+  refit(tree, motion.boxes, {}, pool);
   expect_bounds();
 }
 
@@ -83,7 +83,7 @@ TEST_F(TreeTest, RefitToTheSameMotionChangesNothing) {
   take(0, 0.3);
   build(tree, *scene, features, motion.boxes, pool);
   const std::vector<Node> built = tree.nodes;
-  refit(tree, motion.boxes, pool);
+  refit(tree, motion.boxes, {}, pool);
   for (std::size_t i = 0; i < built.size(); ++i) {
     EXPECT_TRUE(contains(tree.nodes[i].box, built[i].box)) << "node " << i;
     EXPECT_TRUE(contains(built[i].box, tree.nodes[i].box)) << "node " << i;

@@ -220,7 +220,7 @@ void build(Tree& tree, const Scene& scene, const Features& features, const std::
            ThreadPool& pool) {
   tree = {};
   Builder(tree, scene, features, vertex_boxes, pool).run();
-  refit(tree, vertex_boxes, pool);
+  refit(tree, vertex_boxes, {}, pool);
   tree.area_when_built = relative_area(tree, pool);
 }
 

@@ -15,7 +15,7 @@ struct CoordinateMap {
   double center[3] = {0, 0, 0};
   double scale = 1;
 
-  // Maps the given ranges to about [-1, 1].
+  // Maps the given ranges into [-2.25, 2.25].
   HPCCD_HD static CoordinateMap around(const double low[3], const double high[3]) {
     CoordinateMap m;
     double extent = 0;
@@ -25,6 +25,12 @@ struct CoordinateMap {
     }
     const int exponent = extent > 0 ? ilogb(extent) : 0;
     if (extent > 0) m.scale = ldexp(1.0, exponent < -1000 ? 1000 : exponent > 1000 ? -1000 : -exponent);
+    // On a coarse grid, so that a motion inside a large scene leaves the map as it is, and with it the boxes of what
+    // rests. The map depends on the step alone, never on the steps before.
+    for (int k = 0; k < 3; ++k) {
+      const double steps = 4 * (m.center[k] * m.scale);
+      if (extent > 0 && fabs(steps) < 1e15) m.center[k] = rint(steps) / 4 / m.scale;
+    }
     return m;
   }
 

@@ -1,16 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "bvh/motion_bounds.h"
 
+#include <algorithm>
 #include <cmath>
 #include <string>
+#include <utility>
 
 namespace hpccd {
 namespace {
 
-struct Extent {
-  double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
-  bool good = true;
-};
+constexpr std::size_t grain = 1024;
 
 // NaN fails the comparison as well.
 bool acceptable(double x) { return std::fabs(x) <= largest_coordinate; }
@@ -56,50 +55,97 @@ void copy_motion(const Real* t0, const Real* t1, const CoordinateMap& map, doubl
     }
 }
 
-template <class Real>
-void take_positions(MotionBounds& m, const Real* t0, const Real* t1, std::size_t n, double separation,
-                    ThreadPool& pool) {
-  constexpr std::size_t grain = 1024;
-  std::vector<Extent> extents((n + grain - 1) / grain * 2);
-  parallel_for(pool, extents.size(), 1, [&](std::size_t from, std::size_t to, int) {
-    for (std::size_t i = from; i < to; ++i) {
-      const std::size_t begin = i / 2 * grain;
-      extents[i] = extent_of(i % 2 ? t1 : t0, begin, std::min(begin + grain, n));
-    }
-  });
-  Extent whole;
-  for (const Extent& e : extents) {
-    whole.good = whole.good && e.good;
-    for (int k = 0; k < 3; ++k) {
-      whole.low[k] = std::min(whole.low[k], e.low[k]);
-      whole.high[k] = std::max(whole.high[k], e.high[k]);
-    }
-  }
-  if (!whole.good) {
-    if (!extent_of(t0, 0, n).good) report_bad("vertices_t0", t0, n);
-    report_bad("vertices_t1", t1, n);
-  }
-  if (n > 0) m.map = CoordinateMap::around(whole.low, whole.high);
-  // Half the separation to each side, and what rounding x - margin and x + margin can lose.
-  double most = 0;
-  for (int k = 0; k < 3 && n > 0; ++k) most = std::max({most, std::fabs(whole.low[k]), std::fabs(whole.high[k])});
-  const double margin = separation > 0 ? 0.5 * separation + 4.5e-16 * (most + separation) : 0;
-  m.rows.resize(n);
-  m.boxes.resize(n);
-  parallel_for(pool, n, grain, [&](std::size_t begin, std::size_t end, int) {
-    copy_motion(t0, t1, m.map, margin, begin, end, m.rows.data(), m.boxes.data());
-  });
+// Pieces of the wanted parts, each with the number of its part.
+struct Piece {
+  std::size_t begin, end, part;
+};
+
+template <class Wanted>
+std::vector<Piece> pieces_of(const std::vector<VertexRange>& parts, Wanted&& wanted) {
+  std::vector<Piece> pieces;
+  for (std::size_t p = 0; p < parts.size(); ++p)
+    if (wanted(p))
+      for (std::size_t i = parts[p].begin; i < parts[p].end; i += grain)
+        pieces.push_back({i, std::min(i + grain, parts[p].end), p});
+  return pieces;
 }
 
 }  // namespace
 
-void MotionBounds::take(Positions t0, Positions t1, double separation, ThreadPool& pool) {
+void Extent::include(const Extent& e) {
+  good = good && e.good;
+  for (int k = 0; k < 3; ++k) {
+    low[k] = std::min(low[k], e.low[k]);
+    high[k] = std::max(high[k], e.high[k]);
+  }
+}
+
+template <class Real>
+void MotionBounds::take(const Real* t0, const Real* t1, std::size_t n, double separation, ThreadPool& pool) {
+  const auto moves = [&](std::size_t part) { return resting.empty() || !resting[part]; };
+  std::vector<Piece> pieces = pieces_of(parts_, moves);
+  std::vector<Extent> extents(pieces.size());
+  parallel_for(pool, pieces.size(), 1, [&](std::size_t from, std::size_t to, int) {
+    for (std::size_t i = from; i < to; ++i) {
+      extents[i] = extent_of(t0, pieces[i].begin, pieces[i].end);
+      extents[i].include(extent_of(t1, pieces[i].begin, pieces[i].end));
+    }
+  });
+  extents_.resize(parts_.size());
+  for (std::size_t p = 0; p < parts_.size(); ++p)
+    if (moves(p)) extents_[p] = {};
+  for (std::size_t i = 0; i < pieces.size(); ++i) extents_[pieces[i].part].include(extents[i]);
+  Extent whole;
+  for (const Extent& e : extents_) whole.include(e);
+  if (!whole.good) {
+    if (!extent_of(t0, 0, n).good) report_bad("vertices_t0", t0, n);
+    report_bad("vertices_t1", t1, n);
+  }
+
+  const CoordinateMap old_map = map;
+  if (n > 0) map = CoordinateMap::around(whole.low, whole.high);
+  // Half the separation to each side, and what rounding x - margin and x + margin can lose.
+  double most = 0;
+  for (int k = 0; k < 3 && n > 0; ++k) most = std::max({most, std::fabs(whole.low[k]), std::fabs(whole.high[k])});
+  const double margin = separation > 0 ? 0.5 * separation + 4.5e-16 * (most + separation) : 0;
+  if (!resting.empty() && (!(map == old_map) || margin != margin_)) {
+    resting.clear();
+    pieces = pieces_of(parts_, moves);
+  }
+  margin_ = margin;
+  rows.resize(n);
+  boxes.resize(n);
+  parallel_for(pool, pieces.size(), 1, [&](std::size_t from, std::size_t to, int) {
+    for (std::size_t i = from; i < to; ++i)
+      copy_motion(t0, t1, map, margin, pieces[i].begin, pieces[i].end, rows.data(), boxes.data());
+  });
+}
+
+void MotionBounds::take_all(Positions t0, Positions t1, double separation, ThreadPool& pool) {
+  if (!std::exchange(complete_, false)) resting.clear();
   if (t0.is_double)
-    take_positions(*this, static_cast<const double*>(t0.data), static_cast<const double*>(t1.data), t0.n, separation,
-                   pool);
+    take(static_cast<const double*>(t0.data), static_cast<const double*>(t1.data), t0.n, separation, pool);
   else
-    take_positions(*this, static_cast<const float*>(t0.data), static_cast<const float*>(t1.data), t0.n, separation,
-                   pool);
+    take(static_cast<const float*>(t0.data), static_cast<const float*>(t1.data), t0.n, separation, pool);
+  complete_ = true;
+}
+
+void MotionBounds::take(const Scene& scene, Positions t0, Positions t1, double separation, ThreadPool& pool) {
+  parts_.clear();
+  for (const Scene::Mesh& m : scene.meshes())
+    parts_.push_back({m.first_vertex, std::size_t{m.first_vertex} + m.n_vertices});
+  resting = statics_.unchanged(scene, t0, t1, pool);
+  take_all(t0, t1, separation, pool);
+}
+
+void MotionBounds::take(Positions t0, Positions t1, double separation, ThreadPool& pool) {
+  parts_ = {{0, t0.n}};
+  resting.clear();
+  take_all(t0, t1, separation, pool);
+}
+
+std::size_t MotionBounds::bytes() const {
+  return rows.capacity() * sizeof(VertexRow) + boxes.capacity() * sizeof(Box) + statics_.bytes();
 }
 
 }  // namespace hpccd

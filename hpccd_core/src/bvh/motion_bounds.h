@@ -2,26 +2,56 @@
 // Takes the caller's positions in: checks them, keeps both ends of each vertex's motion together, bounds the motion.
 #pragma once
 
+#include <cmath>
 #include <vector>
 
 #include "base/parallel.h"
 #include "bvh/box.h"
 #include "bvh/coordinate_map.h"
 #include "elementary/batch.h"
+#include "scene/static_meshes.h"
 
 namespace hpccd {
 
 // Beyond this, differences and squares of coordinates could overflow in the error bounds.
 inline constexpr double largest_coordinate = 1e150;
 
+// A part of the vertices that moves, or rests, as a whole: those of one mesh.
+struct VertexRange {
+  std::size_t begin, end;
+};
+
+// Smallest and largest coordinates.
+struct Extent {
+  double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
+  bool good = true;  // all coordinates are finite and not too large
+  void include(const Extent& e);
+};
+
 struct MotionBounds {
   std::vector<VertexRow> rows;
   std::vector<Box> boxes;
   CoordinateMap map;
+  // By mesh: its rows and boxes are still those of the call before. Empty: of none.
+  std::vector<char> resting;
 
   // Boxes of features that come within `separation` of each other, along each axis, overlap too.
-  // Throws InvalidArgument where a coordinate is not finite or too large.
+  // Throws InvalidArgument where a coordinate is not finite or too large, or where a static mesh moves.
+  void take(const Scene& scene, Positions vertices_t0, Positions vertices_t1, double separation, ThreadPool& pool);
+  // The same for vertices of no scene.
   void take(Positions vertices_t0, Positions vertices_t1, double separation, ThreadPool& pool);
+  std::size_t bytes() const;
+
+ private:
+  template <class Real>
+  void take(const Real* t0, const Real* t1, std::size_t n, double separation, ThreadPool& pool);
+  void take_all(Positions t0, Positions t1, double separation, ThreadPool& pool);
+
+  StaticMeshes statics_;
+  std::vector<VertexRange> parts_;  // of each mesh
+  std::vector<Extent> extents_;     // of each part, when it was last taken
+  double margin_ = 0;
+  bool complete_ = false;  // false while a call is under way, and after it has thrown
 };
 
 }  // namespace hpccd

@@ -31,15 +31,20 @@ Box leaf_bounds(Tree& tree, const LeafRange& leaf, const std::vector<Box>& verte
 
 }  // namespace
 
-void refit(Tree& tree, const std::vector<Box>& vertex_boxes, ThreadPool& pool) {
+void refit(Tree& tree, const std::vector<Box>& vertex_boxes, const std::vector<char>& resting, ThreadPool& pool) {
+  const auto rests = [&](const Node& node) {
+    return !resting.empty() && node.mesh != mixed_meshes && resting[node.mesh];
+  };
   parallel_for(pool, tree.leaves.size(), 32, [&](std::size_t begin, std::size_t end, int) {
-    for (std::size_t i = begin; i < end; ++i)
-      tree.nodes[tree.leaf_nodes[i]].box = leaf_bounds(tree, tree.leaves[i], vertex_boxes);
+    for (std::size_t i = begin; i < end; ++i) {
+      Node& node = tree.nodes[tree.leaf_nodes[i]];
+      if (!rests(node)) node.box = leaf_bounds(tree, tree.leaves[i], vertex_boxes);
+    }
   });
   const auto join_children = [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = end; i-- > begin;) {
       Node& node = tree.nodes[i];
-      if (!node.children) continue;
+      if (!node.children || rests(node)) continue;
       node.box = tree.nodes[node.children].box;
       node.box.include(tree.nodes[node.children + 1].box);
     }

@@ -41,7 +41,7 @@ struct Tree {
   static constexpr std::uint32_t leaf_size = 8;
   static constexpr std::uint32_t load_width = 16;  // boxes are compared 16 at a time
 
-  std::vector<Node> nodes;             // breadth first: children come after their parents
+  std::vector<Node> nodes;  // breadth first: children come after their parents
   // nodes[level_begin[i] .. level_begin[i + 1]) have their children on the next level; on the first, which joins whole
   // meshes, also on the same one.
   std::vector<std::uint32_t> level_begin;
@@ -51,7 +51,7 @@ struct Tree {
   std::vector<std::uint32_t> face_of_slot, edge_of_slot, vertex_of_slot;
   std::vector<std::uint32_t> face_corners[3], edge_ends[2];  // vertex numbers by slot
   BoxArrays face_boxes, edge_boxes, vertex_boxes;
-  double area_when_built = 0;          // sum over nodes, relative to the root's
+  double area_when_built = 0;  // sum over nodes, relative to the root's
 
   std::size_t bytes() const;
 };
@@ -60,8 +60,9 @@ struct Tree {
 void build(Tree& tree, const Scene& scene, const Features& features, const std::vector<Box>& vertex_boxes,
            ThreadPool& pool);
 
-// The same tree with new bounds, bottom up (Kim et al. 2009, section 6, parallel BVH update).
-void refit(Tree& tree, const std::vector<Box>& vertex_boxes, ThreadPool& pool);
+// The same tree with new bounds, bottom up (Kim et al. 2009, section 6, parallel BVH update). `resting`: by mesh, true
+// where vertex boxes are as they were at the last call; empty: of none.
+void refit(Tree& tree, const std::vector<Box>& vertex_boxes, const std::vector<char>& resting, ThreadPool& pool);
 
 // Sum of the nodes' areas over the root's: what traversal pays grows with it.
 double relative_area(const Tree& tree, ThreadPool& pool);

@@ -6,7 +6,8 @@ namespace hpccd {
 std::uint32_t Scene::add_mesh(std::string name, std::span<const std::uint32_t> faces, std::uint32_t n_vertices,
                               MeshOptions options) {
   for (const Mesh& m : meshes_)
-    if (m.name == name) throw InvalidArgument("name: a mesh named '" + name + "' is already in the scene; choose another");
+    if (m.name == name)
+      throw InvalidArgument("name: a mesh named '" + name + "' is already in the scene; choose another");
   if (faces.size() % 3 != 0) throw InvalidArgument("faces: must hold three vertex indices a triangle");
   for (std::size_t i = 0; i < faces.size(); ++i)
     if (faces[i] >= n_vertices)

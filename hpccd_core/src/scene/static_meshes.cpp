@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "scene/static_meshes.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cstring>
+
+namespace hpccd {
+namespace {
+
+template <class Real>
+void require_rest(const Scene::Mesh& mesh, const Real* t0, const Real* t1) {
+  const std::size_t begin = 3 * std::size_t{mesh.first_vertex}, n = 3 * std::size_t{mesh.n_vertices};
+  if (std::memcmp(t0 + begin, t1 + begin, n * sizeof(Real)) == 0) return;
+  for (std::size_t i = begin; i < begin + n; ++i)
+    // 0 and -0 differ in bits only; NaN is reported where all coordinates are checked.
+    if (t0[i] < t1[i] || t0[i] > t1[i])
+      throw InvalidArgument("vertices_t1[" + std::to_string(i / 3) + "]: moves, but it belongs to mesh '" + mesh.name +
+                            "', which was added as static; add the mesh without static=True, or keep its vertices");
+}
+
+const std::byte* begin_of(const Scene::Mesh& mesh, Positions p) {
+  return static_cast<const std::byte*>(p.data) + 3 * std::size_t{mesh.first_vertex} * (p.is_double ? 8 : 4);
+}
+
+bool equal(const std::vector<std::byte>& last, const std::byte* t0, const std::byte* t1, ThreadPool& pool) {
+  std::atomic<bool> same{true};
+  parallel_for(pool, last.size(), 1 << 16, [&](std::size_t begin, std::size_t end, int) {
+    if (std::memcmp(&last[begin], t0 + begin, end - begin) != 0 ||
+        std::memcmp(&last[begin], t1 + begin, end - begin) != 0)
+      same = false;
+  });
+  return same;
+}
+
+}  // namespace
+
+void require_static_meshes_rest(const Scene& scene, Positions t0, Positions t1) {
+  for (const Scene::Mesh& mesh : scene.meshes()) {
+    if (!mesh.options.is_static) continue;
+    if (t0.is_double)
+      require_rest(mesh, static_cast<const double*>(t0.data), static_cast<const double*>(t1.data));
+    else
+      require_rest(mesh, static_cast<const float*>(t0.data), static_cast<const float*>(t1.data));
+  }
+}
+
+std::vector<char> StaticMeshes::unchanged(const Scene& scene, Positions t0, Positions t1, ThreadPool& pool) {
+  const auto& meshes = scene.meshes();
+  std::vector<char> same(meshes.size(), 0);
+  last_.resize(meshes.size());
+  bool any_moved = false;
+  for (std::size_t m = 0; m < meshes.size(); ++m) {
+    if (!meshes[m].options.is_static) continue;
+    const std::size_t n = 3 * std::size_t{meshes[m].n_vertices} * (t0.is_double ? 8 : 4);
+    same[m] = last_[m].size() == n && equal(last_[m], begin_of(meshes[m], t0), begin_of(meshes[m], t1), pool);
+    any_moved = any_moved || !same[m];
+  }
+  if (!any_moved) return same;
+  require_static_meshes_rest(scene, t0, t1);
+  for (std::size_t m = 0; m < meshes.size(); ++m) {
+    if (!meshes[m].options.is_static || same[m]) continue;
+    const std::byte* begin = begin_of(meshes[m], t0);
+    last_[m].assign(begin, begin + 3 * std::size_t{meshes[m].n_vertices} * (t0.is_double ? 8 : 4));
+  }
+  return same;
+}
+
+std::size_t StaticMeshes::bytes() const {
+  std::size_t n = 0;
+  for (const auto& mesh : last_) n += mesh.capacity();
+  return n;
+}
+
+}  // namespace hpccd
