@@ -177,12 +177,16 @@ class Builder {
       Node& node = tree_.nodes[r.node];
       node.leaf = static_cast<std::uint32_t>(tree_.leaves.size());
       node.carriers = r.end - r.begin;
+      node.only_points = leaf.first_face == leaf.end_face;
       tree_.leaves.push_back(leaf);
       tree_.leaf_nodes.push_back(r.node);
     }
     for (std::size_t i = tree_.nodes.size(); i-- > 0;)
-      if (const auto c = tree_.nodes[i].children)
-        tree_.nodes[i].carriers = tree_.nodes[c].carriers + tree_.nodes[c + 1].carriers;
+      if (const auto c = tree_.nodes[i].children) {
+        const Node &left = tree_.nodes[c], &right = tree_.nodes[c + 1];
+        tree_.nodes[i].carriers = left.carriers + right.carriers;
+        tree_.nodes[i].only_points = left.only_points && right.only_points;
+      }
 
     // Room behind the last slot, so that a full vector can be loaded anywhere.
     const auto pad = Tree::load_width;

@@ -20,6 +20,7 @@ struct Node {
   std::uint32_t leaf = 0;      // where a leaf: its number
   std::uint32_t mesh = mixed_meshes;
   std::uint32_t carriers = 0;  // in the whole subtree
+  bool only_points = false;    // no triangle in the whole subtree, so nothing that another such node could touch
 };
 
 // Boxes of features in the order of the leaves.

@@ -23,7 +23,9 @@ class PairRules {
     if (all_enabled_ || mesh_a == mixed_meshes || mesh_b == mixed_meshes) return true;
     return enabled_[mesh_a * n_ + mesh_b];
   }
-  bool enabled(const Node& a, const Node& b) const { return enabled(a.mesh, b.mesh); }
+  bool enabled(const Node& a, const Node& b) const {
+    return enabled(a.mesh, b.mesh) && !(a.only_points && b.only_points);
+  }
   Accuracy accuracy(std::uint32_t mesh_a, std::uint32_t mesh_b) const {
     return accuracy_.empty() ? default_ : accuracy_[mesh_a * n_ + mesh_b];
   }
