@@ -3,8 +3,9 @@
 
 What is timed is one call of `detect`, argument checks and the arrays of contacts included; where the topology has
 changed since the step before, making scene and detector too. Not timed: reading or generating the step, the first
-round (warm-up), and, where the measured steps do not follow each other, the step before each one, which is computed
-because detectors carry their hierarchy from step to step.
+round (warm-up), and, where the measured steps do not follow each other, the step before each one (of the only step of a
+file: the same step), which is computed because detectors carry their hierarchy from step to step, and because in a
+stream no other detector has used the caches in between.
 """
 
 from __future__ import annotations
@@ -141,8 +142,8 @@ def measure(source: Source, runners: Sequence, rounds: int, steps: int = 0, desc
         try:
             for turn in range(rounds + 1):
                 for place, k in enumerate(wanted):
-                    before = source.step(k - 1) if k and (place == 0 or wanted[place - 1] != k - 1) else None
                     step = source.step(k)
+                    before = None if place and wanted[place - 1] == k - 1 else source.step(k - 1) if k else step
                     gc.collect()
                     gc.disable()
                     # Another one begins each time: whoever runs first finds the step's data in no cache.
