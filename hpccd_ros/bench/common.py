@@ -31,12 +31,17 @@ def configure(parser: argparse.ArgumentParser, *, default: Sequence[str], steps:
                       help="steps measured of each scene, evenly spread; 0: all (default: %(default)s)")
     what.add_argument("--repeat", type=int, default=rounds, metavar="N",
                       help="timed rounds after one of warm-up (default: %(default)s)")
+    output_options(parser)
+    parser.set_defaults(default_sources=tuple(default))
+
+
+def output_options(parser: argparse.ArgumentParser) -> None:
+    """Where the results go, and under which name."""
     out = parser.add_argument_group("what is written")
     out.add_argument("--out", default="hpccd-bench", metavar="DIR", help="JSON and CSV (default: %(default)s)")
     out.add_argument("--figures", metavar="DIR", help="pictures (default: the folder of --out)")
     out.add_argument("--label", default=f"{machine.cores()}-cores", metavar="NAME",
                      help="end of the files' names, one for each machine (default: %(default)s)")
-    parser.set_defaults(default_sources=tuple(default))
 
 
 def threads_option(parser) -> None:

@@ -23,6 +23,8 @@ BENCHMARKS = {
     "size": "how time and memory grow with the number of triangles",
     "memory": "peak memory and bytes per triangle",
     "options": "what each way to model less saves",
+    "ros": "the node over DDS: latency beside that of an echo, sustained rate, overload",
+    "soak": "half an hour of mixed load on the node: memory, counts, answers",
     "accuracy": "the tiers: time, wrong answers, error of times; sweeps of scale and offset",
 }
 

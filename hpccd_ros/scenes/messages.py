@@ -43,6 +43,10 @@ class Player:
         self._version = dict(self._base)
         self._step = 0
 
+    def version(self, mesh: str) -> int:
+        """Version of the mesh's topology in the messages so far; -1 before the first."""
+        return self._version[mesh]
+
     def messages(self, frame: Frame, stamp_ns: int) -> Iterator[Message]:
         """Messages of one frame, stamped `stamp_ns`: topologies that change, then vertices, static meshes first."""
         for mesh in self._scene.meshes:
