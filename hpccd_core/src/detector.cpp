@@ -117,7 +117,8 @@ struct Detector::Impl {
     const bool tree_followed = std::exchange(tree_fits_motion, false);
     motion.take(*scene, t0, t1, options.minimum_separation, pool);
     profiler.mark("bounds");
-    search.geometry = {motion.rows.data(), features.edges.data(), features.faces.data(), motion.map.scale};
+    search.geometry = {motion.rows.data(), features.edges.data(), features.faces.data(),
+                       options.minimum_separation > 0 ? nullptr : motion.slabs.data(), motion.map.scale};
     search.earliest = std::numeric_limits<double>::infinity();
     if (engine) {
       engine->update(motion.boxes, profiler);
@@ -144,6 +145,7 @@ struct Detector::Impl {
         const std::string kind = kinds[k];
         const BatchCounts& c = w.counts[k];
         stats[kind + "_candidates"] += c.tested;
+        stats[kind + "_rejected_slabs"] += c.slabs;
         stats[kind + "_rejected_coplanarity"] += c.coplanarity;
         stats[kind + "_rejected_projection"] += c.projection;
         stats[kind + "_rejected_roots"] += c.roots;

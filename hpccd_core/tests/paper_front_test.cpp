@@ -27,7 +27,8 @@ struct FrontTest : PaperTest {
   Scenery scenery() const { return {h, features, rules, motion.boxes}; }
 
   std::vector<FrontSegment> update(const std::vector<FrontSegment>& front) {
-    search.geometry = {motion.rows.data(), features.edges.data(), features.faces.data(), motion.map.scale};
+    search.geometry = {motion.rows.data(), features.edges.data(), features.faces.data(), motion.slabs.data(),
+                       motion.map.scale};
     worker.begin(search);
     const Scenery s = scenery();
     std::vector<std::vector<FrontSegment>> kept;

@@ -44,8 +44,8 @@ template <class Real>
 
 template <class Real>
 void copy_motion(const Real* t0, const Real* t1, const CoordinateMap& map, double margin, std::size_t begin,
-                 std::size_t end, VertexRow* rows, Box* boxes) {
-  for (std::size_t i = begin; i < end; ++i)
+                 std::size_t end, VertexRow* rows, Box* boxes, SlabRow* slabs) {
+  for (std::size_t i = begin; i < end; ++i) {
     for (int k = 0; k < 3; ++k) {
       const double a = t0[3 * i + k], b = t1[3 * i + k];
       rows[i].t0[k] = a;
@@ -53,6 +53,9 @@ void copy_motion(const Real* t0, const Real* t1, const CoordinateMap& map, doubl
       boxes[i].low[k] = map((a < b ? a : b) - margin, k);
       boxes[i].high[k] = map((a < b ? b : a) + margin, k);
     }
+    slabs[i] =
+        slab_row({rows[i].t0[0], rows[i].t0[1], rows[i].t0[2]}, {rows[i].t1[0], rows[i].t1[1], rows[i].t1[2]}, map);
+  }
 }
 
 // Pieces of the wanted parts, each with the number of its part.
@@ -115,9 +118,10 @@ void MotionBounds::take(const Real* t0, const Real* t1, std::size_t n, double se
   margin_ = margin;
   rows.resize(n);
   boxes.resize(n);
+  slabs.resize(n);
   parallel_for(pool, pieces.size(), 1, [&](std::size_t from, std::size_t to, int) {
     for (std::size_t i = from; i < to; ++i)
-      copy_motion(t0, t1, map, margin, pieces[i].begin, pieces[i].end, rows.data(), boxes.data());
+      copy_motion(t0, t1, map, margin, pieces[i].begin, pieces[i].end, rows.data(), boxes.data(), slabs.data());
   });
 }
 
@@ -145,7 +149,8 @@ void MotionBounds::take(Positions t0, Positions t1, double separation, ThreadPoo
 }
 
 std::size_t MotionBounds::bytes() const {
-  return rows.capacity() * sizeof(VertexRow) + boxes.capacity() * sizeof(Box) + statics_.bytes();
+  return rows.capacity() * sizeof(VertexRow) + boxes.capacity() * sizeof(Box) + slabs.capacity() * sizeof(SlabRow) +
+         statics_.bytes();
 }
 
 }  // namespace hpccd

@@ -31,6 +31,7 @@ struct Extent {
 struct MotionBounds {
   std::vector<VertexRow> rows;
   std::vector<Box> boxes;
+  std::vector<SlabRow> slabs;
   CoordinateMap map;
   // By mesh: its rows and boxes are still those of the call before. Empty: of none.
   std::vector<char> resting;

@@ -5,6 +5,7 @@
 #include <cstdint>
 
 #include "elementary/motion.h"
+#include "elementary/slabs.h"
 #include "hpccd/hpccd.h"
 
 namespace hpccd {
@@ -18,27 +19,29 @@ struct Geometry {
   const VertexRow* vertices;
   const std::array<std::uint32_t, 2>* edges;
   const std::array<std::uint32_t, 3>* faces;
-  double scale = 1;  // power of two that brings the scene to about one; only single precision needs it
+  const SlabRow* slabs = nullptr;  // of each vertex; none where features need not touch to count
+  double scale = 1;                // power of two that brings the scene to about one; only single precision needs it
 };
 
 inline constexpr std::uint32_t batch_capacity = 1024;
 
 // Where the pairs of the batch went; every pair is in exactly one place.
 struct BatchCounts {
-  std::uint64_t tested = 0;        // pairs that came in
-  std::uint64_t coplanarity = 0;   // rejected by the sign test on the cubic
-  std::uint64_t projection = 0;    // rejected because they stay outside in a projection
-  std::uint64_t roots = 0;         // rejected at the roots of the cubic
-  std::uint64_t contacts = 0;      // proven contacts
-  std::uint64_t undecided = 0;     // handed to the tier's last resort
+  std::uint64_t tested = 0;       // pairs that came in
+  std::uint64_t slabs = 0;        // rejected because they are apart along a direction of slabs.h
+  std::uint64_t coplanarity = 0;  // rejected by the sign test on the cubic
+  std::uint64_t projection = 0;   // rejected because they stay outside in a projection
+  std::uint64_t roots = 0;        // rejected at the roots of the cubic
+  std::uint64_t contacts = 0;     // proven contacts
+  std::uint64_t undecided = 0;    // handed to the tier's last resort
 };
 
 struct BatchResult {
   std::uint32_t n_contacts = 0, n_undecided = 0;
-  std::uint32_t contact[batch_capacity];    // positions in the batch
+  std::uint32_t contact[batch_capacity];  // positions in the batch
   std::uint32_t undecided[batch_capacity];
   double toc[batch_capacity], delta[batch_capacity];
-  BatchCounts counts;                       // accumulates over batches
+  BatchCounts counts;  // accumulates over batches
 };
 
 // first/second: vertex and face, or two edges. n <= batch_capacity.

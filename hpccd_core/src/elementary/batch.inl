@@ -10,6 +10,7 @@ namespace hpccd::HPCCD_ISA {
 inline constexpr int double_width = RealTraits<Double>::width;
 
 #include "elementary/load.inl"
+#include "elementary/near_pairs.inl"
 
 // The pairs at `where`, as many at a time as there are lanes; the last group is filled up with copies of the last pair.
 template <Kind kind, class R, class Function>
@@ -55,10 +56,11 @@ void test(const Geometry& g, const std::uint32_t* first, const std::uint32_t* se
           BatchResult& result) {
   using Lanes = const Motion<R>&;
   result.n_contacts = result.n_undecided = 0;
-  std::uint32_t survivors[batch_capacity], single[batch_capacity], many[batch_capacity];
+  std::uint32_t near[batch_capacity], survivors[batch_capacity], single[batch_capacity], many[batch_capacity];
   std::uint32_t n_survivors = 0, n_single = 0, n_many = 0;
 
-  for_lanes<kind, R>(g, first, second, nullptr, n, [&](Lanes m, const std::uint32_t* at, unsigned valid) {
+  const std::uint32_t n_near = g.slabs ? near_pairs<kind>(g, first, second, n, near) : n;
+  for_lanes<kind, R>(g, first, second, g.slabs ? near : nullptr, n_near, [&](Lanes m, const std::uint32_t* at, unsigned valid) {
     append(survivors, n_survivors, at, valid & ~bits(coplanarity_filter<Policy>(m).none));
   });
   for_lanes<kind, R>(g, first, second, survivors, n_survivors, [&](Lanes m, const std::uint32_t* at, unsigned valid) {
@@ -77,7 +79,8 @@ void test(const Geometry& g, const std::uint32_t* first, const std::uint32_t* se
   });
 
   result.counts.tested += n;
-  result.counts.coplanarity += n - n_survivors;
+  result.counts.slabs += n - n_near;
+  result.counts.coplanarity += n_near - n_survivors;
   result.counts.projection += n_survivors - n_single - n_many;
   result.counts.contacts += result.n_contacts;
   result.counts.undecided += result.n_undecided;

@@ -13,7 +13,7 @@ using Points = const Vec3<double>*;
 
 template <Kind kind>
 std::optional<double> tolerant_contact(Points q_t0, Points q_t1) {
-  const tolerant::Answer a = tolerant::decide<kind>(motion_of<kind>(q_t0, q_t1));
+  const tolerant::Answer a = tolerant::contact<kind>(q_t0, q_t1);
   if (!a.contact) return std::nullopt;
   return a.toc;
 }
@@ -28,8 +28,8 @@ std::optional<double> exact_contact(Points q_t0, Points q_t1) {
 }
 
 std::optional<double> within_separation(const inclusion::Limits& limits, Kind kind, Points q_t0, Points q_t1) {
-  const Motion<double> m = kind == Kind::vertex_face ? motion_of<Kind::vertex_face>(q_t0, q_t1)
-                                                     : motion_of<Kind::edge_edge>(q_t0, q_t1);
+  const Motion<double> m =
+      kind == Kind::vertex_face ? motion_of<Kind::vertex_face>(q_t0, q_t1) : motion_of<Kind::edge_edge>(q_t0, q_t1);
   return inclusion::earliest_within(kind, m, limits);
 }
 
@@ -37,8 +37,7 @@ std::optional<double> within_separation(const inclusion::Limits& limits, Kind ki
 
 std::optional<double> last_resort(Accuracy accuracy, const inclusion::Limits& limits, Kind kind, Points q_t0,
                                   Points q_t1) {
-  if (accuracy == Accuracy::conservative && limits.separation > 0)
-    return within_separation(limits, kind, q_t0, q_t1);
+  if (accuracy == Accuracy::conservative && limits.separation > 0) return within_separation(limits, kind, q_t0, q_t1);
   // Without a separation the exact answer is conservative too, and cheaper than a search that has to give up somewhere.
   if (accuracy == Accuracy::conservative || accuracy == Accuracy::exact)
     return kind == Kind::vertex_face ? exact_contact<Kind::vertex_face>(q_t0, q_t1)

@@ -5,6 +5,7 @@
 
 #include "elementary/inside.h"
 #include "elementary/roots.h"
+#include "elementary/slabs.h"
 
 namespace hpccd::tolerant {
 
@@ -135,6 +136,13 @@ HPCCD_HD Answer decide(const Motion<double>& given) {
   for (int i = 0; i < times.n; ++i)
     if (touches_at<kind>(m, times.t[i])) return {true, times.t[i]};
   return {false, 0};
+}
+
+// The same for features given by their vertices.
+template <Kind kind>
+HPCCD_HD Answer contact(const Vec3<double> t0[4], const Vec3<double> t1[4]) {
+  if (apart<kind>(t0, t1)) return {false, 0};
+  return decide<kind>(motion_of<kind>(t0, t1));
 }
 
 }  // namespace hpccd::tolerant

@@ -123,18 +123,17 @@ __global__ __launch_bounds__(32) void last_resort_kernel(const __grid_constant__
       const uint4 v = kind == Kind::edge_edge ? vertices_of<Kind::edge_edge>(f, pair.x, pair.y)
                                               : vertices_of<Kind::vertex_face>(f, pair.x, pair.y);
       const Accuracy accuracy = accuracy_of(f, v);
+      const Ends r[4] = {load_row(f.rows, v.x), load_row(f.rows, v.y), load_row(f.rows, v.z), load_row(f.rows, v.w)};
+      const Vec3<double> q0[4] = {r[0].t0, r[1].t0, r[2].t0, r[3].t0}, q1[4] = {r[0].t1, r[1].t1, r[2].t1, r[3].t1};
       if (accuracy == Accuracy::exact || accuracy == Accuracy::conservative) {
-        const Ends r[4] = {load_row(f.rows, v.x), load_row(f.rows, v.y), load_row(f.rows, v.z), load_row(f.rows, v.w)};
-        const Vec3<double> q0[4] = {r[0].t0, r[1].t0, r[2].t0, r[3].t0}, q1[4] = {r[0].t1, r[1].t1, r[2].t1, r[3].t1};
         const extended::Answer a = kind == Kind::edge_edge ? extended::decide<Kind::edge_edge>(q0, q1)
                                                            : extended::decide<Kind::vertex_face>(q0, q1);
         contact = a.contact;
         host = !a.contact && !a.none;
         toc = a.toc;
       } else {
-        const tolerant::Answer a =
-            kind == Kind::edge_edge ? tolerant::decide<Kind::edge_edge>(load_motion<Kind::edge_edge>(f.rows, v))
-                                    : tolerant::decide<Kind::vertex_face>(load_motion<Kind::vertex_face>(f.rows, v));
+        const tolerant::Answer a = kind == Kind::edge_edge ? tolerant::contact<Kind::edge_edge>(q0, q1)
+                                                           : tolerant::contact<Kind::vertex_face>(q0, q1);
         contact = a.contact;
         toc = a.toc;
       }

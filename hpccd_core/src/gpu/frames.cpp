@@ -209,7 +209,7 @@ Contacts Frames::join(const FrameResult& d, Positions t0, Positions t1) {
 
 void Frames::add_outputs(Contacts& c, Positions t0, Positions t1) {
   motion_.take(t0, t1, 0, pool_);
-  const Geometry geometry{motion_.rows.data(), features_.edges.data(), features_.faces.data(), motion_.map.scale};
+  const Geometry geometry{motion_.rows.data(), features_.edges.data(), features_.faces.data(), nullptr, motion_.map.scale};
   const auto& edges = features_.edges;
   const auto edge_number = [&](std::uint32_t v0, std::uint32_t v1) {
     const std::array<std::uint32_t, 2> e{v0, v1};

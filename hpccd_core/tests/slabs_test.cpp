@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: Apache-2.0
+// The filter by slabs: never a pair that touches, the same pairs with every instruction set, and nothing that the
+// question in double precision does not confirm.
+#include "elementary/slabs.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "base/simd.h"
+#include "elementary/batch.h"
+
+namespace hpccd {
+namespace {
+
+struct Pairs {
+  std::vector<VertexRow> rows;
+  std::vector<SlabRow> slabs;
+  std::vector<std::array<std::uint32_t, 2>> edges;
+  std::vector<std::array<std::uint32_t, 3>> faces;
+  std::vector<std::uint32_t> first, second;
+
+  Geometry geometry() const { return {rows.data(), edges.data(), faces.data(), slabs.data()}; }
+};
+
+Vec3<double> point(const double* x) { return {x[0], x[1], x[2]}; }
+
+// Pairs of features around `offset`, on a lattice, so that many touch exactly on their borders.
+Pairs random_pairs(Kind kind, unsigned seed, double offset) {
+  std::mt19937 random(seed);
+  std::uniform_int_distribution<int> lattice(-4, 4);
+  Pairs p;
+  CoordinateMap map;
+  for (double& c : map.center) c = offset;
+  for (std::uint32_t i = 0; i < batch_capacity; ++i) {
+    for (int v = 0; v < 4; ++v) {
+      VertexRow row{};
+      for (int k = 0; k < 3; ++k) {
+        row.t0[k] = offset + 0.25 * lattice(random) + (v >= 2 ? 0.5 : 0);
+        row.t1[k] = row.t0[k] + 0.25 * lattice(random);
+      }
+      p.rows.push_back(row);
+      p.slabs.push_back(slab_row(point(row.t0), point(row.t1), map));
+    }
+    p.edges.push_back({4 * i, 4 * i + 1});
+    p.edges.push_back({4 * i + 2, 4 * i + 3});
+    p.faces.push_back({4 * i + 1, 4 * i + 2, 4 * i + 3});
+    p.first.push_back(kind == Kind::vertex_face ? 4 * i : 2 * i);
+    p.second.push_back(kind == Kind::vertex_face ? i : 2 * i + 1);
+  }
+  return p;
+}
+
+struct SlabsTest : testing::TestWithParam<double> {};
+
+TEST_P(SlabsTest, LeaveOutOnlyPairsThatAreApart) {
+  for (Kind kind : {Kind::vertex_face, Kind::edge_edge})
+    for (unsigned seed = 0; seed < 20; ++seed) {
+      const Pairs p = random_pairs(kind, seed, GetParam());
+      std::vector<Query> queries(batch_capacity);
+      std::vector<char> confirmed(batch_capacity);
+      for (std::uint32_t i = 0; i < batch_capacity; ++i) {
+        Vec3<double> t0[4], t1[4];
+        for (std::uint32_t v = 0; v < 4; ++v) {
+          t0[v] = point(p.rows[4 * i + v].t0), t1[v] = point(p.rows[4 * i + v].t1);
+          std::copy_n(p.rows[4 * i + v].t0, 3, &queries[i][3 * v]);
+          std::copy_n(p.rows[4 * i + v].t1, 3, &queries[i][12 + 3 * v]);
+        }
+        confirmed[i] = kind == Kind::vertex_face ? apart<Kind::vertex_face>(t0, t1) : apart<Kind::edge_edge>(t0, t1);
+      }
+      // Exact arithmetic, without slabs.
+      const auto hit = std::make_unique<bool[]>(batch_capacity);
+      std::vector<double> toc(batch_capacity);
+      (kind == Kind::vertex_face ? test_vertex_face : test_edge_edge)(queries, {}, hit.get(), toc.data());
+      std::uint64_t hits = 0, left_out = 0;
+      for (std::uint32_t i = 0; i < batch_capacity; ++i) {
+        hits += hit[i], left_out += confirmed[i];
+        EXPECT_FALSE(hit[i] && confirmed[i]) << "pair " << i << " of seed " << seed;
+      }
+      EXPECT_GT(hits, 10u);
+      EXPECT_GT(left_out, 10u);
+      // What each instruction set leaves out is seen in the counts: of the pairs apart in double precision, floats may
+      // miss some; they may find no other.
+      std::uint64_t slabs = batch_capacity + 1;
+      for (Simd simd : simd_levels()) {
+        auto result = std::make_unique<BatchResult>();
+        batch_test(simd, Accuracy::exact)(p.geometry(), kind, p.first.data(), p.second.data(), batch_capacity, *result);
+        EXPECT_LE(result->counts.slabs, left_out);
+        if (slabs <= batch_capacity) EXPECT_EQ(result->counts.slabs, slabs);
+        slabs = result->counts.slabs;
+      }
+      if (GetParam() == 0) EXPECT_EQ(slabs, left_out);  // coordinates that floats hold exactly
+    }
+}
+
+INSTANTIATE_TEST_SUITE_P(Offsets, SlabsTest, testing::Values(0.0, 1e6, 0.1, 1e12));
+
+}  // namespace
+}  // namespace hpccd
