@@ -19,7 +19,7 @@ from rclpy.task import Future
 
 from hpccd_ros import convert
 from hpccd_ros.detection import CORE_ERRORS, Options, SceneBuilder, make_detector
-from hpccd_ros.messages import MeshSettings, Topology
+from hpccd_ros.messages import Topology
 
 
 class RequestError(ValueError):
@@ -30,8 +30,7 @@ class RequestError(ValueError):
 class NodeScene:
     """What the node itself knows at the time of a request: its meshes and the topologies in force."""
 
-    meshes: dict[str, MeshSettings]
-    ignored_pairs: tuple[tuple[str, str], ...]
+    builder: SceneBuilder
     topologies: dict[str, Topology | None]
 
 
@@ -144,9 +143,12 @@ class DetectService:
         return limit
 
     def _compute(self, request: Detect.Request, scene: NodeScene, options: Options) -> ContactArray:
-        names = list(request.mesh_names) or list(scene.meshes)
+        names = list(request.mesh_names) or list(scene.topologies)
         if not names:
             raise RequestError("mesh_names: empty, and the node has no meshes of its own")
+        most = self._settings["max_meshes"]
+        if len(names) > most:
+            raise RequestError(f"mesh_names: {len(names)} meshes, at most {most} are taken (parameter max_meshes)")
         if len(set(names)) != len(names):
             raise RequestError(f"mesh_names: names must differ, got {', '.join(names)}")
         for field in ("topologies", "start", "end"):
@@ -157,11 +159,7 @@ class DetectService:
         start = self._vertices("start", names, request.start, topologies)
         end = self._vertices("end", names, request.end, topologies)
         options = replace(options, accuracy=request.accuracy or options.accuracy, report=request.report or "all")
-        builder = SceneBuilder(
-            tuple(scene.meshes.get(name, MeshSettings(name)) for name in names),
-            tuple(pair for pair in scene.ignored_pairs if set(pair) <= set(names)),
-        )
-        detector = make_detector(builder.build(topologies), options)
+        detector = make_detector(scene.builder.among(names).build(topologies), options)
         contacts = detector.detect(start, end)
         message = ContactArray(accuracy=options.accuracy, backend=detector.backend)
         message.header = request.end[0].header
@@ -184,10 +182,10 @@ class DetectService:
                 )
             except convert.InvalidMessageError as error:
                 raise RequestError(f"topologies[{index}] ({name}): {error}") from error
-        if name not in scene.meshes:
+        if name not in scene.topologies:
             raise RequestError(
                 f"mesh_names: unknown mesh {name!r}; the node has "
-                f"{', '.join(scene.meshes) or 'none'}, or send topologies"
+                f"{', '.join(scene.topologies) or 'none'}, or send topologies"
             )
         topology = scene.topologies[name]
         if topology is None:

@@ -22,7 +22,7 @@ CORE_ERRORS = (ValueError, TypeError, RuntimeError, MemoryError)
 class Options:
     """Arguments of hpccd_core.Detector."""
 
-    accuracy: str = "balanced"
+    accuracy: str = "exact"
     backend: str = "auto"
     threads: int = 0
     report: str = "all"
@@ -35,6 +35,7 @@ class SceneBuilder:
 
     meshes: tuple[MeshSettings, ...]
     ignored_pairs: tuple[tuple[str, str], ...] = ()
+    pair_accuracies: tuple[tuple[str, str, str], ...] = ()
 
     def build(self, topologies: tuple[Topology, ...]) -> hc.Scene:
         """One topology for each mesh, in order. Raises what the core raises."""
@@ -49,7 +50,18 @@ class SceneBuilder:
             )
         for a, b in self.ignored_pairs:
             scene.ignore_pair(a, b)
+        for a, b, accuracy in self.pair_accuracies:
+            scene.set_accuracy(a, b, accuracy)
         return scene
+
+    def among(self, names: list[str]) -> "SceneBuilder":
+        """The scene of these meshes, in this order; names that it does not have are meshes of their own."""
+        known = {mesh.name: mesh for mesh in self.meshes}
+        return SceneBuilder(
+            tuple(known.get(name, MeshSettings(name)) for name in names),
+            tuple(pair for pair in self.ignored_pairs if set(pair) <= set(names)),
+            tuple(entry for entry in self.pair_accuracies if set(entry[:2]) <= set(names)),
+        )
 
     def concatenate(self, frame: SceneFrame, static_of: SceneFrame) -> np.ndarray:
         """(V,3) positions of all meshes; those of static meshes from ``static_of``. No copy of a single mesh.

@@ -6,7 +6,7 @@ received + lost in the middleware = answered + dropped + still waiting.
 """
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from enum import StrEnum
 
 
@@ -26,6 +26,8 @@ class Reason(StrEnum):
     NO_TOPOLOGY = "no_topology"  # the topology that the frame names has not come (in time)
     WRONG_COUNT = "wrong_vertex_count"
     FRAME_ID = "frame_id"
+    NO_TRANSFORM = "no_transform"  # mesh.NAME.transform asks for one that did not come
+    RATE = "rate"  # came faster than max_rate
     BACKWARD = "stamp_backward"
     REPEATED = "stamp_repeated"
     LATE = "late"  # its stamp was already answered (or given up) when it came
@@ -51,6 +53,7 @@ class DropCounter:
         self._lock = threading.Lock()
         self._counts: dict[tuple[str, Reason], int] = {}
         self._total = 0
+        self._by_mesh: dict[str, int] = {}
         self._listener = listener
 
     def count(self, mesh: str, reason: Reason, text: str = "", n: int = 1) -> None:
@@ -59,6 +62,7 @@ class DropCounter:
             key = (mesh, reason)
             self._counts[key] = self._counts.get(key, 0) + n
             self._total += n
+            self._by_mesh[mesh] = self._by_mesh.get(mesh, 0) + n
         if text and self._listener is not None:
             self._listener(mesh, reason, text)
 
@@ -66,6 +70,12 @@ class DropCounter:
     def total(self) -> int:
         """All drops since the start."""
         return self._total
+
+    def most_of(self, meshes: Iterable[str]) -> int:
+        """The largest count of one of these meshes: frames of the scene that were lost, as each of them has one
+        message of every deforming mesh, and where one is refused its partners are counted as incomplete."""
+        with self._lock:
+            return max((self._by_mesh.get(mesh, 0) for mesh in meshes), default=0)
 
     def by_reason(self) -> dict[Reason, int]:
         """Reason -> count, summed over the meshes."""

@@ -5,6 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
+from hpccd_ros.rigid import Rigid
+
 FORMATS = (".obj", ".ply", ".stl")
 
 
@@ -53,24 +55,10 @@ def place(vertices: np.ndarray, pose: list[float]) -> np.ndarray:
 
     Raises MeshFileError: not 7 numbers, not finite, quaternion not of unit length within 1e-3.
     """
-    values = np.asarray(pose, np.float64)
-    if values.shape != (7,) or not np.isfinite(values).all():
-        raise MeshFileError(f"pose: needs 7 finite numbers (x y z, quaternion x y z w), got {pose}")
-    shift, quaternion = values[:3], values[3:]
-    length = np.linalg.norm(quaternion)
-    if abs(length - 1.0) > 1e-3:
-        raise MeshFileError(f"pose: the quaternion {pose[3:]} has length {length:.4g}; it must be 1")
-    x, y, z, w = quaternion / length
-    if x == y == z == 0.0:  # no rotation: the file's coordinates stay as they are, bit for bit
-        return vertices + shift if shift.any() else vertices
-    rotation = np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-        ]
-    )
-    return vertices @ rotation.T + shift
+    try:
+        return Rigid.of(pose[:3], pose[3:]).apply(vertices)
+    except ValueError as error:
+        raise MeshFileError(f"pose: {pose} {error}") from error
 
 
 def _join_equal(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -17,20 +17,18 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 from visualization_msgs.msg import MarkerArray
 
-import hpccd_core as hc
-from hpccd_ros import _env, convert, detection, parameters, qos, stop_signals
+from hpccd_ros import _env, convert, detection, parameters, qos, scene_parameters, stop_signals
 from hpccd_ros.detect_service import DetectService, NodeScene
-from hpccd_ros.detection import CORE_ERRORS, Detection, DetectionThread, Options, SceneBuilder
+from hpccd_ros.detection import Detection, DetectionThread, Options
 from hpccd_ros.diagnostics import Metrics, Reporter
 from hpccd_ros.drops import DropCounter, Reason
 from hpccd_ros.frame_queue import FrameQueue
-from hpccd_ros.frames import FrameAssembler
+from hpccd_ros.inputs import Inputs
 from hpccd_ros.markers import contact_markers
-from hpccd_ros.mesh_file import MeshFileError, load_mesh, place
-from hpccd_ros.messages import MeshFrame, MeshSettings, SceneFrame, Topology
+from hpccd_ros.messages import SceneFrame
+from hpccd_ros.parameter_table import OUTPUTS
 from hpccd_ros.parameters import ParameterError
 from hpccd_ros.refusal_log import RefusalLog
-from hpccd_ros.streams import MeshStream
 from hpccd_ros.unknown_meshes import UnknownMeshWatch
 
 
@@ -47,14 +45,18 @@ class HpccdNode(LifecycleNode):
         self._settings, self._mesh_settings = parameters.declare(self)
         for name in parameters.unknown_overrides(self):
             self.get_logger().warning(f"parameter {name} is unknown and has no effect; see the README's table")
-        self._meshes = {
-            name: MeshSettings(name, row["static"], row["self_collision"]) for name, row in self._mesh_settings.items()
-        }
-        self._ignored_pairs = tuple(parameters.ignored_pairs(self._settings))
+        scene_parameters.check(self._settings, self._mesh_settings)
         self._options = _options(self._settings)
         if why := detection.refusal(self._options):
             raise ParameterError(why)
-        parameters.watch(self, self._settings, self._check_change, self._apply_change)
+        parameters.watch(
+            self,
+            self._settings,
+            self._mesh_settings,
+            configured=lambda: self._service is not None,
+            check=self._check_change,
+            on_change=self._apply_change,
+        )
 
         self._log = RefusalLog(self.get_logger().warning)
         self._drops = DropCounter(self._log)
@@ -62,10 +64,9 @@ class HpccdNode(LifecycleNode):
         self._metrics = Metrics()
         self._links: Counter = Counter()
         self._reporter = Reporter(self.get_fully_qualified_name(), self._metrics, self._drops, self._refused)
-        self._assembler: FrameAssembler | None = None
-        self._service: DetectService | None = None
-        self._streams: list[MeshStream] = []
+        self._inputs: Inputs | None = None
         self._unknown: UnknownMeshWatch | None = None
+        self._service: DetectService | None = None
         self._queue: FrameQueue | None = None
         self._thread: DetectionThread | None = None
         self._markers_after = 0.0
@@ -73,9 +74,11 @@ class HpccdNode(LifecycleNode):
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Read mesh files, create publishers, service and diagnostics."""
         settings = self._settings
+        self._builder = scene_parameters.scene_builder(settings, self._mesh_settings)
+        self._deforming = [mesh.name for mesh in self._builder.meshes if not mesh.static]
         try:
-            self._assembler = self._make_assembler() if self._meshes else None
-        except (MeshFileError, ValueError) as error:
+            self._inputs = self._make_inputs() if self._builder.meshes else None
+        except ValueError as error:
             self.get_logger().error(f"cannot configure: {error}")
             return TransitionCallbackReturn.FAILURE
         self._contacts = self.create_publisher(ContactArray, "contacts", qos.CONTACTS)
@@ -90,11 +93,10 @@ class HpccdNode(LifecycleNode):
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Start the detection thread and subscribe."""
-        settings = self._settings
-        if self._assembler is not None:
-            self._queue = FrameQueue(settings["frame_queue"])
+        if self._inputs is not None:
+            self._queue = FrameQueue(self._settings["frame_queue"])
             self._thread = DetectionThread(
-                SceneBuilder(tuple(self._meshes.values()), self._ignored_pairs),
+                self._builder,
                 self._queue,
                 self._drops,
                 options=lambda: self._options,
@@ -103,31 +105,16 @@ class HpccdNode(LifecycleNode):
                 on_failure=self._failed,
             )
             self._thread.start()
-            self._streams = [
-                MeshStream(
-                    self,
-                    name,
-                    row["input"],
-                    settings,
-                    assembler=self._assembler,
-                    drops=self._drops,
-                    refused=self._refused,
-                    metrics=self._metrics,
-                    links=self._links,
-                    on_frames=self._enqueue,
-                    check_topology=_core_refusal,
-                )
-                for name, row in self._mesh_settings.items()
-            ]
+            self._inputs.open(self._enqueue)
         self._unknown = UnknownMeshWatch(
             self,
-            list(self._meshes),
+            list(self._mesh_settings),
             self._drops,
             self._metrics.frame_received,
-            settings["count_unknown_meshes"],
+            self._settings["count_unknown_meshes"],
         )
         self.get_logger().info(
-            f"active: meshes {', '.join(self._meshes) or 'none (service only)'}; "
+            f"active: meshes {', '.join(self._mesh_settings) or 'none (service only)'}; "
             f"accuracy {self._options.accuracy}, backend {self._options.backend}, "
             f"contacts on {self._contacts.topic_name}"
         )
@@ -162,17 +149,14 @@ class HpccdNode(LifecycleNode):
         return self._state_machine.current_state[1]
 
     def _stop(self) -> None:
-        for stream in self._streams:
-            stream.close()
-        self._streams = []
         if self._unknown is not None:
             self._unknown.close()
             self._unknown = None
         if self._queue is not None:
+            self._inputs.close()
             for frame in self._queue.close():
                 self._count_dropped(frame, Reason.STOPPED)
             self._thread.join()
-            self._assembler.clear(Reason.STOPPED)
             self._queue = self._thread = None
 
     def _release(self) -> None:
@@ -182,47 +166,38 @@ class HpccdNode(LifecycleNode):
             self.destroy_timer(self._timer)
             for publisher in (self._contacts, self._markers, self._diagnostics):
                 self.destroy_publisher(publisher)
-        self._assembler = None
+        self._inputs = None
 
-    def _make_assembler(self) -> FrameAssembler:
-        settings = self._settings
-        tolerance = round(settings["stamp_tolerance"] * 1e9) if settings["stamp_match"] == "nearest" else None
-        assembler = FrameAssembler(
-            list(self._meshes.values()),
-            self._drops,
-            self._refused,
-            max_pending=settings["pending_frames"],
-            restart_after=settings["restart_after"],
-            tolerance=tolerance,
-            frame_id=settings["frame_id"],
-            on_restart=self.get_logger().warning,
+    def _make_inputs(self) -> Inputs:
+        return Inputs(
+            self,
+            self._settings,
+            self._mesh_settings,
+            self._builder.meshes,
+            drops=self._drops,
+            refused=self._refused,
+            metrics=self._metrics,
+            links=self._links,
         )
-        for name, row in self._mesh_settings.items():
-            if not row["file"]:
-                continue
-            vertices, faces = load_mesh(row["file"])
-            topology = Topology(0, len(vertices), faces)
-            if why := _core_refusal(topology):
-                raise MeshFileError(f"mesh.{name}.file {row['file']}: {why}")
-            assembler.set_topology(name, topology)
-            if row["static"]:
-                assembler.add(name, MeshFrame(0, place(vertices, row["pose"]), version=0))
-        return assembler
 
     def _scene_for_service(self) -> NodeScene | str:
         if self.state != "active":
             return f"the node is {self.state}; activate it first"
-        topologies = {name: self._assembler.topology(name) for name in self._meshes}
-        return NodeScene(self._meshes, self._ignored_pairs, topologies)
+        topologies = {mesh.name: self._inputs.assembler.topology(mesh.name) for mesh in self._builder.meshes}
+        return NodeScene(self._builder, topologies)
 
-    def _check_change(self, wanted: dict[str, Any]) -> str | None:
+    def _check_change(self, wanted: dict[str, Any], meshes: dict[str, dict[str, Any]]) -> str | None:
+        try:
+            scene_parameters.check(wanted, meshes)
+        except ParameterError as error:
+            return str(error)
         options = _options(wanted)
         return None if options == self._options else detection.refusal(options)
 
     def _apply_change(self) -> None:
         self._options = _options(self._settings)
-        if self._assembler is not None:
-            self._assembler.restart_after = self._settings["restart_after"]
+        if self._inputs is not None:
+            self._inputs.assembler.restart_after = self._settings["restart_after"]
 
     def _enqueue(self, frames: list[SceneFrame]) -> None:
         for frame in frames:
@@ -247,7 +222,7 @@ class HpccdNode(LifecycleNode):
             max_contacts=settings["max_contacts"],
             outputs=tuple(settings["outputs"]),
         )
-        message.dropped_frames = self._drops.total
+        message.dropped_frames = self._drops.most_of(self._deforming)
         self._contacts.publish(message)
         now = time.monotonic()
         self._metrics.detected(
@@ -287,21 +262,21 @@ class HpccdNode(LifecycleNode):
         self._log("scene", Reason.DETECTION_FAILED, f"step that ends at {frame.stamp} ns: {error}")
 
     def _report(self) -> None:
-        waiting = self._assembler.waiting if self._assembler else 0
+        inputs = self._inputs
+        waiting = inputs.waiting if inputs else 0
         if self._queue is not None:
             held = [*self._queue.frames(), self._thread.working_on]
             waiting += sum(len(frame.fresh) for frame in held if frame is not None)
-        warnings = [line for part in (*self._streams, self._unknown) if part is not None for line in part.warnings()]
         self._diagnostics.publish(
             self._reporter.report(
                 self.get_clock().now().to_msg(),
                 state=self.state,
                 waiting=waiting,
-                restarts=self._assembler.restarts if self._assembler else 0,
-                static_taken=self._assembler.static_taken if self._assembler else 0,
+                restarts=inputs.assembler.restarts if inputs else 0,
+                static_taken=inputs.assembler.static_taken if inputs else 0,
                 last_refusal=self._log.last,
                 links=self._links,
-                warnings=warnings,
+                warnings=[line for part in (inputs, self._unknown) if part is not None for line in part.warnings()],
                 service=self._service.counts,
             )
         )
@@ -316,17 +291,8 @@ def _options(settings: dict[str, Any]) -> Options:
         settings["backend"],
         settings["threads"],
         settings["report"],
-        tuple(name for name in parameters.OUTPUTS if name in outputs),
+        tuple(name for name in OUTPUTS if name in outputs),
     )
-
-
-def _core_refusal(topology: Topology) -> str | None:
-    """Why the core cannot take this topology, in its own words, or None."""
-    try:
-        hc.Scene().add_mesh("mesh", topology.faces, n_vertices=topology.n_vertices)
-    except CORE_ERRORS as error:
-        return str(error)
-    return None
 
 
 def main(argv: list[str] | None = None) -> int:

@@ -1,12 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The parameters of the node: one table, from which descriptors, checks and the README's table are made.
+"""The parameters of the node: descriptors, checks and the README's table, all made from parameter_table.py.
 
 ``python -m hpccd_ros.parameters`` prints the table.
 """
 
 import re
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 from typing import Any
 
 from rcl_interfaces.msg import (
@@ -24,6 +23,8 @@ from rclpy.exceptions import (
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
+from hpccd_ros.parameter_table import ALWAYS, MESH_ROWS, NEVER, NODE_ROWS, UNCONFIGURED, Row
+
 _TYPES = {
     "bool": ParameterType.PARAMETER_BOOL,
     "int": ParameterType.PARAMETER_INTEGER,
@@ -38,209 +39,8 @@ class ParameterError(ValueError):
     """A parameter that the node cannot start with; the text names it and the remedy."""
 
 
-@dataclass(frozen=True)
-class Row:
-    """One parameter. ``span``: closed range of a number; ``choices``: allowed strings (of each entry)."""
-
-    name: str
-    kind: str
-    default: Any
-    text: str
-    unit: str = ""
-    span: tuple[float, float] | None = None
-    choices: tuple[str, ...] = ()
-    changeable: bool = False
-
-
-ACCURACIES = ("fast", "balanced", "conservative", "exact")
-BACKENDS = ("auto", "cpu", "hybrid", "gpu")
-REPORTS = ("all", "first", "any")
-OUTPUTS = ("points", "normals")
-
-NODE_ROWS = (
-    Row(
-        "meshes",
-        "string[]",
-        [],
-        "Names of the meshes of the scene, in the order of the core's numbering. Each name "
-        "makes the topics meshes/NAME/... and the parameters mesh.NAME.*",
-    ),
-    Row(
-        "ignored_pairs",
-        "string[]",
-        [],
-        "Pairs of meshes that are never tested against each other, each as NAME:NAME",
-    ),
-    Row("autostart", "bool", True, "Configure and activate at once; false: wait for the life-cycle services"),
-    Row("accuracy", "string", "balanced", "Tier of the elementary tests", choices=ACCURACIES, changeable=True),
-    Row("backend", "string", "auto", "Where the core runs", choices=BACKENDS, changeable=True),
-    Row("threads", "int", 0, "Threads of the core; 0: all cores", span=(0, 1024), changeable=True),
-    Row(
-        "report",
-        "string",
-        "all",
-        "Every contact, those at the earliest time, or any one",
-        choices=REPORTS,
-        changeable=True,
-    ),
-    Row("outputs", "string[]", [], "Computed and sent beside the contacts", choices=OUTPUTS, changeable=True),
-    Row(
-        "max_contacts",
-        "int",
-        200_000,
-        "Most contacts in one message: the earliest are kept, `truncated` is set; 0: no limit",
-        span=(0, 100_000_000),
-        changeable=True,
-    ),
-    Row(
-        "frame_id",
-        "string",
-        "",
-        "Coordinate frame that all vertex messages must carry; empty: that of the first one",
-    ),
-    Row(
-        "frame_queue",
-        "int",
-        1,
-        "Complete frames that may wait for the detection; 1: only the latest. The oldest gives "
-        "way, counted as overload",
-        span=(1, 100_000),
-    ),
-    Row(
-        "pending_frames",
-        "int",
-        8,
-        "Frames of a mesh that may wait for a topology or for other meshes",
-        span=(1, 10_000),
-    ),
-    Row(
-        "stamp_match",
-        "string",
-        "exact",
-        "How frames of several meshes are joined: equal stamps, or nearest to those of the first deforming mesh",
-        choices=("exact", "nearest"),
-    ),
-    Row(
-        "stamp_tolerance",
-        "float",
-        0.01,
-        "Largest difference of stamps for stamp_match nearest",
-        unit="s",
-        span=(0.0, 3600.0),
-    ),
-    Row(
-        "restart_after",
-        "int",
-        5,
-        "Frames in a row with increasing stamps before the last accepted one that are taken "
-        "as a restart of the stream; 0: never",
-        span=(0, 1_000_000),
-        changeable=True,
-    ),
-    Row(
-        "input_reliability",
-        "string",
-        "reliable",
-        "QoS of the vertex subscriptions; best_effort also accepts best-effort publishers, and may lose large messages",
-        choices=("reliable", "best_effort"),
-    ),
-    Row(
-        "input_depth",
-        "int",
-        10,
-        "QoS history depth of the vertex subscriptions: messages that may come at once without loss",
-        span=(1, 1000),
-    ),
-    Row("max_vertices", "int", 5_000_000, "Largest mesh accepted", unit="vertices", span=(1, 1_000_000_000)),
-    Row("max_faces", "int", 10_000_000, "Largest mesh accepted", unit="triangles", span=(1, 1_000_000_000)),
-    Row(
-        "count_unknown_meshes",
-        "bool",
-        True,
-        "Subscribe (raw) to vertex topics of meshes that are not in `meshes`, to "
-        "count their frames; false: only name the topics in the diagnostics",
-    ),
-    Row("detect_jobs", "int", 2, "Requests of ~/detect that are computed at the same time", span=(1, 256)),
-    Row(
-        "detect_waiting",
-        "int",
-        8,
-        "Requests of ~/detect that may wait; more are refused as busy",
-        span=(0, 10_000),
-    ),
-    Row(
-        "detect_time_limit",
-        "float",
-        30.0,
-        "Answer of ~/detect after this time at the latest, where the request sets no limit",
-        unit="s",
-        span=(0.001, 86_400.0),
-        changeable=True,
-    ),
-    Row("diagnostics_period", "float", 1.0, "Period of /diagnostics", unit="s", span=(0.05, 3600.0)),
-    Row(
-        "markers",
-        "bool",
-        False,
-        "Publish contact points and normals as visualization_msgs/MarkerArray on markers",
-        changeable=True,
-    ),
-    Row(
-        "markers_max",
-        "int",
-        2000,
-        "Most contacts drawn; evenly thinned out",
-        span=(1, 1_000_000),
-        changeable=True,
-    ),
-    Row(
-        "markers_rate",
-        "float",
-        10.0,
-        "Most marker messages a second",
-        unit="Hz",
-        span=(0.001, 1000.0),
-        changeable=True,
-    ),
-    Row(
-        "markers_size",
-        "float",
-        0.01,
-        "Diameter of a point; a normal is ten times as long",
-        unit="unit of the vertices",
-        span=(1e-9, 1e9),
-        changeable=True,
-    ),
-)
-
-MESH_ROWS = (
-    Row(
-        "input",
-        "string",
-        "vertices",
-        "Topic of the positions: meshes/NAME/vertices (MeshVertices) or meshes/NAME/points (PointCloud2)",
-        choices=("vertices", "points"),
-    ),
-    Row("static", "bool", False, "Does not move: positions from the file or from one message"),
-    Row("self_collision", "bool", True, "Test the mesh against itself"),
-    Row(
-        "file",
-        "string",
-        "",
-        "Mesh file (OBJ, PLY, STL; needs trimesh) with the topology, version 0, and for a static mesh the positions",
-    ),
-    Row(
-        "pose",
-        "float[]",
-        [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0],
-        "Where the file's vertices are placed: translation x y z, unit quaternion x y z w",
-        unit="unit of the vertices",
-    ),
-)
-
 # A mesh name becomes part of topic and parameter names.
 _MESH_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
-_BY_NAME = {row.name: row for row in NODE_ROWS}
 
 
 def refusal(row: Row, value: Any) -> str | None:
@@ -257,7 +57,7 @@ def refusal(row: Row, value: Any) -> str | None:
 
 def descriptor(row: Row) -> ParameterDescriptor:
     """What ``describe_parameters`` shows."""
-    out = ParameterDescriptor(name=row.name, type=_TYPES[row.kind], description=row.text, read_only=not row.changeable)
+    out = ParameterDescriptor(name=row.name, type=_TYPES[row.kind], description=row.text, read_only=row.change == NEVER)
     if row.unit:
         out.description += f" [{row.unit}]"
     if row.choices:
@@ -272,7 +72,7 @@ def descriptor(row: Row) -> ParameterDescriptor:
 def declare(node: Node) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
     """Declare all parameters of the table; return (node settings, mesh name -> mesh settings).
 
-    Raises ParameterError: wrong type, out of range, bad or repeated mesh name, unknown pair.
+    Raises ParameterError: wrong type, out of range, bad or repeated mesh name.
     """
     settings = {row.name: _declare_one(node, row, row.name) for row in NODE_ROWS}
     names = settings["meshes"]
@@ -283,25 +83,10 @@ def declare(node: Node) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
             )
     if len(set(names)) != len(names):
         raise ParameterError(f"meshes: names must differ, got {', '.join(names)}")
-    ignored_pairs(settings)
     meshes = {
         name: {row.name: _declare_one(node, row, f"mesh.{name}.{row.name}") for row in MESH_ROWS} for name in names
     }
     return settings, meshes
-
-
-def ignored_pairs(settings: dict[str, Any]) -> list[tuple[str, str]]:
-    """Parameter ``ignored_pairs`` as pairs of mesh names. Raises ParameterError."""
-    pairs = []
-    for text in settings["ignored_pairs"]:
-        pair = tuple(text.split(":"))
-        if len(pair) != 2 or not set(pair) <= set(settings["meshes"]) or pair[0] == pair[1]:
-            raise ParameterError(
-                f"ignored_pairs: {text!r} must be NAME:NAME with two different meshes out of "
-                f"{', '.join(settings['meshes']) or '(none)'}"
-            )
-        pairs.append(pair)
-    return pairs
 
 
 def _declare_one(node: Node, row: Row, name: str) -> Any:
@@ -338,28 +123,40 @@ def unknown_overrides(node: Node) -> list[str]:
 def watch(
     node: Node,
     settings: dict[str, Any],
-    check: Callable[[dict[str, Any]], str | None],
+    meshes: dict[str, dict[str, Any]],
+    *,
+    configured: Callable[[], bool],
+    check: Callable[[dict[str, Any], dict[str, dict[str, Any]]], str | None],
     on_change: Callable[[], None],
 ) -> None:
-    """Keep ``settings`` up to date with changes at run time; refuse bad ones with a reason.
+    """Keep ``settings`` and ``meshes`` up to date with changes at run time; refuse bad ones with a reason.
 
-    check: called with the settings as they would be; returns why they cannot be used, or None.
+    configured: whether the life cycle is past `unconfigured`; then only rows that may always change do.
+    check: called with settings and meshes as they would be; returns why they cannot be used, or None.
     on_change: called after each accepted change.
     """
+    rows = {row.name: (None, row) for row in NODE_ROWS}
+    rows |= {f"mesh.{name}.{row.name}": (name, row) for name in meshes for row in MESH_ROWS}
 
     def on_set(parameters: Iterable[Parameter]) -> SetParametersResult:
-        wanted = dict(settings)
+        wanted, wanted_meshes = dict(settings), {name: dict(values) for name, values in meshes.items()}
         for parameter in parameters:
-            row = _BY_NAME.get(parameter.name)
-            if row is None:
+            if parameter.name not in rows:
                 continue
+            mesh, row = rows[parameter.name]
+            values = wanted if mesh is None else wanted_meshes[mesh]
             value = normalise(row, parameter.value)
-            if reason := refusal(row, value):
+            if row.change == UNCONFIGURED and configured() and value != values[row.name]:
+                reason = f"{parameter.name}: read-only while the node is configured; deactivate and clean up first"
                 return SetParametersResult(successful=False, reason=reason)
-            wanted[row.name] = value
-        if reason := check(wanted):
+            if reason := refusal(row, value):
+                return SetParametersResult(successful=False, reason=reason.replace(row.name, parameter.name, 1))
+            values[row.name] = value
+        if reason := check(wanted, wanted_meshes):
             return SetParametersResult(successful=False, reason=reason)
         settings.update(wanted)
+        for name, values in wanted_meshes.items():
+            meshes[name].update(values)
         on_change()
         return SetParametersResult(successful=True)
 
@@ -374,6 +171,9 @@ def _allowed(row: Row) -> str:
     return ""
 
 
+_CHANGE = {ALWAYS: "changeable", UNCONFIGURED: "while unconfigured", NEVER: "read-only"}
+
+
 def markdown_table() -> str:
     """The README's table of parameters."""
     lines = [
@@ -385,7 +185,7 @@ def markdown_table() -> str:
         default = f"`{str(row.default).lower()}`" if row.kind == "bool" else f"`{row.default!r}`".replace("'", '"')
         lines.append(
             f"| `{name}` | {row.kind} | {default} | {_allowed(row)} | {row.unit} | "
-            f"{'changeable' if row.changeable else 'read-only'} | {row.text} |"
+            f"{_CHANGE[row.change]} | {row.text} |"
         )
     return "\n".join(lines)
 

@@ -21,6 +21,10 @@ CONTACTS = _profile(10)
 
 DIAGNOSTICS = _profile(10)
 
+# As tf2's own listeners ask for them.
+TRANSFORMS = _profile(100)
+TRANSFORMS_STATIC = _profile(100, latched=True)
+
 # A viewer wants the newest only.
 MARKERS = _profile(1)
 

@@ -6,6 +6,9 @@ from collections.abc import Callable
 
 from hpccd_ros.drops import Reason
 
+# Texts quote what publishers sent (frame names, field names), which may be of any length.
+_LONGEST = 500
+
 
 class RefusalLog:
     """Hands on the first text of each (mesh, reason), then one every ``period`` s."""
@@ -20,6 +23,8 @@ class RefusalLog:
         self.last = ""
 
     def __call__(self, mesh: str, reason: Reason, text: str) -> None:
+        if len(text) > _LONGEST:
+            text = f"{text[:_LONGEST]} ..."
         self.last = f"{mesh}: {reason}: {text}"
         now = self._clock()
         since, count = self._silent.get((mesh, reason), (-float("inf"), 0))

@@ -9,6 +9,7 @@ from hpccd_ros.drops import DropCounter
 from hpccd_ros.frames import FrameAssembler
 from hpccd_ros.mcap_decode import make_decoder
 from hpccd_ros.messages import MeshFrame, SceneFrame
+from hpccd_ros.placement import Placement
 from hpccd_ros.replay_setup import ReplaySetup
 from hpccd_ros.sequence import SequenceWatch
 
@@ -27,7 +28,7 @@ class FrameSource:
         self._decoders = {name: make_decoder(topics[name]) for name in setup.roles if name in topics}
         self._watches = {name: SequenceWatch() for name in setup.roles}
         self._assembler = FrameAssembler(
-            list(setup.mesh_settings),
+            list(setup.builder.meshes),
             self.drops,
             self.refused,
             # Messages of several topics may have reached the recorder in another order than the node.
@@ -36,6 +37,10 @@ class FrameSource:
             tolerance=round(settings["stamp_tolerance"] * 1e9) if settings["stamp_match"] == "nearest" else None,
             frame_id=settings["frame_id"],
         )
+        self._placements = {
+            mesh: Placement(mesh, row, settings["frame_id"], settings["pending_frames"], self.drops)
+            for mesh, row in setup.meshes.items()
+        }
         for mesh, (topology, frame) in setup.files.items():
             self._assembler.set_topology(mesh, topology)
             if frame is not None:
@@ -71,7 +76,11 @@ class FrameSource:
             return []
         header = decoded.header
         frame = MeshFrame(convert.stamp_to_ns(header.stamp), vertices, version, step, header.frame_id)
-        return self._assembler.add(mesh, frame, new_publisher)
+        return [
+            scene_frame
+            for placed, new in self._placements[mesh].take(frame, new_publisher)
+            for scene_frame in self._assembler.add(mesh, placed, new)
+        ]
 
 
 class FrameWindow:

@@ -8,12 +8,13 @@ from pathlib import Path
 import yaml
 
 from hpccd_ros import parameters as table
+from hpccd_ros import scene_parameters
 from hpccd_ros.detection import Options, SceneBuilder
 from hpccd_ros.errors import UserError
 from hpccd_ros.mcap_reader import Recording, RecordingError
 from hpccd_ros.mesh_attachment import attachment_name
 from hpccd_ros.mesh_file import MeshFileError, load_mesh, place
-from hpccd_ros.messages import MeshFrame, MeshSettings, Topology
+from hpccd_ros.messages import MeshFrame, Topology
 
 
 @dataclasses.dataclass(frozen=True)
@@ -28,13 +29,7 @@ class ReplaySetup:
 
     @property
     def builder(self) -> SceneBuilder:
-        return SceneBuilder(self.mesh_settings, tuple(table.ignored_pairs(self.settings)))
-
-    @property
-    def mesh_settings(self) -> tuple[MeshSettings, ...]:
-        return tuple(
-            MeshSettings(name, row["static"], row["self_collision"]) for name, row in self.meshes.items()
-        )
+        return scene_parameters.scene_builder(self.settings, self.meshes)
 
     def options(self, accuracy: str, backend: str, threads: int) -> Options:
         """Detector options of the recorded node, but for what may differ without a change of the result."""
@@ -63,6 +58,12 @@ def of_recording(recording: Recording, parameter_file: str | None = None) -> Rep
         name: {row.name: given.get(f"mesh.{name}.{row.name}", row.default) for row in table.MESH_ROWS}
         for name in settings["meshes"]
     }
+    for name, row in meshes.items():
+        if row["transform"] == "tf":
+            raise RecordingError(
+                f"{recording.path}: mesh {name} was transformed by tf (parameter mesh.{name}.transform), and transforms "
+                "are not recorded: its positions cannot be computed again"
+            )
     relative = info.get("topics") or _by_suffix(recording, settings["meshes"])
     roles = {}
     for topic, name in relative.items():

@@ -18,6 +18,8 @@ from hpccd_ros.diagnostics import Metrics
 from hpccd_ros.drops import DropCounter, Reason
 from hpccd_ros.frames import FrameAssembler
 from hpccd_ros.messages import MeshFrame, SceneFrame, Topology
+from hpccd_ros.placement import Placement, Ready
+from hpccd_ros.rate_limit import RateLimit
 from hpccd_ros.sequence import SequenceWatch
 
 
@@ -46,6 +48,7 @@ def link_events(
 class MeshStream:
     """The topology and vertex subscriptions of one mesh, from construction until ``close``.
 
+    placement: brings positions into the scene's frame.
     on_frames: takes the scene frames that a message completes.
     check_topology: why the core refuses a topology, or None.
     """
@@ -57,6 +60,7 @@ class MeshStream:
         kind: str,
         settings: dict[str, Any],
         *,
+        placement: Placement,
         assembler: FrameAssembler,
         drops: DropCounter,
         refused: DropCounter,
@@ -68,6 +72,7 @@ class MeshStream:
         self._node = node
         self._mesh = mesh
         self._settings = settings
+        self._placement = placement
         self._assembler = assembler
         self._drops = drops
         self._refused = refused
@@ -77,6 +82,7 @@ class MeshStream:
         self._check_topology = check_topology
         self._topology_numbers = SequenceWatch()
         self._vertex_numbers = SequenceWatch()
+        self._topology_limit, self._vertex_limit = (RateLimit(settings["max_rate"]) for _ in range(2))
         message, callback = {
             "vertices": (MeshVertices, self._on_vertices),
             "points": (PointCloud2, self._on_cloud),
@@ -104,14 +110,28 @@ class MeshStream:
         for subscription in self._subscriptions:
             self._node.destroy_subscription(subscription)
         self._subscriptions.clear()
+        self._placement.clear(Reason.STOPPED)
+
+    @property
+    def waiting(self) -> int:
+        """Messages that wait for a transform."""
+        return self._placement.waiting
+
+    def retry(self) -> None:
+        """Go on with frames that waited for a transform."""
+        self._hand_on(self._placement.retry())
 
     def warnings(self) -> list[str]:
         """What is odd about the publishers of the mesh."""
         publishers = self._node.count_publishers(self._vertex_topic)
-        return [f"{publishers} publishers on {self._vertex_topic}"] if publishers > 1 else []
+        several = [f"{publishers} publishers on {self._vertex_topic}"] if publishers > 1 else []
+        return several + self._placement.warnings()
 
     def _on_topology(self, message: MeshTopology, info: dict[str, Any]) -> None:
         _, new_publisher = self._topology_numbers.next(info["publication_sequence_number"])
+        if not self._topology_limit.allows():
+            self._refused.count(self._mesh, Reason.RATE, self._too_fast())
+            return
         try:
             topology = convert.topology_from_message(
                 message, self._settings["max_vertices"], self._settings["max_faces"]
@@ -144,6 +164,9 @@ class MeshStream:
                 f"{missing} messages lost before the node could read them; see parameter input_depth",
                 missing,
             )
+        if not self._vertex_limit.allows():
+            self._drops.count(self._mesh, Reason.RATE, self._too_fast())
+            return
         try:
             vertices = read(message, self._settings["max_vertices"])
         except InvalidMessageError as error:
@@ -157,4 +180,11 @@ class MeshStream:
             message.header.frame_id,
             received,
         )
-        self._on_frames(self._assembler.add(self._mesh, frame, new_publisher))
+        self._hand_on(self._placement.take(frame, new_publisher))
+
+    def _hand_on(self, frames: list[Ready]) -> None:
+        for frame, new_publisher in frames:
+            self._on_frames(self._assembler.add(self._mesh, frame, new_publisher))
+
+    def _too_fast(self) -> str:
+        return f"more than {self._settings['max_rate']:g} messages a second (parameter max_rate)"

@@ -159,7 +159,7 @@ class Peer:
 
 def assert_same_contacts(message: ContactArray, t0: np.ndarray, t1: np.ndarray, scene: hc.Scene, **options: Any) -> int:
     """Contacts equal those of the core called directly on the same positions; their number."""
-    expected = hc.Detector(scene, **{"accuracy": "balanced", **options}).detect(t0, t1)
+    expected = hc.Detector(scene, **options).detect(t0, t1)
     names = tuple(message.mesh_names)
     vertex_offsets = [scene.vertex_offset(name) for name in names] + [scene.n_vertices]
     face_offsets = [scene.face_offset(name) for name in names] + [scene.n_faces]

@@ -50,7 +50,7 @@ def test_latest_frames_win_and_drops_are_counted_exactly(start_node):
     for earlier, message in zip(chain, messages, strict=False):
         assert convert.stamp_to_ns(message.start) == earlier, "no time between two steps is left unwatched"
     scene = scene_of(cloth=FACES)
-    detector = hc.Detector(scene, accuracy="balanced")
+    detector = hc.Detector(scene)
     for message in messages[:3] + messages[-3:]:
         start, end = (convert.stamp_to_ns(s) - 1 for s in (message.start, message.header.stamp))
         expected = detector.detect(FRAMES[start % 8], FRAMES[end % 8])
@@ -86,7 +86,7 @@ def test_large_output_is_whole(start_node):
     for k in (2, 3):
         node.peer.vertices("cloth", FRAMES[k], stamp=k)
     message = node.contacts(1)[0]
-    expected = hc.Detector(scene_of(cloth=FACES), accuracy="balanced", outputs=("points", "normals")).detect(
+    expected = hc.Detector(scene_of(cloth=FACES), outputs=("points", "normals")).detect(
         *FRAMES[2:4]
     )
     assert message.total == len(expected) > 100_000

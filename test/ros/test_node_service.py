@@ -177,6 +177,6 @@ def test_stream_goes_on_while_requests_are_computed(node):
 def test_outputs_of_the_node_are_sent(start_node):
     node = start_node({"meshes": ["cloth"], "outputs": ["points"], "max_contacts": 50})
     (answer,) = ask(node, request())
-    full = hc.Detector(scene_of(cloth=FACES), accuracy="balanced").detect(sheet_positions(N, 0), sheet_positions(N, 1))
+    full = hc.Detector(scene_of(cloth=FACES)).detect(sheet_positions(N, 0), sheet_positions(N, 1))
     assert answer.contacts.truncated and answer.contacts.total == len(full)
     assert len(answer.contacts.points) == 150 and len(answer.contacts.normals) == 0

@@ -35,7 +35,7 @@ def test_every_step_of_one_mesh(start_node, dtype):
             10**9 + k,
         )
         assert (message.step, message.header.frame_id) == (100 + k, "world")
-        assert (message.accuracy, message.backend, message.dropped_frames) == ("balanced", "cpu", 0)
+        assert (message.accuracy, message.backend, message.dropped_frames) == ("exact", "cpu", 0)
         assert len(message.points) == len(message.normals) == 0
         found += assert_same_contacts(message, positions[k - 1], positions[k], scene_of(cloth=FACES))
     assert found > 100, "the scene is made to touch"
@@ -64,7 +64,7 @@ def test_two_meshes_are_assembled_by_stamp(start_node):
         between += np.count_nonzero(
             np.frombuffer(message.mesh_a, np.uint32) != np.frombuffer(message.mesh_b, np.uint32)
         )
-        expected = hc.Detector(scene, accuracy="balanced", outputs=("points", "normals")).detect(both[k - 1], both[k])
+        expected = hc.Detector(scene, outputs=("points", "normals")).detect(both[k - 1], both[k])
         assert np.array_equal(np.frombuffer(message.points).reshape(-1, 3), expected.points)
         assert np.array_equal(np.frombuffer(message.normals).reshape(-1, 3), expected.normals)
     assert between > 10, "the meshes are made to touch each other"
@@ -195,7 +195,7 @@ def test_truncated_contacts_are_the_earliest(start_node):
     for k in range(2):
         node.peer.vertices("cloth", frames[k], stamp=k)
     message = node.contacts(1)[0]
-    full = hc.Detector(scene_of(cloth=FACES), accuracy="balanced").detect(*frames)
+    full = hc.Detector(scene_of(cloth=FACES)).detect(*frames)
     assert message.truncated and message.total == len(full) and len(message.toc) == 10
     earliest = np.sort(np.concatenate([full.vf_toc, full.ee_toc]))[:10]
     assert np.array_equal(np.sort(message.toc), earliest)

@@ -9,8 +9,9 @@ import yaml
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from hpccd_ros import parameters
-from hpccd_ros.parameters import MESH_ROWS, NODE_ROWS, ParameterError
+from hpccd_ros import parameters, scene_parameters
+from hpccd_ros.parameter_table import MESH_ROWS, NEVER, NODE_ROWS
+from hpccd_ros.parameters import ParameterError
 
 CONFIG = Path(__file__).resolve().parents[2] / "config"
 
@@ -38,7 +39,7 @@ def test_each_row_is_sound(row):
     assert parameters.refusal(row, row.default) is None
     assert row.text and not row.text.endswith(".")
     described = parameters.descriptor(row)
-    assert described.read_only == (not row.changeable)
+    assert described.read_only == (row.change == NEVER)
     if row.span is not None:
         assert parameters.refusal(row, row.span[1] + 1) is not None
         assert parameters.refusal(row, row.span[0] - 1) is not None
@@ -59,7 +60,7 @@ def test_overrides_reach_the_settings(node_with):
     assert settings["meshes"] == ["cloth", "floor"] and settings["threads"] == 3
     assert settings["outputs"] == ["points"]
     assert meshes["floor"]["static"] and not meshes["cloth"]["static"]
-    assert node.describe_parameter("mesh.floor.static").read_only
+    assert node.describe_parameter("meshes").read_only
 
 
 @pytest.mark.parametrize(
@@ -69,6 +70,23 @@ def test_overrides_reach_the_settings(node_with):
         ({"meshes": ["a", "a"]}, "names must differ"),
         ({"meshes": ["a", "b"], "ignored_pairs": ["a:c"]}, "ignored_pairs: 'a:c'"),
         ({"meshes": ["a", "b"], "ignored_pairs": ["a"]}, "ignored_pairs: 'a'"),
+        ({"meshes": ["a", "b"], "pair_accuracy": ["a:b"]}, "pair_accuracy: 'a:b' must be NAME:NAME:TIER"),
+        ({"meshes": ["a", "b"], "pair_accuracy": ["a:c:fast"]}, "meshes out of a, b"),
+        ({"meshes": ["a", "b"], "pair_accuracy": ["a:b:best"]}, "a tier out of fast, balanced"),
+        ({"meshes": ["a", "b"], "pair_accuracy": ["a:b:fast", "b:a:exact"]}, "'b:a:exact' contradicts 'a:b:fast'"),
+        ({"meshes": ["a"], "mesh__a__transform": "tf"}, "mesh.a.transform: tf needs a frame to transform to"),
+        ({"meshes": ["a"], "mesh__a__frame": "arm", "frame_id": "world"}, "'arm' is not the scene's frame 'world'"),
+        ({"meshes": ["a"], "mesh__a__pose": [0.0] * 7}, "mesh.a.pose: "),
+        (
+            {
+                "meshes": ["a"],
+                "frame_id": "world",
+                "mesh__a__transform": "tf",
+                "mesh__a__static": True,
+                "mesh__a__file": "a.obj",
+            },
+            "give mesh.a.pose",
+        ),
         ({"accuracy": "sloppy"}, "accuracy: 'sloppy' is none of fast, balanced"),
         ({"outputs": ["points", "colours"]}, "outputs: 'colours' is none of"),
         ({"threads": -1}, "threads"),
@@ -79,7 +97,7 @@ def test_overrides_reach_the_settings(node_with):
 )
 def test_bad_values_are_named(node_with, overrides, text):
     with pytest.raises(ParameterError) as caught:
-        parameters.declare(node_with(**overrides))
+        scene_parameters.check(*parameters.declare(node_with(**overrides)))
     assert text in str(caught.value)
 
 
@@ -91,13 +109,15 @@ def test_unknown_parameters_are_noticed(node_with):
 
 def test_changes_at_run_time(node_with):
     node = node_with(meshes=["a"])
-    settings, _ = parameters.declare(node)
-    changes = []
+    settings, meshes = parameters.declare(node)
+    changes, configured = [], [True]
     parameters.watch(
         node,
         settings,
-        lambda wanted: "exact is not built" if wanted["accuracy"] == "exact" else None,
-        lambda: changes.append(dict(settings)),
+        meshes,
+        configured=lambda: configured[0],
+        check=lambda wanted, _: "fast is not built" if wanted["accuracy"] == "fast" else None,
+        on_change=lambda: changes.append(dict(settings)),
     )
 
     def change(name, value):
@@ -108,16 +128,24 @@ def test_changes_at_run_time(node_with):
     assert change("outputs", ["normals"]).successful and settings["outputs"] == ["normals"]
     assert change("outputs", [""]).successful and settings["outputs"] == []
     refusals = {
-        "accuracy": ("exact", "exact is not built"),
+        "accuracy": ("fast", "fast is not built"),
         "report": ("some", "report: 'some' is none of"),
-        "frame_queue": (4, "read-only"),
+        "frame_queue": (4, "frame_queue: read-only while the node is configured; deactivate and clean up first"),
+        "mesh.a.static": (True, "mesh.a.static: read-only while"),
+        "meshes": (["b"], "read-only"),
         "threads": (-4, "range"),
     }
     for name, (value, reason) in refusals.items():
         result = change(name, value)
         assert not result.successful and reason in result.reason
     assert len(changes) == 3
-    assert settings["accuracy"] == "balanced" and settings["threads"] == 0
+    assert settings["accuracy"] == "exact" and settings["threads"] == 0
+    configured[0] = False
+    assert change("frame_queue", 4).successful and settings["frame_queue"] == 4
+    assert change("mesh.a.static", True).successful and meshes["a"]["static"]
+    result = change("mesh.a.input", "clouds")
+    assert not result.successful and "mesh.a.input: 'clouds' is none of" in result.reason
+    assert not change("meshes", ["b"]).successful
 
 
 @pytest.mark.parametrize("path", sorted(CONFIG.glob("*.yaml")), ids=lambda path: path.stem)

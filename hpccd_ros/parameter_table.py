@@ -1,0 +1,253 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The table of the node's parameters. Logic is in parameters.py; the README's table is made from this one."""
+
+from dataclasses import dataclass
+from typing import Any
+
+# When a parameter may be changed.
+ALWAYS, UNCONFIGURED, NEVER = "always", "unconfigured", "never"
+
+
+@dataclass(frozen=True)
+class Row:
+    """One parameter.
+
+    ``span``: closed range of a number; ``choices``: allowed strings (of each entry). ``change``: ALWAYS; UNCONFIGURED:
+    only while the node is unconfigured (before configure, after clean-up), as it is read there; NEVER: read-only.
+    """
+
+    name: str
+    kind: str
+    default: Any
+    text: str
+    unit: str = ""
+    span: tuple[float, float] | None = None
+    choices: tuple[str, ...] = ()
+    change: str = UNCONFIGURED
+
+
+ACCURACIES = ("fast", "balanced", "conservative", "exact")
+BACKENDS = ("auto", "cpu", "hybrid", "gpu")
+REPORTS = ("all", "first", "any")
+OUTPUTS = ("points", "normals")
+
+NODE_ROWS = (
+    Row(
+        "meshes",
+        "string[]",
+        [],
+        "Names of the meshes of the scene, in the order of the core's numbering. Each name "
+        "makes the topics meshes/NAME/... and the parameters mesh.NAME.*",
+        change=NEVER,
+    ),
+    Row(
+        "ignored_pairs",
+        "string[]",
+        [],
+        "Pairs of meshes that are never tested against each other, each as NAME:NAME",
+    ),
+    Row(
+        "pair_accuracy",
+        "string[]",
+        [],
+        "Pairs of meshes that are tested at another accuracy, each as NAME:NAME:TIER; the same name twice: within it",
+    ),
+    Row(
+        "autostart",
+        "bool",
+        True,
+        "Configure and activate at once; false: wait for the life-cycle services",
+        change=NEVER,
+    ),
+    Row("accuracy", "string", "exact", "Tier of the elementary tests", choices=ACCURACIES, change=ALWAYS),
+    Row("backend", "string", "auto", "Where the core runs", choices=BACKENDS, change=ALWAYS),
+    Row("threads", "int", 0, "Threads of the core; 0: all cores", span=(0, 1024), change=ALWAYS),
+    Row(
+        "report",
+        "string",
+        "all",
+        "Every contact, those at the earliest time, or any one",
+        choices=REPORTS,
+        change=ALWAYS,
+    ),
+    Row("outputs", "string[]", [], "Computed and sent beside the contacts", choices=OUTPUTS, change=ALWAYS),
+    Row(
+        "max_contacts",
+        "int",
+        200_000,
+        "Most contacts in one message: the earliest are kept, `truncated` is set; 0: no limit",
+        span=(0, 100_000_000),
+        change=ALWAYS,
+    ),
+    Row(
+        "frame_id",
+        "string",
+        "",
+        "Coordinate frame of the scene, which all vertex messages must carry or be transformed to; empty: that of the "
+        "first one",
+    ),
+    Row(
+        "frame_queue",
+        "int",
+        1,
+        "Complete frames that may wait for the detection; 1: only the latest. The oldest gives "
+        "way, counted as overload",
+        span=(1, 100_000),
+    ),
+    Row(
+        "pending_frames",
+        "int",
+        8,
+        "Frames of a mesh that may wait for a topology or for other meshes",
+        span=(1, 10_000),
+    ),
+    Row(
+        "stamp_match",
+        "string",
+        "exact",
+        "How frames of several meshes are joined: equal stamps, or nearest to those of the first deforming mesh",
+        choices=("exact", "nearest"),
+    ),
+    Row(
+        "stamp_tolerance",
+        "float",
+        0.01,
+        "Largest difference of stamps for stamp_match nearest",
+        unit="s",
+        span=(0.0, 3600.0),
+    ),
+    Row(
+        "restart_after",
+        "int",
+        5,
+        "Frames in a row with increasing stamps before the last accepted one that are taken "
+        "as a restart of the stream; 0: never",
+        span=(0, 1_000_000),
+        change=ALWAYS,
+    ),
+    Row(
+        "input_reliability",
+        "string",
+        "reliable",
+        "QoS of the vertex subscriptions; best_effort also accepts best-effort publishers, and may lose large messages",
+        choices=("reliable", "best_effort"),
+    ),
+    Row(
+        "input_depth",
+        "int",
+        10,
+        "QoS history depth of the vertex subscriptions: messages that may come at once without loss",
+        span=(1, 1000),
+    ),
+    Row("max_vertices", "int", 5_000_000, "Largest mesh accepted", unit="vertices", span=(1, 1_000_000_000)),
+    Row("max_faces", "int", 10_000_000, "Largest mesh accepted", unit="triangles", span=(1, 1_000_000_000)),
+    Row(
+        "max_rate",
+        "float",
+        1000.0,
+        "Most messages a second that are looked at of each input topic, as a mean over a second; more are dropped, "
+        "counted as rate; 0: no limit",
+        unit="Hz",
+        span=(0.0, 1e6),
+    ),
+    Row("max_meshes", "int", 1000, "Most meshes in a request of ~/detect", span=(1, 1_000_000)),
+    Row(
+        "count_unknown_meshes",
+        "bool",
+        True,
+        "Subscribe (raw) to vertex topics of meshes that are not in `meshes`, to "
+        "count their frames; false: only name the topics in the diagnostics",
+    ),
+    Row("detect_jobs", "int", 2, "Requests of ~/detect that are computed at the same time", span=(1, 256)),
+    Row(
+        "detect_waiting",
+        "int",
+        8,
+        "Requests of ~/detect that may wait; more are refused as busy",
+        span=(0, 10_000),
+    ),
+    Row(
+        "detect_time_limit",
+        "float",
+        30.0,
+        "Answer of ~/detect after this time at the latest, where the request sets no limit",
+        unit="s",
+        span=(0.001, 86_400.0),
+        change=ALWAYS,
+    ),
+    Row("diagnostics_period", "float", 1.0, "Period of /diagnostics", unit="s", span=(0.05, 3600.0)),
+    Row(
+        "markers",
+        "bool",
+        False,
+        "Publish contact points and normals as visualization_msgs/MarkerArray on markers",
+        change=ALWAYS,
+    ),
+    Row(
+        "markers_max",
+        "int",
+        2000,
+        "Most contacts drawn; evenly thinned out",
+        span=(1, 1_000_000),
+        change=ALWAYS,
+    ),
+    Row(
+        "markers_rate",
+        "float",
+        10.0,
+        "Most marker messages a second",
+        unit="Hz",
+        span=(0.001, 1000.0),
+        change=ALWAYS,
+    ),
+    Row(
+        "markers_size",
+        "float",
+        0.01,
+        "Diameter of a point; a normal is ten times as long",
+        unit="unit of the vertices",
+        span=(1e-9, 1e9),
+        change=ALWAYS,
+    ),
+)
+
+MESH_ROWS = (
+    Row(
+        "input",
+        "string",
+        "vertices",
+        "Topic of the positions: meshes/NAME/vertices (MeshVertices) or meshes/NAME/points (PointCloud2)",
+        choices=("vertices", "points"),
+    ),
+    Row("static", "bool", False, "Does not move: positions from the file or from one message"),
+    Row("self_collision", "bool", True, "Test the mesh against itself"),
+    Row(
+        "file",
+        "string",
+        "",
+        "Mesh file (OBJ, PLY, STL; needs trimesh) with the topology, version 0, and for a static mesh the positions",
+    ),
+    Row(
+        "transform",
+        "string",
+        "none",
+        "How the positions of the messages get into the scene's frame: as they are; by `pose`; or by the "
+        "transform from header.frame_id to `frame_id` at their stamp, from /tf or transforms",
+        choices=("none", "pose", "tf"),
+    ),
+    Row(
+        "frame",
+        "string",
+        "",
+        "Coordinate frame that the messages must carry, where they are transformed; taken where theirs is "
+        "empty; empty: any",
+    ),
+    Row(
+        "pose",
+        "float[]",
+        [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0],
+        "Where the file's vertices, and with transform pose those of the messages, are placed: translation x y z, unit "
+        "quaternion x y z w",
+        unit="unit of the vertices",
+    ),
+)

@@ -1,0 +1,113 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Bring the positions of one mesh into the scene's frame, before frames are assembled. No ROS.
+
+Where a transform has not come yet, frames wait for it in the order in which they came, as many as may wait for
+a topology; what cannot be transformed is counted with the reason.
+"""
+
+from collections import deque
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from hpccd_ros.drops import DropCounter, Reason
+from hpccd_ros.messages import MeshFrame
+from hpccd_ros.rigid import IDENTITY, Rigid
+from hpccd_ros.transforms import NoTransformError, TransformBuffer
+
+# A frame that is ready, and whether it is the first of a new publisher.
+Ready = tuple[MeshFrame, bool]
+
+
+class Placement:
+    """How the frames of ``mesh`` are placed: parameters mesh.NAME.transform, .frame, .pose (``row``).
+
+    target: the scene's frame (parameter frame_id). transforms: None where transform is not "tf".
+    """
+
+    def __init__(
+        self,
+        mesh: str,
+        row: dict[str, Any],
+        target: str,
+        max_waiting: int,
+        drops: DropCounter,
+        transforms: TransformBuffer | None = None,
+    ) -> None:
+        self._mesh = mesh
+        self._kind = row["transform"]
+        self._frame = row["frame"]
+        self._target = target
+        self._max_waiting = max_waiting
+        self._drops = drops
+        self._transforms = transforms
+        self._waiting: deque[Ready] = deque()
+        self._awaited = ""
+        self._pose = Rigid.of(row["pose"][:3], row["pose"][3:]) if self._kind == "pose" else None
+
+    @property
+    def waiting(self) -> int:
+        return len(self._waiting)
+
+    def warnings(self) -> list[str]:
+        """What the frames that wait are waiting for."""
+        return [f"{self._mesh} waits for a transform: {self._awaited}"] if self._waiting else []
+
+    def take(self, frame: MeshFrame, new_publisher: bool = False) -> list[Ready]:
+        """Frames in the scene's frame that this one completes: with ``transform: none`` always itself."""
+        if self._kind == "none":
+            return [(frame, new_publisher)]
+        if self._frame and frame.frame_id not in ("", self._frame):
+            self._refuse(
+                Reason.FRAME_ID,
+                f"frame_id {frame.frame_id!r}, parameter mesh.{self._mesh}.frame demands {self._frame!r}",
+            )
+            return []
+        if self._kind == "pose":
+            return [(self._placed(frame, self._pose), new_publisher)]
+        if not (frame.frame_id or self._frame):
+            self._refuse(
+                Reason.FRAME_ID,
+                "frame_id is empty: it must say what to transform from; set it, or parameter "
+                f"mesh.{self._mesh}.frame",
+            )
+            return []
+        self._waiting.append((frame, new_publisher))
+        ready = self.retry()
+        if len(self._waiting) > self._max_waiting:
+            self._waiting.popleft()
+            self._refuse(Reason.NO_TRANSFORM, self._awaited)
+        return ready
+
+    def retry(self) -> list[Ready]:
+        """Frames that can be placed now; call after a transform has come."""
+        ready = []
+        while self._waiting:
+            frame, new_publisher = self._waiting[0]
+            try:
+                rigid = self._transforms.lookup(frame.frame_id or self._frame, self._target, frame.stamp)
+            except NoTransformError as error:
+                self._awaited = str(error)
+                if not error.final:
+                    break
+                self._waiting.popleft()
+                self._refuse(Reason.NO_TRANSFORM, str(error))
+                continue
+            self._waiting.popleft()
+            ready.append((self._placed(frame, rigid), new_publisher))
+        return ready
+
+    def clear(self, reason: Reason) -> None:
+        """Drop what waits, counted as ``reason``."""
+        for _ in self._waiting:
+            self._drops.count(self._mesh, reason)
+        self._waiting.clear()
+
+    def _placed(self, frame: MeshFrame, rigid: Rigid) -> MeshFrame:
+        # Always double, with or without a rotation: the precision of a stream must not depend on its values.
+        vertices = frame.vertices if rigid is IDENTITY else rigid.apply(frame.vertices.astype(np.float64))
+        return replace(frame, vertices=vertices, frame_id=self._target)
+
+    def _refuse(self, reason: Reason, text: str) -> None:
+        self._drops.count(self._mesh, reason, text)

@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Rigid motions of 3D space: a unit quaternion x y z w, then a translation. No ROS."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+# Quaternions come rounded, often to float32 or to a few digits: within this they are taken as of unit length.
+_LENGTH_TOLERANCE = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Rigid:
+    """x -> R x + shift. ``quaternion`` (4,) float64 x y z w of length 1, ``shift`` (3,) float64."""
+
+    quaternion: np.ndarray
+    shift: np.ndarray
+
+    @classmethod
+    def of(cls, shift: Sequence[float], quaternion: Sequence[float]) -> "Rigid":
+        """Checked. Raises ValueError: not 3 and 4 numbers, not finite, quaternion not of length 1 within 1e-3."""
+        shift, quaternion = np.array(shift, np.float64), np.array(quaternion, np.float64)
+        if shift.shape != (3,) or quaternion.shape != (4,) or not np.isfinite([*shift, *quaternion]).all():
+            raise ValueError("needs 7 finite numbers: x y z, quaternion x y z w")
+        length = np.linalg.norm(quaternion)
+        if abs(length - 1.0) > _LENGTH_TOLERANCE:
+            raise ValueError(f"the quaternion {quaternion.tolist()} has length {length:.4g}; it must be 1")
+        return cls(quaternion / length, shift)
+
+    def apply(self, vertices: np.ndarray) -> np.ndarray:
+        """(n,3) float64. Without a rotation, coordinates are only shifted; without a shift, returned as they are."""
+        if not self.quaternion[:3].any():
+            return vertices + self.shift if self.shift.any() else vertices
+        return vertices @ self._rotation().T + self.shift
+
+    def after(self, first: "Rigid") -> "Rigid":
+        """``first``, then this one."""
+        return Rigid(_product(self.quaternion, first.quaternion), self._rotation() @ first.shift + self.shift)
+
+    def inverse(self) -> "Rigid":
+        back = Rigid(self.quaternion * [-1, -1, -1, 1], np.zeros(3))
+        return Rigid(back.quaternion, -(back._rotation() @ self.shift))
+
+    def between(self, other: "Rigid", t: float) -> "Rigid":
+        """At t in [0, 1] on the way to ``other``: shifts linearly, rotation at constant speed the shorter way."""
+        a, b = self.quaternion, other.quaternion
+        cosine = float(a @ b)
+        if cosine < 0.0:
+            b, cosine = -b, -cosine
+        angle = np.arccos(min(cosine, 1.0))
+        if angle < 1e-6:  # the sines vanish; linear is exact to rounding
+            mixed = (1 - t) * a + t * b
+        else:
+            mixed = np.sin((1 - t) * angle) * a + np.sin(t * angle) * b
+        return Rigid(mixed / np.linalg.norm(mixed), (1 - t) * self.shift + t * other.shift)
+
+    def _rotation(self) -> np.ndarray:
+        x, y, z, w = self.quaternion
+        return np.array(
+            [
+                [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+                [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+                [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+            ]
+        )
+
+
+IDENTITY = Rigid(np.array([0.0, 0.0, 0.0, 1.0]), np.zeros(3))
+
+
+def _product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    (ax, ay, az, aw), (bx, by, bz, bw) = a, b
+    product = np.array(
+        [
+            aw * bx + ax * bw + ay * bz - az * by,
+            aw * by - ax * bz + ay * bw + az * bx,
+            aw * bz + ax * by - ay * bx + az * bw,
+            aw * bw - ax * bx - ay * by - az * bz,
+        ]
+    )
+    return product / np.linalg.norm(product)
