@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Record the topics of a node into MCAP: raw subscriptions, so that a file holds the very bytes that were sent."""
+"""`hpccd record`: record the topics of a running node into MCAP until told to stop."""
 
 import signal
 import sys
@@ -11,76 +11,14 @@ import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 
-from hpccd_ros import _env, mcap_qos, node_parameters, recorded_topics
+from hpccd_ros import _env, node_parameters, recorded_topics
 from hpccd_ros.errors import UserError
-from hpccd_ros.mcap_bag import BagWriter, Topic
+from hpccd_ros.mcap_bag import BagWriter
 from hpccd_ros.mcap_decode import message_class
-from hpccd_ros.mesh_attachment import attachment_name
+from hpccd_ros.mesh_attachment import mesh_files
 from hpccd_ros.recorded_topics import Wanted
-from hpccd_ros.version import package_version
-
-
-class Recorder:
-    """Subscribes to the wanted topics through `node` and writes every message to `bag` until told to stop.
-
-    received: messages so far, by resolved topic name. lost: messages that did not get here, by topic, found by gaps
-    in the numbers that a topic's publisher counts (known where it has one publisher only).
-    """
-
-    def __init__(self, node, bag: BagWriter, wanted: list[Wanted], depth: int):
-        self._node = node
-        self._bag = bag
-        self.received: dict[str, int] = {}
-        self.lost: dict[str, int] = {}
-        self.taken = 0  # messages handed over by the middleware, those after the end too
-        self._end: int | None = None
-        self._sequence: dict[str, int] = {}
-        self._subscriptions = {}
-        for topic in wanted:
-            name = node.resolve_topic_name(topic.name)
-            qos = recorded_topics.subscription_qos(node, name, topic.latched, depth)
-            self.received[name] = 0
-            self._subscriptions[name] = node.create_subscription(
-                message_class(topic.type_name), name, self._receiver(name, topic), qos, raw=True
-            )
-
-    @property
-    def topics(self) -> list[str]:
-        return list(self._subscriptions)
-
-    def publishers(self, topic: str) -> int:
-        """Publishers that this recorder is connected to on `topic` (resolved name)."""
-        return self._subscriptions[topic].get_publisher_count()
-
-    def end(self) -> None:
-        """From now on take only what had arrived before: it belongs to the recording, what comes later does not."""
-        self._end = time.time_ns()
-
-    def _receiver(self, name, topic):
-        def receive(data, info):
-            self.taken += 1
-            if self._end is not None and info["received_timestamp"] > self._end:
-                return
-            if self.received[name] == 0:
-                self._bag.add_topic(Topic(name, topic.type_name, self._offered_qos(name), topic.latched))
-            self.received[name] += 1
-            self._watch_for_loss(name, info["publication_sequence_number"])
-            self._bag.write(
-                name, data, info["received_timestamp"], info["source_timestamp"], info["publication_sequence_number"]
-            )
-
-        return receive
-
-    def _offered_qos(self, name):
-        offers = [p.qos_profile for p in self._node.get_publishers_info_by_topic(name)]
-        # A publisher that sent and left at once is not listed any more: what was asked of it, it offered.
-        return mcap_qos.offered_qos(offers or [self._subscriptions[name].qos_profile])
-
-    def _watch_for_loss(self, name, sequence):
-        last = self._sequence.get(name)
-        self._sequence[name] = sequence
-        if last is not None and sequence > last + 1 and self.publishers(name) == 1:
-            self.lost[name] = self.lost.get(name, 0) + sequence - last - 1
+from hpccd_ros.recording_info import recording_info
+from hpccd_ros.topic_recorder import Recorder
 
 
 def main(args) -> int:
@@ -107,16 +45,12 @@ def _record(node, target, args, stop) -> int:
     if not parameters.get("meshes"):
         raise UserError(f"the node {args.node} has no parameter `meshes`: is it an hpccd node?")
     wanted = recorded_topics.of_node(parameters) + [_extra(text) for text in args.topic]
-    info = {
-        "format": 1,
-        "hpccd": package_version(),
-        "node": args.node,
-        "parameters": parameters,
-        # The role of each topic, whatever it was remapped to.
-        "topics": {node.resolve_topic_name(topic.name): topic.name for topic in wanted},
-    }
+    files, missing = mesh_files(parameters)
+    for text in missing:
+        print(text, file=sys.stderr, flush=True)
+    info = recording_info(args.node, parameters, wanted, node.resolve_topic_name)
     try:
-        bag = BagWriter(target, info=info, attachments=_mesh_files(parameters), compression=args.compression,
+        bag = BagWriter(target, info=info, attachments=files, compression=args.compression,
                         flush_interval=args.flush, max_bytes=int(args.split_size * 1e6), max_seconds=args.split_time)
     except (ValueError, OSError) as error:
         raise UserError(str(error)) from error
@@ -127,7 +61,7 @@ def _record(node, target, args, stop) -> int:
     finally:
         bag.close()
     _report(bag, recorder)
-    return 0
+    return 1 if bag.write_errors else 0
 
 
 def _spin(node, recorder, bag, contacts, args, stop):
@@ -149,13 +83,7 @@ def _spin(node, recorder, bag, contacts, args, stop):
         if args.frames and recorder.received[contacts] >= args.frames:
             break
     status.clear()
-    recorder.end()
-    # At most `depth` messages of each topic can have been waiting.
-    most = recorder.taken + args.depth * len(recorder.topics)
-    taken = -1
-    while taken != recorder.taken and recorder.taken < most:
-        taken = recorder.taken
-        executor.spin_once(timeout_sec=0.05)
+    recorder.finish(executor, args.depth)
     executor.shutdown()
 
 
@@ -173,7 +101,9 @@ class Status:
             self._next += self.PERIOD
             lost = sum(self._recorder.lost.values())
             print(f"\r{self._bag.message_count} messages, {self._recorder.received[self._contacts]} of contacts, "
-                  f"{self._bag.size / 1e6:.1f} MB, {lost} lost   ", end="", file=sys.stderr, flush=True)
+                  f"{self._bag.size / 1e6:.1f} MB, {lost} lost"
+                  + (f", {self._bag.not_written.total()} NOT WRITTEN ({self._bag.last_error})"
+                     if self._bag.failing else "") + "   ", end="", file=sys.stderr, flush=True)
 
     def clear(self):
         if sys.stderr.isatty():
@@ -186,23 +116,13 @@ def _report(bag, recorder):
             lost = recorder.lost.get(name, 0)
             print(f"  {name}: {count} messages" + (f", {lost} LOST on the way here" if lost else ""))
     files = bag.file_paths
+    for path in bag.torn_files:
+        print(f"  {path} ends early, without index: `hpccd doctor {path} --recover OUT.mcap`")
+    if bag.write_errors:
+        print(f"  {bag.not_written.total()} messages NOT WRITTEN, {bag.write_errors} write errors, the last: "
+              f"{bag.last_error}")
     where = str(files[0]) if len(files) == 1 else f"{len(files)} files in {bag.path}"
     print(f"recorded {bag.message_count} messages, {bag.size / 1e6:.2f} MB: {where}", flush=True)
-
-
-def _mesh_files(parameters) -> list[tuple[str, bytes]]:
-    """The mesh files that the node was given: without them a replay elsewhere could not rebuild its scene."""
-    found = []
-    for mesh in parameters["meshes"]:
-        path = parameters.get(f"mesh.{mesh}.file")
-        if not path:
-            continue
-        try:
-            found.append((attachment_name(mesh, path), Path(path).expanduser().read_bytes()))
-        except OSError as error:
-            print(f"mesh file {path} is not in the recording ({error.strerror}): a replay will need it at that place",
-                  file=sys.stderr, flush=True)
-    return found
 
 
 def _extra(text) -> Wanted:

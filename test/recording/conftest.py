@@ -9,12 +9,19 @@ from pathlib import Path
 
 import pytest
 
+import hpccd_ros
 from hpccd_ros.demo.children import Children
 
 ROOT = Path(__file__).resolve().parents[2]
 
 # Domains 0..101 are safe on Linux whatever the ephemeral port range is.
 os.environ.setdefault("ROS_DOMAIN_ID", str(1 + os.getpid() % 100))
+
+# Processes import the package from where the tests do, and the rest from where this process finds it: the messages of a
+# colcon workspace lie on PYTHONPATH.
+SOURCES = os.pathsep.join(
+    [str(Path(hpccd_ros.__file__).parents[1]), *filter(None, [os.environ.get("PYTHONPATH")])]
+)
 
 _numbers = itertools.count()
 
@@ -32,7 +39,7 @@ def hpccd(tmp_path):
     def run(*arguments, **options):
         return subprocess.run(
             [sys.executable, "-m", "hpccd_ros.cli", *map(str, arguments)], cwd=tmp_path, text=True,
-            capture_output=True, timeout=300, env={**os.environ, "PYTHONPATH": str(ROOT)}, **options,
+            capture_output=True, timeout=300, env={**os.environ, "PYTHONPATH": SOURCES}, **options,
         )  # fmt: skip
 
     return run
@@ -41,7 +48,7 @@ def hpccd(tmp_path):
 @pytest.fixture
 def children(tmp_path, monkeypatch):
     """Starts processes that are ended with the test."""
-    monkeypatch.setenv("PYTHONPATH", str(ROOT))
+    monkeypatch.setenv("PYTHONPATH", SOURCES)
     folder = tmp_path / "logs"
     folder.mkdir()
     with Children(folder) as started:

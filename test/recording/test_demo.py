@@ -9,7 +9,7 @@ import time
 from pathlib import Path
 
 import pytest
-from conftest import ROOT
+from conftest import SOURCES
 from matplotlib.image import imread
 
 SMALL = ["demo", "--size", "0.1", "--frames", "40", "--rate", "40"]
@@ -63,7 +63,7 @@ def test_demo_can_be_run_again(hpccd, tmp_path, demo_domain):
 def test_interrupted_demo_leaves_no_process(tmp_path, demo_domain, number):
     process = subprocess.Popen(
         [sys.executable, "-m", "hpccd_ros.cli", "demo", "--size", "0.1", "--rate", "5"], cwd=tmp_path,
-        stdout=subprocess.PIPE, text=True, env={**os.environ, "PYTHONPATH": str(ROOT)},
+        stdout=subprocess.PIPE, text=True, env={**os.environ, "PYTHONPATH": SOURCES},
     )  # fmt: skip
     for line in process.stdout:
         if line.startswith("processes"):
