@@ -295,8 +295,8 @@ def _options(settings: dict[str, Any]) -> Options:
     )
 
 
-def main(argv: list[str] | None = None) -> int:
-    """Run the node until SIGINT or SIGTERM.
+def main(argv: list[str] | None = None, node_type: type[HpccdNode] = HpccdNode) -> int:
+    """Run the node until SIGINT or SIGTERM; node_type: a class built on HpccdNode, to look into it.
 
     Returns the exit status: 0 ended as told, 1 could not be configured, 2 wrong parameters.
     """
@@ -305,7 +305,7 @@ def main(argv: list[str] | None = None) -> int:
     _env.prepare()
     rclpy.init(args=argv, signal_handler_options=SignalHandlerOptions.NO)
     try:
-        node = HpccdNode()
+        node = node_type()
     except ParameterError as error:
         print(f"hpccd: {error}", file=sys.stderr)
         rclpy.try_shutdown()
