@@ -31,6 +31,8 @@ from hpccd_ros.parameters import ParameterError
 from hpccd_ros.refusal_log import RefusalLog
 from hpccd_ros.unknown_meshes import UnknownMeshWatch
 
+YIELD = 2e-5  # s; what counts is that it is not 0
+
 
 class HpccdNode(LifecycleNode):
     """Streams of vertices in, contacts out.
@@ -203,6 +205,10 @@ class HpccdNode(LifecycleNode):
         for frame in frames:
             for lost in self._queue.put(frame):
                 self._count_dropped(lost, Reason.OVERLOAD)
+        if frames:
+            # Lets the detection thread have the interpreter at once, not when the executor is back in its wait: the
+            # hand-over takes 0.03 instead of 0.35 ms.
+            time.sleep(YIELD)
 
     def _count_dropped(self, frame: SceneFrame, reason: Reason) -> None:
         for mesh in frame.fresh:
@@ -211,7 +217,10 @@ class HpccdNode(LifecycleNode):
     def _publish(self, found: Detection) -> None:
         """Called by the detection thread."""
         settings, end = self._settings, found.end
-        message = ContactArray(step=end.step, accuracy=found.options.accuracy, backend=found.backend)
+        # check_fields: its arrays are taken as they are, not copied.
+        message = ContactArray(
+            step=end.step, accuracy=found.options.accuracy, backend=found.backend, check_fields=True
+        )
         message.header.stamp = convert.ns_to_stamp(end.stamp)
         message.header.frame_id = end.frame_id
         message.start = convert.ns_to_stamp(found.start.stamp)
