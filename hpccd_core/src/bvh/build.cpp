@@ -46,7 +46,7 @@ class Builder {
       : tree_(tree), scene_(scene), features_(features), vertex_boxes_(vertex_boxes), pool_(pool) {}
 
   void run() {
-    carriers_of_mesh();
+    group_by_mesh();
     split_meshes();
     tree_.level_begin = {0};
     while (!level_.empty()) split_level();
@@ -61,39 +61,44 @@ class Builder {
     return b;
   }
 
-  void carriers_of_mesh() {
+  void group_by_mesh() {
     const std::uint32_t n = features_.n_carriers();
+    first_of_mesh_.assign(scene_.meshes().size() + 1, 0);
+    for (std::uint32_t m : features_.mesh_of_carrier) ++first_of_mesh_[m + 1];
+    std::partial_sum(first_of_mesh_.begin(), first_of_mesh_.end(), first_of_mesh_.begin());
+    std::vector<std::uint32_t> next(first_of_mesh_.begin(), first_of_mesh_.end() - 1);
     order_.resize(n);
-    std::iota(order_.begin(), order_.end(), 0);
-    std::stable_sort(order_.begin(), order_.end(), [&](std::uint32_t a, std::uint32_t b) {
-      return features_.mesh_of_carrier[a] < features_.mesh_of_carrier[b];
-    });
+    for (std::uint32_t c = 0; c < n; ++c) order_[next[features_.mesh_of_carrier[c]]++] = c;
     centroids_.resize(n);
-    parallel_for(pool_, n, 4096, [&](std::size_t begin, std::size_t end, int) {
+    parallel_for(pool_, n, 1024, [&](std::size_t begin, std::size_t end, int) {
       for (std::size_t c = begin; c < end; ++c) centroids_[c] = centroid_of(carrier_box(static_cast<std::uint32_t>(c)));
     });
   }
 
+  Centroid center_of_mesh(std::uint32_t m) const {
+    const Scene::Mesh& mesh = scene_.meshes()[m];
+    Box b;
+    for (std::uint32_t v = mesh.first_vertex; v < mesh.first_vertex + mesh.n_vertices; ++v) b.include(vertex_boxes_[v]);
+    return centroid_of(b);
+  }
+
   // Upper part: a tree over whole meshes, so that below it every node belongs to one mesh.
   void split_meshes() {
-    std::vector<std::vector<std::uint32_t>> carriers(scene_.meshes().size());
-    for (std::uint32_t c : order_) carriers[features_.mesh_of_carrier[c]].push_back(c);
+    const std::size_t n_meshes = scene_.meshes().size();
+    const auto is_empty = [&](std::size_t m) { return first_of_mesh_[m] == first_of_mesh_[m + 1]; };
     std::vector<std::uint32_t> meshes;
-    std::vector<Centroid> centers(carriers.size());
-    for (std::uint32_t m = 0; m < carriers.size(); ++m) {
-      if (carriers[m].empty()) continue;
-      Box b;
-      for (std::uint32_t c : carriers[m]) b.include(carrier_box(c));
-      centers[m] = centroid_of(b);
-      meshes.push_back(m);
-    }
+    for (std::uint32_t m = 0; m < n_meshes; ++m)
+      if (!is_empty(m)) meshes.push_back(m);
+    std::vector<Centroid> centers(n_meshes);
+    if (meshes.size() > 1)
+      for (std::uint32_t m : meshes) centers[m] = center_of_mesh(m);
     if (meshes.empty()) return;
     struct MeshRange {
       std::uint32_t node, begin, end;
     };
     tree_.nodes.push_back({});
     std::vector<MeshRange> queue{{0, 0, static_cast<std::uint32_t>(meshes.size())}};
-    std::vector<std::uint32_t> node_of_mesh(carriers.size());
+    std::vector<std::uint32_t> node_of_mesh(n_meshes);
     for (std::size_t i = 0; i < queue.size(); ++i) {
       const MeshRange r = queue[i];
       if (r.end - r.begin == 1) {
@@ -106,13 +111,16 @@ class Builder {
       queue.push_back({child, r.begin, r.begin + half});
       queue.push_back({child + 1, r.begin + half, r.end});
     }
-    std::uint32_t at = 0;
+    // In the order of the upper tree: neighbours in space are neighbours in memory.
+    std::vector<std::uint32_t> order;
+    order.reserve(order_.size());
     for (std::uint32_t m : meshes) {
-      const auto begin = at;
-      for (std::uint32_t c : carriers[m]) order_[at++] = c;
+      const auto begin = static_cast<std::uint32_t>(order.size());
+      order.insert(order.end(), order_.begin() + first_of_mesh_[m], order_.begin() + first_of_mesh_[m + 1]);
       tree_.nodes[node_of_mesh[m]].mesh = m;
-      level_.push_back({node_of_mesh[m], begin, at});
+      level_.push_back({node_of_mesh[m], begin, static_cast<std::uint32_t>(order.size())});
     }
+    order_.swap(order);
   }
 
   std::uint32_t add_children(std::uint32_t parent) {
@@ -157,55 +165,69 @@ class Builder {
     // Leaves in the order of their carriers: neighbours in space are neighbours in memory.
     std::sort(leaf_ranges_.begin(), leaf_ranges_.end(),
               [](const Range& a, const Range& b) { return a.begin < b.begin; });
-    for (const Range& r : leaf_ranges_) {
-      LeafRange leaf{};
-      leaf.first_face = static_cast<std::uint32_t>(tree_.face_of_slot.size());
-      leaf.first_edge = static_cast<std::uint32_t>(tree_.edge_of_slot.size());
-      leaf.first_vertex = static_cast<std::uint32_t>(tree_.vertex_of_slot.size());
-      std::sort(order_.begin() + r.begin, order_.begin() + r.end);
-      for (std::uint32_t i = r.begin; i < r.end; ++i) {
-        const std::uint32_t c = order_[i];
-        if (c < features_.n_faces()) tree_.face_of_slot.push_back(c);
-        for (auto e = features_.first_edge[c]; e < features_.first_edge[c + 1]; ++e)
-          tree_.edge_of_slot.push_back(features_.owned_edges[e]);
-        for (auto v = features_.first_vertex[c]; v < features_.first_vertex[c + 1]; ++v)
-          tree_.vertex_of_slot.push_back(features_.owned_vertices[v]);
-      }
-      leaf.end_face = static_cast<std::uint32_t>(tree_.face_of_slot.size());
-      leaf.end_edge = static_cast<std::uint32_t>(tree_.edge_of_slot.size());
-      leaf.end_vertex = static_cast<std::uint32_t>(tree_.vertex_of_slot.size());
-      Node& node = tree_.nodes[r.node];
-      node.leaf = static_cast<std::uint32_t>(tree_.leaves.size());
-      node.carriers = r.end - r.begin;
-      node.only_points = leaf.first_face == leaf.end_face;
-      tree_.leaves.push_back(leaf);
-      tree_.leaf_nodes.push_back(r.node);
-    }
+    const std::size_t n_leaves = leaf_ranges_.size();
+    tree_.leaves.resize(n_leaves);
+    tree_.leaf_nodes.resize(n_leaves);
+    LeafRange at{};
+    for (std::size_t i = 0; i < n_leaves; ++i) tree_.leaves[i] = at = leaf_behind(at, leaf_ranges_[i]);
+    // Room behind the last slot, so that a full vector can be loaded anywhere.
+    const std::size_t n_faces = at.end_face + Tree::load_width, n_edges = at.end_edge + Tree::load_width,
+                      n_vertices = at.end_vertex + Tree::load_width;
+    tree_.face_of_slot.resize(n_faces);
+    tree_.edge_of_slot.resize(n_edges);
+    tree_.vertex_of_slot.resize(n_vertices);
+    for (auto& corner : tree_.face_corners) corner.resize(n_faces);
+    for (auto& end : tree_.edge_ends) end.resize(n_edges);
+    tree_.face_boxes.resize(n_faces);
+    tree_.edge_boxes.resize(n_edges);
+    tree_.vertex_boxes.resize(n_vertices);
+    parallel_for(pool_, n_leaves, 64, [&](std::size_t begin, std::size_t end, int) {
+      for (std::size_t i = begin; i < end; ++i) fill_leaf(i);
+    });
     for (std::size_t i = tree_.nodes.size(); i-- > 0;)
       if (const auto c = tree_.nodes[i].children) {
         const Node &left = tree_.nodes[c], &right = tree_.nodes[c + 1];
         tree_.nodes[i].carriers = left.carriers + right.carriers;
         tree_.nodes[i].only_points = left.only_points && right.only_points;
       }
+  }
 
-    // Room behind the last slot, so that a full vector can be loaded anywhere.
-    const auto pad = Tree::load_width;
-    const auto n_faces = tree_.face_of_slot.size(), n_edges = tree_.edge_of_slot.size(),
-               n_vertices = tree_.vertex_of_slot.size();
-    for (int k = 0; k < 3; ++k) {
-      tree_.face_corners[k].assign(n_faces + pad, 0);
-      for (std::size_t s = 0; s < n_faces; ++s) tree_.face_corners[k][s] = features_.faces[tree_.face_of_slot[s]][k];
+  // The slots of a leaf that follows another.
+  LeafRange leaf_behind(const LeafRange& before, const Range& r) const {
+    LeafRange leaf{before.end_face, before.end_face,   before.end_edge,
+                   before.end_edge, before.end_vertex, before.end_vertex};
+    for (std::uint32_t i = r.begin; i < r.end; ++i) {
+      const std::uint32_t c = order_[i];
+      leaf.end_face += c < features_.n_faces();
+      leaf.end_edge += features_.first_edge[c + 1] - features_.first_edge[c];
+      leaf.end_vertex += features_.first_vertex[c + 1] - features_.first_vertex[c];
     }
-    for (int k = 0; k < 2; ++k) {
-      tree_.edge_ends[k].assign(n_edges + pad, 0);
-      for (std::size_t s = 0; s < n_edges; ++s) tree_.edge_ends[k][s] = features_.edges[tree_.edge_of_slot[s]][k];
+    return leaf;
+  }
+
+  void fill_leaf(std::size_t i) {
+    const Range& r = leaf_ranges_[i];
+    Node& node = tree_.nodes[r.node];
+    tree_.leaf_nodes[i] = r.node;
+    node.leaf = static_cast<std::uint32_t>(i);
+    node.carriers = r.end - r.begin;
+    auto [face, end_face, edge, end_edge, vertex, end_vertex] = tree_.leaves[i];
+    node.only_points = face == end_face;
+    std::sort(order_.begin() + r.begin, order_.begin() + r.end);
+    for (std::uint32_t k = r.begin; k < r.end; ++k) {
+      const std::uint32_t c = order_[k];
+      if (c < features_.n_faces()) {
+        for (int j = 0; j < 3; ++j) tree_.face_corners[j][face] = features_.faces[c][j];
+        tree_.face_of_slot[face++] = c;
+      }
+      for (auto e = features_.first_edge[c]; e < features_.first_edge[c + 1]; ++e) {
+        const std::uint32_t number = features_.owned_edges[e];
+        for (int j = 0; j < 2; ++j) tree_.edge_ends[j][edge] = features_.edges[number][j];
+        tree_.edge_of_slot[edge++] = number;
+      }
+      for (auto v = features_.first_vertex[c]; v < features_.first_vertex[c + 1]; ++v)
+        tree_.vertex_of_slot[vertex++] = features_.owned_vertices[v];
     }
-    tree_.face_of_slot.resize(n_faces + pad);
-    tree_.edge_of_slot.resize(n_edges + pad);
-    tree_.vertex_of_slot.resize(n_vertices + pad);
-    tree_.face_boxes.resize(n_faces + pad);
-    tree_.edge_boxes.resize(n_edges + pad);
-    tree_.vertex_boxes.resize(n_vertices + pad);
   }
 
   Tree& tree_;
@@ -213,7 +235,7 @@ class Builder {
   const Features& features_;
   const std::vector<Box>& vertex_boxes_;
   ThreadPool& pool_;
-  std::vector<std::uint32_t> order_;
+  std::vector<std::uint32_t> first_of_mesh_, order_;
   std::vector<Centroid> centroids_;
   std::vector<Range> level_, leaf_ranges_;
 };
