@@ -26,12 +26,25 @@ _DDS_CHOICES = (
 )
 _DDS_FILES = ("DEFAULT_FASTRTPS_PROFILES.xml", "DEFAULT_FASTDDS_PROFILES.xml")
 
+# In the package's folder config.
+_PROFILES = ("fastdds_localhost.xml", "fastdds.xml")
+
+# The switch that opens discovery to the network (SUBNET), and others that say whom the user wants to meet.
+DISCOVERY = "ROS_AUTOMATIC_DISCOVERY_RANGE"
+_DISCOVERY_CHOICES = (DISCOVERY, "ROS_STATIC_PEERS", "ROS_LOCALHOST_ONLY")
+
 
 def prepare() -> None:
-    """Make package shares findable, choose the DDS profile, keep freed memory. Safe to call again."""
+    """Make package shares findable, choose discovery range and DDS profile, keep freed memory. Safe to call again."""
     _find_shares_of_wheels()
     _choose_dds_profile()
     _keep_freed_memory()
+
+
+def this_host_only() -> bool:
+    """Whether discovery is limited to this machine, as the environment stands after ``prepare``."""
+    localhost_only = os.environ.get("ROS_LOCALHOST_ONLY")  # older, and stronger where both are set
+    return localhost_only == "1" if localhost_only else os.environ.get(DISCOVERY) == "LOCALHOST"
 
 
 def _find_shares_of_wheels() -> None:
@@ -43,13 +56,19 @@ def _find_shares_of_wheels() -> None:
 def _choose_dds_profile() -> None:
     from ament_index_python.packages import PackageNotFoundError, get_package_share_directory
 
-    if any(os.environ.get(name) for name in _DDS_CHOICES) or any(Path(name).is_file() for name in _DDS_FILES):
+    # One of ours was inherited from a parent process, whose discovery range may have been another.
+    chosen = [os.environ[name] for name in _DDS_CHOICES if os.environ.get(name)]
+    if any(Path(value).name not in _PROFILES for value in chosen) or any(Path(name).is_file() for name in _DDS_FILES):
         return
+    # Nobody on the network is met unless asked for: without DDS security whoever is met may send anything.
+    if not any(os.environ.get(name) for name in _DISCOVERY_CHOICES):
+        os.environ[DISCOVERY] = "LOCALHOST"
     try:
         share = get_package_share_directory("hpccd")
     except PackageNotFoundError:
         return  # run from the sources without installation: Fast DDS works with its defaults, only slower
-    os.environ["FASTRTPS_DEFAULT_PROFILES_FILE"] = str(Path(share) / "config" / "fastdds.xml")
+    profile = _PROFILES[0 if this_host_only() else 1]
+    os.environ["FASTRTPS_DEFAULT_PROFILES_FILE"] = str(Path(share) / "config" / profile)
 
 
 def _keep_freed_memory() -> None:

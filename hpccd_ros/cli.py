@@ -10,6 +10,7 @@ import importlib
 import importlib.util
 import sys
 
+from hpccd_ros import dds_security
 from hpccd_ros.errors import UserError
 
 COMMANDS = {
@@ -62,6 +63,11 @@ def main(argv=None) -> int:
         return run(args) or 0
     except UserError as error:
         print(f"hpccd {args.command}: {error}", file=sys.stderr)
+        return 2
+    except RuntimeError as error:  # rclpy's own errors are
+        if (why := dds_security.refusal(error)) is None:
+            raise
+        print(f"hpccd {args.command}: {why}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         print(f"hpccd {args.command}: interrupted", file=sys.stderr)

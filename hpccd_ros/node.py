@@ -17,7 +17,17 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 from visualization_msgs.msg import MarkerArray
 
-from hpccd_ros import _env, convert, detection, parameters, qos, scene_parameters, stop_signals
+from hpccd_ros import (
+    _env,
+    convert,
+    dds_security,
+    detection,
+    node_recording,
+    parameters,
+    qos,
+    scene_parameters,
+    stop_signals,
+)
 from hpccd_ros.detect_service import DetectService, NodeScene
 from hpccd_ros.detection import Detection, DetectionThread, Options
 from hpccd_ros.diagnostics import Metrics, Reporter
@@ -26,6 +36,7 @@ from hpccd_ros.frame_queue import FrameQueue
 from hpccd_ros.inputs import Inputs
 from hpccd_ros.markers import contact_markers
 from hpccd_ros.messages import SceneFrame
+from hpccd_ros.node_recording import NodeRecording
 from hpccd_ros.parameter_table import OUTPUTS
 from hpccd_ros.parameters import ParameterError
 from hpccd_ros.refusal_log import RefusalLog
@@ -51,6 +62,9 @@ class HpccdNode(LifecycleNode):
         self._options = _options(self._settings)
         if why := detection.refusal(self._options):
             raise ParameterError(why)
+        if why := node_recording.refusal(self._settings):
+            raise ParameterError(why)
+        self._recording = NodeRecording(self, self._settings)
         parameters.watch(
             self,
             self._settings,
@@ -95,6 +109,7 @@ class HpccdNode(LifecycleNode):
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Start the detection thread and subscribe."""
+        self._recording.follow(active=True)  # first: what the node hears, the recording shall have
         if self._inputs is not None:
             self._queue = FrameQueue(self._settings["frame_queue"])
             self._thread = DetectionThread(
@@ -118,7 +133,8 @@ class HpccdNode(LifecycleNode):
         self.get_logger().info(
             f"active: meshes {', '.join(self._mesh_settings) or 'none (service only)'}; "
             f"accuracy {self._options.accuracy}, backend {self._options.backend}, "
-            f"contacts on {self._contacts.topic_name}"
+            f"contacts on {self._contacts.topic_name}; discovery "
+            + (f"on this host only ({_env.DISCOVERY}=SUBNET opens it)" if _env.this_host_only() else "beyond this host")
         )
         return TransitionCallbackReturn.SUCCESS
 
@@ -160,6 +176,7 @@ class HpccdNode(LifecycleNode):
                 self._count_dropped(frame, Reason.STOPPED)
             self._thread.join()
             self._queue = self._thread = None
+        self._recording.end()
 
     def _release(self) -> None:
         if self._service is not None:
@@ -193,6 +210,8 @@ class HpccdNode(LifecycleNode):
             scene_parameters.check(wanted, meshes)
         except ParameterError as error:
             return str(error)
+        if why := node_recording.refusal(wanted):
+            return why
         options = _options(wanted)
         return None if options == self._options else detection.refusal(options)
 
@@ -200,6 +219,7 @@ class HpccdNode(LifecycleNode):
         self._options = _options(self._settings)
         if self._inputs is not None:
             self._inputs.assembler.restart_after = self._settings["restart_after"]
+        self._recording.follow(active=self.state == "active")
 
     def _enqueue(self, frames: list[SceneFrame]) -> None:
         for frame in frames:
@@ -287,6 +307,7 @@ class HpccdNode(LifecycleNode):
                 links=self._links,
                 warnings=[line for part in (inputs, self._unknown) if part is not None for line in part.warnings()],
                 service=self._service.counts,
+                recording=self._recording.status(),
             )
         )
 
@@ -307,18 +328,25 @@ def _options(settings: dict[str, Any]) -> Options:
 def main(argv: list[str] | None = None, node_type: type[HpccdNode] = HpccdNode) -> int:
     """Run the node until SIGINT or SIGTERM; node_type: a class built on HpccdNode, to look into it.
 
-    Returns the exit status: 0 ended as told, 1 could not be configured, 2 wrong parameters.
+    Returns the exit status: 0 ended as told, 1 could not be configured, 2 wrong parameters, 3 DDS security is demanded
+    and cannot be had.
     """
     stop = Future()
     stop_signals.watch(lambda: stop.set_result(None))
     _env.prepare()
-    rclpy.init(args=argv, signal_handler_options=SignalHandlerOptions.NO)
     try:
+        rclpy.init(args=argv, signal_handler_options=SignalHandlerOptions.NO)
         node = node_type()
     except ParameterError as error:
         print(f"hpccd: {error}", file=sys.stderr)
         rclpy.try_shutdown()
         return 2
+    except RuntimeError as error:  # rclpy's own errors are
+        if (why := dds_security.refusal(error)) is None:
+            raise
+        print(f"hpccd: {why}", file=sys.stderr)
+        rclpy.try_shutdown()
+        return 3
     executor = SingleThreadedExecutor()
     executor.add_node(node)
     try:

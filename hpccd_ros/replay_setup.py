@@ -61,8 +61,8 @@ def of_recording(recording: Recording, parameter_file: str | None = None) -> Rep
     for name, row in meshes.items():
         if row["transform"] == "tf":
             raise RecordingError(
-                f"{recording.path}: mesh {name} was transformed by tf (parameter mesh.{name}.transform), and transforms "
-                "are not recorded: its positions cannot be computed again"
+                f"{recording.path}: mesh {name} was transformed by tf (parameter mesh.{name}.transform), and "
+                "transforms are not recorded: its positions cannot be computed again"
             )
     relative = info.get("topics") or _by_suffix(recording, settings["meshes"])
     roles = {}
