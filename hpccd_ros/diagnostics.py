@@ -132,10 +132,12 @@ class Reporter:
         links: Mapping[str, int],
         warnings: list[str],
         service: Mapping[str, int],
+        recording: tuple[bytes, str, Mapping[str, object]] | None = None,
     ) -> DiagnosticArray:
         """static_taken: accepted messages of static meshes, which count as answered.
+        recording: level, message and values of the node's own recording, where there is one.
 
-        Message of four statuses: frames, detection, service, process."""
+        Message of the statuses frames, detection, service, process, and recording where there is one."""
         now = time.monotonic()
         period, self._time = max(now - self._time, 1e-9), now
         data = self._metrics.snapshot()
@@ -147,6 +149,7 @@ class Reporter:
             self._detection(data, period, state),
             self._status("service", DiagnosticStatus.OK, "~/detect", service),
             self._status("process", DiagnosticStatus.OK, state, {"state": state, **_memory()}),
+            *([self._status("recording", *recording)] if recording is not None else []),
         ]
         return out
 

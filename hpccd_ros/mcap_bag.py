@@ -109,6 +109,11 @@ class BagWriter:
         return sum(file.message_count for file in self._files)
 
     @property
+    def flushed_count(self) -> int:
+        """Messages that survive the death of this process."""
+        return sum(file.message_count - file.open_chunk.total() for file in self._files)
+
+    @property
     def file_paths(self) -> list[Path]:
         return [file.path for file in self._files]
 

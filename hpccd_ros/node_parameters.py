@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Read all parameters of a running node over its parameter services."""
+"""All parameters of a node as plain values: of one in this process, or of a running one over its services."""
 
 import time
 
@@ -8,6 +8,11 @@ from rcl_interfaces.srv import GetParameters, ListParameters
 from rclpy.parameter import parameter_value_to_python
 
 from hpccd_ros.errors import UserError
+
+
+def of(node) -> dict:
+    """{name: value} of all parameters of `node`, which lives in this process."""
+    return {name: _plain(parameter.value) for name, parameter in node.get_parameters_by_prefix("").items()}
 
 
 def fetch(node, remote: str, wait: float) -> dict:

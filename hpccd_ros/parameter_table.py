@@ -209,6 +209,49 @@ NODE_ROWS = (
         span=(1e-9, 1e9),
         change=ALWAYS,
     ),
+    Row(
+        "record",
+        "string",
+        "",
+        "Record the meshes and contacts while active: a file ending in .mcap, or a folder; % codes of strftime for "
+        "the date, a number is added where it exists; empty: do not. Changing it begins and ends recordings",
+        change=ALWAYS,
+    ),
+    Row(
+        "record_compression",
+        "string",
+        "none",
+        "Of the next recording",
+        choices=("none", "lz4", "zstd"),
+        change=ALWAYS,
+    ),
+    Row(
+        "record_split_size",
+        "float",
+        0.0,
+        "A new file after so much, in a folder; 0: no limit. For the next recording",
+        unit="MB",
+        span=(0.0, 1e9),
+        change=ALWAYS,
+    ),
+    Row(
+        "record_split_time",
+        "float",
+        0.0,
+        "A new file after so long, in a folder; 0: no limit. For the next recording",
+        unit="s",
+        span=(0.0, 1e9),
+        change=ALWAYS,
+    ),
+    Row(
+        "record_flush",
+        "float",
+        0.5,
+        "Most that a killed node can lose of the next recording",
+        unit="s",
+        span=(0.0, 3600.0),
+        change=ALWAYS,
+    ),
 )
 
 MESH_ROWS = (

@@ -39,9 +39,18 @@ def subscription_qos(node, topic: str, latched: bool, depth: int) -> QoSProfile:
     offers = [p.qos_profile.reliability for p in node.get_publishers_info_by_topic(topic)]
     asked = [s.qos_profile.reliability for s in node.get_subscriptions_info_by_topic(topic)]
     best_effort = ReliabilityPolicy.BEST_EFFORT in (offers or asked)
+    return _profile(ReliabilityPolicy.BEST_EFFORT if best_effort else ReliabilityPolicy.RELIABLE, latched, depth)
+
+
+def as_node_asks(node, topic: str, latched: bool, depth: int, *, reliability: ReliabilityPolicy) -> QoSProfile:
+    """For the node's own recording. reliability: that which the node asks of vertices; topologies are reliable."""
+    return _profile(ReliabilityPolicy.RELIABLE if latched else reliability, latched, depth)
+
+
+def _profile(reliability, latched, depth) -> QoSProfile:
     return QoSProfile(
         history=HistoryPolicy.KEEP_LAST,
         depth=depth,
-        reliability=ReliabilityPolicy.BEST_EFFORT if best_effort else ReliabilityPolicy.RELIABLE,
+        reliability=reliability,
         durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
     )

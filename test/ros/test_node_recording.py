@@ -1,0 +1,168 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The node records itself: the bytes that any recorder hears, begun and ended by a parameter, never at its own cost."""
+
+import random
+import resource
+import signal
+
+import numpy as np
+import pytest
+from lifecycle_msgs.msg import Transition
+from node_process import NodeProcess
+from test_node_life import change_state, set_parameter, stream
+from waving_sheet import sheet_faces, sheet_positions
+
+from hpccd_ros import recorded_topics, replay_setup
+from hpccd_ros.mcap_bag import BagWriter
+from hpccd_ros.mcap_reader import Recording
+from hpccd_ros.mcap_recover import examine, recover
+from hpccd_ros.replay import Replay
+from hpccd_ros.topic_recorder import Recorder
+
+N = 8
+FACES = sheet_faces(N)
+
+
+def _replayed(path):
+    with Recording(path) as recording:
+        replay = Replay(recording, replay_setup.of_recording(recording))
+        steps = list(replay.steps())
+    assert replay.diverged == replay.unverified == 0
+    return steps
+
+
+def _messages(path):
+    with Recording(path) as recording:
+        return [(m.topic, m.publish_time, m.sequence, m.data) for m in recording.messages()]
+
+
+def _recording(node, **expected):
+    """Wait until the status `recording` holds these values; (level, values)."""
+
+    def matches():
+        level, _, values = node.peer.statuses.get("recording", (b"", "", {}))
+        return {k: str(v) for k, v in expected.items()}.items() <= values.items() and (level, values)
+
+    return node.wait_until(matches, f"recording status with {expected}")
+
+
+def _flushed(node, least):
+    """Condition: how many messages the node says it has flushed, once they are `least`."""
+    return lambda: (n := int(node.peer.statuses["recording"][2]["flushed"])) >= least and n
+
+
+def test_the_bytes_that_another_recorder_hears(start_node, tmp_path):
+    node = start_node({"meshes": ["cloth"], "outputs": ["points"], "record": str(tmp_path / "own.mcap")})
+    other = BagWriter(tmp_path / "other.mcap")
+    recorder = Recorder(node.peer.node, other, recorded_topics.of_node({"meshes": ["cloth"]}), 100)
+    node.peer.topology("cloth", FACES, N * N)
+    node.wait_until(lambda: all(recorder.publishers(t) for t in recorder.topics if "vertices" not in t), "matching")
+    stream(node, range(20))
+    node.wait_until(lambda: sum(recorder.received.values()) == 1 + 20 + 19, "the other recording")
+    other.close()
+    level, values = _recording(node, messages=40)
+    assert level == b"\0" and int(values["lost"]) == int(values["not_written"]) == int(values["write_errors"]) == 0
+    assert node.stop() == 0
+
+    own = _messages(tmp_path / "own.mcap")
+    assert sorted(own) == sorted(_messages(tmp_path / "other.mcap"))
+    assert len(own) == 40
+    assert [step.total > 0 for step in _replayed(tmp_path / "own.mcap")] == [True] * 19
+    with Recording(tmp_path / "own.mcap") as recording:
+        assert recording.info["node"] == f"{node.namespace}/hpccd"
+        assert recording.info["parameters"]["outputs"] == ["points"]
+
+
+def test_begun_and_ended_at_run_time(start_node, tmp_path):
+    """By the parameter, and by the life cycle; each recording is complete alone and none is overwritten."""
+    node = start_node({"meshes": ["cloth"], "record_compression": "zstd"})
+    node.peer.topology("cloth", FACES, N * N)
+    stream(node, range(5))
+    assert not list(tmp_path.glob("*.mcap")) and "recording" not in node.peer.statuses
+    assert set_parameter(node, "record", str(tmp_path / "part-%Y.mcap")).successful
+    _recording(node, files=1)
+    # The topology, sent long ago, is latched: it comes to the recorder, then frames can be used.
+    _recording(node, messages=1)
+    stream(node, range(5, 10))
+    _recording(node, messages=1 + 5 + 5)
+    assert set_parameter(node, "record", "").successful
+    (first,) = tmp_path.glob("part-2*.mcap")
+    stream(node, range(10, 12))
+    assert set_parameter(node, "record", str(first)).successful
+    _recording(node, messages=1)
+    assert change_state(node, Transition.TRANSITION_DEACTIVATE)
+    second = first.with_name(f"{first.stem}-1.mcap")
+    assert examine(first).sound and examine(second).sound
+    assert [step.step for step in _replayed(first)] == [0] * 5
+    refused = set_parameter(node, "record", str(first / "no" / "folder"))
+    assert not refused.successful and f"the folder {first} is not writable" in refused.reason
+    refused = set_parameter(node, "record_split_size", 1.0)
+    assert not refused.successful and "cannot split the single file" in refused.reason
+
+
+def test_a_full_disk_stops_only_the_recording(start_node, tmp_path):
+    node = start_node({"meshes": ["cloth"], "record": str(tmp_path / "run"), "record_flush": 0.0})
+    node.peer.topology("cloth", FACES, N * N)
+    stream(node, range(5))
+    _recording(node, messages=1 + 5 + 4)
+    limit = resource.prlimit(node.process.pid, resource.RLIMIT_FSIZE)
+    resource.prlimit(node.process.pid, resource.RLIMIT_FSIZE, (10_000, limit[1]))
+    stream(node, range(5, 25))
+    level, values = node.wait_until(
+        lambda: (s := node.peer.statuses["recording"])[0] == b"\2" and (s[1], s[2]), "an error of the recording"
+    )
+    assert "File too large" in level and int(values["write_errors"]) >= 1
+    # The detection went on: `stream` waits for each answer. With space, the recording does too.
+    resource.prlimit(node.process.pid, resource.RLIMIT_FSIZE, limit)
+    before = int(values["messages"])
+    for k in range(25, 2000):
+        stream(node, [k])
+        level, _, values = node.peer.statuses["recording"]
+        if level == b"\1" and int(values["messages"]) > before + 20:
+            break
+        node.peer.executor.spin_once(timeout_sec=0.05)
+    assert node.stop() == 0
+    files = sorted((tmp_path / "run").glob("*.mcap"))
+    sound = [file for file in files if examine(file).sound]
+    assert sound and len(sound) < len(files)
+    assert len(_replayed(sound[-1])) > 5
+
+
+def test_where_nothing_can_be_recorded(start_node, tmp_path):
+    (tmp_path / "file").write_text("")
+    node = start_node({"meshes": ["cloth"], "record": str(tmp_path / "file" / "run.mcap")}, wait=False)
+    assert node.process.wait(60) == 2
+    assert "is not writable" in node.output()
+
+
+@pytest.mark.parametrize("compression", ["none", "zstd"])
+def test_killed_node_keeps_what_was_flushed(tmp_path, compression):
+    generator = random.Random(7)
+    for number in range(2):
+        path = tmp_path / f"run{number}.mcap"
+        node = NodeProcess(
+            tmp_path,
+            {"meshes": ["cloth"], "record": str(path), "record_flush": 0.1, "record_compression": compression},
+        )
+        try:
+            node.peer.topology("cloth", FACES, N * N)
+            stream(node, range(generator.randrange(10, 60)))
+            flushed = node.wait_until(_flushed(node, 10), "messages flushed")
+            node.stop(signal.SIGKILL)
+        finally:
+            node.close()
+        found = examine(path)
+        assert not found.finished and found.message_count >= flushed
+        recover(path, tmp_path / f"saved{number}.mcap")
+        _replayed(tmp_path / f"saved{number}.mcap")
+
+
+def test_own_recording_holds_what_was_sent(start_node, tmp_path):
+    node = start_node({"meshes": ["cloth"], "record": str(tmp_path / "run"), "record_split_time": 0.5})
+    node.peer.topology("cloth", FACES, N * N)
+    stream(node, range(60))
+    assert node.stop(signal.SIGTERM) == 0
+    steps = _replayed(tmp_path / "run")
+    assert len(steps) == 59
+    for k, step in enumerate(steps):
+        assert np.array_equal(step.start_frame.vertices[0], sheet_positions(N, k))
