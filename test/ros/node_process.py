@@ -34,16 +34,27 @@ _numbers = itertools.count()
 class NodeProcess:
     """``python -m hpccd_ros.node`` in a namespace of its own, and a peer in this process.
 
-    parameters: nested as in YAML, meshes included. remaps: further ``from:=to`` rules.
+    parameters: nested as in YAML, meshes included. profiles: parameter files, read after the parameters.
+    remaps: further ``from:=to`` rules.
     """
 
-    def __init__(self, folder: Path, parameters: dict[str, Any], *, remaps: tuple[str, ...] = (), wait: bool = True):
+    def __init__(
+        self,
+        folder: Path,
+        parameters: dict[str, Any],
+        *,
+        profiles: tuple[Path, ...] = (),
+        remaps: tuple[str, ...] = (),
+        wait: bool = True,
+    ):
         self.namespace = f"/t{os.getpid()}_{next(_numbers)}"
         values = {"diagnostics_period": 0.1, **parameters}
         file = folder / f"parameters{self.namespace[1:]}.yaml"
         file.write_text(yaml.safe_dump({"/**": {"ros__parameters": values}}))
         rules = (f"__ns:={self.namespace}", f"/diagnostics:={self.namespace}/diagnostics", *remaps)
         command = [sys.executable, "-m", "hpccd_ros.node", "--ros-args", "--params-file", str(file)]
+        for profile in profiles:
+            command += ["--params-file", str(profile)]
         for rule in rules:
             command += ["-r", rule]
         self._output = (folder / f"output{self.namespace[1:]}.txt").open("w+")

@@ -148,7 +148,7 @@ def test_changes_at_run_time(node_with):
     assert not change("meshes", ["b"]).successful
 
 
-@pytest.mark.parametrize("path", sorted(CONFIG.glob("*.yaml")), ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", sorted(CONFIG.rglob("*.yaml")), ids=lambda path: path.stem)
 def test_shipped_configurations(path, node_with):
     ((name, body),) = yaml.safe_load(path.read_text()).items()
     assert name == "/**"

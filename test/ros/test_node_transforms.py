@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Meshes in frames of their own, brought into the scene's frame by the node where it is told to."""
+
+import numpy as np
+import pytest
+from geometry_msgs.msg import TransformStamped
+from node_process import assert_same_contacts
+from waving_sheet import scene_of, sheet_faces, sheet_positions
+
+from hpccd_ros import convert, qos
+from hpccd_ros.rigid import Rigid
+
+N = 12
+FACES = sheet_faces(N)
+SECOND = 10**9
+HAND = Rigid.of((0.3, -0.2, 0.1), (0.0, 0.0, np.sin(0.4), np.cos(0.4)))
+SCENE = {"meshes": ["cloth", "net"], "frame_id": "world"}
+
+
+def transform(parent, child, rigid, stamp=0):
+    message = TransformStamped(child_frame_id=child)
+    message.header.frame_id, message.header.stamp = parent, convert.ns_to_stamp(stamp)
+    to = message.transform
+    to.translation.x, to.translation.y, to.translation.z = rigid.shift.tolist()
+    to.rotation.x, to.rotation.y, to.rotation.z, to.rotation.w = rigid.quaternion.tolist()
+    return message
+
+
+def parts(k):
+    """The meshes in the scene's frame; what the net's publisher sends is in the frame of the hand."""
+    net = sheet_positions(N, k + 2, offset=0.003, dtype=np.float64)
+    return sheet_positions(N, k), net, HAND.inverse().apply(net)
+
+
+def send(node, k, frame_id):
+    cloth, _, local = parts(k)
+    node.peer.vertices("cloth", cloth, k * SECOND, frame_id="world")
+    node.peer.vertices("net", local, k * SECOND, frame_id=frame_id)
+
+
+def check(message, k, rigid=HAND):
+    placed = [np.concatenate([parts(s)[0], rigid.apply(parts(s)[2])]) for s in (k - 1, k)]
+    assert message.header.frame_id == "world"
+    assert assert_same_contacts(message, *placed, scene_of(cloth=FACES, net=FACES)) > 0
+
+
+def topologies(node):
+    for name in ("cloth", "net"):
+        node.peer.topology(name, FACES, N * N)
+
+
+def test_pose_of_a_stream(start_node):
+    pose = [*HAND.shift.tolist(), *HAND.quaternion.tolist()]
+    net = {"transform": "pose", "pose": pose, "frame": "hand"}
+    node = start_node({**SCENE, "mesh": {"net": net}})
+    topologies(node)
+    for k in range(2):
+        send(node, k, "hand")
+        node.frames_status(answered=2 * k + 2)
+    check(node.contacts(1)[0], 1)
+    node.peer.vertices("net", parts(2)[2], 2 * SECOND, frame_id="foot")
+    values = node.frames_status(dropped__net__frame_id=1)
+    assert "mesh.net.frame demands 'hand'" in values["last_refusal"]
+
+
+def through_topics(node, publish, publish_static, k):
+    """Frame k and its transform, in an order that must not matter."""
+    if k == 0:
+        publish_static(transform("world", "arm", Rigid.of((0, 0, 0), (0, 0, 0, 1))))
+    if k % 2:
+        publish(transform("arm", "hand", HAND, k * SECOND))
+        send(node, k, "hand")
+    else:
+        send(node, k, "hand")
+        publish(transform("arm", "hand", HAND, k * SECOND))
+    node.frames_status(answered=2 * k + 2, waiting=0)
+
+
+def test_transforms_of_geometry_msgs(start_node):
+    node = start_node({**SCENE, "pending_frames": 2, "mesh": {"net": {"transform": "tf"}}})
+    topologies(node)
+    publisher = node.peer.publisher(TransformStamped, "transforms", qos.TRANSFORMS)
+    static = node.peer.publisher(TransformStamped, "transforms_static", qos.TRANSFORMS_STATIC)
+    for k in range(4):
+        through_topics(node, publisher.publish, static.publish, k)
+    for k, message in enumerate(node.contacts(3), start=1):
+        check(message, k)
+    # A frame without its transform waits, says so, and gives way where too many wait.
+    for k in (4, 5, 6):
+        node.peer.vertices("net", parts(k)[2], k * SECOND, frame_id="hand")
+    values = node.frames_status(dropped__net__no_transform=1, waiting=2)
+    assert "before the stamp 4000000000 ns" in values["last_refusal"]
+    node.wait_until(lambda: "net waits for a transform" in node.peer.statuses["frames"][1], "warning")
+    node.peer.vertices("net", parts(7)[2], 7 * SECOND)
+    values = node.frames_status(dropped__net__frame_id=1)
+    assert "frame_id is empty" in values["last_refusal"]
+    publisher.publish(transform("arm", "hand", Rigid(HAND.quaternion * 2, HAND.shift), 9 * SECOND))
+    node.frames_status(transforms_refused=1)
+    assert "it must be 1" in node.output()
+
+
+def test_transforms_of_tf2(start_node):
+    """As robot_state_publisher sends them; the package tf2_msgs is no wheel."""
+    tf2 = pytest.importorskip("tf2_msgs.msg", reason="tf2_msgs is not installed: /tf is not understood")
+    node = start_node({**SCENE, "mesh": {"net": {"transform": "tf", "frame": "hand"}}})
+    topologies(node)
+    publisher = node.peer.publisher(tf2.TFMessage, "/tf", qos.TRANSFORMS)
+    static = node.peer.publisher(tf2.TFMessage, "/tf_static", qos.TRANSFORMS_STATIC)
+    for k in range(4):
+        through_topics(
+            node,
+            lambda message: publisher.publish(tf2.TFMessage(transforms=[message])),
+            lambda message: static.publish(tf2.TFMessage(transforms=[message])),
+            k,
+        )
+    for k, message in enumerate(node.contacts(3), start=1):
+        check(message, k)

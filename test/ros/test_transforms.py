@@ -1,0 +1,171 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Rigid motions, the tree of frames over time, and frames of a mesh that wait for their transform."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hpccd_ros import transforms
+from hpccd_ros.drops import DropCounter, Reason
+from hpccd_ros.messages import MeshFrame
+from hpccd_ros.parameter_table import MESH_ROWS
+from hpccd_ros.placement import Placement
+from hpccd_ros.rate_limit import RateLimit
+from hpccd_ros.rigid import IDENTITY, Rigid
+from hpccd_ros.transforms import NoTransformError, TransformBuffer
+
+POINTS = np.array([[0.0, 0, 0], [1, 0, 0], [0, 2, 0], [0, 0, 3]])
+SECOND = 10**9
+
+
+def turn(degrees, shift=(0.0, 0.0, 0.0)):
+    """About z, then ``shift``."""
+    half = np.radians(degrees) / 2
+    return Rigid.of(shift, (0.0, 0.0, np.sin(half), np.cos(half)))
+
+
+components = st.floats(-1, 1).filter(lambda x: x == 0 or abs(x) > 1e-3)
+
+
+@st.composite
+def rigids(draw):
+    quaternion = np.array([draw(components) for _ in range(4)])
+    if not quaternion.any():
+        quaternion[3] = 1.0
+    return Rigid.of([10 * draw(components) for _ in range(3)], quaternion / np.linalg.norm(quaternion))
+
+
+@given(rigids(), rigids())
+def test_motions_compose_and_invert(a, b):
+    assert np.allclose(b.after(a).apply(POINTS), b.apply(a.apply(POINTS)), atol=1e-12)
+    assert np.allclose(a.inverse().apply(a.apply(POINTS)), POINTS, atol=1e-12)
+    edges = np.linalg.norm(np.diff(POINTS, axis=0), axis=1)
+    assert np.allclose(np.linalg.norm(np.diff(a.apply(POINTS), axis=0), axis=1), edges, atol=1e-12)
+    assert np.allclose(a.between(b, 0.0).apply(POINTS), a.apply(POINTS), atol=1e-9)
+    assert np.allclose(a.between(b, 1.0).apply(POINTS), b.apply(POINTS), atol=1e-9)
+
+
+def test_rotation_between_two_samples_has_constant_speed():
+    for t in (0.25, 0.5, 0.75):
+        assert np.allclose(turn(10).between(turn(130), t).apply(POINTS), turn(10 + 120 * t).apply(POINTS))
+
+
+def test_lookup_along_the_tree():
+    buffer = TransformBuffer()
+    buffer.add("world", "base", Rigid.of((1, 0, 0), (0, 0, 0, 1)), None)
+    buffer.add("base", "hand", turn(0), 1 * SECOND)
+    buffer.add("base", "hand", turn(90, (0, 0, 2)), 2 * SECOND)
+    buffer.add("world", "/camera", turn(180), None)  # names with the slash of ROS 1 are the same frames
+    at = buffer.lookup("hand", "world", 3 * SECOND // 2)
+    assert np.allclose(at.apply(POINTS), turn(45, (1, 0, 1)).apply(POINTS))
+    there = buffer.lookup("hand", "camera", 2 * SECOND)
+    assert np.allclose(there.apply(POINTS), turn(180).inverse().after(turn(90, (1, 0, 2))).apply(POINTS))
+    assert buffer.lookup("anything", "anything", 0) is IDENTITY
+
+
+@pytest.mark.parametrize(
+    "source, stamp, text, final",
+    [
+        ("hand", 3, "before the stamp", False),
+        ("hand", 0, "after the stamp", True),
+        ("foot", 1, "no transform connects 'foot' and 'world'", False),
+        ("head", 1, "form a loop", False),
+    ],
+    ids=["not yet", "never", "unknown", "loop"],
+)
+def test_missing_transforms_say_what_is_missing(source, stamp, text, final):
+    buffer = TransformBuffer()
+    for k in (1, 2):
+        buffer.add("world", "hand", turn(0), k * SECOND)
+    buffer.add("neck", "head", turn(0), None)
+    buffer.add("head", "neck", turn(0), None)
+    with pytest.raises(NoTransformError, match=text) as caught:
+        buffer.lookup(source, "world", stamp * SECOND)
+    assert caught.value.final == final
+
+
+def test_what_strangers_send_is_bounded(monkeypatch):
+    buffer = TransformBuffer()
+    for k in range(30):
+        buffer.add("world", "hand", turn(k), k * SECOND)
+    with pytest.raises(NoTransformError):
+        buffer.lookup("hand", "world", 15 * SECOND)  # older than ten seconds
+    buffer.lookup("hand", "world", 25 * SECOND)
+    monkeypatch.setattr(transforms, "MOST_FRAMES", 2)
+    buffer.add("world", "foot", turn(0), None)
+    with pytest.raises(ValueError, match="one too many"):
+        buffer.add("world", "tail", turn(0), None)
+    for parent, child in (("", "a"), ("a", ""), ("a", "/a")):
+        with pytest.raises(ValueError, match="two different names"):
+            buffer.add(parent, child, turn(0), None)
+
+
+def test_source_that_starts_anew_is_not_mixed_with_its_past():
+    buffer = TransformBuffer()
+    buffer.add("world", "hand", turn(0), 100 * SECOND)
+    for k in (1, 2):
+        buffer.add("world", "hand", turn(90 * k), k * SECOND)
+    assert np.allclose(buffer.lookup("hand", "world", 2 * SECOND).apply(POINTS), turn(180).apply(POINTS))
+    with pytest.raises(NoTransformError):
+        buffer.lookup("hand", "world", 50 * SECOND)
+
+
+def placement(buffer=None, drops=None, **row):
+    values = {r.name: r.default for r in MESH_ROWS} | row
+    return Placement("cloth", values, "world", 2, drops or DropCounter(), buffer)
+
+
+def frame(stamp, frame_id="hand"):
+    return MeshFrame(stamp, POINTS.astype(np.float32), frame_id=frame_id)
+
+
+def test_positions_are_untouched_where_nothing_is_asked_for():
+    given = frame(1, "anything")
+    assert placement().take(given) == [(given, False)]
+
+
+def test_placed_by_a_pose():
+    ((placed, new),) = placement(transform="pose", frame="hand", pose=[0, 0, 1, 0, 0, 0, 1]).take(frame(1), True)
+    assert new and placed.frame_id == "world" and placed.vertices.dtype == np.float64
+    assert np.array_equal(placed.vertices, POINTS + [0, 0, 1])
+    drops = DropCounter()
+    assert placement(drops=drops, transform="pose", frame="hand").take(frame(1, "foot")) == []
+    assert drops.by_mesh_and_reason() == {("cloth", Reason.FRAME_ID): 1}
+
+
+def test_frames_wait_in_order_for_their_transforms():
+    buffer, texts = TransformBuffer(), []
+    drops = DropCounter(lambda mesh, reason, text: texts.append(text))
+    gate = placement(buffer, drops, transform="tf", frame="hand")
+    assert gate.take(frame(1 * SECOND)) == gate.take(frame(2 * SECOND, "")) == [] and gate.waiting == 2
+    assert "no transform connects 'hand' and 'world'" in gate.warnings()[0]
+    assert gate.take(frame(3 * SECOND)) == [] and gate.waiting == 2, "the oldest gave way"
+    assert drops.by_reason() == {Reason.NO_TRANSFORM: 1} and "no transform connects" in texts[0]
+    for k in (2, 3):
+        buffer.add("world", "hand", turn(90 * k), k * SECOND)
+    ready = gate.retry()
+    assert [f.stamp for f, _ in ready] == [2 * SECOND, 3 * SECOND] and gate.waiting == 0 and not gate.warnings()
+    assert np.allclose(ready[0][0].vertices, turn(180).apply(POINTS))
+    assert gate.take(frame(SECOND)) == [] and gate.waiting == 0, "older than what is kept: will never come"
+    assert drops.by_reason() == {Reason.NO_TRANSFORM: 2}
+    gate.take(frame(9 * SECOND))
+    gate.clear(Reason.STOPPED)
+    assert gate.waiting == 0 and drops.by_reason()[Reason.STOPPED] == 1
+
+
+def test_frame_to_transform_from_must_be_named():
+    drops = DropCounter()
+    assert placement(TransformBuffer(), drops, transform="tf").take(frame(1, "")) == []
+    assert drops.by_reason() == {Reason.FRAME_ID: 1}
+
+
+def test_rate_limit():
+    now = [0.0]
+    limit = RateLimit(10.0, clock=lambda: now[0])
+    assert [limit.allows() for _ in range(11)] == [True] * 10 + [False], "a burst of one second's worth"
+    now[0] = 0.25
+    assert [limit.allows() for _ in range(3)] == [True, True, False]
+    now[0] = 100.0
+    assert sum(limit.allows() for _ in range(20)) == 10
+    assert all(RateLimit(0.0, clock=lambda: 0.0).allows() for _ in range(1000))
