@@ -1,11 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Draw recorded steps into picture files: shaded meshes, contacts as points coloured by their time in the step.
+"""Look at recorded steps: pictures of shaded meshes with contacts coloured by their time in the step, or all of it in
+the Rerun viewer.
 
   hpccd view run.mcap                       the step with most contacts, into run.png
   hpccd view run.mcap --step 30 -o frame.png
   hpccd view run.mcap --every 1 -o frames   a sequence frames/000000.png, ... of every step, for a film
+  hpccd view run.mcap --rerun               opens the Rerun viewer; without a screen, writes run.rrd
+  hpccd view run.mcap -o run.rrd            meshes, contacts, normals and curves on a timeline, to open elsewhere
 
-Needs no display and no graphics driver.
+Pictures need no display and no graphics driver. Rerun comes with the extra "rerun".
 """
 
 from hpccd_ros.errors import UserError
@@ -13,10 +16,14 @@ from hpccd_ros.errors import UserError
 
 def configure(parser):
     parser.add_argument("file", metavar="FILE", help="recording: an .mcap file, or a folder of them")
-    parser.add_argument("-o", "--output", metavar="PATH", help="picture (.png, .jpg, .pdf), or folder with --every")
+    parser.add_argument("-o", "--output", metavar="PATH",
+                        help="picture (.png, .jpg, .pdf), Rerun recording (.rrd), or folder with --every")
+    parser.add_argument("--rerun", action="store_true",
+                        help="open the Rerun viewer; where there is no screen, write a Rerun recording")
     which = parser.add_mutually_exclusive_group()
     which.add_argument("--step", type=int, metavar="N", help="step number (default: the one with most contacts)")
-    which.add_argument("--every", type=int, metavar="K", help="each K-th step, into a folder")
+    which.add_argument("--every", type=int, metavar="K",
+                       help="each K-th step, into a folder or the Rerun recording (there: default 1)")
     parser.add_argument("--azimuth", type=float, default=-60.0, metavar="DEG",
                         help="from where to look, around z (default: %(default)s)")
     parser.add_argument("--elevation", type=float, default=26.0, metavar="DEG",

@@ -1,12 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """`hpccd view`: which steps of a recording to draw, and where to put the pictures."""
 
+import contextlib
+import os
 from pathlib import Path
 
 from hpccd_ros import replay_setup
 from hpccd_ros.errors import UserError
 from hpccd_ros.mcap_reader import Recording
 from hpccd_ros.picture.of_recording import History, draw_step
+from hpccd_ros.picture.rerun_recording import RerunWriter, need_rerun
 from hpccd_ros.replay import Replay
 
 
@@ -15,10 +18,16 @@ def main(args) -> int:
     source = Path(args.file)
     title = args.title or source.stem
     view = {"azimuth": args.azimuth, "elevation": args.elevation}
+    in_rerun = args.rerun or str(args.output).endswith(".rrd")
+    if in_rerun:
+        need_rerun()  # before anything is computed
+    outputs = ("points", "normals") if in_rerun else ("points",)
     with Recording(source) as recording:
         setup = replay_setup.of_recording(recording, args.params)
-        steps = (s for s in Replay(recording, setup, outputs=("points",)).steps() if s.contacts is not None)
-        if args.every is None:
+        steps = (s for s in Replay(recording, setup, outputs=outputs).steps() if s.contacts is not None)
+        if in_rerun:
+            _show_in_rerun(args, steps, source, title, view)
+        elif args.every is None:
             target = Path(args.output or source.with_suffix(".png").name)
             _draw_one(args, steps, target, title, view)
         else:
@@ -26,6 +35,30 @@ def main(args) -> int:
             target.mkdir(parents=True, exist_ok=True)
             _draw_many(args, steps, target, title, view)
     return 0
+
+
+def _show_in_rerun(args, steps, source, title, view):
+    # Without a screen, or where a file is named: written.
+    target = args.output or (None if _has_screen() else f"{source.stem}.rrd")
+    count = 0
+    try:
+        with contextlib.closing(RerunWriter(title, target, **view)) as writer:
+            for number, step in enumerate(steps):
+                if step.step == args.step if args.step is not None else number % (args.every or 1) == 0:
+                    writer.add(step)
+                    count += 1
+                    print(f"\r{count} steps", end="", flush=True)
+    except OSError as error:
+        raise UserError(f"--output {target}: {error.strerror}") from error
+    print()
+    if not count:
+        raise UserError(f"{args.file}: no step {args.step if args.step is not None else ''} that can be shown")
+    if target is not None:
+        print(f"{target}: {count} steps, {Path(target).stat().st_size / 1e6:.1f} MB; open it with: rerun {target}")
+
+
+def _has_screen() -> bool:
+    return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 
 def _draw_one(args, steps, target, title, view):

@@ -1,0 +1,120 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Steps of a replayed recording as a Rerun recording: meshes, contacts by their time, normals, curves, timelines."""
+
+import numpy as np
+
+from hpccd_ros import extras
+from hpccd_ros.picture.contacts import MESH_COLOURS, TOC_COLOURS
+from hpccd_ros.picture.shading import vertex_normals
+from hpccd_ros.replay import Step
+
+# Parts of the largest extent of the first step's scene.
+POINT_RADIUS, NORMAL_LENGTH, EYE_DISTANCE = 0.003, 0.03, 1.5
+# Contacts between layers show through.
+MESH_ALPHA = 190
+
+
+def need_rerun():
+    """The module rerun, or UserError."""
+    return extras.require("rerun", "rerun", "a Rerun recording")
+
+
+class RerunWriter:
+    """Writes steps, computed with outputs=("points", "normals"), to `path` (.rrd), or to a viewer it opens (None).
+
+    Entities: meshes/NAME in the middle of the step, contacts/vertex_face, contacts/edge_edge coloured by toc,
+    contacts/normals, and curves of contacts, first_toc and milliseconds of the core. Timelines: step (the number that
+    the publisher gave), stamp (its end).
+    azimuth, elevation: degrees, from where the viewer looks first.
+    Raises UserError where rerun-sdk is not installed, OSError where `path` cannot be written.
+    """
+
+    def __init__(self, title: str, path=None, *, azimuth=-60.0, elevation=26.0):
+        self._rr = rr = need_rerun()
+        self._stream = rr.RecordingStream("hpccd")
+        if path is None:
+            self._stream.spawn()
+        else:
+            with open(path, "wb"):  # rerun tells of a path that cannot be written only in a log
+                pass
+            self._stream.save(path)
+        self._stream.send_recording_name(title)
+        self._topologies = {}
+        self._extent = 0.0
+        self._direction = np.radians([azimuth, elevation])
+
+    def close(self) -> None:
+        """Hand all to the file or the viewer."""
+        self._stream.flush()
+        self._stream.disconnect()
+
+    def add(self, step: Step) -> None:
+        rr, stream = self._rr, self._stream
+        if not self._extent:
+            self._look_at(np.concatenate([np.asarray(v, np.float64) for v in step.end_frame.vertices]))
+        stream.set_time("step", sequence=step.step)
+        stream.set_time("stamp", timestamp=np.datetime64(step.end, "ns"))
+        for index, name in enumerate(step.layout.mesh_names):
+            self._add_mesh(index, name, step)
+        self._add_contacts(step)
+        for name, value in (
+            ("contacts", step.total),
+            ("milliseconds", step.milliseconds),
+            ("first_toc", float(step.contacts.first_toc) if step.total else np.nan),
+        ):
+            stream.log(f"curves/{name}", rr.Scalars(value))
+
+    def _look_at(self, vertices):
+        low, high = vertices.min(axis=0), vertices.max(axis=0)
+        self._extent = float((high - low).max()) or 1.0
+        azimuth, elevation = self._direction
+        towards = [np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)]
+        middle = 0.5 * (low + high)
+        self._stream.send_blueprint(_blueprint(middle + EYE_DISTANCE * self._extent * np.array(towards), middle))
+
+    def _add_mesh(self, index, name, step):
+        rr, topology = self._rr, step.end_frame.topologies[index]
+        entity = f"meshes/{name}"
+        if self._topologies.get(name) is not topology:
+            self._topologies[name] = topology
+            fields = {"triangle_indices": topology.faces}
+            colour = MESH_COLOURS[index % len(MESH_COLOURS)]
+            fields["albedo_factor"] = [*(int(colour[k : k + 2], 16) for k in (1, 3, 5)), MESH_ALPHA]
+            self._stream.log(entity, rr.Mesh3D.from_fields(clear_unset=True, **fields))
+        # In the middle of the step, so that contacts at any time of it lie close to the surfaces.
+        middle = 0.5 * (np.asarray(step.start_frame.vertices[index], np.float64) + step.end_frame.vertices[index])
+        normals = vertex_normals(middle, topology.faces)
+        self._stream.log(entity, rr.Mesh3D.from_fields(vertex_positions=middle, vertex_normals=normals))
+
+    def _add_contacts(self, step):
+        rr, found = self._rr, step.contacts
+        points, normals, n_vf = np.asarray(found.points), np.asarray(found.normals), len(found.vf)
+        toc = np.concatenate([found.vf_toc, found.ee_toc])
+        colours = (255 * TOC_COLOURS(toc)[:, :3]).astype(np.uint8)
+        radius = POINT_RADIUS * self._extent
+        for name, part in (("vertex_face", slice(0, n_vf)), ("edge_edge", slice(n_vf, None))):
+            self._stream.log(f"contacts/{name}", rr.Points3D(points[part], colors=colours[part], radii=radius))
+        self._stream.log(
+            "contacts/normals",
+            rr.Arrows3D(origins=points, vectors=NORMAL_LENGTH * self._extent * normals, colors=colours,
+                        radii=0.2 * radius),
+        )  # fmt: skip
+
+
+def _blueprint(eye, target):
+    import rerun.blueprint as rrb
+
+    return rrb.Blueprint(
+        rrb.Vertical(
+            rrb.Spatial3DView(
+                name="meshes and contacts", origin="/", contents=["/meshes/**", "/contacts/**"],
+                eye_controls=rrb.EyeControls3D(kind=rrb.Eye3DKind.Orbital, position=eye, look_target=target,
+                                               eye_up=[0, 0, 1]),
+            ),
+            rrb.Horizontal(*(rrb.TimeSeriesView(name=name, origin=f"/curves/{name}")
+                             for name in ("contacts", "first_toc", "milliseconds"))),
+            row_shares=[4, 1],
+        ),
+        rrb.TimePanel(state="collapsed", timeline="step"),
+        collapse_panels=True,
+    )  # fmt: skip
