@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: Apache-2.0
+"""An independent DDS implementation, in a process without ROS, streams to the node and reads its contacts."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from builtin_interfaces.msg import Time
+from hpccd.msg import ContactArray
+from node_process import PATIENCE, assert_same_contacts
+from std_msgs.msg import Header
+from waving_sheet import scene_of, sheet_faces, sheet_positions
+
+pytest.importorskip("cyclonedds", reason="Cyclone DDS is not installed: pip install 'hpccd[interop]'")
+
+# The node listens on the loopback interface only, where multicast is off: the peer has to name it.
+LOOPBACK = """
+<CycloneDDS><Domain><General><Interfaces><NetworkInterface address="127.0.0.1"/></Interfaces></General>
+<Discovery><ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>100</MaxAutoParticipantIndex>
+<Peers><Peer address="127.0.0.1"/></Peers></Discovery></Domain></CycloneDDS>
+"""
+
+
+def play(node, folder, faces, frames):
+    """Let the peer stream ``frames``; the answers as messages."""
+    source, target = folder / "frames.npz", folder / "answers.json"
+    np.savez(source, faces=faces, frames=frames)
+    peer = subprocess.run(
+        [sys.executable, str(Path(__file__).with_name("cyclone_peer.py")), node.namespace, str(source), str(target)],
+        env={**os.environ, "CYCLONEDDS_URI": LOOPBACK}, capture_output=True, text=True, timeout=4 * PATIENCE,
+    )  # fmt: skip
+    assert peer.returncode == 0, peer.stdout + peer.stderr + node.output()
+    return [message_of(fields) for fields in json.loads(target.read_text())]
+
+
+def message_of(fields):
+    """A ContactArray of the same values."""
+    header = Header(stamp=Time(**fields["header"]["stamp"]), frame_id=fields["header"]["frame_id"])
+    return ContactArray(**{**fields, "header": header, "start": Time(**fields["start"])})
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_peer_gets_the_contacts_of_the_core(start_node, tmp_path, dtype):
+    n, outputs = 16, ("points", "normals")
+    node = start_node({"meshes": ["cloth"], "outputs": list(outputs)})
+    frames = np.stack([sheet_positions(n, k, dtype=dtype) for k in range(6)])
+    answers = play(node, tmp_path, sheet_faces(n), frames)
+    assert_all_but_one(answers, frames, sheet_faces(n), outputs=outputs)
+    assert answers[0].step == 1, "answers that fit one datagram are not lost"
+    for answer in answers:
+        assert len(answer.points) == len(answer.normals) == 3 * answer.total
+        assert (answer.header.frame_id, list(answer.mesh_names)) == ("lab", ["cloth"])
+    node.frames_status(received=6, answered=6, dropped=0)
+
+
+def test_large_messages_cross_over_udp(start_node, tmp_path):
+    """A hundred thousand contacts: several megabytes in fragments, between two implementations."""
+    n = 100
+    node = start_node({"meshes": ["cloth"], "max_contacts": 0})
+    frames = np.stack([sheet_positions(n, k) for k in (2, 3, 4)])
+    answers = play(node, tmp_path, sheet_faces(n), frames)
+    assert_all_but_one(answers, frames, sheet_faces(n))
+    assert answers[-1].total > 100_000
+
+
+def assert_all_but_one(answers, frames, faces, **options):
+    """Every answer equals the core's, and at most one is missing.
+
+    Cyclone's reader takes what was written before the first heartbeat that it hears for older than itself. Fast DDS
+    sends the first one among the fragments of the first answer that has more than one: that answer is passed over.
+    """
+    assert len({answer.step for answer in answers}) == len(answers) >= len(frames) - 2
+    for answer in answers:
+        end = answer.step
+        assert (answer.start.nanosec, answer.header.stamp.nanosec) == (end, end + 1)
+        assert assert_same_contacts(answer, frames[end - 1], frames[end], scene_of(cloth=faces), **options) > 100
