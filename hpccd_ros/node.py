@@ -264,6 +264,7 @@ class HpccdNode(LifecycleNode):
                 "backend": found.backend,
                 "threads": found.threads,
                 "contacts": message.total,
+                "contacts_sent": len(message.kind),
                 "first_toc": message.first_toc,
                 "step": end.step,
                 **{f"core.{name}": value for name, value in found.stats.items()},

@@ -4,6 +4,7 @@
 from collections.abc import Callable
 
 from hpccd.msg import MeshVertices
+from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.subscription import Subscription
 from sensor_msgs.msg import PointCloud2
@@ -40,7 +41,8 @@ class UnknownMeshWatch:
         self._count = count
         self._topics: dict[str, Subscription | None] = {}
         self._prefix = node.resolve_topic_name("meshes/x").removesuffix("x")
-        self._timer = node.create_timer(1.0, self._look)
+        # Steady time: simulated time may stand still.
+        self._timer = node.create_timer(1.0, self._look, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def close(self) -> None:
         self._node.destroy_timer(self._timer)

@@ -124,12 +124,14 @@ class Peer:
         self.executor.add_node(self.node)
         self.received: list[ContactArray] = []
         self.statuses: dict[str, tuple[bytes, str, dict[str, str]]] = {}
+        self.reported_at: int | None = None  # ns, in the time of the node
         deep = QoSProfile(depth=1000, history=HistoryPolicy.KEEP_LAST)
         self.node.create_subscription(ContactArray, "contacts", self.received.append, deep)
         self.node.create_subscription(DiagnosticArray, "diagnostics", self._on_diagnostics, 10)
         self._publishers: dict[str, Any] = {}
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
+        self.reported_at = convert.stamp_to_ns(message.header.stamp)
         for status in message.status:
             values = {v.key: v.value for v in status.values}
             self.statuses[status.name.rpartition(": ")[2]] = (status.level, status.message, values)

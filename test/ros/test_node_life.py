@@ -4,6 +4,7 @@
 import signal
 import threading
 
+import numpy as np
 import pytest
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
@@ -12,6 +13,7 @@ from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import Parameter
 from waving_sheet import scene_of, sheet_faces, sheet_positions
 
+import hpccd_core as hc
 from hpccd_ros import convert
 
 N = 8
@@ -39,6 +41,10 @@ def stream(node, steps, start=0):
     for k in steps:
         node.peer.vertices("cloth", sheet_positions(N, k), start + k)
         node.contacts(max(0, k))
+
+
+def state(node):
+    return call(node, GetState, "get_state", GetState.Request()).current_state.label
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=["SIGINT", "SIGTERM"])
@@ -113,14 +119,10 @@ def test_misspelt_parameter_is_told(start_node):
 
 def test_life_cycle(start_node):
     node = start_node({"meshes": ["cloth"], "autostart": False}, wait=False)
-
-    def state():
-        return call(node, GetState, "get_state", GetState.Request()).current_state.label
-
-    assert state() == "unconfigured"
+    assert state(node) == "unconfigured"
     assert change_state(node, Transition.TRANSITION_CONFIGURE)
     node.wait_until(lambda: node.peer.statuses, "diagnostics")
-    assert state() == "inactive"
+    assert state(node) == "inactive"
     assert change_state(node, Transition.TRANSITION_ACTIVATE)
     node.peer.topology("cloth", FACES, N * N)
     stream(node, range(3))
@@ -138,12 +140,71 @@ def test_life_cycle(start_node):
     assert_same_contacts(message, sheet_positions(N, 4), sheet_positions(N, 5), scene_of(cloth=FACES))
     assert change_state(node, Transition.TRANSITION_DEACTIVATE)
     assert change_state(node, Transition.TRANSITION_CLEANUP)
-    assert state() == "unconfigured"
+    assert state(node) == "unconfigured"
     assert change_state(node, Transition.TRANSITION_CONFIGURE)
     assert change_state(node, Transition.TRANSITION_ACTIVATE)
     assert change_state(node, Transition.TRANSITION_ACTIVE_SHUTDOWN)
-    assert state() == "finalized"
+    assert state(node) == "finalized"
     assert node.stop() == 0
+
+
+def test_scene_is_changed_while_unconfigured(start_node):
+    """Scene and streams are read when configured: told so while they are in use, taken after a clean-up."""
+    node = start_node({"meshes": ["cloth", "net"], "max_vertices": 10_000})
+    for name in ("cloth", "net"):
+        node.peer.topology(name, FACES, N * N)
+    frames = [sheet_positions(N, k) for k in range(4)]
+    for k in range(2):
+        for name in ("cloth", "net"):
+            node.peer.vertices(name, frames[k], k)
+        node.contacts(k)
+    scene = scene_of(cloth=FACES, net=FACES)
+    assert_same_contacts(node.contacts(1)[0], *(np.concatenate([f, f]) for f in frames[:2]), scene)
+    changes = [
+        ("mesh.net.static", True),
+        ("ignored_pairs", ["net:cloth"]),
+        ("pair_accuracy", ["cloth:cloth:fast"]),
+        ("stamp_match", "nearest"),
+        ("max_vertices", 5_000),
+    ]
+    for name, value in changes:
+        result = set_parameter(node, name, value)
+        assert not result.successful and f"{name}: read-only while the node is configured" in result.reason
+    assert change_state(node, Transition.TRANSITION_DEACTIVATE)
+    assert "deactivate and clean up first" in set_parameter(node, "stamp_match", "nearest").reason
+    assert change_state(node, Transition.TRANSITION_CLEANUP)
+    for name, value in changes:
+        assert set_parameter(node, name, value).successful, name
+    for name, value, reason in [
+        ("mesh.cloth.file", "/nowhere/cloth.obj", ""),  # found out when it is read
+        ("ignored_pairs", ["net:towel"], "two different meshes out of cloth, net"),
+        ("mesh.net.pose", [0.0] * 7, "mesh.net.pose: "),
+        ("meshes", ["cloth"], "read-only"),
+    ]:
+        result = set_parameter(node, name, value)
+        assert result.successful == (not reason) and reason in result.reason
+    assert not change_state(node, Transition.TRANSITION_CONFIGURE)
+    assert state(node) == "unconfigured" and "/nowhere/cloth.obj: no such file" in node.output()
+    assert set_parameter(node, "mesh.cloth.file", "").successful
+    assert change_state(node, Transition.TRANSITION_CONFIGURE)
+    assert change_state(node, Transition.TRANSITION_ACTIVATE)
+    for name in ("cloth", "net"):  # latched, but these publishers were matched by the subscriptions that are gone
+        for kind in ("topology", "vertices"):
+            node.peer.forget_publisher(f"meshes/{name}/{kind}")
+        node.peer.topology(name, FACES, N * N)
+    node.peer.vertices("net", frames[3], 0)
+    node.frames_status(answered=5)
+    before = len(node.peer.received)
+    for k in (2, 3):
+        node.peer.vertices("cloth", frames[k], 10 + k)
+        node.frames_status(answered=4 + k)
+    scene = hc.Scene()
+    scene.add_mesh("cloth", FACES)
+    scene.add_mesh("net", FACES, static=True)
+    scene.ignore_pair("cloth", "net")
+    scene.set_accuracy("cloth", "cloth", "fast")
+    message = node.contacts(before + 1)[before]
+    assert assert_same_contacts(message, *(np.concatenate([f, frames[3]]) for f in frames[2:]), scene) > 0
 
 
 def test_options_change_at_run_time(start_node):

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from node_process import assert_same_contacts
 from rclpy.qos import ReliabilityPolicy
+from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import PointCloud2
 from test_convert import F32, F64, cloud
 from visualization_msgs.msg import MarkerArray
@@ -227,6 +228,80 @@ def test_markers_on_request(start_node):
     vertex_face, edge_edge, normals = array.markers
     assert len(vertex_face.points) + len(edge_edge.points) == 20 and len(normals.points) == 40
     assert vertex_face.header.frame_id == "world" and vertex_face.scale.x == 0.5
+
+
+def test_markers_come_at_their_rate_only(start_node):
+    node = start_node({"meshes": ["cloth"], "markers": True, "markers_rate": 0.001})
+    markers = []
+    node.peer.node.create_subscription(MarkerArray, "markers", markers.append, qos.MARKERS)
+    node.peer.topology("cloth", FACES, N * N)
+    node.wait_until(lambda: node.peer.node.count_publishers("markers"), "publisher of markers")
+    for k in range(5):
+        node.peer.vertices("cloth", sheet_positions(N, k), stamp=k)
+        node.contacts(k)
+    node.wait_until(lambda: markers, "markers")
+    node.frames_status(answered=5)
+    assert len(markers) == 1, "the next one would be due in a thousand seconds"
+
+
+def test_simulated_time(start_node):
+    """The node's own stamps are of /clock; frames are answered whether it runs or not."""
+    node = start_node({"meshes": ["cloth"], "use_sim_time": True}, remaps=("/clock:=clock",))
+    node.peer.topology("cloth", FACES, N * N)
+    frames = [sheet_positions(N, k) for k in range(3)]
+    for k in range(2):
+        node.peer.vertices("cloth", frames[k], stamp=k)
+    message = node.contacts(1)[0]
+    assert_same_contacts(message, *frames[:2], scene_of(cloth=FACES))
+    assert node.peer.reported_at == 0, "no /clock yet: simulated time is zero, and reports go on"
+    clock = node.peer.publisher(Clock, "clock")
+    for seconds in (1234, 5):  # a simulator that starts anew goes back
+        now = Clock(clock=convert.ns_to_stamp(seconds * 10**9))
+
+        def told(now=now):
+            clock.publish(now)  # again and again: /clock is read best effort
+            return node.peer.reported_at == convert.stamp_to_ns(now.clock)
+
+        node.wait_until(told, f"report at {seconds} s")
+    node.peer.vertices("cloth", frames[2], stamp=2)
+    assert convert.stamp_to_ns(node.contacts(2)[1].header.stamp) == 2, "stamps of answers are those of the frames"
+
+
+def test_meshes_at_rates_of_their_own(start_node):
+    """The slower mesh is used again while it is the nearest; a frame without a near one is counted."""
+    node = start_node(
+        {"meshes": ["cloth", "net"], "stamp_match": "nearest", "stamp_tolerance": 15e-9, "frame_queue": 100}
+    )
+    for name in ("cloth", "net"):
+        node.peer.topology(name, FACES, N * N)
+    cloth = {10 * k: sheet_positions(N, k) for k in range(1, 8)}
+    net = {stamp: sheet_positions(N, stamp, offset=0.004) for stamp in (12, 42, 95)}
+    for stamp, vertices in net.items():
+        node.peer.vertices("net", vertices, stamp)
+    for stamp, vertices in cloth.items():
+        node.peer.vertices("cloth", vertices, stamp)
+    nearest = {10: 12, 20: 12, 30: 42, 40: 42, 50: 42}  # 60 and 70 are more than 15 ns away from 42 and 95
+    node.frames_status(received=10, dropped=2, dropped__cloth__incomplete=2, waiting=1)
+    assert "60 ns has no frame of net within the tolerance" in node.output()
+    scene = scene_of(cloth=FACES, net=FACES)
+    messages = node.contacts(4)
+    for before, after, message in zip(list(nearest)[:-1], list(nearest)[1:], messages, strict=True):
+        assert convert.stamp_to_ns(message.header.stamp) == after
+        ends = (np.concatenate([cloth[stamp], net[nearest[stamp]]]) for stamp in (before, after))
+        assert_same_contacts(message, *ends, scene)
+
+
+def test_messages_beyond_the_rate_are_counted(start_node):
+    node = start_node({"meshes": ["cloth"], "max_rate": 2.0, "input_depth": 100})
+    node.peer.topology("cloth", FACES, N * N)
+    for k in range(40):
+        node.peer.vertices("cloth", sheet_positions(N, k % 4), stamp=k)
+    values = node.wait_until(
+        lambda: (v := node.peer.statuses["frames"][2])["received"] == "40" and v, "status with all messages"
+    )
+    refused = int(values["dropped.cloth.rate"])
+    assert 0 < refused <= 38, "two at once are within the rate; how many more depends on how long sending took"
+    assert "parameter max_rate" in values["last_refusal"]
 
 
 def test_best_effort_input(start_node):
