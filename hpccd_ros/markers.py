@@ -1,11 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Contacts as visualization_msgs markers for RViz and Foxglove: thinned out, so that a viewer keeps up."""
+"""What RViz and Foxglove show: contacts as markers, thinned out so that viewers keep up, and vertices."""
+
+from collections.abc import Sequence
 
 import numpy as np
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import Point
-from std_msgs.msg import ColorRGBA
+from sensor_msgs.msg import PointCloud2, PointField
+from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
+
+from hpccd_ros import convert
 
 # Colour-blind safe pair (Okabe and Ito): vertex-face orange, edge-edge blue.
 _VERTEX_FACE = ColorRGBA(r=0.90, g=0.62, b=0.0, a=1.0)
@@ -52,6 +57,24 @@ def contact_markers(
         lines,
     )
     return MarkerArray(markers=[*spheres, normal])
+
+
+def surface_cloud(vertices: Sequence[np.ndarray], header: Header) -> PointCloud2:
+    """All vertices of all meshes, (n,3) each; fields x y z FLOAT32 and mesh UINT32, the number of the mesh.
+
+    Triangles would be drawn nicer, but markers hold them point by point: 0.3 s for 90,000 triangles.
+    """
+    counts = [len(part) for part in vertices]
+    cloud = np.empty(sum(counts), [("xyz", np.float32, 3), ("mesh", np.uint32)])
+    np.concatenate(vertices, out=cloud["xyz"], casting="same_kind")
+    cloud["mesh"] = np.repeat(np.arange(len(counts), dtype=np.uint32), counts)
+    step = cloud.dtype.itemsize
+    out = PointCloud2(header=header, height=1, width=len(cloud), point_step=step, row_step=step * len(cloud))
+    out.fields = [PointField(name=n, offset=4 * i, datatype=PointField.FLOAT32, count=1) for i, n in enumerate("xyz")]
+    out.fields.append(PointField(name="mesh", offset=12, datatype=PointField.UINT32, count=1))
+    out.is_dense = True
+    out.data = convert.to_field(cloud.view(np.uint8))
+    return out
 
 
 def _marker(

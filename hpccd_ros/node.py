@@ -15,6 +15,8 @@ from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
+from sensor_msgs.msg import PointCloud2
+from std_msgs.msg import Header
 from visualization_msgs.msg import MarkerArray
 
 from hpccd_ros import (
@@ -34,7 +36,7 @@ from hpccd_ros.diagnostics import Metrics, Reporter
 from hpccd_ros.drops import DropCounter, Reason
 from hpccd_ros.frame_queue import FrameQueue
 from hpccd_ros.inputs import Inputs
-from hpccd_ros.markers import contact_markers
+from hpccd_ros.markers import contact_markers, surface_cloud
 from hpccd_ros.messages import SceneFrame
 from hpccd_ros.node_recording import NodeRecording
 from hpccd_ros.parameter_table import OUTPUTS
@@ -99,6 +101,7 @@ class HpccdNode(LifecycleNode):
             return TransitionCallbackReturn.FAILURE
         self._contacts = self.create_publisher(ContactArray, "contacts", qos.CONTACTS)
         self._markers = self.create_publisher(MarkerArray, "markers", qos.MARKERS)
+        self._surface = self.create_publisher(PointCloud2, "surface", qos.MARKERS)
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", qos.DIAGNOSTICS)
         # Steady time: diagnostics go on while simulated time stands still.
         self._timer = self.create_timer(
@@ -183,7 +186,7 @@ class HpccdNode(LifecycleNode):
             self._service.close()
             self._service = None
             self.destroy_timer(self._timer)
-            for publisher in (self._contacts, self._markers, self._diagnostics):
+            for publisher in (self._contacts, self._markers, self._surface, self._diagnostics):
                 self.destroy_publisher(publisher)
         self._inputs = None
 
@@ -272,17 +275,22 @@ class HpccdNode(LifecycleNode):
         )
         if settings["markers"] and now >= self._markers_after:
             self._markers_after = now + 1.0 / settings["markers_rate"]
-            self._markers.publish(
-                contact_markers(
-                    np.asarray(found.contacts.points),
-                    np.asarray(found.contacts.normals),
-                    len(found.contacts.vf),
-                    stamp=message.header.stamp,
-                    frame_id=end.frame_id,
-                    size=settings["markers_size"],
-                    limit=settings["markers_max"],
-                )
+            self._show(found, message.header)
+
+    def _show(self, found: Detection, header: Header) -> None:
+        """For viewers: called by the detection thread."""
+        self._surface.publish(surface_cloud(found.end.vertices, header))
+        self._markers.publish(
+            contact_markers(
+                np.asarray(found.contacts.points),
+                np.asarray(found.contacts.normals),
+                len(found.contacts.vf),
+                stamp=header.stamp,
+                frame_id=header.frame_id,
+                size=self._settings["markers_size"],
+                limit=self._settings["markers_max"],
             )
+        )
 
     def _failed(self, frame: SceneFrame, error: Exception) -> None:
         """Called by the detection thread."""

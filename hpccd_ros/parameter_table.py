@@ -180,7 +180,7 @@ NODE_ROWS = (
         "markers",
         "bool",
         False,
-        "Publish contact points and normals as visualization_msgs/MarkerArray on markers",
+        "For viewers: publish contact points and normals on markers, and the vertices on surface",
         change=ALWAYS,
     ),
     Row(

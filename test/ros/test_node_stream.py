@@ -217,9 +217,12 @@ def test_names_are_relative_and_remappable(start_node):
 
 def test_markers_on_request(start_node):
     node = start_node({"meshes": ["cloth"], "markers": True, "markers_max": 20, "markers_size": 0.5})
-    markers = []
+    markers, surfaces = [], []
     node.peer.node.create_subscription(MarkerArray, "markers", markers.append, qos.MARKERS)
+    node.peer.node.create_subscription(PointCloud2, "surface", surfaces.append, qos.MARKERS)
     node.peer.topology("cloth", FACES, N * N)
+    for topic in ("markers", "surface"):
+        node.wait_until(lambda topic=topic: node.peer.node.count_publishers(topic), f"publisher of {topic}")
     for k in range(2):
         node.peer.vertices("cloth", sheet_positions(N, k), stamp=k, frame_id="world")
     message = node.contacts(1)[0]
@@ -228,6 +231,9 @@ def test_markers_on_request(start_node):
     vertex_face, edge_edge, normals = array.markers
     assert len(vertex_face.points) + len(edge_edge.points) == 20 and len(normals.points) == 40
     assert vertex_face.header.frame_id == "world" and vertex_face.scale.x == 0.5
+    (surface,) = node.wait_until(lambda: surfaces, "vertices for viewers")
+    assert surface.header == vertex_face.header
+    assert np.array_equal(convert.vertices_from_cloud(surface, N * N), sheet_positions(N, 1))
 
 
 def test_markers_come_at_their_rate_only(start_node):
