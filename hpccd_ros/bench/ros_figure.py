@@ -30,5 +30,5 @@ def draw(report, path) -> None:
         axis.set_xlabel("ms; strokes: 95th and 99th percentile", fontsize=8)
         axis.set_title(f"{row['scene']}: {row['mb_in']:.2g} MB in, {row['mb_out']:.2g} MB out, "
                        f"{row['ratio']:.2f} x the echo", fontsize=9)
-    figure.legend(list(used.values()), list(used), loc="outside lower center", ncols=5, fontsize=8, frameon=False)
+    figure.legend(list(used.values()), list(used), loc="outside right upper", fontsize=8, frameon=False)
     drawing.save(figure, path, report, "From publish to contacts: what the node adds to ROS")
