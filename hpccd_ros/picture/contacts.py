@@ -71,23 +71,29 @@ def render(meshes, touched, size, azimuth, elevation):
     vertices = np.concatenate([np.asarray(v, dtype=np.float64) for _, v, _ in meshes])
     offsets = np.cumsum([0] + [len(v) for _, v, _ in meshes])
     faces = np.concatenate([np.asarray(f, dtype=np.int64) + o for (_, _, f), o in zip(meshes, offsets, strict=False)])
-    owner = np.repeat(np.arange(len(meshes)), np.diff(offsets))
-    colours = np.array([_linear(to_rgb(MESH_COLOURS[i % len(MESH_COLOURS)])) for i in range(len(meshes))])[owner]
-    glow, weight = _glow(touched, faces)
-    colours = (1 - TINT * weight[:, None]) * colours + TINT * glow
+    colours = vertex_colours([len(v) for _, v, _ in meshes], faces, touched)
     large = (size[0] * SUPERSAMPLING, size[1] * SUPERSAMPLING)
     camera = Camera(vertices, large, azimuth, elevation)
     buffers = rasterize(camera.project(vertices)[faces], large)
     light = LIGHT @ np.array([[np.cos(np.radians(azimuth + 60)), np.sin(np.radians(azimuth + 60)), 0],
                               [-np.sin(np.radians(azimuth + 60)), np.cos(np.radians(azimuth + 60)), 0], [0, 0, 1]])
-    linear = shade(buffers, camera, vertices, faces, colours, light)
+    shaded = shade(buffers, camera, vertices, faces, colours, light)
     alpha = (buffers.triangle >= 0).astype(np.float64)[..., None]
-    linear = np.concatenate([linear, alpha], axis=2)
+    shaded = np.concatenate([shaded, alpha], axis=2)
     h, w = size[1], size[0]
-    linear = linear.reshape(h, SUPERSAMPLING, w, SUPERSAMPLING, 4).mean(axis=(1, 3))
-    alpha = linear[..., 3:]
-    rgb = _srgb(np.clip(linear[..., :3] / np.maximum(alpha, 1e-9), 0, 1))
+    shaded = shaded.reshape(h, SUPERSAMPLING, w, SUPERSAMPLING, 4).mean(axis=(1, 3))
+    alpha = shaded[..., 3:]
+    rgb = srgb(np.clip(shaded[..., :3] / np.maximum(alpha, 1e-9), 0, 1))
     return np.concatenate([rgb, alpha], axis=2), camera, buffers.depth
+
+
+def vertex_colours(sizes, faces, touched):
+    """(V,3) linear RGB: the meshes' own colours, tinted around the contacts. sizes: vertices of each mesh; faces (F,3)
+    and touched (V,) of all meshes together."""
+    owner = np.repeat(np.arange(len(sizes)), sizes)
+    own = np.array([linear(to_rgb(MESH_COLOURS[i % len(MESH_COLOURS)])) for i in range(len(sizes))])[owner]
+    glow, weight = _glow(touched, faces)
+    return (1 - TINT * weight[:, None]) * own + TINT * glow
 
 
 def _glow(touched, faces):
@@ -95,7 +101,7 @@ def _glow(touched, faces):
     show on the outside of the layers. Spread twice over the edges, or single vertices would make stars."""
     contact = np.isfinite(touched)
     values = np.zeros((len(touched), 4))
-    values[contact, :3] = _linear(TOC_COLOURS(touched[contact])[:, :3])
+    values[contact, :3] = linear(TOC_COLOURS(touched[contact])[:, :3])
     values[contact, 3] = 1.0
     edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
     a, b = np.concatenate([edges, edges[:, ::-1]]).T
@@ -177,10 +183,10 @@ def _style(axes):
         spine.set_color(FAINT)
 
 
-def _linear(srgb):
+def linear(srgb):
     c = np.asarray(srgb, dtype=np.float64)
     return np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4)
 
 
-def _srgb(linear):
+def srgb(linear):
     return np.where(linear <= 0.0031308, linear * 12.92, 1.055 * np.maximum(linear, 0) ** (1 / 2.4) - 0.055)

@@ -21,14 +21,8 @@ class History:
 
 def draw_step(step: Step, path, history: History | None = None, *, title: str, **view) -> None:
     """Write a picture of `step`, which was computed with outputs=("points",). view: azimuth, elevation, size."""
-    found, start, end = step.contacts, step.start_frame, step.end_frame
-    # In the middle of the step, so that contacts at any time of it lie close to the surfaces.
-    meshes = [
-        (name, 0.5 * (np.asarray(v0, np.float64) + v1), topology.faces)
-        for name, v0, v1, topology in zip(
-            step.layout.mesh_names, start.vertices, end.vertices, end.topologies, strict=True
-        )
-    ]
+    found = step.contacts
+    meshes, offsets = meshes_in_the_middle(step), step.layout.vertex_offsets
     triangles = sum(len(faces) for _, _, faces in meshes)
     accuracy = f"accuracy {step.recorded.accuracy}" if step.recorded is not None else None
     first = f"first at t = {found.first_toc:.4f}" if step.total else None
@@ -39,7 +33,7 @@ def draw_step(step: Step, path, history: History | None = None, *, title: str, *
     ]  # fmt: skip
     drawn = picture.Step(
         meshes,
-        _touched(found, meshes, step.layout.vertex_offsets),
+        touched(found, scene_faces(meshes, offsets), offsets[-1]),
         np.asarray(found.points),
         np.concatenate([found.vf_toc, found.ee_toc]),
         len(found.vf),
@@ -55,10 +49,26 @@ def draw_step(step: Step, path, history: History | None = None, *, title: str, *
     picture.draw(drawn, path, context, **view)
 
 
-def _touched(found, meshes, offsets):
+def meshes_in_the_middle(step: Step):
+    """[(name, vertices (V,3), faces (F,3))] in the middle of the step, so that contacts at any time of it lie close to
+    the surfaces."""
+    start, end = step.start_frame, step.end_frame
+    return [
+        (name, 0.5 * (np.asarray(v0, np.float64) + v1), topology.faces)
+        for name, v0, v1, topology in zip(
+            step.layout.mesh_names, start.vertices, end.vertices, end.topologies, strict=True
+        )
+    ]
+
+
+def scene_faces(meshes, offsets):
+    """(F,3) of all meshes [(name, vertices, faces)], in vertex numbers of the scene."""
+    return np.concatenate([np.asarray(f, np.int64) + o for (_, _, f), o in zip(meshes, offsets, strict=False)])
+
+
+def touched(found, faces, n_vertices):
     """(V,) earliest time of contact of each vertex: its own, that of an edge it ends, or of a face around it."""
-    faces = np.concatenate([np.asarray(f, np.int64) + o for (_, _, f), o in zip(meshes, offsets, strict=False)])
-    earliest = np.full(offsets[-1], np.inf)
+    earliest = np.full(n_vertices, np.inf)
     for vertices, toc in (
         (found.vf[:, :1], found.vf_toc),
         (faces[found.vf[:, 1]], found.vf_toc),

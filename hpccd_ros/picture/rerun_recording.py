@@ -4,14 +4,13 @@
 import numpy as np
 
 from hpccd_ros import extras
-from hpccd_ros.picture.contacts import MESH_COLOURS, TOC_COLOURS
+from hpccd_ros.picture.contacts import TOC_COLOURS, srgb, vertex_colours
+from hpccd_ros.picture.of_recording import meshes_in_the_middle, scene_faces, touched
 from hpccd_ros.picture.shading import vertex_normals
 from hpccd_ros.replay import Step
 
 # Parts of the largest extent of the first step's scene.
-POINT_RADIUS, NORMAL_LENGTH, EYE_DISTANCE = 0.003, 0.03, 1.5
-# Contacts between layers show through.
-MESH_ALPHA = 190
+POINT_RADIUS, NORMAL_LENGTH, EYE_DISTANCE = 0.003, 0.03, 1.0
 
 
 def need_rerun():
@@ -22,9 +21,9 @@ def need_rerun():
 class RerunWriter:
     """Writes steps, computed with outputs=("points", "normals"), to `path` (.rrd), or to a viewer it opens (None).
 
-    Entities: meshes/NAME in the middle of the step, contacts/vertex_face, contacts/edge_edge coloured by toc,
-    contacts/normals, and curves of contacts, first_toc and milliseconds of the core. Timelines: step (the number that
-    the publisher gave), stamp (its end).
+    Entities: meshes/NAME in the middle of the step, tinted around contacts; contacts/vertex_face, contacts/edge_edge,
+    coloured by toc; contacts/normals; curves of contacts, first_toc and milliseconds of the core. Timelines: step (the
+    number that the publisher gave), stamp (its end).
     azimuth, elevation: degrees, from where the viewer looks first.
     Raises UserError where rerun-sdk is not installed, OSError where `path` cannot be written.
     """
@@ -39,7 +38,7 @@ class RerunWriter:
                 pass
             self._stream.save(path)
         self._stream.send_recording_name(title)
-        self._topologies = {}
+        self._faces: dict[str, np.ndarray] = {}  # logged last
         self._extent = 0.0
         self._direction = np.radians([azimuth, elevation])
 
@@ -50,12 +49,16 @@ class RerunWriter:
 
     def add(self, step: Step) -> None:
         rr, stream = self._rr, self._stream
+        meshes, offsets = meshes_in_the_middle(step), step.layout.vertex_offsets
         if not self._extent:
-            self._look_at(np.concatenate([np.asarray(v, np.float64) for v in step.end_frame.vertices]))
+            self._look_at(np.concatenate([vertices for _, vertices, _ in meshes]))
         stream.set_time("step", sequence=step.step)
         stream.set_time("stamp", timestamp=np.datetime64(step.end, "ns"))
-        for index, name in enumerate(step.layout.mesh_names):
-            self._add_mesh(index, name, step)
+        faces = scene_faces(meshes, offsets)
+        colours = vertex_colours(np.diff(offsets), faces, touched(step.contacts, faces, offsets[-1]))
+        colours = (255 * srgb(colours)).astype(np.uint8)
+        for index, (name, vertices, own_faces) in enumerate(meshes):
+            self._add_mesh(name, vertices, own_faces, colours[offsets[index] : offsets[index + 1]])
         self._add_contacts(step)
         for name, value in (
             ("contacts", step.total),
@@ -72,19 +75,15 @@ class RerunWriter:
         middle = 0.5 * (low + high)
         self._stream.send_blueprint(_blueprint(middle + EYE_DISTANCE * self._extent * np.array(towards), middle))
 
-    def _add_mesh(self, index, name, step):
-        rr, topology = self._rr, step.end_frame.topologies[index]
-        entity = f"meshes/{name}"
-        if self._topologies.get(name) is not topology:
-            self._topologies[name] = topology
-            fields = {"triangle_indices": topology.faces}
-            colour = MESH_COLOURS[index % len(MESH_COLOURS)]
-            fields["albedo_factor"] = [*(int(colour[k : k + 2], 16) for k in (1, 3, 5)), MESH_ALPHA]
-            self._stream.log(entity, rr.Mesh3D.from_fields(clear_unset=True, **fields))
-        # In the middle of the step, so that contacts at any time of it lie close to the surfaces.
-        middle = 0.5 * (np.asarray(step.start_frame.vertices[index], np.float64) + step.end_frame.vertices[index])
-        normals = vertex_normals(middle, topology.faces)
-        self._stream.log(entity, rr.Mesh3D.from_fields(vertex_positions=middle, vertex_normals=normals))
+    def _add_mesh(self, name, vertices, faces, colours):
+        rr, entity = self._rr, f"meshes/{name}"
+        if self._faces.get(name) is not faces:  # once, and after each change of topology
+            self._faces[name] = faces
+            self._stream.log(entity, rr.Mesh3D.from_fields(clear_unset=True, triangle_indices=faces))
+        normals = vertex_normals(vertices, faces)
+        self._stream.log(
+            entity, rr.Mesh3D.from_fields(vertex_positions=vertices, vertex_normals=normals, vertex_colors=colours)
+        )
 
     def _add_contacts(self, step):
         rr, found = self._rr, step.contacts
