@@ -57,7 +57,7 @@ def main(args) -> int:
 
 
 def _accuracies(hc, scene) -> list[str]:
-    from hpccd_ros.parameters import ACCURACIES
+    from hpccd_ros.parameter_table import ACCURACIES
 
     usable = []
     for tier in ACCURACIES:

@@ -14,6 +14,7 @@ from hpccd_ros import _env, replay_setup
 from hpccd_ros.errors import UserError
 from hpccd_ros.mcap_decode import message_class
 from hpccd_ros.mcap_reader import RecordedTopic, Recording, RecordingError
+from hpccd_ros.pacing import Pace, next_wanted
 
 # Reliable readers that are late now and then must still find what they missed.
 DEPTH = 20
@@ -83,7 +84,8 @@ def _await_subscribers(node, publishers, wait, stop) -> None:
 
 
 def _play(recording, publishers, args, stop) -> int:
-    count, first, began, last_frame = 0, None, 0.0, None
+    count, first, last_frame = 0, None, None
+    pace = Pace(1.0 if args.rate is None else args.rate, stop)
     latched = {}
     for message in recording.messages(list(publishers)):
         first = message.log_time if first is None else first
@@ -99,28 +101,14 @@ def _play(recording, publishers, args, stop) -> int:
             publishers[earlier.topic].publish(earlier.data)
             count += 1
         latched.clear()
-        began = began or time.monotonic()
         if args.step:
             # One frame: all messages published at about the same time, as meshes of one step are.
             if last_frame is None or message.log_time - last_frame > 2_000_000:
-                if not _next_wanted(f"{at:.3f} s"):
+                if not next_wanted(f"{at:.3f} s"):
                     break
             last_frame = message.log_time
-        elif args.rate:
-            _sleep(began + (at - args.begin) / args.rate, stop)
+        else:
+            pace.wait(at)
         publishers[message.topic].publish(message.data)
         count += 1
     return count
-
-
-def _next_wanted(where) -> bool:
-    try:
-        input(f"{where}: Enter plays the next frame, Ctrl-D ends ")
-    except EOFError:
-        return False
-    return True
-
-
-def _sleep(until, stop) -> None:
-    while not stop and (left := until - time.monotonic()) > 0:
-        time.sleep(min(left, 0.1))

@@ -33,6 +33,7 @@ class Step:
     start_frame: SceneFrame | None
     end_frame: SceneFrame | None
     recorded: object | None  # ContactArray, or None in a recording without contacts
+    at: float = 0.0  # seconds into the recording, of the answer or else of the last message of its end frame
     contacts: object | None = None  # of the core, or None where a frame is missing
     layout: Layout | None = None
     milliseconds: float = 0.0  # the core's call, wall time
@@ -51,15 +52,18 @@ class Replay:
     backend, threads: as of hpccd_core.Detector; the contacts must not depend on them.
     accuracy: "": that with which each answer was found.
     outputs: computed beside the contacts (they are not compared).
+    begin, end: seconds into the recording; steps outside are neither computed nor counted.
     on_message: called with the number of recorded messages read so far.
     """
 
     def __init__(self, recording: Recording, setup: ReplaySetup, *, backend="auto", threads=0, accuracy="",
-                 outputs=(), on_message=lambda count: None):
+                 outputs=(), begin=0.0, end=float("inf"), on_message=lambda count: None):
         self._recording = recording
         self._setup = setup
         self._backend, self._threads, self._accuracy = backend, threads, accuracy
         self._outputs = tuple(outputs)
+        self._begin, self._end = begin, end
+        self._at = 0.0  # seconds into the recording, of the message read last
         self._on_message = on_message
         self.source = FrameSource(setup, recording.topics)
         answers = recording.topics.get(setup.contacts)
@@ -87,8 +91,13 @@ class Replay:
     def steps(self) -> Iterator[Step]:
         """Each recorded answer, computed again; in a recording without answers, each step from frame to frame."""
         find = self._answers if self.recorded_answers else self._successive_frames
-        for number, step in enumerate(find()):
-            step.number = number
+        number = 0
+        for step in find():
+            if step.at < self._begin:
+                continue
+            if step.at > self._end:
+                break
+            step.number, number = number, number + 1
             if step.missing is None:
                 self._compute(step)
                 self._compare(step)
@@ -102,20 +111,20 @@ class Replay:
         for message in self._messages():
             if message.topic == self._setup.contacts:
                 # An answer may have been written before the last of the messages that it answers.
-                waiting.append((self.frames, self._decode_answer(message)))
+                waiting.append((self.frames, self._at, self._decode_answer(message)))
             else:
                 for frame in self.source.take(message):
                     self.frames += 1
                     window.put(frame)
             while waiting:
-                came, answer = waiting[0]
-                step = self._step_of(answer, window)
+                came, at, answer = waiting[0]
+                step = self._step_of(answer, at, window)
                 if step.missing and not step.before_recording and self.frames < came + PATIENCE:
                     break
                 waiting.pop(0)
                 yield step
-        for _, answer in waiting:
-            yield self._step_of(answer, window)
+        for _, at, answer in waiting:
+            yield self._step_of(answer, at, window)
 
     def _successive_frames(self):
         last = None
@@ -123,17 +132,20 @@ class Replay:
             for frame in self.source.take(message):
                 self.frames += 1
                 if last is not None and last.same_scene(frame) and frame.stamp > last.stamp:
-                    yield Step(0, frame.step or 0, last.stamp, frame.stamp, last, frame, None)
+                    yield Step(0, frame.step or 0, last.stamp, frame.stamp, last, frame, None, self._at)
                 last = frame
 
     def _messages(self):
+        first = None
         for count, message in enumerate(self._recording.messages(self._topics), start=1):
+            first = message.log_time if first is None else first
+            self._at = (message.log_time - first) * 1e-9
             yield message
             self._on_message(count)
 
-    def _step_of(self, answer, window) -> Step:
+    def _step_of(self, answer, at, window) -> Step:
         start, end = convert.stamp_to_ns(answer.start), convert.stamp_to_ns(answer.header.stamp)
-        step = Step(0, answer.step, start, end, window.get(start), window.get(end), answer)
+        step = Step(0, answer.step, start, end, window.get(start), window.get(end), answer, at)
         for name, stamp, frame in (("start", start, step.start_frame), ("end", end, step.end_frame)):
             if frame is None:
                 step.before_recording = window.first is not None and stamp < window.first

@@ -3,6 +3,7 @@
 
 import contextlib
 import csv
+import json
 import os
 import sys
 import time
@@ -13,6 +14,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from hpccd_ros import replay_setup
 from hpccd_ros.errors import UserError
 from hpccd_ros.mcap_reader import Recording
+from hpccd_ros.pacing import Pace, next_wanted
 from hpccd_ros.replay import Replay, Step
 
 COLUMNS = ("number", "step", "start_ns", "end_ns", "contacts", "vertex_face", "edge_edge", "first_toc", "ms", "hash",
@@ -44,6 +46,15 @@ class Table:
         self._file.close()
 
 
+def write_json(path, rows) -> None:
+    """Write the rows of a report into a new file."""
+    try:
+        with open(path, "x", encoding="utf-8") as stream:
+            json.dump(rows, stream, indent=1)
+    except OSError as error:
+        raise UserError(f"--json {path}: {error.strerror}; existing files are not overwritten") from error
+
+
 def main(args) -> int:
     """Verify as the options of `hpccd replay` say. 0: all equal, 1: not."""
     with contextlib.ExitStack() as stack:
@@ -52,10 +63,13 @@ def main(args) -> int:
         table = stack.enter_context(contextlib.closing(Table(args.csv))) if args.csv else None
         progress = stack.enter_context(_progress_bar())
         replay = Replay(recording, setup, backend=args.backend, threads=args.threads, accuracy=args.accuracy,
+                        begin=args.begin, end=args.end,
                         on_message=lambda count: progress.update(bar, completed=count))
         bar = progress.add_task("replay", total=replay.message_count, said="")
         summary = Summary()
+        pace = Pace(args.rate or 0.0)
         for step in replay.steps():
+            pace.wait(step.at)
             summary.add(step)
             if table:
                 table.add(step)
@@ -64,9 +78,24 @@ def main(args) -> int:
             if step.difference and args.keep_going:
                 progress.console.print(f"step {step.step} (ends at {step.end} ns): {step.difference}", markup=False,
                                        highlight=False)
+            if args.step:
+                progress.stop()
+                print(line(step))
+                if not next_wanted(f"{step.at:.3f} s"):
+                    break
         progress.update(bar, said="")
+    if args.json:
+        write_json(args.json, [summary.row(args.file, replay)])
     summary.print(args, recording, replay)
     return 1 if replay.diverged or replay.unverified or not summary.computed else 0
+
+
+def line(step: Step) -> str:
+    """One step in words."""
+    if step.missing:
+        return f"step {step.step}: not computed: {step.missing}"
+    result = step.difference or ("equal" if step.recorded is not None else "nothing recorded to compare with")
+    return f"step {step.step}: {step.total:,} contacts, hash {step.contacts.hash:#018x}, {result}"
 
 
 class Summary:
@@ -93,6 +122,25 @@ class Summary:
         self.seconds_recorded += (step.end - step.start) * 1e-9
         if step.recorded is not None:
             self.accuracies.add(step.recorded.accuracy)
+
+    def row(self, path, replay) -> dict:
+        """What came of it, JSON-able."""
+        if replay.diverged:
+            result, first = "DIVERGED", replay.first_divergence
+            why = f"step {first.step}: {first.difference}"
+        elif replay.unverified:
+            result, why = "NOT VERIFIED", f"step {self.missing.step}: {self.missing.missing}"
+        elif replay.verified:
+            result, why = "VERIFIED", ""
+        else:
+            result = "COMPUTED" if self.computed else "NOTHING"
+            why = "no recorded contacts" if self.computed else "no step of all meshes"
+        return {
+            "file": str(path), "result": result, "verified": replay.verified, "diverged": replay.diverged,
+            "unverified": replay.unverified, "frames": replay.frames, "steps": self.computed,
+            "contacts": self.contacts, "core_ms": round(self.milliseconds, 3),
+            "seconds": round(time.perf_counter() - self.began, 3), "accuracy": sorted(self.accuracies), "why": why,
+        }  # fmt: skip
 
     def print(self, args, recording, replay) -> None:
         wall = time.perf_counter() - self.began

@@ -2,6 +2,7 @@
 """A replay finds the recorded contacts again, and says where they differ if they do."""
 
 import csv
+import json
 import re
 
 import numpy as np
@@ -209,6 +210,27 @@ def test_replay_command(hpccd, small_bag, tmp_path):
     assert changed.returncode == 1
     assert "DIVERGED: 1 of 89 answers differ, first in step 61" in changed.stdout
     assert "vertex " in changed.stdout and "now at t = " in changed.stdout
+
+
+def test_a_part_of_a_recording(hpccd, small_bag, tmp_path):
+    with Recording(small_bag) as recording:
+        first = next(recording.messages()).log_time
+        answers = [(m.log_time - first) * 1e-9 for m in recording.messages(["/contacts"])]
+    replay, steps = _replay(small_bag, begin=1.0, end=2.0)
+    assert [s.at for s in steps] == [at for at in answers if 1.0 <= at <= 2.0] and len(steps) > 10
+    assert (replay.verified, replay.diverged) == (len(steps), 0)
+    done = hpccd("replay", small_bag, "--from", "1", "--to", "2", "--rate", "4", "--json", "part.json")
+    assert done.returncode == 0 and f"VERIFIED: {len(steps)} answers" in done.stdout
+    (row,) = json.loads((tmp_path / "part.json").read_text())
+    assert (row["result"], row["verified"]) == ("VERIFIED", len(steps))
+
+
+def test_one_step_at_each_enter(hpccd, small_bag):
+    done = hpccd("replay", small_bag, "--from", "1", "--step", input="\n\n")
+    assert done.returncode == 0, done.stderr
+    lines = [line for line in done.stdout.splitlines() if "contacts, hash 0x" in line]
+    assert len(lines) == 3 and all(line.endswith(", equal") for line in lines)
+    assert "VERIFIED: 3 answers" in done.stdout
 
 
 def test_replay_of_unusable_files(hpccd, small_bag, tmp_path):
