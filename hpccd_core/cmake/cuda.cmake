@@ -72,7 +72,7 @@ function(hpccd_find_cuda)
 
   file(GLOB headers CONFIGURE_DEPENDS "${CMAKE_CURRENT_SOURCE_DIR}/src/*/*.h" "${CMAKE_CURRENT_SOURCE_DIR}/src/*/*.cuh"
     "${CMAKE_CURRENT_SOURCE_DIR}/include/hpccd/*.h")
-  foreach(source pipeline device sort)
+  foreach(source pipeline test_lists hybrid_devices device sort)
     set(object "${CMAKE_CURRENT_BINARY_DIR}/gpu_${source}.o")
     add_custom_command(OUTPUT "${object}"
       COMMAND "${HPCCD_NVCC}" ${flags} "-DHPCCD_CUDA_ARCHITECTURES_TEXT=\"${shown}\""

@@ -6,6 +6,7 @@
 
 #include "base/simd.h"
 #include "gpu/device.h"
+#include "gpu/memory_on_device.h"
 #include "hpccd/hpccd.h"
 
 namespace py = pybind11;
@@ -111,11 +112,13 @@ PYBIND11_MODULE(_core, m) {
   py::class_<Detector>(m, "Detector")
       .def(py::init([](std::shared_ptr<Scene> scene, Accuracy accuracy, Backend backend, Report report, Simd simd,
                        int threads, bool points, bool normals, double separation, double tolerance, Method method,
-                       bool restructure) {
+                       bool restructure, std::size_t hybrid_segments,
+                       std::size_t hybrid_segment_pairs, int gpus) {
         // A copy: what is added to the caller's scene later does not reach this detector.
         return std::make_unique<Detector>(std::make_shared<const Scene>(*scene),
                                           Options{accuracy, backend, report, simd, threads, points, normals,
-                                                  separation, tolerance, method, restructure});
+                                                  separation, tolerance, method, restructure, hybrid_segments,
+                                                  hybrid_segment_pairs, gpus});
       }))
       .def("detect",
            [](Detector& d, const py::array& t0, const py::array& t1) {
@@ -140,10 +143,23 @@ PYBIND11_MODULE(_core, m) {
       .def("profile", &Detector::profile)
       .def("stats", &Detector::stats)
       .def_property_readonly("last_backend",
-                             [](const Detector& d) { return d.last_backend() == Backend::gpu ? "gpu" : "cpu"; })
+                             [](const Detector& d) {
+                               const Backend b = d.last_backend();
+                               return b == Backend::gpu ? "gpu" : b == Backend::hybrid ? "hybrid" : "cpu";
+                             })
       .def_property_readonly("last_gpu_error", &Detector::last_gpu_error)
       .def_property_readonly("threads", [](const Detector& d) { return d.options().threads; })
       .def_property_readonly("simd", [](const Detector& d) { return name_of(d.options().simd); });
+
+  py::class_<gpu::MemoryOnDevice>(m, "MemoryOnDevice")
+      .def(py::init([] { return gpu::MemoryOnDevice::create(); }))
+      .def("assign",
+           [](gpu::MemoryOnDevice& m, std::uintptr_t from, std::size_t bytes) {
+             py::gil_scoped_release release;
+             m.assign(reinterpret_cast<const void*>(from), bytes);
+           })
+      .def_property_readonly("pointer",
+                             [](const gpu::MemoryOnDevice& m) { return reinterpret_cast<std::uintptr_t>(m.data()); });
 
   m.def("test_vertex_face", &run_queries<&test_vertex_face>);
   m.def("test_edge_edge", &run_queries<&test_edge_edge>);

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <optional>
 #include <utility>
 
@@ -9,6 +10,7 @@
 #include "bvh/tree.h"
 #include "contacts/canonical.h"
 #include "gpu/frames.h"
+#include "hybrid/frames.h"
 #include "paper/method.h"
 #include "scene/features.h"
 #include "scene/static_meshes.h"
@@ -32,13 +34,7 @@ struct Detector::Impl {
     search.limits = {o.minimum_separation, o.tolerance};
     if (o.minimum_separation > 0) search.batch_test[static_cast<int>(Accuracy::conservative)] = all_undecided;
     engine = paper::engine_of(options, {features, rules, pool});
-    const bool wanted = o.backend == Backend::gpu || o.backend == Backend::automatic;
-    if (const std::string why = gpu::unsupported(o); o.backend == Backend::gpu && !why.empty())
-      throw InvalidArgument(why);
-    if (wanted && gpu::unsupported(o).empty() && !gpu::status().devices.empty())
-      gpu = std::make_unique<gpu::Frames>(*scene, features, options, pool);
-    else if (o.backend == Backend::gpu)
-      throw InvalidArgument("backend: \"gpu\" is not usable here: " + gpu::status().reason);
+    use_gpus();
   }
 
   std::shared_ptr<const Scene> scene;
@@ -54,46 +50,82 @@ struct Detector::Impl {
   bool tree_fits_motion = false;                // its bounds are those of the last motion taken
   std::unique_ptr<paper::MethodEngine> engine;  // of a published method; none for the default traversal
   std::unique_ptr<gpu::Frames> gpu;             // where the backend is "gpu", or may become it
-  // "auto": the first frames go to both in turn, the rest to the faster. The first of each warms up.
+  std::unique_ptr<hybrid::Frames> hybrid;       // likewise
+  std::uint64_t builds = 0;                     // of the tree
+  // "auto": the first frames go to each in turn, the rest to the fastest. The first of each warms up.
   struct Trial {
     int frames = 0;
     double best_ms = std::numeric_limits<double>::infinity();
-  } trial[2];  // CPU, GPU
-  bool last_on_gpu = false;
+  } trial[4];  // by backend
+  Backend last_backend = Backend::cpu;
   Profiler profiler;
   std::map<std::string, std::uint64_t> stats;
 
-  bool next_on_gpu(bool given_on_device) const {
-    constexpr int frames_each = 3;
-    if (!gpu || gpu->gave_up()) return false;
-    if (options.backend == Backend::gpu || given_on_device) return true;
-    if (trial[1].frames < frames_each) return trial[1].frames < trial[0].frames;
-    return trial[1].best_ms < trial[0].best_ms;
+  void use_gpus() {
+    const std::string why[2] = {gpu::unsupported(options), hybrid::unsupported(options)};
+    const bool usable = !gpu::status().devices.empty(), any = options.backend == Backend::automatic;
+    if (options.backend == Backend::gpu || options.backend == Backend::hybrid) {
+      const bool on_gpu = options.backend == Backend::gpu;
+      if (!why[!on_gpu].empty()) throw InvalidArgument(why[!on_gpu]);
+      if (!usable)
+        throw InvalidArgument(std::string("backend: \"") + (on_gpu ? "gpu" : "hybrid") +
+                              "\" is not usable here: " + gpu::status().reason);
+    }
+    if (usable && (any || options.backend == Backend::gpu) && why[0].empty())
+      gpu = std::make_unique<gpu::Frames>(*scene, features, options, pool);
+    if (usable && (any || options.backend == Backend::hybrid) && why[1].empty())
+      hybrid = std::make_unique<hybrid::Frames>(*scene, features, rules, options, pool);
   }
 
-  void note_time(bool on_gpu) {
-    last_on_gpu = on_gpu;
-    ++trial[on_gpu].frames;
-    trial[on_gpu].best_ms = std::min(trial[on_gpu].best_ms, profiler.stages().at("total"));
+  Backend next_backend(bool given_on_device) const {
+    constexpr int frames_each = 3;
+    if (gpu && !gpu->gave_up() && (options.backend == Backend::gpu || given_on_device)) return Backend::gpu;
+    if (options.backend == Backend::hybrid && !hybrid->gave_up()) return Backend::hybrid;
+    if (options.backend != Backend::automatic) return Backend::cpu;
+    std::vector<Backend> usable{Backend::cpu};
+    if (gpu && !gpu->gave_up()) usable.push_back(Backend::gpu);
+    if (hybrid && !hybrid->gave_up()) usable.push_back(Backend::hybrid);
+    const auto trial_of = [this](Backend b) -> const Trial& { return trial[static_cast<int>(b)]; };
+    for (int n = 0; n < frames_each; ++n)
+      for (const Backend b : usable)
+        if (trial_of(b).frames <= n) return b;
+    return *std::min_element(usable.begin(), usable.end(),
+                             [&](Backend a, Backend b) { return trial_of(a).best_ms < trial_of(b).best_ms; });
+  }
+
+  // `meant`: where the frame should have been computed; a backend that failed has had its turn.
+  void note_time(Backend meant, Backend used) {
+    last_backend = used;
+    Trial& t = trial[static_cast<int>(meant)];
+    ++t.frames;
+    if (meant == used) t.best_ms = std::min(t.best_ms, profiler.stages().at("total"));
   }
 
   std::optional<Contacts> frame_on_gpu(Positions t0, Positions t1) {
     const auto build_tree = [this](Positions a, Positions b) -> const Tree& {
       tree_fits_motion = false;
       motion.take(*scene, a, b, 0, pool);
-      build(tree, *scene, features, motion.boxes, pool);
+      build_tree_anew();
       tree_fits_motion = true;
       return tree;
     };
     return gpu->detect(t0, t1, build_tree, profiler);
   }
 
+  std::uint64_t fallbacks() const { return (gpu ? gpu->fallbacks() : 0) + (hybrid ? hybrid->fallbacks() : 0); }
+
   void count_gpu(const Contacts& contacts) {
     stats = gpu->stats();
+    stats["gpu_fallbacks"] = fallbacks();
     stats["vf_contacts"] = contacts.vf.size();
     stats["ee_contacts"] = contacts.ee.size();
     stats["triangles"] = features.n_faces();
     stats["bytes"] = motion.bytes() + tree.bytes() + features.bytes();
+  }
+
+  void build_tree_anew() {
+    ++builds;
+    build(tree, *scene, features, motion.boxes, pool);
   }
 
   // A tree that fits the motion of this step: refitted, or built anew where refitting has lost too much.
@@ -101,37 +133,47 @@ struct Detector::Impl {
     // Traversal visits node pairs about in proportion to the nodes' area; half as much again costs more than a build.
     constexpr double worn_out = 1.5;
     if (tree.nodes.empty()) {
-      build(tree, *scene, features, motion.boxes, pool);
+      build_tree_anew();
       profiler.mark("build");
       return;
     }
     refit(tree, motion.boxes, tree_followed ? motion.resting : std::vector<char>(), pool);
     profiler.mark("refit");
     if (relative_area(tree, pool) > worn_out * tree.area_when_built) {
-      build(tree, *scene, features, motion.boxes, pool);
+      build_tree_anew();
       profiler.mark("build");
     }
   }
 
-  void find_contacts(Positions t0, Positions t1) {
+  // With the tests on the CPU, or on GPUs beside it. Returns where they were.
+  Backend find_contacts(Positions t0, Positions t1, bool with_devices) {
+    std::unique_ptr<hybrid::FrameGuard> devices;
+    if (with_devices) devices = hybrid->begin(t0, t1, workers, profiler);
     const bool tree_followed = std::exchange(tree_fits_motion, false);
     motion.take(*scene, t0, t1, options.minimum_separation, pool);
     profiler.mark("bounds");
     search.geometry = {motion.rows.data(), features.edges.data(), features.faces.data(),
                        options.minimum_separation > 0 ? nullptr : motion.slabs.data(), motion.map.scale};
     search.earliest = std::numeric_limits<double>::infinity();
+    // Devices find all contacts, and test "fast" as "balanced": then so does the CPU beside them.
+    search.report = devices && options.report == Report::any ? Report::all : options.report;
+    search.batch_test[static_cast<int>(Accuracy::fast)] =
+        batch_test(options.simd, devices ? Accuracy::balanced : Accuracy::fast);
     if (engine) {
       engine->update(motion.boxes, profiler);
+      if (devices) hybrid->traverse_carriers(motion.boxes, workers);
       engine->traverse(motion.boxes, search, workers);
     } else {
       update_tree(tree_followed);
       tree_fits_motion = true;
+      if (devices) hybrid->traverse(tree, builds, workers);
       traverse(tree, rules, search, pool, workers);
     }
     double elementary = 0;
     for (const Worker& w : workers) elementary += 1e3 * w.elementary_seconds;
     // Tests run inside the traversal; their share of the wall-clock time is their share of the threads' time.
     profiler.mark_split("traverse", "elementary", elementary / pool.size());
+    return devices && hybrid->finish(*devices, workers, profiler) ? Backend::hybrid : Backend::cpu;
   }
 
   void count(const Contacts& contacts) {
@@ -162,7 +204,8 @@ struct Detector::Impl {
     stats["triangles"] = features.n_faces();
     stats["bytes"] = bytes + motion.bytes() + tree.bytes() + features.bytes() + (engine ? engine->bytes() : 0);
     if (engine) engine->count(stats);
-    if (gpu) stats["gpu_fallbacks"] = gpu->fallbacks();
+    if (hybrid) hybrid->count(stats);
+    if (gpu || hybrid) stats["gpu_fallbacks"] = fallbacks();
   }
 };
 
@@ -183,36 +226,40 @@ Contacts Detector::detect(Positions t0, Positions t1) {
         "vertices_t0, vertices_t1: are in a GPU's memory, which this detector does not use; copy them "
         "to the host, or use backend=\"gpu\"");
   d.profiler.begin();
-  if (d.next_on_gpu(t0.on_device || t1.on_device)) {
+  const Backend backend = d.next_backend(t0.on_device || t1.on_device);
+  if (backend == Backend::gpu) {
     if (!t0.on_device && !t1.on_device) require_static_meshes_rest(*d.scene, t0, t1);
     if (auto contacts = d.frame_on_gpu(t0, t1)) {
       d.count_gpu(*contacts);
       d.profiler.end();
-      d.note_time(true);
+      d.note_time(backend, Backend::gpu);
       return std::move(*contacts);
     }
     d.profiler.mark("gpu_failed");
   }
   if (d.gpu) t0 = d.gpu->on_host(t0, 0), t1 = d.gpu->on_host(t1, 1);
-  d.find_contacts(t0, t1);
+  const Backend used = d.find_contacts(t0, t1, backend == Backend::hybrid);
   Contacts contacts = collect_contacts(d.workers, d.search.geometry, d.options.report,
                                        {d.options.points, d.options.normals}, d.order, d.pool);
   d.profiler.mark("contacts");
   d.count(contacts);
   d.profiler.end();
-  d.note_time(false);
+  d.note_time(backend, used);
   return contacts;
 }
 
 std::map<std::string, double> Detector::profile() const {
   auto stages = impl_->profiler.stages();
-  if (impl_->gpu && impl_->last_on_gpu)
+  if (impl_->gpu && impl_->last_backend == Backend::gpu)
     for (const auto& [name, ms] : impl_->gpu->stages()) stages["gpu/" + name] = ms;
   return stages;
 }
 std::map<std::string, std::uint64_t> Detector::stats() const { return impl_->stats; }
 const Options& Detector::options() const { return impl_->options; }
-Backend Detector::last_backend() const { return impl_->last_on_gpu ? Backend::gpu : Backend::cpu; }
-std::string Detector::last_gpu_error() const { return impl_->gpu ? impl_->gpu->last_error() : std::string(); }
+Backend Detector::last_backend() const { return impl_->last_backend; }
+std::string Detector::last_gpu_error() const {
+  if (impl_->hybrid && !impl_->hybrid->last_error().empty()) return impl_->hybrid->last_error();
+  return impl_->gpu ? impl_->gpu->last_error() : std::string();
+}
 
 }  // namespace hpccd

@@ -78,6 +78,9 @@ struct Options {
   double tolerance = 1e-6;
   Method method = Method::standard;
   bool restructure = true;  // of `published` and `naive`: whether nodes that cull badly are split anew
+  // Of backend `hybrid` (Kim et al. 2009, section 5.1): the triangle index queue, and how many GPUs; 0: all.
+  std::size_t hybrid_segments = 128, hybrid_segment_pairs = 2048;
+  int gpus = 0;
 };
 
 // Contacts of one motion step in canonical order: vertex-face by (vertex, face), then edge-edge by (a0, a1, b0, b1).

@@ -2,6 +2,7 @@
 #include <atomic>
 
 #include "gpu/cuda_call.h"
+#include "gpu/memory_on_device.h"
 
 #ifndef HPCCD_CUDA_ARCHITECTURES_TEXT
 #define HPCCD_CUDA_ARCHITECTURES_TEXT "default architecture"
@@ -50,7 +51,37 @@ Status look() {
   return s;
 }
 
+class DeviceCopy final : public MemoryOnDevice {
+ public:
+  ~DeviceCopy() override { cudaFree(data_); }
+  void assign(const void* from, std::size_t bytes) override {
+    cudaPointerAttributes a;
+    check(cudaPointerGetAttributes(&a, from), "cudaPointerGetAttributes");
+    check(cudaSetDevice(a.device), "cudaSetDevice");
+    check(cudaDeviceSynchronize(), "cudaDeviceSynchronize");  // the producer may use any stream
+    if (bytes > size_) {
+      check(cudaFree(data_), "cudaFree");
+      data_ = nullptr, size_ = 0;
+      check(cudaMalloc(&data_, bytes), "cudaMalloc");
+      size_ = bytes;
+    }
+    if (bytes == 0) return;
+    check(cudaMemcpy(data_, from, bytes, cudaMemcpyDeviceToDevice), "cudaMemcpy");
+    check(cudaDeviceSynchronize(), "cudaDeviceSynchronize");  // device to device, it returns before the end
+  }
+  const void* data() const override { return data_; }
+
+ private:
+  void* data_ = nullptr;
+  std::size_t size_ = 0;
+};
+
 }  // namespace
+
+std::unique_ptr<MemoryOnDevice> MemoryOnDevice::create() {
+  if (status().devices.empty()) throw Error(status().reason);
+  return std::make_unique<DeviceCopy>();
+}
 
 const Status& status() {
   static const Status s = look();

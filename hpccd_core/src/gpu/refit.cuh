@@ -6,10 +6,10 @@
 
 namespace hpccd::gpu {
 
+// Boxes of a leaf's features and, in every lane, of the whole leaf; by one warp.
 template <class T>
-__global__ void refit_kernel(Frame<T> f) {
-  const u32 leaf = (blockIdx.x * blockDim.x + threadIdx.x) / 32, lane = lane_number();
-  if (leaf >= f.n_leaves) return;
+__device__ DeviceBox refit_leaf(const Frame<T>& f, u32 leaf) {
+  const u32 lane = lane_number();
   const DeviceLeaf l = f.leaves[leaf];
   const u32 n_faces = l.counts & 0xFF, n_edges = l.counts >> 8 & 0xFF, n_vertices = l.counts >> 16;
   DeviceBox whole{{INFINITY, INFINITY, INFINITY}, 0, {-INFINITY, -INFINITY, -INFINITY}, 0};
@@ -41,10 +41,24 @@ __global__ void refit_kernel(Frame<T> f) {
     }
     include(whole, other);
   }
-  if (lane != 0) return;
-  u32 node = f.leaf_nodes[leaf];
   whole.tag_low = 0, whole.tag_high = leaf;
-  store_box(&f.leaf_boxes[leaf], whole);
+  if (lane == 0) store_box(&f.leaf_boxes[leaf], whole);
+  return whole;
+}
+
+template <class T>
+__global__ void refit_leaves_kernel(Frame<T> f) {
+  const u32 leaf = (blockIdx.x * blockDim.x + threadIdx.x) / 32;
+  if (leaf < f.n_leaves) refit_leaf(f, leaf);
+}
+
+template <class T>
+__global__ void refit_kernel(Frame<T> f) {
+  const u32 leaf = (blockIdx.x * blockDim.x + threadIdx.x) / 32;
+  if (leaf >= f.n_leaves) return;
+  const DeviceBox whole = refit_leaf(f, leaf);
+  if (lane_number() != 0) return;
+  u32 node = f.leaf_nodes[leaf];
   store_box(&f.node_boxes[node], whole);
   while (node != 0) {
     node = f.node_parent[node];

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // In builds without CUDA.
-#include "gpu/pipeline.h"
 #include "gpu/device.h"
+#include "gpu/hybrid_devices.h"
+#include "gpu/memory_on_device.h"
+#include "gpu/pipeline.h"
 
 namespace hpccd::gpu {
 
@@ -15,5 +17,11 @@ void fail_after(int) {}
 std::unique_ptr<Pipeline> Pipeline::create(const Scene&, const Features&, Accuracy, int, bool) {
   throw Error(status().reason);
 }
+
+std::vector<std::unique_ptr<hybrid::TestDevice>> hybrid_devices(const Scene&, const Features&, Accuracy, int) {
+  throw Error(status().reason);
+}
+
+std::unique_ptr<MemoryOnDevice> MemoryOnDevice::create() { throw Error(status().reason); }
 
 }  // namespace hpccd::gpu

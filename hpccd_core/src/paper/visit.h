@@ -36,6 +36,8 @@ inline void test_leaves(const Scenery& s, Pair p, Worker& worker) {
   if (p.a == p.b) return;  // within one triangle, all features share vertices
   const Node &a = s.hierarchy.nodes[p.a], &b = s.hierarchy.nodes[p.b];
   const std::uint32_t carrier_a = s.hierarchy.order[a.begin], carrier_b = s.hierarchy.order[b.begin];
+  ++worker.leaf_pairs;
+  if (worker.sink) return worker.sink->take(carrier_a, carrier_b, worker);
   worker.candidates(s.rules.accuracy(a.mesh, b.mesh), [&](CandidateBuffer& edge_edge, CandidateBuffer& vertex_face) {
     carrier_pairs(s.features, s.vertex_boxes, {carrier_a, a.box}, {carrier_b, b.box}, edge_edge, vertex_face);
   });

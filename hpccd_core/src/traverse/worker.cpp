@@ -26,12 +26,22 @@ void Worker::begin(Search& search) {
 }
 
 void Worker::leaf_pair(const Tree& tree, const LeafRange& a, const LeafRange& b, Accuracy accuracy) {
+  ++leaf_pairs;
+  const auto number = [&](const LeafRange& leaf) { return static_cast<std::uint32_t>(&leaf - tree.leaves.data()); };
+  if (sink)
+    sink->take(number(a), number(b), *this);
+  else
+    test_leaf_pair(tree, a, b, accuracy);
+}
+
+void Worker::test_leaf_pair(const Tree& tree, const LeafRange& a, const LeafRange& b, Accuracy accuracy) {
   candidates(accuracy, [&](CandidateBuffer& edge_edge, CandidateBuffer& vertex_face) {
     search_->leaf_pairs(tree, a, b, edge_edge, vertex_face);
   });
 }
 
 void Worker::flush() {
+  if (sink) sink->flush();
   for (int i = 0; i < 4; ++i)
     if (waiting_[i]) {
       drain(waiting_[i]->edge_edge, Kind::edge_edge, static_cast<Accuracy>(i), 1);
@@ -73,18 +83,20 @@ void Worker::test(const std::uint32_t* first, const std::uint32_t* second, std::
     const double toc = accuracy == Accuracy::conservative ? std::max(0.0, r.toc[i] - r.delta[i]) : r.toc[i];
     report(kind, first[r.contact[i]], second[r.contact[i]], toc);
   }
-  for (std::uint32_t i = 0; i < r.n_undecided; ++i) {
-    const std::uint32_t a = first[r.undecided[i]], b = second[r.undecided[i]];
-    const Geometry& g = search_->geometry;
-    std::uint32_t v[4];
-    if (kind == Kind::vertex_face)
-      v[0] = a, v[1] = g.faces[b][0], v[2] = g.faces[b][1], v[3] = g.faces[b][2];
-    else
-      v[0] = g.edges[a][0], v[1] = g.edges[a][1], v[2] = g.edges[b][0], v[3] = g.edges[b][1];
-    Vec3<double> q_t0[4], q_t1[4];
-    for (int k = 0; k < 4; ++k) q_t0[k] = vec(g.vertices[v[k]].t0), q_t1[k] = vec(g.vertices[v[k]].t1);
-    if (const auto toc = last_resort(accuracy, search_->limits, kind, q_t0, q_t1)) report(kind, a, b, *toc);
-  }
+  for (std::uint32_t i = 0; i < r.n_undecided; ++i)
+    resolve(kind, first[r.undecided[i]], second[r.undecided[i]], accuracy);
+}
+
+void Worker::resolve(Kind kind, std::uint32_t a, std::uint32_t b, Accuracy accuracy) {
+  const Geometry& g = search_->geometry;
+  std::uint32_t v[4];
+  if (kind == Kind::vertex_face)
+    v[0] = a, v[1] = g.faces[b][0], v[2] = g.faces[b][1], v[3] = g.faces[b][2];
+  else
+    v[0] = g.edges[a][0], v[1] = g.edges[a][1], v[2] = g.edges[b][0], v[3] = g.edges[b][1];
+  Vec3<double> q_t0[4], q_t1[4];
+  for (int k = 0; k < 4; ++k) q_t0[k] = vec(g.vertices[v[k]].t0), q_t1[k] = vec(g.vertices[v[k]].t1);
+  if (const auto toc = last_resort(accuracy, search_->limits, kind, q_t0, q_t1)) report(kind, a, b, *toc);
 }
 
 void Worker::report(Kind kind, std::uint32_t first, std::uint32_t second, double toc) {

@@ -29,6 +29,16 @@ struct Search {
   std::atomic<double> earliest;  // best time so far, where report is first
 };
 
+class Worker;
+
+// Takes pairs of leaves (by number; of carriers for the published methods) that somebody else shall test: hybrid/.
+class PairSink {
+ public:
+  virtual ~PairSink() = default;
+  virtual void take(std::uint32_t a, std::uint32_t b, Worker& worker) = 0;
+  virtual void flush() = 0;  // no more for now
+};
+
 // Contacts within this of the earliest count as simultaneous: the accuracy promised for times of contact.
 inline constexpr double simultaneous = 1e-12;
 
@@ -36,12 +46,12 @@ inline constexpr double simultaneous = 1e-12;
 class alignas(128) Worker {
  public:
   void begin(Search& search);
-  // Candidates of two leaves whose boxes overlap, to be tested at `accuracy`.
+  // Candidates of two leaves whose boxes overlap, to be tested at `accuracy`; or left to the sink, where there is one.
   void leaf_pair(const Tree& tree, const LeafRange& a, const LeafRange& b, Accuracy accuracy);
+  void test_leaf_pair(const Tree& tree, const LeafRange& a, const LeafRange& b, Accuracy accuracy);
   // The same from any source: add(edge_edge, vertex_face) appends at most CandidateBuffer::most_per_call pairs to each.
   template <class Add>
   void candidates(Accuracy accuracy, Add&& add) {
-    ++leaf_pairs;
     Waiting& waiting = waiting_at(accuracy);
     add(waiting.edge_edge, waiting.vertex_face);
     if (waiting.edge_edge.n >= batch_capacity) drain(waiting.edge_edge, Kind::edge_edge, accuracy, batch_capacity);
@@ -49,12 +59,16 @@ class alignas(128) Worker {
       drain(waiting.vertex_face, Kind::vertex_face, accuracy, batch_capacity);
   }
   void flush();  // tests what waits
+  // The tier's last resort on a pair that nothing else decides, and a contact found elsewhere.
+  void resolve(Kind kind, std::uint32_t first, std::uint32_t second, Accuracy accuracy);
+  void report(Kind kind, std::uint32_t first, std::uint32_t second, double toc);
   std::size_t bytes() const;
 
   std::vector<Found> vertex_face, edge_edge;
   BatchCounts counts[2];  // vertex-face, edge-edge
   std::uint64_t node_pairs = 0, leaf_pairs = 0;
   double elementary_seconds = 0;
+  PairSink* sink = nullptr;
   std::size_t best_task = 0;  // where report is any: the task these contacts come from
 
  private:
@@ -68,7 +82,6 @@ class alignas(128) Worker {
   }
   void drain(CandidateBuffer& buffer, Kind kind, Accuracy accuracy, std::uint32_t keep_below);
   void test(const std::uint32_t* first, const std::uint32_t* second, std::uint32_t n, Kind kind, Accuracy accuracy);
-  void report(Kind kind, std::uint32_t first, std::uint32_t second, double toc);
 
   Search* search_ = nullptr;
   std::unique_ptr<Waiting> waiting_[4];  // by accuracy

@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+// What stays on the device as long as the scene: features, meshes, rules between them, and how pairs are numbered.
+#pragma once
+
+#include <algorithm>
+#include <bit>
+#include <vector>
+
+#include "gpu/frame.cuh"
+#include "gpu/pipeline.h"
+#include "gpu/stream.h"
+#include "scene/features.h"
+
+namespace hpccd::gpu {
+
+class DeviceScene {
+ public:
+  // On the current device. Throws Error where the scene has too many features for 31-bit numbers.
+  DeviceScene(const Scene& scene, const Features& features, Accuracy accuracy) : features_(features) {
+    const auto n_edges = features.edges.size();
+    if (features.n_vertices >= kind_bit || n_edges >= kind_bit || features.n_faces() >= kind_bit)
+      throw Error("the scene has 2^31 or more features of one kind; use backend=\"cpu\"");
+    upload(edges_, features.edges.data(), n_edges);
+    upload(faces_, features.faces.data(), 3 * features.faces.size());
+    upload_rules(scene, accuracy);
+    const auto bits = [](std::size_t n) { return static_cast<u32>(std::bit_width(std::max<std::size_t>(n, 1) - 1)); };
+    key_shift_ = std::max<u32>(1, std::max(bits(features.n_faces()), bits(n_edges)));
+    kind_shift_ = std::max<u32>(1, std::max(bits(features.n_vertices), bits(n_edges))) + key_shift_;
+  }
+
+  template <class T>
+  void fill(Frame<T>& f) const {
+    f.n_vertices = features_.n_vertices;
+    f.n_edges = static_cast<u32>(features_.edges.size());
+    f.n_faces = features_.n_faces();
+    f.edges = edges_.data(), f.faces = faces_.data(), f.mesh_of_vertex = mesh_of_vertex_.data();
+    f.n_meshes = n_meshes_;
+    f.enabled = all_enabled_ ? nullptr : enabled_.data();
+    f.accuracy = one_accuracy_ ? nullptr : accuracy_.data();
+    f.default_accuracy = default_accuracy_;
+    f.key_shift = key_shift_, f.kind_shift = kind_shift_;
+  }
+
+  u32 key_bits() const { return kind_shift_ + 1; }
+  Undecided pair_of(u64 key) const {
+    const u64 features = key & ((u64{1} << kind_shift_) - 1);
+    return {static_cast<u32>(features >> key_shift_), static_cast<u32>(features & ((u64{1} << key_shift_) - 1)),
+            key >> kind_shift_ ? Kind::edge_edge : Kind::vertex_face};
+  }
+  std::size_t bytes() const { return edges_.bytes() + faces_.bytes() + mesh_of_vertex_.bytes(); }
+
+ private:
+  void upload_rules(const Scene& scene, Accuracy accuracy) {
+    default_accuracy_ = accuracy;
+    n_meshes_ = static_cast<u32>(scene.meshes().size());
+    std::vector<unsigned char> enabled(std::size_t{n_meshes_} * n_meshes_), tiers(enabled.size());
+    for (u32 a = 0; a < n_meshes_; ++a)
+      for (u32 b = 0; b < n_meshes_; ++b) {
+        const std::size_t i = std::size_t{a} * n_meshes_ + b;
+        enabled[i] = scene.pair_enabled(a, b);
+        tiers[i] = static_cast<unsigned char>(scene.pair_accuracy(a, b, accuracy));
+        all_enabled_ = all_enabled_ && enabled[i];
+        one_accuracy_ = one_accuracy_ && tiers[i] == static_cast<unsigned char>(accuracy);
+      }
+    std::vector<u32> mesh(scene.n_vertices());
+    for (u32 m = 0; m < n_meshes_; ++m)
+      std::fill_n(mesh.begin() + scene.meshes()[m].first_vertex, scene.meshes()[m].n_vertices, m);
+    upload(enabled_, enabled.data(), enabled.size());
+    upload(accuracy_, tiers.data(), tiers.size());
+    upload(mesh_of_vertex_, mesh.data(), mesh.size());
+  }
+
+  const Features& features_;
+  DeviceBuffer<uint2> edges_;
+  DeviceBuffer<u32> faces_, mesh_of_vertex_;
+  DeviceBuffer<unsigned char> enabled_, accuracy_;
+  bool all_enabled_ = true, one_accuracy_ = true;
+  u32 n_meshes_ = 0, key_shift_ = 0, kind_shift_ = 0;
+  Accuracy default_accuracy_ = Accuracy::exact;
+};
+
+}  // namespace hpccd::gpu

@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+// The lists between the stages of the elementary tests, and the stages themselves: from pairs of leaves to contacts.
+#pragma once
+
+#include "gpu/frame.cuh"
+#include "gpu/stream.h"
+
+namespace hpccd::gpu {
+
+class TestLists {
+ public:
+  // A start that most scenes outgrow once or never; lists grow where they overflow.
+  TestLists(std::size_t survivors, std::size_t later, std::size_t undecided) {
+    for (int k = 0; k < 2; ++k) survivors_[k].reserve(survivors), single_[k].reserve(later), many_[k].reserve(later);
+    undecided_.reserve(undecided);
+    to_host_.reserve(undecided);
+  }
+
+  // All stages on pairs of leaves that the frame lists; the frame's counters were cleared, its contacts have a place.
+  // Defined for float and double.
+  template <class T>
+  void launch(Frame<T>& f, int multiprocessors, cudaStream_t stream, StageTimer& timer);
+
+  // Makes room where a list was too short. True where the pairs must be tested again.
+  bool grow(const Counters& c) {
+    bool again = false;
+    const auto grow = [&](auto& buffer, u64 needed, bool divisible) {
+      if (needed <= buffer.size()) return;
+      again = true;
+      if (divisible && needed > most_listed) {
+        buffer.reserve(most_listed);
+        n_segments_ *= 2;  // one list may want this for several; the next pass shows
+      } else {
+        buffer.reserve(needed + needed / 4);
+      }
+    };
+    for (int k = 0; k < 2; ++k) {
+      grow(survivors_[k], c.most_survivors, true);
+      grow(single_[k], c.most_single, true);
+      grow(many_[k], c.most_many, true);
+    }
+    grow(undecided_, c.undecided, false);
+    grow(to_host_, c.to_host, false);
+    return again;
+  }
+
+  // Keys of the pairs that the last launch left to exact arithmetic, in page-locked memory.
+  const u64* to_host() const { return to_host_.data(); }
+  u32 n_segments() const { return n_segments_; }
+  std::size_t bytes() const {
+    std::size_t b = undecided_.bytes();
+    for (int k = 0; k < 2; ++k) b += survivors_[k].bytes() + single_[k].bytes() + many_[k].bytes();
+    return b;
+  }
+
+ private:
+  DeviceBuffer<uint2> survivors_[2], single_[2], many_[2];
+  DeviceBuffer<u64> undecided_;
+  PinnedBuffer<u64> to_host_;
+  // Lists of one pass stay below this; larger frames take several segments.
+  static constexpr std::size_t most_listed = std::size_t{1} << 26;
+  u32 n_segments_ = 1;
+};
+
+}  // namespace hpccd::gpu

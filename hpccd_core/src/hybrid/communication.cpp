@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "hybrid/communication.h"
+
+#include <algorithm>
+#include <exception>
+#include <functional>
+
+#include "base/pause.h"
+
+namespace hpccd::hybrid {
+namespace {
+
+// Active waiting at first; where that takes long, the core is left to others, who may have the work that is waited for.
+class Patience {
+ public:
+  void wait() {
+    if (++turns_ < 2000)
+      pause();
+    else
+      std::this_thread::yield();
+  }
+  void reset() { turns_ = 0; }
+
+ private:
+  int turns_ = 0;
+};
+
+}  // namespace
+
+Communication::Communication(Devices& devices, TriangleIndexQueue& queue, std::vector<SegmentSupply>& supplies)
+    : devices_(devices), queue_(queue), supplies_(supplies), under_way_(devices.size(), 0) {
+  for (const auto& device : devices_) concurrency_ += device->concurrency();
+  thread_ = std::thread([this] { work(); });
+}
+
+Communication::~Communication() {
+  cancel();
+  order(Stage::stop);
+  thread_.join();
+}
+
+void Communication::order(Stage stage) {
+  {
+    std::lock_guard lock(mutex_);
+    stage_ = stage;
+  }
+  changed_.notify_all();
+}
+
+void Communication::begin_frame(Positions t0, Positions t1) {
+  wait_until_idle();
+  t0_ = t0, t1_ = t1;
+  failed_ = false;
+  error_.clear();
+  output_.found.clear();
+  output_.counts[0] = output_.counts[1] = {};
+  counts_ = {};
+  order(Stage::positions);
+}
+
+void Communication::begin_traversal(const LeafTable& leaves) {
+  leaves_ = leaves;
+  order(Stage::traversal);
+}
+
+void Communication::finish() {
+  order(Stage::draining);
+  wait_until_idle();
+}
+
+void Communication::cancel() {
+  if (stage_ != Stage::idle) order(Stage::canceled);
+  wait_until_idle();
+}
+
+void Communication::wait_until_idle() {
+  for (Patience patience; stage_.load(std::memory_order_acquire) != Stage::idle;) patience.wait();
+}
+
+void Communication::work() {
+  for (;;) {
+    {
+      std::unique_lock lock(mutex_);
+      changed_.wait(lock, [this] { return stage_ != Stage::idle; });
+    }
+    if (stage_ == Stage::stop) return;
+    try {
+      frame();
+    } catch (const std::exception& e) {
+      error_ = e.what();
+      failed_.store(true, std::memory_order_release);
+    }
+    if (failed_ || stage_ == Stage::canceled) {
+      for (auto& device : devices_) device->cancel();
+      elements_.clear();
+      std::fill(under_way_.begin(), under_way_.end(), std::size_t{0});
+      queued_ = 0;
+    }
+    // The frame goes on without this thread until the caller knows.
+    for (Patience patience; stage_ != Stage::draining && stage_ != Stage::canceled;) patience.wait();
+    stage_.store(Stage::idle, std::memory_order_release);
+  }
+}
+
+void Communication::frame() {
+  for (auto& device : devices_) device->begin_frame(t0_, t1_);
+  wait_for_traversal();
+  if (stage_ == Stage::canceled) return;
+  for (auto& device : devices_) device->begin_traversal(leaves_);
+  Patience patience;
+  for (std::size_t turns_without = 0;;) {
+    // Looked at first: what comes to light afterwards in a whole round of the window was full before.
+    const Stage stage = stage_.load(std::memory_order_acquire);
+    if (stage == Stage::canceled) return;
+    const bool sent = send(), taken = take_in(), handed = hand_out();
+    if (sent || taken || handed)
+      turns_without = 0, patience.reset();
+    else
+      ++turns_without, patience.wait();
+    if (stage != Stage::draining) turns_without = 0;
+    const std::size_t round = queue_.size() / queue_.window() + 1;
+    if (elements_.empty() && turns_without > round) return;
+  }
+}
+
+void Communication::wait_for_traversal() {
+  // Threads ask for segments before the traversal begins, and each gets its two.
+  for (Patience patience; stage_ == Stage::positions;)
+    if (!hand_out()) patience.wait();
+}
+
+bool Communication::send() {
+  std::size_t best = devices_.size();
+  for (std::size_t i = 0; i < devices_.size(); ++i)
+    if (under_way_[i] < devices_[i]->slots() && (best == devices_.size() || under_way_[i] < under_way_[best])) best = i;
+  if (best == devices_.size()) return false;
+  const auto run = queue_.take_run();
+  if (!run) return false;
+  const Ticket ticket = devices_[best]->submit(queue_.pairs(run->first), run->pairs);
+  elements_.push_back({*run, best, ticket});
+  ++under_way_[best];
+  queued_.store(elements_.size(), std::memory_order_relaxed);
+  ++counts_.elements;
+  counts_.segments += run->segments;
+  counts_.most_queued = std::max<std::uint64_t>(counts_.most_queued, elements_.size());
+  return true;
+}
+
+bool Communication::take_in() {
+  bool any = false;
+  for (auto e = elements_.begin(); e != elements_.end();) {
+    if (!devices_[e->device]->ready(e->ticket)) {
+      ++e;
+      continue;
+    }
+    devices_[e->device]->collect(e->ticket, output_);
+    queue_.release(e->run);
+    --under_way_[e->device];
+    e = elements_.erase(e);
+    any = true;
+  }
+  if (any) queued_.store(elements_.size(), std::memory_order_relaxed);
+  return any;
+}
+
+bool Communication::hand_out() {
+  bool any = false;
+  for (SegmentSupply& supply : supplies_)
+    while (supply.wanted()) {
+      const auto s = queue_.take_empty();
+      if (!s) return any;
+      supply.give(*s);
+      any = true;
+    }
+  return any;
+}
+
+}  // namespace hpccd::hybrid

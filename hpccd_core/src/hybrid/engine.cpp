@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "hybrid/engine.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace hpccd::hybrid {
+namespace {
+
+// Two in each thread's hands and as many on the way.
+std::size_t enough_segments(const Sizes& sizes, const ThreadPool& pool) {
+  return std::max(sizes.segments, 4 * static_cast<std::size_t>(pool.size()));
+}
+
+}  // namespace
+
+Engine::Engine(Communication::Devices devices, const Sizes& sizes, ThreadPool& pool)
+    : devices_(std::move(devices)),
+      queue_(devices_.front()->pair_memory(enough_segments(sizes, pool) * sizes.segment_pairs),
+             enough_segments(sizes, pool), sizes.segment_pairs),
+      supplies_(static_cast<std::size_t>(pool.size())),
+      communication_(devices_, queue_, supplies_),
+      pool_(pool) {
+  for (SegmentSupply& supply : supplies_) sinks_.emplace_back(queue_, supply, communication_);
+}
+
+void Engine::begin_traversal(const LeafTable& leaves, TestHere test_here, std::vector<Worker>& workers) {
+  test_here_ = std::move(test_here);
+  for (std::size_t i = 0; i < workers.size(); ++i) {
+    sinks_[i].begin(test_here_);
+    workers[i].sink = &sinks_[i];
+  }
+  communication_.begin_traversal(leaves);
+}
+
+bool Engine::finish(std::vector<Worker>& workers, Profiler& profiler) {
+  for (Worker& w : workers) w.sink = nullptr;
+  for (SegmentSink& sink : sinks_) sink.flush();
+  communication_.finish();
+  profiler.mark("gpu_wait");
+  exact_on_cpu_ = pairs_on_cpu_ = without_segment_ = 0;
+  for (const SegmentSink& sink : sinks_)
+    pairs_on_cpu_ += sink.tested_here(), without_segment_ += sink.without_segment();
+  const bool complete = !communication_.failed();
+  if (!complete) {
+    test_leftovers(workers);
+    reset();
+  }
+  merge(workers);
+  profiler.mark("gpu_merge");
+  return complete;
+}
+
+void Engine::cancel(std::vector<Worker>& workers) {
+  for (Worker& w : workers) w.sink = nullptr;
+  communication_.cancel();
+  reset();
+}
+
+void Engine::test_leftovers(std::vector<Worker>& workers) {
+  std::vector<SegmentNumber> left;
+  for (SegmentNumber s = 0; s < queue_.size(); ++s)
+    if (queue_.state(s) == SegmentState::full) left.push_back(s);
+  parallel_for(pool_, left.size(), 1, [&](std::size_t begin, std::size_t end, int thread) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const IndexPair* pairs = queue_.pairs(left[i]);
+      for (std::size_t k = 0; k < queue_.filled(left[i]); ++k) test_here_(workers[thread], pairs[k]);
+    }
+  });
+  for (SegmentNumber s : left) pairs_on_cpu_ += queue_.filled(s);
+  for (Worker& w : workers) w.flush();
+}
+
+void Engine::merge(std::vector<Worker>& workers) {
+  const Output& output = communication_.output();
+  const auto add = [&](std::size_t begin, std::size_t end, int thread) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const DeviceFound& f = output.found[i];
+      if (f.decided)
+        workers[thread].report(f.kind, f.first, f.second, f.toc);
+      else
+        workers[thread].resolve(f.kind, f.first, f.second, Accuracy::exact);
+    }
+  };
+  // Small enough that the few pairs for exact arithmetic, which arrive together, are shared between the threads.
+  parallel_for(pool_, output.found.size(), 64, add);
+  for (const DeviceFound& f : output.found) exact_on_cpu_ += !f.decided;
+  for (int k = 0; k < 2; ++k) {
+    BatchCounts& sum = workers[0].counts[k];
+    const BatchCounts& c = output.counts[k];
+    sum.tested += c.tested, sum.coplanarity += c.coplanarity, sum.projection += c.projection;
+    sum.roots += c.roots, sum.contacts += c.contacts, sum.undecided += c.undecided;
+  }
+}
+
+void Engine::reset() {
+  queue_.clear();
+  for (SegmentSupply& supply : supplies_) supply.reset();
+  for (SegmentSink& sink : sinks_) sink.reset();
+}
+
+void Engine::count(std::map<std::string, std::uint64_t>& stats) const {
+  const CommunicationCounts& c = communication_.counts();
+  stats["hybrid_calls"] = c.elements;
+  stats["hybrid_segments"] = c.segments;
+  stats["hybrid_most_queued"] = c.most_queued;
+  stats["hybrid_pairs_on_cpu"] = pairs_on_cpu_;
+  stats["hybrid_without_segment"] = without_segment_;
+  stats["gpu_exact_on_cpu"] = exact_on_cpu_;
+  for (const auto& device : devices_) device->count(stats);
+}
+
+}  // namespace hpccd::hybrid

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+// Section 5 of Kim et al. 2009 as the detector sees it: positions are sent while the hierarchy is refitted, the CPU
+// threads' traversal hands pairs of leaves to the devices, and what these find joins what the threads found. What a
+// device that fails leaves undone is done on the CPU: no contact is lost.
+#pragma once
+
+#include <deque>
+
+#include "base/parallel.h"
+#include "base/profiler.h"
+#include "hybrid/sink.h"
+
+namespace hpccd::hybrid {
+
+struct Sizes {
+  std::size_t segments = 128, segment_pairs = 2048;
+};
+
+class Engine {
+ public:
+  // At least one device. Queues too short for the threads (four segments each) are lengthened.
+  Engine(Communication::Devices devices, const Sizes& sizes, ThreadPool& pool);
+
+  // Returns at once. The positions must stay unchanged until finish() or cancel() has returned.
+  void begin_frame(Positions t0, Positions t1) { communication_.begin_frame(t0, t1); }
+  // The workers' pairs go to the devices from here on.
+  void begin_traversal(const LeafTable& leaves, TestHere test_here, std::vector<Worker>& workers);
+  // Waits for the devices; afterwards the workers hold all contacts. False where a device failed: error().
+  bool finish(std::vector<Worker>& workers, Profiler& profiler);
+  // Where a frame cannot go on.
+  void cancel(std::vector<Worker>& workers);
+
+  const std::string& error() const { return communication_.error(); }
+  void count(std::map<std::string, std::uint64_t>& stats) const;
+
+ private:
+  void test_leftovers(std::vector<Worker>& workers);
+  void merge(std::vector<Worker>& workers);
+  void reset();
+
+  Communication::Devices devices_;
+  TriangleIndexQueue queue_;
+  std::vector<SegmentSupply> supplies_;
+  Communication communication_;
+  std::deque<SegmentSink> sinks_;
+  ThreadPool& pool_;
+  TestHere test_here_;
+  std::uint64_t pairs_on_cpu_ = 0, without_segment_ = 0, exact_on_cpu_ = 0;
+};
+
+// The elementary tests of a frame that may end early.
+class FrameGuard {
+ public:
+  FrameGuard(Engine& engine, std::vector<Worker>& workers) : engine_(engine), workers_(workers) {}
+  ~FrameGuard() {
+    if (!done_) engine_.cancel(workers_);
+  }
+  FrameGuard(const FrameGuard&) = delete;
+  FrameGuard& operator=(const FrameGuard&) = delete;
+  bool finish(Profiler& profiler) {
+    done_ = true;
+    return engine_.finish(workers_, profiler);
+  }
+
+ private:
+  Engine& engine_;
+  std::vector<Worker>& workers_;
+  bool done_ = false;
+};
+
+}  // namespace hpccd::hybrid

@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "hybrid/frames.h"
+
+#include <algorithm>
+#include <numeric>
+
+#include "gpu/hybrid_devices.h"
+#include "paper/carrier_pairs.h"
+
+namespace hpccd::hybrid {
+namespace {
+
+// The first contact in canonical order, where one is enough: which one does not depend on threads or devices.
+void keep_first(std::vector<Worker>& workers) {
+  const auto before = [](const Found& a, const Found& b) {
+    return a.first < b.first || (a.first == b.first && a.second < b.second);
+  };
+  std::vector<Found> Worker::* const lists[2] = {&Worker::vertex_face, &Worker::edge_edge};
+  bool have = false;
+  for (const auto list : lists) {
+    const Found* best = nullptr;
+    for (const Worker& w : workers)
+      for (const Found& f : w.*list)
+        if (!best || before(f, *best)) best = &f;
+    const std::vector<Found> kept = best && !have ? std::vector<Found>{*best} : std::vector<Found>();
+    have = have || best;
+    for (Worker& w : workers) (w.*list).clear();
+    workers[0].*list = kept;
+  }
+}
+
+Box box_of_carrier(const Features& features, const std::vector<Box>& vertex_boxes, std::uint32_t c) {
+  if (c >= features.n_faces()) return vertex_boxes[features.lone_vertices[c - features.n_faces()]];
+  Box box;
+  for (const std::uint32_t v : features.faces[c]) box.include(vertex_boxes[v]);
+  return box;
+}
+
+}  // namespace
+
+std::string unsupported(const Options& options) {
+  if (options.minimum_separation > 0) return "minimum_separation: not on the GPU; use backend=\"cpu\"";
+  return "";
+}
+
+Frames::Frames(const Scene& scene, const Features& features, const PairRules& rules, const Options& options,
+               ThreadPool& pool)
+    : scene_(scene), features_(features), rules_(rules), options_(options), pool_(pool) {}
+
+std::unique_ptr<FrameGuard> Frames::begin(Positions t0, Positions t1, std::vector<Worker>& workers,
+                                          Profiler& profiler) {
+  if (!engine_) try {
+      const Sizes sizes{options_.hybrid_segments, options_.hybrid_segment_pairs};
+      engine_ = std::make_unique<Engine>(gpu::hybrid_devices(scene_, features_, options_.accuracy, options_.gpus),
+                                         sizes, pool_);
+      profiler.mark("gpu_start");
+    } catch (const gpu::Error& e) {
+      note_failure(e.what());
+      return nullptr;
+    }
+  engine_->begin_frame(t0, t1);
+  return std::make_unique<FrameGuard>(*engine_, workers);
+}
+
+void Frames::traverse(const Tree& tree, std::uint64_t builds, std::vector<Worker>& workers) {
+  const auto test_here = [this, &tree](Worker& worker, IndexPair p) {
+    const auto mesh = [&](std::uint32_t leaf) -> const Node& { return tree.nodes[tree.leaf_nodes[leaf]]; };
+    worker.test_leaf_pair(tree, tree.leaves[p.first], tree.leaves[p.second],
+                          rules_.accuracy(mesh(p.first), mesh(p.second)));
+  };
+  engine_->begin_traversal({&tree.leaves, &tree.face_of_slot, &tree.edge_of_slot, &tree.vertex_of_slot, builds},
+                           test_here, workers);
+}
+
+void Frames::traverse_carriers(const std::vector<Box>& vertex_boxes, std::vector<Worker>& workers) {
+  if (carriers_.empty()) list_carriers();
+  const auto test_here = [this, &vertex_boxes](Worker& worker, IndexPair p) {
+    const Box a = box_of_carrier(features_, vertex_boxes, p.first), b = box_of_carrier(features_, vertex_boxes, p.second);
+    const auto& mesh = features_.mesh_of_carrier;
+    worker.candidates(rules_.accuracy(mesh[p.first], mesh[p.second]), [&](CandidateBuffer& ee, CandidateBuffer& vf) {
+      paper::carrier_pairs(features_, vertex_boxes, {p.first, a}, {p.second, b}, ee, vf);
+    });
+  };
+  engine_->begin_traversal({&carriers_, &face_of_carrier_, &features_.owned_edges, &features_.owned_vertices, 1},
+                           test_here, workers);
+}
+
+void Frames::list_carriers() {
+  face_of_carrier_.resize(features_.n_faces());
+  std::iota(face_of_carrier_.begin(), face_of_carrier_.end(), 0u);
+  for (std::uint32_t c = 0; c < features_.n_carriers(); ++c)
+    carriers_.push_back({std::min(c, features_.n_faces()), std::min(c + 1, features_.n_faces()),
+                         features_.first_edge[c], features_.first_edge[c + 1], features_.first_vertex[c],
+                         features_.first_vertex[c + 1]});
+}
+
+bool Frames::finish(FrameGuard& frame, std::vector<Worker>& workers, Profiler& profiler) {
+  const bool complete = frame.finish(profiler);
+  if (complete)
+    failures_in_a_row_ = 0;
+  else
+    note_failure(engine_->error());
+  if (options_.report == Report::any) keep_first(workers);
+  return complete;
+}
+
+void Frames::note_failure(const std::string& error) {
+  ++fallbacks_;
+  ++failures_in_a_row_;
+  last_error_ = error;
+}
+
+void Frames::count(std::map<std::string, std::uint64_t>& stats) const {
+  if (engine_) engine_->count(stats);
+}
+
+}  // namespace hpccd::hybrid

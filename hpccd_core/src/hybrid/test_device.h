@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the communication thread asks of a device that performs elementary tests (Kim et al. 2009, section 5). All calls
+// come from one thread and return at once; every one may throw, which leaves the frame to the CPU.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "bvh/tree.h"
+#include "elementary/batch.h"
+#include "hpccd/hpccd.h"
+
+namespace hpccd::hybrid {
+
+// Two leaves whose boxes overlap. For the published methods a leaf is one triangle: the paper's triangle indices.
+struct IndexPair {
+  std::uint32_t first, second;
+};
+
+// The features in each leaf. `version` changes with the leaves.
+struct LeafTable {
+  const std::vector<LeafRange>* leaves = nullptr;
+  const std::vector<std::uint32_t>*face_of_slot = nullptr, *edge_of_slot = nullptr, *vertex_of_slot = nullptr;
+  std::uint64_t version = 0;
+};
+
+// A contact, or a pair that only exact arithmetic on the CPU decides.
+struct DeviceFound {
+  std::uint32_t first, second;
+  Kind kind;
+  bool decided;
+  double toc;
+};
+
+// What an element of the GPU task queue brings back.
+struct Output {
+  std::vector<DeviceFound> found;
+  BatchCounts counts[2];  // vertex-face, edge-edge
+};
+
+using Ticket = std::size_t;
+
+class TestDevice {
+ public:
+  virtual ~TestDevice() = default;
+  // Memory that the device reads index pairs from while other threads write elsewhere in it.
+  virtual std::shared_ptr<IndexPair[]> pair_memory(std::size_t n) { return std::shared_ptr<IndexPair[]>(new IndexPair[n]); }
+
+  // A new frame: its positions begin to travel. The arrays stay unchanged until the frame has ended.
+  virtual void begin_frame(Positions t0, Positions t1) = 0;
+  // The leaves that index pairs name, before the first of them is sent.
+  virtual void begin_traversal(const LeafTable& leaves) = 0;
+  // How many submissions the device holds at a time, and how many of them it works on at a time.
+  virtual std::size_t slots() const = 0;
+  virtual std::size_t concurrency() const = 0;
+  // Only while fewer than slots() are under way. The pairs stay unchanged until they are collected.
+  virtual Ticket submit(const IndexPair* pairs, std::size_t n) = 0;
+  // Whether the state variable says "data ready".
+  virtual bool ready(Ticket ticket) = 0;
+  // Appends to the output; the ticket ends.
+  virtual void collect(Ticket ticket, Output& output) = 0;
+  // Drops whatever is under way, also after a failure. Does not throw.
+  virtual void cancel() = 0;
+
+  virtual void count(std::map<std::string, std::uint64_t>& stats) const = 0;
+};
+
+}  // namespace hpccd::hybrid

@@ -1,0 +1,191 @@
+// SPDX-License-Identifier: Apache-2.0
+// The whole of section 5 on a device that computes on a CPU thread: contacts equal the plain traversal's whatever the
+// number of threads and devices, the size of the queue, lagging or failing devices. Also run under ThreadSanitizer.
+#include <gtest/gtest.h>
+
+#include "contacts/canonical.h"
+#include "cpu_test_device.h"
+#include "grid_scene.h"
+#include "hybrid/engine.h"
+#include "traverse/traverse.h"
+
+namespace hpccd {
+namespace {
+
+constexpr std::uint32_t side = 24;
+
+// A detector with its parts laid open.
+struct Bench {
+  explicit Bench(int threads, BatchTest batch_test = hpccd::batch_test(Simd::scalar, Accuracy::exact))
+      : scene(test::two_sheets(side)),
+        features(features_of(*scene)),
+        rules(*scene, Accuracy::exact),
+        pool(threads),
+        workers(static_cast<std::size_t>(threads)) {
+    for (auto& test : search.batch_test) test = batch_test;
+    search.leaf_pairs = leaf_pairs(Simd::scalar);
+    search.report = Report::all;
+  }
+
+  void take(double from, double to) {
+    start = test::sheet_positions(side, from), end = test::sheet_positions(side, to);
+    motion.take(*scene, test::view(start), test::view(end), 0, pool);
+    build(tree, *scene, features, motion.boxes, pool);
+    search.geometry = {motion.rows.data(), features.edges.data(), features.faces.data(), nullptr, motion.map.scale};
+    search.earliest = std::numeric_limits<double>::infinity();
+  }
+
+  Contacts collect() { return collect_contacts(workers, search.geometry, Report::all, {false, false}, order, pool); }
+
+  Contacts on_cpu() {
+    traverse(tree, rules, search, pool, workers);
+    return collect();
+  }
+
+  struct Result {
+    Contacts contacts;
+    bool complete;
+    std::map<std::string, std::uint64_t> stats;
+  };
+
+  Result with(hybrid::Engine& engine, std::uint64_t version = 1) {
+    engine.begin_frame(test::view(start), test::view(end));
+    hybrid::FrameGuard frame(engine, workers);
+    engine.begin_traversal({&tree.leaves, &tree.face_of_slot, &tree.edge_of_slot, &tree.vertex_of_slot, version},
+                           [this](Worker& worker, hybrid::IndexPair p) {
+                             worker.test_leaf_pair(tree, tree.leaves[p.first], tree.leaves[p.second], Accuracy::exact);
+                           },
+                           workers);
+    traverse(tree, rules, search, pool, workers);
+    Profiler profiler;
+    profiler.begin();
+    Result r;
+    r.complete = frame.finish(profiler);
+    engine.count(r.stats);
+    r.contacts = collect();
+    return r;
+  }
+
+  hybrid::Communication::Devices devices(std::size_t n) {
+    hybrid::Communication::Devices list;
+    for (std::size_t i = 0; i < n; ++i) list.push_back(std::make_unique<test::CpuTestDevice>(features, tree, search.batch_test[0], faults));
+    return list;
+  }
+
+  std::shared_ptr<const Scene> scene;
+  Features features;
+  PairRules rules;
+  ThreadPool pool;
+  std::vector<Worker> workers;
+  Search search;
+  MotionBounds motion;
+  Tree tree;
+  ContactOrder order;
+  std::vector<double> start, end;
+  std::shared_ptr<test::DeviceFaults> faults = std::make_shared<test::DeviceFaults>();
+};
+
+void expect_equal(const Contacts& a, const Contacts& b) {
+  EXPECT_EQ(a.vf, b.vf);
+  EXPECT_EQ(a.ee, b.ee);
+  EXPECT_EQ(a.vf_toc, b.vf_toc);
+  EXPECT_EQ(a.ee_toc, b.ee_toc);
+  EXPECT_EQ(a.hash, b.hash);
+}
+
+TEST(Hybrid, SameContactsForAnyThreadsDevicesAndSegments) {
+  for (const int threads : {1, 2, 4}) {
+    Bench bench(threads);
+    bench.take(0, 1);
+    const Contacts expected = bench.on_cpu();
+    ASSERT_GT(expected.vf.size() + expected.ee.size(), 200u);
+    for (const std::size_t n_devices : {1u, 2u})
+      for (const hybrid::Sizes sizes : {hybrid::Sizes{}, hybrid::Sizes{8, 16}, hybrid::Sizes{1, 1}}) {
+        hybrid::Engine engine(bench.devices(n_devices), sizes, bench.pool);
+        const auto result = bench.with(engine);
+        EXPECT_TRUE(result.complete);
+        EXPECT_EQ(result.stats.at("test_devices"), n_devices);
+        expect_equal(result.contacts, expected);
+        if (sizes.segment_pairs > 1) EXPECT_GT(result.stats.at("hybrid_calls"), 0u);
+      }
+  }
+}
+
+TEST(Hybrid, FrameAfterFrameAndOnANewTree) {
+  Bench bench(3);
+  bench.take(0, 0.5);
+  hybrid::Engine engine(bench.devices(2), {16, 32}, bench.pool);
+  for (int k = 0; k < 30; ++k) {
+    bench.take(0.03 * k, 0.03 * k + 0.5);
+    const auto result = bench.with(engine, static_cast<std::uint64_t>(k + 1));
+    EXPECT_TRUE(result.complete);
+    expect_equal(result.contacts, bench.on_cpu());
+  }
+}
+
+TEST(Hybrid, WhatADeviceLeavesUndecidedIsDecidedOnTheCpu) {
+  Bench bench(2, all_undecided);
+  bench.take(0, 1);
+  const Contacts expected = bench.on_cpu();
+  hybrid::Engine engine(bench.devices(1), {8, 16}, bench.pool);
+  const auto result = bench.with(engine);
+  EXPECT_GT(result.stats.at("gpu_exact_on_cpu"), 0u);
+  expect_equal(result.contacts, expected);
+}
+
+TEST(Hybrid, ThreadsTestHalfSegmentsThemselvesWhereDevicesLag) {
+  Bench bench(2);
+  bench.take(0, 1);
+  const Contacts expected = bench.on_cpu();
+  hybrid::Engine engine(bench.devices(1), {8, 16}, bench.pool);
+  bench.faults->holds_back = true;
+  std::thread release([&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(300));
+    bench.faults->holds_back = false;
+  });
+  const auto result = bench.with(engine);
+  release.join();
+  EXPECT_TRUE(result.complete);
+  EXPECT_GT(result.stats.at("hybrid_pairs_on_cpu"), 0u);
+  expect_equal(result.contacts, expected);
+}
+
+TEST(Hybrid, AFrameInWhichADeviceFailsIsFinishedOnTheCpu) {
+  Bench bench(2);
+  bench.take(0, 1);
+  const Contacts expected = bench.on_cpu();
+  hybrid::Engine engine(bench.devices(2), {16, 16}, bench.pool);
+  for (const int good_submissions : {0, 1, 2, 5}) {
+    bench.faults->submits_before_failure = good_submissions;
+    const auto failed = bench.with(engine);
+    EXPECT_FALSE(failed.complete);
+    EXPECT_EQ(engine.error(), "asked for: at a submission");
+    expect_equal(failed.contacts, expected);
+    bench.faults->submits_before_failure = -1;
+    const auto next = bench.with(engine);
+    EXPECT_TRUE(next.complete);
+    expect_equal(next.contacts, expected);
+  }
+  bench.faults->fails_at_begin = true;
+  const auto failed = bench.with(engine);
+  EXPECT_FALSE(failed.complete);
+  EXPECT_EQ(engine.error(), "asked for: at begin");
+  expect_equal(failed.contacts, expected);
+}
+
+TEST(Hybrid, AFrameThatIsGivenUpLeavesNothingBehind) {
+  Bench bench(2);
+  bench.take(0, 1);
+  const Contacts expected = bench.on_cpu();
+  hybrid::Engine engine(bench.devices(1), {8, 16}, bench.pool);
+  for (int k = 0; k < 3; ++k) {
+    engine.begin_frame(test::view(bench.start), test::view(bench.end));
+    hybrid::FrameGuard(engine, bench.workers);  // as when the positions turn out to be bad
+    const auto result = bench.with(engine);
+    EXPECT_TRUE(result.complete);
+    expect_equal(result.contacts, expected);
+  }
+}
+
+}  // namespace
+}  // namespace hpccd
