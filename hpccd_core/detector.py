@@ -12,7 +12,7 @@ METHODS = ("default", "published", "naive", "front")
 
 def backends():
     """The backends usable with this build on this machine, e.g. ["cpu"] or ["cpu", "gpu", "hybrid"]."""
-    return ["cpu", "gpu"] if gpu_status()["devices"] else ["cpu"]
+    return ["cpu", "gpu", "hybrid"] if gpu_status()["devices"] else ["cpu"]
 
 
 def gpu_status():
@@ -40,6 +40,10 @@ class Detector:
         "naive": their section 3.2, the baseline of Fig. 7: pairs shared among threads, reconstruction behind locks.
         "front": Tang et al. 2009, with which section 6.3 compares: the front of the traversal is kept from step to
             step. Costs memory: 8 bytes for each pair of nodes where the last traversal ended.
+    hybrid_segments, hybrid_segment_pairs (backend "hybrid"): the triangle index queue of Kim et al. 2009, section 5.1:
+        how many segments, and how many pairs of leaves each holds. At least four segments a thread are used.
+    gpus (backend "hybrid"): how many GPUs; 0 for all. Threads are those of the traversal: the communication thread
+        comes on top of them. A leaf is a block of eight triangles, with the published methods one triangle.
     restructure: of "published" and "naive", whether they restructure; False only to measure what it brings.
     The scene is copied: meshes added to it later do not reach this detector.
     """
@@ -58,6 +62,9 @@ class Detector:
         tolerance=1e-6,
         method="default",
         restructure=True,
+        hybrid_segments=128,
+        hybrid_segment_pairs=2048,
+        gpus=0,
     ):
         if not isinstance(scene, Scene):
             raise TypeError(f"scene: expected hpccd_core.Scene, got {type(scene).__name__}")
@@ -77,6 +84,13 @@ class Detector:
             raise ValueError(
                 f"report: 'any' is not offered by method {method!r}; use method='default', or report='all' or 'first'"
             )
+        queue = (
+            arguments.whole_number("hybrid_segments", hybrid_segments, 1, 65536),
+            arguments.whole_number("hybrid_segment_pairs", hybrid_segment_pairs, 1, 1 << 20),
+            arguments.whole_number("gpus", gpus, 0, 1024),
+        )
+        if gpus > (here := len(gpu_status()["devices"])) and backend in ("hybrid", "auto"):
+            raise ValueError(f"gpus: {gpus} were asked for, {here} are usable here; give at most {here}, or 0 for all")
         lengths = arguments.separation(accuracy, minimum_separation, tolerance)
         self.n_vertices = scene.n_vertices
         self._core = _core.Detector(
@@ -91,8 +105,10 @@ class Detector:
             *lengths,
             getattr(_core.Method, method),
             bool(restructure),
+            *queue,
         )
         self._last = None
+        self._last_on_device = device_arrays.LastStep()
 
     def detect(self, vertices_t0, vertices_t1):
         """Contacts of the motion from vertices_t0 to vertices_t1, each (V, 3) float32 or float64.
@@ -115,6 +131,9 @@ class Detector:
     def _detect_on_device(self, vertices_t0, vertices_t1):
         first = device_arrays.positions("vertices_t0", vertices_t0, self.n_vertices)
         second = device_arrays.positions("vertices_t1", vertices_t1, self.n_vertices)
+        return self._detect_places(first, second)
+
+    def _detect_places(self, first, second):
         if first.is_double != second.is_double:
             raise TypeError("vertices_t0, vertices_t1: device arrays must both be float32 or both be float64")
         return Contacts(
@@ -122,7 +141,15 @@ class Detector:
         )
 
     def step(self, vertices):
-        """Streaming: the end of the last step is the start of this one. The first call returns no contacts."""
+        """Streaming: the end of the last step is the start of this one. The first call returns no contacts.
+
+        Device arrays are taken as by detect(); the last one is kept in a copy on the device. A step from a host array
+        to a device array, or back, raises TypeError; reset() first.
+        """
+        if device_arrays.is_on_device(vertices):
+            return self._step_on_device(vertices)
+        if self._last_on_device:
+            raise TypeError("vertices: the last step was a device array; give another one, or call reset() first")
         vertices = arguments.vertices("vertices", vertices, self.n_vertices)
         last = self._last
         if last is None:  # later ones are checked when they are used
@@ -131,9 +158,19 @@ class Detector:
         self._last = vertices.copy()
         return contacts
 
+    def _step_on_device(self, vertices):
+        if self._last is not None:
+            raise TypeError("vertices: the last step was a host array; give another one, or call reset() first")
+        place = device_arrays.positions("vertices", vertices, self.n_vertices)
+        last = self._last_on_device.place
+        contacts = Contacts.none() if last is None else self._detect_places(last, place)
+        self._last_on_device.keep(place, self.n_vertices)
+        return contacts
+
     def reset(self):
         """Forget the last positions: the next step() starts anew."""
         self._last = None
+        self._last_on_device.forget()
 
     @property
     def backend(self):

@@ -4,6 +4,8 @@
 import ctypes
 import typing
 
+from . import _core
+
 
 class DevicePositions(typing.NamedTuple):
     """A C-contiguous (V, 3) array on the device."""
@@ -36,6 +38,29 @@ def positions(name, value, n_vertices):
     if strides is not None and n_vertices and tuple(strides) != (3 * size, size):
         raise ValueError(f"{name}: must be C-contiguous, got strides {tuple(strides)} bytes; copy it first")
     return DevicePositions(int(pointer or 0), size == 8)
+
+
+class LastStep:
+    """The positions of the last step in a copy on their device: whoever made them may write there again."""
+
+    def __init__(self):
+        self._memory = None
+        self.place = None
+
+    def __bool__(self):
+        return self.place is not None
+
+    def keep(self, place, n_vertices):
+        """Copies what is at this place now. Raises RuntimeError where the device fails."""
+        if self._memory is None:
+            self._memory = _core.MemoryOnDevice()
+        self.place = None
+        self._memory.assign(place.pointer, n_vertices * 3 * (8 if place.is_double else 4))
+        self.place = DevicePositions(self._memory.pointer, place.is_double)
+
+    def forget(self):
+        """Without a last step; the memory stays for the next one."""
+        self.place = None
 
 
 class _Tensor(ctypes.Structure):

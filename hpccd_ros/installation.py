@@ -34,6 +34,7 @@ def gather() -> dict:
         "simd": detector.simd,
         "threads": detector.threads,
         "backends": hc.backends(),
+        "gpu": _gpu(hc.gpu_status()),
         "accuracies": _accuracies(hc, probe),
         "packages": {name: _version(name) for name in PACKAGES},
         "environment": {name: os.environ[name] for name in SETTINGS if name in os.environ},
@@ -54,6 +55,19 @@ def main(args) -> int:
         else:
             print(f"{name:12} {', '.join(value) if isinstance(value, list) else value}")
     return 0
+
+
+def _gpu(status) -> dict[str, str]:
+    """What of GPUs was found, and why not more."""
+    found = {"CUDA code in this build": status["toolkit"] if status["compiled"] else "none"}
+    for d in status["devices"]:
+        found[f"device {d['number']}"] = (
+            f"{d['name']}, sm_{d['major']}{d['minor']}, {d['multiprocessors']} multiprocessors, "
+            f"{d['memory'] / 2**30:.0f} GiB"
+        )
+    if status["reason"]:
+        found["why none is used"] = status["reason"]
+    return found
 
 
 def _accuracies(hc, scene) -> list[str]:

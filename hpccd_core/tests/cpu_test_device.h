@@ -68,6 +68,7 @@ class CpuTestDevice final : public hybrid::TestDevice {
     std::lock_guard lock(mutex_);
     const Job& done = job(ticket);
     output.found.insert(output.found.end(), done.output.found.begin(), done.output.found.end());
+    output.undecided.insert(output.undecided.end(), done.output.undecided.begin(), done.output.undecided.end());
     for (int k = 0; k < 2; ++k) output.counts[k].tested += done.output.counts[k].tested;
     std::erase_if(jobs_, [&](const Job& j) { return j.ticket == ticket; });
   }
@@ -128,11 +129,13 @@ class CpuTestDevice final : public hybrid::TestDevice {
     worker.flush();
     hybrid::Output output;
     for (const Found& f : worker.vertex_face)
-      output.found.push_back({f.first, f.second, Kind::vertex_face, true, f.toc});
+      output.found.push_back({f.first, f.second, Kind::vertex_face, f.toc});
     // Some as a device brings them that has no exact arithmetic: the CPU finds the same time for them.
     for (const Found& f : worker.edge_edge) {
-      const bool decided = test_ != all_undecided || f.first % 3 != 0;
-      output.found.push_back({f.first, f.second, Kind::edge_edge, decided, decided ? f.toc : -1});
+      if (test_ == all_undecided && f.first % 3 == 0)
+        output.undecided.push_back({f.first, f.second, Kind::edge_edge});
+      else
+        output.found.push_back({f.first, f.second, Kind::edge_edge, f.toc});
     }
     for (int k = 0; k < 2; ++k) output.counts[k] = worker.counts[k];
     return output;

@@ -17,10 +17,12 @@ for accuracy in ("balanced", "exact"):
             rng = np.random.default_rng(1)
             scene, t0, t1 = scenes.join([make(rng, 14), make(rng, 14)], ignored=((0, 0),))
             t0, t1 = t0.astype(dtype), t1.astype(dtype)
-            detector = hc.Detector(scene, backend="gpu", accuracy=accuracy, threads=2)
-            found = detector.detect(t0, t1)
-            if found.hash != hc.Detector(scene, backend="cpu", accuracy=accuracy).detect(t0, t1).hash:
-                sys.exit(f"{make.__name__}, {accuracy}: contacts differ")
-            if detector.stats["gpu_fallbacks"]:
-                sys.exit(f"{make.__name__}, {accuracy}: {detector.last_gpu_error}")
-            print(make.__name__, accuracy, dtype.__name__, found)
+            expected = hc.Detector(scene, backend="cpu", accuracy=accuracy).detect(t0, t1)
+            for backend in ("gpu", "hybrid"):
+                detector = hc.Detector(scene, backend=backend, accuracy=accuracy, threads=2, hybrid_segment_pairs=64)
+                found = detector.detect(t0, t1)
+                if found.hash != expected.hash:
+                    sys.exit(f"{make.__name__}, {accuracy}, {backend}: contacts differ")
+                if detector.stats["gpu_fallbacks"]:
+                    sys.exit(f"{make.__name__}, {accuracy}, {backend}: {detector.last_gpu_error}")
+                print(make.__name__, accuracy, dtype.__name__, backend, found)

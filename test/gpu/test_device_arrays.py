@@ -56,3 +56,24 @@ def test_mistakes_are_named():
         detector.detect(d0.astype("i4"), d1)
     with pytest.raises(ValueError, match="copy them to the host"):
         hc.Detector(scene, backend="cpu").detect(d0, d1)
+
+
+@pytest.mark.parametrize("library", ("cupy", "torch"))
+def test_steps_stay_on_the_device(library):
+    module = pytest.importorskip(library)
+    rng = np.random.default_rng(6)
+    scene, t0, _ = scenes.join([scenes.crumpled(rng, 20)])
+    frames = [t0 + rng.normal(0, 0.3, t0.shape) for _ in range(4)]
+    on_device = module.asarray(t0) if library == "cupy" else module.from_numpy(t0).cuda()
+    cpu, gpu = hc.Detector(scene, backend="cpu"), hc.Detector(scene, backend="gpu")
+    for frame in frames:
+        # The producer writes every frame into the same array, as simulators do.
+        on_device[...] = module.asarray(frame) if library == "cupy" else module.from_numpy(frame).cuda()
+        assert gpu.step(on_device).hash == cpu.step(frame).hash
+    assert len(gpu.detect(frames[0], frames[1])) > 0
+    with pytest.raises(TypeError, match="the last step was a device array"):
+        gpu.step(frames[0])
+    gpu.reset()
+    assert len(gpu.step(frames[0])) == 0
+    with pytest.raises(TypeError, match="the last step was a host array"):
+        gpu.step(on_device)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The GPU finds the CPU's contacts, in the same order, to the last bit."""
+"""The GPU, alone and beside the CPU, finds the CPU's contacts, in the same order, to the last bit."""
 
 import numpy as np
 import pytest
@@ -10,12 +10,22 @@ import hpccd_core as hc
 TIERS = ("balanced", "conservative", "exact")
 
 
+BACKENDS = ("gpu", "hybrid")
+
+
 def assert_same(scene, t0, t1, **options):
+    for backend in BACKENDS:
+        found = assert_backend_same(backend, scene, t0, t1, **options)
+    return found
+
+
+def assert_backend_same(backend, scene, t0, t1, **options):
     cpu = hc.Detector(scene, backend="cpu", **options).detect(t0, t1)
-    detector = hc.Detector(scene, backend="gpu", **options)
+    detector = hc.Detector(scene, backend=backend, **options)
     for _ in range(2):  # with a new tree, and with a refitted one
         gpu = detector.detect(t0, t1)
         assert detector.stats["gpu_fallbacks"] == 0, detector.last_gpu_error
+        assert detector.backend == backend
         for name in ("vf", "ee", "vf_toc", "ee_toc", "points", "normals"):
             np.testing.assert_array_equal(getattr(gpu, name), getattr(cpu, name), err_msg=name)
         assert gpu.hash == cpu.hash
@@ -31,6 +41,38 @@ def test_random_scenes(make, dtype, accuracy):
         rng = np.random.default_rng(seed)
         scene, t0, t1 = scenes.join([make(rng, 30)])
         assert len(assert_same(scene, t0.astype(dtype), t1.astype(dtype), accuracy=accuracy)) > 0
+
+
+@pytest.mark.parametrize("method", ("published", "naive", "front"))
+def test_published_methods_send_triangles(method):
+    rng = np.random.default_rng(11)
+    parts = [scenes.crumpled(rng, 24), scenes.soup(rng, 30)]
+    scene, t0, t1 = scenes.join(parts, accuracy=((0, 1, "balanced"),))
+    assert_backend_same("hybrid", scene, t0, t1, method=method, restructure=True)
+
+
+@pytest.mark.parametrize("segments, pairs", ((1, 1), (4, 16), (128, 2048), (16, 1 << 14)))
+@pytest.mark.parametrize("threads", (1, 3))
+def test_any_queue_gives_the_same_contacts(segments, pairs, threads):
+    scene, t0, t1 = scenes.join([scenes.crumpled(np.random.default_rng(12), 40)])
+    options = {"hybrid_segments": segments, "hybrid_segment_pairs": pairs, "threads": threads}
+    assert_backend_same("hybrid", scene, t0, t1, **options)
+
+
+@pytest.mark.parametrize("gpus", (1, 2))
+def test_any_number_of_gpus(gpus):
+    if gpus > len(hc.gpu_status()["devices"]):
+        pytest.skip(f"{gpus} GPUs are not here")
+    scene, t0, t1 = scenes.join([scenes.crumpled(np.random.default_rng(13), 60)])
+    detector = hc.Detector(scene, backend="hybrid", gpus=gpus, hybrid_segment_pairs=64)
+    assert detector.detect(t0, t1).hash == hc.Detector(scene, backend="cpu").detect(t0, t1).hash
+    assert detector.stats["gpus"] == gpus
+
+
+def test_more_gpus_than_there_are_is_refused():
+    scene, _, _ = scenes.join([scenes.crumpled(np.random.default_rng(14), 8)])
+    with pytest.raises(ValueError, match="gpus: 1000 were asked for"):
+        hc.Detector(scene, backend="hybrid", gpus=1000)
 
 
 @pytest.mark.parametrize("name", ("cloth-funnel", "cloth-ball", "n-body"))
@@ -66,10 +108,11 @@ def test_points_and_normals():
 def test_report_first_and_any():
     scene, t0, t1 = scenes.join([scenes.crumpled(np.random.default_rng(7), 16)])
     assert_same(scene, t0, t1, report="first")
-    every = hc.Detector(scene, backend="gpu").detect(t0, t1)
-    one = hc.Detector(scene, backend="gpu", report="any").detect(t0, t1)
-    assert len(one) == 1
-    assert one.vf.tolist()[0] in every.vf.tolist() if len(one.vf) else one.ee.tolist()[0] in every.ee.tolist()
+    every = hc.Detector(scene, backend="cpu").detect(t0, t1)
+    for backend in BACKENDS:
+        one = hc.Detector(scene, backend=backend, report="any").detect(t0, t1)
+        assert len(one) == 1
+        assert one.vf.tolist() == every.vf[:1].tolist()
 
 
 def test_nothing_and_little():
@@ -90,6 +133,11 @@ def test_lists_that_overflow_grow():
 
 def test_bad_coordinates_are_named():
     scene, t0, t1 = scenes.join([scenes.crumpled(np.random.default_rng(10), 8)])
+    good = t1.copy()
     t1[3, 1] = np.nan
-    with pytest.raises(ValueError, match=r"vertices_t1\[3, 1\] is NaN"):
-        hc.Detector(scene, backend="gpu").detect(t0, t1)
+    for backend in BACKENDS:
+        detector = hc.Detector(scene, backend=backend)
+        for _ in range(2):
+            with pytest.raises(ValueError, match=r"vertices_t1\[3, 1\] is NaN"):
+                detector.detect(t0, t1)
+            assert detector.detect(t0, good).hash == hc.Detector(scene, backend="cpu").detect(t0, good).hash

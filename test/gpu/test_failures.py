@@ -15,12 +15,15 @@ def _disarm():
     _core.gpu_fail_after(0)
 
 
-def test_every_call_of_a_frame_may_fail():
+@pytest.mark.parametrize("backend", ("gpu", "hybrid"))
+def test_every_call_of_a_frame_may_fail(backend):
     scene, t0, t1 = scenes.join([scenes.crumpled(np.random.default_rng(1), 16)])
     expected = hc.Detector(scene, backend="cpu").detect(t0, t1).hash
+    # Creating the hybrid's 16 slots takes hundreds of calls alike: not all of them need to fail.
+    steps = range(1, 400) if backend == "gpu" else [*range(1, 60), *range(60, 3000, 23)]
     failures = 0
-    for n in range(1, 400):
-        detector = hc.Detector(scene, backend="gpu", threads=2)
+    for n in steps:
+        detector = hc.Detector(scene, backend=backend, threads=2)
         _core.gpu_fail_after(n)
         assert detector.detect(t0, t1).hash == expected
         _core.gpu_fail_after(0)
@@ -30,14 +33,35 @@ def test_every_call_of_a_frame_may_fail():
         assert failed == 1 and "asked for by a test" in detector.last_gpu_error and detector.backend == "cpu"
         failures += 1
         assert detector.detect(t0, t1).hash == expected  # the device is back
-        assert detector.backend == "gpu"
+        assert detector.backend == backend
+    assert not failed
     assert failures > 30
 
 
-def test_after_three_failures_in_a_row_the_device_is_left_alone():
+def test_every_call_of_a_hybrid_frame_on_warm_devices_may_fail():
+    scene, t0, t1 = scenes.join([scenes.crumpled(np.random.default_rng(3), 40)])
+    expected = hc.Detector(scene, backend="cpu").detect(t0, t1).hash
+    detector = hc.Detector(scene, backend="hybrid", threads=2, hybrid_segment_pairs=128)
+    detector.detect(t0, t1)
+    failures = 0
+    for n in range(1, 200):
+        detector.detect(t0, t1)
+        assert detector.backend == "hybrid"
+        _core.gpu_fail_after(n)
+        assert detector.detect(t0, t1).hash == expected
+        _core.gpu_fail_after(0)
+        if detector.backend == "hybrid":
+            break
+        failures += 1
+        assert detector.stats["gpu_fallbacks"] == failures
+    assert 8 < failures < 199
+
+
+@pytest.mark.parametrize("backend", ("gpu", "hybrid"))
+def test_after_three_failures_in_a_row_the_device_is_left_alone(backend):
     scene, t0, t1 = scenes.join([scenes.crumpled(np.random.default_rng(2), 8)])
     expected = hc.Detector(scene, backend="cpu").detect(t0, t1).hash
-    detector = hc.Detector(scene, backend="gpu", threads=2)
+    detector = hc.Detector(scene, backend=backend, threads=2)
     for i in range(5):
         _core.gpu_fail_after(1)
         assert detector.detect(t0, t1).hash == expected

@@ -18,19 +18,25 @@ using hybrid::Ticket;
 
 static_assert(sizeof(IndexPair) == sizeof(uint2));
 
-__global__ void begin_batch_kernel(Counters* counters, u64 leaf_pairs) {
+// What differs between submissions of one slot; in page-locked memory, where the device reads it.
+struct Order {
+  u64 leaf_pairs;
+  u32 number;
+};
+
+__global__ void begin_batch_kernel(Counters* counters, const Order* order) {
   constexpr u32 words = sizeof(Counters) / sizeof(u64);
   static_assert(sizeof(Counters) % sizeof(u64) == 0);
   for (u32 i = threadIdx.x; i < words; i += blockDim.x) reinterpret_cast<u64*>(counters)[i] = 0;
   __syncthreads();
-  if (threadIdx.x == 0) counters->leaf_pairs = leaf_pairs;
+  if (threadIdx.x == 0) counters->leaf_pairs = order->leaf_pairs;
 }
 
 // The state variable of an element of the GPU task queue becomes "data ready", after everything that it announces.
-__global__ void data_ready_kernel(const Counters* counters, Counters* to_host, u32* state, u32 number) {
+__global__ void data_ready_kernel(const Counters* counters, Counters* to_host, u32* state, const Order* order) {
   *to_host = *counters;
   __threadfence_system();
-  *reinterpret_cast<volatile u32*>(state) = number;
+  *reinterpret_cast<volatile u32*>(state) = order->number;
 }
 
 // What one element of the GPU task queue needs on the device, and its output buffer in page-locked memory, which the
@@ -40,7 +46,9 @@ struct Slot {
     counters.reserve(1);
     host_counters.reserve(1);
     state.reserve(1);
+    order.reserve(1);
     *state.data() = 0;
+    *order.data() = {0, 0};
     reserve_found(std::size_t{1} << 13);
   }
   void reserve_found(std::size_t n) {
@@ -48,7 +56,7 @@ struct Slot {
     tocs.reserve(n);
   }
   bool data_ready() const {
-    return std::atomic_ref<u32>(*state.data()).load(std::memory_order_acquire) == number;
+    return std::atomic_ref<u32>(*state.data()).load(std::memory_order_acquire) == order.data()->number;
   }
 
   Stream stream;
@@ -59,7 +67,9 @@ struct Slot {
   PinnedBuffer<u64> keys;
   PinnedBuffer<double> tocs;
   PinnedBuffer<u32> state;
-  u32 number = 0;  // of the submission; what `state` shows when it is ready
+  PinnedBuffer<Order> order;  // its number is what `state` shows when the submission is ready
+  Graph graph;
+  std::vector<std::uintptr_t> recorded;  // what the graph depends on, as it was
   const IndexPair* sent = nullptr;
   std::size_t n = 0;
   u32 looks = 0;
@@ -131,6 +141,8 @@ class CudaTestDevice final : public hybrid::TestDevice {
     }
     if (again) {
       ++resubmitted_;
+      largest_.include(s.lists.sizes());
+      most_found_ = std::max(most_found_, s.keys.size());
       launch(s);
     }
     return !again;
@@ -139,12 +151,14 @@ class CudaTestDevice final : public hybrid::TestDevice {
   void collect(Ticket ticket, hybrid::Output& output) override {
     Slot& s = slots_[ticket];
     const Counters& c = *s.host_counters.data();
-    const auto add = [&](u64 key, bool decided, double toc) {
-      const Undecided p = scene_.pair_of(key);
-      output.found.push_back({p.first, p.second, p.kind, decided, toc});
-    };
-    for (u64 i = 0; i < c.found_all; ++i) add(s.keys.data()[i], true, s.tocs.data()[i]);
-    for (u64 i = 0; i < c.to_host; ++i) add(s.lists.to_host()[i], false, 0);
+    for (u64 i = 0; i < c.found_all; ++i) {
+      const Undecided p = scene_.pair_of(s.keys.data()[i]);
+      output.found.push_back({p.first, p.second, p.kind, s.tocs.data()[i]});
+    }
+    for (u64 i = 0; i < c.to_host; ++i) {
+      const Undecided p = scene_.pair_of(s.lists.to_host()[i]);
+      output.undecided.push_back({p.first, p.second, p.kind});
+    }
     for (int k = 0; k < 2; ++k) {
       BatchCounts& sum = output.counts[k];
       sum.tested += c.candidates[k];
@@ -228,21 +242,40 @@ class CudaTestDevice final : public hybrid::TestDevice {
   template <class T>
   void launch(Slot& s) {
     check(cudaSetDevice(device_), "cudaSetDevice");
-    if (s.n > s.pairs.size()) s.pairs.reserve(s.n + s.n / 4);
+    // What was too short in one slot will be in the others.
+    s.lists.reserve(largest_);
+    s.reserve_found(most_found_);
+    if (s.n > s.pairs.size()) s.pairs.reserve(2 * s.n);
+    *s.order.data() = {s.n, s.order.data()->number + 1};
+    s.looks = 0;
+    record<T>(s);
     check(cudaStreamWaitEvent(s.stream, ready_, 0), "cudaStreamWaitEvent");
     check(cudaMemcpyAsync(s.pairs.data(), s.sent, s.n * sizeof(uint2), cudaMemcpyHostToDevice, s.stream),
           "cudaMemcpyAsync");
+    s.graph.launch(s.stream);
+  }
+
+  // The kernels between the copy and "data ready", anew where something that they name has changed.
+  template <class T>
+  void record(Slot& s) {
+    const TestLists::Sizes z = s.lists.sizes();
+    const std::vector<std::uintptr_t> now{sizeof(T), leaves_version_, s.pairs.size(), s.keys.size(), z.survivors[0],
+                                          z.survivors[1], z.single[0], z.single[1], z.many[0], z.many[1],
+                                          z.undecided, z.to_host, s.lists.n_segments()};
+    if (now == s.recorded) return;
+    s.recorded.clear();
     Frame<T> f = frame<T>();
     f.counters = s.counters.data();
-    f.leaf_pairs = {s.pairs.data(), s.n};
+    f.leaf_pairs = {s.pairs.data(), s.pairs.size()};
     f.found_keys = s.keys.data(), f.found_tocs = s.tocs.data(), f.found_capacity = s.keys.size();
-    begin_batch_kernel<<<1, 32, 0, s.stream>>>(f.counters, s.n);
-    check_launch("begin_batch_kernel");
-    s.lists.launch(f, multiprocessors_, s.stream, timer_);
-    ++s.number;
-    s.looks = 0;
-    data_ready_kernel<<<1, 1, 0, s.stream>>>(f.counters, s.host_counters.data(), s.state.data(), s.number);
-    check_launch("data_ready_kernel");
+    s.graph.record(s.stream, [&] {
+      begin_batch_kernel<<<1, 32, 0, s.stream>>>(f.counters, s.order.data());
+      check_launch("begin_batch_kernel");
+      s.lists.launch(f, multiprocessors_, s.stream, timer_);
+      data_ready_kernel<<<1, 1, 0, s.stream>>>(f.counters, s.host_counters.data(), s.state.data(), s.order.data());
+      check_launch("data_ready_kernel");
+    });
+    s.recorded = now;
   }
 
   const int device_;
@@ -261,6 +294,8 @@ class CudaTestDevice final : public hybrid::TestDevice {
   DeviceBuffer<DeviceBox> vertex_boxes_;
   DeviceBuffer<Counters> counters_;
   std::vector<Slot> slots_;
+  TestLists::Sizes largest_{};
+  std::size_t most_found_ = 0;
   std::uint64_t resubmitted_ = 0;
 };
 

@@ -46,6 +46,43 @@ class Event {
   cudaEvent_t event_ = nullptr;
 };
 
+// Work that is submitted again and again, by one call instead of one for each of its kernels.
+class Graph {
+ public:
+  Graph() = default;
+  ~Graph() { drop(); }
+  Graph(const Graph&) = delete;
+  Graph& operator=(const Graph&) = delete;
+
+  // Records what `submit` puts on the stream, instead of doing it.
+  template <class Submit>
+  void record(cudaStream_t stream, Submit&& submit) {
+    drop();
+    check(cudaStreamBeginCapture(stream, cudaStreamCaptureModeRelaxed), "cudaStreamBeginCapture");
+    cudaGraph_t graph = nullptr;
+    try {
+      submit();
+    } catch (...) {  // the stream must not stay in this state
+      cudaStreamEndCapture(stream, &graph);
+      if (graph) cudaGraphDestroy(graph);
+      throw;
+    }
+    const cudaError_t ended = cudaStreamEndCapture(stream, &graph);
+    const cudaError_t made = ended == cudaSuccess ? cudaGraphInstantiate(&graph_, graph, 0) : ended;
+    if (graph) cudaGraphDestroy(graph);
+    if (made != cudaSuccess) graph_ = nullptr;
+    check(made, "cudaGraphInstantiate");
+  }
+  void launch(cudaStream_t stream) const { check(cudaGraphLaunch(graph_, stream), "cudaGraphLaunch"); }
+  void drop() {
+    if (graph_) cudaGraphExecDestroy(graph_);
+    graph_ = nullptr;
+  }
+
+ private:
+  cudaGraphExec_t graph_ = nullptr;
+};
+
 // Device time between marks on the stream; recorded only where asked for, since each mark costs a microsecond.
 class StageTimer {
  public:

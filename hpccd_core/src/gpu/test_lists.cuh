@@ -9,11 +9,32 @@ namespace hpccd::gpu {
 
 class TestLists {
  public:
+  struct Sizes {
+    std::size_t survivors[2], single[2], many[2], undecided, to_host;
+    void include(const Sizes& s) {
+      for (int k = 0; k < 2; ++k) {
+        survivors[k] = std::max(survivors[k], s.survivors[k]);
+        single[k] = std::max(single[k], s.single[k]);
+        many[k] = std::max(many[k], s.many[k]);
+      }
+      undecided = std::max(undecided, s.undecided);
+      to_host = std::max(to_host, s.to_host);
+    }
+  };
   // A start that most scenes outgrow once or never; lists grow where they overflow.
   TestLists(std::size_t survivors, std::size_t later, std::size_t undecided) {
-    for (int k = 0; k < 2; ++k) survivors_[k].reserve(survivors), single_[k].reserve(later), many_[k].reserve(later);
-    undecided_.reserve(undecided);
-    to_host_.reserve(undecided);
+    reserve({{survivors, survivors}, {later, later}, {later, later}, undecided, undecided});
+  }
+
+  void reserve(const Sizes& s) {
+    for (int k = 0; k < 2; ++k)
+      survivors_[k].reserve(s.survivors[k]), single_[k].reserve(s.single[k]), many_[k].reserve(s.many[k]);
+    undecided_.reserve(s.undecided);
+    to_host_.reserve(s.to_host);
+  }
+  Sizes sizes() const {
+    return {{survivors_[0].size(), survivors_[1].size()}, {single_[0].size(), single_[1].size()},
+            {many_[0].size(), many_[1].size()}, undecided_.size(), to_host_.size()};
   }
 
   // All stages on pairs of leaves that the frame lists; the frame's counters were cleared, its contacts have a place.

@@ -53,6 +53,7 @@ void Communication::begin_frame(Positions t0, Positions t1) {
   failed_ = false;
   error_.clear();
   output_.found.clear();
+  output_.undecided.clear();
   output_.counts[0] = output_.counts[1] = {};
   counts_ = {};
   order(Stage::positions);

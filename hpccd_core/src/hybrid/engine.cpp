@@ -73,18 +73,20 @@ void Engine::test_leftovers(std::vector<Worker>& workers) {
 
 void Engine::merge(std::vector<Worker>& workers) {
   const Output& output = communication_.output();
-  const auto add = [&](std::size_t begin, std::size_t end, int thread) {
+  // 20 us each: one at a time.
+  parallel_for(pool_, output.undecided.size(), 1, [&](std::size_t begin, std::size_t end, int thread) {
     for (std::size_t i = begin; i < end; ++i) {
-      const DeviceFound& f = output.found[i];
-      if (f.decided)
-        workers[thread].report(f.kind, f.first, f.second, f.toc);
-      else
-        workers[thread].resolve(f.kind, f.first, f.second, Accuracy::exact);
+      const UndecidedPair& p = output.undecided[i];
+      workers[thread].resolve(p.kind, p.first, p.second, Accuracy::exact);
     }
-  };
-  // Small enough that the few pairs for exact arithmetic, which arrive together, are shared between the threads.
-  parallel_for(pool_, output.found.size(), 64, add);
-  for (const DeviceFound& f : output.found) exact_on_cpu_ += !f.decided;
+  });
+  parallel_for(pool_, output.found.size(), 1024, [&](std::size_t begin, std::size_t end, int thread) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const DeviceContact& f = output.found[i];
+      workers[thread].report(f.kind, f.first, f.second, f.toc);
+    }
+  });
+  exact_on_cpu_ = output.undecided.size();
   for (int k = 0; k < 2; ++k) {
     BatchCounts& sum = workers[0].counts[k];
     const BatchCounts& c = output.counts[k];

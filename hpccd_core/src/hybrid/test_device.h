@@ -27,17 +27,21 @@ struct LeafTable {
   std::uint64_t version = 0;
 };
 
-// A contact, or a pair that only exact arithmetic on the CPU decides.
-struct DeviceFound {
+struct DeviceContact {
   std::uint32_t first, second;
   Kind kind;
-  bool decided;
   double toc;
 };
+// A pair that only exact arithmetic on the CPU decides.
+struct UndecidedPair {
+  std::uint32_t first, second;
+  Kind kind;
+};
 
-// What an element of the GPU task queue brings back.
+// What elements of the GPU task queue bring back.
 struct Output {
-  std::vector<DeviceFound> found;
+  std::vector<DeviceContact> found;
+  std::vector<UndecidedPair> undecided;
   BatchCounts counts[2];  // vertex-face, edge-edge
 };
 
