@@ -42,8 +42,9 @@ class Detector:
             step. Costs memory: 8 bytes for each pair of nodes where the last traversal ended.
     hybrid_segments, hybrid_segment_pairs (backend "hybrid"): the triangle index queue of Kim et al. 2009, section 5.1:
         how many segments, and how many pairs of leaves each holds. At least four segments a thread are used.
-    gpus (backend "hybrid"): how many GPUs; 0 for all. Threads are those of the traversal: the communication thread
-        comes on top of them. A leaf is a block of eight triangles, with the published methods one triangle.
+    gpus (backend "hybrid"): how many GPUs; 0 for all. A leaf is a block of eight triangles, with the published methods
+        one triangle. The communication thread comes on top of `threads`; with as many as cores it takes the last one's
+        place.
     restructure: of "published" and "naive", whether they restructure; False only to measure what it brings.
     The scene is copied: meshes added to it later do not reach this detector.
     """

@@ -46,8 +46,7 @@ py::dict to_dict(Contacts&& c) {
 }
 
 template <auto test>
-py::tuple run_queries(const Array<double>& queries, Accuracy accuracy, Simd simd, double separation,
-                     double tolerance) {
+py::tuple run_queries(const Array<double>& queries, Accuracy accuracy, Simd simd, double separation, double tolerance) {
   const auto n = static_cast<std::size_t>(queries.shape(0));
   py::array_t<bool> hit(static_cast<py::ssize_t>(n));
   py::array_t<double> toc(static_cast<py::ssize_t>(n));
@@ -112,13 +111,12 @@ PYBIND11_MODULE(_core, m) {
   py::class_<Detector>(m, "Detector")
       .def(py::init([](std::shared_ptr<Scene> scene, Accuracy accuracy, Backend backend, Report report, Simd simd,
                        int threads, bool points, bool normals, double separation, double tolerance, Method method,
-                       bool restructure, std::size_t hybrid_segments,
-                       std::size_t hybrid_segment_pairs, int gpus) {
+                       bool restructure, std::size_t hybrid_segments, std::size_t hybrid_segment_pairs, int gpus) {
         // A copy: what is added to the caller's scene later does not reach this detector.
-        return std::make_unique<Detector>(std::make_shared<const Scene>(*scene),
-                                          Options{accuracy, backend, report, simd, threads, points, normals,
-                                                  separation, tolerance, method, restructure, hybrid_segments,
-                                                  hybrid_segment_pairs, gpus});
+        return std::make_unique<Detector>(
+            std::make_shared<const Scene>(*scene),
+            Options{accuracy, backend, report, simd, threads, points, normals, separation, tolerance, method,
+                    restructure, hybrid_segments, hybrid_segment_pairs, gpus});
       }))
       .def("detect",
            [](Detector& d, const py::array& t0, const py::array& t1) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <optional>
+#include <thread>
 #include <utility>
 
 #include "base/parallel.h"
@@ -17,6 +18,17 @@
 #include "traverse/traverse.h"
 
 namespace hpccd {
+namespace {
+
+// The communication thread of the hybrid waits actively: on a core that the pool uses it would hold up a thread that
+// all others then wait for (a quarter of a frame of 1 ms).
+int pool_threads(const Options& o) {
+  const int cores = static_cast<int>(std::thread::hardware_concurrency());
+  if (o.backend != Backend::hybrid || cores < 2 || (o.threads > 0 && o.threads < cores)) return o.threads;
+  return o.threads > cores ? o.threads : cores - 1;
+}
+
+}  // namespace
 
 struct Detector::Impl {
   Impl(std::shared_ptr<const Scene> s, Options o)
@@ -24,7 +36,7 @@ struct Detector::Impl {
         options(o),
         features(features_of(*scene)),
         rules(*scene, o.accuracy),
-        pool(o.threads),
+        pool(pool_threads(o)),
         workers(static_cast<std::size_t>(pool.size())) {
     options.simd = resolve(o.simd);
     options.threads = pool.size();

@@ -27,12 +27,9 @@ struct DeviceFaults {
 class CpuTestDevice final : public hybrid::TestDevice {
  public:
   CpuTestDevice(const Features& features, const Tree& tree, BatchTest test, std::shared_ptr<DeviceFaults> faults)
-      : features_(features),
-        tree_(tree),
-        test_(test),
-        faults_(std::move(faults)),
-        pool_(1),
-        thread_([this] { work(); }) {}
+      : features_(features), tree_(tree), test_(test), faults_(std::move(faults)), pool_(1), thread_([this] {
+          work();
+        }) {}
   ~CpuTestDevice() override {
     {
       std::lock_guard lock(mutex_);
@@ -45,19 +42,17 @@ class CpuTestDevice final : public hybrid::TestDevice {
   void begin_frame(Positions t0, Positions t1) override {
     if (faults_->fails_at_begin) throw std::runtime_error("asked for: at begin");
     motion_.take(t0, t1, 0, pool_);
-    ++frames;
   }
-  void begin_traversal(const hybrid::LeafTable& leaves) override { version = leaves.version; }
+  void begin_traversal(const hybrid::LeafTable&) override {}
   std::size_t slots() const override { return 4; }
-  std::size_t concurrency() const override { return 2; }
+  std::size_t cores() const override { return 2; }
 
-  hybrid::Ticket submit(const hybrid::IndexPair* pairs, std::size_t n) override {
+  hybrid::Ticket submit(const std::vector<hybrid::Piece>& pieces) override {
     if (faults_->submits_before_failure >= 0 && faults_->submits_before_failure-- == 0)
       throw std::runtime_error("asked for: at a submission");
     std::lock_guard lock(mutex_);
-    jobs_.push_back({++last_ticket_, pairs, n, false, {}});
+    jobs_.push_back({++last_ticket_, pieces, false, {}});
     changed_.notify_all();
-    pairs_tested += n;
     return last_ticket_;
   }
   bool ready(hybrid::Ticket ticket) override {
@@ -79,14 +74,10 @@ class CpuTestDevice final : public hybrid::TestDevice {
   }
   void count(std::map<std::string, std::uint64_t>& stats) const override { stats["test_devices"] += 1; }
 
-  std::uint64_t version = 0;
-  std::size_t frames = 0, pairs_tested = 0;
-
  private:
   struct Job {
     hybrid::Ticket ticket;
-    const hybrid::IndexPair* pairs;
-    std::size_t n;
+    std::vector<hybrid::Piece> pieces;
     bool done;
     hybrid::Output output;
   };
@@ -105,7 +96,7 @@ class CpuTestDevice final : public hybrid::TestDevice {
         return stop_ || next;
       });
       if (stop_) return;
-      const Job given{next->ticket, next->pairs, next->n, false, {}};
+      const Job given{next->ticket, next->pieces, false, {}};
       busy_ = true;
       lock.unlock();
       hybrid::Output output = perform(given);
@@ -124,12 +115,13 @@ class CpuTestDevice final : public hybrid::TestDevice {
     search.geometry = {motion_.rows.data(), features_.edges.data(), features_.faces.data(), nullptr, motion_.map.scale};
     Worker worker;
     worker.begin(search);
-    for (std::size_t i = 0; i < job.n; ++i)
-      worker.leaf_pair(tree_, tree_.leaves[job.pairs[i].first], tree_.leaves[job.pairs[i].second], Accuracy::exact);
+    for (const hybrid::Piece& piece : job.pieces)
+      for (std::size_t i = 0; i < piece.n; ++i)
+        worker.leaf_pair(tree_, tree_.leaves[piece.pairs[i].first], tree_.leaves[piece.pairs[i].second],
+                         Accuracy::exact);
     worker.flush();
     hybrid::Output output;
-    for (const Found& f : worker.vertex_face)
-      output.found.push_back({f.first, f.second, Kind::vertex_face, f.toc});
+    for (const Found& f : worker.vertex_face) output.found.push_back({f.first, f.second, Kind::vertex_face, f.toc});
     // Some as a device brings them that has no exact arithmetic: the CPU finds the same time for them.
     for (const Found& f : worker.edge_edge) {
       if (test_ == all_undecided && f.first % 3 == 0)

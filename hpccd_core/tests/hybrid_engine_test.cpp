@@ -51,11 +51,12 @@ struct Bench {
   Result with(hybrid::Engine& engine, std::uint64_t version = 1) {
     engine.begin_frame(test::view(start), test::view(end));
     hybrid::FrameGuard frame(engine, workers);
-    engine.begin_traversal({&tree.leaves, &tree.face_of_slot, &tree.edge_of_slot, &tree.vertex_of_slot, version},
-                           [this](Worker& worker, hybrid::IndexPair p) {
-                             worker.test_leaf_pair(tree, tree.leaves[p.first], tree.leaves[p.second], Accuracy::exact);
-                           },
-                           workers);
+    engine.begin_traversal(
+        {&tree.leaves, &tree.face_of_slot, &tree.edge_of_slot, &tree.vertex_of_slot, version},
+        [this](Worker& worker, hybrid::IndexPair p) {
+          worker.test_leaf_pair(tree, tree.leaves[p.first], tree.leaves[p.second], Accuracy::exact);
+        },
+        workers);
     traverse(tree, rules, search, pool, workers);
     Profiler profiler;
     profiler.begin();
@@ -68,7 +69,8 @@ struct Bench {
 
   hybrid::Communication::Devices devices(std::size_t n) {
     hybrid::Communication::Devices list;
-    for (std::size_t i = 0; i < n; ++i) list.push_back(std::make_unique<test::CpuTestDevice>(features, tree, search.batch_test[0], faults));
+    for (std::size_t i = 0; i < n; ++i)
+      list.push_back(std::make_unique<test::CpuTestDevice>(features, tree, search.batch_test[0], faults));
     return list;
   }
 

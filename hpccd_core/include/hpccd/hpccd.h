@@ -33,7 +33,8 @@ struct MeshOptions {
   bool is_static = false;  // promised not to move; pairs of two static meshes are never tested
 };
 
-// Meshes with their topology, and which pairs of them matter. Vertices of all meshes are concatenated in the order added.
+// Meshes with their topology, and which pairs of them matter. Vertices of all meshes are concatenated in the order
+// added.
 class Scene {
  public:
   // faces: 3 indices a triangle into this mesh's own vertices [0, n_vertices). Returns the mesh's number.
@@ -112,11 +113,11 @@ class Detector {
   // Contacts of the straight-line motion from t0 to t1 (Kim et al. 2009, section 3.1).
   Contacts detect(Positions vertices_t0, Positions vertices_t1);
 
-  std::map<std::string, double> profile() const;        // stage -> ms of the last call
-  std::map<std::string, std::uint64_t> stats() const;   // counts of the last call
-  const Options& options() const;                       // with "automatic" resolved
-  Backend last_backend() const;                         // where the last frame was computed
-  std::string last_gpu_error() const;                   // why a frame meant for the GPU was computed on the CPU
+  std::map<std::string, double> profile() const;       // stage -> ms of the last call
+  std::map<std::string, std::uint64_t> stats() const;  // counts of the last call
+  const Options& options() const;                      // with "automatic" resolved
+  Backend last_backend() const;                        // where the last frame was computed
+  std::string last_gpu_error() const;                  // why a frame meant for the GPU was computed on the CPU
 
  private:
   struct Impl;

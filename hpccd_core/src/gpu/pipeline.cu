@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "gpu/pipeline.h"
-
 #include <cstring>
 
 #include "gpu/bounds.cuh"
 #include "gpu/device_leaves.cuh"
 #include "gpu/device_scene.cuh"
+#include "gpu/pipeline.h"
 #include "gpu/refit.cuh"
 #include "gpu/results.cuh"
 #include "gpu/sort.h"
@@ -191,8 +190,8 @@ void DevicePipeline::reserve_found(std::size_t n) {
   order_.reserve(n);  // last: its size says that all of these are there
 }
 
-// The caller's positions on the device, by way of page-locked memory: the driver's own way from pageable memory takes one
-// thread 100 us a megabyte. Waking the pool costs as much as copying half a megabyte.
+// The caller's positions on the device, by way of page-locked memory: the driver's own way from pageable memory takes
+// one thread 100 us a megabyte. Waking the pool costs as much as copying half a megabyte.
 template <class T>
 void DevicePipeline::bring(Positions t0, Positions t1, const T* given[2], ThreadPool& pool) {
   const Positions ends[2] = {t0, t1};

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "gpu/test_lists.cuh"
-
 #include <map>
 #include <mutex>
 
 #include "gpu/candidates.cuh"
 #include "gpu/elementary.cuh"
+#include "gpu/test_lists.cuh"
 
 namespace hpccd::gpu {
 namespace {

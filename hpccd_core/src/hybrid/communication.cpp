@@ -3,7 +3,7 @@
 
 #include <algorithm>
 #include <exception>
-#include <functional>
+#include <utility>
 
 #include "base/pause.h"
 
@@ -29,7 +29,7 @@ class Patience {
 
 Communication::Communication(Devices& devices, TriangleIndexQueue& queue, std::vector<SegmentSupply>& supplies)
     : devices_(devices), queue_(queue), supplies_(supplies), under_way_(devices.size(), 0) {
-  for (const auto& device : devices_) concurrency_ += device->concurrency();
+  for (const auto& device : devices_) cores_ += device->cores();
   thread_ = std::thread([this] { work(); });
 }
 
@@ -113,7 +113,7 @@ void Communication::frame() {
     // Looked at first: what comes to light afterwards in a whole round of the window was full before.
     const Stage stage = stage_.load(std::memory_order_acquire);
     if (stage == Stage::canceled) return;
-    const bool sent = send(), taken = take_in(), handed = hand_out();
+    const bool sent = send(stage == Stage::draining), taken = take_in(), handed = hand_out();
     if (sent || taken || handed)
       turns_without = 0, patience.reset();
     else
@@ -130,20 +130,41 @@ void Communication::wait_for_traversal() {
     if (!hand_out()) patience.wait();
 }
 
-bool Communication::send() {
+std::size_t Communication::Element::segments() const {
+  std::size_t n = 0;
+  for (const Run& run : runs) n += run.segments;
+  return n;
+}
+
+// One run of consecutive segments, as published. When the traversal has ended, all that is left goes together: segments
+// that were not filled up lie anywhere, and a call for each would be what the frame waits for.
+std::vector<Run> Communication::take_runs(bool all) {
+  std::vector<Run> runs;
+  for (std::size_t looks = all ? queue_.size() / queue_.window() + 1 : 1; looks > 0; --looks)
+    while (const auto run = queue_.take_run()) {
+      runs.push_back(*run);
+      if (!all) break;
+    }
+  return runs;
+}
+
+bool Communication::send(bool traversal_has_ended) {
   std::size_t best = devices_.size();
   for (std::size_t i = 0; i < devices_.size(); ++i)
     if (under_way_[i] < devices_[i]->slots() && (best == devices_.size() || under_way_[i] < under_way_[best])) best = i;
   if (best == devices_.size()) return false;
-  const auto run = queue_.take_run();
-  if (!run) return false;
-  const Ticket ticket = devices_[best]->submit(queue_.pairs(run->first), run->pairs);
-  elements_.push_back({*run, best, ticket});
+  std::vector<Run> runs = take_runs(traversal_has_ended);
+  if (runs.empty()) return false;
+  std::vector<Piece> pieces;
+  for (const Run& run : runs) pieces.push_back({queue_.pairs(run.first), run.pairs});
+  const Ticket ticket = devices_[best]->submit(pieces);
+  elements_.push_back({std::move(runs), best, ticket});
   ++under_way_[best];
-  queued_.store(elements_.size(), std::memory_order_relaxed);
+  const std::size_t segments = elements_.back().segments();
+  queued_.fetch_add(segments, std::memory_order_relaxed);
   ++counts_.elements;
-  counts_.segments += run->segments;
-  counts_.most_queued = std::max<std::uint64_t>(counts_.most_queued, elements_.size());
+  counts_.segments += segments;
+  counts_.most_queued = std::max<std::uint64_t>(counts_.most_queued, queued_);
   return true;
 }
 
@@ -155,12 +176,12 @@ bool Communication::take_in() {
       continue;
     }
     devices_[e->device]->collect(e->ticket, output_);
-    queue_.release(e->run);
+    for (const Run& run : e->runs) queue_.release(run);
+    queued_.fetch_sub(e->segments(), std::memory_order_relaxed);
     --under_way_[e->device];
     e = elements_.erase(e);
     any = true;
   }
-  if (any) queued_.store(elements_.size(), std::memory_order_relaxed);
   return any;
 }
 

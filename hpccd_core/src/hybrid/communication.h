@@ -17,9 +17,9 @@
 namespace hpccd::hybrid {
 
 struct CommunicationCounts {
-  std::uint64_t elements = 0;      // of the GPU task queue: calls that sent segments
-  std::uint64_t segments = 0;      // sent
-  std::uint64_t most_queued = 0;   // elements at a time
+  std::uint64_t elements = 0;     // of the GPU task queue: calls that sent segments
+  std::uint64_t segments = 0;     // sent
+  std::uint64_t most_queued = 0;  // segments at a time
 };
 
 class Communication {
@@ -38,8 +38,8 @@ class Communication {
   // Instead of finish, at any time in a frame: returns when nobody uses the frame's positions any longer.
   void cancel();
 
-  // Whether the devices lag behind: more elements are queued than they work on at a time.
-  bool devices_lag() const { return queued_.load(std::memory_order_relaxed) > concurrency_; }
+  // Whether the devices lag behind: more segments are in the GPU task queue than the GPUs have cores (multiprocessors).
+  bool devices_lag() const { return queued_.load(std::memory_order_relaxed) > cores_; }
   // Set as soon as a device has failed in this frame; then nothing more is sent.
   bool failed() const { return failed_.load(std::memory_order_acquire); }
 
@@ -51,9 +51,10 @@ class Communication {
  private:
   enum class Stage : int { idle, positions, traversal, draining, canceled, stop };
   struct Element {  // of the GPU task queue
-    Run run;
+    std::vector<Run> runs;
     std::size_t device;
     Ticket ticket;
+    std::size_t segments() const;
   };
 
   void order(Stage stage);
@@ -61,14 +62,15 @@ class Communication {
   void work();
   void frame();
   void wait_for_traversal();
-  bool send();
+  bool send(bool traversal_has_ended);
+  std::vector<Run> take_runs(bool all);
   bool take_in();
   bool hand_out();
 
   Devices& devices_;
   TriangleIndexQueue& queue_;
   std::vector<SegmentSupply>& supplies_;
-  std::size_t concurrency_ = 0;
+  std::size_t cores_ = 0;
 
   Positions t0_, t1_;
   LeafTable leaves_;

@@ -75,7 +75,8 @@ void Frames::traverse(const Tree& tree, std::uint64_t builds, std::vector<Worker
 void Frames::traverse_carriers(const std::vector<Box>& vertex_boxes, std::vector<Worker>& workers) {
   if (carriers_.empty()) list_carriers();
   const auto test_here = [this, &vertex_boxes](Worker& worker, IndexPair p) {
-    const Box a = box_of_carrier(features_, vertex_boxes, p.first), b = box_of_carrier(features_, vertex_boxes, p.second);
+    const Box a = box_of_carrier(features_, vertex_boxes, p.first),
+              b = box_of_carrier(features_, vertex_boxes, p.second);
     const auto& mesh = features_.mesh_of_carrier;
     worker.candidates(rules_.accuracy(mesh[p.first], mesh[p.second]), [&](CandidateBuffer& ee, CandidateBuffer& vf) {
       paper::carrier_pairs(features_, vertex_boxes, {p.first, a}, {p.second, b}, ee, vf);

@@ -24,7 +24,7 @@ class alignas(128) SegmentSink final : public PairSink {
   // Forgets its segment: the queue was cleared.
   void reset();
 
-  std::uint64_t tested_here() const { return tested_here_; }     // pairs
+  std::uint64_t tested_here() const { return tested_here_; }          // pairs
   std::uint64_t without_segment() const { return without_segment_; }  // times that no other segment was there yet
 
  private:
@@ -38,7 +38,7 @@ class alignas(128) SegmentSink final : public PairSink {
   const TestHere* test_here_ = nullptr;
   std::optional<SegmentNumber> segment_;  // at work
   IndexPair* pairs_ = nullptr;
-  std::size_t n_ = 0, end_ = 0;           // filled, and where it is full; 0: no segment at work
+  std::size_t n_ = 0, end_ = 0;  // filled, and where it is full; 0: no segment at work
   std::uint64_t tested_here_ = 0, without_segment_ = 0;
 };
 

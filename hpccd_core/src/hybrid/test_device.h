@@ -45,23 +45,32 @@ struct Output {
   BatchCounts counts[2];  // vertex-face, edge-edge
 };
 
+// Index pairs that lie together in memory.
+struct Piece {
+  const IndexPair* pairs;
+  std::size_t n;
+};
+
 using Ticket = std::size_t;
 
 class TestDevice {
  public:
   virtual ~TestDevice() = default;
   // Memory that the device reads index pairs from while other threads write elsewhere in it.
-  virtual std::shared_ptr<IndexPair[]> pair_memory(std::size_t n) { return std::shared_ptr<IndexPair[]>(new IndexPair[n]); }
+  virtual std::shared_ptr<IndexPair[]> pair_memory(std::size_t n) {
+    return std::shared_ptr<IndexPair[]>(new IndexPair[n]);
+  }
 
   // A new frame: its positions begin to travel. The arrays stay unchanged until the frame has ended.
   virtual void begin_frame(Positions t0, Positions t1) = 0;
   // The leaves that index pairs name, before the first of them is sent.
   virtual void begin_traversal(const LeafTable& leaves) = 0;
-  // How many submissions the device holds at a time, and how many of them it works on at a time.
+  // How many submissions the device takes at a time.
   virtual std::size_t slots() const = 0;
-  virtual std::size_t concurrency() const = 0;
+  // Its cores, each of which can be busy with a segment.
+  virtual std::size_t cores() const = 0;
   // Only while fewer than slots() are under way. The pairs stay unchanged until they are collected.
-  virtual Ticket submit(const IndexPair* pairs, std::size_t n) = 0;
+  virtual Ticket submit(const std::vector<Piece>& pieces) = 0;
   // Whether the state variable says "data ready".
   virtual bool ready(Ticket ticket) = 0;
   // Appends to the output; the ticket ends.
