@@ -363,7 +363,7 @@ def main(argv: list[str] | None = None, node_type: type[HpccdNode] = HpccdNode) 
             for transition in (node.trigger_configure, node.trigger_activate):
                 if transition() != TransitionCallbackReturn.SUCCESS:
                     return 1
-        executor.spin_until_future_complete(stop)
+        stop_signals.spin(executor, stop)
     except ExternalShutdownException:
         pass
     finally:

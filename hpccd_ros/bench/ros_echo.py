@@ -40,7 +40,7 @@ def main(namespace: str) -> int:
     node.create_subscription(MeshVertices, "echo/vertices", take, qos.vertices("reliable", 10))
     executor = SingleThreadedExecutor()
     executor.add_node(node)
-    executor.spin_until_future_complete(stop)
+    stop_signals.spin(executor, stop)
     executor.shutdown(timeout_sec=1.0)
     node.destroy_node()
     rclpy.try_shutdown()

@@ -21,7 +21,7 @@ from .soak_mischief import MOST_VERTICES, Mischief
 SCENE, SIZE = "breaking-like", 0.02  # 5,036 triangles; sixteen changes of topology in each run of 60 frames
 TIER = "balanced"
 HISTORY = 100  # frames kept to check answers with
-CHECK_EVERY = 50  # answers; each check costs a detection
+CHECK_EVERY = 25  # answers; each check costs a detection
 MISCHIEF_EVERY = 7  # frames
 REQUEST_EVERY = 20  # frames
 UNKNOWN_EVERY = 50  # frames
@@ -172,4 +172,8 @@ class SoakLoad:
         expected = detector.detect(np.concatenate(start[1]), np.concatenate(end[1]))
         self.checked += 1
         if message.hash != expected.hash or message.total != len(expected):
-            self.wrong.append(f"the answer for step {message.step} has other contacts than the core")
+            self.wrong.append(
+                f"the answer for step {message.step}, {message.start.sec}.{message.start.nanosec:09} to "
+                f"{message.header.stamp.sec}.{message.header.stamp.nanosec:09}, has {message.total} contacts, the core "
+                f"alone finds {len(expected)}"
+            )
