@@ -17,6 +17,7 @@ import yaml
 from diagnostic_msgs.msg import DiagnosticArray
 from hpccd.msg import ContactArray, MeshTopology, MeshVertices
 from hpccd.srv import Detect
+from rclpy.duration import Duration
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import HistoryPolicy, QoSProfile
@@ -153,6 +154,8 @@ class Peer:
     def topology(self, mesh: str, faces: np.ndarray, n_vertices: int, version: int = 0) -> None:
         publisher = self.publisher(MeshTopology, f"meshes/{mesh}/topology", qos.TOPOLOGY)
         publisher.publish(convert.topology_message(faces, n_vertices, version=version))
+        # Nothing orders two topics: vertices that follow must not overtake it.
+        assert publisher.wait_for_all_acked(Duration(seconds=PATIENCE))
 
     def vertices(self, mesh: str, vertices: np.ndarray, stamp: int, **fields: Any) -> None:
         publisher = self.publisher(MeshVertices, f"meshes/{mesh}/vertices")

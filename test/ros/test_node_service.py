@@ -90,6 +90,10 @@ def changed(change, **options):
     return out
 
 
+def many_names(r):
+    r.mesh_names = [f"mesh{k}" for k in range(1001)]
+
+
 def cut_end(r):
     r.end = []
 
@@ -115,6 +119,7 @@ def bad_index(r):
     [
         (request(names=("ghost",), topologies=False), "unknown mesh 'ghost'"),
         (request(names=("a", "a")), "names must differ"),
+        (changed(many_names), "1001 meshes, at most 1000 are taken (parameter max_meshes)"),
         (changed(cut_end), "end: 0 entries for 1 meshes"),
         (changed(cut_vertices), "end[0] (cloth): 255 vertices, the topology has 256"),
         (changed(put_nan), "start[0] (cloth): vertex 1 is"),
@@ -125,7 +130,7 @@ def bad_index(r):
         (request(time_limit=-1.0), "time_limit"),
         (request(time_limit=math.nan), "time_limit"),
     ],
-    ids=["mesh", "names", "count", "vertices", "nan", "version", "index", "accuracy", "report", "limit", "nan-limit"],
+    ids="mesh names many count vertices nan version index accuracy report limit nan-limit".split(),
 )
 def test_bad_requests_are_refused_with_a_reason(node, bad, text):
     refused, good = ask(node, bad, request())

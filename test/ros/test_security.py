@@ -57,14 +57,21 @@ def test_the_policy_allows_all_that_the_node_does(start_node):
             "mesh": {"net": {"input": "points", "transform": "tf"}},
         }
     )
-    peer, published, subscribed = node.peer.node, set(), set()
-    for topic, _ in peer.get_topic_names_and_types(no_demangle=True):
-        for infos, names in (
-            (peer.get_publishers_info_by_topic(topic, no_mangle=True), published),
-            (peer.get_subscriptions_info_by_topic(topic, no_mangle=True), subscribed),
-        ):
-            if any(i.node_name == "hpccd" and i.node_namespace == node.namespace for i in infos):
-                names.add(topic.replace(node.namespace, ""))
+    peer = node.peer.node
+
+    def endpoints():
+        published, subscribed = set(), set()
+        for topic, _ in peer.get_topic_names_and_types(no_demangle=True):
+            for infos, names in (
+                (peer.get_publishers_info_by_topic(topic, no_mangle=True), published),
+                (peer.get_subscriptions_info_by_topic(topic, no_mangle=True), subscribed),
+            ):
+                if any(i.node_name == "hpccd" and i.node_namespace == node.namespace for i in infos):
+                    names.add(topic.replace(node.namespace, ""))
+        # Whose an endpoint is comes to be known a little later; that of the points is made last.
+        return (published, subscribed) if "rt/meshes/net/points" in subscribed else None
+
+    published, subscribed = node.wait_until(endpoints, "endpoints of the node")
     for names, allowed in zip((published, subscribed), policy_names(), strict=True):
         assert len(names) > 5
         for name in names:

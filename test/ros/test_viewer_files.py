@@ -25,12 +25,16 @@ def published(tmp_path_factory):
             node.peer.vertices("cloth", sheet_positions(8, k), k, frame_id="world")
         message = node.contacts(1)[0]
         peer = node.peer.node
-        names = {
-            topic.removeprefix(node.namespace): types[0]
-            for topic, types in peer.get_topic_names_and_types()
-            if any(info.node_name == "hpccd" for info in peer.get_publishers_info_by_topic(topic))
-        }
-        yield names, set(node.peer.statuses), message
+
+        def published():
+            names = {
+                topic.removeprefix(node.namespace): types[0]
+                for topic, types in peer.get_topic_names_and_types()
+                if any(info.node_name == "hpccd" for info in peer.get_publishers_info_by_topic(topic))
+            }
+            return names if "/contacts" in names else None  # whose an endpoint is comes to be known a little later
+
+        yield node.wait_until(published, "publishers of the node"), set(node.peer.statuses), message
     finally:
         node.close()
 
