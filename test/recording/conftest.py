@@ -5,23 +5,14 @@ import itertools
 import os
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
+from sources import ROOT, SOURCES
 
-import hpccd_ros
 from hpccd_ros.demo.children import Children
-
-ROOT = Path(__file__).resolve().parents[2]
 
 # Domains 0..101 are safe on Linux whatever the ephemeral port range is.
 os.environ.setdefault("ROS_DOMAIN_ID", str(1 + os.getpid() % 100))
-
-# Processes import the package from where the tests do, and the rest from where this process finds it: the messages of a
-# colcon workspace lie on PYTHONPATH.
-SOURCES = os.pathsep.join(
-    [str(Path(hpccd_ros.__file__).parents[1]), *filter(None, [os.environ.get("PYTHONPATH")])]
-)
 
 _numbers = itertools.count()
 

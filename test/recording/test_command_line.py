@@ -6,7 +6,7 @@ import subprocess
 import sys
 
 import pytest
-from conftest import ROOT
+from sources import ROOT
 
 from hpccd_ros import cli
 

@@ -9,8 +9,8 @@ import time
 from pathlib import Path
 
 import pytest
-from conftest import SOURCES
 from matplotlib.image import imread
+from sources import SOURCES
 
 SMALL = ["demo", "--size", "0.1", "--frames", "40", "--rate", "40"]
 
