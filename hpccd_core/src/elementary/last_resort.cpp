@@ -20,10 +20,12 @@ std::optional<double> tolerant_contact(Points q_t0, Points q_t1) {
 
 // 106 bits first: they decide nearly all that double precision does not, several times faster, and to the same bits.
 template <Kind kind>
-std::optional<double> exact_contact(Points q_t0, Points q_t1) {
+std::optional<double> exact_contact(Points q_t0, Points q_t1, LastResortCounts& counts) {
   const extended::Answer a = extended::decide<kind>(q_t0, q_t1);
+  counts.extended += a.contact || a.none;
   if (a.contact) return a.toc;
   if (a.none) return std::nullopt;
+  ++counts.integers;
   return exact::earliest_contact(kind, q_t0, q_t1);
 }
 
@@ -36,12 +38,16 @@ std::optional<double> within_separation(const inclusion::Limits& limits, Kind ki
 }  // namespace
 
 std::optional<double> last_resort(Accuracy accuracy, const inclusion::Limits& limits, Kind kind, Points q_t0,
-                                  Points q_t1) {
-  if (accuracy == Accuracy::conservative && limits.separation > 0) return within_separation(limits, kind, q_t0, q_t1);
+                                  Points q_t1, LastResortCounts& counts) {
+  if (accuracy == Accuracy::conservative && limits.separation > 0) {
+    ++counts.inclusion;
+    return within_separation(limits, kind, q_t0, q_t1);
+  }
   // Without a separation the exact answer is conservative too, and cheaper than a search that has to give up somewhere.
   if (accuracy == Accuracy::conservative || accuracy == Accuracy::exact)
-    return kind == Kind::vertex_face ? exact_contact<Kind::vertex_face>(q_t0, q_t1)
-                                     : exact_contact<Kind::edge_edge>(q_t0, q_t1);
+    return kind == Kind::vertex_face ? exact_contact<Kind::vertex_face>(q_t0, q_t1, counts)
+                                     : exact_contact<Kind::edge_edge>(q_t0, q_t1, counts);
+  ++counts.tolerance;
   return kind == Kind::vertex_face ? tolerant_contact<Kind::vertex_face>(q_t0, q_t1)
                                    : tolerant_contact<Kind::edge_edge>(q_t0, q_t1);
 }

@@ -29,6 +29,7 @@ void test_queries(Kind kind, std::span<const Query> queries, const Options& opti
                              : batch_test(resolve(options.simd), accuracy);
   const inclusion::Limits limits{options.minimum_separation, options.tolerance};
   auto result = std::make_unique<BatchResult>();
+  LastResortCounts counts;
   std::vector<VertexRow> rows(4 * batch_capacity);
   std::vector<std::array<std::uint32_t, 2>> edges(2 * batch_capacity);
   std::vector<std::array<std::uint32_t, 3>> faces(batch_capacity);
@@ -65,7 +66,7 @@ void test_queries(Kind kind, std::span<const Query> queries, const Options& opti
       const Query& q = queries[at];
       const Vec3<double> q_t0[4] = {point(q, 0), point(q, 1), point(q, 2), point(q, 3)};
       const Vec3<double> q_t1[4] = {point(q, 4), point(q, 5), point(q, 6), point(q, 7)};
-      if (const auto t = last_resort(accuracy, limits, kind, q_t0, q_t1)) hit[at] = true, toc[at] = *t;
+      if (const auto t = last_resort(accuracy, limits, kind, q_t0, q_t1, counts)) hit[at] = true, toc[at] = *t;
     }
   }
 }

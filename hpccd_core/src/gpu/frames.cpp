@@ -100,7 +100,8 @@ std::optional<Contacts> Frames::detect(Positions t0, Positions t1, const Build& 
 Contacts Frames::frame(Positions t0, Positions t1, const Build& build, Profiler& profiler) {
   if (!pipeline_) {
     const char* stages = std::getenv("HPCCD_GPU_STAGES");
-    pipeline_ = Pipeline::create(scene_, features_, options_.accuracy, status().devices.at(0).number, stages && *stages);
+    pipeline_ =
+        Pipeline::create(scene_, features_, options_.accuracy, status().devices.at(0).number, stages && *stages);
     profiler.mark("gpu_start");
   }
   // As on the CPU: refitting that has lost a third of the culling costs more than a build.
@@ -135,11 +136,13 @@ Contacts Frames::frame(Positions t0, Positions t1, const Build& build, Profiler&
       }
       Vec3<double> q0[4], q1[4];
       for (int k = 0; k < 4; ++k) q0[k] = position(h0, v[k]), q1[k] = position(h1, v[k]);
-      toc[i] = last_resort(Accuracy::exact, {}, u.kind, q0, q1);
+      LastResortCounts counts;
+      toc[i] = last_resort(Accuracy::exact, {}, u.kind, q0, q1, counts);
     }
   });
   for (std::size_t i = 0; i < undecided.size(); ++i)
-    if (toc[i]) exact_[undecided[i].kind == Kind::edge_edge].push_back({undecided[i].first, undecided[i].second, *toc[i]});
+    if (toc[i])
+      exact_[undecided[i].kind == Kind::edge_edge].push_back({undecided[i].first, undecided[i].second, *toc[i]});
   for (auto& list : exact_)
     std::sort(list.begin(), list.end(), [](const Exact& a, const Exact& b) {
       return a.first < b.first || (a.first == b.first && a.second < b.second);
@@ -209,7 +212,8 @@ Contacts Frames::join(const FrameResult& d, Positions t0, Positions t1) {
 
 void Frames::add_outputs(Contacts& c, Positions t0, Positions t1) {
   motion_.take(t0, t1, 0, pool_);
-  const Geometry geometry{motion_.rows.data(), features_.edges.data(), features_.faces.data(), nullptr, motion_.map.scale};
+  const Geometry geometry{motion_.rows.data(), features_.edges.data(), features_.faces.data(), nullptr,
+                          motion_.map.scale};
   const auto& edges = features_.edges;
   const auto edge_number = [&](std::uint32_t v0, std::uint32_t v1) {
     const std::array<std::uint32_t, 2> e{v0, v1};

@@ -18,6 +18,7 @@ void Worker::begin(Search& search) {
   vertex_face.clear();
   edge_edge.clear();
   counts[0] = counts[1] = {};
+  last_resorts[0] = last_resorts[1] = {};
   node_pairs = leaf_pairs = 0;
   elementary_seconds = 0;
   for (auto& w : waiting_)  // what an exception left behind
@@ -96,7 +97,8 @@ void Worker::resolve(Kind kind, std::uint32_t a, std::uint32_t b, Accuracy accur
     v[0] = g.edges[a][0], v[1] = g.edges[a][1], v[2] = g.edges[b][0], v[3] = g.edges[b][1];
   Vec3<double> q_t0[4], q_t1[4];
   for (int k = 0; k < 4; ++k) q_t0[k] = vec(g.vertices[v[k]].t0), q_t1[k] = vec(g.vertices[v[k]].t1);
-  if (const auto toc = last_resort(accuracy, search_->limits, kind, q_t0, q_t1)) report(kind, a, b, *toc);
+  if (const auto toc = last_resort(accuracy, search_->limits, kind, q_t0, q_t1, last_resorts[kind == Kind::edge_edge]))
+    report(kind, a, b, *toc);
 }
 
 void Worker::report(Kind kind, std::uint32_t first, std::uint32_t second, double toc) {

@@ -9,6 +9,7 @@
 
 #include "elementary/batch.h"
 #include "elementary/inclusion.h"
+#include "elementary/last_resort.h"
 #include "traverse/leaf_pairs.h"
 
 namespace hpccd {
@@ -66,6 +67,7 @@ class alignas(128) Worker {
 
   std::vector<Found> vertex_face, edge_edge;
   BatchCounts counts[2];  // vertex-face, edge-edge
+  LastResortCounts last_resorts[2];
   std::uint64_t node_pairs = 0, leaf_pairs = 0;
   double elementary_seconds = 0;
   PairSink* sink = nullptr;
