@@ -23,7 +23,7 @@ import hpccd_ros
 
 HERE, THERE = "10.213.77.1", "10.213.77.2"
 # The open network answers within a second or two: what has not answered after this is closed.
-CLOSED = 8.0  # s
+CLOSED = 5.0  # s
 SWITCH = "ROS_AUTOMATIC_DISCOVERY_RANGE"
 
 
