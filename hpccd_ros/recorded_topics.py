@@ -30,21 +30,22 @@ def of_node(parameters: dict) -> list[Wanted]:
     return [*wanted, Wanted("contacts", CONTACTS)]
 
 
-def subscription_qos(node, topic: str, latched: bool, depth: int) -> QoSProfile:
-    """What to ask of the publishers of `topic` (resolved name), so that all that others receive is received here.
+def subscription_qos(node, name: str, topic: Wanted, depth: int) -> QoSProfile:
+    """What to ask of the publishers of `topic` (`name`: resolved), so that all that others receive is received here.
 
     A reader that asks for more than a writer offers is not served at all. So ask for what is offered by those
     publishers that are there, else for what other readers of the topic ask, else for reliable delivery.
     """
-    offers = [p.qos_profile.reliability for p in node.get_publishers_info_by_topic(topic)]
-    asked = [s.qos_profile.reliability for s in node.get_subscriptions_info_by_topic(topic)]
+    offers = [p.qos_profile.reliability for p in node.get_publishers_info_by_topic(name)]
+    asked = [s.qos_profile.reliability for s in node.get_subscriptions_info_by_topic(name)]
     best_effort = ReliabilityPolicy.BEST_EFFORT in (offers or asked)
-    return _profile(ReliabilityPolicy.BEST_EFFORT if best_effort else ReliabilityPolicy.RELIABLE, latched, depth)
+    return _profile(ReliabilityPolicy.BEST_EFFORT if best_effort else ReliabilityPolicy.RELIABLE, topic.latched, depth)
 
 
-def as_node_asks(node, topic: str, latched: bool, depth: int, *, reliability: ReliabilityPolicy) -> QoSProfile:
-    """For the node's own recording. reliability: that which the node asks of vertices; topologies are reliable."""
-    return _profile(ReliabilityPolicy.RELIABLE if latched else reliability, latched, depth)
+def as_node_asks(node, name: str, topic: Wanted, depth: int, *, reliability: ReliabilityPolicy) -> QoSProfile:
+    """For the node's own recording. reliability: what the node asks of vertices; the others are reliable."""
+    always = topic.type_name in (TOPOLOGY, CONTACTS)
+    return _profile(ReliabilityPolicy.RELIABLE if always else reliability, topic.latched, depth)
 
 
 def _profile(reliability, latched, depth) -> QoSProfile:

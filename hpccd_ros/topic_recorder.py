@@ -27,7 +27,7 @@ class Recorder:
         self._subscriptions = {}
         for topic in wanted:
             name = node.resolve_topic_name(topic.name)
-            qos = qos_of(node, name, topic.latched, depth)
+            qos = qos_of(node, name, topic, depth)
             self.received[name] = 0
             self._subscriptions[name] = node.create_subscription(
                 message_class(topic.type_name), name, self._receiver(name, topic), qos, raw=True

@@ -9,6 +9,8 @@ exactly as it goes over the wire, with the node's parameters beside it.
 
 The files play with `ros2 bag play`, open in Foxglove, and `hpccd replay` verifies them. Ctrl-C (SIGINT) and
 SIGTERM finish the file. Killed otherwise, it keeps all but the last half second (--flush): `hpccd doctor`.
+A disk that refuses (full) ends the file at its last whole chunk; messages lost are counted (exit status 1), and a new
+file is tried every 5 seconds. A node can also record itself: its parameter `record`.
 A node whose topics are remapped: give the same remappings here, after --ros-args.
 """
 
