@@ -74,4 +74,5 @@ class TransformInput:
                 None if static else convert.stamp_to_ns(message.header.stamp),
             )
         except ValueError as error:
-            self._warn(f"{topic}: transform from {message.child_frame_id!r} to {message.header.frame_id!r}: {error}")
+            names = f"{message.child_frame_id[:80]!r} to {message.header.frame_id[:80]!r}"
+            self._warn(f"{topic}: transform from {names}: {error}")

@@ -10,8 +10,9 @@ from bisect import bisect_left
 from hpccd_ros.rigid import IDENTITY, Rigid
 
 HISTORY_NS = 10_000_000_000
-MOST_FRAMES = 10_000
-MOST_SAMPLES = 10_000  # of one frame: 1000 Hz for the whole history
+MOST_FRAMES = 1000
+MOST_SAMPLES = 1000  # of one frame: 100 Hz for the whole history; about 500 MB if every frame were full
+LONGEST_NAME = 255
 
 
 class NoTransformError(LookupError):
@@ -70,9 +71,11 @@ class TransformBuffer:
     def add(self, parent: str, child: str, rigid: Rigid, stamp: int | None) -> None:
         """``rigid`` takes coordinates in ``child`` to coordinates in ``parent``; stamp ns, None: at all times.
 
-        Raises ValueError: an empty name, a frame in itself, too many frames.
+        Raises ValueError: an empty or too long name, a frame in itself, too many frames.
         """
         parent, child = parent.removeprefix("/"), child.removeprefix("/")
+        if max(len(parent), len(child)) > LONGEST_NAME:
+            raise ValueError(f"a frame's name has more than {LONGEST_NAME} characters")
         if not parent or not child or parent == child:
             raise ValueError(f"frames {parent!r} and {child!r}: two different names are needed")
         edge = self._edges.get(child)

@@ -99,6 +99,13 @@ def test_what_strangers_send_is_bounded(monkeypatch):
     for parent, child in (("", "a"), ("a", ""), ("a", "/a")):
         with pytest.raises(ValueError, match="two different names"):
             buffer.add(parent, child, turn(0), None)
+    with pytest.raises(ValueError, match="255 characters"):
+        buffer.add("world", "x" * 256, turn(0), None)
+    for k in range(3 * transforms.MOST_SAMPLES):
+        buffer.add("world", "hand", turn(0), 100 * SECOND + k)
+    with pytest.raises(NoTransformError, match="the first one kept"):
+        buffer.lookup("hand", "world", 100 * SECOND + 2 * transforms.MOST_SAMPLES - 1)
+    buffer.lookup("hand", "world", 100 * SECOND + 2 * transforms.MOST_SAMPLES)
 
 
 def test_source_that_starts_anew_is_not_mixed_with_its_past():
