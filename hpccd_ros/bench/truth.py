@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Found contacts against the true ones: missed, invented, and how far times of contact are off."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+
+@dataclasses.dataclass(frozen=True)
+class Errors:
+    """missed, invented: numbers of pairs. toc_worst, toc_p99: of |toc - true toc| over pairs found and true, 0 where
+    there are none; latest: of toc - true toc."""
+
+    true: int
+    missed: int
+    invented: int
+    toc_worst: float
+    toc_p99: float
+    latest: float
+
+
+def of_scene(found, truth: dict[str, np.ndarray]) -> Errors:
+    """found: hpccd_core.Contacts; truth: {"vf", "vf_toc", "ee", "ee_toc"} in any order."""
+    missed = invented = 0
+    off = [np.empty(0)]
+    for kind in ("vf", "ee"):
+        there, here = _keys(getattr(found, kind)), _keys(truth[kind])
+        common, i, j = np.intersect1d(there, here, assume_unique=True, return_indices=True)
+        missed += len(here) - len(common)
+        invented += len(there) - len(common)
+        off.append(getattr(found, kind + "_toc")[i] - truth[kind + "_toc"][j])
+    return _errors(len(truth["vf"]) + len(truth["ee"]), missed, invented, np.concatenate(off))
+
+
+def of_queries(hit, toc, true_hit, true_toc) -> Errors:
+    """All (Q,): answers to queries and what is true."""
+    both = hit & true_hit
+    return _errors(int(true_hit.sum()), int((true_hit & ~hit).sum()), int((hit & ~true_hit).sum()),
+                   toc[both] - true_toc[both])  # fmt: skip
+
+
+def _errors(true, missed, invented, late):
+    off = np.abs(late)
+    worst, p99 = (float(off.max()), float(np.percentile(off, 99))) if len(off) else (0.0, 0.0)
+    return Errors(true, missed, invented, worst, p99, float(late.max(initial=0.0)))
+
+
+def _keys(pairs):
+    """Each row as one value that can be compared."""
+    rows = np.ascontiguousarray(pairs, np.uint32)
+    return rows.view([("", np.uint32)] * rows.shape[1]).ravel()
