@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The main loop of the node: it ends when told, and holds nothing of the turns it has made."""
+
+import gc
+import sys
+import threading
+
+import pytest
+import rclpy
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.task import Future
+
+from hpccd_ros import _env, stop_signals
+
+
+@pytest.fixture
+def executor():
+    _env.prepare()
+    context = rclpy.Context()
+    rclpy.init(context=context)
+    executor = SingleThreadedExecutor(context=context)
+    yield executor
+    executor.shutdown()
+    rclpy.shutdown(context=context)
+
+
+def test_turns_leave_nothing_behind(executor):
+    stop, turns, blocks = Future(), 0, []
+
+    def turn():
+        nonlocal turns
+        turns += 1
+        if turns in (1000, 3000):
+            gc.collect()
+            blocks.append(sys.getallocatedblocks())
+        if turns < 3000:
+            executor.create_task(turn)
+        else:
+            stop.set_result(None)
+
+    executor.create_task(turn)
+    stop_signals.spin(executor, stop)
+    assert turns == 3000
+    assert blocks[1] - blocks[0] < 1000, "spin_until_future_complete leaves at least two for each of the 2000 turns"
+
+
+def test_another_thread_ends_an_idle_loop(executor):
+    stop = Future()
+    timer = threading.Timer(0.2, lambda: stop.set_result(None))
+    timer.start()
+    stop_signals.spin(executor, stop)
+    assert stop.done()
+
+
+def test_a_loop_that_was_ended_before_returns_at_once(executor):
+    stop = Future()
+    stop.set_result(None)
+    stop_signals.spin(executor, stop)
