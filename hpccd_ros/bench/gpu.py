@@ -1,24 +1,25 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The GPU backend beside the CPU: ms a frame with all transfers (host arrays in, host arrays out), device time by
-stage, and the two floors, bytes over bandwidth and operations over rate. Needs a machine with a usable GPU.
+"""The GPU and hybrid backends beside the CPU: ms a frame with all transfers (host arrays in, host arrays out), device
+time by stage, and the two floors, bytes over bandwidth and operations over rate; then Fig. 6 of Kim et al. 2009
+(threads by GPUs) and the segment sizes of their section 6.2. Needs a machine with a usable GPU.
 
   hpccd bench gpu data                      the scene files of HPCCD_DATA, balanced and exact
-  hpccd bench gpu cloth-ball --repeat 100
+  hpccd bench gpu cloth-ball --repeat 100 --parts frames
 
-Contacts of both backends are compared; a difference, or a frame that the device left to the CPU, fails the command.
+Contacts of all backends are compared; a difference, or a frame that a device left to the CPU, fails the command.
 """
 
 from __future__ import annotations
 
 import os
-import time
 
 import hpccd_core as hc
 from hpccd_ros.errors import UserError
 
-from . import common, table
-from .timing import times
+from . import common, gpu_hybrid, table
+from .gpu_hybrid import detector_times
 
+PARTS = ("frames", "threads", "segments")
 TIERS = ("balanced", "exact")
 # Double-precision operations of a pair in each stage, counted in the source: differences, cross products, bounds.
 OPERATIONS = {"candidates": 170, "survivors": 400, "roots": 1500}
@@ -27,6 +28,8 @@ OPERATIONS = {"candidates": 170, "survivors": 400, "roots": 1500}
 def configure(parser):
     common.configure(parser, default=("data",), steps=1, rounds=50)
     common.threads_option(parser)
+    parser.add_argument("--parts", default=",".join(PARTS), metavar="NAME,...",
+                        help="of frames, threads (Fig. 6) and segments (default: %(default)s)")  # fmt: skip
     parser.add_argument("--pcie", type=float, default=53.0, metavar="GB/s", help="host link (default: %(default)s)")
     parser.add_argument("--memory", type=float, default=2800.0, metavar="GB/s",
                         help="device memory (default: %(default)s, H100)")  # fmt: skip
@@ -37,37 +40,41 @@ def configure(parser):
 def run(args) -> int:
     if "gpu" not in hc.backends():
         raise UserError(f"no usable GPU: {hc.gpu_status()['reason']}")
+    parts = common.listed("--parts", args.parts, PARTS)
     report, sources = common.begin(args, "gpu")
     report.note("floors: PCIe bytes of positions and contacts; device bytes of the lists that stages hand on; "
                 "operations counted from the source for each pair of each stage; rates are options")
     for source in sources:
         step = source.step(0)
-        for accuracy in TIERS:
-            _measure(report, args, source.name, step, accuracy)
-    table.show(
-        "ms a frame, host arrays in and out",
-        ["scene", "accuracy", "triangles", "contacts", "CPU", "GPU median", "p95", "best", "PCIe floor", "memory floor",
-         "arithmetic floor"],
-        [[r["scene"], r["accuracy"], r["triangles"], r["contacts"], r["cpu_median_ms"], r["median_ms"], r["p95_ms"],
-          r["best_ms"], r["floor_pcie_ms"], r["floor_memory_ms"], r["floor_arithmetic_ms"]] for r in report.rows],
-    )  # fmt: skip
-    stages = list(dict.fromkeys(s for r in report.rows for s in r["stages_ms"]))
-    table.show(
-        "where the time goes, ms (gpu/...: device time, measured in calls of their own)",
-        ["stage", *(f"{r['scene']} {r['accuracy']}" for r in report.rows)],
-        [[stage, *(r["stages_ms"].get(stage) for r in report.rows)] for stage in stages],
-    )
+        if "frames" in parts:
+            for accuracy in TIERS:
+                _measure(report, args, source.name, step, accuracy)
+        if "threads" in parts:
+            gpu_hybrid.figure_6(report, args, source.name, step)
+        if "segments" in parts:
+            gpu_hybrid.segment_sizes(report, args, source.name, step)
+    if "frames" in parts:
+        _show_frames([r for r in report.rows if r["part"] == "frame"])
+    if len(parts) > 1 or "frames" not in parts:
+        gpu_hybrid.show(report)
     return common.end(args, report)
 
 
-def _timed(detector, step, repeat):
-    detector.detect(step.vertices_t0, step.vertices_t1)
-    ms = []
-    for _ in range(repeat):
-        start = time.perf_counter()
-        contacts = detector.detect(step.vertices_t0, step.vertices_t1)
-        ms.append(1e3 * (time.perf_counter() - start))
-    return times(ms), contacts
+def _show_frames(rows):
+    table.show(
+        "ms a frame, host arrays in and out",
+        ["scene", "accuracy", "triangles", "contacts", "CPU", "hybrid", "GPU median", "p95", "best", "PCIe floor",
+         "memory floor", "arithmetic floor"],
+        [[r["scene"], r["accuracy"], r["triangles"], r["contacts"], r["cpu_median_ms"], r["hybrid_median_ms"],
+          r["median_ms"], r["p95_ms"], r["best_ms"], r["floor_pcie_ms"], r["floor_memory_ms"],
+          r["floor_arithmetic_ms"]] for r in rows],
+    )  # fmt: skip
+    stages = list(dict.fromkeys(s for r in rows for s in r["stages_ms"]))
+    table.show(
+        "where the time goes, ms (gpu/...: device time, measured in calls of their own)",
+        ["stage", *(f"{r['scene']} {r['accuracy']}" for r in rows)],
+        [[stage, *(r["stages_ms"].get(stage) for r in rows)] for stage in stages],
+    )
 
 
 def _stages(scene, options, step):
@@ -85,23 +92,32 @@ def _stages(scene, options, step):
 def _measure(report, args, name, step, accuracy):
     options = {"accuracy": accuracy, "threads": args.threads}
     scene = step.scene()
-    on_cpu, expected = _timed(hc.Detector(scene, backend="cpu", **options), step, max(1, args.repeat // 5))
+    on_cpu, expected = detector_times(hc.Detector(scene, backend="cpu", **options), step, args.repeat)
+    detector = hc.Detector(scene, backend="hybrid", **options)
+    hybrid, contacts = detector_times(detector, step, args.repeat)
+    hybrid_stages = {f"hybrid/{stage}": ms for stage, ms in detector.profile.items()}
+    if contacts.hash != expected.hash:
+        report.failure(f"{name}, {accuracy}: contacts of hybrid and CPU differ")
+    if detector.stats["gpu_fallbacks"]:
+        report.failure(f"{name}, {accuracy}: hybrid frames left to the CPU: {detector.last_gpu_error}")
     detector = hc.Detector(scene, backend="gpu", **options)
-    on_gpu, contacts = _timed(detector, step, args.repeat)
+    on_gpu, contacts = detector_times(detector, step, args.repeat)
     stats, profile = detector.stats, detector.profile
     if contacts.hash != expected.hash:
         report.failure(f"{name}, {accuracy}: contacts of GPU and CPU differ")
     if stats["gpu_fallbacks"]:
         report.failure(f"{name}, {accuracy}: frames left to the CPU: {detector.last_gpu_error}")
     report.add(
+        part="frame",
         scene=name,
         accuracy=accuracy,
         triangles=step.triangles,
         contacts=len(contacts),
         cpu_median_ms=on_cpu.median,
+        hybrid_median_ms=hybrid.median,
         **on_gpu.as_row(),
         **_floors(args, step, stats, contacts),
-        stages_ms={**profile, **_stages(scene, options, step)},
+        stages_ms={**profile, **_stages(scene, options, step), **hybrid_stages},
         stats=stats,
     )
 
