@@ -133,6 +133,7 @@ class CudaTestDevice final : public hybrid::TestDevice {
       return false;
     }
     const Counters& c = *s.host_counters.data();
+    check(cudaSetDevice(device_), "cudaSetDevice");  // lists that grow must not end up on another one
     bool again = s.lists.grow(c);
     if (c.found_all > s.keys.size()) {
       again = true;
