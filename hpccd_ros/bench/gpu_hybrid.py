@@ -77,17 +77,19 @@ def show(report):
         lines.setdefault((r["scene"], r["method"], r["threads"]), {})[r["gpus"]] = r
     cells = [[*key, *(value for g in gpus for value in _cell(found.get(g)))] for key, found in lines.items()]
     heads = [head for g in gpus for head in (f"{g} GPUs: ms", "times")]
-    table.show(
-        "Fig. 6: ms, and times one CPU thread with the published method",
-        ["scene", "method", "threads", *heads], cells,
-        "the communication thread comes on top; with all cores it takes the place of the last one",
-    )  # fmt: skip
+    if cells:
+        table.show(
+            "Fig. 6: ms, and times one CPU thread with the published method",
+            ["scene", "method", "threads", *heads], cells,
+            "the communication thread comes on top; with all cores it takes the place of the last one",
+        )  # fmt: skip
     rows = [r for r in report.rows if r.get("part") == "segment size"]
     lines = {}
     for r in rows:
         lines.setdefault((r["scene"], r["method"], r["threads"]), []).append(r["median_ms"])
-    table.show("section 6.2: ms by pairs in a segment", ["scene", "method", "threads", *map(str, SEGMENT_PAIRS)],
-               [[*key, *ms] for key, ms in lines.items()])  # fmt: skip
+    if lines:
+        table.show("section 6.2: ms by pairs in a segment", ["scene", "method", "threads", *map(str, SEGMENT_PAIRS)],
+                   [[*key, *ms] for key, ms in lines.items()])  # fmt: skip
 
 
 def _cell(row):
