@@ -51,8 +51,13 @@ def run(args) -> int:
     report, found = common.begin(args, "ros")
     for source in found:
         for k in source.spread(args.steps):
+            if (step := source.step(k)) is None:
+                report.note(f"{source.name}, step {k}: a change of topology without motion, passed over")
+                continue
             with tempfile.TemporaryDirectory(prefix="hpccd-bench-") as folder:
-                _measure(report, args, source.name, source.step(k), Path(folder))
+                _measure(report, args, source.name, step, Path(folder))
+    if not report.rows:
+        raise UserError("none of the steps has a motion; take more with --steps")
     _tables(report)
     return common.end(args, report, {"ros": ros_figure.draw})
 
