@@ -15,7 +15,7 @@ from . import progress, truth
 SCALES = tuple(10.0**k for k in (-150, -100, -60, -30, -20, -10, -3, 0, 3, 10, 20, 30, 60, 100, 148))
 OFFSETS = (0.0, *(10.0**k for k in range(0, 13)))
 # No short binary fractions: a shift by one of these rounds, as those of real scenes do.
-DIRECTION = np.array([0.7, -1.1, 0.9])
+DIRECTION = np.array([0.7312, -1.1379, 0.9151])
 
 
 def sweep(tiers: list[str], n: int, seed: int) -> list[dict]:
