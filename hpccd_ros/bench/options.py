@@ -13,7 +13,6 @@ once as a static one.
 from __future__ import annotations
 
 import dataclasses
-import functools
 
 import numpy as np
 
@@ -66,9 +65,10 @@ def _variants(step: Step, args) -> list[Variant]:
     if any(mesh.static or not mesh.self_collision for mesh in step.meshes) or step.ignored_pairs:
         found.append(Variant("as the scene says", base))
     if args.landscape > 0:
+        landscape = _landscape(step, args.landscape)
         found += [
-            Variant("landscape around it", base, lambda s: _in_landscape(_full(s), args.landscape, static=False)),
-            Variant("the same, static", base, lambda s: _in_landscape(_full(s), args.landscape, static=True)),
+            Variant("landscape around it", base, lambda s: _in_landscape(_full(s), landscape, static=False)),
+            Variant("the same, static", base, lambda s: _in_landscape(_full(s), landscape, static=True)),
         ]
     return found
 
@@ -92,11 +92,8 @@ def _between(scene, n_meshes: int, tier: str) -> None:
             scene.set_accuracy(scene.mesh_names[a], scene.mesh_names[b], tier)
 
 
-def _in_landscape(step: Step, triangles: int, static: bool) -> Step:
-    low, high = step.vertices_t0.min(axis=0), step.vertices_t0.max(axis=0)
-    faces, flat = _landscape(triangles)
-    size = 4 * float((high - low).max())
-    xyz = np.float32(flat * size + [*(low + high)[:2] / 2, low[2] - size]).astype(step.vertices_t0.dtype)
+def _in_landscape(step: Step, landscape: tuple[np.ndarray, np.ndarray], static: bool) -> Step:
+    faces, xyz = landscape
     return dataclasses.replace(
         step,
         meshes=(*step.meshes, MeshPart("landscape", faces, len(xyz), static=static)),
@@ -105,15 +102,17 @@ def _in_landscape(step: Step, triangles: int, static: bool) -> Step:
     )
 
 
-@functools.lru_cache(maxsize=1)
-def _landscape(triangles: int) -> tuple[np.ndarray, np.ndarray]:
-    """faces, vertices of a wavy square of edge one around the origin."""
+def _landscape(step: Step, triangles: int) -> tuple[np.ndarray, np.ndarray]:
+    """faces, vertices of a wavy square far below the scene and four times as wide; the same for all its steps."""
+    low, high = step.vertices_t0.min(axis=0), step.vertices_t0.max(axis=0)
+    size = 4 * float((high - low).max())
     side = max(2, round((triangles / 2) ** 0.5) + 1)
     y, x = np.mgrid[0:side, 0:side] / (side - 1) - 0.5
     a = (np.arange(side - 1)[:, None] * side + np.arange(side - 1)).ravel()
     quads = np.stack([a, a + 1, a + side, a + 1, a + side + 1, a + side], axis=1)
-    z = 0.02 * np.sin(20 * x) * np.cos(17 * y)
-    return quads.reshape(-1, 3).astype(np.uint32), np.stack([x, y, z], axis=2).reshape(-1, 3)
+    shape = np.stack([x, y, 0.02 * np.sin(20 * x) * np.cos(17 * y)], axis=2).reshape(-1, 3)
+    xyz = size * shape + [*(low + high)[:2] / 2, low[2] - size]
+    return quads.reshape(-1, 3).astype(np.uint32), xyz.astype(step.vertices_t0.dtype)
 
 
 def _row(source, variant, series, full, args):
