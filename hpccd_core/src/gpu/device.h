@@ -16,10 +16,10 @@ struct Device {
 };
 
 struct Status {
-  bool compiled = false;          // this build holds CUDA code
-  std::string toolkit;            // which version, and for which architectures
-  std::vector<Device> devices;    // the ones that run this build's code
-  std::string reason;             // why there are none; empty where there are
+  bool compiled = false;        // this build holds CUDA code
+  std::string toolkit;          // which version, and for which architectures
+  std::vector<Device> devices;  // the ones that run this build's code
+  std::string reason;           // why there are none; empty where there are
 };
 
 // Looked up once. Never throws: a machine without GPU is an answer, not an error.

@@ -27,7 +27,7 @@ struct FrameResult {
   std::uint64_t n_vf = 0, n_ee = 0;
   const std::array<std::uint32_t, 2>* vf = nullptr;  // in canonical order
   const std::array<std::uint32_t, 4>* ee = nullptr;
-  const double* toc = nullptr;                       // vertex-face, then edge-edge
+  const double* toc = nullptr;  // vertex-face, then edge-edge
   std::uint64_t hash = 0;
 };
 

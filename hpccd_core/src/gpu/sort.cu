@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Apart from the other kernels: CUB's headers take longer to compile than all of these.
-#include "gpu/sort.h"
-
 #include <cub/device/device_radix_sort.cuh>
 
 #include "gpu/cuda_call.h"
+#include "gpu/sort.h"
 
 namespace hpccd::gpu {
 
