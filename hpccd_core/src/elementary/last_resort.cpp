@@ -2,6 +2,7 @@
 #include "elementary/last_resort.h"
 
 #include "elementary/batch.h"
+#include "elementary/beyond.h"
 #include "elementary/exact/contact.h"
 #include "elementary/extended.h"
 #include "elementary/tolerant.h"
@@ -29,9 +30,12 @@ std::optional<double> exact_contact(Points q_t0, Points q_t1, LastResortCounts& 
   return exact::earliest_contact(kind, q_t0, q_t1);
 }
 
-std::optional<double> within_separation(const inclusion::Limits& limits, Kind kind, Points q_t0, Points q_t1) {
-  const Motion<double> m =
-      kind == Kind::vertex_face ? motion_of<Kind::vertex_face>(q_t0, q_t1) : motion_of<Kind::edge_edge>(q_t0, q_t1);
+template <Kind kind>
+std::optional<double> within_separation(const inclusion::Limits& limits, Points q_t0, Points q_t1,
+                                        LastResortCounts& counts) {
+  const Motion<double> m = motion_of<kind>(q_t0, q_t1);
+  if (certainly_beyond<kind>(m, limits.separation)) return std::nullopt;
+  ++counts.inclusion;
   return inclusion::earliest_within(kind, m, limits);
 }
 
@@ -39,10 +43,9 @@ std::optional<double> within_separation(const inclusion::Limits& limits, Kind ki
 
 std::optional<double> last_resort(Accuracy accuracy, const inclusion::Limits& limits, Kind kind, Points q_t0,
                                   Points q_t1, LastResortCounts& counts) {
-  if (accuracy == Accuracy::conservative && limits.separation > 0) {
-    ++counts.inclusion;
-    return within_separation(limits, kind, q_t0, q_t1);
-  }
+  if (accuracy == Accuracy::conservative && limits.separation > 0)
+    return kind == Kind::vertex_face ? within_separation<Kind::vertex_face>(limits, q_t0, q_t1, counts)
+                                     : within_separation<Kind::edge_edge>(limits, q_t0, q_t1, counts);
   // Without a separation the exact answer is conservative too, and cheaper than a search that has to give up somewhere.
   if (accuracy == Accuracy::conservative || accuracy == Accuracy::exact)
     return kind == Kind::vertex_face ? exact_contact<Kind::vertex_face>(q_t0, q_t1, counts)
