@@ -46,7 +46,8 @@ def commit() -> str:
     # An environment inside somebody else's repository would name a commit of that.
     if not top or not (Path(top) / "hpccd_core" / "include" / "hpccd").is_dir():
         return "unknown"
-    changed = _git(here, "-C", top, "status", "--porcelain", "--untracked-files=no", "--", "hpccd_core", "hpccd_ros")
+    sources = ("hpccd_core", "hpccd_ros", ":(exclude)hpccd_core/bench/results")
+    changed = _git(here, "-C", top, "status", "--porcelain", "--untracked-files=no", "--", *sources)
     return (_git(here, "rev-parse", "--short=10", "HEAD") or "unknown") + ("+changes" if changed else "")
 
 

@@ -162,11 +162,11 @@ class SoakLoad:
         if start[0] != end[0]:
             self.wrong.append(f"the answer for step {message.step} spans a change of topology")
             return
-        meshes = (*self._scene.meshes, *self._strip.meshes)
+        meshes, faces = (*self._scene.meshes, *self._strip.meshes), (*end[2], *self._strip.faces())
         scene = hc.Scene()
-        for mesh, faces, xyz in zip(meshes, (*end[2], *self._strip.faces()), end[1], strict=True):
+        for mesh, triangles, xyz in zip(meshes, faces, end[1], strict=True):
             scene.add_mesh(
-                mesh.name, faces, static=mesh.static, self_collision=mesh.self_collision, n_vertices=len(xyz)
+                mesh.name, triangles, static=mesh.static, self_collision=mesh.self_collision, n_vertices=len(xyz)
             )
         detector = hc.Detector(scene, accuracy=TIER, threads=1)
         expected = detector.detect(np.concatenate(start[1]), np.concatenate(end[1]))
@@ -175,5 +175,26 @@ class SoakLoad:
             self.wrong.append(
                 f"the answer for step {message.step}, {message.start.sec}.{message.start.nanosec:09} to "
                 f"{message.header.stamp.sec}.{message.header.stamp.nanosec:09}, has {message.total} contacts, the core "
-                f"alone finds {len(expected)}"
+                f"alone finds {len(expected)}; {self._differences(message, expected, meshes, faces, end[1])}"
             )
+
+    @staticmethod
+    def _differences(message: ContactArray, expected, meshes, faces, vertices) -> str:
+        """What an answer has otherwise than the core."""
+        offsets = [np.cumsum([0, *(len(rows) for rows in part)]) for part in (vertices, faces)]
+        layout = convert.Layout(tuple(mesh.name for mesh in meshes), *offsets)
+        if message.truncated:
+            return "cut off, so not compared"
+        found = convert.read_contacts(message, layout)
+        said = []
+        for kind in ("ee", "vf"):
+            here, there = getattr(found, kind), getattr(expected, kind)
+            if here.shape != there.shape or not (here == there).all():
+                said.append(f"other {kind} pairs")
+                continue
+            off = np.nonzero(getattr(found, kind + "_toc") != getattr(expected, kind + "_toc"))[0]
+            if len(off):
+                k = off[0]
+                times = (getattr(c, kind + "_toc")[k] for c in (found, expected))
+                said.append(f"{len(off)} {kind} times differ, first that of {here[k].tolist()}: {list(times)}")
+        return "; ".join(said) or "the arrays are equal: only the hash differs"
