@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`hpccd bench ...`: each command runs, checks what it promises to check, and writes what it says."""
+
+import csv
+
+import numpy as np
+import pytest
+from matplotlib import image
+
+STRIP = ("folding-strip", "--size", "0.1", "--steps", "2", "--repeat", "1")
+
+
+def check_files(result, folder, *figures):
+    """Rows as JSON and as CSV, and pictures that hold more than one colour."""
+    assert result["failures"] == []
+    assert result["machine"]["commit"] and result["machine"]["cores"] >= 1
+    with open(folder / f"{result['benchmark']}-test.csv", newline="", encoding="utf-8") as file:
+        assert len(list(csv.DictReader(file))) == len(result["rows"]) > 0
+    for name in figures:
+        picture = image.imread(folder / f"{name}.png")
+        assert min(picture.shape[:2]) > 200 and len(np.unique(picture.reshape(-1, picture.shape[2]), axis=0)) > 10
+
+
+def test_cpu(bench):
+    status, result, folder = bench("cpu", *STRIP, "--report", "all,first,any")
+    assert status == 0
+    check_files(result, folder, "cpu")
+    every, first, any_ = result["rows"]
+    assert every["contacts"] >= first["contacts"] >= any_["contacts"]
+    assert every["stages_ms"]["total"] > 0 and every["stats"]["vf_candidates"] > 0
+
+
+def test_scaling(bench):
+    status, result, folder = bench("scaling", *STRIP, "--threads-list", "1,2", "--methods", "default,naive")
+    assert status == 0
+    check_files(result, folder, "scaling", "threads")
+    assert [(r["method"], r["threads"]) for r in result["rows"]] == [
+        ("default", 1), ("default", 2), ("naive", 1), ("naive", 2),
+    ]  # fmt: skip
+    assert len({r["contacts"] for r in result["rows"]}) == 1
+    assert result["rows"][0]["efficiency"] == 1
+
+
+def test_methods(bench):
+    status, result, folder = bench("methods", *STRIP, "--threads", "2")
+    assert status == 0
+    check_files(result, folder, "methods")
+    assert all(row["same_contacts"] for row in result["rows"])
+    assert {"default", "published", "naive", "front", "scalar"} <= {row["variant"] for row in result["rows"]}
+
+
+def test_size(bench):
+    few = ("--steps", "2", "--repeat", "1", "--threads-list", "1,2")
+    status, result, folder = bench("size", "folding-strip", "--sizes", "0.1,0.4", *few)
+    assert status == 0
+    check_files(result, folder, "size")
+    small, _, large, _ = result["rows"]
+    assert 3 < large["triangles"] / small["triangles"] < 5
+    assert large["bytes_per_triangle"] > 50
+    assert sum("time ~ triangles^" in note for note in result["notes"]) == 2
+
+
+def test_memory(bench):
+    status, result, folder = bench("memory", "folding-strip", "--repeat", "1", "--methods", "default,front")
+    assert status == 0
+    check_files(result, folder)
+    default, front = result["rows"]
+    assert 0 < default["detector_bytes"] < front["detector_bytes"], "the front keeps pairs of nodes"
+    assert default["process_bytes"] > default["detector_bytes"] / 2
+    assert default["all_candidates_bytes"] == 8 * default["candidates"] > 0
+
+
+def test_accuracy(bench):
+    status, result, folder = bench("accuracy", *STRIP, "--sweep-queries", "40", "--simd", "auto,scalar")
+    assert status == 0
+    check_files(result, folder, "accuracy", "accuracy-sweeps")
+    parts = {name: [r for r in result["rows"] if r["part"] == name] for name in ("scene", "adversarial", "sweep")}
+    assert len(parts["scene"]) == 4 * 2
+    for row in parts["scene"]:
+        assert sum(row["decided"].values()) == pytest.approx(row["candidates"]), "each pair is decided once"
+    hard = {tier: [r for r in parts["adversarial"] if r["accuracy"] == tier] for tier in ("balanced", "exact")}
+    assert all(r["missed"] == r["invented"] == 0 for r in hard["exact"])
+    assert any(r["missed"] + r["invented"] > 0 for r in hard["balanced"]), "these queries are not hard"
+    assert {r["at"] for r in parts["sweep"] if r["sweep"] == "scale"} >= {1e-30, 1e30}
+    assert max(r["at"] for r in parts["sweep"] if r["sweep"] == "offset") == 1e12
+
+
+def test_options(bench):
+    few = ("--size", "0.02", "--steps", "1", "--repeat", "1", "--landscape", "200")
+    status, result, folder = bench("options", "n-body-like-lr", *few)
+    assert status == 0
+    check_files(result, folder, "options")
+    rows = {row["option"]: row for row in result["rows"]}
+    full = rows["full"]
+    assert full["over_full"] == 1
+    assert rows["no self-collision"]["candidates"] < full["candidates"]
+    assert rows["largest mesh ignored by all"]["candidates"] < full["candidates"]
+    assert rows["report any"]["contacts"] <= 1
+    assert rows["the same, static"]["contacts"] == rows["landscape around it"]["contacts"] == full["contacts"]
+    assert rows["the same, static"]["candidates"] < rows["landscape around it"]["candidates"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (("cpu", "no-such-scene"), "no-such-scene"),
+        (("cpu", *STRIP[:-1], "0"), "--repeat"),
+        (("scaling", *STRIP, "--threads-list", "0"), "--threads-list"),
+        (("size", "folding-strip", "--sizes", "one"), "--sizes"),
+        (("size", "cloth-ball"), "generated"),
+        (("accuracy", *STRIP, "--tiers", "best"), "best"),
+        (("memory", "folding-strip", "--methods", ","), "--methods"),
+    ],
+)
+def test_wrong_use_is_explained(bench, capsys, arguments, text):
+    status, result, _ = bench(*arguments)
+    assert status == 2 and result is None
+    assert text in capsys.readouterr().err
