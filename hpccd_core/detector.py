@@ -168,6 +168,13 @@ class Detector:
         self._last_on_device.keep(place, self.n_vertices)
         return contacts
 
+    def cancel(self):
+        """End the use of this detector, from any thread: a call under way, if any, and all later ones raise
+        hpccd_core.Cancelled (a RuntimeError), usually within a few ms. The published methods do not notice while they
+        work, nor does what has been handed to a GPU.
+        """
+        self._core.cancel()
+
     def reset(self):
         """Forget the last positions: the next step() starts anew."""
         self._last = None

@@ -20,6 +20,7 @@ from rclpy.task import Future
 from hpccd_ros import convert
 from hpccd_ros.detection import CORE_ERRORS, Options, SceneBuilder, make_detector
 from hpccd_ros.messages import Topology
+from hpccd_ros.ongoing import Ongoing
 
 
 class RequestError(ValueError):
@@ -58,6 +59,7 @@ class DetectService:
         self._pool = ThreadPoolExecutor(settings["detect_jobs"], thread_name_prefix="detect")
         self._lock = threading.Lock()
         self._open = 0
+        self._ongoing: set[Ongoing] = set()
         self.counts: Counter = Counter(answered=0, refused=0, busy=0, timed_out=0, failed=0, open=0)
         # A callback that awaits occupies its group until it ends: in the node's own group it would stop everything.
         self._group = ReentrantCallbackGroup()
@@ -66,6 +68,8 @@ class DetectService:
     def close(self) -> None:
         self._node.destroy_service(self._service)
         self._pool.shutdown(wait=False, cancel_futures=True)
+        for ongoing in tuple(self._ongoing):
+            ongoing.end()
 
     async def _answer(self, request: Detect.Request, response: Detect.Response) -> Detect.Response:
         try:
@@ -90,7 +94,10 @@ class DetectService:
             if (executor := self._node.executor) is not None:
                 executor.wake()  # a task that awaits is only looked at when the executor wakes up
 
-        job = self._pool.submit(self._compute, request, scene, self._options())
+        ongoing = Ongoing()
+        self._ongoing.add(ongoing)
+        job = self._pool.submit(self._compute, request, scene, self._options(), ongoing)
+        job.add_done_callback(lambda _: self._ongoing.discard(ongoing))
         job.add_done_callback(self._leave)
         job.add_done_callback(settle)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
@@ -99,6 +106,7 @@ class DetectService:
         self._node.destroy_timer(timer)
         if not job.done():
             job.cancel()
+            ongoing.end()
             return self._refuse(
                 response,
                 "timed_out",
@@ -142,7 +150,9 @@ class DetectService:
             )
         return limit
 
-    def _compute(self, request: Detect.Request, scene: NodeScene, options: Options) -> ContactArray:
+    def _compute(
+        self, request: Detect.Request, scene: NodeScene, options: Options, ongoing: Ongoing
+    ) -> ContactArray:
         names = list(request.mesh_names) or list(scene.topologies)
         if not names:
             raise RequestError("mesh_names: empty, and the node has no meshes of its own")
@@ -159,7 +169,7 @@ class DetectService:
         start = self._vertices("start", names, request.start, topologies)
         end = self._vertices("end", names, request.end, topologies)
         options = replace(options, accuracy=request.accuracy or options.accuracy, report=request.report or "all")
-        detector = make_detector(scene.builder.among(names).build(topologies), options)
+        detector = ongoing.use(make_detector(scene.builder.among(names).build(topologies), options))
         contacts = detector.detect(start, end)
         message = ContactArray(accuracy=options.accuracy, backend=detector.backend)
         message.header = request.end[0].header

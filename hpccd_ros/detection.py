@@ -13,6 +13,7 @@ from hpccd_ros.convert import Layout
 from hpccd_ros.drops import DropCounter, Reason
 from hpccd_ros.frame_queue import FrameQueue
 from hpccd_ros.messages import MeshSettings, SceneFrame, Topology
+from hpccd_ros.ongoing import Ongoing
 
 # What the core raises for bad input, options that are not built, and lack of memory or of a device.
 CORE_ERRORS = (ValueError, TypeError, RuntimeError, MemoryError)
@@ -147,7 +148,12 @@ class DetectionThread(threading.Thread):
         self._detector: hc.Detector | None = None
         self._detector_options: Options | None = None
         self._start: SceneFrame | None = None
+        self._ongoing = Ongoing()
         self.working_on: SceneFrame | None = None
+
+    def cancel(self) -> None:
+        """Give up the frame that is worked on: counted as stopped. For the end, after the queue was closed."""
+        self._ongoing.end()
 
     def run(self) -> None:
         while (item := self._queue.take()) is not None:
@@ -158,6 +164,9 @@ class DetectionThread(threading.Thread):
                     self._on_first(frame)
                 else:
                     self._on_detection(self._detect(start, frame))
+            except hc.Cancelled:
+                for mesh in frame.fresh:
+                    self._drops.count(mesh, Reason.STOPPED)
             except CORE_ERRORS as error:
                 for mesh in frame.fresh:
                     self._drops.count(mesh, Reason.DETECTION_FAILED)
@@ -171,7 +180,7 @@ class DetectionThread(threading.Thread):
             self._scene_of, self._detector = end, None
         options = self._options()
         if self._detector is None or options != self._detector_options:
-            self._detector = make_detector(self._scene, options)
+            self._detector = self._ongoing.use(make_detector(self._scene, options))
             self._detector_options = options
         began = time.perf_counter()
         contacts = self._detector.detect(self._builder.concatenate(start, end), self._builder.concatenate(end, end))

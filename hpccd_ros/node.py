@@ -177,6 +177,7 @@ class HpccdNode(LifecycleNode):
             self._inputs.close()
             for frame in self._queue.close():
                 self._count_dropped(frame, Reason.STOPPED)
+            self._thread.cancel()
             self._thread.join()
             self._queue = self._thread = None
         self._recording.end()

@@ -67,6 +67,7 @@ py::tuple run_queries(const Array<double>& queries, Accuracy accuracy, Simd simd
 
 PYBIND11_MODULE(_core, m) {
   py::register_exception<InvalidArgument>(m, "InvalidArgument", PyExc_ValueError);
+  py::register_exception<Cancelled>(m, "Cancelled", PyExc_RuntimeError);
   py::enum_<Accuracy>(m, "Accuracy")
       .value("fast", Accuracy::fast)
       .value("balanced", Accuracy::balanced)
@@ -138,6 +139,7 @@ PYBIND11_MODULE(_core, m) {
              }
              return to_dict(std::move(c));
            })
+      .def("cancel", &Detector::cancel)
       .def("profile", &Detector::profile)
       .def("stats", &Detector::stats)
       .def_property_readonly("last_backend",

@@ -242,6 +242,7 @@ Contacts Detector::detect(Positions t0, Positions t1) {
     throw InvalidArgument(
         "vertices_t0, vertices_t1: are in a GPU's memory, which this detector does not use; copy them "
         "to the host, or use backend=\"gpu\"");
+  if (d.search.cancelled) throw Cancelled();
   d.profiler.begin();
   const Backend backend = d.next_backend(t0.on_device || t1.on_device);
   if (backend == Backend::gpu) {
@@ -264,6 +265,8 @@ Contacts Detector::detect(Positions t0, Positions t1) {
   d.note_time(backend, used);
   return contacts;
 }
+
+void Detector::cancel() { impl_->search.cancelled = true; }
 
 std::map<std::string, double> Detector::profile() const {
   auto stages = impl_->profiler.stages();

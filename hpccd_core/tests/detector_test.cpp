@@ -2,6 +2,7 @@
 // The public C++ interface; the same contacts on any number of threads is also what the sanitizers are run on.
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <thread>
 
 #include "grid_scene.h"
@@ -79,6 +80,23 @@ TEST(Detector, DetectorsOfOneSceneWorkSideBySide) {
   for (Contacts& contacts : found) threads.emplace_back([&] { contacts = detect(scene, {.threads = 2}); });
   for (std::thread& thread : threads) thread.join();
   for (const Contacts& contacts : found) expect_equal(expected, contacts);
+}
+
+TEST(Detector, AnotherThreadMayEndIt) {
+  for (int threads : {1, 4})
+    for (Report report : {Report::all, Report::any}) {
+      Options options;
+      options.backend = Backend::cpu, options.threads = threads, options.report = report;
+      Detector detector(test::two_sheets(side), options);
+      const auto start = test::sheet_positions(side, 0), end = test::sheet_positions(side, 1);
+      std::thread other([&] {
+        std::this_thread::sleep_for(std::chrono::milliseconds(20));
+        detector.cancel();
+      });
+      EXPECT_THROW(for (;;) detector.detect(test::view(start), test::view(end)), Cancelled);
+      other.join();
+      EXPECT_THROW(detector.detect(test::view(start), test::view(end)), Cancelled);
+    }
 }
 
 TEST(Detector, RefusesPositionsThatDoNotFitTheScene) {

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Whole scenes against brute force with the exact tests, and what must not change a result."""
 
+import threading
+
 import hypothesis.strategies as st
 import numpy as np
 import pytest
@@ -324,3 +326,25 @@ def test_added_meshes_do_not_reach_a_detector():
     detector = hc.Detector(scene)
     scene.add_mesh("later", meshes.faces[0])
     assert_exact(detector.detect(meshes.vertices_t0, meshes.vertices_t1), meshes.truth())
+
+
+def test_cancel_ends_a_call_under_way():
+    # Layers of a regular grid that pass through each other: a hundred thousand exact contacts, seconds of work.
+    n = 120
+    y, x = np.mgrid[0:n, 0:n].astype(float)
+    a = (np.arange(n - 1)[:, None] * n + np.arange(n - 1)).ravel()
+    faces = np.concatenate([np.stack([a, a + 1, a + n], 1), np.stack([a + 1, a + n + 1, a + n], 1)])
+    scene = hc.Scene()
+    layers = 6
+    for layer in range(layers):
+        scene.add_mesh(f"layer {layer}", faces)
+    start = np.concatenate([np.stack([x.ravel(), y.ravel(), np.full(n * n, float(k))], 1) for k in range(layers)])
+    end = start * [1, 1, -1]
+    detector = hc.Detector(scene, accuracy="exact", backend="cpu", threads=2)
+    timer = threading.Timer(0.3, detector.cancel)
+    timer.start()
+    with pytest.raises(hc.Cancelled, match="cancelled"):
+        detector.detect(start, end)
+    timer.join()
+    with pytest.raises(hc.Cancelled):
+        detector.detect(start, start)

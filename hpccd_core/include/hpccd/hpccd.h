@@ -21,6 +21,12 @@ class InvalidArgument : public std::invalid_argument {
   using std::invalid_argument::invalid_argument;
 };
 
+// Thrown by a call that Detector::cancel has ended.
+class Cancelled : public std::runtime_error {
+ public:
+  Cancelled() : std::runtime_error("the detection was cancelled") {}
+};
+
 enum class Accuracy : std::uint8_t { fast, balanced, conservative, exact };
 enum class Backend : std::uint8_t { automatic, cpu, hybrid, gpu };
 enum class Report : std::uint8_t { all, first, any };
@@ -112,6 +118,10 @@ class Detector {
 
   // Contacts of the straight-line motion from t0 to t1 (Kim et al. 2009, section 3.1).
   Contacts detect(Positions vertices_t0, Positions vertices_t1);
+
+  // From any thread: a call under way, if any, and all later ones throw Cancelled as soon as their traversal notices.
+  // Not noticed by the published methods nor by work that is on a GPU already.
+  void cancel();
 
   std::map<std::string, double> profile() const;       // stage -> ms of the last call
   std::map<std::string, std::uint64_t> stats() const;  // counts of the last call

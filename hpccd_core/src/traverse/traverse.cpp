@@ -10,8 +10,10 @@ namespace {
 
 // `between` is called between two pairs and may take from the stack.
 template <class Between>
-void walk(const Tree& tree, const PairRules& rules, std::vector<NodePair>& stack, Worker& worker, Between&& between) {
+void walk(const Tree& tree, const PairRules& rules, const Search& search, std::vector<NodePair>& stack, Worker& worker,
+          Between&& between) {
   while (!stack.empty()) {
+    if (search.cancelled.load(std::memory_order_relaxed)) throw Cancelled();
     const NodePair p = stack.back();
     stack.pop_back();
     const Node &a = tree.nodes[p.a], &b = tree.nodes[p.b];
@@ -55,7 +57,7 @@ void traverse_any(const Tree& tree, const PairRules& rules, Search& search, Thre
       const std::size_t task = next.fetch_add(1);
       if (task >= tasks.size() || task > found.load()) break;
       stack.push_back(tasks[task]);
-      walk(tree, rules, stack, worker, [] {});
+      walk(tree, rules, search, stack, worker, [] {});
       worker.flush();
       keep_first_of_task(worker, task, found);
       if (task < best && !(worker.vertex_face.empty() && worker.edge_edge.empty())) {
@@ -93,7 +95,7 @@ void traverse(const Tree& tree, const PairRules& rules, Search& search, ThreadPo
     BusyThread busy(pairs, thread);
     std::vector<NodePair> stack;
     while (busy.next(stack))
-      walk(tree, rules, stack, worker, [&] {
+      walk(tree, rules, search, stack, worker, [&] {
         if (pairs.wanted()) pairs.give(stack);
       });
     worker.flush();

@@ -28,6 +28,7 @@ struct Search {
   Report report;
   inclusion::Limits limits;
   std::atomic<double> earliest;  // best time so far, where report is first
+  std::atomic<bool> cancelled{false};
 };
 
 class Worker;
