@@ -5,6 +5,8 @@ from __future__ import annotations
 
 from . import drawing
 
+# Where the words stand beside a point, in points: tiers of about the same time and error must not hide each other.
+WORDS = {"fast": (7, -3), "conservative": (7, 5), "balanced": (7, -2), "exact": (7, -11)}
 # Where an error of exactly zero is drawn on a logarithmic axis.
 TOC_FLOOR, SHARE_FLOOR = 1e-17, 1e-5
 
@@ -17,7 +19,7 @@ def draw_scenes(report, path) -> None:
     figure, axes = drawing.panels(len(scenes), columns=3, width=3.9, height=3.2)
     for scene, axis in zip(scenes, axes, strict=True):
         mine = [row for row in rows if row["scene"] == scene]
-        for place, row in enumerate(mine):
+        for row in mine:
             y = max(row["toc_worst"], TOC_FLOOR)
             marker = {"cpu": "o", "hybrid": "D", "gpu": "^"}[row["backend"]]
             axis.plot(row["step_ms"], y, marker, color=drawing.TIER[row["accuracy"]], markersize=8,
@@ -26,7 +28,7 @@ def draw_scenes(report, path) -> None:
             where = "" if row["backend"] == "cpu" else f", {row['backend']}"
             simd = "" if row["simd"] == "auto" else f", {row['simd']}"
             axis.annotate(row["accuracy"] + where + simd + wrong, (row["step_ms"], y), textcoords="offset points",
-                          xytext=(7, 4 if place % 2 else -9), fontsize=7)  # fmt: skip
+                          xytext=WORDS[row["accuracy"]], fontsize=7)  # fmt: skip
         axis.set_yscale("log")
         axis.set_ylim(TOC_FLOOR / 5, 1)
         axis.set_yticks([TOC_FLOOR, 1e-12, 1e-8, 1e-4, 1], ["exact", "1e-12", "1e-8", "1e-4", "1"])
