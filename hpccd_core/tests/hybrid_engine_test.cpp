@@ -108,9 +108,18 @@ TEST(Hybrid, SameContactsForAnyThreadsDevicesAndSegments) {
         EXPECT_TRUE(result.complete);
         EXPECT_EQ(result.stats.at("test_devices"), n_devices);
         expect_equal(result.contacts, expected);
-        if (sizes.segment_pairs > 1) EXPECT_GT(result.stats.at("hybrid_calls"), 0u);
       }
   }
+}
+
+TEST(Hybrid, SegmentsGoToTheDevices) {
+  Bench bench(2);
+  bench.take(0, 1);
+  hybrid::Engine engine(bench.devices(2), {8, 16}, bench.pool);
+  // On a busy machine the traversal of a small scene may be over before the communication thread has woken up.
+  std::uint64_t calls = 0;
+  for (int frame = 0; frame < 2000 && calls == 0; ++frame) calls = bench.with(engine).stats.at("hybrid_calls");
+  EXPECT_GT(calls, 0u);
 }
 
 TEST(Hybrid, FrameAfterFrameAndOnANewTree) {
@@ -159,7 +168,12 @@ TEST(Hybrid, AFrameInWhichADeviceFailsIsFinishedOnTheCpu) {
   hybrid::Engine engine(bench.devices(2), {16, 16}, bench.pool);
   for (const int good_submissions : {0, 1, 2, 5}) {
     bench.faults->submits_before_failure = good_submissions;
-    const auto failed = bench.with(engine);
+    auto failed = bench.with(engine);
+    // How many runs of segments a frame is sent in depends on how the threads are scheduled.
+    for (int frame = 0; frame < 1000 && failed.complete; ++frame) {
+      expect_equal(failed.contacts, expected);
+      failed = bench.with(engine);
+    }
     EXPECT_FALSE(failed.complete);
     EXPECT_EQ(engine.error(), "asked for: at a submission");
     expect_equal(failed.contacts, expected);
