@@ -61,6 +61,16 @@ def _has_screen() -> bool:
     return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 
+def _what_is_there(history, args) -> str:
+    if not history.steps:
+        return "it has none"
+    first, last = min(history.steps), max(history.steps)
+    if args.step is None or not first < args.step < last:
+        return f"it has {first} to {last}"
+    nearest = min(history.steps, key=lambda step: abs(step - args.step))
+    return f"dropped when it was recorded; the nearest is --step {nearest}"
+
+
 def _draw_one(args, steps, target, title, view):
     history, chosen = History(), None
     for step in steps:
@@ -70,7 +80,7 @@ def _draw_one(args, steps, target, title, view):
         elif step.step == args.step:
             chosen = step
     if chosen is None:
-        there = f"it has {min(history.steps)} to {max(history.steps)}" if history.steps else "it has none"
+        there = _what_is_there(history, args)
         raise UserError(f"{args.file}: no step {'' if args.step is None else args.step}: {there}")
     try:
         draw_step(chosen, target, history, title=title, **view)

@@ -4,6 +4,7 @@
 from pathlib import Path
 
 from hpccd_ros import scenes
+from hpccd_ros.mcap_recover import examine
 from hpccd_ros.scenes import files
 
 # Long enough for a loaded machine; reached only by tests that fail.
@@ -47,6 +48,17 @@ class Live:
             "publisher", "hpccd_ros.cli", "scene", *self._scene, "--publish", "--rate", "40", "--subscribers",
             str(subscribers), "--wait", "60", *options, *self._remap,
         )  # fmt: skip
+
+    def wait_for_answers(self, path, count: int):
+        """Wait until so many contact messages are flushed to the recording `path`, a file or a folder of files.
+
+        The publisher ends when all it sent was acknowledged; the last answers may still be computed then.
+        """
+        files = lambda: sorted(path.glob("*.mcap")) if path.is_dir() else [path]  # noqa: E731
+        recorded = lambda: sum(  # noqa: E731
+            number for file in files() for topic, number in examine(file).counts.items() if topic.endswith("/contacts")
+        )
+        self._children.wait(lambda: recorded() >= count, f"{count} answers were not recorded", PATIENCE)
 
     def play(self, path, *options: str):
         """Start publishing a recording."""

@@ -2,6 +2,7 @@
 """The demo as a newcomer runs it: it ends by itself, leaves what it says, and nothing that runs on."""
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -42,10 +43,12 @@ def test_demo(hpccd, tmp_path, demo_domain):
     picture = imread(tmp_path / "hpccd-demo" / "demo.png")
     assert picture.shape[:2] == (1080, 1920)
     assert hpccd("replay", "hpccd-demo/demo.mcap").returncode == 0
-    again = hpccd("view", "hpccd-demo/demo.mcap", "--step", "30", "-o", "other.png")
-    assert again.returncode == 0 and "other.png: step 30" in again.stdout
+    # A step that was answered for sure: on a busy machine the demo drops some, and says so.
+    worst = re.search(r"worst frame: step (\d+)", done.stdout).group(1)
+    again = hpccd("view", "hpccd-demo/demo.mcap", "--step", worst, "-o", "other.png")
+    assert again.returncode == 0 and f"other.png: step {worst}" in again.stdout
     missing = hpccd("view", "hpccd-demo/demo.mcap", "--step", "300")
-    assert missing.returncode == 2 and "it has 1 to 39" in missing.stderr
+    assert missing.returncode == 2 and re.search(r"no step 300: it has \d+ to \d+", missing.stderr)
     assert not _running_from(tmp_path)
 
 

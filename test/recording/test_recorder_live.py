@@ -27,8 +27,7 @@ def _record(live, path, *options, stop=signal.SIGINT, node_options=()):
     node = live.node(*node_options)
     recorder = live.recorder(path, *options)
     live.wait_for(live.publisher())
-    # The publisher ends when all it sent was acknowledged; the last answers may still be computed.
-    time.sleep(2.0)
+    live.wait_for_answers(path, FRAMES - 1)
     recorder.process.send_signal(stop)
     live.wait_for(recorder)
     live.end(node)
@@ -106,6 +105,16 @@ def _verified_file(file):
     return steps
 
 
+def _frames_from(path, seconds: float) -> int:
+    """How many whole frames (cloth and ball) a player publishes that begins so many seconds into the recording."""
+    with Recording(path) as recording:
+        messages = [(message.topic, message.log_time) for message in recording.messages()]
+    begin = messages[0][1] + seconds * 1e9
+    return min(
+        sum(topic == f"/meshes/{mesh}/vertices" and at >= begin for topic, at in messages) for mesh in ("cloth", "ball")
+    )
+
+
 def test_played_back_over_dds_gives_the_same_contacts(live, small_bag, tmp_path, children):
     """Recording -> player -> a fresh node -> recorder: the answers are those of the first recording."""
     again = tmp_path / "again.mcap"
@@ -118,7 +127,7 @@ def test_played_back_over_dds_gives_the_same_contacts(live, small_bag, tmp_path,
     children.wait(lambda: node.said("active: meshes"), "the node was not active", 60.0)
     recorder = live.recorder(again, "--ros-args", *remaps)
     live.wait_for(live.play(small_bag, "--rate", "2", "--from", "1.0"))
-    time.sleep(2.0)
+    live.wait_for_answers(again, _frames_from(small_bag, 1.0) - 1)
     live.end(recorder)
     live.end(node)
 
