@@ -15,6 +15,9 @@ def _profile(depth: int, *, reliable: bool = True, latched: bool = False) -> QoS
 
 # The last topology reaches a node that starts after it was published.
 TOPOLOGY = _profile(1, latched=True)
+# The reader keeps several: of two that come at once, the later (a conflicting one, that of the next break) would else
+# replace the earlier before the node has seen it. Ten bound what a stranger can make the node hold.
+TOPOLOGY_INPUT = _profile(10, latched=True)
 
 # Enough for a reader that is late now and then (a depth of 2 lost 3 % at 200 Hz); recorders ask for more.
 CONTACTS = _profile(10)

@@ -93,7 +93,7 @@ class MeshStream:
                 MeshTopology,
                 topology_topic,
                 self._on_topology,
-                qos.TOPOLOGY,
+                qos.TOPOLOGY_INPUT,
                 event_callbacks=link_events(node, topology_topic, links, self._topology_numbers.new_publisher),
             ),
             node.create_subscription(

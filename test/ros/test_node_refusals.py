@@ -112,6 +112,20 @@ def test_bad_topology(streaming, message, reason, text):
     goes_on()
 
 
+def test_a_conflict_right_behind_the_topology_does_not_replace_it(start_node):
+    """Both wait for the node: it takes them one after the other, however late."""
+    node = start_node({"meshes": ["cloth"]})
+    publisher = node.peer.publisher(MeshTopology, "meshes/cloth/topology", qos.TOPOLOGY_INPUT)
+    for faces in (FACES, FACES[1:]):
+        publisher.publish(convert.topology_message(faces, N * N, version=3))
+    node.frames_status(topologies_refused=1, topologies_refused__cloth__topology_conflict=1)
+    for k in range(2):
+        node.peer.vertices("cloth", sheet_positions(N, k), k, topology_version=3)
+        node.frames_status(answered=k + 1)
+    expected = sheet_positions(N, 0), sheet_positions(N, 1)
+    assert assert_same_contacts(node.contacts(1)[0], *expected, scene_of(cloth=FACES)) > 0
+
+
 def test_frames_of_an_unknown_mesh(streaming):
     node, goes_on = streaming
     publisher = node.peer.publisher(MeshVertices, "meshes/clot/vertices")  # waits until the node listens
