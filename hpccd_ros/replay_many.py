@@ -61,7 +61,7 @@ def _cluster(distributed, args, jobs):
     """(client, threads of the core for each job; 0: all that the worker's machine has)."""
     if args.scheduler:
         try:
-            client = distributed.Client(args.scheduler, timeout="10s")
+            client = distributed.Client(args.scheduler, timeout="60s")
         except (OSError, ValueError, TimeoutError) as error:
             raise UserError(f"--scheduler {args.scheduler}: no Dask scheduler answers there: {error}") from error
         with client:

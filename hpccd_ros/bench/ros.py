@@ -140,9 +140,11 @@ def _latency(row: dict, lanes: dict, times: dict) -> dict:
     for who, ms in (("node", added), ("echo", echo), ("core", core), ("whole", 1e3 * (end - begin))):
         for key, q in (("median", 50), ("p95", 95), ("p99", 99)):
             out[f"{who}_{key}_ms"] = float(np.percentile(ms, q))
+        out[f"{who}_mean_ms"] = float(np.mean(ms))
     for key in ("median", "p95", "p99"):
         out["ratio" if key == "median" else f"ratio_{key}"] = out[f"node_{key}_ms"] / out[f"echo_{key}_ms"]
     out["parts_ms"] = {part: 1e3 * float(np.median(s)) for part, s in parts.items()}
+    out["parts_mean_ms"] = {part: 1e3 * float(np.mean(s)) for part, s in parts.items()}
     return out
 
 

@@ -21,7 +21,7 @@ from . import ros_echo
 from .steps import Step
 
 MESH = "scene"
-PATIENCE = 60.0  # s, for what takes less than one
+PATIENCE = 300.0  # s, for what takes less than one on a machine that is not busy
 
 
 @dataclass

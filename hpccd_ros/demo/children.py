@@ -35,7 +35,7 @@ class Child:
 class Children:
     """Starts Python modules with their output in `folder`/NAME.log. Leaving the context ends all of them."""
 
-    GRACE = 10.0  # s for a child to end by itself, before it is killed
+    GRACE = 60.0  # s for a child to end by itself, before it is killed
 
     def __init__(self, folder: Path):
         self._folder = folder

@@ -73,12 +73,12 @@ def _stream(args, scene, folder, console):
         )  # fmt: skip
         recorder = children.start(
             "recorder", "hpccd_ros.cli", "record", "-o", str(folder / RECORDING), "--compression", args.compression,
-            "--wait", "60",
+            "--wait", "180",
         )  # fmt: skip
-        children.wait(lambda: recorder.said("recording "), "the recorder did not hear the node", 60.0)
+        children.wait(lambda: recorder.said("recording "), "the recorder did not hear the node", 180.0)
         publisher = children.start(
             "publisher", "hpccd_ros.cli", "scene", args.scene, "--size", str(args.size), "--frames",
-            str(scene.n_frames), "--publish", "--rate", str(args.rate), "--subscribers", "2", "--wait", "30",
+            str(scene.n_frames), "--publish", "--rate", str(args.rate), "--subscribers", "2", "--wait", "120",
         )  # fmt: skip
         console.print(f"[bold]processes[/]  node {node.process.pid}, recorder {recorder.process.pid}, publisher "
                       f"{publisher.process.pid}, over DDS (domain {os.environ['ROS_DOMAIN_ID']})")
@@ -103,7 +103,9 @@ def _watch(monitor, children, publisher, frames, console):
     shown = -1
     with progress:
         bar = progress.add_task("steps", total=steps, said="")
-        while publisher.running or (monitor.answers < steps and time.monotonic() - monitor.heard < 3.0):
+        # Without a single answer there is nothing to show: on a busy machine the first may be late.
+        silence = lambda: 3.0 if monitor.answers else 60.0  # noqa: E731
+        while publisher.running or (monitor.answers < steps and time.monotonic() - monitor.heard < silence()):
             monitor.listen(0.1)
             children.check()
             said = _state(monitor)

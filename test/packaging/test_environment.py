@@ -44,7 +44,7 @@ def run(script: str, folder: Path, **variables: str) -> str:
     theirs = (*USER_CHOICES, *DISCOVERY_CHOICES)
     env = {name: value for name, value in os.environ.items() if name not in theirs} | variables
     command = [sys.executable, "-c", script]
-    ended = subprocess.run(command, cwd=folder, env=env, text=True, capture_output=True, timeout=60)
+    ended = subprocess.run(command, cwd=folder, env=env, text=True, capture_output=True, timeout=300)
     assert ended.returncode == 0, ended.stderr
     return ended.stdout.strip()
 

@@ -30,7 +30,7 @@ def hpccd(tmp_path):
     def run(*arguments, **options):
         return subprocess.run(
             [sys.executable, "-m", "hpccd_ros.cli", *map(str, arguments)], cwd=tmp_path, text=True,
-            capture_output=True, timeout=300, env={**os.environ, "PYTHONPATH": SOURCES}, **options,
+            capture_output=True, timeout=500, env={**os.environ, "PYTHONPATH": SOURCES}, **options,
         )  # fmt: skip
 
     return run

@@ -7,8 +7,10 @@ from hpccd_ros import scenes
 from hpccd_ros.mcap_recover import examine
 from hpccd_ros.scenes import files
 
-# Long enough for a loaded machine; reached only by tests that fail.
-PATIENCE = 90.0
+# Long enough for a machine that is ten times too busy; reached only by tests that fail.
+PATIENCE = 240.0
+# What the processes wait for each other, s.
+WAIT = str(PATIENCE)
 
 
 class Live:
@@ -36,8 +38,8 @@ class Live:
     def recorder(self, path, *options: str):
         name = f"recorder-{Path(path).name}"
         child = self._children.start(
-            name, "hpccd_ros.cli", "record", "-o", str(path), "--node", f"{self._namespace}/hpccd", "--wait", "60",
-            *options,
+            name, "hpccd_ros.cli", "record", "-o", str(path), "--node", f"{self._namespace}/hpccd", "--wait", WAIT,
+            "--depth", "1000", *options,
         )  # fmt: skip
         self._children.wait(lambda: child.said("recording "), "the recorder did not hear the node", PATIENCE)
         return child
@@ -46,7 +48,7 @@ class Live:
         """Start publishing the scene; --loop and the like as options."""
         return self._children.start(
             "publisher", "hpccd_ros.cli", "scene", *self._scene, "--publish", "--rate", "40", "--subscribers",
-            str(subscribers), "--wait", "60", *options, *self._remap,
+            str(subscribers), "--wait", WAIT, *options, *self._remap,
         )  # fmt: skip
 
     def wait_for_answers(self, path, count: int):
@@ -63,7 +65,7 @@ class Live:
     def play(self, path, *options: str):
         """Start publishing a recording."""
         return self._children.start(
-            "player", "hpccd_ros.cli", "replay", str(path), "--publish", "--wait", "60", *options
+            "player", "hpccd_ros.cli", "replay", str(path), "--publish", "--wait", WAIT, *options
         )
 
     def kill(self, child):

@@ -10,6 +10,7 @@ import time
 from pathlib import Path
 
 import pytest
+from live import PATIENCE
 from matplotlib.image import imread
 from sources import SOURCES
 
@@ -73,8 +74,8 @@ def test_interrupted_demo_leaves_no_process(tmp_path, demo_domain, number):
             break
     assert len(_running_from(tmp_path)) >= 3
     process.send_signal(number)
-    assert process.wait(60) == (-9 if number == signal.SIGKILL else 130)
-    deadline = time.monotonic() + 60
+    assert process.wait(PATIENCE) == (-9 if number == signal.SIGKILL else 130)
+    deadline = time.monotonic() + PATIENCE
     while _running_from(tmp_path):
         assert time.monotonic() < deadline, _running_from(tmp_path)
         time.sleep(0.1)

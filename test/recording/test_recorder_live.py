@@ -7,7 +7,7 @@ import time
 import numpy as np
 import pytest
 from bag_tools import read_by_mcap_ros2, read_by_rosbags, typestore
-from live import Live
+from live import PATIENCE, Live
 from rosbags.rosbag2 import Reader
 
 from hpccd_ros import replay_setup, scenes
@@ -124,7 +124,7 @@ def test_played_back_over_dds_gives_the_same_contacts(live, small_bag, tmp_path,
     remaps = [word for rule in rules for word in ("-r", rule)]
     node = children.start("node", "hpccd_ros.node", *live._remap, *remaps, "--params-file", str(live.parameters),
                           "-p", "accuracy:=exact", "-p", "frame_queue:=1000", "-p", "input_depth:=1000")
-    children.wait(lambda: node.said("active: meshes"), "the node was not active", 60.0)
+    children.wait(lambda: node.said("active: meshes"), "the node was not active", PATIENCE)
     recorder = live.recorder(again, "--ros-args", *remaps)
     live.wait_for(live.play(small_bag, "--rate", "2", "--from", "1.0"))
     live.wait_for_answers(again, _frames_from(small_bag, 1.0) - 1)

@@ -10,14 +10,12 @@ import types
 import numpy as np
 import pytest
 from bag_tools import rewrite
+from live import PATIENCE
 
 from hpccd_ros import replay_many
 from hpccd_ros.errors import UserError
 
 pytest.importorskip("distributed", reason="Dask is not installed: make venv EXTRAS='test cluster'")
-
-PATIENCE = 90.0
-
 
 @pytest.fixture
 def recordings(small_bag, tmp_path):

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """A simulator on another machine, as far as the network can tell: streams a mesh until an answer comes.
 
-`python network_peer.py NAMESPACE SECONDS`; prints JSON: {"answer": {"step", "hash", "total"} or null, "listeners"}.
+`python network_peer.py NAMESPACE SECONDS`; prints JSON: {"answer": {"start", "step", "hash", "total"} or null,
+"listeners"}; start, step: numbers of the two frames.
 """
 
 import json
@@ -33,6 +34,8 @@ def main(namespace: str, seconds: float) -> None:
         step += 1
         rclpy.spin_once(node, timeout_sec=0.1)
     answer = {key: getattr(answers[0], key) for key in ("step", "hash", "total")} if answers else None
+    if answer:
+        answer["start"] = convert.stamp_to_ns(answers[0].start) - 1
     print(json.dumps({"answer": answer, "listeners": listeners}), flush=True)
     node.destroy_node()
     rclpy.shutdown()

@@ -67,7 +67,7 @@ def test_close_returns_what_is_left_and_ends_the_reader():
     while queue.frames():
         pass
     assert queue.close() == []
-    reader.join(timeout=30)
+    reader.join(timeout=300)
     assert not reader.is_alive() and got == [7]
     assert stamps(queue.put(frame(8))) == [8]
     assert queue.take() is None
@@ -80,7 +80,7 @@ def test_nothing_is_lost_between_threads():
     for k in range(5000):
         lost += queue.put(frame(k, OLD if k % 7 else NEW))
     lost += queue.close()
-    reader.join(timeout=30)
+    reader.join(timeout=300)
     assert sorted(stamps(got + lost)) == list(range(5000))
     assert stamps(got) == sorted(stamps(got))
 

@@ -59,11 +59,11 @@ def test_peer_gets_the_contacts_of_the_core(start_node, tmp_path, dtype):
 
 def test_large_messages_cross_over_udp(start_node, tmp_path):
     """A hundred thousand contacts: several megabytes in fragments, between two implementations."""
-    n = 100
-    node = start_node({"meshes": ["cloth"], "max_contacts": 0})
+    n, tier = 100, "balanced"  # nearly every contact is degenerate: exact takes seconds, and this is not about it
+    node = start_node({"meshes": ["cloth"], "max_contacts": 0, "accuracy": tier})
     frames = np.stack([sheet_positions(n, k) for k in (2, 3, 4)])
     answers = play(node, tmp_path, sheet_faces(n), frames)
-    assert_all_but_one(answers, frames, sheet_faces(n))
+    assert_all_but_one(answers, frames, sheet_faces(n), accuracy=tier)
     assert answers[-1].total > 100_000
 
 

@@ -105,11 +105,11 @@ def node_in(networks, tmp_path):
 
 
 def assert_contacts_of_the_core(answer):
-    step = answer["step"]
-    detector = hc.Detector(scene_of(cloth=sheet_faces(N)))
-    frames = [sheet_positions(N, k) for k in range(step + 1)]
-    # The frames before the two were known to each other are lost: the answer's step begins one frame before its end.
-    expected = detector.detect(frames[step - 1], frames[step])
+    # Frames before the two were known to each other are lost, and a busy machine may pass over others.
+    assert answer["start"] < answer["step"]
+    expected = hc.Detector(scene_of(cloth=sheet_faces(N))).detect(
+        *(sheet_positions(N, answer[end]) for end in ("start", "step"))
+    )
     assert answer["hash"] == expected.hash and answer["total"] == len(expected) > 100
 
 

@@ -8,7 +8,7 @@ import signal
 import numpy as np
 import pytest
 from lifecycle_msgs.msg import Transition
-from node_process import NodeProcess
+from node_process import PATIENCE, NodeProcess
 from test_node_life import change_state, set_parameter, stream
 from waving_sheet import sheet_faces, sheet_positions
 
@@ -55,6 +55,7 @@ def test_the_bytes_that_another_recorder_hears(start_node, tmp_path):
     node = start_node({"meshes": ["cloth"], "outputs": ["points"], "record": str(tmp_path / "own.mcap")})
     other = BagWriter(tmp_path / "other.mcap")
     recorder = Recorder(node.peer.node, other, recorded_topics.of_node({"meshes": ["cloth"]}), 100)
+    node.peer.readers = 3
     node.peer.topology("cloth", FACES, N * N)
     node.wait_until(lambda: all(recorder.publishers(t) for t in recorder.topics if "vertices" not in t), "matching")
     stream(node, range(20))
@@ -83,6 +84,8 @@ def test_begun_and_ended_at_run_time(start_node, tmp_path):
     _recording(node, files=1)
     # The topology, sent long ago, is latched: it comes to the recorder, then frames can be used.
     _recording(node, messages=1)
+    node.peer.readers = 2
+    node.peer.await_readers("meshes/cloth/vertices")
     stream(node, range(5, 10))
     _recording(node, messages=1 + 5 + 5)
     assert set_parameter(node, "record", "").successful
@@ -131,7 +134,7 @@ def test_a_full_disk_stops_only_the_recording(start_node, tmp_path):
 def test_where_nothing_can_be_recorded(start_node, tmp_path):
     (tmp_path / "file").write_text("")
     node = start_node({"meshes": ["cloth"], "record": str(tmp_path / "file" / "run.mcap")}, wait=False)
-    assert node.process.wait(60) == 2
+    assert node.process.wait(PATIENCE) == 2
     assert "is not writable" in node.output()
 
 

@@ -32,7 +32,8 @@ def published(tmp_path_factory):
                 for topic, types in peer.get_topic_names_and_types()
                 if any(info.node_name == "hpccd" for info in peer.get_publishers_info_by_topic(topic))
             }
-            return names if "/contacts" in names else None  # whose an endpoint is comes to be known a little later
+            # Whose an endpoint is comes to be known a little later, of each at its own time.
+            return names if {"/contacts", "/markers", "/surface", "/diagnostics"} <= names.keys() else None
 
         yield node.wait_until(published, "publishers of the node"), set(node.peer.statuses), message
     finally:

@@ -19,7 +19,7 @@ from hpccd_ros import _env, scenes
 from hpccd_ros.scenes import messages
 
 # Reached only by tests that fail.
-PATIENCE = 90.0
+PATIENCE = 240.0
 ROOT = Path(hpccd_ros.__file__).resolve().parents[1]
 
 
@@ -95,7 +95,8 @@ def publish_command(name, namespace, *options):
 def test_every_frame_arrives_in_another_process(listen, children):
     scene = scenes.make("breaking-like", size=1 / 64, frames=12)
     listener = listen(scene, "/all_frames")
-    command = publish_command(scene.name, "/all_frames", "--size", 1 / 64, "--frames", 12, "--rate", 50, "--wait", 60)
+    options = ("--size", 1 / 64, "--frames", 12, "--rate", 50, "--wait", PATIENCE)
+    command = publish_command(scene.name, "/all_frames", *options)
     children.append(start(*command))
     vertices = {mesh: listener.received[messages.vertices_topic(mesh)] for mesh in scene.mesh_names}
     listener.wait(lambda: all(len(rows) == 12 for rows in vertices.values()), children[0])
@@ -126,7 +127,7 @@ def test_every_frame_arrives_in_another_process(listen, children):
 def test_loop_counts_versions_on_and_sigterm_ends_it(listen, children):
     scene = scenes.make("two-triangles")
     listener = listen(scene, "/loop")
-    children.append(start(*publish_command(scene.name, "/loop", "--rate", 200, "--loop", "--wait", 60)))
+    children.append(start(*publish_command(scene.name, "/loop", "--rate", 200, "--loop", "--wait", PATIENCE)))
     rows = listener.received[messages.vertices_topic("upper")]
     listener.wait(lambda: len(rows) >= 40, children[0])
     children[0].send_signal(signal.SIGTERM)
@@ -170,11 +171,11 @@ def test_node_reports_the_contacts_of_a_scene(name, size, listen, children, tmp_
     listener = listen(scene, "/whole")
     answers = []
     listener.node.create_subscription(ContactArray, "contacts", answers.append, QoSProfile(depth=1000))
-    # A queue as long as the scene: no frame may be dropped here, however slow the machine.
+    # Queues as long as the scene: no frame may be dropped here, however slow the machine.
     node = start("hpccd_ros.node", "--ros-args", "-r", "__ns:=/whole", "--params-file", parameters,
-                 "-p", f"frame_queue:={frames}", "-p", "max_contacts:=0")  # fmt: skip
+                 "-p", f"frame_queue:={frames}", "-p", f"input_depth:={frames}", "-p", "max_contacts:=0")  # fmt: skip
     children.append(node)
-    command = publish_command(name, "/whole", *options, "--rate", 20, "--wait", 60, "--subscribers", 2)
+    command = publish_command(name, "/whole", *options, "--rate", 20, "--wait", PATIENCE, "--subscribers", 2)
     publisher = start(*command)
     children.append(publisher)
 
