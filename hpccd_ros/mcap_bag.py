@@ -79,8 +79,7 @@ class BagWriter:
             self.not_written[topic_name] += 1
         else:
             self._guarded(lambda: self._append(topic, *message))
-        if topic.latched:
-            topic.last = message
+        topic.last.append(message)
 
     def poll(self) -> None:
         """Close the open chunk if it is older than `flush_interval`. Call it also while no messages come."""
@@ -171,12 +170,13 @@ class BagWriter:
         self._go_on(log_time, cause)
 
     def _go_on(self, log_time, cause):
-        """Open the next file. It is complete alone: it starts with the topologies in force."""
+        """Open the next file. It is complete alone: it starts with what is in force before the message of `cause`."""
         self._open_file()
         for topic in self._topics.values():
             self._file.register(topic)
-            if topic.latched and topic.last and topic is not cause:
-                self._file.append(topic, log_time, *topic.last[1:])
+            outlived = topic is cause and len(topic.last) == topic.latched
+            for earlier in list(topic.last)[int(outlived):]:
+                self._file.append(topic, log_time, *earlier[1:])
 
     def _is_full(self, log_time):
         max_bytes, max_ns = self._limits

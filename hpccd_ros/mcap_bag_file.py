@@ -4,7 +4,7 @@
 import dataclasses
 import json
 import time
-from collections import Counter
+from collections import Counter, deque
 from pathlib import Path
 
 from mcap.writer import CompressionType, Writer
@@ -21,13 +21,20 @@ HPCCD_RECORD = "hpccd"
 
 @dataclasses.dataclass
 class Topic:
-    """A recorded topic. `qos` as from `mcap_qos.offered_qos`; `latched`: repeated at the start of each file."""
+    """A recorded topic. `qos` as from `mcap_qos.offered_qos`.
+
+    `latched`: how many of its last messages are repeated at the start of each file; `last`: these, as (log_time,
+    publish_time, sequence, data).
+    """
 
     name: str
     type_name: str
     qos: list[dict]
-    latched: bool = False
-    last: tuple | None = None  # (log_time, publish_time, sequence, data) of a latched topic
+    latched: int = 0
+    last: deque[tuple] = dataclasses.field(init=False)
+
+    def __post_init__(self):
+        self.last = deque(maxlen=self.latched)
 
 
 class BagFile:

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Play recorded messages over DDS: the very bytes, with the recorded quality of service, in their rhythm."""
 
+import itertools
 import signal
 import time
+from collections import deque
 
 import rclpy
 import yaml
@@ -10,7 +12,7 @@ from rclpy.duration import Duration
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 
-from hpccd_ros import _env, replay_setup
+from hpccd_ros import _env, qos, replay_setup, transform_topics
 from hpccd_ros.errors import UserError
 from hpccd_ros.mcap_decode import message_class
 from hpccd_ros.mcap_reader import RecordedTopic, Recording, RecordingError
@@ -66,10 +68,15 @@ def _qos(topic) -> QoSProfile:
     latched = offers and all(offer["durability"] in ("transient_local", 1) for offer in offers)
     return QoSProfile(
         history=HistoryPolicy.KEEP_LAST,
-        depth=1 if latched else DEPTH,
+        depth=_in_force(topic) if latched else DEPTH,
         reliability=ReliabilityPolicy.BEST_EFFORT if best_effort else ReliabilityPolicy.RELIABLE,
         durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
     )
+
+
+def _in_force(topic) -> int:
+    """How many of the last messages of a latched topic are in force: static transforms add up."""
+    return qos.TRANSFORMS_STATIC.depth if topic.type_name in transform_topics.TYPES else 1
 
 
 def _await_subscribers(node, publishers, wait, stop) -> None:
@@ -91,13 +98,14 @@ def _play(recording, publishers, args, stop) -> int:
         first = message.log_time if first is None else first
         at = (message.log_time - first) * 1e-9
         if at < args.begin:
-            # What is latched (topologies) is in force at the beginning, whenever it was sent.
+            # What is latched (topologies, static transforms) is in force at the beginning, whenever it was sent.
             if publishers[message.topic].qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL:
-                latched[message.topic] = message
+                depth = publishers[message.topic].qos_profile.depth
+                latched.setdefault(message.topic, deque(maxlen=depth)).append(message)
             continue
         if stop or at > args.end:
             break
-        for earlier in latched.values():
+        for earlier in itertools.chain.from_iterable(latched.values()):
             publishers[earlier.topic].publish(earlier.data)
             count += 1
         latched.clear()

@@ -5,6 +5,8 @@ import dataclasses
 
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
+from hpccd_ros import qos, transform_topics
+
 TOPOLOGY = "hpccd/msg/MeshTopology"
 VERTICES = "hpccd/msg/MeshVertices"
 POINTS = "sensor_msgs/msg/PointCloud2"
@@ -13,19 +15,25 @@ CONTACTS = "hpccd/msg/ContactArray"
 
 @dataclasses.dataclass(frozen=True)
 class Wanted:
-    """A topic to record: `name` relative or absolute, `type_name` "pkg/msg/Name", `latched`: transient local."""
+    """A topic to record: `name` relative or absolute, `type_name` "pkg/msg/Name".
+
+    `latched`: of a transient local topic, how many of its last messages are in force at any time; else 0.
+    """
 
     name: str
     type_name: str
-    latched: bool = False
+    latched: int = 0
 
 
 def of_node(parameters: dict) -> list[Wanted]:
     """The topics of a node with these parameters, inputs before outputs."""
     wanted = []
+    if any(parameters.get(f"mesh.{mesh}.transform") == "tf" for mesh in parameters["meshes"]):
+        static = qos.TRANSFORMS_STATIC.depth
+        wanted += [Wanted(t.name, t.type_name, static * t.static) for t in transform_topics.understood()]
     for mesh in parameters["meshes"]:
         clouds = parameters.get(f"mesh.{mesh}.input") == "points"
-        wanted.append(Wanted(f"meshes/{mesh}/topology", TOPOLOGY, latched=True))
+        wanted.append(Wanted(f"meshes/{mesh}/topology", TOPOLOGY, latched=1))
         wanted.append(Wanted(f"meshes/{mesh}/{'points' if clouds else 'vertices'}", POINTS if clouds else VERTICES))
     return [*wanted, Wanted("contacts", CONTACTS)]
 
@@ -44,14 +52,14 @@ def subscription_qos(node, name: str, topic: Wanted, depth: int) -> QoSProfile:
 
 def as_node_asks(node, name: str, topic: Wanted, depth: int, *, reliability: ReliabilityPolicy) -> QoSProfile:
     """For the node's own recording. reliability: what the node asks of vertices; the others are reliable."""
-    always = topic.type_name in (TOPOLOGY, CONTACTS)
+    always = topic.type_name not in (VERTICES, POINTS)
     return _profile(ReliabilityPolicy.RELIABLE if always else reliability, topic.latched, depth)
 
 
 def _profile(reliability, latched, depth) -> QoSProfile:
     return QoSProfile(
         history=HistoryPolicy.KEEP_LAST,
-        depth=depth,
+        depth=max(depth, latched),
         reliability=reliability,
         durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
     )

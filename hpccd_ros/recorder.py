@@ -44,7 +44,8 @@ def _record(node, target, args, stop) -> int:
     parameters = node_parameters.fetch(node, args.node, args.wait)
     if not parameters.get("meshes"):
         raise UserError(f"the node {args.node} has no parameter `meshes`: is it an hpccd node?")
-    wanted = recorded_topics.of_node(parameters) + [_extra(text) for text in args.topic]
+    wanted = recorded_topics.of_node(parameters)
+    wanted += [topic for topic in map(_extra, args.topic) if topic.name not in {known.name for known in wanted}]
     files, missing = mesh_files(parameters)
     for text in missing:
         print(text, file=sys.stderr, flush=True)
@@ -128,7 +129,7 @@ def _report(bag, recorder):
 def _extra(text) -> Wanted:
     name, equals, type_name = text.partition("=")
     if not equals or type_name.count("/") != 2:
-        raise UserError(f"--topic {text}: write it as NAME=PACKAGE/msg/TYPE, for example /tf=tf2_msgs/msg/TFMessage")
+        raise UserError(f"--topic {text}: write it as NAME=PACKAGE/msg/TYPE, for example /odom=nav_msgs/msg/Odometry")
     try:
         message_class(type_name)
     except LookupError as error:

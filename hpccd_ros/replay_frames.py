@@ -3,42 +3,47 @@
 
 from collections import OrderedDict
 
-from hpccd_ros import convert
+from hpccd_ros import convert, transform_topics
 from hpccd_ros.convert import InvalidMessageError
-from hpccd_ros.drops import DropCounter
+from hpccd_ros.drops import DropCounter, Reason
 from hpccd_ros.frames import FrameAssembler
 from hpccd_ros.mcap_decode import make_decoder
 from hpccd_ros.messages import MeshFrame, SceneFrame
-from hpccd_ros.placement import Placement
+from hpccd_ros.placement import Placement, Ready
 from hpccd_ros.replay_setup import ReplaySetup
 from hpccd_ros.sequence import SequenceWatch
+from hpccd_ros.transform_topics import TransformTopic
+from hpccd_ros.transforms import TransformBuffer
 
 
 class FrameSource:
     """Assembles frames of the scene from recorded messages.
 
-    drops, refused: what could not be used and why, counted as in the node.
+    drops, refused: what could not be used and why, counted as in the node. transforms_refused: by topic.
     """
 
     def __init__(self, setup: ReplaySetup, topics):
         settings = setup.settings
+        # Messages of several topics may have reached the recorder in another order than the node.
+        pending = 4 * settings["pending_frames"]
         self._setup = setup
         self.drops = DropCounter()
         self.refused = DropCounter()
+        self.transforms_refused = DropCounter()
         self._decoders = {name: make_decoder(topics[name]) for name in setup.roles if name in topics}
         self._watches = {name: SequenceWatch() for name in setup.roles}
         self._assembler = FrameAssembler(
             list(setup.builder.meshes),
             self.drops,
             self.refused,
-            # Messages of several topics may have reached the recorder in another order than the node.
-            max_pending=4 * settings["pending_frames"],
+            max_pending=pending,
             restart_after=settings["restart_after"],
             tolerance=round(settings["stamp_tolerance"] * 1e9) if settings["stamp_match"] == "nearest" else None,
             frame_id=settings["frame_id"],
         )
+        self._transforms = TransformBuffer()
         self._placements = {
-            mesh: Placement(mesh, row, settings["frame_id"], settings["pending_frames"], self.drops)
+            mesh: Placement(mesh, row, settings["frame_id"], pending, self.drops, self._transforms)
             for mesh, row in setup.meshes.items()
         }
         for mesh, (topology, frame) in setup.files.items():
@@ -54,6 +59,8 @@ class FrameSource:
         """Frames that this recorded message completes."""
         mesh, kind = self._setup.roles[message.topic]
         decoded = self._decoders[message.topic](message)
+        if kind in transform_topics.ALL:
+            return self._take_transforms(decoded, transform_topics.ALL[kind])
         watch = self._watches[message.topic]
         _, new_publisher = watch.next(message.sequence) if message.sequence else (0, False)
         settings = self._setup.settings
@@ -76,11 +83,20 @@ class FrameSource:
             return []
         header = decoded.header
         frame = MeshFrame(convert.stamp_to_ns(header.stamp), vertices, version, step, header.frame_id)
+        return self._assemble(mesh, self._placements[mesh].take(frame, new_publisher))
+
+    def _take_transforms(self, message, topic: TransformTopic) -> list[SceneFrame]:
+        for transform in transform_topics.in_message(message):
+            try:
+                transform_topics.keep(self._transforms, transform, topic.static)
+            except ValueError as error:
+                self.transforms_refused.count(topic.name, Reason.MALFORMED, str(error))
         return [
-            scene_frame
-            for placed, new in self._placements[mesh].take(frame, new_publisher)
-            for scene_frame in self._assembler.add(mesh, placed, new)
+            frame for mesh, placement in self._placements.items() for frame in self._assemble(mesh, placement.retry())
         ]
+
+    def _assemble(self, mesh: str, placed: list[Ready]) -> list[SceneFrame]:
+        return [frame for of_mesh, new in placed for frame in self._assembler.add(mesh, of_mesh, new)]
 
 
 class FrameWindow:

@@ -173,7 +173,10 @@ class Summary:
 
 
 def _print_losses(replay) -> None:
-    for counter, what in ((replay.source.drops, "vertex messages"), (replay.source.refused, "topologies")):
+    source = replay.source
+    for counter, what in (
+        (source.drops, "vertex messages"), (source.refused, "topologies"), (source.transforms_refused, "transforms")
+    ):  # fmt: skip
         for (mesh, reason), count in sorted(counter.by_mesh_and_reason().items()):
             print(f"  {count} {what} of {mesh} not used: {reason}")
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import yaml
 
 from hpccd_ros import parameters as table
-from hpccd_ros import scene_parameters
+from hpccd_ros import scene_parameters, transform_topics
 from hpccd_ros.detection import Options, SceneBuilder
 from hpccd_ros.errors import UserError
 from hpccd_ros.mcap_reader import Recording, RecordingError
@@ -23,7 +23,8 @@ class ReplaySetup:
 
     settings: dict
     meshes: dict[str, dict]
-    roles: dict[str, tuple[str, str]]  # topic name -> (mesh, "topology" | "vertices" | "points")
+    # Topic name -> (mesh, "topology" | "vertices" | "points"), or ("", name in transform_topics.ALL).
+    roles: dict[str, tuple[str, str]]
     contacts: str  # topic name
     files: dict[str, tuple[Topology, MeshFrame | None]]  # of meshes that come from a file; frame: static ones
 
@@ -58,12 +59,6 @@ def of_recording(recording: Recording, parameter_file: str | None = None) -> Rep
         name: {row.name: given.get(f"mesh.{name}.{row.name}", row.default) for row in table.MESH_ROWS}
         for name in settings["meshes"]
     }
-    for name, row in meshes.items():
-        if row["transform"] == "tf":
-            raise RecordingError(
-                f"{recording.path}: mesh {name} was transformed by tf (parameter mesh.{name}.transform), and "
-                "transforms are not recorded: its positions cannot be computed again"
-            )
     relative = info.get("topics") or _by_suffix(recording, settings["meshes"])
     roles = {}
     for topic, name in relative.items():
@@ -71,11 +66,19 @@ def of_recording(recording: Recording, parameter_file: str | None = None) -> Rep
         if first == "meshes":
             mesh, _, kind = rest.rpartition("/")
             roles[topic] = (mesh, kind)
+        elif name in transform_topics.ALL:
+            roles[topic] = ("", name)
     contacts = next((topic for topic, name in relative.items() if name == "contacts"), "/contacts")
     if not any(kind in ("vertices", "points") and topic in recording.topics for topic, (_, kind) in roles.items()):
         raise RecordingError(
             f"{recording.path} holds no vertices of the meshes {', '.join(meshes)}; its topics are "
             f"{', '.join(recording.topics) or 'none'}"
+        )
+    moved = [name for name, row in meshes.items() if row["transform"] == "tf"]
+    if moved and not any(kind in transform_topics.ALL and t in recording.topics for t, (_, kind) in roles.items()):
+        raise RecordingError(
+            f"{recording.path}: mesh {moved[0]} was transformed by tf (parameter mesh.{moved[0]}.transform), and the "
+            "recording holds no transforms: its positions cannot be computed again"
         )
     return ReplaySetup(settings, meshes, roles, contacts, _files(recording, meshes))
 
@@ -106,8 +109,8 @@ def _by_suffix(recording, meshes):
     return {
         topic: ending
         for topic in recording.topics
-        for ending in [*endings, "contacts"]
-        if topic.endswith("/" + ending)
+        for ending in [*endings, "contacts", *transform_topics.ALL]
+        if topic.endswith("/" + ending.removeprefix("/"))
     }
 
 

@@ -1,6 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Rigid motions of 3D space: a unit quaternion x y z w, then a translation. No ROS."""
+"""Rigid motions of 3D space: a unit quaternion x y z w, then a translation. No ROS.
 
+Sums are written out and sines are those of the C library: matrix products and numpy's own sines have other last bits on
+other processors, and a recording must be computed again to the same contacts anywhere.
+"""
+
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -23,7 +28,7 @@ class Rigid:
         shift, quaternion = np.array(shift, np.float64), np.array(quaternion, np.float64)
         if shift.shape != (3,) or quaternion.shape != (4,) or not np.isfinite([*shift, *quaternion]).all():
             raise ValueError("needs 7 finite numbers: x y z, quaternion x y z w")
-        length = np.linalg.norm(quaternion)
+        length = _length(quaternion)
         if abs(length - 1.0) > _LENGTH_TOLERANCE:
             raise ValueError(f"the quaternion {quaternion.tolist()} has length {length:.4g}; it must be 1")
         return cls(quaternion / length, shift)
@@ -32,28 +37,28 @@ class Rigid:
         """(n,3) float64. Without a rotation, coordinates are only shifted; without a shift, returned as they are."""
         if not self.quaternion[:3].any():
             return vertices + self.shift if self.shift.any() else vertices
-        return vertices @ self._rotation().T + self.shift
+        return _rotated(self._rotation(), vertices) + self.shift
 
     def after(self, first: "Rigid") -> "Rigid":
         """``first``, then this one."""
-        return Rigid(_product(self.quaternion, first.quaternion), self._rotation() @ first.shift + self.shift)
+        return Rigid(_product(self.quaternion, first.quaternion), _rotated(self._rotation(), first.shift) + self.shift)
 
     def inverse(self) -> "Rigid":
         back = Rigid(self.quaternion * [-1, -1, -1, 1], np.zeros(3))
-        return Rigid(back.quaternion, -(back._rotation() @ self.shift))
+        return Rigid(back.quaternion, -_rotated(back._rotation(), self.shift))
 
     def between(self, other: "Rigid", t: float) -> "Rigid":
         """At t in [0, 1] on the way to ``other``: shifts linearly, rotation at constant speed the shorter way."""
         a, b = self.quaternion, other.quaternion
-        cosine = float(a @ b)
+        cosine = sum((a * b).tolist())
         if cosine < 0.0:
             b, cosine = -b, -cosine
-        angle = np.arccos(min(cosine, 1.0))
+        angle = math.acos(min(cosine, 1.0))
         if angle < 1e-6:  # the sines vanish; linear is exact to rounding
             mixed = (1 - t) * a + t * b
         else:
-            mixed = np.sin((1 - t) * angle) * a + np.sin(t * angle) * b
-        return Rigid(mixed / np.linalg.norm(mixed), (1 - t) * self.shift + t * other.shift)
+            mixed = math.sin((1 - t) * angle) * a + math.sin(t * angle) * b
+        return Rigid(mixed / _length(mixed), (1 - t) * self.shift + t * other.shift)
 
     def _rotation(self) -> np.ndarray:
         x, y, z, w = self.quaternion
@@ -79,4 +84,14 @@ def _product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
             aw * bw - ax * bx - ay * by - az * bz,
         ]
     )
-    return product / np.linalg.norm(product)
+    return product / _length(product)
+
+
+def _length(quaternion: np.ndarray) -> float:
+    return math.sqrt(sum((quaternion * quaternion).tolist()))
+
+
+def _rotated(rotation: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """points: (3,) or (n,3)."""
+    x, y, z = points[..., 0:1], points[..., 1:2], points[..., 2:3]
+    return x * rotation[:, 0] + y * rotation[:, 1] + z * rotation[:, 2]

@@ -1,24 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Subscriptions that fill a TransformBuffer: tf2's topics where its messages are installed, and topics of our own.
-
-There is no wheel of tf2_msgs, so geometry_msgs/TransformStamped on ``transforms`` and ``transforms_static`` is always
-understood as well.
-"""
+"""Subscriptions that fill a TransformBuffer."""
 
 from collections.abc import Callable
 
-from geometry_msgs.msg import TransformStamped
 from rclpy.node import Node
 
-from hpccd_ros import convert, qos
+from hpccd_ros import qos, transform_topics
+from hpccd_ros.mcap_decode import message_class
 from hpccd_ros.rate_limit import RateLimit
-from hpccd_ros.rigid import Rigid
+from hpccd_ros.transform_topics import TransformTopic
 from hpccd_ros.transforms import TransformBuffer
-
-try:
-    from tf2_msgs.msg import TFMessage
-except ImportError:
-    TFMessage = None
 
 
 class TransformInput:
@@ -41,38 +32,27 @@ class TransformInput:
         self._on_change = on_change
         self._warn = warn
         self._max_rate = max_rate
-        topics = [("transforms", TransformStamped, False), ("transforms_static", TransformStamped, True)]
-        if TFMessage is not None:
-            topics += [("/tf", TFMessage, False), ("/tf_static", TFMessage, True)]
-        self._subscriptions = [self._subscribe(*topic) for topic in topics]
+        self._subscriptions = [self._subscribe(topic) for topic in transform_topics.understood()]
 
     def close(self) -> None:
         for subscription in self._subscriptions:
             self._node.destroy_subscription(subscription)
         self._subscriptions.clear()
 
-    def _subscribe(self, topic: str, kind: type, static: bool):
+    def _subscribe(self, topic: TransformTopic):
         limit = RateLimit(self._max_rate)
 
         def take(message) -> None:
             if not limit.allows():
-                self._warn(f"{topic}: more than max_rate = {self._max_rate:g} messages a second; some are dropped")
+                text = f"more than max_rate = {self._max_rate:g} messages a second; some are dropped"
+                self._warn(f"{topic.name}: {text}")
                 return
-            for transform in [message] if kind is TransformStamped else message.transforms:
-                self._add(topic, transform, static)
+            for transform in transform_topics.in_message(message):
+                try:
+                    transform_topics.keep(self._buffer, transform, topic.static)
+                except ValueError as error:
+                    self._warn(f"{topic.name}: {error}")
             self._on_change()
 
-        return self._node.create_subscription(kind, topic, take, qos.TRANSFORMS_STATIC if static else qos.TRANSFORMS)
-
-    def _add(self, topic: str, message: TransformStamped, static: bool) -> None:
-        shift, turn = message.transform.translation, message.transform.rotation
-        try:
-            self._buffer.add(
-                message.header.frame_id,
-                message.child_frame_id,
-                Rigid.of((shift.x, shift.y, shift.z), (turn.x, turn.y, turn.z, turn.w)),
-                None if static else convert.stamp_to_ns(message.header.stamp),
-            )
-        except ValueError as error:
-            names = f"{message.child_frame_id[:80]!r} to {message.header.frame_id[:80]!r}"
-            self._warn(f"{topic}: transform from {names}: {error}")
+        profile = qos.TRANSFORMS_STATIC if topic.static else qos.TRANSFORMS
+        return self._node.create_subscription(message_class(topic.type_name), topic.name, take, profile)

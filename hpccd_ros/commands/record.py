@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Record what goes into a running node (mesh topologies, vertices, points) and what comes out of it (contacts),
-exactly as it goes over the wire, with the node's parameters beside it.
+"""Record what goes into a running node (mesh topologies, vertices, points, transforms that it applies) and what comes
+out of it (contacts), exactly as it goes over the wire, with the node's parameters beside it.
 
   hpccd record                          the node /hpccd, into ./hpccd-<date>.mcap, until Ctrl-C
   hpccd record -o run.mcap --node /arm/hpccd --duration 60
@@ -21,7 +21,7 @@ def configure(parser):
     parser.add_argument("-o", "--output", metavar="PATH", help="file NAME.mcap, or folder for a split recording")
     parser.add_argument("--node", default="/hpccd", help="full name of the node to record (default: %(default)s)")
     parser.add_argument("--topic", action="append", default=[], metavar="NAME=TYPE",
-                        help="record this topic too, for example /tf=tf2_msgs/msg/TFMessage; may be repeated")
+                        help="record this topic too, for example /odom=nav_msgs/msg/Odometry; may be repeated")
     parser.add_argument("--compression", choices=("none", "lz4", "zstd"), default="none",
                         help="lz4: about half the writing speed; zstd: smaller, a fifth (default: %(default)s)")
     parser.add_argument("--split-size", type=float, default=0, metavar="MB", help="new file after so many megabytes")

@@ -27,7 +27,7 @@ def test_independent_readers_find_every_message(tmp_path, compression, chunk_siz
 def test_split_recordings(tmp_path, limits):
     path = tmp_path / "bag"
     writer = BagWriter(path, chunk_size=5000, **limits)
-    writer.add_topic(Topic("/latched", STRING, [], latched=True))
+    writer.add_topic(Topic("/latched", STRING, [], latched=1))
     writer.add_topic(Topic("/text", STRING, []))
     writer.write("/latched", text_message("in force"), 10**18, 10**18)
     for number, text in enumerate(TEXTS):

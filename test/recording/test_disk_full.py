@@ -33,7 +33,7 @@ def _write(bag, first, count):
 
 def _bag(path, **options):
     bag = BagWriter(path, chunk_size=5000, **options)
-    bag.add_topic(Topic("/latched", STRING, [], latched=True))
+    bag.add_topic(Topic("/latched", STRING, [], latched=1))
     bag.add_topic(Topic("/text", STRING, []))
     bag.write("/latched", text_message("in force"), 10**18, 10**18)
     return bag
