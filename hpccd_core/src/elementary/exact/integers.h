@@ -1,55 +1,93 @@
 // SPDX-License-Identifier: Apache-2.0
-// Integers of the exact tier. Coordinates of one query become integers by a common power of two.
+// Integers of the exact tier: of fixed size for all but the widest coordinates, else of any size. The coordinates of
+// one query become integers by a power of two, one for each axis.
 #pragma once
 
-#include <array>
+#include <bit>
 #include <boost/multiprecision/cpp_int.hpp>
-#include <cmath>
-#include <cstdint>
+#include <limits>
+
+#include "elementary/exact/fixed_integer.h"
 
 namespace hpccd::exact {
 
-// Without memory allocation: enough for coordinates of `fixed_coordinate_bits` bits. Their cubic has
-// 3 * 152 + 3 bits, evaluated at dyadic times of `fixed_time_bits` bits: 459 + 3 * 128 = 843 < 1024.
-using Fixed = boost::multiprecision::number<
-    boost::multiprecision::cpp_int_backend<1024, 1024, boost::multiprecision::signed_magnitude,
-                                           boost::multiprecision::unchecked, void>,
-    boost::multiprecision::et_off>;
-inline constexpr int fixed_coordinate_bits = 150;
-inline constexpr int fixed_time_bits = 128;
-
-// Of any size: for coordinates that spread over more bits, and for greatest common divisors.
 using Big = boost::multiprecision::number<boost::multiprecision::cpp_int_backend<>, boost::multiprecision::et_off>;
 
-template <class Z>
-int sign(const Z& z) {
-  return z.sign();
+inline int sign(const Big& x) { return x.sign(); }
+
+template <int More>
+Big shifted(const Big& x, int bits) {
+  return x << bits;
 }
 
-// The exponents of the lowest and the highest bit in use among finite doubles (zeros apart).
+inline double magnitude_of(const Big& x, int& exponent) {
+  exponent = 0;
+  if (x.is_zero()) return 0;
+  const Big y = abs(x);
+  const int excess = std::max(0, static_cast<int>(boost::multiprecision::msb(y)) - 63);
+  const double fraction = std::frexp(static_cast<double>(static_cast<std::uint64_t>(y >> excess)), &exponent);
+  exponent += excess;
+  return fraction;
+}
+
+// What a template needs to know of the integer type of its coordinates.
+template <class Z>
+struct Widths;
+template <int N>
+struct Widths<Integer<N>> {
+  // A quadratic's coefficients have at most 2 b + 7 bits, a cubic's 3 b + 10 (query.h); all that is computed from them
+  // fits its type if b is at most this.
+  static constexpr int coordinate_bits = 64 * N - 4;
+  static constexpr bool any_size = false;
+  template <int More>
+  using Plus = Integer<N + More>;
+  using Time = Integer<1>;
+};
+template <>
+struct Widths<Big> {
+  static constexpr bool any_size = true;
+  template <int More>
+  using Plus = Big;
+  using Time = Big;
+};
+template <class Z, int More>
+using Plus = typename Widths<Z>::template Plus<More>;  // with room for `More` limbs more
+template <class Z>
+using Time = typename Widths<Z>::Time;  // of a numerator of a dyadic time
+
+// A finite double as mantissa * 2^exponent, an odd mantissa or zero.
+struct OddMantissa {
+  std::int64_t mantissa = 0;
+  int exponent = 0;
+  OddMantissa() = default;
+  explicit OddMantissa(double x) {
+    const auto bits = std::bit_cast<std::uint64_t>(x);
+    const int field = static_cast<int>(bits >> 52 & 0x7ff);
+    std::uint64_t m = bits & ((std::uint64_t{1} << 52) - 1);
+    if (field) m |= std::uint64_t{1} << 52;
+    if (!m) return;
+    const int zeros = std::countr_zero(m);
+    exponent = std::max(field, 1) - 1075 + zeros;
+    mantissa = static_cast<std::int64_t>(m >> zeros);
+    if (bits >> 63) mantissa = -mantissa;
+  }
+};
+
+// The exponents of the lowest and the highest bit in use among doubles (zeros apart).
 struct BitRange {
   int low = 4096, high = -4096;
-  void include(double x) {
-    if (x == 0) return;
-    int e;
-    const double fraction = std::frexp(x, &e);
-    auto mantissa = static_cast<std::int64_t>(std::ldexp(std::fabs(fraction), 53));
-    low = std::min(low, e - 53 + __builtin_ctzll(static_cast<unsigned long long>(mantissa)));
-    high = std::max(high, e);
+  void include(const OddMantissa& x) {
+    if (!x.mantissa) return;
+    low = std::min(low, x.exponent);
+    high = std::max(high, x.exponent + 64 - std::countl_zero(static_cast<std::uint64_t>(std::abs(x.mantissa))));
   }
   int bits() const { return high > low ? high - low : 1; }
 };
 
 // x * 2^-low, which must be an integer.
 template <class Z>
-Z scaled_integer(double x, int low) {
-  if (x == 0) return Z(0);
-  int e;
-  const double fraction = std::frexp(x, &e);
-  auto mantissa = static_cast<std::int64_t>(std::ldexp(fraction, 53));
-  const int shift = e - 53 - low;
-  if (shift >= 0) return Z(mantissa) << shift;
-  return Z(mantissa / (std::int64_t{1} << -shift));  // the bits dropped are zero
+Z scaled_integer(const OddMantissa& x, int low) {
+  return x.mantissa ? Z(shifted<0>(Z(x.mantissa), x.exponent - low)) : Z(0);
 }
 
 }  // namespace hpccd::exact

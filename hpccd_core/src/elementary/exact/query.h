@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: Apache-2.0
+// All polynomials whose signs decide whether the features touch at a time at which f = p . (a x b) vanishes.
+//
+// Bits, for coordinates of b bits: a difference's coefficients have b + 1 and b + 2, a cross product's 2 b + 3, 2 b + 5
+// and 2 b + 5, sums of three of them at most 2 b + 7; f's at most 3 b + 10.
+#pragma once
+
+#include "elementary/exact/polynomial.h"
+#include "elementary/motion.h"
+
+namespace hpccd::exact {
+
+template <class Z>
+using Coordinates = std::array<Polynomial<Z, 1>, 3>;  // a vector that moves: one polynomial a coordinate
+
+template <class Z>
+Coordinates<Z> operator-(const Coordinates<Z>& a, const Coordinates<Z>& b) {
+  return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
+}
+template <class Z>
+Coordinates<Z> operator+(const Coordinates<Z>& a, const Coordinates<Z>& b) {
+  return {a[0] + b[0], a[1] + b[1], a[2] + b[2]};
+}
+// Coordinate k of a x b.
+template <class Z>
+auto cross(const Coordinates<Z>& a, const Coordinates<Z>& b, int k) {
+  const int i = (k + 1) % 3, j = (k + 2) % 3;
+  return a[i] * b[j] - a[j] * b[i];
+}
+template <class Z, class V>
+auto dot(const Coordinates<Z>& a, const V& b) {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+// Each axis of the points may have a scale of its own: no sign below notices.
+template <class Z>
+struct Query {
+  using Square = decltype(Z() * Z());
+  using Quadratic = Polynomial<Square, 2>;
+  using Cubic = Polynomial<decltype(Z() * Square()), 3>;
+
+  Kind kind;
+  Coordinates<Z> p, a, b;  // as in motion.h
+  std::array<Quadratic, 3> n;
+  Cubic f;
+
+  Query(Kind kind_, const Coordinates<Z> q[4]) : kind(kind_) {
+    if (kind == Kind::vertex_face) {
+      p = q[0] - q[1], a = q[2] - q[1], b = q[3] - q[1];
+    } else {
+      p = q[2] - q[0], a = q[1] - q[0], b = q[3] - q[2];
+    }
+    for (int k = 0; k < 3; ++k) n[k] = cross(a, b, k);
+    f = dot(p, n);
+  }
+
+  // The features touch where all conditions of a coordinate k, times the sign of n_k, are at least 0: alpha n and so
+  // on.
+  template <class Visit>
+  void conditions(int k, Visit&& visit) const {
+    const Quadratic pb = cross(p, b, k), ap = cross(a, p, k);
+    if (kind == Kind::vertex_face)
+      (void)(visit(pb) && visit(ap) && visit(n[k] - pb - ap));
+    else
+      (void)(visit(pb) && visit(n[k] - pb) && visit(cross(p, a, k)) && visit(n[k] + ap));
+  }
+
+  // Where n vanishes the triangle is the union of its edges, and two segments are parallel or points: they touch where
+  // a point lies on a segment. The vectors from a segment's ends to the point.
+  struct PointOnSegment {
+    Coordinates<Z> from_start, from_end;
+  };
+  int n_degenerate() const { return kind == Kind::vertex_face ? 3 : 4; }
+  PointOnSegment degenerate(int i) const {
+    if (kind == Kind::vertex_face) {
+      if (i == 0) return {p, p - a};
+      if (i == 1) return {p, p - b};
+      return {p - a, p - b};
+    }
+    if (i == 0) return {p, p + b};          // a0 on b, both vectors turned round
+    if (i == 1) return {a - p, a - p - b};  // a1 on b
+    return i == 2 ? PointOnSegment{p, p - a} : PointOnSegment{p + b, p + b - a};
+  }
+};
+
+// sign_of(q) tells the sign of a polynomial at the time in question.
+template <class Z, class Sign>
+bool touches(const Query<Z>& q, Sign&& sign_of) {
+  for (int k = 0; k < 3; ++k) {
+    const int s = sign_of(q.n[k]);
+    if (s == 0) continue;
+    bool inside = true;
+    q.conditions(k, [&](const auto& c) { return inside = sign_of(c) * s >= 0; });
+    return inside;
+  }
+  for (int i = 0; i < q.n_degenerate(); ++i) {
+    const auto d = q.degenerate(i);
+    bool on_line = true;
+    for (int k = 0; k < 3 && on_line; ++k) on_line = sign_of(cross(d.from_start, d.from_end, k)) == 0;
+    // Between the ends, ends included; for a segment that is a point: at that point.
+    if (on_line && sign_of(dot(d.from_start, d.from_end)) <= 0) return true;
+  }
+  return false;
+}
+
+// Coplanar throughout: whether they touch can only change where one of these polynomials vanishes, and the set of
+// times at which they do is closed, so the earliest is 0 or one of their roots.
+template <class Z, class Visit>
+void for_event_polynomials(const Query<Z>& q, Visit&& visit) {
+  for (int k = 0; k < 3; ++k) {
+    visit(q.n[k]);
+    q.conditions(k, [&](const auto& c) { return visit(c), true; });
+  }
+  for (int i = 0; i < q.n_degenerate(); ++i) {
+    const auto d = q.degenerate(i);
+    visit(dot(d.from_start, d.from_end));
+  }
+}
+
+}  // namespace hpccd::exact

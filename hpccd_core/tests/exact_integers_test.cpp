@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: Apache-2.0
+// Integers of fixed size against those of any size: on the widest coordinates that each size takes, nothing overflows.
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "elementary/exact/earliest.h"
+
+namespace hpccd::exact {
+namespace {
+
+using Numbers = std::array<std::int64_t, 24>;  // 4 points at t = 0, then at t = 1
+
+// Magnitudes below 2^60 that reach the limit, with many equal ones, so that contacts and degeneracies are common.
+Numbers wide_numbers(std::mt19937_64& random) {
+  constexpr std::int64_t limit = (std::int64_t{1} << 60) - 1;
+  const std::int64_t values[] = {limit,
+                                 -limit,
+                                 limit / 2 + 1,
+                                 -(limit / 2 + 1),
+                                 0,
+                                 1,
+                                 static_cast<std::int64_t>(random() % limit),
+                                 -static_cast<std::int64_t>(random() % limit)};
+  const std::size_t few = random() % 3 ? 8 : 5;
+  Numbers numbers;
+  for (auto& x : numbers) x = values[random() % few];
+  return numbers;
+}
+
+template <class Z>
+Z widened(std::int64_t x, int bits) {
+  return Z(shifted<0>(Z(x), bits));
+}
+
+template <class Z>
+Answer answer(Kind kind, const Numbers& numbers, int bits) {
+  Coordinates<Z> points[4];
+  for (int i = 0; i < 4; ++i)
+    for (int k = 0; k < 3; ++k) {
+      const Z z0 = widened<Z>(numbers[3 * i + k], bits), z1 = widened<Z>(numbers[12 + 3 * i + k], bits);
+      // The lowest bits in use too, where there is room below.
+      const Z low(bits ? numbers[3 * i + k] >> 8 : 0);
+      points[i][k] = {{z0 + low, z1 - z0}};
+    }
+  return earliest(Query<Z>(kind, points));
+}
+
+template <class Z>
+void expect_same_as_big(int bits) {
+  std::mt19937_64 random(7);
+  int contacts = 0, decided = 0;
+  constexpr int n = 20000;
+  for (int i = 0; i < n; ++i) {
+    const Numbers numbers = wide_numbers(random);
+    const Kind kind = i % 2 ? Kind::vertex_face : Kind::edge_edge;
+    const Answer fixed = answer<Z>(kind, numbers, bits), big = answer<Big>(kind, numbers, bits);
+    ASSERT_TRUE(big.decided);
+    if (!fixed.decided) continue;
+    ++decided;
+    contacts += fixed.toc.has_value();
+    ASSERT_EQ(fixed.toc, big.toc) << "query " << i;
+  }
+  EXPECT_GT(contacts, n / 10);
+  EXPECT_GT(decided, n * 9 / 10);
+}
+
+TEST(ExactIntegers, OneLimbAgreesWithAnySize) { expect_same_as_big<Integer<1>>(0); }
+TEST(ExactIntegers, TwoLimbsAgreeWithAnySize) { expect_same_as_big<Integer<2>>(64); }
+
+TEST(ExactIntegers, ProductsAndShiftsAreThoseOfAnySize) {
+  std::mt19937_64 random(3);
+  const auto big = [](const auto& x) {
+    Big y = 0;
+    for (std::size_t i = x.limbs.size(); i-- > 0;) y = (y << 64) + x.limbs[i];
+    return x.negative() ? Big(y - (Big(1) << 64 * static_cast<int>(x.limbs.size()))) : y;
+  };
+  for (int i = 0; i < 1000; ++i) {
+    Integer<3> a;
+    Integer<2> b;
+    const std::uint64_t patterns[] = {0, ~std::uint64_t{0}, std::uint64_t{1} << 63, random()};
+    for (auto& limb : a.limbs) limb = patterns[random() % 4];
+    for (auto& limb : b.limbs) limb = patterns[random() % 4];
+    EXPECT_EQ(big(a * b), big(a) * big(b));
+    EXPECT_EQ(sign(a), sign(big(a)));
+    const int bits = static_cast<int>(random() % 128);
+    EXPECT_EQ(big(shifted<2>(a, bits)), Big(big(a) << bits));
+    int e, e_big;
+    const double m = magnitude_of(a, e), m_big = magnitude_of(big(a), e_big);
+    EXPECT_NEAR(std::ldexp(m, e - e_big), m_big, 1e-15);
+  }
+}
+
+}  // namespace
+}  // namespace hpccd::exact
