@@ -207,7 +207,6 @@ struct Detector::Impl {
         stats[kind + "_undecided"] += c.undecided;
         const LastResortCounts& last = w.last_resorts[k];
         stats[kind + "_by_tolerance"] += last.tolerance;
-        stats[kind + "_by_106_bits"] += last.extended;
         stats[kind + "_by_integers"] += last.integers;
         stats[kind + "_by_inclusion"] += last.inclusion;
       }

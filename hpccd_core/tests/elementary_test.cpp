@@ -7,6 +7,7 @@
 
 #include "elementary/batch.h"
 #include "elementary/exact/contact.h"
+#include "elementary/extended.h"
 #include "elementary/inclusion.h"
 #include "hpccd/hpccd.h"
 
@@ -40,13 +41,19 @@ std::vector<Query> random_queries(std::size_t n, bool lattice) {
   return queries;
 }
 
-std::optional<double> exact_answer(Kind kind, const Query& q) {
+struct Points {
   Vec3<double> t0[4], t1[4];
-  for (int i = 0; i < 4; ++i) {
-    t0[i] = {q[3 * i], q[3 * i + 1], q[3 * i + 2]};
-    t1[i] = {q[12 + 3 * i], q[13 + 3 * i], q[14 + 3 * i]};
+  explicit Points(const Query& q) {
+    for (int i = 0; i < 4; ++i) {
+      t0[i] = {q[3 * i], q[3 * i + 1], q[3 * i + 2]};
+      t1[i] = {q[12 + 3 * i], q[13 + 3 * i], q[14 + 3 * i]};
+    }
   }
-  return exact::earliest_contact(kind, t0, t1);
+};
+
+std::optional<double> exact_answer(Kind kind, const Query& q) {
+  const Points points(q);
+  return exact::earliest_contact(kind, points.t0, points.t1);
 }
 
 class Elementary : public ::testing::TestWithParam<std::tuple<Kind, bool>> {
@@ -69,6 +76,25 @@ TEST_P(Elementary, FiltersAgreeWithIntegerArithmetic) {
     }
   }
   EXPECT_GT(contacts, 100);
+}
+
+// What a device decides with 106 bits, the CPU decides with integers: the hash of all contacts must be the same.
+TEST_P(Elementary, HundredAndSixBitsAnswerAsIntegersOrNotAtAll) {
+  int contacts = 0, none = 0;
+  for (const Query& q : queries()) {
+    const Points points(q);
+    const auto a = kind() == Kind::vertex_face ? extended::decide<Kind::vertex_face>(points.t0, points.t1)
+                                               : extended::decide<Kind::edge_edge>(points.t0, points.t1);
+    contacts += a.contact, none += a.none;
+    if (!a.contact && !a.none) continue;
+    const auto truth = exact_answer(kind(), q);
+    ASSERT_EQ(a.contact, truth.has_value());
+    if (truth) {
+      ASSERT_EQ(a.toc, *truth);
+    }
+  }
+  EXPECT_GT(contacts, 100);
+  EXPECT_GT(none, 1000);
 }
 
 TEST_P(Elementary, ConservativeIsNeverLate) {

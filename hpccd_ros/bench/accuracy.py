@@ -22,8 +22,7 @@ BACKENDS = ("cpu", "hybrid", "gpu")
 # Stats of the core by who decided, in the order in which a pair meets them.
 DECIDED = {
     "slabs": "rejected_slabs", "coplanarity": "rejected_coplanarity", "projection": "rejected_projection",
-    "roots": "rejected_roots", "proven": "proven_contacts", "tolerance": "by_tolerance", "106 bits": "by_106_bits",
-    "integers": "by_integers",
+    "roots": "rejected_roots", "proven": "proven_contacts", "tolerance": "by_tolerance", "integers": "by_integers",
 }  # fmt: skip
 
 

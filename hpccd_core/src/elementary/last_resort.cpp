@@ -4,7 +4,6 @@
 #include "elementary/batch.h"
 #include "elementary/beyond.h"
 #include "elementary/exact/contact.h"
-#include "elementary/extended.h"
 #include "elementary/tolerant.h"
 
 namespace hpccd {
@@ -17,17 +16,6 @@ std::optional<double> tolerant_contact(Points q_t0, Points q_t1) {
   const tolerant::Answer a = tolerant::contact<kind>(q_t0, q_t1);
   if (!a.contact) return std::nullopt;
   return a.toc;
-}
-
-// 106 bits first: they decide nearly all that double precision does not, several times faster, and to the same bits.
-template <Kind kind>
-std::optional<double> exact_contact(Points q_t0, Points q_t1, LastResortCounts& counts) {
-  const extended::Answer a = extended::decide<kind>(q_t0, q_t1);
-  counts.extended += a.contact || a.none;
-  if (a.contact) return a.toc;
-  if (a.none) return std::nullopt;
-  ++counts.integers;
-  return exact::earliest_contact(kind, q_t0, q_t1);
 }
 
 template <Kind kind>
@@ -47,9 +35,10 @@ std::optional<double> last_resort(Accuracy accuracy, const inclusion::Limits& li
     return kind == Kind::vertex_face ? within_separation<Kind::vertex_face>(limits, q_t0, q_t1, counts)
                                      : within_separation<Kind::edge_edge>(limits, q_t0, q_t1, counts);
   // Without a separation the exact answer is conservative too, and cheaper than a search that has to give up somewhere.
-  if (accuracy == Accuracy::conservative || accuracy == Accuracy::exact)
-    return kind == Kind::vertex_face ? exact_contact<Kind::vertex_face>(q_t0, q_t1, counts)
-                                     : exact_contact<Kind::edge_edge>(q_t0, q_t1, counts);
+  if (accuracy == Accuracy::conservative || accuracy == Accuracy::exact) {
+    ++counts.integers;
+    return exact::earliest_contact(kind, q_t0, q_t1);
+  }
   ++counts.tolerance;
   return kind == Kind::vertex_face ? tolerant_contact<Kind::vertex_face>(q_t0, q_t1)
                                    : tolerant_contact<Kind::edge_edge>(q_t0, q_t1);

@@ -14,7 +14,6 @@ namespace hpccd {
 // Who decided, at the end.
 struct LastResortCounts {
   std::uint64_t tolerance = 0;  // "balanced", "fast": double precision with a tolerance
-  std::uint64_t extended = 0;   // 106 bits
   std::uint64_t integers = 0;   // exact arithmetic
   std::uint64_t inclusion = 0;  // "conservative" with a separation: the search
 };

@@ -123,7 +123,8 @@ Contacts Frames::frame(Positions t0, Positions t1, const Build& build, Profiler&
   if (!undecided.empty() || options_.points || options_.normals) h0 = on_host(t0, 0), h1 = on_host(t1, 1);
   exact_[0].clear(), exact_[1].clear();
   std::vector<std::optional<double>> toc(undecided.size());
-  parallel_for(pool_, undecided.size(), 1, [&](std::size_t begin, std::size_t end, int) {
+  constexpr std::size_t pairs_a_piece = 8;  // about 10 us, as long as it takes to wake a thread
+  parallel_for(pool_, undecided.size(), pairs_a_piece, [&](std::size_t begin, std::size_t end, int) {
     for (std::size_t i = begin; i < end; ++i) {
       const Undecided& u = undecided[i];
       std::uint32_t v[4];
