@@ -169,10 +169,12 @@ def test_stream_goes_on_while_requests_are_computed(node):
     node.peer.topology("cloth", FACES, N * N)
     clients = [node.peer.client() for _ in range(2)]
     futures = [client.call_async(request(2, n=LARGE)) for client in clients]
+    under_way = []
     for k in range(5):
         node.peer.vertices("cloth", sheet_positions(N, k), k)
         node.contacts(k)
-    assert not all(f.done() for f in futures), "the steps of the stream did not wait for the requests"
+        under_way.append(k > 0 and not all(f.done() for f in futures))
+    assert any(under_way), "the steps of the stream waited for the requests"
     node.wait_until(lambda: all(f.done() for f in futures), "answers")
     assert all(f.result().success for f in futures)
     for k, message in enumerate(node.contacts(4), start=1):
