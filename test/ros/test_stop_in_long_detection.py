@@ -6,37 +6,47 @@ import signal
 import threading
 import time
 
+import numpy as np
 import pytest
-from test_node_service import request
+from hpccd.srv import Detect
 from waving_sheet import scene_of, sheet_faces, sheet_positions
 
 import hpccd_core as hc
+from hpccd_ros import convert
 from hpccd_ros.mcap_recover import examine
 
-# A million contacts, nearly all degenerate, on one thread: tens of seconds of exact arithmetic.
-N = 300
-STEP = (2, 3)
-ALONE = {"meshes": ["cloth"], "threads": 1, "accuracy": "exact"}
+# Two sheets that lie on each other and move as one: millions of contacts, most of them degenerate, on one thread.
+N, MESHES = 260, ("a", "b")
+START, END = (sheet_positions(N, k) for k in (2, 3))
+ALONE = {"meshes": list(MESHES), "threads": 1, "accuracy": "exact"}
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=["SIGINT", "SIGTERM"])
 def test_of_the_stream(start_node, tmp_path, number):
     own = tmp_path / "own.mcap"
     node = start_node({**ALONE, "record": str(own)})
-    node.peer.topology("cloth", sheet_faces(N), N * N)
-    node.peer.vertices("cloth", sheet_positions(N, STEP[0]), stamp=0)
-    node.frames_status(answered=1)
-    node.peer.vertices("cloth", sheet_positions(N, STEP[1]), stamp=1)
-    node.frames_status(received=2, waiting=1)
+    for mesh in MESHES:
+        node.peer.topology(mesh, sheet_faces(N), N * N)
+    for stamp, positions in enumerate((START, END)):
+        for mesh in MESHES:
+            node.peer.vertices(mesh, positions, stamp)
+        node.frames_status(received=2 * stamp + 2, answered=2, waiting=2 * stamp)
     assert node.stop(number) == 0, node.output()
-    counts = {topic.rpartition("/")[2]: count for topic, count in examine(own).counts.items()}
-    assert counts == {"topology": 1, "vertices": 2}, "it did not wait for the answer"
+    counts = {topic.partition("/meshes/")[2] or topic: count for topic, count in examine(own).counts.items()}
+    assert counts == {f"{mesh}/{kind}": n for mesh in MESHES for kind, n in (("topology", 1), ("vertices", 2))}, (
+        "it did not wait for the answer"
+    )
     assert "Traceback" not in node.output()
 
 
 def test_of_a_request(start_node):
     node = start_node({**ALONE, "detect_time_limit": 600.0})
-    reply = node.peer.client().call_async(request(STEP[0], n=N))
+    request = Detect.Request(mesh_names=MESHES)
+    for _ in MESHES:
+        request.topologies.append(convert.topology_message(sheet_faces(N), N * N))
+        request.start.append(convert.vertices_message(START, 0))
+        request.end.append(convert.vertices_message(END, 1))
+    reply = node.peer.client().call_async(request)
     node.wait_until(lambda: node.peer.statuses["service"][2]["open"] == "1", "request under way")
     before = cpu_of_ended_children()
     assert node.stop() == 0, node.output()
@@ -53,20 +63,22 @@ def cpu_of_ended_children():
 
 def step_needs_more_than(seconds):
     """Whether the step, computed here, is still under way after so many seconds of a core."""
-    detector = hc.Detector(scene_of(cloth=sheet_faces(N)), threads=1, accuracy="exact")
-    under_way = threading.Thread(target=lambda: given_up.append(not finishes(detector)))
-    given_up, begin = [], time.process_time()
+    scene = scene_of(**{mesh: sheet_faces(N) for mesh in MESHES})
+    detector = hc.Detector(scene, threads=1, accuracy="exact")
+    given_up = []
+
+    def detect():
+        try:
+            detector.detect(*(np.concatenate([positions] * len(MESHES)) for positions in (START, END)))
+            given_up.append(False)
+        except hc.Cancelled:
+            given_up.append(True)
+
+    begin = time.process_time()
+    under_way = threading.Thread(target=detect)
     under_way.start()
     while under_way.is_alive() and time.process_time() - begin < seconds:
         time.sleep(0.05)
     detector.cancel()
     under_way.join()
-    return given_up[0]
-
-
-def finishes(detector):
-    try:
-        detector.detect(*(sheet_positions(N, k) for k in STEP))
-    except hc.Cancelled:
-        return False
-    return True
+    return given_up == [True]
