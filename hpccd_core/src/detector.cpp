@@ -172,9 +172,10 @@ struct Detector::Impl {
     search.batch_test[static_cast<int>(Accuracy::fast)] =
         batch_test(options.simd, devices ? Accuracy::balanced : Accuracy::fast);
     if (engine) {
-      engine->update(motion.boxes, profiler);
-      if (devices) hybrid->traverse_carriers(motion.boxes, workers);
-      engine->traverse(motion.boxes, search, workers);
+      motion.sweep(pool);
+      engine->update(motion.swept, profiler);
+      if (devices) hybrid->traverse_carriers(motion.swept, workers);
+      engine->traverse(motion.swept, search, workers);
     } else {
       update_tree(tree_followed);
       tree_fits_motion = true;

@@ -30,12 +30,13 @@ struct PaperTest : testing::Test {
   void take(int step) {
     const auto start = test::swarm_positions(2 * step), end = test::swarm_positions(2 * step + 1);
     motion.take(test::view(start), test::view(end), 0, pool);
+    motion.sweep(pool);
   }
 
   Box box_of(std::uint32_t carrier) const {
-    if (carrier >= features.n_faces()) return motion.boxes[features.lone_vertices[carrier - features.n_faces()]];
+    if (carrier >= features.n_faces()) return motion.swept[features.lone_vertices[carrier - features.n_faces()]];
     Box b;
-    for (std::uint32_t v : features.faces[carrier]) b.include(motion.boxes[v]);
+    for (std::uint32_t v : features.faces[carrier]) b.include(motion.swept[v]);
     return b;
   }
 

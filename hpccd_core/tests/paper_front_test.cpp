@@ -18,13 +18,13 @@ struct FrontTest : PaperTest {
 
   void SetUp() override {
     take(0);
-    build(h, features, motion.boxes, pool);
+    build(h, features, motion.swept, pool);
     ancestry = Ancestry(h);
     for (int a = 0; a < 4; ++a) search.batch_test[a] = batch_test(Simd::scalar, static_cast<Accuracy>(a));
     search.report = Report::all;
   }
 
-  Scenery scenery() const { return {h, features, rules, motion.boxes}; }
+  Scenery scenery() const { return {h, features, rules, motion.swept}; }
 
   std::vector<FrontSegment> update(const std::vector<FrontSegment>& front) {
     search.geometry = {motion.rows.data(), features.edges.data(), features.faces.data(), motion.slabs.data(),
@@ -71,7 +71,7 @@ TEST_F(FrontTest, AKeptFrontIsTheFrontOfATraversalFromTheRoot) {
   std::vector<FrontSegment> front{{{0, 0}}};
   for (int step = 0; step < 10; ++step) {
     take(step);
-    refit(h, features, motion.boxes, pool);
+    refit(h, features, motion.swept, pool);
     // Cut into pieces of all sizes, so that runs of pairs that climb to one are cut as well.
     std::vector<FrontSegment> cut;
     std::size_t length = 1;

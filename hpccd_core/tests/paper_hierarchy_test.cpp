@@ -11,7 +11,7 @@ struct HierarchyTest : PaperTest {
   Hierarchy h;
   void SetUp() override {
     take(0);
-    build(h, features, motion.boxes, pool);
+    build(h, features, motion.swept, pool);
   }
 };
 
@@ -24,7 +24,7 @@ TEST_F(HierarchyTest, SameOnAnyNumberOfThreads) {
   for (int threads : {1, 2, 7}) {
     ThreadPool other_pool(threads);
     Hierarchy other;
-    build(other, features, motion.boxes, other_pool);
+    build(other, features, motion.swept, other_pool);
     EXPECT_EQ(other.order, h.order);
   }
 }
@@ -32,25 +32,25 @@ TEST_F(HierarchyTest, SameOnAnyNumberOfThreads) {
 TEST_F(HierarchyTest, RefitBoundsTheNewStep) {
   for (int step : {1, 5, 9}) {
     take(step);
-    refit(h, features, motion.boxes, pool);
+    refit(h, features, motion.swept, pool);
     expect_valid(h);
   }
 }
 
 TEST_F(HierarchyTest, RefitStopsAtNodesThatAreNotSplit) {
   take(5);
-  bound_carriers(h, features, motion.boxes, pool);
+  bound_carriers(h, features, motion.swept, pool);
   const NodeIndex n = h.right(Hierarchy::left(0));
   h.split(n, features);  // the nodes below its children hold what they held before
   ASSERT_FALSE(h.nodes[Hierarchy::left(n)].is_split);
   take(6);
-  refit(h, features, motion.boxes, pool);
+  refit(h, features, motion.swept, pool);
   expect_valid(h);
 }
 
 TEST_F(HierarchyTest, SplittingTouchesTheSubtreeOnly) {
   take(5);
-  refit(h, features, motion.boxes, pool);
+  refit(h, features, motion.swept, pool);
   NodeIndex n = 0;
   while (h.nodes[n].mesh == mixed_meshes) n = h.right(n);
   ASSERT_GT(h.nodes[n].count, 50u);

@@ -21,7 +21,7 @@ TEST_F(UpkeepTest, RestructuringWhatATraversalReachesKeepsTheHierarchyValid) {
   Upkeep upkeep(features, true);
   for (int step = 0; step < 12; ++step) {
     take(step);
-    upkeep.begin_step(motion.boxes, pool, profiler);
+    upkeep.begin_step(motion.swept, pool, profiler);
     expect_valid(upkeep.hierarchy());
     // Another half of the hierarchy in each step: the other stays as it is, split or not.
     upkeep.examine(0, counts);
@@ -39,7 +39,7 @@ TEST_F(UpkeepTest, ARestructuredNodeHasChildrenThatAreSplitWhenNeeded) {
   const Hierarchy& h = upkeep.hierarchy();
   for (int step = 0; step < 12; ++step) {
     take(step);
-    upkeep.begin_step(motion.boxes, pool, profiler);
+    upkeep.begin_step(motion.swept, pool, profiler);
     examine_below(h, 0, [&](NodeIndex n) {
       const UpkeepCounts before = counts;
       upkeep.examine(n, counts);
@@ -56,7 +56,7 @@ TEST_F(UpkeepTest, ANodeIsExaminedOnceAStep) {
   Upkeep upkeep(features, true);
   for (int step = 0; step < 12; ++step) {
     take(step);
-    upkeep.begin_step(motion.boxes, pool, profiler);
+    upkeep.begin_step(motion.swept, pool, profiler);
     const auto all = [&] { examine_below(upkeep.hierarchy(), 0, [&](NodeIndex n) { upkeep.examine(n, counts); }); };
     all();
     const std::vector<std::uint32_t> order = upkeep.hierarchy().order;
@@ -72,12 +72,12 @@ TEST_F(UpkeepTest, ANodeIsExaminedOnceAStep) {
 TEST_F(UpkeepTest, WithoutRestructuringTheOrderStays) {
   Upkeep upkeep(features, false);
   take(0);
-  upkeep.begin_step(motion.boxes, pool, profiler);
+  upkeep.begin_step(motion.swept, pool, profiler);
   upkeep.end_step();
   const std::vector<std::uint32_t> order = upkeep.hierarchy().order;
   for (int step = 1; step < 12; ++step) {
     take(step);
-    upkeep.begin_step(motion.boxes, pool, profiler);
+    upkeep.begin_step(motion.swept, pool, profiler);
     examine_below(upkeep.hierarchy(), 0, [&](NodeIndex n) { upkeep.examine(n, counts); });
     upkeep.end_step();
   }
@@ -91,7 +91,7 @@ TEST_F(UpkeepTest, RestructuringMendsTheCulling) {
     Upkeep upkeep(features, restructure);
     for (int step = 0; step < 12; ++step) {
       take(step);
-      upkeep.begin_step(motion.boxes, pool, profiler);
+      upkeep.begin_step(motion.swept, pool, profiler);
       examine_below(upkeep.hierarchy(), 0, [&](NodeIndex n) { upkeep.examine(n, counts); });
       upkeep.end_step();
     }
@@ -105,10 +105,10 @@ TEST_F(UpkeepTest, RestructuringMendsTheCulling) {
 TEST_F(UpkeepTest, AnInterruptedStepIsFollowedByANewHierarchy) {
   Upkeep upkeep(features, true);
   take(0);
-  upkeep.begin_step(motion.boxes, pool, profiler);  // no end_step
+  upkeep.begin_step(motion.swept, pool, profiler);  // no end_step
   Profiler next;
   next.begin();
-  upkeep.begin_step(motion.boxes, pool, next);
+  upkeep.begin_step(motion.swept, pool, next);
   EXPECT_TRUE(next.stages().contains("build"));
   expect_valid(upkeep.hierarchy());
 }
@@ -119,7 +119,7 @@ TEST_F(UpkeepTest, ThreadsThatMeetAtNodesSeeOneHierarchy) {
   std::uint64_t restructured = 0;
   for (int step = 0; step < 12; ++step) {
     take(step);
-    upkeep.begin_step(motion.boxes, pool, profiler);
+    upkeep.begin_step(motion.swept, pool, profiler);
     std::vector<UpkeepCounts> counts_of(static_cast<std::size_t>(pool.size()));
     std::vector<std::uint64_t> visited(counts_of.size());
     pool.run([&](int thread) {

@@ -19,6 +19,10 @@ bool contains(const Box& outer, const Box& inner) {
   return true;
 }
 
+bool contains(const MotionBox& outer, const MotionBox& inner) {
+  return contains(outer.t0, inner.t0) && contains(outer.t1, inner.t1);
+}
+
 struct TreeTest : testing::Test {
   std::shared_ptr<const Scene> scene = test::two_sheets(side, lone);
   Features features = features_of(*scene);

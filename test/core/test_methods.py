@@ -113,7 +113,8 @@ def test_published_scenes(data_folder, name):
             detector.detect(step[0], step[0])  # a step without motion leaves a hierarchy, and a front, to be updated
             assert_same(detector.detect(*step), expected)
             for count in ("vf_candidates", "ee_candidates"):
-                assert detector.stats[count] == default.stats[count]
+                # Theirs are boxes of the whole sweep.
+                assert detector.stats[count] > default.stats[count]
 
 
 def test_profile_and_stats_tell_of_the_method():

@@ -37,11 +37,15 @@ void split(const std::vector<Centroid>& centroids, std::uint32_t* order, std::ui
   });
 }
 
-Centroid centroid_of(const Box& b) { return {{b.low[0] + b.high[0], b.low[1] + b.high[1], b.low[2] + b.high[2]}}; }
+Centroid centroid_of(const MotionBox& b) {
+  Centroid c;
+  for (int k = 0; k < 3; ++k) c.x[k] = (b.t0.low[k] + b.t0.high[k]) + (b.t1.low[k] + b.t1.high[k]);
+  return c;
+}
 
 class Builder {
  public:
-  Builder(Tree& tree, const Scene& scene, const Features& features, const std::vector<Box>& vertex_boxes,
+  Builder(Tree& tree, const Scene& scene, const Features& features, const std::vector<MotionBox>& vertex_boxes,
           ThreadPool& pool)
       : tree_(tree), scene_(scene), features_(features), vertex_boxes_(vertex_boxes), pool_(pool) {}
 
@@ -54,9 +58,9 @@ class Builder {
   }
 
  private:
-  Box carrier_box(std::uint32_t c) const {
+  MotionBox carrier_box(std::uint32_t c) const {
     if (c >= features_.n_faces()) return vertex_boxes_[features_.lone_vertices[c - features_.n_faces()]];
-    Box b;
+    MotionBox b;
     for (std::uint32_t v : features_.faces[c]) b.include(vertex_boxes_[v]);
     return b;
   }
@@ -77,7 +81,7 @@ class Builder {
 
   Centroid center_of_mesh(std::uint32_t m) const {
     const Scene::Mesh& mesh = scene_.meshes()[m];
-    Box b;
+    MotionBox b;
     for (std::uint32_t v = mesh.first_vertex; v < mesh.first_vertex + mesh.n_vertices; ++v) b.include(vertex_boxes_[v]);
     return centroid_of(b);
   }
@@ -178,9 +182,8 @@ class Builder {
     tree_.vertex_of_slot.resize(n_vertices);
     for (auto& corner : tree_.face_corners) corner.resize(n_faces);
     for (auto& end : tree_.edge_ends) end.resize(n_edges);
-    tree_.face_boxes.resize(n_faces);
-    tree_.edge_boxes.resize(n_edges);
-    tree_.vertex_boxes.resize(n_vertices);
+    tree_.n_box_groups = n_leaves ? at.end_group() : 0;
+    tree_.box_groups = std::make_unique_for_overwrite<BoxGroup[]>(tree_.n_box_groups);
     parallel_for(pool_, n_leaves, 64, [&](std::size_t begin, std::size_t end, int) {
       for (std::size_t i = begin; i < end; ++i) fill_leaf(i);
     });
@@ -194,8 +197,8 @@ class Builder {
 
   // The slots of a leaf that follows another.
   LeafRange leaf_behind(const LeafRange& before, const Range& r) const {
-    LeafRange leaf{before.end_face, before.end_face,   before.end_edge,
-                   before.end_edge, before.end_vertex, before.end_vertex};
+    LeafRange leaf{before.end_face,   before.end_face,   before.end_edge,   before.end_edge,
+                   before.end_vertex, before.end_vertex, before.end_group()};
     for (std::uint32_t i = r.begin; i < r.end; ++i) {
       const std::uint32_t c = order_[i];
       leaf.end_face += c < features_.n_faces();
@@ -211,8 +214,10 @@ class Builder {
     tree_.leaf_nodes[i] = r.node;
     node.leaf = static_cast<std::uint32_t>(i);
     node.carriers = r.end - r.begin;
-    auto [face, end_face, edge, end_edge, vertex, end_vertex] = tree_.leaves[i];
-    node.only_points = face == end_face;
+    const LeafRange& leaf = tree_.leaves[i];
+    std::uint32_t face = leaf.first_face, edge = leaf.first_edge, vertex = leaf.first_vertex;
+    node.only_points = leaf.n_faces() == 0;
+    std::fill(&tree_.box_groups[leaf.first_group], &tree_.box_groups[leaf.end_group()], BoxGroup{});
     std::sort(order_.begin() + r.begin, order_.begin() + r.end);
     for (std::uint32_t k = r.begin; k < r.end; ++k) {
       const std::uint32_t c = order_[k];
@@ -233,7 +238,7 @@ class Builder {
   Tree& tree_;
   const Scene& scene_;
   const Features& features_;
-  const std::vector<Box>& vertex_boxes_;
+  const std::vector<MotionBox>& vertex_boxes_;
   ThreadPool& pool_;
   std::vector<std::uint32_t> first_of_mesh_, order_;
   std::vector<Centroid> centroids_;
@@ -242,7 +247,7 @@ class Builder {
 
 }  // namespace
 
-void build(Tree& tree, const Scene& scene, const Features& features, const std::vector<Box>& vertex_boxes,
+void build(Tree& tree, const Scene& scene, const Features& features, const std::vector<MotionBox>& vertex_boxes,
            ThreadPool& pool) {
   tree = {};
   Builder(tree, scene, features, vertex_boxes, pool).run();

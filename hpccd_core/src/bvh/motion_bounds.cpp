@@ -44,14 +44,16 @@ template <class Real>
 
 template <class Real>
 void copy_motion(const Real* t0, const Real* t1, const CoordinateMap& map, double margin, std::size_t begin,
-                 std::size_t end, VertexRow* rows, Box* boxes, SlabRow* slabs) {
+                 std::size_t end, VertexRow* rows, MotionBox* boxes, SlabRow* slabs) {
   for (std::size_t i = begin; i < end; ++i) {
     for (int k = 0; k < 3; ++k) {
       const double a = t0[3 * i + k], b = t1[3 * i + k];
       rows[i].t0[k] = a;
       rows[i].t1[k] = b;
-      boxes[i].low[k] = map((a < b ? a : b) - margin, k);
-      boxes[i].high[k] = map((a < b ? b : a) + margin, k);
+      boxes[i].t0.low[k] = map(a - margin, k);
+      boxes[i].t0.high[k] = map(a + margin, k);
+      boxes[i].t1.low[k] = map(b - margin, k);
+      boxes[i].t1.high[k] = map(b + margin, k);
     }
     slabs[i] =
         slab_row({rows[i].t0[0], rows[i].t0[1], rows[i].t0[2]}, {rows[i].t1[0], rows[i].t1[1], rows[i].t1[2]}, map);
@@ -148,9 +150,16 @@ void MotionBounds::take(Positions t0, Positions t1, double separation, ThreadPoo
   take_all(t0, t1, separation, pool);
 }
 
+void MotionBounds::sweep(ThreadPool& pool) {
+  swept.resize(boxes.size());
+  parallel_for(pool, boxes.size(), grain, [&](std::size_t begin, std::size_t end, int) {
+    for (std::size_t i = begin; i < end; ++i) swept[i] = boxes[i].swept();
+  });
+}
+
 std::size_t MotionBounds::bytes() const {
-  return rows.capacity() * sizeof(VertexRow) + boxes.capacity() * sizeof(Box) + slabs.capacity() * sizeof(SlabRow) +
-         statics_.bytes();
+  return rows.capacity() * sizeof(VertexRow) + boxes.capacity() * sizeof(MotionBox) + swept.capacity() * sizeof(Box) +
+         slabs.capacity() * sizeof(SlabRow) + statics_.bytes();
 }
 
 }  // namespace hpccd

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "base/parallel.h"
-#include "bvh/box.h"
 #include "bvh/coordinate_map.h"
+#include "bvh/motion_box.h"
 #include "elementary/batch.h"
 #include "scene/static_meshes.h"
 
@@ -30,17 +30,20 @@ struct Extent {
 
 struct MotionBounds {
   std::vector<VertexRow> rows;
-  std::vector<Box> boxes;
+  std::vector<MotionBox> boxes;
   std::vector<SlabRow> slabs;
   CoordinateMap map;
   // By mesh: its rows and boxes are still those of the call before. Empty: of none.
   std::vector<char> resting;
+  // Boxes of the whole sweep, where a method asks for them.
+  std::vector<Box> swept;
 
-  // Boxes of features that come within `separation` of each other, along each axis, overlap too.
+  // Boxes of features that come within `separation` of each other overlap too.
   // Throws InvalidArgument where a coordinate is not finite or too large, or where a static mesh moves.
   void take(const Scene& scene, Positions vertices_t0, Positions vertices_t1, double separation, ThreadPool& pool);
   // The same for vertices of no scene.
   void take(Positions vertices_t0, Positions vertices_t1, double separation, ThreadPool& pool);
+  void sweep(ThreadPool& pool);
   std::size_t bytes() const;
 
  private:

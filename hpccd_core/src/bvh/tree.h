@@ -3,39 +3,71 @@
 // each, together with the vertices and edges these represent, laid out for tests of many boxes at once.
 #pragma once
 
+#if defined(__SSE2__)
+#include <emmintrin.h>
+#endif
+
 #include <cstdint>
+#include <memory>
 #include <vector>
 
+#include "base/hd.h"
 #include "base/parallel.h"
-#include "bvh/box.h"
+#include "bvh/motion_box.h"
 #include "scene/features.h"
 
 namespace hpccd {
 
 inline constexpr std::uint32_t mixed_meshes = 0xFFFFFFFFu;
 
-struct Node {
-  Box box;
+// One cache line.
+struct alignas(64) Node {
+  MotionBox box;
   std::uint32_t children = 0;  // the left one; the right one follows. 0: a leaf
   std::uint32_t leaf = 0;      // where a leaf: its number
   std::uint32_t mesh = mixed_meshes;
-  std::uint32_t carriers = 0;  // in the whole subtree
-  bool only_points = false;    // no triangle in the whole subtree, so nothing that another such node could touch
-};
+  std::uint32_t carriers : 31 = 0;    // in the whole subtree
+  std::uint32_t only_points : 1 = 0;  // no triangle in the whole subtree, so nothing that another such node could touch
 
-// Boxes of features in the order of the leaves.
-struct BoxArrays {
-  std::vector<float> low[3], high[3];
-  void resize(std::size_t n) {
-    for (int k = 0; k < 3; ++k) low[k].resize(n), high[k].resize(n);
-  }
-  void set(std::size_t i, const Box& b) {
-    for (int k = 0; k < 3; ++k) low[k][i] = b.low[k], high[k][i] = b.high[k];
-  }
+  bool overlaps(const Node& other) const;  // as MotionBox::overlaps
+};
+static_assert(sizeof(Node) == 64);
+
+#if defined(__SSE2__)
+// Four numbers are loaded where three count: the one behind the last bound is `children`.
+inline bool Node::overlaps(const Node& other) const {
+  const auto below = [](const Node& a, const Node& b) {  // a before b at both ends: a bit for each axis
+    const __m128 at_t0 = _mm_cmplt_ps(_mm_loadu_ps(a.box.t0.high), _mm_loadu_ps(b.box.t0.low));
+    return _mm_and_ps(at_t0, _mm_cmplt_ps(_mm_loadu_ps(a.box.t1.high), _mm_loadu_ps(b.box.t1.low)));
+  };
+  return (_mm_movemask_ps(_mm_or_ps(below(*this, other), below(other, *this))) & 7) == 0;
+}
+#else
+inline bool Node::overlaps(const Node& other) const { return box.overlaps(other.box); }
+#endif
+
+// Boxes of up to 16 features of a leaf, a row for each of the twelve bounds: low and high at t = 0, low and high at
+// t = 1, each along x, y, z. Every row is a cache line, and the rows of a group lie together.
+struct alignas(64) BoxGroup {
+  static constexpr std::uint32_t n_rows = 12, width = 16;
+  float rows[n_rows][width];
 };
 
 struct LeafRange {
   std::uint32_t first_face, end_face, first_edge, end_edge, first_vertex, end_vertex;  // slots
+  std::uint32_t first_group = 0;
+
+  HPCCD_HD std::uint32_t n_faces() const { return end_face - first_face; }
+  HPCCD_HD std::uint32_t n_edges() const { return end_edge - first_edge; }
+  HPCCD_HD std::uint32_t n_vertices() const { return end_vertex - first_vertex; }
+  // Groups of boxes: first those of the edges, then those of the faces and, from a lane on that is a multiple of four,
+  // the vertices.
+  HPCCD_HD std::uint32_t first_vertex_lane() const { return (n_faces() + 3) / 4 * 4; }
+  HPCCD_HD std::uint32_t surface_group() const { return first_group + groups_for(n_edges()); }
+  HPCCD_HD std::uint32_t end_group() const { return surface_group() + groups_for(first_vertex_lane() + n_vertices()); }
+
+ private:
+  HPCCD_HD static std::uint32_t groups_for(std::uint32_t n) { return (n + BoxGroup::width - 1) / BoxGroup::width; }
 };
 
 struct Tree {
@@ -51,19 +83,20 @@ struct Tree {
   // Slots: features in the order of the leaves; each array ends with load_width slots of padding.
   std::vector<std::uint32_t> face_of_slot, edge_of_slot, vertex_of_slot;
   std::vector<std::uint32_t> face_corners[3], edge_ends[2];  // vertex numbers by slot
-  BoxArrays face_boxes, edge_boxes, vertex_boxes;
+  std::unique_ptr<BoxGroup[]> box_groups;
+  std::size_t n_box_groups = 0;
   double area_when_built = 0;  // sum over nodes, relative to the root's
 
   std::size_t bytes() const;
 };
 
 // A new tree over the current vertex boxes (bounds of the motion of each vertex).
-void build(Tree& tree, const Scene& scene, const Features& features, const std::vector<Box>& vertex_boxes,
+void build(Tree& tree, const Scene& scene, const Features& features, const std::vector<MotionBox>& vertex_boxes,
            ThreadPool& pool);
 
 // The same tree with new bounds, bottom up (Kim et al. 2009, section 6, parallel BVH update). `resting`: by mesh, true
 // where vertex boxes are as they were at the last call; empty: of none.
-void refit(Tree& tree, const std::vector<Box>& vertex_boxes, const std::vector<char>& resting, ThreadPool& pool);
+void refit(Tree& tree, const std::vector<MotionBox>& vertex_boxes, const std::vector<char>& resting, ThreadPool& pool);
 
 // Sum of the nodes' areas over the root's: what traversal pays grows with it.
 double relative_area(const Tree& tree, ThreadPool& pool);

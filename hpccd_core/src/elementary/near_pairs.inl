@@ -1,49 +1,62 @@
 // SPDX-License-Identifier: Apache-2.0
 // Leaves out the pairs that are apart along a direction of slabs.h. Part of batch.inl.
 
+// Lowest and highest places of some vertices at both ends of their motion.
 #if defined(__AVX512F__)
 
 struct Slabs {
-  __m512 row;
+  __m512 low, high;  // at t = 0, then at t = 1
 };
-HPCCD_HD Slabs slabs_at(const SlabRow* rows, std::uint32_t v) { return {_mm512_load_ps(rows[v].low)}; }
-HPCCD_HD Slabs both(Slabs a, Slabs b) { return {_mm512_min_ps(a.row, b.row)}; }
+HPCCD_HD Slabs slabs_at(const SlabRow* rows, std::uint32_t v) {
+  const __m512 row = _mm512_load_ps(rows[v].t0);
+  return {row, row};
+}
+HPCCD_HD Slabs both(Slabs a, Slabs b) { return {_mm512_min_ps(a.low, b.low), _mm512_max_ps(a.high, b.high)}; }
 HPCCD_HD bool are_apart(Slabs a, Slabs b) {
-  const __m512 gap = _mm512_add_ps(a.row, _mm512_shuffle_f32x4(b.row, b.row, 0x4E));  // halves swapped
-  return _mm512_cmp_ps_mask(gap, _mm512_setzero_ps(), _CMP_GT_OQ) != 0;
+  const unsigned below = _mm512_cmp_ps_mask(a.high, b.low, _CMP_LT_OQ);
+  const unsigned above = _mm512_cmp_ps_mask(b.high, a.low, _CMP_LT_OQ);
+  return ((below & below >> n_slabs) | (above & above >> n_slabs)) != 0;
 }
 
 #elif defined(__AVX2__)
 
 struct Slabs {
-  __m256 low, minus_high;
+  __m256 low[2], high[2];  // at t = 0, at t = 1
 };
 HPCCD_HD Slabs slabs_at(const SlabRow* rows, std::uint32_t v) {
-  return {_mm256_load_ps(rows[v].low), _mm256_load_ps(rows[v].minus_high)};
+  const __m256 t0 = _mm256_load_ps(rows[v].t0), t1 = _mm256_load_ps(rows[v].t1);
+  return {{t0, t1}, {t0, t1}};
 }
 HPCCD_HD Slabs both(Slabs a, Slabs b) {
-  return {_mm256_min_ps(a.low, b.low), _mm256_min_ps(a.minus_high, b.minus_high)};
+  return {{_mm256_min_ps(a.low[0], b.low[0]), _mm256_min_ps(a.low[1], b.low[1])},
+          {_mm256_max_ps(a.high[0], b.high[0]), _mm256_max_ps(a.high[1], b.high[1])}};
+}
+HPCCD_HD __m256 in_order(Slabs a, Slabs b) {
+  return _mm256_and_ps(_mm256_cmp_ps(a.high[0], b.low[0], _CMP_LT_OQ), _mm256_cmp_ps(a.high[1], b.low[1], _CMP_LT_OQ));
 }
 HPCCD_HD bool are_apart(Slabs a, Slabs b) {
-  const __m256 gap = _mm256_max_ps(_mm256_add_ps(a.low, b.minus_high), _mm256_add_ps(b.low, a.minus_high));
-  return _mm256_movemask_ps(_mm256_cmp_ps(gap, _mm256_setzero_ps(), _CMP_GT_OQ)) != 0;
+  return _mm256_movemask_ps(_mm256_or_ps(in_order(a, b), in_order(b, a))) != 0;
 }
 
 #else
 
-using Slabs = SlabRow;
-HPCCD_HD Slabs slabs_at(const SlabRow* rows, std::uint32_t v) { return rows[v]; }
+struct Slabs {
+  SlabRow low, high;
+};
+HPCCD_HD Slabs slabs_at(const SlabRow* rows, std::uint32_t v) { return {rows[v], rows[v]}; }
 HPCCD_HD Slabs both(const Slabs& a, const Slabs& b) {
   Slabs c;
   for (int k = 0; k < n_slabs; ++k) {
-    c.low[k] = lesser(a.low[k], b.low[k]);
-    c.minus_high[k] = lesser(a.minus_high[k], b.minus_high[k]);
+    c.low.t0[k] = lesser(a.low.t0[k], b.low.t0[k]), c.high.t0[k] = greater(a.high.t0[k], b.high.t0[k]);
+    c.low.t1[k] = lesser(a.low.t1[k], b.low.t1[k]), c.high.t1[k] = greater(a.high.t1[k], b.high.t1[k]);
   }
   return c;
 }
 HPCCD_HD bool are_apart(const Slabs& a, const Slabs& b) {
   bool apart = false;
-  for (int k = 0; k < n_slabs; ++k) apart |= (a.low[k] + b.minus_high[k] > 0) | (b.low[k] + a.minus_high[k] > 0);
+  for (int k = 0; k < n_slabs; ++k)
+    apart |= ((a.high.t0[k] < b.low.t0[k]) & (a.high.t1[k] < b.low.t1[k])) |
+             ((b.high.t0[k] < a.low.t0[k]) & (b.high.t1[k] < a.low.t1[k]));
   return apart;
 }
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Included once per instruction set, with HPCCD_ISA naming the set. Boxes are compared 16 at a time.
 
-#if defined(__AVX512F__) || defined(__AVX2__)
+#if defined(__SSE2__)
 #include <immintrin.h>
 #endif
 
@@ -11,46 +11,97 @@
 namespace hpccd::HPCCD_ISA {
 namespace {
 
-// Plain pointers: methods of std::vector compiled here could be linked into code for older processors.
-struct Boxes {
-  const float *low[3], *high[3];
+// A box to compare with: its bounds, in the order of a group's rows, each `stride` numbers behind the one before.
+template <std::uint32_t stride>
+struct Bounds {
+  const float* at;
+  HPCCD_HD float operator[](std::uint32_t row) const { return at[row * stride]; }
 };
 
-HPCCD_HD Boxes pointers(const BoxArrays& b) {
-  return {{b.low[0].data(), b.low[1].data(), b.low[2].data()}, {b.high[0].data(), b.high[1].data(), b.high[2].data()}};
+// Plain pointers: methods of std::vector compiled here could be linked into code for older processors.
+HPCCD_HD Bounds<BoxGroup::width> bounds_at(const BoxGroup* groups, std::uint32_t i) {
+  return {groups[i / BoxGroup::width].rows[0] + i % BoxGroup::width};
+}
+HPCCD_HD Bounds<1> bounds_of(const Node& node) { return {node.box.t0.low}; }
+
+#if defined(__AVX512F__)
+
+// A group in registers, where it stays while it is compared with many boxes.
+struct Group {
+  __m512 rows[BoxGroup::n_rows];
+};
+HPCCD_HD Group load(const BoxGroup& group) {
+  Group g;
+  for (std::uint32_t r = 0; r < BoxGroup::n_rows; ++r) g.rows[r] = _mm512_load_ps(group.rows[r]);
+  return g;
 }
 
-// Bit j: box i + j overlaps b.
-HPCCD_HD unsigned overlapping(const Boxes& s, std::uint32_t i, const Box& b) {
-#if defined(__AVX512F__)
-  __mmask16 m = 0xFFFF;
-  for (int k = 0; k < 3; ++k) {
-    m = _mm512_mask_cmp_ps_mask(m, _mm512_loadu_ps(s.low[k] + i), _mm512_set1_ps(b.high[k]), _CMP_LE_OQ);
-    m = _mm512_mask_cmp_ps_mask(m, _mm512_loadu_ps(s.high[k] + i), _mm512_set1_ps(b.low[k]), _CMP_GE_OQ);
+// Bit j: box j of the group overlaps b (MotionBox::overlaps).
+template <class Bounds>
+HPCCD_HD unsigned overlapping(const Group& g, Bounds b) {
+  const auto bound = [&](std::uint32_t row) { return _mm512_set1_ps(b[row]); };
+  __mmask16 apart = 0;
+  for (std::uint32_t axis = 0; axis < 3; ++axis) {
+    const __mmask16 below = _mm512_cmp_ps_mask(g.rows[3 + axis], bound(axis), _CMP_LT_OQ);
+    const __mmask16 above = _mm512_cmp_ps_mask(g.rows[axis], bound(3 + axis), _CMP_GT_OQ);
+    apart = _kor_mask16(apart, _mm512_mask_cmp_ps_mask(below, g.rows[9 + axis], bound(6 + axis), _CMP_LT_OQ));
+    apart = _kor_mask16(apart, _mm512_mask_cmp_ps_mask(above, g.rows[6 + axis], bound(9 + axis), _CMP_GT_OQ));
   }
-  return m;
-#elif defined(__AVX2__)
-  unsigned bits = 0;
-  for (int half = 0; half < 2; ++half) {
-    __m256 m = _mm256_castsi256_ps(_mm256_set1_epi32(-1));
-    for (int k = 0; k < 3; ++k) {
-      m = _mm256_and_ps(m, _mm256_cmp_ps(_mm256_loadu_ps(s.low[k] + i + 8 * half), _mm256_set1_ps(b.high[k]), _CMP_LE_OQ));
-      m = _mm256_and_ps(m, _mm256_cmp_ps(_mm256_loadu_ps(s.high[k] + i + 8 * half), _mm256_set1_ps(b.low[k]), _CMP_GE_OQ));
-    }
-    bits |= static_cast<unsigned>(_mm256_movemask_ps(m)) << (8 * half);
-  }
-  return bits;
-#else
-  unsigned bits = 0;
-  for (unsigned j = 0; j < 16; ++j) {
-    const bool all = (s.low[0][i + j] <= b.high[0]) & (s.high[0][i + j] >= b.low[0]) &
-                     (s.low[1][i + j] <= b.high[1]) & (s.high[1][i + j] >= b.low[1]) &
-                     (s.low[2][i + j] <= b.high[2]) & (s.high[2][i + j] >= b.low[2]);
-    bits |= static_cast<unsigned>(all) << j;
-  }
-  return bits;
-#endif
+  return static_cast<__mmask16>(~apart);
 }
+
+#else
+
+using Group = const BoxGroup&;
+HPCCD_HD Group load(const BoxGroup& group) { return group; }
+
+// Some of a row's numbers at a time.
+#if defined(__AVX2__)
+using Part = __m256;
+HPCCD_HD Part part(const float* row) { return _mm256_load_ps(row); }
+HPCCD_HD Part all(float x) { return _mm256_set1_ps(x); }
+HPCCD_HD Part less(Part a, Part b) { return _mm256_cmp_ps(a, b, _CMP_LT_OQ); }
+HPCCD_HD Part both(Part a, Part b) { return _mm256_and_ps(a, b); }
+HPCCD_HD Part either(Part a, Part b) { return _mm256_or_ps(a, b); }
+HPCCD_HD unsigned lanes_of(Part a) { return static_cast<unsigned>(_mm256_movemask_ps(a)); }
+#elif defined(__SSE2__)
+using Part = __m128;
+HPCCD_HD Part part(const float* row) { return _mm_load_ps(row); }
+HPCCD_HD Part all(float x) { return _mm_set1_ps(x); }
+HPCCD_HD Part less(Part a, Part b) { return _mm_cmplt_ps(a, b); }
+HPCCD_HD Part both(Part a, Part b) { return _mm_and_ps(a, b); }
+HPCCD_HD Part either(Part a, Part b) { return _mm_or_ps(a, b); }
+HPCCD_HD unsigned lanes_of(Part a) { return static_cast<unsigned>(_mm_movemask_ps(a)); }
+#else
+struct Part {
+  float x;
+};
+HPCCD_HD Part part(const float* row) { return {*row}; }
+HPCCD_HD Part all(float x) { return {x}; }
+HPCCD_HD bool less(Part a, Part b) { return a.x < b.x; }
+HPCCD_HD bool both(bool a, bool b) { return a & b; }
+HPCCD_HD bool either(bool a, bool b) { return a | b; }
+HPCCD_HD unsigned lanes_of(bool a) { return a; }
+#endif
+
+template <class Bounds>
+HPCCD_HD unsigned overlapping(Group g, Bounds b) {
+  constexpr std::uint32_t n = sizeof(Part) / sizeof(float);
+  unsigned bits = 0;
+  for (std::uint32_t i = 0; i < BoxGroup::width; i += n) {
+    const auto in_order = [&](std::uint32_t axis) {
+      const auto below =
+          both(less(part(g.rows[3 + axis] + i), all(b[axis])), less(part(g.rows[9 + axis] + i), all(b[6 + axis])));
+      const auto above =
+          both(less(all(b[3 + axis]), part(g.rows[axis] + i)), less(all(b[9 + axis]), part(g.rows[6 + axis] + i)));
+      return either(below, above);
+    };
+    bits |= lanes_of(either(either(in_order(0), in_order(1)), in_order(2))) << i;
+  }
+  return ~bits & 0xFFFF;
+}
+
+#endif
 
 // Bit j: number i + j equals x.
 HPCCD_HD unsigned equal(const std::uint32_t* numbers, std::uint32_t i, std::uint32_t x) {
@@ -69,17 +120,6 @@ HPCCD_HD unsigned equal(const std::uint32_t* numbers, std::uint32_t i, std::uint
   for (unsigned j = 0; j < 16; ++j) bits |= static_cast<unsigned>(numbers[i + j] == x) << j;
   return bits;
 #endif
-}
-
-HPCCD_HD Box box_at(const Boxes& s, std::uint32_t i) {
-  Box b;
-  for (int k = 0; k < 3; ++k) b.low[k] = s.low[k][i], b.high[k] = s.high[k][i];
-  return b;
-}
-
-HPCCD_HD bool overlap(const Box& a, const Box& b) {
-  return (a.low[0] <= b.high[0]) & (b.low[0] <= a.high[0]) & (a.low[1] <= b.high[1]) & (b.low[1] <= a.high[1]) &
-         (a.low[2] <= b.high[2]) & (b.low[2] <= a.high[2]);
 }
 
 // The lanes of the group [i, i + 16) that lie in [begin, end).
@@ -108,59 +148,99 @@ HPCCD_HD void append(CandidateBuffer& out, std::uint32_t number, const std::uint
 #endif
 }
 
-HPCCD_HD void edge_pairs(const Tree& tree, const LeafRange& a, const LeafRange& b, bool same, const Box& box_b,
+// Features of one leaf that overlap the other leaf's box: a bit each, by group.
+struct Near {
+  static constexpr std::uint32_t most_groups = (4 * Tree::leaf_size + BoxGroup::width - 1) / BoxGroup::width;
+  unsigned lanes[most_groups] = {};
+  unsigned count = 0;
+};
+
+// Of features begin to end - 1 of the groups.
+HPCCD_HD Near near(const BoxGroup* groups, std::uint32_t begin, std::uint32_t end, const Node& other) {
+  Near n;
+  for (std::uint32_t i = 0, group = 0; i < end; i += BoxGroup::width, ++group)
+    n.lanes[group] = overlapping(load(groups[group]), bounds_of(other)) & lanes_in(i, begin, end),
+    n.count += static_cast<unsigned>(__builtin_popcount(n.lanes[group]));
+  return n;
+}
+
+// f(number) for each of them.
+template <class Function>
+HPCCD_HD void for_each(const Near& n, std::uint32_t end, Function&& f) {
+  for (std::uint32_t i = 0, group = 0; i < end; i += BoxGroup::width, ++group)
+    for (unsigned lanes = n.lanes[group]; lanes; lanes &= lanes - 1) f(i + static_cast<unsigned>(__builtin_ctz(lanes)));
+}
+
+// Edges of a that are near b, against all edges of b.
+HPCCD_HD void near_edges(const Tree& tree, const Near& near_a, const LeafRange& a, const LeafRange& b,
                          CandidateBuffer& out) {
-  const Boxes boxes = pointers(tree.edge_boxes);
+  const bool same = &a == &b;
+  const BoxGroup* all = tree.box_groups.get();
+  const BoxGroup *groups_a = all + a.first_group, *groups_b = all + b.first_group;
+  const std::uint32_t n_a = a.n_edges(), n_b = b.n_edges();
   const std::uint32_t *end0 = tree.edge_ends[0].data(), *end1 = tree.edge_ends[1].data();
   const std::uint32_t* edge = tree.edge_of_slot.data();
-  for (std::uint32_t group = a.first_edge; group < a.end_edge; group += 16)
-    for (unsigned near = overlapping(boxes, group, box_b) & lanes_in(group, group, a.end_edge); near; near &= near - 1) {
-      const std::uint32_t s = group + static_cast<unsigned>(__builtin_ctz(near));
-      const Box box = box_at(boxes, s);
-      const std::uint32_t v0 = end0[s], v1 = end1[s];
-      const std::uint32_t begin = same ? s + 1 : b.first_edge;
-      for (std::uint32_t i = begin; i < b.end_edge; i += 16) {
-        unsigned m = overlapping(boxes, i, box) & lanes_in(i, begin, b.end_edge);
-        m &= ~(equal(end0, i, v0) | equal(end0, i, v1) | equal(end1, i, v0) | equal(end1, i, v1));
-        append<true>(out, edge[s], edge + i, m);
-      }
-    }
+  for (std::uint32_t i = 0; i < n_b; i += BoxGroup::width) {
+    const Group group = load(groups_b[i / BoxGroup::width]);
+    const std::uint32_t slot = b.first_edge + i;
+    for_each(near_a, n_a, [&](std::uint32_t k) {
+      unsigned m = overlapping(group, bounds_at(groups_a, k)) & lanes_in(i, same ? k + 1 : 0, n_b);
+      if (!m) return;
+      const std::uint32_t v0 = end0[a.first_edge + k], v1 = end1[a.first_edge + k];
+      m &= ~(equal(end0, slot, v0) | equal(end0, slot, v1) | equal(end1, slot, v0) | equal(end1, slot, v1));
+      append<true>(out, edge[a.first_edge + k], edge + slot, m);
+    });
+  }
+}
+
+HPCCD_HD void edge_pairs(const Tree& tree, const LeafRange& a, const LeafRange& b, const Node& node_a,
+                         const Node& node_b, CandidateBuffer& out) {
+  const BoxGroup* all = tree.box_groups.get();
+  const BoxGroup *groups_a = all + a.first_group, *groups_b = all + b.first_group;
+  const Near near_a = near(groups_a, 0, a.n_edges(), node_b);
+  if (!near_a.count) return;
+  if (&a == &b) return near_edges(tree, near_a, a, a, out);
+  const Near near_b = near(groups_b, 0, b.n_edges(), node_a);
+  if (!near_b.count) return;
+  // One by one the fewer, in groups the others.
+  const bool by_a = near_a.count <= near_b.count;
+  near_edges(tree, by_a ? near_a : near_b, by_a ? a : b, by_a ? b : a, out);
 }
 
 // Vertices of a against faces of b.
-HPCCD_HD void vertex_face_pairs(const Tree& tree, const LeafRange& a, const LeafRange& b, const Box& box_b,
+HPCCD_HD void vertex_face_pairs(const Tree& tree, const LeafRange& a, const LeafRange& b, const Node& node_b,
                                 CandidateBuffer& out) {
-  const Boxes vertex_boxes = pointers(tree.vertex_boxes), boxes = pointers(tree.face_boxes);
-  const std::uint32_t* vertex = tree.vertex_of_slot.data();
-  const std::uint32_t* face = tree.face_of_slot.data();
-  const std::uint32_t *c0 = tree.face_corners[0].data(), *c1 = tree.face_corners[1].data(),
-                      *c2 = tree.face_corners[2].data();
-  for (std::uint32_t group = a.first_vertex; group < a.end_vertex; group += 16)
-    for (unsigned near = overlapping(vertex_boxes, group, box_b) & lanes_in(group, group, a.end_vertex); near;
-         near &= near - 1) {
-      const std::uint32_t s = group + static_cast<unsigned>(__builtin_ctz(near));
-      const Box box = box_at(vertex_boxes, s);
-      const std::uint32_t v = vertex[s];
-      for (std::uint32_t i = b.first_face; i < b.end_face; i += 16) {
-        unsigned m = overlapping(boxes, i, box) & lanes_in(i, i, b.end_face);
-        m &= ~(equal(c0, i, v) | equal(c1, i, v) | equal(c2, i, v));
-        append<false>(out, v, face + i, m);
-      }
-    }
+  const BoxGroup* all = tree.box_groups.get();
+  const BoxGroup *groups_a = all + a.surface_group(), &group_b = all[b.surface_group()];
+  const std::uint32_t first_a = a.first_vertex_lane(), end_a = first_a + a.n_vertices();
+  static_assert(Tree::leaf_size <= BoxGroup::width);
+  const Near near_a = near(groups_a, first_a, end_a, node_b);
+  if (!near_a.count) return;
+  const std::uint32_t* vertex = tree.vertex_of_slot.data() + a.first_vertex;
+  const std::uint32_t* face = tree.face_of_slot.data() + b.first_face;
+  const std::uint32_t *c0 = tree.face_corners[0].data() + b.first_face,
+                      *c1 = tree.face_corners[1].data() + b.first_face,
+                      *c2 = tree.face_corners[2].data() + b.first_face;
+  const Group faces = load(group_b);
+  for_each(near_a, end_a, [&](std::uint32_t k) {
+    unsigned m = overlapping(faces, bounds_at(groups_a, k)) & lanes_in(0, 0, b.n_faces());
+    if (!m) return;
+    const std::uint32_t v = vertex[k - first_a];
+    m &= ~(equal(c0, 0, v) | equal(c1, 0, v) | equal(c2, 0, v));
+    append<false>(out, v, face, m);
+  });
 }
 
 }  // namespace
 
 void leaf_pairs(const Tree& tree, const LeafRange& a, const LeafRange& b, CandidateBuffer& edge_edge,
                 CandidateBuffer& vertex_face) {
-  const Node* nodes = tree.nodes.data();
   const std::uint32_t* leaf_nodes = tree.leaf_nodes.data();
   const LeafRange* leaves = tree.leaves.data();
-  const bool same = &a == &b;
-  const Box &box_a = nodes[leaf_nodes[&a - leaves]].box, &box_b = nodes[leaf_nodes[&b - leaves]].box;
-  edge_pairs(tree, a, b, same, box_b, edge_edge);
-  vertex_face_pairs(tree, a, b, box_b, vertex_face);
-  if (!same) vertex_face_pairs(tree, b, a, box_a, vertex_face);
+  const Node &node_a = tree.nodes.data()[leaf_nodes[&a - leaves]], &node_b = tree.nodes.data()[leaf_nodes[&b - leaves]];
+  edge_pairs(tree, a, b, node_a, node_b, edge_edge);
+  vertex_face_pairs(tree, a, b, node_b, vertex_face);
+  if (&a != &b) vertex_face_pairs(tree, b, a, node_a, vertex_face);
 }
 
 }  // namespace hpccd::HPCCD_ISA

@@ -25,13 +25,13 @@ std::vector<NodePair> traversal_tasks(const Tree& tree, const PairRules& rules, 
     progress = false;
     next.clear();
     for (const NodePair& p : level) {
-      const Node &a = tree.nodes[p.a], &b = tree.nodes[p.b];
-      if (!rules.enabled(a, b) || !a.box.overlaps(b.box)) continue;
       if (is_leaf_pair(tree.nodes, p)) {
         next.push_back(p);
         continue;
       }
-      refine(tree.nodes, p, [&](NodePair q) { next.push_back(q); });
+      refine(tree.nodes, p, [&](NodePair q) {
+        if (worth_visiting(tree.nodes, rules, q)) next.push_back(q);
+      });
       progress = true;
     }
     level.swap(next);

@@ -66,6 +66,12 @@ inline bool is_leaf_pair(const std::vector<Node>& nodes, NodePair p) {
   return !nodes[p.a].children && !nodes[p.b].children;
 }
 
+inline bool worth_visiting(const std::vector<Node>& nodes, const PairRules& rules, NodePair p) {
+  const Node &a = nodes[p.a], &b = nodes[p.b];
+  return rules.enabled(a, b) && (p.a == p.b || a.overlaps(b));
+}
+
+// All of them worth visiting.
 std::vector<NodePair> traversal_tasks(const Tree& tree, const PairRules& rules, std::size_t enough);
 
 }  // namespace hpccd

@@ -8,7 +8,7 @@
 namespace hpccd {
 namespace {
 
-// `between` is called between two pairs and may take from the stack.
+// From pairs that are worth visiting. `between` is called between two of them and may take from the stack.
 template <class Between>
 void walk(const Tree& tree, const PairRules& rules, const Search& search, std::vector<NodePair>& stack, Worker& worker,
           Between&& between) {
@@ -16,13 +16,15 @@ void walk(const Tree& tree, const PairRules& rules, const Search& search, std::v
     if (search.cancelled.load(std::memory_order_relaxed)) throw Cancelled();
     const NodePair p = stack.back();
     stack.pop_back();
-    const Node &a = tree.nodes[p.a], &b = tree.nodes[p.b];
-    ++worker.node_pairs;
-    if (!rules.enabled(a, b) || !a.box.overlaps(b.box)) continue;
-    if (is_leaf_pair(tree.nodes, p))
+    if (is_leaf_pair(tree.nodes, p)) {
+      const Node &a = tree.nodes[p.a], &b = tree.nodes[p.b];
       worker.leaf_pair(tree, tree.leaves[a.leaf], tree.leaves[b.leaf], rules.accuracy(a, b));
-    else
-      refine(tree.nodes, p, [&](NodePair q) { stack.push_back(q); });
+    } else {
+      refine(tree.nodes, p, [&](NodePair q) {
+        ++worker.node_pairs;
+        if (worth_visiting(tree.nodes, rules, q)) stack.push_back(q);
+      });
+    }
     between();
   }
 }
