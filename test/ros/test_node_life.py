@@ -74,7 +74,9 @@ def test_signals_end_the_node_cleanly(start_node, number, busy):
         publisher.join(PATIENCE)
     output = node.output()
     assert status == 0, output
-    assert "Traceback" not in output and "rror" not in output, output
+    # Where shared memory is short, as in containers, the middleware says so and goes on over UDP.
+    own = [line for line in output.splitlines() if "RTPS_TRANSPORT_SHM" not in line]
+    assert not any("Traceback" in line or "rror" in line for line in own), output
 
 
 def test_second_signal_changes_nothing(start_node):
