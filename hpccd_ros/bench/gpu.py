@@ -5,6 +5,7 @@ time by stage, and the two floors, bytes over bandwidth and operations over rate
 
   hpccd bench gpu data                      the scene files of HPCCD_DATA, balanced and exact
   hpccd bench gpu cloth-ball --repeat 100 --parts frames
+  hpccd bench gpu --redraw gpu-16-cores.json --figures docs/figures
 
 Contacts of all backends are compared; a difference, or a frame that a device left to the CPU, fails the command.
 """
@@ -12,12 +13,14 @@ Contacts of all backends are compared; a difference, or a frame that a device le
 from __future__ import annotations
 
 import os
+from pathlib import Path
 
 import hpccd_core as hc
 from hpccd_ros.errors import UserError
 
-from . import common, gpu_hybrid, table
+from . import common, gpu_figure, gpu_hybrid, table
 from .gpu_hybrid import detector_times
+from .results import Kept
 
 PARTS = ("frames", "threads", "segments")
 TIERS = ("balanced", "exact")
@@ -37,7 +40,14 @@ def configure(parser):
                         help="10^12 double-precision operations a second, not fused (default: %(default)s, H100)")
 
 
+    parser.add_argument("--redraw", metavar="JSON", help="draw Fig. 6 from this kept result; measure nothing")
+
+
 def run(args) -> int:
+    if args.redraw:
+        path = gpu_figure.draw(Kept.read(Path(args.redraw), "gpu"), Path(args.figures or args.out) / "hybrid.png")
+        print(f"wrote {path}")
+        return 0
     if "gpu" not in hc.backends():
         raise UserError(f"no usable GPU: {hc.gpu_status()['reason']}")
     parts = common.listed("--parts", args.parts, PARTS)
@@ -57,7 +67,7 @@ def run(args) -> int:
         _show_frames([r for r in report.rows if r["part"] == "frame"])
     if len(parts) > 1 or "frames" not in parts:
         gpu_hybrid.show(report)
-    return common.end(args, report)
+    return common.end(args, report, {"hybrid": gpu_figure.draw} if "threads" in parts else None)
 
 
 def _show_frames(rows):

@@ -40,7 +40,7 @@ def figure_6(report, args, name, step, accuracy="balanced"):
     counts = sorted({*(1 << k for k in range(cores().bit_length()) if 1 << k <= cores()), cores()})
     runs = [("published", 1, 0)]
     runs += [(method, n, g) for method in ("published", "default") for n in counts for g in gpus
-             if (method, n, g) != runs[0] and (method == "default" or g or n == 1)]  # fmt: skip
+             if (method, n, g) != runs[0]]  # fmt: skip
     base, expected = None, None
     with bar(f"{name}: threads and GPUs", len(runs)) as progress:
         for method, threads, n_gpus in runs:

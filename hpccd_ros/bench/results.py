@@ -4,11 +4,33 @@
 from __future__ import annotations
 
 import csv
+import dataclasses
 import json
 import math
 from pathlib import Path
 
+from hpccd_ros.errors import UserError
+
 from . import machine
+
+
+@dataclasses.dataclass(frozen=True)
+class Kept:
+    """What a picture needs of a result that was written earlier."""
+
+    machine: dict
+    rows: list[dict]
+
+    @classmethod
+    def read(cls, path: Path, benchmark: str) -> Kept:
+        """Raises UserError where the file is not a result of this benchmark."""
+        try:
+            whole = json.loads(path.read_text(encoding="utf-8"))
+            if whole["benchmark"] != benchmark:
+                raise UserError(f"{path}: results of `hpccd bench {whole['benchmark']}`, not of {benchmark}")
+            return cls(whole["machine"], whole["rows"])
+        except (OSError, ValueError, KeyError, TypeError) as e:
+            raise UserError(f"{path}: not a JSON file that `hpccd bench {benchmark}` wrote ({e})") from e
 
 
 class Report:

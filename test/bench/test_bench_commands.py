@@ -2,6 +2,7 @@
 """`hpccd bench ...`: each command runs, checks what it promises to check, and writes what it says."""
 
 import csv
+import json
 
 import numpy as np
 import pytest
@@ -116,3 +117,25 @@ def test_wrong_use_is_explained(bench, capsys, arguments, text):
     status, result, _ = bench(*arguments)
     assert status == 2 and result is None
     assert text in capsys.readouterr().err
+
+
+def test_gpu_redraws_a_kept_result(bench, tmp_path):
+    """The measuring needs a GPU (test/gpu has the backends); the picture of what was measured does not."""
+    rows = [
+        {"part": "threads and GPUs", "scene": "s", "accuracy": "balanced", "method": method, "threads": threads,
+         "gpus": gpus, "median_ms": 8 / threads / (1 + gpus), "speedup": threads * (1.0 + gpus)}
+        for method in ("default", "published") for threads in (1, 2, 4) for gpus in (0, 1, 2)
+    ]  # fmt: skip
+    machine = {"processor": "p", "cores": 4, "gpus": ["g", "g"], "commit": "c", "date": "d"}
+    kept = tmp_path / "kept.json"
+    kept.write_text(json.dumps({"benchmark": "gpu", "machine": machine, "rows": rows}))
+    assert bench("gpu", "--redraw", str(kept))[0] == 0
+    assert min(image.imread(tmp_path / "hybrid.png").shape[:2]) > 200
+
+
+def test_gpu_redraw_refuses_what_is_no_result(bench, tmp_path, capsys):
+    wrong = {"text.json": "no json", "cpu.json": '{"benchmark": "cpu"}', "empty.json": "{}"}
+    for name, text in wrong.items():
+        (tmp_path / name).write_text(text)
+        assert bench("gpu", "--redraw", str(tmp_path / name))[0] != 0
+        assert name in capsys.readouterr().err
