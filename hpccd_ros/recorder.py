@@ -24,6 +24,7 @@ from hpccd_ros.topic_recorder import Recorder
 def main(args) -> int:
     """Record as the options of `hpccd record` say; returns the exit status."""
     target = Path(args.output or datetime.now().strftime("hpccd-%Y%m%d-%H%M%S.mcap"))
+    stop = _stop_on_signals()
     _env.prepare()
     rclpy.init(args=["--ros-args", *args.ros_args] if args.ros_args else None,
                signal_handler_options=SignalHandlerOptions.NO)
@@ -33,15 +34,14 @@ def main(args) -> int:
     # In the namespace of the recorded node, relative names and remappings mean the same as there.
     node = rclpy.create_node(f"{name}_recorder", namespace=namespace or "/", start_parameter_services=False)
     try:
-        return _record(node, target, args)
+        return _record(node, target, args, stop)
     finally:
         node.destroy_node()
         rclpy.try_shutdown()
 
 
-def _record(node, target, args) -> int:
-    parameters = node_parameters.fetch(node, args.node, args.wait)
-    stop = _stop_on_signals()  # not before: until there is something to finish, a signal ends the program at once
+def _record(node, target, args, stop) -> int:
+    parameters = node_parameters.fetch(node, args.node, args.wait, stop)
     if not parameters.get("meshes"):
         raise UserError(f"the node {args.node} has no parameter `meshes`: is it an hpccd node?")
     wanted = recorded_topics.of_node(parameters)

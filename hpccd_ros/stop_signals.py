@@ -6,6 +6,7 @@ invalid context, or waited forever. Blocking the signals for a thread that waits
 that libraries made at import would take them.
 """
 
+import contextlib
 import os
 import signal
 import threading
@@ -34,6 +35,25 @@ def watch(on_stop: Callable[[], None]) -> None:
         on_stop()
 
     threading.Thread(target=wait, name="signals", daemon=True).start()
+
+
+@contextlib.contextmanager
+def later():
+    """A SIGINT or SIGTERM within this block becomes a KeyboardInterrupt behind it.
+
+    Inside of rclpy's calls, which call Python back from C++, the exception would come out as another one.
+    """
+    came: list[int] = []
+    before = {}
+    try:
+        for number in (signal.SIGINT, signal.SIGTERM):
+            before[number] = signal.signal(number, lambda number, frame: came.append(number))
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+    if came:
+        raise KeyboardInterrupt
 
 
 def spin(executor: Executor, stop: Future) -> None:

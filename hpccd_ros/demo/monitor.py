@@ -10,7 +10,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.qos import QoSProfile
 from rclpy.signals import SignalHandlerOptions
 
-from hpccd_ros import _env
+from hpccd_ros import _env, stop_signals
 
 
 class Monitor:
@@ -50,8 +50,9 @@ class Monitor:
     def listen(self, seconds: float) -> None:
         """Take what comes within `seconds`."""
         end = time.monotonic() + seconds
-        while (left := end - time.monotonic()) > 0:
-            self._executor.spin_once(timeout_sec=left)
+        with stop_signals.later():
+            while (left := end - time.monotonic()) > 0:
+                self._executor.spin_once(timeout_sec=left)
 
     def _on_contacts(self, message):
         self.heard = time.monotonic()

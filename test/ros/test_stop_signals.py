@@ -2,6 +2,7 @@
 """The main loop of the node: it ends when told, and holds nothing of the turns it has made."""
 
 import gc
+import signal
 import sys
 import threading
 
@@ -42,6 +43,17 @@ def test_turns_leave_nothing_behind(executor):
     stop_signals.spin(executor, stop)
     assert turns == 3000
     assert blocks[1] - blocks[0] < 1000, "spin_until_future_complete leaves at least two for each of the 2000 turns"
+
+
+def test_a_signal_within_a_block_is_answered_behind_it():
+    done = []
+    before = signal.getsignal(signal.SIGTERM)
+    with pytest.raises(KeyboardInterrupt):
+        with stop_signals.later():
+            signal.raise_signal(signal.SIGTERM)
+            done.append("the rest of the block")
+        done.append("what is behind it")
+    assert done == ["the rest of the block"] and signal.getsignal(signal.SIGTERM) is before
 
 
 def test_another_thread_ends_an_idle_loop(executor):
