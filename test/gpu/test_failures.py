@@ -38,14 +38,15 @@ def test_every_call_of_a_frame_may_fail(backend):
     assert failures > 30
 
 
-def test_every_call_of_a_hybrid_frame_on_warm_devices_may_fail():
-    scene, t0, t1 = scenes.join([scenes.crumpled(np.random.default_rng(3), 40)])
+@pytest.mark.parametrize("seed", range(3, 9))
+def test_every_call_of_a_hybrid_frame_on_warm_devices_may_fail(seed):
+    scene, t0, t1 = scenes.join([scenes.crumpled(np.random.default_rng(seed), 40)])
     expected = hc.Detector(scene, backend="cpu").detect(t0, t1).hash
     detector = hc.Detector(scene, backend="hybrid", threads=2, hybrid_segment_pairs=128)
     detector.detect(t0, t1)
     failures = 0
     for n in range(1, 200):
-        detector.detect(t0, t1)
+        assert detector.detect(t0, t1).hash == expected  # nothing of the failed frame is relied on
         assert detector.backend == "hybrid"
         _core.gpu_fail_after(n)
         assert detector.detect(t0, t1).hash == expected

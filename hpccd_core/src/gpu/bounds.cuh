@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// bvh/motion_bounds.cpp on the device: extent of the scene, then rows and boxes of the vertices. Same arithmetic.
+// bvh/motion_bounds.cpp on the device: extent of the scene, then rows and points of the vertices. Same arithmetic.
 #pragma once
 
 #include "bvh/coordinate_map.h"
@@ -67,16 +67,14 @@ __global__ void rows_kernel(Frame<T> f) {
   }
   const CoordinateMap map = CoordinateMap::around(low, high);
   T a[3], b[3];
-  DeviceBox box;
+  DevicePoint point;
   for (int k = 0; k < 3; ++k) {
     a[k] = f.given_t0[3 * static_cast<u64>(i) + k], b[k] = f.given_t1[3 * static_cast<u64>(i) + k];
-    const float x = map(a[k], k), y = map(b[k], k);
-    box.low[k] = x < y ? x : y;
-    box.high[k] = x < y ? y : x;
+    point.at[0].x[k] = map(a[k], k), point.at[1].x[k] = map(b[k], k);
   }
-  box.tag_low = box.tag_high = 0;
+  point.at[0].tag = point.at[1].tag = 0;
   set_row(f.rows[i], a, b);
-  store_box(&f.vertex_boxes[i], box);
+  for (int end = 0; end < 2; ++end) store(&f.points[i].at[end], point.at[end]);
 }
 
 }  // namespace hpccd::gpu

@@ -14,65 +14,75 @@ inline constexpr u32 candidate_warps = 4;
 static_assert(3 * Tree::leaf_size <= 32, "a lane for each feature of a leaf");
 
 struct CandidateSpace {
-  // Features of the two leaves that overlap the other leaf, and their numbers.
-  DeviceBox box[2][3 * Tree::leaf_size];
+  // Features of the two leaves that overlap the other leaf, and their numbers. The four words of a box lie apart, so
+  // that neighbouring lanes read neighbouring words.
+  Bound bound[2][4][3 * Tree::leaf_size];
   u32 number[2][3 * Tree::leaf_size];
   u32 corner2[Tree::leaf_size];
   // Candidates: the vertices that p, a and b lead from and to, and the features.
   uint4 vertices[64];
   uint2 features[64];
   uint2 survivors[2][96];
+
+  __device__ void put(u32 side, u32 at, const DeviceBox& b) {
+    for (int end = 0; end < 2; ++end)
+      store(&bound[side][end][at], b.low[end]), store(&bound[side][2 + end][at], b.high[end]);
+  }
+  __device__ DeviceBox box(u32 side, u32 at) const {
+    const auto word = [&](int i) { return bound_of(*reinterpret_cast<const float4*>(&bound[side][i][at])); };
+    return {{word(0), word(1)}, {word(2), word(3)}};
+  }
 };
 
-// Edges of a leaf that overlap `other`, one after the other in list `side`.
+// Edges of a leaf that overlap the leaf `other`, one after the other in list `side`.
 template <class T>
-__device__ u32 stage_edges(const Frame<T>& f, const DeviceLeaf& l, const DeviceBox& other, CandidateSpace& s, u32 side) {
+__device__ u32 stage_edges(const Frame<T>& f, const DeviceLeaf& l, u32 other, CandidateSpace& s, u32 side) {
   const u32 lane = lane_number(), slot = l.first_edge + lane;
   DeviceBox b;
   bool near = lane < (l.counts >> 8 & 0xFF);
   if (near) {
     b = load_box(&f.edge_boxes[slot]);
-    near = overlap(b, other);
+    near = overlap(b, load_box(&f.leaf_boxes[other]));
   }
   const u32 mask = __ballot_sync(all_lanes, near), at = __popc(mask & ((1u << lane) - 1));
   if (near) {
-    s.box[side][at] = b;
+    s.put(side, at, b);
     s.number[side][at] = __ldg(&f.edge_of_slot[slot]);
   }
   return __popc(mask);
 }
 
 template <class T>
-__device__ u32 stage_vertices(const Frame<T>& f, const DeviceLeaf& l, const DeviceBox& other, CandidateSpace& s) {
+__device__ u32 stage_vertices(const Frame<T>& f, const DeviceLeaf& l, u32 other, CandidateSpace& s) {
   const u32 lane = lane_number();
   DeviceBox b;
   u32 v = 0;
   bool near = lane < l.counts >> 16;
   if (near) {
     v = __ldg(&f.vertex_of_slot[l.first_vertex + lane]);
-    b = load_box(&f.vertex_boxes[v]);
-    near = overlap(b, other);
+    b = load_point(&f.points[v]);
+    near = overlap(b, load_box(&f.leaf_boxes[other]));
   }
   const u32 mask = __ballot_sync(all_lanes, near), at = __popc(mask & ((1u << lane) - 1));
   if (near) {
-    b.tag_low = v;
-    s.box[0][at] = b;
+    b.tag_low() = v;
+    s.put(0, at, b);
   }
   return __popc(mask);
 }
 
 template <class T>
-__device__ u32 stage_faces(const Frame<T>& f, const DeviceLeaf& l, const DeviceBox& other, CandidateSpace& s) {
+__device__ u32 stage_faces(const Frame<T>& f, const DeviceLeaf& l, u32 other, CandidateSpace& s) {
   const u32 lane = lane_number(), slot = l.first_face + lane;
   DeviceBox b;
   bool near = lane < (l.counts & 0xFF);
   if (near) {
     b = load_box(&f.face_boxes[slot]);
-    near = overlap(b, other);
+    near = overlap(b, load_box(&f.leaf_boxes[other]));
   }
   const u32 mask = __ballot_sync(all_lanes, near), at = __popc(mask & ((1u << lane) - 1));
   if (near) {
-    s.box[1][at] = b;
+    s.put(1, at, b);
     s.corner2[at] = __ldg(&f.face_corner2[slot]);
     s.number[1][at] = __ldg(&f.face_of_slot[slot]);
   }
@@ -142,12 +152,13 @@ __device__ __forceinline__ Candidate edge_pair(const CandidateSpace& s, u32 i, u
   Candidate c{valid && (!same || i < j), {0, 0, 0, 0}, {0, 0}};
   if (!c.wanted) return c;
   const u32 side = same ? 0 : 1;
-  const DeviceBox &a = s.box[0][i], &b = s.box[side][j];
-  c.wanted = overlap(a, b) && a.tag_low != b.tag_low && a.tag_low != b.tag_high && a.tag_high != b.tag_low &&
-             a.tag_high != b.tag_high;
+  const DeviceBox a = s.box(0, i), b = s.box(side, j);
+  c.wanted = overlap(a, b) && a.tag_low() != b.tag_low() && a.tag_low() != b.tag_high() && a.tag_high() != b.tag_low() &&
+             a.tag_high() != b.tag_high();
   const u32 x = s.number[0][i], y = s.number[side][j];
-  const DeviceBox &lower = x < y ? a : b, &upper = x < y ? b : a;
-  c.vertices = {lower.tag_low, upper.tag_low, lower.tag_high, upper.tag_high};
+  const uint2 ends_a{a.tag_low(), a.tag_high()}, ends_b{b.tag_low(), b.tag_high()};
+  const uint2 lower = x < y ? ends_a : ends_b, upper = x < y ? ends_b : ends_a;
+  c.vertices = {lower.x, upper.x, lower.y, upper.y};
   c.features = {x < y ? x : y, (x < y ? y : x) | kind_bit};
   return c;
 }
@@ -155,11 +166,11 @@ __device__ __forceinline__ Candidate edge_pair(const CandidateSpace& s, u32 i, u
 __device__ __forceinline__ Candidate vertex_face_pair(const CandidateSpace& s, u32 i, u32 j, bool valid) {
   Candidate c{valid, {0, 0, 0, 0}, {0, 0}};
   if (!valid) return c;
-  const DeviceBox &vertex = s.box[0][i], &face = s.box[1][j];
-  c.vertices = {face.tag_low, vertex.tag_low, face.tag_high, s.corner2[j]};
-  c.wanted = overlap(vertex, face) && vertex.tag_low != c.vertices.x && vertex.tag_low != c.vertices.z &&
-             vertex.tag_low != c.vertices.w;
-  c.features = {vertex.tag_low, s.number[1][j]};
+  const DeviceBox vertex = s.box(0, i), face = s.box(1, j);
+  c.vertices = {face.tag_low(), vertex.tag_low(), face.tag_high(), s.corner2[j]};
+  c.wanted = overlap(vertex, face) && vertex.tag_low() != c.vertices.x && vertex.tag_low() != c.vertices.z &&
+             vertex.tag_low() != c.vertices.w;
+  c.features = {vertex.tag_low(), s.number[1][j]};
   return c;
 }
 
@@ -175,13 +186,12 @@ __device__ __forceinline__ void leaf_pair_candidates(const Frame<T>& f, Candidat
     {
       const u32 x = phase == 2 ? pair.y : pair.x, y = phase == 2 ? pair.x : pair.y;
       const DeviceLeaf a = f.leaves[x], b = f.leaves[y];
-      const DeviceBox box_a = load_box(&f.leaf_boxes[x]), box_b = load_box(&f.leaf_boxes[y]);
       if (phase == 0) {
-        n_first = stage_edges(f, a, box_b, s, 0);
-        n_second = same ? n_first : stage_edges(f, b, box_a, s, 1);
+        n_first = stage_edges(f, a, y, s, 0);
+        n_second = same ? n_first : stage_edges(f, b, x, s, 1);
       } else {
-        n_first = stage_vertices(f, a, box_b, s);
-        n_second = n_first ? stage_faces(f, b, box_a, s) : 0;
+        n_first = stage_vertices(f, a, y, s);
+        n_second = n_first ? stage_faces(f, b, x, s) : 0;
       }
     }
     __syncwarp();
@@ -204,7 +214,7 @@ __device__ __forceinline__ void leaf_pair_candidates(const Frame<T>& f, Candidat
 }
 
 template <class T>
-__global__ __launch_bounds__(32 * candidate_warps, 6) void candidates_kernel(const __grid_constant__ Frame<T> f) {
+__global__ __launch_bounds__(32 * candidate_warps, 5) void candidates_kernel(const __grid_constant__ Frame<T> f) {
   __shared__ CandidateSpace spaces[candidate_warps];
   CandidateSpace& s = spaces[threadIdx.x / 32];
   CandidateState state;

@@ -29,11 +29,11 @@ class DeviceLeaves {
     std::vector<u32> corner2(n_faces);
     for (std::size_t s = 0; s < n_edges; ++s) {
       const auto& e = features.edges[edge_of_slot[s]];
-      edge[s].tag_low = e[0], edge[s].tag_high = e[1];
+      edge[s].tag_low() = e[0], edge[s].tag_high() = e[1];
     }
     for (std::size_t s = 0; s < n_faces; ++s) {
       const auto& corners = features.faces[face_of_slot[s]];
-      face[s].tag_low = corners[0], face[s].tag_high = corners[1], corner2[s] = corners[2];
+      face[s].tag_low() = corners[0], face[s].tag_high() = corners[1], corner2[s] = corners[2];
     }
     boxes_.reserve(std::max<std::size_t>(leaves.size(), 1));
     upload(leaves_, packed.data(), packed.size());

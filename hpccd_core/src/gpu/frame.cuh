@@ -4,6 +4,7 @@
 
 #include <cstdint>
 
+#include "base/hd.h"
 #include "elementary/motion.h"
 #include "hpccd/hpccd.h"
 
@@ -29,12 +30,24 @@ struct alignas(64) Row<double> {
   double2 t0[2], t1[2];
 };
 
-// Two 16-byte words that are loaded together; what `tag` holds depends on the list.
-struct alignas(32) DeviceBox {
-  float low[3];
-  u32 tag_low;
-  float high[3];
-  u32 tag_high;
+// A 16-byte word; what the tags of a box hold depends on the list.
+struct alignas(16) Bound {
+  float x[3];
+  u32 tag;
+};
+
+// Where a vertex is at both ends of its motion.
+struct alignas(32) DevicePoint {
+  Bound at[2];
+};
+
+// Bounds at both ends of the motion (bvh/motion_box.h).
+struct alignas(64) DeviceBox {
+  Bound low[2], high[2];
+  HPCCD_HD u32& tag_low() { return low[0].tag; }
+  HPCCD_HD u32& tag_high() { return high[0].tag; }
+  HPCCD_HD u32 tag_low() const { return low[0].tag; }
+  HPCCD_HD u32 tag_high() const { return high[0].tag; }
 };
 
 struct alignas(16) DeviceLeaf {
@@ -93,7 +106,7 @@ struct Frame {
   // This frame's motion.
   const T *given_t0, *given_t1;
   Row<T>* rows;
-  DeviceBox* vertex_boxes;
+  DevicePoint* points;         // of the vertices
 
   // Lists.
   PairList leaf_pairs, survivors[2], single[2], many[2];
@@ -125,32 +138,48 @@ __device__ inline u64 warp_append(u64* counter, bool wants) {
   return base + __popc(mask & ((1u << lane) - 1));
 }
 
+__device__ inline Bound bound_of(float4 v) { return {{v.x, v.y, v.z}, __float_as_uint(v.w)}; }
+
 __device__ inline DeviceBox load_box(const DeviceBox* b) {
-  const float4 low = reinterpret_cast<const float4*>(b)[0], high = reinterpret_cast<const float4*>(b)[1];
-  return {{low.x, low.y, low.z}, __float_as_uint(low.w), {high.x, high.y, high.z}, __float_as_uint(high.w)};
+  const float4* v = reinterpret_cast<const float4*>(b);
+  return {{bound_of(v[0]), bound_of(v[1])}, {bound_of(v[2]), bound_of(v[3])}};
 }
 
 // Past this multiprocessor's own cache: written by another one in the same kernel.
 __device__ inline DeviceBox load_box_fresh(const DeviceBox* b) {
-  const float4 low = __ldcg(reinterpret_cast<const float4*>(b)), high = __ldcg(reinterpret_cast<const float4*>(b) + 1);
-  return {{low.x, low.y, low.z}, __float_as_uint(low.w), {high.x, high.y, high.z}, __float_as_uint(high.w)};
+  const float4* v = reinterpret_cast<const float4*>(b);
+  return {{bound_of(__ldcg(v)), bound_of(__ldcg(v + 1))}, {bound_of(__ldcg(v + 2)), bound_of(__ldcg(v + 3))}};
 }
 
+// The box of one vertex.
+__device__ inline DeviceBox load_point(const DevicePoint* p) {
+  const float4* v = reinterpret_cast<const float4*>(p);
+  const Bound t0 = bound_of(v[0]), t1 = bound_of(v[1]);
+  return {{t0, t1}, {t0, t1}};
+}
+
+__device__ inline void store(Bound* to, const Bound& b) {
+  *reinterpret_cast<float4*>(to) = {b.x[0], b.x[1], b.x[2], __uint_as_float(b.tag)};
+}
 __device__ inline void store_box(DeviceBox* to, const DeviceBox& b) {
-  reinterpret_cast<float4*>(to)[0] = {b.low[0], b.low[1], b.low[2], __uint_as_float(b.tag_low)};
-  reinterpret_cast<float4*>(to)[1] = {b.high[0], b.high[1], b.high[2], __uint_as_float(b.tag_high)};
+  for (int end = 0; end < 2; ++end) store(&to->low[end], b.low[end]), store(&to->high[end], b.high[end]);
 }
 
 __device__ inline void include(DeviceBox& a, const DeviceBox& b) {
-  for (int k = 0; k < 3; ++k) {
-    a.low[k] = b.low[k] < a.low[k] ? b.low[k] : a.low[k];
-    a.high[k] = a.high[k] < b.high[k] ? b.high[k] : a.high[k];
-  }
+  for (int end = 0; end < 2; ++end)
+    for (int k = 0; k < 3; ++k) {
+      a.low[end].x[k] = b.low[end].x[k] < a.low[end].x[k] ? b.low[end].x[k] : a.low[end].x[k];
+      a.high[end].x[k] = a.high[end].x[k] < b.high[end].x[k] ? b.high[end].x[k] : a.high[end].x[k];
+    }
 }
 
+// Not in the same order along an axis at both ends.
 __device__ inline bool overlap(const DeviceBox& a, const DeviceBox& b) {
-  return (a.low[0] <= b.high[0]) & (b.low[0] <= a.high[0]) & (a.low[1] <= b.high[1]) & (b.low[1] <= a.high[1]) &
-         (a.low[2] <= b.high[2]) & (b.low[2] <= a.high[2]);
+  bool apart = false;
+  for (int k = 0; k < 3; ++k)
+    apart |= ((a.high[0].x[k] < b.low[0].x[k]) & (a.high[1].x[k] < b.low[1].x[k])) |
+             ((b.high[0].x[k] < a.low[0].x[k]) & (b.high[1].x[k] < a.low[1].x[k]));
+  return !apart;
 }
 
 // One vertex at both ends, widened.

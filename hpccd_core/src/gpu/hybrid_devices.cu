@@ -85,7 +85,7 @@ class CudaTestDevice final : public hybrid::TestDevice {
         slots_(n_slots) {
     check(cudaDeviceGetAttribute(&multiprocessors_, cudaDevAttrMultiProcessorCount, device), "cudaDeviceGetAttribute");
     counters_.reserve(1);
-    vertex_boxes_.reserve(std::max<std::size_t>(features.n_vertices, 1));
+    points_.reserve(std::max<std::size_t>(features.n_vertices, 1));
     rows_.reserve(std::max<std::size_t>(features.n_vertices, 1));
   }
   ~CudaTestDevice() override { cancel(); }
@@ -182,7 +182,7 @@ class CudaTestDevice final : public hybrid::TestDevice {
   }
 
   void count(std::map<std::string, std::uint64_t>& stats) const override {
-    std::size_t bytes = scene_.bytes() + leaves_.bytes() + vertex_boxes_.bytes() + rows_.bytes() + given_[0].bytes() +
+    std::size_t bytes = scene_.bytes() + leaves_.bytes() + points_.bytes() + rows_.bytes() + given_[0].bytes() +
                         given_[1].bytes();
     for (const Slot& s : slots_) bytes += s.lists.bytes() + s.pairs.bytes();
     stats["gpu_bytes"] += bytes;
@@ -200,7 +200,7 @@ class CudaTestDevice final : public hybrid::TestDevice {
     Frame<T> f{};
     scene_.fill(f);
     leaves_.fill(f);
-    f.rows = reinterpret_cast<Row<T>*>(rows_.data()), f.vertex_boxes = vertex_boxes_.data();
+    f.rows = reinterpret_cast<Row<T>*>(rows_.data()), f.points = points_.data();
     f.counters = counters_.data();
     return f;
   }
@@ -267,10 +267,14 @@ class CudaTestDevice final : public hybrid::TestDevice {
   // The kernels between the copy and "data ready", anew where something that they name has changed.
   template <class T>
   void record(Slot& s) {
-    const TestLists::Sizes z = s.lists.sizes();
-    const std::vector<std::uintptr_t> now{
-        sizeof(T),   leaves_version_, s.pairs.size(), s.keys.size(), z.survivors[0], z.survivors[1],      z.single[0],
-        z.single[1], z.many[0],       z.many[1],      z.undecided,   z.to_host,      s.lists.n_segments()};
+    // Places as well as sizes: after a failed allocation a buffer may come back as large as it was, elsewhere.
+    std::vector<std::uintptr_t> now{sizeof(T), leaves_version_, s.lists.n_segments()};
+    const auto depends_on = [&](const auto& buffer) {
+      now.push_back(reinterpret_cast<std::uintptr_t>(buffer.data()));
+      now.push_back(buffer.size());
+    };
+    depends_on(s.pairs), depends_on(s.keys), depends_on(s.tocs);
+    s.lists.for_buffers(depends_on);
     if (now == s.recorded) return;
     s.recorded.clear();
     Frame<T> f = frame<T>();
@@ -300,7 +304,7 @@ class CudaTestDevice final : public hybrid::TestDevice {
   PinnedBuffer<double> staging_[2];
   DeviceBuffer<double> given_[2];
   DeviceBuffer<Row<double>> rows_;
-  DeviceBuffer<DeviceBox> vertex_boxes_;
+  DeviceBuffer<DevicePoint> points_;
   DeviceBuffer<Counters> counters_;
   std::vector<Slot> slots_;
   TestLists::Sizes largest_{};

@@ -118,7 +118,8 @@ class DevicePipeline : public Pipeline {
 
   u32 n_nodes_ = 0;
   DeviceLeaves leaves_;
-  DeviceBuffer<DeviceBox> node_boxes_, vertex_boxes_;
+  DeviceBuffer<DeviceBox> node_boxes_;
+  DeviceBuffer<DevicePoint> points_;
   DeviceBuffer<u32> node_mesh_, node_parent_, node_arrivals_, leaf_nodes_;
 
   PinnedBuffer<double> staging_[2];
@@ -155,7 +156,7 @@ void DevicePipeline::set_tree(const Tree& tree) {
     mesh[i] = node.mesh == mixed_meshes ? no_mesh : node.mesh;
     if (node.children) parent[node.children] = parent[node.children + 1] = static_cast<u32>(i);
     last_leaf[i] = node.children ? std::max(last_leaf[node.children], last_leaf[node.children + 1]) : node.leaf;
-    boxes[i] = {{0, 0, 0}, node.children, {0, 0, 0}, last_leaf[i]};
+    boxes[i].tag_low() = node.children, boxes[i].tag_high() = last_leaf[i];
   }
   for (std::size_t i = 1; i < n; ++i) deepest = std::max(deepest, depth[i] = depth[parent[i]] + 1);
   if (deepest > traverse_depth) throw Error("the tree is too deep for the device; use backend=\"cpu\"");
@@ -166,13 +167,13 @@ void DevicePipeline::set_tree(const Tree& tree) {
   check(cudaMemset(node_arrivals_.data(), 0, node_arrivals_.bytes()), "cudaMemset");
   upload(leaf_nodes_, tree.leaf_nodes.data(), n_leaves);
   leaves_.set(features_, tree.leaves, tree.face_of_slot, tree.edge_of_slot, tree.vertex_of_slot);
-  vertex_boxes_.reserve(std::max<std::size_t>(n_vertices, 1));
+  points_.reserve(std::max<std::size_t>(n_vertices, 1));
   rows_.reserve(std::max<std::size_t>(n_vertices, 1));
   n_nodes_ = static_cast<u32>(n);
 }
 
 std::size_t DevicePipeline::device_bytes() const {
-  return scene_.bytes() + leaves_.bytes() + lists_.bytes() + node_boxes_.bytes() + vertex_boxes_.bytes() +
+  return scene_.bytes() + leaves_.bytes() + lists_.bytes() + node_boxes_.bytes() + points_.bytes() +
          rows_.bytes() + leaf_pairs_.bytes() + found_keys_.bytes() + sorted_keys_.bytes() + found_tocs_.bytes() +
          numbers_.bytes() + order_.bytes() + workspace_.bytes() + given_[0].bytes() + given_[1].bytes();
 }
@@ -229,7 +230,7 @@ Frame<T> DevicePipeline::frame(Positions t0, Positions t1, ThreadPool& pool) {
   const T* given[2];
   bring(t0, t1, given, pool);
   f.given_t0 = given[0], f.given_t1 = given[1];
-  f.rows = reinterpret_cast<Row<T>*>(rows_.data()), f.vertex_boxes = vertex_boxes_.data();
+  f.rows = reinterpret_cast<Row<T>*>(rows_.data()), f.points = points_.data();
   f.counters = counters_.data();
   return f;
 }

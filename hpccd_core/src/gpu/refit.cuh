@@ -12,36 +12,38 @@ __device__ DeviceBox refit_leaf(const Frame<T>& f, u32 leaf) {
   const u32 lane = lane_number();
   const DeviceLeaf l = f.leaves[leaf];
   const u32 n_faces = l.counts & 0xFF, n_edges = l.counts >> 8 & 0xFF, n_vertices = l.counts >> 16;
-  DeviceBox whole{{INFINITY, INFINITY, INFINITY}, 0, {-INFINITY, -INFINITY, -INFINITY}, 0};
+  const Bound top{{INFINITY, INFINITY, INFINITY}, 0}, bottom{{-INFINITY, -INFINITY, -INFINITY}, 0};
+  DeviceBox whole{{top, top}, {bottom, bottom}};
   if (lane < n_faces) {
     DeviceBox& face = f.face_boxes[l.first_face + lane];
-    const u32 c0 = face.tag_low, c1 = face.tag_high, c2 = f.face_corner2[l.first_face + lane];
-    DeviceBox b = load_box(&f.vertex_boxes[c0]);
-    include(b, load_box(&f.vertex_boxes[c1]));
-    include(b, load_box(&f.vertex_boxes[c2]));
-    b.tag_low = c0, b.tag_high = c1;
+    const u32 c0 = face.tag_low(), c1 = face.tag_high(), c2 = f.face_corner2[l.first_face + lane];
+    DeviceBox b = load_point(&f.points[c0]);
+    include(b, load_point(&f.points[c1]));
+    include(b, load_point(&f.points[c2]));
+    b.tag_low() = c0, b.tag_high() = c1;
     store_box(&face, b);
     include(whole, b);
   }
   if (lane < n_edges) {
     DeviceBox& edge = f.edge_boxes[l.first_edge + lane];
-    const u32 v0 = edge.tag_low, v1 = edge.tag_high;
-    DeviceBox b = load_box(&f.vertex_boxes[v0]);
-    include(b, load_box(&f.vertex_boxes[v1]));
-    b.tag_low = v0, b.tag_high = v1;
+    const u32 v0 = edge.tag_low(), v1 = edge.tag_high();
+    DeviceBox b = load_point(&f.points[v0]);
+    include(b, load_point(&f.points[v1]));
+    b.tag_low() = v0, b.tag_high() = v1;
     store_box(&edge, b);  // inside its triangle's box
   }
   if (lane < n_vertices)  // a lone vertex has no triangle
-    include(whole, load_box(&f.vertex_boxes[f.vertex_of_slot[l.first_vertex + lane]]));
+    include(whole, load_point(&f.points[f.vertex_of_slot[l.first_vertex + lane]]));
   for (int d = 16; d > 0; d /= 2) {
     DeviceBox other;
-    for (int k = 0; k < 3; ++k) {
-      other.low[k] = __shfl_xor_sync(all_lanes, whole.low[k], d);
-      other.high[k] = __shfl_xor_sync(all_lanes, whole.high[k], d);
-    }
+    for (int end = 0; end < 2; ++end)
+      for (int k = 0; k < 3; ++k) {
+        other.low[end].x[k] = __shfl_xor_sync(all_lanes, whole.low[end].x[k], d);
+        other.high[end].x[k] = __shfl_xor_sync(all_lanes, whole.high[end].x[k], d);
+      }
     include(whole, other);
   }
-  whole.tag_low = 0, whole.tag_high = leaf;
+  whole.tag_low() = 0, whole.tag_high() = leaf;
   if (lane == 0) store_box(&f.leaf_boxes[leaf], whole);
   return whole;
 }
@@ -67,27 +69,33 @@ __global__ void refit_kernel(Frame<T> f) {
     __threadfence();
     f.node_arrivals[node] = 0;
     const DeviceBox& own = f.node_boxes[node];
-    const u32 child = own.tag_low, last = own.tag_high;
+    const u32 child = own.tag_low(), last = own.tag_high();
     DeviceBox b = load_box_fresh(&f.node_boxes[child]);
     include(b, load_box_fresh(&f.node_boxes[child + 1]));
-    b.tag_low = child, b.tag_high = last;
+    b.tag_low() = child, b.tag_high() = last;
     store_box(&f.node_boxes[node], b);
   }
 }
 
-// Sum of the nodes' half areas (tree.h, relative_area); the root's own is divided out by the host.
+// The mean of both ends, times two (motion_box.h).
+__device__ inline float area_of(const DeviceBox& b) {
+  float sum = 0;
+  for (int end = 0; end < 2; ++end) {
+    const float *low = b.low[end].x, *high = b.high[end].x;
+    const float x = high[0] - low[0], y = high[1] - low[1], z = high[2] - low[2];
+    sum += x * y + y * z + z * x;
+  }
+  return sum;
+}
+
+// Sum of the nodes' areas over the root's (tree.h, relative_area).
 template <class T>
 __global__ void area_kernel(Frame<T> f) {
   double sum = 0;
-  for (u32 i = blockIdx.x * blockDim.x + threadIdx.x; i < f.n_nodes; i += gridDim.x * blockDim.x) {
-    const DeviceBox b = load_box(&f.node_boxes[i]);
-    const float x = b.high[0] - b.low[0], y = b.high[1] - b.low[1], z = b.high[2] - b.low[2];
-    sum += x * y + y * z + z * x;
-  }
+  for (u32 i = blockIdx.x * blockDim.x + threadIdx.x; i < f.n_nodes; i += gridDim.x * blockDim.x)
+    sum += area_of(load_box(&f.node_boxes[i]));
   for (int d = 16; d > 0; d /= 2) sum += __shfl_xor_sync(all_lanes, sum, d);
-  const DeviceBox root = load_box(&f.node_boxes[0]);
-  const float x = root.high[0] - root.low[0], y = root.high[1] - root.low[1], z = root.high[2] - root.low[2];
-  const float area = x * y + y * z + z * x;
+  const float area = area_of(load_box(&f.node_boxes[0]));
   if (lane_number() == 0 && area > 0) atomicAdd(&f.counters->area, sum / area);
 }
 

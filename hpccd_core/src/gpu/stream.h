@@ -58,9 +58,10 @@ class Graph {
   template <class Submit>
   void record(cudaStream_t stream, Submit&& submit) {
     drop();
-    check(cudaStreamBeginCapture(stream, cudaStreamCaptureModeRelaxed), "cudaStreamBeginCapture");
+    const cudaError_t began = cudaStreamBeginCapture(stream, cudaStreamCaptureModeRelaxed);
     cudaGraph_t graph = nullptr;
     try {
+      check(began, "cudaStreamBeginCapture");
       submit();
     } catch (...) {  // the stream must not stay in this state
       cudaStreamEndCapture(stream, &graph);

@@ -37,6 +37,12 @@ class TestLists {
             {many_[0].size(), many_[1].size()}, undecided_.size(), to_host_.size()};
   }
 
+  template <class Visit>
+  void for_buffers(Visit&& visit) const {
+    for (int k = 0; k < 2; ++k) visit(survivors_[k]), visit(single_[k]), visit(many_[k]);
+    visit(undecided_), visit(to_host_);
+  }
+
   // All stages on pairs of leaves that the frame lists; the frame's counters were cleared, its contacts have a place.
   // Defined for float and double.
   template <class T>

@@ -46,11 +46,11 @@ __global__ __launch_bounds__(32 * traverse_warps) void traverse_kernel(Frame<T> 
   };
   // Keeps a node of the lane: leaves go to the list, others on the stack.
   const auto keep = [&](bool wanted, u32 node, const DeviceBox& b) {
-    const bool hit = wanted && b.tag_high >= leaf && overlap(box, b) &&
+    const bool hit = wanted && b.tag_high() >= leaf && overlap(box, b) &&
                      (!f.enabled || meshes_enabled(f, mesh, f.node_mesh[node]));
-    const u32 leaves = __ballot_sync(all_lanes, hit && b.tag_low == 0), inner = __ballot_sync(all_lanes, hit && b.tag_low != 0);
-    if (hit && b.tag_low == 0) found[n_found + __popc(leaves & below)] = b.tag_high;
-    if (hit && b.tag_low != 0) stack[n_stack + __popc(inner & below)] = b.tag_low;
+    const u32 leaves = __ballot_sync(all_lanes, hit && b.tag_low() == 0), inner = __ballot_sync(all_lanes, hit && b.tag_low() != 0);
+    if (hit && b.tag_low() == 0) found[n_found + __popc(leaves & below)] = b.tag_high();
+    if (hit && b.tag_low() != 0) stack[n_stack + __popc(inner & below)] = b.tag_low();
     n_found += __popc(leaves);
     n_stack += __popc(inner);
     if (n_found > traverse_found - 32) flush();
