@@ -24,7 +24,7 @@ PairPool::PairPool(const Tree& tree, const std::vector<NodePair>& pairs, int thr
 
 void PairPool::give(std::vector<NodePair>& stack) {
   // Below this a pair costs less than handing it over.
-  constexpr int worth_moving = 4 * Tree::leaf_size;
+  constexpr int worth_moving = 64 * Tree::leaf_size;
   const std::size_t half = stack.size() / 2;
   if (half == 0 || tree_.nodes[stack[0].a].carriers + tree_.nodes[stack[0].b].carriers < worth_moving) return;
   const auto end = stack.begin() + static_cast<std::ptrdiff_t>(half);
