@@ -151,7 +151,7 @@ struct Detector::Impl {
     }
     refit(tree, motion.boxes, tree_followed ? motion.resting : std::vector<char>(), pool);
     profiler.mark("refit");
-    if (relative_area(tree, pool) > worn_out * tree.area_when_built) {
+    if (tree.area > worn_out * tree.area_when_built) {
       build_tree_anew();
       profiler.mark("build");
     }

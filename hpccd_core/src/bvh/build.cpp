@@ -52,9 +52,9 @@ class Builder {
   void run() {
     group_by_mesh();
     split_meshes();
-    tree_.level_begin = {0};
     while (!level_.empty()) split_level();
     lay_out_slots();
+    choose_front();
   }
 
  private:
@@ -144,7 +144,6 @@ class Builder {
   }
 
   void split_level() {
-    tree_.level_begin.push_back(static_cast<std::uint32_t>(tree_.nodes.size()));
     parallel_for(pool_, level_.size(), 1, [&](std::size_t begin, std::size_t end, int) {
       for (std::size_t i = begin; i < end; ++i) {
         const std::uint32_t n = level_[i].end - level_[i].begin;
@@ -193,6 +192,24 @@ class Builder {
         tree_.nodes[i].carriers = left.carriers + right.carriers;
         tree_.nodes[i].only_points = left.only_points && right.only_points;
       }
+  }
+
+  void choose_front() {
+    // Enough for any number of threads, and each worth a thread's while.
+    const std::uint32_t most = std::max(features_.n_carriers() / 256, 8 * Tree::leaf_size);
+    std::vector<std::uint32_t> queue;
+    if (!tree_.nodes.empty()) queue.push_back(0);
+    for (std::size_t i = 0; i < queue.size(); ++i) {
+      const Node& node = tree_.nodes[queue[i]];
+      if (node.children && (node.mesh == mixed_meshes || node.carriers > most)) {
+        tree_.above_front.push_back(queue[i]);
+        queue.push_back(node.children);
+        queue.push_back(node.children + 1);
+      } else {
+        tree_.front.push_back({queue[i]});
+      }
+    }
+    std::reverse(tree_.above_front.begin(), tree_.above_front.end());
   }
 
   // The slots of a leaf that follows another.
@@ -252,7 +269,7 @@ void build(Tree& tree, const Scene& scene, const Features& features, const std::
   tree = {};
   Builder(tree, scene, features, vertex_boxes, pool).run();
   refit(tree, vertex_boxes, {}, pool);
-  tree.area_when_built = relative_area(tree, pool);
+  tree.area_when_built = tree.area;
 }
 
 }  // namespace hpccd

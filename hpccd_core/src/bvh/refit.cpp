@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cstring>
-#include <numeric>
 
 #include "bvh/tree.h"
 
@@ -80,59 +79,50 @@ MotionBox leaf_bounds(const Tree& tree, const LeafRange& leaf, const std::vector
   return box;
 }
 
+void join_children(Tree& tree, Node& node) {
+  node.box = tree.nodes[node.children].box;
+  node.box.include(tree.nodes[node.children + 1].box);
+}
+
+// Returns the sum of the areas of its nodes.
+double refit_subtree(Tree& tree, std::uint32_t root, const std::vector<MotionBox>& vertex_boxes) {
+  Node& node = tree.nodes[root];
+  if (!node.children) {
+    node.box = leaf_bounds(tree, tree.leaves[node.leaf], vertex_boxes);
+    return node.box.area();
+  }
+  const double left = refit_subtree(tree, node.children, vertex_boxes);
+  const double right = refit_subtree(tree, node.children + 1, vertex_boxes);
+  join_children(tree, node);
+  return left + right + node.box.area();
+}
+
 }  // namespace
 
 void refit(Tree& tree, const std::vector<MotionBox>& vertex_boxes, const std::vector<char>& resting, ThreadPool& pool) {
-  const auto rests = [&](const Node& node) {
-    return !resting.empty() && node.mesh != mixed_meshes && resting[node.mesh];
-  };
-  parallel_for(pool, tree.leaves.size(), 32, [&](std::size_t begin, std::size_t end, int) {
+  parallel_for(pool, tree.front.size(), 1, [&](std::size_t begin, std::size_t end, int) {
     for (std::size_t i = begin; i < end; ++i) {
-      Node& node = tree.nodes[tree.leaf_nodes[i]];
-      if (!rests(node)) node.box = leaf_bounds(tree, tree.leaves[i], vertex_boxes);
+      Tree::Subtree& subtree = tree.front[i];
+      if (!resting.empty() && resting[tree.nodes[subtree.root].mesh]) continue;
+      subtree.area = refit_subtree(tree, subtree.root, vertex_boxes);
     }
   });
-  const auto join_children = [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = end; i-- > begin;) {
-      Node& node = tree.nodes[i];
-      if (!node.children || rests(node)) continue;
-      node.box = tree.nodes[node.children].box;
-      node.box.include(tree.nodes[node.children + 1].box);
-    }
-  };
-  // A level this small is done before other threads have noticed.
-  constexpr std::size_t small = 1024;
-  for (std::size_t level = tree.level_begin.size(); level-- > 0;) {
-    const std::size_t first = tree.level_begin[level];
-    const std::size_t n =
-        (level + 1 < tree.level_begin.size() ? tree.level_begin[level + 1] : tree.nodes.size()) - first;
-    if (level == 0)
-      join_children(first, first + n);
-    else
-      parallel_for(pool, n, small,
-                   [&](std::size_t begin, std::size_t end, int) { join_children(first + begin, first + end); });
+  double area = 0;
+  for (const Tree::Subtree& subtree : tree.front) area += subtree.area;
+  for (const std::uint32_t n : tree.above_front) {
+    join_children(tree, tree.nodes[n]);
+    area += tree.nodes[n].box.area();
   }
+  const double root = tree.nodes.empty() ? 0 : tree.nodes[0].box.area();
+  tree.area = root > 0 ? area / root : 0;
 }
 
 std::size_t Tree::bytes() const {
   const std::size_t faces = face_of_slot.capacity(), edges = edge_of_slot.capacity(),
                     vertices = vertex_of_slot.capacity();
-  return nodes.capacity() * sizeof(Node) + leaves.capacity() * (sizeof(LeafRange) + 4) + faces * 16 + edges * 12 +
-         vertices * 4 + n_box_groups * sizeof(BoxGroup);
-}
-
-double relative_area(const Tree& tree, ThreadPool& pool) {
-  if (tree.nodes.empty()) return 0;
-  // Added piece by piece in a fixed order: when a tree is rebuilt must not depend on the number of threads.
-  constexpr std::size_t piece = 2048;
-  std::vector<double> sums((tree.nodes.size() + piece - 1) / piece, 0);
-  parallel_for(pool, sums.size(), 1, [&](std::size_t begin, std::size_t end, int) {
-    for (std::size_t i = begin; i < end; ++i)
-      for (std::size_t k = i * piece; k < std::min((i + 1) * piece, tree.nodes.size()); ++k)
-        sums[i] += tree.nodes[k].box.area();
-  });
-  const double root = tree.nodes[0].box.area();
-  return root > 0 ? std::accumulate(sums.begin(), sums.end(), 0.0) / root : 0;
+  return nodes.capacity() * sizeof(Node) + front.capacity() * sizeof(Subtree) + above_front.capacity() * 4 +
+         leaves.capacity() * (sizeof(LeafRange) + 4) + faces * 16 + edges * 12 + vertices * 4 +
+         n_box_groups * sizeof(BoxGroup);
 }
 
 }  // namespace hpccd

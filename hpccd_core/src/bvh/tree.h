@@ -75,9 +75,14 @@ struct Tree {
   static constexpr std::uint32_t load_width = 16;  // boxes are compared 16 at a time
 
   std::vector<Node> nodes;  // breadth first: children come after their parents
-  // nodes[level_begin[i] .. level_begin[i + 1]) have their children on the next level; on the first, which joins whole
-  // meshes, also on the same one.
-  std::vector<std::uint32_t> level_begin;
+  // A front of subtrees, each within one mesh, that are refitted by one thread each (Kim et al. 2009, section 6), and
+  // the nodes above it, children before parents. The same for any number of threads, so that sums of areas are.
+  struct Subtree {
+    std::uint32_t root;
+    double area = 0;  // sum over its nodes
+  };
+  std::vector<Subtree> front;
+  std::vector<std::uint32_t> above_front;
   std::vector<LeafRange> leaves;
   std::vector<std::uint32_t> leaf_nodes;
   // Slots: features in the order of the leaves; each array ends with load_width slots of padding.
@@ -85,7 +90,8 @@ struct Tree {
   std::vector<std::uint32_t> face_corners[3], edge_ends[2];  // vertex numbers by slot
   std::unique_ptr<BoxGroup[]> box_groups;
   std::size_t n_box_groups = 0;
-  double area_when_built = 0;  // sum over nodes, relative to the root's
+  double area = 0;  // sum over nodes, relative to the root's: what traversal pays grows with it
+  double area_when_built = 0;
 
   std::size_t bytes() const;
 };
@@ -97,8 +103,5 @@ void build(Tree& tree, const Scene& scene, const Features& features, const std::
 // The same tree with new bounds, bottom up (Kim et al. 2009, section 6, parallel BVH update). `resting`: by mesh, true
 // where vertex boxes are as they were at the last call; empty: of none.
 void refit(Tree& tree, const std::vector<MotionBox>& vertex_boxes, const std::vector<char>& resting, ThreadPool& pool);
-
-// Sum of the nodes' areas over the root's: what traversal pays grows with it.
-double relative_area(const Tree& tree, ThreadPool& pool);
 
 }  // namespace hpccd

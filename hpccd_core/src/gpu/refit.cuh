@@ -88,7 +88,7 @@ __device__ inline float area_of(const DeviceBox& b) {
   return sum;
 }
 
-// Sum of the nodes' areas over the root's (tree.h, relative_area).
+// Sum of the nodes' areas over the root's (Tree::area).
 template <class T>
 __global__ void area_kernel(Frame<T> f) {
   double sum = 0;
