@@ -24,7 +24,7 @@ PairPool::PairPool(const Tree& tree, const std::vector<NodePair>& pairs, int thr
 
 void PairPool::give(std::vector<NodePair>& stack) {
   // Below this a pair costs less than handing it over.
-  constexpr int worth_moving = 64 * Tree::leaf_size;
+  constexpr int worth_moving = 16 * Tree::leaf_size;
   const std::size_t half = stack.size() / 2;
   if (half == 0 || tree_.nodes[stack[0].a].carriers + tree_.nodes[stack[0].b].carriers < worth_moving) return;
   const auto end = stack.begin() + static_cast<std::ptrdiff_t>(half);
@@ -51,9 +51,7 @@ bool PairPool::take_one(int thread, std::vector<NodePair>& stack) {
 }
 
 // No pair is lost: whoever gives one away asks for another before it ends.
-bool PairPool::take(int thread, std::vector<NodePair>& stack) {
-  if (take_one(thread, stack)) return true;
-  ++hungry_;
+bool PairPool::wait(int thread, std::vector<NodePair>& stack) {
   bool got = false;
   for (int turn = 0; !got && !abandoned_; ++turn) {
     // Busy first: a thread that gives stays busy until it has given.
@@ -68,7 +66,6 @@ bool PairPool::take(int thread, std::vector<NodePair>& stack) {
     else
       std::this_thread::yield();
   }
-  --hungry_;
   return got;
 }
 

@@ -23,15 +23,24 @@ class PairPool {
   // Takes the older half of a stack that holds work worth moving.
   void give(std::vector<NodePair>& stack);
 
-  // Puts a pair on the empty stack; waits for one where others may still give. False: everything is done. The caller
-  // counts as busy until it asks again.
-  bool take(int thread, std::vector<NodePair>& stack);
+  // Puts a pair on the empty stack; where others may still give one, does `meanwhile()` and waits. False: everything is
+  // done. The caller counts as busy until it asks again.
+  template <class Meanwhile>
+  bool take(int thread, std::vector<NodePair>& stack, Meanwhile&& meanwhile) {
+    if (take_one(thread, stack)) return true;
+    ++hungry_;
+    meanwhile();
+    const bool got = wait(thread, stack);
+    --hungry_;
+    return got;
+  }
 
   // After an exception: all others stop.
   void abandon() { abandoned_ = true; }
 
  private:
   bool take_one(int thread, std::vector<NodePair>& stack);
+  bool wait(int thread, std::vector<NodePair>& stack);
 
   const Tree& tree_;
   std::mutex mutex_;
@@ -54,9 +63,10 @@ class BusyThread {
   BusyThread& operator=(const BusyThread&) = delete;
 
   // As PairPool::take.
-  bool next(std::vector<NodePair>& stack) {
+  template <class Meanwhile>
+  bool next(std::vector<NodePair>& stack, Meanwhile&& meanwhile) {
     if (busy_) --pool_.busy_;
-    return busy_ = pool_.take(thread_, stack);
+    return busy_ = pool_.take(thread_, stack, meanwhile);
   }
 
  private:

@@ -96,7 +96,11 @@ void traverse(const Tree& tree, const PairRules& rules, Search& search, ThreadPo
     Worker& worker = workers[thread];
     BusyThread busy(pairs, thread);
     std::vector<NodePair> stack;
-    while (busy.next(stack))
+    // What waits for a full batch is tested while there is nothing better to do; a sink's segments are for it to send.
+    const auto meanwhile = [&] {
+      if (!worker.sink) worker.flush();
+    };
+    while (busy.next(stack, meanwhile))
       walk(tree, rules, search, stack, worker, [&] {
         if (pairs.wanted()) pairs.give(stack);
       });
