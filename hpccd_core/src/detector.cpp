@@ -243,6 +243,8 @@ Contacts Detector::detect(Positions t0, Positions t1) {
         "vertices_t0, vertices_t1: are in a GPU's memory, which this detector does not use; copy them "
         "to the host, or use backend=\"gpu\"");
   if (d.search.cancelled) throw Cancelled();
+  std::optional<gpu::CallersDevice> callers;
+  if (d.gpu || d.hybrid) callers.emplace();
   d.profiler.begin();
   const Backend backend = d.next_backend(t0.on_device || t1.on_device);
   if (backend == Backend::gpu) {

@@ -22,6 +22,40 @@ def test_same_contacts_as_from_the_host(library, dtype):
     assert detector.stats["gpu_fallbacks"] == 0
 
 
+@pytest.mark.parametrize("library", ("cupy", "torch"))
+def test_arrays_on_another_device_than_the_detectors(library):
+    module = pytest.importorskip(library)
+    if len(hc.gpu_status()["devices"]) < 2:
+        pytest.skip("2 GPUs are not here")
+    scene, t0, t1 = scenes.join([scenes.lattice(np.random.default_rng(3), 20)])
+    expected = hc.Detector(scene, backend="cpu").detect(t0, t1).hash
+    detector = hc.Detector(scene, backend="gpu")
+    if library == "cupy":
+        with module.cuda.Device(1):
+            given = [module.asarray(t) for t in (t0, t1)]
+    else:
+        given = [module.from_numpy(t).to("cuda:1") for t in (t0, t1)]
+    for _ in range(2):
+        assert detector.detect(*given).hash == expected
+    detector.reset()
+    assert [len(detector.step(t)) > 0 for t in given] == [False, True]
+    assert detector.stats["gpu_fallbacks"] == 0
+
+
+@pytest.mark.parametrize("backend", ("gpu", "hybrid"))
+def test_the_callers_device_stays_current(backend):
+    torch = pytest.importorskip("torch")
+    scene, t0, t1 = scenes.join([scenes.crumpled(np.random.default_rng(6), 12)])
+    for device in range(torch.cuda.device_count()):
+        torch.cuda.set_device(device)
+        detector = hc.Detector(scene, backend=backend)
+        detector.detect(t0, t1)
+        assert detector.backend == backend
+        del detector
+        assert torch.cuda.current_device() == device
+    torch.cuda.set_device(0)
+
+
 class _OnlyDlpack:
     def __init__(self, array):
         self.array = array

@@ -4,5 +4,5 @@
 namespace hpccd::HPCCD_ISA {
 using Double = Lanes<double, 4>;
 using Single = Lanes<float, 8>;
-}
+}  // namespace hpccd::HPCCD_ISA
 #include "elementary/batch.inl"

@@ -4,5 +4,5 @@
 namespace hpccd::HPCCD_ISA {
 using Double = Lanes<double, 8>;
 using Single = Lanes<float, 16>;
-}
+}  // namespace hpccd::HPCCD_ISA
 #include "elementary/batch.inl"

@@ -4,5 +4,5 @@
 namespace hpccd::HPCCD_ISA {
 using Double = double;
 using Single = float;
-}
+}  // namespace hpccd::HPCCD_ISA
 #include "elementary/batch.inl"

@@ -69,7 +69,8 @@ HPCCD_HD Outcome<R> many_roots_test(const Motion<R>& m) {
     Mask passed = empty;
     if (any(one)) {
       const R sign = select(piece[i].c0 < R(0), R(-1), R(1));
-      const Outcome<R> o = piece_with_one_root<kind, Policy>(m, size, f, error.value, bound[i], bound[i + 1], sign, one);
+      const Outcome<R> o =
+          piece_with_one_root<kind, Policy>(m, size, f, error.value, bound[i], bound[i + 1], sign, one);
       out.contact = out.contact || o.contact;
       out.toc = select(o.contact, o.toc, out.toc);
       out.delta = select(o.contact, o.delta, out.delta);

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Search for the earliest time at which two features come within a given separation, by inclusion (Snyder 1992; Wang et
-// al. 2021): the gap g(t, x, y) = p(t) - x a(t) - y b(t) is linear in each variable, so over a box of (t, x, y) it stays
-// within the bounds of its eight corners. A box whose bounds stay outside the separation holds no contact; the others are
-// halved, earliest first, until their gap is known to the tolerance.
+// al. 2021): the gap g(t, x, y) = p(t) - x a(t) - y b(t) is linear in each variable, so over a box of (t, x, y) it
+// stays within the bounds of its eight corners. A box whose bounds stay outside the separation holds no contact; the
+// others are halved, earliest first, until their gap is known to the tolerance.
 //
 // The guarantee: a pair that comes within `separation` (measured along each axis, hence also in Euclidean distance) is
 // reported, at a time no later than this happens. A reported pair comes within separation + tolerance along each axis
@@ -20,8 +20,8 @@
 namespace hpccd::inclusion {
 
 struct Limits {
-  double separation = 0;     // in units of the coordinates
-  double tolerance = 1e-6;   // likewise
+  double separation = 0;    // in units of the coordinates
+  double tolerance = 1e-6;  // likewise
   int max_boxes = 100000;
 };
 
@@ -44,11 +44,13 @@ inline Interval hull(double a, double b, double c, double d) {
 
 inline Gap gap_over(const Motion<double>& m, const Domain& d) {
   Gap g;
-  const double Vec3<double>::*axes[3] = {&Vec3<double>::x, &Vec3<double>::y, &Vec3<double>::z};
+  const double Vec3<double>::* axes[3] = {&Vec3<double>::x, &Vec3<double>::y, &Vec3<double>::z};
   for (int k = 0; k < 3; ++k) {
     const auto axis = axes[k];
     const auto at = [&](double t) {
-      const auto mix = [&](const Vec3<double>& v0, const Vec3<double>& v1) { return (1 - t) * v0.*axis + t * v1.*axis; };
+      const auto mix = [&](const Vec3<double>& v0, const Vec3<double>& v1) {
+        return (1 - t) * v0.*axis + t * v1.*axis;
+      };
       const double p = mix(m.p0, m.p1), a = mix(m.a0, m.a1), b = mix(m.b0, m.b1);
       return hull(p - d.x.low * a - d.y.low * b, p - d.x.high * a - d.y.low * b, p - d.x.low * a - d.y.high * b,
                   p - d.x.high * a - d.y.high * b);
@@ -61,7 +63,7 @@ inline Gap gap_over(const Motion<double>& m, const Domain& d) {
 
 inline double coordinate(const Vec3<double>& v, int axis) { return axis == 0 ? v.x : axis == 1 ? v.y : v.z; }
 
-inline Interval Domain::*widest_variable(const Motion<double>& m, const Domain& d, int axis) {
+inline Interval Domain::* widest_variable(const Motion<double>& m, const Domain& d, int axis) {
   const auto change = [&](const Vec3<double>& v0, const Vec3<double>& v1) {
     return std::fabs(coordinate(v1, axis) - coordinate(v0, axis));
   };
@@ -102,7 +104,7 @@ inline std::optional<double> earliest_within(Kind kind, const Motion<double>& m,
       if (excess > furthest) furthest = excess, axis = k;
     }
     if (axis < 0) return d.t.low;
-    Interval Domain::*const set = widest_variable(m, d, axis);
+    Interval Domain::* const set = widest_variable(m, d, axis);
     const Interval whole = d.*set;
     const double middle = whole.low + 0.5 * (whole.high - whole.low);
     if (!(middle > whole.low && middle < whole.high)) return d.t.low;  // as fine as doubles go

@@ -45,8 +45,8 @@ HPCCD_HD Verdict<R> inside(const Motion<R>& m, const Magnitudes<R>& size, R t, R
   const R signed_n = component(ab);
   const R sign = select(signed_n < R(0), R(-1), R(1));
   const R n = sign * signed_n, alpha = sign * component(pb), beta = sign * component(ap);
-  const R relative = Policy::borders_inside ? R(-24 * Policy::bound * half_ulp<R>())
-                                            : R(24 * half_ulp<R>()) + R(9) * delta;
+  const R relative =
+      Policy::borders_inside ? R(-24 * Policy::bound * half_ulp<R>()) : R(24 * half_ulp<R>()) + R(9) * delta;
   const R e_n = relative * size.a * size.b, e_alpha = relative * size.p * size.b, e_beta = relative * size.a * size.p;
   Verdict<R> v{n > magnitude(e_n), R(1) < R(0)};
   if constexpr (kind == Kind::vertex_face) {

@@ -64,14 +64,15 @@ HPCCD_HD TurningPoints<R> turning_points(const Cubic<R>& f) {
 
 template <class R>
 struct Root {
-  R t, delta;                               // the true root lies within delta of t
-  typename RealTraits<R>::Mask certain;     // ... which was proven by signs on both sides
+  R t, delta;                            // the true root lies within delta of t
+  typename RealTraits<R>::Mask certain;  // ... which was proven by signs on both sides
 };
 
 // The root of f in [low, high], which holds exactly one, with f(low) of sign `sign`. Newton's method kept inside the
 // shrinking bracket; each lane stops by its own criterion, so its result does not depend on its neighbours.
 template <class R>
-HPCCD_HD Root<R> bracketed_root(const Cubic<R>& f, R error, R low, R high, R sign, typename RealTraits<R>::Mask active) {
+HPCCD_HD Root<R> bracketed_root(const Cubic<R>& f, R error, R low, R high, R sign,
+                                typename RealTraits<R>::Mask active) {
   using Mask = typename RealTraits<R>::Mask;
   const R eps(half_ulp<R>());
   const R begin = low, end = high;

@@ -26,6 +26,7 @@ std::string why_unusable(int device) {
 }
 
 Status look() {
+  const CallersDevice callers;
   Status s;
   s.compiled = true;
   const int version = CUDART_VERSION;
@@ -55,6 +56,7 @@ class DeviceCopy final : public MemoryOnDevice {
  public:
   ~DeviceCopy() override { cudaFree(data_); }
   void assign(const void* from, std::size_t bytes) override {
+    const CallersDevice callers;
     cudaPointerAttributes a;
     check(cudaPointerGetAttributes(&a, from), "cudaPointerGetAttributes");
     check(cudaSetDevice(a.device), "cudaSetDevice");
@@ -86,6 +88,16 @@ std::unique_ptr<MemoryOnDevice> MemoryOnDevice::create() {
 const Status& status() {
   static const Status s = look();
   return s;
+}
+
+CallersDevice::CallersDevice() {
+  if (cudaGetDevice(&device_) == cudaSuccess) return;
+  cudaGetLastError();
+  device_ = -1;
+}
+
+CallersDevice::~CallersDevice() {
+  if (device_ >= 0 && cudaSetDevice(device_) != cudaSuccess) cudaGetLastError();
 }
 
 void fail_after(int checked_calls) { calls_until_failure = checked_calls; }

@@ -31,6 +31,18 @@ class Error : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+// Puts the thread's current device back at the end: other users of CUDA in the thread (CuPy, PyTorch) rely on it.
+class CallersDevice {
+ public:
+  CallersDevice();
+  ~CallersDevice();
+  CallersDevice(const CallersDevice&) = delete;
+  CallersDevice& operator=(const CallersDevice&) = delete;
+
+ private:
+  int device_ = -1;  // none, or unknown
+};
+
 // For tests: lets the n-th of the next checked CUDA calls fail (1: the next one; 0: none).
 void fail_after(int checked_calls);
 

@@ -172,6 +172,7 @@ class CudaTestDevice final : public hybrid::TestDevice {
   }
 
   void cancel() override {
+    const CallersDevice callers;
     cudaSetDevice(device_);
     cudaStreamSynchronize(upload_);
     for (Slot& s : slots_) {
@@ -182,8 +183,8 @@ class CudaTestDevice final : public hybrid::TestDevice {
   }
 
   void count(std::map<std::string, std::uint64_t>& stats) const override {
-    std::size_t bytes = scene_.bytes() + leaves_.bytes() + points_.bytes() + rows_.bytes() + given_[0].bytes() +
-                        given_[1].bytes();
+    std::size_t bytes =
+        scene_.bytes() + leaves_.bytes() + points_.bytes() + rows_.bytes() + given_[0].bytes() + given_[1].bytes();
     for (const Slot& s : slots_) bytes += s.lists.bytes() + s.pairs.bytes();
     stats["gpu_bytes"] += bytes;
     stats["hybrid_resubmitted"] += resubmitted_;

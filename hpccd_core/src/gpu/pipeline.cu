@@ -31,6 +31,7 @@ class DevicePipeline : public Pipeline {
   }
 
   ~DevicePipeline() override {
+    const CallersDevice callers;
     cudaSetDevice(device_);
     cudaStreamSynchronize(stream_);
   }
@@ -59,9 +60,9 @@ class DevicePipeline : public Pipeline {
   Positions download(Positions p, int which) override {
     const std::size_t bytes = 3 * p.n * (p.is_double ? 8 : 4);
     downloaded_[which].resize(bytes);
-    check(cudaSetDevice(device_), "cudaSetDevice");
-    check(cudaDeviceSynchronize(), "cudaDeviceSynchronize");
-    if (bytes) check(cudaMemcpy(downloaded_[which].data(), p.data, bytes, cudaMemcpyDeviceToHost), "cudaMemcpy");
+    if (!bytes) return {downloaded_[which].data(), p.n, p.is_double};
+    settled_device(p.data);
+    check(cudaMemcpy(downloaded_[which].data(), p.data, bytes, cudaMemcpyDefault), "cudaMemcpy");
     return {downloaded_[which].data(), p.n, p.is_double};
   }
 
@@ -96,6 +97,7 @@ class DevicePipeline : public Pipeline {
   std::size_t typical_size() const { return std::max<std::size_t>(features_.n_carriers(), 1024); }
   std::size_t device_bytes() const;
   void reserve_found(std::size_t n);
+  int settled_device(const void* array);
   template <class T>
   void bring(Positions t0, Positions t1, const T* given[2], ThreadPool& pool);
   template <class T>
@@ -173,9 +175,9 @@ void DevicePipeline::set_tree(const Tree& tree) {
 }
 
 std::size_t DevicePipeline::device_bytes() const {
-  return scene_.bytes() + leaves_.bytes() + lists_.bytes() + node_boxes_.bytes() + points_.bytes() +
-         rows_.bytes() + leaf_pairs_.bytes() + found_keys_.bytes() + sorted_keys_.bytes() + found_tocs_.bytes() +
-         numbers_.bytes() + order_.bytes() + workspace_.bytes() + given_[0].bytes() + given_[1].bytes();
+  return scene_.bytes() + leaves_.bytes() + lists_.bytes() + node_boxes_.bytes() + points_.bytes() + rows_.bytes() +
+         leaf_pairs_.bytes() + found_keys_.bytes() + sorted_keys_.bytes() + found_tocs_.bytes() + numbers_.bytes() +
+         order_.bytes() + workspace_.bytes() + given_[0].bytes() + given_[1].bytes();
 }
 
 void DevicePipeline::reserve_found(std::size_t n) {
@@ -191,8 +193,21 @@ void DevicePipeline::reserve_found(std::size_t n) {
   order_.reserve(n);  // last: its size says that all of these are there
 }
 
+// The device on which an array of the caller lies. Its producer may still be at work on a stream of its own: it is not
+// when this returns.
+int DevicePipeline::settled_device(const void* array) {
+  cudaPointerAttributes a;
+  check(cudaPointerGetAttributes(&a, array), "cudaPointerGetAttributes");
+  const int where = a.type == cudaMemoryTypeDevice ? a.device : device_;
+  check(cudaSetDevice(where), "cudaSetDevice");
+  check(cudaDeviceSynchronize(), "cudaDeviceSynchronize");
+  check(cudaSetDevice(device_), "cudaSetDevice");
+  return where;
+}
+
 // The caller's positions on the device, by way of page-locked memory: the driver's own way from pageable memory takes
-// one thread 100 us a megabyte. Waking the pool costs as much as copying half a megabyte.
+// one thread 100 us a megabyte. Waking the pool costs as much as copying half a megabyte. Those on another device are
+// copied from there.
 template <class T>
 void DevicePipeline::bring(Positions t0, Positions t1, const T* given[2], ThreadPool& pool) {
   const Positions ends[2] = {t0, t1};
@@ -200,11 +215,16 @@ void DevicePipeline::bring(Positions t0, Positions t1, const T* given[2], Thread
   char* to[2] = {nullptr, nullptr};
   for (int i = 0; i < 2; ++i) {
     given[i] = static_cast<const T*>(ends[i].data);
-    if (ends[i].on_device) continue;
-    staging_[i].reserve(words);
+    const bool on_device = ends[i].on_device;
+    if (on_device && (bytes == 0 || settled_device(given[i]) == device_)) continue;
     given_[i].reserve(words);
-    to[i] = reinterpret_cast<char*>(staging_[i].data());
     given[i] = reinterpret_cast<const T*>(given_[i].data());
+    if (on_device) {
+      check(cudaMemcpyAsync(given_[i].data(), ends[i].data, bytes, cudaMemcpyDefault, stream_), "cudaMemcpyAsync");
+      continue;
+    }
+    staging_[i].reserve(words);
+    to[i] = reinterpret_cast<char*>(staging_[i].data());
   }
   const auto copy = [&](std::size_t begin, std::size_t end, int) {
     for (int i = 0; i < 2; ++i)
@@ -303,8 +323,6 @@ bool DevicePipeline::run_frame(Positions t0, Positions t1, ThreadPool& pool) {
     *host_counters_.data() = {};
     return true;
   }
-  // The producer of device arrays may still be at work on a stream of its own.
-  if (t0.on_device || t1.on_device) check(cudaDeviceSynchronize(), "cudaDeviceSynchronize");
   Frame<T> f = frame<T>(t0, t1, pool);
   timer_.mark("upload", stream_);
   for (bool again = true; again;) {

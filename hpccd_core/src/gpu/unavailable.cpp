@@ -12,6 +12,9 @@ const Status& status() {
   return s;
 }
 
+CallersDevice::CallersDevice() = default;
+CallersDevice::~CallersDevice() = default;
+
 void fail_after(int) {}
 
 std::unique_ptr<Pipeline> Pipeline::create(const Scene&, const Features&, Accuracy, int, bool) {
