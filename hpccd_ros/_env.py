@@ -11,8 +11,8 @@ from pathlib import Path
 
 # glibc's mallopt parameters (malloc.h), the environment variable of each, and our value.
 # Keeping freed megabytes instead of returning them to the kernel saves the page faults of the next message:
-# measured 17 -> 6 ms one way for 5 MB between two rclpy processes. Kept by each thread's arena (32 on 4 cores), it would
-# add up: publishers that came and went 290 times in half an hour took 3 MB.
+# measured 17 -> 6 ms one way for 5 MB between two rclpy processes. Kept in an arena for each thread, it would add
+# up: publishers that came and went 290 times in half an hour took 3 MB.
 _MALLOC = (
     ("MALLOC_ARENA_MAX", -8, 2),
     ("MALLOC_MMAP_THRESHOLD_", -3, 1 << 30),
