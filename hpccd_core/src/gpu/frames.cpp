@@ -106,10 +106,11 @@ Contacts Frames::frame(Positions t0, Positions t1, const Build& build, Profiler&
   }
   // As on the CPU: refitting that has lost a third of the culling costs more than a build.
   constexpr double worn_out = 1.5;
+  if (area_when_built_ == 0) area_when_built_ = pipeline_->relative_area();  // as the device measures it
   if (!has_tree_ || pipeline_->relative_area() > worn_out * area_when_built_) {
     const Tree& tree = build(on_host(t0, 0), on_host(t1, 1));
     pipeline_->set_tree(tree);
-    area_when_built_ = tree.area_when_built;
+    area_when_built_ = 0;  // known when the device has refitted it
     has_tree_ = true;
     profiler.mark("build");
   }
