@@ -6,12 +6,16 @@ ten kinds; a misspelt mesh; right and wrong requests to ~/detect. Every 25th ans
   hpccd bench soak                          half an hour, about a tenth of the machine
   hpccd bench soak --minutes 1 --rate 30
 
+In the warm-up the node is held up (SIGSTOP) until what waits for it is as much as it can be: the middleware keeps the
+memory for that, whenever it comes to be needed.
+
 Fails where the node ends, an answer is wrong, a counter does not add up, or its resident memory changes by more than
 --memory-limit between the beginning (after --warm-up) and the end.
 """
 
 from __future__ import annotations
 
+import math
 import os
 import random
 import signal
@@ -30,6 +34,7 @@ from . import common, table
 from .results import Report
 
 NAMESPACE = "/soak"
+HELD_UP_FRAMES = 60  # more than may wait for the node (input_depth, soak_load.py)
 PATIENCE = 300.0  # s, for what takes less than one on a machine that is not busy
 
 
@@ -136,6 +141,8 @@ class _Soak:
         tick = int(time.time() * rate) + 1
         restart_at = begin + self._life()
         sample_at = row_at = begin
+        hold_at = begin + seconds * self._args.warm_up / 2
+        release_at = hold_at + HELD_UP_FRAMES / rate
         with bar("soak", round(seconds)) as progress:
             while (now := time.monotonic()) - begin < seconds:
                 self._alive()
@@ -146,6 +153,12 @@ class _Soak:
                     self._load.tick(tick)
                     tick = max(tick + 1, int(time.time() * rate))
                 self._load.look_at_replies()
+                if now >= hold_at:
+                    self._node.process.send_signal(signal.SIGSTOP)
+                    hold_at = math.inf
+                if now >= release_at:
+                    self._node.process.send_signal(signal.SIGCONT)
+                    release_at = math.inf
                 if now >= restart_at:
                     self._end_strip(kill=self._random.random() < 1 / 3)
                     self._strip = self._start_strip()
@@ -157,6 +170,7 @@ class _Soak:
                 if now >= row_at:
                     row_at += max(1.0, seconds / 60)
                     self._row(now - begin)
+        self._node.process.send_signal(signal.SIGCONT)
         return tick
 
     def _life(self) -> float:
