@@ -13,9 +13,7 @@ namespace hpccd::reference {
 class Root {
  public:
   static Root exactly(Integer n, unsigned k) { return Root({}, std::move(n), k, true); }
-  static Root between(Polynomial p, Integer n, unsigned k) {
-    return Root(std::move(p), std::move(n), k, false);
-  }
+  static Root between(Polynomial p, Integer n, unsigned k) { return Root(std::move(p), std::move(n), k, false); }
 
   // Sign of q at the root: -1, 0 or 1.
   int sign_of(const Polynomial& q);
@@ -24,8 +22,7 @@ class Root {
   double rounded_down();
 
  private:
-  Root(Polynomial p, Integer n, unsigned k, bool exact)
-      : p_(std::move(p)), n_(std::move(n)), k_(k), exact_(exact) {}
+  Root(Polynomial p, Integer n, unsigned k, bool exact) : p_(std::move(p)), n_(std::move(n)), k_(k), exact_(exact) {}
   void refine();
 
   Polynomial p_;

@@ -13,10 +13,9 @@ using Edge = std::array<std::uint32_t, 2>;
 
 struct Scene {
   std::vector<Point> vertices_t0, vertices_t1;
-  std::vector<Face> faces;                    // scene-wide vertex indices
-  std::vector<std::uint32_t> mesh_of_vertex;  // all vertices of a face lie in one mesh
-  std::vector<std::vector<std::uint8_t>>
-      tested;  // tested[a][b]: contacts between meshes a and b are asked for
+  std::vector<Face> faces;                        // scene-wide vertex indices
+  std::vector<std::uint32_t> mesh_of_vertex;      // all vertices of a face lie in one mesh
+  std::vector<std::vector<std::uint8_t>> tested;  // tested[a][b]: contacts between meshes a and b are asked for
 };
 
 struct Contacts {

@@ -12,8 +12,8 @@ namespace hpccd::reference {
 
 // 512 bits kept inside the object: the coefficients of common queries then need no heap memory. Larger ones
 // grow.
-using Integer = boost::multiprecision::number<boost::multiprecision::cpp_int_backend<512, 0>,
-                                              boost::multiprecision::et_off>;
+using Integer =
+    boost::multiprecision::number<boost::multiprecision::cpp_int_backend<512, 0>, boost::multiprecision::et_off>;
 
 // Coefficients from the constant term upwards, without leading zeros; the zero polynomial has none.
 class Polynomial {
@@ -49,9 +49,7 @@ inline Polynomial operator*(const Polynomial& a, const Polynomial& b) {
   return Polynomial(std::move(product));
 }
 
-inline Polynomial operator-(const Polynomial& a, const Polynomial& b) {
-  return a + Polynomial({Integer(-1)}) * b;
-}
+inline Polynomial operator-(const Polynomial& a, const Polynomial& b) { return a + Polynomial({Integer(-1)}) * b; }
 
 inline Polynomial derivative(const Polynomial& p) {
   std::vector<Integer> d;

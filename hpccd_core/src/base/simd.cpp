@@ -39,10 +39,14 @@ std::vector<Simd> simd_levels() {
 
 const char* name_of(Simd simd) {
   switch (simd) {
-    case Simd::automatic: return "auto";
-    case Simd::scalar: return "scalar";
-    case Simd::avx2: return "avx2";
-    case Simd::avx512: return "avx512";
+    case Simd::automatic:
+      return "auto";
+    case Simd::scalar:
+      return "scalar";
+    case Simd::avx2:
+      return "avx2";
+    case Simd::avx512:
+      return "avx512";
   }
   return "?";
 }

@@ -60,9 +60,10 @@ void test(const Geometry& g, const std::uint32_t* first, const std::uint32_t* se
   std::uint32_t n_survivors = 0, n_single = 0, n_many = 0;
 
   const std::uint32_t n_near = g.slabs ? near_pairs<kind>(g, first, second, n, near) : n;
-  for_lanes<kind, R>(g, first, second, g.slabs ? near : nullptr, n_near, [&](Lanes m, const std::uint32_t* at, unsigned valid) {
-    append(survivors, n_survivors, at, valid & ~bits(coplanarity_filter<Policy>(m).none));
-  });
+  for_lanes<kind, R>(g, first, second, g.slabs ? near : nullptr, n_near,
+                     [&](Lanes m, const std::uint32_t* at, unsigned valid) {
+                       append(survivors, n_survivors, at, valid & ~bits(coplanarity_filter<Policy>(m).none));
+                     });
   for_lanes<kind, R>(g, first, second, survivors, n_survivors, [&](Lanes m, const std::uint32_t* at, unsigned valid) {
     const Magnitudes<R> size = magnitudes(m);
     const unsigned usable = bits(in_range(size));

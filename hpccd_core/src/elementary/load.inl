@@ -128,7 +128,7 @@ HPCCD_HD Motion<Single> load(const Geometry& g, const std::uint32_t* first, cons
   Motion<Double> parts[n];
   for (int i = 0; i < n; ++i)
     parts[i] = load<kind>(g, first + i * double_width, second + i * double_width, static_cast<Double*>(nullptr));
-  const auto vector = [&](Vec3<Double> Motion<Double>::*v) {
+  const auto vector = [&](Vec3<Double> Motion<Double>::* v) {
     Double x[n], y[n], z[n];
     for (int i = 0; i < n; ++i) x[i] = (parts[i].*v).x, y[i] = (parts[i].*v).y, z[i] = (parts[i].*v).z;
     return Vec3<Single>{narrowed(x, g.scale), narrowed(y, g.scale), narrowed(z, g.scale)};

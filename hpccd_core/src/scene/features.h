@@ -23,8 +23,8 @@ struct Features {
 
   std::size_t bytes() const {
     return edges.capacity() * sizeof(edges[0]) + faces.capacity() * sizeof(faces[0]) +
-           4 * (lone_vertices.capacity() + mesh_of_carrier.capacity() + first_edge.capacity() +
-                owned_edges.capacity() + first_vertex.capacity() + owned_vertices.capacity());
+           4 * (lone_vertices.capacity() + mesh_of_carrier.capacity() + first_edge.capacity() + owned_edges.capacity() +
+                first_vertex.capacity() + owned_vertices.capacity());
   }
   std::uint32_t n_faces() const { return static_cast<std::uint32_t>(faces.size()); }
   std::uint32_t n_carriers() const { return static_cast<std::uint32_t>(mesh_of_carrier.size()); }
