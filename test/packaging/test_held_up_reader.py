@@ -15,7 +15,7 @@ from std_msgs.msg import UInt32
 from hpccd_ros import _env
 
 PATIENCE = 240.0
-HELD_UP = 3.0  # s; with the default of Fast DDS, 1 s and another process that joins lose all but the writer's history
+HELD_UP = 2.0  # s; with the default of Fast DDS, 1 s and another process that joins lose all but the writer's history
 LAST = 2**32 - 1
 
 READER = """
