@@ -29,3 +29,8 @@ class Pace:
         until = self._began + (at - self._first) / self._rate
         while not self._stop and (left := until - time.monotonic()) > 0:
             time.sleep(min(left, 0.1))
+
+    def delay(self, seconds: float) -> None:
+        """All that follows comes so much later."""
+        if self._began is not None:
+            self._began += seconds

@@ -3,23 +3,24 @@
 
 import itertools
 import signal
-import time
 from collections import deque
 
 import rclpy
 import yaml
-from rclpy.duration import Duration
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 
 from hpccd_ros import _env, qos, replay_setup, transform_topics
 from hpccd_ros.errors import UserError
+from hpccd_ros.listeners import await_acknowledged, await_subscribers
 from hpccd_ros.mcap_decode import message_class
 from hpccd_ros.mcap_reader import RecordedTopic, Recording, RecordingError
 from hpccd_ros.pacing import Pace, next_wanted
 
 # Reliable readers that are late now and then must still find what they missed.
 DEPTH = 20
+# Seconds that the last messages may take on their way.
+LAST = 2.0
 
 
 def main(args) -> int:
@@ -35,10 +36,11 @@ def main(args) -> int:
         node = rclpy.create_node("hpccd_replay", start_parameter_services=False)
         try:
             publishers = {topic.name: _publisher(node, topic) for topic in topics}
-            _await_subscribers(node, publishers, args.wait, stop)
+            lacking = await_subscribers(publishers, args.subscribers, args.wait, stop)
+            if lacking and not stop:
+                raise UserError(_too_few(lacking, args.subscribers))
             count = _play(recording, publishers, args, stop)
-            for publisher in publishers.values():
-                publisher.wait_for_all_acked(Duration(seconds=2.0))
+            await_acknowledged(publishers.values(), LAST)
         finally:
             node.destroy_node()
             rclpy.try_shutdown()
@@ -79,21 +81,17 @@ def _in_force(topic) -> int:
     return qos.TRANSFORMS_STATIC.depth if topic.type_name in transform_topics.TYPES else 1
 
 
-def _await_subscribers(node, publishers, wait, stop) -> None:
-    deadline = time.monotonic() + wait
-    while not stop:
-        alone = [name for name, publisher in publishers.items() if publisher.get_subscription_count() == 0]
-        if not alone:
-            return
-        if time.monotonic() > deadline:
-            raise UserError(f"nobody subscribes to {', '.join(alone)}: start a node for these meshes first, or --wait")
-        time.sleep(0.05)
+def _too_few(lacking: dict[str, int], wanted: int) -> str:
+    names = ", ".join(lacking)
+    if not any(lacking.values()):
+        return f"nobody subscribes to {names}: start a node for these meshes first, or --wait"
+    return f"fewer than {wanted} subscribe to {names}: start them first, --wait longer, or ask for fewer --subscribers"
 
 
 def _play(recording, publishers, args, stop) -> int:
     count, first, last_frame = 0, None, None
     pace = Pace(1.0 if args.rate is None else args.rate, stop)
-    latched = {}
+    latched, begun = {}, set()
     for message in recording.messages(list(publishers)):
         first = message.log_time if first is None else first
         at = (message.log_time - first) * 1e-9
@@ -108,6 +106,7 @@ def _play(recording, publishers, args, stop) -> int:
         for earlier in itertools.chain.from_iterable(latched.values()):
             publishers[earlier.topic].publish(earlier.data)
             count += 1
+        await_acknowledged([publishers[topic] for topic in latched], args.wait, stop)
         latched.clear()
         if args.step:
             # One frame: all messages published at about the same time, as meshes of one step are.
@@ -119,4 +118,7 @@ def _play(recording, publishers, args, stop) -> int:
             pace.wait(at)
         publishers[message.topic].publish(message.data)
         count += 1
+        if message.topic not in begun:
+            begun.add(message.topic)
+            pace.delay(await_acknowledged([publishers[message.topic]], args.wait, stop))
     return count

@@ -104,6 +104,8 @@ class _Soak:
                 parameters = soak_load.node_parameters(scene)
                 self._node = node_child.start(children, self._folder, NAMESPACE, parameters)
                 self._spin_until(self._load.heard, "the node was not heard")
+                self._load.begin()
+                self._spin_until(self._load.acknowledged, "the first frame was not acknowledged")
                 self._strip = self._start_strip()
                 last = self._stream()
                 self._end_strip(kill=False)

@@ -3,12 +3,14 @@
 
 from __future__ import annotations
 
+import time
 from collections import Counter, OrderedDict
 from typing import Any
 
 import numpy as np
 from hpccd.msg import ContactArray, MeshTopology, MeshVertices
 from hpccd.srv import Detect
+from rclpy.duration import Duration
 from rclpy.node import Node
 
 import hpccd_core as hc
@@ -84,6 +86,14 @@ class SoakLoad:
         return all(p.get_subscription_count() for p in self._publishers.values()) and (
             self._client.service_is_ready()
         )
+
+    def begin(self) -> None:
+        """Send a first right frame: what came before the node knew of its publisher could not be accounted for."""
+        self._send_frame(int(time.time() * self._rate))
+
+    def acknowledged(self) -> bool:
+        """Whether the node has all that was sent on its topics."""
+        return all(p.wait_for_all_acked(Duration()) for p in self._publishers.values())
 
     def _publish_vertices(self, mesh: str, message: MeshVertices | bytes) -> None:
         self.sent[mesh] += 1

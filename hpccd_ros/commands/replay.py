@@ -47,6 +47,8 @@ def configure(parser):
     play.add_argument("--all", action="store_true", help="publish every recorded topic, contacts too")
     play.add_argument("--wait", type=float, default=10.0, metavar="S",
                       help="how long to wait for subscribers (default: %(default)s)")
+    play.add_argument("--subscribers", type=int, default=1, metavar="N",
+                      help="how many to wait for: 2 for a node and a recorder (default: %(default)s)")
     play.add_argument("--ros-args", nargs="...", default=[], help="remappings and the like, as for any ROS program")
 
 

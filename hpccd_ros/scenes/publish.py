@@ -10,11 +10,11 @@ import time
 
 import rclpy
 from hpccd.msg import MeshTopology, MeshVertices
-from rclpy.duration import Duration
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 
 from hpccd_ros import _env
+from hpccd_ros.listeners import await_acknowledged, await_subscribers
 
 from .messages import Player, topology_topic, vertices_topic
 from .progress import track
@@ -25,6 +25,8 @@ LATCHED = QoSProfile(
 )
 # Seconds between the static meshes and the first frame.
 SETTLE = 0.2
+# Seconds that the last frame may take on its way.
+LAST = 2.0
 STREAM = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.VOLATILE)
 
 
@@ -39,7 +41,8 @@ def publish(
 ) -> int:
     """Publish all frames at `rate` Hz (over and over if `loop`); return how many. SIGINT and SIGTERM end it.
 
-    Before the first frame, waits up to `wait` seconds until every mesh's vertices have `subscribers`.
+    Before the first frame, waits up to `wait` seconds until every mesh's vertices have `subscribers`; before the
+    second, until these have acknowledged the first.
     """
     stop = []
     previous = {
@@ -57,14 +60,13 @@ def publish(
             publishers[name] = node.create_publisher(MeshTopology, name, LATCHED)
             name = vertices_topic(mesh)
             publishers[name] = node.create_publisher(MeshVertices, name, STREAM)
-        listened = [publishers[vertices_topic(mesh)] for mesh in scene.mesh_names]
-        if not _await_listeners(listened, subscribers, wait, stop):
+        listened = {vertices_topic(mesh): publishers[vertices_topic(mesh)] for mesh in scene.mesh_names}
+        if await_subscribers(listened, subscribers, wait, stop) and not stop:
             text = f"not every mesh has {subscribers} subscriber(s) yet: publishing all the same"
             print(text, file=sys.stderr, flush=True)
-        count = _play(node, scene, publishers, rate, loop, stop, progress)
-        for publisher in publishers.values():
-            # What is still on its way must not be cut off by the end of this process.
-            publisher.wait_for_all_acked(Duration(seconds=2.0))
+        count = _play(node, scene, publishers, rate, loop, wait, stop, progress)
+        # What is still on its way must not be cut off by the end of this process.
+        await_acknowledged(publishers.values(), LAST)
         return count
     finally:
         node.destroy_node()
@@ -73,16 +75,7 @@ def publish(
             signal.signal(number, handler)
 
 
-def _await_listeners(publishers, wanted, wait, stop) -> bool:
-    deadline = time.monotonic() + wait
-    while not stop and not (ready := all(p.get_subscription_count() >= wanted for p in publishers)):
-        if time.monotonic() >= deadline:
-            return False
-        time.sleep(0.02)
-    return bool(stop) or ready
-
-
-def _play(node, scene, publishers, rate, loop, stop, progress) -> int:
+def _play(node, scene, publishers, rate, loop, wait, stop, progress) -> int:
     player = Player(scene)
     moving = [mesh.name for mesh in scene.meshes if not mesh.static]
     first_moving = vertices_topic(moving[0]) if len(moving) < len(scene.meshes) else None
@@ -102,6 +95,8 @@ def _play(node, scene, publishers, rate, loop, stop, progress) -> int:
                     _sleep_until(time.monotonic() + SETTLE, stop)
                     begin += SETTLE
                 publishers[message.topic].publish(message.data)
+            if count == 0:
+                begin += await_acknowledged(publishers.values(), wait, stop)
             count += 1
     return count
 

@@ -63,9 +63,9 @@ class Live:
         self._children.wait(lambda: recorded() >= count, f"{count} answers were not recorded", PATIENCE)
 
     def play(self, path, *options: str):
-        """Start publishing a recording."""
+        """Start publishing a recording, to a node and a recorder."""
         return self._children.start(
-            "player", "hpccd_ros.cli", "replay", str(path), "--publish", "--wait", WAIT, *options
+            "player", "hpccd_ros.cli", "replay", str(path), "--publish", "--subscribers", "2", "--wait", WAIT, *options
         )
 
     def kill(self, child):
