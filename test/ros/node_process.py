@@ -28,6 +28,8 @@ from hpccd_ros import _env, convert, qos
 
 # Long enough for a machine that is ten times too busy; reached only by tests that fail.
 PATIENCE = 240.0
+# Seconds for a node to end by itself when a test is over.
+ORDERLY = 20.0
 
 _numbers = itertools.count()
 
@@ -109,8 +111,13 @@ class NodeProcess:
 
     def close(self) -> None:
         if self.process.poll() is None:
-            self.process.kill()
-            self.process.wait()
+            # A killed process leaves its part of the shared memory to its peers as it happens to be.
+            self.process.send_signal(signal.SIGINT)
+            try:
+                self.process.wait(timeout=ORDERLY)
+            except subprocess.TimeoutExpired:
+                self.process.kill()
+                self.process.wait()
         self.peer.close()
         self._output.close()
 
