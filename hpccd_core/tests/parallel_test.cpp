@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <stdexcept>
 #include <vector>
 
@@ -31,6 +32,30 @@ TEST(ThreadPool, RethrowsAnExceptionOfAJobAndGoesOn) {
   std::vector<int> calls(3);
   pool.run([&](int thread) { ++calls[thread]; });
   EXPECT_EQ(calls, std::vector<int>(3, 1));
+}
+
+TEST(ThreadPool, WakesThreadsThatHaveGoneToSleep) {
+  for (int threads : {2, 4, 64}) {
+    ThreadPool pool(threads);
+    std::vector<int> calls(threads);
+    for (int repeat = 0; repeat < 20; ++repeat) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(2));
+      pool.run([&](int thread) { ++calls[thread]; });
+    }
+    EXPECT_EQ(calls, std::vector<int>(threads, 20));
+  }
+}
+
+TEST(ThreadPool, WaitsForAThreadThatIsLong) {
+  ThreadPool pool(3);
+  for (int slow = 0; slow < 3; ++slow) {
+    std::atomic<int> done{0};
+    pool.run([&](int thread) {
+      if (thread == slow) std::this_thread::sleep_for(std::chrono::milliseconds(20));
+      ++done;
+    });
+    EXPECT_EQ(done, 3);
+  }
 }
 
 TEST(ParallelFor, VisitsEachIndexOnceInPiecesOfTheGrain) {

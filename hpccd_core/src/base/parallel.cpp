@@ -2,11 +2,33 @@
 #include "base/parallel.h"
 
 #include <algorithm>
+#include <mutex>
 #include <utility>
 
 #include "base/pause.h"
 
 namespace hpccd {
+namespace {
+
+// A sleeper announces itself before it looks whether it may go on; a waker brings about what is waited for before it
+// looks whether somebody sleeps (all in one order, std::memory_order_seq_cst). So one of them sees the other.
+template <class Ready>
+void sleep(const std::atomic<int>& changes, Ready&& ready) {
+  for (;;) {
+    const int before = changes.load();
+    if (ready()) return;
+    changes.wait(before);
+  }
+}
+
+void wake(std::atomic<int>& changes) {
+  ++changes;
+  changes.notify_all();
+}
+
+int hardware_threads() { return static_cast<int>(std::max(1u, std::thread::hardware_concurrency())); }
+
+}  // namespace
 
 ThreadPool::Entry ThreadPool::Entry::of(std::uint64_t w) {
   return {static_cast<std::uint32_t>(w >> 32), ((w >> 31) & 1) != 0, static_cast<std::uint16_t>((w >> 16) & 0x7FFF),
@@ -17,9 +39,8 @@ std::uint64_t ThreadPool::Entry::word() const {
   return std::uint64_t{job} << 32 | std::uint64_t{closed} << 31 | std::uint64_t{joined} << 16 | finished;
 }
 
-ThreadPool::ThreadPool(int threads) {
-  const int cores = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
-  const int n = threads > 0 ? threads : cores;
+ThreadPool::ThreadPool(int threads) : placement_(threads > 0 ? threads : hardware_threads()) {
+  const int cores = hardware_threads(), n = threads > 0 ? threads : cores;
   // About 200 us, longer than the serial parts between two jobs of a call. More threads than cores would only keep
   // each other from working.
   rounds_awake_ = n <= cores ? 5000 : 0;
@@ -27,11 +48,8 @@ ThreadPool::ThreadPool(int threads) {
 }
 
 ThreadPool::~ThreadPool() {
-  {
-    std::lock_guard lock(mutex_);
-    stop_ = true;
-  }
-  start_.notify_all();
+  stop_ = true;
+  wake(starts_);
   for (auto& w : workers_) w.join();
 }
 
@@ -39,22 +57,24 @@ void ThreadPool::call(int thread) {
   try {
     (*job_)(thread);
   } catch (...) {
-    std::lock_guard lock(mutex_);
+    std::lock_guard lock(error_lock_);
     if (!error_) error_ = std::current_exception();
   }
 }
 
 bool ThreadPool::new_job(std::uint32_t seen) const { return Entry::of(entry_.load()).job != seen || stop_.load(); }
 
-void ThreadPool::wait_for_job(std::uint32_t seen) {
+void ThreadPool::wait_for_job(int thread, std::uint32_t seen) {
+  placement_.awake(thread);
   for (int i = 0; i < rounds_awake_; ++i) {
     if (new_job(seen)) return;
     pause();
   }
-  std::unique_lock lock(mutex_);
+  placement_.asleep(thread);
   ++sleeping_;
-  start_.wait(lock, [&] { return new_job(seen); });
+  sleep(starts_, [&] { return new_job(seen); });
   --sleeping_;
+  placement_.woken(thread);
 }
 
 bool ThreadPool::join(std::uint32_t& seen) {
@@ -77,12 +97,11 @@ bool ThreadPool::join(std::uint32_t& seen) {
 void ThreadPool::work(int thread) {
   std::uint32_t seen = 0;
   while (!stop_) {
-    wait_for_job(seen);
+    wait_for_job(thread, seen);
     if (!join(seen)) continue;
     call(thread);
     entry_.fetch_add(1);
-    std::lock_guard lock(mutex_);
-    if (caller_sleeps_) done_.notify_one();
+    if (caller_sleeps_) wake(ends_);
   }
 }
 
@@ -96,9 +115,8 @@ void ThreadPool::wait_for_threads(Join join) {
     if (finished(join)) return;
     pause();
   }
-  std::unique_lock lock(mutex_);
   caller_sleeps_ = true;
-  done_.wait(lock, [&] { return finished(join); });
+  sleep(ends_, [&] { return finished(join); });
   caller_sleeps_ = false;
 }
 
@@ -107,11 +125,10 @@ void ThreadPool::run(const std::function<void(int)>& job, Join join) {
   job_ = &job;
   error_ = nullptr;
   entry_ = Entry{Entry::of(entry_.load()).job + 1, false, 0, 0}.word();
-  {
-    std::lock_guard lock(mutex_);
-    if (sleeping_ > 0) start_.notify_all();
-  }
+  const bool placed = placement_.place(workers_);
+  if (sleeping_ > 0) wake(starts_);
   call(0);
+  if (placed) placement_.free_late(workers_);
   if (join == Join::in_time) entry_.fetch_or(Entry{0, true, 0, 0}.word());
   wait_for_threads(join);
   if (auto error = std::exchange(error_, nullptr)) std::rethrow_exception(error);

@@ -1,16 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 // A pool of threads and a parallel loop over it. Between the jobs of one call threads wait actively for a moment, since
-// waking a sleeping one (about 50 us) costs more than many jobs take; between calls they sleep.
+// waking a sleeping one (about 50 us) costs more than many jobs take; between calls they sleep, on a futex each side
+// (std::atomic::wait): a condition variable's mutex would put those that wake together to sleep again (spin_lock.h).
 #pragma once
 
 #include <atomic>
-#include <condition_variable>
 #include <cstdint>
 #include <exception>
 #include <functional>
-#include <mutex>
 #include <thread>
 #include <vector>
+
+#include "base/placement.h"
+#include "base/spin_lock.h"
 
 namespace hpccd {
 
@@ -50,7 +52,7 @@ class ThreadPool {
   void work(int thread);
   void call(int thread);
   bool join(std::uint32_t& seen);
-  void wait_for_job(std::uint32_t seen);
+  void wait_for_job(int thread, std::uint32_t seen);
   bool new_job(std::uint32_t seen) const;
   void wait_for_threads(Join join);
   bool finished(Join join) const;
@@ -60,10 +62,11 @@ class ThreadPool {
   std::atomic<std::uint64_t> entry_{0};
   std::atomic<bool> stop_{false};
   int rounds_awake_ = 0;
-  std::mutex mutex_;
-  std::condition_variable start_, done_;
-  int sleeping_ = 0;
-  bool caller_sleeps_ = false;
+  std::atomic<int> starts_{0}, ends_{0};  // change when there is something to wake up for
+  std::atomic<int> sleeping_{0};
+  Placement placement_;
+  std::atomic<bool> caller_sleeps_{false};
+  SpinLock error_lock_;
   std::exception_ptr error_;
 };
 

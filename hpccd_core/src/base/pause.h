@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <thread>
+
 #if defined(__x86_64__)
 #include <immintrin.h>
-#else
-#include <thread>
 #endif
 
 namespace hpccd {
@@ -17,5 +17,23 @@ inline void pause() {
   std::this_thread::yield();
 #endif
 }
+
+// Active waiting for what should take a moment. Where it takes longer (the other thread was interrupted, or is long in
+// exact arithmetic), the core is left to others.
+class ActiveWait {
+ public:
+  void turn() {
+    if (turns_ < patience) {
+      ++turns_;
+      pause();
+    } else {
+      std::this_thread::yield();
+    }
+  }
+
+ private:
+  static constexpr int patience = 4000;
+  int turns_ = 0;
+};
 
 }  // namespace hpccd

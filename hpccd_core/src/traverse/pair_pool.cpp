@@ -2,9 +2,7 @@
 #include "traverse/pair_pool.h"
 
 #include <algorithm>
-#include <thread>
-
-#include "base/pause.h"
+#include <mutex>
 
 namespace hpccd {
 namespace {
@@ -29,7 +27,7 @@ void PairPool::give(std::vector<NodePair>& stack) {
   if (half == 0 || tree_.nodes[stack[0].a].carriers + tree_.nodes[stack[0].b].carriers < worth_moving) return;
   const auto end = stack.begin() + static_cast<std::ptrdiff_t>(half);
   {
-    std::lock_guard lock(mutex_);
+    std::lock_guard lock(lock_);
     lists_.back().insert(lists_.back().end(), stack.begin(), end);
     waiting_pairs_ += half;
   }
@@ -37,7 +35,7 @@ void PairPool::give(std::vector<NodePair>& stack) {
 }
 
 bool PairPool::take_one(int thread, std::vector<NodePair>& stack) {
-  std::lock_guard lock(mutex_);
+  std::lock_guard lock(lock_);
   std::vector<NodePair>* list = &lists_[static_cast<std::size_t>(thread)];
   if (list->empty()) list = &lists_.back();
   if (list->empty())
@@ -53,18 +51,14 @@ bool PairPool::take_one(int thread, std::vector<NodePair>& stack) {
 // No pair is lost: whoever gives one away asks for another before it ends.
 bool PairPool::wait(int thread, std::vector<NodePair>& stack) {
   bool got = false;
-  for (int turn = 0; !got && !abandoned_; ++turn) {
+  for (ActiveWait wait; !got && !abandoned_;) {
     // Busy first: a thread that gives stays busy until it has given.
     const bool all_idle = busy_ == 0;
     if (waiting_pairs_ > 0)
       got = take_one(thread, stack);
     else if (all_idle)
       break;
-    // A thread may be long in exact arithmetic; then leave the core to others.
-    if (turn < 4000)
-      pause();
-    else
-      std::this_thread::yield();
+    wait.turn();
   }
   return got;
 }

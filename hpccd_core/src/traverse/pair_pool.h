@@ -5,9 +5,9 @@
 #pragma once
 
 #include <atomic>
-#include <mutex>
 #include <vector>
 
+#include "base/spin_lock.h"
 #include "traverse/tasks.h"
 
 namespace hpccd {
@@ -43,7 +43,7 @@ class PairPool {
   bool wait(int thread, std::vector<NodePair>& stack);
 
   const Tree& tree_;
-  std::mutex mutex_;
+  SpinLock lock_;
   std::vector<std::vector<NodePair>> lists_;  // of each thread, then those given away
   std::atomic<std::size_t> waiting_pairs_;
   std::atomic<int> busy_{0}, hungry_{0};
