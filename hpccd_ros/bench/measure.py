@@ -3,15 +3,16 @@
 
 What is timed is one call of `detect`, argument checks and the arrays of contacts included; where the topology has
 changed since the step before, making scene and detector too. Not timed: reading or generating the step, the first
-round (warm-up), and, where the measured steps do not follow each other, the step before each one (of the only step of a
-file: the same step), which is computed because detectors carry their hierarchy from step to step, and because in a
-stream no other detector has used the caches in between.
+round (warm-up), and, where the measured steps do not follow each other, the steps before each one, LEAD_MS long and at
+least one (of the only step of a file: the same step). They are computed because detectors carry their hierarchy from step
+to step, and because in a stream no other detector has used the caches, and no other thread the cores, in between.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import gc
+import math
 import time
 from collections import defaultdict
 from collections.abc import Sequence
@@ -20,6 +21,9 @@ from . import progress
 from .steps import Source, Step
 from .timing import Times, times
 from .variants import Variant
+
+# A scene of 1.4 ms reaches the speed of a stream after three or more steps.
+LEAD_MS = 10.0
 
 NOTE = (
     "ms are wall-clock times of one detect() call from Python; variants run in turn, one round of warm-up is left out; "
@@ -137,28 +141,39 @@ def measure(source: Source, runners: Sequence, rounds: int, steps: int = 0, desc
         raise ValueError(f"{source.name}: none of its steps keeps its topology")
     series = {runner.name: Series(runner.name) for runner in runners}
     collecting = gc.isenabled()
-    warm: set[str] = set()  # the very first call of a runner is that of a new detector
+    took: dict[str, float] = {}  # ms of the last step; the very first call of a runner is that of a new detector
     with progress.bar(description or source.name, (rounds + 1) * len(wanted) * len(runners)) as bar:
         try:
             for turn in range(rounds + 1):
                 for place, k in enumerate(wanted):
                     step = source.step(k)
-                    before = None if place and wanted[place - 1] == k - 1 else source.step(k - 1) if k else step
+                    follows = place > 0 and wanted[place - 1] == k - 1
+                    lead = [] if follows or not took else _lead(source, k, min(took.values()))
                     gc.collect()
                     gc.disable()
                     # Another one begins each time: whoever runs first finds the step's data in no cache.
                     shift = (turn + place) % len(runners)
                     for runner in [*runners[shift:], *runners[:shift]]:
-                        if before is not None and runner.carries_state and runner.name in warm:
-                            runner.run(before)
+                        if runner.carries_state and runner.name in took:
+                            for before in lead[-_lead_steps(took[runner.name]) :]:
+                                runner.run(before)
                         sample = runner.run(step)
-                        warm.add(runner.name)
+                        took[runner.name] = sample.ms
                         series[runner.name].add(k, sample, warm_up=turn == 0)
                         bar.step(f"{runner.name}: {sample.ms:.1f} ms")
                     gc.enable()
         finally:
             (gc.enable if collecting else gc.disable)()
     return series
+
+
+def _lead(source: Source, k: int, ms: float) -> list[Step]:
+    """The steps before step k where one takes `ms`; where there is none, step k itself."""
+    return [(source.step(k - back) if k >= back else None) or source.step(k) for back in range(_lead_steps(ms), 0, -1)]
+
+
+def _lead_steps(ms: float) -> int:
+    return max(1, math.ceil(LEAD_MS / ms))
 
 
 def disagreements(series: Sequence[Series]) -> list[str]:

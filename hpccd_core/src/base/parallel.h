@@ -5,6 +5,7 @@
 #pragma once
 
 #include <atomic>
+#include <chrono>
 #include <cstdint>
 #include <exception>
 #include <functional>
@@ -61,7 +62,7 @@ class ThreadPool {
   const std::function<void(int)>* job_ = nullptr;
   std::atomic<std::uint64_t> entry_{0};
   std::atomic<bool> stop_{false};
-  int rounds_awake_ = 0;
+  std::chrono::microseconds awake_for_{0};
   std::atomic<int> starts_{0}, ends_{0};  // change when there is something to wake up for
   std::atomic<int> sleeping_{0};
   Placement placement_;

@@ -9,7 +9,7 @@
 
 namespace hpccd {
 
-// One turn of active waiting: about 40 ns on x86-64, leaving the core's resources to a sibling thread.
+// One turn of active waiting: 15 to 50 ns on x86-64, leaving the core's resources to a sibling thread.
 inline void pause() {
 #if defined(__x86_64__)
   _mm_pause();
