@@ -4,8 +4,8 @@
 What is timed is one call of `detect`, argument checks and the arrays of contacts included; where the topology has
 changed since the step before, making scene and detector too. Not timed: reading or generating the step, the first
 round (warm-up), and, where the measured steps do not follow each other, the steps before each one, LEAD_MS long and at
-least one (of the only step of a file: the same step). They are computed because detectors carry their hierarchy from step
-to step, and because in a stream no other detector has used the caches, and no other thread the cores, in between.
+least one (of the only step of a file: the same step). They are computed because detectors carry their hierarchy from
+step to step, and because in a stream no other detector has used caches and cores in between.
 """
 
 from __future__ import annotations
