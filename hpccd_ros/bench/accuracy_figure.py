@@ -5,8 +5,7 @@ from __future__ import annotations
 
 from . import drawing
 
-# Where the words stand beside a point, in points: tiers of about the same time and error must not hide each other.
-WORDS = {"fast": (7, -3), "conservative": (7, 5), "balanced": (7, -2), "exact": (7, -11)}
+BACKEND = {"cpu": "o", "hybrid": "D", "gpu": "^"}
 # Where an error of exactly zero is drawn on a logarithmic axis.
 TOC_FLOOR, SHARE_FLOOR = 1e-17, 1e-5
 
@@ -21,23 +20,39 @@ def draw_scenes(report, path) -> None:
         mine = [row for row in rows if row["scene"] == scene]
         for row in mine:
             y = max(row["toc_worst"], TOC_FLOOR)
-            marker = {"cpu": "o", "hybrid": "D", "gpu": "^"}[row["backend"]]
-            axis.plot(row["step_ms"], y, marker, color=drawing.TIER[row["accuracy"]], markersize=8,
-                      fillstyle="none" if row["simd"] == "scalar" else "full")  # fmt: skip
-            wrong = f"\n{row['missed']} missed, {row['invented']} invented" if row["missed"] + row["invented"] else ""
-            where = "" if row["backend"] == "cpu" else f", {row['backend']}"
-            simd = "" if row["simd"] == "auto" else f", {row['simd']}"
-            axis.annotate(row["accuracy"] + where + simd + wrong, (row["step_ms"], y), textcoords="offset points",
-                          xytext=WORDS[row["accuracy"]], fontsize=7)  # fmt: skip
+            axis.plot(row["step_ms"], y, **_style(row["accuracy"], row["backend"], row["simd"]))
+            if row["missed"] + row["invented"]:
+                axis.annotate(f"{row['missed']} missed, {row['invented']} invented", (row["step_ms"], y),
+                              textcoords="offset points", xytext=(7, -2), fontsize=7)  # fmt: skip
         axis.set_yscale("log")
         axis.set_ylim(TOC_FLOOR / 5, 1)
         axis.set_yticks([TOC_FLOOR, 1e-12, 1e-8, 1e-4, 1], ["exact", "1e-12", "1e-8", "1e-4", "1"])
-        axis.set_xlim(0, 1.45 * max(row["step_ms"] for row in mine))
+        axis.set_xlim(0, 1.25 * max(row["step_ms"] for row in mine))
         axis.set_xlabel("ms a step", fontsize=8)
         axis.set_ylabel("worst error of toc (step = 1)", fontsize=8)
         axis.set_title(f"{scene}, {mine[0]['contacts']:,.0f} contacts", fontsize=9)
+    figure.legend(handles=list(_legend(rows)), loc="outside right center", fontsize=8, frameon=False)
     threads = rows[0]["threads"]
     drawing.save(figure, path, report, f"What each tier costs and how far its times are off, {threads} threads")
+
+
+def _style(tier: str, backend: str, simd: str) -> dict:
+    return {"linestyle": "", "marker": BACKEND[backend], "color": drawing.TIER[tier], "markersize": 8,
+            "fillstyle": "none" if simd == "scalar" else "full"}  # fmt: skip
+
+
+def _legend(rows):
+    """Each colour once, then what else markers tell apart."""
+    from matplotlib.lines import Line2D
+
+    def entry(label, tier="exact", backend="cpu", simd="auto", **other):
+        return Line2D([], [], label=label, **_style(tier, backend, simd) | other)
+
+    yield from (entry(tier, tier) for tier in dict.fromkeys(row["accuracy"] for row in rows))
+    if len({row["simd"] for row in rows}) > 1:
+        yield entry("scalar code", simd="scalar", color="grey")
+    if len(backends := dict.fromkeys(row["backend"] for row in rows)) > 1:
+        yield from (entry(backend, backend=backend, color="grey") for backend in backends)
 
 
 def draw_sweeps(report, path) -> None:
