@@ -9,7 +9,7 @@
 namespace hpccd {
 namespace {
 
-constexpr std::size_t grain = 1024;
+constexpr std::size_t grain = 256;
 
 // NaN fails the comparison as well.
 bool acceptable(double x) { return std::fabs(x) <= largest_coordinate; }
