@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A stream begins when its readers have its first message, not when its publisher knows of them."""
+
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+import rclpy
+from node_process import PATIENCE
+from rclpy.qos import QoSProfile
+from std_msgs.msg import UInt32
+
+from hpccd_ros import _env
+from hpccd_ros.listeners import await_acknowledged, await_subscribers
+
+READER = """
+from hpccd_ros import _env
+_env.prepare()
+import rclpy
+from rclpy.qos import QoSProfile
+from std_msgs.msg import UInt32
+rclpy.init()
+node = rclpy.create_node("reader")
+hear = lambda message: print(message.data, flush=True)
+node.create_subscription(UInt32, "listeners/numbers", hear, QoSProfile(depth=10))
+rclpy.spin(node)
+"""
+
+
+@pytest.fixture
+def publisher():
+    _env.prepare()
+    context = rclpy.Context()
+    rclpy.init(context=context)
+    node = rclpy.create_node("writer", context=context)
+    yield node.create_publisher(UInt32, "listeners/numbers", QoSProfile(depth=10))
+    node.destroy_node()
+    rclpy.shutdown(context=context)
+
+
+@pytest.fixture
+def reader():
+    process = subprocess.Popen([sys.executable, "-c", READER], stdout=subprocess.PIPE, text=True)
+    yield process
+    process.send_signal(signal.SIGCONT)
+    process.send_signal(signal.SIGTERM)
+    process.communicate()
+
+
+def test_nobody_listens(publisher):
+    assert await_subscribers({"a": publisher}, 1, 0.1) == {"a": 0}
+    publisher.publish(UInt32(data=0))
+    assert await_acknowledged([publisher], PATIENCE) < 1.0, "nobody is waited for"
+
+
+def test_a_signal_ends_the_wait(publisher):
+    began = time.monotonic()
+    assert await_subscribers({"a": publisher}, 1, PATIENCE, stop=[signal.SIGINT]) == {"a": 0}
+    assert time.monotonic() - began < PATIENCE / 2
+
+
+def test_readers_that_have_not_got_it_are_waited_for(publisher, reader):
+    assert await_subscribers({"a": publisher}, 1, PATIENCE) == {}
+    assert await_subscribers({"a": publisher}, 2, 0.1) == {"a": 1}
+    publisher.publish(UInt32(data=1))
+    assert await_acknowledged([publisher], PATIENCE) < PATIENCE
+    assert reader.stdout.readline() == "1\n"
+
+    reader.send_signal(signal.SIGSTOP)
+    publisher.publish(UInt32(data=2))
+    assert await_acknowledged([publisher], 0.5) >= 0.5, "a process that stands still acknowledges nothing"
+    assert await_acknowledged([publisher], PATIENCE, stop=[signal.SIGINT]) < PATIENCE / 2
+    reader.send_signal(signal.SIGCONT)
+    assert await_acknowledged([publisher], PATIENCE) < PATIENCE
+    assert reader.stdout.readline() == "2\n"
