@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from . import drawing
+from . import drawing, table
 
 
 def in_order(stages: dict[str, float]) -> list[str]:
@@ -25,7 +25,7 @@ def draw(report, path) -> None:
                 used[stage] = axis.barh(place, ms, left=left, color=color, height=0.7)
                 left += ms
             ratio = row.get("times_faster_than_ipctk")
-            said = f" {left:.3g} ms" + (f", {ratio:.3g} x faster" if ratio else "")
+            said = f" {table.text(left)} ms" + (f", {ratio:.3g} x faster" if ratio else "")
             axis.text(left, place, said, va="center", fontsize=7.5)
         axis.set_yticks(range(len(rows)), [row["variant"] for row in rows], fontsize=8)
         axis.invert_yaxis()
