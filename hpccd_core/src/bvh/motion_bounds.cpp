@@ -9,6 +9,7 @@
 namespace hpccd {
 namespace {
 
+// Of ten pieces of 1024 vertices one of four threads gets three, a fifth more than its share.
 constexpr std::size_t grain = 256;
 
 // NaN fails the comparison as well.
