@@ -15,12 +15,16 @@ def draw(report, path) -> None:
         for place, n in enumerate(threads):
             mine = [row for row in rows if row["scene"] == scene and row["threads"] == n]
             x, y = [row["triangles"] for row in mine], [row["step_ms"] for row in mine]
-            axis.plot(x, y, marker=drawing.MARKERS[place], color=drawing.SERIES[place], label=f"{n} threads")
+            axis.plot(x, y, marker=drawing.MARKERS[place], color=drawing.SERIES[place],
+                      label="1 thread" if n == 1 else f"{n} threads")  # fmt: skip
             axis.plot(x, [y[0] * t / x[0] for t in x], color="black", linewidth=0.8, linestyle=":",
                       label="linear" if place == 0 else None)  # fmt: skip
         axis.set_xscale("log")
         axis.set_yscale("log")
         axis.set_title(scene, fontsize=9)
+        # Only what was measured: the axis's own labels run into one another on little more than a decade.
+        axis.set_xticks(x, [f"{triangles:,}" for triangles in x])
+        axis.minorticks_off()
         axis.set_xlabel("triangles", fontsize=8)
         axis.set_ylabel("ms a step", fontsize=8)
         axis.legend(fontsize=7, frameon=False)
