@@ -5,6 +5,7 @@ import operator
 
 import numpy as np
 
+REALS = frozenset({np.dtype(np.float32), np.dtype(np.float64)})  # in this machine's byte order
 LARGEST_COORDINATE = 1e150  # largest_coordinate in src/bvh/motion_bounds.h
 
 
@@ -78,17 +79,14 @@ def output_names(value):
 
 def vertices(name, value, n_vertices):
     """(V, 3) float32 or float64; C-contiguous arrays are taken without a copy."""
-    array = _array(name, value)
-    if array.dtype.newbyteorder("=") not in (np.float32, np.float64):
-        raise TypeError(
-            f"{name}: expected float32 or float64, got dtype {array.dtype}; convert with {name}.astype(numpy.float64)"
-        )
+    array = _reals(name, _array(name, value))
     if array.shape != (n_vertices, 3):
         raise ValueError(
             f"{name}: expected shape ({n_vertices}, 3), one row a vertex of the scene's meshes in the order added, "
             f"got {array.shape}"
         )
-    return np.require(array, array.dtype.newbyteorder("="), ["C", "A"])
+    usable_in_place = array.flags.c_contiguous and array.flags.aligned
+    return array if usable_in_place else np.require(array, None, ["C", "A"])
 
 
 def usable(name, array):
@@ -103,17 +101,23 @@ def usable(name, array):
 
 def queries(value):
     """(Q, 8, 3) float64: four points at t=0, then the same at t=1; finite."""
-    array = _array("queries", value)
-    if array.dtype.newbyteorder("=") not in (np.float32, np.float64):
-        raise TypeError(
-            f"queries: expected float32 or float64, got dtype {array.dtype}; convert with queries.astype(numpy.float64)"
-        )
+    array = _reals("queries", _array("queries", value))
     if array.ndim != 3 or array.shape[1:] != (8, 3):
         expected = "(Q, 8, 3), four points at t=0 and the same at t=1"
         raise ValueError(f"queries: expected shape {expected}, got {array.shape}")
     array = np.ascontiguousarray(array, np.float64)
     usable("queries", array)
     return array
+
+
+def _reals(name, array):
+    if array.dtype in REALS:
+        return array
+    if array.dtype.newbyteorder("=") in REALS:
+        return array.astype(array.dtype.newbyteorder("="))
+    raise TypeError(
+        f"{name}: expected float32 or float64, got dtype {array.dtype}; convert with {name}.astype(numpy.float64)"
+    )
 
 
 def _array(name, value):

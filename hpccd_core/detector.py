@@ -207,5 +207,6 @@ class Detector:
 
     @property
     def stats(self):
-        """Counts of the last call: candidate pairs, survivors of each filter, contacts, bytes used, ..."""
+        """Counts of the last call: candidate pairs, survivors of each filter, contacts, bytes used, ... Empty where it
+        failed."""
         return self._core.stats()

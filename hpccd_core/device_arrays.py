@@ -4,6 +4,8 @@
 import ctypes
 import typing
 
+import numpy as np
+
 from . import _core
 
 
@@ -16,6 +18,8 @@ class DevicePositions(typing.NamedTuple):
 
 def is_on_device(value):
     """Whether the array lies in the memory of a CUDA device."""
+    if type(value) is np.ndarray:  # looking for attributes that it has not takes 3 us
+        return False
     if getattr(value, "__cuda_array_interface__", None) is not None:
         return True
     device = getattr(value, "__dlpack_device__", None)

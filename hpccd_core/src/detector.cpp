@@ -53,7 +53,7 @@ struct Detector::Impl {
   Options options;
   Features features;
   PairRules rules;
-  ThreadPool pool;
+  ThreadPool pool, one_thread{1};
   std::vector<Worker> workers;
   Search search;
   ContactOrder order;
@@ -71,7 +71,11 @@ struct Detector::Impl {
   } trial[4];  // by backend
   Backend last_backend = Backend::cpu;
   Profiler profiler;
-  std::map<std::string, std::uint64_t> stats;
+  // Of the last call. Its other counts stay where they were made until somebody asks.
+  struct Numbers {
+    std::size_t vf, ee;
+  };
+  std::optional<Numbers> found;
 
   void use_gpus() {
     const std::string why[2] = {gpu::unsupported(options), hybrid::unsupported(options)};
@@ -126,13 +130,24 @@ struct Detector::Impl {
 
   std::uint64_t fallbacks() const { return (gpu ? gpu->fallbacks() : 0) + (hybrid ? hybrid->fallbacks() : 0); }
 
-  void count_gpu(const Contacts& contacts) {
-    stats = gpu->stats();
-    stats["gpu_fallbacks"] = fallbacks();
-    stats["vf_contacts"] = contacts.vf.size();
-    stats["ee_contacts"] = contacts.ee.size();
+  Contacts collect() {
+    // Handing out the work (five jobs) takes as long as the work on so many.
+    constexpr std::size_t few = 1024;
+    std::size_t n = 0;
+    for (const Worker& w : workers) n += w.vertex_face.size() + w.edge_edge.size();
+    return collect_contacts(workers, search.geometry, options.report, {options.points, options.normals}, order,
+                            n < few ? one_thread : pool);
+  }
+
+  std::map<std::string, std::uint64_t> stats() const {
+    if (!found) return {};
+    auto stats = last_backend == Backend::gpu ? gpu->stats() : stats_of_workers();
+    stats["vf_contacts"] = found->vf;
+    stats["ee_contacts"] = found->ee;
     stats["triangles"] = features.n_faces();
-    stats["bytes"] = motion.bytes() + tree.bytes() + features.bytes();
+    stats["bytes"] += motion.bytes() + tree.bytes() + features.bytes();
+    if (gpu || hybrid) stats["gpu_fallbacks"] = fallbacks();
+    return stats;
   }
 
   void build_tree_anew() {
@@ -189,8 +204,8 @@ struct Detector::Impl {
     return devices && hybrid->finish(*devices, workers, profiler) ? Backend::hybrid : Backend::cpu;
   }
 
-  void count(const Contacts& contacts) {
-    stats.clear();
+  std::map<std::string, std::uint64_t> stats_of_workers() const {
+    std::map<std::string, std::uint64_t> stats;
     std::uint64_t node_pairs = 0, leaf_pairs = 0, bytes = 0;
     const char* kinds[2] = {"vf", "ee"};
     for (const Worker& w : workers) {
@@ -216,13 +231,10 @@ struct Detector::Impl {
     bytes += order.bytes();
     stats["node_pairs"] = node_pairs;
     stats["leaf_pairs"] = leaf_pairs;
-    stats["vf_contacts"] = contacts.vf.size();
-    stats["ee_contacts"] = contacts.ee.size();
-    stats["triangles"] = features.n_faces();
-    stats["bytes"] = bytes + motion.bytes() + tree.bytes() + features.bytes() + (engine ? engine->bytes() : 0);
+    stats["bytes"] = bytes + (engine ? engine->bytes() : 0);
     if (engine) engine->count(stats);
     if (hybrid) hybrid->count(stats);
-    if (gpu || hybrid) stats["gpu_fallbacks"] = fallbacks();
+    return stats;
   }
 };
 
@@ -243,6 +255,7 @@ Contacts Detector::detect(Positions t0, Positions t1) {
         "vertices_t0, vertices_t1: are in a GPU's memory, which this detector does not use; copy them "
         "to the host, or use backend=\"gpu\"");
   if (d.search.cancelled) throw Cancelled();
+  d.found.reset();
   std::optional<gpu::CallersDevice> callers;
   if (d.gpu || d.hybrid) callers.emplace();
   d.profiler.begin();
@@ -250,7 +263,7 @@ Contacts Detector::detect(Positions t0, Positions t1) {
   if (backend == Backend::gpu) {
     if (!t0.on_device && !t1.on_device) require_static_meshes_rest(*d.scene, t0, t1);
     if (auto contacts = d.frame_on_gpu(t0, t1)) {
-      d.count_gpu(*contacts);
+      d.found = {contacts->vf.size(), contacts->ee.size()};
       d.profiler.end();
       d.note_time(backend, Backend::gpu);
       return std::move(*contacts);
@@ -259,10 +272,9 @@ Contacts Detector::detect(Positions t0, Positions t1) {
   }
   if (d.gpu) t0 = d.gpu->on_host(t0, 0), t1 = d.gpu->on_host(t1, 1);
   const Backend used = d.find_contacts(t0, t1, backend == Backend::hybrid);
-  Contacts contacts = collect_contacts(d.workers, d.search.geometry, d.options.report,
-                                       {d.options.points, d.options.normals}, d.order, d.pool);
+  Contacts contacts = d.collect();
   d.profiler.mark("contacts");
-  d.count(contacts);
+  d.found = {contacts.vf.size(), contacts.ee.size()};
   d.profiler.end();
   d.note_time(backend, used);
   return contacts;
@@ -276,7 +288,7 @@ std::map<std::string, double> Detector::profile() const {
     for (const auto& [name, ms] : impl_->gpu->stages()) stages["gpu/" + name] = ms;
   return stages;
 }
-std::map<std::string, std::uint64_t> Detector::stats() const { return impl_->stats; }
+std::map<std::string, std::uint64_t> Detector::stats() const { return impl_->stats(); }
 const Options& Detector::options() const { return impl_->options; }
 Backend Detector::last_backend() const { return impl_->last_backend; }
 std::string Detector::last_gpu_error() const {

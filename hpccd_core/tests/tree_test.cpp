@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstring>
 
 #include "bvh/motion_bounds.h"
 #include "grid_scene.h"
@@ -92,6 +93,58 @@ TEST_F(TreeTest, RefitToTheSameMotionChangesNothing) {
     EXPECT_TRUE(contains(tree.nodes[i].box, built[i].box)) << "node " << i;
     EXPECT_TRUE(contains(built[i].box, tree.nodes[i].box)) << "node " << i;
   }
+}
+
+// Above the front whoever comes second joins the boxes, so many rounds: each would show a box joined too early.
+TEST(TreeRefit, IsTheSameWithAnyNumberOfThreads) {
+  constexpr std::uint32_t large = 65;
+  const auto scene = test::two_sheets(large);
+  const Features features = features_of(*scene);
+  ThreadPool one(1), four(4);
+  MotionBounds motion;
+  const auto take = [&](double t0, double t1) {
+    const auto start = test::sheet_positions(large, t0), end = test::sheet_positions(large, t1);
+    motion.take(test::view(start), test::view(end), 0, one);
+  };
+  Tree alone, shared;
+  take(0, 0.1);
+  build(alone, *scene, features, motion.boxes, one);
+  build(shared, *scene, features, motion.boxes, one);
+  ASSERT_GT(shared.above_front.size(), 64u);
+  for (int round = 0; round < 200; ++round) {
+    const double t = 0.005 * (round % 100);
+    take(t, t + 0.1);
+    refit(alone, motion.boxes, {}, one);
+    refit(shared, motion.boxes, {}, four);
+    ASSERT_EQ(alone.area, shared.area) << "round " << round;
+    for (std::size_t i = 0; i < alone.nodes.size(); ++i)
+      ASSERT_EQ(0, std::memcmp(&alone.nodes[i].box, &shared.nodes[i].box, sizeof(MotionBox)))
+          << "round " << round << ", node " << i;
+  }
+}
+
+TEST(TreeRefit, LeavesOutWhatRestsAndNothingAboveIt) {
+  constexpr std::uint32_t large = 65;
+  const auto scene = test::two_sheets(large);
+  const Features features = features_of(*scene);
+  ThreadPool pool(4);
+  MotionBounds motion;
+  const auto take = [&](double t0, double t1) {
+    const auto start = test::sheet_positions(large, t0), end = test::sheet_positions(large, t1);
+    motion.take(test::view(start), test::view(end), 0, pool);
+  };
+  Tree whole, part;
+  take(0, 0.1);
+  build(whole, *scene, features, motion.boxes, pool);
+  build(part, *scene, features, motion.boxes, pool);
+  const std::vector<MotionBox> before = motion.boxes;
+  take(0.1, 0.2);
+  std::copy_n(before.begin(), large * large, motion.boxes.begin());  // the first sheet
+  refit(whole, motion.boxes, {}, pool);
+  refit(part, motion.boxes, {1, 0}, pool);
+  EXPECT_EQ(whole.area, part.area);
+  for (std::size_t i = 0; i < whole.nodes.size(); ++i)
+    EXPECT_EQ(0, std::memcmp(&whole.nodes[i].box, &part.nodes[i].box, sizeof(MotionBox))) << "node " << i;
 }
 
 }  // namespace

@@ -312,12 +312,16 @@ def test_offsets_of_meshes():
 def test_profile_and_stats():
     meshes = random_scenes.many_meshes(np.random.default_rng(64))
     detector = hc.Detector(meshes.scene())
+    assert detector.stats == {}
     contacts = detector.detect(meshes.vertices_t0, meshes.vertices_t1)
     profile = detector.profile
     assert profile["total"] == pytest.approx(sum(ms for stage, ms in profile.items() if stage != "total"), abs=1e-6)
     assert detector.stats["vf_contacts"] == len(contacts.vf)
     assert detector.stats["ee_contacts"] == len(contacts.ee)
     assert detector.stats["vf_candidates"] >= len(contacts.vf)
+    with pytest.raises(ValueError, match="NaN"):
+        detector.detect(meshes.vertices_t0, np.full_like(meshes.vertices_t1, np.nan))
+    assert detector.stats == {}
 
 
 def test_added_meshes_do_not_reach_a_detector():

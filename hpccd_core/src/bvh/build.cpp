@@ -197,19 +197,24 @@ class Builder {
   void choose_front() {
     // Enough for any number of threads, and each worth a thread's while.
     const std::uint32_t most = std::max(features_.n_carriers() / 256, 8 * Tree::leaf_size);
-    std::vector<std::uint32_t> queue;
-    if (!tree_.nodes.empty()) queue.push_back(0);
-    for (std::size_t i = 0; i < queue.size(); ++i) {
-      const Node& node = tree_.nodes[queue[i]];
+    struct Visit {
+      std::uint32_t node, above;
+    };
+    std::vector<Visit> stack;
+    if (!tree_.nodes.empty()) stack.push_back({0, Tree::none});
+    while (!stack.empty()) {
+      const Visit v = stack.back();
+      stack.pop_back();
+      const Node& node = tree_.nodes[v.node];
       if (node.children && (node.mesh == mixed_meshes || node.carriers > most)) {
-        tree_.above_front.push_back(queue[i]);
-        queue.push_back(node.children);
-        queue.push_back(node.children + 1);
+        const auto number = static_cast<std::uint32_t>(tree_.above_front.size());
+        tree_.above_front.push_back({v.node, v.above});
+        stack.push_back({node.children + 1, number});
+        stack.push_back({node.children, number});
       } else {
-        tree_.front.push_back({queue[i]});
+        tree_.front.push_back({v.node, v.above});
       }
     }
-    std::reverse(tree_.above_front.begin(), tree_.above_front.end());
   }
 
   // The slots of a leaf that follows another.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <algorithm>
+#include <atomic>
 #include <cstring>
 
 #include "bvh/tree.h"
@@ -55,6 +55,13 @@ void fill(BoxGroup* groups, std::uint32_t lane, std::uint32_t n, BoxOf&& box_of)
   }
 }
 
+// Where the vertices of a leaf lie the processor cannot guess, and other cores have written there last: a tenth of the
+// refit of 18 K triangles on four cores, a fiftieth on one. To fetch the groups of boxes ahead as well brought nothing.
+void fetch_ahead(const Tree& tree, const LeafRange& leaf, const std::vector<MotionBox>& vertex_boxes) {
+  for (std::uint32_t s = leaf.first_face; s < leaf.end_face; ++s)
+    for (const auto& corner : tree.face_corners) __builtin_prefetch(&vertex_boxes[corner[s]]);
+}
+
 MotionBox leaf_bounds(const Tree& tree, const LeafRange& leaf, const std::vector<MotionBox>& vertex_boxes) {
   Bounds whole = load(MotionBox());
   const auto vertex_box = [&](std::uint32_t v) { return load(vertex_boxes[v]); };
@@ -88,6 +95,7 @@ void join_children(Tree& tree, Node& node) {
 double refit_subtree(Tree& tree, std::uint32_t root, const std::vector<MotionBox>& vertex_boxes) {
   Node& node = tree.nodes[root];
   if (!node.children) {
+    if (node.leaf + 1 < tree.leaves.size()) fetch_ahead(tree, tree.leaves[node.leaf + 1], vertex_boxes);
     node.box = leaf_bounds(tree, tree.leaves[node.leaf], vertex_boxes);
     return node.box.area();
   }
@@ -97,22 +105,35 @@ double refit_subtree(Tree& tree, std::uint32_t root, const std::vector<MotionBox
   return left + right + node.box.area();
 }
 
+// Up from a subtree that is done: of two siblings whoever comes second goes on. A serial pass over the nodes above the
+// front, whose children other cores have written last, took a tenth of the refit of 18 K triangles on four cores.
+void refit_above(Tree& tree, std::uint32_t number) {
+  while (number != Tree::none) {
+    Tree::AboveFront& above = tree.above_front[number];
+    const std::atomic_ref half_done(above.half_done);
+    if (!half_done.exchange(1, std::memory_order_acq_rel)) return;
+    half_done.store(0, std::memory_order_relaxed);
+    Node& node = tree.nodes[above.node];
+    join_children(tree, node);
+    above.area = node.box.area();
+    number = above.above;
+  }
+}
+
 }  // namespace
 
 void refit(Tree& tree, const std::vector<MotionBox>& vertex_boxes, const std::vector<char>& resting, ThreadPool& pool) {
   parallel_for(pool, tree.front.size(), 1, [&](std::size_t begin, std::size_t end, int) {
     for (std::size_t i = begin; i < end; ++i) {
       Tree::Subtree& subtree = tree.front[i];
-      if (!resting.empty() && resting[tree.nodes[subtree.root].mesh]) continue;
-      subtree.area = refit_subtree(tree, subtree.root, vertex_boxes);
+      const bool rests = !resting.empty() && resting[tree.nodes[subtree.root].mesh];
+      if (!rests) subtree.area = refit_subtree(tree, subtree.root, vertex_boxes);
+      refit_above(tree, subtree.above);
     }
   });
   double area = 0;
   for (const Tree::Subtree& subtree : tree.front) area += subtree.area;
-  for (const std::uint32_t n : tree.above_front) {
-    join_children(tree, tree.nodes[n]);
-    area += tree.nodes[n].box.area();
-  }
+  for (const Tree::AboveFront& above : tree.above_front) area += above.area;
   const double root = tree.nodes.empty() ? 0 : tree.nodes[0].box.area();
   tree.area = root > 0 ? area / root : 0;
 }
@@ -120,7 +141,7 @@ void refit(Tree& tree, const std::vector<MotionBox>& vertex_boxes, const std::ve
 std::size_t Tree::bytes() const {
   const std::size_t faces = face_of_slot.capacity(), edges = edge_of_slot.capacity(),
                     vertices = vertex_of_slot.capacity();
-  return nodes.capacity() * sizeof(Node) + front.capacity() * sizeof(Subtree) + above_front.capacity() * 4 +
+  return nodes.capacity() * sizeof(Node) + front.capacity() * sizeof(Subtree) + above_front.capacity() * sizeof(AboveFront) +
          leaves.capacity() * (sizeof(LeafRange) + 4) + faces * 16 + edges * 12 + vertices * 4 +
          n_box_groups * sizeof(BoxGroup);
 }

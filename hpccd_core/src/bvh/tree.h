@@ -75,14 +75,24 @@ struct Tree {
   static constexpr std::uint32_t load_width = 16;  // boxes are compared 16 at a time
 
   std::vector<Node> nodes;  // breadth first: children come after their parents
-  // A front of subtrees, each within one mesh, that are refitted by one thread each (Kim et al. 2009, section 6), and
-  // the nodes above it, children before parents. The same for any number of threads, so that sums of areas are.
+  static constexpr std::uint32_t none = 0xFFFFFFFFu;
+
+  // A front of subtrees, each within one mesh, that are refitted by one thread each (Kim et al. 2009, section 6), in the
+  // order of their leaves. The same for any number of threads, so that sums of areas are.
   struct Subtree {
     std::uint32_t root;
-    double area = 0;  // sum over its nodes
+    std::uint32_t above;  // its parent, by number in above_front, or none
+    double area = 0;      // sum over its nodes
   };
   std::vector<Subtree> front;
-  std::vector<std::uint32_t> above_front;
+  // The nodes above it. Whoever finishes the second child of one refits that as well.
+  struct AboveFront {
+    std::uint32_t node;
+    std::uint32_t above;  // as in Subtree
+    std::uint32_t half_done = 0;
+    double area = 0;
+  };
+  std::vector<AboveFront> above_front;
   std::vector<LeafRange> leaves;
   std::vector<std::uint32_t> leaf_nodes;
   // Slots: features in the order of the leaves; each array ends with load_width slots of padding.

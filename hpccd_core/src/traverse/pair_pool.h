@@ -43,10 +43,12 @@ class PairPool {
   bool wait(int thread, std::vector<NodePair>& stack);
 
   const Tree& tree_;
-  SpinLock lock_;
+  // Read between any two pairs: on a cache line that changes when a thread runs dry, not with each pair handed over.
+  alignas(64) std::atomic<int> hungry_{0};
+  alignas(64) SpinLock lock_;
   std::vector<std::vector<NodePair>> lists_;  // of each thread, then those given away
   std::atomic<std::size_t> waiting_pairs_;
-  std::atomic<int> busy_{0}, hungry_{0};
+  std::atomic<int> busy_{0};
   std::atomic<bool> abandoned_{false};
 
   friend class BusyThread;
