@@ -26,6 +26,23 @@ def test_other_contacts_are_seen():
         assert len(measure.disagreements(list(series.values()))) == n
 
 
+def test_a_short_step_of_a_file_is_timed_more_often():
+    source = of_scene("folding-strip", 0.1)
+    one = dataclasses.replace(source, n_steps=1, step=lambda k: source.step(source.n_steps - 1))
+
+    class Takes:
+        carries_state = True
+
+        def __init__(self, ms):
+            self.name, self.ms = f"{ms} ms", ms
+
+        def run(self, step):
+            return measure.Sample(self.ms, 0.0, 0, 0, {}, {})
+
+    series = measure.measure(one, [Takes(2.0), Takes(50.0)], rounds=3)
+    assert [len(s.samples) for s in series.values()] == [3 * measure.TURN_MS / 2.0, 3]
+
+
 def test_errors_against_truth():
     found = type("Found", (), {})()
     found.vf, found.vf_toc = np.array([[0, 1], [2, 3]], np.uint32), np.array([0.5, 0.25])

@@ -141,9 +141,9 @@ void refit(Tree& tree, const std::vector<MotionBox>& vertex_boxes, const std::ve
 std::size_t Tree::bytes() const {
   const std::size_t faces = face_of_slot.capacity(), edges = edge_of_slot.capacity(),
                     vertices = vertex_of_slot.capacity();
-  return nodes.capacity() * sizeof(Node) + front.capacity() * sizeof(Subtree) + above_front.capacity() * sizeof(AboveFront) +
-         leaves.capacity() * (sizeof(LeafRange) + 4) + faces * 16 + edges * 12 + vertices * 4 +
-         n_box_groups * sizeof(BoxGroup);
+  return nodes.capacity() * sizeof(Node) + front.capacity() * sizeof(Subtree) +
+         above_front.capacity() * sizeof(AboveFront) + leaves.capacity() * (sizeof(LeafRange) + 4) + faces * 16 +
+         edges * 12 + vertices * 4 + n_box_groups * sizeof(BoxGroup);
 }
 
 }  // namespace hpccd

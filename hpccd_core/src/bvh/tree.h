@@ -77,8 +77,8 @@ struct Tree {
   std::vector<Node> nodes;  // breadth first: children come after their parents
   static constexpr std::uint32_t none = 0xFFFFFFFFu;
 
-  // A front of subtrees, each within one mesh, that are refitted by one thread each (Kim et al. 2009, section 6), in the
-  // order of their leaves. The same for any number of threads, so that sums of areas are.
+  // A front of subtrees, each within one mesh, that are refitted by one thread each (Kim et al. 2009, section 6), in
+  // the order of their leaves. The same for any number of threads, so that sums of areas are.
   struct Subtree {
     std::uint32_t root;
     std::uint32_t above;  // its parent, by number in above_front, or none
