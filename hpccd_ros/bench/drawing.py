@@ -14,7 +14,7 @@ PURPLE, SKY, YELLOW, GREY = "#CC79A7", "#56B4E9", "#F0E442", "#888888"
 SERIES = (BLUE, ORANGE, GREEN, RED, PURPLE, SKY, "#000000", "#A6761D")
 MARKERS = "osD^vP*X"
 
-METHOD = {"default": BLUE, "published": GREEN, "naive": RED, "front": PURPLE}
+METHOD = {"default": BLUE, "published": GREEN, "naive": RED, "front": PURPLE, "independent": GREY}
 TIER = {"fast": ORANGE, "balanced": SKY, "conservative": GREEN, "exact": BLUE}
 # Stages in the order in which they run; the paper's four components (section 6.2) have four families of colour.
 STAGE = {

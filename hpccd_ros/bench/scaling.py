@@ -8,7 +8,8 @@ method on each scene, and the speed-up of the components of section 6.2.
 Methods: default (what a Detector does unless told otherwise), published (sections 3 and 4 of the paper), naive
 (section 3.2: one shared queue) and front (Tang et al. 2009, with which section 6.3 compares). The speed-up of a method
 is over itself with one thread; parallel efficiency is the speed-up divided by the number of threads. All variants must
-find the same contacts: the hashes are compared.
+find the same contacts: the hashes are compared. Beside them stands what the machine gives ("independent"): the same
+step by as many detectors of one thread each, all at once, which share nothing.
 """
 
 from __future__ import annotations
@@ -16,6 +17,8 @@ from __future__ import annotations
 from hpccd_ros.errors import UserError
 
 from . import common, measure, scaling_figure, table
+from .independent import METHOD as INDEPENDENT
+from .independent import IndependentRunner
 from .machine import cores
 from .sources import TABLE_1
 from .variants import METHODS, Variant, usable, with_method
@@ -61,15 +64,27 @@ def run(args) -> int:
             for method in methods for n in counts
         }  # fmt: skip
         runners = [measure.CoreRunner(variant) for variant in variants.values()]
-        series = measure.measure(source, runners, args.repeat, args.steps)
+        independent = _independent(args, methods, counts)
+        series = measure.measure(source, [*runners, *independent.values()], args.repeat, args.steps)
         for text in measure.disagreements(list(series.values())):
             report.failure(f"{source.name}: contacts differ between methods or numbers of threads: {text}")
         for method in methods:
             alone = series[variants[method, counts[0]].name] if counts[0] == 1 else None
             for n in counts:
                 report.add(**_row(source, method, n, series[variants[method, n].name], alone, args))
+        for n, runner in independent.items():
+            alone = series[variants["default", 1].name]
+            report.add(**_row(source, INDEPENDENT, n, series[runner.name], alone, args))
+            runner.close()
     _print(report)
     return common.end(args, report, {"scaling": scaling_figure.draw_speedup, "threads": scaling_figure.draw_times})
+
+
+def _independent(args, methods, counts):
+    """By number of detectors; none where nothing tells how long one takes on its own."""
+    if args.backend != "cpu" or "default" not in methods or 1 not in counts:
+        return {}
+    return {n: IndependentRunner(n, {"accuracy": args.accuracy, "backend": "cpu"}) for n in counts if n > 1}
 
 
 def _thread_counts(text):
@@ -102,8 +117,10 @@ def _row(source, method, threads, series, alone, args):
         "stages_ms": stages,
     }
     if alone:
-        speedup = alone.sequence_ms() / series.sequence_ms()
+        at_once = threads if method == INDEPENDENT else 1
+        speedup = at_once * alone.sequence_ms() / series.sequence_ms()
         row |= {"speedup": speedup, "efficiency": speedup / threads}
+    if alone and stages:
         before, after = components(alone.stages()), components(stages)
         row["component_speedup"] = {name: before[name] / after[name] for name in COMPONENTS if after[name] > 0}
     return row
@@ -115,15 +132,22 @@ def components(stages: dict[str, float]) -> dict[str, float]:
 
 
 def _print(report):
+    given = {(r["scene"], r["threads"]): r["speedup"] for r in report.rows if r["method"] == INDEPENDENT}
+
+    def of_given(row):
+        most = given.get((row["scene"], row["threads"]))
+        return row["speedup"] / most if most else None
+
     table.show(
         f"speed-up over one thread ({report.rows[0]['accuracy']})",
-        ["scene", "method", "threads", "median ms", "p95 ms", "speed-up", "efficiency", *COMPONENTS],
+        ["scene", "method", "threads", "median ms", "p95 ms", "speed-up", "efficiency", "of independent", *COMPONENTS],
         [
             [
                 r["scene"], r["method"], r["threads"], r["median_ms"], r["p95_ms"], r.get("speedup"),
-                r.get("efficiency"), *(r.get("component_speedup", {}).get(name) for name in COMPONENTS),
+                r.get("efficiency"), of_given(r), *(r.get("component_speedup", {}).get(name) for name in COMPONENTS),
             ]
             for r in report.rows
         ],
-        "median and p95 over all steps and rounds; speed-up of the sequence of steps, then of its components",
+        "median and p95 over all steps and rounds; speed-up of the sequence of steps, then of its components; "
+        "independent: as many detectors of one thread each at once, which share nothing: what the machine gives",
     )  # fmt: skip

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from . import drawing
+from .independent import METHOD as INDEPENDENT
 
 
 def draw_speedup(report, path) -> None:
@@ -28,7 +29,8 @@ def draw_speedup(report, path) -> None:
     for axis, scene in zip(axes[1:], scenes, strict=True):
         axis.set_title(scene, fontsize=9)
         for method in methods:
-            _line(axis, rows, scene, method, label=method, color=drawing.METHOD[method], marker="o")
+            label, line = (method, "-") if method != INDEPENDENT else ("independent detectors", "--")
+            _line(axis, rows, scene, method, label=label, linestyle=line, color=drawing.METHOD[method], marker="o")
     for axis in axes:
         axis.plot(threads, threads, color="black", linewidth=0.8, linestyle=":", label="linear", zorder=1)
         axis.set_xlim(0.7, threads[-1] + 0.3)
@@ -46,7 +48,7 @@ def draw_speedup(report, path) -> None:
 
 def draw_times(report, path) -> None:
     """ms a step over threads, one panel for each scene, a line for each method."""
-    rows = report.rows
+    rows = [row for row in report.rows if row["method"] != INDEPENDENT]
     scenes, methods = _names(rows, "scene"), _names(rows, "method")
     threads = sorted({row["threads"] for row in rows})
     figure, axes = drawing.panels(len(scenes), columns=4)

@@ -36,10 +36,18 @@ def test_scaling(bench):
     assert status == 0
     check_files(result, folder, "scaling", "threads")
     assert [(r["method"], r["threads"]) for r in result["rows"]] == [
-        ("default", 1), ("default", 2), ("naive", 1), ("naive", 2),
+        ("default", 1), ("default", 2), ("naive", 1), ("naive", 2), ("independent", 2),
     ]  # fmt: skip
     assert len({r["contacts"] for r in result["rows"]}) == 1
     assert result["rows"][0]["efficiency"] == 1
+    alone, at_once = result["rows"][0], result["rows"][-1]
+    assert at_once["speedup"] == pytest.approx(2 * alone["sequence_ms"] / at_once["sequence_ms"], rel=0.05)
+
+
+def test_nothing_to_hold_independent_detectors_against(bench):
+    status, result, _ = bench("scaling", *STRIP, "--threads-list", "2", "--methods", "naive")
+    assert status == 0
+    assert [(r["method"], r["threads"]) for r in result["rows"]] == [("naive", 2)]
 
 
 def test_methods(bench):
