@@ -34,9 +34,9 @@ struct Detector::Impl {
   Impl(std::shared_ptr<const Scene> s, Options o)
       : scene(std::move(s)),
         options(o),
-        features(features_of(*scene)),
-        rules(*scene, o.accuracy),
         pool(pool_threads(o)),
+        features(features_of(*scene, pool)),
+        rules(*scene, o.accuracy),
         workers(static_cast<std::size_t>(pool.size())) {
     options.simd = resolve(o.simd);
     options.threads = pool.size();
@@ -51,9 +51,9 @@ struct Detector::Impl {
 
   std::shared_ptr<const Scene> scene;
   Options options;
+  ThreadPool pool, one_thread{1};
   Features features;
   PairRules rules;
-  ThreadPool pool, one_thread{1};
   std::vector<Worker> workers;
   Search search;
   ContactOrder order;

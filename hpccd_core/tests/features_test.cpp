@@ -54,5 +54,25 @@ TEST(Features, EachFeatureIsRepresentedOnceByATriangleThatHasIt) {
   EXPECT_EQ(features.lone_vertices.size(), lone * test::sheets);
 }
 
+TEST(Features, AreTheSameWithAnyNumberOfThreads) {
+  for (const std::uint32_t n : {2u, 3u, side, 80u}) {
+    const auto sheets = test::two_sheets(n, lone);
+    auto scene = std::make_shared<Scene>(*sheets);
+    scene->add_mesh("none", {}, 0, {});
+    const Features alone = features_of(*scene);
+    for (int threads : {2, 3, 16}) {
+      ThreadPool pool(threads);
+      const Features shared = features_of(*scene, pool);
+      EXPECT_EQ(alone.edges, shared.edges);
+      EXPECT_EQ(alone.first_edge, shared.first_edge);
+      EXPECT_EQ(alone.owned_edges, shared.owned_edges);
+      EXPECT_EQ(alone.first_vertex, shared.first_vertex);
+      EXPECT_EQ(alone.owned_vertices, shared.owned_vertices);
+      EXPECT_EQ(alone.lone_vertices, shared.lone_vertices);
+      EXPECT_EQ(alone.mesh_of_carrier, shared.mesh_of_carrier);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace hpccd

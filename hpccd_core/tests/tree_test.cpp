@@ -95,6 +95,30 @@ TEST_F(TreeTest, RefitToTheSameMotionChangesNothing) {
   }
 }
 
+// Large enough that threads split the upper ranges together.
+TEST(TreeBuild, IsTheSameWithAnyNumberOfThreads) {
+  constexpr std::uint32_t large = 120;
+  const auto scene = test::two_sheets(large, lone);
+  const Features features = features_of(*scene);
+  ThreadPool one(1);
+  MotionBounds motion;
+  const auto start = test::sheet_positions(large, 0, lone), end = test::sheet_positions(large, 0.3, lone);
+  motion.take(test::view(start), test::view(end), 0, one);
+  Tree alone;
+  build(alone, *scene, features, motion.boxes, one);
+  for (int threads : {2, 4, 16}) {
+    ThreadPool pool(threads);
+    Tree shared;
+    build(shared, *scene, features, motion.boxes, pool);
+    EXPECT_EQ(alone.area, shared.area);
+    EXPECT_EQ(alone.face_of_slot, shared.face_of_slot);
+    EXPECT_EQ(alone.edge_of_slot, shared.edge_of_slot);
+    EXPECT_EQ(alone.vertex_of_slot, shared.vertex_of_slot);
+    ASSERT_EQ(alone.nodes.size(), shared.nodes.size());
+    EXPECT_EQ(0, std::memcmp(alone.nodes.data(), shared.nodes.data(), alone.nodes.size() * sizeof(Node))) << threads;
+  }
+}
+
 // Above the front whoever comes second joins the boxes, so many rounds: each would show a box joined too early.
 TEST(TreeRefit, IsTheSameWithAnyNumberOfThreads) {
   constexpr std::uint32_t large = 65;

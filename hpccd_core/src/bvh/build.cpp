@@ -1,46 +1,33 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
-#include <numeric>
+#include <memory>
 
+#include "bvh/split.h"
 #include "bvh/tree.h"
 
 namespace hpccd {
 namespace {
 
-struct Centroid {
-  float x[3];
-};
-
 struct Range {
   std::uint32_t node, begin, end;
 };
 
-int widest_axis(const Centroid* centroids, const std::uint32_t* order, std::uint32_t n) {
-  float low[3] = {Box::inf, Box::inf, Box::inf}, high[3] = {-Box::inf, -Box::inf, -Box::inf};
-  for (std::uint32_t i = 0; i < n; ++i)
-    for (int k = 0; k < 3; ++k) {
-      low[k] = std::min(low[k], centroids[order[i]].x[k]);
-      high[k] = std::max(high[k], centroids[order[i]].x[k]);
-    }
-  int axis = 0;
-  for (int k = 1; k < 3; ++k)
-    if (high[k] - low[k] > high[axis] - low[axis]) axis = k;
-  return axis;
-}
+// A mesh's carriers: their numbers, and where they stand among those that are split.
+struct Part {
+  std::uint32_t first_face, n_faces, first_lone, n_lone;
+  std::uint32_t node = 0, begin = 0;
 
-// Puts the `left` lowest along the widest axis first. Ties are ordered by number, so the result is the same everywhere.
-void split(const std::vector<Centroid>& centroids, std::uint32_t* order, std::uint32_t n, std::uint32_t left) {
-  const int axis = widest_axis(centroids.data(), order, n);
-  std::nth_element(order, order + left, order + n, [&](std::uint32_t a, std::uint32_t b) {
-    const float xa = centroids[a].x[axis], xb = centroids[b].x[axis];
-    return xa < xb || (xa == xb && a < b);
-  });
-}
+  std::uint32_t size() const { return n_faces + n_lone; }
+  std::uint32_t place_of(std::uint32_t c) const {
+    return begin + (c < first_face + n_faces ? c - first_face : n_faces + (c - first_lone));
+  }
+};
 
-Centroid centroid_of(const MotionBox& b) {
-  Centroid c;
-  for (int k = 0; k < 3; ++k) c.x[k] = (b.t0.low[k] + b.t0.high[k]) + (b.t1.low[k] + b.t1.high[k]);
-  return c;
+Placed at_center(const MotionBox& b, std::uint32_t number) {
+  Placed p;
+  for (int k = 0; k < 3; ++k) p.center[k] = (b.t0.low[k] + b.t0.high[k]) + (b.t1.low[k] + b.t1.high[k]);
+  p.number = number;
+  return p;
 }
 
 class Builder {
@@ -50,8 +37,9 @@ class Builder {
       : tree_(tree), scene_(scene), features_(features), vertex_boxes_(vertex_boxes), pool_(pool) {}
 
   void run() {
-    group_by_mesh();
-    split_meshes();
+    find_parts();
+    order_meshes();
+    place_carriers();
     while (!level_.empty()) split_level();
     lay_out_slots();
     choose_front();
@@ -65,66 +53,67 @@ class Builder {
     return b;
   }
 
-  void group_by_mesh() {
-    const std::uint32_t n = features_.n_carriers();
-    first_of_mesh_.assign(scene_.meshes().size() + 1, 0);
-    for (std::uint32_t m : features_.mesh_of_carrier) ++first_of_mesh_[m + 1];
-    std::partial_sum(first_of_mesh_.begin(), first_of_mesh_.end(), first_of_mesh_.begin());
-    std::vector<std::uint32_t> next(first_of_mesh_.begin(), first_of_mesh_.end() - 1);
-    order_.resize(n);
-    for (std::uint32_t c = 0; c < n; ++c) order_[next[features_.mesh_of_carrier[c]]++] = c;
-    centroids_.resize(n);
-    parallel_for(pool_, n, 1024, [&](std::size_t begin, std::size_t end, int) {
-      for (std::size_t c = begin; c < end; ++c) centroids_[c] = centroid_of(carrier_box(static_cast<std::uint32_t>(c)));
-    });
+  void find_parts() {
+    const auto lone_before = [&](std::uint32_t vertex) {
+      const auto& lone = features_.lone_vertices;
+      return static_cast<std::uint32_t>(std::ranges::lower_bound(lone, vertex) - lone.begin());
+    };
+    for (const Scene::Mesh& m : scene_.meshes()) {
+      const std::uint32_t first = lone_before(m.first_vertex), end = lone_before(m.first_vertex + m.n_vertices);
+      parts_.push_back({m.first_face, m.n_faces, features_.n_faces() + first, end - first});
+    }
   }
 
-  Centroid center_of_mesh(std::uint32_t m) const {
+  Placed mesh_at_center(std::uint32_t m) const {
     const Scene::Mesh& mesh = scene_.meshes()[m];
     MotionBox b;
     for (std::uint32_t v = mesh.first_vertex; v < mesh.first_vertex + mesh.n_vertices; ++v) b.include(vertex_boxes_[v]);
-    return centroid_of(b);
+    return at_center(b, m);
   }
 
   // Upper part: a tree over whole meshes, so that below it every node belongs to one mesh.
-  void split_meshes() {
-    const std::size_t n_meshes = scene_.meshes().size();
-    const auto is_empty = [&](std::size_t m) { return first_of_mesh_[m] == first_of_mesh_[m + 1]; };
-    std::vector<std::uint32_t> meshes;
-    for (std::uint32_t m = 0; m < n_meshes; ++m)
-      if (!is_empty(m)) meshes.push_back(m);
-    std::vector<Centroid> centers(n_meshes);
-    if (meshes.size() > 1)
-      for (std::uint32_t m : meshes) centers[m] = center_of_mesh(m);
+  void order_meshes() {
+    std::vector<Placed> meshes;
+    for (std::uint32_t m = 0; m < parts_.size(); ++m)
+      if (parts_[m].size() > 0) meshes.push_back({{}, m});
     if (meshes.empty()) return;
-    struct MeshRange {
-      std::uint32_t node, begin, end;
-    };
+    if (meshes.size() > 1)
+      for (Placed& mesh : meshes) mesh = mesh_at_center(mesh.number);
+    std::vector<Placed> scratch(meshes.size());
     tree_.nodes.push_back({});
-    std::vector<MeshRange> queue{{0, 0, static_cast<std::uint32_t>(meshes.size())}};
-    std::vector<std::uint32_t> node_of_mesh(n_meshes);
+    std::vector<Range> queue{{0, 0, static_cast<std::uint32_t>(meshes.size())}};
     for (std::size_t i = 0; i < queue.size(); ++i) {
-      const MeshRange r = queue[i];
+      const Range r = queue[i];
       if (r.end - r.begin == 1) {
-        node_of_mesh[meshes[r.begin]] = r.node;
+        Part& part = parts_[meshes[r.begin].number];
+        part.node = r.node;
+        tree_.nodes[r.node].mesh = meshes[r.begin].number;
         continue;
       }
       const std::uint32_t half = (r.end - r.begin) / 2;
-      split(centers, meshes.data() + r.begin, r.end - r.begin, half);
+      split(meshes.data() + r.begin, r.end - r.begin, half, scratch.data());
       const std::uint32_t child = add_children(r.node);
       queue.push_back({child, r.begin, r.begin + half});
       queue.push_back({child + 1, r.begin + half, r.end});
     }
     // In the order of the upper tree: neighbours in space are neighbours in memory.
-    std::vector<std::uint32_t> order;
-    order.reserve(order_.size());
-    for (std::uint32_t m : meshes) {
-      const auto begin = static_cast<std::uint32_t>(order.size());
-      order.insert(order.end(), order_.begin() + first_of_mesh_[m], order_.begin() + first_of_mesh_[m + 1]);
-      tree_.nodes[node_of_mesh[m]].mesh = m;
-      level_.push_back({node_of_mesh[m], begin, static_cast<std::uint32_t>(order.size())});
+    std::uint32_t begin = 0;
+    for (const Placed& mesh : meshes) {
+      Part& part = parts_[mesh.number];
+      part.begin = begin;
+      begin += part.size();
+      level_.push_back({part.node, part.begin, begin});
     }
-    order_.swap(order);
+  }
+
+  void place_carriers() {
+    const std::size_t n = features_.n_carriers();
+    carriers_ = std::make_unique_for_overwrite<Placed[]>(n);
+    scratch_ = std::make_unique_for_overwrite<Placed[]>(n);
+    parallel_for(pool_, n, 1024, [&](std::size_t begin, std::size_t end, int) {
+      for (auto c = static_cast<std::uint32_t>(begin); c < end; ++c)
+        carriers_[parts_[features_.mesh_of_carrier[c]].place_of(c)] = at_center(carrier_box(c), c);
+    });
   }
 
   std::uint32_t add_children(std::uint32_t parent) {
@@ -144,10 +133,20 @@ class Builder {
   }
 
   void split_level() {
+    // A range larger than a thread's share of all would leave the others without work.
+    constexpr std::uint32_t worth_sharing = 1 << 14;
+    const std::uint32_t share = features_.n_carriers() / static_cast<std::uint32_t>(pool_.size());
+    const auto is_shared = [&](const Range& r) {
+      return pool_.size() > 1 && r.end - r.begin > std::max(share, worth_sharing);
+    };
+    for (const Range& r : level_)
+      if (is_shared(r))
+        split_together(&carriers_[r.begin], r.end - r.begin, left_size(r.end - r.begin), &scratch_[r.begin], pool_);
     parallel_for(pool_, level_.size(), 1, [&](std::size_t begin, std::size_t end, int) {
       for (std::size_t i = begin; i < end; ++i) {
-        const std::uint32_t n = level_[i].end - level_[i].begin;
-        if (n > Tree::leaf_size) split(centroids_, order_.data() + level_[i].begin, n, left_size(n));
+        const Range& r = level_[i];
+        const std::uint32_t n = r.end - r.begin;
+        if (n > Tree::leaf_size && !is_shared(r)) split(&carriers_[r.begin], n, left_size(n), &scratch_[r.begin]);
       }
     });
     std::vector<Range> next;
@@ -222,7 +221,7 @@ class Builder {
     LeafRange leaf{before.end_face,   before.end_face,   before.end_edge,   before.end_edge,
                    before.end_vertex, before.end_vertex, before.end_group()};
     for (std::uint32_t i = r.begin; i < r.end; ++i) {
-      const std::uint32_t c = order_[i];
+      const std::uint32_t c = carriers_[i].number;
       leaf.end_face += c < features_.n_faces();
       leaf.end_edge += features_.first_edge[c + 1] - features_.first_edge[c];
       leaf.end_vertex += features_.first_vertex[c + 1] - features_.first_vertex[c];
@@ -240,9 +239,9 @@ class Builder {
     std::uint32_t face = leaf.first_face, edge = leaf.first_edge, vertex = leaf.first_vertex;
     node.only_points = leaf.n_faces() == 0;
     std::fill(&tree_.box_groups[leaf.first_group], &tree_.box_groups[leaf.end_group()], BoxGroup{});
-    std::sort(order_.begin() + r.begin, order_.begin() + r.end);
+    std::sort(&carriers_[r.begin], &carriers_[r.end], [](const Placed& a, const Placed& b) { return a.number < b.number; });
     for (std::uint32_t k = r.begin; k < r.end; ++k) {
-      const std::uint32_t c = order_[k];
+      const std::uint32_t c = carriers_[k].number;
       if (c < features_.n_faces()) {
         for (int j = 0; j < 3; ++j) tree_.face_corners[j][face] = features_.faces[c][j];
         tree_.face_of_slot[face++] = c;
@@ -262,8 +261,8 @@ class Builder {
   const Features& features_;
   const std::vector<MotionBox>& vertex_boxes_;
   ThreadPool& pool_;
-  std::vector<std::uint32_t> first_of_mesh_, order_;
-  std::vector<Centroid> centroids_;
+  std::vector<Part> parts_;         // by mesh
+  std::unique_ptr<Placed[]> carriers_, scratch_;  // carriers in the order of the tree, as far as it has been split
   std::vector<Range> level_, leaf_ranges_;
 };
 

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "base/parallel.h"
 #include "hpccd/hpccd.h"
 
 namespace hpccd {
@@ -30,6 +31,8 @@ struct Features {
   std::uint32_t n_carriers() const { return static_cast<std::uint32_t>(mesh_of_carrier.size()); }
 };
 
-Features features_of(const Scene& scene);
+// The same with any number of threads.
+Features features_of(const Scene& scene, ThreadPool& pool);
+Features features_of(const Scene& scene);  // by the calling thread
 
 }  // namespace hpccd

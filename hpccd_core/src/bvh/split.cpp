@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "bvh/split.h"
+
+#include <algorithm>
+#include <array>
+#include <vector>
+
+#include "bvh/box.h"
+
+namespace hpccd {
+namespace {
+
+Box box_of(const Placed* set, std::uint32_t n) {
+  Box b;
+  for (std::uint32_t i = 0; i < n; ++i)
+    for (int k = 0; k < 3; ++k) {
+      b.low[k] = std::min(b.low[k], set[i].center[k]);
+      b.high[k] = std::max(b.high[k], set[i].center[k]);
+    }
+  return b;
+}
+
+int widest_axis(const Box& b) {
+  int axis = 0;
+  for (int k = 1; k < 3; ++k)
+    if (b.high[k] - b.low[k] > b.high[axis] - b.low[axis]) axis = k;
+  return axis;
+}
+
+void split_along(int axis, Placed* set, std::uint32_t n, std::uint32_t left) {
+  std::nth_element(set, set + left, set + n, [axis](const Placed& a, const Placed& b) {
+    const float xa = a.center[axis], xb = b.center[axis];
+    return xa < xb || (xa == xb && a.number < b.number);
+  });
+}
+
+// Equal steps along an axis. Rounding keeps the order, so nothing in a bucket lies below anything in the one before.
+class Buckets {
+ public:
+  static constexpr std::uint32_t number = 1024;
+
+  Buckets(const Box& b, int axis)
+      : axis_(axis), low_(b.low[axis]), per_length_(b.high[axis] > low_ ? number / (b.high[axis] - low_) : 0) {}
+
+  std::uint32_t of(const Placed& p) const {
+    return std::min(number - 1, static_cast<std::uint32_t>((p.center[axis_] - low_) * per_length_));
+  }
+
+ private:
+  int axis_;
+  double low_, per_length_;  // the smallest length that a float can have would overflow one
+};
+
+// Part of a set: what it holds, and where its next ones go below, in and above the bucket that is cut.
+struct Piece {
+  std::uint32_t begin, end;
+  Box box;
+  std::array<std::uint32_t, Buckets::number> count;
+  std::uint32_t next[3];
+};
+
+// Counts by bucket, moves each to its side of the bucket with the cut, and sorts out that one alone: without a branch
+// that depends on the data. for_pieces(f) calls f(piece) for each.
+template <class ForPieces>
+void split_by_buckets(Placed* set, std::uint32_t left, Placed* scratch, std::vector<Piece>& pieces,
+                      ForPieces&& for_pieces) {
+  for_pieces([&](Piece& p) { p.box = box_of(set + p.begin, p.end - p.begin); });
+  Box whole;
+  for (const Piece& p : pieces) whole.include(p.box);
+  const int axis = widest_axis(whole);
+  const Buckets buckets(whole, axis);
+  for_pieces([&](Piece& p) {
+    p.count.fill(0);
+    for (std::uint32_t i = p.begin; i < p.end; ++i) ++p.count[buckets.of(set[i])];
+  });
+
+  std::uint32_t cut = 0, below = 0, inside = 0;
+  for (;; ++cut, below += inside) {
+    inside = 0;
+    for (const Piece& p : pieces) inside += p.count[cut];
+    if (left < below + inside) break;
+  }
+  const auto side_of = [cut](std::uint32_t bucket) { return (bucket >= cut) + (bucket > cut); };
+  std::uint32_t next[3] = {0, below, below + inside};
+  for (Piece& p : pieces) {
+    std::copy_n(next, 3, p.next);
+    for (std::uint32_t b = 0; b < Buckets::number; ++b) next[side_of(b)] += p.count[b];
+  }
+  for_pieces([&](Piece& p) {
+    for (std::uint32_t i = p.begin; i < p.end; ++i) scratch[p.next[side_of(buckets.of(set[i]))]++] = set[i];
+  });
+  for_pieces([&](Piece& p) { std::copy(scratch + p.begin, scratch + p.end, set + p.begin); });
+  if (left > below) split_along(axis, set + below, inside, left - below);
+}
+
+}  // namespace
+
+void split(Placed* set, std::uint32_t n, std::uint32_t left, Placed* scratch) {
+  constexpr std::uint32_t few = 2 * Buckets::number;  // going through the buckets costs more
+  if (n < few) return split_along(widest_axis(box_of(set, n)), set, n, left);
+  std::vector<Piece> whole(1);
+  whole[0].begin = 0, whole[0].end = n;
+  split_by_buckets(set, left, scratch, whole, [&](auto&& work) { work(whole[0]); });
+}
+
+void split_together(Placed* set, std::uint32_t n, std::uint32_t left, Placed* scratch, ThreadPool& pool) {
+  std::vector<Piece> pieces(static_cast<std::size_t>(4 * pool.size()));
+  for (std::size_t p = 0; p < pieces.size(); ++p) {
+    pieces[p].begin = static_cast<std::uint32_t>(n * p / pieces.size());
+    pieces[p].end = static_cast<std::uint32_t>(n * (p + 1) / pieces.size());
+  }
+  split_by_buckets(set, left, scratch, pieces, [&](auto&& work) {
+    parallel_for(pool, pieces.size(), 1, [&](std::size_t from, std::size_t to, int) {
+      for (std::size_t p = from; p < to; ++p) work(pieces[p]);
+    });
+  });
+}
+
+}  // namespace hpccd
