@@ -3,11 +3,11 @@
 
 What is timed is one call of `detect`, argument checks and the arrays of contacts included; where the topology has
 changed since the step before, making scene and detector too. Not timed: reading or generating the step, the first
-round (warm-up), and, where the measured steps do not follow each other, the steps before each one: of the fastest variant
-TURN_MS long and at least one, and the same for all, so that all build their hierarchy at the same step (of the only step
-of a file: the same step). They are computed because detectors carry their hierarchy from step to step, and because in a
-stream no other detector has used caches and cores in between. The only step of a file is then timed again and again, for
-TURN_MS: five times of 1.4 ms say little on a machine that others use as well.
+round (warm-up), and, where the measured steps do not follow each other, the steps before each one: of the fastest
+variant TURN_MS long and at least one, and the same for all, so that all build their hierarchy at the same step (of the
+only step of a file: the same step). They are computed because detectors carry their hierarchy from step to step, and
+because in a stream no other detector has used caches and cores in between. The only step of a file is then timed again
+and again, for TURN_MS: five times of 1.4 ms say little on a machine that others use as well.
 """
 
 from __future__ import annotations

@@ -239,7 +239,8 @@ class Builder {
     std::uint32_t face = leaf.first_face, edge = leaf.first_edge, vertex = leaf.first_vertex;
     node.only_points = leaf.n_faces() == 0;
     std::fill(&tree_.box_groups[leaf.first_group], &tree_.box_groups[leaf.end_group()], BoxGroup{});
-    std::sort(&carriers_[r.begin], &carriers_[r.end], [](const Placed& a, const Placed& b) { return a.number < b.number; });
+    std::sort(&carriers_[r.begin], &carriers_[r.end],
+              [](const Placed& a, const Placed& b) { return a.number < b.number; });
     for (std::uint32_t k = r.begin; k < r.end; ++k) {
       const std::uint32_t c = carriers_[k].number;
       if (c < features_.n_faces()) {
@@ -261,7 +262,7 @@ class Builder {
   const Features& features_;
   const std::vector<MotionBox>& vertex_boxes_;
   ThreadPool& pool_;
-  std::vector<Part> parts_;         // by mesh
+  std::vector<Part> parts_;                       // by mesh
   std::unique_ptr<Placed[]> carriers_, scratch_;  // carriers in the order of the tree, as far as it has been split
   std::vector<Range> level_, leaf_ranges_;
 };
