@@ -26,7 +26,7 @@ class IndependentRunner:
 
     def __init__(self, n: int, options: dict):
         self.name = f"{METHOD}, {n} threads"
-        self._barrier = threading.Barrier(n)
+        self._barrier = threading.Barrier(n, timeout=60)  # one that cannot be put on its core must not hold up the rest
         self._runners = [CoreRunner(Variant(f"{METHOD} {i}", {**options, "threads": 1})) for i in range(n)]
         cores = sorted(os.sched_getaffinity(0))
         self._cores = cores if n <= len(cores) else None
