@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <string>
 
 #include "bvh/motion_bounds.h"
 #include "grid_scene.h"
@@ -24,17 +25,25 @@ bool contains(const MotionBox& outer, const MotionBox& inner) {
   return contains(outer.t0, inner.t0) && contains(outer.t1, inner.t1);
 }
 
-struct TreeTest : testing::Test {
-  std::shared_ptr<const Scene> scene = test::two_sheets(side, lone);
+struct Sheets : testing::Test {
+  explicit Sheets(std::uint32_t n) : n(n) {}
+
+  const std::uint32_t n;  // vertices along a side
+  std::shared_ptr<const Scene> scene = test::two_sheets(n, lone);
   Features features = features_of(*scene);
   ThreadPool pool{2};
   MotionBounds motion;
-  Tree tree;
 
   void take(double t0, double t1) {
-    const auto start = test::sheet_positions(side, t0, lone), end = test::sheet_positions(side, t1, lone);
+    const auto start = test::sheet_positions(n, t0, lone), end = test::sheet_positions(n, t1, lone);
     motion.take(test::view(start), test::view(end), 0, pool);
   }
+};
+
+struct TreeTest : Sheets {
+  TreeTest() : Sheets(side) {}
+
+  Tree tree;
 
   // Each node's box holds its children's; each leaf's box holds the motion of all vertices of its features.
   void expect_bounds() const {
@@ -95,21 +104,28 @@ TEST_F(TreeTest, RefitToTheSameMotionChangesNothing) {
   }
 }
 
-// Large enough that threads split the upper ranges together.
-TEST(TreeBuild, IsTheSameWithAnyNumberOfThreads) {
-  constexpr std::uint32_t large = 120;
-  const auto scene = test::two_sheets(large, lone);
-  const Features features = features_of(*scene);
-  ThreadPool one(1);
-  MotionBounds motion;
-  const auto start = test::sheet_positions(large, 0, lone), end = test::sheet_positions(large, 0.3, lone);
-  motion.take(test::view(start), test::view(end), 0, one);
+// So many triangles that threads split the upper ranges together and that many nodes lie above the front.
+struct LargeTreeTest : Sheets {
+  LargeTreeTest() : Sheets(120) {}
+
+  ThreadPool one{1}, four{4};
+
+  static void expect_equal_boxes(const Tree& a, const Tree& b, const std::string& when) {
+    EXPECT_EQ(a.area, b.area) << when;
+    ASSERT_EQ(a.nodes.size(), b.nodes.size());
+    for (std::size_t i = 0; i < a.nodes.size(); ++i)
+      ASSERT_EQ(0, std::memcmp(&a.nodes[i].box, &b.nodes[i].box, sizeof(MotionBox))) << when << ", node " << i;
+  }
+};
+
+TEST_F(LargeTreeTest, IsBuiltAlikeByAnyNumberOfThreads) {
+  take(0, 0.3);
   Tree alone;
   build(alone, *scene, features, motion.boxes, one);
   for (int threads : {2, 4, 16}) {
-    ThreadPool pool(threads);
+    ThreadPool many(threads);
     Tree shared;
-    build(shared, *scene, features, motion.boxes, pool);
+    build(shared, *scene, features, motion.boxes, many);
     EXPECT_EQ(alone.area, shared.area);
     EXPECT_EQ(alone.face_of_slot, shared.face_of_slot);
     EXPECT_EQ(alone.edge_of_slot, shared.edge_of_slot);
@@ -120,18 +136,9 @@ TEST(TreeBuild, IsTheSameWithAnyNumberOfThreads) {
 }
 
 // Above the front whoever comes second joins the boxes, so many rounds: each would show a box joined too early.
-TEST(TreeRefit, IsTheSameWithAnyNumberOfThreads) {
-  constexpr std::uint32_t large = 65;
-  const auto scene = test::two_sheets(large);
-  const Features features = features_of(*scene);
-  ThreadPool one(1), four(4);
-  MotionBounds motion;
-  const auto take = [&](double t0, double t1) {
-    const auto start = test::sheet_positions(large, t0), end = test::sheet_positions(large, t1);
-    motion.take(test::view(start), test::view(end), 0, one);
-  };
-  Tree alone, shared;
+TEST_F(LargeTreeTest, IsRefittedAlikeByAnyNumberOfThreads) {
   take(0, 0.1);
+  Tree alone, shared;
   build(alone, *scene, features, motion.boxes, one);
   build(shared, *scene, features, motion.boxes, one);
   ASSERT_GT(shared.above_front.size(), 64u);
@@ -140,35 +147,21 @@ TEST(TreeRefit, IsTheSameWithAnyNumberOfThreads) {
     take(t, t + 0.1);
     refit(alone, motion.boxes, {}, one);
     refit(shared, motion.boxes, {}, four);
-    ASSERT_EQ(alone.area, shared.area) << "round " << round;
-    for (std::size_t i = 0; i < alone.nodes.size(); ++i)
-      ASSERT_EQ(0, std::memcmp(&alone.nodes[i].box, &shared.nodes[i].box, sizeof(MotionBox)))
-          << "round " << round << ", node " << i;
+    ASSERT_NO_FATAL_FAILURE(expect_equal_boxes(alone, shared, "round " + std::to_string(round)));
   }
 }
 
-TEST(TreeRefit, LeavesOutWhatRestsAndNothingAboveIt) {
-  constexpr std::uint32_t large = 65;
-  const auto scene = test::two_sheets(large);
-  const Features features = features_of(*scene);
-  ThreadPool pool(4);
-  MotionBounds motion;
-  const auto take = [&](double t0, double t1) {
-    const auto start = test::sheet_positions(large, t0), end = test::sheet_positions(large, t1);
-    motion.take(test::view(start), test::view(end), 0, pool);
-  };
-  Tree whole, part;
+TEST_F(LargeTreeTest, RefitLeavesOutWhatRestsAndNothingAboveIt) {
   take(0, 0.1);
-  build(whole, *scene, features, motion.boxes, pool);
-  build(part, *scene, features, motion.boxes, pool);
+  Tree whole, part;
+  build(whole, *scene, features, motion.boxes, one);
+  build(part, *scene, features, motion.boxes, one);
   const std::vector<MotionBox> before = motion.boxes;
   take(0.1, 0.2);
-  std::copy_n(before.begin(), large * large, motion.boxes.begin());  // the first sheet
-  refit(whole, motion.boxes, {}, pool);
-  refit(part, motion.boxes, {1, 0}, pool);
-  EXPECT_EQ(whole.area, part.area);
-  for (std::size_t i = 0; i < whole.nodes.size(); ++i)
-    EXPECT_EQ(0, std::memcmp(&whole.nodes[i].box, &part.nodes[i].box, sizeof(MotionBox))) << "node " << i;
+  std::copy_n(before.begin(), n * n + lone, motion.boxes.begin());  // the first sheet
+  refit(whole, motion.boxes, {}, four);
+  refit(part, motion.boxes, {1, 0}, four);
+  expect_equal_boxes(whole, part, "at rest");
 }
 
 }  // namespace

@@ -98,4 +98,12 @@ void parallel_for(ThreadPool& pool, std::size_t n, std::size_t grain, F&& f) {
   });
 }
 
+// f(i) for each i < n, one at a time.
+template <class F>
+void parallel_for_each(ThreadPool& pool, std::size_t n, F&& f) {
+  parallel_for(pool, n, 1, [&](std::size_t begin, std::size_t end, int) {
+    for (std::size_t i = begin; i < end; ++i) f(i);
+  });
+}
+
 }  // namespace hpccd

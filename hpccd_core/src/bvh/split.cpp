@@ -110,9 +110,7 @@ void split_together(Placed* set, std::uint32_t n, std::uint32_t left, Placed* sc
     pieces[p].end = static_cast<std::uint32_t>(n * (p + 1) / pieces.size());
   }
   split_by_buckets(set, left, scratch, pieces, [&](auto&& work) {
-    parallel_for(pool, pieces.size(), 1, [&](std::size_t from, std::size_t to, int) {
-      for (std::size_t p = from; p < to; ++p) work(pieces[p]);
-    });
+    parallel_for_each(pool, pieces.size(), [&](std::size_t p) { work(pieces[p]); });
   });
 }
 

@@ -88,13 +88,6 @@ Edges sort_out(std::uint32_t begin, std::uint32_t end, ForEachSide&& for_each_si
   return out;
 }
 
-template <class Work>
-void for_each_in(ThreadPool& pool, std::size_t n, Work&& work) {
-  parallel_for(pool, n, 1, [&](std::size_t begin, std::size_t end, int) {
-    for (std::size_t i = begin; i < end; ++i) work(i);
-  });
-}
-
 Edges find_edges(const Features& x, std::vector<std::uint32_t>& vertex_owner) {
   for (std::uint32_t f = x.n_faces(); f-- > 0;)
     for (std::uint32_t v : x.faces[f]) vertex_owner[v] = f;
@@ -106,13 +99,13 @@ Edges find_edges(const Features& x, ThreadPool& pool, std::vector<std::uint32_t>
   const std::uint32_t n_parts = 2 * static_cast<std::uint32_t>(pool.size());
   const Portions portions(x.n_vertices, 2 * n_parts);
   std::vector<std::vector<std::vector<Side>>> sides(n_parts, std::vector<std::vector<Side>>(portions.size()));
-  for_each_in(pool, n_parts, [&](std::size_t i) {
+  parallel_for_each(pool, n_parts, [&](std::size_t i) {
     const auto begin = static_cast<std::uint32_t>(x.faces.size() * i / n_parts);
     const auto end = static_cast<std::uint32_t>(x.faces.size() * (i + 1) / n_parts);
     deal_out(x, begin, end, portions, sides[i], vertex_owner);
   });
   std::vector<Edges> found(portions.size());
-  for_each_in(pool, found.size(), [&](std::size_t p) {
+  parallel_for_each(pool, found.size(), [&](std::size_t p) {
     const auto portion = static_cast<std::uint32_t>(p);
     found[p] = sort_out(portions.begin(portion), portions.begin(portion + 1), [&](auto&& use) {
       for (const auto& part : sides)
@@ -124,7 +117,7 @@ Edges find_edges(const Features& x, ThreadPool& pool, std::vector<std::uint32_t>
   Edges all;
   all.edges.resize(static_cast<std::size_t>(at.back()));
   all.owner.resize(static_cast<std::size_t>(at.back()));
-  for_each_in(pool, found.size(), [&](std::size_t p) {
+  parallel_for_each(pool, found.size(), [&](std::size_t p) {
     std::ranges::copy(found[p].edges, all.edges.begin() + at[p]);
     std::ranges::copy(found[p].owner, all.owner.begin() + at[p]);
   });
@@ -168,7 +161,7 @@ Features features_of(const Scene& scene, ThreadPool& pool) {
     for (auto v = std::ranges::lower_bound(x.lone_vertices, mesh.first_vertex); v < end; ++v)
       x.mesh_of_carrier[x.faces.size() + static_cast<std::size_t>(v - x.lone_vertices.begin())] = m;
   }
-  for_each_in(pool, 2, [&](std::size_t i) {
+  parallel_for_each(pool, 2, [&](std::size_t i) {
     if (i == 0)
       group_by_owner(edges.owner, x.n_carriers(), x.first_edge, x.owned_edges);
     else
