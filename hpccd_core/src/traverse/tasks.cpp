@@ -19,8 +19,10 @@ PairRules::PairRules(const Scene& scene, Accuracy accuracy) : n_(scene.meshes().
 
 std::vector<NodePair> traversal_tasks(const Tree& tree, const PairRules& rules, std::size_t enough) {
   std::vector<NodePair> level, next;
-  if (tree.nodes.empty()) return level;
-  level.push_back({0, 0});
+  // The root may be all there is: a mesh of one leaf, which the scene may forbid to touch itself.
+  constexpr NodePair root{0, 0};
+  if (tree.nodes.empty() || !worth_visiting(tree.nodes, rules, root)) return level;
+  level.push_back(root);
   for (bool progress = true; progress && level.size() < enough;) {
     progress = false;
     next.clear();
