@@ -91,7 +91,8 @@ def vertices(name, value, n_vertices):
 
 def usable(name, array):
     """Raises ValueError where a coordinate is NaN, infinite, or so large that intermediate results could overflow."""
-    good = np.abs(array) <= LARGEST_COORDINATE  # false for NaN too
+    # In the array's own precision, which may end below that.
+    good = np.abs(array) <= min(LARGEST_COORDINATE, float(np.finfo(array.dtype).max))  # false for NaN too
     if good.all():
         return
     where = tuple(np.argwhere(~good)[0])

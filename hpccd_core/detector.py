@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The detector: motion of a scene in, contacts out."""
 
+import contextlib
+import re
+
 import numpy as np
 
 from . import _core, arguments, device_arrays
@@ -144,19 +147,24 @@ class Detector:
     def step(self, vertices):
         """Streaming: the end of the last step is the start of this one. The first call returns no contacts.
 
-        Device arrays are taken as by detect(); the last one is kept in a copy on the device. A step from a host array
-        to a device array, or back, raises TypeError; reset() first.
+        vertices: as for detect(), and refused with the same errors, the first ones too; what was refused does not
+        count: the next step starts where this one would have. Device arrays are taken as by detect(); the last one is
+        kept in a copy on the device. A step from a host array to a device array, or back, raises TypeError; reset()
+        first.
         """
         if device_arrays.is_on_device(vertices):
             return self._step_on_device(vertices)
         if self._last_on_device:
             raise TypeError("vertices: the last step was a device array; give another one, or call reset() first")
         vertices = arguments.vertices("vertices", vertices, self.n_vertices)
-        last = self._last
-        if last is None:  # later ones are checked when they are used
+        vertices = vertices.copy()  # checked, used and kept as it is now, whatever the caller writes there meanwhile
+        if self._last is None:
             arguments.usable("vertices", vertices)
-        contacts = Contacts.none() if last is None else self.detect(last, vertices)
-        self._last = vertices.copy()
+            contacts = Contacts.none()
+        else:
+            with _names_of_step():
+                contacts = self.detect(self._last, vertices)
+        self._last = vertices
         return contacts
 
     def _step_on_device(self, vertices):
@@ -164,9 +172,13 @@ class Detector:
             raise TypeError("vertices: the last step was a host array; give another one, or call reset() first")
         place = device_arrays.positions("vertices", vertices, self.n_vertices)
         last = self._last_on_device.place
-        contacts = Contacts.none() if last is None else self._detect_places(last, place)
+        if last is not None and last.is_double != place.is_double:
+            kind = "float64" if last.is_double else "float32"
+            raise TypeError(f"vertices: the last step was {kind} on the device; give that again, or call reset() first")
+        with _names_of_step():  # the device checks the first one too, as a step that goes nowhere
+            contacts = self._detect_places(place if last is None else last, place)
         self._last_on_device.keep(place, self.n_vertices)
-        return contacts
+        return Contacts.none() if last is None else contacts
 
     def cancel(self):
         """End the use of this detector, from any thread: a call under way, if any, and all later ones raise
@@ -210,3 +222,13 @@ class Detector:
         """Counts of the last call: candidate pairs, survivors of each filter, contacts, bytes used, ... Empty where it
         failed."""
         return self._core.stats()
+
+
+@contextlib.contextmanager
+def _names_of_step():
+    """Errors of detect() speak of the one argument that step() has: the start was checked when it was the end."""
+    try:
+        yield
+    except _core.InvalidArgument as error:
+        text = re.sub("vertices_t0, vertices_t1|vertices_t[01]", "vertices", str(error), count=1)
+        raise _core.InvalidArgument(text) from None

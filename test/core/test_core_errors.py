@@ -190,7 +190,7 @@ def test_scene_of_a_detector(not_a_scene):
         (changed(VERTICES, 3, 0, np.inf), ValueError, r"\[3, 0\] is infinite"),
         (changed(VERTICES, 0, 2, -np.inf), ValueError, r"\[0, 2\] is infinite"),
         (changed(VERTICES.astype(np.float32), 1, 2, np.nan), ValueError, r"\[1, 2\] is NaN"),
-        (changed(VERTICES, 1, 1, 1e200), ValueError, r"\[1, 1\].*scale"),
+        (changed(VERTICES, 1, 1, 1e200), ValueError, r"\[1, 1\] is 1e\+200,.*scale"),
     ],
 )
 def test_vertices(detector, argument, bad, error, text):
@@ -205,24 +205,38 @@ def test_vertices(detector, argument, bad, error, text):
     assert detector.detect(*arguments).hash == good.hash, "goes on as before"
 
 
-@pytest.mark.parametrize(
-    ("bad", "error", "text"),
-    [
-        (VERTICES[:3], ValueError, r"vertices.*\(4, 3\).*\(3, 3\)"),
-        (VERTICES.astype(int), TypeError, r"vertices.*float32 or float64"),
-        (changed(VERTICES, 2, 1, np.nan), ValueError, r"vertices.*\[2, 1\]"),
-        (changed(VERTICES, 2, 1, np.inf), ValueError, r"vertices.*\[2, 1\]"),
-        (changed(VERTICES, 2, 1, 1e200), ValueError, r"vertices.*\[2, 1\]"),
-    ],
-)
-def test_a_refused_step_does_not_count(detector, bad, error, text):
-    with pytest.raises(error, match=text):
+BAD_STEPS = [
+    (VERTICES[:3], ValueError, r"vertices: .*\(4, 3\).*\(3, 3\)"),
+    (VERTICES.astype(int), TypeError, r"vertices: .*float32 or float64"),
+    (changed(VERTICES, 2, 1, np.nan), ValueError, r"vertices\[2, 1\] is nan"),
+    (changed(VERTICES, 2, 1, np.inf), ValueError, r"vertices\[2, 1\] is inf"),
+    (changed(VERTICES, 2, 1, 1e200), ValueError, r"vertices\[2, 1\] is 1e\+200.*scale"),
+    (changed(VERTICES.astype(np.float32), 2, 1, np.nan), ValueError, r"vertices\[2, 1\] is nan"),
+    (changed(VERTICES.astype(np.float32), 2, 1, -np.inf), ValueError, r"vertices\[2, 1\] is -?inf"),
+]
+
+
+@pytest.mark.parametrize(("bad", "error", "text"), BAD_STEPS)
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.filterwarnings("error")
+def test_a_refused_step_does_not_count(detector, bad, error, text, dtype):
+    start, moved = VERTICES.astype(dtype), VERTICES[::-1].astype(dtype)
+    with pytest.raises(error, match=f"(?i)^{text}"):
         detector.step(bad)
-    assert len(detector.step(VERTICES)) == 0
-    with pytest.raises(error, match=text):
+    assert len(detector.step(start)) == 0
+    with pytest.raises(error, match=f"(?i)^{text}"):
         detector.step(bad)
-    moved = VERTICES[::-1].copy()
-    assert detector.step(moved).hash == detector.detect(VERTICES, moved).hash
+    assert detector.step(moved).hash == detector.detect(start, moved).hash
+
+
+def test_a_step_of_a_static_mesh():
+    scene = hc.Scene()
+    scene.add_mesh("floor", FACES, static=True)
+    detector = hc.Detector(scene)
+    detector.step(VERTICES)
+    with pytest.raises(ValueError, match=r"^vertices\[1\]: moves.*'floor'"):
+        detector.step(changed(VERTICES, 1, 0, 9.0))
+    detector.step(VERTICES)
 
 
 @pytest.mark.parametrize("test", [hc.test_vertex_face, hc.test_edge_edge])

@@ -111,3 +111,21 @@ def test_steps_stay_on_the_device(library):
     assert len(gpu.step(frames[0])) == 0
     with pytest.raises(TypeError, match="the last step was a host array"):
         gpu.step(on_device)
+
+
+def test_a_refused_step_does_not_count():
+    cupy = pytest.importorskip("cupy")
+    scene, t0, t1 = scenes.join([scenes.crumpled(np.random.default_rng(7), 12)])
+    bad = t0.copy()
+    bad[3, 1] = np.inf
+    detector = hc.Detector(scene, backend="gpu")
+    for start in (True, False):
+        with pytest.raises(ValueError, match=r"^vertices\[3, 1\] is infinite"):
+            detector.step(cupy.asarray(bad))
+        if start:
+            assert len(detector.step(cupy.asarray(t0))) == 0
+    with pytest.raises(TypeError, match="the last step was float64 on the device"):
+        detector.step(cupy.asarray(t1.astype(np.float32)))
+    assert detector.step(cupy.asarray(t1)).hash == hc.Detector(scene, backend="cpu").detect(t0, t1).hash
+    with pytest.raises(ValueError, match="^vertices: are in a GPU's memory"):
+        hc.Detector(scene, backend="cpu").step(cupy.asarray(t0))

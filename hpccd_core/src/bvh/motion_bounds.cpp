@@ -2,6 +2,7 @@
 #include "bvh/motion_bounds.h"
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <string>
 #include <utility>
@@ -28,6 +29,12 @@ Extent extent_of(const Real* x, std::size_t begin, std::size_t end) {
   return e;
 }
 
+// As many digits as tell it apart: 1e+200, not two hundred zeros.
+std::string shortest(double x) {
+  char text[32];
+  return {text, std::to_chars(text, text + sizeof text, x).ptr};
+}
+
 template <class Real>
 [[noreturn]] void report_bad(const char* name, const Real* x, std::size_t n) {
   for (std::size_t i = 0; i < n; ++i)
@@ -37,7 +44,7 @@ template <class Real>
       const std::string where = std::string(name) + "[" + std::to_string(i) + ", " + std::to_string(k) + "] is ";
       if (!std::isfinite(value))
         throw InvalidArgument(where + (std::isnan(value) ? "NaN" : "infinite") + "; all coordinates must be finite");
-      throw InvalidArgument(where + std::to_string(value) +
+      throw InvalidArgument(where + shortest(value) +
                             ", beyond 1e150: intermediate results could overflow; scale the scene down");
     }
   throw InvalidArgument(std::string(name) + " changed while it was being read");
