@@ -9,6 +9,26 @@ REALS = frozenset({np.dtype(np.float32), np.dtype(np.float64)})  # in this machi
 LARGEST_COORDINATE = 1e150  # largest_coordinate in src/bvh/motion_bounds.h
 
 
+def flag(name, value):
+    """The value as bool: True, False, 1 or 0. Anything else has a truth too, but "no" has the wrong one."""
+    if isinstance(value, (bool, np.bool_)) or (isinstance(value, (int, np.integer)) and value in (0, 1)):
+        return bool(value)
+    raise TypeError(f"{name}: expected True or False, got {type(value).__name__}")
+
+
+def text(name, value):
+    """A string that has an UTF-8 encoding and is not empty."""
+    if not isinstance(value, str):
+        raise TypeError(f"{name}: expected a string, got {type(value).__name__}")
+    if not value:
+        raise ValueError(f"{name}: must not be empty")
+    try:
+        value.encode()
+    except UnicodeEncodeError as error:
+        raise ValueError(f"{name}: {value!r} has no UTF-8 encoding ({error.reason}); use another string") from None
+    return value
+
+
 def choice(name, value, choices):
     """The value, if it is one of the choices."""
     if not isinstance(value, str):
@@ -27,24 +47,31 @@ def whole_number(name, value, low, high):
     except TypeError:
         raise TypeError(f"{name}: expected an integer, got {type(value).__name__}") from None
     if not low <= number <= high:
-        raise ValueError(f"{name}: must lie in [{low}, {high}], got {number}")
+        raise ValueError(f"{name}: must lie in [{low}, {high}], got {_shown(number)}")
     return number
 
 
 def separation(accuracy, minimum_separation, tolerance):
-    """Both lengths as floats: finite, not negative, tolerance above zero; a separation needs accuracy conservative."""
-    lengths = []
-    for name, value in (("minimum_separation", minimum_separation), ("tolerance", tolerance)):
-        if isinstance(value, bool) or not isinstance(value, (int, float, np.floating, np.integer)):
-            raise TypeError(f"{name}: expected a number, got {type(value).__name__}")
-        if not np.isfinite(value) or value < 0:
-            raise ValueError(f"{name}: must be finite and not negative, got {value}")
-        lengths.append(float(value))
+    """Both lengths as floats, finite and not negative. Only accuracy "conservative" has a use for them: there the
+    tolerance must be above zero, elsewhere the separation must be zero."""
+    lengths = [_length("minimum_separation", minimum_separation), _length("tolerance", tolerance)]
     if lengths[0] > 0 and accuracy != "conservative":
         raise ValueError('minimum_separation: only accuracy="conservative" has one; use that accuracy, or 0')
-    if lengths[1] == 0:
+    if lengths[1] == 0 and accuracy == "conservative":
         raise ValueError("tolerance: must be above zero, else the search has no end")
     return lengths
+
+
+def _length(name, value):
+    if isinstance(value, bool) or not isinstance(value, (int, float, np.floating, np.integer)):
+        raise TypeError(f"{name}: expected a number, got {type(value).__name__}")
+    try:
+        number = float(value)
+    except OverflowError:
+        raise ValueError(f"{name}: must lie within float64, got {_shown(value)}") from None
+    if not np.isfinite(number) or number < 0:
+        raise ValueError(f"{name}: must be finite and not negative, got {value}")
+    return number
 
 
 def faces(value):
@@ -52,18 +79,28 @@ def faces(value):
     array = _array("faces", value)
     if array.size == 0 and array.ndim in (1, 2):
         return np.empty((0, 3), np.uint32)
-    if array.dtype.kind not in "iu":
-        raise TypeError(f"faces: expected integers, got dtype {array.dtype}; convert with faces.astype(numpy.uint32)")
+    integers = _integers_of_any_size(value, array) if array.dtype.kind in "fO" else array
+    if array.dtype.kind not in "iu" and integers is array:
+        remedy = "; convert with faces.astype(numpy.uint32)" if array.dtype.kind == "f" else ": indices of vertices"
+        raise TypeError(f"faces: expected integers, got {_kind(value, array)}{remedy}")
     if array.ndim != 2 or array.shape[1] != 3:
         raise ValueError(f"faces: expected shape (F, 3), got {array.shape}")
-    for bad, what in ((array < 0, "is negative"), (array > 0xFFFFFFFE, "is beyond 2**32 - 2")):
+    for bad, what in ((integers < 0, "is negative"), (integers > 0xFFFFFFFE, "is beyond 2**32 - 2")):
         if bad.any():
             row, column = np.argwhere(bad)[0]
             raise ValueError(
-                f"faces[{row}, {column}] is {array[row, column]}, which {what}; "
+                f"faces[{row}, {column}] is {_shown(integers[row, column])}, which {what}; "
                 "indices count this mesh's vertices from 0"
             )
-    return np.ascontiguousarray(array, np.uint32)
+    return np.ascontiguousarray(integers, np.uint32)
+
+
+def _integers_of_any_size(value, array):
+    """The same as Python's integers, where it holds nothing else: numpy turns those beyond its own into floats."""
+    if isinstance(value, np.ndarray) and array.dtype.kind == "f":
+        return array
+    objects = np.asarray(value, object)
+    return objects if all(type(x) is int for x in objects.flat) else array
 
 
 def output_names(value):
@@ -79,7 +116,7 @@ def output_names(value):
 
 def vertices(name, value, n_vertices):
     """(V, 3) float32 or float64; C-contiguous arrays are taken without a copy."""
-    array = _reals(name, _array(name, value))
+    array = _reals(name, _array(name, value), value)
     if array.shape != (n_vertices, 3):
         raise ValueError(
             f"{name}: expected shape ({n_vertices}, 3), one row a vertex of the scene's meshes in the order added, "
@@ -102,7 +139,7 @@ def usable(name, array):
 
 def queries(value):
     """(Q, 8, 3) float64: four points at t=0, then the same at t=1; finite."""
-    array = _reals("queries", _array("queries", value))
+    array = _reals("queries", _array("queries", value), value)
     if array.ndim != 3 or array.shape[1:] != (8, 3):
         expected = "(Q, 8, 3), four points at t=0 and the same at t=1"
         raise ValueError(f"queries: expected shape {expected}, got {array.shape}")
@@ -111,18 +148,48 @@ def queries(value):
     return array
 
 
-def _reals(name, array):
+def _reals(name, array, value):
     if array.dtype in REALS:
         return array
     if array.dtype.newbyteorder("=") in REALS:
         return array.astype(array.dtype.newbyteorder("="))
-    raise TypeError(
-        f"{name}: expected float32 or float64, got dtype {array.dtype}; convert with {name}.astype(numpy.float64)"
-    )
+    remedy = "give an array of numbers"
+    if array.dtype.kind in "iuf" and array.ndim > 0:
+        remedy = f"convert with {name}.astype(numpy.float64)"
+    elif array.dtype.kind == "c":
+        remedy = "coordinates are real numbers: give the array of their real parts, if that is what you mean"
+    raise TypeError(f"{name}: expected float32 or float64, got {_kind(value, array)}; {remedy}")
 
 
 def _array(name, value):
+    _refuse_masked(name, value)
     try:
         return np.asarray(value)
     except ValueError as error:  # rows of different lengths
         raise ValueError(f"{name}: not a rectangular array ({error}); give every row the same length") from None
+    except OverflowError as error:  # an integer among floats
+        raise ValueError(f"{name}: holds a number beyond float64 ({error}); scale the numbers down") from None
+
+
+def _refuse_masked(name, value):
+    """A masked array with nothing masked is as good as any; of others the mask would be lost."""
+    rows = value if isinstance(value, (list, tuple)) else (value,)
+    if any(isinstance(row, np.ma.MaskedArray) and np.ma.is_masked(row) for row in rows):
+        raise TypeError(
+            f"{name}: some of its elements are masked, and every one is needed; leave the masked ones out before, or "
+            "give an array in which they are filled in (numpy.ma.filled)"
+        )
+
+
+def _kind(value, array):
+    """What was given, in a few words."""
+    if array.ndim == 0 and not isinstance(value, (np.ndarray, np.generic)):
+        return type(value).__name__
+    return f"dtype {array.dtype}"
+
+
+def _shown(value):
+    """As text that fits on a line; of a huge integer its size."""
+    if isinstance(value, int) and abs(value) >= 10**20:
+        return f"{'-' if value < 0 else ''}1e{(abs(value).bit_length() - 1) * 0.30103:.0f}"
+    return f"{value}"

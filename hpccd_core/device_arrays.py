@@ -30,8 +30,7 @@ def positions(name, value, n_vertices):
     """The array's place and type. Raises TypeError or ValueError naming the argument."""
     interface = getattr(value, "__cuda_array_interface__", None)
     if interface is not None:
-        shape, strides, kind = tuple(interface["shape"]), interface.get("strides"), interface["typestr"]
-        pointer = interface["data"][0]
+        shape, strides, kind, pointer = _from_interface(name, interface)
     else:
         shape, strides, kind, pointer = _from_dlpack(name, value)
     if kind not in ("<f4", "<f8"):
@@ -41,7 +40,20 @@ def positions(name, value, n_vertices):
     size = int(kind[2])
     if strides is not None and n_vertices and tuple(strides) != (3 * size, size):
         raise ValueError(f"{name}: must be C-contiguous, got strides {tuple(strides)} bytes; copy it first")
+    if n_vertices and not pointer:
+        raise ValueError(f"{name}: its address on the device is null; give an array that holds memory")
     return DevicePositions(int(pointer or 0), size == 8)
+
+
+def _from_interface(name, interface):
+    try:
+        place = tuple(interface["shape"]), interface.get("strides"), interface["typestr"], interface["data"][0]
+        mask = interface.get("mask")
+    except (AttributeError, IndexError, KeyError, TypeError) as error:
+        raise TypeError(f"{name}: its __cuda_array_interface__ is not as the protocol has it ({error!r})") from None
+    if mask is not None:
+        raise TypeError(f"{name}: has a mask, and every element is needed; give an array without one")
+    return place
 
 
 class LastStep:

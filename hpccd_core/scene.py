@@ -28,14 +28,12 @@ class Scene:
 
         Raises TypeError or ValueError naming the argument, also where an index is out of range.
         """
-        if not isinstance(name, str):
-            raise TypeError(f"name: expected a string, got {type(name).__name__}")
-        if not name:
-            raise ValueError("name: must not be empty")
+        name = arguments.text("name", name)
+        self_collision, static = arguments.flag("self_collision", self_collision), arguments.flag("static", static)
         faces = arguments.faces(faces)
         used = int(faces.max()) + 1 if faces.size else 0
         n_vertices = used if n_vertices is None else arguments.whole_number("n_vertices", n_vertices, 0, 2**32 - 2)
-        number = self._core.add_mesh(name, faces, n_vertices, bool(self_collision), bool(static))
+        number = self._core.add_mesh(name, faces, n_vertices, self_collision, static)
         self._ids[name] = number
         return number
 

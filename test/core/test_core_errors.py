@@ -40,11 +40,26 @@ def changed(vertices, row, column, value):
         ([[0, 1, 2], [0, -1, 2]], ValueError, r"faces\[1, 1\] is -1"),
         ([[0, 1, 2**32 - 1]], ValueError, r"faces\[0, 2\] is 4294967295"),
         ([[0, 1, 2**40]], ValueError, r"faces\[0, 2\] is 1099511627776"),
+        ([[0, 1, 2j]], TypeError, r"faces.*integers.*complex128: indices"),
+        (b"abc", TypeError, r"faces.*integers.*indices"),
     ],
 )
 def test_faces(faces, error, text):
     with pytest.raises(error, match=text):
         hc.Scene().add_mesh("cloth", np.array(faces))
+
+
+@pytest.mark.parametrize(
+    ("index", "text"),
+    [(2**63, "is 9223372036854775808"), (2**70, "is 1e21"), pytest.param(10**5000, "is 1e5000", id="huge")],
+)
+def test_faces_beyond_what_numpy_holds(index, text):
+    for row in ([0, 1, index], [0, -1, -index]):
+        with pytest.raises(ValueError, match=r"faces\[0, [12]\] is") as raised:
+            hc.Scene().add_mesh("cloth", [row])
+    with pytest.raises(ValueError, match=f"faces\\[0, 2\\] {text}, which is beyond"):
+        hc.Scene().add_mesh("cloth", [[0, 1, index]])
+    assert len(str(raised.value)) < 200
 
 
 def test_ragged_faces():
@@ -59,7 +74,14 @@ def test_face_index_beyond_n_vertices():
 
 @pytest.mark.parametrize(
     ("n_vertices", "error"),
-    [(-1, ValueError), (2**32, ValueError), (4.0, TypeError), ("4", TypeError), (True, TypeError)],
+    [
+        (-1, ValueError),
+        (2**32, ValueError),
+        pytest.param(10**5000, ValueError, id="huge"),
+        (4.0, TypeError),
+        ("4", TypeError),
+        (True, TypeError),
+    ],
 )
 def test_n_vertices(n_vertices, error):
     with pytest.raises(error, match="n_vertices"):
@@ -73,10 +95,21 @@ def test_more_vertices_than_indices_can_name():
         scene.add_mesh("second", np.empty((0, 3), int), n_vertices=2)
 
 
-@pytest.mark.parametrize(("name", "error"), [("", ValueError), (3, TypeError), (None, TypeError), (b"a", TypeError)])
+@pytest.mark.parametrize(
+    ("name", "error"), [("", ValueError), (3, TypeError), (None, TypeError), (b"a", TypeError), ("\ud800", ValueError)]
+)
 def test_mesh_name(name, error):
     with pytest.raises(error, match="name"):
         hc.Scene().add_mesh(name, FACES)
+
+
+@pytest.mark.parametrize("option", ["self_collision", "static"])
+@pytest.mark.parametrize("value", ["no", "", None, 2, 0.0, np.array([True, False]), np.ma.masked])
+def test_flags_of_a_mesh(option, value):
+    with pytest.raises(TypeError, match=f"{option}: expected True or False, got"):
+        hc.Scene().add_mesh("cloth", FACES, **{option: value})
+    for good in (np.bool_(True), 0):
+        hc.Scene().add_mesh("cloth", FACES, **{option: good})
 
 
 def test_mesh_name_twice(scene):
@@ -143,16 +176,26 @@ def test_offset_of_an_unknown_mesh(scene):
         ("simd", "sse2", ValueError),
         ("threads", -1, ValueError),
         ("threads", 10**9, ValueError),
+        pytest.param("threads", 10**5000, ValueError, id="threads-huge"),
         ("threads", 2.0, TypeError),
         ("threads", "all", TypeError),
         ("outputs", ("colours",), ValueError),
         ("outputs", (1,), TypeError),
         ("outputs", 1, TypeError),
+        ("restructure", "no", TypeError),
+        pytest.param("minimum_separation", 10**400, ValueError, id="minimum_separation-huge"),
+        pytest.param("minimum_separation", -(10**5000), ValueError, id="minimum_separation-negative"),
+        ("minimum_separation", "1", TypeError),
+        ("minimum_separation", 1j, TypeError),
+        pytest.param("tolerance", 10**400, ValueError, id="tolerance-huge"),
+        ("tolerance", -1e-6, ValueError),
+        ("tolerance", np.nan, ValueError),
     ],
 )
 def test_options_of_a_detector(scene, option, value, error):
-    with pytest.raises(error, match=option):
+    with pytest.raises(error, match=f"^{option}: ") as raised:
         hc.Detector(scene, **{option: value})
+    assert len(str(raised.value)) < 200
 
 
 def test_choices_are_listed(scene):
@@ -184,7 +227,14 @@ def test_scene_of_a_detector(not_a_scene):
         (VERTICES[None], ValueError, r"\(4, 3\).*\(1, 4, 3\)"),
         (VERTICES.astype(int), TypeError, r"float32 or float64.*int64.*astype"),
         (VERTICES.astype(np.float16), TypeError, r"float32 or float64.*float16"),
-        (VERTICES.astype(complex), TypeError, r"float32 or float64.*complex"),
+        (VERTICES.astype(complex), TypeError, r"float32 or float64.*complex128; coordinates are real"),
+        (VERTICES.astype(object), TypeError, r"float32 or float64.*object; give an array of numbers"),
+        (VERTICES.astype("S20"), TypeError, r"float32 or float64.*S20; give an array of numbers"),
+        (VERTICES > 0, TypeError, r"float32 or float64.*bool; give an array of numbers"),
+        (b"1234", TypeError, r"float32 or float64.*bytes; give an array of numbers"),
+        ([[10**400, 0.5, 0]] * 4, (TypeError, ValueError), r"number"),
+        (np.ma.masked_array(VERTICES, mask=VERTICES > 1), TypeError, r"masked.*filled"),
+        ([np.ma.masked_array(row, mask=row > 0) for row in VERTICES], TypeError, r"masked.*filled"),
         (None, TypeError, r"float32 or float64"),
         (changed(VERTICES, 2, 1, np.nan), ValueError, r"\[2, 1\] is NaN"),
         (changed(VERTICES, 3, 0, np.inf), ValueError, r"\[3, 0\] is infinite"),
@@ -246,6 +296,8 @@ def test_a_step_of_a_static_mesh():
         (np.zeros((8, 3)), ValueError, r"queries.*\(Q, 8, 3\).*\(8, 3\)"),
         (np.zeros((1, 4, 6)), ValueError, r"queries.*\(Q, 8, 3\).*\(1, 4, 6\)"),
         (np.zeros((1, 8, 3), int), TypeError, r"queries.*float32 or float64.*int64"),
+        (np.zeros((1, 8, 3), complex), TypeError, r"queries.*float32 or float64.*complex128; coordinates are real"),
+        (np.ma.masked_equal(np.zeros((1, 8, 3)), 0), TypeError, r"queries.*masked"),
         (np.full((2, 8, 3), np.nan), ValueError, r"queries\[0, 0, 0\] is nan.*finite"),
         (np.full((2, 8, 3), np.inf), ValueError, r"queries\[0, 0, 0\] is inf.*finite"),
         (np.full((2, 8, 3), 1e300), ValueError, r"queries\[0, 0, 0\].*scale"),
@@ -254,6 +306,50 @@ def test_a_step_of_a_static_mesh():
 def test_queries(test, bad, error, text):
     with pytest.raises(error, match=text):
         test(bad)
+
+
+class _OnDevice:
+    def __init__(self, interface):
+        self.__cuda_array_interface__ = interface
+
+
+GOOD_INTERFACE = {"shape": (4, 3), "typestr": "<f8", "data": (4096, False), "version": 3}
+
+
+@pytest.mark.parametrize(
+    ("interface", "error", "text"),
+    [
+        (3, TypeError, "__cuda_array_interface__.*protocol"),
+        ({"shape": (4, 3)}, TypeError, "__cuda_array_interface__.*protocol.*typestr"),
+        (GOOD_INTERFACE | {"data": None}, TypeError, "__cuda_array_interface__.*protocol"),
+        (GOOD_INTERFACE | {"data": (0, False)}, ValueError, "null"),
+        (GOOD_INTERFACE | {"mask": object()}, TypeError, "mask"),
+        (GOOD_INTERFACE | {"shape": (3, 4)}, ValueError, r"\(4, 3\).*\(3, 4\)"),
+        (GOOD_INTERFACE | {"typestr": "<i4"}, TypeError, "float32 or float64"),
+        (GOOD_INTERFACE, ValueError, "are in a GPU's memory.*copy them to the host"),
+    ],
+)
+def test_device_arrays(scene, interface, error, text):
+    detector = hc.Detector(scene, backend="cpu")
+    with pytest.raises(error, match=f"^vertices: .*{text}"):
+        detector.step(_OnDevice(interface))
+    with pytest.raises(error, match=f"^vertices_t0(, vertices_t1)?: .*{text}"):
+        detector.detect(_OnDevice(interface), _OnDevice(GOOD_INTERFACE))
+    assert len(detector.step(VERTICES)) == 0
+
+
+@pytest.mark.parametrize(
+    "bad", [np.ma.masked_array(FACES, mask=FACES == 2), [np.ma.masked_array([0, 1, 2], [0, 0, 1])]]
+)
+def test_masked_faces(bad):
+    with pytest.raises(TypeError, match="^faces: .*masked"):
+        hc.Scene().add_mesh("cloth", bad)
+
+
+def test_a_mask_over_nothing_is_no_mistake(detector):
+    unmasked = np.ma.masked_array(VERTICES, mask=np.zeros(VERTICES.shape))
+    assert detector.detect(unmasked, VERTICES).hash == detector.detect(VERTICES, VERTICES).hash
+    hc.Scene().add_mesh("cloth", np.ma.masked_array(FACES))
 
 
 @pytest.mark.parametrize("test", [hc.test_vertex_face, hc.test_edge_edge])

@@ -91,3 +91,13 @@ def test_bad_separation(options, error, text):
         hc.Detector(hc.Scene(), **options)
     with pytest.raises(error, match=text):
         hc.test_vertex_face(np.zeros((1, 8, 3)), **options)
+
+
+@pytest.mark.parametrize("accuracy", ["fast", "balanced", "exact"])
+def test_a_tolerance_of_zero_where_it_means_nothing(accuracy):
+    meshes = random_scenes.single_mesh(np.random.default_rng(5))
+    found = [
+        hc.Detector(meshes.scene(), accuracy=accuracy, **options).detect(meshes.vertices_t0, meshes.vertices_t1).hash
+        for options in ({}, {"tolerance": 0}, {"tolerance": 0.0, "minimum_separation": 0})
+    ]
+    assert found[1:] == found[:1] * 2
