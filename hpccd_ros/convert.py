@@ -14,6 +14,7 @@ from builtin_interfaces.msg import Time
 from hpccd.msg import ContactArray, MeshTopology, MeshVertices
 from sensor_msgs.msg import PointCloud2, PointField
 
+from hpccd_ros import coordinates
 from hpccd_ros.drops import Reason
 from hpccd_ros.messages import Topology
 
@@ -83,7 +84,7 @@ def topology_from_message(message: MeshTopology, max_vertices: int, max_faces: i
 def vertices_from_message(message: MeshVertices, max_vertices: int) -> np.ndarray:
     """(n,3) float32 or float64: a view of the message's bytes.
 
-    Raises InvalidMessageError: none or both of the arrays filled, no triples, too large, NaN or infinity.
+    Raises InvalidMessageError: none or both of the arrays filled, no triples, too large, NaN, infinity or beyond 1e150.
     """
     single, double = message.vertices_f32, message.vertices_f64
     if bool(len(single)) == bool(len(double)):
@@ -93,7 +94,7 @@ def vertices_from_message(message: MeshVertices, max_vertices: int) -> np.ndarra
     if len(flat) % 3:
         raise InvalidMessageError(Reason.MALFORMED, f"vertices has {len(flat)} coordinates, not a multiple of 3")
     _limit("vertices", len(flat) // 3, "max_vertices", max_vertices)
-    return _finite(flat.reshape(-1, 3))
+    return _usable(flat.reshape(-1, 3))
 
 
 def vertices_from_cloud(cloud: PointCloud2, max_vertices: int) -> np.ndarray:
@@ -102,7 +103,7 @@ def vertices_from_cloud(cloud: PointCloud2, max_vertices: int) -> np.ndarray:
     A view where x, y, z fill the points without a gap, else a copy. Fields may come in any order, with
     padding within points and rows; x, y, z of both types become float64 (exactly).
     Raises InvalidMessageError: big-endian, fields missing or of another type or out of bounds, too little
-    data, too large, NaN or infinity.
+    data, too large, NaN, infinity or beyond 1e150.
     """
     if cloud.is_bigendian:
         raise InvalidMessageError(
@@ -135,13 +136,13 @@ def vertices_from_cloud(cloud: PointCloud2, max_vertices: int) -> np.ndarray:
         and cloud.point_step == 3 * size
         and (row_step == row_bytes or cloud.height == 1)
     ):
-        return _finite(data.view(types[0]).reshape(-1, 3))
+        return _usable(data.view(types[0]).reshape(-1, 3))
     point = np.dtype({"names": list("xyz"), "formats": types, "offsets": offsets, "itemsize": cloud.point_step})
     rows = np.ndarray((cloud.height, cloud.width), point, data, strides=(row_step, cloud.point_step))
     points = np.empty((cloud.height, cloud.width, 3), np.result_type(*types))
     for axis, name in enumerate("xyz"):
         points[..., axis] = rows[name]
-    return _finite(points.reshape(-1, 3))
+    return _usable(points.reshape(-1, 3))
 
 
 def _cloud_field(cloud: PointCloud2, axis: str) -> tuple[int, np.dtype]:
@@ -173,13 +174,9 @@ def _limit(what: str, size: int, parameter: str, limit: int) -> None:
         )
 
 
-def _finite(vertices: np.ndarray) -> np.ndarray:
-    finite = np.isfinite(vertices)
-    if not finite.all():
-        bad = int(np.flatnonzero(~finite.all(axis=1))[0])
-        raise InvalidMessageError(
-            Reason.NOT_FINITE, f"vertex {bad} is {vertices[bad].tolist()}; coordinates must be finite"
-        )
+def _usable(vertices: np.ndarray) -> np.ndarray:
+    if refusal := coordinates.refusal(vertices):
+        raise InvalidMessageError(*refusal)
     return vertices
 
 

@@ -118,9 +118,9 @@ class Detection:
 class DetectionThread(threading.Thread):
     """Takes scene frames from ``queue``, hands detections to ``on_detection``, until it is closed.
 
-    The motion goes from the last frame taken to the new one, so where frames were dropped between them no
-    time is left unwatched. The first frame, and the first after a change of topology, is only a start:
-    ``on_first``. ``options()`` is read before each frame; a change makes a new detector.
+    The motion goes from the end of the last step that was answered to the new frame, so where frames were dropped
+    between them, or their detection failed, no time is left unwatched. The first frame, and the first after a change
+    of topology, is only a start: ``on_first``. ``options()`` is read before each frame; a change makes a new detector.
     """
 
     def __init__(
@@ -158,12 +158,13 @@ class DetectionThread(threading.Thread):
     def run(self) -> None:
         while (item := self._queue.take()) is not None:
             frame = self.working_on = item.frame
-            start, self._start = self._start, frame
             try:
                 if item.first:
+                    self._start = frame
                     self._on_first(frame)
                 else:
-                    self._on_detection(self._detect(start, frame))
+                    self._on_detection(self._detect(self._start, frame))
+                    self._start = frame  # only now: a step that failed is part of the next one
             except hc.Cancelled:
                 for mesh in frame.fresh:
                     self._drops.count(mesh, Reason.STOPPED)

@@ -18,6 +18,7 @@ class Reason(StrEnum):
     UNSUPPORTED_TYPE = "unsupported_type"  # PointCloud2 field that is neither FLOAT32 nor FLOAT64
     BIG_ENDIAN = "big_endian"
     NOT_FINITE = "not_finite"  # NaN or infinity
+    OUT_OF_RANGE = "out_of_range"  # a coordinate beyond what the core computes with
     TOO_LARGE = "too_large"  # above max_vertices or max_faces
     INDEX_RANGE = "index_range"  # a face names a vertex that does not exist
     BAD_TOPOLOGY = "bad_topology"  # refused by the core, e.g. a face that names a vertex twice

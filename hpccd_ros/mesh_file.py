@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from hpccd_ros import coordinates
 from hpccd_ros.rigid import Rigid
 
 FORMATS = (".obj", ".ply", ".stl")
@@ -45,20 +46,23 @@ def load_mesh(path: str) -> tuple[np.ndarray, np.ndarray]:
         raise MeshFileError(f"{file}: has no triangles")
     if file.suffix.lower() == ".stl":
         vertices, faces = _join_equal(vertices, faces)
-    if not np.isfinite(vertices).all():
-        raise MeshFileError(f"{file}: has a coordinate that is NaN or infinite")
+    if refusal := coordinates.refusal(vertices):
+        raise MeshFileError(f"{file}: {refusal[1]}")
     return vertices, faces.astype(np.uint32)
 
 
 def place(vertices: np.ndarray, pose: list[float]) -> np.ndarray:
     """Rotate by the quaternion x y z w, then translate by x y z (pose: 3 + 4 numbers).
 
-    Raises MeshFileError: not 7 numbers, not finite, quaternion not of unit length within 1e-3.
+    Raises MeshFileError: not 7 numbers, not finite, quaternion not of unit length within 1e-3, too far away.
     """
     try:
-        return Rigid.of(pose[:3], pose[3:]).apply(vertices)
+        placed = Rigid.of(pose[:3], pose[3:]).apply(vertices)
     except ValueError as error:
         raise MeshFileError(f"pose: {pose} {error}") from error
+    if refusal := coordinates.refusal(placed):
+        raise MeshFileError(f"pose: {pose}: placed by it, {refusal[1]}")
+    return placed
 
 
 def _join_equal(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

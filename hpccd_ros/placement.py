@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from hpccd_ros import coordinates
 from hpccd_ros.drops import DropCounter, Reason
 from hpccd_ros.messages import MeshFrame
 from hpccd_ros.rigid import IDENTITY, Rigid
@@ -65,7 +66,7 @@ class Placement:
             )
             return []
         if self._kind == "pose":
-            return [(self._placed(frame, self._pose), new_publisher)]
+            return self._placed(frame, self._pose, new_publisher)
         if not (frame.frame_id or self._frame):
             self._refuse(
                 Reason.FRAME_ID,
@@ -95,7 +96,7 @@ class Placement:
                 self._refuse(Reason.NO_TRANSFORM, str(error))
                 continue
             self._waiting.popleft()
-            ready.append((self._placed(frame, rigid), new_publisher))
+            ready += self._placed(frame, rigid, new_publisher)
         return ready
 
     def clear(self, reason: Reason) -> None:
@@ -104,10 +105,14 @@ class Placement:
             self._drops.count(self._mesh, reason)
         self._waiting.clear()
 
-    def _placed(self, frame: MeshFrame, rigid: Rigid) -> MeshFrame:
+    def _placed(self, frame: MeshFrame, rigid: Rigid, new_publisher: bool) -> list[Ready]:
         # Always double, with or without a rotation: the precision of a stream must not depend on its values.
         vertices = frame.vertices if rigid is IDENTITY else rigid.apply(frame.vertices.astype(np.float64))
-        return replace(frame, vertices=vertices, frame_id=self._target)
+        if refusal := coordinates.refusal(vertices):
+            reason, text = refusal
+            self._refuse(reason, f"after the transform {text}")
+            return []
+        return [(replace(frame, vertices=vertices, frame_id=self._target), new_publisher)]
 
     def _refuse(self, reason: Reason, text: str) -> None:
         self._drops.count(self._mesh, reason, text)

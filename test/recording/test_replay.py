@@ -171,6 +171,24 @@ def test_without_contacts_every_step_is_computed(small_bag, tmp_path):
     assert replay.verified == 0
 
 
+def test_a_frame_that_the_core_cannot_take_is_stepped_over(small_bag, tmp_path):
+    """As the node does: the motion goes on from the frame before it."""
+
+    def edit(index, message, decoded):
+        if message.topic == "/contacts":
+            return None
+        if message.topic == "/meshes/cloth/vertices" and index == 40:
+            _set("vertices_f64", np.full(len(decoded.vertices_f32), 1e200))(decoded)
+            _set("vertices_f32", decoded.vertices_f32[:0])(decoded)
+        return decoded
+
+    rewrite(small_bag, tmp_path / "far.mcap", edit)
+    replay, steps = _replay(tmp_path / "far.mcap", accuracy="exact")
+    assert [step.step for step in steps] == [k for k in range(1, 90) if k != 40]
+    assert steps[39].start == steps[38].end and steps[39].total > 0
+    assert replay.source.drops.by_mesh_and_reason() == {("cloth", "out_of_range"): 1, ("ball", "incomplete"): 1}
+
+
 def test_recording_of_another_recorder_needs_parameters(small_bag, tmp_path, hpccd):
     path = tmp_path / "foreign.mcap"
     rewrite(small_bag, path, info={})

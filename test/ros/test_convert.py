@@ -111,12 +111,27 @@ def test_bad_vertices():
             assert "vertex 2" in refused(Reason.NOT_FINITE, read, convert.vertices_message(points, 0), 100)
 
 
-def test_largest_finite_values_are_finite():
-    points = np.full((4, 3), np.finfo(np.float64).max)
-    assert np.array_equal(convert.vertices_from_message(convert.vertices_message(points, 0), 9), points)
-
-
 F32, F64 = PointField.FLOAT32, PointField.FLOAT64
+
+
+@pytest.mark.parametrize("largest", [np.full((4, 3), np.finfo("f4").max), np.full((4, 3), 1e150)], ids=["f4", "f8"])
+def test_largest_coordinates_that_the_core_takes(largest):
+    for points in (largest, -largest):
+        assert np.array_equal(convert.vertices_from_message(convert.vertices_message(points, 0), 9), points)
+
+
+def test_coordinates_beyond_what_the_core_takes():
+    for bad in (1e151, -1e200, np.finfo(np.float64).max):
+        points = POINTS.astype(np.float64)
+        points[2, 1] = bad
+        message = convert.vertices_message(points, 0)
+        text = refused(Reason.OUT_OF_RANGE, convert.vertices_from_message, message, 100)
+        assert "vertex 2" in text and "1e+150" in text
+        refused(Reason.OUT_OF_RANGE, convert.vertices_from_cloud, cloud(points, kinds=[F64] * 3), 100)
+        points[3, 0] = math.nan
+        assert "vertex 3" in refused(
+            Reason.NOT_FINITE, convert.vertices_from_message, convert.vertices_message(points, 0), 100
+        )
 
 
 @pytest.mark.parametrize(

@@ -74,6 +74,10 @@ def test_bad_files(tmp_path, monkeypatch):
     torn.write_bytes(b"ply\nformat binary_little_endian 1.0\nelement vertex 5\n")
     with pytest.raises(MeshFileError, match=r"torn.ply: cannot be read"):
         load_mesh(str(torn))
+    far = tmp_path / "far.obj"
+    far.write_text("v 0 0 0\nv 1 0 0\nv 0 1e151 0\nf 1 2 3\n")
+    with pytest.raises(MeshFileError, match=r"far.obj: vertex 2 is .* must lie in"):
+        load_mesh(str(far))
     good = write_obj(tmp_path / "good.obj")
     real = builtins.__import__
 
@@ -98,3 +102,5 @@ def test_pose():
         place(VERTICES, [0, 0, 0, 0, 0, 0, 2])
     with pytest.raises(MeshFileError, match="7 finite numbers"):
         place(VERTICES, [0, 0, 0])
+    with pytest.raises(MeshFileError, match="placed by it, vertex 0 is"):
+        place(VERTICES, [0, 2e150, 0, 0, 0, 0, 1])

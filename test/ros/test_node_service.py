@@ -106,6 +106,12 @@ def put_nan(r):
     r.start[0].vertices_f32[5] = math.nan
 
 
+def put_far(r):
+    points = sheet_positions(N, 1, dtype=np.float64)
+    points[7, 2] = 1e151
+    r.end[0] = convert.vertices_message(points, 1)
+
+
 def other_version(r):
     r.start[0].topology_version = 4
 
@@ -123,6 +129,7 @@ def bad_index(r):
         (changed(cut_end), "end: 0 entries for 1 meshes"),
         (changed(cut_vertices), "end[0] (cloth): 255 vertices, the topology has 256"),
         (changed(put_nan), "start[0] (cloth): vertex 1 is"),
+        (changed(put_far), "end[0] (cloth): vertex 7 is"),
         (changed(other_version), "start[0] (cloth): topology_version 4"),
         (changed(bad_index), "topologies[0] (cloth): face 0 names vertex 256"),
         (request(accuracy="sloppy"), "accuracy"),
@@ -130,7 +137,7 @@ def bad_index(r):
         (request(time_limit=-1.0), "time_limit"),
         (request(time_limit=math.nan), "time_limit"),
     ],
-    ids="mesh names many count vertices nan version index accuracy report limit nan-limit".split(),
+    ids="mesh names many count vertices nan far version index accuracy report limit nan-limit".split(),
 )
 def test_bad_requests_are_refused_with_a_reason(node, bad, text):
     refused, good = ask(node, bad, request())

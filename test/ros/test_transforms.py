@@ -141,6 +141,16 @@ def test_placed_by_a_pose():
     assert drops.by_mesh_and_reason() == {("cloth", Reason.FRAME_ID): 1}
 
 
+def test_a_transform_can_push_positions_out_of_range():
+    drops, buffer = DropCounter(), TransformBuffer()
+    far = Rigid.of((2e150, 0, 0), (0, 0, 0, 1))
+    buffer.add("world", "hand", far, None)
+    by_pose = {"transform": "pose", "pose": [*far.shift.tolist(), 0, 0, 0, 1]}
+    for gate in (placement(drops=drops, **by_pose), placement(buffer, drops, transform="tf")):
+        assert gate.take(frame(1)) == [] and gate.waiting == 0
+    assert drops.by_reason() == {Reason.OUT_OF_RANGE: 2}
+
+
 def test_frames_wait_in_order_for_their_transforms():
     buffer, texts = TransformBuffer(), []
     drops = DropCounter(lambda mesh, reason, text: texts.append(text))
