@@ -37,7 +37,12 @@ class InvalidMessageError(ValueError):
 
 
 def stamp_to_ns(stamp: Time) -> int:
-    """Nanoseconds since the epoch."""
+    """Nanoseconds since the epoch. Raises InvalidMessageError: before it, or a whole second in nanosec."""
+    if stamp.sec < 0 or stamp.nanosec >= _NS:
+        raise InvalidMessageError(
+            Reason.MALFORMED,
+            f"stamp has sec {stamp.sec} and nanosec {stamp.nanosec}; sec must not be negative, nanosec below {_NS}",
+        )
     return stamp.sec * _NS + stamp.nanosec
 
 
@@ -66,8 +71,9 @@ def _zeros(code: str, count: int) -> array:
 def topology_from_message(message: MeshTopology, max_vertices: int, max_faces: int) -> Topology:
     """Checked topology; ``faces`` (F,3) uint32 is a view of the message's bytes.
 
-    Raises InvalidMessageError: too large, no triples, an index out of range.
+    Raises InvalidMessageError: too large, no triples, an index out of range, a stamp that is no time.
     """
+    stamp_to_ns(message.header.stamp)  # not used, but wrong
     flat = np.frombuffer(message.faces, np.uint32)
     if len(flat) % 3:
         raise InvalidMessageError(Reason.MALFORMED, f"faces has {len(flat)} indices, not a multiple of 3")

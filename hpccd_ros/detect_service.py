@@ -209,6 +209,7 @@ class DetectService:
         for i, (name, message, topology) in enumerate(zip(names, messages, topologies, strict=True)):
             where = f"{field}[{i}] ({name})"
             try:
+                convert.stamp_to_ns(message.header.stamp)
                 vertices = convert.vertices_from_message(message, self._settings["max_vertices"])
             except convert.InvalidMessageError as error:
                 raise RequestError(f"{where}: {error}") from error

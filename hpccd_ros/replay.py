@@ -6,7 +6,7 @@ import time
 from collections.abc import Iterator
 
 from hpccd_ros import convert
-from hpccd_ros.convert import Layout
+from hpccd_ros.convert import InvalidMessageError, Layout
 from hpccd_ros.detection import CORE_ERRORS, make_detector
 from hpccd_ros.mcap_decode import make_decoder
 from hpccd_ros.mcap_reader import Recording, RecordingError
@@ -144,7 +144,10 @@ class Replay:
             self._on_message(count)
 
     def _step_of(self, answer, at, window) -> Step:
-        start, end = convert.stamp_to_ns(answer.start), convert.stamp_to_ns(answer.header.stamp)
+        try:
+            start, end = convert.stamp_to_ns(answer.start), convert.stamp_to_ns(answer.header.stamp)
+        except InvalidMessageError as error:
+            return Step(0, answer.step, 0, 0, None, None, answer, at, missing=f"the answer is malformed: {error}")
         step = Step(0, answer.step, start, end, window.get(start), window.get(end), answer, at)
         for name, stamp, frame in (("start", start, step.start_frame), ("end", end, step.end_frame)):
             if frame is None:

@@ -72,6 +72,7 @@ class FrameSource:
                 return []
             return self._assembler.set_topology(mesh, topology, new_publisher)
         try:
+            stamp = convert.stamp_to_ns(decoded.header.stamp)
             if kind == "vertices":
                 vertices = convert.vertices_from_message(decoded, settings["max_vertices"])
                 version, step = decoded.topology_version, decoded.step
@@ -81,8 +82,7 @@ class FrameSource:
         except InvalidMessageError as error:
             self.drops.count(mesh, error.reason, str(error))
             return []
-        header = decoded.header
-        frame = MeshFrame(convert.stamp_to_ns(header.stamp), vertices, version, step, header.frame_id)
+        frame = MeshFrame(stamp, vertices, version, step, decoded.header.frame_id)
         return self._assemble(mesh, self._placements[mesh].take(frame, new_publisher))
 
     def _take_transforms(self, message, topic: TransformTopic) -> list[SceneFrame]:

@@ -168,18 +168,12 @@ class MeshStream:
             self._drops.count(self._mesh, Reason.RATE, self._too_fast())
             return
         try:
+            stamp = convert.stamp_to_ns(message.header.stamp)
             vertices = read(message, self._settings["max_vertices"])
         except InvalidMessageError as error:
             self._drops.count(self._mesh, error.reason, str(error))
             return
-        frame = MeshFrame(
-            convert.stamp_to_ns(message.header.stamp),
-            vertices,
-            version,
-            step,
-            message.header.frame_id,
-            received,
-        )
+        frame = MeshFrame(stamp, vertices, version, step, message.header.frame_id, received)
         self._hand_on(self._placement.take(frame, new_publisher))
 
     def _hand_on(self, frames: list[Ready]) -> None:

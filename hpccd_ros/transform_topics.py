@@ -60,11 +60,12 @@ def keep(buffer: TransformBuffer, message: Any, static: bool) -> None:
     """Add a TransformStamped to ``buffer``. Raises ValueError, naming its frames, where it is none."""
     shift, turn = message.transform.translation, message.transform.rotation
     try:
+        stamp = convert.stamp_to_ns(message.header.stamp)
         buffer.add(
             message.header.frame_id,
             message.child_frame_id,
             Rigid.of((shift.x, shift.y, shift.z), (turn.x, turn.y, turn.z, turn.w)),
-            None if static else convert.stamp_to_ns(message.header.stamp),
+            None if static else stamp,
         )
     except ValueError as error:
         names = f"{message.child_frame_id[:80]!r} to {message.header.frame_id[:80]!r}"

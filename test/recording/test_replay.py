@@ -127,6 +127,19 @@ def test_answers_without_their_frames_are_not_called_verified(small_bag, tmp_pat
     assert "no frame of all meshes at its start" in steps[40].missing
 
 
+def test_stamps_that_are_no_time(small_bag, tmp_path):
+    def edit(index, message, decoded):
+        if index == 40 and message.topic in ("/meshes/ball/vertices", "/contacts"):
+            decoded.header.stamp.nanosec += 10**9
+        return decoded
+
+    rewrite(small_bag, tmp_path / "stamps.mcap", edit)
+    replay, steps = _replay(tmp_path / "stamps.mcap")
+    assert (replay.verified, replay.diverged, replay.unverified) == (87, 0, 2)
+    assert replay.source.drops.by_mesh_and_reason() == {("ball", "malformed"): 1, ("cloth", "incomplete"): 1}
+    assert re.search("the answer is malformed: .*nanosec", steps[40].missing)
+
+
 def test_frames_that_the_node_dropped(small_bag, tmp_path):
     """Under overload the node answers from the last frame that it took to the latest: some frames have no answer."""
 

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from builtin_interfaces.msg import Time
 from hpccd.msg import ContactArray, MeshTopology, MeshVertices
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -50,8 +51,20 @@ def refused(reason, read, *args):
 
 
 def test_stamps():
-    for ns in (0, 1, 999_999_999, 1_000_000_000, 1_700_000_000_123_456_789, -1):
+    latest = (2**31 - 1) * 10**9 + 999_999_999
+    for ns in (0, 1, 999_999_999, 1_000_000_000, 1_700_000_000_123_456_789, latest):
         assert convert.stamp_to_ns(convert.ns_to_stamp(ns)) == ns
+
+
+BAD_STAMPS = [Time(nanosec=10**9), Time(sec=2**31 - 1, nanosec=2**32 - 1), Time(sec=-1), Time(sec=-(2**31), nanosec=5)]
+
+
+@pytest.mark.parametrize("stamp", BAD_STAMPS, ids=["nanosec", "last second", "negative", "most negative"])
+def test_stamps_that_are_no_time(stamp):
+    assert str(stamp.sec) in refused(Reason.MALFORMED, convert.stamp_to_ns, stamp)
+    topology = convert.topology_message(np.array([[0, 1, 2]]), 3)
+    topology.header.stamp = stamp
+    refused(Reason.MALFORMED, convert.topology_from_message, topology, 100, 100)
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64, np.uint32, np.uint8])

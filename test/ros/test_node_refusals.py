@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 import pytest
+from builtin_interfaces.msg import Time
 from hpccd.msg import MeshTopology, MeshVertices
 from node_process import assert_same_contacts
 from waving_sheet import scene_of, sheet_faces, sheet_positions
@@ -29,6 +30,12 @@ def with_coordinate(value, dtype):
     return convert.vertices_message(points, 50)
 
 
+def stamped(sec, nanosec):
+    message = vertices()
+    message.header.stamp = Time(sec=sec, nanosec=nanosec)
+    return message
+
+
 BAD_VERTICES = {
     "shape": (vertices(vertices_f32=convert.to_field(GOOD.ravel()[:-1])), "malformed", "not a multiple of 3"),
     "no dtype": (vertices(vertices_f32=convert.to_field(GOOD[:0])), "malformed", "both are empty"),
@@ -41,6 +48,9 @@ BAD_VERTICES = {
     "nan": (with_coordinate(math.nan, np.float32), "not_finite", "vertex 7"),
     "inf": (with_coordinate(-math.inf, np.float64), "not_finite", "vertex 7"),
     "far": (with_coordinate(1e151, np.float64), "out_of_range", "vertex 7"),
+    "nanosec": (stamped(0, 1_000_000_050), "malformed", "nanosec 1000000050"),
+    "last second": (stamped(2**31 - 1, 2**32 - 1), "malformed", "nanosec below"),
+    "negative": (stamped(-1, 0), "malformed", "sec -1"),
     "old version": (vertices(topology_version=2), "old_topology", "version 2"),
     "backward": (convert.vertices_message(GOOD, 9), "stamp_backward", "before the last one"),
     "repeated": (convert.vertices_message(GOOD, 11), "stamp_repeated", "came before"),

@@ -112,6 +112,10 @@ def put_far(r):
     r.end[0] = convert.vertices_message(points, 1)
 
 
+def bad_stamp(r):
+    r.start[0].header.stamp.nanosec = 10**9
+
+
 def other_version(r):
     r.start[0].topology_version = 4
 
@@ -130,6 +134,7 @@ def bad_index(r):
         (changed(cut_vertices), "end[0] (cloth): 255 vertices, the topology has 256"),
         (changed(put_nan), "start[0] (cloth): vertex 1 is"),
         (changed(put_far), "end[0] (cloth): vertex 7 is"),
+        (changed(bad_stamp), "start[0] (cloth): stamp has sec 0 and nanosec 1000000000"),
         (changed(other_version), "start[0] (cloth): topology_version 4"),
         (changed(bad_index), "topologies[0] (cloth): face 0 names vertex 256"),
         (request(accuracy="sloppy"), "accuracy"),
@@ -137,7 +142,7 @@ def bad_index(r):
         (request(time_limit=-1.0), "time_limit"),
         (request(time_limit=math.nan), "time_limit"),
     ],
-    ids="mesh names many count vertices nan far version index accuracy report limit nan-limit".split(),
+    ids="mesh names many count vertices nan far stamp version index accuracy report limit nan-limit".split(),
 )
 def test_bad_requests_are_refused_with_a_reason(node, bad, text):
     refused, good = ask(node, bad, request())

@@ -3,10 +3,11 @@
 
 import numpy as np
 import pytest
+from geometry_msgs.msg import TransformStamped
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hpccd_ros import transforms
+from hpccd_ros import transform_topics, transforms
 from hpccd_ros.drops import DropCounter, Reason
 from hpccd_ros.messages import MeshFrame
 from hpccd_ros.parameter_table import MESH_ROWS
@@ -106,6 +107,17 @@ def test_what_strangers_send_is_bounded(monkeypatch):
     with pytest.raises(NoTransformError, match="the first one kept"):
         buffer.lookup("hand", "world", 100 * SECOND + 2 * transforms.MOST_SAMPLES - 1)
     buffer.lookup("hand", "world", 100 * SECOND + 2 * transforms.MOST_SAMPLES)
+
+
+@pytest.mark.parametrize("static", [False, True])
+def test_transform_of_no_time_is_refused(static):
+    message = TransformStamped(child_frame_id="hand")
+    message.header.frame_id, message.header.stamp.nanosec = "world", SECOND
+    buffer = TransformBuffer()
+    with pytest.raises(ValueError, match="transform from 'hand' to 'world': stamp has sec 0 and nanosec 1000000000"):
+        transform_topics.keep(buffer, message, static)
+    with pytest.raises(NoTransformError, match="no transform connects"):
+        buffer.lookup("hand", "world", SECOND)
 
 
 def test_source_that_starts_anew_is_not_mixed_with_its_past():
