@@ -16,11 +16,15 @@ LONGEST_NAME = 255
 
 
 class NoTransformError(LookupError):
-    """There is no transform; ``final``: none will come for this stamp either."""
+    """There is no transform; ``final``: none will come for this stamp either.
 
-    def __init__(self, text: str, final: bool) -> None:
+    ``connected``: transforms lead from one frame to the other, only not for this stamp.
+    """
+
+    def __init__(self, text: str, final: bool, connected: bool = True) -> None:
         super().__init__(text)
         self.final = final
+        self.connected = connected
 
 
 class _Edge:
@@ -100,14 +104,16 @@ class TransformBuffer:
         up, down = self._ancestors(source), self._ancestors(target)
         common = next((frame for frame in up if frame in set(down)), None)
         if common is None:
-            raise NoTransformError(f"no transform connects {source!r} and {target!r}", final=False)
+            text = f"no transform connects {source!r} and {target!r}"
+            raise NoTransformError(text, final=False, connected=False)
         return self._to_ancestor(target, common, stamp).inverse().after(self._to_ancestor(source, common, stamp))
 
     def _ancestors(self, frame: str) -> list[str]:
         path = [frame]
         while (edge := self._edges.get(path[-1])) is not None:
             if edge.parent in path:
-                raise NoTransformError(f"the frames {' -> '.join(path)} form a loop", final=False)
+                text = f"the frames {' -> '.join(path)} form a loop"
+                raise NoTransformError(text, final=False, connected=False)
             path.append(edge.parent)
         return path
 

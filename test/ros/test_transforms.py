@@ -183,6 +183,43 @@ def test_frames_wait_in_order_for_their_transforms():
     assert gate.waiting == 0 and drops.by_reason()[Reason.STOPPED] == 1
 
 
+def test_a_frame_without_any_transform_holds_up_nobody():
+    buffer, texts = TransformBuffer(), []
+    drops = DropCounter(lambda mesh, reason, text: texts.append(text))
+    gate = placement(buffer, drops, transform="tf")
+    buffer.add("world", "hand", turn(0), 2 * SECOND)
+    assert gate.take(frame(1 * SECOND, "ghost")) == [] and gate.waiting == 1
+    assert "no transform connects 'ghost' and 'world'" in gate.warnings()[0]
+    assert [f.stamp for f, _ in gate.take(frame(2 * SECOND))] == [2 * SECOND]
+    assert gate.waiting == 0 and drops.by_reason() == {Reason.NO_TRANSFORM: 1}
+    assert "no transform connects 'ghost'" in texts[0] and "a later frame" in texts[0]
+    # What is only late is waited for, in order, and a ghost between them gives way with the first that is ready.
+    assert gate.take(frame(3 * SECOND, "ghost")) == gate.take(frame(4 * SECOND)) == [] and gate.waiting == 2
+    buffer.add("world", "hand", turn(0), 4 * SECOND)
+    assert [f.stamp for f, _ in gate.retry()] == [4 * SECOND] and gate.waiting == 0
+    assert drops.by_reason() == {Reason.NO_TRANSFORM: 2}
+
+
+def test_a_ghost_that_becomes_known_in_time_is_placed_in_order():
+    buffer, drops = TransformBuffer(), DropCounter()
+    gate = placement(buffer, drops, transform="tf")
+    buffer.add("world", "hand", turn(0), SECOND)
+    assert gate.take(frame(2 * SECOND, "ghost")) == gate.take(frame(3 * SECOND)) == [] and gate.waiting == 2
+    buffer.add("world", "ghost", turn(0), None)
+    assert [f.stamp for f, _ in gate.retry()] == [2 * SECOND] and gate.waiting == 1
+    buffer.add("world", "hand", turn(0), 3 * SECOND)
+    assert [f.stamp for f, _ in gate.retry()] == [3 * SECOND] and drops.total == 0
+
+
+def test_a_new_publisher_is_noticed_although_its_first_frame_is_refused():
+    buffer = TransformBuffer()
+    buffer.add("world", "hand", turn(0), None)
+    gate = placement(buffer, transform="tf")
+    for refused in (frame(1, ""), frame(1, "ghost")):
+        assert gate.take(refused, new_publisher=True) == []
+        assert [new for k in (2, 3) for _, new in gate.take(frame(k))] == [True, False]
+
+
 def test_frame_to_transform_from_must_be_named():
     drops = DropCounter()
     assert placement(TransformBuffer(), drops, transform="tf").take(frame(1, "")) == []
