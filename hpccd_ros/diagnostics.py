@@ -133,8 +133,10 @@ class Reporter:
         warnings: list[str],
         service: Mapping[str, int],
         recording: tuple[bytes, str, Mapping[str, object]] | None = None,
+        coordinate_frame: tuple[str, str] = ("", ""),
     ) -> DiagnosticArray:
         """static_taken: accepted messages of static meshes, which count as answered.
+        coordinate_frame: that of the scene, and what determined it.
         recording: level, message and values of the node's own recording, where there is one.
 
         Message of the statuses frames, detection, service, process, and recording where there is one."""
@@ -145,7 +147,7 @@ class Reporter:
         out = DiagnosticArray()
         out.header.stamp = stamp
         out.status = [
-            self._frames(data, period, waiting, restarts, last_refusal, links, warnings),
+            self._frames(data, period, waiting, restarts, last_refusal, links, warnings, coordinate_frame),
             self._detection(data, period, state),
             self._status("service", DiagnosticStatus.OK, "~/detect", service),
             self._status("process", DiagnosticStatus.OK, state, {"state": state, **_memory()}),
@@ -162,6 +164,7 @@ class Reporter:
         last_refusal: str,
         links: Mapping[str, int],
         warnings: list[str],
+        coordinate_frame: tuple[str, str],
     ) -> DiagnosticStatus:
         dropped, topologies_refused = self._drops.total, self._refused.total
         new = dropped - self._dropped
@@ -178,6 +181,8 @@ class Reporter:
             "dropped": dropped,
             "restarts": restarts,
             "topologies_refused": topologies_refused,
+            "frame_id": coordinate_frame[0],
+            "frame_id_by": coordinate_frame[1],
         }
         for reason, count in sorted(self._drops.by_reason().items()):
             values[f"dropped.{reason}"] = count

@@ -6,7 +6,12 @@ Rules, in the order in which they are applied to a vertex message:
 1. Its topology version must be the one in force. An older one is refused; a newer one waits for its topology
    (topology and vertices are separate topics, nothing orders them), at most ``max_pending`` frames a mesh.
 2. The number of vertices must be that of the topology.
-3. The frame_id must equal that of the scene (an empty one fits all).
+3. The frame_id must equal that of the scene (an empty one fits all): the one demanded, else that of the first
+   message. Where none is demanded, a stream that goes on in another one is a restart, as in 4, for neither a stray
+   first message nor a simulation that has ended may bind those that follow: at once if it comes from a new publisher
+   that is its mesh's only one; else after ``restart_after`` increasing stamps in a row, if no mesh sends in the
+   scene's frame meanwhile, as two meshes in different frames would take turns. Static meshes do not determine the
+   frame: their positions are kept by frame_id, and used where it is the scene's.
 4. Its stamp must be later than the mesh's last. A stream that goes on from an earlier time (``restart_after``
    increasing stamps in a row, or the first message of a new publisher) is a restart: all starts anew.
 5. Frames of several meshes are joined by their stamps (matching.py); static meshes keep their last positions.
@@ -22,23 +27,43 @@ from hpccd_ros.drops import DropCounter, Reason
 from hpccd_ros.matching import ExactMatcher, Match, Matcher, NearestMatcher
 from hpccd_ros.messages import MeshFrame, MeshSettings, SceneFrame, Topology
 
+# Of one static mesh: bounds what strangers can make the node keep.
+_MOST_STATIC_FRAMES = 4
+
+
+class _Run:
+    """Counts frames with increasing stamps in a row."""
+
+    def __init__(self) -> None:
+        self.count = 0
+        self._last = 0
+
+    def next(self, stamp: int) -> int:
+        self.count = self.count + 1 if stamp > self._last else 1
+        self._last = stamp
+        return self.count
+
 
 class _MeshState:
-    """What is known of one mesh."""
+    """What is known of one mesh. ``statics``: positions by frame_id, the last one taken last."""
 
     def __init__(self, settings: MeshSettings, max_pending: int) -> None:
         self.settings = settings
         self.topology: Topology | None = None
         self.early: deque[MeshFrame] = deque()
         self.max_early = max_pending
-        self.last_stamp: int | None = None
-        self.static_frame: MeshFrame | None = None
-        self.backward_run = 0
-        self.last_backward = 0
+        self.statics: dict[str, MeshFrame] = {}
+        self.new_publisher = False  # came, and none of its frames was taken yet
+        self.forget_stamps()
 
     def forget_stamps(self) -> None:
-        self.last_stamp = None
-        self.backward_run = 0
+        self.last_stamp: int | None = None
+        self.backward = _Run()
+
+    def static_in(self, frame_id: str) -> MeshFrame | None:
+        """The last positions in this coordinate frame; those that name none fit all, as does an empty frame_id."""
+        fitting = [frame for name, frame in self.statics.items() if name in ("", frame_id) or not frame_id]
+        return fitting[-1] if fitting else None
 
 
 class FrameAssembler:
@@ -50,8 +75,9 @@ class FrameAssembler:
     restart_after: increasing stamps in a row, all before the last accepted one, that make a restart; 0:
     never.
     tolerance: None: stamps must be equal; else the largest difference in ns to the first deforming mesh.
-    frame_id: what all messages must carry; "": what the first one carries.
+    frame_id: what all messages must carry; "": see rule 3.
     on_restart: called with a text when the stream starts anew.
+    only_publisher: whether a mesh has no other publisher of vertices than the one heard last.
 
     Counters: ``restarts``; ``static_taken``: accepted messages of static meshes.
     """
@@ -67,6 +93,7 @@ class FrameAssembler:
         tolerance: int | None = None,
         frame_id: str = "",
         on_restart: Callable[[str], None] = lambda text: None,
+        only_publisher: Callable[[str], bool] = lambda mesh: True,
     ) -> None:
         deforming = [m.name for m in meshes if not m.static]
         if not deforming:
@@ -79,7 +106,10 @@ class FrameAssembler:
         self.restart_after = restart_after
         self._fixed_frame_id = frame_id
         self._frame_id = frame_id
+        self._pinned_by = ""
+        self._elsewhere: dict[str, tuple[str, _Run]] = {}  # mesh -> another frame that it sends in
         self._on_restart = on_restart
+        self._only_publisher = only_publisher
         self.restarts = 0
         self.static_taken = 0
         self._completed = 0
@@ -94,13 +124,28 @@ class FrameAssembler:
         """Messages received that are neither handed on nor dropped yet."""
         return self._matcher.waiting + sum(len(m.early) for m in self._meshes.values())
 
+    @property
+    def coordinate_frame(self) -> tuple[str, str]:
+        """(frame_id in force or "", where it comes from)."""
+        if self._fixed_frame_id:
+            return self._frame_id, "parameter frame_id"
+        return self._frame_id, f"a message of mesh {self._pinned_by}" if self._pinned_by else ""
+
+    def warnings(self) -> list[str]:
+        """Positions of static meshes that are not used."""
+        return [
+            f"the last positions of static mesh {name} are in frame {last!r}, the scene is in {self._frame_id!r}"
+            for name, state in self._meshes.items()
+            if self._frame_id and (last := next(reversed(state.statics), "")) not in ("", self._frame_id)
+        ]
+
     def topology(self, mesh: str) -> Topology | None:
         """The topology in force, or None."""
         return self._meshes[mesh].topology
 
     def static_vertices(self, mesh: str) -> np.ndarray | None:
         """The last positions of a static mesh, or None."""
-        frame = self._meshes[mesh].static_frame
+        frame = self._meshes[mesh].static_in(self._frame_id)
         return None if frame is None else frame.vertices
 
     def set_topology(self, mesh: str, topology: Topology, new_publisher: bool = False) -> list[SceneFrame]:
@@ -133,14 +178,17 @@ class FrameAssembler:
                 )
                 return []
         state.topology = topology
-        state.static_frame = None
+        state.statics.clear()
         early, state.early = state.early, deque()
-        return [scene for frame in early for scene in self._route(state, frame, new_publisher=False)]
+        return [scene for frame in early for scene in self._route(state, frame)]
 
     def add(self, mesh: str, frame: MeshFrame, new_publisher: bool = False) -> list[SceneFrame]:
         """Take one vertex message; return the scene frames that it completes (usually none or one)."""
         state = self._state(mesh, self._drops)
-        return [] if state is None else self._route(state, frame, new_publisher)
+        if state is None:
+            return []
+        state.new_publisher |= new_publisher
+        return self._route(state, frame)
 
     def clear(self, reason: Reason) -> None:
         """Forget all frames (not topologies and static positions); what waits is counted as ``reason``."""
@@ -151,6 +199,8 @@ class FrameAssembler:
             state.early.clear()
             state.forget_stamps()
         self._frame_id = self._fixed_frame_id
+        self._pinned_by = ""
+        self._elsewhere.clear()
 
     def _state(self, mesh: str, counter: DropCounter) -> _MeshState | None:
         state = self._meshes.get(mesh)
@@ -158,7 +208,7 @@ class FrameAssembler:
             counter.count(mesh, Reason.UNKNOWN_MESH, f"no such mesh; parameter meshes has {', '.join(self._meshes)}")
         return state
 
-    def _route(self, state: _MeshState, frame: MeshFrame, new_publisher: bool) -> list[SceneFrame]:
+    def _route(self, state: _MeshState, frame: MeshFrame) -> list[SceneFrame]:
         mesh = state.settings.name
         topology = state.topology
         if topology is None or (frame.version is not None and frame.version > topology.version):
@@ -178,15 +228,16 @@ class FrameAssembler:
                 f"{len(frame.vertices)} vertices, topology version {topology.version} has {topology.n_vertices}",
             )
             return []
-        if not self._fits_frame_id(mesh, frame.frame_id):
-            return []
         frame = replace(frame, topology=topology)
         if state.settings.static:
             return self._take_static(state, frame)
-        if not self._in_order(state, frame, new_publisher):
+        if not (self._in_frame(state, frame) and self._in_order(state, frame)):
             return []
+        if frame.frame_id and not self._frame_id:
+            self._frame_id, self._pinned_by = frame.frame_id, mesh
+        state.new_publisher = False
         state.last_stamp = frame.stamp
-        state.backward_run = 0
+        state.backward = _Run()
         return [s for match in self._matcher.add(mesh, frame) for s in self._complete(match)]
 
     def _hold(self, state: _MeshState, frame: MeshFrame) -> None:
@@ -202,62 +253,87 @@ class FrameAssembler:
                 f"meshes/{mesh}/topology (reliable, transient local) before the vertices",
             )
 
-    def _fits_frame_id(self, mesh: str, frame_id: str) -> bool:
-        if not frame_id or frame_id == self._frame_id:
+    def _in_frame(self, state: _MeshState, frame: MeshFrame) -> bool:
+        mesh = state.settings.name
+        if not frame.frame_id or not self._frame_id:
             return True
-        if not self._frame_id:
-            self._frame_id = frame_id
+        if frame.frame_id == self._frame_id:
+            self._elsewhere.clear()
             return True
+        if not self._fixed_frame_id:
+            frame_id, run = self._elsewhere.get(mesh, ("", _Run()))
+            if frame_id != frame.frame_id:
+                run = _Run()
+            self._elsewhere[mesh] = frame.frame_id, run
+            if 0 < self.restart_after <= run.next(frame.stamp) or (state.new_publisher and self._only_publisher(mesh)):
+                self._restart(f"mesh {mesh} goes on in frame {frame.frame_id!r} after {self._frame_id!r}")
+                return True
+        self._refuse_frame_id(mesh, frame.frame_id)
+        return False
+
+    def _refuse_frame_id(self, mesh: str, frame_id: str) -> None:
+        _, source = self.coordinate_frame
         self._drops.count(
             mesh,
             Reason.FRAME_ID,
-            f"frame_id {frame_id!r}, the scene is in {self._frame_id!r}; publish all meshes in one coordinate frame",
+            f"frame_id {frame_id!r}, the scene is in {self._frame_id!r} (by {source}); publish all meshes in one "
+            "coordinate frame",
         )
-        return False
 
     def _take_static(self, state: _MeshState, frame: MeshFrame) -> list[SceneFrame]:
-        known = state.static_frame
-        if known is None or not np.array_equal(known.vertices, frame.vertices):
-            state.static_frame = frame
+        if self._fixed_frame_id and frame.frame_id not in ("", self._fixed_frame_id):
+            self._refuse_frame_id(state.settings.name, frame.frame_id)
+            return []
+        known = state.statics.pop(frame.frame_id, None)
+        same = known is not None and np.array_equal(known.vertices, frame.vertices)
+        state.statics[frame.frame_id] = known if same else frame
+        if len(state.statics) > _MOST_STATIC_FRAMES:
+            del state.statics[next(iter(state.statics))]
+        state.new_publisher = False
         self.static_taken += 1
         return []
 
-    def _in_order(self, state: _MeshState, frame: MeshFrame, new_publisher: bool) -> bool:
+    def _in_order(self, state: _MeshState, frame: MeshFrame) -> bool:
         mesh, last = state.settings.name, state.last_stamp
         if last is None or frame.stamp > last:
             return True
-        if frame.stamp == last and not new_publisher:
+        if frame.stamp == last and not state.new_publisher:
             self._drops.count(
                 mesh,
                 Reason.REPEATED,
                 f"stamp {frame.stamp} ns came before; each frame needs a later stamp than the one before",
             )
             return False
-        state.backward_run = state.backward_run + 1 if frame.stamp > state.last_backward else 1
-        state.last_backward = frame.stamp
-        enough = self.restart_after > 0 and state.backward_run >= self.restart_after
-        if not (new_publisher or enough):
+        enough = 0 < self.restart_after <= state.backward.next(frame.stamp)
+        if not (state.new_publisher or enough):
             self._drops.count(mesh, Reason.BACKWARD, f"stamp {frame.stamp} ns is before the last one, {last} ns")
             return False
+        self._restart(f"mesh {mesh} goes on from stamp {frame.stamp} ns after {last} ns")
+        return True
+
+    def _restart(self, text: str) -> None:
         self.restarts += 1
         self.clear(Reason.RESTART)
-        self._on_restart(f"mesh {mesh} goes on from stamp {frame.stamp} ns after {last} ns: taken as a restart")
-        return True
+        self._on_restart(f"{text}: taken as a restart")
 
     def _complete(self, match: Match) -> list[SceneFrame]:
         frames = []
+        frame_id = self._frame_id
         for name, state in self._meshes.items():
-            frame = state.static_frame if state.settings.static else match.frames[name]
+            frame = state.static_in(frame_id) if state.settings.static else match.frames[name]
             if frame is None:
+                others = ", ".join(map(repr, state.statics))
+                there = f" in frame {frame_id!r}, only in {others}" if others else ""
                 for fresh in match.fresh:
                     self._drops.count(
                         fresh,
                         Reason.STATIC_MISSING,
-                        f"static mesh {name} has no positions yet; "
+                        f"static mesh {name} has no positions{there} yet; "
                         f"publish them once or give a file (parameter mesh.{name}.file)",
                     )
                 return []
             frames.append(frame)
+            frame_id = frame_id or frame.frame_id
         moving = [match.frames[n] for n in self._meshes if n in match.frames]
         step = next((f.step for f in moving if f.step is not None), self._completed)
         self._completed += 1
@@ -265,7 +341,7 @@ class FrameAssembler:
             SceneFrame(
                 stamp=match.stamp,
                 step=step,
-                frame_id=self._frame_id,
+                frame_id=frame_id,
                 topologies=tuple(f.topology for f in frames),
                 vertices=tuple(f.vertices for f in frames),
                 fresh=match.fresh,

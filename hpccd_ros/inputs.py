@@ -47,7 +47,7 @@ class Inputs:
         self._refused = refused
         self._metrics = metrics
         self._links = links
-        self._streams: list[MeshStream] = []
+        self._streams: dict[str, MeshStream] = {}
         self._transforms: TransformInput | None = None
         self.assembler = FrameAssembler(
             list(meshes),
@@ -58,6 +58,7 @@ class Inputs:
             tolerance=round(settings["stamp_tolerance"] * 1e9) if settings["stamp_match"] == "nearest" else None,
             frame_id=settings["frame_id"],
             on_restart=node.get_logger().warning,
+            only_publisher=lambda mesh: self._streams[mesh].publishers <= 1,
         )
         for name, row in rows.items():
             if row["file"]:
@@ -72,8 +73,8 @@ class Inputs:
             self._transforms = TransformInput(
                 self._node, buffer, settings["max_rate"], self._retry_placement, self._warn_of_transforms
             )
-        self._streams = [
-            MeshStream(
+        self._streams = {
+            name: MeshStream(
                 self._node,
                 name,
                 row["input"],
@@ -90,13 +91,13 @@ class Inputs:
                 check_topology=core_refusal,
             )
             for name, row in self._rows.items()
-        ]
+        }
 
     def close(self) -> None:
         """Unsubscribe; frames that waited for others are counted as dropped. Topologies and static positions stay."""
-        for stream in self._streams:
+        for stream in self._streams.values():
             stream.close()
-        self._streams = []
+        self._streams = {}
         if self._transforms is not None:
             self._transforms.close()
             self._transforms = None
@@ -105,11 +106,12 @@ class Inputs:
     @property
     def waiting(self) -> int:
         """Messages received that are neither handed on nor dropped yet."""
-        return self.assembler.waiting + sum(stream.waiting for stream in self._streams)
+        return self.assembler.waiting + sum(stream.waiting for stream in self._streams.values())
 
     def warnings(self) -> list[str]:
         """What is odd about the publishers."""
-        return [line for stream in self._streams for line in stream.warnings()]
+        lines = [line for stream in self._streams.values() for line in stream.warnings()]
+        return lines + self.assembler.warnings()
 
     def _read_file(self, name: str, row: dict[str, Any]) -> None:
         vertices, faces = load_mesh(row["file"])
@@ -121,7 +123,7 @@ class Inputs:
             self.assembler.add(name, MeshFrame(0, place(vertices, row["pose"]), version=0))
 
     def _retry_placement(self) -> None:
-        for stream in self._streams:
+        for stream in self._streams.values():
             stream.retry()
 
     def _warn_of_transforms(self, text: str) -> None:

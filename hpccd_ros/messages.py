@@ -63,5 +63,6 @@ class SceneFrame:
     received: float
 
     def same_scene(self, other: "SceneFrame") -> bool:
-        """True if a motion from one to the other exists: the same topology of every mesh."""
-        return all(a is b for a, b in zip(self.topologies, other.topologies, strict=True))
+        """True if a motion from one to the other exists: the same topology of every mesh, one coordinate frame."""
+        elsewhere = self.frame_id and other.frame_id and self.frame_id != other.frame_id
+        return not elsewhere and all(a is b for a, b in zip(self.topologies, other.topologies, strict=True))

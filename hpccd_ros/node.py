@@ -318,6 +318,7 @@ class HpccdNode(LifecycleNode):
                 warnings=[line for part in (inputs, self._unknown) if part is not None for line in part.warnings()],
                 service=self._service.counts,
                 recording=self._recording.status(),
+                coordinate_frame=inputs.assembler.coordinate_frame if inputs else ("", ""),
             )
         )
 

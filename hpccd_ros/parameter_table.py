@@ -84,7 +84,7 @@ NODE_ROWS = (
         "string",
         "",
         "Coordinate frame of the scene, which all vertex messages must carry or be transformed to; empty: that of the "
-        "first one",
+        "first one, until a restart or a new publisher brings another",
     ),
     Row(
         "frame_queue",
@@ -120,8 +120,8 @@ NODE_ROWS = (
         "restart_after",
         "int",
         5,
-        "Frames in a row with increasing stamps before the last accepted one that are taken "
-        "as a restart of the stream; 0: never",
+        "Frames in a row with increasing stamps before the last accepted one, or in another coordinate frame than the "
+        "first one brought, that are taken as a restart of the stream; 0: never",
         span=(0, 1_000_000),
         change=ALWAYS,
     ),

@@ -155,7 +155,7 @@ class Replay:
                 step.missing = f"the recording has no frame of all meshes at its {name}, stamp {stamp} ns"
                 return step
         if not step.start_frame.same_scene(step.end_frame):
-            step.missing = "the topology changes between its start and its end"
+            step.missing = "the topology or the coordinate frame changes between its start and its end"
         return step
 
     def _compute(self, step):

@@ -32,6 +32,7 @@ class FrameSource:
         self.transforms_refused = DropCounter()
         self._decoders = {name: make_decoder(topics[name]) for name in setup.roles if name in topics}
         self._watches = {name: SequenceWatch() for name in setup.roles}
+        self._unnoticed: set[str] = set()  # topics where the first message of a new publisher was refused
         self._assembler = FrameAssembler(
             list(setup.builder.meshes),
             self.drops,
@@ -71,6 +72,8 @@ class FrameSource:
                 self.refused.count(mesh, error.reason, str(error))
                 return []
             return self._assembler.set_topology(mesh, topology, new_publisher)
+        if new_publisher:
+            self._unnoticed.add(message.topic)
         try:
             stamp = convert.stamp_to_ns(decoded.header.stamp)
             if kind == "vertices":
@@ -82,6 +85,8 @@ class FrameSource:
         except InvalidMessageError as error:
             self.drops.count(mesh, error.reason, str(error))
             return []
+        new_publisher = message.topic in self._unnoticed
+        self._unnoticed.discard(message.topic)
         frame = MeshFrame(stamp, vertices, version, step, decoded.header.frame_id)
         return self._assemble(mesh, self._placements[mesh].take(frame, new_publisher))
 

@@ -82,6 +82,7 @@ class MeshStream:
         self._check_topology = check_topology
         self._topology_numbers = SequenceWatch()
         self._vertex_numbers = SequenceWatch()
+        self._unnoticed = False  # the first message of a new publisher was refused: the next one stands for it
         self._topology_limit, self._vertex_limit = (RateLimit(settings["max_rate"]) for _ in range(2))
         message, callback = {
             "vertices": (MeshVertices, self._on_vertices),
@@ -117,13 +118,18 @@ class MeshStream:
         """Messages that wait for a transform."""
         return self._placement.waiting
 
+    @property
+    def publishers(self) -> int:
+        """Of vertices, as far as is known."""
+        return self._node.count_publishers(self._vertex_topic)
+
     def retry(self) -> None:
         """Go on with frames that waited for a transform."""
         self._hand_on(self._placement.retry())
 
     def warnings(self) -> list[str]:
         """What is odd about the publishers of the mesh."""
-        publishers = self._node.count_publishers(self._vertex_topic)
+        publishers = self.publishers
         several = [f"{publishers} publishers on {self._vertex_topic}"] if publishers > 1 else []
         return several + self._placement.warnings()
 
@@ -155,9 +161,10 @@ class MeshStream:
         transport = (info["received_timestamp"] - info["source_timestamp"]) * 1e-6
         self._metrics.frame_received(self._mesh, transport if transport >= 0 else None)
         missing, new_publisher = self._vertex_numbers.next(info["publication_sequence_number"])
+        self._unnoticed |= new_publisher
         self._links[f"before_first.{self._mesh}"] = self._vertex_numbers.before_first
         # Numbers of several publishers interleave: their gaps mean nothing.
-        if missing and self._node.count_publishers(self._vertex_topic) <= 1:
+        if missing and self.publishers <= 1:
             self._drops.count(
                 self._mesh,
                 Reason.MIDDLEWARE,
@@ -174,6 +181,7 @@ class MeshStream:
             self._drops.count(self._mesh, error.reason, str(error))
             return
         frame = MeshFrame(stamp, vertices, version, step, message.header.frame_id, received)
+        new_publisher, self._unnoticed = self._unnoticed, False
         self._hand_on(self._placement.take(frame, new_publisher))
 
     def _hand_on(self, frames: list[Ready]) -> None:

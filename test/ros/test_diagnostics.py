@@ -79,6 +79,11 @@ def test_warnings_are_told():
     assert level == DiagnosticStatus.WARN and "2 publishers" in text and values["message_lost.x"] == "3"
 
 
+def test_coordinate_frame_is_told():
+    values = Fixture().report(coordinate_frame=("world", "a message of mesh cloth"))["/hpccd: frames"][2]
+    assert (values["frame_id"], values["frame_id_by"]) == ("world", "a message of mesh cloth")
+
+
 def test_percentiles():
     assert percentiles([]) == {}
     assert percentiles(list(range(101))) == {"p50": "50.00", "p95": "95.00", "p99": "99.00", "max": "100.00"}

@@ -215,6 +215,108 @@ def test_meshes_in_different_frames():
     assert len(scene.add("ball", 1, frame_id="")) == 1, "an empty frame_id fits all"
 
 
+def test_a_stray_first_message_does_not_bind_those_that_follow():
+    scene = Scene("cloth", restart_after=3).topologies("cloth")
+    assert len(scene.add("cloth", 10**9, frame_id="stray")) == 1
+    assert scene.assembler.coordinate_frame == ("stray", "a message of mesh cloth")
+    taken = [scene.add("cloth", k, frame_id="world") for k in (1, 2, 3, 4)]
+    assert [len(frames) for frames in taken] == [0, 0, 1, 1] and taken[2][0].frame_id == "world"
+    assert scene.dropped() == {"frame_id": 2}
+    assert scene.assembler.coordinate_frame == ("world", "a message of mesh cloth")
+    assert scene.assembler.restarts == 1 and "'world' after 'stray'" in scene.restart_texts[0]
+
+
+def test_a_new_publisher_brings_its_frame_at_once():
+    scene = Scene("cloth", "ball", restart_after=0).topologies("cloth", "ball")
+    for mesh in ("cloth", "ball"):
+        (*_, before) = [None, *scene.add(mesh, 10, frame_id="world")]
+    for mesh in ("cloth", "ball"):  # later stamps: only the frame tells
+        (*_, after) = [None, *scene.add(mesh, 20, frame_id="map", new_publisher=True)]
+    assert (before.frame_id, after.frame_id) == ("world", "map")
+    assert not before.same_scene(after), "no motion leads from one coordinate frame into another"
+    assert scene.drops.total == 0 and scene.assembler.restarts == 1
+    assert scene.add("cloth", 30, frame_id="world") == []
+    assert scene.dropped() == {"frame_id": 1}
+
+
+def test_a_new_publisher_beside_another_one_does_not_take_the_frame_from_it():
+    scene = Scene("cloth", restart_after=0, only_publisher=lambda mesh: False).topologies("cloth")
+    scene.add("cloth", 1, frame_id="world")
+    assert scene.add("cloth", 2, frame_id="stray", new_publisher=True) == []
+    assert len(scene.add("cloth", 3, frame_id="world")) == 1
+    assert scene.assembler.restarts == 0
+
+
+def test_new_publisher_is_noticed_although_its_first_frames_are_refused():
+    scene = Scene("cloth", restart_after=0).topologies("cloth")
+    scene.add("cloth", 100, frame_id="world")
+    assert scene.add("cloth", 1, n=4, frame_id="map", new_publisher=True) == []
+    (taken,) = scene.add("cloth", 2, frame_id="map")
+    assert taken.frame_id == "map" and scene.assembler.restarts == 1
+    assert scene.add("cloth", 1, frame_id="map") == [], "only once"
+    assert scene.dropped() == {"wrong_vertex_count": 1, "stamp_backward": 1}
+
+
+def test_meshes_in_two_frames_do_not_take_turns():
+    scene = Scene("cloth", "ball", restart_after=3).topologies("cloth", "ball")
+    for stamp in range(20):
+        assert scene.add("cloth", stamp, frame_id="world") == scene.add("ball", stamp, frame_id="camera") == []
+    assert scene.assembler.restarts == 0 and scene.assembler.coordinate_frame[0] == "world"
+    assert scene.dropped()["frame_id"] == 20
+
+
+def test_demanded_frame_never_changes():
+    scene = Scene("cloth", frame_id="world", restart_after=2).topologies("cloth")
+    assert not any(scene.add("cloth", stamp, frame_id="odom", new_publisher=True) for stamp in range(9))
+    assert scene.dropped() == {"frame_id": 9}
+    assert scene.assembler.coordinate_frame == ("world", "parameter frame_id")
+
+
+def test_frame_is_that_of_the_restarted_stream():
+    scene = Scene("cloth", restart_after=2).topologies("cloth")
+    scene.add("cloth", 100, frame_id="world")
+    (*_, first) = [*scene.add("cloth", 1, frame_id="map"), *scene.add("cloth", 2, frame_id="map")]
+    assert (first.stamp, first.frame_id) == (2, "map")
+    scene.add("cloth", 1, frame_id="map")
+    (again,) = scene.add("cloth", 2, frame_id="map", new_publisher=True)
+    assert again.frame_id == "map", "a restart in the same frame keeps it"
+
+
+def static_scene(**options):
+    return Scene("cloth", MeshSettings("floor", static=True), **options).topologies("cloth", "floor")
+
+
+def test_static_positions_are_used_in_their_own_frame_only():
+    scene = static_scene(restart_after=2)
+    assert scene.add("floor", 0, value=1.0, frame_id="world") == []
+    scene.add("cloth", 1, frame_id="stray")
+    assert scene.dropped() == {"static_missing": 1}
+    assert "'world', the scene is in 'stray'" in scene.assembler.warnings()[0]
+    scene.add("cloth", 2, frame_id="world")
+    (complete,) = scene.add("cloth", 3, frame_id="world")
+    assert (complete.frame_id, complete.vertices[1][0, 0]) == ("world", 1.0)
+    assert scene.assembler.warnings() == []
+    # A restarted simulation sends the floor first; what it had in the other frame is not mixed in, but kept.
+    scene.add("floor", 0, value=5.0, frame_id="map", new_publisher=True)
+    assert scene.add("cloth", 4, frame_id="world")[0].vertices[1][0, 0] == 1.0
+    (complete,) = scene.add("cloth", 1, frame_id="map", new_publisher=True)
+    assert (complete.frame_id, complete.vertices[1][0, 0]) == ("map", 5.0)
+
+
+def test_scene_without_a_frame_has_that_of_its_static_mesh():
+    scene = static_scene()
+    scene.add("floor", 0, frame_id="world")
+    assert scene.add("cloth", 1)[0].frame_id == "world"
+
+
+def test_static_positions_in_many_frames_are_bounded():
+    scene = static_scene()
+    for k in range(100):
+        scene.add("floor", 0, value=k, frame_id=f"frame{k}")
+    complete = [len(scene.add("cloth", k, frame_id=f"frame{k}", new_publisher=True)) for k in (50, 95, 96, 99)]
+    assert complete == [0, 0, 1, 1]
+
+
 def test_demanded_frame_id():
     scene = Scene("cloth", frame_id="world").topologies("cloth")
     assert scene.add("cloth", 1, frame_id="odom") == []

@@ -183,6 +183,21 @@ def test_restarted_publisher_is_heard_at_once(start_node):
     node.frames_status(restarts=1, received=6, answered=6, dropped=0)
 
 
+def test_restarted_simulation_brings_its_own_frame(start_node):
+    node = start_node({"meshes": ["cloth"]})
+    node.peer.topology("cloth", FACES, N * N)
+    node.peer.vertices("cloth", GOOD, 1, frame_id="stray")
+    node.frames_status(answered=1, frame_id="stray", frame_id_by="a message of mesh cloth")
+    node.peer.forget_publisher("meshes/cloth/vertices")
+    for k in range(3):
+        node.peer.vertices("cloth", sheet_positions(N, k), 10 + k, frame_id="world")
+        node.contacts(k)
+    for message, k in zip(node.contacts(2), (1, 2), strict=True):
+        assert (message.header.frame_id, convert.stamp_to_ns(message.start)) == ("world", 9 + k)
+        assert_same_contacts(message, sheet_positions(N, k - 1), sheet_positions(N, k), scene_of(cloth=FACES))
+    node.frames_status(answered=4, dropped=0, restarts=1, frame_id="world")
+
+
 def test_no_time_is_hidden_by_a_frame_that_cannot_be_tested(start_node):
     """Finite, but beyond what the core computes with."""
     node = start_node({"meshes": ["cloth"]})
