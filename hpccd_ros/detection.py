@@ -168,7 +168,7 @@ class DetectionThread(threading.Thread):
             except hc.Cancelled:
                 for mesh in frame.fresh:
                     self._drops.count(mesh, Reason.STOPPED)
-            except CORE_ERRORS as error:
+            except Exception as error:  # CORE_ERRORS; any other would end this thread, and no frame be answered again
                 for mesh in frame.fresh:
                     self._drops.count(mesh, Reason.DETECTION_FAILED)
                 self._on_failure(frame, error)

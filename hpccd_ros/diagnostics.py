@@ -132,14 +132,16 @@ class Reporter:
         links: Mapping[str, int],
         warnings: list[str],
         service: Mapping[str, int],
+        errors: tuple[int, str] = (0, ""),
         recording: tuple[bytes, str, Mapping[str, object]] | None = None,
         coordinate_frame: tuple[str, str] = ("", ""),
     ) -> DiagnosticArray:
         """static_taken: accepted messages of static meshes, which count as answered.
         coordinate_frame: that of the scene, and what determined it.
+        errors: how many exceptions nothing expected, and the last one.
         recording: level, message and values of the node's own recording, where there is one.
 
-        Message of the statuses frames, detection, service, process, and recording where there is one."""
+        Message of the statuses frames, detection, service, process, errors, and recording where there is one."""
         now = time.monotonic()
         period, self._time = max(now - self._time, 1e-9), now
         data = self._metrics.snapshot()
@@ -151,6 +153,7 @@ class Reporter:
             self._detection(data, period, state),
             self._status("service", DiagnosticStatus.OK, "~/detect", service),
             self._status("process", DiagnosticStatus.OK, state, {"state": state, **_memory()}),
+            self._errors(*errors),
             *([self._status("recording", *recording)] if recording is not None else []),
         ]
         return out
@@ -229,6 +232,12 @@ class Reporter:
         if data["failing"]:
             return self._status("detection", DiagnosticStatus.ERROR, f"failed: {data['last_failure']}", values)
         return self._status("detection", DiagnosticStatus.OK, f"{rate:.1f} detections a second ({state})", values)
+
+    def _errors(self, count: int, last: str) -> DiagnosticStatus:
+        # For good: what else went wrong with it nobody knows.
+        level = DiagnosticStatus.ERROR if count else DiagnosticStatus.OK
+        text = f"{count} unexpected errors, the last: {last}" if count else "none"
+        return self._status("errors", level, text, {"errors": count, "last_error": last})
 
     def _status(self, part: str, level: bytes, message: str, values: Mapping[str, object]) -> DiagnosticStatus:
         return DiagnosticStatus(

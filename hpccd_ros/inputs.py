@@ -73,15 +73,14 @@ class Inputs:
             self._transforms = TransformInput(
                 self._node, buffer, settings["max_rate"], self._retry_placement, self._warn_of_transforms
             )
-        self._streams = {
-            name: MeshStream(
+        for name, row in self._rows.items():  # one by one: `close` must find those that are there, should one fail
+            placement = Placement(name, row, settings["frame_id"], settings["pending_frames"], self._drops, buffer)
+            stream = MeshStream(
                 self._node,
                 name,
                 row["input"],
                 settings,
-                placement=Placement(
-                    name, row, settings["frame_id"], settings["pending_frames"], self._drops, buffer
-                ),
+                placement=placement,
                 assembler=self.assembler,
                 drops=self._drops,
                 refused=self._refused,
@@ -90,8 +89,7 @@ class Inputs:
                 on_frames=on_frames,
                 check_topology=core_refusal,
             )
-            for name, row in self._rows.items()
-        }
+            self._streams[name] = stream
 
     def close(self) -> None:
         """Unsubscribe; frames that waited for others are counted as dropped. Topologies and static positions stay."""

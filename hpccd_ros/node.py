@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The node: life cycle and wiring. ``python -m hpccd_ros.node --ros-args --params-file FILE``"""
 
+import contextlib
 import sys
 import time
 from collections import Counter
@@ -11,8 +12,10 @@ import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from hpccd.msg import ContactArray
 from rclpy.clock import Clock, ClockType
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
-from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from rclpy.executors import ExternalShutdownException
+from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
+from rclpy.publisher import Publisher
+from rclpy.qos import QoSProfile
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 from sensor_msgs.msg import PointCloud2
@@ -31,11 +34,13 @@ from hpccd_ros import (
     stop_signals,
 )
 from hpccd_ros.detect_service import DetectService, NodeScene
-from hpccd_ros.detection import Detection, DetectionThread, Options
+from hpccd_ros.detection import CORE_ERRORS, Detection, DetectionThread, Options
 from hpccd_ros.diagnostics import Metrics, Reporter
 from hpccd_ros.drops import DropCounter, Reason
 from hpccd_ros.frame_queue import FrameQueue
+from hpccd_ros.guard import GuardedExecutor
 from hpccd_ros.inputs import Inputs
+from hpccd_ros.life_cycle import GuardedLifecycleNode
 from hpccd_ros.markers import contact_markers, surface_cloud
 from hpccd_ros.messages import SceneFrame
 from hpccd_ros.node_recording import NodeRecording
@@ -47,8 +52,8 @@ from hpccd_ros.unknown_meshes import UnknownMeshWatch
 YIELD = 2e-5  # s; what counts is that it is not 0
 
 
-class HpccdNode(LifecycleNode):
-    """Streams of vertices in, contacts out.
+class HpccdNode(GuardedLifecycleNode):
+    """Streams of vertices in, contacts out. To be run by a GuardedExecutor.
 
     Configured: parameters checked, mesh files read, publishers and service there. Active: subscribed,
     detecting.
@@ -66,7 +71,7 @@ class HpccdNode(LifecycleNode):
             raise ParameterError(why)
         if why := node_recording.refusal(self._settings):
             raise ParameterError(why)
-        self._recording = NodeRecording(self, self._settings)
+        self._recording = NodeRecording(self, self._settings, self.errors)
         parameters.watch(
             self,
             self._settings,
@@ -85,6 +90,7 @@ class HpccdNode(LifecycleNode):
         self._inputs: Inputs | None = None
         self._unknown: UnknownMeshWatch | None = None
         self._service: DetectService | None = None
+        self._configured = contextlib.ExitStack()  # how to undo on_configure
         self._queue: FrameQueue | None = None
         self._thread: DetectionThread | None = None
         self._markers_after = 0.0
@@ -99,15 +105,16 @@ class HpccdNode(LifecycleNode):
         except ValueError as error:
             self.get_logger().error(f"cannot configure: {error}")
             return TransitionCallbackReturn.FAILURE
-        self._contacts = self.create_publisher(ContactArray, "contacts", qos.CONTACTS)
-        self._markers = self.create_publisher(MarkerArray, "markers", qos.MARKERS)
-        self._surface = self.create_publisher(PointCloud2, "surface", qos.MARKERS)
-        self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", qos.DIAGNOSTICS)
+        self._contacts = self._publisher(ContactArray, "contacts", qos.CONTACTS)
+        self._markers = self._publisher(MarkerArray, "markers", qos.MARKERS)
+        self._surface = self._publisher(PointCloud2, "surface", qos.MARKERS)
+        self._diagnostics = self._publisher(DiagnosticArray, "/diagnostics", qos.DIAGNOSTICS)
+        self._service = DetectService(self, settings, lambda: self._options, self._scene_for_service)
         # Steady time: diagnostics go on while simulated time stands still.
-        self._timer = self.create_timer(
+        timer = self.create_timer(
             settings["diagnostics_period"], self._report, clock=Clock(clock_type=ClockType.STEADY_TIME)
         )
-        self._service = DetectService(self, settings, lambda: self._options, self._scene_for_service)
+        self._configured.callback(self.destroy_timer, timer)
         return TransitionCallbackReturn.SUCCESS
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -115,7 +122,7 @@ class HpccdNode(LifecycleNode):
         self._recording.follow(active=True)  # first: what the node hears, the recording shall have
         if self._inputs is not None:
             self._queue = FrameQueue(self._settings["frame_queue"])
-            self._thread = DetectionThread(
+            thread = DetectionThread(
                 self._builder,
                 self._queue,
                 self._drops,
@@ -124,7 +131,8 @@ class HpccdNode(LifecycleNode):
                 on_first=lambda frame: self._metrics.first_frame(len(frame.fresh)),
                 on_failure=self._failed,
             )
-            self._thread.start()
+            thread.start()
+            self._thread = thread
             self._inputs.open(self._enqueue)
         self._unknown = UnknownMeshWatch(
             self,
@@ -157,17 +165,18 @@ class HpccdNode(LifecycleNode):
         self._release()
         return TransitionCallbackReturn.SUCCESS
 
+    def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """After a transition that raised: back to unconfigured, with nothing left of what it may have made."""
+        self._stop()
+        self._release()
+        return TransitionCallbackReturn.SUCCESS
+
     def close(self) -> None:
         """End threads before the node is destroyed; needs no valid context."""
         self._stop()
         if self._service is not None:
             self._service.close()
             self._service = None
-
-    @property
-    def state(self) -> str:
-        """Label of the life-cycle state."""
-        return self._state_machine.current_state[1]
 
     def _stop(self) -> None:
         if self._unknown is not None:
@@ -177,19 +186,23 @@ class HpccdNode(LifecycleNode):
             self._inputs.close()
             for frame in self._queue.close():
                 self._count_dropped(frame, Reason.STOPPED)
+        if self._thread is not None:
             self._thread.cancel()
             self._thread.join()
-            self._queue = self._thread = None
+        self._queue = self._thread = None
         self._recording.end()
 
     def _release(self) -> None:
         if self._service is not None:
             self._service.close()
             self._service = None
-            self.destroy_timer(self._timer)
-            for publisher in (self._contacts, self._markers, self._surface, self._diagnostics):
-                self.destroy_publisher(publisher)
+        self._configured.close()
         self._inputs = None
+
+    def _publisher(self, kind: type, topic: str, profile: QoSProfile) -> Publisher:
+        publisher = self.create_publisher(kind, topic, profile)
+        self._configured.callback(self.destroy_publisher, publisher)
+        return publisher
 
     def _make_inputs(self) -> Inputs:
         return Inputs(
@@ -297,6 +310,8 @@ class HpccdNode(LifecycleNode):
         """Called by the detection thread."""
         if not self.context.ok():
             return  # shutting down: the publisher is gone, nothing failed
+        if not isinstance(error, CORE_ERRORS):
+            self.errors.caught("detection", error)
         self._metrics.failed(f"{type(error).__name__}: {error}")
         self._log("scene", Reason.DETECTION_FAILED, f"step that ends at {frame.stamp} ns: {error}")
 
@@ -317,6 +332,7 @@ class HpccdNode(LifecycleNode):
                 links=self._links,
                 warnings=[line for part in (inputs, self._unknown) if part is not None for line in part.warnings()],
                 service=self._service.counts,
+                errors=(self.errors.count, self.errors.last),
                 recording=self._recording.status(),
                 coordinate_frame=inputs.assembler.coordinate_frame if inputs else ("", ""),
             )
@@ -358,7 +374,7 @@ def main(argv: list[str] | None = None, node_type: type[HpccdNode] = HpccdNode) 
         print(f"hpccd: {why}", file=sys.stderr)
         rclpy.try_shutdown()
         return 3
-    executor = SingleThreadedExecutor()
+    executor = GuardedExecutor(node.errors)
     executor.add_node(node)
     try:
         if node.get_parameter("autostart").value:

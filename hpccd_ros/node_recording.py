@@ -11,11 +11,12 @@ from typing import Any
 
 import rclpy
 from diagnostic_msgs.msg import DiagnosticStatus
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.qos import ReliabilityPolicy
 
 from hpccd_ros import mcap_bag, node_parameters, recorded_topics
+from hpccd_ros.guard import Errors, GuardedExecutor
 from hpccd_ros.mcap_bag import BagWriter
 from hpccd_ros.mesh_attachment import mesh_files
 from hpccd_ros.recording_info import recording_info
@@ -32,9 +33,10 @@ class NodeRecording:
     nor detection, and the files hold the bytes as they were sent.
     """
 
-    def __init__(self, node: Node, settings: dict[str, Any]) -> None:
+    def __init__(self, node: Node, settings: dict[str, Any], errors: Errors) -> None:
         self._node = node
         self._settings = settings
+        self._errors = errors
         self._wanted = ""  # what the parameter was when a recording was last begun
         self._running: _Running | None = None
         self._last: _Running | None = None
@@ -50,7 +52,7 @@ class NodeRecording:
         if not wanted:
             return
         try:
-            self._running = self._last = _Running(self._node, self._settings)
+            self._running = self._last = _Running(self._node, self._settings, self._errors)
             self._node.get_logger().info(f"recording into {self._running.bag.path}")
         except (OSError, ValueError) as error:
             self._failure = f"cannot record into {wanted}: {error}"
@@ -87,7 +89,7 @@ def refusal(settings: dict[str, Any]) -> str | None:
 class _Running:
     """One recording, from construction until `end`. Raises OSError, ValueError where it cannot begin."""
 
-    def __init__(self, node: Node, settings: dict[str, Any]) -> None:
+    def __init__(self, node: Node, settings: dict[str, Any], errors: Errors) -> None:
         parameters = node_parameters.of(node)
         files, missing = mesh_files(parameters)
         for text in missing:
@@ -115,7 +117,8 @@ class _Running:
             # As the node itself asks: whatever reaches it reaches the recording.
             functools.partial(recorded_topics.as_node_asks, reliability=reliability),
         )  # fmt: skip
-        self._executor = SingleThreadedExecutor(context=node.context)
+        self._errors = errors
+        self._executor = GuardedExecutor(errors, context=node.context)
         self._executor.add_node(self._node)
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name="recording", daemon=True)
@@ -129,6 +132,8 @@ class _Running:
             self._recorder.finish(self._executor, DEPTH)
         except ExternalShutdownException:
             pass  # the context is gone, and with it what had not been taken
+        except Exception as error:
+            self._errors.caught("recording", error)  # ended by it: `status` says so
         finally:
             self.bag.close()
 

@@ -38,7 +38,7 @@ class NodeProcess:
     """``python -m hpccd_ros.node`` in a namespace of its own, and a peer in this process.
 
     parameters: nested as in YAML, meshes included. profiles: parameter files, read after the parameters.
-    remaps: further ``from:=to`` rules.
+    remaps: further ``from:=to`` rules. program: what Python runs in place of the node's module.
     """
 
     def __init__(
@@ -49,13 +49,14 @@ class NodeProcess:
         profiles: tuple[Path, ...] = (),
         remaps: tuple[str, ...] = (),
         wait: bool = True,
+        program: tuple[str, ...] | list[str] = ("-m", "hpccd_ros.node"),
     ):
         self.namespace = f"/t{os.getpid()}_{next(_numbers)}"
         values = {"diagnostics_period": 0.1, **parameters}
         file = folder / f"parameters{self.namespace[1:]}.yaml"
         file.write_text(yaml.safe_dump({"/**": {"ros__parameters": values}}))
         rules = (f"__ns:={self.namespace}", f"/diagnostics:={self.namespace}/diagnostics", *remaps)
-        command = [sys.executable, "-m", "hpccd_ros.node", "--ros-args", "--params-file", str(file)]
+        command = [sys.executable, *program, "--ros-args", "--params-file", str(file)]
         for profile in profiles:
             command += ["--params-file", str(profile)]
         for rule in rules:

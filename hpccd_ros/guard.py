@@ -1,0 +1,133 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a callback raises ends the callback, never the node: logged, counted, told on /diagnostics."""
+
+import threading
+import traceback
+import weakref
+from collections.abc import Callable
+from typing import Any
+
+from rcl_interfaces.msg import SetParametersResult
+from rclpy.context import Context
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor, await_or_execute
+from rclpy.service import Service
+
+# Waits of the executor that may fail one after the other, without a callback in between, before the node gives up:
+# one that can neither hear nor be told to end is better started again.
+MOST_IN_A_ROW = 100
+# Of the text of an error, which may quote what others sent.
+LONGEST = 500
+
+
+class Errors:
+    """Exceptions that nothing expected; from any thread.
+
+    log: takes the whole traceback, once for each kind of exception and place where it was raised: a publisher in
+    error repeats it at its full rate.
+    """
+
+    def __init__(self, log: Callable[[str], None]) -> None:
+        self._log = log
+        self._lock = threading.Lock()
+        self._seen: set[tuple[type, str, int | None]] = set()
+        self.count = 0
+        self.last = ""
+
+    def caught(self, where: str, error: Exception) -> str:
+        """Count it; returns a line that names it. where: what did not get done, for the reader of the log."""
+        places = traceback.extract_tb(error.__traceback__)
+        kind = (type(error), places[-1].filename, places[-1].lineno) if places else (type(error), where, 0)
+        text = f"{where}: {type(error).__name__}: {error}"[:LONGEST]
+        with self._lock:
+            self.count += 1
+            self.last = text
+            new = kind not in self._seen
+            self._seen.add(kind)
+        if new:
+            trace = "".join(traceback.format_exception(error)).rstrip()
+            self._log(f"{text}; the node goes on, more of these are only counted\n{trace}")
+        return text
+
+
+class GuardedExecutor(SingleThreadedExecutor):
+    """Goes on after a callback that raised; `errors` has it. A service's caller is told that it failed.
+
+    rclpy's own raises it from spin_once; and where taking the message raised, neither that subscription nor another
+    of its callback group is served ever again.
+    """
+
+    def __init__(self, errors: Errors, *, context: Context | None = None) -> None:
+        super().__init__(context=context)
+        self._errors = errors
+        self._in_a_row = 0
+        self._answering: weakref.WeakSet[Service] = weakref.WeakSet()
+
+    def spin_once(self, timeout_sec: float | None = None) -> None:
+        try:
+            super().spin_once(timeout_sec)
+            self._in_a_row = 0
+        except ExternalShutdownException:
+            raise
+        except Exception as error:
+            self._in_a_row += 1
+            if self._in_a_row > MOST_IN_A_ROW:
+                raise
+            self._caught("executor", error)
+
+    def _make_handler(self, entity: Any, node: Any, take: Callable[[Any], Any]) -> Any:
+        # All that rclpy runs for an entity passes here. take: gives the coroutine function to be run, or None.
+        def guarded(entity: Any) -> Any:
+            try:
+                work = take(entity)
+            except Exception as error:
+                self._caught(_name(entity), error)
+                return None
+
+            async def run() -> None:
+                try:
+                    await work()
+                except Exception as error:
+                    self._caught(_name(entity), error)
+
+            return None if work is None else run
+
+        return super()._make_handler(entity, node, guarded)
+
+    def _take_service(self, service: Service) -> Any:
+        if service not in self._answering:
+            self._answering.add(service)
+            service.callback = self._answer_always(service.callback, _name(service))
+        return super()._take_service(service)
+
+    def _answer_always(self, callback: Callable, where: str) -> Callable:
+        async def answer(request: Any, response: Any) -> Any:
+            try:
+                return await await_or_execute(callback, request, response)
+            except Exception as error:
+                return _failed(type(response)(), request, self._caught(where, error))
+
+        return answer
+
+    def _caught(self, where: str, error: Exception) -> str:
+        if not self.context.ok():  # rclpy's calls fail then, whatever they are
+            raise ExternalShutdownException() from error
+        return self._errors.caught(where, error)
+
+
+def _name(entity: Any) -> str:
+    for kind in ("srv_name", "topic"):
+        if name := getattr(entity, kind, ""):
+            return name
+    callback = getattr(entity, "callback", None)
+    return getattr(callback, "__qualname__", type(entity).__name__)
+
+
+def _failed(response: Any, request: Any, text: str) -> Any:
+    """`response`, fresh and so without success where it has such a field, with the reason where it has a place."""
+    if hasattr(response, "message"):
+        response.message = text
+    if hasattr(response, "results"):  # set_parameters: one for each
+        response.results = [SetParametersResult(successful=False, reason=text) for _ in request.parameters]
+    elif isinstance(getattr(response, "result", None), SetParametersResult):
+        response.result.reason = text
+    return response
