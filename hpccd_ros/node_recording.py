@@ -24,6 +24,10 @@ from hpccd_ros.topic_recorder import Recorder
 
 # Messages of a topic that may wait for the disk before they are lost (and counted): bounds the memory.
 DEPTH = 50
+# Made for a recording; more is a mistake, and Python's own way to make them fails at a thousand.
+MOST_NEW_FOLDERS = 100
+# The longest that is put behind the name of a recording.
+NUMBER = "_1000000.mcap.part"
 
 
 class NodeRecording:
@@ -54,7 +58,7 @@ class NodeRecording:
         try:
             self._running = self._last = _Running(self._node, self._settings, self._errors)
             self._node.get_logger().info(f"recording into {self._running.bag.path}")
-        except (OSError, ValueError) as error:
+        except Exception as error:  # of the disk mostly; the middleware may have no place for another node either
             self._failure = f"cannot record into {wanted}: {error}"
             self._node.get_logger().error(f"{self._failure}; the node goes on without a recording")
 
@@ -77,12 +81,37 @@ def refusal(settings: dict[str, Any]) -> str | None:
     """Why nothing can be recorded with these settings, or None; a disk may still refuse later."""
     if not settings["record"]:
         return None
-    target = _expand(settings["record"])
-    if why := mcap_bag.refusal(target, settings["record_compression"], *_limits(settings)):
-        return f"record: {why}"
-    existing = next(folder for folder in target.absolute().parents if folder.exists())
+    try:
+        target = _expand(settings["record"])
+        if why := mcap_bag.refusal(target, settings["record_compression"], *_limits(settings)):
+            return f"record: {why}"
+        if why := _no_place(target):
+            return f"record: {_shortened(target)}: {why}"
+    # RuntimeError: ~nobody; ValueError: a character that no path can have; OSError: what the system says of it.
+    except (OSError, RuntimeError, ValueError) as error:
+        why = error.strerror if isinstance(error, OSError) else str(error)
+        return f"record: {_shortened(settings['record'])}: {why}"
+    return None
+
+
+def _no_place(target: Path) -> str | None:
+    """Why no file or folder can be made there, or None. Raises OSError."""
+    if target.name in ("", ".."):
+        return "give the name of a file ending in .mcap, or of a folder that is to be made"
+    path = target.absolute()
+    missing = 0
+    while not (existing := path.parents[missing]).exists():
+        missing += 1
     if not (existing.is_dir() and os.access(existing, os.W_OK | os.X_OK)):
-        return f"record: {target}: the folder {existing} is not writable"
+        return f"the folder {existing} is not writable"
+    if missing > MOST_NEW_FOLDERS:
+        return f"{missing} folders are missing on the way to it, at most {MOST_NEW_FOLDERS} are made"
+    longest, whole = (os.pathconf(existing, limit) for limit in ("PC_NAME_MAX", "PC_PATH_MAX"))
+    names = [*path.parts[-missing - 1 : -1], target.name + NUMBER]
+    if any(len(os.fsencode(name)) > longest for name in names):
+        return f"a name in it has more than the {longest} bytes of this file system (with {len(NUMBER)} for a number)"
+    if len(os.fsencode(path / names[-1])) > whole:
+        return f"has more than the {whole} bytes of a path"
     return None
 
 
@@ -172,6 +201,11 @@ class _Running:
             "write_errors": bag.write_errors,
             "last_error": bag.last_error,
         }
+
+
+def _shortened(path: object) -> str:
+    text = str(path)
+    return text if len(text) <= 100 else f"{text[:50]}...{text[-50:]}"
 
 
 def _expand(pattern: str) -> Path:

@@ -12,7 +12,7 @@ from node_process import PATIENCE, NodeProcess
 from test_node_life import change_state, set_parameter, stream
 from waving_sheet import sheet_faces, sheet_positions
 
-from hpccd_ros import recorded_topics, replay_setup
+from hpccd_ros import node_recording, recorded_topics, replay_setup
 from hpccd_ros.mcap_bag import BagWriter
 from hpccd_ros.mcap_reader import Recording
 from hpccd_ros.mcap_recover import examine, recover
@@ -136,6 +136,52 @@ def test_where_nothing_can_be_recorded(start_node, tmp_path):
     node = start_node({"meshes": ["cloth"], "record": str(tmp_path / "file" / "run.mcap")}, wait=False)
     assert node.process.wait(PATIENCE) == 2
     assert "is not writable" in node.output()
+
+
+IMPOSSIBLE = {
+    "root": ("/", "give the name of a file"),
+    "here": (".", "give the name of a file"),
+    "parent": ("..", "give the name of a file"),
+    "nobody": ("~nosuchuser/x.mcap", "home directory"),
+    "long name": ("{folder}/" + "x" * 300 + ".mcap", "255 bytes"),
+    "name without room for a number": ("{folder}/" + "x" * 250, "255 bytes"),
+    "long folder": ("{folder}/" + "x" * 300 + "/run.mcap", "File name too long"),
+    "levels": ("{folder}/" + "d/" * 2000 + "run.mcap", "2000 folders are missing"),
+    "long path": ("{folder}/" + ("d" * 200 + "/") * 30 + "run.mcap", "File name too long"),
+    "nul": ("{folder}/a\0b.mcap", "null"),
+    "no text": ("{folder}/\udc80\ud800.mcap", "surrogates"),
+}
+
+
+def _settings_with(record):
+    return {"record": record, "record_compression": "none", "record_split_size": 0.0, "record_split_time": 0.0}
+
+
+@pytest.mark.parametrize("record, why", IMPOSSIBLE.values(), ids=IMPOSSIBLE)
+def test_impossible_places_are_refused_with_a_reason(tmp_path, record, why):
+    refused = node_recording.refusal(_settings_with(record.format(folder=tmp_path)))
+    assert refused.startswith("record: ") and why in refused and len(refused) < 400, refused
+
+
+def test_a_running_node_refuses_them_too(start_node, tmp_path):
+    """Those that can be sent: DDS has no strings with a NUL or half a character."""
+    node = start_node({"meshes": ["cloth"]})
+    for name in IMPOSSIBLE.keys() - {"nul", "no text"}:
+        record, why = IMPOSSIBLE[name]
+        refused = set_parameter(node, "record", record.format(folder=tmp_path))
+        assert not refused.successful and why in refused.reason, (name, refused.reason)
+    node.peer.topology("cloth", FACES, N * N)
+    stream(node, range(2))
+    assert set_parameter(node, "record", str(tmp_path / ("x" * 230) / "run.mcap")).successful
+    _recording(node, files=1)
+    assert node.stop() == 0 and "Traceback" not in node.output()
+
+
+@pytest.mark.parametrize("record", ["/", "~nosuchuser/x.mcap"])
+def test_a_node_is_not_started_with_them(start_node, record):
+    node = start_node({"meshes": ["cloth"], "record": record}, wait=False)
+    assert node.process.wait(PATIENCE) == 2
+    assert "hpccd: record: " in node.output() and "Traceback" not in node.output()
 
 
 @pytest.mark.parametrize("compression", ["none", "zstd"])
