@@ -3,9 +3,11 @@
 
 import math
 import threading
+import time
 from collections import Counter
 from collections.abc import Callable
 from concurrent.futures import CancelledError, ThreadPoolExecutor
+from concurrent.futures import Future as JobFuture
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -17,8 +19,10 @@ from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.task import Future
 
-from hpccd_ros import convert
+from hpccd_core import Cancelled
+from hpccd_ros import convert, qos
 from hpccd_ros.detection import CORE_ERRORS, Options, SceneBuilder, make_detector
+from hpccd_ros.guard import Errors
 from hpccd_ros.messages import Topology
 from hpccd_ros.ongoing import Ongoing
 
@@ -35,13 +39,29 @@ class NodeScene:
     topologies: dict[str, Topology | None]
 
 
+# Requests that may lie in the queue of the service beside those that find a place: a burst of them is answered "busy"
+# rather than lost. Bounds what strangers can make the node hold.
+ROOM_TO_REFUSE = 1000
+# s, the longest time limit: rclpy's timers count nanoseconds in 64 bits, 292 years.
+LONGEST = 86_400.0
+# s for telling those whose requests nobody has looked at yet that the service ends.
+FAREWELL = 0.5
+STOPPED = "stopped: the node was shut down or cleaned up before the answer was ready; ask again when it is active"
+
+
+def new_counts() -> Counter:
+    """How many requests ended how."""
+    return Counter(answered=0, refused=0, busy=0, timed_out=0, failed=0, stopped=0)
+
+
 class DetectService:
     """Answers ``detect_jobs`` requests at a time; ``detect_waiting`` more may wait, the rest is refused.
 
-    The core cannot be interrupted: after its time limit a request is answered, but its computation goes on
-    and holds its place until it ends.
+    A request that is not answered when its time limit has passed, or when the service is closed, is told so and its
+    computation given up; the place that it holds is free once that ends.
     scene: what the node knows, asked in the executor at each request; a text instead: why it cannot answer
     now.
+    ended: counts of `new_counts`, gone on with.
     """
 
     def __init__(
@@ -50,35 +70,76 @@ class DetectService:
         settings: dict[str, Any],
         options: Callable[[], Options],
         scene: Callable[[], NodeScene | str],
+        ended: Counter,
+        errors: Errors,
     ) -> None:
         self._node = node
         self._settings = settings
         self._options = options
         self._scene = scene
+        self._ended = ended
+        self._errors = errors
         self._capacity = settings["detect_jobs"] + settings["detect_waiting"]
         self._pool = ThreadPoolExecutor(settings["detect_jobs"], thread_name_prefix="detect")
         self._lock = threading.Lock()
         self._open = 0
+        self._closed = False
         self._ongoing: set[Ongoing] = set()
-        self.counts: Counter = Counter(answered=0, refused=0, busy=0, timed_out=0, failed=0, open=0)
+        self._awaited: set[Callable[[], None]] = set()
         # A callback that awaits occupies its group until it ends: in the node's own group it would stop everything.
         self._group = ReentrantCallbackGroup()
-        self._service = node.create_service(Detect, "~/detect", self._answer, callback_group=self._group)
+        self._service = node.create_service(
+            Detect,
+            "~/detect",
+            self._answer,
+            qos_profile=qos.requests(self._capacity + ROOM_TO_REFUSE),
+            callback_group=self._group,
+        )
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """How requests ended, and how many hold a place now."""
+        return {**self._ended, "open": self._open}
 
     def close(self) -> None:
-        self._node.destroy_service(self._service)
-        self._pool.shutdown(wait=False, cancel_futures=True)
+        """Answer whoever still waits, then end. In the thread of the executor; its next turn comes too late."""
+        self._closed = True
         for ongoing in tuple(self._ongoing):
             ongoing.end()
+        self._pool.shutdown(wait=False, cancel_futures=True)
+        for settle in tuple(self._awaited):
+            settle()
+        executor = self._node.executor
+        # rclpy has no way to have answers sent now but to go on with the callbacks that await.
+        for task, entity, _ in tuple(executor._tasks) if executor is not None else ():
+            if entity is self._service:
+                task()
+        self._turn_away()
+        self._node.destroy_service(self._service)
+
+    def _turn_away(self) -> None:
+        """Answer the requests that came and were not looked at yet."""
+        deadline = time.monotonic() + FAREWELL  # an answer to a client that is gone takes 0.1 s
+        with self._service.handle:
+            while time.monotonic() < deadline:
+                request, header = self._service.handle.service_take_request(Detect.Request)
+                if header is None:
+                    return
+                self._service.send_response(self._refuse(Detect.Response(), "stopped", STOPPED), header)
 
     async def _answer(self, request: Detect.Request, response: Detect.Response) -> Detect.Response:
         try:
-            limit = self._time_limit(request)
-            scene = self._scene()
-            if isinstance(scene, str):
-                raise RequestError(scene)
+            return await self._computed(request, response)
         except RequestError as error:
             return self._refuse(response, "refused", str(error))
+        except Exception as error:  # here and not only by the executor's guard, so that it is counted as failed
+            return self._refuse(Detect.Response(), "failed", self._errors.caught("~/detect", error))
+
+    async def _computed(self, request: Detect.Request, response: Detect.Response) -> Detect.Response:
+        limit = self._time_limit(request)
+        scene = self._scene()
+        if isinstance(scene, str):
+            raise RequestError(scene)
         if not self._enter():
             return self._refuse(
                 response,
@@ -86,6 +147,44 @@ class DetectService:
                 f"busy: {self._capacity} requests are being computed or wait "
                 "(parameters detect_jobs, detect_waiting); try again later",
             )
+        ongoing = Ongoing()
+        self._ongoing.add(ongoing)
+        try:
+            job = self._pool.submit(self._compute, request, scene, self._options(), ongoing)
+        except RuntimeError:  # the system gives no further thread
+            self._ongoing.discard(ongoing)
+            self._leave()
+            raise
+        job.add_done_callback(lambda _: self._ongoing.discard(ongoing))
+        job.add_done_callback(lambda _: self._leave())
+        await self._settled(job, limit)
+        if not job.done():
+            job.cancel()
+            ongoing.end()
+            if self._closed:
+                return self._refuse(response, "stopped", STOPPED)
+            return self._refuse(
+                response,
+                "timed_out",
+                f"time limit of {limit:g} s passed before the answer was ready; "
+                "ask for less (report first), or set a longer time_limit",
+            )
+        try:
+            contacts = job.result()
+        except RequestError:
+            raise
+        except (Cancelled, CancelledError):  # only `close` ends a job that is awaited
+            return self._refuse(response, "stopped", STOPPED)
+        except CORE_ERRORS as error:
+            return self._refuse(response, "failed", f"{type(error).__name__}: {error}")
+        response.contacts = contacts
+        response.success = True
+        response.message = f"{contacts.total} contacts"
+        self._ended["answered"] += 1
+        return response
+
+    async def _settled(self, job: JobFuture, limit: float) -> None:
+        """Wait until the job is done, `limit` seconds have passed or the service is closed."""
         settled = Future(executor=self._node.executor)
 
         def settle(_: Any = None) -> None:
@@ -94,38 +193,18 @@ class DetectService:
             if (executor := self._node.executor) is not None:
                 executor.wake()  # a task that awaits is only looked at when the executor wakes up
 
-        ongoing = Ongoing()
-        self._ongoing.add(ongoing)
-        job = self._pool.submit(self._compute, request, scene, self._options(), ongoing)
-        job.add_done_callback(lambda _: self._ongoing.discard(ongoing))
-        job.add_done_callback(self._leave)
-        job.add_done_callback(settle)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         timer = self._node.create_timer(limit, settle, callback_group=self._group, clock=steady)
-        await settled
-        self._node.destroy_timer(timer)
-        if not job.done():
-            job.cancel()
-            ongoing.end()
-            return self._refuse(
-                response,
-                "timed_out",
-                f"time limit of {limit:g} s passed before the answer was ready; "
-                "ask for less (report first), or set a longer time_limit",
-            )
+        self._awaited.add(settle)
+        job.add_done_callback(settle)
         try:
-            response.contacts = job.result()
-        except RequestError as error:
-            return self._refuse(response, "refused", str(error))
-        except (*CORE_ERRORS, CancelledError) as error:
-            return self._refuse(response, "failed", f"{type(error).__name__}: {error}")
-        response.success = True
-        response.message = f"{response.contacts.total} contacts"
-        self.counts["answered"] += 1
-        return response
+            await settled
+        finally:
+            self._awaited.discard(settle)
+            self._node.destroy_timer(timer)
 
     def _refuse(self, response: Detect.Response, kind: str, text: str) -> Detect.Response:
-        self.counts[kind] += 1
+        self._ended[kind] += 1
         response.success, response.message = False, text
         return response
 
@@ -134,13 +213,11 @@ class DetectService:
             if self._open >= self._capacity:
                 return False
             self._open += 1
-            self.counts["open"] = self._open
             return True
 
-    def _leave(self, _: Any) -> None:
+    def _leave(self) -> None:
         with self._lock:
             self._open -= 1
-            self.counts["open"] = self._open
 
     def _time_limit(self, request: Detect.Request) -> float:
         limit = request.time_limit or self._settings["detect_time_limit"]
@@ -148,7 +225,7 @@ class DetectService:
             raise RequestError(
                 f"time_limit: {request.time_limit} must be positive and finite, or 0 for the node's default"
             )
-        return limit
+        return min(limit, LONGEST)
 
     def _compute(
         self, request: Detect.Request, scene: NodeScene, options: Options, ongoing: Ongoing

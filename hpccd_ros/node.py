@@ -33,7 +33,7 @@ from hpccd_ros import (
     scene_parameters,
     stop_signals,
 )
-from hpccd_ros.detect_service import DetectService, NodeScene
+from hpccd_ros.detect_service import DetectService, NodeScene, new_counts
 from hpccd_ros.detection import CORE_ERRORS, Detection, DetectionThread, Options
 from hpccd_ros.diagnostics import Metrics, Reporter
 from hpccd_ros.drops import DropCounter, Reason
@@ -90,6 +90,7 @@ class HpccdNode(GuardedLifecycleNode):
         self._inputs: Inputs | None = None
         self._unknown: UnknownMeshWatch | None = None
         self._service: DetectService | None = None
+        self._served = new_counts()
         self._configured = contextlib.ExitStack()  # how to undo on_configure
         self._queue: FrameQueue | None = None
         self._thread: DetectionThread | None = None
@@ -109,7 +110,9 @@ class HpccdNode(GuardedLifecycleNode):
         self._markers = self._publisher(MarkerArray, "markers", qos.MARKERS)
         self._surface = self._publisher(PointCloud2, "surface", qos.MARKERS)
         self._diagnostics = self._publisher(DiagnosticArray, "/diagnostics", qos.DIAGNOSTICS)
-        self._service = DetectService(self, settings, lambda: self._options, self._scene_for_service)
+        self._service = DetectService(
+            self, settings, lambda: self._options, self._scene_for_service, self._served, self.errors
+        )
         # Steady time: diagnostics go on while simulated time stands still.
         timer = self.create_timer(
             settings["diagnostics_period"], self._report, clock=Clock(clock_type=ClockType.STEADY_TIME)

@@ -35,3 +35,8 @@ MARKERS = _profile(1)
 def vertices(reliability: str, depth: int) -> QoSProfile:
     """Subscription to vertices. reliability: "reliable" or "best_effort"."""
     return _profile(depth, reliable=reliability == "reliable")
+
+
+def requests(depth: int) -> QoSProfile:
+    """A service in whose queue so many requests find room; the usual profile of services holds 10."""
+    return _profile(depth)

@@ -177,9 +177,10 @@ class Peer:
         publisher = self.publisher(MeshVertices, f"meshes/{mesh}/vertices")
         publisher.publish(convert.vertices_message(vertices, stamp, **fields))
 
-    def client(self) -> Any:
-        """A client of ~/detect that is connected."""
-        client = self.node.create_client(Detect, "hpccd/detect")
+    def client(self, depth: int = 10) -> Any:
+        """A client of ~/detect that is connected. depth: requests, and answers, that it holds at once."""
+        profile = QoSProfile(depth=depth, history=HistoryPolicy.KEEP_LAST)
+        client = self.node.create_client(Detect, "hpccd/detect", qos_profile=profile)
         assert client.wait_for_service(timeout_sec=PATIENCE)
         return client
 

@@ -6,7 +6,9 @@ import math
 import numpy as np
 import pytest
 from hpccd.srv import Detect
+from lifecycle_msgs.msg import Transition
 from node_process import assert_same_contacts
+from test_node_life import change_state
 from waving_sheet import scene_of, sheet_faces, sheet_positions
 
 import hpccd_core as hc
@@ -30,9 +32,23 @@ def request(step=0, *, n=N, names=("cloth",), topologies=True, dtype=np.float32,
 def ask(node, *requests):
     """Answers to requests that are all under way at the same time, each from a client of its own."""
     clients = [node.peer.client() for _ in requests]
-    futures = [client.call_async(r) for client, r in zip(clients, requests, strict=True)]
+    return gather(node, [client.call_async(r) for client, r in zip(clients, requests, strict=True)])
+
+
+def gather(node, futures):
     node.wait_until(lambda: all(f.done() for f in futures), f"{len(futures)} answers")
     return [f.result() for f in futures]
+
+
+def service_counts(node, **expected):
+    """Wait until the status `service` holds these values; all of them."""
+    wanted = {key: str(value) for key, value in expected.items()}
+
+    def matches():
+        values = node.peer.statuses["service"][2]
+        return values if wanted.items() <= values.items() else None
+
+    return node.wait_until(matches, f"service status with {wanted}")
 
 
 @pytest.fixture
@@ -175,6 +191,52 @@ def test_time_limit(node):
     assert not late.success and "time limit of 0.001 s" in late.message
     assert good.success
     node.wait_until(lambda: counts_of(node) == ("0", "1"), "end of the late computation, counted")
+
+
+@pytest.mark.parametrize("limit", [1e10, 1e300, 1e-300], ids=str)
+def test_time_limit_of_any_size(node, limit):
+    (extreme,) = ask(node, request(time_limit=limit))
+    assert extreme.success or f"time limit of {limit:g} s" in extreme.message, extreme.message
+    (good,) = ask(node, request())
+    assert good.success, "the node goes on"
+
+
+@pytest.mark.parametrize("many", [60, 300])
+def test_every_request_of_a_burst_is_answered(start_node, many):
+    """However many come at once: those that find no place are told so, and counted."""
+    node = start_node({"meshes": ["cloth"], "detect_jobs": 1, "detect_waiting": 2})
+    client = node.peer.client(depth=many)
+    small = request(n=3)
+    answers = gather(node, [client.call_async(small) for _ in range(many)])
+    good = sum(answer.success for answer in answers)
+    busy = sum(answer.message.startswith("busy: 3 requests") for answer in answers)
+    assert good >= 3 and good + busy == many
+    service_counts(node, open=0, answered=good, busy=busy)
+
+
+@pytest.mark.parametrize(
+    "transitions",
+    [
+        (Transition.TRANSITION_DEACTIVATE, Transition.TRANSITION_CLEANUP),
+        (Transition.TRANSITION_ACTIVE_SHUTDOWN,),
+    ],
+    ids=["clean-up", "shutdown"],
+)
+def test_open_requests_are_answered_before_the_service_ends(start_node, transitions):
+    """One that is computed, one that waits for its turn."""
+    node = start_node({"meshes": ["cloth"], "detect_jobs": 1, "threads": 1})
+    large = request(2, n=LARGE, names=("a", "b"))
+    replies = [node.peer.client().call_async(large) for _ in range(2)]
+    service_counts(node, open=2)
+    assert all(change_state(node, transition) for transition in transitions)
+    for answer in gather(node, replies):
+        assert not answer.success and answer.message.startswith("stopped: "), answer.message
+    if Transition.TRANSITION_CLEANUP in transitions:
+        assert change_state(node, Transition.TRANSITION_CONFIGURE)
+        assert change_state(node, Transition.TRANSITION_ACTIVATE)
+        (answer,) = ask(node, request())
+        assert answer.success, answer.message
+    assert node.stop() == 0 and "Traceback" not in node.output()
 
 
 def test_stream_goes_on_while_requests_are_computed(node):

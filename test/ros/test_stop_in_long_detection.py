@@ -9,6 +9,7 @@ import time
 import numpy as np
 import pytest
 from hpccd.srv import Detect
+from node_process import PATIENCE
 from waving_sheet import scene_of, sheet_faces, sheet_positions
 
 import hpccd_core as hc
@@ -51,7 +52,9 @@ def test_of_a_request(start_node):
     before = cpu_of_ended_children()
     assert node.stop() == 0, node.output()
     used = cpu_of_ended_children() - before
-    assert not reply.done() and "Traceback" not in node.output()
+    assert "Traceback" not in node.output()
+    node.peer.executor.spin_once(timeout_sec=PATIENCE)
+    assert reply.done() and reply.result().message.startswith("stopped: "), "told before the node was gone"
     assert step_needs_more_than(used), f"it took {used:.1f} s of a core: it did not wait for the answer"
 
 
