@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""rclpy's life-cycle node, with what it lacks: errors of transitions are told."""
+"""rclpy's life-cycle node, with what it lacks: invalid transitions are refused, errors of transitions are told."""
 
 from collections.abc import Callable
 from typing import Any
 
+from lifecycle_msgs.srv import ChangeState
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 
 from hpccd_ros.guard import Errors
@@ -18,6 +19,8 @@ class GuardedLifecycleNode(LifecycleNode):
         super().__init__(name, **options)
         self.errors = Errors(self.get_logger().error)
         self._callbacks = {state: self._guarded(callback) for state, callback in self._callbacks.items()}
+        service = self._service_change_state
+        service.callback = self._refuse_or(service.callback)
 
     @property
     def state(self) -> str:
@@ -34,3 +37,20 @@ class GuardedLifecycleNode(LifecycleNode):
                 return TransitionCallbackReturn.ERROR
 
         return transition
+
+    def _refuse_or(self, change: Callable) -> Callable:
+        # rclpy 7.1 raises for a transition that the state does not have (ros2/rclpy#1209).
+        def change_state(request: ChangeState.Request, response: ChangeState.Response) -> ChangeState.Response:
+            wanted = request.transition
+            offered = {label: number for number, label, *_ in self._state_machine.available_transitions}
+            if wanted.label in offered if wanted.label else wanted.id in offered.values():
+                return change(request, response)
+            self.get_logger().warning(
+                f"no transition {wanted.label or wanted.id} from {self.state}, which has "
+                + (", ".join(f"{label} ({number})" for label, number in offered.items()) or "none"),
+                throttle_duration_sec=1.0,
+            )
+            response.success = False
+            return response
+
+        return change_state

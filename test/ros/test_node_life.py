@@ -150,6 +150,34 @@ def test_life_cycle(start_node):
     assert node.stop() == 0
 
 
+def label_of(node, label):
+    request = ChangeState.Request(transition=Transition(label=label))
+    return call(node, ChangeState, "change_state", request).success
+
+
+def test_transitions_that_the_state_does_not_have_are_refused(start_node):
+    """What is asked for in the wrong state or does not exist at all is answered, and changes nothing."""
+    node = start_node({"meshes": ["cloth"]})
+    node.peer.topology("cloth", FACES, N * N)
+    stream(node, range(2))
+    # The first thing that a life-cycle manager sends to any node, this one started by itself or not.
+    assert not change_state(node, Transition.TRANSITION_CONFIGURE)
+    assert not change_state(node, Transition.TRANSITION_ACTIVATE)
+    for unknown in (Transition.TRANSITION_CREATE, Transition.TRANSITION_ON_CONFIGURE_SUCCESS, 77, 255):
+        assert not change_state(node, unknown), unknown
+    assert not label_of(node, "configure") and not label_of(node, "no such transition")
+    assert state(node) == "active"
+    stream(node, [2])
+    assert label_of(node, "deactivate") and not label_of(node, "deactivate")
+    assert not change_state(node, Transition.TRANSITION_ACTIVE_SHUTDOWN)
+    assert state(node) == "inactive"
+    assert change_state(node, Transition.TRANSITION_INACTIVE_SHUTDOWN)
+    for transition in (Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_UNCONFIGURED_SHUTDOWN):
+        assert not change_state(node, transition)
+    assert state(node) == "finalized"
+    assert node.stop() == 0 and "Traceback" not in node.output()
+
+
 def test_scene_is_changed_while_unconfigured(start_node):
     """Scene and streams are read when configured: told so while they are in use, taken after a clean-up."""
     node = start_node({"meshes": ["cloth", "net"], "max_vertices": 10_000})
