@@ -28,6 +28,7 @@ from hpccd_ros import (
     dds_security,
     detection,
     node_recording,
+    parameter_services,
     parameters,
     qos,
     scene_parameters,
@@ -62,6 +63,7 @@ class HpccdNode(GuardedLifecycleNode):
 
     def __init__(self) -> None:
         super().__init__("hpccd")
+        parameter_services.refuse_unknown_types(self)
         self._settings, self._mesh_settings = parameters.declare(self)
         for name in parameters.unknown_overrides(self):
             self.get_logger().warning(f"parameter {name} is unknown and has no effect; see the README's table")

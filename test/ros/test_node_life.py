@@ -9,7 +9,7 @@ import pytest
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from node_process import PATIENCE, assert_same_contacts
-from rcl_interfaces.srv import SetParameters
+from rcl_interfaces.srv import SetParameters, SetParametersAtomically
 from rclpy.parameter import Parameter
 from waving_sheet import scene_of, sheet_faces, sheet_positions
 
@@ -235,6 +235,20 @@ def test_scene_is_changed_while_unconfigured(start_node):
     scene.set_accuracy("cloth", "cloth", "fast")
     message = node.contacts(before + 1)[before]
     assert assert_same_contacts(message, *(np.concatenate([f, frames[3]]) for f in frames[2:]), scene) > 0
+
+
+def test_values_of_a_type_that_does_not_exist_are_refused(start_node):
+    node = start_node({"meshes": ["cloth"]})
+    good = Parameter("report", value="first").to_parameter_msg()
+    bad = Parameter("accuracy", value="fast").to_parameter_msg()
+    bad.value.type = 77
+    results = call(node, SetParameters, "set_parameters", SetParameters.Request(parameters=[bad, good])).results
+    assert [result.successful for result in results] == [False, True]
+    assert "accuracy: 77 is no type" in results[0].reason
+    request = SetParametersAtomically.Request(parameters=[good, bad])
+    result = call(node, SetParametersAtomically, "set_parameters_atomically", request).result
+    assert not result.successful and "accuracy: 77 is no type" in result.reason
+    assert node.stop() == 0 and "Traceback" not in node.output()
 
 
 def test_options_change_at_run_time(start_node):
