@@ -13,6 +13,8 @@ class Contacts:
     vf: (N, 2) uint32, vertex and face, scene-wide indices. vf_toc: (N,) float64, times of contact in [0, 1].
     ee: (M, 4) uint32, a0<a1, b0<b1, (a0,a1)<(b0,b1), vertex indices. ee_toc: (M,) float64.
     points, normals: (N+M, 3) float64, vertex-face first; empty (0, 3) unless asked for in the detector's outputs.
+    A point is the vertex, or lies on the shorter edge where the other crosses it; where edges are parallel, in the
+    middle of what they share.
     Normals have length one and point from the face to the side the vertex comes from, or from edge a to the side that
     edge b comes from; zero where degenerate features define none.
     first_toc: the earliest time, +inf where nothing touches.

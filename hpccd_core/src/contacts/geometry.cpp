@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "contacts/meeting_point.h"
 #include "elementary/inside.h"
 
 namespace hpccd {
@@ -13,14 +14,6 @@ using V = Vec3<double>;
 
 V at(const VertexRow& row, double t) {
   return interpolate(V{row.t0[0], row.t0[1], row.t0[2]}, V{row.t1[0], row.t1[1], row.t1[2]}, t);
-}
-
-// Scaled first, so that lengths near the ends of the number range survive being squared.
-V unit(V v) {
-  const double most = max_norm(v);
-  if (!(most > 0) || !std::isfinite(most)) return {0, 0, 0};
-  v = {v.x / most, v.y / most, v.z / most};
-  return (1 / std::sqrt(dot(v, v))) * v;
 }
 
 V scaled(V v, double by) { return {v.x / by, v.y / by, v.z / by}; }
@@ -40,14 +33,11 @@ ContactPoint contact_point(const Geometry& g, Kind kind, std::uint32_t first, st
   const V a = vf ? q2 - q1 : q1 - q0, b = vf ? q3 - q1 : q3 - q2;
   const double size = std::max(max_norm(a), max_norm(b));
   V point = q0, normal{0, 0, 0};
-  if (size > 0) {
-    const V as = scaled(a, size), bs = scaled(b, size);
-    normal = unit(cross(as, bs));
-    if (!vf) {
-      const V n = cross(as, bs), p = scaled(q2 - q0, size);
-      const double d = dot(n, n);
-      if (d > 0) point = q0 + std::clamp(dot(cross(p, bs), n) / d, 0.0, 1.0) * a;
-    }
+  if (size > 0) normal = unit(cross(scaled(a, size), scaled(b, size)));
+  if (!vf) {
+    // On the shorter edge: what is within rounding of it need not be within 1e-9 of its length on the longer one.
+    const Segment on_a{{0, 0, 0}, a}, on_b{q2 - q0, b};
+    point = largest(a) < largest(b) ? q0 + meeting_place(on_b, on_a) * a : q2 + meeting_place(on_a, on_b) * b;
   }
   const auto start = [&](int i) {
     const double* x = g.vertices[v[i]].t0;

@@ -10,7 +10,8 @@ struct ContactPoint {
   double point[3], normal[3];
 };
 
-// point: on the face at the vertex's place; on edge a where edge b crosses it. normal: unit length, of the face
+// point: the vertex; or on the shorter edge where the other crosses it, in the middle of what they share where they are
+// parallel. normal: unit length, of the face
 // (oriented towards the side from which the vertex comes) or a x b (oriented from a towards the side from which b
 // comes); zero where degenerate features define none.
 ContactPoint contact_point(const Geometry& geometry, Kind kind, std::uint32_t first, std::uint32_t second, double toc);
