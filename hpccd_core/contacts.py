@@ -15,8 +15,13 @@ class Contacts:
     points, normals: (N+M, 3) float64, vertex-face first; empty (0, 3) unless asked for in the detector's outputs.
     A point is the vertex, or lies on the shorter edge where the other crosses it; where edges are parallel, in the
     middle of what they share.
-    Normals have length one and point from the face to the side the vertex comes from, or from edge a to the side that
-    edge b comes from; zero where degenerate features define none.
+    A normal has length one and stands on the face, or on both edges, as they are at toc. It points to the side of the
+    face on which the vertex is just before toc, or from edge a to the side on which edge b is just before toc. For
+    contact at t=0 that is the side from which the straight-line motion would have come, had it begun earlier. The
+    normal is zero where there is no side, because the motion is coplanar throughout (at rest on each other, or gliding
+    in one plane), and where there is no direction, because at toc the face has no area, or the edges are parallel or
+    points. Names do not matter: any order of corners and ends gives the same normal, edges exchanged turn it round.
+    With a minimum separation the side is that at toc.
     first_toc: the earliest time, +inf where nothing touches.
     hash: 64-bit, the same for the same contacts on any backend and any number of threads.
     """

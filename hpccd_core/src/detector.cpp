@@ -135,8 +135,8 @@ struct Detector::Impl {
     constexpr std::size_t few = 1024;
     std::size_t n = 0;
     for (const Worker& w : workers) n += w.vertex_face.size() + w.edge_edge.size();
-    return collect_contacts(workers, search.geometry, options.report, {options.points, options.normals}, order,
-                            n < few ? one_thread : pool);
+    const Outputs outputs{options.points, options.normals, options.minimum_separation == 0};
+    return collect_contacts(workers, search.geometry, options.report, outputs, order, n < few ? one_thread : pool);
   }
 
   std::map<std::string, std::uint64_t> stats() const {

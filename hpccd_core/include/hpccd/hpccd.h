@@ -96,7 +96,11 @@ struct Contacts {
   std::vector<double> vf_toc;
   std::vector<std::array<std::uint32_t, 4>> ee;
   std::vector<double> ee_toc;
-  std::vector<std::array<double, 3>> points, normals;  // vf first, then ee; empty unless asked for
+  // vf first, then ee; empty unless asked for. A normal points to the side of the face on which the vertex is just
+  // before toc, or from edge a to the side on which edge b is then; for contact at t = 0, to where the straight-line
+  // motion would have come from. Zero where the motion is coplanar throughout, and where at toc features are degenerate
+  // or parallel.
+  std::vector<std::array<double, 3>> points, normals;
   double first_toc = std::numeric_limits<double>::infinity();
   std::uint64_t hash = 0;
 };

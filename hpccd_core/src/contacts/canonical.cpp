@@ -41,7 +41,7 @@ void write(Contacts& c, std::size_t n, std::size_t i, const Found& f, const Geom
     sum.hash += hash_of(kind, pack(a[0], a[1]), pack(b[0], b[1]), f.toc);
   }
   if (!outputs.points && !outputs.normals) return;
-  const ContactPoint p = contact_point(geometry, kind, f.first, f.second, f.toc);
+  const ContactPoint p = contact_point(geometry, kind, f.first, f.second, f.toc, outputs.touching);
   if (outputs.points) c.points[i] = {p.point[0], p.point[1], p.point[2]};
   if (outputs.normals) c.normals[i] = {p.normal[0], p.normal[1], p.normal[2]};
 }

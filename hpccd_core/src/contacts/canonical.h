@@ -11,6 +11,7 @@ namespace hpccd {
 
 struct Outputs {
   bool points, normals;
+  bool touching;  // all contacts touch; false: with a minimum separation they need not
 };
 
 // Takes what the workers found. Features are numbered so that their pairs sort into the canonical order. `order` keeps

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "contacts/geometry.h"
 
-#include <algorithm>
 #include <cmath>
 
 #include "contacts/meeting_point.h"
+#include "elementary/exact/contact.h"
 #include "elementary/inside.h"
 
 namespace hpccd {
@@ -12,43 +12,106 @@ namespace {
 
 using V = Vec3<double>;
 
-V at(const VertexRow& row, double t) {
-  return interpolate(V{row.t0[0], row.t0[1], row.t0[2]}, V{row.t1[0], row.t1[1], row.t1[2]}, t);
-}
+struct Vertices {
+  V t0[4], t1[4];
+  V at(int i, double t) const { return interpolate(t0[i], t1[i], t); }
+};
 
-V scaled(V v, double by) { return {v.x / by, v.y / by, v.z / by}; }
+V vector(const double x[3]) { return {x[0], x[1], x[2]}; }
 
-}  // namespace
-
-ContactPoint contact_point(const Geometry& g, Kind kind, std::uint32_t first, std::uint32_t second, double toc) {
+Vertices vertices_of(const Geometry& g, Kind kind, std::uint32_t first, std::uint32_t second) {
   std::uint32_t v[4];
   if (kind == Kind::vertex_face)
     v[0] = first, v[1] = g.faces[second][0], v[2] = g.faces[second][1], v[3] = g.faces[second][2];
   else
     v[0] = g.edges[first][0], v[1] = g.edges[first][1], v[2] = g.edges[second][0], v[3] = g.edges[second][1];
-  const V q0 = at(g.vertices[v[0]], toc), q1 = at(g.vertices[v[1]], toc), q2 = at(g.vertices[v[2]], toc),
-          q3 = at(g.vertices[v[3]], toc);
-  // The two spanning vectors, and the side from which the second feature (edge b, or the vertex) comes at t = 0.
-  const bool vf = kind == Kind::vertex_face;
-  const V a = vf ? q2 - q1 : q1 - q0, b = vf ? q3 - q1 : q3 - q2;
-  const double size = std::max(max_norm(a), max_norm(b));
-  V point = q0, normal{0, 0, 0};
-  if (size > 0) normal = unit(cross(scaled(a, size), scaled(b, size)));
-  if (!vf) {
-    // On the shorter edge: what is within rounding of it need not be within 1e-9 of its length on the longer one.
-    const Segment on_a{{0, 0, 0}, a}, on_b{q2 - q0, b};
-    point = largest(a) < largest(b) ? q0 + meeting_place(on_b, on_a) * a : q2 + meeting_place(on_a, on_b) * b;
-  }
-  const auto start = [&](int i) {
-    const double* x = g.vertices[v[i]].t0;
-    return V{x[0], x[1], x[2]};
+  Vertices q;
+  for (int i = 0; i < 4; ++i) q.t0[i] = vector(g.vertices[v[i]].t0), q.t1[i] = vector(g.vertices[v[i]].t1);
+  return q;
+}
+
+// The motion at the time of contact.
+struct Moment {
+  double t;
+  V p, a, b, n;    // as in motion.h, and a x b
+  double nn;       // |n|^2
+  double product;  // |p||a||b|, the largest of the step in the maximum norm
+  bool regular;    // doubles hold all products, and n is known well
+};
+
+Moment moment(const Motion<double>& m, double toc) {
+  const Magnitudes<double> size{std::max(largest(m.p0), largest(m.p1)), std::max(largest(m.a0), largest(m.a1)),
+                                std::max(largest(m.b0), largest(m.b1))};
+  const V a = interpolate(m.a0, m.a1, toc), b = interpolate(m.b0, m.b1, toc), n = cross(a, b);
+  // Below this sine of the angle between a and b, relative to their largest lengths in the step, the roundings of n
+  // (20 u) are no longer small beside it.
+  constexpr double flat = 1e-6;
+  return {toc,
+          interpolate(m.p0, m.p1, toc),
+          a,
+          b,
+          n,
+          dot(n, n),
+          size.p * size.a * size.b,
+          in_range(size) && largest(n) > flat * (size.a * size.b)};
+}
+
+// The side of n on which p is just before the contact; 0: not certain. With f = p . n and M = |p||a||b|, |f| <= 6 M,
+// |f'| <= 36 M, |f''| <= 144 M; counting roundings as in coplanarity.h, f is known to 108 u M and f' to 600 u M.
+int certain_side(const Motion<double>& m, const Moment& now, bool touching) {
+  const double f = dot(now.p, now.n), error = 1.5e-14 * now.product;
+  if (!touching) return f > error ? 1 : f < -error ? -1 : 0;
+  const V da = m.a1 - m.a0, db = m.b1 - m.b0;
+  const double slope = dot(m.p1 - m.p0, now.n) + dot(now.p, cross(da, now.b) + cross(now.a, db));
+  // The root of f that belongs to the contact lies within the rounding of its time, or, in the tiers that promise no
+  // time, about f / f' away. Up to twice as far (Kantorovich) f' shall keep its sign: then f comes from the other side.
+  constexpr double time_error = 4e-12;
+  const double steep = std::fabs(slope) - 1.2e-13 * now.product;
+  if (!(steep > 0 && steep * steep > 150 * now.product * (time_error * steep + 2 * (std::fabs(f) + error)))) return 0;
+  return slope < 0 ? 1 : -1;
+}
+
+V normal_of(Kind kind, const Vertices& q, const Motion<double>& m, const Moment& now, bool touching) {
+  if (const int side = now.regular ? certain_side(m, now, touching) : 0) return (side / std::sqrt(now.nn)) * now.n;
+  const exact::Approach a = exact::approach(kind, q.t0, q.t1, now.t, touching);
+  return a.side * unit(a.n);
+}
+
+// On the shorter edge: what is within rounding of it need not be within 1e-9 of its length on the longer one.
+V crossing(const Vertices& q, const Moment& now) {
+  const double size_a = largest(now.a), size_b = largest(now.b);
+  const bool a_shorter = size_a < size_b;
+  const auto on_shorter = [&](double place) {
+    return a_shorter ? q.at(0, now.t) + place * now.a : q.at(2, now.t) + place * now.b;
   };
-  const V from = vf ? start(0) - start(1) : start(2) - start(0);
-  const V to = vf ? q0 - q1 : q2 - q0;
-  // Displacement out of the plane before contact; the sign of the normal follows it.
-  const double side = dot(unit(from), normal) != 0 ? dot(unit(from), normal) : dot(unit(from - to), normal);
-  if (side < 0) normal = {-normal.x, -normal.y, -normal.z};
+  if (now.regular) {
+    const double per_nn = 1 / now.nn;
+    const double on_a = std::clamp(per_nn * dot(cross(now.p, now.b), now.n), 0.0, 1.0),
+                 on_b = std::clamp(per_nn * dot(cross(now.p, now.a), now.n), 0.0, 1.0);
+    // What is left across both is no matter of the places.
+    const V gap = now.p + on_b * now.b - on_a * now.a, along = gap - (per_nn * dot(gap, now.n)) * now.n;
+    if (largest(along) <= 1e-10 * std::max(size_a, size_b)) return on_shorter(a_shorter ? on_a : on_b);
+  }
+  const Segment a{{0, 0, 0}, now.a}, b{now.p, now.b};
+  return on_shorter(a_shorter ? meeting_place(b, a) : meeting_place(a, b));
+}
+
+template <Kind kind>
+ContactPoint contact_point_of(const Vertices& q, double toc, bool touching) {
+  const Motion<double> m = motion_of<kind>(q.t0, q.t1);
+  const Moment now = moment(m, toc);
+  const V normal = normal_of(kind, q, m, now, touching);
+  const V point = kind == Kind::vertex_face ? q.at(0, toc) : crossing(q, now);
   return {{point.x, point.y, point.z}, {normal.x, normal.y, normal.z}};
+}
+
+}  // namespace
+
+ContactPoint contact_point(const Geometry& g, Kind kind, std::uint32_t first, std::uint32_t second, double toc,
+                           bool touching) {
+  const Vertices q = vertices_of(g, kind, first, second);
+  return kind == Kind::vertex_face ? contact_point_of<Kind::vertex_face>(q, toc, touching)
+                                   : contact_point_of<Kind::edge_edge>(q, toc, touching);
 }
 
 }  // namespace hpccd

@@ -230,7 +230,7 @@ void Frames::add_outputs(Contacts& c, Positions t0, Positions t1) {
       const std::uint32_t first = vf ? c.vf[i][0] : edge_number(c.ee[i - n][0], c.ee[i - n][1]);
       const std::uint32_t second = vf ? c.vf[i][1] : edge_number(c.ee[i - n][2], c.ee[i - n][3]);
       const ContactPoint p = contact_point(geometry, vf ? Kind::vertex_face : Kind::edge_edge, first, second,
-                                           vf ? c.vf_toc[i] : c.ee_toc[i - n]);
+                                           vf ? c.vf_toc[i] : c.ee_toc[i - n], true);
       if (options_.points) c.points[i] = {p.point[0], p.point[1], p.point[2]};
       if (options_.normals) c.normals[i] = {p.normal[0], p.normal[1], p.normal[2]};
     }

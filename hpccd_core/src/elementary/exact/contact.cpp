@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "elementary/exact/contact.h"
 
+#include "elementary/exact/approach.h"
 #include "elementary/exact/earliest.h"
 
 namespace hpccd::exact {
@@ -64,6 +65,17 @@ std::optional<double> earliest_contact(Kind kind, const Vec3<double> q_t0[4], co
     answer = earliest(given.query<Integer<2>>(kind));
   if (!answer.decided) answer = earliest(given.query<Big>(kind));
   return answer.toc;
+}
+
+Approach approach(Kind kind, const Vec3<double> q_t0[4], const Vec3<double> q_t1[4], double toc, bool touching) {
+  const Given given(q_t0, q_t1);
+  std::optional<Approach> answer;
+  if (given.bits <= Widths<Integer<1>>::coordinate_bits)
+    answer = approach(given.query<Integer<1>>(kind), given.low, toc, touching);
+  else if (given.bits <= Widths<Integer<2>>::coordinate_bits)
+    answer = approach(given.query<Integer<2>>(kind), given.low, toc, touching);
+  if (!answer) answer = approach(given.query<Big>(kind), given.low, toc, touching);
+  return *answer;
 }
 
 }  // namespace hpccd::exact

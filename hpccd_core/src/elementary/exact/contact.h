@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The exact tier's last resort: the earliest contact of one vertex-face or edge-edge query in integer arithmetic.
+// The exact tier's last resort: the earliest contact of one vertex-face or edge-edge query in integer arithmetic; and
+// from which side its features come.
 #pragma once
 
 #include <optional>
@@ -10,5 +11,16 @@ namespace hpccd::exact {
 
 // q[0..3] as in motion.h, finite. The time is the true one rounded down (error below 2^-60), or nothing.
 std::optional<double> earliest_contact(Kind kind, const Vec3<double> q_t0[4], const Vec3<double> q_t1[4]);
+
+// How the features come together: the side of a x b (motion.h) on which p is just before their contact, and a x b at
+// the contact, of any length. Zero where there is no such side (the motion is coplanar throughout) or direction.
+struct Approach {
+  int side;
+  Vec3<double> n;
+};
+
+// Of a contact found at `toc`, which may be off by its rounding. touching: the features do touch about then; otherwise
+// they may be apart (minimum separation), and on the side at which they are.
+Approach approach(Kind kind, const Vec3<double> q_t0[4], const Vec3<double> q_t1[4], double toc, bool touching);
 
 }  // namespace hpccd::exact

@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: Apache-2.0
+// From which side the features come together, in integers of one type: the sign that f = p . n has just before their
+// contact, and n at the contact.
+#pragma once
+
+#include <cstdlib>
+
+#include "elementary/exact/contact.h"
+#include "elementary/exact/isolate.h"
+#include "elementary/exact/query.h"
+#include "elementary/exact/sign_at_root.h"
+
+namespace hpccd::exact {
+
+namespace detail {
+
+// The sign of f beside m / 2^k, where its lowest derivative that does not vanish decides; direction is 1 or -1. Before
+// t = 0 and after t = 1 the motion goes on in its straight lines.
+template <class Z, class M>
+int sign_beside(const Polynomial<Z, 3>& f, const M& m, int k, int direction) {
+  if (const int s = sign_at_dyadic(f, m, k)) return s;
+  using W = Plus<Z, 1>;  // three times a coefficient may need a bit more than it
+  const W c1(f.c[1]), c2(f.c[2]), c3(f.c[3]);
+  const Polynomial<W, 2> slope{{c1, c2 + c2, c3 + c3 + c3}};
+  if (const int s = sign_at_dyadic(slope, m, k)) return direction * s;
+  const Polynomial<W, 1> curvature{{c2, c3 + c3 + c3}};
+  if (const int s = sign_at_dyadic(curvature, m, k)) return s;
+  return direction * sign(f.c[3]);
+}
+
+template <class Z, int D>
+int sign_before(const Polynomial<Z, 3>& f, const Root<Z, D>& root) {
+  // The interval of a root that is not exact holds no other.
+  return root.exact ? sign_beside(f, root.m, root.k, -1) : sign_beside(f, root.m, root.k, 1);
+}
+
+// n_k as floating-point numbers with one common scale; `low` is the power of two of each axis. sign_of(k) is the sign
+// of n_k.
+template <class Z, class M, class Sign>
+Vec3<double> direction(const Query<Z>& q, const int low[3], const M& m, int k, Sign&& sign_of) {
+  double fraction[3] = {};
+  int exponent[3] = {}, most = std::numeric_limits<int>::min();
+  for (int axis = 0; axis < 3; ++axis) {
+    const int s = sign_of(axis);
+    if (s == 0) continue;
+    fraction[axis] = s * magnitude_of(value_at(q.n[axis], m, k), exponent[axis]);
+    exponent[axis] -= low[axis];
+    most = std::max(most, exponent[axis]);
+  }
+  const auto scaled = [&](int axis) {
+    return fraction[axis] == 0 ? 0 : std::ldexp(fraction[axis], std::max(exponent[axis] - most, -2000));
+  };
+  return {scaled(0), scaled(1), scaled(2)};
+}
+
+// The root of f at which the contact at `toc` is: of those within `same_time` the first at which the features touch;
+// else the nearest, where the features are known to touch. -1: none.
+template <class Z, class AllRoots>
+int root_of_contact(const Query<Z>& q, AllRoots& roots, std::int64_t toc, bool touching, bool& open) {
+  // Above the radius of times of contact (policy.h), twice, which the conservative tier takes off.
+  constexpr std::int64_t same_time = std::int64_t{1} << (time_bits - 38);  // 3.6e-12
+  const auto distance = [&](int i) { return std::abs(roots.root[i].time() - toc); };
+  int nearest = -1;
+  for (int i = 0; i < roots.n; ++i) {
+    locate(roots.root[i]);
+    if (nearest < 0 || distance(i) < distance(nearest)) nearest = i;
+  }
+  for (int i = 0; i < roots.n; ++i)
+    if (distance(i) <= same_time) {
+      const bool here = touches(q, [&](const auto& p) { return open ? 0 : sign_at(p, roots.root[i], open); });
+      if (here || open) return i;
+    }
+  return touching || (nearest >= 0 && distance(nearest) <= same_time) ? nearest : -1;
+}
+
+}  // namespace detail
+
+// Nothing where it stays open with integers of this size.
+template <class Z>
+std::optional<Approach> approach(const Query<Z>& q, const int low[3], double toc, bool touching) {
+  const int degree = q.f.degree();
+  if (degree < 0) return Approach{0, {0, 0, 0}};
+  const auto time = static_cast<std::int64_t>(std::ldexp(toc, time_bits));
+  if (degree > 0) {
+    Roots roots(q.f);
+    if (!roots.complete) return std::nullopt;
+    bool open = false;
+    const int i = detail::root_of_contact(q, roots, time, touching, open);
+    if (i >= 0) {
+      auto& root = roots.root[i];
+      int sign_of_n[3];
+      for (int k = 0; k < 3; ++k) sign_of_n[k] = open ? 0 : sign_at(q.n[k], root, open);
+      if (open) return std::nullopt;
+      return Approach{detail::sign_before(q.f, root),
+                      detail::direction(q, low, root.m, root.k, [&](int k) { return sign_of_n[k]; })};
+    }
+  }
+  const Time<Z> m(time);
+  return Approach{detail::sign_beside(q.f, m, time_bits, -1),
+                  detail::direction(q, low, m, time_bits, [&](int k) { return sign_at_dyadic(q.n[k], m, time_bits); })};
+}
+
+}  // namespace hpccd::exact
