@@ -15,12 +15,15 @@ from hpccd_ros import replay_setup, scenes
 from hpccd_ros.demo.children import Children
 from hpccd_ros.errors import UserError
 from hpccd_ros.mcap_reader import Recording
+from hpccd_ros.mcap_recover import examine
 from hpccd_ros.replay import Replay
 from hpccd_ros.scenes import files
 
 # What a run leaves behind, and the next one replaces.
 RECORDING, PICTURE, PARAMETERS = "demo.mcap", "demo.png", "node.yaml"
 LOGS = ("node.log", "recorder.log", "publisher.log")
+# s for the last answers to reach the disk; reached where the recorder has lost some.
+WRITTEN = 30.0
 
 
 def main(args) -> int:
@@ -76,30 +79,56 @@ def _stream(args, scene, folder, console):
             "--wait", "180",
         )  # fmt: skip
         children.wait(lambda: recorder.said("recording "), "the recorder did not hear the node", 180.0)
+        children.wait(monitor.hears_contacts, "the node was not heard", 180.0)
         publisher = children.start(
-            "publisher", "hpccd_ros.cli", "scene", args.scene, "--size", str(args.size), "--frames",
-            str(scene.n_frames), "--publish", "--rate", str(args.rate), "--subscribers", "2", "--wait", "120",
-        )  # fmt: skip
+            "publisher", "hpccd_ros.demo.publisher", args.scene, str(args.size), str(scene.n_frames), str(args.rate)
+        )
         console.print(f"[bold]processes[/]  node {node.process.pid}, recorder {recorder.process.pid}, publisher "
                       f"{publisher.process.pid}, over DDS (domain {os.environ['ROS_DOMAIN_ID']})")
-        _watch(monitor, children, publisher, scene.n_frames, console)
+        steps = _steps(scene)
+        _watch(monitor, children, publisher, steps, console)
+        _await_recorded(folder / RECORDING, monitor, children)
         for child in (recorder, node):
             if children.end(child) != 0:
                 children.check()
         if monitor.answers == 0:
             raise UserError(f"the node answered nothing; see the logs in {folder}")
         core = "" if monitor.core_ms is None else f", {monitor.core_ms:.1f} ms a frame in the core (median)"
-        console.print(f"[bold]answers[/]    {monitor.answers} of {scene.n_frames - 1} steps, {monitor.dropped} frames "
-                      f"dropped{core}")
+        console.print(f"[bold]answers[/]    {monitor.answers} of {steps} steps, {monitor.dropped} frames dropped{core}"
+                      f"{_slower(monitor, scene.n_frames, args.rate)}")
 
 
-def _watch(monitor, children, publisher, frames, console):
+def _steps(scene) -> int:
+    """Steps that a node answers: the first frame, and the first with another topology, only begins one."""
+    if scene.make_faces is None:
+        return scene.n_frames - 1
+    return sum(1 for frame in scene.frames() if frame.index and not frame.topologies)
+
+
+def _slower(monitor, frames, rate) -> str:
+    """What to say where the scene has played slower than at `rate`."""
+    took = monitor.heard - monitor.heard_first
+    planned = (frames - 2) / rate  # from the first answer to the last
+    if took < 1.25 * planned + 1.0:
+        return ""
+    return f"; it took {took:.0f} instead of {planned:.0f} s: each frame waits for the answer to the one before"
+
+
+def _await_recorded(path, monitor, children):
+    """Wait until all answers are on the disk: a recorder that is told to end takes only what has reached it."""
+    deadline = time.monotonic() + WRITTEN
+    contacts = lambda: sum(n for topic, n in examine(path).counts.items() if topic.endswith("/contacts"))  # noqa: E731
+    while contacts() < monitor.answers and time.monotonic() < deadline:
+        children.check()
+        monitor.listen(0.25)
+
+
+def _watch(monitor, children, publisher, steps, console):
     """Show the answers as they come, until the publisher has ended and the last answer is there."""
     progress = Progress(
         TextColumn("          "), BarColumn(bar_width=28), MofNCompleteColumn(), TextColumn("steps"),
         TextColumn("{task.fields[said]}"), console=console, transient=True, disable=not console.is_terminal,
     )  # fmt: skip
-    steps = frames - 1
     shown = -1
     with progress:
         bar = progress.add_task("steps", total=steps, said="")

@@ -16,6 +16,7 @@ from rclpy.signals import SignalHandlerOptions
 from hpccd_ros import _env
 from hpccd_ros.listeners import await_acknowledged, await_subscribers
 
+from .answers import Answers
 from .messages import Player, topology_topic, vertices_topic
 from .progress import track
 from .scene import Scene
@@ -29,6 +30,10 @@ SETTLE = 0.2
 LAST = 2.0
 STREAM = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.VOLATILE)
 
+# Where each frame is awaited: a history that one message fills makes the middleware ask for its acknowledgement at
+# once, and not with its next heartbeat (3 s).
+AWAITED = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.VOLATILE)
+
 
 def publish(
     scene: Scene,
@@ -38,11 +43,14 @@ def publish(
     ros_args: list[str] | None = None,
     progress: bool = False,
     subscribers: int = 1,
+    answered: bool = False,
 ) -> int:
     """Publish all frames at `rate` Hz (over and over if `loop`); return how many. SIGINT and SIGTERM end it.
 
     Before the first frame, waits up to `wait` seconds until every mesh's vertices have `subscribers`; before the
     second, until these have acknowledged the first.
+    answered: no frame before all have the one before and the node has answered its step, each awaited up to `wait`
+    seconds: where the machine is too slow for `rate`, the scene plays slower and nothing is dropped.
     """
     stop = []
     previous = {
@@ -53,29 +61,34 @@ def publish(
         args=["--ros-args", *ros_args] if ros_args else None, signal_handler_options=SignalHandlerOptions.NO
     )
     node = rclpy.create_node("hpccd_scene", start_parameter_services=False)
+    answers = Answers(node) if answered else None
     try:
         publishers = {}
         for mesh in scene.mesh_names:
             name = topology_topic(mesh)
             publishers[name] = node.create_publisher(MeshTopology, name, LATCHED)
             name = vertices_topic(mesh)
-            publishers[name] = node.create_publisher(MeshVertices, name, STREAM)
+            publishers[name] = node.create_publisher(MeshVertices, name, AWAITED if answered else STREAM)
         listened = {vertices_topic(mesh): publishers[vertices_topic(mesh)] for mesh in scene.mesh_names}
         if await_subscribers(listened, subscribers, wait, stop) and not stop:
             text = f"not every mesh has {subscribers} subscriber(s) yet: publishing all the same"
             print(text, file=sys.stderr, flush=True)
-        count = _play(node, scene, publishers, rate, loop, wait, stop, progress)
+        if answers is not None and not answers.await_node(wait, stop) and not stop:
+            print("no node publishes contacts: publishing all the same", file=sys.stderr, flush=True)
+        count = _play(node, scene, publishers, answers, rate, loop, wait, stop, progress)
         # What is still on its way must not be cut off by the end of this process.
         await_acknowledged(publishers.values(), LAST)
         return count
     finally:
+        if answers is not None:
+            answers.close()
         node.destroy_node()
         rclpy.try_shutdown()
         for number, handler in previous.items():
             signal.signal(number, handler)
 
 
-def _play(node, scene, publishers, rate, loop, wait, stop, progress) -> int:
+def _play(node, scene, publishers, answers, rate, loop, wait, stop, progress) -> int:
     player = Player(scene)
     moving = [mesh.name for mesh in scene.meshes if not mesh.static]
     first_moving = vertices_topic(moving[0]) if len(moving) < len(scene.meshes) else None
@@ -98,7 +111,21 @@ def _play(node, scene, publishers, rate, loop, wait, stop, progress) -> int:
             if count == 0:
                 begin += await_acknowledged(publishers.values(), wait, stop)
             count += 1
+            if answers is not None:
+                answers = _await_answer(answers, publishers, frame, stamp, wait, stop)
+                # What was waited is not made up for: frames that follow at once would wait for each other.
+                begin = max(begin, time.monotonic() - count / rate)
     return count
+
+
+def _await_answer(answers, publishers, frame, stamp, wait, stop):
+    """Wait until all have the frame and its step is answered; returns `answers`, or None to wait no more."""
+    await_acknowledged(publishers.values(), wait, stop)
+    # The first frame, and the first with another topology, only begins the next step.
+    if frame.index == 0 or frame.topologies or answers.await_step(stamp, wait, stop) or stop:
+        return answers
+    print(f"frame {frame.index} is not answered in {wait:g} s: publishing by the clock", file=sys.stderr, flush=True)
+    return None
 
 
 def _sleep_until(instant, stop) -> None:
