@@ -194,7 +194,8 @@ class DetectService:
                 executor.wake()  # a task that awaits is only looked at when the executor wakes up
 
         steady = Clock(clock_type=ClockType.STEADY_TIME)
-        timer = self._node.create_timer(limit, settle, callback_group=self._group, clock=steady)
+        # Of a group of its own, which ends with it: a group remembers every timer that it ever had.
+        timer = self._node.create_timer(limit, settle, callback_group=ReentrantCallbackGroup(), clock=steady)
         self._awaited.add(settle)
         job.add_done_callback(settle)
         try:

@@ -1,18 +1,25 @@
 # SPDX-License-Identifier: Apache-2.0
 """~/detect: two snapshots in, contacts out, for several clients at once."""
 
+import gc
 import math
+import os
+import time
 
 import numpy as np
 import pytest
+import rclpy
 from hpccd.srv import Detect
 from lifecycle_msgs.msg import Transition
-from node_process import assert_same_contacts
+from node_process import PATIENCE, assert_same_contacts
+from rclpy.executors import SingleThreadedExecutor
 from test_node_life import change_state
 from waving_sheet import scene_of, sheet_faces, sheet_positions
 
 import hpccd_core as hc
 from hpccd_ros import convert
+from hpccd_ros.detect_service import DetectService, NodeScene
+from hpccd_ros.detection import Options, SceneBuilder
 
 N = 16
 FACES = sheet_faces(N)
@@ -261,3 +268,43 @@ def test_outputs_of_the_node_are_sent(start_node):
     full = hc.Detector(scene_of(cloth=FACES)).detect(sheet_positions(N, 0), sheet_positions(N, 1))
     assert answer.contacts.truncated and answer.contacts.total == len(full)
     assert len(answer.contacts.points) == 150 and len(answer.contacts.normals) == 0
+
+
+@pytest.fixture
+def service():
+    """The service alone, in this process, and a function that asks it."""
+    context = rclpy.Context()
+    rclpy.init(context=context)
+    node = rclpy.create_node("service", namespace=f"/kept{os.getpid()}", context=context)
+    executor = SingleThreadedExecutor(context=context)
+    executor.add_node(node)
+    settings = {"detect_jobs": 1, "detect_waiting": 1, "detect_time_limit": PATIENCE, "max_meshes": 4,
+                "max_vertices": 1000, "max_faces": 1000, "max_contacts": 0}  # fmt: skip
+    service = DetectService(node, settings, Options, lambda: NodeScene(SceneBuilder(()), {}))
+    client = node.create_client(Detect, "service/detect")
+    assert client.wait_for_service(PATIENCE)
+
+    def ask_once(what):
+        answer = client.call_async(what)
+        deadline = time.monotonic() + PATIENCE
+        # Not spin_until_future_complete, which leaves a task of its own for each turn.
+        while not answer.done() and time.monotonic() < deadline:
+            executor.spin_once(timeout_sec=0.1)
+        return answer.result()
+
+    yield ask_once
+    service.close()
+    executor.shutdown()
+    node.destroy_node()
+    rclpy.shutdown(context=context)
+
+
+def test_nothing_is_kept_of_a_request(service):
+    def objects_after(requests):
+        for _ in range(requests):
+            assert service(request()).success
+        gc.collect()
+        return len(gc.get_objects())
+
+    few, many = objects_after(20), objects_after(60)
+    assert many - few < 30, f"{many - few} objects are left of 60 requests"
