@@ -118,8 +118,8 @@ class Detector:
         """Contacts of the motion from vertices_t0 to vertices_t1, each (V, 3) float32 or float64.
 
         C-contiguous arrays are read in place. Arrays in a GPU's memory (CUDA array interface or DLPack: CuPy, PyTorch,
-        Warp; C-contiguous, backend "gpu" or "auto") are used there without a copy. Raises TypeError for a wrong dtype or
-        a masked element, ValueError for a wrong shape or a coordinate that is NaN, infinite or beyond 1e150.
+        Warp; C-contiguous, backend "gpu" or "auto") are used there without a copy. Raises TypeError for a wrong dtype
+        or a masked element, ValueError for a wrong shape or a coordinate that is NaN, infinite or beyond 1e150.
         """
         on_device = [device_arrays.is_on_device(v) for v in (vertices_t0, vertices_t1)]
         if all(on_device):
