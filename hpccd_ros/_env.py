@@ -26,6 +26,10 @@ _DDS_CHOICES = (
     "FASTDDS_DEFAULT_PROFILES_FILE",
     "FASTDDS_BUILTIN_TRANSPORTS",
 )
+# Makes ROS leave to the profile how queues keep their memory, and with it how messages are sent: what a user says of
+# either wins.
+_QUEUES_OF_PROFILE = "RMW_FASTRTPS_USE_QOS_FROM_XML"
+_SENDING = "RMW_FASTRTPS_PUBLICATION_MODE"
 _DDS_FILES = ("DEFAULT_FASTRTPS_PROFILES.xml", "DEFAULT_FASTDDS_PROFILES.xml")
 
 # In the package's folder config.
@@ -71,6 +75,8 @@ def _choose_dds_profile() -> None:
         return  # run from the sources without installation: Fast DDS works with its defaults, only slower
     profile = _PROFILES[0 if this_host_only() else 1]
     os.environ["FASTRTPS_DEFAULT_PROFILES_FILE"] = str(Path(share) / "config" / profile)
+    if not os.environ.get(_SENDING):
+        os.environ.setdefault(_QUEUES_OF_PROFILE, "1")
 
 
 def _keep_freed_memory() -> None:

@@ -12,6 +12,7 @@ CHOSEN = "FASTRTPS_DEFAULT_PROFILES_FILE"
 USER_CHOICES = (CHOSEN, "FASTDDS_DEFAULT_PROFILES_FILE", "FASTDDS_BUILTIN_TRANSPORTS")
 LOCAL = "fastdds_localhost.xml"
 RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
+QUEUES, SENDING = "RMW_FASTRTPS_USE_QOS_FROM_XML", "RMW_FASTRTPS_PUBLICATION_MODE"
 DISCOVERY_CHOICES = (RANGE, "ROS_STATIC_PEERS", "ROS_LOCALHOST_ONLY")
 
 PRINT_CHOICE = f"""
@@ -41,7 +42,7 @@ rclpy.shutdown()
 
 def run(script: str, folder: Path, **variables: str) -> str:
     """Run `script` in a process of its own in `folder`; return what it prints."""
-    theirs = (*USER_CHOICES, *DISCOVERY_CHOICES)
+    theirs = (*USER_CHOICES, *DISCOVERY_CHOICES, QUEUES, SENDING)
     env = {name: value for name, value in os.environ.items() if name not in theirs} | variables
     command = [sys.executable, "-c", script]
     ended = subprocess.run(command, cwd=folder, env=env, text=True, capture_output=True, timeout=300)
@@ -95,6 +96,16 @@ def test_a_choice_of_the_user_in_the_environment_wins(tmp_path, name):
     value = "UDPv4" if name == "FASTDDS_BUILTIN_TRANSPORTS" else "/some/profile.xml"
     expected = value if name == CHOSEN else "none"
     assert run(PRINT_CHOICE, tmp_path, **{name: value}) == f"{expected} none"
+
+
+@pytest.mark.parametrize(
+    "variables, left",
+    [({}, "1"), ({QUEUES: "0"}, "0"), ({SENDING: "ASYNCHRONOUS"}, "none"), ({CHOSEN: "/some/profile.xml"}, "none")],
+    ids=["ours", "the middleware's", "ours would undo how to send", "a profile of the user"],
+)
+def test_how_queues_keep_their_memory_is_the_choice_of_the_user(tmp_path, variables, left):
+    script = PRINT_CHOICE.replace(CHOSEN, QUEUES)
+    assert run(script, tmp_path, **variables).split()[0] == left
 
 
 def test_a_profile_in_the_working_folder_wins(tmp_path):

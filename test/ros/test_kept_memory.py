@@ -1,13 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Memory of large messages is kept between them: fresh pages cost more than the copy of a message."""
+"""Memory of large messages is kept between them, for whatever comes next: fresh pages cost more than the copy of a
+message. But no queue keeps for itself what once waited in it."""
 
+import ctypes
 import os
 import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 import hpccd_ros
 
+ROOT = Path(hpccd_ros.__file__).resolve().parents[1]
 MEGABYTES, ROUNDS = 8, 50
 FAULTS = f"""
 import resource
@@ -22,13 +27,51 @@ for _ in range({ROUNDS}):
 print((faults() - before) / {ROUNDS})
 """
 
+DEPTH = 20
+# A queue is filled with megabytes that nobody takes, then emptied; printed: megabytes allocated before, when it is
+# full, and at the end.
+QUEUE = f"""
+import ctypes, gc, os, sys, time
+from hpccd_ros import _env, qos
+_env.prepare()
+import rclpy
+from rclpy.duration import Duration
+from std_msgs.msg import UInt8MultiArray
+class Info(ctypes.Structure):
+    names = "arena ordblks smblks hblks hblkhd usmblks fsmblks uordblks fordblks keepcost"
+    _fields_ = [(name, ctypes.c_size_t) for name in names.split()]
+libc = ctypes.CDLL(None)
+libc.mallinfo2.restype = Info
+def allocated():
+    gc.collect()
+    info = libc.mallinfo2()
+    return (info.uordblks + info.hblkhd) / 1e6
+rclpy.init()
+node = rclpy.create_node("queue", namespace=f"/queue{{os.getpid()}}", start_parameter_services=False)
+taken = []
+profile = qos.vertices("reliable", {DEPTH})
+node.create_subscription(UInt8MultiArray, "large", lambda data: taken.append(len(data)), profile, raw=True)
+publisher = node.create_publisher(UInt8MultiArray, "large", profile)
+while not publisher.get_subscription_count():
+    time.sleep(0.05)
+# CDR: no dimensions, offset 0, so many bytes.
+data = bytes([0, 1, 0, 0]) + bytes(8) + (10**6).to_bytes(4, "little") + bytes(10**6)
+before = allocated()
+for _ in range({DEPTH}):
+    publisher.publish(data)
+publisher.wait_for_all_acked(Duration(seconds=60))
+full = allocated()
+while len(taken) < {DEPTH}:
+    rclpy.spin_once(node, timeout_sec=10)
+print(before, full, allocated())
+"""
+
 
 def faults_per_message(**environment):
     """Page faults of a buffer of 8 MB that is taken and given back."""
-    root = Path(hpccd_ros.__file__).resolve().parents[1]
     env = {key: value for key, value in os.environ.items() if not key.startswith("MALLOC_")}
     command = [sys.executable, "-c", FAULTS]
-    done = subprocess.run(command, env=env | environment, cwd=root, capture_output=True, text=True)
+    done = subprocess.run(command, env=env | environment, cwd=ROOT, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     return float(done.stdout)
 
@@ -40,3 +83,13 @@ def test_freed_memory_is_kept():
 def test_a_threshold_of_the_user_wins():
     own = {"MALLOC_MMAP_THRESHOLD_": "131072", "MALLOC_TRIM_THRESHOLD_": "131072", "MALLOC_TOP_PAD_": "0"}
     assert faults_per_message(**own) > 1000
+
+
+@pytest.mark.skipif(not hasattr(ctypes.CDLL(None), "mallinfo2"), reason="only glibc since 2.33 tells what is allocated")
+def test_an_emptied_queue_keeps_nothing():
+    command = [sys.executable, "-c", QUEUE]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr
+    before, full, after = map(float, done.stdout.split())
+    assert full > before + 0.9 * DEPTH, "the queue was not full: nothing is shown"
+    assert after < before + 3, f"{before:.1f} MB, {full:.1f} MB when full, {after:.1f} MB when empty again"
