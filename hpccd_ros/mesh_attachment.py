@@ -12,7 +12,7 @@ def attachment_name(mesh: str, path: str) -> str:
 def mesh_files(parameters: dict) -> tuple[list[tuple[str, bytes]], list[str]]:
     """([(attachment name, content)] of the files that the node's parameters name, [what could not be read])."""
     found, missing = [], []
-    for mesh in parameters["meshes"]:
+    for mesh in parameters["meshes"] or []:  # None: never set
         path = parameters.get(f"mesh.{mesh}.file")
         if not path:
             continue

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from hpccd_ros import coordinates
+from hpccd_ros.quoting import shortened
 from hpccd_ros.rigid import Rigid
 
 FORMATS = (".obj", ".ply", ".stl")
@@ -22,11 +23,7 @@ def load_mesh(path: str) -> tuple[np.ndarray, np.ndarray]:
     use. Polygons become triangle fans. Raises MeshFileError: trimesh missing, no such file, other format, no
     triangles.
     """
-    file = Path(path).expanduser()
-    if file.suffix.lower() not in FORMATS:
-        raise MeshFileError(f"{file}: format {file.suffix or '(none)'!r}; use one of {', '.join(FORMATS)}")
-    if not file.is_file():
-        raise MeshFileError(f"{file}: no such file (relative paths start from {Path.cwd()})")
+    file = _existing(path)
     try:
         import trimesh
     except ImportError as error:
@@ -40,7 +37,8 @@ def load_mesh(path: str) -> tuple[np.ndarray, np.ndarray]:
         options = {"maintain_order": True, "skip_materials": True} if file.suffix.lower() == ".obj" else {}
         mesh = trimesh.load(file, force="mesh", process=False, **options)
     except Exception as error:  # trimesh raises whatever its parsers meet
-        raise MeshFileError(f"{file}: cannot be read: {error}") from error
+        why = _not_text(file) or shortened(" ".join(str(error).split()))
+        raise MeshFileError(f"{file}: cannot be read: {why}") from error
     vertices, faces = np.asarray(mesh.vertices, np.float64), np.asarray(mesh.faces)
     if len(faces) == 0:
         raise MeshFileError(f"{file}: has no triangles")
@@ -51,6 +49,35 @@ def load_mesh(path: str) -> tuple[np.ndarray, np.ndarray]:
     return vertices, faces.astype(np.uint32)
 
 
+def _existing(path: str) -> Path:
+    shown = shortened(path)
+    if (suffix := Path(path).suffix).lower() not in FORMATS:
+        raise MeshFileError(f"{shown}: format {shortened(suffix) or '(none)'!r}; use one of {', '.join(FORMATS)}")
+    try:
+        file = Path(path).expanduser()
+        if file.is_file():
+            return file
+    except RuntimeError as error:  # ~name, and there is no such user
+        raise MeshFileError(f"{shown}: no such home folder; give the whole path") from error
+    except OSError as error:
+        raise MeshFileError(f"{shown}: {error.strerror}; give the path of a file that can be read") from error
+    raise MeshFileError(f"{shown}: no such file (relative paths start from {Path.cwd()})")
+
+
+def _not_text(file: Path) -> str | None:
+    """What is wrong where bytes are no text but have to be: trimesh then speaks of a module to guess what they are."""
+    try:
+        file.read_bytes().decode("utf-8")
+    except UnicodeDecodeError:
+        if file.suffix.lower() == ".stl":
+            return "neither a binary STL (its length does not fit its number of triangles) nor text; export it anew"
+        if file.suffix.lower() == ".obj":
+            return "its text is not UTF-8; save it as UTF-8"
+    except OSError:
+        pass  # then that is what trimesh says
+    return None
+
+
 def place(vertices: np.ndarray, pose: list[float]) -> np.ndarray:
     """Rotate by the quaternion x y z w, then translate by x y z (pose: 3 + 4 numbers).
 
@@ -59,9 +86,9 @@ def place(vertices: np.ndarray, pose: list[float]) -> np.ndarray:
     try:
         placed = Rigid.of(pose[:3], pose[3:]).apply(vertices)
     except ValueError as error:
-        raise MeshFileError(f"pose: {pose} {error}") from error
+        raise MeshFileError(f"pose: {shortened(pose)} {error}") from error
     if refusal := coordinates.refusal(placed):
-        raise MeshFileError(f"pose: {pose}: placed by it, {refusal[1]}")
+        raise MeshFileError(f"pose: {shortened(pose)}: placed by it, {refusal[1]}")
     return placed
 
 

@@ -1,8 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """The node: life cycle and wiring. ``python -m hpccd_ros.node --ros-args --params-file FILE``"""
 
-import contextlib
 import sys
+
+from hpccd_ros import start
+
+if __name__ == "__main__":
+    sys.exit(start.main())  # before the rest is loaded
+
+import contextlib
 import time
 from collections import Counter
 from typing import Any
@@ -16,7 +22,6 @@ from rclpy.executors import ExternalShutdownException
 from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
-from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Header
@@ -25,12 +30,14 @@ from visualization_msgs.msg import MarkerArray
 from hpccd_ros import (
     _env,
     convert,
-    dds_security,
     detection,
     node_recording,
+    node_topics,
     parameter_services,
     parameters,
     qos,
+    quoting,
+    ros_start,
     scene_parameters,
     stop_signals,
 )
@@ -66,8 +73,11 @@ class HpccdNode(GuardedLifecycleNode):
         parameter_services.refuse_unknown_types(self)
         self._settings, self._mesh_settings = parameters.declare(self)
         for name in parameters.unknown_overrides(self):
-            self.get_logger().warning(f"parameter {name} is unknown and has no effect; see the README's table")
+            text = f"parameter {quoting.shortened(name)} is unknown and has no effect; see the README's table"
+            self.get_logger().warning(text)
         scene_parameters.check(self._settings, self._mesh_settings)
+        if why := node_topics.refusal(self, self._mesh_settings):
+            raise ParameterError(why)
         self._options = _options(self._settings)
         if why := detection.refusal(self._options):
             raise ParameterError(why)
@@ -147,7 +157,7 @@ class HpccdNode(GuardedLifecycleNode):
             self._settings["count_unknown_meshes"],
         )
         self.get_logger().info(
-            f"active: meshes {', '.join(self._mesh_settings) or 'none (service only)'}; "
+            f"active: meshes {quoting.listed(self._mesh_settings) or 'none (service only)'}; "
             f"accuracy {self._options.accuracy}, backend {self._options.backend}, "
             f"contacts on {self._contacts.topic_name}; discovery "
             + (f"on this host only ({_env.DISCOVERY}=SUBNET opens it)" if _env.this_host_only() else "beyond this host")
@@ -360,29 +370,25 @@ def _options(settings: dict[str, Any]) -> Options:
 def main(argv: list[str] | None = None, node_type: type[HpccdNode] = HpccdNode) -> int:
     """Run the node until SIGINT or SIGTERM; node_type: a class built on HpccdNode, to look into it.
 
-    Returns the exit status: 0 ended as told, 1 could not be configured, 2 wrong parameters, 3 DDS security is demanded
-    and cannot be had.
+    Returns the exit status: 0 ended as told, 1 could not be configured, 2 wrong parameters or arguments, 3 DDS security
+    is demanded and cannot be had.
     """
     stop = Future()
     stop_signals.watch(lambda: stop.set_result(None))
     _env.prepare()
     try:
-        rclpy.init(args=argv, signal_handler_options=SignalHandlerOptions.NO)
+        ros_start.init(argv)
         node = node_type()
     except ParameterError as error:
-        print(f"hpccd: {error}", file=sys.stderr)
-        rclpy.try_shutdown()
-        return 2
-    except RuntimeError as error:  # rclpy's own errors are
-        if (why := dds_security.refusal(error)) is None:
+        return _not_started(ros_start.WRONG_PARAMETERS, str(error))
+    except Exception as error:
+        if (refused := ros_start.refusal(error)) is None:
             raise
-        print(f"hpccd: {why}", file=sys.stderr)
-        rclpy.try_shutdown()
-        return 3
+        return _not_started(*refused)
     executor = GuardedExecutor(node.errors)
     executor.add_node(node)
     try:
-        if node.get_parameter("autostart").value:
+        if node.get_parameter("autostart").value and not stop.done():
             for transition in (node.trigger_configure, node.trigger_activate):
                 if transition() != TransitionCallbackReturn.SUCCESS:
                     return 1
@@ -397,5 +403,7 @@ def main(argv: list[str] | None = None, node_type: type[HpccdNode] = HpccdNode) 
     return 0
 
 
-if __name__ == "__main__":
-    sys.exit(main())
+def _not_started(status: int, why: str) -> int:
+    print(f"hpccd: {why}", file=sys.stderr)
+    rclpy.try_shutdown()
+    return status

@@ -23,6 +23,7 @@ from rclpy.exceptions import (
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
+from hpccd_ros import quoting
 from hpccd_ros.parameter_table import ALWAYS, MESH_ROWS, NEVER, NODE_ROWS, UNCONFIGURED, Row
 
 _TYPES = {
@@ -51,7 +52,7 @@ def refusal(row: Row, value: Any) -> str | None:
     if row.choices:
         for entry in entries:
             if entry not in row.choices:
-                return f"{row.name}: {entry!r} is none of {', '.join(row.choices)}"
+                return f"{row.name}: {quoting.shortened(repr(entry))} is none of {', '.join(row.choices)}"
     return None
 
 
@@ -79,10 +80,11 @@ def declare(node: Node) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
     for name in names:
         if not _MESH_NAME.fullmatch(name):
             raise ParameterError(
-                f"meshes: {name!r} cannot be part of a topic name; use letters, digits and _, a letter first"
+                f"meshes: {quoting.shortened(repr(name))} cannot be part of a topic name; use letters, digits and _, a "
+                "letter first"
             )
     if len(set(names)) != len(names):
-        raise ParameterError(f"meshes: names must differ, got {', '.join(names)}")
+        raise ParameterError(f"meshes: names must differ, {quoting.repeated(names)} is there twice")
     meshes = {
         name: {row.name: _declare_one(node, row, f"mesh.{name}.{row.name}") for row in MESH_ROWS} for name in names
     }
@@ -98,9 +100,11 @@ def _declare_one(node: Node, row: Row, name: str) -> Any:
     except ParameterUninitializedException:
         return list(row.default)
     except InvalidParameterTypeException as error:
-        raise ParameterError(f"{name}: {error}; expected {row.kind}, e.g. {row.default!r}") from error
+        raise ParameterError(
+            f"{name}: {quoting.shortened(error, 300)}; expected {row.kind}, e.g. {row.default!r}"
+        ) from error
     except InvalidParameterValueException as error:
-        raise ParameterError(f"{name}: {error}; allowed {_allowed(row)}") from error
+        raise ParameterError(f"{name}: {quoting.shortened(error, 300)}; allowed {_allowed(row)}") from error
     value = normalise(row, value)
     if reason := refusal(row, value):
         raise ParameterError(reason.replace(row.name, name, 1))

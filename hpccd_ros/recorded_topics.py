@@ -28,10 +28,11 @@ class Wanted:
 def of_node(parameters: dict) -> list[Wanted]:
     """The topics of a node with these parameters, inputs before outputs."""
     wanted = []
-    if any(parameters.get(f"mesh.{mesh}.transform") == "tf" for mesh in parameters["meshes"]):
+    meshes = parameters["meshes"] or []  # None: never set
+    if any(parameters.get(f"mesh.{mesh}.transform") == "tf" for mesh in meshes):
         static = qos.TRANSFORMS_STATIC.depth
         wanted += [Wanted(t.name, t.type_name, static * t.static) for t in transform_topics.understood()]
-    for mesh in parameters["meshes"]:
+    for mesh in meshes:
         clouds = parameters.get(f"mesh.{mesh}.input") == "points"
         wanted.append(Wanted(f"meshes/{mesh}/topology", TOPOLOGY, latched=1))
         wanted.append(Wanted(f"meshes/{mesh}/{'points' if clouds else 'vertices'}", POINTS if clouds else VERTICES))

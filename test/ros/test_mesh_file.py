@@ -78,6 +78,11 @@ def test_bad_files(tmp_path, monkeypatch):
     far.write_text("v 0 0 0\nv 1 0 0\nv 0 1e151 0\nf 1 2 3\n")
     with pytest.raises(MeshFileError, match=r"far.obj: vertex 2 is .* must lie in"):
         load_mesh(str(far))
+    for suffix, why in ((".stl", "neither a binary STL"), (".obj", "save it as UTF-8|has no triangles")):
+        garbage = tmp_path / f"garbage{suffix}"
+        garbage.write_bytes(bytes(range(128, 256)) * 8)
+        with pytest.raises(MeshFileError, match=f"garbage{suffix}: (cannot be read: )?.*({why})"):
+            load_mesh(str(garbage))
     good = write_obj(tmp_path / "good.obj")
     real = builtins.__import__
 
@@ -89,6 +94,25 @@ def test_bad_files(tmp_path, monkeypatch):
     monkeypatch.setattr(builtins, "__import__", without_trimesh)
     with pytest.raises(MeshFileError, match="pip install 'hpccd"):
         load_mesh(good)
+
+
+@pytest.mark.parametrize(
+    "path, why",
+    [
+        ("~nosuchuser/x.obj", "no such home folder; give the whole path"),
+        (f"{'x' * 300}.obj", "File name too long"),
+        (f"x.{'y' * 1000}", "use one of .obj"),
+        (f"{'x/' * 5000}a.obj", "File name too long"),
+        ("a\0b.obj", "no such file"),
+        ("/", "use one of .obj"),
+        ("/proc/self/mem.obj", "no such file"),
+    ],
+    ids=["nobody", "long-name", "long-suffix", "long-path", "nul", "root", "proc"],
+)
+def test_paths_that_cannot_be(path, why):
+    with pytest.raises(MeshFileError, match=why) as caught:
+        load_mesh(path)
+    assert len(str(caught.value)) < 500
 
 
 def test_pose():

@@ -1,0 +1,33 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What users and strangers sent, quoted in messages: short enough to be read, whatever its length."""
+
+from collections import Counter
+from collections.abc import Iterable
+
+# Of one value: a path of usual length is shown whole.
+LONGEST = 200
+# Of a whole message, which may quote several.
+LONGEST_MESSAGE = 1000
+# Names in a list.
+MOST = 10
+
+
+def shortened(text: object, longest: int = LONGEST) -> str:
+    """Beginning and end of a text that is longer than ``longest``, and how long it is."""
+    text = str(text)
+    if len(text) <= longest:
+        return text
+    half = longest // 2
+    return f"{text[:half]}... ({len(text)} characters) ...{text[-half:]}"
+
+
+def listed(names: Iterable[str]) -> str:
+    """Names with commas between them: the first, and how many more there are."""
+    names = list(names)
+    more = f" and {len(names) - MOST} more" if len(names) > MOST else ""
+    return ", ".join(shortened(name, 80) for name in names[:MOST]) + more
+
+
+def repeated(names: Iterable[str]) -> str:
+    """The name that is there most often."""
+    return shortened(repr(Counter(names).most_common(1)[0][0]), 80)

@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Many starts of the node at little cost: one process has loaded everything, each start is a fork of it.
+
+Reads {name: [arguments]} as JSON from stdin, writes {name: [exit status, output]} as JSON. A node that becomes active
+is told to end.
+"""
+
+import json
+import os
+import signal
+import sys
+import tempfile
+import time
+import traceback
+
+from hpccd_ros import node
+
+AT_ONCE = 4
+
+
+def start(arguments, output):
+    os.dup2(output.fileno(), 1)
+    os.dup2(output.fileno(), 2)
+    try:
+        status = node.main(["hpccd_node", *arguments])
+    except BaseException:
+        traceback.print_exc()
+        status = 1
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(status)
+
+
+def main():
+    waiting = json.load(sys.stdin)
+    results, running = {}, {}
+    while waiting or running:
+        while waiting and len(running) < AT_ONCE:
+            name, arguments = waiting.popitem()
+            output = tempfile.TemporaryFile("w+b")
+            pid = os.fork()
+            if pid == 0:
+                start(arguments, output)
+            running[pid] = (name, output)
+        time.sleep(0.01)
+        for pid, (name, output) in tuple(running.items()):
+            ended, status = os.waitpid(pid, os.WNOHANG)
+            text = os.pread(output.fileno(), 1 << 20, 0)
+            if ended:
+                results[name] = [os.waitstatus_to_exitcode(status), text.decode(errors="replace")]
+                del running[pid]
+            elif b"active: meshes" in text:
+                os.kill(pid, signal.SIGINT)
+    json.dump(results, sys.stdout)
+
+
+if __name__ == "__main__":
+    main()
