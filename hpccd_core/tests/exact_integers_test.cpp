@@ -4,7 +4,7 @@
 
 #include <random>
 
-#include "elementary/exact/earliest.h"
+#include "elementary/exact/wide/earliest.h"
 
 namespace hpccd::exact {
 namespace {

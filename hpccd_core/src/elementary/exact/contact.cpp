@@ -2,7 +2,7 @@
 #include "elementary/exact/contact.h"
 
 #include "elementary/exact/approach.h"
-#include "elementary/exact/earliest.h"
+#include "elementary/exact/wide/earliest.h"
 
 namespace hpccd::exact {
 namespace {

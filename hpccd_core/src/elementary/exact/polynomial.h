@@ -31,6 +31,12 @@ Polynomial<Z, D> operator-(const Polynomial<Z, D>& a, const Polynomial<Z, D>& b)
   for (int i = 0; i <= D; ++i) s.c[i] = a.c[i] - b.c[i];
   return s;
 }
+template <class Z, int D>
+Polynomial<Z, D> operator-(const Polynomial<Z, D>& a) {
+  Polynomial<Z, D> s;
+  for (int i = 0; i <= D; ++i) s.c[i] = -a.c[i];
+  return s;
+}
 template <class X, class Y>
 auto operator*(const Polynomial<X, 1>& a, const Polynomial<Y, 1>& b) -> Polynomial<decltype(a.c[0] * b.c[0]), 2> {
   return {{a.c[0] * b.c[0], a.c[0] * b.c[1] + a.c[1] * b.c[0], a.c[1] * b.c[1]}};

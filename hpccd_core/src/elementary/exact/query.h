@@ -5,6 +5,8 @@
 // and 2 b + 5, sums of three of them at most 2 b + 7; f's at most 3 b + 10.
 #pragma once
 
+#include <optional>
+
 #include "elementary/exact/polynomial.h"
 #include "elementary/motion.h"
 
@@ -44,6 +46,10 @@ struct Query {
   std::array<Quadratic, 3> n;
   Cubic f;
 
+  // Of p x b and a x p. Large numbers are not multiplied twice.
+  decltype(auto) pb(int k) const { return product<0>(p, b, k); }
+  decltype(auto) ap(int k) const { return product<3>(a, p, k); }
+
   Query(Kind kind_, const Coordinates<Z> q[4]) : kind(kind_) {
     if (kind == Kind::vertex_face) {
       p = q[0] - q[1], a = q[2] - q[1], b = q[3] - q[1];
@@ -58,11 +64,11 @@ struct Query {
   // on.
   template <class Visit>
   void conditions(int k, Visit&& visit) const {
-    const Quadratic pb = cross(p, b, k), ap = cross(a, p, k);
+    const Quadratic &pb_k = pb(k), &ap_k = ap(k);
     if (kind == Kind::vertex_face)
-      (void)(visit(pb) && visit(ap) && visit(n[k] - pb - ap));
+      (void)(visit(pb_k) && visit(ap_k) && visit(n[k] - pb_k - ap_k));
     else
-      (void)(visit(pb) && visit(n[k] - pb) && visit(cross(p, a, k)) && visit(n[k] + ap));
+      (void)(visit(pb_k) && visit(n[k] - pb_k) && visit(-ap_k) && visit(n[k] + ap_k));
   }
 
   // Where n vanishes the triangle is the union of its edges, and two segments are parallel or points: they touch where
@@ -73,13 +79,34 @@ struct Query {
   int n_degenerate() const { return kind == Kind::vertex_face ? 3 : 4; }
   PointOnSegment degenerate(int i) const {
     if (kind == Kind::vertex_face) {
-      if (i == 0) return {p, p - a};
-      if (i == 1) return {p, p - b};
+      if (i == 0) return {p, p - b};
+      if (i == 1) return {p, p - a};
       return {p - a, p - b};
     }
     if (i == 0) return {p, p + b};          // a0 on b, both vectors turned round
     if (i == 1) return {a - p, a - p - b};  // a1 on b
     return i == 2 ? PointOnSegment{p, p - a} : PointOnSegment{p + b, p + b - a};
+  }
+  // Coordinate k of their cross product, up to its sign: condition i.
+  Quadratic beside_line(int i, int k) const {
+    if (kind == Kind::vertex_face) return i == 0 ? pb(k) : i == 1 ? ap(k) : n[k] - pb(k) - ap(k);
+    return i == 0 ? pb(k) : i == 1 ? n[k] - pb(k) : i == 2 ? ap(k) : n[k] + ap(k);
+  }
+
+ private:
+  static constexpr bool remembers = Widths<Z>::any_size;
+  struct Nothing {};
+  mutable std::conditional_t<remembers, std::array<std::optional<Quadratic>, 6>, Nothing> products_;
+
+  template <int first>
+  decltype(auto) product(const Coordinates<Z>& x, const Coordinates<Z>& y, int k) const {
+    if constexpr (remembers) {
+      auto& known = products_[first + k];
+      if (!known) known = cross(x, y, k);
+      return static_cast<const Quadratic&>(*known);
+    } else {
+      return cross(x, y, k);
+    }
   }
 };
 
@@ -94,26 +121,36 @@ bool touches(const Query<Z>& q, Sign&& sign_of) {
     return inside;
   }
   for (int i = 0; i < q.n_degenerate(); ++i) {
-    const auto d = q.degenerate(i);
     bool on_line = true;
-    for (int k = 0; k < 3 && on_line; ++k) on_line = sign_of(cross(d.from_start, d.from_end, k)) == 0;
+    for (int k = 0; k < 3 && on_line; ++k) on_line = sign_of(q.beside_line(i, k)) == 0;
     // Between the ends, ends included; for a segment that is a point: at that point.
-    if (on_line && sign_of(dot(d.from_start, d.from_end)) <= 0) return true;
+    if (!on_line) continue;
+    const auto d = q.degenerate(i);
+    if (sign_of(dot(d.from_start, d.from_end)) <= 0) return true;
   }
   return false;
 }
 
-// Coplanar throughout: whether they touch can only change where one of these polynomials vanishes, and the set of
-// times at which they do is closed, so the earliest is 0 or one of their roots.
+// Coplanar throughout: the earliest time at which they touch is 0 or a root of one of these polynomials. Where one
+// coordinate of n does not vanish throughout, its conditions alone decide between its roots, and the set of times at
+// which they touch is closed. Where n does, each point is on its line at roots of one polynomial only, or always.
 template <class Z, class Visit>
 void for_event_polynomials(const Query<Z>& q, Visit&& visit) {
   for (int k = 0; k < 3; ++k) {
+    if (q.n[k].degree() < 0) continue;
     visit(q.n[k]);
     q.conditions(k, [&](const auto& c) { return visit(c), true; });
+    return;
   }
   for (int i = 0; i < q.n_degenerate(); ++i) {
-    const auto d = q.degenerate(i);
-    visit(dot(d.from_start, d.from_end));
+    int k = 0;
+    while (k < 3 && q.beside_line(i, k).degree() < 0) ++k;
+    if (k < 3) {
+      visit(q.beside_line(i, k));
+    } else {
+      const auto d = q.degenerate(i);
+      visit(dot(d.from_start, d.from_end));
+    }
   }
 }
 

@@ -1,0 +1,12 @@
+// SPDX-License-Identifier: Apache-2.0
+// The earliest contact of a query in integers of any size: never undecided, and in about the same time whatever the
+// numbers are.
+#pragma once
+
+#include "elementary/exact/earliest.h"
+
+namespace hpccd::exact {
+
+Answer earliest(const Query<Big>& q);
+
+}  // namespace hpccd::exact

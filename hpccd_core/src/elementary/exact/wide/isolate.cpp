@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "elementary/exact/wide/isolate.h"
+
+#include "elementary/exact/wide/sign_at_root.h"
+
+namespace hpccd::exact::wide {
+namespace {
+
+// A time that divides the step, and whether the polynomial in question vanishes there.
+struct Mark {
+  Root root;
+  bool zero;
+};
+
+std::vector<Big> derivative(Coefficients p) {
+  std::vector<Big> d;
+  for (int i = 1; i <= degree_of(p); ++i) d.push_back(i * p[i]);
+  return d;
+}
+
+// Adds the roots of p to the marks, among which are 0, 1 and all places at which p turns: in between p rises or falls.
+std::vector<Mark> with_roots(Coefficients p, std::vector<Mark> marks) {
+  std::vector<Mark> all;
+  int before = 0;
+  for (Mark& mark : marks) {
+    const int s = sign_at(p, mark.root);
+    if (before * s < 0) {
+      const Root &left = all.back().root, &right = mark.root;
+      const int k = std::max(left.k(), right.k());
+      all.push_back({Root(p, left.high() << (k - left.k()), right.low() << (k - right.k()), k, before), true});
+    }
+    before = s;
+    mark.zero = s == 0;
+    all.push_back(std::move(mark));
+  }
+  return all;
+}
+
+}  // namespace
+
+std::vector<Root> roots(Coefficients p) {
+  std::vector<std::vector<Big>> derivatives;
+  for (Coefficients d = p; d.size() > 2; d = derivatives.back()) derivatives.push_back(derivative(d));
+  std::vector<Mark> marks = {{Root(0, 0), false}, {Root(1, 0), false}};
+  for (std::size_t i = derivatives.size(); i-- > 0;) marks = with_roots(derivatives[i], std::move(marks));
+  std::vector<Root> found;
+  for (Mark& mark : with_roots(p, std::move(marks)))
+    if (mark.zero) found.push_back(std::move(mark.root));
+  return found;
+}
+
+}  // namespace hpccd::exact::wide

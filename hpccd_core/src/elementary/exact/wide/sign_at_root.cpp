@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "elementary/exact/wide/sign_at_root.h"
+
+#include <algorithm>
+
+#include "elementary/exact/wide/residue.h"
+
+namespace hpccd::exact::wide {
+namespace {
+
+template <class Number>
+std::vector<Number> copied(Coefficients p) {
+  std::vector<Number> v;
+  for (const Big& c : p) v.emplace_back(c);
+  return v;
+}
+
+// Whether the remainders of one polynomial by the other end in something else than zero, seen modulo a prime: if so, no
+// number is a root of both.
+bool certainly_no_common_root(Coefficients f, Coefficients q) {
+  if (f.size() < q.size()) std::swap(f, q);
+  auto a = copied<Residue>(f), b = copied<Residue>(q);
+  while (b.size() > 1) a = pseudo_remainder(std::move(a), b), a.swap(b);
+  return !b[0].zero();
+}
+
+// Both multiplied by what makes them coprime where the second one is `of`: den t - num with the root num / den of r, a
+// multiple of it, if q has that root. The lowest terms' denominator divides q's leading coefficient.
+std::vector<Big> common_line(const std::vector<Big>& r, Coefficients q) {
+  Big den = abs(gcd(Big(r[1] % q.back()), q.back())), num, rest;
+  divide_qr(Big(-r[0] * den), r[1], num, rest);
+  if (!rest.is_zero() || sign_at_ratio(q, num, den) != 0) return {};
+  return {-num, den};
+}
+
+// What f and q have in common, in lowest terms where it is of degree 1; empty where they have no common root.
+std::vector<Big> common_factor(Coefficients f, Coefficients q) {
+  if (f.size() < q.size()) std::swap(f, q);
+  if (q.size() == 2) return common_line(copied<Big>(q), f);
+  auto r = pseudo_remainder(copied<Big>(f), copied<Big>(q));
+  while (!r.empty() && r.back().is_zero()) r.pop_back();
+  if (r.empty()) return copied<Big>(q);
+  return r.size() == 1 ? std::vector<Big>{} : common_line(r, q);
+}
+
+bool vanishes_at(Coefficients q, Root& root) {
+  if (std::ranges::equal(q, root.of())) return true;
+  if (certainly_no_common_root(root.of(), q)) return false;
+  auto factor = common_factor(root.of(), q);
+  if (factor.empty() || sign_at_dyadic(factor, root.low(), root.k()) * sign_at_dyadic(factor, root.high(), root.k()) > 0)
+    return false;
+  if (factor.size() < root.of().size()) root.set_factor(std::move(factor));
+  return true;
+}
+
+}  // namespace
+
+int sign_at(Coefficients q, Root& root) {
+  if (q.empty()) return 0;
+  if (q.size() == 1) return sign(q[0]);
+  // Most signs show before the question whether there is one at all, which costs as much as a few steps, is worth it.
+  constexpr int patience = 3;
+  for (bool asked = false;;) {
+    if (root.exact()) return sign_at_dyadic(q, root.low(), root.k());
+    if (const int s = sign_on(q, root.low(), root.high(), root.k())) return s;
+    if (!asked && root.steps() >= patience) {
+      asked = true;
+      if (vanishes_at(q, root)) return 0;
+    }
+    root.narrow();
+  }
+}
+
+}  // namespace hpccd::exact::wide
