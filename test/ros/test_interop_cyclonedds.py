@@ -10,10 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from builtin_interfaces.msg import Time
-from hpccd.msg import ContactArray
+from hpccd.msg import ContactArray, MeshVertices
 from node_process import PATIENCE, assert_same_contacts
 from std_msgs.msg import Header
 from waving_sheet import scene_of, sheet_faces, sheet_positions
+
+from hpccd_ros import convert
 
 pytest.importorskip("cyclonedds", reason="Cyclone DDS is not installed: pip install 'hpccd[interop]'")
 
@@ -65,6 +67,32 @@ def test_large_messages_cross_over_udp(start_node, tmp_path):
     answers = play(node, tmp_path, sheet_faces(n), frames)
     assert_all_but_one(answers, frames, sheet_faces(n), accuracy=tier)
     assert answers[-1].total > 100_000
+
+
+STRANGER = """
+import os
+import sys
+import cyclone_types as types
+from cyclonedds.domain import DomainParticipant
+from cyclonedds.pub import DataWriter
+from cyclonedds.topic import Topic
+participant = DomainParticipant(int(os.environ["ROS_DOMAIN_ID"]))
+writer = DataWriter(participant, Topic(participant, sys.argv[1], types.MeshVertices))
+sys.stdin.read()
+"""
+
+
+def test_a_topic_that_ros_could_not_name_is_passed_over(start_node):
+    node = start_node({"meshes": ["cloth"]})
+    environment = {**os.environ, "CYCLONEDDS_URI": LOOPBACK, "PYTHONPATH": str(Path(__file__).parent)}
+    command = [sys.executable, "-c", STRANGER, f"rt{node.namespace}/meshes/9/vertices"]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, env=environment) as stranger:
+        there = (f"{node.namespace}/meshes/9/vertices", ["hpccd/msg/MeshVertices"])
+        node.wait_until(lambda: there in node.peer.node.get_topic_names_and_types(), "topic of the stranger")
+        misspelt = node.peer.publisher(MeshVertices, "meshes/clot/vertices")  # waits until the node listens
+        misspelt.publish(convert.vertices_message(sheet_positions(8, 0), 1))
+        node.frames_status(dropped__clot__unknown_mesh=1)
+        stranger.stdin.close()
 
 
 def assert_all_but_one(answers, frames, faces, **options):

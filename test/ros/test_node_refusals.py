@@ -148,6 +148,45 @@ def test_frames_of_an_unknown_mesh(streaming):
     goes_on()
 
 
+def unknown_topics(node):
+    """How the diagnostics name topics of unknown meshes."""
+    return [line for line in node.peer.statuses["frames"][1].split("; ") if " to no mesh " in line]
+
+
+def test_unknown_meshes_that_are_gone_make_room_for_others(streaming):
+    node, goes_on = streaming
+    create = node.peer.node.create_publisher
+    strays = [create(MeshVertices, f"meshes/stray{k}/vertices", 10) for k in range(19)]
+    node.wait_until(lambda: "3 more topics" in node.peer.statuses["frames"][1], "topics beyond the bound")
+    lines = unknown_topics(node)
+    assert len(lines) == 17 and "are not counted (16 are)" in lines[-1]
+    for stray in strays:
+        node.peer.node.destroy_publisher(stray)
+    node.wait_until(lambda: not unknown_topics(node), "topics without publishers to be let go")
+    node.peer.publisher(MeshVertices, "meshes/clot/vertices").publish(convert.vertices_message(GOOD, 1))
+    node.frames_status(dropped__clot__unknown_mesh=1, received__clot=1)
+    assert node.peer.node.count_subscribers(f"{node.namespace}/meshes/stray0/vertices") == 0
+    goes_on()
+
+
+def test_meshes_of_another_node_are_not_counted(streaming, start_node):
+    """Two nodes share the names; one who merely listens to everything, as recorders do, is no owner of a mesh."""
+    node, goes_on = streaming
+    rules = (f"meshes/ball/{kind}:={node.namespace}/meshes/ball/{kind}" for kind in ("topology", "vertices"))
+    other = start_node({"meshes": ["ball"]}, remaps=tuple(rules))
+    for name in ("ball", "clot"):
+        node.peer.node.create_subscription(MeshTopology, f"meshes/{name}/topology", lambda message: None, 10)
+    node.peer.topology("ball", FACES, N * N)
+    for k in range(3):
+        node.peer.vertices("ball", sheet_positions(N, k), k)
+        other.frames_status(received=k + 1, answered=k + 1)
+    node.peer.publisher(MeshVertices, "meshes/clot/vertices").publish(convert.vertices_message(GOOD, 1))
+    values = node.frames_status(dropped=1, dropped__clot__unknown_mesh=1)
+    assert "received.ball" not in values
+    assert not [line for line in unknown_topics(node) if "ball" in line]
+    goes_on()
+
+
 def test_vertices_without_a_topology(start_node):
     node = start_node({"meshes": ["cloth"], "pending_frames": 2})
     for k in range(5):
