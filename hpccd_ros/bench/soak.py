@@ -3,11 +3,11 @@
 changes of topology in every run, one from a publisher that is ended or killed and started again; wrong messages of
 ten kinds; a misspelt mesh; right and wrong requests to ~/detect. Every 25th answer (--check-every) is computed again.
 
-  hpccd bench soak                          half an hour, about a tenth of the machine
+  hpccd bench soak                          forty minutes, about a tenth of the machine
   hpccd bench soak --minutes 1 --rate 30
 
-In the warm-up the node is held up (SIGSTOP) until what waits for it is as much as it can be: the middleware keeps the
-memory for that, whenever it comes to be needed.
+In the warm-up the node is held up (SIGSTOP) until what waits for it is as much as it can be: so much its heap must
+have held once, whenever that comes.
 
 Fails where the node ends, an answer is wrong, a counter does not add up, or its resident memory changes by more than
 --memory-limit between the beginning (after --warm-up) and the end.
@@ -40,13 +40,13 @@ PATIENCE = 300.0  # s, for what takes less than one on a machine that is not bus
 
 def configure(parser):
     what = parser.add_argument_group("what is done")
-    what.add_argument("--minutes", type=float, default=30.0, metavar="M", help="(default: %(default)s)")
+    what.add_argument("--minutes", type=float, default=40.0, metavar="M", help="(default: %(default)s)")
     what.add_argument("--rate", type=float, default=10.0, metavar="HZ", help="frames a second (default: %(default)s)")
     what.add_argument("--restart-every", type=float, default=12.0, metavar="S",
                       help="life of the publisher that is restarted, s, on average (default: %(default)s)")
-    what.add_argument("--warm-up", type=float, default=0.1, metavar="X",
-                      help="share of the time before memory counts (default: %(default)s)")
-    what.add_argument("--memory-limit", type=float, default=2.0, metavar="PERCENT",
+    what.add_argument("--warm-up", type=float, default=0.25, metavar="X",
+                      help="share of the time before memory counts (default: %(default)s, ten of forty minutes)")
+    what.add_argument("--memory-limit", type=float, default=1.0, metavar="PERCENT",
                       help="largest change of resident memory (default: %(default)s)")
     what.add_argument("--check-every", type=int, default=25, metavar="N",
                       help="compute every Nth answer again (default: %(default)s)")
