@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """See it work, in about half a minute: starts the node, a publisher that streams a moving scene, and a recorder,
 as separate processes over DDS; shows the contacts as they come; verifies the recording; draws its worst frame.
+No frame is dropped: each waits for the answer to the one before, so that a slow machine plays the scene slower.
 
   hpccd demo                                a small cloth falls on a ball that then spins
   hpccd demo --scene n-body-like-lr --rate 10
