@@ -100,6 +100,7 @@ class HpccdNode(GuardedLifecycleNode):
         self._links: Counter = Counter()
         self._reporter = Reporter(self.get_fully_qualified_name(), self._metrics, self._drops, self._refused)
         self._inputs: Inputs | None = None
+        self._before: Counter = Counter()  # restarts, static_taken: counts of inputs that are gone
         self._unknown: UnknownMeshWatch | None = None
         self._service: DetectService | None = None
         self._served = new_counts()
@@ -212,7 +213,14 @@ class HpccdNode(GuardedLifecycleNode):
             self._service.close()
             self._service = None
         self._configured.close()
+        self._before = self._counted_by_inputs()
         self._inputs = None
+
+    def _counted_by_inputs(self) -> Counter:
+        if self._inputs is None:
+            return self._before
+        assembler = self._inputs.assembler
+        return self._before + Counter(restarts=assembler.restarts, static_taken=assembler.static_taken)
 
     def _publisher(self, kind: type, topic: str, profile: QoSProfile) -> Publisher:
         publisher = self.create_publisher(kind, topic, profile)
@@ -332,6 +340,7 @@ class HpccdNode(GuardedLifecycleNode):
 
     def _report(self) -> None:
         inputs = self._inputs
+        counts = self._counted_by_inputs()
         waiting = inputs.waiting if inputs else 0
         if self._queue is not None:
             held = [*self._queue.frames(), self._thread.working_on]
@@ -341,8 +350,8 @@ class HpccdNode(GuardedLifecycleNode):
                 self.get_clock().now().to_msg(),
                 state=self.state,
                 waiting=waiting,
-                restarts=inputs.assembler.restarts if inputs else 0,
-                static_taken=inputs.assembler.static_taken if inputs else 0,
+                restarts=counts["restarts"],
+                static_taken=counts["static_taken"],
                 last_refusal=self._log.last,
                 links=self._links,
                 warnings=[line for part in (inputs, self._unknown) if part is not None for line in part.warnings()],

@@ -237,6 +237,21 @@ def test_scene_is_changed_while_unconfigured(start_node):
     assert assert_same_contacts(message, *(np.concatenate([f, frames[3]]) for f in frames[2:]), scene) > 0
 
 
+def test_counts_outlive_a_clean_up(start_node):
+    node = start_node({"meshes": ["cloth", "floor"], "mesh": {"floor": {"static": True}}})
+    for name in ("cloth", "floor"):
+        node.peer.topology(name, FACES, N * N)
+    node.peer.vertices("floor", sheet_positions(N, 5), 0)
+    node.frames_status(received=1, answered=1)
+    stream(node, range(3))
+    node.peer.vertices("cloth", sheet_positions(N, 0), 0)  # begins before what was answered
+    node.frames_status(received=5, answered=4, dropped=1)
+    assert change_state(node, Transition.TRANSITION_DEACTIVATE) and change_state(node, Transition.TRANSITION_CLEANUP)
+    node.peer.statuses.clear()
+    assert change_state(node, Transition.TRANSITION_CONFIGURE)
+    node.frames_status(received=5, answered=4, dropped=1)
+
+
 def test_values_of_a_type_that_does_not_exist_are_refused(start_node):
     node = start_node({"meshes": ["cloth"]})
     good = Parameter("report", value="first").to_parameter_msg()
