@@ -214,12 +214,14 @@ def vertices_message(
 class Layout:
     """Where each mesh lies in the scene-wide numbering of the core.
 
-    ``vertex_offsets``, ``face_offsets``: (K+1,) int64, the last entry is the total.
+    ``vertex_offsets``, ``face_offsets``: (K+1,) int64, the last entry is the total. ``topology_versions``: one for each
+    mesh; empty: not known.
     """
 
     mesh_names: tuple[str, ...]
     vertex_offsets: np.ndarray
     face_offsets: np.ndarray
+    topology_versions: tuple[int, ...] = ()
 
     @classmethod
     def of(cls, mesh_names: tuple[str, ...], topologies: tuple[Topology, ...]) -> "Layout":
@@ -228,6 +230,7 @@ class Layout:
             tuple(mesh_names),
             np.cumsum([0] + [t.n_vertices for t in topologies], dtype=np.int64),
             np.cumsum([0] + [len(t.faces) for t in topologies], dtype=np.int64),
+            tuple(t.version for t in topologies),
         )
 
 
@@ -272,6 +275,7 @@ def fill_contacts(
     np.concatenate([vf_toc, ee_toc], out=np.frombuffer(toc))
 
     message.mesh_names = list(layout.mesh_names)
+    message.topology_versions = array("I", layout.topology_versions)
     # Only now: the setters copy, unless the message was made with check_fields=True.
     message.kind, message.mesh_a, message.mesh_b = kind, mesh_a, mesh_b
     message.features_a, message.features_b, message.toc = features_a, features_b, toc
@@ -320,8 +324,21 @@ class SceneContacts:
     normals: np.ndarray
 
 
+def other_topologies(message: ContactArray, layout: Layout) -> str | None:
+    """In words, where both tell the versions of their topologies and these differ; else None."""
+    of_message, of_layout = tuple(message.topology_versions), layout.topology_versions
+    if not of_message or not of_layout or of_message == of_layout:
+        return None
+    return f"the contacts are of topology versions {list(of_message)}, the layout is of {list(of_layout)}"
+
+
 def read_contacts(message: ContactArray, layout: Layout) -> SceneContacts:
-    """The inverse of fill_contacts (what was cut off stays cut off). points, normals: (N,3) or (0,3)."""
+    """The inverse of fill_contacts (what was cut off stays cut off). points, normals: (N,3) or (0,3).
+
+    Raises ValueError where the message belongs to other versions of the topologies than the layout.
+    """
+    if why := other_topologies(message, layout):
+        raise ValueError(f"layout: {why}; make it of the topologies of these versions")
     kind = np.frombuffer(message.kind, np.uint8)
     n_vf = int(np.count_nonzero(kind == ContactArray.VERTEX_FACE))
     mesh_a = np.frombuffer(message.mesh_a, np.uint32)

@@ -16,6 +16,35 @@ def message_class(type_name: str):
         raise LookupError(f"message type {type_name} is not installed here: {error}") from error
 
 
+# Fields that were added behind the last one of a message, and the CDR of their value in a recording from before.
+_ADDED = {"hpccd/msg/ContactArray": ("uint32[] topology_versions", b"\0\0\0\0")}
+
+
+def completion(topic: RecordedTopic) -> bytes | None:
+    """What must follow each recorded message of `topic`, that it be one of the type that is installed here.
+
+    None where it was recorded with another definition. Raises LookupError where the type is not installed.
+    """
+    installed = mcap_schema.definition_text(topic.type_name)
+    # The hash says whether two definitions have the same fields; the text would also differ by a comment.
+    if topic.type_hash == mcap_schema.type_hash(topic.type_name):
+        return b""
+    then, now = _fields(topic.definition), _fields(installed)
+    if not topic.type_hash and then == now:
+        return b""
+    added, tail = _ADDED.get(topic.type_name, (None, None))
+    return tail if then == {name: [f for f in fields if f != added] for name, fields in now.items()} else None
+
+
+def _fields(definition: str) -> dict[str, list[str]]:
+    """Name of the type, "" for the first -> its fields and constants, without comments."""
+    own, *others = definition.split(mcap_schema.SEPARATOR)
+    sections = {"": own} | {name: text for name, _, text in (other.lstrip().partition("\n") for other in others)}
+    lines = {name: (" ".join(line.partition("#")[0].split()) for line in text.splitlines())
+             for name, text in sections.items()}  # fmt: skip
+    return {name: [line for line in of_type if line] for name, of_type in lines.items()}
+
+
 def make_decoder(topic: RecordedTopic):
     """Function (RecordedMessage -> message object) for `topic`.
 
@@ -25,22 +54,19 @@ def make_decoder(topic: RecordedTopic):
     from rclpy.serialization import deserialize_message
 
     try:
-        cls = message_class(topic.type_name)
-        installed = (mcap_schema.type_hash(topic.type_name), mcap_schema.definition_text(topic.type_name))
+        cls, tail = message_class(topic.type_name), completion(topic)
     except LookupError as error:
         raise RecordingError(f"topic {topic.name} cannot be decoded: {error}") from error
-    # The hash says whether two definitions have the same fields; the text would also differ by a comment.
-    same = topic.type_hash == installed[0] if topic.type_hash else topic.definition.split() == installed[1].split()
-    if not same:
+    if tail is None:
         raise RecordingError(
             f"topic {topic.name} was recorded with another definition of {topic.type_name} "
-            f"(recorded {topic.type_hash or 'without a hash'}, installed {installed[0]}): "
+            f"(recorded {topic.type_hash or 'without a hash'}, installed {mcap_schema.type_hash(topic.type_name)}): "
             "replay it with the version of the package that recorded it"
         )
 
     def decode(message):
         try:
-            return deserialize_message(message.data, cls)
+            return deserialize_message(message.data + tail if tail else message.data, cls)
         except Exception as error:  # rclpy raises RMWError, RCLError or MemoryError, by what is wrong in the bytes
             raise RecordingError(
                 f"message of {topic.name} received at {message.log_time} ns is no valid {topic.type_name}: {error}"

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Play recorded messages over DDS: the very bytes, with the recorded quality of service, in their rhythm."""
+"""Play recorded messages over DDS: the very bytes, with the recorded quality of service, in their rhythm.
+
+Only where a message has got a field since it was recorded, an empty one is added: its readers expect one.
+"""
 
 import itertools
 import signal
@@ -13,7 +16,7 @@ from rclpy.signals import SignalHandlerOptions
 from hpccd_ros import _env, qos, replay_setup, transform_topics
 from hpccd_ros.errors import UserError
 from hpccd_ros.listeners import await_acknowledged, await_subscribers
-from hpccd_ros.mcap_decode import message_class
+from hpccd_ros.mcap_decode import completion, message_class
 from hpccd_ros.mcap_reader import RecordedTopic, Recording, RecordingError
 from hpccd_ros.pacing import Pace, next_wanted
 
@@ -36,10 +39,11 @@ def main(args) -> int:
         node = rclpy.create_node("hpccd_replay", start_parameter_services=False)
         try:
             publishers = {topic.name: _publisher(node, topic) for topic in topics}
+            tails = {topic.name: completion(topic) or b"" for topic in topics}
             lacking = await_subscribers(publishers, args.subscribers, args.wait, stop)
             if lacking and not stop:
                 raise UserError(_too_few(lacking, args.subscribers))
-            count = _play(recording, publishers, args, stop)
+            count = _play(recording, publishers, tails, args, stop)
             await_acknowledged(publishers.values(), LAST)
         finally:
             node.destroy_node()
@@ -88,7 +92,7 @@ def _too_few(lacking: dict[str, int], wanted: int) -> str:
     return f"fewer than {wanted} subscribe to {names}: start them first, --wait longer, or ask for fewer --subscribers"
 
 
-def _play(recording, publishers, args, stop) -> int:
+def _play(recording, publishers, tails, args, stop) -> int:
     count, first, last_frame = 0, None, None
     pace = Pace(1.0 if args.rate is None else args.rate, stop)
     latched, begun = {}, set()
@@ -104,7 +108,7 @@ def _play(recording, publishers, args, stop) -> int:
         if stop or at > args.end:
             break
         for earlier in itertools.chain.from_iterable(latched.values()):
-            publishers[earlier.topic].publish(earlier.data)
+            publishers[earlier.topic].publish(earlier.data + tails[earlier.topic])
             count += 1
         await_acknowledged([publishers[topic] for topic in latched], args.wait, stop)
         latched.clear()
@@ -116,7 +120,7 @@ def _play(recording, publishers, args, stop) -> int:
             last_frame = message.log_time
         else:
             pace.wait(at)
-        publishers[message.topic].publish(message.data)
+        publishers[message.topic].publish(message.data + tails[message.topic])
         count += 1
         if message.topic not in begun:
             begun.add(message.topic)

@@ -15,6 +15,9 @@ def difference(recorded, contacts, layout: Layout, any_one: bool = False) -> str
     on the timing of its threads: only whether there is one can be compared.
     """
     total = len(contacts.vf) + len(contacts.ee)
+    then, now = list(recorded.topology_versions), list(layout.topology_versions)
+    if then and then != now:  # recordings from before there were any hold none
+        return f"topology versions {then} were recorded, now they are {now}"
     if any_one:
         return None if bool(recorded.total) == bool(total) else _count(recorded.total, total)
     if problem := _malformed(recorded, layout):

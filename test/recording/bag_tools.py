@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Read recordings with independent readers, and write changed copies of them."""
 
+import dataclasses
 from pathlib import Path
 
 from rosbags.highlevel import AnyReader
@@ -8,6 +9,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from hpccd_ros import mcap_schema
 from hpccd_ros.mcap_bag import BagWriter, Topic
+from hpccd_ros.mcap_decode import completion
 from hpccd_ros.mcap_reader import Recording
 
 STRING = "std_msgs/msg/String"
@@ -46,6 +48,13 @@ def raw_messages(path):
         return list(recording.messages())
 
 
+def as_installed(recording):
+    """Messages of a recording that may be older than the package, with the fields that their types have got since."""
+    tails = {topic.name: completion(topic) for topic in recording.topics.values()}
+    for message in recording.messages():
+        yield dataclasses.replace(message, data=message.data + tails[message.topic])
+
+
 def rewrite(source, target, change=lambda index, message, decoded: decoded, info=...):
     """Copy a recording; `change(index, message, decoded)` gives the decoded message to write, or None to leave it out.
 
@@ -57,7 +66,7 @@ def rewrite(source, target, change=lambda index, message, decoded: decoded, info
         writer = BagWriter(target, info=recording.info if info is ... else info)
         for topic in recording.topics.values():
             writer.add_topic(Topic(topic.name, topic.type_name, []))
-        for message in recording.messages():
+        for message in as_installed(recording):
             type_name = recording.topics[message.topic].type_name
             index = counts[message.topic] = counts.get(message.topic, -1) + 1
             decoded = store.deserialize_cdr(message.data, type_name)

@@ -6,11 +6,14 @@ import time
 
 import numpy as np
 import pytest
+import rclpy
 from bag_tools import read_by_mcap_ros2, read_by_rosbags, typestore
 from live import PATIENCE, Live
+from rclpy.executors import SingleThreadedExecutor
 from rosbags.rosbag2 import Reader
 
-from hpccd_ros import replay_setup, scenes
+from hpccd_ros import _env, replay_setup, scenes
+from hpccd_ros.mcap_decode import message_class
 from hpccd_ros.mcap_reader import Recording
 from hpccd_ros.replay import Replay
 
@@ -50,6 +53,7 @@ def test_recorded_live_read_by_others_and_verified(live, namespace, tmp_path, st
 
     steps = _verified(path)
     assert [step.step for step in steps] == list(range(1, FRAMES)), "every step is recorded and verified"
+    assert all(list(step.recorded.topology_versions) == [0, 0] for step in steps)
 
     scene = scenes.make("cloth-drop", size=0.1, frames=FRAMES)
     messages = read_by_rosbags(path)
@@ -167,3 +171,35 @@ def test_mesh_file_travels_with_the_recording(children, namespace, tmp_path):
     assert len(steps) == FRAMES - 1
     assert steps[0].layout.mesh_names == ("cloth", "ball", "floor")
     assert sum(step.total for step in steps) > 0
+
+
+def test_answers_are_played_as_those_of_today(children, small_bag):
+    """The recording is from before answers told the versions of their topologies."""
+    with Recording(small_bag) as recording:
+        topics = recording.topics.values()
+        begin = next(recording.messages()).log_time
+        expected = sum(message.log_time <= begin + 500_000_000 for message in recording.messages(["/contacts"]))
+    received = []
+    _env.prepare()
+    context = rclpy.Context()
+    rclpy.init(context=context)
+    node = rclpy.create_node("listener", context=context)
+    executor = SingleThreadedExecutor(context=context)
+    executor.add_node(node)
+    for topic in topics:
+        take = received.append if topic.name == "/contacts" else lambda message: None
+        node.create_subscription(message_class(topic.type_name), topic.name, take, 1000)
+
+    def all_there():
+        executor.spin_once(timeout_sec=0.05)
+        return len(received) == expected
+
+    options = ("--publish", "--all", "--to", "0.5", "--wait", str(PATIENCE))
+    children.start("player", "hpccd_ros.cli", "replay", str(small_bag), *options)
+    children.wait(all_there, f"{expected} answers were not heard", PATIENCE)
+    executor.shutdown()
+    node.destroy_node()
+    rclpy.shutdown(context=context)
+    assert expected > 5
+    assert [message.hash for message in received] == [step.recorded.hash for step in _verified(small_bag)][:expected]
+    assert all(message.backend == "cpu" and not message.topology_versions for message in received)

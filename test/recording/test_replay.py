@@ -2,15 +2,17 @@
 """A replay finds the recorded contacts again, and says where they differ if they do."""
 
 import csv
+import dataclasses
 import json
 import re
 
 import numpy as np
 import pytest
-from bag_tools import rewrite
+from bag_tools import as_installed, rewrite, typestore
 
 from hpccd_ros import replay_setup
 from hpccd_ros.mcap_bag import BagWriter, Topic
+from hpccd_ros.mcap_decode import completion, make_decoder
 from hpccd_ros.mcap_reader import Recording, RecordingError
 from hpccd_ros.replay import Replay
 
@@ -48,6 +50,38 @@ def test_an_unchanged_copy_is_verified(small_bag, tmp_path):
     rewrite(small_bag, tmp_path / "copy.mcap")
     replay, _ = _replay(tmp_path / "copy.mcap")
     assert (replay.verified, replay.diverged) == (89, 0)
+
+
+def test_a_recording_with_topology_versions(small_bag, tmp_path):
+    """The one of the repository is from before they were told; as a node records them now."""
+    _, before = _replay(small_bag)
+    assert not any(len(step.recorded.topology_versions) for step in before)
+
+    def edit(index, message, decoded):
+        if message.topic == "/contacts":
+            _set("topology_versions", np.zeros(2, np.uint32))(decoded)
+        return decoded
+
+    rewrite(small_bag, tmp_path / "now.mcap", edit)
+    replay, steps = _replay(tmp_path / "now.mcap")
+    assert (replay.verified, replay.diverged) == (89, 0)
+    assert all(list(step.recorded.topology_versions) == [0, 0] for step in steps)
+
+
+@pytest.mark.parametrize("with_hash", [True, False], ids=["hash", "text only"])
+def test_definitions_that_only_lack_what_was_added(small_bag, with_hash):
+    with Recording(small_bag) as recording:
+        topic = recording.topics["/contacts"]
+        old = topic if with_hash else dataclasses.replace(topic, type_hash="")
+        message = next(recording.messages(["/contacts"]))
+        decoded = make_decoder(old)(message)
+        assert list(decoded.mesh_names) == ["cloth", "ball"] and decoded.backend == "cpu"
+        store = typestore()
+        complete = store.deserialize_cdr(message.data + completion(old), topic.type_name)
+        assert complete.hash == decoded.hash and len(complete.topology_versions) == 0
+        other = dataclasses.replace(old, definition=topic.definition.replace("uint64 total", "uint32 total"))
+        with pytest.raises(RecordingError, match="another definition of hpccd/msg/ContactArray"):
+            make_decoder(other)
 
 
 def _first_edge_edge(decoded):
@@ -88,6 +122,7 @@ def _set(name, value):
         (_set("first_toc", 0.5), r"first time of contact: recorded 0\.5, now"),
         (_set("toc", np.zeros(3)), r"malformed: toc has 3 entries"),
         (_set("mesh_names", ["cloth", "sphere"]), r"malformed: its meshes are"),
+        (_set("topology_versions", np.array([0, 3], np.uint32)), r"\[0, 3\] were recorded, now they are \[0, 0\]"),
         (_set("mesh_a", np.full(1, 9, np.uint32)), r"malformed: mesh_a has 1 entries"),
     ],
 )
@@ -167,7 +202,7 @@ def test_answers_before_their_frames(small_bag, tmp_path):
         writer = BagWriter(tmp_path / "early.mcap", info=recording.info)
         for topic in recording.topics.values():
             writer.add_topic(Topic(topic.name, topic.type_name, []))
-        for message in recording.messages():
+        for message in as_installed(recording):
             early = 500_000_000 if message.topic == "/contacts" else 0
             writer.write(message.topic, message.data, message.log_time - early, message.publish_time, message.sequence)
         writer.close()

@@ -63,3 +63,4 @@ class ContactArray(IdlStruct, typename="hpccd::msg::dds_::ContactArray_"):
     accuracy: str
     backend: str
     dropped_frames: uint64
+    topology_versions: sequence[uint32]

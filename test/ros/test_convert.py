@@ -16,6 +16,7 @@ from sensor_msgs.msg import PointCloud2, PointField
 from hpccd_ros import convert
 from hpccd_ros.convert import InvalidMessageError, Layout
 from hpccd_ros.drops import Reason
+from hpccd_ros.messages import Topology
 
 POINTS = np.arange(12, dtype=np.float32).reshape(4, 3) * 0.5
 
@@ -286,6 +287,19 @@ def test_contacts_read_back():
             value = getattr(back, name)
             assert np.array_equal(value, getattr(found, name)), name
             assert value.dtype == getattr(found, name).dtype
+
+
+def test_topology_versions():
+    faces = np.array([[0, 1, 2]], np.uint32)
+    layout = Layout.of(("cloth", "ball"), (Topology(7, 3, faces), Topology(2**32 - 1, 3, faces)))
+    message = filled(contacts([[3, 0]], [], [0.5], []), layout)
+    assert list(message.topology_versions) == [7, 2**32 - 1]
+    assert convert.read_contacts(message, layout).vf.tolist() == [[3, 0]]
+    other = Layout.of(("cloth", "ball"), (Topology(8, 3, faces), Topology(2**32 - 1, 3, faces)))
+    with pytest.raises(ValueError, match=r"layout: .* versions \[7, 4294967295\], the layout is of \[8, 4294967295\]"):
+        convert.read_contacts(message, other)
+    message.topology_versions = array("I")  # from before they were told
+    assert convert.read_contacts(message, other).vf.tolist() == [[3, 0]]
 
 
 def test_no_contacts():

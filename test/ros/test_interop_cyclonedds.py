@@ -56,6 +56,7 @@ def test_peer_gets_the_contacts_of_the_core(start_node, tmp_path, dtype):
     for answer in answers:
         assert len(answer.points) == len(answer.normals) == 3 * answer.total
         assert (answer.header.frame_id, list(answer.mesh_names)) == ("lab", ["cloth"])
+        assert list(answer.topology_versions) == [3]
     node.frames_status(received=6, answered=6, dropped=0)
 
 

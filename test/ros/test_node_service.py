@@ -81,6 +81,14 @@ def test_meshes_that_the_node_does_not_have(node):
     assert list(answer.contacts.mesh_names) == ["left", "right"]
 
 
+def test_topology_versions_are_those_of_the_request(node):
+    given = request(names=("left", "right"))
+    for i, version in enumerate((7, 2**32 - 1)):
+        given.topologies[i].version = given.start[i].topology_version = given.end[i].topology_version = version
+    (answer,) = ask(node, given)
+    assert list(answer.contacts.topology_versions) == [7, 2**32 - 1]
+
+
 def test_topology_of_the_stream_is_used(node):
     (answer,) = ask(node, request(topologies=False))
     assert not answer.success and "no topology yet" in answer.message

@@ -120,6 +120,7 @@ def test_topology_change_in_mid_stream(start_node):
     node.peer.vertices("cloth", b[1], stamp=11, topology_version=2)
     message = node.contacts(2)[1]
     assert convert.stamp_to_ns(message.start) == 10, "no motion from the old topology to the new one"
+    assert [list(m.topology_versions) for m in node.contacts(2)] == [[1], [2]]
     assert_same_contacts(message, b[0], b[1], scene_of(cloth=large))
     node.peer.vertices("cloth", a[0], stamp=12, topology_version=1)
     node.frames_status(dropped=1, dropped__cloth__old_topology=1)
