@@ -8,9 +8,9 @@ the module of the command that was asked for is imported: `hpccd --help` needs n
 import argparse
 import importlib
 import importlib.util
+import signal
 import sys
 
-from hpccd_ros import dds_security
 from hpccd_ros.errors import UserError
 
 COMMANDS = {
@@ -38,6 +38,50 @@ exit status: 0 done, 1 a check failed, 2 wrong use or unusable input, 130 interr
 def main(argv=None) -> int:
     """Run the command line `argv` (default: that of the process) and return the exit status."""
     argv = sys.argv[1:] if argv is None else list(argv)
+    asked = next((word for word in argv if not word.startswith("-")), None)
+    name = f"hpccd {asked}" if asked in COMMANDS else "hpccd"
+    interrupts = _Interrupts()
+    try:
+        return _run(argv, asked)
+    except UserError as error:
+        print(f"{name}: {error}", file=sys.stderr)
+        return 2
+    except BrokenPipeError:
+        # The reader of our output (`| head`) has gone: nothing left to say, and nothing to say it to.
+        sys.stderr.close()
+        return 0
+    except (Exception, KeyboardInterrupt) as error:
+        # An interrupted import of a library may come out as its own error.
+        if interrupts.came or isinstance(error, KeyboardInterrupt):
+            print(f"{name}: interrupted", file=sys.stderr)
+            return 130
+        if not isinstance(error, RuntimeError) or (why := _ros_refusal(error)) is None:
+            raise
+        print(f"{name}: {why}", file=sys.stderr)
+        return 2
+    finally:
+        interrupts.close()
+
+
+class _Interrupts:
+    """Python's own answer to SIGINT, which also remembers that it came; nothing where SIGINT is not left to Python."""
+
+    def __init__(self):
+        self.came = False
+        self._ours = signal.getsignal(signal.SIGINT) is signal.default_int_handler
+        if self._ours:
+            signal.signal(signal.SIGINT, self._answer)
+
+    def close(self):
+        if self._ours:
+            signal.signal(signal.SIGINT, signal.default_int_handler)
+
+    def _answer(self, number, frame):
+        self.came = True
+        raise KeyboardInterrupt
+
+
+def _run(argv, asked) -> int:
     parser = argparse.ArgumentParser(
         prog="hpccd",
         description="Continuous collision detection of deforming triangle meshes, at home in ROS 2.",
@@ -45,7 +89,6 @@ def main(argv=None) -> int:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     subparsers = parser.add_subparsers(dest="command", metavar="<command>", required=True)
-    asked = next((word for word in argv if not word.startswith("-")), None)
     run = None
     for name, summary in COMMANDS.items():
         if importlib.util.find_spec(f"hpccd_ros.commands.{name}") is None:
@@ -58,24 +101,16 @@ def main(argv=None) -> int:
             subparser.description = module.__doc__
             module.configure(subparser)
             run = module.run
-    args = parser.parse_args(argv)
-    try:
-        return run(args) or 0
-    except UserError as error:
-        print(f"hpccd {args.command}: {error}", file=sys.stderr)
-        return 2
-    except RuntimeError as error:  # rclpy's own errors are
-        if (why := dds_security.refusal(error)) is None:
-            raise
-        print(f"hpccd {args.command}: {why}", file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        print(f"hpccd {args.command}: interrupted", file=sys.stderr)
-        return 130
-    except BrokenPipeError:
-        # The reader of our output (`| head`) has gone: nothing left to say, and nothing to say it to.
-        sys.stderr.close()
-        return 0
+    return run(parser.parse_args(argv)) or 0
+
+
+def _ros_refusal(error) -> str | None:
+    if "rclpy" not in sys.modules:
+        return None  # not of ROS; most commands need none
+    from hpccd_ros import ros_start
+
+    refused = ros_start.refusal(error)
+    return refused and refused[1]
 
 
 if __name__ == "__main__":

@@ -11,9 +11,8 @@ from collections import deque
 import rclpy
 import yaml
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
-from rclpy.signals import SignalHandlerOptions
 
-from hpccd_ros import _env, qos, replay_setup, transform_topics
+from hpccd_ros import _env, qos, replay_setup, ros_start, transform_topics
 from hpccd_ros.errors import UserError
 from hpccd_ros.listeners import await_acknowledged, await_subscribers
 from hpccd_ros.mcap_decode import completion, message_class
@@ -34,8 +33,7 @@ def main(args) -> int:
     with Recording(args.file) as recording:
         topics = _topics(recording, args)
         _env.prepare()
-        rclpy.init(args=["--ros-args", *args.ros_args] if args.ros_args else None,
-                   signal_handler_options=SignalHandlerOptions.NO)
+        ros_start.init(["--ros-args", *args.ros_args] if args.ros_args else None)
         node = rclpy.create_node("hpccd_replay", start_parameter_services=False)
         try:
             publishers = {topic.name: _publisher(node, topic) for topic in topics}

@@ -9,9 +9,8 @@ from pathlib import Path
 
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
-from rclpy.signals import SignalHandlerOptions
 
-from hpccd_ros import _env, node_parameters, recorded_topics
+from hpccd_ros import _env, node_parameters, recorded_topics, ros_start
 from hpccd_ros.errors import UserError
 from hpccd_ros.mcap_bag import BagWriter
 from hpccd_ros.mcap_decode import message_class
@@ -26,8 +25,7 @@ def main(args) -> int:
     target = Path(args.output or datetime.now().strftime("hpccd-%Y%m%d-%H%M%S.mcap"))
     stop = _stop_on_signals()
     _env.prepare()
-    rclpy.init(args=["--ros-args", *args.ros_args] if args.ros_args else None,
-               signal_handler_options=SignalHandlerOptions.NO)
+    ros_start.init(["--ros-args", *args.ros_args] if args.ros_args else None)
     namespace, _, name = args.node.rpartition("/")
     if not name or not args.node.startswith("/"):
         raise UserError(f"--node {args.node}: give the full name with its namespace, for example /hpccd")

@@ -15,11 +15,11 @@ from node_process import PATIENCE
 import hpccd_ros
 
 ROOT = Path(hpccd_ros.__file__).resolve().parents[1]
-SCRIPTS = Path(__file__).resolve().parents[2] / "scripts"
+HERE = Path(__file__).resolve().parents[2]
 WAYS = {
     "module": [sys.executable, "-m", "hpccd_ros.node"],
     "console": [str(Path(sys.executable).with_name("hpccd_node"))],
-    "ros2-run": [sys.executable, str(SCRIPTS / "hpccd_node")],
+    "ros2-run": [sys.executable, str(HERE / "scripts" / "hpccd_node")],
 }
 
 
@@ -36,7 +36,7 @@ def has_loaded(library):
 def told_to_end(command, number, moment, delay=0.0):
     """(exit status, output) of a node that is sent a signal so many seconds after ``moment(pid)`` has come true."""
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    node = subprocess.Popen(command, cwd=ROOT, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+    node = subprocess.Popen(command, cwd=HERE, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
     deadline = time.monotonic() + PATIENCE
     while node.poll() is None and not moment(node.pid):
         assert time.monotonic() < deadline
@@ -65,3 +65,12 @@ def test_a_signal_while_the_node_starts():
         status, output = told_to_end(WAYS["module"], number, has_loaded("_rclpy_pybind11"), 0.2 * step)
         assert status == 0 and "Traceback" not in output, (step, output)
         assert all("[hpccd]: active: meshes" in line for line in output.splitlines()), output
+
+
+@pytest.mark.parametrize("command", [["info"], ["replay", "bags/cloth-drop-small.mcap", "--publish"]], ids=" ".join)
+def test_a_command_interrupted_while_it_loads_says_so(command):
+    for step in range(4):
+        # An import of numpy or rclpy that is interrupted may come out as an error of theirs.
+        whole = [sys.executable, "-m", "hpccd_ros.cli", *command]
+        outcome = told_to_end(whole, signal.SIGINT, has_loaded("_multiarray_umath"), 0.015 * step)
+        assert outcome == (130, f"hpccd {command[0]}: interrupted\n")
