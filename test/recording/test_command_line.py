@@ -74,3 +74,21 @@ def test_info(hpccd):
     found = json.loads(done.stdout)
     assert "cpu" in found["backends"] and "exact" in found["accuracies"]
     assert found["packages"]["mcap"] and found["cores"] >= 1
+
+
+def test_interrupted_within_an_import():
+    """numpy's C parts make an ImportError of the exception that a SIGINT raises while they load."""
+    code = (
+        "import builtins, signal, sys\n"
+        "load = builtins.__import__\n"
+        "def told_to_end(name, *rest, **named):\n"
+        "    from_c = sys._getframe(1).f_code.co_name == '_call_with_frames_removed'\n"
+        "    if from_c and name == 'numpy._core._multiarray_umath': signal.raise_signal(signal.SIGINT)\n"
+        "    return load(name, *rest, **named)\n"
+        "builtins.__import__ = told_to_end\n"
+        "from hpccd_ros import cli\n"
+        "sys.exit(cli.main(['replay', 'run.mcap']))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 130, done.stderr
+    assert done.stderr.splitlines()[-1] == "hpccd replay: interrupted"

@@ -65,12 +65,3 @@ def test_a_signal_while_the_node_starts():
         status, output = told_to_end(WAYS["module"], number, has_loaded("_rclpy_pybind11"), 0.2 * step)
         assert status == 0 and "Traceback" not in output, (step, output)
         assert all("[hpccd]: active: meshes" in line for line in output.splitlines()), output
-
-
-@pytest.mark.parametrize("command", [["info"], ["replay", "bags/cloth-drop-small.mcap", "--publish"]], ids=" ".join)
-def test_a_command_interrupted_while_it_loads_says_so(command):
-    for step in range(4):
-        # An import of numpy or rclpy that is interrupted may come out as an error of theirs.
-        whole = [sys.executable, "-m", "hpccd_ros.cli", *command]
-        outcome = told_to_end(whole, signal.SIGINT, has_loaded("_multiarray_umath"), 0.015 * step)
-        assert outcome == (130, f"hpccd {command[0]}: interrupted\n")
