@@ -6,8 +6,8 @@ ten kinds; a misspelt mesh; right and wrong requests to ~/detect. Every 25th ans
   hpccd bench soak                          forty minutes, about a tenth of the machine
   hpccd bench soak --minutes 1 --rate 30
 
-In the warm-up the node is held up (SIGSTOP) until what waits for it is as much as it can be: so much its heap must
-have held once, whenever that comes.
+In the warm-up the node is held up (SIGSTOP) until what waits for it is as much as it can be, in its queues and in the
+shared memory of the publisher: what it takes for that counts as its own from then on, whenever it comes.
 
 Fails where the node ends, an answer is wrong, a counter does not add up, or its resident memory changes by more than
 --memory-limit between the beginning (after --warm-up) and the end.
@@ -159,6 +159,7 @@ class _Soak:
                     self._node.process.send_signal(signal.SIGSTOP)
                     hold_at = math.inf
                 if now >= release_at:
+                    self._load.fill_segment()
                     self._node.process.send_signal(signal.SIGCONT)
                     release_at = math.inf
                 if now >= restart_at:

@@ -26,6 +26,7 @@ HISTORY = 10_000  # frames that an answer may name: what a busy machine holds up
 MISCHIEF_EVERY = 7  # frames
 REQUEST_EVERY = 20  # frames
 UNKNOWN_EVERY = 50  # frames
+SEGMENT = 16 << 20  # bytes of shared memory that a publisher has (config/fastdds*.xml)
 
 
 def node_parameters(scene: scenes.Scene) -> dict[str, Any]:
@@ -110,6 +111,14 @@ class SoakLoad:
             self._misspelt.publish(convert.vertices_message(frame[0][:9], stamp))
         if self._count % REQUEST_EVERY == 0:
             self._request(right=self._count % (3 * REQUEST_EVERY) != 0)
+
+    def fill_segment(self) -> None:
+        """Send, to a node that is held up, as much as the shared memory of this process holds: the pages that a reader
+        has ever seen count as its own, and how many these are is else a matter of how long it is once held up."""
+        large = convert.vertices_message(np.zeros((MOST_VERTICES, 3), np.float32), 1)
+        for _ in range(SEGMENT // (12 * MOST_VERTICES) + 1):
+            self.misspelt_sent += 1
+            self._misspelt.publish(large)
 
     def end(self, tick: int) -> None:
         """Send one more right frame: a message cut off is seen as a gap only once another comes behind it."""
