@@ -310,7 +310,9 @@ class HpccdNode(GuardedLifecycleNode):
                 **{f"core.{name}": value for name, value in found.stats.items()},
             },
         )
-        if settings["markers"] and now >= self._markers_after:
+        # A step that was under way when markers were asked for has none of what they show.
+        shown = settings["markers"] and {"points", "normals"} <= set(found.options.outputs)
+        if shown and now >= self._markers_after:
             self._markers_after = now + 1.0 / settings["markers_rate"]
             self._show(found, message.header)
 

@@ -252,6 +252,27 @@ def test_counts_outlive_a_clean_up(start_node):
     node.frames_status(received=5, answered=4, dropped=1)
 
 
+MARKERS_MEANWHILE = """
+import sys
+from hpccd_ros import node
+class MarkersMeanwhile(node.HpccdNode):
+    def _publish(self, found):
+        self._settings["markers"] = True
+        super()._publish(found)
+sys.exit(node.main(node_type=MarkersMeanwhile))
+"""
+
+
+def test_markers_are_asked_for_while_a_step_is_detected(start_node):
+    """That step was detected without the normals that they show: it is answered, once, and not shown."""
+    node = start_node({"meshes": ["cloth"], "outputs": ["points"]}, program=("-c", MARKERS_MEANWHILE))
+    node.peer.topology("cloth", FACES, N * N)
+    for k in range(3):
+        node.peer.vertices("cloth", sheet_positions(N, k), k)
+        values = node.frames_status(received=k + 1, waiting=0)
+        assert values["answered"] == values["received"] and values["dropped"] == "0", node.output()
+
+
 def test_values_of_a_type_that_does_not_exist_are_refused(start_node):
     node = start_node({"meshes": ["cloth"]})
     good = Parameter("report", value="first").to_parameter_msg()
