@@ -36,6 +36,7 @@ from hpccd_ros import (
     parameter_services,
     parameters,
     qos,
+    qos_overrides,
     quoting,
     ros_start,
     scene_parameters,
@@ -72,12 +73,12 @@ class HpccdNode(GuardedLifecycleNode):
         super().__init__("hpccd")
         parameter_services.refuse_unknown_types(self)
         self._settings, self._mesh_settings = parameters.declare(self)
-        for name in parameters.unknown_overrides(self):
+        scene_parameters.check(self._settings, self._mesh_settings)
+        if why := node_topics.refusal(self, self._mesh_settings) or qos_overrides.refusal(self):
+            raise ParameterError(why)
+        for name in parameters.unknown_overrides(self, qos_overrides.known(self, self._mesh_settings)):
             text = f"parameter {quoting.shortened(name)} is unknown and has no effect; see the README's table"
             self.get_logger().warning(text)
-        scene_parameters.check(self._settings, self._mesh_settings)
-        if why := node_topics.refusal(self, self._mesh_settings):
-            raise ParameterError(why)
         self._options = _options(self._settings)
         if why := detection.refusal(self._options):
             raise ParameterError(why)
@@ -223,7 +224,7 @@ class HpccdNode(GuardedLifecycleNode):
         return self._before + Counter(restarts=assembler.restarts, static_taken=assembler.static_taken)
 
     def _publisher(self, kind: type, topic: str, profile: QoSProfile) -> Publisher:
-        publisher = self.create_publisher(kind, topic, profile)
+        publisher = qos_overrides.create_publisher(self, kind, topic, profile)
         self._configured.callback(self.destroy_publisher, publisher)
         return publisher
 

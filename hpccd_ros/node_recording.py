@@ -144,7 +144,7 @@ class _Running:
         self._recorder = Recorder(
             self._node, self.bag, resolved, DEPTH,
             # As the node itself asks: whatever reaches it reaches the recording.
-            functools.partial(recorded_topics.as_node_asks, reliability=reliability),
+            functools.partial(recorded_topics.as_node_asks, recorded=node, vertices=reliability),
         )  # fmt: skip
         self._errors = errors
         self._executor = GuardedExecutor(errors, context=node.context)

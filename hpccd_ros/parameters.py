@@ -5,7 +5,7 @@
 """
 
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Container, Iterable
 from typing import Any
 
 from rcl_interfaces.msg import (
@@ -118,10 +118,13 @@ def normalise(row: Row, value: Any) -> Any:
     return list(value) if row.kind == "float[]" else value
 
 
-def unknown_overrides(node: Node) -> list[str]:
-    """Parameters given on the command line or in a file that the node does not have: usually misspelt."""
+def unknown_overrides(node: Node, qos_overrides: Container[str] = ()) -> list[str]:
+    """Parameters given on the command line or in a file that the node does not have: usually misspelt.
+
+    qos_overrides: names of those that are declared only when their topics are there.
+    """
     given = getattr(node, "_parameter_overrides", {})  # rclpy has no public list of what was given
-    return sorted(name for name in given if not node.has_parameter(name) and not name.startswith("qos_overrides."))
+    return sorted(name for name in given if not node.has_parameter(name) and name not in qos_overrides)
 
 
 def watch(
@@ -137,16 +140,17 @@ def watch(
 
     configured: whether the life cycle is past `unconfigured`; then only rows that may always change do.
     check: called with settings and meshes as they would be; returns why they cannot be used, or None.
-    on_change: called after each accepted change.
+    on_change: called after each accepted change of a row; other parameters (qos_overrides, use_sim_time) are rclpy's.
     """
     rows = {row.name: (None, row) for row in NODE_ROWS}
     rows |= {f"mesh.{name}.{row.name}": (name, row) for name in meshes for row in MESH_ROWS}
 
     def on_set(parameters: Iterable[Parameter]) -> SetParametersResult:
         wanted, wanted_meshes = dict(settings), {name: dict(values) for name, values in meshes.items()}
-        for parameter in parameters:
-            if parameter.name not in rows:
-                continue
+        ours = [parameter for parameter in parameters if parameter.name in rows]
+        if not ours:
+            return SetParametersResult(successful=True)
+        for parameter in ours:
             mesh, row = rows[parameter.name]
             values = wanted if mesh is None else wanted_meshes[mesh]
             value = normalise(row, parameter.value)

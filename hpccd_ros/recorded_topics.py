@@ -5,7 +5,7 @@ import dataclasses
 
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
-from hpccd_ros import qos, transform_topics
+from hpccd_ros import qos, qos_overrides, transform_topics
 
 TOPOLOGY = "hpccd/msg/MeshTopology"
 VERTICES = "hpccd/msg/MeshVertices"
@@ -51,10 +51,13 @@ def subscription_qos(node, name: str, topic: Wanted, depth: int) -> QoSProfile:
     return _profile(ReliabilityPolicy.BEST_EFFORT if best_effort else ReliabilityPolicy.RELIABLE, topic.latched, depth)
 
 
-def as_node_asks(node, name: str, topic: Wanted, depth: int, *, reliability: ReliabilityPolicy) -> QoSProfile:
-    """For the node's own recording. reliability: what the node asks of vertices; the others are reliable."""
-    always = topic.type_name not in (VERTICES, POINTS)
-    return _profile(ReliabilityPolicy.RELIABLE if always else reliability, topic.latched, depth)
+def as_node_asks(node, name: str, topic: Wanted, depth: int, *, recorded, vertices: ReliabilityPolicy) -> QoSProfile:
+    """For the own recording of the node `recorded`. vertices: what it asks of them; the others are reliable, unless
+    parameters of the node (qos_overrides) say otherwise.
+    """
+    default = vertices if topic.type_name in (VERTICES, POINTS) else ReliabilityPolicy.RELIABLE
+    entity = "publisher" if topic.type_name == CONTACTS else "subscription"
+    return _profile(qos_overrides.reliability(recorded, entity, name, default), topic.latched, depth)
 
 
 def _profile(reliability, latched, depth) -> QoSProfile:

@@ -12,7 +12,7 @@ from rclpy.node import Node
 from rclpy.subscription import Subscription
 from sensor_msgs.msg import PointCloud2
 
-from hpccd_ros import convert, qos
+from hpccd_ros import convert, qos, qos_overrides
 from hpccd_ros.convert import InvalidMessageError
 from hpccd_ros.diagnostics import Metrics
 from hpccd_ros.drops import DropCounter, Reason
@@ -90,14 +90,16 @@ class MeshStream:
         }[kind]
         topology_topic, vertex_topic = f"meshes/{mesh}/topology", f"meshes/{mesh}/{kind}"
         self._subscriptions: list[Subscription] = [
-            node.create_subscription(
+            qos_overrides.create_subscription(
+                node,
                 MeshTopology,
                 topology_topic,
                 self._on_topology,
                 qos.TOPOLOGY_INPUT,
                 event_callbacks=link_events(node, topology_topic, links, self._topology_numbers.new_publisher),
             ),
-            node.create_subscription(
+            qos_overrides.create_subscription(
+                node,
                 message,
                 vertex_topic,
                 callback,

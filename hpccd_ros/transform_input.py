@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 from rclpy.node import Node
 
-from hpccd_ros import qos, transform_topics
+from hpccd_ros import qos, qos_overrides, transform_topics
 from hpccd_ros.mcap_decode import message_class
 from hpccd_ros.rate_limit import RateLimit
 from hpccd_ros.transform_topics import TransformTopic
@@ -55,4 +55,5 @@ class TransformInput:
             self._on_change()
 
         profile = qos.TRANSFORMS_STATIC if topic.static else qos.TRANSFORMS
-        return self._node.create_subscription(message_class(topic.type_name), topic.name, take, profile)
+        message = message_class(topic.type_name)
+        return qos_overrides.create_subscription(self._node, message, topic.name, take, profile)

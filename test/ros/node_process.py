@@ -37,8 +37,9 @@ _numbers = itertools.count()
 class NodeProcess:
     """``python -m hpccd_ros.node`` in a namespace of its own, and a peer in this process.
 
-    parameters: nested as in YAML, meshes included. profiles: parameter files, read after the parameters.
-    remaps: further ``from:=to`` rules. program: what Python runs in place of the node's module.
+    parameters: nested as in YAML, meshes included; NAMESPACE in them stands for that of the node. profiles: parameter
+    files, read after the parameters. remaps: further ``from:=to`` rules. program: what Python runs in place of the
+    node's module.
     """
 
     def __init__(
@@ -54,7 +55,8 @@ class NodeProcess:
         self.namespace = f"/t{os.getpid()}_{next(_numbers)}"
         values = {"diagnostics_period": 0.1, **parameters}
         file = folder / f"parameters{self.namespace[1:]}.yaml"
-        file.write_text(yaml.safe_dump({"/**": {"ros__parameters": values}}))
+        text = yaml.safe_dump({"/**": {"ros__parameters": values}})
+        file.write_text(text.replace("NAMESPACE", self.namespace))
         rules = (f"__ns:={self.namespace}", f"/diagnostics:={self.namespace}/diagnostics", *remaps)
         command = [sys.executable, *program, "--ros-args", "--params-file", str(file)]
         for profile in profiles:
