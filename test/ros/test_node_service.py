@@ -18,8 +18,9 @@ from waving_sheet import scene_of, sheet_faces, sheet_positions
 
 import hpccd_core as hc
 from hpccd_ros import convert
-from hpccd_ros.detect_service import DetectService, NodeScene
+from hpccd_ros.detect_service import DetectService, NodeScene, new_counts
 from hpccd_ros.detection import Options, SceneBuilder
+from hpccd_ros.guard import Errors
 
 N = 16
 FACES = sheet_faces(N)
@@ -288,7 +289,8 @@ def service():
     executor.add_node(node)
     settings = {"detect_jobs": 1, "detect_waiting": 1, "detect_time_limit": PATIENCE, "max_meshes": 4,
                 "max_vertices": 1000, "max_faces": 1000, "max_contacts": 0}  # fmt: skip
-    service = DetectService(node, settings, Options, lambda: NodeScene(SceneBuilder(()), {}))
+    errors = Errors(lambda text: None)
+    service = DetectService(node, settings, Options, lambda: NodeScene(SceneBuilder(()), {}), new_counts(), errors)
     client = node.create_client(Detect, "service/detect")
     assert client.wait_for_service(PATIENCE)
 
@@ -301,6 +303,7 @@ def service():
         return answer.result()
 
     yield ask_once
+    assert errors.count == 0, errors.last
     service.close()
     executor.shutdown()
     node.destroy_node()
