@@ -2,12 +2,21 @@
 """Write MCAP recordings that rosbag2 accepts: profile ros2, CDR messages, ros2msg schemas, bag metadata."""
 
 import os
+import textwrap
 import time
 from collections import Counter
 from pathlib import Path
 
 from hpccd_ros import mcap_qos, mcap_schema
-from hpccd_ros.mcap_bag_file import COMPRESSIONS, HPCCD_RECORD, BagFile, Topic, bag_metadata
+from hpccd_ros.mcap_bag_file import (
+    COMPRESSIONS,
+    HPCCD_RECORD,
+    BagFile,
+    Topic,
+    bag_metadata,
+    file_information,
+    summary,
+)
 
 __all__ = ["COMPRESSIONS", "HPCCD_RECORD", "BagWriter", "Topic"]
 
@@ -51,6 +60,7 @@ class BagWriter:
         self._limits = (max_bytes, int(max_seconds * 1e9))
         self._topics: dict[str, Topic] = {}
         self._files: list[BagFile] = []
+        self._listed: list[tuple[str, str]] = []  # of the finished ones, their parts of metadata.yaml
         self._file: BagFile | None = None  # None: after an error, until the next try
         self._try_again = 0.0
         self._closed = False
@@ -159,11 +169,21 @@ class BagWriter:
         self._file.finish(bag_metadata([self._file], list(self._topics.values())))
         self._file = None
         if not self.single_file:
-            finished = [file for file in self._files if file.finished]
-            bag = {"rosbag2_bagfile_information": bag_metadata(finished, list(self._topics.values()))}
-            draft = self.path / "metadata.yaml.part"
-            draft.write_text(mcap_qos.to_yaml(bag), encoding="utf-8")
-            os.replace(draft, self.path / "metadata.yaml")  # whole at any moment
+            self._list_files()
+
+    def _list_files(self):
+        finished = [file for file in self._files if file.finished]
+        # Those before are rendered already: with all of them anew, each split takes longer than the one before, and the
+        # messages of a stream that goes on meanwhile are lost.
+        for file in finished[len(self._listed) :]:
+            parts = ([file.path.name], [file_information(file)])
+            self._listed.append(tuple(textwrap.indent(mcap_qos.to_yaml(part), "  ") for part in parts))
+        names, files = ("".join(parts) for parts in zip(*self._listed, strict=True))
+        bag = {"rosbag2_bagfile_information": summary(finished, list(self._topics.values()))}
+        lists = f"  relative_file_paths:\n{names}  files:\n{files}"
+        draft = self.path / "metadata.yaml.part"
+        draft.write_text(mcap_qos.to_yaml(bag) + lists, encoding="utf-8")
+        os.replace(draft, self.path / "metadata.yaml")  # whole at any moment
 
     def _split(self, log_time, cause):
         self._close_file()

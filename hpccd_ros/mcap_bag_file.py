@@ -138,10 +138,30 @@ class BagFile:
 
 def bag_metadata(files: list[BagFile], topics: list[Topic]) -> dict:
     """rosbag2's BagMetadata, version 9 (Jazzy), of the given files."""
+    return summary(files, topics) | {
+        "relative_file_paths": [f.path.name for f in files],
+        "files": [file_information(f) for f in files],
+    }
+
+
+def file_information(file: BagFile) -> dict:
+    """What BagMetadata says of one file."""
+    return {
+        "path": file.path.name,
+        "starting_time": {"nanoseconds_since_epoch": file.start},
+        "duration": {"nanoseconds": file.end - file.start},
+        "message_count": file.message_count,
+    }
+
+
+def summary(files: list[BagFile], topics: list[Topic]) -> dict:
+    """BagMetadata without its lists of files."""
     used = [f for f in files if f.message_count]
     start = min((f.start for f in used), default=0)
     end = max((f.end for f in used), default=0)
-    counts = sum((f.counts for f in files), Counter())
+    counts: Counter[str] = Counter()
+    for file in files:
+        counts.update(file.counts)
     return {
         "version": 9,
         "storage_identifier": "mcap",
@@ -164,16 +184,6 @@ def bag_metadata(files: list[BagFile], topics: list[Topic]) -> dict:
         # MCAP compresses its own chunks; these two keys are about compression around the file.
         "compression_format": "",
         "compression_mode": "",
-        "relative_file_paths": [f.path.name for f in files],
-        "files": [
-            {
-                "path": f.path.name,
-                "starting_time": {"nanoseconds_since_epoch": f.start},
-                "duration": {"nanoseconds": f.end - f.start},
-                "message_count": f.message_count,
-            }
-            for f in files
-        ],
         "custom_data": None,
         "ros_distro": "jazzy",
     }

@@ -12,8 +12,9 @@ ALWAYS, UNCONFIGURED, NEVER = "always", "unconfigured", "never"
 class Row:
     """One parameter.
 
-    ``span``: closed range of a number; ``choices``: allowed strings (of each entry). ``change``: ALWAYS; UNCONFIGURED:
-    only while the node is unconfigured (before configure, after clean-up), as it is read there; NEVER: read-only.
+    ``span``: closed range of a number; ``least``: the smallest beside 0; ``choices``: allowed strings (of each entry).
+    ``change``: ALWAYS; UNCONFIGURED: only while the node is unconfigured (before configure, after clean-up), as it is
+    read there; NEVER: read-only.
     """
 
     name: str
@@ -22,6 +23,7 @@ class Row:
     text: str
     unit: str = ""
     span: tuple[float, float] | None = None
+    least: float = 0.0
     choices: tuple[str, ...] = ()
     change: str = UNCONFIGURED
 
@@ -30,6 +32,11 @@ ACCURACIES = ("fast", "balanced", "conservative", "exact")
 BACKENDS = ("auto", "cpu", "hybrid", "gpu")
 REPORTS = ("all", "first", "any")
 OUTPUTS = ("points", "normals")
+
+# Of the files of a split recording: smaller ones would hold a message each, and beginning a file takes longer (a few
+# milliseconds) than messages may wait.
+LEAST_SPLIT_SIZE = 0.01  # MB
+LEAST_SPLIT_TIME = 0.1  # s
 
 NODE_ROWS = (
     Row(
@@ -232,6 +239,7 @@ NODE_ROWS = (
         "A new file after so much, in a folder; 0: no limit. For the next recording",
         unit="MB",
         span=(0.0, 1e9),
+        least=LEAST_SPLIT_SIZE,
         change=ALWAYS,
     ),
     Row(
@@ -241,6 +249,7 @@ NODE_ROWS = (
         "A new file after so long, in a folder; 0: no limit. For the next recording",
         unit="s",
         span=(0.0, 1e9),
+        least=LEAST_SPLIT_TIME,
         change=ALWAYS,
     ),
     Row(

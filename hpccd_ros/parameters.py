@@ -48,6 +48,8 @@ def refusal(row: Row, value: Any) -> str | None:
     """Why ``value`` (of the right type) cannot be used, or None."""
     if row.span is not None and not row.span[0] <= value <= row.span[1]:
         return f"{row.name}: {value} is outside {row.span[0]} .. {row.span[1]}"
+    if row.least and 0 < value < row.least:
+        return f"{row.name}: {value} is neither 0 nor at least {row.least:g}"
     entries = value if row.kind == "string[]" else [value]
     if row.choices:
         for entry in entries:
@@ -63,6 +65,8 @@ def descriptor(row: Row) -> ParameterDescriptor:
         out.description += f" [{row.unit}]"
     if row.choices:
         out.additional_constraints = "one of " + ", ".join(row.choices)
+    elif row.least:
+        out.additional_constraints = f"0 or at least {row.least:g}"
     if row.span is not None and row.kind == "int":
         out.integer_range = [IntegerRange(from_value=int(row.span[0]), to_value=int(row.span[1]), step=1)]
     elif row.span is not None:
@@ -174,6 +178,8 @@ def watch(
 def _allowed(row: Row) -> str:
     if row.choices:
         return ", ".join(f"`{choice}`" for choice in row.choices)
+    if row.least:
+        return f"0, {row.least:g} .. {row.span[1]:,}"
     if row.span is not None:
         return f"{row.span[0]:,} .. {row.span[1]:,}"
     return ""

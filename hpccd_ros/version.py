@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """The version of the installed package; pyproject.toml is the one place that states it."""
 
+import functools
 from importlib.metadata import PackageNotFoundError, version
 
 
+@functools.cache  # asked for each file of a recording; the distribution's metadata take 2 ms to be read
 def package_version() -> str:
     """Version of the installed distribution, or "not installed" where the code runs from a bare checkout."""
     try:

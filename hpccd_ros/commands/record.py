@@ -15,6 +15,7 @@ A node whose topics are remapped: give the same remappings here, after --ros-arg
 """
 
 from hpccd_ros.errors import UserError
+from hpccd_ros.parameter_table import LEAST_SPLIT_SIZE, LEAST_SPLIT_TIME
 
 
 def configure(parser):
@@ -41,6 +42,9 @@ def run(args) -> int:
     for name in ("split_size", "split_time", "flush", "duration", "wait", "frames"):
         if getattr(args, name) < 0:
             raise UserError(f"--{name.replace('_', '-')} {getattr(args, name)}: must not be negative")
+    for name, least in (("split_size", LEAST_SPLIT_SIZE), ("split_time", LEAST_SPLIT_TIME)):
+        if 0 < getattr(args, name) < least:
+            raise UserError(f"--{name.replace('_', '-')} {getattr(args, name)}: must be 0 or at least {least:g}")
     if args.depth < 1:
         raise UserError(f"--depth {args.depth}: must be at least 1")
     from hpccd_ros import recorder

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Files are what rosbag2 and independent readers expect."""
 
+import sys
+
 import pytest
 import yaml
 from bag_tools import STRING, read_by_mcap_ros2, read_by_rosbags, text_message, typestore, write_texts
@@ -48,6 +50,32 @@ def test_split_recordings(tmp_path, limits):
         assert recording.topics["/text"].count == len(TEXTS)
         times = [m.log_time for m in recording.messages()]
     assert times == sorted(times)
+
+
+def test_a_split_takes_no_longer_for_the_files_before_it(tmp_path):
+    """Messages that come meanwhile wait in a short queue; counted are Python's calls, which no other load changes."""
+    writer = BagWriter(tmp_path / "bag", max_bytes=1)
+    writer.add_topic(Topic("/text", STRING, []))
+    calls = []
+
+    def count(frame, event, argument):
+        if event == "call":
+            calls[-1] += 1
+
+    for number in range(200):
+        calls.append(0)
+        sys.setprofile(count)
+        try:
+            writer.write("/text", text_message("x"), 10**18 + number, 10**18 + number)
+        finally:
+            sys.setprofile(None)
+    writer.close()
+    assert calls[199] < 3 * calls[20], "counts of all files are added up, nothing more"
+    bag = yaml.safe_load((tmp_path / "bag" / "metadata.yaml").read_text())["rosbag2_bagfile_information"]
+    assert bag["relative_file_paths"] == [f"bag_{number}.mcap" for number in range(200)]
+    assert bag["message_count"] == 200 and len(bag["files"]) == 200
+    begins = [file["starting_time"]["nanoseconds_since_epoch"] for file in bag["files"]]
+    assert begins == [10**18 + number for number in range(200)]
 
 
 def test_metadata_for_rosbag2(tmp_path):

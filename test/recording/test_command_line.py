@@ -45,6 +45,8 @@ def test_help_imports_neither_ros_nor_the_core():
     [
         (["record", "--depth", "0"], "--depth 0: must be at least 1"),
         (["record", "--split-size", "-1"], "--split-size -1.0: must not be negative"),
+        (["record", "-o", "run", "--split-size", "1e-6"], "--split-size 1e-06: must be 0 or at least 0.01"),
+        (["record", "-o", "run", "--split-time", "1e-6"], "--split-time 1e-06: must be 0 or at least 0.1"),
         (["record", "--node", "hpccd"], "full name"),
         (["replay", "x.mcap", "--threads", "-1"], "--threads -1: must not be negative"),
         (["replay", "x.mcap", "--publish", "--from", "5", "--to", "2"], "--to not before --from"),
