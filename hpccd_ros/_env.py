@@ -47,6 +47,13 @@ def prepare() -> None:
     _keep_freed_memory()
 
 
+def give_back_freed_memory() -> None:
+    """Return to the kernel what is free now, for a process that has kept it since `prepare` for long enough."""
+    trim = getattr(ctypes.CDLL(None), "malloc_trim", None)  # glibc only
+    if trim is not None and "MALLOC_TRIM_THRESHOLD_" not in os.environ:
+        trim(ctypes.c_size_t(0))
+
+
 def this_host_only() -> bool:
     """Whether discovery is limited to this machine, as the environment stands after ``prepare``."""
     localhost_only = os.environ.get("ROS_LOCALHOST_ONLY")  # older, and stronger where both are set

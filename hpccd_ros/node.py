@@ -11,6 +11,7 @@ if __name__ == "__main__":
 import contextlib
 import time
 from collections import Counter
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -59,6 +60,9 @@ from hpccd_ros.refusal_log import RefusalLog
 from hpccd_ros.unknown_meshes import UnknownMeshWatch
 
 YIELD = 2e-5  # s; what counts is that it is not 0
+# s. Once in so long, the pages that a message takes anew cost little; a node that once had to hold much, because its
+# machine was busy for seconds, is not larger ever after.
+GIVE_BACK_EVERY = 60.0
 
 
 class HpccdNode(GuardedLifecycleNode):
@@ -127,11 +131,8 @@ class HpccdNode(GuardedLifecycleNode):
         self._service = DetectService(
             self, settings, lambda: self._options, self._scene_for_service, self._served, self.errors
         )
-        # Steady time: diagnostics go on while simulated time stands still.
-        timer = self.create_timer(
-            settings["diagnostics_period"], self._report, clock=Clock(clock_type=ClockType.STEADY_TIME)
-        )
-        self._configured.callback(self.destroy_timer, timer)
+        self._steady_timer(settings["diagnostics_period"], self._report)
+        self._steady_timer(GIVE_BACK_EVERY, _env.give_back_freed_memory)
         return TransitionCallbackReturn.SUCCESS
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -222,6 +223,11 @@ class HpccdNode(GuardedLifecycleNode):
             return self._before
         assembler = self._inputs.assembler
         return self._before + Counter(restarts=assembler.restarts, static_taken=assembler.static_taken)
+
+    def _steady_timer(self, period: float, callback: Callable[[], None]) -> None:
+        # Steady time: it goes on while simulated time stands still.
+        timer = self.create_timer(period, callback, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self._configured.callback(self.destroy_timer, timer)
 
     def _publisher(self, kind: type, topic: str, profile: QoSProfile) -> Publisher:
         publisher = qos_overrides.create_publisher(self, kind, topic, profile)

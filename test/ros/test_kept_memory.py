@@ -1,16 +1,25 @@
 # SPDX-License-Identifier: Apache-2.0
 """Memory of large messages is kept between them, for whatever comes next: fresh pages cost more than the copy of a
-message. But no queue keeps for itself what once waited in it."""
+message. But no queue keeps for itself what once waited in it, and in the long run the node gives back what is free."""
 
 import ctypes
 import os
 import subprocess
 import sys
+import time
 from pathlib import Path
 
+import numpy as np
 import pytest
+import rclpy
+import yaml
+from hpccd.msg import MeshVertices
+from rclpy.duration import Duration
+from rclpy.signals import SignalHandlerOptions
 
 import hpccd_ros
+from hpccd_ros import _env, convert, qos
+from hpccd_ros.bench.node_child import resident_mb
 
 ROOT = Path(hpccd_ros.__file__).resolve().parents[1]
 MEGABYTES, ROUNDS = 8, 50
@@ -93,3 +102,47 @@ def test_an_emptied_queue_keeps_nothing():
     before, full, after = map(float, done.stdout.split())
     assert full > before + 0.9 * DEPTH, "the queue was not full: nothing is shown"
     assert after < before + 3, f"{before:.1f} MB, {full:.1f} MB when full, {after:.1f} MB when empty again"
+
+
+NODE = """
+import sys
+from hpccd_ros import node
+node.GIVE_BACK_EVERY = float(sys.argv.pop(1))
+sys.exit(node.main())
+"""
+# Longer than a message takes to come, shorter than the test has patience.
+SOON, PATIENCE = 5.0, 240.0
+
+
+def test_the_node_shrinks_again_after_a_large_message(tmp_path):
+    """20 MB that it refuses: in the middleware, in Python, and as an array."""
+    namespace = f"/shrinks{os.getpid()}"
+    parameters = tmp_path / "node.yaml"
+    parameters.write_text(yaml.safe_dump({"/**": {"ros__parameters": {"meshes": ["cloth"], "max_vertices": 1000}}}))
+    rules = ["--ros-args", "--params-file", parameters, "-r", f"__ns:={namespace}", "-r", "/diagnostics:=diagnostics"]
+    node = subprocess.Popen([sys.executable, "-c", NODE, str(SOON), *rules], cwd=ROOT)
+    _env.prepare()
+    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+    peer = rclpy.create_node("large", namespace=namespace, start_parameter_services=False)
+    try:
+        publisher = peer.create_publisher(MeshVertices, "meshes/cloth/vertices", qos.vertices("reliable", 1))
+        deadline = time.monotonic() + PATIENCE
+
+        def until(ready, what):
+            while not ready():
+                assert node.poll() is None and time.monotonic() < deadline, what
+                time.sleep(0.02)
+
+        until(publisher.get_subscription_count, "the node does not listen")
+        publisher.publish(convert.vertices_message(np.zeros((10, 3), np.float32), 1))
+        assert publisher.wait_for_all_acked(Duration(seconds=PATIENCE))
+        before = resident_mb(node.pid)
+        publisher.publish(convert.vertices_message(np.zeros((1_700_000, 3), np.float32), 2))
+        until(lambda: resident_mb(node.pid) > before + 30, "the message did not come")
+        # 16 MB of it may be shared memory of this process.
+        until(lambda: resident_mb(node.pid) < before + 20, "the node keeps what it had for one message")
+    finally:
+        node.terminate()
+        peer.destroy_node()
+        rclpy.try_shutdown()
+        assert node.wait(PATIENCE) == 0
