@@ -169,6 +169,11 @@ def _array(name, value):
         raise ValueError(f"{name}: not a rectangular array ({error}); give every row the same length") from None
     except OverflowError as error:  # an integer among floats
         raise ValueError(f"{name}: holds a number beyond float64 ({error}); scale the numbers down") from None
+    except MemoryError:
+        raise
+    except Exception as error:  # the object's own conversion: a PyTorch tensor that requires a gradient has none
+        kind = type(value).__name__
+        raise TypeError(f"{name}: {kind} does not turn into an array ({error}); give an array of numbers") from error
 
 
 def _refuse_masked(name, value):

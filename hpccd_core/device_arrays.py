@@ -20,15 +20,25 @@ def is_on_device(value):
     """Whether the array lies in the memory of a CUDA device."""
     if type(value) is np.ndarray:  # looking for attributes that it has not takes 3 us
         return False
-    if getattr(value, "__cuda_array_interface__", None) is not None:
+    if _interface_of(value) is not None:
         return True
     device = getattr(value, "__dlpack_device__", None)
-    return device is not None and int(device()[0]) == 2  # kDLCUDA
+    try:
+        return device is not None and int(device()[0]) == 2  # kDLCUDA
+    except Exception:  # a class, a PyTorch tensor without memory: refused by name as an array on the host
+        return False
+
+
+def _interface_of(value):
+    try:
+        return getattr(value, "__cuda_array_interface__", None)
+    except Exception:  # PyTorch raises RuntimeError where a gradient is required; DLPack says so as well
+        return None
 
 
 def positions(name, value, n_vertices):
     """The array's place and type. Raises TypeError or ValueError naming the argument."""
-    interface = getattr(value, "__cuda_array_interface__", None)
+    interface = _interface_of(value)
     if interface is not None:
         shape, strides, kind, pointer = _from_interface(name, interface)
     else:
@@ -38,8 +48,8 @@ def positions(name, value, n_vertices):
     if shape != (n_vertices, 3):
         raise ValueError(f"{name}: expected shape ({n_vertices}, 3), one row a vertex of the scene, got {shape}")
     size = int(kind[2])
-    if strides is not None and n_vertices and tuple(strides) != (3 * size, size):
-        raise ValueError(f"{name}: must be C-contiguous, got strides {tuple(strides)} bytes; copy it first")
+    if strides is not None and n_vertices and strides != (3 * size, size):
+        raise ValueError(f"{name}: must be C-contiguous, got strides {strides} bytes; copy it first")
     if n_vertices and not pointer:
         raise ValueError(f"{name}: its address on the device is null; give an array that holds memory")
     return DevicePositions(int(pointer or 0), size == 8)
@@ -47,8 +57,9 @@ def positions(name, value, n_vertices):
 
 def _from_interface(name, interface):
     try:
-        place = tuple(interface["shape"]), interface.get("strides"), interface["typestr"], interface["data"][0]
-        mask = interface.get("mask")
+        strides, mask = interface.get("strides"), interface.get("mask")
+        strides = None if strides is None else tuple(strides)
+        place = tuple(interface["shape"]), strides, interface["typestr"], interface["data"][0]
     except (AttributeError, IndexError, KeyError, TypeError) as error:
         raise TypeError(f"{name}: its __cuda_array_interface__ is not as the protocol has it ({error!r})") from None
     if mask is not None:
@@ -98,7 +109,10 @@ class _Tensor(ctypes.Structure):
 def _from_dlpack(name, value):
     # Stream 1 is the legacy default stream: the producer's work is done before ours starts there. The capsule stays
     # unconsumed, so the producer's own destructor frees it; the caller keeps the array itself alive.
-    capsule = value.__dlpack__(stream=1)
+    try:
+        capsule = value.__dlpack__(stream=1)
+    except Exception as error:
+        raise TypeError(f"{name}: {type(value).__name__} is not given out by DLPack ({error})") from error
     get = ctypes.pythonapi.PyCapsule_GetPointer
     get.restype, get.argtypes = ctypes.c_void_p, [ctypes.py_object, ctypes.c_char_p]
     tensor = ctypes.cast(get(capsule, b"dltensor"), ctypes.POINTER(_Tensor)).contents

@@ -322,6 +322,7 @@ GOOD_INTERFACE = {"shape": (4, 3), "typestr": "<f8", "data": (4096, False), "ver
         (3, TypeError, "__cuda_array_interface__.*protocol"),
         ({"shape": (4, 3)}, TypeError, "__cuda_array_interface__.*protocol.*typestr"),
         (GOOD_INTERFACE | {"data": None}, TypeError, "__cuda_array_interface__.*protocol"),
+        (GOOD_INTERFACE | {"strides": 24}, TypeError, "__cuda_array_interface__.*protocol"),
         (GOOD_INTERFACE | {"data": (0, False)}, ValueError, "null"),
         (GOOD_INTERFACE | {"mask": object()}, TypeError, "mask"),
         (GOOD_INTERFACE | {"shape": (3, 4)}, ValueError, r"\(4, 3\).*\(3, 4\)"),
@@ -379,3 +380,54 @@ def test_static_mesh_that_moves(dtype):
     end[4, 2] = 1
     with pytest.raises(ValueError, match=r"vertices_t1\[4\].*'floor'.*static"):
         detector.detect(start, end)
+
+
+class GradientOnHost:
+    """As a PyTorch tensor that requires a gradient, in the host's memory."""
+
+    def __array__(self, *args, **kwargs):
+        raise RuntimeError("Can't call numpy() on Tensor that requires grad. Use tensor.detach().numpy() instead.")
+
+
+class GradientOnDevice:
+    """The same in a GPU's."""
+
+    @property
+    def __cuda_array_interface__(self):
+        raise RuntimeError("Can't get __cuda_array_interface__ on Variable that requires grad. Use detach().")
+
+    def __dlpack_device__(self):
+        return (2, 0)
+
+    def __dlpack__(self, **options):
+        raise BufferError("Can't export tensors that require gradient, use tensor.detach()")
+
+
+class WithoutMemory:
+    """As a PyTorch tensor of device "meta"."""
+
+    def __dlpack_device__(self):
+        raise ValueError("Unknown device type meta for Dlpack")
+
+    def __array__(self, *args, **kwargs):
+        raise TypeError("can't convert meta device type tensor to numpy")
+
+
+@pytest.mark.parametrize("bad", [GradientOnHost(), GradientOnDevice(), WithoutMemory(), np.ndarray])
+def test_objects_that_do_not_turn_into_arrays(detector, bad):
+    with pytest.raises(TypeError, match="^vertices_t0"):
+        detector.detect(bad, bad)
+    with pytest.raises(TypeError, match="^vertices: "):
+        detector.step(bad)
+    detector.step(VERTICES)
+    with pytest.raises(TypeError, match="^vertices: "):
+        detector.step(bad)
+    assert detector.step(VERTICES).hash == detector.detect(VERTICES, VERTICES).hash
+
+
+@pytest.mark.parametrize("bad", [GradientOnHost(), WithoutMemory()])
+def test_faces_and_queries_that_do_not_turn_into_arrays(bad):
+    with pytest.raises(TypeError, match="^faces: GradientOnHost|^faces: WithoutMemory"):
+        hc.Scene().add_mesh("mesh", bad)
+    with pytest.raises(TypeError, match="^queries: "):
+        hc.test_vertex_face(bad)
