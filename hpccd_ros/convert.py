@@ -17,6 +17,7 @@ from sensor_msgs.msg import PointCloud2, PointField
 from hpccd_ros import coordinates
 from hpccd_ros.drops import Reason
 from hpccd_ros.messages import Topology
+from hpccd_ros.quoting import listed
 
 _NS = 1_000_000_000
 _CODES = {
@@ -156,7 +157,7 @@ def _cloud_field(cloud: PointCloud2, axis: str) -> tuple[int, np.dtype]:
     if field is None:
         raise InvalidMessageError(
             Reason.MALFORMED,
-            f"no field {axis!r}; the cloud has {', '.join(f.name for f in cloud.fields) or 'none'}",
+            f"no field {axis!r}; the cloud has {listed(f.name for f in cloud.fields) or 'none'}",
         )
     if field.datatype not in _FIELD_TYPES or field.count > 1:
         raise InvalidMessageError(

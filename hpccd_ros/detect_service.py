@@ -25,6 +25,7 @@ from hpccd_ros.detection import CORE_ERRORS, Options, SceneBuilder, make_detecto
 from hpccd_ros.guard import Errors
 from hpccd_ros.messages import Topology
 from hpccd_ros.ongoing import Ongoing
+from hpccd_ros.quoting import LONGEST_MESSAGE, listed, quoted, repeated, shortened
 
 
 class RequestError(ValueError):
@@ -206,7 +207,7 @@ class DetectService:
 
     def _refuse(self, response: Detect.Response, kind: str, text: str) -> Detect.Response:
         self._ended[kind] += 1
-        response.success, response.message = False, text
+        response.success, response.message = False, shortened(text, LONGEST_MESSAGE)
         return response
 
     def _enter(self) -> bool:
@@ -238,11 +239,11 @@ class DetectService:
         if len(names) > most:
             raise RequestError(f"mesh_names: {len(names)} meshes, at most {most} are taken (parameter max_meshes)")
         if len(set(names)) != len(names):
-            raise RequestError(f"mesh_names: names must differ, got {', '.join(names)}")
+            raise RequestError(f"mesh_names: names must differ, {repeated(names)} is there twice")
         for field in ("topologies", "start", "end"):
             given = len(getattr(request, field))
             if given != len(names) and not (field == "topologies" and given == 0):
-                raise RequestError(f"{field}: {given} entries for {len(names)} meshes ({', '.join(names)})")
+                raise RequestError(f"{field}: {given} entries for {len(names)} meshes ({listed(names)})")
         topologies = tuple(self._topology(request, scene, i, name) for i, name in enumerate(names))
         start = self._vertices("start", names, request.start, topologies)
         end = self._vertices("end", names, request.end, topologies)
@@ -269,11 +270,11 @@ class DetectService:
                     request.topologies[index], self._settings["max_vertices"], self._settings["max_faces"]
                 )
             except convert.InvalidMessageError as error:
-                raise RequestError(f"topologies[{index}] ({name}): {error}") from error
+                raise RequestError(f"topologies[{index}] ({shortened(name)}): {error}") from error
         if name not in scene.topologies:
             raise RequestError(
-                f"mesh_names: unknown mesh {name!r}; the node has "
-                f"{', '.join(scene.topologies) or 'none'}, or send topologies"
+                f"mesh_names: unknown mesh {quoted(name)}; the node has "
+                f"{listed(scene.topologies) or 'none'}, or send topologies"
             )
         topology = scene.topologies[name]
         if topology is None:
@@ -285,7 +286,7 @@ class DetectService:
     ) -> np.ndarray:
         parts = []
         for i, (name, message, topology) in enumerate(zip(names, messages, topologies, strict=True)):
-            where = f"{field}[{i}] ({name})"
+            where = f"{field}[{i}] ({shortened(name)})"
             try:
                 convert.stamp_to_ns(message.header.stamp)
                 vertices = convert.vertices_from_message(message, self._settings["max_vertices"])

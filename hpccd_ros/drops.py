@@ -21,7 +21,7 @@ class Reason(StrEnum):
     OUT_OF_RANGE = "out_of_range"  # a coordinate beyond what the core computes with
     TOO_LARGE = "too_large"  # above max_vertices or max_faces
     INDEX_RANGE = "index_range"  # a face names a vertex that does not exist
-    BAD_TOPOLOGY = "bad_topology"  # refused by the core, e.g. a face that names a vertex twice
+    BAD_TOPOLOGY = "bad_topology"  # refused by the core in words of its own
     TOPOLOGY_CONFLICT = "topology_conflict"  # same version, other content
     OLD_TOPOLOGY = "old_topology"
     NO_TOPOLOGY = "no_topology"  # the topology that the frame names has not come (in time)

@@ -26,6 +26,7 @@ import numpy as np
 from hpccd_ros.drops import DropCounter, Reason
 from hpccd_ros.matching import ExactMatcher, Match, Matcher, NearestMatcher
 from hpccd_ros.messages import MeshFrame, MeshSettings, SceneFrame, Topology
+from hpccd_ros.quoting import listed, quoted
 
 # Of one static mesh: bounds what strangers can make the node keep.
 _MOST_STATIC_FRAMES = 4
@@ -205,7 +206,7 @@ class FrameAssembler:
     def _state(self, mesh: str, counter: DropCounter) -> _MeshState | None:
         state = self._meshes.get(mesh)
         if state is None:
-            counter.count(mesh, Reason.UNKNOWN_MESH, f"no such mesh; parameter meshes has {', '.join(self._meshes)}")
+            counter.count(mesh, Reason.UNKNOWN_MESH, f"no such mesh; parameter meshes has {listed(self._meshes)}")
         return state
 
     def _route(self, state: _MeshState, frame: MeshFrame) -> list[SceneFrame]:
@@ -266,7 +267,7 @@ class FrameAssembler:
                 run = _Run()
             self._elsewhere[mesh] = frame.frame_id, run
             if 0 < self.restart_after <= run.next(frame.stamp) or (state.new_publisher and self._only_publisher(mesh)):
-                self._restart(f"mesh {mesh} goes on in frame {frame.frame_id!r} after {self._frame_id!r}")
+                self._restart(f"mesh {mesh} goes on in frame {quoted(frame.frame_id)} after {quoted(self._frame_id)}")
                 return True
         self._refuse_frame_id(mesh, frame.frame_id)
         return False
@@ -276,8 +277,8 @@ class FrameAssembler:
         self._drops.count(
             mesh,
             Reason.FRAME_ID,
-            f"frame_id {frame_id!r}, the scene is in {self._frame_id!r} (by {source}); publish all meshes in one "
-            "coordinate frame",
+            f"frame_id {quoted(frame_id)}, the scene is in {quoted(self._frame_id)} (by {source}); publish all meshes "
+            "in one coordinate frame",
         )
 
     def _take_static(self, state: _MeshState, frame: MeshFrame) -> list[SceneFrame]:

@@ -54,7 +54,7 @@ def refusal(row: Row, value: Any) -> str | None:
     if row.choices:
         for entry in entries:
             if entry not in row.choices:
-                return f"{row.name}: {quoting.shortened(repr(entry))} is none of {', '.join(row.choices)}"
+                return f"{row.name}: {quoting.quoted(entry)} is none of {', '.join(row.choices)}"
     return None
 
 
@@ -84,7 +84,7 @@ def declare(node: Node) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
     for name in names:
         if not _MESH_NAME.fullmatch(name):
             raise ParameterError(
-                f"meshes: {quoting.shortened(repr(name))} cannot be part of a topic name; use letters, digits and _, a "
+                f"meshes: {quoting.quoted(name)} cannot be part of a topic name; use letters, digits and _, a "
                 "letter first"
             )
     if len(set(names)) != len(names):

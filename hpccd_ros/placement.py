@@ -16,6 +16,7 @@ import numpy as np
 from hpccd_ros import coordinates
 from hpccd_ros.drops import DropCounter, Reason
 from hpccd_ros.messages import MeshFrame
+from hpccd_ros.quoting import quoted
 from hpccd_ros.rigid import IDENTITY, Rigid
 from hpccd_ros.transforms import NoTransformError, TransformBuffer
 
@@ -71,7 +72,7 @@ class Placement:
         if self._kind == "none":
             return [(frame, new_publisher)]
         if self._frame and frame.frame_id not in ("", self._frame):
-            text = f"frame_id {frame.frame_id!r}, parameter mesh.{self._mesh}.frame demands {self._frame!r}"
+            text = f"frame_id {quoted(frame.frame_id)}, parameter mesh.{self._mesh}.frame demands {quoted(self._frame)}"
             self._refuse(Reason.FRAME_ID, text, new_publisher)
             return []
         if self._kind == "pose":

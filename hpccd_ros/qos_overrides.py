@@ -17,7 +17,7 @@ from rclpy.qos_overriding_options import QoSOverridingOptions
 from rclpy.subscription import Subscription
 
 from hpccd_ros import node_topics
-from hpccd_ros.quoting import shortened
+from hpccd_ros.quoting import quoted, shortened
 
 PREFIX = "qos_overrides."
 # A history of more would hold more messages than a node has memory for.
@@ -60,7 +60,7 @@ def refusal(node: Node) -> str | None:
         if policy == "depth" and not (type(value) is int and 1 <= value <= DEEPEST):
             return f"{shortened(name)}: {shortened(value)} is no whole number of 1 .. {DEEPEST:,}"
         if policy in _CHOICES and value not in _CHOICES[policy]:
-            return f"{shortened(name)}: {shortened(repr(value))} is none of {', '.join(_CHOICES[policy])}"
+            return f"{shortened(name)}: {quoted(value)} is none of {', '.join(_CHOICES[policy])}"
     return None
 
 

@@ -21,6 +21,11 @@ def shortened(text: object, longest: int = LONGEST) -> str:
     return f"{text[:half]}... ({len(text)} characters) ...{text[-half:]}"
 
 
+def quoted(value: object) -> str:
+    """A value as Python writes it, with quotes around a text."""
+    return shortened(repr(value))
+
+
 def listed(names: Iterable[str]) -> str:
     """Names with commas between them: the first, and how many more there are."""
     names = list(names)
@@ -30,4 +35,4 @@ def listed(names: Iterable[str]) -> str:
 
 def repeated(names: Iterable[str]) -> str:
     """The name that is there most often."""
-    return shortened(repr(Counter(names).most_common(1)[0][0]), 80)
+    return quoted(Counter(names).most_common(1)[0][0])

@@ -5,6 +5,7 @@ import time
 from collections.abc import Callable
 
 from hpccd_ros.drops import Reason
+from hpccd_ros.quoting import shortened
 
 # Texts quote what publishers sent (frame names, field names), which may be of any length.
 _LONGEST = 500
@@ -23,9 +24,7 @@ class RefusalLog:
         self.last = ""
 
     def __call__(self, mesh: str, reason: Reason, text: str) -> None:
-        if len(text) > _LONGEST:
-            text = f"{text[:_LONGEST]} ..."
-        self.last = f"{mesh}: {reason}: {text}"
+        self.last = f"{mesh}: {reason}: {shortened(text, _LONGEST)}"
         now = self._clock()
         since, count = self._silent.get((mesh, reason), (-float("inf"), 0))
         if now - since < self._period:

@@ -7,7 +7,7 @@ from hpccd_ros.detection import SceneBuilder
 from hpccd_ros.messages import MeshSettings
 from hpccd_ros.parameter_table import ACCURACIES
 from hpccd_ros.parameters import ParameterError
-from hpccd_ros.quoting import listed, shortened
+from hpccd_ros.quoting import listed, quoted, shortened
 from hpccd_ros.rigid import Rigid
 
 MeshRows = dict[str, dict[str, Any]]
@@ -30,7 +30,7 @@ def ignored_pairs(settings: dict[str, Any]) -> tuple[tuple[str, str], ...]:
         pair = tuple(text.split(":"))
         if len(pair) != 2 or not set(pair) <= set(settings["meshes"]) or pair[0] == pair[1]:
             raise ParameterError(
-                f"ignored_pairs: {shortened(repr(text))} must be NAME:NAME with two different meshes out of "
+                f"ignored_pairs: {quoted(text)} must be NAME:NAME with two different meshes out of "
                 f"{_names(settings)}"
             )
         pairs.append(pair)
@@ -44,7 +44,7 @@ def pair_accuracies(settings: dict[str, Any]) -> tuple[tuple[str, str, str], ...
         entry = tuple(text.split(":"))
         if len(entry) != 3 or not set(entry[:2]) <= set(settings["meshes"]) or entry[2] not in ACCURACIES:
             raise ParameterError(
-                f"pair_accuracy: {shortened(repr(text))} must be NAME:NAME:TIER with meshes out of {_names(settings)} "
+                f"pair_accuracy: {quoted(text)} must be NAME:NAME:TIER with meshes out of {_names(settings)} "
                 f"and a tier out of {', '.join(ACCURACIES)}"
             )
         pair = frozenset(entry[:2])
@@ -78,8 +78,8 @@ def check(settings: dict[str, Any], meshes: MeshRows) -> None:
             )
         if row["transform"] == "none" and row["frame"] not in ("", settings["frame_id"]):
             raise ParameterError(
-                f"mesh.{name}.frame: {shortened(repr(row['frame']))} is not the scene's frame "
-                f"{shortened(repr(settings['frame_id']))}; set "
+                f"mesh.{name}.frame: {quoted(row['frame'])} is not the scene's frame "
+                f"{quoted(settings['frame_id'])}; set "
                 f"mesh.{name}.transform to pose or tf, or the parameter frame_id"
             )
 

@@ -10,6 +10,7 @@ from typing import Any
 
 from hpccd_ros import convert
 from hpccd_ros.mcap_decode import message_class
+from hpccd_ros.quoting import quoted
 from hpccd_ros.rigid import Rigid
 from hpccd_ros.transforms import TransformBuffer
 
@@ -68,5 +69,5 @@ def keep(buffer: TransformBuffer, message: Any, static: bool) -> None:
             None if static else stamp,
         )
     except ValueError as error:
-        names = f"{message.child_frame_id[:80]!r} to {message.header.frame_id[:80]!r}"
+        names = f"{quoted(message.child_frame_id)} to {quoted(message.header.frame_id)}"
         raise ValueError(f"transform from {names}: {error}") from error

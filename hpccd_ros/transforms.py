@@ -7,6 +7,7 @@ extrapolation. Bounded, as anybody may publish transforms.
 
 from bisect import bisect_left
 
+from hpccd_ros.quoting import quoted
 from hpccd_ros.rigid import IDENTITY, Rigid
 
 HISTORY_NS = 10_000_000_000
@@ -104,7 +105,7 @@ class TransformBuffer:
         up, down = self._ancestors(source), self._ancestors(target)
         common = next((frame for frame in up if frame in set(down)), None)
         if common is None:
-            text = f"no transform connects {source!r} and {target!r}"
+            text = f"no transform connects {quoted(source)} and {quoted(target)}"
             raise NoTransformError(text, final=False, connected=False)
         return self._to_ancestor(target, common, stamp).inverse().after(self._to_ancestor(source, common, stamp))
 

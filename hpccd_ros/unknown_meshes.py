@@ -14,6 +14,7 @@ from sensor_msgs.msg import PointCloud2
 
 from hpccd_ros import qos
 from hpccd_ros.drops import DropCounter, Reason
+from hpccd_ros.quoting import listed
 
 # Bounds what strangers can make the node subscribe to, at a time.
 _MOST_TOPICS = 16
@@ -83,7 +84,7 @@ class UnknownMeshWatch:
         for topic in wanted[:free]:
             self._topics[topic] = self._listen(topic, *unknown[topic]) if self._count else None
         if names := ", ".join(wanted[:free]):
-            known = ", ".join(self._known) or "none"
+            known = listed(self._known) or "none"
             self._node.get_logger().warning(f"{names} belongs to no mesh: parameter meshes has {known}")
 
     def _unknown(self) -> dict[str, tuple[str, type]]:

@@ -123,6 +123,20 @@ def test_bad_topology(streaming, message, reason, text):
     goes_on()
 
 
+def test_a_triangle_that_names_a_vertex_twice_is_a_segment(start_node):
+    node = start_node({"meshes": ["cloth"]})
+    faces = np.array([[0, 0, 1], [2, 3, 4]])
+    node.peer.topology("cloth", faces, 5)
+    start = np.array([[0, 0, 0], [2, 0, 0], [1, 0, 1], [0, 5, 5], [2, 5, 5]], np.float32)
+    end = start - np.array([[0, 0, 0], [0, 0, 0], [0, 0, 2], [0, 0, 0], [0, 0, 0]], np.float32)
+    for k, positions in enumerate((start, end)):
+        node.peer.vertices("cloth", positions, k)
+        node.frames_status(answered=k + 1)
+    message = node.contacts(1)[0]
+    assert assert_same_contacts(message, start, end, scene_of(cloth=faces)) > 0, "vertex 2 goes through it"
+    assert node.peer.statuses["frames"][2].get("topologies_refused", "0") == "0"
+
+
 def test_a_conflict_right_behind_the_topology_does_not_replace_it(start_node):
     """Both wait for the node: it takes them one after the other, however late."""
     node = start_node({"meshes": ["cloth"]})

@@ -169,17 +169,25 @@ def bad_index(r):
         (changed(bad_stamp), "start[0] (cloth): stamp has sec 0 and nanosec 1000000000"),
         (changed(other_version), "start[0] (cloth): topology_version 4"),
         (changed(bad_index), "topologies[0] (cloth): face 0 names vertex 256"),
+        (request(names=("g" * 2_000_000,), topologies=False), "unknown mesh 'ggg"),
+        (request(names=("a" * 1_000_000, "b", "a" * 1_000_000)), "names must differ"),
+        (changed(cut_end, names=("a" * 1_000_000, "b" * 1_000_000)), "end: 0 entries for 2 meshes"),
+        (changed(bad_index, names=("a" * 2_000_000,)), "face 0 names vertex 256"),
+        (request(accuracy="s" * 2_000_000), "accuracy"),
         (request(accuracy="sloppy"), "accuracy"),
         (request(report="some"), "report"),
         (request(time_limit=-1.0), "time_limit"),
         (request(time_limit=math.nan), "time_limit"),
     ],
-    ids="mesh names many count vertices nan far stamp version index accuracy report limit nan-limit".split(),
+    ids=(
+        "mesh names many count vertices nan far stamp version index mesh-2MB names-2MB count-2MB index-2MB "
+        "accuracy-2MB accuracy report limit nan-limit"
+    ).split(),
 )
 def test_bad_requests_are_refused_with_a_reason(node, bad, text):
     refused, good = ask(node, bad, request())
     assert not refused.success and text in refused.message, refused.message
-    assert len(refused.contacts.toc) == 0
+    assert len(refused.contacts.toc) == 0 and len(refused.message) < 1200
     assert good.success, "the node goes on"
 
 
