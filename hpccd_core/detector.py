@@ -3,6 +3,7 @@
 
 import contextlib
 import re
+import threading
 
 import numpy as np
 
@@ -50,6 +51,9 @@ class Detector:
         place.
     restructure: of "published" and "naive", whether they restructure; False only to measure what it brings.
     The scene is copied: meshes added to it later do not reach this detector.
+    One call at a time: of the calls that several Python threads make of one detector each waits until the one before
+    has ended, and profile and stats are those of the last. Only cancel() never waits. Threads that are to work side by
+    side need a detector each, of one scene if they like.
     """
 
     def __init__(
@@ -111,6 +115,7 @@ class Detector:
             arguments.flag("restructure", restructure),
             *queue,
         )
+        self._stepping = threading.RLock()  # of the positions of the last step
         self._last = None
         self._last_on_device = device_arrays.LastStep()
 
@@ -152,8 +157,12 @@ class Detector:
         kept in a copy on the device. A step from a host array to a device array, or back, raises TypeError; reset()
         first.
         """
-        if device_arrays.is_on_device(vertices):
-            return self._step_on_device(vertices)
+        with self._stepping:
+            if device_arrays.is_on_device(vertices):
+                return self._step_on_device(vertices)
+            return self._step_on_host(vertices)
+
+    def _step_on_host(self, vertices):
         if self._last_on_device:
             raise TypeError("vertices: the last step was a device array; give another one, or call reset() first")
         vertices = arguments.vertices("vertices", vertices, self.n_vertices)
@@ -181,16 +190,17 @@ class Detector:
         return Contacts.none() if last is None else contacts
 
     def cancel(self):
-        """End the use of this detector, from any thread: a call under way, if any, and all later ones raise
-        hpccd_core.Cancelled (a RuntimeError), usually within a few ms. The published methods do not notice while they
-        work, nor does what has been handed to a GPU.
+        """End the use of this detector, from any thread and without waiting: a call under way, those that wait for it,
+        and all later ones raise hpccd_core.Cancelled (a RuntimeError), within 10 ms. What has been handed to a GPU
+        comes to its end first.
         """
         self._core.cancel()
 
     def reset(self):
         """Forget the last positions: the next step() starts anew."""
-        self._last = None
-        self._last_on_device.forget()
+        with self._stepping:
+            self._last = None
+            self._last_on_device.forget()
 
     @property
     def backend(self):

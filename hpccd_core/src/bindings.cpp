@@ -140,14 +140,15 @@ PYBIND11_MODULE(_core, m) {
              return to_dict(std::move(c));
            })
       .def("cancel", &Detector::cancel)
-      .def("profile", &Detector::profile)
-      .def("stats", &Detector::stats)
+      .def("profile", &Detector::profile, py::call_guard<py::gil_scoped_release>())  // may wait for a call under way
+      .def("stats", &Detector::stats, py::call_guard<py::gil_scoped_release>())
       .def_property_readonly("last_backend",
                              [](const Detector& d) {
                                const Backend b = d.last_backend();
                                return b == Backend::gpu ? "gpu" : b == Backend::hybrid ? "hybrid" : "cpu";
                              })
-      .def_property_readonly("last_gpu_error", &Detector::last_gpu_error)
+      .def_property_readonly("last_gpu_error",
+                             py::cpp_function(&Detector::last_gpu_error, py::call_guard<py::gil_scoped_release>()))
       .def_property_readonly("threads", [](const Detector& d) { return d.options().threads; })
       .def_property_readonly("simd", [](const Detector& d) { return name_of(d.options().simd); });
 

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <atomic>
+#include <mutex>
 #include <optional>
 #include <thread>
 #include <utility>
@@ -44,10 +46,17 @@ struct Detector::Impl {
     search.leaf_pairs = leaf_pairs(options.simd);
     search.report = o.report;
     search.limits = {o.minimum_separation, o.tolerance};
+    search.cancellation = search.limits.cancellation = &cancellation;
+    for (ThreadPool* p : {&pool, &one_thread}) p->heed(cancellation);
     if (o.minimum_separation > 0) search.batch_test[static_cast<int>(Accuracy::conservative)] = all_undecided;
     engine = paper::engine_of(options, {features, rules, pool});
     use_gpus();
   }
+
+  // All that a call changes is one call's at a time, on whatever thread. What follows the lock is for all.
+  mutable std::mutex one_call;
+  Cancellation cancellation;
+  std::atomic<Backend> last_backend{Backend::cpu};
 
   std::shared_ptr<const Scene> scene;
   Options options;
@@ -57,6 +66,8 @@ struct Detector::Impl {
   std::vector<Worker> workers;
   Search search;
   ContactOrder order;
+  // Kept by a call that is cancelled: to give the memory of 10 million back to the system takes longer than to end it.
+  Contacts contacts;
   MotionBounds motion;
   Tree tree;
   bool tree_fits_motion = false;                // its bounds are those of the last motion taken
@@ -69,7 +80,6 @@ struct Detector::Impl {
     int frames = 0;
     double best_ms = std::numeric_limits<double>::infinity();
   } trial[4];  // by backend
-  Backend last_backend = Backend::cpu;
   Profiler profiler;
   // Of the last call. Its other counts stay where they were made until somebody asks.
   struct Numbers {
@@ -130,13 +140,13 @@ struct Detector::Impl {
 
   std::uint64_t fallbacks() const { return (gpu ? gpu->fallbacks() : 0) + (hybrid ? hybrid->fallbacks() : 0); }
 
-  Contacts collect() {
+  void collect() {
     // Handing out the work (five jobs) takes as long as the work on so many.
     constexpr std::size_t few = 1024;
     std::size_t n = 0;
     for (const Worker& w : workers) n += w.vertex_face.size() + w.edge_edge.size();
     const Outputs outputs{options.points, options.normals, options.minimum_separation == 0};
-    return collect_contacts(workers, search.geometry, options.report, outputs, order, n < few ? one_thread : pool);
+    collect_contacts(workers, search.geometry, options.report, outputs, order, n < few ? one_thread : pool, contacts);
   }
 
   std::map<std::string, std::uint64_t> stats() const {
@@ -254,7 +264,8 @@ Contacts Detector::detect(Positions t0, Positions t1) {
     throw InvalidArgument(
         "vertices_t0, vertices_t1: are in a GPU's memory, which this detector does not use; copy them "
         "to the host, or use backend=\"gpu\"");
-  if (d.search.cancelled) throw Cancelled();
+  const std::lock_guard lock(d.one_call);
+  d.cancellation.heed();
   d.found.reset();
   std::optional<gpu::CallersDevice> callers;
   if (d.gpu || d.hybrid) callers.emplace();
@@ -263,6 +274,7 @@ Contacts Detector::detect(Positions t0, Positions t1) {
   if (backend == Backend::gpu) {
     if (!t0.on_device && !t1.on_device) require_static_meshes_rest(*d.scene, t0, t1);
     if (auto contacts = d.frame_on_gpu(t0, t1)) {
+      d.cancellation.heed();
       d.found = {contacts->vf.size(), contacts->ee.size()};
       d.profiler.end();
       d.note_time(backend, Backend::gpu);
@@ -272,26 +284,33 @@ Contacts Detector::detect(Positions t0, Positions t1) {
   }
   if (d.gpu) t0 = d.gpu->on_host(t0, 0), t1 = d.gpu->on_host(t1, 1);
   const Backend used = d.find_contacts(t0, t1, backend == Backend::hybrid);
-  Contacts contacts = d.collect();
+  d.contacts = {};
+  d.collect();
   d.profiler.mark("contacts");
-  d.found = {contacts.vf.size(), contacts.ee.size()};
+  d.cancellation.heed();  // whoever cancelled a call shall not have to look at its answer
+  d.found = {d.contacts.vf.size(), d.contacts.ee.size()};
   d.profiler.end();
   d.note_time(backend, used);
-  return contacts;
+  return std::move(d.contacts);
 }
 
-void Detector::cancel() { impl_->search.cancelled = true; }
+void Detector::cancel() { impl_->cancellation.request(); }
 
 std::map<std::string, double> Detector::profile() const {
+  const std::lock_guard lock(impl_->one_call);
   auto stages = impl_->profiler.stages();
   if (impl_->gpu && impl_->last_backend == Backend::gpu)
     for (const auto& [name, ms] : impl_->gpu->stages()) stages["gpu/" + name] = ms;
   return stages;
 }
-std::map<std::string, std::uint64_t> Detector::stats() const { return impl_->stats(); }
+std::map<std::string, std::uint64_t> Detector::stats() const {
+  const std::lock_guard lock(impl_->one_call);
+  return impl_->stats();
+}
 const Options& Detector::options() const { return impl_->options; }
 Backend Detector::last_backend() const { return impl_->last_backend; }
 std::string Detector::last_gpu_error() const {
+  const std::lock_guard lock(impl_->one_call);
   if (impl_->hybrid && !impl_->hybrid->last_error().empty()) return impl_->hybrid->last_error();
   return impl_->gpu ? impl_->gpu->last_error() : std::string();
 }

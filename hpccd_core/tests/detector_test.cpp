@@ -2,6 +2,7 @@
 // The public C++ interface; the same contacts on any number of threads is also what the sanitizers are run on.
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <chrono>
 #include <thread>
 
@@ -80,6 +81,58 @@ TEST(Detector, DetectorsOfOneSceneWorkSideBySide) {
   for (Contacts& contacts : found) threads.emplace_back([&] { contacts = detect(scene, {.threads = 2}); });
   for (std::thread& thread : threads) thread.join();
   for (const Contacts& contacts : found) expect_equal(expected, contacts);
+}
+
+TEST(Detector, CallsOfSeveralThreadsTakeTurns) {
+  for (const Method method : {Method::standard, Method::published}) {
+    Options options;
+    options.backend = Backend::cpu, options.threads = 2, options.method = method, options.points = true;
+    const auto scene = test::two_sheets(side);
+    const auto start = test::sheet_positions(side, 0), end = test::sheet_positions(side, 1);
+    Detector alone(scene, options), shared(scene, options);
+    const Contacts there = alone.detect(test::view(start), test::view(end));
+    const Contacts back = alone.detect(test::view(end), test::view(start));
+    ASSERT_NE(there.hash, back.hash);
+    std::atomic<bool> done{false};
+    std::thread reader([&] {
+      while (!done) {
+        const auto stats = shared.stats();
+        EXPECT_TRUE(stats.empty() || stats.at("vf_contacts") == there.vf.size() ||
+                    stats.at("vf_contacts") == back.vf.size());
+        (void)shared.profile();
+        EXPECT_EQ(shared.last_backend(), Backend::cpu);
+        EXPECT_EQ(shared.last_gpu_error(), "");
+      }
+    });
+    std::vector<std::thread> callers;
+    for (int caller = 0; caller < 4; ++caller)
+      callers.emplace_back([&, caller] {
+        for (int call = 0; call < 10; ++call) {
+          const bool forth = (caller + call) % 2 == 0;
+          expect_equal(shared.detect(test::view(forth ? start : end), test::view(forth ? end : start)),
+                       forth ? there : back);
+        }
+      });
+    for (std::thread& caller : callers) caller.join();
+    done = true;
+    reader.join();
+  }
+}
+
+TEST(Detector, CancelEndsTheCallUnderWayAndThoseThatWait) {
+  for (const Method method : {Method::standard, Method::published, Method::naive, Method::front}) {
+    Options options;
+    options.backend = Backend::cpu, options.threads = 2, options.method = method;
+    Detector detector(test::two_sheets(side), options);
+    const auto start = test::sheet_positions(side, 0), end = test::sheet_positions(side, 1);
+    std::vector<std::thread> callers;
+    for (int caller = 0; caller < 3; ++caller)
+      callers.emplace_back(
+          [&] { EXPECT_THROW(for (;;) detector.detect(test::view(start), test::view(end)), Cancelled); });
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    detector.cancel();
+    for (std::thread& caller : callers) caller.join();
+  }
 }
 
 TEST(Detector, AnotherThreadMayEndIt) {

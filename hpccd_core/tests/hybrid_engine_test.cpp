@@ -35,7 +35,11 @@ struct Bench {
     search.earliest = std::numeric_limits<double>::infinity();
   }
 
-  Contacts collect() { return collect_contacts(workers, search.geometry, Report::all, {false, false}, order, pool); }
+  Contacts collect() {
+    Contacts contacts;
+    collect_contacts(workers, search.geometry, Report::all, {false, false}, order, pool, contacts);
+    return contacts;
+  }
 
   Contacts on_cpu() {
     traverse(tree, rules, search, pool, workers);

@@ -66,9 +66,7 @@ TEST(ParallelFor, VisitsEachIndexOnceInPiecesOfTheGrain) {
       parallel_for(pool, n, 64, [&](std::size_t begin, std::size_t end, int thread) {
         EXPECT_LT(begin, end);
         EXPECT_LT(thread, threads);
-        if (threads > 1) {
-          EXPECT_LE(end - begin, 64u);
-        }
+        EXPECT_LE(end - begin, 64u);
         for (std::size_t i = begin; i < end; ++i) ++visits[i];
       });
       EXPECT_EQ(visits, std::vector<int>(n, 1));

@@ -62,7 +62,7 @@ Set random_set(std::uint32_t n, float width, float height) {
 }
 
 TEST(Split, TheLowestAlongTheWidestAxisComeFirst) {
-  for (const std::uint32_t n : {2u, 3u, 40u, 2047u, 2048u, 50000u})
+  for (const std::uint32_t n : {2u, 3u, 40u, 2047u, 2048u, 50000u, 600000u})
     for (const std::uint32_t left : {1u, n / 3, n / 2, n - 1})
       if (left > 0) {
         expect_right_sides(random_set(n, 30, 2), left, 0, "wide");

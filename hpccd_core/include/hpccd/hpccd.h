@@ -113,6 +113,8 @@ struct Positions {
   bool on_device = false;  // data is in a GPU's memory
 };
 
+// One call at a time: of those that several threads make of one detector, each waits until the one before has ended.
+// Threads that are to work side by side need a detector each; the scene may be the same.
 class Detector {
  public:
   Detector(std::shared_ptr<const Scene> scene, Options options);
@@ -123,15 +125,17 @@ class Detector {
   // Contacts of the straight-line motion from t0 to t1 (Kim et al. 2009, section 3.1).
   Contacts detect(Positions vertices_t0, Positions vertices_t1);
 
-  // From any thread: a call under way, if any, and all later ones throw Cancelled as soon as their traversal notices.
-  // Not noticed by the published methods nor by work that is on a GPU already.
+  // From any thread, without waiting: a call under way, those that wait for it, and all later ones throw Cancelled,
+  // within 10 ms. What is on a GPU already comes to its end first.
   void cancel();
 
-  std::map<std::string, double> profile() const;       // stage -> ms of the last call
-  std::map<std::string, std::uint64_t> stats() const;  // counts of the last call
-  const Options& options() const;                      // with "automatic" resolved
-  Backend last_backend() const;                        // where the last frame was computed
+  // Of the last call; while one is under way, of that one when it has ended.
+  std::map<std::string, double> profile() const;       // stage -> ms
+  std::map<std::string, std::uint64_t> stats() const;  // counts
   std::string last_gpu_error() const;                  // why a frame meant for the GPU was computed on the CPU
+  // These do not wait.
+  const Options& options() const;  // with "automatic" resolved
+  Backend last_backend() const;    // where the last frame was computed
 
  private:
   struct Impl;

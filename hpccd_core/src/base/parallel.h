@@ -12,6 +12,7 @@
 #include <thread>
 #include <vector>
 
+#include "base/cancellation.h"
 #include "base/placement.h"
 #include "base/spin_lock.h"
 
@@ -30,6 +31,10 @@ class ThreadPool {
   };
 
   int size() const { return static_cast<int>(workers_.size()) + 1; }
+
+  // From here on parallel_for ends with Cancelled where that is requested.
+  void heed(const Cancellation& cancellation) { cancellation_ = &cancellation; }
+  const Cancellation& cancellation() const { return *cancellation_; }
 
   // Runs job(thread number) once on every thread and returns when all have finished. An exception of a job is rethrown
   // here.
@@ -59,6 +64,7 @@ class ThreadPool {
   bool finished(Join join) const;
 
   std::vector<std::thread> workers_;
+  const Cancellation* cancellation_ = &never_cancelled;
   const std::function<void(int)>* job_ = nullptr;
   std::atomic<std::uint64_t> entry_{0};
   std::atomic<bool> stop_{false};
@@ -77,7 +83,7 @@ template <class F>
 void parallel_for(ThreadPool& pool, std::size_t n, std::size_t grain, F&& f) {
   if (n == 0) return;
   if (pool.size() == 1 || n <= grain) {
-    f(std::size_t{0}, n, 0);
+    in_pieces(pool.cancellation(), n, grain, [&](std::size_t begin, std::size_t end) { f(begin, end, 0); });
     return;
   }
   const auto threads = static_cast<std::size_t>(pool.size());
@@ -92,6 +98,7 @@ void parallel_for(ThreadPool& pool, std::size_t n, std::size_t grain, F&& f) {
       for (;;) {
         const std::size_t piece = next[part].value.fetch_add(1, std::memory_order_relaxed);
         if (piece >= end) break;
+        pool.cancellation().heed();
         f(piece * grain, piece * grain + grain < n ? piece * grain + grain : n, thread);
       }
     }

@@ -67,7 +67,9 @@ class Builder {
   Placed mesh_at_center(std::uint32_t m) const {
     const Scene::Mesh& mesh = scene_.meshes()[m];
     MotionBox b;
-    for (std::uint32_t v = mesh.first_vertex; v < mesh.first_vertex + mesh.n_vertices; ++v) b.include(vertex_boxes_[v]);
+    in_pieces(cancellation_, mesh.n_vertices, some, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t v = begin; v < end; ++v) b.include(vertex_boxes_[mesh.first_vertex + v]);
+    });
     return at_center(b, m);
   }
 
@@ -146,11 +148,13 @@ class Builder {
       for (std::size_t i = begin; i < end; ++i) {
         const Range& r = level_[i];
         const std::uint32_t n = r.end - r.begin;
-        if (n > Tree::leaf_size && !is_shared(r)) split(&carriers_[r.begin], n, left_size(n), &scratch_[r.begin]);
+        if (n > Tree::leaf_size && !is_shared(r))
+          split(&carriers_[r.begin], n, left_size(n), &scratch_[r.begin], cancellation_);
       }
     });
     std::vector<Range> next;
     for (const Range& r : level_) {
+      cancellation_.heed();
       const std::uint32_t n = r.end - r.begin;
       if (n <= Tree::leaf_size) {
         leaf_ranges_.push_back(r);
@@ -166,31 +170,37 @@ class Builder {
   void lay_out_slots() {
     // Leaves in the order of their carriers: neighbours in space are neighbours in memory.
     std::sort(leaf_ranges_.begin(), leaf_ranges_.end(),
-              [](const Range& a, const Range& b) { return a.begin < b.begin; });
+              heeding(cancellation_, [](const Range& a, const Range& b) { return a.begin < b.begin; }));
     const std::size_t n_leaves = leaf_ranges_.size();
-    tree_.leaves.resize(n_leaves);
-    tree_.leaf_nodes.resize(n_leaves);
+    const auto make_room = [this](auto& slots, std::size_t n) { resize(slots, n, cancellation_); };
+    make_room(tree_.leaves, n_leaves);
+    make_room(tree_.leaf_nodes, n_leaves);
     LeafRange at{};
-    for (std::size_t i = 0; i < n_leaves; ++i) tree_.leaves[i] = at = leaf_behind(at, leaf_ranges_[i]);
+    in_pieces(cancellation_, n_leaves, some, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) tree_.leaves[i] = at = leaf_behind(at, leaf_ranges_[i]);
+    });
     // Room behind the last slot, so that a full vector can be loaded anywhere.
     const std::size_t n_faces = at.end_face + Tree::load_width, n_edges = at.end_edge + Tree::load_width,
                       n_vertices = at.end_vertex + Tree::load_width;
-    tree_.face_of_slot.resize(n_faces);
-    tree_.edge_of_slot.resize(n_edges);
-    tree_.vertex_of_slot.resize(n_vertices);
-    for (auto& corner : tree_.face_corners) corner.resize(n_faces);
-    for (auto& end : tree_.edge_ends) end.resize(n_edges);
+    make_room(tree_.face_of_slot, n_faces);
+    make_room(tree_.edge_of_slot, n_edges);
+    make_room(tree_.vertex_of_slot, n_vertices);
+    for (auto& corner : tree_.face_corners) make_room(corner, n_faces);
+    for (auto& end : tree_.edge_ends) make_room(end, n_edges);
     tree_.n_box_groups = n_leaves ? at.end_group() : 0;
     tree_.box_groups = std::make_unique_for_overwrite<BoxGroup[]>(tree_.n_box_groups);
     parallel_for(pool_, n_leaves, 64, [&](std::size_t begin, std::size_t end, int) {
       for (std::size_t i = begin; i < end; ++i) fill_leaf(i);
     });
-    for (std::size_t i = tree_.nodes.size(); i-- > 0;)
-      if (const auto c = tree_.nodes[i].children) {
-        const Node &left = tree_.nodes[c], &right = tree_.nodes[c + 1];
-        tree_.nodes[i].carriers = left.carriers + right.carriers;
-        tree_.nodes[i].only_points = left.only_points && right.only_points;
-      }
+    const std::size_t n_nodes = tree_.nodes.size();
+    in_pieces(cancellation_, n_nodes, some, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = n_nodes - begin; i-- > n_nodes - end;)
+        if (const auto c = tree_.nodes[i].children) {
+          const Node &left = tree_.nodes[c], &right = tree_.nodes[c + 1];
+          tree_.nodes[i].carriers = left.carriers + right.carriers;
+          tree_.nodes[i].only_points = left.only_points && right.only_points;
+        }
+    });
   }
 
   void choose_front() {
@@ -262,6 +272,8 @@ class Builder {
   const Features& features_;
   const std::vector<MotionBox>& vertex_boxes_;
   ThreadPool& pool_;
+  const Cancellation& cancellation_ = pool_.cancellation();
+  static constexpr std::size_t some = 1 << 15;    // pieces of the serial work: less than 1 ms
   std::vector<Part> parts_;                       // by mesh
   std::unique_ptr<Placed[]> carriers_, scratch_;  // carriers in the order of the tree, as far as it has been split
   std::vector<Range> level_, leaf_ranges_;

@@ -126,9 +126,9 @@ void MotionBounds::take(const Real* t0, const Real* t1, std::size_t n, double se
     pieces = pieces_of(parts_, moves);
   }
   margin_ = margin;
-  rows.resize(n);
-  boxes.resize(n);
-  slabs.resize(n);
+  resize(rows, n, pool.cancellation());
+  resize(boxes, n, pool.cancellation());
+  resize(slabs, n, pool.cancellation());
   parallel_for(pool, pieces.size(), 1, [&](std::size_t from, std::size_t to, int) {
     for (std::size_t i = from; i < to; ++i)
       copy_motion(t0, t1, map, margin, pieces[i].begin, pieces[i].end, rows.data(), boxes.data(), slabs.data());
@@ -159,7 +159,7 @@ void MotionBounds::take(Positions t0, Positions t1, double separation, ThreadPoo
 }
 
 void MotionBounds::sweep(ThreadPool& pool) {
-  swept.resize(boxes.size());
+  resize(swept, boxes.size(), pool.cancellation());
   parallel_for(pool, boxes.size(), grain, [&](std::size_t begin, std::size_t end, int) {
     for (std::size_t i = begin; i < end; ++i) swept[i] = boxes[i].swept();
   });

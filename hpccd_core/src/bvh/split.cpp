@@ -27,11 +27,16 @@ int widest_axis(const Box& b) {
   return axis;
 }
 
-void split_along(int axis, Placed* set, std::uint32_t n, std::uint32_t left) {
-  std::nth_element(set, set + left, set + n, [axis](const Placed& a, const Placed& b) {
+void split_along(int axis, Placed* set, std::uint32_t n, std::uint32_t left, const Cancellation& cancellation) {
+  const auto before = [axis](const Placed& a, const Placed& b) {
     const float xa = a.center[axis], xb = b.center[axis];
     return xa < xb || (xa == xb && a.number < b.number);
-  });
+  };
+  constexpr std::uint32_t many = 1 << 16;  // where all lie in one place
+  if (n < many)
+    std::nth_element(set, set + left, set + n, before);
+  else
+    std::nth_element(set, set + left, set + n, heeding(cancellation, before));
 }
 
 // Equal steps along an axis. Rounding keeps the order, so nothing in a bucket lies below anything in the one before.
@@ -63,7 +68,7 @@ struct Piece {
 // that depends on the data. for_pieces(f) calls f(piece) for each.
 template <class ForPieces>
 void split_by_buckets(Placed* set, std::uint32_t left, Placed* scratch, std::vector<Piece>& pieces,
-                      ForPieces&& for_pieces) {
+                      const Cancellation& cancellation, ForPieces&& for_pieces) {
   for_pieces([&](Piece& p) { p.box = box_of(set + p.begin, p.end - p.begin); });
   Box whole;
   for (const Piece& p : pieces) whole.include(p.box);
@@ -90,26 +95,34 @@ void split_by_buckets(Placed* set, std::uint32_t left, Placed* scratch, std::vec
     for (std::uint32_t i = p.begin; i < p.end; ++i) scratch[p.next[side_of(buckets.of(set[i]))]++] = set[i];
   });
   for_pieces([&](Piece& p) { std::copy(scratch + p.begin, scratch + p.end, set + p.begin); });
-  if (left > below) split_along(axis, set + below, inside, left - below);
+  if (left > below) split_along(axis, set + below, inside, left - below, cancellation);
+}
+
+// Not touched yet, but for where they begin and end.
+std::vector<Piece> pieces_of(std::uint32_t n, std::size_t number) {
+  std::vector<Piece> pieces(number);
+  for (std::size_t p = 0; p < number; ++p) {
+    pieces[p].begin = static_cast<std::uint32_t>(n * p / number);
+    pieces[p].end = static_cast<std::uint32_t>(n * (p + 1) / number);
+  }
+  return pieces;
 }
 
 }  // namespace
 
-void split(Placed* set, std::uint32_t n, std::uint32_t left, Placed* scratch) {
+void split(Placed* set, std::uint32_t n, std::uint32_t left, Placed* scratch, const Cancellation& cancellation) {
   constexpr std::uint32_t few = 2 * Buckets::number;  // going through the buckets costs more
-  if (n < few) return split_along(widest_axis(box_of(set, n)), set, n, left);
-  std::vector<Piece> whole(1);
-  whole[0].begin = 0, whole[0].end = n;
-  split_by_buckets(set, left, scratch, whole, [&](auto&& work) { work(whole[0]); });
+  if (n < few) return split_along(widest_axis(box_of(set, n)), set, n, left, cancellation);
+  constexpr std::uint32_t longest_piece = 1 << 18;  // 1 ms
+  std::vector<Piece> pieces = pieces_of(n, n / longest_piece + 1);
+  split_by_buckets(set, left, scratch, pieces, cancellation, [&](auto&& work) {
+    in_pieces(cancellation, pieces.size(), 1, [&](std::size_t p, std::size_t) { work(pieces[p]); });
+  });
 }
 
 void split_together(Placed* set, std::uint32_t n, std::uint32_t left, Placed* scratch, ThreadPool& pool) {
-  std::vector<Piece> pieces(static_cast<std::size_t>(4 * pool.size()));
-  for (std::size_t p = 0; p < pieces.size(); ++p) {
-    pieces[p].begin = static_cast<std::uint32_t>(n * p / pieces.size());
-    pieces[p].end = static_cast<std::uint32_t>(n * (p + 1) / pieces.size());
-  }
-  split_by_buckets(set, left, scratch, pieces, [&](auto&& work) {
+  std::vector<Piece> pieces = pieces_of(n, static_cast<std::size_t>(4 * pool.size()));
+  split_by_buckets(set, left, scratch, pieces, pool.cancellation(), [&](auto&& work) {
     parallel_for_each(pool, pieces.size(), [&](std::size_t p) { work(pieces[p]); });
   });
 }

@@ -16,7 +16,8 @@ struct Placed {
 
 // Puts the `left` lowest of the set first, 0 < left < n, in any order on either side. Ties are decided by number, so
 // that each side holds the same ones everywhere. `scratch` has room for n.
-void split(Placed* set, std::uint32_t n, std::uint32_t left, Placed* scratch);
+void split(Placed* set, std::uint32_t n, std::uint32_t left, Placed* scratch,
+           const Cancellation& cancellation = never_cancelled);
 
 // The same by all threads of the pool, for sets so large that they would leave the others without work.
 void split_together(Placed* set, std::uint32_t n, std::uint32_t left, Placed* scratch, ThreadPool& pool);

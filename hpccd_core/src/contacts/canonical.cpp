@@ -15,14 +15,21 @@ struct alignas(64) Summary {
   double first_toc = std::numeric_limits<double>::infinity();
 };
 
-void keep_earliest(std::vector<Worker>& workers) {
+// Pieces of the work on contacts: 1 ms where points and normals are asked for.
+constexpr std::size_t some = 4096;
+
+void keep_earliest(std::vector<Worker>& workers, const Cancellation& cancellation) {
   double first = std::numeric_limits<double>::infinity();
   for (const Worker& w : workers)
     for (const auto* list : {&w.vertex_face, &w.edge_edge})
-      for (const Found& f : *list) first = std::min(first, f.toc);
+      in_pieces(cancellation, list->size(), some, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) first = std::min(first, (*list)[i].toc);
+      });
   for (Worker& w : workers)
-    for (auto* list : {&w.vertex_face, &w.edge_edge})
+    for (auto* list : {&w.vertex_face, &w.edge_edge}) {
+      cancellation.heed();
       std::erase_if(*list, [&](const Found& f) { return f.toc > first + simultaneous; });
+    }
 }
 
 // Writes contact i of n vertex-face contacts and then edge-edge ones.
@@ -48,43 +55,45 @@ void write(Contacts& c, std::size_t n, std::size_t i, const Found& f, const Geom
 
 }  // namespace
 
-Contacts collect_contacts(std::vector<Worker>& workers, const Geometry& geometry, Report report, Outputs outputs,
-                          ContactOrder& order, ThreadPool& pool) {
-  if (report == Report::first) keep_earliest(workers);
+void collect_contacts(std::vector<Worker>& workers, const Geometry& geometry, Report report, Outputs outputs,
+                      ContactOrder& order, ThreadPool& pool, Contacts& c) {
+  const Cancellation& cancellation = pool.cancellation();
+  if (report == Report::first) keep_earliest(workers, cancellation);
   std::size_t n = 0, m = 0;
   for (const Worker& w : workers) n += w.vertex_face.size(), m += w.edge_edge.size();
 
-  Contacts c;
   // New memory comes page by page from the system, which takes as long as the sorting: each array on its own thread.
   order.take(workers, pool, 6, [&](std::size_t array) {
     switch (array) {
       case 0:
-        return c.ee.resize(m);
+        return resize(c.ee, m, cancellation);
       case 1:
-        return c.ee_toc.resize(m);
+        return resize(c.ee_toc, m, cancellation);
       case 2:
-        return c.vf.resize(n);
+        return resize(c.vf, n, cancellation);
       case 3:
-        return c.vf_toc.resize(n);
+        return resize(c.vf_toc, n, cancellation);
       case 4:
-        return c.points.resize(outputs.points ? n + m : 0);
+        return resize(c.points, outputs.points ? n + m : 0, cancellation);
       default:
-        return c.normals.resize(outputs.normals ? n + m : 0);
+        return resize(c.normals, outputs.normals ? n + m : 0, cancellation);
     }
   });
   std::vector<Summary> summary(static_cast<std::size_t>(pool.size()));
   parallel_for(pool, order.buckets(), 4, [&](std::size_t begin, std::size_t end, int thread) {
     for (std::size_t bucket = begin; bucket < end; ++bucket) {
-      order.sort(bucket);
-      for (std::size_t i = order.begin(bucket); i < order.end(bucket); ++i)
-        write(c, n, i, order[i], geometry, outputs, summary[thread]);
+      order.sort(bucket, cancellation);
+      const std::size_t first = order.begin(bucket);
+      in_pieces(cancellation, order.end(bucket) - first, some, [&](std::size_t from, std::size_t to) {
+        for (std::size_t i = first + from; i < first + to; ++i)
+          write(c, n, i, order[i], geometry, outputs, summary[thread]);
+      });
     }
   });
   for (const Summary& s : summary) {
     c.hash += s.hash;
     c.first_toc = std::min(c.first_toc, s.first_toc);
   }
-  return c;
 }
 
 }  // namespace hpccd

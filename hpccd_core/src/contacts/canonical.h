@@ -14,9 +14,9 @@ struct Outputs {
   bool touching;  // all contacts touch; false: with a minimum separation they need not
 };
 
-// Takes what the workers found. Features are numbered so that their pairs sort into the canonical order. `order` keeps
-// its memory from call to call.
-Contacts collect_contacts(std::vector<Worker>& workers, const Geometry& geometry, Report report, Outputs outputs,
-                          ContactOrder& order, ThreadPool& pool);
+// Takes what the workers found into contacts that hold nothing yet; where this is cancelled, they hold anything.
+// Features are numbered so that their pairs sort into the canonical order. `order` keeps its memory from call to call.
+void collect_contacts(std::vector<Worker>& workers, const Geometry& geometry, Report report, Outputs outputs,
+                      ContactOrder& order, ThreadPool& pool, Contacts& contacts);
 
 }  // namespace hpccd

@@ -4,6 +4,17 @@
 #include <algorithm>
 
 namespace hpccd {
+namespace {
+
+// Calls use(found) for each, in pieces of about 0.1 ms.
+template <class Use>
+void for_each_found(const std::vector<Found>& list, const Cancellation& cancellation, Use&& use) {
+  in_pieces(cancellation, list.size(), 1 << 15, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) use(list[i]);
+  });
+}
+
+}  // namespace
 
 void ContactOrder::add_lists(const std::vector<Worker>& workers, std::vector<Found> Worker::* found, ThreadPool& pool) {
   std::size_t n = 0;
@@ -12,7 +23,8 @@ void ContactOrder::add_lists(const std::vector<Worker>& workers, std::vector<Fou
   std::vector<std::uint32_t> highest(workers.size(), 0);
   parallel_for(pool, workers.size(), 1, [&](std::size_t begin, std::size_t end, int) {
     for (std::size_t i = begin; i < end; ++i)
-      for (const Found& f : workers[i].*found) highest[i] = std::max(highest[i], f.first);
+      for_each_found(workers[i].*found, pool.cancellation(),
+                     [&](const Found& f) { highest[i] = std::max(highest[i], f.first); });
   });
   const double features = static_cast<double>(*std::max_element(highest.begin(), highest.end())) + 1;
   const std::size_t n_buckets = std::clamp<std::size_t>(n / 128, 1, 2048);
@@ -30,7 +42,7 @@ void ContactOrder::count(const std::vector<Worker>& workers, ThreadPool& pool) {
     for (std::size_t i = begin; i < end; ++i) {
       List& list = lists_[i];
       list.next.assign(list.n_buckets, 0);
-      for (const Found& f : *list.found) ++list.next[list.bucket_of(f)];
+      for_each_found(*list.found, pool.cancellation(), [&](const Found& f) { ++list.next[list.bucket_of(f)]; });
     }
   });
   std::size_t at = 0;
@@ -44,19 +56,26 @@ void ContactOrder::count(const std::vector<Worker>& workers, ThreadPool& pool) {
       }
     }
   begin_.push_back(at);
-  if (all_.size() < at) all_.resize(at);
+  if (all_.size() < at) resize(all_, at, pool.cancellation());
 }
 
-void ContactOrder::scatter(std::size_t i) {
+void ContactOrder::scatter(std::size_t i, const Cancellation& cancellation) {
   List& list = lists_[i];
-  for (const Found& f : *list.found) all_[list.next[list.bucket_of(f)]++] = f;
+  for_each_found(*list.found, cancellation, [&](const Found& f) { all_[list.next[list.bucket_of(f)]++] = f; });
 }
 
-void ContactOrder::sort(std::size_t bucket) {
-  std::sort(all_.begin() + static_cast<std::ptrdiff_t>(begin(bucket)),
-            all_.begin() + static_cast<std::ptrdiff_t>(end(bucket)), [](const Found& x, const Found& y) {
-              return x.first < y.first || (x.first == y.first && x.second < y.second);
-            });
+void ContactOrder::sort(std::size_t bucket, const Cancellation& cancellation) {
+  const auto first = all_.begin() + static_cast<std::ptrdiff_t>(begin(bucket)),
+             last = all_.begin() + static_cast<std::ptrdiff_t>(end(bucket));
+  const auto before = [](const Found& x, const Found& y) {
+    return x.first < y.first || (x.first == y.first && x.second < y.second);
+  };
+  // All contacts of one vertex lie in one bucket, however many they are.
+  constexpr std::ptrdiff_t many = 1 << 14;
+  if (last - first < many)
+    std::sort(first, last, before);
+  else
+    std::sort(first, last, heeding(cancellation, before));
 }
 
 }  // namespace hpccd

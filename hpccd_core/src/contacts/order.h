@@ -17,7 +17,8 @@ class ContactOrder {
   void take(const std::vector<Worker>& workers, ThreadPool& pool, std::size_t n_meanwhile, Job&& meanwhile) {
     count(workers, pool);
     parallel_for(pool, lists_.size() + n_meanwhile, 1, [&](std::size_t begin, std::size_t end, int) {
-      for (std::size_t i = begin; i < end; ++i) i < lists_.size() ? scatter(i) : meanwhile(i - lists_.size());
+      for (std::size_t i = begin; i < end; ++i)
+        i < lists_.size() ? scatter(i, pool.cancellation()) : meanwhile(i - lists_.size());
     });
   }
 
@@ -25,7 +26,7 @@ class ContactOrder {
   // Where the bucket's contacts stand among all.
   std::size_t begin(std::size_t bucket) const { return begin_[bucket]; }
   std::size_t end(std::size_t bucket) const { return begin_[bucket + 1]; }
-  void sort(std::size_t bucket);
+  void sort(std::size_t bucket, const Cancellation& cancellation);
   const Found& operator[](std::size_t i) const { return all_[i]; }
 
   std::size_t bytes() const { return all_.capacity() * sizeof(Found); }
@@ -41,7 +42,7 @@ class ContactOrder {
 
   void count(const std::vector<Worker>& workers, ThreadPool& pool);
   void add_lists(const std::vector<Worker>& workers, std::vector<Found> Worker::* found, ThreadPool& pool);
-  void scatter(std::size_t list);
+  void scatter(std::size_t list, const Cancellation& cancellation);
 
   std::vector<List> lists_;
   std::vector<std::size_t> begin_;

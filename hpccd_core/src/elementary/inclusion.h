@@ -14,6 +14,7 @@
 #include <optional>
 #include <vector>
 
+#include "base/cancellation.h"
 #include "elementary/inclusion_rows.h"
 
 namespace hpccd::inclusion {
@@ -22,6 +23,7 @@ struct Limits {
   double separation = 0;    // in units of the coordinates
   double tolerance = 1e-6;  // likewise
   int max_boxes = 100000;
+  const Cancellation* cancellation = &never_cancelled;  // so many boxes take 0.1 s and more
 };
 
 inline Interval Domain::* widest_variable(const Row& axis, const Domain& d) {
@@ -44,6 +46,7 @@ inline std::optional<double> earliest_within(Kind kind, const Motion<double>& m,
   };
   consider({{0, 1}, {0, 1}, kind == Kind::vertex_face ? Interval{0, 1} : Interval{-1, 0}});
   for (int boxes = 0; !open.empty(); ++boxes) {
+    limits.cancellation->heed();
     std::pop_heap(open.begin(), open.end(), later);
     const Domain d = open.back();
     if (boxes >= limits.max_boxes) return d.t.low;

@@ -16,6 +16,7 @@ std::vector<FrontSegment> FrontUpdate::operator()(const FrontSegment& segment) {
   kept_.clear();
   Pair last_climbed{no_node, no_node};
   for (const Pair p : segment) {
+    worker_.heed_cancellation();
     ++worker_.node_pairs;
     if (overlaps(s_, p)) {
       descend(p);
@@ -34,6 +35,7 @@ std::vector<FrontSegment> FrontUpdate::operator()(const FrontSegment& segment) {
 void FrontUpdate::descend(Pair start) {
   stack_.push_back(start);
   while (!stack_.empty()) {
+    worker_.heed_cancellation();
     const Pair p = stack_.back();
     stack_.pop_back();
     if (p != start) ++worker_.node_pairs;

@@ -34,7 +34,9 @@ class FrontBased final : public MethodEngine {
     }
     if (!whole_) {
       build(h_, context_.features, vertex_boxes, context_.pool);
+      context_.pool.cancellation().heed();
       ancestry_ = Ancestry(h_);
+      context_.pool.cancellation().heed();
       area_when_built_ = relative_area(h_);
       front_.clear();
       rebuilt_ = 1;

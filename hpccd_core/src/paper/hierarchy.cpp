@@ -29,14 +29,20 @@ struct CenterBounds {
 };
 
 // Puts the lower half along the widest axis first; ties by number, so that the result is the same everywhere.
-void median(std::uint32_t* items, std::uint32_t n, std::uint32_t half, const std::vector<Box>& boxes) {
+void median(std::uint32_t* items, std::uint32_t n, std::uint32_t half, const std::vector<Box>& boxes,
+            const Cancellation& cancellation) {
   CenterBounds bounds;
   for (std::uint32_t i = 0; i < n; ++i) bounds.include(boxes[items[i]]);
   const int axis = bounds.widest_axis();
-  std::nth_element(items, items + half, items + n, [&](std::uint32_t a, std::uint32_t b) {
+  const auto before = [&](std::uint32_t a, std::uint32_t b) {
     const float xa = center(boxes[a], axis), xb = center(boxes[b], axis);
     return xa < xb || (xa == xb && a < b);
-  });
+  };
+  constexpr std::uint32_t many = 1 << 14;
+  if (n < many)
+    std::nth_element(items, items + half, items + n, before);
+  else
+    std::nth_element(items, items + half, items + n, heeding(cancellation, before));
 }
 
 }  // namespace
@@ -46,20 +52,22 @@ void Hierarchy::start(const Features& features) {
   order.resize(features.n_carriers());
   std::iota(order.begin(), order.end(), 0);
   if (order.empty()) return;
-  nodes.resize(2 * order.size() - 1);
+  resize(nodes, 2 * order.size() - 1, *cancellation_);
   make_child(0, 0, features.n_carriers(), features);
 }
 
 void Hierarchy::split(NodeIndex n, const Features& features) {
+  cancellation_->heed();
   const Node node = nodes[n];
   std::uint32_t left_count;
   if (node.mesh == mixed_meshes) {
     left_count = split_meshes(node, features);
   } else {
     left_count = (node.count + 1) / 2;
-    median(order.data() + node.begin, node.count, left_count, carrier_boxes);
+    median(order.data() + node.begin, node.count, left_count, carrier_boxes, *cancellation_);
   }
   make_child(left(n), node.begin, left_count, features);
+  cancellation_->heed();
   make_child(right(n), node.begin + left_count, node.count - left_count, features);
   nodes[n].is_split = true;
   nodes[n].culling_when_split = culling_inefficiency(*this, n);
@@ -76,7 +84,7 @@ std::uint32_t Hierarchy::split_meshes(const Node& node, const Features& features
     mesh_boxes[mesh].include(carrier_boxes[*c]);
   }
   const auto half = static_cast<std::uint32_t>(meshes.size() / 2);
-  median(meshes.data(), static_cast<std::uint32_t>(meshes.size()), half, mesh_boxes);
+  median(meshes.data(), static_cast<std::uint32_t>(meshes.size()), half, mesh_boxes, *cancellation_);
   std::vector<char> goes_left(mesh_boxes.size(), 0);
   for (std::uint32_t i = 0; i < half; ++i) goes_left[meshes[i]] = 1;
   const auto middle =

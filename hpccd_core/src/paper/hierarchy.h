@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "base/cancellation.h"
 #include "bvh/box.h"
 #include "scene/features.h"
 
@@ -38,6 +39,9 @@ class Hierarchy {
   std::vector<std::uint32_t> order;  // carriers, so that each subtree's lie together
   std::vector<Box> carrier_boxes;    // by carrier, at the current step
 
+  // From here on start and split end with Cancelled where that is requested.
+  void heed(const Cancellation& cancellation) { cancellation_ = &cancellation; }
+
   static NodeIndex left(NodeIndex n) { return n + 1; }
   NodeIndex right(NodeIndex n) const { return n + 2 * nodes[n + 1].count; }
 
@@ -53,6 +57,8 @@ class Hierarchy {
  private:
   std::uint32_t split_meshes(const Node& node, const Features& features);
   void make_child(NodeIndex n, std::uint32_t begin, std::uint32_t count, const Features& features);
+
+  const Cancellation* cancellation_ = &never_cancelled;
 };
 
 // Surface of the children over that of the node (Larsson and Akenine-Möller 2006 compare the same sizes): about 1 where

@@ -17,11 +17,12 @@ Box carrier_box(std::uint32_t c, const Features& features, const std::vector<Box
 
 class Refit {
  public:
-  Refit(Hierarchy& h, const Features& features, const std::vector<Box>& vertex_boxes)
-      : h_(h), features_(features), vertex_boxes_(vertex_boxes) {}
+  Refit(Hierarchy& h, const Features& features, const std::vector<Box>& vertex_boxes, const Cancellation& cancellation)
+      : h_(h), features_(features), vertex_boxes_(vertex_boxes), cancellation_(cancellation) {}
 
   void subtree(NodeIndex n) {
     if (!h_.nodes[n].is_split) return carriers(h_.nodes[n]);
+    if (h_.nodes[n].count > many) cancellation_.heed();
     subtree(Hierarchy::left(n));
     subtree(h_.right(n));
     from_children(n);
@@ -33,6 +34,8 @@ class Refit {
   }
 
  private:
+  static constexpr std::uint32_t many = 1024;  // 10 us
+
   // A leaf, or a node that nothing has needed the children of: what lies below it is not valid.
   void carriers(Node& node) {
     node.box = {};
@@ -46,6 +49,7 @@ class Refit {
   Hierarchy& h_;
   const Features& features_;
   const std::vector<Box>& vertex_boxes_;
+  const Cancellation& cancellation_;
 };
 
 }  // namespace
@@ -53,7 +57,7 @@ class Refit {
 void refit(Hierarchy& h, const Features& features, const std::vector<Box>& vertex_boxes, ThreadPool& pool) {
   const auto k = static_cast<std::size_t>(pool.size());
   const BreadthFirstFront front = breadth_first_front(h, 2 * k, [&](NodeIndex n) { return h.nodes[n].is_split; });
-  Refit refit(h, features, vertex_boxes);
+  Refit refit(h, features, vertex_boxes, pool.cancellation());
   parallel_for(pool, front.low.size(), 1, [&](std::size_t begin, std::size_t end, int) {
     for (std::size_t i = begin; i < end; ++i) refit.subtree(front.low[i]);
   });
@@ -62,7 +66,7 @@ void refit(Hierarchy& h, const Features& features, const std::vector<Box>& verte
 }
 
 void bound_carriers(Hierarchy& h, const Features& features, const std::vector<Box>& vertex_boxes, ThreadPool& pool) {
-  h.carrier_boxes.resize(features.n_carriers());
+  resize(h.carrier_boxes, features.n_carriers(), pool.cancellation());
   parallel_for(pool, features.n_carriers(), 4096, [&](std::size_t begin, std::size_t end, int) {
     for (std::size_t c = begin; c < end; ++c)
       h.carrier_boxes[c] = carrier_box(static_cast<std::uint32_t>(c), features, vertex_boxes);

@@ -70,6 +70,7 @@ void refine(const Hierarchy& h, Pair p, Examine&& examine, Push&& push) {
 
 template <class Examine, class Push>
 void visit(const Scenery& s, Pair p, Worker& worker, Examine&& examine, Push&& push) {
+  worker.heed_cancellation();
   ++worker.node_pairs;
   if (!enabled(s, p) || !overlaps(s, p)) return;
   if (is_leaf_pair(s, p))

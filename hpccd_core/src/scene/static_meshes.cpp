@@ -60,8 +60,10 @@ std::vector<char> StaticMeshes::unchanged(const Scene& scene, Positions t0, Posi
   require_static_meshes_rest(scene, t0, t1);
   for (std::size_t m = 0; m < meshes.size(); ++m) {
     if (!meshes[m].options.is_static || same[m]) continue;
-    const std::byte* begin = begin_of(meshes[m], t0);
-    last_[m].assign(begin, begin + 3 * std::size_t{meshes[m].n_vertices} * (t0.is_double ? 8 : 4));
+    const std::byte* all = begin_of(meshes[m], t0);
+    resize(last_[m], 3 * std::size_t{meshes[m].n_vertices} * (t0.is_double ? 8 : 4), pool.cancellation());
+    parallel_for(pool, last_[m].size(), 1 << 16,
+                 [&](std::size_t begin, std::size_t end, int) { std::copy(all + begin, all + end, &last_[m][begin]); });
   }
   return same;
 }

@@ -74,6 +74,7 @@ void Worker::drain(CandidateBuffer& buffer, Kind kind, Accuracy accuracy, std::u
 
 void Worker::test(const std::uint32_t* first, const std::uint32_t* second, std::uint32_t n, Kind kind,
                   Accuracy accuracy) {
+  heed_cancellation();
   BatchResult& r = *result_;
   BatchCounts& count = counts[kind == Kind::edge_edge];
   r.counts = count;
@@ -89,6 +90,7 @@ void Worker::test(const std::uint32_t* first, const std::uint32_t* second, std::
 }
 
 void Worker::resolve(Kind kind, std::uint32_t a, std::uint32_t b, Accuracy accuracy) {
+  heed_cancellation();
   const Geometry& g = search_->geometry;
   std::uint32_t v[4];
   if (kind == Kind::vertex_face)
@@ -108,7 +110,10 @@ void Worker::report(Kind kind, std::uint32_t first, std::uint32_t second, double
     while (toc < best && !search_->earliest.compare_exchange_weak(best, toc, std::memory_order_relaxed)) {
     }
   }
-  (kind == Kind::vertex_face ? vertex_face : edge_edge).push_back({first, second, toc});
+  std::vector<Found>& found = kind == Kind::vertex_face ? vertex_face : edge_edge;
+  constexpr std::size_t many = 1 << 16;
+  if (found.size() == found.capacity() && found.size() >= many) grow(found, *search_->cancellation);
+  found.push_back({first, second, toc});
 }
 
 }  // namespace hpccd

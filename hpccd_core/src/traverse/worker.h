@@ -7,6 +7,7 @@
 #include <memory>
 #include <vector>
 
+#include "base/cancellation.h"
 #include "elementary/batch.h"
 #include "elementary/inclusion.h"
 #include "elementary/last_resort.h"
@@ -28,7 +29,7 @@ struct Search {
   Report report;
   inclusion::Limits limits;
   std::atomic<double> earliest;  // best time so far, where report is first
-  std::atomic<bool> cancelled{false};
+  const Cancellation* cancellation = &never_cancelled;
 };
 
 class Worker;
@@ -64,6 +65,8 @@ class alignas(128) Worker {
   // The tier's last resort on a pair that nothing else decides, and a contact found elsewhere.
   void resolve(Kind kind, std::uint32_t first, std::uint32_t second, Accuracy accuracy);
   void report(Kind kind, std::uint32_t first, std::uint32_t second, double toc);
+  // Ends the work where that is requested: between any two pairs of nodes, batches and last resorts.
+  void heed_cancellation() const { search_->cancellation->heed(); }
   std::size_t bytes() const;
 
   std::vector<Found> vertex_face, edge_edge;

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: Apache-2.0
+// A request that ends work under way, from any thread. Those who work look at it between pieces that take a moment: a
+// look is one load of what hardly ever changes.
+#pragma once
+
+#include <algorithm>
+#include <atomic>
+#include <cstddef>
+#include <vector>
+
+#include "hpccd/hpccd.h"
+
+namespace hpccd {
+
+// On a cache line of its own: what others write beside it would have to be fetched with it.
+class alignas(64) Cancellation {
+ public:
+  void request() { requested_.store(true, std::memory_order_relaxed); }
+  // Throws Cancelled where it was requested.
+  void heed() const {
+    if (requested_.load(std::memory_order_relaxed)) throw Cancelled();
+  }
+
+ private:
+  std::atomic<bool> requested_{false};
+};
+
+inline const Cancellation never_cancelled;
+
+// f(begin, end) over [0, n) in pieces of at most `grain`.
+template <class F>
+void in_pieces(const Cancellation& cancellation, std::size_t n, std::size_t grain, F&& f) {
+  for (std::size_t begin = 0; begin < n; begin += grain) {
+    cancellation.heed();
+    f(begin, n - begin < grain ? n : begin + grain);
+  }
+}
+
+// What v.resize(n) does: new memory comes page by page from the system, 100 MB in 25 to 100 ms.
+template <class T>
+void resize(std::vector<T>& v, std::size_t n, const Cancellation& cancellation) {
+  constexpr std::size_t piece = (std::size_t{1} << 20) / sizeof(T);
+  if (n > v.capacity()) v.reserve(std::max(n, 2 * v.capacity()));
+  while (v.size() < n) {
+    cancellation.heed();
+    v.resize(std::min(n, v.size() + piece));
+  }
+  v.resize(n);
+}
+
+// Room for as many again: what v.push_back does by itself where it is full, but 10 million contacts take 0.1 s.
+template <class T>
+void grow(std::vector<T>& v, const Cancellation& cancellation) {
+  std::vector<T> larger;
+  larger.reserve(2 * v.size());
+  in_pieces(cancellation, v.size(), (std::size_t{1} << 20) / sizeof(T),
+            [&](std::size_t begin, std::size_t end) { larger.insert(larger.end(), v.data() + begin, v.data() + end); });
+  v.swap(larger);
+}
+
+// The same order for sorting many: a million take 80 ms.
+template <class Less>
+auto heeding(const Cancellation& cancellation, Less less) {
+  return [&cancellation, less](const auto& a, const auto& b) {
+    cancellation.heed();
+    return less(a, b);
+  };
+}
+
+}  // namespace hpccd

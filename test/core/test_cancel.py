@@ -1,0 +1,126 @@
+# SPDX-License-Identifier: Apache-2.0
+"""cancel() is heard in whatever a call is about: at most 10 ms, and never a normal return.
+
+What counts is the time of a processor, which unlike that on a clock hardly depends on how busy the machine is.
+"""
+
+import threading
+import time
+
+import numpy as np
+import pytest
+
+import hpccd_core as hc
+
+
+def faces_of_sheet(n):
+    at = np.arange(n * n).reshape(n, n)
+    a, b, c, d = at[:-1, :-1].ravel(), at[1:, :-1].ravel(), at[:-1, 1:].ravel(), at[1:, 1:].ravel()
+    return np.concatenate([np.stack([a, b, d], 1), np.stack([a, d, c], 1)])
+
+
+def layers(n, noise, layers=3):
+    """Sheets that pass through each other; without noise on a grid, where nothing but exact arithmetic decides."""
+    scene = hc.Scene()
+    for k in range(layers):
+        scene.add_mesh(f"layer {k}", faces_of_sheet(n))
+    y, x = np.mgrid[0:n, 0:n].astype(float)
+    start = np.concatenate([np.stack([x.ravel(), y.ravel(), np.full(n * n, float(k))], 1) for k in range(layers)])
+    start += np.random.default_rng(0).normal(0, noise, start.shape) if noise else 0
+    return scene, start, start * [1, 1, -1]
+
+
+def soup(n, size):
+    """Triangles anywhere."""
+    rng = np.random.default_rng(0)
+    scene = hc.Scene()
+    scene.add_mesh("soup", np.arange(3 * n).reshape(-1, 3))
+    start = (rng.random((n, 1, 3)) + rng.normal(0, size, (n, 3, 3))).reshape(-1, 3)
+    return scene, start, start + np.repeat(0.02 * rng.normal(size=(n, 3)), 3, axis=0)
+
+
+def needle(n):
+    """A point that flies through n triangles: all contacts have the same first feature."""
+    scene = hc.Scene()
+    scene.add_mesh("needle", np.empty((0, 3), int), n_vertices=1)
+    scene.add_mesh("stack", np.arange(3 * n).reshape(-1, 3), self_collision=False)
+    corners = np.array([[-1, -1, 0], [2, -1, 0], [-1, 2, 0]]) + np.linspace(0, 1, n)[:, None, None] * [0, 0, 1]
+    start = np.concatenate([[[0, 0, -1.0]], corners.reshape(-1, 3)])
+    end = start.copy()
+    end[0] = [0.01, 0.02, 2]
+    return scene, start, end
+
+
+def quiet(n):
+    """Much to build, nothing to find."""
+    scene = hc.Scene()
+    scene.add_mesh("sheet", faces_of_sheet(n))
+    y, x = np.mgrid[0:n, 0:n].astype(float)
+    start = np.stack([x.ravel(), y.ravel(), 0 * x.ravel()], 1)
+    return scene, start, start + [0, 0, 0.1]
+
+
+FAST = {"accuracy": "balanced"}
+CASES = {
+    "batches": (lambda: soup(30_000, 0.01), FAST),
+    "last resorts": (lambda: layers(40, 0), {}),
+    "one contact": (lambda: layers(40, 0), {"report": "any"}),
+    "separation": (
+        lambda: layers(20, 0.02),
+        {"accuracy": "conservative", "minimum_separation": 0.3, "tolerance": 1e-9},
+    ),
+    "many contacts": (lambda: soup(8_000, 0.05), FAST | {"outputs": ("points", "normals")}),
+    "contacts of one vertex": (lambda: needle(200_000), FAST | {"outputs": ("points", "normals")}),
+    "building": (lambda: quiet(400), FAST),
+} | {
+    f"{what}, {method}": (make, options | {"method": method})
+    for method in ("published", "naive", "front")
+    for what, make, options in [
+        ("batches", lambda: soup(20_000, 0.01), FAST),
+        ("last resorts", lambda: layers(40, 0), {}),
+        ("building", lambda: quiet(250), FAST),
+    ]
+}
+
+
+def cancelled_after(detector, start, end, delay):
+    """Milliseconds of processor time from cancel() to Cancelled; None where the call had ended before."""
+    times = []
+
+    def cancel():
+        time.sleep(delay)
+        times.append(time.process_time())
+        detector.cancel()
+        times.append(time.process_time())
+
+    under_way = threading.Thread(target=cancel)
+    under_way.start()
+    try:
+        detector.detect(start, end)
+        was_cancelled = False
+    except hc.Cancelled:
+        was_cancelled = True
+    ended = time.process_time()
+    under_way.join()
+    before, after = times
+    assert was_cancelled or ended - after < 0.01, "it returned normally, long after it was cancelled"
+    return 1e3 * (ended - before) if was_cancelled else None
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_within_10_ms(case):
+    make, options = CASES[case]
+    motion = make()
+    new_detector = lambda: hc.Detector(motion[0], backend="cpu", threads=1, **options)  # noqa: E731
+    # At places all over a call, whose length is found out by the way: half of what ended before is tried next.
+    whole, latencies = 1.0, []
+    for place in np.tile([0.1, 0.3, 0.5, 0.7, 0.9], 4):
+        took = cancelled_after(new_detector(), *motion[1:], place * whole)
+        if took is None:
+            whole /= 2
+        else:
+            latencies.append(took)
+        if len(latencies) == 5:
+            break
+    assert len(latencies) >= 3, "it ends before it can be cancelled"
+    assert np.median(latencies) < 10, latencies
