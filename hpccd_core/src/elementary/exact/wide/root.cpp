@@ -50,18 +50,18 @@ void Root::become_exact(Big m, int k) {
 void Root::set_factor(std::vector<Big> factor) {
   of_ = std::move(factor);
   before_ = sign_there(low_, k_);
-  at_low_ = at_high_ = 0;
 }
 
 void Root::narrow() {
-  ++steps_;
   if (of_.size() == 2)
     divide();
-  else if (!approached_)
+  else if (rough_k_ < 0)
     approach();
   else
-    jump();
+    step();
 }
+
+int Root::known_bits() const { return of_.size() == 2 ? k_ : rough_k_ < 0 ? 0 : k_ - rough_k_; }
 
 void Root::divide() {
   k_ = std::max(time_bits + 2, 2 * k_);
@@ -75,11 +75,10 @@ void Root::divide() {
     high_ = low_ + 1;
 }
 
-// Brings the root into an interval of 9 to 32 cells of a grid that is no finer than its distance from the ends calls
+// Brings the root into an interval of 9 to 28 cells of a grid that is no finer than its distance from the ends calls
 // for. All other roots, complex ones too, are at least about as far from it as the nearer end was: p turns or inflects
-// there. So jumps gain ground from here on.
+// there. So steps gain ground from here on.
 void Root::approach() {
-  approached_ = true;
   constexpr int cell_bits = 4;
   int excess = highest_bit(Big(high_ - low_)) - cell_bits;
   if (excess < 0) {
@@ -89,14 +88,14 @@ void Root::approach() {
     excess = 0;
   }
   const int k = k_ - excess;
-  Big first = (low_ >> excess) + 1, last = high_ >> excess;
+  Big first = (low_ >> excess) + 2, last = ((high_ - 1) >> excess) - 1;
   const int at_first = sign_there(first, k);
   if (at_first == 0) return become_exact(std::move(first), k);
-  if (at_first != before_) return approach_from(low_, true, excess);
+  if (at_first != before_) return approach_from(low_, true, excess + 1);
   const int at_last = sign_there(last, k);
   if (at_last == 0) return become_exact(std::move(last), k);
-  if (at_last == before_) return approach_from(high_, false, excess);
-  low_ = std::move(first), high_ = std::move(last), k_ = k;
+  if (at_last == before_) return approach_from(high_, false, excess + 1);
+  low_ = std::move(first), high_ = std::move(last), rough_k_ = k_ = k;
 }
 
 // The root is nearer than 2^limit to the base, one end of the interval.
@@ -120,47 +119,40 @@ void Root::approach_from(const Big& base, bool upwards, int limit) {
   const Big cell = scaled(base, -excess);
   low_ = upwards ? cell + 8 : cell - 17;
   high_ = upwards ? cell + 17 : cell - 7;
-  k_ -= excess;
+  rough_k_ = k_ -= excess;
 }
 
-// Quadratic interval refinement (Abbott 2006): the secant says near the end of which of 2^bits cells the root is, and
-// exact signs there and at the next end whether it is so.
-void Root::jump() {
-  const int degree = degree_of(of_);
-  if (at_low_.is_zero()) at_low_ = value(of_, low_, k_), at_high_ = value(of_, high_, k_);
-  const int k = k_ + bits_;
-  const auto move = [&](Big low, Big at_low, Big high, Big at_high) {
-    low_ = std::move(low), at_low_ = std::move(at_low), high_ = std::move(high), at_high_ = std::move(at_high);
-    k_ = k;
-    bits_ *= 2;
-  };
-  if (bits_ == 1) {
-    Big middle = low_ + high_, v = value(of_, middle, k);
-    if (v.is_zero()) return become_exact(std::move(middle), k);
-    if (sign(v) == before_)
-      move(std::move(middle), std::move(v), high_ << 1, at_high_ << degree);
-    else
-      move(low_ << 1, at_low_ << degree, std::move(middle), std::move(v));
-    return;
+// Newton's method on the whole interval: with p = a0 + a1 s + a2 s^2 + a3 s^3 seen from its middle, the root is at
+// s = -a0 / (a1 + d), and |d| <= |a2| w + |a3| w^2 for all |s| <= w. One value per doubling of the bits, at half the bits
+// that it yields. Halves the interval where that gains more.
+void Root::step() {
+  const int degree = degree_of(of_), k = k_ + 1;
+  const Big middle = low_ + high_, w = high_ - low_;
+  const auto a = seen_from(of_, middle, k);
+  if (a[0].is_zero()) return become_exact(middle, k);
+  Big d = degree == 3 ? Big((abs(a[3]) * w + abs(a[2])) * w) : Big(abs(a[2]) * w), least = abs(a[1]) - d;
+  if (sign(least) > 0) {
+    // The error of -a0 / a1 is below 2^e. Bits that cost more than all before are not taken, though they come free.
+    const int most = 16 + k_ - rough_k_;
+    const int e = highest_bit(a[0]) + highest_bit(d) + 2 - highest_bit(a[1]) - highest_bit(least);
+    const int more = std::clamp(-e, 0, most);
+    Big num = -a[0] << more, den = a[1];
+    // As many bits of both as an error below one asks for.
+    const int quotient_bits = highest_bit(a[0]) - highest_bit(a[1]) + 1 + more;
+    const int excess = highest_bit(a[1]) - std::max(quotient_bits, 0) - 4;
+    if (excess > 0) num >>= excess, den >>= excess;
+    const Big center = (middle << more) + num / den, margin = (Big(1) << std::max(0, e)) + 2;
+    Big low = std::max(Big(center - margin), Big(low_ << (1 + more)));
+    Big high = std::min(Big(center + margin), Big(high_ << (1 + more)));
+    if (high - low < w << more) {
+      low_ = std::move(low), high_ = std::move(high), k_ = k + more;
+      return;
+    }
   }
-  const Big cells = (high_ - low_) << bits_;
-  Big fall = abs(at_low_), whole = fall + abs(at_high_);
-  const int excess = highest_bit(whole) - highest_bit(cells) - 8;  // bits that the guess does not need
-  if (excess > 0) fall >>= excess, whole >>= excess;
-  // To the nearest end of a cell, whose two cells are both tried.
-  const Big nearest = (2 * cells * fall + whole) / (2 * whole);
-  Big m = (low_ << bits_) + std::clamp(nearest, Big(1), Big(cells - 1));
-  Big v = value(of_, m, k);
-  if (v.is_zero()) return become_exact(std::move(m), k);
-  const bool below = sign(v) == before_;
-  Big other = below ? m + 1 : m - 1, at_other = value(of_, other, k);
-  if (at_other.is_zero()) return become_exact(std::move(other), k);
-  if ((sign(at_other) == before_) == below)
-    bits_ /= 2;
-  else if (below)
-    move(std::move(m), std::move(v), std::move(other), std::move(at_other));
-  else
-    move(std::move(other), std::move(at_other), std::move(m), std::move(v));
+  const bool after = sign(a[0]) == before_;
+  low_ = after ? middle : Big(low_ << 1);
+  high_ = after ? Big(high_ << 1) : middle;
+  k_ = k;
 }
 
 std::int64_t Root::time() {

@@ -30,7 +30,7 @@ class Root {
   void set_factor(std::vector<Big> factor);
 
   void narrow();
-  int steps() const { return steps_; }  // how often it was narrowed
+  int known_bits() const;  // about how many bits tell it from the ends of its first interval
 
   // floor(root * 2^62)
   std::int64_t time();
@@ -40,17 +40,15 @@ class Root {
   void divide();
   void approach();
   void approach_from(const Big& base, bool upwards, int limit);
-  void jump();
+  void step();
   int sign_there(const Big& m, int k) const { return sign_at_dyadic(of_, m, k); }
 
   std::vector<Big> of_;
   Big low_, high_;
   int k_;
   int before_ = 0;
-  bool exact_ = false, approached_ = false;
-  int steps_ = 0;
-  int bits_ = 4;          // that the next jump tries to gain
-  Big at_low_, at_high_;  // value() at the ends; zero: not known
+  bool exact_ = false;
+  int rough_k_ = -1;  // k when the interval was first as long as its distance from 0, 1 and where p turns
 };
 
 }  // namespace hpccd::exact::wide

@@ -59,11 +59,11 @@ int sign_at(Coefficients q, Root& root) {
   if (q.empty()) return 0;
   if (q.size() == 1) return sign(q[0]);
   // Most signs show before the question whether there is one at all, which costs as much as a few steps, is worth it.
-  constexpr int patience = 3;
+  constexpr int patience = 40;
   for (bool asked = false;;) {
     if (root.exact()) return sign_at_dyadic(q, root.low(), root.k());
     if (const int s = sign_on(q, root.low(), root.high(), root.k())) return s;
-    if (!asked && root.steps() >= patience) {
+    if (!asked && root.known_bits() >= patience) {
       asked = true;
       if (vanishes_at(q, root)) return 0;
     }
