@@ -91,5 +91,7 @@ def _no_log_file() -> str | None:
             return None
     except RuntimeError as error:  # rclpy's: neither HOME nor ROS_LOG_DIR is set
         return _sentence(error)
+    except UnicodeDecodeError as error:  # rclpy's: it takes every path for UTF-8
+        return f"{shortened(error.object)[1:]}: the name of the folder is not UTF-8"
     except OSError as error:
         return f"{folder}: {error.strerror}"

@@ -166,8 +166,9 @@ def test_status_and_sentence(outcomes, name):
         {"HOME": "/proc/nothing", "ROS_HOME": None, "ROS_LOG_DIR": None},
         {"ROS_LOG_DIR": "/dev/null"},
         {"ROS_LOG_DIR": "/proc"},
+        {"ROS_LOG_DIR": "/tmp/\udcff"},
     ],
-    ids=["no-home", "home-not-writable", "log-folder-is-a-file", "log-folder-not-writable"],
+    ids=["no-home", "home-not-writable", "log-folder-is-a-file", "log-folder-not-writable", "log-folder-not-utf-8"],
 )
 def test_a_log_that_cannot_be_written_keeps_no_node_from_starting(variables):
     environment = {key: value for key, value in {**os.environ, **variables}.items() if value is not None}
