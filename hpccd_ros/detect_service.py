@@ -47,6 +47,9 @@ ROOM_TO_REFUSE = 1000
 LONGEST = 86_400.0
 # s for telling those whose requests nobody has looked at yet that the service ends.
 FAREWELL = 0.5
+# s that the service outlives its last answer: DDS tells a client of the end by another way, which on a busy machine
+# overtook 4 of 610 answers, and a reader takes nothing of a writer that is gone.
+DELIVERY = 0.2
 STOPPED = "stopped: the node was shut down or cleaned up before the answer was ready; ask again when it is active"
 
 
@@ -85,6 +88,7 @@ class DetectService:
         self._lock = threading.Lock()
         self._open = 0
         self._closed = False
+        self._last_answer = -math.inf
         self._ongoing: set[Ongoing] = set()
         self._awaited: set[Callable[[], None]] = set()
         # A callback that awaits occupies its group until it ends: in the node's own group it would stop everything.
@@ -116,6 +120,7 @@ class DetectService:
             if entity is self._service:
                 task()
         self._turn_away()
+        time.sleep(max(0.0, self._last_answer + DELIVERY - time.monotonic()))
         self._node.destroy_service(self._service)
 
     def _turn_away(self) -> None:
@@ -127,6 +132,7 @@ class DetectService:
                 if header is None:
                     return
                 self._service.send_response(self._refuse(Detect.Response(), "stopped", STOPPED), header)
+                self._last_answer = time.monotonic()
 
     async def _answer(self, request: Detect.Request, response: Detect.Response) -> Detect.Response:
         try:
@@ -135,6 +141,8 @@ class DetectService:
             return self._refuse(response, "refused", str(error))
         except Exception as error:  # here and not only by the executor's guard, so that it is counted as failed
             return self._refuse(Detect.Response(), "failed", self._errors.caught("~/detect", error))
+        finally:
+            self._last_answer = time.monotonic()
 
     async def _computed(self, request: Detect.Request, response: Detect.Response) -> Detect.Response:
         limit = self._time_limit(request)
