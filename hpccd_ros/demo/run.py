@@ -76,7 +76,8 @@ def _stream(args, scene, folder, console):
         )  # fmt: skip
         recorder = children.start(
             "recorder", "hpccd_ros.cli", "record", "-o", str(folder / RECORDING), "--compression", args.compression,
-            "--wait", "180",
+            # Room for the whole scene: a disk that is still busy with the installation may hold the recorder up.
+            "--depth", str(scene.n_frames), "--wait", "180",
         )  # fmt: skip
         children.wait(lambda: recorder.said("recording "), "the recorder did not hear the node", 180.0)
         children.wait(monitor.hears_contacts, "the node was not heard", 180.0)
