@@ -101,7 +101,10 @@ def _run(argv, asked) -> int:
             subparser.description = module.__doc__
             module.configure(subparser)
             run = module.run
-    return run(parser.parse_args(argv)) or 0
+    args = parser.parse_args(argv)
+    if hasattr(sys.stdout, "reconfigure"):
+        sys.stdout.reconfigure(errors="backslashreplace")  # names of files and topics may be no text of the terminal's
+    return run(args) or 0
 
 
 def _ros_refusal(error) -> str | None:

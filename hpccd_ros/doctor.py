@@ -4,7 +4,7 @@
 from datetime import UTC, datetime
 from pathlib import Path
 
-from hpccd_ros.errors import UserError
+from hpccd_ros.errors import UserError, sentence
 from hpccd_ros.mcap_reader import RecordingError, recording_files
 from hpccd_ros.mcap_recover import Examination, examine, recover
 
@@ -39,15 +39,15 @@ def _recover(source, args) -> int:
 
 def _tell(found: Examination) -> None:
     print(f"{found.path}: {_verdict(found)}")
-    print(f"  {found.size:,} bytes, written by {found.library or '?'}, profile {found.profile or '?'}, "
-          f"{found.chunks} chunks, compression {found.compression}")
+    print(f"  {found.size:,} bytes, written by {sentence(found.library) or '?'}, "
+          f"profile {sentence(found.profile) or '?'}, {found.chunks} chunks, compression {found.compression}")
     if found.message_count:
         begin = datetime.fromtimestamp(found.start * 1e-9, UTC).strftime("%Y-%m-%d %H:%M:%S")
         print(f"  {found.message_count} messages in {_seconds(found):.3f} s from {begin} UTC")
     for topic, count in found.counts.items():
-        print(f"    {count:7} {topic}  {found.types.get(topic, '(type unknown)')}")
+        print(f"    {count:7} {sentence(topic)}  {sentence(found.types.get(topic, '(type unknown)'))}")
     if found.problem:
-        print(f"  readable up to byte {found.readable:,}; then: {found.problem}")
+        print(f"  readable up to byte {found.readable:,}; the first problem: {sentence(found.problem)}")
     if found.damaged_chunks:
         print(f"  {found.damaged_chunks} damaged chunks skipped"
               + (f", and {found.orphans} messages that only they described" if found.orphans else ""))
@@ -58,10 +58,10 @@ def _tell(found: Examination) -> None:
 def _verdict(found: Examination) -> str:
     if found.sound:
         return "sound"
-    if found.damaged_chunks:
-        return "DAMAGED"
     if found.message_count == 0:
         return "NO WHOLE MESSAGE"
+    if found.damaged_chunks or found.ended:
+        return "DAMAGED"
     return "CUT OFF, not finished by its recorder"
 
 

@@ -8,12 +8,15 @@ from hpccd_ros.mcap_reader import RecordedTopic, RecordingError
 
 
 def message_class(type_name: str):
-    """The Python class of "pkg/msg/Name". Raises LookupError where the package is not installed."""
-    package, folder, short = type_name.split("/")
+    """The Python class of "pkg/msg/Name". Raises LookupError where it is no such name, or is not installed."""
+    package, folder, short = mcap_schema.parts(type_name)
     try:
-        return getattr(importlib.import_module(f"{package}.{folder}"), short)
+        found = getattr(importlib.import_module(f"{package}.{folder}"), short)
     except (ImportError, AttributeError) as error:
         raise LookupError(f"message type {type_name} is not installed here: {error}") from error
+    if not hasattr(found, "get_fields_and_field_types"):
+        raise LookupError(f"{type_name} is no message type")
+    return found
 
 
 # Fields that were added behind the last one of a message, and the CDR of their value in a recording from before.

@@ -5,29 +5,22 @@ import contextlib
 import dataclasses
 import heapq
 import json
-import struct
 from collections.abc import Iterator
 from pathlib import Path
 
-import zstandard
-from mcap.exceptions import McapError
-from mcap.reader import SeekingReader
-from mcap.stream_reader import CRCValidationError
 from mcap.writer import MCAP0_MAGIC
 
-from hpccd_ros.errors import UserError
+from hpccd_ros.errors import UserError, sentence
 from hpccd_ros.mcap_bag import HPCCD_RECORD
-
-# What reading torn or flipped bytes can raise: the MCAP reader, its decompressors (lz4: RuntimeError), text that is
-# no UTF-8 (a ValueError), an index that names channels which are not there, nonsensical sizes and places (OSError).
-DAMAGE = (
-    McapError, CRCValidationError, struct.error, zstandard.ZstdError, RuntimeError, ValueError, KeyError,
-    OverflowError, OSError, MemoryError, EOFError,
-)  # fmt: skip
+from hpccd_ros.mcap_file import McapFile
+from hpccd_ros.mcap_records import DAMAGE
 
 
 class RecordingError(UserError, ValueError):
     """A recording cannot be read, or not used for what was asked; the text names the file and the remedy."""
+
+    def __init__(self, text: str):
+        super().__init__(sentence(text))  # names in it are those of the recording
 
 
 @dataclasses.dataclass(frozen=True)
@@ -53,7 +46,8 @@ class Recording:
     """A finished recording. Use as a context manager.
 
     path: an `.mcap` file or a folder of them.
-    Raises RecordingError where it does not exist, is no MCAP file, is cut off, or holds no ROS 2 messages.
+    Raises RecordingError where it does not exist, is no MCAP file, is cut off or damaged, or holds no ROS 2 messages;
+    `messages` too, where damage shows only then.
 
     topics: dict topic name -> RecordedTopic.
     info: what `hpccd record` stored beside the messages (dict), or None in a recording of another recorder.
@@ -68,7 +62,7 @@ class Recording:
         self.info: dict | None = None
         self.attachments: dict[str, bytes] = {}
         try:
-            self._readers = [self._open(file) for file in self.files]
+            self._opened = [self._open(file) for file in self.files]
         except BaseException:
             self._stack.close()
             raise
@@ -85,35 +79,32 @@ class Recording:
 
     def messages(self, topics=None) -> Iterator[RecordedMessage]:
         """Messages in the order in which they were received, over all files. `topics`: only these names."""
-        streams = [self._read(file, reader, topics) for file, reader in zip(self.files, self._readers, strict=True)]
+        streams = [self._read(*opened, topics) for opened in zip(self.files, self._opened, strict=True)]
         yield from heapq.merge(*streams, key=lambda message: message.log_time)
 
-    def _open(self, path):
+    def _open(self, path) -> McapFile:
         check_ends(path)
-        stream = self._stack.enter_context(open(path, "rb"))
         with _explained(path):
-            reader = SeekingReader(stream, validate_crcs=True)
-            header = reader.get_header()
-            summary = reader.get_summary()
-        if header.profile != "ros2":
-            raise RecordingError(f"{path} has MCAP profile {header.profile!r}: only ros2 recordings can be used")
-        if summary is None or summary.statistics is None:
+            stream = self._stack.enter_context(open(path, "rb"))
+            file = McapFile(stream, path.stat().st_size)
+        if file.header.profile != "ros2":
+            raise RecordingError(f"{path} has MCAP profile {file.header.profile!r}: only ros2 recordings can be used")
+        if file.index is None or file.index.statistics is None:
             raise RecordingError(f"{path} has no summary section: rewrite it with `hpccd doctor {path} --recover OUT`")
-        for channel_id, channel in summary.channels.items():
-            schema = summary.schemas.get(channel.schema_id)
+        for channel_id, channel in file.index.channels.items():
+            schema = file.index.schemas.get(channel.schema_id)
             if channel.message_encoding != "cdr" or schema is None:
                 raise RecordingError(
                     f"{path}: topic {channel.topic} has encoding {channel.message_encoding!r} and "
                     f"{'no' if schema is None else 'a'} schema; ROS 2 recordings hold cdr with a schema"
                 )
-            self._add_topic(channel, schema, summary.statistics.channel_message_counts.get(channel_id, 0))
-        with _explained(path):
-            for record in reader.iter_metadata():
-                if record.name == HPCCD_RECORD and self.info is None:
-                    self.info = json.loads(record.metadata["json"])
-            if not self.attachments:
-                self.attachments = {a.name: a.data for a in reader.iter_attachments()}
-        return reader
+            self._add_topic(channel, schema, file.index.statistics.channel_message_counts.get(channel_id, 0))
+        stored = next((record for record in file.metadata if record.name == HPCCD_RECORD), None)
+        if stored is not None and self.info is None:
+            self.info = _info(path, stored)
+        if not self.attachments:
+            self.attachments = {a.name: a.data for a in file.attachments}
+        return file
 
     def _add_topic(self, channel, schema, count):
         known = self.topics.get(channel.topic)
@@ -131,38 +122,56 @@ class Recording:
             )
         self.topics[topic.name] = topic
 
-    def _read(self, path, reader, topics):
+    def _read(self, path, file, topics):
         with _explained(path):
-            for _, channel, message in reader.iter_messages(topics=topics, log_time_order=True):
+            for channel, message in file.messages(topics):
                 yield RecordedMessage(
                     channel.topic, message.log_time, message.publish_time, message.sequence, message.data
                 )
 
 
+def _info(path, stored) -> dict:
+    try:
+        info = json.loads(stored.metadata["json"])
+    except (KeyError, ValueError, RecursionError) as error:
+        raise RecordingError(f"{path}: what `hpccd record` stored of the node is no JSON ({_text(error)})") from error
+    if not isinstance(info, dict):
+        raise RecordingError(f"{path}: what `hpccd record` stored of the node is no object but a {type(info).__name__}")
+    return info
+
+
 def recording_files(path: Path) -> list[Path]:
-    """The .mcap files of a recording, in order. Raises RecordingError where there is none."""
+    """The .mcap files of a recording, in order. Raises RecordingError where there is none, or something else."""
     if path.is_dir():
         files = sorted(path.glob("*.mcap"), key=_split_number)
         if not files:
             raise RecordingError(f"the folder {path} holds no .mcap file")
-        return files
-    if not path.exists():
-        raise RecordingError(f"{path} does not exist")
-    return [path]
+    else:
+        files = [path]
+    for file in files:
+        if not file.exists():
+            raise RecordingError(f"{file} does not exist")
+        # Of a pipe, a device or a socket nothing may ever come, and nothing can be read twice.
+        if not file.is_file():
+            raise RecordingError(f"{file} is no file that can be read again: copy the recording into one")
+    return files
 
 
 def _split_number(path: Path):
     number = path.stem.rpartition("_")[2]
-    return (int(number) if number.isdigit() else -1, path.name)
+    return (int(number) if number.isdecimal() else -1, path.name)
 
 
 def check_ends(path: Path) -> None:
     """Raise RecordingError where `path` does not begin as an MCAP file, or does not end as a finished one."""
-    with open(path, "rb") as stream:
-        begin = stream.read(len(MCAP0_MAGIC))
-        size = stream.seek(0, 2)
-        stream.seek(max(0, size - len(MCAP0_MAGIC)))
-        end = stream.read()
+    try:
+        with open(path, "rb") as stream:
+            begin = stream.read(len(MCAP0_MAGIC))
+            size = stream.seek(0, 2)
+            stream.seek(max(0, size - len(MCAP0_MAGIC)))
+            end = stream.read()
+    except OSError as error:
+        raise RecordingError(f"{path} cannot be read: {error.strerror}") from error
     if size == 0:
         raise RecordingError(f"{path} is empty")
     if begin != MCAP0_MAGIC:
@@ -176,11 +185,15 @@ def check_ends(path: Path) -> None:
 
 @contextlib.contextmanager
 def _explained(path):
-    """Turn what the MCAP library and its decompressors raise on damaged bytes into one clear error."""
+    """Turn what reading damaged bytes raises into one clear error."""
     try:
         yield
     except DAMAGE as error:
         raise RecordingError(
-            f"{path} is damaged ({type(error).__name__}: {error}). "
+            f"{path} is damaged ({_text(error)}). "
             f"`hpccd doctor {path} --recover OUT.mcap` saves everything that can be read"
         ) from error
+
+
+def _text(error) -> str:
+    return f"{type(error).__name__}: {error}".rstrip(": ")

@@ -2,15 +2,18 @@
 """Check an MCAP file record by record, and save what is readable of a cut-off or damaged one."""
 
 import dataclasses
+from collections import Counter
+from collections.abc import Callable
 from pathlib import Path
 
-from mcap.reader import SeekingReader
-from mcap.records import Attachment, Channel, Chunk, DataEnd, Header, Message, Metadata, Schema
-from mcap.stream_reader import StreamReader, breakup_chunk
-from mcap.writer import CompressionType, Writer
+from mcap.opcode import Opcode
+from mcap.records import Attachment, Channel, Chunk, Header, Message, Metadata, Schema
+from mcap.writer import MCAP0_MAGIC, CompressionType, Writer
 
 from hpccd_ros.mcap_bag import COMPRESSIONS
-from hpccd_ros.mcap_reader import DAMAGE, RecordingError
+from hpccd_ros.mcap_index import Descriptions, miscounted, misplaced, read_index, undescribed
+from hpccd_ros.mcap_reader import RecordingError
+from hpccd_ros.mcap_records import DAMAGE, Place, data_section, inside, parse, told_by
 
 
 @dataclasses.dataclass
@@ -21,7 +24,8 @@ class Examination:
     size: int  # bytes
     readable: int = 0  # bytes from the start that hold whole, valid records
     finished: bool = False  # index and footer are there
-    problem: str = ""  # why the walk ended before the end, or ""
+    ended: bool = False  # as a finished file does: it was not cut off
+    problem: str = ""  # the first one, or ""
     profile: str = ""
     library: str = ""
     counts: dict[str, int] = dataclasses.field(default_factory=dict)  # messages by topic
@@ -29,8 +33,8 @@ class Examination:
     start: int = 0  # ns, smallest log time
     end: int = 0  # ns, largest log time
     chunks: int = 0
-    damaged_chunks: int = 0  # skipped: their check sum or compression is wrong
-    orphans: int = 0  # messages of channels that only a damaged chunk described
+    damaged_chunks: int = 0  # of which what follows the damage is skipped
+    orphans: int = 0  # messages of channels that nothing readable describes
     compression: str = "none"
 
     @property
@@ -44,8 +48,11 @@ class Examination:
 
 
 def examine(path) -> Examination:
-    """Walk over all records of `path` with their check sums. Never raises for damage: it is in the result."""
-    return _walk(Path(path), lambda record: None)
+    """Walk over all records of `path` with their check sums. Never raises for damage: it is in the result.
+
+    Raises RecordingError where `path` cannot be opened.
+    """
+    return _Walk(Path(path), lambda record: None).result
 
 
 def recover(source, target, compression=None) -> Examination:
@@ -59,9 +66,13 @@ def recover(source, target, compression=None) -> Examination:
     if first.message_count == 0:
         raise RecordingError(f"{source} holds no whole message ({first.problem or 'an empty recording'})")
     with open(target, "xb") as stream:
-        copy = _Copy(Writer(stream, compression=_compression(compression or first.compression)))
-        result = _walk(source, copy)
-        copy.finish()
+        try:
+            copy = _Copy(Writer(stream, compression=_compression(compression or first.compression)), first)
+            result = _Walk(source, copy).result
+            copy.finish()
+        except BaseException:
+            target.unlink()
+            raise
     return result
 
 
@@ -71,96 +82,147 @@ def _compression(name) -> CompressionType:
     return COMPRESSIONS[name]
 
 
-def _walk(path, visit) -> Examination:
-    result = Examination(path, path.stat().st_size)
-    schemas, channels = _described_in_summary(path)
-    announced: set[int] = set()
+class _Walk:
+    """Calls `visit` for each whole record of a file, with those that a message needs before it."""
 
-    def take(record):
-        if isinstance(record, Schema):
-            schemas[record.id] = record
-        elif isinstance(record, Channel):
-            channels[record.id] = record
-        elif isinstance(record, Message):
-            if record.channel_id not in channels:
-                result.orphans += 1
-                return
-            channel = channels[record.channel_id]
-            if record.channel_id not in announced:
-                announced.add(record.channel_id)
-                if channel.schema_id in schemas:
-                    visit(schemas[channel.schema_id])
-                    result.types[channel.topic] = schemas[channel.schema_id].name
-                visit(channel)
-            result.start = min(result.start, record.log_time) if result.message_count else record.log_time
-            result.end = max(result.end, record.log_time)
-            result.counts[channel.topic] = result.counts.get(channel.topic, 0) + 1
-            visit(record)
-        else:
-            visit(record)
-
-    with open(path, "rb") as stream:
+    def __init__(self, path: Path, visit: Callable):
+        self._visit = visit
         try:
-            for record in StreamReader(stream, emit_chunks=True, validate_crcs=True).records:
-                if isinstance(record, Header):
-                    result.profile, result.library = record.profile, record.library
-                    visit(record)
-                elif isinstance(record, Chunk):
-                    result.chunks += 1
-                    result.compression = record.compression or "none"
-                    try:
-                        inner = breakup_chunk(record, validate_crc=True)
-                    except DAMAGE as error:
-                        # The frame of the chunk is whole: what follows it can be read.
-                        result.damaged_chunks += 1
-                        result.problem = result.problem or _text(error)
-                        continue
-                    for item in inner:
-                        take(item)
-                elif isinstance(record, DataEnd):
-                    result.finished = True  # unless the rest, the index, proves unreadable
-                elif not result.finished:
-                    take(record)
-                result.readable = stream.tell()
-        except DAMAGE as error:
-            result.problem = result.problem or _text(error)
+            self.result = Examination(path, path.stat().st_size)
+            stream = open(path, "rb")
+        except OSError as error:
+            raise RecordingError(f"{path} cannot be read: {error.strerror}") from error
+        self._described = Descriptions(self._note)
+        self._visited: dict[int, Channel] = {}
+        self._counts: Counter[int] = Counter()
+        with stream:
+            self._go(stream)
+
+    def _go(self, stream):
+        result = self.result
+        index, data_end, index_problem = self._read_index(stream)
+        places: list[Place] = []
+        for raw in self._whole_records(stream):
+            places.append(raw.place)
+            for record in self._records_of(raw):
+                self._take(record)
+            result.readable = stream.tell()
+        if result.orphans:
+            self._note(f"{result.orphans} messages of channels that nothing describes")
+        if result.finished and data_end != result.readable:
+            index_problem = index_problem or f"the data ends at byte {result.readable:,}, the footer says {data_end:,}"
+        if result.finished and index_problem:
+            self._note(index_problem)
             result.finished = False
-    return result
+        elif result.finished and index is not None and not result.damaged_chunks:
+            result.readable = result.size
+            counts = self._counts
+            for why in (misplaced(index, places), undescribed(index, counts), miscounted(index, counts)):
+                if why:
+                    self._note(why)
+
+    def _whole_records(self, stream):
+        # What `visit` raises, such as a full disk, is no damage: so the loop is not in here.
+        try:
+            yield from data_section(stream, self.result.size)
+        except DAMAGE as error:
+            self._note(_text(error))
+        else:
+            self.result.finished = True
+
+    def _records_of(self, raw):
+        result = self.result
+        if raw.at == len(MCAP0_MAGIC) and raw.opcode != Opcode.HEADER:
+            self._note("no header at its begin")
+        if raw.at != len(MCAP0_MAGIC) and raw.opcode == Opcode.HEADER:
+            self._note(f"a header at byte {raw.at:,}")
+        try:
+            record = parse(raw)
+            if isinstance(record, Chunk):
+                result.chunks += 1
+                result.compression = record.compression if record.compression in COMPRESSIONS else "none"
+                for item in inside(record):
+                    if not told_by(record, item):
+                        self._note(f"the chunk at byte {raw.at:,} has a message outside of the times that it tells")
+                    yield item
+            elif record is not None:
+                yield record
+        except DAMAGE as error:
+            # The frame of the record is whole: what follows it can be read.
+            result.damaged_chunks += raw.opcode == Opcode.CHUNK
+            self._note(_text(error))
+
+    def _read_index(self, stream):
+        """(index or None, where the data must end, why there is none). It may describe what a damaged chunk did."""
+        try:
+            stream.seek(max(0, self.result.size - len(MCAP0_MAGIC)))
+            if stream.read() != MCAP0_MAGIC:
+                return None, 0, "no end of a finished file"
+            self.result.ended = True
+            index, data_end = read_index(stream, self.result.size)
+        except DAMAGE as error:
+            return None, 0, _text(error)
+        if index is not None:
+            for record in (*index.schemas.values(), *index.channels.values()):
+                self._described.add(record)
+        return index, data_end, None
+
+    def _take(self, record):
+        result = self.result
+        if isinstance(record, Header):
+            result.profile, result.library = result.profile or record.profile, result.library or record.library
+        if isinstance(record, (Schema, Channel)):
+            self._described.add(record)
+        elif isinstance(record, Message):
+            self._take_message(record)
+        else:
+            self._visit(record)
+
+    def _take_message(self, record):
+        result, number = self.result, record.channel_id
+        if number not in self._described.channels:
+            result.orphans += 1
+            return
+        channel = self._described.channels[number]
+        if self._visited.get(number) is not channel:
+            self._visited[number] = channel
+            if channel.schema_id in self._described.schemas:
+                self._visit(self._described.schemas[channel.schema_id])
+                result.types[channel.topic] = self._described.schemas[channel.schema_id].name
+            self._visit(channel)
+        result.start = min(result.start, record.log_time) if result.message_count else record.log_time
+        result.end = max(result.end, record.log_time)
+        self._counts[number] += 1
+        result.counts[channel.topic] = result.counts.get(channel.topic, 0) + 1
+        self._visit(record)
+
+    def _note(self, problem: str) -> None:
+        self.result.problem = self.result.problem or problem
 
 
 def _text(error) -> str:
     return f"{type(error).__name__}: {error}".rstrip(": ")
 
 
-def _described_in_summary(path):
-    """Schemas and channels of the index, where the file has one: they may stand in a damaged chunk otherwise."""
-    try:
-        with open(path, "rb") as stream:
-            summary = SeekingReader(stream).get_summary()
-    except DAMAGE:
-        summary = None  # what this module is for
-    return (dict(summary.schemas), dict(summary.channels)) if summary else ({}, {})
-
-
 class _Copy:
     """Visitor that writes each record it is given into a new file, with channel and schema ids of that file."""
 
-    def __init__(self, writer: Writer):
+    def __init__(self, writer: Writer, found: Examination):
         self._writer = writer
         self._schemas: dict[int, int] = {}
         self._channels: dict[int, int] = {}
+        self._known: dict[tuple, int] = {}
+        writer.start(profile=found.profile, library=f"{found.library} (recovered)")
 
     def __call__(self, record):
         writer = self._writer
-        if isinstance(record, Header):
-            writer.start(profile=record.profile, library=f"{record.library} (recovered)")
-        elif isinstance(record, Schema) and record.id not in self._schemas:
-            self._schemas[record.id] = writer.register_schema(record.name, record.encoding, record.data)
+        if isinstance(record, Schema):
+            key = (record.name, record.encoding, record.data)
+            self._schemas[record.id] = self._once(writer.register_schema, *key)
         elif isinstance(record, Channel):
             schema_id = self._schemas.get(record.schema_id, 0)  # 0: no schema, in the words of the format
-            self._channels[record.id] = writer.register_channel(
-                record.topic, record.message_encoding, schema_id, dict(record.metadata)
-            )
+            key = (record.topic, record.message_encoding, schema_id, tuple(record.metadata.items()))
+            self._channels[record.id] = self._once(self._register_channel, *key)
         elif isinstance(record, Message):
             writer.add_message(
                 self._channels[record.channel_id], record.log_time, record.data, record.publish_time, record.sequence
@@ -171,6 +233,15 @@ class _Copy:
             writer.add_attachment(
                 record.create_time, record.log_time, record.name, record.media_type, record.data
             )
+
+    def _once(self, register, *key) -> int:
+        # A damaged file may tell the same again and again.
+        if key not in self._known:
+            self._known[key] = register(*key)
+        return self._known[key]
+
+    def _register_channel(self, topic, encoding, schema_id, metadata):
+        return self._writer.register_channel(topic, encoding, schema_id, dict(metadata))
 
     def finish(self):
         self._writer.finish()

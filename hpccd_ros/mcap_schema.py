@@ -4,11 +4,23 @@
 import functools
 import json
 import os
+import re
 import sys
 from pathlib import Path
 
 # rosbag2's LocalMessageDefinitionSource separates a type from those it is made of by exactly this line.
 SEPARATOR = "=" * 80
+
+
+# A name may come from a recording: it must not lead out of the folders of messages, nor to any other module.
+_TYPE_NAME = re.compile(r"([A-Za-z][A-Za-z0-9_]*)/([a-z]+)/([A-Za-z][A-Za-z0-9_]*)")
+
+
+def parts(type_name: str) -> tuple[str, str, str]:
+    """("pkg", "msg", "Name") of "pkg/msg/Name". Raises LookupError where it is no such name."""
+    if (match := _TYPE_NAME.fullmatch(type_name)) is None:
+        raise LookupError(f"{type_name!r} is no name of a message type (package/msg/Name)")
+    return match[1], match[2], match[3]
 
 
 @functools.cache
@@ -18,12 +30,12 @@ def definition_text(type_name: str) -> str:
     Raises LookupError where the message package is not installed in this environment.
     """
     own, *nested = _type_hashes(type_name)
-    parts = [_message_file(own, ".msg").read_text(encoding="utf-8")]
+    texts = [_message_file(own, ".msg").read_text(encoding="utf-8")]
     for name in nested:
-        package, _, short = name.split("/")
+        package, _, short = parts(name)
         text = _message_file(name, ".msg").read_text(encoding="utf-8")
-        parts.append(f"MSG: {package}/{short}\n{text}")
-    return f"\n{SEPARATOR}\n".join(parts)
+        texts.append(f"MSG: {package}/{short}\n{text}")
+    return f"\n{SEPARATOR}\n".join(texts)
 
 
 def type_hash(type_name: str) -> str:
@@ -39,7 +51,7 @@ def _type_hashes(type_name: str) -> dict[str, str]:
 
 
 def _message_file(type_name: str, suffix: str) -> Path:
-    package, folder, short = type_name.split("/")
+    package, folder, short = parts(type_name)
     # The wheels install into sys.prefix and never set AMENT_PREFIX_PATH; a sourced workspace sets it.
     prefixes = [p for p in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep) if p] + [sys.prefix]
     for prefix in prefixes:

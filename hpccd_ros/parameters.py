@@ -58,6 +58,38 @@ def refusal(row: Row, value: Any) -> str | None:
     return None
 
 
+def of_plain(given: dict[str, Any]) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
+    """What ``declare`` returns for a node with the parameters ``given``, by full name, from a file. None: not set.
+
+    Raises ParameterError: as ``declare``.
+    """
+    settings = {row.name: _checked(row, row.name, given.get(row.name)) for row in NODE_ROWS}
+    _check_names(settings["meshes"])
+    of_mesh = {mesh: f"mesh.{mesh}." for mesh in settings["meshes"]}
+    meshes = {
+        mesh: {row.name: _checked(row, prefix + row.name, given.get(prefix + row.name)) for row in MESH_ROWS}
+        for mesh, prefix in of_mesh.items()
+    }
+    return settings, meshes
+
+
+_PLAIN = {"bool": bool, "int": int, "float": float, "string": str}
+
+
+def _checked(row: Row, name: str, value: Any) -> Any:
+    if value is None:
+        return normalise(row, row.default)
+    is_list = row.kind.endswith("[]") and isinstance(value, list)
+    entries, kind = (value, row.kind[:-2]) if is_list else ([value], row.kind)
+    # Not isinstance: True is an int.
+    if not all(type(entry) is _PLAIN.get(kind) for entry in entries):
+        raise ParameterError(f"{name}: {value!r} is of the wrong type; expected {row.kind}, e.g. {row.default!r}")
+    value = normalise(row, value)
+    if reason := refusal(row, value):
+        raise ParameterError(reason.replace(row.name, name, 1))
+    return value
+
+
 def descriptor(row: Row) -> ParameterDescriptor:
     """What ``describe_parameters`` shows."""
     out = ParameterDescriptor(name=row.name, type=_TYPES[row.kind], description=row.text, read_only=row.change == NEVER)
@@ -81,6 +113,14 @@ def declare(node: Node) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
     """
     settings = {row.name: _declare_one(node, row, row.name) for row in NODE_ROWS}
     names = settings["meshes"]
+    _check_names(names)
+    meshes = {
+        name: {row.name: _declare_one(node, row, f"mesh.{name}.{row.name}") for row in MESH_ROWS} for name in names
+    }
+    return settings, meshes
+
+
+def _check_names(names: list[str]) -> None:
     for name in names:
         if not _MESH_NAME.fullmatch(name):
             raise ParameterError(
@@ -89,10 +129,6 @@ def declare(node: Node) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
             )
     if len(set(names)) != len(names):
         raise ParameterError(f"meshes: names must differ, {quoting.repeated(names)} is there twice")
-    meshes = {
-        name: {row.name: _declare_one(node, row, f"mesh.{name}.{row.name}") for row in MESH_ROWS} for name in names
-    }
-    return settings, meshes
 
 
 def _declare_one(node: Node, row: Row, name: str) -> Any:
@@ -129,6 +165,16 @@ def unknown_overrides(node: Node, qos_overrides: Container[str] = ()) -> list[st
     """
     given = getattr(node, "_parameter_overrides", {})  # rclpy has no public list of what was given
     return sorted(name for name in given if not node.has_parameter(name) and name not in qos_overrides)
+
+
+# Of every node.
+_ROS_OWN = ("use_sim_time", "start_type_description_service")
+
+
+def unknown(given: Iterable[str], meshes: Iterable[str]) -> list[str]:
+    """Those of the names ``given`` that a node of these meshes would not have."""
+    rows = {row.name for row in NODE_ROWS} | {f"mesh.{mesh}.{row.name}" for mesh in meshes for row in MESH_ROWS}
+    return sorted(n for n in given if n not in rows and n not in _ROS_OWN and not n.startswith("qos_overrides."))
 
 
 def watch(

@@ -10,6 +10,7 @@ from collections import deque
 
 import rclpy
 import yaml
+from rclpy.exceptions import NameValidationException
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
 from hpccd_ros import _env, qos, replay_setup, ros_start, transform_topics
@@ -21,6 +22,8 @@ from hpccd_ros.pacing import Pace, next_wanted
 
 # Reliable readers that are late now and then must still find what they missed.
 DEPTH = 20
+# Characters of YAML: rosbag2 writes 400 for a publisher.
+MOST_QOS = 100_000
 # Seconds that the last messages may take on their way.
 LAST = 2.0
 
@@ -60,22 +63,36 @@ def _topics(recording, args) -> list[RecordedTopic]:
 def _publisher(node, topic):
     try:
         return node.create_publisher(message_class(topic.type_name), topic.name, _qos(topic))
-    except LookupError as error:
+    # ValueError: no name of a topic. RuntimeError, as RCLError is: that of another one already, once it is resolved.
+    except (LookupError, NameValidationException, ValueError, RuntimeError) as error:
         raise RecordingError(f"topic {topic.name} cannot be played: {error}") from error
 
 
 def _qos(topic) -> QoSProfile:
     """The recorded reliability and durability where all its publishers agreed, else reliable and volatile."""
-    offers = yaml.safe_load(topic.offered_qos) or [] if topic.offered_qos else []
+    offers = _offers(topic)
     # rosbag2 before version 9 wrote the numbers of the enumeration: 1 reliable, 2 best effort; 1 transient local.
-    best_effort = offers and all(offer["reliability"] in ("best_effort", 2) for offer in offers)
-    latched = offers and all(offer["durability"] in ("transient_local", 1) for offer in offers)
+    best_effort = offers and all(offer.get("reliability") in ("best_effort", 2) for offer in offers)
+    latched = offers and all(offer.get("durability") in ("transient_local", 1) for offer in offers)
     return QoSProfile(
         history=HistoryPolicy.KEEP_LAST,
         depth=_in_force(topic) if latched else DEPTH,
         reliability=ReliabilityPolicy.BEST_EFFORT if best_effort else ReliabilityPolicy.RELIABLE,
         durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
     )
+
+
+def _offers(topic) -> list[dict]:
+    try:
+        if len(topic.offered_qos) > MOST_QOS:
+            raise ValueError("too long")
+        offers = yaml.safe_load(topic.offered_qos) or []
+    except (yaml.YAMLError, ValueError, RecursionError):  # ValueError: what YAML takes for a date and is none
+        offers = None
+    if not isinstance(offers, list) or not all(isinstance(offer, dict) for offer in offers):
+        why = "its quality of service is not stored as rosbag2 does"
+        raise RecordingError(f"topic {topic.name} cannot be played: {why}")
+    return offers
 
 
 def _in_force(topic) -> int:

@@ -39,6 +39,16 @@ def of_node(parameters: dict) -> list[Wanted]:
     return [*wanted, Wanted("contacts", CONTACTS)]
 
 
+def types_by_role(meshes) -> dict[str, str]:
+    """Relative name -> type of all topics from which a node of these meshes can be computed again."""
+    of_mesh = {"topology": TOPOLOGY, "vertices": VERTICES, "points": POINTS}
+    return {
+        **{f"meshes/{mesh}/{kind}": type_name for mesh in meshes for kind, type_name in of_mesh.items()},
+        **{topic.name: topic.type_name for topic in transform_topics.ALL.values()},
+        "contacts": CONTACTS,
+    }
+
+
 def subscription_qos(node, name: str, topic: Wanted, depth: int) -> QoSProfile:
     """What to ask of the publishers of `topic` (`name`: resolved), so that all that others receive is received here.
 

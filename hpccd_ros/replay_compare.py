@@ -12,16 +12,16 @@ def difference(recorded, contacts, layout: Layout, any_one: bool = False) -> str
 
     Compared bit for bit: pairs, times, their order, totals, first time and hash. Points and normals are derived
     from these and not compared. any_one: the node stopped at the first contact found (report "any"), which depends
-    on the timing of its threads: only whether there is one can be compared.
+    on the timing of its threads: there must be one if there is any, and it must be one of `contacts`, which are all.
     """
     total = len(contacts.vf) + len(contacts.ee)
     then, now = list(recorded.topology_versions), list(layout.topology_versions)
     if then and then != now:  # recordings from before there were any hold none
         return f"topology versions {then} were recorded, now they are {now}"
-    if any_one:
-        return None if bool(recorded.total) == bool(total) else _count(recorded.total, total)
     if problem := _malformed(recorded, layout):
         return f"the recorded answer is malformed: {problem}"
+    if any_one:
+        return _not_any(recorded, contacts, layout)
     count = len(recorded.kind)
     expected = type(recorded)()
     convert.fill_contacts(expected, contacts, layout, max_contacts=count if recorded.truncated else 0, outputs=())
@@ -34,6 +34,8 @@ def difference(recorded, contacts, layout: Layout, any_one: bool = False) -> str
             return _explain(first, then, now, kind, lambda row, d=describe: d(row, layout))
     if recorded.total != total:
         return _count(recorded.total, total)
+    if recorded.truncated != expected.truncated:
+        return f"{count:,} of {total:,} contacts are marked as {'' if recorded.truncated else 'not '}truncated"
     if recorded.first_toc != contacts.first_toc:
         return f"first time of contact: recorded {recorded.first_toc!r}, now {contacts.first_toc!r}"
     if recorded.hash != contacts.hash:
@@ -54,12 +56,50 @@ def _malformed(message, layout) -> str | None:
             return f"{name} has {len(getattr(message, name))} entries for {count} contacts"
     if list(message.mesh_names) != list(layout.mesh_names):
         return f"its meshes are {list(message.mesh_names)}, those of the recording {list(layout.mesh_names)}"
+    for name in ("points", "normals"):
+        if len(getattr(message, name)) not in (0, 3 * count):
+            return f"{name} has {len(getattr(message, name))} coordinates for {count} contacts"
     kind = np.frombuffer(message.kind, np.uint8)
     if (kind > message.EDGE_EDGE).any() or (np.diff(kind.astype(np.int16)) < 0).any():
         return "kind is not a run of vertex-face followed by a run of edge-edge"
-    for name in ("mesh_a", "mesh_b"):
-        if count and max(getattr(message, name)) >= len(layout.mesh_names):
-            return f"{name} names mesh {max(getattr(message, name))} of {len(layout.mesh_names)}"
+    for side, of_vertex_face in (("a", layout.vertex_offsets), ("b", layout.face_offsets)):
+        if problem := _misnamed(message, side, of_vertex_face, kind, layout):
+            return problem
+    return None
+
+
+def _misnamed(message, side, of_vertex_face, kind, layout) -> str | None:
+    """What a side names that is not there: added up to numbers of the scene, it could pass for something else."""
+    mesh = np.frombuffer(getattr(message, f"mesh_{side}"), np.uint32)
+    feature = np.frombuffer(getattr(message, f"features_{side}"), np.uint32).reshape(-1, 2)
+    if (mesh >= len(layout.mesh_names)).any():
+        return f"mesh_{side} names mesh {mesh.max()} of {len(layout.mesh_names)}"
+    vertex_face = kind == message.VERTEX_FACE
+    first = np.where(vertex_face, np.diff(of_vertex_face)[mesh], np.diff(layout.vertex_offsets)[mesh])
+    wrong = (feature[:, 0] >= first) | np.where(vertex_face, feature[:, 1] != message.NONE, feature[:, 1] >= first)
+    if wrong.any():
+        row = int(np.argmax(wrong))
+        return f"features_{side} of contact {row} are {feature[row].tolist()}, in mesh {layout.mesh_names[mesh[row]]}"
+    return None
+
+
+def _not_any(recorded, contacts, layout) -> str | None:
+    count, total = len(recorded.kind), len(contacts.vf) + len(contacts.ee)
+    if bool(count) != bool(total):
+        return _count(count, total)
+    if recorded.total < count or (recorded.total > count and not recorded.truncated):
+        return f"{recorded.total:,} contacts are told of, {count:,} were recorded"
+    first = min(recorded.toc, default=float("inf"))
+    if recorded.first_toc != first:
+        return f"first time of contact: recorded {recorded.first_toc!r}, that of the recorded contacts is {first!r}"
+    then = convert.read_contacts(recorded, layout)
+    for kind, describe in (("vf", _vertex_face), ("ee", _edge_edge)):
+        toc_of = dict(zip(map(tuple, getattr(contacts, kind)), getattr(contacts, kind + "_toc"), strict=True))
+        for row, toc in zip(map(tuple, getattr(then, kind)), getattr(then, kind + "_toc"), strict=True):
+            if row not in toc_of:
+                return f"{describe(row, layout)}: recorded at t = {float(toc)!r}, now not found"
+            if toc_of[row] != toc:
+                return f"{describe(row, layout)}: recorded at t = {float(toc)!r}, now at t = {float(toc_of[row])!r}"
     return None
 
 

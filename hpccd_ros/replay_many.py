@@ -14,7 +14,8 @@ from rich.table import Table
 
 from hpccd_ros import extras, replay_setup
 from hpccd_ros.errors import UserError
-from hpccd_ros.mcap_reader import Recording, RecordingError
+from hpccd_ros.mcap_reader import Recording
+from hpccd_ros.parameter_file import read_parameters
 from hpccd_ros.replay import Replay
 from hpccd_ros.replay_report import Summary, write_json
 
@@ -32,7 +33,7 @@ def replay_one(path: str, *, params=None, **options) -> dict:
             for step in replay.steps():
                 summary.add(step)
             return summary.row(path, replay) | host
-    except RecordingError as error:
+    except UserError as error:
         return {"file": path, "result": "UNUSABLE", "why": str(error)} | host
 
 
@@ -42,6 +43,8 @@ def main(args) -> int:
     for path in (args.csv, args.json):
         if path and Path(path).exists():
             raise UserError(f"{path} exists: existing files are not overwritten")
+    if args.params:
+        read_parameters(args.params)  # one sentence now rather than one for each recording
     paths = [str(Path(path).absolute()) for path in args.files]
     with _cluster(distributed, args, len(paths)) as (client, threads):
         options = {"params": args.params and str(Path(args.params).absolute()), "backend": args.backend,

@@ -84,6 +84,8 @@ def main(args) -> int:
                 if not next_wanted(f"{step.at:.3f} s"):
                     break
         progress.update(bar, said="")
+    for name in setup.unknown:
+        print(f"parameter {name} is unknown and has no effect", file=sys.stderr)
     if args.json:
         write_json(args.json, [summary.row(args.file, replay)])
     summary.print(args, recording, replay)
@@ -161,8 +163,9 @@ class Summary:
                   f"{first.step}, answer {first.number} of the recording (ends at {first.end} ns):\n"
                   f"  {first.difference}")
         elif replay.verified:
-            print(f"VERIFIED: {replay.verified} answers are equal in every contact, time and hash "
-                  f"(accuracy {', '.join(sorted(self.accuracies))})")
+            what = "hold a contact where there is one, and one that there is" if replay.any_one else (
+                "are equal in every contact, time and hash")  # fmt: skip
+            print(f"VERIFIED: {replay.verified} answers {what} (accuracy {', '.join(sorted(self.accuracies))})")
         elif replay.recorded_answers:
             print("NOTHING VERIFIED: the recording has answers, but not the frames that they belong to")
         elif self.computed:

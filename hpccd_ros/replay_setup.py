@@ -3,18 +3,18 @@
 
 import dataclasses
 import tempfile
-from pathlib import Path
-
-import yaml
+from pathlib import Path, PurePosixPath
 
 from hpccd_ros import parameters as table
-from hpccd_ros import scene_parameters, transform_topics
+from hpccd_ros import recorded_topics, scene_parameters, transform_topics
 from hpccd_ros.detection import Options, SceneBuilder
-from hpccd_ros.errors import UserError
+from hpccd_ros.errors import UserError, sentence
 from hpccd_ros.mcap_reader import Recording, RecordingError
 from hpccd_ros.mesh_attachment import attachment_name
-from hpccd_ros.mesh_file import MeshFileError, load_mesh, place
+from hpccd_ros.mesh_file import FORMATS, MeshFileError, load_mesh, place
 from hpccd_ros.messages import MeshFrame, Topology
+from hpccd_ros.parameter_file import read_parameters
+from hpccd_ros.parameters import ParameterError
 
 
 @dataclasses.dataclass(frozen=True)
@@ -25,8 +25,9 @@ class ReplaySetup:
     meshes: dict[str, dict]
     # Topic name -> (mesh, "topology" | "vertices" | "points"), or ("", name in transform_topics.ALL).
     roles: dict[str, tuple[str, str]]
-    contacts: str  # topic name
+    contacts: str  # topic name, or "" where the recording has none
     files: dict[str, tuple[Topology, MeshFrame | None]]  # of meshes that come from a file; frame: static ones
+    unknown: list[str]  # parameters that the node does not have: without effect
 
     @property
     def builder(self) -> SceneBuilder:
@@ -40,47 +41,90 @@ class ReplaySetup:
 def of_recording(recording: Recording, parameter_file: str | None = None) -> ReplaySetup:
     """Setup from what `hpccd record` stored, or from a parameter file for a recording of another recorder.
 
-    Raises RecordingError where neither tells what the meshes are.
+    Both are checked as the node checks its parameters. Raises RecordingError where the recording, UserError where the
+    file does not tell what the meshes are, or tells what cannot be.
     """
     info = recording.info or {}
-    if parameter_file:
-        given = _read_parameters(parameter_file)
-    elif info.get("parameters"):
-        given = info["parameters"]
-    else:
-        raise RecordingError(
-            f"{recording.path} was not written by `hpccd record`: it does not hold the node's parameters. Give "
-            "them with --params FILE (the YAML file that the node was started with)"
-        )
-    settings = {row.name: table.normalise(row, given.get(row.name, row.default)) for row in table.NODE_ROWS}
-    if not settings["meshes"]:
-        raise RecordingError(f"{parameter_file or recording.path}: parameter `meshes` names no mesh")
-    meshes = {
-        name: {row.name: given.get(f"mesh.{name}.{row.name}", row.default) for row in table.MESH_ROWS}
-        for name in settings["meshes"]
-    }
-    relative = info.get("topics") or _by_suffix(recording, settings["meshes"])
-    roles = {}
-    for topic, name in relative.items():
-        first, _, rest = name.partition("/")
-        if first == "meshes":
-            mesh, _, kind = rest.rpartition("/")
-            roles[topic] = (mesh, kind)
-        elif name in transform_topics.ALL:
-            roles[topic] = ("", name)
-    contacts = next((topic for topic, name in relative.items() if name == "contacts"), "/contacts")
-    if not any(kind in ("vertices", "points") and topic in recording.topics for topic, (_, kind) in roles.items()):
+    try:
+        if parameter_file:
+            where, refused = f"--params {parameter_file}", UserError
+            given = read_parameters(parameter_file)
+        else:
+            where, refused = f"{recording.path}: the stored parameters", RecordingError
+            given = _stored(recording, info)
+        settings, meshes = table.of_plain(given)
+        if not settings["meshes"]:
+            raise ParameterError("parameter `meshes` names no mesh")
+        if all(row["static"] for row in meshes.values()):
+            raise ParameterError("at least one mesh must not be static, or nothing ever moves")
+        scene_parameters.check(settings, meshes)
+    except ParameterError as error:
+        raise refused(sentence(f"{where}: {error}")) from error
+    by_role = _by_role(recording, info, recorded_topics.types_by_role(meshes))
+    roles = {topic: ("", role) if role in transform_topics.ALL else tuple(role.split("/")[1:])
+             for role, topic in by_role.items() if role != "contacts"}  # fmt: skip
+    if not any(kind in ("vertices", "points") for _, kind in roles.values()):
         raise RecordingError(
             f"{recording.path} holds no vertices of the meshes {', '.join(meshes)}; its topics are "
             f"{', '.join(recording.topics) or 'none'}"
         )
     moved = [name for name, row in meshes.items() if row["transform"] == "tf"]
-    if moved and not any(kind in transform_topics.ALL and t in recording.topics for t, (_, kind) in roles.items()):
+    if moved and not any(kind in transform_topics.ALL for _, kind in roles.values()):
         raise RecordingError(
             f"{recording.path}: mesh {moved[0]} was transformed by tf (parameter mesh.{moved[0]}.transform), and the "
             "recording holds no transforms: its positions cannot be computed again"
         )
-    return ReplaySetup(settings, meshes, roles, contacts, _files(recording, meshes))
+    return ReplaySetup(settings, meshes, roles, by_role.get("contacts", ""), _files(recording, meshes),
+                       table.unknown(given, meshes))  # fmt: skip
+
+
+def _stored(recording, info) -> dict:
+    stored = info.get("parameters", {})
+    if stored == {}:
+        raise RecordingError(
+            f"{recording.path} was not written by `hpccd record`: it does not hold the node's parameters. Give "
+            "them with --params FILE (the YAML file that the node was started with)"
+        )
+    if not isinstance(stored, dict):
+        raise ParameterError(f"no names and values but a {type(stored).__name__}")
+    return stored
+
+
+def _by_role(recording, info, types) -> dict[str, str]:
+    """Role -> topic of the recording. types: role -> type; topics of other roles were recorded beside them."""
+    stored = info.get("topics", {})
+    if not isinstance(stored, dict):
+        raise RecordingError(f"{recording.path}: the stored topics are no names but a {type(stored).__name__}")
+    stored = stored or _by_suffix(recording, types)
+    found: dict[str, str] = {}
+    for topic, role in stored.items():
+        if topic not in recording.topics or not isinstance(role, str) or role not in types:
+            continue
+        type_name = recording.topics[topic].type_name
+        if type_name != types[role]:
+            raise RecordingError(
+                f"{recording.path}: topic {topic} is stored as the node's {role}, which is {types[role]}; "
+                f"it holds {type_name}"
+            )
+        if role in found:
+            raise RecordingError(f"{recording.path}: topics {found[role]} and {topic} are both stored as {role}")
+        found[role] = topic
+    if "contacts" not in found and types["contacts"] == getattr(recording.topics.get("/contacts"), "type_name", None):
+        found["contacts"] = "/contacts"
+    return found
+
+
+def _by_suffix(recording, types) -> dict[str, str]:
+    """Topic -> role by what a topic's name ends in; of several topics with the same role, the first."""
+    by_ending = {role.removeprefix("/"): role for role in types}
+    found: dict[str, str] = {}
+    for topic in recording.topics.values():
+        words = topic.name.split("/")
+        endings = ("/".join(words[-count:]) for count in (1, 3) if len(words) > count)
+        role = next((by_ending[ending] for ending in endings if ending in by_ending), None)
+        if role is not None and types[role] == topic.type_name and role not in found.values():
+            found[topic.name] = role
+    return found
 
 
 def _files(recording, meshes):
@@ -88,15 +132,12 @@ def _files(recording, meshes):
     for name, row in meshes.items():
         if not row["file"]:
             continue
-        data = recording.attachments.get(attachment_name(name, row["file"]))
+        attachment = attachment_name(name, row["file"])
         try:
-            if data is None:
-                vertices, faces = load_mesh(row["file"])
+            if attachment in recording.attachments:
+                vertices, faces = _load(attachment, recording.attachments[attachment])
             else:
-                with tempfile.TemporaryDirectory() as folder:
-                    copy = Path(folder) / Path(row["file"]).name
-                    copy.write_bytes(data)
-                    vertices, faces = load_mesh(str(copy))
+                vertices, faces = load_mesh(row["file"])
             frame = MeshFrame(0, place(vertices, row["pose"]), version=0) if row["static"] else None
         except MeshFileError as error:
             raise RecordingError(f"mesh {name} of the recording: {error}") from error
@@ -104,34 +145,14 @@ def _files(recording, meshes):
     return found
 
 
-def _by_suffix(recording, meshes):
-    endings = [f"meshes/{mesh}/{kind}" for mesh in meshes for kind in ("topology", "vertices", "points")]
-    return {
-        topic: ending
-        for topic in recording.topics
-        for ending in [*endings, "contacts", *transform_topics.ALL]
-        if topic.endswith("/" + ending.removeprefix("/"))
-    }
-
-
-def _read_parameters(path) -> dict:
-    """{full name: value} of a ROS parameter file, all nodes in it taken together."""
-    try:
-        tree = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
-        sections = [section["ros__parameters"] for section in tree.values()]
-    except (OSError, yaml.YAMLError, UnicodeDecodeError) as error:
-        raise UserError(f"--params {path}: cannot be read: {error}") from error
-    except (AttributeError, KeyError, TypeError) as error:
-        raise UserError(f"--params {path}: no ROS parameter file (node name, ros__parameters, names)") from error
-    flat = {}
-
-    def walk(prefix, branch):
-        for key, value in branch.items():
-            if isinstance(value, dict):
-                walk(f"{prefix}{key}.", value)
-            else:
-                flat[f"{prefix}{key}"] = value
-
-    for section in sections:
-        walk("", section)
-    return flat
+def _load(attachment, data):
+    suffix = PurePosixPath(attachment).suffix
+    with tempfile.TemporaryDirectory() as folder:
+        # A name of our own: that of a recording may be any.
+        copy = Path(folder) / f"mesh{suffix}"
+        if suffix.lower() in FORMATS:
+            copy.write_bytes(data)
+        try:
+            return load_mesh(str(copy))
+        except MeshFileError as error:
+            raise MeshFileError(str(error).replace(str(copy), attachment)) from error

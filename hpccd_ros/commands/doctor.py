@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Check recordings record by record, with their check sums; save what is readable of a damaged one.
+"""Check recordings record by record, with their check sums and against their index; save what is readable of a damaged
+one.
 
   hpccd doctor run.mcap                          what is in it, and whether it is sound
   hpccd doctor run.mcap --recover saved.mcap     copy every whole message into a new, finished file
@@ -7,7 +8,7 @@
 
 A recorder that is killed (SIGKILL, power of its process, not of the machine) leaves a file without an index. All
 that it had flushed, by default all but the last half second, is whole: --recover makes it a recording again.
-Exit status: 0 sound (or recovered), 1 damaged, 2 unusable.
+Exit status: 0 sound (or recovered), 1 damaged, 2 unusable: no recording, nothing to save, no file (a pipe, a device).
 """
 
 from hpccd_ros.errors import UserError

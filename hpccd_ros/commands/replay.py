@@ -13,8 +13,8 @@ hash with what the node had answered. Or play one over DDS instead, to a node (-
   hpccd replay run.mcap --publish --rate 2  play the meshes to a node, twice as fast as they were recorded
 
 FILE is an .mcap file or a folder of them. Recordings of `ros2 bag record` work too, with --params naming the
-parameter file of the node. Recordings without contacts are computed only, from each frame to the next. Many at once
-need the extra "cluster" (Dask).
+parameter file of the node; what the node would not start with is refused. Recordings without contacts are computed
+only, from each frame to the next. Many at once need the extra "cluster" (Dask).
 """
 
 from hpccd_ros.errors import UserError

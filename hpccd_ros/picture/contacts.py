@@ -54,6 +54,7 @@ class History:
 
 def draw(step: Step, path, history: History | None = None, *, azimuth=-60.0, elevation=26.0, size=(1280, 860)):
     """Write the picture of `step` to `path` (PNG, or another format that matplotlib writes, by its suffix)."""
+    step = _of_drawable_size(step)
     image, camera, depth = render(step.meshes, step.touched, size, azimuth, elevation)
     figure = Figure(figsize=(16, 9), dpi=120, facecolor=BACKGROUND)
     FigureCanvasAgg(figure)
@@ -64,6 +65,16 @@ def draw(step: Step, path, history: History | None = None, *, azimuth=-60.0, ele
     if history is not None:
         _draw_history(figure.add_axes((0.045, 0.055, 0.90, 0.085)), history)
     figure.savefig(Path(path), facecolor=BACKGROUND)
+
+
+def _of_drawable_size(step: Step) -> Step:
+    """The same in another unit of length where single precision, in which the light is computed, would not hold it."""
+    largest = max(float(np.abs(vertices).max(initial=0.0)) for _, vertices, _ in step.meshes)
+    if largest == 0.0 or 1e-6 < largest < 1e6:
+        return step
+    exponent = -int(np.frexp(largest)[1])  # of two: no digit changes
+    meshes = [(name, np.ldexp(np.asarray(v, np.float64), exponent), faces) for name, v, faces in step.meshes]
+    return dataclasses.replace(step, meshes=meshes, points=np.ldexp(step.points, exponent))
 
 
 def render(meshes, touched, size, azimuth, elevation):

@@ -54,7 +54,7 @@ def meshes_in_the_middle(step: Step):
     the surfaces."""
     start, end = step.start_frame, step.end_frame
     return [
-        (name, 0.5 * (np.asarray(v0, np.float64) + v1), topology.faces)
+        (name, 0.5 * np.asarray(v0, np.float64) + 0.5 * np.asarray(v1, np.float64), topology.faces)
         for name, v0, v1, topology in zip(
             step.layout.mesh_names, start.vertices, end.vertices, end.topologies, strict=True
         )

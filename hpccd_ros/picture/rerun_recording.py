@@ -52,7 +52,7 @@ class RerunWriter:
         meshes, offsets = meshes_in_the_middle(step), step.layout.vertex_offsets
         if not self._extent:
             self._look_at(np.concatenate([vertices for _, vertices, _ in meshes]))
-        stream.set_time("step", sequence=step.step)
+        stream.set_time("step", sequence=min(step.step, np.iinfo(np.int64).max))  # a publisher may count to 2**64
         stream.set_time("stamp", timestamp=np.datetime64(step.end, "ns"))
         faces = scene_faces(meshes, offsets)
         colours = vertex_colours(np.diff(offsets), faces, touched(step.contacts, faces, offsets[-1]))

@@ -32,7 +32,10 @@ def main(args) -> int:
             _draw_one(args, steps, target, title, view)
         else:
             target = Path(args.output or f"{source.stem}-frames")
-            target.mkdir(parents=True, exist_ok=True)
+            try:
+                target.mkdir(parents=True, exist_ok=True)
+            except OSError as error:
+                raise UserError(f"--output {target}: {error.strerror}") from error
             _draw_many(args, steps, target, title, view)
     return 0
 

@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 
+import base_bags
 import pytest
 from sources import ROOT, SOURCES
 
@@ -50,3 +51,11 @@ def children(tmp_path, monkeypatch):
 def namespace():
     """A ROS namespace that no other test uses."""
     return f"/rec{os.getpid()}_{next(_numbers)}"
+
+
+@pytest.fixture(scope="session")
+def sound_bags(tmp_path_factory):
+    """A folder with the sound recordings of base_bags.py: streams.mcap and everything.mcap."""
+    folder = tmp_path_factory.mktemp("sound")
+    base_bags.write_all(folder)
+    return folder

@@ -1,0 +1,180 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The records of an MCAP file, taken apart so that no length and no size in it is believed before it is checked.
+
+The reader of the library `mcap` believes them: it reads on into the next record where a length is too large, takes what
+is there where the file ends, and unpacks whatever a chunk unpacks to.
+"""
+
+import struct
+import zlib
+from collections.abc import Iterator
+from io import BytesIO
+from typing import NamedTuple
+
+import lz4.frame
+import zstandard
+from mcap import records as known
+from mcap.data_stream import ReadDataStream
+from mcap.exceptions import EndOfFile, McapError, UnsupportedCompressionError
+from mcap.opcode import Opcode
+from mcap.stream_reader import CRCValidationError
+from mcap.writer import MCAP0_MAGIC
+
+# What reading torn or flipped bytes can raise: the above, decompressors (lz4: RuntimeError), text that is no UTF-8 (a
+# ValueError), a disk that does not give its bytes.
+DAMAGE = (
+    McapError, CRCValidationError, struct.error, zstandard.ZstdError, RuntimeError, ValueError, OSError, MemoryError,
+)  # fmt: skip
+
+# Recorders close a chunk after about a megabyte, or after one message; DDS carries no message as large as this.
+MOST_UNPACKED = 1 << 30
+# A chunk of a megabyte has 34,000 of the smallest messages. Each costs a reader ten times its bytes.
+MOST_RECORDS = 1 << 20
+
+_HEAD = struct.Struct("<BQ")
+_MESSAGE = struct.Struct("<HIQQ")
+_KINDS = {
+    Opcode.HEADER: known.Header, Opcode.FOOTER: known.Footer, Opcode.SCHEMA: known.Schema,
+    Opcode.CHANNEL: known.Channel, Opcode.CHUNK: known.Chunk, Opcode.CHUNK_INDEX: known.ChunkIndex,
+    Opcode.ATTACHMENT: known.Attachment, Opcode.ATTACHMENT_INDEX: known.AttachmentIndex,
+    Opcode.STATISTICS: known.Statistics, Opcode.METADATA: known.Metadata, Opcode.METADATA_INDEX: known.MetadataIndex,
+    Opcode.DATA_END: known.DataEnd,
+}  # fmt: skip
+
+
+class Place(NamedTuple):
+    """Of a whole record in a file."""
+
+    opcode: int
+    at: int
+    length: int
+
+
+class Raw(NamedTuple):
+    """A whole record that is not looked into yet. at: its place in the file."""
+
+    opcode: int
+    at: int
+    body: bytes
+
+    @property
+    def place(self) -> Place:
+        return Place(self.opcode, self.at, _HEAD.size + len(self.body))
+
+
+def records(stream, begin: int, end: int) -> Iterator[Raw]:
+    """The records between two places of a file. Raises EndOfFile where one does not end within."""
+    stream.seek(begin)
+    at = begin
+    while at < end:
+        head = stream.read(_HEAD.size)
+        if len(head) < _HEAD.size:
+            raise EndOfFile(f"the file ends within a record at byte {at:,}")
+        opcode, length = _HEAD.unpack(head)
+        left = end - at - _HEAD.size
+        body = stream.read(length) if length <= left else b""
+        if len(body) < length:
+            raise EndOfFile(f"the record at byte {at:,} has {length:,} bytes, {max(left, 0):,} are left")
+        yield Raw(opcode, at, body)
+        at += _HEAD.size + length
+
+
+def data_section(stream, size: int) -> Iterator[Raw]:
+    """The records of a file of `size` bytes up to its DataEnd, which comes last, its check sum found right.
+
+    Raises what is in DAMAGE.
+    """
+    stream.seek(0)
+    if (magic := stream.read(len(MCAP0_MAGIC))) != MCAP0_MAGIC:
+        raise McapError(f"the file begins with {magic!r}")
+    check_sum = zlib.crc32(magic)
+    for raw in records(stream, len(magic), size):
+        if raw.opcode == Opcode.FOOTER:
+            raise McapError(f"a footer at byte {raw.at:,}, before the end of the data")
+        if raw.opcode == Opcode.DATA_END:
+            end = parse(raw)
+            if end.data_section_crc not in (0, check_sum):
+                raise CRCValidationError(end.data_section_crc, check_sum, end)
+            yield raw
+            return
+        check_sum = zlib.crc32(raw.body, zlib.crc32(_HEAD.pack(raw.opcode, len(raw.body)), check_sum))
+        yield raw
+    raise EndOfFile("the data has no end")
+
+
+def parse(raw: Raw) -> known.McapRecord | None:
+    """The record, or None where it is of a kind that is not needed here. Raises what is in DAMAGE."""
+    if raw.opcode == Opcode.MESSAGE:
+        return _message(raw.body)
+    kind = _KINDS.get(raw.opcode)
+    if kind is None:
+        return None
+    record = kind.read(_Whole(raw.body))
+    if isinstance(record, known.Attachment):
+        # All but its own four bytes, which the library skips.
+        stored, found = int.from_bytes(raw.body[-4:], "little"), zlib.crc32(raw.body[:-4])
+        if stored not in (0, found):
+            raise CRCValidationError(stored, found, record)
+    return record
+
+
+def inside(chunk: known.Chunk) -> Iterator[known.Schema | known.Channel | known.Message]:
+    """The records of a chunk, its check sum found right. Raises what is in DAMAGE."""
+    data = memoryview(_unpacked(chunk))
+    at = 0
+    for _ in range(MOST_RECORDS):
+        if at == len(data):
+            return
+        opcode, length = _HEAD.unpack_from(data, at)
+        at += _HEAD.size
+        if length > len(data) - at:
+            raise EndOfFile(f"a record of {length:,} bytes in a chunk with {len(data) - at:,} left")
+        if opcode in (Opcode.MESSAGE, Opcode.SCHEMA, Opcode.CHANNEL):
+            yield parse(Raw(opcode, 0, bytes(data[at : at + length])))
+        at += length
+    raise McapError(f"a chunk of more than {MOST_RECORDS:,} records")
+
+
+def told_by(chunk: known.Chunk, record: known.McapRecord) -> bool:
+    """Whether a record of the chunk is within the times that it tells, by which chunks are put into order."""
+    inner = isinstance(record, known.Message)
+    return not inner or chunk.message_start_time <= record.log_time <= chunk.message_end_time
+
+
+def _unpacked(chunk) -> bytes:
+    size = chunk.uncompressed_size
+    if size > MOST_UNPACKED:
+        raise McapError(f"a chunk of {size:,} bytes, more than {MOST_UNPACKED:,}")
+    # One byte more than it says is enough to see that it lies.
+    if chunk.compression == "zstd":
+        with zstandard.ZstdDecompressor().stream_reader(chunk.data) as reader:
+            data = reader.read(size + 1)
+    elif chunk.compression == "lz4":
+        data = lz4.frame.LZ4FrameDecompressor().decompress(chunk.data, max_length=size + 1)
+    elif chunk.compression == "":
+        data = chunk.data
+    else:
+        raise UnsupportedCompressionError(chunk.compression[:20])
+    if len(data) != size:
+        raise McapError(f"a chunk of {size:,} bytes unpacks to {'more' if len(data) > size else f'{len(data):,}'}")
+    if chunk.uncompressed_crc not in (0, found := zlib.crc32(data)):
+        raise CRCValidationError(chunk.uncompressed_crc, found, chunk)
+    return data
+
+
+def _message(body: bytes) -> known.Message:
+    channel_id, sequence, log_time, publish_time = _MESSAGE.unpack_from(body)
+    return known.Message(channel_id, log_time, body[_MESSAGE.size :], publish_time, sequence)
+
+
+class _Whole(ReadDataStream):
+    """That of the library gives what is there."""
+
+    def __init__(self, body: bytes):
+        super().__init__(BytesIO(body))
+        self._size = len(body)
+
+    def read(self, length: int) -> bytes:
+        if length > self._size - self.count:
+            raise EndOfFile(f"a field of {length:,} bytes, {self._size - self.count:,} are left")
+        return super().read(length)

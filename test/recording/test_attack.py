@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Thousands of damaged and hostile recordings: no traceback, no hang, bounded memory, never a wrong "verified".
+
+HPCCD_ATTACK=2000 runs 2,000 of each family instead of a few; `python attack.py` beside this file tells the counts.
+"""
+
+import os
+
+import attack
+import hostile
+import pytest
+
+from hpccd_ros import replay_many
+
+MANY = int(os.environ.get("HPCCD_ATTACK", "0"))
+
+
+@pytest.mark.timeout(0 if MANY else 600)
+@pytest.mark.parametrize("family", ["random", "crafted"])
+def test_whatever_a_recording_holds_it_ends_with_a_status_and_a_sentence(family, sound_bags):
+    number = MANY or {"random": 130, "crafted": 2 * len(hostile.KINDS)}[family]
+    names = attack.cases(*((number, 0) if family == "random" else (0, number)))
+    seen = []
+    bad = attack.attack(names, sound_bags, seen.append)
+    assert not bad, "\n".join(f"{result['name']}: {problem}" for result in bad for problem in result["problems"])
+    assert len(seen) == number
+    # Both must be reached, or nothing was tried.
+    verified = [result["name"] for result in seen if result["outcomes"]["replay"] == "VERIFIED"]
+    refused = [result["name"] for result in seen if result["outcomes"]["replay"] == 2]
+    assert len(refused) > number / 4 and (verified or family == "random")
+
+
+def test_a_sample_as_processes(sound_bags, tmp_path, hpccd):
+    """As a user meets them: the status that the shell sees, and nothing on the terminal but sentences."""
+    for name in ("random/truncate/1", "crafted/setup_is_no_json/1", "crafted/roles_swapped/3", "crafted/bomb/1"):
+        path = tmp_path / (name.replace("/", "-") + ".mcap")
+        path.write_bytes(attack.make_case(name, sound_bags))
+        for command in ("doctor", "replay", "view"):
+            done = hpccd(command, path)
+            assert done.returncode in (0, 1, 2) and "Traceback" not in done.stderr, done
+            assert done.returncode != 2 or done.stderr.startswith(f"hpccd {command}: "), done
+
+
+def test_one_of_many_recordings_is_unusable_not_failed(sound_bags, tmp_path):
+    for number, name in enumerate(attack.cases(0, 60, seed=7)):
+        path = tmp_path / f"{number}.mcap"
+        path.write_bytes(attack.make_case(name, sound_bags))
+        row = replay_many.replay_one(str(path), backend="cpu")
+        assert row["result"] in ("VERIFIED", "DIVERGED", "NOT VERIFIED", "COMPUTED", "NOTHING", "UNUSABLE"), name

@@ -1,0 +1,170 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Answers that are not what the node would have sent diverge, however they are disguised."""
+
+import functools
+import json
+import math
+
+import numpy as np
+import pytest
+from bag_tools import typestore
+from hostile_kinds import decoded
+from in_process import hpccd
+from mcap_model import Bag
+
+import hpccd_core as hc
+from hpccd_ros.picture import view
+
+ANSWER = 3
+
+
+@pytest.fixture
+def answered(sound_bags, tmp_path):
+    """Replays a copy with one answer changed by `change(put, answer)`, put(field, value); options for the node."""
+
+    def replay(change, **parameters):
+        bag = Bag.read(sound_bags / "streams.mcap")
+        info = json.loads(bag.metadata[0].metadata["json"])
+        info["parameters"] |= parameters
+        bag.metadata[0].metadata["json"] = json.dumps(info)
+        target = bag.of_topic("/contacts")[ANSWER]
+        others, bag.messages = bag.messages, [target]
+        decoded(bag, "/contacts", _First(), change)
+        bag.messages = others
+        done = hpccd("replay", bag.write(tmp_path / "x.mcap"))
+        assert not done.traceback, done.traceback
+        return done
+
+    return replay
+
+
+class _First:
+    @staticmethod
+    def choice(things):
+        return things[0]
+
+
+def _diverges(done, says):
+    assert done.status == 1 and "DIVERGED: 1 of 7 answers differ" in done.out and says in done.out, done.out
+
+
+def _vertices(sound_bags):
+    message = Bag.read(sound_bags / "streams.mcap").of_topic("/meshes/cloth/topology")[0]
+    return typestore().deserialize_cdr(message.data, "hpccd/msg/MeshTopology").n_vertices
+
+
+def test_the_same_number_in_the_scene_under_another_mesh(answered, sound_bags):
+    shift = _vertices(sound_bags)
+
+    def change(put, answer):
+        mesh, features = answer.mesh_a.copy(), answer.features_a.copy()
+        sign = 1 if mesh[0] == 1 else -1
+        mesh[0] = 1 - mesh[0]
+        features[0] = np.uint32((int(features[0]) + sign * shift) % 2**32)
+        put("mesh_a", mesh)
+        put("features_a", features)
+
+    _diverges(answered(change), "malformed: features_a of contact 0 are ")
+
+
+def test_an_entry_that_is_not_used(answered):
+    def change(put, answer):
+        features = answer.features_b.copy()
+        features[1] = 5
+        put("features_b", features)
+
+    _diverges(answered(change), "malformed: features_b of contact 0 are ")
+
+
+@pytest.mark.parametrize("name", ["points", "normals"])
+def test_points_of_another_number(answered, name):
+    _diverges(answered(lambda put, answer: put(name, np.zeros(4))), f"malformed: {name} has 4 coordinates for")
+
+
+def test_marked_as_cut_off_though_it_is_whole(answered):
+    _diverges(answered(lambda put, answer: put("truncated", True)), "contacts are marked as truncated")
+
+
+def test_a_time_that_is_no_number(answered):
+    def change(put, answer):
+        put("toc", np.where(np.arange(len(answer.toc)) == 0, math.nan, answer.toc))
+
+    _diverges(answered(change), "recorded at t = nan")
+
+
+def _only(rows):
+    """A change that keeps these contacts of the answer."""
+    def change(put, answer):
+        for name, size in {"kind": 1, "mesh_a": 1, "mesh_b": 1, "features_a": 2, "features_b": 2, "toc": 1}.items():
+            put(name, getattr(answer, name).reshape(-1, size)[rows].reshape(-1))
+        for name in ("points", "normals"):
+            put(name, getattr(answer, name)[:0])
+        put("total", len(answer.kind))
+        put("first_toc", float(min(answer.toc, default=math.inf)))
+
+    return change
+
+
+def test_any_contact_is_verified_where_any_was_asked_for(answered):
+    done = answered(_only([5]), report="any")
+    assert done.status == 0, done
+    assert "VERIFIED: 7 answers hold a contact where there is one, and one that there is" in done.out
+
+
+def test_the_core_finds_the_same_time_of_any_contact(sound_bags):
+    """Or the comparison above would call the node's own answers wrong."""
+    generator = np.random.default_rng(5)
+    faces = np.arange(120).reshape(-1, 3)
+    scene = hc.Scene()
+    scene.add_mesh("soup", faces)
+    for _ in range(20):
+        t0, t1 = generator.normal(size=(2, 120, 3))
+        every = hc.Detector(scene, backend="cpu").detect(t0, t1)
+        any_one = hc.Detector(scene, backend="cpu", report="any").detect(t0, t1)
+        rows = {(*map(int, row), toc) for name in ("vf", "ee")
+                for row, toc in zip(getattr(every, name), getattr(every, name + "_toc"), strict=True)}  # fmt: skip
+        found = [(*map(int, row), toc) for name in ("vf", "ee")
+                 for row, toc in zip(getattr(any_one, name), getattr(any_one, name + "_toc"), strict=True)]  # fmt: skip
+        assert found and set(found) <= rows and any_one.first_toc == min(row[-1] for row in found)
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        (lambda put, answer: put("toc", answer.toc[::-1].copy()), "now at t = "),
+        (lambda put, answer: put("features_b", np.where(np.arange(len(answer.features_b)) == 0, 0, answer.features_b)),
+         "now not found"),
+        (lambda put, answer: put("total", 1), "1 contacts are told of"),
+        (lambda put, answer: put("first_toc", 0.5), "first time of contact"),
+        (_only([]), "0 contacts were recorded"),
+        (lambda put, answer: put("kind", answer.kind[:-1]), "malformed"),
+    ],
+)
+def test_any_contact_must_be_one_that_there_is(answered, change, says):
+    _diverges(answered(change, report="any"), says)
+
+
+def test_coordinates_that_the_core_refuses(sound_bags, tmp_path):
+    bag = Bag.read(sound_bags / "everything.mcap")
+
+    def change(put, message):
+        put("vertices_f64", np.full_like(message.vertices_f64, 1e300))
+
+    decoded(bag, "/meshes/cloth/vertices", _First(), change, all_of_them=True)
+    path = bag.write(tmp_path / "x.mcap")
+    done = hpccd("replay", path)
+    assert done.status == 1 and "answers NOT VERIFIED" in done.out and "the core refuses it" in done.out, done
+    assert hpccd("view", path, "-o", tmp_path / "x.png").status == 2
+
+
+@pytest.mark.parametrize("factor", [1e30, 1e-35])
+def test_pictures_of_scenes_beyond_single_precision(sound_bags, tmp_path, factor, monkeypatch):
+    monkeypatch.setattr(view, "draw_step", functools.partial(view.draw_step, size=(160, 120)))  # sooner
+    bag = Bag.read(sound_bags / "everything.mcap")
+
+    def change(put, message):
+        put("vertices_f64", message.vertices_f64 * factor)
+
+    decoded(bag, "/meshes/cloth/vertices", _First(), change, all_of_them=True)
+    done = hpccd("view", bag.write(tmp_path / "x.mcap"), "-o", tmp_path / "x.png")
+    assert done.status == 0 and not done.err, done
