@@ -6,7 +6,7 @@ Each kind is a function of a random generator and a `Bag`, in which it changes o
 
 import json
 
-from bag_tools import typestore
+from bag_tools import missing_tail, typestore
 
 KINDS = {}
 NUMBERS = (0, 1, 2, 7, 255, 2**16 - 1, 2**31 - 1, 2**31, 2**32 - 1)
@@ -30,12 +30,13 @@ def decoded(bag, topic, rng, change, all_of_them=False):
     """Change messages of a topic as rosbags decodes them."""
     store = typestore()
     channel = bag.channel(topic)
-    type_name = next(schema.name for schema in bag.schemas if schema.id == channel.schema_id)
+    schema = next(schema for schema in bag.schemas if schema.id == channel.schema_id)
+    tail = missing_tail(schema)
     messages = bag.of_topic(topic)
     for message in messages if all_of_them else [rng.choice(messages)]:
-        thing = store.deserialize_cdr(message.data, type_name)
+        thing = store.deserialize_cdr(message.data + tail, schema.name)
         change(lambda name, value, thing=thing: object.__setattr__(thing, name, value), thing)
-        message.data = bytes(store.serialize_cdr(thing, type_name))
+        message.data = bytes(store.serialize_cdr(thing, schema.name)).removesuffix(tail)
 
 
 def topic_of(bag, *ends):

@@ -10,7 +10,7 @@ from collections import defaultdict
 from pathlib import Path
 
 import numpy as np
-from bag_tools import typestore
+from bag_tools import missing_tail, typestore
 from base_bags import SECOND
 from mcap_model import Bag
 from rosbags.serde import SerdeError
@@ -38,13 +38,14 @@ class Oracle:
             roles = {**roles, "/contacts": "contacts"}
         self.found = defaultdict(list)
         store = typestore()
-        types = {schema.id: schema.name for schema in bag.schemas}
+        schemas = {schema.id: schema for schema in bag.schemas}
         channels = {channel.id: channel for channel in bag.channels}
         for message in bag.messages:
             channel = channels[message.channel_id]
             if channel.topic in roles:
-                decoded = _decode(store, message.data, types[channel.schema_id])
-                self.found[str(roles[channel.topic])].append(decoded)
+                schema = schemas[channel.schema_id]
+                data = message.data + missing_tail(schema)
+                self.found[str(roles[channel.topic])].append(_decode(store, data, schema.name))
         self.answers = self.found["contacts"]
         self.transforms = TransformBuffer()
         for role in ("transforms_static", "transforms"):
