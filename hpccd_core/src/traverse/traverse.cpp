@@ -10,9 +10,10 @@ namespace {
 
 // From pairs that are worth visiting. `between` is called between two of them and may take from the stack.
 template <class Between>
-void walk(const Tree& tree, const PairRules& rules, std::vector<NodePair>& stack, Worker& worker, Between&& between) {
+void walk(const Tree& tree, const PairRules& rules, const Cancellation& cancellation, std::vector<NodePair>& stack,
+          Worker& worker, Between&& between) {
   while (!stack.empty()) {
-    worker.heed_cancellation();
+    cancellation.heed();
     const NodePair p = stack.back();
     stack.pop_back();
     if (is_leaf_pair(tree.nodes, p)) {
@@ -58,7 +59,7 @@ void traverse_any(const Tree& tree, const PairRules& rules, Search& search, Thre
       const std::size_t task = next.fetch_add(1);
       if (task >= tasks.size() || task > found.load()) break;
       stack.push_back(tasks[task]);
-      walk(tree, rules, stack, worker, [] {});
+      walk(tree, rules, *search.cancellation, stack, worker, [] {});
       worker.flush();
       keep_first_of_task(worker, task, found);
       if (task < best && !(worker.vertex_face.empty() && worker.edge_edge.empty())) {
@@ -100,7 +101,7 @@ void traverse(const Tree& tree, const PairRules& rules, Search& search, ThreadPo
       if (!worker.sink) worker.flush();
     };
     while (busy.next(stack, meanwhile))
-      walk(tree, rules, stack, worker, [&] {
+      walk(tree, rules, *search.cancellation, stack, worker, [&] {
         if (pairs.wanted()) pairs.give(stack);
       });
     worker.flush();

@@ -75,6 +75,9 @@ void Worker::drain(CandidateBuffer& buffer, Kind kind, Accuracy accuracy, std::u
 void Worker::test(const std::uint32_t* first, const std::uint32_t* second, std::uint32_t n, Kind kind,
                   Accuracy accuracy) {
   heed_cancellation();
+  std::vector<Found>& found = kind == Kind::vertex_face ? vertex_face : edge_edge;
+  constexpr std::size_t many = 1 << 16;
+  if (found.capacity() - found.size() < n && found.size() >= many) grow(found, *search_->cancellation);
   BatchResult& r = *result_;
   BatchCounts& count = counts[kind == Kind::edge_edge];
   r.counts = count;
@@ -110,10 +113,7 @@ void Worker::report(Kind kind, std::uint32_t first, std::uint32_t second, double
     while (toc < best && !search_->earliest.compare_exchange_weak(best, toc, std::memory_order_relaxed)) {
     }
   }
-  std::vector<Found>& found = kind == Kind::vertex_face ? vertex_face : edge_edge;
-  constexpr std::size_t many = 1 << 16;
-  if (found.size() == found.capacity() && found.size() >= many) grow(found, *search_->cancellation);
-  found.push_back({first, second, toc});
+  (kind == Kind::vertex_face ? vertex_face : edge_edge).push_back({first, second, toc});
 }
 
 }  // namespace hpccd
