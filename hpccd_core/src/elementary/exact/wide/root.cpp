@@ -123,8 +123,8 @@ void Root::approach_from(const Big& base, bool upwards, int limit) {
 }
 
 // Newton's method on the whole interval: with p = a0 + a1 s + a2 s^2 + a3 s^3 seen from its middle, the root is at
-// s = -a0 / (a1 + d), and |d| <= |a2| w + |a3| w^2 for all |s| <= w. One value per doubling of the bits, at half the bits
-// that it yields. Halves the interval where that gains more.
+// s = -a0 / (a1 + d), and |d| <= |a2| w + |a3| w^2 for all |s| <= w. One value per doubling of the bits, at half the
+// bits that it yields. Halves the interval where that gains more.
 void Root::step() {
   const int degree = degree_of(of_), k = k_ + 1;
   const Big middle = low_ + high_, w = high_ - low_;
