@@ -170,7 +170,7 @@ class MeshStream:
             self._drops.count(
                 self._mesh,
                 Reason.MIDDLEWARE,
-                f"{missing} messages did not reach the node: they came faster than it reads (parameter input_depth), or "
+                f"{missing} messages did not reach the node: they came faster than it reads (parameter input_depth) or "
                 "were no message of this type (look for deserialisation errors in the log of DDS)",
                 missing,
             )
