@@ -36,10 +36,10 @@ class Metrics:
         self._transport_ms: deque[float] = deque(maxlen=WINDOW)
         self._stages: dict[str, deque[float]] = {}
 
-    def frame_received(self, mesh: str, transport_ms: float | None) -> None:
-        """One vertex message came. transport_ms: since its publisher wrote it, None where unknown."""
+    def frame_received(self, mesh: str, transport_ms: float | None, messages: int = 1) -> None:
+        """Vertex messages came. transport_ms: since the publisher wrote one, None where unknown."""
         with self._lock:
-            self.received[mesh] = self.received.get(mesh, 0) + 1
+            self.received[mesh] = self.received.get(mesh, 0) + messages
             if transport_ms is not None:
                 self._transport_ms.append(transport_ms)
 

@@ -14,7 +14,8 @@ class Reason(StrEnum):
     """Why a message was refused (it is wrong) or dropped (it is right, but could not be used)."""
 
     UNKNOWN_MESH = "unknown_mesh"  # not in parameter `meshes`
-    MALFORMED = "malformed"  # lengths that do not fit each other; both or neither vertex array; missing field; no time
+    # Lengths that do not fit each other; both or neither vertex array; missing field; no time; not to be deserialised.
+    MALFORMED = "malformed"
     UNSUPPORTED_TYPE = "unsupported_type"  # PointCloud2 field that is neither FLOAT32 nor FLOAT64
     BIG_ENDIAN = "big_endian"
     NOT_FINITE = "not_finite"  # NaN or infinity

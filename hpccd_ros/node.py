@@ -58,11 +58,16 @@ from hpccd_ros.parameter_table import OUTPUTS
 from hpccd_ros.parameters import ParameterError
 from hpccd_ros.refusal_log import RefusalLog
 from hpccd_ros.unknown_meshes import UnknownMeshWatch
+from hpccd_ros.unreadable import UnreadableExecutor
 
 YIELD = 2e-5  # s; what counts is that it is not 0
 # s. Once in so long, the pages that a message takes anew cost little; a node that once had to hold much, because its
 # machine was busy for seconds, is not larger ever after.
 GIVE_BACK_EVERY = 60.0
+
+
+class _Executor(UnreadableExecutor, GuardedExecutor):
+    """No callback ends the node, and no message is lost without a word."""
 
 
 class HpccdNode(GuardedLifecycleNode):
@@ -403,7 +408,7 @@ def main(argv: list[str] | None = None, node_type: type[HpccdNode] = HpccdNode) 
         if (refused := ros_start.refusal(error)) is None:
             raise
         return _not_started(*refused)
-    executor = GuardedExecutor(node.errors)
+    executor = _Executor(node.errors)
     executor.add_node(node)
     try:
         if node.get_parameter("autostart").value and not stop.done():

@@ -12,7 +12,7 @@ from rclpy.node import Node
 from rclpy.subscription import Subscription
 from sensor_msgs.msg import PointCloud2
 
-from hpccd_ros import convert, qos, qos_overrides
+from hpccd_ros import convert, qos, qos_overrides, unreadable
 from hpccd_ros.convert import InvalidMessageError
 from hpccd_ros.diagnostics import Metrics
 from hpccd_ros.drops import DropCounter, Reason
@@ -21,6 +21,8 @@ from hpccd_ros.messages import MeshFrame, SceneFrame, Topology
 from hpccd_ros.placement import Placement, Ready
 from hpccd_ros.rate_limit import RateLimit
 from hpccd_ros.sequence import SequenceWatch
+
+_UNREADABLE = "a message cannot be deserialised; build its publisher with the same definition of the message"
 
 
 def link_events(
@@ -108,6 +110,11 @@ class MeshStream:
             ),
         ]
         self._vertex_topic = self._subscriptions[1].topic_name
+        self._unreadable = 0  # vertex messages counted as such since the last that was read
+        for subscription, on_unreadable in zip(
+            self._subscriptions, (self._on_unreadable_topology, self._on_unreadable), strict=True
+        ):
+            unreadable.watch(subscription, on_unreadable)
 
     def close(self) -> None:
         for subscription in self._subscriptions:
@@ -164,16 +171,11 @@ class MeshStream:
         self._metrics.frame_received(self._mesh, transport if transport >= 0 else None)
         missing, new_publisher = self._vertex_numbers.next(info["publication_sequence_number"])
         self._unnoticed |= new_publisher
+        counted, self._unreadable = self._unreadable, 0
         self._links[f"before_first.{self._mesh}"] = self._vertex_numbers.before_first
         # Numbers of several publishers interleave: their gaps mean nothing.
-        if missing and self.publishers <= 1:
-            self._drops.count(
-                self._mesh,
-                Reason.MIDDLEWARE,
-                f"{missing} messages did not reach the node: they came faster than it reads (parameter input_depth) or "
-                "were no message of this type (look for deserialisation errors in the log of DDS)",
-                missing,
-            )
+        if missing > counted and self.publishers <= 1:
+            self._count_missing(missing - counted, unreadable=counted > 0)
         if not self._vertex_limit.allows():
             self._drops.count(self._mesh, Reason.RATE, self._too_fast())
             return
@@ -186,6 +188,30 @@ class MeshStream:
         frame = MeshFrame(stamp, vertices, version, step, message.header.frame_id, received)
         new_publisher, self._unnoticed = self._unnoticed, False
         self._hand_on(self._placement.take(frame, new_publisher))
+
+    def _count_missing(self, missing: int, unreadable: bool) -> None:
+        """unreadable: some of the same gap were, so that these are taken for unreadable too."""
+        if unreadable:
+            self._count_unreadable(missing)
+            return
+        self._drops.count(
+            self._mesh,
+            Reason.MIDDLEWARE,
+            f"{missing} messages did not reach the node: they came faster than it reads (parameter input_depth) or "
+            "could not be deserialised (see the log of DDS)",
+            missing,
+        )
+
+    def _on_unreadable(self) -> None:
+        self._unreadable += 1
+        self._count_unreadable(1)
+
+    def _count_unreadable(self, messages: int) -> None:
+        self._metrics.frame_received(self._mesh, None, messages)
+        self._drops.count(self._mesh, Reason.MALFORMED, f"{self._vertex_topic}: {_UNREADABLE}", messages)
+
+    def _on_unreadable_topology(self) -> None:
+        self._refused.count(self._mesh, Reason.MALFORMED, f"{self._subscriptions[0].topic_name}: {_UNREADABLE}")
 
     def _hand_on(self, frames: list[Ready]) -> None:
         for frame, new_publisher in frames:

@@ -98,6 +98,34 @@ def test_bad_vertices(streaming, kind):
     node.wait_until(lambda: text in node.output(), "line in the log")
 
 
+# A sequence of four thousand million floats in a message of 54 bytes.
+UNREADABLE = b"\0\1\0\0" + b"\xff" * 50
+
+
+def test_what_cannot_be_deserialised_is_told_as_such(streaming):
+    node, goes_on = streaming
+    publisher = node.peer.publisher(MeshVertices, "meshes/cloth/vertices")
+    for count in (1, 2):
+        publisher.publish(UNREADABLE)
+        values = node.frames_status(dropped=count, dropped__cloth__malformed=count)
+    assert "cannot be deserialised" in values["last_refusal"] and "input_depth" not in node.output()
+    for _ in range(5):  # how many these are is known at the next that is read
+        publisher.publish(UNREADABLE)
+    node.wait_until(lambda: int(node.peer.statuses["frames"][2]["dropped"]) >= 3, "count of the unreadable ones")
+    answer = goes_on()
+    assert answer.dropped_frames == 7
+    values = node.frames_status(received=10, answered=3, dropped=7, dropped__cloth__malformed=7, waiting=0)
+    assert "dropped.middleware" not in values
+
+
+def test_a_topology_that_cannot_be_deserialised_is_told(streaming):
+    node, goes_on = streaming
+    node.peer.publisher(MeshTopology, "meshes/cloth/topology").publish(UNREADABLE)
+    values = node.frames_status(topologies_refused=1, topologies_refused__cloth__malformed=1)
+    assert "cannot be deserialised" in values["last_refusal"]
+    goes_on()
+
+
 def bad_topology(faces, n_vertices=N * N, version=4):
     message = MeshTopology(version=version, n_vertices=n_vertices)
     message.faces = convert.to_field(np.array(faces, np.uint32))
