@@ -42,8 +42,11 @@ inline std::array<Big, 4> seen_from(Coefficients p, const Big& base, int k) {
   const int n = degree_of(p);
   std::array<Big, 4> a;
   for (int i = 0; i <= n; ++i) a[i] = p[i] << (n - i) * k;
-  for (int i = 0; i < n; ++i)
-    for (int j = n; j-- > i;) a[j] += base * a[j + 1];
+  const Big top = base * a[n];  // met again in every row
+  for (int i = 0; i < n; ++i) {
+    a[n - 1] += top;
+    for (int j = n - 1; j-- > i;) a[j] += base * a[j + 1];
+  }
   return a;
 }
 

@@ -24,11 +24,7 @@ std::vector<Mark> with_roots(Coefficients p, std::vector<Mark> marks) {
   int before = 0;
   for (Mark& mark : marks) {
     const int s = sign_at(p, mark.root);
-    if (before * s < 0) {
-      const Root &left = all.back().root, &right = mark.root;
-      const int k = std::max(left.k(), right.k());
-      all.push_back({Root(p, left.high() << (k - left.k()), right.low() << (k - right.k()), k, before), true});
-    }
+    if (before * s < 0) all.push_back({Root(p, all.back().root.high(), mark.root.low(), before), true});
     before = s;
     mark.zero = s == 0;
     all.push_back(std::move(mark));
@@ -41,7 +37,7 @@ std::vector<Mark> with_roots(Coefficients p, std::vector<Mark> marks) {
 std::vector<Root> roots(Coefficients p) {
   std::vector<std::vector<Big>> derivatives;
   for (Coefficients d = p; d.size() > 2; d = derivatives.back()) derivatives.push_back(derivative(d));
-  std::vector<Mark> marks = {{Root(0, 0), false}, {Root(1, 0), false}};
+  std::vector<Mark> marks = {{Root({0, 0}), false}, {Root({1, 0}), false}};
   for (std::size_t i = derivatives.size(); i-- > 0;) marks = with_roots(derivatives[i], std::move(marks));
   std::vector<Root> found;
   for (Mark& mark : with_roots(p, std::move(marks)))

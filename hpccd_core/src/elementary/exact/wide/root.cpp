@@ -6,73 +6,81 @@ namespace {
 
 int highest_bit(const Big& x) { return static_cast<int>(msb(x.sign() < 0 ? Big(-x) : x)); }
 
-Big scaled(const Big& x, int bits) { return bits < 0 ? Big(x >> -bits) : Big(x << bits); }  // rounded down, x >= 0
-
 int floor_of_ratio(int a, int b) { return a >= 0 ? a / b : -((b - 1 - a) / b); }
 
-// An e such that p, as seen from a place where it is not zero, has no root up to a distance of 2^e: there no other term
-// reaches a power of one half of the constant one, each term a smaller power.
-int distance_without_root(const std::array<Big, 4>& p, int degree) {
+// An e such that p, not zero at 0, has no root up to a distance of 2^e: there no other term reaches a power of one half
+// of the constant one, each term a smaller power.
+int distance_without_root(Coefficients p) {
   int e = std::numeric_limits<int>::max();
-  for (int i = 1; i <= degree; ++i)
+  for (int i = 1; i <= degree_of(p); ++i)
     if (!p[i].is_zero()) e = std::min(e, floor_of_ratio(highest_bit(p[0]) - highest_bit(p[i]) - 1, i) - 1);
   return e;
 }
 
-// The sign of p(+-2^e).
-int sign_at_distance(const std::array<Big, 4>& p, int degree, bool upwards, int e) {
-  Big sum = 0;
-  for (int i = 0; i <= degree; ++i) {
-    const Big term = p[i] << (e < 0 ? (i - degree) * e : i * e);
-    sum = upwards || i % 2 == 0 ? Big(sum + term) : Big(sum - term);
-  }
-  return sign(sum);
+// p(2^e x) times a power of two.
+std::vector<Big> stretched(Coefficients p, int e) {
+  std::vector<Big> q;
+  for (int i = 0; i <= degree_of(p); ++i) q.push_back(p[i] << (e < 0 ? (i - degree_of(p)) * e : i * e));
+  return q;
+}
+
+int sign_at_distance(Coefficients p, bool upwards, int e) {
+  return sign_at_dyadic(stretched(p, e), upwards ? 1 : -1, 0);
+}
+
+// Both over the power of two that the finer one asks for.
+void align(Dyadic& x, Dyadic& y) {
+  if (x.k < y.k) return align(y, x);
+  y.m <<= x.k - y.k;
+  y.k = x.k;
 }
 
 }  // namespace
 
-Root::Root(Big m, int k) : k_(k) { become_exact(std::move(m), k); }
-
-Root::Root(Coefficients p, Big low, Big high, int k, int before)
-    : of_(p.begin(), p.end()), low_(std::move(low)), high_(std::move(high)), k_(k), before_(before) {}
-
-void Root::become_exact(Big m, int k) {
-  if (!m.is_zero()) {
-    const int zeros = std::min(k, static_cast<int>(lsb(m)));
-    m >>= zeros;
-    k -= zeros;
-  }
-  high_ = low_ = std::move(m);
-  k_ = k;
-  exact_ = true;
+Root::Root(Coefficients p, const Dyadic& low, const Dyadic& high, int before)
+    : of_(p.begin(), p.end()), before_(before) {
+  Dyadic first = low, last = high;
+  align(first, last);
+  low_ = std::move(first.m), high_ = std::move(last.m), k_ = first.k;
 }
+
+Dyadic Root::absolute(const Big& offset) const {
+  Dyadic from = base_, by{offset, unit_ + k_};
+  align(from, by);
+  return {from.m + by.m, from.k};
+}
+
+std::vector<Big> Root::seen(Coefficients q) const {
+  if (base_.m.is_zero()) return stretched(q, -unit_);
+  const auto a = seen_from(q, base_.m, base_.k);
+  return stretched({a.data(), q.size()}, base_.k - unit_);
+}
+
+bool Root::changes_sign(Coefficients q) const {
+  const auto local = seen(q);
+  return sign_at_dyadic(local, low_, k_) * sign_at_dyadic(local, high_, k_) < 0;
+}
+
+void Root::become_exact(Dyadic x) { *this = Root(std::move(x)); }
 
 void Root::set_factor(std::vector<Big> factor) {
   of_ = std::move(factor);
-  before_ = sign_there(low_, k_);
+  local_ = seen(of_);
+  before_ = sign_at_dyadic(local_, low_, k_);
+}
+
+void Root::set_base(Dyadic base, Big low, Big high, int unit) {
+  base_ = std::move(base), unit_ = unit;
+  low_ = std::move(low), high_ = std::move(high), k_ = 0;
+  has_base_ = true;
+  local_ = seen(of_);
 }
 
 void Root::narrow() {
-  if (of_.size() == 2)
-    divide();
-  else if (rough_k_ < 0)
-    approach();
-  else
+  if (has_base_)
     step();
-}
-
-int Root::known_bits() const { return of_.size() == 2 ? k_ : rough_k_ < 0 ? 0 : k_ - rough_k_; }
-
-void Root::divide() {
-  k_ = std::max(time_bits + 2, 2 * k_);
-  const bool turned = sign(of_[1]) < 0;
-  const Big den = turned ? Big(-of_[1]) : of_[1];
-  Big rest;
-  divide_qr(Big((turned ? of_[0] : Big(-of_[0])) << k_), den, low_, rest);
-  if (rest.is_zero())
-    become_exact(Big(low_), k_);
   else
-    high_ = low_ + 1;
+    approach();
 }
 
 // Brings the root into an interval of 9 to 28 cells of a grid that is no finer than its distance from the ends calls
@@ -88,53 +96,60 @@ void Root::approach() {
     excess = 0;
   }
   const int k = k_ - excess;
-  Big first = (low_ >> excess) + 2, last = ((high_ - 1) >> excess) - 1;
-  const int at_first = sign_there(first, k);
-  if (at_first == 0) return become_exact(std::move(first), k);
-  if (at_first != before_) return approach_from(low_, true, excess + 1);
-  const int at_last = sign_there(last, k);
-  if (at_last == 0) return become_exact(std::move(last), k);
-  if (at_last == before_) return approach_from(high_, false, excess + 1);
-  low_ = std::move(first), high_ = std::move(last), rough_k_ = k_ = k;
+  Dyadic first{(low_ >> excess) + 2, k}, last{((high_ - 1) >> excess) - 1, k};
+  const int at_first = sign_at_dyadic(of_, first.m, k);
+  if (at_first == 0) return become_exact(std::move(first));
+  if (at_first != before_) return approach_from({low_, k_}, true, excess + 1);
+  const int at_last = sign_at_dyadic(of_, last.m, k);
+  if (at_last == 0) return become_exact(std::move(last));
+  if (at_last == before_) return approach_from({high_, k_}, false, excess + 1);
+  Big cells = last.m - first.m;
+  set_base(std::move(first), 0, std::move(cells), k);
 }
 
-// The root is nearer than 2^limit to the base, one end of the interval.
-void Root::approach_from(const Big& base, bool upwards, int limit) {
-  const int degree = degree_of(of_);
-  const auto local = seen_from(of_, base, k_);
-  const int at_base = upwards ? before_ : -before_;
-  int below = distance_without_root(local, degree), above = limit;
+// The root is nearer than 2^limit / 2^k to that end of the interval.
+void Root::approach_from(const Dyadic& end, bool upwards, int limit) {
+  const auto a = seen_from(of_, end.m, end.k);
+  const Coefficients local(a.data(), of_.size());
+  const int at_end = upwards ? before_ : -before_;
+  int below = distance_without_root(local), above = limit;
   for (int step = 1; below + step < above; step *= 2) {
-    const int s = sign_at_distance(local, degree, upwards, below + step);
-    if (s != at_base) above = below + step;
-    if (s == at_base) below += step;
+    if (sign_at_distance(local, upwards, below + step) == at_end)
+      below += step;
+    else
+      above = below + step;
   }
   while (above - below > 1) {
     const int middle = below + (above - below) / 2;
-    const int s = sign_at_distance(local, degree, upwards, middle);
-    (s == at_base ? below : above) = middle;
+    (sign_at_distance(local, upwards, middle) == at_end ? below : above) = middle;
   }
-  // The distance is in (8, 16] cells of a grid in which the base lies in [cell, cell + 1).
-  const int excess = below - 3;
-  const Big cell = scaled(base, -excess);
-  low_ = upwards ? cell + 8 : cell - 17;
-  high_ = upwards ? cell + 17 : cell - 7;
-  rough_k_ = k_ -= excess;
+  // The distance is in (8, 16] cells.
+  const int unit = end.k - (below - 3);
+  if (upwards)
+    set_base(end, 8, 17, unit);
+  else
+    set_base(end, -17, -8, unit);
 }
 
 // Newton's method on the whole interval: with p = a0 + a1 s + a2 s^2 + a3 s^3 seen from its middle, the root is at
-// s = -a0 / (a1 + d), and |d| <= |a2| w + |a3| w^2 for all |s| <= w. One value per doubling of the bits, at half the
-// bits that it yields. Halves the interval where that gains more.
+// s = -a0 / (a1 + d), and |d| <= |a2| w + |a3| w^2 for all |s| <= w. One value per doubling of the bits, at half the bits
+// that it yields. Halves the interval where that gains more.
 void Root::step() {
-  const int degree = degree_of(of_), k = k_ + 1;
+  const int degree = degree_of(local_), k = k_ + 1;
   const Big middle = low_ + high_, w = high_ - low_;
-  const auto a = seen_from(of_, middle, k);
-  if (a[0].is_zero()) return become_exact(middle, k);
-  Big d = degree == 3 ? Big((abs(a[3]) * w + abs(a[2])) * w) : Big(abs(a[2]) * w), least = abs(a[1]) - d;
+  const auto a = seen_from(local_, middle, k);
+  if (a[0].is_zero()) {
+    k_ = k;
+    return become_exact(absolute(middle));
+  }
+  Big d = 0;
+  for (int i = degree; i > 1; --i) d = (d + abs(a[i])) * w;
+  const Big least = abs(a[1]) - d;
   if (sign(least) > 0) {
     // The error of -a0 / a1 is below 2^e. Bits that cost more than all before are not taken, though they come free.
-    const int most = 16 + k_ - rough_k_;
-    const int e = highest_bit(a[0]) + highest_bit(d) + 2 - highest_bit(a[1]) - highest_bit(least);
+    const int most = 64 + k_;
+    const int e =
+        d.is_zero() ? -most : highest_bit(a[0]) + highest_bit(d) + 2 - highest_bit(a[1]) - highest_bit(least);
     const int more = std::clamp(-e, 0, most);
     Big num = -a[0] << more, den = a[1];
     // As many bits of both as an error below one asks for.
@@ -156,22 +171,16 @@ void Root::step() {
 }
 
 std::int64_t Root::time() {
-  for (;;) {
-    if (exact_) return static_cast<std::int64_t>(scaled(low_, time_bits - k_));
-    if (const int excess = k_ - time_bits; excess >= 0) {
-      const Big first = low_ >> excess;
-      Big last = (high_ - 1) >> excess;
-      if (first == last) return static_cast<std::int64_t>(first);
-      if (last - first == 1) {
-        const int s = sign_there(last, time_bits);
-        if (s == 0)
-          become_exact(std::move(last), time_bits);
-        else
-          return static_cast<std::int64_t>(s == before_ ? last : first);
-        continue;
-      }
-    }
-    narrow();
+  for (;; narrow()) {
+    const Dyadic first = low(), last = high();
+    const int excess = first.k - time_bits;
+    if (exact_) return static_cast<std::int64_t>(excess < 0 ? Big(first.m << -excess) : Big(first.m >> excess));
+    if (excess < 0) continue;
+    const Big before = first.m >> excess, after = (last.m - 1) >> excess;
+    if (before == after) return static_cast<std::int64_t>(before);
+    if (after - before > 1) continue;
+    const int s = sign_at_dyadic(of_, after, time_bits);
+    return static_cast<std::int64_t>(s == 0 || s == before_ ? after : before);
   }
 }
 

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // A real root in [0, 1] of an integer polynomial, as narrow as anyone asks. Coordinates may lie 1500 binary orders
-// apart and roots thousands of bits from one another or from 0 and 1, so no step here gains a fixed number of bits:
-// distances are found by their exponents first, then every step doubles the bits that are known.
+// apart and roots thousands of bits from one another, so no step here gains a fixed number of bits: a root's distance
+// from its neighbours is found by its exponent first, then every step doubles the bits that are known. And since such
+// roots come in crowds, what is computed with is the offset from a base nearby: few bits, where the root itself has
+// thousands.
 #pragma once
 
 #include <vector>
@@ -12,43 +14,54 @@ namespace hpccd::exact::wide {
 
 inline constexpr int time_bits = 62;
 
+struct Dyadic {  // m / 2^k
+  Big m;
+  int k;
+};
+
 class Root {
  public:
-  // The number m / 2^k.
-  Root(Big m, int k);
-  // The only root of p in (low, high) / 2^k, a simple one; p has the sign `before` at low and the opposite one at high.
-  // Between a root that p turns or inflects at (or 0, or 1) and the next one.
-  Root(Coefficients p, Big low, Big high, int k, int before);
+  explicit Root(Dyadic x) : low_(x.m), high_(std::move(x.m)), k_(x.k), exact_(true) {}
+  // The only root of p between low and high, a simple one; p has the sign `before` at low and the opposite one at high.
+  // There, or next to there, p turns or inflects, or the step begins or ends.
+  Root(Coefficients p, const Dyadic& low, const Dyadic& high, int before);
 
-  bool exact() const { return exact_; }
-  const Big& low() const { return low_; }  // of the interval, times 2^k; the number itself where it is exact
-  const Big& high() const { return high_; }
-  int k() const { return k_; }
   Coefficients of() const { return of_; }  // unless exact
+  bool exact() const { return exact_; }
+  Dyadic low() const { return absolute(low_); }  // of the open interval that holds it; the root itself where exact
+  Dyadic high() const { return absolute(high_); }
+
+  // q as a polynomial in the offset from the base, times a power of two, and the sign that it certainly has on the
+  // interval; 0: not certain. The base comes when the root is first narrowed; until then it is 0, and seen(q) is q.
+  std::vector<Big> seen(Coefficients q) const;
+  int sign_of_seen(Coefficients seen) const { return exact_ ? 0 : sign_on(seen, low_, high_, k_); }
+  bool changes_sign(Coefficients q) const;
+  bool has_base() const { return has_base_; }
+  int known_bits() const { return has_base_ ? k_ : 0; }  // of its offset
 
   // A factor of `of`, in fewer bits or of a lower degree, that has the root too.
   void set_factor(std::vector<Big> factor);
 
   void narrow();
-  int known_bits() const;  // about how many bits tell it from the ends of its first interval
 
   // floor(root * 2^62)
   std::int64_t time();
 
  private:
-  void become_exact(Big m, int k);
-  void divide();
+  void become_exact(Dyadic x);
   void approach();
-  void approach_from(const Big& base, bool upwards, int limit);
+  void approach_from(const Dyadic& end, bool upwards, int limit);
+  void set_base(Dyadic base, Big low, Big high, int unit);
   void step();
-  int sign_there(const Big& m, int k) const { return sign_at_dyadic(of_, m, k); }
+  Dyadic absolute(const Big& offset) const;
 
-  std::vector<Big> of_;
-  Big low_, high_;
+  std::vector<Big> of_, local_;  // local_ = seen(of_), once there is a base
+  Dyadic base_{0, 0};
+  int unit_ = 0;    // offsets are multiples of 2^-(unit + k)
+  Big low_, high_;  // offsets
   int k_;
   int before_ = 0;
-  bool exact_ = false;
-  int rough_k_ = -1;  // k when the interval was first as long as its distance from 0, 1 and where p turns
+  bool exact_ = false, has_base_ = false;
 };
 
 }  // namespace hpccd::exact::wide

@@ -44,11 +44,9 @@ std::vector<Big> common_factor(Coefficients f, Coefficients q) {
 }
 
 bool vanishes_at(Coefficients q, Root& root) {
-  if (std::ranges::equal(q, root.of())) return true;
   if (certainly_no_common_root(root.of(), q)) return false;
   auto factor = common_factor(root.of(), q);
-  if (factor.empty() || sign_at_dyadic(factor, root.low(), root.k()) * sign_at_dyadic(factor, root.high(), root.k()) > 0)
-    return false;
+  if (factor.empty() || !root.changes_sign(factor)) return false;
   if (factor.size() < root.of().size()) root.set_factor(std::move(factor));
   return true;
 }
@@ -58,16 +56,18 @@ bool vanishes_at(Coefficients q, Root& root) {
 int sign_at(Coefficients q, Root& root) {
   if (q.empty()) return 0;
   if (q.size() == 1) return sign(q[0]);
+  if (std::ranges::equal(q, root.of())) return 0;
   // Most signs show before the question whether there is one at all, which costs as much as a few steps, is worth it.
   constexpr int patience = 40;
-  for (bool asked = false;;) {
-    if (root.exact()) return sign_at_dyadic(q, root.low(), root.k());
-    if (const int s = sign_on(q, root.low(), root.high(), root.k())) return s;
-    if (!asked && root.known_bits() >= patience) {
-      asked = true;
-      if (vanishes_at(q, root)) return 0;
-    }
-    root.narrow();
+  bool asked = false;
+  std::vector<Big> from_base;
+  for (;; root.narrow()) {
+    if (root.exact()) return sign_at_dyadic(q, root.low().m, root.low().k);
+    if (root.has_base() && from_base.empty()) from_base = root.seen(q);
+    if (const int s = root.sign_of_seen(root.has_base() ? from_base : q)) return s;
+    if (asked || root.known_bits() < patience) continue;
+    asked = true;
+    if (vanishes_at(q, root)) return 0;
   }
 }
 
