@@ -183,7 +183,8 @@ def main(arguments: list[str] | None = None) -> int:
     for kind, herd in slowest.items():
         console.print(f"{kind}: " + ", ".join(f"{s * 1e6:.0f}" for s in herd.seconds[:10]) + " us")
         wrong += _different_from_oracle(kind, herd)
-    console.print(f"{tried:,} queries in {time.monotonic() - start:.0f} s, seed {a.seed}; {wrong} differ from the oracle.")
+    seconds = time.monotonic() - start
+    console.print(f"{tried:,} queries in {seconds:.0f} s, seed {a.seed}; {wrong} differ from the oracle.")
     if a.save:
         np.savez_compressed(a.save, **{kind: np.array(herd.queries) for kind, herd in slowest.items()})
         console.print(f"The slowest ones: {a.save}")

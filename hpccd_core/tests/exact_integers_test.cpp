@@ -4,6 +4,7 @@
 
 #include <random>
 
+#include "elementary/exact/wide/approach.h"
 #include "elementary/exact/wide/earliest.h"
 
 namespace hpccd::exact {
@@ -34,7 +35,7 @@ Z widened(std::int64_t x, int bits) {
 }
 
 template <class Z>
-Answer answer(Kind kind, const Numbers& numbers, int bits) {
+Query<Z> query(Kind kind, const Numbers& numbers, int bits) {
   Coordinates<Z> points[4];
   for (int i = 0; i < 4; ++i)
     for (int k = 0; k < 3; ++k) {
@@ -43,7 +44,7 @@ Answer answer(Kind kind, const Numbers& numbers, int bits) {
       const Z low(bits ? numbers[3 * i + k] >> 8 : 0);
       points[i][k] = {{z0 + low, z1 - z0}};
     }
-  return earliest(Query<Z>(kind, points));
+  return {kind, points};
 }
 
 template <class Z>
@@ -54,7 +55,7 @@ void expect_same_as_big(int bits) {
   for (int i = 0; i < n; ++i) {
     const Numbers numbers = wide_numbers(random);
     const Kind kind = i % 2 ? Kind::vertex_face : Kind::edge_edge;
-    const Answer fixed = answer<Z>(kind, numbers, bits), big = answer<Big>(kind, numbers, bits);
+    const Answer fixed = earliest(query<Z>(kind, numbers, bits)), big = earliest(query<Big>(kind, numbers, bits));
     ASSERT_TRUE(big.decided);
     if (!fixed.decided) continue;
     ++decided;
@@ -64,6 +65,43 @@ void expect_same_as_big(int bits) {
   EXPECT_GT(contacts, n / 10);
   EXPECT_GT(decided, n * 9 / 10);
 }
+
+void expect_near(const Vec3<double>& a, const Vec3<double>& b) {
+  // With integers of fixed size t is known to 2^-62, where n may nearly vanish.
+  const double tolerance = 1e-4 * std::max({std::fabs(b.x), std::fabs(b.y), std::fabs(b.z)});
+  EXPECT_NEAR(a.x, b.x, tolerance);
+  EXPECT_NEAR(a.y, b.y, tolerance);
+  EXPECT_NEAR(a.z, b.z, tolerance);
+}
+
+// At contacts and, as features that a separation keeps apart, at any time.
+template <class Z>
+void expect_same_approach_as_big(int bits) {
+  std::mt19937_64 random(11);
+  const int low[3] = {0, -3, 40};
+  int sides[3] = {}, decided = 0;
+  constexpr int n = 20000;
+  for (int i = 0; i < n; ++i) {
+    const Numbers numbers = wide_numbers(random);
+    const Kind kind = i % 2 ? Kind::vertex_face : Kind::edge_edge;
+    const auto big = query<Big>(kind, numbers, bits);
+    const auto contact = earliest(big).toc;
+    const double toc = contact.value_or(std::ldexp(static_cast<double>(random() >> 11), -53));
+    const auto fixed = approach(query<Z>(kind, numbers, bits), low, toc, contact.has_value());
+    if (!fixed) continue;
+    ++decided;
+    const Approach expected = approach(big, low, toc, contact.has_value());
+    ++sides[fixed->side + 1];
+    ASSERT_EQ(fixed->side, expected.side) << "query " << i;
+    expect_near(fixed->n, expected.n);
+    ASSERT_FALSE(::testing::Test::HasFailure()) << "query " << i;
+  }
+  EXPECT_GT(decided, n * 9 / 10);
+  for (const int k : {0, 2}) EXPECT_GT(sides[k], n / 10);
+}
+
+TEST(ExactIntegers, SidesOfOneLimbAgreeWithAnySize) { expect_same_approach_as_big<Integer<1>>(0); }
+TEST(ExactIntegers, SidesOfTwoLimbsAgreeWithAnySize) { expect_same_approach_as_big<Integer<2>>(64); }
 
 TEST(ExactIntegers, OneLimbAgreesWithAnySize) { expect_same_as_big<Integer<1>>(0); }
 TEST(ExactIntegers, TwoLimbsAgreeWithAnySize) { expect_same_as_big<Integer<2>>(64); }

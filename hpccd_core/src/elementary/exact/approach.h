@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdlib>
+#include <span>
 
 #include "elementary/exact/contact.h"
 #include "elementary/exact/isolate.h"
@@ -53,51 +54,58 @@ Vec3<double> direction(const Query<Z>& q, const int low[3], const M& m, int k, S
   return {scaled(0), scaled(1), scaled(2)};
 }
 
-// The root of f at which the contact at `toc` is: of those within `same_time` the first at which the features touch;
-// else the nearest, where the features are known to touch. -1: none.
-template <class Z, class AllRoots>
-int root_of_contact(const Query<Z>& q, AllRoots& roots, std::int64_t toc, bool touching, bool& open) {
+// Which of the roots of f, whose times are given, the contact at `toc` is: of those within `same_time` the first at
+// which the features touch; else the nearest, where the features are known to touch. -1: none.
+template <class Touches>
+int root_of_contact(std::span<const std::int64_t> times, std::int64_t toc, bool touching, Touches&& touches_at) {
   // Above the radius of times of contact (policy.h), twice, which the conservative tier takes off.
   constexpr std::int64_t same_time = std::int64_t{1} << (time_bits - 38);  // 3.6e-12
-  const auto distance = [&](int i) { return std::abs(roots.root[i].time() - toc); };
+  const auto distance = [&](int i) { return std::abs(times[i] - toc); };
+  const int n = static_cast<int>(times.size());
   int nearest = -1;
-  for (int i = 0; i < roots.n; ++i) {
-    locate(roots.root[i]);
+  for (int i = 0; i < n; ++i)
     if (nearest < 0 || distance(i) < distance(nearest)) nearest = i;
-  }
-  for (int i = 0; i < roots.n; ++i)
-    if (distance(i) <= same_time) {
-      const bool here = touches(q, [&](const auto& p) { return open ? 0 : sign_at(p, roots.root[i], open); });
-      if (here || open) return i;
-    }
+  for (int i = 0; i < n; ++i)
+    if (distance(i) <= same_time && touches_at(i)) return i;
   return touching || (nearest >= 0 && distance(nearest) <= same_time) ? nearest : -1;
 }
 
+// Where no root of f belongs to the contact: features that are apart.
+template <class Z>
+Approach approach_between_roots(const Query<Z>& q, const int low[3], std::int64_t toc) {
+  const Time<Z> m(toc);
+  return {sign_beside(q.f, m, time_bits, -1),
+          direction(q, low, m, time_bits, [&](int k) { return sign_at_dyadic(q.n[k], m, time_bits); })};
+}
+
 }  // namespace detail
+
+inline std::int64_t time_of(double toc) { return static_cast<std::int64_t>(std::ldexp(toc, time_bits)); }
 
 // Nothing where it stays open with integers of this size.
 template <class Z>
 std::optional<Approach> approach(const Query<Z>& q, const int low[3], double toc, bool touching) {
   const int degree = q.f.degree();
   if (degree < 0) return Approach{0, {0, 0, 0}};
-  const auto time = static_cast<std::int64_t>(std::ldexp(toc, time_bits));
-  if (degree > 0) {
-    Roots roots(q.f);
-    if (!roots.complete) return std::nullopt;
-    bool open = false;
-    const int i = detail::root_of_contact(q, roots, time, touching, open);
-    if (i >= 0) {
-      auto& root = roots.root[i];
-      int sign_of_n[3];
-      for (int k = 0; k < 3; ++k) sign_of_n[k] = open ? 0 : sign_at(q.n[k], root, open);
-      if (open) return std::nullopt;
-      return Approach{detail::sign_before(q.f, root),
-                      detail::direction(q, low, root.m, root.k, [&](int k) { return sign_of_n[k]; })};
-    }
+  if (degree == 0) return detail::approach_between_roots(q, low, time_of(toc));
+  Roots roots(q.f);
+  if (!roots.complete) return std::nullopt;
+  std::int64_t times[3];
+  for (int i = 0; i < roots.n; ++i) {
+    locate(roots.root[i]);
+    times[i] = roots.root[i].time();
   }
-  const Time<Z> m(time);
-  return Approach{detail::sign_beside(q.f, m, time_bits, -1),
-                  detail::direction(q, low, m, time_bits, [&](int k) { return sign_at_dyadic(q.n[k], m, time_bits); })};
+  bool open = false;
+  const auto sign_there = [&](const auto& p, int i) { return open ? 0 : sign_at(p, roots.root[i], open); };
+  const auto touches_at = [&](int i) { return touches(q, [&](const auto& p) { return sign_there(p, i); }) || open; };
+  const int i = detail::root_of_contact({times, static_cast<std::size_t>(roots.n)}, time_of(toc), touching, touches_at);
+  if (i < 0) return detail::approach_between_roots(q, low, time_of(toc));
+  int sign_of_n[3];
+  for (int k = 0; k < 3; ++k) sign_of_n[k] = sign_there(q.n[k], i);
+  if (open) return std::nullopt;
+  const auto& root = roots.root[i];
+  return Approach{detail::sign_before(q.f, root),
+                  detail::direction(q, low, root.m, root.k, [&](int k) { return sign_of_n[k]; })};
 }
 
 }  // namespace hpccd::exact

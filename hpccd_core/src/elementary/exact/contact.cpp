@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "elementary/exact/contact.h"
 
-#include "elementary/exact/approach.h"
+#include "elementary/exact/wide/approach.h"
 #include "elementary/exact/wide/earliest.h"
 
 namespace hpccd::exact {
@@ -69,7 +69,7 @@ std::optional<double> earliest_contact(Kind kind, const Vec3<double> q_t0[4], co
 
 Approach approach(Kind kind, const Vec3<double> q_t0[4], const Vec3<double> q_t1[4], double toc, bool touching) {
   const Given given(q_t0, q_t1);
-  std::optional<Approach> answer;
+  std::optional<Approach> answer;  // nothing: undecided
   if (given.bits <= Widths<Integer<1>>::coordinate_bits)
     answer = approach(given.query<Integer<1>>(kind), given.low, toc, touching);
   else if (given.bits <= Widths<Integer<2>>::coordinate_bits)

@@ -73,27 +73,18 @@ struct Roots {
   bool complete = true;  // false: some were too close to tell apart with integers of this size
 
   // p must not be constant.
-  explicit Roots(const Polynomial<Z, D>& p) {
-    if (add_all(p, p.degree(), detail::isolation_depth)) return;
-    n = 0;
-    if constexpr (Widths<Z>::any_size) {
-      const auto simple = square_free(p);
-      add_all(simple, simple.degree(), std::numeric_limits<int>::max());
-    } else {
-      complete = false;
-    }
-  }
+  explicit Roots(const Polynomial<Z, D>& p) { complete = add_all(p, p.degree()); }
 
  private:
-  bool add_all(const Polynomial<Z, D>& p, int degree, int depth) {
+  bool add_all(const Polynomial<Z, D>& p, int degree) {
     if (degree == 2 && discriminant_sign(p) == 0) {
       Polynomial<Z, D> derivative{};
       derivative.c[0] = p.c[1], derivative.c[1] = p.c[2] + p.c[2];
-      return add_all(derivative, 1, depth);
+      return add_all(derivative, 1);
     }
     const auto b = detail::to_bernstein(p, degree);
     if (sign(b.b[0]) == 0) add(p, Time<Z>(0), 0, true, 0, degree);
-    if (!isolate(p, b, Time<Z>(0), 0, depth)) return false;
+    if (!isolate(p, b, Time<Z>(0), 0)) return false;
     if (sign(b.b[b.n]) == 0) add(p, Time<Z>(1), 0, true, 0, degree);
     return true;
   }
@@ -102,39 +93,23 @@ struct Roots {
     root[n++] = {p, m, k, exact, before, degree == 1};
   }
 
-  // Those strictly inside. False where a piece still shows several roots after `depth` halvings.
+  // Those strictly inside. False where a piece still shows several roots after all halvings.
   template <class W>
-  bool isolate(const Polynomial<Z, D>& p, const detail::Bernstein<W>& b, const Time<Z>& m, int k, int depth) {
+  bool isolate(const Polynomial<Z, D>& p, const detail::Bernstein<W>& b, const Time<Z>& m, int k) {
     const int v = b.variations();
     if (v == 1) add(p, m, k, false, b.first_sign(), b.n);
     if (v <= 1) return true;
-    if (k == depth) return false;
+    if (k == detail::isolation_depth) return false;
     detail::Bernstein<W> left, right;
     detail::halve(b, left, right);
     const Time<Z> first = shifted<0>(m, 1), second = first + Time<Z>(1);
-    if (!isolate(p, left, first, k + 1, depth)) return false;
+    if (!isolate(p, left, first, k + 1)) return false;
     if (sign(right.b[0]) == 0) add(p, second, k + 1, true, 0, b.n);
-    return isolate(p, right, second, k + 1, depth);
+    return isolate(p, right, second, k + 1);
   }
 
   static int discriminant_sign(const Polynomial<Z, D>& p) {
     return sign(p.c[1] * p.c[1] - shifted<0>(p.c[0] * p.c[2], 2));
-  }
-
-  // The same roots, each of them simple.
-  static Polynomial<Z, D> square_free(const Polynomial<Z, D>& p) {
-    if constexpr (D == 3) {
-      const Polynomial<Z, 2> derivative{{p.c[1], 2 * p.c[2], 3 * p.c[3]}};
-      if (sign(derivative.c[2]) == 0) return p;
-      const auto r = pseudo_remainder(p, derivative);
-      if (r.degree() < 0) return {{p.c[2], 3 * p.c[3], 0, 0}};  // a triple root
-      if (r.degree() < 1 || sign_at_ratio(derivative, Z(-r.c[0]), r.c[1]) != 0) return p;
-      // The remainder's root is a double one, and the roots add up to -c2 / c3.
-      const Polynomial<Z, 1> twice{{r.c[0], r.c[1]}}, once{{p.c[2] * r.c[1] - 2 * p.c[3] * r.c[0], p.c[3] * r.c[1]}};
-      const auto both = twice * once;
-      return {{both.c[0], both.c[1], both.c[2], 0}};
-    }
-    return p;
   }
 };
 

@@ -10,7 +10,6 @@ namespace hpccd::exact {
 inline constexpr int time_bits = 62;
 
 inline std::int64_t to_int64(const Integer<1>& x) { return static_cast<std::int64_t>(x.limbs[0]); }
-inline std::int64_t to_int64(const Big& x) { return static_cast<std::int64_t>(x); }
 
 // The only root of `of` within (m, m+1) / 2^k, simple; or, where `exact`, the number m / 2^k itself.
 template <class Z, int D>
@@ -23,18 +22,7 @@ struct Root {
   bool linear;  // whether `of` is of degree 1
 
   // floor(root * 2^62), for a root that is located.
-  std::int64_t time() const {
-    if (k <= time_bits) return to_int64(m) << (time_bits - k);
-    if constexpr (Widths<Z>::any_size) return to_int64(Z(m >> (k - time_bits)));
-    return to_int64(m);
-  }
-
-  void bisect() {
-    const Time<Z> middle = shifted<0>(m, 1) + Time<Z>(1);
-    const int at_middle = sign_at_dyadic(of, middle, ++k);
-    exact = at_middle == 0;
-    m = exact || at_middle == before ? middle : Time<Z>(shifted<0>(m, 1));
-  }
+  std::int64_t time() const { return to_int64(m) << (time_bits - k); }
 };
 
 // The coefficients times 2^-exponent, the largest about one, in Bernstein form: for guesses.

@@ -36,7 +36,7 @@ Known vanishes_at(const Polynomial<Y, 2>& q, const Root<Z, D>& root) {
   return s == 0 ? Known::unknown : known(s < 0);
 }
 
-// Narrows the root where that helps. With integers of fixed size there are signs that stay open: `open` is set then.
+// Narrows the root where that helps. There are signs that stay open: `open` is set then.
 template <class Y, class Z, int D>
 int sign_at(const Polynomial<Y, 2>& q, Root<Z, D>& root, bool& open) {
   const int degree = q.degree();
@@ -44,18 +44,10 @@ int sign_at(const Polynomial<Y, 2>& q, Root<Z, D>& root, bool& open) {
   if (root.exact) return sign_at_dyadic(q, root.m, root.k);
   if (root.linear) return sign_at_ratio(q, -root.of.c[0], root.of.c[1]);
   locate(root);
-  Known zero = Known::unknown;
-  for (;;) {
-    if (root.exact) return sign_at_dyadic(q, root.m, root.k);
-    if (const int s = sign_on_dyadic(q, root.m, root.k)) return s;
-    if (zero == Known::unknown) zero = vanishes_at(q, root);
-    if (zero == Known::yes) return 0;
-    if constexpr (!Widths<Z>::any_size) {
-      open = true;
-      return 0;
-    }
-    root.bisect();
-  }
+  if (root.exact) return sign_at_dyadic(q, root.m, root.k);
+  if (const int s = sign_on_dyadic(q, root.m, root.k)) return s;
+  if (vanishes_at(q, root) != Known::yes) open = true;
+  return 0;
 }
 
 }  // namespace hpccd::exact

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <span>
+#include <vector>
 
 #include "elementary/exact/polynomial.h"
 
@@ -15,6 +16,12 @@ inline int degree_of(Coefficients p) { return static_cast<int>(p.size()) - 1; }
 template <int D>
 Coefficients coefficients(const Polynomial<Big, D>& p) {
   return {p.c.data(), static_cast<std::size_t>(p.degree() + 1)};
+}
+
+inline std::vector<Big> derivative(Coefficients p) {
+  std::vector<Big> d;
+  for (int i = 1; i <= degree_of(p); ++i) d.push_back(i * p[i]);
+  return d;
 }
 
 // p(m / 2^k) 2^(k degree)

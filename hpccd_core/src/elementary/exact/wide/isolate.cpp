@@ -12,12 +12,6 @@ struct Mark {
   bool zero;
 };
 
-std::vector<Big> derivative(Coefficients p) {
-  std::vector<Big> d;
-  for (int i = 1; i <= degree_of(p); ++i) d.push_back(i * p[i]);
-  return d;
-}
-
 // Adds the roots of p to the marks, among which are 0, 1 and all places at which p turns: in between p rises or falls.
 std::vector<Mark> with_roots(Coefficients p, std::vector<Mark> marks) {
   std::vector<Mark> all;

@@ -132,8 +132,8 @@ void Root::approach_from(const Dyadic& end, bool upwards, int limit) {
 }
 
 // Newton's method on the whole interval: with p = a0 + a1 s + a2 s^2 + a3 s^3 seen from its middle, the root is at
-// s = -a0 / (a1 + d), and |d| <= |a2| w + |a3| w^2 for all |s| <= w. One value per doubling of the bits, at half the bits
-// that it yields. Halves the interval where that gains more.
+// s = -a0 / (a1 + d), and |d| <= |a2| w + |a3| w^2 for all |s| <= w. One value per doubling of the bits, at half the
+// bits that it yields. Halves the interval where that gains more.
 void Root::step() {
   const int degree = degree_of(local_), k = k_ + 1;
   const Big middle = low_ + high_, w = high_ - low_;
@@ -148,8 +148,7 @@ void Root::step() {
   if (sign(least) > 0) {
     // The error of -a0 / a1 is below 2^e. Bits that cost more than all before are not taken, though they come free.
     const int most = 64 + k_;
-    const int e =
-        d.is_zero() ? -most : highest_bit(a[0]) + highest_bit(d) + 2 - highest_bit(a[1]) - highest_bit(least);
+    const int e = d.is_zero() ? -most : highest_bit(a[0]) + highest_bit(d) + 2 - highest_bit(a[1]) - highest_bit(least);
     const int more = std::clamp(-e, 0, most);
     Big num = -a[0] << more, den = a[1];
     // As many bits of both as an error below one asks for.
