@@ -10,6 +10,7 @@ namespace {
 struct Event {
   std::int64_t time;
   wide::Root root;
+  bool repeats = false;  // one before it is of the same root
 };
 
 void add_events(std::vector<Event>& events, wide::Coefficients p) {
@@ -17,6 +18,23 @@ void add_events(std::vector<Event>& events, wide::Coefficients p) {
     const std::int64_t time = root.time();
     events.push_back({time, std::move(root)});
   }
+}
+
+// Whether the features touch at event i. The slowest queries are those whose polynomials share roots.
+bool touches_at(const Query<Big>& q, std::vector<Event>& events, std::size_t i) {
+  std::vector<std::size_t> may_repeat;
+  const auto sign_of = [&](const auto& polynomial) {
+    const auto p = wide::coefficients(polynomial);
+    const int s = wide::sign_at(p, events[i].root);
+    if (s == 0)
+      for (std::size_t j = i + 1; j < events.size() && events[j].time == events[i].time; ++j)
+        if (std::ranges::equal(p, events[j].root.of())) may_repeat.push_back(j);
+    return s;
+  };
+  if (touches(q, sign_of)) return true;
+  for (const std::size_t j : may_repeat)
+    if (events[j].root.surely_holds(events[i].root)) events[j].repeats = true;
+  return false;
 }
 
 }  // namespace
@@ -35,9 +53,8 @@ Answer earliest(const Query<Big>& q) {
     });
   // Events in the wrong order have the same time.
   std::stable_sort(events.begin(), events.end(), [](const Event& x, const Event& y) { return x.time < y.time; });
-  for (auto& [time, root] : events)
-    if (touches(q, [&](const auto& p) { return wide::sign_at(wide::coefficients(p), root); }))
-      return {true, rounded_down(time)};
+  for (std::size_t i = 0; i < events.size(); ++i)
+    if (!events[i].repeats && touches_at(q, events, i)) return {true, rounded_down(events[i].time)};
   return {true, {}};
 }
 

@@ -35,6 +35,11 @@ void align(Dyadic& x, Dyadic& y) {
   y.k = x.k;
 }
 
+bool not_above(Dyadic x, Dyadic y) {
+  align(x, y);
+  return x.m <= y.m;
+}
+
 }  // namespace
 
 Root::Root(Coefficients p, const Dyadic& low, const Dyadic& high, int before)
@@ -59,6 +64,11 @@ std::vector<Big> Root::seen(Coefficients q) const {
 bool Root::changes_sign(Coefficients q) const {
   const auto local = seen(q);
   return sign_at_dyadic(local, low_, k_) * sign_at_dyadic(local, high_, k_) < 0;
+}
+
+bool Root::surely_holds(const Root& other) const {
+  // The ends of an interval do not belong to it: a root that is exact could be one of them.
+  return !exact_ && !other.exact_ && not_above(low(), other.low()) && not_above(other.high(), high());
 }
 
 void Root::become_exact(Dyadic x) { *this = Root(std::move(x)); }

@@ -36,6 +36,8 @@ class Root {
   std::vector<Big> seen(Coefficients q) const;
   int sign_of_seen(Coefficients seen) const { return exact_ ? 0 : sign_on(seen, low_, high_, k_); }
   bool changes_sign(Coefficients q) const;
+  // Whether the intervals show that the other root lies in this one's; false: maybe not.
+  bool surely_holds(const Root& other) const;
   bool has_base() const { return has_base_; }
   int known_bits() const { return has_base_ ? k_ : 0; }  // of its offset
 
