@@ -48,7 +48,10 @@ def prepare() -> None:
 
 
 def give_back_freed_memory() -> None:
-    """Return to the kernel what is free now, for a process that has kept it since `prepare` for long enough."""
+    """Return to the kernel what is free now, for a process that has kept it since `prepare` for long enough.
+
+    glibc keeps the end of each arena but the first: as much as the largest message that a thread of DDS received.
+    """
     trim = getattr(ctypes.CDLL(None), "malloc_trim", None)  # glibc only
     if trim is not None and "MALLOC_TRIM_THRESHOLD_" not in os.environ:
         trim(ctypes.c_size_t(0))
