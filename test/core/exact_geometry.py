@@ -111,16 +111,36 @@ def side(kind, query, toc):
     return 1 if before > 0 else -1
 
 
+def _direction(vector, t):
+    values = [_value(x, t) for x in vector]
+    largest = max(map(abs, values)) or 1
+    direction = np.array([float(x / largest) for x in values])
+    return direction / (np.linalg.norm(direction) or 1)
+
+
+def normal_before_contact(kind, query, toc):
+    """a x b, of length one, to the side of p just before the contact, of which toc is the time rounded down: the motion
+    may change it within that rounding. None where p . (a x b) has none or several roots there, or a double one."""
+    f, (_, a, b) = _coplanarity(kind, query), _spanned(kind, query)
+    n, chain = _cross(a, b), _sturm_chain(f)
+    low, high = Fraction(float(toc)) - Fraction(1, 2**60), Fraction(float(toc)) + Fraction(1, 2**52)
+    rising = _value(f, high) > 0
+    if _variations(chain, low) - _variations(chain, high) != 1 or rising == (_value(f, low) > 0):
+        return None
+    while np.abs(_direction(n, low) - _direction(n, high)).max() > 1e-9:
+        for _ in range(32):
+            middle = (low + high) / 2
+            low, high = (low, middle) if (_value(f, middle) > 0) == rising else (middle, high)
+    return -_direction(n, low) if rising else _direction(n, low)
+
+
 def normal(kind, query, toc):
     """a x b at toc in floating point, of length one, and its size relative to the largest of a and b in the step."""
     _, a, b = _spanned(kind, query)
-    n = [_value(x, Fraction(float(toc))) for x in _cross(a, b)]
-    largest = max(map(abs, n))
-    if largest == 0:
-        return np.zeros(3), 0.0
-    direction = np.array([float(x / largest) for x in n])
+    n, t = _cross(a, b), Fraction(float(toc))
+    largest = max(abs(_value(x, t)) for x in n)
     sizes = [max(abs(_value(x, t)) for x in v for t in (0, 1)) for v in (a, b)]
-    return direction / np.linalg.norm(direction), float(largest / (sizes[0] * sizes[1]))
+    return _direction(n, t), float(largest / (sizes[0] * sizes[1])) if largest else 0.0
 
 
 def _dot(u, v):

@@ -79,6 +79,12 @@ def far_away(rng, n):
     return small_steps(rng, n) + 1e6
 
 
+def all_magnitudes(rng, n, exponents=450):
+    """Each coordinate times one of three powers of two."""
+    powers = rng.integers(-exponents, exponents, size=(n, 1, 3)).repeat(8, axis=1)
+    return np.ldexp(small_steps(rng, n), np.take_along_axis(powers, rng.integers(3, size=(n, 8, 3)), axis=2))
+
+
 REGULAR = [small_steps, pinned, scaled(480), scaled(-900), far_away]
 DEGENERATE = [
     generators.lattice, generators.still, generators.in_plane, generators.on_line, generators.meeting_vertex_face,

@@ -70,6 +70,18 @@ def test_other_names_for_corners_ends_and_sides(kind, generate):
             np.testing.assert_allclose(turn * other, normal, atol=1e-6)
 
 
+@KINDS
+def test_coordinates_of_all_magnitudes(kind):
+    detector, seen = single_pairs.detector(kind), 0
+    for query in contacts(kind, single_pairs.all_magnitudes, 80):
+        toc, _, normal = single_pairs.contact(detector, kind, query)
+        expected = exact_geometry.normal_before_contact(kind, query, toc)
+        if expected is not None:
+            seen += 1
+            np.testing.assert_allclose(normal, expected, atol=1e-6)
+    assert seen > 40
+
+
 def test_vertex_above_a_face_that_rises():
     # The normal at toc stands at an angle to that at t = 0: a sign taken from both at once depends on the corner.
     start, end = [(0.3, 0.4, 0.1), *FLOOR], [(0.3, 0.4, 0.1), (0, 0, -0.1), (1, 0, 0.5), (0, 1, 0.5)]
