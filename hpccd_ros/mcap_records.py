@@ -33,6 +33,7 @@ MOST_RECORDS = 1 << 20
 
 _HEAD = struct.Struct("<BQ")
 _MESSAGE = struct.Struct("<HIQQ")
+_INDEX_HEAD, _INDEX_ENTRY = struct.Struct("<HI"), 16
 _KINDS = {
     Opcode.HEADER: known.Header, Opcode.FOOTER: known.Footer, Opcode.SCHEMA: known.Schema,
     Opcode.CHANNEL: known.Channel, Opcode.CHUNK: known.Chunk, Opcode.CHUNK_INDEX: known.ChunkIndex,
@@ -106,6 +107,8 @@ def parse(raw: Raw) -> known.McapRecord | None:
     """The record, or None where it is of a kind that is not needed here. Raises what is in DAMAGE."""
     if raw.opcode == Opcode.MESSAGE:
         return _message(raw.body)
+    if raw.opcode == Opcode.MESSAGE_INDEX:
+        _check_message_index(raw.body)
     kind = _KINDS.get(raw.opcode)
     if kind is None:
         return None
@@ -160,6 +163,13 @@ def _unpacked(chunk) -> bytes:
     if chunk.uncompressed_crc not in (0, found := zlib.crc32(data)):
         raise CRCValidationError(chunk.uncompressed_crc, found, chunk)
     return data
+
+
+def _check_message_index(body: bytes) -> None:
+    # Not needed here, but other readers fall over one that is not whole.
+    entries = _INDEX_HEAD.unpack_from(body)[1]
+    if entries % _INDEX_ENTRY or entries > len(body) - _INDEX_HEAD.size:
+        raise EndOfFile(f"an index of messages of {entries:,} bytes, {len(body) - _INDEX_HEAD.size:,} are left")
 
 
 def _message(body: bytes) -> known.Message:

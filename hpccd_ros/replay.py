@@ -11,6 +11,7 @@ from hpccd_ros.detection import CORE_ERRORS, make_detector
 from hpccd_ros.mcap_decode import make_decoder
 from hpccd_ros.mcap_reader import Recording, RecordingError
 from hpccd_ros.messages import SceneFrame
+from hpccd_ros.parameter_table import ACCURACIES
 from hpccd_ros.replay_compare import difference
 from hpccd_ros.replay_frames import FrameSource, FrameWindow
 from hpccd_ros.replay_setup import ReplaySetup
@@ -169,7 +170,8 @@ class Replay:
                 raise RecordingError(f"frame with stamp {end.stamp} ns: the core refuses it: {error}") from error
             self._layout = Layout.of(tuple(m.name for m in self._builder.meshes), end.topologies)
             self._scene_of, self._detector = end, None
-        accuracy = self._accuracy or (step.recorded.accuracy if step.recorded is not None else "")
+        told = step.recorded.accuracy if step.recorded is not None else ""
+        accuracy = self._accuracy or (told if told in ACCURACIES else "")  # one that is not diverges: replay_compare.py
         options = dataclasses.replace(
             self._setup.options(accuracy, self._backend, self._threads), outputs=self._outputs
         )

@@ -5,6 +5,7 @@ import numpy as np
 
 from hpccd_ros import convert
 from hpccd_ros.convert import Layout
+from hpccd_ros.parameter_table import ACCURACIES
 
 
 def difference(recorded, contacts, layout: Layout, any_one: bool = False) -> str | None:
@@ -54,6 +55,8 @@ def _malformed(message, layout) -> str | None:
     for name, per_contact in sizes.items():
         if len(getattr(message, name)) != count * per_contact:
             return f"{name} has {len(getattr(message, name))} entries for {count} contacts"
+    if message.accuracy not in ACCURACIES:
+        return f"its accuracy is {message.accuracy[:20]!r}, none of {', '.join(ACCURACIES)}"
     if list(message.mesh_names) != list(layout.mesh_names):
         return f"its meshes are {list(message.mesh_names)}, those of the recording {list(layout.mesh_names)}"
     for name in ("points", "normals"):

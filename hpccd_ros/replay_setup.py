@@ -25,7 +25,7 @@ class ReplaySetup:
     meshes: dict[str, dict]
     # Topic name -> (mesh, "topology" | "vertices" | "points"), or ("", name in transform_topics.ALL).
     roles: dict[str, tuple[str, str]]
-    contacts: str  # topic name, or "" where the recording has none
+    contacts: str | None  # topic name; None: the recording has none
     files: dict[str, tuple[Topology, MeshFrame | None]]  # of meshes that come from a file; frame: static ones
     unknown: list[str]  # parameters that the node does not have: without effect
 
@@ -74,7 +74,7 @@ def of_recording(recording: Recording, parameter_file: str | None = None) -> Rep
             f"{recording.path}: mesh {moved[0]} was transformed by tf (parameter mesh.{moved[0]}.transform), and the "
             "recording holds no transforms: its positions cannot be computed again"
         )
-    return ReplaySetup(settings, meshes, roles, by_role.get("contacts", ""), _files(recording, meshes),
+    return ReplaySetup(settings, meshes, roles, by_role.get("contacts"), _files(recording, meshes),
                        table.unknown(given, meshes))  # fmt: skip
 
 

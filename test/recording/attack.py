@@ -7,6 +7,7 @@
 
 import argparse
 import collections
+import csv
 import faulthandler
 import functools
 import json
@@ -88,8 +89,8 @@ def work(folder: Path) -> None:
 
 def run_case(name: str, folder: Path) -> dict:
     """{command: outcome} and problems (texts) of one case."""
-    ends = ("in.mcap", "out.mcap", "x.png", "x.json")
-    path, saved, picture, table = (folder / f"{os.getpid()}-{end}" for end in ends)
+    ends = ("in.mcap", "out.mcap", "x.png", "x.json", "x.csv")
+    path, saved, picture, table, steps = (folder / f"{os.getpid()}-{end}" for end in ends)
     for leftover in (saved, picture, table):
         leftover.unlink(missing_ok=True)
     path.write_bytes(make_case(name, folder))
@@ -109,12 +110,13 @@ def run_case(name: str, folder: Path) -> dict:
 
     def replay(label, recording):
         table.unlink(missing_ok=True)
-        done = command(label, "replay", recording, "--json", table, "--backend", "cpu")
+        steps.unlink(missing_ok=True)
+        done = command(label, "replay", recording, "--json", table, "--csv", steps, "--backend", "cpu")
         if table.exists():
             (row,) = json.loads(table.read_text())
             outcomes[label] = row["result"]
             if row["result"] == "VERIFIED" or re.search("^VERIFIED", done.out, re.MULTILINE):
-                problems.extend(_lies(recording, row, done.out))
+                problems.extend(_lies(recording, row, steps, done.out))
         return done
 
     sound = command("doctor", "doctor", path)
@@ -138,16 +140,20 @@ def run_case(name: str, folder: Path) -> dict:
             "memory": grown, "told": [*sound, *replayed]}  # fmt: skip
 
 
-def _lies(path, row, told) -> list[str]:
+def _lies(path, row, steps, told) -> list[str]:
     try:
         reader = oracle.Oracle(path)
-        wrong = reader.untruths()
+        whys = reader.untruths()
     except Exception:
         return [f"replay: verified what the oracle cannot read: {traceback.format_exc()}"]
+    with open(steps, newline="") as stream:
+        equal = [r for r in csv.DictReader(stream) if r["result"] == "equal"]
+    verified = collections.Counter(tuple(int(r[name]) for name in ("step", "start_ns", "end_ns")) for r in equal)
+    true = collections.Counter(step for step, why in zip(reader.steps(), whys, strict=True) if why is None)
+    if wrong := verified - true:
+        return [f"replay: WRONG VERIFIED: {list(wrong)}; untrue are {list(zip(reader.steps(), whys, strict=True))}"]
     said = re.search(r"(\d+) answers not verified: their step began", told)
     untold = row["unverified"] + (int(said[1]) if said else 0)
-    if any(not why.endswith(oracle.NOT_THERE) for why in wrong) or len(wrong) > untold:
-        return [f"replay: WRONG VERIFIED: {wrong}"]
     if row["verified"] + untold != len(reader.answers):
         return [f"replay: {row['verified']} answers verified, the file has {len(reader.answers)}"]
     return []

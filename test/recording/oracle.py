@@ -52,10 +52,13 @@ class Oracle:
             for message in self.found[role]:
                 self._take_transform(message, role == "transforms_static")
 
-    def untruths(self) -> list[str]:
-        """Of each answer that is not what its positions give, why."""
-        found = [(answer.step, self._untruth_of(answer)) for answer in self.answers]
-        return [f"answer of step {step}: {why}" for step, why in found if why]
+    def steps(self) -> list[tuple[int, int, int]]:
+        """(step, start, end) of each answer."""
+        return [(answer.step, _ns(answer.start), _ns(answer.header.stamp)) for answer in self.answers]
+
+    def untruths(self) -> list[str | None]:
+        """Of each answer, why it is not what its positions give; None where it is."""
+        return [self._untruth_of(answer) for answer in self.answers]
 
     def _of(self, mesh, name, otherwise):
         value = self.given.get(f"mesh.{mesh}.{name}")
@@ -127,6 +130,8 @@ class Oracle:
         return why
 
     def _difference(self, answer, first, last):
+        if answer.accuracy not in ("fast", "balanced", "conservative", "exact"):
+            return "no such accuracy"
         scene = hc.Scene()
         for mesh, (faces, n_vertices, _) in zip(self.meshes, last, strict=True):
             scene.add_mesh(mesh, faces, n_vertices=n_vertices, static=self._of(mesh, "static", False),

@@ -92,6 +92,11 @@ def test_a_time_that_is_no_number(answered):
     _diverges(answered(change), "recorded at t = nan")
 
 
+@pytest.mark.parametrize("accuracy", ["", "exakt", "a" * 100_000])
+def test_found_with_an_accuracy_that_there_is_not(answered, accuracy):
+    _diverges(answered(lambda put, answer: put("accuracy", accuracy)), "malformed: its accuracy is ")
+
+
 def _only(rows):
     """A change that keeps these contacts of the answer."""
     def change(put, answer):

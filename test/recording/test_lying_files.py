@@ -92,6 +92,21 @@ def test_topics_cannot_write_to_the_terminal(bag, tmp_path):
     assert "\x1b" not in done.out and r"/x\x1b[2J\n" in done.out
 
 
+def test_a_topic_without_a_name_is_not_that_of_the_answers(bag, tmp_path):
+    bag.channel("/contacts").topic = ""
+    replayed = hpccd("replay", bag.write(tmp_path / "x.mcap"))
+    assert replayed.status == 0 and "VERIFIED:" not in replayed.out and "the recording holds no contacts" in replayed.out
+
+
+@pytest.mark.parametrize("body", [b"", struct.pack("<HI", 1, 16), struct.pack("<HI", 1, 15) + bytes(15)])
+def test_an_index_of_messages_that_is_not_whole(bag, tmp_path, body):
+    """It is not needed to replay, but other readers fall over it."""
+    bag.data = lambda records: [*records[:-1], raw_record(Opcode.MESSAGE_INDEX, body), records[-1]]
+    path = bag.write(tmp_path / "x.mcap")
+    assert hpccd("doctor", path).status == 1
+    _called_damaged(path)
+
+
 def _indexed(change):
     """A function for `Bag.index` that changes copies of its records."""
     return lambda records: change([dataclasses.replace(record) for record in records])
