@@ -59,9 +59,8 @@ class Mischief:
         self._send(reason, convert.vertices_message(xyz, at, topology_version=version))
 
     def _cut(self, xyz, faces, version, stamp) -> None:
-        # No message for the middleware, which leaves it out: only the gap in the numbers tells of it.
         whole = b"\0\1\0\0" + bytes(range(1, 60))
-        self._send(Reason.MIDDLEWARE, whole[: self._random.randrange(5, len(whole))])
+        self._send(Reason.MALFORMED, whole[: self._random.randrange(5, len(whole))])
 
     def _wrong_topology(self, xyz, faces, version, stamp) -> None:
         reason, message = self._random.choice((
