@@ -243,8 +243,8 @@ class _Soak:
                 failure(f"{mesh}: {missing} messages were sent, but neither received nor counted as lost")
         if status.unaccounted():
             failure(f"{status.unaccounted()} messages are not accounted for: {status.counts()}")
-        # Topics are not ordered among one another: a wrong message that the next topology overtakes is old as well. Of one
-        # cut off, in a burst with right ones, only the gap in the numbers tells.
+        # Topics are not ordered among one another: a wrong message that the next topology overtakes is old as well. Of
+        # one cut off, in a burst with right ones, only the gap in the numbers tells.
         known_otherwise = sum(
             status.count(f"dropped.{load.victim}.{reason}") for reason in (Reason.OLD_TOPOLOGY, Reason.MIDDLEWARE)
         )
