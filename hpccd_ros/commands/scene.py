@@ -128,7 +128,11 @@ def _write(scene, args):
     if args.png:
         from hpccd_ros.scenes import picture
 
-        picture.save(scene, _frames(scene, args.at), args.png)
+        frames = _frames(scene, args.at)
+        try:
+            picture.save(scene, frames, args.png)
+        except ValueError as error:  # a suffix that matplotlib cannot write
+            raise UserError(f"--png {args.png}: {error}") from error
         print(f"wrote {args.png}")
 
 

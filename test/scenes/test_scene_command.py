@@ -75,6 +75,7 @@ def test_step_is_what_the_detector_takes(capsys, tmp_path):
         (["two-triangles", "--npz", "x.npz", "--step", "11"], "--step 11: the scene has steps 1 to 10"),
         (["two-triangles", "--png", "x.png", "--at", "1,x"], "--at 1,x: frame numbers"),
         (["two-triangles", "--png", "x.png", "--at", "11"], "--at 11: the scene has frames 0 to 10"),
+        (["two-triangles", "--png", "x.xyz", "--at", "1"], "--png x.xyz: Format 'xyz' is not supported"),
         (["two-triangles", "--mcap", "x.bag"], "name a file that ends in .mcap"),
         (["two-triangles", "--npz", os.path.join("no", "such", "folder", "x.npz")], "No such file or directory"),
     ],
