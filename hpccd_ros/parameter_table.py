@@ -37,6 +37,7 @@ OUTPUTS = ("points", "normals")
 # milliseconds) than messages may wait.
 LEAST_SPLIT_SIZE = 0.01  # MB
 LEAST_SPLIT_TIME = 0.1  # s
+MOST_SPLIT = 1e9  # MB, s
 
 NODE_ROWS = (
     Row(
@@ -238,7 +239,7 @@ NODE_ROWS = (
         0.0,
         "A new file after so much, in a folder; 0: no limit. For the next recording",
         unit="MB",
-        span=(0.0, 1e9),
+        span=(0.0, MOST_SPLIT),
         least=LEAST_SPLIT_SIZE,
         change=ALWAYS,
     ),
@@ -248,7 +249,7 @@ NODE_ROWS = (
         0.0,
         "A new file after so long, in a folder; 0: no limit. For the next recording",
         unit="s",
-        span=(0.0, 1e9),
+        span=(0.0, MOST_SPLIT),
         least=LEAST_SPLIT_TIME,
         change=ALWAYS,
     ),

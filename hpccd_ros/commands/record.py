@@ -14,8 +14,10 @@ file is tried every 5 seconds. A node can also record itself: its parameter `rec
 A node whose topics are remapped: give the same remappings here, after --ros-args.
 """
 
+import math
+
 from hpccd_ros.errors import UserError
-from hpccd_ros.parameter_table import LEAST_SPLIT_SIZE, LEAST_SPLIT_TIME
+from hpccd_ros.parameter_table import LEAST_SPLIT_SIZE, LEAST_SPLIT_TIME, MOST_SPLIT
 
 
 def configure(parser):
@@ -42,9 +44,13 @@ def run(args) -> int:
     for name in ("split_size", "split_time", "flush", "duration", "wait", "frames"):
         if getattr(args, name) < 0:
             raise UserError(f"--{name.replace('_', '-')} {getattr(args, name)}: must not be negative")
+        if math.isnan(getattr(args, name)):
+            raise UserError(f"--{name.replace('_', '-')} nan: must be a number")
     for name, least in (("split_size", LEAST_SPLIT_SIZE), ("split_time", LEAST_SPLIT_TIME)):
         if 0 < getattr(args, name) < least:
             raise UserError(f"--{name.replace('_', '-')} {getattr(args, name)}: must be 0 or at least {least:g}")
+        if getattr(args, name) > MOST_SPLIT:
+            raise UserError(f"--{name.replace('_', '-')} {getattr(args, name)}: must be at most {MOST_SPLIT:g}")
     if args.depth < 1:
         raise UserError(f"--depth {args.depth}: must be at least 1")
     from hpccd_ros import recorder

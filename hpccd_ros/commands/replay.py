@@ -17,6 +17,8 @@ parameter file of the node; what the node would not start with is refused. Recor
 only, from each frame to the next. Many at once need the extra "cluster" (Dask).
 """
 
+import math
+
 from hpccd_ros.errors import UserError
 
 
@@ -53,6 +55,8 @@ def configure(parser):
 
 
 def run(args) -> int:
+    if any(map(math.isnan, (args.rate or 0, args.begin, args.end, args.wait))):
+        raise UserError("--rate, --from, --to and --wait must be numbers, not nan")
     if (args.rate or 0) < 0 or args.begin < 0 or args.end < args.begin or args.wait < 0:
         raise UserError("--rate, --from and --wait must not be negative, and --to not before --from")
     if args.threads < 0:

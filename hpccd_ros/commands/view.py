@@ -11,6 +11,8 @@ the Rerun viewer.
 Pictures need no display and no graphics driver. Rerun comes with the extra "rerun".
 """
 
+import math
+
 from hpccd_ros.errors import UserError
 
 
@@ -37,6 +39,8 @@ def run(args) -> int:
         raise UserError(f"--every {args.every}: must be at least 1")
     if not -89.9 <= args.elevation <= 89.9:
         raise UserError(f"--elevation {args.elevation}: must lie between -89.9 and 89.9 degrees")
+    if not math.isfinite(args.azimuth):
+        raise UserError(f"--azimuth {args.azimuth}: must be a number of degrees")
     from hpccd_ros.picture import view
 
     return view.main(args)
