@@ -30,9 +30,12 @@ def main(args) -> int:
     """Run the demo as the options of `hpccd demo` say."""
     signal.signal(signal.SIGTERM, _interrupt)
     folder = Path(args.out)
-    folder.mkdir(parents=True, exist_ok=True)
-    for name in (RECORDING, PICTURE, PARAMETERS, *LOGS):
-        (folder / name).unlink(missing_ok=True)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for name in (RECORDING, PICTURE, PARAMETERS, *LOGS):
+            (folder / name).unlink(missing_ok=True)
+    except OSError as error:
+        raise UserError(f"--out {args.out}: {error.strerror}") from error
     if "ROS_DOMAIN_ID" not in os.environ:
         # A domain of its own: neither the nodes that run here already nor a second demo can mix with it.
         os.environ["ROS_DOMAIN_ID"] = str(1 + os.getpid() % 100)

@@ -62,6 +62,7 @@ def test_help_imports_neither_ros_nor_the_core():
         (["doctor", "x.mcap"], "x.mcap does not exist"),
         (["doctor", "x.mcap", "--compression", "lz4"], "--compression belongs to --recover"),
         (["demo", "--rate", "0"], "--rate 0.0: must be above 0"),
+        (["demo", "--out", "/dev/null/out"], "--out /dev/null/out: Not a directory"),
         (["demo", "--scene", "nothing"], "unknown scene 'nothing'"),
     ],
 )
