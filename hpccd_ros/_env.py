@@ -37,6 +37,7 @@ _PROFILES = ("fastdds_localhost.xml", "fastdds.xml")
 
 # The switch that opens discovery to the network (SUBNET), and others that say whom the user wants to meet.
 DISCOVERY = "ROS_AUTOMATIC_DISCOVERY_RANGE"
+_BEYOND_THIS_HOST = ("SUBNET", "SYSTEM_DEFAULT", "", None)
 _DISCOVERY_CHOICES = (DISCOVERY, "ROS_STATIC_PEERS", "ROS_LOCALHOST_ONLY")
 
 
@@ -60,7 +61,8 @@ def give_back_freed_memory() -> None:
 def this_host_only() -> bool:
     """Whether discovery is limited to this machine, as the environment stands after ``prepare``."""
     localhost_only = os.environ.get("ROS_LOCALHOST_ONLY")  # older, and stronger where both are set
-    return localhost_only == "1" if localhost_only else os.environ.get(DISCOVERY) == "LOCALHOST"
+    # Of a value that it does not know, ROS says that it assumes localhost.
+    return localhost_only == "1" if localhost_only else os.environ.get(DISCOVERY) not in _BEYOND_THIS_HOST
 
 
 def _find_shares_of_wheels() -> None:

@@ -66,6 +66,9 @@ def test_discovery_is_limited_to_this_host(tmp_path):
     [
         ({RANGE: "SUBNET"}, "fastdds.xml", "SUBNET"),
         ({RANGE: "LOCALHOST"}, LOCAL, "LOCALHOST"),
+        ({RANGE: "localhost"}, LOCAL, "localhost"),
+        ({RANGE: "OFF"}, LOCAL, "OFF"),
+        ({RANGE: "SYSTEM_DEFAULT"}, "fastdds.xml", "SYSTEM_DEFAULT"),
         ({"ROS_STATIC_PEERS": "192.0.2.7"}, "fastdds.xml", "none"),
         ({"ROS_LOCALHOST_ONLY": "1"}, LOCAL, "none"),
         ({"ROS_LOCALHOST_ONLY": "0"}, "fastdds.xml", "none"),
