@@ -43,7 +43,7 @@ _DISCOVERY_CHOICES = (DISCOVERY, "ROS_STATIC_PEERS", "ROS_LOCALHOST_ONLY")
 
 def prepare() -> None:
     """Make package shares findable, choose discovery range and DDS profile, keep freed memory. Safe to call again."""
-    _find_shares_of_wheels()
+    find_shares_of_wheels()
     _choose_dds_profile()
     _keep_freed_memory()
 
@@ -65,7 +65,8 @@ def this_host_only() -> bool:
     return localhost_only == "1" if localhost_only else os.environ.get(DISCOVERY) not in _BEYOND_THIS_HOST
 
 
-def _find_shares_of_wheels() -> None:
+def find_shares_of_wheels() -> None:
+    """Let the ament index find the packages of the ROS wheels."""
     # The ROS wheels never set AMENT_PREFIX_PATH; a sourced ROS installation or colcon workspace does.
     if not os.environ.get("AMENT_PREFIX_PATH") and (Path(sys.prefix) / "share" / "ament_index").is_dir():
         os.environ["AMENT_PREFIX_PATH"] = sys.prefix

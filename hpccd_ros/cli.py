@@ -24,6 +24,9 @@ COMMANDS = {
     "info": "what is installed here: versions, backends, processor",
 }
 
+# Those that load rcl whatever their options.
+NEED_ROS = ("demo", "record", "replay", "view")
+
 EPILOG = """\
 a first tour:
   hpccd demo                        records a cloth on a spinning ball and draws its worst frame
@@ -104,6 +107,10 @@ def _run(argv, asked) -> int:
     args = parser.parse_args(argv)
     if hasattr(sys.stdout, "reconfigure"):
         sys.stdout.reconfigure(errors="backslashreplace")  # names of files and topics may be no text of the terminal's
+    if asked in NEED_ROS or getattr(args, "publish", False):
+        from hpccd_ros import middleware
+
+        middleware.check()  # before ROS is loaded
     return run(args) or 0
 
 

@@ -15,6 +15,14 @@ def main() -> int:
     for number in (signal.SIGINT, signal.SIGTERM):
         # Nothing is there yet that would have to be ended; an exception may be caught in the middle of an import.
         signal.signal(number, lambda number, frame: os._exit(0))
+    from hpccd_ros import middleware
+    from hpccd_ros.errors import UserError
+
+    try:
+        middleware.check()  # before ROS is loaded
+    except UserError as error:
+        print(f"hpccd: {error}", file=sys.stderr)
+        return 2
     from hpccd_ros import node
 
     return node.main()

@@ -78,6 +78,16 @@ def test_unknown_command(hpccd):
     assert done.returncode == 2 and "invalid choice: 'rekord'" in done.stderr
 
 
+@pytest.mark.parametrize(
+    "arguments", [["replay", "x.mcap"], ["view", "x.mcap"], ["record"], ["scene", "two-triangles", "--publish"]]
+)
+def test_another_rmw_implementation_is_refused_before_rcl_ends_the_process(hpccd, monkeypatch, arguments):
+    monkeypatch.setenv("RMW_IMPLEMENTATION", "rmw_nobody_cpp")
+    done = hpccd(*arguments)
+    assert done.returncode == 2 and "RMW_IMPLEMENTATION: 'rmw_nobody_cpp' is not installed here" in done.stderr
+    assert done.stderr.count("\n") == 1
+
+
 def test_info(hpccd):
     done = hpccd("info", "--json")
     assert done.returncode == 0, done.stderr

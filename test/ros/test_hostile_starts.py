@@ -193,7 +193,13 @@ def test_a_log_that_cannot_be_written_keeps_no_node_from_starting(variables):
 
 @pytest.mark.parametrize(
     "variable, value, status",
-    [("ROS_DOMAIN_ID", "one", 2), ("ROS_DOMAIN_ID", "500", 2), ("ROS_STATIC_PEERS", "a;;b", 1)],
+    [
+        ("ROS_DOMAIN_ID", "one", 2),
+        ("ROS_DOMAIN_ID", "500", 2),
+        ("ROS_STATIC_PEERS", "a;;b", 1),
+        ("RMW_IMPLEMENTATION", "rmw_nobody_cpp", 2),
+        ("RMW_IMPLEMENTATION", "a/b", 2),
+    ],
 )
 def test_settings_of_the_environment_that_ros_refuses(variable, value, status):
     done = subprocess.run(
