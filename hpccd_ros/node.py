@@ -401,6 +401,7 @@ def main(argv: list[str] | None = None, node_type: type[HpccdNode] = HpccdNode) 
     _env.prepare()
     try:
         ros_start.init(argv)
+        ros_start.refuse_other_arguments(argv)
         node = node_type()
     except ParameterError as error:
         return _not_started(ros_start.WRONG_PARAMETERS, str(error))

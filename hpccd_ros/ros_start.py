@@ -12,10 +12,11 @@ import rclpy
 from rclpy.exceptions import NameValidationException, ParameterException
 from rclpy.logging import get_logging_directory
 from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import remove_ros_args
 
 from hpccd_ros import dds_security
 from hpccd_ros.errors import UserError
-from hpccd_ros.quoting import LONGEST_MESSAGE, shortened
+from hpccd_ros.quoting import LONGEST_MESSAGE, listed, shortened
 
 # Exit status of the node.
 NOT_CONFIGURED, WRONG_PARAMETERS, NO_SECURITY = 1, 2, 3
@@ -50,6 +51,15 @@ def init(arguments: list[str] | None = None) -> None:
         print(f"hpccd: no log file is written: {why}; set ROS_LOG_DIR to a folder that can be written", file=sys.stderr)
         arguments += ["--ros-args", _NO_LOG_FILE]
     rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
+
+
+def refuse_other_arguments(arguments: list[str] | None = None) -> None:
+    """Raises UserError for arguments that are none of ROS, which rcl passes over; ``arguments``: as of `init`."""
+    if others := remove_ros_args(arguments)[1:]:
+        raise UserError(
+            f"unknown arguments {listed(others)}: ROS arguments come after --ros-args, for example "
+            "--ros-args --params-file config/hpccd.yaml"
+        )
 
 
 def refusal(error: Exception) -> tuple[int, str] | None:

@@ -112,7 +112,15 @@ ARGUMENTS = {
     "not-utf-8": (["-p", "accuracy:=\udcff"], 2, "not UTF-8"),
 }
 
-CASES = [*FILES, *ARGUMENTS]
+# Arguments without --ros-args, or behind its end.
+OTHERS = {
+    "without---ros-args": (["--params-file", "config/hpccd.yaml"], 2, "unknown arguments --params-file, config"),
+    "help": (["--help"], 2, "unknown arguments --help: ROS arguments come after --ros-args"),
+    "behind-the-end": (["--ros-args", "-p", "threads:=1", "--", "scene.yaml"], 2, "unknown arguments scene.yaml"),
+    "end": (["--ros-args", "-p", "threads:=1", "--"], 0, ""),
+}  # fmt: skip
+
+CASES = [*FILES, *ARGUMENTS, *OTHERS]
 
 
 @pytest.fixture(scope="module")
@@ -120,6 +128,7 @@ def outcomes(tmp_path_factory):
     """{name: [exit status, output]} of all starts."""
     folder = tmp_path_factory.mktemp("hostile")
     starts = {name: ["--ros-args", *arguments] for name, (arguments, _, _) in ARGUMENTS.items()}
+    starts |= {name: arguments for name, (arguments, _, _) in OTHERS.items()}
     for name, (content, _, _) in FILES.items():
         file = folder / f"{name}.yaml"
         file.write_bytes(content if isinstance(content, bytes) else content.replace("FOLDER", str(folder)).encode())
@@ -144,7 +153,7 @@ def sentences(output):
 
 @pytest.mark.parametrize("name", CASES)
 def test_status_and_sentence(outcomes, name):
-    _, expected, text = (FILES | ARGUMENTS)[name]
+    _, expected, text = (FILES | ARGUMENTS | OTHERS)[name]
     status, output = outcomes[name]
     assert status == expected, output[:3000]
     assert "Traceback" not in output
