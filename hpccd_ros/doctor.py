@@ -10,7 +10,10 @@ from hpccd_ros.mcap_recover import Examination, examine, recover
 
 
 def main(args) -> int:
-    """Examine, and recover where asked. 0: sound or recovered, 1: damaged."""
+    """Examine, and recover where asked. 0: sound or recovered, 1: damaged.
+
+    Raises UserError where nothing can be saved.
+    """
     files = recording_files(Path(args.file))
     if args.recover:
         if len(files) != 1:
@@ -19,7 +22,11 @@ def main(args) -> int:
     examinations = [examine(path) for path in files]
     for examination in examinations:
         _tell(examination)
-    return 0 if all(e.sound for e in examinations) else 1
+    if all(e.sound for e in examinations):
+        return 0
+    if not any(e.message_count for e in examinations):
+        raise UserError(f"{args.file} holds no whole message: no recording, or nothing is left of it")
+    return 1
 
 
 def _recover(source, args) -> int:

@@ -6,6 +6,7 @@ import random
 import pytest
 from bag_tools import STRING, read_by_rosbags, text_message, write_texts
 from mcap.reader import make_reader
+from mcap.writer import MCAP0_MAGIC
 
 from hpccd_ros.mcap_bag import BagWriter, Topic
 from hpccd_ros.mcap_reader import Recording, RecordingError
@@ -111,3 +112,11 @@ def test_doctor_command(hpccd, tmp_path):
     assert examine(tmp_path / "saved.mcap").compression == "zstd"
     again = hpccd("doctor", path, "--recover", "saved.mcap")
     assert again.returncode == 2 and "not overwritten" in again.stderr
+
+
+@pytest.mark.parametrize("content", [b"", b"no recording", MCAP0_MAGIC], ids=["empty", "text", "magic"])
+def test_what_holds_nothing_to_save_is_unusable(hpccd, tmp_path, content):
+    (tmp_path / "x.mcap").write_bytes(content)
+    for options in ((), ("--recover", "saved.mcap")):
+        done = hpccd("doctor", "x.mcap", *options)
+        assert done.returncode == 2 and done.stderr.startswith("hpccd doctor: x.mcap holds no whole message"), done
