@@ -32,7 +32,8 @@ class BagWriter:
     chunk_size: bytes of messages after which a chunk is closed, indexed and handed to the system.
     flush_interval: seconds after which an open chunk is closed all the same. A process killed at any moment
     loses at most the messages of the open chunk, so at most those of the last `flush_interval`.
-    max_bytes, max_seconds: split limits (0: none), for a folder only. Files pass `max_bytes` by at most a chunk.
+    max_bytes, max_seconds: split limits (0: none), for a folder only. `max_bytes` counts messages
+    before compression, and the last one of a file may pass it.
 
     The constructor raises ValueError for options that do not fit each other, FileExistsError rather than overwrite
     a recording, OSError where it cannot write. Later a disk that refuses (full, gone) raises nothing: the file ends

@@ -237,7 +237,7 @@ NODE_ROWS = (
         "record_split_size",
         "float",
         0.0,
-        "A new file after so much, in a folder; 0: no limit. For the next recording",
+        "A new file after so much, before compression, in a folder; 0: no limit. For the next recording",
         unit="MB",
         span=(0.0, MOST_SPLIT),
         least=LEAST_SPLIT_SIZE,

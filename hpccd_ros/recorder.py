@@ -127,7 +127,7 @@ def _report(bag, recorder):
 def _extra(text) -> Wanted:
     name, equals, type_name = text.partition("=")
     if not equals or type_name.count("/") != 2:
-        raise UserError(f"--topic {text}: write it as NAME=PACKAGE/msg/TYPE, for example /odom=nav_msgs/msg/Odometry")
+        raise UserError(f"--topic {text}: write it as NAME=PACKAGE/msg/TYPE, e.g. /joints=sensor_msgs/msg/JointState")
     try:
         message_class(type_name)
     except LookupError as error:

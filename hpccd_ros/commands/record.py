@@ -5,7 +5,8 @@ out of it (contacts), exactly as it goes over the wire, with the node's paramete
   hpccd record                          the node /hpccd, into ./hpccd-<date>.mcap, until Ctrl-C
   hpccd record -o run.mcap --node /arm/hpccd --duration 60
   hpccd record -o run --split-size 512 --compression zstd
-                                        a folder run/ in the layout of rosbag2, a new file each 512 MB
+                                        a folder run/ in the layout of rosbag2, a new file each 512 MB,
+                                        before compression
 
 The files play with `ros2 bag play`, open in Foxglove, and `hpccd replay` verifies them. Ctrl-C (SIGINT) and
 SIGTERM finish the file. Killed otherwise, it keeps all but the last half second (--flush): `hpccd doctor`.
@@ -24,10 +25,11 @@ def configure(parser):
     parser.add_argument("-o", "--output", metavar="PATH", help="file NAME.mcap, or folder for a split recording")
     parser.add_argument("--node", default="/hpccd", help="full name of the node to record (default: %(default)s)")
     parser.add_argument("--topic", action="append", default=[], metavar="NAME=TYPE",
-                        help="record this topic too, for example /odom=nav_msgs/msg/Odometry; may be repeated")
+                        help="record this topic too, for example /joints=sensor_msgs/msg/JointState; may be repeated")
     parser.add_argument("--compression", choices=("none", "lz4", "zstd"), default="none",
                         help="lz4: about half the writing speed; zstd: smaller, a fifth (default: %(default)s)")
-    parser.add_argument("--split-size", type=float, default=0, metavar="MB", help="new file after so many megabytes")
+    parser.add_argument("--split-size", type=float, default=0, metavar="MB",
+                        help="new file after so many megabytes, before compression")
     parser.add_argument("--split-time", type=float, default=0, metavar="S", help="new file after so many seconds")
     parser.add_argument("--flush", type=float, default=0.5, metavar="S",
                         help="most seconds of messages that a kill can cost (default: %(default)s)")
