@@ -100,6 +100,7 @@ def test_interrupted_within_an_import():
     """numpy's C parts make an ImportError of the exception that a SIGINT raises while they load."""
     code = (
         "import builtins, signal, sys\n"
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"  # a shell's background job ignores it
         "load = builtins.__import__\n"
         "def told_to_end(name, *rest, **named):\n"
         "    from_c = sys._getframe(1).f_code.co_name == '_call_with_frames_removed'\n"
