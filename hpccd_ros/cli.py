@@ -11,7 +11,7 @@ import importlib.util
 import signal
 import sys
 
-from hpccd_ros.errors import UserError
+from hpccd_ros.base.errors import UserError
 
 COMMANDS = {
     "demo": "see it work: node, moving scene and recorder as separate processes, then a picture",
@@ -108,16 +108,16 @@ def _run(argv, asked) -> int:
     if hasattr(sys.stdout, "reconfigure"):
         sys.stdout.reconfigure(errors="backslashreplace")  # names of files and topics may be no text of the terminal's
     if asked in NEED_ROS or getattr(args, "publish", False):
-        from hpccd_ros import middleware
+        from hpccd_ros.middleware import rmw
 
-        middleware.check()  # before ROS is loaded
+        rmw.check()  # before ROS is loaded
     return run(args) or 0
 
 
 def _ros_refusal(error) -> str | None:
     if "rclpy" not in sys.modules:
         return None  # not of ROS; most commands need none
-    from hpccd_ros import ros_start
+    from hpccd_ros.middleware import ros_start
 
     refused = ros_start.refusal(error)
     return refused and refused[1]

@@ -7,7 +7,7 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
-from hpccd_ros.errors import UserError
+from hpccd_ros.base.errors import UserError
 
 from . import machine, sources
 from .results import Report

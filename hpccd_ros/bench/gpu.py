@@ -16,7 +16,7 @@ import os
 from pathlib import Path
 
 import hpccd_core as hc
-from hpccd_ros.errors import UserError
+from hpccd_ros.base.errors import UserError
 
 from . import common, gpu_figure, gpu_hybrid, table
 from .gpu_hybrid import detector_times

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from hpccd_ros.errors import UserError
+from hpccd_ros.base.errors import UserError
 
 from . import drawing
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hpccd_ros.version import package_version
+from hpccd_ros.base.version import package_version
 
 
 def cores() -> int:

@@ -11,8 +11,8 @@ import yaml
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
 
-from hpccd_ros import qos
 from hpccd_ros.demo.children import Child, Children
+from hpccd_ros.middleware import qos
 
 
 def start(

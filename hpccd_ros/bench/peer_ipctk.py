@@ -14,7 +14,7 @@ import time
 
 import numpy as np
 
-from hpccd_ros.errors import UserError
+from hpccd_ros.base.errors import UserError
 
 from .measure import Sample
 from .steps import Step

@@ -9,7 +9,7 @@ import json
 import math
 from pathlib import Path
 
-from hpccd_ros.errors import UserError
+from hpccd_ros.base.errors import UserError
 
 from . import machine
 

@@ -21,7 +21,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hpccd_ros.errors import UserError
+from hpccd_ros.base.errors import UserError
 
 from . import common, ros_figure, sources, table
 from .progress import bar
@@ -66,8 +66,8 @@ def _measure(report, args, name, step, folder: Path) -> None:
     import rclpy
     from rclpy.signals import SignalHandlerOptions
 
-    from hpccd_ros import _env
     from hpccd_ros.demo.children import Children
+    from hpccd_ros.middleware import environment
 
     from . import node_child, ros_node
     from .ros_link import MESH, Link
@@ -75,7 +75,7 @@ def _measure(report, args, name, step, folder: Path) -> None:
     options = {"accuracy": args.accuracy, "threads": args.threads}
     parameters = {**options, "meshes": [MESH], "diagnostics_period": 0.5, "max_contacts": 0}
     os.environ[ros_node.VARIABLE] = str(folder / "times.json")
-    _env.prepare()
+    environment.prepare()
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     node = rclpy.create_node("simulator", namespace=NAMESPACE, start_parameter_services=False)
     link = Link(node, step, options)

@@ -15,7 +15,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 
-from hpccd_ros import _env, qos, stop_signals
+from hpccd_ros.middleware import environment, qos, stop_signals
 
 # The last two are kept for a late joiner: those of even and of odd steps.
 ANSWERS = QoSProfile(depth=2, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -24,7 +24,7 @@ ANSWERS = QoSProfile(depth=2, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 def main(namespace: str) -> int:
     stop = Future()
     stop_signals.watch(lambda: stop.set_result(None))
-    _env.prepare()
+    environment.prepare()
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     node = rclpy.create_node("echo", namespace=namespace, start_parameter_services=False)
     answers: dict[int, ContactArray] = {}

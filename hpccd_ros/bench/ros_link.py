@@ -13,9 +13,10 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
 import hpccd_core as hc
-from hpccd_ros import convert, qos
-from hpccd_ros.errors import UserError
-from hpccd_ros.messages import Topology
+from hpccd_ros.base.errors import UserError
+from hpccd_ros.detect.layout import Layout
+from hpccd_ros.frames.types import Topology
+from hpccd_ros.middleware import contact_messages, fields, mesh_messages, qos
 
 from . import ros_echo
 from .steps import Step
@@ -58,7 +59,7 @@ class Link:
         whole = step.as_one_mesh()
         self._faces = whole.meshes[0].faces
         positions = [np.asarray(v, np.float32) for v in (step.vertices_t0, step.vertices_t1)]
-        self._frames = [convert.vertices_message(p, 0, frame_id="world") for p in positions]
+        self._frames = [mesh_messages.vertices_message(p, 0, frame_id="world") for p in positions]
         self.bytes_in = positions[0].nbytes
         self.triangles, self.n_vertices = len(self._faces), len(positions[0])
         detector = hc.Detector(whole.scene(), **options)
@@ -82,8 +83,8 @@ class Link:
 
     def _answer(self, contacts, parity: int) -> ContactArray:
         message = ContactArray(step=parity)
-        layout = convert.Layout.of((MESH,), (Topology(0, self.n_vertices, self._faces),))
-        convert.fill_contacts(message, contacts, layout)
+        layout = Layout.of((MESH,), (Topology(0, self.n_vertices, self._faces),))
+        contact_messages.fill_contacts(message, contacts, layout)
         return message
 
     @property
@@ -110,7 +111,7 @@ class Link:
         """Wait for node and echo, give both what they need, and send the frame that the first step begins with."""
         publishers = (self._topology, self._templates, self.node.publisher, self.echo.publisher)
         self.spin_until(lambda: all(p.get_subscription_count() for p in publishers), "node and echo", alive)
-        self._topology.publish(convert.topology_message(self._faces, self.n_vertices))
+        self._topology.publish(mesh_messages.topology_message(self._faces, self.n_vertices))
         for answer in self.answers:
             self._templates.publish(answer)
         deadline = time.monotonic() + PATIENCE
@@ -129,7 +130,7 @@ class Link:
         lane.position[lane.step] = at = lane.step // self.hold % 2
         message = self._frames[at]
         message.step = lane.step
-        message.header.stamp = convert.ns_to_stamp(lane.step)
+        message.header.stamp = fields.ns_to_stamp(lane.step)
         lane.sent[lane.step] = time.monotonic()
         lane.publisher.publish(message)
         return lane.step

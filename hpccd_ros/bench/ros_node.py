@@ -13,8 +13,8 @@ import sys
 import time
 from pathlib import Path
 
-from hpccd_ros import node
-from hpccd_ros.detection import Detection
+from hpccd_ros.detect.detection import Detection
+from hpccd_ros.node import node
 
 VARIABLE = "HPCCD_BENCH_TIMES"
 

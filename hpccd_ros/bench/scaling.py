@@ -14,7 +14,7 @@ step by as many detectors of one thread each, all at once, which share nothing.
 
 from __future__ import annotations
 
-from hpccd_ros.errors import UserError
+from hpccd_ros.base.errors import UserError
 
 from . import common, measure, scaling_figure, table
 from .independent import METHOD as INDEPENDENT

@@ -13,7 +13,7 @@ from __future__ import annotations
 import dataclasses
 
 from hpccd_ros import scenes
-from hpccd_ros.errors import UserError
+from hpccd_ros.base.errors import UserError
 
 from . import common, measure, size_figure, table
 from .machine import cores

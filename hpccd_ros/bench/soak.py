@@ -28,8 +28,8 @@ from pathlib import Path
 
 import numpy as np
 
-from hpccd_ros.drops import Reason
-from hpccd_ros.errors import UserError
+from hpccd_ros.base.errors import UserError
+from hpccd_ros.frames.drops import Reason
 
 from . import common, table
 from .results import Report
@@ -85,12 +85,13 @@ class _Soak:
         from rclpy.executors import SingleThreadedExecutor
         from rclpy.signals import SignalHandlerOptions
 
-        from hpccd_ros import _env, scenes
+        from hpccd_ros import scenes
         from hpccd_ros.demo.children import Children
+        from hpccd_ros.middleware import environment
 
         from . import node_child, soak_load
 
-        _env.prepare()
+        environment.prepare()
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
         node = rclpy.create_node("load", namespace=NAMESPACE, start_parameter_services=False)
         executor = SingleThreadedExecutor()

@@ -14,7 +14,9 @@ from rclpy.duration import Duration
 from rclpy.node import Node
 
 import hpccd_core as hc
-from hpccd_ros import convert, qos, scenes
+from hpccd_ros import scenes
+from hpccd_ros.detect.layout import Layout
+from hpccd_ros.middleware import contact_messages, fields, mesh_messages, qos
 from hpccd_ros.scenes.messages import Player, topology_topic, vertices_topic
 
 from . import soak_strip
@@ -108,14 +110,14 @@ class SoakLoad:
             self.mischief.one(frame[0], faces, version, stamp)
         if self._count % UNKNOWN_EVERY == 0:
             self.misspelt_sent += 1
-            self._misspelt.publish(convert.vertices_message(frame[0][:9], stamp))
+            self._misspelt.publish(mesh_messages.vertices_message(frame[0][:9], stamp))
         if self._count % REQUEST_EVERY == 0:
             self._request(right=self._count % (3 * REQUEST_EVERY) != 0)
 
     def fill_segment(self) -> None:
         """Send, to a node that is held up, as much as the shared memory of this process holds: the pages that a reader
         has ever seen count as its own, and how many these are is else a matter of how long it is once held up."""
-        large = convert.vertices_message(np.zeros((MOST_VERTICES, 3), np.float32), 1)
+        large = mesh_messages.vertices_message(np.zeros((MOST_VERTICES, 3), np.float32), 1)
         for _ in range(SEGMENT // (12 * MOST_VERTICES) + 1):
             self.misspelt_sent += 1
             self._misspelt.publish(large)
@@ -149,9 +151,9 @@ class SoakLoad:
         start, end = (self._strip.frame(i)[0] for i in (k, k + 1))
         request = Detect.Request(
             mesh_names=["strip"],
-            topologies=[convert.topology_message(faces, len(start))],
-            start=[convert.vertices_message(start, 1)],
-            end=[convert.vertices_message(end if right else end[:-1], 2)],
+            topologies=[mesh_messages.topology_message(faces, len(start))],
+            start=[mesh_messages.vertices_message(start, 1)],
+            end=[mesh_messages.vertices_message(end if right else end[:-1], 2)],
         )
         self.requests += 1
         self._replies.append((self._client.call_async(request), k, right))
@@ -181,7 +183,7 @@ class SoakLoad:
         self.truncated += message.truncated
         if self.answers % self._check_every:
             return
-        start, end = (self._frames.get(convert.stamp_to_ns(s)) for s in (message.start, message.header.stamp))
+        start, end = (self._frames.get(fields.stamp_to_ns(s)) for s in (message.start, message.header.stamp))
         if start is None or end is None:
             self.wrong.append(f"an answer for step {message.step} names a time that was not sent, or long ago")
             return
@@ -212,10 +214,10 @@ class SoakLoad:
     def _differences(message: ContactArray, expected, meshes, faces, vertices) -> str:
         """What an answer has otherwise than the core."""
         offsets = [np.cumsum([0, *(len(rows) for rows in part)]) for part in (vertices, faces)]
-        layout = convert.Layout(tuple(mesh.name for mesh in meshes), *offsets)
+        layout = Layout(tuple(mesh.name for mesh in meshes), *offsets)
         if message.truncated:
             return "cut off, so not compared"
-        found = convert.read_contacts(message, layout)
+        found = contact_messages.read_contacts(message, layout)
         said = []
         for kind in ("ee", "vf"):
             here, there = getattr(found, kind), getattr(expected, kind)

@@ -10,8 +10,8 @@ from collections.abc import Callable
 import numpy as np
 from hpccd.msg import MeshTopology, MeshVertices
 
-from hpccd_ros import convert
-from hpccd_ros.drops import Reason
+from hpccd_ros.frames.drops import Reason
+from hpccd_ros.middleware import fields, mesh_messages
 
 MOST_VERTICES = 20_000  # parameter max_vertices of the node that is soaked
 EARLIER = 10_000_000_000  # ns
@@ -41,9 +41,9 @@ class Mischief:
 
     def _malformed(self, xyz, faces, version, stamp) -> None:
         message = MeshVertices(topology_version=version)
-        message.header.stamp = convert.ns_to_stamp(stamp + 1)
+        message.header.stamp = fields.ns_to_stamp(stamp + 1)
         if self._random.random() < 0.5:
-            message.vertices_f32 = convert.to_field(xyz.ravel()[:-1])
+            message.vertices_f32 = fields.to_field(xyz.ravel()[:-1])
         self._send(Reason.MALFORMED, message)
 
     def _values(self, xyz, faces, version, stamp) -> None:
@@ -52,11 +52,11 @@ class Mischief:
             (Reason.WRONG_COUNT, xyz[:-1]),
             (Reason.TOO_LARGE, np.zeros((MOST_VERTICES + 1, 3), np.float32)),
         ))  # fmt: skip
-        self._send(reason, convert.vertices_message(wrong, stamp + 1, topology_version=version))
+        self._send(reason, mesh_messages.vertices_message(wrong, stamp + 1, topology_version=version))
 
     def _order(self, xyz, faces, version, stamp) -> None:
         reason, at = self._random.choice(((Reason.REPEATED, stamp), (Reason.BACKWARD, stamp - EARLIER)))
-        self._send(reason, convert.vertices_message(xyz, at, topology_version=version))
+        self._send(reason, mesh_messages.vertices_message(xyz, at, topology_version=version))
 
     def _cut(self, xyz, faces, version, stamp) -> None:
         whole = b"\0\1\0\0" + bytes(range(1, 60))
@@ -64,8 +64,8 @@ class Mischief:
 
     def _wrong_topology(self, xyz, faces, version, stamp) -> None:
         reason, message = self._random.choice((
-            (Reason.INDEX_RANGE, convert.topology_message(faces, int(faces.max()), version=version + 1)),
-            (Reason.TOPOLOGY_CONFLICT, convert.topology_message(faces[1:], len(xyz), version=version)),
+            (Reason.INDEX_RANGE, mesh_messages.topology_message(faces, int(faces.max()), version=version + 1)),
+            (Reason.TOPOLOGY_CONFLICT, mesh_messages.topology_message(faces[1:], len(xyz), version=version)),
             (Reason.MALFORMED, MeshTopology(version=version + 1, n_vertices=len(xyz), faces=[0, 1])),
         ))  # fmt: skip
         self.refused[reason] += 1

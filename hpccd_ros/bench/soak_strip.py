@@ -18,7 +18,8 @@ import rclpy
 from hpccd.msg import MeshTopology, MeshVertices
 from rclpy.signals import SignalHandlerOptions
 
-from hpccd_ros import _env, qos, scenes, stop_signals
+from hpccd_ros import scenes
+from hpccd_ros.middleware import environment, qos, stop_signals
 from hpccd_ros.scenes import cdr
 
 MESH = "strip"
@@ -44,7 +45,7 @@ def stamp_of(tick: int, rate: float) -> int:
 def main(namespace: str, rate: float, counter: Path) -> int:
     stop = threading.Event()
     stop_signals.watch(stop.set)
-    _env.prepare()
+    environment.prepare()
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     node = rclpy.create_node("strip", namespace=namespace, start_parameter_services=False)
     topology = node.create_publisher(MeshTopology, f"meshes/{MESH}/topology", qos.TOPOLOGY)

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hpccd_ros.errors import UserError
+from hpccd_ros.base.errors import UserError
 
 from .steps import MeshPart, Source, Step
 
@@ -121,12 +121,12 @@ def of_npz(path: Path) -> Source:
 
 def of_recording(path: Path) -> Source:
     """The steps from each recorded frame of all meshes to the next, read as `hpccd replay` reads them."""
-    from hpccd_ros import replay_setup
-    from hpccd_ros.mcap_reader import Recording
-    from hpccd_ros.replay_frames import FrameSource
+    from hpccd_ros.bag.reader import Recording
+    from hpccd_ros.replay import recorded_setup
+    from hpccd_ros.replay.frames import FrameSource
 
     with Recording(path) as recording:
-        setup = replay_setup.of_recording(recording)
+        setup = recorded_setup.of_recording(recording)
         source = FrameSource(setup, recording.topics)
         frames = [f for message in recording.messages(source.topics) for f in source.take(message)]
     if len(frames) < 2:

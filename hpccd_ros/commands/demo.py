@@ -12,7 +12,7 @@ Leaves DIR/demo.mcap and DIR/demo.png (a run replaces those of the run before), 
 Uses a DDS domain of its own unless ROS_DOMAIN_ID is set. Ctrl-C ends all processes.
 """
 
-from hpccd_ros.errors import UserError
+from hpccd_ros.base.errors import UserError
 
 
 def configure(parser):

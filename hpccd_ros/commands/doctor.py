@@ -11,7 +11,7 @@ that it had flushed, by default all but the last half second, is whole: --recove
 Exit status: 0 sound (or recovered), 1 damaged, 2 unusable: no recording, nothing to save, no file (a pipe, a device).
 """
 
-from hpccd_ros.errors import UserError
+from hpccd_ros.base.errors import UserError
 
 
 def configure(parser):
@@ -24,6 +24,6 @@ def configure(parser):
 def run(args) -> int:
     if args.compression and not args.recover:
         raise UserError("--compression belongs to --recover")
-    from hpccd_ros import doctor
+    from hpccd_ros.replay import doctor
 
     return doctor.main(args)

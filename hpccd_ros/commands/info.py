@@ -11,6 +11,6 @@ def configure(parser):
 
 
 def run(args) -> int:
-    from hpccd_ros import installation
+    from hpccd_ros.commands import installation
 
     return installation.main(args)

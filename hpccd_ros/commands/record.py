@@ -17,8 +17,8 @@ A node whose topics are remapped: give the same remappings here, after --ros-arg
 
 import math
 
-from hpccd_ros.errors import UserError
-from hpccd_ros.parameter_table import LEAST_SPLIT_SIZE, LEAST_SPLIT_TIME, MOST_SPLIT
+from hpccd_ros.base.errors import UserError
+from hpccd_ros.params.table import LEAST_SPLIT_SIZE, LEAST_SPLIT_TIME, MOST_SPLIT
 
 
 def configure(parser):
@@ -55,6 +55,6 @@ def run(args) -> int:
             raise UserError(f"--{name.replace('_', '-')} {getattr(args, name)}: must be at most {MOST_SPLIT:g}")
     if args.depth < 1:
         raise UserError(f"--depth {args.depth}: must be at least 1")
-    from hpccd_ros import recorder
+    from hpccd_ros.record import recorder
 
     return recorder.main(args)

@@ -19,7 +19,7 @@ only, from each frame to the next. Many at once need the extra "cluster" (Dask).
 
 import math
 
-from hpccd_ros.errors import UserError
+from hpccd_ros.base.errors import UserError
 
 
 def configure(parser):
@@ -67,14 +67,14 @@ def run(args) -> int:
         for name, given in (("publish", args.publish), ("step", args.step), ("rate", args.rate is not None)):
             if given:
                 raise UserError(f"--{name} is for one recording; {len(args.files)} are given")
-        from hpccd_ros import replay_many
+        from hpccd_ros.replay import many_recordings
 
-        return replay_many.main(args)
+        return many_recordings.main(args)
     args.file = args.files[0]
     if args.publish:
-        from hpccd_ros import playback
+        from hpccd_ros.replay import playback
 
         return playback.main(args)
-    from hpccd_ros import replay_report
+    from hpccd_ros.replay import report
 
-    return replay_report.main(args)
+    return report.main(args)

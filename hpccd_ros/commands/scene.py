@@ -15,7 +15,7 @@ Scenes are the same on every run for the same name, size, frames and seed. Those
 seconds the first time; it is then kept in the cache folder ($XDG_CACHE_HOME or ~/.cache, hpccd/scenes).
 """
 
-from hpccd_ros.errors import UserError
+from hpccd_ros.base.errors import UserError
 
 
 def configure(parser):
@@ -126,11 +126,11 @@ def _write(scene, args):
         files.write_parameters(scene, args.params)
         print(f"wrote {args.params}")
     if args.png:
-        from hpccd_ros.scenes import picture
+        from hpccd_ros.picture import of_scene
 
         frames = _frames(scene, args.at)
         try:
-            picture.save(scene, frames, args.png)
+            of_scene.save(scene, frames, args.png)
         except ValueError as error:  # a suffix that matplotlib cannot write
             raise UserError(f"--png {args.png}: {error}") from error
         print(f"wrote {args.png}")

@@ -13,7 +13,7 @@ Pictures need no display and no graphics driver. Rerun comes with the extra "rer
 
 import math
 
-from hpccd_ros.errors import UserError
+from hpccd_ros.base.errors import UserError
 
 
 def configure(parser):

@@ -9,7 +9,7 @@ import sys
 import time
 from pathlib import Path
 
-from hpccd_ros.errors import UserError
+from hpccd_ros.base.errors import UserError
 
 PR_SET_PDEATHSIG = 1  # linux/prctl.h
 

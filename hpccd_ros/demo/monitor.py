@@ -11,7 +11,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.qos import QoSProfile
 from rclpy.signals import SignalHandlerOptions
 
-from hpccd_ros import _env, stop_signals
+from hpccd_ros.middleware import environment, stop_signals
 
 
 class Monitor:
@@ -23,7 +23,7 @@ class Monitor:
     """
 
     def __init__(self):
-        _env.prepare()
+        environment.prepare()
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
         self._node = rclpy.create_node("hpccd_demo", start_parameter_services=False)
         self._contacts = self._node.create_subscription(

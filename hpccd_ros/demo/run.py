@@ -11,12 +11,13 @@ from pathlib import Path
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
-from hpccd_ros import replay_setup, scenes
+from hpccd_ros import scenes
+from hpccd_ros.bag.reader import Recording
+from hpccd_ros.bag.recover import examine
+from hpccd_ros.base.errors import UserError
 from hpccd_ros.demo.children import Children
-from hpccd_ros.errors import UserError
-from hpccd_ros.mcap_reader import Recording
-from hpccd_ros.mcap_recover import examine
-from hpccd_ros.replay import Replay
+from hpccd_ros.replay import recorded_setup
+from hpccd_ros.replay.recomputed import Replay
 from hpccd_ros.scenes import files
 
 # What a run leaves behind, and the next one replaces.
@@ -160,7 +161,7 @@ def _verify_and_draw(args, scene, folder, console):
 
     history, worst = History(), None
     with Recording(folder / RECORDING) as recording:
-        replay = Replay(recording, replay_setup.of_recording(recording), threads=args.threads, outputs=("points",))
+        replay = Replay(recording, recorded_setup.of_recording(recording), threads=args.threads, outputs=("points",))
         for step in replay.steps():
             if step.contacts is None:
                 continue

@@ -4,7 +4,7 @@
 import numpy as np
 
 from hpccd_ros.picture import contacts as picture
-from hpccd_ros.replay import Step
+from hpccd_ros.replay.recomputed import Step
 
 
 class History:

@@ -3,11 +3,11 @@
 
 import numpy as np
 
-from hpccd_ros import extras
+from hpccd_ros.base import extras
 from hpccd_ros.picture.contacts import TOC_COLOURS, srgb, vertex_colours
 from hpccd_ros.picture.of_recording import meshes_in_the_middle, scene_faces, touched
 from hpccd_ros.picture.shading import vertex_normals
-from hpccd_ros.replay import Step
+from hpccd_ros.replay.recomputed import Step
 
 # Parts of the largest extent of the first step's scene.
 POINT_RADIUS, NORMAL_LENGTH, EYE_DISTANCE = 0.003, 0.03, 1.0

@@ -5,12 +5,12 @@ import contextlib
 import os
 from pathlib import Path
 
-from hpccd_ros import replay_setup
-from hpccd_ros.errors import UserError
-from hpccd_ros.mcap_reader import Recording
+from hpccd_ros.bag.reader import Recording
+from hpccd_ros.base.errors import UserError
 from hpccd_ros.picture.of_recording import History, draw_step
 from hpccd_ros.picture.rerun_recording import RerunWriter, need_rerun
-from hpccd_ros.replay import Replay
+from hpccd_ros.replay import recorded_setup
+from hpccd_ros.replay.recomputed import Replay
 
 
 def main(args) -> int:
@@ -23,7 +23,7 @@ def main(args) -> int:
         need_rerun()  # before anything is computed
     outputs = ("points", "normals") if in_rerun else ("points",)
     with Recording(source) as recording:
-        setup = replay_setup.of_recording(recording, args.params)
+        setup = recorded_setup.of_recording(recording, args.params)
         steps = (s for s in Replay(recording, setup, outputs=outputs).steps() if s.contacts is not None)
         if in_rerun:
             _show_in_rerun(args, steps, source, title, view)

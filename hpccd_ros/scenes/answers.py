@@ -11,7 +11,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
-from hpccd_ros.convert import stamp_to_ns
+from hpccd_ros.middleware.fields import stamp_to_ns
 
 
 class Answers:

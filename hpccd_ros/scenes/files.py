@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import yaml
 
-from hpccd_ros.mcap_bag import BagWriter, Topic
-from hpccd_ros.mcap_qos import INFINITE
-from hpccd_ros.version import package_version
+from hpccd_ros.bag.qos_yaml import INFINITE
+from hpccd_ros.bag.writer import BagWriter, Topic
+from hpccd_ros.base.version import package_version
 
 from . import messages
 from .progress import track

@@ -13,8 +13,8 @@ from hpccd.msg import MeshTopology, MeshVertices
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 
-from hpccd_ros import _env
-from hpccd_ros.listeners import await_acknowledged, await_subscribers
+from hpccd_ros.middleware import environment
+from hpccd_ros.middleware.listeners import await_acknowledged, await_subscribers
 
 from .answers import Answers
 from .messages import Player, topology_topic, vertices_topic
@@ -56,7 +56,7 @@ def publish(
     previous = {
         s: signal.signal(s, lambda number, _: stop.append(number)) for s in (signal.SIGINT, signal.SIGTERM)
     }
-    _env.prepare()
+    environment.prepare()
     rclpy.init(
         args=["--ros-args", *ros_args] if ros_args else None, signal_handler_options=SignalHandlerOptions.NO
     )

@@ -10,7 +10,7 @@ import pytest
 
 PEER = """
 import sys, time
-from hpccd_ros._env import prepare
+from hpccd_ros.middleware.environment import prepare
 prepare()
 import rclpy
 from std_msgs.msg import String

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""hpccd_ros._env: the tuned DDS profile is chosen, takes effect, and gives way to what the user has set."""
+"""hpccd_ros.middleware.environment: the tuned DDS profile takes effect, and gives way to what the user has set."""
 
 import os
 import subprocess
@@ -17,7 +17,7 @@ DISCOVERY_CHOICES = (RANGE, "ROS_STATIC_PEERS", "ROS_LOCALHOST_ONLY")
 
 PRINT_CHOICE = f"""
 import os
-from hpccd_ros._env import prepare
+from hpccd_ros.middleware.environment import prepare
 prepare()
 prepare()
 print(os.environ.get("{CHOSEN}", "none"), os.environ.get("{RANGE}", "none"))
@@ -25,7 +25,7 @@ print(os.environ.get("{CHOSEN}", "none"), os.environ.get("{RANGE}", "none"))
 
 # Fast DDS maps its shared-memory segment into the process; its size tells which profile is in force.
 PRINT_LARGEST_SEGMENT = """
-from hpccd_ros._env import prepare
+from hpccd_ros.middleware.environment import prepare
 prepare()
 import rclpy
 rclpy.init()

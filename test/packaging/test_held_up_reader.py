@@ -12,15 +12,15 @@ from rclpy.duration import Duration
 from rclpy.qos import QoSProfile
 from std_msgs.msg import UInt32
 
-from hpccd_ros import _env
+from hpccd_ros.middleware import environment
 
 PATIENCE = 240.0
 HELD_UP = 2.0  # s; with the default of Fast DDS, 1 s and another process that joins lose all but the writer's history
 LAST = 2**32 - 1
 
 READER = """
-from hpccd_ros import _env
-_env.prepare()
+from hpccd_ros.middleware import environment
+environment.prepare()
 import rclpy
 from rclpy.qos import QoSProfile
 from std_msgs.msg import UInt32
@@ -50,7 +50,7 @@ def unused_domain():
 
 def test_nothing_is_lost(monkeypatch):
     monkeypatch.setenv("ROS_DOMAIN_ID", str(unused_domain()))
-    _env.prepare()
+    environment.prepare()
     context = rclpy.Context()
     rclpy.init(context=context)
     node = rclpy.create_node("writer", context=context)

@@ -7,10 +7,10 @@ from pathlib import Path
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from hpccd_ros import mcap_schema
-from hpccd_ros.mcap_bag import BagWriter, Topic
-from hpccd_ros.mcap_decode import completion
-from hpccd_ros.mcap_reader import Recording
+from hpccd_ros.bag import message_definitions
+from hpccd_ros.bag.decode import completion
+from hpccd_ros.bag.reader import Recording
+from hpccd_ros.bag.writer import BagWriter, Topic
 
 STRING = "std_msgs/msg/String"
 
@@ -19,7 +19,7 @@ def typestore():
     """rosbags' own knowledge of the messages of this package, from the text of the .msg files."""
     store = get_typestore(Stores.ROS2_JAZZY)
     for name in ("MeshTopology", "MeshVertices", "ContactArray"):
-        text = mcap_schema.definition_text(f"hpccd/msg/{name}").split(mcap_schema.SEPARATOR)[0]
+        text = message_definitions.definition_text(f"hpccd/msg/{name}").split(message_definitions.SEPARATOR)[0]
         store.register(get_types_from_msg(text, f"hpccd/msg/{name}"))
     return store
 

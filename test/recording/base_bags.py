@@ -6,10 +6,11 @@ from bag_tools import typestore
 from mcap_model import Bag
 from sources import ROOT
 
-from hpccd_ros import convert, replay_setup
-from hpccd_ros.mcap_bag import BagWriter, Topic
-from hpccd_ros.mcap_reader import Recording
-from hpccd_ros.replay import Replay
+from hpccd_ros.bag.reader import Recording
+from hpccd_ros.bag.writer import BagWriter, Topic
+from hpccd_ros.middleware import contact_messages
+from hpccd_ros.replay import recorded_setup
+from hpccd_ros.replay.recomputed import Replay
 
 SECOND = 1_000_000_000
 FIRST, FRAMES = 55, 8  # of the recording of the repository: its contacts are of both kinds
@@ -136,10 +137,10 @@ def _answers(path):
     store = typestore()
     make = Maker(store)
     with Recording(path) as recording:
-        setup = replay_setup.of_recording(recording)
+        setup = recorded_setup.of_recording(recording)
         for step in Replay(recording, setup, outputs=("points", "normals"), backend="cpu").steps():
             message = ContactArray(step=step.step, accuracy="exact", backend="cpu")
-            convert.fill_contacts(message, step.contacts, step.layout)
+            contact_messages.fill_contacts(message, step.contacts, step.layout)
             plain = {
                 name: np.array(value) if kind.startswith("sequence<") and "string" not in kind else value
                 for name, kind in message.get_fields_and_field_types().items()

@@ -24,7 +24,7 @@ def junk(rng):
 
 
 def rows():
-    from hpccd_ros.parameter_table import MESH_ROWS, NODE_ROWS
+    from hpccd_ros.params.table import MESH_ROWS, NODE_ROWS
 
     return NODE_ROWS, MESH_ROWS
 

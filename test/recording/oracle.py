@@ -16,9 +16,9 @@ from mcap_model import Bag
 from rosbags.serde import SerdeError
 
 import hpccd_core as hc
-from hpccd_ros.mesh_file import load_mesh, place
-from hpccd_ros.rigid import Rigid
-from hpccd_ros.transforms import NoTransformError, TransformBuffer
+from hpccd_ros.frames.mesh_file import load_mesh, place
+from hpccd_ros.frames.rigid import Rigid
+from hpccd_ros.frames.transform_buffer import NoTransformError, TransformBuffer
 
 NOT_THERE = "its positions are not there"
 FIELDS = ("kind", "mesh_a", "mesh_b", "features_a", "features_b", "toc")
@@ -200,7 +200,7 @@ def _decode(store, data, type_name):
         # rosbags takes no byte behind the message, and no text that is no UTF-8; ROS does.
         from rclpy.serialization import deserialize_message
 
-        from hpccd_ros.mcap_decode import message_class
+        from hpccd_ros.middleware.message_types import message_class
 
         return _with_arrays(deserialize_message(data, message_class(type_name)))
 

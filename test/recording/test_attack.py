@@ -10,7 +10,7 @@ import attack
 import hostile
 import pytest
 
-from hpccd_ros import replay_many
+from hpccd_ros.replay import many_recordings
 
 MANY = int(os.environ.get("HPCCD_ATTACK", "0"))
 
@@ -45,5 +45,5 @@ def test_one_of_many_recordings_is_unusable_not_failed(sound_bags, tmp_path):
     for number, name in enumerate(attack.cases(0, 60, seed=7)):
         path = tmp_path / f"{number}.mcap"
         path.write_bytes(attack.make_case(name, sound_bags))
-        row = replay_many.replay_one(str(path), backend="cpu")
+        row = many_recordings.replay_one(str(path), backend="cpu")
         assert row["result"] in ("VERIFIED", "DIVERGED", "NOT VERIFIED", "COMPUTED", "NOTHING", "UNUSABLE"), name

@@ -8,9 +8,9 @@ import pytest
 from bag_tools import STRING, text_message, write_texts
 from mcap.writer import Writer
 
-from hpccd_ros.mcap_bag import BagWriter, Topic
-from hpccd_ros.mcap_decode import make_decoder
-from hpccd_ros.mcap_reader import Recording, RecordingError
+from hpccd_ros.bag.decode import make_decoder
+from hpccd_ros.bag.reader import Recording, RecordingError
+from hpccd_ros.bag.writer import BagWriter, Topic
 
 
 @pytest.fixture

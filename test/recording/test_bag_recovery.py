@@ -8,9 +8,9 @@ from bag_tools import STRING, read_by_rosbags, text_message, write_texts
 from mcap.reader import make_reader
 from mcap.writer import MCAP0_MAGIC
 
-from hpccd_ros.mcap_bag import BagWriter, Topic
-from hpccd_ros.mcap_reader import Recording, RecordingError
-from hpccd_ros.mcap_recover import examine, recover
+from hpccd_ros.bag.reader import Recording, RecordingError
+from hpccd_ros.bag.recover import examine, recover
+from hpccd_ros.bag.writer import BagWriter, Topic
 
 STEP = 1_000_000  # ns between messages
 TEXTS = [f"{k:05}" + "y" * 300 for k in range(300)]

@@ -9,9 +9,9 @@ from bag_tools import STRING, read_by_mcap_ros2, read_by_rosbags, text_message, 
 from mcap.reader import make_reader
 from rosbags.rosbag2 import Reader
 
-from hpccd_ros import mcap_qos, mcap_schema
-from hpccd_ros.mcap_bag import BagWriter, Topic
-from hpccd_ros.mcap_reader import Recording
+from hpccd_ros.bag import message_definitions, qos_yaml
+from hpccd_ros.bag.reader import Recording
+from hpccd_ros.bag.writer import BagWriter, Topic
 
 TEXTS = [f"{k:05}" + "x" * 400 for k in range(500)]
 
@@ -82,8 +82,8 @@ def test_metadata_for_rosbag2(tmp_path):
     path = tmp_path / "bag.mcap"
     writer = BagWriter(path)
     qos = [{"history": "keep_last", "depth": 3, "reliability": "reliable", "durability": "transient_local",
-            "deadline": mcap_qos.INFINITE, "lifespan": mcap_qos.INFINITE, "liveliness": "automatic",
-            "liveliness_lease_duration": mcap_qos.INFINITE, "avoid_ros_namespace_conventions": False}]  # fmt: skip
+            "deadline": qos_yaml.INFINITE, "lifespan": qos_yaml.INFINITE, "liveliness": "automatic",
+            "liveliness_lease_duration": qos_yaml.INFINITE, "avoid_ros_namespace_conventions": False}]  # fmt: skip
     writer.add_topic(Topic("/contacts", "hpccd/msg/ContactArray", qos))
     writer.close()
     with open(path, "rb") as stream:
@@ -102,8 +102,8 @@ def test_metadata_for_rosbag2(tmp_path):
 
 
 def test_definitions_hold_every_nested_type():
-    text = mcap_schema.definition_text("hpccd/msg/ContactArray")
-    assert text.count(mcap_schema.SEPARATOR) == 2
+    text = message_definitions.definition_text("hpccd/msg/ContactArray")
+    assert text.count(message_definitions.SEPARATOR) == 2
     assert "MSG: std_msgs/Header\n" in text and "MSG: builtin_interfaces/Time\n" in text
 
 

@@ -9,8 +9,8 @@ import pytest
 import yaml
 from bag_tools import STRING, read_by_rosbags, text_message
 
-from hpccd_ros.mcap_bag import BagWriter, Topic
-from hpccd_ros.mcap_recover import examine, recover
+from hpccd_ros.bag.recover import examine, recover
+from hpccd_ros.bag.writer import BagWriter, Topic
 
 TEXT = random.Random(6).randbytes(500).hex()  # compresses by half at most
 

@@ -18,9 +18,9 @@ from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Chunk, ChunkIndex, Statistics
 from mcap_model import Bag, as_bytes, raw_record
 
-from hpccd_ros.mcap_reader import Recording, RecordingError
-from hpccd_ros.mcap_records import MOST_RECORDS, inside
-from hpccd_ros.mcap_recover import examine, recover
+from hpccd_ros.bag.mcap_records import MOST_RECORDS, inside
+from hpccd_ros.bag.reader import Recording, RecordingError
+from hpccd_ros.bag.recover import examine, recover
 
 
 @pytest.fixture
@@ -271,7 +271,7 @@ def test_a_recovery_that_fails_leaves_no_file(bag, tmp_path):
 
 
 def test_messages_far_out_of_order_do_not_fill_the_memory(bag, tmp_path, monkeypatch):
-    monkeypatch.setattr("hpccd_ros.mcap_file.MOST_WAITING", 50_000)
+    monkeypatch.setattr("hpccd_ros.bag.mcap_file.MOST_WAITING", 50_000)
     times = [message.log_time for message in bag.messages]
     for number, message in enumerate(bag.messages):
         message.log_time = min(times) if number % 4 == 0 else max(times)

@@ -14,10 +14,10 @@ import pytest
 from bag_tools import read_by_mcap_ros2, read_by_rosbags
 from live import Live
 
-from hpccd_ros import replay_setup
-from hpccd_ros.mcap_reader import Recording
-from hpccd_ros.mcap_recover import examine, recover
-from hpccd_ros.replay import Replay
+from hpccd_ros.bag.reader import Recording
+from hpccd_ros.bag.recover import examine, recover
+from hpccd_ros.replay import recorded_setup
+from hpccd_ros.replay.recomputed import Replay
 
 KILLS = int(os.environ.get("HPCCD_KILLS", "8"))
 FLUSH = 0.2  # s
@@ -56,7 +56,7 @@ def test_killed_at_random_moments(children, namespace, tmp_path, compression):
                 sequences[message.topic].append(message.sequence)
             gaps = {topic: [(a, b) for a, b in pairwise(n) if b != a + 1] for topic, n in sequences.items()}
             assert not any(gaps.values()), gaps
-            replay = Replay(recording, replay_setup.of_recording(recording))
+            replay = Replay(recording, recorded_setup.of_recording(recording))
             list(replay.steps())
         assert replay.diverged == 0 and replay.verified > 0
         # Bound: the open chunk, closed every FLUSH seconds. On a machine left alone the rest is 0.1 s; a busy one may

@@ -12,10 +12,12 @@ from live import PATIENCE, Live
 from rclpy.executors import SingleThreadedExecutor
 from rosbags.rosbag2 import Reader
 
-from hpccd_ros import _env, replay_setup, scenes
-from hpccd_ros.mcap_decode import message_class
-from hpccd_ros.mcap_reader import Recording
-from hpccd_ros.replay import Replay
+from hpccd_ros import scenes
+from hpccd_ros.bag.reader import Recording
+from hpccd_ros.middleware import environment
+from hpccd_ros.middleware.message_types import message_class
+from hpccd_ros.replay import recorded_setup
+from hpccd_ros.replay.recomputed import Replay
 
 FRAMES = 30
 OUTPUTS = 'outputs:=["points", "normals"]'
@@ -39,7 +41,7 @@ def _record(live, path, *options, stop=signal.SIGINT, node_options=()):
 
 def _verified(path):
     with Recording(path) as recording:
-        replay = Replay(recording, replay_setup.of_recording(recording))
+        replay = Replay(recording, recorded_setup.of_recording(recording))
         steps = list(replay.steps())
     assert replay.diverged == replay.unverified == 0
     return steps
@@ -103,7 +105,7 @@ def test_split_and_compressed(live, tmp_path):
 
 def _verified_file(file):
     with Recording(file) as recording:
-        replay = Replay(recording, replay_setup.of_recording(recording))
+        replay = Replay(recording, recorded_setup.of_recording(recording))
         steps = list(replay.steps())
     assert replay.diverged == 0
     return steps
@@ -180,7 +182,7 @@ def test_answers_are_played_as_those_of_today(children, small_bag):
         begin = next(recording.messages()).log_time
         expected = sum(message.log_time <= begin + 500_000_000 for message in recording.messages(["/contacts"]))
     received = []
-    _env.prepare()
+    environment.prepare()
     context = rclpy.Context()
     rclpy.init(context=context)
     node = rclpy.create_node("listener", context=context)

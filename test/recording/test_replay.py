@@ -10,18 +10,18 @@ import numpy as np
 import pytest
 from bag_tools import as_installed, rewrite, typestore
 
-from hpccd_ros import replay_setup
-from hpccd_ros.mcap_bag import BagWriter, Topic
-from hpccd_ros.mcap_decode import completion, make_decoder
-from hpccd_ros.mcap_reader import Recording, RecordingError
-from hpccd_ros.replay import Replay
+from hpccd_ros.bag.decode import completion, make_decoder
+from hpccd_ros.bag.reader import Recording, RecordingError
+from hpccd_ros.bag.writer import BagWriter, Topic
+from hpccd_ros.replay import recorded_setup
+from hpccd_ros.replay.recomputed import Replay
 
 ANSWER = 60  # one of the 89 answers, with contacts of both kinds
 
 
 def _replay(path, **options):
     with Recording(path) as recording:
-        replay = Replay(recording, replay_setup.of_recording(recording), **options)
+        replay = Replay(recording, recorded_setup.of_recording(recording), **options)
         return replay, list(replay.steps())
 
 
@@ -241,7 +241,7 @@ def test_recording_of_another_recorder_needs_parameters(small_bag, tmp_path, hpc
     path = tmp_path / "foreign.mcap"
     rewrite(small_bag, path, info={})
     with Recording(path) as recording, pytest.raises(RecordingError, match="--params"):
-        replay_setup.of_recording(recording)
+        recorded_setup.of_recording(recording)
     (tmp_path / "node.yaml").write_text(
         "/**:\n  ros__parameters:\n    meshes: [cloth, ball]\n    mesh: {ball: {self_collision: false}}\n"
     )

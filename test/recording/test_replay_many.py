@@ -12,8 +12,8 @@ import pytest
 from bag_tools import rewrite
 from live import PATIENCE
 
-from hpccd_ros import replay_many
-from hpccd_ros.errors import UserError
+from hpccd_ros.base.errors import UserError
+from hpccd_ros.replay import many_recordings
 
 pytest.importorskip("distributed", reason="Dask is not installed: make venv EXTRAS='test cluster'")
 
@@ -87,4 +87,4 @@ def test_options_for_one_recording_only(hpccd, small_bag):
 def test_missing_dask_names_the_extra(monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)  # as if it were not installed
     with pytest.raises(UserError, match="needs the Python package distributed .* extra 'cluster'"):
-        replay_many.main(types.SimpleNamespace())
+        many_recordings.main(types.SimpleNamespace())

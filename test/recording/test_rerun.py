@@ -6,11 +6,11 @@ import sys
 import numpy as np
 import pytest
 
-from hpccd_ros import replay_setup
-from hpccd_ros.errors import UserError
-from hpccd_ros.mcap_reader import Recording
+from hpccd_ros.bag.reader import Recording
+from hpccd_ros.base.errors import UserError
 from hpccd_ros.picture.rerun_recording import need_rerun
-from hpccd_ros.replay import Replay
+from hpccd_ros.replay import recorded_setup
+from hpccd_ros.replay.recomputed import Replay
 
 
 def test_missing_rerun_names_the_extra(monkeypatch):
@@ -46,7 +46,7 @@ def test_what_rerun_reads_is_what_was_found(hpccd, small_bag, tmp_path):
     assert "run.rrd: 23 steps" in done.stdout
     entities = _batches(tmp_path / "run.rrd")
     with Recording(small_bag) as recording:
-        replay = Replay(recording, replay_setup.of_recording(recording), outputs=("points", "normals"))
+        replay = Replay(recording, recorded_setup.of_recording(recording), outputs=("points", "normals"))
         steps = {step.step: step for number, step in enumerate(replay.steps()) if number % 4 == 0}
     cloth = _by_step(entities["/meshes/cloth"], "Mesh3D:vertex_positions")
     triangles = _by_step(entities["/meshes/cloth"], "Mesh3D:triangle_indices")

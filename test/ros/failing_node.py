@@ -6,8 +6,8 @@ import sys
 from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 
-from hpccd_ros import node
-from hpccd_ros.detection import Detection
+from hpccd_ros.detect.detection import Detection
+from hpccd_ros.node import node
 
 
 class FailingNode(node.HpccdNode):

@@ -13,7 +13,7 @@ import tempfile
 import time
 import traceback
 
-from hpccd_ros import node
+from hpccd_ros.node import node
 
 AT_ONCE = 4
 

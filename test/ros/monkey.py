@@ -15,8 +15,8 @@ from lifecycle_msgs.srv import ChangeState
 from rcl_interfaces.msg import Parameter, ParameterValue
 from waving_sheet import sheet_faces, sheet_positions
 
-from hpccd_ros import convert
-from hpccd_ros.parameter_table import MESH_ROWS, NODE_ROWS, Row
+from hpccd_ros.middleware import mesh_messages
+from hpccd_ros.params.table import MESH_ROWS, NODE_ROWS, Row
 
 # Ends the node's life for good: asked of it last.
 SHUTDOWN = {
@@ -132,11 +132,11 @@ class Monkey:
         )
         many = len(names or self._meshes)
         if choose((True, not odd)):
-            request.topologies = [convert.topology_message(sheet_faces(n), n * n) for _ in range(many)]
+            request.topologies = [mesh_messages.topology_message(sheet_faces(n), n * n) for _ in range(many)]
         for k in range(many):
             for step, ends in ((0, request.start), (1, request.end)):
                 positions = sheet_positions(n, step + 2 * k, offset=0.003 * k, dtype=choose((np.float32, np.float64)))
-                ends.append(convert.vertices_message(positions, step))
+                ends.append(mesh_messages.vertices_message(positions, step))
         if not odd:
             return request
         if self.random.random() < 0.3:

@@ -13,29 +13,29 @@ import rclpy
 from hpccd.msg import ContactArray, MeshTopology, MeshVertices
 from waving_sheet import sheet_faces, sheet_positions
 
-from hpccd_ros import _env, convert, qos
+from hpccd_ros.middleware import environment, fields, mesh_messages, qos
 
 N = 16
 
 
 def main(namespace: str, seconds: float) -> None:
-    _env.prepare()
+    environment.prepare()
     rclpy.init()
     node = rclpy.create_node("simulation", namespace=namespace)
     topology = node.create_publisher(MeshTopology, "meshes/cloth/topology", qos.TOPOLOGY)
     vertices = node.create_publisher(MeshVertices, "meshes/cloth/vertices", qos.vertices("reliable", 10))
     answers: list[ContactArray] = []
     node.create_subscription(ContactArray, "contacts", answers.append, qos.CONTACTS)
-    topology.publish(convert.topology_message(sheet_faces(N), N * N))
+    topology.publish(mesh_messages.topology_message(sheet_faces(N), N * N))
     deadline, step, listeners = time.monotonic() + seconds, 0, 0
     while not answers and time.monotonic() < deadline:
-        vertices.publish(convert.vertices_message(sheet_positions(N, step), step + 1, step=step))
+        vertices.publish(mesh_messages.vertices_message(sheet_positions(N, step), step + 1, step=step))
         listeners = max(listeners, vertices.get_subscription_count())
         step += 1
         rclpy.spin_once(node, timeout_sec=0.1)
     answer = {key: getattr(answers[0], key) for key in ("step", "hash", "total")} if answers else None
     if answer:
-        answer["start"] = convert.stamp_to_ns(answers[0].start) - 1
+        answer["start"] = fields.stamp_to_ns(answers[0].start) - 1
     print(json.dumps({"answer": answer, "listeners": listeners}), flush=True)
     node.destroy_node()
     rclpy.shutdown()

@@ -24,7 +24,8 @@ from rclpy.qos import HistoryPolicy, QoSProfile
 
 import hpccd_core as hc
 import hpccd_ros
-from hpccd_ros import _env, convert, qos
+from hpccd_ros.detect.layout import Layout
+from hpccd_ros.middleware import contact_messages, environment, fields, mesh_messages, qos
 
 # Long enough for a machine that is ten times too busy; reached only by tests that fail.
 PATIENCE = 240.0
@@ -129,7 +130,7 @@ class Peer:
     """A node in this process, in a context of its own: publishes meshes, reads contacts and diagnostics."""
 
     def __init__(self, namespace: str):
-        _env.prepare()
+        environment.prepare()
         self.context = rclpy.Context()
         rclpy.init(context=self.context)
         self.node = Node("peer", namespace=namespace, context=self.context)
@@ -145,7 +146,7 @@ class Peer:
         self._publishers: dict[str, Any] = {}
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
-        self.reported_at = convert.stamp_to_ns(message.header.stamp)
+        self.reported_at = fields.stamp_to_ns(message.header.stamp)
         for status in message.status:
             values = {v.key: v.value for v in status.values}
             self.statuses[status.name.rpartition(": ")[2]] = (status.level, status.message, values)
@@ -171,13 +172,13 @@ class Peer:
 
     def topology(self, mesh: str, faces: np.ndarray, n_vertices: int, version: int = 0) -> None:
         publisher = self.publisher(MeshTopology, f"meshes/{mesh}/topology", qos.TOPOLOGY)
-        publisher.publish(convert.topology_message(faces, n_vertices, version=version))
+        publisher.publish(mesh_messages.topology_message(faces, n_vertices, version=version))
         # Nothing orders two topics: vertices that follow must not overtake it.
         assert publisher.wait_for_all_acked(Duration(seconds=PATIENCE))
 
     def vertices(self, mesh: str, vertices: np.ndarray, stamp: int, **fields: Any) -> None:
         publisher = self.publisher(MeshVertices, f"meshes/{mesh}/vertices")
-        publisher.publish(convert.vertices_message(vertices, stamp, **fields))
+        publisher.publish(mesh_messages.vertices_message(vertices, stamp, **fields))
 
     def client(self, depth: int = 10) -> Any:
         """A client of ~/detect that is connected. depth: requests, and answers, that it holds at once."""
@@ -198,8 +199,8 @@ def assert_same_contacts(message: ContactArray, t0: np.ndarray, t1: np.ndarray, 
     names = tuple(message.mesh_names)
     vertex_offsets = [scene.vertex_offset(name) for name in names] + [scene.n_vertices]
     face_offsets = [scene.face_offset(name) for name in names] + [scene.n_faces]
-    layout = convert.Layout(names, np.array(vertex_offsets), np.array(face_offsets))
-    got = convert.read_contacts(message, layout)
+    layout = Layout(names, np.array(vertex_offsets), np.array(face_offsets))
+    got = contact_messages.read_contacts(message, layout)
     for name in ("vf", "ee", "vf_toc", "ee_toc"):
         assert np.array_equal(getattr(got, name), getattr(expected, name)), name
     assert message.hash == expected.hash

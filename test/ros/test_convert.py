@@ -13,10 +13,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from sensor_msgs.msg import PointCloud2, PointField
 
-from hpccd_ros import convert
-from hpccd_ros.convert import InvalidMessageError, Layout
-from hpccd_ros.drops import Reason
-from hpccd_ros.messages import Topology
+from hpccd_ros.detect.layout import Layout
+from hpccd_ros.frames.drops import Reason
+from hpccd_ros.frames.types import Topology
+from hpccd_ros.middleware import contact_messages, fields, mesh_messages
+from hpccd_ros.middleware.fields import InvalidMessageError
 
 POINTS = np.arange(12, dtype=np.float32).reshape(4, 3) * 0.5
 
@@ -54,7 +55,7 @@ def refused(reason, read, *args):
 def test_stamps():
     latest = (2**31 - 1) * 10**9 + 999_999_999
     for ns in (0, 1, 999_999_999, 1_000_000_000, 1_700_000_000_123_456_789, latest):
-        assert convert.stamp_to_ns(convert.ns_to_stamp(ns)) == ns
+        assert fields.stamp_to_ns(fields.ns_to_stamp(ns)) == ns
 
 
 BAD_STAMPS = [Time(nanosec=10**9), Time(sec=2**31 - 1, nanosec=2**32 - 1), Time(sec=-1), Time(sec=-(2**31), nanosec=5)]
@@ -62,24 +63,24 @@ BAD_STAMPS = [Time(nanosec=10**9), Time(sec=2**31 - 1, nanosec=2**32 - 1), Time(
 
 @pytest.mark.parametrize("stamp", BAD_STAMPS, ids=["nanosec", "last second", "negative", "most negative"])
 def test_stamps_that_are_no_time(stamp):
-    assert str(stamp.sec) in refused(Reason.MALFORMED, convert.stamp_to_ns, stamp)
-    topology = convert.topology_message(np.array([[0, 1, 2]]), 3)
+    assert str(stamp.sec) in refused(Reason.MALFORMED, fields.stamp_to_ns, stamp)
+    topology = mesh_messages.topology_message(np.array([[0, 1, 2]]), 3)
     topology.header.stamp = stamp
-    refused(Reason.MALFORMED, convert.topology_from_message, topology, 100, 100)
+    refused(Reason.MALFORMED, mesh_messages.topology_from_message, topology, 100, 100)
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64, np.uint32, np.uint8])
 def test_array_fields(dtype):
     values = np.arange(24).astype(dtype).reshape(4, 6)
-    field = convert.to_field(values[:, ::2])
+    field = fields.to_field(values[:, ::2])
     assert np.array_equal(np.frombuffer(field, dtype), values[:, ::2].ravel())
-    assert len(convert.to_field(values[:0])) == 0
+    assert len(fields.to_field(values[:0])) == 0
 
 
 def test_topology_is_a_view():
     faces = np.array([[0, 1, 2], [2, 1, 3]])
-    message = convert.topology_message(faces, 5, version=7)
-    topology = convert.topology_from_message(message, 100, 100)
+    message = mesh_messages.topology_message(faces, 5, version=7)
+    topology = mesh_messages.topology_from_message(message, 100, 100)
     assert (topology.version, topology.n_vertices) == (7, 5)
     assert topology.faces.dtype == np.uint32 and np.array_equal(topology.faces, faces)
     assert np.shares_memory(topology.faces, np.frombuffer(message.faces, np.uint32))
@@ -89,18 +90,18 @@ def test_bad_topologies():
     def message(faces, n):
         return MeshTopology(n_vertices=n, faces=array("I", faces))
 
-    text = refused(Reason.INDEX_RANGE, convert.topology_from_message, message([0, 1, 2, 0, 2, 3], 3), 100, 100)
+    text = refused(Reason.INDEX_RANGE, mesh_messages.topology_from_message, message([0, 1, 2, 0, 2, 3], 3), 100, 100)
     assert "face 1 names vertex 3" in text
-    refused(Reason.MALFORMED, convert.topology_from_message, message([0, 1], 3), 100, 100)
-    refused(Reason.TOO_LARGE, convert.topology_from_message, message([0, 1, 2] * 3, 3), 100, 2)
-    refused(Reason.TOO_LARGE, convert.topology_from_message, message([0, 1, 2], 101), 100, 2)
+    refused(Reason.MALFORMED, mesh_messages.topology_from_message, message([0, 1], 3), 100, 100)
+    refused(Reason.TOO_LARGE, mesh_messages.topology_from_message, message([0, 1, 2] * 3, 3), 100, 2)
+    refused(Reason.TOO_LARGE, mesh_messages.topology_from_message, message([0, 1, 2], 101), 100, 2)
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 def test_vertices_are_a_view(dtype):
     points = POINTS.astype(dtype)
-    message = convert.vertices_message(points, 5, step=3)
-    vertices = convert.vertices_from_message(message, 100)
+    message = mesh_messages.vertices_message(points, 5, step=3)
+    vertices = mesh_messages.vertices_from_message(message, 100)
     assert vertices.dtype == dtype and np.array_equal(vertices, points)
     field = message.vertices_f32 if dtype == np.float32 else message.vertices_f64
     assert np.shares_memory(vertices, np.frombuffer(field, dtype))
@@ -108,21 +109,21 @@ def test_vertices_are_a_view(dtype):
 
 def test_vertices_of_another_type_are_not_sent():
     with pytest.raises(TypeError, match="use float32 or float64"):
-        convert.vertices_message(np.zeros((3, 3), np.int32), 0)
+        mesh_messages.vertices_message(np.zeros((3, 3), np.int32), 0)
 
 
 def test_bad_vertices():
-    read = convert.vertices_from_message
+    read = mesh_messages.vertices_from_message
     refused(Reason.MALFORMED, read, MeshVertices(), 100)
     both = MeshVertices(vertices_f32=array("f", [0] * 3), vertices_f64=array("d", [0] * 3))
     refused(Reason.MALFORMED, read, both, 100)
     refused(Reason.MALFORMED, read, MeshVertices(vertices_f32=array("f", [0] * 4)), 100)
-    refused(Reason.TOO_LARGE, read, convert.vertices_message(POINTS, 0), 3)
+    refused(Reason.TOO_LARGE, read, mesh_messages.vertices_message(POINTS, 0), 3)
     for bad in (math.nan, math.inf, -math.inf):
         for dtype in (np.float32, np.float64):
             points = POINTS.astype(dtype)
             points[2, 1] = bad
-            assert "vertex 2" in refused(Reason.NOT_FINITE, read, convert.vertices_message(points, 0), 100)
+            assert "vertex 2" in refused(Reason.NOT_FINITE, read, mesh_messages.vertices_message(points, 0), 100)
 
 
 F32, F64 = PointField.FLOAT32, PointField.FLOAT64
@@ -131,20 +132,20 @@ F32, F64 = PointField.FLOAT32, PointField.FLOAT64
 @pytest.mark.parametrize("largest", [np.full((4, 3), np.finfo("f4").max), np.full((4, 3), 1e150)], ids=["f4", "f8"])
 def test_largest_coordinates_that_the_core_takes(largest):
     for points in (largest, -largest):
-        assert np.array_equal(convert.vertices_from_message(convert.vertices_message(points, 0), 9), points)
+        assert np.array_equal(mesh_messages.vertices_from_message(mesh_messages.vertices_message(points, 0), 9), points)
 
 
 def test_coordinates_beyond_what_the_core_takes():
     for bad in (1e151, -1e200, np.finfo(np.float64).max):
         points = POINTS.astype(np.float64)
         points[2, 1] = bad
-        message = convert.vertices_message(points, 0)
-        text = refused(Reason.OUT_OF_RANGE, convert.vertices_from_message, message, 100)
+        message = mesh_messages.vertices_message(points, 0)
+        text = refused(Reason.OUT_OF_RANGE, mesh_messages.vertices_from_message, message, 100)
         assert "vertex 2" in text and "1e+150" in text
-        refused(Reason.OUT_OF_RANGE, convert.vertices_from_cloud, cloud(points, kinds=[F64] * 3), 100)
+        refused(Reason.OUT_OF_RANGE, mesh_messages.vertices_from_cloud, cloud(points, kinds=[F64] * 3), 100)
         points[3, 0] = math.nan
         assert "vertex 3" in refused(
-            Reason.NOT_FINITE, convert.vertices_from_message, convert.vertices_message(points, 0), 100
+            Reason.NOT_FINITE, mesh_messages.vertices_from_message, mesh_messages.vertices_message(points, 0), 100
         )
 
 
@@ -169,7 +170,7 @@ def test_cloud_layouts(layout):
     names = layout.get("names", "xyz")
     points = POINTS[:, ["xyz".index(n) for n in names]]
     message = cloud(points, **layout)
-    got = convert.vertices_from_cloud(message, 100)
+    got = mesh_messages.vertices_from_cloud(message, 100)
     assert np.array_equal(got, POINTS)
     assert got.flags.c_contiguous and got.flags.aligned
     assert got.dtype == (np.float64 if F64 in layout.get("kinds", []) else np.float32)
@@ -177,13 +178,13 @@ def test_cloud_layouts(layout):
 
 def test_dense_cloud_is_a_view():
     message = cloud(POINTS)
-    assert np.shares_memory(convert.vertices_from_cloud(message, 100), np.frombuffer(message.data, np.uint8))
+    assert np.shares_memory(mesh_messages.vertices_from_cloud(message, 100), np.frombuffer(message.data, np.uint8))
 
 
 def test_cloud_of_one_row_may_leave_row_step_empty():
     message = cloud(POINTS)
     message.row_step = 0
-    assert np.array_equal(convert.vertices_from_cloud(message, 100), POINTS)
+    assert np.array_equal(mesh_messages.vertices_from_cloud(message, 100), POINTS)
 
 
 @given(st.data())
@@ -202,11 +203,11 @@ def test_any_cloud_layout(data):
         POINTS, kinds=kinds, offsets=offsets, step=at + gaps[3],
         height=data.draw(st.sampled_from([1, 2, 4])), row_pad=data.draw(st.integers(0, 9)),
     )  # fmt: skip
-    assert np.array_equal(convert.vertices_from_cloud(message, 100), POINTS)
+    assert np.array_equal(mesh_messages.vertices_from_cloud(message, 100), POINTS)
 
 
 def test_bad_clouds():
-    read = convert.vertices_from_cloud
+    read = mesh_messages.vertices_from_cloud
     assert "swap the bytes" in refused(Reason.BIG_ENDIAN, read, cloud(POINTS, big=True), 100)
     assert "'z'" in refused(Reason.MALFORMED, read, cloud(POINTS, names="xyw"), 100)
     integers = cloud(POINTS, kinds=[F32, PointField.INT32, F32])
@@ -233,7 +234,7 @@ def test_bad_clouds():
 def test_cloud_that_claims_to_be_huge():
     message = cloud(POINTS)
     message.width = message.height = 2**32 - 1
-    refused(Reason.TOO_LARGE, convert.vertices_from_cloud, message, 100)
+    refused(Reason.TOO_LARGE, mesh_messages.vertices_from_cloud, message, 100)
 
 
 LAYOUT = Layout(("cloth", "ball", "floor"), np.array([0, 10, 14, 20]), np.array([0, 8, 12, 20]))
@@ -260,7 +261,7 @@ SAMPLE = contacts(
 
 def filled(found, layout=LAYOUT, **options):
     message = ContactArray()
-    convert.fill_contacts(message, found, layout, **options)
+    contact_messages.fill_contacts(message, found, layout, **options)
     return message
 
 
@@ -282,7 +283,7 @@ def test_contacts_read_back():
         (contacts([], [], [], []), LAYOUT),
         (SAMPLE, Layout(("all",), np.array([0, 20]), np.array([0, 20]))),
     ]:
-        back = convert.read_contacts(filled(found, layout), layout)
+        back = contact_messages.read_contacts(filled(found, layout), layout)
         for name in ("vf", "vf_toc", "ee", "ee_toc", "points", "normals"):
             value = getattr(back, name)
             assert np.array_equal(value, getattr(found, name)), name
@@ -294,12 +295,12 @@ def test_topology_versions():
     layout = Layout.of(("cloth", "ball"), (Topology(7, 3, faces), Topology(2**32 - 1, 3, faces)))
     message = filled(contacts([[3, 0]], [], [0.5], []), layout)
     assert list(message.topology_versions) == [7, 2**32 - 1]
-    assert convert.read_contacts(message, layout).vf.tolist() == [[3, 0]]
+    assert contact_messages.read_contacts(message, layout).vf.tolist() == [[3, 0]]
     other = Layout.of(("cloth", "ball"), (Topology(8, 3, faces), Topology(2**32 - 1, 3, faces)))
     with pytest.raises(ValueError, match=r"layout: .* versions \[7, 4294967295\], the layout is of \[8, 4294967295\]"):
-        convert.read_contacts(message, other)
+        contact_messages.read_contacts(message, other)
     message.topology_versions = array("I")  # from before they were told
-    assert convert.read_contacts(message, other).vf.tolist() == [[3, 0]]
+    assert contact_messages.read_contacts(message, other).vf.tolist() == [[3, 0]]
 
 
 def test_no_contacts():
@@ -316,7 +317,7 @@ def test_truncation_keeps_the_earliest_in_canonical_order(limit):
     assert np.array_equal(np.frombuffer(message.points).reshape(-1, 3), SAMPLE.points[expected])
     assert message.total == 6 and message.truncated == (limit < 6)
     assert message.first_toc == 0.0 and message.hash == SAMPLE.hash
-    back = convert.read_contacts(message, LAYOUT)
+    back = contact_messages.read_contacts(message, LAYOUT)
     assert np.array_equal(back.vf, SAMPLE.vf[expected[expected < 3]])
     assert np.array_equal(back.ee, SAMPLE.ee[expected[expected >= 3] - 3])
 

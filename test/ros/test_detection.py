@@ -6,10 +6,10 @@ import pytest
 from waving_sheet import scene_of
 
 import hpccd_core as hc
-from hpccd_ros.detection import DetectionThread, Options, SceneBuilder
-from hpccd_ros.drops import DropCounter
-from hpccd_ros.frame_queue import FrameQueue
-from hpccd_ros.messages import MeshSettings, SceneFrame, Topology
+from hpccd_ros.detect.detection import DetectionThread, Options, SceneBuilder
+from hpccd_ros.frames.drops import DropCounter
+from hpccd_ros.frames.frame_queue import FrameQueue
+from hpccd_ros.frames.types import MeshSettings, SceneFrame, Topology
 
 FACES = np.array([[0, 1, 2], [3, 4, 5]], np.uint32)
 OLD, NEW = (Topology(version, 6, FACES) for version in (0, 1))

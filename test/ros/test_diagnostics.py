@@ -6,9 +6,9 @@ from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticStatus
 from visualization_msgs.msg import Marker
 
-from hpccd_ros.diagnostics import Metrics, Reporter, percentiles
-from hpccd_ros.drops import DropCounter, Reason
-from hpccd_ros.markers import contact_markers
+from hpccd_ros.frames.drops import DropCounter, Reason
+from hpccd_ros.node.diagnostics import Metrics, Reporter, percentiles
+from hpccd_ros.node.markers import contact_markers
 
 
 class Fixture:

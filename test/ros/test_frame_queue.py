@@ -6,8 +6,8 @@ import threading
 import numpy as np
 import pytest
 
-from hpccd_ros.frame_queue import FrameQueue
-from hpccd_ros.messages import SceneFrame, Topology
+from hpccd_ros.frames.frame_queue import FrameQueue
+from hpccd_ros.frames.types import SceneFrame, Topology
 
 OLD, NEW = (Topology(v, 3, np.array([[0, 1, 2]], np.uint32)) for v in (0, 1))
 

@@ -4,9 +4,9 @@
 import numpy as np
 import pytest
 
-from hpccd_ros.drops import DropCounter, Reason
-from hpccd_ros.frames import FrameAssembler
-from hpccd_ros.messages import MeshFrame, MeshSettings, Topology
+from hpccd_ros.frames.assembler import FrameAssembler
+from hpccd_ros.frames.drops import DropCounter, Reason
+from hpccd_ros.frames.types import MeshFrame, MeshSettings, Topology
 
 FACES = np.array([[0, 1, 2]], np.uint32)
 

@@ -17,8 +17,8 @@ from std_msgs.msg import UInt32
 from test_node_life import call, change_state, set_parameter, state, stream
 from waving_sheet import sheet_faces, sheet_positions
 
-from hpccd_ros import _env
-from hpccd_ros.guard import MOST_IN_A_ROW, Errors, GuardedExecutor
+from hpccd_ros.middleware import environment
+from hpccd_ros.middleware.guard import MOST_IN_A_ROW, Errors, GuardedExecutor
 
 N = 8
 
@@ -26,7 +26,7 @@ N = 8
 @pytest.fixture
 def place():
     """A node and its guarded executor, in a context of their own; .log holds what was logged."""
-    _env.prepare()
+    environment.prepare()
     context = rclpy.Context()
     rclpy.init(context=context)
 

@@ -15,7 +15,7 @@ from node_process import PATIENCE, assert_same_contacts
 from std_msgs.msg import Header
 from waving_sheet import scene_of, sheet_faces, sheet_positions
 
-from hpccd_ros import convert
+from hpccd_ros.middleware import mesh_messages
 
 pytest.importorskip("cyclonedds", reason="Cyclone DDS is not installed: pip install 'hpccd[interop]'")
 
@@ -91,7 +91,7 @@ def test_a_topic_that_ros_could_not_name_is_passed_over(start_node):
         there = (f"{node.namespace}/meshes/9/vertices", ["hpccd/msg/MeshVertices"])
         node.wait_until(lambda: there in node.peer.node.get_topic_names_and_types(), "topic of the stranger")
         misspelt = node.peer.publisher(MeshVertices, "meshes/clot/vertices")  # waits until the node listens
-        misspelt.publish(convert.vertices_message(sheet_positions(8, 0), 1))
+        misspelt.publish(mesh_messages.vertices_message(sheet_positions(8, 0), 1))
         node.frames_status(dropped__clot__unknown_mesh=1)
         stranger.stdin.close()
 

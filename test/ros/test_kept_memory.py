@@ -18,14 +18,14 @@ from rclpy.duration import Duration
 from rclpy.signals import SignalHandlerOptions
 
 import hpccd_ros
-from hpccd_ros import _env, convert, qos
+from hpccd_ros.middleware import environment, mesh_messages, qos
 
 ROOT = Path(hpccd_ros.__file__).resolve().parents[1]
 MEGABYTES, ROUNDS = 8, 50
 FAULTS = f"""
 import resource
-from hpccd_ros import _env
-_env.prepare()
+from hpccd_ros.middleware import environment
+environment.prepare()
 def faults():
     return resource.getrusage(resource.RUSAGE_SELF).ru_minflt
 bytearray({MEGABYTES} << 20)
@@ -40,8 +40,8 @@ DEPTH = 20
 # full, and at the end.
 QUEUE = f"""
 import ctypes, gc, os, sys, time
-from hpccd_ros import _env, qos
-_env.prepare()
+from hpccd_ros.middleware import environment, qos
+environment.prepare()
 import rclpy
 from rclpy.duration import Duration
 from std_msgs.msg import UInt8MultiArray
@@ -75,11 +75,11 @@ print(before, full, allocated())
 """
 
 
-def faults_per_message(**environment):
+def faults_per_message(**variables):
     """Page faults of a buffer of 8 MB that is taken and given back."""
     env = {key: value for key, value in os.environ.items() if not key.startswith("MALLOC_")}
     command = [sys.executable, "-c", FAULTS]
-    done = subprocess.run(command, env=env | environment, cwd=ROOT, capture_output=True, text=True)
+    done = subprocess.run(command, env=env | variables, cwd=ROOT, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     return float(done.stdout)
 
@@ -127,7 +127,7 @@ def test_the_node_shrinks_again_after_a_large_message(tmp_path):
     parameters.write_text(yaml.safe_dump({"/**": {"ros__parameters": {"meshes": ["cloth"], "max_vertices": 1000}}}))
     rules = ["--ros-args", "--params-file", parameters, "-r", f"__ns:={namespace}", "-r", "/diagnostics:=diagnostics"]
     node = subprocess.Popen([sys.executable, "-c", NODE, str(SOON), *rules], cwd=ROOT)
-    _env.prepare()
+    environment.prepare()
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     peer = rclpy.create_node("large", namespace=namespace, start_parameter_services=False)
     try:
@@ -140,12 +140,12 @@ def test_the_node_shrinks_again_after_a_large_message(tmp_path):
                 time.sleep(0.02)
 
         until(publisher.get_subscription_count, "the node does not listen")
-        publisher.publish(convert.vertices_message(np.zeros((10, 3), np.float32), 1))
+        publisher.publish(mesh_messages.vertices_message(np.zeros((10, 3), np.float32), 1))
         assert publisher.wait_for_all_acked(Duration(seconds=PATIENCE))
         before = own_mb(node.pid)
         large = np.zeros((1_700_000, 3), np.float32)
         once = large.nbytes / 2**20
-        publisher.publish(convert.vertices_message(large, 2))
+        publisher.publish(mesh_messages.vertices_message(large, 2))
         until(lambda: own_mb(node.pid) > before + 2 * once, "the message did not come")
         until(lambda: own_mb(node.pid) < before + once + 8, "the node keeps what it had for one message")
     finally:

@@ -12,12 +12,12 @@ from node_process import PATIENCE
 from rclpy.qos import QoSProfile
 from std_msgs.msg import UInt32
 
-from hpccd_ros import _env
-from hpccd_ros.listeners import await_acknowledged, await_subscribers
+from hpccd_ros.middleware import environment
+from hpccd_ros.middleware.listeners import await_acknowledged, await_subscribers
 
 READER = """
-from hpccd_ros import _env
-_env.prepare()
+from hpccd_ros.middleware import environment
+environment.prepare()
 import rclpy
 from rclpy.qos import QoSProfile
 from std_msgs.msg import UInt32
@@ -31,7 +31,7 @@ rclpy.spin(node)
 
 @pytest.fixture
 def publisher():
-    _env.prepare()
+    environment.prepare()
     context = rclpy.Context()
     rclpy.init(context=context)
     node = rclpy.create_node("writer", context=context)

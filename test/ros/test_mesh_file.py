@@ -6,7 +6,7 @@ import builtins
 import numpy as np
 import pytest
 
-from hpccd_ros.mesh_file import MeshFileError, load_mesh, place
+from hpccd_ros.frames.mesh_file import MeshFileError, load_mesh, place
 
 trimesh = pytest.importorskip("trimesh")
 

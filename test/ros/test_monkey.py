@@ -11,6 +11,7 @@ from collections import Counter
 
 import numpy as np
 import pytest
+from hpccd.msg import MeshVertices
 from hpccd.srv import Detect
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
@@ -21,7 +22,7 @@ from rcl_interfaces.srv import SetParameters, SetParametersAtomically
 from rclpy.qos import QoSProfile
 from waving_sheet import scene_of, sheet_faces, sheet_positions
 
-from hpccd_ros import convert
+from hpccd_ros.middleware import mesh_messages
 
 SECONDS = 60.0
 CALLS = int(os.environ.get("HPCCD_MONKEY_CALLS", "0"))
@@ -131,10 +132,10 @@ class Streamer(threading.Thread):
                 for mesh in MESHES:
                     if k % 50 == 1:
                         self._peer.topology(mesh, FACES, N * N)
-                    message = convert.vertices_message(sheet_positions(N, k % 100), k)
+                    message = mesh_messages.vertices_message(sheet_positions(N, k % 100), k)
                     if self._monkey.random.random() < 0.05:
                         self._monkey.spoil(message)
-                    self._peer.publisher(convert.MeshVertices, f"meshes/{mesh}/vertices").publish(message)
+                    self._peer.publisher(MeshVertices, f"meshes/{mesh}/vertices").publish(message)
         finally:
             self._peer.close()
 

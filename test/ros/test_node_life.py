@@ -14,7 +14,7 @@ from rclpy.parameter import Parameter
 from waving_sheet import scene_of, sheet_faces, sheet_positions
 
 import hpccd_core as hc
-from hpccd_ros import convert
+from hpccd_ros.middleware import fields
 
 N = 8
 FACES = sheet_faces(N)
@@ -138,7 +138,7 @@ def test_life_cycle(start_node):
         node.peer.vertices("cloth", sheet_positions(N, k), k)
         node.frames_status(answered=k)
     message = node.contacts(3)[2]
-    assert convert.stamp_to_ns(message.start) == 4
+    assert fields.stamp_to_ns(message.start) == 4
     assert_same_contacts(message, sheet_positions(N, 4), sheet_positions(N, 5), scene_of(cloth=FACES))
     assert change_state(node, Transition.TRANSITION_DEACTIVATE)
     assert change_state(node, Transition.TRANSITION_CLEANUP)

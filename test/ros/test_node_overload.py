@@ -6,7 +6,7 @@ from lifecycle_msgs.srv import GetState
 from waving_sheet import scene_of, sheet_faces, sheet_positions
 
 import hpccd_core as hc
-from hpccd_ros import convert
+from hpccd_ros.middleware import fields
 
 N = 100  # about 50,000 to 200,000 contacts a step: tens of ms, where a frame comes every few
 FACES = sheet_faces(N)
@@ -48,14 +48,14 @@ def test_latest_frames_win_and_drops_are_counted_exactly(start_node):
     node.wait_until(lambda: node.peer.received[-1].step == count - 1, "contacts of the last frame")
     assert len(messages) == detections
     assert messages[-1].dropped_frames == dropped
-    chain = [convert.stamp_to_ns(messages[0].start)] + [convert.stamp_to_ns(m.header.stamp) for m in messages]
+    chain = [fields.stamp_to_ns(messages[0].start)] + [fields.stamp_to_ns(m.header.stamp) for m in messages]
     assert chain[0] == 1 and chain[-1] == count
     for earlier, message in zip(chain, messages, strict=False):
-        assert convert.stamp_to_ns(message.start) == earlier, "no time between two steps is left unwatched"
+        assert fields.stamp_to_ns(message.start) == earlier, "no time between two steps is left unwatched"
     scene = scene_of(cloth=FACES)
     detector = hc.Detector(scene, accuracy=TIER)
     for message in messages[:3] + messages[-3:]:
-        start, end = (convert.stamp_to_ns(s) - 1 for s in (message.start, message.header.stamp))
+        start, end = (fields.stamp_to_ns(s) - 1 for s in (message.start, message.header.stamp))
         expected = detector.detect(FRAMES[start % 8], FRAMES[end % 8])
         assert message.hash == expected.hash and message.total == len(expected)
         assert message.truncated == (len(expected) > 1000)

@@ -12,12 +12,14 @@ from node_process import PATIENCE, NodeProcess
 from test_node_life import change_state, set_parameter, stream
 from waving_sheet import sheet_faces, sheet_positions
 
-from hpccd_ros import node_recording, recorded_topics, replay_setup
-from hpccd_ros.mcap_bag import BagWriter
-from hpccd_ros.mcap_reader import Recording
-from hpccd_ros.mcap_recover import examine, recover
-from hpccd_ros.replay import Replay
-from hpccd_ros.topic_recorder import Recorder
+from hpccd_ros.bag.reader import Recording
+from hpccd_ros.bag.recover import examine, recover
+from hpccd_ros.bag.writer import BagWriter
+from hpccd_ros.node import node_recording
+from hpccd_ros.record import recorded_topics
+from hpccd_ros.record.topic_recorder import Recorder
+from hpccd_ros.replay import recorded_setup
+from hpccd_ros.replay.recomputed import Replay
 
 N = 8
 FACES = sheet_faces(N)
@@ -25,7 +27,7 @@ FACES = sheet_faces(N)
 
 def _replayed(path):
     with Recording(path) as recording:
-        replay = Replay(recording, replay_setup.of_recording(recording))
+        replay = Replay(recording, recorded_setup.of_recording(recording))
         steps = list(replay.steps())
     assert replay.diverged == replay.unverified == 0
     return steps

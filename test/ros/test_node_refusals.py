@@ -10,7 +10,7 @@ from hpccd.msg import MeshTopology, MeshVertices
 from node_process import assert_same_contacts
 from waving_sheet import scene_of, sheet_faces, sheet_positions
 
-from hpccd_ros import convert, qos
+from hpccd_ros.middleware import fields, mesh_messages, qos
 
 N = 8
 FACES = sheet_faces(N)
@@ -18,7 +18,7 @@ GOOD = sheet_positions(N, 0)
 
 
 def vertices(**fields):
-    message = convert.vertices_message(GOOD, 50)
+    message = mesh_messages.vertices_message(GOOD, 50)
     for name, value in fields.items():
         setattr(message, name, value)
     return message
@@ -27,7 +27,7 @@ def vertices(**fields):
 def with_coordinate(value, dtype):
     points = GOOD.astype(dtype)
     points[7, 2] = value
-    return convert.vertices_message(points, 50)
+    return mesh_messages.vertices_message(points, 50)
 
 
 def stamped(sec, nanosec):
@@ -37,14 +37,14 @@ def stamped(sec, nanosec):
 
 
 BAD_VERTICES = {
-    "shape": (vertices(vertices_f32=convert.to_field(GOOD.ravel()[:-1])), "malformed", "not a multiple of 3"),
-    "no dtype": (vertices(vertices_f32=convert.to_field(GOOD[:0])), "malformed", "both are empty"),
+    "shape": (vertices(vertices_f32=fields.to_field(GOOD.ravel()[:-1])), "malformed", "not a multiple of 3"),
+    "no dtype": (vertices(vertices_f32=fields.to_field(GOOD[:0])), "malformed", "both are empty"),
     "two dtypes": (
-        vertices(vertices_f64=convert.to_field(GOOD.astype(float))),
+        vertices(vertices_f64=fields.to_field(GOOD.astype(float))),
         "malformed",
         "both are filled",
     ),
-    "count": (convert.vertices_message(GOOD[:-1], 50), "wrong_vertex_count", "63 vertices"),
+    "count": (mesh_messages.vertices_message(GOOD[:-1], 50), "wrong_vertex_count", "63 vertices"),
     "nan": (with_coordinate(math.nan, np.float32), "not_finite", "vertex 7"),
     "inf": (with_coordinate(-math.inf, np.float64), "not_finite", "vertex 7"),
     "far": (with_coordinate(1e151, np.float64), "out_of_range", "vertex 7"),
@@ -52,10 +52,10 @@ BAD_VERTICES = {
     "last second": (stamped(2**31 - 1, 2**32 - 1), "malformed", "nanosec below"),
     "negative": (stamped(-1, 0), "malformed", "sec -1"),
     "old version": (vertices(topology_version=2), "old_topology", "version 2"),
-    "backward": (convert.vertices_message(GOOD, 9), "stamp_backward", "before the last one"),
-    "repeated": (convert.vertices_message(GOOD, 11), "stamp_repeated", "came before"),
-    "frame": (convert.vertices_message(GOOD, 50, frame_id="elsewhere"), "frame_id", "'elsewhere'"),
-    "size": (convert.vertices_message(np.zeros((101, 3), np.float32), 50), "too_large", "max_vertices"),
+    "backward": (mesh_messages.vertices_message(GOOD, 9), "stamp_backward", "before the last one"),
+    "repeated": (mesh_messages.vertices_message(GOOD, 11), "stamp_repeated", "came before"),
+    "frame": (mesh_messages.vertices_message(GOOD, 50, frame_id="elsewhere"), "frame_id", "'elsewhere'"),
+    "size": (mesh_messages.vertices_message(np.zeros((101, 3), np.float32), 50), "too_large", "max_vertices"),
 }
 
 
@@ -72,7 +72,7 @@ def streaming(start_node):
         before = len(node.peer.received)
         send(2)
         message = node.contacts(before + 1)[before]
-        assert convert.stamp_to_ns(message.start) == 11, "the refused frame is not a start either"
+        assert fields.stamp_to_ns(message.start) == 11, "the refused frame is not a start either"
         expected = sheet_positions(N, 1), sheet_positions(N, 2)
         assert_same_contacts(message, *expected, scene_of(cloth=FACES))
         return message
@@ -128,7 +128,7 @@ def test_a_topology_that_cannot_be_deserialised_is_told(streaming):
 
 def bad_topology(faces, n_vertices=N * N, version=4):
     message = MeshTopology(version=version, n_vertices=n_vertices)
-    message.faces = convert.to_field(np.array(faces, np.uint32))
+    message.faces = fields.to_field(np.array(faces, np.uint32))
     return message
 
 
@@ -170,7 +170,7 @@ def test_a_conflict_right_behind_the_topology_does_not_replace_it(start_node):
     node = start_node({"meshes": ["cloth"]})
     publisher = node.peer.publisher(MeshTopology, "meshes/cloth/topology", qos.TOPOLOGY_INPUT)
     for faces in (FACES, FACES[1:]):
-        publisher.publish(convert.topology_message(faces, N * N, version=3))
+        publisher.publish(mesh_messages.topology_message(faces, N * N, version=3))
     node.frames_status(topologies_refused=1, topologies_refused__cloth__topology_conflict=1)
     for k in range(2):
         node.peer.vertices("cloth", sheet_positions(N, k), k, topology_version=3)
@@ -183,7 +183,7 @@ def test_frames_of_an_unknown_mesh(streaming):
     node, goes_on = streaming
     publisher = node.peer.publisher(MeshVertices, "meshes/clot/vertices")  # waits until the node listens
     for k in range(3):
-        publisher.publish(convert.vertices_message(GOOD, k))
+        publisher.publish(mesh_messages.vertices_message(GOOD, k))
     node.frames_status(dropped__clot__unknown_mesh=3, received__clot=3)
     warning = node.wait_until(lambda: "clot/vertices" in node.peer.statuses["frames"][1], "warning")
     assert warning
@@ -205,7 +205,7 @@ def test_unknown_meshes_that_are_gone_make_room_for_others(streaming):
     for stray in strays:
         node.peer.node.destroy_publisher(stray)
     node.wait_until(lambda: not unknown_topics(node), "topics without publishers to be let go")
-    node.peer.publisher(MeshVertices, "meshes/clot/vertices").publish(convert.vertices_message(GOOD, 1))
+    node.peer.publisher(MeshVertices, "meshes/clot/vertices").publish(mesh_messages.vertices_message(GOOD, 1))
     node.frames_status(dropped__clot__unknown_mesh=1, received__clot=1)
     assert node.peer.node.count_subscribers(f"{node.namespace}/meshes/stray0/vertices") == 0
     goes_on()
@@ -222,7 +222,7 @@ def test_meshes_of_another_node_are_not_counted(streaming, start_node):
     for k in range(3):
         node.peer.vertices("ball", sheet_positions(N, k), k)
         other.frames_status(received=k + 1, answered=k + 1)
-    node.peer.publisher(MeshVertices, "meshes/clot/vertices").publish(convert.vertices_message(GOOD, 1))
+    node.peer.publisher(MeshVertices, "meshes/clot/vertices").publish(mesh_messages.vertices_message(GOOD, 1))
     values = node.frames_status(dropped=1, dropped__clot__unknown_mesh=1)
     assert "received.ball" not in values
     assert not [line for line in unknown_topics(node) if "ball" in line]
@@ -260,7 +260,7 @@ def test_restarted_publisher_is_heard_at_once(start_node):
         node.peer.vertices("cloth", sheet_positions(N, k), 10 + k, topology_version=1)
         node.contacts(2 + k)
     message = node.contacts(4)[2]
-    assert convert.stamp_to_ns(message.start) == 10
+    assert fields.stamp_to_ns(message.start) == 10
     node.frames_status(restarts=1, received=6, answered=6, dropped=0)
 
 
@@ -274,7 +274,7 @@ def test_restarted_simulation_brings_its_own_frame(start_node):
         node.peer.vertices("cloth", sheet_positions(N, k), 10 + k, frame_id="world")
         node.contacts(k)
     for message, k in zip(node.contacts(2), (1, 2), strict=True):
-        assert (message.header.frame_id, convert.stamp_to_ns(message.start)) == ("world", 9 + k)
+        assert (message.header.frame_id, fields.stamp_to_ns(message.start)) == ("world", 9 + k)
         assert_same_contacts(message, sheet_positions(N, k - 1), sheet_positions(N, k), scene_of(cloth=FACES))
     node.frames_status(answered=4, dropped=0, restarts=1, frame_id="world")
 
@@ -290,5 +290,5 @@ def test_no_time_is_hidden_by_a_frame_that_cannot_be_tested(start_node):
     values = node.frames_status(answered=2, dropped=2, dropped__cloth__out_of_range=2)
     assert "1e+150" in values["last_refusal"]
     (message,) = node.contacts(1)
-    assert (convert.stamp_to_ns(message.start), convert.stamp_to_ns(message.header.stamp)) == (1, 3)
+    assert (fields.stamp_to_ns(message.start), fields.stamp_to_ns(message.header.stamp)) == (1, 3)
     assert_same_contacts(message, *(sheet_positions(N, k, dtype=np.float64) for k in (1, 3)), scene_of(cloth=FACES))

@@ -17,10 +17,10 @@ from test_node_life import change_state
 from waving_sheet import scene_of, sheet_faces, sheet_positions
 
 import hpccd_core as hc
-from hpccd_ros import convert
-from hpccd_ros.detect_service import DetectService, NodeScene, new_counts
-from hpccd_ros.detection import Options, SceneBuilder
-from hpccd_ros.guard import Errors
+from hpccd_ros.detect.detection import Options, SceneBuilder
+from hpccd_ros.middleware import fields, mesh_messages
+from hpccd_ros.middleware.guard import Errors
+from hpccd_ros.node.detect_service import DetectService, NodeScene, new_counts
 
 N = 16
 FACES = sheet_faces(N)
@@ -29,11 +29,11 @@ FACES = sheet_faces(N)
 def request(step=0, *, n=N, names=("cloth",), topologies=True, dtype=np.float32, **fields):
     out = Detect.Request(mesh_names=list(names), **fields)
     if topologies:
-        out.topologies = [convert.topology_message(sheet_faces(n), n * n) for _ in names]
+        out.topologies = [mesh_messages.topology_message(sheet_faces(n), n * n) for _ in names]
     for i, _ in enumerate(names):
         for target, k in ((out.start, step), (out.end, step + 1)):
             positions = sheet_positions(n, k + 2 * i, offset=0.003 * i, dtype=dtype)
-            target.append(convert.vertices_message(positions, k, step=k, frame_id="lab"))
+            target.append(mesh_messages.vertices_message(positions, k, step=k, frame_id="lab"))
     return out
 
 
@@ -70,8 +70,8 @@ def test_without_any_stream(node):
     start, end = (sheet_positions(N, k, dtype=np.float64) for k in (0, 1))
     assert assert_same_contacts(answer.contacts, start, end, scene_of(cloth=FACES)) > 100
     header = answer.contacts.header
-    assert (header.frame_id, convert.stamp_to_ns(header.stamp), answer.contacts.step) == ("lab", 1, 1)
-    assert convert.stamp_to_ns(answer.contacts.start) == 0
+    assert (header.frame_id, fields.stamp_to_ns(header.stamp), answer.contacts.step) == ("lab", 1, 1)
+    assert fields.stamp_to_ns(answer.contacts.start) == 0
 
 
 def test_meshes_that_the_node_does_not_have(node):
@@ -141,7 +141,7 @@ def put_nan(r):
 def put_far(r):
     points = sheet_positions(N, 1, dtype=np.float64)
     points[7, 2] = 1e151
-    r.end[0] = convert.vertices_message(points, 1)
+    r.end[0] = mesh_messages.vertices_message(points, 1)
 
 
 def bad_stamp(r):

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hpccd.msg import ContactArray, MeshVertices
 from node_process import assert_same_contacts
 from rclpy.qos import ReliabilityPolicy
 from rosgraph_msgs.msg import Clock
@@ -15,7 +16,8 @@ from visualization_msgs.msg import MarkerArray
 from waving_sheet import scene_of, sheet_faces, sheet_positions
 
 import hpccd_core as hc
-from hpccd_ros import convert, qos
+from hpccd_ros.detect.layout import Layout
+from hpccd_ros.middleware import contact_messages, fields, mesh_messages, qos
 
 N = 16
 FACES = sheet_faces(N)
@@ -31,7 +33,7 @@ def test_every_step_of_one_mesh(start_node, dtype):
         node.contacts(k)  # the first frame has no start: it gives none
     found = 0
     for k, message in enumerate(node.contacts(5), start=1):
-        assert (convert.stamp_to_ns(message.start), convert.stamp_to_ns(message.header.stamp)) == (
+        assert (fields.stamp_to_ns(message.start), fields.stamp_to_ns(message.header.stamp)) == (
             10**9 + k - 1,
             10**9 + k,
         )
@@ -119,7 +121,7 @@ def test_topology_change_in_mid_stream(start_node):
     node.frames_status(answered=3, waiting=0)
     node.peer.vertices("cloth", b[1], stamp=11, topology_version=2)
     message = node.contacts(2)[1]
-    assert convert.stamp_to_ns(message.start) == 10, "no motion from the old topology to the new one"
+    assert fields.stamp_to_ns(message.start) == 10, "no motion from the old topology to the new one"
     assert [list(m.topology_versions) for m in node.contacts(2)] == [[1], [2]]
     assert_same_contacts(message, b[0], b[1], scene_of(cloth=large))
     node.peer.vertices("cloth", a[0], stamp=12, topology_version=1)
@@ -146,14 +148,14 @@ def test_point_clouds(start_node, layout):
     frames = [sheet_positions(n, k, dtype=dtype) for k in range(3)]
     for k, vertices in enumerate(frames):
         message = cloud(vertices, **layout)
-        message.header.stamp = convert.ns_to_stamp(k)
+        message.header.stamp = fields.ns_to_stamp(k)
         publisher.publish(message)
         node.contacts(k)
     for k, message in enumerate(node.contacts(2), start=1):
         assert assert_same_contacts(message, frames[k - 1], frames[k], scene_of(cloth=sheet_faces(n))) > 0
         assert message.step == k
     refused = cloud(frames[0], **layout)
-    refused.header.stamp = convert.ns_to_stamp(100)
+    refused.header.stamp = fields.ns_to_stamp(100)
     refused.is_bigendian = True
     publisher.publish(refused)
     values = node.frames_status(dropped=1, dropped__cloth__big_endian=1)
@@ -207,11 +209,11 @@ def test_truncated_contacts_are_the_earliest(start_node):
 def test_names_are_relative_and_remappable(start_node):
     node = start_node({"meshes": ["cloth"]}, remaps=("contacts:=hits", "meshes/cloth/vertices:=simulation/points"))
     hits = []
-    node.peer.node.create_subscription(type(convert.ContactArray()), "hits", hits.append, qos.CONTACTS)
+    node.peer.node.create_subscription(ContactArray, "hits", hits.append, qos.CONTACTS)
     node.peer.topology("cloth", FACES, N * N)
-    publisher = node.peer.publisher(convert.MeshVertices, "simulation/points")
+    publisher = node.peer.publisher(MeshVertices, "simulation/points")
     for k in range(2):
-        publisher.publish(convert.vertices_message(sheet_positions(N, k), k))
+        publisher.publish(mesh_messages.vertices_message(sheet_positions(N, k), k))
     node.wait_until(lambda: hits, "contacts on the remapped topic")
     assert not node.peer.received
 
@@ -234,7 +236,7 @@ def test_markers_on_request(start_node):
     assert vertex_face.header.frame_id == "world" and vertex_face.scale.x == 0.5
     (surface,) = node.wait_until(lambda: surfaces, "vertices for viewers")
     assert surface.header == vertex_face.header
-    assert np.array_equal(convert.vertices_from_cloud(surface, N * N), sheet_positions(N, 1))
+    assert np.array_equal(mesh_messages.vertices_from_cloud(surface, N * N), sheet_positions(N, 1))
 
 
 def test_markers_come_at_their_rate_only(start_node):
@@ -263,15 +265,15 @@ def test_simulated_time(start_node):
     assert node.peer.reported_at == 0, "no /clock yet: simulated time is zero, and reports go on"
     clock = node.peer.publisher(Clock, "clock")
     for seconds in (1234, 5):  # a simulator that starts anew goes back
-        now = Clock(clock=convert.ns_to_stamp(seconds * 10**9))
+        now = Clock(clock=fields.ns_to_stamp(seconds * 10**9))
 
         def told(now=now):
             clock.publish(now)  # again and again: /clock is read best effort
-            return node.peer.reported_at == convert.stamp_to_ns(now.clock)
+            return node.peer.reported_at == fields.stamp_to_ns(now.clock)
 
         node.wait_until(told, f"report at {seconds} s")
     node.peer.vertices("cloth", frames[2], stamp=2)
-    assert convert.stamp_to_ns(node.contacts(2)[1].header.stamp) == 2, "stamps of answers are those of the frames"
+    assert fields.stamp_to_ns(node.contacts(2)[1].header.stamp) == 2, "stamps of answers are those of the frames"
 
 
 def test_meshes_at_rates_of_their_own(start_node):
@@ -293,7 +295,7 @@ def test_meshes_at_rates_of_their_own(start_node):
     scene = scene_of(cloth=FACES, net=FACES)
     messages = node.contacts(4)
     for before, after, message in zip(list(nearest)[:-1], list(nearest)[1:], messages, strict=True):
-        assert convert.stamp_to_ns(message.header.stamp) == after
+        assert fields.stamp_to_ns(message.header.stamp) == after
         ends = (np.concatenate([cloth[stamp], net[nearest[stamp]]]) for stamp in (before, after))
         assert_same_contacts(message, *ends, scene)
 
@@ -316,17 +318,17 @@ def test_best_effort_input(start_node):
     node.peer.topology("cloth", FACES, N * N)
     sensor = qos.vertices("best_effort", 10)
     assert sensor.reliability == ReliabilityPolicy.BEST_EFFORT
-    publisher = node.peer.publisher(convert.MeshVertices, "meshes/cloth/vertices", sensor)
+    publisher = node.peer.publisher(MeshVertices, "meshes/cloth/vertices", sensor)
     sent = 0
 
     def answered():
         nonlocal sent  # frame after frame: each of them may be lost
-        publisher.publish(convert.vertices_message(sheet_positions(N, sent), sent))
+        publisher.publish(mesh_messages.vertices_message(sheet_positions(N, sent), sent))
         sent += 1
         return node.peer.received
 
     message = node.wait_until(answered, "contacts")[0]
-    start, end = (convert.stamp_to_ns(stamp) for stamp in (message.start, message.header.stamp))
+    start, end = (fields.stamp_to_ns(stamp) for stamp in (message.start, message.header.stamp))
     assert start < end
     assert_same_contacts(message, sheet_positions(N, start), sheet_positions(N, end), scene_of(cloth=FACES))
 
@@ -339,8 +341,8 @@ def test_cloth_ball_through_the_node_gives_exactly_the_true_contacts(start_node)
     node.peer.vertices("cloth_ball", data["vertices_t0"], stamp=92)
     node.peer.vertices("cloth_ball", data["vertices_t1"], stamp=93)
     message = node.contacts(1)[0]
-    layout = convert.Layout(("cloth_ball",), np.array([0, len(data["vertices_t0"])]), np.array([0, len(data["faces"])]))
-    got = convert.read_contacts(message, layout)
+    layout = Layout(("cloth_ball",), np.array([0, len(data["vertices_t0"])]), np.array([0, len(data["faces"])]))
+    got = contact_messages.read_contacts(message, layout)
     assert not message.truncated
     for name in ("vf", "ee"):
         order = np.lexsort(data[name].T[::-1])

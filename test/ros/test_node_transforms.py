@@ -7,8 +7,8 @@ from geometry_msgs.msg import TransformStamped
 from node_process import assert_same_contacts
 from waving_sheet import scene_of, sheet_faces, sheet_positions
 
-from hpccd_ros import convert, qos
-from hpccd_ros.rigid import Rigid
+from hpccd_ros.frames.rigid import Rigid
+from hpccd_ros.middleware import fields, qos
 
 N = 12
 FACES = sheet_faces(N)
@@ -19,7 +19,7 @@ SCENE = {"meshes": ["cloth", "net"], "frame_id": "world"}
 
 def transform(parent, child, rigid, stamp=0):
     message = TransformStamped(child_frame_id=child)
-    message.header.frame_id, message.header.stamp = parent, convert.ns_to_stamp(stamp)
+    message.header.frame_id, message.header.stamp = parent, fields.ns_to_stamp(stamp)
     to = message.transform
     to.translation.x, to.translation.y, to.translation.z = rigid.shift.tolist()
     to.rotation.x, to.rotation.y, to.rotation.z, to.rotation.w = rigid.quaternion.tolist()

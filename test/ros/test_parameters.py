@@ -9,9 +9,9 @@ import yaml
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from hpccd_ros import parameters, scene_parameters
-from hpccd_ros.parameter_table import MESH_ROWS, NEVER, NODE_ROWS
-from hpccd_ros.parameters import ParameterError
+from hpccd_ros.params import parameters, scene_parameters
+from hpccd_ros.params.parameters import ParameterError
+from hpccd_ros.params.table import MESH_ROWS, NEVER, NODE_ROWS
 
 CONFIG = Path(__file__).resolve().parents[2] / "config"
 

@@ -10,7 +10,7 @@ from node_process import assert_same_contacts
 from waving_sheet import scene_of, sheet_faces, sheet_positions
 
 import hpccd_core as hc
-from hpccd_ros import convert
+from hpccd_ros.middleware import fields
 
 CONFIG = Path(__file__).resolve().parents[2] / "config"
 PROFILES = sorted((CONFIG / "profiles").glob("*.yaml"))
@@ -85,5 +85,5 @@ def test_accuracy_of_a_pair_reaches_the_core(start_node):
     for k, message in enumerate(node.contacts(2), start=1):
         assert assert_same_contacts(message, *frames[k - 1 : k + 1], scene) > 0
         differs += message.hash != exact.detect(*frames[k - 1 : k + 1]).hash
-        assert convert.stamp_to_ns(message.header.stamp) == k
+        assert fields.stamp_to_ns(message.header.stamp) == k
     assert differs

@@ -13,7 +13,7 @@ from rclpy.qos import ReliabilityPolicy
 from test_node_life import call, change_state, set_parameter
 from waving_sheet import sheet_faces, sheet_positions
 
-from hpccd_ros import qos
+from hpccd_ros.middleware import qos
 
 N = 8
 BEST_EFFORT = {"reliability": "best_effort"}

@@ -11,14 +11,16 @@ from node_process import PATIENCE, assert_same_contacts
 from test_node_transforms import FACES, SCENE, SECOND, N, topologies, transform
 from waving_sheet import scene_of, sheet_positions
 
-from hpccd_ros import qos, recorded_topics, replay_setup
-from hpccd_ros.mcap_bag import BagWriter, Topic
-from hpccd_ros.mcap_reader import Recording, RecordingError
-from hpccd_ros.recording_info import recording_info
-from hpccd_ros.replay import Replay
-from hpccd_ros.rigid import Rigid
-from hpccd_ros.topic_recorder import Recorder
-from hpccd_ros.transforms import TransformBuffer
+from hpccd_ros.bag.reader import Recording, RecordingError
+from hpccd_ros.bag.writer import BagWriter, Topic
+from hpccd_ros.frames.rigid import Rigid
+from hpccd_ros.frames.transform_buffer import TransformBuffer
+from hpccd_ros.middleware import qos
+from hpccd_ros.record import recorded_topics
+from hpccd_ros.record.recording_info import recording_info
+from hpccd_ros.record.topic_recorder import Recorder
+from hpccd_ros.replay import recorded_setup
+from hpccd_ros.replay.recomputed import Replay
 
 STEPS = 12
 NET = {"transform": "tf", "frame": "hand"}
@@ -82,7 +84,7 @@ def of_tf2(node):
 
 def replayed(path):
     with Recording(path) as recording:
-        replay = Replay(recording, replay_setup.of_recording(recording))
+        replay = Replay(recording, recorded_setup.of_recording(recording))
         steps = list(replay.steps())
     assert replay.diverged == 0, replay.first_divergence.difference
     return replay, steps
@@ -143,4 +145,4 @@ def test_without_transforms_says_so(tmp_path):
         bag.add_topic(Topic(f"/{topic.name}", topic.type_name, []))
     bag.close()
     with Recording(path) as recording, pytest.raises(RecordingError, match="holds no transforms"):
-        replay_setup.of_recording(recording)
+        recorded_setup.of_recording(recording)

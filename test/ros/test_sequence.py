@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Lost messages and new publishers from sequence numbers; the log of refusals."""
 
-from hpccd_ros.drops import Reason
-from hpccd_ros.refusal_log import RefusalLog
-from hpccd_ros.sequence import SequenceWatch
+from hpccd_ros.frames.drops import Reason
+from hpccd_ros.frames.sequence import SequenceWatch
+from hpccd_ros.node.refusal_log import RefusalLog
 
 
 def test_gaps_are_losses():

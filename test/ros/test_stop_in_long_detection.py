@@ -13,8 +13,8 @@ from node_process import PATIENCE
 from waving_sheet import scene_of, sheet_faces, sheet_positions
 
 import hpccd_core as hc
-from hpccd_ros import convert
-from hpccd_ros.mcap_recover import examine
+from hpccd_ros.bag.recover import examine
+from hpccd_ros.middleware import mesh_messages
 
 # Two sheets that lie on each other and move as one: millions of contacts, most of them degenerate, on one thread.
 N, MESHES = 260, ("a", "b")
@@ -44,9 +44,9 @@ def test_of_a_request(start_node):
     node = start_node({**ALONE, "detect_time_limit": 600.0})
     request = Detect.Request(mesh_names=MESHES)
     for _ in MESHES:
-        request.topologies.append(convert.topology_message(sheet_faces(N), N * N))
-        request.start.append(convert.vertices_message(START, 0))
-        request.end.append(convert.vertices_message(END, 1))
+        request.topologies.append(mesh_messages.topology_message(sheet_faces(N), N * N))
+        request.start.append(mesh_messages.vertices_message(START, 0))
+        request.end.append(mesh_messages.vertices_message(END, 1))
     reply = node.peer.client().call_async(request)
     node.wait_until(lambda: node.peer.statuses["service"][2]["open"] == "1", "request under way")
     before = cpu_of_ended_children()

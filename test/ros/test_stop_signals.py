@@ -11,12 +11,12 @@ import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.task import Future
 
-from hpccd_ros import _env, stop_signals
+from hpccd_ros.middleware import environment, stop_signals
 
 
 @pytest.fixture
 def executor():
-    _env.prepare()
+    environment.prepare()
     context = rclpy.Context()
     rclpy.init(context=context)
     executor = SingleThreadedExecutor(context=context)

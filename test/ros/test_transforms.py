@@ -7,14 +7,15 @@ from geometry_msgs.msg import TransformStamped
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hpccd_ros import transform_topics, transforms
-from hpccd_ros.drops import DropCounter, Reason
-from hpccd_ros.messages import MeshFrame
-from hpccd_ros.parameter_table import MESH_ROWS
-from hpccd_ros.placement import Placement
-from hpccd_ros.rate_limit import RateLimit
-from hpccd_ros.rigid import IDENTITY, Rigid
-from hpccd_ros.transforms import NoTransformError, TransformBuffer
+from hpccd_ros.frames import transform_buffer
+from hpccd_ros.frames.drops import DropCounter, Reason
+from hpccd_ros.frames.rate_limit import RateLimit
+from hpccd_ros.frames.rigid import IDENTITY, Rigid
+from hpccd_ros.frames.transform_buffer import NoTransformError, TransformBuffer
+from hpccd_ros.frames.transformer import Placement
+from hpccd_ros.frames.types import MeshFrame
+from hpccd_ros.middleware import transform_topics
+from hpccd_ros.params.table import MESH_ROWS
 
 POINTS = np.array([[0.0, 0, 0], [1, 0, 0], [0, 2, 0], [0, 0, 3]])
 SECOND = 10**9
@@ -93,7 +94,7 @@ def test_what_strangers_send_is_bounded(monkeypatch):
     with pytest.raises(NoTransformError):
         buffer.lookup("hand", "world", 15 * SECOND)  # older than ten seconds
     buffer.lookup("hand", "world", 25 * SECOND)
-    monkeypatch.setattr(transforms, "MOST_FRAMES", 2)
+    monkeypatch.setattr(transform_buffer, "MOST_FRAMES", 2)
     buffer.add("world", "foot", turn(0), None)
     with pytest.raises(ValueError, match="one too many"):
         buffer.add("world", "tail", turn(0), None)
@@ -102,11 +103,11 @@ def test_what_strangers_send_is_bounded(monkeypatch):
             buffer.add(parent, child, turn(0), None)
     with pytest.raises(ValueError, match="255 characters"):
         buffer.add("world", "x" * 256, turn(0), None)
-    for k in range(3 * transforms.MOST_SAMPLES):
+    for k in range(3 * transform_buffer.MOST_SAMPLES):
         buffer.add("world", "hand", turn(0), 100 * SECOND + k)
     with pytest.raises(NoTransformError, match="the first one kept"):
-        buffer.lookup("hand", "world", 100 * SECOND + 2 * transforms.MOST_SAMPLES - 1)
-    buffer.lookup("hand", "world", 100 * SECOND + 2 * transforms.MOST_SAMPLES)
+        buffer.lookup("hand", "world", 100 * SECOND + 2 * transform_buffer.MOST_SAMPLES - 1)
+    buffer.lookup("hand", "world", 100 * SECOND + 2 * transform_buffer.MOST_SAMPLES)
 
 
 @pytest.mark.parametrize("static", [False, True])

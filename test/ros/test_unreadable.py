@@ -10,8 +10,8 @@ from rclpy.context import Context
 from rclpy.duration import Duration
 from std_msgs.msg import Header
 
-from hpccd_ros import _env
-from hpccd_ros.unreadable import UnreadableExecutor, watch
+from hpccd_ros.middleware import environment
+from hpccd_ros.middleware.unreadable import UnreadableExecutor, watch
 
 PATIENCE = 60.0
 UNREADABLE = b"\0\1\0\0" + b"\xff" * 50
@@ -20,7 +20,7 @@ UNREADABLE = b"\0\1\0\0" + b"\xff" * 50
 @pytest.fixture
 def spinning():
     """An executor and a node that it runs."""
-    _env.prepare()
+    environment.prepare()
     context = Context()
     rclpy.init(context=context)
     node = rclpy.create_node("unreadable", context=context, namespace=f"/unreadable{os.getpid()}")

@@ -7,8 +7,9 @@ import yaml
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from hpccd_ros import mcap_schema, scenes
-from hpccd_ros.mcap_reader import Recording
+from hpccd_ros import scenes
+from hpccd_ros.bag import message_definitions
+from hpccd_ros.bag.reader import Recording
 from hpccd_ros.scenes import cdr, files, messages
 
 
@@ -22,7 +23,7 @@ def typestore():
     """An independent implementation of CDR that knows our two messages."""
     store = get_typestore(Stores.ROS2_JAZZY)
     for name in (messages.TOPOLOGY_TYPE, messages.VERTICES_TYPE):
-        text = mcap_schema.definition_text(name).split(mcap_schema.SEPARATOR)[0]
+        text = message_definitions.definition_text(name).split(message_definitions.SEPARATOR)[0]
         store.register(get_types_from_msg(text, name))
     return store
 

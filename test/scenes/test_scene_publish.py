@@ -15,7 +15,8 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
 import hpccd_ros
-from hpccd_ros import _env, scenes
+from hpccd_ros import scenes
+from hpccd_ros.middleware import environment
 from hpccd_ros.scenes import messages
 
 # Reached only by tests that fail.
@@ -44,7 +45,7 @@ class Listener:
     """Subscribes raw to what a scene publishes: {topic: [bytes, ...]}."""
 
     def __init__(self, scene, namespace):
-        _env.prepare()
+        environment.prepare()
         self.context = rclpy.Context()
         rclpy.init(context=self.context)
         self.node = rclpy.create_node("listener", namespace=namespace, context=self.context)

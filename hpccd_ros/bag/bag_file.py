@@ -1,0 +1,189 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One MCAP file of a recording, and what rosbag2 wants to know about it."""
+
+import dataclasses
+import json
+import time
+from collections import Counter, deque
+from pathlib import Path
+
+from mcap.writer import CompressionType, Writer
+
+from hpccd_ros.bag import message_definitions, qos_yaml
+from hpccd_ros.bag.stream import WholeWrites
+from hpccd_ros.base.version import package_version
+
+COMPRESSIONS = {"none": CompressionType.NONE, "lz4": CompressionType.LZ4, "zstd": CompressionType.ZSTD}
+
+# Name of the metadata record with what a replay needs beside the messages (parameters, topic names).
+HPCCD_RECORD = "hpccd"
+
+
+@dataclasses.dataclass
+class Topic:
+    """A recorded topic. `qos` as from `mcap_qos.offered_qos`.
+
+    `latched`: how many of its last messages are repeated at the start of each file; `last`: these, as (log_time,
+    publish_time, sequence, data).
+    """
+
+    name: str
+    type_name: str
+    qos: list[dict]
+    latched: int = 0
+    last: deque[tuple] = dataclasses.field(init=False)
+
+    def __post_init__(self):
+        self.last = deque(maxlen=self.latched)
+
+
+class BagFile:
+    """An open file. counts: messages by topic. open_chunk: those of them that are not handed to the system yet.
+
+    start, end: smallest and largest log time, ns. data_bytes: of all messages, uncompressed.
+    Every method but `abandon` raises OSError where the disk refuses; only `abandon` may follow that.
+    """
+
+    def __init__(self, path: Path, *, info: dict, attachments, compression: str, chunk_size: int):
+        self.path = path
+        self.counts: Counter[str] = Counter()
+        self.open_chunk: Counter[str] = Counter()
+        self.start = self.end = self.data_bytes = 0
+        self.finished = False
+        self._channels: dict[str, int] = {}
+        self._schemas: dict[str, int] = {}
+        self._stream = WholeWrites(path)
+        self._writer = Writer(self._stream, chunk_size=chunk_size, compression=COMPRESSIONS[compression])
+        try:
+            self._writer.start(profile="ros2", library=f"hpccd {package_version()}")
+            # First, so that even a file cut off later can be replayed.
+            self._writer.add_metadata(HPCCD_RECORD, {"json": json.dumps(info, sort_keys=True)})
+            for name, data in attachments:
+                now = time.time_ns()
+                self._writer.add_attachment(now, now, name, "application/octet-stream", data)
+        except OSError:
+            self.abandon()
+            raise
+
+    @property
+    def message_count(self) -> int:
+        return self.counts.total()
+
+    @property
+    def size(self) -> int:
+        """Bytes handed to the system."""
+        return self._stream.size
+
+    def register(self, topic: Topic) -> None:
+        """Describe a topic, before its first message."""
+        before = self.size
+        if topic.type_name not in self._schemas:
+            text = message_definitions.definition_text(topic.type_name)
+            self._schemas[topic.type_name] = self._writer.register_schema(
+                name=topic.type_name, encoding="ros2msg", data=text.encode()
+            )
+        self._channels[topic.name] = self._writer.register_channel(
+            topic=topic.name,
+            message_encoding="cdr",
+            schema_id=self._schemas[topic.type_name],
+            metadata={
+                "offered_qos_profiles": qos_yaml.to_yaml(topic.qos) if topic.qos else "",
+                "topic_type_hash": message_definitions.type_hash(topic.type_name),
+            },
+        )
+        self._watch(before)
+
+    def append(self, topic: Topic, log_time: int, publish_time: int, sequence: int, data: bytes) -> None:
+        self.start = min(self.start, log_time) if self.counts else log_time
+        self.end = max(self.end, log_time)
+        self.counts[topic.name] += 1
+        self.open_chunk[topic.name] += 1
+        self.data_bytes += len(data)
+        before = self.size
+        self._writer.add_message(
+            channel_id=self._channels[topic.name],
+            log_time=log_time,
+            publish_time=publish_time,
+            data=data,
+            sequence=sequence & 0xFFFFFFFF,  # MCAP has 32 bits for it
+        )
+        self._watch(before)
+
+    def _watch(self, size_before: int) -> None:
+        if self.size != size_before:  # the chunk was full and has been closed
+            self.open_chunk.clear()
+
+    def flush(self) -> None:
+        """Close the open chunk: all messages so far survive the death of this process."""
+        self._writer.flush()
+        self.open_chunk.clear()
+
+    def finish(self, bag_metadata: dict) -> None:
+        """Close the open chunk, write index, statistics and footer. bag_metadata: rosbag2's, of this file."""
+        self.flush()
+        self._writer.add_metadata("rosbag2", {"serialized_metadata": qos_yaml.to_yaml(bag_metadata)})
+        self._writer.finish()
+        self._stream.close()
+        self.finished = True
+
+    def abandon(self) -> None:
+        """Close without index and footer, after an error: `hpccd doctor` recovers the closed chunks, which are
+        what the counts then tell. A file without any is removed."""
+        self._stream.close()
+        self.counts -= self.open_chunk
+        self.open_chunk.clear()
+        if not self.message_count:
+            self.path.unlink(missing_ok=True)
+
+
+def bag_metadata(files: list[BagFile], topics: list[Topic]) -> dict:
+    """rosbag2's BagMetadata, version 9 (Jazzy), of the given files."""
+    return summary(files, topics) | {
+        "relative_file_paths": [f.path.name for f in files],
+        "files": [file_information(f) for f in files],
+    }
+
+
+def file_information(file: BagFile) -> dict:
+    """What BagMetadata says of one file."""
+    return {
+        "path": file.path.name,
+        "starting_time": {"nanoseconds_since_epoch": file.start},
+        "duration": {"nanoseconds": file.end - file.start},
+        "message_count": file.message_count,
+    }
+
+
+def summary(files: list[BagFile], topics: list[Topic]) -> dict:
+    """BagMetadata without its lists of files."""
+    used = [f for f in files if f.message_count]
+    start = min((f.start for f in used), default=0)
+    end = max((f.end for f in used), default=0)
+    counts: Counter[str] = Counter()
+    for file in files:
+        counts.update(file.counts)
+    return {
+        "version": 9,
+        "storage_identifier": "mcap",
+        "duration": {"nanoseconds": end - start},
+        "starting_time": {"nanoseconds_since_epoch": start},
+        "message_count": counts.total(),
+        "topics_with_message_count": [
+            {
+                "topic_metadata": {
+                    "name": topic.name,
+                    "type": topic.type_name,
+                    "serialization_format": "cdr",
+                    "offered_qos_profiles": topic.qos,
+                    "type_description_hash": message_definitions.type_hash(topic.type_name),
+                },
+                "message_count": counts[topic.name],
+            }
+            for topic in topics
+        ],
+        # MCAP compresses its own chunks; these two keys are about compression around the file.
+        "compression_format": "",
+        "compression_mode": "",
+        "custom_data": None,
+        "ros_distro": "jazzy",
+    }

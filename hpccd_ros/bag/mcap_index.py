@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The index of an MCAP file (its summary section), and whether the data is what it tells."""
+
+import struct
+import zlib
+from collections.abc import Callable, Iterable
+
+from mcap import records as known
+from mcap.exceptions import McapError
+from mcap.opcode import Opcode
+from mcap.stream_reader import CRCValidationError
+from mcap.summary import Summary
+from mcap.writer import MCAP0_MAGIC
+
+from hpccd_ros.bag.mcap_records import Place, parse, records
+
+_FOOTER = struct.Struct("<BQQQI")
+
+
+class Descriptions:
+    """Schemas and channels by their numbers, from the index and from the data.
+
+    complain: takes a text for each that is described twice, differently; the later one counts.
+    """
+
+    def __init__(self, complain: Callable[[str], None]) -> None:
+        self.schemas: dict[int, known.Schema] = {}
+        self.channels: dict[int, known.Channel] = {}
+        self._complain = complain
+
+    def add(self, record: known.Schema | known.Channel) -> None:
+        kind, into = ("schema", self.schemas) if isinstance(record, known.Schema) else ("channel", self.channels)
+        if into.setdefault(record.id, record) != record:
+            self._complain(f"{kind} {record.id} is described twice, differently")
+            into[record.id] = record
+
+
+def read_index(stream, size: int) -> tuple[Summary | None, int]:
+    """(index or None, where the data must end) of a file of `size` bytes. Raises what is in mcap_records.DAMAGE."""
+    footer_at = size - len(MCAP0_MAGIC) - _FOOTER.size
+    if footer_at < len(MCAP0_MAGIC):
+        raise McapError("no room for a footer")
+    stream.seek(footer_at)
+    raw = stream.read(_FOOTER.size)
+    opcode, length, begin, _, stored = _FOOTER.unpack(raw)
+    if opcode != Opcode.FOOTER or length != _FOOTER.size - 9:
+        raise McapError("no footer at its end")
+    if begin == 0:
+        return None, footer_at
+    if not len(MCAP0_MAGIC) <= begin <= footer_at:
+        raise McapError(f"the footer says that the index begins at byte {begin:,}, {footer_at:,} is the footer's own")
+    stream.seek(begin)
+    found = zlib.crc32(raw[:-4], zlib.crc32(stream.read(footer_at - begin)))
+    if stored not in (0, found):
+        raise CRCValidationError(stored, found, known.Footer(begin, 0, stored))
+    return _summary(records(stream, begin, footer_at)), begin
+
+
+def _summary(raws) -> Summary:
+    def complain(text):
+        raise McapError(f"in the index, {text}")
+
+    described = Descriptions(complain)
+    summary = Summary()
+    lists = {
+        known.ChunkIndex: summary.chunk_indexes,
+        known.AttachmentIndex: summary.attachment_indexes,
+        known.MetadataIndex: summary.metadata_indexes,
+    }
+    for raw in raws:
+        record = parse(raw)
+        if isinstance(record, (known.Schema, known.Channel)):
+            described.add(record)
+        elif isinstance(record, known.Statistics):
+            summary.statistics = record
+        elif type(record) in lists:
+            lists[type(record)].append(record)
+        elif record is not None:
+            raise McapError(f"a {type(record).__name__} in the index")
+    summary.schemas.update(described.schemas)
+    summary.channels.update(described.channels)
+    return summary
+
+
+def misplaced(summary: Summary, data: list[Place]) -> str | None:
+    """How the places that the index names are not those in the `data`, or None.
+
+    An index may name none of a kind at all.
+    """
+    for opcode, name, told in (
+        (Opcode.CHUNK, "chunk", [(i.chunk_start_offset, i.chunk_length) for i in summary.chunk_indexes]),
+        (Opcode.ATTACHMENT, "attachment", [(i.offset, i.length) for i in summary.attachment_indexes]),
+        (Opcode.METADATA, "metadata record", [(i.offset, i.length) for i in summary.metadata_indexes]),
+    ):
+        there = [(place.at, place.length) for place in data if place.opcode == opcode]
+        if told and sorted(told) != there:
+            wrong = sorted(set(told).symmetric_difference(there)) or told
+            return f"the index is wrong about the {name} at byte {wrong[0][0]:,}"
+    return None
+
+
+def undescribed(summary: Summary, channels: Iterable[int]) -> str | None:
+    """Which of the `channels` that have messages the index lacks, or None."""
+    missing = next((number for number in channels if number not in summary.channels), None)
+    return None if missing is None else f"the index does not describe channel {missing}"
+
+
+def miscounted(summary: Summary, counts: dict[int, int]) -> str | None:
+    """How the statistics of the index differ from `counts`, messages by channel, or None."""
+    if summary.statistics is None:
+        return None
+    told = {number: count for number, count in summary.statistics.channel_message_counts.items() if count}
+    if told == dict(counts) and summary.statistics.message_count == sum(counts.values()):
+        return None
+    where = next((n for n in {**told, **counts} if told.get(n, 0) != counts.get(n, 0)), None)
+    if where is None:
+        return f"the index tells of {summary.statistics.message_count:,} messages, there are {sum(counts.values()):,}"
+    return f"the index tells of {told.get(where, 0):,} messages of channel {where}, there are {counts.get(where, 0):,}"

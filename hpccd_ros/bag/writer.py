@@ -1,0 +1,229 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Write MCAP recordings that rosbag2 accepts: profile ros2, CDR messages, ros2msg schemas, bag metadata."""
+
+import os
+import textwrap
+import time
+from collections import Counter
+from pathlib import Path
+
+from hpccd_ros.bag import message_definitions, qos_yaml
+from hpccd_ros.bag.bag_file import (
+    COMPRESSIONS,
+    HPCCD_RECORD,
+    BagFile,
+    Topic,
+    bag_metadata,
+    file_information,
+    summary,
+)
+
+__all__ = ["COMPRESSIONS", "HPCCD_RECORD", "BagWriter", "Topic"]
+
+
+class BagWriter:
+    """One recording: a single file, or a folder of files in rosbag2's layout, split by size or duration.
+
+    path: ends in `.mcap`: one file, which `ros2 bag play` opens alone. Otherwise a folder, made here, with
+    `NAME_0.mcap`, `NAME_1.mcap`, ... and `metadata.yaml` of the finished ones.
+    info: JSON-able dict, stored with each file for the replay (see `mcap_reader.Recording.info`).
+    attachments: (name, bytes) of files that a replay needs, stored with each file too.
+    compression: "none", "lz4" or "zstd", a chunk at a time.
+    chunk_size: bytes of messages after which a chunk is closed, indexed and handed to the system.
+    flush_interval: seconds after which an open chunk is closed all the same. A process killed at any moment
+    loses at most the messages of the open chunk, so at most those of the last `flush_interval`.
+    max_bytes, max_seconds: split limits (0: none), for a folder only. `max_bytes` counts messages
+    before compression, and the last one of a file may pass it.
+
+    The constructor raises ValueError for options that do not fit each other, FileExistsError rather than overwrite
+    a recording, OSError where it cannot write. Later a disk that refuses (full, gone) raises nothing: the file ends
+    behind its last whole chunk, messages that come are counted, and after `retry_interval` seconds a new file is
+    tried: the next number of the folder, or NAME-1.mcap beside NAME.mcap.
+
+    write_errors, last_error: what the disk refused. not_written: messages by topic that are in no file.
+    """
+
+    def __init__(self, path, *, info=None, attachments=(), compression="none", chunk_size=1 << 20, flush_interval=0.5,
+                 max_bytes=0, max_seconds=0.0, retry_interval=5.0):
+        self.path = Path(path)
+        self.single_file = self.path.suffix == ".mcap"
+        if why := refusal(path, compression, max_bytes, max_seconds):
+            raise ValueError(why)
+        if self.path.exists():
+            raise FileExistsError(f"{self.path} exists: recordings are not overwritten; remove it or name another")
+        self.path.parent.mkdir(parents=True, exist_ok=True)
+        if not self.single_file:
+            self.path.mkdir()
+        self._options = {"info": info or {}, "attachments": list(attachments), "compression": compression,
+                         "chunk_size": chunk_size}
+        self._flush_interval = flush_interval
+        self._retry_interval = retry_interval
+        self._limits = (max_bytes, int(max_seconds * 1e9))
+        self._topics: dict[str, Topic] = {}
+        self._files: list[BagFile] = []
+        self._listed: list[tuple[str, str]] = []  # of the finished ones, their parts of metadata.yaml
+        self._file: BagFile | None = None  # None: after an error, until the next try
+        self._try_again = 0.0
+        self._closed = False
+        self.write_errors = 0
+        self.last_error = ""
+        self.not_written: Counter[str] = Counter()
+        self._open_file()
+
+    def add_topic(self, topic: Topic) -> None:
+        """Announce a topic before its first message. Raises LookupError where its type is not installed."""
+        message_definitions.definition_text(topic.type_name)  # fail before anything is written
+        self._topics[topic.name] = topic
+        if self._file is not None:
+            self._guarded(lambda: self._file.register(topic))
+
+    def write(self, topic_name: str, data: bytes, log_time: int, publish_time: int, sequence: int = 0) -> None:
+        """Append the CDR bytes of one message; times in ns since the epoch."""
+        topic = self._topics[topic_name]
+        message = (log_time, publish_time, sequence, data)
+        if self._file is None and time.monotonic() >= self._try_again:
+            self._guarded(lambda: self._go_on(log_time, topic))
+        elif self._file is not None and self._is_full(log_time):
+            self._guarded(lambda: self._split(log_time, topic))
+        # What the error of a failing write loses, its file counts.
+        if self._file is None:
+            self.not_written[topic_name] += 1
+        else:
+            self._guarded(lambda: self._append(topic, *message))
+        topic.last.append(message)
+
+    def poll(self) -> None:
+        """Close the open chunk if it is older than `flush_interval`. Call it also while no messages come."""
+        if time.monotonic() - self._flushed > self._flush_interval:
+            self.flush()
+
+    def flush(self) -> None:
+        """Hand everything written so far to the operating system: it survives the death of this process."""
+        if self._file is not None:
+            self._guarded(self._file.flush)
+        self._flushed = time.monotonic()
+
+    def close(self) -> None:
+        """Finish the last file: index, statistics, footer. The recording is then complete."""
+        self._closed = True
+        if self._file is not None:
+            self._guarded(self._close_file)
+
+    @property
+    def failing(self) -> bool:
+        """Whether the disk refused the last try, so that messages are lost now."""
+        return self._file is None and not self._closed
+
+    @property
+    def message_count(self) -> int:
+        return sum(file.message_count for file in self._files)
+
+    @property
+    def flushed_count(self) -> int:
+        """Messages that survive the death of this process."""
+        return sum(file.message_count - file.open_chunk.total() for file in self._files)
+
+    @property
+    def file_paths(self) -> list[Path]:
+        return [file.path for file in self._files]
+
+    @property
+    def torn_files(self) -> list[Path]:
+        """Files that an error ended before they were finished."""
+        return [file.path for file in self._files if not file.finished and file is not self._file]
+
+    @property
+    def size(self) -> int:
+        """Bytes handed to the system so far, over all files."""
+        return sum(file.size for file in self._files)
+
+    def _guarded(self, action) -> None:
+        """Do `action` with the current file; where the disk refuses, count it and give the file up."""
+        try:
+            action()
+        except OSError as error:
+            self.write_errors += 1
+            self.last_error = f"{error.strerror}: {error.filename or (self._file and self._file.path) or self.path}"
+            self._try_again = time.monotonic() + self._retry_interval
+            file, self._file = self._file, None
+            if file is None:
+                return
+            self.not_written += file.open_chunk
+            file.abandon()
+            if not file.message_count:
+                self._files.remove(file)
+
+    def _next_path(self) -> Path:
+        if self.single_file:
+            return free_path(self.path)
+        number = len(self._files)
+        while (path := self.path / f"{self.path.name}_{number}.mcap").exists():
+            number += 1
+        return path
+
+    def _open_file(self):
+        self._file = BagFile(self._next_path(), **self._options)
+        self._files.append(self._file)
+        self._flushed = time.monotonic()
+
+    def _close_file(self):
+        self._file.finish(bag_metadata([self._file], list(self._topics.values())))
+        self._file = None
+        if not self.single_file:
+            self._list_files()
+
+    def _list_files(self):
+        finished = [file for file in self._files if file.finished]
+        # Those before are rendered already: with all of them anew, each split takes longer than the one before, and the
+        # messages of a stream that goes on meanwhile are lost.
+        for file in finished[len(self._listed) :]:
+            parts = ([file.path.name], [file_information(file)])
+            self._listed.append(tuple(textwrap.indent(qos_yaml.to_yaml(part), "  ") for part in parts))
+        names, files = ("".join(parts) for parts in zip(*self._listed, strict=True))
+        bag = {"rosbag2_bagfile_information": summary(finished, list(self._topics.values()))}
+        lists = f"  relative_file_paths:\n{names}  files:\n{files}"
+        draft = self.path / "metadata.yaml.part"
+        draft.write_text(qos_yaml.to_yaml(bag) + lists, encoding="utf-8")
+        os.replace(draft, self.path / "metadata.yaml")  # whole at any moment
+
+    def _split(self, log_time, cause):
+        self._close_file()
+        self._go_on(log_time, cause)
+
+    def _go_on(self, log_time, cause):
+        """Open the next file. It is complete alone: it starts with what is in force before the message of `cause`."""
+        self._open_file()
+        for topic in self._topics.values():
+            self._file.register(topic)
+            outlived = topic is cause and len(topic.last) == topic.latched
+            for earlier in list(topic.last)[int(outlived):]:
+                self._file.append(topic, log_time, *earlier[1:])
+
+    def _is_full(self, log_time):
+        max_bytes, max_ns = self._limits
+        file = self._file
+        return file.message_count and (
+            (max_bytes and file.data_bytes >= max_bytes) or (max_ns and log_time - file.start >= max_ns)
+        )
+
+    def _append(self, topic, *message):
+        self._file.append(topic, *message)
+        self.poll()
+
+
+def refusal(path, compression: str, max_bytes: float, max_seconds: float) -> str | None:
+    """Why a recording cannot be made with these options, or None."""
+    if Path(path).suffix == ".mcap" and (max_bytes or max_seconds):
+        return f"cannot split the single file {path}: give a folder (a path that does not end in .mcap)"
+    if compression not in COMPRESSIONS:
+        return f"compression {compression!r} is none of {', '.join(COMPRESSIONS)}"
+    return None
+
+
+def free_path(path: Path) -> Path:
+    """`path`, or where it exists NAME-1, NAME-2, ... beside it: recordings are not overwritten."""
+    candidate, number = path, 0
+    while candidate.exists():
+        number += 1
+        candidate = path.with_name(f"{path.stem}-{number}{path.suffix}")
+    return candidate

@@ -1,0 +1,32 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The core numbers features across the scene, messages within a mesh: how one becomes the other."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hpccd_ros.frames.types import Topology
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """Where each mesh lies in the scene-wide numbering of the core.
+
+    ``vertex_offsets``, ``face_offsets``: (K+1,) int64, the last entry is the total. ``topology_versions``: one for each
+    mesh; empty: not known.
+    """
+
+    mesh_names: tuple[str, ...]
+    vertex_offsets: np.ndarray
+    face_offsets: np.ndarray
+    topology_versions: tuple[int, ...] = ()
+
+    @classmethod
+    def of(cls, mesh_names: tuple[str, ...], topologies: tuple[Topology, ...]) -> "Layout":
+        """Meshes concatenated in the order given, as hpccd_core.Scene does."""
+        return cls(
+            tuple(mesh_names),
+            np.cumsum([0] + [t.n_vertices for t in topologies], dtype=np.int64),
+            np.cumsum([0] + [len(t.faces) for t in topologies], dtype=np.int64),
+            tuple(t.version for t in topologies),
+        )

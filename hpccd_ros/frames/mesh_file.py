@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Read a mesh file: vertices and triangles as they are numbered in the file, optionally placed by a pose."""
+
+from pathlib import Path
+
+import numpy as np
+
+from hpccd_ros.base.quoting import shortened
+from hpccd_ros.frames import coordinates
+from hpccd_ros.frames.rigid import Rigid
+
+FORMATS = (".obj", ".ply", ".stl")
+
+
+class MeshFileError(ValueError):
+    """A mesh file that cannot be used; the text names it and the remedy."""
+
+
+def load_mesh(path: str) -> tuple[np.ndarray, np.ndarray]:
+    """(vertices (n,3) float64, faces (F,3) uint32) of an OBJ, PLY or STL file, in the file's own numbering.
+
+    STL repeats the corners of each triangle; equal ones (bit for bit) become one vertex, in order of first
+    use. Polygons become triangle fans. Raises MeshFileError: trimesh missing, no such file, other format, no
+    triangles.
+    """
+    file = _existing(path)
+    try:
+        import trimesh
+    except ImportError as error:
+        raise MeshFileError(
+            f"{file}: reading mesh files needs trimesh; install it with: pip install 'hpccd[meshes]' "
+            "(or pip install trimesh)"
+        ) from error
+    try:
+        # process=False: trimesh would merge and reorder vertices, and publishers number them as the file
+        # does.
+        options = {"maintain_order": True, "skip_materials": True} if file.suffix.lower() == ".obj" else {}
+        mesh = trimesh.load(file, force="mesh", process=False, **options)
+    except Exception as error:  # trimesh raises whatever its parsers meet
+        why = _not_text(file) or shortened(" ".join(str(error).split()))
+        raise MeshFileError(f"{file}: cannot be read: {why}") from error
+    vertices, faces = np.asarray(mesh.vertices, np.float64), np.asarray(mesh.faces)
+    if len(faces) == 0:
+        raise MeshFileError(f"{file}: has no triangles")
+    if file.suffix.lower() == ".stl":
+        vertices, faces = _join_equal(vertices, faces)
+    if refusal := coordinates.refusal(vertices):
+        raise MeshFileError(f"{file}: {refusal[1]}")
+    return vertices, faces.astype(np.uint32)
+
+
+def _existing(path: str) -> Path:
+    shown = shortened(path)
+    if (suffix := Path(path).suffix).lower() not in FORMATS:
+        raise MeshFileError(f"{shown}: format {shortened(suffix) or '(none)'!r}; use one of {', '.join(FORMATS)}")
+    try:
+        file = Path(path).expanduser()
+        if file.is_file():
+            return file
+    except RuntimeError as error:  # ~name, and there is no such user
+        raise MeshFileError(f"{shown}: no such home folder; give the whole path") from error
+    except OSError as error:
+        raise MeshFileError(f"{shown}: {error.strerror}; give the path of a file that can be read") from error
+    raise MeshFileError(f"{shown}: no such file (relative paths start from {Path.cwd()})")
+
+
+def _not_text(file: Path) -> str | None:
+    """What is wrong where bytes are no text but have to be: trimesh then speaks of a module to guess what they are."""
+    try:
+        file.read_bytes().decode("utf-8")
+    except UnicodeDecodeError:
+        if file.suffix.lower() == ".stl":
+            return "neither a binary STL (its length does not fit its number of triangles) nor text; export it anew"
+        if file.suffix.lower() == ".obj":
+            return "its text is not UTF-8; save it as UTF-8"
+    except OSError:
+        pass  # then that is what trimesh says
+    return None
+
+
+def place(vertices: np.ndarray, pose: list[float]) -> np.ndarray:
+    """Rotate by the quaternion x y z w, then translate by x y z (pose: 3 + 4 numbers).
+
+    Raises MeshFileError: not 7 numbers, not finite, quaternion not of unit length within 1e-3, too far away.
+    """
+    try:
+        placed = Rigid.of(pose[:3], pose[3:]).apply(vertices)
+    except ValueError as error:
+        raise MeshFileError(f"pose: {shortened(pose)} {error}") from error
+    if refusal := coordinates.refusal(placed):
+        raise MeshFileError(f"pose: {shortened(pose)}: placed by it, {refusal[1]}")
+    return placed
+
+
+def _join_equal(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    # + 0.0 makes -0.0 equal to 0.0 in the comparison.
+    _, first, inverse = np.unique(vertices + 0.0, axis=0, return_index=True, return_inverse=True)
+    order = np.argsort(first)
+    rank = np.empty_like(order)
+    rank[order] = np.arange(len(order))
+    return vertices[first[order]], rank[inverse.reshape(-1)][faces]

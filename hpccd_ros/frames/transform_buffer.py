@@ -1,0 +1,127 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A tree of coordinate frames over time, as tf2 keeps it: what is needed to bring positions into one frame. No ROS.
+
+The wheels hold no tf2; its rules are kept: the last ten seconds of each frame, interpolation between samples, no
+extrapolation. Bounded, as anybody may publish transforms.
+"""
+
+from bisect import bisect_left
+
+from hpccd_ros.base.quoting import quoted
+from hpccd_ros.frames.rigid import IDENTITY, Rigid
+
+HISTORY_NS = 10_000_000_000
+MOST_FRAMES = 1000
+MOST_SAMPLES = 1000  # of one frame: 100 Hz for the whole history; about 500 MB if every frame were full
+LONGEST_NAME = 255
+
+
+class NoTransformError(LookupError):
+    """There is no transform; ``final``: none will come for this stamp either.
+
+    ``connected``: transforms lead from one frame to the other, only not for this stamp.
+    """
+
+    def __init__(self, text: str, final: bool, connected: bool = True) -> None:
+        super().__init__(text)
+        self.final = final
+        self.connected = connected
+
+
+class _Edge:
+    """Where one frame was in its parent: samples in the order of their stamps; ``always``: not bound to a time."""
+
+    def __init__(self, parent: str) -> None:
+        self.parent = parent
+        self.always: Rigid | None = None
+        self.stamps: list[int] = []
+        self.samples: list[Rigid] = []
+
+    def add(self, stamp: int, rigid: Rigid) -> None:
+        if self.stamps and stamp < self.stamps[-1] - HISTORY_NS:
+            # The source was restarted at an earlier time: the old samples would be interpolated with the new ones.
+            self.stamps.clear()
+            self.samples.clear()
+        at = bisect_left(self.stamps, stamp)
+        if at < len(self.stamps) and self.stamps[at] == stamp:
+            self.samples[at] = rigid
+            return
+        self.stamps.insert(at, stamp)
+        self.samples.insert(at, rigid)
+        old = max(bisect_left(self.stamps, self.stamps[-1] - HISTORY_NS), len(self.stamps) - MOST_SAMPLES)
+        del self.stamps[:old], self.samples[:old]
+
+    def at(self, child: str, stamp: int) -> Rigid:
+        if self.always is not None:
+            return self.always
+        at = bisect_left(self.stamps, stamp)
+        if at == len(self.stamps):
+            late = f"the last one from {child!r} to {self.parent!r} is of {self.stamps[-1]} ns"
+            raise NoTransformError(f"{late}, before the stamp {stamp} ns", final=False)
+        if self.stamps[at] == stamp:
+            return self.samples[at]
+        if at == 0:
+            early = f"the first one kept from {child!r} to {self.parent!r} is of {self.stamps[0]} ns"
+            raise NoTransformError(f"{early}, after the stamp {stamp} ns", final=True)
+        before, after = self.stamps[at - 1], self.stamps[at]
+        return self.samples[at - 1].between(self.samples[at], (stamp - before) / (after - before))
+
+
+class TransformBuffer:
+    """Transforms from child frames to their parents, and lookups between any two frames of the tree."""
+
+    def __init__(self) -> None:
+        self._edges: dict[str, _Edge] = {}
+
+    def add(self, parent: str, child: str, rigid: Rigid, stamp: int | None) -> None:
+        """``rigid`` takes coordinates in ``child`` to coordinates in ``parent``; stamp ns, None: at all times.
+
+        Raises ValueError: an empty or too long name, a frame in itself, too many frames.
+        """
+        parent, child = parent.removeprefix("/"), child.removeprefix("/")
+        if max(len(parent), len(child)) > LONGEST_NAME:
+            raise ValueError(f"a frame's name has more than {LONGEST_NAME} characters")
+        if not parent or not child or parent == child:
+            raise ValueError(f"frames {parent!r} and {child!r}: two different names are needed")
+        edge = self._edges.get(child)
+        if edge is None and len(self._edges) >= MOST_FRAMES:
+            raise ValueError(f"frame {child!r} is one too many: {MOST_FRAMES} are known already")
+        if edge is None or edge.parent != parent:
+            edge = self._edges[child] = _Edge(parent)
+        if stamp is None:
+            edge.always = rigid
+        else:
+            edge.always = None
+            edge.add(stamp, rigid)
+
+    def lookup(self, source: str, target: str, stamp: int) -> Rigid:
+        """What takes coordinates in ``source`` to coordinates in ``target`` at ``stamp`` ns.
+
+        Raises NoTransformError: unknown frame, no path, or no sample around the stamp.
+        """
+        source, target = source.removeprefix("/"), target.removeprefix("/")
+        if source == target:
+            return IDENTITY
+        up, down = self._ancestors(source), self._ancestors(target)
+        common = next((frame for frame in up if frame in set(down)), None)
+        if common is None:
+            text = f"no transform connects {quoted(source)} and {quoted(target)}"
+            raise NoTransformError(text, final=False, connected=False)
+        return self._to_ancestor(target, common, stamp).inverse().after(self._to_ancestor(source, common, stamp))
+
+    def _ancestors(self, frame: str) -> list[str]:
+        path = [frame]
+        while (edge := self._edges.get(path[-1])) is not None:
+            if edge.parent in path:
+                text = f"the frames {' -> '.join(path)} form a loop"
+                raise NoTransformError(text, final=False, connected=False)
+            path.append(edge.parent)
+        return path
+
+    def _to_ancestor(self, frame: str, ancestor: str, stamp: int) -> Rigid:
+        rigid = IDENTITY
+        while frame != ancestor:
+            edge = self._edges[frame]
+            rigid = edge.at(frame, stamp).after(rigid)
+            frame = edge.parent
+        return rigid

@@ -1,0 +1,156 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Topologies and vertices of a mesh: messages <-> numpy arrays, checked."""
+
+import numpy as np
+from hpccd.msg import MeshTopology, MeshVertices
+from sensor_msgs.msg import PointCloud2, PointField
+
+from hpccd_ros.base.quoting import listed
+from hpccd_ros.frames import coordinates
+from hpccd_ros.frames.drops import Reason
+from hpccd_ros.frames.types import Topology
+from hpccd_ros.middleware.fields import InvalidMessageError, ns_to_stamp, stamp_to_ns, to_field
+
+_FIELD_TYPES = {PointField.FLOAT32: np.dtype(np.float32), PointField.FLOAT64: np.dtype(np.float64)}
+
+
+def topology_from_message(message: MeshTopology, max_vertices: int, max_faces: int) -> Topology:
+    """Checked topology; ``faces`` (F,3) uint32 is a view of the message's bytes.
+
+    Raises InvalidMessageError: too large, no triples, an index out of range, a stamp that is no time.
+    """
+    stamp_to_ns(message.header.stamp)  # not used, but wrong
+    flat = np.frombuffer(message.faces, np.uint32)
+    if len(flat) % 3:
+        raise InvalidMessageError(Reason.MALFORMED, f"faces has {len(flat)} indices, not a multiple of 3")
+    _limit("faces", len(flat) // 3, "max_faces", max_faces)
+    _limit("n_vertices", message.n_vertices, "max_vertices", max_vertices)
+    if len(flat) and (highest := int(flat.max())) >= message.n_vertices:
+        raise InvalidMessageError(
+            Reason.INDEX_RANGE,
+            f"face {int(flat.argmax()) // 3} names vertex {highest}, n_vertices is {message.n_vertices}",
+        )
+    return Topology(message.version, message.n_vertices, flat.reshape(-1, 3))
+
+
+def vertices_from_message(message: MeshVertices, max_vertices: int) -> np.ndarray:
+    """(n,3) float32 or float64: a view of the message's bytes.
+
+    Raises InvalidMessageError: none or both of the arrays filled, no triples, too large, NaN, infinity or beyond 1e150.
+    """
+    single, double = message.vertices_f32, message.vertices_f64
+    if bool(len(single)) == bool(len(double)):
+        which = "both are filled" if len(single) else "both are empty"
+        raise InvalidMessageError(Reason.MALFORMED, f"fill exactly one of vertices_f32 and vertices_f64; {which}")
+    flat = np.frombuffer(single, np.float32) if len(single) else np.frombuffer(double, np.float64)
+    if len(flat) % 3:
+        raise InvalidMessageError(Reason.MALFORMED, f"vertices has {len(flat)} coordinates, not a multiple of 3")
+    _limit("vertices", len(flat) // 3, "max_vertices", max_vertices)
+    return _usable(flat.reshape(-1, 3))
+
+
+def vertices_from_cloud(cloud: PointCloud2, max_vertices: int) -> np.ndarray:
+    """(n,3) float32 or float64 from the fields x, y, z of a PointCloud2, n = width * height.
+
+    A view where x, y, z fill the points without a gap, else a copy. Fields may come in any order, with
+    padding within points and rows; x, y, z of both types become float64 (exactly).
+    Raises InvalidMessageError: big-endian, fields missing or of another type or out of bounds, too little
+    data, too large, NaN, infinity or beyond 1e150.
+    """
+    if cloud.is_bigendian:
+        raise InvalidMessageError(
+            Reason.BIG_ENDIAN,
+            "big-endian clouds are not supported; swap the bytes and set is_bigendian to false",
+        )
+    offsets, types = zip(*(_cloud_field(cloud, axis) for axis in "xyz"), strict=True)
+    count = cloud.width * cloud.height
+    _limit("width * height", count, "max_vertices", max_vertices)
+    row_bytes = cloud.width * cloud.point_step
+    # A cloud of one row may leave row_step at 0: there is no second row to step to.
+    row_step = cloud.row_step if cloud.height > 1 else max(cloud.row_step, row_bytes)
+    if row_step < row_bytes:
+        raise InvalidMessageError(
+            Reason.MALFORMED, f"row_step {row_step} is less than width * point_step = {row_bytes}"
+        )
+    needed = row_step * (cloud.height - 1) + row_bytes if count else 0
+    if len(cloud.data) < needed:
+        raise InvalidMessageError(
+            Reason.MALFORMED,
+            f"data has {len(cloud.data)} bytes, {cloud.height} rows of {cloud.width} points need {needed}",
+        )
+    if count == 0:
+        raise InvalidMessageError(Reason.MALFORMED, "the cloud has no points")
+    data = np.frombuffer(cloud.data, np.uint8, needed)
+    size = types[0].itemsize
+    if (
+        len(set(types)) == 1
+        and offsets == (0, size, 2 * size)
+        and cloud.point_step == 3 * size
+        and (row_step == row_bytes or cloud.height == 1)
+    ):
+        return _usable(data.view(types[0]).reshape(-1, 3))
+    point = np.dtype({"names": list("xyz"), "formats": types, "offsets": offsets, "itemsize": cloud.point_step})
+    rows = np.ndarray((cloud.height, cloud.width), point, data, strides=(row_step, cloud.point_step))
+    points = np.empty((cloud.height, cloud.width, 3), np.result_type(*types))
+    for axis, name in enumerate("xyz"):
+        points[..., axis] = rows[name]
+    return _usable(points.reshape(-1, 3))
+
+
+def _cloud_field(cloud: PointCloud2, axis: str) -> tuple[int, np.dtype]:
+    field = next((f for f in cloud.fields if f.name == axis), None)
+    if field is None:
+        raise InvalidMessageError(
+            Reason.MALFORMED,
+            f"no field {axis!r}; the cloud has {listed(f.name for f in cloud.fields) or 'none'}",
+        )
+    if field.datatype not in _FIELD_TYPES or field.count > 1:
+        raise InvalidMessageError(
+            Reason.UNSUPPORTED_TYPE,
+            f"field {axis!r} has datatype {field.datatype} and count "
+            f"{field.count}; use FLOAT32 (7) or FLOAT64 (8) and count 1",
+        )
+    kind = _FIELD_TYPES[field.datatype]
+    if field.offset + kind.itemsize > cloud.point_step:
+        raise InvalidMessageError(
+            Reason.MALFORMED,
+            f"field {axis!r} ends at byte {field.offset + kind.itemsize}, point_step is {cloud.point_step}",
+        )
+    return field.offset, kind
+
+
+def _limit(what: str, size: int, parameter: str, limit: int) -> None:
+    if size > limit:
+        raise InvalidMessageError(
+            Reason.TOO_LARGE, f"{what} is {size}, above the limit {limit} (parameter {parameter})"
+        )
+
+
+def _usable(vertices: np.ndarray) -> np.ndarray:
+    if refusal := coordinates.refusal(vertices):
+        raise InvalidMessageError(*refusal)
+    return vertices
+
+
+def topology_message(faces: np.ndarray, n_vertices: int, *, version: int = 0, stamp_ns: int = 0) -> MeshTopology:
+    """faces: (F,3) integers, indices of the mesh's own vertices."""
+    message = MeshTopology(version=version, n_vertices=n_vertices, check_fields=True)
+    message.header.stamp = ns_to_stamp(stamp_ns)
+    message.faces = to_field(np.asarray(faces).astype(np.uint32, copy=False))
+    return message
+
+
+def vertices_message(
+    vertices: np.ndarray, stamp_ns: int, *, step: int = 0, topology_version: int = 0, frame_id: str = ""
+) -> MeshVertices:
+    """vertices: (n,3) float32 or float64, sent in that precision. stamp_ns: end of the step."""
+    message = MeshVertices(step=step, topology_version=topology_version, check_fields=True)
+    message.header.stamp = ns_to_stamp(stamp_ns)
+    message.header.frame_id = frame_id
+    if vertices.dtype == np.float32:
+        message.vertices_f32 = to_field(vertices)
+    elif vertices.dtype == np.float64:
+        message.vertices_f64 = to_field(vertices)
+    else:
+        raise TypeError(f"vertices: dtype {vertices.dtype}; use float32 or float64")
+    return message

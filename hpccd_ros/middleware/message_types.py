@@ -1,0 +1,27 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Names of message types, and the Python classes behind them."""
+
+import importlib
+import re
+
+# A name may come from a recording: it must not lead out of the folders of messages, nor to any other module.
+_TYPE_NAME = re.compile(r"([A-Za-z][A-Za-z0-9_]*)/([a-z]+)/([A-Za-z][A-Za-z0-9_]*)")
+
+
+def parts(type_name: str) -> tuple[str, str, str]:
+    """("pkg", "msg", "Name") of "pkg/msg/Name". Raises LookupError where it is no such name."""
+    if (match := _TYPE_NAME.fullmatch(type_name)) is None:
+        raise LookupError(f"{type_name!r} is no name of a message type (package/msg/Name)")
+    return match[1], match[2], match[3]
+
+
+def message_class(type_name: str):
+    """The Python class of "pkg/msg/Name". Raises LookupError where it is no such name, or is not installed."""
+    package, folder, short = parts(type_name)
+    try:
+        found = getattr(importlib.import_module(f"{package}.{folder}"), short)
+    except (ImportError, AttributeError) as error:
+        raise LookupError(f"message type {type_name} is not installed here: {error}") from error
+    if not hasattr(found, "get_fields_and_field_types"):
+        raise LookupError(f"{type_name} is no message type")
+    return found

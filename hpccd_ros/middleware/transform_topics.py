@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The topics on which transforms come, for the node, its recordings and their replay.
+
+There is no wheel of tf2_msgs, so geometry_msgs/TransformStamped on ``transforms`` and ``transforms_static`` is always
+understood as well.
+"""
+
+import dataclasses
+from typing import Any
+
+from hpccd_ros.base.quoting import quoted
+from hpccd_ros.frames.rigid import Rigid
+from hpccd_ros.frames.transform_buffer import TransformBuffer
+from hpccd_ros.middleware import fields
+from hpccd_ros.middleware.message_types import message_class
+
+STAMPED = "geometry_msgs/msg/TransformStamped"
+TF2 = "tf2_msgs/msg/TFMessage"
+TYPES = (STAMPED, TF2)
+
+
+@dataclasses.dataclass(frozen=True)
+class TransformTopic:
+    """static: at all times, and latched: each message adds to those before."""
+
+    name: str
+    type_name: str
+    static: bool
+
+
+ALL = {
+    topic.name: topic
+    for topic in (
+        TransformTopic("transforms", STAMPED, False),
+        TransformTopic("transforms_static", STAMPED, True),
+        TransformTopic("/tf", TF2, False),
+        TransformTopic("/tf_static", TF2, True),
+    )
+}
+
+
+def understood() -> list[TransformTopic]:
+    """Those whose message is installed here."""
+    return [topic for topic in ALL.values() if _installed(topic.type_name)]
+
+
+def _installed(type_name: str) -> bool:
+    try:
+        message_class(type_name)
+    except LookupError:
+        return False
+    return True
+
+
+def in_message(message: Any) -> list[Any]:
+    """The TransformStamped in a message of one of the topics."""
+    return list(message.transforms) if hasattr(message, "transforms") else [message]
+
+
+def keep(buffer: TransformBuffer, message: Any, static: bool) -> None:
+    """Add a TransformStamped to ``buffer``. Raises ValueError, naming its frames, where it is none."""
+    shift, turn = message.transform.translation, message.transform.rotation
+    try:
+        stamp = fields.stamp_to_ns(message.header.stamp)
+        buffer.add(
+            message.header.frame_id,
+            message.child_frame_id,
+            Rigid.of((shift.x, shift.y, shift.z), (turn.x, turn.y, turn.z, turn.w)),
+            None if static else stamp,
+        )
+    except ValueError as error:
+        names = f"{quoted(message.child_frame_id)} to {quoted(message.header.frame_id)}"
+        raise ValueError(f"transform from {names}: {error}") from error

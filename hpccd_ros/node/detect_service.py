@@ -1,0 +1,311 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Service ``~/detect``: two snapshots in, contacts out; computed outside of the executor."""
+
+import math
+import threading
+import time
+from collections import Counter
+from collections.abc import Callable
+from concurrent.futures import CancelledError, ThreadPoolExecutor
+from concurrent.futures import Future as JobFuture
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from hpccd.msg import ContactArray, MeshVertices
+from hpccd.srv import Detect
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.clock import Clock, ClockType
+from rclpy.node import Node
+from rclpy.task import Future
+
+from hpccd_core import Cancelled
+from hpccd_ros.base.quoting import LONGEST_MESSAGE, listed, quoted, repeated, shortened
+from hpccd_ros.detect.cancellation import Ongoing
+from hpccd_ros.detect.detection import CORE_ERRORS, Options, SceneBuilder, make_detector
+from hpccd_ros.detect.layout import Layout
+from hpccd_ros.frames.types import Topology
+from hpccd_ros.middleware import contact_messages, fields, mesh_messages, qos
+from hpccd_ros.middleware.guard import Errors
+
+
+class RequestError(ValueError):
+    """A request that cannot be answered; the text says what to mend."""
+
+
+@dataclass(frozen=True)
+class NodeScene:
+    """What the node itself knows at the time of a request: its meshes and the topologies in force."""
+
+    builder: SceneBuilder
+    topologies: dict[str, Topology | None]
+
+
+# Requests that may lie in the queue of the service beside those that find a place: a burst of them is answered "busy"
+# rather than lost. Bounds what strangers can make the node hold.
+ROOM_TO_REFUSE = 1000
+# s, the longest time limit: rclpy's timers count nanoseconds in 64 bits, 292 years.
+LONGEST = 86_400.0
+# s for telling those whose requests nobody has looked at yet that the service ends.
+FAREWELL = 0.5
+# s that the service outlives its last answer: DDS tells a client of the end by another way, which on a busy machine
+# overtook 4 of 610 answers, and a reader takes nothing of a writer that is gone.
+DELIVERY = 0.2
+STOPPED = "stopped: the node was shut down or cleaned up before the answer was ready; ask again when it is active"
+
+
+def new_counts() -> Counter:
+    """How many requests ended how."""
+    return Counter(answered=0, refused=0, busy=0, timed_out=0, failed=0, stopped=0)
+
+
+class DetectService:
+    """Answers ``detect_jobs`` requests at a time; ``detect_waiting`` more may wait, the rest is refused.
+
+    A request that is not answered when its time limit has passed, or when the service is closed, is told so and its
+    computation given up; the place that it holds is free once that ends.
+    scene: what the node knows, asked in the executor at each request; a text instead: why it cannot answer
+    now.
+    ended: counts of `new_counts`, gone on with.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        settings: dict[str, Any],
+        options: Callable[[], Options],
+        scene: Callable[[], NodeScene | str],
+        ended: Counter,
+        errors: Errors,
+    ) -> None:
+        self._node = node
+        self._settings = settings
+        self._options = options
+        self._scene = scene
+        self._ended = ended
+        self._errors = errors
+        self._capacity = settings["detect_jobs"] + settings["detect_waiting"]
+        self._pool = ThreadPoolExecutor(settings["detect_jobs"], thread_name_prefix="detect")
+        self._lock = threading.Lock()
+        self._open = 0
+        self._closed = False
+        self._last_answer = -math.inf
+        self._ongoing: set[Ongoing] = set()
+        self._awaited: set[Callable[[], None]] = set()
+        # A callback that awaits occupies its group until it ends: in the node's own group it would stop everything.
+        self._group = ReentrantCallbackGroup()
+        self._service = node.create_service(
+            Detect,
+            "~/detect",
+            self._answer,
+            qos_profile=qos.requests(self._capacity + ROOM_TO_REFUSE),
+            callback_group=self._group,
+        )
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """How requests ended, and how many hold a place now."""
+        return {**self._ended, "open": self._open}
+
+    def close(self) -> None:
+        """Answer whoever still waits, then end. In the thread of the executor; its next turn comes too late."""
+        self._closed = True
+        for ongoing in tuple(self._ongoing):
+            ongoing.end()
+        self._pool.shutdown(wait=False, cancel_futures=True)
+        for settle in tuple(self._awaited):
+            settle()
+        executor = self._node.executor
+        # rclpy has no way to have answers sent now but to go on with the callbacks that await.
+        for task, entity, _ in tuple(executor._tasks) if executor is not None else ():
+            if entity is self._service:
+                task()
+        self._turn_away()
+        time.sleep(max(0.0, self._last_answer + DELIVERY - time.monotonic()))
+        self._node.destroy_service(self._service)
+
+    def _turn_away(self) -> None:
+        """Answer the requests that came and were not looked at yet."""
+        deadline = time.monotonic() + FAREWELL  # an answer to a client that is gone takes 0.1 s
+        with self._service.handle:
+            while time.monotonic() < deadline:
+                request, header = self._service.handle.service_take_request(Detect.Request)
+                if header is None:
+                    return
+                self._service.send_response(self._refuse(Detect.Response(), "stopped", STOPPED), header)
+                self._last_answer = time.monotonic()
+
+    async def _answer(self, request: Detect.Request, response: Detect.Response) -> Detect.Response:
+        try:
+            return await self._computed(request, response)
+        except RequestError as error:
+            return self._refuse(response, "refused", str(error))
+        except Exception as error:  # here and not only by the executor's guard, so that it is counted as failed
+            return self._refuse(Detect.Response(), "failed", self._errors.caught("~/detect", error))
+        finally:
+            self._last_answer = time.monotonic()
+
+    async def _computed(self, request: Detect.Request, response: Detect.Response) -> Detect.Response:
+        limit = self._time_limit(request)
+        scene = self._scene()
+        if isinstance(scene, str):
+            raise RequestError(scene)
+        if not self._enter():
+            return self._refuse(
+                response,
+                "busy",
+                f"busy: {self._capacity} requests are being computed or wait "
+                "(parameters detect_jobs, detect_waiting); try again later",
+            )
+        ongoing = Ongoing()
+        self._ongoing.add(ongoing)
+        try:
+            job = self._pool.submit(self._compute, request, scene, self._options(), ongoing)
+        except RuntimeError:  # the system gives no further thread
+            self._ongoing.discard(ongoing)
+            self._leave()
+            raise
+        job.add_done_callback(lambda _: self._ongoing.discard(ongoing))
+        job.add_done_callback(lambda _: self._leave())
+        await self._settled(job, limit)
+        if not job.done():
+            job.cancel()
+            ongoing.end()
+            if self._closed:
+                return self._refuse(response, "stopped", STOPPED)
+            return self._refuse(
+                response,
+                "timed_out",
+                f"time limit of {limit:g} s passed before the answer was ready; "
+                "ask for less (report first), or set a longer time_limit",
+            )
+        try:
+            contacts = job.result()
+        except RequestError:
+            raise
+        except (Cancelled, CancelledError):  # only `close` ends a job that is awaited
+            return self._refuse(response, "stopped", STOPPED)
+        except CORE_ERRORS as error:
+            return self._refuse(response, "failed", f"{type(error).__name__}: {error}")
+        response.contacts = contacts
+        response.success = True
+        response.message = f"{contacts.total} contacts"
+        self._ended["answered"] += 1
+        return response
+
+    async def _settled(self, job: JobFuture, limit: float) -> None:
+        """Wait until the job is done, `limit` seconds have passed or the service is closed."""
+        settled = Future(executor=self._node.executor)
+
+        def settle(_: Any = None) -> None:
+            if not settled.done():
+                settled.set_result(None)
+            if (executor := self._node.executor) is not None:
+                executor.wake()  # a task that awaits is only looked at when the executor wakes up
+
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        # Of a group of its own, which ends with it: a group remembers every timer that it ever had.
+        timer = self._node.create_timer(limit, settle, callback_group=ReentrantCallbackGroup(), clock=steady)
+        self._awaited.add(settle)
+        job.add_done_callback(settle)
+        try:
+            await settled
+        finally:
+            self._awaited.discard(settle)
+            self._node.destroy_timer(timer)
+
+    def _refuse(self, response: Detect.Response, kind: str, text: str) -> Detect.Response:
+        self._ended[kind] += 1
+        response.success, response.message = False, shortened(text, LONGEST_MESSAGE)
+        return response
+
+    def _enter(self) -> bool:
+        with self._lock:
+            if self._open >= self._capacity:
+                return False
+            self._open += 1
+            return True
+
+    def _leave(self) -> None:
+        with self._lock:
+            self._open -= 1
+
+    def _time_limit(self, request: Detect.Request) -> float:
+        limit = request.time_limit or self._settings["detect_time_limit"]
+        if not (math.isfinite(limit) and limit > 0):
+            raise RequestError(
+                f"time_limit: {request.time_limit} must be positive and finite, or 0 for the node's default"
+            )
+        return min(limit, LONGEST)
+
+    def _compute(
+        self, request: Detect.Request, scene: NodeScene, options: Options, ongoing: Ongoing
+    ) -> ContactArray:
+        names = list(request.mesh_names) or list(scene.topologies)
+        if not names:
+            raise RequestError("mesh_names: empty, and the node has no meshes of its own")
+        most = self._settings["max_meshes"]
+        if len(names) > most:
+            raise RequestError(f"mesh_names: {len(names)} meshes, at most {most} are taken (parameter max_meshes)")
+        if len(set(names)) != len(names):
+            raise RequestError(f"mesh_names: names must differ, {repeated(names)} is there twice")
+        for field in ("topologies", "start", "end"):
+            given = len(getattr(request, field))
+            if given != len(names) and not (field == "topologies" and given == 0):
+                raise RequestError(f"{field}: {given} entries for {len(names)} meshes ({listed(names)})")
+        topologies = tuple(self._topology(request, scene, i, name) for i, name in enumerate(names))
+        start = self._vertices("start", names, request.start, topologies)
+        end = self._vertices("end", names, request.end, topologies)
+        options = replace(options, accuracy=request.accuracy or options.accuracy, report=request.report or "all")
+        detector = ongoing.use(make_detector(scene.builder.among(names).build(topologies), options))
+        contacts = detector.detect(start, end)
+        message = ContactArray(accuracy=options.accuracy, backend=detector.backend)
+        message.header = request.end[0].header
+        message.start = request.start[0].header.stamp
+        message.step = request.end[0].step
+        contact_messages.fill_contacts(
+            message,
+            contacts,
+            Layout.of(tuple(names), topologies),
+            max_contacts=self._settings["max_contacts"],
+            outputs=options.outputs,
+        )
+        return message
+
+    def _topology(self, request: Detect.Request, scene: NodeScene, index: int, name: str) -> Topology:
+        if request.topologies:
+            try:
+                return mesh_messages.topology_from_message(
+                    request.topologies[index], self._settings["max_vertices"], self._settings["max_faces"]
+                )
+            except fields.InvalidMessageError as error:
+                raise RequestError(f"topologies[{index}] ({shortened(name)}): {error}") from error
+        if name not in scene.topologies:
+            raise RequestError(
+                f"mesh_names: unknown mesh {quoted(name)}; the node has "
+                f"{listed(scene.topologies) or 'none'}, or send topologies"
+            )
+        topology = scene.topologies[name]
+        if topology is None:
+            raise RequestError(f"mesh {name}: the node has no topology yet; publish it or send topologies")
+        return topology
+
+    def _vertices(
+        self, field: str, names: list[str], messages: list[MeshVertices], topologies: tuple[Topology, ...]
+    ) -> np.ndarray:
+        parts = []
+        for i, (name, message, topology) in enumerate(zip(names, messages, topologies, strict=True)):
+            where = f"{field}[{i}] ({shortened(name)})"
+            try:
+                fields.stamp_to_ns(message.header.stamp)
+                vertices = mesh_messages.vertices_from_message(message, self._settings["max_vertices"])
+            except fields.InvalidMessageError as error:
+                raise RequestError(f"{where}: {error}") from error
+            if message.topology_version != topology.version:
+                raise RequestError(
+                    f"{where}: topology_version {message.topology_version}, the topology has version {topology.version}"
+                )
+            if len(vertices) != topology.n_vertices:
+                raise RequestError(f"{where}: {len(vertices)} vertices, the topology has {topology.n_vertices}")
+            parts.append(vertices)
+        return parts[0] if len(parts) == 1 else np.concatenate(parts)

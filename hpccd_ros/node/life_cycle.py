@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: Apache-2.0
+"""rclpy's life-cycle node, with what it lacks: invalid transitions are refused, errors of transitions are told."""
+
+from collections.abc import Callable
+from typing import Any
+
+from lifecycle_msgs.srv import ChangeState
+from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+
+from hpccd_ros.middleware.guard import Errors
+
+Transition = Callable[[LifecycleState], TransitionCallbackReturn]
+
+
+class GuardedLifecycleNode(LifecycleNode):
+    """errors: what this node's callbacks raised that nothing expected; for the node's executor too."""
+
+    def __init__(self, name: str, **options: Any) -> None:
+        super().__init__(name, **options)
+        self.errors = Errors(self.get_logger().error)
+        self._callbacks = {state: self._guarded(callback) for state, callback in self._callbacks.items()}
+        service = self._service_change_state
+        service.callback = self._refuse_or(service.callback)
+
+    @property
+    def state(self) -> str:
+        """Label of the life-cycle state."""
+        return self._state_machine.current_state[1]
+
+    def _guarded(self, callback: Transition) -> Transition:
+        def transition(state: LifecycleState) -> TransitionCallbackReturn:
+            try:
+                return callback(state)
+            except Exception as error:
+                # rclpy goes on with `on_error`, without a word about what was raised.
+                self.errors.caught(callback.__name__, error)
+                return TransitionCallbackReturn.ERROR
+
+        return transition
+
+    def _refuse_or(self, change: Callable) -> Callable:
+        # rclpy 7.1 raises for a transition that the state does not have (ros2/rclpy#1209).
+        def change_state(request: ChangeState.Request, response: ChangeState.Response) -> ChangeState.Response:
+            wanted = request.transition
+            offered = {label: number for number, label, *_ in self._state_machine.available_transitions}
+            if wanted.label in offered if wanted.label else wanted.id in offered.values():
+                return change(request, response)
+            self.get_logger().warning(
+                f"no transition {wanted.label or wanted.id} from {self.state}, which has "
+                + (", ".join(f"{label} ({number})" for label, number in offered.items()) or "none"),
+                throttle_duration_sec=1.0,
+            )
+            response.success = False
+            return response
+
+        return change_state

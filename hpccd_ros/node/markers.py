@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What RViz and Foxglove show: contacts as markers, thinned out so that viewers keep up, and vertices."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from builtin_interfaces.msg import Time
+from geometry_msgs.msg import Point
+from sensor_msgs.msg import PointCloud2, PointField
+from std_msgs.msg import ColorRGBA, Header
+from visualization_msgs.msg import Marker, MarkerArray
+
+from hpccd_ros.middleware import fields
+
+# Colour-blind safe pair (Okabe and Ito): vertex-face orange, edge-edge blue.
+_VERTEX_FACE = ColorRGBA(r=0.90, g=0.62, b=0.0, a=1.0)
+_EDGE_EDGE = ColorRGBA(r=0.0, g=0.45, b=0.70, a=1.0)
+_NORMAL_LENGTH = 10.0  # in point diameters
+
+
+def contact_markers(
+    points: np.ndarray,
+    normals: np.ndarray,
+    n_vertex_face: int,
+    *,
+    stamp: Time,
+    frame_id: str,
+    size: float,
+    limit: int,
+) -> MarkerArray:
+    """Always three markers, so that old ones disappear: vertex-face, edge-edge (points), normals (lines).
+
+    points, normals: (N,3), the first ``n_vertex_face`` of vertex-face contacts. limit: most contacts drawn,
+    taken evenly from the whole list.
+    """
+    chosen = np.arange(len(points))
+    if len(points) > limit:
+        chosen = np.linspace(0, len(points) - 1, limit).astype(np.int64)
+    is_vf = chosen < n_vertex_face
+    at = points[chosen]
+    tips = at + _NORMAL_LENGTH * size * normals[chosen]
+    lines = np.stack([at, tips], axis=1).reshape(-1, 3)
+    spheres = [
+        _marker(i, name, Marker.POINTS, stamp, frame_id, size, colour, at[mask])
+        for i, (name, colour, mask) in enumerate(
+            [("vertex_face", _VERTEX_FACE, is_vf), ("edge_edge", _EDGE_EDGE, ~is_vf)]
+        )
+    ]
+    normal = _marker(
+        2,
+        "normals",
+        Marker.LINE_LIST,
+        stamp,
+        frame_id,
+        0.2 * size,
+        ColorRGBA(r=0.3, g=0.3, b=0.3, a=1.0),
+        lines,
+    )
+    return MarkerArray(markers=[*spheres, normal])
+
+
+def surface_cloud(vertices: Sequence[np.ndarray], header: Header) -> PointCloud2:
+    """All vertices of all meshes, (n,3) each; fields x y z FLOAT32 and mesh UINT32, the number of the mesh.
+
+    Triangles would be drawn nicer, but markers hold them point by point: 0.3 s for 90,000 triangles.
+    """
+    counts = [len(part) for part in vertices]
+    cloud = np.empty(sum(counts), [("xyz", np.float32, 3), ("mesh", np.uint32)])
+    np.concatenate(vertices, out=cloud["xyz"], casting="same_kind")
+    cloud["mesh"] = np.repeat(np.arange(len(counts), dtype=np.uint32), counts)
+    step = cloud.dtype.itemsize
+    out = PointCloud2(header=header, height=1, width=len(cloud), point_step=step, row_step=step * len(cloud))
+    out.fields = [PointField(name=n, offset=4 * i, datatype=PointField.FLOAT32, count=1) for i, n in enumerate("xyz")]
+    out.fields.append(PointField(name="mesh", offset=12, datatype=PointField.UINT32, count=1))
+    out.is_dense = True
+    out.data = fields.to_field(cloud.view(np.uint8))
+    return out
+
+
+def _marker(
+    identity: int,
+    namespace: str,
+    kind: int,
+    stamp: Time,
+    frame_id: str,
+    size: float,
+    colour: ColorRGBA,
+    points: np.ndarray,
+) -> Marker:
+    # An empty list of points is an error in RViz: delete the marker instead.
+    marker = Marker(ns=namespace, id=identity, type=kind, action=Marker.ADD if len(points) else Marker.DELETE)
+    marker.header.stamp = stamp
+    marker.header.frame_id = frame_id
+    marker.pose.orientation.w = 1.0
+    marker.scale.x = marker.scale.y = size
+    marker.color = colour
+    marker.points = [Point(x=x, y=y, z=z) for x, y, z in points.tolist()]
+    return marker

@@ -1,0 +1,138 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Notice frames of meshes that the node was not told of: usually a misspelt name, else silently unheard."""
+
+from collections.abc import Callable
+
+from hpccd.msg import MeshVertices
+from rclpy._rclpy_pybind11 import RCLError
+from rclpy.clock import Clock, ClockType
+from rclpy.exceptions import InvalidTopicNameException
+from rclpy.node import Node, NodeNameNonExistentError
+from rclpy.subscription import Subscription
+from rclpy.validate_full_topic_name import validate_full_topic_name
+from sensor_msgs.msg import PointCloud2
+
+from hpccd_ros.base.quoting import listed
+from hpccd_ros.frames.drops import DropCounter, Reason
+from hpccd_ros.middleware import qos
+
+# Bounds what strangers can make the node subscribe to, at a time.
+_MOST_TOPICS = 16
+# Bounds the names that strangers can make it keep in its counters.
+_MOST_NAMES = 64
+_OTHERS = "(others)"
+_TYPES = {
+    "vertices": ("hpccd/msg/MeshVertices", MeshVertices),
+    "points": ("sensor_msgs/msg/PointCloud2", PointCloud2),
+}
+_DETECT = "hpccd/srv/Detect"
+
+
+class UnknownMeshWatch:
+    """Looks at the graph once a second for vertex topics that have publishers and belong to no mesh of any node.
+
+    A mesh is another node's where one with a service of type hpccd/srv/Detect subscribes to its topology: so do
+    detectors to their meshes. Recorders, which subscribe to anything, have no such service; nodes like this one, which
+    watch the vertices as strangers, leave the topology alone.
+    A topic is taken up when it is found a second time, since a node that starts is discovered piece by piece, and let
+    go when its publishers have left or another node has taken it over.
+    count: subscribe to them raw (without deserialising) and count each frame as dropped; else only name them.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        known: list[str],
+        drops: DropCounter,
+        received: Callable[[str, None], None],
+        count: bool,
+    ) -> None:
+        self._node = node
+        self._known = known
+        self._drops = drops
+        self._received = received
+        self._count = count
+        self._topics: dict[str, Subscription | None] = {}
+        self._found: set[str] = set()
+        self._beyond: list[str] = []
+        self._names: set[str] = set()
+        self._prefix = node.resolve_topic_name("meshes/x").removesuffix("x")
+        # Steady time: simulated time may stand still.
+        self._timer = node.create_timer(1.0, self._look, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    def close(self) -> None:
+        self._node.destroy_timer(self._timer)
+        for topic in list(self._topics):
+            self._release(topic)
+
+    def warnings(self) -> list[str]:
+        """One line for each vertex topic that belongs to no mesh, and one for those beyond the bound."""
+        lines = [f"{topic} belongs to no mesh in parameter meshes" for topic in self._topics]
+        if self._beyond:
+            what = "counted" if self._count else "named"
+            first, more = self._beyond[0], len(self._beyond)
+            lines.append(f"{more} more topics belong to no mesh and are not {what} ({_MOST_TOPICS} are), as {first}")
+        return lines
+
+    def _look(self) -> None:
+        unknown = self._unknown()
+        for topic in [topic for topic in self._topics if topic not in unknown]:
+            self._release(topic)
+        wanted = [topic for topic in unknown if topic in self._found and topic not in self._topics]
+        free = _MOST_TOPICS - len(self._topics)
+        self._found, self._beyond = set(unknown), wanted[free:]
+        for topic in wanted[:free]:
+            self._topics[topic] = self._listen(topic, *unknown[topic]) if self._count else None
+        if names := ", ".join(wanted[:free]):
+            known = listed(self._known) or "none"
+            self._node.get_logger().warning(f"{names} belongs to no mesh: parameter meshes has {known}")
+
+    def _unknown(self) -> dict[str, tuple[str, type]]:
+        """Topic -> (mesh, message type)."""
+        found = {}
+        for topic, types in self._node.get_topic_names_and_types():
+            mesh, _, kind = topic.removeprefix(self._prefix).rpartition("/")
+            if not topic.startswith(self._prefix) or kind not in _TYPES or mesh in self._known:
+                continue
+            type_name, message = _TYPES[kind]
+            if type_name not in types or not _is_valid(topic) or not self._node.count_publishers(topic):
+                continue
+            if not self._belongs_to_another(mesh):
+                found[topic] = mesh, message
+        return found
+
+    def _belongs_to_another(self, mesh: str) -> bool:
+        listeners = self._node.get_subscriptions_info_by_topic(f"{self._prefix}{mesh}/topology")
+        return any(self._detects(listener.node_name, listener.node_namespace) for listener in listeners)
+
+    def _detects(self, name: str, namespace: str) -> bool:
+        try:
+            services = self._node.get_service_names_and_types_by_node(name, namespace)
+        except (NodeNameNonExistentError, RCLError):  # gone meanwhile; no node of ROS, or not known by name yet
+            return False
+        return any(_DETECT in types for _, types in services)
+
+    def _listen(self, topic: str, mesh: str, message: type) -> Subscription:
+        name = mesh if mesh in self._names or len(self._names) < _MOST_NAMES else _OTHERS
+        self._names.add(name)
+
+        def count(data: bytes) -> None:
+            self._received(name, None)
+            self._drops.count(name, Reason.UNKNOWN_MESH)
+
+        # Best effort is compatible with every publisher.
+        return self._node.create_subscription(message, topic, count, qos.vertices("best_effort", 10), raw=True)
+
+    def _release(self, topic: str) -> None:
+        subscription = self._topics.pop(topic)
+        if subscription is not None:
+            self._node.destroy_subscription(subscription)
+
+
+def _is_valid(topic: str) -> bool:
+    """Participants that are not of ROS may have names in which it finds an error, such as a digit after a slash."""
+    try:
+        validate_full_topic_name(topic)
+    except InvalidTopicNameException:
+        return False
+    return True

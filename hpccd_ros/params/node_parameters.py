@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: Apache-2.0
+"""All parameters of a node as plain values: of one in this process, or of a running one over its services."""
+
+import functools
+import time
+from collections.abc import Sequence
+
+import rclpy
+from rcl_interfaces.srv import GetParameters, ListParameters
+from rclpy.parameter import parameter_value_to_python
+
+from hpccd_ros.base.errors import UserError
+
+
+def of(node) -> dict:
+    """{name: value} of all parameters of `node`, which lives in this process."""
+    return {name: _plain(parameter.value) for name, parameter in node.get_parameters_by_prefix("").items()}
+
+
+def fetch(node, remote: str, wait: float, stop: Sequence = ()) -> dict:
+    """{name: value} of all parameters that are set in the node with the full name `remote`, asked through `node`.
+
+    Raises UserError naming the nodes that are there if `remote` does not answer within `wait` seconds, and
+    KeyboardInterrupt once there is something in `stop`, which a signal's handler may see to.
+    """
+    deadline = time.monotonic() + wait
+    call = functools.partial(_call, node, deadline=deadline, remote=remote, stop=stop)
+    names = call(ListParameters, f"{remote}/list_parameters", [ListParameters.Request()])
+    # One request for each: a node answers a request for several with nothing if one of them was never set.
+    wanted = sorted(names[0].result.names)
+    requests = [GetParameters.Request(names=[name]) for name in wanted]
+    answers = call(GetParameters, f"{remote}/get_parameters", requests)
+    return {
+        name: _plain(parameter_value_to_python(answer.values[0]))
+        for name, answer in zip(wanted, answers, strict=True)
+        if answer.values
+    }
+
+
+def _call(node, service, name, requests, *, deadline, remote, stop):
+    client = node.create_client(service, name)
+    try:
+        while not client.service_is_ready():
+            if time.monotonic() > deadline:
+                raise UserError(f"no node {remote} found{_nodes(node)}: start it, name another with --node, or --wait")
+            _spin_once(node, stop)
+        results = []
+        for request in requests:  # one after the other: the queue of a service holds ten
+            future = client.call_async(request)
+            patience = max(deadline, time.monotonic() + 2.0)
+            while not future.done():
+                if time.monotonic() > patience:
+                    raise UserError(f"the node {remote} does not answer the call of {name}")
+                _spin_once(node, stop)
+            results.append(future.result())
+        return results
+    finally:
+        node.destroy_client(client)
+
+
+def _spin_once(node, stop) -> None:
+    # An exception of a signal's handler inside of rclpy's calls would come out as another one.
+    if stop:
+        raise KeyboardInterrupt
+    rclpy.spin_once(node, timeout_sec=0.05)
+
+
+def _nodes(node) -> str:
+    own = (node.get_name(), node.get_namespace())
+    others = sorted({f"{ns.rstrip('/')}/{name}" for name, ns in node.get_node_names_and_namespaces()
+                     if (name, ns) != own})
+    return f" (there are: {', '.join(others)})" if others else " (no other node is running)"
+
+
+def _plain(value):
+    # Array parameters arrive as array.array or tuples: JSON and comparison want lists.
+    return value if value is None or isinstance(value, (bool, int, float, str)) else list(value)

@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Read a ROS parameter file, as a node is given one with --params-file."""
+
+import re
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from hpccd_ros.base.errors import UserError, sentence
+
+# Characters: far above any that a person writes, far below a recording named by mistake.
+MOST = 1_000_000
+
+
+def read_parameters(path) -> dict[str, Any]:
+    """{full name: value}, all nodes in the file taken together. Raises UserError that names `path`."""
+    try:
+        tree = yaml.load(_text(Path(path)), _Loader)
+    except OSError as error:
+        raise UserError(f"--params {path}: cannot be read: {error.strerror}") from error
+    # ValueError: no UTF-8, or what YAML takes for a date and is none. RecursionError: nested too deeply.
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
+        raise UserError(f"--params {path}: cannot be read: {' '.join(str(error).split())}") from error
+    sections = tree.values() if isinstance(tree, dict) else ()
+    found = [section.get("ros__parameters") if isinstance(section, dict) else None for section in sections]
+    if not found or not all(isinstance(parameters, dict) for parameters in found):
+        raise UserError(f"--params {path}: no ROS parameter file (node name, ros__parameters, names)")
+    flat: dict[str, Any] = {}
+    for parameters in found:
+        flat |= _flat("", parameters)
+    for name, value in flat.items():
+        if value is None:
+            raise UserError(sentence(f"--params {path}: {name} has no value"))
+    return flat
+
+
+def _text(path: Path) -> str:
+    if path.exists() and not path.is_file():
+        raise ValueError("no file")
+    with open(path, encoding="utf-8") as stream:
+        text = stream.read(MOST + 1)
+    if len(text) > MOST:
+        raise ValueError(f"more than {MOST:,} characters")
+    return text
+
+
+def _flat(prefix: str, branch: dict) -> dict[str, Any]:
+    found = {}
+    for key, value in branch.items():
+        found |= _flat(f"{prefix}{key}.", value) if isinstance(value, dict) else {f"{prefix}{key}": value}
+    return found
+
+
+class _Loader(yaml.SafeLoader):
+    """What ROS takes: numbers like 1e-3, no aliases, by which a few lines can stand for more than memory holds."""
+
+    def compose_node(self, parent, index):
+        if self.check_event(yaml.AliasEvent):
+            mark = self.peek_event().start_mark
+            raise yaml.composer.ComposerError(None, None, "ROS parameter files have no aliases", mark)
+        return super().compose_node(parent, index)
+
+
+_NUMBER = re.compile(r"[-+]?[0-9]+[eE][-+]?[0-9]+$")
+_Loader.add_implicit_resolver("tag:yaml.org,2002:float", _NUMBER, list("-+0123456789"))

@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the parameters say of the scene: meshes, pairs, where positions are placed."""
+
+from typing import Any
+
+from hpccd_ros.base.quoting import listed, quoted, shortened
+from hpccd_ros.detect.detection import SceneBuilder
+from hpccd_ros.frames.rigid import Rigid
+from hpccd_ros.frames.types import MeshSettings
+from hpccd_ros.params.parameters import ParameterError
+from hpccd_ros.params.table import ACCURACIES
+
+MeshRows = dict[str, dict[str, Any]]
+
+
+def scene_builder(settings: dict[str, Any], meshes: MeshRows) -> SceneBuilder:
+    """The scene without its topologies. Raises ParameterError: an unknown mesh or tier in a pair."""
+    return SceneBuilder(mesh_settings(meshes), ignored_pairs(settings), pair_accuracies(settings))
+
+
+def mesh_settings(meshes: MeshRows) -> tuple[MeshSettings, ...]:
+    """In the order of parameter ``meshes``."""
+    return tuple(MeshSettings(name, row["static"], row["self_collision"]) for name, row in meshes.items())
+
+
+def ignored_pairs(settings: dict[str, Any]) -> tuple[tuple[str, str], ...]:
+    """Parameter ``ignored_pairs`` as pairs of mesh names. Raises ParameterError."""
+    pairs = []
+    for text in settings["ignored_pairs"]:
+        pair = tuple(text.split(":"))
+        if len(pair) != 2 or not set(pair) <= set(settings["meshes"]) or pair[0] == pair[1]:
+            raise ParameterError(
+                f"ignored_pairs: {quoted(text)} must be NAME:NAME with two different meshes out of "
+                f"{_names(settings)}"
+            )
+        pairs.append(pair)
+    return tuple(pairs)
+
+
+def pair_accuracies(settings: dict[str, Any]) -> tuple[tuple[str, str, str], ...]:
+    """Parameter ``pair_accuracy`` as (mesh name, mesh name, tier). Raises ParameterError."""
+    found: dict[frozenset[str], tuple[str, str, str]] = {}
+    for text in settings["pair_accuracy"]:
+        entry = tuple(text.split(":"))
+        if len(entry) != 3 or not set(entry[:2]) <= set(settings["meshes"]) or entry[2] not in ACCURACIES:
+            raise ParameterError(
+                f"pair_accuracy: {quoted(text)} must be NAME:NAME:TIER with meshes out of {_names(settings)} "
+                f"and a tier out of {', '.join(ACCURACIES)}"
+            )
+        pair = frozenset(entry[:2])
+        if found.setdefault(pair, entry)[2] != entry[2]:
+            raise ParameterError(f"pair_accuracy: {text!r} contradicts {':'.join(found[pair])!r}; leave one out")
+    return tuple(found.values())
+
+
+def poses(meshes: MeshRows) -> dict[str, Rigid]:
+    """``mesh.NAME.pose`` of each mesh. Raises ParameterError."""
+    found = {}
+    for name, row in meshes.items():
+        try:
+            found[name] = Rigid.of(row["pose"][:3], row["pose"][3:])
+        except ValueError as error:
+            raise ParameterError(f"mesh.{name}.pose: {shortened(row['pose'])} {error}") from error
+    return found
+
+
+def check(settings: dict[str, Any], meshes: MeshRows) -> None:
+    """What rows cannot tell one by one. Raises ParameterError."""
+    scene_builder(settings, meshes)
+    poses(meshes)
+    for name, row in meshes.items():
+        if row["transform"] == "tf" and not settings["frame_id"]:
+            raise ParameterError(f"mesh.{name}.transform: tf needs a frame to transform to; set parameter frame_id")
+        if row["transform"] == "tf" and row["static"] and row["file"]:
+            raise ParameterError(
+                f"mesh.{name}.transform: the positions of a static mesh from a file have no stamp to look a transform "
+                f"up for; give mesh.{name}.pose"
+            )
+        if row["transform"] == "none" and row["frame"] not in ("", settings["frame_id"]):
+            raise ParameterError(
+                f"mesh.{name}.frame: {quoted(row['frame'])} is not the scene's frame "
+                f"{quoted(settings['frame_id'])}; set "
+                f"mesh.{name}.transform to pose or tf, or the parameter frame_id"
+            )
+
+
+def _names(settings: dict[str, Any]) -> str:
+    return listed(settings["meshes"]) or "(none)"

@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which topics a recording of a node holds, and the quality of service to ask of each."""
+
+import dataclasses
+
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+
+from hpccd_ros.middleware import qos, qos_overrides, transform_topics
+
+TOPOLOGY = "hpccd/msg/MeshTopology"
+VERTICES = "hpccd/msg/MeshVertices"
+POINTS = "sensor_msgs/msg/PointCloud2"
+CONTACTS = "hpccd/msg/ContactArray"
+
+
+@dataclasses.dataclass(frozen=True)
+class Wanted:
+    """A topic to record: `name` relative or absolute, `type_name` "pkg/msg/Name".
+
+    `latched`: of a transient local topic, how many of its last messages are in force at any time; else 0.
+    """
+
+    name: str
+    type_name: str
+    latched: int = 0
+
+
+def of_node(parameters: dict) -> list[Wanted]:
+    """The topics of a node with these parameters, inputs before outputs."""
+    wanted = []
+    meshes = parameters["meshes"] or []  # None: never set
+    if any(parameters.get(f"mesh.{mesh}.transform") == "tf" for mesh in meshes):
+        static = qos.TRANSFORMS_STATIC.depth
+        wanted += [Wanted(t.name, t.type_name, static * t.static) for t in transform_topics.understood()]
+    for mesh in meshes:
+        clouds = parameters.get(f"mesh.{mesh}.input") == "points"
+        wanted.append(Wanted(f"meshes/{mesh}/topology", TOPOLOGY, latched=1))
+        wanted.append(Wanted(f"meshes/{mesh}/{'points' if clouds else 'vertices'}", POINTS if clouds else VERTICES))
+    return [*wanted, Wanted("contacts", CONTACTS)]
+
+
+def types_by_role(meshes) -> dict[str, str]:
+    """Relative name -> type of all topics from which a node of these meshes can be computed again."""
+    of_mesh = {"topology": TOPOLOGY, "vertices": VERTICES, "points": POINTS}
+    return {
+        **{f"meshes/{mesh}/{kind}": type_name for mesh in meshes for kind, type_name in of_mesh.items()},
+        **{topic.name: topic.type_name for topic in transform_topics.ALL.values()},
+        "contacts": CONTACTS,
+    }
+
+
+def subscription_qos(node, name: str, topic: Wanted, depth: int) -> QoSProfile:
+    """What to ask of the publishers of `topic` (`name`: resolved), so that all that others receive is received here.
+
+    A reader that asks for more than a writer offers is not served at all. So ask for what is offered by those
+    publishers that are there, else for what other readers of the topic ask, else for reliable delivery.
+    """
+    offers = [p.qos_profile.reliability for p in node.get_publishers_info_by_topic(name)]
+    asked = [s.qos_profile.reliability for s in node.get_subscriptions_info_by_topic(name)]
+    best_effort = ReliabilityPolicy.BEST_EFFORT in (offers or asked)
+    return _profile(ReliabilityPolicy.BEST_EFFORT if best_effort else ReliabilityPolicy.RELIABLE, topic.latched, depth)
+
+
+def as_node_asks(node, name: str, topic: Wanted, depth: int, *, recorded, vertices: ReliabilityPolicy) -> QoSProfile:
+    """For the own recording of the node `recorded`. vertices: what it asks of them; the others are reliable, unless
+    parameters of the node (qos_overrides) say otherwise.
+    """
+    default = vertices if topic.type_name in (VERTICES, POINTS) else ReliabilityPolicy.RELIABLE
+    entity = "publisher" if topic.type_name == CONTACTS else "subscription"
+    return _profile(qos_overrides.reliability(recorded, entity, name, default), topic.latched, depth)
+
+
+def _profile(reliability, latched, depth) -> QoSProfile:
+    return QoSProfile(
+        history=HistoryPolicy.KEEP_LAST,
+        depth=max(depth, latched),
+        reliability=reliability,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
+    )

@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`hpccd record`: record the topics of a running node into MCAP until told to stop."""
+
+import signal
+import sys
+import time
+from datetime import datetime
+from pathlib import Path
+
+import rclpy
+from rclpy.executors import SingleThreadedExecutor
+
+from hpccd_ros.bag.writer import BagWriter
+from hpccd_ros.base.errors import UserError
+from hpccd_ros.middleware import environment, ros_start
+from hpccd_ros.middleware.message_types import message_class
+from hpccd_ros.params import node_parameters
+from hpccd_ros.record import recorded_topics
+from hpccd_ros.record.mesh_attachment import mesh_files
+from hpccd_ros.record.recorded_topics import Wanted
+from hpccd_ros.record.recording_info import recording_info
+from hpccd_ros.record.topic_recorder import Recorder
+
+
+def main(args) -> int:
+    """Record as the options of `hpccd record` say; returns the exit status."""
+    target = Path(args.output or datetime.now().strftime("hpccd-%Y%m%d-%H%M%S.mcap"))
+    stop = _stop_on_signals()
+    environment.prepare()
+    ros_start.init(["--ros-args", *args.ros_args] if args.ros_args else None)
+    namespace, _, name = args.node.rpartition("/")
+    if not name or not args.node.startswith("/"):
+        raise UserError(f"--node {args.node}: give the full name with its namespace, for example /hpccd")
+    # In the namespace of the recorded node, relative names and remappings mean the same as there.
+    node = rclpy.create_node(f"{name}_recorder", namespace=namespace or "/", start_parameter_services=False)
+    try:
+        return _record(node, target, args, stop)
+    finally:
+        node.destroy_node()
+        rclpy.try_shutdown()
+
+
+def _record(node, target, args, stop) -> int:
+    parameters = node_parameters.fetch(node, args.node, args.wait, stop)
+    if not parameters.get("meshes"):
+        raise UserError(f"the node {args.node} has no parameter `meshes`: is it an hpccd node?")
+    wanted = recorded_topics.of_node(parameters)
+    wanted += [topic for topic in map(_extra, args.topic) if topic.name not in {known.name for known in wanted}]
+    files, missing = mesh_files(parameters)
+    for text in missing:
+        print(text, file=sys.stderr, flush=True)
+    info = recording_info(args.node, parameters, wanted, node.resolve_topic_name)
+    try:
+        bag = BagWriter(target, info=info, attachments=files, compression=args.compression,
+                        flush_interval=args.flush, max_bytes=int(args.split_size * 1e6), max_seconds=args.split_time)
+    except (ValueError, OSError) as error:
+        raise UserError(str(error)) from error
+    try:
+        recorder = Recorder(node, bag, wanted, args.depth)
+        contacts = node.resolve_topic_name("contacts")
+        _spin(node, recorder, bag, contacts, args, stop)
+    finally:
+        bag.close()
+    _report(bag, recorder)
+    return 1 if bag.write_errors else 0
+
+
+def _spin(node, recorder, bag, contacts, args, stop):
+    executor = SingleThreadedExecutor()
+    executor.add_node(node)
+    status = Status(bag, recorder, contacts)
+    started = time.monotonic()
+    ready = False
+    while not stop:
+        executor.spin_once(timeout_sec=0.1)
+        bag.poll()
+        if not ready and recorder.publishers(contacts):
+            ready = True
+            # Read by programs that start a recorder and must not publish before it listens.
+            print(f"recording {args.node} into {bag.path}: {len(recorder.topics)} topics, Ctrl-C ends", flush=True)
+        status.update()
+        if args.duration and time.monotonic() - started >= args.duration:
+            break
+        if args.frames and recorder.received[contacts] >= args.frames:
+            break
+    status.clear()
+    recorder.finish(executor, args.depth)
+    executor.shutdown()
+
+
+class Status:
+    """One line on the terminal that tells how the recording goes; nothing where the output is not a terminal."""
+
+    PERIOD = 0.5  # s
+
+    def __init__(self, bag, recorder, contacts):
+        self._bag, self._recorder, self._contacts = bag, recorder, contacts
+        self._next = time.monotonic()
+
+    def update(self):
+        if sys.stderr.isatty() and time.monotonic() >= self._next:
+            self._next += self.PERIOD
+            lost = sum(self._recorder.lost.values())
+            print(f"\r{self._bag.message_count} messages, {self._recorder.received[self._contacts]} of contacts, "
+                  f"{self._bag.size / 1e6:.1f} MB, {lost} lost"
+                  + (f", {self._bag.not_written.total()} NOT WRITTEN ({self._bag.last_error})"
+                     if self._bag.failing else "") + "   ", end="", file=sys.stderr, flush=True)
+
+    def clear(self):
+        if sys.stderr.isatty():
+            print("\r" + " " * 78 + "\r", end="", file=sys.stderr, flush=True)
+
+
+def _report(bag, recorder):
+    for name, count in recorder.received.items():
+        if count:
+            lost = recorder.lost.get(name, 0)
+            print(f"  {name}: {count} messages" + (f", {lost} LOST on the way here" if lost else ""))
+    files = bag.file_paths
+    for path in bag.torn_files:
+        print(f"  {path} ends early, without index: `hpccd doctor {path} --recover OUT.mcap`")
+    if bag.write_errors:
+        print(f"  {bag.not_written.total()} messages NOT WRITTEN, {bag.write_errors} write errors, the last: "
+              f"{bag.last_error}")
+    where = str(files[0]) if len(files) == 1 else f"{len(files)} files in {bag.path}"
+    print(f"recorded {bag.message_count} messages, {bag.size / 1e6:.2f} MB: {where}", flush=True)
+
+
+def _extra(text) -> Wanted:
+    name, equals, type_name = text.partition("=")
+    if not equals or type_name.count("/") != 2:
+        raise UserError(f"--topic {text}: write it as NAME=PACKAGE/msg/TYPE, e.g. /joints=sensor_msgs/msg/JointState")
+    try:
+        message_class(type_name)
+    except LookupError as error:
+        raise UserError(f"--topic {text}: {error}") from error
+    return Wanted(name, type_name)
+
+
+def _stop_on_signals() -> list:
+    """An empty list that SIGINT and SIGTERM fill: the loop ends between two messages, never within one."""
+    stop = []
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda received, frame: stop.append(received))
+    return stop

@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Write the messages of topics into a recording: raw subscriptions, so that it holds the very bytes that were sent."""
+
+import time
+
+from hpccd_ros.bag import qos_yaml
+from hpccd_ros.bag.writer import BagWriter, Topic
+from hpccd_ros.middleware.message_types import message_class
+from hpccd_ros.record import recorded_topics
+from hpccd_ros.record.recorded_topics import Wanted
+
+
+class Recorder:
+    """Subscribes to the wanted topics through `node` and writes every message to `bag` until told to stop.
+
+    received: messages so far, by resolved topic name. lost: messages that did not get here, by topic, found by gaps
+    in the numbers that a topic's publisher counts (known where it has one publisher only).
+    """
+
+    def __init__(self, node, bag: BagWriter, wanted: list[Wanted], depth: int, qos_of=recorded_topics.subscription_qos):
+        self._node = node
+        self._bag = bag
+        self.received: dict[str, int] = {}
+        self.lost: dict[str, int] = {}
+        self.taken = 0  # messages handed over by the middleware, those after the end too
+        self._end: int | None = None
+        self._sequence: dict[str, int] = {}
+        self._subscriptions = {}
+        for topic in wanted:
+            name = node.resolve_topic_name(topic.name)
+            qos = qos_of(node, name, topic, depth)
+            self.received[name] = 0
+            self._subscriptions[name] = node.create_subscription(
+                message_class(topic.type_name), name, self._receiver(name, topic), qos, raw=True
+            )
+
+    @property
+    def topics(self) -> list[str]:
+        return list(self._subscriptions)
+
+    def publishers(self, topic: str) -> int:
+        """Publishers that this recorder is connected to on `topic` (resolved name)."""
+        return self._subscriptions[topic].get_publisher_count()
+
+    def end(self) -> None:
+        """From now on take only what had arrived before: it belongs to the recording, what comes later does not."""
+        self._end = time.time_ns()
+
+    def finish(self, executor, depth: int) -> None:
+        """`end`, and take through `executor` what has arrived but waits: at most `depth` messages of each topic."""
+        self.end()
+        most = self.taken + depth * len(self.topics)
+        taken = -1
+        while taken != self.taken and self.taken < most:
+            taken = self.taken
+            executor.spin_once(timeout_sec=0.05)
+
+    def _receiver(self, name, topic):
+        def receive(data, info):
+            self.taken += 1
+            if self._end is not None and info["received_timestamp"] > self._end:
+                return
+            if self.received[name] == 0:
+                self._bag.add_topic(Topic(name, topic.type_name, self._offered_qos(name), topic.latched))
+            self.received[name] += 1
+            self._watch_for_loss(name, info["publication_sequence_number"])
+            self._bag.write(
+                name, data, info["received_timestamp"], info["source_timestamp"], info["publication_sequence_number"]
+            )
+
+        return receive
+
+    def _offered_qos(self, name):
+        offers = [p.qos_profile for p in self._node.get_publishers_info_by_topic(name)]
+        # A publisher that sent and left at once is not listed any more: what was asked of it, it offered.
+        return qos_yaml.offered_qos(offers or [self._subscriptions[name].qos_profile])
+
+    def _watch_for_loss(self, name, sequence):
+        last = self._sequence.get(name)
+        self._sequence[name] = sequence
+        if last is not None and sequence > last + 1 and self.publishers(name) == 1:
+            self.lost[name] = self.lost.get(name, 0) + sequence - last - 1

@@ -1,0 +1,141 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Where a recorded answer of the node and the contacts computed again differ first, in words."""
+
+import numpy as np
+
+from hpccd_ros.detect.layout import Layout
+from hpccd_ros.middleware import contact_messages
+from hpccd_ros.params.table import ACCURACIES
+
+
+def difference(recorded, contacts, layout: Layout, any_one: bool = False) -> str | None:
+    """None where `recorded` (ContactArray) holds just what `contacts` (of the core) would be sent as.
+
+    Compared bit for bit: pairs, times, their order, totals, first time and hash. Points and normals are derived
+    from these and not compared. any_one: the node stopped at the first contact found (report "any"), which depends
+    on the timing of its threads: there must be one if there is any, and it must be one of `contacts`, which are all.
+    """
+    total = len(contacts.vf) + len(contacts.ee)
+    then, now = list(recorded.topology_versions), list(layout.topology_versions)
+    if then and then != now:  # recordings from before there were any hold none
+        return f"topology versions {then} were recorded, now they are {now}"
+    if problem := _malformed(recorded, layout):
+        return f"the recorded answer is malformed: {problem}"
+    if any_one:
+        return _not_any(recorded, contacts, layout)
+    count = len(recorded.kind)
+    expected = type(recorded)()
+    sent = count if recorded.truncated else 0
+    contact_messages.fill_contacts(expected, contacts, layout, max_contacts=sent, outputs=())
+    then, now = contact_messages.read_contacts(recorded, layout), contact_messages.read_contacts(expected, layout)
+    for kind, describe in (("vf", _vertex_face), ("ee", _edge_edge)):
+        first = _first_difference(
+            getattr(then, kind), getattr(then, kind + "_toc"), getattr(now, kind), getattr(now, kind + "_toc")
+        )
+        if first is not None:
+            return _explain(first, then, now, kind, lambda row, d=describe: d(row, layout))
+    if recorded.total != total:
+        return _count(recorded.total, total)
+    if recorded.truncated != expected.truncated:
+        return f"{count:,} of {total:,} contacts are marked as {'' if recorded.truncated else 'not '}truncated"
+    if recorded.first_toc != contacts.first_toc:
+        return f"first time of contact: recorded {recorded.first_toc!r}, now {contacts.first_toc!r}"
+    if recorded.hash != contacts.hash:
+        where = "among the contacts that were cut off" if recorded.truncated else "although all contacts are equal"
+        return f"hash {recorded.hash:#018x} was recorded, now it is {contacts.hash:#018x}, {where}"
+    return None
+
+
+def _count(recorded, now):
+    return f"{recorded:,} contacts were recorded, now there are {now:,}"
+
+
+def _malformed(message, layout) -> str | None:
+    count = len(message.kind)
+    sizes = {"mesh_a": 1, "mesh_b": 1, "features_a": 2, "features_b": 2, "toc": 1}
+    for name, per_contact in sizes.items():
+        if len(getattr(message, name)) != count * per_contact:
+            return f"{name} has {len(getattr(message, name))} entries for {count} contacts"
+    if message.accuracy not in ACCURACIES:
+        return f"its accuracy is {message.accuracy[:20]!r}, none of {', '.join(ACCURACIES)}"
+    if list(message.mesh_names) != list(layout.mesh_names):
+        return f"its meshes are {list(message.mesh_names)}, those of the recording {list(layout.mesh_names)}"
+    for name in ("points", "normals"):
+        if len(getattr(message, name)) not in (0, 3 * count):
+            return f"{name} has {len(getattr(message, name))} coordinates for {count} contacts"
+    kind = np.frombuffer(message.kind, np.uint8)
+    if (kind > message.EDGE_EDGE).any() or (np.diff(kind.astype(np.int16)) < 0).any():
+        return "kind is not a run of vertex-face followed by a run of edge-edge"
+    for side, of_vertex_face in (("a", layout.vertex_offsets), ("b", layout.face_offsets)):
+        if problem := _misnamed(message, side, of_vertex_face, kind, layout):
+            return problem
+    return None
+
+
+def _misnamed(message, side, of_vertex_face, kind, layout) -> str | None:
+    """What a side names that is not there: added up to numbers of the scene, it could pass for something else."""
+    mesh = np.frombuffer(getattr(message, f"mesh_{side}"), np.uint32)
+    feature = np.frombuffer(getattr(message, f"features_{side}"), np.uint32).reshape(-1, 2)
+    if (mesh >= len(layout.mesh_names)).any():
+        return f"mesh_{side} names mesh {mesh.max()} of {len(layout.mesh_names)}"
+    vertex_face = kind == message.VERTEX_FACE
+    first = np.where(vertex_face, np.diff(of_vertex_face)[mesh], np.diff(layout.vertex_offsets)[mesh])
+    wrong = (feature[:, 0] >= first) | np.where(vertex_face, feature[:, 1] != message.NONE, feature[:, 1] >= first)
+    if wrong.any():
+        row = int(np.argmax(wrong))
+        return f"features_{side} of contact {row} are {feature[row].tolist()}, in mesh {layout.mesh_names[mesh[row]]}"
+    return None
+
+
+def _not_any(recorded, contacts, layout) -> str | None:
+    count, total = len(recorded.kind), len(contacts.vf) + len(contacts.ee)
+    if bool(count) != bool(total):
+        return _count(count, total)
+    if recorded.total < count or (recorded.total > count and not recorded.truncated):
+        return f"{recorded.total:,} contacts are told of, {count:,} were recorded"
+    first = min(recorded.toc, default=float("inf"))
+    if recorded.first_toc != first:
+        return f"first time of contact: recorded {recorded.first_toc!r}, that of the recorded contacts is {first!r}"
+    then = contact_messages.read_contacts(recorded, layout)
+    for kind, describe in (("vf", _vertex_face), ("ee", _edge_edge)):
+        toc_of = dict(zip(map(tuple, getattr(contacts, kind)), getattr(contacts, kind + "_toc"), strict=True))
+        for row, toc in zip(map(tuple, getattr(then, kind)), getattr(then, kind + "_toc"), strict=True):
+            if row not in toc_of:
+                return f"{describe(row, layout)}: recorded at t = {float(toc)!r}, now not found"
+            if toc_of[row] != toc:
+                return f"{describe(row, layout)}: recorded at t = {float(toc)!r}, now at t = {float(toc_of[row])!r}"
+    return None
+
+
+def _first_difference(rows, toc, other_rows, other_toc) -> int | None:
+    common = min(len(rows), len(other_rows))
+    unequal = (rows[:common] != other_rows[:common]).any(axis=1) | (toc[:common] != other_toc[:common])
+    if unequal.any():
+        return int(np.argmax(unequal))
+    return None if len(rows) == len(other_rows) else common
+
+
+def _explain(index, then, now, kind, describe) -> str:
+    rows, toc = getattr(then, kind), getattr(then, kind + "_toc")
+    other, other_toc = getattr(now, kind), getattr(now, kind + "_toc")
+    if index < len(rows) and index < len(other) and tuple(rows[index]) == tuple(other[index]):
+        return f"{describe(rows[index])}: recorded at t = {float(toc[index])!r}, now at t = {float(other_toc[index])!r}"
+    # Rows are sorted: of two different ones at the same place, the smaller is missing on the other side.
+    if index >= len(other) or (index < len(rows) and tuple(rows[index]) < tuple(other[index])):
+        return f"{describe(rows[index])}: recorded at t = {float(toc[index])!r}, now not found"
+    return f"{describe(other[index])}: found now at t = {float(other_toc[index])!r}, not recorded"
+
+
+def _vertex_face(row, layout) -> str:
+    vertex, face = _local(row[0], layout.vertex_offsets, layout), _local(row[1], layout.face_offsets, layout)
+    return f"vertex {vertex} - face {face}"
+
+
+def _edge_edge(row, layout) -> str:
+    a, b, c, d = (_local(v, layout.vertex_offsets, layout) for v in row)
+    return f"edge ({a}, {b}) - edge ({c}, {d})"
+
+
+def _local(index, offsets, layout) -> str:
+    mesh = min(int(np.searchsorted(offsets, index, side="right")) - 1, len(layout.mesh_names) - 1)
+    return f"{layout.mesh_names[mesh]}:{int(index) - int(offsets[mesh])}"

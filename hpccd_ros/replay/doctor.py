@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`hpccd doctor`: say in words what an examination of a recording found."""
+
+from datetime import UTC, datetime
+from pathlib import Path
+
+from hpccd_ros.bag.reader import RecordingError, recording_files
+from hpccd_ros.bag.recover import Examination, examine, recover
+from hpccd_ros.base.errors import UserError, sentence
+
+
+def main(args) -> int:
+    """Examine, and recover where asked. 0: sound or recovered, 1: damaged.
+
+    Raises UserError where nothing can be saved.
+    """
+    files = recording_files(Path(args.file))
+    if args.recover:
+        if len(files) != 1:
+            raise UserError(f"--recover takes one file; {args.file} has {len(files)}: recover each by itself")
+        return _recover(files[0], args)
+    examinations = [examine(path) for path in files]
+    for examination in examinations:
+        _tell(examination)
+    if all(e.sound for e in examinations):
+        return 0
+    if not any(e.message_count for e in examinations):
+        raise UserError(f"{args.file} holds no whole message: no recording, or nothing is left of it")
+    return 1
+
+
+def _recover(source, args) -> int:
+    try:
+        found = recover(source, args.recover, args.compression)
+    except FileExistsError as error:
+        raise UserError(f"--recover {args.recover}: exists; recordings are not overwritten") from error
+    except OSError as error:
+        raise UserError(f"--recover {args.recover}: {error.strerror}") from error
+    _tell(found)
+    check = examine(args.recover)
+    if not check.sound or check.message_count != found.message_count:
+        raise RecordingError(f"the recovered file {args.recover} is not what was saved: {check.problem}")
+    print(f"saved {check.message_count} messages, {_seconds(check):.3f} s: {args.recover}")
+    return 0
+
+
+def _tell(found: Examination) -> None:
+    print(f"{found.path}: {_verdict(found)}")
+    print(f"  {found.size:,} bytes, written by {sentence(found.library) or '?'}, "
+          f"profile {sentence(found.profile) or '?'}, {found.chunks} chunks, compression {found.compression}")
+    if found.message_count:
+        begin = datetime.fromtimestamp(found.start * 1e-9, UTC).strftime("%Y-%m-%d %H:%M:%S")
+        print(f"  {found.message_count} messages in {_seconds(found):.3f} s from {begin} UTC")
+    for topic, count in found.counts.items():
+        print(f"    {count:7} {sentence(topic)}  {sentence(found.types.get(topic, '(type unknown)'))}")
+    if found.problem:
+        print(f"  readable up to byte {found.readable:,}; the first problem: {sentence(found.problem)}")
+    if found.damaged_chunks:
+        print(f"  {found.damaged_chunks} damaged chunks skipped"
+              + (f", and {found.orphans} messages that only they described" if found.orphans else ""))
+    if not found.sound and found.message_count:
+        print(f"  `hpccd doctor {found.path} --recover OUT.mcap` saves the messages above")
+
+
+def _verdict(found: Examination) -> str:
+    if found.sound:
+        return "sound"
+    if found.message_count == 0:
+        return "NO WHOLE MESSAGE"
+    if found.damaged_chunks or found.ended:
+        return "DAMAGED"
+    return "CUT OFF, not finished by its recorder"
+
+
+def _seconds(found: Examination) -> float:
+    return (found.end - found.start) * 1e-9

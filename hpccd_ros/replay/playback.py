@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Play recorded messages over DDS: the very bytes, with the recorded quality of service, in their rhythm.
+
+Only where a message has got a field since it was recorded, an empty one is added: its readers expect one.
+"""
+
+import itertools
+import signal
+from collections import deque
+
+import rclpy
+import yaml
+from rclpy.exceptions import NameValidationException
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+
+from hpccd_ros.bag.decode import completion
+from hpccd_ros.bag.reader import RecordedTopic, Recording, RecordingError
+from hpccd_ros.base.errors import UserError
+from hpccd_ros.middleware import environment, qos, ros_start, transform_topics
+from hpccd_ros.middleware.listeners import await_acknowledged, await_subscribers
+from hpccd_ros.middleware.message_types import message_class
+from hpccd_ros.replay import recorded_setup
+from hpccd_ros.replay.pacing import Pace, next_wanted
+
+# Reliable readers that are late now and then must still find what they missed.
+DEPTH = 20
+# Characters of YAML: rosbag2 writes 400 for a publisher.
+MOST_QOS = 100_000
+# Seconds that the last messages may take on their way.
+LAST = 2.0
+
+
+def main(args) -> int:
+    """Play as the options of `hpccd replay --publish` say."""
+    stop = []
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda received, frame: stop.append(received))
+    with Recording(args.file) as recording:
+        topics = _topics(recording, args)
+        environment.prepare()
+        ros_start.init(["--ros-args", *args.ros_args] if args.ros_args else None)
+        node = rclpy.create_node("hpccd_replay", start_parameter_services=False)
+        try:
+            publishers = {topic.name: _publisher(node, topic) for topic in topics}
+            tails = {topic.name: completion(topic) or b"" for topic in topics}
+            lacking = await_subscribers(publishers, args.subscribers, args.wait, stop)
+            if lacking and not stop:
+                raise UserError(_too_few(lacking, args.subscribers))
+            count = _play(recording, publishers, tails, args, stop)
+            await_acknowledged(publishers.values(), LAST)
+        finally:
+            node.destroy_node()
+            rclpy.try_shutdown()
+    print(f"published {count} messages on {len(topics)} topics{' until told to stop' if stop else ''}", flush=True)
+    return 0
+
+
+def _topics(recording, args) -> list[RecordedTopic]:
+    if args.all:
+        return list(recording.topics.values())
+    roles = recorded_setup.of_recording(recording, args.params).roles
+    return [topic for name, topic in recording.topics.items() if name in roles]
+
+
+def _publisher(node, topic):
+    try:
+        return node.create_publisher(message_class(topic.type_name), topic.name, _qos(topic))
+    # ValueError: no name of a topic. RuntimeError, as RCLError is: that of another one already, once it is resolved.
+    except (LookupError, NameValidationException, ValueError, RuntimeError) as error:
+        raise RecordingError(f"topic {topic.name} cannot be played: {error}") from error
+
+
+def _qos(topic) -> QoSProfile:
+    """The recorded reliability and durability where all its publishers agreed, else reliable and volatile."""
+    offers = _offers(topic)
+    # rosbag2 before version 9 wrote the numbers of the enumeration: 1 reliable, 2 best effort; 1 transient local.
+    best_effort = offers and all(offer.get("reliability") in ("best_effort", 2) for offer in offers)
+    latched = offers and all(offer.get("durability") in ("transient_local", 1) for offer in offers)
+    return QoSProfile(
+        history=HistoryPolicy.KEEP_LAST,
+        depth=_in_force(topic) if latched else DEPTH,
+        reliability=ReliabilityPolicy.BEST_EFFORT if best_effort else ReliabilityPolicy.RELIABLE,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
+    )
+
+
+def _offers(topic) -> list[dict]:
+    try:
+        if len(topic.offered_qos) > MOST_QOS:
+            raise ValueError("too long")
+        offers = yaml.safe_load(topic.offered_qos) or []
+    except (yaml.YAMLError, ValueError, RecursionError):  # ValueError: what YAML takes for a date and is none
+        offers = None
+    if not isinstance(offers, list) or not all(isinstance(offer, dict) for offer in offers):
+        why = "its quality of service is not stored as rosbag2 does"
+        raise RecordingError(f"topic {topic.name} cannot be played: {why}")
+    return offers
+
+
+def _in_force(topic) -> int:
+    """How many of the last messages of a latched topic are in force: static transforms add up."""
+    return qos.TRANSFORMS_STATIC.depth if topic.type_name in transform_topics.TYPES else 1
+
+
+def _too_few(lacking: dict[str, int], wanted: int) -> str:
+    names = ", ".join(lacking)
+    if not any(lacking.values()):
+        return f"nobody subscribes to {names}: start a node for these meshes first, or --wait"
+    return f"fewer than {wanted} subscribe to {names}: start them first, --wait longer, or ask for fewer --subscribers"
+
+
+def _play(recording, publishers, tails, args, stop) -> int:
+    count, first, last_frame = 0, None, None
+    pace = Pace(1.0 if args.rate is None else args.rate, stop)
+    latched, begun = {}, set()
+    for message in recording.messages(list(publishers)):
+        first = message.log_time if first is None else first
+        at = (message.log_time - first) * 1e-9
+        if at < args.begin:
+            # What is latched (topologies, static transforms) is in force at the beginning, whenever it was sent.
+            if publishers[message.topic].qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL:
+                depth = publishers[message.topic].qos_profile.depth
+                latched.setdefault(message.topic, deque(maxlen=depth)).append(message)
+            continue
+        if stop or at > args.end:
+            break
+        for earlier in itertools.chain.from_iterable(latched.values()):
+            publishers[earlier.topic].publish(earlier.data + tails[earlier.topic])
+            count += 1
+        await_acknowledged([publishers[topic] for topic in latched], args.wait, stop)
+        latched.clear()
+        if args.step:
+            # One frame: all messages published at about the same time, as meshes of one step are.
+            if last_frame is None or message.log_time - last_frame > 2_000_000:
+                if not next_wanted(f"{at:.3f} s"):
+                    break
+            last_frame = message.log_time
+        else:
+            pace.wait(at)
+        publishers[message.topic].publish(message.data + tails[message.topic])
+        count += 1
+        if message.topic not in begun:
+            begun.add(message.topic)
+            pace.delay(await_acknowledged([publishers[message.topic]], args.wait, stop))
+    return count

@@ -1,0 +1,215 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Compute a recording again, without DDS and as fast as it goes, and compare with what the node answered."""
+
+import dataclasses
+import time
+from collections.abc import Iterator
+
+from hpccd_ros.bag.decode import make_decoder
+from hpccd_ros.bag.reader import Recording, RecordingError
+from hpccd_ros.detect.detection import CORE_ERRORS, make_detector
+from hpccd_ros.detect.layout import Layout
+from hpccd_ros.frames.types import SceneFrame
+from hpccd_ros.middleware import fields
+from hpccd_ros.middleware.fields import InvalidMessageError
+from hpccd_ros.params.table import ACCURACIES
+from hpccd_ros.replay.compare import difference
+from hpccd_ros.replay.frames import FrameSource, FrameWindow
+from hpccd_ros.replay.recorded_setup import ReplaySetup
+
+# Frames kept for answers that come after them; at least as many as can wait in the node.
+WINDOW = 64
+# Frames for which an answer waits that was written before its own; far less than the window, which must still hold
+# the frames of the answers behind it.
+PATIENCE = 16
+
+
+@dataclasses.dataclass
+class Step:
+    """One step of the scene: what was recorded of it and what came out now. Stamps in ns."""
+
+    number: int  # counts the steps of this replay, from 0
+    step: int  # number that the publisher gave
+    start: int
+    end: int
+    start_frame: SceneFrame | None
+    end_frame: SceneFrame | None
+    recorded: object | None  # ContactArray, or None in a recording without contacts
+    at: float = 0.0  # seconds into the recording, of the answer or else of the last message of its end frame
+    contacts: object | None = None  # of the core, or None where a frame is missing
+    layout: Layout | None = None
+    milliseconds: float = 0.0  # the core's call, wall time
+    difference: str | None = None  # first difference from what was recorded
+    missing: str | None = None  # why it could not be computed
+    before_recording: bool = False  # it began before the recording did
+
+    @property
+    def total(self) -> int:
+        return len(self.contacts.vf) + len(self.contacts.ee) if self.contacts is not None else 0
+
+
+class Replay:
+    """Goes once through a recording. Iterate over `steps()`; afterwards, or in between, look at the counts.
+
+    backend, threads: as of hpccd_core.Detector; the contacts must not depend on them.
+    accuracy: "": that with which each answer was found.
+    outputs: computed beside the contacts (they are not compared).
+    begin, end: seconds into the recording; steps outside are neither computed nor counted.
+    on_message: called with the number of recorded messages read so far.
+    """
+
+    def __init__(self, recording: Recording, setup: ReplaySetup, *, backend="auto", threads=0, accuracy="",
+                 outputs=(), begin=0.0, end=float("inf"), on_message=lambda count: None):
+        self._recording = recording
+        self._setup = setup
+        self._backend, self._threads, self._accuracy = backend, threads, accuracy
+        self._outputs = tuple(outputs)
+        self._begin, self._end = begin, end
+        self._at = 0.0  # seconds into the recording, of the message read last
+        self._on_message = on_message
+        self.source = FrameSource(setup, recording.topics)
+        answers = recording.topics.get(setup.contacts)
+        self.recorded_answers = answers.count if answers else 0
+        self._decode_answer = make_decoder(answers) if answers else None
+        self._builder = setup.builder
+        self._scene_of: SceneFrame | None = None
+        self._scene = None
+        self._layout: Layout | None = None
+        self._detector = None
+        self._options = None
+        self.any_one = setup.settings["report"] == "any"  # "verified" means less then: compare.py
+        self.verified = self.diverged = self.unverified = 0
+        self.frames = 0
+        self.first_divergence: Step | None = None
+
+    @property
+    def message_count(self) -> int:
+        """Messages that a replay reads."""
+        return sum(self._recording.topics[name].count for name in self._topics)
+
+    @property
+    def _topics(self):
+        return self.source.topics + ([self._setup.contacts] if self.recorded_answers else [])
+
+    def steps(self) -> Iterator[Step]:
+        """Each recorded answer, computed again; in a recording without answers, each step from frame to frame."""
+        find = self._answers if self.recorded_answers else self._successive_frames
+        number = 0
+        for step in find():
+            if step.at < self._begin:
+                continue
+            if step.at > self._end:
+                break
+            step.number, number = number, number + 1
+            if step.missing is None:
+                self._compute(step)
+            if step.missing is None:
+                self._compare(step)
+            self._count(step)
+            yield step
+
+    def _answers(self):
+        capacity = max(WINDOW, 2 * self._setup.settings["frame_queue"])
+        window = FrameWindow(capacity)
+        waiting = []
+        for message in self._messages():
+            if message.topic == self._setup.contacts:
+                # An answer may have been written before the last of the messages that it answers.
+                waiting.append((self.frames, self._at, self._decode_answer(message)))
+            else:
+                for frame in self.source.take(message):
+                    self.frames += 1
+                    window.put(frame)
+            while waiting:
+                came, at, answer = waiting[0]
+                step = self._step_of(answer, at, window)
+                if step.missing and not step.before_recording and self.frames < came + PATIENCE:
+                    break
+                waiting.pop(0)
+                yield step
+        for _, at, answer in waiting:
+            yield self._step_of(answer, at, window)
+
+    def _successive_frames(self):
+        last = None
+        for message in self._messages():
+            for frame in self.source.take(message):
+                self.frames += 1
+                if last is not None and last.same_scene(frame) and frame.stamp > last.stamp:
+                    yield Step(0, frame.step or 0, last.stamp, frame.stamp, last, frame, None, self._at)
+                last = frame
+
+    def _messages(self):
+        first = None
+        for count, message in enumerate(self._recording.messages(self._topics), start=1):
+            first = message.log_time if first is None else first
+            self._at = (message.log_time - first) * 1e-9
+            yield message
+            self._on_message(count)
+
+    def _step_of(self, answer, at, window) -> Step:
+        try:
+            start, end = fields.stamp_to_ns(answer.start), fields.stamp_to_ns(answer.header.stamp)
+        except InvalidMessageError as error:
+            return Step(0, answer.step, 0, 0, None, None, answer, at, missing=f"the answer is malformed: {error}")
+        step = Step(0, answer.step, start, end, window.get(start), window.get(end), answer, at)
+        for name, stamp, frame in (("start", start, step.start_frame), ("end", end, step.end_frame)):
+            if frame is None:
+                step.before_recording = window.first is not None and stamp < window.first
+                step.missing = f"the recording has no frame of all meshes at its {name}, stamp {stamp} ns"
+                return step
+        if not step.start_frame.same_scene(step.end_frame):
+            step.missing = "the topology or the coordinate frame changes between its start and its end"
+        return step
+
+    def _compute(self, step):
+        end = step.end_frame
+        if self._scene_of is None or not self._scene_of.same_scene(end):
+            try:
+                self._scene = self._builder.build(end.topologies)
+            except CORE_ERRORS as error:
+                raise RecordingError(f"frame with stamp {end.stamp} ns: the core refuses it: {error}") from error
+            self._layout = Layout.of(tuple(m.name for m in self._builder.meshes), end.topologies)
+            self._scene_of, self._detector = end, None
+        told = step.recorded.accuracy if step.recorded is not None else ""
+        accuracy = self._accuracy or (told if told in ACCURACIES else "")  # one that is not diverges: compare.py
+        options = dataclasses.replace(
+            self._setup.options(accuracy, self._backend, self._threads), outputs=self._outputs
+        )
+        if self._detector is None or options != self._options:
+            try:
+                self._detector = make_detector(self._scene, options)
+            except CORE_ERRORS as error:
+                raise RecordingError(f"cannot compute as it was recorded: {error}") from error
+            self._options = options
+        began = time.perf_counter()
+        try:
+            step.contacts = self._detector.detect(*self._motion(step))
+        except CORE_ERRORS as error:
+            step.missing = f"the core refuses it: {error}"  # as in the node, which goes on with the next one
+            return
+        step.milliseconds = 1e3 * (time.perf_counter() - began)
+        step.layout = self._layout
+
+    def _motion(self, step):
+        end = step.end_frame
+        return self._builder.concatenate(step.start_frame, end), self._builder.concatenate(end, end)
+
+    def _compare(self, step):
+        if step.recorded is None:
+            return
+        found, any_one = step.contacts, self._options.report == "any"
+        if any_one:
+            # Which one the node found depended on the timing of its threads: it must be one of all.
+            every = dataclasses.replace(self._options, report="all", outputs=())
+            found = make_detector(self._scene, every).detect(*self._motion(step))
+        step.difference = difference(step.recorded, found, step.layout, any_one)
+
+    def _count(self, step):
+        if step.missing:
+            self.unverified += not step.before_recording
+        elif step.difference:
+            self.diverged += 1
+            self.first_divergence = self.first_divergence or step
+        elif step.recorded is not None:
+            self.verified += 1

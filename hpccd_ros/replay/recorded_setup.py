@@ -1,0 +1,160 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The scene of a recording: what the node knew from its parameters and mesh files when it was recorded."""
+
+import dataclasses
+import tempfile
+from pathlib import Path, PurePosixPath
+
+from hpccd_ros.bag.reader import Recording, RecordingError
+from hpccd_ros.base.errors import UserError, sentence
+from hpccd_ros.detect.detection import Options, SceneBuilder
+from hpccd_ros.frames.mesh_file import FORMATS, MeshFileError, load_mesh, place
+from hpccd_ros.frames.types import MeshFrame, Topology
+from hpccd_ros.middleware import transform_topics
+from hpccd_ros.params import parameters as table
+from hpccd_ros.params import scene_parameters
+from hpccd_ros.params.parameter_file import read_parameters
+from hpccd_ros.params.parameters import ParameterError
+from hpccd_ros.record import recorded_topics
+from hpccd_ros.record.mesh_attachment import attachment_name
+
+
+@dataclasses.dataclass(frozen=True)
+class ReplaySetup:
+    """Node settings and mesh settings as `parameters.declare` gives them, and the topics by what they carry."""
+
+    settings: dict
+    meshes: dict[str, dict]
+    # Topic name -> (mesh, "topology" | "vertices" | "points"), or ("", name in transform_topics.ALL).
+    roles: dict[str, tuple[str, str]]
+    contacts: str | None  # topic name; None: the recording has none
+    files: dict[str, tuple[Topology, MeshFrame | None]]  # of meshes that come from a file; frame: static ones
+    unknown: list[str]  # parameters that the node does not have: without effect
+
+    @property
+    def builder(self) -> SceneBuilder:
+        return scene_parameters.scene_builder(self.settings, self.meshes)
+
+    def options(self, accuracy: str, backend: str, threads: int) -> Options:
+        """Detector options of the recorded node, but for what may differ without a change of the result."""
+        return Options(accuracy or self.settings["accuracy"], backend, threads, self.settings["report"])
+
+
+def of_recording(recording: Recording, parameter_file: str | None = None) -> ReplaySetup:
+    """Setup from what `hpccd record` stored, or from a parameter file for a recording of another recorder.
+
+    Both are checked as the node checks its parameters. Raises RecordingError where the recording, UserError where the
+    file does not tell what the meshes are, or tells what cannot be.
+    """
+    info = recording.info or {}
+    try:
+        if parameter_file:
+            where, refused = f"--params {parameter_file}", UserError
+            given = read_parameters(parameter_file)
+        else:
+            where, refused = f"{recording.path}: the stored parameters", RecordingError
+            given = _stored(recording, info)
+        settings, meshes = table.of_plain(given)
+        if not settings["meshes"]:
+            raise ParameterError("parameter `meshes` names no mesh")
+        if all(row["static"] for row in meshes.values()):
+            raise ParameterError("at least one mesh must not be static, or nothing ever moves")
+        scene_parameters.check(settings, meshes)
+    except ParameterError as error:
+        raise refused(sentence(f"{where}: {error}")) from error
+    by_role = _by_role(recording, info, recorded_topics.types_by_role(meshes))
+    roles = {topic: ("", role) if role in transform_topics.ALL else tuple(role.split("/")[1:])
+             for role, topic in by_role.items() if role != "contacts"}  # fmt: skip
+    if not any(kind in ("vertices", "points") for _, kind in roles.values()):
+        raise RecordingError(
+            f"{recording.path} holds no vertices of the meshes {', '.join(meshes)}; its topics are "
+            f"{', '.join(recording.topics) or 'none'}"
+        )
+    moved = [name for name, row in meshes.items() if row["transform"] == "tf"]
+    if moved and not any(kind in transform_topics.ALL for _, kind in roles.values()):
+        raise RecordingError(
+            f"{recording.path}: mesh {moved[0]} was transformed by tf (parameter mesh.{moved[0]}.transform), and the "
+            "recording holds no transforms: its positions cannot be computed again"
+        )
+    return ReplaySetup(settings, meshes, roles, by_role.get("contacts"), _files(recording, meshes),
+                       table.unknown(given, meshes))  # fmt: skip
+
+
+def _stored(recording, info) -> dict:
+    stored = info.get("parameters", {})
+    if stored == {}:
+        raise RecordingError(
+            f"{recording.path} was not written by `hpccd record`: it does not hold the node's parameters. Give "
+            "them with --params FILE (the YAML file that the node was started with)"
+        )
+    if not isinstance(stored, dict):
+        raise ParameterError(f"no names and values but a {type(stored).__name__}")
+    return stored
+
+
+def _by_role(recording, info, types) -> dict[str, str]:
+    """Role -> topic of the recording. types: role -> type; topics of other roles were recorded beside them."""
+    stored = info.get("topics", {})
+    if not isinstance(stored, dict):
+        raise RecordingError(f"{recording.path}: the stored topics are no names but a {type(stored).__name__}")
+    stored = stored or _by_suffix(recording, types)
+    found: dict[str, str] = {}
+    for topic, role in stored.items():
+        if topic not in recording.topics or not isinstance(role, str) or role not in types:
+            continue
+        type_name = recording.topics[topic].type_name
+        if type_name != types[role]:
+            raise RecordingError(
+                f"{recording.path}: topic {topic} is stored as the node's {role}, which is {types[role]}; "
+                f"it holds {type_name}"
+            )
+        if role in found:
+            raise RecordingError(f"{recording.path}: topics {found[role]} and {topic} are both stored as {role}")
+        found[role] = topic
+    if "contacts" not in found and types["contacts"] == getattr(recording.topics.get("/contacts"), "type_name", None):
+        found["contacts"] = "/contacts"
+    return found
+
+
+def _by_suffix(recording, types) -> dict[str, str]:
+    """Topic -> role by what a topic's name ends in; of several topics with the same role, the first."""
+    by_ending = {role.removeprefix("/"): role for role in types}
+    found: dict[str, str] = {}
+    for topic in recording.topics.values():
+        words = topic.name.split("/")
+        endings = ("/".join(words[-count:]) for count in (1, 3) if len(words) > count)
+        role = next((by_ending[ending] for ending in endings if ending in by_ending), None)
+        if role is not None and types[role] == topic.type_name and role not in found.values():
+            found[topic.name] = role
+    return found
+
+
+def _files(recording, meshes):
+    found = {}
+    for name, row in meshes.items():
+        if not row["file"]:
+            continue
+        attachment = attachment_name(name, row["file"])
+        try:
+            if attachment in recording.attachments:
+                vertices, faces = _load(attachment, recording.attachments[attachment])
+            else:
+                vertices, faces = load_mesh(row["file"])
+            frame = MeshFrame(0, place(vertices, row["pose"]), version=0) if row["static"] else None
+        except MeshFileError as error:
+            raise RecordingError(f"mesh {name} of the recording: {error}") from error
+        found[name] = (Topology(0, len(vertices), faces), frame)
+    return found
+
+
+def _load(attachment, data):
+    suffix = PurePosixPath(attachment).suffix
+    with tempfile.TemporaryDirectory() as folder:
+        # A name of our own: that of a recording may be any.
+        copy = Path(folder) / f"mesh{suffix}"
+        if suffix.lower() in FORMATS:
+            copy.write_bytes(data)
+        try:
+            return load_mesh(str(copy))
+        except MeshFileError as error:
+            raise MeshFileError(str(error).replace(str(copy), attachment)) from error

@@ -1,0 +1,192 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`hpccd replay`: progress while it runs, then what was verified, and the exit status."""
+
+import contextlib
+import csv
+import json
+import os
+import sys
+import time
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+from hpccd_ros.bag.reader import Recording
+from hpccd_ros.base.errors import UserError
+from hpccd_ros.replay import recorded_setup
+from hpccd_ros.replay.pacing import Pace, next_wanted
+from hpccd_ros.replay.recomputed import Replay, Step
+
+COLUMNS = ("number", "step", "start_ns", "end_ns", "contacts", "vertex_face", "edge_edge", "first_toc", "ms", "hash",
+           "recorded_contacts", "recorded_hash", "result")  # fmt: skip
+
+
+class Table:
+    """One row of text for each step, into a CSV file."""
+
+    def __init__(self, path):
+        try:
+            self._file = open(path, "x", newline="", encoding="utf-8")
+        except OSError as error:
+            raise UserError(f"--csv {path}: {error.strerror}; existing files are not overwritten") from error
+        self._writer = csv.writer(self._file)
+        self._writer.writerow(COLUMNS)
+
+    def add(self, step: Step) -> None:
+        found, recorded = step.contacts, step.recorded
+        self._writer.writerow([
+            step.number, step.step, step.start, step.end,
+            *([step.total, len(found.vf), len(found.ee), repr(float(found.first_toc)), f"{step.milliseconds:.3f}",
+               f"{found.hash:#018x}"] if found is not None else [""] * 6),
+            *([recorded.total, f"{recorded.hash:#018x}"] if recorded is not None else [""] * 2),
+            step.missing or step.difference or ("equal" if recorded is not None else ""),
+        ])  # fmt: skip
+
+    def close(self):
+        self._file.close()
+
+
+def write_json(path, rows) -> None:
+    """Write the rows of a report into a new file."""
+    try:
+        with open(path, "x", encoding="utf-8") as stream:
+            json.dump(rows, stream, indent=1)
+    except OSError as error:
+        raise UserError(f"--json {path}: {error.strerror}; existing files are not overwritten") from error
+
+
+def main(args) -> int:
+    """Verify as the options of `hpccd replay` say. 0: all equal, 1: not."""
+    with contextlib.ExitStack() as stack:
+        recording = stack.enter_context(Recording(args.file))
+        setup = recorded_setup.of_recording(recording, args.params)
+        table = stack.enter_context(contextlib.closing(Table(args.csv))) if args.csv else None
+        progress = stack.enter_context(_progress_bar())
+        replay = Replay(recording, setup, backend=args.backend, threads=args.threads, accuracy=args.accuracy,
+                        begin=args.begin, end=args.end,
+                        on_message=lambda count: progress.update(bar, completed=count))
+        bar = progress.add_task("replay", total=replay.message_count, said="")
+        summary = Summary()
+        pace = Pace(args.rate or 0.0)
+        for step in replay.steps():
+            pace.wait(step.at)
+            summary.add(step)
+            if table:
+                table.add(step)
+            if step.contacts is not None:
+                progress.update(bar, said=f"step {step.step}: {step.total:,} contacts, {step.milliseconds:.1f} ms")
+            if step.difference and args.keep_going:
+                progress.console.print(f"step {step.step} (ends at {step.end} ns): {step.difference}", markup=False,
+                                       highlight=False)
+            if args.step:
+                progress.stop()
+                print(line(step))
+                if not next_wanted(f"{step.at:.3f} s"):
+                    break
+        progress.update(bar, said="")
+    for name in setup.unknown:
+        print(f"parameter {name} is unknown and has no effect", file=sys.stderr)
+    if args.json:
+        write_json(args.json, [summary.row(args.file, replay)])
+    summary.print(args, recording, replay)
+    return 1 if replay.diverged or replay.unverified or not summary.computed else 0
+
+
+def line(step: Step) -> str:
+    """One step in words."""
+    if step.missing:
+        return f"step {step.step}: not computed: {step.missing}"
+    result = step.difference or ("equal" if step.recorded is not None else "nothing recorded to compare with")
+    return f"step {step.step}: {step.total:,} contacts, hash {step.contacts.hash:#018x}, {result}"
+
+
+class Summary:
+    """Adds up the steps of a replay, and says what came of them."""
+
+    def __init__(self):
+        self.began = time.perf_counter()
+        self.computed = self.contacts = 0
+        self.milliseconds = 0.0
+        self.seconds_recorded = 0.0
+        self.accuracies = set()
+        self.missing: Step | None = None
+        self.before = 0
+
+    def add(self, step: Step) -> None:
+        if step.missing:
+            self.before += step.before_recording
+            if not step.before_recording:
+                self.missing = self.missing or step
+            return
+        self.computed += 1
+        self.contacts += step.total
+        self.milliseconds += step.milliseconds
+        self.seconds_recorded += (step.end - step.start) * 1e-9
+        if step.recorded is not None:
+            self.accuracies.add(step.recorded.accuracy)
+
+    def row(self, path, replay) -> dict:
+        """What came of it, JSON-able."""
+        if replay.diverged:
+            result, first = "DIVERGED", replay.first_divergence
+            why = f"step {first.step}: {first.difference}"
+        elif replay.unverified:
+            result, why = "NOT VERIFIED", f"step {self.missing.step}: {self.missing.missing}"
+        elif replay.verified:
+            result, why = "VERIFIED", ""
+        else:
+            result = "COMPUTED" if self.computed else "NOTHING"
+            why = "no recorded contacts" if self.computed else "no step of all meshes"
+        return {
+            "file": str(path), "result": result, "verified": replay.verified, "diverged": replay.diverged,
+            "unverified": replay.unverified, "frames": replay.frames, "steps": self.computed,
+            "contacts": self.contacts, "core_ms": round(self.milliseconds, 3),
+            "seconds": round(time.perf_counter() - self.began, 3), "accuracy": sorted(self.accuracies), "why": why,
+        }  # fmt: skip
+
+    def print(self, args, recording, replay) -> None:
+        wall = time.perf_counter() - self.began
+        print(f"{recording.path}: {replay.frames:,} frames, {self.computed:,} steps computed, "
+              f"{self.contacts:,} contacts")
+        if self.computed:
+            print(f"  {wall:.2f} s ({self.milliseconds / self.computed:.2f} ms a step in the core) for "
+                  f"{self.seconds_recorded:.2f} s of motion; {args.threads or os.cpu_count()} threads")
+        _print_losses(replay)
+        if self.before:
+            print(f"  {self.before} answers not verified: their step began before the recording")
+        if self.missing:
+            print(f"  {replay.unverified} answers NOT VERIFIED, first step {self.missing.step} "
+                  f"(ends at {self.missing.end} ns): {self.missing.missing}")
+        if replay.diverged:
+            first = replay.first_divergence
+            print(f"DIVERGED: {replay.diverged} of {replay.diverged + replay.verified} answers differ, first in step "
+                  f"{first.step}, answer {first.number} of the recording (ends at {first.end} ns):\n"
+                  f"  {first.difference}")
+        elif replay.verified:
+            what = "hold a contact where there is one, and one that there is" if replay.any_one else (
+                "are equal in every contact, time and hash")  # fmt: skip
+            print(f"VERIFIED: {replay.verified} answers {what} (accuracy {', '.join(sorted(self.accuracies))})")
+        elif replay.recorded_answers:
+            print("NOTHING VERIFIED: the recording has answers, but not the frames that they belong to")
+        elif self.computed:
+            print("computed only: the recording holds no contacts to compare with")
+        else:
+            print("NOTHING COMPUTED: no two frames of all meshes follow each other in the recording")
+        sys.stdout.flush()
+
+
+def _print_losses(replay) -> None:
+    source = replay.source
+    for counter, what in (
+        (source.drops, "vertex messages"), (source.refused, "topologies"), (source.transforms_refused, "transforms")
+    ):  # fmt: skip
+        for (mesh, reason), count in sorted(counter.by_mesh_and_reason().items()):
+            print(f"  {count} {what} of {mesh} not used: {reason}")
+
+
+def _progress_bar() -> Progress:
+    return Progress(
+        TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TextColumn("messages"),
+        TimeRemainingColumn(), TextColumn("{task.fields[said]}"),
+        console=Console(stderr=True), transient=True, disable=not sys.stderr.isatty(),
+    )  # fmt: skip
