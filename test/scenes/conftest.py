@@ -1,12 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A cache folder and a DDS domain of their own for the tests: they neither use nor fill the user's."""
+"""A cache folder of their own for the tests: they neither use nor fill the user's."""
 
 import os
 
 import pytest
-
-# Domains 0..101 are safe on Linux whatever the ephemeral port range is.
-os.environ.setdefault("ROS_DOMAIN_ID", str(1 + os.getpid() % 100))
 
 
 @pytest.fixture(scope="session", autouse=True)

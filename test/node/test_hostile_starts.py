@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from node_process import PATIENCE
+from sources import SUPPORT
 
 import hpccd_ros
 
@@ -134,7 +135,7 @@ def outcomes(tmp_path_factory):
         file.write_bytes(content if isinstance(content, bytes) else content.replace("FOLDER", str(folder)).encode())
         starts[name] = ["--ros-args", "--params-file", str(file)]
     done = subprocess.run(
-        [sys.executable, str(Path(__file__).with_name("forked_nodes.py"))],
+        [sys.executable, str(SUPPORT / "forked_nodes.py")],
         input=json.dumps(starts),
         env={**os.environ, "PYTHONPATH": str(ROOT)},
         text=True,

@@ -16,6 +16,7 @@ from pathlib import Path
 import pytest
 from network_peer import N
 from node_process import PATIENCE
+from sources import SUPPORT
 from waving_sheet import scene_of, sheet_faces, sheet_positions
 
 import hpccd_core as hc
@@ -75,7 +76,7 @@ def start(network, arguments, **environment):
 
 def ask(network, namespace, seconds, **environment):
     """What the simulator in ``network`` got."""
-    peer = start(network, [str(Path(__file__).with_name("network_peer.py")), namespace, str(seconds)], **environment)
+    peer = start(network, [str(SUPPORT / "network_peer.py"), namespace, str(seconds)], **environment)
     output, _ = peer.communicate(timeout=4 * PATIENCE)
     assert peer.returncode == 0, output
     return json.loads(output.splitlines()[-1])

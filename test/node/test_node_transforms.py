@@ -4,32 +4,12 @@
 import numpy as np
 import pytest
 from geometry_msgs.msg import TransformStamped
+from mesh_in_a_hand import FACES, HAND, SCENE, SECOND, parts, topologies, transform
 from node_process import assert_same_contacts
-from waving_sheet import scene_of, sheet_faces, sheet_positions
+from waving_sheet import scene_of
 
 from hpccd_ros.frames.rigid import Rigid
-from hpccd_ros.middleware import fields, qos
-
-N = 12
-FACES = sheet_faces(N)
-SECOND = 10**9
-HAND = Rigid.of((0.3, -0.2, 0.1), (0.0, 0.0, np.sin(0.4), np.cos(0.4)))
-SCENE = {"meshes": ["cloth", "net"], "frame_id": "world"}
-
-
-def transform(parent, child, rigid, stamp=0):
-    message = TransformStamped(child_frame_id=child)
-    message.header.frame_id, message.header.stamp = parent, fields.ns_to_stamp(stamp)
-    to = message.transform
-    to.translation.x, to.translation.y, to.translation.z = rigid.shift.tolist()
-    to.rotation.x, to.rotation.y, to.rotation.z, to.rotation.w = rigid.quaternion.tolist()
-    return message
-
-
-def parts(k):
-    """The meshes in the scene's frame; what the net's publisher sends is in the frame of the hand."""
-    net = sheet_positions(N, k + 2, offset=0.003, dtype=np.float64)
-    return sheet_positions(N, k), net, HAND.inverse().apply(net)
+from hpccd_ros.middleware import qos
 
 
 def send(node, k, frame_id):
@@ -42,11 +22,6 @@ def check(message, k, rigid=HAND):
     placed = [np.concatenate([parts(s)[0], rigid.apply(parts(s)[2])]) for s in (k - 1, k)]
     assert message.header.frame_id == "world"
     assert assert_same_contacts(message, *placed, scene_of(cloth=FACES, net=FACES)) > 0
-
-
-def topologies(node):
-    for name in ("cloth", "net"):
-        node.peer.topology(name, FACES, N * N)
 
 
 def test_pose_of_a_stream(start_node):

@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from builtin_interfaces.msg import Time
+from clouds import F32, F64, cloud
 from hpccd.msg import ContactArray, MeshTopology, MeshVertices
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -20,29 +21,6 @@ from hpccd_ros.middleware import contact_messages, fields, mesh_messages
 from hpccd_ros.middleware.fields import InvalidMessageError
 
 POINTS = np.arange(12, dtype=np.float32).reshape(4, 3) * 0.5
-
-
-def cloud(points, *, names="xyz", offsets=None, step=None, kinds=None, height=1, row_pad=0, big=False):
-    """PointCloud2 of (n,3) points; one datatype an axis; extra bytes are filled with 0xAB."""
-    kinds = kinds or [PointField.FLOAT32] * 3
-    types = [np.dtype({PointField.FLOAT32: "f4", PointField.FLOAT64: "f8"}.get(k, "i4")) for k in kinds]
-    offsets = offsets or np.cumsum([0, *(t.itemsize for t in types[:2])]).tolist()
-    step = step or max(o + t.itemsize for o, t in zip(offsets, types, strict=True))
-    width = len(points) // height
-    row_step = width * step + row_pad
-    data = np.full((height, row_step), 0xAB, np.uint8)
-    for i, point in enumerate(points):
-        row, column = divmod(i, width)
-        for axis in range(3):
-            raw = np.frombuffer(np.asarray(point[axis], types[axis]).tobytes(), np.uint8)
-            at = column * step + offsets[axis]
-            data[row, at : at + len(raw)] = raw
-    message = PointCloud2(height=height, width=width, point_step=step, row_step=row_step, is_bigendian=big)
-    message.fields = [
-        PointField(name=n, offset=o, datatype=k, count=1) for n, o, k in zip(names, offsets, kinds, strict=True)
-    ]
-    message.data = array("B", data.tobytes())
-    return message
 
 
 def refused(reason, read, *args):
@@ -124,9 +102,6 @@ def test_bad_vertices():
             points = POINTS.astype(dtype)
             points[2, 1] = bad
             assert "vertex 2" in refused(Reason.NOT_FINITE, read, mesh_messages.vertices_message(points, 0), 100)
-
-
-F32, F64 = PointField.FLOAT32, PointField.FLOAT64
 
 
 @pytest.mark.parametrize("largest", [np.full((4, 3), np.finfo("f4").max), np.full((4, 3), 1e150)], ids=["f4", "f8"])

@@ -7,7 +7,8 @@ import threading
 import numpy as np
 import pytest
 from lifecycle_msgs.msg import Transition
-from lifecycle_msgs.srv import ChangeState, GetState
+from lifecycle_msgs.srv import ChangeState
+from node_calls import N, call, change_state, set_parameter, state, stream
 from node_process import PATIENCE, assert_same_contacts
 from rcl_interfaces.srv import SetParameters, SetParametersAtomically
 from rclpy.parameter import Parameter
@@ -16,35 +17,7 @@ from waving_sheet import scene_of, sheet_faces, sheet_positions
 import hpccd_core as hc
 from hpccd_ros.middleware import fields
 
-N = 8
 FACES = sheet_faces(N)
-
-
-def call(node, kind, name, request):
-    client = node.peer.node.create_client(kind, f"hpccd/{name}")
-    node.wait_until(client.service_is_ready, f"service {name}")
-    future = client.call_async(request)
-    node.wait_until(future.done, f"answer of {name}")
-    return future.result()
-
-
-def change_state(node, transition):
-    return call(node, ChangeState, "change_state", ChangeState.Request(transition=Transition(id=transition))).success
-
-
-def set_parameter(node, name, value):
-    request = SetParameters.Request(parameters=[Parameter(name, value=value).to_parameter_msg()])
-    return call(node, SetParameters, "set_parameters", request).results[0]
-
-
-def stream(node, steps, start=0):
-    for k in steps:
-        node.peer.vertices("cloth", sheet_positions(N, k), start + k)
-        node.contacts(max(0, k))
-
-
-def state(node):
-    return call(node, GetState, "get_state", GetState.Request()).current_state.label
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=["SIGINT", "SIGTERM"])

@@ -1,32 +1,60 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the tests of recorder and replay share."""
+"""What tests of several folders share. Imports are late: the tests of the core need neither ROS nor this package's."""
 
 import itertools
 import os
 import subprocess
 import sys
+from pathlib import Path
 
-import base_bags
 import pytest
-from sources import ROOT, SOURCES
 
-from hpccd_ros.demo.children import Children
-
-# Domains 0..101 are safe on Linux whatever the ephemeral port range is.
+# A DDS domain of its own for the test run, shared with the processes that it starts. 0..101 are safe on Linux whatever
+# the ephemeral port range is.
 os.environ.setdefault("ROS_DOMAIN_ID", str(1 + os.getpid() % 100))
 
 _numbers = itertools.count()
 
 
+@pytest.fixture(scope="session")
+def data_folder():
+    """Folder of scenes and queries with ground truth."""
+    folder = os.environ.get("HPCCD_DATA")
+    if not folder:
+        pytest.skip("HPCCD_DATA is not set: no folder of scenes with ground truth to compare with")
+    if not Path(folder).is_dir():
+        pytest.fail(f"HPCCD_DATA is {folder!r}, which is not a folder")
+    return Path(folder)
+
+
+@pytest.fixture
+def start_node(tmp_path):
+    """Starts nodes as processes; ``start_node(parameters, remaps=(...), wait=True)`` -> NodeProcess."""
+    from node_process import NodeProcess
+
+    nodes = []
+
+    def start(parameters, **options):
+        nodes.append(NodeProcess(tmp_path, parameters, **options))
+        return nodes[-1]
+
+    yield start
+    for node in nodes:
+        node.close()
+
+
 @pytest.fixture
 def small_bag():
     """The recording that the repository holds: 90 frames, 89 answers, accuracy exact."""
+    from sources import ROOT
+
     return ROOT / "bags" / "cloth-drop-small.mcap"
 
 
 @pytest.fixture
 def hpccd(tmp_path):
     """Run `hpccd ARGUMENTS` as a process in an empty folder; returns the CompletedProcess, output as text."""
+    from sources import SOURCES
 
     def run(*arguments, **options):
         return subprocess.run(
@@ -40,6 +68,10 @@ def hpccd(tmp_path):
 @pytest.fixture
 def children(tmp_path, monkeypatch):
     """Starts processes that are ended with the test."""
+    from sources import SOURCES
+
+    from hpccd_ros.demo.children import Children
+
     monkeypatch.setenv("PYTHONPATH", SOURCES)
     folder = tmp_path / "logs"
     folder.mkdir()
@@ -56,6 +88,8 @@ def namespace():
 @pytest.fixture(scope="session")
 def sound_bags(tmp_path_factory):
     """A folder with the sound recordings of base_bags.py: streams.mcap and everything.mcap."""
+    import base_bags
+
     folder = tmp_path_factory.mktemp("sound")
     base_bags.write_all(folder)
     return folder

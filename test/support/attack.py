@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Damaged and hostile recordings through doctor, recover, replay, view and play, in a process that may be lost.
 
-  python test/recording/attack.py --random 2000 --crafted 2000     counts by outcome; what failed, with its name
-  python test/recording/attack.py --only crafted/bomb/3            one case, its output and its traceback
+  python test/support/attack.py --random 2000 --crafted 2000     counts by outcome; what failed, with its name
+  python test/support/attack.py --only crafted/bomb/3            one case, its output and its traceback
 """
 
 import argparse

@@ -2,19 +2,19 @@
 """No callback that raises ends the node: it goes on, and tells of it."""
 
 import time
-from pathlib import Path
 
 import pytest
 import rclpy
 from lifecycle_msgs.msg import Transition
+from node_calls import call, change_state, set_parameter, state, stream
 from node_process import PATIENCE
 from rcl_interfaces.srv import GetParameters, SetParameters, SetParametersAtomically
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from sources import SUPPORT
 from std_msgs.msg import UInt32
-from test_node_life import call, change_state, set_parameter, state, stream
 from waving_sheet import sheet_faces, sheet_positions
 
 from hpccd_ros.middleware import environment
@@ -143,7 +143,7 @@ def test_an_executor_that_can_do_nothing_any_more_ends(place):
 
 def test_a_node_with_faults_goes_on(start_node):
     """In every thread, and in a transition, which leads to the state that ROS 2 says it does."""
-    node = start_node({"meshes": ["cloth"]}, program=[str(Path(__file__).with_name("failing_node.py"))])
+    node = start_node({"meshes": ["cloth"]}, program=[str(SUPPORT / "failing_node.py")])
 
     def told(text):
         def matches():

@@ -8,8 +8,8 @@ import signal
 import numpy as np
 import pytest
 from lifecycle_msgs.msg import Transition
+from node_calls import change_state, set_parameter, stream
 from node_process import PATIENCE, NodeProcess
-from test_node_life import change_state, set_parameter, stream
 from waving_sheet import sheet_faces, sheet_positions
 
 from hpccd_ros.bag.reader import Recording

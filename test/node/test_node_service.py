@@ -11,9 +11,9 @@ import pytest
 import rclpy
 from hpccd.srv import Detect
 from lifecycle_msgs.msg import Transition
+from node_calls import change_state
 from node_process import PATIENCE, assert_same_contacts
 from rclpy.executors import SingleThreadedExecutor
-from test_node_life import change_state
 from waving_sheet import scene_of, sheet_faces, sheet_positions
 
 import hpccd_core as hc

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import hpccd_ros
 
-ROOT = Path(__file__).resolve().parents[2]
+SUPPORT = Path(__file__).resolve().parent
+ROOT = SUPPORT.parents[1]
 
 # PYTHONPATH of processes: the package from where the tests import it, and the rest from where this process finds it:
 # the messages of a colcon workspace lie on PYTHONPATH.

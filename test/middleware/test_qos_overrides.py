@@ -7,10 +7,10 @@ import sys
 import pytest
 from hpccd.msg import ContactArray, MeshVertices
 from lifecycle_msgs.msg import Transition
+from node_calls import call, change_state, set_parameter
 from node_process import PATIENCE
 from rcl_interfaces.srv import GetParameters
 from rclpy.qos import ReliabilityPolicy
-from test_node_life import call, change_state, set_parameter
 from waving_sheet import sheet_faces, sheet_positions
 
 from hpccd_ros.middleware import qos

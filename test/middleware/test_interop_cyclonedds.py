@@ -5,13 +5,13 @@ import json
 import os
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 from builtin_interfaces.msg import Time
 from hpccd.msg import ContactArray, MeshVertices
 from node_process import PATIENCE, assert_same_contacts
+from sources import SUPPORT
 from std_msgs.msg import Header
 from waving_sheet import scene_of, sheet_faces, sheet_positions
 
@@ -32,7 +32,7 @@ def play(node, folder, faces, frames):
     source, target = folder / "frames.npz", folder / "answers.json"
     np.savez(source, faces=faces, frames=frames)
     peer = subprocess.run(
-        [sys.executable, str(Path(__file__).with_name("cyclone_peer.py")), node.namespace, str(source), str(target)],
+        [sys.executable, str(SUPPORT / "cyclone_peer.py"), node.namespace, str(source), str(target)],
         env={**os.environ, "CYCLONEDDS_URI": LOOPBACK}, capture_output=True, text=True, timeout=4 * PATIENCE,
     )  # fmt: skip
     assert peer.returncode == 0, peer.stdout + peer.stderr + node.output()
@@ -85,7 +85,7 @@ sys.stdin.read()
 
 def test_a_topic_that_ros_could_not_name_is_passed_over(start_node):
     node = start_node({"meshes": ["cloth"]})
-    environment = {**os.environ, "CYCLONEDDS_URI": LOOPBACK, "PYTHONPATH": str(Path(__file__).parent)}
+    environment = {**os.environ, "CYCLONEDDS_URI": LOOPBACK, "PYTHONPATH": str(SUPPORT)}
     command = [sys.executable, "-c", STRANGER, f"rt{node.namespace}/meshes/9/vertices"]
     with subprocess.Popen(command, stdin=subprocess.PIPE, env=environment) as stranger:
         there = (f"{node.namespace}/meshes/9/vertices", ["hpccd/msg/MeshVertices"])

@@ -6,12 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from clouds import F32, F64, cloud
 from hpccd.msg import ContactArray, MeshVertices
 from node_process import assert_same_contacts
 from rclpy.qos import ReliabilityPolicy
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import PointCloud2
-from test_convert import F32, F64, cloud
 from visualization_msgs.msg import MarkerArray
 from waving_sheet import scene_of, sheet_faces, sheet_positions
 

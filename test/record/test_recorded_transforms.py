@@ -7,8 +7,8 @@ import sys
 import numpy as np
 import pytest
 from geometry_msgs.msg import TransformStamped
+from mesh_in_a_hand import FACES, SCENE, SECOND, N, topologies, transform
 from node_process import PATIENCE, assert_same_contacts
-from test_node_transforms import FACES, SCENE, SECOND, N, topologies, transform
 from waving_sheet import scene_of, sheet_positions
 
 from hpccd_ros.bag.reader import Recording, RecordingError
