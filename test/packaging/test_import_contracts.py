@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Each package imports only what stands below it (.importlinter), and the check of that sees what does not."""
+
+import os
+import shutil
+import subprocess
+import sys
+
+import pytest
+from sources import ROOT
+
+pytest.importorskip("importlinter", reason="import-linter comes with the extra lint")
+
+
+def lint(folder):
+    return subprocess.run(
+        [sys.executable, "-c", "from importlinter.cli import lint_imports_command as main; main()", "--no-cache"],
+        cwd=folder, env={**os.environ, "PYTHONPATH": str(folder)}, text=True, capture_output=True, timeout=100,
+    )  # fmt: skip
+
+
+@pytest.fixture
+def copy(tmp_path):
+    shutil.copy(ROOT / ".importlinter", tmp_path)
+    shutil.copytree(ROOT / "hpccd_ros", tmp_path / "hpccd_ros", ignore=shutil.ignore_patterns("__pycache__"))
+    return tmp_path
+
+
+def test_contracts_are_kept():
+    done = lint(ROOT)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+@pytest.mark.parametrize(
+    "module, statement, broken",
+    [
+        ("frames/drops.py", "from hpccd_ros.middleware import qos", "Each package imports only what stands below it"),
+        ("node/node.py", "from hpccd_ros.replay import compare", "Each package imports only what stands below it"),
+        ("detect/layout.py", "import rclpy", "Frames and their detection know nothing of ROS"),
+    ],
+)
+def test_an_import_that_runs_up_is_seen(copy, module, statement, broken):
+    path = copy / "hpccd_ros" / module
+    path.write_text(f"{path.read_text()}\n{statement}\n")
+    done = lint(copy)
+    assert done.returncode == 1 and f"{broken} BROKEN" in done.stdout, done.stdout + done.stderr
+
+
+def test_a_package_without_a_floor_is_seen(copy):
+    (copy / "hpccd_ros" / "attic").mkdir()
+    (copy / "hpccd_ros" / "attic" / "__init__.py").touch()
+    done = lint(copy)
+    assert done.returncode == 1 and "attic" in done.stdout, done.stdout + done.stderr
