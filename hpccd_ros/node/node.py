@@ -76,7 +76,7 @@ class HpccdNode(GuardedLifecycleNode):
         parameter_services.refuse_unknown_types(self)
         self._settings, self._mesh_settings = parameters.declare(self)
         scene_parameters.check(self._settings, self._mesh_settings)
-        if why := topic_names.refusal(self, self._mesh_settings) or qos_overrides.refusal(self):
+        if why := topic_names.unusable_name(self, self._mesh_settings) or qos_overrides.refusal(self):
             raise ParameterError(why)
         for name in parameters.unknown_overrides(self, qos_overrides.known(self, self._mesh_settings)):
             text = f"parameter {quoting.shortened(name)} is unknown and has no effect; see the README's table"

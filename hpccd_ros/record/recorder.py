@@ -12,7 +12,7 @@ from rclpy.executors import SingleThreadedExecutor
 
 from hpccd_ros.bag.writer import BagWriter
 from hpccd_ros.base.errors import UserError
-from hpccd_ros.middleware import environment, ros_start
+from hpccd_ros.middleware import environment, ros_start, topic_names
 from hpccd_ros.middleware.message_types import message_class
 from hpccd_ros.params import node_parameters
 from hpccd_ros.record import recorded_topics
@@ -57,7 +57,7 @@ def _record(node, target, args, stop) -> int:
         raise UserError(str(error)) from error
     try:
         recorder = Recorder(node, bag, wanted, args.depth)
-        contacts = node.resolve_topic_name("contacts")
+        contacts = node.resolve_topic_name(topic_names.CONTACTS)
         _spin(node, recorder, bag, contacts, args, stop)
     finally:
         bag.close()

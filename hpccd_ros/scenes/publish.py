@@ -13,11 +13,11 @@ from hpccd.msg import MeshTopology, MeshVertices
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 
-from hpccd_ros.middleware import environment
+from hpccd_ros.middleware import environment, topic_names
 from hpccd_ros.middleware.listeners import await_acknowledged, await_subscribers
 
 from .answers import Answers
-from .messages import Player, topology_topic, vertices_topic
+from .messages import Player
 from .progress import track
 from .scene import Scene
 
@@ -65,11 +65,11 @@ def publish(
     try:
         publishers = {}
         for mesh in scene.mesh_names:
-            name = topology_topic(mesh)
+            name = topic_names.topology(mesh)
             publishers[name] = node.create_publisher(MeshTopology, name, LATCHED)
-            name = vertices_topic(mesh)
+            name = topic_names.vertices(mesh)
             publishers[name] = node.create_publisher(MeshVertices, name, AWAITED if answered else STREAM)
-        listened = {vertices_topic(mesh): publishers[vertices_topic(mesh)] for mesh in scene.mesh_names}
+        listened = {topic_names.vertices(mesh): publishers[topic_names.vertices(mesh)] for mesh in scene.mesh_names}
         if await_subscribers(listened, subscribers, wait, stop) and not stop:
             text = f"not every mesh has {subscribers} subscriber(s) yet: publishing all the same"
             print(text, file=sys.stderr, flush=True)
@@ -91,7 +91,7 @@ def publish(
 def _play(node, scene, publishers, answers, rate, loop, wait, stop, progress) -> int:
     player = Player(scene)
     moving = [mesh.name for mesh in scene.meshes if not mesh.static]
-    first_moving = vertices_topic(moving[0]) if len(moving) < len(scene.meshes) else None
+    first_moving = topic_names.vertices(moving[0]) if len(moving) < len(scene.meshes) else None
     begin_ns, begin = node.get_clock().now().nanoseconds, time.monotonic()
     count = 0
     for _ in itertools.count() if loop else range(1):
