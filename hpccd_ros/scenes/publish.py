@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import itertools
-import signal
 import sys
 import time
 
@@ -13,7 +12,7 @@ from hpccd.msg import MeshTopology, MeshVertices
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 
-from hpccd_ros.middleware import environment, topic_names
+from hpccd_ros.middleware import environment, stop_signals, topic_names
 from hpccd_ros.middleware.listeners import await_acknowledged, await_subscribers
 
 from .answers import Answers
@@ -52,40 +51,35 @@ def publish(
     answered: no frame before all have the one before and the node has answered its step, each awaited up to `wait`
     seconds: where the machine is too slow for `rate`, the scene plays slower and nothing is dropped.
     """
-    stop = []
-    previous = {
-        s: signal.signal(s, lambda number, _: stop.append(number)) for s in (signal.SIGINT, signal.SIGTERM)
-    }
-    environment.prepare()
-    rclpy.init(
-        args=["--ros-args", *ros_args] if ros_args else None, signal_handler_options=SignalHandlerOptions.NO
-    )
-    node = rclpy.create_node("hpccd_scene", start_parameter_services=False)
-    answers = Answers(node) if answered else None
-    try:
-        publishers = {}
-        for mesh in scene.mesh_names:
-            name = topic_names.topology(mesh)
-            publishers[name] = node.create_publisher(MeshTopology, name, LATCHED)
-            name = topic_names.vertices(mesh)
-            publishers[name] = node.create_publisher(MeshVertices, name, AWAITED if answered else STREAM)
-        listened = {topic_names.vertices(mesh): publishers[topic_names.vertices(mesh)] for mesh in scene.mesh_names}
-        if await_subscribers(listened, subscribers, wait, stop) and not stop:
-            text = f"not every mesh has {subscribers} subscriber(s) yet: publishing all the same"
-            print(text, file=sys.stderr, flush=True)
-        if answers is not None and not answers.await_node(wait, stop) and not stop:
-            print("no node publishes contacts: publishing all the same", file=sys.stderr, flush=True)
-        count = _play(node, scene, publishers, answers, rate, loop, wait, stop, progress)
-        # What is still on its way must not be cut off by the end of this process.
-        await_acknowledged(publishers.values(), LAST)
-        return count
-    finally:
-        if answers is not None:
-            answers.close()
-        node.destroy_node()
-        rclpy.try_shutdown()
-        for number, handler in previous.items():
-            signal.signal(number, handler)
+    with stop_signals.collected() as stop:
+        environment.prepare()
+        rclpy.init(
+            args=["--ros-args", *ros_args] if ros_args else None, signal_handler_options=SignalHandlerOptions.NO
+        )
+        node = rclpy.create_node("hpccd_scene", start_parameter_services=False)
+        answers = Answers(node) if answered else None
+        try:
+            publishers = {}
+            for mesh in scene.mesh_names:
+                name = topic_names.topology(mesh)
+                publishers[name] = node.create_publisher(MeshTopology, name, LATCHED)
+                name = topic_names.vertices(mesh)
+                publishers[name] = node.create_publisher(MeshVertices, name, AWAITED if answered else STREAM)
+            listened = {topic_names.vertices(mesh): publishers[topic_names.vertices(mesh)] for mesh in scene.mesh_names}
+            if await_subscribers(listened, subscribers, wait, stop) and not stop:
+                text = f"not every mesh has {subscribers} subscriber(s) yet: publishing all the same"
+                print(text, file=sys.stderr, flush=True)
+            if answers is not None and not answers.await_node(wait, stop) and not stop:
+                print("no node publishes contacts: publishing all the same", file=sys.stderr, flush=True)
+            count = _play(node, scene, publishers, answers, rate, loop, wait, stop, progress)
+            # What is still on its way must not be cut off by the end of this process.
+            await_acknowledged(publishers.values(), LAST)
+            return count
+        finally:
+            if answers is not None:
+                answers.close()
+            node.destroy_node()
+            rclpy.try_shutdown()
 
 
 def _play(node, scene, publishers, answers, rate, loop, wait, stop, progress) -> int:
