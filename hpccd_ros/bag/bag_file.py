@@ -21,7 +21,7 @@ HPCCD_RECORD = "hpccd"
 
 @dataclasses.dataclass
 class Topic:
-    """A recorded topic. `qos` as from `mcap_qos.offered_qos`.
+    """A recorded topic. `qos` as from `qos_yaml.offered_qos`.
 
     `latched`: how many of its last messages are repeated at the start of each file; `last`: these, as (log_time,
     publish_time, sequence, data).

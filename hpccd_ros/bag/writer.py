@@ -26,7 +26,7 @@ class BagWriter:
 
     path: ends in `.mcap`: one file, which `ros2 bag play` opens alone. Otherwise a folder, made here, with
     `NAME_0.mcap`, `NAME_1.mcap`, ... and `metadata.yaml` of the finished ones.
-    info: JSON-able dict, stored with each file for the replay (see `mcap_reader.Recording.info`).
+    info: JSON-able dict, stored with each file for the replay (see `reader.Recording.info`).
     attachments: (name, bytes) of files that a replay needs, stored with each file too.
     compression: "none", "lz4" or "zstd", a chunk at a time.
     chunk_size: bytes of messages after which a chunk is closed, indexed and handed to the system.
@@ -47,7 +47,7 @@ class BagWriter:
                  max_bytes=0, max_seconds=0.0, retry_interval=5.0):
         self.path = Path(path)
         self.single_file = self.path.suffix == ".mcap"
-        if why := refusal(path, compression, max_bytes, max_seconds):
+        if why := unusable_options(path, compression, max_bytes, max_seconds):
             raise ValueError(why)
         if self.path.exists():
             raise FileExistsError(f"{self.path} exists: recordings are not overwritten; remove it or name another")
@@ -211,7 +211,7 @@ class BagWriter:
         self.poll()
 
 
-def refusal(path, compression: str, max_bytes: float, max_seconds: float) -> str | None:
+def unusable_options(path, compression: str, max_bytes: float, max_seconds: float) -> str | None:
     """Why a recording cannot be made with these options, or None."""
     if Path(path).suffix == ".mcap" and (max_bytes or max_seconds):
         return f"cannot split the single file {path}: give a folder (a path that does not end in .mcap)"

@@ -3,7 +3,7 @@
 
 import dataclasses
 
-from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 
 from hpccd_ros.middleware import qos, qos_overrides, topic_names, transform_topics
 from hpccd_ros.middleware.message_types import CONTACTS, POINTS, TOPOLOGY, VERTICES
@@ -56,8 +56,7 @@ def subscription_qos(node, name: str, topic: Wanted, depth: int) -> QoSProfile:
     """
     offers = [p.qos_profile.reliability for p in node.get_publishers_info_by_topic(name)]
     asked = [s.qos_profile.reliability for s in node.get_subscriptions_info_by_topic(name)]
-    best_effort = ReliabilityPolicy.BEST_EFFORT in (offers or asked)
-    return _profile(ReliabilityPolicy.BEST_EFFORT if best_effort else ReliabilityPolicy.RELIABLE, topic.latched, depth)
+    return _profile(ReliabilityPolicy.BEST_EFFORT not in (offers or asked), topic, depth)
 
 
 def as_node_asks(node, name: str, topic: Wanted, depth: int, *, recorded, vertices: ReliabilityPolicy) -> QoSProfile:
@@ -66,13 +65,9 @@ def as_node_asks(node, name: str, topic: Wanted, depth: int, *, recorded, vertic
     """
     default = vertices if topic.type_name in (VERTICES, POINTS) else ReliabilityPolicy.RELIABLE
     entity = "publisher" if topic.type_name == CONTACTS else "subscription"
-    return _profile(qos_overrides.reliability(recorded, entity, name, default), topic.latched, depth)
+    asked = qos_overrides.reliability(recorded, entity, name, default)
+    return _profile(asked == ReliabilityPolicy.RELIABLE, topic, depth)
 
 
-def _profile(reliability, latched, depth) -> QoSProfile:
-    return QoSProfile(
-        history=HistoryPolicy.KEEP_LAST,
-        depth=max(depth, latched),
-        reliability=reliability,
-        durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
-    )
+def _profile(reliable: bool, topic: Wanted, depth: int) -> QoSProfile:
+    return qos.keep_last(max(depth, topic.latched), reliable=reliable, latched=topic.latched > 0)

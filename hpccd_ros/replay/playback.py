@@ -10,7 +10,7 @@ from collections import deque
 import rclpy
 import yaml
 from rclpy.exceptions import NameValidationException
-from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, QoSProfile
 
 from hpccd_ros.bag.decode import completion
 from hpccd_ros.bag.reader import RecordedTopic, Recording, RecordingError
@@ -72,12 +72,7 @@ def _qos(topic) -> QoSProfile:
     # rosbag2 before version 9 wrote the numbers of the enumeration: 1 reliable, 2 best effort; 1 transient local.
     best_effort = offers and all(offer.get("reliability") in ("best_effort", 2) for offer in offers)
     latched = offers and all(offer.get("durability") in ("transient_local", 1) for offer in offers)
-    return QoSProfile(
-        history=HistoryPolicy.KEEP_LAST,
-        depth=_in_force(topic) if latched else DEPTH,
-        reliability=ReliabilityPolicy.BEST_EFFORT if best_effort else ReliabilityPolicy.RELIABLE,
-        durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
-    )
+    return qos.keep_last(_in_force(topic) if latched else DEPTH, reliable=not best_effort, latched=bool(latched))
 
 
 def _offers(topic) -> list[dict]:

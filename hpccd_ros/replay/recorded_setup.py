@@ -54,7 +54,7 @@ def of_recording(recording: Recording, parameter_file: str | None = None) -> Rep
         else:
             where, refused = f"{recording.path}: the stored parameters", RecordingError
             given = _stored(recording, info)
-        settings, meshes = table.of_plain(given)
+        settings, meshes = table.checked(given)
         if not settings["meshes"]:
             raise ParameterError("parameter `meshes` names no mesh")
         if all(row["static"] for row in meshes.values()):

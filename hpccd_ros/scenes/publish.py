@@ -9,10 +9,9 @@ import time
 
 import rclpy
 from hpccd.msg import MeshTopology, MeshVertices
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 
-from hpccd_ros.middleware import environment, stop_signals, topic_names
+from hpccd_ros.middleware import environment, qos, stop_signals, topic_names
 from hpccd_ros.middleware.listeners import await_acknowledged, await_subscribers
 
 from .answers import Answers
@@ -20,18 +19,15 @@ from .messages import Player
 from .progress import track
 from .scene import Scene
 
-LATCHED = QoSProfile(
-    depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
-)
 # Seconds between the static meshes and the first frame.
 SETTLE = 0.2
 # Seconds that the last frame may take on its way.
 LAST = 2.0
-STREAM = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.VOLATILE)
+STREAM = qos.vertices("reliable", 10)
 
 # Where each frame is awaited: a history that one message fills makes the middleware ask for its acknowledgement at
 # once, and not with its next heartbeat (3 s).
-AWAITED = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.VOLATILE)
+AWAITED = qos.vertices("reliable", 1)
 
 
 def publish(
@@ -62,7 +58,7 @@ def publish(
             publishers = {}
             for mesh in scene.mesh_names:
                 name = topic_names.topology(mesh)
-                publishers[name] = node.create_publisher(MeshTopology, name, LATCHED)
+                publishers[name] = node.create_publisher(MeshTopology, name, qos.TOPOLOGY)
                 name = topic_names.vertices(mesh)
                 publishers[name] = node.create_publisher(MeshVertices, name, AWAITED if answered else STREAM)
             listened = {topic_names.vertices(mesh): publishers[topic_names.vertices(mesh)] for mesh in scene.mesh_names}
