@@ -7,16 +7,8 @@ import time
 from collections import Counter
 from pathlib import Path
 
-from hpccd_ros.bag import message_definitions, qos_yaml
-from hpccd_ros.bag.bag_file import (
-    COMPRESSIONS,
-    HPCCD_RECORD,
-    BagFile,
-    Topic,
-    bag_metadata,
-    file_information,
-    summary,
-)
+from hpccd_ros.bag import bag_metadata, message_definitions, qos_yaml
+from hpccd_ros.bag.bag_file import COMPRESSIONS, HPCCD_RECORD, BagFile, Topic
 
 __all__ = ["COMPRESSIONS", "HPCCD_RECORD", "BagWriter", "Topic"]
 
@@ -167,7 +159,7 @@ class BagWriter:
         self._flushed = time.monotonic()
 
     def _close_file(self):
-        self._file.finish(bag_metadata([self._file], list(self._topics.values())))
+        self._file.finish(bag_metadata.of_bag([self._file], list(self._topics.values())))
         self._file = None
         if not self.single_file:
             self._list_files()
@@ -177,10 +169,10 @@ class BagWriter:
         # Those before are rendered already: with all of them anew, each split takes longer than the one before, and the
         # messages of a stream that goes on meanwhile are lost.
         for file in finished[len(self._listed) :]:
-            parts = ([file.path.name], [file_information(file)])
+            parts = ([file.path.name], [bag_metadata.of_file(file)])
             self._listed.append(tuple(textwrap.indent(qos_yaml.to_yaml(part), "  ") for part in parts))
         names, files = ("".join(parts) for parts in zip(*self._listed, strict=True))
-        bag = {"rosbag2_bagfile_information": summary(finished, list(self._topics.values()))}
+        bag = {"rosbag2_bagfile_information": bag_metadata.without_files(finished, list(self._topics.values()))}
         lists = f"  relative_file_paths:\n{names}  files:\n{files}"
         draft = self.path / "metadata.yaml.part"
         draft.write_text(qos_yaml.to_yaml(bag) + lists, encoding="utf-8")
