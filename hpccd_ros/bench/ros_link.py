@@ -16,7 +16,7 @@ import hpccd_core as hc
 from hpccd_ros.base.errors import UserError
 from hpccd_ros.detect.layout import Layout
 from hpccd_ros.frames.types import Topology
-from hpccd_ros.middleware import contact_messages, fields, mesh_messages, qos
+from hpccd_ros.middleware import contact_messages, fields, mesh_messages, qos, topic_names
 
 from . import ros_echo
 from .steps import Step
@@ -72,13 +72,13 @@ class Link:
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(node)
         reliable = qos.vertices("reliable", 10)
-        self._topology = node.create_publisher(MeshTopology, f"meshes/{MESH}/topology", qos.TOPOLOGY)
+        self._topology = node.create_publisher(MeshTopology, topic_names.topology(MESH), qos.TOPOLOGY)
         self._templates = node.create_publisher(ContactArray, "echo/answers", ros_echo.ANSWERS)
-        self.node = Lane("node", node.create_publisher(MeshVertices, f"meshes/{MESH}/vertices", reliable))
+        self.node = Lane("node", node.create_publisher(MeshVertices, topic_names.vertices(MESH), reliable))
         self.echo = Lane("echo", node.create_publisher(MeshVertices, "echo/vertices", reliable))
         # A benchmark must hear every answer: deeper than the node's own QoS, which a late reader overruns.
         deep = qos.vertices("reliable", 100)
-        node.create_subscription(ContactArray, "contacts", self._from(self.node), deep)
+        node.create_subscription(ContactArray, topic_names.CONTACTS, self._from(self.node), deep)
         node.create_subscription(ContactArray, "echo/contacts", self._from(self.echo), deep)
 
     def _answer(self, contacts, parity: int) -> ContactArray:
