@@ -20,7 +20,7 @@ it, put your meshes in, and start the node with it:
 hpccd_node --ros-args --params-file my.yaml
 ```
 
-Or give one on the command line: `-p accuracy:=balanced`. Files for a purpose are among the [profiles](node.md#profiles).
+Or give one on the command line: `-p accuracy:=balanced`. Files for a purpose: [profiles](node.md#profiles).
 A value that is not allowed ends the start with one sentence (status 2). An unknown name is warned of.
 
 **When a parameter can change:**
