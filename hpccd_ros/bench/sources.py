@@ -11,8 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from hpccd_ros.base.errors import UserError
-
-from .steps import MeshPart, Source, Step
+from hpccd_ros.bench.steps import MeshPart, Source, Step
 
 # Of Table 1, in its order: generated scenes of the same size and character.
 TABLE_1 = ("cloth-ball-like", "breaking-like", "n-body-like-lr", "n-body-like-hr")
