@@ -9,15 +9,24 @@ from pathlib import Path
 
 from hpccd_ros.base.errors import UserError
 from hpccd_ros.bench import sources
-from hpccd_ros.bench.report import machine
+from hpccd_ros.bench.report import figures, machine
 from hpccd_ros.bench.report.results import Report
 from hpccd_ros.bench.steps import Source
 
 FEWEST_ROUNDS = 5  # below that a median means little, and the result says so
 
 
-def configure(parser: argparse.ArgumentParser, *, default: Sequence[str], steps: int, rounds: int = 5) -> None:
-    """Sources (by default `default`), steps, rounds, and where the results go."""
+# What says where files lie is not kept: paths of this machine do not belong into a result.
+PLACES = ("out", "figures", "data", "label")
+
+
+def configure(
+    parser: argparse.ArgumentParser, *, default: Sequence[str], steps: int | None, rounds: int = 5, size: bool = True
+) -> None:
+    """Sources (by default `default`), their size, steps, rounds, and where the results go.
+
+    steps: None where one step of each source is measured; size: False where the benchmark chooses the sizes.
+    """
     what = parser.add_argument_group("what is measured")
     what.add_argument(
         "sources", nargs="*", metavar="SCENE",
@@ -25,10 +34,12 @@ def configure(parser: argparse.ArgumentParser, *, default: Sequence[str], steps:
         f"the path of an .npz or .mcap file (default: {' '.join(default)})",
     )  # fmt: skip
     what.add_argument("--data", metavar="DIR", help="folder of scene files (default: the variable HPCCD_DATA)")
-    what.add_argument("--size", type=float, default=1.0, metavar="X",
-                      help="factor on the triangles of generated scenes (default: %(default)s)")
-    what.add_argument("--steps", type=int, default=steps, metavar="N",
-                      help="steps measured of each scene, evenly spread; 0: all (default: %(default)s)")
+    if size:
+        what.add_argument("--size", type=float, default=1.0, metavar="X",
+                          help="factor on the triangles of generated scenes (default: %(default)s)")
+    if steps is not None:
+        what.add_argument("--steps", type=int, default=steps, metavar="N",
+                          help="steps measured of each scene, evenly spread; 0: all (default: %(default)s)")
     what.add_argument("--repeat", type=int, default=rounds, metavar="N",
                       help="timed rounds after one of warm-up (default: %(default)s)")
     output_options(parser)
@@ -64,34 +75,40 @@ def listed(option: str, text: str, choices: Sequence[str]) -> list[str]:
     return words
 
 
-def begin(args, benchmark: str) -> tuple[Report, list[Source]]:
+def begin(args) -> tuple[Report, list[Source]]:
     """The report to fill and the sources that were asked for."""
-    if args.repeat < 1:
-        raise UserError(f"--repeat {args.repeat}: at least one round must be timed")
-    if args.steps < 0:
-        raise UserError(f"--steps {args.steps}: must not be negative")
-    if getattr(args, "threads", 0) < 0:
-        raise UserError(f"--threads {args.threads}: must not be negative")
     found = sources.resolve(args.sources, sources.data_folder(args.data), args.default_sources, args.size)
-    # Paths of this machine do not belong into a result that is kept.
-    kept = {k: v for k, v in vars(args).items() if k not in ("command", "benchmark", "out", "figures", "data", "label")
-            and isinstance(v, (int, float, str, type(None)))}
-    report = Report(benchmark, {**kept, "sources": [source.name for source in found]})
-    if args.repeat < FEWEST_ROUNDS:
+    return begin_report(args, [source.name for source in found]), found
+
+
+def begin_report(args, names: Sequence[str] = ()) -> Report:
+    """The report to fill, of sources with these names."""
+    if getattr(args, "repeat", 1) < 1:
+        raise UserError(f"--repeat {args.repeat}: at least one round must be timed")
+    for name in ("steps", "threads"):
+        if getattr(args, name, 0) < 0:
+            raise UserError(f"--{name} {getattr(args, name)}: must not be negative")
+    options = {k: v for k, v in vars(args).items() if k not in ("command", "benchmark", *PLACES)
+               and isinstance(v, (int, float, str, type(None)))}
+    report = Report(args.benchmark, _command(args, options), {**options, "sources": list(names)})
+    if getattr(args, "repeat", FEWEST_ROUNDS) < FEWEST_ROUNDS:
         report.note(f"only {args.repeat} timed rounds: take --repeat {FEWEST_ROUNDS} or more for numbers to rely on")
-    return report, found
+    return report
 
 
-def end(args, report: Report, figures: dict | None = None) -> int:
-    """Write and name the files; figures: {name: function (report, path)}. Exit status 1 where a check failed."""
+def _command(args, options: dict) -> str:
+    """The command line that measures this again: sources by name, and options that are not the default."""
+    words = ["hpccd bench", args.benchmark, *(Path(source).name for source in getattr(args, "sources", ()))]
+    for name, value in options.items():
+        if value != args.parser.get_default(name):
+            words += [f"--{name.replace('_', '-')}", str(value)]
+    return " ".join(words)
+
+
+def end(args, report: Report) -> int:
+    """Write and name the files, pictures among them. Exit status 1 where a check failed."""
     report.finish()
-    written = report.write(Path(args.out), args.label)
-    folder = Path(args.figures or args.out)
-    folder.mkdir(parents=True, exist_ok=True)
-    for name, draw in (figures or {}).items():
-        path = folder / f"{name}.png"
-        draw(report, path)
-        written.append(path)
+    written = report.write(Path(args.out), args.label) + figures.draw(report, Path(args.figures or args.out))
     for note in report.notes:
         print(f"note: {note}")
     for failure in report.failures:

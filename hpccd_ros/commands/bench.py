@@ -36,7 +36,7 @@ def configure(parser):
         module = importlib.import_module(f"hpccd_ros.bench.{place}")
         subparser.description = module.__doc__
         module.configure(subparser)
-        subparser.set_defaults(run_benchmark=module.run)
+        subparser.set_defaults(run_benchmark=module.run, parser=subparser)
 
 
 def run(args) -> int:

@@ -15,7 +15,7 @@ arithmetic.
 from __future__ import annotations
 
 from hpccd_ros.bench import command
-from hpccd_ros.bench.core import accuracy_figure, accuracy_sweep, measure, truth
+from hpccd_ros.bench.core import accuracy_sweep, measure, truth
 from hpccd_ros.bench.core.variants import TIERS, Variant, usable
 from hpccd_ros.bench.report import table
 from hpccd_ros.bench.report.machine import cores
@@ -40,7 +40,7 @@ def configure(parser):
 
 
 def run(args) -> int:
-    report, sources = command.begin(args, "accuracy")
+    report, sources = command.begin(args)
     report.note(measure.NOTE)
     tiers = command.listed("--tiers", args.tiers, TIERS)
     backends, refused = usable("backend", command.listed("--backend", args.backend, BACKENDS))
@@ -50,16 +50,14 @@ def run(args) -> int:
     for source in sources:
         _measure_scene(report, source, tiers, backends, sets, args)
     _print_scenes(report.rows)
-    figures = {"accuracy": accuracy_figure.draw_scenes}
     if args.sweep_queries > 0:
         for part in (accuracy_sweep.adversarial, accuracy_sweep.sweep):
             for row in part(tiers, args.sweep_queries, args.seed):
                 report.add(part=part.__name__, **row)
         _print_adversarial([row for row in report.rows if row["part"] == "adversarial"], tiers)
         _print_first_errors([row for row in report.rows if row["part"] == "sweep"], tiers)
-        figures["accuracy-sweeps"] = accuracy_figure.draw_sweeps
     _check(report)
-    return command.end(args, report, figures)
+    return command.end(args, report)
 
 
 def _measure_scene(report, source, tiers, backends, sets, args):
@@ -94,7 +92,7 @@ def _measure_scene(report, source, tiers, backends, sets, args):
             **one.times().as_row(),
             step_ms=one.sequence_ms() / len(one.by_step),
             over_balanced=one.sequence_ms() / balanced.sequence_ms() if balanced else None,
-            candidates=stats.get("vf_candidates", 0) + stats.get("ee_candidates", 0),
+            candidates=one.candidates(),
             decided={name: sum(stats.get(f"{kind}_{key}", 0) for kind in ("vf", "ee"))
                      for name, key in DECIDED.items()},
         )  # fmt: skip

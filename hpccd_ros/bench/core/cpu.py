@@ -14,11 +14,12 @@ An average step is what a simulation sees; the 95th percentile is what an intera
 from __future__ import annotations
 
 from hpccd_ros.bench import command
-from hpccd_ros.bench.core import cpu_figure, measure
+from hpccd_ros.bench.core import measure
 from hpccd_ros.bench.core.peer_ipctk import NOTE as PEER_NOTE
 from hpccd_ros.bench.core.peer_ipctk import PeerRunner
 from hpccd_ros.bench.core.variants import Variant, usable
 from hpccd_ros.bench.report import table
+from hpccd_ros.bench.report.figures import stages_in_order
 from hpccd_ros.bench.report.machine import cores
 from hpccd_ros.bench.sources import TABLE_1
 from hpccd_ros.bench.steps import Step
@@ -39,7 +40,7 @@ def configure(parser):
 
 
 def run(args) -> int:
-    report, sources = command.begin(args, "cpu")
+    report, sources = command.begin(args)
     report.note(measure.NOTE)
     modes = command.listed("--report", args.report, ("all", "first", "any"))
     backends, refused = usable("backend", command.listed("--backend", args.backend, BACKENDS), accuracy=args.accuracy)
@@ -62,7 +63,7 @@ def run(args) -> int:
             report.add(**_row(source, series[runner.name], args, runner.name))
         _compare(report.rows, source, modes)
     _print(report, args)
-    return command.end(args, report, {"cpu": cpu_figure.draw} if report.rows else None)
+    return command.end(args, report)
 
 
 def _row(source, series, args, name):
@@ -82,7 +83,7 @@ def _row(source, series, args, name):
         "sequence_ms": series.sequence_ms(),
         "first_ms": series.first.ms,
         "stages_ms": series.stages(),
-        "stats": series.stats(),
+        "candidates": series.candidates(),
     }
 
 
@@ -127,7 +128,7 @@ def _print(report, args):
         rows,
         "2009: the paper's machine (4 cores, 2 GPUs) on its own scene; first call: with a new detector",
     )  # fmt: skip
-    stages = list(dict.fromkeys(s for r in report.rows for s in cpu_figure.in_order(r["stages_ms"])))
+    stages = list(dict.fromkeys(s for r in report.rows for s in stages_in_order(r["stages_ms"])))
     table.show(
         "where the time goes, ms of an average step (section 6.2)",
         ["scene", "variant", *stages],

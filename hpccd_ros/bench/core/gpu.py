@@ -18,9 +18,9 @@ from pathlib import Path
 import hpccd_core as hc
 from hpccd_ros.base.errors import UserError
 from hpccd_ros.bench import command
-from hpccd_ros.bench.core import gpu_figure, gpu_hybrid
+from hpccd_ros.bench.core import gpu_hybrid
 from hpccd_ros.bench.core.gpu_hybrid import detector_times
-from hpccd_ros.bench.report import table
+from hpccd_ros.bench.report import figures, table
 from hpccd_ros.bench.report.results import Kept
 
 PARTS = ("frames", "threads", "segments")
@@ -30,7 +30,7 @@ OPERATIONS = {"candidates": 170, "survivors": 400, "roots": 1500}
 
 
 def configure(parser):
-    command.configure(parser, default=("data",), steps=1, rounds=50)
+    command.configure(parser, default=("data",), steps=None, rounds=50)
     command.threads_option(parser)
     parser.add_argument("--parts", default=",".join(PARTS), metavar="NAME,...",
                         help="of frames, threads (Fig. 6) and segments (default: %(default)s)")  # fmt: skip
@@ -39,20 +39,20 @@ def configure(parser):
                         help="device memory (default: %(default)s, H100)")  # fmt: skip
     parser.add_argument("--rate", type=float, default=16.0, metavar="T/s",
                         help="10^12 double-precision operations a second, not fused (default: %(default)s, H100)")
-
-
     parser.add_argument("--redraw", metavar="JSON", help="draw Fig. 6 from this kept result; measure nothing")
 
 
 def run(args) -> int:
     if args.redraw:
-        path = gpu_figure.draw(Kept.read(Path(args.redraw), "gpu"), Path(args.figures or args.out) / "hybrid.png")
-        print(f"wrote {path}")
+        drawn = figures.draw(Kept.read(Path(args.redraw), "gpu"), Path(args.figures or args.out))
+        if not drawn:
+            raise UserError(f"{args.redraw}: no times by threads and GPUs in it: measure with --parts threads")
+        print(f"wrote {drawn[0]}")
         return 0
     if "gpu" not in hc.backends():
         raise UserError(f"no usable GPU: {hc.gpu_status()['reason']}")
     parts = command.listed("--parts", args.parts, PARTS)
-    report, sources = command.begin(args, "gpu")
+    report, sources = command.begin(args)
     report.note("floors: PCIe bytes of positions and contacts; device bytes of the lists that stages hand on; "
                 "operations counted from the source for each pair of each stage; rates are options")
     for source in sources:
@@ -68,7 +68,7 @@ def run(args) -> int:
         _show_frames([r for r in report.rows if r["part"] == "frame"])
     if len(parts) > 1 or "frames" not in parts:
         gpu_hybrid.show(report)
-    return command.end(args, report, {"hybrid": gpu_figure.draw} if "threads" in parts else None)
+    return command.end(args, report)
 
 
 def _show_frames(rows):
@@ -129,7 +129,6 @@ def _measure(report, args, name, step, accuracy):
         **on_gpu.as_row(),
         **_floors(args, step, stats, contacts),
         stages_ms={**profile, **_stages(scene, options, step), **hybrid_stages},
-        stats=stats,
     )
 
 

@@ -49,8 +49,7 @@ def figure_6(report, args, name, step, accuracy="balanced"):
             base, expected = base or measured.median, expected or contacts.hash
             _check(report, detector, contacts, expected, f"{name}, {method}, {threads} threads, {n_gpus} GPUs")
             report.add(part="threads and GPUs", scene=name, accuracy=accuracy, method=method, threads=threads,
-                       gpus=n_gpus, **measured.as_row(), speedup=base / measured.median,
-                       stages_ms=dict(detector.profile), stats=dict(detector.stats))  # fmt: skip
+                       gpus=n_gpus, **measured.as_row(), speedup=base / measured.median)  # fmt: skip
             progress.step()
 
 
@@ -63,7 +62,7 @@ def segment_sizes(report, args, name, step, accuracy="balanced"):
             detector = hc.Detector(step.scene(), accuracy=accuracy, backend="hybrid", **options)
             measured, _ = detector_times(detector, step, args.repeat)
             report.add(part="segment size", scene=name, accuracy=accuracy, method=method, threads=threads,
-                       segment_pairs=pairs, **measured.as_row(), stats=dict(detector.stats))  # fmt: skip
+                       segment_pairs=pairs, **measured.as_row())  # fmt: skip
             progress.step()
 
 

@@ -35,7 +35,7 @@ class IndependentRunner:
     def run(self, step: Step) -> Sample:
         samples = list(self._threads.map(lambda i: self._run_one(i, step), range(len(self._runners))))
         mean = sum(sample.ms for sample in samples) / len(samples)
-        return Sample(mean, samples[0].setup_ms, samples[0].hash, samples[0].contacts, {}, {})
+        return Sample(mean, samples[0].hash, samples[0].contacts, {}, {})
 
     def close(self) -> None:
         self._threads.shutdown()

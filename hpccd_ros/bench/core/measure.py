@@ -38,7 +38,6 @@ class Sample:
     """One timed call. hash, contacts: None where a peer does not list them."""
 
     ms: float
-    setup_ms: float
     hash: int | None
     contacts: int | None
     profile: dict[str, float]
@@ -62,13 +61,11 @@ class CoreRunner:
         began = time.perf_counter()
         if self._detector is None or step.topology != self._topology:
             self._detector, self._topology = self._variant.detector(step), step.topology
-        ready = time.perf_counter()
         contacts = self._detector.detect(step.vertices_t0, step.vertices_t1)
         end = time.perf_counter()
         return Sample(
-            1e3 * (end - began), 1e3 * (ready - began), contacts.hash, len(contacts), dict(self._detector.profile),
-            dict(self._detector.stats),
-        )  # fmt: skip
+            1e3 * (end - began), contacts.hash, len(contacts), dict(self._detector.profile), dict(self._detector.stats)
+        )
 
     def _as_wanted(self, step):
         if self._variant.change is None:
@@ -94,10 +91,6 @@ class Series:
     @property
     def samples(self) -> list[Sample]:
         return [sample for samples in self.by_step.values() for sample in samples]
-
-    @property
-    def last(self) -> Sample:
-        return self.samples[-1]
 
     def times(self) -> Times:
         """Over all steps and rounds."""
@@ -126,6 +119,11 @@ class Series:
                 total[key] += value / len(self.by_step)
         return dict(total)
 
+    def candidates(self) -> float | None:
+        """Pairs of features tested in an average step; None of a peer that does not tell."""
+        stats = self.stats()
+        return stats["vf_candidates"] + stats["ee_candidates"] if "vf_candidates" in stats else None
+
     def contacts(self) -> float | None:
         """Contacts of an average step."""
         counts = [samples[-1].contacts for samples in self.by_step.values()]
@@ -136,7 +134,7 @@ class Series:
         return {step: {s.hash for s in samples} for step, samples in self.by_step.items()}
 
 
-def measure(source: Source, runners: Sequence, rounds: int, steps: int = 0, description: str = "") -> dict[str, Series]:
+def measure(source: Source, runners: Sequence, rounds: int, steps: int = 0) -> dict[str, Series]:
     """Every runner on `steps` steps spread over the source (0: all), `rounds` times; by the runner's name."""
     wanted = [k for k in source.spread(steps) if source.step(k) is not None]
     if not wanted:
@@ -144,7 +142,7 @@ def measure(source: Source, runners: Sequence, rounds: int, steps: int = 0, desc
     series = {runner.name: Series(runner.name) for runner in runners}
     collecting = gc.isenabled()
     took: dict[str, float] = {}  # ms of the last step; the very first call of a runner is that of a new detector
-    with progress.bar(description or source.name, (rounds + 1) * len(wanted) * len(runners)) as bar:
+    with progress.bar(source.name, (rounds + 1) * len(wanted) * len(runners)) as bar:
         try:
             for turn in range(rounds + 1):
                 for place, k in enumerate(wanted):

@@ -29,7 +29,7 @@ BYTES_OF_A_PAIR = 8
 
 
 def configure(parser):
-    command.configure(parser, default=("data", *TABLE_1), steps=1, rounds=5)
+    command.configure(parser, default=("data", *TABLE_1), steps=None, rounds=5)
     parser.add_argument("--methods", default="default", metavar="NAME,...",
                         help=f"of {', '.join(METHODS)} (default: %(default)s)")  # fmt: skip
     command.tier_option(parser)
@@ -37,7 +37,7 @@ def configure(parser):
 
 
 def run(args) -> int:
-    report, sources = command.begin(args, "memory")
+    report, sources = command.begin(args)
     methods, refused = usable("method", command.listed("--methods", args.methods, METHODS), accuracy=args.accuracy)
     command.skipped(report, "method", refused)
     for source in sources:

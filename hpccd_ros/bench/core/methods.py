@@ -12,7 +12,7 @@ whether a method is faster because it does less, or because it does the same in 
 from __future__ import annotations
 
 from hpccd_ros.bench import command
-from hpccd_ros.bench.core import measure, methods_figure
+from hpccd_ros.bench.core import measure
 from hpccd_ros.bench.core.variants import METHODS, Variant, usable, with_method
 from hpccd_ros.bench.report import table
 from hpccd_ros.bench.report.machine import cores
@@ -29,7 +29,7 @@ def configure(parser):
 
 
 def run(args) -> int:
-    report, sources = command.begin(args, "methods")
+    report, sources = command.begin(args)
     report.note(measure.NOTE)
     methods, refused = usable("method", command.listed("--methods", args.methods, METHODS), accuracy=args.accuracy)
     command.skipped(report, "method", refused)
@@ -51,7 +51,7 @@ def run(args) -> int:
         for variant in variants:
             report.add(**_row(source, variant, series, args))
     _print(report)
-    return command.end(args, report, {"methods": methods_figure.draw})
+    return command.end(args, report)
 
 
 def _row(source, variant, series, args):
@@ -72,7 +72,8 @@ def _row(source, variant, series, args):
             series[scalar].sequence_ms() / one.sequence_ms() if "simd" in variant.options and scalar in series else None
         ),
         "stages_ms": one.stages(),
-        "stats": one.stats(),
+        "node_pairs": one.stats().get("node_pairs"),
+        "candidates": one.candidates(),
     }
 
 
@@ -84,8 +85,8 @@ def _print(report):
         [
             [
                 r["scene"], r["variant"], r["threads"], r["median_ms"], r["p95_ms"], r["over_default"],
-                r["times_faster_than_scalar"], r["stages_ms"].get("elementary"), _whole(r["stats"].get("node_pairs")),
-                _whole(r["stats"].get("vf_candidates", 0) + r["stats"].get("ee_candidates", 0)), r["same_contacts"],
+                r["times_faster_than_scalar"], r["stages_ms"].get("elementary"), _whole(r["node_pairs"]),
+                _whole(r["candidates"]), r["same_contacts"],
             ]
             for r in report.rows
         ],

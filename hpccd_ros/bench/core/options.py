@@ -17,7 +17,7 @@ import dataclasses
 import numpy as np
 
 from hpccd_ros.bench import command
-from hpccd_ros.bench.core import measure, options_figure
+from hpccd_ros.bench.core import measure
 from hpccd_ros.bench.core.variants import Variant
 from hpccd_ros.bench.report import table
 from hpccd_ros.bench.report.machine import cores
@@ -33,7 +33,7 @@ def configure(parser):
 
 
 def run(args) -> int:
-    report, sources = command.begin(args, "options")
+    report, sources = command.begin(args)
     report.note(measure.NOTE)
     for source in sources:
         variants = _variants(source.step(source.spread(1)[0]), args)
@@ -42,7 +42,7 @@ def run(args) -> int:
         for variant in variants:
             report.add(**_row(source, variant, series[variant.name], full, args))
     _print(report)
-    return command.end(args, report, {"options": options_figure.draw})
+    return command.end(args, report)
 
 
 def _variants(step: Step, args) -> list[Variant]:
@@ -118,7 +118,6 @@ def _landscape(step: Step, triangles: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _row(source, variant, series, full, args):
-    stats = series.stats()
     return {
         "scene": source.name,
         "option": variant.name,
@@ -126,7 +125,7 @@ def _row(source, variant, series, full, args):
         "threads": args.threads or cores(),
         "steps": len(series.by_step),
         "contacts": series.contacts(),
-        "candidates": stats["vf_candidates"] + stats["ee_candidates"],
+        "candidates": series.candidates(),
         **series.times().as_row(),
         "step_ms": series.sequence_ms() / len(series.by_step),
         "over_full": series.sequence_ms() / full.sequence_ms(),

@@ -67,7 +67,7 @@ class PeerRunner:
             "step_size": step_size,
         }
         stages = {"broad": 1e3 * (between - began), "narrow": 1e3 * (end - between)}
-        return Sample(1e3 * (end - began), 0.0, None, None, stages, found)
+        return Sample(1e3 * (end - began), None, None, stages, found)
 
 
 @contextlib.contextmanager

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from hpccd_ros.base.errors import UserError
 from hpccd_ros.bench import command
-from hpccd_ros.bench.core import measure, scaling_figure
+from hpccd_ros.bench.core import measure
 from hpccd_ros.bench.core.independent import METHOD as INDEPENDENT
 from hpccd_ros.bench.core.independent import IndependentRunner
 from hpccd_ros.bench.core.variants import METHODS, Variant, usable, with_method
@@ -48,7 +48,7 @@ def configure(parser):
 def run(args) -> int:
     methods = command.listed("--methods", args.methods, METHODS)
     counts = _thread_counts(args.threads_list)
-    report, sources = command.begin(args, "scaling")
+    report, sources = command.begin(args)
     report.note(measure.NOTE)
     methods, refused = usable("method", methods, accuracy=args.accuracy, backend=args.backend)
     command.skipped(report, "method", refused)
@@ -78,7 +78,7 @@ def run(args) -> int:
             report.add(**_row(source, INDEPENDENT, n, series[runner.name], alone, args))
             runner.close()
     _print(report)
-    return command.end(args, report, {"scaling": scaling_figure.draw_speedup, "threads": scaling_figure.draw_times})
+    return command.end(args, report)
 
 
 def _independent(args, methods, counts):

@@ -15,7 +15,7 @@ import dataclasses
 from hpccd_ros import scenes
 from hpccd_ros.base.errors import UserError
 from hpccd_ros.bench import command
-from hpccd_ros.bench.core import measure, size_figure
+from hpccd_ros.bench.core import measure
 from hpccd_ros.bench.core.timing import slope
 from hpccd_ros.bench.core.variants import Variant
 from hpccd_ros.bench.report import table
@@ -26,7 +26,7 @@ DEFAULT = ("cloth-ball-like", "n-body-like-hr")
 
 
 def configure(parser):
-    command.configure(parser, default=DEFAULT, steps=4)
+    command.configure(parser, default=DEFAULT, steps=4, size=False)
     parser.add_argument("--sizes", default="0.25,1,4", metavar="X,...",
                         help="factors on the triangles of each scene (default: %(default)s)")
     parser.add_argument("--last-part", type=float, default=0.5, metavar="P",
@@ -44,9 +44,7 @@ def run(args) -> int:
         raise UserError(f"{unknown[0]}: not a generated scene, so it has one size only; see `hpccd scene --list`")
     if not 0 < args.last_part <= 1:
         raise UserError(f"--last-part {args.last_part}: must lie above 0 and not above 1")
-    args.sources = names[:1]  # the sizes are made below, one at a time
-    report, _ = command.begin(args, "size")
-    report.arguments["sources"] = names
+    report = command.begin_report(args, names)
     report.note(measure.NOTE)
     for name in names:
         for size in sizes:
@@ -67,7 +65,7 @@ def run(args) -> int:
     for entry in slopes:
         report.note("{scene}, {threads} threads: time ~ triangles^{time:.3f}, contacts ~ triangles^{contacts:.3f}"
                     .format(**entry))  # fmt: skip
-    return command.end(args, report, {"size": size_figure.draw})
+    return command.end(args, report)
 
 
 def _numbers(option, text, kind):
@@ -87,7 +85,6 @@ def _last_part(source, part):
 
 def _row(name, size, threads, source, series, args):
     step = source.step(next(iter(series.by_step)))
-    stats = series.stats()
     return {
         "scene": name,
         "size": size,
@@ -96,10 +93,10 @@ def _row(name, size, threads, source, series, args):
         "triangles": step.triangles,
         "steps": len(series.by_step),
         "contacts": series.contacts(),
-        "candidates": stats["vf_candidates"] + stats["ee_candidates"],
+        "candidates": series.candidates(),
         **series.times().as_row(),
         "step_ms": series.sequence_ms() / len(series.by_step),
-        "bytes_per_triangle": stats["bytes"] / step.triangles,
+        "bytes_per_triangle": series.stats()["bytes"] / step.triangles,
         "stages_ms": series.stages(),
     }
 

@@ -19,10 +19,10 @@ class Times:
     p95: float
     best: float
 
-    def as_row(self, prefix: str = "") -> dict[str, float]:
-        """{"average_ms": ..., "median_ms": ..., ...} with `prefix` before each key, and the number of calls."""
-        ms = {f"{prefix}{key}_ms": getattr(self, key) for key in ("average", "median", "p95", "best")}
-        return {f"{prefix}calls": self.calls, **ms}
+    def as_row(self) -> dict[str, float]:
+        """{"calls": ..., "average_ms": ..., "median_ms": ..., "p95_ms": ..., "best_ms": ...}"""
+        ms = {f"{key}_ms": getattr(self, key) for key in ("average", "median", "p95", "best")}
+        return {"calls": self.calls, **ms}
 
 
 def times(ms: Sequence[float]) -> Times:

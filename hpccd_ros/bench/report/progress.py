@@ -18,6 +18,7 @@ class Bar:
 
     def step(self, said: str = "") -> None:
         self._progress.update(self._task, advance=1, said=said)
+        self._progress.refresh()
 
 
 @contextlib.contextmanager
@@ -31,10 +32,4 @@ def bar(description: str, total: int):
     )  # fmt: skip
     with progress:
         task = progress.add_task(description, total=total, said="")
-        yield _Refreshing(progress, task)
-
-
-class _Refreshing(Bar):
-    def step(self, said: str = "") -> None:
-        super().step(said)
-        self._progress.refresh()
+        yield Bar(progress, task)

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a benchmark leaves behind: the same rows as JSON (with everything) and CSV (flat, for a spreadsheet)."""
+"""What a benchmark leaves behind: its rows, the machine and the command, as JSON and (flat, for a spreadsheet) as CSV.
+
+A row holds what tables and pictures are made from: medians and percentiles, stages, counts. Single times are not kept.
+"""
 
 from __future__ import annotations
 
@@ -15,8 +18,10 @@ from hpccd_ros.bench.report import machine
 
 @dataclasses.dataclass(frozen=True)
 class Kept:
-    """What a picture needs of a result that was written earlier."""
+    """A result that was written earlier, for pictures and tables."""
 
+    benchmark: str
+    command: str
     machine: dict
     rows: list[dict]
 
@@ -27,16 +32,17 @@ class Kept:
             whole = json.loads(path.read_text(encoding="utf-8"))
             if whole["benchmark"] != benchmark:
                 raise UserError(f"{path}: results of `hpccd bench {whole['benchmark']}`, not of {benchmark}")
-            return cls(whole["machine"], whole["rows"])
+            return cls(**{field.name: whole[field.name] for field in dataclasses.fields(cls)})
         except (OSError, ValueError, KeyError, TypeError) as e:
             raise UserError(f"{path}: not a JSON file that `hpccd bench {benchmark}` wrote ({e})") from e
 
 
 class Report:
-    """Rows of one benchmark with the machine, the commit, the arguments and the notes that belong to them."""
+    """Rows of one benchmark with the command, the machine, the commit and the notes that belong to them."""
 
-    def __init__(self, benchmark: str, arguments: dict):
+    def __init__(self, benchmark: str, command: str, arguments: dict):
         self.benchmark = benchmark
+        self.command = command
         self.arguments = arguments
         self.machine = machine.describe()
         self.notes: list[str] = []
@@ -69,6 +75,7 @@ class Report:
         stem = folder / f"{self.benchmark}-{label}"
         whole = {
             "benchmark": self.benchmark,
+            "command": self.command,
             "machine": self.machine,
             "arguments": self.arguments,
             "other_processes_share": self.others,
@@ -77,7 +84,7 @@ class Report:
             "rows": self.rows,
         }
         as_json, as_csv = stem.with_name(stem.name + ".json"), stem.with_name(stem.name + ".csv")
-        as_json.write_text(json.dumps(_plain(whole), indent=1, allow_nan=False) + "\n", encoding="utf-8")
+        as_json.write_text(as_text(whole), encoding="utf-8")
         flat = [_flat({"commit": self.machine["commit"], "processor": self.machine["processor"], **r})
                 for r in self.rows]
         columns = list(dict.fromkeys(key for row in flat for key in row))
@@ -86,6 +93,18 @@ class Report:
             writer.writeheader()
             writer.writerows(flat)
         return [as_json, as_csv]
+
+
+def as_text(whole: dict) -> str:
+    """JSON with a line for each entry and for each row, so that a difference of two results shows row by row."""
+    entries = []
+    for key, value in _plain(whole).items():
+        if isinstance(value, list) and value:
+            lines = ",\n".join(f"  {json.dumps(item, allow_nan=False)}" for item in value)
+            entries.append(f" {json.dumps(key)}: [\n{lines}\n ]")
+        else:
+            entries.append(f" {json.dumps(key)}: {json.dumps(value, allow_nan=False)}")
+    return "{\n" + ",\n".join(entries) + "\n}\n"
 
 
 def _flat(row, prefix=""):

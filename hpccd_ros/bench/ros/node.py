@@ -25,7 +25,6 @@ from hpccd_ros.base.errors import UserError
 from hpccd_ros.bench import command, sources
 from hpccd_ros.bench.report import table
 from hpccd_ros.bench.report.progress import bar
-from hpccd_ros.bench.ros import node_figure
 
 NAMESPACE = "/bench"
 LARGE, SMALL = "cloth-ball", "cloth-drop"
@@ -49,7 +48,7 @@ def run(args) -> int:
         args.sources = [f"{LARGE}-like", SMALL]
     # A domain of its own, unless the user names one: other nodes would take part of the machine.
     os.environ.setdefault("ROS_DOMAIN_ID", str(1 + os.getpid() % 100))
-    report, found = command.begin(args, "ros")
+    report, found = command.begin(args)
     for source in found:
         for k in source.spread(args.steps):
             if (step := source.step(k)) is None:
@@ -60,7 +59,7 @@ def run(args) -> int:
     if not report.rows:
         raise UserError("none of the steps has a motion; take more with --steps")
     _tables(report)
-    return command.end(args, report, {"ros": node_figure.draw})
+    return command.end(args, report)
 
 
 def _measure(report, args, name, step, folder: Path) -> None:

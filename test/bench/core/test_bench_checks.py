@@ -37,7 +37,7 @@ def test_a_short_step_of_a_file_is_timed_more_often():
             self.name, self.ms = f"{ms} ms", ms
 
         def run(self, step):
-            return measure.Sample(self.ms, 0.0, 0, 0, {}, {})
+            return measure.Sample(self.ms, 0, 0, {}, {})
 
     series = measure.measure(one, [Takes(2.0), Takes(50.0)], rounds=3)
     assert [len(s.samples) for s in series.values()] == [3 * measure.TURN_MS / 2.0, 3]
@@ -66,7 +66,7 @@ def test_a_broken_promise_fails_the_benchmark():
         ({"accuracy": "conservative", "latest": 1e-15}, 1),
         ({"accuracy": "balanced", "missed": 5}, 0),
     ):
-        report = Report("accuracy", {})
+        report = Report("accuracy", "hpccd bench accuracy", {})
         report.add(**{**row, **change})
         accuracy._check(report)
         assert len(report.failures) == failures, change

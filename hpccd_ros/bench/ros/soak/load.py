@@ -16,7 +16,7 @@ from rclpy.node import Node
 import hpccd_core as hc
 from hpccd_ros import scenes
 from hpccd_ros.bench.ros.soak import restarted_publisher
-from hpccd_ros.bench.ros.soak.wrong_messages import MOST_VERTICES, Mischief
+from hpccd_ros.bench.ros.soak.wrong_messages import MOST_VERTICES, WrongMessages
 from hpccd_ros.detect.layout import Layout
 from hpccd_ros.middleware import contact_messages, fields, mesh_messages, qos
 from hpccd_ros.scenes.messages import Player, topology_topic, vertices_topic
@@ -24,7 +24,7 @@ from hpccd_ros.scenes.messages import Player, topology_topic, vertices_topic
 SCENE, SIZE = "breaking-like", 0.02  # 5,036 triangles; sixteen changes of topology in each run of 60 frames
 TIER = "balanced"
 HISTORY = 10_000  # frames that an answer may name: what a busy machine holds up comes late
-MISCHIEF_EVERY = 7  # frames
+WRONG_EVERY = 7  # frames
 REQUEST_EVERY = 20  # frames
 UNKNOWN_EVERY = 50  # frames
 SEGMENT = 16 << 20  # bytes of shared memory that a publisher has (config/fastdds*.xml)
@@ -78,7 +78,7 @@ class SoakLoad:
         self.truncated = 0
         self.wrong: list[str] = []
         self.victim = scene.mesh_names[0]
-        self.mischief = Mischief(
+        self.wrong_messages = WrongMessages(
             lambda message: self._publish_vertices(self.victim, message),
             self._publishers[topology_topic(self.victim)].publish,
         )
@@ -104,9 +104,9 @@ class SoakLoad:
     def tick(self, tick: int) -> None:
         """Send the frame that belongs to `tick`, and now and then what else there is."""
         frame, stamp = self._send_frame(tick)
-        if self._count % MISCHIEF_EVERY == 0:
+        if self._count % WRONG_EVERY == 0:
             faces, version = self._scene.faces(frame.index)[0], self._player.version(self.victim)
-            self.mischief.one(frame[0], faces, version, stamp)
+            self.wrong_messages.send_one(frame[0], faces, version, stamp)
         if self._count % UNKNOWN_EVERY == 0:
             self.misspelt_sent += 1
             self._misspelt.publish(mesh_messages.vertices_message(frame[0][:9], stamp))

@@ -17,20 +17,20 @@ MOST_VERTICES = 20_000  # parameter max_vertices of the node that is soaked
 EARLIER = 10_000_000_000  # ns
 
 
-class Mischief:
-    """Sends one wrong message at a time for `mesh`; `sent` and `refused` count what must be counted by the node.
+class WrongMessages:
+    """Sends one wrong message at a time of one mesh.
 
-    publish_vertices, publish_topology: take a message (or CDR bytes). sent: vertex messages by reason; refused:
-    topologies by reason.
+    publish_vertices, publish_topology: take a message (or CDR bytes). sent, topologies: what the node must count,
+    vertex messages and topologies by reason.
     """
 
     def __init__(self, publish_vertices: Callable, publish_topology: Callable, seed: int = 0):
         self._vertices, self._topology = publish_vertices, publish_topology
         self._random = random.Random(seed)
         self.sent: Counter = Counter()
-        self.refused: Counter = Counter()
+        self.topologies: Counter = Counter()
 
-    def one(self, xyz: np.ndarray, faces: np.ndarray, version: int, stamp: int) -> None:
+    def send_one(self, xyz: np.ndarray, faces: np.ndarray, version: int, stamp: int) -> None:
         """`xyz`, `faces`, `version`: the mesh as it is; `stamp`: that of the last right message."""
         kinds = (self._malformed, self._values, self._order, self._cut, self._wrong_topology)
         self._random.choice(kinds)(xyz, faces, version, stamp)
@@ -68,5 +68,5 @@ class Mischief:
             (Reason.TOPOLOGY_CONFLICT, mesh_messages.topology_message(faces[1:], len(xyz), version=version)),
             (Reason.MALFORMED, MeshTopology(version=version + 1, n_vertices=len(xyz), faces=[0, 1])),
         ))  # fmt: skip
-        self.refused[reason] += 1
+        self.topologies[reason] += 1
         self._topology(message)
