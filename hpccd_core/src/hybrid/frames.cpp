@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <numeric>
 
+#include "bvh/carrier_box.h"
 #include "gpu/hybrid_devices.h"
 #include "paper/carrier_pairs.h"
 
@@ -27,13 +28,6 @@ void keep_first(std::vector<Worker>& workers) {
     for (Worker& w : workers) (w.*list).clear();
     workers[0].*list = kept;
   }
-}
-
-Box box_of_carrier(const Features& features, const std::vector<Box>& vertex_boxes, std::uint32_t c) {
-  if (c >= features.n_faces()) return vertex_boxes[features.lone_vertices[c - features.n_faces()]];
-  Box box;
-  for (const std::uint32_t v : features.faces[c]) box.include(vertex_boxes[v]);
-  return box;
 }
 
 }  // namespace
@@ -75,8 +69,7 @@ void Frames::traverse(const Tree& tree, std::uint64_t builds, std::vector<Worker
 void Frames::traverse_carriers(const std::vector<Box>& vertex_boxes, std::vector<Worker>& workers) {
   if (carriers_.empty()) list_carriers();
   const auto test_here = [this, &vertex_boxes](Worker& worker, IndexPair p) {
-    const Box a = box_of_carrier(features_, vertex_boxes, p.first),
-              b = box_of_carrier(features_, vertex_boxes, p.second);
+    const Box a = carrier_box(features_, vertex_boxes, p.first), b = carrier_box(features_, vertex_boxes, p.second);
     const auto& mesh = features_.mesh_of_carrier;
     worker.candidates(rules_.accuracy(mesh[p.first], mesh[p.second]), [&](CandidateBuffer& ee, CandidateBuffer& vf) {
       paper::carrier_pairs(features_, vertex_boxes, {p.first, a}, {p.second, b}, ee, vf);
