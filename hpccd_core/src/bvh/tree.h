@@ -3,16 +3,13 @@
 // each, together with the vertices and edges these represent, laid out for tests of many boxes at once.
 #pragma once
 
-#if defined(__SSE2__)
-#include <emmintrin.h>
-#endif
-
 #include <cstdint>
 #include <memory>
 #include <vector>
 
 #include "base/hd.h"
 #include "base/parallel.h"
+#include "base/simd/four.h"
 #include "bvh/motion_box.h"
 #include "scene/features.h"
 
@@ -33,18 +30,13 @@ struct alignas(64) Node {
 };
 static_assert(sizeof(Node) == 64);
 
-#if defined(__SSE2__)
 // Four numbers are loaded where three count: the one behind the last bound is `children`.
 inline bool Node::overlaps(const Node& other) const {
-  const auto below = [](const Node& a, const Node& b) {  // a before b at both ends: a bit for each axis
-    const __m128 at_t0 = _mm_cmplt_ps(_mm_loadu_ps(a.box.t0.high), _mm_loadu_ps(b.box.t0.low));
-    return _mm_and_ps(at_t0, _mm_cmplt_ps(_mm_loadu_ps(a.box.t1.high), _mm_loadu_ps(b.box.t1.low)));
+  const auto below = [](const MotionBox& a, const MotionBox& b) {  // a before b at both ends, by axis
+    return (load4(a.t0.high) < load4(b.t0.low)) & (load4(a.t1.high) < load4(b.t1.low));
   };
-  return (_mm_movemask_ps(_mm_or_ps(below(*this, other), below(other, *this))) & 7) == 0;
+  return (bits4(below(box, other.box) | below(other.box, box)) & 7) == 0;
 }
-#else
-inline bool Node::overlaps(const Node& other) const { return box.overlaps(other.box); }
-#endif
 
 // Boxes of up to 16 features of a leaf, a row for each of the twelve bounds (bound_number). Every row is a cache line,
 // and the rows of a group lie together.

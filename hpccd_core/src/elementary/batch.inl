@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// Included once per instruction set, with HPCCD_ISA naming the set, Double and Single its lane types. Uses nothing from
-// the standard library at run time: an inline function compiled here could be linked into code for older processors.
+// Included once per instruction set, after its header (base/simd/scalar.h). Uses nothing from the standard library at
+// run time: an inline function compiled here could be linked into code for older processors.
 
 #include "elementary/batch.h"
 #include "elementary/certified.h"
 
 namespace hpccd::HPCCD_ISA {
-
-inline constexpr int double_width = RealTraits<Double>::width;
 
 #include "elementary/load.inl"
 #include "elementary/near_pairs.inl"
@@ -87,6 +85,8 @@ void test(const Geometry& g, const std::uint32_t* first, const std::uint32_t* se
   result.counts.undecided += result.n_undecided;
 }
 
+namespace {
+
 void run(const Geometry& g, Kind kind, const std::uint32_t* first, const std::uint32_t* second, std::uint32_t n,
          BatchResult& result) {
   if (kind == Kind::vertex_face)
@@ -102,5 +102,9 @@ void run_fast(const Geometry& g, Kind kind, const std::uint32_t* first, const st
   else
     test<Kind::edge_edge, Likely, Single>(g, first, second, n, result);
 }
+
+}  // namespace
+
+BatchTest batch_test(Accuracy accuracy) { return accuracy == Accuracy::fast ? run_fast : run; }
 
 }  // namespace hpccd::HPCCD_ISA

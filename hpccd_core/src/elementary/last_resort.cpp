@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "elementary/last_resort.h"
 
-#include "elementary/batch.h"
 #include "elementary/beyond.h"
 #include "elementary/exact/contact.h"
 #include "elementary/tolerant.h"
@@ -42,15 +41,6 @@ std::optional<double> last_resort(Accuracy accuracy, const inclusion::Limits& li
   ++counts.tolerance;
   return kind == Kind::vertex_face ? tolerant_contact<Kind::vertex_face>(q_t0, q_t1)
                                    : tolerant_contact<Kind::edge_edge>(q_t0, q_t1);
-}
-
-void all_undecided(const Geometry&, Kind, const std::uint32_t*, const std::uint32_t*, std::uint32_t n,
-                   BatchResult& result) {
-  result.n_contacts = 0;
-  result.n_undecided = n;
-  for (std::uint32_t i = 0; i < n; ++i) result.undecided[i] = i;
-  result.counts.tested += n;
-  result.counts.undecided += n;
 }
 
 }  // namespace hpccd

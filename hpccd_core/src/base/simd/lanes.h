@@ -6,9 +6,7 @@
 #pragma once
 
 #include <cstdint>
-#if defined(__AVX512F__) || defined(__AVX2__)
-#include <immintrin.h>
-#endif
+#include <type_traits>
 
 #include "base/real.h"
 
@@ -50,21 +48,7 @@ HPCCD_HD Lanes<T, W> select(LaneMask<T, W> m, Lanes<T, W> a, Lanes<T, W> b) {
   return Lanes<T, W>(m.v ? a.v : b.v);
 }
 
-template <class T, int W>
-HPCCD_HD unsigned bits(LaneMask<T, W> m) {
-#if defined(__AVX512DQ__)
-  if constexpr (sizeof(m.v) == 64 && sizeof(T) == 8) return _mm512_movepi64_mask((__m512i)m.v);
-  if constexpr (sizeof(m.v) == 64 && sizeof(T) == 4) return _mm512_movepi32_mask((__m512i)m.v);
-#endif
-#if defined(__AVX2__)
-  if constexpr (sizeof(m.v) == 32 && sizeof(T) == 8) return static_cast<unsigned>(_mm256_movemask_pd((__m256d)m.v));
-  if constexpr (sizeof(m.v) == 32 && sizeof(T) == 4) return static_cast<unsigned>(_mm256_movemask_ps((__m256)m.v));
-#endif
-  unsigned r = 0;
-  for (int i = 0; i < W; ++i) r |= (m.v[i] ? 1u : 0u) << i;
-  return r;
-}
-
+// bits(mask) and, where a set has it for a whole register, square_root(lanes) come with the instruction set.
 template <class T, int W>
 HPCCD_HD bool any(LaneMask<T, W> m) {
   return bits(m) != 0;
@@ -72,10 +56,6 @@ HPCCD_HD bool any(LaneMask<T, W> m) {
 
 template <class T, int W>
 HPCCD_HD Lanes<T, W> square_root(Lanes<T, W> x) {
-#if defined(__AVX512F__)
-  if constexpr (sizeof(x.v) == 64 && sizeof(T) == 8)
-    return Lanes<T, W>((typename Lanes<T, W>::Vec)_mm512_sqrt_pd((__m512d)x.v));
-#endif
   Lanes<T, W> r;
   for (int i = 0; i < W; ++i) r.v[i] = square_root(x.v[i]);
   return r;
