@@ -62,8 +62,9 @@ class CpuTestDevice final : public hybrid::TestDevice {
   void collect(hybrid::Ticket ticket, hybrid::Output& output) override {
     std::lock_guard lock(mutex_);
     const Job& done = job(ticket);
-    output.found.insert(output.found.end(), done.output.found.begin(), done.output.found.end());
-    output.undecided.insert(output.undecided.end(), done.output.undecided.begin(), done.output.undecided.end());
+    append(output.vertex_face, done.output.vertex_face);
+    append(output.edge_edge, done.output.edge_edge);
+    append(output.undecided, done.output.undecided);
     for (int k = 0; k < 2; ++k) output.counts[k].tested += done.output.counts[k].tested;
     std::erase_if(jobs_, [&](const Job& j) { return j.ticket == ticket; });
   }
@@ -75,6 +76,10 @@ class CpuTestDevice final : public hybrid::TestDevice {
   void count(std::map<std::string, std::uint64_t>& stats) const override { stats["test_devices"] += 1; }
 
  private:
+  template <class T>
+  static void append(std::vector<T>& to, const std::vector<T>& more) {
+    to.insert(to.end(), more.begin(), more.end());
+  }
   struct Job {
     hybrid::Ticket ticket;
     std::vector<hybrid::Piece> pieces;
@@ -121,13 +126,13 @@ class CpuTestDevice final : public hybrid::TestDevice {
                          Accuracy::exact);
     worker.flush();
     hybrid::Output output;
-    for (const Found& f : worker.vertex_face) output.found.push_back({f.first, f.second, Kind::vertex_face, f.toc});
+    output.vertex_face = worker.vertex_face;
     // Some as a device brings them that has no exact arithmetic: the CPU finds the same time for them.
-    for (const Found& f : worker.edge_edge) {
+    for (const Contact& f : worker.edge_edge) {
       if (test_ == all_undecided && f.first % 3 == 0)
         output.undecided.push_back({f.first, f.second, Kind::edge_edge});
       else
-        output.found.push_back({f.first, f.second, Kind::edge_edge, f.toc});
+        output.edge_edge.push_back(f);
     }
     for (int k = 0; k < 2; ++k) output.counts[k] = worker.counts[k];
     return output;

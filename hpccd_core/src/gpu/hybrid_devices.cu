@@ -152,13 +152,11 @@ class CudaTestDevice final : public hybrid::TestDevice {
     Slot& s = slots_[ticket];
     const Counters& c = *s.host_counters.data();
     for (u64 i = 0; i < c.found_all; ++i) {
-      const Undecided p = scene_.pair_of(s.keys.data()[i]);
-      output.found.push_back({p.first, p.second, p.kind, s.tocs.data()[i]});
+      const Candidate p = scene_.candidate_of(s.keys.data()[i]);
+      (p.kind == Kind::vertex_face ? output.vertex_face : output.edge_edge)
+          .push_back({p.first, p.second, s.tocs.data()[i]});
     }
-    for (u64 i = 0; i < c.to_host; ++i) {
-      const Undecided p = scene_.pair_of(s.lists.to_host()[i]);
-      output.undecided.push_back({p.first, p.second, p.kind});
-    }
+    for (u64 i = 0; i < c.to_host; ++i) output.undecided.push_back(scene_.candidate_of(s.lists.to_host()[i]));
     for (int k = 0; k < 2; ++k) {
       BatchCounts& sum = output.counts[k];
       sum.tested += c.candidates[k];

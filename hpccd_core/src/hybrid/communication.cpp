@@ -52,7 +52,8 @@ void Communication::begin_frame(Positions t0, Positions t1) {
   t0_ = t0, t1_ = t1;
   failed_ = false;
   error_.clear();
-  output_.found.clear();
+  output_.vertex_face.clear();
+  output_.edge_edge.clear();
   output_.undecided.clear();
   output_.counts[0] = output_.counts[1] = {};
   counts_ = {};

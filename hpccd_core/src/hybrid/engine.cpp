@@ -75,16 +75,15 @@ void Engine::merge(std::vector<Worker>& workers) {
   const Output& output = communication_.output();
   // 20 us each: one at a time.
   parallel_for(pool_, output.undecided.size(), 1, [&](std::size_t begin, std::size_t end, int thread) {
-    for (std::size_t i = begin; i < end; ++i) {
-      const UndecidedPair& p = output.undecided[i];
-      workers[thread].resolve(p.kind, p.first, p.second, Accuracy::exact);
-    }
+    for (std::size_t i = begin; i < end; ++i) workers[thread].resolve(output.undecided[i], Accuracy::exact);
   });
-  parallel_for(pool_, output.found.size(), 1024, [&](std::size_t begin, std::size_t end, int thread) {
-    for (std::size_t i = begin; i < end; ++i) {
-      const DeviceContact& f = output.found[i];
-      workers[thread].report(f.kind, f.first, f.second, f.toc);
-    }
+  const std::size_t n_vf = output.vertex_face.size();
+  parallel_for(pool_, n_vf + output.edge_edge.size(), 1024, [&](std::size_t begin, std::size_t end, int thread) {
+    for (std::size_t i = begin; i < end; ++i)
+      if (i < n_vf)
+        workers[thread].report(Kind::vertex_face, output.vertex_face[i]);
+      else
+        workers[thread].report(Kind::edge_edge, output.edge_edge[i - n_vf]);
   });
   exact_on_cpu_ = output.undecided.size();
   for (int k = 0; k < 2; ++k) {

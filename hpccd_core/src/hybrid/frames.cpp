@@ -12,17 +12,14 @@ namespace {
 
 // The first contact in canonical order, where one is enough: which one does not depend on threads or devices.
 void keep_first(std::vector<Worker>& workers) {
-  const auto before = [](const Found& a, const Found& b) {
-    return a.first < b.first || (a.first == b.first && a.second < b.second);
-  };
-  std::vector<Found> Worker::* const lists[2] = {&Worker::vertex_face, &Worker::edge_edge};
+  std::vector<Contact> Worker::* const lists[2] = {&Worker::vertex_face, &Worker::edge_edge};
   bool have = false;
   for (const auto list : lists) {
-    const Found* best = nullptr;
+    const Contact* best = nullptr;
     for (const Worker& w : workers)
-      for (const Found& f : w.*list)
+      for (const Contact& f : w.*list)
         if (!best || before(f, *best)) best = &f;
-    const std::vector<Found> kept = best && !have ? std::vector<Found>{*best} : std::vector<Found>();
+    const std::vector<Contact> kept = best && !have ? std::vector<Contact>{*best} : std::vector<Contact>();
     have = have || best;
     for (Worker& w : workers) (w.*list).clear();
     workers[0].*list = kept;

@@ -11,6 +11,7 @@
 
 #include "bvh/tree.h"
 #include "elementary/batch.h"
+#include "elementary/pair.h"
 #include "hpccd/hpccd.h"
 
 namespace hpccd::hybrid {
@@ -27,22 +28,11 @@ struct LeafTable {
   std::uint64_t version = 0;
 };
 
-struct DeviceContact {
-  std::uint32_t first, second;
-  Kind kind;
-  double toc;
-};
-// A pair that only exact arithmetic on the CPU decides.
-struct UndecidedPair {
-  std::uint32_t first, second;
-  Kind kind;
-};
-
 // What elements of the GPU task queue bring back.
 struct Output {
-  std::vector<DeviceContact> found;
-  std::vector<UndecidedPair> undecided;
-  BatchCounts counts[2];  // vertex-face, edge-edge
+  std::vector<Contact> vertex_face, edge_edge;
+  std::vector<Candidate> undecided;  // only exact arithmetic on the CPU decides these
+  BatchCounts counts[2];             // vertex-face, edge-edge
 };
 
 // Index pairs that lie together in memory.

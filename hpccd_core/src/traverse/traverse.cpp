@@ -37,11 +37,7 @@ void keep_first_of_task(Worker& worker, std::size_t task, std::atomic<std::size_
   }
 }
 
-Found least(const std::vector<Found>& found) {
-  return *std::min_element(found.begin(), found.end(), [](const Found& a, const Found& b) {
-    return std::pair{a.first, a.second} < std::pair{b.first, b.second};
-  });
-}
+Contact least(const std::vector<Contact>& found) { return *std::min_element(found.begin(), found.end(), before); }
 
 void traverse_any(const Tree& tree, const PairRules& rules, Search& search, ThreadPool& pool,
                   std::vector<Worker>& workers) {
@@ -53,7 +49,7 @@ void traverse_any(const Tree& tree, const PairRules& rules, Search& search, Thre
     Worker& worker = workers[thread];
     worker.begin(search);
     std::vector<NodePair> stack;
-    std::vector<Found> best_vf, best_ee;
+    std::vector<Contact> best_vf, best_ee;
     std::size_t best = tasks.size();
     for (;;) {
       const std::size_t task = next.fetch_add(1);

@@ -11,15 +11,10 @@
 #include "elementary/batch.h"
 #include "elementary/inclusion.h"
 #include "elementary/last_resort.h"
+#include "elementary/pair.h"
 #include "traverse/leaf_pairs.h"
 
 namespace hpccd {
-
-// A contact of features `first` and `second`: vertex and face, or edges a < b.
-struct Found {
-  std::uint32_t first, second;
-  double toc;
-};
 
 // What all threads share during one call.
 struct Search {
@@ -63,13 +58,13 @@ class alignas(128) Worker {
   }
   void flush();  // tests what waits
   // The tier's last resort on a pair that nothing else decides, and a contact found elsewhere.
-  void resolve(Kind kind, std::uint32_t first, std::uint32_t second, Accuracy accuracy);
-  void report(Kind kind, std::uint32_t first, std::uint32_t second, double toc);
+  void resolve(const Candidate& candidate, Accuracy accuracy);
+  void report(Kind kind, const Contact& contact);
   // Ends the work where that is requested: between any two pairs of nodes, batches and last resorts.
   void heed_cancellation() const { search_->cancellation->heed(); }
   std::size_t bytes() const;
 
-  std::vector<Found> vertex_face, edge_edge;
+  std::vector<Contact> vertex_face, edge_edge;
   BatchCounts counts[2];  // vertex-face, edge-edge
   LastResortCounts last_resorts[2];
   std::uint64_t node_pairs = 0, leaf_pairs = 0;
