@@ -2,7 +2,7 @@
 #include "paper/breadth_first.h"
 #include "paper/hierarchy.h"
 #include "paper/refit.h"
-#include "paper_fixture.h"
+#include "paper/fixture.h"
 
 namespace hpccd::paper {
 namespace {

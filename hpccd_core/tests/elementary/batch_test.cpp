@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The certified tests against exact arithmetic, and the instruction sets against each other, bit for bit.
+// The filtered tests against exact arithmetic, and the instruction sets against each other, bit for bit.
 #include <gtest/gtest.h>
 
 #include <cstring>

@@ -2,7 +2,7 @@
 #include "base/simd.h"
 #include "paper/front.h"
 #include "paper/refit.h"
-#include "paper_fixture.h"
+#include "paper/fixture.h"
 
 namespace hpccd::paper {
 namespace {

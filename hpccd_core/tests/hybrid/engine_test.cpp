@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "contacts/canonical.h"
-#include "cpu_test_device.h"
+#include "hybrid/cpu_test_device.h"
 #include "grid_scene.h"
 #include "hybrid/engine.h"
 #include "traverse/traverse.h"
