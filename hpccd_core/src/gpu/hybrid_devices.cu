@@ -12,11 +12,10 @@
 namespace hpccd::gpu {
 namespace {
 
-using hybrid::IndexPair;
 using hybrid::Piece;
 using hybrid::Ticket;
 
-static_assert(sizeof(IndexPair) == sizeof(uint2));
+static_assert(sizeof(LeafPair) == sizeof(uint2));
 
 // What differs between submissions of one slot; in page-locked memory, where the device reads it.
 struct Order {
@@ -90,8 +89,8 @@ class CudaTestDevice final : public hybrid::TestDevice {
   }
   ~CudaTestDevice() override { cancel(); }
 
-  std::shared_ptr<IndexPair[]> pair_memory(std::size_t n) override {
-    auto memory = std::make_shared<PinnedBuffer<IndexPair>>();
+  std::shared_ptr<LeafPair[]> pair_memory(std::size_t n) override {
+    auto memory = std::make_shared<PinnedBuffer<LeafPair>>();
     memory->reserve(n);
     return {memory, memory->data()};
   }

@@ -5,7 +5,6 @@
 #include <numeric>
 
 #include "gpu/hybrid_devices.h"
-#include "paper/carrier_pairs.h"
 
 namespace hpccd::hybrid {
 namespace {
@@ -24,13 +23,6 @@ void keep_first(std::vector<Worker>& workers) {
     for (Worker& w : workers) (w.*list).clear();
     workers[0].*list = kept;
   }
-}
-
-Box box_of_carrier(const Features& features, const std::vector<Box>& vertex_boxes, std::uint32_t c) {
-  if (c >= features.n_faces()) return vertex_boxes[features.lone_vertices[c - features.n_faces()]];
-  Box box;
-  for (const std::uint32_t v : features.faces[c]) box.include(vertex_boxes[v]);
-  return box;
 }
 
 }  // namespace
@@ -60,27 +52,14 @@ std::unique_ptr<FrameGuard> Frames::begin(Positions t0, Positions t1, std::vecto
 }
 
 void Frames::traverse(const Tree& tree, std::uint64_t builds, std::vector<Worker>& workers) {
-  const auto test_here = [this, &tree](Worker& worker, IndexPair p) {
-    const auto mesh = [&](std::uint32_t leaf) -> const Node& { return tree.nodes[tree.leaf_nodes[leaf]]; };
-    worker.test_leaf_pair(tree, tree.leaves[p.first], tree.leaves[p.second],
-                          rules_.accuracy(mesh(p.first), mesh(p.second)));
-  };
   engine_->begin_traversal({&tree.leaves, &tree.face_of_slot, &tree.edge_of_slot, &tree.vertex_of_slot, builds},
-                           test_here, workers);
+                           workers);
 }
 
-void Frames::traverse_carriers(const std::vector<Box>& vertex_boxes, std::vector<Worker>& workers) {
+void Frames::traverse_carriers(std::vector<Worker>& workers) {
   if (carriers_.empty()) list_carriers();
-  const auto test_here = [this, &vertex_boxes](Worker& worker, IndexPair p) {
-    const Box a = box_of_carrier(features_, vertex_boxes, p.first),
-              b = box_of_carrier(features_, vertex_boxes, p.second);
-    const auto& mesh = features_.mesh_of_carrier;
-    worker.candidates(rules_.accuracy(mesh[p.first], mesh[p.second]), [&](CandidateBuffer& ee, CandidateBuffer& vf) {
-      paper::carrier_pairs(features_, vertex_boxes, {p.first, a}, {p.second, b}, ee, vf);
-    });
-  };
   engine_->begin_traversal({&carriers_, &face_of_carrier_, &features_.owned_edges, &features_.owned_vertices, 1},
-                           test_here, workers);
+                           workers);
 }
 
 void Frames::list_carriers() {
@@ -92,12 +71,18 @@ void Frames::list_carriers() {
                          features_.first_vertex[c + 1]});
 }
 
-bool Frames::finish(FrameGuard& frame, std::vector<Worker>& workers, Profiler& profiler) {
-  const bool complete = frame.finish(profiler);
+bool Frames::finish(FrameGuard& frame, std::vector<Worker>& workers, const Test& test, Profiler& profiler) {
+  const Finished finished = frame.finish(profiler);
+  const bool complete = finished.complete;
   if (complete)
     failures_in_a_row_ = 0;
   else
     note_failure(engine_->error());
+  const auto& pairs = finished.untested;
+  parallel_for(pool_, pairs.size(), 64, [&](std::size_t begin, std::size_t end, int thread) {
+    for (std::size_t i = begin; i < end; ++i) test(pairs[i], workers[thread]);
+  });
+  for (Worker& w : workers) w.flush();
   if (options_.report == Report::any) keep_first(workers);
   return complete;
 }

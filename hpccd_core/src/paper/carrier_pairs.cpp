@@ -51,6 +51,13 @@ void vertex_face_pairs(const Features& features, const std::vector<Box>& vertex_
   }
 }
 
+Box box_of_carrier(const Features& features, const std::vector<Box>& vertex_boxes, std::uint32_t c) {
+  if (c >= features.n_faces()) return vertex_boxes[features.lone_vertices[c - features.n_faces()]];
+  Box box;
+  for (const std::uint32_t v : features.faces[c]) box.include(vertex_boxes[v]);
+  return box;
+}
+
 }  // namespace
 
 void carrier_pairs(const Features& features, const std::vector<Box>& vertex_boxes, BoundedCarrier a, BoundedCarrier b,
@@ -58,6 +65,22 @@ void carrier_pairs(const Features& features, const std::vector<Box>& vertex_boxe
   edge_pairs(features, vertex_boxes, a, b, edge_edge);
   vertex_face_pairs(features, vertex_boxes, a, b, vertex_face);
   vertex_face_pairs(features, vertex_boxes, b, a, vertex_face);
+}
+
+void test_carriers(const Features& features, const PairRules& rules, const std::vector<Box>& vertex_boxes,
+                   BoundedCarrier a, BoundedCarrier b, Worker& worker) {
+  const auto& mesh = features.mesh_of_carrier;
+  worker.test_candidates(rules.accuracy(mesh[a.number], mesh[b.number]),
+                         [&](CandidateBuffer& edge_edge, CandidateBuffer& vertex_face) {
+                           carrier_pairs(features, vertex_boxes, a, b, edge_edge, vertex_face);
+                         });
+}
+
+void test_carriers(const Features& features, const PairRules& rules, const std::vector<Box>& vertex_boxes,
+                   LeafPair carriers, Worker& worker) {
+  const Box a = box_of_carrier(features, vertex_boxes, carriers.first),
+            b = box_of_carrier(features, vertex_boxes, carriers.second);
+  test_carriers(features, rules, vertex_boxes, {carriers.first, a}, {carriers.second, b}, worker);
 }
 
 }  // namespace hpccd::paper

@@ -26,21 +26,6 @@ void Worker::begin(Search& search) {
   if (!result_) result_ = std::make_unique<BatchResult>();
 }
 
-void Worker::leaf_pair(const Tree& tree, const LeafRange& a, const LeafRange& b, Accuracy accuracy) {
-  ++leaf_pairs;
-  const auto number = [&](const LeafRange& leaf) { return static_cast<std::uint32_t>(&leaf - tree.leaves.data()); };
-  if (sink)
-    sink->take(number(a), number(b), *this);
-  else
-    test_leaf_pair(tree, a, b, accuracy);
-}
-
-void Worker::test_leaf_pair(const Tree& tree, const LeafRange& a, const LeafRange& b, Accuracy accuracy) {
-  candidates(accuracy, [&](CandidateBuffer& edge_edge, CandidateBuffer& vertex_face) {
-    search_->leaf_pairs(tree, a, b, edge_edge, vertex_face);
-  });
-}
-
 void Worker::flush() {
   if (sink) sink->flush();
   for (int i = 0; i < 4; ++i)

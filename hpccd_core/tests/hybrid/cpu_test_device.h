@@ -13,7 +13,7 @@
 #include "bvh/motion_bounds.h"
 #include "hybrid/test_device.h"
 #include "scene/features.h"
-#include "traverse/worker.h"
+#include "traverse/traverse.h"
 
 namespace hpccd::test {
 
@@ -26,10 +26,15 @@ struct DeviceFaults {
 
 class CpuTestDevice final : public hybrid::TestDevice {
  public:
-  CpuTestDevice(const Features& features, const Tree& tree, BatchTest test, std::shared_ptr<DeviceFaults> faults)
-      : features_(features), tree_(tree), test_(test), faults_(std::move(faults)), pool_(1), thread_([this] {
-          work();
-        }) {}
+  CpuTestDevice(const Features& features, const PairRules& rules, const Tree& tree, BatchTest test,
+                std::shared_ptr<DeviceFaults> faults)
+      : features_(features),
+        rules_(rules),
+        tree_(tree),
+        test_(test),
+        faults_(std::move(faults)),
+        pool_(1),
+        thread_([this] { work(); }) {}
   ~CpuTestDevice() override {
     {
       std::lock_guard lock(mutex_);
@@ -121,9 +126,7 @@ class CpuTestDevice final : public hybrid::TestDevice {
     Worker worker;
     worker.begin(search);
     for (const hybrid::Piece& piece : job.pieces)
-      for (std::size_t i = 0; i < piece.n; ++i)
-        worker.leaf_pair(tree_, tree_.leaves[piece.pairs[i].first], tree_.leaves[piece.pairs[i].second],
-                         Accuracy::exact);
+      for (std::size_t i = 0; i < piece.n; ++i) test_leaves(tree_, rules_, piece.pairs[i], worker);
     worker.flush();
     hybrid::Output output;
     output.vertex_face = worker.vertex_face;
@@ -139,6 +142,7 @@ class CpuTestDevice final : public hybrid::TestDevice {
   }
 
   const Features& features_;
+  const PairRules& rules_;
   const Tree& tree_;
   const BatchTest test_;  // of each batch of feature pairs
   std::shared_ptr<DeviceFaults> faults_;
