@@ -5,15 +5,14 @@
 #include "gpu/bounds.cuh"
 #include "gpu/device_leaves.cuh"
 #include "gpu/device_scene.cuh"
-#include "gpu/hybrid_devices.h"
 #include "gpu/refit.cuh"
 #include "gpu/test_lists.cuh"
+#include "hybrid/devices.h"
 
-namespace hpccd::gpu {
+namespace hpccd::hybrid {
 namespace {
 
-using hybrid::Piece;
-using hybrid::Ticket;
+using namespace gpu;
 
 static_assert(sizeof(LeafPair) == sizeof(uint2));
 
@@ -74,7 +73,7 @@ struct Slot {
   bool busy = false;
 };
 
-class CudaTestDevice final : public hybrid::TestDevice {
+class CudaTestDevice final : public TestDevice {
  public:
   CudaTestDevice(const Scene& scene, const Features& features, Accuracy accuracy, int device)
       : device_((check(cudaSetDevice(device), "cudaSetDevice"), device)),
@@ -100,7 +99,7 @@ class CudaTestDevice final : public hybrid::TestDevice {
     is_double_ ? upload_positions<double>(t0, t1) : upload_positions<float>(t0, t1);
   }
 
-  void begin_traversal(const hybrid::LeafTable& leaves) override {
+  void begin_traversal(const LeafTable& leaves) override {
     check(cudaSetDevice(device_), "cudaSetDevice");
     if (leaves.version != leaves_version_) {
       leaves_version_ = 0;  // none, should this fail
@@ -147,7 +146,7 @@ class CudaTestDevice final : public hybrid::TestDevice {
     return !again;
   }
 
-  void collect(Ticket ticket, hybrid::Output& output) override {
+  void collect(Ticket ticket, Output& output) override {
     Slot& s = slots_[ticket];
     const Counters& c = *s.host_counters.data();
     for (u64 i = 0; i < c.found_all; ++i) {
@@ -312,15 +311,15 @@ class CudaTestDevice final : public hybrid::TestDevice {
 
 }  // namespace
 
-std::vector<std::unique_ptr<hybrid::TestDevice>> hybrid_devices(const Scene& scene, const Features& features,
-                                                                Accuracy accuracy, int gpus) {
+std::vector<std::unique_ptr<TestDevice>> cuda_devices(const Scene& scene, const Features& features, Accuracy accuracy,
+                                                      int gpus) {
   const auto& devices = status().devices;
   if (devices.empty()) throw Error(status().reason);
   const std::size_t n = gpus > 0 ? static_cast<std::size_t>(gpus) : devices.size();
-  std::vector<std::unique_ptr<hybrid::TestDevice>> found;
+  std::vector<std::unique_ptr<TestDevice>> found;
   for (std::size_t i = 0; i < std::min(n, devices.size()); ++i)
     found.push_back(std::make_unique<CudaTestDevice>(scene, features, accuracy, devices[i].number));
   return found;
 }
 
-}  // namespace hpccd::gpu
+}  // namespace hpccd::hybrid
