@@ -168,8 +168,6 @@ struct Detector::Impl {
 
   // A tree that fits the motion of this step: refitted, or built anew where refitting has lost too much.
   void update_tree(bool tree_followed) {
-    // Traversal visits node pairs about in proportion to the nodes' area; half as much again costs more than a build.
-    constexpr double worn_out = 1.5;
     if (tree.nodes.empty()) {
       build_tree_anew();
       profiler.mark("build");
@@ -177,7 +175,7 @@ struct Detector::Impl {
     }
     refit(tree, motion.boxes, tree_followed ? motion.resting : std::vector<char>(), pool);
     profiler.mark("refit");
-    if (tree.area > worn_out * tree.area_when_built) {
+    if (worn_out(tree.area, tree.area_when_built)) {
       build_tree_anew();
       profiler.mark("build");
     }

@@ -22,6 +22,8 @@ inline void pause() {
 // exact arithmetic), the core is left to others.
 class ActiveWait {
  public:
+  // What was waited for came: the next wait is a new one.
+  void reset() { turns_ = 0; }
   void turn() {
     if (turns_ < patience) {
       ++turns_;
@@ -32,7 +34,7 @@ class ActiveWait {
   }
 
  private:
-  static constexpr int patience = 4000;
+  static constexpr int patience = 4000;  // 60 to 200 us, as a pool waits for its next job (parallel.cpp)
   int turns_ = 0;
 };
 

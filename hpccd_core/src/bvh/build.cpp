@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <memory>
 
+#include "bvh/carrier_box.h"
 #include "bvh/split.h"
 #include "bvh/tree.h"
 
@@ -46,13 +47,6 @@ class Builder {
   }
 
  private:
-  MotionBox carrier_box(std::uint32_t c) const {
-    if (c >= features_.n_faces()) return vertex_boxes_[features_.lone_vertices[c - features_.n_faces()]];
-    MotionBox b;
-    for (std::uint32_t v : features_.faces[c]) b.include(vertex_boxes_[v]);
-    return b;
-  }
-
   void find_parts() {
     const auto lone_before = [&](std::uint32_t vertex) {
       const auto& lone = features_.lone_vertices;
@@ -114,7 +108,8 @@ class Builder {
     scratch_ = std::make_unique_for_overwrite<Placed[]>(n);
     parallel_for(pool_, n, 1024, [&](std::size_t begin, std::size_t end, int) {
       for (auto c = static_cast<std::uint32_t>(begin); c < end; ++c)
-        carriers_[parts_[features_.mesh_of_carrier[c]].place_of(c)] = at_center(carrier_box(c), c);
+        carriers_[parts_[features_.mesh_of_carrier[c]].place_of(c)] =
+            at_center(carrier_box(features_, vertex_boxes_, c), c);
     });
   }
 

@@ -10,7 +10,7 @@ namespace {
 // Four numbers at a time (GCC/Clang vector extension).
 using Four = float __attribute__((vector_size(16)));
 
-// A motion's box in registers: the twelve bounds in the order of MotionBox.
+// A motion's box in registers: the twelve bounds in their order (bound_number).
 struct Bounds {
   Four part[3];
 };
@@ -22,15 +22,16 @@ Bounds load(const MotionBox& b) {
   return r;
 }
 
-// Low bounds are numbers 0 to 2 and 6 to 8.
+// The smaller of two where the bound is a low one, else the larger.
+template <std::uint32_t part>
+Four join_part(Four a, Four b) {
+  const Four low = a < b ? a : b, high = a < b ? b : a;
+  constexpr auto pick = [](int lane) { return side_of_bound(4 * part + lane) == Side::low ? lane : 4 + lane; };
+  return __builtin_shufflevector(low, high, pick(0), pick(1), pick(2), pick(3));
+}
+
 Bounds join(const Bounds& a, const Bounds& b) {
-  Four low[3], high[3];
-  for (int i = 0; i < 3; ++i) {
-    low[i] = a.part[i] < b.part[i] ? a.part[i] : b.part[i];
-    high[i] = a.part[i] < b.part[i] ? b.part[i] : a.part[i];
-  }
-  return {{__builtin_shufflevector(low[0], high[0], 0, 1, 2, 7), __builtin_shufflevector(high[1], low[1], 0, 1, 6, 7),
-           __builtin_shufflevector(low[2], high[2], 0, 5, 6, 7)}};
+  return {{join_part<0>(a.part[0], b.part[0]), join_part<1>(a.part[1], b.part[1]), join_part<2>(a.part[2], b.part[2])}};
 }
 
 // Boxes of n features in a leaf's groups, four at a time, from a lane on that is a multiple of four; the last ones are

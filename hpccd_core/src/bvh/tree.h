@@ -46,11 +46,11 @@ inline bool Node::overlaps(const Node& other) const {
 inline bool Node::overlaps(const Node& other) const { return box.overlaps(other.box); }
 #endif
 
-// Boxes of up to 16 features of a leaf, a row for each of the twelve bounds: low and high at t = 0, low and high at
-// t = 1, each along x, y, z. Every row is a cache line, and the rows of a group lie together.
+// Boxes of up to 16 features of a leaf, a row for each of the twelve bounds (bound_number). Every row is a cache line,
+// and the rows of a group lie together.
 struct alignas(64) BoxGroup {
-  static constexpr std::uint32_t n_rows = 12, width = 16;
-  float rows[n_rows][width];
+  static constexpr std::uint32_t width = 16;
+  float rows[n_bounds][width];
 };
 
 struct LeafRange {
@@ -105,6 +105,10 @@ struct Tree {
 
   std::size_t bytes() const;
 };
+
+// Whether refitting has lost so much that a new tree costs less: traversal visits node pairs about in proportion to the
+// nodes' area, and half as much again costs more than a build. Areas relative to the root's.
+inline bool worn_out(double area, double area_when_built) { return area > 1.5 * area_when_built; }
 
 // A new tree over the current vertex boxes (bounds of the motion of each vertex).
 void build(Tree& tree, const Scene& scene, const Features& features, const std::vector<MotionBox>& vertex_boxes,

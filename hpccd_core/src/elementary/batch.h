@@ -4,7 +4,7 @@
 
 #include <cstdint>
 
-#include "elementary/motion.h"
+#include "elementary/pair_vertices.h"
 #include "elementary/slabs.h"
 #include "hpccd/hpccd.h"
 
@@ -22,6 +22,20 @@ struct Geometry {
   const SlabRow* slabs = nullptr;  // of each vertex; none where features need not touch to count
   double scale = 1;                // power of two that brings the scene to about one; only single precision needs it
 };
+
+template <Kind kind>
+HPCCD_HD void pair_vertices(const Geometry& g, std::uint32_t first, std::uint32_t second, std::uint32_t v[4]) {
+  // Not through std::array, whose functions are compiled for one instruction set and linked for all (batch.inl).
+  pair_vertices<kind>(reinterpret_cast<const std::uint32_t*>(g.edges), reinterpret_cast<const std::uint32_t*>(g.faces),
+                      first, second, v);
+}
+
+inline void pair_vertices(const Geometry& g, Kind kind, std::uint32_t first, std::uint32_t second, std::uint32_t v[4]) {
+  if (kind == Kind::vertex_face)
+    pair_vertices<Kind::vertex_face>(g, first, second, v);
+  else
+    pair_vertices<Kind::edge_edge>(g, first, second, v);
+}
 
 inline constexpr std::uint32_t batch_capacity = 1024;
 

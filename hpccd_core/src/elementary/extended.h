@@ -22,15 +22,13 @@ HPCCD_HD Vec3<DoubleDouble> difference(Vec3<double> a, Vec3<double> b) {
   return {detail::two_sum(a.x, -b.x), detail::two_sum(a.y, -b.y), detail::two_sum(a.z, -b.z)};
 }
 
-// The rows of motion.h without any rounding.
+// The motion without any rounding.
 template <Kind kind>
 HPCCD_HD Motion<DoubleDouble> motion_of(const Vec3<double> q0[4], const Vec3<double> q1[4]) {
-  if constexpr (kind == Kind::vertex_face)
-    return {difference(q0[0], q0[1]), difference(q0[2], q0[1]), difference(q0[3], q0[1]),
-            difference(q1[0], q1[1]), difference(q1[2], q1[1]), difference(q1[3], q1[1])};
-  else
-    return {difference(q0[2], q0[0]), difference(q0[1], q0[0]), difference(q0[3], q0[2]),
-            difference(q1[2], q1[0]), difference(q1[1], q1[0]), difference(q1[3], q1[2])};
+  return motion_by<kind, DoubleDouble>([&](int end, int to, int from) {
+    const Vec3<double>* q = end ? q1 : q0;
+    return difference(q[to], q[from]);
+  });
 }
 
 // floor(x 2^62) for x in [0, 1].

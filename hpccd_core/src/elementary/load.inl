@@ -2,30 +2,6 @@
 // Brings the vectors p, a, b of several pairs (motion.h) from rows of vertices into lanes. Part of batch.inl.
 // Subtractions are done a row at a time (both ends of a motion at once), then rows are turned into lanes.
 
-template <Kind kind>
-HPCCD_HD void vertex_indices(const Geometry& g, std::uint32_t first, std::uint32_t second, std::uint32_t out[4]) {
-  if constexpr (kind == Kind::vertex_face) {
-    const std::uint32_t* f = reinterpret_cast<const std::uint32_t*>(g.faces) + 3 * static_cast<std::size_t>(second);
-    out[0] = first, out[1] = f[0], out[2] = f[1], out[3] = f[2];
-  } else {
-    const std::uint32_t* e = reinterpret_cast<const std::uint32_t*>(g.edges);
-    const std::uint32_t *a = e + 2 * static_cast<std::size_t>(first), *b = e + 2 * static_cast<std::size_t>(second);
-    out[0] = a[0], out[1] = a[1], out[2] = b[0], out[3] = b[1];
-  }
-}
-
-// Which of the four vertices p, a, b lead from and to.
-template <Kind kind>
-struct Ends;
-template <>
-struct Ends<Kind::vertex_face> {
-  static constexpr int from[3] = {1, 1, 1}, to[3] = {0, 2, 3};
-};
-template <>
-struct Ends<Kind::edge_edge> {
-  static constexpr int from[3] = {0, 0, 2}, to[3] = {2, 1, 3};
-};
-
 // x y z at t = 0 and at t = 1 of one of p, a, b in all lanes.
 struct Columns {
   Vec3<Double> t0, t1;
@@ -92,15 +68,16 @@ HPCCD_HD Columns turn(const Row r[1]) { return r[0]; }
 
 template <Kind kind>
 HPCCD_HD Motion<Double> load(const Geometry& g, const std::uint32_t* first, const std::uint32_t* second, Double*) {
-  Row rows[3][double_width];
+  using S = Spans<kind>;
+  Row p[double_width], a[double_width], b[double_width];
   for (int lane = 0; lane < double_width; ++lane) {
     std::uint32_t v[4];
-    vertex_indices<kind>(g, first[lane], second[lane], v);
-    for (int i = 0; i < 3; ++i)
-      rows[i][lane] = difference(g.vertices[v[Ends<kind>::to[i]]], g.vertices[v[Ends<kind>::from[i]]]);
+    pair_vertices<kind>(g, first[lane], second[lane], v);
+    const auto span = [&](int to, int from) { return difference(g.vertices[v[to]], g.vertices[v[from]]); };
+    p[lane] = span(S::p_to, S::p_from), a[lane] = span(S::a_to, S::a_from), b[lane] = span(S::b_to, S::b_from);
   }
-  const Columns p = turn(rows[0]), a = turn(rows[1]), b = turn(rows[2]);
-  return {p.t0, a.t0, b.t0, p.t1, a.t1, b.t1};
+  const Columns p_lanes = turn(p), a_lanes = turn(a), b_lanes = turn(b);
+  return {p_lanes.t0, a_lanes.t0, b_lanes.t0, p_lanes.t1, a_lanes.t1, b_lanes.t1};
 }
 
 // In single precision: differences are taken in double precision and brought to about one by the scene's scale first.

@@ -69,7 +69,7 @@ HPCCD_HD std::uint32_t near_pairs(const Geometry& g, const std::uint32_t* first,
   std::uint32_t count = 0;
   for (std::uint32_t i = 0; i < n; ++i) {
     std::uint32_t v[4];
-    vertex_indices<kind>(g, first[i], second[i], v);
+    pair_vertices<kind>(g, first[i], second[i], v);
     const auto at = [&](int k) { return slabs_at(g.slabs, v[k]); };
     near[count] = i;  // kept only if counted
     if constexpr (kind == Kind::vertex_face)

@@ -8,6 +8,7 @@
 #include "base/simd.h"
 #include "elementary/batch.h"
 #include "elementary/last_resort.h"
+#include "elementary/policy.h"
 
 namespace hpccd {
 namespace {
@@ -59,7 +60,7 @@ void test_queries(Kind kind, std::span<const Query> queries, const Options& opti
     for (std::uint32_t i = 0; i < result->n_contacts; ++i) {
       const std::size_t at = begin + result->contact[i];
       hit[at] = true;
-      toc[at] = accuracy == Accuracy::conservative ? std::max(0.0, result->toc[i] - result->delta[i]) : result->toc[i];
+      toc[at] = reported_time(accuracy, result->toc[i], result->delta[i]);
     }
     for (std::uint32_t i = 0; i < result->n_undecided; ++i) {
       const std::size_t at = begin + result->undecided[i];

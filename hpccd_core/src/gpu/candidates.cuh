@@ -107,6 +107,10 @@ __device__ void flush_survivors(const Frame<T>& f, CandidateSpace& s, u32 kind, 
 }
 
 // The first filter on the last up to 32 candidates. One piece of code for both kinds: they differ in where b starts.
+static_assert(Spans<Kind::vertex_face>::p_from == Spans<Kind::vertex_face>::a_from &&
+              Spans<Kind::vertex_face>::p_from == Spans<Kind::vertex_face>::b_from);
+static_assert(Spans<Kind::edge_edge>::p_from == Spans<Kind::edge_edge>::a_from &&
+              Spans<Kind::edge_edge>::p_to == Spans<Kind::edge_edge>::b_from);
 template <class T>
 __device__ __forceinline__ void filter_candidates(const Frame<T>& f, CandidateSpace& s, CandidateState& state) {
   __syncwarp();

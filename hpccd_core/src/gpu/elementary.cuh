@@ -67,8 +67,7 @@ __global__ __launch_bounds__(128) void roots_kernel(const __grid_constant__ Fram
       const Outcome<double> o = single ? single_root_test<kind, Proven>(m) : many_roots_test<kind, Proven>(m);
       contact = o.contact;
       undecided = !o.contact && !o.none;
-      // "conservative" promises never to be late.
-      toc = accuracy_of(f, v) == Accuracy::conservative ? greater(o.toc - o.delta, 0.0) : o.toc;
+      toc = reported_time(accuracy_of(f, v), o.toc, o.delta);
     }
     append_found(f, kind, contact, pair, toc);
     const u64 at = warp_append(&f.counters->undecided, undecided);

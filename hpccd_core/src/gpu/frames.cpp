@@ -104,10 +104,8 @@ Contacts Frames::frame(Positions t0, Positions t1, const Build& build, Profiler&
         Pipeline::create(scene_, features_, options_.accuracy, status().devices.at(0).number, stages && *stages);
     profiler.mark("gpu_start");
   }
-  // As on the CPU: refitting that has lost a third of the culling costs more than a build.
-  constexpr double worn_out = 1.5;
   if (area_when_built_ == 0) area_when_built_ = pipeline_->relative_area();  // as the device measures it
-  if (!has_tree_ || pipeline_->relative_area() > worn_out * area_when_built_) {
+  if (!has_tree_ || worn_out(pipeline_->relative_area(), area_when_built_)) {
     const Tree& tree = build(on_host(t0, 0), on_host(t1, 1));
     pipeline_->set_tree(tree);
     area_when_built_ = 0;  // known when the device has refitted it
@@ -129,13 +127,7 @@ Contacts Frames::frame(Positions t0, Positions t1, const Build& build, Profiler&
     for (std::size_t i = begin; i < end; ++i) {
       const Candidate& u = undecided[i];
       std::uint32_t v[4];
-      if (u.kind == Kind::vertex_face) {
-        const auto& f = features_.faces[u.second];
-        v[0] = u.first, v[1] = f[0], v[2] = f[1], v[3] = f[2];
-      } else {
-        const auto &a = features_.edges[u.first], &b = features_.edges[u.second];
-        v[0] = a[0], v[1] = a[1], v[2] = b[0], v[3] = b[1];
-      }
+      pair_vertices({nullptr, features_.edges.data(), features_.faces.data()}, u.kind, u.first, u.second, v);
       Vec3<double> q0[4], q1[4];
       for (int k = 0; k < 4; ++k) q0[k] = position(h0, v[k]), q1[k] = position(h1, v[k]);
       LastResortCounts counts;

@@ -8,24 +8,6 @@
 #include "base/pause.h"
 
 namespace hpccd::hybrid {
-namespace {
-
-// Active waiting at first; where that takes long, the core is left to others, who may have the work that is waited for.
-class Patience {
- public:
-  void wait() {
-    if (++turns_ < 2000)
-      pause();
-    else
-      std::this_thread::yield();
-  }
-  void reset() { turns_ = 0; }
-
- private:
-  int turns_ = 0;
-};
-
-}  // namespace
 
 Communication::Communication(Devices& devices, TriangleIndexQueue& queue, std::vector<SegmentSupply>& supplies)
     : devices_(devices), queue_(queue), supplies_(supplies), under_way_(devices.size(), 0) {
@@ -76,7 +58,7 @@ void Communication::cancel() {
 }
 
 void Communication::wait_until_idle() {
-  for (Patience patience; stage_.load(std::memory_order_acquire) != Stage::idle;) patience.wait();
+  for (ActiveWait wait; stage_.load(std::memory_order_acquire) != Stage::idle;) wait.turn();
 }
 
 void Communication::work() {
@@ -99,7 +81,7 @@ void Communication::work() {
       queued_ = 0;
     }
     // The frame goes on without this thread until the caller knows.
-    for (Patience patience; stage_ != Stage::draining && stage_ != Stage::canceled;) patience.wait();
+    for (ActiveWait wait; stage_ != Stage::draining && stage_ != Stage::canceled;) wait.turn();
     stage_.store(Stage::idle, std::memory_order_release);
   }
 }
@@ -109,16 +91,16 @@ void Communication::frame() {
   wait_for_traversal();
   if (stage_ == Stage::canceled) return;
   for (auto& device : devices_) device->begin_traversal(leaves_);
-  Patience patience;
+  ActiveWait wait;
   for (std::size_t turns_without = 0;;) {
     // Looked at first: what comes to light afterwards in a whole round of the window was full before.
     const Stage stage = stage_.load(std::memory_order_acquire);
     if (stage == Stage::canceled) return;
     const bool sent = send(stage == Stage::draining), taken = collect_ready(), handed = hand_out();
     if (sent || taken || handed)
-      turns_without = 0, patience.reset();
+      turns_without = 0, wait.reset();
     else
-      ++turns_without, patience.wait();
+      ++turns_without, wait.turn();
     if (stage != Stage::draining) turns_without = 0;
     const std::size_t round = queue_.size() / queue_.window() + 1;
     if (elements_.empty() && turns_without > round) return;
@@ -127,8 +109,8 @@ void Communication::frame() {
 
 void Communication::wait_for_traversal() {
   // Threads ask for segments before the traversal begins, and each gets its two.
-  for (Patience patience; stage_ == Stage::positions;)
-    if (!hand_out()) patience.wait();
+  for (ActiveWait wait; stage_ == Stage::positions;)
+    if (!hand_out()) wait.turn();
 }
 
 std::size_t Communication::Element::segments() const {

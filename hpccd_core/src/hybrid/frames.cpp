@@ -41,7 +41,8 @@ std::unique_ptr<FrameGuard> Frames::begin(Positions t0, Positions t1, std::vecto
                                           Profiler& profiler) {
   if (!engine_) try {
       const Sizes sizes{options_.hybrid_segments, options_.hybrid_segment_pairs};
-      engine_ = std::make_unique<Engine>(cuda_devices(scene_, features_, options_.accuracy, options_.gpus), sizes, pool_);
+      engine_ =
+          std::make_unique<Engine>(cuda_devices(scene_, features_, options_.accuracy, options_.gpus), sizes, pool_);
       profiler.mark("gpu_start");
     } catch (const gpu::Error& e) {
       note_failure(e.what());

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "paper/carrier_pairs.h"
 
+#include "bvh/carrier_box.h"
+
 namespace hpccd::paper {
 namespace {
 
@@ -51,13 +53,6 @@ void vertex_face_pairs(const Features& features, const std::vector<Box>& vertex_
   }
 }
 
-Box box_of_carrier(const Features& features, const std::vector<Box>& vertex_boxes, std::uint32_t c) {
-  if (c >= features.n_faces()) return vertex_boxes[features.lone_vertices[c - features.n_faces()]];
-  Box box;
-  for (const std::uint32_t v : features.faces[c]) box.include(vertex_boxes[v]);
-  return box;
-}
-
 }  // namespace
 
 void carrier_pairs(const Features& features, const std::vector<Box>& vertex_boxes, BoundedCarrier a, BoundedCarrier b,
@@ -78,8 +73,8 @@ void test_carriers(const Features& features, const PairRules& rules, const std::
 
 void test_carriers(const Features& features, const PairRules& rules, const std::vector<Box>& vertex_boxes,
                    LeafPair carriers, Worker& worker) {
-  const Box a = box_of_carrier(features, vertex_boxes, carriers.first),
-            b = box_of_carrier(features, vertex_boxes, carriers.second);
+  const Box a = carrier_box(features, vertex_boxes, carriers.first),
+            b = carrier_box(features, vertex_boxes, carriers.second);
   test_carriers(features, rules, vertex_boxes, {carriers.first, a}, {carriers.second, b}, worker);
 }
 

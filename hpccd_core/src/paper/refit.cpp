@@ -1,19 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "paper/refit.h"
 
+#include "bvh/carrier_box.h"
 #include "paper/breadth_first.h"
 
 namespace hpccd::paper {
 namespace {
-
-Box carrier_box(std::uint32_t c, const Features& features, const std::vector<Box>& vertex_boxes) {
-  if (c >= features.n_faces()) return vertex_boxes[features.lone_vertices[c - features.n_faces()]];
-  const auto& corners = features.faces[c];
-  Box b = vertex_boxes[corners[0]];
-  b.include(vertex_boxes[corners[1]]);
-  b.include(vertex_boxes[corners[2]]);
-  return b;
-}
 
 class Refit {
  public:
@@ -41,7 +33,7 @@ class Refit {
     node.box = {};
     for (std::uint32_t i = node.begin; i < node.begin + node.count; ++i) {
       const std::uint32_t c = h_.order[i];
-      h_.carrier_boxes[c] = carrier_box(c, features_, vertex_boxes_);
+      h_.carrier_boxes[c] = carrier_box(features_, vertex_boxes_, c);
       node.box.include(h_.carrier_boxes[c]);
     }
   }
@@ -69,7 +61,7 @@ void bound_carriers(Hierarchy& h, const Features& features, const std::vector<Bo
   resize(h.carrier_boxes, features.n_carriers(), pool.cancellation());
   parallel_for(pool, features.n_carriers(), 4096, [&](std::size_t begin, std::size_t end, int) {
     for (std::size_t c = begin; c < end; ++c)
-      h.carrier_boxes[c] = carrier_box(static_cast<std::uint32_t>(c), features, vertex_boxes);
+      h.carrier_boxes[c] = carrier_box(features, vertex_boxes, static_cast<std::uint32_t>(c));
   });
 }
 

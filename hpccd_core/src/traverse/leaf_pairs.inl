@@ -11,6 +11,13 @@
 namespace hpccd::HPCCD_ISA {
 namespace {
 
+HPCCD_HD constexpr std::uint32_t low(std::uint32_t end, std::uint32_t axis) {
+  return bound_number(end, Side::low, axis);
+}
+HPCCD_HD constexpr std::uint32_t high(std::uint32_t end, std::uint32_t axis) {
+  return bound_number(end, Side::high, axis);
+}
+
 // A box to compare with: its bounds, in the order of a group's rows, each `stride` numbers behind the one before.
 template <std::uint32_t stride>
 struct Bounds {
@@ -28,11 +35,11 @@ HPCCD_HD Bounds<1> bounds_of(const Node& node) { return {node.box.t0.low}; }
 
 // A group in registers, where it stays while it is compared with many boxes.
 struct Group {
-  __m512 rows[BoxGroup::n_rows];
+  __m512 rows[n_bounds];
 };
 HPCCD_HD Group load(const BoxGroup& group) {
   Group g;
-  for (std::uint32_t r = 0; r < BoxGroup::n_rows; ++r) g.rows[r] = _mm512_load_ps(group.rows[r]);
+  for (std::uint32_t r = 0; r < n_bounds; ++r) g.rows[r] = _mm512_load_ps(group.rows[r]);
   return g;
 }
 
@@ -42,10 +49,10 @@ HPCCD_HD unsigned overlapping(const Group& g, Bounds b) {
   const auto bound = [&](std::uint32_t row) { return _mm512_set1_ps(b[row]); };
   __mmask16 apart = 0;
   for (std::uint32_t axis = 0; axis < 3; ++axis) {
-    const __mmask16 below = _mm512_cmp_ps_mask(g.rows[3 + axis], bound(axis), _CMP_LT_OQ);
-    const __mmask16 above = _mm512_cmp_ps_mask(g.rows[axis], bound(3 + axis), _CMP_GT_OQ);
-    apart = _kor_mask16(apart, _mm512_mask_cmp_ps_mask(below, g.rows[9 + axis], bound(6 + axis), _CMP_LT_OQ));
-    apart = _kor_mask16(apart, _mm512_mask_cmp_ps_mask(above, g.rows[6 + axis], bound(9 + axis), _CMP_GT_OQ));
+    const __mmask16 below = _mm512_cmp_ps_mask(g.rows[high(0, axis)], bound(low(0, axis)), _CMP_LT_OQ);
+    const __mmask16 above = _mm512_cmp_ps_mask(g.rows[low(0, axis)], bound(high(0, axis)), _CMP_GT_OQ);
+    apart = _kor_mask16(apart, _mm512_mask_cmp_ps_mask(below, g.rows[high(1, axis)], bound(low(1, axis)), _CMP_LT_OQ));
+    apart = _kor_mask16(apart, _mm512_mask_cmp_ps_mask(above, g.rows[low(1, axis)], bound(high(1, axis)), _CMP_GT_OQ));
   }
   return static_cast<__mmask16>(~apart);
 }
@@ -90,10 +97,11 @@ HPCCD_HD unsigned overlapping(Group g, Bounds b) {
   unsigned bits = 0;
   for (std::uint32_t i = 0; i < BoxGroup::width; i += n) {
     const auto in_order = [&](std::uint32_t axis) {
-      const auto below =
-          both(less(part(g.rows[3 + axis] + i), all(b[axis])), less(part(g.rows[9 + axis] + i), all(b[6 + axis])));
-      const auto above =
-          both(less(all(b[3 + axis]), part(g.rows[axis] + i)), less(all(b[9 + axis]), part(g.rows[6 + axis] + i)));
+      const auto of_group = [&](std::uint32_t row) { return part(g.rows[row] + i); };
+      const auto below = both(less(of_group(high(0, axis)), all(b[low(0, axis)])),
+                              less(of_group(high(1, axis)), all(b[low(1, axis)])));
+      const auto above = both(less(all(b[high(0, axis)]), of_group(low(0, axis))),
+                              less(all(b[high(1, axis)]), of_group(low(1, axis))));
       return either(below, above);
     };
     bits |= lanes_of(either(either(in_order(0), in_order(1)), in_order(2))) << i;

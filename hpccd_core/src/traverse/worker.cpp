@@ -5,6 +5,7 @@
 #include <chrono>
 
 #include "elementary/last_resort.h"
+#include "elementary/policy.h"
 
 namespace hpccd {
 namespace {
@@ -69,8 +70,7 @@ void Worker::test(const std::uint32_t* first, const std::uint32_t* second, std::
   search_->batch_test[static_cast<int>(accuracy)](search_->geometry, kind, first, second, n, r);
   count = r.counts;
   for (std::uint32_t i = 0; i < r.n_contacts; ++i) {
-    // "conservative" promises never to be late.
-    const double toc = accuracy == Accuracy::conservative ? std::max(0.0, r.toc[i] - r.delta[i]) : r.toc[i];
+    const double toc = reported_time(accuracy, r.toc[i], r.delta[i]);
     report(kind, {first[r.contact[i]], second[r.contact[i]], toc});
   }
   for (std::uint32_t i = 0; i < r.n_undecided; ++i)
@@ -82,10 +82,7 @@ void Worker::resolve(const Candidate& candidate, Accuracy accuracy) {
   const auto [a, b, kind] = candidate;
   const Geometry& g = search_->geometry;
   std::uint32_t v[4];
-  if (kind == Kind::vertex_face)
-    v[0] = a, v[1] = g.faces[b][0], v[2] = g.faces[b][1], v[3] = g.faces[b][2];
-  else
-    v[0] = g.edges[a][0], v[1] = g.edges[a][1], v[2] = g.edges[b][0], v[3] = g.edges[b][1];
+  pair_vertices(g, kind, a, b, v);
   Vec3<double> q_t0[4], q_t1[4];
   for (int k = 0; k < 4; ++k) q_t0[k] = vec(g.vertices[v[k]].t0), q_t1[k] = vec(g.vertices[v[k]].t1);
   if (const auto toc = last_resort(accuracy, search_->limits, kind, q_t0, q_t1, last_resorts[kind == Kind::edge_edge]))
