@@ -14,6 +14,7 @@
 #include "contacts/canonical.h"
 #include "gpu/frames.h"
 #include "hybrid/frames.h"
+#include "paper/carrier_pairs.h"
 #include "paper/method.h"
 #include "scene/features.h"
 #include "scene/static_meshes.h"
@@ -197,7 +198,7 @@ struct Detector::Impl {
     if (engine) {
       motion.sweep(pool);
       engine->update(motion.swept, profiler);
-      if (devices) hybrid->traverse_carriers(motion.swept, workers);
+      if (devices) hybrid->traverse_carriers(workers);
       engine->traverse(motion.swept, search, workers);
     } else {
       update_tree(tree_followed);
@@ -209,7 +210,11 @@ struct Detector::Impl {
     for (const Worker& w : workers) elementary += 1e3 * w.elementary_seconds;
     // Tests run inside the traversal; their share of the wall-clock time is their share of the threads' time.
     profiler.mark_split("traverse", "elementary", elementary / pool.size());
-    return devices && hybrid->finish(*devices, workers, profiler) ? Backend::hybrid : Backend::cpu;
+    if (!devices) return Backend::cpu;
+    const auto test = [this](LeafPair p, Worker& worker) {
+      engine ? paper::test_carriers(features, rules, motion.swept, p, worker) : test_leaves(tree, rules, p, worker);
+    };
+    return hybrid->finish(*devices, workers, test, profiler) ? Backend::hybrid : Backend::cpu;
   }
 
   std::map<std::string, std::uint64_t> stats_of_workers() const {

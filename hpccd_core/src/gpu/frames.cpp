@@ -117,7 +117,7 @@ Contacts Frames::frame(Positions t0, Positions t1, const Build& build, Profiler&
     throw Error("the device found bad coordinates where the host finds none");
   }
   profiler.mark("gpu");
-  const std::vector<Undecided>& undecided = pipeline_->undecided();
+  const std::vector<Candidate>& undecided = pipeline_->undecided();
   Positions h0 = t0, h1 = t1;
   if (!undecided.empty() || options_.points || options_.normals) h0 = on_host(t0, 0), h1 = on_host(t1, 1);
   exact_[0].clear(), exact_[1].clear();
@@ -125,7 +125,7 @@ Contacts Frames::frame(Positions t0, Positions t1, const Build& build, Profiler&
   constexpr std::size_t pairs_a_piece = 8;  // about 10 us, as long as it takes to wake a thread
   parallel_for(pool_, undecided.size(), pairs_a_piece, [&](std::size_t begin, std::size_t end, int) {
     for (std::size_t i = begin; i < end; ++i) {
-      const Undecided& u = undecided[i];
+      const Candidate& u = undecided[i];
       std::uint32_t v[4];
       pair_vertices({nullptr, features_.edges.data(), features_.faces.data()}, u.kind, u.first, u.second, v);
       Vec3<double> q0[4], q1[4];
@@ -137,10 +137,7 @@ Contacts Frames::frame(Positions t0, Positions t1, const Build& build, Profiler&
   for (std::size_t i = 0; i < undecided.size(); ++i)
     if (toc[i])
       exact_[undecided[i].kind == Kind::edge_edge].push_back({undecided[i].first, undecided[i].second, *toc[i]});
-  for (auto& list : exact_)
-    std::sort(list.begin(), list.end(), [](const Exact& a, const Exact& b) {
-      return a.first < b.first || (a.first == b.first && a.second < b.second);
-    });
+  for (auto& list : exact_) std::sort(list.begin(), list.end(), before);
   profiler.mark("exact");
   const FrameResult device = pipeline_->finish();
   profiler.mark("gpu_sort");
@@ -152,15 +149,15 @@ Contacts Frames::frame(Positions t0, Positions t1, const Build& build, Profiler&
 Contacts Frames::join(const FrameResult& d, Positions t0, Positions t1) {
   Contacts c;
   std::vector<std::size_t> at_vf, at_ee;
-  for (const Exact& e : exact_[0]) {
+  for (const Contact& e : exact_[0]) {
     const std::array<std::uint32_t, 2> row{e.first, e.second};
     at_vf.push_back(static_cast<std::size_t>(std::lower_bound(d.vf, d.vf + d.n_vf, row) - d.vf));
   }
-  const auto quad = [&](const Exact& e) -> std::array<std::uint32_t, 4> {
+  const auto quad = [&](const Contact& e) -> std::array<std::uint32_t, 4> {
     const auto &a = features_.edges[e.first], &b = features_.edges[e.second];
     return {a[0], a[1], b[0], b[1]};
   };
-  for (const Exact& e : exact_[1])
+  for (const Contact& e : exact_[1])
     at_ee.push_back(static_cast<std::size_t>(std::lower_bound(d.ee, d.ee + d.n_ee, quad(e)) - d.ee));
   double first[2] = {c.first_toc, c.first_toc};
   const auto toc_of = [&](int k) { return [this, k](std::size_t i) { return exact_[k][i].toc; }; };
@@ -194,8 +191,8 @@ Contacts Frames::join(const FrameResult& d, Positions t0, Positions t1) {
     copy(0, 4, 0);
   c.first_toc = std::min(first[0], first[1]);
   c.hash = d.hash;
-  for (const Exact& e : exact_[0]) c.hash += hash_of(Kind::vertex_face, e.first, e.second, e.toc);
-  for (const Exact& e : exact_[1]) {
+  for (const Contact& e : exact_[0]) c.hash += hash_of(Kind::vertex_face, e.first, e.second, e.toc);
+  for (const Contact& e : exact_[1]) {
     const auto q = quad(e);
     c.hash += hash_of(Kind::edge_edge, pack(q[0], q[1]), pack(q[2], q[3]), e.toc);
   }

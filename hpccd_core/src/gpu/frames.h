@@ -47,12 +47,8 @@ class Frames {
   std::unique_ptr<Pipeline> pipeline_;
   bool has_tree_ = false;
   double area_when_built_ = 0;
-  MotionBounds motion_;  // only where points or normals are asked for
-  struct Exact {
-    std::uint32_t first, second;
-    double toc;
-  };
-  std::vector<Exact> exact_[2];
+  MotionBounds motion_;            // only where points or normals are asked for
+  std::vector<Contact> exact_[2];  // by kind: decided by the CPU
   std::uint64_t fallbacks_ = 0;
   int failures_in_a_row_ = 0;
   std::string last_error_;

@@ -43,7 +43,7 @@ class DevicePipeline : public Pipeline {
     check(cudaStreamSynchronize(stream_), "cudaStreamSynchronize");
     return t0.is_double ? run_frame<double>(t0, t1, pool) : run_frame<float>(t0, t1, pool);
   }
-  const std::vector<Undecided>& undecided() const override { return undecided_; }
+  const std::vector<Candidate>& undecided() const override { return undecided_; }
 
   FrameResult finish() override {
     check(cudaStreamSynchronize(stream_), "cudaStreamSynchronize");
@@ -140,7 +140,7 @@ class DevicePipeline : public Pipeline {
   PinnedBuffer<Counters> host_counters_;
 
   u64 passes_ = 0, exact_last_time_ = 0;
-  std::vector<Undecided> undecided_;
+  std::vector<Candidate> undecided_;
   std::vector<unsigned char> downloaded_[2];
 };
 
@@ -341,7 +341,7 @@ bool DevicePipeline::run_frame(Positions t0, Positions t1, ThreadPool& pool) {
   undecided_.reserve(c.to_host);
   const u64 n_to_host = exact_last_time_ = c.to_host;
   launch_results(f);
-  for (u64 i = 0; i < n_to_host; ++i) undecided_.push_back(scene_.pair_of(lists_.to_host()[i]));
+  for (u64 i = 0; i < n_to_host; ++i) undecided_.push_back(scene_.candidate_of(lists_.to_host()[i]));
   return true;
 }
 

@@ -34,7 +34,8 @@ void Communication::begin_frame(Positions t0, Positions t1) {
   t0_ = t0, t1_ = t1;
   failed_ = false;
   error_.clear();
-  output_.found.clear();
+  output_.vertex_face.clear();
+  output_.edge_edge.clear();
   output_.undecided.clear();
   output_.counts[0] = output_.counts[1] = {};
   counts_ = {};
@@ -95,7 +96,7 @@ void Communication::frame() {
     // Looked at first: what comes to light afterwards in a whole round of the window was full before.
     const Stage stage = stage_.load(std::memory_order_acquire);
     if (stage == Stage::canceled) return;
-    const bool sent = send(stage == Stage::draining), taken = take_in(), handed = hand_out();
+    const bool sent = send(stage == Stage::draining), taken = collect_ready(), handed = hand_out();
     if (sent || taken || handed)
       turns_without = 0, wait.reset();
     else
@@ -120,10 +121,10 @@ std::size_t Communication::Element::segments() const {
 
 // One run of consecutive segments, as published. When the traversal has ended, all that is left goes together: segments
 // that were not filled up lie anywhere, and a call for each would be what the frame waits for.
-std::vector<Run> Communication::take_runs(bool all) {
+std::vector<Run> Communication::pop_runs(bool all) {
   std::vector<Run> runs;
   for (std::size_t looks = all ? queue_.size() / queue_.window() + 1 : 1; looks > 0; --looks)
-    while (const auto run = queue_.take_run()) {
+    while (const auto run = queue_.pop_run()) {
       runs.push_back(*run);
       if (!all) break;
     }
@@ -135,7 +136,7 @@ bool Communication::send(bool traversal_has_ended) {
   for (std::size_t i = 0; i < devices_.size(); ++i)
     if (under_way_[i] < devices_[i]->slots() && (best == devices_.size() || under_way_[i] < under_way_[best])) best = i;
   if (best == devices_.size()) return false;
-  std::vector<Run> runs = take_runs(traversal_has_ended);
+  std::vector<Run> runs = pop_runs(traversal_has_ended);
   if (runs.empty()) return false;
   std::vector<Piece> pieces;
   for (const Run& run : runs) pieces.push_back({queue_.pairs(run.first), run.pairs});
@@ -150,7 +151,7 @@ bool Communication::send(bool traversal_has_ended) {
   return true;
 }
 
-bool Communication::take_in() {
+bool Communication::collect_ready() {
   bool any = false;
   for (auto e = elements_.begin(); e != elements_.end();) {
     if (!devices_[e->device]->ready(e->ticket)) {
@@ -171,7 +172,7 @@ bool Communication::hand_out() {
   bool any = false;
   for (SegmentSupply& supply : supplies_)
     while (supply.wanted()) {
-      const auto s = queue_.take_empty();
+      const auto s = queue_.pop_empty();
       if (!s) return any;
       supply.give(*s);
       any = true;

@@ -4,26 +4,22 @@
 #include <algorithm>
 #include <numeric>
 
-#include "bvh/carrier_box.h"
-#include "gpu/hybrid_devices.h"
-#include "paper/carrier_pairs.h"
+#include "gpu/device.h"
+#include "hybrid/devices.h"
 
 namespace hpccd::hybrid {
 namespace {
 
 // The first contact in canonical order, where one is enough: which one does not depend on threads or devices.
 void keep_first(std::vector<Worker>& workers) {
-  const auto before = [](const Found& a, const Found& b) {
-    return a.first < b.first || (a.first == b.first && a.second < b.second);
-  };
-  std::vector<Found> Worker::* const lists[2] = {&Worker::vertex_face, &Worker::edge_edge};
+  std::vector<Contact> Worker::* const lists[2] = {&Worker::vertex_face, &Worker::edge_edge};
   bool have = false;
   for (const auto list : lists) {
-    const Found* best = nullptr;
+    const Contact* best = nullptr;
     for (const Worker& w : workers)
-      for (const Found& f : w.*list)
+      for (const Contact& f : w.*list)
         if (!best || before(f, *best)) best = &f;
-    const std::vector<Found> kept = best && !have ? std::vector<Found>{*best} : std::vector<Found>();
+    const std::vector<Contact> kept = best && !have ? std::vector<Contact>{*best} : std::vector<Contact>();
     have = have || best;
     for (Worker& w : workers) (w.*list).clear();
     workers[0].*list = kept;
@@ -45,8 +41,8 @@ std::unique_ptr<FrameGuard> Frames::begin(Positions t0, Positions t1, std::vecto
                                           Profiler& profiler) {
   if (!engine_) try {
       const Sizes sizes{options_.hybrid_segments, options_.hybrid_segment_pairs};
-      engine_ = std::make_unique<Engine>(gpu::hybrid_devices(scene_, features_, options_.accuracy, options_.gpus),
-                                         sizes, pool_);
+      engine_ =
+          std::make_unique<Engine>(cuda_devices(scene_, features_, options_.accuracy, options_.gpus), sizes, pool_);
       profiler.mark("gpu_start");
     } catch (const gpu::Error& e) {
       note_failure(e.what());
@@ -57,26 +53,14 @@ std::unique_ptr<FrameGuard> Frames::begin(Positions t0, Positions t1, std::vecto
 }
 
 void Frames::traverse(const Tree& tree, std::uint64_t builds, std::vector<Worker>& workers) {
-  const auto test_here = [this, &tree](Worker& worker, IndexPair p) {
-    const auto mesh = [&](std::uint32_t leaf) -> const Node& { return tree.nodes[tree.leaf_nodes[leaf]]; };
-    worker.test_leaf_pair(tree, tree.leaves[p.first], tree.leaves[p.second],
-                          rules_.accuracy(mesh(p.first), mesh(p.second)));
-  };
   engine_->begin_traversal({&tree.leaves, &tree.face_of_slot, &tree.edge_of_slot, &tree.vertex_of_slot, builds},
-                           test_here, workers);
+                           workers);
 }
 
-void Frames::traverse_carriers(const std::vector<Box>& vertex_boxes, std::vector<Worker>& workers) {
+void Frames::traverse_carriers(std::vector<Worker>& workers) {
   if (carriers_.empty()) list_carriers();
-  const auto test_here = [this, &vertex_boxes](Worker& worker, IndexPair p) {
-    const Box a = carrier_box(features_, vertex_boxes, p.first), b = carrier_box(features_, vertex_boxes, p.second);
-    const auto& mesh = features_.mesh_of_carrier;
-    worker.candidates(rules_.accuracy(mesh[p.first], mesh[p.second]), [&](CandidateBuffer& ee, CandidateBuffer& vf) {
-      paper::carrier_pairs(features_, vertex_boxes, {p.first, a}, {p.second, b}, ee, vf);
-    });
-  };
   engine_->begin_traversal({&carriers_, &face_of_carrier_, &features_.owned_edges, &features_.owned_vertices, 1},
-                           test_here, workers);
+                           workers);
 }
 
 void Frames::list_carriers() {
@@ -88,12 +72,18 @@ void Frames::list_carriers() {
                          features_.first_vertex[c + 1]});
 }
 
-bool Frames::finish(FrameGuard& frame, std::vector<Worker>& workers, Profiler& profiler) {
-  const bool complete = frame.finish(profiler);
+bool Frames::finish(FrameGuard& frame, std::vector<Worker>& workers, const Test& test, Profiler& profiler) {
+  const Finished finished = frame.finish(profiler);
+  const bool complete = finished.complete;
   if (complete)
     failures_in_a_row_ = 0;
   else
     note_failure(engine_->error());
+  const auto& pairs = finished.untested;
+  parallel_for(pool_, pairs.size(), 64, [&](std::size_t begin, std::size_t end, int thread) {
+    for (std::size_t i = begin; i < end; ++i) test(pairs[i], workers[thread]);
+  });
+  for (Worker& w : workers) w.flush();
   if (options_.report == Report::any) keep_first(workers);
   return complete;
 }

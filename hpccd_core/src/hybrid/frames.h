@@ -2,6 +2,7 @@
 // Frames of the hybrid backend on this machine's GPUs, beside the detector's own bounds, hierarchy and traversal.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <string>
 
@@ -20,9 +21,10 @@ class Frames {
   std::unique_ptr<FrameGuard> begin(Positions t0, Positions t1, std::vector<Worker>& workers, Profiler& profiler);
   // Workers that walk the tree, or a published method's hierarchy, leave its pairs to the devices.
   void traverse(const Tree& tree, std::uint64_t builds, std::vector<Worker>& workers);
-  void traverse_carriers(const std::vector<Box>& vertex_boxes, std::vector<Worker>& workers);
+  void traverse_carriers(std::vector<Worker>& workers);
   // Afterwards the workers hold all contacts. False: devices failed and the CPU did the rest.
-  bool finish(FrameGuard& frame, std::vector<Worker>& workers, Profiler& profiler);
+  using Test = std::function<void(LeafPair, Worker&)>;
+  bool finish(FrameGuard& frame, std::vector<Worker>& workers, const Test& test, Profiler& profiler);
 
   void count(std::map<std::string, std::uint64_t>& stats) const;
   std::uint64_t fallbacks() const { return fallbacks_; }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "paper/carrier_pairs.h"
 
+#include "bvh/carrier_box.h"
+
 namespace hpccd::paper {
 namespace {
 
@@ -58,6 +60,22 @@ void carrier_pairs(const Features& features, const std::vector<Box>& vertex_boxe
   edge_pairs(features, vertex_boxes, a, b, edge_edge);
   vertex_face_pairs(features, vertex_boxes, a, b, vertex_face);
   vertex_face_pairs(features, vertex_boxes, b, a, vertex_face);
+}
+
+void test_carriers(const Features& features, const PairRules& rules, const std::vector<Box>& vertex_boxes,
+                   BoundedCarrier a, BoundedCarrier b, Worker& worker) {
+  const auto& mesh = features.mesh_of_carrier;
+  worker.test_candidates(rules.accuracy(mesh[a.number], mesh[b.number]),
+                         [&](CandidateBuffer& edge_edge, CandidateBuffer& vertex_face) {
+                           carrier_pairs(features, vertex_boxes, a, b, edge_edge, vertex_face);
+                         });
+}
+
+void test_carriers(const Features& features, const PairRules& rules, const std::vector<Box>& vertex_boxes,
+                   LeafPair carriers, Worker& worker) {
+  const Box a = carrier_box(features, vertex_boxes, carriers.first),
+            b = carrier_box(features, vertex_boxes, carriers.second);
+  test_carriers(features, rules, vertex_boxes, {carriers.first, a}, {carriers.second, b}, worker);
 }
 
 }  // namespace hpccd::paper

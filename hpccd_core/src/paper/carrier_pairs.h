@@ -8,6 +8,8 @@
 #include "bvh/box.h"
 #include "scene/features.h"
 #include "traverse/leaf_pairs.h"
+#include "traverse/tasks.h"
+#include "traverse/worker.h"
 
 namespace hpccd::paper {
 
@@ -20,5 +22,12 @@ struct BoundedCarrier {
 // traverse/leaf_pairs.inl, so that all methods test the same pairs.
 void carrier_pairs(const Features& features, const std::vector<Box>& vertex_boxes, BoundedCarrier a, BoundedCarrier b,
                    CandidateBuffer& edge_edge, CandidateBuffer& vertex_face);
+
+// Their elementary tests, at the accuracy of their meshes.
+void test_carriers(const Features& features, const PairRules& rules, const std::vector<Box>& vertex_boxes,
+                   BoundedCarrier a, BoundedCarrier b, Worker& worker);
+// The same of two carriers by number.
+void test_carriers(const Features& features, const PairRules& rules, const std::vector<Box>& vertex_boxes,
+                   LeafPair carriers, Worker& worker);
 
 }  // namespace hpccd::paper

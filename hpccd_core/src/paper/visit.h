@@ -37,10 +37,11 @@ inline void test_leaves(const Scenery& s, Pair p, Worker& worker) {
   const Node &a = s.hierarchy.nodes[p.a], &b = s.hierarchy.nodes[p.b];
   const std::uint32_t carrier_a = s.hierarchy.order[a.begin], carrier_b = s.hierarchy.order[b.begin];
   ++worker.leaf_pairs;
-  if (worker.sink) return worker.sink->take(carrier_a, carrier_b, worker);
-  worker.candidates(s.rules.accuracy(a.mesh, b.mesh), [&](CandidateBuffer& edge_edge, CandidateBuffer& vertex_face) {
-    carrier_pairs(s.features, s.vertex_boxes, {carrier_a, a.box}, {carrier_b, b.box}, edge_edge, vertex_face);
-  });
+  if (!worker.sink)
+    test_carriers(s.features, s.rules, s.vertex_boxes, {carrier_a, a.box}, {carrier_b, b.box}, worker);
+  else
+    for (const LeafPair left : worker.sink->push({carrier_a, carrier_b}))
+      test_carriers(s.features, s.rules, s.vertex_boxes, left, worker);
 }
 
 // Both nodes give way together, a leaf waits for the other. `examine(node)` comes before a node's children are named:

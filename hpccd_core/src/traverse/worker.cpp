@@ -27,21 +27,6 @@ void Worker::begin(Search& search) {
   if (!result_) result_ = std::make_unique<BatchResult>();
 }
 
-void Worker::leaf_pair(const Tree& tree, const LeafRange& a, const LeafRange& b, Accuracy accuracy) {
-  ++leaf_pairs;
-  const auto number = [&](const LeafRange& leaf) { return static_cast<std::uint32_t>(&leaf - tree.leaves.data()); };
-  if (sink)
-    sink->take(number(a), number(b), *this);
-  else
-    test_leaf_pair(tree, a, b, accuracy);
-}
-
-void Worker::test_leaf_pair(const Tree& tree, const LeafRange& a, const LeafRange& b, Accuracy accuracy) {
-  candidates(accuracy, [&](CandidateBuffer& edge_edge, CandidateBuffer& vertex_face) {
-    search_->leaf_pairs(tree, a, b, edge_edge, vertex_face);
-  });
-}
-
 void Worker::flush() {
   if (sink) sink->flush();
   for (int i = 0; i < 4; ++i)
@@ -52,7 +37,7 @@ void Worker::flush() {
 }
 
 std::size_t Worker::bytes() const {
-  std::size_t b = (vertex_face.capacity() + edge_edge.capacity()) * sizeof(Found) + sizeof(BatchResult);
+  std::size_t b = (vertex_face.capacity() + edge_edge.capacity()) * sizeof(Contact) + sizeof(BatchResult);
   for (const auto& w : waiting_) b += w ? sizeof(Waiting) : 0;
   return b;
 }
@@ -76,7 +61,7 @@ void Worker::drain(CandidateBuffer& buffer, Kind kind, Accuracy accuracy, std::u
 void Worker::test(const std::uint32_t* first, const std::uint32_t* second, std::uint32_t n, Kind kind,
                   Accuracy accuracy) {
   heed_cancellation();
-  std::vector<Found>& found = kind == Kind::vertex_face ? vertex_face : edge_edge;
+  std::vector<Contact>& found = kind == Kind::vertex_face ? vertex_face : edge_edge;
   constexpr std::size_t many = 1 << 16;
   if (found.capacity() - found.size() < n && found.size() >= many) grow(found, *search_->cancellation);
   BatchResult& r = *result_;
@@ -86,31 +71,33 @@ void Worker::test(const std::uint32_t* first, const std::uint32_t* second, std::
   count = r.counts;
   for (std::uint32_t i = 0; i < r.n_contacts; ++i) {
     const double toc = reported_time(accuracy, r.toc[i], r.delta[i]);
-    report(kind, first[r.contact[i]], second[r.contact[i]], toc);
+    report(kind, {first[r.contact[i]], second[r.contact[i]], toc});
   }
   for (std::uint32_t i = 0; i < r.n_undecided; ++i)
-    resolve(kind, first[r.undecided[i]], second[r.undecided[i]], accuracy);
+    resolve({first[r.undecided[i]], second[r.undecided[i]], kind}, accuracy);
 }
 
-void Worker::resolve(Kind kind, std::uint32_t a, std::uint32_t b, Accuracy accuracy) {
+void Worker::resolve(const Candidate& candidate, Accuracy accuracy) {
   heed_cancellation();
+  const auto [a, b, kind] = candidate;
   const Geometry& g = search_->geometry;
   std::uint32_t v[4];
   pair_vertices(g, kind, a, b, v);
   Vec3<double> q_t0[4], q_t1[4];
   for (int k = 0; k < 4; ++k) q_t0[k] = vec(g.vertices[v[k]].t0), q_t1[k] = vec(g.vertices[v[k]].t1);
   if (const auto toc = last_resort(accuracy, search_->limits, kind, q_t0, q_t1, last_resorts[kind == Kind::edge_edge]))
-    report(kind, a, b, *toc);
+    report(kind, {a, b, *toc});
 }
 
-void Worker::report(Kind kind, std::uint32_t first, std::uint32_t second, double toc) {
+void Worker::report(Kind kind, const Contact& contact) {
   if (search_->report == Report::first) {
     double best = search_->earliest.load(std::memory_order_relaxed);
-    if (toc > best + simultaneous) return;
-    while (toc < best && !search_->earliest.compare_exchange_weak(best, toc, std::memory_order_relaxed)) {
+    if (contact.toc > best + simultaneous) return;
+    while (contact.toc < best &&
+           !search_->earliest.compare_exchange_weak(best, contact.toc, std::memory_order_relaxed)) {
     }
   }
-  (kind == Kind::vertex_face ? vertex_face : edge_edge).push_back({first, second, toc});
+  (kind == Kind::vertex_face ? vertex_face : edge_edge).push_back(contact);
 }
 
 }  // namespace hpccd

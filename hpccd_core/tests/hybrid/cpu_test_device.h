@@ -13,7 +13,7 @@
 #include "bvh/motion_bounds.h"
 #include "hybrid/test_device.h"
 #include "scene/features.h"
-#include "traverse/worker.h"
+#include "traverse/traverse.h"
 
 namespace hpccd::test {
 
@@ -26,10 +26,15 @@ struct DeviceFaults {
 
 class CpuTestDevice final : public hybrid::TestDevice {
  public:
-  CpuTestDevice(const Features& features, const Tree& tree, BatchTest test, std::shared_ptr<DeviceFaults> faults)
-      : features_(features), tree_(tree), test_(test), faults_(std::move(faults)), pool_(1), thread_([this] {
-          work();
-        }) {}
+  CpuTestDevice(const Features& features, const PairRules& rules, const Tree& tree, BatchTest test,
+                std::shared_ptr<DeviceFaults> faults)
+      : features_(features),
+        rules_(rules),
+        tree_(tree),
+        test_(test),
+        faults_(std::move(faults)),
+        pool_(1),
+        thread_([this] { work(); }) {}
   ~CpuTestDevice() override {
     {
       std::lock_guard lock(mutex_);
@@ -62,8 +67,9 @@ class CpuTestDevice final : public hybrid::TestDevice {
   void collect(hybrid::Ticket ticket, hybrid::Output& output) override {
     std::lock_guard lock(mutex_);
     const Job& done = job(ticket);
-    output.found.insert(output.found.end(), done.output.found.begin(), done.output.found.end());
-    output.undecided.insert(output.undecided.end(), done.output.undecided.begin(), done.output.undecided.end());
+    append(output.vertex_face, done.output.vertex_face);
+    append(output.edge_edge, done.output.edge_edge);
+    append(output.undecided, done.output.undecided);
     for (int k = 0; k < 2; ++k) output.counts[k].tested += done.output.counts[k].tested;
     std::erase_if(jobs_, [&](const Job& j) { return j.ticket == ticket; });
   }
@@ -75,6 +81,10 @@ class CpuTestDevice final : public hybrid::TestDevice {
   void count(std::map<std::string, std::uint64_t>& stats) const override { stats["test_devices"] += 1; }
 
  private:
+  template <class T>
+  static void append(std::vector<T>& to, const std::vector<T>& more) {
+    to.insert(to.end(), more.begin(), more.end());
+  }
   struct Job {
     hybrid::Ticket ticket;
     std::vector<hybrid::Piece> pieces;
@@ -116,24 +126,23 @@ class CpuTestDevice final : public hybrid::TestDevice {
     Worker worker;
     worker.begin(search);
     for (const hybrid::Piece& piece : job.pieces)
-      for (std::size_t i = 0; i < piece.n; ++i)
-        worker.leaf_pair(tree_, tree_.leaves[piece.pairs[i].first], tree_.leaves[piece.pairs[i].second],
-                         Accuracy::exact);
+      for (std::size_t i = 0; i < piece.n; ++i) test_leaves(tree_, rules_, piece.pairs[i], worker);
     worker.flush();
     hybrid::Output output;
-    for (const Found& f : worker.vertex_face) output.found.push_back({f.first, f.second, Kind::vertex_face, f.toc});
+    output.vertex_face = worker.vertex_face;
     // Some as a device brings them that has no exact arithmetic: the CPU finds the same time for them.
-    for (const Found& f : worker.edge_edge) {
+    for (const Contact& f : worker.edge_edge) {
       if (test_ == all_undecided && f.first % 3 == 0)
         output.undecided.push_back({f.first, f.second, Kind::edge_edge});
       else
-        output.found.push_back({f.first, f.second, Kind::edge_edge, f.toc});
+        output.edge_edge.push_back(f);
     }
     for (int k = 0; k < 2; ++k) output.counts[k] = worker.counts[k];
     return output;
   }
 
   const Features& features_;
+  const PairRules& rules_;
   const Tree& tree_;
   const BatchTest test_;  // of each batch of feature pairs
   std::shared_ptr<DeviceFaults> faults_;

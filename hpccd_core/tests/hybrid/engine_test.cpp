@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // The whole of section 5 on a device that computes on a CPU thread: contacts equal the plain traversal's whatever the
 // number of threads and devices, the size of the queue, lagging or failing devices. Also run under ThreadSanitizer.
+#include "hybrid/engine.h"
+
 #include <gtest/gtest.h>
 
 #include "contacts/canonical.h"
-#include "hybrid/cpu_test_device.h"
 #include "grid_scene.h"
-#include "hybrid/engine.h"
+#include "hybrid/cpu_test_device.h"
 #include "traverse/traverse.h"
 
 namespace hpccd {
@@ -55,17 +56,16 @@ struct Bench {
   Result with(hybrid::Engine& engine, std::uint64_t version = 1) {
     engine.begin_frame(test::view(start), test::view(end));
     hybrid::FrameGuard frame(engine, workers);
-    engine.begin_traversal(
-        {&tree.leaves, &tree.face_of_slot, &tree.edge_of_slot, &tree.vertex_of_slot, version},
-        [this](Worker& worker, hybrid::IndexPair p) {
-          worker.test_leaf_pair(tree, tree.leaves[p.first], tree.leaves[p.second], Accuracy::exact);
-        },
-        workers);
+    engine.begin_traversal({&tree.leaves, &tree.face_of_slot, &tree.edge_of_slot, &tree.vertex_of_slot, version},
+                           workers);
     traverse(tree, rules, search, pool, workers);
     Profiler profiler;
     profiler.begin();
     Result r;
-    r.complete = frame.finish(profiler);
+    const hybrid::Finished finished = frame.finish(profiler);
+    r.complete = finished.complete;
+    for (const LeafPair pair : finished.untested) test_leaves(tree, rules, pair, workers[0]);
+    workers[0].flush();
     engine.count(r.stats);
     r.contacts = collect();
     return r;
@@ -74,7 +74,7 @@ struct Bench {
   hybrid::Communication::Devices devices(std::size_t n) {
     hybrid::Communication::Devices list;
     for (std::size_t i = 0; i < n; ++i)
-      list.push_back(std::make_unique<test::CpuTestDevice>(features, tree, search.batch_test[0], faults));
+      list.push_back(std::make_unique<test::CpuTestDevice>(features, rules, tree, search.batch_test[0], faults));
     return list;
   }
 

@@ -5,18 +5,16 @@
 #include "gpu/bounds.cuh"
 #include "gpu/device_leaves.cuh"
 #include "gpu/device_scene.cuh"
-#include "gpu/hybrid_devices.h"
 #include "gpu/refit.cuh"
 #include "gpu/test_lists.cuh"
+#include "hybrid/devices.h"
 
-namespace hpccd::gpu {
+namespace hpccd::hybrid {
 namespace {
 
-using hybrid::IndexPair;
-using hybrid::Piece;
-using hybrid::Ticket;
+using namespace gpu;
 
-static_assert(sizeof(IndexPair) == sizeof(uint2));
+static_assert(sizeof(LeafPair) == sizeof(uint2));
 
 // What differs between submissions of one slot; in page-locked memory, where the device reads it.
 struct Order {
@@ -75,7 +73,7 @@ struct Slot {
   bool busy = false;
 };
 
-class CudaTestDevice final : public hybrid::TestDevice {
+class CudaTestDevice final : public TestDevice {
  public:
   CudaTestDevice(const Scene& scene, const Features& features, Accuracy accuracy, int device)
       : device_((check(cudaSetDevice(device), "cudaSetDevice"), device)),
@@ -90,8 +88,8 @@ class CudaTestDevice final : public hybrid::TestDevice {
   }
   ~CudaTestDevice() override { cancel(); }
 
-  std::shared_ptr<IndexPair[]> pair_memory(std::size_t n) override {
-    auto memory = std::make_shared<PinnedBuffer<IndexPair>>();
+  std::shared_ptr<LeafPair[]> pair_memory(std::size_t n) override {
+    auto memory = std::make_shared<PinnedBuffer<LeafPair>>();
     memory->reserve(n);
     return {memory, memory->data()};
   }
@@ -101,7 +99,7 @@ class CudaTestDevice final : public hybrid::TestDevice {
     is_double_ ? upload_positions<double>(t0, t1) : upload_positions<float>(t0, t1);
   }
 
-  void begin_traversal(const hybrid::LeafTable& leaves) override {
+  void begin_traversal(const LeafTable& leaves) override {
     check(cudaSetDevice(device_), "cudaSetDevice");
     if (leaves.version != leaves_version_) {
       leaves_version_ = 0;  // none, should this fail
@@ -148,17 +146,15 @@ class CudaTestDevice final : public hybrid::TestDevice {
     return !again;
   }
 
-  void collect(Ticket ticket, hybrid::Output& output) override {
+  void collect(Ticket ticket, Output& output) override {
     Slot& s = slots_[ticket];
     const Counters& c = *s.host_counters.data();
     for (u64 i = 0; i < c.found_all; ++i) {
-      const Undecided p = scene_.pair_of(s.keys.data()[i]);
-      output.found.push_back({p.first, p.second, p.kind, s.tocs.data()[i]});
+      const Candidate p = scene_.candidate_of(s.keys.data()[i]);
+      (p.kind == Kind::vertex_face ? output.vertex_face : output.edge_edge)
+          .push_back({p.first, p.second, s.tocs.data()[i]});
     }
-    for (u64 i = 0; i < c.to_host; ++i) {
-      const Undecided p = scene_.pair_of(s.lists.to_host()[i]);
-      output.undecided.push_back({p.first, p.second, p.kind});
-    }
+    for (u64 i = 0; i < c.to_host; ++i) output.undecided.push_back(scene_.candidate_of(s.lists.to_host()[i]));
     for (int k = 0; k < 2; ++k) {
       BatchCounts& sum = output.counts[k];
       sum.tested += c.candidates[k];
@@ -315,15 +311,15 @@ class CudaTestDevice final : public hybrid::TestDevice {
 
 }  // namespace
 
-std::vector<std::unique_ptr<hybrid::TestDevice>> hybrid_devices(const Scene& scene, const Features& features,
-                                                                Accuracy accuracy, int gpus) {
+std::vector<std::unique_ptr<TestDevice>> cuda_devices(const Scene& scene, const Features& features, Accuracy accuracy,
+                                                      int gpus) {
   const auto& devices = status().devices;
   if (devices.empty()) throw Error(status().reason);
   const std::size_t n = gpus > 0 ? static_cast<std::size_t>(gpus) : devices.size();
-  std::vector<std::unique_ptr<hybrid::TestDevice>> found;
+  std::vector<std::unique_ptr<TestDevice>> found;
   for (std::size_t i = 0; i < std::min(n, devices.size()); ++i)
     found.push_back(std::make_unique<CudaTestDevice>(scene, features, accuracy, devices[i].number));
   return found;
 }
 
-}  // namespace hpccd::gpu
+}  // namespace hpccd::hybrid
