@@ -14,8 +14,8 @@
 #include "contacts/canonical.h"
 #include "gpu/frames.h"
 #include "hybrid/frames.h"
-#include "paper/carrier_pairs.h"
 #include "paper/method.h"
+#include "paper/primitive_pairs.h"
 #include "scene/features.h"
 #include "scene/static_meshes.h"
 #include "traverse/traverse.h"
@@ -131,7 +131,7 @@ struct Detector::Impl {
   std::optional<Contacts> frame_on_gpu(Positions t0, Positions t1) {
     const auto build_tree = [this](Positions a, Positions b) -> const Tree& {
       tree_fits_motion = false;
-      motion.take(*scene, a, b, 0, pool);
+      motion.update(*scene, a, b, 0, pool);
       build_tree_anew();
       tree_fits_motion = true;
       return tree;
@@ -186,10 +186,10 @@ struct Detector::Impl {
     std::unique_ptr<hybrid::FrameGuard> devices;
     if (with_devices) devices = hybrid->begin(t0, t1, workers, profiler);
     const bool tree_followed = std::exchange(tree_fits_motion, false);
-    motion.take(*scene, t0, t1, options.minimum_separation, pool);
+    motion.update(*scene, t0, t1, options.minimum_separation, pool);
     profiler.mark("bounds");
-    search.geometry = {motion.rows.data(), features.edges.data(), features.faces.data(),
-                       options.minimum_separation > 0 ? nullptr : motion.slabs.data(), motion.map.scale};
+    search.geometry = {motion.vertices.data(), features.edges.data(), features.faces.data(),
+                       options.minimum_separation > 0 ? nullptr : motion.kdops.data(), motion.map.scale};
     search.earliest = std::numeric_limits<double>::infinity();
     // Devices find all contacts, and test "fast" as "balanced": then so does the CPU beside them.
     search.report = devices && options.report == Report::any ? Report::all : options.report;
@@ -198,7 +198,7 @@ struct Detector::Impl {
     if (engine) {
       motion.sweep(pool);
       engine->update(motion.swept, profiler);
-      if (devices) hybrid->traverse_carriers(workers);
+      if (devices) hybrid->traverse_primitives(workers);
       engine->traverse(motion.swept, search, workers);
     } else {
       update_tree(tree_followed);
@@ -212,7 +212,7 @@ struct Detector::Impl {
     profiler.mark_split("traverse", "elementary", elementary / pool.size());
     if (!devices) return Backend::cpu;
     const auto test = [this](LeafPair p, Worker& worker) {
-      engine ? paper::test_carriers(features, rules, motion.swept, p, worker) : test_leaves(tree, rules, p, worker);
+      engine ? paper::test_primitives(features, rules, motion.swept, p, worker) : test_leaves(tree, rules, p, worker);
     };
     return hybrid->finish(*devices, workers, test, profiler) ? Backend::hybrid : Backend::cpu;
   }
@@ -228,13 +228,13 @@ struct Detector::Impl {
         const std::string kind = kinds[k];
         const BatchCounts& c = w.counts[k];
         stats[kind + "_candidates"] += c.tested;
-        stats[kind + "_rejected_slabs"] += c.slabs;
+        stats[kind + "_rejected_slabs"] += c.kdop;
         stats[kind + "_rejected_coplanarity"] += c.coplanarity;
         stats[kind + "_rejected_projection"] += c.projection;
         stats[kind + "_rejected_roots"] += c.roots;
         stats[kind + "_proven_contacts"] += c.contacts;
         stats[kind + "_undecided"] += c.undecided;
-        const LastResortCounts& last = w.last_resorts[k];
+        const FallbackCounts& last = w.fallbacks[k];
         stats[kind + "_by_tolerance"] += last.tolerance;
         stats[kind + "_by_integers"] += last.integers;
         stats[kind + "_by_inclusion"] += last.inclusion;

@@ -23,7 +23,7 @@ struct alignas(64) Node {
   std::uint32_t children = 0;  // the left one; the right one follows. 0: a leaf
   std::uint32_t leaf = 0;      // where a leaf: its number
   std::uint32_t mesh = mixed_meshes;
-  std::uint32_t carriers : 31 = 0;    // in the whole subtree
+  std::uint32_t primitives : 31 = 0;  // in the whole subtree
   std::uint32_t only_points : 1 = 0;  // no triangle in the whole subtree, so nothing that another such node could touch
 
   bool overlaps(const Node& other) const;  // as MotionBox::overlaps

@@ -63,7 +63,7 @@ void collect_contacts(std::vector<Worker>& workers, const Geometry& geometry, Re
   for (const Worker& w : workers) n += w.vertex_face.size(), m += w.edge_edge.size();
 
   // New memory comes page by page from the system, which takes as long as the sorting: each array on its own thread.
-  order.take(workers, pool, 6, [&](std::size_t array) {
+  order.distribute(workers, pool, 6, [&](std::size_t array) {
     switch (array) {
       case 0:
         return resize(c.ee, m, cancellation);

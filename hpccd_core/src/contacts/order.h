@@ -14,7 +14,7 @@ class ContactOrder {
  public:
   // Distributes what the workers found. `meanwhile(i)`, for each i < n_meanwhile, runs beside it.
   template <class Job>
-  void take(const std::vector<Worker>& workers, ThreadPool& pool, std::size_t n_meanwhile, Job&& meanwhile) {
+  void distribute(const std::vector<Worker>& workers, ThreadPool& pool, std::size_t n_meanwhile, Job&& meanwhile) {
     count(workers, pool);
     parallel_for(pool, lists_.size() + n_meanwhile, 1, [&](std::size_t begin, std::size_t end, int) {
       for (std::size_t i = begin; i < end; ++i)

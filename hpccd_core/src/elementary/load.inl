@@ -3,7 +3,7 @@
 // Subtractions are done a row at a time (both ends of a motion at once), then rows are turned into lanes.
 
 // Both ends: a row of eight.
-HPCCD_HD const double* row_of(const VertexRow& v) { return reinterpret_cast<const double*>(&v); }
+HPCCD_HD const double* row_of(const VertexMotion& v) { return reinterpret_cast<const double*>(&v); }
 
 template <Kind kind>
 HPCCD_HD Motion<Double> load(const Geometry& g, const std::uint32_t* first, const std::uint32_t* second, Double*) {

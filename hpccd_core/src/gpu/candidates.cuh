@@ -5,7 +5,7 @@
 #pragma once
 
 #include "bvh/tree.h"
-#include "elementary/certified.h"
+#include "elementary/filtered_test.h"
 #include "gpu/frame.cuh"
 
 namespace hpccd::gpu {

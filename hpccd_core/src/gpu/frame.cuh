@@ -69,7 +69,7 @@ struct Counters {
   u64 survivors[2], single[2], many[2];                        // of the segment at work
   u64 all_survivors[2], all_single[2], all_many[2], most_survivors, most_single, most_many;  // of all segments
   u64 candidates[2], proven[2], undecided_of[2];
-  u64 found[2];                       // by kind, after the last resort on the device
+  u64 found[2];                       // by kind, after the fallback on the device
   u64 found_all, undecided, to_host;
   u64 hash;
   double area;

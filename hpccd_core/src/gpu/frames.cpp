@@ -7,7 +7,7 @@
 
 #include "contacts/geometry.h"
 #include "contacts/hash.h"
-#include "elementary/last_resort.h"
+#include "elementary/fallback.h"
 #include "traverse/worker.h"
 
 namespace hpccd::gpu {
@@ -113,7 +113,7 @@ Contacts Frames::frame(Positions t0, Positions t1, const Build& build, Profiler&
     profiler.mark("build");
   }
   if (!pipeline_->run(t0, t1, pool_)) {
-    MotionBounds().take(on_host(t0, 0), on_host(t1, 1), 0, pool_);
+    MotionBounds().update(on_host(t0, 0), on_host(t1, 1), 0, pool_);
     throw Error("the device found bad coordinates where the host finds none");
   }
   profiler.mark("gpu");
@@ -130,8 +130,8 @@ Contacts Frames::frame(Positions t0, Positions t1, const Build& build, Profiler&
       pair_vertices({nullptr, features_.edges.data(), features_.faces.data()}, u.kind, u.first, u.second, v);
       Vec3<double> q0[4], q1[4];
       for (int k = 0; k < 4; ++k) q0[k] = position(h0, v[k]), q1[k] = position(h1, v[k]);
-      LastResortCounts counts;
-      toc[i] = last_resort(Accuracy::exact, {}, u.kind, q0, q1, counts);
+      FallbackCounts counts;
+      toc[i] = decide_undecided(Accuracy::exact, {}, u.kind, q0, q1, counts);
     }
   });
   for (std::size_t i = 0; i < undecided.size(); ++i)
@@ -202,8 +202,8 @@ Contacts Frames::join(const FrameResult& d, Positions t0, Positions t1) {
 }
 
 void Frames::add_outputs(Contacts& c, Positions t0, Positions t1) {
-  motion_.take(t0, t1, 0, pool_);
-  const Geometry geometry{motion_.rows.data(), features_.edges.data(), features_.faces.data(), nullptr,
+  motion_.update(t0, t1, 0, pool_);
+  const Geometry geometry{motion_.vertices.data(), features_.edges.data(), features_.faces.data(), nullptr,
                           motion_.map.scale};
   const auto& edges = features_.edges;
   const auto edge_number = [&](std::uint32_t v0, std::uint32_t v1) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Frames on the GPU as a detector sees them: the device's part, the CPU's exact last resort beside it, one result.
+// Frames on the GPU as a detector sees them: the device's part, the CPU's exact fallback beside it, one result.
 // Where the device fails the frame is left to the caller, who finishes it on the CPU.
 #pragma once
 

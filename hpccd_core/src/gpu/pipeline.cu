@@ -94,7 +94,7 @@ class DevicePipeline : public Pipeline {
   std::map<std::string, double> stages() const override { return timer_.stages(); }
 
  private:
-  std::size_t typical_size() const { return std::max<std::size_t>(features_.n_carriers(), 1024); }
+  std::size_t typical_size() const { return std::max<std::size_t>(features_.n_primitives(), 1024); }
   std::size_t device_bytes() const;
   void reserve_found(std::size_t n);
   int settled_device(const void* array);

@@ -38,7 +38,7 @@ class Pipeline {
   // All work up to the undecided pairs; host arrays may be changed by the caller after finish() only.
   // Returns false where a coordinate is not finite or too large.
   virtual bool run(Positions t0, Positions t1, ThreadPool& pool) = 0;
-  // After run(): the pairs left for the exact last resort on the CPU. Sorting goes on meanwhile.
+  // After run(): the pairs left for the exact fallback on the CPU. Sorting goes on meanwhile.
   virtual const std::vector<Candidate>& undecided() const = 0;
   virtual FrameResult finish() = 0;
   // Positions that live on the device, as host arrays.

@@ -5,7 +5,7 @@
 #include <exception>
 #include <utility>
 
-#include "base/pause.h"
+#include "base/active_wait.h"
 
 namespace hpccd::hybrid {
 

@@ -57,19 +57,19 @@ void Frames::traverse(const Tree& tree, std::uint64_t builds, std::vector<Worker
                            workers);
 }
 
-void Frames::traverse_carriers(std::vector<Worker>& workers) {
-  if (carriers_.empty()) list_carriers();
-  engine_->begin_traversal({&carriers_, &face_of_carrier_, &features_.owned_edges, &features_.owned_vertices, 1},
+void Frames::traverse_primitives(std::vector<Worker>& workers) {
+  if (primitives_.empty()) list_primitives();
+  engine_->begin_traversal({&primitives_, &face_of_primitive_, &features_.owned_edges, &features_.owned_vertices, 1},
                            workers);
 }
 
-void Frames::list_carriers() {
-  face_of_carrier_.resize(features_.n_faces());
-  std::iota(face_of_carrier_.begin(), face_of_carrier_.end(), 0u);
-  for (std::uint32_t c = 0; c < features_.n_carriers(); ++c)
-    carriers_.push_back({std::min(c, features_.n_faces()), std::min(c + 1, features_.n_faces()),
-                         features_.first_edge[c], features_.first_edge[c + 1], features_.first_vertex[c],
-                         features_.first_vertex[c + 1]});
+void Frames::list_primitives() {
+  face_of_primitive_.resize(features_.n_faces());
+  std::iota(face_of_primitive_.begin(), face_of_primitive_.end(), 0u);
+  for (std::uint32_t c = 0; c < features_.n_primitives(); ++c)
+    primitives_.push_back({std::min(c, features_.n_faces()), std::min(c + 1, features_.n_faces()),
+                           features_.first_edge[c], features_.first_edge[c + 1], features_.first_vertex[c],
+                           features_.first_vertex[c + 1]});
 }
 
 bool Frames::finish(FrameGuard& frame, std::vector<Worker>& workers, const Test& test, Profiler& profiler) {

@@ -21,7 +21,7 @@ class Frames {
   std::unique_ptr<FrameGuard> begin(Positions t0, Positions t1, std::vector<Worker>& workers, Profiler& profiler);
   // Workers that walk the tree, or a published method's hierarchy, leave its pairs to the devices.
   void traverse(const Tree& tree, std::uint64_t builds, std::vector<Worker>& workers);
-  void traverse_carriers(std::vector<Worker>& workers);
+  void traverse_primitives(std::vector<Worker>& workers);
   // Afterwards the workers hold all contacts. False: devices failed and the CPU did the rest.
   using Test = std::function<void(LeafPair, Worker&)>;
   bool finish(FrameGuard& frame, std::vector<Worker>& workers, const Test& test, Profiler& profiler);
@@ -33,7 +33,7 @@ class Frames {
 
  private:
   void note_failure(const std::string& error);
-  void list_carriers();
+  void list_primitives();
 
   const Scene& scene_;
   const Features& features_;
@@ -41,9 +41,9 @@ class Frames {
   const Options options_;
   ThreadPool& pool_;
   std::unique_ptr<Engine> engine_;
-  // For the published methods: each carrier a leaf of its own.
-  std::vector<LeafRange> carriers_;
-  std::vector<std::uint32_t> face_of_carrier_;
+  // For the published methods: each primitive a leaf of its own.
+  std::vector<LeafRange> primitives_;
+  std::vector<std::uint32_t> face_of_primitive_;
   std::uint64_t fallbacks_ = 0;
   int failures_in_a_row_ = 0;
   std::string last_error_;

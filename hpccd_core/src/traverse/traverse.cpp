@@ -110,7 +110,7 @@ void traverse(const Tree& tree, const PairRules& rules, Search& search, ThreadPo
     };
     while (busy.next(stack, meanwhile))
       walk(tree, rules, *search.cancellation, stack, worker, [&] {
-        if (pairs.wanted()) pairs.give(stack);
+        if (pairs.wanted()) pairs.push_half(stack);
       });
     worker.flush();
   });

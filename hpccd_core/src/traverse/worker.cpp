@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <chrono>
 
-#include "elementary/last_resort.h"
+#include "elementary/fallback.h"
 #include "elementary/policy.h"
 
 namespace hpccd {
@@ -19,7 +19,7 @@ void Worker::begin(Search& search) {
   vertex_face.clear();
   edge_edge.clear();
   counts[0] = counts[1] = {};
-  last_resorts[0] = last_resorts[1] = {};
+  fallbacks[0] = fallbacks[1] = {};
   node_pairs = leaf_pairs = 0;
   elementary_seconds = 0;
   for (auto& w : waiting_)  // what an exception left behind
@@ -85,7 +85,8 @@ void Worker::resolve(const Candidate& candidate, Accuracy accuracy) {
   pair_vertices(g, kind, a, b, v);
   Vec3<double> q_t0[4], q_t1[4];
   for (int k = 0; k < 4; ++k) q_t0[k] = vec(g.vertices[v[k]].t0), q_t1[k] = vec(g.vertices[v[k]].t1);
-  if (const auto toc = last_resort(accuracy, search_->limits, kind, q_t0, q_t1, last_resorts[kind == Kind::edge_edge]))
+  if (const auto toc =
+          decide_undecided(accuracy, search_->limits, kind, q_t0, q_t1, fallbacks[kind == Kind::edge_edge]))
     report(kind, {a, b, *toc});
 }
 

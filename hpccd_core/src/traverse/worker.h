@@ -10,8 +10,8 @@
 
 #include "base/cancellation.h"
 #include "elementary/batch.h"
+#include "elementary/fallback.h"
 #include "elementary/inclusion.h"
-#include "elementary/last_resort.h"
 #include "elementary/pair.h"
 #include "traverse/leaf_pairs.h"
 
@@ -62,16 +62,16 @@ class alignas(128) Worker {
   }
   const Search& search() const { return *search_; }
   void flush();  // tests what waits
-  // The tier's last resort on a pair that nothing else decides, and a contact found elsewhere.
+  // The tier's fallback on a pair that nothing else decides, and a contact found elsewhere.
   void resolve(const Candidate& candidate, Accuracy accuracy);
   void report(Kind kind, const Contact& contact);
-  // Ends the work where that is requested: between any two pairs of nodes, batches and last resorts.
+  // Ends the work where that is requested: between any two pairs of nodes, batches and fallbacks.
   void heed_cancellation() const { search_->cancellation->heed(); }
   std::size_t bytes() const;
 
   std::vector<Contact> vertex_face, edge_edge;
   BatchCounts counts[2];  // vertex-face, edge-edge
-  LastResortCounts last_resorts[2];
+  FallbackCounts fallbacks[2];
   std::uint64_t node_pairs = 0, leaf_pairs = 0;
   double elementary_seconds = 0;
   PairSink* sink = nullptr;   // where pairs of leaves are left to somebody else

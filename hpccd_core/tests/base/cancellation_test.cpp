@@ -55,7 +55,7 @@ TEST(Cancellation, ResizedInPiecesIsResized) {
 
 TEST(Cancellation, OneSortOrSplitHowManyItMaySort) {
   constexpr std::uint32_t n = 1 << 20;
-  std::vector<Placed> set(n), scratch(n);
+  std::vector<Centroid> set(n), scratch(n);
   for (const bool in_one_place : {false, true}) {
     for (std::uint32_t i = 0; i < n; ++i) set[i] = {{in_one_place ? 0 : static_cast<float>(i * 7919u % n), 0, 0}, i};
     Cancellation cancellation;

@@ -13,7 +13,7 @@
 namespace hpccd {
 namespace {
 
-using Set = std::vector<Placed>;
+using Set = std::vector<Centroid>;
 using Numbers = std::vector<std::uint32_t>;
 
 struct Sides {
@@ -31,7 +31,7 @@ Sides sides_of(const Set& set, std::uint32_t left) {
 
 // Sorts all of it along the widest axis.
 Sides sorted_sides(Set set, std::uint32_t left, int widest) {
-  std::sort(set.begin(), set.end(), [widest](const Placed& a, const Placed& b) {
+  std::sort(set.begin(), set.end(), [widest](const Centroid& a, const Centroid& b) {
     return std::pair{a.center[widest], a.number} < std::pair{b.center[widest], b.number};
   });
   return sides_of(set, left);
@@ -76,7 +76,7 @@ TEST(Split, WhereManyLieInOnePlace) {
   for (std::uint32_t i = 2000; i < 2100; ++i) set[i].center[0] = 9;
   for (const std::uint32_t left : {1u, 899u, 900u, 901u, 1500u, 2899u, 2900u, 2999u})
     expect_right_sides(set, left, 0, "heaps");
-  for (Placed& p : set) p = {{2, 2, 2}, p.number};
+  for (Centroid& p : set) p = {{2, 2, 2}, p.number};
   expect_right_sides(set, 1000, 0, "one point");
 }
 
@@ -84,7 +84,8 @@ TEST(Split, AtTheEndsOfFloat) {
   const float largest = std::numeric_limits<float>::max() / 8, smallest = std::numeric_limits<float>::denorm_min();
   for (const float unit : {largest, smallest, 1e-30f}) {
     Set set = random_set(4000, 1, 1);
-    for (Placed& p : set) p = {{unit * static_cast<float>(static_cast<int>(p.number * 7919 % 9) - 4), 0, 0}, p.number};
+    for (Centroid& p : set)
+      p = {{unit * static_cast<float>(static_cast<int>(p.number * 7919 % 9) - 4), 0, 0}, p.number};
     expect_right_sides(set, 777, 0, "in units of " + std::to_string(unit));
   }
 }

@@ -20,7 +20,7 @@ struct Moving {
 };
 
 ContactPoint contact_point_of(Kind kind, const Moving& q, double toc, bool touching) {
-  VertexRow rows[4] = {};
+  VertexMotion rows[4] = {};
   for (int i = 0; i < 4; ++i) {
     const V &x = q.t0[i], &y = q.t1[i];
     rows[i] = {{x.x, x.y, x.z}, {y.x, y.y, y.z}};

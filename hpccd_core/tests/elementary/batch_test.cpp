@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // The filtered tests against exact arithmetic, and the instruction sets against each other, bit for bit.
+#include "elementary/batch.h"
+
 #include <gtest/gtest.h>
 
 #include <cstring>
 #include <random>
 
-#include "elementary/batch.h"
 #include "elementary/exact/contact.h"
-#include "elementary/extended.h"
+#include "elementary/extended_precision.h"
 #include "elementary/inclusion.h"
 #include "hpccd/hpccd.h"
 
@@ -83,8 +84,8 @@ TEST_P(Elementary, HundredAndSixBitsAnswerAsIntegersOrNotAtAll) {
   int contacts = 0, none = 0;
   for (const Query& q : queries()) {
     const Points points(q);
-    const auto a = kind() == Kind::vertex_face ? extended::decide<Kind::vertex_face>(points.t0, points.t1)
-                                               : extended::decide<Kind::edge_edge>(points.t0, points.t1);
+    const auto a = kind() == Kind::vertex_face ? extended_precision::decide<Kind::vertex_face>(points.t0, points.t1)
+                                               : extended_precision::decide<Kind::edge_edge>(points.t0, points.t1);
     contacts += a.contact, none += a.none;
     if (!a.contact && !a.none) continue;
     const auto truth = exact_answer(kind(), q);

@@ -46,7 +46,7 @@ class CpuTestDevice final : public hybrid::TestDevice {
 
   void begin_frame(Positions t0, Positions t1) override {
     if (faults_->fails_at_begin) throw std::runtime_error("asked for: at begin");
-    motion_.take(t0, t1, 0, pool_);
+    motion_.update(t0, t1, 0, pool_);
   }
   void begin_traversal(const hybrid::LeafTable&) override {}
   std::size_t slots() const override { return 4; }
@@ -122,7 +122,8 @@ class CpuTestDevice final : public hybrid::TestDevice {
     for (auto& test : search.batch_test) test = test_;
     search.leaf_pairs = leaf_pairs(Simd::scalar);
     search.report = Report::all;
-    search.geometry = {motion_.rows.data(), features_.edges.data(), features_.faces.data(), nullptr, motion_.map.scale};
+    search.geometry = {motion_.vertices.data(), features_.edges.data(), features_.faces.data(), nullptr,
+                       motion_.map.scale};
     Worker worker;
     worker.begin(search);
     for (const hybrid::Piece& piece : job.pieces)

@@ -30,9 +30,9 @@ struct Bench {
 
   void take(double from, double to) {
     start = test::sheet_positions(side, from), end = test::sheet_positions(side, to);
-    motion.take(*scene, test::view(start), test::view(end), 0, pool);
+    motion.update(*scene, test::view(start), test::view(end), 0, pool);
     build(tree, *scene, features, motion.boxes, pool);
-    search.geometry = {motion.rows.data(), features.edges.data(), features.faces.data(), nullptr, motion.map.scale};
+    search.geometry = {motion.vertices.data(), features.edges.data(), features.faces.data(), nullptr, motion.map.scale};
     search.earliest = std::numeric_limits<double>::infinity();
   }
 

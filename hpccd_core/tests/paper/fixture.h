@@ -27,16 +27,16 @@ struct PaperTest : testing::Test {
   Profiler profiler;
 
   // A step with little motion; between one and the next, pieces have traded places.
-  void take(int step) {
+  void move_to(int step) {
     const auto start = test::swarm_positions(2 * step), end = test::swarm_positions(2 * step + 1);
-    motion.take(test::view(start), test::view(end), 0, pool);
+    motion.update(test::view(start), test::view(end), 0, pool);
     motion.sweep(pool);
   }
 
-  Box box_of(std::uint32_t carrier) const {
-    if (carrier >= features.n_faces()) return motion.swept[features.lone_vertices[carrier - features.n_faces()]];
+  Box box_of(std::uint32_t primitive) const {
+    if (primitive >= features.n_faces()) return motion.swept[features.lone_vertices[primitive - features.n_faces()]];
     Box b;
-    for (std::uint32_t v : features.faces[carrier]) b.include(motion.swept[v]);
+    for (std::uint32_t v : features.faces[primitive]) b.include(motion.swept[v]);
     return b;
   }
 
@@ -44,14 +44,14 @@ struct PaperTest : testing::Test {
     return std::equal(a.low, a.low + 3, b.low) && std::equal(a.high, a.high + 3, b.high);
   }
 
-  // Every carrier in one leaf; children share their node's carriers and nodes between them; boxes are the union of
-  // their carriers' boxes at this step; below a node of one mesh all is of that mesh.
+  // Every primitive in one leaf; children share their node's primitives and nodes between them; boxes are the union of
+  // their primitives' boxes at this step; below a node of one mesh all is of that mesh.
   void expect_valid(const Hierarchy& h) const {
-    ASSERT_EQ(h.nodes.size(), 2 * features.n_carriers() - 1);
-    std::vector<std::uint32_t> carriers = h.order;
-    std::ranges::sort(carriers);
-    for (std::uint32_t c = 0; c < carriers.size(); ++c) ASSERT_EQ(carriers[c], c);
-    ASSERT_EQ(h.nodes[0].count, features.n_carriers());
+    ASSERT_EQ(h.nodes.size(), 2 * features.n_primitives() - 1);
+    std::vector<std::uint32_t> primitives = h.order;
+    std::ranges::sort(primitives);
+    for (std::uint32_t c = 0; c < primitives.size(); ++c) ASSERT_EQ(primitives[c], c);
+    ASSERT_EQ(h.nodes[0].count, features.n_primitives());
     expect_valid(h, 0);
   }
 
@@ -62,9 +62,9 @@ struct PaperTest : testing::Test {
     std::set<std::uint32_t> meshes;
     for (std::uint32_t i = node.begin; i < node.begin + node.count; ++i) {
       const Box b = box_of(h.order[i]);
-      EXPECT_TRUE(same(h.carrier_boxes[h.order[i]], b)) << "carrier " << h.order[i];
+      EXPECT_TRUE(same(h.primitive_boxes[h.order[i]], b)) << "primitive " << h.order[i];
       whole.include(b);
-      meshes.insert(features.mesh_of_carrier[h.order[i]]);
+      meshes.insert(features.mesh_of_primitive[h.order[i]]);
     }
     EXPECT_TRUE(same(node.box, whole)) << "node " << n;
     EXPECT_EQ(node.mesh, meshes.size() == 1 ? *meshes.begin() : mixed_meshes) << "node " << n;

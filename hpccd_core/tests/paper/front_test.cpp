@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "base/simd.h"
 #include "paper/front.h"
-#include "paper/refit.h"
+
+#include "base/simd.h"
 #include "paper/fixture.h"
+#include "paper/refit.h"
 
 namespace hpccd::paper {
 namespace {
@@ -17,7 +18,7 @@ struct FrontTest : PaperTest {
   FrontCounts counts;
 
   void SetUp() override {
-    take(0);
+    move_to(0);
     build(h, features, motion.swept, pool);
     ancestry = Ancestry(h);
     for (int a = 0; a < 4; ++a) search.batch_test[a] = batch_test(Simd::scalar, static_cast<Accuracy>(a));
@@ -27,7 +28,7 @@ struct FrontTest : PaperTest {
   Scenery scenery() const { return {h, features, rules, motion.swept}; }
 
   std::vector<FrontSegment> update(const std::vector<FrontSegment>& front) {
-    search.geometry = {motion.rows.data(), features.edges.data(), features.faces.data(), motion.slabs.data(),
+    search.geometry = {motion.vertices.data(), features.edges.data(), features.faces.data(), motion.kdops.data(),
                        motion.map.scale};
     worker.begin(search);
     const Scenery s = scenery();
@@ -70,7 +71,7 @@ TEST_F(FrontTest, ParentsAreThePairsThatRefinementCameFrom) {
 TEST_F(FrontTest, AKeptFrontIsTheFrontOfATraversalFromTheRoot) {
   std::vector<FrontSegment> front{{{0, 0}}};
   for (int step = 0; step < 10; ++step) {
-    take(step);
+    move_to(step);
     refit(h, features, motion.swept, pool);
     // Cut into pieces of all sizes, so that runs of pairs that climb to one are cut as well.
     std::vector<FrontSegment> cut;

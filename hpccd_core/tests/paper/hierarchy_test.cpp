@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "paper/breadth_first.h"
 #include "paper/hierarchy.h"
-#include "paper/refit.h"
+
+#include "paper/breadth_first.h"
 #include "paper/fixture.h"
+#include "paper/refit.h"
 
 namespace hpccd::paper {
 namespace {
@@ -10,7 +11,7 @@ namespace {
 struct HierarchyTest : PaperTest {
   Hierarchy h;
   void SetUp() override {
-    take(0);
+    move_to(0);
     build(h, features, motion.swept, pool);
   }
 };
@@ -31,25 +32,25 @@ TEST_F(HierarchyTest, SameOnAnyNumberOfThreads) {
 
 TEST_F(HierarchyTest, RefitBoundsTheNewStep) {
   for (int step : {1, 5, 9}) {
-    take(step);
+    move_to(step);
     refit(h, features, motion.swept, pool);
     expect_valid(h);
   }
 }
 
 TEST_F(HierarchyTest, RefitStopsAtNodesThatAreNotSplit) {
-  take(5);
-  bound_carriers(h, features, motion.swept, pool);
+  move_to(5);
+  bound_primitives(h, features, motion.swept, pool);
   const NodeIndex n = h.right(Hierarchy::left(0));
   h.split(n, features);  // the nodes below its children hold what they held before
   ASSERT_FALSE(h.nodes[Hierarchy::left(n)].is_split);
-  take(6);
+  move_to(6);
   refit(h, features, motion.swept, pool);
   expect_valid(h);
 }
 
 TEST_F(HierarchyTest, SplittingTouchesTheSubtreeOnly) {
-  take(5);
+  move_to(5);
   refit(h, features, motion.swept, pool);
   NodeIndex n = 0;
   while (h.nodes[n].mesh == mixed_meshes) n = h.right(n);
@@ -73,7 +74,7 @@ TEST_F(HierarchyTest, FrontHasTheSizeAskedForAndNoParentWithItsChild) {
   for (std::size_t enough : {1u, 3u, 4u, 16u}) {
     const BreadthFirstFront front = breadth_first_front(h, enough, [&](NodeIndex n) { return h.nodes[n].is_split; });
     EXPECT_EQ(front.low.size(), enough);
-    std::vector<int> covered(features.n_carriers());
+    std::vector<int> covered(features.n_primitives());
     for (NodeIndex n : front.low)
       for (std::uint32_t i = h.nodes[n].begin; i < h.nodes[n].begin + h.nodes[n].count; ++i) ++covered[i];
     EXPECT_EQ(std::ranges::count(covered, 1), static_cast<std::ptrdiff_t>(covered.size()));
@@ -85,7 +86,7 @@ TEST_F(HierarchyTest, FrontHasTheSizeAskedForAndNoParentWithItsChild) {
 
 TEST_F(HierarchyTest, FrontEndsAtSingleTriangles) {
   const BreadthFirstFront front = breadth_first_front(h, 1u << 20, [&](NodeIndex n) { return h.nodes[n].is_split; });
-  EXPECT_EQ(front.low.size(), features.n_carriers());
+  EXPECT_EQ(front.low.size(), features.n_primitives());
 }
 
 }  // namespace

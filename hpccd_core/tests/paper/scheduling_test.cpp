@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "paper/scheduling.h"
+
 #include <gtest/gtest.h>
 
 #include <thread>
 
-#include "paper/scheduling.h"
 #include "paper/shared_pairs.h"
 
 namespace hpccd::paper {
@@ -109,9 +110,9 @@ TEST(SharedPairs, HandsTheOlderHalfToWhoWaits) {
   shared.begin(2);
   PairQueue own{{0, 1}, {0, 2}, {0, 3}, {0, 4}}, other;
   EXPECT_FALSE(shared.wanted());
-  std::thread waiting([&] { EXPECT_TRUE(shared.take(other)); });
+  std::thread waiting([&] { EXPECT_TRUE(shared.pop(other)); });
   while (!shared.wanted()) std::this_thread::yield();
-  shared.give(own);
+  shared.push_half(own);
   waiting.join();
   EXPECT_EQ(other, (PairQueue{{0, 1}, {0, 2}}));
   EXPECT_EQ(own, (PairQueue{{0, 3}, {0, 4}}));
@@ -124,7 +125,7 @@ TEST(SharedPairs, EndsWhenAllWaitOrHaveLeft) {
   for (int i = 0; i < 2; ++i)
     threads.emplace_back([&] {
       PairQueue own;
-      EXPECT_FALSE(shared.take(own));
+      EXPECT_FALSE(shared.pop(own));
     });
   shared.leave();
   for (auto& t : threads) t.join();

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "paper/upkeep.h"
+
 #include "paper/fixture.h"
 
 namespace hpccd::paper {
@@ -20,7 +21,7 @@ struct UpkeepTest : PaperTest {
 TEST_F(UpkeepTest, RestructuringWhatATraversalReachesKeepsTheHierarchyValid) {
   Upkeep upkeep(features, true);
   for (int step = 0; step < 12; ++step) {
-    take(step);
+    move_to(step);
     upkeep.begin_step(motion.swept, pool, profiler);
     expect_valid(upkeep.hierarchy());
     // Another half of the hierarchy in each step: the other stays as it is, split or not.
@@ -38,7 +39,7 @@ TEST_F(UpkeepTest, ARestructuredNodeHasChildrenThatAreSplitWhenNeeded) {
   Upkeep upkeep(features, true);
   const Hierarchy& h = upkeep.hierarchy();
   for (int step = 0; step < 12; ++step) {
-    take(step);
+    move_to(step);
     upkeep.begin_step(motion.swept, pool, profiler);
     examine_below(h, 0, [&](NodeIndex n) {
       const UpkeepCounts before = counts;
@@ -55,7 +56,7 @@ TEST_F(UpkeepTest, ARestructuredNodeHasChildrenThatAreSplitWhenNeeded) {
 TEST_F(UpkeepTest, ANodeIsExaminedOnceAStep) {
   Upkeep upkeep(features, true);
   for (int step = 0; step < 12; ++step) {
-    take(step);
+    move_to(step);
     upkeep.begin_step(motion.swept, pool, profiler);
     const auto all = [&] { examine_below(upkeep.hierarchy(), 0, [&](NodeIndex n) { upkeep.examine(n, counts); }); };
     all();
@@ -71,12 +72,12 @@ TEST_F(UpkeepTest, ANodeIsExaminedOnceAStep) {
 
 TEST_F(UpkeepTest, WithoutRestructuringTheOrderStays) {
   Upkeep upkeep(features, false);
-  take(0);
+  move_to(0);
   upkeep.begin_step(motion.swept, pool, profiler);
   upkeep.end_step();
   const std::vector<std::uint32_t> order = upkeep.hierarchy().order;
   for (int step = 1; step < 12; ++step) {
-    take(step);
+    move_to(step);
     upkeep.begin_step(motion.swept, pool, profiler);
     examine_below(upkeep.hierarchy(), 0, [&](NodeIndex n) { upkeep.examine(n, counts); });
     upkeep.end_step();
@@ -90,7 +91,7 @@ TEST_F(UpkeepTest, RestructuringMendsTheCulling) {
   for (const bool restructure : {true, false}) {
     Upkeep upkeep(features, restructure);
     for (int step = 0; step < 12; ++step) {
-      take(step);
+      move_to(step);
       upkeep.begin_step(motion.swept, pool, profiler);
       examine_below(upkeep.hierarchy(), 0, [&](NodeIndex n) { upkeep.examine(n, counts); });
       upkeep.end_step();
@@ -104,7 +105,7 @@ TEST_F(UpkeepTest, RestructuringMendsTheCulling) {
 
 TEST_F(UpkeepTest, AnInterruptedStepIsFollowedByANewHierarchy) {
   Upkeep upkeep(features, true);
-  take(0);
+  move_to(0);
   upkeep.begin_step(motion.swept, pool, profiler);  // no end_step
   Profiler next;
   next.begin();
@@ -118,7 +119,7 @@ TEST_F(UpkeepTest, ThreadsThatMeetAtNodesSeeOneHierarchy) {
   Upkeep upkeep(features, true);
   std::uint64_t restructured = 0;
   for (int step = 0; step < 12; ++step) {
-    take(step);
+    move_to(step);
     upkeep.begin_step(motion.swept, pool, profiler);
     std::vector<UpkeepCounts> counts_of(static_cast<std::size_t>(pool.size()));
     std::vector<std::uint64_t> visited(counts_of.size());
@@ -128,7 +129,7 @@ TEST_F(UpkeepTest, ThreadsThatMeetAtNodesSeeOneHierarchy) {
         ++visited[thread];
       });
     });
-    for (std::uint64_t v : visited) EXPECT_EQ(v, features.n_carriers() - 1);
+    for (std::uint64_t v : visited) EXPECT_EQ(v, features.n_primitives() - 1);
     for (const UpkeepCounts& c : counts_of) restructured += c.restructured;
     expect_valid(upkeep.hierarchy());
     upkeep.end_step();

@@ -30,22 +30,22 @@ TEST(Features, EachFeatureIsRepresentedOnceByATriangleThatHasIt) {
   const auto scene = test::two_sheets(side, lone);
   const Features features = features_of(*scene);
   std::vector<int> edge_owners(features.edges.size()), vertex_owners(scene->n_vertices());
-  for (std::uint32_t carrier = 0; carrier < features.n_carriers(); ++carrier) {
-    const bool is_face = carrier < features.n_faces();
-    for (auto i = features.first_edge[carrier]; i < features.first_edge[carrier + 1]; ++i) {
+  for (std::uint32_t primitive = 0; primitive < features.n_primitives(); ++primitive) {
+    const bool is_face = primitive < features.n_faces();
+    for (auto i = features.first_edge[primitive]; i < features.first_edge[primitive + 1]; ++i) {
       const std::uint32_t edge = features.owned_edges[i];
       ++edge_owners[edge];
       ASSERT_TRUE(is_face);
       for (std::uint32_t end : features.edges[edge])
-        EXPECT_EQ(std::ranges::count(features.faces[carrier], end), 1) << "edge " << edge << ", face " << carrier;
+        EXPECT_EQ(std::ranges::count(features.faces[primitive], end), 1) << "edge " << edge << ", face " << primitive;
     }
-    for (auto i = features.first_vertex[carrier]; i < features.first_vertex[carrier + 1]; ++i) {
+    for (auto i = features.first_vertex[primitive]; i < features.first_vertex[primitive + 1]; ++i) {
       const std::uint32_t vertex = features.owned_vertices[i];
       ++vertex_owners[vertex];
       if (is_face) {
-        EXPECT_EQ(std::ranges::count(features.faces[carrier], vertex), 1);
+        EXPECT_EQ(std::ranges::count(features.faces[primitive], vertex), 1);
       } else {
-        EXPECT_EQ(features.lone_vertices[carrier - features.n_faces()], vertex);
+        EXPECT_EQ(features.lone_vertices[primitive - features.n_faces()], vertex);
       }
     }
   }
@@ -69,7 +69,7 @@ TEST(Features, AreTheSameWithAnyNumberOfThreads) {
       EXPECT_EQ(alone.first_vertex, shared.first_vertex);
       EXPECT_EQ(alone.owned_vertices, shared.owned_vertices);
       EXPECT_EQ(alone.lone_vertices, shared.lone_vertices);
-      EXPECT_EQ(alone.mesh_of_carrier, shared.mesh_of_carrier);
+      EXPECT_EQ(alone.mesh_of_primitive, shared.mesh_of_primitive);
     }
   }
 }

@@ -21,7 +21,7 @@ struct Domain {
 };
 
 // p, a and b along one direction at both ends; within the separation the gap is at most `reach` there.
-struct Row {
+struct Projection {
   double p[2], a[2], b[2], reach;
 };
 
@@ -31,7 +31,7 @@ inline Interval hull(Interval a, Interval b) { return {std::min(a.low, b.low), s
 struct Sides {
   Interval t[2], x[2], y[2];
 
-  Sides(const Row& r, const Domain& d) {
+  Sides(const Projection& r, const Domain& d) {
     Interval edge[2][2];  // by t and x, over y
     for (int i = 0; i < 2; ++i) {
       const double time = i ? d.t.high : d.t.low;
@@ -71,9 +71,9 @@ inline bool clip(Interval& v, const Interval side[2], double reach) {
 }
 
 // The three axes, and three directions along each of which mostly one variable counts at the middle of the step.
-class Rows {
+class GapBounds {
  public:
-  Rows(const Motion<double>& m, double separation) {
+  GapBounds(const Motion<double>& m, double separation) {
     const Magnitudes<double> size = magnitudes(m);
     // Along an axis p, x a and y b carry at most 8 roundings each, their sum 2 more; along other directions 5 more.
     const double reach = separation + 24 * 1.2e-16 * (size.p + size.a + size.b);
@@ -85,10 +85,10 @@ class Rows {
     }
   }
 
-  const Row& axis(int k) const { return row_[k]; }
-  double reach(int k) const { return row_[k].reach; }
+  const Projection& axis(int k) const { return along_[k]; }
+  double reach(int k) const { return along_[k].reach; }
   Interval gap(int k, const Domain& d) const {
-    const Sides s(row_[k], d);
+    const Sides s(along_[k], d);
     return hull(s.t[0], s.t[1]);
   }
 
@@ -97,9 +97,9 @@ class Rows {
     for (;;) {
       const Domain before = d;
       for (int k = 0; k < n_; ++k) {
-        const Sides s(row_[k], d);
-        if (!inclusion::clip(d.t, s.t, row_[k].reach) || !inclusion::clip(d.x, s.x, row_[k].reach) ||
-            !inclusion::clip(d.y, s.y, row_[k].reach))
+        const Sides s(along_[k], d);
+        if (!inclusion::clip(d.t, s.t, along_[k].reach) || !inclusion::clip(d.x, s.x, along_[k].reach) ||
+            !inclusion::clip(d.y, s.y, along_[k].reach))
           return false;
       }
       if (kind == Kind::vertex_face) {
@@ -119,13 +119,13 @@ class Rows {
  private:
   void add(const Motion<double>& m, const Vec3<double>& d, double reach) {
     const double one_norm = std::fabs(d.x) + std::fabs(d.y) + std::fabs(d.z);
-    row_[n_++] = {{dot(d, m.p0), dot(d, m.p1)},
-                  {dot(d, m.a0), dot(d, m.a1)},
-                  {dot(d, m.b0), dot(d, m.b1)},
-                  one_norm * (1 + 1e-15) * reach};
+    along_[n_++] = {{dot(d, m.p0), dot(d, m.p1)},
+                    {dot(d, m.a0), dot(d, m.a1)},
+                    {dot(d, m.b0), dot(d, m.b1)},
+                    one_norm * (1 + 1e-15) * reach};
   }
 
-  Row row_[6];
+  Projection along_[6];
   int n_ = 0;
 };
 

@@ -9,7 +9,7 @@ namespace hpccd {
 
 // With a gap g = p - x a - y b no larger than s along any axis, p . (a x b) = g . (a x b), of which no part of the sum
 // of three exceeds s times 2 |a| |b|. So where the cubic stays beyond 6 s |a| |b|, so do the features.
-HPCCD_HD bool planes_stay_beyond(const Motion<double>& m, const Magnitudes<double>& size, double separation) {
+HPCCD_HD bool planes_stay_separated(const Motion<double>& m, const Magnitudes<double>& size, double separation) {
   if (!in_range(size)) return false;
   const double slack = 6 * (1 + 1e-14) * separation * size.a * size.b;
   return certainly_no_root(coplanarity(m), coplanarity_error(size).coefficient + slack);
@@ -18,7 +18,7 @@ HPCCD_HD bool planes_stay_beyond(const Motion<double>& m, const Magnitudes<doubl
 // The gap along a direction with weights 0, 1 and -1 is linear in time and in the place on each feature, so it stays
 // between its values at the corners; within the separation it is at most as many times that as there are weights.
 template <Kind kind>
-HPCCD_HD bool beyond_along(const Motion<double>& m, double sx, double sy, double sz, double reach) {
+HPCCD_HD bool separated_along(const Motion<double>& m, double sx, double sy, double sz, double reach) {
   double low = INFINITY, high = -INFINITY;
   const auto corner = [&](double gap) { low = lesser(low, gap), high = greater(high, gap); };
   for (int end = 0; end < 2; ++end) {
@@ -39,15 +39,15 @@ HPCCD_HD bool beyond_along(const Motion<double>& m, double sx, double sy, double
 }
 
 template <Kind kind>
-HPCCD_HD bool certainly_beyond(const Motion<double>& m, double separation) {
+HPCCD_HD bool certainly_separated(const Motion<double>& m, double separation) {
   const Magnitudes<double> size = magnitudes(m);
-  if (planes_stay_beyond(m, size, separation)) return true;
+  if (planes_stay_separated(m, size, separation)) return true;
   // Each gap adds up at most nine coordinates of these sizes, each with at most five roundings.
   const double reach = separation + 20 * 1.2e-16 * (size.p + size.a + size.b);
-  return beyond_along<kind>(m, 1, 1, 0, reach) || beyond_along<kind>(m, 1, -1, 0, reach) ||
-         beyond_along<kind>(m, 0, 1, 1, reach) || beyond_along<kind>(m, 0, 1, -1, reach) ||
-         beyond_along<kind>(m, 1, 0, 1, reach) || beyond_along<kind>(m, -1, 0, 1, reach) ||
-         beyond_along<kind>(m, 1, 1, 1, reach) || beyond_along<kind>(m, 1, -1, -1, reach);
+  return separated_along<kind>(m, 1, 1, 0, reach) || separated_along<kind>(m, 1, -1, 0, reach) ||
+         separated_along<kind>(m, 0, 1, 1, reach) || separated_along<kind>(m, 0, 1, -1, reach) ||
+         separated_along<kind>(m, 1, 0, 1, reach) || separated_along<kind>(m, -1, 0, 1, reach) ||
+         separated_along<kind>(m, 1, 1, 1, reach) || separated_along<kind>(m, 1, -1, -1, reach);
 }
 
 }  // namespace hpccd

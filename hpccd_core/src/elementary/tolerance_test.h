@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// The last resort of the "balanced" tier: what the error bounds could not decide is decided in double precision with
+// The fallback of the "balanced" tier: what the error bounds could not decide is decided in double precision with
 // a relative tolerance. Borders count as inside, motion that is coplanar throughout has a branch of its own.
 #pragma once
 
 #include "elementary/inside.h"
+#include "elementary/kdop_filter.h"
 #include "elementary/roots.h"
-#include "elementary/slabs.h"
 
-namespace hpccd::tolerant {
+namespace hpccd::tolerance_test {
 
 // Relative to the size of the quantity compared. Undecided queries lie within about 1e-12 of a border.
 inline constexpr double tolerance = 1e-11;
@@ -145,4 +145,4 @@ HPCCD_HD Answer contact(const Vec3<double> t0[4], const Vec3<double> t1[4]) {
   return decide<kind>(motion_of<kind>(t0, t1));
 }
 
-}  // namespace hpccd::tolerant
+}  // namespace hpccd::tolerance_test

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #if defined(__linux__)
-#include "base/placement.h"
+#include "base/thread_affinity.h"
 
 #include <gtest/gtest.h>
 #include <pthread.h>
@@ -22,11 +22,11 @@ bool equal(const cpu_set_t& a, const cpu_set_t& b) { return CPU_EQUAL(&a, &b); }
 // report that they were woken.
 class Sleepers : public testing::Test {
  protected:
-  Sleepers() : allowed(allowed_of(pthread_self())), placement(CPU_COUNT(&allowed)) {
+  Sleepers() : allowed(allowed_of(pthread_self())), affinity(CPU_COUNT(&allowed)) {
     for (int i = 1; i < CPU_COUNT(&allowed); ++i)
       threads.emplace_back([this, i] {
         step.wait(0);
-        placement.woken(i);
+        affinity.woken(i);
         ++woken;
         step.wait(1);
       });
@@ -43,13 +43,13 @@ class Sleepers : public testing::Test {
 
   const cpu_set_t allowed;
   std::atomic<int> step{0}, woken{0};
-  Placement placement;
+  ThreadAffinity affinity;
   std::vector<std::thread> threads;
 };
 
 TEST_F(Sleepers, AreBoundToACoreEachUntilTheyRun) {
   if (threads.empty()) GTEST_SKIP() << "one core only";
-  ASSERT_TRUE(placement.place(threads));
+  ASSERT_TRUE(affinity.place(threads));
   std::set<int> cores;
   for (std::thread& t : threads) {
     const cpu_set_t set = allowed_of(t.native_handle());
@@ -70,16 +70,16 @@ TEST_F(Sleepers, AreBoundToACoreEachUntilTheyRun) {
 
 TEST_F(Sleepers, ThatDoNotComeInTimeAreFreedByTheCaller) {
   if (threads.empty()) GTEST_SKIP() << "one core only";
-  ASSERT_TRUE(placement.place(threads));
-  placement.free_late(threads);
+  ASSERT_TRUE(affinity.place(threads));
+  affinity.free_late(threads);
   for (std::thread& t : threads) EXPECT_TRUE(equal(allowed_of(t.native_handle()), allowed));
 }
 
 TEST_F(Sleepers, SeenOnOneCoreAreMovedApart) {
   if (threads.empty()) GTEST_SKIP() << "one core only";
   // Called from here, all report the core of this thread.
-  for (std::size_t i = 1; i <= threads.size(); ++i) placement.awake(static_cast<int>(i));
-  ASSERT_TRUE(placement.place(threads));
+  for (std::size_t i = 1; i <= threads.size(); ++i) affinity.awake(static_cast<int>(i));
+  ASSERT_TRUE(affinity.place(threads));
   int bound = 0;
   for (std::thread& t : threads) {
     const cpu_set_t set = allowed_of(t.native_handle());
@@ -87,7 +87,7 @@ TEST_F(Sleepers, SeenOnOneCoreAreMovedApart) {
   }
   // All; but one where the kernel moved this thread to another core in the meantime.
   EXPECT_GE(bound, static_cast<int>(threads.size()) - 1);
-  placement.free_late(threads);
+  affinity.free_late(threads);
 }
 
 TEST_F(Sleepers, AreLeftAloneWhereTheCoresAreNotAsManyAsThreads) {
@@ -97,7 +97,7 @@ TEST_F(Sleepers, AreLeftAloneWhereTheCoresAreNotAsManyAsThreads) {
   for (int core = 0; CPU_COUNT(&one) == 0; ++core)
     if (CPU_ISSET(core, &allowed)) CPU_SET(core, &one);
   ASSERT_EQ(pthread_setaffinity_np(pthread_self(), sizeof one, &one), 0);
-  EXPECT_FALSE(placement.place(threads));
+  EXPECT_FALSE(affinity.place(threads));
   ASSERT_EQ(pthread_setaffinity_np(pthread_self(), sizeof allowed, &allowed), 0);
   for (std::thread& t : threads) EXPECT_TRUE(equal(allowed_of(t.native_handle()), allowed));
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The certified test once more with 106 bits, on devices, where integers of hundreds of bits are slow: for what double
+// The filtered test once more with 106 bits, on devices, where integers of hundreds of bits are slow: for what double
 // precision leaves undecided. Its times of contact are those of exact arithmetic to the last bit, or it does not
 // answer. What is exactly degenerate stays undecided, but for contact at the very start. On cloth-ball 92->93 it leaves
 // 7 of 1382 pairs, on n-body none of 3561. (On a CPU the integers take 0.4 to 1.5 us a pair on these scenes, this 0.2
@@ -9,9 +9,9 @@
 #include <cstdint>
 
 #include "base/double_double.h"
-#include "elementary/certified.h"
+#include "elementary/filtered_test.h"
 
-namespace hpccd::extended {
+namespace hpccd::extended_precision {
 
 struct Answer {
   bool contact, none;  // neither: undecided
@@ -104,4 +104,4 @@ HPCCD_HD Answer decide(const Vec3<double> q0[4], const Vec3<double> q1[4]) {
   return {true, false, rounded_down(point)};
 }
 
-}  // namespace hpccd::extended
+}  // namespace hpccd::extended_precision

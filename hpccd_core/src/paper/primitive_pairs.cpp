@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "paper/carrier_pairs.h"
+#include "paper/primitive_pairs.h"
 
-#include "bvh/carrier_box.h"
+#include "bvh/primitive_box.h"
 
 namespace hpccd::paper {
 namespace {
@@ -11,7 +11,7 @@ void append(CandidateBuffer& buffer, std::uint32_t first, std::uint32_t second) 
   buffer.second[buffer.n++] = second;
 }
 
-void edge_pairs(const Features& features, const std::vector<Box>& vertex_boxes, BoundedCarrier a, BoundedCarrier b,
+void edge_pairs(const Features& features, const std::vector<Box>& vertex_boxes, BoundedPrimitive a, BoundedPrimitive b,
                 CandidateBuffer& out) {
   struct BoundedEdge {
     std::uint32_t number;
@@ -42,8 +42,8 @@ void edge_pairs(const Features& features, const std::vector<Box>& vertex_boxes, 
   }
 }
 
-void vertex_face_pairs(const Features& features, const std::vector<Box>& vertex_boxes, BoundedCarrier vertices,
-                       BoundedCarrier face, CandidateBuffer& out) {
+void vertex_face_pairs(const Features& features, const std::vector<Box>& vertex_boxes, BoundedPrimitive vertices,
+                       BoundedPrimitive face, CandidateBuffer& out) {
   if (face.number >= features.n_faces()) return;  // a vertex that is in no triangle
   const auto& corners = features.faces[face.number];
   for (auto i = features.first_vertex[vertices.number]; i < features.first_vertex[vertices.number + 1]; ++i) {
@@ -55,27 +55,27 @@ void vertex_face_pairs(const Features& features, const std::vector<Box>& vertex_
 
 }  // namespace
 
-void carrier_pairs(const Features& features, const std::vector<Box>& vertex_boxes, BoundedCarrier a, BoundedCarrier b,
-                   CandidateBuffer& edge_edge, CandidateBuffer& vertex_face) {
+void primitive_pairs(const Features& features, const std::vector<Box>& vertex_boxes, BoundedPrimitive a,
+                     BoundedPrimitive b, CandidateBuffer& edge_edge, CandidateBuffer& vertex_face) {
   edge_pairs(features, vertex_boxes, a, b, edge_edge);
   vertex_face_pairs(features, vertex_boxes, a, b, vertex_face);
   vertex_face_pairs(features, vertex_boxes, b, a, vertex_face);
 }
 
-void test_carriers(const Features& features, const PairRules& rules, const std::vector<Box>& vertex_boxes,
-                   BoundedCarrier a, BoundedCarrier b, Worker& worker) {
-  const auto& mesh = features.mesh_of_carrier;
+void test_primitives(const Features& features, const PairRules& rules, const std::vector<Box>& vertex_boxes,
+                     BoundedPrimitive a, BoundedPrimitive b, Worker& worker) {
+  const auto& mesh = features.mesh_of_primitive;
   worker.test_candidates(rules.accuracy(mesh[a.number], mesh[b.number]),
                          [&](CandidateBuffer& edge_edge, CandidateBuffer& vertex_face) {
-                           carrier_pairs(features, vertex_boxes, a, b, edge_edge, vertex_face);
+                           primitive_pairs(features, vertex_boxes, a, b, edge_edge, vertex_face);
                          });
 }
 
-void test_carriers(const Features& features, const PairRules& rules, const std::vector<Box>& vertex_boxes,
-                   LeafPair carriers, Worker& worker) {
-  const Box a = carrier_box(features, vertex_boxes, carriers.first),
-            b = carrier_box(features, vertex_boxes, carriers.second);
-  test_carriers(features, rules, vertex_boxes, {carriers.first, a}, {carriers.second, b}, worker);
+void test_primitives(const Features& features, const PairRules& rules, const std::vector<Box>& vertex_boxes,
+                     LeafPair primitives, Worker& worker) {
+  const Box a = primitive_box(features, vertex_boxes, primitives.first),
+            b = primitive_box(features, vertex_boxes, primitives.second);
+  test_primitives(features, rules, vertex_boxes, {primitives.first, a}, {primitives.second, b}, worker);
 }
 
 }  // namespace hpccd::paper

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "base/placement.h"
+#include "base/thread_affinity.h"
 
 #if defined(__linux__)
 #include <pthread.h>
@@ -12,25 +12,25 @@ namespace hpccd {
 
 #if defined(__linux__)
 
-void Placement::awake(int thread) {
+void ThreadAffinity::awake(int thread) {
   std::atomic<int>& core = places_[static_cast<std::size_t>(thread)].core;
   // Thread 0 reads it before each job: a store that changes nothing would take the line away from it.
   if (const int now = sched_getcpu(); core.load(std::memory_order_relaxed) != now)
     core.store(now, std::memory_order_relaxed);
 }
 
-void Placement::asleep(int thread) {
+void ThreadAffinity::asleep(int thread) {
   places_[static_cast<std::size_t>(thread)].core.store(Place::none, std::memory_order_relaxed);
 }
 
-void Placement::woken(int thread) {
+void ThreadAffinity::woken(int thread) {
   awake(thread);
   Place& place = places_[static_cast<std::size_t>(thread)];
   std::lock_guard lock(place.lock);
   if (std::exchange(place.bound, false)) pthread_setaffinity_np(pthread_self(), sizeof place.free, &place.free);
 }
 
-bool Placement::find_misplaced(cpu_set_t& used) {
+bool ThreadAffinity::find_misplaced(cpu_set_t& used) {
   bool any = false;
   CPU_ZERO(&used);
   for (Place& p : places_) {
@@ -42,7 +42,7 @@ bool Placement::find_misplaced(cpu_set_t& used) {
   return any;
 }
 
-bool Placement::place(std::vector<std::thread>& others) {
+bool ThreadAffinity::place(std::vector<std::thread>& others) {
   awake(0);
   cpu_set_t used;
   if (!find_misplaced(used)) return false;
@@ -65,7 +65,7 @@ bool Placement::place(std::vector<std::thread>& others) {
   return true;
 }
 
-void Placement::free_late(std::vector<std::thread>& others) {
+void ThreadAffinity::free_late(std::vector<std::thread>& others) {
   for (std::size_t i = 1; i < places_.size(); ++i) {
     Place& place = places_[i];
     std::lock_guard lock(place.lock);
@@ -76,11 +76,11 @@ void Placement::free_late(std::vector<std::thread>& others) {
 
 #else
 
-void Placement::awake(int) {}
-void Placement::asleep(int) {}
-void Placement::woken(int) {}
-bool Placement::place(std::vector<std::thread>&) { return false; }
-void Placement::free_late(std::vector<std::thread>&) {}
+void ThreadAffinity::awake(int) {}
+void ThreadAffinity::asleep(int) {}
+void ThreadAffinity::woken(int) {}
+bool ThreadAffinity::place(std::vector<std::thread>&) { return false; }
+void ThreadAffinity::free_late(std::vector<std::thread>&) {}
 
 #endif
 

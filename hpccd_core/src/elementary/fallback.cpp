@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "elementary/last_resort.h"
+#include "elementary/fallback.h"
 
-#include "elementary/beyond.h"
 #include "elementary/exact/contact.h"
-#include "elementary/tolerant.h"
+#include "elementary/separation_filter.h"
+#include "elementary/tolerance_test.h"
 
 namespace hpccd {
 namespace {
@@ -11,25 +11,25 @@ namespace {
 using Points = const Vec3<double>*;
 
 template <Kind kind>
-std::optional<double> tolerant_contact(Points q_t0, Points q_t1) {
-  const tolerant::Answer a = tolerant::contact<kind>(q_t0, q_t1);
+std::optional<double> tolerance_contact(Points q_t0, Points q_t1) {
+  const tolerance_test::Answer a = tolerance_test::contact<kind>(q_t0, q_t1);
   if (!a.contact) return std::nullopt;
   return a.toc;
 }
 
 template <Kind kind>
 std::optional<double> within_separation(const inclusion::Limits& limits, Points q_t0, Points q_t1,
-                                        LastResortCounts& counts) {
+                                        FallbackCounts& counts) {
   const Motion<double> m = motion_of<kind>(q_t0, q_t1);
-  if (certainly_beyond<kind>(m, limits.separation)) return std::nullopt;
+  if (certainly_separated<kind>(m, limits.separation)) return std::nullopt;
   ++counts.inclusion;
   return inclusion::earliest_within(kind, m, limits);
 }
 
 }  // namespace
 
-std::optional<double> last_resort(Accuracy accuracy, const inclusion::Limits& limits, Kind kind, Points q_t0,
-                                  Points q_t1, LastResortCounts& counts) {
+std::optional<double> decide_undecided(Accuracy accuracy, const inclusion::Limits& limits, Kind kind, Points q_t0,
+                                       Points q_t1, FallbackCounts& counts) {
   if (accuracy == Accuracy::conservative && limits.separation > 0)
     return kind == Kind::vertex_face ? within_separation<Kind::vertex_face>(limits, q_t0, q_t1, counts)
                                      : within_separation<Kind::edge_edge>(limits, q_t0, q_t1, counts);
@@ -39,8 +39,8 @@ std::optional<double> last_resort(Accuracy accuracy, const inclusion::Limits& li
     return exact::earliest_contact(kind, q_t0, q_t1);
   }
   ++counts.tolerance;
-  return kind == Kind::vertex_face ? tolerant_contact<Kind::vertex_face>(q_t0, q_t1)
-                                   : tolerant_contact<Kind::edge_edge>(q_t0, q_t1);
+  return kind == Kind::vertex_face ? tolerance_contact<Kind::vertex_face>(q_t0, q_t1)
+                                   : tolerance_contact<Kind::edge_edge>(q_t0, q_t1);
 }
 
 }  // namespace hpccd

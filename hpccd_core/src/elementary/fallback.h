@@ -12,14 +12,14 @@
 namespace hpccd {
 
 // Who decided, at the end.
-struct LastResortCounts {
+struct FallbackCounts {
   std::uint64_t tolerance = 0;  // "balanced", "fast": double precision with a tolerance
   std::uint64_t integers = 0;   // exact arithmetic
   std::uint64_t inclusion = 0;  // "conservative" with a separation: the search
 };
 
 // q[0..3] as in motion.h; the limits matter to "conservative" only. The time of contact, or nothing.
-std::optional<double> last_resort(Accuracy accuracy, const inclusion::Limits& limits, Kind kind,
-                                  const Vec3<double> q_t0[4], const Vec3<double> q_t1[4], LastResortCounts& counts);
+std::optional<double> decide_undecided(Accuracy accuracy, const inclusion::Limits& limits, Kind kind,
+                                       const Vec3<double> q_t0[4], const Vec3<double> q_t1[4], FallbackCounts& counts);
 
 }  // namespace hpccd

@@ -18,9 +18,9 @@
 namespace hpccd {
 
 // Thread 0 gives out the jobs. Elsewhere than on Linux, and where the system refuses, nothing is done.
-class Placement {
+class ThreadAffinity {
  public:
-  explicit Placement(int threads) : places_(static_cast<std::size_t>(threads)) {}
+  explicit ThreadAffinity(int threads) : places_(static_cast<std::size_t>(threads)) {}
 
   // By a thread: it runs; it goes to sleep; it was woken.
   void awake(int thread);

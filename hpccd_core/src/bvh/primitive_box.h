@@ -8,9 +8,9 @@
 
 namespace hpccd {
 
-// The box of a carrier from its vertices': of the whole sweep (box.h) or at both ends of the motion (motion_box.h).
+// The box of a primitive from its vertices': of the whole sweep (box.h) or at both ends of the motion (motion_box.h).
 template <class AnyBox>
-AnyBox carrier_box(const Features& features, const std::vector<AnyBox>& vertex_boxes, std::uint32_t c) {
+AnyBox primitive_box(const Features& features, const std::vector<AnyBox>& vertex_boxes, std::uint32_t c) {
   if (c >= features.n_faces()) return vertex_boxes[features.lone_vertices[c - features.n_faces()]];
   const auto& corners = features.faces[c];
   AnyBox b = vertex_boxes[corners[0]];
