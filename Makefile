@@ -77,8 +77,9 @@ sanitize: $(ENVIRONMENT) ## C++ tests under AddressSanitizer + UndefinedBehavior
 fuzz: venv ## Compare the core with the exact oracle on random and degenerate queries (FUZZ_ARGS=--help)
 	$(BIN)/python -m hpccd_core.fuzz $(FUZZ_ARGS)
 
-lint: $(ENVIRONMENT) ## Check the style: ruff, clang-format
+lint: $(ENVIRONMENT) ## Check the style and the order of includes: ruff, clang-format, scripts/check_includes.py
 	$(BIN)/ruff check .
+	$(BIN)/python scripts/check_includes.py
 	@git ls-files -z '*.h' '*.cpp' '*.inl' '*.cu' | xargs -0r $(BIN)/clang-format --dry-run --Werror
 
 format: $(ENVIRONMENT) ## Mend the style where a tool can
