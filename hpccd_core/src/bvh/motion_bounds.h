@@ -14,9 +14,6 @@
 
 namespace hpccd {
 
-// Beyond this, differences and squares of coordinates could overflow in the error bounds.
-inline constexpr double largest_coordinate = 1e150;
-
 // A part of the vertices that moves, or rests, as a whole: those of one mesh.
 struct VertexRange {
   std::size_t begin, end;

@@ -8,7 +8,7 @@
 
 namespace hpccd {
 
-// A triangle or a lone vertex by its number, or a whole mesh.
+// Of a primitive, or of a whole mesh, and its number. Times four: only the order matters.
 struct Centroid {
   float center[3];
   std::uint32_t number;

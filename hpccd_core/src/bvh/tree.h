@@ -64,7 +64,7 @@ struct LeafRange {
 
 struct Tree {
   static constexpr std::uint32_t leaf_size = 8;
-  static constexpr std::uint32_t load_width = 16;  // boxes are compared 16 at a time
+  static constexpr std::uint32_t load_width = BoxGroup::width;  // numbers of features are loaded as many at a time
 
   std::vector<Node> nodes;  // breadth first: children come after their parents
   static constexpr std::uint32_t none = 0xFFFFFFFFu;

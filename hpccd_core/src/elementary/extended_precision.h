@@ -41,7 +41,7 @@ HPCCD_HD std::int64_t grid_point(DoubleDouble x) {
   return static_cast<std::int64_t>(whole) + static_cast<std::int64_t>(n) - (below ? 1 : 0);
 }
 
-// m / 2^62 rounded down to a double, as IsolatedRoot::lower.
+// m / 2^62 rounded down to a double: the bits of exact::rounded_down, by what devices have.
 HPCCD_HD double rounded_down(std::int64_t m) {
   double d = static_cast<double>(m);  // to nearest
   if (static_cast<std::int64_t>(d) > m) {

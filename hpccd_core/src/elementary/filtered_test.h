@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The elementary test that knows what it knows: contact, no contact or undecided, each of the first two proven by
+// The elementary test as a floating-point filter: contact, no contact or undecided, each of the first two proven by
 // forward error bounds. Undecided queries go on to the tier's fallback (exact arithmetic, a search, a heuristic).
 #pragma once
 

@@ -3,7 +3,7 @@
 // minima and maxima and two comparisons, and on the published scenes 60 to 85 % of the pairs whose boxes overlap end
 // here. Part of batch.inl.
 
-// Lowest and highest places of some vertices, at t = 0 and then at t = 1.
+// The k-DOP of some vertices, at t = 0 and then at t = 1.
 struct Kdop {
   Floats16 low, high;
 };

@@ -42,9 +42,10 @@ HPCCD_HD bool touches_at(const Motion<double>& m, double t) {
          point_on_segment(p + b, p + b - a);
 }
 
-// Times to try, kept in ascending order; more than there can be are never added.
+// Times to try, kept in ascending order. There are at most 34: two roots of each coordinate of four cross products and
+// of four dot products (add_border_events), and both ends.
 struct Times {
-  static constexpr int capacity = 64;
+  static constexpr int capacity = 34;
   double t[capacity];
   int n = 0;
   HPCCD_HD void add(double x) {

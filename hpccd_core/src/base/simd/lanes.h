@@ -17,8 +17,6 @@ struct LaneMask {
   using Int = std::conditional_t<sizeof(T) == 8, std::int64_t, std::int32_t>;
   typedef Int Vec __attribute__((vector_size(sizeof(T) * W)));
   Vec v;
-  HPCCD_HD friend LaneMask operator&(LaneMask a, LaneMask b) { return {a.v & b.v}; }
-  HPCCD_HD friend LaneMask operator|(LaneMask a, LaneMask b) { return {a.v | b.v}; }
   HPCCD_HD friend LaneMask operator&&(LaneMask a, LaneMask b) { return {a.v & b.v}; }
   HPCCD_HD friend LaneMask operator||(LaneMask a, LaneMask b) { return {a.v | b.v}; }
   HPCCD_HD friend LaneMask operator!(LaneMask a) { return {~a.v}; }
