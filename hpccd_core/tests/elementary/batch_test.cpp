@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // The filtered tests against exact arithmetic, and the instruction sets against each other, bit for bit.
+#include "elementary/batch.h"
+
 #include <gtest/gtest.h>
 
 #include <cstring>
 #include <random>
 
-#include "elementary/batch.h"
 #include "elementary/exact/contact.h"
 #include "elementary/extended.h"
 #include "elementary/inclusion.h"

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "base/simd.h"
 #include "paper/front.h"
-#include "paper/refit.h"
+
+#include "base/simd.h"
 #include "paper/fixture.h"
+#include "paper/refit.h"
 
 namespace hpccd::paper {
 namespace {

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "paper/breadth_first.h"
 #include "paper/hierarchy.h"
-#include "paper/refit.h"
+
+#include "paper/breadth_first.h"
 #include "paper/fixture.h"
+#include "paper/refit.h"
 
 namespace hpccd::paper {
 namespace {

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "paper/scheduling.h"
+
 #include <gtest/gtest.h>
 
 #include <thread>
 
-#include "paper/scheduling.h"
 #include "paper/shared_pairs.h"
 
 namespace hpccd::paper {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "paper/upkeep.h"
+
 #include "paper/fixture.h"
 
 namespace hpccd::paper {
