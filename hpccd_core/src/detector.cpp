@@ -6,9 +6,7 @@
 #include <thread>
 #include <utility>
 
-#include "backends/cpu_backend.h"
-#include "backends/gpu_backend.h"
-#include "backends/hybrid_backend.h"
+#include "backends/available.h"
 #include "backends/tuner.h"
 
 namespace hpccd {
@@ -22,33 +20,19 @@ int pool_threads(const Options& o) {
   return o.threads > cores ? o.threads : cores - 1;
 }
 
-// Whether a detector with these options has this backend. Throws InvalidArgument where it shall, and cannot.
-bool wanted(Backend backend, const char* name, const std::string& unsupported, const Options& o) {
-  const bool usable = !gpu::status().devices.empty();
-  if (o.backend == Backend::automatic) return usable && unsupported.empty();
-  if (o.backend != backend) return false;
-  if (!unsupported.empty()) throw InvalidArgument(unsupported);
-  if (!usable)
-    throw InvalidArgument(std::string("backend: \"") + name + "\" is not usable here: " + gpu::status().reason);
-  return true;
-}
-
 }  // namespace
 
 struct Detector::Impl {
   Impl(std::shared_ptr<const Scene> scene, const Options& options)
-      : shared(std::move(scene), options, pool_threads(options)), cpu(shared) {
-    if (wanted(Backend::gpu, "gpu", GpuBackend::unsupported(options), options)) gpu.emplace(shared);
-    if (wanted(Backend::hybrid, "hybrid", HybridBackend::unsupported(options), options)) hybrid.emplace(shared, cpu);
-  }
+      : shared(std::move(scene), options, pool_threads(options)), backends(shared) {}
 
-  // All that a call changes is one call's at a time, on whatever thread.
-  mutable std::mutex one_call;
+  // All that a call changes is one call's at a time, on whatever thread. Only these two are not:
   std::atomic<Backend> last_backend{Backend::cpu};
+  Cancellation& cancellation() { return shared.cancellation; }
+
+  mutable std::mutex one_call;
   Resources shared;
-  CpuBackend cpu;
-  std::optional<GpuBackend> gpu;
-  std::optional<HybridBackend> hybrid;
+  AvailableBackends backends;
   Tuner tuner;
   // Of the last call. Its other counts stay where they were made until somebody asks.
   struct Numbers {
@@ -56,29 +40,33 @@ struct Detector::Impl {
   };
   std::optional<Numbers> found;
 
-  static bool works(const auto& backend) { return backend && !backend->failures().gave_up(); }
+  void check(Positions t0, Positions t1) const {
+    const std::size_t n = shared.features.n_vertices;
+    if (t0.n != n || t1.n != n)
+      throw InvalidArgument("vertices_t0, vertices_t1: the scene has " + std::to_string(n) + " vertices, but " +
+                            std::to_string(t0.n) + " and " + std::to_string(t1.n) + " were given");
+    if (t0.is_double != t1.is_double)
+      throw InvalidArgument("vertices_t0, vertices_t1: must both be float32 or both be float64");
+    if ((t0.on_device || t1.on_device) && !backends.take_device_arrays())
+      throw InvalidArgument(
+          "vertices_t0, vertices_t1: are in a GPU's memory, which this detector does not use; copy them "
+          "to the host, or use backend=\"gpu\"");
+  }
 
   Backend pick(bool given_on_device) const {
     const Backend asked = shared.options.backend;
-    if (works(gpu) && (asked == Backend::gpu || given_on_device)) return Backend::gpu;
-    if (works(hybrid) && asked == Backend::hybrid) return Backend::hybrid;
-    if (asked != Backend::automatic) return Backend::cpu;
-    std::vector<Backend> usable{Backend::cpu};
-    if (works(gpu)) usable.push_back(Backend::gpu);
-    if (works(hybrid)) usable.push_back(Backend::hybrid);
+    if (backends.works(Backend::gpu) && given_on_device) return Backend::gpu;
+    if (asked != Backend::automatic) return backends.works(asked) ? asked : Backend::cpu;
+    std::vector<Backend> usable;
+    for (const Backend b : {Backend::cpu, Backend::gpu, Backend::hybrid})
+      if (backends.works(b)) usable.push_back(b);
     return tuner.next(usable);
-  }
-
-  DetectionBackend& at(Backend b) {
-    if (b == Backend::gpu) return *gpu;
-    if (b == Backend::hybrid) return *hybrid;
-    return cpu;
   }
 
   Detection compute(Backend picked, Positions t0, Positions t1) {
     for (const Backend b : {picked, Backend::cpu}) {
-      if (gpu && b != Backend::gpu) t0 = gpu->on_host(t0, 0), t1 = gpu->on_host(t1, 1);
-      if (auto detection = at(b).detect(t0, t1)) return std::move(*detection);
+      if (b != Backend::gpu) t0 = backends.on_host(t0, 0), t1 = backends.on_host(t1, 1);
+      if (auto detection = backends.at(b).detect(t0, t1)) return std::move(*detection);
     }
     throw std::logic_error("the CPU has left a step to others");
   }
@@ -101,35 +89,25 @@ Detector::~Detector() = default;
 
 Contacts Detector::detect(Positions t0, Positions t1) {
   Impl& d = *impl_;
-  const std::size_t n = d.shared.features.n_vertices;
-  if (t0.n != n || t1.n != n)
-    throw InvalidArgument("vertices_t0, vertices_t1: the scene has " + std::to_string(n) + " vertices, but " +
-                          std::to_string(t0.n) + " and " + std::to_string(t1.n) + " were given");
-  if (t0.is_double != t1.is_double)
-    throw InvalidArgument("vertices_t0, vertices_t1: must both be float32 or both be float64");
-  const bool on_device = t0.on_device || t1.on_device;
-  if (on_device && !d.gpu)
-    throw InvalidArgument(
-        "vertices_t0, vertices_t1: are in a GPU's memory, which this detector does not use; copy them "
-        "to the host, or use backend=\"gpu\"");
+  d.check(t0, t1);
   const std::lock_guard lock(d.one_call);
-  d.shared.cancellation.heed();
+  d.cancellation().heed();
   d.found.reset();
   std::optional<gpu::CallersDevice> callers;
-  if (d.gpu || d.hybrid) callers.emplace();
+  if (d.backends.use_devices()) callers.emplace();
   d.shared.profiler.begin();
-  const Backend picked = d.pick(on_device);
+  const Backend picked = d.pick(t0.on_device || t1.on_device);
   Detection detection = d.compute(picked, t0, t1);
   d.note(picked, detection);
   return std::move(detection.contacts);
 }
 
-void Detector::cancel() { impl_->shared.cancellation.request(); }
+void Detector::cancel() { impl_->cancellation().request(); }
 
 std::map<std::string, double> Detector::profile() const {
   const std::lock_guard lock(impl_->one_call);
   auto stages = impl_->shared.profiler.stages();
-  impl_->at(impl_->last_backend).add_stages(stages);
+  impl_->backends.at(impl_->last_backend).add_stages(stages);
   return stages;
 }
 
@@ -138,18 +116,11 @@ std::map<std::string, std::uint64_t> Detector::stats() const {
   const Impl& d = *impl_;
   if (!d.found) return {};
   std::map<std::string, std::uint64_t> stats;
-  if (d.last_backend == Backend::gpu) {
-    d.gpu->count(stats);
-  } else {
-    d.cpu.count(stats);
-    if (d.hybrid) d.hybrid->count(stats);
-  }
+  d.backends.count(d.last_backend, stats);
   stats["vf_contacts"] = d.found->vf;
   stats["ee_contacts"] = d.found->ee;
   stats["triangles"] = d.shared.features.n_faces();
   stats["bytes"] += d.shared.tree.bytes() + d.shared.features.bytes();
-  if (d.gpu || d.hybrid)
-    stats["gpu_fallbacks"] = (d.gpu ? d.gpu->failures().count() : 0) + (d.hybrid ? d.hybrid->failures().count() : 0);
   return stats;
 }
 
@@ -158,8 +129,7 @@ Backend Detector::last_backend() const { return impl_->last_backend; }
 
 std::string Detector::last_gpu_error() const {
   const std::lock_guard lock(impl_->one_call);
-  if (impl_->hybrid && !impl_->hybrid->failures().last().empty()) return impl_->hybrid->failures().last();
-  return impl_->gpu ? impl_->gpu->failures().last() : std::string();
+  return impl_->backends.last_error();
 }
 
 }  // namespace hpccd
