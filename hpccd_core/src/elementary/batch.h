@@ -44,6 +44,12 @@ struct BatchCounts {
   std::uint64_t roots = 0;        // rejected at the roots of the cubic
   std::uint64_t contacts = 0;     // proven contacts
   std::uint64_t undecided = 0;    // handed to the tier's fallback
+
+  BatchCounts& operator+=(const BatchCounts& c) {
+    tested += c.tested, kdop += c.kdop, coplanarity += c.coplanarity, projection += c.projection;
+    roots += c.roots, contacts += c.contacts, undecided += c.undecided;
+    return *this;
+  }
 };
 
 struct BatchResult {

@@ -6,12 +6,10 @@
 
 #include "base/hd.h"
 #include "elementary/pair_vertices.h"
+#include "gpu/counters.cuh"
 #include "hpccd/hpccd.h"
 
 namespace hpccd::gpu {
-
-using u32 = std::uint32_t;
-using u64 = unsigned long long;
 
 inline constexpr u32 all_lanes = 0xFFFFFFFFu;
 inline constexpr u32 no_mesh = 0xFFFFFFFFu;
@@ -59,20 +57,6 @@ struct alignas(16) DeviceLeaf {
 struct PairList {
   uint2* pairs;
   u64 capacity;
-};
-
-struct Counters {
-  u64 extent_low[3], extent_high[3];  // largest of the ordered bits, low ones negated: zero is neutral
-  u64 bad;                            // coordinates that are not acceptable
-  u64 node_tests;
-  u64 leaf_pairs, next_leaf_pair;
-  u64 survivors[2], single[2], many[2];                        // of the segment at work
-  u64 all_survivors[2], all_single[2], all_many[2], most_survivors, most_single, most_many;  // of all segments
-  u64 candidates[2], proven[2], undecided_of[2];
-  u64 found[2];                       // by kind, after the fallback on the device
-  u64 found_all, undecided, to_host;
-  u64 hash;
-  double area;
 };
 
 template <class T>

@@ -80,12 +80,7 @@ void Engine::merge(std::vector<Worker>& workers) {
         workers[thread].report(Kind::edge_edge, output.edge_edge[i - n_vf]);
   });
   exact_on_cpu_ = output.undecided.size();
-  for (int k = 0; k < 2; ++k) {
-    BatchCounts& sum = workers[0].counts[k];
-    const BatchCounts& c = output.counts[k];
-    sum.tested += c.tested, sum.coplanarity += c.coplanarity, sum.projection += c.projection;
-    sum.roots += c.roots, sum.contacts += c.contacts, sum.undecided += c.undecided;
-  }
+  for (int k = 0; k < 2; ++k) workers[0].counts[k] += output.counts[k];
 }
 
 void Engine::reset() {

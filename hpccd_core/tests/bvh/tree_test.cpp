@@ -34,7 +34,7 @@ struct Sheets : testing::Test {
   ThreadPool pool{2};
   MotionBounds motion;
 
-  void take(double t0, double t1) {
+  void update(double t0, double t1) {
     const auto start = test::sheet_positions(n, t0, lone), end = test::sheet_positions(n, t1, lone);
     motion.update(test::view(start), test::view(end), 0, pool);
   }
@@ -66,7 +66,7 @@ struct TreeTest : Sheets {
 };
 
 TEST_F(TreeTest, EachFeatureLiesInOneLeaf) {
-  take(0, 0.3);
+  update(0, 0.3);
   build(tree, *scene, features, motion.boxes, pool);
   std::vector<int> faces(features.n_faces()), edges(features.edges.size()), vertices(features.n_vertices);
   for (const LeafRange& leaf : tree.leaves) {
@@ -80,21 +80,21 @@ TEST_F(TreeTest, EachFeatureLiesInOneLeaf) {
 }
 
 TEST_F(TreeTest, BoxesBoundTheMotionAfterBuild) {
-  take(0, 0.3);
+  update(0, 0.3);
   build(tree, *scene, features, motion.boxes, pool);
   expect_bounds();
 }
 
 TEST_F(TreeTest, BoxesBoundTheMotionAfterRefit) {
-  take(0, 0.3);
+  update(0, 0.3);
   build(tree, *scene, features, motion.boxes, pool);
-  take(0.3, 1);
+  update(0.3, 1);
   refit(tree, motion.boxes, {}, pool);
   expect_bounds();
 }
 
 TEST_F(TreeTest, RefitToTheSameMotionChangesNothing) {
-  take(0, 0.3);
+  update(0, 0.3);
   build(tree, *scene, features, motion.boxes, pool);
   const std::vector<Node> built = tree.nodes;
   refit(tree, motion.boxes, {}, pool);
@@ -119,7 +119,7 @@ struct LargeTreeTest : Sheets {
 };
 
 TEST_F(LargeTreeTest, IsBuiltAlikeByAnyNumberOfThreads) {
-  take(0, 0.3);
+  update(0, 0.3);
   Tree alone;
   build(alone, *scene, features, motion.boxes, one);
   for (int threads : {2, 4, 16}) {
@@ -137,14 +137,14 @@ TEST_F(LargeTreeTest, IsBuiltAlikeByAnyNumberOfThreads) {
 
 // Above the front whoever comes second joins the boxes, so many rounds: each would show a box joined too early.
 TEST_F(LargeTreeTest, IsRefittedAlikeByAnyNumberOfThreads) {
-  take(0, 0.1);
+  update(0, 0.1);
   Tree alone, shared;
   build(alone, *scene, features, motion.boxes, one);
   build(shared, *scene, features, motion.boxes, one);
   ASSERT_GT(shared.above_front.size(), 64u);
   for (int round = 0; round < 200; ++round) {
     const double t = 0.005 * (round % 100);
-    take(t, t + 0.1);
+    update(t, t + 0.1);
     refit(alone, motion.boxes, {}, one);
     refit(shared, motion.boxes, {}, four);
     ASSERT_NO_FATAL_FAILURE(expect_equal_boxes(alone, shared, "round " + std::to_string(round)));
@@ -152,12 +152,12 @@ TEST_F(LargeTreeTest, IsRefittedAlikeByAnyNumberOfThreads) {
 }
 
 TEST_F(LargeTreeTest, RefitLeavesOutWhatRestsAndNothingAboveIt) {
-  take(0, 0.1);
+  update(0, 0.1);
   Tree whole, part;
   build(whole, *scene, features, motion.boxes, one);
   build(part, *scene, features, motion.boxes, one);
   const std::vector<MotionBox> before = motion.boxes;
-  take(0.1, 0.2);
+  update(0.1, 0.2);
   std::copy_n(before.begin(), n * n + lone, motion.boxes.begin());  // the first sheet
   refit(whole, motion.boxes, {}, four);
   refit(part, motion.boxes, {1, 0}, four);

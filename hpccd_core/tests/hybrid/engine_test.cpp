@@ -28,7 +28,7 @@ struct Bench {
     search.report = Report::all;
   }
 
-  void take(double from, double to) {
+  void update(double from, double to) {
     start = test::sheet_positions(side, from), end = test::sheet_positions(side, to);
     motion.update(*scene, test::view(start), test::view(end), 0, pool);
     build(tree, *scene, features, motion.boxes, pool);
@@ -102,7 +102,7 @@ void expect_equal(const Contacts& a, const Contacts& b) {
 TEST(Hybrid, SameContactsForAnyThreadsDevicesAndSegments) {
   for (const int threads : {1, 2, 4}) {
     Bench bench(threads);
-    bench.take(0, 1);
+    bench.update(0, 1);
     const Contacts expected = bench.on_cpu();
     ASSERT_GT(expected.vf.size() + expected.ee.size(), 200u);
     for (const std::size_t n_devices : {1u, 2u})
@@ -118,7 +118,7 @@ TEST(Hybrid, SameContactsForAnyThreadsDevicesAndSegments) {
 
 TEST(Hybrid, SegmentsGoToTheDevices) {
   Bench bench(2);
-  bench.take(0, 1);
+  bench.update(0, 1);
   hybrid::Engine engine(bench.devices(2), {8, 16}, bench.pool);
   // On a busy machine the traversal of a small scene may be over before the communication thread has woken up.
   std::uint64_t calls = 0;
@@ -128,10 +128,10 @@ TEST(Hybrid, SegmentsGoToTheDevices) {
 
 TEST(Hybrid, FrameAfterFrameAndOnANewTree) {
   Bench bench(3);
-  bench.take(0, 0.5);
+  bench.update(0, 0.5);
   hybrid::Engine engine(bench.devices(2), {16, 32}, bench.pool);
   for (int k = 0; k < 30; ++k) {
-    bench.take(0.03 * k, 0.03 * k + 0.5);
+    bench.update(0.03 * k, 0.03 * k + 0.5);
     const auto result = bench.with(engine, static_cast<std::uint64_t>(k + 1));
     EXPECT_TRUE(result.complete);
     expect_equal(result.contacts, bench.on_cpu());
@@ -140,7 +140,7 @@ TEST(Hybrid, FrameAfterFrameAndOnANewTree) {
 
 TEST(Hybrid, WhatADeviceLeavesUndecidedIsDecidedOnTheCpu) {
   Bench bench(2, all_undecided);
-  bench.take(0, 1);
+  bench.update(0, 1);
   const Contacts expected = bench.on_cpu();
   hybrid::Engine engine(bench.devices(1), {8, 16}, bench.pool);
   const auto result = bench.with(engine);
@@ -150,7 +150,7 @@ TEST(Hybrid, WhatADeviceLeavesUndecidedIsDecidedOnTheCpu) {
 
 TEST(Hybrid, ThreadsTestHalfSegmentsThemselvesWhereDevicesLag) {
   Bench bench(2);
-  bench.take(0, 1);
+  bench.update(0, 1);
   const Contacts expected = bench.on_cpu();
   hybrid::Engine engine(bench.devices(1), {8, 16}, bench.pool);
   std::uint64_t on_cpu = 0;
@@ -172,7 +172,7 @@ TEST(Hybrid, ThreadsTestHalfSegmentsThemselvesWhereDevicesLag) {
 
 TEST(Hybrid, AFrameInWhichADeviceFailsIsFinishedOnTheCpu) {
   Bench bench(2);
-  bench.take(0, 1);
+  bench.update(0, 1);
   const Contacts expected = bench.on_cpu();
   hybrid::Engine engine(bench.devices(2), {16, 16}, bench.pool);
   for (const int good_submissions : {0, 1, 2, 5}) {
@@ -200,7 +200,7 @@ TEST(Hybrid, AFrameInWhichADeviceFailsIsFinishedOnTheCpu) {
 
 TEST(Hybrid, AFrameThatIsGivenUpLeavesNothingBehind) {
   Bench bench(2);
-  bench.take(0, 1);
+  bench.update(0, 1);
   const Contacts expected = bench.on_cpu();
   hybrid::Engine engine(bench.devices(1), {8, 16}, bench.pool);
   for (int k = 0; k < 3; ++k) {

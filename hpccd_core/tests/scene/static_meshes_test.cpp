@@ -104,14 +104,14 @@ TEST(MotionBounds, TellsWhatRestsInALargeScene) {
   scene.add_mesh("moving", test::sheet_faces(side), n_static, {});
   ThreadPool pool(2);
   MotionBounds motion;
-  const auto take = [&](const Frame& f) { motion.update(scene, test::view(f.start), test::view(f.end), 0, pool); };
-  take(frame(0.40, 0.41));
+  const auto update = [&](const Frame& f) { motion.update(scene, test::view(f.start), test::view(f.end), 0, pool); };
+  update(frame(0.40, 0.41));
   EXPECT_TRUE(motion.resting.empty());
-  take(frame(0.41, 0.42));
+  update(frame(0.41, 0.42));
   EXPECT_EQ(motion.resting, (std::vector<char>{1, 0}));
-  take(frame(0.42, 0.43, 0.5));
+  update(frame(0.42, 0.43, 0.5));
   EXPECT_TRUE(motion.resting.empty() || motion.resting == (std::vector<char>{0, 0}));
-  take(frame(0.42, 0.43, 0.5, 1e6));  // another map of coordinates
+  update(frame(0.42, 0.43, 0.5, 1e6));  // another map of coordinates
   EXPECT_TRUE(motion.resting.empty());
 }
 
