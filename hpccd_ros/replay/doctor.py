@@ -4,8 +4,9 @@
 from datetime import UTC, datetime
 from pathlib import Path
 
+from hpccd_ros.bag.examine import Examination, examine
 from hpccd_ros.bag.reader import RecordingError, recording_files
-from hpccd_ros.bag.recover import Examination, examine, recover
+from hpccd_ros.bag.recover import recover
 from hpccd_ros.base.errors import UserError, sentence
 
 
