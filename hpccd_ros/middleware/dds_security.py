@@ -20,6 +20,6 @@ def unmet_demand(error: Exception) -> str | None:
             "has it, or unset ROS_SECURITY_ENABLE to run without protection"
         )
     return (
-        f"{why}. Create a keystore with an enclave for the node from config/security/policy.xml (see the README), and "
-        "name them with ROS_SECURITY_KEYSTORE and --ros-args --enclave"
+        f"{why}. Create a keystore with an enclave for the node from config/security/policy.xml (docs/security.md) "
+        "and name them with ROS_SECURITY_KEYSTORE and --ros-args --enclave"
     )

@@ -79,7 +79,7 @@ class HpccdNode(GuardedLifecycleNode):
         if why := topic_names.unusable_name(self, self._mesh_settings) or qos_overrides.unusable_override(self):
             raise ParameterError(why)
         for name in parameters.unknown_overrides(self, qos_overrides.known(self, self._mesh_settings)):
-            text = f"parameter {quoting.shortened(name)} is unknown and has no effect; see the README's table"
+            text = f"parameter {quoting.shortened(name)} is unknown and has no effect; see docs/parameters.md"
             self.get_logger().warning(text)
         self._options = _options(self._settings)
         if why := detection.refusal(self._options):

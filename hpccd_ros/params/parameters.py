@@ -1,8 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The parameters of the node: descriptors, checks and the README's table, all made from table.py.
-
-``python -m hpccd_ros.parameters`` prints the table.
-"""
+"""The parameters of the node: descriptors and checks, made from table.py."""
 
 import re
 from collections.abc import Callable, Container, Iterable
@@ -24,7 +21,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from hpccd_ros.base import quoting
-from hpccd_ros.params.table import ALWAYS, MESH_ROWS, NEVER, NODE_ROWS, UNCONFIGURED, Row
+from hpccd_ros.params.table import MESH_ROWS, NEVER, NODE_ROWS, UNCONFIGURED, Row
 
 _TYPES = {
     "bool": ParameterType.PARAMETER_BOOL,
@@ -144,7 +141,7 @@ def _declare_one(node: Node, row: Row, name: str) -> Any:
             f"{name}: {quoting.shortened(error, 300)}; expected {row.kind}, e.g. {row.default!r}"
         ) from error
     except InvalidParameterValueException as error:
-        raise ParameterError(f"{name}: {quoting.shortened(error, 300)}; allowed {_allowed(row)}") from error
+        raise ParameterError(f"{name}: {quoting.shortened(error, 300)}; allowed {allowed(row)}") from error
     value = normalise(row, value)
     if reason := unusable_value(row, value):
         raise ParameterError(reason.replace(row.name, name, 1))
@@ -221,7 +218,8 @@ def watch(
     node.add_on_set_parameters_callback(on_set)
 
 
-def _allowed(row: Row) -> str:
+def allowed(row: Row) -> str:
+    """The allowed values in Markdown; empty: any of the type."""
     if row.choices:
         return ", ".join(f"`{choice}`" for choice in row.choices)
     if row.least:
@@ -229,26 +227,3 @@ def _allowed(row: Row) -> str:
     if row.span is not None:
         return f"{row.span[0]:,} .. {row.span[1]:,}"
     return ""
-
-
-_CHANGE = {ALWAYS: "changeable", UNCONFIGURED: "while unconfigured", NEVER: "read-only"}
-
-
-def markdown_table() -> str:
-    """The README's table of parameters."""
-    lines = [
-        "| parameter | type | default | allowed | unit | at run time | meaning |",
-        "|---|---|---|---|---|---|---|",
-    ]
-    named = [(row.name, row) for row in NODE_ROWS] + [(f"mesh.NAME.{row.name}", row) for row in MESH_ROWS]
-    for name, row in named:
-        default = f"`{str(row.default).lower()}`" if row.kind == "bool" else f"`{row.default!r}`".replace("'", '"')
-        lines.append(
-            f"| `{name}` | {row.kind} | {default} | {_allowed(row)} | {row.unit} | "
-            f"{_CHANGE[row.change]} | {row.text} |"
-        )
-    return "\n".join(lines)
-
-
-if __name__ == "__main__":
-    print(markdown_table())

@@ -180,15 +180,3 @@ def test_default_configuration_shows_every_parameter_and_its_default():
             assert parameters.normalise(row, values[row.name]) == row.default, row.name
     for row in MESH_ROWS:
         assert parameters.normalise(row, values["mesh"]["cloth"][row.name]) == row.default, row.name
-
-
-def test_table_names_every_parameter():
-    table = parameters.markdown_table()
-    for row in NODE_ROWS:
-        assert f"| `{row.name}` |" in table
-    for row in MESH_ROWS:
-        assert f"| `mesh.NAME.{row.name}` |" in table
-
-
-def test_readme_shows_the_table():
-    assert parameters.markdown_table() in (CONFIG.parent / "README.md").read_text()
