@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The table of the node's parameters. Logic is in parameters.py; documentation.py makes docs/parameters.md of it."""
+"""The table of the node's parameters: of it are made checks, declarations and docs/parameters.md."""
 
 from dataclasses import dataclass
 from typing import Any

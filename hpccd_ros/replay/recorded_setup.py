@@ -11,10 +11,9 @@ from hpccd_ros.detect.detection import Options, SceneBuilder
 from hpccd_ros.frames.mesh_file import FORMATS, MeshFileError, load_mesh, place
 from hpccd_ros.frames.types import MeshFrame, Topology
 from hpccd_ros.middleware import topic_names, transform_topics
-from hpccd_ros.params import parameters as table
-from hpccd_ros.params import scene_parameters
+from hpccd_ros.params import scene_parameters, values
 from hpccd_ros.params.parameter_file import read_parameters
-from hpccd_ros.params.parameters import ParameterError
+from hpccd_ros.params.values import ParameterError
 from hpccd_ros.record import recorded_topics
 from hpccd_ros.record.mesh_attachment import attachment_name
 
@@ -54,7 +53,7 @@ def of_recording(recording: Recording, parameter_file: str | None = None) -> Rep
         else:
             where, refused = f"{recording.path}: the stored parameters", RecordingError
             given = _stored(recording, info)
-        settings, meshes = table.checked(given)
+        settings, meshes = values.checked(given)
         if not settings["meshes"]:
             raise ParameterError("parameter `meshes` names no mesh")
         if all(row["static"] for row in meshes.values()):
@@ -77,7 +76,7 @@ def of_recording(recording: Recording, parameter_file: str | None = None) -> Rep
             "recording holds no transforms: its positions cannot be computed again"
         )
     return ReplaySetup(settings, meshes, roles, by_role.get(topic_names.CONTACTS), _files(recording, meshes),
-                       table.unknown(given, meshes))  # fmt: skip
+                       values.unknown(given, meshes))  # fmt: skip
 
 
 def _stored(recording, info) -> dict:
