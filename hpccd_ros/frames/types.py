@@ -4,6 +4,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 
 @dataclass(frozen=True)
@@ -21,7 +22,7 @@ class Topology:
 
     version: int
     n_vertices: int
-    faces: np.ndarray
+    faces: NDArray[np.uint32]
 
     def same_content(self, other: "Topology") -> bool:
         """Equal but for the version."""
