@@ -3,11 +3,11 @@
 
 from typing import Any
 
+from hpccd_core.options import ACCURACIES
 from hpccd_ros.base.quoting import listed, quoted, shortened
 from hpccd_ros.detect.detection import SceneBuilder
 from hpccd_ros.frames.rigid import Rigid
 from hpccd_ros.frames.types import MeshSettings
-from hpccd_ros.params.table import ACCURACIES
 from hpccd_ros.params.values import ParameterError
 
 MeshValues = dict[str, dict[str, Any]]

@@ -4,6 +4,8 @@
 from dataclasses import dataclass
 from typing import Any
 
+from hpccd_core.options import ACCURACIES, BACKENDS, OUTPUTS, REPORTS
+
 # When a parameter may be changed.
 ALWAYS, UNCONFIGURED, NEVER = "always", "unconfigured", "never"
 
@@ -27,11 +29,6 @@ class Row:
     choices: tuple[str, ...] = ()
     change: str = UNCONFIGURED
 
-
-ACCURACIES = ("fast", "balanced", "conservative", "exact")
-BACKENDS = ("auto", "cpu", "hybrid", "gpu")
-REPORTS = ("all", "first", "any")
-OUTPUTS = ("points", "normals")
 
 # Of the files of a split recording: smaller ones would hold a message each, and beginning a file takes longer (a few
 # milliseconds) than messages may wait.
