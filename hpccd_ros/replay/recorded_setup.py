@@ -6,7 +6,8 @@ import tempfile
 from pathlib import Path, PurePosixPath
 
 from hpccd_ros.bag.reader import Recording, RecordingError
-from hpccd_ros.base.errors import UserError, sentence
+from hpccd_ros.base.errors import UserError
+from hpccd_ros.base.quoting import printable
 from hpccd_ros.detect.detection import Options, SceneBuilder
 from hpccd_ros.frames.mesh_file import FORMATS, MeshFileError, load_mesh, place
 from hpccd_ros.frames.types import MeshFrame, Topology
@@ -60,7 +61,7 @@ def of_recording(recording: Recording, parameter_file: str | None = None) -> Rep
             raise ParameterError("at least one mesh must not be static, or nothing ever moves")
         scene_parameters.check(settings, meshes)
     except ParameterError as error:
-        raise refused(sentence(f"{where}: {error}")) from error
+        raise refused(printable(f"{where}: {error}")) from error
     by_role = _by_role(recording, info, recorded_topics.types_by_role(meshes))
     roles = {topic: ("", role) if role in transform_topics.ALL else tuple(role.split("/")[1:])
              for role, topic in by_role.items() if role != topic_names.CONTACTS}  # fmt: skip
