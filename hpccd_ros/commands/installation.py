@@ -71,7 +71,7 @@ def _gpu(status) -> dict[str, str]:
 
 
 def _accuracies(hc, scene) -> list[str]:
-    from hpccd_core.options import ACCURACIES
+    from hpccd_ros.params.table import ACCURACIES
 
     usable = []
     for tier in ACCURACIES:
