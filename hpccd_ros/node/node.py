@@ -42,12 +42,12 @@ from hpccd_ros.middleware.guard import GuardedExecutor
 from hpccd_ros.middleware.unreadable import UnreadableExecutor
 from hpccd_ros.node import node_recording, parameter_services
 from hpccd_ros.node.detect_service import DetectService, NodeScene, new_counts
-from hpccd_ros.node.diagnostics import Metrics, Reporter
-from hpccd_ros.node.inputs import Inputs
 from hpccd_ros.node.life_cycle import GuardedLifecycleNode
 from hpccd_ros.node.markers import contact_markers, surface_cloud
 from hpccd_ros.node.node_recording import NodeRecording
 from hpccd_ros.node.refusal_log import RefusalLog
+from hpccd_ros.node.status_report import Metrics, Reporter
+from hpccd_ros.node.subscriptions import Inputs
 from hpccd_ros.node.unknown_meshes import UnknownMeshWatch
 from hpccd_ros.params import parameters, scene_parameters
 from hpccd_ros.params.parameters import ParameterError

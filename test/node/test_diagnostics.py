@@ -7,8 +7,8 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from visualization_msgs.msg import Marker
 
 from hpccd_ros.frames.drops import DropCounter, Reason
-from hpccd_ros.node.diagnostics import Metrics, Reporter, percentiles
 from hpccd_ros.node.markers import contact_markers
+from hpccd_ros.node.status_report import Metrics, Reporter, percentiles
 
 
 class Fixture:

@@ -20,7 +20,7 @@ from hpccd_ros.frames.transformer import Placement, Ready
 from hpccd_ros.frames.types import MeshFrame, SceneFrame, Topology
 from hpccd_ros.middleware import fields, mesh_messages, qos, qos_overrides, unreadable
 from hpccd_ros.middleware.fields import InvalidMessageError
-from hpccd_ros.node.diagnostics import Metrics
+from hpccd_ros.node.status_report import Metrics
 
 _UNREADABLE = "a message cannot be deserialised; build its publisher with the same definition of the message"
 

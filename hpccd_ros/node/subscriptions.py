@@ -15,9 +15,9 @@ from hpccd_ros.frames.mesh_file import MeshFileError, load_mesh, place
 from hpccd_ros.frames.transform_buffer import TransformBuffer
 from hpccd_ros.frames.transformer import Placement
 from hpccd_ros.frames.types import MeshFrame, MeshSettings, SceneFrame, Topology
-from hpccd_ros.node.diagnostics import Metrics
-from hpccd_ros.node.streams import MeshStream
-from hpccd_ros.node.transform_input import TransformInput
+from hpccd_ros.node.mesh_subscriptions import MeshStream
+from hpccd_ros.node.status_report import Metrics
+from hpccd_ros.node.transform_subscriptions import TransformInput
 
 
 class Inputs:
