@@ -1,58 +1,31 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Subscriptions of the meshes: each message is checked, turned into arrays and handed to the assembler."""
+"""Subscriptions to one mesh: each message is counted, checked, turned into arrays and pushed into the pipeline."""
 
 import time
-from collections import Counter
-from collections.abc import Callable
 from typing import Any
 
-from hpccd.msg import MeshTopology, MeshVertices
+from hpccd.msg import MeshTopology
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.subscription import Subscription
-from sensor_msgs.msg import PointCloud2
 
-from hpccd_ros.frames.assembler import FrameAssembler
-from hpccd_ros.frames.drops import DropCounter, Reason
+from hpccd_ros.detect.core import unusable_topology
+from hpccd_ros.frames.drops import Input, Reason, Refusal
+from hpccd_ros.frames.pipeline import FramePipeline
 from hpccd_ros.frames.rate_limit import RateLimit
 from hpccd_ros.frames.sequence import SequenceWatch
-from hpccd_ros.frames.transformer import Placement, Ready
-from hpccd_ros.frames.types import MeshFrame, SceneFrame, Topology
-from hpccd_ros.middleware import fields, mesh_messages, qos, qos_overrides, unreadable
+from hpccd_ros.middleware import mesh_inputs, qos, qos_overrides, unreadable
 from hpccd_ros.middleware.fields import InvalidMessageError
-from hpccd_ros.node.status_report import Metrics
+from hpccd_ros.node.accounts import Accounts
+from hpccd_ros.node.hand_over import hand_over
 
 _UNREADABLE = "a message cannot be deserialised; build its publisher with the same definition of the message"
 
 
-def link_events(
-    node: Node, topic: str, links: Counter, on_matched: Callable[[], None] = lambda: None
-) -> SubscriptionEventCallbacks:
-    """Count and log what the middleware reports of a subscription; ``on_matched``: a publisher came."""
+class MeshSubscriptions:
+    """Topology and vertices of one mesh, subscribed from construction until ``close``.
 
-    def incompatible(event: Any) -> None:
-        links[f"qos_incompatible.{topic}"] += event.total_count_change
-        node.get_logger().warning(
-            f"{topic}: a publisher offers an incompatible QoS (policy {event.last_policy_kind}) and is "
-            "not heard; see parameter input_reliability"
-        )
-
-    def lost(event: Any) -> None:
-        links[f"message_lost.{topic}"] += event.total_count_change
-
-    def matched(event: Any) -> None:
-        if event.current_count_change > 0:
-            on_matched()
-
-    return SubscriptionEventCallbacks(incompatible_qos=incompatible, message_lost=lost, matched=matched)
-
-
-class MeshStream:
-    """The topology and vertex subscriptions of one mesh, from construction until ``close``.
-
-    placement: brings positions into the scene's frame.
-    on_frames: takes the scene frames that a message completes.
-    check_topology: why the core refuses a topology, or None.
+    kind: "vertices" or "points", what its vertices come as.
     """
 
     def __init__(
@@ -61,56 +34,30 @@ class MeshStream:
         mesh: str,
         kind: str,
         settings: dict[str, Any],
-        *,
-        placement: Placement,
-        assembler: FrameAssembler,
-        drops: DropCounter,
-        refused: DropCounter,
-        metrics: Metrics,
-        links: Counter,
-        on_frames: Callable[[list[SceneFrame]], None],
-        check_topology: Callable[[Topology], str | None],
+        pipeline: FramePipeline,
+        accounts: Accounts,
     ) -> None:
         self._node = node
         self._mesh = mesh
+        self._kind = kind
         self._settings = settings
-        self._placement = placement
-        self._assembler = assembler
-        self._drops = drops
-        self._refused = refused
-        self._metrics = metrics
-        self._links = links
-        self._on_frames = on_frames
-        self._check_topology = check_topology
-        self._topology_numbers = SequenceWatch()
-        self._vertex_numbers = SequenceWatch()
-        self._unnoticed = False  # the first message of a new publisher was refused: the next one stands for it
+        self._pipeline = pipeline
+        self._accounts = accounts
+        self._topology_numbers, self._vertex_numbers = SequenceWatch(), SequenceWatch()
         self._topology_limit, self._vertex_limit = (RateLimit(settings["max_rate"]) for _ in range(2))
-        message, callback = {
-            "vertices": (MeshVertices, self._on_vertices),
-            "points": (PointCloud2, self._on_cloud),
-        }[kind]
-        topology_topic, vertex_topic = f"meshes/{mesh}/topology", f"meshes/{mesh}/{kind}"
+        self._unreadable = 0  # vertex messages counted as such since the last that was read
+        topology, vertices = f"meshes/{mesh}/topology", f"meshes/{mesh}/{kind}"
+        vertex_qos = qos.vertices(settings["input_reliability"], settings["input_depth"])
         self._subscriptions: list[Subscription] = [
             qos_overrides.create_subscription(
-                node,
-                MeshTopology,
-                topology_topic,
-                self._on_topology,
-                qos.TOPOLOGY_INPUT,
-                event_callbacks=link_events(node, topology_topic, links, self._topology_numbers.new_publisher),
-            ),
-            qos_overrides.create_subscription(
-                node,
-                message,
-                vertex_topic,
-                callback,
-                qos.vertices(settings["input_reliability"], settings["input_depth"]),
-                event_callbacks=link_events(node, vertex_topic, links, self._vertex_numbers.new_publisher),
-            ),
+                node, mesh_inputs.TYPES[of], topic, callback, profile, event_callbacks=self._events(topic, numbers)
+            )
+            for of, topic, callback, profile, numbers in (
+                ("topology", topology, self._on_topology, qos.TOPOLOGY_INPUT, self._topology_numbers),
+                (kind, vertices, self._on_vertices, vertex_qos, self._vertex_numbers),
+            )
         ]
-        self._vertex_topic = self._subscriptions[1].topic_name
-        self._unreadable = 0  # vertex messages counted as such since the last that was read
+        self._topology_topic, self._vertex_topic = (s.topic_name for s in self._subscriptions)
         for subscription, on_unreadable in zip(
             self._subscriptions, (self._on_unreadable_topology, self._on_unreadable), strict=True
         ):
@@ -120,102 +67,101 @@ class MeshStream:
         for subscription in self._subscriptions:
             self._node.destroy_subscription(subscription)
         self._subscriptions.clear()
-        self._placement.clear(Reason.STOPPED)
-
-    @property
-    def waiting(self) -> int:
-        """Messages that wait for a transform."""
-        return self._placement.waiting
-
-    @property
-    def publishers(self) -> int:
-        """Of vertices, as far as is known."""
-        return self._node.count_publishers(self._vertex_topic)
-
-    def retry(self) -> None:
-        """Go on with frames that waited for a transform."""
-        self._hand_on(self._placement.retry())
 
     def warnings(self) -> list[str]:
         """What is odd about the publishers of the mesh."""
-        publishers = self.publishers
+        publishers = self._publishers()
         several = [f"{publishers} publishers on {self._vertex_topic}"] if publishers > 1 else []
-        return several + self._placement.warnings()
+        return several + self._pipeline.awaited_transform(self._mesh)
+
+    def _publishers(self) -> int:
+        """Of vertices, as far as is known."""
+        return self._node.count_publishers(self._vertex_topic)
 
     def _on_topology(self, message: MeshTopology, info: dict[str, Any]) -> None:
         _, new_publisher = self._topology_numbers.next(info["publication_sequence_number"])
         if not self._topology_limit.allows():
-            self._refused.count(self._mesh, Reason.RATE, self._too_fast())
+            self._refuse_topology(Reason.RATE, self._too_fast())
             return
         try:
-            topology = mesh_messages.topology_from_message(
-                message, self._settings["max_vertices"], self._settings["max_faces"]
-            )
+            topology = mesh_inputs.read("topology", message, self._settings)
         except InvalidMessageError as error:
-            self._refused.count(self._mesh, error.reason, str(error))
+            self._refuse_topology(error.reason, str(error))
             return
-        if why := self._check_topology(topology):
-            self._refused.count(self._mesh, Reason.BAD_TOPOLOGY, why)
+        if why := unusable_topology(topology):
+            self._refuse_topology(Reason.BAD_TOPOLOGY, why)
             return
-        self._on_frames(self._assembler.set_topology(self._mesh, topology, new_publisher))
+        hand_over(self._pipeline.push(self._mesh, topology, new_publisher), self._accounts)
 
-    def _on_vertices(self, message: MeshVertices, info: dict[str, Any]) -> None:
-        self._take(message, info, mesh_messages.vertices_from_message, message.topology_version, message.step)
-
-    def _on_cloud(self, message: PointCloud2, info: dict[str, Any]) -> None:
-        self._take(message, info, mesh_messages.vertices_from_cloud, None, None)
-
-    def _take(self, message: Any, info: dict[str, Any], read: Callable, version: int | None, step: int | None) -> None:
+    def _on_vertices(self, message: Any, info: dict[str, Any]) -> None:
         received = time.monotonic()
-        transport = (info["received_timestamp"] - info["source_timestamp"]) * 1e-6
-        self._metrics.frame_received(self._mesh, transport if transport >= 0 else None)
-        missing, new_publisher = self._vertex_numbers.next(info["publication_sequence_number"])
-        self._unnoticed |= new_publisher
-        counted, self._unreadable = self._unreadable, 0
-        self._links[f"before_first.{self._mesh}"] = self._vertex_numbers.before_first
-        # Numbers of several publishers interleave: their gaps mean nothing.
-        if missing > counted and self.publishers <= 1:
-            self._count_missing(missing - counted, unreadable=counted > 0)
+        self._count_received(info)
         if not self._vertex_limit.allows():
-            self._drops.count(self._mesh, Reason.RATE, self._too_fast())
+            self._refuse(Reason.RATE, self._too_fast())
             return
         try:
-            stamp = fields.stamp_to_ns(message.header.stamp)
-            vertices = read(message, self._settings["max_vertices"])
+            frame = mesh_inputs.read(self._kind, message, self._settings, received)
         except InvalidMessageError as error:
-            self._drops.count(self._mesh, error.reason, str(error))
+            self._refuse(error.reason, str(error))
             return
-        frame = MeshFrame(stamp, vertices, version, step, message.header.frame_id, received)
-        new_publisher, self._unnoticed = self._unnoticed, False
-        self._hand_on(self._placement.take(frame, new_publisher))
+        new_publisher, alone = self._vertex_numbers.notice(), self._publishers() <= 1
+        hand_over(self._pipeline.push(self._mesh, frame, new_publisher, alone), self._accounts)
 
-    def _count_missing(self, missing: int, unreadable: bool) -> None:
-        """unreadable: some of the same gap were, so that these are taken for unreadable too."""
-        if unreadable:
+    def _count_received(self, info: dict[str, Any]) -> None:
+        transport = (info["received_timestamp"] - info["source_timestamp"]) * 1e-6
+        self._accounts.metrics.frame_received(self._mesh, transport if transport >= 0 else None)
+        missing, _ = self._vertex_numbers.next(info["publication_sequence_number"])
+        unreadable, self._unreadable = self._unreadable, 0
+        self._accounts.connections[f"before_first.{self._mesh}"] = self._vertex_numbers.before_first
+        # Numbers of several publishers interleave: their gaps mean nothing.
+        if missing <= unreadable or self._publishers() > 1:
+            return
+        missing -= unreadable
+        if unreadable:  # some of the same gap were, so that these are taken for unreadable too
             self._count_unreadable(missing)
             return
-        self._drops.count(
-            self._mesh,
-            Reason.MIDDLEWARE,
+        text = (
             f"{missing} messages did not reach the node: they came faster than it reads (parameter input_depth) or "
-            "could not be deserialised (see the log of DDS)",
-            missing,
+            "could not be deserialised (see the log of DDS)"
         )
+        self._refuse(Reason.MIDDLEWARE, text, missing)
 
     def _on_unreadable(self) -> None:
         self._unreadable += 1
         self._count_unreadable(1)
 
     def _count_unreadable(self, messages: int) -> None:
-        self._metrics.frame_received(self._mesh, None, messages)
-        self._drops.count(self._mesh, Reason.MALFORMED, f"{self._vertex_topic}: {_UNREADABLE}", messages)
+        self._accounts.metrics.frame_received(self._mesh, None, messages)
+        self._refuse(Reason.MALFORMED, f"{self._vertex_topic}: {_UNREADABLE}", messages)
 
     def _on_unreadable_topology(self) -> None:
-        self._refused.count(self._mesh, Reason.MALFORMED, f"{self._subscriptions[0].topic_name}: {_UNREADABLE}")
+        self._refuse_topology(Reason.MALFORMED, f"{self._topology_topic}: {_UNREADABLE}")
 
-    def _hand_on(self, frames: list[Ready]) -> None:
-        for frame, new_publisher in frames:
-            self._on_frames(self._assembler.add(self._mesh, frame, new_publisher))
+    def _refuse(self, reason: Reason, text: str, messages: int = 1) -> None:
+        self._accounts.refused(Refusal(self._mesh, reason, text, messages))
+
+    def _refuse_topology(self, reason: Reason, text: str) -> None:
+        self._accounts.refused(Refusal(self._mesh, reason, text, what=Input.TOPOLOGY))
 
     def _too_fast(self) -> str:
         return f"more than {self._settings['max_rate']:g} messages a second (parameter max_rate)"
+
+    def _events(self, topic: str, numbers: SequenceWatch) -> SubscriptionEventCallbacks:
+        """Count and log what the middleware reports of a subscription."""
+        connections = self._accounts.connections
+
+        def incompatible(event: Any) -> None:
+            connections[f"qos_incompatible.{topic}"] += event.total_count_change
+            self._node.get_logger().warning(
+                f"{topic}: a publisher offers an incompatible QoS (policy {event.last_policy_kind}) and is "
+                "not heard; see parameter input_reliability"
+            )
+
+        def lost(event: Any) -> None:
+            connections[f"message_lost.{topic}"] += event.total_count_change
+
+        def matched(event: Any) -> None:
+            if event.current_count_change > 0:
+                numbers.new_publisher()
+
+        return SubscriptionEventCallbacks(incompatible_qos=incompatible, message_lost=lost, matched=matched)

@@ -1,36 +1,29 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Subscriptions that fill a TransformBuffer."""
+"""Subscriptions to transforms: those that come go into the pipeline, and frames that waited for them go on."""
 
-from collections.abc import Callable
+from typing import Any
 
 from rclpy.node import Node
 
+from hpccd_ros.frames.pipeline import FramePipeline
 from hpccd_ros.frames.rate_limit import RateLimit
-from hpccd_ros.frames.transform_buffer import TransformBuffer
 from hpccd_ros.middleware import qos, qos_overrides, transform_topics
 from hpccd_ros.middleware.message_types import message_class
 from hpccd_ros.middleware.transform_topics import TransformTopic
+from hpccd_ros.node.accounts import Accounts
+from hpccd_ros.node.hand_over import hand_over
 
 
-class TransformInput:
+class TransformSubscriptions:
     """Subscribed from construction until ``close``.
 
-    on_change: called after each message that brought a transform. warn: takes texts about those that are refused.
     max_rate: most messages a second that are looked at of each topic.
     """
 
-    def __init__(
-        self,
-        node: Node,
-        buffer: TransformBuffer,
-        max_rate: float,
-        on_change: Callable[[], None],
-        warn: Callable[[str], None],
-    ) -> None:
+    def __init__(self, node: Node, pipeline: FramePipeline, accounts: Accounts, max_rate: float) -> None:
         self._node = node
-        self._buffer = buffer
-        self._on_change = on_change
-        self._warn = warn
+        self._pipeline = pipeline
+        self._accounts = accounts
         self._max_rate = max_rate
         self._subscriptions = [self._subscribe(topic) for topic in transform_topics.understood()]
 
@@ -42,18 +35,18 @@ class TransformInput:
     def _subscribe(self, topic: TransformTopic):
         limit = RateLimit(self._max_rate)
 
-        def take(message) -> None:
+        def receive(message: Any) -> None:
             if not limit.allows():
-                text = f"more than max_rate = {self._max_rate:g} messages a second; some are dropped"
-                self._warn(f"{topic.name}: {text}")
+                self._warn(topic, f"more than max_rate = {self._max_rate:g} messages a second; some are dropped")
                 return
-            for transform in transform_topics.in_message(message):
-                try:
-                    transform_topics.keep(self._buffer, transform, topic.static)
-                except ValueError as error:
-                    self._warn(f"{topic.name}: {error}")
-            self._on_change()
+            for refusal in transform_topics.fill(self._pipeline.transforms, message, topic):
+                self._warn(topic, refusal.text)
+            hand_over(self._pipeline.retry(), self._accounts)
 
         profile = qos.TRANSFORMS_STATIC if topic.static else qos.TRANSFORMS
         message = message_class(topic.type_name)
-        return qos_overrides.create_subscription(self._node, message, topic.name, take, profile)
+        return qos_overrides.create_subscription(self._node, message, topic.name, receive, profile)
+
+    def _warn(self, topic: TransformTopic, text: str) -> None:
+        self._accounts.connections["transforms_refused"] += 1
+        self._node.get_logger().warning(f"{topic.name}: {text}", throttle_duration_sec=10.0)
