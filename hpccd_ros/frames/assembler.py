@@ -29,6 +29,7 @@ from hpccd_ros.frames.outcome import Outcome
 from hpccd_ros.frames.restart import Restart
 from hpccd_ros.frames.stamp_order import StampOrder
 from hpccd_ros.frames.static_positions import StaticPositions
+from hpccd_ros.frames.topology_version import check_frame, check_successor, is_early
 from hpccd_ros.frames.types import MeshFrame, MeshSettings, SceneFrame, Topology
 
 
@@ -119,7 +120,7 @@ class FrameAssembler:
         current = state.topology
         if current is not None and topology.version == current.version and topology.same_content(current):
             return Outcome()
-        if current is not None and not new_publisher and (refusal := _outdated(mesh, topology, current)):
+        if current is not None and not new_publisher and (refusal := check_successor(mesh, topology, current)):
             return Outcome(refusals=[refusal])
         state.topology = topology
         state.positions.clear()
@@ -129,9 +130,7 @@ class FrameAssembler:
             outcome += self._admit(state, frame)
         return outcome
 
-    def add(
-        self, mesh: str, frame: MeshFrame, new_publisher: bool = False, only_publisher: bool = True
-    ) -> Outcome:
+    def add(self, mesh: str, frame: MeshFrame, new_publisher: bool = False, only_publisher: bool = True) -> Outcome:
         """Add one vertex message. only_publisher: the mesh has no other publisher of vertices than its own."""
         state = self._meshes.get(mesh)
         if state is None:
@@ -155,12 +154,11 @@ class FrameAssembler:
         return Outcome(refusals=[Refusal(mesh, Reason.UNKNOWN_MESH, text, what=what)])
 
     def _admit(self, state: _MeshState, frame: MeshFrame) -> Outcome:
-        topology = state.topology
-        if topology is None or (frame.version is not None and frame.version > topology.version):
+        if is_early(frame, state.topology):
             return Outcome(refusals=self._hold(state, frame))
-        if refusal := _misfit(state.name, frame, topology):
+        if refusal := check_frame(state.name, frame, state.topology):
             return Outcome(refusals=[refusal])
-        frame = replace(frame, topology=topology)
+        frame = replace(frame, topology=state.topology)
         return self._keep_positions(state, frame) if state.static else self._join(state, frame)
 
     def _hold(self, state: _MeshState, frame: MeshFrame) -> list[Refusal]:
@@ -231,28 +229,6 @@ class FrameAssembler:
             received=max(f.received for f in moving),
         )
         return Outcome(frames=[scene])
-
-
-def _outdated(mesh: str, topology: Topology, current: Topology) -> Refusal | None:
-    """Why ``topology``, of other content, cannot follow ``current`` from the same publisher, or None."""
-    if topology.version == current.version:
-        text = f"version {topology.version} is in force with other content; count the version up with each change"
-        return Refusal(mesh, Reason.TOPOLOGY_CONFLICT, text, what=Input.TOPOLOGY)
-    if topology.version < current.version:
-        text = f"version {topology.version} is older than {current.version}, now in force"
-        return Refusal(mesh, Reason.OLD_TOPOLOGY, text, what=Input.TOPOLOGY)
-    return None
-
-
-def _misfit(mesh: str, frame: MeshFrame, topology: Topology) -> Refusal | None:
-    """Why a frame does not belong to the topology in force, or None."""
-    if frame.version is not None and frame.version < topology.version:
-        text = f"vertices belong to topology version {frame.version}, version {topology.version} is in force"
-        return Refusal(mesh, Reason.OLD_TOPOLOGY, text)
-    if len(frame.vertices) != topology.n_vertices:
-        text = f"{len(frame.vertices)} vertices, topology version {topology.version} has {topology.n_vertices}"
-        return Refusal(mesh, Reason.WRONG_COUNT, text)
-    return None
 
 
 def _no_positions(state: _MeshState, frame_id: str) -> str:
