@@ -47,7 +47,7 @@ class BagWriter:
                  max_bytes=0, max_seconds=0.0, retry_interval=5.0):
         self.path = Path(path)
         self.single_file = self.path.suffix == ".mcap"
-        if why := refusal(path, compression, max_bytes, max_seconds):
+        if why := invalid_options(path, compression, max_bytes, max_seconds):
             raise ValueError(why)
         if self.path.exists():
             raise FileExistsError(f"{self.path} exists: recordings are not overwritten; remove it or name another")
@@ -211,7 +211,7 @@ class BagWriter:
         self.poll()
 
 
-def refusal(path, compression: str, max_bytes: float, max_seconds: float) -> str | None:
+def invalid_options(path, compression: str, max_bytes: float, max_seconds: float) -> str | None:
     """Why a recording cannot be made with these options, or None."""
     if Path(path).suffix == ".mcap" and (max_bytes or max_seconds):
         return f"cannot split the single file {path}: give a folder (a path that does not end in .mcap)"

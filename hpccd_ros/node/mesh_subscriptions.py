@@ -2,11 +2,13 @@
 """Subscriptions to one mesh: each message is counted, checked, turned into arrays and pushed into the pipeline."""
 
 import time
+from collections.abc import Callable
 from typing import Any
 
 from hpccd.msg import MeshTopology
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
+from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 
 from hpccd_ros.detect.core import unusable_topology
@@ -46,22 +48,15 @@ class MeshSubscriptions:
         self._topology_numbers, self._vertex_numbers = SequenceWatch(), SequenceWatch()
         self._topology_limit, self._vertex_limit = (RateLimit(settings["max_rate"]) for _ in range(2))
         self._unreadable = 0  # vertex messages counted as such since the last that was read
-        topology, vertices = f"meshes/{mesh}/topology", f"meshes/{mesh}/{kind}"
         vertex_qos = qos.vertices(settings["input_reliability"], settings["input_depth"])
-        self._subscriptions: list[Subscription] = [
-            qos_overrides.create_subscription(
-                node, mesh_inputs.TYPES[of], topic, callback, profile, event_callbacks=self._events(topic, numbers)
-            )
-            for of, topic, callback, profile, numbers in (
-                ("topology", topology, self._on_topology, qos.TOPOLOGY_INPUT, self._topology_numbers),
-                (kind, vertices, self._on_vertices, vertex_qos, self._vertex_numbers),
-            )
+        self._subscriptions = [
+            self._subscribe("topology", self._on_topology, qos.TOPOLOGY_INPUT, self._topology_numbers),
+            self._subscribe(kind, self._on_vertices, vertex_qos, self._vertex_numbers),
         ]
-        self._topology_topic, self._vertex_topic = (s.topic_name for s in self._subscriptions)
-        for subscription, on_unreadable in zip(
-            self._subscriptions, (self._on_unreadable_topology, self._on_unreadable), strict=True
-        ):
-            unreadable.watch(subscription, on_unreadable)
+        topologies, vertices = self._subscriptions
+        unreadable.watch(topologies, self._on_unreadable_topology)
+        unreadable.watch(vertices, self._on_unreadable)
+        self._topology_topic, self._vertex_topic = topologies.topic_name, vertices.topic_name
 
     def close(self) -> None:
         for subscription in self._subscriptions:
@@ -145,6 +140,17 @@ class MeshSubscriptions:
 
     def _too_fast(self) -> str:
         return f"more than {self._settings['max_rate']:g} messages a second (parameter max_rate)"
+
+    def _subscribe(self, kind: str, callback: Callable, profile: QoSProfile, numbers: SequenceWatch) -> Subscription:
+        topic = f"meshes/{self._mesh}/{kind}"
+        return qos_overrides.create_subscription(
+            self._node,
+            mesh_inputs.TYPES[kind],
+            topic,
+            callback,
+            profile,
+            event_callbacks=self._events(topic, numbers),
+        )
 
     def _events(self, topic: str, numbers: SequenceWatch) -> SubscriptionEventCallbacks:
         """Count and log what the middleware reports of a subscription."""
