@@ -8,8 +8,9 @@ from pathlib import Path, PurePosixPath
 from hpccd_ros.bag.reader import Recording, RecordingError
 from hpccd_ros.base.errors import UserError
 from hpccd_ros.base.quoting import printable
-from hpccd_ros.detect.detection import Options, SceneBuilder
-from hpccd_ros.frames.mesh_file import FORMATS, MeshFileError, load_mesh, place
+from hpccd_ros.detect.core import Options
+from hpccd_ros.detect.scene import SceneBuilder
+from hpccd_ros.frames.mesh_file import FORMATS, MeshFileError, load_mesh, mesh_of_file
 from hpccd_ros.frames.types import MeshFrame, Topology
 from hpccd_ros.middleware import topic_names, transform_topics
 from hpccd_ros.params import scene_parameters, values
@@ -141,10 +142,9 @@ def _files(recording, meshes):
                 vertices, faces = _load(attachment, recording.attachments[attachment])
             else:
                 vertices, faces = load_mesh(row["file"])
-            frame = MeshFrame(0, place(vertices, row["pose"]), version=0) if row["static"] else None
+            found[name] = mesh_of_file(vertices, faces, row["static"], row["pose"])
         except MeshFileError as error:
             raise RecordingError(f"mesh {name} of the recording: {error}") from error
-        found[name] = (Topology(0, len(vertices), faces), frame)
     return found
 
 

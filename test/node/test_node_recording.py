@@ -162,7 +162,7 @@ def _settings_with(record):
 
 @pytest.mark.parametrize("record, why", IMPOSSIBLE.values(), ids=IMPOSSIBLE)
 def test_impossible_places_are_refused_with_a_reason(tmp_path, record, why):
-    refused = node_recording.refusal(_settings_with(record.format(folder=tmp_path)))
+    refused = node_recording.unrecordable(_settings_with(record.format(folder=tmp_path)))
     assert refused.startswith("record: ") and why in refused and len(refused) < 400, refused
 
 
