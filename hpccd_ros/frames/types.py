@@ -4,6 +4,9 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
+
+from hpccd_ros.frames.drops import Reason, Refusal
 
 
 @dataclass(frozen=True)
@@ -13,6 +16,9 @@ class MeshSettings:
     name: str
     static: bool = False
     self_collision: bool = True
+    transform: str = "none"
+    frame: str = ""
+    pose: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,7 +27,7 @@ class Topology:
 
     version: int
     n_vertices: int
-    faces: np.ndarray
+    faces: NDArray[np.uint32]
 
     def same_content(self, other: "Topology") -> bool:
         """Equal but for the version."""
@@ -66,3 +72,7 @@ class SceneFrame:
         """True if a motion from one to the other exists: the same topology of every mesh, one coordinate frame."""
         elsewhere = self.frame_id and other.frame_id and self.frame_id != other.frame_id
         return not elsewhere and all(a is b for a, b in zip(self.topologies, other.topologies, strict=True))
+
+    def refused(self, reason: Reason) -> list[Refusal]:
+        """One refusal for each message that is used nowhere else."""
+        return [Refusal(mesh, reason) for mesh in self.fresh]

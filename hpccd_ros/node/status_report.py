@@ -1,118 +1,24 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the node tells of itself on /diagnostics: measurements are collected here and turned into messages."""
+"""What the node tells of itself on /diagnostics: its accounts as messages."""
 
 import resource
-import threading
 import time
-from collections import deque
 from collections.abc import Mapping
 from pathlib import Path
 
-import numpy as np
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
-from hpccd_ros.frames.drops import DropCounter
-
-# Percentiles are taken over the last answers: p99 needs some hundreds.
-WINDOW = 1000
-
-
-class Metrics:
-    """Counts and times of one node, written by the executor and the detection thread."""
-
-    def __init__(self) -> None:
-        self._lock = threading.Lock()
-        self.received: dict[str, int] = {}
-        self.answered = 0
-        self.detections = 0
-        self.first_frames = 0
-        self.failures = 0
-        self.last_failure = ""
-        self._failing = False
-        self.last: dict[str, str] = {}
-        self._latency_ms: deque[float] = deque(maxlen=WINDOW)
-        self._detect_ms: deque[float] = deque(maxlen=WINDOW)
-        self._transport_ms: deque[float] = deque(maxlen=WINDOW)
-        self._stages: dict[str, deque[float]] = {}
-
-    def frame_received(self, mesh: str, transport_ms: float | None, messages: int = 1) -> None:
-        """Vertex messages came. transport_ms: since the publisher wrote one, None where unknown."""
-        with self._lock:
-            self.received[mesh] = self.received.get(mesh, 0) + messages
-            if transport_ms is not None:
-                self._transport_ms.append(transport_ms)
-
-    def first_frame(self, messages: int) -> None:
-        """A frame of ``messages`` vertex messages was only the start of the next step."""
-        with self._lock:
-            self.first_frames += 1
-            self.answered += messages
-
-    def detected(
-        self,
-        messages: int,
-        latency_ms: float,
-        detect_ms: float,
-        profile: Mapping[str, float],
-        last: Mapping[str, object],
-    ) -> None:
-        """One step was answered. latency_ms: from the arrival of its last message to its contacts sent."""
-        with self._lock:
-            self.detections += 1
-            self.answered += messages
-            self._failing = False
-            self._latency_ms.append(latency_ms)
-            self._detect_ms.append(detect_ms)
-            for stage, ms in profile.items():
-                self._stages.setdefault(stage, deque(maxlen=WINDOW)).append(ms)
-            self.last = {key: str(value) for key, value in last.items()}
-
-    def failed(self, text: str) -> None:
-        """One step could not be answered (its messages are counted as dropped)."""
-        with self._lock:
-            self.failures += 1
-            self.last_failure = text
-            self._failing = True
-
-    def snapshot(self) -> dict:
-        """A consistent copy of all of it."""
-        with self._lock:
-            return {
-                "received": dict(self.received),
-                "answered": self.answered,
-                "detections": self.detections,
-                "first_frames": self.first_frames,
-                "failures": self.failures,
-                "failing": self._failing,
-                "last_failure": self.last_failure,
-                "last": dict(self.last),
-                "latency_ms": list(self._latency_ms),
-                "detect_ms": list(self._detect_ms),
-                "transport_ms": list(self._transport_ms),
-                "stages": {stage: float(np.mean(values)) for stage, values in self._stages.items()},
-            }
-
-
-def percentiles(values: list[float]) -> dict[str, str]:
-    """p50, p95, p99 and max as text; empty for no values."""
-    if not values:
-        return {}
-    p50, p95, p99 = np.percentile(values, [50, 95, 99])
-    return {"p50": f"{p50:.2f}", "p95": f"{p95:.2f}", "p99": f"{p99:.2f}", "max": f"{max(values):.2f}"}
+from hpccd_ros.node.accounts import Accounts
+from hpccd_ros.node.metrics import percentiles
 
 
 class Reporter:
-    """Makes a DiagnosticArray of the state of the node; rates are those since the report before.
+    """Makes a DiagnosticArray of the state of the node; rates are those since the report before."""
 
-    drops: of vertex messages. refused: of topologies. links: free counters of the middleware (name -> count).
-    """
-
-    def __init__(self, node_name: str, metrics: Metrics, drops: DropCounter, refused: DropCounter) -> None:
+    def __init__(self, node_name: str, accounts: Accounts) -> None:
         self._node_name = node_name
-        self._metrics = metrics
-        self._drops = drops
-        self._refused = refused
+        self._accounts = accounts
         self._time = time.monotonic()
         self._received: dict[str, int] = {}
         self._detections = 0
@@ -126,30 +32,25 @@ class Reporter:
         *,
         state: str,
         waiting: int,
-        restarts: int,
-        static_taken: int,
-        last_refusal: str,
-        links: Mapping[str, int],
         warnings: list[str],
         service: Mapping[str, int],
         errors: tuple[int, str] = (0, ""),
         recording: tuple[bytes, str, Mapping[str, object]] | None = None,
         coordinate_frame: tuple[str, str] = ("", ""),
     ) -> DiagnosticArray:
-        """static_taken: accepted messages of static meshes, which count as answered.
-        coordinate_frame: that of the scene, and what determined it.
+        """coordinate_frame: that of the scene, and what determined it.
         errors: how many exceptions nothing expected, and the last one.
         recording: level, message and values of the node's own recording, where there is one.
 
         Message of the statuses frames, detection, service, process, errors, and recording where there is one."""
         now = time.monotonic()
         period, self._time = max(now - self._time, 1e-9), now
-        data = self._metrics.snapshot()
-        data["answered"] += static_taken
+        data = self._accounts.metrics.snapshot()
+        data["answered"] += self._accounts.static_taken
         out = DiagnosticArray()
         out.header.stamp = stamp
         out.status = [
-            self._frames(data, period, waiting, restarts, last_refusal, links, warnings, coordinate_frame),
+            self._frames(data, period, waiting, warnings, coordinate_frame),
             self._detection(data, period, state),
             self._status("service", DiagnosticStatus.OK, "~/detect", service),
             self._status("process", DiagnosticStatus.OK, state, {"state": state, **_memory()}),
@@ -159,17 +60,10 @@ class Reporter:
         return out
 
     def _frames(
-        self,
-        data: dict,
-        period: float,
-        waiting: int,
-        restarts: int,
-        last_refusal: str,
-        links: Mapping[str, int],
-        warnings: list[str],
-        coordinate_frame: tuple[str, str],
+        self, data: dict, period: float, waiting: int, warnings: list[str], coordinate_frame: tuple[str, str]
     ) -> DiagnosticStatus:
-        dropped, topologies_refused = self._drops.total, self._refused.total
+        accounts = self._accounts
+        dropped, topologies_refused = accounts.dropped.total, accounts.topologies_refused.total
         new = dropped - self._dropped
         new_topologies = topologies_refused - self._topologies_refused
         values: dict[str, object] = {}
@@ -182,21 +76,21 @@ class Reporter:
             "answered": data["answered"],
             "waiting": waiting,
             "dropped": dropped,
-            "restarts": restarts,
+            "restarts": accounts.restarts,
             "topologies_refused": topologies_refused,
             "frame_id": coordinate_frame[0],
             "frame_id_by": coordinate_frame[1],
         }
-        for reason, count in sorted(self._drops.by_reason().items()):
+        for reason, count in sorted(accounts.dropped.by_reason().items()):
             values[f"dropped.{reason}"] = count
-        for (mesh, reason), count in sorted(self._drops.by_mesh_and_reason().items()):
+        for (mesh, reason), count in sorted(accounts.dropped.by_mesh_and_reason().items()):
             values[f"dropped.{mesh}.{reason}"] = count
-        for (mesh, reason), count in sorted(self._refused.by_mesh_and_reason().items()):
+        for (mesh, reason), count in sorted(accounts.topologies_refused.by_mesh_and_reason().items()):
             values[f"topologies_refused.{mesh}.{reason}"] = count
-        values |= dict(links)
+        values |= accounts.connections
         for stage, text in percentiles(data["transport_ms"]).items():
             values[f"transport_ms.{stage}"] = text
-        values["last_refusal"] = last_refusal
+        values["last_refusal"] = accounts.log.last
         self._received, self._dropped, self._topologies_refused = (
             data["received"],
             dropped,

@@ -6,8 +6,10 @@ import pytest
 from waving_sheet import scene_of
 
 import hpccd_core as hc
-from hpccd_ros.detect.detection import DetectionThread, Options, SceneBuilder
-from hpccd_ros.frames.drops import DropCounter
+from hpccd_ros.detect.core import Options
+from hpccd_ros.detect.scene import SceneBuilder
+from hpccd_ros.detect.step_detector import StepDetector
+from hpccd_ros.detect.thread import DetectionThread
 from hpccd_ros.frames.frame_queue import FrameQueue
 from hpccd_ros.frames.types import MeshSettings, SceneFrame, Topology
 
@@ -29,11 +31,11 @@ class Run:
     """What a detection thread made of ``frames``."""
 
     def __init__(self, *frames, refuse_answer_at=None):
-        self.steps, self.starts, self.failed, self.drops = [], [], [], DropCounter()
+        self.steps, self.starts, self.failed = [], [], []
         self.refuse_answer_at = refuse_answer_at
         queue = FrameQueue(100)
         thread = DetectionThread(
-            SceneBuilder((MeshSettings("cloth"),)), queue, self.drops, options=Options,
+            StepDetector(SceneBuilder((MeshSettings("cloth"),)), Options()), queue,
             on_detection=self._answer, on_first=self.starts.append,
             on_failure=lambda frame, error: self.failed.append((frame.stamp, str(error))),
         )  # fmt: skip
@@ -57,7 +59,6 @@ def test_step_over_a_frame_that_cannot_be_tested():
     assert [step[:2] for step in run.steps] == [(1, 3), (3, 4)]
     assert run.steps[0][2] == len(hc.Detector(scene_of(cloth=FACES)).detect(positions(0.5), positions(-0.5))) > 0
     assert [stamp for stamp, _ in run.failed] == [2] and "1e150" in run.failed[0][1]
-    assert run.drops.by_mesh_and_reason() == {("cloth", "detection_failed"): 1}
 
 
 def test_step_whose_answer_could_not_be_sent():
