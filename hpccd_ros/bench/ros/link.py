@@ -18,7 +18,7 @@ from hpccd_ros.bench.ros import echo
 from hpccd_ros.bench.steps import Step
 from hpccd_ros.detect.layout import Layout
 from hpccd_ros.frames.types import Topology
-from hpccd_ros.middleware import contact_messages, fields, mesh_messages, qos
+from hpccd_ros.middleware import contact_messages, fields, mesh_messages, qos, topic_names
 
 MESH = "scene"
 PATIENCE = 300.0  # s, for what takes less than one on a machine that is not busy
@@ -71,13 +71,13 @@ class Link:
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(node)
         reliable = qos.vertices("reliable", 10)
-        self._topology = node.create_publisher(MeshTopology, f"meshes/{MESH}/topology", qos.TOPOLOGY)
+        self._topology = node.create_publisher(MeshTopology, topic_names.topology(MESH), qos.TOPOLOGY)
         self._templates = node.create_publisher(ContactArray, "echo/answers", echo.ANSWERS)
-        self.node = Lane("node", node.create_publisher(MeshVertices, f"meshes/{MESH}/vertices", reliable))
+        self.node = Lane("node", node.create_publisher(MeshVertices, topic_names.vertices(MESH), reliable))
         self.echo = Lane("echo", node.create_publisher(MeshVertices, "echo/vertices", reliable))
         # A benchmark must hear every answer: deeper than the node's own QoS, which a late reader overruns.
         deep = qos.vertices("reliable", 100)
-        node.create_subscription(ContactArray, "contacts", self._from(self.node), deep)
+        node.create_subscription(ContactArray, topic_names.CONTACTS, self._from(self.node), deep)
         node.create_subscription(ContactArray, "echo/contacts", self._from(self.echo), deep)
 
     def _answer(self, contacts, parity: int) -> ContactArray:

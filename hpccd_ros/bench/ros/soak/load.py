@@ -18,8 +18,8 @@ from hpccd_ros import scenes
 from hpccd_ros.bench.ros.soak import restarted_publisher
 from hpccd_ros.bench.ros.soak.wrong_messages import MOST_VERTICES, WrongMessages
 from hpccd_ros.detect.layout import Layout
-from hpccd_ros.middleware import contact_messages, fields, mesh_messages, qos
-from hpccd_ros.scenes.messages import Player, topology_topic, vertices_topic
+from hpccd_ros.middleware import contact_messages, fields, mesh_messages, qos, topic_names
+from hpccd_ros.scenes.messages import Player
 
 SCENE, SIZE = "breaking-like", 0.02  # 5,036 triangles; sixteen changes of topology in each run of 60 frames
 TIER = "balanced"
@@ -60,14 +60,15 @@ class SoakLoad:
         self._strip = restarted_publisher.strip()
         self._publishers = {}
         for mesh in scene.mesh_names:
-            self._publishers[topology_topic(mesh)] = node.create_publisher(
-                MeshTopology, topology_topic(mesh), qos.TOPOLOGY
+            self._publishers[topic_names.topology(mesh)] = node.create_publisher(
+                MeshTopology, topic_names.topology(mesh), qos.TOPOLOGY
             )
-            self._publishers[vertices_topic(mesh)] = node.create_publisher(
-                MeshVertices, vertices_topic(mesh), qos.vertices("reliable", INPUT_DEPTH)
+            self._publishers[topic_names.vertices(mesh)] = node.create_publisher(
+                MeshVertices, topic_names.vertices(mesh), qos.vertices("reliable", INPUT_DEPTH)
             )
-        self._misspelt = node.create_publisher(MeshVertices, vertices_topic("statute"), qos.vertices("reliable", 10))
-        node.create_subscription(ContactArray, "contacts", self._on_contacts, 100)
+        misspelt = topic_names.vertices("statute")
+        self._misspelt = node.create_publisher(MeshVertices, misspelt, qos.vertices("reliable", 10))
+        node.create_subscription(ContactArray, topic_names.CONTACTS, self._on_contacts, 100)
         self._client = node.create_client(Detect, "hpccd/detect")
         self._replies: list = []
         # By stamp: how often topologies had changed before, frame of the scene, frame of the strip.
@@ -81,7 +82,7 @@ class SoakLoad:
         self.victim = scene.mesh_names[0]
         self.wrong_messages = WrongMessages(
             lambda message: self._publish_vertices(self.victim, message),
-            self._publishers[topology_topic(self.victim)].publish,
+            self._publishers[topic_names.topology(self.victim)].publish,
         )
 
     def heard(self) -> bool:
@@ -100,7 +101,7 @@ class SoakLoad:
 
     def _publish_vertices(self, mesh: str, message: MeshVertices | bytes) -> None:
         self.sent[mesh] += 1
-        self._publishers[vertices_topic(mesh)].publish(message)
+        self._publishers[topic_names.vertices(mesh)].publish(message)
 
     def tick(self, tick: int) -> None:
         """Send the frame that belongs to `tick`, and now and then what else there is."""

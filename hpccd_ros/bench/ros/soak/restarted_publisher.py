@@ -20,7 +20,7 @@ from hpccd.msg import MeshTopology, MeshVertices
 from rclpy.signals import SignalHandlerOptions
 
 from hpccd_ros import scenes
-from hpccd_ros.middleware import environment, qos, stop_signals
+from hpccd_ros.middleware import environment, qos, stop_signals, topic_names
 from hpccd_ros.scenes import cdr
 
 MESH = "strip"
@@ -49,8 +49,8 @@ def main(namespace: str, rate: float, counter: Path) -> int:
     environment.prepare()
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     node = rclpy.create_node("strip", namespace=namespace, start_parameter_services=False)
-    topology = node.create_publisher(MeshTopology, f"meshes/{MESH}/topology", qos.TOPOLOGY)
-    vertices = node.create_publisher(MeshVertices, f"meshes/{MESH}/vertices", qos.vertices("reliable", 10))
+    topology = node.create_publisher(MeshTopology, topic_names.topology(MESH), qos.TOPOLOGY)
+    vertices = node.create_publisher(MeshVertices, topic_names.vertices(MESH), qos.vertices("reliable", 10))
     scene = strip()
     mesh = scene.meshes[0]
     deadline = time.monotonic() + WAIT
