@@ -80,6 +80,7 @@ fuzz: venv ## Compare the core with the exact oracle on random and degenerate qu
 lint: $(ENVIRONMENT) ## Check style, types and who imports whom: ruff, clang-format, import-linter, mypy
 	$(BIN)/ruff check .
 	$(BIN)/lint-imports --no-logo --cache-dir build/import-linter
+	$(BIN)/mypy
 	@git ls-files -z '*.h' '*.cpp' '*.inl' '*.cu' | xargs -0r $(BIN)/clang-format --dry-run --Werror
 
 format: $(ENVIRONMENT) ## Mend the style where a tool can

@@ -11,7 +11,7 @@ from mcap.records import Attachment, Channel, Chunk, Header, Message, Metadata, 
 from mcap.writer import MCAP0_MAGIC, CompressionType, Writer
 
 from hpccd_ros.bag.mcap_index import Descriptions, miscounted, misplaced, read_index, undescribed
-from hpccd_ros.bag.mcap_records import DAMAGE, Place, data_section, inside, parse, told_by
+from hpccd_ros.bag.mcap_records import DAMAGE, Place, data_section, inside, parse, within_chunk_times
 from hpccd_ros.bag.reader import RecordingError
 from hpccd_ros.bag.writer import COMPRESSIONS
 
@@ -96,16 +96,16 @@ class _Walk:
         self._visited: dict[int, Channel] = {}
         self._counts: Counter[int] = Counter()
         with stream:
-            self._go(stream)
+            self._walk(stream)
 
-    def _go(self, stream):
+    def _walk(self, stream):
         result = self.result
         index, data_end, index_problem = self._read_index(stream)
         places: list[Place] = []
         for raw in self._whole_records(stream):
             places.append(raw.place)
             for record in self._records_of(raw):
-                self._take(record)
+                self._visit_record(record)
             result.readable = stream.tell()
         if result.orphans:
             self._note(f"{result.orphans} messages of channels that nothing describes")
@@ -142,7 +142,7 @@ class _Walk:
                 result.chunks += 1
                 result.compression = record.compression if record.compression in COMPRESSIONS else "none"
                 for item in inside(record):
-                    if not told_by(record, item):
+                    if not within_chunk_times(record, item):
                         self._note(f"the chunk at byte {raw.at:,} has a message outside of the times that it tells")
                     yield item
             elif record is not None:
@@ -167,18 +167,18 @@ class _Walk:
                 self._described.add(record)
         return index, data_end, None
 
-    def _take(self, record):
+    def _visit_record(self, record):
         result = self.result
         if isinstance(record, Header):
             result.profile, result.library = result.profile or record.profile, result.library or record.library
         if isinstance(record, (Schema, Channel)):
             self._described.add(record)
         elif isinstance(record, Message):
-            self._take_message(record)
+            self._visit_message(record)
         else:
             self._visit(record)
 
-    def _take_message(self, record):
+    def _visit_message(self, record):
         result, number = self.result, record.channel_id
         if number not in self._described.channels:
             result.orphans += 1

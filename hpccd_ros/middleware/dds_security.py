@@ -4,7 +4,7 @@
 import os
 
 
-def refusal(error: Exception) -> str | None:
+def unmet_demand(error: Exception) -> str | None:
     """Why nothing is started, and what to do; None where security is not demanded or the error is another one.
 
     error: raised by rclpy.init or the creation of a node. With ROS_SECURITY_ENABLE=true rcl ends there both if keys are

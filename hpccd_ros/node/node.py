@@ -76,7 +76,7 @@ class HpccdNode(GuardedLifecycleNode):
         parameter_services.refuse_unknown_types(self)
         self._settings, self._mesh_settings = parameters.declare(self)
         scene_parameters.check(self._settings, self._mesh_settings)
-        if why := topic_names.refusal(self, self._mesh_settings) or qos_overrides.refusal(self):
+        if why := topic_names.unusable_name(self, self._mesh_settings) or qos_overrides.unusable_override(self):
             raise ParameterError(why)
         for name in parameters.unknown_overrides(self, qos_overrides.known(self, self._mesh_settings)):
             text = f"parameter {quoting.shortened(name)} is unknown and has no effect; see docs/parameters.md"
@@ -403,7 +403,7 @@ def main(argv: list[str] | None = None, node_type: type[HpccdNode] = HpccdNode) 
     except ParameterError as error:
         return _not_started(ros_start.WRONG_PARAMETERS, str(error))
     except Exception as error:
-        if (refused := ros_start.refusal(error)) is None:
+        if (refused := ros_start.start_failure(error)) is None:
             raise
         return _not_started(*refused)
     executor = _Executor(node.errors)

@@ -41,7 +41,7 @@ class ParameterError(ValueError):
 _MESH_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 
 
-def refusal(row: Row, value: Any) -> str | None:
+def unusable_value(row: Row, value: Any) -> str | None:
     """Why ``value`` (of the right type) cannot be used, or None."""
     if row.span is not None and not row.span[0] <= value <= row.span[1]:
         return f"{row.name}: {value} is outside {row.span[0]} .. {row.span[1]}"
@@ -55,16 +55,16 @@ def refusal(row: Row, value: Any) -> str | None:
     return None
 
 
-def of_plain(given: dict[str, Any]) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
+def checked(given: dict[str, Any]) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
     """What ``declare`` returns for a node with the parameters ``given``, by full name, from a file. None: not set.
 
     Raises ParameterError: as ``declare``.
     """
-    settings = {row.name: _checked(row, row.name, given.get(row.name)) for row in NODE_ROWS}
+    settings = {row.name: _checked_value(row, row.name, given.get(row.name)) for row in NODE_ROWS}
     _check_names(settings["meshes"])
     of_mesh = {mesh: f"mesh.{mesh}." for mesh in settings["meshes"]}
     meshes = {
-        mesh: {row.name: _checked(row, prefix + row.name, given.get(prefix + row.name)) for row in MESH_ROWS}
+        mesh: {row.name: _checked_value(row, prefix + row.name, given.get(prefix + row.name)) for row in MESH_ROWS}
         for mesh, prefix in of_mesh.items()
     }
     return settings, meshes
@@ -73,7 +73,7 @@ def of_plain(given: dict[str, Any]) -> tuple[dict[str, Any], dict[str, dict[str,
 _PLAIN = {"bool": bool, "int": int, "float": float, "string": str}
 
 
-def _checked(row: Row, name: str, value: Any) -> Any:
+def _checked_value(row: Row, name: str, value: Any) -> Any:
     if value is None:
         return normalise(row, row.default)
     is_list = row.kind.endswith("[]") and isinstance(value, list)
@@ -82,7 +82,7 @@ def _checked(row: Row, name: str, value: Any) -> Any:
     if not all(type(entry) is _PLAIN.get(kind) for entry in entries):
         raise ParameterError(f"{name}: {value!r} is of the wrong type; expected {row.kind}, e.g. {row.default!r}")
     value = normalise(row, value)
-    if reason := refusal(row, value):
+    if reason := unusable_value(row, value):
         raise ParameterError(reason.replace(row.name, name, 1))
     return value
 
@@ -143,7 +143,7 @@ def _declare_one(node: Node, row: Row, name: str) -> Any:
     except InvalidParameterValueException as error:
         raise ParameterError(f"{name}: {quoting.shortened(error, 300)}; allowed {allowed(row)}") from error
     value = normalise(row, value)
-    if reason := refusal(row, value):
+    if reason := unusable_value(row, value):
         raise ParameterError(reason.replace(row.name, name, 1))
     return value
 
@@ -204,7 +204,7 @@ def watch(
             if row.change == UNCONFIGURED and configured() and value != values[row.name]:
                 reason = f"{parameter.name}: read-only while the node is configured; deactivate and clean up first"
                 return SetParametersResult(successful=False, reason=reason)
-            if reason := refusal(row, value):
+            if reason := unusable_value(row, value):
                 return SetParametersResult(successful=False, reason=reason.replace(row.name, parameter.name, 1))
             values[row.name] = value
         if reason := check(wanted, wanted_meshes):

@@ -10,7 +10,7 @@ from hpccd_ros.base.errors import UserError, sentence
 from hpccd_ros.detect.detection import Options, SceneBuilder
 from hpccd_ros.frames.mesh_file import FORMATS, MeshFileError, load_mesh, place
 from hpccd_ros.frames.types import MeshFrame, Topology
-from hpccd_ros.middleware import transform_topics
+from hpccd_ros.middleware import topic_names, transform_topics
 from hpccd_ros.params import parameters as table
 from hpccd_ros.params import scene_parameters
 from hpccd_ros.params.parameter_file import read_parameters
@@ -54,7 +54,7 @@ def of_recording(recording: Recording, parameter_file: str | None = None) -> Rep
         else:
             where, refused = f"{recording.path}: the stored parameters", RecordingError
             given = _stored(recording, info)
-        settings, meshes = table.of_plain(given)
+        settings, meshes = table.checked(given)
         if not settings["meshes"]:
             raise ParameterError("parameter `meshes` names no mesh")
         if all(row["static"] for row in meshes.values()):
@@ -64,7 +64,7 @@ def of_recording(recording: Recording, parameter_file: str | None = None) -> Rep
         raise refused(sentence(f"{where}: {error}")) from error
     by_role = _by_role(recording, info, recorded_topics.types_by_role(meshes))
     roles = {topic: ("", role) if role in transform_topics.ALL else tuple(role.split("/")[1:])
-             for role, topic in by_role.items() if role != "contacts"}  # fmt: skip
+             for role, topic in by_role.items() if role != topic_names.CONTACTS}  # fmt: skip
     if not any(kind in ("vertices", "points") for _, kind in roles.values()):
         raise RecordingError(
             f"{recording.path} holds no vertices of the meshes {', '.join(meshes)}; its topics are "
@@ -76,7 +76,7 @@ def of_recording(recording: Recording, parameter_file: str | None = None) -> Rep
             f"{recording.path}: mesh {moved[0]} was transformed by tf (parameter mesh.{moved[0]}.transform), and the "
             "recording holds no transforms: its positions cannot be computed again"
         )
-    return ReplaySetup(settings, meshes, roles, by_role.get("contacts"), _files(recording, meshes),
+    return ReplaySetup(settings, meshes, roles, by_role.get(topic_names.CONTACTS), _files(recording, meshes),
                        table.unknown(given, meshes))  # fmt: skip
 
 
@@ -111,8 +111,9 @@ def _by_role(recording, info, types) -> dict[str, str]:
         if role in found:
             raise RecordingError(f"{recording.path}: topics {found[role]} and {topic} are both stored as {role}")
         found[role] = topic
-    if "contacts" not in found and types["contacts"] == getattr(recording.topics.get("/contacts"), "type_name", None):
-        found["contacts"] = "/contacts"
+    contacts, outside = topic_names.CONTACTS, f"/{topic_names.CONTACTS}"
+    if contacts not in found and types[contacts] == getattr(recording.topics.get(outside), "type_name", None):
+        found[contacts] = outside
     return found
 
 

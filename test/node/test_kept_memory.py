@@ -105,7 +105,7 @@ def test_an_emptied_queue_keeps_nothing():
 
 NODE = """
 import sys
-from hpccd_ros import node
+from hpccd_ros.node import node
 node.GIVE_BACK_EVERY = float(sys.argv.pop(1))
 sys.exit(node.main())
 """

@@ -227,7 +227,7 @@ def test_counts_outlive_a_clean_up(start_node):
 
 MARKERS_MEANWHILE = """
 import sys
-from hpccd_ros import node
+from hpccd_ros.node import node
 class MarkersMeanwhile(node.HpccdNode):
     def _publish(self, found):
         self._settings["markers"] = True

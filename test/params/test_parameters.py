@@ -36,16 +36,16 @@ def node_with():
 
 @pytest.mark.parametrize("row", [*NODE_ROWS, *MESH_ROWS], ids=lambda row: row.name)
 def test_each_row_is_sound(row):
-    assert parameters.refusal(row, row.default) is None
+    assert parameters.unusable_value(row, row.default) is None
     assert row.text and not row.text.endswith(".")
     described = parameters.descriptor(row)
     assert described.read_only == (row.change == NEVER)
     if row.span is not None:
-        assert parameters.refusal(row, row.span[1] + 1) is not None
-        assert parameters.refusal(row, row.span[0] - 1) is not None
+        assert parameters.unusable_value(row, row.span[1] + 1) is not None
+        assert parameters.unusable_value(row, row.span[0] - 1) is not None
     if row.choices:
         value = ["nonsense"] if row.kind == "string[]" else "nonsense"
-        assert "nonsense" in parameters.refusal(row, value)
+        assert "nonsense" in parameters.unusable_value(row, value)
 
 
 def test_defaults(node_with):
