@@ -108,6 +108,13 @@ def test_readme_is_two_screens():
     assert len((ROOT / "README.md").read_text().splitlines()) <= 200
 
 
+def test_results_in_readme_are_those_of_the_page_of_figures():
+    results = (ROOT / "README.md").read_text().partition("## Results")[2].partition("\n#")[0]
+    figures = set(re.findall(r"[\d,.]+\d", (ROOT / "docs" / "performance.md").read_text()))
+    rows = re.findall(r"^\| [a-z-]+ \|(.*)\|$", results, re.MULTILINE)[1:]
+    assert rows and {cell.strip() for row in rows for cell in row.split("|")} <= figures
+
+
 def test_first_program_finds_what_it_says(tmp_path):
     program = re.search(r"```python\n(.*?)```", (ROOT / "README.md").read_text(), re.DOTALL).group(1)
     assert "first at 0.5" in output_of(program, tmp_path)
