@@ -6,7 +6,7 @@ import operator
 import numpy as np
 
 REALS = frozenset({np.dtype(np.float32), np.dtype(np.float64)})  # in this machine's byte order
-LARGEST_COORDINATE = 1e150  # largest_coordinate in src/bvh/motion_bounds.h
+LARGEST_COORDINATE = 1e150  # largest_coordinate in src/bvh/coordinate_map.h
 
 
 def flag(name, value):
