@@ -114,12 +114,13 @@ PYBIND11_MODULE(_core, m) {
   py::class_<Detector>(m, "Detector")
       .def(py::init([](std::shared_ptr<Scene> scene, Accuracy accuracy, Backend backend, Report report, Simd simd,
                        int threads, bool points, bool normals, double separation, double tolerance, Method method,
-                       bool restructure, std::size_t hybrid_segments, std::size_t hybrid_segment_pairs, int gpus) {
+                       bool restructure, std::size_t hybrid_segments, std::size_t hybrid_segment_pairs, int gpus,
+                       bool gpu_stages) {
         // A copy: what is added to the caller's scene later does not reach this detector.
         return std::make_unique<Detector>(
             std::make_shared<const Scene>(*scene),
             Options{accuracy, backend, report, simd, threads, points, normals, separation, tolerance, method,
-                    restructure, hybrid_segments, hybrid_segment_pairs, gpus});
+                    restructure, hybrid_segments, hybrid_segment_pairs, gpus, gpu_stages});
       }))
       .def(
           "detect",

@@ -44,7 +44,6 @@ class _MeshState:
         self.positions = StaticPositions()
         self.stamps = StampOrder(settings.name)
         self.new_publisher = False  # came, and none of its frames was accepted yet
-        self.only_publisher = True
 
 
 class FrameAssembler:
@@ -89,6 +88,11 @@ class FrameAssembler:
         return self._matcher.waiting + sum(len(m.early) for m in self._meshes.values())
 
     @property
+    def frame_id(self) -> str:
+        """The one in force, or ""."""
+        return self._frame.name
+
+    @property
     def coordinate_frame(self) -> tuple[str, str]:
         """(frame_id in force or "", where it comes from)."""
         return self._frame.name, self._frame.source
@@ -130,13 +134,12 @@ class FrameAssembler:
             outcome += self._admit(state, frame)
         return outcome
 
-    def add(self, mesh: str, frame: MeshFrame, new_publisher: bool = False, only_publisher: bool = True) -> Outcome:
-        """Add one vertex message. only_publisher: the mesh has no other publisher of vertices than its own."""
+    def add(self, mesh: str, frame: MeshFrame, new_publisher: bool = False) -> Outcome:
+        """Add one vertex message."""
         state = self._meshes.get(mesh)
         if state is None:
             return self._unknown(mesh, Input.VERTICES)
         state.new_publisher |= new_publisher
-        state.only_publisher = only_publisher
         return self._admit(state, frame)
 
     def clear(self, reason: Reason) -> list[Refusal]:
@@ -196,30 +199,34 @@ class FrameAssembler:
         matches, refusals = self._matcher.add(state.name, frame)
         outcome.refusals += refusals
         for match in matches:
-            outcome += self._complete(match)
+            completed = self._complete(match)
+            if isinstance(completed, SceneFrame):
+                outcome.frames.append(completed)
+            else:
+                outcome.refusals += completed
         return outcome
 
     def _check_frame_id(self, state: _MeshState, frame: MeshFrame) -> Refusal | Restart | None:
-        new_and_alone = state.new_publisher and state.only_publisher
+        new_and_alone = state.new_publisher and frame.only_publisher
         return self._frame.check(state.name, frame, self.restart_after, new_and_alone)
 
     def _check_stamp(self, state: _MeshState, frame: MeshFrame) -> Refusal | Restart | None:
         return state.stamps.check(frame.stamp, self.restart_after, state.new_publisher)
 
-    def _complete(self, match: Match) -> Outcome:
+    def _complete(self, match: Match) -> SceneFrame | list[Refusal]:
         frames = []
         frame_id = self._frame.name
         for name, state in self._meshes.items():
             frame = state.positions.fitting(frame_id) if state.static else match.frames[name]
             if frame is None:
                 text = _no_positions(state, frame_id)
-                return Outcome(refusals=[Refusal(fresh, Reason.STATIC_MISSING, text) for fresh in match.fresh])
+                return [Refusal(fresh, Reason.STATIC_MISSING, text) for fresh in match.fresh]
             frames.append(frame)
             frame_id = frame_id or frame.frame_id
         moving = [match.frames[n] for n in self._meshes if n in match.frames]
         step = next((f.step for f in moving if f.step is not None), self._completed)
         self._completed += 1
-        scene = SceneFrame(
+        return SceneFrame(
             stamp=match.stamp,
             step=step,
             frame_id=frame_id,
@@ -228,7 +235,6 @@ class FrameAssembler:
             fresh=match.fresh,
             received=max(f.received for f in moving),
         )
-        return Outcome(frames=[scene])
 
 
 def _no_positions(state: _MeshState, frame_id: str) -> str:

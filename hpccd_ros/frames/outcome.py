@@ -7,7 +7,7 @@ from hpccd_ros.frames.drops import Refusal
 from hpccd_ros.frames.types import SceneFrame
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, slots=True)
 class Outcome:
     """``frames`` of the scene that a message completes (usually none or one), ``refusals``: what will not be used.
 

@@ -29,7 +29,7 @@ class FramePipeline:
     ) -> None:
         self._meshes = tuple(meshes)
         self._max_pending = max_pending
-        self._frame_id = frame_id
+        self._demanded_frame_id = frame_id
         self._assembler = FrameAssembler(
             self._meshes,
             max_pending=max_pending,
@@ -47,24 +47,20 @@ class FramePipeline:
             outcome += self._assembler.add(mesh, positions)
         return outcome
 
-    def push(
-        self, mesh: str, message: MeshFrame | Topology, new_publisher: bool = False, only_publisher: bool = True
-    ) -> Outcome:
+    def push(self, mesh: str, message: MeshFrame | Topology, new_publisher: bool = False) -> Outcome:
         """One message of ``mesh``; frames that it completes are in the queue, if there is one.
 
-        new_publisher: its first message, or the first that could be read. only_publisher: the mesh has no other one.
+        new_publisher: it is the first of its publisher, or the first that could be read.
         """
         if isinstance(message, Topology):
             return self._enqueue(self._assembler.set_topology(mesh, message, new_publisher))
-        transformed = self._transformers[mesh].transform(message, new_publisher)
-        return self._enqueue(self._assemble(mesh, transformed, only_publisher))
+        return self._enqueue(self._assemble(mesh, self._transformers[mesh].transform(message, new_publisher)))
 
     def retry(self) -> Outcome:
         """Frames go on that waited for transforms which have come."""
         outcome = Outcome()
         for mesh, transformer in self._transformers.items():
-            # Only where the scene's frame is demanded do frames wait: then nothing depends on how many publishers are.
-            outcome += self._assemble(mesh, transformer.retry(), only_publisher=True)
+            outcome += self._assemble(mesh, transformer.retry())
         return self._enqueue(outcome)
 
     def start(self, capacity: int) -> FrameQueue:
@@ -92,6 +88,11 @@ class FramePipeline:
         return before + sum(len(frame.fresh) for frame in queued)
 
     @property
+    def frame_id(self) -> str:
+        """Of the scene; "" as long as no message has named one."""
+        return self._assembler.frame_id
+
+    @property
     def coordinate_frame(self) -> tuple[str, str]:
         """(frame_id of the scene or "", where it comes from)."""
         return self._assembler.coordinate_frame
@@ -111,10 +112,10 @@ class FramePipeline:
         """Positions of static meshes that are not used."""
         return self._assembler.warnings()
 
-    def _assemble(self, mesh: str, transformed: Transformed, only_publisher: bool) -> Outcome:
+    def _assemble(self, mesh: str, transformed: Transformed) -> Outcome:
         outcome = Outcome(refusals=transformed.refusals)
         for frame, new_publisher in transformed.frames:
-            outcome += self._assembler.add(mesh, frame, new_publisher, only_publisher)
+            outcome += self._assembler.add(mesh, frame, new_publisher)
         return outcome
 
     def _enqueue(self, outcome: Outcome) -> Outcome:
@@ -127,6 +128,6 @@ class FramePipeline:
     def _forget_transforms(self) -> None:
         self.transforms = TransformBuffer()
         self._transformers = {
-            mesh.name: MeshTransformer(mesh, self._frame_id, self._max_pending, self.transforms)
+            mesh.name: MeshTransformer(mesh, self._demanded_frame_id, self._max_pending, self.transforms)
             for mesh in self._meshes
         }

@@ -40,7 +40,8 @@ class MeshFrame:
 
     ``stamp`` ns, end of the step. ``version``: of the topology it belongs to; None (PointCloud2 has none):
     the one in force. ``step``: the publisher's number, None where it gives none. ``vertices`` (n,3) float32
-    or float64, finite. ``received``: time.monotonic() at its arrival. ``topology``: set by the assembler.
+    or float64, finite. ``received``: time.monotonic() at its arrival; ``only_publisher``: its mesh had no other one of
+    vertices then. ``topology``: set by the assembler.
     """
 
     stamp: int
@@ -49,6 +50,7 @@ class MeshFrame:
     step: int | None = None
     frame_id: str = ""
     received: float = 0.0
+    only_publisher: bool = True
     topology: Topology | None = None
 
 

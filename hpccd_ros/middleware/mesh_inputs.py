@@ -15,17 +15,21 @@ TYPES = {TOPOLOGY: MeshTopology, VERTICES: MeshVertices, POINTS: PointCloud2}
 INPUTS = {TOPOLOGY: Input.TOPOLOGY, VERTICES: Input.VERTICES, POINTS: Input.VERTICES}
 
 
-def read(kind: str, message: Any, limits: dict[str, Any], received: float = 0.0) -> Topology | MeshFrame:
+def read(
+    kind: str, message: Any, limits: dict[str, Any], received: float = 0.0, only_publisher: bool = True
+) -> Topology | MeshFrame:
     """Arrays of the frame are views of the message's bytes where it allows that.
 
-    limits: max_vertices, max_faces. received: time.monotonic() at its arrival. Raises InvalidMessageError.
+    limits: max_vertices, max_faces. received, only_publisher: of the frame, as in `MeshFrame`.
+    Raises InvalidMessageError.
     """
     if kind == TOPOLOGY:
         return mesh_messages.topology_from_message(message, limits["max_vertices"], limits["max_faces"])
-    stamp = fields.stamp_to_ns(message.header.stamp)
+    stamp, frame_id = fields.stamp_to_ns(message.header.stamp), message.header.frame_id
     if kind == VERTICES:
         vertices = mesh_messages.vertices_from_message(message, limits["max_vertices"])
-        return MeshFrame(stamp, vertices, message.topology_version, message.step, message.header.frame_id, received)
-    # A cloud tells neither the version of its topology nor a step.
-    vertices = mesh_messages.vertices_from_cloud(message, limits["max_vertices"])
-    return MeshFrame(stamp, vertices, None, None, message.header.frame_id, received)
+        version, step = message.topology_version, message.step
+    else:
+        vertices = mesh_messages.vertices_from_cloud(message, limits["max_vertices"])
+        version = step = None  # a cloud tells neither
+    return MeshFrame(stamp, vertices, version, step, frame_id, received, only_publisher)

@@ -15,8 +15,9 @@ def topology(version=0, n_vertices=3, faces=FACES):
     return Topology(version, n_vertices, faces)
 
 
-def frame(stamp, version=0, n=3, value=0.0, step=None, frame_id=""):
-    return MeshFrame(stamp, np.full((n, 3), value, np.float32), version, step, frame_id, received=float(stamp))
+def frame(stamp, version=0, n=3, value=0.0, step=None, frame_id="", only_publisher=True):
+    vertices = np.full((n, 3), value, np.float32)
+    return MeshFrame(stamp, vertices, version, step, frame_id, float(stamp), only_publisher)
 
 
 class Scene:
@@ -38,9 +39,9 @@ class Scene:
     def set_topology(self, *args, **kwargs):
         return self._frames(self.assembler.set_topology(*args, **kwargs))
 
-    def add(self, mesh, *args, new_publisher=False, only_publisher=True, **kwargs):
+    def add(self, mesh, *args, new_publisher=False, **kwargs):
         self.sent += 1
-        return self._frames(self.assembler.add(mesh, frame(*args, **kwargs), new_publisher, only_publisher))
+        return self._frames(self.assembler.add(mesh, frame(*args, **kwargs), new_publisher))
 
     def _frames(self, outcome):
         for refusal in outcome.refusals:
