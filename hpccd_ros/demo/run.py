@@ -12,8 +12,8 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
 from hpccd_ros import scenes
+from hpccd_ros.bag.examine import examine
 from hpccd_ros.bag.reader import Recording
-from hpccd_ros.bag.recover import examine
 from hpccd_ros.base.errors import UserError
 from hpccd_ros.demo.children import Children
 from hpccd_ros.replay import recorded_setup

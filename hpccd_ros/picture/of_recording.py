@@ -4,22 +4,22 @@
 import numpy as np
 
 from hpccd_ros.picture import contacts as picture
-from hpccd_ros.replay.recomputed import Step
+from hpccd_ros.replay.recomputed import ReplayedStep
 
 
 class History:
-    """Step number, contacts and milliseconds of each step that was computed."""
+    """Number, contacts and milliseconds of each step that was computed."""
 
     def __init__(self):
         self.steps, self.contacts, self.milliseconds = [], [], []
 
-    def add(self, step: Step) -> None:
+    def add(self, step: ReplayedStep) -> None:
         self.steps.append(step.step)
         self.contacts.append(step.total)
         self.milliseconds.append(step.milliseconds)
 
 
-def draw_step(step: Step, path, history: History | None = None, *, title: str, **view) -> None:
+def draw_step(step: ReplayedStep, path, history: History | None = None, *, title: str, **view) -> None:
     """Write a picture of `step`, which was computed with outputs=("points",). view: azimuth, elevation, size."""
     found = step.contacts
     meshes, offsets = meshes_in_the_middle(step), step.layout.vertex_offsets
@@ -48,7 +48,7 @@ def draw_step(step: Step, path, history: History | None = None, *, title: str, *
     picture.draw(drawn, path, context, **view)
 
 
-def meshes_in_the_middle(step: Step):
+def meshes_in_the_middle(step: ReplayedStep):
     """[(name, vertices (V,3), faces (F,3))] in the middle of the step, so that contacts at any time of it lie close to
     the surfaces."""
     start, end = step.start_frame, step.end_frame
