@@ -93,6 +93,7 @@ class Detector:
         arg12: int,
         arg13: int,
         arg14: int,
+        arg15: bool,
     ) -> None: ...
     def detect(self, vertices_t0: NDArray[Any], vertices_t1: NDArray[Any]) -> _Contacts: ...
     def detect_on_device(
