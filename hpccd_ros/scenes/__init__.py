@@ -15,9 +15,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from . import breaking, cloth, cloth_ball, n_body, small
-from .core import core_scene
-from .scene import Frame, Mesh, Scene, Topology
+from hpccd_ros.scenes import breaking, cloth, cloth_ball, n_body, small
+from hpccd_ros.scenes.core import core_scene
+from hpccd_ros.scenes.scene import Frame, Mesh, Scene, Topology
 
 __all__ = ["Frame", "Mesh", "Scene", "Topology", "core_scene", "describe", "make", "names"]
 

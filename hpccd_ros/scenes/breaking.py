@@ -14,9 +14,9 @@ from functools import lru_cache
 
 import numpy as np
 
-from . import cache, rigid, shapes
-from .exactmath import PI, dot, length, normalized, random_stream, rotate, sincos
-from .scene import Frame, Mesh, Scene, Topology
+from hpccd_ros.scenes import cache, rigid, shapes
+from hpccd_ros.scenes.exactmath import PI, dot, length, normalized, random_stream, rotate, sincos
+from hpccd_ros.scenes.scene import Frame, Mesh, Scene, Topology
 
 FRAME_PERIOD = 1 / 60
 PIECES = 160

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from . import exactmath
+from hpccd_ros.scenes import exactmath
 
 
 def folder() -> Path:

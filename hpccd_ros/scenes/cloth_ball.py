@@ -7,9 +7,9 @@ from functools import lru_cache
 
 import numpy as np
 
-from . import cache, cloth, shapes
-from .exactmath import axis_angle, rotate
-from .scene import Frame, Mesh, Scene
+from hpccd_ros.scenes import cache, cloth, shapes
+from hpccd_ros.scenes.exactmath import axis_angle, rotate
+from hpccd_ros.scenes.scene import Frame, Mesh, Scene
 
 
 def make(

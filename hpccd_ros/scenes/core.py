@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from .scene import Scene
+from hpccd_ros.scenes.scene import Scene
 
 
 def core_scene(scene: Scene, index: int = 0):

@@ -12,10 +12,9 @@ from hpccd_ros.bag.qos_yaml import INFINITE
 from hpccd_ros.bag.writer import BagWriter, Topic
 from hpccd_ros.base.version import package_version
 from hpccd_ros.middleware import message_types, topic_names
-
-from . import messages
-from .progress import track
-from .scene import Scene
+from hpccd_ros.scenes import messages
+from hpccd_ros.scenes.progress import track
+from hpccd_ros.scenes.scene import Scene
 
 # Frame 0 of a file is stamped with this second, so that the same scene makes the same bytes at any time.
 FIRST_STAMP_NS = 1_000_000_000

@@ -6,10 +6,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from hpccd_ros.middleware import topic_names
-
-from . import cdr
-from .scene import Frame, Scene
+from hpccd_ros.middleware import mesh_cdr, topic_names
+from hpccd_ros.scenes.scene import Frame, Scene
 
 
 @dataclass(frozen=True)
@@ -48,11 +46,11 @@ class Player:
             else:
                 continue
             self._version[mesh.name] = self._base[mesh.name] + version
-            data = cdr.topology(stamp_ns, self._frame_id, self._version[mesh.name], faces, n_vertices)
+            data = mesh_cdr.topology(stamp_ns, self._frame_id, self._version[mesh.name], faces, n_vertices)
             yield Message(topic_names.topology(mesh.name), stamp_ns, data)
         meshes = zip(self._scene.meshes, frame, strict=True)
         for mesh, xyz in sorted(meshes, key=lambda pair: not pair[0].static):
-            data = cdr.vertices(stamp_ns, self._frame_id, self._version[mesh.name], self._step, xyz)
+            data = mesh_cdr.vertices(stamp_ns, self._frame_id, self._version[mesh.name], self._step, xyz)
             yield Message(topic_names.vertices(mesh.name), stamp_ns, data)
         self._step += 1
 

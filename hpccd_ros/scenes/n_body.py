@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from . import cache, rigid, shapes
-from .exactmath import PI, normalized, random_stream, sincos
-from .scene import Frame, Mesh, Scene
+from hpccd_ros.scenes import cache, rigid, shapes
+from hpccd_ros.scenes.exactmath import PI, normalized, random_stream, sincos
+from hpccd_ros.scenes.scene import Frame, Mesh, Scene
 
 FRAME_PERIOD = 1 / 60
 BODIES = 60

@@ -13,11 +13,10 @@ from rclpy.signals import SignalHandlerOptions
 
 from hpccd_ros.middleware import environment, qos, stop_signals, topic_names
 from hpccd_ros.middleware.listeners import await_acknowledged, await_subscribers
-
-from .answers import Answers
-from .messages import Player
-from .progress import track
-from .scene import Scene
+from hpccd_ros.scenes.answers import Answers
+from hpccd_ros.scenes.messages import Player
+from hpccd_ros.scenes.progress import track
+from hpccd_ros.scenes.scene import Scene
 
 # Seconds between the static meshes and the first frame.
 SETTLE = 0.2

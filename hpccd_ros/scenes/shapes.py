@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .exactmath import PI, cross, normalized, sincos
+from hpccd_ros.scenes.exactmath import PI, cross, normalized, sincos
 
 
 def icosphere(frequency: int):

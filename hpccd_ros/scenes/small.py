@@ -5,9 +5,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from . import shapes
-from .exactmath import PI, sincos
-from .scene import Frame, Mesh, Scene
+from hpccd_ros.scenes import shapes
+from hpccd_ros.scenes.exactmath import PI, sincos
+from hpccd_ros.scenes.scene import Frame, Mesh, Scene
 
 FRAME_PERIOD = 1 / 30
 

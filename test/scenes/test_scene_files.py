@@ -5,55 +5,15 @@ import numpy as np
 import pytest
 import yaml
 from rosbags.highlevel import AnyReader
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from hpccd_ros import scenes
-from hpccd_ros.bag import message_definitions
 from hpccd_ros.bag.reader import Recording
-from hpccd_ros.middleware import message_types
-from hpccd_ros.scenes import cdr, files
+from hpccd_ros.scenes import files
 
 
 @pytest.fixture(scope="module")
 def breaking():
     return scenes.make("breaking-like", size=1 / 64, frames=14)
-
-
-@pytest.fixture(scope="module")
-def typestore():
-    """An independent implementation of CDR that knows our two messages."""
-    store = get_typestore(Stores.ROS2_JAZZY)
-    for name in (message_types.TOPOLOGY, message_types.VERTICES):
-        text = message_definitions.definition_text(name).split(message_definitions.SEPARATOR)[0]
-        store.register(get_types_from_msg(text, name))
-    return store
-
-
-@pytest.mark.parametrize("frame_id", ["", "a", "abc", "abcd", "world", "côté"])
-@pytest.mark.parametrize("count", [0, 1, 2, 5])
-def test_cdr_is_that_of_an_independent_writer(typestore, frame_id, count):
-    faces = np.arange(3 * count, dtype=np.uint32).reshape(-1, 3)
-    xyz = np.linspace(-1, 1, 3 * count, dtype=np.float32).reshape(-1, 3)
-    for data, name in (
-        (cdr.topology(5_000_000_007, frame_id, 3, faces, 3 * count), message_types.TOPOLOGY),
-        (cdr.vertices(5_000_000_007, frame_id, 3, 2**40, xyz), message_types.VERTICES),
-    ):
-        message = typestore.deserialize_cdr(data, name)
-        assert bytes(typestore.serialize_cdr(message, name)) == data
-        assert (message.header.stamp.sec, message.header.stamp.nanosec) == (5, 7)
-        assert message.header.frame_id == frame_id
-        if name == message_types.TOPOLOGY:
-            assert (message.version, message.n_vertices) == (3, 3 * count)
-            np.testing.assert_array_equal(message.faces, faces.ravel())
-        else:
-            assert (message.topology_version, message.step) == (3, 2**40)
-            np.testing.assert_array_equal(message.vertices_f32, xyz.ravel())
-            assert len(message.vertices_f64) == 0
-
-
-def test_cdr_takes_float32_only():
-    with pytest.raises(TypeError, match="xyz has dtype float64"):
-        cdr.vertices(0, "", 0, 0, np.zeros((1, 3)))
 
 
 def test_mcap_holds_every_frame_for_independent_readers(breaking, tmp_path):

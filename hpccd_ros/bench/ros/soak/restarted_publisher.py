@@ -20,8 +20,7 @@ from hpccd.msg import MeshTopology, MeshVertices
 from rclpy.signals import SignalHandlerOptions
 
 from hpccd_ros import scenes
-from hpccd_ros.middleware import environment, qos, stop_signals, topic_names
-from hpccd_ros.scenes import cdr
+from hpccd_ros.middleware import environment, mesh_cdr, qos, stop_signals, topic_names
 
 MESH = "strip"
 SIZE = 0.1  # 336 triangles: a soak wants many frames, not large ones
@@ -58,7 +57,7 @@ def main(namespace: str, rate: float, counter: Path) -> int:
         if time.monotonic() > deadline:
             print(f"no node listens to {MESH} in {namespace}", file=sys.stderr)
             return 1
-    topology.publish(cdr.topology(0, "world", 0, mesh.faces, mesh.n_vertices))
+    topology.publish(mesh_cdr.topology(0, "world", 0, mesh.faces, mesh.n_vertices))
     with open(counter, "r+b") as file, mmap.mmap(file.fileno(), 8) as shared:
         (sent,) = struct.unpack("<Q", shared)
         tick = int(time.time() * rate) + 1
@@ -66,7 +65,7 @@ def main(namespace: str, rate: float, counter: Path) -> int:
             sent += 1
             shared[:] = struct.pack("<Q", sent)
             stamp = stamp_of(tick, rate)
-            vertices.publish(cdr.vertices(stamp, "world", 0, tick, scene.frame(frame_of(tick, scene))[0]))
+            vertices.publish(mesh_cdr.vertices(stamp, "world", 0, tick, scene.frame(frame_of(tick, scene))[0]))
             tick += 1
     node.destroy_node()
     rclpy.try_shutdown()

@@ -25,7 +25,7 @@ def topology(stamp_ns: int, frame_id: str, version: int, faces: np.ndarray, n_ve
 def vertices(stamp_ns: int, frame_id: str, topology_version: int, step: int, xyz: np.ndarray) -> bytes:
     """hpccd/msg/MeshVertices with `xyz` (V,3) float32 in `vertices_f32`."""
     if xyz.dtype != np.float32:
-        raise TypeError(f"xyz has dtype {xyz.dtype}; scenes send float32")
+        raise TypeError(f"xyz has dtype {xyz.dtype}; it is sent as float32: convert it with astype(numpy.float32)")
     body = _header(stamp_ns, frame_id) + struct.pack("<I", topology_version)
     body += b"\0" * (-len(body) % 8)
     body += struct.pack("<QI", step, xyz.size)
