@@ -84,6 +84,16 @@ def test_commands(page):
                 assert option in options(command) | {"--help"}, word
 
 
+def test_texts_name_pages_that_are_there():
+    """Messages, help and comments: never a part of the README, which has moved to a page."""
+    suffixes = {".py", ".yaml", ".xml", ".msg", ".srv", ".rviz"}
+    for folder in ("hpccd_ros", "hpccd_core", "config", "msg", "srv"):
+        for file in (file for file in (ROOT / folder).rglob("*") if file.suffix in suffixes):
+            text = file.read_text()
+            assert "README" not in text, file
+            assert all((ROOT / page).exists() for page in re.findall(r"docs/\w+\.md", text)), file
+
+
 def options(command):
     """All that the command takes, those of each benchmark together."""
     parser = argparse.ArgumentParser()
