@@ -2,6 +2,7 @@
 """The detector: motion of a scene in, contacts out."""
 
 import contextlib
+import os
 import re
 import threading
 from collections.abc import Iterable, Iterator
@@ -106,6 +107,7 @@ class Detector:
             getattr(_core.Method, method),
             arguments.flag("restructure", restructure),
             *queue,
+            bool(os.environ.get("HPCCD_GPU_STAGES")),  # for measuring: device time by stage in `profile`
         )
         self._stepping = threading.RLock()  # of the positions of the last step
         self._last: NDArray[Any] | None = None

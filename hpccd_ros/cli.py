@@ -7,7 +7,6 @@ the module of the command that was asked for is imported: `hpccd --help` needs n
 
 import argparse
 import importlib
-import importlib.util
 import signal
 import sys
 
@@ -94,8 +93,6 @@ def _run(argv, asked) -> int:
     subparsers = parser.add_subparsers(dest="command", metavar="<command>", required=True)
     run = None
     for name, summary in COMMANDS.items():
-        if importlib.util.find_spec(f"hpccd_ros.commands.{name}") is None:
-            continue
         subparser = subparsers.add_parser(
             name, help=summary, formatter_class=argparse.RawDescriptionHelpFormatter
         )

@@ -126,7 +126,7 @@ def of_recording(path: Path) -> Source:
     with Recording(path) as recording:
         setup = recorded_setup.of_recording(recording)
         source = FrameSource(setup, recording.topics)
-        frames = [f for message in recording.messages(source.topics) for f in source.take(message)]
+        frames = [f for message in recording.messages(source.topics) for f in source.push(message)]
     if len(frames) < 2:
         raise UserError(f"{path}: holds {len(frames)} frames of all meshes; a step needs two")
     builder = setup.builder

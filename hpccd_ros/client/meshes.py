@@ -57,7 +57,7 @@ def vertices_message(
         raise TypeError(f"vertices: expected an array of float32 or float64, got {kind}; convert with numpy.asarray")
     if vertices.ndim != 2 or vertices.shape[1] != 3 or not len(vertices):
         raise ValueError(f"vertices: expected shape (n, 3), one row a vertex and at least one, got {vertices.shape}")
-    if unusable := coordinates.refusal(vertices):
+    if unusable := coordinates.unusable_coordinates(vertices):
         raise ValueError(f"vertices: {unusable[1]}")
     if not isinstance(frame_id, str):
         raise TypeError(f"frame_id: expected a string, got {type(frame_id).__name__}")

@@ -6,29 +6,25 @@ import threading
 import hpccd_core as hc
 
 
-class Ongoing:
-    """`use` each detector before it works; `end` makes the one in use, and all later ones, raise hc.Cancelled."""
+class Cancellation:
+    """`guard` each detector before it works; `cancel` makes the last one, and all later ones, raise hc.Cancelled."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._detector: hc.Detector | None = None
-        self._ended = False
+        self._cancelled = False
 
-    @property
-    def ended(self) -> bool:
-        return self._ended
-
-    def use(self, detector: hc.Detector) -> hc.Detector:
-        """`detector`, from now on the one that `end` ends."""
+    def guard(self, detector: hc.Detector) -> hc.Detector:
+        """`detector`, from now on the one that `cancel` ends."""
         with self._lock:
             self._detector = detector
-            if self._ended:
+            if self._cancelled:
                 detector.cancel()
         return detector
 
-    def end(self) -> None:
+    def cancel(self) -> None:
         """From any thread; for good."""
         with self._lock:
-            self._ended = True
+            self._cancelled = True
             if self._detector is not None:
                 self._detector.cancel()

@@ -7,7 +7,7 @@ from hpccd_core.arguments import LARGEST_COORDINATE
 from hpccd_ros.frames.drops import Reason
 
 
-def refusal(vertices: np.ndarray) -> tuple[Reason, str] | None:
+def unusable_coordinates(vertices: np.ndarray) -> tuple[Reason, str] | None:
     """Why the core cannot take these positions, (n,3), or None."""
     # Two reductions, as they need no array of their own; NaN passes through both and compares false.
     if not len(vertices) or (

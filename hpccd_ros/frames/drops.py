@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Why a frame did not take part in a detection, and how often.
 
+Whoever drops a message hands a `Refusal` back to its caller; counters at the end add them up.
 The unit is one vertex message of one mesh, so that the counts add up:
 received + lost in the middleware = answered + dropped + still waiting.
 """
 
 import threading
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
+from dataclasses import dataclass
 from enum import StrEnum
 
 
@@ -42,31 +44,44 @@ class Reason(StrEnum):
     STOPPED = "stopped"  # was waiting when the node was deactivated
 
 
-Listener = Callable[[str, Reason, str], None]
+class Input(StrEnum):
+    """What a refused message was."""
+
+    VERTICES = "vertex messages"
+    TOPOLOGY = "topologies"
+    TRANSFORM = "transforms"
 
 
-class DropCounter:
-    """Counts by mesh and reason; may be used from several threads.
+@dataclass(frozen=True, slots=True)
+class Refusal:
+    """``messages`` of ``mesh`` (of a transform: its topic) that will not be used, and why.
 
-    ``listener(mesh, reason, text)`` is called outside the lock for each count that comes with a text.
+    ``text``: what was wrong and what to do, for the log; "": nobody can do anything about it.
     """
 
-    def __init__(self, listener: Listener | None = None) -> None:
+    mesh: str
+    reason: Reason
+    text: str = ""
+    messages: int = 1
+    what: Input = Input.VERTICES
+
+
+class RefusalCounter:
+    """Counts by mesh and reason; may be used from several threads."""
+
+    def __init__(self) -> None:
         self._lock = threading.Lock()
         self._counts: dict[tuple[str, Reason], int] = {}
         self._total = 0
         self._by_mesh: dict[str, int] = {}
-        self._listener = listener
 
-    def count(self, mesh: str, reason: Reason, text: str = "", n: int = 1) -> None:
-        """Add ``n`` drops of ``mesh`` for ``reason``; ``text`` says what was wrong and what to do."""
+    def count(self, refusal: Refusal) -> None:
+        """Add the messages of one refusal."""
         with self._lock:
-            key = (mesh, reason)
-            self._counts[key] = self._counts.get(key, 0) + n
-            self._total += n
-            self._by_mesh[mesh] = self._by_mesh.get(mesh, 0) + n
-        if text and self._listener is not None:
-            self._listener(mesh, reason, text)
+            key = (refusal.mesh, refusal.reason)
+            self._counts[key] = self._counts.get(key, 0) + refusal.messages
+            self._total += refusal.messages
+            self._by_mesh[refusal.mesh] = self._by_mesh.get(refusal.mesh, 0) + refusal.messages
 
     @property
     def total(self) -> int:

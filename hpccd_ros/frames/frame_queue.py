@@ -60,7 +60,7 @@ class FrameQueue:
             self._items.remove(item)
         return [item.frame for item in useless]
 
-    def take(self) -> Queued | None:
+    def pop(self) -> Queued | None:
         """Wait for the oldest frame; None once the queue is closed."""
         with self._changed:
             self._changed.wait_for(lambda: self._items or self._closed)

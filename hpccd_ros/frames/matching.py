@@ -7,9 +7,9 @@ that has reached stamp s will never fill a gap before s.
 
 from collections import deque
 from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
-from hpccd_ros.frames.drops import DropCounter, Reason
+from hpccd_ros.frames.drops import Reason, Refusal
 from hpccd_ros.frames.types import MeshFrame
 
 
@@ -22,12 +22,19 @@ class Match:
     fresh: tuple[str, ...]
 
 
-class Matcher(Protocol):
-    def add(self, mesh: str, frame: MeshFrame) -> list[Match]:
-        """Take one frame; return the matches that it completes, oldest first."""
+class Matched(NamedTuple):
+    """What one frame brought about: ``matches`` that it completes, oldest first, and frames that are given up."""
 
-    def clear(self, reason: Reason) -> None:
-        """Drop all that waits, counted as ``reason``."""
+    matches: list[Match]
+    refusals: list[Refusal]
+
+
+class Matcher(Protocol):
+    def add(self, mesh: str, frame: MeshFrame) -> Matched:
+        """Add one frame to those that wait."""
+
+    def clear(self, reason: Reason) -> list[Refusal]:
+        """Drop all that waits, for ``reason``."""
 
     @property
     def waiting(self) -> int:
@@ -40,43 +47,39 @@ class ExactMatcher:
     At most ``max_pending`` stamps wait; the oldest gives way.
     """
 
-    def __init__(self, meshes: list[str], drops: DropCounter, max_pending: int) -> None:
+    def __init__(self, meshes: list[str], max_pending: int) -> None:
         self._meshes = meshes
-        self._drops = drops
         self._max_pending = max_pending
         self._pending: dict[int, dict[str, MeshFrame]] = {}
         self._closed_up_to: int | None = None
 
-    def add(self, mesh: str, frame: MeshFrame) -> list[Match]:
+    def add(self, mesh: str, frame: MeshFrame) -> Matched:
         if self._closed_up_to is not None and frame.stamp <= self._closed_up_to:
-            self._drops.count(mesh, Reason.LATE, f"stamp {frame.stamp} ns was already answered or given up")
-            return []
+            text = f"stamp {frame.stamp} ns was already answered or given up"
+            return Matched([], [Refusal(mesh, Reason.LATE, text)])
         group = self._pending.setdefault(frame.stamp, {})
         group[mesh] = frame
         if len(group) == len(self._meshes):
             del self._pending[frame.stamp]
-            for stamp in [s for s in self._pending if s < frame.stamp]:
-                self._give_up(stamp)
             self._closed_up_to = frame.stamp
-            return [Match(frame.stamp, group, tuple(self._meshes))]
+            earlier = [stamp for stamp in self._pending if stamp < frame.stamp]
+            refusals = [refusal for stamp in earlier for refusal in self._give_up(stamp)]
+            return Matched([Match(frame.stamp, group, tuple(self._meshes))], refusals)
         if len(self._pending) > self._max_pending:
-            oldest = min(self._pending)
-            self._give_up(oldest)
-            self._closed_up_to = oldest
-        return []
+            self._closed_up_to = min(self._pending)
+            return Matched([], self._give_up(self._closed_up_to))
+        return Matched([], [])
 
-    def _give_up(self, stamp: int) -> None:
+    def _give_up(self, stamp: int) -> list[Refusal]:
         group = self._pending.pop(stamp)
         missing = ", ".join(m for m in self._meshes if m not in group)
-        for mesh in group:
-            self._drops.count(mesh, Reason.INCOMPLETE, f"stamp {stamp} ns has no frame of {missing}")
+        return [Refusal(mesh, Reason.INCOMPLETE, f"stamp {stamp} ns has no frame of {missing}") for mesh in group]
 
-    def clear(self, reason: Reason) -> None:
-        for group in self._pending.values():
-            for mesh in group:
-                self._drops.count(mesh, reason)
+    def clear(self, reason: Reason) -> list[Refusal]:
+        refusals = [Refusal(mesh, reason) for group in self._pending.values() for mesh in group]
         self._pending.clear()
         self._closed_up_to = None
+        return refusals
 
     @property
     def waiting(self) -> int:
@@ -90,29 +93,27 @@ class NearestMatcher:
     used again while they are the nearest. At most ``max_pending`` frames of each mesh wait.
     """
 
-    def __init__(self, meshes: list[str], drops: DropCounter, max_pending: int, tolerance: int) -> None:
+    def __init__(self, meshes: list[str], max_pending: int, tolerance: int) -> None:
         self._reference, *self._others = meshes
-        self._drops = drops
         self._max_pending = max_pending
         self._tolerance = tolerance
         self._queues: dict[str, deque[MeshFrame]] = {m: deque() for m in meshes}
         self._used: set[int] = set()  # id() of queued frames of the other meshes that were in a match
 
-    def add(self, mesh: str, frame: MeshFrame) -> list[Match]:
-        self._queues[mesh].append(frame)
-        matches = self._advance()
+    def add(self, mesh: str, frame: MeshFrame) -> Matched:
         queue = self._queues[mesh]
+        queue.append(frame)
+        matches, refusals = self._advance()
         if len(queue) > self._max_pending:
             if mesh == self._reference:
-                text = f"stamp {queue[0].stamp} ns waited in vain for the other meshes"
-                self._drops.count(mesh, Reason.INCOMPLETE, text)
-                queue.popleft()
+                text = f"stamp {queue.popleft().stamp} ns waited in vain for the other meshes"
+                refusals.append(Refusal(mesh, Reason.INCOMPLETE, text))
             else:
-                self._discard(mesh, Reason.INCOMPLETE)
-        return matches
+                refusals += self._discard(mesh)
+        return Matched(matches, refusals)
 
-    def _advance(self) -> list[Match]:
-        matches = []
+    def _advance(self) -> Matched:
+        matches, refusals = [], []
         references = self._queues[self._reference]
         while references:
             stamp = references[0].stamp
@@ -120,42 +121,45 @@ class NearestMatcher:
             if any(not q or q[-1].stamp < stamp for q in map(self._queues.get, self._others)):
                 break
             reference = references.popleft()
-            nearest = {m: self._nearest(m, stamp) for m in self._others}
+            for mesh in self._others:
+                refusals += self._discard_farther(mesh, stamp)
+            nearest = {mesh: self._queues[mesh][0] for mesh in self._others}
             far = [m for m, f in nearest.items() if abs(f.stamp - stamp) > self._tolerance]
             if far:
-                self._drops.count(
-                    self._reference,
-                    Reason.INCOMPLETE,
+                text = (
                     f"stamp {stamp} ns has no frame of {', '.join(far)} within the tolerance "
-                    f"of {self._tolerance} ns (parameter stamp_tolerance)",
+                    f"of {self._tolerance} ns (parameter stamp_tolerance)"
                 )
+                refusals.append(Refusal(self._reference, Reason.INCOMPLETE, text))
                 continue
             fresh = [self._reference] + [m for m, f in nearest.items() if id(f) not in self._used]
             self._used.update(map(id, nearest.values()))
             matches.append(Match(stamp, {self._reference: reference, **nearest}, tuple(fresh)))
-        return matches
+        return Matched(matches, refusals)
 
-    def _nearest(self, mesh: str, stamp: int) -> MeshFrame:
-        queue = self._queues[mesh]
+    def _discard_farther(self, mesh: str, stamp: int) -> list[Refusal]:
+        """Leave the frame that is nearest to ``stamp`` as the first of its queue."""
+        queue, refusals = self._queues[mesh], []
         # References come in order, so what is farther than its successor now is so for all that follow.
         while len(queue) > 1 and abs(queue[1].stamp - stamp) <= abs(queue[0].stamp - stamp):
-            self._discard(mesh, Reason.INCOMPLETE)
-        return queue[0]
+            refusals += self._discard(mesh)
+        return refusals
 
-    def _discard(self, mesh: str, reason: Reason) -> None:
+    def _discard(self, mesh: str) -> list[Refusal]:
         frame = self._queues[mesh].popleft()
         if id(frame) in self._used:
             self._used.remove(id(frame))
-        else:
-            self._drops.count(mesh, reason, f"stamp {frame.stamp} ns is the nearest of no other frame")
+            return []
+        return [Refusal(mesh, Reason.INCOMPLETE, f"stamp {frame.stamp} ns is the nearest of no other frame")]
 
-    def clear(self, reason: Reason) -> None:
-        for mesh, queue in self._queues.items():
-            for frame in queue:
-                if id(frame) not in self._used:
-                    self._drops.count(mesh, reason)
+    def clear(self, reason: Reason) -> list[Refusal]:
+        refusals = [
+            Refusal(mesh, reason) for mesh, queue in self._queues.items() for f in queue if id(f) not in self._used
+        ]
+        for queue in self._queues.values():
             queue.clear()
         self._used.clear()
+        return refusals
 
     @property
     def waiting(self) -> int:

@@ -6,8 +6,9 @@ from pathlib import Path
 import numpy as np
 
 from hpccd_ros.base.quoting import shortened
-from hpccd_ros.frames import coordinates
+from hpccd_ros.frames.coordinates import unusable_coordinates
 from hpccd_ros.frames.rigid import Rigid
+from hpccd_ros.frames.types import MeshFrame, Topology
 
 FORMATS = (".obj", ".ply", ".stl")
 
@@ -44,8 +45,8 @@ def load_mesh(path: str) -> tuple[np.ndarray, np.ndarray]:
         raise MeshFileError(f"{file}: has no triangles")
     if file.suffix.lower() == ".stl":
         vertices, faces = _join_equal(vertices, faces)
-    if refusal := coordinates.refusal(vertices):
-        raise MeshFileError(f"{file}: {refusal[1]}")
+    if problem := unusable_coordinates(vertices):
+        raise MeshFileError(f"{file}: {problem[1]}")
     return vertices, faces.astype(np.uint32)
 
 
@@ -78,6 +79,17 @@ def _not_text(file: Path) -> str | None:
     return None
 
 
+def mesh_of_file(
+    vertices: np.ndarray, faces: np.ndarray, static: bool, pose: list[float]
+) -> tuple[Topology, MeshFrame | None]:
+    """What `load_mesh` gave as topology version 0; of a static mesh the positions too, placed by its pose.
+
+    Raises MeshFileError: as `place`.
+    """
+    frame = MeshFrame(0, place(vertices, pose), version=0) if static else None
+    return Topology(0, len(vertices), faces), frame
+
+
 def place(vertices: np.ndarray, pose: list[float]) -> np.ndarray:
     """Rotate by the quaternion x y z w, then translate by x y z (pose: 3 + 4 numbers).
 
@@ -87,8 +99,8 @@ def place(vertices: np.ndarray, pose: list[float]) -> np.ndarray:
         placed = Rigid.of(pose[:3], pose[3:]).apply(vertices)
     except ValueError as error:
         raise MeshFileError(f"pose: {shortened(pose)} {error}") from error
-    if refusal := coordinates.refusal(placed):
-        raise MeshFileError(f"pose: {shortened(pose)}: placed by it, {refusal[1]}")
+    if problem := unusable_coordinates(placed):
+        raise MeshFileError(f"pose: {shortened(pose)}: placed by it, {problem[1]}")
     return placed
 
 

@@ -16,6 +16,7 @@ class SequenceWatch:
         self._last: int | None = None
         self._seen_any = False
         self.before_first = 0
+        self._unnoticed = False
 
     def new_publisher(self) -> None:
         """A publisher came: its numbers have nothing to do with those before."""
@@ -30,5 +31,12 @@ class SequenceWatch:
         first, self._seen_any = not self._seen_any, True
         if last is None:
             self.before_first += number - 1
-            return 0, not first
-        return (number - last - 1, False) if number > last else (0, True)
+        new_publisher = not first if last is None else number <= last
+        self._unnoticed |= new_publisher
+        return 0 if last is None or new_publisher else number - last - 1, new_publisher
+
+    def notice(self) -> bool:
+        """Whether there was a new publisher since this was asked last: its first message may have been refused, and the
+        next one stands for it."""
+        unnoticed, self._unnoticed = self._unnoticed, False
+        return unnoticed

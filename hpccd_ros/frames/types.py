@@ -4,6 +4,9 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
+
+from hpccd_ros.frames.drops import Reason, Refusal
 
 
 @dataclass(frozen=True)
@@ -13,6 +16,9 @@ class MeshSettings:
     name: str
     static: bool = False
     self_collision: bool = True
+    transform: str = "none"
+    frame: str = ""
+    pose: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,7 +27,7 @@ class Topology:
 
     version: int
     n_vertices: int
-    faces: np.ndarray
+    faces: NDArray[np.uint32]
 
     def same_content(self, other: "Topology") -> bool:
         """Equal but for the version."""
@@ -34,7 +40,8 @@ class MeshFrame:
 
     ``stamp`` ns, end of the step. ``version``: of the topology it belongs to; None (PointCloud2 has none):
     the one in force. ``step``: the publisher's number, None where it gives none. ``vertices`` (n,3) float32
-    or float64, finite. ``received``: time.monotonic() at its arrival. ``topology``: set by the assembler.
+    or float64, finite. ``received``: time.monotonic() at its arrival; ``only_publisher``: its mesh had no other one of
+    vertices then. ``topology``: set by the assembler.
     """
 
     stamp: int
@@ -43,6 +50,7 @@ class MeshFrame:
     step: int | None = None
     frame_id: str = ""
     received: float = 0.0
+    only_publisher: bool = True
     topology: Topology | None = None
 
 
@@ -66,3 +74,7 @@ class SceneFrame:
         """True if a motion from one to the other exists: the same topology of every mesh, one coordinate frame."""
         elsewhere = self.frame_id and other.frame_id and self.frame_id != other.frame_id
         return not elsewhere and all(a is b for a, b in zip(self.topologies, other.topologies, strict=True))
+
+    def refused(self, reason: Reason) -> list[Refusal]:
+        """One refusal for each message that is used nowhere else."""
+        return [Refusal(mesh, reason) for mesh in self.fresh]

@@ -11,7 +11,7 @@ from array import array
 import numpy as np
 from builtin_interfaces.msg import Time
 
-from hpccd_ros.frames.drops import Reason
+from hpccd_ros.frames.drops import Input, Reason, Refusal
 
 _NS = 1_000_000_000
 _CODES = {
@@ -28,6 +28,10 @@ class InvalidMessageError(ValueError):
     def __init__(self, reason: Reason, text: str) -> None:
         super().__init__(text)
         self.reason = reason
+
+    def refusal(self, mesh: str, what: Input = Input.VERTICES) -> Refusal:
+        """Of the message, as one of ``mesh``."""
+        return Refusal(mesh, self.reason, str(self), what=what)
 
 
 def stamp_to_ns(stamp: Time) -> int:

@@ -6,7 +6,7 @@ from hpccd.msg import MeshTopology, MeshVertices
 from sensor_msgs.msg import PointCloud2, PointField
 
 from hpccd_ros.base.quoting import listed
-from hpccd_ros.frames import coordinates
+from hpccd_ros.frames.coordinates import unusable_coordinates
 from hpccd_ros.frames.drops import Reason
 from hpccd_ros.frames.types import Topology
 from hpccd_ros.middleware.fields import InvalidMessageError, ns_to_stamp, stamp_to_ns, to_field
@@ -127,8 +127,8 @@ def _limit(what: str, size: int, parameter: str, limit: int) -> None:
 
 
 def _usable(vertices: np.ndarray) -> np.ndarray:
-    if refusal := coordinates.refusal(vertices):
-        raise InvalidMessageError(*refusal)
+    if problem := unusable_coordinates(vertices):
+        raise InvalidMessageError(*problem)
     return vertices
 
 

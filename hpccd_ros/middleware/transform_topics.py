@@ -9,6 +9,7 @@ import dataclasses
 from typing import Any
 
 from hpccd_ros.base.quoting import quoted
+from hpccd_ros.frames.drops import Input, Reason, Refusal
 from hpccd_ros.frames.rigid import Rigid
 from hpccd_ros.frames.transform_buffer import TransformBuffer
 from hpccd_ros.middleware import fields, topic_names
@@ -52,22 +53,25 @@ def _installed(type_name: str) -> bool:
     return True
 
 
-def in_message(message: Any) -> list[Any]:
-    """The TransformStamped in a message of one of the topics."""
-    return list(message.transforms) if hasattr(message, "transforms") else [message]
+def fill(buffer: TransformBuffer, message: Any, topic: TransformTopic) -> list[Refusal]:
+    """Add the transforms in a message of ``topic`` to ``buffer``; those that are none are refused."""
+    refusals = []
+    for stamped in message.transforms if hasattr(message, "transforms") else [message]:
+        try:
+            _add(buffer, stamped, topic.static)
+        except ValueError as error:
+            names = f"{quoted(stamped.child_frame_id)} to {quoted(stamped.header.frame_id)}"
+            text = f"transform from {names}: {error}"
+            refusals.append(Refusal(topic.name, Reason.MALFORMED, text, what=Input.TRANSFORM))
+    return refusals
 
 
-def keep(buffer: TransformBuffer, message: Any, static: bool) -> None:
-    """Add a TransformStamped to ``buffer``. Raises ValueError, naming its frames, where it is none."""
-    shift, turn = message.transform.translation, message.transform.rotation
-    try:
-        stamp = fields.stamp_to_ns(message.header.stamp)
-        buffer.add(
-            message.header.frame_id,
-            message.child_frame_id,
-            Rigid.of((shift.x, shift.y, shift.z), (turn.x, turn.y, turn.z, turn.w)),
-            None if static else stamp,
-        )
-    except ValueError as error:
-        names = f"{quoted(message.child_frame_id)} to {quoted(message.header.frame_id)}"
-        raise ValueError(f"transform from {names}: {error}") from error
+def _add(buffer: TransformBuffer, stamped: Any, static: bool) -> None:
+    shift, turn = stamped.transform.translation, stamped.transform.rotation
+    stamp = fields.stamp_to_ns(stamped.header.stamp)
+    buffer.add(
+        stamped.header.frame_id,
+        stamped.child_frame_id,
+        Rigid.of((shift.x, shift.y, shift.z), (turn.x, turn.y, turn.z, turn.w)),
+        None if static else stamp,
+    )

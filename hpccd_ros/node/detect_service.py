@@ -8,11 +8,8 @@ from collections import Counter
 from collections.abc import Callable
 from concurrent.futures import CancelledError, ThreadPoolExecutor
 from concurrent.futures import Future as JobFuture
-from dataclasses import dataclass, replace
 from typing import Any
 
-import numpy as np
-from hpccd.msg import ContactArray, MeshVertices
 from hpccd.srv import Detect
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import Clock, ClockType
@@ -20,26 +17,12 @@ from rclpy.node import Node
 from rclpy.task import Future
 
 from hpccd_core import Cancelled
-from hpccd_ros.base.quoting import LONGEST_MESSAGE, listed, quoted, repeated, shortened
-from hpccd_ros.detect.cancellation import Ongoing
-from hpccd_ros.detect.detection import CORE_ERRORS, Options, SceneBuilder, make_detector
-from hpccd_ros.detect.layout import Layout
-from hpccd_ros.frames.types import Topology
-from hpccd_ros.middleware import contact_messages, fields, mesh_messages, qos
+from hpccd_ros.base.quoting import LONGEST_MESSAGE, shortened
+from hpccd_ros.detect.cancellation import Cancellation
+from hpccd_ros.detect.core import CORE_ERRORS, Options
+from hpccd_ros.middleware import qos
 from hpccd_ros.middleware.guard import Errors
-
-
-class RequestError(ValueError):
-    """A request that cannot be answered; the text says what to mend."""
-
-
-@dataclass(frozen=True)
-class NodeScene:
-    """What the node itself knows at the time of a request: its meshes and the topologies in force."""
-
-    builder: SceneBuilder
-    topologies: dict[str, Topology | None]
-
+from hpccd_ros.node.detect_request import NodeScene, RequestError, compute
 
 # Requests that may lie in the queue of the service beside those that find a place: a burst of them is answered "busy"
 # rather than lost. Bounds what strangers can make the node hold.
@@ -90,7 +73,7 @@ class DetectService:
         self._open = 0
         self._closed = False
         self._last_answer = -math.inf
-        self._ongoing: set[Ongoing] = set()
+        self._ongoing: set[Cancellation] = set()
         self._awaited: set[Callable[[], None]] = set()
         # A callback that awaits occupies its group until it ends: in the node's own group it would stop everything.
         self._group = ReentrantCallbackGroup()
@@ -110,8 +93,8 @@ class DetectService:
     def close(self) -> None:
         """Answer whoever still waits, then end. In the thread of the executor; its next turn comes too late."""
         self._closed = True
-        for ongoing in tuple(self._ongoing):
-            ongoing.end()
+        for cancellation in tuple(self._ongoing):
+            cancellation.cancel()
         self._pool.shutdown(wait=False, cancel_futures=True)
         for settle in tuple(self._awaited):
             settle()
@@ -157,20 +140,20 @@ class DetectService:
                 f"busy: {self._capacity} requests are being computed or wait "
                 "(parameters detect_jobs, detect_waiting); try again later",
             )
-        ongoing = Ongoing()
-        self._ongoing.add(ongoing)
+        cancellation = Cancellation()
+        self._ongoing.add(cancellation)
         try:
-            job = self._pool.submit(self._compute, request, scene, self._options(), ongoing)
+            job = self._pool.submit(compute, request, scene, self._options(), self._settings, cancellation)
         except RuntimeError:  # the system gives no further thread
-            self._ongoing.discard(ongoing)
+            self._ongoing.discard(cancellation)
             self._leave()
             raise
-        job.add_done_callback(lambda _: self._ongoing.discard(ongoing))
+        job.add_done_callback(lambda _: self._ongoing.discard(cancellation))
         job.add_done_callback(lambda _: self._leave())
         await self._settled(job, limit)
         if not job.done():
             job.cancel()
-            ongoing.end()
+            cancellation.cancel()
             if self._closed:
                 return self._refuse(response, "stopped", STOPPED)
             return self._refuse(
@@ -237,75 +220,3 @@ class DetectService:
                 f"time_limit: {request.time_limit} must be positive and finite, or 0 for the node's default"
             )
         return min(limit, LONGEST)
-
-    def _compute(
-        self, request: Detect.Request, scene: NodeScene, options: Options, ongoing: Ongoing
-    ) -> ContactArray:
-        names = list(request.mesh_names) or list(scene.topologies)
-        if not names:
-            raise RequestError("mesh_names: empty, and the node has no meshes of its own")
-        most = self._settings["max_meshes"]
-        if len(names) > most:
-            raise RequestError(f"mesh_names: {len(names)} meshes, at most {most} are taken (parameter max_meshes)")
-        if len(set(names)) != len(names):
-            raise RequestError(f"mesh_names: names must differ, {repeated(names)} is there twice")
-        for field in ("topologies", "start", "end"):
-            given = len(getattr(request, field))
-            if given != len(names) and not (field == "topologies" and given == 0):
-                raise RequestError(f"{field}: {given} entries for {len(names)} meshes ({listed(names)})")
-        topologies = tuple(self._topology(request, scene, i, name) for i, name in enumerate(names))
-        start = self._vertices("start", names, request.start, topologies)
-        end = self._vertices("end", names, request.end, topologies)
-        options = replace(options, accuracy=request.accuracy or options.accuracy, report=request.report or "all")
-        detector = ongoing.use(make_detector(scene.builder.among(names).build(topologies), options))
-        contacts = detector.detect(start, end)
-        message = ContactArray(accuracy=options.accuracy, backend=detector.backend)
-        message.header = request.end[0].header
-        message.start = request.start[0].header.stamp
-        message.step = request.end[0].step
-        contact_messages.fill_contacts(
-            message,
-            contacts,
-            Layout.of(tuple(names), topologies),
-            max_contacts=self._settings["max_contacts"],
-            outputs=options.outputs,
-        )
-        return message
-
-    def _topology(self, request: Detect.Request, scene: NodeScene, index: int, name: str) -> Topology:
-        if request.topologies:
-            try:
-                return mesh_messages.topology_from_message(
-                    request.topologies[index], self._settings["max_vertices"], self._settings["max_faces"]
-                )
-            except fields.InvalidMessageError as error:
-                raise RequestError(f"topologies[{index}] ({shortened(name)}): {error}") from error
-        if name not in scene.topologies:
-            raise RequestError(
-                f"mesh_names: unknown mesh {quoted(name)}; the node has "
-                f"{listed(scene.topologies) or 'none'}, or send topologies"
-            )
-        topology = scene.topologies[name]
-        if topology is None:
-            raise RequestError(f"mesh {name}: the node has no topology yet; publish it or send topologies")
-        return topology
-
-    def _vertices(
-        self, field: str, names: list[str], messages: list[MeshVertices], topologies: tuple[Topology, ...]
-    ) -> np.ndarray:
-        parts = []
-        for i, (name, message, topology) in enumerate(zip(names, messages, topologies, strict=True)):
-            where = f"{field}[{i}] ({shortened(name)})"
-            try:
-                fields.stamp_to_ns(message.header.stamp)
-                vertices = mesh_messages.vertices_from_message(message, self._settings["max_vertices"])
-            except fields.InvalidMessageError as error:
-                raise RequestError(f"{where}: {error}") from error
-            if message.topology_version != topology.version:
-                raise RequestError(
-                    f"{where}: topology_version {message.topology_version}, the topology has version {topology.version}"
-                )
-            if len(vertices) != topology.n_vertices:
-                raise RequestError(f"{where}: {len(vertices)} vertices, the topology has {topology.n_vertices}")
-            parts.append(vertices)
-        return parts[0] if len(parts) == 1 else np.concatenate(parts)

@@ -1,12 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
-"""rclpy's life-cycle node, with what it lacks: invalid transitions are refused, errors of transitions are told."""
+"""rclpy's life-cycle node, with what it lacks: invalid transitions are refused, errors of transitions are told, and
+what `on_configure` makes can be undone."""
 
+import contextlib
 from collections.abc import Callable
 from typing import Any
 
 from lifecycle_msgs.srv import ChangeState
+from rclpy.clock import Clock, ClockType
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from rclpy.publisher import Publisher
+from rclpy.qos import QoSProfile
 
+from hpccd_ros.middleware import qos_overrides
 from hpccd_ros.middleware.guard import Errors
 
 Transition = Callable[[LifecycleState], TransitionCallbackReturn]
@@ -19,6 +25,7 @@ class GuardedLifecycleNode(LifecycleNode):
         super().__init__(name, **options)
         self.errors = Errors(self.get_logger().error)
         self._callbacks = {state: self._guarded(callback) for state, callback in self._callbacks.items()}
+        self._configured = contextlib.ExitStack()
         service = self._service_change_state
         service.callback = self._refuse_or(service.callback)
 
@@ -26,6 +33,20 @@ class GuardedLifecycleNode(LifecycleNode):
     def state(self) -> str:
         """Label of the life-cycle state."""
         return self._state_machine.current_state[1]
+
+    def configured_publisher(self, kind: type, topic: str, profile: QoSProfile) -> Publisher:
+        """Until `unconfigure`."""
+        publisher = qos_overrides.create_publisher(self, kind, topic, profile)
+        self._configured.callback(self.destroy_publisher, publisher)
+        return publisher
+
+    def configured_timer(self, period: float, callback: Callable[[], None]) -> None:
+        """Until `unconfigure`. In steady time: it goes on while simulated time stands still."""
+        timer = self.create_timer(period, callback, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self._configured.callback(self.destroy_timer, timer)
+
+    def unconfigure(self) -> None:
+        self._configured.close()
 
     def _guarded(self, callback: Transition) -> Transition:
         def transition(state: LifecycleState) -> TransitionCallbackReturn:

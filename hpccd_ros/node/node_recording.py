@@ -79,7 +79,7 @@ class NodeRecording:
         return self._last.status(self._running is not None) if self._last is not None else None
 
 
-def refusal(settings: dict[str, Any]) -> str | None:
+def unrecordable(settings: dict[str, Any]) -> str | None:
     """Why nothing can be recorded with these settings, or None; a disk may still refuse later."""
     if not settings["record"]:
         return None

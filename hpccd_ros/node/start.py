@@ -11,7 +11,7 @@ import sys
 
 
 def main() -> int:
-    """`node.main`, from the arguments of the process."""
+    """`run.main`, from the arguments of the process."""
     for number in (signal.SIGINT, signal.SIGTERM):
         # Nothing is there yet that would have to be ended; an exception may be caught in the middle of an import.
         signal.signal(number, lambda number, frame: os._exit(0))
@@ -23,9 +23,9 @@ def main() -> int:
     except UserError as error:
         print(f"hpccd: {error}", file=sys.stderr)
         return 2
-    from hpccd_ros.node import node
+    from hpccd_ros.node import run
 
-    return node.main()
+    return run.main()
 
 
 if __name__ == "__main__":

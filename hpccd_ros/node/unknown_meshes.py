@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Notice frames of meshes that the node was not told of: usually a misspelt name, else silently unheard."""
 
-from collections.abc import Callable
+from typing import Any
 
 from hpccd.msg import MeshVertices
 from rclpy._rclpy_pybind11 import RCLError
@@ -13,8 +13,9 @@ from rclpy.validate_full_topic_name import validate_full_topic_name
 from sensor_msgs.msg import PointCloud2
 
 from hpccd_ros.base.quoting import listed
-from hpccd_ros.frames.drops import DropCounter, Reason
+from hpccd_ros.frames.drops import Reason, Refusal
 from hpccd_ros.middleware import qos
+from hpccd_ros.node.accounts import Accounts
 
 # Bounds what strangers can make the node subscribe to, at a time.
 _MOST_TOPICS = 16
@@ -36,22 +37,15 @@ class UnknownMeshWatch:
     watch the vertices as strangers, leave the topology alone.
     A topic is taken up when it is found a second time, since a node that starts is discovered piece by piece, and let
     go when its publishers have left or another node has taken it over.
-    count: subscribe to them raw (without deserialising) and count each frame as dropped; else only name them.
+    Where parameter count_unknown_meshes is set, they are subscribed to raw (without deserialising) and each frame is
+    counted as dropped; else they are only named.
     """
 
-    def __init__(
-        self,
-        node: Node,
-        known: list[str],
-        drops: DropCounter,
-        received: Callable[[str, None], None],
-        count: bool,
-    ) -> None:
+    def __init__(self, node: Node, settings: dict[str, Any], accounts: Accounts) -> None:
         self._node = node
-        self._known = known
-        self._drops = drops
-        self._received = received
-        self._count = count
+        self._known = list(settings["meshes"])
+        self._accounts = accounts
+        self._count = settings["count_unknown_meshes"]
         self._topics: dict[str, Subscription | None] = {}
         self._found: set[str] = set()
         self._beyond: list[str] = []
@@ -117,8 +111,8 @@ class UnknownMeshWatch:
         self._names.add(name)
 
         def count(data: bytes) -> None:
-            self._received(name, None)
-            self._drops.count(name, Reason.UNKNOWN_MESH)
+            self._accounts.metrics.frame_received(name, None)
+            self._accounts.refused(Refusal(name, Reason.UNKNOWN_MESH))
 
         # Best effort is compatible with every publisher.
         return self._node.create_subscription(message, topic, count, qos.vertices("best_effort", 10), raw=True)

@@ -5,8 +5,8 @@
 """
 
 from hpccd_ros.middleware.qos_overrides import DEEPEST
-from hpccd_ros.params.parameters import allowed
 from hpccd_ros.params.table import ALWAYS, MESH_ROWS, NEVER, NODE_GROUPS, UNCONFIGURED, Row
+from hpccd_ros.params.values import allowed
 
 _HEAD = """\
 # Parameters of the node

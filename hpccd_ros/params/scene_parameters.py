@@ -3,12 +3,14 @@
 
 from typing import Any
 
+from hpccd_core.options import ACCURACIES, OUTPUTS
 from hpccd_ros.base.quoting import listed, quoted, shortened
-from hpccd_ros.detect.detection import SceneBuilder
+from hpccd_ros.detect.core import Options
+from hpccd_ros.detect.scene import SceneBuilder
+from hpccd_ros.frames.pipeline import FramePipeline
 from hpccd_ros.frames.rigid import Rigid
 from hpccd_ros.frames.types import MeshSettings
-from hpccd_ros.params.parameters import ParameterError
-from hpccd_ros.params.table import ACCURACIES
+from hpccd_ros.params.values import ParameterError
 
 MeshValues = dict[str, dict[str, Any]]
 
@@ -20,7 +22,36 @@ def scene_builder(settings: dict[str, Any], meshes: MeshValues) -> SceneBuilder:
 
 def mesh_settings(meshes: MeshValues) -> tuple[MeshSettings, ...]:
     """In the order of parameter ``meshes``."""
-    return tuple(MeshSettings(name, values["static"], values["self_collision"]) for name, values in meshes.items())
+    return tuple(
+        MeshSettings(name, of["static"], of["self_collision"], of["transform"], of["frame"], tuple(of["pose"]))
+        for name, of in meshes.items()
+    )
+
+
+def frame_pipeline(settings: dict[str, Any], meshes: MeshValues, max_pending: int) -> FramePipeline:
+    """The way from messages of the meshes to frames of the scene. Raises ValueError: nothing in the scene moves."""
+    nearest = settings["stamp_match"] == "nearest"
+    return FramePipeline(
+        mesh_settings(meshes),
+        max_pending=max_pending,
+        restart_after=settings["restart_after"],
+        tolerance=round(settings["stamp_tolerance"] * 1e9) if nearest else None,
+        frame_id=settings["frame_id"],
+    )
+
+
+def detector_options(settings: dict[str, Any]) -> Options:
+    """What the node's detector computes, and how."""
+    outputs = set(settings["outputs"])
+    if settings["markers"]:
+        outputs |= {"points", "normals"}
+    return Options(
+        settings["accuracy"],
+        settings["backend"],
+        settings["threads"],
+        settings["report"],
+        tuple(name for name in OUTPUTS if name in outputs),
+    )
 
 
 def ignored_pairs(settings: dict[str, Any]) -> tuple[tuple[str, str], ...]:

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The table of the node's parameters. Logic is in parameters.py; documentation.py makes docs/parameters.md of it."""
+"""The table of the node's parameters: of it are made checks, declarations and docs/parameters.md."""
 
 from dataclasses import dataclass
 from typing import Any
+
+from hpccd_core.options import ACCURACIES, BACKENDS, OUTPUTS, REPORTS
 
 # When a parameter may be changed.
 ALWAYS, UNCONFIGURED, NEVER = "always", "unconfigured", "never"
@@ -27,11 +29,6 @@ class Row:
     choices: tuple[str, ...] = ()
     change: str = UNCONFIGURED
 
-
-ACCURACIES = ("fast", "balanced", "conservative", "exact")
-BACKENDS = ("auto", "cpu", "hybrid", "gpu")
-REPORTS = ("all", "first", "any")
-OUTPUTS = ("points", "normals")
 
 # Of the files of a split recording: smaller ones would hold a message each, and beginning a file takes longer (a few
 # milliseconds) than messages may wait.

@@ -4,22 +4,22 @@
 import numpy as np
 
 from hpccd_ros.picture import contacts as picture
-from hpccd_ros.replay.recomputed import Step
+from hpccd_ros.replay.recomputed import ReplayedStep
 
 
 class History:
-    """Step number, contacts and milliseconds of each step that was computed."""
+    """Number, contacts and milliseconds of each step that was computed."""
 
     def __init__(self):
         self.steps, self.contacts, self.milliseconds = [], [], []
 
-    def add(self, step: Step) -> None:
+    def add(self, step: ReplayedStep) -> None:
         self.steps.append(step.step)
         self.contacts.append(step.total)
         self.milliseconds.append(step.milliseconds)
 
 
-def draw_step(step: Step, path, history: History | None = None, *, title: str, **view) -> None:
+def draw_step(step: ReplayedStep, path, history: History | None = None, *, title: str, **view) -> None:
     """Write a picture of `step`, which was computed with outputs=("points",). view: azimuth, elevation, size."""
     found = step.contacts
     meshes, offsets = meshes_in_the_middle(step), step.layout.vertex_offsets
@@ -31,12 +31,11 @@ def draw_step(step: Step, path, history: History | None = None, *, title: str, *
         f"{triangles:,} triangles", f"{len(found.vf):,} vertex-face", f"{len(found.ee):,} edge-edge", first,
         f"{step.milliseconds:.1f} ms", accuracy, f"hash {found.hash:016x}",
     ]  # fmt: skip
-    drawn = picture.Step(
+    drawn = picture.Picture(
         meshes,
         touched(found, scene_faces(meshes, offsets), offsets[-1]),
         np.asarray(found.points),
         np.concatenate([found.vf_toc, found.ee_toc]),
-        len(found.vf),
         f"{step.total:,} contact{'' if step.total == 1 else 's'} in step {step.step}" + of,
         [fact for fact in facts if fact],
         title,
@@ -49,7 +48,7 @@ def draw_step(step: Step, path, history: History | None = None, *, title: str, *
     picture.draw(drawn, path, context, **view)
 
 
-def meshes_in_the_middle(step: Step):
+def meshes_in_the_middle(step: ReplayedStep):
     """[(name, vertices (V,3), faces (F,3))] in the middle of the step, so that contacts at any time of it lie close to
     the surfaces."""
     start, end = step.start_frame, step.end_frame

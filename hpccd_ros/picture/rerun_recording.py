@@ -7,7 +7,7 @@ from hpccd_ros.base import extras
 from hpccd_ros.picture.contacts import TOC_COLOURS, srgb, vertex_colours
 from hpccd_ros.picture.of_recording import meshes_in_the_middle, scene_faces, touched
 from hpccd_ros.picture.shading import vertex_normals
-from hpccd_ros.replay.recomputed import Step
+from hpccd_ros.replay.recomputed import ReplayedStep
 
 # Parts of the largest extent of the first step's scene.
 POINT_RADIUS, NORMAL_LENGTH, EYE_DISTANCE = 0.003, 0.03, 1.0
@@ -47,7 +47,7 @@ class RerunWriter:
         self._stream.flush()
         self._stream.disconnect()
 
-    def add(self, step: Step) -> None:
+    def add(self, step: ReplayedStep) -> None:
         rr, stream = self._rr, self._stream
         meshes, offsets = meshes_in_the_middle(step), step.layout.vertex_offsets
         if not self._extent:

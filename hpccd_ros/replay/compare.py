@@ -3,9 +3,9 @@
 
 import numpy as np
 
+from hpccd_core.options import ACCURACIES
 from hpccd_ros.detect.layout import Layout
 from hpccd_ros.middleware import contact_messages
-from hpccd_ros.params.table import ACCURACIES
 
 
 def difference(recorded, contacts, layout: Layout, any_one: bool = False) -> str | None:
@@ -33,7 +33,7 @@ def difference(recorded, contacts, layout: Layout, any_one: bool = False) -> str
             getattr(then, kind), getattr(then, kind + "_toc"), getattr(now, kind), getattr(now, kind + "_toc")
         )
         if first is not None:
-            return _explain(first, then, now, kind, lambda row, d=describe: d(row, layout))
+            return _explain(first, then, now, kind, lambda pair, d=describe: d(pair, layout))
     if recorded.total != total:
         return _count(recorded.total, total)
     if recorded.truncated != expected.truncated:
@@ -99,40 +99,41 @@ def _not_any(recorded, contacts, layout) -> str | None:
     then = contact_messages.read_contacts(recorded, layout)
     for kind, describe in (("vf", _vertex_face), ("ee", _edge_edge)):
         toc_of = dict(zip(map(tuple, getattr(contacts, kind)), getattr(contacts, kind + "_toc"), strict=True))
-        for row, toc in zip(map(tuple, getattr(then, kind)), getattr(then, kind + "_toc"), strict=True):
-            if row not in toc_of:
-                return f"{describe(row, layout)}: recorded at t = {float(toc)!r}, now not found"
-            if toc_of[row] != toc:
-                return f"{describe(row, layout)}: recorded at t = {float(toc)!r}, now at t = {float(toc_of[row])!r}"
+        for pair, toc in zip(map(tuple, getattr(then, kind)), getattr(then, kind + "_toc"), strict=True):
+            if pair not in toc_of:
+                return f"{describe(pair, layout)}: recorded at t = {float(toc)!r}, now not found"
+            if toc_of[pair] != toc:
+                return f"{describe(pair, layout)}: recorded at t = {float(toc)!r}, now at t = {float(toc_of[pair])!r}"
     return None
 
 
-def _first_difference(rows, toc, other_rows, other_toc) -> int | None:
-    common = min(len(rows), len(other_rows))
-    unequal = (rows[:common] != other_rows[:common]).any(axis=1) | (toc[:common] != other_toc[:common])
+def _first_difference(pairs, toc, other_pairs, other_toc) -> int | None:
+    common = min(len(pairs), len(other_pairs))
+    unequal = (pairs[:common] != other_pairs[:common]).any(axis=1) | (toc[:common] != other_toc[:common])
     if unequal.any():
         return int(np.argmax(unequal))
-    return None if len(rows) == len(other_rows) else common
+    return None if len(pairs) == len(other_pairs) else common
 
 
 def _explain(index, then, now, kind, describe) -> str:
-    rows, toc = getattr(then, kind), getattr(then, kind + "_toc")
+    pairs, toc = getattr(then, kind), getattr(then, kind + "_toc")
     other, other_toc = getattr(now, kind), getattr(now, kind + "_toc")
-    if index < len(rows) and index < len(other) and tuple(rows[index]) == tuple(other[index]):
-        return f"{describe(rows[index])}: recorded at t = {float(toc[index])!r}, now at t = {float(other_toc[index])!r}"
-    # Rows are sorted: of two different ones at the same place, the smaller is missing on the other side.
-    if index >= len(other) or (index < len(rows) and tuple(rows[index]) < tuple(other[index])):
-        return f"{describe(rows[index])}: recorded at t = {float(toc[index])!r}, now not found"
+    if index < len(pairs) and index < len(other) and tuple(pairs[index]) == tuple(other[index]):
+        times = f"recorded at t = {float(toc[index])!r}, now at t = {float(other_toc[index])!r}"
+        return f"{describe(pairs[index])}: {times}"
+    # Pairs are sorted: of two different ones at the same place, the smaller is missing on the other side.
+    if index >= len(other) or (index < len(pairs) and tuple(pairs[index]) < tuple(other[index])):
+        return f"{describe(pairs[index])}: recorded at t = {float(toc[index])!r}, now not found"
     return f"{describe(other[index])}: found now at t = {float(other_toc[index])!r}, not recorded"
 
 
-def _vertex_face(row, layout) -> str:
-    vertex, face = _local(row[0], layout.vertex_offsets, layout), _local(row[1], layout.face_offsets, layout)
+def _vertex_face(pair, layout) -> str:
+    vertex, face = _local(pair[0], layout.vertex_offsets, layout), _local(pair[1], layout.face_offsets, layout)
     return f"vertex {vertex} - face {face}"
 
 
-def _edge_edge(row, layout) -> str:
-    a, b, c, d = (_local(v, layout.vertex_offsets, layout) for v in row)
+def _edge_edge(pair, layout) -> str:
+    a, b, c, d = (_local(v, layout.vertex_offsets, layout) for v in pair)
     return f"edge ({a}, {b}) - edge ({c}, {d})"
 
 

@@ -2,17 +2,17 @@
 """Compute a recording again, without DDS and as fast as it goes, and compare with what the node answered."""
 
 import dataclasses
-import time
 from collections.abc import Iterator
 
+from hpccd_core.options import ACCURACIES
 from hpccd_ros.bag.decode import make_decoder
 from hpccd_ros.bag.reader import Recording, RecordingError
-from hpccd_ros.detect.detection import CORE_ERRORS, make_detector
+from hpccd_ros.detect.core import CORE_ERRORS
 from hpccd_ros.detect.layout import Layout
+from hpccd_ros.detect.step_detector import StepDetector
 from hpccd_ros.frames.types import SceneFrame
 from hpccd_ros.middleware import fields
 from hpccd_ros.middleware.fields import InvalidMessageError
-from hpccd_ros.params.table import ACCURACIES
 from hpccd_ros.replay.compare import difference
 from hpccd_ros.replay.frames import FrameSource, FrameWindow
 from hpccd_ros.replay.recorded_setup import ReplaySetup
@@ -25,7 +25,7 @@ PATIENCE = 16
 
 
 @dataclasses.dataclass
-class Step:
+class ReplayedStep:
     """One step of the scene: what was recorded of it and what came out now. Stamps in ns."""
 
     number: int  # counts the steps of this replay, from 0
@@ -71,16 +71,13 @@ class Replay:
         answers = recording.topics.get(setup.contacts)
         self.recorded_answers = answers.count if answers else 0
         self._decode_answer = make_decoder(answers) if answers else None
-        self._builder = setup.builder
-        self._scene_of: SceneFrame | None = None
-        self._scene = None
-        self._layout: Layout | None = None
-        self._detector = None
-        self._options = None
+        builder = setup.builder
+        self._detector = StepDetector(builder, self._options(""))
+        self._every_contact = StepDetector(builder, self._options(""))
         self.any_one = setup.settings["report"] == "any"  # "verified" means less then: compare.py
         self.verified = self.diverged = self.unverified = 0
         self.frames = 0
-        self.first_divergence: Step | None = None
+        self.first_divergence: ReplayedStep | None = None
 
     @property
     def message_count(self) -> int:
@@ -91,7 +88,7 @@ class Replay:
     def _topics(self):
         return self.source.topics + ([self._setup.contacts] if self.recorded_answers else [])
 
-    def steps(self) -> Iterator[Step]:
+    def steps(self) -> Iterator[ReplayedStep]:
         """Each recorded answer, computed again; in a recording without answers, each step from frame to frame."""
         find = self._answers if self.recorded_answers else self._successive_frames
         number = 0
@@ -117,7 +114,7 @@ class Replay:
                 # An answer may have been written before the last of the messages that it answers.
                 waiting.append((self.frames, self._at, self._decode_answer(message)))
             else:
-                for frame in self.source.take(message):
+                for frame in self.source.push(message):
                     self.frames += 1
                     window.put(frame)
             while waiting:
@@ -133,10 +130,10 @@ class Replay:
     def _successive_frames(self):
         last = None
         for message in self._messages():
-            for frame in self.source.take(message):
+            for frame in self.source.push(message):
                 self.frames += 1
                 if last is not None and last.same_scene(frame) and frame.stamp > last.stamp:
-                    yield Step(0, frame.step or 0, last.stamp, frame.stamp, last, frame, None, self._at)
+                    yield ReplayedStep(0, frame.step or 0, last.stamp, frame.stamp, last, frame, None, self._at)
                 last = frame
 
     def _messages(self):
@@ -147,12 +144,13 @@ class Replay:
             yield message
             self._on_message(count)
 
-    def _step_of(self, answer, at, window) -> Step:
+    def _step_of(self, answer, at, window) -> ReplayedStep:
         try:
             start, end = fields.stamp_to_ns(answer.start), fields.stamp_to_ns(answer.header.stamp)
         except InvalidMessageError as error:
-            return Step(0, answer.step, 0, 0, None, None, answer, at, missing=f"the answer is malformed: {error}")
-        step = Step(0, answer.step, start, end, window.get(start), window.get(end), answer, at)
+            missing = f"the answer is malformed: {error}"
+            return ReplayedStep(0, answer.step, 0, 0, None, None, answer, at, missing=missing)
+        step = ReplayedStep(0, answer.step, start, end, window.get(start), window.get(end), answer, at)
         for name, stamp, frame in (("start", start, step.start_frame), ("end", end, step.end_frame)):
             if frame is None:
                 step.before_recording = window.first is not None and stamp < window.first
@@ -164,46 +162,38 @@ class Replay:
 
     def _compute(self, step):
         end = step.end_frame
-        if self._scene_of is None or not self._scene_of.same_scene(end):
-            try:
-                self._scene = self._builder.build(end.topologies)
-            except CORE_ERRORS as error:
-                raise RecordingError(f"frame with stamp {end.stamp} ns: the core refuses it: {error}") from error
-            self._layout = Layout.of(tuple(m.name for m in self._builder.meshes), end.topologies)
-            self._scene_of, self._detector = end, None
         told = step.recorded.accuracy if step.recorded is not None else ""
-        accuracy = self._accuracy or (told if told in ACCURACIES else "")  # one that is not diverges: compare.py
-        options = dataclasses.replace(
-            self._setup.options(accuracy, self._backend, self._threads), outputs=self._outputs
-        )
-        if self._detector is None or options != self._options:
-            try:
-                self._detector = make_detector(self._scene, options)
-            except CORE_ERRORS as error:
-                raise RecordingError(f"cannot compute as it was recorded: {error}") from error
-            self._options = options
-        began = time.perf_counter()
+        # One that is none diverges: compare.py.
+        self._detector.options = self._options(self._accuracy or (told if told in ACCURACIES else ""))
         try:
-            step.contacts = self._detector.detect(*self._motion(step))
+            self._detector.prepare_scene(end)
+        except CORE_ERRORS as error:
+            raise RecordingError(f"frame with stamp {end.stamp} ns: the core refuses it: {error}") from error
+        try:
+            self._detector.prepare_detector()
+        except CORE_ERRORS as error:
+            raise RecordingError(f"cannot compute as it was recorded: {error}") from error
+        try:
+            found = self._detector.detect(step.start_frame, end)
         except CORE_ERRORS as error:
             step.missing = f"the core refuses it: {error}"  # as in the node, which goes on with the next one
             return
-        step.milliseconds = 1e3 * (time.perf_counter() - began)
-        step.layout = self._layout
+        step.contacts, step.layout, step.milliseconds = found.contacts, found.layout, found.detect_ms
 
-    def _motion(self, step):
-        end = step.end_frame
-        return self._builder.concatenate(step.start_frame, end), self._builder.concatenate(end, end)
+    def _options(self, accuracy):
+        return dataclasses.replace(
+            self._setup.options(accuracy, self._backend, self._threads), outputs=self._outputs
+        )
 
     def _compare(self, step):
         if step.recorded is None:
             return
-        found, any_one = step.contacts, self._options.report == "any"
-        if any_one:
+        found = step.contacts
+        if self.any_one:
             # Which one the node found depended on the timing of its threads: it must be one of all.
-            every = dataclasses.replace(self._options, report="all", outputs=())
-            found = make_detector(self._scene, every).detect(*self._motion(step))
-        step.difference = difference(step.recorded, found, step.layout, any_one)
+            self._every_contact.options = dataclasses.replace(self._detector.options, report="all", outputs=())
+            found = self._every_contact.detect(step.start_frame, step.end_frame).contacts
+        step.difference = difference(step.recorded, found, step.layout, self.any_one)
 
     def _count(self, step):
         if step.missing:

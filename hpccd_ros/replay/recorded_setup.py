@@ -6,15 +6,16 @@ import tempfile
 from pathlib import Path, PurePosixPath
 
 from hpccd_ros.bag.reader import Recording, RecordingError
-from hpccd_ros.base.errors import UserError, sentence
-from hpccd_ros.detect.detection import Options, SceneBuilder
-from hpccd_ros.frames.mesh_file import FORMATS, MeshFileError, load_mesh, place
+from hpccd_ros.base.errors import UserError
+from hpccd_ros.base.quoting import printable
+from hpccd_ros.detect.core import Options
+from hpccd_ros.detect.scene import SceneBuilder
+from hpccd_ros.frames.mesh_file import FORMATS, MeshFileError, load_mesh, mesh_of_file
 from hpccd_ros.frames.types import MeshFrame, Topology
 from hpccd_ros.middleware import topic_names, transform_topics
-from hpccd_ros.params import parameters as table
-from hpccd_ros.params import scene_parameters
+from hpccd_ros.params import scene_parameters, values
 from hpccd_ros.params.parameter_file import read_parameters
-from hpccd_ros.params.parameters import ParameterError
+from hpccd_ros.params.values import ParameterError
 from hpccd_ros.record import recorded_topics
 from hpccd_ros.record.mesh_attachment import attachment_name
 
@@ -54,14 +55,14 @@ def of_recording(recording: Recording, parameter_file: str | None = None) -> Rep
         else:
             where, refused = f"{recording.path}: the stored parameters", RecordingError
             given = _stored(recording, info)
-        settings, meshes = table.checked(given)
+        settings, meshes = values.checked(given)
         if not settings["meshes"]:
             raise ParameterError("parameter `meshes` names no mesh")
         if all(row["static"] for row in meshes.values()):
             raise ParameterError("at least one mesh must not be static, or nothing ever moves")
         scene_parameters.check(settings, meshes)
     except ParameterError as error:
-        raise refused(sentence(f"{where}: {error}")) from error
+        raise refused(printable(f"{where}: {error}")) from error
     by_role = _by_role(recording, info, recorded_topics.types_by_role(meshes))
     roles = {topic: ("", role) if role in transform_topics.ALL else tuple(role.split("/")[1:])
              for role, topic in by_role.items() if role != topic_names.CONTACTS}  # fmt: skip
@@ -77,7 +78,7 @@ def of_recording(recording: Recording, parameter_file: str | None = None) -> Rep
             "recording holds no transforms: its positions cannot be computed again"
         )
     return ReplaySetup(settings, meshes, roles, by_role.get(topic_names.CONTACTS), _files(recording, meshes),
-                       table.unknown(given, meshes))  # fmt: skip
+                       values.unknown(given, meshes))  # fmt: skip
 
 
 def _stored(recording, info) -> dict:
@@ -141,10 +142,9 @@ def _files(recording, meshes):
                 vertices, faces = _load(attachment, recording.attachments[attachment])
             else:
                 vertices, faces = load_mesh(row["file"])
-            frame = MeshFrame(0, place(vertices, row["pose"]), version=0) if row["static"] else None
+            found[name] = mesh_of_file(vertices, faces, row["static"], row["pose"])
         except MeshFileError as error:
             raise RecordingError(f"mesh {name} of the recording: {error}") from error
-        found[name] = (Topology(0, len(vertices), faces), frame)
     return found
 
 

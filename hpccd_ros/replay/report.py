@@ -15,7 +15,7 @@ from hpccd_ros.bag.reader import Recording
 from hpccd_ros.base.errors import UserError
 from hpccd_ros.replay import recorded_setup
 from hpccd_ros.replay.pacing import Pace, next_wanted
-from hpccd_ros.replay.recomputed import Replay, Step
+from hpccd_ros.replay.recomputed import Replay, ReplayedStep
 
 COLUMNS = ("number", "step", "start_ns", "end_ns", "contacts", "vertex_face", "edge_edge", "first_toc", "ms", "hash",
            "recorded_contacts", "recorded_hash", "result")  # fmt: skip
@@ -32,7 +32,7 @@ class Table:
         self._writer = csv.writer(self._file)
         self._writer.writerow(COLUMNS)
 
-    def add(self, step: Step) -> None:
+    def add(self, step: ReplayedStep) -> None:
         found, recorded = step.contacts, step.recorded
         self._writer.writerow([
             step.number, step.step, step.start, step.end,
@@ -92,7 +92,7 @@ def main(args) -> int:
     return 1 if replay.diverged or replay.unverified or not summary.computed else 0
 
 
-def line(step: Step) -> str:
+def line(step: ReplayedStep) -> str:
     """One step in words."""
     if step.missing:
         return f"step {step.step}: not computed: {step.missing}"
@@ -109,10 +109,10 @@ class Summary:
         self.milliseconds = 0.0
         self.seconds_recorded = 0.0
         self.accuracies = set()
-        self.missing: Step | None = None
+        self.missing: ReplayedStep | None = None
         self.before = 0
 
-    def add(self, step: Step) -> None:
+    def add(self, step: ReplayedStep) -> None:
         if step.missing:
             self.before += step.before_recording
             if not step.before_recording:
@@ -176,10 +176,7 @@ class Summary:
 
 
 def _print_losses(replay) -> None:
-    source = replay.source
-    for counter, what in (
-        (source.drops, "vertex messages"), (source.refused, "topologies"), (source.transforms_refused, "transforms")
-    ):  # fmt: skip
+    for what, counter in replay.source.refused.items():
         for (mesh, reason), count in sorted(counter.by_mesh_and_reason().items()):
             print(f"  {count} {what} of {mesh} not used: {reason}")
 

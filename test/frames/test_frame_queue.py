@@ -20,36 +20,36 @@ def stamps(frames):
     return [f.stamp for f in frames]
 
 
-def take_all(queue):
-    return [(item.frame.stamp, item.first) for item in iter(lambda: queue.take() if queue.frames() else None, None)]
+def pop_all(queue):
+    return [(item.frame.stamp, item.first) for item in iter(lambda: queue.pop() if queue.frames() else None, None)]
 
 
 def test_latest_wins_and_the_start_is_kept():
     queue = FrameQueue(1)
     assert [stamps(queue.put(frame(k))) for k in range(4)] == [[], [], [1], [2]]
-    assert take_all(queue) == [(0, True), (3, False)]
+    assert pop_all(queue) == [(0, True), (3, False)]
     assert [stamps(queue.put(frame(k))) for k in (4, 5)] == [[], [4]]
-    assert take_all(queue) == [(5, False)]
+    assert pop_all(queue) == [(5, False)]
 
 
 def test_longer_queue_keeps_order():
     queue = FrameQueue(2)
     assert [stamps(queue.put(frame(k))) for k in range(4)] == [[], [], [], [1]]
-    assert take_all(queue) == [(0, True), (2, False), (3, False)]
+    assert pop_all(queue) == [(0, True), (2, False), (3, False)]
 
 
 def test_other_topology_and_earlier_stamp_start_anew():
     queue = FrameQueue(10)
     for item in (frame(5), frame(6), frame(7, NEW), frame(8, NEW), frame(1, NEW), frame(2, NEW)):
         assert queue.put(item) == []
-    assert [first for _, first in take_all(queue)] == [True, False, True, False, True, False]
+    assert [first for _, first in pop_all(queue)] == [True, False, True, False, True, False]
 
 
 def test_starts_that_lost_their_end_are_dropped():
     queue = FrameQueue(1)
     assert queue.put(frame(0)) == queue.put(frame(1)) == queue.put(frame(2, NEW)) == []
     assert stamps(queue.put(frame(3, NEW))) == [1, 0]
-    assert take_all(queue) == [(2, True), (3, False)]
+    assert pop_all(queue) == [(2, True), (3, False)]
 
 
 def test_memory_is_bounded_where_every_frame_starts_anew():
@@ -61,7 +61,7 @@ def test_memory_is_bounded_where_every_frame_starts_anew():
 
 def test_close_returns_what_is_left_and_ends_the_reader():
     queue, got = FrameQueue(3), []
-    reader = threading.Thread(target=lambda: [got.append(item.frame.stamp) for item in iter(queue.take, None)])
+    reader = threading.Thread(target=lambda: [got.append(item.frame.stamp) for item in iter(queue.pop, None)])
     queue.put(frame(7))
     reader.start()
     while queue.frames():
@@ -70,12 +70,12 @@ def test_close_returns_what_is_left_and_ends_the_reader():
     reader.join(timeout=300)
     assert not reader.is_alive() and got == [7]
     assert stamps(queue.put(frame(8))) == [8]
-    assert queue.take() is None
+    assert queue.pop() is None
 
 
 def test_nothing_is_lost_between_threads():
     queue, got, lost = FrameQueue(2), [], []
-    reader = threading.Thread(target=lambda: [got.append(item.frame) for item in iter(queue.take, None)])
+    reader = threading.Thread(target=lambda: [got.append(item.frame) for item in iter(queue.pop, None)])
     reader.start()
     for k in range(5000):
         lost += queue.put(frame(k, OLD if k % 7 else NEW))

@@ -8,14 +8,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hpccd_ros.frames import transform_buffer
-from hpccd_ros.frames.drops import DropCounter, Reason
+from hpccd_ros.frames.drops import Input, Reason
 from hpccd_ros.frames.rate_limit import RateLimit
 from hpccd_ros.frames.rigid import IDENTITY, Rigid
 from hpccd_ros.frames.transform_buffer import NoTransformError, TransformBuffer
-from hpccd_ros.frames.transformer import Placement
-from hpccd_ros.frames.types import MeshFrame
+from hpccd_ros.frames.transformer import MeshTransformer
+from hpccd_ros.frames.types import MeshFrame, MeshSettings
 from hpccd_ros.middleware import transform_topics
-from hpccd_ros.params.table import MESH_ROWS
 
 POINTS = np.array([[0.0, 0, 0], [1, 0, 0], [0, 2, 0], [0, 0, 3]])
 SECOND = 10**9
@@ -115,8 +114,10 @@ def test_transform_of_no_time_is_refused(static):
     message = TransformStamped(child_frame_id="hand")
     message.header.frame_id, message.header.stamp.nanosec = "world", SECOND
     buffer = TransformBuffer()
-    with pytest.raises(ValueError, match="transform from 'hand' to 'world': stamp has sec 0 and nanosec 1000000000"):
-        transform_topics.keep(buffer, message, static)
+    topic = transform_topics.ALL["transforms_static" if static else "transforms"]
+    (refusal,) = transform_topics.fill(buffer, message, topic)
+    assert (refusal.mesh, refusal.reason, refusal.what) == (topic.name, Reason.MALFORMED, Input.TRANSFORM)
+    assert "transform from 'hand' to 'world': stamp has sec 0 and nanosec 1000000000" in refusal.text
     with pytest.raises(NoTransformError, match="no transform connects"):
         buffer.lookup("hand", "world", SECOND)
 
@@ -131,9 +132,33 @@ def test_source_that_starts_anew_is_not_mixed_with_its_past():
         buffer.lookup("hand", "world", 50 * SECOND)
 
 
-def placement(buffer=None, drops=None, **row):
-    values = {r.name: r.default for r in MESH_ROWS} | row
-    return Placement("cloth", values, "world", 2, drops or DropCounter(), buffer)
+class Gate:
+    """A transformer to the frame "world", and what it gave back."""
+
+    def __init__(self, buffer=None, **settings):
+        mesh = MeshSettings("cloth", **settings)
+        self.transformer = MeshTransformer(mesh, "world", 2, buffer if buffer is not None else TransformBuffer())
+        self.refusals = []
+
+    def transform(self, given, new_publisher=False):
+        return self._frames(self.transformer.transform(given, new_publisher))
+
+    def retry(self):
+        return self._frames(self.transformer.retry())
+
+    def _frames(self, transformed):
+        self.refusals += transformed.refusals
+        return transformed.frames
+
+    @property
+    def waiting(self):
+        return self.transformer.waiting
+
+    def warnings(self):
+        return self.transformer.warnings()
+
+    def reasons(self):
+        return [refusal.reason for refusal in self.refusals]
 
 
 def frame(stamp, frame_id="hand"):
@@ -142,89 +167,87 @@ def frame(stamp, frame_id="hand"):
 
 def test_positions_are_untouched_where_nothing_is_asked_for():
     given = frame(1, "anything")
-    assert placement().take(given) == [(given, False)]
+    assert Gate().transform(given) == [(given, False)]
 
 
 def test_placed_by_a_pose():
-    ((placed, new),) = placement(transform="pose", frame="hand", pose=[0, 0, 1, 0, 0, 0, 1]).take(frame(1), True)
+    ((placed, new),) = Gate(transform="pose", frame="hand", pose=[0, 0, 1, 0, 0, 0, 1]).transform(frame(1), True)
     assert new and placed.frame_id == "world" and placed.vertices.dtype == np.float64
     assert np.array_equal(placed.vertices, POINTS + [0, 0, 1])
-    drops = DropCounter()
-    assert placement(drops=drops, transform="pose", frame="hand").take(frame(1, "foot")) == []
-    assert drops.by_mesh_and_reason() == {("cloth", Reason.FRAME_ID): 1}
+    gate = Gate(transform="pose", frame="hand")
+    assert gate.transform(frame(1, "foot")) == []
+    assert [(refusal.mesh, refusal.reason) for refusal in gate.refusals] == [("cloth", Reason.FRAME_ID)]
 
 
 def test_a_transform_can_push_positions_out_of_range():
-    drops, buffer = DropCounter(), TransformBuffer()
+    buffer = TransformBuffer()
     far = Rigid.of((2e150, 0, 0), (0, 0, 0, 1))
     buffer.add("world", "hand", far, None)
     by_pose = {"transform": "pose", "pose": [*far.shift.tolist(), 0, 0, 0, 1]}
-    for gate in (placement(drops=drops, **by_pose), placement(buffer, drops, transform="tf")):
-        assert gate.take(frame(1)) == [] and gate.waiting == 0
-    assert drops.by_reason() == {Reason.OUT_OF_RANGE: 2}
+    for gate in (Gate(**by_pose), Gate(buffer, transform="tf")):
+        assert gate.transform(frame(1)) == [] and gate.waiting == 0
+        assert gate.reasons() == [Reason.OUT_OF_RANGE]
 
 
 def test_frames_wait_in_order_for_their_transforms():
-    buffer, texts = TransformBuffer(), []
-    drops = DropCounter(lambda mesh, reason, text: texts.append(text))
-    gate = placement(buffer, drops, transform="tf", frame="hand")
-    assert gate.take(frame(1 * SECOND)) == gate.take(frame(2 * SECOND, "")) == [] and gate.waiting == 2
+    buffer = TransformBuffer()
+    gate = Gate(buffer, transform="tf", frame="hand")
+    assert gate.transform(frame(1 * SECOND)) == gate.transform(frame(2 * SECOND, "")) == [] and gate.waiting == 2
     assert "no transform connects 'hand' and 'world'" in gate.warnings()[0]
-    assert gate.take(frame(3 * SECOND)) == [] and gate.waiting == 2, "the oldest gave way"
-    assert drops.by_reason() == {Reason.NO_TRANSFORM: 1} and "no transform connects" in texts[0]
+    assert gate.transform(frame(3 * SECOND)) == [] and gate.waiting == 2, "the oldest gave way"
+    assert gate.reasons() == [Reason.NO_TRANSFORM] and "no transform connects" in gate.refusals[0].text
     for k in (2, 3):
         buffer.add("world", "hand", turn(90 * k), k * SECOND)
     ready = gate.retry()
     assert [f.stamp for f, _ in ready] == [2 * SECOND, 3 * SECOND] and gate.waiting == 0 and not gate.warnings()
     assert np.allclose(ready[0][0].vertices, turn(180).apply(POINTS))
-    assert gate.take(frame(SECOND)) == [] and gate.waiting == 0, "older than what is kept: will never come"
-    assert drops.by_reason() == {Reason.NO_TRANSFORM: 2}
-    gate.take(frame(9 * SECOND))
-    gate.clear(Reason.STOPPED)
-    assert gate.waiting == 0 and drops.by_reason()[Reason.STOPPED] == 1
+    assert gate.transform(frame(SECOND)) == [] and gate.waiting == 0, "older than what is kept: will never come"
+    assert gate.reasons() == [Reason.NO_TRANSFORM] * 2
+    gate.transform(frame(9 * SECOND))
+    assert [refusal.reason for refusal in gate.transformer.clear(Reason.STOPPED)] == [Reason.STOPPED]
+    assert gate.waiting == 0
 
 
 def test_a_frame_without_any_transform_holds_up_nobody():
-    buffer, texts = TransformBuffer(), []
-    drops = DropCounter(lambda mesh, reason, text: texts.append(text))
-    gate = placement(buffer, drops, transform="tf")
+    buffer = TransformBuffer()
+    gate = Gate(buffer, transform="tf")
     buffer.add("world", "hand", turn(0), 2 * SECOND)
-    assert gate.take(frame(1 * SECOND, "ghost")) == [] and gate.waiting == 1
+    assert gate.transform(frame(1 * SECOND, "ghost")) == [] and gate.waiting == 1
     assert "no transform connects 'ghost' and 'world'" in gate.warnings()[0]
-    assert [f.stamp for f, _ in gate.take(frame(2 * SECOND))] == [2 * SECOND]
-    assert gate.waiting == 0 and drops.by_reason() == {Reason.NO_TRANSFORM: 1}
-    assert "no transform connects 'ghost'" in texts[0] and "a later frame" in texts[0]
+    assert [f.stamp for f, _ in gate.transform(frame(2 * SECOND))] == [2 * SECOND]
+    assert gate.waiting == 0 and gate.reasons() == [Reason.NO_TRANSFORM]
+    assert "no transform connects 'ghost'" in gate.refusals[0].text and "a later frame" in gate.refusals[0].text
     # What is only late is waited for, in order, and a ghost between them gives way with the first that is ready.
-    assert gate.take(frame(3 * SECOND, "ghost")) == gate.take(frame(4 * SECOND)) == [] and gate.waiting == 2
+    assert gate.transform(frame(3 * SECOND, "ghost")) == gate.transform(frame(4 * SECOND)) == [] and gate.waiting == 2
     buffer.add("world", "hand", turn(0), 4 * SECOND)
     assert [f.stamp for f, _ in gate.retry()] == [4 * SECOND] and gate.waiting == 0
-    assert drops.by_reason() == {Reason.NO_TRANSFORM: 2}
+    assert gate.reasons() == [Reason.NO_TRANSFORM] * 2
 
 
 def test_a_ghost_that_becomes_known_in_time_is_placed_in_order():
-    buffer, drops = TransformBuffer(), DropCounter()
-    gate = placement(buffer, drops, transform="tf")
+    buffer = TransformBuffer()
+    gate = Gate(buffer, transform="tf")
     buffer.add("world", "hand", turn(0), SECOND)
-    assert gate.take(frame(2 * SECOND, "ghost")) == gate.take(frame(3 * SECOND)) == [] and gate.waiting == 2
+    assert gate.transform(frame(2 * SECOND, "ghost")) == gate.transform(frame(3 * SECOND)) == [] and gate.waiting == 2
     buffer.add("world", "ghost", turn(0), None)
     assert [f.stamp for f, _ in gate.retry()] == [2 * SECOND] and gate.waiting == 1
     buffer.add("world", "hand", turn(0), 3 * SECOND)
-    assert [f.stamp for f, _ in gate.retry()] == [3 * SECOND] and drops.total == 0
+    assert [f.stamp for f, _ in gate.retry()] == [3 * SECOND] and not gate.refusals
 
 
 def test_a_new_publisher_is_noticed_although_its_first_frame_is_refused():
     buffer = TransformBuffer()
     buffer.add("world", "hand", turn(0), None)
-    gate = placement(buffer, transform="tf")
+    gate = Gate(buffer, transform="tf")
     for refused in (frame(1, ""), frame(1, "ghost")):
-        assert gate.take(refused, new_publisher=True) == []
-        assert [new for k in (2, 3) for _, new in gate.take(frame(k))] == [True, False]
+        assert gate.transform(refused, new_publisher=True) == []
+        assert [new for k in (2, 3) for _, new in gate.transform(frame(k))] == [True, False]
 
 
 def test_frame_to_transform_from_must_be_named():
-    drops = DropCounter()
-    assert placement(TransformBuffer(), drops, transform="tf").take(frame(1, "")) == []
-    assert drops.by_reason() == {Reason.FRAME_ID: 1}
+    gate = Gate(transform="tf")
+    assert gate.transform(frame(1, "")) == []
+    assert gate.reasons() == [Reason.FRAME_ID]
 
 
 def test_rate_limit():

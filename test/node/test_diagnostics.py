@@ -6,19 +6,22 @@ from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticStatus
 from visualization_msgs.msg import Marker
 
-from hpccd_ros.frames.drops import DropCounter, Reason
-from hpccd_ros.node.diagnostics import Metrics, Reporter, percentiles
+from hpccd_ros.frames.drops import Input, Reason, Refusal
+from hpccd_ros.node.accounts import Accounts
 from hpccd_ros.node.markers import contact_markers
+from hpccd_ros.node.metrics import percentiles
+from hpccd_ros.node.status_report import Reporter
 
 
 class Fixture:
     def __init__(self):
-        self.metrics, self.drops, self.refused = Metrics(), DropCounter(), DropCounter()
-        self.reporter = Reporter("/hpccd", self.metrics, self.drops, self.refused)
+        self.log = []
+        self.accounts = Accounts(self.log.append)
+        self.metrics = self.accounts.metrics
+        self.reporter = Reporter("/hpccd", self.accounts)
 
     def report(self, **changes):
-        given = {"state": "active", "waiting": 0, "restarts": 0, "static_taken": 0, "last_refusal": ""}
-        given |= {"links": {}, "warnings": [], "service": {}} | changes
+        given = {"state": "active", "waiting": 0, "warnings": [], "service": {}} | changes
         message = self.reporter.report(Time(sec=3), **given)
         assert message.header.stamp.sec == 3
         return {s.name: (s.level, s.message, {v.key: v.value for v in s.values}) for s in message.status}
@@ -51,14 +54,14 @@ def test_frames_and_detections():
 
 def test_drops_warn_once_and_stay_counted():
     node = Fixture()
-    node.drops.count("cloth", Reason.OVERLOAD, n=4)
-    node.drops.count("ball", Reason.NOT_FINITE, "vertex 1 is nan")
-    node.refused.count("ball", Reason.OLD_TOPOLOGY, "version 1")
-    level, text, values = node.report(last_refusal="ball: version 1")["/hpccd: frames"]
+    node.accounts.refused(Refusal("cloth", Reason.OVERLOAD, messages=4))
+    node.accounts.refused(Refusal("ball", Reason.NOT_FINITE, "vertex 1 is nan"))
+    node.accounts.refused(Refusal("ball", Reason.OLD_TOPOLOGY, "version 1", what=Input.TOPOLOGY))
+    level, text, values = node.report()["/hpccd: frames"]
     assert level == DiagnosticStatus.WARN and "5 frames dropped" in text and "1 topologies refused" in text
     assert values["dropped"] == "5" and values["dropped.overload"] == "4"
     assert values["dropped.ball.not_finite"] == "1" and values["topologies_refused.ball.old_topology"] == "1"
-    assert values["last_refusal"] == "ball: version 1"
+    assert values["last_refusal"] == "ball: old_topology: version 1"
     level, _, values = node.report()["/hpccd: frames"]
     assert level == DiagnosticStatus.STALE and values["dropped"] == "5"
 
@@ -73,9 +76,9 @@ def test_failure_is_an_error_until_the_next_success():
 
 
 def test_warnings_are_told():
-    level, text, values = Fixture().report(warnings=["2 publishers on /x"], links={"message_lost.x": 3})[
-        "/hpccd: frames"
-    ]
+    node = Fixture()
+    node.accounts.connections["message_lost.x"] += 3
+    level, text, values = node.report(warnings=["2 publishers on /x"])["/hpccd: frames"]
     assert level == DiagnosticStatus.WARN and "2 publishers" in text and values["message_lost.x"] == "3"
 
 

@@ -105,9 +105,9 @@ def test_an_emptied_queue_keeps_nothing():
 
 NODE = """
 import sys
-from hpccd_ros.node import node
+from hpccd_ros.node import node, run
 node.GIVE_BACK_EVERY = float(sys.argv.pop(1))
-sys.exit(node.main())
+sys.exit(run.main())
 """
 # Longer than a message takes to come, shorter than the test has patience.
 SOON, PATIENCE = 5.0, 240.0

@@ -227,12 +227,12 @@ def test_counts_outlive_a_clean_up(start_node):
 
 MARKERS_MEANWHILE = """
 import sys
-from hpccd_ros.node import node
+from hpccd_ros.node import node, run
 class MarkersMeanwhile(node.HpccdNode):
     def _publish(self, found):
         self._settings["markers"] = True
         super()._publish(found)
-sys.exit(node.main(node_type=MarkersMeanwhile))
+sys.exit(run.main(node_type=MarkersMeanwhile))
 """
 
 

@@ -17,10 +17,12 @@ from rclpy.executors import SingleThreadedExecutor
 from waving_sheet import scene_of, sheet_faces, sheet_positions
 
 import hpccd_core as hc
-from hpccd_ros.detect.detection import Options, SceneBuilder
+from hpccd_ros.detect.core import Options
+from hpccd_ros.detect.scene import SceneBuilder
 from hpccd_ros.middleware import fields, mesh_messages
 from hpccd_ros.middleware.guard import Errors
-from hpccd_ros.node.detect_service import DetectService, NodeScene, new_counts
+from hpccd_ros.node.detect_request import NodeScene
+from hpccd_ros.node.detect_service import DetectService, new_counts
 
 N = 16
 FACES = sheet_faces(N)

@@ -66,8 +66,8 @@ def test_the_stub_is_of_the_compiled_module(compiled):
     [
         ("def gpu_status() -> GpuStatus: ...", ""),
         ("def cancel(self)", "def end(self)"),
-        ("def gpu_fail_after(arg0: int)", "def gpu_fail_after(calls: int)"),
-        ("def assign(self, arg0: int, arg1: int)", "def assign(self, arg0: int)"),
+        ("def gpu_fail_after(calls: int)", "def gpu_fail_after(after: int)"),
+        ("def assign(self, pointer: int, bytes: int)", "def assign(self, pointer: int)"),
         ("avx2: ClassVar[Simd]", ""),
         ("class Cancelled(RuntimeError)", "class Cancelled(ValueError)"),
     ],

@@ -13,6 +13,7 @@ from bag_tools import as_installed, rewrite, typestore
 from hpccd_ros.bag.decode import completion, make_decoder
 from hpccd_ros.bag.reader import Recording, RecordingError
 from hpccd_ros.bag.writer import BagWriter, Topic
+from hpccd_ros.frames.drops import Input
 from hpccd_ros.replay import recorded_setup
 from hpccd_ros.replay.recomputed import Replay
 
@@ -23,6 +24,10 @@ def _replay(path, **options):
     with Recording(path) as recording:
         replay = Replay(recording, recorded_setup.of_recording(recording), **options)
         return replay, list(replay.steps())
+
+
+def _dropped(replay):
+    return replay.source.refused[Input.VERTICES].by_mesh_and_reason()
 
 
 def _changed_answer(source, target, change, answer=ANSWER):
@@ -171,7 +176,7 @@ def test_stamps_that_are_no_time(small_bag, tmp_path):
     rewrite(small_bag, tmp_path / "stamps.mcap", edit)
     replay, steps = _replay(tmp_path / "stamps.mcap")
     assert (replay.verified, replay.diverged, replay.unverified) == (87, 0, 2)
-    assert replay.source.drops.by_mesh_and_reason() == {("ball", "malformed"): 1, ("cloth", "incomplete"): 1}
+    assert _dropped(replay) == {("ball", "malformed"): 1, ("cloth", "incomplete"): 1}
     assert re.search("the answer is malformed: .*nanosec", steps[40].missing)
 
 
@@ -234,7 +239,7 @@ def test_a_frame_that_the_core_cannot_take_is_stepped_over(small_bag, tmp_path):
     replay, steps = _replay(tmp_path / "far.mcap", accuracy="exact")
     assert [step.step for step in steps] == [k for k in range(1, 90) if k != 40]
     assert steps[39].start == steps[38].end and steps[39].total > 0
-    assert replay.source.drops.by_mesh_and_reason() == {("cloth", "out_of_range"): 1, ("ball", "incomplete"): 1}
+    assert _dropped(replay) == {("cloth", "out_of_range"): 1, ("ball", "incomplete"): 1}
 
 
 def test_recording_of_another_recorder_needs_parameters(small_bag, tmp_path, hpccd):

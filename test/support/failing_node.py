@@ -6,8 +6,8 @@ import sys
 from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 
-from hpccd_ros.detect.detection import Detection
-from hpccd_ros.node import node
+from hpccd_ros.detect.step_detector import Detection
+from hpccd_ros.node import node, run
 
 
 class FailingNode(node.HpccdNode):
@@ -42,4 +42,4 @@ class FailingNode(node.HpccdNode):
 
 
 if __name__ == "__main__":
-    sys.exit(node.main(node_type=FailingNode))
+    sys.exit(run.main(node_type=FailingNode))

@@ -13,7 +13,7 @@ import tempfile
 import time
 import traceback
 
-from hpccd_ros.node import node
+from hpccd_ros.node import run
 
 AT_ONCE = 4
 
@@ -22,7 +22,7 @@ def start(arguments, output):
     os.dup2(output.fileno(), 1)
     os.dup2(output.fileno(), 2)
     try:
-        status = node.main(["hpccd_node", *arguments])
+        status = run.main(["hpccd_node", *arguments])
     except BaseException:
         traceback.print_exc()
         status = 1

@@ -16,9 +16,6 @@ __device__ inline double from_ordered_bits(u64 b) {
   return __longlong_as_double(static_cast<long long>(b >> 63 ? b & ~(u64{1} << 63) : ~b));
 }
 
-// Beyond this, differences and squares of coordinates could overflow in the error bounds (motion_bounds.h).
-inline constexpr double largest_usable = 1e150;
-
 template <class T>
 __global__ void extent_kernel(Frame<T> f) {
   double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
@@ -27,7 +24,7 @@ __global__ void extent_kernel(Frame<T> f) {
   for (u32 i = blockIdx.x * blockDim.x + threadIdx.x; i < f.n_vertices; i += stride)
     for (int k = 0; k < 3; ++k) {
       const double a = f.given_t0[3 * static_cast<u64>(i) + k], b = f.given_t1[3 * static_cast<u64>(i) + k];
-      bad = bad || !(fabs(a) <= largest_usable) || !(fabs(b) <= largest_usable);
+      bad = bad || !(fabs(a) <= largest_coordinate) || !(fabs(b) <= largest_coordinate);
       low[k] = fmin(low[k], fmin(a, b));
       high[k] = fmax(high[k], fmax(a, b));
     }

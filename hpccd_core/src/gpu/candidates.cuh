@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// Candidate pairs of features (traverse/leaf_pairs.inl) and the first filter on them, in one kernel: candidates wait in
+// LanePair pairs of features (traverse/leaf_pairs.inl) and the first filter on them, in one kernel: candidates wait in
 // shared memory until a warp is full, and only those that pass the sign test reach device memory (a third of them on
 // cloth-ball, a fifth on n-body).
 #pragma once
 
 #include "bvh/tree.h"
-#include "elementary/certified.h"
+#include "elementary/filtered_test.h"
 #include "gpu/frame.cuh"
 
 namespace hpccd::gpu {
@@ -107,6 +107,10 @@ __device__ void flush_survivors(const Frame<T>& f, CandidateSpace& s, u32 kind, 
 }
 
 // The first filter on the last up to 32 candidates. One piece of code for both kinds: they differ in where b starts.
+static_assert(Spans<Kind::vertex_face>::p_from == Spans<Kind::vertex_face>::a_from &&
+              Spans<Kind::vertex_face>::p_from == Spans<Kind::vertex_face>::b_from);
+static_assert(Spans<Kind::edge_edge>::p_from == Spans<Kind::edge_edge>::a_from &&
+              Spans<Kind::edge_edge>::p_to == Spans<Kind::edge_edge>::b_from);
 template <class T>
 __device__ __forceinline__ void filter_candidates(const Frame<T>& f, CandidateSpace& s, CandidateState& state) {
   __syncwarp();
@@ -139,7 +143,8 @@ __device__ __forceinline__ void filter_candidates(const Frame<T>& f, CandidateSp
   __syncwarp();
 }
 
-struct Candidate {
+// What a lane proposes for the list of candidates.
+struct LanePair {
   bool wanted;
   uint4 vertices;
   uint2 features;
@@ -148,8 +153,8 @@ struct Candidate {
 // i / n for i < 1024 and n <= 32: exact, since the error i (magic n - 65536) / (65536 n) stays below 1 / n.
 __device__ inline u32 magic_of(u32 n) { return (65536 + n - 1) / n; }
 
-__device__ __forceinline__ Candidate edge_pair(const CandidateSpace& s, u32 i, u32 j, bool same, bool valid) {
-  Candidate c{valid && (!same || i < j), {0, 0, 0, 0}, {0, 0}};
+__device__ __forceinline__ LanePair edge_pair(const CandidateSpace& s, u32 i, u32 j, bool same, bool valid) {
+  LanePair c{valid && (!same || i < j), {0, 0, 0, 0}, {0, 0}};
   if (!c.wanted) return c;
   const u32 side = same ? 0 : 1;
   const DeviceBox a = s.box(0, i), b = s.box(side, j);
@@ -163,8 +168,8 @@ __device__ __forceinline__ Candidate edge_pair(const CandidateSpace& s, u32 i, u
   return c;
 }
 
-__device__ __forceinline__ Candidate vertex_face_pair(const CandidateSpace& s, u32 i, u32 j, bool valid) {
-  Candidate c{valid, {0, 0, 0, 0}, {0, 0}};
+__device__ __forceinline__ LanePair vertex_face_pair(const CandidateSpace& s, u32 i, u32 j, bool valid) {
+  LanePair c{valid, {0, 0, 0, 0}, {0, 0}};
   if (!valid) return c;
   const DeviceBox vertex = s.box(0, i), face = s.box(1, j);
   c.vertices = {face.tag_low(), vertex.tag_low(), face.tag_high(), s.corner2[j]};
@@ -199,7 +204,7 @@ __device__ __forceinline__ void leaf_pair_candidates(const Frame<T>& f, Candidat
 #pragma unroll 1
     for (u32 base = 0; base < total; base += 32) {
       const u32 c = base + lane_number(), i = c * magic >> 16, j = c - i * n_second;
-      const Candidate pushed = phase == 0 ? edge_pair(s, i, j, same, c < total) : vertex_face_pair(s, i, j, c < total);
+      const LanePair pushed = phase == 0 ? edge_pair(s, i, j, same, c < total) : vertex_face_pair(s, i, j, c < total);
       const u32 mask = __ballot_sync(all_lanes, pushed.wanted);
       const u32 at = state.n + __popc(mask & ((1u << lane_number()) - 1));
       if (pushed.wanted) {

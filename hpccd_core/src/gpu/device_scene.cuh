@@ -6,8 +6,9 @@
 #include <bit>
 #include <vector>
 
+#include "elementary/pair.h"
+#include "gpu/device.h"
 #include "gpu/frame.cuh"
-#include "gpu/pipeline.h"
 #include "gpu/stream.h"
 #include "scene/features.h"
 
@@ -42,7 +43,7 @@ class DeviceScene {
   }
 
   u32 key_bits() const { return kind_shift_ + 1; }
-  Undecided pair_of(u64 key) const {
+  Candidate candidate_of(u64 key) const {
     const u64 features = key & ((u64{1} << kind_shift_) - 1);
     return {static_cast<u32>(features >> key_shift_), static_cast<u32>(features & ((u64{1} << key_shift_) - 1)),
             key >> kind_shift_ ? Kind::edge_edge : Kind::vertex_face};

@@ -3,9 +3,9 @@
 // survivors of the one before.
 #pragma once
 
-#include "elementary/certified.h"
-#include "elementary/extended.h"
-#include "elementary/tolerant.h"
+#include "elementary/filtered_test.h"
+#include "elementary/extended_precision.h"
+#include "elementary/tolerance_test.h"
 #include "gpu/frame.cuh"
 
 namespace hpccd::gpu {
@@ -67,8 +67,7 @@ __global__ __launch_bounds__(128) void roots_kernel(const __grid_constant__ Fram
       const Outcome<double> o = single ? single_root_test<kind, Proven>(m) : many_roots_test<kind, Proven>(m);
       contact = o.contact;
       undecided = !o.contact && !o.none;
-      // "conservative" promises never to be late.
-      toc = accuracy_of(f, v) == Accuracy::conservative ? greater(o.toc - o.delta, 0.0) : o.toc;
+      toc = reported_time(accuracy_of(f, v), o.toc, o.delta);
     }
     append_found(f, kind, contact, pair, toc);
     const u64 at = warp_append(&f.counters->undecided, undecided);
@@ -105,9 +104,9 @@ __global__ void end_segment_kernel(Frame<T> f) {
   }
 }
 
-// The tier's last resort for what the error bounds left open: here where double precision is enough, else on the host.
+// The tier's fallback for what the error bounds left open: here where double precision is enough, else on the host.
 template <class T>
-__global__ __launch_bounds__(32) void last_resort_kernel(const __grid_constant__ Frame<T> f) {
+__global__ __launch_bounds__(32) void fallback_kernel(const __grid_constant__ Frame<T> f) {
   const u64 n = length(f.counters->undecided, f.undecided_capacity), stride = static_cast<u64>(gridDim.x) * blockDim.x;
   for (u64 i = static_cast<u64>(blockIdx.x) * blockDim.x + threadIdx.x; i - lane_number() < n; i += stride) {
     bool contact = false, host = false;
@@ -126,14 +125,14 @@ __global__ __launch_bounds__(32) void last_resort_kernel(const __grid_constant__
       const Ends r[4] = {load_row(f.rows, v.x), load_row(f.rows, v.y), load_row(f.rows, v.z), load_row(f.rows, v.w)};
       const Vec3<double> q0[4] = {r[0].t0, r[1].t0, r[2].t0, r[3].t0}, q1[4] = {r[0].t1, r[1].t1, r[2].t1, r[3].t1};
       if (accuracy == Accuracy::exact || accuracy == Accuracy::conservative) {
-        const extended::Answer a = kind == Kind::edge_edge ? extended::decide<Kind::edge_edge>(q0, q1)
-                                                           : extended::decide<Kind::vertex_face>(q0, q1);
+        const extended_precision::Answer a = kind == Kind::edge_edge ? extended_precision::decide<Kind::edge_edge>(q0, q1)
+                                                           : extended_precision::decide<Kind::vertex_face>(q0, q1);
         contact = a.contact;
         host = !a.contact && !a.none;
         toc = a.toc;
       } else {
-        const tolerant::Answer a = kind == Kind::edge_edge ? tolerant::contact<Kind::edge_edge>(q0, q1)
-                                                           : tolerant::contact<Kind::vertex_face>(q0, q1);
+        const tolerance_test::Answer a = kind == Kind::edge_edge ? tolerance_test::contact<Kind::edge_edge>(q0, q1)
+                                                           : tolerance_test::contact<Kind::vertex_face>(q0, q1);
         contact = a.contact;
         toc = a.toc;
       }

@@ -5,13 +5,11 @@
 #include <cstdint>
 
 #include "base/hd.h"
-#include "elementary/motion.h"
+#include "elementary/pair_vertices.h"
+#include "gpu/counters.cuh"
 #include "hpccd/hpccd.h"
 
 namespace hpccd::gpu {
-
-using u32 = std::uint32_t;
-using u64 = unsigned long long;
 
 inline constexpr u32 all_lanes = 0xFFFFFFFFu;
 inline constexpr u32 no_mesh = 0xFFFFFFFFu;
@@ -59,20 +57,6 @@ struct alignas(16) DeviceLeaf {
 struct PairList {
   uint2* pairs;
   u64 capacity;
-};
-
-struct Counters {
-  u64 extent_low[3], extent_high[3];  // largest of the ordered bits, low ones negated: zero is neutral
-  u64 bad;                            // coordinates that are not acceptable
-  u64 node_tests;
-  u64 leaf_pairs, next_leaf_pair;
-  u64 survivors[2], single[2], many[2];                        // of the segment at work
-  u64 all_survivors[2], all_single[2], all_many[2], most_survivors, most_single, most_many;  // of all segments
-  u64 candidates[2], proven[2], undecided_of[2];
-  u64 found[2];                       // by kind, after the last resort on the device
-  u64 found_all, undecided, to_host;
-  u64 hash;
-  double area;
 };
 
 template <class T>
@@ -197,25 +181,34 @@ __device__ inline Ends load_row(const Row<double>* rows, u32 v) {
   return {{a.x, a.y, b.x}, {c.x, c.y, d.x}};
 }
 
-// The vectors of motion.h; v as in the public queries: v f0 f1 f2 or a0 a1 b0 b1. The differences of load.inl.
+// v as pair_vertices gives them.
 template <Kind kind, class T>
 __device__ inline Motion<double> load_motion(const Row<T>* rows, uint4 v) {
   const Ends q0 = load_row(rows, v.x), q1 = load_row(rows, v.y), q2 = load_row(rows, v.z), q3 = load_row(rows, v.w);
-  if constexpr (kind == Kind::vertex_face)
-    return {q0.t0 - q1.t0, q2.t0 - q1.t0, q3.t0 - q1.t0, q0.t1 - q1.t1, q2.t1 - q1.t1, q3.t1 - q1.t1};
-  else
-    return {q2.t0 - q0.t0, q1.t0 - q0.t0, q3.t0 - q2.t0, q2.t1 - q0.t1, q1.t1 - q0.t1, q3.t1 - q2.t1};
+  const Vec3<double> t0[4] = {q0.t0, q1.t0, q2.t0, q3.t0}, t1[4] = {q0.t1, q1.t1, q2.t1, q3.t1};
+  return motion_of<kind>(t0, t1);
 }
+
+// Of an edge or of a face.
+struct VertexNumbers {
+  u32 v[3];
+  __device__ u32 operator[](int i) const { return v[i]; }
+};
 
 template <Kind kind, class T>
 __device__ inline uint4 vertices_of(const Frame<T>& f, u32 first, u32 second) {
-  if constexpr (kind == Kind::vertex_face) {
-    const u32* corner = f.faces + 3 * static_cast<u64>(second);
-    return {first, __ldg(corner), __ldg(corner + 1), __ldg(corner + 2)};
-  } else {
-    const uint2 a = __ldg(f.edges + first), b = __ldg(f.edges + second);
-    return {a.x, a.y, b.x, b.y};
-  }
+  // Through the cache for what no kernel writes.
+  const auto edge = [&](u32 e) {
+    const uint2 v = __ldg(f.edges + e);
+    return VertexNumbers{{v.x, v.y}};
+  };
+  const auto face = [&](u32 i) {
+    const u32* v = f.faces + 3 * static_cast<u64>(i);
+    return VertexNumbers{{__ldg(v), __ldg(v + 1), __ldg(v + 2)}};
+  };
+  u32 v[4];
+  pair_vertices<kind>(first, second, edge, face, v);
+  return {v[0], v[1], v[2], v[3]};
 }
 
 template <class T>

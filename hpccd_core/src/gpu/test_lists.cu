@@ -59,8 +59,8 @@ void TestLists::launch(Frame<T>& f, int multiprocessors, cudaStream_t stream, St
     end_segment_kernel<<<1, 1, 0, stream>>>(f);
     check_launch("end_segment_kernel");
   }
-  last_resort_kernel<<<static_cast<unsigned>(2 * multiprocessors), 32, 0, stream>>>(f);
-  check_launch("last_resort_kernel");
+  fallback_kernel<<<static_cast<unsigned>(2 * multiprocessors), 32, 0, stream>>>(f);
+  check_launch("fallback_kernel");
   timer.mark("last_resort", stream);
 }
 

@@ -21,11 +21,10 @@ from hpccd_ros.bench.core.variants import Variant, usable
 from hpccd_ros.bench.report import table
 from hpccd_ros.bench.report.figures import stages_in_order
 from hpccd_ros.bench.report.machine import cores
+from hpccd_ros.bench.report.paper import TABLE_1_MS
 from hpccd_ros.bench.sources import TABLE_1
 from hpccd_ros.bench.steps import Step
 
-# Table 1 of the paper: ms on its machine of four cores (Intel i7, 3.2 GHz) and two GPUs (GTX 285).
-PAPER_MS = dict(zip(TABLE_1, (23.2, 53.6, 6.8, 53.8), strict=True))
 BACKENDS = ("cpu", "hybrid", "gpu")
 
 
@@ -116,7 +115,7 @@ def _print(report, args):
     rows = [
         [
             row["scene"], row["variant"], row["triangles"], row["contacts"], row["average_ms"], row["median_ms"],
-            row["p95_ms"], row["first_ms"], PAPER_MS.get(row["scene"]),
+            row["p95_ms"], row["first_ms"], TABLE_1_MS.get(row["scene"]),
             *([row.get("times_faster_than_ipctk")] if peer else []),
         ]
         for row in report.rows

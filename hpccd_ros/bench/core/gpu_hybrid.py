@@ -6,10 +6,10 @@ from __future__ import annotations
 import time
 
 import hpccd_core as hc
-from hpccd_ros.bench.core.timing import times
 from hpccd_ros.bench.report import table
 from hpccd_ros.bench.report.machine import cores
 from hpccd_ros.bench.report.progress import bar
+from hpccd_ros.bench.report.timing import times
 
 SEGMENT_PAIRS = (128, 256, 512, 1024, 2048, 4096, 8192, 16384)
 FEWEST, SECONDS = 5, 1.0  # rounds of each variant: at least so many, and no more once this time has passed

@@ -41,7 +41,7 @@ class IndependentRunner:
         self._threads.shutdown()
 
     def _run_one(self, number: int, step: Step) -> Sample:
-        # Threads that wake together are put two on a core (base/placement.h).
+        # Linux puts threads that wake together two on a core while another is idle.
         if self._cores:
             os.sched_setaffinity(threading.get_native_id(), {self._cores[number]})
         self._barrier.wait()

@@ -19,9 +19,9 @@ import time
 from collections import defaultdict
 from collections.abc import Sequence
 
-from hpccd_ros.bench.core.timing import Times, times
 from hpccd_ros.bench.core.variants import Variant
 from hpccd_ros.bench.report import progress
+from hpccd_ros.bench.report.timing import Times, times
 from hpccd_ros.bench.steps import Source, Step
 
 # A scene of 1.4 ms reaches the speed of a stream after three or more steps.

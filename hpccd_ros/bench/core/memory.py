@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 
 from hpccd_ros.bench import command
-from hpccd_ros.bench.core.variants import METHODS, usable, with_method
+from hpccd_ros.bench.core.variants import METHODS, usable
 from hpccd_ros.bench.report import progress, table
 from hpccd_ros.bench.report.machine import cores
 from hpccd_ros.bench.sources import TABLE_1
@@ -61,7 +61,7 @@ def _median_peak(path, args, method, bar):
     runs = []
     for _ in range(args.repeat):
         options = None if method is None else {
-            "accuracy": args.accuracy, "backend": "cpu", "threads": args.threads, **with_method(method)
+            "accuracy": args.accuracy, "backend": "cpu", "threads": args.threads, "method": method
         }  # fmt: skip
         child = subprocess.run(
             [sys.executable, "-m", "hpccd_ros.bench.core.memory_process", str(path), json.dumps(options)],

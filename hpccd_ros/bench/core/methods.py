@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from hpccd_ros.bench import command
 from hpccd_ros.bench.core import measure
-from hpccd_ros.bench.core.variants import METHODS, Variant, usable, with_method
+from hpccd_ros.bench.core.variants import METHODS, Variant, usable
 from hpccd_ros.bench.report import table
 from hpccd_ros.bench.report.machine import cores
 
@@ -39,7 +39,7 @@ def run(args) -> int:
     for source in sources:
         base = {"accuracy": args.accuracy, "backend": "cpu"}
         variants = [Variant("default", {**base, "threads": threads})]
-        variants += [Variant(m, {**base, "threads": threads, **with_method(m)}) for m in methods if m != "default"]
+        variants += [Variant(m, {**base, "threads": threads, "method": m}) for m in methods if m != "default"]
         for simd in sets:
             variants += [
                 Variant(simd, {**base, "threads": threads, "simd": simd}),

@@ -19,7 +19,7 @@ from hpccd_ros.bench import command
 from hpccd_ros.bench.core import measure
 from hpccd_ros.bench.core.independent import METHOD as INDEPENDENT
 from hpccd_ros.bench.core.independent import IndependentRunner
-from hpccd_ros.bench.core.variants import METHODS, Variant, usable, with_method
+from hpccd_ros.bench.core.variants import METHODS, Variant, usable
 from hpccd_ros.bench.report import table
 from hpccd_ros.bench.report.machine import cores
 from hpccd_ros.bench.sources import TABLE_1
@@ -60,7 +60,7 @@ def run(args) -> int:
         variants = {
             (method, n): Variant(
                 f"{method}, {n} threads",
-                {"accuracy": args.accuracy, "backend": args.backend, "threads": n, **with_method(method)},
+                {"accuracy": args.accuracy, "backend": args.backend, "threads": n, "method": method},
             )
             for method in methods for n in counts
         }  # fmt: skip

@@ -16,10 +16,10 @@ from hpccd_ros import scenes
 from hpccd_ros.base.errors import UserError
 from hpccd_ros.bench import command
 from hpccd_ros.bench.core import measure
-from hpccd_ros.bench.core.timing import slope
 from hpccd_ros.bench.core.variants import Variant
 from hpccd_ros.bench.report import table
 from hpccd_ros.bench.report.machine import cores
+from hpccd_ros.bench.report.timing import slope
 from hpccd_ros.bench.sources import of_scene
 
 DEFAULT = ("cloth-ball-like", "n-body-like-hr")

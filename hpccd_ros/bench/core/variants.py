@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import dataclasses
-import inspect
 from collections.abc import Callable
 
 import numpy as np
@@ -12,7 +11,6 @@ import numpy as np
 import hpccd_core as hc
 from hpccd_ros.bench.steps import Step
 
-# Of `hc.Detector(method=...)`: "default" stands for leaving the option alone.
 METHODS = ("default", "published", "naive", "front")
 TIERS = ("fast", "balanced", "conservative", "exact")
 
@@ -33,11 +31,8 @@ class Variant:
         return hc.Detector(scene, **self.options)
 
 
-def refusal(**options) -> str | None:
+def why_unusable(**options) -> str | None:
     """Why a detector with these options cannot be had here, in the core's words; None where it can."""
-    unknown = options.keys() - inspect.signature(hc.Detector.__init__).parameters.keys()
-    if unknown:
-        return f"this build has no option {', '.join(sorted(unknown))}"
     scene = hc.Scene()
     scene.add_mesh("a", np.array([[0, 1, 2]], np.uint32))
     scene.add_mesh("b", np.array([[0, 1, 2]], np.uint32))
@@ -52,14 +47,5 @@ def refusal(**options) -> str | None:
 
 def usable(name: str, values, **others) -> tuple[list, dict[str, str]]:
     """Those `values` of the option `name` that work here, and {value: reason} of the others."""
-    refused = {value: refusal(**_option(name, value), **others) for value in values}
+    refused = {value: why_unusable(**{name: value}, **others) for value in values}
     return [v for v in values if refused[v] is None], {v: why for v, why in refused.items() if why is not None}
-
-
-def with_method(method: str) -> dict:
-    """Options of a method of METHODS."""
-    return _option("method", method)
-
-
-def _option(name, value):
-    return {} if (name, value) == ("method", "default") else {name: value}

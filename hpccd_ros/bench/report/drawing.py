@@ -44,7 +44,7 @@ class Figure:
     legend: str | None = None
     right: str = "upper"  # end of the side at which the legend of the whole picture stands
 
-    def drawn(self, result):
+    def compose(self, result):
         """The picture of a result (`machine`, `rows`) as a matplotlib figure, or None where it has no such rows."""
         rows = [row for row in result.rows if self.rows(row)]
         if not rows:
@@ -68,7 +68,7 @@ class Figure:
 
     def save(self, result, folder: Path) -> Path:
         """Write the picture; UserError where the result has no rows for it."""
-        page = self.drawn(result)
+        page = self.compose(result)
         if page is None:
             raise UserError(f"{self.name}.png: this result has no rows for it; see the options of the benchmark")
         folder.mkdir(parents=True, exist_ok=True)

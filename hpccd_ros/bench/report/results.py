@@ -23,6 +23,7 @@ class Kept:
     benchmark: str
     command: str
     machine: dict
+    other_processes_share: float  # of all cores, while it was measured
     rows: list[dict]
 
     @classmethod

@@ -13,8 +13,8 @@ import sys
 import time
 from pathlib import Path
 
-from hpccd_ros.detect.detection import Detection
-from hpccd_ros.node import node
+from hpccd_ros.detect.step_detector import Detection
+from hpccd_ros.node import node, run
 
 VARIABLE = "HPCCD_BENCH_TIMES"
 
@@ -37,4 +37,4 @@ class TimedNode(node.HpccdNode):
 
 
 if __name__ == "__main__":
-    sys.exit(node.main(node_type=TimedNode))
+    sys.exit(run.main(node_type=TimedNode))

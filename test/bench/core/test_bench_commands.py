@@ -131,7 +131,7 @@ def test_gpu_redraws_a_kept_result(bench, tmp_path):
 
 
 def test_gpu_redraw_refuses_what_is_no_result(bench, tmp_path, capsys):
-    frames = '{"benchmark": "gpu", "command": "", "machine": {}, "rows": [{"part": "frame"}]}'
+    frames = '{"benchmark": "gpu", "command": "", "machine": {}, "other_processes_share": 0, "rows": []}'
     wrong = {"text.json": "no json", "cpu.json": '{"benchmark": "cpu"}', "empty.json": "{}", "frames.json": frames}
     for name, text in wrong.items():
         (tmp_path / name).write_text(text)

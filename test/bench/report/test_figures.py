@@ -35,7 +35,7 @@ def widths(axis):
 @pytest.mark.parametrize("figure", [f for f in figures.FIGURES if f.kept], ids=lambda f: f.name)
 def test_committed_pictures_can_be_drawn_again(figure, tmp_path):
     result = kept(figure)
-    page = figure.drawn(result)
+    page = figure.compose(result)
     headings = [figure.heading(rows) for rows in drawing.by(filter(figure.rows, result.rows), *figure.panel)]
     titles = [axis.get_title() for axis in page.axes if axis.axison]
     assert titles[bool(figure.overview) :] == headings and len(headings) > 1
@@ -44,7 +44,7 @@ def test_committed_pictures_can_be_drawn_again(figure, tmp_path):
 
 def test_scaling_has_a_line_for_each_method_and_each_scene():
     result = kept(BY_NAME["scaling"])
-    overview, *panels = BY_NAME["scaling"].drawn(result).axes
+    overview, *panels = BY_NAME["scaling"].compose(result).axes
     of = {(r["scene"], r["method"], r["threads"]): r["speedup"] for r in result.rows}
     for axis, scene in zip(panels, ("cloth-ball", "cloth-funnel", "n-body"), strict=True):
         drawn = lines(axis)
@@ -62,7 +62,7 @@ def test_hybrid_has_a_line_for_each_method_and_number_of_gpus():
         for method in ("published", "default") for threads in (4, 1, 2) for gpus in (1, 0)
     ]  # fmt: skip
     result = dataclasses.replace(kept(BY_NAME["hybrid"]), rows=rows)
-    (axis,) = BY_NAME["hybrid"].drawn(result).axes
+    (axis,) = BY_NAME["hybrid"].compose(result).axes
     assert lines(axis) == {
         "default, no GPU": [(1, 2), (2, 4), (4, 8)], "default, 1 GPU": [(1, 4), (2, 8), (4, 16)],
         "published, no GPU": [(1, 1), (2, 2), (4, 4)], "published, 1 GPU": [(1, 2), (2, 4), (4, 8)],
@@ -71,7 +71,7 @@ def test_hybrid_has_a_line_for_each_method_and_number_of_gpus():
 
 def test_bars_of_stages_add_up_to_the_step():
     result = kept(BY_NAME["cpu"])
-    axis = BY_NAME["cpu"].drawn(result).axes[0]
+    axis = BY_NAME["cpu"].compose(result).axes[0]
     rows = [row for row in result.rows if row["scene"] == "cloth-ball"]
     assert [label.get_text() for label in axis.get_yticklabels()] == [row["variant"] for row in rows]
     for place, row in enumerate(rows):
@@ -82,14 +82,14 @@ def test_wrong_contacts_stand_in_the_picture():
     methods = BY_NAME["methods"]
     rows = [{"scene": "s", "variant": "default", "threads": 4, "accuracy": "exact", "sequence_ms": 8.0, "steps": 2,
              "same_contacts": same} for same in (True, False)]  # fmt: skip
-    (axis,) = methods.drawn(dataclasses.replace(kept(BY_NAME["cpu"]), rows=rows)).axes
+    (axis,) = methods.compose(dataclasses.replace(kept(BY_NAME["cpu"]), rows=rows)).axes
     assert widths(axis) == {0: [4.0], 1: [4.0]}
     assert [text.get_text().strip() for text in axis.texts] == ["4", "4  OTHER CONTACTS"]
 
 
 def test_sweeps_show_errors_of_zero_at_the_lower_end():
     result = kept(BY_NAME["accuracy-sweeps"])
-    ordinary, *_, degenerate = BY_NAME["accuracy-sweeps"].drawn(result).axes
+    ordinary, *_, degenerate = BY_NAME["accuracy-sweeps"].compose(result).axes
     assert {y for _, y in lines(ordinary)["exact"]} == {figures.SHARE_FLOOR}
     assert max(y for _, y in lines(degenerate)["balanced"]) > 0.01
 

@@ -23,6 +23,7 @@ from hpccd_ros.scenes.messages import Player
 
 SCENE, SIZE = "breaking-like", 0.02  # 5,036 triangles; sixteen changes of topology in each run of 60 frames
 TIER = "balanced"
+INPUT_DEPTH = 50  # frames that may wait for the node
 HISTORY = 10_000  # frames that an answer may name: what a busy machine holds up comes late
 WRONG_EVERY = 7  # frames
 REQUEST_EVERY = 20  # frames
@@ -40,7 +41,7 @@ def node_parameters(scene: scenes.Scene) -> dict[str, Any]:
         "threads": 1,
         "max_vertices": MOST_VERTICES,
         "max_contacts": 5000,  # fewer than there are at times: truncation is exercised too
-        "input_depth": 50,
+        "input_depth": INPUT_DEPTH,
         "diagnostics_period": 1.0,
     }
 
@@ -63,7 +64,7 @@ class SoakLoad:
                 MeshTopology, topic_names.topology(mesh), qos.TOPOLOGY
             )
             self._publishers[topic_names.vertices(mesh)] = node.create_publisher(
-                MeshVertices, topic_names.vertices(mesh), qos.vertices("reliable", 50)
+                MeshVertices, topic_names.vertices(mesh), qos.vertices("reliable", INPUT_DEPTH)
             )
         misspelt = topic_names.vertices("statute")
         self._misspelt = node.create_publisher(MeshVertices, misspelt, qos.vertices("reliable", 10))

@@ -27,7 +27,7 @@ from hpccd_ros.demo.children import Children
 from hpccd_ros.middleware import environment
 
 NAMESPACE = "/soak"
-HELD_UP_FRAMES = 60  # more than may wait for the node (input_depth, load.py)
+HELD_UP_FRAMES = load.INPUT_DEPTH + 10  # more than may wait
 PATIENCE = 300.0  # s, for what takes less than one on a machine that is not busy
 ROWS = 10  # of the result, evenly over the time
 

@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The core's detector: its options, and what it cannot work with, in its own words. No ROS."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+import hpccd_core as hc
+from hpccd_ros.frames.types import Topology
+
+# What the core raises for bad input, options that are not built, and lack of memory or of a device.
+CORE_ERRORS = (ValueError, TypeError, RuntimeError, MemoryError)
+
+
+@dataclass(frozen=True)
+class Options:
+    """Arguments of hpccd_core.Detector."""
+
+    accuracy: str = "exact"
+    backend: str = "auto"
+    threads: int = 0
+    report: str = "all"
+    outputs: tuple[str, ...] = ()
+
+
+def make_detector(scene: hc.Scene, options: Options) -> hc.Detector:
+    """Detector with these options. Raises what the core raises."""
+    return hc.Detector(
+        scene,
+        accuracy=options.accuracy,
+        backend=options.backend,
+        threads=options.threads,
+        report=options.report,
+        outputs=options.outputs,
+    )
+
+
+def unusable_options(options: Options) -> str | None:
+    """Why the core cannot work with these options on this machine, or None."""
+    scene = hc.Scene()
+    scene.add_mesh("probe", np.array([[0, 1, 2]], np.uint32))
+    try:
+        make_detector(scene, options)
+    except CORE_ERRORS as error:
+        return str(error)
+    return None
+
+
+def unusable_topology(topology: Topology) -> str | None:
+    """Why the core cannot take this topology, or None."""
+    try:
+        hc.Scene().add_mesh("mesh", topology.faces, n_vertices=topology.n_vertices)
+    except CORE_ERRORS as error:
+        return str(error)
+    return None

@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The core's scene of the meshes, whatever their topologies are at the time. No ROS."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+import hpccd_core as hc
+from hpccd_ros.frames.types import MeshSettings, SceneFrame, Topology
+
+
+@dataclass(frozen=True, eq=False)
+class SceneBuilder:
+    """Makes core scenes of the same meshes with changing topologies."""
+
+    meshes: tuple[MeshSettings, ...]
+    ignored_pairs: tuple[tuple[str, str], ...] = ()
+    pair_accuracies: tuple[tuple[str, str, str], ...] = ()
+
+    def build(self, topologies: tuple[Topology, ...]) -> hc.Scene:
+        """One topology for each mesh, in order. Raises what the core raises."""
+        scene = hc.Scene()
+        for mesh, topology in zip(self.meshes, topologies, strict=True):
+            scene.add_mesh(
+                mesh.name,
+                topology.faces,
+                n_vertices=topology.n_vertices,
+                self_collision=mesh.self_collision,
+                static=mesh.static,
+            )
+        for a, b in self.ignored_pairs:
+            scene.ignore_pair(a, b)
+        for a, b, accuracy in self.pair_accuracies:
+            scene.set_accuracy(a, b, accuracy)
+        return scene
+
+    def among(self, names: list[str]) -> "SceneBuilder":
+        """The scene of these meshes, in this order; names that it does not have are meshes of their own."""
+        known = {mesh.name: mesh for mesh in self.meshes}
+        return SceneBuilder(
+            tuple(known.get(name, MeshSettings(name)) for name in names),
+            tuple(pair for pair in self.ignored_pairs if set(pair) <= set(names)),
+            tuple(entry for entry in self.pair_accuracies if set(entry[:2]) <= set(names)),
+        )
+
+    def concatenate(self, frame: SceneFrame, static_of: SceneFrame) -> np.ndarray:
+        """(V,3) positions of all meshes; those of static meshes from ``static_of``. No copy of a single mesh.
+
+        One float64 mesh makes the whole float64, which holds the others' float32 exactly.
+        """
+        parts = [static_of.vertices[i] if mesh.static else frame.vertices[i] for i, mesh in enumerate(self.meshes)]
+        return parts[0] if len(parts) == 1 else np.concatenate(parts)

@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: Apache-2.0
+"""From the two frames of a step to its contacts. No ROS, no threads of its own."""
+
+import time
+from dataclasses import dataclass, field
+
+import hpccd_core as hc
+from hpccd_ros.detect.cancellation import Cancellation
+from hpccd_ros.detect.core import Options, make_detector
+from hpccd_ros.detect.layout import Layout
+from hpccd_ros.detect.scene import SceneBuilder
+from hpccd_ros.frames.types import SceneFrame
+
+
+@dataclass(frozen=True, eq=False)
+class Detection:
+    """The contacts of one step and how they were found.
+
+    ``backend``, ``threads``: what was used. ``detect_ms``: wall time of the core's call.
+    """
+
+    start: SceneFrame
+    end: SceneFrame
+    contacts: hc.Contacts
+    layout: Layout
+    options: Options
+    backend: str
+    threads: int
+    detect_ms: float
+    profile: dict[str, float] = field(default_factory=dict)
+    stats: dict[str, float] = field(default_factory=dict)
+
+
+class StepDetector:
+    """Keeps the core's scene and detector from step to step, as long as topologies and ``options`` stay the same.
+
+    ``options`` may be set at any time, from any thread: the next step has them.
+    """
+
+    def __init__(self, builder: SceneBuilder, options: Options) -> None:
+        self.options = options
+        self._builder = builder
+        self._names = tuple(mesh.name for mesh in builder.meshes)
+        self._scene: hc.Scene | None = None
+        self._scene_of: SceneFrame | None = None
+        self._layout: Layout | None = None
+        self._detector: hc.Detector | None = None
+        self._detector_options: Options | None = None
+        self._cancellation = Cancellation()
+
+    def cancel(self) -> None:
+        """From any thread, for good: the detection under way, and all later ones, raise hc.Cancelled."""
+        self._cancellation.cancel()
+
+    def prepare_scene(self, frame: SceneFrame) -> None:
+        """The scene of the topologies of ``frame``. Raises what the core raises."""
+        if self._scene_of is None or not self._scene_of.same_scene(frame):
+            self._scene = self._builder.build(frame.topologies)
+            self._layout = Layout.of(self._names, frame.topologies)
+            self._scene_of, self._detector = frame, None
+
+    def prepare_detector(self) -> None:
+        """The detector of the scene, with the options of now. Raises what the core raises."""
+        options = self.options
+        if self._detector is None or options != self._detector_options:
+            self._detector = self._cancellation.guard(make_detector(self._scene, options))
+            self._detector_options = options
+
+    def detect(self, start: SceneFrame, end: SceneFrame) -> Detection:
+        """The contacts on the way from ``start`` to ``end``, of the same scene. Raises what the core raises."""
+        self.prepare_scene(end)
+        self.prepare_detector()
+        began = time.perf_counter()
+        contacts = self._detector.detect(self._builder.concatenate(start, end), self._builder.concatenate(end, end))
+        detect_ms = 1e3 * (time.perf_counter() - began)
+        return Detection(
+            start,
+            end,
+            contacts,
+            self._layout,
+            self._detector_options,
+            self._detector.backend,
+            self._detector.threads,
+            detect_ms,
+            dict(self._detector.profile),
+            dict(self._detector.stats),
+        )

@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The thread that detects, outside of the executor. No ROS."""
+
+import threading
+from collections.abc import Callable
+
+from hpccd_ros.detect.step_detector import Detection, StepDetector
+from hpccd_ros.frames.frame_queue import FrameQueue
+from hpccd_ros.frames.types import SceneFrame
+
+
+class DetectionThread(threading.Thread):
+    """Pops scene frames from ``queue``, hands detections to ``on_detection``, until the queue is closed.
+
+    The motion goes from the end of the last step that was answered to the new frame, so where frames were dropped
+    between them, or their detection failed, no time is left unwatched. The first frame, and the first after a change
+    of topology, is only a start: ``on_first``. ``on_failure`` has the frames that were not answered, and why:
+    hc.Cancelled after `cancel`.
+    """
+
+    def __init__(
+        self,
+        detector: StepDetector,
+        queue: FrameQueue,
+        *,
+        on_detection: Callable[[Detection], None],
+        on_first: Callable[[SceneFrame], None],
+        on_failure: Callable[[SceneFrame, Exception], None],
+    ) -> None:
+        super().__init__(name="detection", daemon=True)
+        self.detector = detector
+        self._queue = queue
+        self._on_detection = on_detection
+        self._on_first = on_first
+        self._on_failure = on_failure
+        self._start: SceneFrame | None = None
+        self.working_on: SceneFrame | None = None
+
+    def cancel(self) -> None:
+        """Give up the frame that is worked on. For the end, after the queue was closed."""
+        self.detector.cancel()
+
+    def run(self) -> None:
+        while (item := self._queue.pop()) is not None:
+            frame = self.working_on = item.frame
+            try:
+                if item.first:
+                    self._start = frame
+                    self._on_first(frame)
+                else:
+                    self._on_detection(self.detector.detect(self._start, frame))
+                    self._start = frame  # only now: a step that failed is part of the next one
+            except Exception as error:  # any: else it would end this thread, and no frame be answered again
+                self._on_failure(frame, error)
+            self.working_on = None

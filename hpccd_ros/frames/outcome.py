@@ -1,0 +1,27 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What comes of a message: values that go up to whoever handed it in. No ROS."""
+
+from dataclasses import dataclass, field
+
+from hpccd_ros.frames.drops import Refusal
+from hpccd_ros.frames.types import SceneFrame
+
+
+@dataclass(eq=False, slots=True)
+class Outcome:
+    """``frames`` of the scene that a message completes (usually none or one), ``refusals``: what will not be used.
+
+    ``restarts``: in words, where the stream starts anew. ``static_taken``: accepted messages of static meshes.
+    """
+
+    frames: list[SceneFrame] = field(default_factory=list)
+    refusals: list[Refusal] = field(default_factory=list)
+    restarts: list[str] = field(default_factory=list)
+    static_taken: int = 0
+
+    def __iadd__(self, other: "Outcome") -> "Outcome":
+        self.frames += other.frames
+        self.refusals += other.refusals
+        self.restarts += other.restarts
+        self.static_taken += other.static_taken
+        return self

@@ -1,0 +1,133 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The way of a checked message to frames of the scene: transform, assemble, queue. No ROS, no threads of its own."""
+
+from collections.abc import Sequence
+
+from hpccd_ros.frames.assembler import FrameAssembler
+from hpccd_ros.frames.drops import Reason
+from hpccd_ros.frames.frame_queue import FrameQueue
+from hpccd_ros.frames.outcome import Outcome
+from hpccd_ros.frames.transform_buffer import TransformBuffer
+from hpccd_ros.frames.transformer import MeshTransformer, Transformed
+from hpccd_ros.frames.types import MeshFrame, MeshSettings, Topology
+
+
+class FramePipeline:
+    """The node and a replay push the messages of the ``meshes`` in; frames of the scene and refusals come out.
+
+    transforms: to be filled from outside, then `retry`. The other arguments are those of the assembler.
+    """
+
+    def __init__(
+        self,
+        meshes: Sequence[MeshSettings],
+        *,
+        max_pending: int = 8,
+        restart_after: int = 5,
+        tolerance: int | None = None,
+        frame_id: str = "",
+    ) -> None:
+        self._meshes = tuple(meshes)
+        self._max_pending = max_pending
+        self._demanded_frame_id = frame_id
+        self._assembler = FrameAssembler(
+            self._meshes,
+            max_pending=max_pending,
+            restart_after=restart_after,
+            tolerance=tolerance,
+            frame_id=frame_id,
+        )
+        self._queue: FrameQueue | None = None
+        self._forget_transforms()
+
+    def load(self, mesh: str, topology: Topology, positions: MeshFrame | None) -> Outcome:
+        """A mesh from a file. positions: of a static one, in the scene's frame already."""
+        outcome = self._assembler.set_topology(mesh, topology)
+        if positions is not None:
+            outcome += self._assembler.add(mesh, positions)
+        return outcome
+
+    def push(self, mesh: str, message: MeshFrame | Topology, new_publisher: bool = False) -> Outcome:
+        """One message of ``mesh``; frames that it completes are in the queue, if there is one.
+
+        new_publisher: it is the first of its publisher, or the first that could be read.
+        """
+        if isinstance(message, Topology):
+            return self._enqueue(self._assembler.set_topology(mesh, message, new_publisher))
+        return self._enqueue(self._assemble(mesh, self._transformers[mesh].transform(message, new_publisher)))
+
+    def retry(self) -> Outcome:
+        """Frames go on that waited for transforms which have come."""
+        outcome = Outcome()
+        for mesh, transformer in self._transformers.items():
+            outcome += self._assemble(mesh, transformer.retry())
+        return self._enqueue(outcome)
+
+    def start(self, capacity: int) -> FrameQueue:
+        """From now on frames go into the queue that is returned, of so many frames that end a step."""
+        self._queue = FrameQueue(capacity)
+        return self._queue
+
+    def stop(self) -> Outcome:
+        """Refuse what waits as stopped, close the queue. Topologies and positions of static meshes stay."""
+        outcome = Outcome()
+        for transformer in self._transformers.values():
+            outcome.refusals += transformer.clear(Reason.STOPPED)
+        outcome.refusals += self._assembler.clear(Reason.STOPPED)
+        for frame in self._queue.close() if self._queue is not None else ():
+            outcome.refusals += frame.refused(Reason.STOPPED)
+        self._queue = None
+        self._forget_transforms()
+        return outcome
+
+    @property
+    def waiting(self) -> int:
+        """Messages pushed that are neither out of the queue nor refused yet."""
+        queued = self._queue.frames() if self._queue is not None else ()
+        before = self._assembler.waiting + sum(t.waiting for t in self._transformers.values())
+        return before + sum(len(frame.fresh) for frame in queued)
+
+    @property
+    def frame_id(self) -> str:
+        """Of the scene; "" as long as no message has named one."""
+        return self._assembler.frame_id
+
+    @property
+    def coordinate_frame(self) -> tuple[str, str]:
+        """(frame_id of the scene or "", where it comes from)."""
+        return self._assembler.coordinate_frame
+
+    def set_restart_after(self, count: int) -> None:
+        self._assembler.restart_after = count
+
+    def topology(self, mesh: str) -> Topology | None:
+        """The topology in force, or None."""
+        return self._assembler.topology(mesh)
+
+    def awaited_transform(self, mesh: str) -> list[str]:
+        """What frames of ``mesh`` wait for, in words; empty: none waits."""
+        return self._transformers[mesh].warnings()
+
+    def warnings(self) -> list[str]:
+        """Positions of static meshes that are not used."""
+        return self._assembler.warnings()
+
+    def _assemble(self, mesh: str, transformed: Transformed) -> Outcome:
+        outcome = Outcome(refusals=transformed.refusals)
+        for frame, new_publisher in transformed.frames:
+            outcome += self._assembler.add(mesh, frame, new_publisher)
+        return outcome
+
+    def _enqueue(self, outcome: Outcome) -> Outcome:
+        if self._queue is not None:
+            for frame in outcome.frames:
+                for lost in self._queue.put(frame):
+                    outcome.refusals += lost.refused(Reason.OVERLOAD)
+        return outcome
+
+    def _forget_transforms(self) -> None:
+        self.transforms = TransformBuffer()
+        self._transformers = {
+            mesh.name: MeshTransformer(mesh, self._demanded_frame_id, self._max_pending, self.transforms)
+            for mesh in self._meshes
+        }

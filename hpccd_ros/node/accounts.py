@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: Apache-2.0
+"""All that the node counts, from its start to its end. No ROS."""
+
+import time
+from collections import Counter
+from collections.abc import Callable
+
+from hpccd_ros.detect.step_detector import Detection
+from hpccd_ros.frames.drops import Input, Reason, Refusal, RefusalCounter
+from hpccd_ros.frames.outcome import Outcome
+from hpccd_ros.frames.types import SceneFrame
+from hpccd_ros.node.metrics import Metrics
+from hpccd_ros.node.refusal_log import RefusalLog
+
+
+class Accounts:
+    """``dropped``: vertex messages. ``connections``: what the middleware tells of its topics (name -> count).
+
+    ``static_taken``: accepted messages of static meshes, which count as answered. warn: takes what is to be logged.
+    """
+
+    def __init__(self, warn: Callable[[str], None]) -> None:
+        self._warn = warn
+        self.log = RefusalLog(warn)
+        self.dropped = RefusalCounter()
+        self.topologies_refused = RefusalCounter()
+        self.metrics = Metrics()
+        self.connections: Counter = Counter()
+        self.restarts = 0
+        self.static_taken = 0
+
+    def add(self, outcome: Outcome) -> None:
+        """What came of a message, but for the frames: those are counted when they are answered."""
+        for text in outcome.restarts:
+            self.restarts += 1
+            self._warn(text)
+        self.static_taken += outcome.static_taken
+        for refusal in outcome.refusals:
+            self.refused(refusal)
+
+    def refused(self, refusal: Refusal) -> None:
+        """Counted, and logged where there is something to say."""
+        counter = self.topologies_refused if refusal.what is Input.TOPOLOGY else self.dropped
+        counter.count(refusal)
+        if refusal.text:
+            self.log(refusal.mesh, refusal.reason, refusal.text)
+
+    def answered(self, found: Detection, total: int, sent: int) -> None:
+        """One step: ``total`` contacts were found, ``sent`` of them have just been published."""
+        latency_ms = 1e3 * (time.monotonic() - found.end.received)
+        last = {
+            "accuracy": found.options.accuracy,
+            "backend": found.backend,
+            "threads": found.threads,
+            "contacts": total,
+            "contacts_sent": sent,
+            "first_toc": float(found.contacts.first_toc),
+            "step": found.end.step,
+            **{f"core.{name}": value for name, value in found.stats.items()},
+        }
+        self.metrics.detected(len(found.end.fresh), latency_ms, found.detect_ms, found.profile, last)
+
+    def unanswered(self, frame: SceneFrame, reason: Reason) -> None:
+        """A frame that the detection was given and that gets no answer."""
+        for refusal in frame.refused(reason):
+            self.refused(refusal)
+
+    def failed(self, frame: SceneFrame, error: Exception) -> None:
+        """Why the step that ends with ``frame`` is `unanswered`."""
+        self.metrics.failed(f"{type(error).__name__}: {error}")
+        self.log("scene", Reason.DETECTION_FAILED, f"step that ends at {frame.stamp} ns: {error}")

@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The parameters of a node: declared and checked when it starts, followed as they change."""
+
+from collections.abc import Callable
+from typing import Any
+
+from rclpy.node import Node
+
+from hpccd_ros.base.quoting import listed, shortened
+from hpccd_ros.detect.core import unusable_options
+from hpccd_ros.middleware import environment, qos_overrides, topic_names
+from hpccd_ros.node.node_recording import unrecordable
+from hpccd_ros.params import parameters, scene_parameters
+from hpccd_ros.params.values import ParameterError
+
+Meshes = dict[str, dict[str, Any]]
+
+
+class Configuration:
+    """``settings``, ``meshes`` (name -> parameters mesh.NAME.*) and the detector's ``options`` as they are now.
+
+    Raises ParameterError for parameters that the node cannot start with.
+    """
+
+    def __init__(self, node: Node) -> None:
+        self._node = node
+        self.settings, self.meshes = parameters.declare(node)
+        scene_parameters.check(self.settings, self.meshes)
+        if why := topic_names.unusable_name(node, self.meshes) or qos_overrides.unusable_override(node):
+            raise ParameterError(why)
+        for name in parameters.unknown_overrides(node, qos_overrides.known(node, self.meshes)):
+            text = f"parameter {shortened(name)} is unknown and has no effect; see docs/parameters.md"
+            node.get_logger().warning(text)
+        self.options = scene_parameters.detector_options(self.settings)
+        if why := unusable_options(self.options) or unrecordable(self.settings):
+            raise ParameterError(why)
+
+    def follow(self, configured: Callable[[], bool], on_change: Callable[[], None]) -> None:
+        """From now on parameters may be set. configured: whether the life cycle is past `unconfigured`."""
+
+        def changed() -> None:
+            self.options = scene_parameters.detector_options(self.settings)
+            on_change()
+
+        parameters.watch(
+            self._node, self.settings, self.meshes, configured=configured, check=self._check, on_change=changed
+        )
+
+    def summary(self, contacts: str) -> str:
+        """For the log, in one line. contacts: name of the topic."""
+        where = f"on this host only ({environment.DISCOVERY}=SUBNET opens it)"
+        return (
+            f"meshes {listed(self.meshes) or 'none (service only)'}; "
+            f"accuracy {self.options.accuracy}, backend {self.options.backend}, contacts on {contacts}; "
+            f"discovery {where if environment.this_host_only() else 'beyond this host'}"
+        )
+
+    def _check(self, wanted: dict[str, Any], meshes: Meshes) -> str | None:
+        try:
+            scene_parameters.check(wanted, meshes)
+        except ParameterError as error:
+            return str(error)
+        if why := unrecordable(wanted):
+            return why
+        options = scene_parameters.detector_options(wanted)
+        return None if options == self.options else unusable_options(options)

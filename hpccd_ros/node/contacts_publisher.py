@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The answer to a step on its topics: contacts, and what viewers show of them."""
+
+import time
+from typing import Any
+
+import numpy as np
+from hpccd.msg import ContactArray
+from sensor_msgs.msg import PointCloud2
+from std_msgs.msg import Header
+from visualization_msgs.msg import MarkerArray
+
+from hpccd_ros.detect.step_detector import Detection
+from hpccd_ros.middleware import contact_messages, fields, qos
+from hpccd_ros.node.life_cycle import GuardedLifecycleNode
+from hpccd_ros.node.markers import contact_markers, surface_cloud
+
+
+class ContactsPublisher:
+    """Of a configured ``node``, until that is unconfigured."""
+
+    def __init__(self, node: GuardedLifecycleNode, settings: dict[str, Any]) -> None:
+        self._settings = settings
+        self._contacts = node.configured_publisher(ContactArray, "contacts", qos.CONTACTS)
+        self._markers = node.configured_publisher(MarkerArray, "markers", qos.MARKERS)
+        self._surface = node.configured_publisher(PointCloud2, "surface", qos.MARKERS)
+        self._show_after = 0.0
+
+    @property
+    def topic(self) -> str:
+        return self._contacts.topic_name
+
+    def publish(self, found: Detection, dropped_frames: int) -> ContactArray:
+        """The message that was sent. dropped_frames: of the scene, so far."""
+        # check_fields: its arrays are taken as they are, not copied.
+        message = ContactArray(
+            step=found.end.step, accuracy=found.options.accuracy, backend=found.backend, check_fields=True
+        )
+        message.header.stamp = fields.ns_to_stamp(found.end.stamp)
+        message.header.frame_id = found.end.frame_id
+        message.start = fields.ns_to_stamp(found.start.stamp)
+        contact_messages.fill_contacts(
+            message,
+            found.contacts,
+            found.layout,
+            max_contacts=self._settings["max_contacts"],
+            outputs=tuple(self._settings["outputs"]),
+        )
+        message.dropped_frames = dropped_frames
+        self._contacts.publish(message)
+        return message
+
+    def show(self, found: Detection, header: Header) -> None:
+        """For viewers, where parameter markers is set: no more often than they want it."""
+        now = time.monotonic()
+        # A step that was under way when markers were asked for has none of what they show.
+        shown = self._settings["markers"] and {"points", "normals"} <= set(found.options.outputs)
+        if not shown or now < self._show_after:
+            return
+        self._show_after = now + 1.0 / self._settings["markers_rate"]
+        self._surface.publish(surface_cloud(found.end.vertices, header))
+        self._markers.publish(
+            contact_markers(
+                np.asarray(found.contacts.points),
+                np.asarray(found.contacts.normals),
+                len(found.contacts.vf),
+                stamp=header.stamp,
+                frame_id=header.frame_id,
+                size=self._settings["markers_size"],
+                limit=self._settings["markers_max"],
+            )
+        )

@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a request to ``~/detect`` asks for: checked, and computed."""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from hpccd.msg import ContactArray, MeshVertices
+from hpccd.srv import Detect
+
+from hpccd_ros.base.quoting import listed, quoted, repeated, shortened
+from hpccd_ros.detect.cancellation import Cancellation
+from hpccd_ros.detect.core import Options, make_detector
+from hpccd_ros.detect.layout import Layout
+from hpccd_ros.detect.scene import SceneBuilder
+from hpccd_ros.frames.types import Topology
+from hpccd_ros.middleware import contact_messages, fields, mesh_messages
+
+
+class RequestError(ValueError):
+    """A request that cannot be answered; the text says what to mend."""
+
+
+@dataclass(frozen=True)
+class NodeScene:
+    """What the node itself knows at the time of a request: its meshes and the topologies in force."""
+
+    builder: SceneBuilder
+    topologies: dict[str, Topology | None]
+
+
+def compute(
+    request: Detect.Request,
+    scene: NodeScene,
+    options: Options,
+    limits: dict[str, Any],
+    cancellation: Cancellation,
+) -> ContactArray:
+    """limits: max_meshes, max_vertices, max_faces, max_contacts. Raises RequestError, and what the core raises."""
+    names = list(request.mesh_names) or list(scene.topologies)
+    if not names:
+        raise RequestError("mesh_names: empty, and the node has no meshes of its own")
+    most = limits["max_meshes"]
+    if len(names) > most:
+        raise RequestError(f"mesh_names: {len(names)} meshes, at most {most} are taken (parameter max_meshes)")
+    if len(set(names)) != len(names):
+        raise RequestError(f"mesh_names: names must differ, {repeated(names)} is there twice")
+    for field in ("topologies", "start", "end"):
+        given = len(getattr(request, field))
+        if given != len(names) and not (field == "topologies" and given == 0):
+            raise RequestError(f"{field}: {given} entries for {len(names)} meshes ({listed(names)})")
+    topologies = tuple(_topology(request, scene, limits, i, name) for i, name in enumerate(names))
+    start = _vertices("start", names, request.start, topologies, limits["max_vertices"])
+    end = _vertices("end", names, request.end, topologies, limits["max_vertices"])
+    options = replace(options, accuracy=request.accuracy or options.accuracy, report=request.report or "all")
+    detector = cancellation.guard(make_detector(scene.builder.among(names).build(topologies), options))
+    contacts = detector.detect(start, end)
+    message = ContactArray(accuracy=options.accuracy, backend=detector.backend)
+    message.header = request.end[0].header
+    message.start = request.start[0].header.stamp
+    message.step = request.end[0].step
+    contact_messages.fill_contacts(
+        message,
+        contacts,
+        Layout.of(tuple(names), topologies),
+        max_contacts=limits["max_contacts"],
+        outputs=options.outputs,
+    )
+    return message
+
+
+def _topology(request: Detect.Request, scene: NodeScene, limits: dict[str, Any], index: int, name: str) -> Topology:
+    if request.topologies:
+        try:
+            return mesh_messages.topology_from_message(
+                request.topologies[index], limits["max_vertices"], limits["max_faces"]
+            )
+        except fields.InvalidMessageError as error:
+            raise RequestError(f"topologies[{index}] ({shortened(name)}): {error}") from error
+    if name not in scene.topologies:
+        raise RequestError(
+            f"mesh_names: unknown mesh {quoted(name)}; the node has "
+            f"{listed(scene.topologies) or 'none'}, or send topologies"
+        )
+    topology = scene.topologies[name]
+    if topology is None:
+        raise RequestError(f"mesh {name}: the node has no topology yet; publish it or send topologies")
+    return topology
+
+
+def _vertices(
+    field: str, names: list[str], messages: list[MeshVertices], topologies: tuple[Topology, ...], max_vertices: int
+) -> np.ndarray:
+    parts = []
+    for i, (name, message, topology) in enumerate(zip(names, messages, topologies, strict=True)):
+        where = f"{field}[{i}] ({shortened(name)})"
+        try:
+            fields.stamp_to_ns(message.header.stamp)
+            vertices = mesh_messages.vertices_from_message(message, max_vertices)
+        except fields.InvalidMessageError as error:
+            raise RequestError(f"{where}: {error}") from error
+        if message.topology_version != topology.version:
+            raise RequestError(
+                f"{where}: topology_version {message.topology_version}, the topology has version {topology.version}"
+            )
+        if len(vertices) != topology.n_vertices:
+            raise RequestError(f"{where}: {len(vertices)} vertices, the topology has {topology.n_vertices}")
+        parts.append(vertices)
+    return parts[0] if len(parts) == 1 else np.concatenate(parts)

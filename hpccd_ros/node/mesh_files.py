@@ -1,0 +1,22 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Meshes whose topology comes from a file (parameter mesh.NAME.file), and that of static ones their positions."""
+
+from typing import Any
+
+from hpccd_ros.detect.core import unusable_topology
+from hpccd_ros.frames.mesh_file import MeshFileError, load_mesh, mesh_of_file
+from hpccd_ros.frames.outcome import Outcome
+from hpccd_ros.frames.pipeline import FramePipeline
+
+
+def load(pipeline: FramePipeline, meshes: dict[str, dict[str, Any]]) -> Outcome:
+    """Read them into the pipeline. meshes: name -> parameters mesh.NAME.*. Raises MeshFileError."""
+    outcome = Outcome()
+    for name, mesh in meshes.items():
+        if mesh["file"]:
+            vertices, faces = load_mesh(mesh["file"])
+            topology, positions = mesh_of_file(vertices, faces, mesh["static"], mesh["pose"])
+            if why := unusable_topology(topology):
+                raise MeshFileError(f"mesh.{name}.file {mesh['file']}: {why}")
+            outcome += pipeline.load(name, topology, positions)
+    return outcome

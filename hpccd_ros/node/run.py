@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The node in its process: started from the arguments, run until it is told to end."""
+
+import sys
+
+import rclpy
+from rclpy.executors import ExternalShutdownException
+from rclpy.lifecycle import TransitionCallbackReturn
+from rclpy.task import Future
+
+from hpccd_ros.middleware import environment, ros_start, stop_signals
+from hpccd_ros.middleware.guard import GuardedExecutor
+from hpccd_ros.middleware.unreadable import UnreadableExecutor
+from hpccd_ros.node.node import HpccdNode
+from hpccd_ros.params.values import ParameterError
+
+
+class _Executor(UnreadableExecutor, GuardedExecutor):
+    """No callback ends the node, and no message is lost without a word."""
+
+
+def main(argv: list[str] | None = None, node_type: type[HpccdNode] = HpccdNode) -> int:
+    """Run the node until SIGINT or SIGTERM; node_type: a class built on HpccdNode, to look into it.
+
+    Returns the exit status: 0 ended as told, 1 could not be configured, 2 wrong parameters or arguments, 3 DDS security
+    is demanded and cannot be had.
+    """
+    stop = Future()
+    stop_signals.watch(lambda: stop.set_result(None))
+    environment.prepare()
+    try:
+        ros_start.init(argv)
+        ros_start.refuse_other_arguments(argv)
+        node = node_type()
+    except ParameterError as error:
+        return _not_started(ros_start.WRONG_PARAMETERS, str(error))
+    except Exception as error:
+        if (refused := ros_start.start_failure(error)) is None:
+            raise
+        return _not_started(*refused)
+    executor = _Executor(node.errors)
+    executor.add_node(node)
+    try:
+        if node.get_parameter("autostart").value and not stop.done():
+            for transition in (node.trigger_configure, node.trigger_activate):
+                if transition() != TransitionCallbackReturn.SUCCESS:
+                    return 1
+        stop_signals.spin(executor, stop)
+    except ExternalShutdownException:
+        pass
+    finally:
+        node.close()
+        executor.shutdown(timeout_sec=1.0)
+        node.destroy_node()
+        rclpy.try_shutdown()
+    return 0
+
+
+def _not_started(status: int, why: str) -> int:
+    print(f"hpccd: {why}", file=sys.stderr)
+    rclpy.try_shutdown()
+    return status

@@ -1,0 +1,153 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the node tells of itself on /diagnostics: its accounts as messages."""
+
+import resource
+import time
+from collections.abc import Mapping
+from pathlib import Path
+
+from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+
+from hpccd_ros.node.accounts import Accounts
+from hpccd_ros.node.metrics import percentiles
+
+
+class Reporter:
+    """Makes a DiagnosticArray of the state of the node; rates are those since the report before."""
+
+    def __init__(self, node_name: str, accounts: Accounts) -> None:
+        self._node_name = node_name
+        self._accounts = accounts
+        self._time = time.monotonic()
+        self._received: dict[str, int] = {}
+        self._detections = 0
+        self._dropped = 0
+        self._topologies_refused = 0
+        self._failures = 0
+
+    def report(
+        self,
+        stamp: Time,
+        *,
+        state: str,
+        waiting: int,
+        warnings: list[str],
+        service: Mapping[str, int],
+        errors: tuple[int, str] = (0, ""),
+        recording: tuple[bytes, str, Mapping[str, object]] | None = None,
+        coordinate_frame: tuple[str, str] = ("", ""),
+    ) -> DiagnosticArray:
+        """coordinate_frame: that of the scene, and what determined it.
+        errors: how many exceptions nothing expected, and the last one.
+        recording: level, message and values of the node's own recording, where there is one.
+
+        Message of the statuses frames, detection, service, process, errors, and recording where there is one."""
+        now = time.monotonic()
+        period, self._time = max(now - self._time, 1e-9), now
+        data = self._accounts.metrics.snapshot()
+        data["answered"] += self._accounts.static_taken
+        out = DiagnosticArray()
+        out.header.stamp = stamp
+        out.status = [
+            self._frames(data, period, waiting, warnings, coordinate_frame),
+            self._detection(data, period, state),
+            self._status("service", DiagnosticStatus.OK, "~/detect", service),
+            self._status("process", DiagnosticStatus.OK, state, {"state": state, **_memory()}),
+            self._errors(*errors),
+            *([self._status("recording", *recording)] if recording is not None else []),
+        ]
+        return out
+
+    def _frames(
+        self, data: dict, period: float, waiting: int, warnings: list[str], coordinate_frame: tuple[str, str]
+    ) -> DiagnosticStatus:
+        accounts = self._accounts
+        dropped, topologies_refused = accounts.dropped.total, accounts.topologies_refused.total
+        new = dropped - self._dropped
+        new_topologies = topologies_refused - self._topologies_refused
+        values: dict[str, object] = {}
+        for mesh, count in sorted(data["received"].items()):
+            values[f"received.{mesh}"] = count
+            values[f"rate_hz.{mesh}"] = f"{(count - self._received.get(mesh, 0)) / period:.2f}"
+        came = sum(data["received"].values()) - sum(self._received.values())
+        values |= {
+            "received": sum(data["received"].values()),
+            "answered": data["answered"],
+            "waiting": waiting,
+            "dropped": dropped,
+            "restarts": accounts.restarts,
+            "topologies_refused": topologies_refused,
+            "frame_id": coordinate_frame[0],
+            "frame_id_by": coordinate_frame[1],
+        }
+        for reason, count in sorted(accounts.dropped.by_reason().items()):
+            values[f"dropped.{reason}"] = count
+        for (mesh, reason), count in sorted(accounts.dropped.by_mesh_and_reason().items()):
+            values[f"dropped.{mesh}.{reason}"] = count
+        for (mesh, reason), count in sorted(accounts.topologies_refused.by_mesh_and_reason().items()):
+            values[f"topologies_refused.{mesh}.{reason}"] = count
+        values |= accounts.connections
+        for stage, text in percentiles(data["transport_ms"]).items():
+            values[f"transport_ms.{stage}"] = text
+        values["last_refusal"] = accounts.log.last
+        self._received, self._dropped, self._topologies_refused = (
+            data["received"],
+            dropped,
+            topologies_refused,
+        )
+        notes = list(warnings)
+        if new:
+            notes.insert(0, f"{new} frames dropped")
+        if new_topologies:
+            notes.insert(0, f"{new_topologies} topologies refused")
+        if notes:
+            return self._status("frames", DiagnosticStatus.WARN, "; ".join(notes), values)
+        if not came:
+            return self._status("frames", DiagnosticStatus.STALE, f"no frames in the last {period:.1f} s", values)
+        return self._status("frames", DiagnosticStatus.OK, f"{came / period:.1f} frames a second", values)
+
+    def _detection(self, data: dict, period: float, state: str) -> DiagnosticStatus:
+        rate = (data["detections"] - self._detections) / period
+        self._detections = data["detections"]
+        values: dict[str, object] = {
+            "rate_hz": f"{rate:.2f}",
+            "detections": data["detections"],
+            "first_frames": data["first_frames"],
+            "failures": data["failures"],
+        }
+        for kind in ("latency_ms", "detect_ms"):
+            for name, text in percentiles(data[kind]).items():
+                values[f"{kind}.{name}"] = text
+        for stage, mean in data["stages"].items():
+            values[f"stage_ms.{stage}"] = f"{mean:.3f}"
+        values |= data["last"]
+        values["last_failure"] = data["last_failure"]
+        if data["failing"]:
+            return self._status("detection", DiagnosticStatus.ERROR, f"failed: {data['last_failure']}", values)
+        return self._status("detection", DiagnosticStatus.OK, f"{rate:.1f} detections a second ({state})", values)
+
+    def _errors(self, count: int, last: str) -> DiagnosticStatus:
+        # For good: what else went wrong with it nobody knows.
+        level = DiagnosticStatus.ERROR if count else DiagnosticStatus.OK
+        text = f"{count} unexpected errors, the last: {last}" if count else "none"
+        return self._status("errors", level, text, {"errors": count, "last_error": last})
+
+    def _status(self, part: str, level: bytes, message: str, values: Mapping[str, object]) -> DiagnosticStatus:
+        return DiagnosticStatus(
+            level=level,
+            name=f"{self._node_name}: {part}",
+            message=message,
+            hardware_id="hpccd",
+            values=[KeyValue(key=key, value=str(value)) for key, value in values.items()],
+        )
+
+
+def _memory() -> dict[str, str]:
+    peak_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024  # KiB on Linux
+    pages = Path("/proc/self/statm")
+    values = {"memory_peak_mb": f"{peak_mb:.1f}"}
+    if pages.exists():
+        resident = int(pages.read_text().split()[1]) * resource.getpagesize()
+        values["memory_mb"] = f"{resident / 2**20:.1f}"
+    return values

@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: Apache-2.0
+"""From the topics of the meshes to detections: subscriptions, pipeline and detection thread, wired together."""
+
+from collections.abc import Callable
+
+from hpccd_core import Cancelled
+from hpccd_ros.detect.core import CORE_ERRORS
+from hpccd_ros.detect.scene import SceneBuilder
+from hpccd_ros.detect.step_detector import Detection, StepDetector
+from hpccd_ros.detect.thread import DetectionThread
+from hpccd_ros.frames.drops import Reason
+from hpccd_ros.frames.types import SceneFrame, Topology
+from hpccd_ros.node import mesh_files
+from hpccd_ros.node.accounts import Accounts
+from hpccd_ros.node.configuration import Configuration
+from hpccd_ros.node.life_cycle import GuardedLifecycleNode
+from hpccd_ros.node.subscriptions import Subscriptions
+from hpccd_ros.params import scene_parameters
+
+
+class StreamDetection:
+    """Made when a node with meshes is configured; works between ``open`` and ``close``.
+
+    Raises MeshFileError, and ValueError for a scene that cannot move.
+    """
+
+    def __init__(
+        self, node: GuardedLifecycleNode, configuration: Configuration, builder: SceneBuilder, accounts: Accounts
+    ) -> None:
+        settings, meshes = configuration.settings, configuration.meshes
+        self._node = node
+        self._configuration = configuration
+        self._builder = builder
+        self._accounts = accounts
+        self._pipeline = scene_parameters.frame_pipeline(settings, meshes, settings["pending_frames"])
+        accounts.add(mesh_files.load(self._pipeline, meshes))
+        self._subscriptions = Subscriptions(node, settings, meshes)
+        self._thread: DetectionThread | None = None
+
+    def open(self, on_detection: Callable[[Detection], None]) -> None:
+        """Start the detection thread, which calls ``on_detection``, and subscribe."""
+        thread = DetectionThread(
+            StepDetector(self._builder, self._configuration.options),
+            self._pipeline.start(self._configuration.settings["frame_queue"]),
+            on_detection=on_detection,
+            on_first=lambda frame: self._accounts.metrics.first_frame(len(frame.fresh)),
+            on_failure=self._failed,
+        )
+        thread.start()
+        self._thread = thread
+        self._subscriptions.open(self._pipeline, self._accounts)
+
+    def close(self) -> None:
+        """Unsubscribe and end the thread; what waited is counted as stopped. Topologies and static positions stay."""
+        self._subscriptions.close()
+        self._accounts.add(self._pipeline.stop())
+        if self._thread is not None:
+            self._thread.cancel()
+            self._thread.join()
+            self._thread = None
+
+    def apply_change(self) -> None:
+        """Follow the parameters, of which some may change at any time."""
+        self._pipeline.set_restart_after(self._configuration.settings["restart_after"])
+        if self._thread is not None:
+            self._thread.detector.options = self._configuration.options
+
+    @property
+    def waiting(self) -> int:
+        """Messages received that are neither answered nor dropped yet."""
+        waiting = self._pipeline.waiting  # before the thread is looked at: it takes over what leaves the queue
+        worked_on = self._thread.working_on if self._thread is not None else None
+        return waiting + (len(worked_on.fresh) if worked_on is not None else 0)
+
+    @property
+    def coordinate_frame(self) -> tuple[str, str]:
+        """(frame_id of the scene or "", where it comes from)."""
+        return self._pipeline.coordinate_frame
+
+    def topologies(self) -> dict[str, Topology | None]:
+        """Mesh name -> the one in force, in the order of the scene."""
+        return {mesh.name: self._pipeline.topology(mesh.name) for mesh in self._builder.meshes}
+
+    def warnings(self) -> list[str]:
+        """What is odd about the publishers."""
+        return self._subscriptions.warnings() + self._pipeline.warnings()
+
+    def _failed(self, frame: SceneFrame, error: Exception) -> None:
+        """Called by the detection thread."""
+        stopped = isinstance(error, Cancelled)
+        self._accounts.unanswered(frame, Reason.STOPPED if stopped else Reason.DETECTION_FAILED)
+        if stopped or not self._node.context.ok():
+            return  # shutting down: the publisher is gone, nothing failed
+        if not isinstance(error, CORE_ERRORS):
+            self._node.errors.caught("detection", error)
+        self._accounts.failed(frame, error)

@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Subscriptions to transforms: those that come go into the pipeline, and frames that waited for them go on."""
+
+from typing import Any
+
+from rclpy.node import Node
+
+from hpccd_ros.frames.pipeline import FramePipeline
+from hpccd_ros.frames.rate_limit import RateLimit
+from hpccd_ros.middleware import qos, qos_overrides, transform_topics
+from hpccd_ros.middleware.message_types import message_class
+from hpccd_ros.middleware.transform_topics import TransformTopic
+from hpccd_ros.node.accounts import Accounts
+from hpccd_ros.node.hand_over import hand_over
+
+
+class TransformSubscriptions:
+    """Subscribed from construction until ``close``.
+
+    max_rate: most messages a second that are looked at of each topic.
+    """
+
+    def __init__(self, node: Node, pipeline: FramePipeline, accounts: Accounts, max_rate: float) -> None:
+        self._node = node
+        self._pipeline = pipeline
+        self._accounts = accounts
+        self._max_rate = max_rate
+        self._subscriptions = [self._subscribe(topic) for topic in transform_topics.understood()]
+
+    def close(self) -> None:
+        for subscription in self._subscriptions:
+            self._node.destroy_subscription(subscription)
+        self._subscriptions.clear()
+
+    def _subscribe(self, topic: TransformTopic):
+        limit = RateLimit(self._max_rate)
+
+        def receive(message: Any) -> None:
+            if not limit.allows():
+                self._warn(topic, f"more than max_rate = {self._max_rate:g} messages a second; some are dropped")
+                return
+            for refusal in transform_topics.fill(self._pipeline.transforms, message, topic):
+                self._warn(topic, refusal.text)
+            hand_over(self._pipeline.retry(), self._accounts)
+
+        profile = qos.TRANSFORMS_STATIC if topic.static else qos.TRANSFORMS
+        message = message_class(topic.type_name)
+        return qos_overrides.create_subscription(self._node, message, topic.name, receive, profile)
+
+    def _warn(self, topic: TransformTopic, text: str) -> None:
+        self._accounts.connections["transforms_refused"] += 1
+        self._node.get_logger().warning(f"{topic.name}: {text}", throttle_duration_sec=10.0)
