@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from .options import OUTPUTS
 
 REALS = frozenset({np.dtype(np.float32), np.dtype(np.float64)})  # in this machine's byte order
-LARGEST_COORDINATE = 1e150  # largest_coordinate in src/bvh/motion_bounds.h
+LARGEST_COORDINATE = 1e150  # largest_coordinate in src/bvh/coordinate_map.h
 
 Word = TypeVar("Word", bound=str)
 

@@ -85,29 +85,30 @@ class Detector:
             raise ValueError(
                 f"report: 'any' is not offered by method {method!r}; use method='default', or report='all' or 'first'"
             )
-        queue = (
-            arguments.whole_number("hybrid_segments", hybrid_segments, 1, 65536),
-            arguments.whole_number("hybrid_segment_pairs", hybrid_segment_pairs, 1, 1 << 20),
-            arguments.whole_number("gpus", gpus, 0, 1024),
-        )
+        hybrid_segments = arguments.whole_number("hybrid_segments", hybrid_segments, 1, 65536)
+        hybrid_segment_pairs = arguments.whole_number("hybrid_segment_pairs", hybrid_segment_pairs, 1, 1 << 20)
+        gpus = arguments.whole_number("gpus", gpus, 0, 1024)
         if gpus > (here := len(gpu_status()["devices"])) and backend in ("hybrid", "auto"):
             raise ValueError(f"gpus: {gpus} were asked for, {here} are usable here; give at most {here}, or 0 for all")
-        lengths = arguments.separation(accuracy, minimum_separation, tolerance)
+        minimum_separation, tolerance = arguments.separation(accuracy, minimum_separation, tolerance)
         self.n_vertices = scene.n_vertices
         self._core = _core.Detector(
-            scene._core,
-            getattr(_core.Accuracy, accuracy),
-            getattr(_core.Backend, backend),
-            getattr(_core.Report, report),
-            getattr(_core.Simd, simd),
-            threads,
-            "points" in computed,
-            "normals" in computed,
-            *lengths,
-            getattr(_core.Method, method),
-            arguments.flag("restructure", restructure),
-            *queue,
-            bool(os.environ.get("HPCCD_GPU_STAGES")),  # for measuring: device time by stage in `profile`
+            scene=scene._core,
+            accuracy=getattr(_core.Accuracy, accuracy),
+            backend=getattr(_core.Backend, backend),
+            report=getattr(_core.Report, report),
+            simd=getattr(_core.Simd, simd),
+            threads=threads,
+            points="points" in computed,
+            normals="normals" in computed,
+            minimum_separation=minimum_separation,
+            tolerance=tolerance,
+            method=getattr(_core.Method, method),
+            restructure=arguments.flag("restructure", restructure),
+            hybrid_segments=hybrid_segments,
+            hybrid_segment_pairs=hybrid_segment_pairs,
+            gpus=gpus,
+            gpu_stages=bool(os.environ.get("HPCCD_GPU_STAGES")),  # for measuring: device time by stage in `profile`
         )
         self._stepping = threading.RLock()  # of the positions of the last step
         self._last: NDArray[Any] | None = None

@@ -116,12 +116,15 @@ PYBIND11_MODULE(_core, m) {
                        int threads, bool points, bool normals, double separation, double tolerance, Method method,
                        bool restructure, std::size_t hybrid_segments, std::size_t hybrid_segment_pairs, int gpus,
                        bool gpu_stages) {
-        // A copy: what is added to the caller's scene later does not reach this detector.
-        return std::make_unique<Detector>(
-            std::make_shared<const Scene>(*scene),
-            Options{accuracy, backend, report, simd, threads, points, normals, separation, tolerance, method,
-                    restructure, hybrid_segments, hybrid_segment_pairs, gpus, gpu_stages});
-      }))
+             // A copy: what is added to the caller's scene later does not reach this detector.
+             return std::make_unique<Detector>(
+                 std::make_shared<const Scene>(*scene),
+                 Options{accuracy, backend, report, simd, threads, points, normals, separation, tolerance, method,
+                         restructure, hybrid_segments, hybrid_segment_pairs, gpus, gpu_stages});
+           }),
+           "scene"_a, "accuracy"_a, "backend"_a, "report"_a, "simd"_a, "threads"_a, "points"_a, "normals"_a,
+           "minimum_separation"_a, "tolerance"_a, "method"_a, "restructure"_a, "hybrid_segments"_a,
+           "hybrid_segment_pairs"_a, "gpus"_a, "gpu_stages"_a)
       .def(
           "detect",
           [](Detector& d, const py::array& t0, const py::array& t1) {

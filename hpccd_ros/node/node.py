@@ -5,7 +5,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 
 from hpccd_ros.detect.step_detector import Detection
-from hpccd_ros.middleware import environment, qos
+from hpccd_ros.middleware import environment, qos, topic_names
 from hpccd_ros.node import parameter_services
 from hpccd_ros.node.accounts import Accounts
 from hpccd_ros.node.configuration import Configuration
@@ -58,7 +58,7 @@ class HpccdNode(GuardedLifecycleNode):
             self.get_logger().error(f"cannot configure: {error}")
             return TransitionCallbackReturn.FAILURE
         self._contacts = ContactsPublisher(self, settings)
-        self._diagnostics = self.configured_publisher(DiagnosticArray, "/diagnostics", qos.DIAGNOSTICS)
+        self._diagnostics = self.configured_publisher(DiagnosticArray, topic_names.DIAGNOSTICS, qos.DIAGNOSTICS)
         self._service = DetectService(
             self, settings, lambda: self._configuration.options, self._scene_for_service, self._served, self.errors
         )

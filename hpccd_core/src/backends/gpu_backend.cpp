@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "elementary/batch.h"
 #include "elementary/fallback.h"
 #include "scene/static_meshes.h"
 

@@ -15,7 +15,7 @@ class MovingTree {
   MovingTree(const Scene& scene, const Features& features, ThreadPool& pool)
       : scene_(scene), features_(features), pool_(pool) {}
 
-  // Bounds of a new motion. Throws InvalidArgument as MotionBounds::take does.
+  // Bounds of a new motion. Throws InvalidArgument as MotionBounds::update does.
   void bound(Positions t0, Positions t1, double separation);
   // A tree that fits it: refitted, or built anew where refitting has lost too much. Marked as "refit" and "build".
   void fit(Profiler& profiler);

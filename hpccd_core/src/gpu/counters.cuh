@@ -16,10 +16,10 @@ struct Counters {
   u64 bad;                            // coordinates that are not acceptable
   u64 node_tests;
   u64 leaf_pairs, next_leaf_pair;
-  u64 survivors[2], single[2], many[2];                        // of the segment at work
+  u64 survivors[2], single[2], many[2];                                                      // of the segment at work
   u64 all_survivors[2], all_single[2], all_many[2], most_survivors, most_single, most_many;  // of all segments
   u64 candidates[2], proven[2], undecided_of[2];
-  u64 found[2];                       // by kind, after the fallback on the device
+  u64 found[2];  // by kind, after the fallback on the device
   u64 found_all, undecided, to_host;
   u64 hash;
   double area;

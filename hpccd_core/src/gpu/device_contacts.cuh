@@ -38,13 +38,14 @@ class DeviceContacts {
   }
 
   template <class T>
-  void fill(Frame<T>& f) const {
-    f.found_keys = keys_.data(), f.found_tocs = tocs_.data(), f.found_capacity = capacity();
+  void fill(LaunchParams<T>& params) const {
+    params.found_keys = keys_.data(), params.found_tocs = tocs_.data(), params.found_capacity = capacity();
   }
 
   // Sorts what the frame has found, and writes it out.
   template <class T>
-  void launch(const Frame<T>& f, const Counters& c, int multiprocessors, cudaStream_t stream, StageTimer& timer) {
+  void launch(const LaunchParams<T>& params, const Counters& c, int multiprocessors, cudaStream_t stream,
+              StageTimer& timer) {
     const auto n = static_cast<u32>(c.found_all);
     const auto roomy = [](u64 x) { return static_cast<std::size_t>(x + x / 4 + 1024); };
     if (c.found[0] > vf_.size()) vf_.reserve(roomy(c.found[0]));
@@ -55,7 +56,8 @@ class DeviceContacts {
                static_cast<int>(n), key_bits_, stream);
     timer.mark("sort", stream);
     results_kernel<<<std::min(blocks_for(n, 128), 8u * multiprocessors), 128, 0, stream>>>(
-        f, sorted_keys_.data(), order_.data(), n, static_cast<u32>(c.found[0]), vf_.data(), ee_.data(), toc_.data());
+        params, sorted_keys_.data(), order_.data(), n, static_cast<u32>(c.found[0]), vf_.data(), ee_.data(),
+        toc_.data());
     check_launch("results_kernel");
     timer.mark("results", stream);
   }

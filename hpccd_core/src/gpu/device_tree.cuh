@@ -42,11 +42,11 @@ class DeviceTree {
   bool empty() const { return leaves_.size() == 0; }
 
   template <class T>
-  void fill(Frame<T>& f) const {
-    leaves_.fill(f);
-    f.n_nodes = n_;
-    f.node_boxes = boxes_.data(), f.node_mesh = mesh_.data(), f.node_parent = parent_.data();
-    f.node_arrivals = arrivals_.data(), f.leaf_nodes = leaf_nodes_.data();
+  void fill(LaunchParams<T>& params) const {
+    leaves_.fill(params);
+    params.n_nodes = n_;
+    params.node_boxes = boxes_.data(), params.node_mesh = mesh_.data(), params.node_parent = parent_.data();
+    params.node_arrivals = arrivals_.data(), params.leaf_nodes = leaf_nodes_.data();
   }
 
   std::size_t bytes() const { return boxes_.bytes() + leaves_.bytes(); }

@@ -66,9 +66,9 @@ class DevicePipeline : public Pipeline {
   template <class T>
   bool run_frame(Positions t0, Positions t1, ThreadPool& pool);
   template <class T>
-  void launch(Frame<T>& f);
+  void launch(LaunchParams<T>& params);
   template <class T>
-  void launch_results(const Frame<T>& f);
+  void launch_results(const LaunchParams<T>& params);
   void copy_counters();
   bool grow_overflowed();
 
@@ -101,19 +101,19 @@ bool DevicePipeline::run_frame(Positions t0, Positions t1, ThreadPool& pool) {
     *host_counters_.data() = {};
     return true;
   }
-  Frame<T> f{};
-  scene_.fill(f);
-  tree_.fill(f);
-  motion_.fill(f);
+  LaunchParams<T> params{};
+  scene_.fill(params);
+  tree_.fill(params);
+  motion_.fill(params);
   const T* given[2];
   positions_.bring(t0, t1, given, pool, stream_);
-  f.given_t0 = given[0], f.given_t1 = given[1];
-  f.counters = counters_.data();
+  params.given_t0 = given[0], params.given_t1 = given[1];
+  params.counters = counters_.data();
   timer_.mark("upload", stream_);
   const Counters& c = *host_counters_.data();
   for (bool again = true; again;) {
     ++passes_;
-    launch(f);
+    launch(params);
     copy_counters();
     check(cudaEventRecord(counted_, stream_), "cudaEventRecord");
     // Pairs for exact arithmetic came last time too: threads that sleep take longer to wake than these take.
@@ -125,30 +125,31 @@ bool DevicePipeline::run_frame(Positions t0, Positions t1, ThreadPool& pool) {
   undecided_.reserve(c.to_host);
   // Before the results: their kernels bring the counters to the host once more.
   const u64 n_to_host = exact_last_time_ = c.to_host;
-  launch_results(f);
+  launch_results(params);
   for (u64 i = 0; i < n_to_host; ++i) undecided_.push_back(scene_.candidate_of(lists_.to_host()[i]));
   return true;
 }
 
 template <class T>
-void DevicePipeline::launch(Frame<T>& f) {
-  f.leaf_pairs = {leaf_pairs_.data(), leaf_pairs_.size()};
-  contacts_.fill(f);
-  motion_.launch(f, multiprocessors_, stream_);
+void DevicePipeline::launch(LaunchParams<T>& params) {
+  params.leaf_pairs = {leaf_pairs_.data(), leaf_pairs_.size()};
+  contacts_.fill(params);
+  motion_.launch(params, multiprocessors_, stream_);
   timer_.mark("bounds", stream_);
-  refit_kernel<<<blocks_for(std::size_t{f.n_leaves} * 32, 128), 128, 0, stream_>>>(f);
+  refit_kernel<<<blocks_for(std::size_t{params.n_leaves} * 32, 128), 128, 0, stream_>>>(params);
   check_launch("refit_kernel");
   timer_.mark("refit", stream_);
-  traverse_kernel<<<blocks_for(f.n_leaves, traverse_warps), 32 * traverse_warps, 0, stream_>>>(f);
+  traverse_kernel<<<blocks_for(params.n_leaves, traverse_warps), 32 * traverse_warps, 0, stream_>>>(params);
   check_launch("traverse_kernel");
   timer_.mark("traverse", stream_);
-  lists_.launch(f, multiprocessors_, stream_, timer_);
+  lists_.launch(params, multiprocessors_, stream_, timer_);
 }
 
 template <class T>
-void DevicePipeline::launch_results(const Frame<T>& f) {
-  contacts_.launch(f, *host_counters_.data(), multiprocessors_, stream_, timer_);
-  area_kernel<<<std::min(blocks_for(f.n_nodes, 256), static_cast<unsigned>(multiprocessors_)), 256, 0, stream_>>>(f);
+void DevicePipeline::launch_results(const LaunchParams<T>& params) {
+  contacts_.launch(params, *host_counters_.data(), multiprocessors_, stream_, timer_);
+  area_kernel<<<std::min(blocks_for(params.n_nodes, 256), static_cast<unsigned>(multiprocessors_)), 256, 0, stream_>>>(
+      params);
   check_launch("area_kernel");
   copy_counters();
   timer_.mark("area", stream_);

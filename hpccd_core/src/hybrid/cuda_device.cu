@@ -93,13 +93,13 @@ class CudaTestDevice final : public TestDevice {
   static constexpr std::size_t n_slots = 8;
 
   template <class T>
-  Frame<T> frame() const {
-    Frame<T> f{};
-    scene_.fill(f);
-    leaves_.fill(f);
-    motion_.fill(f);
-    f.counters = counters_.data();
-    return f;
+  LaunchParams<T> launch_params() const {
+    LaunchParams<T> params{};
+    scene_.fill(params);
+    leaves_.fill(params);
+    motion_.fill(params);
+    params.counters = counters_.data();
+    return params;
   }
 
   // Through page-locked memory: only from there does a copy go on by itself.
@@ -107,7 +107,7 @@ class CudaTestDevice final : public TestDevice {
   void upload_positions(Positions t0, Positions t1) {
     check(cudaSetDevice(device_), "cudaSetDevice");
     check(cudaEventSynchronize(ready_), "cudaEventSynchronize");  // the last frame's copies have left the memory
-    Frame<T> f = frame<T>();
+    LaunchParams<T> params = launch_params<T>();
     const Positions ends[2] = {t0, t1};
     const std::size_t bytes = 3 * t0.n * sizeof(T), words = std::max<std::size_t>((bytes + 7) / 8, 1);
     for (int i = 0; i < 2; ++i) {
@@ -118,16 +118,16 @@ class CudaTestDevice final : public TestDevice {
       check(cudaMemcpyAsync(given_[i].data(), staging_[i].data(), bytes, cudaMemcpyHostToDevice, upload_),
             "cudaMemcpyAsync");
     }
-    f.given_t0 = reinterpret_cast<const T*>(given_[0].data());
-    f.given_t1 = reinterpret_cast<const T*>(given_[1].data());
-    motion_.launch(f, multiprocessors_, upload_);
+    params.given_t0 = reinterpret_cast<const T*>(given_[0].data());
+    params.given_t1 = reinterpret_cast<const T*>(given_[1].data());
+    motion_.launch(params, multiprocessors_, upload_);
     check(cudaEventRecord(ready_, upload_), "cudaEventRecord");
   }
 
   template <class T>
   void refit() {
-    const Frame<T> f = frame<T>();
-    refit_leaves_kernel<<<blocks_for(std::size_t{f.n_leaves} * 32, 128), 128, 0, upload_>>>(f);
+    const LaunchParams<T> params = launch_params<T>();
+    refit_leaves_kernel<<<blocks_for(std::size_t{params.n_leaves} * 32, 128), 128, 0, upload_>>>(params);
     check_launch("refit_leaves_kernel");
     check(cudaEventRecord(ready_, upload_), "cudaEventRecord");
   }
@@ -135,9 +135,9 @@ class CudaTestDevice final : public TestDevice {
   void launch(Slot& s) {
     check(cudaSetDevice(device_), "cudaSetDevice");
     if (is_double_)
-      s.launch(frame<double>(), leaves_version_, largest_, ready_, multiprocessors_);
+      s.launch(launch_params<double>(), leaves_version_, largest_, ready_, multiprocessors_);
     else
-      s.launch(frame<float>(), leaves_version_, largest_, ready_, multiprocessors_);
+      s.launch(launch_params<float>(), leaves_version_, largest_, ready_, multiprocessors_);
   }
 
   const int device_;
@@ -148,7 +148,7 @@ class CudaTestDevice final : public TestDevice {
   std::uint64_t leaves_version_ = 0;
   bool is_double_ = true;
   Stream upload_;
-  Event ready_;  // rows and boxes of this frame
+  Event ready_;  // vertices and boxes of this frame
   PinnedBuffer<double> staging_[2];
   DeviceBuffer<double> given_[2];
   DeviceMotion motion_;

@@ -46,7 +46,7 @@ struct LargestLists {
 
 class Slot {
  public:
-  // A run of segments of the usual size finds room; lists grow where they overflow.
+  // A start: lists grow where they overflow, and what one slot has learnt the others begin with.
   Slot() : lists_(std::size_t{1} << 17, std::size_t{1} << 15, std::size_t{1} << 12) {
     counters_.reserve(1);
     host_counters_.reserve(1);
@@ -62,10 +62,11 @@ class Slot {
   // The pairs of the next launches.
   void assign(const std::vector<Piece>& pieces) { sent_ = pieces; }
 
-  // They are tested when the event has come. `f` names the frame's scene, leaves and motion: the same places as in the
-  // last launch where `version` is the same.
+  // They are tested when the event has come. `params` names the frame's scene, leaves and motion: the same places as in
+  // the last launch where `version` is the same.
   template <class T>
-  void launch(Frame<T> f, std::uint64_t version, const LargestLists& largest, cudaEvent_t after, int multiprocessors) {
+  void launch(LaunchParams<T> params, std::uint64_t version, const LargestLists& largest, cudaEvent_t after,
+              int multiprocessors) {
     lists_.reserve(largest.lists);
     reserve_found(largest.found);
     std::size_t n = 0;
@@ -73,13 +74,12 @@ class Slot {
     if (n > pairs_.size()) pairs_.reserve(2 * n);
     *submission_.data() = {n, submission_.data()->number + 1};
     looks_ = 0;
-    record(f, version, multiprocessors);
+    record(params, version, multiprocessors);
     check(cudaStreamWaitEvent(stream_, after, 0), "cudaStreamWaitEvent");
     std::size_t at = 0;
     for (const Piece& piece : sent_) {
-      check(
-          cudaMemcpyAsync(pairs_.data() + at, piece.pairs, piece.n * sizeof(uint2), cudaMemcpyHostToDevice, stream_),
-          "cudaMemcpyAsync");
+      check(cudaMemcpyAsync(pairs_.data() + at, piece.pairs, piece.n * sizeof(uint2), cudaMemcpyHostToDevice, stream_),
+            "cudaMemcpyAsync");
       at += piece.n;
     }
     graph_.launch(stream_);
@@ -135,7 +135,7 @@ class Slot {
 
   // The kernels between the copy and "data ready", anew where something that they name has changed.
   template <class T>
-  void record(Frame<T> f, std::uint64_t version, int multiprocessors) {
+  void record(LaunchParams<T> params, std::uint64_t version, int multiprocessors) {
     // Places as well as sizes: after a failed allocation a buffer may come back as large as it was, elsewhere.
     std::vector<std::uintptr_t> now{sizeof(T), version, lists_.n_segments()};
     const auto depends_on = [&](const auto& buffer) {
@@ -146,15 +146,16 @@ class Slot {
     lists_.for_buffers(depends_on);
     if (now == recorded_) return;
     recorded_.clear();
-    f.counters = counters_.data();
-    f.leaf_pairs = {pairs_.data(), pairs_.size()};
-    f.found_keys = keys_.data(), f.found_tocs = tocs_.data(), f.found_capacity = keys_.size();
+    params.counters = counters_.data();
+    params.leaf_pairs = {pairs_.data(), pairs_.size()};
+    params.found_keys = keys_.data(), params.found_tocs = tocs_.data(), params.found_capacity = keys_.size();
     StageTimer no_timer(false);
     graph_.record(stream_, [&] {
-      begin_submission_kernel<<<1, 32, 0, stream_>>>(f.counters, submission_.data());
+      begin_submission_kernel<<<1, 32, 0, stream_>>>(params.counters, submission_.data());
       check_launch("begin_submission_kernel");
-      lists_.launch(f, multiprocessors, stream_, no_timer);
-      data_ready_kernel<<<1, 1, 0, stream_>>>(f.counters, host_counters_.data(), state_.data(), submission_.data());
+      lists_.launch(params, multiprocessors, stream_, no_timer);
+      data_ready_kernel<<<1, 1, 0, stream_>>>(params.counters, host_counters_.data(), state_.data(),
+                                              submission_.data());
       check_launch("data_ready_kernel");
     });
     recorded_ = now;

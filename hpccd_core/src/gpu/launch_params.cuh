@@ -16,15 +16,16 @@ inline constexpr u32 no_mesh = 0xFFFFFFFFu;
 // Features are numbered in 31 bits, so that the kind of a pair fits beside them.
 inline constexpr u32 kind_bit = 0x80000000u;
 
-// Both ends of one vertex's motion as the caller gave them: half the bytes where they are floats, and widening is exact.
+// Both ends of one vertex's motion as the caller gave them: half the bytes where they are floats, and widening is
+// exact.
 template <class T>
-struct Row;
+struct GivenEnds;
 template <>
-struct alignas(32) Row<float> {
+struct alignas(32) GivenEnds<float> {
   float4 t0, t1;
 };
 template <>
-struct alignas(64) Row<double> {
+struct alignas(64) GivenEnds<double> {
   double2 t0[2], t1[2];
 };
 
@@ -60,22 +61,22 @@ struct PairList {
 };
 
 template <class T>
-struct Frame {
+struct LaunchParams {
   // The scene.
   u32 n_vertices, n_edges, n_faces;
   const uint2* edges;
-  const u32* faces;            // three vertices each
+  const u32* faces;  // three vertices each
   const u32* mesh_of_vertex;
   u32 n_meshes;
   const unsigned char* enabled;   // n_meshes^2; null: all pairs
   const unsigned char* accuracy;  // n_meshes^2; null: the default
   Accuracy default_accuracy;
-  u32 key_shift;               // bits of a key's second feature
-  u32 kind_shift;              // bits of both features
+  u32 key_shift;   // bits of a key's second feature
+  u32 kind_shift;  // bits of both features
 
   // The tree: topology, and boxes of this frame.
   u32 n_nodes, n_leaves;
-  DeviceBox* node_boxes;       // tags: left child (0: leaf), last leaf of the subtree
+  DeviceBox* node_boxes;  // tags: left child (0: leaf), last leaf of the subtree
   const u32* node_mesh;
   const u32* node_parent;
   u32* node_arrivals;
@@ -83,25 +84,25 @@ struct Frame {
   const u32* leaf_nodes;
   const DeviceLeaf* leaves;
   const u32 *vertex_of_slot, *edge_of_slot, *face_of_slot;
-  DeviceBox* edge_boxes;       // tags: the two vertices
-  DeviceBox* face_boxes;       // tags: the first two corners
+  DeviceBox* edge_boxes;  // tags: the two vertices
+  DeviceBox* face_boxes;  // tags: the first two corners
   const u32* face_corner2;
 
   // This frame's motion.
   const T *given_t0, *given_t1;
-  Row<T>* rows;
-  DevicePoint* points;         // of the vertices
+  GivenEnds<T>* vertices;
+  DevicePoint* points;  // of the vertices
 
   // Lists.
   PairList leaf_pairs, survivors[2], single[2], many[2];
   u64* found_keys;
   double* found_tocs;
   u64 found_capacity;
-  u64* undecided;              // keys
+  u64* undecided;  // keys
   u64 undecided_capacity;
-  u64* to_host;                // keys that need exact arithmetic
+  u64* to_host;  // keys that need exact arithmetic
   u64 to_host_capacity;
-  u32 segment, n_segments;     // leaf pairs of this pass: n * segment / n_segments ...
+  u32 segment, n_segments;  // leaf pairs of this pass: n * segment / n_segments ...
   Counters* counters;
 };
 
@@ -171,20 +172,22 @@ struct Ends {
   Vec3<double> t0, t1;
 };
 
-__device__ inline Ends load_row(const Row<float>* rows, u32 v) {
-  const float4 a = __ldg(&rows[v].t0), b = __ldg(&rows[v].t1);
+__device__ inline Ends load_ends(const GivenEnds<float>* vertices, u32 v) {
+  const float4 a = __ldg(&vertices[v].t0), b = __ldg(&vertices[v].t1);
   return {{a.x, a.y, a.z}, {b.x, b.y, b.z}};
 }
 
-__device__ inline Ends load_row(const Row<double>* rows, u32 v) {
-  const double2 a = __ldg(&rows[v].t0[0]), b = __ldg(&rows[v].t0[1]), c = __ldg(&rows[v].t1[0]), d = __ldg(&rows[v].t1[1]);
+__device__ inline Ends load_ends(const GivenEnds<double>* vertices, u32 v) {
+  const double2 a = __ldg(&vertices[v].t0[0]), b = __ldg(&vertices[v].t0[1]), c = __ldg(&vertices[v].t1[0]),
+                d = __ldg(&vertices[v].t1[1]);
   return {{a.x, a.y, b.x}, {c.x, c.y, d.x}};
 }
 
 // v as pair_vertices gives them.
 template <Kind kind, class T>
-__device__ inline Motion<double> load_motion(const Row<T>* rows, uint4 v) {
-  const Ends q0 = load_row(rows, v.x), q1 = load_row(rows, v.y), q2 = load_row(rows, v.z), q3 = load_row(rows, v.w);
+__device__ inline Motion<double> load_motion(const GivenEnds<T>* vertices, uint4 v) {
+  const Ends q0 = load_ends(vertices, v.x), q1 = load_ends(vertices, v.y), q2 = load_ends(vertices, v.z),
+             q3 = load_ends(vertices, v.w);
   const Vec3<double> t0[4] = {q0.t0, q1.t0, q2.t0, q3.t0}, t1[4] = {q0.t1, q1.t1, q2.t1, q3.t1};
   return motion_of<kind>(t0, t1);
 }
@@ -196,14 +199,14 @@ struct VertexNumbers {
 };
 
 template <Kind kind, class T>
-__device__ inline uint4 vertices_of(const Frame<T>& f, u32 first, u32 second) {
+__device__ inline uint4 vertices_of(const LaunchParams<T>& params, u32 first, u32 second) {
   // Through the cache for what no kernel writes.
   const auto edge = [&](u32 e) {
-    const uint2 v = __ldg(f.edges + e);
+    const uint2 v = __ldg(params.edges + e);
     return VertexNumbers{{v.x, v.y}};
   };
   const auto face = [&](u32 i) {
-    const u32* v = f.faces + 3 * static_cast<u64>(i);
+    const u32* v = params.faces + 3 * static_cast<u64>(i);
     return VertexNumbers{{__ldg(v), __ldg(v + 1), __ldg(v + 2)}};
   };
   u32 v[4];
@@ -212,10 +215,11 @@ __device__ inline uint4 vertices_of(const Frame<T>& f, u32 first, u32 second) {
 }
 
 template <class T>
-__device__ inline Accuracy accuracy_of(const Frame<T>& f, uint4 v) {
-  if (!f.accuracy) return f.default_accuracy;
+__device__ inline Accuracy accuracy_of(const LaunchParams<T>& params, uint4 v) {
+  if (!params.accuracy) return params.default_accuracy;
   // The second vertex belongs to the first edge or to the face, the third to the other edge or the face.
-  return static_cast<Accuracy>(f.accuracy[f.mesh_of_vertex[v.x] * f.n_meshes + f.mesh_of_vertex[v.z]]);
+  return static_cast<Accuracy>(
+      params.accuracy[params.mesh_of_vertex[v.x] * params.n_meshes + params.mesh_of_vertex[v.z]]);
 }
 
 }  // namespace hpccd::gpu
