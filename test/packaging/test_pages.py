@@ -54,8 +54,9 @@ def test_files(page):
             first = path.partition("/")[0]
             if first in FOLDERS:
                 assert (ROOT / path).exists(), path
-            elif (CORE / first).is_dir() and "." in path:
-                assert (CORE / path).exists(), path
+            for sources in (CORE, ROOT / "hpccd_ros"):
+                if first not in FOLDERS and (sources / first).is_dir() and "." in path:
+                    assert (sources / path).exists(), path
 
 
 @each_page
@@ -81,6 +82,16 @@ def test_commands(page):
                 assert set(rest.split()[:1]) <= set(BENCHMARKS), word
             for option in re.findall(r"(?<=\s)--[a-z-]+", rest):
                 assert option in options(command) | {"--help"}, word
+
+
+def test_texts_name_pages_that_are_there():
+    """Messages, help and comments: never a part of the README, which has moved to a page."""
+    suffixes = {".py", ".yaml", ".xml", ".msg", ".srv", ".rviz"}
+    for folder in ("hpccd_ros", "hpccd_core", "config", "msg", "srv"):
+        for file in (file for file in (ROOT / folder).rglob("*") if file.suffix in suffixes):
+            text = file.read_text()
+            assert "README" not in text, file
+            assert all((ROOT / page).exists() for page in re.findall(r"docs/\w+\.md", text)), file
 
 
 def options(command):
@@ -124,6 +135,15 @@ def output_of(program, folder):
     done = subprocess.run([sys.executable, "-c", program], cwd=folder, capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, done.stderr
     return done.stdout
+
+
+def test_walk_of_a_message_has_ten_stops_that_exist():
+    text = (ROOT / "docs" / "architecture.md").read_text()
+    walk = text.partition("## The walk of a message\n")[2].partition("\n## ")[0]
+    stops = re.findall(r"^\d+\. `([\w/]+\.py):(\w+)`", walk, re.MULTILINE)
+    assert 0 < len(stops) <= 10 and len(set(stops)) == len(stops) == len(re.findall(r"^\d+\. ", walk, re.MULTILINE))
+    for file, function in stops:
+        assert f"def {function}(" in (ROOT / "hpccd_ros" / file).read_text(), (file, function)
 
 
 @pytest.mark.parametrize(
