@@ -77,9 +77,11 @@ sanitize: $(ENVIRONMENT) ## C++ tests under AddressSanitizer + UndefinedBehavior
 fuzz: venv ## Compare the core with the exact oracle on random and degenerate queries (FUZZ_ARGS=--help)
 	$(BIN)/python -m hpccd_core.fuzz $(FUZZ_ARGS)
 
-lint: $(ENVIRONMENT) ## Check style, types and who imports whom: ruff, clang-format, import-linter, mypy
+lint: $(ENVIRONMENT) ## Check style, types, and who imports or includes whom: ruff, mypy, import-linter, clang-format
 	$(BIN)/ruff check .
+	$(BIN)/mypy
 	$(BIN)/lint-imports --no-logo --cache-dir build/import-linter
+	$(BIN)/python scripts/check_includes.py
 	@git ls-files -z '*.h' '*.cpp' '*.inl' '*.cu' | xargs -0r $(BIN)/clang-format --dry-run --Werror
 
 format: $(ENVIRONMENT) ## Mend the style where a tool can

@@ -8,7 +8,8 @@
 from . import _find_core  # noqa: F401  (lets a source checkout use the installed extension modules)
 from ._core import Cancelled, InvalidArgument
 from .contacts import Contacts
-from .detector import Detector, backends, gpu_status
+from .detector import Detector
+from .devices import backends, gpu_status
 from .elementary import test_edge_edge, test_vertex_face
 from .scene import Scene
 

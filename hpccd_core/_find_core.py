@@ -12,7 +12,7 @@ from pathlib import Path
 import hpccd_core
 
 
-def _compiled_folder():
+def _compiled_folder() -> Path:
     own = Path(__file__).resolve().parent
     for folder in [own, *(Path(entry or ".").resolve() / "hpccd_core" for entry in sys.path)]:
         if any(folder.glob("_core.*.so")):

@@ -2,21 +2,28 @@
 """Checks of arguments, each with an error that names the argument and the remedy."""
 
 import operator
+from collections.abc import Iterable
+from typing import Any, SupportsIndex, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
+
+from .options import OUTPUTS
 
 REALS = frozenset({np.dtype(np.float32), np.dtype(np.float64)})  # in this machine's byte order
-LARGEST_COORDINATE = 1e150  # largest_coordinate in src/bvh/motion_bounds.h
+LARGEST_COORDINATE = 1e150  # largest_coordinate in src/bvh/coordinate_map.h
+
+Word = TypeVar("Word", bound=str)
 
 
-def flag(name, value):
+def flag(name: str, value: object) -> bool:
     """The value as bool: True, False, 1 or 0. Anything else has a truth too, but "no" has the wrong one."""
     if isinstance(value, (bool, np.bool_)) or (isinstance(value, (int, np.integer)) and value in (0, 1)):
         return bool(value)
     raise TypeError(f"{name}: expected True or False, got {type(value).__name__}")
 
 
-def text(name, value):
+def text(name: str, value: object) -> str:
     """A string that has an UTF-8 encoding and is not empty."""
     if not isinstance(value, str):
         raise TypeError(f"{name}: expected a string, got {type(value).__name__}")
@@ -29,7 +36,7 @@ def text(name, value):
     return value
 
 
-def choice(name, value, choices):
+def choice(name: str, value: Word, choices: Iterable[str]) -> Word:
     """The value, if it is one of the choices."""
     if not isinstance(value, str):
         raise TypeError(f"{name}: expected a string, got {type(value).__name__}; use one of {', '.join(choices)}")
@@ -38,7 +45,7 @@ def choice(name, value, choices):
     return value
 
 
-def whole_number(name, value, low, high):
+def whole_number(name: str, value: SupportsIndex, low: int, high: int) -> int:
     """The value as int, if it lies in [low, high]."""
     if isinstance(value, bool):
         raise TypeError(f"{name}: expected an integer, got bool")
@@ -51,10 +58,10 @@ def whole_number(name, value, low, high):
     return number
 
 
-def separation(accuracy, minimum_separation, tolerance):
+def separation(accuracy: str, minimum_separation: object, tolerance: object) -> tuple[float, float]:
     """Both lengths as floats, finite and not negative. Only accuracy "conservative" has a use for them: there the
     tolerance must be above zero, elsewhere the separation must be zero."""
-    lengths = [_length("minimum_separation", minimum_separation), _length("tolerance", tolerance)]
+    lengths = _length("minimum_separation", minimum_separation), _length("tolerance", tolerance)
     if lengths[0] > 0 and accuracy != "conservative":
         raise ValueError('minimum_separation: only accuracy="conservative" has one; use that accuracy, or 0')
     if lengths[1] == 0 and accuracy == "conservative":
@@ -62,7 +69,7 @@ def separation(accuracy, minimum_separation, tolerance):
     return lengths
 
 
-def _length(name, value):
+def _length(name: str, value: object) -> float:
     if isinstance(value, bool) or not isinstance(value, (int, float, np.floating, np.integer)):
         raise TypeError(f"{name}: expected a number, got {type(value).__name__}")
     try:
@@ -74,7 +81,7 @@ def _length(name, value):
     return number
 
 
-def faces(value):
+def faces(value: object) -> NDArray[np.uint32]:
     """(F, 3) integers -> (F, 3) uint32, C-contiguous."""
     array = _array("faces", value)
     if array.size == 0 and array.ndim in (1, 2):
@@ -95,7 +102,7 @@ def faces(value):
     return np.ascontiguousarray(integers, np.uint32)
 
 
-def _integers_of_any_size(value, array):
+def _integers_of_any_size(value: object, array: NDArray[Any]) -> NDArray[Any]:
     """The same as Python's integers, where it holds nothing else: numpy turns those beyond its own into floats."""
     if isinstance(value, np.ndarray) and array.dtype.kind == "f":
         return array
@@ -103,18 +110,16 @@ def _integers_of_any_size(value, array):
     return objects if all(type(x) is int for x in objects.flat) else array
 
 
-def output_names(value):
+def output_names(value: Iterable[str]) -> tuple[str, ...]:
     """A tuple of output names from one name or several."""
-    if isinstance(value, str):
-        value = (value,)
     try:
-        names = tuple(value)
+        names = (value,) if isinstance(value, str) else tuple(value)
     except TypeError:
         raise TypeError(f"outputs: expected names of outputs, got {type(value).__name__}") from None
-    return tuple(choice("outputs", name, ("points", "normals")) for name in names)
+    return tuple(choice("outputs", name, OUTPUTS) for name in names)
 
 
-def vertices(name, value, n_vertices):
+def vertices(name: str, value: object, n_vertices: int) -> NDArray[Any]:
     """(V, 3) float32 or float64; C-contiguous arrays are taken without a copy."""
     array = _reals(name, _array(name, value), value)
     if array.shape != (n_vertices, 3):
@@ -126,7 +131,7 @@ def vertices(name, value, n_vertices):
     return array if usable_in_place else np.require(array, None, ["C", "A"])
 
 
-def usable(name, array):
+def usable(name: str, array: NDArray[Any]) -> None:
     """Raises ValueError where a coordinate is NaN, infinite, or so large that intermediate results could overflow."""
     # In the array's own precision, which may end below that.
     good = np.abs(array) <= min(LARGEST_COORDINATE, float(np.finfo(array.dtype).max))  # false for NaN too
@@ -137,7 +142,7 @@ def usable(name, array):
     raise ValueError(f"{name}[{', '.join(map(str, where))}] is {array[where]}; {remedy}")
 
 
-def queries(value):
+def queries(value: object) -> NDArray[np.float64]:
     """(Q, 8, 3) float64: four points at t=0, then the same at t=1; finite."""
     array = _reals("queries", _array("queries", value), value)
     if array.ndim != 3 or array.shape[1:] != (8, 3):
@@ -148,7 +153,7 @@ def queries(value):
     return array
 
 
-def _reals(name, array, value):
+def _reals(name: str, array: NDArray[Any], value: object) -> NDArray[Any]:
     if array.dtype in REALS:
         return array
     if array.dtype.newbyteorder("=") in REALS:
@@ -161,7 +166,7 @@ def _reals(name, array, value):
     raise TypeError(f"{name}: expected float32 or float64, got {_kind(value, array)}; {remedy}")
 
 
-def _array(name, value):
+def _array(name: str, value: object) -> NDArray[Any]:
     _refuse_masked(name, value)
     try:
         return np.asarray(value)
@@ -176,7 +181,7 @@ def _array(name, value):
         raise TypeError(f"{name}: {kind} does not turn into an array ({error}); give an array of numbers") from error
 
 
-def _refuse_masked(name, value):
+def _refuse_masked(name: str, value: object) -> None:
     """A masked array with nothing masked is as good as any; of others the mask would be lost."""
     rows = value if isinstance(value, (list, tuple)) else (value,)
     if any(isinstance(row, np.ma.MaskedArray) and np.ma.is_masked(row) for row in rows):
@@ -186,14 +191,14 @@ def _refuse_masked(name, value):
         )
 
 
-def _kind(value, array):
+def _kind(value: object, array: NDArray[Any]) -> str:
     """What was given, in a few words."""
     if array.ndim == 0 and not isinstance(value, (np.ndarray, np.generic)):
         return type(value).__name__
     return f"dtype {array.dtype}"
 
 
-def _shown(value):
+def _shown(value: object) -> str:
     """As text that fits on a line; of a huge integer its size."""
     if isinstance(value, int) and abs(value) >= 10**20:
         return f"{'-' if value < 0 else ''}1e{(abs(value).bit_length() - 1) * 0.30103:.0f}"

@@ -4,6 +4,7 @@
 import dataclasses
 
 import numpy as np
+from numpy.typing import NDArray
 
 
 @dataclasses.dataclass(frozen=True)
@@ -26,23 +27,23 @@ class Contacts:
     hash: 64-bit, the same for the same contacts on any backend and any number of threads.
     """
 
-    vf: np.ndarray
-    vf_toc: np.ndarray
-    ee: np.ndarray
-    ee_toc: np.ndarray
-    points: np.ndarray
-    normals: np.ndarray
+    vf: NDArray[np.uint32]
+    vf_toc: NDArray[np.float64]
+    ee: NDArray[np.uint32]
+    ee_toc: NDArray[np.float64]
+    points: NDArray[np.float64]
+    normals: NDArray[np.float64]
     first_toc: float
     hash: int
 
-    def __len__(self):
+    def __len__(self) -> int:
         return len(self.vf) + len(self.ee)
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         return f"Contacts({len(self.vf)} vertex-face, {len(self.ee)} edge-edge, first at {self.first_toc:.6g})"
 
     @classmethod
-    def none(cls):
+    def none(cls) -> "Contacts":
         """No contacts at all."""
         empty = np.empty
         return cls(

@@ -2,28 +2,21 @@
 """The detector: motion of a scene in, contacts out."""
 
 import contextlib
+import os
 import re
 import threading
+from collections.abc import Iterable, Iterator
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from . import _core, arguments, device_arrays
 from .contacts import Contacts
-from .scene import ACCURACIES, Scene
-
-METHODS = ("default", "published", "naive", "front")
-
-
-def backends():
-    """The backends usable with this build on this machine, e.g. ["cpu"] or ["cpu", "gpu", "hybrid"]."""
-    return ["cpu", "gpu", "hybrid"] if gpu_status()["devices"] else ["cpu"]
-
-
-def gpu_status():
-    """What this build and machine can do with GPUs: dict with "compiled" (bool), "toolkit" (str: CUDA version and
-    architectures), "devices" (list of dicts: name, number, major, minor, multiprocessors, memory in bytes) and "reason"
-    (str: why there are none; empty where there are)."""
-    return _core.gpu_status()
+from .device_arrays import DeviceArray, DevicePositions
+from .devices import backends, gpu_status
+from .options import ACCURACIES, BACKENDS, METHODS, REPORTS, SIMD, Accuracy, Backend, Method, Output, Report, Simd
+from .scene import Scene
 
 
 class Detector:
@@ -58,68 +51,70 @@ class Detector:
 
     def __init__(
         self,
-        scene,
+        scene: Scene,
         *,
-        accuracy="exact",
-        backend="auto",
-        threads=0,
-        report="all",
-        outputs=(),
-        simd="auto",
-        minimum_separation=0.0,
-        tolerance=1e-6,
-        method="default",
-        restructure=True,
-        hybrid_segments=128,
-        hybrid_segment_pairs=2048,
-        gpus=0,
-    ):
+        accuracy: Accuracy = "exact",
+        backend: Backend = "auto",
+        threads: int = 0,
+        report: Report = "all",
+        outputs: Output | Iterable[Output] = (),
+        simd: Simd = "auto",
+        minimum_separation: float = 0.0,
+        tolerance: float = 1e-6,
+        method: Method = "default",
+        restructure: bool = True,
+        hybrid_segments: int = 128,
+        hybrid_segment_pairs: int = 2048,
+        gpus: int = 0,
+    ) -> None:
         if not isinstance(scene, Scene):
             raise TypeError(f"scene: expected hpccd_core.Scene, got {type(scene).__name__}")
         self.accuracy = arguments.choice("accuracy", accuracy, ACCURACIES)
-        self.report = arguments.choice("report", report, ("all", "first", "any"))
-        arguments.choice("backend", backend, ("auto", "cpu", "hybrid", "gpu"))
+        self.report = arguments.choice("report", report, REPORTS)
+        arguments.choice("backend", backend, BACKENDS)
         if backend != "auto" and backend not in backends():
             why = gpu_status()["reason"] or "it is not part of this build"
             usable = ", ".join(["auto", *backends()])
             raise ValueError(f"backend: {backend!r} is not usable here ({why}); use one of {usable}")
         self._backend = backend
-        outputs = arguments.output_names(outputs)
+        computed = arguments.output_names(outputs)
         threads = arguments.whole_number("threads", threads, 0, 1024)
-        simd = arguments.choice("simd", simd, ("auto", "scalar", "avx2", "avx512"))
+        arguments.choice("simd", simd, SIMD)
         self.method = arguments.choice("method", method, METHODS)
         if method != "default" and report == "any":
             raise ValueError(
                 f"report: 'any' is not offered by method {method!r}; use method='default', or report='all' or 'first'"
             )
-        queue = (
-            arguments.whole_number("hybrid_segments", hybrid_segments, 1, 65536),
-            arguments.whole_number("hybrid_segment_pairs", hybrid_segment_pairs, 1, 1 << 20),
-            arguments.whole_number("gpus", gpus, 0, 1024),
-        )
+        hybrid_segments = arguments.whole_number("hybrid_segments", hybrid_segments, 1, 65536)
+        hybrid_segment_pairs = arguments.whole_number("hybrid_segment_pairs", hybrid_segment_pairs, 1, 1 << 20)
+        gpus = arguments.whole_number("gpus", gpus, 0, 1024)
         if gpus > (here := len(gpu_status()["devices"])) and backend in ("hybrid", "auto"):
             raise ValueError(f"gpus: {gpus} were asked for, {here} are usable here; give at most {here}, or 0 for all")
-        lengths = arguments.separation(accuracy, minimum_separation, tolerance)
+        minimum_separation, tolerance = arguments.separation(accuracy, minimum_separation, tolerance)
         self.n_vertices = scene.n_vertices
         self._core = _core.Detector(
-            scene._core,
-            getattr(_core.Accuracy, accuracy),
-            getattr(_core.Backend, backend),
-            getattr(_core.Report, report),
-            getattr(_core.Simd, simd),
-            threads,
-            "points" in outputs,
-            "normals" in outputs,
-            *lengths,
-            getattr(_core.Method, method),
-            arguments.flag("restructure", restructure),
-            *queue,
+            scene=scene._core,
+            accuracy=getattr(_core.Accuracy, accuracy),
+            backend=getattr(_core.Backend, backend),
+            report=getattr(_core.Report, report),
+            simd=getattr(_core.Simd, simd),
+            threads=threads,
+            points="points" in computed,
+            normals="normals" in computed,
+            minimum_separation=minimum_separation,
+            tolerance=tolerance,
+            method=getattr(_core.Method, method),
+            restructure=arguments.flag("restructure", restructure),
+            hybrid_segments=hybrid_segments,
+            hybrid_segment_pairs=hybrid_segment_pairs,
+            gpus=gpus,
+            gpu_stages=bool(os.environ.get("HPCCD_GPU_STAGES")),  # for measuring: device time by stage in `profile`
         )
         self._stepping = threading.RLock()  # of the positions of the last step
-        self._last = None
+        self._last: NDArray[Any] | None = None
         self._last_on_device = device_arrays.LastStep()
 
-    def detect(self, vertices_t0, vertices_t1):
+    def detect(self, vertices_t0: ArrayLike | DeviceArray, vertices_t1: ArrayLike | DeviceArray) -> Contacts:
         """Contacts of the motion from vertices_t0 to vertices_t1, each (V, 3) float32 or float64.
 
         C-contiguous arrays are read in place. Arrays in a GPU's memory (CUDA array interface or DLPack: CuPy, PyTorch,
@@ -131,25 +126,25 @@ class Detector:
             return self._detect_on_device(vertices_t0, vertices_t1)
         if any(on_device):
             raise TypeError("vertices_t0, vertices_t1: one is a device array, the other is not; give both in one place")
-        vertices_t0 = arguments.vertices("vertices_t0", vertices_t0, self.n_vertices)
-        vertices_t1 = arguments.vertices("vertices_t1", vertices_t1, self.n_vertices)
-        if vertices_t0.dtype != vertices_t1.dtype:  # widening a float32 is exact
-            vertices_t0, vertices_t1 = vertices_t0.astype(np.float64), vertices_t1.astype(np.float64)
-        return Contacts(**self._core.detect(vertices_t0, vertices_t1))
+        first = arguments.vertices("vertices_t0", vertices_t0, self.n_vertices)
+        second = arguments.vertices("vertices_t1", vertices_t1, self.n_vertices)
+        if first.dtype != second.dtype:  # widening a float32 is exact
+            first, second = first.astype(np.float64), second.astype(np.float64)
+        return Contacts(**self._core.detect(first, second))
 
-    def _detect_on_device(self, vertices_t0, vertices_t1):
+    def _detect_on_device(self, vertices_t0: object, vertices_t1: object) -> Contacts:
         first = device_arrays.positions("vertices_t0", vertices_t0, self.n_vertices)
         second = device_arrays.positions("vertices_t1", vertices_t1, self.n_vertices)
         return self._detect_places(first, second)
 
-    def _detect_places(self, first, second):
+    def _detect_places(self, first: DevicePositions, second: DevicePositions) -> Contacts:
         if first.is_double != second.is_double:
             raise TypeError("vertices_t0, vertices_t1: device arrays must both be float32 or both be float64")
         return Contacts(
             **self._core.detect_on_device(first.pointer, second.pointer, self.n_vertices, first.is_double)
         )
 
-    def step(self, vertices):
+    def step(self, vertices: ArrayLike | DeviceArray) -> Contacts:
         """Streaming: the end of the last step is the start of this one. The first call returns no contacts.
 
         vertices: as for detect(), and refused with the same errors, the first ones too; what was refused does not
@@ -162,21 +157,21 @@ class Detector:
                 return self._step_on_device(vertices)
             return self._step_on_host(vertices)
 
-    def _step_on_host(self, vertices):
+    def _step_on_host(self, vertices: object) -> Contacts:
         if self._last_on_device:
             raise TypeError("vertices: the last step was a device array; give another one, or call reset() first")
-        vertices = arguments.vertices("vertices", vertices, self.n_vertices)
-        vertices = vertices.copy()  # checked, used and kept as it is now, whatever the caller writes there meanwhile
+        # Checked, used and kept as it is now, whatever the caller writes there meanwhile.
+        end = arguments.vertices("vertices", vertices, self.n_vertices).copy()
         if self._last is None:
-            arguments.usable("vertices", vertices)
+            arguments.usable("vertices", end)
             contacts = Contacts.none()
         else:
             with _names_of_step():
-                contacts = self.detect(self._last, vertices)
-        self._last = vertices
+                contacts = self.detect(self._last, end)
+        self._last = end
         return contacts
 
-    def _step_on_device(self, vertices):
+    def _step_on_device(self, vertices: object) -> Contacts:
         if self._last is not None:
             raise TypeError("vertices: the last step was a host array; give another one, or call reset() first")
         place = device_arrays.positions("vertices", vertices, self.n_vertices)
@@ -189,53 +184,53 @@ class Detector:
         self._last_on_device.keep(place, self.n_vertices)
         return Contacts.none() if last is None else contacts
 
-    def cancel(self):
+    def cancel(self) -> None:
         """End the use of this detector, from any thread and without waiting: a call under way, those that wait for it,
         and all later ones raise hpccd_core.Cancelled (a RuntimeError), within 10 ms. What has been handed to a GPU
         comes to its end first.
         """
         self._core.cancel()
 
-    def reset(self):
+    def reset(self) -> None:
         """Forget the last positions: the next step() starts anew."""
         with self._stepping:
             self._last = None
             self._last_on_device.forget()
 
     @property
-    def backend(self):
+    def backend(self) -> str:
         """Where frames are computed; for "auto" and after failures of the GPU: where the last one was."""
         return self._backend if self._backend == "cpu" else self._core.last_backend
 
     @property
-    def last_gpu_error(self):
+    def last_gpu_error(self) -> str:
         """Why frames meant for the GPU were computed on the CPU (stats["gpu_fallbacks"] counts them); or empty."""
         return self._core.last_gpu_error
 
     @property
-    def threads(self):
+    def threads(self) -> int:
         """Threads in use."""
         return self._core.threads
 
     @property
-    def simd(self):
+    def simd(self) -> str:
         """The instruction set in use."""
         return self._core.simd
 
     @property
-    def profile(self):
+    def profile(self) -> dict[str, float]:
         """Stage name -> ms of the last call, with "total" and the remainder "other"."""
         return self._core.profile()
 
     @property
-    def stats(self):
+    def stats(self) -> dict[str, int]:
         """Counts of the last call: candidate pairs, survivors of each filter, contacts, bytes used, ... Empty where it
         failed."""
         return self._core.stats()
 
 
 @contextlib.contextmanager
-def _names_of_step():
+def _names_of_step() -> Iterator[None]:
     """Errors of detect() speak of the one argument that step() has: the start was checked when it was the end."""
     try:
         yield

@@ -2,21 +2,42 @@
 """Positions that live in a GPU's memory: CUDA array interface (CuPy, PyTorch, Numba, Warp) or DLPack."""
 
 import ctypes
-import typing
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
 from . import _core
 
 
-class DevicePositions(typing.NamedTuple):
+class CudaArray(Protocol):
+    """What PyTorch, CuPy, Numba and Warp give out under this name."""
+
+    @property
+    def __cuda_array_interface__(self) -> dict[str, Any]: ...
+
+
+class DlpackArray(Protocol):
+    """The array API's way of handing over memory."""
+
+    def __dlpack__(self, *, stream: Any = ...) -> Any: ...
+
+    def __dlpack_device__(self) -> tuple[Any, int]: ...
+
+
+DeviceArray = CudaArray | DlpackArray
+
+# shape, strides in bytes (None: C-contiguous), type as in "<f4", address (None: no memory).
+_Layout = tuple[tuple[int, ...], tuple[int, ...] | None, str, int | None]
+
+
+class DevicePositions(NamedTuple):
     """A C-contiguous (V, 3) array on the device."""
 
     pointer: int
     is_double: bool
 
 
-def is_on_device(value):
+def is_on_device(value: object) -> bool:
     """Whether the array lies in the memory of a CUDA device."""
     if type(value) is np.ndarray:  # looking for attributes that it has not takes 3 us
         return False
@@ -29,14 +50,14 @@ def is_on_device(value):
         return False
 
 
-def _interface_of(value):
+def _interface_of(value: object) -> Any:
     try:
         return getattr(value, "__cuda_array_interface__", None)
     except Exception:  # PyTorch raises RuntimeError where a gradient is required; DLPack says so as well
         return None
 
 
-def positions(name, value, n_vertices):
+def positions(name: str, value: Any, n_vertices: int) -> DevicePositions:
     """The array's place and type. Raises TypeError or ValueError naming the argument."""
     interface = _interface_of(value)
     if interface is not None:
@@ -55,7 +76,7 @@ def positions(name, value, n_vertices):
     return DevicePositions(int(pointer or 0), size == 8)
 
 
-def _from_interface(name, interface):
+def _from_interface(name: str, interface: Any) -> _Layout:
     try:
         strides, mask = interface.get("strides"), interface.get("mask")
         strides = None if strides is None else tuple(strides)
@@ -70,14 +91,14 @@ def _from_interface(name, interface):
 class LastStep:
     """The positions of the last step in a copy on their device: whoever made them may write there again."""
 
-    def __init__(self):
-        self._memory = None
-        self.place = None
+    def __init__(self) -> None:
+        self._memory: _core.MemoryOnDevice | None = None
+        self.place: DevicePositions | None = None
 
-    def __bool__(self):
+    def __bool__(self) -> bool:
         return self.place is not None
 
-    def keep(self, place, n_vertices):
+    def keep(self, place: DevicePositions, n_vertices: int) -> None:
         """Copies what is at this place now. Raises RuntimeError where the device fails."""
         if self._memory is None:
             self._memory = _core.MemoryOnDevice()
@@ -85,7 +106,7 @@ class LastStep:
         self._memory.assign(place.pointer, n_vertices * 3 * (8 if place.is_double else 4))
         self.place = DevicePositions(self._memory.pointer, place.is_double)
 
-    def forget(self):
+    def forget(self) -> None:
         """Without a last step; the memory stays for the next one."""
         self.place = None
 
@@ -106,7 +127,7 @@ class _Tensor(ctypes.Structure):
     ]
 
 
-def _from_dlpack(name, value):
+def _from_dlpack(name: str, value: Any) -> _Layout:
     # Stream 1 is the legacy default stream: the producer's work is done before ours starts there. The capsule stays
     # unconsumed, so the producer's own destructor frees it; the caller keeps the array itself alive.
     try:

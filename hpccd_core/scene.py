@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Meshes, and which pairs of them matter."""
 
-from . import _core, arguments
+from numpy.typing import ArrayLike
 
-ACCURACIES = ("fast", "balanced", "conservative", "exact")
+from . import _core, arguments
+from .options import ACCURACIES, Accuracy
 
 
 class Scene:
@@ -13,11 +14,19 @@ class Scene:
     meshes that never move, :meth:`ignore_pair` for pairs that cannot or may touch.
     """
 
-    def __init__(self):
+    def __init__(self) -> None:
         self._core = _core.Scene()
-        self._ids = {}
+        self._ids: dict[str, int] = {}
 
-    def add_mesh(self, name, faces, *, n_vertices=None, self_collision=True, static=False):
+    def add_mesh(
+        self,
+        name: str,
+        faces: ArrayLike,
+        *,
+        n_vertices: int | None = None,
+        self_collision: bool = True,
+        static: bool = False,
+    ) -> int:
         """Add a mesh and return its number.
 
         name: unique string. faces: (F, 3) integers, indices into this mesh's own vertices. n_vertices: how many
@@ -30,25 +39,25 @@ class Scene:
         """
         name = arguments.text("name", name)
         self_collision, static = arguments.flag("self_collision", self_collision), arguments.flag("static", static)
-        faces = arguments.faces(faces)
-        used = int(faces.max()) + 1 if faces.size else 0
+        indices = arguments.faces(faces)
+        used = int(indices.max()) + 1 if indices.size else 0
         n_vertices = used if n_vertices is None else arguments.whole_number("n_vertices", n_vertices, 0, 2**32 - 2)
-        number = self._core.add_mesh(name, faces, n_vertices, self_collision, static)
+        number = self._core.add_mesh(name, indices, n_vertices, self_collision, static)
         self._ids[name] = number
         return number
 
-    def ignore_pair(self, mesh_a, mesh_b):
+    def ignore_pair(self, mesh_a: str | int, mesh_b: str | int) -> None:
         """Never report contacts between these two meshes (names or numbers); the same mesh twice: within it."""
         self._core.ignore_pair(self._number("mesh_a", mesh_a), self._number("mesh_b", mesh_b))
 
-    def set_accuracy(self, mesh_a, mesh_b, accuracy):
+    def set_accuracy(self, mesh_a: str | int, mesh_b: str | int, accuracy: Accuracy) -> None:
         """Test this pair of meshes (names or numbers) at another accuracy than the detector's."""
-        accuracy = arguments.choice("accuracy", accuracy, ACCURACIES)
+        arguments.choice("accuracy", accuracy, ACCURACIES)
         self._core.set_accuracy(
             self._number("mesh_a", mesh_a), self._number("mesh_b", mesh_b), getattr(_core.Accuracy, accuracy)
         )
 
-    def _number(self, name, mesh):
+    def _number(self, name: str, mesh: str | int) -> int:
         if isinstance(mesh, str):
             if mesh not in self._ids:
                 raise ValueError(f"{name}: no mesh is named {mesh!r}; the scene has {', '.join(self._ids) or 'none'}")
@@ -58,27 +67,27 @@ class Scene:
         return arguments.whole_number(name, mesh, 0, len(self._ids) - 1)
 
     @property
-    def n_vertices(self):
+    def n_vertices(self) -> int:
         """Vertices of all meshes together."""
         return self._core.n_vertices
 
     @property
-    def n_faces(self):
+    def n_faces(self) -> int:
         """Triangles of all meshes together."""
         return self._core.n_faces
 
     @property
-    def mesh_names(self):
+    def mesh_names(self) -> list[str]:
         """Names in the order added."""
         return list(self._ids)
 
-    def vertex_offset(self, mesh):
+    def vertex_offset(self, mesh: str | int) -> int:
         """The scene-wide index of the mesh's first vertex."""
         return self._core.meshes[self._number("mesh", mesh)][1]
 
-    def face_offset(self, mesh):
+    def face_offset(self, mesh: str | int) -> int:
         """The scene-wide index of the mesh's first face."""
         return self._core.meshes[self._number("mesh", mesh)][3]
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         return f"Scene({', '.join(self._ids)}: {self.n_vertices} vertices, {self.n_faces} faces)"

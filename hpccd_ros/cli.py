@@ -7,7 +7,6 @@ the module of the command that was asked for is imported: `hpccd --help` needs n
 
 import argparse
 import importlib
-import importlib.util
 import signal
 import sys
 
@@ -58,7 +57,7 @@ def main(argv=None) -> int:
         if interrupts.came or isinstance(error, KeyboardInterrupt):
             print(f"{name}: interrupted", file=sys.stderr)
             return 130
-        if not isinstance(error, RuntimeError) or (why := _ros_refusal(error)) is None:
+        if not isinstance(error, RuntimeError) or (why := _ros_start_failure(error)) is None:
             raise
         print(f"{name}: {why}", file=sys.stderr)
         return 2
@@ -94,8 +93,6 @@ def _run(argv, asked) -> int:
     subparsers = parser.add_subparsers(dest="command", metavar="<command>", required=True)
     run = None
     for name, summary in COMMANDS.items():
-        if importlib.util.find_spec(f"hpccd_ros.commands.{name}") is None:
-            continue
         subparser = subparsers.add_parser(
             name, help=summary, formatter_class=argparse.RawDescriptionHelpFormatter
         )
@@ -114,12 +111,12 @@ def _run(argv, asked) -> int:
     return run(args) or 0
 
 
-def _ros_refusal(error) -> str | None:
+def _ros_start_failure(error) -> str | None:
     if "rclpy" not in sys.modules:
         return None  # not of ROS; most commands need none
     from hpccd_ros.middleware import ros_start
 
-    refused = ros_start.refusal(error)
+    refused = ros_start.start_failure(error)
     return refused and refused[1]
 
 

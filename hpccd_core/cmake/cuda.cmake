@@ -72,14 +72,15 @@ function(hpccd_find_cuda)
 
   file(GLOB headers CONFIGURE_DEPENDS "${CMAKE_CURRENT_SOURCE_DIR}/src/*/*.h" "${CMAKE_CURRENT_SOURCE_DIR}/src/*/*.cuh"
     "${CMAKE_CURRENT_SOURCE_DIR}/include/hpccd/*.h")
-  foreach(source pipeline test_lists hybrid_devices device sort)
-    set(object "${CMAKE_CURRENT_BINARY_DIR}/gpu_${source}.o")
+  foreach(source gpu/pipeline gpu/test_lists gpu/device gpu/sort hybrid/cuda_device)
+    string(REPLACE "/" "_" name "${source}")
+    set(object "${CMAKE_CURRENT_BINARY_DIR}/${name}.o")
     add_custom_command(OUTPUT "${object}"
       COMMAND "${HPCCD_NVCC}" ${flags} "-DHPCCD_CUDA_ARCHITECTURES_TEXT=\"${shown}\""
         -I "${CMAKE_CURRENT_SOURCE_DIR}/src" -I "${CMAKE_CURRENT_SOURCE_DIR}/include"
-        -c "${CMAKE_CURRENT_SOURCE_DIR}/src/gpu/${source}.cu" -o "${object}"
-      DEPENDS "${CMAKE_CURRENT_SOURCE_DIR}/src/gpu/${source}.cu" ${headers}
-      COMMENT "Building CUDA object gpu/${source}.cu" VERBATIM)
+        -c "${CMAKE_CURRENT_SOURCE_DIR}/src/${source}.cu" -o "${object}"
+      DEPENDS "${CMAKE_CURRENT_SOURCE_DIR}/src/${source}.cu" ${headers}
+      COMMENT "Building CUDA object ${source}.cu" VERBATIM)
     list(APPEND objects "${object}")
   endforeach()
   set(hpccd_cuda_objects "${objects}" PARENT_SCOPE)

@@ -14,10 +14,10 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
+from ..options import ACCURACIES
 from .differential import SIMD, Batch, Tally, add_batch, batches, new_tallies, usable_simd
 
 SECONDS_BETWEEN_LINES = 30
-ACCURACIES = ("fast", "balanced", "conservative", "exact")
 
 
 def main(arguments: list[str] | None = None) -> int:

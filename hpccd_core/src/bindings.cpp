@@ -92,14 +92,16 @@ PYBIND11_MODULE(_core, m) {
 
   py::class_<Scene, std::shared_ptr<Scene>>(m, "Scene")
       .def(py::init<>())
-      .def("add_mesh",
-           [](Scene& s, const std::string& name, const Array<std::uint32_t>& faces, std::uint32_t n_vertices,
-              bool self_collision, bool is_static) {
-             return s.add_mesh(name, {faces.data(), static_cast<std::size_t>(faces.size())}, n_vertices,
-                               {self_collision, is_static});
-           })
-      .def("ignore_pair", &Scene::ignore_pair)
-      .def("set_accuracy", &Scene::set_accuracy)
+      .def(
+          "add_mesh",
+          [](Scene& s, const std::string& name, const Array<std::uint32_t>& faces, std::uint32_t n_vertices,
+             bool self_collision, bool is_static) {
+            return s.add_mesh(name, {faces.data(), static_cast<std::size_t>(faces.size())}, n_vertices,
+                              {self_collision, is_static});
+          },
+          "name"_a, "faces"_a, "n_vertices"_a, "self_collision"_a, "static"_a)
+      .def("ignore_pair", &Scene::ignore_pair, "mesh_a"_a, "mesh_b"_a)
+      .def("set_accuracy", &Scene::set_accuracy, "mesh_a"_a, "mesh_b"_a, "accuracy"_a)
       .def_property_readonly("n_vertices", &Scene::n_vertices)
       .def_property_readonly("n_faces", [](const Scene& s) { return s.faces().size(); })
       .def_property_readonly("meshes", [](const Scene& s) {
@@ -112,33 +114,41 @@ PYBIND11_MODULE(_core, m) {
   py::class_<Detector>(m, "Detector")
       .def(py::init([](std::shared_ptr<Scene> scene, Accuracy accuracy, Backend backend, Report report, Simd simd,
                        int threads, bool points, bool normals, double separation, double tolerance, Method method,
-                       bool restructure, std::size_t hybrid_segments, std::size_t hybrid_segment_pairs, int gpus) {
-        // A copy: what is added to the caller's scene later does not reach this detector.
-        return std::make_unique<Detector>(
-            std::make_shared<const Scene>(*scene),
-            Options{accuracy, backend, report, simd, threads, points, normals, separation, tolerance, method,
-                    restructure, hybrid_segments, hybrid_segment_pairs, gpus});
-      }))
-      .def("detect",
-           [](Detector& d, const py::array& t0, const py::array& t1) {
-             const Positions a = positions(t0), b = positions(t1);
-             Contacts c;
-             {
-               py::gil_scoped_release release;
-               c = d.detect(a, b);
-             }
-             return to_dict(std::move(c));
-           })
-      .def("detect_on_device",
-           [](Detector& d, std::uintptr_t t0, std::uintptr_t t1, std::size_t n, bool is_double) {
-             Contacts c;
-             {
-               py::gil_scoped_release release;
-               c = d.detect({reinterpret_cast<const void*>(t0), n, is_double, true},
-                            {reinterpret_cast<const void*>(t1), n, is_double, true});
-             }
-             return to_dict(std::move(c));
-           })
+                       bool restructure, std::size_t hybrid_segments, std::size_t hybrid_segment_pairs, int gpus,
+                       bool gpu_stages) {
+             // A copy: what is added to the caller's scene later does not reach this detector.
+             return std::make_unique<Detector>(
+                 std::make_shared<const Scene>(*scene),
+                 Options{accuracy, backend, report, simd, threads, points, normals, separation, tolerance, method,
+                         restructure, hybrid_segments, hybrid_segment_pairs, gpus, gpu_stages});
+           }),
+           "scene"_a, "accuracy"_a, "backend"_a, "report"_a, "simd"_a, "threads"_a, "points"_a, "normals"_a,
+           "minimum_separation"_a, "tolerance"_a, "method"_a, "restructure"_a, "hybrid_segments"_a,
+           "hybrid_segment_pairs"_a, "gpus"_a, "gpu_stages"_a)
+      .def(
+          "detect",
+          [](Detector& d, const py::array& t0, const py::array& t1) {
+            const Positions a = positions(t0), b = positions(t1);
+            Contacts c;
+            {
+              py::gil_scoped_release release;
+              c = d.detect(a, b);
+            }
+            return to_dict(std::move(c));
+          },
+          "vertices_t0"_a, "vertices_t1"_a)
+      .def(
+          "detect_on_device",
+          [](Detector& d, std::uintptr_t t0, std::uintptr_t t1, std::size_t n, bool is_double) {
+            Contacts c;
+            {
+              py::gil_scoped_release release;
+              c = d.detect({reinterpret_cast<const void*>(t0), n, is_double, true},
+                           {reinterpret_cast<const void*>(t1), n, is_double, true});
+            }
+            return to_dict(std::move(c));
+          },
+          "pointer_t0"_a, "pointer_t1"_a, "n_vertices"_a, "is_double"_a)
       .def("cancel", &Detector::cancel)
       .def("profile", &Detector::profile, py::call_guard<py::gil_scoped_release>())  // may wait for a call under way
       .def("stats", &Detector::stats, py::call_guard<py::gil_scoped_release>())
@@ -154,16 +164,20 @@ PYBIND11_MODULE(_core, m) {
 
   py::class_<gpu::MemoryOnDevice>(m, "MemoryOnDevice")
       .def(py::init([] { return gpu::MemoryOnDevice::create(); }))
-      .def("assign",
-           [](gpu::MemoryOnDevice& m, std::uintptr_t from, std::size_t bytes) {
-             py::gil_scoped_release release;
-             m.assign(reinterpret_cast<const void*>(from), bytes);
-           })
+      .def(
+          "assign",
+          [](gpu::MemoryOnDevice& m, std::uintptr_t from, std::size_t bytes) {
+            py::gil_scoped_release release;
+            m.assign(reinterpret_cast<const void*>(from), bytes);
+          },
+          "pointer"_a, "bytes"_a)
       .def_property_readonly("pointer",
                              [](const gpu::MemoryOnDevice& m) { return reinterpret_cast<std::uintptr_t>(m.data()); });
 
-  m.def("test_vertex_face", &run_queries<&test_vertex_face>);
-  m.def("test_edge_edge", &run_queries<&test_edge_edge>);
+  m.def("test_vertex_face", &run_queries<&test_vertex_face>, "queries"_a, "accuracy"_a, "simd"_a,
+        "minimum_separation"_a, "tolerance"_a);
+  m.def("test_edge_edge", &run_queries<&test_edge_edge>, "queries"_a, "accuracy"_a, "simd"_a, "minimum_separation"_a,
+        "tolerance"_a);
   m.def("gpu_status", [] {
     const gpu::Status& s = gpu::status();
     py::list devices;
@@ -172,7 +186,7 @@ PYBIND11_MODULE(_core, m) {
                               "multiprocessors"_a = x.multiprocessors, "memory"_a = x.memory));
     return py::dict("compiled"_a = s.compiled, "toolkit"_a = s.toolkit, "devices"_a = devices, "reason"_a = s.reason);
   });
-  m.def("gpu_fail_after", &gpu::fail_after);  // for tests
+  m.def("gpu_fail_after", &gpu::fail_after, "calls"_a);  // for tests
   m.def("simd_levels", [] {
     std::vector<std::string> names;
     for (Simd s : simd_levels()) names.push_back(name_of(s));

@@ -1,23 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <algorithm>
+// Checks what it is given, picks where a step is computed, and falls back to the CPU where that fails.
 #include <atomic>
 #include <mutex>
 #include <optional>
 #include <thread>
 #include <utility>
 
-#include "base/parallel.h"
-#include "base/profiler.h"
-#include "base/simd.h"
-#include "bvh/motion_bounds.h"
-#include "bvh/tree.h"
-#include "contacts/canonical.h"
-#include "gpu/frames.h"
-#include "hybrid/frames.h"
-#include "paper/method.h"
-#include "scene/features.h"
-#include "scene/static_meshes.h"
-#include "traverse/traverse.h"
+#include "backends/available.h"
+#include "backends/tuner.h"
 
 namespace hpccd {
 namespace {
@@ -33,218 +23,62 @@ int pool_threads(const Options& o) {
 }  // namespace
 
 struct Detector::Impl {
-  Impl(std::shared_ptr<const Scene> s, Options o)
-      : scene(std::move(s)),
-        options(o),
-        pool(pool_threads(o)),
-        features(features_of(*scene, pool)),
-        rules(*scene, o.accuracy),
-        workers(static_cast<std::size_t>(pool.size())) {
-    options.simd = resolve(o.simd);
-    options.threads = pool.size();
-    for (int a = 0; a < 4; ++a) search.batch_test[a] = batch_test(options.simd, static_cast<Accuracy>(a));
-    search.leaf_pairs = leaf_pairs(options.simd);
-    search.report = o.report;
-    search.limits = {o.minimum_separation, o.tolerance};
-    search.cancellation = search.limits.cancellation = &cancellation;
-    for (ThreadPool* p : {&pool, &one_thread}) p->heed(cancellation);
-    if (o.minimum_separation > 0) search.batch_test[static_cast<int>(Accuracy::conservative)] = all_undecided;
-    engine = paper::engine_of(options, {features, rules, pool});
-    use_gpus();
-  }
+  Impl(std::shared_ptr<const Scene> scene, const Options& options)
+      : shared(std::move(scene), options, pool_threads(options)), backends(shared) {}
 
-  // All that a call changes is one call's at a time, on whatever thread. What follows the lock is for all.
-  mutable std::mutex one_call;
-  Cancellation cancellation;
+  // All that a call changes is one call's at a time, on whatever thread. Only these two are not:
   std::atomic<Backend> last_backend{Backend::cpu};
+  Cancellation& cancellation() { return shared.cancellation; }
 
-  std::shared_ptr<const Scene> scene;
-  Options options;
-  ThreadPool pool, one_thread{1};
-  Features features;
-  PairRules rules;
-  std::vector<Worker> workers;
-  Search search;
-  ContactOrder order;
-  // Kept by a call that is cancelled: to give the memory of 10 million back to the system takes longer than to end it.
-  Contacts contacts;
-  MotionBounds motion;
-  Tree tree;
-  bool tree_fits_motion = false;                // its bounds are those of the last motion taken
-  std::unique_ptr<paper::MethodEngine> engine;  // of a published method; none for the default traversal
-  std::unique_ptr<gpu::Frames> gpu;             // where the backend is "gpu", or may become it
-  std::unique_ptr<hybrid::Frames> hybrid;       // likewise
-  std::uint64_t builds = 0;                     // of the tree
-  // "auto": the first frames go to each in turn, the rest to the fastest. The first of each warms up.
-  struct Trial {
-    int frames = 0;
-    double best_ms = std::numeric_limits<double>::infinity();
-  } trial[4];  // by backend
-  Profiler profiler;
+  mutable std::mutex one_call;
+  Resources shared;
+  AvailableBackends backends;
+  Tuner tuner;
   // Of the last call. Its other counts stay where they were made until somebody asks.
   struct Numbers {
     std::size_t vf, ee;
   };
   std::optional<Numbers> found;
 
-  void use_gpus() {
-    const std::string why[2] = {gpu::unsupported(options), hybrid::unsupported(options)};
-    const bool usable = !gpu::status().devices.empty(), any = options.backend == Backend::automatic;
-    if (options.backend == Backend::gpu || options.backend == Backend::hybrid) {
-      const bool on_gpu = options.backend == Backend::gpu;
-      if (!why[!on_gpu].empty()) throw InvalidArgument(why[!on_gpu]);
-      if (!usable)
-        throw InvalidArgument(std::string("backend: \"") + (on_gpu ? "gpu" : "hybrid") +
-                              "\" is not usable here: " + gpu::status().reason);
+  void check(Positions t0, Positions t1) const {
+    const std::size_t n = shared.features.n_vertices;
+    if (t0.n != n || t1.n != n)
+      throw InvalidArgument("vertices_t0, vertices_t1: the scene has " + std::to_string(n) + " vertices, but " +
+                            std::to_string(t0.n) + " and " + std::to_string(t1.n) + " were given");
+    if (t0.is_double != t1.is_double)
+      throw InvalidArgument("vertices_t0, vertices_t1: must both be float32 or both be float64");
+    if ((t0.on_device || t1.on_device) && !backends.take_device_arrays())
+      throw InvalidArgument(
+          "vertices_t0, vertices_t1: are in a GPU's memory, which this detector does not use; copy them "
+          "to the host, or use backend=\"gpu\"");
+  }
+
+  Backend pick(bool given_on_device) const {
+    const Backend asked = shared.options.backend;
+    if (backends.works(Backend::gpu) && given_on_device) return Backend::gpu;
+    if (asked != Backend::automatic) return backends.works(asked) ? asked : Backend::cpu;
+    std::vector<Backend> usable;
+    for (const Backend b : {Backend::cpu, Backend::gpu, Backend::hybrid})
+      if (backends.works(b)) usable.push_back(b);
+    return tuner.next(usable);
+  }
+
+  Detection compute(Backend picked, Positions t0, Positions t1) {
+    for (const Backend b : {picked, Backend::cpu}) {
+      if (b != Backend::gpu) t0 = backends.on_host(t0, 0), t1 = backends.on_host(t1, 1);
+      if (auto detection = backends.at(b).detect(t0, t1)) return std::move(*detection);
     }
-    if (usable && (any || options.backend == Backend::gpu) && why[0].empty())
-      gpu = std::make_unique<gpu::Frames>(*scene, features, options, pool);
-    if (usable && (any || options.backend == Backend::hybrid) && why[1].empty())
-      hybrid = std::make_unique<hybrid::Frames>(*scene, features, rules, options, pool);
+    throw std::logic_error("the CPU has left a step to others");
   }
 
-  Backend next_backend(bool given_on_device) const {
-    constexpr int frames_each = 3;
-    if (gpu && !gpu->gave_up() && (options.backend == Backend::gpu || given_on_device)) return Backend::gpu;
-    if (options.backend == Backend::hybrid && !hybrid->gave_up()) return Backend::hybrid;
-    if (options.backend != Backend::automatic) return Backend::cpu;
-    std::vector<Backend> usable{Backend::cpu};
-    if (gpu && !gpu->gave_up()) usable.push_back(Backend::gpu);
-    if (hybrid && !hybrid->gave_up()) usable.push_back(Backend::hybrid);
-    const auto trial_of = [this](Backend b) -> const Trial& { return trial[static_cast<int>(b)]; };
-    for (int n = 0; n < frames_each; ++n)
-      for (const Backend b : usable)
-        if (trial_of(b).frames <= n) return b;
-    return *std::min_element(usable.begin(), usable.end(),
-                             [&](Backend a, Backend b) { return trial_of(a).best_ms < trial_of(b).best_ms; });
-  }
-
-  // `meant`: where the frame should have been computed; a backend that failed has had its turn.
-  void note_time(Backend meant, Backend used) {
-    last_backend = used;
-    Trial& t = trial[static_cast<int>(meant)];
-    ++t.frames;
-    if (meant == used) t.best_ms = std::min(t.best_ms, profiler.stages().at("total"));
-  }
-
-  std::optional<Contacts> frame_on_gpu(Positions t0, Positions t1) {
-    const auto build_tree = [this](Positions a, Positions b) -> const Tree& {
-      tree_fits_motion = false;
-      motion.take(*scene, a, b, 0, pool);
-      build_tree_anew();
-      tree_fits_motion = true;
-      return tree;
-    };
-    return gpu->detect(t0, t1, build_tree, profiler);
-  }
-
-  std::uint64_t fallbacks() const { return (gpu ? gpu->fallbacks() : 0) + (hybrid ? hybrid->fallbacks() : 0); }
-
-  void collect() {
-    // Handing out the work (five jobs) takes as long as the work on so many.
-    constexpr std::size_t few = 1024;
-    std::size_t n = 0;
-    for (const Worker& w : workers) n += w.vertex_face.size() + w.edge_edge.size();
-    const Outputs outputs{options.points, options.normals, options.minimum_separation == 0};
-    collect_contacts(workers, search.geometry, options.report, outputs, order, n < few ? one_thread : pool, contacts);
-  }
-
-  std::map<std::string, std::uint64_t> stats() const {
-    if (!found) return {};
-    auto stats = last_backend == Backend::gpu ? gpu->stats() : stats_of_workers();
-    stats["vf_contacts"] = found->vf;
-    stats["ee_contacts"] = found->ee;
-    stats["triangles"] = features.n_faces();
-    stats["bytes"] += motion.bytes() + tree.bytes() + features.bytes();
-    if (gpu || hybrid) stats["gpu_fallbacks"] = fallbacks();
-    return stats;
-  }
-
-  void build_tree_anew() {
-    ++builds;
-    build(tree, *scene, features, motion.boxes, pool);
-  }
-
-  // A tree that fits the motion of this step: refitted, or built anew where refitting has lost too much.
-  void update_tree(bool tree_followed) {
-    // Traversal visits node pairs about in proportion to the nodes' area; half as much again costs more than a build.
-    constexpr double worn_out = 1.5;
-    if (tree.nodes.empty()) {
-      build_tree_anew();
-      profiler.mark("build");
-      return;
-    }
-    refit(tree, motion.boxes, tree_followed ? motion.resting : std::vector<char>(), pool);
-    profiler.mark("refit");
-    if (tree.area > worn_out * tree.area_when_built) {
-      build_tree_anew();
-      profiler.mark("build");
-    }
-  }
-
-  // With the tests on the CPU, or on GPUs beside it. Returns where they were.
-  Backend find_contacts(Positions t0, Positions t1, bool with_devices) {
-    std::unique_ptr<hybrid::FrameGuard> devices;
-    if (with_devices) devices = hybrid->begin(t0, t1, workers, profiler);
-    const bool tree_followed = std::exchange(tree_fits_motion, false);
-    motion.take(*scene, t0, t1, options.minimum_separation, pool);
-    profiler.mark("bounds");
-    search.geometry = {motion.rows.data(), features.edges.data(), features.faces.data(),
-                       options.minimum_separation > 0 ? nullptr : motion.slabs.data(), motion.map.scale};
-    search.earliest = std::numeric_limits<double>::infinity();
-    // Devices find all contacts, and test "fast" as "balanced": then so does the CPU beside them.
-    search.report = devices && options.report == Report::any ? Report::all : options.report;
-    search.batch_test[static_cast<int>(Accuracy::fast)] =
-        batch_test(options.simd, devices ? Accuracy::balanced : Accuracy::fast);
-    if (engine) {
-      motion.sweep(pool);
-      engine->update(motion.swept, profiler);
-      if (devices) hybrid->traverse_carriers(motion.swept, workers);
-      engine->traverse(motion.swept, search, workers);
-    } else {
-      update_tree(tree_followed);
-      tree_fits_motion = true;
-      if (devices) hybrid->traverse(tree, builds, workers);
-      traverse(tree, rules, search, pool, workers);
-    }
-    double elementary = 0;
-    for (const Worker& w : workers) elementary += 1e3 * w.elementary_seconds;
-    // Tests run inside the traversal; their share of the wall-clock time is their share of the threads' time.
-    profiler.mark_split("traverse", "elementary", elementary / pool.size());
-    return devices && hybrid->finish(*devices, workers, profiler) ? Backend::hybrid : Backend::cpu;
-  }
-
-  std::map<std::string, std::uint64_t> stats_of_workers() const {
-    std::map<std::string, std::uint64_t> stats;
-    std::uint64_t node_pairs = 0, leaf_pairs = 0, bytes = 0;
-    const char* kinds[2] = {"vf", "ee"};
-    for (const Worker& w : workers) {
-      node_pairs += w.node_pairs;
-      leaf_pairs += w.leaf_pairs;
-      for (int k = 0; k < 2; ++k) {
-        const std::string kind = kinds[k];
-        const BatchCounts& c = w.counts[k];
-        stats[kind + "_candidates"] += c.tested;
-        stats[kind + "_rejected_slabs"] += c.slabs;
-        stats[kind + "_rejected_coplanarity"] += c.coplanarity;
-        stats[kind + "_rejected_projection"] += c.projection;
-        stats[kind + "_rejected_roots"] += c.roots;
-        stats[kind + "_proven_contacts"] += c.contacts;
-        stats[kind + "_undecided"] += c.undecided;
-        const LastResortCounts& last = w.last_resorts[k];
-        stats[kind + "_by_tolerance"] += last.tolerance;
-        stats[kind + "_by_integers"] += last.integers;
-        stats[kind + "_by_inclusion"] += last.inclusion;
-      }
-      bytes += sizeof(Worker) + w.bytes();
-    }
-    bytes += order.bytes();
-    stats["node_pairs"] = node_pairs;
-    stats["leaf_pairs"] = leaf_pairs;
-    stats["bytes"] = bytes + (engine ? engine->bytes() : 0);
-    if (engine) engine->count(stats);
-    if (hybrid) hybrid->count(stats);
-    return stats;
+  void note(Backend picked, const Detection& d) {
+    found = {d.contacts.vf.size(), d.contacts.ee.size()};
+    shared.profiler.end();
+    last_backend = d.computed_by;
+    if (picked == d.computed_by)
+      tuner.took(picked, shared.profiler.stages().at("total"));
+    else
+      tuner.failed(picked);
   }
 };
 
@@ -255,64 +89,47 @@ Detector::~Detector() = default;
 
 Contacts Detector::detect(Positions t0, Positions t1) {
   Impl& d = *impl_;
-  if (t0.n != d.features.n_vertices || t1.n != d.features.n_vertices)
-    throw InvalidArgument("vertices_t0, vertices_t1: the scene has " + std::to_string(d.features.n_vertices) +
-                          " vertices, but " + std::to_string(t0.n) + " and " + std::to_string(t1.n) + " were given");
-  if (t0.is_double != t1.is_double)
-    throw InvalidArgument("vertices_t0, vertices_t1: must both be float32 or both be float64");
-  if ((t0.on_device || t1.on_device) && !d.gpu)
-    throw InvalidArgument(
-        "vertices_t0, vertices_t1: are in a GPU's memory, which this detector does not use; copy them "
-        "to the host, or use backend=\"gpu\"");
+  d.check(t0, t1);
   const std::lock_guard lock(d.one_call);
-  d.cancellation.heed();
+  d.cancellation().heed();
   d.found.reset();
   std::optional<gpu::CallersDevice> callers;
-  if (d.gpu || d.hybrid) callers.emplace();
-  d.profiler.begin();
-  const Backend backend = d.next_backend(t0.on_device || t1.on_device);
-  if (backend == Backend::gpu) {
-    if (!t0.on_device && !t1.on_device) require_static_meshes_rest(*d.scene, t0, t1);
-    if (auto contacts = d.frame_on_gpu(t0, t1)) {
-      d.cancellation.heed();
-      d.found = {contacts->vf.size(), contacts->ee.size()};
-      d.profiler.end();
-      d.note_time(backend, Backend::gpu);
-      return std::move(*contacts);
-    }
-    d.profiler.mark("gpu_failed");
-  }
-  if (d.gpu) t0 = d.gpu->on_host(t0, 0), t1 = d.gpu->on_host(t1, 1);
-  const Backend used = d.find_contacts(t0, t1, backend == Backend::hybrid);
-  d.contacts = {};
-  d.collect();
-  d.profiler.mark("contacts");
-  d.cancellation.heed();  // whoever cancelled a call shall not have to look at its answer
-  d.found = {d.contacts.vf.size(), d.contacts.ee.size()};
-  d.profiler.end();
-  d.note_time(backend, used);
-  return std::move(d.contacts);
+  if (d.backends.use_devices()) callers.emplace();
+  d.shared.profiler.begin();
+  const Backend picked = d.pick(t0.on_device || t1.on_device);
+  Detection detection = d.compute(picked, t0, t1);
+  d.note(picked, detection);
+  return std::move(detection.contacts);
 }
 
-void Detector::cancel() { impl_->cancellation.request(); }
+void Detector::cancel() { impl_->cancellation().request(); }
 
 std::map<std::string, double> Detector::profile() const {
   const std::lock_guard lock(impl_->one_call);
-  auto stages = impl_->profiler.stages();
-  if (impl_->gpu && impl_->last_backend == Backend::gpu)
-    for (const auto& [name, ms] : impl_->gpu->stages()) stages["gpu/" + name] = ms;
+  auto stages = impl_->shared.profiler.stages();
+  impl_->backends.at(impl_->last_backend).add_stages(stages);
   return stages;
 }
+
 std::map<std::string, std::uint64_t> Detector::stats() const {
   const std::lock_guard lock(impl_->one_call);
-  return impl_->stats();
+  const Impl& d = *impl_;
+  if (!d.found) return {};
+  std::map<std::string, std::uint64_t> stats;
+  d.backends.count(d.last_backend, stats);
+  stats["vf_contacts"] = d.found->vf;
+  stats["ee_contacts"] = d.found->ee;
+  stats["triangles"] = d.shared.features.n_faces();
+  stats["bytes"] += d.shared.tree.bytes() + d.shared.features.bytes();
+  return stats;
 }
-const Options& Detector::options() const { return impl_->options; }
+
+const Options& Detector::options() const { return impl_->shared.options; }
 Backend Detector::last_backend() const { return impl_->last_backend; }
+
 std::string Detector::last_gpu_error() const {
   const std::lock_guard lock(impl_->one_call);
-  if (impl_->hybrid && !impl_->hybrid->last_error().empty()) return impl_->hybrid->last_error();
-  return impl_->gpu ? impl_->gpu->last_error() : std::string();
+  return impl_->backends.last_error();
 }
 
 }  // namespace hpccd

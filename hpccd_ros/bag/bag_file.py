@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One MCAP file of a recording, and what rosbag2 wants to know about it."""
+"""One MCAP file of a recording that is being written."""
 
 import dataclasses
 import json
@@ -10,7 +10,7 @@ from pathlib import Path
 from mcap.writer import CompressionType, Writer
 
 from hpccd_ros.bag import message_definitions, qos_yaml
-from hpccd_ros.bag.stream import WholeWrites
+from hpccd_ros.bag.whole_writes import WholeWrites
 from hpccd_ros.base.version import package_version
 
 COMPRESSIONS = {"none": CompressionType.NONE, "lz4": CompressionType.LZ4, "zstd": CompressionType.ZSTD}
@@ -21,7 +21,7 @@ HPCCD_RECORD = "hpccd"
 
 @dataclasses.dataclass
 class Topic:
-    """A recorded topic. `qos` as from `mcap_qos.offered_qos`.
+    """A recorded topic. `qos` as from `qos_yaml.offered_qos`.
 
     `latched`: how many of its last messages are repeated at the start of each file; `last`: these, as (log_time,
     publish_time, sequence, data).
@@ -134,56 +134,3 @@ class BagFile:
         self.open_chunk.clear()
         if not self.message_count:
             self.path.unlink(missing_ok=True)
-
-
-def bag_metadata(files: list[BagFile], topics: list[Topic]) -> dict:
-    """rosbag2's BagMetadata, version 9 (Jazzy), of the given files."""
-    return summary(files, topics) | {
-        "relative_file_paths": [f.path.name for f in files],
-        "files": [file_information(f) for f in files],
-    }
-
-
-def file_information(file: BagFile) -> dict:
-    """What BagMetadata says of one file."""
-    return {
-        "path": file.path.name,
-        "starting_time": {"nanoseconds_since_epoch": file.start},
-        "duration": {"nanoseconds": file.end - file.start},
-        "message_count": file.message_count,
-    }
-
-
-def summary(files: list[BagFile], topics: list[Topic]) -> dict:
-    """BagMetadata without its lists of files."""
-    used = [f for f in files if f.message_count]
-    start = min((f.start for f in used), default=0)
-    end = max((f.end for f in used), default=0)
-    counts: Counter[str] = Counter()
-    for file in files:
-        counts.update(file.counts)
-    return {
-        "version": 9,
-        "storage_identifier": "mcap",
-        "duration": {"nanoseconds": end - start},
-        "starting_time": {"nanoseconds_since_epoch": start},
-        "message_count": counts.total(),
-        "topics_with_message_count": [
-            {
-                "topic_metadata": {
-                    "name": topic.name,
-                    "type": topic.type_name,
-                    "serialization_format": "cdr",
-                    "offered_qos_profiles": topic.qos,
-                    "type_description_hash": message_definitions.type_hash(topic.type_name),
-                },
-                "message_count": counts[topic.name],
-            }
-            for topic in topics
-        ],
-        # MCAP compresses its own chunks; these two keys are about compression around the file.
-        "compression_format": "",
-        "compression_mode": "",
-        "custom_data": None,
-        "ros_distro": "jazzy",
-    }

@@ -15,7 +15,7 @@ from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 
 from hpccd_ros.bag.mcap_index import Descriptions, miscounted, misplaced, read_index, undescribed
-from hpccd_ros.bag.mcap_records import Place, Raw, data_section, inside, parse, records, told_by
+from hpccd_ros.bag.mcap_records import Place, Raw, data_section, inside, parse, records, within_chunk_times
 
 # Bytes of messages, with what Python needs for each, that may wait for earlier ones of later chunks. Recorders write
 # messages nearly in order: what waits is about a chunk.
@@ -45,7 +45,7 @@ class McapFile:
         self.attachments: list[known.Attachment] = []
         self._places: list[_Waiting] = []
         self._loose = Descriptions(_complain)
-        places = [self._take(raw) for raw in data_section(stream, size)]
+        places = [self._sort_in(raw) for raw in data_section(stream, size)]
         self.index, begin = read_index(stream, size)
         end = places[-1].at + places[-1].length
         if begin != end:
@@ -70,7 +70,7 @@ class McapFile:
                 held -= len(thing.data) + _OF_A_MESSAGE
                 yield self.index.channels[thing.channel_id], thing
                 continue
-            for number, record in enumerate(self._at(thing)):
+            for number, record in enumerate(self._records_at(thing)):
                 if not isinstance(record, known.Message):
                     described.add(record)
                     continue
@@ -85,7 +85,7 @@ class McapFile:
         if why := miscounted(self.index, counts):
             raise McapError(why)
 
-    def _take(self, raw: Raw) -> Place:
+    def _sort_in(self, raw: Raw) -> Place:
         if (raw.opcode == Opcode.HEADER) != (self.header is None):
             raise McapError("no header at its begin" if self.header is None else "a second header")
         if raw.opcode == Opcode.CHUNK:
@@ -105,14 +105,14 @@ class McapFile:
                 self._loose.add(record)
         return raw.place
 
-    def _at(self, place: Place):
+    def _records_at(self, place: Place):
         (raw,) = records(self._stream, place.at, place.at + place.length)
         record = parse(raw)
         if isinstance(record, known.Message):
             yield record
             return
         for item in inside(record):
-            if not told_by(record, item):
+            if not within_chunk_times(record, item):
                 raise McapError(f"the chunk at byte {place.at:,} has a message outside of the times that it tells")
             yield item
 

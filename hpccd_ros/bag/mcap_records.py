@@ -138,7 +138,7 @@ def inside(chunk: known.Chunk) -> Iterator[known.Schema | known.Channel | known.
     raise McapError(f"a chunk of more than {MOST_RECORDS:,} records")
 
 
-def told_by(chunk: known.Chunk, record: known.McapRecord) -> bool:
+def within_chunk_times(chunk: known.Chunk, record: known.McapRecord) -> bool:
     """Whether a record of the chunk is within the times that it tells, by which chunks are put into order."""
     inner = isinstance(record, known.Message)
     return not inner or chunk.message_start_time <= record.log_time <= chunk.message_end_time

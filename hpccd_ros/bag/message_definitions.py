@@ -7,7 +7,7 @@ import os
 import sys
 from pathlib import Path
 
-from hpccd_ros.middleware.message_types import parts
+from hpccd_ros.middleware.message_types import split_type_name
 
 # rosbag2's LocalMessageDefinitionSource separates a type from those it is made of by exactly this line.
 SEPARATOR = "=" * 80
@@ -22,7 +22,7 @@ def definition_text(type_name: str) -> str:
     own, *nested = _type_hashes(type_name)
     texts = [_message_file(own, ".msg").read_text(encoding="utf-8")]
     for name in nested:
-        package, _, short = parts(name)
+        package, _, short = split_type_name(name)
         text = _message_file(name, ".msg").read_text(encoding="utf-8")
         texts.append(f"MSG: {package}/{short}\n{text}")
     return f"\n{SEPARATOR}\n".join(texts)
@@ -41,7 +41,7 @@ def _type_hashes(type_name: str) -> dict[str, str]:
 
 
 def _message_file(type_name: str, suffix: str) -> Path:
-    package, folder, short = parts(type_name)
+    package, folder, short = split_type_name(type_name)
     # The wheels install into sys.prefix and never set AMENT_PREFIX_PATH; a sourced workspace sets it.
     prefixes = [p for p in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep) if p] + [sys.prefix]
     for prefix in prefixes:

@@ -13,14 +13,15 @@ from mcap.writer import MCAP0_MAGIC
 from hpccd_ros.bag.mcap_file import McapFile
 from hpccd_ros.bag.mcap_records import DAMAGE
 from hpccd_ros.bag.writer import HPCCD_RECORD
-from hpccd_ros.base.errors import UserError, sentence
+from hpccd_ros.base.errors import UserError
+from hpccd_ros.base.quoting import printable
 
 
 class RecordingError(UserError, ValueError):
     """A recording cannot be read, or not used for what was asked; the text names the file and the remedy."""
 
     def __init__(self, text: str):
-        super().__init__(sentence(text))  # names in it are those of the recording
+        super().__init__(printable(text))  # names in it are those of the recording
 
 
 @dataclasses.dataclass(frozen=True)

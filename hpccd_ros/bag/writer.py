@@ -7,16 +7,8 @@ import time
 from collections import Counter
 from pathlib import Path
 
-from hpccd_ros.bag import message_definitions, qos_yaml
-from hpccd_ros.bag.bag_file import (
-    COMPRESSIONS,
-    HPCCD_RECORD,
-    BagFile,
-    Topic,
-    bag_metadata,
-    file_information,
-    summary,
-)
+from hpccd_ros.bag import bag_metadata, message_definitions, qos_yaml
+from hpccd_ros.bag.bag_file import COMPRESSIONS, HPCCD_RECORD, BagFile, Topic
 
 __all__ = ["COMPRESSIONS", "HPCCD_RECORD", "BagWriter", "Topic"]
 
@@ -26,7 +18,7 @@ class BagWriter:
 
     path: ends in `.mcap`: one file, which `ros2 bag play` opens alone. Otherwise a folder, made here, with
     `NAME_0.mcap`, `NAME_1.mcap`, ... and `metadata.yaml` of the finished ones.
-    info: JSON-able dict, stored with each file for the replay (see `mcap_reader.Recording.info`).
+    info: JSON-able dict, stored with each file for the replay (see `reader.Recording.info`).
     attachments: (name, bytes) of files that a replay needs, stored with each file too.
     compression: "none", "lz4" or "zstd", a chunk at a time.
     chunk_size: bytes of messages after which a chunk is closed, indexed and handed to the system.
@@ -47,7 +39,7 @@ class BagWriter:
                  max_bytes=0, max_seconds=0.0, retry_interval=5.0):
         self.path = Path(path)
         self.single_file = self.path.suffix == ".mcap"
-        if why := invalid_options(path, compression, max_bytes, max_seconds):
+        if why := unusable_options(path, compression, max_bytes, max_seconds):
             raise ValueError(why)
         if self.path.exists():
             raise FileExistsError(f"{self.path} exists: recordings are not overwritten; remove it or name another")
@@ -167,7 +159,7 @@ class BagWriter:
         self._flushed = time.monotonic()
 
     def _close_file(self):
-        self._file.finish(bag_metadata([self._file], list(self._topics.values())))
+        self._file.finish(bag_metadata.of_bag([self._file], list(self._topics.values())))
         self._file = None
         if not self.single_file:
             self._list_files()
@@ -177,10 +169,10 @@ class BagWriter:
         # Those before are rendered already: with all of them anew, each split takes longer than the one before, and the
         # messages of a stream that goes on meanwhile are lost.
         for file in finished[len(self._listed) :]:
-            parts = ([file.path.name], [file_information(file)])
+            parts = ([file.path.name], [bag_metadata.of_file(file)])
             self._listed.append(tuple(textwrap.indent(qos_yaml.to_yaml(part), "  ") for part in parts))
         names, files = ("".join(parts) for parts in zip(*self._listed, strict=True))
-        bag = {"rosbag2_bagfile_information": summary(finished, list(self._topics.values()))}
+        bag = {"rosbag2_bagfile_information": bag_metadata.without_files(finished, list(self._topics.values()))}
         lists = f"  relative_file_paths:\n{names}  files:\n{files}"
         draft = self.path / "metadata.yaml.part"
         draft.write_text(qos_yaml.to_yaml(bag) + lists, encoding="utf-8")
@@ -211,7 +203,7 @@ class BagWriter:
         self.poll()
 
 
-def invalid_options(path, compression: str, max_bytes: float, max_seconds: float) -> str | None:
+def unusable_options(path, compression: str, max_bytes: float, max_seconds: float) -> str | None:
     """Why a recording cannot be made with these options, or None."""
     if Path(path).suffix == ".mcap" and (max_bytes or max_seconds):
         return f"cannot split the single file {path}: give a folder (a path that does not end in .mcap)"

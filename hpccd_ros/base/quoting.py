@@ -36,3 +36,10 @@ def listed(names: Iterable[str]) -> str:
 def repeated(names: Iterable[str]) -> str:
     """The name that is there most often."""
     return quoted(Counter(names).most_common(1)[0][0])
+
+
+def printable(text: str) -> str:
+    """`text` for a terminal: what is not printable is escaped, and the middle of a long one left out."""
+    plain = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+    half = LONGEST_MESSAGE // 2
+    return plain if len(plain) <= LONGEST_MESSAGE else f"{plain[:half]} ... {plain[-half:]}"

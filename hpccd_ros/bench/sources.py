@@ -11,8 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from hpccd_ros.base.errors import UserError
-
-from .steps import MeshPart, Source, Step
+from hpccd_ros.bench.steps import MeshPart, Source, Step
 
 # Of Table 1, in its order: generated scenes of the same size and character.
 TABLE_1 = ("cloth-ball-like", "breaking-like", "n-body-like-lr", "n-body-like-hr")
@@ -96,10 +95,10 @@ def of_scene(name: str, size: float = 1.0) -> Source:
             MeshPart(mesh.name, faces, len(xyz), mesh.static, mesh.self_collision)
             for mesh, faces, xyz in zip(scene.meshes, scene.faces(k + 1), frame, strict=True)
         )
-        return Step(f"{name} {k}->{k + 1}", meshes, topology(k + 1), np.concatenate(before), np.concatenate(frame))
+        return Step(meshes, topology(k + 1), np.concatenate(before), np.concatenate(frame))
 
     shown = name if size == 1 else f"{name} x {size:g}"
-    return Source(shown, scene.title, scene.n_frames - 1, step)
+    return Source(shown, scene.n_frames - 1, step)
 
 
 def of_npz(path: Path) -> Source:
@@ -113,10 +112,9 @@ def of_npz(path: Path) -> Source:
         raise UserError(f"{path}: holds {', '.join(arrays)}; a step has vertices_t0, vertices_t1 and faces")
     truth = {key: arrays[key] for key in ("vf", "vf_toc", "ee", "ee_toc") if key in arrays}
     mesh = MeshPart("scene", arrays["faces"], len(arrays["vertices_t0"]))
-    step = Step(
-        path.stem, (mesh,), 0, arrays["vertices_t0"], arrays["vertices_t1"], truth=truth if len(truth) == 4 else None
-    )
-    return Source(path.stem, f"one step of a file, {step.triangles:,} triangles", 1, lambda k: step)
+    known = truth if len(truth) == 4 else None
+    step = Step((mesh,), 0, arrays["vertices_t0"], arrays["vertices_t1"], truth=known)
+    return Source(path.stem, 1, lambda k: step)
 
 
 def of_recording(path: Path) -> Source:
@@ -142,11 +140,11 @@ def of_recording(path: Path) -> Source:
             for m, t in zip(builder.meshes, after.topologies, strict=True)
         )
         return Step(
-            f"{path.stem} {k}->{k + 1}", meshes, tuple(map(id, after.topologies)), builder.concatenate(before, after),
+            meshes, tuple(map(id, after.topologies)), builder.concatenate(before, after),
             builder.concatenate(after, after), builder.ignored_pairs,
         )  # fmt: skip
 
-    return Source(path.stem, f"recording of {len(frames)} frames", len(frames) - 1, step)
+    return Source(path.stem, len(frames) - 1, step)
 
 
 def _holds_step(path):

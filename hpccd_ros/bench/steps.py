@@ -30,7 +30,6 @@ class Step:
     truth      {"vf", "vf_toc", "ee", "ee_toc"} as in hpccd_core.Contacts where it is known, else None
     """
 
-    label: str
     meshes: tuple[MeshPart, ...]
     topology: object
     vertices_t0: np.ndarray
@@ -70,7 +69,6 @@ class Source:
     could be tested (a topology that changes without saying where its new vertices came from)."""
 
     name: str
-    title: str
     n_steps: int
     step: Callable[[int], Step | None]
 

@@ -13,32 +13,30 @@ Every benchmark takes generated scenes (`hpccd scene --list`), the files of the 
 
 import argparse
 import importlib
-import importlib.util
 
+# The module of each, in hpccd_ros.bench, and what it measures.
 BENCHMARKS = {
-    "cpu": "ms a frame of each scene (Table 1), its components, and a peer beside it",
-    "gpu": "the GPU backend: ms a frame with transfers, device time by stage, floors",
-    "scaling": "speed-up over one thread against threads (Fig. 6 and 7), for each method",
-    "methods": "the methods and instruction sets compared: time, and equality of the results",
-    "size": "how time and memory grow with the number of triangles",
-    "memory": "peak memory and bytes per triangle",
-    "options": "what each way to model less saves",
-    "ros": "the node over DDS: latency beside that of an echo, sustained rate, overload",
-    "soak": "half an hour of mixed load on the node: memory, counts, answers",
-    "accuracy": "the tiers: time, wrong answers, error of times; sweeps of scale and offset",
+    "cpu": ("core.cpu", "ms a frame of each scene (Table 1), its components, and a peer beside it"),
+    "gpu": ("core.gpu", "the GPU backend: ms a frame with transfers, device time by stage, floors"),
+    "scaling": ("core.scaling", "speed-up over one thread against threads (Fig. 6 and 7), for each method"),
+    "methods": ("core.methods", "the methods and instruction sets compared: time, and equality of the results"),
+    "size": ("core.size", "how time and memory grow with the number of triangles"),
+    "memory": ("core.memory", "peak memory and bytes per triangle"),
+    "options": ("core.options", "what each way to model less saves"),
+    "ros": ("ros.node", "the node over DDS: latency beside that of an echo, sustained rate, overload"),
+    "soak": ("ros.soak.command", "half an hour of mixed load on the node: memory, counts, answers"),
+    "accuracy": ("core.accuracy", "the tiers: time, wrong answers, error of times; sweeps of scale and offset"),
 }
 
 
 def configure(parser):
     subparsers = parser.add_subparsers(dest="benchmark", metavar="<benchmark>", required=True)
-    for name, summary in BENCHMARKS.items():
-        if importlib.util.find_spec(f"hpccd_ros.bench.{name}") is None:
-            continue
+    for name, (place, summary) in BENCHMARKS.items():
         subparser = subparsers.add_parser(name, help=summary, formatter_class=argparse.RawDescriptionHelpFormatter)
-        module = importlib.import_module(f"hpccd_ros.bench.{name}")
+        module = importlib.import_module(f"hpccd_ros.bench.{place}")
         subparser.description = module.__doc__
         module.configure(subparser)
-        subparser.set_defaults(run_benchmark=module.run)
+        subparser.set_defaults(run_benchmark=module.run, parser=subparser)
 
 
 def run(args) -> int:

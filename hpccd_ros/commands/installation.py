@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from hpccd_ros.base.version import package_version
+from hpccd_ros.params.table import ACCURACIES
 
 PACKAGES = ("numpy", "ros-jazzy-rclpy", "mcap", "rich", "matplotlib", "trimesh", "rosbags")
 SETTINGS = ("ROS_DOMAIN_ID", "ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_STATIC_PEERS", "RMW_IMPLEMENTATION",
@@ -35,7 +36,7 @@ def gather() -> dict:
         "threads": detector.threads,
         "backends": hc.backends(),
         "gpu": _gpu(hc.gpu_status()),
-        "accuracies": _accuracies(hc, probe),
+        "accuracies": list(ACCURACIES),
         "packages": {name: _version(name) for name in PACKAGES},
         "environment": {name: os.environ[name] for name in SETTINGS if name in os.environ},
     }
@@ -68,19 +69,6 @@ def _gpu(status) -> dict[str, str]:
     if status["reason"]:
         found["why none is used"] = status["reason"]
     return found
-
-
-def _accuracies(hc, scene) -> list[str]:
-    from hpccd_ros.params.table import ACCURACIES
-
-    usable = []
-    for tier in ACCURACIES:
-        try:
-            hc.Detector(scene, accuracy=tier)
-        except (ValueError, RuntimeError):  # a tier that is not built says so
-            continue
-        usable.append(tier)
-    return usable
 
 
 def _processor() -> str:

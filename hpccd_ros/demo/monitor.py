@@ -11,7 +11,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.qos import QoSProfile
 from rclpy.signals import SignalHandlerOptions
 
-from hpccd_ros.middleware import environment, stop_signals
+from hpccd_ros.middleware import environment, stop_signals, topic_names
 
 
 class Monitor:
@@ -27,9 +27,11 @@ class Monitor:
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
         self._node = rclpy.create_node("hpccd_demo", start_parameter_services=False)
         self._contacts = self._node.create_subscription(
-            ContactArray, "contacts", self._on_contacts, QoSProfile(depth=100)
+            ContactArray, topic_names.CONTACTS, self._on_contacts, QoSProfile(depth=100)
         )
-        self._node.create_subscription(DiagnosticArray, "/diagnostics", self._on_diagnostics, QoSProfile(depth=10))
+        self._node.create_subscription(
+            DiagnosticArray, topic_names.DIAGNOSTICS, self._on_diagnostics, QoSProfile(depth=10)
+        )
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(self._node)
         self._received = 0

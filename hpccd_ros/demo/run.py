@@ -12,8 +12,8 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
 from hpccd_ros import scenes
+from hpccd_ros.bag.examine import examine
 from hpccd_ros.bag.reader import Recording
-from hpccd_ros.bag.recover import examine
 from hpccd_ros.base.errors import UserError
 from hpccd_ros.demo.children import Children
 from hpccd_ros.replay import recorded_setup
@@ -122,10 +122,13 @@ def _slower(monitor, frames, rate) -> str:
 def _await_recorded(path, monitor, children):
     """Wait until all answers are on the disk: a recorder that is told to end takes only what has reached it."""
     deadline = time.monotonic() + WRITTEN
-    contacts = lambda: sum(n for topic, n in examine(path).counts.items() if topic.endswith("/contacts"))  # noqa: E731
-    while contacts() < monitor.answers and time.monotonic() < deadline:
+    while _recorded_answers(path) < monitor.answers and time.monotonic() < deadline:
         children.check()
         monitor.listen(0.25)
+
+
+def _recorded_answers(path) -> int:
+    return sum(count for topic, count in examine(path).counts.items() if topic.endswith("/contacts"))
 
 
 def _watch(monitor, children, publisher, steps, console):
@@ -137,9 +140,7 @@ def _watch(monitor, children, publisher, steps, console):
     shown = -1
     with progress:
         bar = progress.add_task("steps", total=steps, said="")
-        # Without a single answer there is nothing to show: on a busy machine the first may be late.
-        silence = lambda: 3.0 if monitor.answers else 60.0  # noqa: E731
-        while publisher.running or (monitor.answers < steps and time.monotonic() - monitor.heard < silence()):
+        while publisher.running or (monitor.answers < steps and not _silent(monitor)):
             monitor.listen(0.1)
             children.check()
             said = _state(monitor)
@@ -148,6 +149,11 @@ def _watch(monitor, children, publisher, steps, console):
                 shown = monitor.answers // 10
                 console.print(f"           frame {monitor.step:4}: {said}")
     children.check()
+
+
+def _silent(monitor) -> bool:
+    """Whether no more answers are to be expected; on a busy machine the first may be late."""
+    return time.monotonic() - monitor.heard >= (3.0 if monitor.answers else 60.0)
 
 
 def _state(monitor) -> str:

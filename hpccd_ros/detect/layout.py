@@ -4,6 +4,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hpccd_ros.frames.types import Topology
 
@@ -17,8 +18,8 @@ class Layout:
     """
 
     mesh_names: tuple[str, ...]
-    vertex_offsets: np.ndarray
-    face_offsets: np.ndarray
+    vertex_offsets: NDArray[np.int64]
+    face_offsets: NDArray[np.int64]
     topology_versions: tuple[int, ...] = ()
 
     @classmethod

@@ -4,6 +4,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hpccd_ros.frames.drops import Reason, Refusal
 
@@ -26,7 +27,7 @@ class Topology:
 
     version: int
     n_vertices: int
-    faces: np.ndarray
+    faces: NDArray[np.uint32]
 
     def same_content(self, other: "Topology") -> bool:
         """Equal but for the version."""

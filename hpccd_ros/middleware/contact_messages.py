@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from hpccd.msg import ContactArray
+from numpy.typing import NDArray
 
 from hpccd_ros.detect.layout import Layout
 from hpccd_ros.middleware.fields import to_field, zeros
@@ -93,12 +94,12 @@ def _localise(indices: np.ndarray, offsets: np.ndarray, mesh: np.ndarray, local:
 class SceneContacts:
     """A ContactArray in the scene-wide numbering of hpccd_core.Contacts: same names, shapes and dtypes."""
 
-    vf: np.ndarray
-    vf_toc: np.ndarray
-    ee: np.ndarray
-    ee_toc: np.ndarray
-    points: np.ndarray
-    normals: np.ndarray
+    vf: NDArray[np.uint32]
+    vf_toc: NDArray[np.float64]
+    ee: NDArray[np.uint32]
+    ee_toc: NDArray[np.float64]
+    points: NDArray[np.float64]
+    normals: NDArray[np.float64]
 
 
 def other_topologies(message: ContactArray, layout: Layout) -> str | None:

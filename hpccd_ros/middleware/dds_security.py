@@ -4,7 +4,7 @@
 import os
 
 
-def refusal(error: Exception) -> str | None:
+def unmet_demand(error: Exception) -> str | None:
     """Why nothing is started, and what to do; None where security is not demanded or the error is another one.
 
     error: raised by rclpy.init or the creation of a node. With ROS_SECURITY_ENABLE=true rcl ends there both if keys are
@@ -20,6 +20,6 @@ def refusal(error: Exception) -> str | None:
             "has it, or unset ROS_SECURITY_ENABLE to run without protection"
         )
     return (
-        f"{why}. Create a keystore with an enclave for the node from config/security/policy.xml (see the README), and "
-        "name them with ROS_SECURITY_KEYSTORE and --ros-args --enclave"
+        f"{why}. Create a keystore with an enclave for the node from config/security/policy.xml (docs/security.md) "
+        "and name them with ROS_SECURITY_KEYSTORE and --ros-args --enclave"
     )

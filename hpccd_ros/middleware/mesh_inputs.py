@@ -9,9 +9,10 @@ from sensor_msgs.msg import PointCloud2
 from hpccd_ros.frames.drops import Input
 from hpccd_ros.frames.types import MeshFrame, Topology
 from hpccd_ros.middleware import fields, mesh_messages
+from hpccd_ros.middleware.topic_names import POINTS, TOPOLOGY, VERTICES
 
-TYPES = {"topology": MeshTopology, "vertices": MeshVertices, "points": PointCloud2}
-INPUTS = {"topology": Input.TOPOLOGY, "vertices": Input.VERTICES, "points": Input.VERTICES}
+TYPES = {TOPOLOGY: MeshTopology, VERTICES: MeshVertices, POINTS: PointCloud2}
+INPUTS = {TOPOLOGY: Input.TOPOLOGY, VERTICES: Input.VERTICES, POINTS: Input.VERTICES}
 
 
 def read(
@@ -22,10 +23,10 @@ def read(
     limits: max_vertices, max_faces. received, only_publisher: of the frame, as in `MeshFrame`.
     Raises InvalidMessageError.
     """
-    if kind == "topology":
+    if kind == TOPOLOGY:
         return mesh_messages.topology_from_message(message, limits["max_vertices"], limits["max_faces"])
     stamp, frame_id = fields.stamp_to_ns(message.header.stamp), message.header.frame_id
-    if kind == "vertices":
+    if kind == VERTICES:
         vertices = mesh_messages.vertices_from_message(message, limits["max_vertices"])
         version, step = message.topology_version, message.step
     else:

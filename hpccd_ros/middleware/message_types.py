@@ -4,11 +4,16 @@
 import importlib
 import re
 
+TOPOLOGY = "hpccd/msg/MeshTopology"
+VERTICES = "hpccd/msg/MeshVertices"
+POINTS = "sensor_msgs/msg/PointCloud2"
+CONTACTS = "hpccd/msg/ContactArray"
+
 # A name may come from a recording: it must not lead out of the folders of messages, nor to any other module.
 _TYPE_NAME = re.compile(r"([A-Za-z][A-Za-z0-9_]*)/([a-z]+)/([A-Za-z][A-Za-z0-9_]*)")
 
 
-def parts(type_name: str) -> tuple[str, str, str]:
+def split_type_name(type_name: str) -> tuple[str, str, str]:
     """("pkg", "msg", "Name") of "pkg/msg/Name". Raises LookupError where it is no such name."""
     if (match := _TYPE_NAME.fullmatch(type_name)) is None:
         raise LookupError(f"{type_name!r} is no name of a message type (package/msg/Name)")
@@ -17,7 +22,7 @@ def parts(type_name: str) -> tuple[str, str, str]:
 
 def message_class(type_name: str):
     """The Python class of "pkg/msg/Name". Raises LookupError where it is no such name, or is not installed."""
-    package, folder, short = parts(type_name)
+    package, folder, short = split_type_name(type_name)
     try:
         found = getattr(importlib.import_module(f"{package}.{folder}"), short)
     except (ImportError, AttributeError) as error:

@@ -53,7 +53,7 @@ def reliability(node: Node, entity: str, topic: str, default: ReliabilityPolicy)
     return default if given is None else ReliabilityPolicy[given.value.upper()]
 
 
-def refusal(node: Node) -> str | None:
+def unusable_override(node: Node) -> str | None:
     """Why an override cannot be used, or None; one of no topic of the node is unknown: see `known`."""
     for name, parameter in _given(node).items():
         policy, value = name.rpartition(".")[2], parameter.value

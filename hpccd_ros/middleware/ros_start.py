@@ -39,7 +39,7 @@ def init(arguments: list[str] | None = None) -> None:
     """rclpy.init without signal handlers; ``arguments``: with the name of the program, default: those of the process.
 
     Where rcl's log file cannot be written, ROS starts without one, and says so: rcl itself would not start.
-    Raises UserError for a domain that Fast DDS would end the process for, and rclpy's own errors: see `refusal`.
+    Raises UserError for a domain that Fast DDS would end the process for, and rclpy's own errors: see `start_failure`.
     """
     domain = os.environ.get("ROS_DOMAIN_ID", "")
     if domain.isdecimal() and int(domain) > LAST_DOMAIN:
@@ -62,12 +62,12 @@ def refuse_other_arguments(arguments: list[str] | None = None) -> None:
         )
 
 
-def refusal(error: Exception) -> tuple[int, str] | None:
+def start_failure(error: Exception) -> tuple[int, str] | None:
     """(exit status of the node, why ROS did not start and what to do), or None for an error of another kind.
 
     error: raised by `init` or the creation of a node.
     """
-    if why := dds_security.refusal(error):
+    if why := dds_security.unmet_demand(error):
         return NO_SECURITY, why
     if isinstance(error, UserError):
         return WRONG_PARAMETERS, str(error)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""SIGINT and SIGTERM as an event that ends the main loop, instead of an interruption at any place.
+"""SIGINT and SIGTERM as an event that ends the main loop between two turns, instead of an interruption at any place.
 
 rclpy's own handlers shut the context down while callbacks run: in one of ten ends the executor then failed on the
 invalid context, or waited forever. Blocking the signals for a thread that waits for them is no way either: threads
@@ -10,7 +10,7 @@ import contextlib
 import os
 import signal
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 from rclpy.executors import Executor
 from rclpy.task import Future
@@ -38,20 +38,30 @@ def watch(on_stop: Callable[[], None]) -> None:
 
 
 @contextlib.contextmanager
-def later():
-    """A SIGINT or SIGTERM within this block becomes a KeyboardInterrupt behind it.
+def collected() -> Iterator[list[int]]:
+    """Gives an empty list, which each SIGINT and SIGTERM within this block fills: for a loop that looks at it.
 
-    Inside of rclpy's calls, which call Python back from C++, the exception would come out as another one.
+    Call from the main thread, with rclpy's handlers off.
     """
     came: list[int] = []
     before = {}
     try:
         for number in (signal.SIGINT, signal.SIGTERM):
             before[number] = signal.signal(number, lambda number, frame: came.append(number))
-        yield
+        yield came
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+@contextlib.contextmanager
+def later() -> Iterator[None]:
+    """A SIGINT or SIGTERM within this block becomes a KeyboardInterrupt behind it.
+
+    Inside of rclpy's calls, which call Python back from C++, the exception would come out as another one.
+    """
+    with collected() as came:
+        yield
     if came:
         raise KeyboardInterrupt
 

@@ -1,24 +1,63 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The topics of the node, known from its parameters before any is there."""
+"""The names of all topics and services of the node; relative ones follow its namespace and remappings."""
+
+from __future__ import annotations
 
 from collections.abc import Iterable
-
-from rclpy.node import Node
+from typing import TYPE_CHECKING
 
 from hpccd_ros.base.quoting import shortened
-from hpccd_ros.middleware import transform_topics
 
-PUBLISHED = ("contacts", "markers", "surface", "/diagnostics")
-OF_MESH = ("topology", "vertices", "points")
-SERVICES = ("~/detect",)
+if TYPE_CHECKING:  # writers of files need the names and no ROS
+    from rclpy.node import Node
+
+CONTACTS = "contacts"
+MARKERS = "markers"
+SURFACE = "surface"
+DIAGNOSTICS = "/diagnostics"
+PUBLISHED = (CONTACTS, MARKERS, SURFACE, DIAGNOSTICS)
+
+TRANSFORMS = "transforms"
+TRANSFORMS_STATIC = "transforms_static"
+TF = "/tf"
+TF_STATIC = "/tf_static"
+
+DETECT = "~/detect"
+SERVICES = (DETECT,)
+
+# What is published of a mesh: its faces, and its positions as MeshVertices or as PointCloud2.
+TOPOLOGY = "topology"
+VERTICES = "vertices"
+POINTS = "points"
+
+# Of each mesh one name below this one.
+MESHES = "meshes/"
+
+
+def of_mesh(mesh: str, kind: str) -> str:
+    """kind: TOPOLOGY, VERTICES or POINTS."""
+    return f"{MESHES}{mesh}/{kind}"
+
+
+def topology(mesh: str) -> str:
+    return of_mesh(mesh, TOPOLOGY)
+
+
+def vertices(mesh: str) -> str:
+    return of_mesh(mesh, VERTICES)
+
+
+def points(mesh: str) -> str:
+    return of_mesh(mesh, POINTS)
 
 
 def subscribed(meshes: Iterable[str]) -> list[str]:
-    """All that the node may subscribe to, by names as it writes them."""
-    return [f"meshes/{mesh}/{kind}" for mesh in meshes for kind in OF_MESH] + list(transform_topics.ALL)
+    """All that the node may subscribe to."""
+    of_meshes = [of_mesh(mesh, kind) for mesh in meshes for kind in (TOPOLOGY, VERTICES, POINTS)]
+    return [*of_meshes, TRANSFORMS, TRANSFORMS_STATIC, TF, TF_STATIC]
 
 
-def refusal(node: Node, meshes: Iterable[str]) -> str | None:
+def unusable_name(node: Node, meshes: Iterable[str]) -> str | None:
     """Why a topic or service of the node cannot exist under its name here (namespace, remapping), or None."""
     for resolve, names in (
         (node.resolve_topic_name, (*PUBLISHED, *subscribed(meshes))),

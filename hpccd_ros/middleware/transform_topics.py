@@ -12,7 +12,7 @@ from hpccd_ros.base.quoting import quoted
 from hpccd_ros.frames.drops import Input, Reason, Refusal
 from hpccd_ros.frames.rigid import Rigid
 from hpccd_ros.frames.transform_buffer import TransformBuffer
-from hpccd_ros.middleware import fields
+from hpccd_ros.middleware import fields, topic_names
 from hpccd_ros.middleware.message_types import message_class
 
 STAMPED = "geometry_msgs/msg/TransformStamped"
@@ -32,10 +32,10 @@ class TransformTopic:
 ALL = {
     topic.name: topic
     for topic in (
-        TransformTopic("transforms", STAMPED, False),
-        TransformTopic("transforms_static", STAMPED, True),
-        TransformTopic("/tf", TF2, False),
-        TransformTopic("/tf_static", TF2, True),
+        TransformTopic(topic_names.TRANSFORMS, STAMPED, False),
+        TransformTopic(topic_names.TRANSFORMS_STATIC, STAMPED, True),
+        TransformTopic(topic_names.TF, TF2, False),
+        TransformTopic(topic_names.TF_STATIC, TF2, True),
     )
 }
 

@@ -11,7 +11,7 @@ from hpccd_ros.detect.core import unusable_options
 from hpccd_ros.middleware import environment, qos_overrides, topic_names
 from hpccd_ros.node.node_recording import unrecordable
 from hpccd_ros.params import parameters, scene_parameters
-from hpccd_ros.params.parameters import ParameterError
+from hpccd_ros.params.values import ParameterError
 
 Meshes = dict[str, dict[str, Any]]
 
@@ -26,10 +26,10 @@ class Configuration:
         self._node = node
         self.settings, self.meshes = parameters.declare(node)
         scene_parameters.check(self.settings, self.meshes)
-        if why := topic_names.refusal(node, self.meshes) or qos_overrides.refusal(node):
+        if why := topic_names.unusable_name(node, self.meshes) or qos_overrides.unusable_override(node):
             raise ParameterError(why)
         for name in parameters.unknown_overrides(node, qos_overrides.known(node, self.meshes)):
-            text = f"parameter {shortened(name)} is unknown and has no effect; see the README's table"
+            text = f"parameter {shortened(name)} is unknown and has no effect; see docs/parameters.md"
             node.get_logger().warning(text)
         self.options = scene_parameters.detector_options(self.settings)
         if why := unusable_options(self.options) or unrecordable(self.settings):

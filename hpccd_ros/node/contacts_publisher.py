@@ -11,7 +11,7 @@ from std_msgs.msg import Header
 from visualization_msgs.msg import MarkerArray
 
 from hpccd_ros.detect.step_detector import Detection
-from hpccd_ros.middleware import contact_messages, fields, qos
+from hpccd_ros.middleware import contact_messages, fields, qos, topic_names
 from hpccd_ros.node.life_cycle import GuardedLifecycleNode
 from hpccd_ros.node.markers import contact_markers, surface_cloud
 
@@ -21,9 +21,9 @@ class ContactsPublisher:
 
     def __init__(self, node: GuardedLifecycleNode, settings: dict[str, Any]) -> None:
         self._settings = settings
-        self._contacts = node.configured_publisher(ContactArray, "contacts", qos.CONTACTS)
-        self._markers = node.configured_publisher(MarkerArray, "markers", qos.MARKERS)
-        self._surface = node.configured_publisher(PointCloud2, "surface", qos.MARKERS)
+        self._contacts = node.configured_publisher(ContactArray, topic_names.CONTACTS, qos.CONTACTS)
+        self._markers = node.configured_publisher(MarkerArray, topic_names.MARKERS, qos.MARKERS)
+        self._surface = node.configured_publisher(PointCloud2, topic_names.SURFACE, qos.MARKERS)
         self._show_after = 0.0
 
     @property

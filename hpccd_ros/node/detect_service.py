@@ -20,7 +20,7 @@ from hpccd_core import Cancelled
 from hpccd_ros.base.quoting import LONGEST_MESSAGE, shortened
 from hpccd_ros.detect.cancellation import Cancellation
 from hpccd_ros.detect.core import CORE_ERRORS, Options
-from hpccd_ros.middleware import qos
+from hpccd_ros.middleware import qos, topic_names
 from hpccd_ros.middleware.guard import Errors
 from hpccd_ros.node.detect_request import NodeScene, RequestError, compute
 
@@ -74,7 +74,7 @@ class DetectService:
         self._group = ReentrantCallbackGroup()
         self._service = node.create_service(
             Detect,
-            "~/detect",
+            topic_names.DETECT,
             self._answer,
             qos_profile=qos.requests(self._capacity + ROOM_TO_REFUSE),
             callback_group=self._group,
@@ -119,7 +119,7 @@ class DetectService:
         except RequestError as error:
             return self._refuse(response, "refused", str(error))
         except Exception as error:  # here and not only by the executor's guard, so that it is counted as failed
-            return self._refuse(Detect.Response(), "failed", self._errors.caught("~/detect", error))
+            return self._refuse(Detect.Response(), "failed", self._errors.caught(topic_names.DETECT, error))
         finally:
             self._last_answer = time.monotonic()
 

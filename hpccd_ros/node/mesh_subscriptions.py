@@ -16,7 +16,7 @@ from hpccd_ros.frames.drops import Input, Reason, Refusal
 from hpccd_ros.frames.pipeline import FramePipeline
 from hpccd_ros.frames.rate_limit import RateLimit
 from hpccd_ros.frames.sequence import SequenceWatch
-from hpccd_ros.middleware import mesh_inputs, qos, qos_overrides, unreadable
+from hpccd_ros.middleware import mesh_inputs, qos, qos_overrides, topic_names, unreadable
 from hpccd_ros.middleware.fields import InvalidMessageError
 from hpccd_ros.node.accounts import Accounts
 from hpccd_ros.node.hand_over import hand_over
@@ -143,7 +143,7 @@ class MeshSubscriptions:
         return f"more than {self._settings['max_rate']:g} messages a second (parameter max_rate)"
 
     def _subscribe(self, kind: str, callback: Callable, profile: QoSProfile, numbers: SequenceWatch) -> Subscription:
-        topic = f"meshes/{self._mesh}/{kind}"
+        topic = topic_names.of_mesh(self._mesh, kind)
         return qos_overrides.create_subscription(
             self._node,
             mesh_inputs.TYPES[kind],

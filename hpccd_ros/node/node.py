@@ -5,7 +5,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 
 from hpccd_ros.detect.step_detector import Detection
-from hpccd_ros.middleware import environment, qos
+from hpccd_ros.middleware import environment, qos, topic_names
 from hpccd_ros.node import parameter_services
 from hpccd_ros.node.accounts import Accounts
 from hpccd_ros.node.configuration import Configuration
@@ -57,7 +57,7 @@ class HpccdNode(GuardedLifecycleNode):
             self.get_logger().error(f"cannot configure: {error}")
             return TransitionCallbackReturn.FAILURE
         self._contacts = ContactsPublisher(self, settings)
-        self._diagnostics = self.configured_publisher(DiagnosticArray, "/diagnostics", qos.DIAGNOSTICS)
+        self._diagnostics = self.configured_publisher(DiagnosticArray, topic_names.DIAGNOSTICS, qos.DIAGNOSTICS)
         options, ended = lambda: self._configuration.options, self._accounts.requests
         self._service = DetectService(self, settings, options, self._scene_for_service, ended, self.errors)
         self.configured_timer(settings["diagnostics_period"], self._report)

@@ -85,7 +85,7 @@ def unrecordable(settings: dict[str, Any]) -> str | None:
         return None
     try:
         target = _expand(settings["record"])
-        if why := writer.invalid_options(target, settings["record_compression"], *_limits(settings)):
+        if why := writer.unusable_options(target, settings["record_compression"], *_limits(settings)):
             return f"record: {why}"
         if why := _no_place(target):
             return f"record: {_shortened(target)}: {why}"

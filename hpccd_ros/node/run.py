@@ -12,7 +12,7 @@ from hpccd_ros.middleware import environment, ros_start, stop_signals
 from hpccd_ros.middleware.guard import GuardedExecutor
 from hpccd_ros.middleware.unreadable import UnreadableExecutor
 from hpccd_ros.node.node import HpccdNode
-from hpccd_ros.params.parameters import ParameterError
+from hpccd_ros.params.values import ParameterError
 
 
 class _Executor(UnreadableExecutor, GuardedExecutor):
@@ -35,7 +35,7 @@ def main(argv: list[str] | None = None, node_type: type[HpccdNode] = HpccdNode) 
     except ParameterError as error:
         return _not_started(ros_start.WRONG_PARAMETERS, str(error))
     except Exception as error:
-        if (refused := ros_start.refusal(error)) is None:
+        if (refused := ros_start.start_failure(error)) is None:
             raise
         return _not_started(*refused)
     executor = _Executor(node.errors)

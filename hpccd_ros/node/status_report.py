@@ -9,6 +9,7 @@ from pathlib import Path
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
+from hpccd_ros.middleware import topic_names
 from hpccd_ros.node.accounts import Accounts
 from hpccd_ros.node.metrics import percentiles
 
@@ -51,7 +52,7 @@ class Reporter:
         out.status = [
             self._frames(data, period, waiting, warnings, coordinate_frame),
             self._detection(data, period, state),
-            self._status("service", DiagnosticStatus.OK, "~/detect", service),
+            self._status("service", DiagnosticStatus.OK, topic_names.DETECT, service),
             self._status("process", DiagnosticStatus.OK, state, {"state": state, **_memory()}),
             self._errors(*errors),
             *([self._status("recording", *recording)] if recording is not None else []),

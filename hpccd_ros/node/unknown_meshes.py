@@ -14,7 +14,7 @@ from sensor_msgs.msg import PointCloud2
 
 from hpccd_ros.base.quoting import listed
 from hpccd_ros.frames.drops import Reason, Refusal
-from hpccd_ros.middleware import qos
+from hpccd_ros.middleware import message_types, qos, topic_names
 from hpccd_ros.node.accounts import Accounts
 
 # Bounds what strangers can make the node subscribe to, at a time.
@@ -23,8 +23,8 @@ _MOST_TOPICS = 16
 _MOST_NAMES = 64
 _OTHERS = "(others)"
 _TYPES = {
-    "vertices": ("hpccd/msg/MeshVertices", MeshVertices),
-    "points": ("sensor_msgs/msg/PointCloud2", PointCloud2),
+    topic_names.VERTICES: (message_types.VERTICES, MeshVertices),
+    topic_names.POINTS: (message_types.POINTS, PointCloud2),
 }
 _DETECT = "hpccd/srv/Detect"
 
@@ -50,7 +50,7 @@ class UnknownMeshWatch:
         self._found: set[str] = set()
         self._beyond: list[str] = []
         self._names: set[str] = set()
-        self._prefix = node.resolve_topic_name("meshes/x").removesuffix("x")
+        self._prefix = node.resolve_topic_name(f"{topic_names.MESHES}x").removesuffix("x")
         # Steady time: simulated time may stand still.
         self._timer = node.create_timer(1.0, self._look, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
@@ -96,7 +96,7 @@ class UnknownMeshWatch:
         return found
 
     def _belongs_to_another(self, mesh: str) -> bool:
-        listeners = self._node.get_subscriptions_info_by_topic(f"{self._prefix}{mesh}/topology")
+        listeners = self._node.get_subscriptions_info_by_topic(f"{self._prefix}{mesh}/{topic_names.TOPOLOGY}")
         return any(self._detects(listener.node_name, listener.node_namespace) for listener in listeners)
 
     def _detects(self, name: str, namespace: str) -> bool:

@@ -7,7 +7,8 @@ from typing import Any
 
 import yaml
 
-from hpccd_ros.base.errors import UserError, sentence
+from hpccd_ros.base.errors import UserError
+from hpccd_ros.base.quoting import printable
 
 # Characters: far above any that a person writes, far below a recording named by mistake.
 MOST = 1_000_000
@@ -31,7 +32,7 @@ def read_parameters(path) -> dict[str, Any]:
         flat |= _flat("", parameters)
     for name, value in flat.items():
         if value is None:
-            raise UserError(sentence(f"--params {path}: {name} has no value"))
+            raise UserError(printable(f"--params {path}: {name} has no value"))
     return flat
 
 

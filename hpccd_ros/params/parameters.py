@@ -1,10 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The parameters of the node: descriptors, checks and the README's table, all made from table.py.
+"""The parameters of a node: declared with their descriptors, and watched while it runs. Made from table.py."""
 
-``python -m hpccd_ros.parameters`` prints the table.
-"""
-
-import re
 from collections.abc import Callable, Container, Iterable
 from typing import Any
 
@@ -24,7 +20,8 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from hpccd_ros.base import quoting
-from hpccd_ros.params.table import ALWAYS, MESH_ROWS, NEVER, NODE_ROWS, UNCONFIGURED, Row
+from hpccd_ros.params.table import MESH_ROWS, NEVER, NODE_ROWS, UNCONFIGURED, Row
+from hpccd_ros.params.values import ParameterError, allowed, check_mesh_names, normalise, unusable_value, usable
 
 _TYPES = {
     "bool": ParameterType.PARAMETER_BOOL,
@@ -34,60 +31,6 @@ _TYPES = {
     "string[]": ParameterType.PARAMETER_STRING_ARRAY,
     "float[]": ParameterType.PARAMETER_DOUBLE_ARRAY,
 }
-
-
-class ParameterError(ValueError):
-    """A parameter that the node cannot start with; the text names it and the remedy."""
-
-
-# A mesh name becomes part of topic and parameter names.
-_MESH_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
-
-
-def refusal(row: Row, value: Any) -> str | None:
-    """Why ``value`` (of the right type) cannot be used, or None."""
-    if row.span is not None and not row.span[0] <= value <= row.span[1]:
-        return f"{row.name}: {value} is outside {row.span[0]} .. {row.span[1]}"
-    if row.least and 0 < value < row.least:
-        return f"{row.name}: {value} is neither 0 nor at least {row.least:g}"
-    entries = value if row.kind == "string[]" else [value]
-    if row.choices:
-        for entry in entries:
-            if entry not in row.choices:
-                return f"{row.name}: {quoting.quoted(entry)} is none of {', '.join(row.choices)}"
-    return None
-
-
-def of_plain(given: dict[str, Any]) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
-    """What ``declare`` returns for a node with the parameters ``given``, by full name, from a file. None: not set.
-
-    Raises ParameterError: as ``declare``.
-    """
-    settings = {row.name: _checked(row, row.name, given.get(row.name)) for row in NODE_ROWS}
-    _check_names(settings["meshes"])
-    of_mesh = {mesh: f"mesh.{mesh}." for mesh in settings["meshes"]}
-    meshes = {
-        mesh: {row.name: _checked(row, prefix + row.name, given.get(prefix + row.name)) for row in MESH_ROWS}
-        for mesh, prefix in of_mesh.items()
-    }
-    return settings, meshes
-
-
-_PLAIN = {"bool": bool, "int": int, "float": float, "string": str}
-
-
-def _checked(row: Row, name: str, value: Any) -> Any:
-    if value is None:
-        return normalise(row, row.default)
-    is_list = row.kind.endswith("[]") and isinstance(value, list)
-    entries, kind = (value, row.kind[:-2]) if is_list else ([value], row.kind)
-    # Not isinstance: True is an int.
-    if not all(type(entry) is _PLAIN.get(kind) for entry in entries):
-        raise ParameterError(f"{name}: {value!r} is of the wrong type; expected {row.kind}, e.g. {row.default!r}")
-    value = normalise(row, value)
-    if reason := refusal(row, value):
-        raise ParameterError(reason.replace(row.name, name, 1))
-    return value
 
 
 def descriptor(row: Row) -> ParameterDescriptor:
@@ -113,22 +56,11 @@ def declare(node: Node) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
     """
     settings = {row.name: _declare_one(node, row, row.name) for row in NODE_ROWS}
     names = settings["meshes"]
-    _check_names(names)
+    check_mesh_names(names)
     meshes = {
         name: {row.name: _declare_one(node, row, f"mesh.{name}.{row.name}") for row in MESH_ROWS} for name in names
     }
     return settings, meshes
-
-
-def _check_names(names: list[str]) -> None:
-    for name in names:
-        if not _MESH_NAME.fullmatch(name):
-            raise ParameterError(
-                f"meshes: {quoting.quoted(name)} cannot be part of a topic name; use letters, digits and _, a "
-                "letter first"
-            )
-    if len(set(names)) != len(names):
-        raise ParameterError(f"meshes: names must differ, {quoting.repeated(names)} is there twice")
 
 
 def _declare_one(node: Node, row: Row, name: str) -> Any:
@@ -144,18 +76,8 @@ def _declare_one(node: Node, row: Row, name: str) -> Any:
             f"{name}: {quoting.shortened(error, 300)}; expected {row.kind}, e.g. {row.default!r}"
         ) from error
     except InvalidParameterValueException as error:
-        raise ParameterError(f"{name}: {quoting.shortened(error, 300)}; allowed {_allowed(row)}") from error
-    value = normalise(row, value)
-    if reason := refusal(row, value):
-        raise ParameterError(reason.replace(row.name, name, 1))
-    return value
-
-
-def normalise(row: Row, value: Any) -> Any:
-    """Plain Python value. YAML and the command line cannot write an empty list of strings: [""] is one."""
-    if row.kind == "string[]":
-        return [entry for entry in value or [] if entry]
-    return list(value) if row.kind == "float[]" else value
+        raise ParameterError(f"{name}: {quoting.shortened(error, 300)}; allowed {allowed(row)}") from error
+    return usable(row, name, value)
 
 
 def unknown_overrides(node: Node, qos_overrides: Container[str] = ()) -> list[str]:
@@ -165,16 +87,6 @@ def unknown_overrides(node: Node, qos_overrides: Container[str] = ()) -> list[st
     """
     given = getattr(node, "_parameter_overrides", {})  # rclpy has no public list of what was given
     return sorted(name for name in given if not node.has_parameter(name) and name not in qos_overrides)
-
-
-# Of every node.
-_ROS_OWN = ("use_sim_time", "start_type_description_service")
-
-
-def unknown(given: Iterable[str], meshes: Iterable[str]) -> list[str]:
-    """Those of the names ``given`` that a node of these meshes would not have."""
-    rows = {row.name for row in NODE_ROWS} | {f"mesh.{mesh}.{row.name}" for mesh in meshes for row in MESH_ROWS}
-    return sorted(n for n in given if n not in rows and n not in _ROS_OWN and not n.startswith("qos_overrides."))
 
 
 def watch(
@@ -207,7 +119,7 @@ def watch(
             if row.change == UNCONFIGURED and configured() and value != values[row.name]:
                 reason = f"{parameter.name}: read-only while the node is configured; deactivate and clean up first"
                 return SetParametersResult(successful=False, reason=reason)
-            if reason := refusal(row, value):
+            if reason := unusable_value(row, value):
                 return SetParametersResult(successful=False, reason=reason.replace(row.name, parameter.name, 1))
             values[row.name] = value
         if reason := check(wanted, wanted_meshes):
@@ -219,36 +131,3 @@ def watch(
         return SetParametersResult(successful=True)
 
     node.add_on_set_parameters_callback(on_set)
-
-
-def _allowed(row: Row) -> str:
-    if row.choices:
-        return ", ".join(f"`{choice}`" for choice in row.choices)
-    if row.least:
-        return f"0, {row.least:g} .. {row.span[1]:,}"
-    if row.span is not None:
-        return f"{row.span[0]:,} .. {row.span[1]:,}"
-    return ""
-
-
-_CHANGE = {ALWAYS: "changeable", UNCONFIGURED: "while unconfigured", NEVER: "read-only"}
-
-
-def markdown_table() -> str:
-    """The README's table of parameters."""
-    lines = [
-        "| parameter | type | default | allowed | unit | at run time | meaning |",
-        "|---|---|---|---|---|---|---|",
-    ]
-    named = [(row.name, row) for row in NODE_ROWS] + [(f"mesh.NAME.{row.name}", row) for row in MESH_ROWS]
-    for name, row in named:
-        default = f"`{str(row.default).lower()}`" if row.kind == "bool" else f"`{row.default!r}`".replace("'", '"')
-        lines.append(
-            f"| `{name}` | {row.kind} | {default} | {_allowed(row)} | {row.unit} | "
-            f"{_CHANGE[row.change]} | {row.text} |"
-        )
-    return "\n".join(lines)
-
-
-if __name__ == "__main__":
-    print(markdown_table())

@@ -3,32 +3,32 @@
 
 from typing import Any
 
+from hpccd_core.options import ACCURACIES, OUTPUTS
 from hpccd_ros.base.quoting import listed, quoted, shortened
 from hpccd_ros.detect.core import Options
 from hpccd_ros.detect.scene import SceneBuilder
 from hpccd_ros.frames.pipeline import FramePipeline
 from hpccd_ros.frames.rigid import Rigid
 from hpccd_ros.frames.types import MeshSettings
-from hpccd_ros.params.parameters import ParameterError
-from hpccd_ros.params.table import ACCURACIES, OUTPUTS
+from hpccd_ros.params.values import ParameterError
 
-MeshRows = dict[str, dict[str, Any]]
+MeshValues = dict[str, dict[str, Any]]
 
 
-def scene_builder(settings: dict[str, Any], meshes: MeshRows) -> SceneBuilder:
+def scene_builder(settings: dict[str, Any], meshes: MeshValues) -> SceneBuilder:
     """The scene without its topologies. Raises ParameterError: an unknown mesh or tier in a pair."""
     return SceneBuilder(mesh_settings(meshes), ignored_pairs(settings), pair_accuracies(settings))
 
 
-def mesh_settings(meshes: MeshRows) -> tuple[MeshSettings, ...]:
+def mesh_settings(meshes: MeshValues) -> tuple[MeshSettings, ...]:
     """In the order of parameter ``meshes``."""
     return tuple(
-        MeshSettings(name, row["static"], row["self_collision"], row["transform"], row["frame"], tuple(row["pose"]))
-        for name, row in meshes.items()
+        MeshSettings(name, of["static"], of["self_collision"], of["transform"], of["frame"], tuple(of["pose"]))
+        for name, of in meshes.items()
     )
 
 
-def frame_pipeline(settings: dict[str, Any], meshes: MeshRows, max_pending: int) -> FramePipeline:
+def frame_pipeline(settings: dict[str, Any], meshes: MeshValues, max_pending: int) -> FramePipeline:
     """The way from messages of the meshes to frames of the scene. Raises ValueError: nothing in the scene moves."""
     nearest = settings["stamp_match"] == "nearest"
     return FramePipeline(
@@ -84,32 +84,32 @@ def pair_accuracies(settings: dict[str, Any]) -> tuple[tuple[str, str, str], ...
     return tuple(found.values())
 
 
-def poses(meshes: MeshRows) -> dict[str, Rigid]:
+def poses(meshes: MeshValues) -> dict[str, Rigid]:
     """``mesh.NAME.pose`` of each mesh. Raises ParameterError."""
     found = {}
-    for name, row in meshes.items():
+    for name, values in meshes.items():
         try:
-            found[name] = Rigid.of(row["pose"][:3], row["pose"][3:])
+            found[name] = Rigid.of(values["pose"][:3], values["pose"][3:])
         except ValueError as error:
-            raise ParameterError(f"mesh.{name}.pose: {shortened(row['pose'])} {error}") from error
+            raise ParameterError(f"mesh.{name}.pose: {shortened(values['pose'])} {error}") from error
     return found
 
 
-def check(settings: dict[str, Any], meshes: MeshRows) -> None:
-    """What rows cannot tell one by one. Raises ParameterError."""
+def check(settings: dict[str, Any], meshes: MeshValues) -> None:
+    """What the values cannot tell one by one. Raises ParameterError."""
     scene_builder(settings, meshes)
     poses(meshes)
-    for name, row in meshes.items():
-        if row["transform"] == "tf" and not settings["frame_id"]:
+    for name, values in meshes.items():
+        if values["transform"] == "tf" and not settings["frame_id"]:
             raise ParameterError(f"mesh.{name}.transform: tf needs a frame to transform to; set parameter frame_id")
-        if row["transform"] == "tf" and row["static"] and row["file"]:
+        if values["transform"] == "tf" and values["static"] and values["file"]:
             raise ParameterError(
                 f"mesh.{name}.transform: the positions of a static mesh from a file have no stamp to look a transform "
                 f"up for; give mesh.{name}.pose"
             )
-        if row["transform"] == "none" and row["frame"] not in ("", settings["frame_id"]):
+        if values["transform"] == "none" and values["frame"] not in ("", settings["frame_id"]):
             raise ParameterError(
-                f"mesh.{name}.frame: {quoted(row['frame'])} is not the scene's frame "
+                f"mesh.{name}.frame: {quoted(values['frame'])} is not the scene's frame "
                 f"{quoted(settings['frame_id'])}; set "
                 f"mesh.{name}.transform to pose or tf, or the parameter frame_id"
             )

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The table of the node's parameters. Logic is in parameters.py; the README's table is made from this one."""
+"""The table of the node's parameters: of it are made checks, declarations and docs/parameters.md."""
 
 from dataclasses import dataclass
 from typing import Any
+
+from hpccd_core.options import ACCURACIES, BACKENDS, OUTPUTS, REPORTS
 
 # When a parameter may be changed.
 ALWAYS, UNCONFIGURED, NEVER = "always", "unconfigured", "never"
@@ -28,18 +30,13 @@ class Row:
     change: str = UNCONFIGURED
 
 
-ACCURACIES = ("fast", "balanced", "conservative", "exact")
-BACKENDS = ("auto", "cpu", "hybrid", "gpu")
-REPORTS = ("all", "first", "any")
-OUTPUTS = ("points", "normals")
-
 # Of the files of a split recording: smaller ones would hold a message each, and beginning a file takes longer (a few
 # milliseconds) than messages may wait.
 LEAST_SPLIT_SIZE = 0.01  # MB
 LEAST_SPLIT_TIME = 0.1  # s
 MOST_SPLIT = 1e9  # MB, s
 
-NODE_ROWS = (
+SCENE_ROWS = (
     Row(
         "meshes",
         "string[]",
@@ -67,6 +64,9 @@ NODE_ROWS = (
         "Configure and activate at once; false: wait for the life-cycle services",
         change=NEVER,
     ),
+)
+
+DETECTION_ROWS = (
     Row("accuracy", "string", "exact", "Tier of the elementary tests", choices=ACCURACIES, change=ALWAYS),
     Row("backend", "string", "auto", "Where the core runs", choices=BACKENDS, change=ALWAYS),
     Row("threads", "int", 0, "Threads of the core; 0: all cores", span=(0, 1024), change=ALWAYS),
@@ -87,6 +87,9 @@ NODE_ROWS = (
         span=(0, 100_000_000),
         change=ALWAYS,
     ),
+)
+
+INPUT_ROWS = (
     Row(
         "frame_id",
         "string",
@@ -158,7 +161,6 @@ NODE_ROWS = (
         unit="Hz",
         span=(0.0, 1e6),
     ),
-    Row("max_meshes", "int", 1000, "Most meshes in a request of ~/detect", span=(1, 1_000_000)),
     Row(
         "count_unknown_meshes",
         "bool",
@@ -166,6 +168,10 @@ NODE_ROWS = (
         "Subscribe (raw) to vertex topics of meshes that are not in `meshes`, to "
         "count their frames; false: only name the topics in the diagnostics",
     ),
+)
+
+SERVICE_ROWS = (
+    Row("max_meshes", "int", 1000, "Most meshes in a request of ~/detect", span=(1, 1_000_000)),
     Row("detect_jobs", "int", 2, "Requests of ~/detect that are computed at the same time", span=(1, 256)),
     Row(
         "detect_waiting",
@@ -183,6 +189,9 @@ NODE_ROWS = (
         span=(0.001, 86_400.0),
         change=ALWAYS,
     ),
+)
+
+OUTPUT_ROWS = (
     Row("diagnostics_period", "float", 1.0, "Period of /diagnostics", unit="s", span=(0.05, 3600.0)),
     Row(
         "markers",
@@ -217,6 +226,9 @@ NODE_ROWS = (
         span=(1e-9, 1e9),
         change=ALWAYS,
     ),
+)
+
+RECORDING_ROWS = (
     Row(
         "record",
         "string",
@@ -263,6 +275,17 @@ NODE_ROWS = (
         change=ALWAYS,
     ),
 )
+
+# Under the headings that the documentation gives them.
+NODE_GROUPS = {
+    "Scene and start": SCENE_ROWS,
+    "Detection": DETECTION_ROWS,
+    "Input": INPUT_ROWS,
+    "Service `~/detect`": SERVICE_ROWS,
+    "Diagnostics and markers": OUTPUT_ROWS,
+    "Recording": RECORDING_ROWS,
+}
+NODE_ROWS = tuple(row for rows in NODE_GROUPS.values() for row in rows)
 
 MESH_ROWS = (
     Row(

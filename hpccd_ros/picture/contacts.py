@@ -26,8 +26,8 @@ LIGHT = np.array([0.35, -0.55, 1.25])
 
 
 @dataclasses.dataclass
-class Step:
-    """What is drawn. Vertices and faces of each mesh in the middle of the step; contacts at their points (N,3).
+class Picture:
+    """What is drawn of a step: vertices and faces of each mesh in its middle; contacts at their points (N,3).
 
     touched: (V,) earliest time of contact of each vertex, all meshes one after the other; inf where it has none.
     """
@@ -36,7 +36,6 @@ class Step:
     touched: np.ndarray
     points: np.ndarray
     toc: np.ndarray
-    n_vertex_face: int
     title: str
     facts: list[str]
     scene: str = ""  # name, at the right of the title
@@ -52,29 +51,34 @@ class History:
     marked: int
 
 
-def draw(step: Step, path, history: History | None = None, *, azimuth=-60.0, elevation=26.0, size=(1280, 860)):
-    """Write the picture of `step` to `path` (PNG, or another format that matplotlib writes, by its suffix)."""
-    step = _of_drawable_size(step)
-    image, camera, depth = render(step.meshes, step.touched, size, azimuth, elevation)
+def draw(picture: Picture, path, history: History | None = None, **view) -> None:
+    """Write the picture to `path` (PNG, or what else matplotlib writes, by its suffix); view: as compose() takes it."""
+    compose(picture, history, **view).savefig(Path(path), facecolor=BACKGROUND)
+
+
+def compose(picture: Picture, history: History | None = None, *, azimuth=-60.0, elevation=26.0, size=(1280, 860)):
+    """The picture as a matplotlib figure; size: of its scene, pixels."""
+    picture = _of_drawable_size(picture)
+    image, camera, depth = render(picture.meshes, picture.touched, size, azimuth, elevation)
     figure = Figure(figsize=(16, 9), dpi=120, facecolor=BACKGROUND)
     FigureCanvasAgg(figure)
     axes = figure.add_axes((0.0, 0.13, 0.80, 0.77))
-    _draw_scene(axes, image, camera, depth, step)
-    _write_title(figure, step)
-    _draw_times(figure.add_axes((0.845, 0.30, 0.10, 0.52)), step)
+    _draw_scene(axes, image, camera, depth, picture)
+    _write_title(figure, picture)
+    _draw_times(figure.add_axes((0.845, 0.30, 0.10, 0.52)), picture)
     if history is not None:
         _draw_history(figure.add_axes((0.045, 0.055, 0.90, 0.085)), history)
-    figure.savefig(Path(path), facecolor=BACKGROUND)
+    return figure
 
 
-def _of_drawable_size(step: Step) -> Step:
+def _of_drawable_size(picture: Picture) -> Picture:
     """The same in another unit of length where single precision, in which the light is computed, would not hold it."""
-    largest = max(float(np.abs(vertices).max(initial=0.0)) for _, vertices, _ in step.meshes)
+    largest = max(float(np.abs(vertices).max(initial=0.0)) for _, vertices, _ in picture.meshes)
     if largest == 0.0 or 1e-6 < largest < 1e6:
-        return step
+        return picture
     exponent = -int(np.frexp(largest)[1])  # of two: no digit changes
-    meshes = [(name, np.ldexp(np.asarray(v, np.float64), exponent), faces) for name, v, faces in step.meshes]
-    return dataclasses.replace(step, meshes=meshes, points=np.ldexp(step.points, exponent))
+    meshes = [(name, np.ldexp(np.asarray(v, np.float64), exponent), faces) for name, v, faces in picture.meshes]
+    return dataclasses.replace(picture, meshes=meshes, points=np.ldexp(picture.points, exponent))
 
 
 def render(meshes, touched, size, azimuth, elevation):
@@ -123,39 +127,38 @@ def _glow(touched, faces):
     return values[:, :3], values[:, 3]
 
 
-def _draw_scene(axes, image, camera, depth, step):
+def _draw_scene(axes, image, camera, depth, picture):
     axes.imshow(image, extent=(0, image.shape[1], image.shape[0], 0), interpolation="lanczos")
     axes.set_axis_off()
-    if not len(step.points):
+    if not len(picture.points):
         return
-    seen = camera.project(step.points)
+    seen = camera.project(picture.points)
     column = np.clip(seen[:, 0].astype(int), 0, depth.shape[1] - 1)
     row = np.clip(seen[:, 1].astype(int), 0, depth.shape[0] - 1)
     span = np.ptp(depth[np.isfinite(depth)])
     hidden = seen[:, 2] > depth[row, column] + 0.01 * span
     x, y = seen[:, 0] / SUPERSAMPLING, seen[:, 1] / SUPERSAMPLING
     size = float(np.clip(7000 / len(x), 2.5, 40.0))
-    late_first = np.argsort(-step.toc, kind="stable")
+    late_first = np.argsort(-picture.toc, kind="stable")
     for index, alpha, scale in (
         (late_first[hidden[late_first]], 0.45, 0.5),
         (late_first[~hidden[late_first]], 1.0, 1.0),
     ):
-        colours = TOC_COLOURS(step.toc[index])
+        colours = TOC_COLOURS(picture.toc[index])
         if scale == 1.0:
             axes.scatter(x[index], y[index], s=size * 6, c=colours, alpha=0.12, linewidths=0)
         axes.scatter(x[index], y[index], s=size * scale, c=colours, alpha=alpha, linewidths=0)
 
 
-def _write_title(figure, step):
-    figure.text(0.03, 0.945, step.title, color=INK, fontsize=21, fontweight="bold", va="center")
-    figure.text(0.97, 0.945, step.scene, color=INK, fontsize=14, va="center", ha="right")
-    figure.text(0.03, 0.905, "   ·   ".join(step.facts), color=FAINT, fontsize=11.5, va="center")
+def _write_title(figure, picture):
+    figure.text(0.03, 0.945, picture.title, color=INK, fontsize=21, fontweight="bold", va="center")
+    figure.text(0.97, 0.945, picture.scene, color=INK, fontsize=14, va="center", ha="right")
+    figure.text(0.03, 0.905, "   ·   ".join(picture.facts), color=FAINT, fontsize=11.5, va="center")
 
 
-def _draw_times(axes, step):
+def _draw_times(axes, picture):
     edges = np.linspace(0, 1, 41)
-    vf, ee = step.toc[: step.n_vertex_face], step.toc[step.n_vertex_face :]
-    counts = np.histogram(np.concatenate([vf, ee]), edges)[0]
+    counts = np.histogram(picture.toc, edges)[0]
     middle = (edges[1:] + edges[:-1]) / 2
     axes.barh(middle, counts, height=0.9 / 40, color=TOC_COLOURS(middle))
     axes.set_ylim(0, 1)

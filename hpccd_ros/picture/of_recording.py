@@ -31,12 +31,11 @@ def draw_step(step: ReplayedStep, path, history: History | None = None, *, title
         f"{triangles:,} triangles", f"{len(found.vf):,} vertex-face", f"{len(found.ee):,} edge-edge", first,
         f"{step.milliseconds:.1f} ms", accuracy, f"hash {found.hash:016x}",
     ]  # fmt: skip
-    drawn = picture.Step(
+    drawn = picture.Picture(
         meshes,
         touched(found, scene_faces(meshes, offsets), offsets[-1]),
         np.asarray(found.points),
         np.concatenate([found.vf_toc, found.ee_toc]),
-        len(found.vf),
         f"{step.total:,} contact{'' if step.total == 1 else 's'} in step {step.step}" + of,
         [fact for fact in facts if fact],
         title,

@@ -3,14 +3,10 @@
 
 import dataclasses
 
-from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 
-from hpccd_ros.middleware import qos, qos_overrides, transform_topics
-
-TOPOLOGY = "hpccd/msg/MeshTopology"
-VERTICES = "hpccd/msg/MeshVertices"
-POINTS = "sensor_msgs/msg/PointCloud2"
-CONTACTS = "hpccd/msg/ContactArray"
+from hpccd_ros.middleware import qos, qos_overrides, topic_names, transform_topics
+from hpccd_ros.middleware.message_types import CONTACTS, POINTS, TOPOLOGY, VERTICES
 
 
 @dataclasses.dataclass(frozen=True)
@@ -34,18 +30,21 @@ def of_node(parameters: dict) -> list[Wanted]:
         wanted += [Wanted(t.name, t.type_name, static * t.static) for t in transform_topics.understood()]
     for mesh in meshes:
         clouds = parameters.get(f"mesh.{mesh}.input") == "points"
-        wanted.append(Wanted(f"meshes/{mesh}/topology", TOPOLOGY, latched=1))
-        wanted.append(Wanted(f"meshes/{mesh}/{'points' if clouds else 'vertices'}", POINTS if clouds else VERTICES))
-    return [*wanted, Wanted("contacts", CONTACTS)]
+        wanted.append(Wanted(topic_names.topology(mesh), TOPOLOGY, latched=1))
+        if clouds:
+            wanted.append(Wanted(topic_names.points(mesh), POINTS))
+        else:
+            wanted.append(Wanted(topic_names.vertices(mesh), VERTICES))
+    return [*wanted, Wanted(topic_names.CONTACTS, CONTACTS)]
 
 
 def types_by_role(meshes) -> dict[str, str]:
     """Relative name -> type of all topics from which a node of these meshes can be computed again."""
-    of_mesh = {"topology": TOPOLOGY, "vertices": VERTICES, "points": POINTS}
+    of_mesh = {topic_names.TOPOLOGY: TOPOLOGY, topic_names.VERTICES: VERTICES, topic_names.POINTS: POINTS}
     return {
-        **{f"meshes/{mesh}/{kind}": type_name for mesh in meshes for kind, type_name in of_mesh.items()},
+        **{topic_names.of_mesh(mesh, kind): type_name for mesh in meshes for kind, type_name in of_mesh.items()},
         **{topic.name: topic.type_name for topic in transform_topics.ALL.values()},
-        "contacts": CONTACTS,
+        topic_names.CONTACTS: CONTACTS,
     }
 
 
@@ -57,8 +56,7 @@ def subscription_qos(node, name: str, topic: Wanted, depth: int) -> QoSProfile:
     """
     offers = [p.qos_profile.reliability for p in node.get_publishers_info_by_topic(name)]
     asked = [s.qos_profile.reliability for s in node.get_subscriptions_info_by_topic(name)]
-    best_effort = ReliabilityPolicy.BEST_EFFORT in (offers or asked)
-    return _profile(ReliabilityPolicy.BEST_EFFORT if best_effort else ReliabilityPolicy.RELIABLE, topic.latched, depth)
+    return _profile(ReliabilityPolicy.BEST_EFFORT not in (offers or asked), topic, depth)
 
 
 def as_node_asks(node, name: str, topic: Wanted, depth: int, *, recorded, vertices: ReliabilityPolicy) -> QoSProfile:
@@ -67,13 +65,9 @@ def as_node_asks(node, name: str, topic: Wanted, depth: int, *, recorded, vertic
     """
     default = vertices if topic.type_name in (VERTICES, POINTS) else ReliabilityPolicy.RELIABLE
     entity = "publisher" if topic.type_name == CONTACTS else "subscription"
-    return _profile(qos_overrides.reliability(recorded, entity, name, default), topic.latched, depth)
+    asked = qos_overrides.reliability(recorded, entity, name, default)
+    return _profile(asked == ReliabilityPolicy.RELIABLE, topic, depth)
 
 
-def _profile(reliability, latched, depth) -> QoSProfile:
-    return QoSProfile(
-        history=HistoryPolicy.KEEP_LAST,
-        depth=max(depth, latched),
-        reliability=reliability,
-        durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
-    )
+def _profile(reliable: bool, topic: Wanted, depth: int) -> QoSProfile:
+    return qos.keep_last(max(depth, topic.latched), reliable=reliable, latched=topic.latched > 0)

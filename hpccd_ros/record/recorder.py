@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """`hpccd record`: record the topics of a running node into MCAP until told to stop."""
 
-import signal
 import sys
 import time
 from datetime import datetime
@@ -12,7 +11,7 @@ from rclpy.executors import SingleThreadedExecutor
 
 from hpccd_ros.bag.writer import BagWriter
 from hpccd_ros.base.errors import UserError
-from hpccd_ros.middleware import environment, ros_start
+from hpccd_ros.middleware import environment, ros_start, stop_signals, topic_names
 from hpccd_ros.middleware.message_types import message_class
 from hpccd_ros.params import node_parameters
 from hpccd_ros.record import recorded_topics
@@ -25,7 +24,11 @@ from hpccd_ros.record.topic_recorder import Recorder
 def main(args) -> int:
     """Record as the options of `hpccd record` say; returns the exit status."""
     target = Path(args.output or datetime.now().strftime("hpccd-%Y%m%d-%H%M%S.mcap"))
-    stop = _stop_on_signals()
+    with stop_signals.collected() as stop:
+        return _record_until(stop, target, args)
+
+
+def _record_until(stop, target, args) -> int:
     environment.prepare()
     ros_start.init(["--ros-args", *args.ros_args] if args.ros_args else None)
     namespace, _, name = args.node.rpartition("/")
@@ -57,7 +60,7 @@ def _record(node, target, args, stop) -> int:
         raise UserError(str(error)) from error
     try:
         recorder = Recorder(node, bag, wanted, args.depth)
-        contacts = node.resolve_topic_name("contacts")
+        contacts = node.resolve_topic_name(topic_names.CONTACTS)
         _spin(node, recorder, bag, contacts, args, stop)
     finally:
         bag.close()
@@ -135,11 +138,3 @@ def _extra(text) -> Wanted:
     except LookupError as error:
         raise UserError(f"--topic {text}: {error}") from error
     return Wanted(name, type_name)
-
-
-def _stop_on_signals() -> list:
-    """An empty list that SIGINT and SIGTERM fill: the loop ends between two messages, never within one."""
-    stop = []
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda received, frame: stop.append(received))
-    return stop

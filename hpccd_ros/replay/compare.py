@@ -3,9 +3,9 @@
 
 import numpy as np
 
+from hpccd_core.options import ACCURACIES
 from hpccd_ros.detect.layout import Layout
 from hpccd_ros.middleware import contact_messages
-from hpccd_ros.params.table import ACCURACIES
 
 
 def difference(recorded, contacts, layout: Layout, any_one: bool = False) -> str | None:

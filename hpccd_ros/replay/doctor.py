@@ -4,9 +4,11 @@
 from datetime import UTC, datetime
 from pathlib import Path
 
+from hpccd_ros.bag.examine import Examination, examine
 from hpccd_ros.bag.reader import RecordingError, recording_files
-from hpccd_ros.bag.recover import Examination, examine, recover
-from hpccd_ros.base.errors import UserError, sentence
+from hpccd_ros.bag.recover import recover
+from hpccd_ros.base.errors import UserError
+from hpccd_ros.base.quoting import printable
 
 
 def main(args) -> int:
@@ -46,15 +48,15 @@ def _recover(source, args) -> int:
 
 def _tell(found: Examination) -> None:
     print(f"{found.path}: {_verdict(found)}")
-    print(f"  {found.size:,} bytes, written by {sentence(found.library) or '?'}, "
-          f"profile {sentence(found.profile) or '?'}, {found.chunks} chunks, compression {found.compression}")
+    print(f"  {found.size:,} bytes, written by {printable(found.library) or '?'}, "
+          f"profile {printable(found.profile) or '?'}, {found.chunks} chunks, compression {found.compression}")
     if found.message_count:
         begin = datetime.fromtimestamp(found.start * 1e-9, UTC).strftime("%Y-%m-%d %H:%M:%S")
         print(f"  {found.message_count} messages in {_seconds(found):.3f} s from {begin} UTC")
     for topic, count in found.counts.items():
-        print(f"    {count:7} {sentence(topic)}  {sentence(found.types.get(topic, '(type unknown)'))}")
+        print(f"    {count:7} {printable(topic)}  {printable(found.types.get(topic, '(type unknown)'))}")
     if found.problem:
-        print(f"  readable up to byte {found.readable:,}; the first problem: {sentence(found.problem)}")
+        print(f"  readable up to byte {found.readable:,}; the first problem: {printable(found.problem)}")
     if found.damaged_chunks:
         print(f"  {found.damaged_chunks} damaged chunks skipped"
               + (f", and {found.orphans} messages that only they described" if found.orphans else ""))

@@ -5,18 +5,17 @@ Only where a message has got a field since it was recorded, an empty one is adde
 """
 
 import itertools
-import signal
 from collections import deque
 
 import rclpy
 import yaml
 from rclpy.exceptions import NameValidationException
-from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, QoSProfile
 
 from hpccd_ros.bag.decode import completion
 from hpccd_ros.bag.reader import RecordedTopic, Recording, RecordingError
 from hpccd_ros.base.errors import UserError
-from hpccd_ros.middleware import environment, qos, ros_start, transform_topics
+from hpccd_ros.middleware import environment, qos, ros_start, stop_signals, transform_topics
 from hpccd_ros.middleware.listeners import await_acknowledged, await_subscribers
 from hpccd_ros.middleware.message_types import message_class
 from hpccd_ros.replay import recorded_setup
@@ -32,10 +31,7 @@ LAST = 2.0
 
 def main(args) -> int:
     """Play as the options of `hpccd replay --publish` say."""
-    stop = []
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda received, frame: stop.append(received))
-    with Recording(args.file) as recording:
+    with stop_signals.collected() as stop, Recording(args.file) as recording:
         topics = _topics(recording, args)
         environment.prepare()
         ros_start.init(["--ros-args", *args.ros_args] if args.ros_args else None)
@@ -51,7 +47,7 @@ def main(args) -> int:
         finally:
             node.destroy_node()
             rclpy.try_shutdown()
-    print(f"published {count} messages on {len(topics)} topics{' until told to stop' if stop else ''}", flush=True)
+        print(f"published {count} messages on {len(topics)} topics{' until told to stop' if stop else ''}", flush=True)
     return 0
 
 
@@ -76,12 +72,7 @@ def _qos(topic) -> QoSProfile:
     # rosbag2 before version 9 wrote the numbers of the enumeration: 1 reliable, 2 best effort; 1 transient local.
     best_effort = offers and all(offer.get("reliability") in ("best_effort", 2) for offer in offers)
     latched = offers and all(offer.get("durability") in ("transient_local", 1) for offer in offers)
-    return QoSProfile(
-        history=HistoryPolicy.KEEP_LAST,
-        depth=_in_force(topic) if latched else DEPTH,
-        reliability=ReliabilityPolicy.BEST_EFFORT if best_effort else ReliabilityPolicy.RELIABLE,
-        durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
-    )
+    return qos.keep_last(_in_force(topic) if latched else DEPTH, reliable=not best_effort, latched=bool(latched))
 
 
 def _offers(topic) -> list[dict]:

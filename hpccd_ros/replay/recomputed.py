@@ -4,6 +4,7 @@
 import dataclasses
 from collections.abc import Iterator
 
+from hpccd_core.options import ACCURACIES
 from hpccd_ros.bag.decode import make_decoder
 from hpccd_ros.bag.reader import Recording, RecordingError
 from hpccd_ros.detect.core import CORE_ERRORS
@@ -12,7 +13,6 @@ from hpccd_ros.detect.step_detector import StepDetector
 from hpccd_ros.frames.types import SceneFrame
 from hpccd_ros.middleware import fields
 from hpccd_ros.middleware.fields import InvalidMessageError
-from hpccd_ros.params.table import ACCURACIES
 from hpccd_ros.replay.compare import difference
 from hpccd_ros.replay.frames import FrameSource, FrameWindow
 from hpccd_ros.replay.recorded_setup import ReplaySetup

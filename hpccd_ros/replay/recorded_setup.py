@@ -6,16 +6,16 @@ import tempfile
 from pathlib import Path, PurePosixPath
 
 from hpccd_ros.bag.reader import Recording, RecordingError
-from hpccd_ros.base.errors import UserError, sentence
+from hpccd_ros.base.errors import UserError
+from hpccd_ros.base.quoting import printable
 from hpccd_ros.detect.core import Options
 from hpccd_ros.detect.scene import SceneBuilder
 from hpccd_ros.frames.mesh_file import FORMATS, MeshFileError, load_mesh, mesh_of_file
 from hpccd_ros.frames.types import MeshFrame, Topology
-from hpccd_ros.middleware import transform_topics
-from hpccd_ros.params import parameters as table
-from hpccd_ros.params import scene_parameters
+from hpccd_ros.middleware import topic_names, transform_topics
+from hpccd_ros.params import scene_parameters, values
 from hpccd_ros.params.parameter_file import read_parameters
-from hpccd_ros.params.parameters import ParameterError
+from hpccd_ros.params.values import ParameterError
 from hpccd_ros.record import recorded_topics
 from hpccd_ros.record.mesh_attachment import attachment_name
 
@@ -55,17 +55,17 @@ def of_recording(recording: Recording, parameter_file: str | None = None) -> Rep
         else:
             where, refused = f"{recording.path}: the stored parameters", RecordingError
             given = _stored(recording, info)
-        settings, meshes = table.of_plain(given)
+        settings, meshes = values.checked(given)
         if not settings["meshes"]:
             raise ParameterError("parameter `meshes` names no mesh")
         if all(row["static"] for row in meshes.values()):
             raise ParameterError("at least one mesh must not be static, or nothing ever moves")
         scene_parameters.check(settings, meshes)
     except ParameterError as error:
-        raise refused(sentence(f"{where}: {error}")) from error
+        raise refused(printable(f"{where}: {error}")) from error
     by_role = _by_role(recording, info, recorded_topics.types_by_role(meshes))
     roles = {topic: ("", role) if role in transform_topics.ALL else tuple(role.split("/")[1:])
-             for role, topic in by_role.items() if role != "contacts"}  # fmt: skip
+             for role, topic in by_role.items() if role != topic_names.CONTACTS}  # fmt: skip
     if not any(kind in ("vertices", "points") for _, kind in roles.values()):
         raise RecordingError(
             f"{recording.path} holds no vertices of the meshes {', '.join(meshes)}; its topics are "
@@ -77,8 +77,8 @@ def of_recording(recording: Recording, parameter_file: str | None = None) -> Rep
             f"{recording.path}: mesh {moved[0]} was transformed by tf (parameter mesh.{moved[0]}.transform), and the "
             "recording holds no transforms: its positions cannot be computed again"
         )
-    return ReplaySetup(settings, meshes, roles, by_role.get("contacts"), _files(recording, meshes),
-                       table.unknown(given, meshes))  # fmt: skip
+    return ReplaySetup(settings, meshes, roles, by_role.get(topic_names.CONTACTS), _files(recording, meshes),
+                       values.unknown(given, meshes))  # fmt: skip
 
 
 def _stored(recording, info) -> dict:
@@ -112,8 +112,9 @@ def _by_role(recording, info, types) -> dict[str, str]:
         if role in found:
             raise RecordingError(f"{recording.path}: topics {found[role]} and {topic} are both stored as {role}")
         found[role] = topic
-    if "contacts" not in found and types["contacts"] == getattr(recording.topics.get("/contacts"), "type_name", None):
-        found["contacts"] = "/contacts"
+    contacts, outside = topic_names.CONTACTS, f"/{topic_names.CONTACTS}"
+    if contacts not in found and types[contacts] == getattr(recording.topics.get(outside), "type_name", None):
+        found[contacts] = outside
     return found
 
 

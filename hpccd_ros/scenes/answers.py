@@ -11,6 +11,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
+from hpccd_ros.middleware import topic_names
 from hpccd_ros.middleware.fields import stamp_to_ns
 
 
@@ -20,7 +21,9 @@ class Answers:
 
     def __init__(self, node: Node):
         # Late ones of other frames may lie before the one that is waited for.
-        self._subscription = node.create_subscription(ContactArray, "contacts", self._take, QoSProfile(depth=100))
+        self._subscription = node.create_subscription(
+            ContactArray, topic_names.CONTACTS, self._take, QoSProfile(depth=100)
+        )
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(node)
         self._stamp = -1

@@ -11,6 +11,7 @@ import yaml
 from hpccd_ros.bag.qos_yaml import INFINITE
 from hpccd_ros.bag.writer import BagWriter, Topic
 from hpccd_ros.base.version import package_version
+from hpccd_ros.middleware import message_types, topic_names
 
 from . import messages
 from .progress import track
@@ -38,8 +39,8 @@ def write_mcap(
     topics = []
     for mesh in scene.meshes:
         for relative, kind, latched in (
-            (messages.topology_topic(mesh.name), messages.TOPOLOGY_TYPE, True),
-            (messages.vertices_topic(mesh.name), messages.VERTICES_TYPE, False),
+            (topic_names.topology(mesh.name), message_types.TOPOLOGY, True),
+            (topic_names.vertices(mesh.name), message_types.VERTICES, False),
         ):
             topics.append(Topic("/" + relative, kind, [_offered(latched)], latched))
             info["topics"]["/" + relative] = relative

@@ -6,21 +6,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from hpccd_ros.middleware import topic_names
+
 from . import cdr
 from .scene import Frame, Scene
-
-TOPOLOGY_TYPE = "hpccd/msg/MeshTopology"
-VERTICES_TYPE = "hpccd/msg/MeshVertices"
-
-
-def topology_topic(mesh: str) -> str:
-    """Relative name of the topic with a mesh's faces."""
-    return f"meshes/{mesh}/topology"
-
-
-def vertices_topic(mesh: str) -> str:
-    """Relative name of the topic with a mesh's vertices."""
-    return f"meshes/{mesh}/vertices"
 
 
 @dataclass(frozen=True)
@@ -60,11 +49,11 @@ class Player:
                 continue
             self._version[mesh.name] = self._base[mesh.name] + version
             data = cdr.topology(stamp_ns, self._frame_id, self._version[mesh.name], faces, n_vertices)
-            yield Message(topology_topic(mesh.name), stamp_ns, data)
+            yield Message(topic_names.topology(mesh.name), stamp_ns, data)
         meshes = zip(self._scene.meshes, frame, strict=True)
         for mesh, xyz in sorted(meshes, key=lambda pair: not pair[0].static):
             data = cdr.vertices(stamp_ns, self._frame_id, self._version[mesh.name], self._step, xyz)
-            yield Message(vertices_topic(mesh.name), stamp_ns, data)
+            yield Message(topic_names.vertices(mesh.name), stamp_ns, data)
         self._step += 1
 
 

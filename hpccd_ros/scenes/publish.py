@@ -4,35 +4,30 @@
 from __future__ import annotations
 
 import itertools
-import signal
 import sys
 import time
 
 import rclpy
 from hpccd.msg import MeshTopology, MeshVertices
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 
-from hpccd_ros.middleware import environment
+from hpccd_ros.middleware import environment, qos, stop_signals, topic_names
 from hpccd_ros.middleware.listeners import await_acknowledged, await_subscribers
 
 from .answers import Answers
-from .messages import Player, topology_topic, vertices_topic
+from .messages import Player
 from .progress import track
 from .scene import Scene
 
-LATCHED = QoSProfile(
-    depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
-)
 # Seconds between the static meshes and the first frame.
 SETTLE = 0.2
 # Seconds that the last frame may take on its way.
 LAST = 2.0
-STREAM = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.VOLATILE)
+STREAM = qos.vertices("reliable", 10)
 
 # Where each frame is awaited: a history that one message fills makes the middleware ask for its acknowledgement at
 # once, and not with its next heartbeat (3 s).
-AWAITED = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.VOLATILE)
+AWAITED = qos.vertices("reliable", 1)
 
 
 def publish(
@@ -52,46 +47,41 @@ def publish(
     answered: no frame before all have the one before and the node has answered its step, each awaited up to `wait`
     seconds: where the machine is too slow for `rate`, the scene plays slower and nothing is dropped.
     """
-    stop = []
-    previous = {
-        s: signal.signal(s, lambda number, _: stop.append(number)) for s in (signal.SIGINT, signal.SIGTERM)
-    }
-    environment.prepare()
-    rclpy.init(
-        args=["--ros-args", *ros_args] if ros_args else None, signal_handler_options=SignalHandlerOptions.NO
-    )
-    node = rclpy.create_node("hpccd_scene", start_parameter_services=False)
-    answers = Answers(node) if answered else None
-    try:
-        publishers = {}
-        for mesh in scene.mesh_names:
-            name = topology_topic(mesh)
-            publishers[name] = node.create_publisher(MeshTopology, name, LATCHED)
-            name = vertices_topic(mesh)
-            publishers[name] = node.create_publisher(MeshVertices, name, AWAITED if answered else STREAM)
-        listened = {vertices_topic(mesh): publishers[vertices_topic(mesh)] for mesh in scene.mesh_names}
-        if await_subscribers(listened, subscribers, wait, stop) and not stop:
-            text = f"not every mesh has {subscribers} subscriber(s) yet: publishing all the same"
-            print(text, file=sys.stderr, flush=True)
-        if answers is not None and not answers.await_node(wait, stop) and not stop:
-            print("no node publishes contacts: publishing all the same", file=sys.stderr, flush=True)
-        count = _play(node, scene, publishers, answers, rate, loop, wait, stop, progress)
-        # What is still on its way must not be cut off by the end of this process.
-        await_acknowledged(publishers.values(), LAST)
-        return count
-    finally:
-        if answers is not None:
-            answers.close()
-        node.destroy_node()
-        rclpy.try_shutdown()
-        for number, handler in previous.items():
-            signal.signal(number, handler)
+    with stop_signals.collected() as stop:
+        environment.prepare()
+        rclpy.init(
+            args=["--ros-args", *ros_args] if ros_args else None, signal_handler_options=SignalHandlerOptions.NO
+        )
+        node = rclpy.create_node("hpccd_scene", start_parameter_services=False)
+        answers = Answers(node) if answered else None
+        try:
+            publishers = {}
+            for mesh in scene.mesh_names:
+                name = topic_names.topology(mesh)
+                publishers[name] = node.create_publisher(MeshTopology, name, qos.TOPOLOGY)
+                name = topic_names.vertices(mesh)
+                publishers[name] = node.create_publisher(MeshVertices, name, AWAITED if answered else STREAM)
+            listened = {topic_names.vertices(mesh): publishers[topic_names.vertices(mesh)] for mesh in scene.mesh_names}
+            if await_subscribers(listened, subscribers, wait, stop) and not stop:
+                text = f"not every mesh has {subscribers} subscriber(s) yet: publishing all the same"
+                print(text, file=sys.stderr, flush=True)
+            if answers is not None and not answers.await_node(wait, stop) and not stop:
+                print("no node publishes contacts: publishing all the same", file=sys.stderr, flush=True)
+            count = _play(node, scene, publishers, answers, rate, loop, wait, stop, progress)
+            # What is still on its way must not be cut off by the end of this process.
+            await_acknowledged(publishers.values(), LAST)
+            return count
+        finally:
+            if answers is not None:
+                answers.close()
+            node.destroy_node()
+            rclpy.try_shutdown()
 
 
 def _play(node, scene, publishers, answers, rate, loop, wait, stop, progress) -> int:
     player = Player(scene)
     moving = [mesh.name for mesh in scene.meshes if not mesh.static]
-    first_moving = vertices_topic(moving[0]) if len(moving) < len(scene.meshes) else None
+    first_moving = topic_names.vertices(moving[0]) if len(moving) < len(scene.meshes) else None
     begin_ns, begin = node.get_clock().now().nanoseconds, time.monotonic()
     count = 0
     for _ in itertools.count() if loop else range(1):

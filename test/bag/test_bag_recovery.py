@@ -8,8 +8,9 @@ from bag_tools import STRING, read_by_rosbags, text_message, write_texts
 from mcap.reader import make_reader
 from mcap.writer import MCAP0_MAGIC
 
+from hpccd_ros.bag.examine import examine
 from hpccd_ros.bag.reader import Recording, RecordingError
-from hpccd_ros.bag.recover import examine, recover
+from hpccd_ros.bag.recover import recover
 from hpccd_ros.bag.writer import BagWriter, Topic
 
 STEP = 1_000_000  # ns between messages

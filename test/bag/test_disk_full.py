@@ -9,7 +9,8 @@ import pytest
 import yaml
 from bag_tools import STRING, read_by_rosbags, text_message
 
-from hpccd_ros.bag.recover import examine, recover
+from hpccd_ros.bag.examine import examine
+from hpccd_ros.bag.recover import recover
 from hpccd_ros.bag.writer import BagWriter, Topic
 
 TEXT = random.Random(6).randbytes(500).hex()  # compresses by half at most

@@ -18,9 +18,10 @@ from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Chunk, ChunkIndex, Statistics
 from mcap_model import Bag, as_bytes, raw_record
 
+from hpccd_ros.bag.examine import examine
 from hpccd_ros.bag.mcap_records import MOST_RECORDS, inside
 from hpccd_ros.bag.reader import Recording, RecordingError
-from hpccd_ros.bag.recover import examine, recover
+from hpccd_ros.bag.recover import recover
 
 
 @pytest.fixture

@@ -205,6 +205,8 @@ def test_choices_are_listed(scene):
 
 def test_unusable_backend_is_refused(scene):
     unusable = {"hybrid", "gpu"} - set(hc.backends())
+    if not unusable:
+        pytest.skip("every backend can be used here")
     for backend in unusable:
         with pytest.raises(ValueError, match=f"backend.*'{backend}'.*cpu"):
             hc.Detector(scene, backend=backend)

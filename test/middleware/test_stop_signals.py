@@ -68,3 +68,15 @@ def test_a_loop_that_was_ended_before_returns_at_once(executor):
     stop = Future()
     stop.set_result(None)
     stop_signals.spin(executor, stop)
+
+
+def test_signals_within_a_block_are_collected_and_then_as_before():
+    before = [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)]
+    with pytest.raises(RuntimeError, match="of the block"):
+        with stop_signals.collected() as came:
+            assert not came
+            signal.raise_signal(signal.SIGTERM)
+            signal.raise_signal(signal.SIGINT)
+            raise RuntimeError("of the block")
+    assert came == [signal.SIGTERM, signal.SIGINT]
+    assert [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)] == before

@@ -12,8 +12,9 @@ from node_calls import change_state, set_parameter, stream
 from node_process import PATIENCE, NodeProcess
 from waving_sheet import sheet_faces, sheet_positions
 
+from hpccd_ros.bag.examine import examine
 from hpccd_ros.bag.reader import Recording
-from hpccd_ros.bag.recover import examine, recover
+from hpccd_ros.bag.recover import recover
 from hpccd_ros.bag.writer import BagWriter
 from hpccd_ros.node import node_recording
 from hpccd_ros.record import recorded_topics

@@ -13,7 +13,7 @@ from node_process import PATIENCE
 from waving_sheet import scene_of, sheet_faces, sheet_positions
 
 import hpccd_core as hc
-from hpccd_ros.bag.recover import examine
+from hpccd_ros.bag.examine import examine
 from hpccd_ros.middleware import mesh_messages
 
 # Two sheets that lie on each other and move as one: millions of contacts, most of them degenerate, on one thread.

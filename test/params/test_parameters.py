@@ -9,9 +9,9 @@ import yaml
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from hpccd_ros.params import parameters, scene_parameters
-from hpccd_ros.params.parameters import ParameterError
+from hpccd_ros.params import parameters, scene_parameters, values
 from hpccd_ros.params.table import MESH_ROWS, NEVER, NODE_ROWS
+from hpccd_ros.params.values import ParameterError
 
 CONFIG = Path(__file__).resolve().parents[2] / "config"
 
@@ -36,16 +36,16 @@ def node_with():
 
 @pytest.mark.parametrize("row", [*NODE_ROWS, *MESH_ROWS], ids=lambda row: row.name)
 def test_each_row_is_sound(row):
-    assert parameters.refusal(row, row.default) is None
+    assert values.unusable_value(row, row.default) is None
     assert row.text and not row.text.endswith(".")
     described = parameters.descriptor(row)
     assert described.read_only == (row.change == NEVER)
     if row.span is not None:
-        assert parameters.refusal(row, row.span[1] + 1) is not None
-        assert parameters.refusal(row, row.span[0] - 1) is not None
+        assert values.unusable_value(row, row.span[1] + 1) is not None
+        assert values.unusable_value(row, row.span[0] - 1) is not None
     if row.choices:
         value = ["nonsense"] if row.kind == "string[]" else "nonsense"
-        assert "nonsense" in parameters.refusal(row, value)
+        assert "nonsense" in values.unusable_value(row, value)
 
 
 def test_defaults(node_with):
@@ -174,21 +174,9 @@ def test_shipped_configurations(path, node_with):
 
 def test_default_configuration_shows_every_parameter_and_its_default():
     text = (CONFIG / "hpccd.yaml").read_text()
-    values = yaml.safe_load(text)["/**"]["ros__parameters"]
+    shown = yaml.safe_load(text)["/**"]["ros__parameters"]
     for row in NODE_ROWS:
         if row.name != "meshes":
-            assert parameters.normalise(row, values[row.name]) == row.default, row.name
+            assert values.normalise(row, shown[row.name]) == row.default, row.name
     for row in MESH_ROWS:
-        assert parameters.normalise(row, values["mesh"]["cloth"][row.name]) == row.default, row.name
-
-
-def test_table_names_every_parameter():
-    table = parameters.markdown_table()
-    for row in NODE_ROWS:
-        assert f"| `{row.name}` |" in table
-    for row in MESH_ROWS:
-        assert f"| `mesh.NAME.{row.name}` |" in table
-
-
-def test_readme_shows_the_table():
-    assert parameters.markdown_table() in (CONFIG.parent / "README.md").read_text()
+        assert values.normalise(row, shown["mesh"]["cloth"][row.name]) == row.default, row.name

@@ -71,22 +71,50 @@ def test_normals_and_blur():
     assert spread.sum() == pytest.approx(1, rel=1e-5) and spread.argmax() == image.argmax() and spread.max() < 0.1
 
 
-@pytest.mark.parametrize("count", [0, 1, 300])
-def test_contacts_are_drawn_where_they_are(tmp_path, count):
-    """The picture with contacts differs from that without, and just around the places of the contacts."""
-    points = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0.0]])
-    faces = np.array([[0, 1, 2], [0, 2, 3]])
-    generator = np.random.default_rng(9)
-    places = generator.uniform(-0.2, 0.2, size=(count, 3)) * (1, 1, 0)
-    step = contacts.Step([("plane", points, faces)], np.full(4, np.inf), places, generator.uniform(size=count), count,
-                         "title", ["fact"])
-    image, camera, depth = contacts.render(step.meshes, step.touched, (320, 200), -60, 26)
-    assert image.shape == (200, 320, 4) and np.isfinite(image).all() and 0 <= image.min() and image.max() <= 1
-    assert (image[..., 3] > 0.5).mean() > 0.2
-    contacts.draw(step, tmp_path / "picture.png", contacts.History(np.arange(5), np.arange(5), None, 3))
-    from matplotlib.image import imread
+PLANE = ("plane", np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0.0]]), np.array([[0, 1, 2], [0, 2, 3]]))
 
-    drawn = imread(tmp_path / "picture.png")[..., :3]
-    bright = np.abs(drawn - drawn.mean(axis=2, keepdims=True)).max(axis=2) > 0.25  # saturated colours: contacts
-    scene_part = bright[140:900, :1500]
-    assert scene_part.any() == (count > 0)
+
+def picture_of(places, toc):
+    """A picture of a plane with contacts at `places`, none of which tints it."""
+    return contacts.Picture([PLANE], np.full(4, np.inf), np.asarray(places, float), np.asarray(toc), "title", ["fact"])
+
+
+def test_the_surface_is_rendered_within_the_range_of_colours():
+    image, _, depth = contacts.render([PLANE], np.full(4, np.inf), (320, 200), -60, 26)
+    assert image.shape == (200, 320, 4) and 0 <= image.min() and image.max() <= 1
+    seen = image[..., 3] > 0.5
+    assert seen.mean() > 0.2 and np.isfinite(depth[::2, ::2][seen]).mean() > 0.98
+
+
+def test_contacts_are_drawn_where_they_project_to_in_the_colour_of_their_time():
+    generator = np.random.default_rng(9)
+    places, toc = generator.uniform(-0.8, 0.8, size=(300, 3)) * (1, 1, 0), generator.uniform(size=300)
+    scene, *_ = contacts.compose(picture_of(places, toc), size=(320, 200)).axes
+    camera = Camera(PLANE[1], (640, 400), -60.0, 26.0)
+    expected = camera.project(places)[:, :2] / 2
+    drawn = [(dots.get_offsets(), dots.get_facecolor()[:, :3]) for dots in scene.collections if len(dots.get_offsets())]
+    for offsets, colours in drawn:
+        nearest = np.linalg.norm(offsets[:, None] - expected, axis=2).argmin(axis=1)
+        np.testing.assert_allclose(offsets, expected[nearest], atol=1e-9)
+        np.testing.assert_allclose(colours, contacts.TOC_COLOURS(toc[nearest])[:, :3])
+    assert {tuple(o) for offsets, _ in drawn for o in np.round(offsets, 6)} == set(map(tuple, np.round(expected, 6)))
+
+
+def test_contacts_behind_the_surface_are_faint():
+    scene, *_ = contacts.compose(picture_of([[0, 0, 0.1], [0, 0, -0.4]], [0.5, 0.5]), size=(320, 200)).axes
+    faint, _, whole = (dots.get_alpha() for dots in scene.collections)
+    assert faint < 0.5 and whole == 1.0
+    (in_front,) = scene.collections[2].get_offsets()
+    (behind,) = scene.collections[0].get_offsets()
+    assert in_front[1] < behind[1], "pixels go down"
+
+
+@pytest.mark.parametrize("count", [0, 1, 300])
+def test_times_of_contact_are_counted_beside_the_scene(tmp_path, count):
+    toc = np.linspace(0, 1, count)
+    history = contacts.History(np.arange(5), np.arange(5) * 7, None, 3)
+    figure = contacts.compose(picture_of(np.zeros((count, 3)), toc), history, size=(320, 200))
+    scene, times, curve = figure.axes
+    assert sum(bar.get_width() for bar in times.patches) == count
+    assert bool(scene.collections) == (count > 0)
+    assert curve.lines[0].get_ydata().tolist() == [0, 7, 14, 21, 28] and curve.lines[1].get_xdata()[0] == 3

@@ -14,8 +14,9 @@ import pytest
 from bag_tools import read_by_mcap_ros2, read_by_rosbags
 from live import Live
 
+from hpccd_ros.bag.examine import examine
 from hpccd_ros.bag.reader import Recording
-from hpccd_ros.bag.recover import examine, recover
+from hpccd_ros.bag.recover import recover
 from hpccd_ros.replay import recorded_setup
 from hpccd_ros.replay.recomputed import Replay
 

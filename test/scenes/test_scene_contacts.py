@@ -4,9 +4,8 @@
 import numpy as np
 import pytest
 
+import hpccd_core
 from hpccd_ros import scenes
-
-hpccd_core = pytest.importorskip("hpccd_core")
 
 
 def contacts_of_steps(scene, steps):

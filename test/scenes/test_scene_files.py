@@ -10,7 +10,8 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from hpccd_ros import scenes
 from hpccd_ros.bag import message_definitions
 from hpccd_ros.bag.reader import Recording
-from hpccd_ros.scenes import cdr, files, messages
+from hpccd_ros.middleware import message_types
+from hpccd_ros.scenes import cdr, files
 
 
 @pytest.fixture(scope="module")
@@ -22,7 +23,7 @@ def breaking():
 def typestore():
     """An independent implementation of CDR that knows our two messages."""
     store = get_typestore(Stores.ROS2_JAZZY)
-    for name in (messages.TOPOLOGY_TYPE, messages.VERTICES_TYPE):
+    for name in (message_types.TOPOLOGY, message_types.VERTICES):
         text = message_definitions.definition_text(name).split(message_definitions.SEPARATOR)[0]
         store.register(get_types_from_msg(text, name))
     return store
@@ -34,14 +35,14 @@ def test_cdr_is_that_of_an_independent_writer(typestore, frame_id, count):
     faces = np.arange(3 * count, dtype=np.uint32).reshape(-1, 3)
     xyz = np.linspace(-1, 1, 3 * count, dtype=np.float32).reshape(-1, 3)
     for data, name in (
-        (cdr.topology(5_000_000_007, frame_id, 3, faces, 3 * count), messages.TOPOLOGY_TYPE),
-        (cdr.vertices(5_000_000_007, frame_id, 3, 2**40, xyz), messages.VERTICES_TYPE),
+        (cdr.topology(5_000_000_007, frame_id, 3, faces, 3 * count), message_types.TOPOLOGY),
+        (cdr.vertices(5_000_000_007, frame_id, 3, 2**40, xyz), message_types.VERTICES),
     ):
         message = typestore.deserialize_cdr(data, name)
         assert bytes(typestore.serialize_cdr(message, name)) == data
         assert (message.header.stamp.sec, message.header.stamp.nanosec) == (5, 7)
         assert message.header.frame_id == frame_id
-        if name == messages.TOPOLOGY_TYPE:
+        if name == message_types.TOPOLOGY:
             assert (message.version, message.n_vertices) == (3, 3 * count)
             np.testing.assert_array_equal(message.faces, faces.ravel())
         else:

@@ -16,8 +16,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 
 import hpccd_ros
 from hpccd_ros import scenes
-from hpccd_ros.middleware import environment
-from hpccd_ros.scenes import messages
+from hpccd_ros.middleware import environment, topic_names
 
 # Reached only by tests that fail.
 PATIENCE = 240.0
@@ -54,8 +53,8 @@ class Listener:
         self.received = {}
         latched = QoSProfile(depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         for mesh in scene.mesh_names:
-            self.listen(MeshTopology, messages.topology_topic(mesh), latched)
-            self.listen(MeshVertices, messages.vertices_topic(mesh), QoSProfile(depth=1000))
+            self.listen(MeshTopology, topic_names.topology(mesh), latched)
+            self.listen(MeshVertices, topic_names.vertices(mesh), QoSProfile(depth=1000))
 
     def listen(self, kind, topic, profile):
         self.received[topic] = []
@@ -99,9 +98,9 @@ def test_every_frame_arrives_in_another_process(listen, children):
     options = ("--size", 1 / 64, "--frames", 12, "--rate", 50, "--wait", PATIENCE)
     command = publish_command(scene.name, "/all_frames", *options)
     children.append(start(*command))
-    vertices = {mesh: listener.received[messages.vertices_topic(mesh)] for mesh in scene.mesh_names}
+    vertices = {mesh: listener.received[topic_names.vertices(mesh)] for mesh in scene.mesh_names}
     listener.wait(lambda: all(len(rows) == 12 for rows in vertices.values()), children[0])
-    topologies = listener.received[messages.topology_topic("statue")]
+    topologies = listener.received[topic_names.topology("statue")]
     changes = [frame for frame in scene.frames() if frame.topologies]
     listener.wait(lambda: len(topologies) == 1 + len(changes), children[0])
     assert children[0].wait(PATIENCE) == 0
@@ -129,7 +128,7 @@ def test_loop_counts_versions_on_and_sigterm_ends_it(listen, children):
     scene = scenes.make("two-triangles")
     listener = listen(scene, "/loop")
     children.append(start(*publish_command(scene.name, "/loop", "--rate", 200, "--loop", "--wait", PATIENCE)))
-    rows = listener.received[messages.vertices_topic("upper")]
+    rows = listener.received[topic_names.vertices("upper")]
     listener.wait(lambda: len(rows) >= 40, children[0])
     children[0].send_signal(signal.SIGTERM)
     assert children[0].wait(PATIENCE) == 0
@@ -151,7 +150,7 @@ def test_late_listener_still_gets_the_topology(listen, children):
         line = children[0].stdout.readline()
         assert line, "the publisher ended"
     listener = listen(scene, "/late")
-    listener.wait(lambda: listener.received[messages.topology_topic("lower")], children[0])
+    listener.wait(lambda: listener.received[topic_names.topology("lower")], children[0])
     children[0].send_signal(signal.SIGINT)
     assert children[0].wait(PATIENCE) == 0
 

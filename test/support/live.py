@@ -4,7 +4,7 @@
 from pathlib import Path
 
 from hpccd_ros import scenes
-from hpccd_ros.bag.recover import examine
+from hpccd_ros.bag.examine import examine
 from hpccd_ros.scenes import files
 
 # Long enough for a machine that is ten times too busy; reached only by tests that fail.

@@ -88,6 +88,8 @@ struct Options {
   // Of backend `hybrid` (Kim et al. 2009, section 5.1): the triangle index queue, and how many GPUs; 0: all.
   std::size_t hybrid_segments = 128, hybrid_segment_pairs = 2048;
   int gpus = 0;
+  // Of backend `gpu`: profile() tells the time on the device too, by stage. The events for it cost 1 us each.
+  bool gpu_stages = false;
 };
 
 // Contacts of one motion step in canonical order: vertex-face by (vertex, face), then edge-edge by (a0, a1, b0, b1).

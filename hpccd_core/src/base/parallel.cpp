@@ -5,7 +5,7 @@
 #include <mutex>
 #include <utility>
 
-#include "base/pause.h"
+#include "base/active_wait.h"
 
 namespace hpccd {
 namespace {
@@ -53,7 +53,7 @@ std::uint64_t ThreadPool::Entry::word() const {
   return std::uint64_t{job} << 32 | std::uint64_t{closed} << 31 | std::uint64_t{joined} << 16 | finished;
 }
 
-ThreadPool::ThreadPool(int threads) : placement_(threads > 0 ? threads : hardware_threads()) {
+ThreadPool::ThreadPool(int threads) : affinity_(threads > 0 ? threads : hardware_threads()) {
   const int cores = hardware_threads(), n = threads > 0 ? threads : cores;
   // Longer than the serial parts between two jobs of a call, and than a program takes from one call to the next if it
   // does nothing else. More threads than cores would only keep each other from working.
@@ -79,13 +79,13 @@ void ThreadPool::call(int thread) {
 bool ThreadPool::new_job(std::uint32_t seen) const { return Entry::of(entry_.load()).job != seen || stop_.load(); }
 
 void ThreadPool::wait_for_job(int thread, std::uint32_t seen) {
-  placement_.awake(thread);
+  affinity_.awake(thread);
   if (wait_actively(awake_for_, [&] { return new_job(seen); })) return;
-  placement_.asleep(thread);
+  affinity_.asleep(thread);
   ++sleeping_;
   sleep(starts_, [&] { return new_job(seen); });
   --sleeping_;
-  placement_.woken(thread);
+  affinity_.woken(thread);
 }
 
 bool ThreadPool::join(std::uint32_t& seen) {
@@ -133,10 +133,10 @@ void ThreadPool::run(const std::function<void(int)>& job, Join join) {
   job_ = &job;
   error_ = nullptr;
   entry_ = Entry{Entry::of(entry_.load()).job + 1, false, 0, 0}.word();
-  const bool placed = placement_.place(workers_);
+  const bool placed = affinity_.place(workers_);
   if (sleeping_ > 0) wake(starts_);
   call(0);
-  if (placed) placement_.free_late(workers_);
+  if (placed) affinity_.free_late(workers_);
   if (join == Join::in_time) entry_.fetch_or(Entry{0, true, 0, 0}.word());
   wait_for_threads(join);
   if (auto error = std::exchange(error_, nullptr)) std::rethrow_exception(error);

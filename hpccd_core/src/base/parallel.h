@@ -13,8 +13,8 @@
 #include <vector>
 
 #include "base/cancellation.h"
-#include "base/placement.h"
 #include "base/spin_lock.h"
+#include "base/thread_affinity.h"
 
 namespace hpccd {
 
@@ -71,7 +71,7 @@ class ThreadPool {
   std::chrono::microseconds awake_for_{0};
   std::atomic<int> starts_{0}, ends_{0};  // change when there is something to wake up for
   std::atomic<int> sleeping_{0};
-  Placement placement_;
+  ThreadAffinity affinity_;
   std::atomic<bool> caller_sleeps_{false};
   SpinLock error_lock_;
   std::exception_ptr error_;

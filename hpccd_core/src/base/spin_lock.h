@@ -3,7 +3,7 @@
 
 #include <atomic>
 
-#include "base/pause.h"
+#include "base/active_wait.h"
 
 namespace hpccd {
 

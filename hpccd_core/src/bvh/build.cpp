@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <memory>
 
+#include "bvh/primitive_box.h"
 #include "bvh/split.h"
 #include "bvh/tree.h"
 
@@ -12,7 +13,7 @@ struct Range {
   std::uint32_t node, begin, end;
 };
 
-// A mesh's carriers: their numbers, and where they stand among those that are split.
+// A mesh's primitives: their numbers, and where they stand among those that are split.
 struct Part {
   std::uint32_t first_face, n_faces, first_lone, n_lone;
   std::uint32_t node = 0, begin = 0;
@@ -23,8 +24,8 @@ struct Part {
   }
 };
 
-Placed at_center(const MotionBox& b, std::uint32_t number) {
-  Placed p;
+Centroid centroid_of(const MotionBox& b, std::uint32_t number) {
+  Centroid p;
   for (int k = 0; k < 3; ++k) p.center[k] = (b.t0.low[k] + b.t0.high[k]) + (b.t1.low[k] + b.t1.high[k]);
   p.number = number;
   return p;
@@ -39,20 +40,13 @@ class Builder {
   void run() {
     find_parts();
     order_meshes();
-    place_carriers();
+    place_primitives();
     while (!level_.empty()) split_level();
     lay_out_slots();
     choose_front();
   }
 
  private:
-  MotionBox carrier_box(std::uint32_t c) const {
-    if (c >= features_.n_faces()) return vertex_boxes_[features_.lone_vertices[c - features_.n_faces()]];
-    MotionBox b;
-    for (std::uint32_t v : features_.faces[c]) b.include(vertex_boxes_[v]);
-    return b;
-  }
-
   void find_parts() {
     const auto lone_before = [&](std::uint32_t vertex) {
       const auto& lone = features_.lone_vertices;
@@ -64,24 +58,24 @@ class Builder {
     }
   }
 
-  Placed mesh_at_center(std::uint32_t m) const {
+  Centroid mesh_centroid(std::uint32_t m) const {
     const Scene::Mesh& mesh = scene_.meshes()[m];
     MotionBox b;
     in_pieces(cancellation_, mesh.n_vertices, some, [&](std::size_t begin, std::size_t end) {
       for (std::size_t v = begin; v < end; ++v) b.include(vertex_boxes_[mesh.first_vertex + v]);
     });
-    return at_center(b, m);
+    return centroid_of(b, m);
   }
 
   // Upper part: a tree over whole meshes, so that below it every node belongs to one mesh.
   void order_meshes() {
-    std::vector<Placed> meshes;
+    std::vector<Centroid> meshes;
     for (std::uint32_t m = 0; m < parts_.size(); ++m)
       if (parts_[m].size() > 0) meshes.push_back({{}, m});
     if (meshes.empty()) return;
     if (meshes.size() > 1)
-      for (Placed& mesh : meshes) mesh = mesh_at_center(mesh.number);
-    std::vector<Placed> scratch(meshes.size());
+      for (Centroid& mesh : meshes) mesh = mesh_centroid(mesh.number);
+    std::vector<Centroid> scratch(meshes.size());
     tree_.nodes.push_back({});
     std::vector<Range> queue{{0, 0, static_cast<std::uint32_t>(meshes.size())}};
     for (std::size_t i = 0; i < queue.size(); ++i) {
@@ -100,7 +94,7 @@ class Builder {
     }
     // In the order of the upper tree: neighbours in space are neighbours in memory.
     std::uint32_t begin = 0;
-    for (const Placed& mesh : meshes) {
+    for (const Centroid& mesh : meshes) {
       Part& part = parts_[mesh.number];
       part.begin = begin;
       begin += part.size();
@@ -108,13 +102,14 @@ class Builder {
     }
   }
 
-  void place_carriers() {
-    const std::size_t n = features_.n_carriers();
-    carriers_ = std::make_unique_for_overwrite<Placed[]>(n);
-    scratch_ = std::make_unique_for_overwrite<Placed[]>(n);
+  void place_primitives() {
+    const std::size_t n = features_.n_primitives();
+    primitives_ = std::make_unique_for_overwrite<Centroid[]>(n);
+    scratch_ = std::make_unique_for_overwrite<Centroid[]>(n);
     parallel_for(pool_, n, 1024, [&](std::size_t begin, std::size_t end, int) {
       for (auto c = static_cast<std::uint32_t>(begin); c < end; ++c)
-        carriers_[parts_[features_.mesh_of_carrier[c]].place_of(c)] = at_center(carrier_box(c), c);
+        primitives_[parts_[features_.mesh_of_primitive[c]].place_of(c)] =
+            centroid_of(primitive_box(features_, vertex_boxes_, c), c);
     });
   }
 
@@ -137,19 +132,19 @@ class Builder {
   void split_level() {
     // A range larger than a thread's share of all would leave the others without work.
     constexpr std::uint32_t worth_sharing = 1 << 14;
-    const std::uint32_t share = features_.n_carriers() / static_cast<std::uint32_t>(pool_.size());
+    const std::uint32_t share = features_.n_primitives() / static_cast<std::uint32_t>(pool_.size());
     const auto is_shared = [&](const Range& r) {
       return pool_.size() > 1 && r.end - r.begin > std::max(share, worth_sharing);
     };
     for (const Range& r : level_)
       if (is_shared(r))
-        split_together(&carriers_[r.begin], r.end - r.begin, left_size(r.end - r.begin), &scratch_[r.begin], pool_);
+        split_together(&primitives_[r.begin], r.end - r.begin, left_size(r.end - r.begin), &scratch_[r.begin], pool_);
     parallel_for(pool_, level_.size(), 1, [&](std::size_t begin, std::size_t end, int) {
       for (std::size_t i = begin; i < end; ++i) {
         const Range& r = level_[i];
         const std::uint32_t n = r.end - r.begin;
         if (n > Tree::leaf_size && !is_shared(r))
-          split(&carriers_[r.begin], n, left_size(n), &scratch_[r.begin], cancellation_);
+          split(&primitives_[r.begin], n, left_size(n), &scratch_[r.begin], cancellation_);
       }
     });
     std::vector<Range> next;
@@ -168,7 +163,7 @@ class Builder {
   }
 
   void lay_out_slots() {
-    // Leaves in the order of their carriers: neighbours in space are neighbours in memory.
+    // Leaves in the order of their primitives: neighbours in space are neighbours in memory.
     std::sort(leaf_ranges_.begin(), leaf_ranges_.end(),
               heeding(cancellation_, [](const Range& a, const Range& b) { return a.begin < b.begin; }));
     const std::size_t n_leaves = leaf_ranges_.size();
@@ -197,7 +192,7 @@ class Builder {
       for (std::size_t i = n_nodes - begin; i-- > n_nodes - end;)
         if (const auto c = tree_.nodes[i].children) {
           const Node &left = tree_.nodes[c], &right = tree_.nodes[c + 1];
-          tree_.nodes[i].carriers = left.carriers + right.carriers;
+          tree_.nodes[i].primitives = left.primitives + right.primitives;
           tree_.nodes[i].only_points = left.only_points && right.only_points;
         }
     });
@@ -205,7 +200,7 @@ class Builder {
 
   void choose_front() {
     // Enough for any number of threads, and each worth a thread's while.
-    const std::uint32_t most = std::max(features_.n_carriers() / 256, 8 * Tree::leaf_size);
+    const std::uint32_t most = std::max(features_.n_primitives() / 256, 8 * Tree::leaf_size);
     struct Visit {
       std::uint32_t node, above;
     };
@@ -215,7 +210,7 @@ class Builder {
       const Visit v = stack.back();
       stack.pop_back();
       const Node& node = tree_.nodes[v.node];
-      if (node.children && (node.mesh == mixed_meshes || node.carriers > most)) {
+      if (node.children && (node.mesh == mixed_meshes || node.primitives > most)) {
         const auto number = static_cast<std::uint32_t>(tree_.above_front.size());
         tree_.above_front.push_back({v.node, v.above});
         stack.push_back({node.children + 1, number});
@@ -231,7 +226,7 @@ class Builder {
     LeafRange leaf{before.end_face,   before.end_face,   before.end_edge,   before.end_edge,
                    before.end_vertex, before.end_vertex, before.end_group()};
     for (std::uint32_t i = r.begin; i < r.end; ++i) {
-      const std::uint32_t c = carriers_[i].number;
+      const std::uint32_t c = primitives_[i].number;
       leaf.end_face += c < features_.n_faces();
       leaf.end_edge += features_.first_edge[c + 1] - features_.first_edge[c];
       leaf.end_vertex += features_.first_vertex[c + 1] - features_.first_vertex[c];
@@ -244,15 +239,15 @@ class Builder {
     Node& node = tree_.nodes[r.node];
     tree_.leaf_nodes[i] = r.node;
     node.leaf = static_cast<std::uint32_t>(i);
-    node.carriers = r.end - r.begin;
+    node.primitives = r.end - r.begin;
     const LeafRange& leaf = tree_.leaves[i];
     std::uint32_t face = leaf.first_face, edge = leaf.first_edge, vertex = leaf.first_vertex;
     node.only_points = leaf.n_faces() == 0;
     std::fill(&tree_.box_groups[leaf.first_group], &tree_.box_groups[leaf.end_group()], BoxGroup{});
-    std::sort(&carriers_[r.begin], &carriers_[r.end],
-              [](const Placed& a, const Placed& b) { return a.number < b.number; });
+    std::sort(&primitives_[r.begin], &primitives_[r.end],
+              [](const Centroid& a, const Centroid& b) { return a.number < b.number; });
     for (std::uint32_t k = r.begin; k < r.end; ++k) {
-      const std::uint32_t c = carriers_[k].number;
+      const std::uint32_t c = primitives_[k].number;
       if (c < features_.n_faces()) {
         for (int j = 0; j < 3; ++j) tree_.face_corners[j][face] = features_.faces[c][j];
         tree_.face_of_slot[face++] = c;
@@ -273,9 +268,10 @@ class Builder {
   const std::vector<MotionBox>& vertex_boxes_;
   ThreadPool& pool_;
   const Cancellation& cancellation_ = pool_.cancellation();
-  static constexpr std::size_t some = 1 << 15;    // pieces of the serial work: less than 1 ms
-  std::vector<Part> parts_;                       // by mesh
-  std::unique_ptr<Placed[]> carriers_, scratch_;  // carriers in the order of the tree, as far as it has been split
+  static constexpr std::size_t some = 1 << 15;  // pieces of the serial work: less than 1 ms
+  std::vector<Part> parts_;                     // by mesh
+  std::unique_ptr<Centroid[]> primitives_,
+      scratch_;  // primitives in the order of the tree, as far as it has been split
   std::vector<Range> level_, leaf_ranges_;
 };
 

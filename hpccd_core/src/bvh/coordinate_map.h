@@ -11,6 +11,9 @@
 
 namespace hpccd {
 
+// Beyond this, differences and squares of coordinates could overflow in the error bounds.
+inline constexpr double largest_coordinate = 1e150;
+
 struct CoordinateMap {
   double center[3] = {0, 0, 0};
   double scale = 1;

@@ -52,19 +52,19 @@ template <class Real>
 
 template <class Real>
 void copy_motion(const Real* t0, const Real* t1, const CoordinateMap& map, double margin, std::size_t begin,
-                 std::size_t end, VertexRow* rows, MotionBox* boxes, SlabRow* slabs) {
+                 std::size_t end, VertexMotion* vertices, MotionBox* boxes, VertexKdop* kdops) {
   for (std::size_t i = begin; i < end; ++i) {
     for (int k = 0; k < 3; ++k) {
       const double a = t0[3 * i + k], b = t1[3 * i + k];
-      rows[i].t0[k] = a;
-      rows[i].t1[k] = b;
+      vertices[i].t0[k] = a;
+      vertices[i].t1[k] = b;
       boxes[i].t0.low[k] = map(a - margin, k);
       boxes[i].t0.high[k] = map(a + margin, k);
       boxes[i].t1.low[k] = map(b - margin, k);
       boxes[i].t1.high[k] = map(b + margin, k);
     }
-    slabs[i] =
-        slab_row({rows[i].t0[0], rows[i].t0[1], rows[i].t0[2]}, {rows[i].t1[0], rows[i].t1[1], rows[i].t1[2]}, map);
+    kdops[i] = vertex_kdop({vertices[i].t0[0], vertices[i].t0[1], vertices[i].t0[2]},
+                           {vertices[i].t1[0], vertices[i].t1[1], vertices[i].t1[2]}, map);
   }
 }
 
@@ -94,7 +94,7 @@ void Extent::include(const Extent& e) {
 }
 
 template <class Real>
-void MotionBounds::take(const Real* t0, const Real* t1, std::size_t n, double separation, ThreadPool& pool) {
+void MotionBounds::update(const Real* t0, const Real* t1, std::size_t n, double separation, ThreadPool& pool) {
   const auto moves = [&](std::size_t part) { return resting.empty() || !resting[part]; };
   std::vector<Piece> pieces = pieces_of(parts_, moves);
   std::vector<Extent> extents(pieces.size());
@@ -126,36 +126,36 @@ void MotionBounds::take(const Real* t0, const Real* t1, std::size_t n, double se
     pieces = pieces_of(parts_, moves);
   }
   margin_ = margin;
-  resize(rows, n, pool.cancellation());
+  resize(vertices, n, pool.cancellation());
   resize(boxes, n, pool.cancellation());
-  resize(slabs, n, pool.cancellation());
+  resize(kdops, n, pool.cancellation());
   parallel_for(pool, pieces.size(), 1, [&](std::size_t from, std::size_t to, int) {
     for (std::size_t i = from; i < to; ++i)
-      copy_motion(t0, t1, map, margin, pieces[i].begin, pieces[i].end, rows.data(), boxes.data(), slabs.data());
+      copy_motion(t0, t1, map, margin, pieces[i].begin, pieces[i].end, vertices.data(), boxes.data(), kdops.data());
   });
 }
 
-void MotionBounds::take_all(Positions t0, Positions t1, double separation, ThreadPool& pool) {
+void MotionBounds::update_all(Positions t0, Positions t1, double separation, ThreadPool& pool) {
   if (!std::exchange(complete_, false)) resting.clear();
   if (t0.is_double)
-    take(static_cast<const double*>(t0.data), static_cast<const double*>(t1.data), t0.n, separation, pool);
+    update(static_cast<const double*>(t0.data), static_cast<const double*>(t1.data), t0.n, separation, pool);
   else
-    take(static_cast<const float*>(t0.data), static_cast<const float*>(t1.data), t0.n, separation, pool);
+    update(static_cast<const float*>(t0.data), static_cast<const float*>(t1.data), t0.n, separation, pool);
   complete_ = true;
 }
 
-void MotionBounds::take(const Scene& scene, Positions t0, Positions t1, double separation, ThreadPool& pool) {
+void MotionBounds::update(const Scene& scene, Positions t0, Positions t1, double separation, ThreadPool& pool) {
   parts_.clear();
   for (const Scene::Mesh& m : scene.meshes())
     parts_.push_back({m.first_vertex, std::size_t{m.first_vertex} + m.n_vertices});
   resting = statics_.unchanged(scene, t0, t1, pool);
-  take_all(t0, t1, separation, pool);
+  update_all(t0, t1, separation, pool);
 }
 
-void MotionBounds::take(Positions t0, Positions t1, double separation, ThreadPool& pool) {
+void MotionBounds::update(Positions t0, Positions t1, double separation, ThreadPool& pool) {
   parts_ = {{0, t0.n}};
   resting.clear();
-  take_all(t0, t1, separation, pool);
+  update_all(t0, t1, separation, pool);
 }
 
 void MotionBounds::sweep(ThreadPool& pool) {
@@ -166,8 +166,8 @@ void MotionBounds::sweep(ThreadPool& pool) {
 }
 
 std::size_t MotionBounds::bytes() const {
-  return rows.capacity() * sizeof(VertexRow) + boxes.capacity() * sizeof(MotionBox) + swept.capacity() * sizeof(Box) +
-         slabs.capacity() * sizeof(SlabRow) + statics_.bytes();
+  return vertices.capacity() * sizeof(VertexMotion) + boxes.capacity() * sizeof(MotionBox) +
+         swept.capacity() * sizeof(Box) + kdops.capacity() * sizeof(VertexKdop) + statics_.bytes();
 }
 
 }  // namespace hpccd

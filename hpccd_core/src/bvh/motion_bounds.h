@@ -7,14 +7,12 @@
 
 #include "base/parallel.h"
 #include "bvh/coordinate_map.h"
+#include "bvh/kdop.h"
 #include "bvh/motion_box.h"
-#include "elementary/batch.h"
 #include "scene/static_meshes.h"
+#include "scene/vertex_motion.h"
 
 namespace hpccd {
-
-// Beyond this, differences and squares of coordinates could overflow in the error bounds.
-inline constexpr double largest_coordinate = 1e150;
 
 // A part of the vertices that moves, or rests, as a whole: those of one mesh.
 struct VertexRange {
@@ -29,27 +27,27 @@ struct Extent {
 };
 
 struct MotionBounds {
-  std::vector<VertexRow> rows;
+  std::vector<VertexMotion> vertices;
   std::vector<MotionBox> boxes;
-  std::vector<SlabRow> slabs;
+  std::vector<VertexKdop> kdops;
   CoordinateMap map;
-  // By mesh: its rows and boxes are still those of the call before. Empty: of none.
+  // By mesh: its vertices and boxes are still those of the call before. Empty: of none.
   std::vector<char> resting;
   // Boxes of the whole sweep, where a method asks for them.
   std::vector<Box> swept;
 
   // Boxes of features that come within `separation` of each other overlap too.
   // Throws InvalidArgument where a coordinate is not finite or too large, or where a static mesh moves.
-  void take(const Scene& scene, Positions vertices_t0, Positions vertices_t1, double separation, ThreadPool& pool);
+  void update(const Scene& scene, Positions vertices_t0, Positions vertices_t1, double separation, ThreadPool& pool);
   // The same for vertices of no scene.
-  void take(Positions vertices_t0, Positions vertices_t1, double separation, ThreadPool& pool);
+  void update(Positions vertices_t0, Positions vertices_t1, double separation, ThreadPool& pool);
   void sweep(ThreadPool& pool);
   std::size_t bytes() const;
 
  private:
   template <class Real>
-  void take(const Real* t0, const Real* t1, std::size_t n, double separation, ThreadPool& pool);
-  void take_all(Positions t0, Positions t1, double separation, ThreadPool& pool);
+  void update(const Real* t0, const Real* t1, std::size_t n, double separation, ThreadPool& pool);
+  void update_all(Positions t0, Positions t1, double separation, ThreadPool& pool);
 
   StaticMeshes statics_;
   std::vector<VertexRange> parts_;  // of each mesh

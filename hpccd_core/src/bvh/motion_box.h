@@ -7,6 +7,10 @@
 // pairs of features, these 1.8 million; where a step moves further than a triangle is large, forty times fewer.
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
+
+#include "base/hd.h"
 #include "bvh/box.h"
 
 namespace hpccd {
@@ -33,5 +37,17 @@ struct MotionBox {
     return whole;
   }
 };
+
+// The order of the twelve bounds, here and wherever they lie apart: low and high at t = 0, low and high at t = 1, each
+// along x, y and z.
+inline constexpr std::uint32_t n_bounds = 12;
+enum class Side : std::uint32_t { low, high };
+HPCCD_HD constexpr std::uint32_t bound_number(std::uint32_t end, Side side, std::uint32_t axis) {
+  return 6 * end + 3 * static_cast<std::uint32_t>(side) + axis;
+}
+HPCCD_HD constexpr Side side_of_bound(std::uint32_t number) { return number / 3 % 2 == 0 ? Side::low : Side::high; }
+static_assert(sizeof(MotionBox) == n_bounds * sizeof(float) &&
+              offsetof(Box, high) == bound_number(0, Side::high, 0) * sizeof(float) &&
+              offsetof(MotionBox, t1) == bound_number(1, Side::low, 0) * sizeof(float));
 
 }  // namespace hpccd

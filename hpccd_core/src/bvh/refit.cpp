@@ -7,12 +7,9 @@
 namespace hpccd {
 namespace {
 
-// Four numbers at a time (GCC/Clang vector extension).
-using Four = float __attribute__((vector_size(16)));
-
-// A motion's box in registers: the twelve bounds in the order of MotionBox.
+// A motion's box in registers: the twelve bounds in their order (bound_number).
 struct Bounds {
-  Four part[3];
+  Floats4 part[3];
 };
 
 Bounds load(const MotionBox& b) {
@@ -22,15 +19,16 @@ Bounds load(const MotionBox& b) {
   return r;
 }
 
-// Low bounds are numbers 0 to 2 and 6 to 8.
+// The smaller of two where the bound is a low one, else the larger.
+template <std::uint32_t part>
+Floats4 join_part(Floats4 a, Floats4 b) {
+  const Floats4 low = min4(a, b), high = max4(a, b);
+  constexpr auto pick = [](int lane) { return side_of_bound(4 * part + lane) == Side::low ? lane : 4 + lane; };
+  return __builtin_shufflevector(low, high, pick(0), pick(1), pick(2), pick(3));
+}
+
 Bounds join(const Bounds& a, const Bounds& b) {
-  Four low[3], high[3];
-  for (int i = 0; i < 3; ++i) {
-    low[i] = a.part[i] < b.part[i] ? a.part[i] : b.part[i];
-    high[i] = a.part[i] < b.part[i] ? b.part[i] : a.part[i];
-  }
-  return {{__builtin_shufflevector(low[0], high[0], 0, 1, 2, 7), __builtin_shufflevector(high[1], low[1], 0, 1, 6, 7),
-           __builtin_shufflevector(low[2], high[2], 0, 5, 6, 7)}};
+  return {{join_part<0>(a.part[0], b.part[0]), join_part<1>(a.part[1], b.part[1]), join_part<2>(a.part[2], b.part[2])}};
 }
 
 // Boxes of n features in a leaf's groups, four at a time, from a lane on that is a multiple of four; the last ones are
@@ -42,11 +40,11 @@ void fill(BoxGroup* groups, std::uint32_t lane, std::uint32_t n, BoxOf&& box_of)
     for (std::uint32_t j = 0; j < 4; ++j) b[j] = i + j < n ? box_of(i + j) : b[j - 1];
     auto& rows = groups[lane / BoxGroup::width].rows;
     for (std::uint32_t part = 0; part < 3; ++part) {
-      const Four ab_low = __builtin_shufflevector(b[0].part[part], b[1].part[part], 0, 4, 1, 5),
-                 ab_high = __builtin_shufflevector(b[0].part[part], b[1].part[part], 2, 6, 3, 7),
-                 cd_low = __builtin_shufflevector(b[2].part[part], b[3].part[part], 0, 4, 1, 5),
-                 cd_high = __builtin_shufflevector(b[2].part[part], b[3].part[part], 2, 6, 3, 7);
-      const Four row[4] = {
+      const Floats4 ab_low = __builtin_shufflevector(b[0].part[part], b[1].part[part], 0, 4, 1, 5),
+                    ab_high = __builtin_shufflevector(b[0].part[part], b[1].part[part], 2, 6, 3, 7),
+                    cd_low = __builtin_shufflevector(b[2].part[part], b[3].part[part], 0, 4, 1, 5),
+                    cd_high = __builtin_shufflevector(b[2].part[part], b[3].part[part], 2, 6, 3, 7);
+      const Floats4 row[4] = {
           __builtin_shufflevector(ab_low, cd_low, 0, 1, 4, 5), __builtin_shufflevector(ab_low, cd_low, 2, 3, 6, 7),
           __builtin_shufflevector(ab_high, cd_high, 0, 1, 4, 5), __builtin_shufflevector(ab_high, cd_high, 2, 3, 6, 7)};
       for (std::uint32_t k = 0; k < 4; ++k)

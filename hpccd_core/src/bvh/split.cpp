@@ -10,7 +10,7 @@
 namespace hpccd {
 namespace {
 
-Box box_of(const Placed* set, std::uint32_t n) {
+Box box_of(const Centroid* set, std::uint32_t n) {
   Box b;
   for (std::uint32_t i = 0; i < n; ++i)
     for (int k = 0; k < 3; ++k) {
@@ -27,8 +27,8 @@ int widest_axis(const Box& b) {
   return axis;
 }
 
-void split_along(int axis, Placed* set, std::uint32_t n, std::uint32_t left, const Cancellation& cancellation) {
-  const auto before = [axis](const Placed& a, const Placed& b) {
+void split_along(int axis, Centroid* set, std::uint32_t n, std::uint32_t left, const Cancellation& cancellation) {
+  const auto before = [axis](const Centroid& a, const Centroid& b) {
     const float xa = a.center[axis], xb = b.center[axis];
     return xa < xb || (xa == xb && a.number < b.number);
   };
@@ -47,7 +47,7 @@ class Buckets {
   Buckets(const Box& b, int axis)
       : axis_(axis), low_(b.low[axis]), per_length_(b.high[axis] > low_ ? number / (b.high[axis] - low_) : 0) {}
 
-  std::uint32_t of(const Placed& p) const {
+  std::uint32_t of(const Centroid& p) const {
     return std::min(number - 1, static_cast<std::uint32_t>((p.center[axis_] - low_) * per_length_));
   }
 
@@ -67,7 +67,7 @@ struct Piece {
 // Counts by bucket, moves each to its side of the bucket with the cut, and sorts out that one alone: without a branch
 // that depends on the data. for_pieces(f) calls f(piece) for each.
 template <class ForPieces>
-void split_by_buckets(Placed* set, std::uint32_t left, Placed* scratch, std::vector<Piece>& pieces,
+void split_by_buckets(Centroid* set, std::uint32_t left, Centroid* scratch, std::vector<Piece>& pieces,
                       const Cancellation& cancellation, ForPieces&& for_pieces) {
   for_pieces([&](Piece& p) { p.box = box_of(set + p.begin, p.end - p.begin); });
   Box whole;
@@ -110,7 +110,7 @@ std::vector<Piece> pieces_of(std::uint32_t n, std::size_t number) {
 
 }  // namespace
 
-void split(Placed* set, std::uint32_t n, std::uint32_t left, Placed* scratch, const Cancellation& cancellation) {
+void split(Centroid* set, std::uint32_t n, std::uint32_t left, Centroid* scratch, const Cancellation& cancellation) {
   constexpr std::uint32_t few = 2 * Buckets::number;  // going through the buckets costs more
   if (n < few) return split_along(widest_axis(box_of(set, n)), set, n, left, cancellation);
   constexpr std::uint32_t longest_piece = 1 << 18;  // 1 ms
@@ -120,7 +120,7 @@ void split(Placed* set, std::uint32_t n, std::uint32_t left, Placed* scratch, co
   });
 }
 
-void split_together(Placed* set, std::uint32_t n, std::uint32_t left, Placed* scratch, ThreadPool& pool) {
+void split_together(Centroid* set, std::uint32_t n, std::uint32_t left, Centroid* scratch, ThreadPool& pool) {
   std::vector<Piece> pieces = pieces_of(n, static_cast<std::size_t>(4 * pool.size()));
   split_by_buckets(set, left, scratch, pieces, pool.cancellation(), [&](auto&& work) {
     parallel_for_each(pool, pieces.size(), [&](std::size_t p) { work(pieces[p]); });

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Cutting a set of carriers in two along the widest axis of their centers, for the build of the tree.
+// Cutting a set of primitives in two along the widest axis of their centers, for the build of the tree.
 #pragma once
 
 #include <cstdint>
@@ -8,18 +8,18 @@
 
 namespace hpccd {
 
-// A triangle or a lone vertex by its number, or a whole mesh.
-struct Placed {
+// Of a primitive, or of a whole mesh, and its number. Times four: only the order matters.
+struct Centroid {
   float center[3];
   std::uint32_t number;
 };
 
 // Puts the `left` lowest of the set first, 0 < left < n, in any order on either side. Ties are decided by number, so
 // that each side holds the same ones everywhere. `scratch` has room for n.
-void split(Placed* set, std::uint32_t n, std::uint32_t left, Placed* scratch,
+void split(Centroid* set, std::uint32_t n, std::uint32_t left, Centroid* scratch,
            const Cancellation& cancellation = never_cancelled);
 
 // The same by all threads of the pool, for sets so large that they would leave the others without work.
-void split_together(Placed* set, std::uint32_t n, std::uint32_t left, Placed* scratch, ThreadPool& pool);
+void split_together(Centroid* set, std::uint32_t n, std::uint32_t left, Centroid* scratch, ThreadPool& pool);
 
 }  // namespace hpccd

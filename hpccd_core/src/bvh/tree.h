@@ -3,16 +3,13 @@
 // each, together with the vertices and edges these represent, laid out for tests of many boxes at once.
 #pragma once
 
-#if defined(__SSE2__)
-#include <emmintrin.h>
-#endif
-
 #include <cstdint>
 #include <memory>
 #include <vector>
 
 #include "base/hd.h"
 #include "base/parallel.h"
+#include "base/simd/four.h"
 #include "bvh/motion_box.h"
 #include "scene/features.h"
 
@@ -26,31 +23,26 @@ struct alignas(64) Node {
   std::uint32_t children = 0;  // the left one; the right one follows. 0: a leaf
   std::uint32_t leaf = 0;      // where a leaf: its number
   std::uint32_t mesh = mixed_meshes;
-  std::uint32_t carriers : 31 = 0;    // in the whole subtree
+  std::uint32_t primitives : 31 = 0;  // in the whole subtree
   std::uint32_t only_points : 1 = 0;  // no triangle in the whole subtree, so nothing that another such node could touch
 
   bool overlaps(const Node& other) const;  // as MotionBox::overlaps
 };
 static_assert(sizeof(Node) == 64);
 
-#if defined(__SSE2__)
 // Four numbers are loaded where three count: the one behind the last bound is `children`.
 inline bool Node::overlaps(const Node& other) const {
-  const auto below = [](const Node& a, const Node& b) {  // a before b at both ends: a bit for each axis
-    const __m128 at_t0 = _mm_cmplt_ps(_mm_loadu_ps(a.box.t0.high), _mm_loadu_ps(b.box.t0.low));
-    return _mm_and_ps(at_t0, _mm_cmplt_ps(_mm_loadu_ps(a.box.t1.high), _mm_loadu_ps(b.box.t1.low)));
+  const auto below = [](const MotionBox& a, const MotionBox& b) {  // a before b at both ends, by axis
+    return (load4(a.t0.high) < load4(b.t0.low)) & (load4(a.t1.high) < load4(b.t1.low));
   };
-  return (_mm_movemask_ps(_mm_or_ps(below(*this, other), below(other, *this))) & 7) == 0;
+  return (bits4(below(box, other.box) | below(other.box, box)) & 7) == 0;
 }
-#else
-inline bool Node::overlaps(const Node& other) const { return box.overlaps(other.box); }
-#endif
 
-// Boxes of up to 16 features of a leaf, a row for each of the twelve bounds: low and high at t = 0, low and high at
-// t = 1, each along x, y, z. Every row is a cache line, and the rows of a group lie together.
+// Boxes of up to 16 features of a leaf, a row for each of the twelve bounds (bound_number). Every row is a cache line,
+// and the rows of a group lie together.
 struct alignas(64) BoxGroup {
-  static constexpr std::uint32_t n_rows = 12, width = 16;
-  float rows[n_rows][width];
+  static constexpr std::uint32_t width = 16;
+  float rows[n_bounds][width];
 };
 
 struct LeafRange {
@@ -72,7 +64,7 @@ struct LeafRange {
 
 struct Tree {
   static constexpr std::uint32_t leaf_size = 8;
-  static constexpr std::uint32_t load_width = 16;  // boxes are compared 16 at a time
+  static constexpr std::uint32_t load_width = BoxGroup::width;  // numbers of features are loaded as many at a time
 
   std::vector<Node> nodes;  // breadth first: children come after their parents
   static constexpr std::uint32_t none = 0xFFFFFFFFu;
@@ -105,6 +97,10 @@ struct Tree {
 
   std::size_t bytes() const;
 };
+
+// Whether refitting has lost so much that a new tree costs less: traversal visits node pairs about in proportion to the
+// nodes' area, and half as much again costs more than a build. Areas relative to the root's.
+inline bool worn_out(double area, double area_when_built) { return area > 1.5 * area_when_built; }
 
 // A new tree over the current vertex boxes (bounds of the motion of each vertex).
 void build(Tree& tree, const Scene& scene, const Features& features, const std::vector<MotionBox>& vertex_boxes,

@@ -28,12 +28,12 @@ void keep_earliest(std::vector<Worker>& workers, const Cancellation& cancellatio
   for (Worker& w : workers)
     for (auto* list : {&w.vertex_face, &w.edge_edge}) {
       cancellation.heed();
-      std::erase_if(*list, [&](const Found& f) { return f.toc > first + simultaneous; });
+      std::erase_if(*list, [&](const Contact& f) { return f.toc > first + simultaneous; });
     }
 }
 
 // Writes contact i of n vertex-face contacts and then edge-edge ones.
-void write(Contacts& c, std::size_t n, std::size_t i, const Found& f, const Geometry& geometry, Outputs outputs,
+void write(Contacts& c, std::size_t n, std::size_t i, const Contact& f, const Geometry& geometry, Outputs outputs,
            Summary& sum) {
   const Kind kind = i < n ? Kind::vertex_face : Kind::edge_edge;
   sum.first_toc = std::min(sum.first_toc, f.toc);
@@ -63,7 +63,7 @@ void collect_contacts(std::vector<Worker>& workers, const Geometry& geometry, Re
   for (const Worker& w : workers) n += w.vertex_face.size(), m += w.edge_edge.size();
 
   // New memory comes page by page from the system, which takes as long as the sorting: each array on its own thread.
-  order.take(workers, pool, 6, [&](std::size_t array) {
+  order.distribute(workers, pool, 6, [&](std::size_t array) {
     switch (array) {
       case 0:
         return resize(c.ee, m, cancellation);

@@ -21,10 +21,7 @@ V vector(const double x[3]) { return {x[0], x[1], x[2]}; }
 
 Vertices vertices_of(const Geometry& g, Kind kind, std::uint32_t first, std::uint32_t second) {
   std::uint32_t v[4];
-  if (kind == Kind::vertex_face)
-    v[0] = first, v[1] = g.faces[second][0], v[2] = g.faces[second][1], v[3] = g.faces[second][2];
-  else
-    v[0] = g.edges[first][0], v[1] = g.edges[first][1], v[2] = g.edges[second][0], v[3] = g.edges[second][1];
+  pair_vertices(g, kind, first, second, v);
   Vertices q;
   for (int i = 0; i < 4; ++i) q.t0[i] = vector(g.vertices[v[i]].t0), q.t1[i] = vector(g.vertices[v[i]].t1);
   return q;

@@ -8,7 +8,7 @@ namespace {
 
 // Calls use(found) for each, in pieces of about 0.1 ms.
 template <class Use>
-void for_each_found(const std::vector<Found>& list, const Cancellation& cancellation, Use&& use) {
+void for_each_found(const std::vector<Contact>& list, const Cancellation& cancellation, Use&& use) {
   in_pieces(cancellation, list.size(), 1 << 15, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) use(list[i]);
   });
@@ -16,7 +16,8 @@ void for_each_found(const std::vector<Found>& list, const Cancellation& cancella
 
 }  // namespace
 
-void ContactOrder::add_lists(const std::vector<Worker>& workers, std::vector<Found> Worker::* found, ThreadPool& pool) {
+void ContactOrder::add_lists(const std::vector<Worker>& workers, std::vector<Contact> Worker::* found,
+                             ThreadPool& pool) {
   std::size_t n = 0;
   for (const Worker& w : workers) n += (w.*found).size();
   if (n == 0) return;
@@ -24,7 +25,7 @@ void ContactOrder::add_lists(const std::vector<Worker>& workers, std::vector<Fou
   parallel_for(pool, workers.size(), 1, [&](std::size_t begin, std::size_t end, int) {
     for (std::size_t i = begin; i < end; ++i)
       for_each_found(workers[i].*found, pool.cancellation(),
-                     [&](const Found& f) { highest[i] = std::max(highest[i], f.first); });
+                     [&](const Contact& f) { highest[i] = std::max(highest[i], f.first); });
   });
   const double features = static_cast<double>(*std::max_element(highest.begin(), highest.end())) + 1;
   const std::size_t n_buckets = std::clamp<std::size_t>(n / 128, 1, 2048);
@@ -42,7 +43,7 @@ void ContactOrder::count(const std::vector<Worker>& workers, ThreadPool& pool) {
     for (std::size_t i = begin; i < end; ++i) {
       List& list = lists_[i];
       list.next.assign(list.n_buckets, 0);
-      for_each_found(*list.found, pool.cancellation(), [&](const Found& f) { ++list.next[list.bucket_of(f)]; });
+      for_each_found(*list.found, pool.cancellation(), [&](const Contact& f) { ++list.next[list.bucket_of(f)]; });
     }
   });
   std::size_t at = 0;
@@ -61,15 +62,12 @@ void ContactOrder::count(const std::vector<Worker>& workers, ThreadPool& pool) {
 
 void ContactOrder::scatter(std::size_t i, const Cancellation& cancellation) {
   List& list = lists_[i];
-  for_each_found(*list.found, cancellation, [&](const Found& f) { all_[list.next[list.bucket_of(f)]++] = f; });
+  for_each_found(*list.found, cancellation, [&](const Contact& f) { all_[list.next[list.bucket_of(f)]++] = f; });
 }
 
 void ContactOrder::sort(std::size_t bucket, const Cancellation& cancellation) {
   const auto first = all_.begin() + static_cast<std::ptrdiff_t>(begin(bucket)),
              last = all_.begin() + static_cast<std::ptrdiff_t>(end(bucket));
-  const auto before = [](const Found& x, const Found& y) {
-    return x.first < y.first || (x.first == y.first && x.second < y.second);
-  };
   // All contacts of one vertex lie in one bucket, however many they are.
   constexpr std::ptrdiff_t many = 1 << 14;
   if (last - first < many)

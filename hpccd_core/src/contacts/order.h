@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Found contacts in the order of their feature pairs, vertex-face before edge-edge, in buckets that threads can sort on
+// Contacts in the order of their feature pairs, vertex-face before edge-edge, in buckets that threads can sort on
 // their own. No pair is found twice, so the order is unique.
 #pragma once
 
@@ -14,7 +14,7 @@ class ContactOrder {
  public:
   // Distributes what the workers found. `meanwhile(i)`, for each i < n_meanwhile, runs beside it.
   template <class Job>
-  void take(const std::vector<Worker>& workers, ThreadPool& pool, std::size_t n_meanwhile, Job&& meanwhile) {
+  void distribute(const std::vector<Worker>& workers, ThreadPool& pool, std::size_t n_meanwhile, Job&& meanwhile) {
     count(workers, pool);
     parallel_for(pool, lists_.size() + n_meanwhile, 1, [&](std::size_t begin, std::size_t end, int) {
       for (std::size_t i = begin; i < end; ++i)
@@ -27,26 +27,26 @@ class ContactOrder {
   std::size_t begin(std::size_t bucket) const { return begin_[bucket]; }
   std::size_t end(std::size_t bucket) const { return begin_[bucket + 1]; }
   void sort(std::size_t bucket, const Cancellation& cancellation);
-  const Found& operator[](std::size_t i) const { return all_[i]; }
+  const Contact& operator[](std::size_t i) const { return all_[i]; }
 
-  std::size_t bytes() const { return all_.capacity() * sizeof(Found); }
+  std::size_t bytes() const { return all_.capacity() * sizeof(Contact); }
 
  private:
   struct List {
-    const std::vector<Found>* found;
+    const std::vector<Contact>* found;
     std::size_t first_bucket, n_buckets;
     double buckets_per_feature;
     std::vector<std::size_t> next;  // by bucket: how many, then where the next one goes
-    std::size_t bucket_of(const Found& f) const { return static_cast<std::size_t>(f.first * buckets_per_feature); }
+    std::size_t bucket_of(const Contact& f) const { return static_cast<std::size_t>(f.first * buckets_per_feature); }
   };
 
   void count(const std::vector<Worker>& workers, ThreadPool& pool);
-  void add_lists(const std::vector<Worker>& workers, std::vector<Found> Worker::* found, ThreadPool& pool);
+  void add_lists(const std::vector<Worker>& workers, std::vector<Contact> Worker::* found, ThreadPool& pool);
   void scatter(std::size_t list, const Cancellation& cancellation);
 
   std::vector<List> lists_;
   std::vector<std::size_t> begin_;
-  std::vector<Found> all_;
+  std::vector<Contact> all_;
 };
 
 }  // namespace hpccd

@@ -4,36 +4,52 @@
 
 #include <cstdint>
 
-#include "elementary/motion.h"
-#include "elementary/slabs.h"
+#include "bvh/kdop.h"
+#include "elementary/pair_vertices.h"
 #include "hpccd/hpccd.h"
+#include "scene/vertex_motion.h"
 
 namespace hpccd {
 
-// One vertex at both ends of the step: one cache line.
-struct alignas(64) VertexRow {
-  double t0[4], t1[4];  // x y z and padding
-};
-
 struct Geometry {
-  const VertexRow* vertices;
+  const VertexMotion* vertices;
   const std::array<std::uint32_t, 2>* edges;
   const std::array<std::uint32_t, 3>* faces;
-  const SlabRow* slabs = nullptr;  // of each vertex; none where features need not touch to count
-  double scale = 1;                // power of two that brings the scene to about one; only single precision needs it
+  const VertexKdop* kdops = nullptr;  // of each vertex; none where features need not touch to count
+  double scale = 1;                   // power of two that brings the scene to about one; only single precision needs it
 };
+
+template <Kind kind>
+HPCCD_HD void pair_vertices(const Geometry& g, std::uint32_t first, std::uint32_t second, std::uint32_t v[4]) {
+  // Not through std::array, whose functions are compiled for one instruction set and linked for all (batch.inl).
+  pair_vertices<kind>(reinterpret_cast<const std::uint32_t*>(g.edges), reinterpret_cast<const std::uint32_t*>(g.faces),
+                      first, second, v);
+}
+
+inline void pair_vertices(const Geometry& g, Kind kind, std::uint32_t first, std::uint32_t second, std::uint32_t v[4]) {
+  if (kind == Kind::vertex_face)
+    pair_vertices<Kind::vertex_face>(g, first, second, v);
+  else
+    pair_vertices<Kind::edge_edge>(g, first, second, v);
+}
 
 inline constexpr std::uint32_t batch_capacity = 1024;
 
 // Where the pairs of the batch went; every pair is in exactly one place.
 struct BatchCounts {
   std::uint64_t tested = 0;       // pairs that came in
-  std::uint64_t slabs = 0;        // rejected because they are apart along a direction of slabs.h
+  std::uint64_t kdop = 0;         // rejected because their k-DOPs are apart
   std::uint64_t coplanarity = 0;  // rejected by the sign test on the cubic
   std::uint64_t projection = 0;   // rejected because they stay outside in a projection
   std::uint64_t roots = 0;        // rejected at the roots of the cubic
   std::uint64_t contacts = 0;     // proven contacts
-  std::uint64_t undecided = 0;    // handed to the tier's last resort
+  std::uint64_t undecided = 0;    // handed to the tier's fallback
+
+  BatchCounts& operator+=(const BatchCounts& c) {
+    tested += c.tested, kdop += c.kdop, coplanarity += c.coplanarity, projection += c.projection;
+    roots += c.roots, contacts += c.contacts, undecided += c.undecided;
+    return *this;
+  }
 };
 
 struct BatchResult {
@@ -48,10 +64,10 @@ struct BatchResult {
 using BatchTest = void (*)(const Geometry&, Kind, const std::uint32_t* first, const std::uint32_t* second,
                            std::uint32_t n, BatchResult&);
 
-// Never Simd::automatic. "fast" has a test of its own; the other tiers share one and differ in their last resort.
+// Never Simd::automatic. "fast" has a test of its own; the other tiers share one and differ in their fallback.
 BatchTest batch_test(Simd simd, Accuracy accuracy);
 
-// Leaves every pair to the last resort: no filter of this file holds for features that merely come near each other.
+// Leaves every pair to the fallback: no filter of this file holds for features that merely come near each other.
 void all_undecided(const Geometry&, Kind, const std::uint32_t* first, const std::uint32_t* second, std::uint32_t n,
                    BatchResult&);
 

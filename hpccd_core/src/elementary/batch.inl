@@ -1,16 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// Included once per instruction set, with HPCCD_ISA naming the set, Double and Single its lane types. Uses nothing from
-// the standard library at run time: an inline function compiled here could be linked into code for older processors.
+// Included once per instruction set, after its header (base/simd/scalar.h). Uses nothing from the standard library at
+// run time: an inline function compiled here could be linked into code for older processors.
 
 #include "elementary/batch.h"
-#include "elementary/certified.h"
+#include "elementary/filtered_test.h"
 
 namespace hpccd::HPCCD_ISA {
 
-inline constexpr int double_width = RealTraits<Double>::width;
-
+#include "elementary/kdop_filter.inl"
 #include "elementary/load.inl"
-#include "elementary/near_pairs.inl"
 
 // The pairs at `where`, as many at a time as there are lanes; the last group is filled up with copies of the last pair.
 template <Kind kind, class R, class Function>
@@ -59,8 +57,8 @@ void test(const Geometry& g, const std::uint32_t* first, const std::uint32_t* se
   std::uint32_t near[batch_capacity], survivors[batch_capacity], single[batch_capacity], many[batch_capacity];
   std::uint32_t n_survivors = 0, n_single = 0, n_many = 0;
 
-  const std::uint32_t n_near = g.slabs ? near_pairs<kind>(g, first, second, n, near) : n;
-  for_lanes<kind, R>(g, first, second, g.slabs ? near : nullptr, n_near,
+  const std::uint32_t n_near = g.kdops ? near_pairs<kind>(g, first, second, n, near) : n;
+  for_lanes<kind, R>(g, first, second, g.kdops ? near : nullptr, n_near,
                      [&](Lanes m, const std::uint32_t* at, unsigned valid) {
                        append(survivors, n_survivors, at, valid & ~bits(coplanarity_filter<Policy>(m).none));
                      });
@@ -80,12 +78,14 @@ void test(const Geometry& g, const std::uint32_t* first, const std::uint32_t* se
   });
 
   result.counts.tested += n;
-  result.counts.slabs += n - n_near;
+  result.counts.kdop += n - n_near;
   result.counts.coplanarity += n_near - n_survivors;
   result.counts.projection += n_survivors - n_single - n_many;
   result.counts.contacts += result.n_contacts;
   result.counts.undecided += result.n_undecided;
 }
+
+namespace {
 
 void run(const Geometry& g, Kind kind, const std::uint32_t* first, const std::uint32_t* second, std::uint32_t n,
          BatchResult& result) {
@@ -102,5 +102,9 @@ void run_fast(const Geometry& g, Kind kind, const std::uint32_t* first, const st
   else
     test<Kind::edge_edge, Likely, Single>(g, first, second, n, result);
 }
+
+}  // namespace
+
+BatchTest batch_test(Accuracy accuracy) { return accuracy == Accuracy::fast ? run_fast : run; }
 
 }  // namespace hpccd::HPCCD_ISA

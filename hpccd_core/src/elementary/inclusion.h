@@ -2,7 +2,7 @@
 // Search for the earliest time at which two features come within a given separation, by inclusion (Snyder 1992; Wang et
 // al. 2021): the gap g(t, x, y) = p(t) - x a(t) - y b(t) is linear in each variable, so over a box of (t, x, y) it
 // stays within the bounds of its eight corners. A box whose bounds stay outside the separation holds no contact; the
-// others are clipped where the bounds say so (inclusion_rows.h) and halved, earliest first, until their gap is known to
+// others are clipped where the bounds say so (gap_bounds.h) and halved, earliest first, until their gap is known to
 // the tolerance.
 //
 // The guarantee: a pair that comes within `separation` (measured along each axis, hence also in Euclidean distance) is
@@ -15,7 +15,7 @@
 #include <vector>
 
 #include "base/cancellation.h"
-#include "elementary/inclusion_rows.h"
+#include "elementary/gap_bounds.h"
 
 namespace hpccd::inclusion {
 
@@ -26,7 +26,7 @@ struct Limits {
   const Cancellation* cancellation = &never_cancelled;  // so many boxes take 0.1 s and more
 };
 
-inline Interval Domain::* widest_variable(const Row& axis, const Domain& d) {
+inline Interval Domain::* widest_variable(const Projection& axis, const Domain& d) {
   const auto change = [](const double v[2]) { return std::fabs(v[1] - v[0]); };
   const auto size = [](const double v[2]) { return std::max(std::fabs(v[0]), std::fabs(v[1])); };
   const double t = d.t.width() * (change(axis.p) + change(axis.a) + change(axis.b));
@@ -35,12 +35,12 @@ inline Interval Domain::* widest_variable(const Row& axis, const Domain& d) {
 }
 
 inline std::optional<double> earliest_within(Kind kind, const Motion<double>& m, const Limits& limits) {
-  const Rows rows(m, limits.separation);
+  const GapBounds bounds(m, limits.separation);
   const auto later = [](const Domain& l, const Domain& r) { return l.t.low > r.t.low; };
   std::vector<Domain> open;  // a heap
   open.reserve(64);
   const auto consider = [&](Domain d) {
-    if (!rows.clip(kind, d)) return;
+    if (!bounds.clip(kind, d)) return;
     open.push_back(d);
     std::push_heap(open.begin(), open.end(), later);
   };
@@ -55,12 +55,12 @@ inline std::optional<double> earliest_within(Kind kind, const Motion<double>& m,
     double furthest = 0;
     int axis = -1;
     for (int k = 0; k < 3; ++k) {
-      const Interval g = rows.gap(k, d);
-      const double excess = std::max(g.high, -g.low) - (rows.reach(k) + limits.tolerance);
+      const Interval g = bounds.gap(k, d);
+      const double excess = std::max(g.high, -g.low) - (bounds.reach(k) + limits.tolerance);
       if (excess > furthest) furthest = excess, axis = k;
     }
     if (axis < 0) return d.t.low;
-    Interval Domain::* const set = widest_variable(rows.axis(axis), d);
+    Interval Domain::* const set = widest_variable(bounds.axis(axis), d);
     const Interval whole = d.*set;
     const double middle = whole.low + 0.5 * whole.width();
     if (!(middle > whole.low && middle < whole.high)) return d.t.low;  // as fine as doubles go

@@ -17,15 +17,33 @@ struct Motion {
   Vec3<R> p1, a1, b1;  // at t = 1
 };
 
-// q[0..3] in the order of the public queries: v f0 f1 f2, or a0 a1 b0 b1.
+// From which of the four vertices to which p, a and b lead. Vertices in the order of the public queries: v f0 f1 f2, or
+// a0 a1 b0 b1.
+template <Kind kind>
+struct Spans;
+template <>
+struct Spans<Kind::vertex_face> {
+  static constexpr int p_from = 1, p_to = 0, a_from = 1, a_to = 2, b_from = 1, b_to = 3;
+};
+template <>
+struct Spans<Kind::edge_edge> {
+  static constexpr int p_from = 0, p_to = 2, a_from = 0, a_to = 1, b_from = 2, b_to = 3;
+};
+
+// difference(end, to, from): vertex `to` minus vertex `from`, at t = end.
+template <Kind kind, class R, class Difference>
+HPCCD_HD Motion<R> motion_by(Difference&& difference) {
+  using S = Spans<kind>;
+  return {difference(0, S::p_to, S::p_from), difference(0, S::a_to, S::a_from), difference(0, S::b_to, S::b_from),
+          difference(1, S::p_to, S::p_from), difference(1, S::a_to, S::a_from), difference(1, S::b_to, S::b_from)};
+}
+
 template <Kind kind, class R>
 HPCCD_HD Motion<R> motion_of(const Vec3<R> q_t0[4], const Vec3<R> q_t1[4]) {
-  if constexpr (kind == Kind::vertex_face)
-    return {q_t0[0] - q_t0[1], q_t0[2] - q_t0[1], q_t0[3] - q_t0[1],
-            q_t1[0] - q_t1[1], q_t1[2] - q_t1[1], q_t1[3] - q_t1[1]};
-  else
-    return {q_t0[2] - q_t0[0], q_t0[1] - q_t0[0], q_t0[3] - q_t0[2],
-            q_t1[2] - q_t1[0], q_t1[1] - q_t1[0], q_t1[3] - q_t1[2]};
+  return motion_by<kind, R>([&](int end, int to, int from) {
+    const Vec3<R>* q = end ? q_t1 : q_t0;
+    return q[to] - q[from];
+  });
 }
 
 // Largest coordinates of p, a and b over the motion: the scale of every error bound.

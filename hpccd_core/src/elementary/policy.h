@@ -1,8 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-// How sure an answer of the floating-point tests must be.
+// How sure an answer of the floating-point tests must be, and which time of contact a tier reports.
 #pragma once
 
+#include "base/real.h"
+#include "hpccd/hpccd.h"
+
 namespace hpccd {
+
+// Of a proven contact whose true time lies within delta of toc: "conservative" promises never to be late.
+HPCCD_HD double reported_time(Accuracy accuracy, double toc, double delta) {
+  return accuracy == Accuracy::conservative ? greater(toc - delta, 0.0) : toc;
+}
 
 // By the bounds of worst-case rounding. A time of contact is accepted only where it is known to 9e-13: the contract
 // promises 1e-12.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Single queries through the same batches and last resorts as whole scenes.
+// Single queries through the same batches and fallbacks as whole scenes.
 #include <algorithm>
 #include <cmath>
 #include <memory>
@@ -7,7 +7,8 @@
 
 #include "base/simd.h"
 #include "elementary/batch.h"
-#include "elementary/last_resort.h"
+#include "elementary/fallback.h"
+#include "elementary/policy.h"
 
 namespace hpccd {
 namespace {
@@ -29,8 +30,8 @@ void test_queries(Kind kind, std::span<const Query> queries, const Options& opti
                              : batch_test(resolve(options.simd), accuracy);
   const inclusion::Limits limits{options.minimum_separation, options.tolerance};
   auto result = std::make_unique<BatchResult>();
-  LastResortCounts counts;
-  std::vector<VertexRow> rows(4 * batch_capacity);
+  FallbackCounts counts;
+  std::vector<VertexMotion> rows(4 * batch_capacity);
   std::vector<std::array<std::uint32_t, 2>> edges(2 * batch_capacity);
   std::vector<std::array<std::uint32_t, 3>> faces(batch_capacity);
   std::vector<std::uint32_t> first(batch_capacity), second(batch_capacity);
@@ -59,14 +60,14 @@ void test_queries(Kind kind, std::span<const Query> queries, const Options& opti
     for (std::uint32_t i = 0; i < result->n_contacts; ++i) {
       const std::size_t at = begin + result->contact[i];
       hit[at] = true;
-      toc[at] = accuracy == Accuracy::conservative ? std::max(0.0, result->toc[i] - result->delta[i]) : result->toc[i];
+      toc[at] = reported_time(accuracy, result->toc[i], result->delta[i]);
     }
     for (std::uint32_t i = 0; i < result->n_undecided; ++i) {
       const std::size_t at = begin + result->undecided[i];
       const Query& q = queries[at];
       const Vec3<double> q_t0[4] = {point(q, 0), point(q, 1), point(q, 2), point(q, 3)};
       const Vec3<double> q_t1[4] = {point(q, 4), point(q, 5), point(q, 6), point(q, 7)};
-      if (const auto t = last_resort(accuracy, limits, kind, q_t0, q_t1, counts)) hit[at] = true, toc[at] = *t;
+      if (const auto t = decide_undecided(accuracy, limits, kind, q_t0, q_t1, counts)) hit[at] = true, toc[at] = *t;
     }
   }
 }

@@ -79,7 +79,9 @@ HPCCD_HD Root<R> bracketed_root(const Cubic<R>& f, R error, R low, R high, R sig
   R t = R(0.5) * (low + high);
   R step = high - low;
   Mask running = active;
-  for (int i = 0; i < 80 && any(running); ++i) {
+  // As many bisections as a double has bits, and some more: a root that is not there by then shows below as uncertain.
+  constexpr int most_steps = 80;
+  for (int i = 0; i < most_steps && any(running); ++i) {
     const R ft = sign * value(f, t);
     const R newton = ft / (sign * slope(f, t));
     const Mask before = ft > R(0);

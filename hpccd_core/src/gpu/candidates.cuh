@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// Candidate pairs of features (traverse/leaf_pairs.inl) and the first filter on them, in one kernel: candidates wait in
+// LanePair pairs of features (traverse/leaf_pairs.inl) and the first filter on them, in one kernel: candidates wait in
 // shared memory until a warp is full, and only those that pass the sign test reach device memory (a third of them on
 // cloth-ball, a fifth on n-body).
 #pragma once
 
 #include "bvh/tree.h"
-#include "elementary/certified.h"
-#include "gpu/frame.cuh"
+#include "elementary/filtered_test.h"
+#include "gpu/launch_params.cuh"
 
 namespace hpccd::gpu {
 
@@ -36,32 +36,32 @@ struct CandidateSpace {
 
 // Edges of a leaf that overlap the leaf `other`, one after the other in list `side`.
 template <class T>
-__device__ u32 stage_edges(const Frame<T>& f, const DeviceLeaf& l, u32 other, CandidateSpace& s, u32 side) {
+__device__ u32 stage_edges(const LaunchParams<T>& params, const DeviceLeaf& l, u32 other, CandidateSpace& s, u32 side) {
   const u32 lane = lane_number(), slot = l.first_edge + lane;
   DeviceBox b;
   bool near = lane < (l.counts >> 8 & 0xFF);
   if (near) {
-    b = load_box(&f.edge_boxes[slot]);
-    near = overlap(b, load_box(&f.leaf_boxes[other]));
+    b = load_box(&params.edge_boxes[slot]);
+    near = overlap(b, load_box(&params.leaf_boxes[other]));
   }
   const u32 mask = __ballot_sync(all_lanes, near), at = __popc(mask & ((1u << lane) - 1));
   if (near) {
     s.put(side, at, b);
-    s.number[side][at] = __ldg(&f.edge_of_slot[slot]);
+    s.number[side][at] = __ldg(&params.edge_of_slot[slot]);
   }
   return __popc(mask);
 }
 
 template <class T>
-__device__ u32 stage_vertices(const Frame<T>& f, const DeviceLeaf& l, u32 other, CandidateSpace& s) {
+__device__ u32 stage_vertices(const LaunchParams<T>& params, const DeviceLeaf& l, u32 other, CandidateSpace& s) {
   const u32 lane = lane_number();
   DeviceBox b;
   u32 v = 0;
   bool near = lane < l.counts >> 16;
   if (near) {
-    v = __ldg(&f.vertex_of_slot[l.first_vertex + lane]);
-    b = load_point(&f.points[v]);
-    near = overlap(b, load_box(&f.leaf_boxes[other]));
+    v = __ldg(&params.vertex_of_slot[l.first_vertex + lane]);
+    b = load_point(&params.points[v]);
+    near = overlap(b, load_box(&params.leaf_boxes[other]));
   }
   const u32 mask = __ballot_sync(all_lanes, near), at = __popc(mask & ((1u << lane) - 1));
   if (near) {
@@ -72,19 +72,19 @@ __device__ u32 stage_vertices(const Frame<T>& f, const DeviceLeaf& l, u32 other,
 }
 
 template <class T>
-__device__ u32 stage_faces(const Frame<T>& f, const DeviceLeaf& l, u32 other, CandidateSpace& s) {
+__device__ u32 stage_faces(const LaunchParams<T>& params, const DeviceLeaf& l, u32 other, CandidateSpace& s) {
   const u32 lane = lane_number(), slot = l.first_face + lane;
   DeviceBox b;
   bool near = lane < (l.counts & 0xFF);
   if (near) {
-    b = load_box(&f.face_boxes[slot]);
-    near = overlap(b, load_box(&f.leaf_boxes[other]));
+    b = load_box(&params.face_boxes[slot]);
+    near = overlap(b, load_box(&params.leaf_boxes[other]));
   }
   const u32 mask = __ballot_sync(all_lanes, near), at = __popc(mask & ((1u << lane) - 1));
   if (near) {
     s.put(1, at, b);
-    s.corner2[at] = __ldg(&f.face_corner2[slot]);
-    s.number[1][at] = __ldg(&f.face_of_slot[slot]);
+    s.corner2[at] = __ldg(&params.face_corner2[slot]);
+    s.number[1][at] = __ldg(&params.face_of_slot[slot]);
   }
   return __popc(mask);
 }
@@ -96,19 +96,24 @@ struct CandidateState {
 };
 
 template <class T>
-__device__ void flush_survivors(const Frame<T>& f, CandidateSpace& s, u32 kind, u32 n) {
+__device__ void flush_survivors(const LaunchParams<T>& params, CandidateSpace& s, u32 kind, u32 n) {
   __syncwarp();
   u64 base = 0;
-  if (lane_number() == 0) base = atomicAdd(&f.counters->survivors[kind], static_cast<u64>(n));
+  if (lane_number() == 0) base = atomicAdd(&params.counters->survivors[kind], static_cast<u64>(n));
   base = __shfl_sync(all_lanes, base, 0);
   for (u32 i = lane_number(); i < n; i += 32)
-    if (base + i < f.survivors[kind].capacity) f.survivors[kind].pairs[base + i] = s.survivors[kind][i];
+    if (base + i < params.survivors[kind].capacity) params.survivors[kind].pairs[base + i] = s.survivors[kind][i];
   __syncwarp();
 }
 
 // The first filter on the last up to 32 candidates. One piece of code for both kinds: they differ in where b starts.
+static_assert(Spans<Kind::vertex_face>::p_from == Spans<Kind::vertex_face>::a_from &&
+              Spans<Kind::vertex_face>::p_from == Spans<Kind::vertex_face>::b_from);
+static_assert(Spans<Kind::edge_edge>::p_from == Spans<Kind::edge_edge>::a_from &&
+              Spans<Kind::edge_edge>::p_to == Spans<Kind::edge_edge>::b_from);
 template <class T>
-__device__ __forceinline__ void filter_candidates(const Frame<T>& f, CandidateSpace& s, CandidateState& state) {
+__device__ __forceinline__ void filter_candidates(const LaunchParams<T>& params, CandidateSpace& s,
+                                                  CandidateState& state) {
   __syncwarp();
   const u32 lane = lane_number(), n = state.n < 32 ? state.n : 32;
   state.n -= n;
@@ -119,9 +124,11 @@ __device__ __forceinline__ void filter_candidates(const Frame<T>& f, CandidateSp
     features = s.features[state.n + lane];
     edges = features.y & kind_bit;
     features.y &= ~kind_bit;
-    const Ends from = load_row(f.rows, v.x), p = load_row(f.rows, v.y), a = load_row(f.rows, v.z), b = load_row(f.rows, v.w);
+    const Ends from = load_ends(params.vertices, v.x), p = load_ends(params.vertices, v.y),
+               a = load_ends(params.vertices, v.z), b = load_ends(params.vertices, v.w);
     const Vec3<double> b_from0 = edges ? p.t0 : from.t0, b_from1 = edges ? p.t1 : from.t1;
-    const Motion<double> m{p.t0 - from.t0, a.t0 - from.t0, b.t0 - b_from0, p.t1 - from.t1, a.t1 - from.t1, b.t1 - b_from1};
+    const Motion<double> m{p.t0 - from.t0, a.t0 - from.t0, b.t0 - b_from0,
+                           p.t1 - from.t1, a.t1 - from.t1, b.t1 - b_from1};
     survives = !coplanarity_filter<Proven>(m).none;
   }
 #pragma unroll
@@ -132,14 +139,15 @@ __device__ __forceinline__ void filter_candidates(const Frame<T>& f, CandidateSp
     if (survives && mine) s.survivors[kind][state.n_survivors[kind] + __popc(mask & ((1u << lane) - 1))] = features;
     state.n_survivors[kind] += __popc(mask);
     if (state.n_survivors[kind] >= 64) {
-      flush_survivors(f, s, kind, state.n_survivors[kind]);
+      flush_survivors(params, s, kind, state.n_survivors[kind]);
       state.n_survivors[kind] = 0;
     }
   }
   __syncwarp();
 }
 
-struct Candidate {
+// What a lane proposes for the list of candidates.
+struct LanePair {
   bool wanted;
   uint4 vertices;
   uint2 features;
@@ -148,13 +156,13 @@ struct Candidate {
 // i / n for i < 1024 and n <= 32: exact, since the error i (magic n - 65536) / (65536 n) stays below 1 / n.
 __device__ inline u32 magic_of(u32 n) { return (65536 + n - 1) / n; }
 
-__device__ __forceinline__ Candidate edge_pair(const CandidateSpace& s, u32 i, u32 j, bool same, bool valid) {
-  Candidate c{valid && (!same || i < j), {0, 0, 0, 0}, {0, 0}};
+__device__ __forceinline__ LanePair edge_pair(const CandidateSpace& s, u32 i, u32 j, bool same, bool valid) {
+  LanePair c{valid && (!same || i < j), {0, 0, 0, 0}, {0, 0}};
   if (!c.wanted) return c;
   const u32 side = same ? 0 : 1;
   const DeviceBox a = s.box(0, i), b = s.box(side, j);
-  c.wanted = overlap(a, b) && a.tag_low() != b.tag_low() && a.tag_low() != b.tag_high() && a.tag_high() != b.tag_low() &&
-             a.tag_high() != b.tag_high();
+  c.wanted = overlap(a, b) && a.tag_low() != b.tag_low() && a.tag_low() != b.tag_high() &&
+             a.tag_high() != b.tag_low() && a.tag_high() != b.tag_high();
   const u32 x = s.number[0][i], y = s.number[side][j];
   const uint2 ends_a{a.tag_low(), a.tag_high()}, ends_b{b.tag_low(), b.tag_high()};
   const uint2 lower = x < y ? ends_a : ends_b, upper = x < y ? ends_b : ends_a;
@@ -163,8 +171,8 @@ __device__ __forceinline__ Candidate edge_pair(const CandidateSpace& s, u32 i, u
   return c;
 }
 
-__device__ __forceinline__ Candidate vertex_face_pair(const CandidateSpace& s, u32 i, u32 j, bool valid) {
-  Candidate c{valid, {0, 0, 0, 0}, {0, 0}};
+__device__ __forceinline__ LanePair vertex_face_pair(const CandidateSpace& s, u32 i, u32 j, bool valid) {
+  LanePair c{valid, {0, 0, 0, 0}, {0, 0}};
   if (!valid) return c;
   const DeviceBox vertex = s.box(0, i), face = s.box(1, j);
   c.vertices = {face.tag_low(), vertex.tag_low(), face.tag_high(), s.corner2[j]};
@@ -177,7 +185,8 @@ __device__ __forceinline__ Candidate vertex_face_pair(const CandidateSpace& s, u
 // Phases of a pair of leaves: edges, vertices of the first, vertices of the second. The filter stands in one place in
 // the innermost loop: called as a function it costs 30 million spills on n-body, repeated it overflows the code cache.
 template <class T>
-__device__ __forceinline__ void leaf_pair_candidates(const Frame<T>& f, CandidateSpace& s, CandidateState& state, uint2 pair) {
+__device__ __forceinline__ void leaf_pair_candidates(const LaunchParams<T>& params, CandidateSpace& s,
+                                                     CandidateState& state, uint2 pair) {
   const bool same = pair.x == pair.y;
   const u32 n_phases = same ? 2 : 3;
 #pragma unroll 1
@@ -185,13 +194,13 @@ __device__ __forceinline__ void leaf_pair_candidates(const Frame<T>& f, Candidat
     u32 n_first, n_second;
     {
       const u32 x = phase == 2 ? pair.y : pair.x, y = phase == 2 ? pair.x : pair.y;
-      const DeviceLeaf a = f.leaves[x], b = f.leaves[y];
+      const DeviceLeaf a = params.leaves[x], b = params.leaves[y];
       if (phase == 0) {
-        n_first = stage_edges(f, a, y, s, 0);
-        n_second = same ? n_first : stage_edges(f, b, x, s, 1);
+        n_first = stage_edges(params, a, y, s, 0);
+        n_second = same ? n_first : stage_edges(params, b, x, s, 1);
       } else {
-        n_first = stage_vertices(f, a, y, s);
-        n_second = n_first ? stage_faces(f, b, x, s) : 0;
+        n_first = stage_vertices(params, a, y, s);
+        n_second = n_first ? stage_faces(params, b, x, s) : 0;
       }
     }
     __syncwarp();
@@ -199,7 +208,7 @@ __device__ __forceinline__ void leaf_pair_candidates(const Frame<T>& f, Candidat
 #pragma unroll 1
     for (u32 base = 0; base < total; base += 32) {
       const u32 c = base + lane_number(), i = c * magic >> 16, j = c - i * n_second;
-      const Candidate pushed = phase == 0 ? edge_pair(s, i, j, same, c < total) : vertex_face_pair(s, i, j, c < total);
+      const LanePair pushed = phase == 0 ? edge_pair(s, i, j, same, c < total) : vertex_face_pair(s, i, j, c < total);
       const u32 mask = __ballot_sync(all_lanes, pushed.wanted);
       const u32 at = state.n + __popc(mask & ((1u << lane_number()) - 1));
       if (pushed.wanted) {
@@ -207,34 +216,38 @@ __device__ __forceinline__ void leaf_pair_candidates(const Frame<T>& f, Candidat
         s.features[at] = pushed.features;
       }
       state.n += __popc(mask);
-      if (state.n >= 32) filter_candidates(f, s, state);
+      if (state.n >= 32) filter_candidates(params, s, state);
     }
     __syncwarp();
   }
 }
 
 template <class T>
-__global__ __launch_bounds__(32 * candidate_warps, 5) void candidates_kernel(const __grid_constant__ Frame<T> f) {
+__global__ __launch_bounds__(32 * candidate_warps,
+                             5) void candidates_kernel(const __grid_constant__ LaunchParams<T> params) {
   __shared__ CandidateSpace spaces[candidate_warps];
   CandidateSpace& s = spaces[threadIdx.x / 32];
   CandidateState state;
   constexpr u32 grain = 8;
-  const u64 all = f.counters->leaf_pairs < f.leaf_pairs.capacity ? f.counters->leaf_pairs : f.leaf_pairs.capacity;
-  const u64 from = all * f.segment / f.n_segments, to = all * (f.segment + 1) / f.n_segments;
+  const u64 all = params.counters->leaf_pairs < params.leaf_pairs.capacity ? params.counters->leaf_pairs
+                                                                           : params.leaf_pairs.capacity;
+  const u64 from = all * params.segment / params.n_segments, to = all * (params.segment + 1) / params.n_segments;
 #pragma unroll 1
   for (;;) {
     u64 begin = 0;
-    if (lane_number() == 0) begin = from + atomicAdd(&f.counters->next_leaf_pair, static_cast<u64>(grain));
+    if (lane_number() == 0) begin = from + atomicAdd(&params.counters->next_leaf_pair, static_cast<u64>(grain));
     begin = __shfl_sync(all_lanes, begin, 0);
     if (begin >= to) break;
 #pragma unroll 1
-    for (u64 k = begin; k < begin + grain && k < to; ++k) leaf_pair_candidates(f, s, state, f.leaf_pairs.pairs[k]);
+    for (u64 k = begin; k < begin + grain && k < to; ++k)
+      leaf_pair_candidates(params, s, state, params.leaf_pairs.pairs[k]);
   }
-  if (state.n > 0) filter_candidates(f, s, state);
+  if (state.n > 0) filter_candidates(params, s, state);
   for (u32 kind = 0; kind < 2; ++kind)
-    if (state.n_survivors[kind] > 0) flush_survivors(f, s, kind, state.n_survivors[kind]);
+    if (state.n_survivors[kind] > 0) flush_survivors(params, s, kind, state.n_survivors[kind]);
   if (lane_number() == 0)
-    for (u32 kind = 0; kind < 2; ++kind) atomicAdd(&f.counters->candidates[kind], static_cast<u64>(state.tested[kind]));
+    for (u32 kind = 0; kind < 2; ++kind)
+      atomicAdd(&params.counters->candidates[kind], static_cast<u64>(state.tested[kind]));
 }
 
 }  // namespace hpccd::gpu

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "bvh/tree.h"
-#include "gpu/frame.cuh"
+#include "gpu/launch_params.cuh"
 #include "gpu/stream.h"
 #include "scene/features.h"
 
@@ -49,11 +49,11 @@ class DeviceLeaves {
   u32 size() const { return n_; }
 
   template <class T>
-  void fill(Frame<T>& f) const {
-    f.n_leaves = n_, f.leaves = leaves_.data(), f.leaf_boxes = boxes_.data();
-    f.vertex_of_slot = vertex_of_slot_.data(), f.edge_of_slot = edge_of_slot_.data();
-    f.face_of_slot = face_of_slot_.data(), f.face_corner2 = face_corner2_.data();
-    f.edge_boxes = edge_boxes_.data(), f.face_boxes = face_boxes_.data();
+  void fill(LaunchParams<T>& params) const {
+    params.n_leaves = n_, params.leaves = leaves_.data(), params.leaf_boxes = boxes_.data();
+    params.vertex_of_slot = vertex_of_slot_.data(), params.edge_of_slot = edge_of_slot_.data();
+    params.face_of_slot = face_of_slot_.data(), params.face_corner2 = face_corner2_.data();
+    params.edge_boxes = edge_boxes_.data(), params.face_boxes = face_boxes_.data();
   }
 
   std::size_t bytes() const {

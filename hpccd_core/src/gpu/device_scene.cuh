@@ -6,8 +6,9 @@
 #include <bit>
 #include <vector>
 
-#include "gpu/frame.cuh"
-#include "gpu/pipeline.h"
+#include "elementary/pair.h"
+#include "gpu/device.h"
+#include "gpu/launch_params.cuh"
 #include "gpu/stream.h"
 #include "scene/features.h"
 
@@ -29,20 +30,20 @@ class DeviceScene {
   }
 
   template <class T>
-  void fill(Frame<T>& f) const {
-    f.n_vertices = features_.n_vertices;
-    f.n_edges = static_cast<u32>(features_.edges.size());
-    f.n_faces = features_.n_faces();
-    f.edges = edges_.data(), f.faces = faces_.data(), f.mesh_of_vertex = mesh_of_vertex_.data();
-    f.n_meshes = n_meshes_;
-    f.enabled = all_enabled_ ? nullptr : enabled_.data();
-    f.accuracy = one_accuracy_ ? nullptr : accuracy_.data();
-    f.default_accuracy = default_accuracy_;
-    f.key_shift = key_shift_, f.kind_shift = kind_shift_;
+  void fill(LaunchParams<T>& params) const {
+    params.n_vertices = features_.n_vertices;
+    params.n_edges = static_cast<u32>(features_.edges.size());
+    params.n_faces = features_.n_faces();
+    params.edges = edges_.data(), params.faces = faces_.data(), params.mesh_of_vertex = mesh_of_vertex_.data();
+    params.n_meshes = n_meshes_;
+    params.enabled = all_enabled_ ? nullptr : enabled_.data();
+    params.accuracy = one_accuracy_ ? nullptr : accuracy_.data();
+    params.default_accuracy = default_accuracy_;
+    params.key_shift = key_shift_, params.kind_shift = kind_shift_;
   }
 
   u32 key_bits() const { return kind_shift_ + 1; }
-  Undecided pair_of(u64 key) const {
+  Candidate candidate_of(u64 key) const {
     const u64 features = key & ((u64{1} << kind_shift_) - 1);
     return {static_cast<u32>(features >> key_shift_), static_cast<u32>(features & ((u64{1} << key_shift_) - 1)),
             key >> kind_shift_ ? Kind::edge_edge : Kind::vertex_face};

@@ -3,10 +3,10 @@
 // survivors of the one before.
 #pragma once
 
-#include "elementary/certified.h"
-#include "elementary/extended.h"
-#include "elementary/tolerant.h"
-#include "gpu/frame.cuh"
+#include "elementary/extended_precision.h"
+#include "elementary/filtered_test.h"
+#include "elementary/tolerance_test.h"
+#include "gpu/launch_params.cuh"
 
 namespace hpccd::gpu {
 
@@ -25,12 +25,12 @@ __device__ void for_pairs(const PairList& list, u64 counted, Function&& function
 }
 
 template <Kind kind, class T>
-__global__ __launch_bounds__(128) void projection_kernel(const __grid_constant__ Frame<T> f) {
+__global__ __launch_bounds__(128) void projection_kernel(const __grid_constant__ LaunchParams<T> params) {
   constexpr u32 k = kind == Kind::edge_edge;
-  for_pairs(f.survivors[k], f.counters->survivors[k], [&](bool valid, uint2 pair) {
+  for_pairs(params.survivors[k], params.counters->survivors[k], [&](bool valid, uint2 pair) {
     bool one = false, many = false;
     if (valid) {
-      const Motion<double> m = load_motion<kind>(f.rows, vertices_of<kind>(f, pair.x, pair.y));
+      const Motion<double> m = load_motion<kind>(params.vertices, vertices_of<kind>(params, pair.x, pair.y));
       const Magnitudes<double> size = magnitudes(m);
       const bool usable = in_range(size);
       const bool passes = !(certainly_outside<kind>(m, size) && usable);
@@ -38,42 +38,42 @@ __global__ __launch_bounds__(128) void projection_kernel(const __grid_constant__
       one = passes && single;
       many = passes && !single;
     }
-    const u64 at_one = warp_append(&f.counters->single[k], one), at_many = warp_append(&f.counters->many[k], many);
-    if (one && at_one < f.single[k].capacity) f.single[k].pairs[at_one] = pair;
-    if (many && at_many < f.many[k].capacity) f.many[k].pairs[at_many] = pair;
+    const u64 at_one = warp_append(&params.counters->single[k], one),
+              at_many = warp_append(&params.counters->many[k], many);
+    if (one && at_one < params.single[k].capacity) params.single[k].pairs[at_one] = pair;
+    if (many && at_many < params.many[k].capacity) params.many[k].pairs[at_many] = pair;
   });
 }
 
 template <class T>
-__device__ void append_found(const Frame<T>& f, Kind kind, bool wanted, uint2 pair, double toc) {
-  const u64 at = warp_append(&f.counters->found_all, wanted);
-  if (wanted && at < f.found_capacity) {
-    f.found_keys[at] = key_of(f.key_shift, f.kind_shift, kind, pair.x, pair.y);
-    f.found_tocs[at] = toc;
+__device__ void append_found(const LaunchParams<T>& params, Kind kind, bool wanted, uint2 pair, double toc) {
+  const u64 at = warp_append(&params.counters->found_all, wanted);
+  if (wanted && at < params.found_capacity) {
+    params.found_keys[at] = key_of(params.key_shift, params.kind_shift, kind, pair.x, pair.y);
+    params.found_tocs[at] = toc;
   }
 }
 
 template <Kind kind, bool single, class T>
-__global__ __launch_bounds__(128) void roots_kernel(const __grid_constant__ Frame<T> f) {
+__global__ __launch_bounds__(128) void roots_kernel(const __grid_constant__ LaunchParams<T> params) {
   constexpr u32 k = kind == Kind::edge_edge;
-  const PairList& list = single ? f.single[k] : f.many[k];
+  const PairList& list = single ? params.single[k] : params.many[k];
   u32 proven = 0, doubtful = 0;
-  for_pairs(list, single ? f.counters->single[k] : f.counters->many[k], [&](bool valid, uint2 pair) {
+  for_pairs(list, single ? params.counters->single[k] : params.counters->many[k], [&](bool valid, uint2 pair) {
     bool contact = false, undecided = false;
     double toc = 0;
     if (valid) {
-      const uint4 v = vertices_of<kind>(f, pair.x, pair.y);
-      const Motion<double> m = load_motion<kind>(f.rows, v);
+      const uint4 v = vertices_of<kind>(params, pair.x, pair.y);
+      const Motion<double> m = load_motion<kind>(params.vertices, v);
       const Outcome<double> o = single ? single_root_test<kind, Proven>(m) : many_roots_test<kind, Proven>(m);
       contact = o.contact;
       undecided = !o.contact && !o.none;
-      // "conservative" promises never to be late.
-      toc = accuracy_of(f, v) == Accuracy::conservative ? greater(o.toc - o.delta, 0.0) : o.toc;
+      toc = reported_time(accuracy_of(params, v), o.toc, o.delta);
     }
-    append_found(f, kind, contact, pair, toc);
-    const u64 at = warp_append(&f.counters->undecided, undecided);
-    if (undecided && at < f.undecided_capacity)
-      f.undecided[at] = key_of(f.key_shift, f.kind_shift, kind, pair.x, pair.y);
+    append_found(params, kind, contact, pair, toc);
+    const u64 at = warp_append(&params.counters->undecided, undecided);
+    if (undecided && at < params.undecided_capacity)
+      params.undecided[at] = key_of(params.key_shift, params.kind_shift, kind, pair.x, pair.y);
     proven += contact;
     doubtful += undecided;
   });
@@ -83,16 +83,16 @@ __global__ __launch_bounds__(128) void roots_kernel(const __grid_constant__ Fram
   }
   if (lane_number() != 0) return;
   if (proven) {
-    atomicAdd(&f.counters->proven[k], static_cast<u64>(proven));
-    atomicAdd(&f.counters->found[k], static_cast<u64>(proven));
+    atomicAdd(&params.counters->proven[k], static_cast<u64>(proven));
+    atomicAdd(&params.counters->found[k], static_cast<u64>(proven));
   }
-  if (doubtful) atomicAdd(&f.counters->undecided_of[k], static_cast<u64>(doubtful));
+  if (doubtful) atomicAdd(&params.counters->undecided_of[k], static_cast<u64>(doubtful));
 }
 
 // Clears the lists of one segment for the next; remembers how long they were and how long they had to be.
 template <class T>
-__global__ void end_segment_kernel(Frame<T> f) {
-  Counters& c = *f.counters;
+__global__ void end_segment_kernel(LaunchParams<T> params) {
+  Counters& c = *params.counters;
   c.next_leaf_pair = 0;
   for (int k = 0; k < 2; ++k) {
     c.most_survivors = c.survivors[k] > c.most_survivors ? c.survivors[k] : c.most_survivors;
@@ -105,10 +105,11 @@ __global__ void end_segment_kernel(Frame<T> f) {
   }
 }
 
-// The tier's last resort for what the error bounds left open: here where double precision is enough, else on the host.
+// The tier's fallback for what the error bounds left open: here where double precision is enough, else on the host.
 template <class T>
-__global__ __launch_bounds__(32) void last_resort_kernel(const __grid_constant__ Frame<T> f) {
-  const u64 n = length(f.counters->undecided, f.undecided_capacity), stride = static_cast<u64>(gridDim.x) * blockDim.x;
+__global__ __launch_bounds__(32) void fallback_kernel(const __grid_constant__ LaunchParams<T> params) {
+  const u64 n = length(params.counters->undecided, params.undecided_capacity),
+            stride = static_cast<u64>(gridDim.x) * blockDim.x;
   for (u64 i = static_cast<u64>(blockIdx.x) * blockDim.x + threadIdx.x; i - lane_number() < n; i += stride) {
     bool contact = false, host = false;
     double toc = 0;
@@ -116,32 +117,35 @@ __global__ __launch_bounds__(32) void last_resort_kernel(const __grid_constant__
     uint2 pair{0, 0};
     Kind kind = Kind::vertex_face;
     if (i < n) {
-      key = f.undecided[i];
-      kind = key >> f.kind_shift ? Kind::edge_edge : Kind::vertex_face;
-      const u64 features = key & ((u64{1} << f.kind_shift) - 1);
-      pair = {static_cast<u32>(features >> f.key_shift), static_cast<u32>(features & ((u64{1} << f.key_shift) - 1))};
-      const uint4 v = kind == Kind::edge_edge ? vertices_of<Kind::edge_edge>(f, pair.x, pair.y)
-                                              : vertices_of<Kind::vertex_face>(f, pair.x, pair.y);
-      const Accuracy accuracy = accuracy_of(f, v);
-      const Ends r[4] = {load_row(f.rows, v.x), load_row(f.rows, v.y), load_row(f.rows, v.z), load_row(f.rows, v.w)};
+      key = params.undecided[i];
+      kind = key >> params.kind_shift ? Kind::edge_edge : Kind::vertex_face;
+      const u64 features = key & ((u64{1} << params.kind_shift) - 1);
+      pair = {static_cast<u32>(features >> params.key_shift),
+              static_cast<u32>(features & ((u64{1} << params.key_shift) - 1))};
+      const uint4 v = kind == Kind::edge_edge ? vertices_of<Kind::edge_edge>(params, pair.x, pair.y)
+                                              : vertices_of<Kind::vertex_face>(params, pair.x, pair.y);
+      const Accuracy accuracy = accuracy_of(params, v);
+      const Ends r[4] = {load_ends(params.vertices, v.x), load_ends(params.vertices, v.y),
+                         load_ends(params.vertices, v.z), load_ends(params.vertices, v.w)};
       const Vec3<double> q0[4] = {r[0].t0, r[1].t0, r[2].t0, r[3].t0}, q1[4] = {r[0].t1, r[1].t1, r[2].t1, r[3].t1};
       if (accuracy == Accuracy::exact || accuracy == Accuracy::conservative) {
-        const extended::Answer a = kind == Kind::edge_edge ? extended::decide<Kind::edge_edge>(q0, q1)
-                                                           : extended::decide<Kind::vertex_face>(q0, q1);
+        const extended_precision::Answer a = kind == Kind::edge_edge
+                                                 ? extended_precision::decide<Kind::edge_edge>(q0, q1)
+                                                 : extended_precision::decide<Kind::vertex_face>(q0, q1);
         contact = a.contact;
         host = !a.contact && !a.none;
         toc = a.toc;
       } else {
-        const tolerant::Answer a = kind == Kind::edge_edge ? tolerant::contact<Kind::edge_edge>(q0, q1)
-                                                           : tolerant::contact<Kind::vertex_face>(q0, q1);
+        const tolerance_test::Answer a = kind == Kind::edge_edge ? tolerance_test::contact<Kind::edge_edge>(q0, q1)
+                                                                 : tolerance_test::contact<Kind::vertex_face>(q0, q1);
         contact = a.contact;
         toc = a.toc;
       }
     }
-    append_found(f, kind, contact, pair, toc);
-    if (contact) atomicAdd(&f.counters->found[kind == Kind::edge_edge], u64{1});
-    const u64 at = warp_append(&f.counters->to_host, host);
-    if (host && at < f.to_host_capacity) f.to_host[at] = key;
+    append_found(params, kind, contact, pair, toc);
+    if (contact) atomicAdd(&params.counters->found[kind == Kind::edge_edge], u64{1});
+    const u64 at = warp_append(&params.counters->to_host, host);
+    if (host && at < params.to_host_capacity) params.to_host[at] = key;
   }
 }
 

@@ -10,17 +10,11 @@
 #include <vector>
 
 #include "bvh/tree.h"
-#include "elementary/motion.h"
+#include "elementary/pair.h"
 #include "hpccd/hpccd.h"
 #include "scene/features.h"
 
 namespace hpccd::gpu {
-
-// A pair for the exact last resort on the CPU.
-struct Undecided {
-  std::uint32_t first, second;
-  Kind kind;
-};
 
 // What a frame found, in page-locked memory that stays valid until the next frame.
 struct FrameResult {
@@ -44,8 +38,8 @@ class Pipeline {
   // All work up to the undecided pairs; host arrays may be changed by the caller after finish() only.
   // Returns false where a coordinate is not finite or too large.
   virtual bool run(Positions t0, Positions t1, ThreadPool& pool) = 0;
-  // After run(): the pairs left for the CPU. Sorting goes on meanwhile.
-  virtual const std::vector<Undecided>& undecided() const = 0;
+  // After run(): the pairs left for the exact fallback on the CPU. Sorting goes on meanwhile.
+  virtual const std::vector<Candidate>& undecided() const = 0;
   virtual FrameResult finish() = 0;
   // Positions that live on the device, as host arrays.
   virtual Positions download(Positions on_device, int which) = 0;

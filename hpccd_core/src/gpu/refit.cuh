@@ -2,38 +2,38 @@
 // bvh/refit.cpp on the device: a warp a leaf; the last to arrive at a node carries on to its parent (Karras 2012).
 #pragma once
 
-#include "gpu/frame.cuh"
+#include "gpu/launch_params.cuh"
 
 namespace hpccd::gpu {
 
 // Boxes of a leaf's features and, in every lane, of the whole leaf; by one warp.
 template <class T>
-__device__ DeviceBox refit_leaf(const Frame<T>& f, u32 leaf) {
+__device__ DeviceBox refit_leaf(const LaunchParams<T>& params, u32 leaf) {
   const u32 lane = lane_number();
-  const DeviceLeaf l = f.leaves[leaf];
+  const DeviceLeaf l = params.leaves[leaf];
   const u32 n_faces = l.counts & 0xFF, n_edges = l.counts >> 8 & 0xFF, n_vertices = l.counts >> 16;
   const Bound top{{INFINITY, INFINITY, INFINITY}, 0}, bottom{{-INFINITY, -INFINITY, -INFINITY}, 0};
   DeviceBox whole{{top, top}, {bottom, bottom}};
   if (lane < n_faces) {
-    DeviceBox& face = f.face_boxes[l.first_face + lane];
-    const u32 c0 = face.tag_low(), c1 = face.tag_high(), c2 = f.face_corner2[l.first_face + lane];
-    DeviceBox b = load_point(&f.points[c0]);
-    include(b, load_point(&f.points[c1]));
-    include(b, load_point(&f.points[c2]));
+    DeviceBox& face = params.face_boxes[l.first_face + lane];
+    const u32 c0 = face.tag_low(), c1 = face.tag_high(), c2 = params.face_corner2[l.first_face + lane];
+    DeviceBox b = load_point(&params.points[c0]);
+    include(b, load_point(&params.points[c1]));
+    include(b, load_point(&params.points[c2]));
     b.tag_low() = c0, b.tag_high() = c1;
     store_box(&face, b);
     include(whole, b);
   }
   if (lane < n_edges) {
-    DeviceBox& edge = f.edge_boxes[l.first_edge + lane];
+    DeviceBox& edge = params.edge_boxes[l.first_edge + lane];
     const u32 v0 = edge.tag_low(), v1 = edge.tag_high();
-    DeviceBox b = load_point(&f.points[v0]);
-    include(b, load_point(&f.points[v1]));
+    DeviceBox b = load_point(&params.points[v0]);
+    include(b, load_point(&params.points[v1]));
     b.tag_low() = v0, b.tag_high() = v1;
     store_box(&edge, b);  // inside its triangle's box
   }
   if (lane < n_vertices)  // a lone vertex has no triangle
-    include(whole, load_point(&f.points[f.vertex_of_slot[l.first_vertex + lane]]));
+    include(whole, load_point(&params.points[params.vertex_of_slot[l.first_vertex + lane]]));
   for (int d = 16; d > 0; d /= 2) {
     DeviceBox other;
     for (int end = 0; end < 2; ++end)
@@ -44,36 +44,36 @@ __device__ DeviceBox refit_leaf(const Frame<T>& f, u32 leaf) {
     include(whole, other);
   }
   whole.tag_low() = 0, whole.tag_high() = leaf;
-  if (lane == 0) store_box(&f.leaf_boxes[leaf], whole);
+  if (lane == 0) store_box(&params.leaf_boxes[leaf], whole);
   return whole;
 }
 
 template <class T>
-__global__ void refit_leaves_kernel(Frame<T> f) {
+__global__ void refit_leaves_kernel(LaunchParams<T> params) {
   const u32 leaf = (blockIdx.x * blockDim.x + threadIdx.x) / 32;
-  if (leaf < f.n_leaves) refit_leaf(f, leaf);
+  if (leaf < params.n_leaves) refit_leaf(params, leaf);
 }
 
 template <class T>
-__global__ void refit_kernel(Frame<T> f) {
+__global__ void refit_kernel(LaunchParams<T> params) {
   const u32 leaf = (blockIdx.x * blockDim.x + threadIdx.x) / 32;
-  if (leaf >= f.n_leaves) return;
-  const DeviceBox whole = refit_leaf(f, leaf);
+  if (leaf >= params.n_leaves) return;
+  const DeviceBox whole = refit_leaf(params, leaf);
   if (lane_number() != 0) return;
-  u32 node = f.leaf_nodes[leaf];
-  store_box(&f.node_boxes[node], whole);
+  u32 node = params.leaf_nodes[leaf];
+  store_box(&params.node_boxes[node], whole);
   while (node != 0) {
-    node = f.node_parent[node];
+    node = params.node_parent[node];
     __threadfence();
-    if (atomicAdd(&f.node_arrivals[node], 1u) == 0) return;
+    if (atomicAdd(&params.node_arrivals[node], 1u) == 0) return;
     __threadfence();
-    f.node_arrivals[node] = 0;
-    const DeviceBox& own = f.node_boxes[node];
+    params.node_arrivals[node] = 0;
+    const DeviceBox& own = params.node_boxes[node];
     const u32 child = own.tag_low(), last = own.tag_high();
-    DeviceBox b = load_box_fresh(&f.node_boxes[child]);
-    include(b, load_box_fresh(&f.node_boxes[child + 1]));
+    DeviceBox b = load_box_fresh(&params.node_boxes[child]);
+    include(b, load_box_fresh(&params.node_boxes[child + 1]));
     b.tag_low() = child, b.tag_high() = last;
-    store_box(&f.node_boxes[node], b);
+    store_box(&params.node_boxes[node], b);
   }
 }
 
@@ -90,13 +90,13 @@ __device__ inline float area_of(const DeviceBox& b) {
 
 // Sum of the nodes' areas over the root's (Tree::area).
 template <class T>
-__global__ void area_kernel(Frame<T> f) {
+__global__ void area_kernel(LaunchParams<T> params) {
   double sum = 0;
-  for (u32 i = blockIdx.x * blockDim.x + threadIdx.x; i < f.n_nodes; i += gridDim.x * blockDim.x)
-    sum += area_of(load_box(&f.node_boxes[i]));
+  for (u32 i = blockIdx.x * blockDim.x + threadIdx.x; i < params.n_nodes; i += gridDim.x * blockDim.x)
+    sum += area_of(load_box(&params.node_boxes[i]));
   for (int d = 16; d > 0; d /= 2) sum += __shfl_xor_sync(all_lanes, sum, d);
-  const float area = area_of(load_box(&f.node_boxes[0]));
-  if (lane_number() == 0 && area > 0) atomicAdd(&f.counters->area, sum / area);
+  const float area = area_of(load_box(&params.node_boxes[0]));
+  if (lane_number() == 0 && area > 0) atomicAdd(&params.counters->area, sum / area);
 }
 
 }  // namespace hpccd::gpu

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "contacts/hash.h"
-#include "gpu/frame.cuh"
+#include "gpu/launch_params.cuh"
 
 namespace hpccd::gpu {
 
@@ -13,26 +13,26 @@ __global__ void number_kernel(u32* numbers, u32 n) {
 }
 
 template <class T>
-__global__ void results_kernel(Frame<T> f, const u64* keys, const u32* order, u32 n, u32 n_vf, uint2* vf, uint4* ee,
-                               double* toc) {
+__global__ void results_kernel(LaunchParams<T> params, const u64* keys, const u32* order, u32 n, u32 n_vf, uint2* vf,
+                               uint4* ee, double* toc) {
   u64 hash = 0;
   for (u32 i = blockIdx.x * blockDim.x + threadIdx.x; i < n; i += gridDim.x * blockDim.x) {
-    const u64 key = keys[i], features = key & ((u64{1} << f.kind_shift) - 1);
-    const u32 first = static_cast<u32>(features >> f.key_shift);
-    const u32 second = static_cast<u32>(features & ((u64{1} << f.key_shift) - 1));
-    const double t = f.found_tocs[order[i]];
+    const u64 key = keys[i], features = key & ((u64{1} << params.kind_shift) - 1);
+    const u32 first = static_cast<u32>(features >> params.key_shift);
+    const u32 second = static_cast<u32>(features & ((u64{1} << params.key_shift) - 1));
+    const double t = params.found_tocs[order[i]];
     toc[i] = t;
     if (i < n_vf) {
       vf[i] = {first, second};
       hash += hash_of(Kind::vertex_face, first, second, t);
     } else {
-      const uint2 a = f.edges[first], b = f.edges[second];
+      const uint2 a = params.edges[first], b = params.edges[second];
       ee[i - n_vf] = {a.x, a.y, b.x, b.y};
       hash += hash_of(Kind::edge_edge, pack(a.x, a.y), pack(b.x, b.y), t);
     }
   }
   for (int d = 16; d > 0; d /= 2) hash += __shfl_xor_sync(all_lanes, hash, d);
-  if (lane_number() == 0 && hash) atomicAdd(&f.counters->hash, hash);
+  if (lane_number() == 0 && hash) atomicAdd(&params.counters->hash, hash);
 }
 
 }  // namespace hpccd::gpu

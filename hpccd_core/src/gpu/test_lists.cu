@@ -24,27 +24,27 @@ int blocks_that_fit(const void* kernel, unsigned threads, const char* name) {
 
 // As many blocks as fit take work until there is none.
 template <class Kernel, class T>
-void persistent(Kernel kernel, unsigned threads, const Frame<T>& f, int multiprocessors, cudaStream_t stream,
-                const char* name) {
+void persistent(Kernel kernel, unsigned threads, const LaunchParams<T>& params, int multiprocessors,
+                cudaStream_t stream, const char* name) {
   const int blocks = blocks_that_fit(reinterpret_cast<const void*>(kernel), threads, name);
-  kernel<<<static_cast<unsigned>(blocks * multiprocessors), threads, 0, stream>>>(f);
+  kernel<<<static_cast<unsigned>(blocks * multiprocessors), threads, 0, stream>>>(params);
   check_launch(name);
 }
 
 }  // namespace
 
 template <class T>
-void TestLists::launch(Frame<T>& f, int multiprocessors, cudaStream_t stream, StageTimer& timer) {
+void TestLists::launch(LaunchParams<T>& params, int multiprocessors, cudaStream_t stream, StageTimer& timer) {
   const auto list = [](const DeviceBuffer<uint2>& b) { return PairList{b.data(), b.size()}; };
   for (int k = 0; k < 2; ++k)
-    f.survivors[k] = list(survivors_[k]), f.single[k] = list(single_[k]), f.many[k] = list(many_[k]);
-  f.undecided = undecided_.data(), f.undecided_capacity = undecided_.size();
-  f.to_host = to_host_.data(), f.to_host_capacity = to_host_.size();
-  f.n_segments = n_segments_;
+    params.survivors[k] = list(survivors_[k]), params.single[k] = list(single_[k]), params.many[k] = list(many_[k]);
+  params.undecided = undecided_.data(), params.undecided_capacity = undecided_.size();
+  params.to_host = to_host_.data(), params.to_host_capacity = to_host_.size();
+  params.n_segments = n_segments_;
   const auto run = [&](auto kernel, unsigned threads, const char* name) {
-    persistent(kernel, threads, f, multiprocessors, stream, name);
+    persistent(kernel, threads, params, multiprocessors, stream, name);
   };
-  for (f.segment = 0; f.segment < n_segments_; ++f.segment) {
+  for (params.segment = 0; params.segment < n_segments_; ++params.segment) {
     run(candidates_kernel<T>, 32 * candidate_warps, "candidates_kernel");
     timer.mark("candidates", stream);
     run(projection_kernel<Kind::vertex_face, T>, 128, "projection_kernel");
@@ -56,15 +56,15 @@ void TestLists::launch(Frame<T>& f, int multiprocessors, cudaStream_t stream, St
     run(roots_kernel<Kind::vertex_face, false, T>, 128, "roots_kernel");
     run(roots_kernel<Kind::edge_edge, false, T>, 128, "roots_kernel");
     timer.mark("many_roots", stream);
-    end_segment_kernel<<<1, 1, 0, stream>>>(f);
+    end_segment_kernel<<<1, 1, 0, stream>>>(params);
     check_launch("end_segment_kernel");
   }
-  last_resort_kernel<<<static_cast<unsigned>(2 * multiprocessors), 32, 0, stream>>>(f);
-  check_launch("last_resort_kernel");
+  fallback_kernel<<<static_cast<unsigned>(2 * multiprocessors), 32, 0, stream>>>(params);
+  check_launch("fallback_kernel");
   timer.mark("last_resort", stream);
 }
 
-template void TestLists::launch(Frame<float>&, int, cudaStream_t, StageTimer&);
-template void TestLists::launch(Frame<double>&, int, cudaStream_t, StageTimer&);
+template void TestLists::launch(LaunchParams<float>&, int, cudaStream_t, StageTimer&);
+template void TestLists::launch(LaunchParams<double>&, int, cudaStream_t, StageTimer&);
 
 }  // namespace hpccd::gpu

@@ -2,7 +2,7 @@
 // The lists between the stages of the elementary tests, and the stages themselves: from pairs of leaves to contacts.
 #pragma once
 
-#include "gpu/frame.cuh"
+#include "gpu/launch_params.cuh"
 #include "gpu/stream.h"
 
 namespace hpccd::gpu {
@@ -33,8 +33,11 @@ class TestLists {
     to_host_.reserve(s.to_host);
   }
   Sizes sizes() const {
-    return {{survivors_[0].size(), survivors_[1].size()}, {single_[0].size(), single_[1].size()},
-            {many_[0].size(), many_[1].size()}, undecided_.size(), to_host_.size()};
+    return {{survivors_[0].size(), survivors_[1].size()},
+            {single_[0].size(), single_[1].size()},
+            {many_[0].size(), many_[1].size()},
+            undecided_.size(),
+            to_host_.size()};
   }
 
   template <class Visit>
@@ -46,7 +49,7 @@ class TestLists {
   // All stages on pairs of leaves that the frame lists; the frame's counters were cleared, its contacts have a place.
   // Defined for float and double.
   template <class T>
-  void launch(Frame<T>& f, int multiprocessors, cudaStream_t stream, StageTimer& timer);
+  void launch(LaunchParams<T>& params, int multiprocessors, cudaStream_t stream, StageTimer& timer);
 
   // Makes room where a list was too short. True where the pairs must be tested again.
   bool grow(const Counters& c) {

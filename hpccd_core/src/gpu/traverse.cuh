@@ -4,7 +4,7 @@
 // overlap is reached whatever the way down.
 #pragma once
 
-#include "gpu/frame.cuh"
+#include "gpu/launch_params.cuh"
 
 namespace hpccd::gpu {
 
@@ -15,40 +15,41 @@ inline constexpr u32 traverse_stack = 32 * (traverse_depth + 2);
 inline constexpr u32 traverse_found = 128;
 
 template <class T>
-__device__ bool meshes_enabled(const Frame<T>& f, u32 mesh_a, u32 mesh_b) {
+__device__ bool meshes_enabled(const LaunchParams<T>& params, u32 mesh_a, u32 mesh_b) {
   if (mesh_a == no_mesh || mesh_b == no_mesh) return true;
-  return f.enabled[mesh_a * f.n_meshes + mesh_b];
+  return params.enabled[mesh_a * params.n_meshes + mesh_b];
 }
 
 template <class T>
-__global__ __launch_bounds__(32 * traverse_warps) void traverse_kernel(Frame<T> f) {
+__global__ __launch_bounds__(32 * traverse_warps) void traverse_kernel(LaunchParams<T> params) {
   __shared__ u32 stacks[traverse_warps][traverse_stack];
   __shared__ u32 founds[traverse_warps][traverse_found];
   const u32 lane = lane_number(), warp = threadIdx.x / 32, below = (1u << lane) - 1;
   const u32 leaf = blockIdx.x * traverse_warps + warp;
-  if (leaf >= f.n_leaves) return;
+  if (leaf >= params.n_leaves) return;
   u32* stack = stacks[warp];
   u32* found = founds[warp];
   u32 n_stack = 0, n_found = 0;
   u64 tests = 0;
-  const DeviceBox box = load_box(&f.leaf_boxes[leaf]);
-  const u32 mesh = f.enabled ? f.node_mesh[f.leaf_nodes[leaf]] : no_mesh;
+  const DeviceBox box = load_box(&params.leaf_boxes[leaf]);
+  const u32 mesh = params.enabled ? params.node_mesh[params.leaf_nodes[leaf]] : no_mesh;
 
   const auto flush = [&] {
     __syncwarp();
     u64 base = 0;
-    if (lane == 0) base = atomicAdd(&f.counters->leaf_pairs, static_cast<u64>(n_found));
+    if (lane == 0) base = atomicAdd(&params.counters->leaf_pairs, static_cast<u64>(n_found));
     base = __shfl_sync(all_lanes, base, 0);
     for (u32 i = lane; i < n_found; i += 32)
-      if (base + i < f.leaf_pairs.capacity) f.leaf_pairs.pairs[base + i] = {leaf, found[i]};
+      if (base + i < params.leaf_pairs.capacity) params.leaf_pairs.pairs[base + i] = {leaf, found[i]};
     __syncwarp();
     n_found = 0;
   };
   // Keeps a node of the lane: leaves go to the list, others on the stack.
   const auto keep = [&](bool wanted, u32 node, const DeviceBox& b) {
     const bool hit = wanted && b.tag_high() >= leaf && overlap(box, b) &&
-                     (!f.enabled || meshes_enabled(f, mesh, f.node_mesh[node]));
-    const u32 leaves = __ballot_sync(all_lanes, hit && b.tag_low() == 0), inner = __ballot_sync(all_lanes, hit && b.tag_low() != 0);
+                     (!params.enabled || meshes_enabled(params, mesh, params.node_mesh[node]));
+    const u32 leaves = __ballot_sync(all_lanes, hit && b.tag_low() == 0),
+              inner = __ballot_sync(all_lanes, hit && b.tag_low() != 0);
     if (hit && b.tag_low() == 0) found[n_found + __popc(leaves & below)] = b.tag_high();
     if (hit && b.tag_low() != 0) stack[n_stack + __popc(inner & below)] = b.tag_low();
     n_found += __popc(leaves);
@@ -56,7 +57,7 @@ __global__ __launch_bounds__(32 * traverse_warps) void traverse_kernel(Frame<T> 
     if (n_found > traverse_found - 32) flush();
   };
 
-  keep(lane == 0, 0, load_box(&f.node_boxes[0]));
+  keep(lane == 0, 0, load_box(&params.node_boxes[0]));
   while (n_stack > 0) {
     __syncwarp();
     const u32 n = n_stack < 32 ? n_stack : 32;
@@ -65,12 +66,13 @@ __global__ __launch_bounds__(32 * traverse_warps) void traverse_kernel(Frame<T> 
     __syncwarp();
     n_stack -= n;
     tests += 2 * n;
-    const DeviceBox left = load_box(&f.node_boxes[child]), right = load_box(&f.node_boxes[active ? child + 1 : 0]);
+    const DeviceBox left = load_box(&params.node_boxes[child]),
+                    right = load_box(&params.node_boxes[active ? child + 1 : 0]);
     keep(active, child, left);
     keep(active, child + 1, right);
   }
   if (n_found > 0) flush();
-  if (lane == 0) atomicAdd(&f.counters->node_tests, tests);
+  if (lane == 0) atomicAdd(&params.counters->node_tests, tests);
 }
 
 }  // namespace hpccd::gpu

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // In builds without CUDA.
 #include "gpu/device.h"
-#include "gpu/hybrid_devices.h"
 #include "gpu/memory_on_device.h"
 #include "gpu/pipeline.h"
 
@@ -18,10 +17,6 @@ CallersDevice::~CallersDevice() = default;
 void fail_after(int) {}
 
 std::unique_ptr<Pipeline> Pipeline::create(const Scene&, const Features&, Accuracy, int, bool) {
-  throw Error(status().reason);
-}
-
-std::vector<std::unique_ptr<hybrid::TestDevice>> hybrid_devices(const Scene&, const Features&, Accuracy, int) {
   throw Error(status().reason);
 }
 

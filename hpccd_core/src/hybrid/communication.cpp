@@ -5,27 +5,9 @@
 #include <exception>
 #include <utility>
 
-#include "base/pause.h"
+#include "base/active_wait.h"
 
 namespace hpccd::hybrid {
-namespace {
-
-// Active waiting at first; where that takes long, the core is left to others, who may have the work that is waited for.
-class Patience {
- public:
-  void wait() {
-    if (++turns_ < 2000)
-      pause();
-    else
-      std::this_thread::yield();
-  }
-  void reset() { turns_ = 0; }
-
- private:
-  int turns_ = 0;
-};
-
-}  // namespace
 
 Communication::Communication(Devices& devices, TriangleIndexQueue& queue, std::vector<SegmentSupply>& supplies)
     : devices_(devices), queue_(queue), supplies_(supplies), under_way_(devices.size(), 0) {
@@ -52,7 +34,8 @@ void Communication::begin_frame(Positions t0, Positions t1) {
   t0_ = t0, t1_ = t1;
   failed_ = false;
   error_.clear();
-  output_.found.clear();
+  output_.vertex_face.clear();
+  output_.edge_edge.clear();
   output_.undecided.clear();
   output_.counts[0] = output_.counts[1] = {};
   counts_ = {};
@@ -75,7 +58,7 @@ void Communication::cancel() {
 }
 
 void Communication::wait_until_idle() {
-  for (Patience patience; stage_.load(std::memory_order_acquire) != Stage::idle;) patience.wait();
+  for (ActiveWait wait; stage_.load(std::memory_order_acquire) != Stage::idle;) wait.turn();
 }
 
 void Communication::work() {
@@ -98,7 +81,7 @@ void Communication::work() {
       queued_ = 0;
     }
     // The frame goes on without this thread until the caller knows.
-    for (Patience patience; stage_ != Stage::draining && stage_ != Stage::canceled;) patience.wait();
+    for (ActiveWait wait; stage_ != Stage::draining && stage_ != Stage::canceled;) wait.turn();
     stage_.store(Stage::idle, std::memory_order_release);
   }
 }
@@ -108,16 +91,16 @@ void Communication::frame() {
   wait_for_traversal();
   if (stage_ == Stage::canceled) return;
   for (auto& device : devices_) device->begin_traversal(leaves_);
-  Patience patience;
+  ActiveWait wait;
   for (std::size_t turns_without = 0;;) {
     // Looked at first: what comes to light afterwards in a whole round of the window was full before.
     const Stage stage = stage_.load(std::memory_order_acquire);
     if (stage == Stage::canceled) return;
-    const bool sent = send(stage == Stage::draining), taken = take_in(), handed = hand_out();
+    const bool sent = send(stage == Stage::draining), taken = collect_ready(), handed = hand_out();
     if (sent || taken || handed)
-      turns_without = 0, patience.reset();
+      turns_without = 0, wait.reset();
     else
-      ++turns_without, patience.wait();
+      ++turns_without, wait.turn();
     if (stage != Stage::draining) turns_without = 0;
     const std::size_t round = queue_.size() / queue_.window() + 1;
     if (elements_.empty() && turns_without > round) return;
@@ -126,8 +109,8 @@ void Communication::frame() {
 
 void Communication::wait_for_traversal() {
   // Threads ask for segments before the traversal begins, and each gets its two.
-  for (Patience patience; stage_ == Stage::positions;)
-    if (!hand_out()) patience.wait();
+  for (ActiveWait wait; stage_ == Stage::positions;)
+    if (!hand_out()) wait.turn();
 }
 
 std::size_t Communication::Element::segments() const {
@@ -138,10 +121,10 @@ std::size_t Communication::Element::segments() const {
 
 // One run of consecutive segments, as published. When the traversal has ended, all that is left goes together: segments
 // that were not filled up lie anywhere, and a call for each would be what the frame waits for.
-std::vector<Run> Communication::take_runs(bool all) {
+std::vector<Run> Communication::pop_runs(bool all) {
   std::vector<Run> runs;
   for (std::size_t looks = all ? queue_.size() / queue_.window() + 1 : 1; looks > 0; --looks)
-    while (const auto run = queue_.take_run()) {
+    while (const auto run = queue_.pop_run()) {
       runs.push_back(*run);
       if (!all) break;
     }
@@ -153,7 +136,7 @@ bool Communication::send(bool traversal_has_ended) {
   for (std::size_t i = 0; i < devices_.size(); ++i)
     if (under_way_[i] < devices_[i]->slots() && (best == devices_.size() || under_way_[i] < under_way_[best])) best = i;
   if (best == devices_.size()) return false;
-  std::vector<Run> runs = take_runs(traversal_has_ended);
+  std::vector<Run> runs = pop_runs(traversal_has_ended);
   if (runs.empty()) return false;
   std::vector<Piece> pieces;
   for (const Run& run : runs) pieces.push_back({queue_.pairs(run.first), run.pairs});
@@ -168,7 +151,7 @@ bool Communication::send(bool traversal_has_ended) {
   return true;
 }
 
-bool Communication::take_in() {
+bool Communication::collect_ready() {
   bool any = false;
   for (auto e = elements_.begin(); e != elements_.end();) {
     if (!devices_[e->device]->ready(e->ticket)) {
@@ -189,7 +172,7 @@ bool Communication::hand_out() {
   bool any = false;
   for (SegmentSupply& supply : supplies_)
     while (supply.wanted()) {
-      const auto s = queue_.take_empty();
+      const auto s = queue_.pop_empty();
       if (!s) return any;
       supply.give(*s);
       any = true;

@@ -63,8 +63,8 @@ class Communication {
   void frame();
   void wait_for_traversal();
   bool send(bool traversal_has_ended);
-  std::vector<Run> take_runs(bool all);
-  bool take_in();
+  std::vector<Run> pop_runs(bool all);
+  bool collect_ready();
   bool hand_out();
 
   Devices& devices_;

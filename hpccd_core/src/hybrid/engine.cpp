@@ -24,31 +24,30 @@ Engine::Engine(Communication::Devices devices, const Sizes& sizes, ThreadPool& p
   for (SegmentSupply& supply : supplies_) sinks_.emplace_back(queue_, supply, communication_);
 }
 
-void Engine::begin_traversal(const LeafTable& leaves, TestHere test_here, std::vector<Worker>& workers) {
-  test_here_ = std::move(test_here);
+void Engine::begin_traversal(const LeafTable& leaves, std::vector<Worker>& workers) {
   for (std::size_t i = 0; i < workers.size(); ++i) {
-    sinks_[i].begin(test_here_);
+    sinks_[i].begin();
     workers[i].sink = &sinks_[i];
   }
   communication_.begin_traversal(leaves);
 }
 
-bool Engine::finish(std::vector<Worker>& workers, Profiler& profiler) {
+Finished Engine::finish(std::vector<Worker>& workers, Profiler& profiler) {
   for (Worker& w : workers) w.sink = nullptr;
   for (SegmentSink& sink : sinks_) sink.flush();
   communication_.finish();
   profiler.mark("gpu_wait");
   exact_on_cpu_ = pairs_on_cpu_ = without_segment_ = 0;
-  for (const SegmentSink& sink : sinks_)
-    pairs_on_cpu_ += sink.tested_here(), without_segment_ += sink.without_segment();
-  const bool complete = !communication_.failed();
-  if (!complete) {
-    test_leftovers(workers);
+  for (const SegmentSink& sink : sinks_) pairs_on_cpu_ += sink.given_back(), without_segment_ += sink.without_segment();
+  Finished finished{!communication_.failed(), {}};
+  if (!finished.complete) {
+    finished.untested = untested();
+    pairs_on_cpu_ += finished.untested.size();
     reset();
   }
   merge(workers);
   profiler.mark("gpu_merge");
-  return complete;
+  return finished;
 }
 
 void Engine::cancel(std::vector<Worker>& workers) {
@@ -57,42 +56,31 @@ void Engine::cancel(std::vector<Worker>& workers) {
   reset();
 }
 
-void Engine::test_leftovers(std::vector<Worker>& workers) {
-  std::vector<SegmentNumber> left;
+// All that was handed over and has not come back.
+std::vector<LeafPair> Engine::untested() const {
+  std::vector<LeafPair> pairs;
   for (SegmentNumber s = 0; s < queue_.size(); ++s)
-    if (queue_.state(s) == SegmentState::full) left.push_back(s);
-  parallel_for(pool_, left.size(), 1, [&](std::size_t begin, std::size_t end, int thread) {
-    for (std::size_t i = begin; i < end; ++i) {
-      const IndexPair* pairs = queue_.pairs(left[i]);
-      for (std::size_t k = 0; k < queue_.filled(left[i]); ++k) test_here_(workers[thread], pairs[k]);
-    }
-  });
-  for (SegmentNumber s : left) pairs_on_cpu_ += queue_.filled(s);
-  for (Worker& w : workers) w.flush();
+    if (queue_.state(s) == SegmentState::full)
+      pairs.insert(pairs.end(), queue_.pairs(s), queue_.pairs(s) + queue_.filled(s));
+  return pairs;
 }
 
 void Engine::merge(std::vector<Worker>& workers) {
   const Output& output = communication_.output();
   // 20 us each: one at a time.
   parallel_for(pool_, output.undecided.size(), 1, [&](std::size_t begin, std::size_t end, int thread) {
-    for (std::size_t i = begin; i < end; ++i) {
-      const UndecidedPair& p = output.undecided[i];
-      workers[thread].resolve(p.kind, p.first, p.second, Accuracy::exact);
-    }
+    for (std::size_t i = begin; i < end; ++i) workers[thread].resolve(output.undecided[i], Accuracy::exact);
   });
-  parallel_for(pool_, output.found.size(), 1024, [&](std::size_t begin, std::size_t end, int thread) {
-    for (std::size_t i = begin; i < end; ++i) {
-      const DeviceContact& f = output.found[i];
-      workers[thread].report(f.kind, f.first, f.second, f.toc);
-    }
+  const std::size_t n_vf = output.vertex_face.size();
+  parallel_for(pool_, n_vf + output.edge_edge.size(), 1024, [&](std::size_t begin, std::size_t end, int thread) {
+    for (std::size_t i = begin; i < end; ++i)
+      if (i < n_vf)
+        workers[thread].report(Kind::vertex_face, output.vertex_face[i]);
+      else
+        workers[thread].report(Kind::edge_edge, output.edge_edge[i - n_vf]);
   });
   exact_on_cpu_ = output.undecided.size();
-  for (int k = 0; k < 2; ++k) {
-    BatchCounts& sum = workers[0].counts[k];
-    const BatchCounts& c = output.counts[k];
-    sum.tested += c.tested, sum.coplanarity += c.coplanarity, sum.projection += c.projection;
-    sum.roots += c.roots, sum.contacts += c.contacts, sum.undecided += c.undecided;
-  }
+  for (int k = 0; k < 2; ++k) workers[0].counts[k] += output.counts[k];
 }
 
 void Engine::reset() {

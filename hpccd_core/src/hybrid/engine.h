@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Section 5 of Kim et al. 2009 as the detector sees it: positions are sent while the hierarchy is refitted, the CPU
 // threads' traversal hands pairs of leaves to the devices, and what these find joins what the threads found. What a
-// device that fails leaves undone is done on the CPU: no contact is lost.
+// device that fails leaves undone is given back: no contact is lost.
 #pragma once
 
 #include <deque>
@@ -16,6 +16,12 @@ struct Sizes {
   std::size_t segments = 128, segment_pairs = 2048;
 };
 
+// What the devices leave to the caller: nothing, unless one has failed.
+struct Finished {
+  bool complete;                   // false: see Engine::error()
+  std::vector<LeafPair> untested;  // to be tested by the caller
+};
+
 class Engine {
  public:
   // At least one device. Queues too short for the threads (four segments each) are lengthened.
@@ -24,9 +30,9 @@ class Engine {
   // Returns at once. The positions must stay unchanged until finish() or cancel() has returned.
   void begin_frame(Positions t0, Positions t1) { communication_.begin_frame(t0, t1); }
   // The workers' pairs go to the devices from here on.
-  void begin_traversal(const LeafTable& leaves, TestHere test_here, std::vector<Worker>& workers);
-  // Waits for the devices; afterwards the workers hold all contacts. False where a device failed: error().
-  bool finish(std::vector<Worker>& workers, Profiler& profiler);
+  void begin_traversal(const LeafTable& leaves, std::vector<Worker>& workers);
+  // Waits for the devices; afterwards the workers hold what they found.
+  Finished finish(std::vector<Worker>& workers, Profiler& profiler);
   // Where a frame cannot go on.
   void cancel(std::vector<Worker>& workers);
 
@@ -34,7 +40,7 @@ class Engine {
   void count(std::map<std::string, std::uint64_t>& stats) const;
 
  private:
-  void test_leftovers(std::vector<Worker>& workers);
+  std::vector<LeafPair> untested() const;
   void merge(std::vector<Worker>& workers);
   void reset();
 
@@ -44,7 +50,6 @@ class Engine {
   Communication communication_;
   std::deque<SegmentSink> sinks_;
   ThreadPool& pool_;
-  TestHere test_here_;
   std::uint64_t pairs_on_cpu_ = 0, without_segment_ = 0, exact_on_cpu_ = 0;
 };
 
@@ -57,7 +62,7 @@ class FrameGuard {
   }
   FrameGuard(const FrameGuard&) = delete;
   FrameGuard& operator=(const FrameGuard&) = delete;
-  bool finish(Profiler& profiler) {
+  Finished finish(Profiler& profiler) {
     done_ = true;
     return engine_.finish(workers_, profiler);
   }

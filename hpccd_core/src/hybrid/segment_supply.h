@@ -13,7 +13,7 @@ class alignas(64) SegmentSupply {
  public:
   // The CPU thread's side.
   void request() { wanted_.fetch_add(1, std::memory_order_release); }
-  std::optional<SegmentNumber> take() {
+  std::optional<SegmentNumber> receive() {
     for (auto& place : places_)
       if (const SegmentNumber s = place.exchange(none, std::memory_order_acquire); s != none) return s;
     return std::nullopt;

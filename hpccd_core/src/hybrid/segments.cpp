@@ -6,7 +6,7 @@
 
 namespace hpccd::hybrid {
 
-TriangleIndexQueue::TriangleIndexQueue(std::shared_ptr<IndexPair[]> memory, std::size_t segments,
+TriangleIndexQueue::TriangleIndexQueue(std::shared_ptr<LeafPair[]> memory, std::size_t segments,
                                        std::size_t segment_pairs)
     : memory_(std::move(memory)),
       n_(segments),
@@ -19,7 +19,7 @@ void TriangleIndexQueue::set_full(SegmentNumber s, std::size_t filled) {
   segments_[s].state.store(SegmentState::full, std::memory_order_release);
 }
 
-std::optional<SegmentNumber> TriangleIndexQueue::take_empty() {
+std::optional<SegmentNumber> TriangleIndexQueue::pop_empty() {
   for (std::size_t i = 0; i < n_; ++i) {
     const SegmentNumber s = front_;
     front_ = (front_ + 1) % n_;
@@ -30,7 +30,7 @@ std::optional<SegmentNumber> TriangleIndexQueue::take_empty() {
   return std::nullopt;
 }
 
-std::optional<Run> TriangleIndexQueue::take_run() {
+std::optional<Run> TriangleIndexQueue::pop_run() {
   // A run ends where the memory ends, and after a segment that is not filled up: its pairs end there.
   for (std::size_t i = 0; i < window_; ++i) {
     const SegmentNumber first = (window_begin_ + i) % n_;

@@ -29,12 +29,12 @@ struct Run {
 class TriangleIndexQueue {
  public:
   // Memory for segments * segment_pairs pairs.
-  TriangleIndexQueue(std::shared_ptr<IndexPair[]> memory, std::size_t segments, std::size_t segment_pairs);
+  TriangleIndexQueue(std::shared_ptr<LeafPair[]> memory, std::size_t segments, std::size_t segment_pairs);
 
   std::size_t size() const { return n_; }
   std::size_t segment_pairs() const { return segment_pairs_; }
   std::size_t window() const { return window_; }
-  IndexPair* pairs(SegmentNumber s) const { return memory_.get() + s * segment_pairs_; }
+  LeafPair* pairs(SegmentNumber s) const { return memory_.get() + s * segment_pairs_; }
   SegmentState state(SegmentNumber s) const { return segments_[s].state.load(std::memory_order_acquire); }
   std::size_t filled(SegmentNumber s) const { return segments_[s].filled; }
 
@@ -44,10 +44,10 @@ class TriangleIndexQueue {
   // The rest is for the communication thread alone.
 
   // The empty segment at the front pointer, now partial; the pointer goes on to the next empty one.
-  std::optional<SegmentNumber> take_empty();
+  std::optional<SegmentNumber> pop_empty();
   // The first run of full segments in the window that have not been sent. The window slides right after it; without a
   // run it slides by its own length, for partial segments are looked at again when it comes back.
-  std::optional<Run> take_run();
+  std::optional<Run> pop_run();
   // Finished: empty again.
   void release(const Run& run);
   // All empty, whatever they were.
@@ -61,7 +61,7 @@ class TriangleIndexQueue {
   };
   bool can_be_sent(SegmentNumber s) const { return state(s) == SegmentState::full && !segments_[s].sent; }
 
-  std::shared_ptr<IndexPair[]> memory_;
+  std::shared_ptr<LeafPair[]> memory_;
   std::size_t n_, segment_pairs_, window_;
   std::unique_ptr<Segment[]> segments_;
   SegmentNumber front_ = 0, window_begin_ = 0;

@@ -3,44 +3,47 @@
 
 namespace hpccd::hybrid {
 
-void SegmentSink::begin(const TestHere& test_here) {
-  test_here_ = &test_here;
-  tested_here_ = without_segment_ = 0;
+std::span<const LeafPair> SegmentSink::push(LeafPair pair) {
+  if (!segment_ && !begin_segment()) {
+    alone_ = pair;
+    ++given_back_;
+    return {&alone_, 1};
+  }
+  pairs_[n_++] = pair;
+  if (n_ < queue_.segment_pairs()) return {};
+  return make_room();
 }
 
-void SegmentSink::take(std::uint32_t a, std::uint32_t b, Worker& worker) {
-  if (n_ == end_) make_room(worker);
-  if (n_ == end_) {  // no segment: nothing was handed out, or nobody takes it any more
-    ++tested_here_;
-    (*test_here_)(worker, {a, b});
-    return;
-  }
-  pairs_[n_++] = {a, b};
+// False: none was handed out, or nobody takes it any more.
+bool SegmentSink::begin_segment() {
+  if (communication_.failed()) return false;
+  segment_ = supply_.receive();
+  if (!segment_) return false;
+  pairs_ = queue_.pairs(*segment_);
+  n_ = 0;
+  return true;
 }
 
-void SegmentSink::make_room(Worker& worker) {
-  if (communication_.failed()) {
-    if (segment_) test_here(0, worker);
-    return;
-  }
-  if (!segment_) {
-    segment_ = supply_.take();
-    if (!segment_) return;
-    pairs_ = queue_.pairs(*segment_);
-    n_ = 0, end_ = queue_.segment_pairs();
-    return;
-  }
+std::span<const LeafPair> SegmentSink::make_room() {
+  if (communication_.failed()) return give_back(0);
   // Half of the segment stays for the devices; the thread goes on filling the other half.
-  if (communication_.devices_lag()) return test_here(end_ / 2, worker);
-  const auto other = supply_.take();
+  if (communication_.devices_lag()) return give_back(n_ / 2);
+  const auto other = supply_.receive();
   if (!other) {
     ++without_segment_;
-    return test_here(end_ / 2, worker);
+    return give_back(n_ / 2);
   }
   hand_over();
   segment_ = other;
   pairs_ = queue_.pairs(*other);
-  n_ = 0, end_ = queue_.segment_pairs();
+  return {};
+}
+
+std::span<const LeafPair> SegmentSink::give_back(std::size_t begin) {
+  const std::span<const LeafPair> back(pairs_ + begin, n_ - begin);
+  given_back_ += back.size();
+  n_ = begin;
+  return back;
 }
 
 void SegmentSink::flush() {
@@ -50,19 +53,12 @@ void SegmentSink::flush() {
 void SegmentSink::hand_over() {
   queue_.set_full(*segment_, n_);
   supply_.request();
-  segment_.reset();
-  n_ = end_ = 0;
+  reset();
 }
 
 void SegmentSink::reset() {
   segment_.reset();
-  n_ = end_ = 0;
-}
-
-void SegmentSink::test_here(std::size_t begin, Worker& worker) {
-  for (std::size_t i = begin; i < n_; ++i) (*test_here_)(worker, pairs_[i]);
-  tested_here_ += n_ - begin;
-  n_ = begin;
+  n_ = 0;
 }
 
 }  // namespace hpccd::hybrid

@@ -11,14 +11,11 @@
 
 #include "bvh/tree.h"
 #include "elementary/batch.h"
+#include "elementary/pair.h"
 #include "hpccd/hpccd.h"
+#include "traverse/worker.h"
 
 namespace hpccd::hybrid {
-
-// Two leaves whose boxes overlap. For the published methods a leaf is one triangle: the paper's triangle indices.
-struct IndexPair {
-  std::uint32_t first, second;
-};
 
 // The features in each leaf. `version` changes with the leaves.
 struct LeafTable {
@@ -27,27 +24,16 @@ struct LeafTable {
   std::uint64_t version = 0;
 };
 
-struct DeviceContact {
-  std::uint32_t first, second;
-  Kind kind;
-  double toc;
-};
-// A pair that only exact arithmetic on the CPU decides.
-struct UndecidedPair {
-  std::uint32_t first, second;
-  Kind kind;
-};
-
 // What elements of the GPU task queue bring back.
 struct Output {
-  std::vector<DeviceContact> found;
-  std::vector<UndecidedPair> undecided;
-  BatchCounts counts[2];  // vertex-face, edge-edge
+  std::vector<Contact> vertex_face, edge_edge;
+  std::vector<Candidate> undecided;  // only exact arithmetic on the CPU decides these
+  BatchCounts counts[2];             // vertex-face, edge-edge
 };
 
 // Index pairs that lie together in memory.
 struct Piece {
-  const IndexPair* pairs;
+  const LeafPair* pairs;
   std::size_t n;
 };
 
@@ -57,8 +43,8 @@ class TestDevice {
  public:
   virtual ~TestDevice() = default;
   // Memory that the device reads index pairs from while other threads write elsewhere in it.
-  virtual std::shared_ptr<IndexPair[]> pair_memory(std::size_t n) {
-    return std::shared_ptr<IndexPair[]>(new IndexPair[n]);
+  virtual std::shared_ptr<LeafPair[]> pair_memory(std::size_t n) {
+    return std::shared_ptr<LeafPair[]>(new LeafPair[n]);
   }
 
   // A new frame: its positions begin to travel. The arrays stay unchanged until the frame has ended.

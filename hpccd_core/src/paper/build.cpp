@@ -18,7 +18,7 @@ void split_subtree(Hierarchy& h, NodeIndex n, const Features& features) {
 
 void build(Hierarchy& h, const Features& features, const std::vector<Box>& vertex_boxes, ThreadPool& pool) {
   h.heed(pool.cancellation());
-  bound_carriers(h, features, vertex_boxes, pool);
+  bound_primitives(h, features, vertex_boxes, pool);
   h.start(features);
   const auto enough = 8 * static_cast<std::size_t>(pool.size());
   const BreadthFirstFront front = breadth_first_front(h, enough, [&](NodeIndex n) {

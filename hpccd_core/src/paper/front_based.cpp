@@ -3,6 +3,7 @@
 // which Kim et al. 2009 compare in section 6.3: the front of the traversal tree is kept from step to step and dealt out
 // to the threads. It names nodes, so the hierarchy is refitted, never restructured; where that has lost too much,
 // hierarchy and front start anew.
+#include "bvh/tree.h"
 #include "paper/build.h"
 #include "paper/front.h"
 #include "paper/method.h"
@@ -29,8 +30,7 @@ class FrontBased final : public MethodEngine {
     if (whole_) {
       refit(h_, context_.features, vertex_boxes, context_.pool);
       profiler.mark("refit");
-      constexpr double worn_out = 1.5;  // as for the default traversal
-      whole_ = relative_area(h_) <= worn_out * area_when_built_;
+      whole_ = !worn_out(relative_area(h_), area_when_built_);
     }
     if (!whole_) {
       build(h_, context_.features, vertex_boxes, context_.pool);

@@ -49,11 +49,11 @@ void median(std::uint32_t* items, std::uint32_t n, std::uint32_t half, const std
 
 void Hierarchy::start(const Features& features) {
   nodes.clear();
-  order.resize(features.n_carriers());
+  order.resize(features.n_primitives());
   std::iota(order.begin(), order.end(), 0);
   if (order.empty()) return;
   resize(nodes, 2 * order.size() - 1, *cancellation_);
-  make_child(0, 0, features.n_carriers(), features);
+  make_child(0, 0, features.n_primitives(), features);
 }
 
 void Hierarchy::split(NodeIndex n, const Features& features) {
@@ -64,7 +64,7 @@ void Hierarchy::split(NodeIndex n, const Features& features) {
     left_count = split_meshes(node, features);
   } else {
     left_count = (node.count + 1) / 2;
-    median(order.data() + node.begin, node.count, left_count, carrier_boxes, *cancellation_);
+    median(order.data() + node.begin, node.count, left_count, primitive_boxes, *cancellation_);
   }
   make_child(left(n), node.begin, left_count, features);
   cancellation_->heed();
@@ -78,17 +78,17 @@ std::uint32_t Hierarchy::split_meshes(const Node& node, const Features& features
   std::vector<std::uint32_t> meshes;
   const auto first = order.begin() + node.begin, last = first + node.count;
   for (auto c = first; c != last; ++c) {
-    const std::uint32_t mesh = features.mesh_of_carrier[*c];
+    const std::uint32_t mesh = features.mesh_of_primitive[*c];
     if (mesh >= mesh_boxes.size()) mesh_boxes.resize(mesh + 1);
     if (mesh_boxes[mesh].low[0] > mesh_boxes[mesh].high[0]) meshes.push_back(mesh);
-    mesh_boxes[mesh].include(carrier_boxes[*c]);
+    mesh_boxes[mesh].include(primitive_boxes[*c]);
   }
   const auto half = static_cast<std::uint32_t>(meshes.size() / 2);
   median(meshes.data(), static_cast<std::uint32_t>(meshes.size()), half, mesh_boxes, *cancellation_);
   std::vector<char> goes_left(mesh_boxes.size(), 0);
   for (std::uint32_t i = 0; i < half; ++i) goes_left[meshes[i]] = 1;
   const auto middle =
-      std::partition(first, last, [&](std::uint32_t c) { return goes_left[features.mesh_of_carrier[c]] != 0; });
+      std::partition(first, last, [&](std::uint32_t c) { return goes_left[features.mesh_of_primitive[c]] != 0; });
   return static_cast<std::uint32_t>(middle - first);
 }
 
@@ -96,16 +96,17 @@ void Hierarchy::make_child(NodeIndex n, std::uint32_t begin, std::uint32_t count
   Node node;
   node.begin = begin;
   node.count = count;
-  node.mesh = features.mesh_of_carrier[order[begin]];
+  node.mesh = features.mesh_of_primitive[order[begin]];
   for (std::uint32_t i = begin; i < begin + count; ++i) {
-    node.box.include(carrier_boxes[order[i]]);
-    if (features.mesh_of_carrier[order[i]] != node.mesh) node.mesh = mixed_meshes;
+    node.box.include(primitive_boxes[order[i]]);
+    if (features.mesh_of_primitive[order[i]] != node.mesh) node.mesh = mixed_meshes;
   }
   nodes[n] = node;
 }
 
 std::size_t Hierarchy::bytes() const {
-  return nodes.capacity() * sizeof(Node) + order.capacity() * sizeof(order[0]) + carrier_boxes.capacity() * sizeof(Box);
+  return nodes.capacity() * sizeof(Node) + order.capacity() * sizeof(order[0]) +
+         primitive_boxes.capacity() * sizeof(Box);
 }
 
 float culling_inefficiency(const Hierarchy& h, NodeIndex n) {

@@ -18,7 +18,7 @@ inline constexpr NodeIndex no_node = 0xFFFFFFFFu;
 
 struct Node {
   Box box;
-  std::uint32_t begin = 0, count = 0;  // its carriers: order[begin, begin + count)
+  std::uint32_t begin = 0, count = 0;  // its primitives: order[begin, begin + count)
   std::uint32_t mesh = 0;              // mixed_meshes where there are several
   std::uint32_t examined = 0;          // step in which its children were last made sure of (see upkeep.h)
   float culling_when_split = 0;        // see culling_inefficiency
@@ -31,13 +31,13 @@ struct Pair {
   bool operator==(const Pair&) const = default;
 };
 
-// Nodes in depth-first order. A subtree over m carriers has 2m - 1 nodes in one piece, whatever its shape: splitting a
-// node anew touches nothing outside the piece, which is what keeps tasks over disjoint subtrees free of locks.
+// Nodes in depth-first order. A subtree over m primitives has 2m - 1 nodes in one piece, whatever its shape: splitting
+// a node anew touches nothing outside the piece, which is what keeps tasks over disjoint subtrees free of locks.
 class Hierarchy {
  public:
   std::vector<Node> nodes;           // [0] is the root; empty where there is nothing to carry
-  std::vector<std::uint32_t> order;  // carriers, so that each subtree's lie together
-  std::vector<Box> carrier_boxes;    // by carrier, at the current step
+  std::vector<std::uint32_t> order;  // primitives, so that each subtree's lie together
+  std::vector<Box> primitive_boxes;  // by primitive, at the current step
 
   // From here on start and split end with Cancelled where that is requested.
   void heed(const Cancellation& cancellation) { cancellation_ = &cancellation; }
@@ -45,7 +45,7 @@ class Hierarchy {
   static NodeIndex left(NodeIndex n) { return n + 1; }
   NodeIndex right(NodeIndex n) const { return n + 2 * nodes[n + 1].count; }
 
-  // One node over everything, not split. `carrier_boxes` must be current, here and in split.
+  // One node over everything, not split. `primitive_boxes` must be current, here and in split.
   void start(const Features& features);
 
   // Gives a node two new children that are not split themselves: by median of the triangles' centres along the widest

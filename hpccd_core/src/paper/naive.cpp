@@ -72,9 +72,9 @@ class Naive final : public MethodEngine {
         visit(
             scenery, p, worker, [&](NodeIndex n) { upkeep_.examine_locked(n, counts); },
             [&](Pair q) { own.push_back(q); });
-        if (own.size() > 1 && shared_.wanted()) shared_.give(own);
+        if (own.size() > 1 && shared_.wanted()) shared_.push_half(own);
       }
-    } while (shared_.take(own));
+    } while (shared_.pop(own));
   }
 
   const Context context_;

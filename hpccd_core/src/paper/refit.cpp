@@ -1,19 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "paper/refit.h"
 
+#include "bvh/primitive_box.h"
 #include "paper/breadth_first.h"
 
 namespace hpccd::paper {
 namespace {
-
-Box carrier_box(std::uint32_t c, const Features& features, const std::vector<Box>& vertex_boxes) {
-  if (c >= features.n_faces()) return vertex_boxes[features.lone_vertices[c - features.n_faces()]];
-  const auto& corners = features.faces[c];
-  Box b = vertex_boxes[corners[0]];
-  b.include(vertex_boxes[corners[1]]);
-  b.include(vertex_boxes[corners[2]]);
-  return b;
-}
 
 class Refit {
  public:
@@ -21,7 +13,7 @@ class Refit {
       : h_(h), features_(features), vertex_boxes_(vertex_boxes), cancellation_(cancellation) {}
 
   void subtree(NodeIndex n) {
-    if (!h_.nodes[n].is_split) return carriers(h_.nodes[n]);
+    if (!h_.nodes[n].is_split) return primitives(h_.nodes[n]);
     if (h_.nodes[n].count > many) cancellation_.heed();
     subtree(Hierarchy::left(n));
     subtree(h_.right(n));
@@ -37,12 +29,12 @@ class Refit {
   static constexpr std::uint32_t many = 1024;  // 10 us
 
   // A leaf, or a node that nothing has needed the children of: what lies below it is not valid.
-  void carriers(Node& node) {
+  void primitives(Node& node) {
     node.box = {};
     for (std::uint32_t i = node.begin; i < node.begin + node.count; ++i) {
       const std::uint32_t c = h_.order[i];
-      h_.carrier_boxes[c] = carrier_box(c, features_, vertex_boxes_);
-      node.box.include(h_.carrier_boxes[c]);
+      h_.primitive_boxes[c] = primitive_box(features_, vertex_boxes_, c);
+      node.box.include(h_.primitive_boxes[c]);
     }
   }
 
@@ -65,11 +57,11 @@ void refit(Hierarchy& h, const Features& features, const std::vector<Box>& verte
     for (NodeIndex n : *level) refit.from_children(n);
 }
 
-void bound_carriers(Hierarchy& h, const Features& features, const std::vector<Box>& vertex_boxes, ThreadPool& pool) {
-  resize(h.carrier_boxes, features.n_carriers(), pool.cancellation());
-  parallel_for(pool, features.n_carriers(), 4096, [&](std::size_t begin, std::size_t end, int) {
+void bound_primitives(Hierarchy& h, const Features& features, const std::vector<Box>& vertex_boxes, ThreadPool& pool) {
+  resize(h.primitive_boxes, features.n_primitives(), pool.cancellation());
+  parallel_for(pool, features.n_primitives(), 4096, [&](std::size_t begin, std::size_t end, int) {
     for (std::size_t c = begin; c < end; ++c)
-      h.carrier_boxes[c] = carrier_box(static_cast<std::uint32_t>(c), features, vertex_boxes);
+      h.primitive_boxes[c] = primitive_box(features, vertex_boxes, static_cast<std::uint32_t>(c));
   });
 }
 

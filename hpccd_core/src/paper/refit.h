@@ -11,7 +11,7 @@ namespace hpccd::paper {
 // the next when it has finished one; then, on one thread, what lies above.
 void refit(Hierarchy& h, const Features& features, const std::vector<Box>& vertex_boxes, ThreadPool& pool);
 
-// Only the boxes of all carriers.
-void bound_carriers(Hierarchy& h, const Features& features, const std::vector<Box>& vertex_boxes, ThreadPool& pool);
+// Only the boxes of all primitives.
+void bound_primitives(Hierarchy& h, const Features& features, const std::vector<Box>& vertex_boxes, ThreadPool& pool);
 
 }  // namespace hpccd::paper

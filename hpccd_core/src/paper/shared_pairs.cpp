@@ -13,7 +13,7 @@ void SharedPairs::begin(int threads) {
   size_ = 0;
 }
 
-void SharedPairs::give(PairQueue& own) {
+void SharedPairs::push_half(PairQueue& own) {
   {
     std::lock_guard lock(mutex_);
     ++redistributions_;
@@ -26,7 +26,7 @@ void SharedPairs::give(PairQueue& own) {
   changed_.notify_all();
 }
 
-bool SharedPairs::take(PairQueue& own) {
+bool SharedPairs::pop(PairQueue& own) {
   std::unique_lock lock(mutex_);
   ++waiting_;
   if (waiting_ == threads_) changed_.notify_all();

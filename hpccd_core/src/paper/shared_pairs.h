@@ -24,9 +24,9 @@ class SharedPairs {
     return waiting_.load(std::memory_order_relaxed) > 0 && size_.load(std::memory_order_relaxed) == 0;
   }
   // Moves the older half of the queue here: pairs of large nodes, which cost most.
-  void give(PairQueue& own);
+  void push_half(PairQueue& own);
   // Waits for pairs; false when no thread has any left.
-  bool take(PairQueue& own);
+  bool pop(PairQueue& own);
   // For a thread that ends early.
   void leave();
 

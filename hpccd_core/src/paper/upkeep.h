@@ -36,7 +36,7 @@ class Upkeep {
   // The step came to its end. Otherwise (an exception) the next one builds anew.
   void end_step() { whole_ = true; }
 
-  // Makes sure of the children of a node with several carriers. The first for a thread that has the subtree to itself
+  // Makes sure of the children of a node with several primitives. The first for a thread that has the subtree to itself
   // (the disjoint property of section 4.1); the second for threads that may meet at the node (sections 3.2 and 4.4).
   void examine(NodeIndex n, UpkeepCounts& counts);
   void examine_locked(NodeIndex n, UpkeepCounts& counts);

@@ -3,8 +3,8 @@
 // a pair, then its refinement or the elementary tests.
 #pragma once
 
-#include "paper/carrier_pairs.h"
 #include "paper/hierarchy.h"
+#include "paper/primitive_pairs.h"
 #include "traverse/tasks.h"
 #include "traverse/worker.h"
 
@@ -35,12 +35,13 @@ inline bool is_leaf_pair(const Scenery& s, Pair p) {
 inline void test_leaves(const Scenery& s, Pair p, Worker& worker) {
   if (p.a == p.b) return;  // within one triangle, all features share vertices
   const Node &a = s.hierarchy.nodes[p.a], &b = s.hierarchy.nodes[p.b];
-  const std::uint32_t carrier_a = s.hierarchy.order[a.begin], carrier_b = s.hierarchy.order[b.begin];
+  const std::uint32_t primitive_a = s.hierarchy.order[a.begin], primitive_b = s.hierarchy.order[b.begin];
   ++worker.leaf_pairs;
-  if (worker.sink) return worker.sink->take(carrier_a, carrier_b, worker);
-  worker.candidates(s.rules.accuracy(a.mesh, b.mesh), [&](CandidateBuffer& edge_edge, CandidateBuffer& vertex_face) {
-    carrier_pairs(s.features, s.vertex_boxes, {carrier_a, a.box}, {carrier_b, b.box}, edge_edge, vertex_face);
-  });
+  if (!worker.sink)
+    test_primitives(s.features, s.rules, s.vertex_boxes, {primitive_a, a.box}, {primitive_b, b.box}, worker);
+  else
+    for (const LeafPair left : worker.sink->push({primitive_a, primitive_b}))
+      test_primitives(s.features, s.rules, s.vertex_boxes, left, worker);
 }
 
 // Both nodes give way together, a leaf waits for the other. `examine(node)` comes before a node's children are named:

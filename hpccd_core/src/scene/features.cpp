@@ -9,12 +9,12 @@
 namespace hpccd {
 namespace {
 
-// Lists of what each carrier owns, from each thing's owner (ascending within a carrier).
-void group_by_owner(const std::vector<std::uint32_t>& owner, std::size_t n_carriers, std::vector<std::uint32_t>& first,
-                    std::vector<std::uint32_t>& owned) {
-  first.assign(n_carriers + 1, 0);
+// Lists of what each primitive owns, from each thing's owner (ascending within a primitive).
+void group_by_owner(const std::vector<std::uint32_t>& owner, std::size_t n_primitives,
+                    std::vector<std::uint32_t>& first, std::vector<std::uint32_t>& owned) {
+  first.assign(n_primitives + 1, 0);
   for (std::uint32_t c : owner) ++first[c + 1];
-  for (std::size_t c = 0; c < n_carriers; ++c) first[c + 1] += first[c];
+  for (std::size_t c = 0; c < n_primitives; ++c) first[c + 1] += first[c];
   owned.resize(owner.size());
   std::vector<std::uint32_t> next(first.begin(), first.end() - 1);
   for (std::uint32_t i = 0; i < owner.size(); ++i) owned[next[owner[i]]++] = i;
@@ -35,19 +35,19 @@ Features features_of(const Scene& scene, ThreadPool& pool) {
       x.lone_vertices.push_back(v);
     }
 
-  x.mesh_of_carrier.resize(x.faces.size() + x.lone_vertices.size());
+  x.mesh_of_primitive.resize(x.faces.size() + x.lone_vertices.size());
   for (std::uint32_t m = 0; m < scene.meshes().size(); ++m) {
     const auto& mesh = scene.meshes()[m];
-    std::fill_n(x.mesh_of_carrier.begin() + mesh.first_face, mesh.n_faces, m);
+    std::fill_n(x.mesh_of_primitive.begin() + mesh.first_face, mesh.n_faces, m);
     const auto end = std::ranges::lower_bound(x.lone_vertices, mesh.first_vertex + mesh.n_vertices);
     for (auto v = std::ranges::lower_bound(x.lone_vertices, mesh.first_vertex); v < end; ++v)
-      x.mesh_of_carrier[x.faces.size() + static_cast<std::size_t>(v - x.lone_vertices.begin())] = m;
+      x.mesh_of_primitive[x.faces.size() + static_cast<std::size_t>(v - x.lone_vertices.begin())] = m;
   }
   parallel_for_each(pool, 2, [&](std::size_t i) {
     if (i == 0)
-      group_by_owner(edges.owner, x.n_carriers(), x.first_edge, x.owned_edges);
+      group_by_owner(edges.owner, x.n_primitives(), x.first_edge, x.owned_edges);
     else
-      group_by_owner(vertex_owner, x.n_carriers(), x.first_vertex, x.owned_vertices);
+      group_by_owner(vertex_owner, x.n_primitives(), x.first_vertex, x.owned_vertices);
   });
   return x;
 }

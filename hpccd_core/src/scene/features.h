@@ -15,20 +15,21 @@ namespace hpccd {
 struct Features {
   std::vector<std::array<std::uint32_t, 2>> edges;  // v0 < v1, in lexicographic order: an edge's number is its rank
   std::vector<std::array<std::uint32_t, 3>> faces;
-  // What carries features through the hierarchy: all triangles, then the vertices that are in no triangle.
+  // The primitives of the hierarchy, by number: all triangles (the paper's representative triangles, to which features
+  // are assigned), then the vertices that are in no triangle.
   std::vector<std::uint32_t> lone_vertices;
-  std::vector<std::uint32_t> mesh_of_carrier;
-  // What carrier c represents: edges owned_edges[first_edge[c] .. first_edge[c+1]), vertices likewise.
+  std::vector<std::uint32_t> mesh_of_primitive;
+  // What primitive p represents: edges owned_edges[first_edge[p] .. first_edge[p+1]), vertices likewise.
   std::vector<std::uint32_t> first_edge, owned_edges, first_vertex, owned_vertices;
   std::uint32_t n_vertices = 0;
 
   std::size_t bytes() const {
     return edges.capacity() * sizeof(edges[0]) + faces.capacity() * sizeof(faces[0]) +
-           4 * (lone_vertices.capacity() + mesh_of_carrier.capacity() + first_edge.capacity() + owned_edges.capacity() +
-                first_vertex.capacity() + owned_vertices.capacity());
+           4 * (lone_vertices.capacity() + mesh_of_primitive.capacity() + first_edge.capacity() +
+                owned_edges.capacity() + first_vertex.capacity() + owned_vertices.capacity());
   }
   std::uint32_t n_faces() const { return static_cast<std::uint32_t>(faces.size()); }
-  std::uint32_t n_carriers() const { return static_cast<std::uint32_t>(mesh_of_carrier.size()); }
+  std::uint32_t n_primitives() const { return static_cast<std::uint32_t>(mesh_of_primitive.size()); }
 };
 
 // The same with any number of threads.

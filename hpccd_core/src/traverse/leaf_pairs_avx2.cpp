@@ -1,3 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#define HPCCD_ISA avx2
+#include "base/simd/avx2.h"
+// After it: written against the instruction set.
 #include "traverse/leaf_pairs.inl"

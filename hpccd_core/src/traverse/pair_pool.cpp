@@ -20,11 +20,11 @@ PairPool::PairPool(const Tree& tree, const std::vector<NodePair>& pairs, int thr
     lists_[first_leaf(tree, p.a) * static_cast<std::size_t>(threads) / tree.leaves.size()].push_back(p);
 }
 
-void PairPool::give(std::vector<NodePair>& stack) {
+void PairPool::push_half(std::vector<NodePair>& stack) {
   // Below this a pair costs less than handing it over.
   constexpr int worth_moving = 16 * Tree::leaf_size;
   const std::size_t half = stack.size() / 2;
-  if (half == 0 || tree_.nodes[stack[0].a].carriers + tree_.nodes[stack[0].b].carriers < worth_moving) return;
+  if (half == 0 || tree_.nodes[stack[0].a].primitives + tree_.nodes[stack[0].b].primitives < worth_moving) return;
   const auto end = stack.begin() + static_cast<std::ptrdiff_t>(half);
   {
     std::lock_guard lock(lock_);
@@ -34,7 +34,7 @@ void PairPool::give(std::vector<NodePair>& stack) {
   stack.erase(stack.begin(), end);
 }
 
-bool PairPool::take_one(int thread, std::vector<NodePair>& stack) {
+bool PairPool::pop_one(int thread, std::vector<NodePair>& stack) {
   std::lock_guard lock(lock_);
   std::vector<NodePair>* list = &lists_[static_cast<std::size_t>(thread)];
   if (list->empty()) list = &lists_.back();
@@ -55,7 +55,7 @@ bool PairPool::wait(int thread, std::vector<NodePair>& stack) {
     // Busy first: a thread that gives stays busy until it has given.
     const bool all_idle = busy_ == 0;
     if (waiting_pairs_ > 0)
-      got = take_one(thread, stack);
+      got = pop_one(thread, stack);
     else if (all_idle)
       break;
     wait.turn();

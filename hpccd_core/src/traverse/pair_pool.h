@@ -20,14 +20,14 @@ class PairPool {
   // True while some thread has nothing to do.
   bool wanted() const { return hungry_.load(std::memory_order_relaxed) > 0; }
 
-  // Takes the older half of a stack that holds work worth moving.
-  void give(std::vector<NodePair>& stack);
+  // Moves the older half of a stack here, where it holds work worth moving.
+  void push_half(std::vector<NodePair>& stack);
 
   // Puts a pair on the empty stack; where others may still give one, does `meanwhile()` and waits. False: everything is
   // done. The caller counts as busy until it asks again.
   template <class Meanwhile>
-  bool take(int thread, std::vector<NodePair>& stack, Meanwhile&& meanwhile) {
-    if (take_one(thread, stack)) return true;
+  bool pop(int thread, std::vector<NodePair>& stack, Meanwhile&& meanwhile) {
+    if (pop_one(thread, stack)) return true;
     ++hungry_;
     meanwhile();
     const bool got = wait(thread, stack);
@@ -39,7 +39,7 @@ class PairPool {
   void abandon() { abandoned_ = true; }
 
  private:
-  bool take_one(int thread, std::vector<NodePair>& stack);
+  bool pop_one(int thread, std::vector<NodePair>& stack);
   bool wait(int thread, std::vector<NodePair>& stack);
 
   const Tree& tree_;
@@ -64,11 +64,11 @@ class BusyThread {
   BusyThread(const BusyThread&) = delete;
   BusyThread& operator=(const BusyThread&) = delete;
 
-  // As PairPool::take.
+  // As PairPool::pop.
   template <class Meanwhile>
   bool next(std::vector<NodePair>& stack, Meanwhile&& meanwhile) {
     if (busy_) --pool_.busy_;
-    return busy_ = pool_.take(thread_, stack, meanwhile);
+    return busy_ = pool_.pop(thread_, stack, meanwhile);
   }
 
  private:

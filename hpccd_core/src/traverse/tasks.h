@@ -50,8 +50,8 @@ void refine(const std::vector<Node>& nodes, NodePair p, Push&& push) {
     return;
   }
   // The larger node gives way; equal ones go down together.
-  const bool split_a = a.children && (!b.children || a.carriers * 2 > b.carriers);
-  const bool split_b = b.children && (!a.children || b.carriers * 2 > a.carriers);
+  const bool split_a = a.children && (!b.children || a.primitives * 2 > b.primitives);
+  const bool split_b = b.children && (!a.children || b.primitives * 2 > a.primitives);
   if (split_a && split_b) {
     for (std::uint32_t i = 0; i < 2; ++i)
       for (std::uint32_t j = 0; j < 2; ++j) push(NodePair{a.children + i, b.children + j});

@@ -17,8 +17,12 @@ void walk(const Tree& tree, const PairRules& rules, const Cancellation& cancella
     const NodePair p = stack.back();
     stack.pop_back();
     if (is_leaf_pair(tree.nodes, p)) {
-      const Node &a = tree.nodes[p.a], &b = tree.nodes[p.b];
-      worker.leaf_pair(tree, tree.leaves[a.leaf], tree.leaves[b.leaf], rules.accuracy(a, b));
+      const LeafPair leaves{tree.nodes[p.a].leaf, tree.nodes[p.b].leaf};
+      ++worker.leaf_pairs;
+      if (!worker.sink)
+        test_leaves(tree, rules, leaves, worker);
+      else
+        for (const LeafPair left : worker.sink->push(leaves)) test_leaves(tree, rules, left, worker);
     } else {
       refine(tree.nodes, p, [&](NodePair q) {
         ++worker.node_pairs;
@@ -37,11 +41,7 @@ void keep_first_of_task(Worker& worker, std::size_t task, std::atomic<std::size_
   }
 }
 
-Found least(const std::vector<Found>& found) {
-  return *std::min_element(found.begin(), found.end(), [](const Found& a, const Found& b) {
-    return std::pair{a.first, a.second} < std::pair{b.first, b.second};
-  });
-}
+Contact least(const std::vector<Contact>& found) { return *std::min_element(found.begin(), found.end(), before); }
 
 void traverse_any(const Tree& tree, const PairRules& rules, Search& search, ThreadPool& pool,
                   std::vector<Worker>& workers) {
@@ -53,7 +53,7 @@ void traverse_any(const Tree& tree, const PairRules& rules, Search& search, Thre
     Worker& worker = workers[thread];
     worker.begin(search);
     std::vector<NodePair> stack;
-    std::vector<Found> best_vf, best_ee;
+    std::vector<Contact> best_vf, best_ee;
     std::size_t best = tasks.size();
     for (;;) {
       const std::size_t task = next.fetch_add(1);
@@ -85,6 +85,14 @@ void traverse_any(const Tree& tree, const PairRules& rules, Search& search, Thre
 
 }  // namespace
 
+void test_leaves(const Tree& tree, const PairRules& rules, LeafPair pair, Worker& worker) {
+  const auto node = [&](std::uint32_t leaf) -> const Node& { return tree.nodes[tree.leaf_nodes[leaf]]; };
+  worker.test_candidates(rules.accuracy(node(pair.first), node(pair.second)), [&](CandidateBuffer& edge_edge,
+                                                                                  CandidateBuffer& vertex_face) {
+    worker.search().leaf_pairs(tree, tree.leaves[pair.first], tree.leaves[pair.second], edge_edge, vertex_face);
+  });
+}
+
 void traverse(const Tree& tree, const PairRules& rules, Search& search, ThreadPool& pool,
               std::vector<Worker>& workers) {
   if (search.report == Report::any) return traverse_any(tree, rules, search, pool, workers);
@@ -102,7 +110,7 @@ void traverse(const Tree& tree, const PairRules& rules, Search& search, ThreadPo
     };
     while (busy.next(stack, meanwhile))
       walk(tree, rules, *search.cancellation, stack, worker, [&] {
-        if (pairs.wanted()) pairs.give(stack);
+        if (pairs.wanted()) pairs.push_half(stack);
       });
     worker.flush();
   });

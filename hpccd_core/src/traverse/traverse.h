@@ -6,8 +6,12 @@
 
 namespace hpccd {
 
-// Default traversal: independent tasks handed out in order by one atomic counter; each is walked depth first.
-// Leaves what was found in the workers, one per thread of the pool.
+// The elementary tests of two leaves, at the accuracy of their meshes.
+void test_leaves(const Tree& tree, const PairRules& rules, LeafPair pair, Worker& worker);
+
+// Default traversal: depth first, by threads that share what they have left (pair_pool.h); where any one contact will
+// do, by independent tasks in their order, so that the answer does not depend on the threads. Leaves what was found in
+// the workers, one per thread of the pool.
 void traverse(const Tree& tree, const PairRules& rules, Search& search, ThreadPool& pool, std::vector<Worker>& workers);
 
 }  // namespace hpccd

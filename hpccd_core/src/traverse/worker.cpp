@@ -4,7 +4,8 @@
 #include <algorithm>
 #include <chrono>
 
-#include "elementary/last_resort.h"
+#include "elementary/fallback.h"
+#include "elementary/policy.h"
 
 namespace hpccd {
 namespace {
@@ -18,27 +19,12 @@ void Worker::begin(Search& search) {
   vertex_face.clear();
   edge_edge.clear();
   counts[0] = counts[1] = {};
-  last_resorts[0] = last_resorts[1] = {};
+  fallbacks[0] = fallbacks[1] = {};
   node_pairs = leaf_pairs = 0;
   elementary_seconds = 0;
   for (auto& w : waiting_)  // what an exception left behind
     if (w) w->edge_edge.n = w->vertex_face.n = 0;
   if (!result_) result_ = std::make_unique<BatchResult>();
-}
-
-void Worker::leaf_pair(const Tree& tree, const LeafRange& a, const LeafRange& b, Accuracy accuracy) {
-  ++leaf_pairs;
-  const auto number = [&](const LeafRange& leaf) { return static_cast<std::uint32_t>(&leaf - tree.leaves.data()); };
-  if (sink)
-    sink->take(number(a), number(b), *this);
-  else
-    test_leaf_pair(tree, a, b, accuracy);
-}
-
-void Worker::test_leaf_pair(const Tree& tree, const LeafRange& a, const LeafRange& b, Accuracy accuracy) {
-  candidates(accuracy, [&](CandidateBuffer& edge_edge, CandidateBuffer& vertex_face) {
-    search_->leaf_pairs(tree, a, b, edge_edge, vertex_face);
-  });
 }
 
 void Worker::flush() {
@@ -51,7 +37,7 @@ void Worker::flush() {
 }
 
 std::size_t Worker::bytes() const {
-  std::size_t b = (vertex_face.capacity() + edge_edge.capacity()) * sizeof(Found) + sizeof(BatchResult);
+  std::size_t b = (vertex_face.capacity() + edge_edge.capacity()) * sizeof(Contact) + sizeof(BatchResult);
   for (const auto& w : waiting_) b += w ? sizeof(Waiting) : 0;
   return b;
 }
@@ -75,7 +61,7 @@ void Worker::drain(CandidateBuffer& buffer, Kind kind, Accuracy accuracy, std::u
 void Worker::test(const std::uint32_t* first, const std::uint32_t* second, std::uint32_t n, Kind kind,
                   Accuracy accuracy) {
   heed_cancellation();
-  std::vector<Found>& found = kind == Kind::vertex_face ? vertex_face : edge_edge;
+  std::vector<Contact>& found = kind == Kind::vertex_face ? vertex_face : edge_edge;
   constexpr std::size_t many = 1 << 16;
   if (found.capacity() - found.size() < n && found.size() >= many) grow(found, *search_->cancellation);
   BatchResult& r = *result_;
@@ -84,36 +70,35 @@ void Worker::test(const std::uint32_t* first, const std::uint32_t* second, std::
   search_->batch_test[static_cast<int>(accuracy)](search_->geometry, kind, first, second, n, r);
   count = r.counts;
   for (std::uint32_t i = 0; i < r.n_contacts; ++i) {
-    // "conservative" promises never to be late.
-    const double toc = accuracy == Accuracy::conservative ? std::max(0.0, r.toc[i] - r.delta[i]) : r.toc[i];
-    report(kind, first[r.contact[i]], second[r.contact[i]], toc);
+    const double toc = reported_time(accuracy, r.toc[i], r.delta[i]);
+    report(kind, {first[r.contact[i]], second[r.contact[i]], toc});
   }
   for (std::uint32_t i = 0; i < r.n_undecided; ++i)
-    resolve(kind, first[r.undecided[i]], second[r.undecided[i]], accuracy);
+    resolve({first[r.undecided[i]], second[r.undecided[i]], kind}, accuracy);
 }
 
-void Worker::resolve(Kind kind, std::uint32_t a, std::uint32_t b, Accuracy accuracy) {
+void Worker::resolve(const Candidate& candidate, Accuracy accuracy) {
   heed_cancellation();
+  const auto [a, b, kind] = candidate;
   const Geometry& g = search_->geometry;
   std::uint32_t v[4];
-  if (kind == Kind::vertex_face)
-    v[0] = a, v[1] = g.faces[b][0], v[2] = g.faces[b][1], v[3] = g.faces[b][2];
-  else
-    v[0] = g.edges[a][0], v[1] = g.edges[a][1], v[2] = g.edges[b][0], v[3] = g.edges[b][1];
+  pair_vertices(g, kind, a, b, v);
   Vec3<double> q_t0[4], q_t1[4];
   for (int k = 0; k < 4; ++k) q_t0[k] = vec(g.vertices[v[k]].t0), q_t1[k] = vec(g.vertices[v[k]].t1);
-  if (const auto toc = last_resort(accuracy, search_->limits, kind, q_t0, q_t1, last_resorts[kind == Kind::edge_edge]))
-    report(kind, a, b, *toc);
+  if (const auto toc =
+          decide_undecided(accuracy, search_->limits, kind, q_t0, q_t1, fallbacks[kind == Kind::edge_edge]))
+    report(kind, {a, b, *toc});
 }
 
-void Worker::report(Kind kind, std::uint32_t first, std::uint32_t second, double toc) {
+void Worker::report(Kind kind, const Contact& contact) {
   if (search_->report == Report::first) {
     double best = search_->earliest.load(std::memory_order_relaxed);
-    if (toc > best + simultaneous) return;
-    while (toc < best && !search_->earliest.compare_exchange_weak(best, toc, std::memory_order_relaxed)) {
+    if (contact.toc > best + simultaneous) return;
+    while (contact.toc < best &&
+           !search_->earliest.compare_exchange_weak(best, contact.toc, std::memory_order_relaxed)) {
     }
   }
-  (kind == Kind::vertex_face ? vertex_face : edge_edge).push_back({first, second, toc});
+  (kind == Kind::vertex_face ? vertex_face : edge_edge).push_back(contact);
 }
 
 }  // namespace hpccd

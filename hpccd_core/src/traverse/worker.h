@@ -5,21 +5,17 @@
 
 #include <atomic>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "base/cancellation.h"
 #include "elementary/batch.h"
+#include "elementary/fallback.h"
 #include "elementary/inclusion.h"
-#include "elementary/last_resort.h"
+#include "elementary/pair.h"
 #include "traverse/leaf_pairs.h"
 
 namespace hpccd {
-
-// A contact of features `first` and `second`: vertex and face, or edges a < b.
-struct Found {
-  std::uint32_t first, second;
-  double toc;
-};
 
 // What all threads share during one call.
 struct Search {
@@ -32,13 +28,18 @@ struct Search {
   const Cancellation* cancellation = &never_cancelled;
 };
 
-class Worker;
+// Two leaves whose boxes overlap, by number. For the published methods a leaf is one triangle: the paper's triangle
+// indices.
+struct LeafPair {
+  std::uint32_t first, second;
+};
 
-// Takes pairs of leaves (by number; of carriers for the published methods) that somebody else shall test: hybrid/.
+// Takes pairs of leaves that somebody else shall test.
 class PairSink {
  public:
   virtual ~PairSink() = default;
-  virtual void take(std::uint32_t a, std::uint32_t b, Worker& worker) = 0;
+  // Returns the pairs, of all that it was given, that the caller shall test itself; they stay until the next call.
+  virtual std::span<const LeafPair> push(LeafPair pair) = 0;
   virtual void flush() = 0;  // no more for now
 };
 
@@ -49,32 +50,31 @@ inline constexpr double simultaneous = 1e-12;
 class alignas(128) Worker {
  public:
   void begin(Search& search);
-  // Candidates of two leaves whose boxes overlap, to be tested at `accuracy`; or left to the sink, where there is one.
-  void leaf_pair(const Tree& tree, const LeafRange& a, const LeafRange& b, Accuracy accuracy);
-  void test_leaf_pair(const Tree& tree, const LeafRange& a, const LeafRange& b, Accuracy accuracy);
-  // The same from any source: add(edge_edge, vertex_face) appends at most CandidateBuffer::most_per_call pairs to each.
+  // Tests candidates at `accuracy`, sooner or later: add(edge_edge, vertex_face) appends at most
+  // CandidateBuffer::most_per_call pairs to each.
   template <class Add>
-  void candidates(Accuracy accuracy, Add&& add) {
+  void test_candidates(Accuracy accuracy, Add&& add) {
     Waiting& waiting = waiting_at(accuracy);
     add(waiting.edge_edge, waiting.vertex_face);
     if (waiting.edge_edge.n >= batch_capacity) drain(waiting.edge_edge, Kind::edge_edge, accuracy, batch_capacity);
     if (waiting.vertex_face.n >= batch_capacity)
       drain(waiting.vertex_face, Kind::vertex_face, accuracy, batch_capacity);
   }
+  const Search& search() const { return *search_; }
   void flush();  // tests what waits
-  // The tier's last resort on a pair that nothing else decides, and a contact found elsewhere.
-  void resolve(Kind kind, std::uint32_t first, std::uint32_t second, Accuracy accuracy);
-  void report(Kind kind, std::uint32_t first, std::uint32_t second, double toc);
-  // Ends the work where that is requested: between any two pairs of nodes, batches and last resorts.
+  // The tier's fallback on a pair that nothing else decides, and a contact found elsewhere.
+  void resolve(const Candidate& candidate, Accuracy accuracy);
+  void report(Kind kind, const Contact& contact);
+  // Ends the work where that is requested: between any two pairs of nodes, batches and fallbacks.
   void heed_cancellation() const { search_->cancellation->heed(); }
   std::size_t bytes() const;
 
-  std::vector<Found> vertex_face, edge_edge;
+  std::vector<Contact> vertex_face, edge_edge;
   BatchCounts counts[2];  // vertex-face, edge-edge
-  LastResortCounts last_resorts[2];
+  FallbackCounts fallbacks[2];
   std::uint64_t node_pairs = 0, leaf_pairs = 0;
   double elementary_seconds = 0;
-  PairSink* sink = nullptr;
+  PairSink* sink = nullptr;   // where pairs of leaves are left to somebody else
   std::size_t best_task = 0;  // where report is any: the task these contacts come from
 
  private:

@@ -58,7 +58,8 @@ Vec3<double> direction(const Query<Z>& q, const int low[3], const M& m, int k, S
 // which the features touch; else the nearest, where the features are known to touch. -1: none.
 template <class Touches>
 int root_of_contact(std::span<const std::int64_t> times, std::int64_t toc, bool touching, Touches&& touches_at) {
-  // Above the radius of times of contact (policy.h), twice, which the conservative tier takes off.
+  // More than twice the radius of a proven time of contact (Proven::toc_radius), by which the conservative tier reports
+  // it early.
   constexpr std::int64_t same_time = std::int64_t{1} << (time_bits - 38);  // 3.6e-12
   const auto distance = [&](int i) { return std::abs(times[i] - toc); };
   const int n = static_cast<int>(times.size());

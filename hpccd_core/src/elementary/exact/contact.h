@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The exact tier's last resort: the earliest contact of one vertex-face or edge-edge query in integer arithmetic; and
+// The exact tier's fallback: the earliest contact of one vertex-face or edge-edge query in integer arithmetic; and
 // from which side its features come.
 #pragma once
 

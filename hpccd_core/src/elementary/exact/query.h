@@ -51,11 +51,10 @@ struct Query {
   decltype(auto) ap(int k) const { return product<3>(a, p, k); }
 
   Query(Kind kind_, const Coordinates<Z> q[4]) : kind(kind_) {
-    if (kind == Kind::vertex_face) {
-      p = q[0] - q[1], a = q[2] - q[1], b = q[3] - q[1];
-    } else {
-      p = q[2] - q[0], a = q[1] - q[0], b = q[3] - q[2];
-    }
+    if (kind == Kind::vertex_face)
+      set_spans<Kind::vertex_face>(q);
+    else
+      set_spans<Kind::edge_edge>(q);
     for (int k = 0; k < 3; ++k) n[k] = cross(a, b, k);
     f = dot(p, n);
   }
@@ -94,6 +93,12 @@ struct Query {
   }
 
  private:
+  template <Kind k>
+  void set_spans(const Coordinates<Z> q[4]) {
+    using S = Spans<k>;
+    p = q[S::p_to] - q[S::p_from], a = q[S::a_to] - q[S::a_from], b = q[S::b_to] - q[S::b_from];
+  }
+
   static constexpr bool remembers = Widths<Z>::any_size;
   struct Nothing {};
   mutable std::conditional_t<remembers, std::array<std::optional<Quadratic>, 6>, Nothing> products_;

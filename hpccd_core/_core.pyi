@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The compiled module (src/bindings.cpp). Names and arguments are compared with it by test/packaging/test_core_stub.py,
+which tells how to draw up anew what pybind11 itself says of them."""
+
+from typing import Any, ClassVar, TypedDict
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .devices import GpuStatus
+
+class InvalidArgument(ValueError): ...
+class Cancelled(RuntimeError): ...
+
+class _Enumeration:
+    __members__: ClassVar[dict[str, Any]]
+    def __init__(self, value: int) -> None: ...
+    def __index__(self) -> int: ...
+    def __int__(self) -> int: ...
+    @property
+    def name(self) -> str: ...
+    @property
+    def value(self) -> int: ...
+
+class Accuracy(_Enumeration):
+    fast: ClassVar[Accuracy]
+    balanced: ClassVar[Accuracy]
+    conservative: ClassVar[Accuracy]
+    exact: ClassVar[Accuracy]
+
+class Backend(_Enumeration):
+    auto: ClassVar[Backend]
+    cpu: ClassVar[Backend]
+    hybrid: ClassVar[Backend]
+    gpu: ClassVar[Backend]
+
+class Report(_Enumeration):
+    all: ClassVar[Report]
+    first: ClassVar[Report]
+    any: ClassVar[Report]
+
+class Method(_Enumeration):
+    default: ClassVar[Method]
+    published: ClassVar[Method]
+    naive: ClassVar[Method]
+    front: ClassVar[Method]
+
+class Simd(_Enumeration):
+    auto: ClassVar[Simd]
+    scalar: ClassVar[Simd]
+    avx2: ClassVar[Simd]
+    avx512: ClassVar[Simd]
+
+class Scene:
+    def __init__(self) -> None: ...
+    def add_mesh(
+        self, name: str, faces: NDArray[np.uint32], n_vertices: int, self_collision: bool, static: bool
+    ) -> int: ...
+    def ignore_pair(self, mesh_a: int, mesh_b: int) -> None: ...
+    def set_accuracy(self, mesh_a: int, mesh_b: int, accuracy: Accuracy) -> None: ...
+    @property
+    def n_vertices(self) -> int: ...
+    @property
+    def n_faces(self) -> int: ...
+    @property
+    def meshes(self) -> list[tuple[str, int, int, int, int]]: ...
+
+class _Contacts(TypedDict):
+    vf: NDArray[np.uint32]
+    vf_toc: NDArray[np.float64]
+    ee: NDArray[np.uint32]
+    ee_toc: NDArray[np.float64]
+    points: NDArray[np.float64]
+    normals: NDArray[np.float64]
+    first_toc: float
+    hash: int
+
+class Detector:
+    def __init__(
+        self,
+        scene: Scene,
+        accuracy: Accuracy,
+        backend: Backend,
+        report: Report,
+        simd: Simd,
+        threads: int,
+        points: bool,
+        normals: bool,
+        minimum_separation: float,
+        tolerance: float,
+        method: Method,
+        restructure: bool,
+        hybrid_segments: int,
+        hybrid_segment_pairs: int,
+        gpus: int,
+        gpu_stages: bool,
+    ) -> None: ...
+    def detect(self, vertices_t0: NDArray[Any], vertices_t1: NDArray[Any]) -> _Contacts: ...
+    def detect_on_device(
+        self, pointer_t0: int, pointer_t1: int, n_vertices: int, is_double: bool
+    ) -> _Contacts: ...
+    def cancel(self) -> None: ...
+    def profile(self) -> dict[str, float]: ...
+    def stats(self) -> dict[str, int]: ...
+    @property
+    def last_backend(self) -> str: ...
+    @property
+    def last_gpu_error(self) -> str: ...
+    @property
+    def threads(self) -> int: ...
+    @property
+    def simd(self) -> str: ...
+
+class MemoryOnDevice:
+    def __init__(self) -> None: ...
+    def assign(self, pointer: int, bytes: int) -> None: ...
+    @property
+    def pointer(self) -> int: ...
+
+def test_vertex_face(
+    queries: NDArray[np.float64], accuracy: Accuracy, simd: Simd, minimum_separation: float, tolerance: float
+) -> tuple[NDArray[np.bool_], NDArray[np.float64]]: ...
+def test_edge_edge(
+    queries: NDArray[np.float64], accuracy: Accuracy, simd: Simd, minimum_separation: float, tolerance: float
+) -> tuple[NDArray[np.bool_], NDArray[np.float64]]: ...
+def gpu_status() -> GpuStatus: ...
+def gpu_fail_after(calls: int) -> None: ...
+def simd_levels() -> list[str]: ...

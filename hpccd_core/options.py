@@ -1,0 +1,18 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The words that options take, as types and as the values that arguments are checked against."""
+
+from typing import Literal, get_args
+
+Accuracy = Literal["fast", "balanced", "conservative", "exact"]
+Backend = Literal["auto", "cpu", "hybrid", "gpu"]
+Method = Literal["default", "published", "naive", "front"]
+Output = Literal["points", "normals"]
+Report = Literal["all", "first", "any"]
+Simd = Literal["auto", "scalar", "avx2", "avx512"]
+
+ACCURACIES: tuple[str, ...] = get_args(Accuracy)
+BACKENDS: tuple[str, ...] = get_args(Backend)
+METHODS: tuple[str, ...] = get_args(Method)
+OUTPUTS: tuple[str, ...] = get_args(Output)
+REPORTS: tuple[str, ...] = get_args(Report)
+SIMD: tuple[str, ...] = get_args(Simd)

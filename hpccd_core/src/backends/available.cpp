@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "backends/available.h"
+
+#include "gpu/device.h"
+
+namespace hpccd {
+namespace {
+
+bool wanted(Backend backend, const char* name, const std::string& unsupported, const Options& o) {
+  const bool usable = !gpu::status().devices.empty();
+  if (o.backend == Backend::automatic) return usable && unsupported.empty();
+  if (o.backend != backend) return false;
+  if (!unsupported.empty()) throw InvalidArgument(unsupported);
+  if (!usable)
+    throw InvalidArgument(std::string("backend: \"") + name + "\" is not usable here: " + gpu::status().reason);
+  return true;
+}
+
+}  // namespace
+
+AvailableBackends::AvailableBackends(Resources& shared) : cpu_(shared) {
+  const Options& o = shared.options;
+  if (wanted(Backend::gpu, "gpu", GpuBackend::unsupported(o), o)) gpu_.emplace(shared);
+  if (wanted(Backend::hybrid, "hybrid", HybridBackend::unsupported(o), o)) hybrid_.emplace(shared, cpu_);
+}
+
+DetectionBackend& AvailableBackends::at(Backend backend) {
+  if (backend == Backend::gpu) return gpu_.value();
+  if (backend == Backend::hybrid) return hybrid_.value();
+  return cpu_;
+}
+
+bool AvailableBackends::works(Backend backend) const {
+  if (backend == Backend::gpu) return gpu_ && !gpu_->failures().gave_up();
+  if (backend == Backend::hybrid) return hybrid_ && !hybrid_->failures().gave_up();
+  return backend == Backend::cpu;
+}
+
+void AvailableBackends::count(Backend computed_by, std::map<std::string, std::uint64_t>& stats) const {
+  if (computed_by == Backend::gpu) {
+    gpu_->count(stats);
+  } else {
+    cpu_.count(stats);
+    if (hybrid_) hybrid_->count(stats);
+  }
+  if (use_devices())
+    stats["gpu_fallbacks"] = (gpu_ ? gpu_->failures().count() : 0) + (hybrid_ ? hybrid_->failures().count() : 0);
+}
+
+std::string AvailableBackends::last_error() const {
+  if (hybrid_ && !hybrid_->failures().last().empty()) return hybrid_->failures().last();
+  return gpu_ ? gpu_->failures().last() : std::string();
+}
+
+}  // namespace hpccd

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the detector asks of each place where a step can be computed.
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+
+#include "backends/failures.h"
+#include "hpccd/hpccd.h"
+
+namespace hpccd {
+
+struct Detection {
+  Contacts contacts;
+  Backend computed_by;  // the CPU, too, where it did what failing devices left undone
+};
+
+class DetectionBackend {
+ public:
+  virtual ~DetectionBackend() = default;
+
+  // Nothing where the backend failed: the CPU shall compute the step. Positions may be on a device for the GPU only.
+  // Throws InvalidArgument for bad coordinates, and Cancelled.
+  virtual std::optional<Detection> detect(Positions t0, Positions t1) = 0;
+
+  // Adds what the last step counted, and its stages on a device.
+  virtual void count(std::map<std::string, std::uint64_t>& stats) const = 0;
+  virtual void add_stages(std::map<std::string, double>&) const {}
+
+  const Failures& failures() const { return failures_; }
+
+ protected:
+  Failures failures_;
+};
+
+}  // namespace hpccd

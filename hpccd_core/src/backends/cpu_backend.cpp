@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "backends/cpu_backend.h"
+
+#include <utility>
+
+#include "paper/primitive_pairs.h"
+#include "traverse/traverse.h"
+
+namespace hpccd {
+
+CpuBackend::CpuBackend(Resources& shared)
+    : shared_(shared),
+      method_(paper::engine_of(shared.options, {shared.features, shared.rules, shared.pool})),
+      workers_(static_cast<std::size_t>(shared.pool.size())) {
+  const Options& o = shared.options;
+  one_thread_.heed(shared.cancellation);
+  for (int a = 0; a < 4; ++a) search_.batch_test[a] = batch_test(o.simd, static_cast<Accuracy>(a));
+  if (o.minimum_separation > 0) search_.batch_test[static_cast<int>(Accuracy::conservative)] = all_undecided;
+  search_.leaf_pairs = leaf_pairs(o.simd);
+  search_.limits = {o.minimum_separation, o.tolerance};
+  search_.cancellation = search_.limits.cancellation = &shared.cancellation;
+}
+
+std::optional<Detection> CpuBackend::detect(Positions t0, Positions t1) {
+  update(t0, t1, Tests::all_here);
+  traverse();
+  return Detection{collect(), Backend::cpu};
+}
+
+void CpuBackend::update(Positions t0, Positions t1, Tests tests) {
+  const Options& o = shared_.options;
+  Profiler& profiler = shared_.profiler;
+  MovingTree& tree = shared_.tree;
+  tree.bound(t0, t1, o.minimum_separation);
+  profiler.mark("bounds");
+  const MotionBounds& motion = tree.motion();
+  search_.geometry = {motion.vertices.data(), shared_.features.edges.data(), shared_.features.faces.data(),
+                      o.minimum_separation > 0 ? nullptr : motion.kdops.data(), motion.map.scale};
+  search_.earliest = std::numeric_limits<double>::infinity();
+  const bool here = tests == Tests::all_here;
+  search_.report = !here && o.report == Report::any ? Report::all : o.report;
+  search_.batch_test[static_cast<int>(Accuracy::fast)] = batch_test(o.simd, here ? Accuracy::fast : Accuracy::balanced);
+  if (method_) {
+    swept_ = &tree.swept();
+    method_->update(*swept_, profiler);
+  } else {
+    tree.fit(profiler);
+  }
+}
+
+void CpuBackend::traverse() {
+  if (method_)
+    method_->traverse(*swept_, search_, workers_);
+  else
+    hpccd::traverse(shared_.tree.tree(), shared_.rules, search_, shared_.pool, workers_);
+  double elementary = 0;
+  for (const Worker& w : workers_) elementary += 1e3 * w.elementary_seconds;
+  // Tests run inside the traversal; their share of the wall-clock time is their share of the threads' time.
+  shared_.profiler.mark_split("traverse", "elementary", elementary / shared_.pool.size());
+}
+
+void CpuBackend::test(const std::vector<LeafPair>& pairs) {
+  constexpr std::size_t grain = 64;  // small beside a segment: all threads share what one leaves
+  parallel_for(shared_.pool, pairs.size(), grain, [&](std::size_t begin, std::size_t end, int thread) {
+    for (std::size_t i = begin; i < end; ++i)
+      if (method_)
+        paper::test_primitives(shared_.features, shared_.rules, *swept_, pairs[i], workers_[thread]);
+      else
+        test_leaves(shared_.tree.tree(), shared_.rules, pairs[i], workers_[thread]);
+  });
+  for (Worker& w : workers_) w.flush();
+}
+
+Contacts CpuBackend::collect() {
+  // Handing out the work (five jobs) takes as long as the work on so many.
+  constexpr std::size_t few = 1024;
+  std::size_t n = 0;
+  for (const Worker& w : workers_) n += w.vertex_face.size() + w.edge_edge.size();
+  const Options& o = shared_.options;
+  const Outputs outputs{o.points, o.normals, o.minimum_separation == 0};
+  contacts_ = {};
+  collect_contacts(workers_, search_.geometry, o.report, outputs, order_, n < few ? one_thread_ : shared_.pool,
+                   contacts_);
+  shared_.profiler.mark("contacts");
+  shared_.cancellation.heed();  // whoever cancelled a call shall not have to look at its answer
+  return std::move(contacts_);
+}
+
+void CpuBackend::count(std::map<std::string, std::uint64_t>& stats) const {
+  std::uint64_t bytes = order_.bytes() + (method_ ? method_->bytes() : 0);
+  const char* kinds[2] = {"vf", "ee"};
+  for (const Worker& w : workers_) {
+    stats["node_pairs"] += w.node_pairs;
+    stats["leaf_pairs"] += w.leaf_pairs;
+    bytes += sizeof(Worker) + w.bytes();
+    for (int k = 0; k < 2; ++k) {
+      const std::string kind = kinds[k];
+      const BatchCounts& c = w.counts[k];
+      stats[kind + "_candidates"] += c.tested;
+      stats[kind + "_rejected_slabs"] += c.kdop;
+      stats[kind + "_rejected_coplanarity"] += c.coplanarity;
+      stats[kind + "_rejected_projection"] += c.projection;
+      stats[kind + "_rejected_roots"] += c.roots;
+      stats[kind + "_proven_contacts"] += c.contacts;
+      stats[kind + "_undecided"] += c.undecided;
+      const FallbackCounts& last = w.fallbacks[k];
+      stats[kind + "_by_tolerance"] += last.tolerance;
+      stats[kind + "_by_integers"] += last.integers;
+      stats[kind + "_by_inclusion"] += last.inclusion;
+    }
+  }
+  stats["bytes"] += bytes;
+  if (method_) method_->count(stats);
+}
+
+}  // namespace hpccd

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+// A step on CPU threads. Its parts are there for the hybrid too, whose devices take the tests off the same threads.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "backends/backend.h"
+#include "backends/resources.h"
+#include "contacts/canonical.h"
+#include "paper/method.h"
+#include "traverse/worker.h"
+
+namespace hpccd {
+
+class CpuBackend final : public DetectionBackend {
+ public:
+  explicit CpuBackend(Resources& shared);
+
+  std::optional<Detection> detect(Positions t0, Positions t1) override;
+  void count(std::map<std::string, std::uint64_t>& stats) const override;
+
+  // In this order in each step; the workers hold what was found when it is collected. Devices find all contacts, and
+  // test "fast" as "balanced": beside them the CPU does so as well.
+  enum class Tests : bool { all_here, beside_devices };
+  void update(Positions t0, Positions t1, Tests tests);
+  void traverse();
+  Contacts collect();
+
+  // The elementary tests of pairs of leaves that a traversal named, of the tree or of a published method's hierarchy.
+  void test(const std::vector<LeafPair>& pairs);
+  bool walks_tree() const { return method_ == nullptr; }
+  std::vector<Worker>& workers() { return workers_; }
+
+ private:
+  Resources& shared_;
+  ThreadPool one_thread_{1};
+  std::unique_ptr<paper::MethodEngine> method_;  // published; none for the default traversal
+  const std::vector<Box>* swept_ = nullptr;      // for a published method
+  std::vector<Worker> workers_;
+  Search search_;
+  ContactOrder order_;
+  // Kept by a call that is cancelled: to give the memory of 10 million back to the system takes longer than to end it.
+  Contacts contacts_;
+};
+
+}  // namespace hpccd

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+// A step on CPU threads and this machine's GPUs together (Kim et al. 2009, section 5): bounds, hierarchy and traversal
+// are the CPU backend's, which leaves pairs of leaves to the devices.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "backends/cpu_backend.h"
+#include "hybrid/engine.h"
+
+namespace hpccd {
+
+class HybridBackend final : public DetectionBackend {
+ public:
+  HybridBackend(Resources& shared, CpuBackend& cpu) : shared_(shared), cpu_(cpu) {}
+
+  std::optional<Detection> detect(Positions t0, Positions t1) override;
+  void count(std::map<std::string, std::uint64_t>& stats) const override;
+
+  // Why it cannot take a detector with these options; empty where it can.
+  static std::string unsupported(const Options& options);
+
+ private:
+  bool start();
+  hybrid::LeafTable leaves();
+  void list_primitives();
+
+  Resources& shared_;
+  CpuBackend& cpu_;
+  std::unique_ptr<hybrid::Engine> engine_;
+  // For the published methods: each primitive a leaf of its own.
+  std::vector<LeafRange> primitives_;
+  std::vector<std::uint32_t> face_of_primitive_;
+};
+
+}  // namespace hpccd

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "backends/moving_tree.h"
+
+#include <utility>
+
+namespace hpccd {
+
+void MovingTree::bound(Positions t0, Positions t1, double separation) {
+  followed_ = std::exchange(fits_, false);
+  motion_.update(scene_, t0, t1, separation, pool_);
+}
+
+void MovingTree::fit(Profiler& profiler) {
+  if (!tree_.nodes.empty()) {
+    refit(tree_, motion_.boxes, followed_ ? motion_.resting : std::vector<char>(), pool_);
+    profiler.mark("refit");
+    fits_ = true;
+    if (!worn_out(tree_.area, tree_.area_when_built)) return;
+  }
+  build_anew();
+  profiler.mark("build");
+}
+
+void MovingTree::build_anew() {
+  fits_ = false;  // should this be cancelled
+  ++builds_;
+  build(tree_, scene_, features_, motion_.boxes, pool_);
+  fits_ = true;
+}
+
+const std::vector<Box>& MovingTree::swept() {
+  motion_.sweep(pool_);
+  return motion_.swept;
+}
+
+}  // namespace hpccd

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the backends of one detector share, so that each step can go to another one.
+#pragma once
+
+#include <memory>
+
+#include "backends/moving_tree.h"
+#include "base/cancellation.h"
+#include "base/parallel.h"
+#include "base/profiler.h"
+#include "scene/features.h"
+#include "traverse/tasks.h"
+
+namespace hpccd {
+
+struct Resources {
+  // `threads` as for ThreadPool; the options say how many there are.
+  Resources(std::shared_ptr<const Scene> of, const Options& wanted, int threads);
+
+  std::shared_ptr<const Scene> scene;
+  Options options;
+  Cancellation cancellation;
+  ThreadPool pool;
+  Features features;
+  PairRules rules;
+  MovingTree tree;
+  Profiler profiler;
+};
+
+}  // namespace hpccd

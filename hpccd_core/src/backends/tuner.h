@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+// The choice of backend "auto": the first steps go to each in turn, the rest to the fastest.
+#pragma once
+
+#include <limits>
+#include <vector>
+
+#include "hpccd/hpccd.h"
+
+namespace hpccd {
+
+class Tuner {
+ public:
+  // At least one must be usable. The same may be usable in one step and not in the next.
+  Backend next(const std::vector<Backend>& usable) const;
+
+  // A step that was meant for this backend: how long it took there, or that it was computed elsewhere.
+  void took(Backend backend, double ms);
+  void failed(Backend backend) { ++trial(backend).steps; }
+
+ private:
+  // The first step of each warms up (a GPU's context alone takes 350 ms), and of the next two one may be disturbed.
+  static constexpr int steps_each = 3;
+  struct Trial {
+    int steps = 0;
+    double best_ms = std::numeric_limits<double>::infinity();
+  };
+  Trial& trial(Backend b) { return trials_[static_cast<int>(b)]; }
+  const Trial& trial(Backend b) const { return trials_[static_cast<int>(b)]; }
+  Trial trials_[4];  // by backend
+};
+
+}  // namespace hpccd

@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: Apache-2.0
+// What kernels are written against (scalar.h), with AVX-512 F, DQ, BW and VL.
+#pragma once
+
+#include <immintrin.h>
+
+#include "base/simd/lanes.h"
+#include "base/vec3.h"
+
+#define HPCCD_ISA avx512
+
+namespace hpccd {
+
+HPCCD_HD unsigned bits(LaneMask<double, 8> m) { return _mm512_movepi64_mask((__m512i)m.v); }
+HPCCD_HD unsigned bits(LaneMask<float, 16> m) { return _mm512_movepi32_mask((__m512i)m.v); }
+HPCCD_HD Lanes<double, 8> square_root(Lanes<double, 8> x) {
+  return Lanes<double, 8>((Lanes<double, 8>::Vec)_mm512_sqrt_pd((__m512d)x.v));
+}
+
+}  // namespace hpccd
+
+namespace hpccd::avx512 {
+
+using Double = Lanes<double, 8>;
+using Single = Lanes<float, 16>;
+inline constexpr int double_width = 8;
+
+HPCCD_HD Single narrowed(const Double* parts, double scale) {
+  const __m512d s = _mm512_set1_pd(scale);
+  const __m256 low = _mm512_cvtpd_ps(_mm512_mul_pd((__m512d)parts[0].v, s));
+  const __m256 high = _mm512_cvtpd_ps(_mm512_mul_pd((__m512d)parts[1].v, s));
+  return Single((Single::Vec)_mm512_insertf32x8(_mm512_castps256_ps512(low), high, 1));
+}
+
+struct MotionRow {
+  __m512d v;
+};
+HPCCD_HD MotionRow difference(const double* to, const double* from) {
+  return {_mm512_sub_pd(_mm512_load_pd(to), _mm512_load_pd(from))};
+}
+
+struct MotionLanes {
+  Vec3<Double> t0, t1;
+};
+HPCCD_HD MotionLanes transposed(const MotionRow r[double_width]) {
+  // Pairs of rows interleaved: 128-bit parts hold x, z of t0 and x, z of t1 (low), y and padding (high).
+  __m512d low[4], high[4];
+  for (int i = 0; i < 4; ++i) {
+    low[i] = _mm512_unpacklo_pd(r[2 * i].v, r[2 * i + 1].v);
+    high[i] = _mm512_unpackhi_pd(r[2 * i].v, r[2 * i + 1].v);
+  }
+  // 0x88 takes parts 0 and 2 of both, 0xDD parts 1 and 3.
+  const __m512d x_a = _mm512_shuffle_f64x2(low[0], low[1], 0x88), x_b = _mm512_shuffle_f64x2(low[2], low[3], 0x88);
+  const __m512d z_a = _mm512_shuffle_f64x2(low[0], low[1], 0xDD), z_b = _mm512_shuffle_f64x2(low[2], low[3], 0xDD);
+  const __m512d y_a = _mm512_shuffle_f64x2(high[0], high[1], 0x88), y_b = _mm512_shuffle_f64x2(high[2], high[3], 0x88);
+  const auto lanes = [](__m512d v) { return Double((Double::Vec)v); };
+  return {{lanes(_mm512_shuffle_f64x2(x_a, x_b, 0x88)), lanes(_mm512_shuffle_f64x2(y_a, y_b, 0x88)),
+           lanes(_mm512_shuffle_f64x2(z_a, z_b, 0x88))},
+          {lanes(_mm512_shuffle_f64x2(x_a, x_b, 0xDD)), lanes(_mm512_shuffle_f64x2(y_a, y_b, 0xDD)),
+           lanes(_mm512_shuffle_f64x2(z_a, z_b, 0xDD))}};
+}
+
+struct Floats16 {
+  __m512 v;
+};
+HPCCD_HD Floats16 load16(const float* x) { return {_mm512_load_ps(x)}; }
+HPCCD_HD Floats16 all16(float x) { return {_mm512_set1_ps(x)}; }
+HPCCD_HD Floats16 min(Floats16 a, Floats16 b) { return {_mm512_min_ps(a.v, b.v)}; }
+HPCCD_HD Floats16 max(Floats16 a, Floats16 b) { return {_mm512_max_ps(a.v, b.v)}; }
+
+struct Mask16 {
+  __mmask16 m = 0;
+  HPCCD_HD unsigned bits() const { return m; }
+};
+HPCCD_HD Mask16 operator&(Mask16 a, Mask16 b) { return {static_cast<__mmask16>(a.m & b.m)}; }
+HPCCD_HD Mask16 operator|(Mask16 a, Mask16 b) { return {_kor_mask16(a.m, b.m)}; }
+HPCCD_HD Mask16 less(Floats16 a, Floats16 b) { return {_mm512_cmp_ps_mask(a.v, b.v, _CMP_LT_OQ)}; }
+HPCCD_HD bool any_in_both_halves(Mask16 a, Mask16 b) {
+  const unsigned in_a = a.m, in_b = b.m;
+  return ((in_a & in_a >> 8) | (in_b & in_b >> 8)) != 0;
+}
+
+template <std::uint32_t n>
+struct Rows16 {
+  Floats16 rows[n];
+  HPCCD_HD Floats16 operator[](std::uint32_t i) const { return rows[i]; }
+};
+template <std::uint32_t n>
+HPCCD_HD Rows16<n> load_rows(const float (&rows)[n][16]) {
+  Rows16<n> r;
+  for (std::uint32_t i = 0; i < n; ++i) r.rows[i] = load16(rows[i]);
+  return r;
+}
+
+HPCCD_HD unsigned equal16(const std::uint32_t* numbers, std::uint32_t x) {
+  return _mm512_cmpeq_epi32_mask(_mm512_loadu_si512(numbers), _mm512_set1_epi32(static_cast<int>(x)));
+}
+
+template <bool ascending>
+HPCCD_HD void append_pairs(std::uint32_t* first, std::uint32_t* second, std::uint32_t& n, std::uint32_t number,
+                           const std::uint32_t* others, unsigned lanes) {
+  const __m512i x = _mm512_set1_epi32(static_cast<int>(number)), y = _mm512_loadu_si512(others);
+  const auto kept = static_cast<__mmask16>(lanes);
+  _mm512_storeu_si512(first + n, _mm512_maskz_compress_epi32(kept, ascending ? _mm512_min_epu32(x, y) : x));
+  _mm512_storeu_si512(second + n, _mm512_maskz_compress_epi32(kept, ascending ? _mm512_max_epu32(x, y) : y));
+  n += static_cast<unsigned>(__builtin_popcount(lanes));
+}
+
+}  // namespace hpccd::avx512

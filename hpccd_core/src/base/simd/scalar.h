@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: Apache-2.0
+// What kernels are written against, here with what every machine has. Kernels (*.inl) are compiled once for each
+// instruction set, after its header: avx2.h and avx512.h define the same names, and every set gives the same bits. All
+// of it is inlined: a function compiled for one set must not be linked into code for another.
+#pragma once
+
+#include "base/simd/four.h"
+#include "base/simd/one_by_one.h"
+#include "base/vec3.h"
+
+#define HPCCD_ISA scalar
+
+namespace hpccd::scalar {
+
+// Real numbers in lanes, with the operations of real.h: so many doubles, and twice as many floats.
+using Double = double;
+using Single = float;
+inline constexpr int double_width = 1;
+
+// In single precision, scaled first.
+HPCCD_HD Single narrowed(const Double* parts, double scale) { return static_cast<float>(parts[0] * scale); }
+
+// A cache line of eight doubles: x y z and padding at t = 0, then at t = 1.
+struct MotionRow {
+  Vec3<Double> t0, t1;
+};
+HPCCD_HD MotionRow difference(const double* to, const double* from) {
+  return {{to[0] - from[0], to[1] - from[1], to[2] - from[2]}, {to[4] - from[4], to[5] - from[5], to[6] - from[6]}};
+}
+// As many rows as Double has lanes, a row a lane.
+struct MotionLanes {
+  Vec3<Double> t0, t1;
+};
+HPCCD_HD MotionLanes transposed(const MotionRow r[double_width]) { return {r[0].t0, r[0].t1}; }
+
+// A cache line of sixteen floats.
+struct Floats16 {
+  Floats4 part[4];
+};
+HPCCD_HD Floats16 load16(const float* x) { return {{load4(x), load4(x + 4), load4(x + 8), load4(x + 12)}}; }
+HPCCD_HD Floats16 all16(float x) {
+  const Floats4 all = {x, x, x, x};
+  return {{all, all, all, all}};
+}
+HPCCD_HD Floats16 min(const Floats16& a, const Floats16& b) {
+  Floats16 r;
+  for (int i = 0; i < 4; ++i) r.part[i] = min4(a.part[i], b.part[i]);
+  return r;
+}
+HPCCD_HD Floats16 max(const Floats16& a, const Floats16& b) {
+  Floats16 r;
+  for (int i = 0; i < 4; ++i) r.part[i] = max4(a.part[i], b.part[i]);
+  return r;
+}
+
+// Sixteen answers.
+struct Mask16 {
+  Mask4 part[4] = {};
+  // Bit j: lane j.
+  HPCCD_HD unsigned bits() const {
+    return bits4(part[0]) | bits4(part[1]) << 4 | bits4(part[2]) << 8 | bits4(part[3]) << 12;
+  }
+};
+HPCCD_HD Mask16 operator&(const Mask16& a, const Mask16& b) {
+  Mask16 r;
+  for (int i = 0; i < 4; ++i) r.part[i] = a.part[i] & b.part[i];
+  return r;
+}
+HPCCD_HD Mask16 operator|(const Mask16& a, const Mask16& b) {
+  Mask16 r;
+  for (int i = 0; i < 4; ++i) r.part[i] = a.part[i] | b.part[i];
+  return r;
+}
+HPCCD_HD Mask16 less(const Floats16& a, const Floats16& b) {
+  Mask16 r;
+  for (int i = 0; i < 4; ++i) r.part[i] = a.part[i] < b.part[i];
+  return r;
+}
+// Whether for some j < 8 lanes j and j + 8 of a, or of b, both say yes.
+HPCCD_HD bool any_in_both_halves(const Mask16& a, const Mask16& b) {
+  const Mask4 low = (a.part[0] & a.part[2]) | (b.part[0] & b.part[2]);
+  return bits4(low | (a.part[1] & a.part[3]) | (b.part[1] & b.part[3])) != 0;
+}
+
+// Rows of sixteen floats that are used again and again: in registers where these are as long as a row.
+template <std::uint32_t n>
+struct Rows16 {
+  const float (*rows)[16];
+  HPCCD_HD Floats16 operator[](std::uint32_t i) const { return load16(rows[i]); }
+};
+template <std::uint32_t n>
+HPCCD_HD Rows16<n> load_rows(const float (&rows)[n][16]) {
+  return {rows};
+}
+
+// Bit j: number j of sixteen equals x.
+HPCCD_HD unsigned equal16(const std::uint32_t* numbers, std::uint32_t x) {
+  unsigned bits = 0;
+  for (unsigned j = 0; j < 16; ++j) bits |= static_cast<unsigned>(numbers[j] == x) << j;
+  return bits;
+}
+
+// As append_one_by_one, with room for sixteen more behind the last pair.
+template <bool ascending>
+HPCCD_HD void append_pairs(std::uint32_t* first, std::uint32_t* second, std::uint32_t& n, std::uint32_t number,
+                           const std::uint32_t* others, unsigned lanes) {
+  append_one_by_one<ascending>(first, second, n, number, others, lanes);
+}
+
+}  // namespace hpccd::scalar

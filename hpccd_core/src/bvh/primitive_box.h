@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "scene/features.h"
+
+namespace hpccd {
+
+// The box of a primitive from its vertices': of the whole sweep (box.h) or at both ends of the motion (motion_box.h).
+template <class AnyBox>
+AnyBox primitive_box(const Features& features, const std::vector<AnyBox>& vertex_boxes, std::uint32_t c) {
+  if (c >= features.n_faces()) return vertex_boxes[features.lone_vertices[c - features.n_faces()]];
+  const auto& corners = features.faces[c];
+  AnyBox b = vertex_boxes[corners[0]];
+  b.include(vertex_boxes[corners[1]]);
+  b.include(vertex_boxes[corners[2]]);
+  return b;
+}
+
+}  // namespace hpccd

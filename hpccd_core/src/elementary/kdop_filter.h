@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <math.h>
+
+#include "bvh/kdop.h"
+#include "elementary/motion.h"
+
+namespace hpccd {
+
+// Whether two features are apart along a direction of their k-DOPs or along an axis, in double precision. Whatever
+// boxes and k-DOPs of floats say is apart, this does: a tier whose fallback has a tolerance asks it first, so that its
+// answer does not depend on who filtered before.
+template <Kind kind>
+HPCCD_HD bool apart(const Vec3<double> t0[4], const Vec3<double> t1[4]) {
+  constexpr int n_first = kind == Kind::vertex_face ? 1 : 2;
+  for (int k = 0; k < n_kdop_directions + 3; ++k) {
+    bool below = true, above = true;  // the first feature at both ends
+    for (int end = 0; end < 2; ++end) {
+      double low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY};
+      for (int i = 0; i < 4; ++i) {
+        const double x = along(k, (end == 0 ? t0 : t1)[i]);
+        const int feature = i >= n_first;
+        low[feature] = lesser(low[feature], x);
+        high[feature] = greater(high[feature], x);
+      }
+      below = below && high[0] < low[1];
+      above = above && high[1] < low[0];
+    }
+    if (below || above) return true;
+  }
+  return false;
+}
+
+}  // namespace hpccd

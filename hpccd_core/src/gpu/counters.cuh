@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the kernels count; cleared before each frame, or each submission of the hybrid.
+#pragma once
+
+#include <cstdint>
+
+#include "elementary/batch.h"
+
+namespace hpccd::gpu {
+
+using u32 = std::uint32_t;
+using u64 = unsigned long long;
+
+struct Counters {
+  u64 extent_low[3], extent_high[3];  // largest of the ordered bits, low ones negated: zero is neutral
+  u64 bad;                            // coordinates that are not acceptable
+  u64 node_tests;
+  u64 leaf_pairs, next_leaf_pair;
+  u64 survivors[2], single[2], many[2];                                                      // of the segment at work
+  u64 all_survivors[2], all_single[2], all_many[2], most_survivors, most_single, most_many;  // of all segments
+  u64 candidates[2], proven[2], undecided_of[2];
+  u64 found[2];  // by kind, after the fallback on the device
+  u64 found_all, undecided, to_host;
+  u64 hash;
+  double area;
+};
+
+// Where the pairs of one kind went; on the host.
+inline BatchCounts batch_counts(const Counters& c, int kind) {
+  BatchCounts b;
+  b.tested = c.candidates[kind];
+  b.coplanarity = c.candidates[kind] - c.all_survivors[kind];
+  b.projection = c.all_survivors[kind] - c.all_single[kind] - c.all_many[kind];
+  b.roots = c.all_single[kind] + c.all_many[kind] - c.proven[kind] - c.undecided_of[kind];
+  b.contacts = c.proven[kind];
+  b.undecided = c.undecided_of[kind];
+  return b;
+}
+
+}  // namespace hpccd::gpu

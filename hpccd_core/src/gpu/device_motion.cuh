@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+// This frame's motion of every vertex, as the later kernels read it.
+#pragma once
+
+#include <algorithm>
+
+#include "gpu/bounds.cuh"
+#include "gpu/stream.h"
+
+namespace hpccd::gpu {
+
+class DeviceMotion {
+ public:
+  void reserve(std::size_t n_vertices) {
+    points_.reserve(std::max<std::size_t>(n_vertices, 1));
+    vertices_.reserve(std::max<std::size_t>(n_vertices, 1));
+  }
+
+  template <class T>
+  void fill(LaunchParams<T>& params) const {
+    params.vertices = reinterpret_cast<GivenEnds<T>*>(vertices_.data()), params.points = points_.data();
+  }
+
+  // From the positions that the frame names; clears its counters.
+  template <class T>
+  void launch(const LaunchParams<T>& params, int multiprocessors, cudaStream_t stream) const {
+    check(cudaMemsetAsync(params.counters, 0, sizeof(Counters), stream), "cudaMemsetAsync");
+    extent_kernel<<<std::min(blocks_for(params.n_vertices, 256), 2u * multiprocessors), 256, 0, stream>>>(params);
+    check_launch("extent_kernel");
+    vertices_kernel<<<blocks_for(params.n_vertices, 256), 256, 0, stream>>>(params);
+    check_launch("vertices_kernel");
+  }
+
+  std::size_t bytes() const { return points_.bytes() + vertices_.bytes(); }
+
+ private:
+  DeviceBuffer<GivenEnds<double>> vertices_;  // room for floats, too
+  DeviceBuffer<DevicePoint> points_;
+};
+
+}  // namespace hpccd::gpu

@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: Apache-2.0
+// The caller's positions, from wherever they are to the device of a pipeline, and back to the host.
+#pragma once
+
+#include <algorithm>
+#include <cstring>
+#include <vector>
+
+#include "base/parallel.h"
+#include "gpu/stream.h"
+#include "hpccd/hpccd.h"
+
+namespace hpccd::gpu {
+
+class DevicePositions {
+ public:
+  explicit DevicePositions(int device) : device_(device) {}
+
+  // Both ends on the device, as arrays that the stream's later work may read. By way of page-locked memory: the
+  // driver's own way from pageable memory takes one thread 100 us a megabyte. Waking the pool costs as much as copying
+  // half a megabyte. Those on another device are copied from there, those on this one are used where they are.
+  template <class T>
+  void bring(Positions t0, Positions t1, const T* given[2], ThreadPool& pool, cudaStream_t stream) {
+    const Positions ends[2] = {t0, t1};
+    const std::size_t bytes = 3 * t0.n * sizeof(T), words = std::max<std::size_t>((bytes + 7) / 8, 1);
+    char* to[2] = {nullptr, nullptr};
+    for (int i = 0; i < 2; ++i) {
+      given[i] = static_cast<const T*>(ends[i].data);
+      const bool on_device = ends[i].on_device;
+      if (on_device && (bytes == 0 || settled_device(given[i]) == device_)) continue;
+      given_[i].reserve(words);
+      given[i] = reinterpret_cast<const T*>(given_[i].data());
+      if (on_device) {
+        check(cudaMemcpyAsync(given_[i].data(), ends[i].data, bytes, cudaMemcpyDefault, stream), "cudaMemcpyAsync");
+        continue;
+      }
+      staging_[i].reserve(words);
+      to[i] = reinterpret_cast<char*>(staging_[i].data());
+    }
+    const auto copy = [&](std::size_t begin, std::size_t end, int) {
+      for (int i = 0; i < 2; ++i)
+        if (to[i]) std::memcpy(to[i] + begin, static_cast<const char*>(ends[i].data) + begin, end - begin);
+    };
+    if (bytes < (std::size_t{1} << 19))
+      copy(0, bytes, 0);
+    else
+      parallel_for(pool, bytes, std::size_t{1} << 16, copy);
+    for (int i = 0; i < 2; ++i)
+      if (to[i] && bytes)
+        check(cudaMemcpyAsync(given_[i].data(), to[i], bytes, cudaMemcpyHostToDevice, stream), "cudaMemcpyAsync");
+  }
+
+  // As host arrays; each of the two places keeps the last array that was downloaded to it.
+  Positions download(Positions p, int which) {
+    const std::size_t bytes = 3 * p.n * (p.is_double ? 8 : 4);
+    std::vector<unsigned char>& to = downloaded_[which];
+    to.resize(bytes);
+    if (bytes) {
+      settled_device(p.data);
+      check(cudaMemcpy(to.data(), p.data, bytes, cudaMemcpyDefault), "cudaMemcpy");
+    }
+    return {to.data(), p.n, p.is_double};
+  }
+
+  std::size_t bytes() const { return given_[0].bytes() + given_[1].bytes(); }
+
+ private:
+  // The device on which an array of the caller lies. Its producer may still be at work on a stream of its own: it is
+  // not when this returns.
+  int settled_device(const void* array) const {
+    cudaPointerAttributes a;
+    check(cudaPointerGetAttributes(&a, array), "cudaPointerGetAttributes");
+    const int where = a.type == cudaMemoryTypeDevice ? a.device : device_;
+    check(cudaSetDevice(where), "cudaSetDevice");
+    check(cudaDeviceSynchronize(), "cudaDeviceSynchronize");
+    check(cudaSetDevice(device_), "cudaSetDevice");
+    return where;
+  }
+
+  const int device_;
+  PinnedBuffer<double> staging_[2];
+  DeviceBuffer<double> given_[2];
+  std::vector<unsigned char> downloaded_[2];
+};
+
+}  // namespace hpccd::gpu

@@ -1,0 +1,225 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the kernels of one frame read and write. Passed by value: all pointers are to device memory.
+#pragma once
+
+#include <cstdint>
+
+#include "base/hd.h"
+#include "elementary/pair_vertices.h"
+#include "gpu/counters.cuh"
+#include "hpccd/hpccd.h"
+
+namespace hpccd::gpu {
+
+inline constexpr u32 all_lanes = 0xFFFFFFFFu;
+inline constexpr u32 no_mesh = 0xFFFFFFFFu;
+// Features are numbered in 31 bits, so that the kind of a pair fits beside them.
+inline constexpr u32 kind_bit = 0x80000000u;
+
+// Both ends of one vertex's motion as the caller gave them: half the bytes where they are floats, and widening is
+// exact.
+template <class T>
+struct GivenEnds;
+template <>
+struct alignas(32) GivenEnds<float> {
+  float4 t0, t1;
+};
+template <>
+struct alignas(64) GivenEnds<double> {
+  double2 t0[2], t1[2];
+};
+
+// A 16-byte word; what the tags of a box hold depends on the list.
+struct alignas(16) Bound {
+  float x[3];
+  u32 tag;
+};
+
+// Where a vertex is at both ends of its motion.
+struct alignas(32) DevicePoint {
+  Bound at[2];
+};
+
+// Bounds at both ends of the motion (bvh/motion_box.h).
+struct alignas(64) DeviceBox {
+  Bound low[2], high[2];
+  HPCCD_HD u32& tag_low() { return low[0].tag; }
+  HPCCD_HD u32& tag_high() { return high[0].tag; }
+  HPCCD_HD u32 tag_low() const { return low[0].tag; }
+  HPCCD_HD u32 tag_high() const { return high[0].tag; }
+};
+
+struct alignas(16) DeviceLeaf {
+  u32 first_face, first_edge, first_vertex;
+  u32 counts;  // faces | edges << 8 | vertices << 16
+};
+
+// Pairs of features of one kind; n counts on where `capacity` is exceeded, so that the host knows how much is needed.
+struct PairList {
+  uint2* pairs;
+  u64 capacity;
+};
+
+template <class T>
+struct LaunchParams {
+  // The scene.
+  u32 n_vertices, n_edges, n_faces;
+  const uint2* edges;
+  const u32* faces;  // three vertices each
+  const u32* mesh_of_vertex;
+  u32 n_meshes;
+  const unsigned char* enabled;   // n_meshes^2; null: all pairs
+  const unsigned char* accuracy;  // n_meshes^2; null: the default
+  Accuracy default_accuracy;
+  u32 key_shift;   // bits of a key's second feature
+  u32 kind_shift;  // bits of both features
+
+  // The tree: topology, and boxes of this frame.
+  u32 n_nodes, n_leaves;
+  DeviceBox* node_boxes;  // tags: left child (0: leaf), last leaf of the subtree
+  const u32* node_mesh;
+  const u32* node_parent;
+  u32* node_arrivals;
+  DeviceBox* leaf_boxes;
+  const u32* leaf_nodes;
+  const DeviceLeaf* leaves;
+  const u32 *vertex_of_slot, *edge_of_slot, *face_of_slot;
+  DeviceBox* edge_boxes;  // tags: the two vertices
+  DeviceBox* face_boxes;  // tags: the first two corners
+  const u32* face_corner2;
+
+  // This frame's motion.
+  const T *given_t0, *given_t1;
+  GivenEnds<T>* vertices;
+  DevicePoint* points;  // of the vertices
+
+  // Lists.
+  PairList leaf_pairs, survivors[2], single[2], many[2];
+  u64* found_keys;
+  double* found_tocs;
+  u64 found_capacity;
+  u64* undecided;  // keys
+  u64 undecided_capacity;
+  u64* to_host;  // keys that need exact arithmetic
+  u64 to_host_capacity;
+  u32 segment, n_segments;  // leaf pairs of this pass: n * segment / n_segments ...
+  Counters* counters;
+};
+
+__device__ inline u64 key_of(u32 key_shift, u32 kind_shift, Kind kind, u32 first, u32 second) {
+  return (static_cast<u64>(kind == Kind::edge_edge) << kind_shift) | (static_cast<u64>(first) << key_shift) | second;
+}
+
+__device__ inline u32 lane_number() { return threadIdx.x & 31; }
+
+// A place for each lane with `wants`, by one atomic a warp. All lanes must call.
+__device__ inline u64 warp_append(u64* counter, bool wants) {
+  const u32 mask = __ballot_sync(all_lanes, wants);
+  if (!mask) return 0;
+  const u32 lane = lane_number(), leader = __ffs(mask) - 1;
+  u64 base = 0;
+  if (lane == leader) base = atomicAdd(counter, static_cast<u64>(__popc(mask)));
+  base = __shfl_sync(all_lanes, base, leader);
+  return base + __popc(mask & ((1u << lane) - 1));
+}
+
+__device__ inline Bound bound_of(float4 v) { return {{v.x, v.y, v.z}, __float_as_uint(v.w)}; }
+
+__device__ inline DeviceBox load_box(const DeviceBox* b) {
+  const float4* v = reinterpret_cast<const float4*>(b);
+  return {{bound_of(v[0]), bound_of(v[1])}, {bound_of(v[2]), bound_of(v[3])}};
+}
+
+// Past this multiprocessor's own cache: written by another one in the same kernel.
+__device__ inline DeviceBox load_box_fresh(const DeviceBox* b) {
+  const float4* v = reinterpret_cast<const float4*>(b);
+  return {{bound_of(__ldcg(v)), bound_of(__ldcg(v + 1))}, {bound_of(__ldcg(v + 2)), bound_of(__ldcg(v + 3))}};
+}
+
+// The box of one vertex.
+__device__ inline DeviceBox load_point(const DevicePoint* p) {
+  const float4* v = reinterpret_cast<const float4*>(p);
+  const Bound t0 = bound_of(v[0]), t1 = bound_of(v[1]);
+  return {{t0, t1}, {t0, t1}};
+}
+
+__device__ inline void store(Bound* to, const Bound& b) {
+  *reinterpret_cast<float4*>(to) = {b.x[0], b.x[1], b.x[2], __uint_as_float(b.tag)};
+}
+__device__ inline void store_box(DeviceBox* to, const DeviceBox& b) {
+  for (int end = 0; end < 2; ++end) store(&to->low[end], b.low[end]), store(&to->high[end], b.high[end]);
+}
+
+__device__ inline void include(DeviceBox& a, const DeviceBox& b) {
+  for (int end = 0; end < 2; ++end)
+    for (int k = 0; k < 3; ++k) {
+      a.low[end].x[k] = b.low[end].x[k] < a.low[end].x[k] ? b.low[end].x[k] : a.low[end].x[k];
+      a.high[end].x[k] = a.high[end].x[k] < b.high[end].x[k] ? b.high[end].x[k] : a.high[end].x[k];
+    }
+}
+
+// Not in the same order along an axis at both ends.
+__device__ inline bool overlap(const DeviceBox& a, const DeviceBox& b) {
+  bool apart = false;
+  for (int k = 0; k < 3; ++k)
+    apart |= ((a.high[0].x[k] < b.low[0].x[k]) & (a.high[1].x[k] < b.low[1].x[k])) |
+             ((b.high[0].x[k] < a.low[0].x[k]) & (b.high[1].x[k] < a.low[1].x[k]));
+  return !apart;
+}
+
+// One vertex at both ends, widened.
+struct Ends {
+  Vec3<double> t0, t1;
+};
+
+__device__ inline Ends load_ends(const GivenEnds<float>* vertices, u32 v) {
+  const float4 a = __ldg(&vertices[v].t0), b = __ldg(&vertices[v].t1);
+  return {{a.x, a.y, a.z}, {b.x, b.y, b.z}};
+}
+
+__device__ inline Ends load_ends(const GivenEnds<double>* vertices, u32 v) {
+  const double2 a = __ldg(&vertices[v].t0[0]), b = __ldg(&vertices[v].t0[1]), c = __ldg(&vertices[v].t1[0]),
+                d = __ldg(&vertices[v].t1[1]);
+  return {{a.x, a.y, b.x}, {c.x, c.y, d.x}};
+}
+
+// v as pair_vertices gives them.
+template <Kind kind, class T>
+__device__ inline Motion<double> load_motion(const GivenEnds<T>* vertices, uint4 v) {
+  const Ends q0 = load_ends(vertices, v.x), q1 = load_ends(vertices, v.y), q2 = load_ends(vertices, v.z),
+             q3 = load_ends(vertices, v.w);
+  const Vec3<double> t0[4] = {q0.t0, q1.t0, q2.t0, q3.t0}, t1[4] = {q0.t1, q1.t1, q2.t1, q3.t1};
+  return motion_of<kind>(t0, t1);
+}
+
+// Of an edge or of a face.
+struct VertexNumbers {
+  u32 v[3];
+  __device__ u32 operator[](int i) const { return v[i]; }
+};
+
+template <Kind kind, class T>
+__device__ inline uint4 vertices_of(const LaunchParams<T>& params, u32 first, u32 second) {
+  // Through the cache for what no kernel writes.
+  const auto edge = [&](u32 e) {
+    const uint2 v = __ldg(params.edges + e);
+    return VertexNumbers{{v.x, v.y}};
+  };
+  const auto face = [&](u32 i) {
+    const u32* v = params.faces + 3 * static_cast<u64>(i);
+    return VertexNumbers{{__ldg(v), __ldg(v + 1), __ldg(v + 2)}};
+  };
+  u32 v[4];
+  pair_vertices<kind>(first, second, edge, face, v);
+  return {v[0], v[1], v[2], v[3]};
+}
+
+template <class T>
+__device__ inline Accuracy accuracy_of(const LaunchParams<T>& params, uint4 v) {
+  if (!params.accuracy) return params.default_accuracy;
+  // The second vertex belongs to the first edge or to the face, the third to the other edge or the face.
+  return static_cast<Accuracy>(
+      params.accuracy[params.mesh_of_vertex[v.x] * params.n_meshes + params.mesh_of_vertex[v.z]]);
+}
+
+}  // namespace hpccd::gpu

@@ -1,0 +1,179 @@
+// SPDX-License-Identifier: Apache-2.0
+// What one element of the GPU task queue needs on the device, and its output buffer in page-locked memory, which the
+// kernels write themselves: nothing has to be copied back.
+#pragma once
+
+#include <atomic>
+#include <vector>
+
+#include "gpu/device_scene.cuh"
+#include "gpu/test_lists.cuh"
+#include "hybrid/test_device.h"
+
+namespace hpccd::hybrid {
+
+using namespace gpu;  // only device code includes this
+
+static_assert(sizeof(LeafPair) == sizeof(uint2));
+
+// What differs between submissions of one slot; in page-locked memory, where the device reads it.
+struct Submission {
+  u64 leaf_pairs;
+  u32 number;
+};
+
+static __global__ void begin_submission_kernel(Counters* counters, const Submission* submission) {
+  constexpr u32 words = sizeof(Counters) / sizeof(u64);
+  static_assert(sizeof(Counters) % sizeof(u64) == 0);
+  for (u32 i = threadIdx.x; i < words; i += blockDim.x) reinterpret_cast<u64*>(counters)[i] = 0;
+  __syncthreads();
+  if (threadIdx.x == 0) counters->leaf_pairs = submission->leaf_pairs;
+}
+
+// The state variable of an element of the GPU task queue becomes "data ready", after everything that it announces.
+static __global__ void data_ready_kernel(const Counters* counters, Counters* to_host, u32* state,
+                                         const Submission* submission) {
+  *to_host = *counters;
+  __threadfence_system();
+  *reinterpret_cast<volatile u32*>(state) = submission->number;
+}
+
+// What a slot's lists had to grow to: what was too short in one will be in the others.
+struct LargestLists {
+  TestLists::Sizes lists{};
+  std::size_t found = 0;
+};
+
+class Slot {
+ public:
+  // A start: lists grow where they overflow, and what one slot has learnt the others begin with.
+  Slot() : lists_(std::size_t{1} << 17, std::size_t{1} << 15, std::size_t{1} << 12) {
+    counters_.reserve(1);
+    host_counters_.reserve(1);
+    state_.reserve(1);
+    submission_.reserve(1);
+    *state_.data() = 0;
+    *submission_.data() = {0, 0};
+    reserve_found(std::size_t{1} << 13);
+  }
+
+  bool busy = false;
+
+  // The pairs of the next launches.
+  void assign(const std::vector<Piece>& pieces) { sent_ = pieces; }
+
+  // They are tested when the event has come. `params` names the frame's scene, leaves and motion: the same places as in
+  // the last launch where `version` is the same.
+  template <class T>
+  void launch(LaunchParams<T> params, std::uint64_t version, const LargestLists& largest, cudaEvent_t after,
+              int multiprocessors) {
+    lists_.reserve(largest.lists);
+    reserve_found(largest.found);
+    std::size_t n = 0;
+    for (const Piece& piece : sent_) n += piece.n;
+    if (n > pairs_.size()) pairs_.reserve(2 * n);
+    *submission_.data() = {n, submission_.data()->number + 1};
+    looks_ = 0;
+    record(params, version, multiprocessors);
+    check(cudaStreamWaitEvent(stream_, after, 0), "cudaStreamWaitEvent");
+    std::size_t at = 0;
+    for (const Piece& piece : sent_) {
+      check(cudaMemcpyAsync(pairs_.data() + at, piece.pairs, piece.n * sizeof(uint2), cudaMemcpyHostToDevice, stream_),
+            "cudaMemcpyAsync");
+      at += piece.n;
+    }
+    graph_.launch(stream_);
+  }
+
+  bool data_ready() {
+    if (std::atomic_ref<u32>(*state_.data()).load(std::memory_order_acquire) == submission_.data()->number) return true;
+    // A kernel that failed never says so: its stream does. To ask it costs more than to look at the state.
+    if (++looks_ % 1024 == 0)
+      if (const cudaError_t e = cudaStreamQuery(stream_); e != cudaErrorNotReady) check(e, "cudaStreamQuery");
+    return false;
+  }
+
+  // When data is ready: makes room where a list was too short. True where the pairs must be tested again.
+  bool grow(LargestLists& largest) {
+    const Counters& c = *host_counters_.data();
+    bool again = lists_.grow(c);
+    if (c.found_all > keys_.size()) {
+      again = true;
+      reserve_found(c.found_all + c.found_all / 4);
+    }
+    if (again) {
+      largest.lists.include(lists_.sizes());
+      largest.found = std::max(largest.found, keys_.size());
+    }
+    return again;
+  }
+
+  void append_to(Output& output, const DeviceScene& scene) const {
+    const Counters& c = *host_counters_.data();
+    for (u64 i = 0; i < c.found_all; ++i) {
+      const Candidate p = scene.candidate_of(keys_.data()[i]);
+      auto& list = p.kind == Kind::vertex_face ? output.vertex_face : output.edge_edge;
+      list.push_back({p.first, p.second, tocs_.data()[i]});
+    }
+    for (u64 i = 0; i < c.to_host; ++i) output.undecided.push_back(scene.candidate_of(lists_.to_host()[i]));
+    for (int k = 0; k < 2; ++k) output.counts[k] += batch_counts(c, k);
+  }
+
+  // Whatever was under way has ended, well or not.
+  void drain() {
+    cudaStreamSynchronize(stream_);
+    busy = false;
+  }
+
+  std::size_t bytes() const { return lists_.bytes() + pairs_.bytes(); }
+
+ private:
+  void reserve_found(std::size_t n) {
+    keys_.reserve(n);
+    tocs_.reserve(n);
+  }
+
+  // The kernels between the copy and "data ready", anew where something that they name has changed.
+  template <class T>
+  void record(LaunchParams<T> params, std::uint64_t version, int multiprocessors) {
+    // Places as well as sizes: after a failed allocation a buffer may come back as large as it was, elsewhere.
+    std::vector<std::uintptr_t> now{sizeof(T), version, lists_.n_segments()};
+    const auto depends_on = [&](const auto& buffer) {
+      now.push_back(reinterpret_cast<std::uintptr_t>(buffer.data()));
+      now.push_back(buffer.size());
+    };
+    depends_on(pairs_), depends_on(keys_), depends_on(tocs_);
+    lists_.for_buffers(depends_on);
+    if (now == recorded_) return;
+    recorded_.clear();
+    params.counters = counters_.data();
+    params.leaf_pairs = {pairs_.data(), pairs_.size()};
+    params.found_keys = keys_.data(), params.found_tocs = tocs_.data(), params.found_capacity = keys_.size();
+    StageTimer no_timer(false);
+    graph_.record(stream_, [&] {
+      begin_submission_kernel<<<1, 32, 0, stream_>>>(params.counters, submission_.data());
+      check_launch("begin_submission_kernel");
+      lists_.launch(params, multiprocessors, stream_, no_timer);
+      data_ready_kernel<<<1, 1, 0, stream_>>>(params.counters, host_counters_.data(), state_.data(),
+                                              submission_.data());
+      check_launch("data_ready_kernel");
+    });
+    recorded_ = now;
+  }
+
+  Stream stream_;
+  TestLists lists_;
+  DeviceBuffer<uint2> pairs_;
+  DeviceBuffer<Counters> counters_;
+  PinnedBuffer<Counters> host_counters_;
+  PinnedBuffer<u64> keys_;
+  PinnedBuffer<double> tocs_;
+  PinnedBuffer<u32> state_;
+  PinnedBuffer<Submission> submission_;  // its number is what the state shows when it is ready
+  Graph graph_;
+  std::vector<std::uintptr_t> recorded_;  // what the graph depends on, as it was
+  std::vector<Piece> sent_;
+  u32 looks_ = 0;
+};
+
+}  // namespace hpccd::hybrid

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+// Representative triangles (Kim et al. 2009, section 6; Curtis et al. 2008): a pair of triangles stands for the pairs
+// of the features that they represent, so that no two pairs of triangles bring the same elementary test.
+#pragma once
+
+#include <vector>
+
+#include "bvh/box.h"
+#include "scene/features.h"
+#include "traverse/leaf_pairs.h"
+#include "traverse/tasks.h"
+#include "traverse/worker.h"
+
+namespace hpccd::paper {
+
+struct BoundedPrimitive {
+  std::uint32_t number;
+  const Box& box;
+};
+
+// Appends the feature pairs of two different primitives whose boxes overlap and that share no vertex: the rule of
+// traverse/leaf_pairs.inl, so that all methods test the same pairs.
+void primitive_pairs(const Features& features, const std::vector<Box>& vertex_boxes, BoundedPrimitive a,
+                     BoundedPrimitive b, CandidateBuffer& edge_edge, CandidateBuffer& vertex_face);
+
+// Their elementary tests, at the accuracy of their meshes.
+void test_primitives(const Features& features, const PairRules& rules, const std::vector<Box>& vertex_boxes,
+                     BoundedPrimitive a, BoundedPrimitive b, Worker& worker);
+// The same of two primitives by number.
+void test_primitives(const Features& features, const PairRules& rules, const std::vector<Box>& vertex_boxes,
+                     LeafPair primitives, Worker& worker);
+
+}  // namespace hpccd::paper

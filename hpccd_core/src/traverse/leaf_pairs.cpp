@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "traverse/leaf_pairs.h"
+
+namespace hpccd {
+
+// Of leaf_pairs.inl, compiled for each instruction set.
+namespace scalar {
+void leaf_pairs(const Tree&, const LeafRange&, const LeafRange&, CandidateBuffer&, CandidateBuffer&);
+}
+#if defined(HPCCD_X86)
+namespace avx2 {
+void leaf_pairs(const Tree&, const LeafRange&, const LeafRange&, CandidateBuffer&, CandidateBuffer&);
+}
+namespace avx512 {
+void leaf_pairs(const Tree&, const LeafRange&, const LeafRange&, CandidateBuffer&, CandidateBuffer&);
+}
+#endif
+
+LeafPairs leaf_pairs([[maybe_unused]] Simd simd) {
+#if defined(HPCCD_X86)
+  if (simd == Simd::avx512) return avx512::leaf_pairs;
+  if (simd == Simd::avx2) return avx2::leaf_pairs;
+#endif
+  return scalar::leaf_pairs;
+}
+
+}  // namespace hpccd

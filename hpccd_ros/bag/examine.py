@@ -1,0 +1,178 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Check an MCAP file record by record: what is in it, and how much of a cut-off or damaged one is readable."""
+
+import dataclasses
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+
+from mcap.opcode import Opcode
+from mcap.records import Channel, Chunk, Header, Message, Schema
+from mcap.writer import MCAP0_MAGIC
+
+from hpccd_ros.bag.mcap_index import Descriptions, miscounted, misplaced, read_index, undescribed
+from hpccd_ros.bag.mcap_records import DAMAGE, Place, data_section, inside, parse, within_chunk_times
+from hpccd_ros.bag.reader import RecordingError
+from hpccd_ros.bag.writer import COMPRESSIONS
+
+
+@dataclasses.dataclass
+class Examination:
+    """What a walk over all records of a file found."""
+
+    path: Path
+    size: int  # bytes
+    readable: int = 0  # bytes from the start that hold whole, valid records
+    finished: bool = False  # index and footer are there
+    ended: bool = False  # as a finished file does: it was not cut off
+    problem: str = ""  # the first one, or ""
+    profile: str = ""
+    library: str = ""
+    counts: dict[str, int] = dataclasses.field(default_factory=dict)  # messages by topic
+    types: dict[str, str] = dataclasses.field(default_factory=dict)  # type by topic
+    start: int = 0  # ns, smallest log time
+    end: int = 0  # ns, largest log time
+    chunks: int = 0
+    damaged_chunks: int = 0  # of which what follows the damage is skipped
+    orphans: int = 0  # messages of channels that nothing readable describes
+    compression: str = "none"
+
+    @property
+    def message_count(self) -> int:
+        return sum(self.counts.values())
+
+    @property
+    def sound(self) -> bool:
+        """Finished, and every record readable."""
+        return self.finished and not self.problem
+
+
+def examine(path, visit: Callable = lambda record: None) -> Examination:
+    """Walk over all records of `path` with their check sums. Never raises for damage: it is in the result.
+
+    visit: is called with each whole record; a schema and a channel come before the first message that needs them.
+    Raises RecordingError where `path` cannot be opened.
+    """
+    return _Walk(Path(path), visit).result
+
+
+class _Walk:
+    """Calls `visit` for each whole record of a file, with those that a message needs before it."""
+
+    def __init__(self, path: Path, visit: Callable):
+        self._visit = visit
+        try:
+            self.result = Examination(path, path.stat().st_size)
+            stream = open(path, "rb")
+        except OSError as error:
+            raise RecordingError(f"{path} cannot be read: {error.strerror}") from error
+        self._described = Descriptions(self._note)
+        self._visited: dict[int, Channel] = {}
+        self._counts: Counter[int] = Counter()
+        with stream:
+            self._walk(stream)
+
+    def _walk(self, stream):
+        result = self.result
+        index, data_end, index_problem = self._read_index(stream)
+        places: list[Place] = []
+        for raw in self._whole_records(stream):
+            places.append(raw.place)
+            for record in self._records_of(raw):
+                self._visit_record(record)
+            result.readable = stream.tell()
+        if result.orphans:
+            self._note(f"{result.orphans} messages of channels that nothing describes")
+        if result.finished and data_end != result.readable:
+            index_problem = index_problem or f"the data ends at byte {result.readable:,}, the footer says {data_end:,}"
+        if result.finished and index_problem:
+            self._note(index_problem)
+            result.finished = False
+        elif result.finished and index is not None and not result.damaged_chunks:
+            result.readable = result.size
+            counts = self._counts
+            for why in (misplaced(index, places), undescribed(index, counts), miscounted(index, counts)):
+                if why:
+                    self._note(why)
+
+    def _whole_records(self, stream):
+        # What `visit` raises, such as a full disk, is no damage: so the loop is not in here.
+        try:
+            yield from data_section(stream, self.result.size)
+        except DAMAGE as error:
+            self._note(_text(error))
+        else:
+            self.result.finished = True
+
+    def _records_of(self, raw):
+        result = self.result
+        if raw.at == len(MCAP0_MAGIC) and raw.opcode != Opcode.HEADER:
+            self._note("no header at its begin")
+        if raw.at != len(MCAP0_MAGIC) and raw.opcode == Opcode.HEADER:
+            self._note(f"a header at byte {raw.at:,}")
+        try:
+            record = parse(raw)
+            if isinstance(record, Chunk):
+                result.chunks += 1
+                result.compression = record.compression if record.compression in COMPRESSIONS else "none"
+                for item in inside(record):
+                    if not within_chunk_times(record, item):
+                        self._note(f"the chunk at byte {raw.at:,} has a message outside of the times that it tells")
+                    yield item
+            elif record is not None:
+                yield record
+        except DAMAGE as error:
+            # The frame of the record is whole: what follows it can be read.
+            result.damaged_chunks += raw.opcode == Opcode.CHUNK
+            self._note(_text(error))
+
+    def _read_index(self, stream):
+        """(index or None, where the data must end, why there is none). It may describe what a damaged chunk did."""
+        try:
+            stream.seek(max(0, self.result.size - len(MCAP0_MAGIC)))
+            if stream.read() != MCAP0_MAGIC:
+                return None, 0, "no end of a finished file"
+            self.result.ended = True
+            index, data_end = read_index(stream, self.result.size)
+        except DAMAGE as error:
+            return None, 0, _text(error)
+        if index is not None:
+            for record in (*index.schemas.values(), *index.channels.values()):
+                self._described.add(record)
+        return index, data_end, None
+
+    def _visit_record(self, record):
+        result = self.result
+        if isinstance(record, Header):
+            result.profile, result.library = result.profile or record.profile, result.library or record.library
+        if isinstance(record, (Schema, Channel)):
+            self._described.add(record)
+        elif isinstance(record, Message):
+            self._visit_message(record)
+        else:
+            self._visit(record)
+
+    def _visit_message(self, record):
+        result, number = self.result, record.channel_id
+        if number not in self._described.channels:
+            result.orphans += 1
+            return
+        channel = self._described.channels[number]
+        if self._visited.get(number) is not channel:
+            self._visited[number] = channel
+            if channel.schema_id in self._described.schemas:
+                self._visit(self._described.schemas[channel.schema_id])
+                result.types[channel.topic] = self._described.schemas[channel.schema_id].name
+            self._visit(channel)
+        result.start = min(result.start, record.log_time) if result.message_count else record.log_time
+        result.end = max(result.end, record.log_time)
+        self._counts[number] += 1
+        result.counts[channel.topic] = result.counts.get(channel.topic, 0) + 1
+        self._visit(record)
+
+    def _note(self, problem: str) -> None:
+        self.result.problem = self.result.problem or problem
+
+
+def _text(error) -> str:
+    return f"{type(error).__name__}: {error}".rstrip(": ")

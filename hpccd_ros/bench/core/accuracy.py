@@ -1,0 +1,174 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What each tier of accuracy costs, and where it errs.
+
+  hpccd bench accuracy                        the files of HPCCD_DATA and two generated scenes, then the sweeps
+  hpccd bench accuracy cloth-ball --simd auto,scalar
+  hpccd bench accuracy cloth-drop --sweep-queries 0      scenes only
+
+Scenes: ms a step of each tier in turn, contacts missed and invented, error of times of contact, and who decided the
+candidate pairs. Truth is what the file says; for scenes without it, the tier "exact", which the tests compare with
+rational arithmetic. Sweeps: elementary queries at scales from 1e-150 to 1e148 and at distances from the origin up to
+1e12 times their size, ordinary and degenerate ones, and hard ones as `make fuzz` makes them, against rational
+arithmetic.
+"""
+
+from __future__ import annotations
+
+from hpccd_ros.bench import command
+from hpccd_ros.bench.core import accuracy_sweep, measure, truth
+from hpccd_ros.bench.core.variants import TIERS, Variant, usable
+from hpccd_ros.bench.report import table
+from hpccd_ros.bench.report.machine import cores
+
+BACKENDS = ("cpu", "hybrid", "gpu")
+# Stats of the core by who decided, in the order in which a pair meets them.
+DECIDED = {
+    "slabs": "rejected_slabs", "coplanarity": "rejected_coplanarity", "projection": "rejected_projection",
+    "roots": "rejected_roots", "proven": "proven_contacts", "tolerance": "by_tolerance", "integers": "by_integers",
+}  # fmt: skip
+
+
+def configure(parser):
+    command.configure(parser, default=("data", "cloth-drop", "n-body-like-lr"), steps=2)
+    parser.add_argument("--tiers", default=",".join(TIERS), metavar="NAME,...", help="default: %(default)s")
+    parser.add_argument("--backend", default="cpu", metavar="NAME,...", help="of cpu, hybrid, gpu (default: cpu)")
+    parser.add_argument("--simd", default="auto", metavar="NAME,...", help="of auto, scalar, avx2, avx512")
+    parser.add_argument("--sweep-queries", type=int, default=2000, metavar="N",
+                        help="queries of each kind at each point of the sweeps; 0: none (default: %(default)s)")
+    parser.add_argument("--seed", type=int, default=1, metavar="N", help="of the sweeps (default: %(default)s)")
+    command.threads_option(parser)
+
+
+def run(args) -> int:
+    report, sources = command.begin(args)
+    report.note(measure.NOTE)
+    tiers = command.listed("--tiers", args.tiers, TIERS)
+    backends, refused = usable("backend", command.listed("--backend", args.backend, BACKENDS))
+    command.skipped(report, "backend", refused)
+    sets, refused = usable("simd", command.listed("--simd", args.simd, ("auto", "scalar", "avx2", "avx512")))
+    command.skipped(report, "instruction set", refused)
+    for source in sources:
+        _measure_scene(report, source, tiers, backends, sets, args)
+    _print_scenes(report.rows)
+    if args.sweep_queries > 0:
+        for part in (accuracy_sweep.adversarial, accuracy_sweep.sweep):
+            for row in part(tiers, args.sweep_queries, args.seed):
+                report.add(part=part.__name__, **row)
+        _print_adversarial([row for row in report.rows if row["part"] == "adversarial"], tiers)
+        _print_first_errors([row for row in report.rows if row["part"] == "sweep"], tiers)
+    _check(report)
+    return command.end(args, report)
+
+
+def _measure_scene(report, source, tiers, backends, sets, args):
+    variants = {
+        (backend, simd, tier): Variant(
+            f"{backend} {simd} {tier}",
+            {"backend": backend, "accuracy": tier, "threads": args.threads, "simd": simd},
+        )
+        for backend in backends for simd in (sets if backend == "cpu" else ["auto"]) for tier in tiers
+    }  # fmt: skip
+    series = measure.measure(source, [measure.CoreRunner(v) for v in variants.values()], args.repeat, args.steps)
+    known = {step: _truth(source.step(step)) for step in next(iter(series.values())).by_step}
+    for (backend, simd, tier), variant in variants.items():
+        one = series[variant.name]
+        errors = [_errors(source.step(step), variant, true) for step, true in known.items()]
+        balanced = series.get(f"{backend} {simd} balanced")
+        stats = one.stats()
+        report.add(
+            part="scene",
+            scene=source.name,
+            backend=backend,
+            simd=simd,
+            accuracy=tier,
+            threads=args.threads or cores(),
+            truth="file" if source.step(next(iter(known))).truth else "exact tier",
+            contacts=one.contacts(),
+            missed=sum(e.missed for e in errors),
+            invented=sum(e.invented for e in errors),
+            toc_worst=max(e.toc_worst for e in errors),
+            toc_p99=max(e.toc_p99 for e in errors),
+            latest=max(e.latest for e in errors),
+            **one.times().as_row(),
+            step_ms=one.sequence_ms() / len(one.by_step),
+            over_balanced=one.sequence_ms() / balanced.sequence_ms() if balanced else None,
+            candidates=one.candidates(),
+            decided={name: sum(stats.get(f"{kind}_{key}", 0) for kind in ("vf", "ee"))
+                     for name, key in DECIDED.items()},
+        )  # fmt: skip
+
+
+def _truth(step):
+    if step.truth:
+        return step.truth
+    exact = Variant("truth", {"accuracy": "exact", "backend": "cpu"}).detector(step)
+    found = exact.detect(step.vertices_t0, step.vertices_t1)
+    return {key: getattr(found, key) for key in ("vf", "vf_toc", "ee", "ee_toc")}
+
+
+def _errors(step, variant, true):
+    return truth.of_scene(variant.detector(step).detect(step.vertices_t0, step.vertices_t1), true)
+
+
+def _check(report):
+    """The promises of the tiers, on everything that was measured here."""
+    for row in report.rows:
+        where = row.get("scene") or row.get("generator") or f"{row['sweep']} {row['at']:g}, {row['queries']}"
+        wrong = f"missed {row['missed']}, invented {row['invented']}, toc off by {row['toc_worst']:g}"
+        text = f"{where}: {row['accuracy']}: {wrong}"
+        if row["accuracy"] == "exact" and (row["missed"] or row["invented"] or row["toc_worst"] > 1e-12):
+            report.failure(text)
+        if row["accuracy"] == "conservative" and (row["missed"] or row["latest"] > 0):
+            report.failure(f"{text}, latest by {row['latest']:g}")
+
+
+def _print_scenes(rows):
+    table.show(
+        "tiers on whole scenes",
+        ["scene", "backend", "simd", "accuracy", "ms a step", "/ balanced", "contacts", "missed", "invented",
+         "toc worst", "toc p99"],
+        [
+            [r["scene"], r["backend"], r["simd"], r["accuracy"], r["step_ms"], r["over_balanced"], round(r["contacts"]),
+             r["missed"], r["invented"], r["toc_worst"], r["toc_p99"]]
+            for r in rows
+        ],
+        "missed, invented, toc: against the truth of the file, or else against the tier exact",
+    )  # fmt: skip
+    table.show(
+        "who decided the candidate pairs of an average step",
+        ["scene", "backend", "accuracy", "candidates", *DECIDED],
+        [[r["scene"], r["backend"], r["accuracy"], round(r["candidates"]), *(round(n) for n in r["decided"].values())]
+         for r in rows if r["simd"] in ("auto", rows[0]["simd"])],
+        "slabs to roots: dropped by error bounds; proven: contacts by error bounds; the rest: the tier's last resort",
+    )  # fmt: skip
+
+
+def _print_adversarial(rows, tiers):
+    table.show(
+        "hard queries: missed + invented of all (rational arithmetic is the truth)",
+        ["generator", "queries", "contacts", *tiers],
+        [
+            [name, first["n"], first["true"], *(f"{r['missed']} + {r['invented']}" for r in mine)]
+            for name, mine in _groups(rows, "generator")
+            for first in mine[:1]
+        ],
+    )
+
+
+def _print_first_errors(rows, tiers):
+    """For each sweep the share of wrong answers at the ends and in the middle."""
+    for name in ("scale", "offset"):
+        mine = [r for r in rows if r["sweep"] == name]
+        table.show(
+            f"share of wrong answers against {name}",
+            [name, "queries", *tiers],
+            [
+                [f"{at:g}", family, *(r["wrong_share"] for r in mine if (r["at"], r["queries"]) == (at, family))]
+                for family in ("ordinary", "degenerate")
+                for at in dict.fromkeys(r["at"] for r in mine)
+            ],
+        )
+
+
+def _groups(rows, key):
+    return [(value, [r for r in rows if r[key] == value]) for value in dict.fromkeys(r[key] for r in rows)]

@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Where each tier begins to err: elementary queries at growing scale, at growing distance from the origin, and made to
+be hard, each compared with the exact oracle of hpccd_core.reference on the very coordinates that the tier gets."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hpccd_core.fuzz.differential import CORE, ORACLE
+from hpccd_core.fuzz.disturbances import disturb
+from hpccd_core.fuzz.generators import GENERATORS
+from hpccd_ros.bench.core import truth
+from hpccd_ros.bench.report import progress
+
+SCALES = tuple(10.0**k for k in (-150, -100, -60, -30, -20, -10, -3, 0, 3, 10, 20, 30, 60, 100, 148))
+OFFSETS = (0.0, *(10.0**k for k in range(0, 13)))
+# No short binary fractions: a shift by one of these rounds, as those of real scenes do.
+DIRECTION = np.array([0.7312, -1.1379, 0.9151])
+
+
+def sweep(tiers: list[str], n: int, seed: int) -> list[dict]:
+    """Rows {"sweep", "at", "queries": "ordinary" or "degenerate", "accuracy", ...}; n queries of each kind a point."""
+    points = [("scale", at) for at in SCALES] + [("offset", at) for at in OFFSETS]
+    rows = []
+    with progress.bar("sweeps", len(points) * 2) as bar:
+        for family in ("ordinary", "degenerate"):
+            base = {kind: _queries(kind, family, n, seed) for kind in GENERATORS}
+            for name, at in points:
+                moved = {kind: q * at if name == "scale" else q + at * DIRECTION for kind, q in base.items()}
+                rows += [{"sweep": name, "at": at, "queries": family, **row} for row in _ask(moved, tiers)]
+                bar.step(f"{family}, {name} {at:g}")
+    return rows
+
+
+def adversarial(tiers: list[str], n: int, seed: int) -> list[dict]:
+    """Rows {"generator", "accuracy", ...}: n queries of each kind from each generator of `make fuzz`, disturbed as
+    there."""
+    names = sorted({name for generators in GENERATORS.values() for name in generators})
+    rows = []
+    with progress.bar("hard queries", len(names)) as bar:
+        for number, name in enumerate(names):
+            queries = {}
+            for kind, generators in GENERATORS.items():
+                if name in generators:
+                    rng = np.random.default_rng([seed, number])
+                    queries[kind] = disturb(rng, generators[name](rng, n), kind)
+            rows += [{"generator": name, **row} for row in _ask(queries, tiers)]
+            bar.step(name)
+    return rows
+
+
+def _queries(kind, family, n, seed):
+    """Sizes about one. ordinary: real coordinates without any relation; degenerate: small integers, so that borders,
+    common planes and coincident points are hit exactly, as long as rounding leaves them so."""
+    rng = np.random.default_rng([seed, kind == "edge-edge"])
+    if family == "ordinary":
+        return GENERATORS[kind]["generic"](rng, n)
+    return GENERATORS[kind]["meeting"](rng, n)
+
+
+def _ask(queries, tiers):
+    true = {kind: ORACLE[kind](q) for kind, q in queries.items()}
+    for tier in tiers:
+        answers = {kind: CORE[kind](q, accuracy=tier) for kind, q in queries.items()}
+        parts = [np.concatenate(part) for part in zip(*((*answers[k], *true[k]) for k in queries), strict=True)]
+        errors = truth.of_queries(*parts)
+        total = len(parts[0])
+        yield {
+            "accuracy": tier,
+            "n": total,
+            "true": errors.true,
+            "missed": errors.missed,
+            "invented": errors.invented,
+            "wrong_share": (errors.missed + errors.invented) / total,
+            "toc_worst": errors.toc_worst,
+            "toc_p99": errors.toc_p99,
+            "latest": errors.latest,
+        }

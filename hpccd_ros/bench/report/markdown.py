@@ -1,0 +1,35 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Tables in Markdown, and where their numbers come from."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from hpccd_ros.bench.report.results import Kept
+from hpccd_ros.bench.report.table import text
+
+RESULTS = "../hpccd_core/bench/results"  # from docs/
+
+
+def table(columns: Sequence[str], rows: Sequence[Sequence]) -> list[str]:
+    """The lines of a table; a column with a number in its first row stands to the right. None: an empty cell."""
+    numbers = [bool(rows) and not isinstance(cell, str) for cell in rows[0]]
+    lines = [columns, ["---:" if number else "---" for number in numbers]]
+    lines += [["" if cell is None else _number(cell) for cell in row] for row in rows]
+    return [f"| {' | '.join(line)} |" for line in lines]
+
+
+def source(name: str, result: Kept) -> str:
+    """Command, machine and commit of the result with this file name."""
+    machine = result.machine
+    gpus = ", ".join(f"{machine['gpus'].count(gpu)} x {gpu}" for gpu in dict.fromkeys(machine["gpus"]))
+    where = f"{machine['processor']}, {machine['cores']} cores{', ' if gpus else ''}{gpus}"
+    others = result.other_processes_share
+    busy = f" of which other processes took {100 * others:.0f} %" if others > 0.05 else ""
+    commit = f"commit {machine['commit'][:7]}, {machine['date'].split()[0]}"
+    return f"`{result.command}`; {where}{busy}; {commit}; [JSON]({RESULTS}/{name}.json)"
+
+
+def _number(cell) -> str:
+    small = isinstance(cell, float) and 1e-4 <= abs(cell) < 0.01
+    return f"{cell:.2g}" if small else text(cell)

@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: Apache-2.0
+"""docs/performance.md: its text is written by hand, its tables are made from the kept results.
+
+A table stands between `<!-- NAME -->` and `<!-- end -->`; what is there is replaced, with command, machine and commit
+of each result above it.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from hpccd_ros.base.errors import UserError
+from hpccd_ros.bench.report import figures, markdown, performance_core, performance_gpu, performance_node
+from hpccd_ros.bench.report.results import Kept
+
+# Name of each table: how it is made, and of which results.
+TABLES = {
+    "peer": (performance_core.peer, "cpu-4-cores"),
+    "sequences": (performance_core.sequences, "cpu-table-1-4-cores"),
+    "scaling": (performance_core.scaling, "scaling-4-cores", "scaling-generated-4-cores"),
+    "many-cores": (performance_core.many_cores, "scaling-h100-16-cores", "scaling-generated-h100-16-cores"),
+    "methods": (performance_core.methods, "methods-4-cores"),
+    "decided": (performance_core.decided, "accuracy-4-cores"),
+    "size": (performance_core.size, "size-4-cores"),
+    "memory": (performance_core.memory, "memory-4-cores"),
+    "options": (performance_core.options, "options-4-cores"),
+    "tiers": (performance_core.tiers, "accuracy-4-cores"),
+    "wrong-answers": (performance_core.wrong_answers, "accuracy-4-cores"),
+    "backends": (performance_gpu.backends, "gpu-h100-16-cores"),
+    "device-stages": (performance_gpu.device_stages, "gpu-h100-16-cores"),
+    "hybrid": (performance_gpu.hybrid, "gpu-h100-16-cores"),
+    "second-gpu": (performance_gpu.second_gpu, "gpu-2-h200-32-cores"),
+    "segments": (performance_gpu.segments, "gpu-h100-16-cores"),
+    "gpu-tiers": (performance_gpu.tiers, "accuracy-h100-16-cores"),
+    "latency": (performance_node.latency, "ros-4-cores"),
+    "rates": (performance_node.rates, "ros-4-cores"),
+    "soak": (performance_node.soak, "soak-4-cores"),
+}
+TABLE = re.compile(r"(<!-- (?P<name>[a-z-]+) -->\n).*?(<!-- end -->)", re.DOTALL)
+
+
+def read(results: Path, name: str) -> Kept:
+    return Kept.read(results / f"{name}.json", re.match("[a-z]+", name)[0])
+
+
+def page(text: str, results: Path) -> str:
+    """`text` with its tables made anew from the results of this folder. UserError for a table that is not known."""
+
+    def made(found: re.Match) -> str:
+        if found["name"] not in TABLES:
+            raise UserError(f"<!-- {found['name']} -->: there is no such table; there are {', '.join(TABLES)}")
+        make, *names = TABLES[found["name"]]
+        of = {name: read(results, name) for name in names}
+        sources = "  \n".join(markdown.source(*item) for item in of.items())
+        table = "\n".join(make(*of.values()))
+        return f"{found[1]}\n{sources}\n\n{table}\n\n{found[3]}"
+
+    return TABLE.sub(made, text)
+
+
+def write(results: Path, docs: Path) -> list[Path]:
+    """Make the tables of docs/performance.md and the pictures of docs/figures anew; the files."""
+    path = docs / "performance.md"
+    path.write_text(page(path.read_text(encoding="utf-8"), results), encoding="utf-8")
+    drawn = [figure for figure in figures.FIGURES if figure.kept]
+    return [path, *(figure.save(read(results, figure.kept), docs / "figures") for figure in drawn)]

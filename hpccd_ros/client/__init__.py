@@ -1,0 +1,47 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a process of your own needs to send meshes to the node and to read its contacts; the one public part of
+hpccd_ros.
+
+Call :func:`prepare_environment` before ``rclpy.init()``. The QoS profiles are those that fit the node's defaults.
+Lengths are in the unit of the scene, whatever that is; stamps are in nanoseconds since the epoch; a time of contact is
+a fraction of its step, from 0 (its start) to 1 (its end).
+
+    >>> from hpccd_ros import client
+    >>> client.vertices_topic("cloth")
+    'meshes/cloth/vertices'
+"""
+
+from hpccd_ros.client.contacts import ContactArrays, contacts_from_message, scene_contacts
+from hpccd_ros.client.meshes import topology_from_message, topology_message, vertices_from_message, vertices_message
+from hpccd_ros.client.topics import (
+    CONTACTS_QOS,
+    CONTACTS_TOPIC,
+    TOPOLOGY_QOS,
+    VERTICES_QOS,
+    topology_topic,
+    vertices_topic,
+)
+from hpccd_ros.detect.layout import Layout
+from hpccd_ros.frames.types import Topology
+from hpccd_ros.middleware.contact_messages import SceneContacts
+from hpccd_ros.middleware.environment import prepare as prepare_environment
+
+__all__ = [
+    "CONTACTS_QOS",
+    "CONTACTS_TOPIC",
+    "ContactArrays",
+    "Layout",
+    "SceneContacts",
+    "TOPOLOGY_QOS",
+    "Topology",
+    "VERTICES_QOS",
+    "contacts_from_message",
+    "prepare_environment",
+    "scene_contacts",
+    "topology_from_message",
+    "topology_message",
+    "topology_topic",
+    "vertices_from_message",
+    "vertices_message",
+    "vertices_topic",
+]

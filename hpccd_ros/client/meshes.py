@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Faces and positions of a mesh: numpy arrays to messages, and back."""
+
+from typing import Any
+
+import numpy as np
+from hpccd.msg import MeshTopology, MeshVertices
+from numpy.typing import ArrayLike, NDArray
+
+from hpccd_core import arguments
+from hpccd_ros.frames import coordinates
+from hpccd_ros.frames.types import Topology
+from hpccd_ros.middleware import mesh_messages
+
+_LARGEST_UINT32 = 2**32 - 1
+_LARGEST_UINT64 = 2**64 - 1
+# builtin_interfaces/Time counts seconds in 32 bits with a sign.
+_LAST_STAMP = 2**31 * 10**9 - 1
+
+
+def topology_message(faces: ArrayLike, n_vertices: int, *, version: int = 0, stamp_ns: int = 0) -> MeshTopology:
+    """The message that tells the node the triangles of a mesh: at the start, and again whenever they change.
+
+    faces: (F, 3) integers, indices into this mesh's own vertices. n_vertices: how many it has, more than the largest
+    index. version: counts up with each change; vertices name the version that they belong to. stamp_ns: when it came
+    into force, ns since the epoch.
+    Raises TypeError or ValueError naming the argument.
+    """
+    indices = arguments.faces(faces)
+    n_vertices = arguments.whole_number("n_vertices", n_vertices, 0, _LARGEST_UINT32)
+    if indices.size and (highest := int(indices.max())) >= n_vertices:
+        raise ValueError(
+            f"faces: face {int(indices.argmax()) // 3} names vertex {highest}, n_vertices is {n_vertices}; indices "
+            "count this mesh's vertices from 0"
+        )
+    return mesh_messages.topology_message(
+        indices,
+        n_vertices,
+        version=arguments.whole_number("version", version, 0, _LARGEST_UINT32),
+        stamp_ns=arguments.whole_number("stamp_ns", stamp_ns, 0, _LAST_STAMP),
+    )
+
+
+def vertices_message(
+    vertices: NDArray[Any], stamp_ns: int, *, step: int = 0, topology_version: int = 0, frame_id: str = ""
+) -> MeshVertices:
+    """The message that tells the node where the vertices of a mesh are at one time.
+
+    vertices: (n, 3) float32 or float64, sent in that precision; finite, not beyond 1e150, in the unit of the scene.
+    stamp_ns: the time of these positions, ns since the epoch; it grows from message to message, and is the same for all
+    meshes of a frame. step: a number of your own, handed through to ``ContactArray.step``. topology_version: that of
+    the :func:`topology_message` they belong to. frame_id: the coordinate frame of the positions.
+    Raises TypeError or ValueError naming the argument.
+    """
+    if not isinstance(vertices, np.ndarray) or vertices.dtype not in arguments.REALS:
+        kind = f"dtype {vertices.dtype}" if isinstance(vertices, np.ndarray) else type(vertices).__name__
+        raise TypeError(f"vertices: expected an array of float32 or float64, got {kind}; convert with numpy.asarray")
+    if vertices.ndim != 2 or vertices.shape[1] != 3 or not len(vertices):
+        raise ValueError(f"vertices: expected shape (n, 3), one row a vertex and at least one, got {vertices.shape}")
+    if unusable := coordinates.unusable_coordinates(vertices):
+        raise ValueError(f"vertices: {unusable[1]}")
+    if not isinstance(frame_id, str):
+        raise TypeError(f"frame_id: expected a string, got {type(frame_id).__name__}")
+    return mesh_messages.vertices_message(
+        vertices,
+        arguments.whole_number("stamp_ns", stamp_ns, 0, _LAST_STAMP),
+        step=arguments.whole_number("step", step, 0, _LARGEST_UINT64),
+        topology_version=arguments.whole_number("topology_version", topology_version, 0, _LARGEST_UINT32),
+        frame_id=frame_id,
+    )
+
+
+def topology_from_message(message: MeshTopology) -> Topology:
+    """The triangles in a message: ``version``, ``n_vertices`` and ``faces``, (F, 3) uint32.
+
+    ``faces`` is a view of the message, which it keeps alive: to change one is to change the other.
+    Raises ValueError where faces are no triples or name a vertex that is not there.
+    """
+    return mesh_messages.topology_from_message(message, _LARGEST_UINT32, _LARGEST_UINT32)
+
+
+def vertices_from_message(message: MeshVertices) -> NDArray[Any]:
+    """The positions in a message: (n, 3) float32 or float64, whichever was sent, in the unit of the scene.
+
+    A view of the message, which it keeps alive: to change one is to change the other.
+    Raises ValueError where not exactly one of the two arrays is filled, or a coordinate is not finite or beyond 1e150.
+    """
+    return mesh_messages.vertices_from_message(message, _LARGEST_UINT32)

@@ -1,0 +1,26 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Names and quality of service of the topics that a publisher of meshes and a reader of contacts use."""
+
+from rclpy.qos import QoSProfile
+
+from hpccd_ros.middleware import qos, topic_names
+
+#: Publisher of topologies: reliable, transient local, so that a node that starts later gets the last one.
+TOPOLOGY_QOS: QoSProfile = qos.TOPOLOGY
+#: Publisher of vertices or point clouds: reliable, the last 10 kept; fits a node of any ``input_reliability``.
+VERTICES_QOS: QoSProfile = qos.vertices("reliable", 10)
+#: Subscription to contacts: reliable, the last 10 kept for a reader that is late now and then.
+CONTACTS_QOS: QoSProfile = qos.CONTACTS
+
+#: Relative to the namespace of the node, as the names below.
+CONTACTS_TOPIC: str = topic_names.CONTACTS
+
+
+def topology_topic(mesh: str) -> str:
+    """Where MeshTopology of this mesh goes: ``meshes/MESH/topology``. mesh: as in the node's parameter ``meshes``."""
+    return topic_names.topology(mesh)
+
+
+def vertices_topic(mesh: str) -> str:
+    """Where MeshVertices of this mesh go: ``meshes/MESH/vertices``. mesh: as in the node's parameter ``meshes``."""
+    return topic_names.vertices(mesh)

@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Values of the node's parameters: which ones the table allows. Whether they come from a node or from a file."""
+
+import re
+from collections.abc import Iterable
+from typing import Any
+
+from hpccd_ros.base import quoting
+from hpccd_ros.params.table import MESH_ROWS, NODE_ROWS, Row
+
+
+class ParameterError(ValueError):
+    """A parameter that the node cannot start with; the text names it and the remedy."""
+
+
+# A mesh name becomes part of topic and parameter names.
+_MESH_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+
+
+def unusable_value(row: Row, value: Any) -> str | None:
+    """Why ``value`` (of the right type) cannot be used, or None."""
+    if row.span is not None and not row.span[0] <= value <= row.span[1]:
+        return f"{row.name}: {value} is outside {row.span[0]} .. {row.span[1]}"
+    if row.least and 0 < value < row.least:
+        return f"{row.name}: {value} is neither 0 nor at least {row.least:g}"
+    entries = value if row.kind == "string[]" else [value]
+    if row.choices:
+        for entry in entries:
+            if entry not in row.choices:
+                return f"{row.name}: {quoting.quoted(entry)} is none of {', '.join(row.choices)}"
+    return None
+
+
+def usable(row: Row, name: str, value: Any) -> Any:
+    """The value of the parameter with this full name as `normalise` gives it. Raises ParameterError."""
+    value = normalise(row, value)
+    if reason := unusable_value(row, value):
+        raise ParameterError(reason.replace(row.name, name, 1))
+    return value
+
+
+def normalise(row: Row, value: Any) -> Any:
+    """Plain Python value. YAML and the command line cannot write an empty list of strings: [""] is one."""
+    if row.kind == "string[]":
+        return [entry for entry in value or [] if entry]
+    return list(value) if row.kind == "float[]" else value
+
+
+def allowed(row: Row) -> str:
+    """The allowed values in Markdown; empty: any of the type."""
+    if row.choices:
+        return ", ".join(f"`{choice}`" for choice in row.choices)
+    if row.least:
+        return f"0, {row.least:g} .. {row.span[1]:,}"
+    if row.span is not None:
+        return f"{row.span[0]:,} .. {row.span[1]:,}"
+    return ""
+
+
+def checked(given: dict[str, Any]) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
+    """(node settings, mesh name -> mesh settings) of the parameters ``given`` by full name, as a file has them.
+
+    None: not set. Raises ParameterError: wrong type, out of range, bad or repeated mesh name.
+    """
+    settings = {row.name: _checked_value(row, row.name, given.get(row.name)) for row in NODE_ROWS}
+    check_mesh_names(settings["meshes"])
+    of_mesh = {mesh: f"mesh.{mesh}." for mesh in settings["meshes"]}
+    meshes = {
+        mesh: {row.name: _checked_value(row, prefix + row.name, given.get(prefix + row.name)) for row in MESH_ROWS}
+        for mesh, prefix in of_mesh.items()
+    }
+    return settings, meshes
+
+
+_PLAIN = {"bool": bool, "int": int, "float": float, "string": str}
+
+
+def _checked_value(row: Row, name: str, value: Any) -> Any:
+    if value is None:
+        return normalise(row, row.default)
+    is_list = row.kind.endswith("[]") and isinstance(value, list)
+    entries, kind = (value, row.kind[:-2]) if is_list else ([value], row.kind)
+    # Not isinstance: True is an int.
+    if not all(type(entry) is _PLAIN.get(kind) for entry in entries):
+        raise ParameterError(f"{name}: {value!r} is of the wrong type; expected {row.kind}, e.g. {row.default!r}")
+    return usable(row, name, value)
+
+
+def check_mesh_names(names: list[str]) -> None:
+    """Raises ParameterError for one that cannot be part of a topic, or is there twice."""
+    for name in names:
+        if not _MESH_NAME.fullmatch(name):
+            raise ParameterError(
+                f"meshes: {quoting.quoted(name)} cannot be part of a topic name; use letters, digits and _, a "
+                "letter first"
+            )
+    if len(set(names)) != len(names):
+        raise ParameterError(f"meshes: names must differ, {quoting.repeated(names)} is there twice")
+
+
+# Of every node.
+_ROS_OWN = ("use_sim_time", "start_type_description_service")
+
+
+def unknown(given: Iterable[str], meshes: Iterable[str]) -> list[str]:
+    """Those of the names ``given`` that a node of these meshes would not have."""
+    rows = {row.name for row in NODE_ROWS} | {f"mesh.{mesh}.{row.name}" for mesh in meshes for row in MESH_ROWS}
+    return sorted(n for n in given if n not in rows and n not in _ROS_OWN and not n.startswith("qos_overrides."))

@@ -1,0 +1,139 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`hpccd bench ...`: each command runs, checks what it promises to check, and writes what it says."""
+
+import csv
+
+import pytest
+from sources import ROOT
+
+STRIP = ("folding-strip", "--size", "0.1", "--steps", "2", "--repeat", "1")
+
+
+def check_files(result, folder, *figures):
+    """Rows as JSON and as CSV, and these pictures (what they show: report/test_figures.py)."""
+    assert result["failures"] == []
+    assert result["machine"]["commit"] and result["machine"]["cores"] >= 1
+    with open(folder / f"{result['benchmark']}-test.csv", newline="", encoding="utf-8") as file:
+        assert len(list(csv.DictReader(file))) == len(result["rows"]) > 0
+    assert {path.stem for path in folder.glob("*.png")} == set(figures)
+
+
+def test_cpu(bench):
+    status, result, folder = bench("cpu", *STRIP, "--report", "all,first,any")
+    assert status == 0
+    check_files(result, folder, "cpu")
+    every, first, any_ = result["rows"]
+    assert every["contacts"] >= first["contacts"] >= any_["contacts"]
+    assert every["stages_ms"]["total"] > 0 and every["candidates"] > every["contacts"]
+    assert result["command"] == "hpccd bench cpu folding-strip --size 0.1 --steps 2 --repeat 1 --report all,first,any"
+
+
+def test_scaling(bench):
+    status, result, folder = bench("scaling", *STRIP, "--threads-list", "1,2", "--methods", "default,naive")
+    assert status == 0
+    check_files(result, folder, "scaling", "threads")
+    assert [(r["method"], r["threads"]) for r in result["rows"]] == [
+        ("default", 1), ("default", 2), ("naive", 1), ("naive", 2), ("independent", 2),
+    ]  # fmt: skip
+    assert len({r["contacts"] for r in result["rows"]}) == 1
+    assert result["rows"][0]["efficiency"] == 1
+    alone, at_once = result["rows"][0], result["rows"][-1]
+    assert at_once["speedup"] == pytest.approx(2 * alone["sequence_ms"] / at_once["sequence_ms"], rel=0.05)
+
+
+def test_nothing_to_hold_independent_detectors_against(bench):
+    status, result, _ = bench("scaling", *STRIP, "--threads-list", "2", "--methods", "naive")
+    assert status == 0
+    assert [(r["method"], r["threads"]) for r in result["rows"]] == [("naive", 2)]
+
+
+def test_methods(bench):
+    status, result, folder = bench("methods", *STRIP, "--threads", "2")
+    assert status == 0
+    check_files(result, folder, "methods")
+    assert all(row["same_contacts"] for row in result["rows"])
+    assert {"default", "published", "naive", "front", "scalar"} <= {row["variant"] for row in result["rows"]}
+
+
+def test_size(bench):
+    few = ("--steps", "2", "--repeat", "1", "--threads-list", "1,2")
+    status, result, folder = bench("size", "folding-strip", "--sizes", "0.1,0.4", *few)
+    assert status == 0
+    check_files(result, folder, "size")
+    small, _, large, _ = result["rows"]
+    assert 3 < large["triangles"] / small["triangles"] < 5
+    assert large["bytes_per_triangle"] > 50
+    assert sum("time ~ triangles^" in note for note in result["notes"]) == 2
+
+
+def test_memory(bench):
+    status, result, folder = bench("memory", "folding-strip", "--repeat", "1", "--methods", "default,front")
+    assert status == 0
+    check_files(result, folder)
+    default, front = result["rows"]
+    assert 0 < default["detector_bytes"] < front["detector_bytes"], "the front keeps pairs of nodes"
+    assert default["process_bytes"] > default["detector_bytes"] / 2
+    assert default["all_candidates_bytes"] == 8 * default["candidates"] > 0
+
+
+def test_accuracy(bench):
+    status, result, folder = bench("accuracy", *STRIP, "--sweep-queries", "40", "--simd", "auto,scalar")
+    assert status == 0
+    check_files(result, folder, "accuracy", "accuracy-sweeps")
+    parts = {name: [r for r in result["rows"] if r["part"] == name] for name in ("scene", "adversarial", "sweep")}
+    assert len(parts["scene"]) == 4 * 2
+    for row in parts["scene"]:
+        assert sum(row["decided"].values()) == pytest.approx(row["candidates"]), "each pair is decided once"
+    hard = {tier: [r for r in parts["adversarial"] if r["accuracy"] == tier] for tier in ("balanced", "exact")}
+    assert all(r["missed"] == r["invented"] == 0 for r in hard["exact"])
+    assert any(r["missed"] + r["invented"] > 0 for r in hard["balanced"]), "these queries are not hard"
+    assert {r["at"] for r in parts["sweep"] if r["sweep"] == "scale"} >= {1e-30, 1e30}
+    assert max(r["at"] for r in parts["sweep"] if r["sweep"] == "offset") == 1e12
+
+
+def test_options(bench):
+    few = ("--size", "0.02", "--steps", "1", "--repeat", "1", "--landscape", "200")
+    status, result, folder = bench("options", "n-body-like-lr", *few)
+    assert status == 0
+    check_files(result, folder, "options")
+    rows = {row["option"]: row for row in result["rows"]}
+    full = rows["full"]
+    assert full["over_full"] == 1
+    assert rows["no self-collision"]["candidates"] < full["candidates"]
+    assert rows["largest mesh ignored by all"]["candidates"] < full["candidates"]
+    assert rows["report any"]["contacts"] <= 1
+    assert rows["the same, static"]["contacts"] == rows["landscape around it"]["contacts"] == full["contacts"]
+    assert rows["the same, static"]["candidates"] < rows["landscape around it"]["candidates"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (("cpu", "no-such-scene"), "no-such-scene"),
+        (("cpu", *STRIP[:-1], "0"), "--repeat"),
+        (("scaling", *STRIP, "--threads-list", "0"), "--threads-list"),
+        (("size", "folding-strip", "--sizes", "one"), "--sizes"),
+        (("size", "cloth-ball"), "generated"),
+        (("accuracy", *STRIP, "--tiers", "best"), "best"),
+        (("memory", "folding-strip", "--methods", ","), "--methods"),
+    ],
+)
+def test_wrong_use_is_explained(bench, capsys, arguments, text):
+    status, result, _ = bench(*arguments)
+    assert status == 2 and result is None
+    assert text in capsys.readouterr().err
+
+
+def test_gpu_redraws_a_kept_result(bench, tmp_path):
+    """The measuring needs a GPU (test/gpu has the backends); the picture of what was measured does not."""
+    assert bench("gpu", "--redraw", str(ROOT / "hpccd_core/bench/results/gpu-2-h200-32-cores.json"))[0] == 0
+    assert (tmp_path / "hybrid.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_gpu_redraw_refuses_what_is_no_result(bench, tmp_path, capsys):
+    frames = '{"benchmark": "gpu", "command": "", "machine": {}, "other_processes_share": 0, "rows": []}'
+    wrong = {"text.json": "no json", "cpu.json": '{"benchmark": "cpu"}', "empty.json": "{}", "frames.json": frames}
+    for name, text in wrong.items():
+        (tmp_path / name).write_text(text)
+        assert bench("gpu", "--redraw", str(tmp_path / name))[0] != 0
+        assert name in capsys.readouterr().err

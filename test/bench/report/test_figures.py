@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Pictures show the numbers of the result that they are drawn from."""
+
+import dataclasses
+
+import pytest
+from sources import ROOT
+
+from hpccd_ros.base.errors import UserError
+from hpccd_ros.bench.report import drawing, figures
+from hpccd_ros.bench.report.results import Kept
+
+RESULTS = ROOT / "hpccd_core" / "bench" / "results"
+BY_NAME = {figure.name: figure for figure in figures.FIGURES}
+
+
+def kept(figure):
+    return Kept.read(RESULTS / f"{figure.kept}.json", figure.benchmark)
+
+
+def lines(axis):
+    """{label: [(x, y), ...]} of the lines that a legend names."""
+    found = {line.get_label(): list(zip(*line.get_data(), strict=True)) for line in axis.get_lines()}
+    return {label: points for label, points in found.items() if not label.startswith("_")}
+
+
+def widths(axis):
+    """Lengths of the bars, by their place."""
+    found = {}
+    for bar in axis.patches:
+        found.setdefault(round(bar.get_y() + bar.get_height() / 2), []).append(bar.get_width())
+    return found
+
+
+@pytest.mark.parametrize("figure", [f for f in figures.FIGURES if f.kept], ids=lambda f: f.name)
+def test_committed_pictures_can_be_drawn_again(figure, tmp_path):
+    result = kept(figure)
+    page = figure.compose(result)
+    headings = [figure.heading(rows) for rows in drawing.by(filter(figure.rows, result.rows), *figure.panel)]
+    titles = [axis.get_title() for axis in page.axes if axis.axison]
+    assert titles[bool(figure.overview) :] == headings and len(headings) > 1
+    assert (ROOT / "docs" / "figures" / f"{figure.name}.png").exists()
+
+
+def test_scaling_has_a_line_for_each_method_and_each_scene():
+    result = kept(BY_NAME["scaling"])
+    overview, *panels = BY_NAME["scaling"].compose(result).axes
+    of = {(r["scene"], r["method"], r["threads"]): r["speedup"] for r in result.rows}
+    for axis, scene in zip(panels, ("cloth-ball", "cloth-funnel", "n-body"), strict=True):
+        drawn = lines(axis)
+        assert set(drawn) == {"default", "published", "naive", "front", "independent detectors", "linear"}
+        assert drawn["naive"] == [(n, of[scene, "naive", n]) for n in (1, 2, 4)]
+        assert lines(overview)[scene] == [(n, of[scene, "default", n]) for n in (1, 2, 4)]
+    naive = [sum(of[scene, "naive", n] for scene in ("cloth-ball", "cloth-funnel", "n-body")) / 3 for n in (1, 2, 4)]
+    assert [y for _, y in lines(overview)["naive, average"]] == pytest.approx(naive)
+
+
+def test_hybrid_has_a_line_for_each_method_and_number_of_gpus():
+    rows = [
+        {"part": "threads and GPUs", "scene": "s", "accuracy": "balanced", "method": method, "threads": threads,
+         "gpus": gpus, "speedup": threads * (1.0 + gpus) * (2 if method == "default" else 1)}
+        for method in ("published", "default") for threads in (4, 1, 2) for gpus in (1, 0)
+    ]  # fmt: skip
+    result = dataclasses.replace(kept(BY_NAME["hybrid"]), rows=rows)
+    (axis,) = BY_NAME["hybrid"].compose(result).axes
+    assert lines(axis) == {
+        "default, no GPU": [(1, 2), (2, 4), (4, 8)], "default, 1 GPU": [(1, 4), (2, 8), (4, 16)],
+        "published, no GPU": [(1, 1), (2, 2), (4, 4)], "published, 1 GPU": [(1, 2), (2, 4), (4, 8)],
+    }  # fmt: skip
+
+
+def test_bars_of_stages_add_up_to_the_step():
+    result = kept(BY_NAME["cpu"])
+    axis = BY_NAME["cpu"].compose(result).axes[0]
+    rows = [row for row in result.rows if row["scene"] == "cloth-ball"]
+    assert [label.get_text() for label in axis.get_yticklabels()] == [row["variant"] for row in rows]
+    for place, row in enumerate(rows):
+        assert sum(widths(axis)[place]) == pytest.approx(row["median_ms"], rel=0.02)
+
+
+def test_wrong_contacts_stand_in_the_picture():
+    methods = BY_NAME["methods"]
+    rows = [{"scene": "s", "variant": "default", "threads": 4, "accuracy": "exact", "sequence_ms": 8.0, "steps": 2,
+             "same_contacts": same} for same in (True, False)]  # fmt: skip
+    (axis,) = methods.compose(dataclasses.replace(kept(BY_NAME["cpu"]), rows=rows)).axes
+    assert widths(axis) == {0: [4.0], 1: [4.0]}
+    assert [text.get_text().strip() for text in axis.texts] == ["4", "4  OTHER CONTACTS"]
+
+
+def test_sweeps_show_errors_of_zero_at_the_lower_end():
+    result = kept(BY_NAME["accuracy-sweeps"])
+    ordinary, *_, degenerate = BY_NAME["accuracy-sweeps"].compose(result).axes
+    assert {y for _, y in lines(ordinary)["exact"]} == {figures.SHARE_FLOOR}
+    assert max(y for _, y in lines(degenerate)["balanced"]) > 0.01
+
+
+def test_a_result_without_such_rows_has_no_picture(tmp_path):
+    result = dataclasses.replace(kept(BY_NAME["hybrid"]), rows=[{"part": "frame"}])
+    assert figures.draw(result, tmp_path) == []
+    with pytest.raises(UserError, match=r"hybrid\.png: this result has no rows for it"):
+        BY_NAME["hybrid"].save(result, tmp_path)

@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: Apache-2.0
+"""docs/performance.md is what the kept results say, and shows all of them."""
+
+import re
+import shutil
+
+import pytest
+from sources import ROOT
+
+from hpccd_ros.base.errors import UserError
+from hpccd_ros.bench.report import figures, performance
+
+RESULTS = ROOT / "hpccd_core" / "bench" / "results"
+PAGE = ROOT / "docs" / "performance.md"
+
+
+def test_tables_are_those_of_the_kept_results():
+    text = PAGE.read_text(encoding="utf-8")
+    assert text == performance.page(text, RESULTS), "python -m hpccd_ros.bench.report"
+
+
+def test_every_table_and_every_picture_is_on_the_page():
+    text = PAGE.read_text(encoding="utf-8")
+    assert sorted(found["name"] for found in performance.TABLE.finditer(text)) == sorted(performance.TABLES)
+    drawn = [figure.name for figure in figures.FIGURES if figure.kept]
+    assert sorted(re.findall(r"\]\(figures/(.*)\.png\)", text)) == sorted(drawn)
+
+
+def test_no_result_is_kept_for_nothing():
+    used = {name for _, *names in performance.TABLES.values() for name in names}
+    used |= {figure.kept for figure in figures.FIGURES if figure.kept}
+    assert used == {path.stem for path in RESULTS.glob("*")}
+
+
+def test_another_number_makes_another_page(tmp_path):
+    shutil.copytree(RESULTS, tmp_path / "results")
+    path = tmp_path / "results" / "memory-4-cores.json"
+    key = '"detector_bytes_per_triangle": '
+    path.write_text(path.read_text().replace(f"{key}442.162073", f"{key}7"))
+    before = PAGE.read_text(encoding="utf-8").splitlines()
+    after = performance.page(PAGE.read_text(encoding="utf-8"), tmp_path / "results").splitlines()
+    (changed,) = (pair for pair in zip(before, after, strict=True) if pair[0] != pair[1])
+    assert changed[0].startswith("| cloth-ball |") and changed[1] == changed[0].replace("| 442 |", "| 7 |")
+
+
+def test_where_the_numbers_come_from():
+    made = performance.page("<!-- soak -->\nold\n<!-- end -->", RESULTS)
+    assert "old" not in made and "`hpccd bench soak --minutes 30" in made
+    assert "4 cores of which other processes took 56 %; commit 134dcf2, 2026-11-21" in made
+
+
+def test_an_unknown_table_is_refused():
+    with pytest.raises(UserError, match="<!-- speed -->: there is no such table; there are peer, "):
+        performance.page("<!-- speed -->\n<!-- end -->", RESULTS)

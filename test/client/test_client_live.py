@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The programs that the documentation shows, as processes beside a real node."""
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from node_process import PATIENCE
+from sources import ROOT, SOURCES
+
+import hpccd_core as hc
+from hpccd_ros import client
+
+FOLDER = Path(__file__).resolve().parent
+PUBLISHER = FOLDER / "ten_line_publisher.py"
+SUBSCRIBER = FOLDER / "ten_line_subscriber.py"
+FACES = np.array([[0, 1, 2], [3, 4, 5]])
+
+
+def positions(step: int) -> np.ndarray:
+    """What the publisher sends in its step."""
+    x = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0.2, 0.2, 0.5], [1.2, 0.2, 0.5], [0.2, 1.2, 0.5]], np.float32)
+    x[3:, 2] = 0.5 * np.cos(0.3 * step)
+    return x
+
+
+@pytest.fixture
+def start(tmp_path):
+    """Start a program in a namespace; its output goes to a file."""
+    processes = []
+
+    def start(program, namespace):
+        output = tmp_path / f"{program.stem}.txt"
+        command = [sys.executable, "-u", program, "--ros-args", "-r", f"__ns:={namespace}"]
+        with open(output, "w") as stream:
+            environment = {**os.environ, "PYTHONPATH": SOURCES}
+            processes.append(subprocess.Popen(command, stdout=stream, stderr=subprocess.STDOUT, env=environment))
+        return processes[-1], output
+
+    yield start
+    for process in processes:
+        process.kill()
+        process.wait()
+
+
+def test_the_programs_of_the_documentation(start, start_node):
+    node = start_node({"meshes": ["cloth"], "outputs": ["points", "normals"]})
+    _, heard = start(SUBSCRIBER, node.namespace)
+    node.wait_until(lambda: node.peer.node.count_subscribers("contacts") > 1, "subscriber")
+    publisher, said = start(PUBLISHER, node.namespace)
+
+    def neighbours():
+        """Two steps that follow each other, the second with contacts."""
+        pairs = zip(node.peer.received, node.peer.received[1:], strict=False)
+        return [(a, b) for a, b in pairs if b.total and b.start == a.header.stamp and b.step == a.step + 1]
+
+    before, message = node.wait_until(neighbours, "contacts of two steps in a row")[0]
+    scene = hc.Scene()
+    scene.add_mesh("cloth", FACES)
+    detector = hc.Detector(scene, outputs=("points", "normals"))
+    expected = detector.detect(positions(before.step), positions(message.step))
+    topology = client.topology_from_message(client.topology_message(FACES, 6))
+    found = client.scene_contacts(message, client.Layout.of(("cloth",), (topology,)))
+    for name in ("vf", "vf_toc", "ee", "ee_toc", "points", "normals"):
+        assert np.array_equal(getattr(found, name), getattr(expected, name)), name
+
+    of_meshes = client.contacts_from_message(message)
+    assert len(of_meshes) == message.total == len(expected) and of_meshes.n_vertex_face == len(expected.vf)
+    assert of_meshes.mesh_names == ("cloth",) and not of_meshes.mesh_a.any() and not of_meshes.mesh_b.any()
+    n = of_meshes.n_vertex_face
+    assert np.array_equal(np.stack([of_meshes.features_a[:n, 0], of_meshes.features_b[:n, 0]], 1), expected.vf)
+    assert np.array_equal(np.hstack([of_meshes.features_a[n:], of_meshes.features_b[n:]]), expected.ee)
+    assert np.array_equal(of_meshes.toc, np.concatenate([expected.vf_toc, expected.ee_toc]))
+    assert np.array_equal(of_meshes.points, expected.points) and np.array_equal(of_meshes.normals, expected.normals)
+
+    line = f"step {message.step}: {message.total} contacts, the first at {message.first_toc}"
+    node.wait_until(lambda: line in heard.read_text(), f"{line!r} of the subscriber")
+    assert publisher.wait(PATIENCE) == 0, said.read_text()
+
+
+def test_the_documentation_shows_programs_that_are_run_here():
+    """Each whole program in README and docs that uses the client is one of those above, to the letter."""
+    pages = [ROOT / "README.md", *(ROOT / "docs").rglob("*.md")]
+    blocks = [block for page in pages for block in re.findall(r"```python\n(.*?)```", page.read_text(), re.DOTALL)]
+    run = [statements(program.read_text()) for program in (PUBLISHER, SUBSCRIBER)]
+    for block in blocks:
+        if "client.prepare_environment()" in block:
+            assert statements(block) in run, f"the tests run no such program:\n{block}"
+
+
+def statements(program: str) -> list[str]:
+    """Its lines but for imports, which a page may write shorter, comments of their own line and empty lines."""
+    return [line for line in program.splitlines() if line and not line.startswith(("#", "import ", "from "))]

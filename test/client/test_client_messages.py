@@ -1,0 +1,133 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Arrays to messages and back, and what is refused before it is sent."""
+
+import numpy as np
+import pytest
+from hpccd.msg import ContactArray
+
+from hpccd_ros import client
+
+FACES = np.array([[0, 1, 2], [3, 4, 5]])
+VERTICES = np.arange(18.0).reshape(6, 3)
+
+
+def test_a_topology_comes_back():
+    message = client.topology_message(FACES.tolist(), 7, version=3, stamp_ns=5_000_000_007)
+    topology = client.topology_from_message(message)
+    assert (topology.version, topology.n_vertices) == (3, 7)
+    assert topology.faces.dtype == np.uint32 and np.array_equal(topology.faces, FACES)
+    assert (message.header.stamp.sec, message.header.stamp.nanosec) == (5, 7)
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_vertices_come_back_in_their_precision(dtype):
+    message = client.vertices_message(
+        VERTICES.astype(dtype), 5_000_000_007, step=2**40, topology_version=3, frame_id="world"
+    )
+    back = client.vertices_from_message(message)
+    assert back.dtype == dtype and np.array_equal(back, VERTICES.astype(dtype))
+    assert (message.step, message.topology_version, message.header.frame_id) == (2**40, 3, "world")
+    back[0, 0] = 42
+    assert (message.vertices_f32 or message.vertices_f64)[0] == 42, "a view"
+
+
+@pytest.mark.parametrize(
+    "arguments, error, text",
+    [
+        (dict(faces=[[0, 1]]), ValueError, "faces: expected shape"),
+        (dict(faces=[[0.0, 1.0, 2.0]]), TypeError, "faces: expected integers"),
+        (dict(faces=[[0, 1, -1]]), ValueError, r"faces\[0, 2\] is -1"),
+        (dict(n_vertices=5), ValueError, "faces: face 1 names vertex 5, n_vertices is 5"),
+        (dict(n_vertices=2.5), TypeError, "n_vertices: expected an integer"),
+        (dict(version=2**32), ValueError, "version: must lie in"),
+        (dict(stamp_ns=-1), ValueError, "stamp_ns: must lie in"),
+    ],
+)
+def test_a_topology_that_is_refused(arguments, error, text):
+    with pytest.raises(error, match=text):
+        client.topology_message(**{"faces": FACES, "n_vertices": 6, **arguments})
+
+
+@pytest.mark.parametrize(
+    "arguments, error, text",
+    [
+        (dict(vertices=VERTICES.tolist()), TypeError, "vertices: expected an array of float32 or float64, got list"),
+        (dict(vertices=VERTICES.astype(int)), TypeError, "got dtype int64"),
+        (dict(vertices=VERTICES.ravel()), ValueError, r"vertices: expected shape \(n, 3\).*got \(18,\)"),
+        (dict(vertices=VERTICES[:0]), ValueError, "at least one"),
+        (dict(vertices=VERTICES * np.nan), ValueError, "vertices: vertex 0 is .* must be finite"),
+        (dict(vertices=VERTICES * 1e150), ValueError, "vertices: .* must lie in"),
+        (dict(stamp_ns=2**31 * 10**9), ValueError, "stamp_ns: must lie in"),
+        (dict(stamp_ns=0.5), TypeError, "stamp_ns: expected an integer"),
+        (dict(step=-1), ValueError, "step: must lie in"),
+        (dict(topology_version="1"), TypeError, "topology_version: expected an integer"),
+        (dict(frame_id=None), TypeError, "frame_id: expected a string"),
+    ],
+)
+def test_vertices_that_are_refused(arguments, error, text):
+    with pytest.raises(error, match=text):
+        client.vertices_message(**{"vertices": VERTICES, "stamp_ns": 0, **arguments})
+
+
+def test_the_last_values_that_fit():
+    message = client.vertices_message(VERTICES, 2**31 * 10**9 - 1, step=2**64 - 1, topology_version=2**32 - 1)
+    assert message.header.stamp.sec == 2**31 - 1
+
+
+def two_contacts(**changes):
+    """A vertex of mesh a on a face of b, and two edges."""
+    fields = dict(
+        mesh_names=["a", "b"], kind=[0, 1], mesh_a=[0, 0], mesh_b=[1, 1], features_a=[2, ContactArray.NONE, 0, 1],
+        features_b=[0, ContactArray.NONE, 1, 2], toc=[0.25, 0.5], topology_versions=[0, 0],
+    )  # fmt: skip
+    return ContactArray(**{**fields, **changes})
+
+
+def layout(*names):
+    topology = client.topology_from_message(client.topology_message([[0, 1, 2]], 3))
+    return client.Layout.of(names, (topology,) * len(names))
+
+
+def test_contacts_of_meshes_and_of_the_scene():
+    contacts = client.contacts_from_message(two_contacts())
+    assert (len(contacts), contacts.n_vertex_face, contacts.mesh_names) == (2, 1, ("a", "b"))
+    assert contacts.features_a.tolist() == [[2, ContactArray.NONE], [0, 1]]
+    assert contacts.points.shape == contacts.normals.shape == (0, 3)
+    scene = client.scene_contacts(two_contacts(), layout("a", "b"))
+    assert scene.vf.tolist() == [[2, 1]] and scene.ee.tolist() == [[0, 1, 4, 5]]
+    assert (scene.vf_toc.tolist(), scene.ee_toc.tolist()) == ([0.25], [0.5])
+
+
+def test_no_contacts():
+    contacts = client.contacts_from_message(ContactArray(mesh_names=["a"]))
+    assert len(contacts) == 0 and contacts.features_a.shape == (0, 2)
+
+
+@pytest.mark.parametrize(
+    "changes, text",
+    [
+        (dict(kind=[1, 0]), "kind must hold"),
+        (dict(kind=[0, 2]), "kind must hold"),
+        (dict(toc=[0.5]), r"toc has 1 values, 2 were expected for shape \(2,\)"),
+        (dict(features_b=[1, 2]), r"features_b has 2 values, 4 were expected"),
+        (dict(points=[0.0]), r"points has 1 values, 6 were expected for shape \(2, 3\)"),
+        (dict(mesh_b=[1, 2]), "mesh_b names a mesh beyond the 2 of mesh_names"),
+    ],
+)
+def test_contacts_whose_arrays_do_not_fit_together(changes, text):
+    with pytest.raises(ValueError, match=text):
+        client.contacts_from_message(two_contacts(**changes))
+
+
+def test_a_layout_of_another_scene():
+    with pytest.raises(ValueError, match="layout: it is of the meshes b, a, the message of a, b"):
+        client.scene_contacts(two_contacts(), layout("b", "a"))
+    with pytest.raises(ValueError, match="layout: the contacts are of topology versions"):
+        client.scene_contacts(two_contacts(topology_versions=[0, 1]), layout("a", "b"))
+
+
+def test_all_names_are_there_and_documented():
+    assert len(set(client.__all__)) == len(client.__all__)
+    for name in client.__all__:
+        if callable(found := getattr(client, name)):
+            assert found.__doc__, name

@@ -1,0 +1,137 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the pages say is there: links, files, modules, commands and their options, rooms; their programs run."""
+
+import argparse
+import importlib
+import importlib.util
+import re
+import subprocess
+import sys
+
+import pytest
+from sources import ROOT
+
+from hpccd_ros import cli
+from hpccd_ros.commands.bench import BENCHMARKS
+
+PAGES = sorted(page for pattern in ("*.md", "bags/*.md", "docs/*.md") for page in ROOT.glob(pattern))
+CORE = ROOT / "hpccd_core" / "src"
+FOLDERS = {path.name for path in ROOT.iterdir() if path.is_dir() and not path.name.startswith(".")} - {"build"}
+
+each_page = pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+
+
+def code(page):
+    """All that stands in backticks, and the lines of blocks."""
+    text = page.read_text()
+    blocks = re.findall(r"^ *```\w*\n(.*?)^ *```", text, re.DOTALL | re.MULTILINE)
+    spans = re.findall(r"`([^`]+)`", re.sub(r"^ *```.*?^ *```", "", text, flags=re.DOTALL | re.MULTILINE))
+    return [" ".join(span.split()) for span in spans] + [line for block in blocks for line in block.splitlines()]
+
+
+def anchors(page):
+    """Of its headings, as GitHub makes them."""
+    text = re.sub(r"^```.*?^```", "", page.read_text(), flags=re.DOTALL | re.MULTILINE)
+    headings = re.findall(r"^#+ (.+)$", text, re.MULTILINE)
+    return {re.sub(r"[^\w -]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+@each_page
+def test_links(page):
+    for target in re.findall(r"\]\(([^)\s]+)\)", page.read_text()):
+        if "://" in target:
+            continue
+        path, _, anchor = target.partition("#")
+        file = (page.parent / path).resolve() if path else page
+        assert file.exists(), target
+        assert not anchor or anchor in anchors(file), target
+
+
+@each_page
+def test_files(page):
+    for word in code(page):
+        for path in re.findall(r"(?<![\w./~-])[\w.-]+(?:/[\w.-]+)+/?", word):
+            first = path.partition("/")[0]
+            if first in FOLDERS:
+                assert (ROOT / path).exists(), path
+            elif (CORE / first).is_dir() and "." in path:
+                assert (CORE / path).exists(), path
+
+
+@each_page
+def test_modules(page):
+    for word in code(page):
+        for name in re.findall(r"python -m (hpccd_[\w.]+)", word):
+            assert importlib.util.find_spec(name), name
+        if re.fullmatch(r"hpccd_(ros|core)(\.\w+)+", word):
+            module, _, last = word.rpartition(".")
+            assert importlib.util.find_spec(module), word
+            assert hasattr(importlib.import_module(module), last) or importlib.util.find_spec(word), word
+
+
+@each_page
+def test_commands(page):
+    targets = set(re.findall(r"^([a-z-]+):.*## ", (ROOT / "Makefile").read_text(), re.MULTILINE))
+    for word in code(page):
+        for target in re.findall(r"(?:^|\s)make ([a-z][a-z-]*)", word):
+            assert target in targets, word
+        for command, rest in re.findall(r"(?:^|/bin/)hpccd ([a-z]+)([^|;&#]*)", word):
+            assert command in cli.COMMANDS, word
+            if command == "bench":
+                assert set(rest.split()[:1]) <= set(BENCHMARKS), word
+            for option in re.findall(r"(?<=\s)--[a-z-]+", rest):
+                assert option in options(command) | {"--help"}, word
+
+
+def options(command):
+    """All that the command takes, those of each benchmark together."""
+    parser = argparse.ArgumentParser()
+    importlib.import_module(f"hpccd_ros.commands.{command}").configure(parser)
+    found, parsers = set(), [parser]
+    while parsers:
+        for action in parsers.pop()._actions:
+            found |= set(action.option_strings)
+            if isinstance(action, argparse._SubParsersAction):
+                parsers += action.choices.values()
+    return found
+
+
+@each_page
+def test_programs(page, tmp_path):
+    """But those of the client, which need a node: test/client."""
+    for program in re.findall(r"```python\n(.*?)```", page.read_text(), re.DOTALL):
+        if "client." not in program:
+            assert output_of(program, tmp_path)
+
+
+def test_readme_is_two_screens():
+    assert len((ROOT / "README.md").read_text().splitlines()) <= 200
+
+
+def test_results_in_readme_are_those_of_the_page_of_figures():
+    results = (ROOT / "README.md").read_text().partition("## Results")[2].partition("\n#")[0]
+    figures = set(re.findall(r"[\d,.]+\d", (ROOT / "docs" / "performance.md").read_text()))
+    rows = re.findall(r"^\| [a-z-]+ \|(.*)\|$", results, re.MULTILINE)[1:]
+    assert rows and {cell.strip() for row in rows for cell in row.split("|")} <= figures
+
+
+def test_first_program_finds_what_it_says(tmp_path):
+    program = re.search(r"```python\n(.*?)```", (ROOT / "README.md").read_text(), re.DOTALL).group(1)
+    assert "first at 0.5" in output_of(program, tmp_path)
+
+
+def output_of(program, folder):
+    done = subprocess.run([sys.executable, "-c", program], cwd=folder, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+@pytest.mark.parametrize(
+    "heading, folder",
+    [("The rooms of hpccd_core", CORE), ("The floors of hpccd_ros", ROOT / "hpccd_ros")],
+)
+def test_architecture_names_every_room_once(heading, folder):
+    text = (ROOT / "docs" / "architecture.md").read_text()
+    section = text.partition(f"## {heading}\n")[2].partition("\n#")[0]
+    rooms = [path.name for path in folder.iterdir() if path.is_dir() and path.name != "__pycache__"]
+    assert sorted(re.findall(r"^\| `(\w+)` \|", section, re.MULTILINE)) == sorted(rooms)

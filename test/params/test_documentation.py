@@ -1,0 +1,19 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The page of the parameters: made from the table, complete, and as it lies in docs/."""
+
+from pathlib import Path
+
+from hpccd_ros.params import documentation
+from hpccd_ros.params.table import MESH_ROWS, NODE_ROWS
+
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "parameters.md"
+
+
+def test_page_names_every_parameter_once():
+    page = documentation.page()
+    for name in [row.name for row in NODE_ROWS] + [f"mesh.NAME.{row.name}" for row in MESH_ROWS]:
+        assert page.count(f"\n| `{name}` |") == 1, name
+
+
+def test_page_in_docs_is_up_to_date():
+    assert PAGE.read_text() == documentation.page(), "python -m hpccd_ros.params.documentation > docs/parameters.md"
