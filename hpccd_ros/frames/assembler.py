@@ -3,17 +3,18 @@
 
 Rules, in the order in which they are applied to a vertex message:
 
-1. Its topology version must be the one in force. An older one is refused; a newer one waits for its topology
-   (topology and vertices are separate topics, nothing orders them), at most ``max_pending`` frames a mesh.
+1. Its topology version must be the one in force (topology_version.py). An older one is refused; a newer one waits for
+   its topology (topology and vertices are separate topics, nothing orders them), at most ``max_pending`` frames a mesh.
 2. The number of vertices must be that of the topology.
 3. The frame_id must equal that of the scene (an empty one fits all): the one demanded, else that of the first
    message. Where none is demanded, a stream that goes on in another one is a restart, as in 4, for neither a stray
    first message nor a simulation that has ended may bind those that follow: at once if it comes from a new publisher
    that is its mesh's only one; else after ``restart_after`` increasing stamps in a row, if no mesh sends in the
    scene's frame meanwhile, as two meshes in different frames would take turns. Static meshes do not determine the
-   frame: their positions are kept by frame_id, and used where it is the scene's.
+   frame: their positions are kept by frame_id, and used where it is the scene's (coordinate_frame.py,
+   static_positions.py).
 4. Its stamp must be later than the mesh's last. A stream that goes on from an earlier time (``restart_after``
-   increasing stamps in a row, or the first message of a new publisher) is a restart: all starts anew.
+   increasing stamps in a row, or the first message of a new publisher) is a restart: all starts anew (stamp_order.py).
 5. Frames of several meshes are joined by their stamps (matching.py); static meshes keep their last positions.
 """
 
@@ -86,11 +87,6 @@ class FrameAssembler:
     def waiting(self) -> int:
         """Messages received that are neither handed on nor dropped yet."""
         return self._matcher.waiting + sum(len(m.early) for m in self._meshes.values())
-
-    @property
-    def frame_id(self) -> str:
-        """The one in force, or ""."""
-        return self._frame.name
 
     @property
     def coordinate_frame(self) -> tuple[str, str]:

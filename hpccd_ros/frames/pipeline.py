@@ -88,11 +88,6 @@ class FramePipeline:
         return before + sum(len(frame.fresh) for frame in queued)
 
     @property
-    def frame_id(self) -> str:
-        """Of the scene; "" as long as no message has named one."""
-        return self._assembler.frame_id
-
-    @property
     def coordinate_frame(self) -> tuple[str, str]:
         """(frame_id of the scene or "", where it comes from)."""
         return self._assembler.coordinate_frame

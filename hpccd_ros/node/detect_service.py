@@ -37,11 +37,6 @@ DELIVERY = 0.2
 STOPPED = "stopped: the node was shut down or cleaned up before the answer was ready; ask again when it is active"
 
 
-def new_counts() -> Counter:
-    """How many requests ended how."""
-    return Counter(answered=0, refused=0, busy=0, timed_out=0, failed=0, stopped=0)
-
-
 class DetectService:
     """Answers ``detect_jobs`` requests at a time; ``detect_waiting`` more may wait, the rest is refused.
 
@@ -49,7 +44,7 @@ class DetectService:
     computation given up; the place that it holds is free once that ends.
     scene: what the node knows, asked in the executor at each request; a text instead: why it cannot answer
     now.
-    ended: counts of `new_counts`, gone on with.
+    ended: counts requests by how they ended.
     """
 
     def __init__(

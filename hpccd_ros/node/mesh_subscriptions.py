@@ -81,7 +81,7 @@ class MeshSubscriptions:
         try:
             topology = mesh_inputs.read("topology", message, self._settings)
         except InvalidMessageError as error:
-            self._refuse_topology(error.reason, str(error))
+            self._accounts.refused(error.refusal(self._mesh, Input.TOPOLOGY))
             return
         if why := unusable_topology(topology):
             self._refuse_topology(Reason.BAD_TOPOLOGY, why)
@@ -95,11 +95,11 @@ class MeshSubscriptions:
             self._refuse(Reason.RATE, self._too_fast())
             return
         # Asked only where it can matter, as it takes 4 us: of a frame in another frame_id, which may be a restart.
-        alone = message.header.frame_id == self._pipeline.frame_id or self._publishers() <= 1
+        alone = message.header.frame_id == self._pipeline.coordinate_frame[0] or self._publishers() <= 1
         try:
             frame = mesh_inputs.read(self._kind, message, self._settings, received, alone)
         except InvalidMessageError as error:
-            self._refuse(error.reason, str(error))
+            self._accounts.refused(error.refusal(self._mesh))
             return
         hand_over(self._pipeline.push(self._mesh, frame, self._vertex_numbers.notice()), self._accounts)
 

@@ -11,7 +11,7 @@ from hpccd_ros.node.accounts import Accounts
 from hpccd_ros.node.configuration import Configuration
 from hpccd_ros.node.contacts_publisher import ContactsPublisher
 from hpccd_ros.node.detect_request import NodeScene
-from hpccd_ros.node.detect_service import DetectService, new_counts
+from hpccd_ros.node.detect_service import DetectService
 from hpccd_ros.node.life_cycle import GuardedLifecycleNode
 from hpccd_ros.node.node_recording import NodeRecording
 from hpccd_ros.node.status_report import Reporter
@@ -44,7 +44,6 @@ class HpccdNode(GuardedLifecycleNode):
         self._stream: StreamDetection | None = None  # none for a node without meshes
         self._unknown: UnknownMeshWatch | None = None
         self._service: DetectService | None = None
-        self._served = new_counts()
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Read mesh files, create publishers, service and diagnostics."""
@@ -59,9 +58,8 @@ class HpccdNode(GuardedLifecycleNode):
             return TransitionCallbackReturn.FAILURE
         self._contacts = ContactsPublisher(self, settings)
         self._diagnostics = self.configured_publisher(DiagnosticArray, topic_names.DIAGNOSTICS, qos.DIAGNOSTICS)
-        self._service = DetectService(
-            self, settings, lambda: self._configuration.options, self._scene_for_service, self._served, self.errors
-        )
+        options, ended = lambda: self._configuration.options, self._accounts.requests
+        self._service = DetectService(self, settings, options, self._scene_for_service, ended, self.errors)
         self.configured_timer(settings["diagnostics_period"], self._report)
         self.configured_timer(GIVE_BACK_EVERY, environment.give_back_freed_memory)
         return SUCCESS

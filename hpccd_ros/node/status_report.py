@@ -25,7 +25,6 @@ class Reporter:
         self._detections = 0
         self._dropped = 0
         self._topologies_refused = 0
-        self._failures = 0
 
     def report(
         self,

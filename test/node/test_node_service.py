@@ -21,8 +21,9 @@ from hpccd_ros.detect.core import Options
 from hpccd_ros.detect.scene import SceneBuilder
 from hpccd_ros.middleware import fields, mesh_messages
 from hpccd_ros.middleware.guard import Errors
+from hpccd_ros.node.accounts import Accounts
 from hpccd_ros.node.detect_request import NodeScene
-from hpccd_ros.node.detect_service import DetectService, new_counts
+from hpccd_ros.node.detect_service import DetectService
 
 N = 16
 FACES = sheet_faces(N)
@@ -300,7 +301,8 @@ def service():
     settings = {"detect_jobs": 1, "detect_waiting": 1, "detect_time_limit": PATIENCE, "max_meshes": 4,
                 "max_vertices": 1000, "max_faces": 1000, "max_contacts": 0}  # fmt: skip
     errors = Errors(lambda text: None)
-    service = DetectService(node, settings, Options, lambda: NodeScene(SceneBuilder(()), {}), new_counts(), errors)
+    ended = Accounts(print).requests
+    service = DetectService(node, settings, Options, lambda: NodeScene(SceneBuilder(()), {}), ended, errors)
     client = node.create_client(Detect, "service/detect")
     assert client.wait_for_service(PATIENCE)
 

@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The node's accounts: everything that comes up is counted once, and logged where there is something to say. No ROS."""
+
+import numpy as np
+
+from hpccd_ros.frames.drops import Input, Reason, Refusal
+from hpccd_ros.frames.outcome import Outcome
+from hpccd_ros.frames.types import SceneFrame, Topology
+from hpccd_ros.node.accounts import Accounts
+
+TOPOLOGY = Topology(0, 3, np.array([[0, 1, 2]], np.uint32))
+FRAME = SceneFrame(7, 1, "", (TOPOLOGY,) * 2, (np.zeros((3, 3)),) * 2, ("cloth", "ball"), 0.0)
+
+
+def accounts():
+    log = []
+    return Accounts(log.append), log
+
+
+def test_what_came_of_a_message():
+    of_node, log = accounts()
+    refusals = [
+        Refusal("cloth", Reason.RESTART),
+        Refusal("cloth", Reason.LATE, "stamp 3 ns was answered"),
+        Refusal("ball", Reason.OLD_TOPOLOGY, "version 1 is older", what=Input.TOPOLOGY),
+        Refusal("ball", Reason.MIDDLEWARE, "4 messages", messages=4),
+    ]
+    of_node.add(Outcome([FRAME], refusals, ["mesh cloth goes on: taken as a restart"], static_taken=2))
+    assert of_node.dropped.by_mesh_and_reason() == {
+        ("cloth", "restart"): 1, ("cloth", "late"): 1, ("ball", "middleware"): 4,
+    }  # fmt: skip
+    assert of_node.topologies_refused.by_mesh_and_reason() == {("ball", "old_topology"): 1}
+    assert (of_node.restarts, of_node.static_taken, of_node.metrics.snapshot()["answered"]) == (1, 2, 0)
+    assert log == [
+        "mesh cloth goes on: taken as a restart",
+        "cloth: late: stamp 3 ns was answered",
+        "ball: old_topology: version 1 is older",
+        "ball: middleware: 4 messages",
+    ]
+    assert of_node.log.last == log[-1]
+
+
+def test_a_frame_without_an_answer_is_a_drop_of_each_message():
+    of_node, log = accounts()
+    of_node.unanswered(FRAME, Reason.DETECTION_FAILED)
+    of_node.failed(FRAME, MemoryError("no room"))
+    of_node.unanswered(FRAME, Reason.STOPPED)
+    assert of_node.dropped.by_reason() == {Reason.DETECTION_FAILED: 2, Reason.STOPPED: 2}
+    counts = of_node.metrics.snapshot()
+    assert (counts["failures"], counts["last_failure"], counts["answered"]) == (1, "MemoryError: no room", 0)
+    assert log == ["scene: detection_failed: step that ends at 7 ns: no room"]
