@@ -63,6 +63,8 @@ struct LeafRange {
 };
 
 struct Tree {
+  // Primitives of a leaf. With 8, its faces and vertices mostly fill one group of boxes and its edges another, and each
+  // of at most 24 edges has a lane of a GPU's warp.
   static constexpr std::uint32_t leaf_size = 8;
   static constexpr std::uint32_t load_width = BoxGroup::width;  // numbers of features are loaded as many at a time
 

@@ -33,6 +33,8 @@ inline void pair_vertices(const Geometry& g, Kind kind, std::uint32_t first, std
     pair_vertices<Kind::edge_edge>(g, first, second, v);
 }
 
+// So many that the survivors of each filter still fill the lanes of the next, and so few that the vertices and k-DOPs
+// of a batch stay in a core's cache from one filter to the next.
 inline constexpr std::uint32_t batch_capacity = 1024;
 
 // Where the pairs of the batch went; every pair is in exactly one place.
