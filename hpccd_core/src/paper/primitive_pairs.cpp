@@ -63,19 +63,12 @@ void primitive_pairs(const Features& features, const std::vector<Box>& vertex_bo
 }
 
 void test_primitives(const Features& features, const PairRules& rules, const std::vector<Box>& vertex_boxes,
-                     BoundedPrimitive a, BoundedPrimitive b, Worker& worker) {
-  const auto& mesh = features.mesh_of_primitive;
-  worker.test_candidates(rules.accuracy(mesh[a.number], mesh[b.number]),
-                         [&](CandidateBuffer& edge_edge, CandidateBuffer& vertex_face) {
-                           primitive_pairs(features, vertex_boxes, a, b, edge_edge, vertex_face);
-                         });
-}
-
-void test_primitives(const Features& features, const PairRules& rules, const std::vector<Box>& vertex_boxes,
                      LeafPair primitives, Worker& worker) {
   const Box a = primitive_box(features, vertex_boxes, primitives.first),
             b = primitive_box(features, vertex_boxes, primitives.second);
-  test_primitives(features, rules, vertex_boxes, {primitives.first, a}, {primitives.second, b}, worker);
+  const auto& mesh = features.mesh_of_primitive;
+  test_primitives(features, rules.accuracy(mesh[primitives.first], mesh[primitives.second]), vertex_boxes,
+                  {primitives.first, a}, {primitives.second, b}, worker);
 }
 
 }  // namespace hpccd::paper

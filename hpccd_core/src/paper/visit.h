@@ -38,7 +38,9 @@ inline void test_leaves(const Scenery& s, Pair p, Worker& worker) {
   const std::uint32_t primitive_a = s.hierarchy.order[a.begin], primitive_b = s.hierarchy.order[b.begin];
   ++worker.leaf_pairs;
   if (!worker.sink)
-    test_primitives(s.features, s.rules, s.vertex_boxes, {primitive_a, a.box}, {primitive_b, b.box}, worker);
+    // The nodes know their meshes: the primitives' would be read from a table, by no order.
+    test_primitives(s.features, s.rules.accuracy(a.mesh, b.mesh), s.vertex_boxes, {primitive_a, a.box},
+                    {primitive_b, b.box}, worker);
   else
     for (const LeafPair left : worker.sink->push({primitive_a, primitive_b}))
       test_primitives(s.features, s.rules, s.vertex_boxes, left, worker);
