@@ -82,11 +82,11 @@ lint: $(ENVIRONMENT) ## Check style, types, and who imports or includes whom: ru
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-logo --cache-dir build/import-linter
 	$(BIN)/python scripts/check_includes.py
-	@git ls-files -z '*.h' '*.cpp' '*.inl' '*.cu' | xargs -0r $(BIN)/clang-format --dry-run --Werror
+	@git ls-files -z '*.h' '*.cpp' '*.inl' '*.cu' '*.cuh' | xargs -0r $(BIN)/clang-format --dry-run --Werror
 
 format: $(ENVIRONMENT) ## Mend the style where a tool can
 	$(BIN)/ruff check --fix .
-	@git ls-files -z '*.h' '*.cpp' '*.inl' '*.cu' | xargs -0r $(BIN)/clang-format -i
+	@git ls-files -z '*.h' '*.cpp' '*.inl' '*.cu' '*.cuh' | xargs -0r $(BIN)/clang-format -i
 
 pin: $(ENVIRONMENT) ## Write the versions now in .venv to requirements/
 	@version=$$($(BIN)/python -c 'import sys; print("%d.%d" % sys.version_info[:2])'); \
