@@ -224,8 +224,8 @@ class Detector:
 
     @property
     def stats(self) -> dict[str, int]:
-        """Counts of the last call: candidate pairs, survivors of each filter, contacts, bytes used, ... Empty where it
-        failed."""
+        """Counts of the last call: candidate pairs, those that each filter rejected, contacts, bytes used, ... Empty
+        where it failed."""
         return self._core.stats()
 
 

@@ -147,7 +147,7 @@ def wrong_answers(result: Kept) -> list[str]:
 def decided(result: Kept) -> list[str]:
     rows = [r for r in result.rows if r["part"] == "scene" and (r["accuracy"], r["simd"]) == ("exact", "auto")]
     keys = ("slabs", "coplanarity", "projection", "roots", "proven", "integers")
-    heads = ["scene", "candidate pairs", "bounds along axes", "coplanarity", "projections", "roots",
+    heads = ["scene", "candidate pairs", "k-DOPs", "coplanarity", "projections", "roots",
              "contacts by bounds", "by integers"]  # fmt: skip
     return markdown.table(heads, [[r["scene"], round(r["candidates"]), *(round(r["decided"][k]) for k in keys)]
                                   for r in rows])  # fmt: skip
