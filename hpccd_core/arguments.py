@@ -167,7 +167,7 @@ def _reals(name: str, array: NDArray[Any], value: object) -> NDArray[Any]:
 
 
 def _array(name: str, value: object) -> NDArray[Any]:
-    _refuse_masked(name, value)
+    refuse_masked(name, value)
     try:
         return np.asarray(value)
     except ValueError as error:  # rows of different lengths
@@ -181,7 +181,7 @@ def _array(name: str, value: object) -> NDArray[Any]:
         raise TypeError(f"{name}: {kind} does not turn into an array ({error}); give an array of numbers") from error
 
 
-def _refuse_masked(name: str, value: object) -> None:
+def refuse_masked(name: str, value: object) -> None:
     """A masked array with nothing masked is as good as any; of others the mask would be lost."""
     rows = value if isinstance(value, (list, tuple)) else (value,)
     if any(isinstance(row, np.ma.MaskedArray) and np.ma.is_masked(row) for row in rows):

@@ -52,6 +52,7 @@ def vertices_message(
     the :func:`topology_message` they belong to. frame_id: the coordinate frame of the positions.
     Raises TypeError or ValueError naming the argument.
     """
+    arguments.refuse_masked("vertices", vertices)
     if not isinstance(vertices, np.ndarray) or vertices.dtype not in arguments.REALS:
         kind = f"dtype {vertices.dtype}" if isinstance(vertices, np.ndarray) else type(vertices).__name__
         raise TypeError(f"vertices: expected an array of float32 or float64, got {kind}; convert with numpy.asarray")

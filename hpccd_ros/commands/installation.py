@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+import hpccd_ros
 from hpccd_ros.base.version import package_version
 from hpccd_ros.params.table import ACCURACIES
 
@@ -27,7 +28,7 @@ def gather() -> dict:
     detector = hc.Detector(probe)
     return {
         "hpccd": package_version(),
-        "code": str(Path(__file__).parent),
+        "code": str(Path(hpccd_ros.__file__).parent),
         "python": f"{platform.python_version()} ({sys.executable})",
         "system": f"{platform.platform()}",
         "processor": _processor(),

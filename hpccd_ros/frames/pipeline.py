@@ -4,12 +4,12 @@
 from collections.abc import Sequence
 
 from hpccd_ros.frames.assembler import FrameAssembler
-from hpccd_ros.frames.drops import Reason
+from hpccd_ros.frames.drops import Reason, Refusal
 from hpccd_ros.frames.frame_queue import FrameQueue
 from hpccd_ros.frames.outcome import Outcome
 from hpccd_ros.frames.transform_buffer import TransformBuffer
 from hpccd_ros.frames.transformer import MeshTransformer, Transformed
-from hpccd_ros.frames.types import MeshFrame, MeshSettings, Topology
+from hpccd_ros.frames.types import MeshFrame, MeshSettings, SceneFrame, Topology
 
 
 class FramePipeline:
@@ -48,23 +48,29 @@ class FramePipeline:
         return outcome
 
     def push(self, mesh: str, message: MeshFrame | Topology, new_publisher: bool = False) -> Outcome:
-        """One message of ``mesh``; frames that it completes are in the queue, if there is one.
-
-        new_publisher: it is the first of its publisher, or the first that could be read.
-        """
+        """One message of ``mesh``. new_publisher: it is the first of its publisher, or the first that could be read."""
         if isinstance(message, Topology):
-            return self._enqueue(self._assembler.set_topology(mesh, message, new_publisher))
-        return self._enqueue(self._assemble(mesh, self._transformers[mesh].transform(message, new_publisher)))
-
-    def retry(self) -> Outcome:
-        """Frames go on that waited for transforms which have come."""
+            return self._assembler.set_topology(mesh, message, new_publisher)
         outcome = Outcome()
-        for mesh, transformer in self._transformers.items():
-            outcome += self._assemble(mesh, transformer.retry())
-        return self._enqueue(outcome)
+        for part in self._assemble(mesh, self._transformers[mesh].transform(message, new_publisher)):
+            outcome += part
+        return outcome
+
+    def retry(self) -> list[Outcome]:
+        """Frames go on that waited for transforms which have come, each with an outcome of its own: a single transform
+        may let many go on."""
+        return [
+            outcome
+            for mesh, transformer in self._transformers.items()
+            for outcome in self._assemble(mesh, transformer.retry())
+        ]
+
+    def enqueue(self, frame: SceneFrame) -> list[Refusal]:
+        """Into the queue with a frame that came up; those that had to give way are refused."""
+        return [refusal for lost in self._queue.put(frame) for refusal in lost.refused(Reason.OVERLOAD)]
 
     def start(self, capacity: int) -> FrameQueue:
-        """From now on frames go into the queue that is returned, of so many frames that end a step."""
+        """The queue that `enqueue` fills from now on, of so many frames that end a step."""
         self._queue = FrameQueue(capacity)
         return self._queue
 
@@ -82,7 +88,7 @@ class FramePipeline:
 
     @property
     def waiting(self) -> int:
-        """Messages pushed that are neither out of the queue nor refused yet."""
+        """Messages pushed whose frame has neither come up nor been refused, and those in the queue."""
         queued = self._queue.frames() if self._queue is not None else ()
         before = self._assembler.waiting + sum(t.waiting for t in self._transformers.values())
         return before + sum(len(frame.fresh) for frame in queued)
@@ -107,18 +113,10 @@ class FramePipeline:
         """Positions of static meshes that are not used."""
         return self._assembler.warnings()
 
-    def _assemble(self, mesh: str, transformed: Transformed) -> Outcome:
-        outcome = Outcome(refusals=transformed.refusals)
-        for frame, new_publisher in transformed.frames:
-            outcome += self._assembler.add(mesh, frame, new_publisher)
-        return outcome
-
-    def _enqueue(self, outcome: Outcome) -> Outcome:
-        if self._queue is not None:
-            for frame in outcome.frames:
-                for lost in self._queue.put(frame):
-                    outcome.refusals += lost.refused(Reason.OVERLOAD)
-        return outcome
+    def _assemble(self, mesh: str, transformed: Transformed) -> list[Outcome]:
+        outcomes = [Outcome(refusals=transformed.refusals)]
+        outcomes += [self._assembler.add(mesh, frame, new_publisher) for frame, new_publisher in transformed.frames]
+        return outcomes
 
     def _forget_transforms(self) -> None:
         self.transforms = TransformBuffer()

@@ -86,7 +86,7 @@ class MeshSubscriptions:
         if why := unusable_topology(topology):
             self._refuse_topology(Reason.BAD_TOPOLOGY, why)
             return
-        hand_over(self._pipeline.push(self._mesh, topology, new_publisher), self._accounts)
+        hand_over(self._pipeline.push(self._mesh, topology, new_publisher), self._pipeline, self._accounts)
 
     def _on_vertices(self, message: Any, info: dict[str, Any]) -> None:
         received = time.monotonic()
@@ -101,7 +101,8 @@ class MeshSubscriptions:
         except InvalidMessageError as error:
             self._accounts.refused(error.refusal(self._mesh))
             return
-        hand_over(self._pipeline.push(self._mesh, frame, self._vertex_numbers.notice()), self._accounts)
+        outcome = self._pipeline.push(self._mesh, frame, self._vertex_numbers.notice())
+        hand_over(outcome, self._pipeline, self._accounts)
 
     def _count_received(self, info: dict[str, Any]) -> None:
         transport = (info["received_timestamp"] - info["source_timestamp"]) * 1e-6

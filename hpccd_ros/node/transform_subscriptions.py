@@ -41,7 +41,8 @@ class TransformSubscriptions:
                 return
             for refusal in transform_topics.fill(self._pipeline.transforms, message, topic):
                 self._warn(topic, refusal.text)
-            hand_over(self._pipeline.retry(), self._accounts)
+            for outcome in self._pipeline.retry():
+                hand_over(outcome, self._pipeline, self._accounts)
 
         profile = qos.TRANSFORMS_STATIC if topic.static else qos.TRANSFORMS
         message = message_class(topic.type_name)

@@ -59,9 +59,10 @@ class FrameSource:
         return self._pipeline.push(mesh, checked, new_publisher)
 
     def _push_transforms(self, decoded, topic) -> Outcome:
-        refused = Outcome(refusals=transform_topics.fill(self._pipeline.transforms, decoded, topic))
-        refused += self._pipeline.retry()
-        return refused
+        outcome = Outcome(refusals=transform_topics.fill(self._pipeline.transforms, decoded, topic))
+        for part in self._pipeline.retry():
+            outcome += part
+        return outcome
 
 
 class FrameWindow:

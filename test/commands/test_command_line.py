@@ -4,6 +4,7 @@
 import json
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 from sources import ROOT
@@ -94,6 +95,7 @@ def test_info(hpccd):
     found = json.loads(done.stdout)
     assert "cpu" in found["backends"] and "exact" in found["accuracies"]
     assert found["packages"]["mcap"] and found["cores"] >= 1
+    assert Path(found["code"]).name == "hpccd_ros"
 
 
 def test_interrupted_within_an_import():

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from hpccd_ros.frames.drops import Input, Reason
+from hpccd_ros.frames.outcome import Outcome
 from hpccd_ros.frames.pipeline import FramePipeline
 from hpccd_ros.frames.rigid import Rigid
 from hpccd_ros.frames.types import MeshFrame, MeshSettings, Topology
@@ -29,6 +30,20 @@ def pipeline_of(*meshes, **options):
         outcome = made.push(mesh.name, topology())
         assert (outcome.frames, outcome.refusals) == ([], [])
     return made
+
+
+def retried(pipeline):
+    """All that comes of it, in one."""
+    outcome = Outcome()
+    for part in pipeline.retry():
+        outcome += part
+    return outcome
+
+
+def enqueued(pipeline, outcome):
+    for each in outcome.frames:
+        outcome.refusals += pipeline.enqueue(each)
+    return outcome
 
 
 def stamps(frames):
@@ -83,9 +98,17 @@ def test_frames_wait_for_their_transforms():
     assert pipeline.push("cloth", frame(1)).frames == [] and pipeline.waiting == 1
     assert "no transform connects 'hand' and 'world'" in pipeline.awaited_transform("cloth")[0]
     pipeline.transforms.add("world", "hand", UP, None)
-    (placed,) = pipeline.retry().frames
+    (placed,) = retried(pipeline).frames
     assert placed.frame_id == "world" and placed.vertices[0].tolist() == [[1, 1, 2]] * 3
-    assert pipeline.retry().frames == pipeline.awaited_transform("cloth") == []
+    assert retried(pipeline).frames == pipeline.awaited_transform("cloth") == []
+
+
+def test_frames_that_one_transform_lets_go_on_come_up_one_by_one():
+    pipeline = pipeline_of(IN_HAND, frame_id="world")
+    for stamp in (1, 2, 3):
+        pipeline.push("cloth", frame(stamp))
+    pipeline.transforms.add("world", "hand", UP, None)
+    assert [stamps(outcome.frames) for outcome in pipeline.retry()] == [[], [1], [2], [3]]
 
 
 def test_positions_from_a_file_are_not_transformed():
@@ -101,9 +124,9 @@ def test_what_the_queue_has_no_room_for_comes_up_as_overload():
     queue = pipeline.start(1)
     for stamp in (1, 2):
         pipeline.push("cloth", frame(stamp))
-        assert pipeline.push("ball", frame(stamp)).refusals == []
+        assert enqueued(pipeline, pipeline.push("ball", frame(stamp))).refusals == []
     pipeline.push("cloth", frame(3))
-    outcome = pipeline.push("ball", frame(3))
+    outcome = enqueued(pipeline, pipeline.push("ball", frame(3)))
     assert stamps(outcome.frames) == [3] and reasons(outcome) == [("cloth", "overload"), ("ball", "overload")]
     assert [(queue.pop().frame.stamp) for _ in range(2)] == [1, 3]
 
@@ -114,7 +137,7 @@ def test_stopped_with_all_that_waits():
     pipeline.transforms.add("world", "hand", UP, None)
     queue = pipeline.start(5)
     pipeline.push("held", frame(1, frame_id="hand"))
-    assert stamps(pipeline.push("ball", frame(1)).frames) == [1]  # in the queue
+    assert stamps(enqueued(pipeline, pipeline.push("ball", frame(1))).frames) == [1]  # in the queue
     pipeline.push("ball", frame(2))  # waits for the other mesh
     pipeline.push("held", frame(3, frame_id="foot"))  # waits for a transform
     pipeline.push("ball", frame(4, version=1))  # waits for a topology
@@ -144,8 +167,10 @@ def test_no_message_is_unaccounted_for(queued):
         sent += 1
         if i % 5 == 0:
             pipeline.transforms.add("world", "hand", UP, i // 6)
-            outcomes.append(pipeline.retry())
+            outcomes.append(retried(pipeline))
         for outcome in outcomes:
+            if queue is not None:
+                enqueued(pipeline, outcome)
             refused += len(outcome.refusals)
             answered += outcome.static_taken
             if queue is None:
