@@ -2,7 +2,6 @@
 """The detector: motion of a scene in, contacts out."""
 
 import contextlib
-import os
 import re
 import threading
 from collections.abc import Iterable, Iterator
@@ -48,6 +47,8 @@ class Detector:
     has ended, and profile and stats are those of the last. Only cancel() never waits. Threads that are to work side by
     side need a detector each, of one scene if they like.
     """
+
+    _gpu_stages = False  # for measuring, in a class derived from this one: `profile` tells device time by stage too
 
     def __init__(
         self,
@@ -108,7 +109,7 @@ class Detector:
             hybrid_segments=hybrid_segments,
             hybrid_segment_pairs=hybrid_segment_pairs,
             gpus=gpus,
-            gpu_stages=bool(os.environ.get("HPCCD_GPU_STAGES")),  # for measuring: device time by stage in `profile`
+            gpu_stages=self._gpu_stages,
         )
         self._stepping = threading.RLock()  # of the positions of the last step
         self._last: NDArray[Any] | None = None

@@ -6,6 +6,7 @@
 #include <chrono>
 #include <thread>
 
+#include "equal_contacts.h"
 #include "grid_scene.h"
 
 namespace hpccd {
@@ -47,14 +48,6 @@ Contacts detect_pair_by_pair(const Scene& scene) {
   return contacts;
 }
 
-void expect_equal(const Contacts& a, const Contacts& b) {
-  EXPECT_EQ(a.vf, b.vf);
-  EXPECT_EQ(a.ee, b.ee);
-  EXPECT_EQ(a.vf_toc, b.vf_toc);
-  EXPECT_EQ(a.ee_toc, b.ee_toc);
-  EXPECT_EQ(a.hash, b.hash);
-}
-
 TEST(Detector, FindsWhatTestingEachPairFinds) {
   const auto scene = test::two_sheets(side);
   const Contacts found = detect(scene, {}), expected = detect_pair_by_pair(*scene);
@@ -69,7 +62,7 @@ TEST(Detector, SameContactsOnAnyNumberOfThreads) {
     const Contacts alone = detect(test::two_sheets(side), {.accuracy = accuracy, .threads = 1});
     ASSERT_GT(alone.vf.size() + alone.ee.size(), 200u);
     for (int threads : {2, 3, 8})
-      expect_equal(alone, detect(test::two_sheets(side), {.accuracy = accuracy, .threads = threads}));
+      test::expect_equal(alone, detect(test::two_sheets(side), {.accuracy = accuracy, .threads = threads}));
   }
 }
 
@@ -80,7 +73,7 @@ TEST(Detector, DetectorsOfOneSceneWorkSideBySide) {
   std::vector<std::thread> threads;
   for (Contacts& contacts : found) threads.emplace_back([&] { contacts = detect(scene, {.threads = 2}); });
   for (std::thread& thread : threads) thread.join();
-  for (const Contacts& contacts : found) expect_equal(expected, contacts);
+  for (const Contacts& contacts : found) test::expect_equal(expected, contacts);
 }
 
 TEST(Detector, CallsOfSeveralThreadsTakeTurns) {
@@ -109,8 +102,8 @@ TEST(Detector, CallsOfSeveralThreadsTakeTurns) {
       callers.emplace_back([&, caller] {
         for (int call = 0; call < 10; ++call) {
           const bool forth = (caller + call) % 2 == 0;
-          expect_equal(shared.detect(test::view(forth ? start : end), test::view(forth ? end : start)),
-                       forth ? there : back);
+          test::expect_equal(shared.detect(test::view(forth ? start : end), test::view(forth ? end : start)),
+                             forth ? there : back);
         }
       });
     for (std::thread& caller : callers) caller.join();

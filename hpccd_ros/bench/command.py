@@ -7,6 +7,7 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
+from hpccd_core.options import ACCURACIES
 from hpccd_ros.base.errors import UserError
 from hpccd_ros.bench import sources
 from hpccd_ros.bench.report import figures, machine
@@ -60,7 +61,7 @@ def threads_option(parser) -> None:
 
 
 def tier_option(parser, default="balanced") -> None:
-    parser.add_argument("--accuracy", default=default, choices=("fast", "balanced", "conservative", "exact"),
+    parser.add_argument("--accuracy", default=default, choices=ACCURACIES,
                         help="tier (default: %(default)s)")  # fmt: skip
 
 

@@ -11,7 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from hpccd_ros.base.errors import UserError
-from hpccd_ros.bench.steps import MeshPart, Source, Step
+from hpccd_ros.bench.steps import Source, Step
+from hpccd_ros.scenes.scene import Mesh
 
 # Of Table 1, in its order: generated scenes of the same size and character.
 TABLE_1 = ("cloth-ball-like", "breaking-like", "n-body-like-lr", "n-body-like-hr")
@@ -92,7 +93,7 @@ def of_scene(name: str, size: float = 1.0) -> Source:
         frame = scene.frame(k + 1)
         before = frame.start if frame.start is not None else scene.frame(k)
         meshes = tuple(
-            MeshPart(mesh.name, faces, len(xyz), mesh.static, mesh.self_collision)
+            Mesh(mesh.name, faces, len(xyz), mesh.static, mesh.self_collision)
             for mesh, faces, xyz in zip(scene.meshes, scene.faces(k + 1), frame, strict=True)
         )
         return Step(meshes, topology(k + 1), np.concatenate(before), np.concatenate(frame))
@@ -111,7 +112,7 @@ def of_npz(path: Path) -> Source:
     if not {"vertices_t0", "vertices_t1", "faces"} <= arrays.keys():
         raise UserError(f"{path}: holds {', '.join(arrays)}; a step has vertices_t0, vertices_t1 and faces")
     truth = {key: arrays[key] for key in ("vf", "vf_toc", "ee", "ee_toc") if key in arrays}
-    mesh = MeshPart("scene", arrays["faces"], len(arrays["vertices_t0"]))
+    mesh = Mesh("scene", arrays["faces"], len(arrays["vertices_t0"]))
     known = truth if len(truth) == 4 else None
     step = Step((mesh,), 0, arrays["vertices_t0"], arrays["vertices_t1"], truth=known)
     return Source(path.stem, 1, lambda k: step)
@@ -136,7 +137,7 @@ def of_recording(path: Path) -> Source:
         if not before.same_scene(after):
             return None
         meshes = tuple(
-            MeshPart(m.name, t.faces, t.n_vertices, m.static, m.self_collision)
+            Mesh(m.name, t.faces, t.n_vertices, m.static, m.self_collision)
             for m, t in zip(builder.meshes, after.topologies, strict=True)
         )
         return Step(

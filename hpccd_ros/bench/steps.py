@@ -9,17 +9,7 @@ from collections.abc import Callable
 import numpy as np
 
 import hpccd_core as hc
-
-
-@dataclasses.dataclass(frozen=True)
-class MeshPart:
-    """One mesh of a scene as the core takes it: faces (F,3) index into its own n_vertices vertices."""
-
-    name: str
-    faces: np.ndarray
-    n_vertices: int
-    static: bool = False
-    self_collision: bool = True
+from hpccd_ros.scenes.scene import Mesh
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -30,7 +20,7 @@ class Step:
     truth      {"vf", "vf_toc", "ee", "ee_toc"} as in hpccd_core.Contacts where it is known, else None
     """
 
-    meshes: tuple[MeshPart, ...]
+    meshes: tuple[Mesh, ...]
     topology: object
     vertices_t0: np.ndarray
     vertices_t1: np.ndarray
@@ -59,7 +49,7 @@ class Step:
 
     def as_one_mesh(self) -> Step:
         """The same triangles, everything tested against everything: what a peer without such options tests."""
-        whole = MeshPart("all", self.faces().astype(np.uint32), len(self.vertices_t0))
+        whole = Mesh("all", self.faces().astype(np.uint32), len(self.vertices_t0))
         return dataclasses.replace(self, meshes=(whole,), ignored_pairs=(), truth=None)
 
 

@@ -4,7 +4,6 @@
 import math
 import threading
 import time
-from collections import Counter
 from collections.abc import Callable
 from concurrent.futures import CancelledError, ThreadPoolExecutor
 from concurrent.futures import Future as JobFuture
@@ -13,16 +12,17 @@ from typing import Any
 from hpccd.srv import Detect
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import Clock, ClockType
-from rclpy.node import Node
 from rclpy.task import Future
 
 from hpccd_core import Cancelled
 from hpccd_ros.base.quoting import LONGEST_MESSAGE, shortened
 from hpccd_ros.detect.cancellation import Cancellation
-from hpccd_ros.detect.core import CORE_ERRORS, Options
+from hpccd_ros.detect.core import CORE_ERRORS
 from hpccd_ros.middleware import qos, topic_names
-from hpccd_ros.middleware.guard import Errors
+from hpccd_ros.node.accounts import Accounts
+from hpccd_ros.node.configuration import Configuration
 from hpccd_ros.node.detect_request import NodeScene, RequestError, compute
+from hpccd_ros.node.life_cycle import GuardedLifecycleNode
 
 # Requests that may lie in the queue of the service beside those that find a place: a burst of them is answered "busy"
 # rather than lost. Bounds what strangers can make the node hold.
@@ -44,24 +44,20 @@ class DetectService:
     computation given up; the place that it holds is free once that ends.
     scene: what the node knows, asked in the executor at each request; a text instead: why it cannot answer
     now.
-    ended: counts requests by how they ended.
     """
 
     def __init__(
         self,
-        node: Node,
-        settings: dict[str, Any],
-        options: Callable[[], Options],
+        node: GuardedLifecycleNode,
+        configuration: Configuration,
         scene: Callable[[], NodeScene | str],
-        ended: Counter,
-        errors: Errors,
+        accounts: Accounts,
     ) -> None:
         self._node = node
-        self._settings = settings
-        self._options = options
+        self._configuration = configuration
+        self._settings = settings = configuration.settings
         self._scene = scene
-        self._ended = ended
-        self._errors = errors
+        self._ended = accounts.requests
         self._capacity = settings["detect_jobs"] + settings["detect_waiting"]
         self._pool = ThreadPoolExecutor(settings["detect_jobs"], thread_name_prefix="detect")
         self._lock = threading.Lock()
@@ -119,7 +115,7 @@ class DetectService:
         except RequestError as error:
             return self._refuse(response, "refused", str(error))
         except Exception as error:  # here and not only by the executor's guard, so that it is counted as failed
-            return self._refuse(Detect.Response(), "failed", self._errors.caught(topic_names.DETECT, error))
+            return self._refuse(Detect.Response(), "failed", self._node.errors.caught(topic_names.DETECT, error))
         finally:
             self._last_answer = time.monotonic()
 
@@ -138,7 +134,7 @@ class DetectService:
         cancellation = Cancellation()
         self._ongoing.add(cancellation)
         try:
-            job = self._pool.submit(compute, request, scene, self._options(), self._settings, cancellation)
+            job = self._pool.submit(compute, request, scene, self._configuration.options, self._settings, cancellation)
         except RuntimeError:  # the system gives no further thread
             self._ongoing.discard(cancellation)
             self._leave()

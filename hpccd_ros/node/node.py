@@ -58,8 +58,7 @@ class HpccdNode(GuardedLifecycleNode):
             return TransitionCallbackReturn.FAILURE
         self._contacts = ContactsPublisher(self, settings)
         self._diagnostics = self.configured_publisher(DiagnosticArray, topic_names.DIAGNOSTICS, qos.DIAGNOSTICS)
-        options, ended = lambda: self._configuration.options, self._accounts.requests
-        self._service = DetectService(self, settings, options, self._scene_for_service, ended, self.errors)
+        self._service = DetectService(self, self._configuration, self._scene_for_service, self._accounts)
         self.configured_timer(settings["diagnostics_period"], self._report)
         self.configured_timer(GIVE_BACK_EVERY, environment.give_back_freed_memory)
         return SUCCESS

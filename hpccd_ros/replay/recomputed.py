@@ -55,18 +55,18 @@ class Replay:
     accuracy: "": that with which each answer was found.
     outputs: computed beside the contacts (they are not compared).
     begin, end: seconds into the recording; steps outside are neither computed nor counted.
-    on_message: called with the number of recorded messages read so far.
+    messages_read: recorded messages so far, of `message_count`.
     """
 
     def __init__(self, recording: Recording, setup: ReplaySetup, *, backend="auto", threads=0, accuracy="",
-                 outputs=(), begin=0.0, end=float("inf"), on_message=lambda count: None):
+                 outputs=(), begin=0.0, end=float("inf")):
         self._recording = recording
         self._setup = setup
         self._backend, self._threads, self._accuracy = backend, threads, accuracy
         self._outputs = tuple(outputs)
         self._begin, self._end = begin, end
         self._at = 0.0  # seconds into the recording, of the message read last
-        self._on_message = on_message
+        self.messages_read = 0
         self.source = FrameSource(setup, recording.topics)
         answers = recording.topics.get(setup.contacts)
         self.recorded_answers = answers.count if answers else 0
@@ -142,7 +142,7 @@ class Replay:
             first = message.log_time if first is None else first
             self._at = (message.log_time - first) * 1e-9
             yield message
-            self._on_message(count)
+            self.messages_read = count
 
     def _step_of(self, answer, at, window) -> ReplayedStep:
         try:

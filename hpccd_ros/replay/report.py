@@ -63,8 +63,7 @@ def main(args) -> int:
         table = stack.enter_context(contextlib.closing(Table(args.csv))) if args.csv else None
         progress = stack.enter_context(_progress_bar())
         replay = Replay(recording, setup, backend=args.backend, threads=args.threads, accuracy=args.accuracy,
-                        begin=args.begin, end=args.end,
-                        on_message=lambda count: progress.update(bar, completed=count))
+                        begin=args.begin, end=args.end)
         bar = progress.add_task("replay", total=replay.message_count, said="")
         summary = Summary()
         pace = Pace(args.rate or 0.0)
@@ -73,6 +72,7 @@ def main(args) -> int:
             summary.add(step)
             if table:
                 table.add(step)
+            progress.update(bar, completed=replay.messages_read)
             if step.contacts is not None:
                 progress.update(bar, said=f"step {step.step}: {step.total:,} contacts, {step.milliseconds:.1f} ms")
             if step.difference and args.keep_going:

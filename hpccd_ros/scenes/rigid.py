@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from hpccd_ros.scenes.exactmath import cross, dot, length, normalized, rotate
+from hpccd_ros.scenes.exactmath import cross, dot, length, rotate
 from hpccd_ros.scenes.progress import track
 
 GRAVITY = 9.81
@@ -172,8 +172,3 @@ def _turn(q, rotation):
 def placed(points: np.ndarray, body: np.ndarray, position: np.ndarray, orientation: np.ndarray) -> np.ndarray:
     """Points (V,3) in the frames of their bodies (V,) moved to where the bodies are: (V,3) float32."""
     return (position[body] + rotate(orientation[body], points)).astype(np.float32)
-
-
-def random_directions(random: np.random.RandomState, count: int) -> np.ndarray:
-    """`count` unit vectors (count,3), even enough over the sphere."""
-    return normalized(2.0 * random.random_sample((count, 3)) - 1.0)

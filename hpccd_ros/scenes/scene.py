@@ -11,7 +11,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Mesh:
-    """A mesh as it is in frame 0. `faces` is (F,3) uint32 into the mesh's own `n_vertices` vertices."""
+    """`faces` is (F,3) uint32 into the mesh's own `n_vertices` vertices; of a scene: as it is in frame 0."""
 
     name: str
     faces: np.ndarray

@@ -5,6 +5,7 @@ import gc
 import math
 import os
 import time
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -300,9 +301,9 @@ def service():
     executor.add_node(node)
     settings = {"detect_jobs": 1, "detect_waiting": 1, "detect_time_limit": PATIENCE, "max_meshes": 4,
                 "max_vertices": 1000, "max_faces": 1000, "max_contacts": 0}  # fmt: skip
-    errors = Errors(lambda text: None)
-    ended = Accounts(print).requests
-    service = DetectService(node, settings, Options, lambda: NodeScene(SceneBuilder(()), {}), ended, errors)
+    errors = node.errors = Errors(lambda text: None)
+    configuration = SimpleNamespace(settings=settings, options=Options())
+    service = DetectService(node, configuration, lambda: NodeScene(SceneBuilder(()), {}), Accounts(print))
     client = node.create_client(Detect, "service/detect")
     assert client.wait_for_service(PATIENCE)
 

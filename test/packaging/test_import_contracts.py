@@ -11,6 +11,9 @@ from sources import ROOT
 
 pytest.importorskip("importlinter", reason="import-linter comes with the extra lint")
 
+FLOORS = "Each package imports only what stands below it"
+ABOVE = "The core knows nothing of the packages around it"
+
 
 def lint(folder):
     return subprocess.run(
@@ -22,7 +25,8 @@ def lint(folder):
 @pytest.fixture
 def copy(tmp_path):
     shutil.copy(ROOT / ".importlinter", tmp_path)
-    shutil.copytree(ROOT / "hpccd_ros", tmp_path / "hpccd_ros", ignore=shutil.ignore_patterns("__pycache__"))
+    for package in ("hpccd_core", "hpccd_ros"):
+        shutil.copytree(ROOT / package, tmp_path / package, ignore=shutil.ignore_patterns("__pycache__", "results"))
     return tmp_path
 
 
@@ -34,13 +38,14 @@ def test_contracts_are_kept():
 @pytest.mark.parametrize(
     "module, statement, broken",
     [
-        ("frames/drops.py", "from hpccd_ros.middleware import qos", "Each package imports only what stands below it"),
-        ("node/node.py", "from hpccd_ros.replay import compare", "Each package imports only what stands below it"),
-        ("detect/layout.py", "import rclpy", "Frames and their detection know nothing of ROS"),
+        ("hpccd_ros/frames/drops.py", "from hpccd_ros.middleware import qos", FLOORS),
+        ("hpccd_ros/node/node.py", "from hpccd_ros.replay import compare", FLOORS),
+        ("hpccd_ros/detect/layout.py", "import rclpy", "The core, frames and their detection know nothing of ROS"),
+        ("hpccd_core/scene.py", "from hpccd_ros.base import quoting", ABOVE),
     ],
 )
 def test_an_import_that_runs_up_is_seen(copy, module, statement, broken):
-    path = copy / "hpccd_ros" / module
+    path = copy / module
     path.write_text(f"{path.read_text()}\n{statement}\n")
     done = lint(copy)
     assert done.returncode == 1 and f"{broken} BROKEN" in done.stdout, done.stdout + done.stderr

@@ -97,7 +97,7 @@ void CpuBackend::count(std::map<std::string, std::uint64_t>& stats) const {
       const std::string kind = kinds[k];
       const BatchCounts& c = w.counts[k];
       stats[kind + "_candidates"] += c.tested;
-      stats[kind + "_rejected_slabs"] += c.kdop;
+      stats[kind + "_rejected_slabs"] += c.kdop;  // users read it under its first name
       stats[kind + "_rejected_coplanarity"] += c.coplanarity;
       stats[kind + "_rejected_projection"] += c.projection;
       stats[kind + "_rejected_roots"] += c.roots;

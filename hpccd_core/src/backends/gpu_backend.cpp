@@ -23,7 +23,7 @@ Vec3<double> position(Positions p, std::uint32_t v) {
 }  // namespace
 
 std::string GpuBackend::unsupported(const Options& options) {
-  if (options.minimum_separation > 0) return "minimum_separation: not on the GPU; use backend=\"cpu\"";
+  if (options.minimum_separation > 0) return no_separation_on_gpus;
   if (options.method != Method::standard)
     return "method: the published methods run on CPUs; use backend=\"cpu\", or method=\"default\"";
   return "";

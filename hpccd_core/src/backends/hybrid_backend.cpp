@@ -29,8 +29,7 @@ void keep_first(std::vector<Worker>& workers) {
 }  // namespace
 
 std::string HybridBackend::unsupported(const Options& options) {
-  if (options.minimum_separation > 0) return "minimum_separation: not on the GPU; use backend=\"cpu\"";
-  return "";
+  return options.minimum_separation > 0 ? no_separation_on_gpus : "";
 }
 
 std::optional<Detection> HybridBackend::detect(Positions t0, Positions t1) {

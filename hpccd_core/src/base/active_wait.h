@@ -3,16 +3,12 @@
 
 #include <thread>
 
-#if defined(__x86_64__)
-#include <immintrin.h>
-#endif
-
 namespace hpccd {
 
 // One turn of active waiting: 15 to 50 ns on x86-64, leaving the core's resources to a sibling thread.
 inline void pause() {
 #if defined(__x86_64__)
-  _mm_pause();
+  __builtin_ia32_pause();
 #else
   std::this_thread::yield();
 #endif

@@ -270,8 +270,8 @@ class Builder {
   const Cancellation& cancellation_ = pool_.cancellation();
   static constexpr std::size_t some = 1 << 15;  // pieces of the serial work: less than 1 ms
   std::vector<Part> parts_;                     // by mesh
-  std::unique_ptr<Centroid[]> primitives_,
-      scratch_;  // primitives in the order of the tree, as far as it has been split
+  std::unique_ptr<Centroid[]> primitives_;      // in the order of the tree, as far as it has been split
+  std::unique_ptr<Centroid[]> scratch_;         // as large, for the splits
   std::vector<Range> level_, leaf_ranges_;
 };
 

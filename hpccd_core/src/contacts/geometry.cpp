@@ -17,16 +17,6 @@ struct Vertices {
   V at(int i, double t) const { return interpolate(t0[i], t1[i], t); }
 };
 
-V vector(const double x[3]) { return {x[0], x[1], x[2]}; }
-
-Vertices vertices_of(const Geometry& g, Kind kind, std::uint32_t first, std::uint32_t second) {
-  std::uint32_t v[4];
-  pair_vertices(g, kind, first, second, v);
-  Vertices q;
-  for (int i = 0; i < 4; ++i) q.t0[i] = vector(g.vertices[v[i]].t0), q.t1[i] = vector(g.vertices[v[i]].t1);
-  return q;
-}
-
 // The motion at the time of contact.
 struct Moment {
   double t;
@@ -106,7 +96,8 @@ ContactPoint contact_point_of(const Vertices& q, double toc, bool touching) {
 
 ContactPoint contact_point(const Geometry& g, Kind kind, std::uint32_t first, std::uint32_t second, double toc,
                            bool touching) {
-  const Vertices q = vertices_of(g, kind, first, second);
+  Vertices q;
+  pair_positions(g, kind, first, second, q.t0, q.t1);
   return kind == Kind::vertex_face ? contact_point_of<Kind::vertex_face>(q, toc, touching)
                                    : contact_point_of<Kind::edge_edge>(q, toc, touching);
 }

@@ -33,6 +33,17 @@ inline void pair_vertices(const Geometry& g, Kind kind, std::uint32_t first, std
     pair_vertices<Kind::edge_edge>(g, first, second, v);
 }
 
+// Where these vertices are at both ends of the motion.
+HPCCD_HD void pair_positions(const Geometry& g, Kind kind, std::uint32_t first, std::uint32_t second,
+                             Vec3<double> t0[4], Vec3<double> t1[4]) {
+  std::uint32_t v[4];
+  pair_vertices(g, kind, first, second, v);
+  for (int i = 0; i < 4; ++i) {
+    const VertexMotion& m = g.vertices[v[i]];
+    t0[i] = {m.t0[0], m.t0[1], m.t0[2]}, t1[i] = {m.t1[0], m.t1[1], m.t1[2]};
+  }
+}
+
 // So many that the survivors of each filter still fill the lanes of the next, and so few that the vertices and k-DOPs
 // of a batch stay in a core's cache from one filter to the next.
 inline constexpr std::uint32_t batch_capacity = 1024;

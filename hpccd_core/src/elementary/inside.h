@@ -28,6 +28,21 @@ HPCCD_HD void require_between(Verdict<R>& all, R x, R n, R error) {
   all.no = all.no || lesser(x, d) > error || greater(x, d) < R(0) - error;
 }
 
+// The coordinate in which cross products are largest: the conditions of motion.h hold in each, and in this one rounding
+// matters least.
+template <class R>
+struct LargestCoordinate {
+  typename RealTraits<R>::Mask is_x, is_y;  // neither: z
+
+  HPCCD_HD LargestCoordinate(const Vec3<R>& u, const Vec3<R>& v, const Vec3<R>& w) {
+    const R x = magnitude(u.x) + magnitude(v.x) + magnitude(w.x);
+    const R y = magnitude(u.y) + magnitude(v.y) + magnitude(w.y);
+    const R z = magnitude(u.z) + magnitude(v.z) + magnitude(w.z);
+    is_x = x >= y && x >= z, is_y = !is_x && y >= z;
+  }
+  HPCCD_HD R pick(R for_x, R for_y, R for_z) const { return select(is_x, for_x, select(is_y, for_y, for_z)); }
+};
+
 // The conditions of motion.h in the coordinate in which the cross products are largest, sound for a contact anywhere
 // within delta of t.
 //
@@ -37,11 +52,8 @@ template <Kind kind, class Policy, class R>
 HPCCD_HD Verdict<R> inside(const Motion<R>& m, const Magnitudes<R>& size, R t, R delta) {
   const Vec3<R> p = interpolate(m.p0, m.p1, t), a = interpolate(m.a0, m.a1, t), b = interpolate(m.b0, m.b1, t);
   const Vec3<R> ab = cross(a, b), pb = cross(p, b), ap = cross(a, p);
-  const R x = magnitude(ab.x) + magnitude(pb.x) + magnitude(ap.x);
-  const R y = magnitude(ab.y) + magnitude(pb.y) + magnitude(ap.y);
-  const R z = magnitude(ab.z) + magnitude(pb.z) + magnitude(ap.z);
-  const auto take_x = x >= y && x >= z, take_y = !take_x && y >= z;
-  const auto component = [&](const Vec3<R>& v) { return select(take_x, v.x, select(take_y, v.y, v.z)); };
+  const LargestCoordinate<R> largest(ab, pb, ap);
+  const auto component = [&](const Vec3<R>& v) { return largest.pick(v.x, v.y, v.z); };
   const R signed_n = component(ab);
   const R sign = select(signed_n < R(0), R(-1), R(1));
   const R n = sign * signed_n, alpha = sign * component(pb), beta = sign * component(ap);
@@ -94,17 +106,12 @@ HPCCD_HD typename RealTraits<R>::Mask beyond(const Quadratic<R>& x, const Quadra
 
 template <Kind kind, class R>
 HPCCD_HD typename RealTraits<R>::Mask certainly_outside(const Motion<R>& m, const Magnitudes<R>& size) {
-  using Mask = typename RealTraits<R>::Mask;
   // The coordinate in which the cross products are largest at mid-step: drop it and look at the projection.
   const Vec3<R> p = m.p0 + m.p1, a = m.a0 + m.a1, b = m.b0 + m.b1;
-  const Vec3<R> ab = cross(a, b), pb = cross(p, b), ap = cross(a, p);
-  const R nx = magnitude(ab.x) + magnitude(pb.x) + magnitude(ap.x);
-  const R ny = magnitude(ab.y) + magnitude(pb.y) + magnitude(ap.y);
-  const R nz = magnitude(ab.z) + magnitude(pb.z) + magnitude(ap.z);
-  const Mask drop_x = nx >= ny && nx >= nz, drop_y = !drop_x && ny >= nz;
+  const LargestCoordinate<R> dropped(cross(a, b), cross(p, b), cross(a, p));
   // (y, z), (z, x) or (x, y): the order that gives the component of the cross product its sign.
-  const auto first = [&](const Vec3<R>& v) { return select(drop_x, v.y, select(drop_y, v.z, v.x)); };
-  const auto second = [&](const Vec3<R>& v) { return select(drop_x, v.z, select(drop_y, v.x, v.y)); };
+  const auto first = [&](const Vec3<R>& v) { return dropped.pick(v.y, v.z, v.x); };
+  const auto second = [&](const Vec3<R>& v) { return dropped.pick(v.z, v.x, v.y); };
   const R px0 = first(m.p0), py0 = second(m.p0), px1 = first(m.p1), py1 = second(m.p1);
   const R ax0 = first(m.a0), ay0 = second(m.a0), ax1 = first(m.a1), ay1 = second(m.a1);
   const R bx0 = first(m.b0), by0 = second(m.b0), bx1 = first(m.b1), by1 = second(m.b1);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// LanePair pairs of features (traverse/leaf_pairs.inl) and the first filter on them, in one kernel: candidates wait in
+// Candidate pairs of features (traverse/leaf_pairs.inl) and the first filter on them, in one kernel: candidates wait in
 // shared memory until a warp is full, and only those that pass the sign test reach device memory (a third of them on
 // cloth-ball, a fifth on n-body).
 #pragma once
@@ -19,7 +19,7 @@ struct CandidateSpace {
   Bound bound[2][4][3 * Tree::leaf_size];
   u32 number[2][3 * Tree::leaf_size];
   u32 corner2[Tree::leaf_size];
-  // Candidates: the vertices that p, a and b lead from and to, and the features.
+  // Candidates: the vertices that p, a and b lead from and to (span_ends), and the features.
   uint4 vertices[64];
   uint2 features[64];
   uint2 survivors[2][96];
@@ -39,7 +39,7 @@ template <class T>
 __device__ u32 stage_edges(const LaunchParams<T>& params, const DeviceLeaf& l, u32 other, CandidateSpace& s, u32 side) {
   const u32 lane = lane_number(), slot = l.first_edge + lane;
   DeviceBox b;
-  bool near = lane < (l.counts >> 8 & 0xFF);
+  bool near = lane < l.n_edges();
   if (near) {
     b = load_box(&params.edge_boxes[slot]);
     near = overlap(b, load_box(&params.leaf_boxes[other]));
@@ -57,7 +57,7 @@ __device__ u32 stage_vertices(const LaunchParams<T>& params, const DeviceLeaf& l
   const u32 lane = lane_number();
   DeviceBox b;
   u32 v = 0;
-  bool near = lane < l.counts >> 16;
+  bool near = lane < l.n_vertices();
   if (near) {
     v = __ldg(&params.vertex_of_slot[l.first_vertex + lane]);
     b = load_point(&params.points[v]);
@@ -75,7 +75,7 @@ template <class T>
 __device__ u32 stage_faces(const LaunchParams<T>& params, const DeviceLeaf& l, u32 other, CandidateSpace& s) {
   const u32 lane = lane_number(), slot = l.first_face + lane;
   DeviceBox b;
-  bool near = lane < (l.counts & 0xFF);
+  bool near = lane < l.n_faces();
   if (near) {
     b = load_box(&params.face_boxes[slot]);
     near = overlap(b, load_box(&params.leaf_boxes[other]));
@@ -106,11 +106,16 @@ __device__ void flush_survivors(const LaunchParams<T>& params, CandidateSpace& s
   __syncwarp();
 }
 
+// Of the vertices of a pair (pair_vertices.h): the one where p and a start, then those where p, a and b end.
+template <Kind kind>
+__device__ __forceinline__ uint4 span_ends(u32 v0, u32 v1, u32 v2, u32 v3) {
+  using S = Spans<kind>;
+  static_assert(S::a_from == S::p_from && S::b_from == (kind == Kind::edge_edge ? S::p_to : S::p_from));
+  const u32 v[4] = {v0, v1, v2, v3};
+  return {v[S::p_from], v[S::p_to], v[S::a_to], v[S::b_to]};
+}
+
 // The first filter on the last up to 32 candidates. One piece of code for both kinds: they differ in where b starts.
-static_assert(Spans<Kind::vertex_face>::p_from == Spans<Kind::vertex_face>::a_from &&
-              Spans<Kind::vertex_face>::p_from == Spans<Kind::vertex_face>::b_from);
-static_assert(Spans<Kind::edge_edge>::p_from == Spans<Kind::edge_edge>::a_from &&
-              Spans<Kind::edge_edge>::p_to == Spans<Kind::edge_edge>::b_from);
 template <class T>
 __device__ __forceinline__ void filter_candidates(const LaunchParams<T>& params, CandidateSpace& s,
                                                   CandidateState& state) {
@@ -166,7 +171,7 @@ __device__ __forceinline__ LanePair edge_pair(const CandidateSpace& s, u32 i, u3
   const u32 x = s.number[0][i], y = s.number[side][j];
   const uint2 ends_a{a.tag_low(), a.tag_high()}, ends_b{b.tag_low(), b.tag_high()};
   const uint2 lower = x < y ? ends_a : ends_b, upper = x < y ? ends_b : ends_a;
-  c.vertices = {lower.x, upper.x, lower.y, upper.y};
+  c.vertices = span_ends<Kind::edge_edge>(lower.x, lower.y, upper.x, upper.y);
   c.features = {x < y ? x : y, (x < y ? y : x) | kind_bit};
   return c;
 }
@@ -175,10 +180,10 @@ __device__ __forceinline__ LanePair vertex_face_pair(const CandidateSpace& s, u3
   LanePair c{valid, {0, 0, 0, 0}, {0, 0}};
   if (!valid) return c;
   const DeviceBox vertex = s.box(0, i), face = s.box(1, j);
-  c.vertices = {face.tag_low(), vertex.tag_low(), face.tag_high(), s.corner2[j]};
-  c.wanted = overlap(vertex, face) && vertex.tag_low() != c.vertices.x && vertex.tag_low() != c.vertices.z &&
-             vertex.tag_low() != c.vertices.w;
-  c.features = {vertex.tag_low(), s.number[1][j]};
+  const u32 v = vertex.tag_low(), f0 = face.tag_low(), f1 = face.tag_high(), f2 = s.corner2[j];
+  c.vertices = span_ends<Kind::vertex_face>(v, f0, f1, f2);
+  c.wanted = overlap(vertex, face) && v != f0 && v != f1 && v != f2;
+  c.features = {v, s.number[1][j]};
   return c;
 }
 

@@ -21,9 +21,8 @@ class DeviceLeaves {
     std::vector<DeviceLeaf> packed(leaves.size());
     for (std::size_t i = 0; i < leaves.size(); ++i) {
       const LeafRange& l = leaves[i];
-      packed[i] = {
-          l.first_face, l.first_edge, l.first_vertex,
-          (l.end_face - l.first_face) | (l.end_edge - l.first_edge) << 8 | (l.end_vertex - l.first_vertex) << 16};
+      packed[i] = {l.first_face, l.first_edge, l.first_vertex,
+                   DeviceLeaf::counts_of(l.n_faces(), l.n_edges(), l.n_vertices())};
     }
     std::vector<DeviceBox> edge(n_edges), face(n_faces);
     std::vector<u32> corner2(n_faces);

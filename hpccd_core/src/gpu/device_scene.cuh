@@ -3,10 +3,8 @@
 #pragma once
 
 #include <algorithm>
-#include <bit>
 #include <vector>
 
-#include "elementary/pair.h"
 #include "gpu/device.h"
 #include "gpu/launch_params.cuh"
 #include "gpu/stream.h"
@@ -24,30 +22,21 @@ class DeviceScene {
     upload(edges_, features.edges.data(), n_edges);
     upload(faces_, features.faces.data(), 3 * features.faces.size());
     upload_rules(scene, accuracy);
-    const auto bits = [](std::size_t n) { return static_cast<u32>(std::bit_width(std::max<std::size_t>(n, 1) - 1)); };
-    key_shift_ = std::max<u32>(1, std::max(bits(features.n_faces()), bits(n_edges)));
-    kind_shift_ = std::max<u32>(1, std::max(bits(features.n_vertices), bits(n_edges))) + key_shift_;
+    keys_ = PairKeys::of(features.n_vertices, n_edges, features.n_faces());
   }
 
   template <class T>
   void fill(LaunchParams<T>& params) const {
     params.n_vertices = features_.n_vertices;
-    params.n_edges = static_cast<u32>(features_.edges.size());
-    params.n_faces = features_.n_faces();
     params.edges = edges_.data(), params.faces = faces_.data(), params.mesh_of_vertex = mesh_of_vertex_.data();
     params.n_meshes = n_meshes_;
     params.enabled = all_enabled_ ? nullptr : enabled_.data();
     params.accuracy = one_accuracy_ ? nullptr : accuracy_.data();
     params.default_accuracy = default_accuracy_;
-    params.key_shift = key_shift_, params.kind_shift = kind_shift_;
+    params.keys = keys_;
   }
 
-  u32 key_bits() const { return kind_shift_ + 1; }
-  Candidate candidate_of(u64 key) const {
-    const u64 features = key & ((u64{1} << kind_shift_) - 1);
-    return {static_cast<u32>(features >> key_shift_), static_cast<u32>(features & ((u64{1} << key_shift_) - 1)),
-            key >> kind_shift_ ? Kind::edge_edge : Kind::vertex_face};
-  }
+  const PairKeys& keys() const { return keys_; }
   std::size_t bytes() const { return edges_.bytes() + faces_.bytes() + mesh_of_vertex_.bytes(); }
 
  private:
@@ -76,7 +65,8 @@ class DeviceScene {
   DeviceBuffer<u32> faces_, mesh_of_vertex_;
   DeviceBuffer<unsigned char> enabled_, accuracy_;
   bool all_enabled_ = true, one_accuracy_ = true;
-  u32 n_meshes_ = 0, key_shift_ = 0, kind_shift_ = 0;
+  u32 n_meshes_ = 0;
+  PairKeys keys_;
   Accuracy default_accuracy_ = Accuracy::exact;
 };
 

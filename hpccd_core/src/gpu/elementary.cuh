@@ -49,7 +49,7 @@ template <class T>
 __device__ void append_found(const LaunchParams<T>& params, Kind kind, bool wanted, uint2 pair, double toc) {
   const u64 at = warp_append(&params.counters->found_all, wanted);
   if (wanted && at < params.found_capacity) {
-    params.found_keys[at] = key_of(params.key_shift, params.kind_shift, kind, pair.x, pair.y);
+    params.found_keys[at] = params.keys.key_of(kind, pair.x, pair.y);
     params.found_tocs[at] = toc;
   }
 }
@@ -72,8 +72,7 @@ __global__ __launch_bounds__(128) void roots_kernel(const __grid_constant__ Laun
     }
     append_found(params, kind, contact, pair, toc);
     const u64 at = warp_append(&params.counters->undecided, undecided);
-    if (undecided && at < params.undecided_capacity)
-      params.undecided[at] = key_of(params.key_shift, params.kind_shift, kind, pair.x, pair.y);
+    if (undecided && at < params.undecided_capacity) params.undecided[at] = params.keys.key_of(kind, pair.x, pair.y);
     proven += contact;
     doubtful += undecided;
   });
@@ -118,10 +117,8 @@ __global__ __launch_bounds__(32) void fallback_kernel(const __grid_constant__ La
     Kind kind = Kind::vertex_face;
     if (i < n) {
       key = params.undecided[i];
-      kind = key >> params.kind_shift ? Kind::edge_edge : Kind::vertex_face;
-      const u64 features = key & ((u64{1} << params.kind_shift) - 1);
-      pair = {static_cast<u32>(features >> params.key_shift),
-              static_cast<u32>(features & ((u64{1} << params.key_shift) - 1))};
+      const Candidate candidate = params.keys.pair_of(key);
+      kind = candidate.kind, pair = {candidate.first, candidate.second};
       const uint4 v = kind == Kind::edge_edge ? vertices_of<Kind::edge_edge>(params, pair.x, pair.y)
                                               : vertices_of<Kind::vertex_face>(params, pair.x, pair.y);
       const Accuracy accuracy = accuracy_of(params, v);

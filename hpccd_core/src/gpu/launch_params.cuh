@@ -7,6 +7,7 @@
 #include "base/hd.h"
 #include "elementary/pair_vertices.h"
 #include "gpu/counters.cuh"
+#include "gpu/pair_keys.h"
 #include "hpccd/hpccd.h"
 
 namespace hpccd::gpu {
@@ -51,10 +52,16 @@ struct alignas(64) DeviceBox {
 
 struct alignas(16) DeviceLeaf {
   u32 first_face, first_edge, first_vertex;
-  u32 counts;  // faces | edges << 8 | vertices << 16
+  u32 counts;
+
+  static u32 counts_of(u32 faces, u32 edges, u32 vertices) { return faces | edges << 8 | vertices << 16; }
+  HPCCD_HD u32 n_faces() const { return counts & 0xFF; }
+  HPCCD_HD u32 n_edges() const { return counts >> 8 & 0xFF; }
+  HPCCD_HD u32 n_vertices() const { return counts >> 16; }
 };
 
-// Pairs of features of one kind; n counts on where `capacity` is exceeded, so that the host knows how much is needed.
+// Pairs of leaves, or of features of one kind. How many there are stands in the counters, which count on where the
+// capacity is exceeded: so the host knows how much is needed.
 struct PairList {
   uint2* pairs;
   u64 capacity;
@@ -63,7 +70,7 @@ struct PairList {
 template <class T>
 struct LaunchParams {
   // The scene.
-  u32 n_vertices, n_edges, n_faces;
+  u32 n_vertices;
   const uint2* edges;
   const u32* faces;  // three vertices each
   const u32* mesh_of_vertex;
@@ -71,8 +78,7 @@ struct LaunchParams {
   const unsigned char* enabled;   // n_meshes^2; null: all pairs
   const unsigned char* accuracy;  // n_meshes^2; null: the default
   Accuracy default_accuracy;
-  u32 key_shift;   // bits of a key's second feature
-  u32 kind_shift;  // bits of both features
+  PairKeys keys;
 
   // The tree: topology, and boxes of this frame.
   u32 n_nodes, n_leaves;
@@ -105,10 +111,6 @@ struct LaunchParams {
   u32 segment, n_segments;  // leaf pairs of this pass: n * segment / n_segments ...
   Counters* counters;
 };
-
-__device__ inline u64 key_of(u32 key_shift, u32 kind_shift, Kind kind, u32 first, u32 second) {
-  return (static_cast<u64>(kind == Kind::edge_edge) << kind_shift) | (static_cast<u64>(first) << key_shift) | second;
-}
 
 __device__ inline u32 lane_number() { return threadIdx.x & 31; }
 

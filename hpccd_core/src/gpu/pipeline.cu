@@ -20,7 +20,7 @@ class DevicePipeline : public Pipeline {
         scene_(scene, features, accuracy),
         positions_(device),
         lists_(16 * typical_size(), 4 * typical_size(), typical_size() / 2),
-        contacts_(scene_.key_bits()) {
+        contacts_(scene_.keys().bits()) {
     check(cudaDeviceGetAttribute(&multiprocessors_, cudaDevAttrMultiProcessorCount, device), "cudaDeviceGetAttribute");
     counters_.reserve(1);
     host_counters_.reserve(1);
@@ -126,7 +126,7 @@ bool DevicePipeline::run_frame(Positions t0, Positions t1, ThreadPool& pool) {
   // Before the results: their kernels bring the counters to the host once more.
   const u64 n_to_host = exact_last_time_ = c.to_host;
   launch_results(params);
-  for (u64 i = 0; i < n_to_host; ++i) undecided_.push_back(scene_.candidate_of(lists_.to_host()[i]));
+  for (u64 i = 0; i < n_to_host; ++i) undecided_.push_back(scene_.keys().pair_of(lists_.to_host()[i]));
   return true;
 }
 

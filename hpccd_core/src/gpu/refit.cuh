@@ -11,10 +11,9 @@ template <class T>
 __device__ DeviceBox refit_leaf(const LaunchParams<T>& params, u32 leaf) {
   const u32 lane = lane_number();
   const DeviceLeaf l = params.leaves[leaf];
-  const u32 n_faces = l.counts & 0xFF, n_edges = l.counts >> 8 & 0xFF, n_vertices = l.counts >> 16;
   const Bound top{{INFINITY, INFINITY, INFINITY}, 0}, bottom{{-INFINITY, -INFINITY, -INFINITY}, 0};
   DeviceBox whole{{top, top}, {bottom, bottom}};
-  if (lane < n_faces) {
+  if (lane < l.n_faces()) {
     DeviceBox& face = params.face_boxes[l.first_face + lane];
     const u32 c0 = face.tag_low(), c1 = face.tag_high(), c2 = params.face_corner2[l.first_face + lane];
     DeviceBox b = load_point(&params.points[c0]);
@@ -24,7 +23,7 @@ __device__ DeviceBox refit_leaf(const LaunchParams<T>& params, u32 leaf) {
     store_box(&face, b);
     include(whole, b);
   }
-  if (lane < n_edges) {
+  if (lane < l.n_edges()) {
     DeviceBox& edge = params.edge_boxes[l.first_edge + lane];
     const u32 v0 = edge.tag_low(), v1 = edge.tag_high();
     DeviceBox b = load_point(&params.points[v0]);
@@ -32,7 +31,7 @@ __device__ DeviceBox refit_leaf(const LaunchParams<T>& params, u32 leaf) {
     b.tag_low() = v0, b.tag_high() = v1;
     store_box(&edge, b);  // inside its triangle's box
   }
-  if (lane < n_vertices)  // a lone vertex has no triangle
+  if (lane < l.n_vertices())  // a lone vertex has no triangle
     include(whole, load_point(&params.points[params.vertex_of_slot[l.first_vertex + lane]]));
   for (int d = 16; d > 0; d /= 2) {
     DeviceBox other;

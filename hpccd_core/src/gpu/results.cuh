@@ -17,9 +17,8 @@ __global__ void results_kernel(LaunchParams<T> params, const u64* keys, const u3
                                uint4* ee, double* toc) {
   u64 hash = 0;
   for (u32 i = blockIdx.x * blockDim.x + threadIdx.x; i < n; i += gridDim.x * blockDim.x) {
-    const u64 key = keys[i], features = key & ((u64{1} << params.kind_shift) - 1);
-    const u32 first = static_cast<u32>(features >> params.key_shift);
-    const u32 second = static_cast<u32>(features & ((u64{1} << params.key_shift) - 1));
+    const Candidate pair = params.keys.pair_of(keys[i]);
+    const u32 first = pair.first, second = pair.second;
     const double t = params.found_tocs[order[i]];
     toc[i] = t;
     if (i < n_vf) {

@@ -61,7 +61,7 @@ void TestLists::launch(LaunchParams<T>& params, int multiprocessors, cudaStream_
   }
   fallback_kernel<<<static_cast<unsigned>(2 * multiprocessors), 32, 0, stream>>>(params);
   check_launch("fallback_kernel");
-  timer.mark("last_resort", stream);
+  timer.mark("last_resort", stream);  // the fallbacks' first name, under which kept results have it
 }
 
 template void TestLists::launch(LaunchParams<float>&, int, cudaStream_t, StageTimer&);

@@ -111,11 +111,11 @@ class Slot {
   void append_to(Output& output, const DeviceScene& scene) const {
     const Counters& c = *host_counters_.data();
     for (u64 i = 0; i < c.found_all; ++i) {
-      const Candidate p = scene.candidate_of(keys_.data()[i]);
+      const Candidate p = scene.keys().pair_of(keys_.data()[i]);
       auto& list = p.kind == Kind::vertex_face ? output.vertex_face : output.edge_edge;
       list.push_back({p.first, p.second, tocs_.data()[i]});
     }
-    for (u64 i = 0; i < c.to_host; ++i) output.undecided.push_back(scene.candidate_of(lists_.to_host()[i]));
+    for (u64 i = 0; i < c.to_host; ++i) output.undecided.push_back(scene.keys().pair_of(lists_.to_host()[i]));
     for (int k = 0; k < 2; ++k) output.counts[k] += batch_counts(c, k);
   }
 

@@ -19,8 +19,11 @@ void require_rest(const Scene::Mesh& mesh, const Real* t0, const Real* t1) {
                             "', which was added as static; add the mesh without static=True, or keep its vertices");
 }
 
+// Of so many vertices, in the precision of p.
+std::size_t bytes_of(std::uint32_t vertices, Positions p) { return 3 * std::size_t{vertices} * (p.is_double ? 8 : 4); }
+
 const std::byte* begin_of(const Scene::Mesh& mesh, Positions p) {
-  return static_cast<const std::byte*>(p.data) + 3 * std::size_t{mesh.first_vertex} * (p.is_double ? 8 : 4);
+  return static_cast<const std::byte*>(p.data) + bytes_of(mesh.first_vertex, p);
 }
 
 bool equal(const std::vector<std::byte>& last, const std::byte* t0, const std::byte* t1, ThreadPool& pool) {
@@ -52,8 +55,8 @@ std::vector<char> StaticMeshes::unchanged(const Scene& scene, Positions t0, Posi
   bool any_moved = false;
   for (std::size_t m = 0; m < meshes.size(); ++m) {
     if (!meshes[m].options.is_static) continue;
-    const std::size_t n = 3 * std::size_t{meshes[m].n_vertices} * (t0.is_double ? 8 : 4);
-    same[m] = last_[m].size() == n && equal(last_[m], begin_of(meshes[m], t0), begin_of(meshes[m], t1), pool);
+    same[m] = last_[m].size() == bytes_of(meshes[m].n_vertices, t0) &&
+              equal(last_[m], begin_of(meshes[m], t0), begin_of(meshes[m], t1), pool);
     any_moved = any_moved || !same[m];
   }
   if (!any_moved) return same;
@@ -61,7 +64,7 @@ std::vector<char> StaticMeshes::unchanged(const Scene& scene, Positions t0, Posi
   for (std::size_t m = 0; m < meshes.size(); ++m) {
     if (!meshes[m].options.is_static || same[m]) continue;
     const std::byte* all = begin_of(meshes[m], t0);
-    resize(last_[m], 3 * std::size_t{meshes[m].n_vertices} * (t0.is_double ? 8 : 4), pool.cancellation());
+    resize(last_[m], bytes_of(meshes[m].n_vertices, t0), pool.cancellation());
     parallel_for(pool, last_[m].size(), 1 << 16,
                  [&](std::size_t begin, std::size_t end, int) { std::copy(all + begin, all + end, &last_[m][begin]); });
   }

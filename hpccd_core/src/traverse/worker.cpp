@@ -8,12 +8,6 @@
 #include "elementary/policy.h"
 
 namespace hpccd {
-namespace {
-
-Vec3<double> vec(const double* x) { return {x[0], x[1], x[2]}; }
-
-}  // namespace
-
 void Worker::begin(Search& search) {
   search_ = &search;
   vertex_face.clear();
@@ -80,11 +74,8 @@ void Worker::test(const std::uint32_t* first, const std::uint32_t* second, std::
 void Worker::resolve(const Candidate& candidate, Accuracy accuracy) {
   heed_cancellation();
   const auto [a, b, kind] = candidate;
-  const Geometry& g = search_->geometry;
-  std::uint32_t v[4];
-  pair_vertices(g, kind, a, b, v);
   Vec3<double> q_t0[4], q_t1[4];
-  for (int k = 0; k < 4; ++k) q_t0[k] = vec(g.vertices[v[k]].t0), q_t1[k] = vec(g.vertices[v[k]].t1);
+  pair_positions(search_->geometry, kind, a, b, q_t0, q_t1);
   if (const auto toc =
           decide_undecided(accuracy, search_->limits, kind, q_t0, q_t1, fallbacks[kind == Kind::edge_edge]))
     report(kind, {a, b, *toc});

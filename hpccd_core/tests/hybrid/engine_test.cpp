@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "contacts/canonical.h"
+#include "equal_contacts.h"
 #include "grid_scene.h"
 #include "hybrid/cpu_test_device.h"
 #include "traverse/traverse.h"
@@ -91,14 +92,6 @@ struct Bench {
   std::shared_ptr<test::DeviceFaults> faults = std::make_shared<test::DeviceFaults>();
 };
 
-void expect_equal(const Contacts& a, const Contacts& b) {
-  EXPECT_EQ(a.vf, b.vf);
-  EXPECT_EQ(a.ee, b.ee);
-  EXPECT_EQ(a.vf_toc, b.vf_toc);
-  EXPECT_EQ(a.ee_toc, b.ee_toc);
-  EXPECT_EQ(a.hash, b.hash);
-}
-
 TEST(Hybrid, SameContactsForAnyThreadsDevicesAndSegments) {
   for (const int threads : {1, 2, 4}) {
     Bench bench(threads);
@@ -111,7 +104,7 @@ TEST(Hybrid, SameContactsForAnyThreadsDevicesAndSegments) {
         const auto result = bench.with(engine);
         EXPECT_TRUE(result.complete);
         EXPECT_EQ(result.stats.at("test_devices"), n_devices);
-        expect_equal(result.contacts, expected);
+        test::expect_equal(result.contacts, expected);
       }
   }
 }
@@ -134,7 +127,7 @@ TEST(Hybrid, FrameAfterFrameAndOnANewTree) {
     bench.update(0.03 * k, 0.03 * k + 0.5);
     const auto result = bench.with(engine, static_cast<std::uint64_t>(k + 1));
     EXPECT_TRUE(result.complete);
-    expect_equal(result.contacts, bench.on_cpu());
+    test::expect_equal(result.contacts, bench.on_cpu());
   }
 }
 
@@ -145,7 +138,7 @@ TEST(Hybrid, WhatADeviceLeavesUndecidedIsDecidedOnTheCpu) {
   hybrid::Engine engine(bench.devices(1), {8, 16}, bench.pool);
   const auto result = bench.with(engine);
   EXPECT_GT(result.stats.at("gpu_exact_on_cpu"), 0u);
-  expect_equal(result.contacts, expected);
+  test::expect_equal(result.contacts, expected);
 }
 
 TEST(Hybrid, ThreadsTestHalfSegmentsThemselvesWhereDevicesLag) {
@@ -165,7 +158,7 @@ TEST(Hybrid, ThreadsTestHalfSegmentsThemselvesWhereDevicesLag) {
     release.join();
     EXPECT_TRUE(result.complete);
     on_cpu = result.stats.at("hybrid_pairs_on_cpu");
-    expect_equal(result.contacts, expected);
+    test::expect_equal(result.contacts, expected);
   }
   EXPECT_GT(on_cpu, 0u);
 }
@@ -180,22 +173,22 @@ TEST(Hybrid, AFrameInWhichADeviceFailsIsFinishedOnTheCpu) {
     auto failed = bench.with(engine);
     // How many runs of segments a frame is sent in depends on how the threads are scheduled.
     for (int frame = 0; frame < 1000 && failed.complete; ++frame) {
-      expect_equal(failed.contacts, expected);
+      test::expect_equal(failed.contacts, expected);
       failed = bench.with(engine);
     }
     EXPECT_FALSE(failed.complete);
     EXPECT_EQ(engine.error(), "asked for: at a submission");
-    expect_equal(failed.contacts, expected);
+    test::expect_equal(failed.contacts, expected);
     bench.faults->submits_before_failure = -1;
     const auto next = bench.with(engine);
     EXPECT_TRUE(next.complete);
-    expect_equal(next.contacts, expected);
+    test::expect_equal(next.contacts, expected);
   }
   bench.faults->fails_at_begin = true;
   const auto failed = bench.with(engine);
   EXPECT_FALSE(failed.complete);
   EXPECT_EQ(engine.error(), "asked for: at begin");
-  expect_equal(failed.contacts, expected);
+  test::expect_equal(failed.contacts, expected);
 }
 
 TEST(Hybrid, AFrameThatIsGivenUpLeavesNothingBehind) {
@@ -208,7 +201,7 @@ TEST(Hybrid, AFrameThatIsGivenUpLeavesNothingBehind) {
     hybrid::FrameGuard(engine, bench.workers);  // as when the positions turn out to be bad
     const auto result = bench.with(engine);
     EXPECT_TRUE(result.complete);
-    expect_equal(result.contacts, expected);
+    test::expect_equal(result.contacts, expected);
   }
 }
 

@@ -2,6 +2,7 @@
 // Every method, on any number of threads, gives what the default traversal gives; what the sanitizers are run on.
 #include <gtest/gtest.h>
 
+#include "equal_contacts.h"
 #include "grid_scene.h"
 #include "swarm_scene.h"
 
@@ -9,14 +10,6 @@ namespace hpccd {
 namespace {
 
 constexpr Method methods[] = {Method::published, Method::naive, Method::front};
-
-void expect_same(const Contacts& a, const Contacts& b) {
-  EXPECT_EQ(a.vf, b.vf);
-  EXPECT_EQ(a.ee, b.ee);
-  EXPECT_EQ(a.vf_toc, b.vf_toc);
-  EXPECT_EQ(a.ee_toc, b.ee_toc);
-  EXPECT_EQ(a.hash, b.hash);
-}
 
 Contacts detect(Detector& detector, int step) {
   const auto start = test::swarm_positions(step), end = test::swarm_positions(step + 1);
@@ -42,7 +35,7 @@ void compare_over_steps(Options options, bool rules, std::initializer_list<int> 
     for (auto& other : others) {
       SCOPED_TRACE("method " + std::to_string(static_cast<int>(other->options().method)) + ", threads " +
                    std::to_string(other->options().threads) + ", step " + std::to_string(step));
-      expect_same(expected, detect(*other, step));
+      test::expect_equal(expected, detect(*other, step));
       if (options.report == Report::all)
         for (const char* count : {"vf_candidates", "ee_candidates"}) {
           // Boxes of the sweep, in all of these methods, leave more than those of both ends.
@@ -98,11 +91,6 @@ TEST(Methods, ScenesWithoutPairs) {
 TEST(Methods, OneContactOfManyIsRefused) {
   for (Method method : methods)
     EXPECT_THROW(Detector(test::swarm_scene(true), {.report = Report::any, .method = method}), InvalidArgument);
-}
-
-TEST(Methods, GpusAreRefused) {
-  for (Method method : methods)
-    EXPECT_THROW(Detector(test::swarm_scene(true), {.backend = Backend::gpu, .method = method}), InvalidArgument);
 }
 
 TEST(Methods, PublishedRestructuresAndReassigns) {

@@ -14,13 +14,13 @@ arithmetic.
 
 from __future__ import annotations
 
+from hpccd_core.options import ACCURACIES
 from hpccd_ros.bench import command
 from hpccd_ros.bench.core import accuracy_sweep, measure, truth
-from hpccd_ros.bench.core.variants import TIERS, Variant, usable
+from hpccd_ros.bench.core.variants import BACKENDS, Variant, usable
 from hpccd_ros.bench.report import table
 from hpccd_ros.bench.report.machine import cores
 
-BACKENDS = ("cpu", "hybrid", "gpu")
 # Stats of the core by who decided, in the order in which a pair meets them.
 DECIDED = {
     "slabs": "rejected_slabs", "coplanarity": "rejected_coplanarity", "projection": "rejected_projection",
@@ -30,7 +30,7 @@ DECIDED = {
 
 def configure(parser):
     command.configure(parser, default=("data", "cloth-drop", "n-body-like-lr"), steps=2)
-    parser.add_argument("--tiers", default=",".join(TIERS), metavar="NAME,...", help="default: %(default)s")
+    parser.add_argument("--tiers", default=",".join(ACCURACIES), metavar="NAME,...", help="default: %(default)s")
     parser.add_argument("--backend", default="cpu", metavar="NAME,...", help="of cpu, hybrid, gpu (default: cpu)")
     parser.add_argument("--simd", default="auto", metavar="NAME,...", help="of auto, scalar, avx2, avx512")
     parser.add_argument("--sweep-queries", type=int, default=2000, metavar="N",
@@ -42,7 +42,7 @@ def configure(parser):
 def run(args) -> int:
     report, sources = command.begin(args)
     report.note(measure.NOTE)
-    tiers = command.listed("--tiers", args.tiers, TIERS)
+    tiers = command.listed("--tiers", args.tiers, ACCURACIES)
     backends, refused = usable("backend", command.listed("--backend", args.backend, BACKENDS))
     command.skipped(report, "backend", refused)
     sets, refused = usable("simd", command.listed("--simd", args.simd, ("auto", "scalar", "avx2", "avx512")))
@@ -139,7 +139,7 @@ def _print_scenes(rows):
         ["scene", "backend", "accuracy", "candidates", *DECIDED],
         [[r["scene"], r["backend"], r["accuracy"], round(r["candidates"]), *(round(n) for n in r["decided"].values())]
          for r in rows if r["simd"] in ("auto", rows[0]["simd"])],
-        "slabs to roots: dropped by error bounds; proven: contacts by error bounds; the rest: the tier's last resort",
+        "slabs to roots: dropped by error bounds; proven: contacts by error bounds; the rest: the tier's fallback",
     )  # fmt: skip
 
 

@@ -17,15 +17,13 @@ from hpccd_ros.bench import command
 from hpccd_ros.bench.core import measure
 from hpccd_ros.bench.core.peer_ipctk import NOTE as PEER_NOTE
 from hpccd_ros.bench.core.peer_ipctk import PeerRunner
-from hpccd_ros.bench.core.variants import Variant, usable
+from hpccd_ros.bench.core.variants import BACKENDS, Variant, usable
 from hpccd_ros.bench.report import table
 from hpccd_ros.bench.report.figures import stages_in_order
 from hpccd_ros.bench.report.machine import cores
 from hpccd_ros.bench.report.paper import TABLE_1_MS
 from hpccd_ros.bench.sources import TABLE_1
 from hpccd_ros.bench.steps import Step
-
-BACKENDS = ("cpu", "hybrid", "gpu")
 
 
 def configure(parser):

@@ -12,7 +12,6 @@ Contacts of all backends are compared; a difference, or a frame that a device le
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import hpccd_core as hc
@@ -88,16 +87,16 @@ def _show_frames(rows):
     )
 
 
+class _StagesDetector(hc.Detector):
+    _gpu_stages = True
+
+
 def _stages(scene, options, step):
     """Device time by stage: events cost time themselves, so these frames are not the ones that count."""
-    os.environ["HPCCD_GPU_STAGES"] = "1"
-    try:
-        detector = hc.Detector(scene, backend="gpu", **options)
-        for _ in range(20):
-            detector.detect(step.vertices_t0, step.vertices_t1)
-        return {name: ms for name, ms in detector.profile.items() if name.startswith("gpu/")}
-    finally:
-        del os.environ["HPCCD_GPU_STAGES"]
+    detector = _StagesDetector(scene, backend="gpu", **options)
+    for _ in range(20):
+        detector.detect(step.vertices_t0, step.vertices_t1)
+    return {name: ms for name, ms in detector.profile.items() if name.startswith("gpu/")}
 
 
 def _measure(report, args, name, step, accuracy):

@@ -19,8 +19,9 @@ from pathlib import Path
 
 import numpy as np
 
+from hpccd_core.options import METHODS
 from hpccd_ros.bench import command
-from hpccd_ros.bench.core.variants import METHODS, usable
+from hpccd_ros.bench.core.variants import usable
 from hpccd_ros.bench.report import progress, table
 from hpccd_ros.bench.report.machine import cores
 from hpccd_ros.bench.sources import TABLE_1

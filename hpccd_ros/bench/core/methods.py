@@ -11,9 +11,10 @@ whether a method is faster because it does less, or because it does the same in 
 
 from __future__ import annotations
 
+from hpccd_core.options import METHODS
 from hpccd_ros.bench import command
 from hpccd_ros.bench.core import measure
-from hpccd_ros.bench.core.variants import METHODS, Variant, usable
+from hpccd_ros.bench.core.variants import Variant, usable
 from hpccd_ros.bench.report import table
 from hpccd_ros.bench.report.machine import cores
 

@@ -21,7 +21,8 @@ from hpccd_ros.bench.core import measure
 from hpccd_ros.bench.core.variants import Variant
 from hpccd_ros.bench.report import table
 from hpccd_ros.bench.report.machine import cores
-from hpccd_ros.bench.steps import MeshPart, Step
+from hpccd_ros.bench.steps import Step
+from hpccd_ros.scenes.scene import Mesh
 
 
 def configure(parser):
@@ -98,7 +99,7 @@ def _in_landscape(step: Step, landscape: tuple[np.ndarray, np.ndarray], static: 
     faces, xyz = landscape
     return dataclasses.replace(
         step,
-        meshes=(*step.meshes, MeshPart("landscape", faces, len(xyz), static=static)),
+        meshes=(*step.meshes, Mesh("landscape", faces, len(xyz), static=static)),
         vertices_t0=np.concatenate([step.vertices_t0, xyz]),
         vertices_t1=np.concatenate([step.vertices_t1, xyz]),
     )

@@ -14,12 +14,13 @@ step by as many detectors of one thread each, all at once, which share nothing.
 
 from __future__ import annotations
 
+from hpccd_core.options import METHODS
 from hpccd_ros.base.errors import UserError
 from hpccd_ros.bench import command
 from hpccd_ros.bench.core import measure
 from hpccd_ros.bench.core.independent import METHOD as INDEPENDENT
 from hpccd_ros.bench.core.independent import IndependentRunner
-from hpccd_ros.bench.core.variants import METHODS, Variant, usable
+from hpccd_ros.bench.core.variants import Variant, usable
 from hpccd_ros.bench.report import table
 from hpccd_ros.bench.report.machine import cores
 from hpccd_ros.bench.sources import TABLE_1

@@ -9,10 +9,11 @@ from collections.abc import Callable
 import numpy as np
 
 import hpccd_core as hc
+from hpccd_core import options
 from hpccd_ros.bench.steps import Step
 
-METHODS = ("default", "published", "naive", "front")
-TIERS = ("fast", "balanced", "conservative", "exact")
+# All but "auto", which chooses one of these.
+BACKENDS = tuple(name for name in options.BACKENDS if name != "auto")
 
 
 @dataclasses.dataclass(frozen=True)
