@@ -3,6 +3,7 @@
 
 from rclpy.qos import QoSProfile
 
+from hpccd_ros.base.quoting import quoted
 from hpccd_ros.middleware import qos, topic_names
 
 #: Publisher of topologies: reliable, transient local, so that a node that starts later gets the last one.
@@ -17,10 +18,24 @@ CONTACTS_TOPIC: str = topic_names.CONTACTS
 
 
 def topology_topic(mesh: str) -> str:
-    """Where MeshTopology of this mesh goes: ``meshes/MESH/topology``. mesh: as in the node's parameter ``meshes``."""
-    return topic_names.topology(mesh)
+    """Where MeshTopology of this mesh goes: ``meshes/MESH/topology``. mesh: as in the node's parameter ``meshes``.
+
+    Raises TypeError or ValueError for what can be no name of a mesh.
+    """
+    return topic_names.topology(_mesh_name(mesh))
 
 
 def vertices_topic(mesh: str) -> str:
-    """Where MeshVertices of this mesh go: ``meshes/MESH/vertices``. mesh: as in the node's parameter ``meshes``."""
-    return topic_names.vertices(mesh)
+    """Where MeshVertices of this mesh go: ``meshes/MESH/vertices``. mesh: as in the node's parameter ``meshes``.
+
+    Raises TypeError or ValueError for what can be no name of a mesh.
+    """
+    return topic_names.vertices(_mesh_name(mesh))
+
+
+def _mesh_name(mesh: str) -> str:
+    if not isinstance(mesh, str):
+        raise TypeError(f"mesh: expected its name, got {type(mesh).__name__}")
+    if not topic_names.MESH_NAME.fullmatch(mesh):
+        raise ValueError(f"mesh: {quoted(mesh)} can be no name of a mesh; use letters, digits and _, a letter first")
+    return mesh

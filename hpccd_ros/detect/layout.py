@@ -24,7 +24,12 @@ class Layout:
 
     @classmethod
     def of(cls, mesh_names: tuple[str, ...], topologies: tuple[Topology, ...]) -> "Layout":
-        """Meshes concatenated in the order given, as hpccd_core.Scene does."""
+        """Meshes concatenated in the order given, as hpccd_core.Scene does.
+
+        Raises ValueError where there are not as many topologies as names.
+        """
+        if len(mesh_names) != len(topologies):
+            raise ValueError(f"topologies: {len(topologies)} of {len(mesh_names)} meshes; give one for each name")
         return cls(
             tuple(mesh_names),
             np.cumsum([0] + [t.n_vertices for t in topologies], dtype=np.int64),

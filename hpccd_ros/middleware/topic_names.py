@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
@@ -29,6 +30,9 @@ SERVICES = (DETECT,)
 TOPOLOGY = "topology"
 VERTICES = "vertices"
 POINTS = "points"
+
+# A mesh name becomes part of topic and parameter names.
+MESH_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 
 # Of each mesh one name below this one.
 MESHES = "meshes/"

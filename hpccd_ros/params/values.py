@@ -1,20 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """Values of the node's parameters: which ones the table allows. Whether they come from a node or from a file."""
 
-import re
 from collections.abc import Iterable
 from typing import Any
 
 from hpccd_ros.base import quoting
+from hpccd_ros.middleware import topic_names
 from hpccd_ros.params.table import MESH_ROWS, NODE_ROWS, Row
 
 
 class ParameterError(ValueError):
     """A parameter that the node cannot start with; the text names it and the remedy."""
-
-
-# A mesh name becomes part of topic and parameter names.
-_MESH_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 
 
 def unusable_value(row: Row, value: Any) -> str | None:
@@ -89,7 +85,7 @@ def _checked_value(row: Row, name: str, value: Any) -> Any:
 def check_mesh_names(names: list[str]) -> None:
     """Raises ParameterError for one that cannot be part of a topic, or is there twice."""
     for name in names:
-        if not _MESH_NAME.fullmatch(name):
+        if not topic_names.MESH_NAME.fullmatch(name):
             raise ParameterError(
                 f"meshes: {quoting.quoted(name)} cannot be part of a topic name; use letters, digits and _, a "
                 "letter first"

@@ -120,11 +120,25 @@ def test_contacts_whose_arrays_do_not_fit_together(changes, text):
         client.contacts_from_message(two_contacts(**changes))
 
 
+def test_a_layout_needs_a_topology_for_each_mesh():
+    with pytest.raises(ValueError, match="topologies: 0 of 1 meshes"):
+        client.Layout.of(("cloth",), ())
+
+
 def test_a_layout_of_another_scene():
     with pytest.raises(ValueError, match="layout: it is of the meshes b, a, the message of a, b"):
         client.scene_contacts(two_contacts(), layout("b", "a"))
     with pytest.raises(ValueError, match="layout: the contacts are of topology versions"):
         client.scene_contacts(two_contacts(topology_versions=[0, 1]), layout("a", "b"))
+
+
+@pytest.mark.parametrize("name", ["", "a b", "1st", "a/b", "näher", "x\n"])
+def test_names_that_no_mesh_can_have(name):
+    for topic in (client.topology_topic, client.vertices_topic):
+        with pytest.raises(ValueError, match="mesh: .* can be no name of a mesh; use letters"):
+            topic(name)
+        with pytest.raises(TypeError, match="mesh: expected its name, got NoneType"):
+            topic(None)
 
 
 def test_all_names_are_there_and_documented():

@@ -110,7 +110,7 @@ def test_contacts_behind_the_surface_are_faint():
 
 
 @pytest.mark.parametrize("count", [0, 1, 300])
-def test_times_of_contact_are_counted_beside_the_scene(tmp_path, count):
+def test_times_of_contact_are_counted_beside_the_scene(count):
     toc = np.linspace(0, 1, count)
     history = contacts.History(np.arange(5), np.arange(5) * 7, None, 3)
     figure = contacts.compose(picture_of(np.zeros((count, 3)), toc), history, size=(320, 200))

@@ -116,7 +116,7 @@ def test_any_contact_is_verified_where_any_was_asked_for(answered):
     assert "VERIFIED: 7 answers hold a contact where there is one, and one that there is" in done.out
 
 
-def test_the_core_finds_the_same_time_of_any_contact(sound_bags):
+def test_the_core_finds_the_same_time_of_any_contact():
     """Or the comparison above would call the node's own answers wrong."""
     generator = np.random.default_rng(5)
     faces = np.arange(120).reshape(-1, 3)

@@ -33,7 +33,7 @@ def widths(axis):
 
 
 @pytest.mark.parametrize("figure", [f for f in figures.FIGURES if f.kept], ids=lambda f: f.name)
-def test_committed_pictures_can_be_drawn_again(figure, tmp_path):
+def test_committed_pictures_can_be_drawn_again(figure):
     result = kept(figure)
     page = figure.compose(result)
     headings = [figure.heading(rows) for rows in drawing.by(filter(figure.rows, result.rows), *figure.panel)]
