@@ -31,7 +31,7 @@ from hpccd_ros.frames.restart import Restart
 from hpccd_ros.frames.stamp_order import StampOrder
 from hpccd_ros.frames.static_positions import StaticPositions
 from hpccd_ros.frames.topology_version import check_frame, check_successor, is_early
-from hpccd_ros.frames.types import MeshFrame, MeshSettings, SceneFrame, Topology
+from hpccd_ros.frames.types import AssemblyRules, MeshFrame, MeshSettings, SceneFrame, Topology
 
 
 class _MeshState:
@@ -51,36 +51,23 @@ class FrameAssembler:
     """Joins checked messages of the meshes into frames of the scene.
 
     meshes: in the order of the scene; at least one must not be static.
-    max_pending: bound on the frames a mesh that wait for a topology or for other meshes.
-    restart_after: increasing stamps in a row, all before the last accepted one, that make a restart; 0:
-    never.
-    tolerance: None: stamps must be equal; else the largest difference in ns to the first deforming mesh.
-    frame_id: what all messages must carry; "": see rule 3.
     """
 
-    def __init__(
-        self,
-        meshes: Sequence[MeshSettings],
-        *,
-        max_pending: int = 8,
-        restart_after: int = 5,
-        tolerance: int | None = None,
-        frame_id: str = "",
-    ) -> None:
+    def __init__(self, meshes: Sequence[MeshSettings], rules: AssemblyRules) -> None:
         deforming = [m.name for m in meshes if not m.static]
         if not deforming:
             raise ValueError("meshes: at least one mesh must not be static, or nothing ever moves")
         if len({m.name for m in meshes}) != len(meshes):
             raise ValueError(f"meshes: names must differ, got {[m.name for m in meshes]}")
         self._meshes = {m.name: _MeshState(m) for m in meshes}
-        self._max_early = max_pending
-        self.restart_after = restart_after
-        self._frame = CoordinateFrame(frame_id)
+        self._max_early = rules.max_pending
+        self.restart_after = rules.restart_after
+        self._frame = CoordinateFrame(rules.frame_id)
         self._completed = 0
         self._matcher: Matcher = (
-            ExactMatcher(deforming, max_pending)
-            if tolerance is None
-            else NearestMatcher(deforming, max_pending, tolerance)
+            ExactMatcher(deforming, rules.max_pending)
+            if rules.tolerance is None
+            else NearestMatcher(deforming, rules.max_pending, rules.tolerance)
         )
 
     @property

@@ -9,34 +9,19 @@ from hpccd_ros.frames.frame_queue import FrameQueue
 from hpccd_ros.frames.outcome import Outcome
 from hpccd_ros.frames.transform_buffer import TransformBuffer
 from hpccd_ros.frames.transformer import MeshTransformer, Transformed
-from hpccd_ros.frames.types import MeshFrame, MeshSettings, SceneFrame, Topology
+from hpccd_ros.frames.types import AssemblyRules, MeshFrame, MeshSettings, SceneFrame, Topology
 
 
 class FramePipeline:
     """The node and a replay push the messages of the ``meshes`` in; frames of the scene and refusals come out.
 
-    transforms: to be filled from outside, then `retry`. The other arguments are those of the assembler.
+    transforms: to be filled from outside, then `retry`.
     """
 
-    def __init__(
-        self,
-        meshes: Sequence[MeshSettings],
-        *,
-        max_pending: int = 8,
-        restart_after: int = 5,
-        tolerance: int | None = None,
-        frame_id: str = "",
-    ) -> None:
+    def __init__(self, meshes: Sequence[MeshSettings], rules: AssemblyRules) -> None:
         self._meshes = tuple(meshes)
-        self._max_pending = max_pending
-        self._demanded_frame_id = frame_id
-        self._assembler = FrameAssembler(
-            self._meshes,
-            max_pending=max_pending,
-            restart_after=restart_after,
-            tolerance=tolerance,
-            frame_id=frame_id,
-        )
+        self._rules = rules
+        self._assembler = FrameAssembler(self._meshes, rules)
         self._queue: FrameQueue | None = None
         self._forget_transforms()
 
@@ -121,6 +106,6 @@ class FramePipeline:
     def _forget_transforms(self) -> None:
         self.transforms = TransformBuffer()
         self._transformers = {
-            mesh.name: MeshTransformer(mesh, self._demanded_frame_id, self._max_pending, self.transforms)
+            mesh.name: MeshTransformer(mesh, self._rules.frame_id, self._rules.max_pending, self.transforms)
             for mesh in self._meshes
         }

@@ -21,6 +21,22 @@ class MeshSettings:
     pose: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 
 
+@dataclass(frozen=True)
+class AssemblyRules:
+    """How messages of the meshes are joined to frames of the scene (parameters of the same names; see assembler.py).
+
+    max_pending: bound on the frames a mesh that wait for a topology, a transform or other meshes.
+    restart_after: increasing stamps in a row, all before the last accepted one, that make a restart; 0: never.
+    tolerance: None: stamps must be equal; else the largest difference in ns to the first deforming mesh.
+    frame_id: what all messages must carry; "": that of the first one.
+    """
+
+    max_pending: int = 8
+    restart_after: int = 5
+    tolerance: int | None = None
+    frame_id: str = ""
+
+
 @dataclass(frozen=True, eq=False)
 class Topology:
     """Triangles of one mesh: ``faces`` (F,3) uint32, all below ``n_vertices``."""

@@ -9,7 +9,7 @@ from hpccd_ros.detect.core import Options
 from hpccd_ros.detect.scene import SceneBuilder
 from hpccd_ros.frames.pipeline import FramePipeline
 from hpccd_ros.frames.rigid import Rigid
-from hpccd_ros.frames.types import MeshSettings
+from hpccd_ros.frames.types import AssemblyRules, MeshSettings
 from hpccd_ros.params.values import ParameterError
 
 MeshValues = dict[str, dict[str, Any]]
@@ -31,13 +31,13 @@ def mesh_settings(meshes: MeshValues) -> tuple[MeshSettings, ...]:
 def frame_pipeline(settings: dict[str, Any], meshes: MeshValues, max_pending: int) -> FramePipeline:
     """The way from messages of the meshes to frames of the scene. Raises ValueError: nothing in the scene moves."""
     nearest = settings["stamp_match"] == "nearest"
-    return FramePipeline(
-        mesh_settings(meshes),
+    rules = AssemblyRules(
         max_pending=max_pending,
         restart_after=settings["restart_after"],
         tolerance=round(settings["stamp_tolerance"] * 1e9) if nearest else None,
         frame_id=settings["frame_id"],
     )
+    return FramePipeline(mesh_settings(meshes), rules)
 
 
 def detector_options(settings: dict[str, Any]) -> Options:

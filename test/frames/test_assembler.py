@@ -6,7 +6,7 @@ import pytest
 
 from hpccd_ros.frames.assembler import FrameAssembler
 from hpccd_ros.frames.drops import Input, Reason, RefusalCounter
-from hpccd_ros.frames.types import MeshFrame, MeshSettings, Topology
+from hpccd_ros.frames.types import AssemblyRules, MeshFrame, MeshSettings, Topology
 
 FACES = np.array([[0, 1, 2]], np.uint32)
 
@@ -28,7 +28,7 @@ class Scene:
         self.restart_texts = []
         self.static_taken = 0
         meshes = [m if isinstance(m, MeshSettings) else MeshSettings(m) for m in meshes]
-        self.assembler = FrameAssembler(meshes, **options)
+        self.assembler = FrameAssembler(meshes, AssemblyRules(**options))
         self.sent = 0
 
     def topologies(self, *names):

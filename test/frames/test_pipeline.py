@@ -8,7 +8,7 @@ from hpccd_ros.frames.drops import Input, Reason
 from hpccd_ros.frames.outcome import Outcome
 from hpccd_ros.frames.pipeline import FramePipeline
 from hpccd_ros.frames.rigid import Rigid
-from hpccd_ros.frames.types import MeshFrame, MeshSettings, Topology
+from hpccd_ros.frames.types import AssemblyRules, MeshFrame, MeshSettings, Topology
 
 FACES = np.array([[0, 1, 2]], np.uint32)
 CLOTH, BALL, FLOOR = MeshSettings("cloth"), MeshSettings("ball"), MeshSettings("floor", static=True)
@@ -25,7 +25,7 @@ def frame(stamp, n=3, frame_id="", version=0):
 
 
 def pipeline_of(*meshes, **options):
-    made = FramePipeline(meshes, **options)
+    made = FramePipeline(meshes, AssemblyRules(**options))
     for mesh in meshes:
         outcome = made.push(mesh.name, topology())
         assert (outcome.frames, outcome.refusals) == ([], [])
@@ -112,7 +112,7 @@ def test_frames_that_one_transform_lets_go_on_come_up_one_by_one():
 
 
 def test_positions_from_a_file_are_not_transformed():
-    pipeline = FramePipeline((CLOTH, FLOOR))
+    pipeline = FramePipeline((CLOTH, FLOOR), AssemblyRules())
     assert pipeline.load("floor", topology(), frame(0)).static_taken == 1
     pipeline.push("cloth", topology())
     (complete,) = pipeline.push("cloth", frame(5)).frames

@@ -5,7 +5,7 @@ import numpy as np
 
 from hpccd_ros.frames.drops import Reason
 from hpccd_ros.frames.pipeline import FramePipeline
-from hpccd_ros.frames.types import MeshFrame, MeshSettings, Topology
+from hpccd_ros.frames.types import AssemblyRules, MeshFrame, MeshSettings, Topology
 from hpccd_ros.node.accounts import Accounts
 from hpccd_ros.node.hand_over import hand_over
 
@@ -17,7 +17,7 @@ def push(pipeline, accounts, mesh, stamp):
 
 
 def test_drops_are_counted_and_told_before_the_detection_thread_is_let_in():
-    pipeline = FramePipeline(MESHES)
+    pipeline = FramePipeline(MESHES, AssemblyRules())
     queue = pipeline.start(1)
     queued_when_told = []
     accounts = Accounts(lambda text: queued_when_told.append((text.partition(" stamp")[0], len(queue.frames()))))
@@ -31,7 +31,7 @@ def test_drops_are_counted_and_told_before_the_detection_thread_is_let_in():
 
 
 def test_what_the_queue_has_no_room_for_is_counted():
-    pipeline, accounts = FramePipeline(MESHES[:1]), Accounts(print)
+    pipeline, accounts = FramePipeline(MESHES[:1], AssemblyRules()), Accounts(print)
     queue = pipeline.start(1)
     hand_over(pipeline.push("cloth", Topology(0, 3, np.array([[0, 1, 2]], np.uint32))), pipeline, accounts)
     for stamp in (1, 2, 3):
