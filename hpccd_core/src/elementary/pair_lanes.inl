@@ -1,28 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
-// A test of many pairs in lanes: brings them in and takes the outcomes apart. Part of every batch.
+// Tests of many pairs of features in lanes: brings them in and takes the outcomes apart. Part of batch.inl and
+// distance_batch.inl.
 
+#include "elementary/lane_groups.inl"
 #include "elementary/load.inl"
 
-// The pairs at `where`, as many at a time as there are lanes; the last group is filled up with copies of the last pair.
+template <Kind kind, class R>
+struct FeaturePairs {
+  static constexpr int width = RealTraits<R>::width;
+  HPCCD_HD static Motion<R> load(const Geometry& g, const std::uint32_t* first, const std::uint32_t* second) {
+    return HPCCD_ISA::load<kind>(g, first, second, static_cast<R*>(nullptr));
+  }
+};
+
 template <Kind kind, class R, class Function>
 HPCCD_HD void for_lanes(const Geometry& g, const std::uint32_t* first, const std::uint32_t* second,
                         const std::uint32_t* where, std::uint32_t n, Function&& function) {
-  constexpr int W = RealTraits<R>::width;
-  for (std::uint32_t i = 0; i < n; i += W) {
-    std::uint32_t a[W], b[W], at[W];
-    for (int lane = 0; lane < W; ++lane) {
-      const std::uint32_t j = i + lane < n ? i + lane : n - 1;
-      at[lane] = where ? where[j] : j;
-      a[lane] = first[at[lane]];
-      b[lane] = second[at[lane]];
-    }
-    const unsigned valid = n - i >= W ? (1u << W) - 1 : (1u << (n - i)) - 1;
-    function(load<kind>(g, a, b, static_cast<R*>(nullptr)), at, valid);
-  }
-}
-
-HPCCD_HD void append(std::uint32_t* list, std::uint32_t& n, const std::uint32_t* at, unsigned lanes) {
-  for (; lanes; lanes &= lanes - 1) list[n++] = at[__builtin_ctz(lanes)];
+  for_groups<FeaturePairs<kind, R>>(g, first, second, where, n, function);
 }
 
 template <class R>
