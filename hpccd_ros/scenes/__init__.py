@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from hpccd_ros.scenes import breaking, cloth, cloth_ball, n_body, small
+from hpccd_ros.scenes import breaking, cloth, cloth_ball, n_body, rod_twist, small
 from hpccd_ros.scenes.core import core_scene
 from hpccd_ros.scenes.scene import Frame, Mesh, Scene, Topology
 
@@ -49,6 +49,10 @@ def _n_body(triangles):
     )
 
 
+def _rod_twist(name, title, size, frames, seed, progress):
+    return rod_twist.make(name, title, 106_000, size, frames, seed)
+
+
 _REGISTRY = {
     "two-triangles": _Entry(
         "a triangle falls through another: one vertex-face contact", 11,
@@ -72,6 +76,9 @@ _REGISTRY = {
     ),
     "n-body-like-hr": _Entry(
         "60 rigid and deforming bodies fall into a pile, 146 K triangles", 76, _n_body(146_000),
+    ),
+    "rod-twist-like": _Entry(
+        "a bundle of rods is twisted until it coils up: layers close together, 106 K triangles", 260, _rod_twist,
     ),
 }  # fmt: skip
 
