@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from hpccd_ros.scenes import breaking, cloth, cloth_ball, n_body, rod_twist, small
+from hpccd_ros.scenes import armadillo, breaking, cloth, cloth_ball, n_body, rod_twist, small
 from hpccd_ros.scenes.core import core_scene
 from hpccd_ros.scenes.scene import Frame, Mesh, Scene, Topology
 
@@ -53,6 +53,10 @@ def _rod_twist(name, title, size, frames, seed, progress):
     return rod_twist.make(name, title, 106_000, size, frames, seed)
 
 
+def _armadillo(name, title, size, frames, seed, progress):
+    return armadillo.make(name, title, 50_000, 10_000, size, frames, seed)
+
+
 _REGISTRY = {
     "two-triangles": _Entry(
         "a triangle falls through another: one vertex-face contact", 11,
@@ -79,6 +83,9 @@ _REGISTRY = {
     ),
     "rod-twist-like": _Entry(
         "a bundle of rods is twisted until it coils up: layers close together, 106 K triangles", 260, _rod_twist,
+    ),
+    "armadillo-like": _Entry(
+        "a knobbly body with limbs is drawn between two rollers, 70 K triangles", 260, _armadillo,
     ),
 }  # fmt: skip
 

@@ -38,6 +38,19 @@ def _ramp(x):
     return x * x * x * (x * (6.0 * x - 15.0) + 10.0)
 
 
+def _tight_lean(rate: float) -> float:
+    """Lean of the coil whose turns are TURN_GAP apart.
+
+    Turns of a helix are 2 pi cos(lean) / rate apart along x, and by sin(lean) nearer measured across them.
+    """
+    wanted = (2 * BUNDLE + TURN_GAP) * rate / (2 * PI)
+    lean = PI / 2
+    for _ in range(8):  # Newton's method: five steps reach the last bit
+        s, c = sincos(lean)
+        lean = lean + float((s * c - wanted) / (s * s - c * c))
+    return lean
+
+
 class _Curve:
     """Middle of the bundle: a unit-speed curve along x, whose part between the clamps coils up as `tightness` grows.
 
@@ -47,19 +60,12 @@ class _Curve:
 
     def __init__(self, tightness: float):
         self.rate = 1.0 / COIL
-        # Turns of a helix of this lean are 2 pi cos(lean) / rate apart along x, by sin(lean) nearer across.
-        pitch = (2 * BUNDLE + TURN_GAP) * self.rate / (2 * PI)
-        # lean = pi/2 - e with tan(e) about pitch: by Newton's method, in exact operations.
-        self.lean = PI / 2
-        for _ in range(8):
-            s, c = sincos(self.lean)
-            self.lean = self.lean + float((s * c - pitch) / (s * s - c * c))
-        self.lean = self.lean * tightness
+        self.lean = tightness * _tight_lean(self.rate)
         step = LENGTH / NODES
         tangents = self.frame((np.arange(NODES) + 0.5) * step)[0]
         self.points = np.zeros((NODES + 1, 3))
         self.points[1:] = np.cumsum(tangents * step, axis=0)
-        self.points -= self.points[NODES // 2].copy()
+        self.points = self.points - self.points[NODES // 2]
 
     def _angles(self, along):
         rise = _ramp((along - CLAMP) / 0.14) * _ramp((LENGTH - CLAMP - along) / 0.14)
@@ -82,7 +88,7 @@ class _Curve:
 
 
 def _section(around: int):
-    """Half a channel wide, (around, 2): a square with round corners, its sides almost flat (8-norm)."""
+    """Outline of unit width, (around, 2): a square with round corners, its sides almost flat (8-norm)."""
     quarter = around // 4
     run = (2.0 * np.arange(quarter) + 1.0) / quarter - 1.0
     one = np.ones(quarter)
@@ -100,7 +106,7 @@ def make(name: str, title: str, triangles: int, size: float, frames: int, seed: 
     per_rod = triangles * size / RODS
     around = 4 * max(1, round(4 * size**0.5))
     rings = max(8, round((per_rod - 2 * around) / (2 * around)) + 1)
-    section, faces = _section(around), shapes.rod_faces(rings, around)
+    section, faces = np.append(_section(around), [(0.0, 0.0)], axis=0), shapes.rod_faces(rings, around)
     along = LENGTH * np.arange(rings) / (rings - 1)
     random = random_stream(seed)
     waves = 24.0 + 24.0 * random.random_sample((RODS, 1))
@@ -117,6 +123,7 @@ def make(name: str, title: str, triangles: int, size: float, frames: int, seed: 
         gap = LOOSE_GAP + (TIGHT_GAP - LOOSE_GAP) * float(_ramp(np.float64(2.0 * index / PATH)))
         bulge = BULGE * sincos(2 * PI * waves * along - running * index + phase[:, 1])[0]
         width = CHANNEL - gap + 2.0 * bulge
+        # Outlines, and with them the middles: of the first and last ring these close the ends.
         flat = centres[:, None, None, :] + width[..., None, None] * section
         # The chequerboard is pressed into a disc.
         x, y = flat[..., 0] / (1.5 * CHANNEL), flat[..., 1] / (1.5 * CHANNEL)
@@ -129,8 +136,8 @@ def make(name: str, title: str, triangles: int, size: float, frames: int, seed: 
         sideways = cross(tangent, normal)
         middle = curve.at(slid)[:, :, None, :]
         tubes = middle + u * normal[:, :, None, :] + v * sideways[:, :, None, :]
-        caps = [tubes[:, end].sum(axis=1)[:, None] / around for end in (0, -1)]
-        points = np.concatenate([tubes.reshape(RODS, rings * around, 3), *caps], axis=1)
+        sides, ends = tubes[:, :, :around].reshape(RODS, rings * around, 3), tubes[:, [0, -1], around]
+        points = np.concatenate([sides, ends], axis=1)
         return Frame([points[kind == k].reshape(-1, 3) for k in range(3)], index, index * FRAME_PERIOD)
 
     meshes = []
