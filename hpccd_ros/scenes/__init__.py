@@ -6,8 +6,9 @@
     >>> for frame in scene.frames():
     ...     vertices = frame.stacked()        # (V,3) float32, meshes in the order of scene.meshes
 
-The "-like" scenes have the sizes and the character of Table 1 of Kim et al. 2009, not its data. Motions are
-built from IEEE-exact operations only (see exactmath): the same arguments give the same bits, on any machine.
+The "-like" scenes have the sizes and the character of published ones (Table 1 of Kim et al. 2009; twisted rods and
+rollers of the literature of incremental potential contact), not their data. Motions are built from IEEE-exact
+operations only (see exactmath): the same arguments give the same bits, on any machine.
 """
 
 from __future__ import annotations
@@ -109,7 +110,7 @@ def make(
     size      factor on the triangle count, 1/64 to 64, of the same motion (two-triangles has one size only)
     frames    number of frames, at least 2; None for the scene's own. More let the motion go on, fewer cut it
               off; where the motion is a fixed path (two-triangles, folding-strip) more sample it finer
-    seed      of the random numbers, 0 to 2**32 - 1 (cloth, n-body and breaking scenes)
+    seed      of the random numbers, 0 to 2**32 - 1 (not of two-triangles and folding-strip)
     progress  show a progress bar on stderr while a motion is simulated (seconds, once: it is cached)
 
     ValueError for a name, size, frame count or seed outside these.

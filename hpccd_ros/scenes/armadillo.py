@@ -3,7 +3,8 @@
 
 After the armadillo that the literature of incremental potential contact pulls through rollers; its size, not its data.
 A closed form, no simulation: the body is posed (limbs fold against it as they come to the rollers), moved down, and
-pressed into the space between the rollers. The skin beside a roller lies a little inside of it, and slips: rollers turn faster than they pull.
+pressed into the space between the rollers. Its skin there lies a hair inside of the rollers, which turn faster than
+it moves.
 """
 
 from __future__ import annotations
@@ -89,10 +90,10 @@ def _posed(vertices, belongs, roots, amount: float):
 
 
 def _squeezed(points):
-    """Points of the body at rest -> between the rollers, whose axes are at z = 0: none farther in x than there is room.
+    """Points of the posed body -> between the rollers, whose axes are at z = 0: none farther in x than there is room.
 
-    The map is continuous and turns nothing over. Skin that was far outside comes to lie against the roller; what is lost
-    in x is gained in y and z.
+    The map is continuous and turns nothing over. Skin that was far outside comes to lie against the roller; what is
+    lost in x is gained in y and z.
     """
     x, y, z = points[:, 0], points[:, 1], points[:, 2]
     z = z + DRAWN * z / np.sqrt(z * z + ROLLER * ROLLER)

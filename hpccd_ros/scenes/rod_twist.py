@@ -4,7 +4,7 @@
 After the twisted rods that the literature of incremental potential contact measures on; its sizes, not its data.
 A closed form, no simulation. The straight bundle is carried by one smooth map of space, which cannot make
 disjoint rods meet: layers stay as far apart as they are made, at every twist. What meets are bulges that run along
-the rods, a little thicker than the gap, and neighbouring turns of the coil.
+the rods, together a little higher than the gap, and neighbouring turns of the coil.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ TURNS = 9.0  # of the twist by then; it goes on at this rate
 CLAMP = 0.05  # of the length, at each end: stays straight
 COIL = 0.8 * 2 * BUNDLE  # radius of the coil, at least: inside of it rods are shortened to 40 %, not turned over
 LOOSE_GAP, TIGHT_GAP = 6e-4, 2e-4  # between neighbouring rods, at first and when the coil is tight
-BULGE = 1.4e-4  # height: where two meet they overlap by a little less than half the gap
-TURN_GAP = -4e-4
+BULGE = 1.2e-4  # height: where two meet they overlap by a fifth of the gap
+TURN_GAP = -4e-4  # between the outlines of neighbouring turns of the tight coil: they press into one another
 SLIDE = 0.004  # how far a rod slides along its neighbours
-SLIDING, RUNNING = 0.05, 1.0
+SLIDING, RUNNING = 0.05, 1.0  # radians a frame: of the sliding, and of the bulges (half of it to either side)
 NODES = 4096  # of the curve, whatever the mesh: the motion does not depend on how finely it is meshed
 
 
@@ -88,16 +88,18 @@ class _Curve:
 
 
 def _section(around: int):
-    """Outline of unit width, (around, 2): a square with round corners, its sides almost flat (8-norm)."""
+    """Outline of unit width, (around, 2): a square with round corners, its sides all but flat (16-norm)."""
     quarter = around // 4
     run = (2.0 * np.arange(quarter) + 1.0) / quarter - 1.0
     one = np.ones(quarter)
     sides = [(one, run), (-run, one), (-one, -run), (run, -one)]
     points = np.concatenate([np.stack(side, axis=1) for side in sides])
-    eighth = points * points
-    eighth = eighth * eighth
-    eighth = eighth * eighth
-    norm = np.sqrt(np.sqrt(np.sqrt(eighth[:, 0] + eighth[:, 1])))
+    power = points
+    for _ in range(4):
+        power = power * power
+    norm = power[:, 0] + power[:, 1]
+    for _ in range(4):
+        norm = np.sqrt(norm)
     return 0.5 * points / norm[:, None]
 
 
