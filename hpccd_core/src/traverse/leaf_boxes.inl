@@ -36,9 +36,15 @@ HPCCD_HD unsigned overlapping(const Group& g, Bounds b) {
   return ~apart.bits() & 0xFFFF;
 }
 
-// The same of the boxes at t = 0 alone.
+// The same of the boxes at t = 0 alone, whose rows come first.
+using StartGroup = Rows16<n_bounds / 2>;
+static_assert(high(0, 2) + 1 == n_bounds / 2);
+HPCCD_HD StartGroup load_start_rows(const BoxGroup& group) {
+  return load_rows(reinterpret_cast<const float (&)[n_bounds / 2][BoxGroup::width]>(group.rows));
+}
+
 template <class Bounds>
-HPCCD_HD unsigned overlapping_at_start(const Group& g, Bounds b) {
+HPCCD_HD unsigned overlapping_at_start(const StartGroup& g, Bounds b) {
   Mask16 apart;
   for (std::uint32_t axis = 0; axis < 3; ++axis) {
     apart = apart | less(g[high(0, axis)], all16(b[low(0, axis)]));
