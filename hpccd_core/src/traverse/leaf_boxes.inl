@@ -21,10 +21,10 @@ HPCCD_HD Bounds<BoxGroup::width> bounds_at(const BoxGroup* groups, std::uint32_t
 }
 HPCCD_HD Bounds<1> bounds_of(const Node& node) { return {node.box.t0.low}; }
 
-using Group = Rows16<n_bounds>;
-
 // Bit j: box j of the group overlaps b. Through the whole motion (MotionBox::overlaps):
 struct BothEnds {
+  using Group = Rows16<n_bounds>;
+  HPCCD_HD static Group load(const BoxGroup& group) { return load_rows(group.rows); }
   template <class Bounds>
   HPCCD_HD unsigned overlapping(const Group& g, Bounds b) const {
     Mask16 apart;
@@ -41,6 +41,12 @@ struct BothEnds {
 // At t = 0 alone, where boxes may also be as far apart as `reach` along each axis.
 struct AtStart {
   float reach;
+  // The rows of t = 0 come first.
+  using Group = Rows16<n_bounds / 2>;
+  static_assert(high(0, 2) + 1 == n_bounds / 2);
+  HPCCD_HD static Group load(const BoxGroup& group) {
+    return load_rows(reinterpret_cast<const float (&)[n_bounds / 2][BoxGroup::width]>(group.rows));
+  }
   template <class Bounds>
   HPCCD_HD unsigned overlapping(const Group& g, Bounds b) const {
     Mask16 apart;
@@ -77,7 +83,7 @@ template <class When>
 HPCCD_HD Near near(When when, const BoxGroup* groups, std::uint32_t begin, std::uint32_t end, const Node& other) {
   Near n;
   for (std::uint32_t i = 0, group = 0; i < end; i += BoxGroup::width, ++group)
-    n.lanes[group] = when.overlapping(load_rows(groups[group].rows), bounds_of(other)) & lanes_in(i, begin, end),
+    n.lanes[group] = when.overlapping(When::load(groups[group]), bounds_of(other)) & lanes_in(i, begin, end),
     n.count += static_cast<unsigned>(__builtin_popcount(n.lanes[group]));
   return n;
 }

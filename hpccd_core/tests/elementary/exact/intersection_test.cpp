@@ -143,7 +143,7 @@ TEST(ExactIntersection, DoesNotDependOnTheScaleOfAnAxis) {
 // Corners that are moved by the least that a double can be, or by much less than its unit: 5 * 2^-1074 to 2^480.
 TEST(ExactIntersection, OfEveryRangeOfBitsIsThatOfTheLinearProgram) {
   std::mt19937_64 random(7);
-  const double tiny[] = {0, 0, 0x1p-40, -0x1p-60, 0x1p-110, 5 * 0x1p-1074, -0x1p-1074};
+  const double tiny[] = {0, 0, 0x1p-40, -0x1p-60, 0x1p-110, -0x1p-128, 5 * 0x1p-1074, -0x1p-1074};
   Counts counts;
   int changed = 0;
   for (int i = 0; i < 2000; ++i) {
@@ -151,7 +151,7 @@ TEST(ExactIntersection, OfEveryRangeOfBitsIsThatOfTheLinearProgram) {
     const bool before = intersect(c);
     const double large = random() % 3 ? 1 : 0x1p480;
     for (auto& corner : c)
-      for (double& x : corner) x = x == 0 ? tiny[random() % 7] : x * (random() % 8 ? 1 : large) + tiny[random() % 7];
+      for (double& x : corner) x = x == 0 ? tiny[random() % 8] : x * (random() % 8 ? 1 : large) + tiny[random() % 8];
     const bool truth = brute_force_on_reals(c);
     ASSERT_EQ(intersect(c), truth) << "query " << i;
     counts(truth);
