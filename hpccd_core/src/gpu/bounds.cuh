@@ -24,7 +24,7 @@ __global__ void extent_kernel(LaunchParams<T> params) {
   for (u32 i = blockIdx.x * blockDim.x + threadIdx.x; i < params.n_vertices; i += stride)
     for (int k = 0; k < 3; ++k) {
       const double a = params.given_t0[3 * static_cast<u64>(i) + k], b = params.given_t1[3 * static_cast<u64>(i) + k];
-      bad = bad || !(fabs(a) <= largest_coordinate) || !(fabs(b) <= largest_coordinate);
+      bad = bad || !(fabs(a) <= params.largest) || !(fabs(b) <= params.largest);
       low[k] = fmin(low[k], fmin(a, b));
       high[k] = fmax(high[k], fmax(a, b));
     }
@@ -54,6 +54,14 @@ __device__ inline void set_ends(GivenEnds<double>& r, const double* a, const dou
   r.t0[0] = {a[0], a[1]}, r.t0[1] = {a[2], 0}, r.t1[0] = {b[0], b[1]}, r.t1[1] = {b[2], 0};
 }
 
+// By how much boxes grow, in their own coordinates, so that features within a separation of each other overlap: half of
+// it, and what rounding a coordinate to a float and growing it there can lose (2.4e-7 and 4.8e-7 for two boxes). More
+// than the scene is large would bring no more pairs.
+__device__ inline float reach_of(double separation, double scale) {
+  if (!(separation > 0)) return 0;
+  return static_cast<float>(lesser(0.5 * separation * scale, 4.5) * (1 + 1e-6) + 1e-6);
+}
+
 template <class T>
 __global__ void vertices_kernel(LaunchParams<T> params) {
   const u32 i = blockIdx.x * blockDim.x + threadIdx.x;
@@ -70,7 +78,9 @@ __global__ void vertices_kernel(LaunchParams<T> params) {
     a[k] = params.given_t0[3 * static_cast<u64>(i) + k], b[k] = params.given_t1[3 * static_cast<u64>(i) + k];
     point.at[0].x[k] = map(a[k], k), point.at[1].x[k] = map(b[k], k);
   }
-  point.at[0].tag = point.at[1].tag = 0;
+  const double separation =
+      params.largest_separation ? params.largest_separation[params.mesh_of_vertex[i]] : params.separation;
+  point.at[0].tag = point.at[1].tag = __float_as_uint(reach_of(separation, map.scale));
   set_ends(params.vertices[i], a, b);
   for (int end = 0; end < 2; ++end) store(&params.points[i].at[end], point.at[end]);
 }

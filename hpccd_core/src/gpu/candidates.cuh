@@ -52,7 +52,7 @@ __device__ u32 stage_edges(const LaunchParams<T>& params, const DeviceLeaf& l, u
   return __popc(mask);
 }
 
-template <class T>
+template <bool grown, class T>
 __device__ u32 stage_vertices(const LaunchParams<T>& params, const DeviceLeaf& l, u32 other, CandidateSpace& s) {
   const u32 lane = lane_number();
   DeviceBox b;
@@ -60,7 +60,7 @@ __device__ u32 stage_vertices(const LaunchParams<T>& params, const DeviceLeaf& l
   bool near = lane < l.n_vertices();
   if (near) {
     v = __ldg(&params.vertex_of_slot[l.first_vertex + lane]);
-    b = load_point(&params.points[v]);
+    b = load_point<grown>(&params.points[v]);
     near = overlap(b, load_box(&params.leaf_boxes[other]));
   }
   const u32 mask = __ballot_sync(all_lanes, near), at = __popc(mask & ((1u << lane) - 1));
@@ -115,8 +115,23 @@ __device__ __forceinline__ uint4 span_ends(u32 v0, u32 v1, u32 v2, u32 v3) {
   return {v[S::p_from], v[S::p_to], v[S::a_to], v[S::b_to]};
 }
 
-// The first filter on the last up to 32 candidates. One piece of code for both kinds: they differ in where b starts.
-template <class T>
+// Whether the first filter lets a pair pass. One piece of code for both kinds: they differ in where b starts. Pairs with
+// a separation all pass: their filter reads more than this one. So do all pairs of a snapshot.
+template <Query query, class T>
+__device__ __forceinline__ bool passes_filter(const LaunchParams<T>& params, uint4 v, bool edges) {
+  if constexpr (query == Query::proximity || query == Query::intersections) return true;
+  if constexpr (query == Query::separations)
+    if (separation_of(params, v.x, v.y) > 0) return true;
+  const Ends from = load_ends(params.vertices, v.x), p = load_ends(params.vertices, v.y),
+             a = load_ends(params.vertices, v.z), b = load_ends(params.vertices, v.w);
+  const Vec3<double> b_from0 = edges ? p.t0 : from.t0, b_from1 = edges ? p.t1 : from.t1;
+  const Motion<double> m{p.t0 - from.t0, a.t0 - from.t0, b.t0 - b_from0,
+                         p.t1 - from.t1, a.t1 - from.t1, b.t1 - b_from1};
+  return !coplanarity_filter<Proven>(m).none;
+}
+
+// The last up to 32 candidates.
+template <Query query, class T>
 __device__ __forceinline__ void filter_candidates(const LaunchParams<T>& params, CandidateSpace& s,
                                                   CandidateState& state) {
   __syncwarp();
@@ -129,12 +144,7 @@ __device__ __forceinline__ void filter_candidates(const LaunchParams<T>& params,
     features = s.features[state.n + lane];
     edges = features.y & kind_bit;
     features.y &= ~kind_bit;
-    const Ends from = load_ends(params.vertices, v.x), p = load_ends(params.vertices, v.y),
-               a = load_ends(params.vertices, v.z), b = load_ends(params.vertices, v.w);
-    const Vec3<double> b_from0 = edges ? p.t0 : from.t0, b_from1 = edges ? p.t1 : from.t1;
-    const Motion<double> m{p.t0 - from.t0, a.t0 - from.t0, b.t0 - b_from0,
-                           p.t1 - from.t1, a.t1 - from.t1, b.t1 - b_from1};
-    survives = !coplanarity_filter<Proven>(m).none;
+    survives = passes_filter<query>(params, v, edges);
   }
 #pragma unroll
   for (u32 kind = 0; kind < 2; ++kind) {
@@ -187,33 +197,59 @@ __device__ __forceinline__ LanePair vertex_face_pair(const CandidateSpace& s, u3
   return c;
 }
 
-// Phases of a pair of leaves: edges, vertices of the first, vertices of the second. The filter stands in one place in
-// the innermost loop: called as a function it costs 30 million spills on n-body, repeated it overflows the code cache.
-template <class T>
+// Intersections have no order of edge and face to choose.
+__device__ __forceinline__ LanePair edge_face_pair(const CandidateSpace& s, u32 i, u32 j, bool valid) {
+  LanePair c{valid, {0, 0, 0, 0}, {0, 0}};
+  if (!valid) return c;
+  const DeviceBox edge = s.box(0, i), face = s.box(1, j);
+  const u32 f[3] = {face.tag_low(), face.tag_high(), s.corner2[j]};
+  c.wanted = overlap(edge, face);
+  for (const u32 v : f) c.wanted = c.wanted && edge.tag_low() != v && edge.tag_high() != v;
+  c.features = {s.number[0][i], s.number[1][j]};
+  return c;
+}
+
+// Features of the two leaves that may be a pair in a phase: edges, vertices of the first, vertices of the second; or
+// edges of the first and edges of the second. Returns how many there are of each side.
+template <Query query, class T>
+__device__ __forceinline__ uint2 stage_phase(const LaunchParams<T>& params, CandidateSpace& s, uint2 pair, u32 phase) {
+  constexpr bool edges_and_faces = query == Query::intersections;
+  const bool same = pair.x == pair.y, swapped = phase == (edges_and_faces ? 1 : 2);
+  const u32 x = swapped ? pair.y : pair.x, y = swapped ? pair.x : pair.y;
+  const DeviceLeaf a = params.leaves[x], b = params.leaves[y];
+  u32 n_first;
+  if constexpr (edges_and_faces) {
+    n_first = stage_edges(params, a, y, s, 0);
+  } else if (phase == 0) {
+    n_first = stage_edges(params, a, y, s, 0);
+    return {n_first, same ? n_first : stage_edges(params, b, x, s, 1)};
+  } else {
+    n_first = stage_vertices<grows_boxes(query)>(params, a, y, s);
+  }
+  return {n_first, n_first ? stage_faces(params, b, x, s) : 0};
+}
+
+// The filter stands in one place in the innermost loop: called as a function it costs 30 million spills on n-body,
+// repeated it overflows the code cache.
+template <Query query, class T>
 __device__ __forceinline__ void leaf_pair_candidates(const LaunchParams<T>& params, CandidateSpace& s,
                                                      CandidateState& state, uint2 pair) {
+  constexpr bool edges_and_faces = query == Query::intersections;
   const bool same = pair.x == pair.y;
-  const u32 n_phases = same ? 2 : 3;
+  const u32 n_phases = (same ? 2 : 3) - (edges_and_faces ? 1 : 0);
 #pragma unroll 1
   for (u32 phase = 0; phase < n_phases; ++phase) {
-    u32 n_first, n_second;
-    {
-      const u32 x = phase == 2 ? pair.y : pair.x, y = phase == 2 ? pair.x : pair.y;
-      const DeviceLeaf a = params.leaves[x], b = params.leaves[y];
-      if (phase == 0) {
-        n_first = stage_edges(params, a, y, s, 0);
-        n_second = same ? n_first : stage_edges(params, b, x, s, 1);
-      } else {
-        n_first = stage_vertices(params, a, y, s);
-        n_second = n_first ? stage_faces(params, b, x, s) : 0;
-      }
-    }
+    const uint2 n = stage_phase<query>(params, s, pair, phase);
     __syncwarp();
-    const u32 total = n_first * n_second, magic = magic_of(n_second ? n_second : 1);
+    const u32 total = n.x * n.y, magic = magic_of(n.y ? n.y : 1);
 #pragma unroll 1
     for (u32 base = 0; base < total; base += 32) {
-      const u32 c = base + lane_number(), i = c * magic >> 16, j = c - i * n_second;
-      const LanePair pushed = phase == 0 ? edge_pair(s, i, j, same, c < total) : vertex_face_pair(s, i, j, c < total);
+      const u32 c = base + lane_number(), i = c * magic >> 16, j = c - i * n.y;
+      LanePair pushed;
+      if constexpr (edges_and_faces)
+        pushed = edge_face_pair(s, i, j, c < total);
+      else
+        pushed = phase == 0 ? edge_pair(s, i, j, same, c < total) : vertex_face_pair(s, i, j, c < total);
       const u32 mask = __ballot_sync(all_lanes, pushed.wanted);
       const u32 at = state.n + __popc(mask & ((1u << lane_number()) - 1));
       if (pushed.wanted) {
@@ -221,13 +257,13 @@ __device__ __forceinline__ void leaf_pair_candidates(const LaunchParams<T>& para
         s.features[at] = pushed.features;
       }
       state.n += __popc(mask);
-      if (state.n >= 32) filter_candidates(params, s, state);
+      if (state.n >= 32) filter_candidates<query>(params, s, state);
     }
     __syncwarp();
   }
 }
 
-template <class T>
+template <Query query, class T>
 __global__ __launch_bounds__(32 * candidate_warps,
                              5) void candidates_kernel(const __grid_constant__ LaunchParams<T> params) {
   __shared__ CandidateSpace spaces[candidate_warps];
@@ -245,9 +281,9 @@ __global__ __launch_bounds__(32 * candidate_warps,
     if (begin >= to) break;
 #pragma unroll 1
     for (u64 k = begin; k < begin + grain && k < to; ++k)
-      leaf_pair_candidates(params, s, state, params.leaf_pairs.pairs[k]);
+      leaf_pair_candidates<query>(params, s, state, params.leaf_pairs.pairs[k]);
   }
-  if (state.n > 0) filter_candidates(params, s, state);
+  if (state.n > 0) filter_candidates<query>(params, s, state);
   for (u32 kind = 0; kind < 2; ++kind)
     if (state.n_survivors[kind] > 0) flush_survivors(params, s, kind, state.n_survivors[kind]);
   if (lane_number() == 0)
