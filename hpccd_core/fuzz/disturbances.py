@@ -37,6 +37,15 @@ def disturb_near(
     return q, np.maximum(distance, np.nextafter(0.0, 1.0))
 
 
+def disturb_still(rng: np.random.Generator, points: np.ndarray) -> np.ndarray:
+    """The same for points at rest (n,p,3), the order of which stays."""
+    points = points.copy()
+    for change, share in ((rotate, 0.1), (offset, 0.3), (scale, 0.4), (single, 0.15), (one_ulp, 0.3)):
+        chosen = rng.random(len(points)) < share
+        points[chosen] = change(rng, points[chosen])
+    return points
+
+
 def permute(rng: np.random.Generator, q: np.ndarray, kind: str) -> np.ndarray:
     """Another order of the triangle's corners, or of the edges and their ends; the answer stays."""
     n = len(q)
@@ -98,7 +107,7 @@ def one_ulp(rng: np.random.Generator, q: np.ndarray) -> np.ndarray:
     q = q.copy()
     rows = np.arange(len(q))
     for _ in range(3):
-        point, axis = rng.integers(0, 8, size=len(q)), rng.integers(0, 3, size=len(q))
+        point, axis = rng.integers(0, q.shape[1], size=len(q)), rng.integers(0, 3, size=len(q))
         towards = np.where(rng.random(len(q)) < 0.5, -np.inf, np.inf)
         moved = np.nextafter(q[rows, point, axis], towards)
         # Stepping away from 0 gives the smallest denormal number; now and then is enough, in each case it is exact.
