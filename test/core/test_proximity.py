@@ -92,7 +92,7 @@ def test_a_larger_distance_keeps_what_a_smaller_one_has(generate):
 def test_distances_by_construction(accuracy, scale, offset):
     """Pairs that are exactly the distance apart, and those beside it."""
     for kind, name in ((VERTEX_FACE, "over_a_face"), ("edge-edge", "crossing_planes")):
-        queries, distances = NEAR_GENERATORS[kind][name](np.random.default_rng(56), 120)
+        queries, distances = NEAR_GENERATORS[kind][name](np.random.default_rng(56), 200)
         faces = [[1, 2, 3]] if kind == VERTEX_FACE else [[0, 1, 1], [2, 3, 3]]
         meshes = random_scenes.combine((np.array(faces), queries[0, :4], queries[0, :4]))
         detector, n_exactly = detector_of(meshes, accuracy=accuracy, threads=1), 0

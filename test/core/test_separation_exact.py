@@ -66,8 +66,9 @@ def test_distances_by_construction(accuracy, kind, name, scale, offset):
 def test_small_numbers(kind, simd):
     """Degenerate features of all sorts at a few distances, many queries in a call."""
     for name in GENERATORS[kind]:
-        queries, _ = NEAR_GENERATORS[kind][f"{name}, small numbers"](np.random.default_rng(2), 150)
-        for d in (2.0**-1074, 1e-9, 0.5, 1.0, 3.0, 1e100):
+        every, _ = NEAR_GENERATORS[kind][f"{name}, small numbers"](np.random.default_rng(2), 100)
+        for d, n in ((2.0**-1074, 4), (1e-30, 20), (0.5, 100), (1.0, 100), (3.0, 100), (1e100, 50)):
+            queries = every[:n]
             truth = ORACLE[kind](queries, d)
             for accuracy in ("exact", "conservative"):
                 found = TEST[kind](queries, accuracy, simd=simd, minimum_separation=d)
@@ -193,21 +194,21 @@ def test_scenes_without_separation_give_contact_in_every_bit(generate, accuracy)
 def test_separations_of_pairs_of_meshes(accuracy):
     meshes = random_scenes.many_meshes(np.random.default_rng(34))
     v0, v1 = meshes.vertices_t0, meshes.vertices_t1
-    pairs = {(0, 0): 0.125, (0, 2): 0.0, (1, 4): 1.5, (3, 3): 2.0}
+    pairs = {(0, 0): 0.0625, (0, 2): 0.0, (1, 4): 0.75, (3, 3): 2.0}
     scene = meshes.scene()
     for (a, b), d in pairs.items():
         scene.set_separation(f"mesh{b}", a, d)  # by name or number, in any order
-    detector = hc.Detector(scene, accuracy=accuracy, minimum_separation=0.25, backend="cpu")
-    assert_pairs(detector.detect(v0, v1), meshes.truth(minimum_separation=0.25, pair_separation=pairs), "toc", accuracy)
-    for (a, b), d in {(1, 4): 0.0, (0, 2): 0.75, (2, 3): 3.0}.items():
+    detector = hc.Detector(scene, accuracy=accuracy, minimum_separation=0.125, backend="cpu")
+    assert_pairs(detector.detect(v0, v1), meshes.truth(minimum_separation=0.125, pair_separation=pairs), "toc", accuracy)
+    for (a, b), d in {(1, 4): 0.0, (0, 2): 0.5, (2, 3): 3.0}.items():
         pairs[a, b] = d
         detector.set_separation(f"mesh{a}", f"mesh{b}", d)
-        truth = meshes.truth(minimum_separation=0.25, pair_separation=pairs)
+        truth = meshes.truth(minimum_separation=0.125, pair_separation=pairs)
         assert_pairs(detector.detect(v0, v1), truth, "toc", accuracy)
     built_with_them = meshes.scene()
     for (a, b), d in pairs.items():
         built_with_them.set_separation(a, b, d)
-    other = hc.Detector(built_with_them, accuracy=accuracy, minimum_separation=0.25, backend="cpu").detect(v0, v1)
+    other = hc.Detector(built_with_them, accuracy=accuracy, minimum_separation=0.125, backend="cpu").detect(v0, v1)
     assert other.hash == detector.detect(v0, v1).hash
 
 
@@ -287,7 +288,8 @@ def test_points_and_normals_stand_between_the_nearest_points():
     # From face to vertex, and from edge a to edge b; `closest` has the sides in the order of the pair.
     towards = np.where(np.arange(len(toc)) < len(found.vf), -1, 1)[:, None] * apart
     apart_at_all = distance > 1e-6
-    np.testing.assert_allclose(found.normals[apart_at_all], (towards / distance[:, None])[apart_at_all], atol=1e-6)
+    towards = towards[apart_at_all] / distance[apart_at_all, None]
+    np.testing.assert_allclose(found.normals[apart_at_all], towards, atol=1e-6)
 
 
 @pytest.mark.parametrize(
