@@ -12,7 +12,7 @@ import hpccd_core as hc
 
 SMALL, LARGE = ("two-cubes", "thick-cloth"), ("cloth-ball", "cloth-funnel")
 PROMISES = ("exact", "conservative")
-SCENES = pytest.mark.parametrize(("name", "accuracy"), itertools.product(SMALL + LARGE, PROMISES))
+SCENES = pytest.mark.parametrize(("name", "accuracy"), list(itertools.product(SMALL + LARGE, PROMISES)))
 KINDS = (("vf", hc.test_vertex_face), ("ee", hc.test_edge_edge))
 
 

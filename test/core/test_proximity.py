@@ -11,7 +11,8 @@ from test_small_scenes import small_scene
 
 import hpccd_core as hc
 from hpccd_core import reference
-from hpccd_core.fuzz.generators import VERTEX_FACE
+from hpccd_core.fuzz.generators import EDGE_EDGE, VERTEX_FACE
+from hpccd_core.fuzz.near_generators import DISTANCE as DISTANCE_OF
 from hpccd_core.fuzz.near_generators import NEAR_GENERATORS
 
 ACCURACIES = pytest.mark.parametrize("accuracy", ["exact", "conservative"])
@@ -91,8 +92,11 @@ def test_a_larger_distance_keeps_what_a_smaller_one_has(generate):
 @pytest.mark.parametrize(("scale", "offset"), [(1.0, 0), (2.0**490, 0), (2.0**-498, 0), (2.0**-1060, 0), (1.0, 2**40)])
 def test_distances_by_construction(accuracy, scale, offset):
     """Pairs that are exactly the distance apart, and those beside it."""
-    for kind, name in ((VERTEX_FACE, "over_a_face"), ("edge-edge", "crossing_planes")):
-        queries, distances = NEAR_GENERATORS[kind][name](np.random.default_rng(56), 200)
+    for kind, name in ((VERTEX_FACE, "over_a_face"), (EDGE_EDGE, "crossing_planes")):
+        queries, distances = NEAR_GENERATORS[kind][name](np.random.default_rng(56), 2000)
+        rows_exactly = np.flatnonzero(DISTANCE_OF[kind](queries[:, :4]) == distances)[:40]
+        chosen = np.concatenate([np.arange(40), rows_exactly])
+        queries, distances = queries[chosen], distances[chosen]
         faces = [[1, 2, 3]] if kind == VERTEX_FACE else [[0, 1, 1], [2, 3, 3]]
         meshes = random_scenes.combine((np.array(faces), queries[0, :4], queries[0, :4]))
         detector, n_exactly = detector_of(meshes, accuracy=accuracy, threads=1), 0
@@ -102,7 +106,7 @@ def test_distances_by_construction(accuracy, scale, offset):
                 truth = truth_of(meshes, d)
                 assert_pairs(detector.proximity(points, d), truth, "distance", accuracy, size_of(points))
                 n_exactly += (truth.vf_distance == d).any() or (truth.ee_distance == d).any()
-        assert n_exactly > 5
+        assert n_exactly >= 40
 
 
 @SCENES
