@@ -9,6 +9,7 @@ from test_small_scenes import small_scene
 
 import hpccd_core as hc
 from hpccd_core import reference
+from hpccd_core.fuzz.snapshots import EDGE_FACE_POINTS
 
 SCENES = pytest.mark.parametrize("generate", random_scenes.ALL)
 KINDS = ("vertex-face", "edge-edge", "edge-face")
@@ -97,7 +98,9 @@ def apart(rng, n_bodies=4):
     return random_scenes.combine(*bodies, lone)
 
 
-@pytest.mark.parametrize(("scale", "offset"), [(1.0, 0.0), (2.0**300, 0.0), (2.0**-300, 0.0), (1.0, 2.0**20)])
+@pytest.mark.parametrize(
+    ("scale", "offset"), [(1.0, 0.0), (2.0**300, 0.0), (2.0**490, 0.0), (2.0**-300, 0.0), (1.0, 2.0**20)]
+)
 def test_bodies_apart(scale, offset):
     seen = set()
     for seed in range(12):
@@ -107,6 +110,25 @@ def test_bodies_apart(scale, offset):
         assert_gaps(gaps, meshes, vertices, {}, size_of(vertices))
         seen |= {gap.kind for gap in gaps if 0 < gap.distance < np.inf}
     assert seen == {"vertex-face", "edge-edge"}
+
+
+@pytest.mark.parametrize("name", EDGE_FACE_POINTS)
+def test_where_an_edge_meets_a_face(name):
+    """The common point lies on both, also where they are all but coplanar, and whatever their magnitude."""
+    points = EDGE_FACE_POINTS[name](np.random.default_rng(1), 3000)
+    scene = hc.Scene()
+    scene.add_mesh("mesh0", [[0, 1, 1]], self_collision=False)
+    scene.add_mesh("mesh1", [[0, 1, 2]], self_collision=False)
+    detector = hc.Detector(scene, backend="cpu", threads=1)
+    points = points[reference.edge_face_intersect(points)]
+    size = np.abs(points).max(axis=(1, 2))
+    normal = size > 1e-290  # smaller ones have fewer bits
+    assert normal.sum() > 30
+    for q, s in zip(points[normal], size[normal], strict=True):
+        (gap,) = detector.distances(q)
+        assert (gap.kind, gap.distance, tuple(gap.features)) == ("edge-face", 0.0, (0, 1, 1))
+        ends = np.array([[gap.points[0], q[0], q[1], q[1]], [gap.points[1], q[2], q[3], q[4]]])
+        assert np.isfinite(ends).all() and reference.distance_vertex_face(ends).max() <= 1e-12 * s, q.tolist()
 
 
 def test_rules_of_scenes():
@@ -131,7 +153,7 @@ def test_they_agree_with_proximity_and_intersections(generate):
     """Nothing is nearer than the smallest of the distances, and something is as near."""
     meshes = generate(np.random.default_rng(83))
     detector = hc.Detector(meshes.scene(), backend="cpu")
-    gaps, smallest = detector.distances(meshes.vertices_t0), np.inf
+    gaps = detector.distances(meshes.vertices_t0)
     smallest = min(gap.distance for gap in gaps)
     near = detector.proximity(meshes.vertices_t0, smallest * (1 + 1e-12))
     if any(gap.kind == "edge-face" for gap in gaps):

@@ -219,7 +219,7 @@ def test_bad_positions_are_refused():
     for bad, error in (
         (np.zeros((3, 3)), ValueError),
         (np.full((detector.n_vertices, 3), np.nan), ValueError),
-        (np.full((detector.n_vertices, 3), 1e151), ValueError),
+        (np.full((detector.n_vertices, 3), 1e301), ValueError),
         (np.zeros((detector.n_vertices, 3), int), TypeError),
     ):
         with pytest.raises(error, match="vertices"):
