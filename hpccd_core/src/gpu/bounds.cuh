@@ -3,6 +3,8 @@
 #pragma once
 
 #include "bvh/coordinate_map.h"
+#include "bvh/kdop.h"
+#include "bvh/tree.h"
 #include "gpu/launch_params.cuh"
 
 namespace hpccd::gpu {
@@ -55,21 +57,23 @@ __device__ inline void set_ends(GivenEnds<double>& r, const double* a, const dou
 }
 
 // By how much boxes grow, in their own coordinates, so that features within a separation of each other overlap: half of
-// it, and what rounding a coordinate to a float and growing it there can lose (2.4e-7 and 4.8e-7 for two boxes). More
-// than the scene is large would bring no more pairs.
-__device__ inline float reach_of(double separation, double scale) {
+// it, and what rounding a coordinate to a float and growing it there can lose (2.4e-7 and 4.8e-7 for two boxes; along
+// the slanted directions twice that, and as much as their sums of two coordinates lose far from the origin). More than
+// the scene is large would bring no more pairs.
+__device__ inline float reach_of(double separation, double scale, double largest) {
   if (!(separation > 0)) return 0;
-  return static_cast<float>(lesser(0.5 * separation * scale, 4.5) * (1 + 1e-6) + 1e-6);
+  return static_cast<float>(lesser(0.5 * separation * scale + 1e-15 * (largest * scale), 4.5) * (1 + 1e-6) + 1e-6);
 }
 
-template <class T>
+template <bool snapshot, class T>
 __global__ void vertices_kernel(LaunchParams<T> params) {
   const u32 i = blockIdx.x * blockDim.x + threadIdx.x;
   if (i >= params.n_vertices) return;
-  double low[3], high[3];
+  double low[3], high[3], largest = 0;
   for (int k = 0; k < 3; ++k) {
     low[k] = from_ordered_bits(~params.counters->extent_low[k]);
     high[k] = from_ordered_bits(params.counters->extent_high[k]);
+    largest = greater(largest, greater(magnitude(low[k]), magnitude(high[k])));
   }
   const CoordinateMap map = CoordinateMap::around(low, high);
   T a[3], b[3];
@@ -80,7 +84,13 @@ __global__ void vertices_kernel(LaunchParams<T> params) {
   }
   const double separation =
       params.largest_separation ? params.largest_separation[params.mesh_of_vertex[i]] : params.separation;
-  point.at[0].tag = point.at[1].tag = __float_as_uint(reach_of(separation, map.scale));
+  const float reach = reach_of(separation, map.scale, largest);
+  point.at[0].tag = point.at[1].tag = __float_as_uint(reach);
+  if constexpr (snapshot) {
+    const SlantedCoordinates slanted({a[0], a[1], a[2]}, map);
+    for (int k = 0; k < 3; ++k) point.at[1].x[k] = slanted.along[k];
+    point.at[1].tag = __float_as_uint(slanted_reach(reach));
+  }
   set_ends(params.vertices[i], a, b);
   for (int end = 0; end < 2; ++end) store(&params.points[i].at[end], point.at[end]);
 }

@@ -37,7 +37,8 @@ struct alignas(16) Bound {
   u32 tag;
 };
 
-// Where a vertex is at both ends of its motion. The tags hold by how much its box grows there (a float).
+// Where a vertex is at both ends of its motion; of a snapshot, where it is along the axes, and along the slanted
+// directions (bvh/kdop.h). The tags hold by how much its box grows there (a float).
 struct alignas(32) DevicePoint {
   Bound at[2];
 };
@@ -151,9 +152,9 @@ __device__ inline DeviceBox load_point(const DevicePoint* p) {
   const Bound t0 = bound_of(v[0]), t1 = bound_of(v[1]);
   DeviceBox b{{t0, t1}, {t0, t1}};
   if constexpr (grown) {
-    const float reach = __uint_as_float(t0.tag);
+    const float reach[2] = {__uint_as_float(t0.tag), __uint_as_float(t1.tag)};
     for (int end = 0; end < 2; ++end)
-      for (int k = 0; k < 3; ++k) b.low[end].x[k] -= reach, b.high[end].x[k] += reach;
+      for (int k = 0; k < 3; ++k) b.low[end].x[k] -= reach[end], b.high[end].x[k] += reach[end];
   }
   return b;
 }
@@ -173,9 +174,16 @@ __device__ inline void include(DeviceBox& a, const DeviceBox& b) {
     }
 }
 
-// Not in the same order along an axis at both ends.
+// Of a motion: not in the same order along an axis at both ends. Of a snapshot: along no direction apart.
+template <Query query>
 __device__ inline bool overlap(const DeviceBox& a, const DeviceBox& b) {
   bool apart = false;
+  if constexpr (of_snapshot(query)) {
+    for (int k = 0; k < 3; ++k)
+      apart |= (a.high[0].x[k] < b.low[0].x[k]) | (b.high[0].x[k] < a.low[0].x[k]) |
+               (a.high[1].x[k] < b.low[1].x[k]) | (b.high[1].x[k] < a.low[1].x[k]);
+    return !apart;
+  }
   for (int k = 0; k < 3; ++k)
     apart |= ((a.high[0].x[k] < b.low[0].x[k]) & (a.high[1].x[k] < b.low[1].x[k])) |
              ((b.high[0].x[k] < a.low[0].x[k]) & (b.high[1].x[k] < a.low[1].x[k]));

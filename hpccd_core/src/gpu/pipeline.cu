@@ -117,12 +117,11 @@ bool DevicePipeline::run_frame(Positions t0, Positions t1, double distance, Thre
   }
   LaunchParams<T> params{};
   scene_.fill(params);
-  const bool of_motion = query_ == Query::contacts || query_ == Query::separations;
-  if (of_motion)
-    scene_.fill_separations(params);
-  else
+  if (of_snapshot(query_))
     params.separation = distance;
-  params.largest = of_motion ? largest_coordinate : largest_in_snapshot;
+  else
+    scene_.fill_separations(params);
+  params.largest = of_snapshot(query_) ? largest_in_snapshot : largest_coordinate;
   tree_.fill(params);
   motion_.fill(params);
   const T* given[2];
@@ -154,13 +153,14 @@ template <class T>
 void DevicePipeline::launch(LaunchParams<T>& params) {
   params.leaf_pairs = {leaf_pairs_.data(), leaf_pairs_.size()};
   contacts_.fill(params);
-  motion_.launch(params, multiprocessors_, stream_);
+  motion_.launch(query_, params, multiprocessors_, stream_);
   timer_.mark("bounds", stream_);
   const auto refit = grows_boxes(query_) ? refit_kernel<true, T> : refit_kernel<false, T>;
   refit<<<blocks_for(std::size_t{params.n_leaves} * 32, 128), 128, 0, stream_>>>(params);
   check_launch("refit_kernel");
   timer_.mark("refit", stream_);
-  traverse_kernel<<<blocks_for(params.n_leaves, traverse_warps), 32 * traverse_warps, 0, stream_>>>(params);
+  const auto traverse = of_snapshot(query_) ? traverse_kernel<true, T> : traverse_kernel<false, T>;
+  traverse<<<blocks_for(params.n_leaves, traverse_warps), 32 * traverse_warps, 0, stream_>>>(params);
   check_launch("traverse_kernel");
   timer_.mark("traverse", stream_);
   lists_.launch(query_, params, multiprocessors_, stream_, timer_);

@@ -11,6 +11,7 @@ enum class Query : unsigned char {
   intersections,  // of one snapshot: edges that pierce or touch faces
 };
 
+constexpr bool of_snapshot(Query q) { return q == Query::proximity || q == Query::intersections; }
 // Whether boxes grow, so that what comes within a distance overlaps.
 constexpr bool grows_boxes(Query q) { return q == Query::separations || q == Query::proximity; }
 

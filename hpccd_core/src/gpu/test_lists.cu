@@ -56,7 +56,6 @@ void TestLists::launch(Query query, LaunchParams<T>& params, int multiprocessors
   params.to_host = to_host_.data(), params.to_host_capacity = to_host_.size();
   params.n_segments = n_segments_;
   const Stages stages{multiprocessors, stream, timer};
-  const bool of_motion = query == Query::contacts || query == Query::separations;
   for (params.segment = 0; params.segment < n_segments_; ++params.segment) {
     if (query == Query::contacts)
       launch_contacts(params, stages);
@@ -64,11 +63,11 @@ void TestLists::launch(Query query, LaunchParams<T>& params, int multiprocessors
       launch_separations(params, stages);
     else
       launch_snapshot(query, params, stages);
-    if (of_motion) launch_root_tests(params, stages);
+    if (!of_snapshot(query)) launch_root_tests(params, stages);
     end_segment_kernel<<<1, 1, 0, stream>>>(params);
     check_launch("end_segment_kernel");
   }
-  if (!of_motion) return;
+  if (of_snapshot(query)) return;
   fallback_kernel<<<static_cast<unsigned>(2 * multiprocessors), 32, 0, stream>>>(params);
   check_launch("fallback_kernel");
   timer.mark("last_resort", stream);  // the fallbacks' first name, under which kept results have it
