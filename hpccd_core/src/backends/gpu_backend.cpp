@@ -131,7 +131,7 @@ void GpuBackend::prepare(Boxes boxes, Bound&& bound) {
 // By the last frame, against the first one whose boxes were of the same kind.
 bool GpuBackend::worn_out_on_device() {
   const double area = pipeline_->relative_area();
-  if (!(area > 0)) return false;  // the frame was refused
+  if (!(area > 0)) return false;          // the frame was refused
   constexpr std::size_t most_kinds = 64;  // who asks for another distance in each frame shall not fill the memory
   if (area_when_built_.size() > most_kinds) area_when_built_.clear();
   return worn_out(area, area_when_built_.try_emplace(last_boxes_, area).first->second);

@@ -134,7 +134,8 @@ void add_places(Contacts& c, Outputs outputs, const Features& features, const Se
   std::vector<VertexMotion> vertices(t0.n);
   parallel_for(pool, vertices.size(), 4096, [&](std::size_t begin, std::size_t end, int) {
     for (std::size_t i = begin; i < end; ++i) {
-      const Vec3<double> a = position(t0, static_cast<std::uint32_t>(i)), b = position(t1, static_cast<std::uint32_t>(i));
+      const Vec3<double> a = position(t0, static_cast<std::uint32_t>(i)),
+                         b = position(t1, static_cast<std::uint32_t>(i));
       vertices[i] = {{a.x, a.y, a.z, 0}, {b.x, b.y, b.z, 0}};
     }
   });

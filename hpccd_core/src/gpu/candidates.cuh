@@ -20,7 +20,7 @@ struct CandidateSpace {
   Bound bound[2][4][3 * Tree::leaf_size];
   u32 number[2][3 * Tree::leaf_size];
   u32 corner2[Tree::leaf_size];
-  // Candidates: the vertices that p, a and b lead from and to (span_ends), and the features.
+  // Candidates: the vertices that p, a and b lead from and to (span_ends; not of a snapshot), and the features.
   uint4 vertices[64];
   uint2 features[64];
   uint2 survivors[2][96];
@@ -116,11 +116,9 @@ __device__ __forceinline__ uint4 span_ends(u32 v0, u32 v1, u32 v2, u32 v3) {
   return {v[S::p_from], v[S::p_to], v[S::a_to], v[S::b_to]};
 }
 
-// Whether the first filter lets a pair pass; all of a snapshot do. One piece of code for both kinds: they differ in
-// where b starts.
+// Whether the first filter lets a pair pass. One piece of code for both kinds: they differ in where b starts.
 template <Query query, class T>
 __device__ __forceinline__ bool passes_filter(const LaunchParams<T>& params, uint4 v, bool edges) {
-  if constexpr (of_snapshot(query)) return true;
   const Ends from = load_ends(params.vertices, v.x), p = load_ends(params.vertices, v.y),
              a = load_ends(params.vertices, v.z), b = load_ends(params.vertices, v.w);
   const Vec3<double> b_from0 = edges ? p.t0 : from.t0, b_from1 = edges ? p.t1 : from.t1;
@@ -141,11 +139,10 @@ __device__ __forceinline__ void filter_candidates(const LaunchParams<T>& params,
   bool survives = false, edges = false;
   uint2 features{0, 0};
   if (lane < n) {
-    const uint4 v = s.vertices[state.n + lane];
     features = s.features[state.n + lane];
     edges = features.y & kind_bit;
     features.y &= ~kind_bit;
-    survives = passes_filter<query>(params, v, edges);
+    survives = of_snapshot(query) || passes_filter<query>(params, s.vertices[state.n + lane], edges);
   }
 #pragma unroll
   for (u32 kind = 0; kind < 2; ++kind) {
@@ -257,7 +254,7 @@ __device__ __forceinline__ void leaf_pair_candidates(const LaunchParams<T>& para
       const u32 mask = __ballot_sync(all_lanes, pushed.wanted);
       const u32 at = state.n + __popc(mask & ((1u << lane_number()) - 1));
       if (pushed.wanted) {
-        s.vertices[at] = pushed.vertices;
+        if constexpr (!of_snapshot(query)) s.vertices[at] = pushed.vertices;
         s.features[at] = pushed.features;
       }
       state.n += __popc(mask);

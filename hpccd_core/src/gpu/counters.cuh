@@ -21,7 +21,7 @@ struct Counters {
   u64 most_separated;
   u64 candidates[2], proven[2], undecided_of[2];
   u64 apart[2], proven_near[2], undecided_near[2];  // of the tests that know a distance
-  u64 found[2];  // by kind, after the fallback on the device
+  u64 found[2];                                     // by kind, after the fallback on the device
   u64 found_all, undecided, to_host;
   u64 hash;
   double area;

@@ -12,8 +12,8 @@ namespace {
 
 class CudaTestDevice final : public TestDevice {
  public:
-  CudaTestDevice(const Scene& scene, const Features& features, Accuracy accuracy,
-                 const SeparationTable& separations, int device)
+  CudaTestDevice(const Scene& scene, const Features& features, Accuracy accuracy, const SeparationTable& separations,
+                 int device)
       : device_((check(cudaSetDevice(device), "cudaSetDevice"), device)),
         features_(features),
         scene_(scene, features, accuracy, separations),

@@ -65,8 +65,8 @@ class Slot {
   // They are tested when the event has come. `params` names the frame's scene, leaves and motion: the same places as in
   // the last launch where `version` is the same.
   template <class T>
-  void launch(const DeviceScene& scene, LaunchParams<T> params, std::uint64_t version, const LargestLists& largest, cudaEvent_t after,
-              int multiprocessors) {
+  void launch(const DeviceScene& scene, LaunchParams<T> params, std::uint64_t version, const LargestLists& largest,
+              cudaEvent_t after, int multiprocessors) {
     lists_.reserve(largest.lists);
     reserve_found(largest.found);
     std::size_t n = 0;

@@ -10,9 +10,7 @@ namespace {
 
 bool names(const std::string& why, const std::string& option) { return why.starts_with(option + ":"); }
 
-TEST(Unsupported, NothingOfTheDefaults) {
-  EXPECT_EQ(GpuBackend::unsupported({}), "");
-}
+TEST(Unsupported, NothingOfTheDefaults) { EXPECT_EQ(GpuBackend::unsupported({}), ""); }
 
 TEST(Unsupported, PublishedMethodsOnTheGpuAlone) {
   for (const Method method : {Method::published, Method::naive, Method::front})
