@@ -9,7 +9,6 @@
 
 #include "base/parallel.h"
 #include "bvh/split.h"
-#include "elementary/inclusion.h"
 
 namespace hpccd {
 namespace {
@@ -79,18 +78,6 @@ TEST(Cancellation, OneSortOrSplitHowManyItMaySort) {
                                  })),
                Cancelled);
   EXPECT_EQ(looks, 50);
-}
-
-TEST(Cancellation, TheSearchForOnePairHeedsIt) {
-  // Two edges that lie beside each other, within the separation.
-  const Vec3<double> at_t0[4] = {{0, 0, 0}, {1, 0, 0}, {0, 1e-3, 0}, {1, 1e-3, 0}};
-  const Motion<double> motion = motion_of<Kind::edge_edge>(at_t0, at_t0);
-  Cancellation cancellation;
-  inclusion::Limits limits{2e-3, 1e-15};
-  limits.cancellation = &cancellation;
-  EXPECT_NO_THROW(inclusion::earliest_within(Kind::edge_edge, motion, limits));
-  cancellation.request();
-  EXPECT_THROW(inclusion::earliest_within(Kind::edge_edge, motion, limits), Cancelled);
 }
 
 }  // namespace

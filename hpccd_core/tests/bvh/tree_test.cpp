@@ -36,7 +36,7 @@ struct Sheets : testing::Test {
 
   void update(double t0, double t1) {
     const auto start = test::sheet_positions(n, t0, lone), end = test::sheet_positions(n, t1, lone);
-    motion.update(test::view(start), test::view(end), 0, pool);
+    motion.update(test::view(start), test::view(end), pool);
   }
 };
 

@@ -19,7 +19,7 @@ struct Moving {
   V t0[4], t1[4];
 };
 
-ContactPoint contact_point_of(Kind kind, const Moving& q, double toc, bool touching) {
+ContactPoint contact_point_of(Kind kind, const Moving& q, double toc) {
   VertexMotion rows[4] = {};
   for (int i = 0; i < 4; ++i) {
     const V &x = q.t0[i], &y = q.t1[i];
@@ -28,7 +28,7 @@ ContactPoint contact_point_of(Kind kind, const Moving& q, double toc, bool touch
   const std::array<std::uint32_t, 2> edges[2] = {{0, 1}, {2, 3}};
   const std::array<std::uint32_t, 3> face[1] = {{1, 2, 3}};
   const Geometry geometry{rows, edges, face};
-  return contact_point(geometry, kind, 0, kind == Kind::vertex_face ? 0 : 1, toc, touching);
+  return contact_point(geometry, kind, 0, kind == Kind::vertex_face ? 0 : 1, toc);
 }
 
 // Steps of any length: the shorter, the more often the side at t = 0 is not that before the contact.
@@ -46,8 +46,8 @@ TEST_P(RandomContacts, SidesAreThoseOfExactArithmetic) {
     const auto toc = exact::earliest_contact(kind, q.t0, q.t1);
     if (!toc) continue;
     ++contacts;
-    const ContactPoint found = contact_point_of(kind, q, *toc, true);
-    const exact::Approach a = exact::approach(kind, q.t0, q.t1, *toc, true);
+    const ContactPoint found = contact_point_of(kind, q, *toc);
+    const exact::Approach a = exact::approach(kind, q.t0, q.t1, *toc);
     const V normal{found.normal[0], found.normal[1], found.normal[2]};
     EXPECT_LE(largest(normal - a.side * unit(a.n)), 1e-9) << "query " << i;
   }
@@ -74,7 +74,7 @@ Moving with_roots(double r, double s, double u) {
 
 TEST(Approach, SideIsThatBetweenTheRootBeforeAndTheContact) {
   const auto side = [](const Moving& q, double toc) {
-    return exact::approach(Kind::vertex_face, q.t0, q.t1, toc, true).side;
+    return exact::approach(Kind::vertex_face, q.t0, q.t1, toc).side;
   };
   const Moving three = with_roots(0.25, 0.5, 0.75);
   EXPECT_EQ(side(three, 0.25), 1);
@@ -93,15 +93,7 @@ TEST(Approach, SideIsThatBetweenTheRootBeforeAndTheContact) {
 TEST(Approach, OfRootsAtTheSameTimeTheFirstThatTouches) {
   const Moving q = with_roots(0.5, 0.5 + 1e-13, 0.9);
   for (const double toc : {0.5 - 1e-12, 0.5, 0.5 + 1e-13, 0.5 + 1e-12})
-    EXPECT_EQ(exact::approach(Kind::vertex_face, q.t0, q.t1, toc, true).side, 1) << toc;
-}
-
-TEST(Approach, FeaturesThatAreApartAreOnTheSideWhereTheyAre) {
-  const Moving q{{{5, 0.2, -1}, {0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0.8, 0.2, 0.2}, {0, 0, 0}, {1, 0, 0}, {0, 1, 0}}};
-  for (const auto& [toc, z] : {std::pair{0.5, -1.0}, {0.9, 1.0}}) {
-    EXPECT_EQ(contact_point_of(Kind::vertex_face, q, toc, false).normal[2], z);
-    EXPECT_EQ(exact::approach(Kind::vertex_face, q.t0, q.t1, toc, false).side, z);
-  }
+    EXPECT_EQ(exact::approach(Kind::vertex_face, q.t0, q.t1, toc).side, 1) << toc;
 }
 
 }  // namespace

@@ -9,7 +9,6 @@
 
 #include "elementary/exact/contact.h"
 #include "elementary/extended_precision.h"
-#include "elementary/inclusion.h"
 #include "hpccd/hpccd.h"
 
 namespace hpccd {
@@ -125,20 +124,6 @@ TEST_P(Elementary, InstructionSetsGiveTheSameBits) {
 
 INSTANTIATE_TEST_SUITE_P(Kinds, Elementary,
                          ::testing::Combine(::testing::Values(Kind::vertex_face, Kind::edge_edge), ::testing::Bool()));
-
-// The triangle x, y >= 0, x + y <= 1 rises from z = 0 to 1; the vertex waits at height 0.5 + gap beside or above it.
-Motion<double> rising(double gap) {
-  return {{0.25, 0.25, 2 + gap}, {1, 0, 0}, {0, 1, 0}, {0.25, 0.25, 1 + gap}, {1, 0, 0}, {0, 1, 0}};
-}
-
-TEST(Inclusion, ReportsWhatComesWithinTheSeparationAndNoLater) {
-  const inclusion::Limits limits{0.5, 1e-6, 100000};
-  const auto near = inclusion::earliest_within(Kind::vertex_face, rising(-0.75), limits);
-  ASSERT_TRUE(near.has_value());
-  EXPECT_LE(*near, 0.75);  // 1.25 - t <= 0.5
-  EXPECT_GE(*near, 0.75 - 1e-5);
-  EXPECT_FALSE(inclusion::earliest_within(Kind::vertex_face, rising(-0.4), limits).has_value());
-}
 
 }  // namespace
 }  // namespace hpccd

@@ -46,7 +46,7 @@ class CpuTestDevice final : public hybrid::TestDevice {
 
   void begin_frame(Positions t0, Positions t1) override {
     if (faults_->fails_at_begin) throw std::runtime_error("asked for: at begin");
-    motion_.update(t0, t1, 0, pool_);
+    motion_.update(t0, t1, pool_);
   }
   void begin_traversal(const hybrid::LeafTable&) override {}
   std::size_t slots() const override { return 4; }
@@ -120,6 +120,7 @@ class CpuTestDevice final : public hybrid::TestDevice {
   hybrid::Output perform(const Job& job) {
     Search search;
     for (auto& test : search.batch_test) test = test_;
+    for (auto& fallback : search.fallback) fallback = decide_contact;
     search.leaf_pairs = leaf_pairs(Simd::scalar);
     search.report = Report::all;
     search.geometry = {motion_.vertices.data(), features_.edges.data(), features_.faces.data(), nullptr,

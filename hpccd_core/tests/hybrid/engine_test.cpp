@@ -21,17 +21,18 @@ struct Bench {
   explicit Bench(int threads, BatchTest batch_test = hpccd::batch_test(Simd::scalar, Accuracy::exact))
       : scene(test::two_sheets(side)),
         features(features_of(*scene)),
-        rules(*scene, Accuracy::exact),
+        rules(*scene, Accuracy::exact, SeparationTable(*scene, 0)),
         pool(threads),
         workers(static_cast<std::size_t>(threads)) {
     for (auto& test : search.batch_test) test = batch_test;
+    for (auto& fallback : search.fallback) fallback = decide_contact;
     search.leaf_pairs = leaf_pairs(Simd::scalar);
     search.report = Report::all;
   }
 
   void update(double from, double to) {
     start = test::sheet_positions(side, from), end = test::sheet_positions(side, to);
-    motion.update(*scene, test::view(start), test::view(end), 0, pool);
+    motion.update(*scene, test::view(start), test::view(end), {}, pool);
     build(tree, *scene, features, motion.boxes, pool);
     search.geometry = {motion.vertices.data(), features.edges.data(), features.faces.data(), nullptr, motion.map.scale};
     search.earliest = std::numeric_limits<double>::infinity();
@@ -39,7 +40,7 @@ struct Bench {
 
   Contacts collect() {
     Contacts contacts;
-    collect_contacts(workers, search.geometry, Report::all, {false, false}, order, pool, contacts);
+    collect_contacts(workers, search.geometry, Report::all, {false, false, false, AtTime::contact}, order, pool, contacts);
     return contacts;
   }
 

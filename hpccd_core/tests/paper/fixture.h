@@ -21,7 +21,7 @@ namespace hpccd::paper {
 struct PaperTest : testing::Test {
   std::shared_ptr<const Scene> scene = test::swarm_scene(true);
   Features features = features_of(*scene);
-  PairRules rules{*scene, Accuracy::balanced};
+  PairRules rules{*scene, Accuracy::balanced, SeparationTable(*scene, 0)};
   ThreadPool pool{3};
   MotionBounds motion;
   Profiler profiler;
@@ -29,7 +29,7 @@ struct PaperTest : testing::Test {
   // A step with little motion; between one and the next, pieces have traded places.
   void move_to(int step) {
     const auto start = test::swarm_positions(2 * step), end = test::swarm_positions(2 * step + 1);
-    motion.update(test::view(start), test::view(end), 0, pool);
+    motion.update(test::view(start), test::view(end), pool);
     motion.sweep(pool);
   }
 

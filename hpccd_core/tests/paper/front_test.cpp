@@ -21,7 +21,8 @@ struct FrontTest : PaperTest {
     move_to(0);
     build(h, features, motion.swept, pool);
     ancestry = Ancestry(h);
-    for (int a = 0; a < 4; ++a) search.batch_test[a] = batch_test(Simd::scalar, static_cast<Accuracy>(a));
+    for (int a = 0; a < 4; ++a)
+      search.batch_test[a] = batch_test(Simd::scalar, static_cast<Accuracy>(a)), search.fallback[a] = decide_contact;
     search.report = Report::all;
   }
 

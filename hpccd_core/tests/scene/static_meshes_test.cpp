@@ -104,7 +104,7 @@ TEST(MotionBounds, TellsWhatRestsInALargeScene) {
   scene.add_mesh("moving", test::sheet_faces(side), n_static, {});
   ThreadPool pool(2);
   MotionBounds motion;
-  const auto update = [&](const Frame& f) { motion.update(scene, test::view(f.start), test::view(f.end), 0, pool); };
+  const auto update = [&](const Frame& f) { motion.update(scene, test::view(f.start), test::view(f.end), {}, pool); };
   update(frame(0.40, 0.41));
   EXPECT_TRUE(motion.resting.empty());
   update(frame(0.41, 0.42));

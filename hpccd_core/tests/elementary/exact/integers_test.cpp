@@ -74,7 +74,7 @@ void expect_near(const Vec3<double>& a, const Vec3<double>& b) {
   EXPECT_NEAR(a.z, b.z, tolerance);
 }
 
-// At contacts and, as features that a separation keeps apart, at any time.
+// At contacts, and at any time.
 template <class Z>
 void expect_same_approach_as_big(int bits) {
   std::mt19937_64 random(11);
@@ -87,10 +87,10 @@ void expect_same_approach_as_big(int bits) {
     const auto big = query<Big>(kind, numbers, bits);
     const auto contact = earliest(big).toc;
     const double toc = contact.value_or(std::ldexp(static_cast<double>(random() >> 11), -53));
-    const auto fixed = approach(query<Z>(kind, numbers, bits), low, toc, contact.has_value());
+    const auto fixed = approach(query<Z>(kind, numbers, bits), low, toc);
     if (!fixed) continue;
     ++decided;
-    const Approach expected = approach(big, low, toc, contact.has_value());
+    const Approach expected = approach(big, low, toc);
     ++sides[fixed->side + 1];
     ASSERT_EQ(fixed->side, expected.side) << "query " << i;
     expect_near(fixed->n, expected.n);
