@@ -6,6 +6,7 @@
 #include "bvh/kdop.h"
 #include "bvh/tree.h"
 #include "gpu/launch_params.cuh"
+#include "gpu/reach.h"
 
 namespace hpccd::gpu {
 
@@ -54,15 +55,6 @@ __device__ inline void set_ends(GivenEnds<float>& r, const float* a, const float
 }
 __device__ inline void set_ends(GivenEnds<double>& r, const double* a, const double* b) {
   r.t0[0] = {a[0], a[1]}, r.t0[1] = {a[2], 0}, r.t1[0] = {b[0], b[1]}, r.t1[1] = {b[2], 0};
-}
-
-// By how much boxes grow, in their own coordinates, so that features within a separation of each other overlap: half of
-// it, and what rounding a coordinate to a float and growing it there can lose (2.4e-7 and 4.8e-7 for two boxes; along
-// the slanted directions twice that, and as much as their sums of two coordinates lose far from the origin). More than
-// the scene is large would bring no more pairs.
-__device__ inline float reach_of(double separation, double scale, double largest) {
-  if (!(separation > 0)) return 0;
-  return static_cast<float>(lesser(0.5 * separation * scale + 1e-15 * (largest * scale), 4.5) * (1 + 1e-6) + 1e-6);
 }
 
 template <bool snapshot, class T>
