@@ -26,3 +26,23 @@ for accuracy in ("balanced", "exact"):
                 if detector.stats["gpu_fallbacks"]:
                     sys.exit(f"{make.__name__}, {accuracy}, {backend}: {detector.last_gpu_error}")
                 print(make.__name__, accuracy, dtype.__name__, backend, found)
+
+for make in (scenes.crumpled, scenes.lattice, scenes.soup):
+    rng = np.random.default_rng(2)
+    scene, t0, t1 = scenes.join([make(rng, 10), make(rng, 10)])
+    scene.set_separation(0, 1, 0.1)
+    scene.set_separation(1, 1, 0.0)
+    detectors = {b: hc.Detector(scene, backend=b, threads=2, minimum_separation=0.05) for b in ("cpu", "gpu", "hybrid")}
+    for query in (
+        lambda d, t0=t0, t1=t1: d.detect(t0, t1),
+        lambda d, t1=t1: d.proximity(t1, 0.1),
+        lambda d, t1=t1: d.proximity(t1.astype(np.float32), 0.1),
+        lambda d, t1=t1: d.intersections(t1),
+    ):
+        answers = {backend: query(detector) for backend, detector in detectors.items()}
+        print(make.__name__, answers)
+        if len({answer.hash for answer in answers.values()}) > 1:
+            sys.exit(f"{make.__name__}: answers differ")
+    for backend in ("gpu", "hybrid"):
+        if detectors[backend].stats["gpu_fallbacks"]:
+            sys.exit(f"{make.__name__}, {backend}: {detectors[backend].last_gpu_error}")

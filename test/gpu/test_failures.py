@@ -38,6 +38,31 @@ def test_every_call_of_a_frame_may_fail(backend):
     assert failures > 30
 
 
+@pytest.mark.parametrize(
+    "ask",
+    (lambda d, v: d.proximity(v, 0.1), lambda d, v: d.intersections(v), lambda d, v: d.detect(v, v[::-1].copy())),
+    ids=("proximity", "intersections", "separation"),
+)
+def test_every_call_of_a_distance_query_may_fail(ask):
+    scene, vertices, _ = scenes.join([scenes.crumpled(np.random.default_rng(3), 12)])
+    expected = ask(hc.Detector(scene, backend="cpu", minimum_separation=0.05), vertices).hash
+    failures = 0
+    for n in range(1, 400):
+        detector = hc.Detector(scene, backend="gpu", threads=2, minimum_separation=0.05)
+        _core.gpu_fail_after(n)
+        assert ask(detector, vertices).hash == expected
+        _core.gpu_fail_after(0)
+        failed = detector.stats["gpu_fallbacks"]
+        if not failed:
+            break
+        assert failed == 1 and "asked for by a test" in detector.last_gpu_error and detector.backend == "cpu"
+        failures += 1
+        assert ask(detector, vertices).hash == expected  # the device is back
+        assert detector.backend == "gpu"
+    assert not failed
+    assert failures > 30
+
+
 @pytest.mark.parametrize("seed", range(3, 9))
 def test_every_call_of_a_hybrid_frame_on_warm_devices_may_fail(seed):
     scene, t0, t1 = scenes.join([scenes.crumpled(np.random.default_rng(seed), 40)])

@@ -21,7 +21,7 @@ bool wanted(Backend backend, const char* name, const std::string& unsupported, c
 AvailableBackends::AvailableBackends(Resources& shared) : cpu_(shared) {
   const Options& o = shared.options;
   if (wanted(Backend::gpu, "gpu", GpuBackend::unsupported(o), o)) gpu_.emplace(shared);
-  if (wanted(Backend::hybrid, "hybrid", HybridBackend::unsupported(o), o)) hybrid_.emplace(shared, cpu_);
+  if (wanted(Backend::hybrid, "hybrid", "", o)) hybrid_.emplace(shared, cpu_);
 }
 
 DetectionBackend& AvailableBackends::at(Backend backend) {

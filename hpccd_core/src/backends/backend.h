@@ -17,9 +17,6 @@ struct Detection {
   Backend computed_by;  // the CPU, too, where it did what failing devices left undone
 };
 
-// Filters and tests of the devices hold for features that touch.
-inline constexpr const char* no_separation_on_gpus = "minimum_separation: not on the GPU; use backend=\"cpu\"";
-
 class DetectionBackend {
  public:
   virtual ~DetectionBackend() = default;

@@ -1,38 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "backends/gpu_backend.h"
 
-#include <algorithm>
-
-#include "elementary/batch.h"
-#include "elementary/fallback.h"
+#include "backends/gpu_undecided.h"
+#include "elementary/exact/intersection.h"
 #include "scene/static_meshes.h"
 
 namespace hpccd {
-namespace {
-
-Vec3<double> position(Positions p, std::uint32_t v) {
-  const std::size_t i = 3 * std::size_t{v};
-  if (p.is_double) {
-    const auto* x = static_cast<const double*>(p.data) + i;
-    return {x[0], x[1], x[2]};
-  }
-  const auto* x = static_cast<const float*>(p.data) + i;
-  return {x[0], x[1], x[2]};
-}
-
-}  // namespace
 
 std::string GpuBackend::unsupported(const Options& options) {
-  if (options.minimum_separation > 0) return no_separation_on_gpus;
   if (options.method != Method::standard)
     return "method: the published methods run on CPUs; use backend=\"cpu\", or method=\"default\"";
   return "";
 }
 
-std::optional<Detection> GpuBackend::detect(Positions t0, Positions t1) {
-  if (!t0.on_device && !t1.on_device) require_static_meshes_rest(*shared_.scene, t0, t1);
+// What the device computes with the CPU beside it, or nothing after a failure.
+template <class Compute>
+auto GpuBackend::attempt(Compute&& compute) -> std::optional<decltype(compute())> {
   try {
-    Detection found{compute(t0, t1), Backend::gpu};
+    std::optional found(compute());
     failures_.succeeded();
     shared_.cancellation.heed();
     return found;
@@ -44,72 +29,145 @@ std::optional<Detection> GpuBackend::detect(Positions t0, Positions t1) {
   }
 }
 
-Contacts GpuBackend::compute(Positions t0, Positions t1) {
+std::optional<Detection> GpuBackend::detect(Positions t0, Positions t1) {
+  if (!t0.on_device && !t1.on_device) require_static_meshes_rest(*shared_.scene, t0, t1);
+  return attempt([&] { return Detection{contacts(t0, t1), Backend::gpu}; });
+}
+
+std::optional<Contacts> GpuBackend::proximity(Positions vertices, double distance) {
+  return attempt([&] { return near_pairs(vertices, distance); });
+}
+
+std::optional<Intersections> GpuBackend::intersections(Positions vertices) {
+  return attempt([&] { return pierced_faces(vertices); });
+}
+
+Contacts GpuBackend::contacts(Positions t0, Positions t1) {
   const Options& o = shared_.options;
-  Profiler& profiler = shared_.profiler;
-  if (!pipeline_) {
-    pipeline_ = gpu::Pipeline::create(*shared_.scene, shared_.features, o.accuracy, gpu::status().devices.at(0).number,
-                                      o.gpu_stages);
-    profiler.mark("gpu_start");
-  }
-  update_tree(t0, t1);
+  const SeparationTable& table = shared_.separations;
+  prepare({table.any() ? gpu::Query::separations : gpu::Query::contacts, static_cast<double>(table.version())},
+          [&] { shared_.tree.bound(on_host(t0, 0), on_host(t1, 1), {}); });
   if (!pipeline_->run(t0, t1, shared_.pool)) {
     MotionBounds().update(on_host(t0, 0), on_host(t1, 1), shared_.pool);  // throws, and names the coordinate
     throw gpu::Error("the device found bad coordinates where the host finds none");
   }
-  profiler.mark("gpu");
-  const bool outputs = o.points || o.normals || o.closest;
-  const std::vector<Candidate>& undecided = pipeline_->undecided();
-  if (!undecided.empty() || outputs) t0 = on_host(t0, 0), t1 = on_host(t1, 1);
-  decide(undecided, t0, t1);
-  profiler.mark("exact");
-  const gpu::FrameResult device = pipeline_->finish();
-  profiler.mark("gpu_sort");
-  Contacts contacts = join(device, decided_, shared_.features, shared_.pool);
-  reduce(contacts, o.report);
-  if (outputs) {
-    motion_.update(t0, t1, shared_.pool);
-    add_points_and_normals(contacts, o, motion_, shared_.features, shared_.pool);
-  }
-  profiler.mark("contacts");
-  return contacts;
+  shared_.profiler.mark("gpu");
+  const Outputs outputs{o.points, o.normals, o.closest, AtTime::contact};
+  const bool places = o.points || o.normals || o.closest;
+  if (places || !pipeline_->undecided().empty()) t0 = on_host(t0, 0), t1 = on_host(t1, 1);
+  const Separations separations = shared_.separations_now();
+  decide([&](const Candidate& u) {
+    const UndecidedPair pair = undecided_pair(shared_.features, separations, u, t0, t1);
+    FallbackCounts counts;
+    return pair.separation > 0 ? decide_separation(Accuracy::exact, pair, counts)
+                               : decide_contact(Accuracy::exact, pair, counts);
+  });
+  Contacts found = join(finish(), decided_, shared_.features, shared_.pool);
+  reduce(found, o.report);
+  if (places) add_places(found, outputs, shared_.features, separations, t0, t1, shared_.pool);
+  shared_.profiler.mark("contacts");
+  return found;
 }
 
-// A new tree for the first step, and where refitting on the device has lost too much.
-void GpuBackend::update_tree(Positions t0, Positions t1) {
-  if (area_when_built_ == 0) area_when_built_ = pipeline_->relative_area();
-  if (has_tree_ && !worn_out(pipeline_->relative_area(), area_when_built_)) return;
-  shared_.tree.bound(on_host(t0, 0), on_host(t1, 1), {});
+Contacts GpuBackend::near_pairs(Positions vertices, double distance) {
+  run_snapshot(gpu::Query::proximity, vertices, distance);
+  const bool places = shared_.options.closest;
+  if (places || !pipeline_->undecided().empty()) vertices = on_host(vertices, 0);
+  const Separations separations{distance};
+  decide([&](const Candidate& u) {
+    const UndecidedPair pair = undecided_pair(shared_.features, separations, u, vertices, vertices);
+    FallbackCounts counts;
+    return decide_proximity(accuracy_of(u), pair, counts);
+  });
+  Contacts found = join(finish(), decided_, shared_.features, shared_.pool);
+  const Outputs outputs{false, false, places, AtTime::start};
+  if (places) add_places(found, outputs, shared_.features, separations, vertices, vertices, shared_.pool);
+  shared_.profiler.mark("contacts");
+  return found;
+}
+
+Intersections GpuBackend::pierced_faces(Positions vertices) {
+  run_snapshot(gpu::Query::intersections, vertices, 0);
+  if (!pipeline_->undecided().empty()) vertices = on_host(vertices, 0);
+  decide([&](const Candidate& u) {
+    Vec3<double> q[5];
+    edge_face_positions(shared_.features, u, vertices, q);
+    return exact::intersect(q) ? std::optional(0.0) : std::nullopt;
+  });
+  Intersections found = join_intersections(finish(), decided_, shared_.features);
+  shared_.profiler.mark("contacts");
+  return found;
+}
+
+void GpuBackend::run_snapshot(gpu::Query query, Positions vertices, double distance) {
+  prepare({query, distance}, [&] { shared_.tree.bound(on_host(vertices, 0)); });
+  if (!pipeline_->run_snapshot(query, vertices, distance, shared_.pool)) {
+    MotionBounds().update(*shared_.scene, on_host(vertices, 0), shared_.pool);  // throws, and names the coordinate
+    throw gpu::Error("the device found bad coordinates where the host finds none");
+  }
+  shared_.profiler.mark("gpu");
+}
+
+// A pipeline, and a tree: a new one for the first call, and where refitting on the device has lost too much.
+template <class Bound>
+void GpuBackend::prepare(Boxes boxes, Bound&& bound) {
+  if (!pipeline_) {
+    pipeline_ = gpu::Pipeline::create(*shared_.scene, shared_.features, shared_.options.accuracy, shared_.separations,
+                                      gpu::status().devices.at(0).number, shared_.options.gpu_stages);
+    shared_.profiler.mark("gpu_start");
+  }
+  const bool worn = has_tree_ && worn_out_on_device();
+  last_boxes_ = boxes;
+  if (has_tree_ && !worn) return;
+  has_tree_ = false;  // should this fail
+  bound();
   shared_.tree.build_anew();
   pipeline_->set_tree(shared_.tree.tree());
-  area_when_built_ = 0;  // known when the device has refitted it
+  area_when_built_.clear();  // known when the device has refitted it
   has_tree_ = true;
   shared_.profiler.mark("build");
 }
 
-// What neither the device nor its error bounds could decide.
-void GpuBackend::decide(const std::vector<Candidate>& undecided, Positions t0, Positions t1) {
-  const Features& features = shared_.features;
-  std::vector<std::optional<double>> toc(undecided.size());
+// By the last frame, against the first one whose boxes were of the same kind.
+bool GpuBackend::worn_out_on_device() {
+  const double area = pipeline_->relative_area();
+  if (!(area > 0)) return false;          // the frame was refused
+  constexpr std::size_t most_kinds = 64;  // who asks for another distance in each frame shall not fill the memory
+  if (area_when_built_.size() > most_kinds) area_when_built_.clear();
+  return worn_out(area, area_when_built_.try_emplace(last_boxes_, area).first->second);
+}
+
+// What neither the device nor its error bounds could decide: decide(pair) is its time or its distance, or nothing.
+template <class Decide>
+void GpuBackend::decide(Decide&& decide) {
+  const std::vector<Candidate>& undecided = pipeline_->undecided();
+  std::vector<std::optional<double>> values(undecided.size());
   constexpr std::size_t pairs_a_piece = 8;  // about 10 us, as long as it takes to wake a thread
   parallel_for(shared_.pool, undecided.size(), pairs_a_piece, [&](std::size_t begin, std::size_t end, int) {
-    for (std::size_t i = begin; i < end; ++i) {
-      const Candidate& u = undecided[i];
-      std::uint32_t v[4];
-      pair_vertices({nullptr, features.edges.data(), features.faces.data()}, u.kind, u.first, u.second, v);
-      UndecidedPair pair{u.kind, {}, {}, 0};
-      for (int k = 0; k < 4; ++k) pair.t0[k] = position(t0, v[k]), pair.t1[k] = position(t1, v[k]);
-      FallbackCounts counts;
-      toc[i] = decide_contact(Accuracy::exact, pair, counts);
-    }
+    for (std::size_t i = begin; i < end; ++i) values[i] = decide(undecided[i]);
   });
-  decided_.vertex_face.clear(), decided_.edge_edge.clear();
-  for (std::size_t i = 0; i < undecided.size(); ++i) {
-    if (!toc[i]) continue;
-    auto& list = undecided[i].kind == Kind::vertex_face ? decided_.vertex_face : decided_.edge_edge;
-    list.push_back({undecided[i].first, undecided[i].second, *toc[i]});
-  }
-  for (auto* list : {&decided_.vertex_face, &decided_.edge_edge}) std::sort(list->begin(), list->end(), before);
+  decided_ = decided_contacts(undecided, values);
+  shared_.profiler.mark("exact");
+}
+
+gpu::FrameResult GpuBackend::finish() {
+  const gpu::FrameResult found = pipeline_->finish();
+  shared_.profiler.mark("gpu_sort");
+  return found;
+}
+
+Accuracy GpuBackend::accuracy_of(const Candidate& pair) const {
+  const Features& f = shared_.features;
+  const bool edges = pair.kind == Kind::edge_edge;
+  const std::uint32_t first = edges ? f.edges[pair.first][0] : pair.first;
+  const std::uint32_t second = edges ? f.edges[pair.second][0] : f.faces[pair.second][0];
+  const auto& meshes = shared_.scene->meshes();
+  const auto mesh_of = [&](std::uint32_t vertex) {
+    std::uint32_t m = 0;
+    while (vertex - meshes[m].first_vertex >= meshes[m].n_vertices) ++m;
+    return m;
+  };
+  return shared_.rules.rule(mesh_of(first), mesh_of(second)).accuracy;
 }
 
 Positions GpuBackend::on_host(Positions p, int which) {

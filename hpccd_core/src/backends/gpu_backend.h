@@ -2,8 +2,10 @@
 // A whole step on one GPU; the CPU's exact fallback beside it.
 #pragma once
 
+#include <map>
 #include <memory>
 #include <string>
+#include <utility>
 
 #include "backends/backend.h"
 #include "backends/gpu_contacts.h"
@@ -19,6 +21,8 @@ class GpuBackend final : public DetectionBackend {
 
   std::optional<Detection> detect(Positions t0, Positions t1) override;
   void count(std::map<std::string, std::uint64_t>& stats) const override;
+  std::optional<Contacts> proximity(Positions vertices, double distance) override;
+  std::optional<Intersections> intersections(Positions vertices) override;
   void add_stages(std::map<std::string, double>& stages) const override;
 
   // Host arrays with the same positions. which: 0 or 1, the place where a copy is kept.
@@ -28,16 +32,30 @@ class GpuBackend final : public DetectionBackend {
   static std::string unsupported(const Options& options);
 
  private:
-  Contacts compute(Positions t0, Positions t1);
-  void update_tree(Positions t0, Positions t1);
-  void decide(const std::vector<Candidate>& undecided, Positions t0, Positions t1);
+  // What a tree is refitted to: boxes of a query, grown by so much.
+  using Boxes = std::pair<gpu::Query, double>;
+
+  template <class Compute>
+  auto attempt(Compute&& compute) -> std::optional<decltype(compute())>;
+  Contacts contacts(Positions t0, Positions t1);
+  Contacts near_pairs(Positions vertices, double distance);
+  Intersections pierced_faces(Positions vertices);
+  void run_snapshot(gpu::Query query, Positions vertices, double distance);
+  template <class Bound>
+  void prepare(Boxes boxes, Bound&& bound);
+  bool worn_out_on_device();
+  template <class Decide>
+  void decide(Decide&& decide);
+  gpu::FrameResult finish();
+  Accuracy accuracy_of(const Candidate& pair) const;
 
   Resources& shared_;
   std::unique_ptr<gpu::Pipeline> pipeline_;
   bool has_tree_ = false;
-  double area_when_built_ = 0;  // as the device measures it; 0: not known yet
+  // How the device measured the tree when it first refitted it to such boxes.
+  std::map<Boxes, double> area_when_built_;
+  Boxes last_boxes_;
   DecidedContacts decided_;
-  MotionBounds motion_;  // only where points or normals are asked for
 };
 
 }  // namespace hpccd

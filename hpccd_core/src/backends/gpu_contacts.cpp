@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <functional>
 
+#include "backends/gpu_undecided.h"
 #include "contacts/hash.h"
-#include "contacts/places.h"
 #include "traverse/worker.h"
 
 namespace hpccd {
@@ -13,6 +13,7 @@ namespace {
 
 using VertexFace = std::array<std::uint32_t, 2>;
 using EdgeEdge = std::array<std::uint32_t, 4>;
+using EdgeFace = std::array<std::uint32_t, 3>;
 
 // `from` with one more at each of the places in `at` (ascending), by whole runs.
 template <class T, class Get>
@@ -112,19 +113,42 @@ void reduce(Contacts& c, Report report) {
   for (std::size_t i = 0; i < c.ee.size(); ++i) c.hash += hash_of_row(c.ee[i], c.ee_toc[i]);
 }
 
-void add_points_and_normals(Contacts& c, const Options& options, const MotionBounds& motion, const Features& features,
-                            ThreadPool& pool) {
+Intersections join_intersections(const gpu::FrameResult& d, const DecidedContacts& decided, const Features& features) {
+  const auto row = [&](std::size_t i) {
+    const Contact& c = decided.vertex_face[i];
+    return EdgeFace{features.edges[c.first][0], features.edges[c.first][1], c.second};
+  };
+  Intersections found;
+  found.ef = spliced(d.ef, d.n_ef, places(d.ef, d.n_ef, decided.vertex_face.size(), row), row);
+  found.hash = d.hash;
+  for (std::size_t i = 0; i < decided.vertex_face.size(); ++i) {
+    const EdgeFace r = row(i);
+    found.hash += hash_of(Kind::edge_face, pack(r[0], r[1]), r[2], 0);
+  }
+  return found;
+}
+
+void add_places(Contacts& c, Outputs outputs, const Features& features, const Separations& separations, Positions t0,
+                Positions t1, ThreadPool& pool) {
   const auto& edges = features.edges;
-  const Geometry geometry{motion.vertices.data(), edges.data(), features.faces.data(), nullptr, motion.map.scale};
+  std::vector<VertexMotion> vertices(t0.n);
+  parallel_for(pool, vertices.size(), 4096, [&](std::size_t begin, std::size_t end, int) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const Vec3<double> a = position(t0, static_cast<std::uint32_t>(i)),
+                         b = position(t1, static_cast<std::uint32_t>(i));
+      vertices[i] = {{a.x, a.y, a.z, 0}, {b.x, b.y, b.z, 0}};
+    }
+  });
+  Geometry geometry{vertices.data(), edges.data(), features.faces.data()};
+  geometry.separations = separations;
   const auto edge_number = [&](std::uint32_t v0, std::uint32_t v1) {
     const std::array<std::uint32_t, 2> e{v0, v1};
     return static_cast<std::uint32_t>(std::lower_bound(edges.begin(), edges.end(), e) - edges.begin());
   };
   const std::size_t n = c.vf.size(), m = c.ee.size();
-  if (options.points) c.points.resize(n + m);
-  if (options.normals) c.normals.resize(n + m);
-  if (options.closest) c.closest.resize(n + m);
-  const Outputs outputs{options.points, options.normals, options.closest, AtTime::contact};
+  if (outputs.points) c.points.resize(n + m);
+  if (outputs.normals) c.normals.resize(n + m);
+  if (outputs.closest) c.closest.resize(n + m);
   parallel_for(pool, n + m, 1024, [&](std::size_t begin, std::size_t end, int) {
     for (std::size_t i = begin; i < end; ++i) {
       const bool vf = i < n;

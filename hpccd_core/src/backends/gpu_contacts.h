@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "base/parallel.h"
-#include "bvh/motion_bounds.h"
+#include "contacts/places.h"
 #include "elementary/pair.h"
 #include "gpu/pipeline.h"
 #include "scene/features.h"
@@ -17,14 +17,17 @@ struct DecidedContacts {
   std::vector<Contact> vertex_face, edge_edge;
 };
 
+// Of edges and faces, which the pipeline numbers as vertices and faces.
+Intersections join_intersections(const gpu::FrameResult& device, const DecidedContacts& decided,
+                                 const Features& features);
+
 Contacts join(const gpu::FrameResult& device, const DecidedContacts& decided, const Features& features,
               ThreadPool& pool);
 
 // The device finds all contacts: drops what was not asked for.
 void reduce(Contacts& contacts, Report report);
 
-// Those that the options ask for.
-void add_points_and_normals(Contacts& contacts, const Options& options, const MotionBounds& motion,
-                            const Features& features, ThreadPool& pool);
+void add_places(Contacts& contacts, Outputs outputs, const Features& features, const Separations& separations,
+                Positions t0, Positions t1, ThreadPool& pool);
 
 }  // namespace hpccd

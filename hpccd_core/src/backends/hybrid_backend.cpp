@@ -28,10 +28,6 @@ void keep_first(std::vector<Worker>& workers) {
 
 }  // namespace
 
-std::string HybridBackend::unsupported(const Options& options) {
-  return options.minimum_separation > 0 ? no_separation_on_gpus : "";
-}
-
 std::optional<Detection> HybridBackend::detect(Positions t0, Positions t1) {
   if (!engine_ && !start()) return std::nullopt;
   std::vector<Worker>& workers = cpu_.workers();
@@ -55,9 +51,9 @@ std::optional<Detection> HybridBackend::detect(Positions t0, Positions t1) {
 bool HybridBackend::start() {
   const Options& o = shared_.options;
   try {
-    engine_ =
-        std::make_unique<hybrid::Engine>(hybrid::cuda_devices(*shared_.scene, shared_.features, o.accuracy, o.gpus),
-                                         hybrid::Sizes{o.hybrid_segments, o.hybrid_segment_pairs}, shared_.pool);
+    engine_ = std::make_unique<hybrid::Engine>(
+        hybrid::cuda_devices(*shared_.scene, shared_.features, o.accuracy, shared_.separations, o.gpus),
+        hybrid::Sizes{o.hybrid_segments, o.hybrid_segment_pairs}, shared_.pool);
   } catch (const gpu::Error& e) {
     failures_.failed(e.what());
     return false;

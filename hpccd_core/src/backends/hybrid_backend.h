@@ -19,9 +19,6 @@ class HybridBackend final : public DetectionBackend {
   std::optional<Detection> detect(Positions t0, Positions t1) override;
   void count(std::map<std::string, std::uint64_t>& stats) const override;
 
-  // Why it cannot take a detector with these options; empty where it can.
-  static std::string unsupported(const Options& options);
-
  private:
   bool start();
   hybrid::LeafTable leaves();

@@ -3,7 +3,10 @@
 #pragma once
 
 #include "bvh/coordinate_map.h"
+#include "bvh/kdop.h"
+#include "bvh/tree.h"
 #include "gpu/launch_params.cuh"
+#include "gpu/reach.h"
 
 namespace hpccd::gpu {
 
@@ -24,7 +27,7 @@ __global__ void extent_kernel(LaunchParams<T> params) {
   for (u32 i = blockIdx.x * blockDim.x + threadIdx.x; i < params.n_vertices; i += stride)
     for (int k = 0; k < 3; ++k) {
       const double a = params.given_t0[3 * static_cast<u64>(i) + k], b = params.given_t1[3 * static_cast<u64>(i) + k];
-      bad = bad || !(fabs(a) <= largest_coordinate) || !(fabs(b) <= largest_coordinate);
+      bad = bad || !(fabs(a) <= params.largest) || !(fabs(b) <= params.largest);
       low[k] = fmin(low[k], fmin(a, b));
       high[k] = fmax(high[k], fmax(a, b));
     }
@@ -54,14 +57,15 @@ __device__ inline void set_ends(GivenEnds<double>& r, const double* a, const dou
   r.t0[0] = {a[0], a[1]}, r.t0[1] = {a[2], 0}, r.t1[0] = {b[0], b[1]}, r.t1[1] = {b[2], 0};
 }
 
-template <class T>
+template <bool snapshot, class T>
 __global__ void vertices_kernel(LaunchParams<T> params) {
   const u32 i = blockIdx.x * blockDim.x + threadIdx.x;
   if (i >= params.n_vertices) return;
-  double low[3], high[3];
+  double low[3], high[3], largest = 0;
   for (int k = 0; k < 3; ++k) {
     low[k] = from_ordered_bits(~params.counters->extent_low[k]);
     high[k] = from_ordered_bits(params.counters->extent_high[k]);
+    largest = greater(largest, greater(magnitude(low[k]), magnitude(high[k])));
   }
   const CoordinateMap map = CoordinateMap::around(low, high);
   T a[3], b[3];
@@ -70,7 +74,15 @@ __global__ void vertices_kernel(LaunchParams<T> params) {
     a[k] = params.given_t0[3 * static_cast<u64>(i) + k], b[k] = params.given_t1[3 * static_cast<u64>(i) + k];
     point.at[0].x[k] = map(a[k], k), point.at[1].x[k] = map(b[k], k);
   }
-  point.at[0].tag = point.at[1].tag = 0;
+  const double separation =
+      params.largest_separation ? params.largest_separation[params.mesh_of_vertex[i]] : params.separation;
+  const float reach = reach_of(separation, map.scale, largest);
+  point.at[0].tag = point.at[1].tag = __float_as_uint(reach);
+  if constexpr (snapshot) {
+    const SlantedCoordinates slanted({a[0], a[1], a[2]}, map);
+    for (int k = 0; k < 3; ++k) point.at[1].x[k] = slanted.along[k];
+    point.at[1].tag = __float_as_uint(slanted_reach(reach));
+  }
   set_ends(params.vertices[i], a, b);
   for (int end = 0; end < 2; ++end) store(&params.points[i].at[end], point.at[end]);
 }

@@ -5,6 +5,7 @@
 #pragma once
 
 #include "bvh/tree.h"
+#include "elementary/distance/separation_test.h"
 #include "elementary/filtered_test.h"
 #include "gpu/launch_params.cuh"
 
@@ -19,7 +20,7 @@ struct CandidateSpace {
   Bound bound[2][4][3 * Tree::leaf_size];
   u32 number[2][3 * Tree::leaf_size];
   u32 corner2[Tree::leaf_size];
-  // Candidates: the vertices that p, a and b lead from and to (span_ends), and the features.
+  // Candidates: the vertices that p, a and b lead from and to (span_ends; not of a snapshot), and the features.
   uint4 vertices[64];
   uint2 features[64];
   uint2 survivors[2][96];
@@ -35,14 +36,14 @@ struct CandidateSpace {
 };
 
 // Edges of a leaf that overlap the leaf `other`, one after the other in list `side`.
-template <class T>
+template <Query query, class T>
 __device__ u32 stage_edges(const LaunchParams<T>& params, const DeviceLeaf& l, u32 other, CandidateSpace& s, u32 side) {
   const u32 lane = lane_number(), slot = l.first_edge + lane;
   DeviceBox b;
   bool near = lane < l.n_edges();
   if (near) {
     b = load_box(&params.edge_boxes[slot]);
-    near = overlap(b, load_box(&params.leaf_boxes[other]));
+    near = overlap<query>(b, load_box(&params.leaf_boxes[other]));
   }
   const u32 mask = __ballot_sync(all_lanes, near), at = __popc(mask & ((1u << lane) - 1));
   if (near) {
@@ -52,7 +53,7 @@ __device__ u32 stage_edges(const LaunchParams<T>& params, const DeviceLeaf& l, u
   return __popc(mask);
 }
 
-template <class T>
+template <Query query, class T>
 __device__ u32 stage_vertices(const LaunchParams<T>& params, const DeviceLeaf& l, u32 other, CandidateSpace& s) {
   const u32 lane = lane_number();
   DeviceBox b;
@@ -60,8 +61,8 @@ __device__ u32 stage_vertices(const LaunchParams<T>& params, const DeviceLeaf& l
   bool near = lane < l.n_vertices();
   if (near) {
     v = __ldg(&params.vertex_of_slot[l.first_vertex + lane]);
-    b = load_point(&params.points[v]);
-    near = overlap(b, load_box(&params.leaf_boxes[other]));
+    b = load_point<grows_boxes(query)>(&params.points[v]);
+    near = overlap<query>(b, load_box(&params.leaf_boxes[other]));
   }
   const u32 mask = __ballot_sync(all_lanes, near), at = __popc(mask & ((1u << lane) - 1));
   if (near) {
@@ -71,14 +72,14 @@ __device__ u32 stage_vertices(const LaunchParams<T>& params, const DeviceLeaf& l
   return __popc(mask);
 }
 
-template <class T>
+template <Query query, class T>
 __device__ u32 stage_faces(const LaunchParams<T>& params, const DeviceLeaf& l, u32 other, CandidateSpace& s) {
   const u32 lane = lane_number(), slot = l.first_face + lane;
   DeviceBox b;
   bool near = lane < l.n_faces();
   if (near) {
     b = load_box(&params.face_boxes[slot]);
-    near = overlap(b, load_box(&params.leaf_boxes[other]));
+    near = overlap<query>(b, load_box(&params.leaf_boxes[other]));
   }
   const u32 mask = __ballot_sync(all_lanes, near), at = __popc(mask & ((1u << lane) - 1));
   if (near) {
@@ -115,8 +116,21 @@ __device__ __forceinline__ uint4 span_ends(u32 v0, u32 v1, u32 v2, u32 v3) {
   return {v[S::p_from], v[S::p_to], v[S::a_to], v[S::b_to]};
 }
 
-// The first filter on the last up to 32 candidates. One piece of code for both kinds: they differ in where b starts.
-template <class T>
+// Whether the first filter lets a pair pass. One piece of code for both kinds: they differ in where b starts.
+template <Query query, class T>
+__device__ __forceinline__ bool passes_filter(const LaunchParams<T>& params, uint4 v, bool edges) {
+  const Ends from = load_ends(params.vertices, v.x), p = load_ends(params.vertices, v.y),
+             a = load_ends(params.vertices, v.z), b = load_ends(params.vertices, v.w);
+  const Vec3<double> b_from0 = edges ? p.t0 : from.t0, b_from1 = edges ? p.t1 : from.t1;
+  const Motion<double> m{p.t0 - from.t0, a.t0 - from.t0, b.t0 - b_from0,
+                         p.t1 - from.t1, a.t1 - from.t1, b.t1 - b_from1};
+  // Without a separation both say the same, in every bit.
+  if constexpr (query == Query::separations) return !planes_stay_apart(m, separation_of(params, v.x, v.y));
+  return !coplanarity_filter<Proven>(m).none;
+}
+
+// The last up to 32 candidates.
+template <Query query, class T>
 __device__ __forceinline__ void filter_candidates(const LaunchParams<T>& params, CandidateSpace& s,
                                                   CandidateState& state) {
   __syncwarp();
@@ -125,16 +139,10 @@ __device__ __forceinline__ void filter_candidates(const LaunchParams<T>& params,
   bool survives = false, edges = false;
   uint2 features{0, 0};
   if (lane < n) {
-    const uint4 v = s.vertices[state.n + lane];
     features = s.features[state.n + lane];
     edges = features.y & kind_bit;
     features.y &= ~kind_bit;
-    const Ends from = load_ends(params.vertices, v.x), p = load_ends(params.vertices, v.y),
-               a = load_ends(params.vertices, v.z), b = load_ends(params.vertices, v.w);
-    const Vec3<double> b_from0 = edges ? p.t0 : from.t0, b_from1 = edges ? p.t1 : from.t1;
-    const Motion<double> m{p.t0 - from.t0, a.t0 - from.t0, b.t0 - b_from0,
-                           p.t1 - from.t1, a.t1 - from.t1, b.t1 - b_from1};
-    survives = !coplanarity_filter<Proven>(m).none;
+    survives = of_snapshot(query) || passes_filter<query>(params, s.vertices[state.n + lane], edges);
   }
 #pragma unroll
   for (u32 kind = 0; kind < 2; ++kind) {
@@ -161,12 +169,13 @@ struct LanePair {
 // i / n for i < 1024 and n <= 32: exact, since the error i (magic n - 65536) / (65536 n) stays below 1 / n.
 __device__ inline u32 magic_of(u32 n) { return (65536 + n - 1) / n; }
 
+template <Query query>
 __device__ __forceinline__ LanePair edge_pair(const CandidateSpace& s, u32 i, u32 j, bool same, bool valid) {
   LanePair c{valid && (!same || i < j), {0, 0, 0, 0}, {0, 0}};
   if (!c.wanted) return c;
   const u32 side = same ? 0 : 1;
   const DeviceBox a = s.box(0, i), b = s.box(side, j);
-  c.wanted = overlap(a, b) && a.tag_low() != b.tag_low() && a.tag_low() != b.tag_high() &&
+  c.wanted = overlap<query>(a, b) && a.tag_low() != b.tag_low() && a.tag_low() != b.tag_high() &&
              a.tag_high() != b.tag_low() && a.tag_high() != b.tag_high();
   const u32 x = s.number[0][i], y = s.number[side][j];
   const uint2 ends_a{a.tag_low(), a.tag_high()}, ends_b{b.tag_low(), b.tag_high()};
@@ -176,58 +185,86 @@ __device__ __forceinline__ LanePair edge_pair(const CandidateSpace& s, u32 i, u3
   return c;
 }
 
+template <Query query>
 __device__ __forceinline__ LanePair vertex_face_pair(const CandidateSpace& s, u32 i, u32 j, bool valid) {
   LanePair c{valid, {0, 0, 0, 0}, {0, 0}};
   if (!valid) return c;
   const DeviceBox vertex = s.box(0, i), face = s.box(1, j);
   const u32 v = vertex.tag_low(), f0 = face.tag_low(), f1 = face.tag_high(), f2 = s.corner2[j];
   c.vertices = span_ends<Kind::vertex_face>(v, f0, f1, f2);
-  c.wanted = overlap(vertex, face) && v != f0 && v != f1 && v != f2;
+  c.wanted = overlap<query>(vertex, face) && v != f0 && v != f1 && v != f2;
   c.features = {v, s.number[1][j]};
   return c;
 }
 
-// Phases of a pair of leaves: edges, vertices of the first, vertices of the second. The filter stands in one place in
-// the innermost loop: called as a function it costs 30 million spills on n-body, repeated it overflows the code cache.
-template <class T>
+// Intersections have no order of edge and face to choose.
+template <Query query>
+__device__ __forceinline__ LanePair edge_face_pair(const CandidateSpace& s, u32 i, u32 j, bool valid) {
+  LanePair c{valid, {0, 0, 0, 0}, {0, 0}};
+  if (!valid) return c;
+  const DeviceBox edge = s.box(0, i), face = s.box(1, j);
+  const u32 f[3] = {face.tag_low(), face.tag_high(), s.corner2[j]};
+  c.wanted = overlap<query>(edge, face);
+  for (const u32 v : f) c.wanted = c.wanted && edge.tag_low() != v && edge.tag_high() != v;
+  c.features = {s.number[0][i], s.number[1][j]};
+  return c;
+}
+
+// Features of the two leaves that may be a pair in a phase: edges, vertices of the first, vertices of the second; or
+// edges of the first and edges of the second. Returns how many there are of each side.
+template <Query query, class T>
+__device__ __forceinline__ uint2 stage_phase(const LaunchParams<T>& params, CandidateSpace& s, uint2 pair, u32 phase) {
+  constexpr bool edges_and_faces = query == Query::intersections;
+  const bool same = pair.x == pair.y, swapped = phase == (edges_and_faces ? 1 : 2);
+  const u32 x = swapped ? pair.y : pair.x, y = swapped ? pair.x : pair.y;
+  const DeviceLeaf a = params.leaves[x], b = params.leaves[y];
+  u32 n_first;
+  if constexpr (edges_and_faces) {
+    n_first = stage_edges<query>(params, a, y, s, 0);
+  } else if (phase == 0) {
+    n_first = stage_edges<query>(params, a, y, s, 0);
+    return {n_first, same ? n_first : stage_edges<query>(params, b, x, s, 1)};
+  } else {
+    n_first = stage_vertices<query>(params, a, y, s);
+  }
+  return {n_first, n_first ? stage_faces<query>(params, b, x, s) : 0};
+}
+
+// The filter stands in one place in the innermost loop: called as a function it costs 30 million spills on n-body,
+// repeated it overflows the code cache.
+template <Query query, class T>
 __device__ __forceinline__ void leaf_pair_candidates(const LaunchParams<T>& params, CandidateSpace& s,
                                                      CandidateState& state, uint2 pair) {
+  constexpr bool edges_and_faces = query == Query::intersections;
   const bool same = pair.x == pair.y;
-  const u32 n_phases = same ? 2 : 3;
+  const u32 n_phases = (same ? 2 : 3) - (edges_and_faces ? 1 : 0);
 #pragma unroll 1
   for (u32 phase = 0; phase < n_phases; ++phase) {
-    u32 n_first, n_second;
-    {
-      const u32 x = phase == 2 ? pair.y : pair.x, y = phase == 2 ? pair.x : pair.y;
-      const DeviceLeaf a = params.leaves[x], b = params.leaves[y];
-      if (phase == 0) {
-        n_first = stage_edges(params, a, y, s, 0);
-        n_second = same ? n_first : stage_edges(params, b, x, s, 1);
-      } else {
-        n_first = stage_vertices(params, a, y, s);
-        n_second = n_first ? stage_faces(params, b, x, s) : 0;
-      }
-    }
+    const uint2 n = stage_phase<query>(params, s, pair, phase);
     __syncwarp();
-    const u32 total = n_first * n_second, magic = magic_of(n_second ? n_second : 1);
+    const u32 total = n.x * n.y, magic = magic_of(n.y ? n.y : 1);
 #pragma unroll 1
     for (u32 base = 0; base < total; base += 32) {
-      const u32 c = base + lane_number(), i = c * magic >> 16, j = c - i * n_second;
-      const LanePair pushed = phase == 0 ? edge_pair(s, i, j, same, c < total) : vertex_face_pair(s, i, j, c < total);
+      const u32 c = base + lane_number(), i = c * magic >> 16, j = c - i * n.y;
+      LanePair pushed;
+      if constexpr (edges_and_faces)
+        pushed = edge_face_pair<query>(s, i, j, c < total);
+      else
+        pushed = phase == 0 ? edge_pair<query>(s, i, j, same, c < total) : vertex_face_pair<query>(s, i, j, c < total);
       const u32 mask = __ballot_sync(all_lanes, pushed.wanted);
       const u32 at = state.n + __popc(mask & ((1u << lane_number()) - 1));
       if (pushed.wanted) {
-        s.vertices[at] = pushed.vertices;
+        if constexpr (!of_snapshot(query)) s.vertices[at] = pushed.vertices;
         s.features[at] = pushed.features;
       }
       state.n += __popc(mask);
-      if (state.n >= 32) filter_candidates(params, s, state);
+      if (state.n >= 32) filter_candidates<query>(params, s, state);
     }
     __syncwarp();
   }
 }
 
-template <class T>
+template <Query query, class T>
 __global__ __launch_bounds__(32 * candidate_warps,
                              5) void candidates_kernel(const __grid_constant__ LaunchParams<T> params) {
   __shared__ CandidateSpace spaces[candidate_warps];
@@ -245,9 +282,9 @@ __global__ __launch_bounds__(32 * candidate_warps,
     if (begin >= to) break;
 #pragma unroll 1
     for (u64 k = begin; k < begin + grain && k < to; ++k)
-      leaf_pair_candidates(params, s, state, params.leaf_pairs.pairs[k]);
+      leaf_pair_candidates<query>(params, s, state, params.leaf_pairs.pairs[k]);
   }
-  if (state.n > 0) filter_candidates(params, s, state);
+  if (state.n > 0) filter_candidates<query>(params, s, state);
   for (u32 kind = 0; kind < 2; ++kind)
     if (state.n_survivors[kind] > 0) flush_survivors(params, s, kind, state.n_survivors[kind]);
   if (lane_number() == 0)

@@ -44,32 +44,45 @@ class DeviceContacts {
 
   // Sorts what the frame has found, and writes it out.
   template <class T>
-  void launch(const LaunchParams<T>& params, const Counters& c, int multiprocessors, cudaStream_t stream,
+  void launch(Query query, const LaunchParams<T>& params, const Counters& c, int multiprocessors, cudaStream_t stream,
               StageTimer& timer) {
     const auto n = static_cast<u32>(c.found_all);
     const auto roomy = [](u64 x) { return static_cast<std::size_t>(x + x / 4 + 1024); };
-    if (c.found[0] > vf_.size()) vf_.reserve(roomy(c.found[0]));
-    if (c.found[1] > ee_.size()) ee_.reserve(roomy(c.found[1]));
-    if (n > toc_.size()) toc_.reserve(roomy(n));
+    if (query == Query::intersections) {
+      if (n > ef_.size()) ef_.reserve(roomy(n));
+    } else {
+      if (c.found[0] > vf_.size()) vf_.reserve(roomy(c.found[0]));
+      if (c.found[1] > ee_.size()) ee_.reserve(roomy(c.found[1]));
+      if (n > toc_.size()) toc_.reserve(roomy(n));
+    }
     if (n == 0) return;
     sort_pairs(workspace_.data(), workspace_.bytes(), keys_.data(), sorted_keys_.data(), numbers_.data(), order_.data(),
                static_cast<int>(n), key_bits_, stream);
     timer.mark("sort", stream);
-    results_kernel<<<std::min(blocks_for(n, 128), 8u * multiprocessors), 128, 0, stream>>>(
-        params, sorted_keys_.data(), order_.data(), n, static_cast<u32>(c.found[0]), vf_.data(), ee_.data(),
-        toc_.data());
+    const unsigned blocks = std::min(blocks_for(n, 128), 8u * multiprocessors);
+    if (query == Query::intersections)
+      intersections_kernel<<<blocks, 128, 0, stream>>>(params, sorted_keys_.data(), n, ef_.data());
+    else
+      results_kernel<<<blocks, 128, 0, stream>>>(params, sorted_keys_.data(), order_.data(), n,
+                                                 static_cast<u32>(c.found[0]), vf_.data(), ee_.data(), toc_.data());
     check_launch("results_kernel");
     timer.mark("results", stream);
   }
 
   // When the stream has come to its end.
-  FrameResult result(const Counters& c) const {
-    return {c.found[0],
-            c.found[1],
-            reinterpret_cast<const std::array<u32, 2>*>(vf_.data()),
-            reinterpret_cast<const std::array<u32, 4>*>(ee_.data()),
-            toc_.data(),
-            c.hash};
+  FrameResult result(Query query, const Counters& c) const {
+    FrameResult r;
+    r.hash = c.hash;
+    if (query == Query::intersections) {
+      r.n_ef = c.found_all;
+      r.ef = reinterpret_cast<const std::array<u32, 3>*>(ef_.data());
+      return r;
+    }
+    r.n_vf = c.found[0], r.n_ee = c.found[1];
+    r.vf = reinterpret_cast<const std::array<u32, 2>*>(vf_.data());
+    r.ee = reinterpret_cast<const std::array<u32, 4>*>(ee_.data());
+    r.toc = toc_.data();
+    return r;
   }
 
   std::size_t bytes() const {
@@ -87,6 +100,7 @@ class DeviceContacts {
   DeviceBuffer<unsigned char> workspace_;
   PinnedBuffer<uint2> vf_;
   PinnedBuffer<uint4> ee_;
+  PinnedBuffer<uint3> ef_;
   PinnedBuffer<double> toc_;
 };
 

@@ -23,11 +23,12 @@ class DeviceMotion {
 
   // From the positions that the frame names; clears its counters.
   template <class T>
-  void launch(const LaunchParams<T>& params, int multiprocessors, cudaStream_t stream) const {
+  void launch(Query query, const LaunchParams<T>& params, int multiprocessors, cudaStream_t stream) const {
     check(cudaMemsetAsync(params.counters, 0, sizeof(Counters), stream), "cudaMemsetAsync");
     extent_kernel<<<std::min(blocks_for(params.n_vertices, 256), 2u * multiprocessors), 256, 0, stream>>>(params);
     check_launch("extent_kernel");
-    vertices_kernel<<<blocks_for(params.n_vertices, 256), 256, 0, stream>>>(params);
+    const auto kernel = of_snapshot(query) ? vertices_kernel<true, T> : vertices_kernel<false, T>;
+    kernel<<<blocks_for(params.n_vertices, 256), 256, 0, stream>>>(params);
     check_launch("vertices_kernel");
   }
 

@@ -25,6 +25,10 @@ class DevicePositions {
     const std::size_t bytes = 3 * t0.n * sizeof(T), words = std::max<std::size_t>((bytes + 7) / 8, 1);
     char* to[2] = {nullptr, nullptr};
     for (int i = 0; i < 2; ++i) {
+      if (i == 1 && ends[1].data == ends[0].data) {  // of one snapshot
+        given[1] = given[0];
+        break;
+      }
       given[i] = static_cast<const T*>(ends[i].data);
       const bool on_device = ends[i].on_device;
       if (on_device && (bytes == 0 || settled_device(given[i]) == device_)) continue;

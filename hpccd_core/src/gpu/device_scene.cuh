@@ -9,13 +9,15 @@
 #include "gpu/launch_params.cuh"
 #include "gpu/stream.h"
 #include "scene/features.h"
+#include "scene/separation_table.h"
 
 namespace hpccd::gpu {
 
 class DeviceScene {
  public:
   // On the current device. Throws Error where the scene has too many features for 31-bit numbers.
-  DeviceScene(const Scene& scene, const Features& features, Accuracy accuracy) : features_(features) {
+  DeviceScene(const Scene& scene, const Features& features, Accuracy accuracy, const SeparationTable& separations)
+      : features_(features), separations_(separations) {
     const auto n_edges = features.edges.size();
     if (features.n_vertices >= kind_bit || n_edges >= kind_bit || features.n_faces() >= kind_bit)
       throw Error("the scene has 2^31 or more features of one kind; use backend=\"cpu\"");
@@ -35,6 +37,27 @@ class DeviceScene {
     params.default_accuracy = default_accuracy_;
     params.keys = keys_;
   }
+
+  // What a frame of motions looks for.
+  Query query_now() const { return separations_.any() ? Query::separations : Query::contacts; }
+  // Brings the separations to the device, where they have changed; to be called before a frame of motions.
+  void update_separations() {
+    if (!separations_.any() || separations_.version() == uploaded_) return;
+    uploaded_ = 0;  // none, should this fail
+    upload(pair_separation_, separations_.all().data(), separations_.all().size());
+    upload(largest_separation_, separations_.largest().data(), separations_.largest().size());
+    uploaded_ = separations_.version();
+  }
+  // For frames of that query.
+  template <class T>
+  void fill_separations(LaunchParams<T>& params) const {
+    const bool any = query_now() == Query::separations;
+    params.separation = 0;
+    params.separations = any ? pair_separation_.data() : nullptr;
+    params.largest_separation = any ? largest_separation_.data() : nullptr;
+  }
+  // Changes with all that fill_separations names.
+  u64 separations_version() const { return separations_.version(); }
 
   const PairKeys& keys() const { return keys_; }
   std::size_t bytes() const { return edges_.bytes() + faces_.bytes() + mesh_of_vertex_.bytes(); }
@@ -61,9 +84,12 @@ class DeviceScene {
   }
 
   const Features& features_;
+  const SeparationTable& separations_;
+  std::uint64_t uploaded_ = 0;  // version of the separations there
   DeviceBuffer<uint2> edges_;
   DeviceBuffer<u32> faces_, mesh_of_vertex_;
   DeviceBuffer<unsigned char> enabled_, accuracy_;
+  DeviceBuffer<double> pair_separation_, largest_separation_;
   bool all_enabled_ = true, one_accuracy_ = true;
   u32 n_meshes_ = 0;
   PairKeys keys_;

@@ -6,52 +6,38 @@
 #include "elementary/extended_precision.h"
 #include "elementary/filtered_test.h"
 #include "elementary/tolerance_test.h"
-#include "gpu/launch_params.cuh"
+#include "gpu/pair_lists.cuh"
 
 namespace hpccd::gpu {
 
-// How many entries of a list are really there.
-__device__ inline u64 length(u64 counted, u64 capacity) { return counted < capacity ? counted : capacity; }
+// Which of the root tests a pair needs, if any.
+struct RootTests {
+  bool one, many;
+};
 
-// f(pair or nothing) for each pair of a list, whole warps at a time.
-template <class Function>
-__device__ void for_pairs(const PairList& list, u64 counted, Function&& function) {
-  const u64 n = length(counted, list.capacity), stride = static_cast<u64>(gridDim.x) * blockDim.x;
-  const u64 first = static_cast<u64>(blockIdx.x) * blockDim.x + threadIdx.x;
-  for (u64 i = first; i - lane_number() < n; i += stride) {
-    const bool valid = i < n;
-    function(valid, valid ? list.pairs[i] : uint2{0, 0});
-  }
+template <Kind kind, class T>
+__device__ __forceinline__ RootTests root_tests(const LaunchParams<T>& params, uint2 pair) {
+  const Motion<double> m = load_motion<kind>(params.vertices, vertices_of<kind>(params, pair.x, pair.y));
+  const Magnitudes<double> size = magnitudes(m);
+  const bool usable = in_range(size);
+  const bool passes = !(certainly_outside<kind>(m, size) && usable);
+  const bool single = certainly_one_root(coplanarity(m), error_of<Proven>(size).coefficient) && usable;
+  return {passes && single, passes && !single};
+}
+
+template <class T>
+__device__ __forceinline__ void append_to_root_tests(const LaunchParams<T>& params, u32 k, uint2 pair,
+                                                     RootTests wanted) {
+  append_pair(params.single[k], &params.counters->single[k], wanted.one, pair);
+  append_pair(params.many[k], &params.counters->many[k], wanted.many, pair);
 }
 
 template <Kind kind, class T>
 __global__ __launch_bounds__(128) void projection_kernel(const __grid_constant__ LaunchParams<T> params) {
   constexpr u32 k = kind == Kind::edge_edge;
   for_pairs(params.survivors[k], params.counters->survivors[k], [&](bool valid, uint2 pair) {
-    bool one = false, many = false;
-    if (valid) {
-      const Motion<double> m = load_motion<kind>(params.vertices, vertices_of<kind>(params, pair.x, pair.y));
-      const Magnitudes<double> size = magnitudes(m);
-      const bool usable = in_range(size);
-      const bool passes = !(certainly_outside<kind>(m, size) && usable);
-      const bool single = certainly_one_root(coplanarity(m), error_of<Proven>(size).coefficient) && usable;
-      one = passes && single;
-      many = passes && !single;
-    }
-    const u64 at_one = warp_append(&params.counters->single[k], one),
-              at_many = warp_append(&params.counters->many[k], many);
-    if (one && at_one < params.single[k].capacity) params.single[k].pairs[at_one] = pair;
-    if (many && at_many < params.many[k].capacity) params.many[k].pairs[at_many] = pair;
+    append_to_root_tests(params, k, pair, valid ? root_tests<kind>(params, pair) : RootTests{false, false});
   });
-}
-
-template <class T>
-__device__ void append_found(const LaunchParams<T>& params, Kind kind, bool wanted, uint2 pair, double toc) {
-  const u64 at = warp_append(&params.counters->found_all, wanted);
-  if (wanted && at < params.found_capacity) {
-    params.found_keys[at] = params.keys.key_of(kind, pair.x, pair.y);
-    params.found_tocs[at] = toc;
-  }
 }
 
 template <Kind kind, bool single, class T>
@@ -97,10 +83,11 @@ __global__ void end_segment_kernel(LaunchParams<T> params) {
     c.most_survivors = c.survivors[k] > c.most_survivors ? c.survivors[k] : c.most_survivors;
     c.most_single = c.single[k] > c.most_single ? c.single[k] : c.most_single;
     c.most_many = c.many[k] > c.most_many ? c.many[k] : c.most_many;
+    c.most_separated = c.separated[k] > c.most_separated ? c.separated[k] : c.most_separated;
     c.all_survivors[k] += c.survivors[k];
     c.all_single[k] += c.single[k];
     c.all_many[k] += c.many[k];
-    c.survivors[k] = c.single[k] = c.many[k] = 0;
+    c.survivors[k] = c.single[k] = c.many[k] = c.separated[k] = 0;
   }
 }
 

@@ -8,6 +8,7 @@
 #include "elementary/pair_vertices.h"
 #include "gpu/counters.cuh"
 #include "gpu/pair_keys.h"
+#include "gpu/query.h"
 #include "hpccd/hpccd.h"
 
 namespace hpccd::gpu {
@@ -36,7 +37,8 @@ struct alignas(16) Bound {
   u32 tag;
 };
 
-// Where a vertex is at both ends of its motion.
+// Where a vertex is at both ends of its motion; of a snapshot, where it is along the axes, and along the slanted
+// directions (bvh/kdop.h). The tags hold by how much its box grows there (a float).
 struct alignas(32) DevicePoint {
   Bound at[2];
 };
@@ -79,6 +81,10 @@ struct LaunchParams {
   const unsigned char* accuracy;  // n_meshes^2; null: the default
   Accuracy default_accuracy;
   PairKeys keys;
+  // How far apart features shall stay, or how near they are looked for.
+  double separation;                 // where there is no table
+  const double* separations;         // n_meshes^2
+  const double* largest_separation;  // of each mesh, where there is a table
 
   // The tree: topology, and boxes of this frame.
   u32 n_nodes, n_leaves;
@@ -96,11 +102,12 @@ struct LaunchParams {
 
   // This frame's motion.
   const T *given_t0, *given_t1;
+  double largest;  // coordinate that is acceptable
   GivenEnds<T>* vertices;
   DevicePoint* points;  // of the vertices
 
   // Lists.
-  PairList leaf_pairs, survivors[2], single[2], many[2];
+  PairList leaf_pairs, survivors[2], single[2], many[2], separated[2];
   u64* found_keys;
   double* found_tocs;
   u64 found_capacity;
@@ -138,11 +145,18 @@ __device__ inline DeviceBox load_box_fresh(const DeviceBox* b) {
   return {{bound_of(__ldcg(v)), bound_of(__ldcg(v + 1))}, {bound_of(__ldcg(v + 2)), bound_of(__ldcg(v + 3))}};
 }
 
-// The box of one vertex.
+// The box of one vertex. The tags of a grown one are to be set.
+template <bool grown>
 __device__ inline DeviceBox load_point(const DevicePoint* p) {
   const float4* v = reinterpret_cast<const float4*>(p);
   const Bound t0 = bound_of(v[0]), t1 = bound_of(v[1]);
-  return {{t0, t1}, {t0, t1}};
+  DeviceBox b{{t0, t1}, {t0, t1}};
+  if constexpr (grown) {
+    const float reach[2] = {__uint_as_float(t0.tag), __uint_as_float(t1.tag)};
+    for (int end = 0; end < 2; ++end)
+      for (int k = 0; k < 3; ++k) b.low[end].x[k] -= reach[end], b.high[end].x[k] += reach[end];
+  }
+  return b;
 }
 
 __device__ inline void store(Bound* to, const Bound& b) {
@@ -160,9 +174,16 @@ __device__ inline void include(DeviceBox& a, const DeviceBox& b) {
     }
 }
 
-// Not in the same order along an axis at both ends.
+// Of a motion: not in the same order along an axis at both ends. Of a snapshot: along no direction apart.
+template <Query query>
 __device__ inline bool overlap(const DeviceBox& a, const DeviceBox& b) {
   bool apart = false;
+  if constexpr (of_snapshot(query)) {
+    for (int k = 0; k < 3; ++k)
+      apart |= (a.high[0].x[k] < b.low[0].x[k]) | (b.high[0].x[k] < a.low[0].x[k]) | (a.high[1].x[k] < b.low[1].x[k]) |
+               (b.high[1].x[k] < a.low[1].x[k]);
+    return !apart;
+  }
   for (int k = 0; k < 3; ++k)
     apart |= ((a.high[0].x[k] < b.low[0].x[k]) & (a.high[1].x[k] < b.low[1].x[k])) |
              ((b.high[0].x[k] < a.low[0].x[k]) & (b.high[1].x[k] < a.low[1].x[k]));
@@ -222,6 +243,13 @@ __device__ inline Accuracy accuracy_of(const LaunchParams<T>& params, uint4 v) {
   // The second vertex belongs to the first edge or to the face, the third to the other edge or the face.
   return static_cast<Accuracy>(
       params.accuracy[params.mesh_of_vertex[v.x] * params.n_meshes + params.mesh_of_vertex[v.z]]);
+}
+
+// Of two features by one vertex of each.
+template <class T>
+__device__ inline double separation_of(const LaunchParams<T>& params, u32 first, u32 second) {
+  if (!params.separations) return params.separation;
+  return params.separations[params.mesh_of_vertex[first] * params.n_meshes + params.mesh_of_vertex[second]];
 }
 
 }  // namespace hpccd::gpu

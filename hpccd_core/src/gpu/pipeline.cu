@@ -13,11 +13,12 @@ namespace {
 
 class DevicePipeline : public Pipeline {
  public:
-  DevicePipeline(const Scene& scene, const Features& features, Accuracy accuracy, int device, bool time_stages)
+  DevicePipeline(const Scene& scene, const Features& features, Accuracy accuracy, const SeparationTable& separations,
+                 int device, bool time_stages)
       : device_((check(cudaSetDevice(device), "cudaSetDevice"), device)),
         timer_(time_stages),
         features_(features),
-        scene_(scene, features, accuracy),
+        scene_(scene, features, accuracy, separations),
         positions_(device),
         lists_(16 * typical_size(), 4 * typical_size(), typical_size() / 2),
         contacts_(scene_.keys().bits()) {
@@ -43,16 +44,19 @@ class DevicePipeline : public Pipeline {
   }
 
   bool run(Positions t0, Positions t1, ThreadPool& pool) override {
-    check(cudaSetDevice(device_), "cudaSetDevice");
-    // Work of a frame that failed may still be under way on these buffers.
-    check(cudaStreamSynchronize(stream_), "cudaStreamSynchronize");
-    return t0.is_double ? run_frame<double>(t0, t1, pool) : run_frame<float>(t0, t1, pool);
+    begin();
+    scene_.update_separations();
+    return run_frame(scene_.query_now(), t0, t1, 0, pool);
+  }
+  bool run_snapshot(Query query, Positions vertices, double distance, ThreadPool& pool) override {
+    begin();
+    return run_frame(query, vertices, vertices, distance, pool);
   }
   const std::vector<Candidate>& undecided() const override { return undecided_; }
 
   FrameResult finish() override {
     check(cudaStreamSynchronize(stream_), "cudaStreamSynchronize");
-    return contacts_.result(*host_counters_.data());
+    return contacts_.result(query_, *host_counters_.data());
   }
 
   Positions download(Positions p, int which) override { return positions_.download(p, which); }
@@ -63,8 +67,17 @@ class DevicePipeline : public Pipeline {
  private:
   // Lists begin with room for so many times the scene's primitives that most scenes outgrow them once or never.
   std::size_t typical_size() const { return std::max<std::size_t>(features_.n_primitives(), 1024); }
+  void begin() {
+    check(cudaSetDevice(device_), "cudaSetDevice");
+    // Work of a frame that failed may still be under way on these buffers.
+    check(cudaStreamSynchronize(stream_), "cudaStreamSynchronize");
+  }
+  bool run_frame(Query query, Positions t0, Positions t1, double distance, ThreadPool& pool) {
+    query_ = query;
+    return t0.is_double ? run_frame<double>(t0, t1, distance, pool) : run_frame<float>(t0, t1, distance, pool);
+  }
   template <class T>
-  bool run_frame(Positions t0, Positions t1, ThreadPool& pool);
+  bool run_frame(Positions t0, Positions t1, double distance, ThreadPool& pool);
   template <class T>
   void launch(LaunchParams<T>& params);
   template <class T>
@@ -88,12 +101,13 @@ class DevicePipeline : public Pipeline {
   DeviceBuffer<Counters> counters_;
   PinnedBuffer<Counters> host_counters_;
 
+  Query query_ = Query::contacts;
   u64 passes_ = 0, exact_last_time_ = 0;
   std::vector<Candidate> undecided_;
 };
 
 template <class T>
-bool DevicePipeline::run_frame(Positions t0, Positions t1, ThreadPool& pool) {
+bool DevicePipeline::run_frame(Positions t0, Positions t1, double distance, ThreadPool& pool) {
   undecided_.clear();
   passes_ = 0;
   timer_.begin(stream_);
@@ -103,6 +117,11 @@ bool DevicePipeline::run_frame(Positions t0, Positions t1, ThreadPool& pool) {
   }
   LaunchParams<T> params{};
   scene_.fill(params);
+  if (of_snapshot(query_))
+    params.separation = distance;
+  else
+    scene_.fill_separations(params);
+  params.largest = of_snapshot(query_) ? largest_in_snapshot : largest_coordinate;
   tree_.fill(params);
   motion_.fill(params);
   const T* given[2];
@@ -134,20 +153,22 @@ template <class T>
 void DevicePipeline::launch(LaunchParams<T>& params) {
   params.leaf_pairs = {leaf_pairs_.data(), leaf_pairs_.size()};
   contacts_.fill(params);
-  motion_.launch(params, multiprocessors_, stream_);
+  motion_.launch(query_, params, multiprocessors_, stream_);
   timer_.mark("bounds", stream_);
-  refit_kernel<<<blocks_for(std::size_t{params.n_leaves} * 32, 128), 128, 0, stream_>>>(params);
+  const auto refit = grows_boxes(query_) ? refit_kernel<true, T> : refit_kernel<false, T>;
+  refit<<<blocks_for(std::size_t{params.n_leaves} * 32, 128), 128, 0, stream_>>>(params);
   check_launch("refit_kernel");
   timer_.mark("refit", stream_);
-  traverse_kernel<<<blocks_for(params.n_leaves, traverse_warps), 32 * traverse_warps, 0, stream_>>>(params);
+  const auto traverse = of_snapshot(query_) ? traverse_kernel<true, T> : traverse_kernel<false, T>;
+  traverse<<<blocks_for(params.n_leaves, traverse_warps), 32 * traverse_warps, 0, stream_>>>(params);
   check_launch("traverse_kernel");
   timer_.mark("traverse", stream_);
-  lists_.launch(params, multiprocessors_, stream_, timer_);
+  lists_.launch(query_, params, multiprocessors_, stream_, timer_);
 }
 
 template <class T>
 void DevicePipeline::launch_results(const LaunchParams<T>& params) {
-  contacts_.launch(params, *host_counters_.data(), multiprocessors_, stream_, timer_);
+  contacts_.launch(query_, params, *host_counters_.data(), multiprocessors_, stream_, timer_);
   area_kernel<<<std::min(blocks_for(params.n_nodes, 256), static_cast<unsigned>(multiprocessors_)), 256, 0, stream_>>>(
       params);
   check_launch("area_kernel");
@@ -174,14 +195,16 @@ bool DevicePipeline::grow_overflowed() {
 std::map<std::string, std::uint64_t> DevicePipeline::stats() const {
   const Counters& c = *host_counters_.data();
   std::map<std::string, std::uint64_t> s;
-  const char* kinds[2] = {"vf", "ee"};
-  for (int k = 0; k < 2; ++k) {
+  const bool edges_and_faces = query_ == Query::intersections;  // in the place of the first kind
+  const char* kinds[2] = {edges_and_faces ? "ef" : "vf", "ee"};
+  for (int k = 0; k < (edges_and_faces ? 1 : 2); ++k) {
     const std::string kind = kinds[k];
     const BatchCounts b = batch_counts(c, k);
     s[kind + "_candidates"] = b.tested;
     s[kind + "_rejected_coplanarity"] = b.coplanarity;
     s[kind + "_rejected_projection"] = b.projection;
     s[kind + "_rejected_roots"] = b.roots;
+    s[kind + "_rejected_separated"] = b.separated;
     s[kind + "_proven_contacts"] = b.contacts;
     s[kind + "_undecided"] = b.undecided;
     s[kind + "_single_root"] = c.all_single[k];
@@ -198,10 +221,10 @@ std::map<std::string, std::uint64_t> DevicePipeline::stats() const {
 
 }  // namespace
 
-std::unique_ptr<Pipeline> Pipeline::create(const Scene& scene, const Features& features, Accuracy accuracy, int device,
-                                           bool time_stages) {
+std::unique_ptr<Pipeline> Pipeline::create(const Scene& scene, const Features& features, Accuracy accuracy,
+                                           const SeparationTable& separations, int device, bool time_stages) {
   if (status().devices.empty()) throw Error(status().reason);
-  return std::make_unique<DevicePipeline>(scene, features, accuracy, device, time_stages);
+  return std::make_unique<DevicePipeline>(scene, features, accuracy, separations, device, time_stages);
 }
 
 }  // namespace hpccd::gpu

@@ -11,8 +11,10 @@
 
 #include "bvh/tree.h"
 #include "elementary/pair.h"
+#include "gpu/query.h"
 #include "hpccd/hpccd.h"
 #include "scene/features.h"
+#include "scene/separation_table.h"
 
 namespace hpccd::gpu {
 
@@ -21,15 +23,18 @@ struct FrameResult {
   std::uint64_t n_vf = 0, n_ee = 0;
   const std::array<std::uint32_t, 2>* vf = nullptr;  // in canonical order
   const std::array<std::uint32_t, 4>* ee = nullptr;
-  const double* toc = nullptr;  // vertex-face, then edge-edge
+  const double* toc = nullptr;  // vertex-face, then edge-edge; of a snapshot the distances
+  std::uint64_t n_ef = 0;
+  const std::array<std::uint32_t, 3>* ef = nullptr;  // where edges and faces were looked for, alone
   std::uint64_t hash = 0;
 };
 
 class Pipeline {
  public:
-  // Throws Error where the device has not enough memory or the scene has too many features for 31-bit numbers.
-  static std::unique_ptr<Pipeline> create(const Scene& scene, const Features& features, Accuracy accuracy, int device,
-                                          bool time_stages);
+  // Throws Error where the device has not enough memory or the scene has too many features for 31-bit numbers. The
+  // separations may change between frames.
+  static std::unique_ptr<Pipeline> create(const Scene& scene, const Features& features, Accuracy accuracy,
+                                          const SeparationTable& separations, int device, bool time_stages);
   virtual ~Pipeline() = default;
 
   // The tree whose boxes are refitted in every frame.
@@ -38,6 +43,8 @@ class Pipeline {
   // All work up to the undecided pairs; host arrays may be changed by the caller after finish() only.
   // Returns false where a coordinate is not finite or too large.
   virtual bool run(Positions t0, Positions t1, ThreadPool& pool) = 0;
+  // The same of one snapshot. distance: for proximity.
+  virtual bool run_snapshot(Query query, Positions vertices, double distance, ThreadPool& pool) = 0;
   // After run(): the pairs left for the exact fallback on the CPU. Sorting goes on meanwhile.
   virtual const std::vector<Candidate>& undecided() const = 0;
   virtual FrameResult finish() = 0;

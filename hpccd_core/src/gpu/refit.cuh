@@ -7,7 +7,7 @@
 namespace hpccd::gpu {
 
 // Boxes of a leaf's features and, in every lane, of the whole leaf; by one warp.
-template <class T>
+template <bool grown, class T>
 __device__ DeviceBox refit_leaf(const LaunchParams<T>& params, u32 leaf) {
   const u32 lane = lane_number();
   const DeviceLeaf l = params.leaves[leaf];
@@ -16,9 +16,9 @@ __device__ DeviceBox refit_leaf(const LaunchParams<T>& params, u32 leaf) {
   if (lane < l.n_faces()) {
     DeviceBox& face = params.face_boxes[l.first_face + lane];
     const u32 c0 = face.tag_low(), c1 = face.tag_high(), c2 = params.face_corner2[l.first_face + lane];
-    DeviceBox b = load_point(&params.points[c0]);
-    include(b, load_point(&params.points[c1]));
-    include(b, load_point(&params.points[c2]));
+    DeviceBox b = load_point<grown>(&params.points[c0]);
+    include(b, load_point<grown>(&params.points[c1]));
+    include(b, load_point<grown>(&params.points[c2]));
     b.tag_low() = c0, b.tag_high() = c1;
     store_box(&face, b);
     include(whole, b);
@@ -26,13 +26,13 @@ __device__ DeviceBox refit_leaf(const LaunchParams<T>& params, u32 leaf) {
   if (lane < l.n_edges()) {
     DeviceBox& edge = params.edge_boxes[l.first_edge + lane];
     const u32 v0 = edge.tag_low(), v1 = edge.tag_high();
-    DeviceBox b = load_point(&params.points[v0]);
-    include(b, load_point(&params.points[v1]));
+    DeviceBox b = load_point<grown>(&params.points[v0]);
+    include(b, load_point<grown>(&params.points[v1]));
     b.tag_low() = v0, b.tag_high() = v1;
     store_box(&edge, b);  // inside its triangle's box
   }
   if (lane < l.n_vertices())  // a lone vertex has no triangle
-    include(whole, load_point(&params.points[params.vertex_of_slot[l.first_vertex + lane]]));
+    include(whole, load_point<grown>(&params.points[params.vertex_of_slot[l.first_vertex + lane]]));
   for (int d = 16; d > 0; d /= 2) {
     DeviceBox other;
     for (int end = 0; end < 2; ++end)
@@ -47,17 +47,17 @@ __device__ DeviceBox refit_leaf(const LaunchParams<T>& params, u32 leaf) {
   return whole;
 }
 
-template <class T>
+template <bool grown, class T>
 __global__ void refit_leaves_kernel(LaunchParams<T> params) {
   const u32 leaf = (blockIdx.x * blockDim.x + threadIdx.x) / 32;
-  if (leaf < params.n_leaves) refit_leaf(params, leaf);
+  if (leaf < params.n_leaves) refit_leaf<grown>(params, leaf);
 }
 
-template <class T>
+template <bool grown, class T>
 __global__ void refit_kernel(LaunchParams<T> params) {
   const u32 leaf = (blockIdx.x * blockDim.x + threadIdx.x) / 32;
   if (leaf >= params.n_leaves) return;
-  const DeviceBox whole = refit_leaf(params, leaf);
+  const DeviceBox whole = refit_leaf<grown>(params, leaf);
   if (lane_number() != 0) return;
   u32 node = params.leaf_nodes[leaf];
   store_box(&params.node_boxes[node], whole);

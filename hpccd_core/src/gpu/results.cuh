@@ -34,4 +34,18 @@ __global__ void results_kernel(LaunchParams<T> params, const u64* keys, const u3
   if (lane_number() == 0 && hash) atomicAdd(&params.counters->hash, hash);
 }
 
+// Of edges and faces.
+template <class T>
+__global__ void intersections_kernel(LaunchParams<T> params, const u64* keys, u32 n, uint3* ef) {
+  u64 hash = 0;
+  for (u32 i = blockIdx.x * blockDim.x + threadIdx.x; i < n; i += gridDim.x * blockDim.x) {
+    const Candidate pair = params.keys.pair_of(keys[i]);
+    const uint2 edge = params.edges[pair.first];
+    ef[i] = {edge.x, edge.y, pair.second};
+    hash += hash_of(Kind::edge_face, pack(edge.x, edge.y), pair.second, 0);
+  }
+  for (int d = 16; d > 0; d /= 2) hash += __shfl_xor_sync(all_lanes, hash, d);
+  if (lane_number() == 0 && hash) atomicAdd(&params.counters->hash, hash);
+}
+
 }  // namespace hpccd::gpu

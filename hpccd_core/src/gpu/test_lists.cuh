@@ -10,12 +10,13 @@ namespace hpccd::gpu {
 class TestLists {
  public:
   struct Sizes {
-    std::size_t survivors[2], single[2], many[2], undecided, to_host;
+    std::size_t survivors[2], single[2], many[2], separated[2], undecided, to_host;
     void include(const Sizes& s) {
       for (int k = 0; k < 2; ++k) {
         survivors[k] = std::max(survivors[k], s.survivors[k]);
         single[k] = std::max(single[k], s.single[k]);
         many[k] = std::max(many[k], s.many[k]);
+        separated[k] = std::max(separated[k], s.separated[k]);
       }
       undecided = std::max(undecided, s.undecided);
       to_host = std::max(to_host, s.to_host);
@@ -23,12 +24,13 @@ class TestLists {
   };
   // A start that most scenes outgrow once or never; lists grow where they overflow.
   TestLists(std::size_t survivors, std::size_t later, std::size_t undecided) {
-    reserve({{survivors, survivors}, {later, later}, {later, later}, undecided, undecided});
+    reserve({{survivors, survivors}, {later, later}, {later, later}, {0, 0}, undecided, undecided});
   }
 
   void reserve(const Sizes& s) {
     for (int k = 0; k < 2; ++k)
-      survivors_[k].reserve(s.survivors[k]), single_[k].reserve(s.single[k]), many_[k].reserve(s.many[k]);
+      survivors_[k].reserve(s.survivors[k]), single_[k].reserve(s.single[k]), many_[k].reserve(s.many[k]),
+          separated_[k].reserve(s.separated[k]);
     undecided_.reserve(s.undecided);
     to_host_.reserve(s.to_host);
   }
@@ -36,20 +38,21 @@ class TestLists {
     return {{survivors_[0].size(), survivors_[1].size()},
             {single_[0].size(), single_[1].size()},
             {many_[0].size(), many_[1].size()},
+            {separated_[0].size(), separated_[1].size()},
             undecided_.size(),
             to_host_.size()};
   }
 
   template <class Visit>
   void for_buffers(Visit&& visit) const {
-    for (int k = 0; k < 2; ++k) visit(survivors_[k]), visit(single_[k]), visit(many_[k]);
+    for (int k = 0; k < 2; ++k) visit(survivors_[k]), visit(single_[k]), visit(many_[k]), visit(separated_[k]);
     visit(undecided_), visit(to_host_);
   }
 
   // All stages on pairs of leaves that the frame lists; the frame's counters were cleared, its contacts have a place.
   // Defined for float and double.
   template <class T>
-  void launch(LaunchParams<T>& params, int multiprocessors, cudaStream_t stream, StageTimer& timer);
+  void launch(Query query, LaunchParams<T>& params, int multiprocessors, cudaStream_t stream, StageTimer& timer);
 
   // Makes room where a list was too short. True where the pairs must be tested again.
   bool grow(const Counters& c) {
@@ -68,6 +71,7 @@ class TestLists {
       grow(survivors_[k], c.most_survivors, true);
       grow(single_[k], c.most_single, true);
       grow(many_[k], c.most_many, true);
+      grow(separated_[k], c.most_separated, true);
     }
     grow(undecided_, c.undecided, false);
     grow(to_host_, c.to_host, false);
@@ -79,12 +83,13 @@ class TestLists {
   u32 n_segments() const { return n_segments_; }
   std::size_t bytes() const {
     std::size_t b = undecided_.bytes();
-    for (int k = 0; k < 2; ++k) b += survivors_[k].bytes() + single_[k].bytes() + many_[k].bytes();
+    for (int k = 0; k < 2; ++k)
+      b += survivors_[k].bytes() + single_[k].bytes() + many_[k].bytes() + separated_[k].bytes();
     return b;
   }
 
  private:
-  DeviceBuffer<uint2> survivors_[2], single_[2], many_[2];
+  DeviceBuffer<uint2> survivors_[2], single_[2], many_[2], separated_[2];
   DeviceBuffer<u64> undecided_;
   PinnedBuffer<u64> to_host_;
   // Lists of one pass stay below this; larger frames take several segments.

@@ -20,7 +20,7 @@ __device__ bool meshes_enabled(const LaunchParams<T>& params, u32 mesh_a, u32 me
   return params.enabled[mesh_a * params.n_meshes + mesh_b];
 }
 
-template <class T>
+template <bool snapshot, class T>
 __global__ __launch_bounds__(32 * traverse_warps) void traverse_kernel(LaunchParams<T> params) {
   __shared__ u32 stacks[traverse_warps][traverse_stack];
   __shared__ u32 founds[traverse_warps][traverse_found];
@@ -46,7 +46,7 @@ __global__ __launch_bounds__(32 * traverse_warps) void traverse_kernel(LaunchPar
   };
   // Keeps a node of the lane: leaves go to the list, others on the stack.
   const auto keep = [&](bool wanted, u32 node, const DeviceBox& b) {
-    const bool hit = wanted && b.tag_high() >= leaf && overlap(box, b) &&
+    const bool hit = wanted && b.tag_high() >= leaf && overlap<snapshot ? Query::proximity : Query::contacts>(box, b) &&
                      (!params.enabled || meshes_enabled(params, mesh, params.node_mesh[node]));
     const u32 leaves = __ballot_sync(all_lanes, hit && b.tag_low() == 0),
               inner = __ballot_sync(all_lanes, hit && b.tag_low() != 0);

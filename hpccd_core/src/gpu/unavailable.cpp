@@ -16,7 +16,7 @@ CallersDevice::~CallersDevice() = default;
 
 void fail_after(int) {}
 
-std::unique_ptr<Pipeline> Pipeline::create(const Scene&, const Features&, Accuracy, int, bool) {
+std::unique_ptr<Pipeline> Pipeline::create(const Scene&, const Features&, Accuracy, const SeparationTable&, int, bool) {
   throw Error(status().reason);
 }
 

@@ -12,10 +12,11 @@ namespace {
 
 class CudaTestDevice final : public TestDevice {
  public:
-  CudaTestDevice(const Scene& scene, const Features& features, Accuracy accuracy, int device)
+  CudaTestDevice(const Scene& scene, const Features& features, Accuracy accuracy, const SeparationTable& separations,
+                 int device)
       : device_((check(cudaSetDevice(device), "cudaSetDevice"), device)),
         features_(features),
-        scene_(scene, features, accuracy),
+        scene_(scene, features, accuracy, separations),
         slots_(n_slots) {
     check(cudaDeviceGetAttribute(&multiprocessors_, cudaDevAttrMultiProcessorCount, device), "cudaDeviceGetAttribute");
     counters_.reserve(1);
@@ -30,6 +31,8 @@ class CudaTestDevice final : public TestDevice {
   }
 
   void begin_frame(Positions t0, Positions t1) override {
+    check(cudaSetDevice(device_), "cudaSetDevice");
+    scene_.update_separations();
     is_double_ = t0.is_double;
     is_double_ ? upload_positions<double>(t0, t1) : upload_positions<float>(t0, t1);
   }
@@ -96,6 +99,8 @@ class CudaTestDevice final : public TestDevice {
   LaunchParams<T> launch_params() const {
     LaunchParams<T> params{};
     scene_.fill(params);
+    scene_.fill_separations(params);
+    params.largest = largest_coordinate;
     leaves_.fill(params);
     motion_.fill(params);
     params.counters = counters_.data();
@@ -120,14 +125,15 @@ class CudaTestDevice final : public TestDevice {
     }
     params.given_t0 = reinterpret_cast<const T*>(given_[0].data());
     params.given_t1 = reinterpret_cast<const T*>(given_[1].data());
-    motion_.launch(params, multiprocessors_, upload_);
+    motion_.launch(scene_.query_now(), params, multiprocessors_, upload_);
     check(cudaEventRecord(ready_, upload_), "cudaEventRecord");
   }
 
   template <class T>
   void refit() {
     const LaunchParams<T> params = launch_params<T>();
-    refit_leaves_kernel<<<blocks_for(std::size_t{params.n_leaves} * 32, 128), 128, 0, upload_>>>(params);
+    const auto refit = grows_boxes(scene_.query_now()) ? refit_leaves_kernel<true, T> : refit_leaves_kernel<false, T>;
+    refit<<<blocks_for(std::size_t{params.n_leaves} * 32, 128), 128, 0, upload_>>>(params);
     check_launch("refit_leaves_kernel");
     check(cudaEventRecord(ready_, upload_), "cudaEventRecord");
   }
@@ -135,9 +141,9 @@ class CudaTestDevice final : public TestDevice {
   void launch(Slot& s) {
     check(cudaSetDevice(device_), "cudaSetDevice");
     if (is_double_)
-      s.launch(launch_params<double>(), leaves_version_, largest_, ready_, multiprocessors_);
+      s.launch(scene_, launch_params<double>(), leaves_version_, largest_, ready_, multiprocessors_);
     else
-      s.launch(launch_params<float>(), leaves_version_, largest_, ready_, multiprocessors_);
+      s.launch(scene_, launch_params<float>(), leaves_version_, largest_, ready_, multiprocessors_);
   }
 
   const int device_;
@@ -161,13 +167,13 @@ class CudaTestDevice final : public TestDevice {
 }  // namespace
 
 std::vector<std::unique_ptr<TestDevice>> cuda_devices(const Scene& scene, const Features& features, Accuracy accuracy,
-                                                      int gpus) {
+                                                      const SeparationTable& separations, int gpus) {
   const auto& devices = status().devices;
   if (devices.empty()) throw Error(status().reason);
   const std::size_t n = gpus > 0 ? static_cast<std::size_t>(gpus) : devices.size();
   std::vector<std::unique_ptr<TestDevice>> found;
   for (std::size_t i = 0; i < std::min(n, devices.size()); ++i)
-    found.push_back(std::make_unique<CudaTestDevice>(scene, features, accuracy, devices[i].number));
+    found.push_back(std::make_unique<CudaTestDevice>(scene, features, accuracy, separations, devices[i].number));
   return found;
 }
 

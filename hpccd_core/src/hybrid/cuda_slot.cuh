@@ -65,8 +65,8 @@ class Slot {
   // They are tested when the event has come. `params` names the frame's scene, leaves and motion: the same places as in
   // the last launch where `version` is the same.
   template <class T>
-  void launch(LaunchParams<T> params, std::uint64_t version, const LargestLists& largest, cudaEvent_t after,
-              int multiprocessors) {
+  void launch(const DeviceScene& scene, LaunchParams<T> params, std::uint64_t version, const LargestLists& largest,
+              cudaEvent_t after, int multiprocessors) {
     lists_.reserve(largest.lists);
     reserve_found(largest.found);
     std::size_t n = 0;
@@ -74,7 +74,7 @@ class Slot {
     if (n > pairs_.size()) pairs_.reserve(2 * n);
     *submission_.data() = {n, submission_.data()->number + 1};
     looks_ = 0;
-    record(params, version, multiprocessors);
+    record(scene, params, version, multiprocessors);
     check(cudaStreamWaitEvent(stream_, after, 0), "cudaStreamWaitEvent");
     std::size_t at = 0;
     for (const Piece& piece : sent_) {
@@ -135,9 +135,9 @@ class Slot {
 
   // The kernels between the copy and "data ready", anew where something that they name has changed.
   template <class T>
-  void record(LaunchParams<T> params, std::uint64_t version, int multiprocessors) {
+  void record(const DeviceScene& scene, LaunchParams<T> params, std::uint64_t version, int multiprocessors) {
     // Places as well as sizes: after a failed allocation a buffer may come back as large as it was, elsewhere.
-    std::vector<std::uintptr_t> now{sizeof(T), version, lists_.n_segments()};
+    std::vector<std::uintptr_t> now{sizeof(T), version, lists_.n_segments(), scene.separations_version()};
     const auto depends_on = [&](const auto& buffer) {
       now.push_back(reinterpret_cast<std::uintptr_t>(buffer.data()));
       now.push_back(buffer.size());
@@ -153,7 +153,7 @@ class Slot {
     graph_.record(stream_, [&] {
       begin_submission_kernel<<<1, 32, 0, stream_>>>(params.counters, submission_.data());
       check_launch("begin_submission_kernel");
-      lists_.launch(params, multiprocessors, stream_, no_timer);
+      lists_.launch(scene.query_now(), params, multiprocessors, stream_, no_timer);
       data_ready_kernel<<<1, 1, 0, stream_>>>(params.counters, host_counters_.data(), state_.data(),
                                               submission_.data());
       check_launch("data_ready_kernel");

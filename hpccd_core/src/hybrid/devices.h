@@ -7,12 +7,13 @@
 
 #include "hybrid/test_device.h"
 #include "scene/features.h"
+#include "scene/separation_table.h"
 
 namespace hpccd::hybrid {
 
-// The first `gpus` of them, 0: all. Scene and features must outlive them. Throws gpu::Error where there are none,
-// or too little memory.
+// The first `gpus` of them, 0: all. Scene, features and separations must outlive them; separations may change between
+// frames. Throws gpu::Error where there are none, or too little memory.
 std::vector<std::unique_ptr<TestDevice>> cuda_devices(const Scene& scene, const Features& features, Accuracy accuracy,
-                                                      int gpus);
+                                                      const SeparationTable& separations, int gpus);
 
 }  // namespace hpccd::hybrid

@@ -14,6 +14,7 @@ SeparationTable::SeparationTable(const Scene& scene, double otherwise) : n_(scen
 
 void SeparationTable::set(std::uint32_t a, std::uint32_t b, double separation) {
   of_[a * n_ + b] = of_[b * n_ + a] = separation;
+  ++version_;
   look_through();
 }
 

@@ -15,6 +15,8 @@ class SeparationTable {
 
   double of(std::uint32_t mesh_a, std::uint32_t mesh_b) const { return of_[mesh_a * n_ + mesh_b]; }
   void set(std::uint32_t mesh_a, std::uint32_t mesh_b, double separation);
+  // Of no two states of one table the same.
+  std::uint64_t version() const { return version_; }
 
   bool any() const { return any_; }
   bool uniform() const { return uniform_; }
@@ -28,6 +30,7 @@ class SeparationTable {
   void look_through();
 
   std::size_t n_;
+  std::uint64_t version_ = 1;
   std::vector<double> of_, largest_;
   bool any_ = false, uniform_ = true;
 };

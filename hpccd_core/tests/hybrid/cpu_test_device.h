@@ -7,6 +7,7 @@
 #include <condition_variable>
 #include <deque>
 #include <mutex>
+#include <numeric>
 #include <stdexcept>
 #include <thread>
 
@@ -24,14 +25,23 @@ struct DeviceFaults {
   std::atomic<bool> holds_back{false};
 };
 
+// A batch test that leaves everything to the fallback.
+inline void all_undecided(const Geometry&, Kind, const std::uint32_t*, const std::uint32_t*, std::uint32_t n,
+                          BatchResult& result) {
+  result.n_contacts = 0, result.n_undecided = n;
+  std::iota(result.undecided, result.undecided + n, 0u);
+  result.counts.tested += n, result.counts.undecided += n;
+}
+
 class CpuTestDevice final : public hybrid::TestDevice {
  public:
-  CpuTestDevice(const Features& features, const PairRules& rules, const Tree& tree, BatchTest test,
+  CpuTestDevice(const Features& features, const PairRules& rules, const Tree& tree, BatchTest test, double separation,
                 std::shared_ptr<DeviceFaults> faults)
       : features_(features),
         rules_(rules),
         tree_(tree),
         test_(test),
+        separation_(separation),
         faults_(std::move(faults)),
         pool_(1),
         thread_([this] { work(); }) {}
@@ -120,11 +130,12 @@ class CpuTestDevice final : public hybrid::TestDevice {
   hybrid::Output perform(const Job& job) {
     Search search;
     for (auto& test : search.batch_test) test = test_;
-    for (auto& fallback : search.fallback) fallback = decide_contact;
+    for (auto& fallback : search.fallback) fallback = separation_ > 0 ? decide_separation : decide_contact;
     search.leaf_pairs = leaf_pairs(Simd::scalar);
     search.report = Report::all;
     search.geometry = {motion_.vertices.data(), features_.edges.data(), features_.faces.data(), nullptr,
                        motion_.map.scale};
+    search.geometry.separations = {separation_};
     Worker worker;
     worker.begin(search);
     for (const hybrid::Piece& piece : job.pieces)
@@ -147,6 +158,7 @@ class CpuTestDevice final : public hybrid::TestDevice {
   const PairRules& rules_;
   const Tree& tree_;
   const BatchTest test_;  // of each batch of feature pairs
+  const double separation_;
   std::shared_ptr<DeviceFaults> faults_;
   ThreadPool pool_;
   MotionBounds motion_;

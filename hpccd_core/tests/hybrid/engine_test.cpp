@@ -18,29 +18,34 @@ constexpr std::uint32_t side = 24;
 
 // A detector with its parts laid open.
 struct Bench {
-  explicit Bench(int threads, BatchTest batch_test = hpccd::batch_test(Simd::scalar, Accuracy::exact))
+  explicit Bench(int threads, BatchTest batch_test = hpccd::batch_test(Simd::scalar, Accuracy::exact),
+                 double of_all_pairs = 0)
       : scene(test::two_sheets(side)),
         features(features_of(*scene)),
-        rules(*scene, Accuracy::exact, SeparationTable(*scene, 0)),
+        separations(*scene, of_all_pairs),
+        rules(*scene, Accuracy::exact, separations),
         pool(threads),
         workers(static_cast<std::size_t>(threads)) {
     for (auto& test : search.batch_test) test = batch_test;
-    for (auto& fallback : search.fallback) fallback = decide_contact;
+    for (unsigned i = 0; i < n_rules; ++i)
+      search.fallback[i] = Rule::of_number(i).separated ? decide_separation : decide_contact;
     search.leaf_pairs = leaf_pairs(Simd::scalar);
     search.report = Report::all;
   }
 
   void update(double from, double to) {
     start = test::sheet_positions(side, from), end = test::sheet_positions(side, to);
-    motion.update(*scene, test::view(start), test::view(end), {}, pool);
+    motion.update(*scene, test::view(start), test::view(end), separations.largest(), pool);
     build(tree, *scene, features, motion.boxes, pool);
     search.geometry = {motion.vertices.data(), features.edges.data(), features.faces.data(), nullptr, motion.map.scale};
+    search.geometry.separations = {separations.first()};
     search.earliest = std::numeric_limits<double>::infinity();
   }
 
   Contacts collect() {
     Contacts contacts;
-    collect_contacts(workers, search.geometry, Report::all, {false, false, false, AtTime::contact}, order, pool, contacts);
+    collect_contacts(workers, search.geometry, Report::all, {false, false, false, AtTime::contact}, order, pool,
+                     contacts);
     return contacts;
   }
 
@@ -76,12 +81,14 @@ struct Bench {
   hybrid::Communication::Devices devices(std::size_t n) {
     hybrid::Communication::Devices list;
     for (std::size_t i = 0; i < n; ++i)
-      list.push_back(std::make_unique<test::CpuTestDevice>(features, rules, tree, search.batch_test[0], faults));
+      list.push_back(std::make_unique<test::CpuTestDevice>(features, rules, tree, search.batch_test[0],
+                                                           separations.first(), faults));
     return list;
   }
 
   std::shared_ptr<const Scene> scene;
   Features features;
+  SeparationTable separations;
   PairRules rules;
   ThreadPool pool;
   std::vector<Worker> workers;
@@ -133,13 +140,29 @@ TEST(Hybrid, FrameAfterFrameAndOnANewTree) {
 }
 
 TEST(Hybrid, WhatADeviceLeavesUndecidedIsDecidedOnTheCpu) {
-  Bench bench(2, all_undecided);
+  Bench bench(2, test::all_undecided);
   bench.update(0, 1);
   const Contacts expected = bench.on_cpu();
   hybrid::Engine engine(bench.devices(1), {8, 16}, bench.pool);
   const auto result = bench.with(engine);
   EXPECT_GT(result.stats.at("gpu_exact_on_cpu"), 0u);
   test::expect_equal(result.contacts, expected);
+}
+
+TEST(Hybrid, WhatADeviceLeavesUndecidedIsDecidedByItsSeparation) {
+  Bench bench(2, test::all_undecided, 0.05), without(2);
+  bench.update(0, 1), without.update(0, 1);
+  const Contacts expected = bench.on_cpu();
+  ASSERT_GT(expected.ee.size(), without.on_cpu().ee.size());
+  hybrid::Engine engine(bench.devices(1), {8, 16}, bench.pool);
+  // On a busy machine all pairs of a frame may be given back to the threads.
+  std::uint64_t undecided = 0;
+  for (int frame = 0; frame < 100 && undecided == 0; ++frame) {
+    const auto result = bench.with(engine);
+    undecided = result.stats.at("gpu_exact_on_cpu");
+    test::expect_equal(result.contacts, expected);
+  }
+  EXPECT_GT(undecided, 0u);
 }
 
 TEST(Hybrid, ThreadsTestHalfSegmentsThemselvesWhereDevicesLag) {

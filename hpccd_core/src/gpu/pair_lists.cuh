@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+// How kernels read and lengthen lists of pairs.
+#pragma once
+
+#include "gpu/launch_params.cuh"
+
+namespace hpccd::gpu {
+
+// How many entries of a list are really there.
+__device__ inline u64 length(u64 counted, u64 capacity) { return counted < capacity ? counted : capacity; }
+
+// f(pair or nothing) for each pair of a list, whole warps at a time.
+template <class Function>
+__device__ void for_pairs(const PairList& list, u64 counted, Function&& function) {
+  const u64 n = length(counted, list.capacity), stride = static_cast<u64>(gridDim.x) * blockDim.x;
+  const u64 first = static_cast<u64>(blockIdx.x) * blockDim.x + threadIdx.x;
+  for (u64 i = first; i - lane_number() < n; i += stride) {
+    const bool valid = i < n;
+    function(valid, valid ? list.pairs[i] : uint2{0, 0});
+  }
+}
+
+// All lanes must call.
+__device__ inline void append_pair(const PairList& list, u64* counter, bool wanted, uint2 pair) {
+  const u64 at = warp_append(counter, wanted);
+  if (wanted && at < list.capacity) list.pairs[at] = pair;
+}
+
+template <class T>
+__device__ void append_found(const LaunchParams<T>& params, Kind kind, bool wanted, uint2 pair, double toc) {
+  const u64 at = warp_append(&params.counters->found_all, wanted);
+  if (wanted && at < params.found_capacity) {
+    params.found_keys[at] = params.keys.key_of(kind, pair.x, pair.y);
+    params.found_tocs[at] = toc;
+  }
+}
+
+// Left to exact arithmetic.
+template <class T>
+__device__ void append_to_host(const LaunchParams<T>& params, Kind kind, bool wanted, uint2 pair) {
+  const u64 at = warp_append(&params.counters->to_host, wanted);
+  if (wanted && at < params.to_host_capacity) params.to_host[at] = params.keys.key_of(kind, pair.x, pair.y);
+}
+
+// Adds what all lanes counted.
+__device__ inline void add_up(u64* counter, u32 n) {
+  for (int d = 16; d > 0; d /= 2) n += __shfl_xor_sync(all_lanes, n, d);
+  if (lane_number() == 0 && n) atomicAdd(counter, static_cast<u64>(n));
+}
+
+}  // namespace hpccd::gpu

@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: Apache-2.0
+// By how much boxes on the device grow, so that features within a separation of each other overlap.
+#pragma once
+
+#include "base/hd.h"
+#include "base/real.h"
+
+namespace hpccd::gpu {
+
+// In the boxes' own coordinates (coordinate_map.h), for `largest` of the scene's: half of the separation, and what
+// rounding a coordinate to a float and growing it there can lose (2.4e-7 and 4.8e-7 for two boxes; along the slanted
+// directions of a snapshot twice that, and as much as their sums of two coordinates lose far from the origin). More
+// than the scene is large would bring no more pairs.
+HPCCD_HD float reach_of(double separation, double scale, double largest) {
+  if (!(separation > 0)) return 0;
+  return static_cast<float>(lesser(0.5 * separation * scale + 1e-15 * (largest * scale), 4.5) * (1 + 1e-6) + 1e-6);
+}
+
+}  // namespace hpccd::gpu

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "gpu/candidates.cuh"
+#include "gpu/snapshot.cuh"
+#include "gpu/stages.cuh"
+
+namespace hpccd::gpu {
+
+template <class T>
+void launch_snapshot(Query query, const LaunchParams<T>& params, const Stages& stages) {
+  constexpr unsigned threads = 32 * candidate_warps;
+  if (query == Query::proximity) {
+    stages.persistent(candidates_kernel<Query::proximity, T>, threads, params, "candidates_kernel");
+    stages.mark("candidates");
+    stages.persistent(proximity_kernel<Kind::vertex_face, T>, 128, params, "proximity_kernel");
+    stages.persistent(proximity_kernel<Kind::edge_edge, T>, 128, params, "proximity_kernel");
+    stages.mark("proximity");
+  } else {
+    stages.persistent(candidates_kernel<Query::intersections, T>, threads, params, "candidates_kernel");
+    stages.mark("candidates");
+    stages.persistent(intersection_kernel<T>, 128, params, "intersection_kernel");
+    stages.mark("intersections");
+  }
+}
+
+template void launch_snapshot(Query, const LaunchParams<float>&, const Stages&);
+template void launch_snapshot(Query, const LaunchParams<double>&, const Stages&);
+
+}  // namespace hpccd::gpu

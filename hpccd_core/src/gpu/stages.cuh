@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+// How the stages of a frame are launched, one after the other on one stream.
+#pragma once
+
+#include <algorithm>
+
+#include "gpu/launch_params.cuh"
+#include "gpu/stream.h"
+
+namespace hpccd::gpu {
+
+// Blocks of a kernel that fit on one multiprocessor of the current device; looked up once.
+int blocks_that_fit(const void* kernel, unsigned threads, const char* name);
+
+struct Stages {
+  int multiprocessors;
+  cudaStream_t stream;
+  StageTimer& timer;
+
+  // As many blocks as fit take work until there is none.
+  template <class Kernel, class T>
+  void persistent(Kernel kernel, unsigned threads, const LaunchParams<T>& params, const char* name) const {
+    const int blocks = blocks_that_fit(reinterpret_cast<const void*>(kernel), threads, name);
+    kernel<<<static_cast<unsigned>(blocks * multiprocessors), threads, 0, stream>>>(params);
+    check_launch(name);
+  }
+  void mark(const char* name) const { timer.mark(name, stream); }
+};
+
+// From pairs of leaves to survivors of the first filter, and the tests that know a distance. Defined for float and
+// double.
+template <class T>
+void launch_separations(const LaunchParams<T>& params, const Stages& stages);
+template <class T>
+void launch_snapshot(Query query, const LaunchParams<T>& params, const Stages& stages);
+
+}  // namespace hpccd::gpu

@@ -1,0 +1,165 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Queries of one snapshot: the GPU answers what the CPU answers, to the last bit."""
+
+import numpy as np
+import pytest
+import scenes
+
+import hpccd_core as hc
+
+TIERS = ("fast", "balanced", "conservative", "exact")
+
+
+def detectors(scene, **options):
+    return hc.Detector(scene, backend="cpu", **options), hc.Detector(scene, backend="gpu", **options)
+
+
+def assert_on_gpu(detector):
+    assert detector.stats["gpu_fallbacks"] == 0, detector.last_gpu_error
+    assert detector.backend == "gpu"
+
+
+def assert_near_same(cpu, gpu, vertices, distance):
+    expected = cpu.proximity(vertices, distance)
+    for _ in range(2):  # with a new tree, and with a refitted one
+        found = gpu.proximity(vertices, distance)
+        assert_on_gpu(gpu)
+        for name in ("vf", "vf_distance", "ee", "ee_distance", "closest"):
+            np.testing.assert_array_equal(getattr(found, name), getattr(expected, name), err_msg=name)
+        assert found.hash == expected.hash
+    return expected
+
+
+def assert_hits_same(cpu, gpu, vertices):
+    expected = cpu.intersections(vertices)
+    for _ in range(2):
+        found = gpu.intersections(vertices)
+        assert_on_gpu(gpu)
+        np.testing.assert_array_equal(found.ef, expected.ef)
+        assert found.hash == expected.hash
+    return expected
+
+
+@pytest.mark.parametrize("accuracy", TIERS)
+@pytest.mark.parametrize("dtype", (np.float32, np.float64))
+@pytest.mark.parametrize("make", (scenes.crumpled, scenes.lattice, scenes.soup))
+def test_random_scenes(make, dtype, accuracy):
+    scene, vertices, _ = scenes.join([make(np.random.default_rng(1), 24)])
+    vertices = vertices.astype(dtype)
+    cpu, gpu = detectors(scene, accuracy=accuracy)
+    sizes = [len(assert_near_same(cpu, gpu, vertices, distance)) for distance in (0, 1e-6, 0.1, 1.0)]
+    assert sizes == sorted(sizes) and sizes[-1] > 0
+    assert_hits_same(cpu, gpu, vertices)
+
+
+@pytest.mark.parametrize("make", (scenes.crumpled, scenes.lattice, scenes.soup))
+def test_intersections_of_tangled_scenes(make):
+    scene, _, vertices = scenes.join([make(np.random.default_rng(2), 24)])
+    assert len(assert_hits_same(*detectors(scene), vertices)) > 0
+
+
+@pytest.mark.parametrize("scale, offset", ((1e-150, 0.0), (1e-20, 0.0), (1e148, 0.0), (1e290, 0.0), (1.0, 2.0**30)))
+def test_scales_and_offsets(scale, offset):
+    scene, _, vertices = scenes.join([scenes.lattice(np.random.default_rng(3), 9)])
+    vertices = scale * (vertices + offset)
+    cpu, gpu = detectors(scene)
+    assert len(assert_near_same(cpu, gpu, vertices, scale)) > 0
+    assert len(assert_hits_same(cpu, gpu, vertices)) > 0
+
+
+def test_edges_in_no_face():
+    rng = np.random.default_rng(4)
+    scene = hc.Scene()
+    faces, sheet, _ = scenes.crumpled(rng, 10)
+    scene.add_mesh("sheet", faces, n_vertices=100)
+    scene.add_mesh("rope", edges=np.stack([np.arange(40), np.arange(1, 41)], axis=1), n_vertices=41)
+    rope = np.stack([np.linspace(0, 9, 41), np.linspace(1, 8, 41), np.sin(np.arange(41.0))], axis=1)
+    vertices = np.concatenate([sheet, rope])
+    cpu, gpu = detectors(scene, outputs=("closest",))
+    assert len(assert_near_same(cpu, gpu, vertices, 0.3)) > 0
+    assert (assert_hits_same(cpu, gpu, vertices).ef[:, 0] >= 100).any()
+
+
+def test_rules_between_meshes():
+    rng = np.random.default_rng(5)
+    scene, _, vertices = scenes.join(
+        [scenes.crumpled(rng, 12) for _ in range(4)], no_self=(1,), ignored=((0, 2),),
+        accuracy=((0, 1, "balanced"), (2, 3, "fast")),
+    )  # fmt: skip
+    cpu, gpu = detectors(scene)
+    near = assert_near_same(cpu, gpu, vertices, 0.2)
+    mesh = np.repeat(np.arange(4), 144)
+    meshes = {tuple(sorted(m)) for m in mesh[near.ee[:, [0, 2]]]}
+    assert (1, 1) not in meshes and (0, 2) not in meshes and (0, 1) in meshes
+    assert_hits_same(cpu, gpu, vertices)
+
+
+def test_nearest_points():
+    scene, vertices, _ = scenes.join([scenes.lattice(np.random.default_rng(6), 14)])
+    near = assert_near_same(*detectors(scene, outputs=("closest", "points")), vertices, 1.0)
+    assert near.closest.shape == (len(near), 2, 3)
+
+
+def test_queries_in_turn():
+    """One detector, one tree: no query leaves anything behind that another one sees."""
+    rng = np.random.default_rng(7)
+    scene, v, _ = scenes.join([scenes.crumpled(rng, 16), scenes.soup(rng, 20)])
+    cpu, gpu = detectors(scene)
+    for turn in range(8):
+        w = v + rng.normal(0, 0.5, v.shape)
+        gpu.set_separation(0, 1, 0.1 * (turn % 3))
+        cpu.set_separation(0, 1, 0.1 * (turn % 3))
+        assert gpu.detect(v, w).hash == cpu.detect(v, w).hash
+        assert_hits_same(cpu, gpu, w)
+        assert gpu.detect(v, w).hash == cpu.detect(v, w).hash
+        assert_near_same(cpu, gpu, w, 0.05 * (turn % 4))
+        assert gpu.distances(w) == cpu.distances(w)
+        v = w
+    assert gpu.stats["gpu_fallbacks"] == 0, gpu.last_gpu_error
+
+
+def test_the_hybrid_leaves_them_to_the_cpu():
+    scene, vertices, _ = scenes.join([scenes.crumpled(np.random.default_rng(8), 12)])
+    cpu, hybrid = hc.Detector(scene, backend="cpu"), hc.Detector(scene, backend="hybrid")
+    assert hybrid.proximity(vertices, 0.1).hash == cpu.proximity(vertices, 0.1).hash
+    assert hybrid.intersections(vertices).hash == cpu.intersections(vertices).hash
+    assert hybrid.backend == "cpu"
+
+
+@pytest.mark.parametrize("dtype", (np.float32, np.float64))
+@pytest.mark.parametrize("library", ("cupy", "torch"))
+def test_device_arrays(library, dtype):
+    module = pytest.importorskip(library)
+    scene, vertices, _ = scenes.join([scenes.lattice(np.random.default_rng(9), 20)])
+    vertices = vertices.astype(dtype)
+    there = module.asarray(vertices) if library == "cupy" else module.from_numpy(vertices).cuda()
+    cpu, gpu = detectors(scene, outputs=("closest",))
+    for _ in range(2):
+        assert gpu.proximity(there, 0.5).hash == cpu.proximity(vertices, 0.5).hash
+        np.testing.assert_array_equal(gpu.proximity(there, 0.5).closest, cpu.proximity(vertices, 0.5).closest)
+        assert gpu.intersections(there).hash == cpu.intersections(vertices).hash
+        assert_on_gpu(gpu)
+    assert gpu.distances(there) == cpu.distances(vertices)
+
+
+def test_nothing_and_little():
+    for faces, n in ((np.empty((0, 3), int), 0), (np.empty((0, 3), int), 2), ([[0, 1, 2]], 3), ([[0, 1, 2]], 5)):
+        scene = hc.Scene()
+        scene.add_mesh("few", faces, n_vertices=n)
+        cpu, gpu = detectors(scene)
+        vertices = np.random.default_rng(10).normal(size=(n, 3))
+        assert_near_same(cpu, gpu, vertices, 10.0)
+        assert_hits_same(cpu, gpu, vertices)
+
+
+def test_bad_coordinates_are_named():
+    scene, vertices, _ = scenes.join([scenes.crumpled(np.random.default_rng(11), 8)])
+    cpu, gpu = detectors(scene)
+    bad = vertices.copy()
+    bad[3, 1] = np.nan
+    for _ in range(2):
+        with pytest.raises(ValueError, match=r"^vertices\[3, 1\] is NaN"):
+            gpu.proximity(bad, 0.1)
+        with pytest.raises(ValueError, match=r"^vertices\[3, 1\] is NaN"):
+            gpu.intersections(bad)
+        assert_near_same(cpu, gpu, vertices, 0.1)
