@@ -67,9 +67,7 @@ bool round(const Polynomial<Z, D>& p, Rounded<D>& rounded) {
   using W = Plus<Z, 1>;
   std::array<W, D + 1> b;
   for (int i = 0; i <= D; ++i) b[i] = W(p.c[i]);
-  // Those times the binomial coefficients.
-  for (int i = 0; i < D; ++i)
-    for (int j = 1; j <= D - i; ++j) b[j] = b[j] + b[j - 1];
+  to_bernstein(b.data(), D);
   int e[D + 1];
   rounded.exponent = std::numeric_limits<int>::min();
   double binomial = 1;

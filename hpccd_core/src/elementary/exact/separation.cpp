@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "elementary/exact/separation.h"
 
+#include "elementary/exact/boxes.h"
 #include "elementary/exact/distance.h"
 #include "elementary/exact/earliest.h"
 #include "elementary/exact/pieces.h"
@@ -10,23 +11,6 @@
 
 namespace hpccd::exact {
 namespace {
-
-// Along each axis the swept boxes are farther apart than d; a difference of doubles, rounded, is above d only where
-// the true one is.
-bool boxes_apart(Kind kind, const Vec3<double> q_t0[4], const Vec3<double> q_t1[4], double d) {
-  const int split = kind == Kind::vertex_face ? 1 : 2;
-  for (int k = 0; k < 3; ++k) {
-    double low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY};
-    for (int i = 0; i < 4; ++i)
-      for (const auto* q : {q_t0, q_t1}) {
-        const double x = coordinate(q[i], k);
-        low[i >= split] = std::min(low[i >= split], x);
-        high[i >= split] = std::max(high[i >= split], x);
-      }
-    if (low[1] - high[0] > d || low[0] - high[1] > d) return true;
-  }
-  return false;
-}
 
 template <class Z, int D>
 Polynomial<Big, D> to_big(const Polynomial<Z, D>& p) {

@@ -6,8 +6,6 @@
 namespace hpccd::exact::wide {
 namespace {
 
-int highest_bit(const Big& x) { return static_cast<int>(msb(x.sign() < 0 ? Big(-x) : x)); }
-
 void drop_common_power_of_two(Numbers& a) {
   int common = std::numeric_limits<int>::max();
   for (const Big& x : a)
@@ -18,13 +16,6 @@ void drop_common_power_of_two(Numbers& a) {
 }
 
 constexpr std::size_t most_coefficients = 7;
-
-// Of polynomials of degree n: the Bernstein coefficients times the binomial ones.
-template <class Number>
-void to_bernstein(Number* a, std::size_t n) {
-  for (std::size_t i = 0; i < n; ++i)
-    for (std::size_t m = 1; m <= n - i; ++m) a[m] += a[m - 1];
-}
 
 // The coefficients over one power of two, the largest about one.
 void rounded(const Numbers& a, double* p) {
@@ -42,7 +33,7 @@ bool rounded_signs(const Numbers& a, int* signs) {
   double b[most_coefficients];
   rounded(a, b);
   signs[0] = sign(a[0]);
-  to_bernstein(b, n);
+  to_bernstein(b, static_cast<int>(n));
   // Each is a sum of at most 64 numbers below 1, added up with at most 6 roundings.
   constexpr double error = 64 * 8 * 0x1p-52;
   for (std::size_t i = 1; i <= n; ++i) {
@@ -55,7 +46,7 @@ bool rounded_signs(const Numbers& a, int* signs) {
 void bernstein_signs(const Numbers& p, int* signs) {
   if (rounded_signs(p, signs)) return;
   Numbers a = p;
-  to_bernstein(a.data(), a.size() - 1);
+  to_bernstein(a.data(), static_cast<int>(a.size()) - 1);
   for (std::size_t i = 0; i < a.size(); ++i) signs[i] = sign(a[i]);
 }
 
