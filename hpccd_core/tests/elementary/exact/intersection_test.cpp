@@ -5,8 +5,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <random>
 
 #include "elementary/exact/integers.h"
@@ -76,9 +78,16 @@ bool brute_force_on_lattice(const Corners& c) {
 bool brute_force_on_reals(const Corners& c) {
   std::array<std::array<Big, 3>, 5> corners;
   for (int k = 0; k < 3; ++k) {
-    BitRange range;
-    for (int i = 0; i < 5; ++i) range.include(OddMantissa(c[i][k]));
-    for (int i = 0; i < 5; ++i) corners[i][k] = scaled_integer<Big>(OddMantissa(c[i][k]), range.low);
+    int low = 0;
+    for (int i = 0; i < 5; ++i)
+      if (c[i][k] != 0) low = std::min(low, std::ilogb(c[i][k]) - 52);
+    for (int i = 0; i < 5; ++i) {
+      int exponent = 0;
+      const double fraction = std::frexp(c[i][k], &exponent);
+      const Big mantissa(static_cast<std::int64_t>(std::ldexp(fraction, 53)));
+      corners[i][k] =
+          mantissa == 0 ? mantissa : Big(mantissa * pow(Big(2), static_cast<unsigned>(exponent - 53 - low)));
+    }
   }
   return brute_force(corners);
 }
