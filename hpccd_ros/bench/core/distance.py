@@ -59,7 +59,8 @@ def run(args) -> int:
     asked = questions(queries, distances)
     of_peer = [q for q in asked if q.query in peer_ipctk_distance.QUERIES] if args.peer else []
     for source in sources:
-        runners = [question.runner(options, Step.as_one_mesh if args.peer else None) for question in asked]
+        change = Step.as_one_mesh if args.peer else None
+        runners = [measure.CoreRunner(question.variant(options, change), question.ask) for question in asked]
         runners += [DistancePeer(question, threads) for question in of_peer]
         series = measure.measure(source, runners, args.repeat, args.steps)
         for question in asked:

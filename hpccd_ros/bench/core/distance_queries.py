@@ -35,10 +35,10 @@ class Question:
     def name(self) -> str:
         return self.query if self.distance is None else f"{self.query} {self.distance:g}"
 
-    def runner(self, options: dict, change=None) -> measure.CoreRunner:
-        """A detector of its own, asked this of every step."""
+    def variant(self, options: dict, change=None, name: str | None = None) -> Variant:
+        """The detector that is asked this, under the name of the question where no other is given."""
         own = {"minimum_separation": self.distance} if self.query == "separation" else {}
-        return measure.CoreRunner(Variant(self.name, {**options, **own}, change), self.ask)
+        return Variant(name or self.name, {**options, **own}, change)
 
     def ask(self, detector: hc.Detector, step: Step):
         """Of one snapshot: the end of the step."""

@@ -15,7 +15,7 @@ LABEL = {"plain": "plain detection", "separation": "with separation d", "proximi
 
 def heading(rows: list[dict]) -> str:
     plain = next(row for row in rows if row["query"] == "plain")
-    return f"{plain['scene']}, {plain['triangles'] / 1000:.0f} K triangles, {plain['pairs']:,.0f} contacts"
+    return f"{plain['scene']}\n{plain['triangles'] / 1000:.0f} K triangles, {plain['pairs']:,.0f} contacts"
 
 
 def against_distance(axis, rows: list[dict]) -> dict:

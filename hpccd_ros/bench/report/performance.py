@@ -36,6 +36,8 @@ TABLES = {
     "wrong-answers": (performance_core.wrong_answers, "accuracy-4-cores"),
     "separations": (performance_distance.by_distance, "distance-2-cores"),
     "snapshots": (performance_distance.of_a_snapshot, "distance-2-cores"),
+    "distance-truth": (performance_distance.on_scenes, "accuracy-distance-2-cores"),
+    "distance-wrong-answers": (performance_distance.hard_queries, "accuracy-distance-2-cores"),
     "backends": (performance_gpu.backends, "gpu-h100-16-cores"),
     "device-stages": (performance_gpu.device_stages, "gpu-h100-16-cores"),
     "hybrid": (performance_gpu.hybrid, "gpu-h100-16-cores"),

@@ -35,6 +35,34 @@ def of_a_snapshot(result: Kept) -> list[str]:
     return markdown.table(columns, lines)
 
 
+def on_scenes(result: Kept) -> list[str]:
+    """Missed and invented pairs, and the worst error of a value, of each tier."""
+    rows = [r for r in result.rows if r["part"] == "distance" and r["simd"] == "auto"]
+
+    def cell(row):
+        worst = f", {row['value_worst']:.0e}" if row["value_worst"] else ""
+        return f"{row['missed']} + {row['invented']}{worst}"
+
+    lines = [
+        [mine[0]["scene"], mine[0]["query"], "" if mine[0]["distance"] is None else f"{mine[0]['distance']:.5g}",
+         mine[0]["true"], *map(cell, mine)]
+        for mine in by(rows, "scene", "query", "distance")
+    ]  # fmt: skip
+    tiers = [f"`{r['accuracy']}`" for r in by(rows, "scene", "query", "distance")[0]]
+    return markdown.table(["missed + invented", "query", "d", "pairs", *tiers], lines)
+
+
+def hard_queries(result: Kept) -> list[str]:
+    rows = [r for r in result.rows if r["part"] == "hard distance"]
+    tiers = list(dict.fromkeys(r["accuracy"] for r in rows))
+    lines = []
+    for mine in by(rows, "query"):
+        by_tier = by(mine, "accuracy")
+        wrong = (" + ".join(f"{sum(r[key] for r in of_one):,}" for key in ("missed", "invented")) for of_one in by_tier)
+        lines.append([mine[0]["query"], sum(r["n"] for r in by_tier[0]), *wrong])
+    return markdown.table(["missed + invented", "queries", *(f"`{tier}`" for tier in tiers)], lines)
+
+
 def _cells(row: dict | None) -> list:
     """Pairs, ms with the times of plain, us a pair more, times faster than the peer; empty where not measured."""
     if row is None:
