@@ -178,15 +178,13 @@ __device__ inline void include(DeviceBox& a, const DeviceBox& b) {
 template <Query query>
 __device__ inline bool overlap(const DeviceBox& a, const DeviceBox& b) {
   bool apart = false;
-  if constexpr (of_snapshot(query)) {
-    for (int k = 0; k < 3; ++k)
+  for (int k = 0; k < 3; ++k)
+    if constexpr (of_snapshot(query))
       apart |= (a.high[0].x[k] < b.low[0].x[k]) | (b.high[0].x[k] < a.low[0].x[k]) | (a.high[1].x[k] < b.low[1].x[k]) |
                (b.high[1].x[k] < a.low[1].x[k]);
-    return !apart;
-  }
-  for (int k = 0; k < 3; ++k)
-    apart |= ((a.high[0].x[k] < b.low[0].x[k]) & (a.high[1].x[k] < b.low[1].x[k])) |
-             ((b.high[0].x[k] < a.low[0].x[k]) & (b.high[1].x[k] < a.low[1].x[k]));
+    else
+      apart |= ((a.high[0].x[k] < b.low[0].x[k]) & (a.high[1].x[k] < b.low[1].x[k])) |
+               ((b.high[0].x[k] < a.low[0].x[k]) & (b.high[1].x[k] < a.low[1].x[k]));
   return !apart;
 }
 
