@@ -4,6 +4,7 @@
   hpccd bench cpu n-body-like-lr            ms a frame and where they go, in under a minute
   hpccd bench cpu data --peer ipctk         side by side with ipctk
   hpccd bench scaling                       speed-up against threads, for each method
+  hpccd bench distance                      what a separation, proximity, intersections cost
   hpccd bench accuracy                      what each tier costs, and where it errs
   hpccd bench <benchmark> --help            scenes, options and examples of one benchmark
 
@@ -23,6 +24,7 @@ BENCHMARKS = {
     "size": ("core.size", "how time and memory grow with the number of triangles"),
     "memory": ("core.memory", "peak memory and bytes per triangle"),
     "options": ("core.options", "what each way to model less saves"),
+    "distance": ("core.distance", "separation, proximity, intersections, smallest distances beside plain detection"),
     "ros": ("ros.node", "the node over DDS: latency beside that of an echo, sustained rate, overload"),
     "soak": ("ros.soak.command", "half an hour of mixed load on the node: memory, counts, answers"),
     "accuracy": ("core.accuracy", "the tiers: time, wrong answers, error of times; sweeps of scale and offset"),

@@ -65,10 +65,7 @@ CASES = {
     "batches": (lambda: soup(30_000, 0.01), FAST),
     "last resorts": (lambda: layers(40, 0), {}),
     "one contact": (lambda: layers(40, 0), {"report": "any"}),
-    "separation": (
-        lambda: layers(20, 0.02),
-        {"accuracy": "conservative", "minimum_separation": 0.3, "tolerance": 1e-9},
-    ),
+    "separation": (lambda: layers(20, 0.02), {"minimum_separation": 0.3}),
     "many contacts": (lambda: soup(8_000, 0.05), FAST | {"outputs": ("points", "normals")}),
     "contacts of one vertex": (lambda: needle(200_000), FAST | {"outputs": ("points", "normals")}),
     "building": (lambda: quiet(400), FAST),

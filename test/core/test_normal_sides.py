@@ -163,10 +163,13 @@ def test_published_scenes(data_folder, name):
         check_scene(scene, truth["faces"], truth["vertices_t0"], truth["vertices_t1"], 400, backend="cpu")
 
 
-def test_with_a_separation_the_side_is_that_at_toc():
-    # Beyond the face the vertex rises through its plane; then it comes near.
-    path = [(5, 0.2, -1), *FLOOR], [(0.8, 0.2, 0.2), *FLOOR]
-    detector = single_pairs.detector(VERTEX_FACE, accuracy="conservative", minimum_separation=0.3)
-    toc, _, normal = single_pairs.contact(detector, VERTEX_FACE, np.array([*path[0], *path[1]], float))
-    assert 0.84 < toc < 1
-    np.testing.assert_array_equal(normal, [0, 0, 1])
+def test_with_a_separation_it_is_the_direction_between_the_nearest_points():
+    # Beyond the face the vertex rises through its plane; then it comes near, from above.
+    path = [(5, 0.2, -1), *FLOOR], [(0.2, 0.2, 0.2), *FLOOR]
+    detector = single_pairs.detector(VERTEX_FACE, minimum_separation=0.5)
+    toc, point, normal = single_pairs.contact(detector, VERTEX_FACE, np.array([*path[0], *path[1]], float))
+    vertex = np.array(path[0][0]) * (1 - toc) + np.array(path[1][0]) * toc
+    np.testing.assert_allclose(np.linalg.norm(normal), 1, atol=1e-15)
+    np.testing.assert_allclose(point, vertex - 0.25 * normal, atol=1e-12)
+    np.testing.assert_allclose((vertex - 0.5 * normal) @ (1, 1, 0), 1, atol=1e-12)  # on the border x + y = 1
+    assert abs((vertex - 0.5 * normal)[2]) < 1e-12

@@ -10,6 +10,7 @@ from single_pairs import renamed as query_renamed
 
 import hpccd_core as hc
 from hpccd_core import reference
+from hpccd_core.fuzz.disturbances import rotate
 from hpccd_core.fuzz.generators import EDGE_EDGE, GENERATORS, VERTEX_FACE
 from hpccd_core.fuzz.near_generators import NEAR_GENERATORS
 
@@ -66,6 +67,18 @@ def test_distances_by_construction(accuracy, kind, name, scale, offset):
         truth = ORACLE[kind](queries, d)
         assert truth[0].any() or (d < distances).any()
         assert_kept(accuracy, asked(kind, queries, d, accuracy), truth)
+
+
+@pytest.mark.parametrize(("kind", "name"), EXACT_DISTANCES)
+def test_missing_by_a_hair_is_no_contact(kind, name):
+    """Turned by any angle the distances hold up to rounding: flat triangles and parallel edges that pass a few ulps
+    beyond the separation, where a witness of nearness must not be too lenient."""
+    rng = np.random.default_rng(9)
+    queries, distances = NEAR_GENERATORS[kind][name](rng, 1500)
+    queries = rotate(rng, queries)
+    truth = ORACLE[kind](queries, distances)
+    assert truth[0].any() and not truth[0].all()
+    assert_kept("exact", asked(kind, queries, distances), truth)
 
 
 @KINDS

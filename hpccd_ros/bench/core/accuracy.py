@@ -3,23 +3,28 @@
 
   hpccd bench accuracy                        the files of HPCCD_DATA and two generated scenes, then the sweeps
   hpccd bench accuracy cloth-ball --simd auto,scalar
-  hpccd bench accuracy cloth-drop --sweep-queries 0      scenes only
+  hpccd bench accuracy cloth-drop --parts scenes         whole scenes only
+  hpccd bench accuracy --parts distance       separation, proximity, intersections
 
 Scenes: ms a step of each tier in turn, contacts missed and invented, error of times of contact, and who decided the
 candidate pairs. Truth is what the file says; for scenes without it, the tier "exact", which the tests compare with
 rational arithmetic. Sweeps: elementary queries at scales from 1e-150 to 1e148 and at distances from the origin up to
 1e12 times their size, ordinary and degenerate ones, and hard ones as `make fuzz` makes them, against rational
-arithmetic.
+arithmetic. Distance: separation, proximity and intersections on the scenes of HPCCD_DATA/distance, whose truth is
+known, and on hard queries.
 """
 
 from __future__ import annotations
 
 from hpccd_core.options import ACCURACIES
 from hpccd_ros.bench import command
-from hpccd_ros.bench.core import accuracy_sweep, measure, truth
+from hpccd_ros.bench.core import accuracy_distance, accuracy_sweep, measure, truth
 from hpccd_ros.bench.core.variants import BACKENDS, Variant, usable
 from hpccd_ros.bench.report import table
 from hpccd_ros.bench.report.machine import cores
+from hpccd_ros.bench.sources import data_folder
+
+PARTS = ("scenes", "sweeps", "distance")
 
 # Stats of the core by who decided, in the order in which a pair meets them.
 DECIDED = {
@@ -30,6 +35,7 @@ DECIDED = {
 
 def configure(parser):
     command.configure(parser, default=("data", "cloth-drop", "n-body-like-lr"), steps=2)
+    parser.add_argument("--parts", default=",".join(PARTS), metavar="NAME,...", help="default: %(default)s")
     parser.add_argument("--tiers", default=",".join(ACCURACIES), metavar="NAME,...", help="default: %(default)s")
     parser.add_argument("--backend", default="cpu", metavar="NAME,...", help="of cpu, hybrid, gpu (default: cpu)")
     parser.add_argument("--simd", default="auto", metavar="NAME,...", help="of auto, scalar, avx2, avx512")
@@ -40,7 +46,8 @@ def configure(parser):
 
 
 def run(args) -> int:
-    report, sources = command.begin(args)
+    parts = command.listed("--parts", args.parts, PARTS)
+    report, sources = command.begin(args) if "scenes" in parts else (command.begin_report(args), [])
     report.note(measure.NOTE)
     tiers = command.listed("--tiers", args.tiers, ACCURACIES)
     backends, refused = usable("backend", command.listed("--backend", args.backend, BACKENDS))
@@ -49,8 +56,11 @@ def run(args) -> int:
     command.skipped(report, "instruction set", refused)
     for source in sources:
         _measure_scene(report, source, tiers, backends, sets, args)
-    _print_scenes(report.rows)
-    if args.sweep_queries > 0:
+    if sources:
+        _print_scenes(report.rows)
+    if "distance" in parts:
+        _measure_distance(report, tiers, backends, sets, args)
+    if "sweeps" in parts and args.sweep_queries > 0:
         for part in (accuracy_sweep.adversarial, accuracy_sweep.sweep):
             for row in part(tiers, args.sweep_queries, args.seed):
                 report.add(part=part.__name__, **row)
@@ -60,14 +70,35 @@ def run(args) -> int:
     return command.end(args, report)
 
 
-def _measure_scene(report, source, tiers, backends, sets, args):
-    variants = {
-        (backend, simd, tier): Variant(
-            f"{backend} {simd} {tier}",
-            {"backend": backend, "accuracy": tier, "threads": args.threads, "simd": simd},
-        )
+def _options(tiers, backends, sets, args) -> dict[tuple[str, str, str], dict]:
+    """Of the detectors that are compared, by backend, instruction set and tier."""
+    return {
+        (backend, simd, tier): {"backend": backend, "accuracy": tier, "threads": args.threads, "simd": simd}
         for backend in backends for simd in (sets if backend == "cpu" else ["auto"]) for tier in tiers
     }  # fmt: skip
+
+
+def _measure_distance(report, tiers, backends, sets, args):
+    data = data_folder(args.data)
+    folder = data / "distance" if data and (data / "distance").is_dir() else None
+    compared = {" ".join(key): options for key, options in _options(tiers, backends, sets, args).items()}
+    if folder is None:
+        report.note("distance queries on scenes skipped: they need HPCCD_DATA, and the folder distance in it")
+    for source, known in accuracy_distance.scenes(folder) if folder else ():
+        for row in accuracy_distance.on_scene(source, known, compared, args.repeat):
+            named = dict(zip(("backend", "simd", "accuracy"), row.pop("variant").split(), strict=True))
+            report.add(part="distance", threads=args.threads or cores(), **row, **named)
+    if args.sweep_queries > 0:
+        for row in accuracy_distance.hard(tiers, args.sweep_queries, args.seed, folder):
+            report.add(part="hard distance", **row)
+    by_part = [[row for row in report.rows if row["part"] == part] for part in ("distance", "hard distance")]
+    accuracy_distance.show(*by_part, tiers)
+
+
+def _measure_scene(report, source, tiers, backends, sets, args):
+    variants = {
+        key: Variant(" ".join(key), options) for key, options in _options(tiers, backends, sets, args).items()
+    }
     series = measure.measure(source, [measure.CoreRunner(v) for v in variants.values()], args.repeat, args.steps)
     known = {step: _truth(source.step(step)) for step in next(iter(series.values())).by_step}
     for (backend, simd, tier), variant in variants.items():
@@ -114,11 +145,14 @@ def _check(report):
     """The promises of the tiers, on everything that was measured here."""
     for row in report.rows:
         where = row.get("scene") or row.get("generator") or f"{row['sweep']} {row['at']:g}, {row['queries']}"
-        wrong = f"missed {row['missed']}, invented {row['invented']}, toc off by {row['toc_worst']:g}"
-        text = f"{where}: {row['accuracy']}: {wrong}"
-        if row["accuracy"] == "exact" and (row["missed"] or row["invented"] or row["toc_worst"] > 1e-12):
+        what, off = row.get("query", "contacts"), row.get("toc_worst", row.get("value_worst"))
+        wrong = f"missed {row['missed']}, invented {row['invented']}, off by {off:g}"
+        text = f"{where}: {what}: {row['accuracy']}: {wrong}"
+        if row["accuracy"] == "exact" and (row["missed"] or row["invented"] or off > 1e-12):
             report.failure(text)
-        if row["accuracy"] == "conservative" and (row["missed"] or row["latest"] > 0):
+        # A distance and its truth are each rounded; a time of the truth is rounded down.
+        late = 1e-15 if "query" in row else 0.0
+        if row["accuracy"] == "conservative" and (row["missed"] or row["latest"] > late):
             report.failure(f"{text}, latest by {row['latest']:g}")
 
 

@@ -4,11 +4,13 @@ be hard, each compared with the exact oracle of hpccd_core.reference on the very
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
-from hpccd_core.fuzz.differential import CORE, ORACLE
-from hpccd_core.fuzz.disturbances import disturb
+from hpccd_core.fuzz import questions
 from hpccd_core.fuzz.generators import GENERATORS
+from hpccd_core.fuzz.questions import CONTACT, Batch
 from hpccd_ros.bench.core import truth
 from hpccd_ros.bench.report import progress
 
@@ -26,25 +28,28 @@ def sweep(tiers: list[str], n: int, seed: int) -> list[dict]:
         for family in ("ordinary", "degenerate"):
             base = {kind: _queries(kind, family, n, seed) for kind in GENERATORS}
             for name, at in points:
-                moved = {kind: q * at if name == "scale" else q + at * DIRECTION for kind, q in base.items()}
-                rows += [{"sweep": name, "at": at, "queries": family, **row} for row in _ask(moved, tiers)]
+                moved = [
+                    Batch(CONTACT, kind, family, q * at if name == "scale" else q + at * DIRECTION, np.zeros(len(q)))
+                    for kind, q in base.items()
+                ]
+                rows += [{"sweep": name, "at": at, "queries": family, **row} for row in ask(moved, tiers)]
                 bar.step(f"{family}, {name} {at:g}")
     return rows
 
 
-def adversarial(tiers: list[str], n: int, seed: int) -> list[dict]:
+def adversarial(tiers: list[str], n: int, seed: int, question: str = CONTACT) -> list[dict]:
     """Rows {"generator", "accuracy", ...}: n queries of each kind from each generator of `make fuzz`, disturbed as
     there."""
-    names = sorted({name for generators in GENERATORS.values() for name in generators})
+    kinds = {kind: questions.generators_of(question, kind) for kind in questions.kinds_of(question)}
+    names = sorted({name for generators in kinds.values() for name in generators})
     rows = []
-    with progress.bar("hard queries", len(names)) as bar:
+    with progress.bar(f"hard queries, {question}", len(names)) as bar:
         for number, name in enumerate(names):
-            queries = {}
-            for kind, generators in GENERATORS.items():
-                if name in generators:
-                    rng = np.random.default_rng([seed, number])
-                    queries[kind] = disturb(rng, generators[name](rng, n), kind)
-            rows += [{"generator": name, **row} for row in _ask(queries, tiers)]
+            batches = [
+                questions.generated(question, kind, name, np.random.default_rng([seed, number]), n)
+                for kind, generators in kinds.items() if name in generators
+            ]  # fmt: skip
+            rows += [{"generator": name, **row} for row in ask(batches, tiers)]
             bar.step(name)
     return rows
 
@@ -58,13 +63,16 @@ def _queries(kind, family, n, seed):
     return GENERATORS[kind]["meeting"](rng, n)
 
 
-def _ask(queries, tiers):
-    true = {kind: ORACLE[kind](q) for kind, q in queries.items()}
+def ask(batches: list[Batch], tiers: list[str], known: list[questions.Answers] | None = None) -> Iterator[dict]:
+    """A row for each tier, of all batches together; `known`: the truth of each batch, by default the oracle's."""
+    true = known or [questions.truth(batch) for batch in batches]
+    sizes = np.concatenate([questions.size_of(batch) for batch in batches])
     for tier in tiers:
-        answers = {kind: CORE[kind](q, accuracy=tier) for kind, q in queries.items()}
-        parts = [np.concatenate(part) for part in zip(*((*answers[k], *true[k]) for k in queries), strict=True)]
-        errors = truth.of_queries(*parts)
-        total = len(parts[0])
+        answers = [questions.answers(batch, tier, "auto") for batch in batches]
+        parts = [np.concatenate(part) for part in zip(*((*a, *t) for a, t in zip(answers, true, strict=True)),
+                                                      strict=True)]  # fmt: skip
+        errors = truth.of_queries(*parts, sizes)
+        total = len(sizes)
         yield {
             "accuracy": tier,
             "n": total,

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """The timing loop: variants in turn on the same steps, so that what disturbs the machine disturbs all alike.
 
-What is timed is one call of `detect`, argument checks and the arrays of contacts included; where the topology has
-changed since the step before, making scene and detector too. Not timed: reading or generating the step, the first
-round (warm-up), and, where the measured steps do not follow each other, the steps before each one: of the fastest
-variant TURN_MS long and at least one, and the same for all, so that all build their hierarchy at the same step (of the
-only step of a file: the same step). They are computed because detectors carry their hierarchy from step to step, and
-because in a stream no other detector has used caches and cores in between. The only step of a file is then timed again
-and again, for TURN_MS: five times of 1.4 ms say little on a machine that others use as well.
+What is timed is one call of `detect` (or of another query), argument checks and the arrays of contacts included; where
+the topology has changed since the step before, making scene and detector too. Not timed: reading or generating the
+step, the first round (warm-up), and, where the measured steps do not follow each other, the steps before each one: of
+the fastest variant TURN_MS long and at least one, and the same for all, so that all build their hierarchy at the same
+step (of the only step of a file: the same step). They are computed because detectors carry their hierarchy from step to
+step, and because in a stream no other detector has used caches and cores in between. The only step of a file is then
+timed again and again, for TURN_MS: five times of 1.4 ms say little on a machine that others use as well.
 """
 
 from __future__ import annotations
@@ -17,8 +17,9 @@ import gc
 import math
 import time
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence, Sized
 
+import hpccd_core as hc
 from hpccd_ros.bench.core.variants import Variant
 from hpccd_ros.bench.report import progress
 from hpccd_ros.bench.report.timing import Times, times
@@ -28,8 +29,9 @@ from hpccd_ros.bench.steps import Source, Step
 TURN_MS = 10.0
 
 NOTE = (
-    "ms are wall-clock times of one detect() call from Python; variants run in turn, one round of warm-up is left out; "
-    "the hierarchy is carried from step to step (first_ms: one call with a new detector, which builds it)"
+    "ms are wall-clock times of one call of detect() or another query from Python; variants run in turn, one round of "
+    "warm-up is left out; the hierarchy is carried from step to step (first_ms: one call with a new detector, which "
+    "builds it)"
 )
 
 
@@ -44,13 +46,21 @@ class Sample:
     stats: dict[str, float]
 
 
+def detect(detector: hc.Detector, step: Step) -> hc.Contacts:
+    return detector.detect(step.vertices_t0, step.vertices_t1)
+
+
 class CoreRunner:
-    """Runs one variant of the core along a sequence of steps."""
+    """Runs one variant of the core along a sequence of steps.
+
+    ask(detector, step): the query, by default `detect`. Its answer has a length and a hash.
+    """
 
     carries_state = True
 
-    def __init__(self, variant: Variant):
+    def __init__(self, variant: Variant, ask: Callable[[hc.Detector, Step], Sized] = detect):
         self.name = variant.name
+        self._ask = ask
         self._variant = variant
         self._detector = None
         self._topology = None
@@ -61,11 +71,12 @@ class CoreRunner:
         began = time.perf_counter()
         if self._detector is None or step.topology != self._topology:
             self._detector, self._topology = self._variant.detector(step), step.topology
-        contacts = self._detector.detect(step.vertices_t0, step.vertices_t1)
+        found = self._ask(self._detector, step)
         end = time.perf_counter()
         return Sample(
-            1e3 * (end - began), contacts.hash, len(contacts), dict(self._detector.profile), dict(self._detector.stats)
-        )
+            1e3 * (end - began), found.hash, len(found), dict(self._detector.profile),
+            dict(self._detector.stats),
+        )  # fmt: skip
 
     def _as_wanted(self, step):
         if self._variant.change is None:
@@ -99,6 +110,14 @@ class Series:
     def sequence_ms(self) -> float:
         """The whole sequence once: the sum over its steps of the median over the rounds."""
         return sum(times([s.ms for s in samples]).median for samples in self.by_step.values())
+
+    def step_ms(self) -> float:
+        """An average step: the median over the rounds."""
+        return self.sequence_ms() / len(self.by_step)
+
+    def least_ms(self) -> float:
+        """An average step: the least over the rounds, which others on the machine disturb least."""
+        return sum(times([s.ms for s in samples]).best for samples in self.by_step.values()) / len(self.by_step)
 
     def stages(self) -> dict[str, float]:
         """ms of each stage in an average step, the median over the rounds; "outside" is what the core did not see:

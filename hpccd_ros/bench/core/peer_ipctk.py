@@ -54,13 +54,20 @@ class PeerRunner:
             self._step = step
         # The number of threads is a setting of the whole process.
         self._ipctk.set_num_threads(self._threads)
+        with silent_stdout():
+            return self._ask()
+
+    def _ask(self) -> Sample:
+        return self._earliest(0.0)
+
+    def _earliest(self, distance: float) -> Sample:
+        """The earliest time at which two features are within a distance (0: touch)."""
         candidates = self._ipctk.Candidates()
-        with _silent_stdout():
-            began = time.perf_counter()
-            candidates.build(self._mesh, self._start, self._end, 0.0, self._ipctk.LBVH())
-            between = time.perf_counter()
-            step_size = candidates.compute_collision_free_stepsize(self._mesh, self._start, self._end)
-            end = time.perf_counter()
+        began = time.perf_counter()
+        candidates.build(self._mesh, self._start, self._end, distance, self._ipctk.LBVH())
+        between = time.perf_counter()
+        step_size = candidates.compute_collision_free_stepsize(self._mesh, self._start, self._end, distance)
+        end = time.perf_counter()
         found = {
             "vf_candidates": len(candidates.fv_candidates),
             "ee_candidates": len(candidates.ee_candidates),
@@ -71,7 +78,7 @@ class PeerRunner:
 
 
 @contextlib.contextmanager
-def _silent_stdout():
+def silent_stdout():
     """Its log goes to file descriptor 1 past Python, thousands of lines where features touch at t=0."""
     sys.stdout.flush()
     kept = os.dup(1)

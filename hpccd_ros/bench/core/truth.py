@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Found contacts against the true ones: missed, invented, and how far times of contact are off."""
+"""Found pairs against the true ones: missed, invented, and how far times of contact, or distances, are off."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 @dataclasses.dataclass(frozen=True)
 class Errors:
     """missed, invented: numbers of pairs. toc_worst, toc_p99: of |toc - true toc| over pairs found and true, 0 where
-    there are none; latest: of toc - true toc."""
+    there are none; latest: of toc - true toc. Of distances likewise, over the size of what they were measured in."""
 
     true: int
     missed: int
@@ -21,24 +21,28 @@ class Errors:
     latest: float
 
 
-def of_scene(found, truth: dict[str, np.ndarray]) -> Errors:
-    """found: hpccd_core.Contacts; truth: {"vf", "vf_toc", "ee", "ee_toc"} in any order."""
+def of_scene(found, truth: dict[str, np.ndarray], value: str = "toc", size: float = 1.0) -> Errors:
+    """found: hpccd_core.Contacts; truth: {"vf", "vf_toc", "ee", "ee_toc"} in any order. Of Proximity: value="distance",
+    and the size of the scene. Of Intersections: {"ef"}."""
     missed = invented = 0
     off = [np.empty(0)]
-    for kind in ("vf", "ee"):
+    kinds = [kind for kind in ("vf", "ee", "ef") if kind in truth]
+    for kind in kinds:
         there, here = _keys(getattr(found, kind)), _keys(truth[kind])
         common, i, j = np.intersect1d(there, here, assume_unique=True, return_indices=True)
         missed += len(here) - len(common)
         invented += len(there) - len(common)
-        off.append(getattr(found, kind + "_toc")[i] - truth[kind + "_toc"][j])
-    return _errors(len(truth["vf"]) + len(truth["ee"]), missed, invented, np.concatenate(off))
+        if f"{kind}_{value}" in truth:
+            off.append((getattr(found, f"{kind}_{value}")[i] - truth[f"{kind}_{value}"][j]) / size)
+    return _errors(sum(len(truth[kind]) for kind in kinds), missed, invented, np.concatenate(off))
 
 
-def of_queries(hit, toc, true_hit, true_toc) -> Errors:
-    """All (Q,): answers to queries and what is true."""
+def of_queries(hit, toc, true_hit, true_toc, sizes=1.0) -> Errors:
+    """All (Q,): answers to queries and what is true. toc: of proximity the distances, with the sizes of the queries."""
     both = hit & true_hit
+    sizes = np.broadcast_to(sizes, hit.shape)
     return _errors(int(true_hit.sum()), int((true_hit & ~hit).sum()), int((hit & ~true_hit).sum()),
-                   toc[both] - true_toc[both])  # fmt: skip
+                   (toc[both] - true_toc[both]) / sizes[both])  # fmt: skip
 
 
 def _errors(true, missed, invented, late):

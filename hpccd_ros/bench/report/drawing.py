@@ -105,10 +105,11 @@ def bars(axis, rows: Sequence[dict], label: str, parts: Callable, said: Callable
     return pieces
 
 
-def line(axis, rows: Sequence[dict], x: str, y: str, **style) -> None:
-    """y over x of the rows, by rising x."""
+def line(axis, rows: Sequence[dict], x: str, y: str, **style):
+    """y over x of the rows, by rising x; the line."""
     found = sorted(rows, key=lambda row: row[x])
-    axis.plot([row[x] for row in found], [row[y] for row in found], **{"markersize": 4.5, "linewidth": 1.5} | style)
+    style = {"markersize": 4.5, "linewidth": 1.5} | style
+    return axis.plot([row[x] for row in found], [row[y] for row in found], **style)[0]
 
 
 def labels(axis, x: str, y: str) -> None:

@@ -11,7 +11,14 @@ import re
 from pathlib import Path
 
 from hpccd_ros.base.errors import UserError
-from hpccd_ros.bench.report import figures, markdown, performance_core, performance_gpu, performance_node
+from hpccd_ros.bench.report import (
+    figures,
+    markdown,
+    performance_core,
+    performance_distance,
+    performance_gpu,
+    performance_node,
+)
 from hpccd_ros.bench.report.results import Kept
 
 # Name of each table: how it is made, and of which results.
@@ -27,6 +34,10 @@ TABLES = {
     "options": (performance_core.options, "options-4-cores"),
     "tiers": (performance_core.tiers, "accuracy-4-cores"),
     "wrong-answers": (performance_core.wrong_answers, "accuracy-4-cores"),
+    "separations": (performance_distance.by_distance, "distance-2-cores"),
+    "snapshots": (performance_distance.of_a_snapshot, "distance-2-cores"),
+    "distance-truth": (performance_distance.on_scenes, "accuracy-distance-2-cores"),
+    "distance-wrong-answers": (performance_distance.hard_queries, "accuracy-distance-2-cores"),
     "backends": (performance_gpu.backends, "gpu-h100-16-cores"),
     "device-stages": (performance_gpu.device_stages, "gpu-h100-16-cores"),
     "hybrid": (performance_gpu.hybrid, "gpu-h100-16-cores"),

@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "elementary/exact/contact.h"
 
+#include "elementary/exact/boxes.h"
 #include "elementary/exact/wide/approach.h"
 #include "elementary/exact/wide/earliest.h"
 
 namespace hpccd::exact {
 namespace {
-
-double coordinate(const Vec3<double>& v, int k) { return k == 0 ? v.x : k == 1 ? v.y : v.z; }
 
 // The coordinates of a query, by axis, and the power of two that makes each axis integers.
 struct Given {
@@ -38,25 +37,10 @@ struct Given {
   }
 };
 
-bool boxes_apart(Kind kind, const Vec3<double> q_t0[4], const Vec3<double> q_t1[4]) {
-  const int split = kind == Kind::vertex_face ? 1 : 2;
-  for (int k = 0; k < 3; ++k) {
-    double low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY};
-    for (int i = 0; i < 4; ++i)
-      for (const auto* q : {q_t0, q_t1}) {
-        const double x = coordinate(q[i], k);
-        low[i >= split] = std::min(low[i >= split], x);
-        high[i >= split] = std::max(high[i >= split], x);
-      }
-    if (high[0] < low[1] || high[1] < low[0]) return true;
-  }
-  return false;
-}
-
 }  // namespace
 
 std::optional<double> earliest_contact(Kind kind, const Vec3<double> q_t0[4], const Vec3<double> q_t1[4]) {
-  if (boxes_apart(kind, q_t0, q_t1)) return std::nullopt;
+  if (boxes_apart(kind, q_t0, q_t1, 0)) return std::nullopt;
   const Given given(q_t0, q_t1);
   Answer answer{false, {}};
   if (given.bits <= Widths<Integer<1>>::coordinate_bits)

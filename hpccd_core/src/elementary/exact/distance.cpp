@@ -63,8 +63,6 @@ bool within(const Resting<Z>& features, const Margin& d) {
   return compare.found;
 }
 
-int highest_bit(const Big& x) { return static_cast<int>(msb(x)); }
-
 // sqrt(num / den) 2^low, rounded.
 double root_of_ratio(const Big& num, const Big& den, int low) {
   if (num.is_zero()) return 0;

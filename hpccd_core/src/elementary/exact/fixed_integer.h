@@ -79,6 +79,10 @@ Integer<std::max(A, B)> operator-(const Integer<A>& a, const Integer<B>& b) {
   return detail::sum<true, std::max(A, B)>(a, b);
 }
 template <int N>
+Integer<N>& operator+=(Integer<N>& a, const Integer<N>& b) {
+  return a = a + b;
+}
+template <int N>
 Integer<N> operator-(const Integer<N>& a) {
   return Integer<N>(0) - a;
 }

@@ -15,6 +15,11 @@ using Big = boost::multiprecision::number<boost::multiprecision::cpp_int_backend
 
 inline int sign(const Big& x) { return x.sign(); }
 
+// Of a number that is not zero.
+inline int highest_bit(const Big& x) {
+  return static_cast<int>(boost::multiprecision::msb(x.sign() < 0 ? Big(-x) : x));
+}
+
 inline Big to_big(const Big& x) { return x; }
 template <int N>
 Big to_big(const Integer<N>& x) {

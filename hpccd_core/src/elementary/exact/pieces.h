@@ -27,16 +27,17 @@ class Pieces {
 
   Pieces(const Query<Z>& q, const Margin& d) : q_(q), d_(d), d2_(Z(d.mantissa) * Z(d.mantissa)) {}
 
+  // The cheapest first: what comes later need not be looked at beyond their times.
   template <class Visit>
   void visit_all(Visit&& visit) const {
-    inside(visit);
     for (int i = 0; i < q_.n_degenerate(); ++i) {
       const auto [from_start, from_end] = q_.degenerate(i);
-      point_and_line(i, from_start, from_start - from_end, visit);
       // Each pair of points once.
       if (q_.kind == Kind::edge_edge ? i < 2 : i == 0) points(from_start, visit);
       if (i < 2) points(from_end, visit);
     }
+    for (int i = 0; i < q_.n_degenerate(); ++i) point_and_line(i, visit);
+    inside(visit);
   }
 
  private:
@@ -65,7 +66,9 @@ class Pieces {
   }
 
   template <class Visit>
-  void point_and_line(int i, const Coordinates<Z>& from_start, const Coordinates<Z>& line, Visit& visit) const {
+  void point_and_line(int i, Visit& visit) const {
+    const auto [from_start, from_end] = q_.degenerate(i);
+    const auto line = from_start - from_end;
     const auto length = dot(line, line), along = dot(from_start, line);
     Vector<typename Query<Z>::Quadratic> beside;
     for (int k = 0; k < 3; ++k) beside[k] = q_.beside_line(i, k);

@@ -93,6 +93,13 @@ int sign_on_dyadic(const Polynomial<Z, 2>& p, const M& m, int k) {
   return sign(left + rise + p.c[2]) == s ? s : 0;
 }
 
+// Coefficients of degree n become those of Bernstein times the binomial ones.
+template <class Number>
+void to_bernstein(Number* a, int n) {
+  for (int i = 0; i < n; ++i)
+    for (int j = 1; j <= n - i; ++j) a[j] += a[j - 1];
+}
+
 // The remainder of q2^2 f by q, whose leading coefficient is not zero.
 template <class X, class Y>
 auto pseudo_remainder(const Polynomial<X, 3>& f, const Polynomial<Y, 2>& q) {

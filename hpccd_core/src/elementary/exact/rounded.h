@@ -67,9 +67,7 @@ bool round(const Polynomial<Z, D>& p, Rounded<D>& rounded) {
   using W = Plus<Z, 1>;
   std::array<W, D + 1> b;
   for (int i = 0; i <= D; ++i) b[i] = W(p.c[i]);
-  // Those times the binomial coefficients.
-  for (int i = 0; i < D; ++i)
-    for (int j = 1; j <= D - i; ++j) b[j] = b[j] + b[j - 1];
+  to_bernstein(b.data(), D);
   int e[D + 1];
   rounded.exponent = std::numeric_limits<int>::min();
   double binomial = 1;
@@ -109,37 +107,49 @@ struct Bracket {
   Rounded<D> f;
 };
 
-// The first root below limit / 2^62, as a time: found(bracket) tells it of a bracket, undecided(low, halvings) of an
-// interval (its later end included) where doubles do not tell, if there is one.
-template <int D, int E, class Found, class Undecided>
+// The first root below limit / 2^62, as a time. `others` tells it where doubles do not: others.in_bracket(bracket)
+// always, others.in_interval(low, halvings), its later end included, and others.after(from / 2^62), if there is one.
+template <int D, int E, class Others>
 class EarlySearch {
  public:
-  EarlySearch(std::int64_t limit, Found& found, Undecided& undecided)
-      : limit_(limit), found_(found), undecided_(undecided) {}
+  EarlySearch(std::int64_t limit, Others& others) : limit_(limit), others_(others) {}
 
   std::optional<std::int64_t> first(const RoundedEvent<D, E>& event, std::int64_t low = 0, int halvings = 0) {
-    if (low << (time_bits - halvings) >= limit_ || event.f.sign_inside(halvings)) return {};
+    const int bits = time_bits - halvings;
+    if (low << bits >= limit_ || (low + 1) << bits <= known_ || event.f.sign_inside(halvings)) return {};
     RoundedEvent<D, E> left, right;
     for (int i = 0; i < event.n; ++i) {
       const int s = event.positive[i].sign_inside(halvings);
       if (s < 0) return {};
       if (s == 0) event.positive[i].halve(left.positive[left.n++], right.positive[right.n++]);
     }
-    if (left.n == 0 && event.f.certainly_one_root(halvings)) return found_(Bracket<D>{low, halvings, event.f});
+    if (left.n == 0 && event.f.certainly_one_root(halvings))
+      return others_.in_bracket(Bracket<D>{low, halvings, event.f});
     if (halvings == most_halvings || ++steps_ > most_steps || event.f.all_uncertain(halvings))
-      return undecided_(low, halvings);
+      return ask(low, halvings);
     event.f.halve(left.f, right.f);
     if (const auto time = first(left, 2 * low, halvings + 1)) return time;
     return first(right, 2 * low + 1, halvings + 1);
   }
 
  private:
-  static constexpr int most_halvings = 45, most_steps = 200;
+  static constexpr int most_halvings = 45, most_steps = 200, most_questions = 2;
+
+  // Of a somewhat larger interval: what is uncertain here is so next to it.
+  std::optional<std::int64_t> ask(std::int64_t low, int halvings) {
+    if (++n_questions_ > most_questions) {
+      limit_ = 0;
+      return others_.after(low << (time_bits - halvings));
+    }
+    const int larger = std::min(3, halvings);
+    known_ = ((low >> larger) + 1) << (time_bits - halvings + larger);
+    return others_.in_interval(low >> larger, halvings - larger);
+  }
 
   std::int64_t limit_;
-  Found& found_;
-  Undecided& undecided_;
-  int steps_ = 0;
+  Others& others_;
+  std::int64_t known_ = 0;  // there is none before
+  int steps_ = 0, n_questions_ = 0;
 };
 
 // floor(root 2^62)

@@ -2,12 +2,10 @@
 // The coordinates of a query over one power of two for all axes, as Euclidean distances ask for; and a distance.
 #pragma once
 
+#include "elementary/exact/boxes.h"
 #include "elementary/exact/integers.h"
-#include "elementary/motion.h"
 
 namespace hpccd::exact {
-
-inline double coordinate(const Vec3<double>& v, int k) { return k == 0 ? v.x : k == 1 ? v.y : v.z; }
 
 // Four vertices.
 struct Given {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "elementary/exact/separation.h"
 
+#include "elementary/exact/boxes.h"
 #include "elementary/exact/distance.h"
 #include "elementary/exact/earliest.h"
 #include "elementary/exact/pieces.h"
@@ -11,23 +12,6 @@
 namespace hpccd::exact {
 namespace {
 
-// Along each axis the swept boxes are farther apart than d; a difference of doubles, rounded, is above d only where
-// the true one is.
-bool boxes_apart(Kind kind, const Vec3<double> q_t0[4], const Vec3<double> q_t1[4], double d) {
-  const int split = kind == Kind::vertex_face ? 1 : 2;
-  for (int k = 0; k < 3; ++k) {
-    double low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY};
-    for (int i = 0; i < 4; ++i)
-      for (const auto* q : {q_t0, q_t1}) {
-        const double x = coordinate(q[i], k);
-        low[i >= split] = std::min(low[i >= split], x);
-        high[i >= split] = std::max(high[i >= split], x);
-      }
-    if (low[1] - high[0] > d || low[0] - high[1] > d) return true;
-  }
-  return false;
-}
-
 template <class Z, int D>
 Polynomial<Big, D> to_big(const Polynomial<Z, D>& p) {
   Polynomial<Big, D> big;
@@ -35,24 +19,38 @@ Polynomial<Big, D> to_big(const Polynomial<Z, D>& p) {
   return big;
 }
 
-// In integers of any size.
-template <int D, int E, int n>
-struct WidePiece {
-  Polynomial<Big, D> distance;
-  Polynomial<Big, E> not_zero;
-  std::array<Polynomial<Big, E>, n> at_least_zero;
-  int n_at_least_zero;
+// The first time at which a piece counts, in integers.
+template <class Distance, class Condition, int n>
+class InIntegers;
+template <class Z, int D, class Y, int E, int n>
+class InIntegers<Polynomial<Z, D>, Polynomial<Y, E>, n> {
+ public:
+  using P = Piece<Polynomial<Z, D>, Polynomial<Y, E>, n>;
+  InIntegers(const P& piece, std::int64_t limit) : piece_(piece), limit_(limit) {}
 
-  template <class P>
-  explicit WidePiece(const P& piece)
-      : distance(to_big(piece.distance)), not_zero(to_big(piece.not_zero)), n_at_least_zero(piece.n_at_least_zero) {
-    for (int i = 0; i < n_at_least_zero; ++i) at_least_zero[i] = to_big(piece.at_least_zero[i]);
+  std::optional<std::int64_t> in_bracket(const Bracket<D>& bracket) { return time_of_root(piece_.distance, bracket); }
+  std::optional<std::int64_t> in_interval(std::int64_t low, int halvings) {
+    return first_time({low, halvings, halvings}, 0);
   }
-  wide::Event event() const {
-    wide::Event event{wide::coefficients(distance), wide::coefficients(not_zero), {}};
-    for (int i = 0; i < n_at_least_zero; ++i) event.at_least_zero.push_back(wide::coefficients(at_least_zero[i]));
-    return event;
+  std::optional<std::int64_t> after(std::int64_t from) { return first_time({}, from); }
+
+ private:
+  std::optional<std::int64_t> first_time(const wide::Window& window, std::int64_t from) {
+    if (event_.vanishes.empty()) {
+      big_ = {to_big(piece_.distance), to_big(piece_.not_zero), {}, piece_.n_at_least_zero};
+      event_ = {wide::coefficients(big_.distance), wide::coefficients(big_.not_zero), {}};
+      for (int i = 0; i < piece_.n_at_least_zero; ++i) {
+        big_.at_least_zero[i] = to_big(piece_.at_least_zero[i]);
+        event_.at_least_zero.push_back(wide::coefficients(big_.at_least_zero[i]));
+      }
+    }
+    return wide::first_time(event_, window, from, limit_);
   }
+
+  const P& piece_;
+  std::int64_t limit_;
+  Piece<Polynomial<Big, D>, Polynomial<Big, E>, n> big_;
+  wide::Event event_;
 };
 
 // The earliest time of all pieces.
@@ -79,15 +77,9 @@ class Earliest {
     if (E > 0) round(piece.not_zero, event.positive[event.n++]);
     for (int i = 0; i < piece.n_at_least_zero; ++i)
       if (round(piece.at_least_zero[i], event.positive[event.n])) ++event.n;
-    std::optional<WidePiece<D, E, n>> wide;
-    const auto found = [&](const Bracket<D>& bracket) { return time_of_root(piece.distance, bracket); };
-    const auto undecided = [&](std::int64_t low, int halvings) {
-      if (!wide) wide.emplace(piece);
-      return wide::first_time(wide->event(), {low, halvings, halvings}, first_);
-    };
-    if (const auto time =
-            EarlySearch<D, E, decltype(found), decltype(undecided)>(first_, found, undecided).first(event))
-      first_ = std::min(first_, *time);
+    InIntegers<Polynomial<Z, D>, Polynomial<Y, E>, n> integers(piece, first_);
+    EarlySearch<D, E, decltype(integers)> search(first_, integers);
+    if (const auto time = search.first(event)) first_ = std::min(first_, *time);
   }
 
   std::int64_t first_ = never;

@@ -18,6 +18,13 @@ Coefficients coefficients(const Polynomial<Big, D>& p) {
   return {p.c.data(), static_cast<std::size_t>(p.degree() + 1)};
 }
 
+template <class Number>
+std::vector<Number> copied(Coefficients p) {
+  std::vector<Number> v;
+  for (const Big& c : p) v.emplace_back(c);
+  return v;
+}
+
 inline std::vector<Big> derivative(Coefficients p) {
   std::vector<Big> d;
   for (int i = 1; i <= degree_of(p); ++i) d.push_back(i * p[i]);

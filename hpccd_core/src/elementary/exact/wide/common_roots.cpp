@@ -6,13 +6,6 @@
 namespace hpccd::exact::wide {
 namespace {
 
-template <class Number>
-std::vector<Number> copied(Coefficients p) {
-  std::vector<Number> v;
-  for (const Big& c : p) v.emplace_back(c);
-  return v;
-}
-
 template <class Number, class Zero>
 void trim(std::vector<Number>& p, Zero&& is_zero) {
   while (!p.empty() && is_zero(p.back())) p.pop_back();
@@ -30,13 +23,6 @@ std::vector<Number> last_remainder(std::vector<Number> f, std::vector<Number> g,
     f.swap(g);
   }
   return f;
-}
-
-// Whether the remainders end in something else than zero, seen modulo a prime that divides neither leading number.
-bool certainly_no_common_root(Coefficients f, Coefficients g) {
-  auto a = copied<Residue>(f), b = copied<Residue>(g);
-  if (a.back().zero() || b.back().zero()) return false;
-  return last_remainder(std::move(a), std::move(b), [](Residue x) { return x.zero(); }, [](auto&) {}).size() == 1;
 }
 
 void drop_content(Numbers& p) {
@@ -62,6 +48,12 @@ Numbers quotient(Numbers f, const Numbers& g) {
 }
 
 }  // namespace
+
+bool certainly_no_common_root(Coefficients f, Coefficients g) {
+  auto a = copied<Residue>(f), b = copied<Residue>(g);
+  if (a.back().zero() || b.back().zero()) return false;
+  return last_remainder(std::move(a), std::move(b), [](Residue x) { return x.zero(); }, [](auto&) {}).size() == 1;
+}
 
 Numbers common_factor(Coefficients f, Coefficients g) {
   if (certainly_no_common_root(f, g)) return {1};

@@ -6,6 +6,10 @@
 
 namespace hpccd::exact::wide {
 
+// Whether their remainders end in something else than zero, seen modulo a prime that divides neither leading number: if
+// so, no number is a root of both. False: it stays open.
+bool certainly_no_common_root(Coefficients f, Coefficients g);
+
 // The greatest common factor, without content; of degree 0 where no number is a root of both.
 Numbers common_factor(Coefficients f, Coefficients g);
 

@@ -16,8 +16,8 @@ std::int64_t floor_before(const Dyadic& x) { return x.k < time_bits ? floor_of(x
 
 class Search {
  public:
-  Search(const Event& event, std::int64_t limit)
-      : event_(event), of_(event.vanishes.begin(), event.vanishes.end()), limit_(limit) {}
+  Search(const Event& event, std::int64_t from, std::int64_t limit)
+      : event_(event), of_(event.vanishes.begin(), event.vanishes.end()), from_(from), limit_(limit) {}
 
   std::optional<std::int64_t> in(const Window& window) {
     const Part part(of_, window);
@@ -34,7 +34,8 @@ class Search {
   // conditions: those that may be negative somewhere in the part.
   std::optional<std::int64_t> within(Part part, std::vector<Coefficients> conditions) {
     while (part.variations() > 0) {
-      if (floor_of(part.window().begin()) >= limit_ || excluded(part.window(), conditions)) return {};
+      if (floor_of(part.window().begin()) >= limit_ || floor_of(part.window().end()) < from_) return {};
+      if (excluded(part.window(), conditions)) return {};
       if (part.variations() == 1) return at_root(std::move(part), conditions);
       if (part.window().w > patience && !square_free_) {
         of_ = square_free(of_);
@@ -116,13 +117,14 @@ class Search {
   const Event& event_;
   Numbers of_;
   bool square_free_ = false;
-  std::int64_t limit_;
+  std::int64_t from_, limit_;
 };
 
 }  // namespace
 
-std::optional<std::int64_t> first_time(const Event& event, const Window& window, std::int64_t limit) {
-  return Search(event, limit).in(window);
+std::optional<std::int64_t> first_time(const Event& event, const Window& window, std::int64_t from,
+                                       std::int64_t limit) {
+  return Search(event, from, limit).in(window);
 }
 
 }  // namespace hpccd::exact::wide

@@ -6,8 +6,6 @@
 namespace hpccd::exact::wide {
 namespace {
 
-int highest_bit(const Big& x) { return static_cast<int>(msb(x.sign() < 0 ? Big(-x) : x)); }
-
 void drop_common_power_of_two(Numbers& a) {
   int common = std::numeric_limits<int>::max();
   for (const Big& x : a)
@@ -19,25 +17,23 @@ void drop_common_power_of_two(Numbers& a) {
 
 constexpr std::size_t most_coefficients = 7;
 
-// Of polynomials of degree n: the Bernstein coefficients times the binomial ones.
-template <class Number>
-void to_bernstein(Number* a, std::size_t n) {
-  for (std::size_t i = 0; i < n; ++i)
-    for (std::size_t m = 1; m <= n - i; ++m) a[m] += a[m - 1];
+// The coefficients over one power of two, the largest about one.
+void rounded(const Numbers& a, double* p) {
+  int e[most_coefficients], most = std::numeric_limits<int>::min();
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    p[i] = sign(a[i]) * magnitude_of(a[i], e[i]);
+    if (p[i] != 0) most = std::max(most, e[i]);
+  }
+  for (std::size_t i = 0; i < a.size(); ++i) p[i] = std::ldexp(p[i], std::max(e[i] - most, -1000));
 }
 
 // Their signs in double precision; false where one stays open.
 bool rounded_signs(const Numbers& a, int* signs) {
   const std::size_t n = a.size() - 1;
   double b[most_coefficients];
-  int e[most_coefficients], most = std::numeric_limits<int>::min();
-  for (std::size_t i = 0; i <= n; ++i) {
-    b[i] = sign(a[i]) * magnitude_of(a[i], e[i]);
-    if (b[i] != 0) most = std::max(most, e[i]);
-  }
-  for (std::size_t i = 0; i <= n; ++i) b[i] = std::ldexp(b[i], std::max(e[i] - most, -1000));
+  rounded(a, b);
   signs[0] = sign(a[0]);
-  to_bernstein(b, n);
+  to_bernstein(b, static_cast<int>(n));
   // Each is a sum of at most 64 numbers below 1, added up with at most 6 roundings.
   constexpr double error = 64 * 8 * 0x1p-52;
   for (std::size_t i = 1; i <= n; ++i) {
@@ -50,7 +46,7 @@ bool rounded_signs(const Numbers& a, int* signs) {
 void bernstein_signs(const Numbers& p, int* signs) {
   if (rounded_signs(p, signs)) return;
   Numbers a = p;
-  to_bernstein(a.data(), a.size() - 1);
+  to_bernstein(a.data(), static_cast<int>(a.size()) - 1);
   for (std::size_t i = 0; i < a.size(); ++i) signs[i] = sign(a[i]);
 }
 
@@ -134,23 +130,69 @@ bool Part::move_to(const Big& j, int h, int e) {
 }
 
 bool Part::narrow() {
-  const auto succeeds = [&] {
-    // Where as many roots as there are variations lie together, far from all others, the derivative that has one of
-    // them left is almost a straight line.
-    const std::size_t v = variations_;
-    const int h = gain_ + 2;
-    const Big cells = Big(1) << h;
-    if (v < a_.size() && !a_[v].is_zero()) {
-      const Big center = rounded_ratio(a_[v - 1], static_cast<int>(v) * a_[v], h);
-      if (center >= -1 && center <= cells + 1 && move_to(std::clamp(Big(center - 2), Big(0), Big(cells - 4)), h, 2))
-        return true;
-    }
-    // Roots at an end, or next to it on either side, are not all among the variations.
-    return move_to(0, gain_, 0) || move_to((Big(1) << gain_) - 1, gain_, 0);
-  };
-  const bool moved = succeeds();
-  gain_ = moved ? 2 * gain_ : std::max(1, gain_ / 2);
+  if (variations_ == 1 && jump()) return true;
+  int gain = std::min(gain_, most_gain());
+  const bool inside = gain > 0 && to_cluster(gain);
+  if (!inside) gain = gain_;
+  const bool moved = inside || (ends_ && to_end(gain));
+  ends_ = !inside;
+  gain_ = moved ? 2 * gain : std::max(1, gain / 2);
   return moved;
+}
+
+// Where as many roots as there are variations lie together, far from all others, the derivative that has one of them
+// left is almost a straight line.
+bool Part::to_cluster(int gain) {
+  const std::size_t v = variations_;
+  if (v >= a_.size() || a_[v].is_zero()) return false;
+  const int h = gain + 2;
+  const Big cells = Big(1) << h, center = rounded_ratio(a_[v - 1], static_cast<int>(v) * a_[v], h);
+  if (center < -1 || center > cells + 1) return false;
+  return move_to(std::clamp(Big(center - 2), Big(0), Big(cells - 4)), h, 2);
+}
+
+// Roots at an end, or next to it on either side, are not all among the variations.
+bool Part::to_end(int gain) { return move_to(0, gain, 0) || move_to((Big(1) << gain) - 1, gain, 0); }
+
+// A single root, by doubles and with as many bits as they know of it.
+bool Part::jump() {
+  double p[most_coefficients], size = 0, s = 0.5, low = 0, high = 1, slope = 0;
+  rounded(a_, p);
+  const int n = static_cast<int>(a_.size()) - 1;
+  for (int i = 0; i <= n; ++i) size += std::fabs(p[i]);
+  for (int turn = 0; turn < 60; ++turn) {
+    double value = p[n];
+    slope = 0;
+    for (int i = n; i-- > 0;) slope = slope * s + value, value = value * s + p[i];
+    ((value < 0) == (a_[0] < 0) ? low : high) = s;
+    double next = s - value / slope;
+    if (!(next > low && next < high)) next = low + 0.5 * (high - low);
+    if (std::fabs(next - s) < 0x1p-50) break;
+    s = next;
+  }
+  int bits;
+  std::frexp(std::fabs(slope) / size, &bits);
+  const int h = std::min(bits + 46, 46);
+  if (h < gain_ + 4) return false;
+  const std::int64_t cells = std::int64_t{1} << h;
+  const auto at = static_cast<std::int64_t>(std::ldexp(s, h));
+  if (!move_to(std::clamp<std::int64_t>(at - 2, 0, cells - 4), h, 2)) return false;
+  gain_ = h;
+  return true;
+}
+
+// What more than this many bits cannot hold: two roots c +- r, or c +- i r, whose r is known to doubles.
+int Part::most_gain() const {
+  constexpr int any = std::numeric_limits<int>::max() / 4;
+  if (variations_ != 2 || a_.size() < 3) return any;
+  double p[most_coefficients];
+  rounded(a_, p);
+  const double square = (p[1] * p[1] - 4 * p[0] * p[2]) / (4 * p[2] * p[2]);
+  constexpr double least = 0x1p-44;
+  if (!(std::fabs(square) > least * std::max(1.0, 1 / std::fabs(p[2])))) return any;
+  int exponent;
+  std::frexp(square, &exponent);
+  return -(exponent / 2) - 2;
 }
 
 bool Part::root_at_end() const {
@@ -162,7 +204,7 @@ bool Part::root_at_end() const {
 Part::Halves Part::halves() const {
   Halves h;
   for (Part* half : {&h.first, &h.second}) {
-    half->gain_ = gain_;
+    half->gain_ = gain_, half->ends_ = ends_;
     half->window_ = window_.part(half == &h.first ? 0 : 1, 1, 0);
   }
   h.first.a_ = seen_on_part(a_, 0, 1, 0);

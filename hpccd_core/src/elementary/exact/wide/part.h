@@ -52,13 +52,18 @@ class Part {
 
  private:
   Part() = default;
+  bool to_cluster(int gain);
+  bool to_end(int gain);
+  bool jump();
+  int most_gain() const;
   bool move_to(const Big& j, int h, int e);
   void drop_root_at_begin();
 
   Window window_;
   Numbers a_;
   int variations_ = 0;
-  int gain_ = 2;  // bits to be tried next
+  int gain_ = 2;       // bits to be tried next
+  bool ends_ = false;  // whether the last cluster was not found inside: then the ends are tried too
 };
 
 struct Part::Halves {

@@ -4,8 +4,6 @@
 namespace hpccd::exact::wide {
 namespace {
 
-int highest_bit(const Big& x) { return static_cast<int>(msb(x.sign() < 0 ? Big(-x) : x)); }
-
 int floor_of_ratio(int a, int b) { return a >= 0 ? a / b : -((b - 1 - a) / b); }
 
 // An e such that p, not zero at 0, has no root up to a distance of 2^e: there no other term reaches a power of one half

@@ -3,26 +3,10 @@
 
 #include <algorithm>
 
-#include "elementary/exact/wide/residue.h"
+#include "elementary/exact/wide/common_roots.h"
 
 namespace hpccd::exact::wide {
 namespace {
-
-template <class Number>
-std::vector<Number> copied(Coefficients p) {
-  std::vector<Number> v;
-  for (const Big& c : p) v.emplace_back(c);
-  return v;
-}
-
-// Whether the remainders of one polynomial by the other end in something else than zero, seen modulo a prime: if so, no
-// number is a root of both.
-bool certainly_no_common_root(Coefficients f, Coefficients q) {
-  if (f.size() < q.size()) std::swap(f, q);
-  auto a = copied<Residue>(f), b = copied<Residue>(q);
-  while (b.size() > 1) a = pseudo_remainder(std::move(a), b), a.swap(b);
-  return !b[0].zero();
-}
 
 // Both multiplied by what makes them coprime where the second one is `of`: den t - num with the root num / den of r, a
 // multiple of it, if q has that root. The lowest terms' denominator divides q's leading coefficient.

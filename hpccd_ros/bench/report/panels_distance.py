@@ -1,0 +1,43 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Panels of the picture of distance queries: time against distance, beside plain detection and a peer."""
+
+from __future__ import annotations
+
+from hpccd_ros.bench.report import drawing
+from hpccd_ros.bench.report.drawing import BLUE, GREEN, ORANGE, PURPLE
+
+BY_DISTANCE = {"separation": {"color": BLUE, "marker": "o"}, "proximity": {"color": GREEN, "marker": "s"}}
+# Without a distance: a level line.
+LEVEL = {"plain": "black", "intersections": ORANGE, "distances": PURPLE}
+LABEL = {"plain": "plain detection", "separation": "with separation d", "proximity": "proximity within d",
+         "distances": "smallest distances"}  # fmt: skip
+
+
+def heading(rows: list[dict]) -> str:
+    plain = next(row for row in rows if row["query"] == "plain")
+    return f"{plain['scene']}\n{plain['triangles'] / 1000:.0f} K triangles, {plain['pairs']:,.0f} contacts"
+
+
+def against_distance(axis, rows: list[dict]) -> dict:
+    """ms a step upwards, d to the right, both logarithmic; dashed: the peer."""
+    of = {mine[0]["query"]: mine for mine in drawing.by(rows, "query")}
+    handles = {}
+    for query, colour in LEVEL.items():
+        for row in of.get(query, ()):
+            label = LABEL.get(query, query)
+            handles[label] = axis.axhline(row["step_ms"], color=colour, linewidth=1.5, label=label)
+            if "ipctk_ms" in row:
+                handles[f"ipctk: {query}"] = axis.axhline(row["ipctk_ms"], color=colour, linewidth=1.2, linestyle="--",
+                                                          label=f"ipctk: {query}")  # fmt: skip
+    for query, style in BY_DISTANCE.items():
+        if query not in of:
+            continue
+        handles[LABEL[query]] = drawing.line(axis, of[query], "distance", "step_ms", label=LABEL[query], **style)
+        if theirs := [row for row in of[query] if "ipctk_ms" in row]:
+            style = style | {"linestyle": "--", "fillstyle": "none", "label": f"ipctk: {query}"}
+            handles[f"ipctk: {query}"] = drawing.line(axis, theirs, "distance", "ipctk_ms", **style)
+    axis.set_xscale("log")
+    axis.set_yscale("log")
+    axis.yaxis.set_major_formatter(lambda value, _: f"{value:,g}")
+    drawing.labels(axis, "d, units of the scene", "ms a step")
+    return handles
