@@ -3,11 +3,23 @@
 // meet which faces (elementary/intersection_filter.h).
 #pragma once
 
+#include "elementary/coincidence.h"
 #include "elementary/distance/proximity_test.h"
 #include "elementary/intersection_filter.h"
 #include "gpu/pair_lists.cuh"
 
 namespace hpccd::gpu {
+
+// Whether integers would find at once that they touch; the tiers that promise no answer compute a distance instead.
+template <Kind kind, class T>
+__device__ inline bool certainly_touch(const LaunchParams<T>& params, uint4 v) {
+  const Accuracy accuracy = accuracy_of(params, v);
+  if (accuracy != Accuracy::exact && accuracy != Accuracy::conservative) return false;
+  const u32 vertex[4] = {v.x, v.y, v.z, v.w};
+  Vec3<double> q[4];
+  for (int i = 0; i < 4; ++i) q[i] = load_ends(params.vertices, vertex[i]).t0;
+  return share_a_place<kind == Kind::vertex_face ? 1 : 2>(q);
+}
 
 // Distances stand where contacts have their times.
 template <Kind kind, class T>
@@ -18,11 +30,13 @@ __global__ __launch_bounds__(128) void proximity_kernel(const __grid_constant__ 
     bool near = false, undecided = false;
     double distance = 0;
     if (valid) {
-      const Motion<double> m = load_motion<kind>(params.vertices, vertices_of<kind>(params, pair.x, pair.y));
+      const uint4 v = vertices_of<kind>(params, pair.x, pair.y);
+      const Motion<double> m = load_motion<kind>(params.vertices, v);
       const NearOrFar<double> o = proximity_test<kind>(Snapshot<double>{m.p0, m.a0, m.b0}, params.separation);
-      near = o.near;
-      undecided = !o.near && !o.far;
-      distance = o.distance;
+      const bool touch = !o.near && !o.far && certainly_touch<kind>(params, v);
+      near = o.near || touch;
+      undecided = !near && !o.far;
+      distance = touch ? 0 : o.distance;
       n_far += o.far;
     }
     append_found(params, kind, near, pair, distance);
@@ -37,13 +51,11 @@ __global__ __launch_bounds__(128) void proximity_kernel(const __grid_constant__ 
 }
 
 template <class T>
-__device__ inline EdgeFace<double> load_edge_face(const LaunchParams<T>& params, u32 edge, u32 face) {
+__device__ inline void load_edge_face(const LaunchParams<T>& params, u32 edge, u32 face, Vec3<double> (&q)[5]) {
   const uint2 e = __ldg(params.edges + edge);
   const u32* f = params.faces + 3 * static_cast<u64>(face);
   const u32 v[5] = {e.x, e.y, __ldg(f), __ldg(f + 1), __ldg(f + 2)};
-  Vec3<double> q[5];
   for (int i = 0; i < 5; ++i) q[i] = load_ends(params.vertices, v[i]).t0;
-  return edge_face(q);
 }
 
 // Pairs of edge and face use the lists of the first kind.
@@ -54,10 +66,13 @@ __global__ __launch_bounds__(128) void intersection_kernel(const __grid_constant
   for_pairs(params.survivors[k], params.counters->survivors[k], [&](bool valid, uint2 pair) {
     bool intersect = false, undecided = false;
     if (valid) {
-      const EdgeFace<double> q = load_edge_face(params, pair.x, pair.y);
-      const Verdict<double> volumes = volume_test(q);
-      intersect = volumes.yes;
-      undecided = !volumes.yes && !volumes.no && !certainly_apart_in_projection(q);
+      Vec3<double> q[5];
+      load_edge_face(params, pair.x, pair.y, q);
+      const EdgeFace<double> spans = edge_face(q);
+      const Verdict<double> volumes = volume_test(spans);
+      const bool open = !volumes.yes && !volumes.no && !certainly_apart_in_projection(spans);
+      intersect = volumes.yes || (open && share_a_place<2>(q));
+      undecided = open && !intersect;
       n_apart += !intersect && !undecided;
     }
     append_found(params, Kind::vertex_face, intersect, pair, 0);

@@ -68,8 +68,10 @@ void TestLists::launch(Query query, LaunchParams<T>& params, int multiprocessors
     check_launch("end_segment_kernel");
   }
   if (of_snapshot(query)) return;
-  fallback_kernel<<<static_cast<unsigned>(2 * multiprocessors), 32, 0, stream>>>(params);
-  check_launch("fallback_kernel");
+  if (query == Query::contacts)
+    launch_fallback<Query::contacts>(params, stages);
+  else
+    launch_separation_fallback(params, stages);
   timer.mark("last_resort", stream);  // the fallbacks' first name, under which kept results have it
 }
 
