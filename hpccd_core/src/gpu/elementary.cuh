@@ -3,7 +3,7 @@
 // survivors of the one before.
 #pragma once
 
-#include "elementary/extended_precision.h"
+#include "elementary/distance/extended_separation.h"
 #include "elementary/filtered_test.h"
 #include "elementary/tolerance_test.h"
 #include "gpu/pair_lists.cuh"
@@ -57,8 +57,7 @@ __global__ __launch_bounds__(128) void roots_kernel(const __grid_constant__ Laun
       toc = reported_time(accuracy_of(params, v), o.toc, o.delta);
     }
     append_found(params, kind, contact, pair, toc);
-    const u64 at = warp_append(&params.counters->undecided, undecided);
-    if (undecided && at < params.undecided_capacity) params.undecided[at] = params.keys.key_of(kind, pair.x, pair.y);
+    append_undecided(params, kind, undecided, pair);
     proven += contact;
     doubtful += undecided;
   });
@@ -91,8 +90,9 @@ __global__ void end_segment_kernel(LaunchParams<T> params) {
   }
 }
 
-// The tier's fallback for what the error bounds left open: here where double precision is enough, else on the host.
-template <class T>
+// The tier's fallback for what the error bounds left open: here where double precision or twice that is enough, else on
+// the host. A kernel of its own where some pairs have a separation: the others' would be slower for its registers.
+template <bool separations, class T>
 __global__ __launch_bounds__(32) void fallback_kernel(const __grid_constant__ LaunchParams<T> params) {
   const u64 n = length(params.counters->undecided, params.undecided_capacity),
             stride = static_cast<u64>(gridDim.x) * blockDim.x;
@@ -112,7 +112,15 @@ __global__ __launch_bounds__(32) void fallback_kernel(const __grid_constant__ La
       const Ends r[4] = {load_ends(params.vertices, v.x), load_ends(params.vertices, v.y),
                          load_ends(params.vertices, v.z), load_ends(params.vertices, v.w)};
       const Vec3<double> q0[4] = {r[0].t0, r[1].t0, r[2].t0, r[3].t0}, q1[4] = {r[0].t1, r[1].t1, r[2].t1, r[3].t1};
-      if (accuracy == Accuracy::exact || accuracy == Accuracy::conservative) {
+      const double separation = separations ? separation_of(params, v.x, v.z) : 0;
+      if (separations && separation > 0) {
+        const extended_precision::Answer a =
+            kind == Kind::edge_edge ? extended_precision::earliest_within<Kind::edge_edge>(q0, q1, separation)
+                                    : extended_precision::earliest_within<Kind::vertex_face>(q0, q1, separation);
+        contact = a.contact;
+        host = !a.contact && !a.none;
+        toc = a.toc;
+      } else if (accuracy == Accuracy::exact || accuracy == Accuracy::conservative) {
         const extended_precision::Answer a = kind == Kind::edge_edge
                                                  ? extended_precision::decide<Kind::edge_edge>(q0, q1)
                                                  : extended_precision::decide<Kind::vertex_face>(q0, q1);

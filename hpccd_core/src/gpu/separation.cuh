@@ -37,7 +37,6 @@ __global__ __launch_bounds__(128) void separation_filter_kernel(const __grid_con
   add_up(&params.counters->apart[k], n_apart);
 }
 
-// What stays undecided goes to the host: it is rare.
 template <Kind kind, class T>
 __global__ __launch_bounds__(128) void separation_kernel(const __grid_constant__ LaunchParams<T> params) {
   constexpr u32 k = kind == Kind::edge_edge;
@@ -55,7 +54,7 @@ __global__ __launch_bounds__(128) void separation_kernel(const __grid_constant__
       n_apart += o.none;
     }
     append_found(params, kind, contact, pair, toc);
-    append_to_host(params, kind, undecided, pair);
+    append_undecided(params, kind, undecided, pair);
     n_contacts += contact;
     n_undecided += undecided;
   });
