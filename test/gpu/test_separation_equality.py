@@ -37,7 +37,7 @@ def assert_same(scene, t0, t1, backends=BACKENDS, **options):
 def test_random_scenes(make, dtype, accuracy, separation):
     if accuracy == "fast" and separation < 1:
         pytest.skip("one separation is enough for the tier that promises nothing")
-    scene, t0, t1 = scenes.join([make(np.random.default_rng(1), 20)])
+    scene, t0, t1 = scenes.join([make(np.random.default_rng(1), 12)])
     t0, t1 = t0.astype(dtype), t1.astype(dtype)
     contacts = assert_same(scene, t0, t1, accuracy=accuracy, minimum_separation=separation)
     assert len(contacts) > len(hc.Detector(scene, backend="cpu", accuracy=accuracy).detect(t0, t1)) * (separation == 1)
@@ -91,7 +91,7 @@ def test_separations_may_change_between_frames(backend, method):
             assert other.backend == backend
         hashes.append(expected.hash)
     assert other.stats["gpu_fallbacks"] == 0, other.last_gpu_error
-    assert hashes[0] == hashes[-1] and len(set(hashes)) == len(hashes) - 1
+    assert hashes[0] == hashes[6] and hashes[1] == hashes[3] and len(set(hashes)) == 5
 
 
 @pytest.mark.parametrize("method", ("published", "naive", "front"))
@@ -129,13 +129,12 @@ def test_rods_at_rest():
     """Two long parallel edges exactly at the separation, one sliding along the other; nothing in between."""
     scene = hc.Scene()
     for name in ("a", "b"):
-        scene.add_mesh(name, edges=np.array([[0, 1], [1, 2]]), n_vertices=3)
+        scene.add_mesh(name, np.array([[0, 1, 1], [1, 2, 2]]), n_vertices=3)
     rod = np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0]])
     t0 = np.concatenate([rod, rod + [0.25, 0.5, 0]])
     t1 = np.concatenate([rod, rod + [0.5, 0.5, 0]])
-    for separation, n in ((0.5, 4), (np.nextafter(0.5, 0), 0)):
-        assert len(assert_same(scene, t0, t1, minimum_separation=separation).ee) >= n
-    assert len(assert_same(scene, t0, t1, minimum_separation=np.nextafter(0.5, 0))) == 0
+    for separation, n in ((0.5, 3), (np.nextafter(0.5, 0), 0)):
+        assert len(assert_same(scene, t0, t1, minimum_separation=separation).ee) == n
 
 
 def test_device_arrays():
