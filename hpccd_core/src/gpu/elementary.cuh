@@ -4,11 +4,9 @@
 #pragma once
 
 #include "elementary/distance/extended_separation.h"
-#include "elementary/extended_precision.h"
 #include "elementary/filtered_test.h"
 #include "elementary/tolerance_test.h"
 #include "gpu/pair_lists.cuh"
-#include "gpu/stages.cuh"
 
 namespace hpccd::gpu {
 
@@ -59,8 +57,7 @@ __global__ __launch_bounds__(128) void roots_kernel(const __grid_constant__ Laun
       toc = reported_time(accuracy_of(params, v), o.toc, o.delta);
     }
     append_found(params, kind, contact, pair, toc);
-    const u64 at = warp_append(&params.counters->undecided, undecided);
-    if (undecided && at < params.undecided_capacity) params.undecided[at] = params.keys.key_of(kind, pair.x, pair.y);
+    append_undecided(params, kind, undecided, pair);
     proven += contact;
     doubtful += undecided;
   });
@@ -93,8 +90,9 @@ __global__ void end_segment_kernel(LaunchParams<T> params) {
   }
 }
 
-// The tier's fallback for what the error bounds left open: here where double precision is enough, else on the host.
-template <Query query, class T>
+// The tier's fallback for what the error bounds left open: here where double precision or twice that is enough, else on
+// the host. A kernel of its own where some pairs have a separation: the others' would be slower for its registers.
+template <bool separations, class T>
 __global__ __launch_bounds__(32) void fallback_kernel(const __grid_constant__ LaunchParams<T> params) {
   const u64 n = length(params.counters->undecided, params.undecided_capacity),
             stride = static_cast<u64>(gridDim.x) * blockDim.x;
@@ -114,8 +112,8 @@ __global__ __launch_bounds__(32) void fallback_kernel(const __grid_constant__ La
       const Ends r[4] = {load_ends(params.vertices, v.x), load_ends(params.vertices, v.y),
                          load_ends(params.vertices, v.z), load_ends(params.vertices, v.w)};
       const Vec3<double> q0[4] = {r[0].t0, r[1].t0, r[2].t0, r[3].t0}, q1[4] = {r[0].t1, r[1].t1, r[2].t1, r[3].t1};
-      const double separation = query == Query::separations ? separation_of(params, v.x, v.z) : 0;
-      if (query == Query::separations && separation > 0) {
+      const double separation = separations ? separation_of(params, v.x, v.z) : 0;
+      if (separations && separation > 0) {
         const extended_precision::Answer a =
             kind == Kind::edge_edge ? extended_precision::earliest_within<Kind::edge_edge>(q0, q1, separation)
                                     : extended_precision::earliest_within<Kind::vertex_face>(q0, q1, separation);
@@ -141,12 +139,6 @@ __global__ __launch_bounds__(32) void fallback_kernel(const __grid_constant__ La
     const u64 at = warp_append(&params.counters->to_host, host);
     if (host && at < params.to_host_capacity) params.to_host[at] = key;
   }
-}
-
-template <Query query, class T>
-void launch_fallback(const LaunchParams<T>& params, const Stages& stages) {
-  fallback_kernel<query><<<static_cast<unsigned>(2 * stages.multiprocessors), 32, 0, stages.stream>>>(params);
-  check_launch("fallback_kernel");
 }
 
 }  // namespace hpccd::gpu

@@ -35,6 +35,13 @@ __device__ void append_found(const LaunchParams<T>& params, Kind kind, bool want
   }
 }
 
+// Left to the fallback.
+template <class T>
+__device__ void append_undecided(const LaunchParams<T>& params, Kind kind, bool wanted, uint2 pair) {
+  const u64 at = warp_append(&params.counters->undecided, wanted);
+  if (wanted && at < params.undecided_capacity) params.undecided[at] = params.keys.key_of(kind, pair.x, pair.y);
+}
+
 // Left to exact arithmetic.
 template <class T>
 __device__ void append_to_host(const LaunchParams<T>& params, Kind kind, bool wanted, uint2 pair) {

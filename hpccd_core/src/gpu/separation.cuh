@@ -54,8 +54,7 @@ __global__ __launch_bounds__(128) void separation_kernel(const __grid_constant__
       n_apart += o.none;
     }
     append_found(params, kind, contact, pair, toc);
-    const u64 at = warp_append(&params.counters->undecided, undecided);
-    if (undecided && at < params.undecided_capacity) params.undecided[at] = params.keys.key_of(kind, pair.x, pair.y);
+    append_undecided(params, kind, undecided, pair);
     n_contacts += contact;
     n_undecided += undecided;
   });

@@ -17,13 +17,6 @@ void launch_separations(const LaunchParams<T>& params, const Stages& stages) {
   stages.mark("separation");
 }
 
-template <class T>
-void launch_separation_fallback(const LaunchParams<T>& params, const Stages& stages) {
-  launch_fallback<Query::separations>(params, stages);
-}
-
-template void launch_separation_fallback(const LaunchParams<float>&, const Stages&);
-template void launch_separation_fallback(const LaunchParams<double>&, const Stages&);
 template void launch_separations(const LaunchParams<float>&, const Stages&);
 template void launch_separations(const LaunchParams<double>&, const Stages&);
 

@@ -32,8 +32,6 @@ struct Stages {
 template <class T>
 void launch_separations(const LaunchParams<T>& params, const Stages& stages);
 template <class T>
-void launch_separation_fallback(const LaunchParams<T>& params, const Stages& stages);
-template <class T>
 void launch_snapshot(Query query, const LaunchParams<T>& params, const Stages& stages);
 
 }  // namespace hpccd::gpu

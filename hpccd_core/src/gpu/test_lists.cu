@@ -68,10 +68,9 @@ void TestLists::launch(Query query, LaunchParams<T>& params, int multiprocessors
     check_launch("end_segment_kernel");
   }
   if (of_snapshot(query)) return;
-  if (query == Query::contacts)
-    launch_fallback<Query::contacts>(params, stages);
-  else
-    launch_separation_fallback(params, stages);
+  const auto fallback = query == Query::separations ? fallback_kernel<true, T> : fallback_kernel<false, T>;
+  fallback<<<static_cast<unsigned>(2 * multiprocessors), 32, 0, stream>>>(params);
+  check_launch("fallback_kernel");
   timer.mark("last_resort", stream);  // the fallbacks' first name, under which kept results have it
 }
 

@@ -88,9 +88,8 @@ def _measure_distance(report, tiers, backends, sets, args):
         for row in accuracy_distance.on_scene(source, known, compared, args.repeat):
             named = dict(zip(("backend", "simd", "accuracy"), row.pop("variant").split(), strict=True))
             report.add(part="distance", threads=args.threads or cores(), **row, **named)
-    if args.sweep_queries > 0:
-        for row in accuracy_distance.hard(tiers, args.sweep_queries, args.seed, folder):
-            report.add(part="hard distance", **row)
+    for row in accuracy_distance.hard(tiers, max(0, args.sweep_queries), args.seed, folder):
+        report.add(part="hard distance", **row)
     by_part = [[row for row in report.rows if row["part"] == part] for part in ("distance", "hard distance")]
     accuracy_distance.show(*by_part, tiers)
 

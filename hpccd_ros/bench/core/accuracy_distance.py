@@ -74,9 +74,9 @@ def on_scene(source: Source, known: dict, variants: dict[str, dict], rounds: int
 
 def hard(tiers: list[str], n: int, seed: int, folder: Path | None) -> Iterator[dict]:
     """Rows {"query", "generator", "accuracy", ...}: n queries of each kind from each generator, and the single queries
-    of the folder."""
+    of the folder, whose truth is known."""
     for question in QUESTIONS:
-        rows = accuracy_sweep.adversarial(tiers, n, seed, question)
+        rows = accuracy_sweep.adversarial(tiers, n, seed, question) if n else []
         if folder and (folder / SINGLE).is_file():
             rows += [{"generator": SINGLE, **row} for row in accuracy_sweep.ask(*_singles(folder, question, tiers))]
         for row in rows:

@@ -100,7 +100,7 @@ def bars(axis, rows: Sequence[dict], label: str, parts: Callable, said: Callable
     axis.set_yticks(range(len(rows)), [row[label] for row in rows], fontsize=7.5)
     axis.invert_yaxis()
     axis.grid(False, axis="y")
-    axis.set_xlim(0, room * longest)
+    axis.set_xlim(0, room * longest or 1)
     axis.set_xlabel("ms a step", fontsize=8)
     return pieces
 

@@ -187,12 +187,6 @@ def _tiers(axis, rows):
     return handles
 
 
-def _distance_tiers(axis, rows):
-    handles = _tiers(axis, [row | {"toc_worst": row["value_worst"]} for row in rows])
-    drawing.labels(axis, "ms", f"worst error of {'toc' if rows[0]['query'] == 'separation' else 'distance'}")
-    return handles
-
-
 def _sweep(axis, rows):
     for place, mine in enumerate(drawing.by(rows, "accuracy")):
         tier = mine[0]["accuracy"]
@@ -226,10 +220,9 @@ FIGURES = (
            heading=lambda rows: f"{rows[0]['queries']} queries", size=(2, 4.6, 2.8), legend="first"),
     Figure("distance", "distance", "Distance queries, {accuracy}, {threads} threads", panels_distance.against_distance,
            kept="distance-2-cores", heading=panels_distance.heading, size=(3, 3.5, 3.0), legend="right"),
-    Figure("accuracy-distance", "accuracy", "Separation and proximity against the truth, {threads} threads",
-           _distance_tiers, rows=lambda row: row["part"] == "distance" and row["query"] != "intersections",
-           kept="accuracy-distance-2-cores", panel=("scene", "query", "distance"), size=(3, 3.9, 2.8), legend="right",
-           heading=lambda rows: "{scene}, {query} {distance:.3g}, {true:,} pairs".format_map(rows[0]), right="center"),
+    Figure("accuracy-distance", "accuracy", "Where each tier errs in distance queries made to be hard",
+           panels_distance.wrong_answers, rows=lambda row: row["part"] == "hard distance", panel=("query",),
+           kept="accuracy-distance-2-cores", heading=panels_distance.queries, size=(3, 3.9, 1.7), legend="right"),
     Figure("methods", "methods", "Methods and instruction sets, {accuracy}, {threads} threads", _variants,
            size=(3, 3.8, 2.8)),
     Figure("options", "options", "What each option saves, {accuracy}, {threads} threads", _options, size=(3, 4.4, 2.9)),

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Panels of the picture of distance queries: time against distance, beside plain detection and a peer."""
+"""Panels about distance queries: time against distance, beside plain detection and a peer; wrong answers of tiers."""
 
 from __future__ import annotations
 
 from hpccd_ros.bench.report import drawing
-from hpccd_ros.bench.report.drawing import BLUE, GREEN, ORANGE, PURPLE
+from hpccd_ros.bench.report.drawing import BLUE, GREEN, ORANGE, PURPLE, RED
 
 BY_DISTANCE = {"separation": {"color": BLUE, "marker": "o"}, "proximity": {"color": GREEN, "marker": "s"}}
 # Without a distance: a level line.
@@ -40,4 +40,26 @@ def against_distance(axis, rows: list[dict]) -> dict:
     axis.set_yscale("log")
     axis.yaxis.set_major_formatter(lambda value, _: f"{value:,g}")
     drawing.labels(axis, "d, units of the scene", "ms a step")
+    return handles
+
+
+def queries(rows: list[dict]) -> str:
+    return f"{rows[0]['query']}, {sum(mine[0]['n'] for mine in drawing.by(rows, 'generator')):,} queries"
+
+
+def wrong_answers(axis, rows: list[dict]) -> dict:
+    """Share of queries that each tier misses or invents, of all generators together."""
+    tiers = [
+        {"accuracy": mine[0]["accuracy"]} | {key: sum(row[key] for row in mine) for key in ("n", "missed", "invented")}
+        for mine in drawing.by(rows, "accuracy")
+    ]
+
+    def parts(tier):
+        return {key: (100 * tier[key] / tier["n"], colour) for key, colour in (("missed", RED), ("invented", ORANGE))}
+
+    def said(tier, _):
+        return f" {tier['missed']:,} + {tier['invented']:,}" if tier["missed"] + tier["invented"] else " none"
+
+    handles = drawing.bars(axis, tiers, "accuracy", parts, said, room=1.5)
+    axis.set_xlabel("wrong answers, %", fontsize=8)
     return handles

@@ -143,6 +143,12 @@ def test_wrong_answers_of_each_tier(bench, data):
     scenes, queries = performance_distance.on_scenes(kept), performance_distance.hard_queries(kept)
     assert len(scenes) == len(queries) == 2 + 3
     assert scenes[2].startswith("| strip | separation | 0.02 |")
+    panels = next(f for f in figures.FIGURES if f.name == "accuracy-distance").compose(kept).axes
+    for axis, query in zip(panels, ("separation", "proximity", "intersections"), strict=True):
+        wrong = [[r["missed"] + r["invented"], r["n"]] for r in hard if (r["query"], r["accuracy"]) == (query, "fast")]
+        missed, invented = [bar for bar in axis.patches if round(bar.get_y() + 0.35) == 0]
+        total = missed.get_width() + invented.get_width()
+        assert total == pytest.approx(100 * sum(w for w, _ in wrong) / sum(n for _, n in wrong))
 
 
 @pytest.mark.parametrize("key", ["s_vf", "p_ee", "x_ef"])

@@ -14,8 +14,8 @@ struct NearOrFar {
   R distance;
 };
 
-// Relative to the size of the pair: the contract promises 1e-12 of the scene's. Below it features may touch, which is
-// for integers to say.
+// Relative to the size of the pair: the contract promises 1e-12 of the scene's. A distance below it is known well
+// enough whatever its direction.
 inline constexpr double distance_radius = 2e-13;
 
 template <Kind kind, class R>
@@ -29,8 +29,8 @@ HPCCD_HD NearOrFar<R> proximity_test(const Snapshot<R>& at, R d) {
   R least = gaps[0];
   for (int i = 1; i < n_corners<kind>; ++i) least = lesser(least, gaps[i]);
   const R radius = R(distance_radius) * s;
-  const auto usable = squares_in_range(s) && length > R(2) * radius;
-  return {usable && length <= margin.below && length - least <= radius, usable && least > margin.above, length};
+  const auto usable = squares_in_range(s), known = length - least <= radius || length <= radius;
+  return {usable && length <= margin.below && known, usable && least > margin.above, length};
 }
 
 }  // namespace hpccd

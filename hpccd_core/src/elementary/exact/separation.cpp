@@ -36,21 +36,23 @@ class InIntegers<Polynomial<Z, D>, Polynomial<Y, E>, n> {
 
  private:
   std::optional<std::int64_t> first_time(const wide::Window& window, std::int64_t from) {
-    if (event_.vanishes.empty()) {
-      big_ = {to_big(piece_.distance), to_big(piece_.not_zero), {}, piece_.n_at_least_zero};
-      event_ = {wide::coefficients(big_.distance), wide::coefficients(big_.not_zero), {}};
-      for (int i = 0; i < piece_.n_at_least_zero; ++i) {
-        big_.at_least_zero[i] = to_big(piece_.at_least_zero[i]);
-        event_.at_least_zero.push_back(wide::coefficients(big_.at_least_zero[i]));
-      }
+    if (!first_time_) {
+      wide::Event event{wide::coefficients(distance_ = to_big(piece_.distance)),
+                        wide::coefficients(not_zero_ = to_big(piece_.not_zero)),
+                        {}};
+      for (int i = 0; i < piece_.n_at_least_zero; ++i)
+        event.at_least_zero.push_back(wide::coefficients(at_least_zero_[i] = to_big(piece_.at_least_zero[i])));
+      first_time_.emplace(event);
     }
-    return wide::first_time(event_, window, from, limit_);
+    return first_time_->in(window, from, limit_);
   }
 
   const P& piece_;
   std::int64_t limit_;
-  Piece<Polynomial<Big, D>, Polynomial<Big, E>, n> big_;
-  wide::Event event_;
+  std::optional<wide::FirstTime> first_time_;
+  Polynomial<Big, D> distance_;
+  Polynomial<Big, E> not_zero_;
+  std::array<Polynomial<Big, E>, n> at_least_zero_;
 };
 
 // The earliest time of all pieces.

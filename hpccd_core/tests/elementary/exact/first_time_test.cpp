@@ -46,7 +46,7 @@ Ratio random_root(std::mt19937_64& random, int near) {
 const Numbers one = {1};
 constexpr std::int64_t never = std::numeric_limits<std::int64_t>::max();
 
-std::int64_t first_time(const wide::Event& event) { return wide::first_time(event, {}, 0, never).value_or(never); }
+std::int64_t first_time(const wide::Event& event) { return wide::FirstTime(event).in({}, 0, never).value_or(never); }
 
 // The first root in (0, 1] at which a line, `condition`, is not negative.
 std::int64_t expected(std::vector<Ratio> roots, const Ratio& condition, int rises) {
@@ -107,11 +107,11 @@ struct Others {
   std::optional<std::int64_t> in_bracket(const Bracket<6>& bracket) { return time_of_root(p, bracket); }
   std::optional<std::int64_t> in_interval(std::int64_t low, int halvings) {
     ++asked;
-    return wide::first_time(event, {low, halvings, halvings}, 0, never);
+    return wide::FirstTime(event).in({low, halvings, halvings}, 0, never);
   }
   std::optional<std::int64_t> after(std::int64_t from) {
     ++asked;
-    return wide::first_time(event, {}, from, never);
+    return wide::FirstTime(event).in({}, from, never);
   }
 };
 

@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Separation of coordinates of all magnitudes: exact answers, and no cliff.
+
+slowest_separations.npz holds the slowest of two short searches by `python -m hpccd_core.fuzz.slowest`, one of them with
+exponents at most 200 apart.
+"""
+
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from single_pairs import KINDS, TEST
+
+from hpccd_core import reference
+from hpccd_core.fuzz.generators import EDGE_EDGE, VERTEX_FACE
+
+ORACLE = {VERTEX_FACE: reference.separation_vertex_face, EDGE_EDGE: reference.separation_edge_edge}
+# Ten times what is promised, so that a slow machine does not fail; processor time, so that a busy one does not.
+LIMITS = pytest.mark.parametrize(("span", "limit"), [("span 200", 10e-3), ("any", 200e-3)])
+
+
+@pytest.fixture
+def queries(kind, span):
+    with np.load(Path(__file__).with_name("slowest_separations.npz")) as kept:
+        return list(zip(kept[f"{span}|{kind}"], kept[f"{span}|{kind}|distances"].tolist(), strict=True))
+
+
+@KINDS
+@LIMITS
+def test_answers_and_time(kind, span, limit, queries):
+    for points, distance in queries:
+        seconds = []
+        for _ in range(5):
+            start = time.thread_time()
+            (hit,), (toc,) = TEST[kind](points[None], "exact", minimum_separation=distance)
+            seconds.append(time.thread_time() - start)
+        (true_hit,), (true_toc,) = ORACLE[kind](points[None], distance)
+        assert hit == true_hit and (not hit or abs(toc - true_toc) <= 1e-12)
+        assert min(seconds) < limit
