@@ -4,91 +4,11 @@
 // cloth-ball, a fifth on n-body).
 #pragma once
 
-#include "bvh/tree.h"
 #include "elementary/distance/separation_test.h"
 #include "elementary/filtered_test.h"
-#include "gpu/launch_params.cuh"
+#include "gpu/candidate_space.cuh"
 
 namespace hpccd::gpu {
-
-inline constexpr u32 candidate_warps = 4;
-static_assert(3 * Tree::leaf_size <= 32, "a lane for each feature of a leaf");
-
-struct CandidateSpace {
-  // Features of the two leaves that overlap the other leaf, and their numbers. The four words of a box lie apart, so
-  // that neighbouring lanes read neighbouring words.
-  Bound bound[2][4][3 * Tree::leaf_size];
-  u32 number[2][3 * Tree::leaf_size];
-  u32 corner2[Tree::leaf_size];
-  // Candidates: the vertices that p, a and b lead from and to (span_ends; not of a snapshot), and the features.
-  uint4 vertices[64];
-  uint2 features[64];
-  uint2 survivors[2][96];
-
-  __device__ void put(u32 side, u32 at, const DeviceBox& b) {
-    for (int end = 0; end < 2; ++end)
-      store(&bound[side][end][at], b.low[end]), store(&bound[side][2 + end][at], b.high[end]);
-  }
-  __device__ DeviceBox box(u32 side, u32 at) const {
-    const auto word = [&](int i) { return bound_of(*reinterpret_cast<const float4*>(&bound[side][i][at])); };
-    return {{word(0), word(1)}, {word(2), word(3)}};
-  }
-};
-
-// Edges of a leaf that overlap the leaf `other`, one after the other in list `side`.
-template <Query query, class T>
-__device__ u32 stage_edges(const LaunchParams<T>& params, const DeviceLeaf& l, u32 other, CandidateSpace& s, u32 side) {
-  const u32 lane = lane_number(), slot = l.first_edge + lane;
-  DeviceBox b;
-  bool near = lane < l.n_edges();
-  if (near) {
-    b = load_box(&params.edge_boxes[slot]);
-    near = overlap<query>(b, load_box(&params.leaf_boxes[other]));
-  }
-  const u32 mask = __ballot_sync(all_lanes, near), at = __popc(mask & ((1u << lane) - 1));
-  if (near) {
-    s.put(side, at, b);
-    s.number[side][at] = __ldg(&params.edge_of_slot[slot]);
-  }
-  return __popc(mask);
-}
-
-template <Query query, class T>
-__device__ u32 stage_vertices(const LaunchParams<T>& params, const DeviceLeaf& l, u32 other, CandidateSpace& s) {
-  const u32 lane = lane_number();
-  DeviceBox b;
-  u32 v = 0;
-  bool near = lane < l.n_vertices();
-  if (near) {
-    v = __ldg(&params.vertex_of_slot[l.first_vertex + lane]);
-    b = load_point<grows_boxes(query)>(&params.points[v]);
-    near = overlap<query>(b, load_box(&params.leaf_boxes[other]));
-  }
-  const u32 mask = __ballot_sync(all_lanes, near), at = __popc(mask & ((1u << lane) - 1));
-  if (near) {
-    b.tag_low() = v;
-    s.put(0, at, b);
-  }
-  return __popc(mask);
-}
-
-template <Query query, class T>
-__device__ u32 stage_faces(const LaunchParams<T>& params, const DeviceLeaf& l, u32 other, CandidateSpace& s) {
-  const u32 lane = lane_number(), slot = l.first_face + lane;
-  DeviceBox b;
-  bool near = lane < l.n_faces();
-  if (near) {
-    b = load_box(&params.face_boxes[slot]);
-    near = overlap<query>(b, load_box(&params.leaf_boxes[other]));
-  }
-  const u32 mask = __ballot_sync(all_lanes, near), at = __popc(mask & ((1u << lane) - 1));
-  if (near) {
-    s.put(1, at, b);
-    s.corner2[at] = __ldg(&params.face_corner2[slot]);
-    s.number[1][at] = __ldg(&params.face_of_slot[slot]);
-  }
-  return __popc(mask);
-}
 
 // What a warp carries along.
 struct CandidateState {

@@ -3,6 +3,7 @@
 // meet which faces (elementary/intersection_filter.h).
 #pragma once
 
+#include "elementary/coincidence.h"
 #include "elementary/distance/proximity_test.h"
 #include "elementary/intersection_filter.h"
 #include "gpu/pair_lists.cuh"
@@ -37,13 +38,11 @@ __global__ __launch_bounds__(128) void proximity_kernel(const __grid_constant__ 
 }
 
 template <class T>
-__device__ inline EdgeFace<double> load_edge_face(const LaunchParams<T>& params, u32 edge, u32 face) {
+__device__ inline void load_edge_face(const LaunchParams<T>& params, u32 edge, u32 face, Vec3<double> (&q)[5]) {
   const uint2 e = __ldg(params.edges + edge);
   const u32* f = params.faces + 3 * static_cast<u64>(face);
   const u32 v[5] = {e.x, e.y, __ldg(f), __ldg(f + 1), __ldg(f + 2)};
-  Vec3<double> q[5];
   for (int i = 0; i < 5; ++i) q[i] = load_ends(params.vertices, v[i]).t0;
-  return edge_face(q);
 }
 
 // Pairs of edge and face use the lists of the first kind.
@@ -54,10 +53,13 @@ __global__ __launch_bounds__(128) void intersection_kernel(const __grid_constant
   for_pairs(params.survivors[k], params.counters->survivors[k], [&](bool valid, uint2 pair) {
     bool intersect = false, undecided = false;
     if (valid) {
-      const EdgeFace<double> q = load_edge_face(params, pair.x, pair.y);
-      const Verdict<double> volumes = volume_test(q);
-      intersect = volumes.yes;
-      undecided = !volumes.yes && !volumes.no && !certainly_apart_in_projection(q);
+      Vec3<double> q[5];
+      load_edge_face(params, pair.x, pair.y, q);
+      const EdgeFace<double> spans = edge_face(q);
+      const Verdict<double> volumes = volume_test(spans);
+      const bool open = !volumes.yes && !volumes.no && !certainly_apart_in_projection(spans);
+      intersect = volumes.yes || (open && share_a_place<2>(q));
+      undecided = open && !intersect;
       n_apart += !intersect && !undecided;
     }
     append_found(params, Kind::vertex_face, intersect, pair, 0);

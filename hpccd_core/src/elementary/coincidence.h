@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+// Features of a snapshot that have a vertex at the same place, though it is not the same vertex: they touch, at
+// distance 0, whatever else there is. Meshes that were cut apart along a seam are full of such pairs, which no error
+// bound decides.
+#pragma once
+
+#include "base/vec3.h"
+
+namespace hpccd {
+
+// Any of the first n_first places with any of the others. The coordinates are the given ones, not differences.
+template <int n_first, int n>
+HPCCD_HD bool share_a_place(const Vec3<double> (&q)[n]) {
+  bool shared = false;
+  for (int i = 0; i < n_first; ++i)
+    for (int k = n_first; k < n; ++k) shared = shared || (q[i].x == q[k].x && q[i].y == q[k].y && q[i].z == q[k].z);
+  return shared;
+}
+
+}  // namespace hpccd
