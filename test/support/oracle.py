@@ -10,7 +10,7 @@ from collections import defaultdict
 from pathlib import Path
 
 import numpy as np
-from bag_tools import missing_tail, typestore
+from bag_tools import completed, typestore
 from base_bags import SECOND
 from mcap_model import Bag
 from rosbags.serde import SerdeError
@@ -44,7 +44,7 @@ class Oracle:
             channel = channels[message.channel_id]
             if channel.topic in roles:
                 schema = schemas[channel.schema_id]
-                data = message.data + missing_tail(schema)
+                data = completed(schema, message.data)
                 self.found[str(roles[channel.topic])].append(_decode(store, data, schema.name))
         self.answers = self.found["contacts"]
         self.transforms = TransformBuffer()
