@@ -108,7 +108,8 @@ def test_no_contacts():
     "changes, text",
     [
         (dict(kind=[1, 0]), "kind must hold"),
-        (dict(kind=[0, 2]), "kind must hold"),
+        (dict(kind=[0, 3]), "kind must hold"),
+        (dict(kind=[0, 2]), r"toc has 2 values, 0 were expected"),
         (dict(toc=[0.5]), r"toc has 1 values, 2 were expected for shape \(2,\)"),
         (dict(features_b=[1, 2]), r"features_b has 2 values, 4 were expected"),
         (dict(points=[0.0]), r"points has 1 values, 6 were expected for shape \(2, 3\)"),
