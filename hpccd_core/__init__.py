@@ -11,13 +11,17 @@ from .contacts import Contacts
 from .detector import Detector
 from .devices import backends, gpu_status
 from .elementary import test_edge_edge, test_vertex_face
+from .proximity import Gap, Intersections, Proximity
 from .scene import Scene
 
 __all__ = [
     "Cancelled",
     "Contacts",
     "Detector",
+    "Gap",
+    "Intersections",
     "InvalidArgument",
+    "Proximity",
     "Scene",
     "backends",
     "gpu_status",

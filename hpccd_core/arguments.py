@@ -58,18 +58,19 @@ def whole_number(name: str, value: SupportsIndex, low: int, high: int) -> int:
     return number
 
 
-def separation(accuracy: str, minimum_separation: object, tolerance: object) -> tuple[float, float]:
-    """Both lengths as floats, finite and not negative. Only accuracy "conservative" has a use for them: there the
-    tolerance must be above zero, elsewhere the separation must be zero."""
-    lengths = _length("minimum_separation", minimum_separation), _length("tolerance", tolerance)
-    if lengths[0] > 0 and accuracy != "conservative":
-        raise ValueError('minimum_separation: only accuracy="conservative" has one; use that accuracy, or 0')
-    if lengths[1] == 0 and accuracy == "conservative":
-        raise ValueError("tolerance: must be above zero, else the search has no end")
-    return lengths
+def mesh_number(name: str, mesh: str | int, names: tuple[str, ...]) -> int:
+    """The number of a mesh that is given by its name or its number."""
+    if isinstance(mesh, str):
+        if mesh not in names:
+            raise ValueError(f"{name}: no mesh is named {mesh!r}; the scene has {', '.join(names) or 'none'}")
+        return names.index(mesh)
+    if not names:
+        raise ValueError(f"{name}: the scene has no mesh yet; add_mesh comes first")
+    return whole_number(name, mesh, 0, len(names) - 1)
 
 
-def _length(name: str, value: object) -> float:
+def length(name: str, value: object) -> float:
+    """The value as float, finite and not negative."""
     if isinstance(value, bool) or not isinstance(value, (int, float, np.floating, np.integer)):
         raise TypeError(f"{name}: expected a number, got {type(value).__name__}")
     try:

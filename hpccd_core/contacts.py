@@ -22,7 +22,10 @@ class Contacts:
     normal is zero where there is no side, because the motion is coplanar throughout (at rest on each other, or gliding
     in one plane), and where there is no direction, because at toc the face has no area, or the edges are parallel or
     points. Names do not matter: any order of corners and ends gives the same normal, edges exchanged turn it round.
-    With a minimum separation the side is that at toc.
+    With a minimum separation a point is the midpoint of the nearest points at toc, and the normal the direction from
+    face to vertex, or from edge a to edge b; where they already touch at the start, as above.
+    closest: (N+M, 2, 3) float64, the nearest points of both sides at toc: of the vertex and the face, or of edge a and
+    edge b; empty (0, 2, 3) unless "closest" is among the detector's outputs.
     first_toc: the earliest time, +inf where nothing touches.
     hash: 64-bit, the same for the same contacts on any backend and any number of threads.
     """
@@ -33,6 +36,7 @@ class Contacts:
     ee_toc: NDArray[np.float64]
     points: NDArray[np.float64]
     normals: NDArray[np.float64]
+    closest: NDArray[np.float64]
     first_toc: float
     hash: int
 
@@ -53,6 +57,7 @@ class Contacts:
             ee_toc=empty(0),
             points=empty((0, 3)),
             normals=empty((0, 3)),
+            closest=empty((0, 2, 3)),
             first_toc=np.inf,
             hash=0,
         )

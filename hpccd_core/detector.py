@@ -1,10 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The detector: motion of a scene in, contacts out."""
 
-import contextlib
-import re
 import threading
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -16,18 +14,21 @@ from .device_arrays import DeviceArray, DevicePositions
 from .devices import backends, gpu_status
 from .options import ACCURACIES, BACKENDS, METHODS, REPORTS, SIMD, Accuracy, Backend, Method, Output, Report, Simd
 from .scene import Scene
+from .snapshot_queries import SnapshotQueries, names_of_one_argument
 
 
-class Detector:
+class Detector(SnapshotQueries):
     """Finds every contact of a scene's straight-line motion from one set of positions to the next.
 
     accuracy: "fast", "balanced", "conservative" or "exact"; backend: "auto", "cpu", "hybrid" or "gpu"; threads: 0 for
     all cores; report: "all" contacts, those at the earliest time only ("first"), or one contact ("any"); outputs: any
-    of "points", "normals"; simd: "auto", "scalar", "avx2" or "avx512" (the result is the same). On the GPU "fast" is
+    of "points", "normals", "closest"; simd: "auto", "scalar", "avx2" or "avx512" (the result is the same). On the GPU "fast" is
     computed as "balanced", and "any" gives the first contact in canonical order.
-    minimum_separation, tolerance ("conservative" only, in coordinate units): report every pair that comes within
-    minimum_separation, measured along each axis, no later than it does so; pairs that miss it by up to tolerance may be
-    reported too. Without a separation "conservative" reports exactly the true contacts, at a time never late.
+    minimum_separation (in coordinate units): report every pair whose Euclidean distance is at most this at some time of
+    the step, and the earliest such time; 0: those that touch. scene.set_separation and set_separation() say it for a
+    pair of meshes. Neighbours that share no vertex count like all others: keep it below the shortest edge. "exact":
+    as rational arithmetic would decide, times within 1e-12; "conservative": the same, no time late; "balanced", "fast":
+    computed as "exact". tolerance: no longer of any effect: no pair beyond the separation is reported.
     method: how CPUs find the pairs to test. Contacts, their order and hash are the same with each, "all" or "first";
     "any" (one contact, whichever comes first) is offered by "default" only.
         "default": blocks of eight triangles, boxes compared in SIMD lanes, independent tasks.
@@ -91,8 +92,10 @@ class Detector:
         gpus = arguments.whole_number("gpus", gpus, 0, 1024)
         if gpus > (here := len(gpu_status()["devices"])) and backend in ("hybrid", "auto"):
             raise ValueError(f"gpus: {gpus} were asked for, {here} are usable here; give at most {here}, or 0 for all")
-        minimum_separation, tolerance = arguments.separation(accuracy, minimum_separation, tolerance)
+        minimum_separation = arguments.length("minimum_separation", minimum_separation)
+        arguments.length("tolerance", tolerance)
         self.n_vertices = scene.n_vertices
+        self._mesh_names = tuple(scene.mesh_names)
         self._core = _core.Detector(
             scene=scene._core,
             accuracy=getattr(_core.Accuracy, accuracy),
@@ -102,8 +105,8 @@ class Detector:
             threads=threads,
             points="points" in computed,
             normals="normals" in computed,
+            closest="closest" in computed,
             minimum_separation=minimum_separation,
-            tolerance=tolerance,
             method=getattr(_core.Method, method),
             restructure=arguments.flag("restructure", restructure),
             hybrid_segments=hybrid_segments,
@@ -167,7 +170,7 @@ class Detector:
             arguments.usable("vertices", end)
             contacts = Contacts.none()
         else:
-            with _names_of_step():
+            with names_of_one_argument():
                 contacts = self.detect(self._last, end)
         self._last = end
         return contacts
@@ -180,10 +183,18 @@ class Detector:
         if last is not None and last.is_double != place.is_double:
             kind = "float64" if last.is_double else "float32"
             raise TypeError(f"vertices: the last step was {kind} on the device; give that again, or call reset() first")
-        with _names_of_step():  # the device checks the first one too, as a step that goes nowhere
+        with names_of_one_argument():  # the device checks the first one too, as a step that goes nowhere
             contacts = self._detect_places(place if last is None else last, place)
         self._last_on_device.keep(place, self.n_vertices)
         return Contacts.none() if last is None else contacts
+
+    def set_separation(self, mesh_a: str | int, mesh_b: str | int, separation: float) -> None:
+        """From the next call on, report pairs of these two meshes (names or numbers) that come within this distance.
+
+        The same mesh twice: within it. 0: those that touch. Nothing is rebuilt. A call under way ends first.
+        """
+        a, b = (arguments.mesh_number(n, m, self._mesh_names) for n, m in (("mesh_a", mesh_a), ("mesh_b", mesh_b)))
+        self._core.set_separation(a, b, arguments.length("separation", separation))
 
     def cancel(self) -> None:
         """End the use of this detector, from any thread and without waiting: a call under way, those that wait for it,
@@ -229,12 +240,3 @@ class Detector:
         where it failed."""
         return self._core.stats()
 
-
-@contextlib.contextmanager
-def _names_of_step() -> Iterator[None]:
-    """Errors of detect() speak of the one argument that step() has: the start was checked when it was the end."""
-    try:
-        yield
-    except _core.InvalidArgument as error:
-        text = re.sub("vertices_t0, vertices_t1|vertices_t[01]", "vertices", str(error), count=1)
-        raise _core.InvalidArgument(text) from None

@@ -51,8 +51,9 @@ def _test(
     arguments.choice("accuracy", accuracy, ACCURACIES)
     arguments.choice("simd", simd, SIMD)
     checked = arguments.queries(queries)
-    lengths = arguments.separation(accuracy, minimum_separation, tolerance)
-    return function(checked, getattr(_core.Accuracy, accuracy), getattr(_core.Simd, simd), *lengths)
+    separation = arguments.length("minimum_separation", minimum_separation)
+    arguments.length("tolerance", tolerance)
+    return function(checked, getattr(_core.Accuracy, accuracy), getattr(_core.Simd, simd), separation)
 
 
 # The names begin like tests; they are not.

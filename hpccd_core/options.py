@@ -6,7 +6,7 @@ from typing import Literal, get_args
 Accuracy = Literal["fast", "balanced", "conservative", "exact"]
 Backend = Literal["auto", "cpu", "hybrid", "gpu"]
 Method = Literal["default", "published", "naive", "front"]
-Output = Literal["points", "normals"]
+Output = Literal["points", "normals", "closest"]
 Report = Literal["all", "first", "any"]
 Simd = Literal["auto", "scalar", "avx2", "avx512"]
 

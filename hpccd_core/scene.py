@@ -57,14 +57,15 @@ class Scene:
             self._number("mesh_a", mesh_a), self._number("mesh_b", mesh_b), getattr(_core.Accuracy, accuracy)
         )
 
+    def set_separation(self, mesh_a: str | int, mesh_b: str | int, separation: float) -> None:
+        """Report pairs of these two meshes (names or numbers) that come within this distance, Euclidean and in units of
+        the coordinates, instead of the detector's minimum_separation; the same mesh twice: within it; 0: that touch."""
+        self._core.set_separation(
+            self._number("mesh_a", mesh_a), self._number("mesh_b", mesh_b), arguments.length("separation", separation)
+        )
+
     def _number(self, name: str, mesh: str | int) -> int:
-        if isinstance(mesh, str):
-            if mesh not in self._ids:
-                raise ValueError(f"{name}: no mesh is named {mesh!r}; the scene has {', '.join(self._ids) or 'none'}")
-            return self._ids[mesh]
-        if not self._ids:
-            raise ValueError(f"{name}: the scene has no mesh yet; add_mesh comes first")
-        return arguments.whole_number(name, mesh, 0, len(self._ids) - 1)
+        return arguments.mesh_number(name, mesh, tuple(self._ids))
 
     @property
     def n_vertices(self) -> int:

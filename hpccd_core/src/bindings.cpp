@@ -19,12 +19,11 @@ template <class T>
 using Array = py::array_t<T, py::array::c_style>;
 
 // A numpy array that owns the moved vector: no copy.
-template <class T, class Row>
-py::array hand_over(std::vector<Row>&& rows, py::ssize_t columns) {
+template <class T, class Row, class... Columns>
+py::array hand_over(std::vector<Row>&& rows, Columns... columns) {
   auto* owner = new std::vector<Row>(std::move(rows));
   py::capsule free(owner, [](void* p) { delete static_cast<std::vector<Row>*>(p); });
-  std::vector<py::ssize_t> shape{static_cast<py::ssize_t>(owner->size())};
-  if (columns > 1) shape.push_back(columns);
+  const std::vector<py::ssize_t> shape{static_cast<py::ssize_t>(owner->size()), py::ssize_t{columns}...};
   return py::array_t<T>(shape, reinterpret_cast<const T*>(owner->data()), free);
 }
 
@@ -32,21 +31,82 @@ Positions positions(const py::array& a) {
   return {a.data(), static_cast<std::size_t>(a.shape(0)), py::isinstance<py::array_t<double>>(a)};
 }
 
+Positions on_device(std::uintptr_t pointer, std::size_t n, bool is_double) {
+  return {reinterpret_cast<const void*>(pointer), n, is_double, true};
+}
+
 py::dict to_dict(Contacts&& c) {
   py::dict d;
   d["vf"] = hand_over<std::uint32_t>(std::move(c.vf), 2);
-  d["vf_toc"] = hand_over<double>(std::move(c.vf_toc), 1);
+  d["vf_toc"] = hand_over<double>(std::move(c.vf_toc));
   d["ee"] = hand_over<std::uint32_t>(std::move(c.ee), 4);
-  d["ee_toc"] = hand_over<double>(std::move(c.ee_toc), 1);
+  d["ee_toc"] = hand_over<double>(std::move(c.ee_toc));
   d["points"] = hand_over<double>(std::move(c.points), 3);
   d["normals"] = hand_over<double>(std::move(c.normals), 3);
+  d["closest"] = hand_over<double>(std::move(c.closest), 2, 3);
   d["first_toc"] = c.first_toc;
   d["hash"] = c.hash;
   return d;
 }
 
+py::dict to_dict(Proximity&& c) {
+  py::dict d;
+  d["vf"] = hand_over<std::uint32_t>(std::move(c.vf), 2);
+  d["vf_distance"] = hand_over<double>(std::move(c.vf_distance));
+  d["ee"] = hand_over<std::uint32_t>(std::move(c.ee), 4);
+  d["ee_distance"] = hand_over<double>(std::move(c.ee_distance));
+  d["closest"] = hand_over<double>(std::move(c.closest), 2, 3);
+  d["hash"] = c.hash;
+  return d;
+}
+
+py::dict to_dict(Intersections&& c) {
+  py::dict d;
+  d["ef"] = hand_over<std::uint32_t>(std::move(c.ef), 3);
+  d["hash"] = c.hash;
+  return d;
+}
+
+const char* name_of(GapKind kind) {
+  switch (kind) {
+    case GapKind::vertex_face:
+      return "vertex-face";
+    case GapKind::edge_edge:
+      return "edge-edge";
+    case GapKind::edge_face:
+      return "edge-face";
+    case GapKind::none:
+      break;
+  }
+  return "";
+}
+
+std::size_t n_features(GapKind kind) {
+  return kind == GapKind::none ? 0 : kind == GapKind::vertex_face ? 2 : kind == GapKind::edge_edge ? 4 : 3;
+}
+
+// (mesh_a, mesh_b, distance, kind, features, points) of each.
+py::list to_list(const std::vector<Gap>& gaps) {
+  py::list l;
+  for (const Gap& g : gaps) {
+    const std::span<const std::uint32_t> features(g.features.data(), n_features(g.kind));
+    py::array_t<double> points(std::vector<py::ssize_t>{g.kind == GapKind::none ? 0 : 2, 3});
+    if (g.kind != GapKind::none) std::copy_n(g.points[0].data(), 6, points.mutable_data());
+    l.append(py::make_tuple(g.mesh_a, g.mesh_b, g.distance, name_of(g.kind),
+                            std::vector<std::uint32_t>(features.begin(), features.end()), points));
+  }
+  return l;
+}
+
+// The answer to a query of one snapshot, on the host or on a device.
+template <class Query>
+auto of_snapshot(Detector& d, Positions vertices, Query&& query) {
+  py::gil_scoped_release release;
+  return query(d, vertices);
+}
+
 template <auto test>
-py::tuple run_queries(const Array<double>& queries, Accuracy accuracy, Simd simd, double separation, double tolerance) {
+py::tuple run_queries(const Array<double>& queries, Accuracy accuracy, Simd simd, double separation) {
   const auto n = static_cast<std::size_t>(queries.shape(0));
   py::array_t<bool> hit(static_cast<py::ssize_t>(n));
   py::array_t<double> toc(static_cast<py::ssize_t>(n));
@@ -57,7 +117,7 @@ py::tuple run_queries(const Array<double>& queries, Accuracy accuracy, Simd simd
     py::gil_scoped_release release;
     Options options;
     options.accuracy = accuracy, options.simd = simd;
-    options.minimum_separation = separation, options.tolerance = tolerance;
+    options.minimum_separation = separation;
     test(view, options, h, t);
   }
   return py::make_tuple(hit, toc);
@@ -102,6 +162,7 @@ PYBIND11_MODULE(_core, m) {
           "name"_a, "faces"_a, "n_vertices"_a, "self_collision"_a, "static"_a)
       .def("ignore_pair", &Scene::ignore_pair, "mesh_a"_a, "mesh_b"_a)
       .def("set_accuracy", &Scene::set_accuracy, "mesh_a"_a, "mesh_b"_a, "accuracy"_a)
+      .def("set_separation", &Scene::set_separation, "mesh_a"_a, "mesh_b"_a, "separation"_a)
       .def_property_readonly("n_vertices", &Scene::n_vertices)
       .def_property_readonly("n_faces", [](const Scene& s) { return s.faces().size(); })
       .def_property_readonly("meshes", [](const Scene& s) {
@@ -113,17 +174,17 @@ PYBIND11_MODULE(_core, m) {
 
   py::class_<Detector>(m, "Detector")
       .def(py::init([](std::shared_ptr<Scene> scene, Accuracy accuracy, Backend backend, Report report, Simd simd,
-                       int threads, bool points, bool normals, double separation, double tolerance, Method method,
+                       int threads, bool points, bool normals, bool closest, double separation, Method method,
                        bool restructure, std::size_t hybrid_segments, std::size_t hybrid_segment_pairs, int gpus,
                        bool gpu_stages) {
              // A copy: what is added to the caller's scene later does not reach this detector.
              return std::make_unique<Detector>(
                  std::make_shared<const Scene>(*scene),
-                 Options{accuracy, backend, report, simd, threads, points, normals, separation, tolerance, method,
+                 Options{accuracy, backend, report, simd, threads, points, normals, closest, separation, method,
                          restructure, hybrid_segments, hybrid_segment_pairs, gpus, gpu_stages});
            }),
            "scene"_a, "accuracy"_a, "backend"_a, "report"_a, "simd"_a, "threads"_a, "points"_a, "normals"_a,
-           "minimum_separation"_a, "tolerance"_a, "method"_a, "restructure"_a, "hybrid_segments"_a,
+           "closest"_a, "minimum_separation"_a, "method"_a, "restructure"_a, "hybrid_segments"_a,
            "hybrid_segment_pairs"_a, "gpus"_a, "gpu_stages"_a)
       .def(
           "detect",
@@ -143,12 +204,55 @@ PYBIND11_MODULE(_core, m) {
             Contacts c;
             {
               py::gil_scoped_release release;
-              c = d.detect({reinterpret_cast<const void*>(t0), n, is_double, true},
-                           {reinterpret_cast<const void*>(t1), n, is_double, true});
+              c = d.detect(on_device(t0, n, is_double), on_device(t1, n, is_double));
             }
             return to_dict(std::move(c));
           },
           "pointer_t0"_a, "pointer_t1"_a, "n_vertices"_a, "is_double"_a)
+      .def(
+          "proximity",
+          [](Detector& d, const py::array& vertices, double distance) {
+            return to_dict(of_snapshot(d, positions(vertices),
+                                       [&](Detector& on, Positions v) { return on.proximity(v, distance); }));
+          },
+          "vertices"_a, "distance"_a)
+      .def(
+          "proximity_on_device",
+          [](Detector& d, std::uintptr_t pointer, std::size_t n, bool is_double, double distance) {
+            return to_dict(of_snapshot(d, on_device(pointer, n, is_double),
+                                       [&](Detector& on, Positions v) { return on.proximity(v, distance); }));
+          },
+          "pointer"_a, "n_vertices"_a, "is_double"_a, "distance"_a)
+      .def(
+          "intersections",
+          [](Detector& d, const py::array& vertices) {
+            return to_dict(
+                of_snapshot(d, positions(vertices), [](Detector& on, Positions v) { return on.intersections(v); }));
+          },
+          "vertices"_a)
+      .def(
+          "intersections_on_device",
+          [](Detector& d, std::uintptr_t pointer, std::size_t n, bool is_double) {
+            return to_dict(of_snapshot(d, on_device(pointer, n, is_double),
+                                       [](Detector& on, Positions v) { return on.intersections(v); }));
+          },
+          "pointer"_a, "n_vertices"_a, "is_double"_a)
+      .def(
+          "distances",
+          [](Detector& d, const py::array& vertices) {
+            return to_list(
+                of_snapshot(d, positions(vertices), [](Detector& on, Positions v) { return on.distances(v); }));
+          },
+          "vertices"_a)
+      .def(
+          "distances_on_device",
+          [](Detector& d, std::uintptr_t pointer, std::size_t n, bool is_double) {
+            return to_list(of_snapshot(d, on_device(pointer, n, is_double),
+                                       [](Detector& on, Positions v) { return on.distances(v); }));
+          },
+          "pointer"_a, "n_vertices"_a, "is_double"_a)
+      .def("set_separation", &Detector::set_separation, "mesh_a"_a, "mesh_b"_a, "separation"_a,
+           py::call_guard<py::gil_scoped_release>())  // may wait for a call under way
       .def("cancel", &Detector::cancel)
       .def("profile", &Detector::profile, py::call_guard<py::gil_scoped_release>())  // may wait for a call under way
       .def("stats", &Detector::stats, py::call_guard<py::gil_scoped_release>())
@@ -175,9 +279,8 @@ PYBIND11_MODULE(_core, m) {
                              [](const gpu::MemoryOnDevice& m) { return reinterpret_cast<std::uintptr_t>(m.data()); });
 
   m.def("test_vertex_face", &run_queries<&test_vertex_face>, "queries"_a, "accuracy"_a, "simd"_a,
-        "minimum_separation"_a, "tolerance"_a);
-  m.def("test_edge_edge", &run_queries<&test_edge_edge>, "queries"_a, "accuracy"_a, "simd"_a, "minimum_separation"_a,
-        "tolerance"_a);
+        "minimum_separation"_a);
+  m.def("test_edge_edge", &run_queries<&test_edge_edge>, "queries"_a, "accuracy"_a, "simd"_a, "minimum_separation"_a);
   m.def("gpu_status", [] {
     const gpu::Status& s = gpu::status();
     py::list devices;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Checks what it is given, picks where a step is computed, and falls back to the CPU where that fails.
 #include <atomic>
+#include <cmath>
 #include <mutex>
 #include <optional>
 #include <thread>
@@ -20,6 +21,8 @@ int pool_threads(const Options& o) {
   return o.threads > cores ? o.threads : cores - 1;
 }
 
+using Counts = std::map<std::string, std::uint64_t>;
+
 }  // namespace
 
 struct Detector::Impl {
@@ -35,10 +38,7 @@ struct Detector::Impl {
   AvailableBackends backends;
   Tuner tuner;
   // Of the last call. Its other counts stay where they were made until somebody asks.
-  struct Numbers {
-    std::size_t vf, ee;
-  };
-  std::optional<Numbers> found;
+  std::optional<Counts> found;
 
   void check(Positions t0, Positions t1) const {
     const std::size_t n = shared.features.n_vertices;
@@ -71,8 +71,31 @@ struct Detector::Impl {
     throw std::logic_error("the CPU has left a step to others");
   }
 
+  // A query of one snapshot: where it is offered and works, else on the CPU.
+  template <class Query>
+  auto snapshot(Positions vertices, Query&& query) {
+    check(vertices, vertices);
+    const std::lock_guard lock(one_call);
+    cancellation().heed();
+    found.reset();
+    std::optional<gpu::CallersDevice> callers;
+    if (backends.use_devices()) callers.emplace();
+    shared.profiler.begin();
+    Counts counts;
+    for (const Backend b : {backends.works(Backend::gpu) ? Backend::gpu : Backend::cpu, Backend::cpu}) {
+      const Positions there = b == Backend::gpu ? vertices : backends.on_host(vertices, 0);
+      if (auto answer = query(backends.at(b), there, counts)) {
+        shared.profiler.end();
+        last_backend = b;
+        found = counts;
+        return std::move(*answer);
+      }
+    }
+    throw std::logic_error("the CPU has left a query to others");
+  }
+
   void note(Backend picked, const Detection& d) {
-    found = {d.contacts.vf.size(), d.contacts.ee.size()};
+    found = {{"vf_contacts", d.contacts.vf.size()}, {"ee_contacts", d.contacts.ee.size()}};
     shared.profiler.end();
     last_backend = d.computed_by;
     if (picked == d.computed_by)
@@ -102,6 +125,52 @@ Contacts Detector::detect(Positions t0, Positions t1) {
   return std::move(detection.contacts);
 }
 
+namespace {
+
+// The last call's numbers are those of a snapshot.
+Proximity as_proximity(Contacts&& c) {
+  return {std::move(c.vf), std::move(c.vf_toc), std::move(c.ee), std::move(c.ee_toc), std::move(c.closest), c.hash};
+}
+
+}  // namespace
+
+Proximity Detector::proximity(Positions vertices, double distance) {
+  if (!(distance >= 0) || !std::isfinite(distance))
+    throw InvalidArgument("distance: must be finite and not negative, got " + std::to_string(distance));
+  return as_proximity(impl_->snapshot(vertices, [&](DetectionBackend& backend, Positions v, Counts& found) {
+    auto near = backend.proximity(v, distance);
+    if (near) found = {{"vf_near", near->vf.size()}, {"ee_near", near->ee.size()}};
+    return near;
+  }));
+}
+
+Intersections Detector::intersections(Positions vertices) {
+  return impl_->snapshot(vertices, [](DetectionBackend& backend, Positions v, Counts& found) {
+    auto hits = backend.intersections(v);
+    if (hits) found = {{"ef_intersections", hits->ef.size()}};
+    return hits;
+  });
+}
+
+std::vector<Gap> Detector::distances(Positions vertices) {
+  return impl_->snapshot(vertices, [](DetectionBackend& backend, Positions v, Counts& found) {
+    auto gaps = backend.distances(v);
+    if (gaps) found = {{"gaps", gaps->size()}};
+    return gaps;
+  });
+}
+
+void Detector::set_separation(std::uint32_t mesh_a, std::uint32_t mesh_b, double separation) {
+  Resources& shared = impl_->shared;
+  const std::size_t n = shared.scene->meshes().size();
+  if (mesh_a >= n || mesh_b >= n)
+    throw InvalidArgument("mesh_a, mesh_b: the scene has " + std::to_string(n) + " meshes, numbered from 0");
+  if (!(separation >= 0) || !std::isfinite(separation))
+    throw InvalidArgument("separation: must be finite and not negative, got " + std::to_string(separation));
+  const std::lock_guard lock(impl_->one_call);
+  shared.set_separation(mesh_a, mesh_b, separation);
+}
+
 void Detector::cancel() { impl_->cancellation().request(); }
 
 std::map<std::string, double> Detector::profile() const {
@@ -117,8 +186,7 @@ std::map<std::string, std::uint64_t> Detector::stats() const {
   if (!d.found) return {};
   std::map<std::string, std::uint64_t> stats;
   d.backends.count(d.last_backend, stats);
-  stats["vf_contacts"] = d.found->vf;
-  stats["ee_contacts"] = d.found->ee;
+  stats.insert(d.found->begin(), d.found->end());
   stats["triangles"] = d.shared.features.n_faces();
   stats["bytes"] += d.shared.tree.bytes() + d.shared.features.bytes();
   return stats;

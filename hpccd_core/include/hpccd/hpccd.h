@@ -48,6 +48,8 @@ class Scene {
                          MeshOptions options);
   void ignore_pair(std::uint32_t mesh_a, std::uint32_t mesh_b);
   void set_accuracy(std::uint32_t mesh_a, std::uint32_t mesh_b, Accuracy accuracy);
+  // How far apart the two shall stay, instead of Options::minimum_separation; the same mesh twice: within it. >= 0.
+  void set_separation(std::uint32_t mesh_a, std::uint32_t mesh_b, double separation);
 
   struct Mesh {
     std::string name;
@@ -60,6 +62,7 @@ class Scene {
   std::uint32_t n_vertices() const { return n_vertices_; }
   bool pair_enabled(std::uint32_t mesh_a, std::uint32_t mesh_b) const;
   Accuracy pair_accuracy(std::uint32_t mesh_a, std::uint32_t mesh_b, Accuracy otherwise) const;
+  double pair_separation(std::uint32_t mesh_a, std::uint32_t mesh_b, double otherwise) const;
 
  private:
   using Pair = std::pair<std::uint32_t, std::uint32_t>;
@@ -69,6 +72,7 @@ class Scene {
   std::uint32_t n_vertices_ = 0;
   std::map<Pair, bool> ignored_;
   std::map<Pair, Accuracy> accuracy_;
+  std::map<Pair, double> separation_;
 };
 
 struct Options {
@@ -79,10 +83,9 @@ struct Options {
   int threads = 0;  // 0: all cores
   bool points = false;
   bool normals = false;
-  // "conservative" only, in units of the coordinates: report pairs that come within minimum_separation, and pairs that
-  // do so only by up to tolerance more as well.
+  bool closest = false;  // the nearest points of both sides
+  // In units of the coordinates: report pairs that come within this Euclidean distance of each other, and when.
   double minimum_separation = 0;
-  double tolerance = 1e-6;
   Method method = Method::standard;
   bool restructure = true;  // of `published` and `naive`: whether nodes that cull badly are split anew
   // Of backend `hybrid` (Kim et al. 2009, section 5.1): the triangle index queue, and how many GPUs; 0: all.
@@ -102,9 +105,38 @@ struct Contacts {
   // before toc, or from edge a to the side on which edge b is then; for contact at t = 0, to where the straight-line
   // motion would have come from. Zero where the motion is coplanar throughout, and where at toc features are degenerate
   // or parallel.
+  // With a minimum separation a point is the midpoint of the nearest points at toc, and a normal the direction from face
+  // to vertex or from edge a to edge b.
   std::vector<std::array<double, 3>> points, normals;
+  std::vector<std::array<std::array<double, 3>, 2>> closest;  // the nearest points of both sides at toc
   double first_toc = std::numeric_limits<double>::infinity();
   std::uint64_t hash = 0;
+};
+
+// Pairs of features within a distance of each other at one time; order as in Contacts.
+struct Proximity {
+  std::vector<std::array<std::uint32_t, 2>> vf;
+  std::vector<double> vf_distance;
+  std::vector<std::array<std::uint32_t, 4>> ee;
+  std::vector<double> ee_distance;
+  std::vector<std::array<std::array<double, 3>, 2>> closest;  // vf first; empty unless asked for
+  std::uint64_t hash = 0;
+};
+
+// Edges that pierce or touch faces at one time, in lexicographic order.
+struct Intersections {
+  std::vector<std::array<std::uint32_t, 3>> ef;  // a0 < a1, face
+  std::uint64_t hash = 0;
+};
+
+// What two meshes have nearest to each other.
+enum class GapKind : std::uint8_t { none, vertex_face, edge_edge, edge_face };
+struct Gap {
+  std::uint32_t mesh_a, mesh_b;
+  double distance = std::numeric_limits<double>::infinity();
+  GapKind kind = GapKind::none;  // edge_face: they intersect, the distance is 0
+  std::array<std::uint32_t, 4> features{};  // as in vf, ee or ef
+  std::array<std::array<double, 3>, 2> points{};
 };
 
 // Positions of all vertices at one time: n rows of x y z without gaps, float or double.
@@ -127,6 +159,17 @@ class Detector {
   // Contacts of the straight-line motion from t0 to t1 (Kim et al. 2009, section 3.1).
   Contacts detect(Positions vertices_t0, Positions vertices_t1);
 
+  // Vertex-face and edge-edge pairs within this distance of each other, Euclidean, between closed features.
+  Proximity proximity(Positions vertices, double distance);
+  // Edges and faces that share a point but no vertex.
+  Intersections intersections(Positions vertices);
+  // The smallest distance of each enabled pair of meshes, by (mesh_a, mesh_b), mesh_a <= mesh_b. Of pairs of features
+  // that are equally near the first in order, vertex-face before edge-edge.
+  std::vector<Gap> distances(Positions vertices);
+
+  // As Scene::set_separation, from the next call on. Nothing is rebuilt.
+  void set_separation(std::uint32_t mesh_a, std::uint32_t mesh_b, double separation);
+
   // From any thread, without waiting: a call under way, those that wait for it, and all later ones throw Cancelled,
   // within 10 ms. What is on a GPU already comes to its end first.
   void cancel();
@@ -144,7 +187,7 @@ class Detector {
   std::unique_ptr<Impl> impl_;
 };
 
-// Elementary queries one by one; of the options only accuracy, simd, minimum_separation and tolerance matter.
+// Elementary queries one by one; of the options only accuracy, simd and minimum_separation matter.
 // One query: rows v f0 f1 f2 (vertex-face) or a0 a1 b0 b1 (edge-edge) at t=0, then the same at t=1.
 using Query = std::array<double, 24>;
 void test_vertex_face(std::span<const Query> queries, const Options& options, bool* hit, double* toc);

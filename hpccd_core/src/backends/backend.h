@@ -5,6 +5,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "backends/failures.h"
 #include "hpccd/hpccd.h"
@@ -26,6 +27,11 @@ class DetectionBackend {
   // Nothing where the backend failed: the CPU shall compute the step. Positions may be on a device for the GPU only.
   // Throws InvalidArgument for bad coordinates, and Cancelled.
   virtual std::optional<Detection> detect(Positions t0, Positions t1) = 0;
+
+  // Of one snapshot. Nothing as well where a backend leaves the query to the CPU.
+  virtual std::optional<Contacts> proximity(Positions, double) { return std::nullopt; }  // distances in place of times
+  virtual std::optional<Intersections> intersections(Positions) { return std::nullopt; }
+  virtual std::optional<std::vector<Gap>> distances(Positions) { return std::nullopt; }
 
   // Adds what the last step counted, and its stages on a device.
   virtual void count(std::map<std::string, std::uint64_t>& stats) const = 0;

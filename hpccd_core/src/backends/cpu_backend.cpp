@@ -3,6 +3,7 @@
 
 #include <utility>
 
+#include "elementary/distance/distance_batch.h"
 #include "paper/primitive_pairs.h"
 #include "traverse/traverse.h"
 
@@ -14,11 +15,8 @@ CpuBackend::CpuBackend(Resources& shared)
       workers_(static_cast<std::size_t>(shared.pool.size())) {
   const Options& o = shared.options;
   one_thread_.heed(shared.cancellation);
-  for (int a = 0; a < 4; ++a) search_.batch_test[a] = batch_test(o.simd, static_cast<Accuracy>(a));
-  if (o.minimum_separation > 0) search_.batch_test[static_cast<int>(Accuracy::conservative)] = all_undecided;
   search_.leaf_pairs = leaf_pairs(o.simd);
-  search_.limits = {o.minimum_separation, o.tolerance};
-  search_.cancellation = search_.limits.cancellation = &shared.cancellation;
+  search_.cancellation = &shared.cancellation;
 }
 
 std::optional<Detection> CpuBackend::detect(Positions t0, Positions t1) {
@@ -30,29 +28,60 @@ std::optional<Detection> CpuBackend::detect(Positions t0, Positions t1) {
 void CpuBackend::update(Positions t0, Positions t1, Tests tests) {
   const Options& o = shared_.options;
   Profiler& profiler = shared_.profiler;
-  MovingTree& tree = shared_.tree;
-  tree.bound(t0, t1, o.minimum_separation);
-  profiler.mark("bounds");
-  const MotionBounds& motion = tree.motion();
-  search_.geometry = {motion.vertices.data(), shared_.features.edges.data(), shared_.features.faces.data(),
-                      o.minimum_separation > 0 ? nullptr : motion.kdops.data(), motion.map.scale};
-  search_.earliest = std::numeric_limits<double>::infinity();
+  see(t0, t1, shared_.separations.largest());
+  search_.geometry.separations = shared_.separations_now();
   const bool here = tests == Tests::all_here;
   search_.report = !here && o.report == Report::any ? Report::all : o.report;
-  search_.batch_test[static_cast<int>(Accuracy::fast)] = batch_test(o.simd, here ? Accuracy::fast : Accuracy::balanced);
+  for (unsigned i = 0; i < n_rules; ++i) {
+    const Rule rule = Rule::of_number(i);
+    const bool as_balanced = rule.accuracy == Accuracy::fast && !here;
+    search_.batch_test[i] = rule.separated ? separation_batch(o.simd)
+                                           : batch_test(o.simd, as_balanced ? Accuracy::balanced : rule.accuracy);
+    search_.fallback[i] = rule.separated ? decide_separation : decide_contact;
+  }
   if (method_) {
-    swept_ = &tree.swept();
+    swept_ = &shared_.tree.swept();
     method_->update(*swept_, profiler);
   } else {
-    tree.fit(profiler);
+    shared_.tree.fit(profiler);
   }
 }
 
+std::optional<Contacts> CpuBackend::proximity(Positions vertices, double distance) {
+  const Options& o = shared_.options;
+  const std::vector<double> separations(shared_.scene->meshes().size(), distance);
+  see(vertices, vertices, separations);
+  search_.geometry.separations = {distance};
+  search_.report = Report::all;
+  for (unsigned i = 0; i < n_rules; ++i)
+    search_.batch_test[i] = proximity_batch(o.simd), search_.fallback[i] = decide_proximity;
+  shared_.tree.fit(shared_.profiler);
+  walk_tree();
+  return collect({false, false, o.closest, AtTime::start});
+}
+
+// Takes positions in.
+void CpuBackend::see(Positions t0, Positions t1, std::span<const double> separations) {
+  shared_.tree.bound(t0, t1, separations);
+  shared_.profiler.mark("bounds");
+  const MotionBounds& motion = shared_.tree.motion();
+  search_.geometry = {motion.vertices.data(), shared_.features.edges.data(), shared_.features.faces.data(),
+                      motion.kdops.data(), motion.map.scale};
+  search_.earliest = std::numeric_limits<double>::infinity();
+}
+
 void CpuBackend::traverse() {
-  if (method_)
-    method_->traverse(*swept_, search_, workers_);
-  else
-    hpccd::traverse(shared_.tree.tree(), shared_.rules, search_, shared_.pool, workers_);
+  if (!method_) return walk_tree();
+  method_->traverse(*swept_, search_, workers_);
+  mark_traversal();
+}
+
+void CpuBackend::walk_tree() {
+  hpccd::traverse(shared_.tree.tree(), shared_.rules, search_, shared_.pool, workers_);
+  mark_traversal();
+}
+
+void CpuBackend::mark_traversal() {
   double elementary = 0;
   for (const Worker& w : workers_) elementary += 1e3 * w.elementary_seconds;
   // Tests run inside the traversal; their share of the wall-clock time is their share of the threads' time.
@@ -72,14 +101,17 @@ void CpuBackend::test(const std::vector<LeafPair>& pairs) {
 }
 
 Contacts CpuBackend::collect() {
+  const Options& o = shared_.options;
+  return collect({o.points, o.normals, o.closest, AtTime::contact});
+}
+
+Contacts CpuBackend::collect(Outputs outputs) {
   // Handing out the work (five jobs) takes as long as the work on so many.
   constexpr std::size_t few = 1024;
   std::size_t n = 0;
   for (const Worker& w : workers_) n += w.vertex_face.size() + w.edge_edge.size();
-  const Options& o = shared_.options;
-  const Outputs outputs{o.points, o.normals, o.minimum_separation == 0};
   contacts_ = {};
-  collect_contacts(workers_, search_.geometry, o.report, outputs, order_, n < few ? one_thread_ : shared_.pool,
+  collect_contacts(workers_, search_.geometry, search_.report, outputs, order_, n < few ? one_thread_ : shared_.pool,
                    contacts_);
   shared_.profiler.mark("contacts");
   shared_.cancellation.heed();  // whoever cancelled a call shall not have to look at its answer
@@ -101,12 +133,13 @@ void CpuBackend::count(std::map<std::string, std::uint64_t>& stats) const {
       stats[kind + "_rejected_coplanarity"] += c.coplanarity;
       stats[kind + "_rejected_projection"] += c.projection;
       stats[kind + "_rejected_roots"] += c.roots;
+      stats[kind + "_rejected_separated"] += c.separated;
       stats[kind + "_proven_contacts"] += c.contacts;
       stats[kind + "_undecided"] += c.undecided;
       const FallbackCounts& last = w.fallbacks[k];
       stats[kind + "_by_tolerance"] += last.tolerance;
+      stats[kind + "_by_extended"] += last.extended;
       stats[kind + "_by_integers"] += last.integers;
-      stats[kind + "_by_inclusion"] += last.inclusion;
     }
   }
   stats["bytes"] += bytes;
@@ -114,3 +147,7 @@ void CpuBackend::count(std::map<std::string, std::uint64_t>& stats) const {
 }
 
 }  // namespace hpccd
+namespace hpccd {
+std::optional<Intersections> CpuBackend::intersections(Positions) { return Intersections{}; }
+std::optional<std::vector<Gap>> CpuBackend::distances(Positions) { return std::vector<Gap>{}; }
+}

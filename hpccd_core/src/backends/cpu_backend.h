@@ -20,6 +20,11 @@ class CpuBackend final : public DetectionBackend {
   std::optional<Detection> detect(Positions t0, Positions t1) override;
   void count(std::map<std::string, std::uint64_t>& stats) const override;
 
+  // By the default traversal, whatever the method.
+  std::optional<Contacts> proximity(Positions vertices, double distance) override;
+  std::optional<Intersections> intersections(Positions vertices) override;
+  std::optional<std::vector<Gap>> distances(Positions vertices) override;
+
   // In this order in each step; the workers hold what was found when it is collected. Devices find all contacts, and
   // test "fast" as "balanced": beside them the CPU does so as well.
   enum class Tests : bool { all_here, beside_devices };
@@ -33,6 +38,11 @@ class CpuBackend final : public DetectionBackend {
   std::vector<Worker>& workers() { return workers_; }
 
  private:
+  void see(Positions t0, Positions t1, std::span<const double> separations);
+  void walk_tree();
+  void mark_traversal();
+  Contacts collect(Outputs outputs);
+
   Resources& shared_;
   ThreadPool one_thread_{1};
   std::unique_ptr<paper::MethodEngine> method_;  // published; none for the default traversal

@@ -54,11 +54,11 @@ Contacts GpuBackend::compute(Positions t0, Positions t1) {
   }
   update_tree(t0, t1);
   if (!pipeline_->run(t0, t1, shared_.pool)) {
-    MotionBounds().update(on_host(t0, 0), on_host(t1, 1), 0, shared_.pool);  // throws, and names the coordinate
+    MotionBounds().update(on_host(t0, 0), on_host(t1, 1), shared_.pool);  // throws, and names the coordinate
     throw gpu::Error("the device found bad coordinates where the host finds none");
   }
   profiler.mark("gpu");
-  const bool outputs = o.points || o.normals;
+  const bool outputs = o.points || o.normals || o.closest;
   const std::vector<Candidate>& undecided = pipeline_->undecided();
   if (!undecided.empty() || outputs) t0 = on_host(t0, 0), t1 = on_host(t1, 1);
   decide(undecided, t0, t1);
@@ -68,7 +68,7 @@ Contacts GpuBackend::compute(Positions t0, Positions t1) {
   Contacts contacts = join(device, decided_, shared_.features, shared_.pool);
   reduce(contacts, o.report);
   if (outputs) {
-    motion_.update(t0, t1, 0, shared_.pool);
+    motion_.update(t0, t1, shared_.pool);
     add_points_and_normals(contacts, o, motion_, shared_.features, shared_.pool);
   }
   profiler.mark("contacts");
@@ -79,7 +79,7 @@ Contacts GpuBackend::compute(Positions t0, Positions t1) {
 void GpuBackend::update_tree(Positions t0, Positions t1) {
   if (area_when_built_ == 0) area_when_built_ = pipeline_->relative_area();
   if (has_tree_ && !worn_out(pipeline_->relative_area(), area_when_built_)) return;
-  shared_.tree.bound(on_host(t0, 0), on_host(t1, 1), 0);
+  shared_.tree.bound(on_host(t0, 0), on_host(t1, 1), {});
   shared_.tree.build_anew();
   pipeline_->set_tree(shared_.tree.tree());
   area_when_built_ = 0;  // known when the device has refitted it
@@ -97,10 +97,10 @@ void GpuBackend::decide(const std::vector<Candidate>& undecided, Positions t0, P
       const Candidate& u = undecided[i];
       std::uint32_t v[4];
       pair_vertices({nullptr, features.edges.data(), features.faces.data()}, u.kind, u.first, u.second, v);
-      Vec3<double> q0[4], q1[4];
-      for (int k = 0; k < 4; ++k) q0[k] = position(t0, v[k]), q1[k] = position(t1, v[k]);
+      UndecidedPair pair{u.kind, {}, {}, 0};
+      for (int k = 0; k < 4; ++k) pair.t0[k] = position(t0, v[k]), pair.t1[k] = position(t1, v[k]);
       FallbackCounts counts;
-      toc[i] = decide_undecided(Accuracy::exact, {}, u.kind, q0, q1, counts);
+      toc[i] = decide_contact(Accuracy::exact, pair, counts);
     }
   });
   decided_.vertex_face.clear(), decided_.edge_edge.clear();

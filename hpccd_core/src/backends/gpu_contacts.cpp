@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <functional>
 
-#include "contacts/geometry.h"
 #include "contacts/hash.h"
+#include "contacts/places.h"
 #include "traverse/worker.h"
 
 namespace hpccd {
@@ -123,15 +123,15 @@ void add_points_and_normals(Contacts& c, const Options& options, const MotionBou
   const std::size_t n = c.vf.size(), m = c.ee.size();
   if (options.points) c.points.resize(n + m);
   if (options.normals) c.normals.resize(n + m);
+  if (options.closest) c.closest.resize(n + m);
+  const Outputs outputs{options.points, options.normals, options.closest, AtTime::contact};
   parallel_for(pool, n + m, 1024, [&](std::size_t begin, std::size_t end, int) {
     for (std::size_t i = begin; i < end; ++i) {
       const bool vf = i < n;
       const std::uint32_t first = vf ? c.vf[i][0] : edge_number(c.ee[i - n][0], c.ee[i - n][1]);
       const std::uint32_t second = vf ? c.vf[i][1] : edge_number(c.ee[i - n][2], c.ee[i - n][3]);
-      const ContactPoint p = contact_point(geometry, vf ? Kind::vertex_face : Kind::edge_edge, first, second,
-                                           vf ? c.vf_toc[i] : c.ee_toc[i - n], true);
-      if (options.points) c.points[i] = {p.point[0], p.point[1], p.point[2]};
-      if (options.normals) c.normals[i] = {p.normal[0], p.normal[1], p.normal[2]};
+      write_places(c, i, {first, second, vf ? Kind::vertex_face : Kind::edge_edge}, vf ? c.vf_toc[i] : c.ee_toc[i - n],
+                   geometry, outputs);
     }
   });
 }

@@ -5,9 +5,9 @@
 
 namespace hpccd {
 
-void MovingTree::bound(Positions t0, Positions t1, double separation) {
+void MovingTree::bound(Positions t0, Positions t1, std::span<const double> separations) {
   followed_ = std::exchange(fits_, false);
-  motion_.update(scene_, t0, t1, separation, pool_);
+  motion_.update(scene_, t0, t1, separations, pool_);
 }
 
 void MovingTree::fit(Profiler& profiler) {

@@ -16,7 +16,7 @@ class MovingTree {
       : scene_(scene), features_(features), pool_(pool) {}
 
   // Bounds of a new motion. Throws InvalidArgument as MotionBounds::update does.
-  void bound(Positions t0, Positions t1, double separation);
+  void bound(Positions t0, Positions t1, std::span<const double> separations);
   // A tree that fits it: refitted, or built anew where refitting has lost too much. Marked as "refit" and "build".
   void fit(Profiler& profiler);
   void build_anew();

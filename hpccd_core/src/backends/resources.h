@@ -8,7 +8,9 @@
 #include "base/cancellation.h"
 #include "base/parallel.h"
 #include "base/profiler.h"
+#include "elementary/distance/separations.h"
 #include "scene/features.h"
+#include "scene/separation_table.h"
 #include "traverse/tasks.h"
 
 namespace hpccd {
@@ -22,9 +24,18 @@ struct Resources {
   Cancellation cancellation;
   ThreadPool pool;
   Features features;
+  SeparationTable separations;
   PairRules rules;
   MovingTree tree;
   Profiler profiler;
+
+  void set_separation(std::uint32_t mesh_a, std::uint32_t mesh_b, double separation);
+  // Of this moment, for tests.
+  Separations separations_now() const;
+
+ private:
+  std::vector<std::uint32_t> mesh_of_vertex_;  // filled when pairs differ
+  void list_meshes();
 };
 
 }  // namespace hpccd

@@ -68,6 +68,19 @@ void copy_motion(const Real* t0, const Real* t1, const CoordinateMap& map, doubl
   }
 }
 
+// By how much the boxes of a mesh grow: half the separation, and what rounding x - margin and x + margin can lose. More
+// than the scene is large would not bring more pairs, but boxes without an area.
+double margin_for(double separation, const Extent& scene) {
+  if (!(separation > 0)) return 0;
+  double most = 0, size = 0;
+  for (int k = 0; k < 3; ++k) {
+    most = std::max({most, std::fabs(scene.low[k]), std::fabs(scene.high[k])});
+    size = std::max(size, scene.high[k] - scene.low[k]);
+  }
+  const double reach = std::min(0.5 * separation, size);
+  return reach + 4.5e-16 * (most + reach);
+}
+
 // Pieces of the wanted parts, each with the number of its part.
 struct Piece {
   std::size_t begin, end, part;
@@ -94,7 +107,8 @@ void Extent::include(const Extent& e) {
 }
 
 template <class Real>
-void MotionBounds::update(const Real* t0, const Real* t1, std::size_t n, double separation, ThreadPool& pool) {
+void MotionBounds::update(const Real* t0, const Real* t1, std::size_t n, std::span<const double> separations,
+                          ThreadPool& pool) {
   const auto moves = [&](std::size_t part) { return resting.empty() || !resting[part]; };
   std::vector<Piece> pieces = pieces_of(parts_, moves);
   std::vector<Extent> extents(pieces.size());
@@ -117,45 +131,45 @@ void MotionBounds::update(const Real* t0, const Real* t1, std::size_t n, double 
 
   const CoordinateMap old_map = map;
   if (n > 0) map = CoordinateMap::around(whole.low, whole.high);
-  // Half the separation to each side, and what rounding x - margin and x + margin can lose.
-  double most = 0;
-  for (int k = 0; k < 3 && n > 0; ++k) most = std::max({most, std::fabs(whole.low[k]), std::fabs(whole.high[k])});
-  const double margin = separation > 0 ? 0.5 * separation + 4.5e-16 * (most + separation) : 0;
-  if (!resting.empty() && (!(map == old_map) || margin != margin_)) {
+  std::vector<double> margins(parts_.size(), 0);
+  if (!separations.empty() && n > 0)
+    for (std::size_t p = 0; p < parts_.size(); ++p) margins[p] = margin_for(separations[p], whole);
+  if (!resting.empty() && (!(map == old_map) || margins != margins_)) {
     resting.clear();
     pieces = pieces_of(parts_, moves);
   }
-  margin_ = margin;
+  margins_ = std::move(margins);
   resize(vertices, n, pool.cancellation());
   resize(boxes, n, pool.cancellation());
   resize(kdops, n, pool.cancellation());
   parallel_for(pool, pieces.size(), 1, [&](std::size_t from, std::size_t to, int) {
     for (std::size_t i = from; i < to; ++i)
-      copy_motion(t0, t1, map, margin, pieces[i].begin, pieces[i].end, vertices.data(), boxes.data(), kdops.data());
+      copy_motion(t0, t1, map, margins_[pieces[i].part], pieces[i].begin, pieces[i].end, vertices.data(), boxes.data(), kdops.data());
   });
 }
 
-void MotionBounds::update_all(Positions t0, Positions t1, double separation, ThreadPool& pool) {
+void MotionBounds::update_all(Positions t0, Positions t1, std::span<const double> separations, ThreadPool& pool) {
   if (!std::exchange(complete_, false)) resting.clear();
   if (t0.is_double)
-    update(static_cast<const double*>(t0.data), static_cast<const double*>(t1.data), t0.n, separation, pool);
+    update(static_cast<const double*>(t0.data), static_cast<const double*>(t1.data), t0.n, separations, pool);
   else
-    update(static_cast<const float*>(t0.data), static_cast<const float*>(t1.data), t0.n, separation, pool);
+    update(static_cast<const float*>(t0.data), static_cast<const float*>(t1.data), t0.n, separations, pool);
   complete_ = true;
 }
 
-void MotionBounds::update(const Scene& scene, Positions t0, Positions t1, double separation, ThreadPool& pool) {
+void MotionBounds::update(const Scene& scene, Positions t0, Positions t1, std::span<const double> separations,
+                          ThreadPool& pool) {
   parts_.clear();
   for (const Scene::Mesh& m : scene.meshes())
     parts_.push_back({m.first_vertex, std::size_t{m.first_vertex} + m.n_vertices});
   resting = statics_.unchanged(scene, t0, t1, pool);
-  update_all(t0, t1, separation, pool);
+  update_all(t0, t1, separations, pool);
 }
 
-void MotionBounds::update(Positions t0, Positions t1, double separation, ThreadPool& pool) {
+void MotionBounds::update(Positions t0, Positions t1, ThreadPool& pool) {
   parts_ = {{0, t0.n}};
   resting.clear();
-  update_all(t0, t1, separation, pool);
+  update_all(t0, t1, {}, pool);
 }
 
 void MotionBounds::sweep(ThreadPool& pool) {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cmath>
+#include <span>
 #include <vector>
 
 #include "base/parallel.h"
@@ -36,23 +37,25 @@ struct MotionBounds {
   // Boxes of the whole sweep, where a method asks for them.
   std::vector<Box> swept;
 
-  // Boxes of features that come within `separation` of each other overlap too.
+  // Boxes of features that come within a separation of each other overlap too. `separations`: by mesh, the largest of
+  // its pairs; empty: none.
   // Throws InvalidArgument where a coordinate is not finite or too large, or where a static mesh moves.
-  void update(const Scene& scene, Positions vertices_t0, Positions vertices_t1, double separation, ThreadPool& pool);
-  // The same for vertices of no scene.
-  void update(Positions vertices_t0, Positions vertices_t1, double separation, ThreadPool& pool);
+  void update(const Scene& scene, Positions vertices_t0, Positions vertices_t1, std::span<const double> separations,
+              ThreadPool& pool);
+  // The same for vertices of no scene, without separations.
+  void update(Positions vertices_t0, Positions vertices_t1, ThreadPool& pool);
   void sweep(ThreadPool& pool);
   std::size_t bytes() const;
 
  private:
   template <class Real>
-  void update(const Real* t0, const Real* t1, std::size_t n, double separation, ThreadPool& pool);
-  void update_all(Positions t0, Positions t1, double separation, ThreadPool& pool);
+  void update(const Real* t0, const Real* t1, std::size_t n, std::span<const double> separations, ThreadPool& pool);
+  void update_all(Positions t0, Positions t1, std::span<const double> separations, ThreadPool& pool);
 
   StaticMeshes statics_;
   std::vector<VertexRange> parts_;  // of each mesh
   std::vector<Extent> extents_;     // of each part, when it was last taken
-  double margin_ = 0;
+  std::vector<double> margins_;     // of each part's boxes
   bool complete_ = false;  // false while a call is under way, and after it has thrown
 };
 

@@ -3,8 +3,8 @@
 
 #include <algorithm>
 
-#include "contacts/geometry.h"
 #include "contacts/hash.h"
+#include "contacts/places.h"
 
 namespace hpccd {
 namespace {
@@ -47,10 +47,7 @@ void write(Contacts& c, std::size_t n, std::size_t i, const Contact& f, const Ge
     c.ee_toc[i - n] = f.toc;
     sum.hash += hash_of(kind, pack(a[0], a[1]), pack(b[0], b[1]), f.toc);
   }
-  if (!outputs.points && !outputs.normals) return;
-  const ContactPoint p = contact_point(geometry, kind, f.first, f.second, f.toc, outputs.touching);
-  if (outputs.points) c.points[i] = {p.point[0], p.point[1], p.point[2]};
-  if (outputs.normals) c.normals[i] = {p.normal[0], p.normal[1], p.normal[2]};
+  write_places(c, i, {f.first, f.second, kind}, f.toc, geometry, outputs);
 }
 
 }  // namespace
@@ -63,7 +60,7 @@ void collect_contacts(std::vector<Worker>& workers, const Geometry& geometry, Re
   for (const Worker& w : workers) n += w.vertex_face.size(), m += w.edge_edge.size();
 
   // New memory comes page by page from the system, which takes as long as the sorting: each array on its own thread.
-  order.distribute(workers, pool, 6, [&](std::size_t array) {
+  order.distribute(workers, pool, 7, [&](std::size_t array) {
     switch (array) {
       case 0:
         return resize(c.ee, m, cancellation);
@@ -75,8 +72,10 @@ void collect_contacts(std::vector<Worker>& workers, const Geometry& geometry, Re
         return resize(c.vf_toc, n, cancellation);
       case 4:
         return resize(c.points, outputs.points ? n + m : 0, cancellation);
-      default:
+      case 5:
         return resize(c.normals, outputs.normals ? n + m : 0, cancellation);
+      default:
+        return resize(c.closest, outputs.closest ? n + m : 0, cancellation);
     }
   });
   std::vector<Summary> summary(static_cast<std::size_t>(pool.size()));

@@ -4,15 +4,11 @@
 
 #include "base/parallel.h"
 #include "contacts/order.h"
+#include "contacts/places.h"
 #include "elementary/batch.h"
 #include "traverse/worker.h"
 
 namespace hpccd {
-
-struct Outputs {
-  bool points, normals;
-  bool touching;  // all contacts touch; false: with a minimum separation they need not
-};
 
 // Takes what the workers found into contacts that hold nothing yet; where this is cancelled, they hold anything.
 // Features are numbered so that their pairs sort into the canonical order. `order` keeps its memory from call to call.

@@ -45,9 +45,8 @@ Moment moment(const Motion<double>& m, double toc) {
 
 // The side of n on which p is just before the contact; 0: not certain. With f = p . n and M = |p||a||b|, |f| <= 6 M,
 // |f'| <= 36 M, |f''| <= 144 M; counting roundings as in coplanarity.h, f is known to 108 u M and f' to 600 u M.
-int certain_side(const Motion<double>& m, const Moment& now, bool touching) {
+int certain_side(const Motion<double>& m, const Moment& now) {
   const double f = dot(now.p, now.n), error = 1.5e-14 * now.product;
-  if (!touching) return f > error ? 1 : f < -error ? -1 : 0;
   const V da = m.a1 - m.a0, db = m.b1 - m.b0;
   const double slope = dot(m.p1 - m.p0, now.n) + dot(now.p, cross(da, now.b) + cross(now.a, db));
   // The root of f that belongs to the contact lies within the rounding of its time, or, in the tiers that promise no
@@ -58,9 +57,9 @@ int certain_side(const Motion<double>& m, const Moment& now, bool touching) {
   return slope < 0 ? 1 : -1;
 }
 
-V normal_of(Kind kind, const Vertices& q, const Motion<double>& m, const Moment& now, bool touching) {
-  if (const int side = now.regular ? certain_side(m, now, touching) : 0) return (side / std::sqrt(now.nn)) * now.n;
-  const exact::Approach a = exact::approach(kind, q.t0, q.t1, now.t, touching);
+V normal_of(Kind kind, const Vertices& q, const Motion<double>& m, const Moment& now) {
+  if (const int side = now.regular ? certain_side(m, now) : 0) return (side / std::sqrt(now.nn)) * now.n;
+  const exact::Approach a = exact::approach(kind, q.t0, q.t1, now.t);
   return a.side * unit(a.n);
 }
 
@@ -84,22 +83,21 @@ V crossing(const Vertices& q, const Moment& now) {
 }
 
 template <Kind kind>
-ContactPoint contact_point_of(const Vertices& q, double toc, bool touching) {
+ContactPoint contact_point_of(const Vertices& q, double toc) {
   const Motion<double> m = motion_of<kind>(q.t0, q.t1);
   const Moment now = moment(m, toc);
-  const V normal = normal_of(kind, q, m, now, touching);
+  const V normal = normal_of(kind, q, m, now);
   const V point = kind == Kind::vertex_face ? q.at(0, toc) : crossing(q, now);
   return {{point.x, point.y, point.z}, {normal.x, normal.y, normal.z}};
 }
 
 }  // namespace
 
-ContactPoint contact_point(const Geometry& g, Kind kind, std::uint32_t first, std::uint32_t second, double toc,
-                           bool touching) {
+ContactPoint contact_point(const Geometry& g, Kind kind, std::uint32_t first, std::uint32_t second, double toc) {
   Vertices q;
   pair_positions(g, kind, first, second, q.t0, q.t1);
-  return kind == Kind::vertex_face ? contact_point_of<Kind::vertex_face>(q, toc, touching)
-                                   : contact_point_of<Kind::edge_edge>(q, toc, touching);
+  return kind == Kind::vertex_face ? contact_point_of<Kind::vertex_face>(q, toc)
+                                   : contact_point_of<Kind::edge_edge>(q, toc);
 }
 
 }  // namespace hpccd

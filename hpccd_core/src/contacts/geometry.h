@@ -15,8 +15,6 @@ struct ContactPoint {
 // from a towards the side on which b is then. With contact at t = 0 just before it is where the straight-line motion
 // would have come from. Zero where there is no such side, because the motion is coplanar throughout, or no direction,
 // because features are degenerate or parallel at toc. Neither names nor their order matter to any of this.
-// touching: false where a minimum separation is in force: then the side at toc, where they are apart.
-ContactPoint contact_point(const Geometry& geometry, Kind kind, std::uint32_t first, std::uint32_t second, double toc,
-                           bool touching);
+ContactPoint contact_point(const Geometry& geometry, Kind kind, std::uint32_t first, std::uint32_t second, double toc);
 
 }  // namespace hpccd

@@ -24,13 +24,4 @@ BatchTest batch_test([[maybe_unused]] Simd simd, Accuracy accuracy) {
   return scalar::batch_test(accuracy);
 }
 
-void all_undecided(const Geometry&, Kind, const std::uint32_t*, const std::uint32_t*, std::uint32_t n,
-                   BatchResult& result) {
-  result.n_contacts = 0;
-  result.n_undecided = n;
-  for (std::uint32_t i = 0; i < n; ++i) result.undecided[i] = i;
-  result.counts.tested += n;
-  result.counts.undecided += n;
-}
-
 }  // namespace hpccd

@@ -5,6 +5,7 @@
 #include <cstdint>
 
 #include "bvh/kdop.h"
+#include "elementary/distance/separations.h"
 #include "elementary/pair_vertices.h"
 #include "hpccd/hpccd.h"
 #include "scene/vertex_motion.h"
@@ -17,6 +18,7 @@ struct Geometry {
   const std::array<std::uint32_t, 3>* faces;
   const VertexKdop* kdops = nullptr;  // of each vertex; none where features need not touch to count
   double scale = 1;                   // power of two that brings the scene to about one; only single precision needs it
+  Separations separations = {};       // for tests of distances
 };
 
 template <Kind kind>
@@ -55,12 +57,13 @@ struct BatchCounts {
   std::uint64_t coplanarity = 0;  // rejected by the sign test on the cubic
   std::uint64_t projection = 0;   // rejected because they stay outside in a projection
   std::uint64_t roots = 0;        // rejected at the roots of the cubic
+  std::uint64_t separated = 0;    // rejected because a direction keeps them farther apart than their separation
   std::uint64_t contacts = 0;     // proven contacts
   std::uint64_t undecided = 0;    // handed to the tier's fallback
 
   BatchCounts& operator+=(const BatchCounts& c) {
     tested += c.tested, kdop += c.kdop, coplanarity += c.coplanarity, projection += c.projection;
-    roots += c.roots, contacts += c.contacts, undecided += c.undecided;
+    roots += c.roots, separated += c.separated, contacts += c.contacts, undecided += c.undecided;
     return *this;
   }
 };
@@ -79,9 +82,5 @@ using BatchTest = void (*)(const Geometry&, Kind, const std::uint32_t* first, co
 
 // Never Simd::automatic. "fast" has a test of its own; the other tiers share one and differ in their fallback.
 BatchTest batch_test(Simd simd, Accuracy accuracy);
-
-// Leaves every pair to the fallback: no filter of this file holds for features that merely come near each other.
-void all_undecided(const Geometry&, Kind, const std::uint32_t* first, const std::uint32_t* second, std::uint32_t n,
-                   BatchResult&);
 
 }  // namespace hpccd

@@ -89,6 +89,11 @@ HPCCD_HD bool certainly_touch_at_start(const Motion<DoubleDouble>& m) {
   return false;
 }
 
+// The nearest double not above x >= 0.
+HPCCD_HD double rounded_towards_zero(DoubleDouble x) {
+  return x.low < 0 ? x.high - x.high * 1.1102230246251565e-16 : x.high;  // 2^-53: half an ulp or a whole one
+}
+
 template <Kind kind>
 HPCCD_HD Answer decide(const Vec3<double> q0[4], const Vec3<double> q1[4]) {
   using R = DoubleDouble;

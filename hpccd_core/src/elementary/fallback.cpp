@@ -1,46 +1,74 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "elementary/fallback.h"
 
+#include <algorithm>
+#include <cmath>
+
+#include "elementary/distance/extended_separation.h"
+#include "elementary/distance/nearest.h"
 #include "elementary/exact/contact.h"
-#include "elementary/separation_filter.h"
+#include "elementary/exact/distance.h"
+#include "elementary/exact/separation.h"
 #include "elementary/tolerance_test.h"
 
 namespace hpccd {
 namespace {
 
-using Points = const Vec3<double>*;
+bool promises_answers(Accuracy accuracy) { return accuracy == Accuracy::exact || accuracy == Accuracy::conservative; }
 
 template <Kind kind>
-std::optional<double> tolerance_contact(Points q_t0, Points q_t1) {
-  const tolerance_test::Answer a = tolerance_test::contact<kind>(q_t0, q_t1);
+std::optional<double> tolerance_contact(const UndecidedPair& q) {
+  const tolerance_test::Answer a = tolerance_test::contact<kind>(q.t0, q.t1);
   if (!a.contact) return std::nullopt;
   return a.toc;
 }
 
 template <Kind kind>
-std::optional<double> within_separation(const inclusion::Limits& limits, Points q_t0, Points q_t1,
-                                        FallbackCounts& counts) {
-  const Motion<double> m = motion_of<kind>(q_t0, q_t1);
-  if (certainly_separated<kind>(m, limits.separation)) return std::nullopt;
-  ++counts.inclusion;
-  return inclusion::earliest_within(kind, m, limits);
+std::optional<double> extended_or_exact(const UndecidedPair& q, FallbackCounts& counts) {
+  const extended_precision::Answer a = extended_precision::earliest_within<kind>(q.t0, q.t1, q.separation);
+  if (a.none || a.contact) ++counts.extended;
+  if (a.none) return std::nullopt;
+  if (a.contact) return a.toc;
+  ++counts.integers;
+  return exact::earliest_within(kind, q.t0, q.t1, q.separation);
+}
+
+template <Kind kind>
+double computed_distance(const UndecidedPair& q) {
+  const Motion<double> m = motion_of<kind>(q.t0, q.t0);
+  return std::sqrt(nearest<kind>(Snapshot<double>{m.p0, m.a0, m.b0}).square);
 }
 
 }  // namespace
 
-std::optional<double> decide_undecided(Accuracy accuracy, const inclusion::Limits& limits, Kind kind, Points q_t0,
-                                       Points q_t1, FallbackCounts& counts) {
-  if (accuracy == Accuracy::conservative && limits.separation > 0)
-    return kind == Kind::vertex_face ? within_separation<Kind::vertex_face>(limits, q_t0, q_t1, counts)
-                                     : within_separation<Kind::edge_edge>(limits, q_t0, q_t1, counts);
-  // Without a separation the exact answer is conservative too, and cheaper than a search that has to give up somewhere.
-  if (accuracy == Accuracy::conservative || accuracy == Accuracy::exact) {
+std::optional<double> decide_contact(Accuracy accuracy, const UndecidedPair& q, FallbackCounts& counts) {
+  // The exact answer is conservative too.
+  if (promises_answers(accuracy)) {
     ++counts.integers;
-    return exact::earliest_contact(kind, q_t0, q_t1);
+    return exact::earliest_contact(q.kind, q.t0, q.t1);
   }
   ++counts.tolerance;
-  return kind == Kind::vertex_face ? tolerance_contact<Kind::vertex_face>(q_t0, q_t1)
-                                   : tolerance_contact<Kind::edge_edge>(q_t0, q_t1);
+  return q.kind == Kind::vertex_face ? tolerance_contact<Kind::vertex_face>(q)
+                                     : tolerance_contact<Kind::edge_edge>(q);
+}
+
+std::optional<double> decide_separation(Accuracy accuracy, const UndecidedPair& q, FallbackCounts& counts) {
+  static_cast<void>(accuracy);  // what stays open is rare: no tier gains by a guess
+  return q.kind == Kind::vertex_face ? extended_or_exact<Kind::vertex_face>(q, counts)
+                                     : extended_or_exact<Kind::edge_edge>(q, counts);
+}
+
+std::optional<double> decide_proximity(Accuracy accuracy, const UndecidedPair& q, FallbackCounts& counts) {
+  if (!promises_answers(accuracy)) {
+    ++counts.tolerance;
+    const double distance = q.kind == Kind::vertex_face ? computed_distance<Kind::vertex_face>(q)
+                                                        : computed_distance<Kind::edge_edge>(q);
+    return distance <= q.separation ? std::optional(distance) : std::nullopt;
+  }
+  ++counts.integers;
+  if (!exact::within(q.kind, q.t0, q.separation)) return std::nullopt;
+  // Rounded it may come out above what it is known not to exceed.
+  return std::min(exact::distance(q.kind, q.t0), q.separation);
 }
 
 }  // namespace hpccd

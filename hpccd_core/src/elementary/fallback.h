@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <optional>
 
-#include "elementary/inclusion.h"
 #include "elementary/motion.h"
 #include "hpccd/hpccd.h"
 
@@ -14,12 +13,24 @@ namespace hpccd {
 // Who decided, at the end.
 struct FallbackCounts {
   std::uint64_t tolerance = 0;  // "balanced", "fast": double precision with a tolerance
+  std::uint64_t extended = 0;   // twice the precision
   std::uint64_t integers = 0;   // exact arithmetic
-  std::uint64_t inclusion = 0;  // "conservative" with a separation: the search
 };
 
-// q[0..3] as in motion.h; the limits matter to "conservative" only. The time of contact, or nothing.
-std::optional<double> decide_undecided(Accuracy accuracy, const inclusion::Limits& limits, Kind kind,
-                                       const Vec3<double> q_t0[4], const Vec3<double> q_t1[4], FallbackCounts& counts);
+// A pair and where its vertices are at both ends of the step; q[0..3] as in motion.h.
+struct UndecidedPair {
+  Kind kind;
+  Vec3<double> t0[4], t1[4];
+  double separation;  // where the test has one
+};
+
+// The time of contact, or the distance, or nothing.
+using Fallback = std::optional<double> (*)(Accuracy, const UndecidedPair&, FallbackCounts&);
+
+std::optional<double> decide_contact(Accuracy accuracy, const UndecidedPair& pair, FallbackCounts& counts);
+// The earliest time within a separation above 0.
+std::optional<double> decide_separation(Accuracy accuracy, const UndecidedPair& pair, FallbackCounts& counts);
+// Of t0 alone: the distance, where it is no larger than the separation.
+std::optional<double> decide_proximity(Accuracy accuracy, const UndecidedPair& pair, FallbackCounts& counts);
 
 }  // namespace hpccd

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Brings the vectors p, a, b of several pairs (motion.h) from rows of vertices into lanes. Part of batch.inl.
+// Brings the vectors p, a, b of several pairs (motion.h) from rows of vertices into lanes. Part of pair_lanes.inl.
 // Subtractions are done a row at a time (both ends of a motion at once), then rows are turned into lanes.
 
 // Both ends: a row of eight.

@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "base/simd.h"
-#include "elementary/batch.h"
-#include "elementary/fallback.h"
+#include "elementary/distance/distance_batch.h"
 #include "elementary/policy.h"
+#include "elementary/undecided.h"
 
 namespace hpccd {
 namespace {
@@ -25,10 +25,9 @@ double power_of_two_scale(const Query& q) {
 
 void test_queries(Kind kind, std::span<const Query> queries, const Options& options, bool* hit, double* toc) {
   const Accuracy accuracy = options.accuracy;
-  const BatchTest test = accuracy == Accuracy::conservative && options.minimum_separation > 0
-                             ? all_undecided
-                             : batch_test(resolve(options.simd), accuracy);
-  const inclusion::Limits limits{options.minimum_separation, options.tolerance};
+  const double separation = options.minimum_separation;
+  const BatchTest test = separation > 0 ? separation_batch(resolve(options.simd)) : batch_test(resolve(options.simd), accuracy);
+  const Fallback fallback = separation > 0 ? decide_separation : decide_contact;
   auto result = std::make_unique<BatchResult>();
   FallbackCounts counts;
   std::vector<VertexMotion> rows(4 * batch_capacity);
@@ -42,12 +41,12 @@ void test_queries(Kind kind, std::span<const Query> queries, const Options& opti
     first[i] = kind == Kind::vertex_face ? 4 * i : 2 * i;
     second[i] = kind == Kind::vertex_face ? i : 2 * i + 1;
   }
-  const Geometry geometry{rows.data(), edges.data(), faces.data()};
+  const Geometry geometry{rows.data(), edges.data(), faces.data(), nullptr, 1, {separation}};
   for (std::size_t begin = 0; begin < queries.size(); begin += batch_capacity) {
     const auto n = static_cast<std::uint32_t>(std::min<std::size_t>(queries.size() - begin, batch_capacity));
     for (std::uint32_t i = 0; i < n; ++i) {
       const Query& q = queries[begin + i];
-      const double scale = accuracy == Accuracy::fast ? power_of_two_scale(q) : 1;
+      const double scale = accuracy == Accuracy::fast && separation == 0 ? power_of_two_scale(q) : 1;
       for (int row = 0; row < 4; ++row)
         for (int k = 0; k < 3; ++k) {
           rows[4 * i + row].t0[k] = scale * q[3 * row + k];
@@ -65,9 +64,11 @@ void test_queries(Kind kind, std::span<const Query> queries, const Options& opti
     for (std::uint32_t i = 0; i < result->n_undecided; ++i) {
       const std::size_t at = begin + result->undecided[i];
       const Query& q = queries[at];
-      const Vec3<double> q_t0[4] = {point(q, 0), point(q, 1), point(q, 2), point(q, 3)};
-      const Vec3<double> q_t1[4] = {point(q, 4), point(q, 5), point(q, 6), point(q, 7)};
-      if (const auto t = decide_undecided(accuracy, limits, kind, q_t0, q_t1, counts)) hit[at] = true, toc[at] = *t;
+      const UndecidedPair pair{kind,
+                               {point(q, 0), point(q, 1), point(q, 2), point(q, 3)},
+                               {point(q, 4), point(q, 5), point(q, 6), point(q, 7)},
+                               separation};
+      if (const auto t = fallback(accuracy, pair, counts)) hit[at] = true, toc[at] = *t;
     }
   }
 }

@@ -69,7 +69,7 @@ void Engine::merge(std::vector<Worker>& workers) {
   const Output& output = communication_.output();
   // 20 us each: one at a time.
   parallel_for(pool_, output.undecided.size(), 1, [&](std::size_t begin, std::size_t end, int thread) {
-    for (std::size_t i = begin; i < end; ++i) workers[thread].resolve(output.undecided[i], Accuracy::exact);
+    for (std::size_t i = begin; i < end; ++i) workers[thread].resolve(output.undecided[i], {Accuracy::exact, false});
   });
   const std::size_t n_vf = output.vertex_face.size();
   parallel_for(pool_, n_vf + output.edge_edge.size(), 1024, [&](std::size_t begin, std::size_t end, int thread) {

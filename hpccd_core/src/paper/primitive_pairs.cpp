@@ -67,7 +67,7 @@ void test_primitives(const Features& features, const PairRules& rules, const std
   const Box a = primitive_box(features, vertex_boxes, primitives.first),
             b = primitive_box(features, vertex_boxes, primitives.second);
   const auto& mesh = features.mesh_of_primitive;
-  test_primitives(features, rules.accuracy(mesh[primitives.first], mesh[primitives.second]), vertex_boxes,
+  test_primitives(features, rules.rule(mesh[primitives.first], mesh[primitives.second]), vertex_boxes,
                   {primitives.first, a}, {primitives.second, b}, worker);
 }
 

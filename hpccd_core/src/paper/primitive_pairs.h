@@ -24,13 +24,13 @@ void primitive_pairs(const Features& features, const std::vector<Box>& vertex_bo
                      BoundedPrimitive b, CandidateBuffer& edge_edge, CandidateBuffer& vertex_face);
 
 // Their elementary tests. Inline: it is called for each pair of leaves (out of line the traversal took 5 % longer).
-inline void test_primitives(const Features& features, Accuracy accuracy, const std::vector<Box>& vertex_boxes,
+inline void test_primitives(const Features& features, Rule rule, const std::vector<Box>& vertex_boxes,
                             BoundedPrimitive a, BoundedPrimitive b, Worker& worker) {
-  worker.test_candidates(accuracy, [&](CandidateBuffer& edge_edge, CandidateBuffer& vertex_face) {
+  worker.test_candidates(rule, [&](CandidateBuffer& edge_edge, CandidateBuffer& vertex_face) {
     primitive_pairs(features, vertex_boxes, a, b, edge_edge, vertex_face);
   });
 }
-// The same of two primitives by number, at the accuracy of their meshes.
+// The same of two primitives by number, by the rule of their meshes.
 void test_primitives(const Features& features, const PairRules& rules, const std::vector<Box>& vertex_boxes,
                      LeafPair primitives, Worker& worker);
 

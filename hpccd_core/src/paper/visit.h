@@ -39,7 +39,7 @@ inline void test_leaves(const Scenery& s, Pair p, Worker& worker) {
   ++worker.leaf_pairs;
   if (!worker.sink)
     // The nodes know their meshes: the primitives' would be read from a table, by no order.
-    test_primitives(s.features, s.rules.accuracy(a.mesh, b.mesh), s.vertex_boxes, {primitive_a, a.box},
+    test_primitives(s.features, s.rules.rule(a.mesh, b.mesh), s.vertex_boxes, {primitive_a, a.box},
                     {primitive_b, b.box}, worker);
   else
     for (const LeafPair left : worker.sink->push({primitive_a, primitive_b}))

@@ -32,6 +32,10 @@ void Scene::set_accuracy(std::uint32_t mesh_a, std::uint32_t mesh_b, Accuracy ac
   accuracy_[ordered(mesh_a, mesh_b)] = accuracy;
 }
 
+void Scene::set_separation(std::uint32_t mesh_a, std::uint32_t mesh_b, double separation) {
+  separation_[ordered(mesh_a, mesh_b)] = separation;
+}
+
 bool Scene::pair_enabled(std::uint32_t a, std::uint32_t b) const {
   const MeshOptions &oa = meshes_[a].options, &ob = meshes_[b].options;
   if (a == b && !oa.self_collision) return false;
@@ -42,6 +46,11 @@ bool Scene::pair_enabled(std::uint32_t a, std::uint32_t b) const {
 Accuracy Scene::pair_accuracy(std::uint32_t a, std::uint32_t b, Accuracy otherwise) const {
   const auto found = accuracy_.find(ordered(a, b));
   return found == accuracy_.end() ? otherwise : found->second;
+}
+
+double Scene::pair_separation(std::uint32_t a, std::uint32_t b, double otherwise) const {
+  const auto found = separation_.find(ordered(a, b));
+  return found == separation_.end() ? otherwise : found->second;
 }
 
 }  // namespace hpccd

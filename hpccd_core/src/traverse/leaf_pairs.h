@@ -7,7 +7,8 @@
 namespace hpccd {
 
 struct CandidateBuffer {
-  // One pair of leaves adds at most (3 * leaf_size)^2 pairs of edges and 2 * 3 * leaf_size * leaf_size vertex-face.
+  // One pair of leaves adds at most (3 * leaf_size)^2 pairs of edges and 2 * 3 * leaf_size * leaf_size vertex-face or
+  // edge-face.
   static constexpr std::uint32_t capacity = 2048;
   static constexpr std::uint32_t most_per_call = 9 * Tree::leaf_size * Tree::leaf_size;
   std::uint32_t n = 0;

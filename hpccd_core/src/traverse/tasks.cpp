@@ -3,18 +3,30 @@
 
 namespace hpccd {
 
-PairRules::PairRules(const Scene& scene, Accuracy accuracy) : n_(scene.meshes().size()), default_(accuracy) {
+PairRules::PairRules(const Scene& scene, Accuracy accuracy, const SeparationTable& separations)
+    : n_(scene.meshes().size()) {
   enabled_.resize(n_ * n_);
   accuracy_.resize(n_ * n_);
-  bool all_default = true;
   for (std::uint32_t a = 0; a < n_; ++a)
     for (std::uint32_t b = 0; b < n_; ++b) {
       enabled_[a * n_ + b] = scene.pair_enabled(a, b);
       accuracy_[a * n_ + b] = scene.pair_accuracy(a, b, accuracy);
       all_enabled_ = all_enabled_ && enabled_[a * n_ + b];
-      all_default = all_default && accuracy_[a * n_ + b] == accuracy;
     }
-  if (all_default) accuracy_.clear();
+  change(separations);
+}
+
+void PairRules::change(const SeparationTable& separations) {
+  rules_.resize(n_ * n_);
+  bool all_default = true;
+  for (std::uint32_t a = 0; a < n_; ++a)
+    for (std::uint32_t b = 0; b < n_; ++b) {
+      const std::size_t i = a * n_ + b;
+      rules_[i] = {accuracy_[i], separations.of(a, b) > 0};
+      all_default = all_default && rules_[i].number() == rules_[0].number();
+    }
+  if (!rules_.empty()) default_ = rules_[0];
+  if (all_default) rules_.clear();
 }
 
 std::vector<NodePair> traversal_tasks(const Tree& tree, const PairRules& rules, std::size_t enough) {

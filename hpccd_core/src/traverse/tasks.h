@@ -7,6 +7,7 @@
 
 #include "bvh/tree.h"
 #include "hpccd/hpccd.h"
+#include "scene/separation_table.h"
 
 namespace hpccd {
 
@@ -14,10 +15,21 @@ struct NodePair {
   std::uint32_t a, b;  // a == b: pairs within the subtree
 };
 
+// How the candidates of a pair of meshes are tested.
+struct Rule {
+  Accuracy accuracy;
+  bool separated;  // for a minimum separation above 0
+
+  unsigned number() const { return static_cast<unsigned>(accuracy) + (separated ? 4 : 0); }
+  static Rule of_number(unsigned i) { return {static_cast<Accuracy>(i % 4), i >= 4}; }
+};
+inline constexpr unsigned n_rules = 8;
+
 // What the scene says of two meshes, looked up once per call.
 class PairRules {
  public:
-  PairRules(const Scene& scene, Accuracy accuracy);
+  PairRules(const Scene& scene, Accuracy accuracy, const SeparationTable& separations);
+  void change(const SeparationTable& separations);
   // Meshes by number, or mixed_meshes: then some of their pairs may be enabled.
   bool enabled(std::uint32_t mesh_a, std::uint32_t mesh_b) const {
     if (all_enabled_ || mesh_a == mixed_meshes || mesh_b == mixed_meshes) return true;
@@ -26,17 +38,18 @@ class PairRules {
   bool enabled(const Node& a, const Node& b) const {
     return enabled(a.mesh, b.mesh) && !(a.only_points && b.only_points);
   }
-  Accuracy accuracy(std::uint32_t mesh_a, std::uint32_t mesh_b) const {
-    return accuracy_.empty() ? default_ : accuracy_[mesh_a * n_ + mesh_b];
+  Rule rule(std::uint32_t mesh_a, std::uint32_t mesh_b) const {
+    return rules_.empty() ? default_ : rules_[mesh_a * n_ + mesh_b];
   }
-  Accuracy accuracy(const Node& a, const Node& b) const { return accuracy(a.mesh, b.mesh); }
+  Rule rule(const Node& a, const Node& b) const { return rule(a.mesh, b.mesh); }
 
  private:
   std::size_t n_;
   bool all_enabled_ = true;
-  Accuracy default_;
   std::vector<char> enabled_;
   std::vector<Accuracy> accuracy_;
+  Rule default_{};
+  std::vector<Rule> rules_;  // empty where all are the default
 };
 
 // The pairs that follow from one whose boxes overlap and which is not two leaves.

@@ -87,8 +87,8 @@ void traverse_any(const Tree& tree, const PairRules& rules, Search& search, Thre
 
 void test_leaves(const Tree& tree, const PairRules& rules, LeafPair pair, Worker& worker) {
   const auto node = [&](std::uint32_t leaf) -> const Node& { return tree.nodes[tree.leaf_nodes[leaf]]; };
-  worker.test_candidates(rules.accuracy(node(pair.first), node(pair.second)), [&](CandidateBuffer& edge_edge,
-                                                                                  CandidateBuffer& vertex_face) {
+  const Rule rule = rules.rule(node(pair.first), node(pair.second));
+  worker.test_candidates(rule, [&](CandidateBuffer& edge_edge, CandidateBuffer& vertex_face) {
     worker.search().leaf_pairs(tree, tree.leaves[pair.first], tree.leaves[pair.second], edge_edge, vertex_face);
   });
 }

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <chrono>
 
-#include "elementary/fallback.h"
+#include "elementary/undecided.h"
 #include "elementary/policy.h"
 
 namespace hpccd {
@@ -23,10 +23,10 @@ void Worker::begin(Search& search) {
 
 void Worker::flush() {
   if (sink) sink->flush();
-  for (int i = 0; i < 4; ++i)
+  for (unsigned i = 0; i < n_rules; ++i)
     if (waiting_[i]) {
-      drain(waiting_[i]->edge_edge, Kind::edge_edge, static_cast<Accuracy>(i), 1);
-      drain(waiting_[i]->vertex_face, Kind::vertex_face, static_cast<Accuracy>(i), 1);
+      drain(waiting_[i]->edge_edge, Kind::edge_edge, Rule::of_number(i), 1);
+      drain(waiting_[i]->vertex_face, Kind::vertex_face, Rule::of_number(i), 1);
     }
 }
 
@@ -36,14 +36,14 @@ std::size_t Worker::bytes() const {
   return b;
 }
 
-void Worker::drain(CandidateBuffer& buffer, Kind kind, Accuracy accuracy, std::uint32_t keep_below) {
+void Worker::drain(CandidateBuffer& buffer, Kind kind, Rule rule, std::uint32_t keep_below) {
   static_assert(batch_capacity - 1 + CandidateBuffer::most_per_call <= CandidateBuffer::capacity);
   if (buffer.n < keep_below) return;
   const auto start = std::chrono::steady_clock::now();
   std::uint32_t done = 0;
   while (buffer.n - done >= keep_below && done < buffer.n) {
     const std::uint32_t n = std::min(buffer.n - done, batch_capacity);
-    test(buffer.first + done, buffer.second + done, n, kind, accuracy);
+    test(buffer.first + done, buffer.second + done, n, kind, rule);
     done += n;
   }
   std::copy(buffer.first + done, buffer.first + buffer.n, buffer.first);
@@ -53,7 +53,7 @@ void Worker::drain(CandidateBuffer& buffer, Kind kind, Accuracy accuracy, std::u
 }
 
 void Worker::test(const std::uint32_t* first, const std::uint32_t* second, std::uint32_t n, Kind kind,
-                  Accuracy accuracy) {
+                  Rule rule) {
   heed_cancellation();
   std::vector<Contact>& found = kind == Kind::vertex_face ? vertex_face : edge_edge;
   constexpr std::size_t many = 1 << 16;
@@ -61,24 +61,23 @@ void Worker::test(const std::uint32_t* first, const std::uint32_t* second, std::
   BatchResult& r = *result_;
   BatchCounts& count = counts[kind == Kind::edge_edge];
   r.counts = count;
-  search_->batch_test[static_cast<int>(accuracy)](search_->geometry, kind, first, second, n, r);
+  search_->batch_test[rule.number()](search_->geometry, kind, first, second, n, r);
   count = r.counts;
   for (std::uint32_t i = 0; i < r.n_contacts; ++i) {
-    const double toc = reported_time(accuracy, r.toc[i], r.delta[i]);
+    const double toc = reported_time(rule.accuracy, r.toc[i], r.delta[i]);
     report(kind, {first[r.contact[i]], second[r.contact[i]], toc});
   }
   for (std::uint32_t i = 0; i < r.n_undecided; ++i)
-    resolve({first[r.undecided[i]], second[r.undecided[i]], kind}, accuracy);
+    resolve({first[r.undecided[i]], second[r.undecided[i]], kind}, rule);
 }
 
-void Worker::resolve(const Candidate& candidate, Accuracy accuracy) {
+void Worker::resolve(const Candidate& candidate, Rule rule) {
   heed_cancellation();
   const auto [a, b, kind] = candidate;
-  Vec3<double> q_t0[4], q_t1[4];
-  pair_positions(search_->geometry, kind, a, b, q_t0, q_t1);
-  if (const auto toc =
-          decide_undecided(accuracy, search_->limits, kind, q_t0, q_t1, fallbacks[kind == Kind::edge_edge]))
-    report(kind, {a, b, *toc});
+  const UndecidedPair pair = undecided_pair(search_->geometry, candidate);
+  if (const auto value =
+          search_->fallback[rule.number()](rule.accuracy, pair, fallbacks[kind == Kind::edge_edge]))
+    report(kind, {a, b, *value});
 }
 
 void Worker::report(Kind kind, const Contact& contact) {

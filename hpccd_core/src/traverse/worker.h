@@ -3,30 +3,14 @@
 // and only contacts stay. Candidates are never all kept.
 #pragma once
 
-#include <atomic>
 #include <memory>
 #include <span>
 #include <vector>
 
-#include "base/cancellation.h"
-#include "elementary/batch.h"
-#include "elementary/fallback.h"
-#include "elementary/inclusion.h"
 #include "elementary/pair.h"
-#include "traverse/leaf_pairs.h"
+#include "traverse/search.h"
 
 namespace hpccd {
-
-// What all threads share during one call.
-struct Search {
-  Geometry geometry;
-  BatchTest batch_test[4];  // by accuracy
-  LeafPairs leaf_pairs;
-  Report report;
-  inclusion::Limits limits;
-  std::atomic<double> earliest;  // best time so far, where report is first
-  const Cancellation* cancellation = &never_cancelled;
-};
 
 // Two leaves whose boxes overlap, by number. For the published methods a leaf is one triangle: the paper's triangle
 // indices.
@@ -50,20 +34,20 @@ inline constexpr double simultaneous = 1e-12;
 class alignas(128) Worker {
  public:
   void begin(Search& search);
-  // Tests candidates at `accuracy`, sooner or later: add(edge_edge, vertex_face) appends at most
+  // Tests candidates by the rule, sooner or later: add(edge_edge, vertex_face) appends at most
   // CandidateBuffer::most_per_call pairs to each.
   template <class Add>
-  void test_candidates(Accuracy accuracy, Add&& add) {
-    Waiting& waiting = waiting_at(accuracy);
+  void test_candidates(Rule rule, Add&& add) {
+    Waiting& waiting = waiting_by(rule);
     add(waiting.edge_edge, waiting.vertex_face);
-    if (waiting.edge_edge.n >= batch_capacity) drain(waiting.edge_edge, Kind::edge_edge, accuracy, batch_capacity);
+    if (waiting.edge_edge.n >= batch_capacity) drain(waiting.edge_edge, Kind::edge_edge, rule, batch_capacity);
     if (waiting.vertex_face.n >= batch_capacity)
-      drain(waiting.vertex_face, Kind::vertex_face, accuracy, batch_capacity);
+      drain(waiting.vertex_face, Kind::vertex_face, rule, batch_capacity);
   }
   const Search& search() const { return *search_; }
   void flush();  // tests what waits
   // The tier's fallback on a pair that nothing else decides, and a contact found elsewhere.
-  void resolve(const Candidate& candidate, Accuracy accuracy);
+  void resolve(const Candidate& candidate, Rule rule);
   void report(Kind kind, const Contact& contact);
   // Ends the work where that is requested: between any two pairs of nodes, batches and fallbacks.
   void heed_cancellation() const { search_->cancellation->heed(); }
@@ -81,16 +65,16 @@ class alignas(128) Worker {
   struct Waiting {
     CandidateBuffer edge_edge, vertex_face;
   };
-  Waiting& waiting_at(Accuracy accuracy) {
-    auto& waiting = waiting_[static_cast<int>(accuracy)];
+  Waiting& waiting_by(Rule rule) {
+    auto& waiting = waiting_[rule.number()];
     if (!waiting) waiting = std::make_unique<Waiting>();
     return *waiting;
   }
-  void drain(CandidateBuffer& buffer, Kind kind, Accuracy accuracy, std::uint32_t keep_below);
-  void test(const std::uint32_t* first, const std::uint32_t* second, std::uint32_t n, Kind kind, Accuracy accuracy);
+  void drain(CandidateBuffer& buffer, Kind kind, Rule rule, std::uint32_t keep_below);
+  void test(const std::uint32_t* first, const std::uint32_t* second, std::uint32_t n, Kind kind, Rule rule);
 
   Search* search_ = nullptr;
-  std::unique_ptr<Waiting> waiting_[4];  // by accuracy
+  std::unique_ptr<Waiting> waiting_[n_rules];
   std::unique_ptr<BatchResult> result_;
 };
 

@@ -53,6 +53,19 @@ HPCCD_HD MotionLanes transposed(const MotionRow r[double_width]) {
   return {transposed(r[0].t0, r[1].t0, r[2].t0, r[3].t0), transposed(r[0].t1, r[1].t1, r[2].t1, r[3].t1)};
 }
 
+struct PointRows {
+  __m256d row[double_width];
+};
+HPCCD_HD PointRows point_rows(const double* const at[double_width]) {
+  return {{_mm256_load_pd(at[0]), _mm256_load_pd(at[1]), _mm256_load_pd(at[2]), _mm256_load_pd(at[3])}};
+}
+HPCCD_HD PointRows difference(const PointRows& to, const PointRows& from) {
+  PointRows d;
+  for (int i = 0; i < double_width; ++i) d.row[i] = _mm256_sub_pd(to.row[i], from.row[i]);
+  return d;
+}
+HPCCD_HD Vec3<Double> transposed(const PointRows& r) { return transposed(r.row[0], r.row[1], r.row[2], r.row[3]); }
+
 struct Floats16 {
   __m256 half[2];
 };

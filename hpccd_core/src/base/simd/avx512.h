@@ -60,6 +60,31 @@ HPCCD_HD MotionLanes transposed(const MotionRow r[double_width]) {
            lanes(_mm512_shuffle_f64x2(z_a, z_b, 0xDD))}};
 }
 
+// Rows 0 and 2, 1 and 3, 4 and 6, 5 and 7: so that the lanes of transposed rows come in order.
+struct PointRows {
+  __m512d pair[4];
+};
+HPCCD_HD PointRows point_rows(const double* const at[double_width]) {
+  PointRows r;
+  for (int i = 0; i < 4; ++i) {
+    const int row = 4 * (i / 2) + i % 2;
+    r.pair[i] = _mm512_insertf64x4(_mm512_castpd256_pd512(_mm256_load_pd(at[row])), _mm256_load_pd(at[row + 2]), 1);
+  }
+  return r;
+}
+HPCCD_HD PointRows difference(const PointRows& to, const PointRows& from) {
+  PointRows d;
+  for (int i = 0; i < 4; ++i) d.pair[i] = _mm512_sub_pd(to.pair[i], from.pair[i]);
+  return d;
+}
+HPCCD_HD Vec3<Double> transposed(const PointRows& r) {
+  const __m512d xz_a = _mm512_unpacklo_pd(r.pair[0], r.pair[1]), y_a = _mm512_unpackhi_pd(r.pair[0], r.pair[1]);
+  const __m512d xz_b = _mm512_unpacklo_pd(r.pair[2], r.pair[3]), y_b = _mm512_unpackhi_pd(r.pair[2], r.pair[3]);
+  const auto lanes = [](__m512d v) { return Double((Double::Vec)v); };
+  return {lanes(_mm512_shuffle_f64x2(xz_a, xz_b, 0x88)), lanes(_mm512_shuffle_f64x2(y_a, y_b, 0x88)),
+          lanes(_mm512_shuffle_f64x2(xz_a, xz_b, 0xDD))};
+}
+
 struct Floats16 {
   __m512 v;
 };

@@ -33,6 +33,14 @@ struct MotionLanes {
 };
 HPCCD_HD MotionLanes transposed(const MotionRow r[double_width]) { return {r[0].t0, r[0].t1}; }
 
+// The same of a snapshot: x y z and padding, of as many points as Double has lanes.
+struct PointRows {
+  Vec3<Double> only;
+};
+HPCCD_HD PointRows point_rows(const double* const at[double_width]) { return {{at[0][0], at[0][1], at[0][2]}}; }
+HPCCD_HD PointRows difference(const PointRows& to, const PointRows& from) { return {to.only - from.only}; }
+HPCCD_HD Vec3<Double> transposed(const PointRows& r) { return r.only; }
+
 // A cache line of sixteen floats.
 struct Floats16 {
   Floats4 part[4];

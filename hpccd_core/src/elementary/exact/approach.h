@@ -57,7 +57,7 @@ Vec3<double> direction(const Query<Z>& q, const int low[3], const M& m, int k, S
 // Which of the roots of f, whose times are given, the contact at `toc` is: of those within `same_time` the first at
 // which the features touch; else the nearest, where the features are known to touch. -1: none.
 template <class Touches>
-int root_of_contact(std::span<const std::int64_t> times, std::int64_t toc, bool touching, Touches&& touches_at) {
+int root_of_contact(std::span<const std::int64_t> times, std::int64_t toc, Touches&& touches_at) {
   // More than twice the radius of a proven time of contact (Proven::toc_radius), by which the conservative tier reports
   // it early.
   constexpr std::int64_t same_time = std::int64_t{1} << (time_bits - 38);  // 3.6e-12
@@ -68,7 +68,7 @@ int root_of_contact(std::span<const std::int64_t> times, std::int64_t toc, bool 
     if (nearest < 0 || distance(i) < distance(nearest)) nearest = i;
   for (int i = 0; i < n; ++i)
     if (distance(i) <= same_time && touches_at(i)) return i;
-  return touching || (nearest >= 0 && distance(nearest) <= same_time) ? nearest : -1;
+  return nearest;
 }
 
 // Where no root of f belongs to the contact: features that are apart.
@@ -85,7 +85,7 @@ inline std::int64_t time_of(double toc) { return static_cast<std::int64_t>(std::
 
 // Nothing where it stays open with integers of this size.
 template <class Z>
-std::optional<Approach> approach(const Query<Z>& q, const int low[3], double toc, bool touching) {
+std::optional<Approach> approach(const Query<Z>& q, const int low[3], double toc) {
   const int degree = q.f.degree();
   if (degree < 0) return Approach{0, {0, 0, 0}};
   if (degree == 0) return detail::approach_between_roots(q, low, time_of(toc));
@@ -99,7 +99,7 @@ std::optional<Approach> approach(const Query<Z>& q, const int low[3], double toc
   bool open = false;
   const auto sign_there = [&](const auto& p, int i) { return open ? 0 : sign_at(p, roots.root[i], open); };
   const auto touches_at = [&](int i) { return touches(q, [&](const auto& p) { return sign_there(p, i); }) || open; };
-  const int i = detail::root_of_contact({times, static_cast<std::size_t>(roots.n)}, time_of(toc), touching, touches_at);
+  const int i = detail::root_of_contact({times, static_cast<std::size_t>(roots.n)}, time_of(toc), touches_at);
   if (i < 0) return detail::approach_between_roots(q, low, time_of(toc));
   int sign_of_n[3];
   for (int k = 0; k < 3; ++k) sign_of_n[k] = sign_there(q.n[k], i);

@@ -67,14 +67,14 @@ std::optional<double> earliest_contact(Kind kind, const Vec3<double> q_t0[4], co
   return answer.toc;
 }
 
-Approach approach(Kind kind, const Vec3<double> q_t0[4], const Vec3<double> q_t1[4], double toc, bool touching) {
+Approach approach(Kind kind, const Vec3<double> q_t0[4], const Vec3<double> q_t1[4], double toc) {
   const Given given(q_t0, q_t1);
   std::optional<Approach> answer;  // nothing: undecided
   if (given.bits <= Widths<Integer<1>>::coordinate_bits)
-    answer = approach(given.query<Integer<1>>(kind), given.low, toc, touching);
+    answer = approach(given.query<Integer<1>>(kind), given.low, toc);
   else if (given.bits <= Widths<Integer<2>>::coordinate_bits)
-    answer = approach(given.query<Integer<2>>(kind), given.low, toc, touching);
-  if (!answer) answer = approach(given.query<Big>(kind), given.low, toc, touching);
+    answer = approach(given.query<Integer<2>>(kind), given.low, toc);
+  if (!answer) answer = approach(given.query<Big>(kind), given.low, toc);
   return *answer;
 }
 

@@ -19,8 +19,7 @@ struct Approach {
   Vec3<double> n;
 };
 
-// Of a contact found at `toc`, which may be off by its rounding. touching: the features do touch about then; otherwise
-// they may be apart (minimum separation), and on the side at which they are.
-Approach approach(Kind kind, const Vec3<double> q_t0[4], const Vec3<double> q_t1[4], double toc, bool touching);
+// Of a contact found at `toc`, which may be off by its rounding.
+Approach approach(Kind kind, const Vec3<double> q_t0[4], const Vec3<double> q_t1[4], double toc);
 
 }  // namespace hpccd::exact

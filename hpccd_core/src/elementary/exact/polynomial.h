@@ -46,6 +46,17 @@ auto operator*(const Polynomial<X, 1>& a, const Polynomial<Y, 2>& b) -> Polynomi
   return {{a.c[0] * b.c[0], a.c[0] * b.c[1] + a.c[1] * b.c[0], a.c[0] * b.c[2] + a.c[1] * b.c[1], a.c[1] * b.c[2]}};
 }
 
+template <class X, int A, class Y, int B>
+auto operator*(const Polynomial<X, A>& a, const Polynomial<Y, B>& b) -> Polynomial<decltype(a.c[0] * b.c[0]), A + B> {
+  Polynomial<decltype(a.c[0] * b.c[0]), A + B> product;
+  for (int k = 0; k <= A + B; ++k) {
+    const int first = std::max(0, k - B), last = std::min(A, k);
+    product.c[k] = a.c[first] * b.c[k - first];
+    for (int i = first + 1; i <= last; ++i) product.c[k] = product.c[k] + a.c[i] * b.c[k - i];
+  }
+  return product;
+}
+
 // p(m / 2^k) 2^(k D), by Horner's rule from coefficient I upwards.
 template <int I = 0, class Z, int D, class M>
 auto value_at(const Polynomial<Z, D>& p, const M& m, int k) {

@@ -8,31 +8,13 @@
 #include <optional>
 
 #include "elementary/exact/polynomial.h"
+#include "elementary/exact/vector.h"
 #include "elementary/motion.h"
 
 namespace hpccd::exact {
 
 template <class Z>
-using Coordinates = std::array<Polynomial<Z, 1>, 3>;  // a vector that moves: one polynomial a coordinate
-
-template <class Z>
-Coordinates<Z> operator-(const Coordinates<Z>& a, const Coordinates<Z>& b) {
-  return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
-}
-template <class Z>
-Coordinates<Z> operator+(const Coordinates<Z>& a, const Coordinates<Z>& b) {
-  return {a[0] + b[0], a[1] + b[1], a[2] + b[2]};
-}
-// Coordinate k of a x b.
-template <class Z>
-auto cross(const Coordinates<Z>& a, const Coordinates<Z>& b, int k) {
-  const int i = (k + 1) % 3, j = (k + 2) % 3;
-  return a[i] * b[j] - a[j] * b[i];
-}
-template <class Z, class V>
-auto dot(const Coordinates<Z>& a, const V& b) {
-  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
+using Coordinates = Vector<Polynomial<Z, 1>>;  // a vector that moves: one polynomial a coordinate
 
 // Each axis of the points may have a scale of its own: no sign below notices.
 template <class Z>

@@ -7,6 +7,6 @@
 
 namespace hpccd::exact {
 
-Approach approach(const Query<Big>& q, const int low[3], double toc, bool touching);
+Approach approach(const Query<Big>& q, const int low[3], double toc);
 
 }  // namespace hpccd::exact

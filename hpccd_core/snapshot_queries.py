@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Queries of one snapshot, a part of Detector."""
+
+import contextlib
+import re
+from collections.abc import Iterator
+from typing import Any
+
+from numpy.typing import ArrayLike
+
+from . import _core, arguments, device_arrays
+from .device_arrays import DeviceArray
+from .proximity import Gap, Intersections, Proximity
+
+
+class SnapshotQueries:
+    """What is near, pierced, or nearest at one time."""
+
+    n_vertices: int
+    _core: _core.Detector
+    _mesh_names: tuple[str, ...]
+
+    def proximity(self, vertices: ArrayLike | DeviceArray, distance: float) -> Proximity:
+        """All vertex-face and edge-edge pairs within a distance of each other, features that share a vertex apart.
+
+        vertices: (V, 3) float32 or float64, taken as by detect(). distance: Euclidean, between closed features, in units
+        of the coordinates; 0 gives those that touch. "exact" and "conservative" report exactly the pairs that rational
+        arithmetic would, "balanced" and "fast" decide within about 1e-15 of the distance by rounding; distances are
+        within 1e-12 of the scene's size. Neighbours that share no vertex count like all others: with a distance beyond
+        the shortest edge all of them are reported.
+        """
+        distance = arguments.length("distance", distance)
+        return Proximity(**self._ask("proximity", vertices, distance))
+
+    def intersections(self, vertices: ArrayLike | DeviceArray) -> Intersections:
+        """All edges that pierce or touch a face with which they share no vertex, coplanar ones included.
+
+        vertices: (V, 3) float32 or float64, taken as by detect(). Decided as rational arithmetic would, at every
+        accuracy.
+        """
+        return Intersections(**self._ask("intersections", vertices))
+
+    def distances(self, vertices: ArrayLike | DeviceArray) -> list[Gap]:
+        """The smallest distance of each pair of meshes that the scene enables, within a mesh too.
+
+        vertices: (V, 3) float32 or float64, taken as by detect(). One Gap for each pair, in the order in which the
+        meshes were added: (0, 0), (0, 1), ... Found by branch and bound, without a list of pairs.
+        """
+        names = self._mesh_names
+        return [
+            Gap(names[a], names[b], distance, kind, tuple(features), points)
+            for a, b, distance, kind, features, points in self._ask("distances", vertices)
+        ]
+
+    def _ask(self, query: str, vertices: object, *more: float) -> Any:
+        with names_of_one_argument():
+            if device_arrays.is_on_device(vertices):
+                place = device_arrays.positions("vertices", vertices, self.n_vertices)
+                ask = getattr(self._core, f"{query}_on_device")
+                return ask(place.pointer, self.n_vertices, place.is_double, *more)
+            return getattr(self._core, query)(arguments.vertices("vertices", vertices, self.n_vertices), *more)
+
+
+@contextlib.contextmanager
+def names_of_one_argument() -> Iterator[None]:
+    """Errors of the core speak of both ends of a motion; here there is one argument."""
+    try:
+        yield
+    except _core.InvalidArgument as error:
+        text = re.sub("vertices_t0, vertices_t1|vertices_t[01]", "vertices", str(error), count=1)
+        raise _core.InvalidArgument(text) from None

@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: Apache-2.0
+// The earliest time at which two features come within d > 0 of each other, by steps that are certified. At two times
+// one looks for the direction of the gap; between them it is turned linearly from one to the other. Along it the
+// difference of two corners is quadratic in time, and its Bernstein coefficients bound it: where all of them stay above
+// d the features are farther apart than d in between, whatever lies between. Times are tried as Newton's method for the
+// distance proposes. That the features do come within d is proven by two points of them. Parallel edges and needles
+// need no case of their own: the direction of a gap is always well defined.
+#pragma once
+
+#include "elementary/distance/margins.h"
+#include "elementary/distance/nearest.h"
+#include "elementary/filtered_test.h"
+
+namespace hpccd {
+
+// The features at one time.
+template <Kind kind, class R>
+struct Look {
+  R t;
+  Snapshot<R> at;
+  Vec3<R> direction;  // of the gap, of length one
+  R length, slope;    // of the gap, and how fast it changes
+  typename RealTraits<R>::Mask known;  // the direction is
+};
+
+template <Kind kind, class R>
+HPCCD_HD Look<kind, R> look(const Motion<R>& m, R s, R t) {
+  const Snapshot<R> at = snapshot_at(m, t);
+  const Nearest<R> near = nearest<kind>(at);
+  const R length = square_root(near.square);
+  const Vec3<R> direction = (R(1) / length) * near.gap;
+  const Vec3<R> velocity = (m.p1 - m.p0) - near.x * (m.a1 - m.a0) - near.y * (m.b1 - m.b0);
+  return {t, at, direction, length, dot(direction, velocity), has_direction(near.square, s)};
+}
+
+// Whether the features are certainly farther apart than d from one time to the other; limit: Margins::above.
+template <Kind kind, class R>
+HPCCD_HD typename RealTraits<R>::Mask free_between(const Look<kind, R>& i, const Look<kind, R>& j, R limit) {
+  R begin[4], first[4], second[4], end[4];
+  corner_gaps<kind>(i.direction, i.at, begin);
+  corner_gaps<kind>(i.direction, j.at, first);
+  corner_gaps<kind>(j.direction, i.at, second);
+  corner_gaps<kind>(j.direction, j.at, end);
+  auto all = i.known && j.known;
+  for (int k = 0; k < n_corners<kind>; ++k)
+    all = all && begin[k] > limit && R(0.5) * (first[k] + second[k]) > limit && end[k] > limit;
+  return all;
+}
+
+template <Kind kind, class R>
+HPCCD_HD Look<kind, R> select(typename RealTraits<R>::Mask m, const Look<kind, R>& a, const Look<kind, R>& b) {
+  const auto vector = [&](const Vec3<R>& x, const Vec3<R>& y) {
+    return Vec3<R>{select(m, x.x, y.x), select(m, x.y, y.y), select(m, x.z, y.z)};
+  };
+  return {select(m, a.t, b.t),
+          {vector(a.at.p, b.at.p), vector(a.at.a, b.at.a), vector(a.at.b, b.at.b)},
+          vector(a.direction, b.direction),
+          select(m, a.length, b.length),
+          select(m, a.slope, b.slope),
+          (m && a.known) || (!m && b.known)};
+}
+
+// A contact is accepted where its time is known to this: the contract promises 1e-12.
+inline constexpr double separation_toc_radius = 8e-13;
+
+// Both ends of the step: already within d, or kept apart by their directions.
+template <Kind kind, class R>
+HPCCD_HD Outcome<R> separation_filter(const Motion<R>& m, R d) {
+  const R s = extent(magnitudes(m));
+  const Margins<R> margin = margins(d, s);
+  const auto usable = squares_in_range(s);
+  const Look<kind, R> start = look<kind>(m, s, R(0)), end = look<kind>(m, s, R(1));
+  return {usable && start.length <= margin.below, usable && free_between(start, end, margin.above), R(0), R(0)};
+}
+
+template <Kind kind, class R>
+HPCCD_HD Outcome<R> separation_test(const Motion<R>& m, R d) {
+  using Mask = typename RealTraits<R>::Mask;
+  const R s = extent(magnitudes(m)), radius(separation_toc_radius);
+  const Margins<R> margin = margins(d, s);
+  // Between these two distances rounding hides the answer; trials aim as far before it.
+  const R aim = margin.above + (margin.above - margin.below);
+  Look<kind, R> from = look<kind>(m, s, R(0));  // certainly farther apart than d up to here
+  Mask contact = squares_in_range(s) && from.length <= margin.below;
+  Mask running = squares_in_range(s) && !contact, none = R(1) < R(0);
+  R high(2), length_at_high(0);  // certainly within d here, once that is found
+  R reach(1);                    // so far ahead trials have succeeded lately
+  R trial = R(0.5) + R(0) * s;
+  // A near miss by a relative 1e-15 takes 25 steps to pass.
+  constexpr int most_steps = 60;
+  for (int i = 0; i < most_steps && any(running); ++i) {
+    const Look<kind, R> to = look<kind>(m, s, trial);
+    const Mask within = running && to.length <= margin.below;
+    const Mask free = running && !within && free_between(from, to, margin.above);
+    const Mask blocked = !within && !free;
+    const R ahead = trial - from.t;
+    reach = select(blocked, R(0.5) * ahead, R(3) * ahead);
+    from = select(free, to, from);
+    high = select(within, trial, high);
+    length_at_high = select(within, to.length, length_at_high);
+    none = none || (free && trial >= R(1));
+    contact = contact || (running && high - from.t <= radius);
+    running = running && !none && !contact && !(blocked && ahead <= R(0.25) * radius);
+
+    const R left = from.length - aim;
+    const R newton = left / (R(0) - from.slope), secant = (high - from.t) * (left / (from.length - length_at_high));
+    R step = select(from.slope < R(0), newton, R(1));
+    step = select(step < R(0.99) * (high - from.t), step, secant);  // a trial that was too late would come again
+    step = lesser(greater(step, R(0.5) * radius), reach);
+    trial = lesser(from.t + step, R(1));
+  }
+  return {contact, none, from.t, R(0)};
+}
+
+}  // namespace hpccd

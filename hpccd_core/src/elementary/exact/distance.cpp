@@ -1,0 +1,208 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "elementary/exact/distance.h"
+
+#include "elementary/exact/resting.h"
+#include "elementary/exact/scaled.h"
+
+namespace hpccd::exact {
+namespace {
+
+template <class Z>
+Resting<Z> resting(Kind kind, const Given& given, int low) {
+  Resting<Z> r;
+  r.kind = kind;
+  for (int i = 0; i < 4; ++i)
+    for (int k = 0; k < 3; ++k) r.q[i][k] = scaled_integer<Z>(given.x[i][k], low);
+  return r;
+}
+
+// Calls f with the features in the smallest integers that hold them.
+template <class F>
+auto in_integers(Kind kind, const Vec3<double> q[4], F&& f) {
+  const Given given(q);
+  const int bits = given.range.bits(), low = given.range.low;
+  if (bits <= Widths<Integer<1>>::coordinate_bits) return f(resting<Integer<1>>(kind, given, low), low);
+  if (bits <= Widths<Integer<2>>::coordinate_bits) return f(resting<Integer<2>>(kind, given, low), low);
+  return f(resting<Big>(kind, given, low), low);
+}
+
+// Whether num / den <= d^2.
+template <class Z>
+struct Compare {
+  static constexpr int room = 3;  // limbs between the scales of d^2 and of the squared coordinates
+  Margin d;
+  bool found = false;
+
+  static bool fits(const Margin& d) { return std::abs(2 * d.shift) <= 64 * room; }
+
+  template <class N, class D>
+  bool not_above(const N& num, const D& den) const {
+    const Z m(d.mantissa);
+    const auto limit = Z(d.mantissa) * m * den;
+    if (d.shift <= 0) return sign(limit - shifted<room>(num, -2 * d.shift)) >= 0;
+    return sign(shifted<room>(limit, 2 * d.shift) - num) >= 0;
+  }
+  template <class N, class D>
+  bool planes(const N& num, const D& den, const D&, const D&) {
+    return !(found = not_above(num, den));
+  }
+  template <class N, class D>
+  bool line(const N& num, const D& den, const D&, int) {
+    return !(found = not_above(num, den));
+  }
+  template <class N>
+  bool points(const N& num, int, int) {
+    return !(found = not_above(num, Z(1)));
+  }
+};
+
+template <class Z>
+bool within(const Resting<Z>& features, const Margin& d) {
+  Compare<Z> compare{d};
+  features.for_nearest(compare);
+  return compare.found;
+}
+
+Big to_big(const Big& x) { return x; }
+template <int N>
+Big to_big(const Integer<N>& x) {
+  const Integer<N> size = x.negative() ? -x : x;
+  Big y = 0;
+  for (int i = N; i-- > 0;) y = (y << 64) + size.limbs[i];
+  return x.negative() ? Big(-y) : y;
+}
+
+int highest_bit(const Big& x) { return static_cast<int>(msb(x)); }
+
+// sqrt(num / den) 2^low, rounded.
+double root_of_ratio(const Big& num, const Big& den, int low) {
+  if (num.is_zero()) return 0;
+  // Bits of the ratio: twice those of its root, which has more than a double.
+  constexpr int bits = 124;
+  int scale = bits - (highest_bit(num) - highest_bit(den));
+  scale += scale % 2 != 0;
+  const Big ratio = scale >= 0 ? Big((num << scale) / den) : Big(num / (den << -scale));
+  const double root = std::ldexp(static_cast<double>(static_cast<std::uint64_t>(sqrt(ratio))), low - scale / 2);
+  return root > 0 ? root : std::numeric_limits<double>::denorm_min();
+}
+
+// x / y, rounded twice or so; y > 0.
+template <class X, class Y>
+double ratio(const X& x, const Y& y) {
+  int ex, ey;
+  const double fraction = magnitude_of(x, ex) / magnitude_of(y, ey);
+  return sign(x) * std::ldexp(fraction, std::max(ex - ey, -2000));
+}
+
+// p = alpha a + beta b (motion.h) for nearest points inside; else a point and a place on a segment.
+struct Place {
+  bool inside = false;
+  double alpha = 0, beta = 0;
+  int segment = 0;
+  double along = 0;  // 0 at the segment's start, 1 at its end
+};
+
+// The least of the squared distances.
+template <class Z>
+struct Least {
+  using Square = decltype(Z() * Z());
+  using Fourth = decltype(Square() * Square());
+  Fourth num{};
+  Square den{};  // of points and segments
+  bool any = false;
+  Big plane_num, plane_den;
+  Place place;
+
+  template <class N, class D>
+  bool planes(const N& num_, const D& den_, const D& alpha, const D& beta) {
+    plane_num = to_big(num_), plane_den = to_big(den_);
+    place = {true, ratio(alpha, den_), ratio(beta, den_), 0, 0};
+    return false;
+  }
+  bool line(const Fourth& n, const Square& d, const Square& along, int i) {
+    if (improve(n, d)) place = {false, 0, 0, i, ratio(along, d)};
+    return true;
+  }
+  bool points(const Square& n, int i, int end) {
+    if (improve(Fourth(n), Square(1))) place = {false, 0, 0, i, static_cast<double>(end)};
+    return true;
+  }
+  bool improve(const Fourth& n, const Square& d) {
+    if (any && sign(n * den - num * d) >= 0) return false;
+    num = n, den = d, any = true;
+    return true;
+  }
+  double distance(int low) const {
+    return place.inside ? root_of_ratio(plane_num, plane_den, low) : root_of_ratio(to_big(num), to_big(den), low);
+  }
+};
+
+Vec3<double> between(const Vec3<double>& from, const Vec3<double>& to, double t) {
+  return t == 1 ? to : from + t * (to - from);
+}
+
+Nearest points_at(Kind kind, const Vec3<double> q[4], const Place& place) {
+  if (place.inside && kind == Kind::vertex_face)
+    return {0, q[0], q[1] + (place.alpha * (q[2] - q[1]) + place.beta * (q[3] - q[1]))};
+  if (place.inside) return {0, between(q[0], q[1], place.alpha), between(q[2], q[3], -place.beta)};
+  const auto [point, from, to] = point_segments[kind == Kind::edge_edge][place.segment];
+  const Vec3<double> foot = between(q[from], q[to], place.along);
+  if (kind == Kind::vertex_face || point < 2) return {0, q[point], foot};
+  return {0, foot, q[point]};
+}
+
+// Of parallel edges that are side by side: the places on both in the middle of the common stretch.
+template <class Z>
+bool middle_of_common_stretch(const Resting<Z>& edges, double& on_a, double& on_b) {
+  const auto [p, a, b] = edges.spanned();
+  const auto n = cross(a, b);
+  const auto length = dot(a, a);
+  if (sign(dot(n, n)) != 0 || sign(length) == 0) return false;
+  const auto b0 = dot(p, a), b1 = dot(edges.q[3] - edges.q[0], a), turn = b1 - b0;
+  if (sign(turn) == 0) return false;  // b is a point
+  const auto least = [](const auto& x, const auto& y) { return sign(y - x) < 0 ? y : x; };
+  const auto most = [](const auto& x, const auto& y) { return sign(y - x) < 0 ? x : y; };
+  const auto from = most(decltype(length)(0), least(b0, b1)), to = least(length, most(b0, b1));
+  if (sign(to - from) < 0) return false;
+  on_a = ratio(from + to, length + length);
+  const auto along_b = from + to - b0 - b0;
+  on_b = sign(turn) > 0 ? ratio(along_b, turn + turn) : ratio(-along_b, -turn - turn);
+  return true;
+}
+
+}  // namespace
+
+bool within(Kind kind, const Vec3<double> q[4], double d) {
+  const Given given(q);
+  const int bits = given.range.bits(), low = given.range.low;
+  const Margin margin(d, low);
+  const bool small = Compare<Big>::fits(margin);
+  if (small && bits <= Widths<Integer<1>>::coordinate_bits)
+    return within(resting<Integer<1>>(kind, given, low), margin);
+  if (small && bits <= Widths<Integer<2>>::coordinate_bits)
+    return within(resting<Integer<2>>(kind, given, low), margin);
+  return within(resting<Big>(kind, given, low), margin);
+}
+
+double distance(Kind kind, const Vec3<double> q[4]) {
+  return in_integers(kind, q, [&]<class Z>(const Resting<Z>& features, int low) {
+    Least<Z> least;
+    features.for_nearest(least);
+    return least.distance(low);
+  });
+}
+
+Nearest nearest(Kind kind, const Vec3<double> q[4]) {
+  return in_integers(kind, q, [&]<class Z>(const Resting<Z>& features, int low) {
+    Least<Z> least;
+    features.for_nearest(least);
+    double on_a = 0, on_b = 0;
+    Nearest found = kind == Kind::edge_edge && middle_of_common_stretch(features, on_a, on_b)
+                        ? Nearest{0, between(q[0], q[1], on_a), between(q[2], q[3], on_b)}
+                        : points_at(kind, q, least.place);
+    found.distance = least.distance(low);
+    return found;
+  });
+}
+
+}  // namespace hpccd::exact

@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+// Euclidean distances between the closed features of one vertex-face or edge-edge query at rest, in integers. Features
+// that are degenerate are the segments or points that they are.
+#pragma once
+
+#include "elementary/motion.h"
+
+namespace hpccd::exact {
+
+// Whether the distance is at most d >= 0, for finite q[0..3] (v f0 f1 f2 or a0 a1 b0 b1) and d.
+bool within(Kind kind, const Vec3<double> q[4], double d);
+
+// The true distance, off by one unit in the last place at most; 0 only where the features touch.
+double distance(Kind kind, const Vec3<double> q[4]);
+
+struct Nearest {
+  double distance;
+  Vec3<double> on_first, on_second;
+};
+
+// Of parallel edges side by side: the middle of the stretch that they share. Each coordinate of the points is off by a
+// few roundings of the vertices' coordinates.
+Nearest nearest(Kind kind, const Vec3<double> q[4]);
+
+}  // namespace hpccd::exact

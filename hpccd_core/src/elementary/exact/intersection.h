@@ -1,0 +1,13 @@
+// SPDX-License-Identifier: Apache-2.0
+// Whether an edge pierces or touches a face in one snapshot, in integer arithmetic.
+#pragma once
+
+#include "base/vec3.h"
+
+namespace hpccd::exact {
+
+// The edge q[0] q[1] and the face q[2] q[3] q[4], all finite: whether the closed sets share a point. Degenerate ones
+// are the segments and points that they are.
+bool intersect(const Vec3<double> q[5]);
+
+}  // namespace hpccd::exact

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+// A part of the step and a polynomial seen there: as one in s, which goes from 0 to 1 on it.
+#pragma once
+
+#include <vector>
+
+#include "elementary/exact/wide/coefficients.h"
+#include "elementary/exact/wide/root.h"
+
+namespace hpccd::exact::wide {
+
+using Numbers = std::vector<Big>;
+
+struct Window {  // [low / 2^k, low / 2^k + 2^-w], w <= k
+  Big low = 0;
+  int k = 0, w = 0;
+
+  Dyadic begin() const { return {low, k}; }
+  Dyadic end() const { return {low + (Big(1) << (k - w)), k}; }
+  Window part(const Big& j, int h, int e) const;  // [j, j + 2^e] / 2^h of it
+};
+
+// Each of these polynomials is a positive multiple of the one that it stands for.
+Numbers seen(Coefficients p, const Window& window);
+Numbers seen_on_part(const Numbers& a, const Big& j, int h, int e);  // of [0, 1]: [j, j + 2^e] / 2^h
+
+// Sign changes among the Bernstein coefficients: at least as many as there are roots within (0, 1), each counted as
+// often as it is one, and more by an even number.
+int variations(Numbers a);
+
+// The sign that it certainly has throughout (0, 1), by the same coefficients; 0: not certain, or zero.
+int sign_inside(Numbers a);
+
+// Where a polynomial that does not vanish throughout may have roots, inside the window and not at its ends.
+class Part {
+ public:
+  Part(Coefficients p, Window window);
+
+  const Window& window() const { return window_; }
+  const Numbers& polynomial() const { return a_; }
+  int variations() const { return variations_; }  // 0: no root; 1: one, a simple one
+
+  // To a part that has all variations, and so all roots; false where none is found. Roots may lie 1500 binary orders
+  // apart or away from where the step begins: what succeeds is tried with twice the bits the next time.
+  bool narrow();
+
+  // Its halves, and whether the middle is a root.
+  struct Halves;
+  Halves halves() const;
+
+  bool root_at_end() const;  // at the later one
+
+ private:
+  Part() = default;
+  bool move_to(const Big& j, int h, int e);
+  void drop_root_at_begin();
+
+  Window window_;
+  Numbers a_;
+  int variations_ = 0;
+  int gain_ = 2;  // bits to be tried next
+};
+
+struct Part::Halves {
+  Part first, second;
+  bool root_between;
+};
+
+}  // namespace hpccd::exact::wide

@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+// A batch's pairs, as many at a time as there are lanes. Part of batch.inl and intersection_batch.inl.
+
+// The pairs at `where` (null: all); the last group is filled up with copies of the last pair. What Pairs::load brings
+// into lanes goes to `function`, with the positions of these pairs and a bit for each lane that counts.
+template <class Pairs, class Function>
+HPCCD_HD void for_groups(const Geometry& g, const std::uint32_t* first, const std::uint32_t* second,
+                         const std::uint32_t* where, std::uint32_t n, Function&& function) {
+  constexpr int W = Pairs::width;
+  for (std::uint32_t i = 0; i < n; i += W) {
+    std::uint32_t a[W], b[W], at[W];
+    for (int lane = 0; lane < W; ++lane) {
+      const std::uint32_t j = i + lane < n ? i + lane : n - 1;
+      at[lane] = where ? where[j] : j;
+      a[lane] = first[at[lane]];
+      b[lane] = second[at[lane]];
+    }
+    const unsigned valid = n - i >= W ? (1u << W) - 1 : (1u << (n - i)) - 1;
+    function(Pairs::load(g, a, b), at, valid);
+  }
+}
+
+HPCCD_HD void append(std::uint32_t* list, std::uint32_t& n, const std::uint32_t* at, unsigned lanes) {
+  for (; lanes; lanes &= lanes - 1) list[n++] = at[__builtin_ctz(lanes)];
+}

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+// The minimum separation of each pair of meshes, as it is now.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "hpccd/hpccd.h"
+
+namespace hpccd {
+
+class SeparationTable {
+ public:
+  SeparationTable(const Scene& scene, double otherwise);
+
+  double of(std::uint32_t mesh_a, std::uint32_t mesh_b) const { return of_[mesh_a * n_ + mesh_b]; }
+  void set(std::uint32_t mesh_a, std::uint32_t mesh_b, double separation);
+
+  bool any() const { return any_; }
+  bool uniform() const { return uniform_; }
+  double first() const { return of_.empty() ? 0 : of_[0]; }
+  const std::vector<double>& all() const { return of_; }  // n_meshes^2
+  // By mesh: the largest of its pairs. Empty where no pair has a separation.
+  const std::vector<double>& largest() const { return largest_; }
+
+ private:
+  void look_through();
+
+  std::size_t n_;
+  std::vector<double> of_, largest_;
+  bool any_ = false, uniform_ = true;
+};
+
+}  // namespace hpccd

@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: Apache-2.0
+// Boxes of a leaf's features, compared 16 at a time. Part of leaf_pairs.inl and leaf_edge_faces.inl.
+
+HPCCD_HD constexpr std::uint32_t low(std::uint32_t end, std::uint32_t axis) {
+  return bound_number(end, Side::low, axis);
+}
+HPCCD_HD constexpr std::uint32_t high(std::uint32_t end, std::uint32_t axis) {
+  return bound_number(end, Side::high, axis);
+}
+
+// A box to compare with: its bounds, in the order of a group's rows, each `stride` numbers behind the one before.
+template <std::uint32_t stride>
+struct Bounds {
+  const float* at;
+  HPCCD_HD float operator[](std::uint32_t row) const { return at[row * stride]; }
+};
+
+// Plain pointers: methods of std::vector compiled here could be linked into code for older processors.
+HPCCD_HD Bounds<BoxGroup::width> bounds_at(const BoxGroup* groups, std::uint32_t i) {
+  return {groups[i / BoxGroup::width].rows[0] + i % BoxGroup::width};
+}
+HPCCD_HD Bounds<1> bounds_of(const Node& node) { return {node.box.t0.low}; }
+
+using Group = Rows16<n_bounds>;
+
+// Bit j: box j of the group overlaps b (MotionBox::overlaps).
+template <class Bounds>
+HPCCD_HD unsigned overlapping(const Group& g, Bounds b) {
+  Mask16 apart;
+  for (std::uint32_t axis = 0; axis < 3; ++axis) {
+    const Mask16 below = less(g[high(0, axis)], all16(b[low(0, axis)]));
+    const Mask16 above = less(all16(b[high(0, axis)]), g[low(0, axis)]);
+    apart = apart | (below & less(g[high(1, axis)], all16(b[low(1, axis)])));
+    apart = apart | (above & less(all16(b[high(1, axis)]), g[low(1, axis)]));
+  }
+  return ~apart.bits() & 0xFFFF;
+}
+
+// The same of the boxes at t = 0 alone.
+template <class Bounds>
+HPCCD_HD unsigned overlapping_at_start(const Group& g, Bounds b) {
+  Mask16 apart;
+  for (std::uint32_t axis = 0; axis < 3; ++axis) {
+    apart = apart | less(g[high(0, axis)], all16(b[low(0, axis)]));
+    apart = apart | less(all16(b[high(0, axis)]), g[low(0, axis)]);
+  }
+  return ~apart.bits() & 0xFFFF;
+}
+
+// The lanes of the group [i, i + 16) that lie in [begin, end).
+HPCCD_HD unsigned lanes_in(std::uint32_t i, std::uint32_t begin, std::uint32_t end) {
+  unsigned m = end - i >= 16 ? 0xFFFFu : (1u << (end - i)) - 1;
+  if (begin > i) m &= begin - i >= 16 ? 0u : ~((1u << (begin - i)) - 1);
+  return m;
+}
+
+// Appends the pairs of `number` with those of the 16 features from `others` on that are in m.
+template <bool ascending>
+HPCCD_HD void append(CandidateBuffer& out, std::uint32_t number, const std::uint32_t* others, unsigned m) {
+  append_pairs<ascending>(out.first, out.second, out.n, number, others, m);
+}
+
+// Features of one leaf that overlap the other leaf's box: a bit each, by group.
+struct Near {
+  static constexpr std::uint32_t most_groups = (4 * Tree::leaf_size + BoxGroup::width - 1) / BoxGroup::width;
+  unsigned lanes[most_groups] = {};
+  unsigned count = 0;
+};
+
+// Of features begin to end - 1 of the groups.
+HPCCD_HD Near near(const BoxGroup* groups, std::uint32_t begin, std::uint32_t end, const Node& other) {
+  Near n;
+  for (std::uint32_t i = 0, group = 0; i < end; i += BoxGroup::width, ++group)
+    n.lanes[group] = overlapping(load_rows(groups[group].rows), bounds_of(other)) & lanes_in(i, begin, end),
+    n.count += static_cast<unsigned>(__builtin_popcount(n.lanes[group]));
+  return n;
+}
+
+// f(number) for each of them.
+template <class Function>
+HPCCD_HD void for_each(const Near& n, std::uint32_t end, Function&& f) {
+  for (std::uint32_t i = 0, group = 0; i < end; i += BoxGroup::width, ++group)
+    for (unsigned lanes = n.lanes[group]; lanes; lanes &= lanes - 1) f(i + static_cast<unsigned>(__builtin_ctz(lanes)));
+}

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+// Included once per instruction set, after its header (base/simd/scalar.h), on the terms of leaf_pairs.inl.
+
+#include "traverse/leaf_edge_faces.h"
+
+namespace hpccd::HPCCD_ISA {
+namespace {
+
+#include "traverse/leaf_boxes.inl"
+
+// Edges of a against faces of b: one by one the faces, of which a leaf has fewer, in groups the edges.
+HPCCD_HD void edges_against_faces(const Tree& tree, const LeafRange& a, const LeafRange& b, const Node& node_a,
+                                  const Node& node_b, CandidateBuffer& out) {
+  const std::uint32_t n_edges = a.n_edges(), n_faces = b.n_faces();
+  if (!n_edges || !n_faces) return;
+  const BoxGroup* all = tree.box_groups.get();
+  const BoxGroup *edge_groups = all + a.first_group, *face_group = all + b.surface_group();
+  static_assert(Tree::leaf_size <= BoxGroup::width);
+  const unsigned near_faces =
+      overlapping_at_start(load_rows(face_group->rows), bounds_of(node_a)) & lanes_in(0, 0, n_faces);
+  if (!near_faces) return;
+  const std::uint32_t* face = tree.face_of_slot.data() + b.first_face;
+  const std::uint32_t *c0 = tree.face_corners[0].data() + b.first_face,
+                      *c1 = tree.face_corners[1].data() + b.first_face,
+                      *c2 = tree.face_corners[2].data() + b.first_face;
+  for (std::uint32_t i = 0; i < n_edges; i += BoxGroup::width) {
+    const Group edges = load_rows(edge_groups[i / BoxGroup::width].rows);
+    const unsigned near_edges = overlapping_at_start(edges, bounds_of(node_b)) & lanes_in(i, 0, n_edges);
+    if (!near_edges) continue;
+    const std::uint32_t slot = a.first_edge + i;
+    const std::uint32_t *end0 = tree.edge_ends[0].data() + slot, *end1 = tree.edge_ends[1].data() + slot;
+    for (unsigned lanes = near_faces; lanes; lanes &= lanes - 1) {
+      const auto k = static_cast<std::uint32_t>(__builtin_ctz(lanes));
+      unsigned m = overlapping_at_start(edges, bounds_at(face_group, k)) & near_edges;
+      if (!m) continue;
+      const std::uint32_t corners[] = {c0[k], c1[k], c2[k]};
+      for (const std::uint32_t v : corners) m &= ~(equal16(end0, v) | equal16(end1, v));
+      append_pairs<false>(out.second, out.first, out.n, face[k], tree.edge_of_slot.data() + slot, m);
+    }
+  }
+}
+
+}  // namespace
+
+void leaf_edge_faces(const Tree& tree, const LeafRange& a, const LeafRange& b, CandidateBuffer& edge_face) {
+  const std::uint32_t* leaf_nodes = tree.leaf_nodes.data();
+  const LeafRange* leaves = tree.leaves.data();
+  const Node &node_a = tree.nodes.data()[leaf_nodes[&a - leaves]], &node_b = tree.nodes.data()[leaf_nodes[&b - leaves]];
+  edges_against_faces(tree, a, b, node_a, node_b, edge_face);
+  if (&a != &b) edges_against_faces(tree, b, a, node_b, node_a, edge_face);
+}
+
+}  // namespace hpccd::HPCCD_ISA
