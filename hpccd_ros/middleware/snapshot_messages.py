@@ -53,7 +53,7 @@ def fill_distances(message: DistanceArray, gaps: list[hc.Gap], layout: Layout) -
     kind, meshes = np.empty(count, np.uint8), np.empty((count, 2), np.uint32)
     features, points = np.full((count, 2, 2), DistanceArray.NONE, np.uint32), np.zeros((count, 2, 3))
     for row, gap in enumerate(gaps):
-        if math.isinf(gap.distance):
+        if not gap.kind:
             kind[row] = DistanceArray.NO_PAIR
             meshes[row] = layout.mesh_names.index(gap.mesh_a), layout.mesh_names.index(gap.mesh_b)
             continue
