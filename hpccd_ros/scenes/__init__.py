@@ -6,8 +6,9 @@
     >>> for frame in scene.frames():
     ...     vertices = frame.stacked()        # (V,3) float32, meshes in the order of scene.meshes
 
-The "-like" scenes have the sizes and the character of Table 1 of Kim et al. 2009, not its data. Motions are
-built from IEEE-exact operations only (see exactmath): the same arguments give the same bits, on any machine.
+The "-like" scenes have the sizes and the character of published ones (Table 1 of Kim et al. 2009; twisted rods and
+rollers of the literature of incremental potential contact), not their data. Motions are built from IEEE-exact
+operations only (see exactmath): the same arguments give the same bits, on any machine.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from hpccd_ros.scenes import breaking, cloth, cloth_ball, n_body, small
+from hpccd_ros.scenes import armadillo, breaking, cloth, cloth_ball, n_body, rod_twist, small
 from hpccd_ros.scenes.core import core_scene
 from hpccd_ros.scenes.scene import Frame, Mesh, Scene, Topology
 
@@ -49,6 +50,14 @@ def _n_body(triangles):
     )
 
 
+def _rod_twist(name, title, size, frames, seed, progress):
+    return rod_twist.make(name, title, 106_000, size, frames, seed)
+
+
+def _armadillo(name, title, size, frames, seed, progress):
+    return armadillo.make(name, title, 50_000, 10_000, size, frames, seed)
+
+
 _REGISTRY = {
     "two-triangles": _Entry(
         "a triangle falls through another: one vertex-face contact", 11,
@@ -73,6 +82,12 @@ _REGISTRY = {
     "n-body-like-hr": _Entry(
         "60 rigid and deforming bodies fall into a pile, 146 K triangles", 76, _n_body(146_000),
     ),
+    "rod-twist-like": _Entry(
+        "a bundle of rods is twisted until it coils up: layers close together, 106 K triangles", 260, _rod_twist,
+    ),
+    "armadillo-like": _Entry(
+        "a knobbly body with limbs is drawn between two rollers, 70 K triangles", 260, _armadillo,
+    ),
 }  # fmt: skip
 
 
@@ -95,7 +110,7 @@ def make(
     size      factor on the triangle count, 1/64 to 64, of the same motion (two-triangles has one size only)
     frames    number of frames, at least 2; None for the scene's own. More let the motion go on, fewer cut it
               off; where the motion is a fixed path (two-triangles, folding-strip) more sample it finer
-    seed      of the random numbers, 0 to 2**32 - 1 (cloth, n-body and breaking scenes)
+    seed      of the random numbers, 0 to 2**32 - 1 (not of two-triangles and folding-strip)
     progress  show a progress bar on stderr while a motion is simulated (seconds, once: it is cached)
 
     ValueError for a name, size, frame count or seed outside these.

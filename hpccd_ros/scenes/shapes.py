@@ -108,6 +108,34 @@ def sheet(columns: int, rows: int):
     return vertices, _quads(rows, columns, wrap=False)
 
 
+def revolved(profile, around: int):
+    """Surface of 2 * len(profile) * around faces that a closed `profile` (N,2: radius, y) leaves in turning round y.
+
+    `profile` runs so that the solid is on its left, y to the right and the radius upwards: that winds outwards.
+    """
+    s, c = sincos(np.arange(around) * (2 * PI / around))
+    radius, y = profile[:, 0], profile[:, 1]
+    vertices = np.stack(
+        [s[:, None] * radius[None, :], np.tile(y, (around, 1)), c[:, None] * radius[None, :]], axis=-1
+    )
+    return vertices.reshape(-1, 3), _quads(around, len(profile), wrap=True)
+
+
+def rod_faces(rings: int, around: int):
+    """Faces of a closed rod: `rings` of `around` points one after the other, then the middles of its two ends."""
+    # The sides are a strip that is closed around: a grid with the seam's points taken for one.
+    corners = _quads(rings - 1, around, wrap=False)
+    ring, place = np.divmod(corners, np.uint32(around + 1))
+    sides = ring * np.uint32(around) + place % np.uint32(around)
+    this = np.arange(around)
+    after, last, first_end = (this + 1) % around, (rings - 1) * around, rings * around
+    ends = [
+        np.stack([np.full(around, first_end), after, this], axis=1),
+        np.stack([np.full(around, first_end + 1), last + this, last + after], axis=1),
+    ]
+    return np.concatenate([sides, *ends]).astype(np.uint32)
+
+
 def _quads(rows: int, columns: int, wrap: bool):
     """Two triangles for each cell of a grid of rows x columns cells, closed in both directions if `wrap`."""
     row, column = np.divmod(np.arange(rows * columns), columns)

@@ -65,6 +65,27 @@ def test_bodies_touch_in_every_step(name):
     assert pairs >= {(0, 0), (0, 1), (0, 2), (1, 1), (1, 2)}
 
 
+def test_twisted_rods_press_together():
+    scene = scenes.make("rod-twist-like")
+    found = contacts_of_steps(scene, [10, 120, 240])
+    assert counts(found)[10] == 0, "rods lie loose in the bundle"
+    assert all(2_000 < counts(found)[k] < 12_000 for k in (120, 240))
+    # Turns of the coil meet too: rods at the corners of the bundle, which are no neighbours in it.
+    corner_rods = scene.meshes[0].n_vertices
+    assert not (found[120].ee < corner_rods).all(axis=1).any()
+    assert (found[240].ee < corner_rods).all(axis=1).sum() > 100
+
+
+def test_body_touches_both_rollers_and_itself():
+    scene = scenes.make("armadillo-like")
+    found = contacts_of_steps(scene, [60, 150, 190])
+    assert all(500 < count < 20_000 for count in counts(found).values())
+    ends = np.cumsum([mesh.n_vertices for mesh in scene.meshes])
+    for k in (150, 190):
+        meshes = np.searchsorted(ends, found[k].ee, side="right")[:, [0, 2]]
+        assert {tuple(sorted(pair)) for pair in np.unique(meshes, axis=0).tolist()} == {(0, 0), (0, 1), (0, 2)}
+
+
 def test_breaking_pieces_collide():
     scene = scenes.make("breaking-like", size=0.1)
     changes = [frame.index for frame in scene.frames() if frame.topologies]
@@ -74,7 +95,10 @@ def test_breaking_pieces_collide():
     assert found[40] > 1000, "debris lies in a heap"
 
 
-@pytest.mark.parametrize(("name", "steps"), [("cloth-ball-like", [48, 80]), ("n-body-like-hr", [24, 48])])
+GROWING = [("cloth-ball-like", [48, 80]), ("n-body-like-hr", [24, 48]), ("rod-twist-like", [150, 240])]
+
+
+@pytest.mark.parametrize(("name", "steps"), GROWING)
 def test_contacts_grow_like_the_triangles(name, steps):
     """The same motion, meshed four times as finely, has about four times the contacts."""
     few, many = (counts(contacts_of_steps(scenes.make(name, size=size), steps)) for size in (0.25, 1.0))

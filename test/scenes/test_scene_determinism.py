@@ -16,7 +16,8 @@ from hpccd_ros import scenes
 from hpccd_ros.scenes.exactmath import sincos
 
 # A changed hash here means that every recording and benchmark made before shows another motion.
-# Frames are cut short, but for the breaking scene as far as its first changes of topology.
+# Frames are cut short, but for the breaking scene as far as its first changes of topology; where early frames show
+# little of the motion a small size shows the rest.
 GOLDEN = {
     "two-triangles:1:11": "42c0cb49e4f6b9f2",
     "folding-strip:1:61": "fc81eb21a325e8f8",
@@ -25,6 +26,10 @@ GOLDEN = {
     "breaking-like:0.25:10": "f06d008007208b9f",
     "n-body-like-lr:1:20": "5a98a9ecb6ac7509",
     "n-body-like-hr:1:4": "4c92229e8d72e92b",
+    "rod-twist-like:1:3": "e25ce57a0567622f",
+    "rod-twist-like:0.0625:241": "1fe79321ffb60ee8",
+    "armadillo-like:1:3": "11e3be9bf74d0b9c",
+    "armadillo-like:0.0625:191": "ef07568c210e674e",
 }
 
 
@@ -48,7 +53,10 @@ def test_instruction_sets_do_not_change_the_numbers(tmp_path):
         "NPY_DISABLE_CPU_FEATURES": " ".join(features),
         "PYTHONPATH": str(Path(hpccd_ros.__file__).parents[1]),
     }
-    words = ["folding-strip:1:61", "cloth-drop:1:40", "breaking-like:0.25:10", "n-body-like-lr:1:20"]
+    words = [
+        "folding-strip:1:61", "cloth-drop:1:40", "breaking-like:0.25:10", "n-body-like-lr:1:20",
+        "rod-twist-like:0.0625:241", "armadillo-like:0.0625:191",
+    ]  # fmt: skip
     program = Path(__file__).with_name("scene_digest.py")
     result = subprocess.run(
         [sys.executable, program, *words], env=environment, capture_output=True, text=True, timeout=300
@@ -66,7 +74,7 @@ def test_more_frames_continue_the_same_motion(name):
             np.testing.assert_array_equal(a, b)
 
 
-@pytest.mark.parametrize("name", ["cloth-drop", "breaking-like", "n-body-like-lr"])
+@pytest.mark.parametrize("name", ["cloth-drop", "breaking-like", "n-body-like-lr", "rod-twist-like", "armadillo-like"])
 def test_seed_changes_the_motion(name):
     a, b = (scenes.make(name, size=0.25, frames=12, seed=seed).frame(11).stacked() for seed in (0, 1))
     assert a.shape != b.shape or np.abs(a - b).max() > 1e-4

@@ -13,9 +13,7 @@ CpuBackend::CpuBackend(Resources& shared)
     : shared_(shared),
       method_(paper::engine_of(shared.options, {shared.features, shared.rules, shared.pool})),
       workers_(static_cast<std::size_t>(shared.pool.size())) {
-  const Options& o = shared.options;
   one_thread_.heed(shared.cancellation);
-  search_.leaf_pairs = leaf_pairs(o.simd);
   search_.cancellation = &shared.cancellation;
 }
 
@@ -28,8 +26,10 @@ std::optional<Detection> CpuBackend::detect(Positions t0, Positions t1) {
 void CpuBackend::update(Positions t0, Positions t1, Tests tests) {
   const Options& o = shared_.options;
   Profiler& profiler = shared_.profiler;
-  see(t0, t1, shared_.separations.largest());
+  shared_.tree.bound(t0, t1, shared_.separations.largest());
+  begin_query();
   search_.geometry.separations = shared_.separations_now();
+  search_.leaf_pairs = leaf_pairs(o.simd);
   const bool here = tests == Tests::all_here;
   search_.report = !here && o.report == Report::any ? Report::all : o.report;
   for (unsigned i = 0; i < n_rules; ++i) {
@@ -47,27 +47,15 @@ void CpuBackend::update(Positions t0, Positions t1, Tests tests) {
   }
 }
 
-std::optional<Contacts> CpuBackend::proximity(Positions vertices, double distance) {
-  const Options& o = shared_.options;
-  const std::vector<double> separations(shared_.scene->meshes().size(), distance);
-  see(vertices, vertices, separations);
-  search_.geometry.separations = {distance};
-  search_.report = Report::all;
-  for (unsigned i = 0; i < n_rules; ++i)
-    search_.batch_test[i] = proximity_batch(o.simd), search_.fallback[i] = decide_proximity;
-  shared_.tree.fit(shared_.profiler);
-  walk_tree();
-  return collect({false, false, o.closest, AtTime::start});
-}
-
-// Takes positions in.
-void CpuBackend::see(Positions t0, Positions t1, std::span<const double> separations) {
-  shared_.tree.bound(t0, t1, separations);
+// With new bounds, nothing is looked at yet.
+void CpuBackend::begin_query() {
   shared_.profiler.mark("bounds");
   const MotionBounds& motion = shared_.tree.motion();
   search_.geometry = {motion.vertices.data(), shared_.features.edges.data(), shared_.features.faces.data(),
                       motion.kdops.data(), motion.map.scale};
   search_.earliest = std::numeric_limits<double>::infinity();
+  search_.leaf_pairs = nullptr, search_.leaf_pairs_at_start = nullptr, search_.leaf_edge_faces = nullptr;
+  search_.nearest = nullptr;
 }
 
 void CpuBackend::traverse() {
@@ -120,14 +108,15 @@ Contacts CpuBackend::collect(Outputs outputs) {
 
 void CpuBackend::count(std::map<std::string, std::uint64_t>& stats) const {
   std::uint64_t bytes = order_.bytes() + (method_ ? method_->bytes() : 0);
-  const char* kinds[2] = {"vf", "ee"};
+  const char* kinds[3] = {"vf", "ee", "ef"};
   for (const Worker& w : workers_) {
     stats["node_pairs"] += w.node_pairs;
     stats["leaf_pairs"] += w.leaf_pairs;
     bytes += sizeof(Worker) + w.bytes();
-    for (int k = 0; k < 2; ++k) {
+    for (int k = 0; k < 3; ++k) {
       const std::string kind = kinds[k];
       const BatchCounts& c = w.counts[k];
+      if (k == 2 && !search_.leaf_edge_faces) continue;
       stats[kind + "_candidates"] += c.tested;
       stats[kind + "_rejected_slabs"] += c.kdop;  // users read it under its first name
       stats[kind + "_rejected_coplanarity"] += c.coplanarity;
@@ -147,7 +136,3 @@ void CpuBackend::count(std::map<std::string, std::uint64_t>& stats) const {
 }
 
 }  // namespace hpccd
-namespace hpccd {
-std::optional<Intersections> CpuBackend::intersections(Positions) { return Intersections{}; }
-std::optional<std::vector<Gap>> CpuBackend::distances(Positions) { return std::vector<Gap>{}; }
-}

@@ -38,7 +38,8 @@ class CpuBackend final : public DetectionBackend {
   std::vector<Worker>& workers() { return workers_; }
 
  private:
-  void see(Positions t0, Positions t1, std::span<const double> separations);
+  void begin_query();
+  void see_snapshot(Positions vertices);
   void walk_tree();
   void mark_traversal();
   Contacts collect(Outputs outputs);

@@ -10,6 +10,11 @@ void MovingTree::bound(Positions t0, Positions t1, std::span<const double> separ
   motion_.update(scene_, t0, t1, separations, pool_);
 }
 
+void MovingTree::bound(Positions vertices) {
+  followed_ = std::exchange(fits_, false);
+  motion_.update(scene_, vertices, pool_);
+}
+
 void MovingTree::fit(Profiler& profiler) {
   if (!tree_.nodes.empty()) {
     refit(tree_, motion_.boxes, followed_ ? motion_.resting : std::vector<char>(), pool_);

@@ -17,6 +17,8 @@ class MovingTree {
 
   // Bounds of a new motion. Throws InvalidArgument as MotionBounds::update does.
   void bound(Positions t0, Positions t1, std::span<const double> separations);
+  // The same of one snapshot.
+  void bound(Positions vertices);
   // A tree that fits it: refitted, or built anew where refitting has lost too much. Marked as "refit" and "build".
   void fit(Profiler& profiler);
   void build_anew();

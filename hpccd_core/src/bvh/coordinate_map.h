@@ -13,6 +13,8 @@ namespace hpccd {
 
 // Beyond this, differences and squares of coordinates could overflow in the error bounds.
 inline constexpr double largest_coordinate = 1e150;
+// Of one snapshot only differences are taken before a range is looked at.
+inline constexpr double largest_in_snapshot = 1e300;
 
 struct CoordinateMap {
   double center[3] = {0, 0, 0};

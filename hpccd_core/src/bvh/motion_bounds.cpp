@@ -14,15 +14,15 @@ namespace {
 constexpr std::size_t grain = 256;
 
 // NaN fails the comparison as well.
-bool acceptable(double x) { return std::fabs(x) <= largest_coordinate; }
+bool acceptable(double x, double largest) { return std::fabs(x) <= largest; }
 
 template <class Real>
-Extent extent_of(const Real* x, std::size_t begin, std::size_t end) {
+Extent extent_of(const Real* x, std::size_t begin, std::size_t end, double largest) {
   Extent e;
   for (std::size_t i = begin; i < end; ++i)
     for (int k = 0; k < 3; ++k) {
       const double value = x[3 * i + k];
-      e.good = e.good && acceptable(value);
+      e.good = e.good && acceptable(value, largest);
       e.low[k] = std::min(e.low[k], value);
       e.high[k] = std::max(e.high[k], value);
     }
@@ -36,16 +36,16 @@ std::string shortest(double x) {
 }
 
 template <class Real>
-[[noreturn]] void report_bad(const char* name, const Real* x, std::size_t n) {
+[[noreturn]] void report_bad(const char* name, const Real* x, std::size_t n, double largest) {
   for (std::size_t i = 0; i < n; ++i)
     for (int k = 0; k < 3; ++k) {
       const double value = x[3 * i + k];
-      if (acceptable(value)) continue;
+      if (acceptable(value, largest)) continue;
       const std::string where = std::string(name) + "[" + std::to_string(i) + ", " + std::to_string(k) + "] is ";
       if (!std::isfinite(value))
         throw InvalidArgument(where + (std::isnan(value) ? "NaN" : "infinite") + "; all coordinates must be finite");
       throw InvalidArgument(where + shortest(value) +
-                            ", beyond 1e150: intermediate results could overflow; scale the scene down");
+                            ", beyond " + shortest(largest) + ": intermediate results could overflow; scale the scene down");
     }
   throw InvalidArgument(std::string(name) + " changed while it was being read");
 }
@@ -114,8 +114,8 @@ void MotionBounds::update(const Real* t0, const Real* t1, std::size_t n, std::sp
   std::vector<Extent> extents(pieces.size());
   parallel_for(pool, pieces.size(), 1, [&](std::size_t from, std::size_t to, int) {
     for (std::size_t i = from; i < to; ++i) {
-      extents[i] = extent_of(t0, pieces[i].begin, pieces[i].end);
-      extents[i].include(extent_of(t1, pieces[i].begin, pieces[i].end));
+      extents[i] = extent_of(t0, pieces[i].begin, pieces[i].end, largest_);
+      extents[i].include(extent_of(t1, pieces[i].begin, pieces[i].end, largest_));
     }
   });
   extents_.resize(parts_.size());
@@ -125,8 +125,8 @@ void MotionBounds::update(const Real* t0, const Real* t1, std::size_t n, std::sp
   Extent whole;
   for (const Extent& e : extents_) whole.include(e);
   if (!whole.good) {
-    if (!extent_of(t0, 0, n).good) report_bad("vertices_t0", t0, n);
-    report_bad("vertices_t1", t1, n);
+    if (!extent_of(t0, 0, n, largest_).good) report_bad("vertices_t0", t0, n, largest_);
+    report_bad("vertices_t1", t1, n, largest_);
   }
 
   const CoordinateMap old_map = map;
@@ -157,13 +157,26 @@ void MotionBounds::update_all(Positions t0, Positions t1, std::span<const double
   complete_ = true;
 }
 
-void MotionBounds::update(const Scene& scene, Positions t0, Positions t1, std::span<const double> separations,
-                          ThreadPool& pool) {
+// Each mesh is a part.
+void MotionBounds::divide(const Scene& scene) {
   parts_.clear();
   for (const Scene::Mesh& m : scene.meshes())
     parts_.push_back({m.first_vertex, std::size_t{m.first_vertex} + m.n_vertices});
+}
+
+void MotionBounds::update(const Scene& scene, Positions t0, Positions t1, std::span<const double> separations,
+                          ThreadPool& pool) {
+  divide(scene);
   resting = statics_.unchanged(scene, t0, t1, pool);
+  largest_ = largest_coordinate;
   update_all(t0, t1, separations, pool);
+}
+
+void MotionBounds::update(const Scene& scene, Positions vertices, ThreadPool& pool) {
+  divide(scene);
+  resting = statics_.unchanged(scene, vertices, vertices, pool);
+  largest_ = largest_in_snapshot;
+  update_all(vertices, vertices, {}, pool);
 }
 
 void MotionBounds::update(Positions t0, Positions t1, ThreadPool& pool) {

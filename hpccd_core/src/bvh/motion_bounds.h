@@ -42,12 +42,15 @@ struct MotionBounds {
   // Throws InvalidArgument where a coordinate is not finite or too large, or where a static mesh moves.
   void update(const Scene& scene, Positions vertices_t0, Positions vertices_t1, std::span<const double> separations,
               ThreadPool& pool);
+  // Of one snapshot: a motion that goes nowhere.
+  void update(const Scene& scene, Positions vertices, ThreadPool& pool);
   // The same for vertices of no scene, without separations.
   void update(Positions vertices_t0, Positions vertices_t1, ThreadPool& pool);
   void sweep(ThreadPool& pool);
   std::size_t bytes() const;
 
  private:
+  void divide(const Scene& scene);
   template <class Real>
   void update(const Real* t0, const Real* t1, std::size_t n, std::span<const double> separations, ThreadPool& pool);
   void update_all(Positions t0, Positions t1, std::span<const double> separations, ThreadPool& pool);
@@ -56,6 +59,7 @@ struct MotionBounds {
   std::vector<VertexRange> parts_;  // of each mesh
   std::vector<Extent> extents_;     // of each part, when it was last taken
   std::vector<double> margins_;     // of each part's boxes
+  double largest_ = largest_coordinate;
   bool complete_ = false;  // false while a call is under way, and after it has thrown
 };
 

@@ -27,6 +27,8 @@ struct alignas(64) Node {
   std::uint32_t only_points : 1 = 0;  // no triangle in the whole subtree, so nothing that another such node could touch
 
   bool overlaps(const Node& other) const;  // as MotionBox::overlaps
+  // At t = 0 alone: no farther apart than `reach` along any axis.
+  bool near_at_start(const Node& other, float reach) const;
 };
 static_assert(sizeof(Node) == 64);
 
@@ -36,6 +38,13 @@ inline bool Node::overlaps(const Node& other) const {
     return (load4(a.t0.high) < load4(b.t0.low)) & (load4(a.t1.high) < load4(b.t1.low));
   };
   return (bits4(below(box, other.box) | below(other.box, box)) & 7) == 0;
+}
+
+inline bool Node::near_at_start(const Node& other, float reach) const {
+  const Floats4 by = {reach, reach, reach, reach};
+  const Mask4 apart = (load4(box.t0.high) + by < load4(other.box.t0.low)) |
+                      (load4(other.box.t0.high) + by < load4(box.t0.low));
+  return (bits4(apart) & 7) == 0;
 }
 
 // Boxes of up to 16 features of a leaf, a row for each of the twelve bounds (bound_number). Every row is a cache line,

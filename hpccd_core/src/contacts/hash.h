@@ -24,9 +24,13 @@ HPCCD_HD std::uint64_t bits_of(double x) {
   return b;
 }
 
-// a, b: vertex and face, or both edges, each as first vertex << 32 | second vertex.
+HPCCD_HD std::uint64_t salt_of(Kind kind) {
+  return kind == Kind::edge_edge ? 0x9e3779b97f4a7c15ULL : kind == Kind::vertex_face ? 1 : 0xd1b54a32d192ed03ULL;
+}
+
+// a, b: vertex and face, both edges, or edge and face; an edge is first vertex << 32 | second vertex.
 HPCCD_HD std::uint64_t hash_of(Kind kind, std::uint64_t a, std::uint64_t b, double toc) {
-  return mix(mix(mix(a + (kind == Kind::edge_edge ? 0x9e3779b97f4a7c15ULL : 1)) ^ b) ^ bits_of(toc));
+  return mix(mix(mix(a + salt_of(kind)) ^ b) ^ bits_of(toc));
 }
 
 HPCCD_HD std::uint64_t pack(std::uint32_t high, std::uint32_t low) { return (std::uint64_t{high} << 32) | low; }

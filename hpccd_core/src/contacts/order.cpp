@@ -39,6 +39,7 @@ void ContactOrder::count(const std::vector<Worker>& workers, ThreadPool& pool) {
   begin_.clear();
   add_lists(workers, &Worker::vertex_face, pool);
   add_lists(workers, &Worker::edge_edge, pool);
+  add_lists(workers, &Worker::edge_face, pool);
   parallel_for(pool, lists_.size(), 1, [&](std::size_t begin, std::size_t end, int) {
     for (std::size_t i = begin; i < end; ++i) {
       List& list = lists_[i];

@@ -9,7 +9,8 @@
 
 namespace hpccd {
 
-enum class Kind : unsigned char { vertex_face, edge_edge };
+// Edges meet faces in queries of one snapshot only.
+enum class Kind : unsigned char { vertex_face, edge_edge, edge_face };
 
 template <class R>
 struct Motion {

@@ -21,31 +21,42 @@ HPCCD_HD Bounds<BoxGroup::width> bounds_at(const BoxGroup* groups, std::uint32_t
 }
 HPCCD_HD Bounds<1> bounds_of(const Node& node) { return {node.box.t0.low}; }
 
-using Group = Rows16<n_bounds>;
-
-// Bit j: box j of the group overlaps b (MotionBox::overlaps).
-template <class Bounds>
-HPCCD_HD unsigned overlapping(const Group& g, Bounds b) {
-  Mask16 apart;
-  for (std::uint32_t axis = 0; axis < 3; ++axis) {
-    const Mask16 below = less(g[high(0, axis)], all16(b[low(0, axis)]));
-    const Mask16 above = less(all16(b[high(0, axis)]), g[low(0, axis)]);
-    apart = apart | (below & less(g[high(1, axis)], all16(b[low(1, axis)])));
-    apart = apart | (above & less(all16(b[high(1, axis)]), g[low(1, axis)]));
+// Bit j: box j of the group overlaps b. Through the whole motion (MotionBox::overlaps):
+struct BothEnds {
+  using Group = Rows16<n_bounds>;
+  HPCCD_HD static Group load(const BoxGroup& group) { return load_rows(group.rows); }
+  template <class Bounds>
+  HPCCD_HD unsigned overlapping(const Group& g, Bounds b) const {
+    Mask16 apart;
+    for (std::uint32_t axis = 0; axis < 3; ++axis) {
+      const Mask16 below = less(g[high(0, axis)], all16(b[low(0, axis)]));
+      const Mask16 above = less(all16(b[high(0, axis)]), g[low(0, axis)]);
+      apart = apart | (below & less(g[high(1, axis)], all16(b[low(1, axis)])));
+      apart = apart | (above & less(all16(b[high(1, axis)]), g[low(1, axis)]));
+    }
+    return ~apart.bits() & 0xFFFF;
   }
-  return ~apart.bits() & 0xFFFF;
-}
+};
 
-// The same of the boxes at t = 0 alone.
-template <class Bounds>
-HPCCD_HD unsigned overlapping_at_start(const Group& g, Bounds b) {
-  Mask16 apart;
-  for (std::uint32_t axis = 0; axis < 3; ++axis) {
-    apart = apart | less(g[high(0, axis)], all16(b[low(0, axis)]));
-    apart = apart | less(all16(b[high(0, axis)]), g[low(0, axis)]);
+// At t = 0 alone, where boxes may also be as far apart as `reach` along each axis.
+struct AtStart {
+  float reach;
+  // The rows of t = 0 come first.
+  using Group = Rows16<n_bounds / 2>;
+  static_assert(high(0, 2) + 1 == n_bounds / 2);
+  HPCCD_HD static Group load(const BoxGroup& group) {
+    return load_rows(reinterpret_cast<const float (&)[n_bounds / 2][BoxGroup::width]>(group.rows));
   }
-  return ~apart.bits() & 0xFFFF;
-}
+  template <class Bounds>
+  HPCCD_HD unsigned overlapping(const Group& g, Bounds b) const {
+    Mask16 apart;
+    for (std::uint32_t axis = 0; axis < 3; ++axis) {
+      apart = apart | less(g[high(0, axis)], all16(b[low(0, axis)] - reach));
+      apart = apart | less(all16(b[high(0, axis)] + reach), g[low(0, axis)]);
+    }
+    return ~apart.bits() & 0xFFFF;
+  }
+};
 
 // The lanes of the group [i, i + 16) that lie in [begin, end).
 HPCCD_HD unsigned lanes_in(std::uint32_t i, std::uint32_t begin, std::uint32_t end) {
@@ -68,10 +79,11 @@ struct Near {
 };
 
 // Of features begin to end - 1 of the groups.
-HPCCD_HD Near near(const BoxGroup* groups, std::uint32_t begin, std::uint32_t end, const Node& other) {
+template <class When>
+HPCCD_HD Near near(When when, const BoxGroup* groups, std::uint32_t begin, std::uint32_t end, const Node& other) {
   Near n;
   for (std::uint32_t i = 0, group = 0; i < end; i += BoxGroup::width, ++group)
-    n.lanes[group] = overlapping(load_rows(groups[group].rows), bounds_of(other)) & lanes_in(i, begin, end),
+    n.lanes[group] = when.overlapping(When::load(groups[group]), bounds_of(other)) & lanes_in(i, begin, end),
     n.count += static_cast<unsigned>(__builtin_popcount(n.lanes[group]));
   return n;
 }

@@ -16,22 +16,23 @@ HPCCD_HD void edges_against_faces(const Tree& tree, const LeafRange& a, const Le
   const BoxGroup* all = tree.box_groups.get();
   const BoxGroup *edge_groups = all + a.first_group, *face_group = all + b.surface_group();
   static_assert(Tree::leaf_size <= BoxGroup::width);
+  constexpr AtStart when{0};
   const unsigned near_faces =
-      overlapping_at_start(load_rows(face_group->rows), bounds_of(node_a)) & lanes_in(0, 0, n_faces);
+      when.overlapping(AtStart::load(*face_group), bounds_of(node_a)) & lanes_in(0, 0, n_faces);
   if (!near_faces) return;
   const std::uint32_t* face = tree.face_of_slot.data() + b.first_face;
   const std::uint32_t *c0 = tree.face_corners[0].data() + b.first_face,
                       *c1 = tree.face_corners[1].data() + b.first_face,
                       *c2 = tree.face_corners[2].data() + b.first_face;
   for (std::uint32_t i = 0; i < n_edges; i += BoxGroup::width) {
-    const Group edges = load_rows(edge_groups[i / BoxGroup::width].rows);
-    const unsigned near_edges = overlapping_at_start(edges, bounds_of(node_b)) & lanes_in(i, 0, n_edges);
+    const AtStart::Group edges = AtStart::load(edge_groups[i / BoxGroup::width]);
+    const unsigned near_edges = when.overlapping(edges, bounds_of(node_b)) & lanes_in(i, 0, n_edges);
     if (!near_edges) continue;
     const std::uint32_t slot = a.first_edge + i;
     const std::uint32_t *end0 = tree.edge_ends[0].data() + slot, *end1 = tree.edge_ends[1].data() + slot;
     for (unsigned lanes = near_faces; lanes; lanes &= lanes - 1) {
       const auto k = static_cast<std::uint32_t>(__builtin_ctz(lanes));
-      unsigned m = overlapping_at_start(edges, bounds_at(face_group, k)) & near_edges;
+      unsigned m = when.overlapping(edges, bounds_at(face_group, k)) & near_edges;
       if (!m) continue;
       const std::uint32_t corners[] = {c0[k], c1[k], c2[k]};
       for (const std::uint32_t v : corners) m &= ~(equal16(end0, v) | equal16(end1, v));

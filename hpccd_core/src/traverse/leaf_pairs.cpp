@@ -6,13 +6,16 @@ namespace hpccd {
 // Of leaf_pairs.inl, compiled for each instruction set.
 namespace scalar {
 void leaf_pairs(const Tree&, const LeafRange&, const LeafRange&, CandidateBuffer&, CandidateBuffer&);
+void leaf_pairs_at_start(const Tree&, const LeafRange&, const LeafRange&, float, CandidateBuffer&, CandidateBuffer&);
 }
 #if defined(HPCCD_X86)
 namespace avx2 {
 void leaf_pairs(const Tree&, const LeafRange&, const LeafRange&, CandidateBuffer&, CandidateBuffer&);
+void leaf_pairs_at_start(const Tree&, const LeafRange&, const LeafRange&, float, CandidateBuffer&, CandidateBuffer&);
 }
 namespace avx512 {
 void leaf_pairs(const Tree&, const LeafRange&, const LeafRange&, CandidateBuffer&, CandidateBuffer&);
+void leaf_pairs_at_start(const Tree&, const LeafRange&, const LeafRange&, float, CandidateBuffer&, CandidateBuffer&);
 }
 #endif
 
@@ -22,6 +25,14 @@ LeafPairs leaf_pairs([[maybe_unused]] Simd simd) {
   if (simd == Simd::avx2) return avx2::leaf_pairs;
 #endif
   return scalar::leaf_pairs;
+}
+
+LeafPairsAtStart leaf_pairs_at_start([[maybe_unused]] Simd simd) {
+#if defined(HPCCD_X86)
+  if (simd == Simd::avx512) return avx512::leaf_pairs_at_start;
+  if (simd == Simd::avx2) return avx2::leaf_pairs_at_start;
+#endif
+  return scalar::leaf_pairs_at_start;
 }
 
 }  // namespace hpccd

@@ -8,16 +8,27 @@
 #include "base/cancellation.h"
 #include "elementary/batch.h"
 #include "elementary/fallback.h"
+#include "elementary/intersection_batch.h"
+#include "traverse/leaf_edge_faces.h"
 #include "traverse/leaf_pairs.h"
+#include "traverse/nearest_pairs.h"
 #include "traverse/tasks.h"
 
 namespace hpccd {
 
 struct Search {
   Geometry geometry;
-  LeafPairs leaf_pairs;
-  BatchTest batch_test[n_rules];  // by number of the rule
+  // Which pairs of features of two leaves; null: none.
+  LeafPairs leaf_pairs = nullptr;
+  LeafPairsAtStart leaf_pairs_at_start = nullptr;  // of one snapshot, within `reach` or what `nearest` leaves
+  LeafEdgeFaces leaf_edge_faces = nullptr;
+  float reach = 0;
+  // How they are tested, by number of the rule; edges against faces alike by all.
+  BatchTest batch_test[n_rules];
   Fallback fallback[n_rules];
+  IntersectionBatch intersection_batch = nullptr;
+  // Where what is found goes; null: to the workers' lists.
+  NearestPairs* nearest = nullptr;
   Report report;
   std::atomic<double> earliest;  // best time so far, where report is first
   const Cancellation* cancellation = &never_cancelled;

@@ -29,28 +29,4 @@ void PairRules::change(const SeparationTable& separations) {
   if (all_default) rules_.clear();
 }
 
-std::vector<NodePair> traversal_tasks(const Tree& tree, const PairRules& rules, std::size_t enough) {
-  std::vector<NodePair> level, next;
-  // The root may be all there is: a mesh of one leaf, which the scene may forbid to touch itself.
-  constexpr NodePair root{0, 0};
-  if (tree.nodes.empty() || !worth_visiting(tree.nodes, rules, root)) return level;
-  level.push_back(root);
-  for (bool progress = true; progress && level.size() < enough;) {
-    progress = false;
-    next.clear();
-    for (const NodePair& p : level) {
-      if (is_leaf_pair(tree.nodes, p)) {
-        next.push_back(p);
-        continue;
-      }
-      refine(tree.nodes, p, [&](NodePair q) {
-        if (worth_visiting(tree.nodes, rules, q)) next.push_back(q);
-      });
-      progress = true;
-    }
-    level.swap(next);
-  }
-  return level;
-}
-
 }  // namespace hpccd

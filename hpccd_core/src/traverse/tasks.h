@@ -79,12 +79,42 @@ inline bool is_leaf_pair(const std::vector<Node>& nodes, NodePair p) {
   return !nodes[p.a].children && !nodes[p.b].children;
 }
 
-inline bool worth_visiting(const std::vector<Node>& nodes, const PairRules& rules, NodePair p) {
+// Which boxes count: overlap(node, node) says whether two nodes may hold a pair. Through the whole motion:
+struct MotionBoxes {
+  static constexpr bool shrink = false;  // whether pairs that were worth visiting may be so no longer
+  bool overlap(const Node& a, const Node& b) const { return a.overlaps(b); }
+};
+
+template <class Boxes>
+bool worth_visiting(const std::vector<Node>& nodes, const PairRules& rules, const Boxes& boxes, NodePair p) {
   const Node &a = nodes[p.a], &b = nodes[p.b];
-  return rules.enabled(a, b) && (p.a == p.b || a.overlaps(b));
+  return rules.enabled(a, b) && (p.a == p.b || boxes.overlap(a, b));
 }
 
 // All of them worth visiting.
-std::vector<NodePair> traversal_tasks(const Tree& tree, const PairRules& rules, std::size_t enough);
+template <class Boxes>
+std::vector<NodePair> traversal_tasks(const Tree& tree, const PairRules& rules, const Boxes& boxes, std::size_t enough) {
+  std::vector<NodePair> level, next;
+  // The root may be all there is: a mesh of one leaf, which the scene may forbid to touch itself.
+  constexpr NodePair root{0, 0};
+  if (tree.nodes.empty() || !worth_visiting(tree.nodes, rules, boxes, root)) return level;
+  level.push_back(root);
+  for (bool progress = true; progress && level.size() < enough;) {
+    progress = false;
+    next.clear();
+    for (const NodePair& p : level) {
+      if (is_leaf_pair(tree.nodes, p)) {
+        next.push_back(p);
+        continue;
+      }
+      refine(tree.nodes, p, [&](NodePair q) {
+        if (worth_visiting(tree.nodes, rules, boxes, q)) next.push_back(q);
+      });
+      progress = true;
+    }
+    level.swap(next);
+  }
+  return level;
+}
 
 }  // namespace hpccd

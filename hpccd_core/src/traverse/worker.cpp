@@ -4,20 +4,40 @@
 #include <algorithm>
 #include <chrono>
 
+#include "elementary/exact/intersection.h"
 #include "elementary/undecided.h"
 #include "elementary/policy.h"
 
 namespace hpccd {
+namespace {
+
+// One vertex of each feature tells their meshes.
+std::pair<std::uint32_t, std::uint32_t> meshes_of(const NearestPairs& nearest, const Geometry& g, Kind kind,
+                                                  std::uint32_t first, std::uint32_t second) {
+  const std::uint32_t a = kind == Kind::vertex_face ? first : g.edges[first][0];
+  const std::uint32_t b = kind == Kind::edge_edge ? g.edges[second][0] : g.faces[second][0];
+  return {nearest.mesh_of(a), nearest.mesh_of(b)};
+}
+
+double limit_of(const NearestPairs& nearest, const Geometry& g, Kind kind, std::uint32_t first, std::uint32_t second) {
+  const auto [a, b] = meshes_of(nearest, g, kind, first, second);
+  return nearest.limit(a, b);
+}
+
+}  // namespace
+
 void Worker::begin(Search& search) {
   search_ = &search;
   vertex_face.clear();
   edge_edge.clear();
-  counts[0] = counts[1] = {};
-  fallbacks[0] = fallbacks[1] = {};
+  edge_face.clear();
+  for (BatchCounts& c : counts) c = {};
+  for (FallbackCounts& c : fallbacks) c = {};
   node_pairs = leaf_pairs = 0;
   elementary_seconds = 0;
   for (auto& w : waiting_)  // what an exception left behind
     if (w) w->edge_edge.n = w->vertex_face.n = 0;
+  if (edge_faces_) edge_faces_->n = 0;
   if (!result_) result_ = std::make_unique<BatchResult>();
 }
 
@@ -28,10 +48,12 @@ void Worker::flush() {
       drain(waiting_[i]->edge_edge, Kind::edge_edge, Rule::of_number(i), 1);
       drain(waiting_[i]->vertex_face, Kind::vertex_face, Rule::of_number(i), 1);
     }
+  if (edge_faces_) drain(*edge_faces_, Kind::edge_face, {}, 1);
 }
 
 std::size_t Worker::bytes() const {
-  std::size_t b = (vertex_face.capacity() + edge_edge.capacity()) * sizeof(Contact) + sizeof(BatchResult);
+  std::size_t b = (vertex_face.capacity() + edge_edge.capacity() + edge_face.capacity()) * sizeof(Contact) +
+                  sizeof(BatchResult) + (edge_faces_ ? sizeof(CandidateBuffer) : 0);
   for (const auto& w : waiting_) b += w ? sizeof(Waiting) : 0;
   return b;
 }
@@ -55,13 +77,19 @@ void Worker::drain(CandidateBuffer& buffer, Kind kind, Rule rule, std::uint32_t 
 void Worker::test(const std::uint32_t* first, const std::uint32_t* second, std::uint32_t n, Kind kind,
                   Rule rule) {
   heed_cancellation();
-  std::vector<Contact>& found = kind == Kind::vertex_face ? vertex_face : edge_edge;
+  std::vector<Contact>& list = found(kind);
   constexpr std::size_t many = 1 << 16;
-  if (found.capacity() - found.size() < n && found.size() >= many) grow(found, *search_->cancellation);
+  if (list.capacity() - list.size() < n && list.size() >= many) grow(list, *search_->cancellation);
   BatchResult& r = *result_;
-  BatchCounts& count = counts[kind == Kind::edge_edge];
+  BatchCounts& count = counts[static_cast<int>(kind)];
   r.counts = count;
-  search_->batch_test[rule.number()](search_->geometry, kind, first, second, n, r);
+  if (kind == Kind::edge_face) {
+    search_->intersection_batch(search_->geometry, first, second, n, r);
+    std::fill_n(r.toc, r.n_contacts, 0.0);
+    std::fill_n(r.delta, r.n_contacts, 0.0);
+  } else {
+    search_->batch_test[rule.number()](geometry_of(first, second, n, kind), kind, first, second, n, r);
+  }
   count = r.counts;
   for (std::uint32_t i = 0; i < r.n_contacts; ++i) {
     const double toc = reported_time(rule.accuracy, r.toc[i], r.delta[i]);
@@ -74,13 +102,46 @@ void Worker::test(const std::uint32_t* first, const std::uint32_t* second, std::
 void Worker::resolve(const Candidate& candidate, Rule rule) {
   heed_cancellation();
   const auto [a, b, kind] = candidate;
-  const UndecidedPair pair = undecided_pair(search_->geometry, candidate);
-  if (const auto value =
-          search_->fallback[rule.number()](rule.accuracy, pair, fallbacks[kind == Kind::edge_edge]))
-    report(kind, {a, b, *value});
+  FallbackCounts& count = fallbacks[static_cast<int>(kind)];
+  if (kind == Kind::edge_face) {
+    Vec3<double> q[5];
+    edge_face_positions(search_->geometry, a, b, q);
+    ++count.integers;
+    if (exact::intersect(q)) report(kind, {a, b, 0});
+    return;
+  }
+  UndecidedPair pair = undecided_pair(search_->geometry, candidate);
+  if (const NearestPairs* nearest = search_->nearest) {
+    pair.separation = limit_of(*nearest, search_->geometry, kind, a, b);
+    if (pair.separation < 0) return;
+  }
+  if (const auto value = search_->fallback[rule.number()](rule.accuracy, pair, count)) report(kind, {a, b, *value});
+}
+
+// With the limit of each pair of the batch, where the nearest pairs are looked for.
+const Geometry& Worker::geometry_of(const std::uint32_t* first, const std::uint32_t* second, std::uint32_t n,
+                                    Kind kind) {
+  if (!search_->nearest) return search_->geometry;
+  limits_.resize(batch_capacity);
+  for (std::uint32_t i = 0; i < n; ++i)
+    limits_[i] = limit_of(*search_->nearest, search_->geometry, kind, first[i], second[i]);
+  limited_ = search_->geometry;
+  limited_.separations.of_candidates = limits_.data();
+  return limited_;
+}
+
+std::vector<Contact>& Worker::found(Kind kind) {
+  return kind == Kind::vertex_face ? vertex_face : kind == Kind::edge_edge ? edge_edge : edge_face;
+}
+
+void Worker::offer(Kind kind, const Contact& pair) {
+  NearestPairs& nearest = *search_->nearest;
+  const auto [a, b] = meshes_of(nearest, search_->geometry, kind, pair.first, pair.second);
+  nearest.offer(a, b, {pair.toc, kind, pair.first, pair.second});
 }
 
 void Worker::report(Kind kind, const Contact& contact) {
+  if (search_->nearest) return offer(kind, contact);
   if (search_->report == Report::first) {
     double best = search_->earliest.load(std::memory_order_relaxed);
     if (contact.toc > best + simultaneous) return;
@@ -88,7 +149,7 @@ void Worker::report(Kind kind, const Contact& contact) {
            !search_->earliest.compare_exchange_weak(best, contact.toc, std::memory_order_relaxed)) {
     }
   }
-  (kind == Kind::vertex_face ? vertex_face : edge_edge).push_back(contact);
+  found(kind).push_back(contact);
 }
 
 }  // namespace hpccd

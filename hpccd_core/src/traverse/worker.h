@@ -44,6 +44,13 @@ class alignas(128) Worker {
     if (waiting.vertex_face.n >= batch_capacity)
       drain(waiting.vertex_face, Kind::vertex_face, rule, batch_capacity);
   }
+  // The same of edges against faces: add(edge_face).
+  template <class Add>
+  void test_edge_faces(Add&& add) {
+    if (!edge_faces_) edge_faces_ = std::make_unique<CandidateBuffer>();
+    add(*edge_faces_);
+    if (edge_faces_->n >= batch_capacity) drain(*edge_faces_, Kind::edge_face, {}, batch_capacity);
+  }
   const Search& search() const { return *search_; }
   void flush();  // tests what waits
   // The tier's fallback on a pair that nothing else decides, and a contact found elsewhere.
@@ -53,9 +60,9 @@ class alignas(128) Worker {
   void heed_cancellation() const { search_->cancellation->heed(); }
   std::size_t bytes() const;
 
-  std::vector<Contact> vertex_face, edge_edge;
-  BatchCounts counts[2];  // vertex-face, edge-edge
-  FallbackCounts fallbacks[2];
+  std::vector<Contact> vertex_face, edge_edge, edge_face;
+  BatchCounts counts[3];  // by kind
+  FallbackCounts fallbacks[3];
   std::uint64_t node_pairs = 0, leaf_pairs = 0;
   double elementary_seconds = 0;
   PairSink* sink = nullptr;   // where pairs of leaves are left to somebody else
@@ -72,10 +79,16 @@ class alignas(128) Worker {
   }
   void drain(CandidateBuffer& buffer, Kind kind, Rule rule, std::uint32_t keep_below);
   void test(const std::uint32_t* first, const std::uint32_t* second, std::uint32_t n, Kind kind, Rule rule);
+  const Geometry& geometry_of(const std::uint32_t* first, const std::uint32_t* second, std::uint32_t n, Kind kind);
+  std::vector<Contact>& found(Kind kind);
+  void offer(Kind kind, const Contact& pair);
+  Geometry limited_;
 
   Search* search_ = nullptr;
   std::unique_ptr<Waiting> waiting_[n_rules];
+  std::unique_ptr<CandidateBuffer> edge_faces_;
   std::unique_ptr<BatchResult> result_;
+  std::vector<double> limits_;  // of the batch, in the search for nearest pairs
 };
 
 }  // namespace hpccd

@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <memory>
 #include <random>
@@ -126,15 +127,14 @@ TEST_P(IntersectionBatchTest, DecidesAsIntegersDo) {
 }
 
 // Far from one, volumes would under- or overflow: there everything is left to integers.
-INSTANTIATE_TEST_SUITE_P(Sources, IntersectionBatchTest,
-                         testing::Values(Case{"Reals", Source::reals, 1, 0}, Case{"Small", Source::reals, 0x1p-200, 0},
-                                         Case{"TooSmall", Source::reals, 0x1p-300, 1},
-                                         Case{"TooLarge", Source::reals, 0x1p400, 1},
-                                         Case{"Lattice", Source::lattice, 1, 0.6},
-                                         Case{"Touching", Source::touching, 1, 1},
-                                         Case{"InAPlane", Source::in_a_plane, 1, 0.7},
-                                         Case{"SmallInAPlane", Source::in_a_plane, 0x1p-200, 0.7}),
-                         [](const auto& info) { return info.param.name; });
+INSTANTIATE_TEST_SUITE_P(
+    Sources, IntersectionBatchTest,
+    testing::Values(Case{"Reals", Source::reals, 1, 0}, Case{"Small", Source::reals, 0x1p-200, 0},
+                    Case{"TooSmall", Source::reals, 0x1p-300, 1}, Case{"TooLarge", Source::reals, 0x1p400, 1},
+                    Case{"Underflow", Source::touching, 0x1p-357, 1}, Case{"Lattice", Source::lattice, 1, 0.6},
+                    Case{"Touching", Source::touching, 1, 1}, Case{"InAPlane", Source::in_a_plane, 1, 0.7},
+                    Case{"SmallInAPlane", Source::in_a_plane, 0x1p-200, 0.7}),
+    [](const auto& info) { return info.param.name; });
 
 }  // namespace
 }  // namespace hpccd

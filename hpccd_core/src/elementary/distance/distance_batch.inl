@@ -16,9 +16,14 @@ namespace {
 template <Kind kind>
 HPCCD_HD Double separations_at(const Geometry& g, const std::uint32_t* first, const std::uint32_t* second,
                                const std::uint32_t* at) {
-  if (!g.separations.of_meshes) return Double(g.separations.uniform);
+  const bool listed = g.separations.of_candidates;
+  if (!listed && !g.separations.of_meshes) return Double(g.separations.uniform);
   alignas(64) double d[double_width];
   for (int lane = 0; lane < double_width; ++lane) {
+    if (listed) {
+      d[lane] = g.separations.of_candidates[at[lane]];
+      continue;
+    }
     std::uint32_t v[4];
     pair_vertices<kind>(g, first[at[lane]], second[at[lane]], v);
     d[lane] = g.separations.between(v[0], v[2]);

@@ -5,8 +5,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <random>
 
 #include "elementary/exact/integers.h"
@@ -76,9 +78,16 @@ bool brute_force_on_lattice(const Corners& c) {
 bool brute_force_on_reals(const Corners& c) {
   std::array<std::array<Big, 3>, 5> corners;
   for (int k = 0; k < 3; ++k) {
-    BitRange range;
-    for (int i = 0; i < 5; ++i) range.include(OddMantissa(c[i][k]));
-    for (int i = 0; i < 5; ++i) corners[i][k] = scaled_integer<Big>(OddMantissa(c[i][k]), range.low);
+    int low = 0;
+    for (int i = 0; i < 5; ++i)
+      if (c[i][k] != 0) low = std::min(low, std::ilogb(c[i][k]) - 52);
+    for (int i = 0; i < 5; ++i) {
+      int exponent = 0;
+      const double fraction = std::frexp(c[i][k], &exponent);
+      const Big mantissa(static_cast<std::int64_t>(std::ldexp(fraction, 53)));
+      corners[i][k] =
+          mantissa == 0 ? mantissa : Big(mantissa * pow(Big(2), static_cast<unsigned>(exponent - 53 - low)));
+    }
   }
   return brute_force(corners);
 }
@@ -143,7 +152,7 @@ TEST(ExactIntersection, DoesNotDependOnTheScaleOfAnAxis) {
 // Corners that are moved by the least that a double can be, or by much less than its unit: 5 * 2^-1074 to 2^480.
 TEST(ExactIntersection, OfEveryRangeOfBitsIsThatOfTheLinearProgram) {
   std::mt19937_64 random(7);
-  const double tiny[] = {0, 0, 0x1p-40, -0x1p-60, 0x1p-110, 5 * 0x1p-1074, -0x1p-1074};
+  const double tiny[] = {0, 0, 0x1p-40, -0x1p-60, 0x1p-110, -0x1p-128, 5 * 0x1p-1074, -0x1p-1074};
   Counts counts;
   int changed = 0;
   for (int i = 0; i < 2000; ++i) {
@@ -151,7 +160,7 @@ TEST(ExactIntersection, OfEveryRangeOfBitsIsThatOfTheLinearProgram) {
     const bool before = intersect(c);
     const double large = random() % 3 ? 1 : 0x1p480;
     for (auto& corner : c)
-      for (double& x : corner) x = x == 0 ? tiny[random() % 7] : x * (random() % 8 ? 1 : large) + tiny[random() % 7];
+      for (double& x : corner) x = x == 0 ? tiny[random() % 8] : x * (random() % 8 ? 1 : large) + tiny[random() % 8];
     const bool truth = brute_force_on_reals(c);
     ASSERT_EQ(intersect(c), truth) << "query " << i;
     counts(truth);

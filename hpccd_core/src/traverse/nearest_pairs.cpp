@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "traverse/nearest_pairs.h"
+
+#include <mutex>
+#include <tuple>
+
+#include "traverse/snapshot.h"
+
+namespace hpccd {
+
+bool NearestPair::before(const NearestPair& other) const {
+  const auto key = [](const NearestPair& p) {
+    const bool intersects = p.kind == Kind::edge_face && p.distance == 0;
+    return std::tuple(!intersects, p.distance, p.kind, p.first, p.second);
+  };
+  return key(*this) < key(other);
+}
+
+NearestPairs::NearestPairs(const Scene& scene, const MotionBounds& motion)
+    : n_(scene.meshes().size()),
+      entries_(std::make_unique<Entry[]>(n_ * n_)),
+      scale_(motion.map.scale),
+      // The margins of the test (margins.h), of a pair as large as the scene: boxes lie within 2.25 of zero, so p, a and
+      // b together are below 14.
+      rounding_(14 * 1e-14 / motion.map.scale) {
+  for (std::uint32_t m = 0; m < n_; ++m)
+    mesh_of_vertex_.insert(mesh_of_vertex_.end(), scene.meshes()[m].n_vertices, m);
+}
+
+void NearestPairs::offer(std::uint32_t mesh_a, std::uint32_t mesh_b, const NearestPair& pair) {
+  Entry& entry = at(mesh_a, mesh_b);
+  const std::lock_guard lock(entry.lock);
+  if (!pair.before(entry.best)) return;
+  entry.best = pair;
+  const bool intersects = pair.kind == Kind::edge_face;
+  // Pairs at the same distance are still wanted, one of which is the first in order.
+  entry.limit.store(intersects ? -1 : pair.distance * (1 + 1e-14) + rounding_, std::memory_order_relaxed);
+  entry.reach.store(intersects ? 0 : reach_of(pair.distance * (1 + 1e-14) + rounding_, scale_),
+                    std::memory_order_relaxed);
+}
+
+}  // namespace hpccd

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+// Branch and bound for the smallest distance of each pair of meshes: the nearest pair of features so far, and what it
+// leaves to be looked at. Shared by all threads.
+#pragma once
+
+#include <atomic>
+#include <memory>
+
+#include "base/spin_lock.h"
+#include "bvh/motion_bounds.h"
+#include "bvh/tree.h"
+#include "elementary/pair.h"
+
+namespace hpccd {
+
+struct NearestPair {
+  double distance = std::numeric_limits<double>::infinity();
+  Kind kind = Kind::edge_face;
+  std::uint32_t first = 0xFFFFFFFFu, second = 0xFFFFFFFFu;
+
+  // An edge and a face that intersect come first, then what is nearer, then the canonical order.
+  bool before(const NearestPair& other) const;
+};
+
+class NearestPairs {
+ public:
+  NearestPairs(const Scene& scene, const MotionBounds& motion);
+
+  // Farther apart along an axis than this, in coordinates of the boxes, is nothing that could come before.
+  float reach(std::uint32_t mesh_a, std::uint32_t mesh_b) const {
+    if (mesh_a == mixed_meshes || mesh_b == mixed_meshes) return std::numeric_limits<float>::infinity();
+    return at(mesh_a, mesh_b).reach.load(std::memory_order_relaxed);
+  }
+  // Vertex-face and edge-edge pairs beyond this distance could not come before; below 0: none could.
+  double limit(std::uint32_t mesh_a, std::uint32_t mesh_b) const {
+    return at(mesh_a, mesh_b).limit.load(std::memory_order_relaxed);
+  }
+  std::uint32_t mesh_of(std::uint32_t vertex) const { return mesh_of_vertex_[vertex]; }
+  void offer(std::uint32_t mesh_a, std::uint32_t mesh_b, const NearestPair& pair);
+  const NearestPair& found(std::uint32_t mesh_a, std::uint32_t mesh_b) const { return at(mesh_a, mesh_b).best; }
+
+ private:
+  struct Entry {
+    std::atomic<float> reach{std::numeric_limits<float>::infinity()};
+    std::atomic<double> limit{1e200};  // finite: margins are computed with it
+    SpinLock lock;
+    NearestPair best;
+  };
+  Entry& at(std::uint32_t a, std::uint32_t b) const { return entries_[a < b ? a * n_ + b : b * n_ + a]; }
+
+  std::size_t n_;
+  std::unique_ptr<Entry[]> entries_;
+  std::vector<std::uint32_t> mesh_of_vertex_;
+  double scale_, rounding_;
+};
+
+}  // namespace hpccd
