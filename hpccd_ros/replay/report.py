@@ -166,6 +166,7 @@ class Summary:
         if self.missing:
             print(f"  {replay.unverified} answers NOT VERIFIED, first step {self.missing.step} "
                   f"(ends at {self.missing.end} ns): {self.missing.missing}")
+        _print_distances(replay.distances)
         if replay.diverged:
             first = replay.first_divergence
             print(f"DIVERGED: {replay.diverged} of {replay.diverged + replay.verified} answers differ, first in step "
@@ -174,14 +175,15 @@ class Summary:
         elif replay.verified:
             what = "hold a contact where there is one, and one that there is" if replay.any_one else (
                 "are equal in every contact, time and hash")  # fmt: skip
-            print(f"VERIFIED: {replay.verified} answers {what} ({self._tiers()})")
+            # The word stands for all of the recording.
+            verdict = " " if replay.distances.diverged else "VERIFIED:"
+            print(f"{verdict} {replay.verified} answers {what} ({self._tiers()})")
         elif replay.recorded_answers:
             print("NOTHING VERIFIED: the recording has answers, but not the frames that they belong to")
         elif self.computed:
             print("computed only: the recording holds no contacts to compare with")
         else:
             print("NOTHING COMPUTED: no two frames of all meshes follow each other in the recording")
-        _print_distances(replay.distances)
         sys.stdout.flush()
 
     def _tiers(self) -> str:
@@ -196,7 +198,7 @@ def _print_distances(distances) -> None:
     elif distances.unverified:
         print(f"  {distances.unverified} answers about distances NOT VERIFIED, the first: {distances.first}")
     elif distances.verified:
-        print(f"VERIFIED: {distances.verified} answers about distances are equal, points included")
+        print(f"  {distances.verified} answers about distances are equal, points included")
 
 
 def _print_losses(replay) -> None:
