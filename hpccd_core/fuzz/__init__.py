@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Differential fuzzing of the elementary tests against the exact oracle: `python -m hpccd_core.fuzz --help`."""
+"""Differential fuzzing of the core's queries against the exact oracle: `python -m hpccd_core.fuzz --help`."""

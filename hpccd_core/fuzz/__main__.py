@@ -6,16 +6,17 @@ from __future__ import annotations
 import argparse
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 
-import numpy as np
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from ..options import ACCURACIES
-from .differential import SIMD, Batch, Tally, add_batch, batches, new_tallies, usable_simd
+from .differential import QUESTIONS, SIMD, Tallies, add_batch, batches, new_tallies, usable_simd
+from .failures import load_batches, save_failing
 
 SECONDS_BETWEEN_LINES = 30
 
@@ -25,7 +26,7 @@ def main(arguments: list[str] | None = None) -> int:
     console = Console(width=None if sys.stdout.isatty() else 120)
     simd = usable_simd() if a.simd == "all" else [a.simd]
     tallies = new_tallies()
-    source = _replayed(a.replay) if a.replay else batches(a.seed, a.batch)
+    source = load_batches(a.replay) if a.replay else batches(a.seed, a.batch, a.question)
     goal = None if a.replay else a.count or a.seconds
     done, reported, start = 0, 0.0, time.monotonic()
     columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
@@ -37,7 +38,8 @@ def main(arguments: list[str] | None = None) -> int:
                 done += len(batch.queries)
                 seconds = time.monotonic() - start
                 broken = sum(t.broken for t in tallies.values())
-                text = f"{done:,} queries, {done / seconds:,.0f}/s, {broken} broken promises, last: {batch.generator}"
+                speed = f"{done:,} queries, {done / seconds:,.0f}/s, {broken} broken promises"
+                text = f"{speed}, last: {batch.question}, {batch.generator}"
                 progress.update(bar, completed=done if a.count else seconds, description=text)
                 if not console.is_terminal and seconds > reported + SECONDS_BETWEEN_LINES:
                     console.print(text)  # the bar shows on terminals only
@@ -48,17 +50,15 @@ def main(arguments: list[str] | None = None) -> int:
             console.print("Stopped early; what was done:")
     console.print(_table(tallies))
     console.print(
-        "toc err: largest error of a time of contact; late: latest beyond the true one; uneven: an instruction set "
-        "differs;\nbroken: promises of exact and conservative, and agreement of instruction sets."
+        "error: largest error of a time, or of a distance in sizes of its query; late: largest beyond the true one; "
+        "uneven:\nan instruction set differs; broken: promises of exact and conservative, and agreement of instruction "
+        "sets."
     )
     source_text = f"replay of {a.replay}" if a.replay else f"seed {a.seed}, batches of {a.batch}"
     seconds = time.monotonic() - start
     console.print(f"{done:,} queries in {seconds:.1f} s, {source_text}, instruction sets: {', '.join(simd)}.")
-    failing = {key: t.failing for key, t in tallies.items() if t.failing}
-    if not failing:
+    if not save_failing(a.save, tallies):
         return 0
-    a.save.parent.mkdir(parents=True, exist_ok=True)
-    np.savez_compressed(a.save, **{"|".join(key): np.concatenate(q) for key, q in failing.items()})
     console.print(f"Failing queries: {a.save}. Again: python -m hpccd_core.fuzz --replay {a.save}")
     return 1
 
@@ -66,17 +66,19 @@ def main(arguments: list[str] | None = None) -> int:
 def _parser() -> argparse.ArgumentParser:
     p = argparse.ArgumentParser(
         prog="python -m hpccd_core.fuzz",
-        description="Compare the elementary tests with the exact oracle on degenerate queries. Exit status 1 where "
-        "exact differs (time of contact: by more than 1e-12), where conservative misses a contact or reports it late, "
-        "or where an instruction set's answer differs; fast and balanced promise no more and are only counted.",
+        description="Compare contact, separation, proximity and intersections of single pairs with the exact oracle "
+        "on degenerate queries. Exit status 1 where exact differs (time or distance: by more than 1e-12), where "
+        "conservative misses a pair or reports it late, or where an instruction set's answer differs; fast and "
+        "balanced promise no more and are only counted.",
     )
     length = p.add_mutually_exclusive_group()
     length.add_argument("--seconds", type=float, default=60.0, help="how long (default 60)")
     length.add_argument("--count", type=int, help="how many queries instead")
     p.add_argument("--seed", type=int, default=0, help="the same seed and batch give the same queries")
     p.add_argument("--batch", type=int, default=10_000, help="queries in a batch (default 10000)")
-    tiers = ",".join(ACCURACIES)
-    p.add_argument("--accuracy", type=_accuracies, default=ACCURACIES, help=f"comma-separated (default: {tiers})")
+    for name, choices in (("question", QUESTIONS), ("accuracy", ACCURACIES)):
+        text = f"comma-separated (default: {','.join(choices)})"
+        p.add_argument(f"--{name}", type=_some_of(choices), default=choices, help=text)
     p.add_argument("--simd", choices=("all", "auto", *SIMD), default="all", help="default: all that are usable")
     p.add_argument("--threads", type=int, default=0, help="threads of the oracle, 0 = all cores")
     p.add_argument("--save", type=Path, default=Path("fuzz-failures.npz"), help="file for failing queries")
@@ -84,31 +86,32 @@ def _parser() -> argparse.ArgumentParser:
     return p
 
 
-def _accuracies(text: str) -> tuple[str, ...]:
-    names = tuple(text.split(","))
-    unknown = set(names) - set(ACCURACIES)
-    if unknown:
-        raise argparse.ArgumentTypeError(f"{', '.join(sorted(unknown))}: choose from {', '.join(ACCURACIES)}")
+def _some_of(choices: tuple[str, ...]) -> Callable[[str], tuple[str, ...]]:
+    def names(text: str) -> tuple[str, ...]:
+        names = tuple(text.split(","))
+        unknown = set(names) - set(choices)
+        if unknown:
+            raise argparse.ArgumentTypeError(f"{', '.join(sorted(unknown))}: choose from {', '.join(choices)}")
+        return names
+
     return names
 
 
-def _replayed(path: Path):
-    with np.load(path) as file:
-        for key in file.files:
-            yield Batch(kind=key.split("|")[1], generator=key, queries=file[key])
-
-
-def _table(tallies: dict[tuple[str, str], Tally]) -> Table:
-    table = Table(title="Elementary tests against the exact oracle", box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
-    for column in ("tier", ""):
+def _table(tallies: Tallies) -> Table:
+    table = Table(title="The core against the exact oracle", box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
+    for column in ("question", "tier", ""):
         table.add_column(column, no_wrap=True)
-    for column in ("queries", "contacts", "missed", "invented", "toc err", "late", "uneven", "broken"):
+    for column in ("queries", "true", "missed", "invented", "error", "late", "uneven", "broken"):
         table.add_column(column, justify="right", no_wrap=True)
-    for (accuracy, kind), t in sorted(tallies.items()):
+    for (question, accuracy, kind), t in sorted(
+        tallies.items(), key=lambda item: (QUESTIONS.index(item[0][0]), item[0])
+    ):
         counts = (t.queries, t.hits, t.missed, t.invented)
-        errors = (f"{t.worst_toc_error:.0e}", f"{t.latest:.0e}" if t.latest else "0")
+        errors = (f"{t.worst_error:.0e}", f"{t.latest:.0e}" if t.latest else "0")
         abbreviated = "".join(word[0].upper() for word in kind.split("-"))
-        table.add_row(accuracy, abbreviated, *(f"{n:,}" for n in counts), *errors, f"{t.uneven:,}", f"{t.broken:,}")
+        table.add_row(
+            question, accuracy, abbreviated, *(f"{n:,}" for n in counts), *errors, f"{t.uneven:,}", f"{t.broken:,}"
+        )
     return table
 
 

@@ -10,39 +10,33 @@ from dataclasses import dataclass, field
 import numpy as np
 
 import hpccd_core as hc
-from hpccd_core import reference
 
-from .disturbances import disturb
-from .generators import EDGE_EDGE, GENERATORS, VERTEX_FACE
-
-Answers = tuple[np.ndarray, np.ndarray]  # hit (Q,) bool, toc (Q,) float64
-
-ORACLE = {VERTEX_FACE: reference.vertex_face, EDGE_EDGE: reference.edge_edge}
-CORE = {VERTEX_FACE: hc.test_vertex_face, EDGE_EDGE: hc.test_edge_edge}
+from . import questions
+from .questions import CONTACT, INTERSECTIONS, PROXIMITY, SEPARATION, Answers, Batch
 
 SIMD = ("scalar", "avx2", "avx512")
+QUESTIONS = (CONTACT, SEPARATION, PROXIMITY, INTERSECTIONS)
 
-# Promised to be within this of the true time of contact (`exact`).
-TOC_TOLERANCE = 1e-12
+# Promised by `exact`: within this of the true time; within this, times the size of the query, of the true distance.
+TOLERANCE = 1e-12
+# The oracle's distances are rounded to the nearest double, the core's may be off by another unit: not later than that.
+ROUNDING = {CONTACT: 0.0, SEPARATION: 0.0, PROXIMITY: 1e-15, INTERSECTIONS: 0.0}
 
-
-@dataclass(frozen=True)
-class Batch:
-    """Queries of one kind from one generator; the same seed and number give the same batch."""
-
-    kind: str
-    generator: str
-    queries: np.ndarray
+Tallies = dict[tuple[str, str, str], "Tally"]  # by question, accuracy and kind
 
 
 @dataclass(frozen=True)
 class Disagreement:
-    """How one tier's answers differ from the oracle's, for each query; late: toc - true toc, NaN without both."""
+    """How one tier's answers differ from the oracle's, for each query.
+
+    late: time - true time, or distance - true distance in sizes of the query; NaN without both.
+    """
 
     missed: np.ndarray
     invented: np.ndarray
     late: np.ndarray
     uneven: np.ndarray  # instruction sets that should agree to the bit do not
+    question: str = CONTACT
 
     def broken_promises(self, accuracy: str) -> np.ndarray:
         """Mask of the queries at which the tier does not do what its name promises.
@@ -50,15 +44,15 @@ class Disagreement:
         fast and balanced promise nothing but the same answer from all instruction sets.
         """
         if accuracy == "exact":
-            return self.uneven | self.missed | self.invented | (np.abs(self.late) > TOC_TOLERANCE)
+            return self.uneven | self.missed | self.invented | (np.abs(self.late) > TOLERANCE)
         if accuracy == "conservative":
-            return self.uneven | self.missed | (self.late > 0)
+            return self.uneven | self.missed | (self.late > ROUNDING[self.question])
         return self.uneven
 
 
 @dataclass
 class Tally:
-    """Sums over all batches for one accuracy and kind."""
+    """Sums over all batches for one question, accuracy and kind."""
 
     queries: int = 0
     hits: int = 0
@@ -66,69 +60,69 @@ class Tally:
     invented: int = 0
     uneven: int = 0
     broken: int = 0
-    worst_toc_error: float = 0.0
+    worst_error: float = 0.0
     latest: float = 0.0
-    failing: list[np.ndarray] = field(default_factory=list)
+    failing: list[Batch] = field(default_factory=list)
 
-    def add(self, queries: np.ndarray, hit: np.ndarray, difference: Disagreement, accuracy: str) -> None:
-        self.queries += len(queries)
+    def add(self, batch: Batch, hit: np.ndarray, difference: Disagreement, accuracy: str) -> None:
+        self.queries += len(batch.queries)
         self.hits += int(hit.sum())
         self.missed += int(difference.missed.sum())
         self.invented += int(difference.invented.sum())
         self.uneven += int(difference.uneven.sum())
         both = difference.late[~np.isnan(difference.late)]
-        self.worst_toc_error = max(self.worst_toc_error, np.abs(both).max(initial=0.0))
+        self.worst_error = max(self.worst_error, np.abs(both).max(initial=0.0))
         self.latest = max(self.latest, both.max(initial=0.0))
         broken = difference.broken_promises(accuracy)
         self.broken += int(broken.sum())
-        if broken.any() and sum(map(len, self.failing)) < 1000:
-            self.failing.append(queries[broken])
+        if broken.any() and sum(len(b.queries) for b in self.failing) < 1000:
+            self.failing.append(batch.part(broken))
 
 
-def batches(seed: int, size: int) -> Iterator[Batch]:
-    """Batches without end, kinds and generators in turn."""
-    turns = [(kind, name) for kind, generators in GENERATORS.items() for name in generators]
+def batches(seed: int, size: int, asked: Sequence[str] = QUESTIONS) -> Iterator[Batch]:
+    """Batches without end: the questions and their kinds in turn, of each the generators in turn.
+
+    The same seed and number give the same batch.
+    """
+    turns = [(question, kind) for question in asked for kind in questions.kinds_of(question)]
     number = 0
     while True:
-        kind, name = turns[number % len(turns)]
-        rng = np.random.default_rng([seed, number])
-        yield Batch(kind, name, disturb(rng, GENERATORS[kind][name](rng, size), kind))
+        question, kind = turns[number % len(turns)]
+        names = list(questions.generators_of(question, kind))
+        name = names[number // len(turns) % len(names)]
+        yield questions.generated(question, kind, name, np.random.default_rng([seed, number]), size)
         number += 1
 
 
-def compare(kind: str, queries: np.ndarray, accuracy: str, simd: Sequence[str], truth: Answers) -> Disagreement:
+def compare(batch: Batch, accuracy: str, simd: Sequence[str], truth: Answers) -> Disagreement:
     """Ask one tier on each instruction set; the first one's answers are compared with the truth.
 
     Raises AssertionError where an answer is not one at all: NaN, or a time outside [0,1].
     """
-    true_hit, true_toc = truth
-    (hit, toc), *others = (CORE[kind](queries, accuracy=accuracy, simd=s) for s in simd)
-    if not ((toc[hit] >= 0) & (toc[hit] <= 1)).all():
-        raise AssertionError(f"{accuracy} {kind}: time of contact outside [0,1]: {toc[hit][:5]}")
-    uneven = np.zeros(len(queries), bool)
-    for other_hit, other_toc in others:
-        uneven |= (other_hit != hit) | (hit & (other_toc != toc))
+    true_hit, true_value = truth
+    (hit, value), *others = (questions.answers(batch, accuracy, s) for s in simd)
+    largest = 1.0 if batch.question in (CONTACT, SEPARATION) else np.inf
+    if not ((value[hit] >= 0) & (value[hit] <= largest)).all():
+        raise AssertionError(f"{accuracy} {batch.question} {batch.kind}: value out of range: {value[hit][:5]}")
+    uneven = np.zeros(len(hit), bool)
+    for other_hit, other_value in others:
+        uneven |= (other_hit != hit) | (hit & (other_value != value))
     both = hit & true_hit
-    late = np.where(both, toc, np.nan) - np.where(both, true_toc, np.nan)
-    return Disagreement(missed=true_hit & ~hit, invented=hit & ~true_hit, late=late, uneven=uneven)
+    late = (np.where(both, value, np.nan) - np.where(both, true_value, np.nan)) / questions.size_of(batch)
+    return Disagreement(true_hit & ~hit, hit & ~true_hit, late, uneven, batch.question)
 
 
 def add_batch(
-    tallies: dict[tuple[str, str], Tally],
-    batch: Batch,
-    accuracies: Sequence[str],
-    *,
-    simd: Sequence[str] = ("auto",),
-    threads: int = 0,
+    tallies: Tallies, batch: Batch, accuracies: Sequence[str], *, simd: Sequence[str] = ("auto",), threads: int = 0
 ) -> None:
-    """Ask the oracle (on so many threads) and each tier, and add what comes out to tallies[accuracy, kind]."""
-    truth = ORACLE[batch.kind](batch.queries, threads)
+    """Ask the oracle (on so many threads) and each tier, and add what comes out to tallies."""
+    truth = questions.truth(batch, threads)
     for accuracy in accuracies:
-        difference = compare(batch.kind, batch.queries, accuracy, simd, truth)
-        tallies[accuracy, batch.kind].add(batch.queries, truth[0], difference, accuracy)
+        difference = compare(batch, accuracy, simd, truth)
+        tallies[batch.question, accuracy, batch.kind].add(batch, truth[0], difference, accuracy)
 
 
-def new_tallies() -> dict[tuple[str, str], Tally]:
+def new_tallies() -> Tallies:
     return defaultdict(Tally)
 
 

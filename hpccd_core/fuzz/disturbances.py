@@ -17,6 +17,35 @@ def disturb(rng: np.random.Generator, q: np.ndarray, kind: str) -> np.ndarray:
     return q
 
 
+def disturb_near(
+    rng: np.random.Generator, q: np.ndarray, distance: np.ndarray, kind: str
+) -> tuple[np.ndarray, np.ndarray]:
+    """The same for queries with distances (n,), which are scaled with them."""
+    q, distance = permute(rng, q, kind), distance.copy()
+    for change, share in ((uneven, 0.1), (rotate, 0.1), (offset, 0.2)):
+        chosen = rng.random(len(q)) < share
+        q[chosen] = change(rng, q[chosen])
+    chosen = rng.random(len(q)) < 0.4
+    factor = factors(rng, chosen.sum())
+    q[chosen] *= factor[:, None, None]
+    distance[chosen] *= factor
+    for change, share in ((single, 0.15), (one_ulp, 0.2)):
+        chosen = rng.random(len(q)) < share
+        q[chosen] = change(rng, q[chosen])
+    neighbour = rng.random(len(q)) < 0.1
+    distance[neighbour] = np.nextafter(distance[neighbour], rng.choice([-np.inf, np.inf], size=neighbour.sum()))
+    return q, np.maximum(distance, np.nextafter(0.0, 1.0))
+
+
+def disturb_still(rng: np.random.Generator, points: np.ndarray) -> np.ndarray:
+    """The same for points at rest (n,p,3), the order of which stays."""
+    points = points.copy()
+    for change, share in ((rotate, 0.1), (offset, 0.3), (scale, 0.4), (single, 0.15), (one_ulp, 0.3)):
+        chosen = rng.random(len(points)) < share
+        points[chosen] = change(rng, points[chosen])
+    return points
+
+
 def permute(rng: np.random.Generator, q: np.ndarray, kind: str) -> np.ndarray:
     """Another order of the triangle's corners, or of the edges and their ends; the answer stays."""
     n = len(q)
@@ -54,12 +83,16 @@ def offset(rng: np.random.Generator, q: np.ndarray) -> np.ndarray:
 
 
 def scale(rng: np.random.Generator, q: np.ndarray) -> np.ndarray:
-    """Scales 1e-30 to 1e30, by a power of two (exact) or of ten (rounded); a few down to denormal numbers."""
-    exponent = rng.uniform(-30, 30, size=(len(q), 1, 1))
+    """Scales of `factors`, each query its own."""
+    return q * factors(rng, len(q))[:, None, None]
+
+
+def factors(rng: np.random.Generator, n: int) -> np.ndarray:
+    """1e-30 to 1e30, a power of two (exact) or of ten (rounded); a few lead down to denormal numbers."""
+    exponent = rng.uniform(-30, 30, size=n)
     exact = np.exp2(np.round(exponent * np.log2(10)))
-    factor = np.where(rng.random((len(q), 1, 1)) < 0.6, exact, 10.0**exponent)
-    denormal = rng.random((len(q), 1, 1)) < 0.05
-    return np.where(denormal, q * np.exp2(-1070.0), q * factor)
+    factor = np.where(rng.random(n) < 0.6, exact, 10.0**exponent)
+    return np.where(rng.random(n) < 0.05, np.exp2(-1070.0), factor)
 
 
 def single(rng: np.random.Generator, q: np.ndarray) -> np.ndarray:
@@ -74,7 +107,7 @@ def one_ulp(rng: np.random.Generator, q: np.ndarray) -> np.ndarray:
     q = q.copy()
     rows = np.arange(len(q))
     for _ in range(3):
-        point, axis = rng.integers(0, 8, size=len(q)), rng.integers(0, 3, size=len(q))
+        point, axis = rng.integers(0, q.shape[1], size=len(q)), rng.integers(0, 3, size=len(q))
         towards = np.where(rng.random(len(q)) < 0.5, -np.inf, np.inf)
         moved = np.nextafter(q[rows, point, axis], towards)
         # Stepping away from 0 gives the smallest denormal number; now and then is enough, in each case it is exact.

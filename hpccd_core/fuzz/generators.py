@@ -59,9 +59,14 @@ def on_line(rng: np.random.Generator, n: int) -> np.ndarray:
 def meeting_vertex_face(rng: np.random.Generator, n: int) -> np.ndarray:
     """A vertex that is in the triangle, on its border or just beside it at a rational time, 0 and 1 among them."""
     corners = 4 * rng.integers(-2, 3, size=(n, 3, 3))
-    weights = rng.choice(_QUARTERS, size=n)
-    vertex = (weights[:, :, None] * corners).sum(axis=1) // 4
+    vertex = barycentric_quarters(rng, corners)
     return _moving_through(rng, np.concatenate([vertex[:, None], corners], axis=1))
+
+
+def barycentric_quarters(rng: np.random.Generator, corners: np.ndarray) -> np.ndarray:
+    """A point of each triangle (n,3,3) of multiples of four, on its border or just beside it."""
+    weights = rng.choice(_QUARTERS, size=len(corners))
+    return (weights[:, :, None] * corners).sum(axis=1) // 4
 
 
 def meeting_edge_edge(rng: np.random.Generator, n: int) -> np.ndarray:
@@ -169,8 +174,7 @@ def near_multiple_root(rng: np.random.Generator, n: int) -> np.ndarray:
 
 
 BOTH: dict[str, Generator] = {
-    g.__name__: g
-    for g in (lattice, still, in_plane, on_line, parallel_at_root, thin, generic, near_multiple_root)
+    g.__name__: g for g in (lattice, still, in_plane, on_line, parallel_at_root, thin, generic, near_multiple_root)
 }
 GENERATORS: dict[str, dict[str, Generator]] = {
     VERTEX_FACE: BOTH | {"meeting": meeting_vertex_face, "chosen_roots": chosen_roots, "grazing": grazing},
@@ -179,9 +183,7 @@ GENERATORS: dict[str, dict[str, Generator]] = {
 }
 
 # Barycentric coordinates in quarters: corners, points of edges, inside, and one quarter outside.
-_QUARTERS = np.array(
-    [(a, b, 4 - a - b) for a in range(-1, 6) for b in range(-1, 6) if -1 <= 4 - a - b <= 5]
-)
+_QUARTERS = np.array([(a, b, 4 - a - b) for a in range(-1, 6) for b in range(-1, 6) if -1 <= 4 - a - b <= 5])
 
 
 def _shuffle_axes(rng: np.random.Generator, q: np.ndarray) -> np.ndarray:

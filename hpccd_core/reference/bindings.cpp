@@ -1,15 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
-// Python module _reference: conversion only. Arguments are checked in __init__.py, which calls it.
+// Python module _reference: conversion only. Arguments are checked in the Python files, which call it.
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 
 #include <cstring>
 #include <limits>
+#include <sstream>
+#include <string>
 
 #include "brute_force.h"
+#include "distance.h"
 #include "elementary.h"
+#include "intersection.h"
 #include "parallel.h"
+#include "separation.h"
 
 namespace py = pybind11;
 namespace reference = hpccd::reference;
@@ -34,48 +39,130 @@ auto columns(const std::vector<Row>& rows) {
   return array;
 }
 
-template <class Test>
-py::tuple run(const Array<double>& queries, unsigned threads, Test test) {
-  const auto list = rows<reference::Query>(queries);
-  py::array_t<bool> hit(static_cast<py::ssize_t>(list.size()));
-  py::array_t<double> toc(static_cast<py::ssize_t>(list.size()));
-  bool* hits = hit.mutable_data();
-  double* tocs = toc.mutable_data();
-  {
-    py::gil_scoped_release release;
-    reference::parallel_for(list.size(), threads, [&](std::size_t i) {
-      const auto time = test(list[i]);
-      hits[i] = time.has_value();
-      tocs[i] = time.value_or(std::numeric_limits<double>::infinity());
-    });
-  }
-  return py::make_tuple(hit, toc);
+template <class T>
+py::array_t<T> column(const std::vector<T>& values) {
+  return py::array_t<T>(static_cast<py::ssize_t>(values.size()), values.data());
 }
 
-py::dict brute_force(const Array<double>& vertices_t0, const Array<double>& vertices_t1,
-                     const Array<std::uint32_t>& faces, const std::vector<std::uint32_t>& mesh_of_vertex,
-                     const std::vector<std::vector<std::uint8_t>>& tested, unsigned threads) {
-  const reference::Scene scene{rows<reference::Point>(vertices_t0), rows<reference::Point>(vertices_t1),
-                               rows<reference::Face>(faces), mesh_of_vertex, tested};
-  reference::Contacts contacts;
+// of(i) for each i < count, on so many threads.
+template <class T, class Of>
+py::array_t<T> computed(std::size_t count, unsigned threads, const Of& of) {
+  py::array_t<T> array(static_cast<py::ssize_t>(count));
+  T* values = array.mutable_data();
   {
     py::gil_scoped_release release;
-    contacts = reference::brute_force(scene, threads);
+    reference::parallel_for(count, threads, [&](std::size_t i) { values[i] = of(i); });
   }
-  py::dict result;
-  result["vf"] = columns(contacts.vf);
-  result["vf_toc"] = py::array_t<double>(static_cast<py::ssize_t>(contacts.vf_toc.size()), contacts.vf_toc.data());
-  result["ee"] = columns(contacts.ee);
-  result["ee_toc"] = py::array_t<double>(static_cast<py::ssize_t>(contacts.ee_toc.size()), contacts.ee_toc.data());
-  return result;
+  return array;
+}
+
+// Times of queries (Q,8,3); +inf for none.
+template <class Test>
+auto times(Test test) {
+  return [test](const Array<double>& queries, unsigned threads) {
+    const auto list = rows<reference::Query>(queries);
+    return computed<double>(list.size(), threads, [&](std::size_t i) {
+      return test(list[i]).value_or(std::numeric_limits<double>::infinity());
+    });
+  };
+}
+
+template <class Test>
+auto times_within(Test test) {
+  return [test](const Array<double>& queries, const Array<double>& distances, unsigned threads) {
+    const auto list = rows<reference::Query>(queries);
+    const auto d = rows<double>(distances);
+    return computed<double>(list.size(), threads, [&](std::size_t i) {
+      return test(list[i], d[i]).value_or(std::numeric_limits<double>::infinity());
+    });
+  };
+}
+
+// Answers about points (Q,4,3) or (Q,5,3) at rest.
+template <class T, class Points, class Of>
+auto at_rest(Of of) {
+  return [of](const Array<double>& points, unsigned threads) {
+    const auto list = rows<Points>(points);
+    return computed<T>(list.size(), threads, [&](std::size_t i) { return of(list[i]); });
+  };
+}
+
+template <class Of>
+auto within(Of of) {
+  return [of](const Array<double>& points, const Array<double>& distances, unsigned threads) {
+    const auto list = rows<reference::Points>(points);
+    const auto d = rows<double>(distances);
+    return computed<bool>(list.size(), threads, [&](std::size_t i) { return of(list[i], d[i]); });
+  };
+}
+
+// Numerator and denominator in hexadecimal, and the exponent of 4: for one set of points.
+template <class Of>
+auto squared(Of of) {
+  return [of](const Array<double>& points) {
+    const auto text = [](const reference::Integer& n) {
+      std::ostringstream out;
+      out << std::hex << n;
+      return out.str();
+    };
+    const reference::SquaredDistance square = of(rows<reference::Points>(points).at(0));
+    return py::make_tuple(text(square.numerator), text(square.denominator), square.exponent);
+  };
+}
+
+using Tested = std::vector<std::vector<std::uint8_t>>;
+
+reference::Meshes meshes_of(const Array<std::uint32_t>& faces, const std::vector<std::uint32_t>& mesh_of_vertex,
+                            const Tested& tested) {
+  return {rows<reference::Face>(faces), mesh_of_vertex, tested};
+}
+
+template <class Of>
+auto without_gil(Of of) {
+  py::gil_scoped_release release;
+  return of();
+}
+
+py::tuple arrays(const reference::Pairs& pairs) {
+  return py::make_tuple(columns(pairs.vf), column(pairs.vf_value), columns(pairs.ee), column(pairs.ee_value));
 }
 
 }  // namespace
 
 PYBIND11_MODULE(_reference, m) {
-  m.def("vertex_face",
-        [](const Array<double>& queries, unsigned threads) { return run(queries, threads, reference::vertex_face); });
-  m.def("edge_edge",
-        [](const Array<double>& queries, unsigned threads) { return run(queries, threads, reference::edge_edge); });
-  m.def("brute_force", &brute_force);
+  using reference::Meshes, reference::Point, reference::Points;
+  m.def("vertex_face", times(reference::vertex_face));
+  m.def("edge_edge", times(reference::edge_edge));
+  m.def("separation_vertex_face", times_within(reference::separation_vertex_face));
+  m.def("separation_edge_edge", times_within(reference::separation_edge_edge));
+  m.def("distance_vertex_face", at_rest<double, Points>(reference::distance_vertex_face));
+  m.def("distance_edge_edge", at_rest<double, Points>(reference::distance_edge_edge));
+  m.def("within_vertex_face", within(reference::within_vertex_face));
+  m.def("within_edge_edge", within(reference::within_edge_edge));
+  m.def("squared_distance_vertex_face", squared(reference::squared_distance_vertex_face));
+  m.def("squared_distance_edge_edge", squared(reference::squared_distance_edge_edge));
+  m.def("edge_face_intersect", at_rest<bool, std::array<Point, 5>>(reference::edge_face_intersect));
+
+  py::class_<Meshes>(m, "Meshes").def(py::init(&meshes_of));
+  m.def("contacts", [](const Meshes& meshes, const Array<double>& t0, const Array<double>& t1,
+                       const reference::Separations& separations, unsigned threads) {
+    const auto first = rows<Point>(t0), second = rows<Point>(t1);
+    return arrays(without_gil([&] { return reference::contacts(meshes, first, second, separations, threads); }));
+  });
+  m.def("proximity", [](const Meshes& meshes, const Array<double>& vertices, double distance, unsigned threads) {
+    const auto positions = rows<Point>(vertices);
+    return arrays(without_gil([&] { return reference::proximity(meshes, positions, distance, threads); }));
+  });
+  m.def("intersections", [](const Meshes& meshes, const Array<double>& vertices, unsigned threads) {
+    const auto positions = rows<Point>(vertices);
+    return columns(without_gil([&] { return reference::intersections(meshes, positions, threads); }));
+  });
+  m.def("smallest_distances", [](const Meshes& meshes, const Array<double>& vertices, unsigned threads) {
+    const auto positions = rows<Point>(vertices);
+    py::list list;
+    for (const reference::Gap& gap :
+         without_gil([&] { return reference::smallest_distances(meshes, positions, threads); }))
+      list.append(py::make_tuple(gap.mesh_a, gap.mesh_b, gap.distance, gap.intersect));
+    return list;
+  });
 }

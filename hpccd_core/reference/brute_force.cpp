@@ -3,119 +3,135 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <limits>
+#include <map>
 
+#include "distance.h"
 #include "elementary.h"
-#include "parallel.h"
+#include "intersection.h"
+#include "separation.h"
 
 namespace hpccd::reference {
 namespace {
 
-// Box of a feature's vertices at both ends of the step. A vertex on a straight line stays in the box of its
-// two ends and a feature in the box of its vertices; minima and maxima do not round: disjoint boxes prove
-// that nothing touches.
-struct Box {
-  Point low, high;
-};
-
-template <class Vertices>
-Box swept_box(const Scene& scene, const Vertices& vertices) {
-  Box box{scene.vertices_t0[vertices[0]], scene.vertices_t0[vertices[0]]};
-  for (const std::uint32_t v : vertices)
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      const auto [low, high] = std::minmax(scene.vertices_t0[v][axis], scene.vertices_t1[v][axis]);
-      box.low[axis] = std::min(box.low[axis], low);
-      box.high[axis] = std::max(box.high[axis], high);
-    }
-  return box;
-}
-
-bool disjoint(const Box& a, const Box& b) {
-  for (std::size_t axis = 0; axis < 3; ++axis)
-    if (a.high[axis] < b.low[axis] || b.high[axis] < a.low[axis]) return true;
-  return false;
-}
-
-template <class A, class B>
-bool share_a_vertex(const A& a, const B& b) {
-  return std::any_of(a.begin(), a.end(), [&](auto v) { return std::find(b.begin(), b.end(), v) != b.end(); });
-}
-
-template <class A, class B>
-Query query_of(const Scene& scene, const A& a, const B& b) {
+// The points of a pair's vertices, once for each set of positions.
+template <class Query, class A, class B>
+Query points_of(const A& a, const B& b, std::initializer_list<const std::vector<Point>*> positions) {
   Query query;
   std::size_t row = 0;
-  for (const auto* vertices : {&scene.vertices_t0, &scene.vertices_t1}) {
+  for (const auto* vertices : positions) {
     for (const auto v : a) query[row++] = (*vertices)[v];
     for (const auto v : b) query[row++] = (*vertices)[v];
   }
   return query;
 }
 
-std::vector<Edge> edges_of(const std::vector<Face>& faces) {
-  std::vector<Edge> edges;
-  for (const Face& f : faces)
-    for (const Edge e : {Edge{f[0], f[1]}, Edge{f[1], f[2]}, Edge{f[2], f[0]}})
-      if (e[0] != e[1]) edges.push_back({std::min(e[0], e[1]), std::max(e[0], e[1])});
-  std::sort(edges.begin(), edges.end());
-  edges.erase(std::unique(edges.begin(), edges.end()), edges.end());
-  return edges;
+Pairs named(const std::vector<Edge>& edges, const std::vector<Found>& vf, const std::vector<Found>& ee) {
+  Pairs pairs;
+  for (const Found& found : vf) {
+    pairs.vf.push_back({static_cast<std::uint32_t>(found.first), static_cast<std::uint32_t>(found.second)});
+    pairs.vf_value.push_back(found.value);
+  }
+  for (const Found& found : ee) {
+    const Edge &a = edges[found.first], &b = edges[found.second];
+    pairs.ee.push_back({a[0], a[1], b[0], b[1]});
+    pairs.ee_value.push_back(found.value);
+  }
+  return pairs;
 }
 
-template <class Feature>
-std::vector<Box> boxes_of(const Scene& scene, const std::vector<Feature>& features) {
-  std::vector<Box> boxes;
-  for (const Feature& feature : features) boxes.push_back(swept_box(scene, feature));
-  return boxes;
+template <class A, class B>
+std::vector<Found> intersecting(const Meshes& meshes, const Features<A>& edges, const Features<B>& faces,
+                                const std::vector<Point>& vertices, unsigned threads) {
+  const auto touching = [](auto, auto) { return 0.0; };
+  return all_pairs(meshes, edges, faces, touching, threads, [&](const A& a, const B& b) -> std::optional<double> {
+    if (!edge_face_intersect(points_of<std::array<Point, 5>>(a, b, {&vertices}))) return {};
+    return 0.0;
+  });
 }
-
-struct Hit {
-  std::size_t partner;
-  double toc;
-};
 
 }  // namespace
 
-Contacts brute_force(const Scene& scene, unsigned threads) {
-  const auto asked_for = [&](std::uint32_t v, std::uint32_t w) {
-    return scene.tested[scene.mesh_of_vertex[v]][scene.mesh_of_vertex[w]] != 0;
+Pairs contacts(const Meshes& meshes, const std::vector<Point>& t0, const std::vector<Point>& t1,
+               const Separations& separations, unsigned threads) {
+  const auto reach = [&](std::uint32_t a, std::uint32_t b) { return separations[a][b]; };
+  const auto vertices = with_boxes(vertices_of(meshes), t0, t1);
+  const auto edges = with_boxes(edges_of(meshes), t0, t1);
+  const auto faces = with_boxes(meshes.faces, t0, t1);
+  const auto time = [&](const auto& a, const auto& b, auto plain, auto separated) {
+    const auto query = points_of<Query>(a, b, {&t0, &t1});
+    const double d = separations[meshes.mesh_of(a[0])][meshes.mesh_of(b[0])];
+    return d == 0 ? plain(query) : separated(query, d);
   };
-  Contacts contacts;
-
-  const std::vector<Box> face_boxes = boxes_of(scene, scene.faces);
-  std::vector<std::vector<Hit>> faces_hit(scene.vertices_t0.size());
-  parallel_for(faces_hit.size(), threads, [&](std::size_t i) {
-    const std::array<std::uint32_t, 1> vertex{static_cast<std::uint32_t>(i)};
-    const Box box = swept_box(scene, vertex);
-    for (std::size_t f = 0; f < scene.faces.size(); ++f) {
-      const Face& face = scene.faces[f];
-      if (disjoint(box, face_boxes[f]) || share_a_vertex(vertex, face) || !asked_for(vertex[0], face[0])) continue;
-      if (const auto toc = vertex_face(query_of(scene, vertex, face))) faces_hit[i].push_back({f, *toc});
-    }
+  const auto vf = all_pairs(meshes, vertices, faces, reach, threads, [&](const Vertex& v, const Face& f) {
+    return time(v, f, vertex_face, separation_vertex_face);
   });
-  for (std::size_t i = 0; i < faces_hit.size(); ++i)
-    for (const Hit& hit : faces_hit[i]) {
-      contacts.vf.push_back({static_cast<std::uint32_t>(i), static_cast<std::uint32_t>(hit.partner)});
-      contacts.vf_toc.push_back(hit.toc);
-    }
+  const auto ee = all_pairs(meshes, edges, edges, reach, threads,
+                            [&](const Edge& a, const Edge& b) { return time(a, b, edge_edge, separation_edge_edge); });
+  return named(edges.list, vf, ee);
+}
 
-  const std::vector<Edge> edges = edges_of(scene.faces);
-  const std::vector<Box> edge_boxes = boxes_of(scene, edges);
-  std::vector<std::vector<Hit>> edges_hit(edges.size());
-  parallel_for(edges.size(), threads, [&](std::size_t a) {
-    for (std::size_t b = a + 1; b < edges.size(); ++b) {
-      if (disjoint(edge_boxes[a], edge_boxes[b]) || share_a_vertex(edges[a], edges[b]) ||
-          !asked_for(edges[a][0], edges[b][0]))
-        continue;
-      if (const auto toc = edge_edge(query_of(scene, edges[a], edges[b]))) edges_hit[a].push_back({b, *toc});
-    }
+Pairs proximity(const Meshes& meshes, const std::vector<Point>& positions, double distance, unsigned threads) {
+  const auto reach = [&](std::uint32_t, std::uint32_t) { return distance; };
+  const auto vertices = with_boxes(vertices_of(meshes), positions, positions);
+  const auto edges = with_boxes(edges_of(meshes), positions, positions);
+  const auto faces = with_boxes(meshes.faces, positions, positions);
+  const auto near = [&](const auto& a, const auto& b, auto within, auto exactly) -> std::optional<double> {
+    const auto points = points_of<Points>(a, b, {&positions});
+    if (!within(points, distance)) return {};
+    return exactly(points);
+  };
+  const auto vf = all_pairs(meshes, vertices, faces, reach, threads, [&](const Vertex& v, const Face& f) {
+    return near(v, f, within_vertex_face, distance_vertex_face);
   });
-  for (std::size_t a = 0; a < edges.size(); ++a)
-    for (const Hit& hit : edges_hit[a]) {
-      const Edge &e = edges[a], &f = edges[hit.partner];
-      contacts.ee.push_back({e[0], e[1], f[0], f[1]});
-      contacts.ee_toc.push_back(hit.toc);
-    }
-  return contacts;
+  const auto ee = all_pairs(meshes, edges, edges, reach, threads, [&](const Edge& a, const Edge& b) {
+    return near(a, b, within_edge_edge, distance_edge_edge);
+  });
+  return named(edges.list, vf, ee);
+}
+
+std::vector<std::array<std::uint32_t, 3>> intersections(const Meshes& meshes, const std::vector<Point>& positions,
+                                                        unsigned threads) {
+  const auto edges = with_boxes(edges_of(meshes), positions, positions);
+  const auto faces = with_boxes(meshes.faces, positions, positions);
+  std::vector<std::array<std::uint32_t, 3>> rows;
+  for (const Found& found : intersecting(meshes, edges, faces, positions, threads)) {
+    const Edge& e = edges.list[found.first];
+    rows.push_back({e[0], e[1], static_cast<std::uint32_t>(found.second)});
+  }
+  return rows;
+}
+
+std::vector<Gap> smallest_distances(const Meshes& meshes, const std::vector<Point>& positions, unsigned threads) {
+  constexpr double infinity = std::numeric_limits<double>::infinity();
+  std::vector<Gap> gaps;
+  std::map<std::array<std::uint32_t, 2>, std::size_t> place;
+  for (std::uint32_t a = 0; a < meshes.tested.size(); ++a)
+    for (std::uint32_t b = a; b < meshes.tested.size(); ++b)
+      if (meshes.tested[a][b]) {
+        place[{a, b}] = gaps.size();
+        gaps.push_back({a, b, infinity, false});
+      }
+  const auto gap_of = [&](std::uint32_t v, std::uint32_t w) -> Gap& {
+    const auto [a, b] = std::minmax({meshes.mesh_of(v), meshes.mesh_of(w)});
+    return gaps[place.at({a, b})];
+  };
+  // Rounding keeps the order: the smallest of the rounded distances is the smallest distance, rounded.
+  const Pairs all = proximity(meshes, positions, std::numeric_limits<double>::max(), threads);
+  for (std::size_t i = 0; i < all.vf.size(); ++i) {
+    Gap& gap = gap_of(all.vf[i][0], meshes.faces[all.vf[i][1]][0]);
+    gap.distance = std::min(gap.distance, all.vf_value[i]);
+  }
+  for (std::size_t i = 0; i < all.ee.size(); ++i) {
+    Gap& gap = gap_of(all.ee[i][0], all.ee[i][2]);
+    gap.distance = std::min(gap.distance, all.ee_value[i]);
+  }
+  for (const auto& [v0, v1, face] : intersections(meshes, positions, threads)) {
+    Gap& gap = gap_of(v0, meshes.faces[face][0]);
+    gap.distance = 0;
+    gap.intersect = true;
+  }
+  return gaps;
 }
 
 }  // namespace hpccd::reference

@@ -12,4 +12,11 @@ namespace hpccd::reference {
 // that makes them integers, which changes neither contacts nor times.
 std::array<Vector, 4> motion(const Query& query);
 
+// The same with a distance, multiplied by the same power.
+struct MotionAndDistance {
+  std::array<Vector, 4> points;
+  Integer distance;
+};
+MotionAndDistance motion_and_distance(const Query& query, double distance);
+
 }  // namespace hpccd::reference

@@ -2,18 +2,14 @@
 // Polynomials in one variable with integer coefficients of any size.
 #pragma once
 
-#include <array>
-#include <boost/multiprecision/cpp_int.hpp>
 #include <cstddef>
 #include <utility>
 #include <vector>
 
-namespace hpccd::reference {
+#include "integers.h"
+#include "vec.h"
 
-// 512 bits kept inside the object: the coefficients of common queries then need no heap memory. Larger ones
-// grow.
-using Integer =
-    boost::multiprecision::number<boost::multiprecision::cpp_int_backend<512, 0>, boost::multiprecision::et_off>;
+namespace hpccd::reference {
 
 // Coefficients from the constant term upwards, without leading zeros; the zero polynomial has none.
 class Polynomial {
@@ -101,16 +97,6 @@ inline Polynomial square_free_part(const Polynomial& p) {
   return primitive_part(pseudo_divide(p, common_divisor(p, derivative(p))).quotient);
 }
 
-using Vector = std::array<Polynomial, 3>;
-
-inline Vector operator+(const Vector& a, const Vector& b) { return {a[0] + b[0], a[1] + b[1], a[2] + b[2]}; }
-
-inline Vector operator-(const Vector& a, const Vector& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
-
-inline Polynomial dot(const Vector& a, const Vector& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-
-inline Vector cross(const Vector& a, const Vector& b) {
-  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
+using Vector = Vec<Polynomial>;
 
 }  // namespace hpccd::reference

@@ -147,7 +147,7 @@ def _dot(u, v):
     return sum(x * y for x, y in zip(u, v, strict=True))
 
 
-def _squared_distance_to_segment(x, start, end):
+def squared_distance_to_segment(x, start, end):
     along, there = [e - s for s, e in zip(start, end, strict=True)], [c - s for s, c in zip(start, x, strict=True)]
     length = _dot(along, along)
     place = min(max(_dot(there, along) / length, 0), 1) if length else 0
@@ -155,8 +155,8 @@ def _squared_distance_to_segment(x, start, end):
     return _dot(rest, rest)
 
 
-def _squared_distance_to_triangle(x, corners):
-    border = min(_squared_distance_to_segment(x, corners[i - 1], corners[i]) for i in range(3))
+def squared_distance_to_triangle(x, corners):
+    border = min(squared_distance_to_segment(x, corners[i - 1], corners[i]) for i in range(3))
     p, a, b = ([c - o for o, c in zip(corners[0], y, strict=True)] for y in (x, corners[1], corners[2]))
     aa, ab, bb, pa, pb = _dot(a, a), _dot(a, b), _dot(b, b), _dot(p, a), _dot(p, b)
     area = aa * bb - ab * ab
@@ -181,9 +181,9 @@ def excess(kind, query, toc, point):
     motion = max(abs(c - d) for i in range(4) for c, d in zip(q[i], q[i + 4], strict=True))
     allowed = Fraction(2) ** -50 * coordinates + Fraction(2, 10**12) * motion + Fraction(2) ** -1070
     if kind == VERTEX_FACE:
-        features = [([now[0]], _squared_distance_to_segment(x, now[0], now[0]))]
-        features.append((now[1:], _squared_distance_to_triangle(x, now[1:])))
+        features = [([now[0]], squared_distance_to_segment(x, now[0], now[0]))]
+        features.append((now[1:], squared_distance_to_triangle(x, now[1:])))
     else:
-        features = [(ends, _squared_distance_to_segment(x, *ends)) for ends in (now[:2], now[2:])]
+        features = [(ends, squared_distance_to_segment(x, *ends)) for ends in (now[:2], now[2:])]
     squares = [d / (allowed + _moving_size(corners) / 10**9) ** 2 for corners, d in features]
     return float(max(squares)) ** 0.5

@@ -12,7 +12,10 @@ import pytest
 import single_pairs
 from single_pairs import KINDS, TEST
 
-from hpccd_core.fuzz.differential import ORACLE
+from hpccd_core import reference
+from hpccd_core.fuzz.generators import EDGE_EDGE, VERTEX_FACE
+
+ORACLE = {VERTEX_FACE: reference.vertex_face, EDGE_EDGE: reference.edge_edge}
 
 # They take half a millisecond; before they were hunted down, 30 to 200. Processor time, so that a busy machine does not
 # count, and ten times what is promised, so that a slow one does not.

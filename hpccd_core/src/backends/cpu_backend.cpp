@@ -29,6 +29,7 @@ void CpuBackend::update(Positions t0, Positions t1, Tests tests) {
   shared_.tree.bound(t0, t1, shared_.separations.largest());
   begin_query();
   search_.geometry.separations = shared_.separations_now();
+  search_.geometry.margin = {shared_.separations.most(), shared_.tree.motion().map.scale};
   search_.leaf_pairs = leaf_pairs(o.simd);
   const bool here = tests == Tests::all_here;
   search_.report = !here && o.report == Report::any ? Report::all : o.report;
@@ -54,7 +55,7 @@ void CpuBackend::begin_query() {
   search_.geometry = {motion.vertices.data(), shared_.features.edges.data(), shared_.features.faces.data(),
                       motion.kdops.data(), motion.map.scale};
   search_.earliest = std::numeric_limits<double>::infinity();
-  search_.leaf_pairs = nullptr, search_.leaf_pairs_at_start = nullptr, search_.leaf_edge_faces = nullptr;
+  search_.leaf_pairs = nullptr, search_.leaf_pairs_in_snapshot = nullptr, search_.leaf_edge_faces = nullptr;
   search_.nearest = nullptr;
 }
 

@@ -12,7 +12,7 @@ std::optional<Contacts> CpuBackend::proximity(Positions vertices, double distanc
   const Options& o = shared_.options;
   see_snapshot(vertices);
   search_.geometry.separations = {distance};
-  search_.leaf_pairs_at_start = leaf_pairs_at_start(o.simd);
+  search_.leaf_pairs_in_snapshot = leaf_pairs_in_snapshot(o.simd);
   search_.reach = reach_of(distance, shared_.tree.motion().map.scale);
   walk_tree();
   return collect({false, false, o.closest, AtTime::start});
@@ -34,7 +34,7 @@ std::optional<std::vector<Gap>> CpuBackend::distances(Positions vertices) {
   see_snapshot(vertices);
   NearestPairs nearest(*shared_.scene, shared_.tree.motion());
   search_.nearest = &nearest;
-  search_.leaf_pairs_at_start = leaf_pairs_at_start(o.simd);
+  search_.leaf_pairs_in_snapshot = leaf_pairs_in_snapshot(o.simd);
   search_.leaf_edge_faces = leaf_edge_faces(o.simd);
   walk_tree();
   std::vector<Gap> gaps = collect_gaps(*shared_.scene, shared_.rules, nearest, search_.geometry);

@@ -15,6 +15,19 @@ struct alignas(64) VertexKdop {
   float t0[n_kdop_directions], t1[n_kdop_directions];
 };
 
+// By how much k-DOPs of features may lie apart in each direction that come within a separation of each other.
+struct alignas(64) KdopMargin {
+  float in[2 * n_kdop_directions] = {};
+
+  KdopMargin() = default;
+  // In the map's scale. Rounding: values lie below eight, so two of them and their difference are off by 7.2e-7.
+  KdopMargin(double separation, double scale) {
+    constexpr double length[n_kdop_directions] = {1.4143, 1.4143, 1.4143, 1.4143, 1.4143, 1.4143, 2.2361, 2.2361};
+    for (int k = 0; k < 2 * n_kdop_directions; ++k)
+      in[k] = static_cast<float>(separation * length[k % n_kdop_directions] * scale * (1 + 1e-6) + 1e-6);
+  }
+};
+
 // x along direction k; after those of the k-DOP come the axes. One sum of two terms, one of them perhaps doubled:
 // rounded once, which never reverses an order, so no margin is needed. (Sums of three terms would need one. Of all that
 // a cache line has room for besides the six diagonals, the last two left the fewest pairs on the published scenes.)
@@ -44,6 +57,16 @@ HPCCD_HD double along(int k, const Vec3<double>& x) {
       return x.z;
   }
 }
+
+// Where a vertex of one snapshot is along the first directions of the k-DOPs that no axis is near to.
+struct SlantedCoordinates {
+  float along[3];
+  HPCCD_HD SlantedCoordinates(const Vec3<double>& x, const CoordinateMap& map) {
+    const Vec3<double> center{map.center[0], map.center[1], map.center[2]};
+    for (int k = 0; k < 3; ++k)
+      along[k] = static_cast<float>((hpccd::along(2 * k, x) - hpccd::along(2 * k, center)) * map.scale);
+  }
+};
 
 // Neither does the map to float reverse an order (coordinate_map.h).
 HPCCD_HD VertexKdop vertex_kdop(const Vec3<double>& t0, const Vec3<double>& t1, const CoordinateMap& map) {

@@ -68,6 +68,22 @@ void copy_motion(const Real* t0, const Real* t1, const CoordinateMap& map, doubl
   }
 }
 
+// Of one snapshot. In place of a second end, bounds along three directions more: slanted features leave far less room.
+template <class Real>
+void copy_snapshot(const Real* x, const CoordinateMap& map, std::size_t begin, std::size_t end, VertexMotion* vertices,
+                   MotionBox* boxes) {
+  for (std::size_t i = begin; i < end; ++i) {
+    const Vec3<double> v{x[3 * i], x[3 * i + 1], x[3 * i + 2]};
+    const double at[3] = {v.x, v.y, v.z};
+    const SlantedCoordinates slanted(v, map);
+    for (int k = 0; k < 3; ++k) {
+      vertices[i].t0[k] = vertices[i].t1[k] = at[k];
+      boxes[i].t0.low[k] = boxes[i].t0.high[k] = map(at[k], k);
+      boxes[i].t1.low[k] = boxes[i].t1.high[k] = slanted.along[k];
+    }
+  }
+}
+
 // By how much the boxes of a mesh grow: half the separation, and what rounding x - margin and x + margin can lose. More
 // than the scene is large would not bring more pairs, but boxes without an area.
 double margin_for(double separation, const Extent& scene) {
@@ -115,7 +131,7 @@ void MotionBounds::update(const Real* t0, const Real* t1, std::size_t n, std::sp
   parallel_for(pool, pieces.size(), 1, [&](std::size_t from, std::size_t to, int) {
     for (std::size_t i = from; i < to; ++i) {
       extents[i] = extent_of(t0, pieces[i].begin, pieces[i].end, largest_);
-      extents[i].include(extent_of(t1, pieces[i].begin, pieces[i].end, largest_));
+      if (!snapshot_) extents[i].include(extent_of(t1, pieces[i].begin, pieces[i].end, largest_));
     }
   });
   extents_.resize(parts_.size());
@@ -134,17 +150,21 @@ void MotionBounds::update(const Real* t0, const Real* t1, std::size_t n, std::sp
   std::vector<double> margins(parts_.size(), 0);
   if (!separations.empty() && n > 0)
     for (std::size_t p = 0; p < parts_.size(); ++p) margins[p] = margin_for(separations[p], whole);
-  if (!resting.empty() && (!(map == old_map) || margins != margins_)) {
+  if (!resting.empty() && (!(map == old_map) || margins != margins_ || snapshot_ != was_snapshot_)) {
     resting.clear();
     pieces = pieces_of(parts_, moves);
   }
   margins_ = std::move(margins);
+  was_snapshot_ = snapshot_;
   resize(vertices, n, pool.cancellation());
   resize(boxes, n, pool.cancellation());
   resize(kdops, n, pool.cancellation());
   parallel_for(pool, pieces.size(), 1, [&](std::size_t from, std::size_t to, int) {
     for (std::size_t i = from; i < to; ++i)
-      copy_motion(t0, t1, map, margins_[pieces[i].part], pieces[i].begin, pieces[i].end, vertices.data(), boxes.data(), kdops.data());
+      if (snapshot_)
+        copy_snapshot(t0, map, pieces[i].begin, pieces[i].end, vertices.data(), boxes.data());
+      else
+        copy_motion(t0, t1, map, margins_[pieces[i].part], pieces[i].begin, pieces[i].end, vertices.data(), boxes.data(), kdops.data());
   });
 }
 
@@ -168,18 +188,19 @@ void MotionBounds::update(const Scene& scene, Positions t0, Positions t1, std::s
                           ThreadPool& pool) {
   divide(scene);
   resting = statics_.unchanged(scene, t0, t1, pool);
-  largest_ = largest_coordinate;
+  largest_ = largest_coordinate, snapshot_ = false;
   update_all(t0, t1, separations, pool);
 }
 
 void MotionBounds::update(const Scene& scene, Positions vertices, ThreadPool& pool) {
   divide(scene);
   resting = statics_.unchanged(scene, vertices, vertices, pool);
-  largest_ = largest_in_snapshot;
+  largest_ = largest_in_snapshot, snapshot_ = true;
   update_all(vertices, vertices, {}, pool);
 }
 
 void MotionBounds::update(Positions t0, Positions t1, ThreadPool& pool) {
+  largest_ = largest_coordinate, snapshot_ = false;
   parts_ = {{0, t0.n}};
   resting.clear();
   update_all(t0, t1, {}, pool);

@@ -42,7 +42,8 @@ struct MotionBounds {
   // Throws InvalidArgument where a coordinate is not finite or too large, or where a static mesh moves.
   void update(const Scene& scene, Positions vertices_t0, Positions vertices_t1, std::span<const double> separations,
               ThreadPool& pool);
-  // Of one snapshot: a motion that goes nowhere.
+  // Of one snapshot: a motion that goes nowhere, whose boxes have bounds along other directions in place of the second
+  // end (SlantedCoordinates); without k-DOPs.
   void update(const Scene& scene, Positions vertices, ThreadPool& pool);
   // The same for vertices of no scene, without separations.
   void update(Positions vertices_t0, Positions vertices_t1, ThreadPool& pool);
@@ -60,6 +61,7 @@ struct MotionBounds {
   std::vector<Extent> extents_;     // of each part, when it was last taken
   std::vector<double> margins_;     // of each part's boxes
   double largest_ = largest_coordinate;
+  bool snapshot_ = false, was_snapshot_ = false;
   bool complete_ = false;  // false while a call is under way, and after it has thrown
 };
 

@@ -17,6 +17,10 @@ namespace hpccd {
 
 inline constexpr std::uint32_t mixed_meshes = 0xFFFFFFFFu;
 
+// A reach along the axes, along the slanted directions of a snapshot: they are longer by the root of two, and their
+// coordinates twice as large, with roundings to match.
+HPCCD_HD float slanted_reach(float reach) { return 1.41422f * reach; }
+
 // One cache line.
 struct alignas(64) Node {
   MotionBox box;
@@ -27,8 +31,8 @@ struct alignas(64) Node {
   std::uint32_t only_points : 1 = 0;  // no triangle in the whole subtree, so nothing that another such node could touch
 
   bool overlaps(const Node& other) const;  // as MotionBox::overlaps
-  // At t = 0 alone: no farther apart than `reach` along any axis.
-  bool near_at_start(const Node& other, float reach) const;
+  // Of one snapshot: no farther apart than `reach` along any axis and any of the slanted directions (kdop.h).
+  bool near_in_snapshot(const Node& other, float reach) const;
 };
 static_assert(sizeof(Node) == 64);
 
@@ -40,10 +44,13 @@ inline bool Node::overlaps(const Node& other) const {
   return (bits4(below(box, other.box) | below(other.box, box)) & 7) == 0;
 }
 
-inline bool Node::near_at_start(const Node& other, float reach) const {
-  const Floats4 by = {reach, reach, reach, reach};
+inline bool Node::near_in_snapshot(const Node& other, float reach) const {
+  const float slanted = slanted_reach(reach);
+  const Floats4 by = {reach, reach, reach, reach}, by_slanted = {slanted, slanted, slanted, slanted};
   const Mask4 apart = (load4(box.t0.high) + by < load4(other.box.t0.low)) |
-                      (load4(other.box.t0.high) + by < load4(box.t0.low));
+                      (load4(other.box.t0.high) + by < load4(box.t0.low)) |
+                      (load4(box.t1.high) + by_slanted < load4(other.box.t1.low)) |
+                      (load4(other.box.t1.high) + by_slanted < load4(box.t1.low));
   return (bits4(apart) & 7) == 0;
 }
 

@@ -19,6 +19,7 @@ struct Geometry {
   const VertexKdop* kdops = nullptr;  // of each vertex; none where features need not touch to count
   double scale = 1;                   // power of two that brings the scene to about one; only single precision needs it
   Separations separations = {};       // for tests of distances
+  KdopMargin margin = {};             // of the largest of them
 };
 
 template <Kind kind>

@@ -17,6 +17,8 @@ void SeparationTable::set(std::uint32_t a, std::uint32_t b, double separation) {
   look_through();
 }
 
+double SeparationTable::most() const { return of_.empty() ? 0 : *std::max_element(of_.begin(), of_.end()); }
+
 void SeparationTable::look_through() {
   const auto differs = [&](double d) { return d != of_[0]; };
   uniform_ = std::none_of(of_.begin(), of_.end(), differs);

@@ -19,6 +19,7 @@ class SeparationTable {
   bool any() const { return any_; }
   bool uniform() const { return uniform_; }
   double first() const { return of_.empty() ? 0 : of_[0]; }
+  double most() const;
   const std::vector<double>& all() const { return of_; }  // n_meshes^2
   // By mesh: the largest of its pairs. Empty where no pair has a separation.
   const std::vector<double>& largest() const { return largest_; }

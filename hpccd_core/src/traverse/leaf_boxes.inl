@@ -38,21 +38,20 @@ struct BothEnds {
   }
 };
 
-// At t = 0 alone, where boxes may also be as far apart as `reach` along each axis.
-struct AtStart {
+// In one snapshot, where boxes may also be as far apart as `reach` (Node::near_in_snapshot).
+struct InSnapshot {
   float reach;
-  // The rows of t = 0 come first.
-  using Group = Rows16<n_bounds / 2>;
-  static_assert(high(0, 2) + 1 == n_bounds / 2);
-  HPCCD_HD static Group load(const BoxGroup& group) {
-    return load_rows(reinterpret_cast<const float (&)[n_bounds / 2][BoxGroup::width]>(group.rows));
-  }
+  using Group = Rows16<n_bounds>;
+  HPCCD_HD static Group load(const BoxGroup& group) { return load_rows(group.rows); }
   template <class Bounds>
   HPCCD_HD unsigned overlapping(const Group& g, Bounds b) const {
     Mask16 apart;
-    for (std::uint32_t axis = 0; axis < 3; ++axis) {
-      apart = apart | less(g[high(0, axis)], all16(b[low(0, axis)] - reach));
-      apart = apart | less(all16(b[high(0, axis)] + reach), g[low(0, axis)]);
+    for (std::uint32_t end = 0; end < 2; ++end) {
+      const float by = end == 0 ? reach : slanted_reach(reach);
+      for (std::uint32_t axis = 0; axis < 3; ++axis) {
+        apart = apart | less(g[high(end, axis)], all16(b[low(end, axis)] - by));
+        apart = apart | less(all16(b[high(end, axis)] + by), g[low(end, axis)]);
+      }
     }
     return ~apart.bits() & 0xFFFF;
   }

@@ -6,16 +6,16 @@ namespace hpccd {
 // Of leaf_pairs.inl, compiled for each instruction set.
 namespace scalar {
 void leaf_pairs(const Tree&, const LeafRange&, const LeafRange&, CandidateBuffer&, CandidateBuffer&);
-void leaf_pairs_at_start(const Tree&, const LeafRange&, const LeafRange&, float, CandidateBuffer&, CandidateBuffer&);
+void leaf_pairs_in_snapshot(const Tree&, const LeafRange&, const LeafRange&, float, CandidateBuffer&, CandidateBuffer&);
 }
 #if defined(HPCCD_X86)
 namespace avx2 {
 void leaf_pairs(const Tree&, const LeafRange&, const LeafRange&, CandidateBuffer&, CandidateBuffer&);
-void leaf_pairs_at_start(const Tree&, const LeafRange&, const LeafRange&, float, CandidateBuffer&, CandidateBuffer&);
+void leaf_pairs_in_snapshot(const Tree&, const LeafRange&, const LeafRange&, float, CandidateBuffer&, CandidateBuffer&);
 }
 namespace avx512 {
 void leaf_pairs(const Tree&, const LeafRange&, const LeafRange&, CandidateBuffer&, CandidateBuffer&);
-void leaf_pairs_at_start(const Tree&, const LeafRange&, const LeafRange&, float, CandidateBuffer&, CandidateBuffer&);
+void leaf_pairs_in_snapshot(const Tree&, const LeafRange&, const LeafRange&, float, CandidateBuffer&, CandidateBuffer&);
 }
 #endif
 
@@ -27,12 +27,12 @@ LeafPairs leaf_pairs([[maybe_unused]] Simd simd) {
   return scalar::leaf_pairs;
 }
 
-LeafPairsAtStart leaf_pairs_at_start([[maybe_unused]] Simd simd) {
+LeafPairsInSnapshot leaf_pairs_in_snapshot([[maybe_unused]] Simd simd) {
 #if defined(HPCCD_X86)
-  if (simd == Simd::avx512) return avx512::leaf_pairs_at_start;
-  if (simd == Simd::avx2) return avx2::leaf_pairs_at_start;
+  if (simd == Simd::avx512) return avx512::leaf_pairs_in_snapshot;
+  if (simd == Simd::avx2) return avx2::leaf_pairs_in_snapshot;
 #endif
-  return scalar::leaf_pairs_at_start;
+  return scalar::leaf_pairs_in_snapshot;
 }
 
 }  // namespace hpccd

@@ -23,9 +23,9 @@ using LeafPairs = void (*)(const Tree& tree, const LeafRange& a, const LeafRange
 LeafPairs leaf_pairs(Simd simd);
 
 // The same of one snapshot: features whose boxes at t = 0 are no farther apart than `reach` along any axis.
-using LeafPairsAtStart = void (*)(const Tree& tree, const LeafRange& a, const LeafRange& b, float reach,
+using LeafPairsInSnapshot = void (*)(const Tree& tree, const LeafRange& a, const LeafRange& b, float reach,
                                   CandidateBuffer& edge_edge, CandidateBuffer& vertex_face);
 
-LeafPairsAtStart leaf_pairs_at_start(Simd simd);
+LeafPairsInSnapshot leaf_pairs_in_snapshot(Simd simd);
 
 }  // namespace hpccd

@@ -89,9 +89,9 @@ void leaf_pairs(const Tree& tree, const LeafRange& a, const LeafRange& b, Candid
   pairs_of_leaves(BothEnds(), tree, a, b, edge_edge, vertex_face);
 }
 
-void leaf_pairs_at_start(const Tree& tree, const LeafRange& a, const LeafRange& b, float reach,
+void leaf_pairs_in_snapshot(const Tree& tree, const LeafRange& a, const LeafRange& b, float reach,
                          CandidateBuffer& edge_edge, CandidateBuffer& vertex_face) {
-  pairs_of_leaves(AtStart{reach}, tree, a, b, edge_edge, vertex_face);
+  pairs_of_leaves(InSnapshot{reach}, tree, a, b, edge_edge, vertex_face);
 }
 
 }  // namespace hpccd::HPCCD_ISA

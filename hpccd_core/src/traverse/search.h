@@ -20,7 +20,7 @@ struct Search {
   Geometry geometry;
   // Which pairs of features of two leaves; null: none.
   LeafPairs leaf_pairs = nullptr;
-  LeafPairsAtStart leaf_pairs_at_start = nullptr;  // of one snapshot, within `reach` or what `nearest` leaves
+  LeafPairsInSnapshot leaf_pairs_in_snapshot = nullptr;  // of one snapshot, within `reach` or what `nearest` leaves
   LeafEdgeFaces leaf_edge_faces = nullptr;
   float reach = 0;
   // How they are tested, by number of the rule; edges against faces alike by all.

@@ -15,7 +15,7 @@ inline float reach_of(double distance, double scale) {
 struct SnapshotBoxes {
   static constexpr bool shrink = false;
   float reach;
-  bool overlap(const Node& a, const Node& b) const { return a.near_at_start(b, reach); }
+  bool overlap(const Node& a, const Node& b) const { return a.near_in_snapshot(b, reach); }
 };
 
 }  // namespace hpccd

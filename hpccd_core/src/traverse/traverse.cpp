@@ -13,7 +13,7 @@ namespace {
 struct NearerBoxes {
   static constexpr bool shrink = true;
   const NearestPairs& nearest;
-  bool overlap(const Node& a, const Node& b) const { return a.near_at_start(b, nearest.reach(a.mesh, b.mesh)); }
+  bool overlap(const Node& a, const Node& b) const { return a.near_in_snapshot(b, nearest.reach(a.mesh, b.mesh)); }
 };
 
 // What lies on the stack from `begin` on, so that the nearest is taken first.
@@ -124,7 +124,7 @@ void test_leaves(const Tree& tree, const PairRules& rules, LeafPair pair, Worker
     });
   if (search.leaf_edge_faces)
     worker.test_edge_faces([&](CandidateBuffer& edge_face) { search.leaf_edge_faces(tree, a, b, edge_face); });
-  if (!search.leaf_pairs_at_start) return;
+  if (!search.leaf_pairs_in_snapshot) return;
   float reach = search.reach;
   bool first_look = false;
   if (search.nearest) {
@@ -134,7 +134,7 @@ void test_leaves(const Tree& tree, const PairRules& rules, LeafPair pair, Worker
     first_look = reach == std::numeric_limits<float>::infinity();
   }
   worker.test_candidates(rule, [&](CandidateBuffer& edge_edge, CandidateBuffer& vertex_face) {
-    search.leaf_pairs_at_start(tree, a, b, reach, edge_edge, vertex_face);
+    search.leaf_pairs_in_snapshot(tree, a, b, reach, edge_edge, vertex_face);
   });
   if (first_look) worker.flush();  // any bound is better than none
 }

@@ -71,6 +71,9 @@ struct Floats16 {
 };
 HPCCD_HD Floats16 load16(const float* x) { return {{_mm256_load_ps(x), _mm256_load_ps(x + 8)}}; }
 HPCCD_HD Floats16 all16(float x) { return {{_mm256_set1_ps(x), _mm256_set1_ps(x)}}; }
+HPCCD_HD Floats16 operator+(const Floats16& a, const Floats16& b) {
+  return {{_mm256_add_ps(a.half[0], b.half[0]), _mm256_add_ps(a.half[1], b.half[1])}};
+}
 HPCCD_HD Floats16 min(const Floats16& a, const Floats16& b) {
   return {{_mm256_min_ps(a.half[0], b.half[0]), _mm256_min_ps(a.half[1], b.half[1])}};
 }

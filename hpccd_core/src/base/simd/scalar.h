@@ -50,6 +50,11 @@ HPCCD_HD Floats16 all16(float x) {
   const Floats4 all = {x, x, x, x};
   return {{all, all, all, all}};
 }
+HPCCD_HD Floats16 operator+(const Floats16& a, const Floats16& b) {
+  Floats16 r;
+  for (int i = 0; i < 4; ++i) r.part[i] = a.part[i] + b.part[i];
+  return r;
+}
 HPCCD_HD Floats16 min(const Floats16& a, const Floats16& b) {
   Floats16 r;
   for (int i = 0; i < 4; ++i) r.part[i] = min4(a.part[i], b.part[i]);

@@ -8,6 +8,7 @@
 
 namespace hpccd::HPCCD_ISA {
 
+#include "elementary/kdop_filter.inl"
 #include "elementary/pair_lanes.inl"
 
 namespace {
@@ -38,10 +39,17 @@ void test_separation(const Geometry& g, const std::uint32_t* first, const std::u
                      BatchResult& result) {
   using Lanes = const Motion<Double>&;
   result.n_contacts = result.n_undecided = 0;
-  std::uint32_t open[batch_capacity], n_open = 0;
+  std::uint32_t near[batch_capacity], beside[batch_capacity], open[batch_capacity], n_beside = 0, n_open = 0;
   std::uint64_t none = 0;
 
-  for_lanes<kind, Double>(g, first, second, nullptr, n, [&](Lanes m, const std::uint32_t* at, unsigned valid) {
+  const std::uint32_t n_near =
+      g.kdops ? near_pairs<kind>(ApartByMore{load16(g.margin.in)}, g, first, second, n, near) : n;
+  const std::uint32_t* const where = g.kdops ? near : nullptr;
+  for_lanes<kind, Double>(g, first, second, where, n_near, [&](Lanes m, const std::uint32_t* at, unsigned valid) {
+    const Double d = separations_at<kind>(g, first, second, at);
+    append(beside, n_beside, at, valid & ~bits(planes_stay_apart(m, d)));
+  });
+  for_lanes<kind, Double>(g, first, second, beside, n_beside, [&](Lanes m, const std::uint32_t* at, unsigned valid) {
     const Outcome<Double> o = separation_filter<kind>(m, separations_at<kind>(g, first, second, at));
     const unsigned within = bits(o.contact) & valid, apart = bits(o.none) & valid;
     for (unsigned lanes = within; lanes; lanes &= lanes - 1) {
@@ -57,20 +65,39 @@ void test_separation(const Geometry& g, const std::uint32_t* first, const std::u
   });
 
   result.counts.tested += n;
+  result.counts.kdop += n - n_near;
+  result.counts.coplanarity += n_near - n_beside;
   result.counts.separated += none;
   result.counts.contacts += result.n_contacts;
   result.counts.undecided += result.n_undecided;
 }
 
 template <Kind kind>
+struct FeaturesInSnapshot {
+  static constexpr int width = double_width;
+  HPCCD_HD static Snapshot<Double> load(const Geometry& g, const std::uint32_t* first, const std::uint32_t* second) {
+    using S = Spans<kind>;
+    const double* at[4][width];
+    for (int lane = 0; lane < width; ++lane) {
+      std::uint32_t v[4];
+      pair_vertices<kind>(g, first[lane], second[lane], v);
+      for (int i = 0; i < 4; ++i) at[i][lane] = g.vertices[v[i]].t0;
+    }
+    PointRows rows[4];
+    for (int i = 0; i < 4; ++i) rows[i] = point_rows(at[i]);
+    const auto span = [&](int to, int from) { return transposed(difference(rows[to], rows[from])); };
+    return {span(S::p_to, S::p_from), span(S::a_to, S::a_from), span(S::b_to, S::b_from)};
+  }
+};
+
+template <Kind kind>
 void test_proximity(const Geometry& g, const std::uint32_t* first, const std::uint32_t* second, std::uint32_t n,
                     BatchResult& result) {
   result.n_contacts = result.n_undecided = 0;
   std::uint64_t none = 0;
-  for_lanes<kind, Double>(
-      g, first, second, nullptr, n, [&](const Motion<Double>& m, const std::uint32_t* at, unsigned valid) {
-        const NearOrFar<Double> found = proximity_test<kind>(Snapshot<Double>{m.p0, m.a0, m.b0},
-                                                             separations_at<kind>(g, first, second, at));
+  for_groups<FeaturesInSnapshot<kind>>(
+      g, first, second, nullptr, n, [&](const Snapshot<Double>& s, const std::uint32_t* at, unsigned valid) {
+        const NearOrFar<Double> found = proximity_test<kind>(s, separations_at<kind>(g, first, second, at));
         const unsigned near = bits(found.near) & valid, far = bits(found.far) & valid;
         alignas(64) double distance[double_width];
         __builtin_memcpy(distance, &found.distance, sizeof distance);

@@ -6,7 +6,19 @@
 #include "elementary/distance/separation_test.h"
 #include "elementary/extended_precision.h"
 
-namespace hpccd::extended_precision {
+namespace hpccd {
+
+// No proof needs more of the places than that they are some of the features: doubles will do (a sixth of the time).
+template <Kind kind>
+HPCCD_HD Nearest<DoubleDouble> nearest(const Snapshot<DoubleDouble>& s) {
+  using R = DoubleDouble;
+  const auto rounded = [](const Vec3<R>& v) { return Vec3<double>{v.x.high, v.y.high, v.z.high}; };
+  const detail::Place<double> best = detail::best_place<kind>(Snapshot<double>{rounded(s.p), rounded(s.a), rounded(s.b)});
+  return detail::straightened(
+      detail::Place<R>{R(best.x), R(best.y), R(best.over_a), R(best.over_b), best.inside, R(best.square)}, s);
+}
+
+namespace extended_precision {
 
 template <Kind kind>
 HPCCD_HD Answer earliest_within(const Vec3<double> q_t0[4], const Vec3<double> q_t1[4], double d) {
@@ -14,4 +26,5 @@ HPCCD_HD Answer earliest_within(const Vec3<double> q_t0[4], const Vec3<double> q
   return {o.contact, o.none, rounded_towards_zero(o.toc)};
 }
 
-}  // namespace hpccd::extended_precision
+}  // namespace extended_precision
+}  // namespace hpccd

@@ -27,54 +27,86 @@ struct Nearest {
 
 namespace detail {
 
+// A place of the features and what it may move along: the border over_a a + over_b b, nothing at a corner, or inside
+// both a and b.
 template <class R>
 struct Place {
-  using Mask = typename RealTraits<R>::Mask;
-  R x, y;
-  Vec3<R> gap, along;  // the border that it is on; zero at a corner
-  R square;
-  Mask inside;  // on no border
+  R x, y, over_a, over_b;
+  typename RealTraits<R>::Mask inside;
+  R square;  // |gap|^2 there
 };
 
 template <class R>
-HPCCD_HD Place<R> place(const Snapshot<R>& s, R x, R y, const Vec3<R>& along, typename RealTraits<R>::Mask inside) {
-  const Vec3<R> gap = s.p - x * s.a - y * s.b;
-  return {x, y, gap, along, dot(gap, gap), inside};
+HPCCD_HD Vec3<R> gap_at(const Snapshot<R>& s, R x, R y) {
+  return s.p - x * s.a - y * s.b;
 }
 
-// The places of a border, from 0 to 1: at `best`, or at the end that is nearest to it. Written so that NaN gives 0.
+template <class R>
+HPCCD_HD R square_at(const Snapshot<R>& s, R x, R y) {
+  const Vec3<R> gap = gap_at(s, x, y);
+  return dot(gap, gap);
+}
+
+// A place on a border, from 0 to 1: the best, or the end that is nearest to it. Written so that NaN gives 0.
 template <class R>
 struct OnBorder {
-  R at;
-  Vec3<R> along;
-  HPCCD_HD OnBorder(R best, const Vec3<R>& border)
-      : at(select(best > R(0), lesser(best, R(1)), R(0))),
-        along(select(best > R(0) && best < R(1), R(1), R(0)) * border) {}
+  R at, moves;
+  HPCCD_HD explicit OnBorder(R best)
+      : at(select(best > R(0), lesser(best, R(1)), R(0))), moves(select(best > R(0) && best < R(1), R(1), R(0))) {}
 };
 
 // Written so that NaN never wins.
 template <class R>
 HPCCD_HD void keep_nearer(Place<R>& best, const Place<R>& other, typename RealTraits<R>::Mask allowed) {
   const auto wins = allowed && other.square < best.square;
-  const auto vector = [&](const Vec3<R>& x, const Vec3<R>& y) {
-    return Vec3<R>{select(wins, x.x, y.x), select(wins, x.y, y.y), select(wins, x.z, y.z)};
-  };
   best = {select(wins, other.x, best.x),
           select(wins, other.y, best.y),
-          vector(other.gap, best.gap),
-          vector(other.along, best.along),
-          select(wins, other.square, best.square),
-          (wins && other.inside) || (!wins && best.inside)};
+          select(wins, other.over_a, best.over_a),
+          select(wins, other.over_b, best.over_b),
+          (wins && other.inside) || (!wins && best.inside),
+          select(wins, other.square, best.square)};
+}
+
+// The best of the free minimum and of the best places of the borders: of those that rounding spoils (parallel edges,
+// needles) none is best.
+template <Kind kind, class R>
+HPCCD_HD Place<R> best_place(const Snapshot<R>& s) {
+  const R aa = dot(s.a, s.a), ab = dot(s.a, s.b), bb = dot(s.b, s.b), pa = dot(s.p, s.a), pb = dot(s.p, s.b);
+  const R per_det = R(1) / (aa * bb - ab * ab), x = per_det * (pa * bb - pb * ab), y = per_det * (pb * aa - pa * ab);
+  const R per_aa = R(1) / aa, per_bb = R(1) / bb;
+  const auto yes = R(0) < R(1), no = R(1) < R(0);
+  const auto place = [&](R at_x, R at_y, R over_a, R over_b) {
+    return Place<R>{at_x, at_y, over_a, over_b, no, square_at(s, at_x, at_y)};
+  };
+  const Place<R> free{x, y, R(0), R(0), yes, square_at(s, x, y)};
+  if constexpr (kind == Kind::vertex_face) {
+    const Vec3<R> c = s.b - s.a;
+    const OnBorder<R> on_a(per_aa * pa), on_b(per_bb * pb), on_c(dot(s.p - s.a, c) / dot(c, c));
+    Place<R> best = place(on_a.at, R(0), on_a.moves, R(0));
+    keep_nearer(best, place(R(0), on_b.at, R(0), on_b.moves), yes);
+    keep_nearer(best, place(R(1) - on_c.at, on_c.at, R(0) - on_c.moves, on_c.moves), yes);
+    keep_nearer(best, free, x >= R(0) && y >= R(0) && x + y <= R(1));
+    return best;
+  } else {
+    const OnBorder<R> start_of_b(per_aa * pa), end_of_b(per_aa * (pa + ab)), start_of_a(R(0) - per_bb * pb),
+        end_of_a(per_bb * (ab - pb));
+    Place<R> best = place(start_of_b.at, R(0), start_of_b.moves, R(0));
+    keep_nearer(best, place(end_of_b.at, R(-1), end_of_b.moves, R(0)), yes);
+    keep_nearer(best, place(R(0), R(0) - start_of_a.at, R(0), start_of_a.moves), yes);
+    keep_nearer(best, place(R(1), R(0) - end_of_a.at, R(0), end_of_a.moves), yes);
+    keep_nearer(best, free, x >= R(0) && x <= R(1) && y <= R(0) && y >= R(-1));
+    return best;
+  }
 }
 
 // A short gap between long features is known to their rounding only, and its direction to that over its length. But it
 // stands on what its place may move along, which is known well: what it has along that is all rounding.
 template <class R>
 HPCCD_HD Nearest<R> straightened(const Place<R>& best, const Snapshot<R>& s) {
-  const Vec3<R> n = cross(s.a, s.b);
-  const R along = dot(best.along, best.along);
-  const R by_n = dot(best.gap, n) / dot(n, n), by_border = dot(best.gap, best.along) / along;
-  const Vec3<R> on_plane = by_n * n, on_border = best.gap - select(along > R(0), by_border, R(0)) * best.along;
+  const Vec3<R> given = gap_at(s, best.x, best.y), n = cross(s.a, s.b);
+  const Vec3<R> along = best.over_a * s.a + best.over_b * s.b;
+  const R square = dot(along, along), by_n = dot(given, n) / dot(n, n);
+  const Vec3<R> on_plane = by_n * n, on_border = given - select(square > R(0), dot(given, along) / square, R(0)) * along;
   const Vec3<R> gap{select(best.inside, on_plane.x, on_border.x), select(best.inside, on_plane.y, on_border.y),
                     select(best.inside, on_plane.z, on_border.z)};
   return {best.x, best.y, gap, dot(gap, gap)};
@@ -82,33 +114,9 @@ HPCCD_HD Nearest<R> straightened(const Place<R>& best, const Snapshot<R>& s) {
 
 }  // namespace detail
 
-// The smallest of the gaps at the free minimum and at the best places of the borders: of those that rounding spoils
-// (parallel edges, needles) none is smallest.
 template <Kind kind, class R>
 HPCCD_HD Nearest<R> nearest(const Snapshot<R>& s) {
-  using namespace detail;
-  const R aa = dot(s.a, s.a), ab = dot(s.a, s.b), bb = dot(s.b, s.b), pa = dot(s.p, s.a), pb = dot(s.p, s.b);
-  const R per_det = R(1) / (aa * bb - ab * ab), x = per_det * (pa * bb - pb * ab), y = per_det * (pb * aa - pa * ab);
-  const R per_aa = R(1) / aa, per_bb = R(1) / bb;
-  const auto yes = R(0) < R(1), no = R(1) < R(0);
-  Place<R> best;
-  if constexpr (kind == Kind::vertex_face) {
-    const Vec3<R> c = s.b - s.a;
-    const OnBorder<R> on_a(per_aa * pa, s.a), on_b(per_bb * pb, s.b), on_c(dot(s.p - s.a, c) / dot(c, c), c);
-    best = place(s, on_a.at, R(0), on_a.along, no);
-    keep_nearer(best, place(s, R(0), on_b.at, on_b.along, no), yes);
-    keep_nearer(best, place(s, R(1) - on_c.at, on_c.at, on_c.along, no), yes);
-    keep_nearer(best, place(s, x, y, c, yes), x >= R(0) && y >= R(0) && x + y <= R(1));
-  } else {
-    const OnBorder<R> start_of_b(per_aa * pa, s.a), end_of_b(per_aa * (pa + ab), s.a),
-        start_of_a(R(0) - per_bb * pb, s.b), end_of_a(per_bb * (ab - pb), s.b);
-    best = place(s, start_of_b.at, R(0), start_of_b.along, no);
-    keep_nearer(best, place(s, end_of_b.at, R(-1), end_of_b.along, no), yes);
-    keep_nearer(best, place(s, R(0), R(0) - start_of_a.at, start_of_a.along, no), yes);
-    keep_nearer(best, place(s, R(1), R(0) - end_of_a.at, end_of_a.along, no), yes);
-    keep_nearer(best, place(s, x, y, s.a, yes), x >= R(0) && x <= R(1) && y <= R(0) && y >= R(-1));
-  }
-  return straightened(best, s);
+  return detail::straightened(detail::best_place<kind>(s), s);
 }
 
 // Along a fixed direction the gap of two features is smallest between two of their corners.

@@ -63,6 +63,19 @@ HPCCD_HD Look<kind, R> select(typename RealTraits<R>::Mask m, const Look<kind, R
 // A contact is accepted where its time is known to this: the contract promises 1e-12.
 inline constexpr double separation_toc_radius = 8e-13;
 
+// With a gap of at most d between the features, p . n for n = a x b is at most d |n|. So where the cubic stays beyond d
+// times the largest |n| of the step, which is one of its Bernstein coefficients' (they bound it as they bound the cubic),
+// so do the features. The roundings of n, 20 u |a||b| a coordinate, count as much as those of the cubic at most.
+template <class R>
+HPCCD_HD typename RealTraits<R>::Mask planes_stay_apart(const Motion<R>& m, R d) {
+  const Magnitudes<R> size = magnitudes(m);
+  const Vec3<R> n0 = cross(m.a0, m.b0), n2 = cross(m.a1, m.b1);
+  const Vec3<R> n1 = R(0.5) * (cross(m.a0, m.b1) + cross(m.a1, m.b0));
+  const R longest = square_root(greater(greater(dot(n0, n0), dot(n1, n1)), dot(n2, n2)));
+  const R slack = d * (longest + R(64 * half_ulp<R>()) * (size.a * size.b)) * R(1 + 8 * half_ulp<R>());
+  return in_range(size) && certainly_no_root(coplanarity(m), coplanarity_error(size).coefficient + slack);
+}
+
 // Both ends of the step: already within d, or kept apart by their directions.
 template <Kind kind, class R>
 HPCCD_HD Outcome<R> separation_filter(const Motion<R>& m, R d) {

@@ -63,15 +63,6 @@ bool within(const Resting<Z>& features, const Margin& d) {
   return compare.found;
 }
 
-Big to_big(const Big& x) { return x; }
-template <int N>
-Big to_big(const Integer<N>& x) {
-  const Integer<N> size = x.negative() ? -x : x;
-  Big y = 0;
-  for (int i = N; i-- > 0;) y = (y << 64) + size.limbs[i];
-  return x.negative() ? Big(-y) : y;
-}
-
 int highest_bit(const Big& x) { return static_cast<int>(msb(x)); }
 
 // sqrt(num / den) 2^low, rounded.

@@ -15,6 +15,15 @@ using Big = boost::multiprecision::number<boost::multiprecision::cpp_int_backend
 
 inline int sign(const Big& x) { return x.sign(); }
 
+inline Big to_big(const Big& x) { return x; }
+template <int N>
+Big to_big(const Integer<N>& x) {
+  const Integer<N> size = x.negative() ? -x : x;
+  Big y = 0;
+  import_bits(y, size.limbs.begin(), size.limbs.end(), 64, false);
+  return x.negative() ? Big(-y) : y;
+}
+
 template <int More>
 Big shifted(const Big& x, int bits) {
   return x << bits;
@@ -80,6 +89,10 @@ struct BitRange {
     if (!x.mantissa) return;
     low = std::min(low, x.exponent);
     high = std::max(high, x.exponent + 64 - std::countl_zero(static_cast<std::uint64_t>(std::abs(x.mantissa))));
+  }
+  void include(const BitRange& x) {
+    low = std::min(low, x.low);
+    high = std::max(high, x.high);
   }
   int bits() const { return high > low ? high - low : 1; }
 };

@@ -39,8 +39,33 @@ Cubic<double> approximate(const Polynomial<Z, D>& p, int& exponent) {
   return {c[0], 3 * c[0] + c[1], 3 * c[0] + 2 * c[1] + c[2], c[0] + c[1] + c[2] + c[3]};
 }
 
-// Narrows the interval to 2^-62. Every step is proven by an exact sign; where Newton's do not get there, bisection
-// does.
+// Narrows (low, high), in units of 2^-62, to one of them around its only root, x being a guess. Every step is proven by
+// an exact sign; where Newton's do not get there, bisection does. value(x) is exact; newton(value, x) tells how far
+// above the root x is about. True where `low` is the root itself.
+template <class Value, class Newton>
+bool close_in(std::int64_t& low, std::int64_t& high, int before, std::int64_t x, Value&& value_there, Newton&& newton) {
+  constexpr double most = 0x1p62;
+  for (int turn = 0; high - low > 1; ++turn) {
+    constexpr int patience = 6;
+    if (x <= low || x >= high || turn > patience) x = low + (high - low) / 2;
+    const auto value = value_there(x);
+    const int s = sign(value);
+    if (s == 0) {
+      low = x;
+      return true;
+    }
+    (s == before ? low : high) = x;
+    const double step = s * newton(value, x);
+    // A step that rounds to nothing is one to the other side of the root: it closes the interval.
+    if (std::fabs(step) < 1)
+      x += s == before ? 1 : -1;
+    else
+      x = std::fabs(step) < most ? x - static_cast<std::int64_t>(step) : low;
+  }
+  return false;
+}
+
+// Narrows the interval to 2^-62.
 template <class Z, int D>
 void locate(Root<Z, D>& r) {
   if (r.exact || r.k >= time_bits) return;
@@ -50,27 +75,13 @@ void locate(Root<Z, D>& r) {
   int exponent;
   const Cubic<double> f = approximate(r.of, exponent);
   const double guess = bracketed_root(f, 0.0, unit * low, unit * high, static_cast<double>(r.before), true).t;
-  auto x = static_cast<std::int64_t>(guess / unit);
-  for (int turn = 0; high - low > 1; ++turn) {
-    constexpr int patience = 6;
-    if (x <= low || x >= high || turn > patience) x = low + (high - low) / 2;
-    const auto value = value_at(r.of, Time<Z>(x), time_bits);
-    const int s = sign(value);
-    if (s == 0) {
-      r.m = Time<Z>(x);
-      r.exact = true;
-      return;
-    }
-    (s == r.before ? low : high) = x;
+  const auto value = [&](std::int64_t x) { return value_at(r.of, Time<Z>(x), time_bits); };
+  const auto newton = [&](const auto& v, std::int64_t x) {
     int e;
-    const double size = magnitude_of(value, e);
-    const double step = s * std::ldexp(size, e - exponent - (D - 1) * time_bits) / slope(f, unit * x);
-    // A step that rounds to nothing is one to the other side of the root: it closes the interval.
-    if (std::fabs(step) < 1)
-      x += s == r.before ? 1 : -1;
-    else
-      x = std::fabs(step) < 1 / unit ? x - static_cast<std::int64_t>(step) : low;
-  }
+    const double size = magnitude_of(v, e);
+    return std::ldexp(size, e - exponent - (D - 1) * time_bits) / slope(f, unit * x);
+  };
+  r.exact = close_in(low, high, r.before, static_cast<std::int64_t>(guess / unit), value, newton);
   r.m = Time<Z>(low);
 }
 

@@ -3,23 +3,13 @@
 
 #include "elementary/exact/distance.h"
 #include "elementary/exact/earliest.h"
+#include "elementary/exact/pieces.h"
+#include "elementary/exact/rounded.h"
 #include "elementary/exact/scaled.h"
 #include "elementary/exact/wide/first_time.h"
 
 namespace hpccd::exact {
 namespace {
-
-template <class Z, int D>
-auto square(const Polynomial<Z, D>& p) {
-  return p * p;
-}
-
-template <class Z, int D, class W>
-Polynomial<Z, D> scaled(const Polynomial<Z, D>& p, const W& factor) {
-  Polynomial<Z, D> s;
-  for (int i = 0; i <= D; ++i) s.c[i] = p.c[i] * factor;
-  return s;
-}
 
 // Along each axis the swept boxes are farther apart than d; a difference of doubles, rounded, is above d only where
 // the true one is.
@@ -38,76 +28,83 @@ bool boxes_apart(Kind kind, const Vec3<double> q_t0[4], const Vec3<double> q_t1[
   return false;
 }
 
-// The squared distance of planes, or lines, points less d^2, times what makes it a polynomial.
-class Meeting {
- public:
-  Meeting(const Query<Big>& q, const Margin& d) : q_(q), d_(d), d2_(Big(d.mantissa) * d.mantissa) {}
+template <class Z, int D>
+Polynomial<Big, D> to_big(const Polynomial<Z, D>& p) {
+  Polynomial<Big, D> big;
+  for (int i = 0; i <= D; ++i) big.c[i] = exact::to_big(p.c[i]);
+  return big;
+}
 
-  std::optional<double> earliest() {
-    constexpr std::int64_t never = (std::int64_t{1} << time_bits) + 1;
-    first_ = never;
-    inside();
-    for (int i = 0; i < q_.n_degenerate(); ++i) on_segment(i);
+// In integers of any size.
+template <int D, int E, int n>
+struct WidePiece {
+  Polynomial<Big, D> distance;
+  Polynomial<Big, E> not_zero;
+  std::array<Polynomial<Big, E>, n> at_least_zero;
+  int n_at_least_zero;
+
+  template <class P>
+  explicit WidePiece(const P& piece)
+      : distance(to_big(piece.distance)), not_zero(to_big(piece.not_zero)), n_at_least_zero(piece.n_at_least_zero) {
+    for (int i = 0; i < n_at_least_zero; ++i) at_least_zero[i] = to_big(piece.at_least_zero[i]);
+  }
+  wide::Event event() const {
+    wide::Event event{wide::coefficients(distance), wide::coefficients(not_zero), {}};
+    for (int i = 0; i < n_at_least_zero; ++i) event.at_least_zero.push_back(wide::coefficients(at_least_zero[i]));
+    return event;
+  }
+};
+
+// The earliest time of all pieces.
+class Earliest {
+ public:
+  template <class Distance, class Condition, int n>
+  void operator()(const Piece<Distance, Condition, n>& piece) {
+    if (piece.distance.degree() <= 0 || piece.not_zero.degree() < 0) return;
+    consider(piece);
+  }
+
+  std::optional<double> time() const {
     if (first_ == never) return {};
     return rounded_down(first_);
   }
 
  private:
-  template <int D, int E>
-  Polynomial<Big, D> beyond(Polynomial<Big, D> num, const Polynomial<Big, E>& den) const {
-    auto limit = scaled(den, d2_);
-    if (d_.shift < 0)
-      for (Big& c : num.c) c <<= -2 * d_.shift;
-    if (d_.shift > 0)
-      for (Big& c : limit.c) c <<= 2 * d_.shift;
-    for (int i = 0; i <= E; ++i) num.c[i] -= limit.c[i];
-    return num;
+  static constexpr std::int64_t never = (std::int64_t{1} << time_bits) + 1;
+
+  template <class Z, int D, class Y, int E, int n>
+  void consider(const Piece<Polynomial<Z, D>, Polynomial<Y, E>, n>& piece) {
+    RoundedEvent<D, E> event;
+    round(piece.distance, event.f);
+    if (E > 0) round(piece.not_zero, event.positive[event.n++]);
+    for (int i = 0; i < piece.n_at_least_zero; ++i)
+      if (round(piece.at_least_zero[i], event.positive[event.n])) ++event.n;
+    std::optional<WidePiece<D, E, n>> wide;
+    const auto found = [&](const Bracket<D>& bracket) { return time_of_root(piece.distance, bracket); };
+    const auto undecided = [&](std::int64_t low, int halvings) {
+      if (!wide) wide.emplace(piece);
+      return wide::first_time(wide->event(), {low, halvings, halvings}, first_);
+    };
+    if (const auto time =
+            EarlySearch<D, E, decltype(found), decltype(undecided)>(first_, found, undecided).first(event))
+      first_ = std::min(first_, *time);
   }
 
-  void consider(const wide::Event& event) { first_ = std::min(first_, wide::first_time(event, first_)); }
-
-  void inside() {
-    const auto nn = dot(q_.n, q_.n);
-    Vector<Query<Big>::Quadratic> pb, ap;
-    for (int k = 0; k < 3; ++k) pb[k] = q_.pb(k), ap[k] = q_.ap(k);
-    const auto alpha = dot(pb, q_.n), beta = dot(ap, q_.n);
-    const auto f = beyond(square(q_.f), nn);
-    std::vector<Polynomial<Big, 4>> conditions;
-    if (q_.kind == Kind::vertex_face)
-      conditions = {alpha, beta, nn - alpha - beta};
-    else
-      conditions = {alpha, nn - alpha, -beta, nn + beta};
-    wide::Event event{wide::coefficients(f), wide::coefficients(nn), {}};
-    for (const auto& c : conditions) event.at_least_zero.push_back(wide::coefficients(c));
-    consider(event);
-  }
-
-  void to_point(const Coordinates<Big>& between) {
-    const Polynomial<Big, 0> one{{1}};
-    const auto f = beyond(dot(between, between), one);
-    consider({wide::coefficients(f), wide::coefficients(one), {}});
-  }
-
-  void on_segment(int i) {
-    const auto [from_start, from_end] = q_.degenerate(i);
-    const auto e = from_start - from_end;
-    const auto length = dot(e, e);
-    Vector<Query<Big>::Quadratic> beside;
-    for (int k = 0; k < 3; ++k) beside[k] = q_.beside_line(i, k);
-    const auto f = beyond(dot(beside, beside), length);
-    const auto along = dot(from_start, e), rest = length - along;
-    consider(
-        {wide::coefficients(f), wide::coefficients(length), {wide::coefficients(along), wide::coefficients(rest)}});
-    // Each pair of points once.
-    if (q_.kind == Kind::edge_edge ? i < 2 : i == 0) to_point(from_start);
-    if (i < 2) to_point(from_end);
-  }
-
-  const Query<Big>& q_;
-  Margin d_;
-  Big d2_;
-  std::int64_t first_;
+  std::int64_t first_ = never;
 };
+
+template <class Z>
+std::optional<double> earliest(Kind kind, const Given& begin, const Given& end, int low, const Margin& d) {
+  Coordinates<Z> points[4];
+  for (int i = 0; i < 4; ++i)
+    for (int k = 0; k < 3; ++k) {
+      const Z z0 = scaled_integer<Z>(begin.x[i][k], low), z1 = scaled_integer<Z>(end.x[i][k], low);
+      points[i][k] = {{z0, z1 - z0}};
+    }
+  Earliest earliest;
+  Pieces<Z>({kind, points}, d).visit_all(earliest);
+  return earliest.time();
+}
 
 }  // namespace
 
@@ -115,15 +112,15 @@ std::optional<double> earliest_within(Kind kind, const Vec3<double> q_t0[4], con
   if (boxes_apart(kind, q_t0, q_t1, d)) return std::nullopt;
   if (within(kind, q_t0, d)) return 0.0;
   const Given begin(q_t0), end(q_t1);
-  const int low = std::min(begin.range.low, end.range.low);
-  Coordinates<Big> points[4];
-  for (int i = 0; i < 4; ++i)
-    for (int k = 0; k < 3; ++k) {
-      const Big z0 = scaled_integer<Big>(begin.x[i][k], low), z1 = scaled_integer<Big>(end.x[i][k], low);
-      points[i][k] = {{z0, z1 - z0}};
-    }
-  const Query<Big> query(kind, points);
-  return Meeting(query, Margin(d, low)).earliest();
+  BitRange range = begin.range;
+  range.include(end.range);
+  const Margin margin(d, range.low);
+  const bool small = Pieces<Big>::fits(margin);
+  if (small && range.bits() <= Widths<Integer<1>>::coordinate_bits)
+    return earliest<Integer<1>>(kind, begin, end, range.low, margin);
+  if (small && range.bits() <= Widths<Integer<2>>::coordinate_bits)
+    return earliest<Integer<2>>(kind, begin, end, range.low, margin);
+  return earliest<Big>(kind, begin, end, range.low, margin);
 }
 
 }  // namespace hpccd::exact

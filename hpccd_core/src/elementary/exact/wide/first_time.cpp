@@ -19,21 +19,23 @@ class Search {
   Search(const Event& event, std::int64_t limit)
       : event_(event), of_(event.vanishes.begin(), event.vanishes.end()), limit_(limit) {}
 
-  std::int64_t run() {
-    const Part step(of_, {});
-    const bool at_end = step.root_at_end();
-    if (const auto t = within(step)) return *t;
-    return at_end && holds_at({1, 0}) ? std::int64_t{1} << time_bits : limit_;
+  std::optional<std::int64_t> in(const Window& window) {
+    const Part part(of_, window);
+    const bool at_end = part.root_at_end();
+    if (const auto t = within(part, event_.at_least_zero)) return t;
+    if (at_end && holds_at(window.end())) return floor_of(window.end());
+    return {};
   }
 
  private:
   // Before this many bits it rarely is worth the price to ask whether something vanishes.
   static constexpr int patience = 40;
 
-  std::optional<std::int64_t> within(Part part) {
+  // conditions: those that may be negative somewhere in the part.
+  std::optional<std::int64_t> within(Part part, std::vector<Coefficients> conditions) {
     while (part.variations() > 0) {
-      if (floor_of(part.window().begin()) >= limit_ || excluded(part.window())) return {};
-      if (part.variations() == 1) return at_root(std::move(part));
+      if (floor_of(part.window().begin()) >= limit_ || excluded(part.window(), conditions)) return {};
+      if (part.variations() == 1) return at_root(std::move(part), conditions);
       if (part.window().w > patience && !square_free_) {
         of_ = square_free(of_);
         square_free_ = true;
@@ -43,7 +45,7 @@ class Search {
       if (part.narrow()) continue;
       auto [first, second, root_between] = part.halves();
       const bool was_square_free = square_free_;
-      if (const auto t = within(std::move(first))) return t;
+      if (const auto t = within(std::move(first), conditions)) return t;
       if (was_square_free != square_free_) second = Part(of_, second.window());
       if (root_between && holds_at(second.window().begin())) return floor_of(second.window().begin());
       part = std::move(second);
@@ -51,9 +53,13 @@ class Search {
     return {};
   }
 
-  bool excluded(const Window& window) const {
-    for (const Coefficients& q : event_.at_least_zero)
-      if (q.empty() ? false : sign_inside(seen(q, window)) < 0) return true;
+  // Whether one is negative throughout. Forgets those that are positive throughout.
+  static bool excluded(const Window& window, std::vector<Coefficients>& conditions) {
+    for (std::size_t i = conditions.size(); i-- > 0;) {
+      const int s = conditions[i].empty() ? 1 : sign_inside(seen(conditions[i], window));
+      if (s < 0) return true;
+      if (s > 0) conditions.erase(conditions.begin() + static_cast<std::ptrdiff_t>(i));
+    }
     return false;
   }
 
@@ -65,10 +71,10 @@ class Search {
   }
 
   // Of the one root in the part.
-  std::optional<std::int64_t> at_root(Part part) {
+  std::optional<std::int64_t> at_root(Part part, const std::vector<Coefficients>& conditions) {
     std::optional<Dyadic> exact;
     const auto sign_of = [&](Coefficients q) { return sign_at(q, part, exact); };
-    for (const Coefficients& q : event_.at_least_zero)
+    for (const Coefficients& q : conditions)
       if (sign_of(q) < 0) return {};
     if (sign_of(event_.not_zero) == 0) return {};
     while (!exact) {
@@ -115,8 +121,8 @@ class Search {
 
 }  // namespace
 
-std::int64_t first_time(const Event& event, std::int64_t limit) {
-  return event.vanishes.empty() ? limit : Search(event, limit).run();
+std::optional<std::int64_t> first_time(const Event& event, const Window& window, std::int64_t limit) {
+  return Search(event, limit).in(window);
 }
 
 }  // namespace hpccd::exact::wide

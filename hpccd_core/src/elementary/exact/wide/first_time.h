@@ -14,7 +14,7 @@ struct Event {
   std::vector<Coefficients> at_least_zero;
 };
 
-// floor(t 2^62) for the first t in (0, 1], or any number not below `limit` where there is none below it.
-std::int64_t first_time(const Event& event, std::int64_t limit);
+// floor(t 2^62) for the first t in the window, its end included and its beginning not, if it is below `limit`.
+std::optional<std::int64_t> first_time(const Event& event, const Window& window, std::int64_t limit);
 
 }  // namespace hpccd::exact::wide

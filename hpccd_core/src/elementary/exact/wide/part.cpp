@@ -17,11 +17,41 @@ void drop_common_power_of_two(Numbers& a) {
     if (!x.is_zero()) x >>= common;
 }
 
-// Those times the binomial coefficients.
-void to_bernstein(Numbers& a) {
-  const std::size_t n = a.size() - 1;
+constexpr std::size_t most_coefficients = 7;
+
+// Of polynomials of degree n: the Bernstein coefficients times the binomial ones.
+template <class Number>
+void to_bernstein(Number* a, std::size_t n) {
   for (std::size_t i = 0; i < n; ++i)
     for (std::size_t m = 1; m <= n - i; ++m) a[m] += a[m - 1];
+}
+
+// Their signs in double precision; false where one stays open.
+bool rounded_signs(const Numbers& a, int* signs) {
+  const std::size_t n = a.size() - 1;
+  double b[most_coefficients];
+  int e[most_coefficients], most = std::numeric_limits<int>::min();
+  for (std::size_t i = 0; i <= n; ++i) {
+    b[i] = sign(a[i]) * magnitude_of(a[i], e[i]);
+    if (b[i] != 0) most = std::max(most, e[i]);
+  }
+  for (std::size_t i = 0; i <= n; ++i) b[i] = std::ldexp(b[i], std::max(e[i] - most, -1000));
+  signs[0] = sign(a[0]);
+  to_bernstein(b, n);
+  // Each is a sum of at most 64 numbers below 1, added up with at most 6 roundings.
+  constexpr double error = 64 * 8 * 0x1p-52;
+  for (std::size_t i = 1; i <= n; ++i) {
+    if (std::fabs(b[i]) <= error) return false;
+    signs[i] = b[i] < 0 ? -1 : 1;
+  }
+  return true;
+}
+
+void bernstein_signs(const Numbers& p, int* signs) {
+  if (rounded_signs(p, signs)) return;
+  Numbers a = p;
+  to_bernstein(a.data(), a.size() - 1);
+  for (std::size_t i = 0; i < a.size(); ++i) signs[i] = sign(a[i]);
 }
 
 // About -num 2^h / den, rounded.
@@ -63,24 +93,24 @@ Numbers seen(Coefficients p, const Window& window) {
   return seen_on_part({p.begin(), p.end()}, window.low, window.k, window.k - window.w);
 }
 
-int variations(Numbers a) {
-  to_bernstein(a);
+int variations(const Numbers& a) {
+  int signs[most_coefficients];
+  bernstein_signs(a, signs);
   int v = 0, last = 0;
-  for (const Big& b : a) {
-    const int s = sign(b);
-    v += s * last < 0;
-    if (s) last = s;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    v += signs[i] * last < 0;
+    if (signs[i]) last = signs[i];
   }
   return v;
 }
 
-int sign_inside(Numbers a) {
-  to_bernstein(a);
+int sign_inside(const Numbers& a) {
+  int signs[most_coefficients];
+  bernstein_signs(a, signs);
   int all = 0;
-  for (const Big& b : a) {
-    const int s = sign(b);
-    if (s * all < 0) return 0;
-    if (s) all = s;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    if (signs[i] * all < 0) return 0;
+    if (signs[i]) all = signs[i];
   }
   return all;
 }

@@ -20,16 +20,16 @@ struct Window {  // [low / 2^k, low / 2^k + 2^-w], w <= k
   Window part(const Big& j, int h, int e) const;  // [j, j + 2^e] / 2^h of it
 };
 
-// Each of these polynomials is a positive multiple of the one that it stands for.
+// Each of these polynomials is a positive multiple of the one that it stands for. None has a degree above 6.
 Numbers seen(Coefficients p, const Window& window);
 Numbers seen_on_part(const Numbers& a, const Big& j, int h, int e);  // of [0, 1]: [j, j + 2^e] / 2^h
 
 // Sign changes among the Bernstein coefficients: at least as many as there are roots within (0, 1), each counted as
 // often as it is one, and more by an even number.
-int variations(Numbers a);
+int variations(const Numbers& a);
 
 // The sign that it certainly has throughout (0, 1), by the same coefficients; 0: not certain, or zero.
-int sign_inside(Numbers a);
+int sign_inside(const Numbers& a);
 
 // Where a polynomial that does not vanish throughout may have roots, inside the window and not at its ends.
 class Part {

@@ -1,0 +1,131 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the core and the oracle are asked: contact, separation, proximity, intersections; of single pairs."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+import hpccd_core as hc
+from hpccd_core import reference
+
+from .disturbances import disturb, disturb_near
+from .generators import EDGE_EDGE, GENERATORS, VERTEX_FACE
+from .near_generators import NEAR_GENERATORS
+from .snapshots import EDGE_FACE, EDGE_FACE_POINTS, SNAPSHOTS
+
+CONTACT, SEPARATION, PROXIMITY, INTERSECTIONS = "contact", "separation", "proximity", "intersections"
+
+Answers = tuple[np.ndarray, np.ndarray]  # hit (Q,) bool; value (Q,) float64: time, distance, or 0
+
+
+@dataclass(frozen=True)
+class Batch:
+    """Queries of one kind from one generator. distances: (Q,); zero where the question has none."""
+
+    question: str
+    kind: str
+    generator: str
+    queries: np.ndarray
+    distances: np.ndarray
+
+    def part(self, chosen: np.ndarray) -> Batch:
+        return Batch(self.question, self.kind, self.generator, self.queries[chosen], self.distances[chosen])
+
+
+def kinds_of(question: str) -> tuple[str, ...]:
+    return (EDGE_FACE,) if question == INTERSECTIONS else (VERTEX_FACE, EDGE_EDGE)
+
+
+def generators_of(question: str, kind: str) -> dict[str, Callable]:
+    return {
+        CONTACT: GENERATORS, SEPARATION: NEAR_GENERATORS, PROXIMITY: SNAPSHOTS,
+        INTERSECTIONS: {EDGE_FACE: EDGE_FACE_POINTS},
+    }[question][kind]  # fmt: skip
+
+
+def generated(question: str, kind: str, generator: str, rng: np.random.Generator, size: int) -> Batch:
+    made = generators_of(question, kind)[generator](rng, size)
+    if question == CONTACT:
+        made = disturb(rng, made, kind)
+    elif question == SEPARATION:
+        made = disturb_near(rng, *made, kind)
+    queries, distances = made if isinstance(made, tuple) else (made, np.zeros(size))
+    return Batch(question, kind, generator, queries, distances)
+
+
+def truth(batch: Batch, threads: int = 0) -> Answers:
+    """What the oracle says, on so many threads."""
+    vertex_face = batch.kind == VERTEX_FACE
+    if batch.question == CONTACT:
+        return (reference.vertex_face if vertex_face else reference.edge_edge)(batch.queries, threads)
+    if batch.question == SEPARATION:
+        separation = reference.separation_vertex_face if vertex_face else reference.separation_edge_edge
+        return separation(batch.queries, batch.distances, threads)
+    if batch.question == PROXIMITY:
+        within = reference.within_vertex_face if vertex_face else reference.within_edge_edge
+        distance = reference.distance_vertex_face if vertex_face else reference.distance_edge_edge
+        return within(batch.queries, batch.distances, threads), distance(batch.queries, threads)
+    return reference.edge_face_intersect(batch.queries, threads), np.zeros(len(batch.queries))
+
+
+def answers(batch: Batch, accuracy: str, simd: str) -> Answers:
+    """What the core says."""
+    if batch.question in (CONTACT, SEPARATION):
+        return _times(batch, accuracy, simd)
+    return _of_snapshots(batch, accuracy, simd)
+
+
+def size_of(batch: Batch) -> np.ndarray:
+    """What an error of a value is measured by: a step, or the largest coordinate."""
+    if batch.question != PROXIMITY:
+        return np.ones(len(batch.queries))
+    return np.maximum(np.abs(batch.queries).max(axis=(1, 2)), np.finfo(float).tiny)
+
+
+CORE = {VERTEX_FACE: hc.test_vertex_face, EDGE_EDGE: hc.test_edge_edge}
+
+
+def _times(batch: Batch, accuracy: str, simd: str) -> Answers:
+    test = CORE[batch.kind]
+    if batch.question == CONTACT:
+        return test(batch.queries, accuracy=accuracy, simd=simd)
+    hit, toc = np.zeros(len(batch.queries), bool), np.full(len(batch.queries), np.inf)
+    distances, which = np.unique(batch.distances, return_inverse=True)
+    for rows in np.split(np.argsort(which, kind="stable"), np.cumsum(np.bincount(which))[:-1]):
+        d = float(distances[which[rows[0]]])
+        hit[rows], toc[rows] = test(batch.queries[rows], accuracy=accuracy, simd=simd, minimum_separation=d)
+    return hit, toc
+
+
+def _of_snapshots(batch: Batch, accuracy: str, simd: str) -> Answers:
+    detector = _detector(batch.kind, accuracy, simd)
+    hit, value = np.zeros(len(batch.queries), bool), np.full(len(batch.queries), np.inf)
+    for i, (points, distance) in enumerate(zip(batch.queries, batch.distances, strict=True)):
+        if batch.question == INTERSECTIONS:
+            found = (detector.intersections(points).ef == (0, 1, 1)).all(axis=1)
+            hit[i], value[i] = found.any(), 0.0
+            continue
+        near = detector.proximity(points, float(distance))
+        pairs, pair = (near.vf, (0, 0)) if batch.kind == VERTEX_FACE else (near.ee, (0, 1, 2, 3))
+        at = np.flatnonzero((pairs == pair).all(axis=1))
+        if len(at):
+            hit[i] = True
+            value[i] = (near.vf_distance if batch.kind == VERTEX_FACE else near.ee_distance)[at[0]]
+    return hit, value
+
+
+@functools.cache
+def _detector(kind: str, accuracy: str, simd: str) -> hc.Detector:
+    """For the points of one pair: a vertex and a face, or two edges, in one mesh; an edge and a face in two."""
+    scene = hc.Scene()
+    if kind == EDGE_FACE:
+        scene.add_mesh("edge", [[0, 1, 1]], n_vertices=2)
+        scene.add_mesh("face", [[0, 1, 2]], n_vertices=3)
+    else:
+        # A face that names a vertex twice is an edge.
+        scene.add_mesh("pair", [[1, 2, 3]] if kind == VERTEX_FACE else [[0, 1, 1], [2, 3, 3]], n_vertices=4)
+    return hc.Detector(scene, accuracy=accuracy, simd=simd, backend="cpu", threads=1)

@@ -1,0 +1,172 @@
+// SPDX-License-Identifier: Apache-2.0
+// How far double precision gets with the first root of a polynomial at which others are positive. Their Bernstein
+// coefficients are computed in integers and then rounded; from there on all errors are bounded.
+#pragma once
+
+#include <limits>
+#include <optional>
+
+#include "elementary/exact/polynomial.h"
+#include "elementary/exact/root.h"
+
+namespace hpccd::exact {
+
+// By its Bernstein coefficients, the largest of which is between 1/4 and 1.
+template <int D>
+struct Rounded {
+  std::array<double, D + 1> b;
+  int exponent;  // of the power of two that it was divided by
+
+  // A coefficient is rounded three times to begin with; each halving adds D means, each rounded once.
+  static double error(int halvings) { return (3 + D * halvings) * 0x1p-53; }
+
+  // 0: not certain.
+  static int sign_of(double x, int halvings) { return x > error(halvings) ? 1 : x < -error(halvings) ? -1 : 0; }
+  int sign_inside(int halvings) const {
+    const int s = sign_of(b[0], halvings);
+    for (int i = 1; i <= D; ++i)
+      if (sign_of(b[i], halvings) != s) return 0;
+    return s;
+  }
+  // Whatever the uncertain ones are: one change of sign, so one root, a simple one.
+  bool certainly_one_root(int halvings) const {
+    const int first = sign_of(b[0], halvings);
+    if (first * sign_of(b[D], halvings) >= 0) return false;
+    int i = 1;
+    while (sign_of(b[i], halvings) == first) ++i;
+    if (sign_of(b[i], halvings) == 0) ++i;
+    while (i < D && sign_of(b[i], halvings) == -first) ++i;
+    return i >= D;
+  }
+  bool all_uncertain(int halvings) const {
+    for (const double x : b)
+      if (sign_of(x, halvings)) return false;
+    return true;
+  }
+  void halve(Rounded& left, Rounded& right) const {
+    right = *this;
+    left.exponent = exponent;
+    for (int i = 0; i <= D; ++i) {
+      left.b[i] = right.b[0];
+      for (int j = 0; j < D - i; ++j) right.b[j] = 0.5 * (right.b[j] + right.b[j + 1]);
+    }
+  }
+  // The value at s in [0, 1], and the derivative there.
+  double at(double s, double& derivative) const {
+    auto x = b;
+    for (int i = D; i > 1; --i)
+      for (int j = 0; j < i; ++j) x[j] += s * (x[j + 1] - x[j]);
+    derivative = D * (x[1] - x[0]);
+    return x[0] + s * (x[1] - x[0]);
+  }
+};
+
+// Nothing for a polynomial that vanishes throughout.
+template <class Z, int D>
+bool round(const Polynomial<Z, D>& p, Rounded<D>& rounded) {
+  using W = Plus<Z, 1>;
+  std::array<W, D + 1> b;
+  for (int i = 0; i <= D; ++i) b[i] = W(p.c[i]);
+  // Those times the binomial coefficients.
+  for (int i = 0; i < D; ++i)
+    for (int j = 1; j <= D - i; ++j) b[j] = b[j] + b[j - 1];
+  int e[D + 1];
+  rounded.exponent = std::numeric_limits<int>::min();
+  double binomial = 1;
+  for (int i = 0; i <= D; ++i) {
+    const int s = sign(b[i]);
+    rounded.b[i] = s ? s * magnitude_of(b[i], e[i]) / binomial : 0;
+    if (s) rounded.exponent = std::max(rounded.exponent, e[i]);
+    binomial = binomial * (D - i) / (i + 1);
+  }
+  double most = 0;
+  for (int i = 0; i <= D; ++i) {
+    if (rounded.b[i] != 0) rounded.b[i] = std::ldexp(rounded.b[i], std::max(e[i] - rounded.exponent, -1000));
+    most = std::max(most, std::fabs(rounded.b[i]));
+  }
+  if (most == 0) return false;
+  int scale;
+  std::frexp(most, &scale);
+  rounded.exponent += scale;
+  for (double& x : rounded.b) x = std::ldexp(x, -scale);
+  return true;
+}
+
+// D: degree of the polynomial with the root, E: of those that must be positive.
+template <int D, int E>
+struct RoundedEvent {
+  static constexpr int most_conditions = 5;
+  Rounded<D> f;
+  Rounded<E> positive[most_conditions];
+  int n = 0;
+};
+
+// A root that is certainly the only one of [low, low + 1] / 2^halvings, and the polynomial there.
+template <int D>
+struct Bracket {
+  std::int64_t low;
+  int halvings;
+  Rounded<D> f;
+};
+
+// The first root below limit / 2^62, as a time: found(bracket) tells it of a bracket, undecided(low, halvings) of an
+// interval (its later end included) where doubles do not tell, if there is one.
+template <int D, int E, class Found, class Undecided>
+class EarlySearch {
+ public:
+  EarlySearch(std::int64_t limit, Found& found, Undecided& undecided)
+      : limit_(limit), found_(found), undecided_(undecided) {}
+
+  std::optional<std::int64_t> first(const RoundedEvent<D, E>& event, std::int64_t low = 0, int halvings = 0) {
+    if (low << (time_bits - halvings) >= limit_ || event.f.sign_inside(halvings)) return {};
+    RoundedEvent<D, E> left, right;
+    for (int i = 0; i < event.n; ++i) {
+      const int s = event.positive[i].sign_inside(halvings);
+      if (s < 0) return {};
+      if (s == 0) event.positive[i].halve(left.positive[left.n++], right.positive[right.n++]);
+    }
+    if (left.n == 0 && event.f.certainly_one_root(halvings)) return found_(Bracket<D>{low, halvings, event.f});
+    if (halvings == most_halvings || ++steps_ > most_steps || event.f.all_uncertain(halvings))
+      return undecided_(low, halvings);
+    event.f.halve(left.f, right.f);
+    if (const auto time = first(left, 2 * low, halvings + 1)) return time;
+    return first(right, 2 * low + 1, halvings + 1);
+  }
+
+ private:
+  static constexpr int most_halvings = 45, most_steps = 200;
+
+  std::int64_t limit_;
+  Found& found_;
+  Undecided& undecided_;
+  int steps_ = 0;
+};
+
+// floor(root 2^62)
+template <class Z, int D>
+std::int64_t time_of_root(const Polynomial<Z, D>& p, const Bracket<D>& found) {
+  const int bits = time_bits - found.halvings;
+  const double cells = std::ldexp(1.0, bits);
+  std::int64_t low = found.low << bits, high = (found.low + 1) << bits;
+  const std::int64_t begin = low;
+  double inside_low = 0, inside_high = 1, s = 0.5, derivative;
+  for (int i = 0; i < 60; ++i) {
+    const double value = found.f.at(s, derivative);
+    ((value < 0) == (found.f.b[0] < 0) ? inside_low : inside_high) = s;
+    double next = s - value / derivative;
+    if (!(next > inside_low && next < inside_high)) next = inside_low + 0.5 * (inside_high - inside_low);
+    if (std::fabs(next - s) < 0x1p-50) break;
+    s = next;
+  }
+  const auto value = [&](std::int64_t x) { return value_at(p, Time<Z>(x), time_bits); };
+  const auto newton = [&](const auto& v, std::int64_t x) {
+    int e;
+    const double size = magnitude_of(v, e);
+    found.f.at(static_cast<double>(x - begin) / cells, derivative);
+    return std::ldexp(size, e - found.f.exponent - D * time_bits) / derivative * cells;
+  };
+  close_in(low, high, found.f.b[0] < 0 ? -1 : 1, begin + static_cast<std::int64_t>(s * cells), value, newton);
+  return low;
+}
+
+}  // namespace hpccd::exact
