@@ -1,28 +1,70 @@
 # SPDX-License-Identifier: Apache-2.0
 """CDR bytes of a recording -> message objects of the packages that are installed here."""
 
+import dataclasses
+import functools
+from collections.abc import Callable
+
 from hpccd_ros.bag import message_definitions
 from hpccd_ros.bag.reader import RecordedTopic, RecordingError
 from hpccd_ros.middleware.message_types import message_class
 
-# Fields that were added behind the last one of a message, and the CDR of their value in a recording from before.
-_ADDED = {"hpccd/msg/ContactArray": ("uint32[] topology_versions", b"\0\0\0\0")}
+# Of CDR: a message begins behind these bytes, which tell its encoding.
+_HEADER = 4
 
 
-def completion(topic: RecordedTopic) -> bytes | None:
-    """What must follow each recorded message of `topic`, that it be one of the type that is installed here.
+@dataclasses.dataclass(frozen=True)
+class _Addition:
+    """Lines that a definition has got, all fields behind those it had; the CDR of their values in a recording from
+    before, and to how many bytes the first of them is aligned."""
+
+    lines: frozenset[str]
+    value: bytes
+    alignment: int
+
+
+# Oldest first.
+_ADDED = {
+    "hpccd/msg/ContactArray": (
+        _Addition(frozenset({"uint32[] topology_versions"}), bytes(4), 4),
+        _Addition(
+            frozenset({
+                "uint8 EDGE_FACE=2", "float64 minimum_separation", "uint32[] separation_mesh_a",
+                "uint32[] separation_mesh_b", "float64[] separations", "float64[] closest", "float64[] distance",
+            }),
+            bytes(8 + 5 * 4),
+            8,
+        ),
+    ),
+}  # fmt: skip
+
+
+def completion(topic: RecordedTopic) -> Callable[[bytes], bytes] | None:
+    """What makes of each recorded message of `topic` one of the type that is installed here, whose later fields are
+    empty or 0.
 
     None where it was recorded with another definition. Raises LookupError where the type is not installed.
     """
     installed = message_definitions.definition_text(topic.type_name)
     # The hash says whether two definitions have the same fields; the text would also differ by a comment.
     if topic.type_hash == message_definitions.type_hash(topic.type_name):
-        return b""
+        return bytes
     then, now = _fields(topic.definition), _fields(installed)
     if not topic.type_hash and then == now:
-        return b""
-    added, tail = _ADDED.get(topic.type_name, (None, None))
-    return tail if then == {name: [f for f in fields if f != added] for name, fields in now.items()} else None
+        return bytes
+    additions = _ADDED.get(topic.type_name, ())
+    for count in range(len(additions)):
+        lacking = additions[count:]
+        added = frozenset().union(*(addition.lines for addition in lacking))
+        if then == {name: [line for line in lines if line not in added] for name, lines in now.items()}:
+            return functools.partial(_completed, lacking=lacking)
+    return None
+
+
+def _completed(data: bytes, lacking: tuple[_Addition, ...]) -> bytes:
+    for addition in lacking:
+        data += bytes(-(len(data) - _HEADER) % addition.alignment) + addition.value
+    return data
 
 
 def _fields(definition: str) -> dict[str, list[str]]:
@@ -43,10 +85,10 @@ def make_decoder(topic: RecordedTopic):
     from rclpy.serialization import deserialize_message
 
     try:
-        cls, tail = message_class(topic.type_name), completion(topic)
+        cls, complete = message_class(topic.type_name), completion(topic)
     except LookupError as error:
         raise RecordingError(f"topic {topic.name} cannot be decoded: {error}") from error
-    if tail is None:
+    if complete is None:
         raise RecordingError(
             f"topic {topic.name} was recorded with another definition of {topic.type_name} "
             f"(recorded {topic.type_hash or 'without a hash'}, "
@@ -56,7 +98,7 @@ def make_decoder(topic: RecordedTopic):
 
     def decode(message):
         try:
-            return deserialize_message(message.data + tail if tail else message.data, cls)
+            return deserialize_message(complete(message.data), cls)
         except Exception as error:  # rclpy raises RMWError, RCLError or MemoryError, by what is wrong in the bytes
             raise RecordingError(
                 f"message of {topic.name} received at {message.log_time} ns is no valid {topic.type_name}: {error}"

@@ -12,10 +12,13 @@ a fraction of its step, from 0 (its start) to 1 (its end).
 """
 
 from hpccd_ros.client.contacts import ContactArrays, contacts_from_message, scene_contacts
+from hpccd_ros.client.distances import DistanceArrays, distances_from_message
 from hpccd_ros.client.meshes import topology_from_message, topology_message, vertices_from_message, vertices_message
 from hpccd_ros.client.topics import (
     CONTACTS_QOS,
     CONTACTS_TOPIC,
+    DISTANCES_QOS,
+    DISTANCES_TOPIC,
     TOPOLOGY_QOS,
     VERTICES_QOS,
     topology_topic,
@@ -30,12 +33,16 @@ __all__ = [
     "CONTACTS_QOS",
     "CONTACTS_TOPIC",
     "ContactArrays",
+    "DISTANCES_QOS",
+    "DISTANCES_TOPIC",
+    "DistanceArrays",
     "Layout",
     "SceneContacts",
     "TOPOLOGY_QOS",
     "Topology",
     "VERTICES_QOS",
     "contacts_from_message",
+    "distances_from_message",
     "prepare_environment",
     "scene_contacts",
     "topology_from_message",

@@ -2,14 +2,15 @@
 """The contacts of a step: the node's message to numpy arrays, numbered within each mesh or across the scene."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from hpccd.msg import ContactArray
 from numpy.typing import NDArray
 
+from hpccd_ros.client.arrays import field, meshes_of
 from hpccd_ros.detect.layout import Layout
-from hpccd_ros.middleware import contact_messages
+from hpccd_ros.detect.separation import Separation
+from hpccd_ros.middleware import contact_messages, separation_fields
 from hpccd_ros.middleware.contact_messages import SceneContacts
 
 
@@ -17,20 +18,29 @@ from hpccd_ros.middleware.contact_messages import SceneContacts
 class ContactArrays:
     """The N contacts of one message in their canonical order; features are numbered within their mesh.
 
-    mesh_names: of the scene. n_vertex_face: so many contacts, the first ones, are vertex-face, the others edge-edge.
+    mesh_names: of the scene. n_vertex_face, n_edge_edge, n_edge_face: so many contacts, in this order, are of each
+    kind; edge-face ones are told only by ``~/detect``, for query ``intersections``.
     mesh_a, mesh_b: (N,) uint32, indices into mesh_names: the mesh of each side.
     features_a: (N, 2) uint32, of mesh_a: vertex and ``ContactArray.NONE``, or the two vertices of the edge.
     features_b: (N, 2) uint32, of mesh_b: face and ``ContactArray.NONE``, or the two vertices of the edge.
-    toc: (N,) float64, time of contact as a fraction of the step, 0 .. 1.
-    points: (N, 3) float64, where the sides meet at toc, in the unit of the scene.
+    toc: (N,) float64, time of contact as a fraction of the step, 0 .. 1; (0,) in answers of one snapshot.
+    points: (N, 3) float64, where the sides meet at toc, in the unit of the scene; with a separation the middle between
+    their nearest points.
     normals: (N, 3) float64, of length one: from the face to the vertex, or from edge a to edge b; zero where there is
     no such side (ContactArray.msg tells when).
-    points and normals are (0, 3) where the node does not send them (its parameter ``outputs``). All are views of the
-    message, which they keep alive.
+    closest: (N, 2, 3) float64, the nearest points of both sides at toc, in the unit of the scene.
+    distance: (N,) float64, how far apart the sides are, in the unit of the scene: in answers to query ``proximity``,
+    else (0,).
+    minimum_separation: in force in the whole scene, in its unit; 0 where contacts touch. pair_separation: for the pairs
+    of meshes that have one of their own, by their names in the order of the scene.
+    points, normals and closest are (0, 3) and (0, 2, 3) where the node does not send them (its parameter ``outputs``).
+    All are views of the message, which they keep alive.
     """
 
     mesh_names: tuple[str, ...]
     n_vertex_face: int
+    n_edge_edge: int
+    n_edge_face: int
     mesh_a: NDArray[np.uint32]
     mesh_b: NDArray[np.uint32]
     features_a: NDArray[np.uint32]
@@ -38,9 +48,17 @@ class ContactArrays:
     toc: NDArray[np.float64]
     points: NDArray[np.float64]
     normals: NDArray[np.float64]
+    closest: NDArray[np.float64]
+    distance: NDArray[np.float64]
+    minimum_separation: float
+    pair_separation: dict[tuple[str, str], float]
 
     def __len__(self) -> int:
-        return len(self.toc)
+        return len(self.mesh_a)
+
+
+# Fields that may be empty, and the shape of what they hold for each contact.
+_OPTIONAL: dict[str, tuple[int, ...]] = {"points": (3,), "normals": (3,), "closest": (2, 3), "distance": ()}
 
 
 def contacts_from_message(message: ContactArray) -> ContactArrays:
@@ -49,32 +67,40 @@ def contacts_from_message(message: ContactArray) -> ContactArrays:
     Raises ValueError where the arrays of the message do not fit together, which those of the node always do.
     """
     kind = np.frombuffer(message.kind, np.uint8)
-    count, n_vertex_face = len(kind), int(np.count_nonzero(kind == ContactArray.VERTEX_FACE))
-    of_vf, of_ee = kind[:n_vertex_face], kind[n_vertex_face:]
-    if (of_vf != ContactArray.VERTEX_FACE).any() or (of_ee != ContactArray.EDGE_EDGE).any():
-        raise ValueError("message: kind must hold those of vertex-face contacts, then those of edge-edge contacts")
-    arrays = ContactArrays(
+    if (kind > ContactArray.EDGE_FACE).any() or (kind[1:] < kind[:-1]).any():
+        raise ValueError("message: kind must hold those of vertex-face contacts, then edge-edge, then edge-face")
+    count, (n_vertex_face, n_edge_edge, n_edge_face) = len(kind), np.bincount(kind, minlength=3).tolist()
+    of_snapshot = n_edge_face > 0 or len(message.distance) > 0
+    separation = _separation_of(message)
+    order = {name: number for number, name in enumerate(message.mesh_names)}
+    optional = {
+        name: field(message, name, np.float64, (count if len(getattr(message, name)) else 0, *shape))
+        for name, shape in _OPTIONAL.items()
+    }
+    return ContactArrays(
         tuple(message.mesh_names),
         n_vertex_face,
-        mesh_a=_field(message, "mesh_a", np.uint32, (count,)),
-        mesh_b=_field(message, "mesh_b", np.uint32, (count,)),
-        features_a=_field(message, "features_a", np.uint32, (count, 2)),
-        features_b=_field(message, "features_b", np.uint32, (count, 2)),
-        toc=_field(message, "toc", np.float64, (count,)),
-        points=_field(message, "points", np.float64, (count, 3) if len(message.points) else (0, 3)),
-        normals=_field(message, "normals", np.float64, (count, 3) if len(message.normals) else (0, 3)),
+        n_edge_edge,
+        n_edge_face,
+        mesh_a=meshes_of(message, "mesh_a", count),
+        mesh_b=meshes_of(message, "mesh_b", count),
+        features_a=field(message, "features_a", np.uint32, (count, 2)),
+        features_b=field(message, "features_b", np.uint32, (count, 2)),
+        toc=field(message, "toc", np.float64, (0 if of_snapshot else count,)),
+        **optional,
+        minimum_separation=separation.minimum,
+        pair_separation={
+            (a, b) if order[a] <= order[b] else (b, a): distance for a, b, distance in separation.pairs
+        },
     )
-    for name in ("mesh_a", "mesh_b"):
-        if (getattr(arrays, name) >= len(arrays.mesh_names)).any():
-            raise ValueError(f"message: {name} names a mesh beyond the {len(arrays.mesh_names)} of mesh_names")
-    return arrays
 
 
-def _field(message: ContactArray, name: str, dtype: type[Any], shape: tuple[int, ...]) -> NDArray[Any]:
-    flat = np.frombuffer(getattr(message, name), dtype)
-    if flat.size != np.prod(shape):
-        raise ValueError(f"message: {name} has {flat.size} values, {np.prod(shape)} were expected for shape {shape}")
-    return flat.reshape(shape)
+def _separation_of(message: ContactArray) -> Separation:
+    """The separation in force. Raises ValueError where the fields that tell it do not fit together."""
+    try:
+        return separation_fields.read_separation(message)
+    except ValueError as error:
+        raise ValueError(f"message: {error}") from None
 
 
 def scene_contacts(message: ContactArray, layout: Layout) -> SceneContacts:
@@ -82,7 +108,9 @@ def scene_contacts(message: ContactArray, layout: Layout) -> SceneContacts:
 
     layout: ``Layout.of(mesh_names, topologies)`` of the meshes in the order of ``message.mesh_names``.
     Returns ``vf`` (N, 2) uint32, vertex and face; ``vf_toc`` (N,) float64; ``ee`` (M, 4) uint32, two edges by their
-    vertices; ``ee_toc`` (M,) float64; ``points`` and ``normals`` (N+M, 3) float64, or (0, 3) where not sent.
+    vertices; ``ee_toc`` (M,) float64; ``points`` and ``normals`` (N+M, 3) float64, or (0, 3) where not sent;
+    ``closest`` (N+M, 2, 3) float64, or (0, 2, 3). Of query ``proximity`` ``vf_distance`` (N,) and ``ee_distance`` (M,)
+    take the place of the times; of query ``intersections`` there is only ``ef`` (K, 3) uint32, edge and face.
     Raises ValueError where the layout is of other meshes or of other versions of their topologies than the message.
     """
     contacts = contacts_from_message(message)

@@ -13,8 +13,13 @@ VERTICES_QOS: QoSProfile = qos.vertices("reliable", 10)
 #: Subscription to contacts: reliable, the last 10 kept for a reader that is late now and then.
 CONTACTS_QOS: QoSProfile = qos.CONTACTS
 
+#: Subscription to distances, in the same way.
+DISTANCES_QOS: QoSProfile = qos.DISTANCES
+
 #: Relative to the namespace of the node, as the names below.
 CONTACTS_TOPIC: str = topic_names.CONTACTS
+#: Published while the node's parameter ``distances`` is true.
+DISTANCES_TOPIC: str = topic_names.DISTANCES
 
 
 def topology_topic(mesh: str) -> str:

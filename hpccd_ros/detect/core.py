@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """The core's detector: its options, and what it cannot work with, in its own words. No ROS."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 import hpccd_core as hc
+from hpccd_ros.detect.separation import NONE, Separation
 from hpccd_ros.frames.types import Topology
 
 # What the core raises for bad input, options that are not built, and lack of memory or of a device.
@@ -14,31 +15,45 @@ CORE_ERRORS = (ValueError, TypeError, RuntimeError, MemoryError)
 
 @dataclass(frozen=True)
 class Options:
-    """Arguments of hpccd_core.Detector."""
+    """Arguments of hpccd_core.Detector, and what may change without another one: the separation of pairs of meshes, and
+    whether the smallest ``distances`` at the end of a step are computed too.
+    """
 
     accuracy: str = "exact"
     backend: str = "auto"
     threads: int = 0
     report: str = "all"
     outputs: tuple[str, ...] = ()
+    separation: Separation = NONE
+    distances: bool = False
+
+    def same_detector(self, other: "Options") -> bool:
+        """Whether a detector made with one may go on with the other."""
+        return replace(self, separation=NONE, distances=False) == replace(other, separation=NONE, distances=False)
 
 
 def make_detector(scene: hc.Scene, options: Options) -> hc.Detector:
     """Detector with these options. Raises what the core raises."""
-    return hc.Detector(
+    detector = hc.Detector(
         scene,
         accuracy=options.accuracy,
         backend=options.backend,
         threads=options.threads,
         report=options.report,
         outputs=options.outputs,
+        minimum_separation=options.separation.minimum,
     )
+    for mesh_a, mesh_b, distance in options.separation.pairs:
+        detector.set_separation(mesh_a, mesh_b, distance)
+    return detector
 
 
 def unusable_options(options: Options) -> str | None:
     """Why the core cannot work with these options on this machine, or None."""
     scene = hc.Scene()
-    scene.add_mesh("probe", np.array([[0, 1, 2]], np.uint32))
+    names = {name for entry in options.separation.pairs for name in entry[:2]}
+    for name in sorted(names) or ["probe"]:
+        scene.add_mesh(name, np.array([[0, 1, 2]], np.uint32))
     try:
         make_detector(scene, options)
     except CORE_ERRORS as error:

@@ -2,13 +2,14 @@
 """From the two frames of a step to its contacts. No ROS, no threads of its own."""
 
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import hpccd_core as hc
 from hpccd_ros.detect.cancellation import Cancellation
 from hpccd_ros.detect.core import Options, make_detector
 from hpccd_ros.detect.layout import Layout
 from hpccd_ros.detect.scene import SceneBuilder
+from hpccd_ros.detect.separation import change_separation, count_near
 from hpccd_ros.frames.types import SceneFrame
 
 
@@ -16,7 +17,8 @@ from hpccd_ros.frames.types import SceneFrame
 class Detection:
     """The contacts of one step and how they were found.
 
-    ``backend``, ``threads``: what was used. ``detect_ms``: wall time of the core's call.
+    ``backend``, ``threads``: what was used. ``detect_ms``: wall time of the core's call. ``gaps``: the smallest
+    distance of each pair of meshes at the end, where the options ask for it.
     """
 
     start: SceneFrame
@@ -29,6 +31,12 @@ class Detection:
     detect_ms: float
     profile: dict[str, float] = field(default_factory=dict)
     stats: dict[str, float] = field(default_factory=dict)
+    gaps: list[hc.Gap] | None = None
+
+    @property
+    def near(self) -> int:
+        """How many of the contacts are of meshes that have a separation."""
+        return count_near(self.contacts, self.layout, self.options.separation)
 
 
 class StepDetector:
@@ -48,6 +56,11 @@ class StepDetector:
         self._detector_options: Options | None = None
         self._cancellation = Cancellation()
 
+    @property
+    def mesh_names(self) -> tuple[str, ...]:
+        """In the order of the scene."""
+        return self._names
+
     def cancel(self) -> None:
         """From any thread, for good: the detection under way, and all later ones, raise hc.Cancelled."""
         self._cancellation.cancel()
@@ -62,9 +75,19 @@ class StepDetector:
     def prepare_detector(self) -> None:
         """The detector of the scene, with the options of now. Raises what the core raises."""
         options = self.options
-        if self._detector is None or options != self._detector_options:
+        if self._detector is None or not options.same_detector(self._detector_options):
             self._detector = self._cancellation.guard(make_detector(self._scene, options))
-            self._detector_options = options
+        elif options.separation != (before := self._detector_options.separation):
+            detector, self._detector = self._detector, None  # none where only a part of the change is made
+            change_separation(detector, self._names, before, options.separation)
+            self._detector = detector
+        self._detector_options = options
+
+    def distances(self, frame: SceneFrame) -> list[hc.Gap]:
+        """The smallest distance of each pair of meshes in ``frame``. Raises what the core raises."""
+        self.prepare_scene(frame)
+        self.prepare_detector()
+        return self._detector.distances(self._builder.concatenate(frame, frame))
 
     def detect(self, start: SceneFrame, end: SceneFrame) -> Detection:
         """The contacts on the way from ``start`` to ``end``, of the same scene. Raises what the core raises."""
@@ -73,7 +96,7 @@ class StepDetector:
         began = time.perf_counter()
         contacts = self._detector.detect(self._builder.concatenate(start, end), self._builder.concatenate(end, end))
         detect_ms = 1e3 * (time.perf_counter() - began)
-        return Detection(
+        found = Detection(
             start,
             end,
             contacts,
@@ -85,3 +108,5 @@ class StepDetector:
             dict(self._detector.profile),
             dict(self._detector.stats),
         )
+        # Only now: profile and stats are of the last call.
+        return replace(found, gaps=self.distances(end)) if found.options.distances else found

@@ -13,10 +13,11 @@ if TYPE_CHECKING:  # writers of files need the names and no ROS
     from rclpy.node import Node
 
 CONTACTS = "contacts"
+DISTANCES = "distances"
 MARKERS = "markers"
 SURFACE = "surface"
 DIAGNOSTICS = "/diagnostics"
-PUBLISHED = (CONTACTS, MARKERS, SURFACE, DIAGNOSTICS)
+PUBLISHED = (CONTACTS, DISTANCES, MARKERS, SURFACE, DIAGNOSTICS)
 
 TRANSFORMS = "transforms"
 TRANSFORMS_STATIC = "transforms_static"

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """All that the node counts, from its start to its end. No ROS."""
 
+import math
 import time
 from collections import Counter
 from collections.abc import Callable
@@ -50,17 +51,22 @@ class Accounts:
     def answered(self, found: Detection, total: int, sent: int) -> None:
         """One step: ``total`` contacts were found, ``sent`` of them have just been published."""
         latency_ms = 1e3 * (time.monotonic() - found.end.received)
+        near = found.near
         last = {
             "accuracy": found.options.accuracy,
             "backend": found.backend,
             "threads": found.threads,
             "contacts": total,
             "contacts_sent": sent,
+            "near": near,
+            "minimum_separation": found.options.separation.minimum,
             "first_toc": float(found.contacts.first_toc),
             "step": found.end.step,
             **{f"core.{name}": value for name, value in found.stats.items()},
         }
-        self.metrics.detected(len(found.end.fresh), latency_ms, found.detect_ms, found.profile, last)
+        if found.gaps is not None:
+            last["smallest_distance"] = min((gap.distance for gap in found.gaps), default=math.inf)
+        self.metrics.detected(len(found.end.fresh), latency_ms, found.detect_ms, found.profile, last, near)
 
     def unanswered(self, frame: SceneFrame, reason: Reason) -> None:
         """A frame that the detection was given and that gets no answer."""

@@ -1,17 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The answer to a step on its topics: contacts, and what viewers show of them."""
+"""The answer to a step on its topics: contacts, smallest distances on request, and what viewers show of them."""
 
 import time
 from typing import Any
 
 import numpy as np
-from hpccd.msg import ContactArray
+from hpccd.msg import ContactArray, DistanceArray
 from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Header
 from visualization_msgs.msg import MarkerArray
 
 from hpccd_ros.detect.step_detector import Detection
-from hpccd_ros.middleware import contact_messages, fields, qos, topic_names
+from hpccd_ros.middleware import contact_messages, fields, qos, separation_fields, snapshot_messages, topic_names
 from hpccd_ros.node.life_cycle import GuardedLifecycleNode
 from hpccd_ros.node.markers import contact_markers, surface_cloud
 
@@ -22,6 +22,7 @@ class ContactsPublisher:
     def __init__(self, node: GuardedLifecycleNode, settings: dict[str, Any]) -> None:
         self._settings = settings
         self._contacts = node.configured_publisher(ContactArray, topic_names.CONTACTS, qos.CONTACTS)
+        self._distances = node.configured_publisher(DistanceArray, topic_names.DISTANCES, qos.DISTANCES)
         self._markers = node.configured_publisher(MarkerArray, topic_names.MARKERS, qos.MARKERS)
         self._surface = node.configured_publisher(PointCloud2, topic_names.SURFACE, qos.MARKERS)
         self._show_after = 0.0
@@ -46,9 +47,19 @@ class ContactsPublisher:
             max_contacts=self._settings["max_contacts"],
             outputs=tuple(self._settings["outputs"]),
         )
+        separation_fields.fill_separation(message, found.options.separation)
         message.dropped_frames = dropped_frames
         self._contacts.publish(message)
+        if found.gaps is not None:
+            self._publish_distances(found, message.header)
         return message
+
+    def _publish_distances(self, found: Detection, header: Header) -> None:
+        message = DistanceArray(
+            header=header, step=found.end.step, accuracy=found.options.accuracy, backend=found.backend
+        )
+        snapshot_messages.fill_distances(message, found.gaps, found.layout)
+        self._distances.publish(message)
 
     def show(self, found: Detection, header: Header) -> None:
         """For viewers, where parameter markers is set: no more often than they want it."""
@@ -63,6 +74,7 @@ class ContactsPublisher:
             contact_markers(
                 np.asarray(found.contacts.points),
                 np.asarray(found.contacts.normals),
+                np.asarray(found.contacts.closest),
                 len(found.contacts.vf),
                 stamp=header.stamp,
                 frame_id=header.frame_id,

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a request to ``~/detect`` asks for: checked, and computed."""
+"""What a request to ``~/detect`` brings: meshes, topologies and positions, checked; then its query is answered."""
 
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from hpccd.msg import ContactArray, MeshVertices
+from hpccd.msg import MeshVertices
 from hpccd.srv import Detect
 
 from hpccd_ros.base.quoting import listed, quoted, repeated, shortened
@@ -14,11 +14,8 @@ from hpccd_ros.detect.core import Options, make_detector
 from hpccd_ros.detect.layout import Layout
 from hpccd_ros.detect.scene import SceneBuilder
 from hpccd_ros.frames.types import Topology
-from hpccd_ros.middleware import contact_messages, fields, mesh_messages
-
-
-class RequestError(ValueError):
-    """A request that cannot be answered; the text says what to mend."""
+from hpccd_ros.middleware import fields, mesh_messages
+from hpccd_ros.node.detect_query import ANSWERS, Answer, Asked, RequestError, requested_query
 
 
 @dataclass(frozen=True)
@@ -35,38 +32,47 @@ def compute(
     options: Options,
     limits: dict[str, Any],
     cancellation: Cancellation,
-) -> ContactArray:
+) -> Answer:
     """limits: max_meshes, max_vertices, max_faces, max_contacts. Raises RequestError, and what the core raises."""
-    names = list(request.mesh_names) or list(scene.topologies)
-    if not names:
-        raise RequestError("mesh_names: empty, and the node has no meshes of its own")
-    most = limits["max_meshes"]
-    if len(names) > most:
-        raise RequestError(f"mesh_names: {len(names)} meshes, at most {most} are taken (parameter max_meshes)")
-    if len(set(names)) != len(names):
-        raise RequestError(f"mesh_names: names must differ, {repeated(names)} is there twice")
-    for field in ("topologies", "start", "end"):
+    query = requested_query(request)
+    names = _names(request, scene, limits["max_meshes"])
+    for field in ("topologies", "end") if query.of_snapshot else ("topologies", "start", "end"):
         given = len(getattr(request, field))
         if given != len(names) and not (field == "topologies" and given == 0):
             raise RequestError(f"{field}: {given} entries for {len(names)} meshes ({listed(names)})")
     topologies = tuple(_topology(request, scene, limits, i, name) for i, name in enumerate(names))
-    start = _vertices("start", names, request.start, topologies, limits["max_vertices"])
     end = _vertices("end", names, request.end, topologies, limits["max_vertices"])
-    options = replace(options, accuracy=request.accuracy or options.accuracy, report=request.report or "all")
-    detector = cancellation.guard(make_detector(scene.builder.among(names).build(topologies), options))
-    contacts = detector.detect(start, end)
-    message = ContactArray(accuracy=options.accuracy, backend=detector.backend)
-    message.header = request.end[0].header
-    message.start = request.start[0].header.stamp
-    message.step = request.end[0].step
-    contact_messages.fill_contacts(
-        message,
-        contacts,
-        Layout.of(tuple(names), topologies),
-        max_contacts=limits["max_contacts"],
-        outputs=options.outputs,
+    start = end
+    if not query.of_snapshot:
+        start = _vertices("start", names, request.start, topologies, limits["max_vertices"])
+    options = replace(
+        options,
+        accuracy=request.accuracy or options.accuracy,
+        report=request.report or "all",
+        separation=query.separation or options.separation.among(names),
     )
-    return message
+    detector = cancellation.guard(make_detector(scene.builder.among(names).build(topologies), options))
+    asked = Asked(start, end, detector, Layout.of(tuple(names), topologies), options, limits["max_contacts"])
+    answer = ANSWERS[query.name](asked, query)
+    for message in (answer.contacts, answer.distances):
+        if message is not None:
+            message.header, message.step = request.end[0].header, request.end[0].step
+            message.accuracy, message.backend = options.accuracy, detector.backend
+    if answer.contacts is not None:
+        first = request.end if query.of_snapshot else request.start
+        answer.contacts.start = first[0].header.stamp
+    return answer
+
+
+def _names(request: Detect.Request, scene: NodeScene, most: int) -> list[str]:
+    names = list(request.mesh_names) or list(scene.topologies)
+    if not names:
+        raise RequestError("mesh_names: empty, and the node has no meshes of its own")
+    if len(names) > most:
+        raise RequestError(f"mesh_names: {len(names)} meshes, at most {most} are taken (parameter max_meshes)")
+    if len(set(names)) != len(names):
+        raise RequestError(f"mesh_names: names must differ, {repeated(names)} is there twice")
+    return names
 
 
 def _topology(request: Detect.Request, scene: NodeScene, limits: dict[str, Any], index: int, name: str) -> Topology:

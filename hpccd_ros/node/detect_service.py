@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Service ``~/detect``: two snapshots in, contacts out; computed outside of the executor."""
+"""Service ``~/detect``: snapshots in, contacts or distances out; computed outside of the executor."""
 
 import math
 import threading
@@ -21,7 +21,8 @@ from hpccd_ros.detect.core import CORE_ERRORS
 from hpccd_ros.middleware import qos, topic_names
 from hpccd_ros.node.accounts import Accounts
 from hpccd_ros.node.configuration import Configuration
-from hpccd_ros.node.detect_request import NodeScene, RequestError, compute
+from hpccd_ros.node.detect_query import RequestError
+from hpccd_ros.node.detect_request import NodeScene, compute
 from hpccd_ros.node.life_cycle import GuardedLifecycleNode
 
 # Requests that may lie in the queue of the service beside those that find a place: a burst of them is answered "busy"
@@ -154,16 +155,18 @@ class DetectService:
                 "ask for less (report first), or set a longer time_limit",
             )
         try:
-            contacts = job.result()
+            answer = job.result()
         except RequestError:
             raise
         except (Cancelled, CancelledError):  # only `close` ends a job that is awaited
             return self._refuse(response, "stopped", STOPPED)
         except CORE_ERRORS as error:
             return self._refuse(response, "failed", f"{type(error).__name__}: {error}")
-        response.contacts = contacts
-        response.success = True
-        response.message = f"{contacts.total} contacts"
+        if answer.contacts is not None:
+            response.contacts = answer.contacts
+        if answer.distances is not None:
+            response.distances = answer.distances
+        response.success, response.message = True, answer.text
         self._ended["answered"] += 1
         return response
 

@@ -15,12 +15,15 @@ from hpccd_ros.middleware import fields
 # Colour-blind safe pair (Okabe and Ito): vertex-face orange, edge-edge blue.
 _VERTEX_FACE = ColorRGBA(r=0.90, g=0.62, b=0.0, a=1.0)
 _EDGE_EDGE = ColorRGBA(r=0.0, g=0.45, b=0.70, a=1.0)
+# Of the same set: sky blue.
+_NEAR = ColorRGBA(r=0.34, g=0.71, b=0.91, a=1.0)
 _NORMAL_LENGTH = 10.0  # in point diameters
 
 
 def contact_markers(
     points: np.ndarray,
     normals: np.ndarray,
+    closest: np.ndarray,
     n_vertex_face: int,
     *,
     stamp: Time,
@@ -28,10 +31,11 @@ def contact_markers(
     size: float,
     limit: int,
 ) -> MarkerArray:
-    """Always three markers, so that old ones disappear: vertex-face, edge-edge (points), normals (lines).
+    """Always four markers, so that old ones disappear: vertex-face, edge-edge (points), normals, and between the sides
+    of pairs that are near (lines).
 
-    points, normals: (N,3), the first ``n_vertex_face`` of vertex-face contacts. limit: most contacts drawn,
-    taken evenly from the whole list.
+    points, normals: (N,3), the first ``n_vertex_face`` of vertex-face contacts. closest: (N,2,3) nearest points of both
+    sides, or (0,2,3) where nothing is to stay apart. limit: most contacts drawn, taken evenly from the whole list.
     """
     chosen = np.arange(len(points))
     if len(points) > limit:
@@ -56,7 +60,9 @@ def contact_markers(
         ColorRGBA(r=0.3, g=0.3, b=0.3, a=1.0),
         lines,
     )
-    return MarkerArray(markers=[*spheres, normal])
+    gaps = (closest[chosen] if len(closest) else closest).reshape(-1, 3)
+    near = _marker(3, "near", Marker.LINE_LIST, stamp, frame_id, 0.2 * size, _NEAR, gaps)
+    return MarkerArray(markers=[*spheres, normal, near])
 
 
 def surface_cloud(vertices: Sequence[np.ndarray], header: Header) -> PointCloud2:

@@ -20,6 +20,7 @@ class Metrics:
         self.answered = 0
         self.detections = 0
         self.first_frames = 0
+        self.near = 0
         self.failures = 0
         self.last_failure = ""
         self._failing = False
@@ -49,11 +50,14 @@ class Metrics:
         detect_ms: float,
         profile: Mapping[str, float],
         last: Mapping[str, object],
+        near: int = 0,
     ) -> None:
-        """One step was answered. latency_ms: from the arrival of its last message to its contacts sent."""
+        """One step was answered. latency_ms: from the arrival of its last message to its contacts sent. near: pairs of
+        features that came nearer than their meshes' separation."""
         with self._lock:
             self.detections += 1
             self.answered += messages
+            self.near += near
             self._failing = False
             self._latency_ms.append(latency_ms)
             self._detect_ms.append(detect_ms)
@@ -76,6 +80,7 @@ class Metrics:
                 "answered": self.answered,
                 "detections": self.detections,
                 "first_frames": self.first_frames,
+                "near": self.near,
                 "failures": self.failures,
                 "failing": self._failing,
                 "last_failure": self.last_failure,

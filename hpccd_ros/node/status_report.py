@@ -115,6 +115,7 @@ class Reporter:
             "detections": data["detections"],
             "first_frames": data["first_frames"],
             "failures": data["failures"],
+            "near_total": data["near"],
         }
         for kind in ("latency_ms", "detect_ms"):
             for name, text in percentiles(data[kind]).items():

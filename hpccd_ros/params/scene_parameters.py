@@ -7,9 +7,11 @@ from hpccd_core.options import ACCURACIES, OUTPUTS
 from hpccd_ros.base.quoting import listed, quoted, shortened
 from hpccd_ros.detect.core import Options
 from hpccd_ros.detect.scene import SceneBuilder
+from hpccd_ros.detect.separation import NONE, Separation
 from hpccd_ros.frames.pipeline import FramePipeline
 from hpccd_ros.frames.rigid import Rigid
 from hpccd_ros.frames.types import AssemblyRules, MeshSettings
+from hpccd_ros.params.table import FARTHEST
 from hpccd_ros.params.values import ParameterError
 
 MeshValues = dict[str, dict[str, Any]]
@@ -42,16 +44,47 @@ def frame_pipeline(settings: dict[str, Any], meshes: MeshValues, max_pending: in
 
 def detector_options(settings: dict[str, Any]) -> Options:
     """What the node's detector computes, and how."""
-    outputs = set(settings["outputs"])
+    outputs, wanted = set(settings["outputs"]), separation(settings)
     if settings["markers"]:
         outputs |= {"points", "normals"}
+        if wanted != NONE:
+            outputs.add("closest")
     return Options(
         settings["accuracy"],
         settings["backend"],
         settings["threads"],
         settings["report"],
         tuple(name for name in OUTPUTS if name in outputs),
+        wanted,
+        settings["distances"],
     )
+
+
+def separation(settings: dict[str, Any]) -> Separation:
+    """Parameters ``minimum_separation`` and ``pair_separation``. Raises ParameterError."""
+    found: dict[frozenset[str], tuple[str, str, float]] = {}
+    for text in settings["pair_separation"]:
+        *names, number = text.split(":")
+        distance = _distance(number)
+        if len(names) != 2 or not set(names) <= set(settings["meshes"]) or distance is None:
+            raise ParameterError(
+                f"pair_separation: {quoted(text)} must be NAME:NAME:DISTANCE with meshes out of {_names(settings)} "
+                f"and a distance from 0 to {FARTHEST:g}"
+            )
+        entry = (*names, distance)
+        pair = frozenset(names)
+        if found.setdefault(pair, entry)[2] != distance:
+            other = ":".join(map(str, found[pair]))
+            raise ParameterError(f"pair_separation: {text!r} contradicts {other!r}; leave one out")
+    return Separation(settings["minimum_separation"], tuple(found.values()))
+
+
+def _distance(text: str) -> float | None:
+    try:
+        number = float(text)
+    except ValueError:
+        return None
+    return number if 0 <= number <= FARTHEST else None
 
 
 def ignored_pairs(settings: dict[str, Any]) -> tuple[tuple[str, str], ...]:
@@ -98,6 +131,7 @@ def poses(meshes: MeshValues) -> dict[str, Rigid]:
 def check(settings: dict[str, Any], meshes: MeshValues) -> None:
     """What the values cannot tell one by one. Raises ParameterError."""
     scene_builder(settings, meshes)
+    separation(settings)
     poses(meshes)
     for name, values in meshes.items():
         if values["transform"] == "tf" and not settings["frame_id"]:

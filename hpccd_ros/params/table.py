@@ -36,6 +36,9 @@ LEAST_SPLIT_SIZE = 0.01  # MB
 LEAST_SPLIT_TIME = 0.1  # s
 MOST_SPLIT = 1e9  # MB, s
 
+# The largest coordinate that the core takes: no distance between two points is worth asking for beyond a few of it.
+FARTHEST = 1e150
+
 SCENE_ROWS = (
     Row(
         "meshes",
@@ -79,6 +82,30 @@ DETECTION_ROWS = (
         change=ALWAYS,
     ),
     Row("outputs", "string[]", [], "Computed and sent beside the contacts", choices=OUTPUTS, change=ALWAYS),
+    Row(
+        "minimum_separation",
+        "float",
+        0.0,
+        "A contact is a pair of features that comes this near, or touches; 0: that touches. Keep it below the shortest "
+        "edge: neighbours count that share no vertex",
+        unit="unit of the vertices",
+        span=(0.0, FARTHEST),
+        change=ALWAYS,
+    ),
+    Row(
+        "pair_separation",
+        "string[]",
+        [],
+        "Pairs of meshes with a separation of their own, each as NAME:NAME:DISTANCE; the same name twice: within it",
+        change=ALWAYS,
+    ),
+    Row(
+        "distances",
+        "bool",
+        False,
+        "Publish on distances the smallest distance of each pair of meshes at the end of each step",
+        change=ALWAYS,
+    ),
     Row(
         "max_contacts",
         "int",

@@ -29,7 +29,8 @@ def draw_step(step: ReplayedStep, path, history: History | None = None, *, title
     of = f" of {max(history.steps)}" if history is not None else ""
     facts = [
         f"{triangles:,} triangles", f"{len(found.vf):,} vertex-face", f"{len(found.ee):,} edge-edge", first,
-        f"{step.milliseconds:.1f} ms", accuracy, f"hash {found.hash:016x}",
+        f"{step.milliseconds:.1f} ms", accuracy, step.separation.text and f"separation {step.separation.text}",
+        f"hash {found.hash:016x}",
     ]  # fmt: skip
     drawn = picture.Picture(
         meshes,

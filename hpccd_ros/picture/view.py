@@ -24,7 +24,8 @@ def main(args) -> int:
     outputs = ("points", "normals") if in_rerun else ("points",)
     with Recording(source) as recording:
         setup = recorded_setup.of_recording(recording, args.params)
-        steps = (s for s in Replay(recording, setup, outputs=outputs).steps() if s.contacts is not None)
+        replay = Replay(recording, setup, outputs=outputs, distances=False)
+        steps = (s for s in replay.steps() if s.contacts is not None)
         if in_rerun:
             _show_in_rerun(args, steps, source, title, view)
         elif args.every is None:

@@ -6,7 +6,10 @@ import dataclasses
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 
 from hpccd_ros.middleware import qos, qos_overrides, topic_names, transform_topics
-from hpccd_ros.middleware.message_types import CONTACTS, POINTS, TOPOLOGY, VERTICES
+from hpccd_ros.middleware.message_types import CONTACTS, DISTANCES, POINTS, TOPOLOGY, VERTICES
+
+# Relative name -> type of what the node computes.
+ANSWERS = {topic_names.CONTACTS: CONTACTS, topic_names.DISTANCES: DISTANCES}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -35,7 +38,8 @@ def of_node(parameters: dict) -> list[Wanted]:
             wanted.append(Wanted(topic_names.points(mesh), POINTS))
         else:
             wanted.append(Wanted(topic_names.vertices(mesh), VERTICES))
-    return [*wanted, Wanted(topic_names.CONTACTS, CONTACTS)]
+    # Distances whether they are asked for now or not: they may be at any time.
+    return [*wanted, *(Wanted(name, type_name) for name, type_name in ANSWERS.items())]
 
 
 def types_by_role(meshes) -> dict[str, str]:
@@ -44,7 +48,7 @@ def types_by_role(meshes) -> dict[str, str]:
     return {
         **{topic_names.of_mesh(mesh, kind): type_name for mesh in meshes for kind, type_name in of_mesh.items()},
         **{topic.name: topic.type_name for topic in transform_topics.ALL.values()},
-        topic_names.CONTACTS: CONTACTS,
+        **ANSWERS,
     }
 
 
@@ -64,7 +68,7 @@ def as_node_asks(node, name: str, topic: Wanted, depth: int, *, recorded, vertic
     parameters of the node (qos_overrides) say otherwise.
     """
     default = vertices if topic.type_name in (VERTICES, POINTS) else ReliabilityPolicy.RELIABLE
-    entity = "publisher" if topic.type_name == CONTACTS else "subscription"
+    entity = "publisher" if topic.type_name in ANSWERS.values() else "subscription"
     asked = qos_overrides.reliability(recorded, entity, name, default)
     return _profile(asked == ReliabilityPolicy.RELIABLE, topic, depth)
 

@@ -6,14 +6,16 @@ import numpy as np
 from hpccd_core.options import ACCURACIES
 from hpccd_ros.detect.layout import Layout
 from hpccd_ros.middleware import contact_messages
+from hpccd_ros.middleware.separation_fields import read_separation
 
 
 def difference(recorded, contacts, layout: Layout, any_one: bool = False) -> str | None:
     """None where `recorded` (ContactArray) holds just what `contacts` (of the core) would be sent as.
 
-    Compared bit for bit: pairs, times, their order, totals, first time and hash. Points and normals are derived
-    from these and not compared. any_one: the node stopped at the first contact found (report "any"), which depends
-    on the timing of its threads: there must be one if there is any, and it must be one of `contacts`, which are all.
+    Compared bit for bit: pairs, times, their order, totals, first time and hash. Points, normals and nearest
+    points are derived from these and not compared. any_one: the node stopped at the first contact found (report "any"),
+    which depends on the timing of its threads: there must be one if there is any, and it must be one of `contacts`,
+    which are all.
     """
     total = len(contacts.vf) + len(contacts.ee)
     then, now = list(recorded.topology_versions), list(layout.topology_versions)
@@ -56,13 +58,19 @@ def _malformed(message, layout) -> str | None:
     for name, per_contact in sizes.items():
         if len(getattr(message, name)) != count * per_contact:
             return f"{name} has {len(getattr(message, name))} entries for {count} contacts"
+    try:
+        read_separation(message)
+    except ValueError as error:
+        return str(error)
     if message.accuracy not in ACCURACIES:
         return f"its accuracy is {message.accuracy[:20]!r}, none of {', '.join(ACCURACIES)}"
     if list(message.mesh_names) != list(layout.mesh_names):
         return f"its meshes are {list(message.mesh_names)}, those of the recording {list(layout.mesh_names)}"
-    for name in ("points", "normals"):
-        if len(getattr(message, name)) not in (0, 3 * count):
+    for name, per_contact in (("points", 3), ("normals", 3), ("closest", 6)):
+        if len(getattr(message, name)) not in (0, per_contact * count):
             return f"{name} has {len(getattr(message, name))} coordinates for {count} contacts"
+    if len(message.distance):
+        return f"distance has {len(message.distance)} entries; contacts of a step have none"
     kind = np.frombuffer(message.kind, np.uint8)
     if (kind > message.EDGE_EDGE).any() or (np.diff(kind.astype(np.int16)) < 0).any():
         return "kind is not a run of vertex-face followed by a run of edge-edge"

@@ -13,6 +13,10 @@ from hpccd_ros.middleware.fields import InvalidMessageError
 from hpccd_ros.params import scene_parameters
 from hpccd_ros.replay.recorded_setup import ReplaySetup
 
+# Frames for which an answer waits that was written before its own; far less than the window, which must still hold
+# the frames of the answers behind it.
+PATIENCE = 16
+
 
 class FrameSource:
     """Pushes recorded messages into a pipeline as the node has it.

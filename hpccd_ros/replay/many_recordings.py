@@ -125,6 +125,7 @@ def _write_csv(path, rows) -> None:
         with open(path, "x", newline="", encoding="utf-8") as stream:
             writer = csv.DictWriter(stream, columns)
             writer.writeheader()
-            writer.writerows(row | {"accuracy": " ".join(row.get("accuracy", []))} for row in rows)
+            lists = ("accuracy", "separation")
+            writer.writerows(row | {name: " ".join(row.get(name, [])) for name in lists} for row in rows)
     except OSError as error:
         raise UserError(f"--csv {path}: {error.strerror}") from error

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Play recorded messages over DDS: the very bytes, with the recorded quality of service, in their rhythm.
 
-Only where a message has got a field since it was recorded, an empty one is added: its readers expect one.
+Only where a message has got fields since it was recorded, empty ones are added: its readers expect them.
 """
 
 import itertools
@@ -38,11 +38,11 @@ def main(args) -> int:
         node = rclpy.create_node("hpccd_replay", start_parameter_services=False)
         try:
             publishers = {topic.name: _publisher(node, topic) for topic in topics}
-            tails = {topic.name: completion(topic) or b"" for topic in topics}
+            complete = {topic.name: completion(topic) or bytes for topic in topics}
             lacking = await_subscribers(publishers, args.subscribers, args.wait, stop)
             if lacking and not stop:
                 raise UserError(_too_few(lacking, args.subscribers))
-            count = _play(recording, publishers, tails, args, stop)
+            count = _play(recording, publishers, complete, args, stop)
             await_acknowledged(publishers.values(), LAST)
         finally:
             node.destroy_node()
@@ -100,7 +100,7 @@ def _too_few(lacking: dict[str, int], wanted: int) -> str:
     return f"fewer than {wanted} subscribe to {names}: start them first, --wait longer, or ask for fewer --subscribers"
 
 
-def _play(recording, publishers, tails, args, stop) -> int:
+def _play(recording, publishers, complete, args, stop) -> int:
     count, first, last_frame = 0, None, None
     pace = Pace(1.0 if args.rate is None else args.rate, stop)
     latched, begun = {}, set()
@@ -116,7 +116,7 @@ def _play(recording, publishers, tails, args, stop) -> int:
         if stop or at > args.end:
             break
         for earlier in itertools.chain.from_iterable(latched.values()):
-            publishers[earlier.topic].publish(earlier.data + tails[earlier.topic])
+            publishers[earlier.topic].publish(complete[earlier.topic](earlier.data))
             count += 1
         await_acknowledged([publishers[topic] for topic in latched], args.wait, stop)
         latched.clear()
@@ -128,7 +128,7 @@ def _play(recording, publishers, tails, args, stop) -> int:
             last_frame = message.log_time
         else:
             pace.wait(at)
-        publishers[message.topic].publish(message.data + tails[message.topic])
+        publishers[message.topic].publish(complete[message.topic](message.data))
         count += 1
         if message.topic not in begun:
             begun.add(message.topic)

@@ -9,19 +9,19 @@ from hpccd_ros.bag.decode import make_decoder
 from hpccd_ros.bag.reader import Recording, RecordingError
 from hpccd_ros.detect.core import CORE_ERRORS
 from hpccd_ros.detect.layout import Layout
+from hpccd_ros.detect.separation import NONE, Separation
 from hpccd_ros.detect.step_detector import StepDetector
 from hpccd_ros.frames.types import SceneFrame
 from hpccd_ros.middleware import fields
 from hpccd_ros.middleware.fields import InvalidMessageError
+from hpccd_ros.middleware.separation_fields import read_separation
 from hpccd_ros.replay.compare import difference
-from hpccd_ros.replay.frames import FrameSource, FrameWindow
+from hpccd_ros.replay.distances import DistanceCheck
+from hpccd_ros.replay.frames import PATIENCE, FrameSource, FrameWindow
 from hpccd_ros.replay.recorded_setup import ReplaySetup
 
 # Frames kept for answers that come after them; at least as many as can wait in the node.
 WINDOW = 64
-# Frames for which an answer waits that was written before its own; far less than the window, which must still hold
-# the frames of the answers behind it.
-PATIENCE = 16
 
 
 @dataclasses.dataclass
@@ -38,6 +38,7 @@ class ReplayedStep:
     at: float = 0.0  # seconds into the recording, of the answer or else of the last message of its end frame
     contacts: object | None = None  # of the core, or None where a frame is missing
     layout: Layout | None = None
+    separation: Separation = NONE  # in force
     milliseconds: float = 0.0  # the core's call, wall time
     difference: str | None = None  # first difference from what was recorded
     missing: str | None = None  # why it could not be computed
@@ -52,14 +53,15 @@ class Replay:
     """Goes once through a recording. Iterate over `steps()`; afterwards, or in between, look at the counts.
 
     backend, threads: as of hpccd_core.Detector; the contacts must not depend on them.
-    accuracy: "": that with which each answer was found.
+    accuracy: "": that with which each answer was found. The separation is always that of the answer.
     outputs: computed beside the contacts (they are not compared).
+    distances: whether to check the answers of topic distances too.
     begin, end: seconds into the recording; steps outside are neither computed nor counted.
     messages_read: recorded messages so far, of `message_count`.
     """
 
     def __init__(self, recording: Recording, setup: ReplaySetup, *, backend="auto", threads=0, accuracy="",
-                 outputs=(), begin=0.0, end=float("inf")):
+                 outputs=(), distances=True, begin=0.0, end=float("inf")):
         self._recording = recording
         self._setup = setup
         self._backend, self._threads, self._accuracy = backend, threads, accuracy
@@ -72,8 +74,11 @@ class Replay:
         self.recorded_answers = answers.count if answers else 0
         self._decode_answer = make_decoder(answers) if answers else None
         builder = setup.builder
-        self._detector = StepDetector(builder, self._options(""))
-        self._every_contact = StepDetector(builder, self._options(""))
+        self._detector = StepDetector(builder, self._options(None))
+        self._every_contact = StepDetector(builder, self._options(None))
+        told = recording.topics.get(setup.distances) if distances else None
+        self.distances = DistanceCheck(told, StepDetector(builder, self._options(None)), accuracy)
+        self._window = FrameWindow(max(WINDOW, 2 * setup.settings["frame_queue"]))
         self.any_one = setup.settings["report"] == "any"  # "verified" means less then: compare.py
         self.verified = self.diverged = self.unverified = 0
         self.frames = 0
@@ -86,7 +91,7 @@ class Replay:
 
     @property
     def _topics(self):
-        return self.source.topics + ([self._setup.contacts] if self.recorded_answers else [])
+        return self.source.topics + ([self._setup.contacts] if self.recorded_answers else []) + self.distances.topics
 
     def steps(self) -> Iterator[ReplayedStep]:
         """Each recorded answer, computed again; in a recording without answers, each step from frame to frame."""
@@ -104,37 +109,47 @@ class Replay:
                 self._compare(step)
             self._count(step)
             yield step
+        self.distances.settle(self._window)
 
     def _answers(self):
-        capacity = max(WINDOW, 2 * self._setup.settings["frame_queue"])
-        window = FrameWindow(capacity)
         waiting = []
         for message in self._messages():
             if message.topic == self._setup.contacts:
                 # An answer may have been written before the last of the messages that it answers.
                 waiting.append((self.frames, self._at, self._decode_answer(message)))
             else:
-                for frame in self.source.push(message):
-                    self.frames += 1
-                    window.put(frame)
+                for _ in self._push(message):
+                    pass
             while waiting:
                 came, at, answer = waiting[0]
-                step = self._step_of(answer, at, window)
+                step = self._step_of(answer, at)
                 if step.missing and not step.before_recording and self.frames < came + PATIENCE:
                     break
                 waiting.pop(0)
                 yield step
         for _, at, answer in waiting:
-            yield self._step_of(answer, at, window)
+            yield self._step_of(answer, at)
 
     def _successive_frames(self):
         last = None
         for message in self._messages():
-            for frame in self.source.push(message):
-                self.frames += 1
+            for frame in self._push(message):
                 if last is not None and last.same_scene(frame) and frame.stamp > last.stamp:
                     yield ReplayedStep(0, frame.step or 0, last.stamp, frame.stamp, last, frame, None, self._at)
                 last = frame
+
+    def _push(self, message) -> list[SceneFrame]:
+        """The frames that a message completes, put into the window; none of an answer about distances."""
+        if message.topic in self.distances.topics:
+            if self._begin <= self._at <= self._end:
+                self.distances.put(message, self.frames)
+            return []
+        frames = self.source.push(message)
+        for frame in frames:
+            self.frames += 1
+            self._window.put(frame)
+        self.distances.settle(self._window, self.frames)
+        return frames
 
     def _messages(self):
         first = None
@@ -144,7 +159,8 @@ class Replay:
             yield message
             self.messages_read = count
 
-    def _step_of(self, answer, at, window) -> ReplayedStep:
+    def _step_of(self, answer, at) -> ReplayedStep:
+        window = self._window
         try:
             start, end = fields.stamp_to_ns(answer.start), fields.stamp_to_ns(answer.header.stamp)
         except InvalidMessageError as error:
@@ -162,9 +178,7 @@ class Replay:
 
     def _compute(self, step):
         end = step.end_frame
-        told = step.recorded.accuracy if step.recorded is not None else ""
-        # One that is none diverges: compare.py.
-        self._detector.options = self._options(self._accuracy or (told if told in ACCURACIES else ""))
+        self._detector.options = self._options(step.recorded)
         try:
             self._detector.prepare_scene(end)
         except CORE_ERRORS as error:
@@ -179,11 +193,24 @@ class Replay:
             step.missing = f"the core refuses it: {error}"  # as in the node, which goes on with the next one
             return
         step.contacts, step.layout, step.milliseconds = found.contacts, found.layout, found.detect_ms
+        step.separation = found.options.separation
 
-    def _options(self, accuracy):
-        return dataclasses.replace(
-            self._setup.options(accuracy, self._backend, self._threads), outputs=self._outputs
-        )
+    def _options(self, recorded):
+        """As the answer was found, if there is one; an accuracy or a separation that is none diverges: compare.py."""
+        options = self._setup.options(self._accuracy, self._backend, self._threads)
+        if recorded is not None:
+            if not self._accuracy and recorded.accuracy in ACCURACIES:
+                options = dataclasses.replace(options, accuracy=recorded.accuracy)
+            options = dataclasses.replace(options, separation=self._separation_of(recorded))
+        return dataclasses.replace(options, outputs=self._outputs)
+
+    def _separation_of(self, recorded) -> Separation:
+        if list(recorded.mesh_names) != list(self._setup.meshes):
+            return NONE
+        try:
+            return read_separation(recorded)
+        except ValueError:
+            return NONE
 
     def _compare(self, step):
         if step.recorded is None:

@@ -29,6 +29,7 @@ class ReplaySetup:
     # Topic name -> (mesh, "topology" | "vertices" | "points"), or ("", name in transform_topics.ALL).
     roles: dict[str, tuple[str, str]]
     contacts: str | None  # topic name; None: the recording has none
+    distances: str | None  # as well
     files: dict[str, tuple[Topology, MeshFrame | None]]  # of meshes that come from a file; frame: static ones
     unknown: list[str]  # parameters that the node does not have: without effect
 
@@ -38,7 +39,10 @@ class ReplaySetup:
 
     def options(self, accuracy: str, backend: str, threads: int) -> Options:
         """Detector options of the recorded node, but for what may differ without a change of the result."""
-        return Options(accuracy or self.settings["accuracy"], backend, threads, self.settings["report"])
+        return Options(
+            accuracy or self.settings["accuracy"], backend, threads, self.settings["report"],
+            separation=scene_parameters.separation(self.settings),
+        )  # fmt: skip
 
 
 def of_recording(recording: Recording, parameter_file: str | None = None) -> ReplaySetup:
@@ -65,7 +69,7 @@ def of_recording(recording: Recording, parameter_file: str | None = None) -> Rep
         raise refused(printable(f"{where}: {error}")) from error
     by_role = _by_role(recording, info, recorded_topics.types_by_role(meshes))
     roles = {topic: ("", role) if role in transform_topics.ALL else tuple(role.split("/")[1:])
-             for role, topic in by_role.items() if role != topic_names.CONTACTS}  # fmt: skip
+             for role, topic in by_role.items() if role not in recorded_topics.ANSWERS}  # fmt: skip
     if not any(kind in ("vertices", "points") for _, kind in roles.values()):
         raise RecordingError(
             f"{recording.path} holds no vertices of the meshes {', '.join(meshes)}; its topics are "
@@ -77,8 +81,8 @@ def of_recording(recording: Recording, parameter_file: str | None = None) -> Rep
             f"{recording.path}: mesh {moved[0]} was transformed by tf (parameter mesh.{moved[0]}.transform), and the "
             "recording holds no transforms: its positions cannot be computed again"
         )
-    return ReplaySetup(settings, meshes, roles, by_role.get(topic_names.CONTACTS), _files(recording, meshes),
-                       values.unknown(given, meshes))  # fmt: skip
+    return ReplaySetup(settings, meshes, roles, by_role.get(topic_names.CONTACTS), by_role.get(topic_names.DISTANCES),
+                       _files(recording, meshes), values.unknown(given, meshes))  # fmt: skip
 
 
 def _stored(recording, info) -> dict:

@@ -17,8 +17,8 @@ from hpccd_ros.replay import recorded_setup
 from hpccd_ros.replay.pacing import Pace, next_wanted
 from hpccd_ros.replay.recomputed import Replay, ReplayedStep
 
-COLUMNS = ("number", "step", "start_ns", "end_ns", "contacts", "vertex_face", "edge_edge", "first_toc", "ms", "hash",
-           "recorded_contacts", "recorded_hash", "result")  # fmt: skip
+COLUMNS = ("number", "step", "start_ns", "end_ns", "contacts", "vertex_face", "edge_edge", "first_toc", "separation",
+           "ms", "hash", "recorded_contacts", "recorded_hash", "result")  # fmt: skip
 
 
 class Table:
@@ -36,8 +36,8 @@ class Table:
         found, recorded = step.contacts, step.recorded
         self._writer.writerow([
             step.number, step.step, step.start, step.end,
-            *([step.total, len(found.vf), len(found.ee), repr(float(found.first_toc)), f"{step.milliseconds:.3f}",
-               f"{found.hash:#018x}"] if found is not None else [""] * 6),
+            *([step.total, len(found.vf), len(found.ee), repr(float(found.first_toc)), step.separation.text,
+               f"{step.milliseconds:.3f}", f"{found.hash:#018x}"] if found is not None else [""] * 7),
             *([recorded.total, f"{recorded.hash:#018x}"] if recorded is not None else [""] * 2),
             step.missing or step.difference or ("equal" if recorded is not None else ""),
         ])  # fmt: skip
@@ -89,7 +89,8 @@ def main(args) -> int:
     if args.json:
         write_json(args.json, [summary.row(args.file, replay)])
     summary.print(args, recording, replay)
-    return 1 if replay.diverged or replay.unverified or not summary.computed else 0
+    failed = any(part.diverged or part.unverified for part in (replay, replay.distances))
+    return 1 if failed or not summary.computed else 0
 
 
 def line(step: ReplayedStep) -> str:
@@ -109,6 +110,7 @@ class Summary:
         self.milliseconds = 0.0
         self.seconds_recorded = 0.0
         self.accuracies = set()
+        self.separations = set()
         self.missing: ReplayedStep | None = None
         self.before = 0
 
@@ -122,16 +124,22 @@ class Summary:
         self.contacts += step.total
         self.milliseconds += step.milliseconds
         self.seconds_recorded += (step.end - step.start) * 1e-9
+        self.separations |= {step.separation.text} - {""}
         if step.recorded is not None:
             self.accuracies.add(step.recorded.accuracy)
 
     def row(self, path, replay) -> dict:
         """What came of it, JSON-able."""
+        distances = replay.distances
         if replay.diverged:
             result, first = "DIVERGED", replay.first_divergence
             why = f"step {first.step}: {first.difference}"
+        elif distances.diverged:
+            result, why = "DIVERGED", distances.first
         elif replay.unverified:
             result, why = "NOT VERIFIED", f"step {self.missing.step}: {self.missing.missing}"
+        elif distances.unverified:
+            result, why = "NOT VERIFIED", distances.first
         elif replay.verified:
             result, why = "VERIFIED", ""
         else:
@@ -141,7 +149,8 @@ class Summary:
             "file": str(path), "result": result, "verified": replay.verified, "diverged": replay.diverged,
             "unverified": replay.unverified, "frames": replay.frames, "steps": self.computed,
             "contacts": self.contacts, "core_ms": round(self.milliseconds, 3),
-            "seconds": round(time.perf_counter() - self.began, 3), "accuracy": sorted(self.accuracies), "why": why,
+            "seconds": round(time.perf_counter() - self.began, 3), "accuracy": sorted(self.accuracies),
+            "separation": sorted(self.separations), "distances_verified": distances.verified, "why": why,
         }  # fmt: skip
 
     def print(self, args, recording, replay) -> None:
@@ -157,6 +166,7 @@ class Summary:
         if self.missing:
             print(f"  {replay.unverified} answers NOT VERIFIED, first step {self.missing.step} "
                   f"(ends at {self.missing.end} ns): {self.missing.missing}")
+        _print_distances(replay.distances)
         if replay.diverged:
             first = replay.first_divergence
             print(f"DIVERGED: {replay.diverged} of {replay.diverged + replay.verified} answers differ, first in step "
@@ -165,7 +175,9 @@ class Summary:
         elif replay.verified:
             what = "hold a contact where there is one, and one that there is" if replay.any_one else (
                 "are equal in every contact, time and hash")  # fmt: skip
-            print(f"VERIFIED: {replay.verified} answers {what} (accuracy {', '.join(sorted(self.accuracies))})")
+            # The word stands for all of the recording.
+            verdict = " " if replay.distances.diverged else "VERIFIED:"
+            print(f"{verdict} {replay.verified} answers {what} ({self._tiers()})")
         elif replay.recorded_answers:
             print("NOTHING VERIFIED: the recording has answers, but not the frames that they belong to")
         elif self.computed:
@@ -173,6 +185,20 @@ class Summary:
         else:
             print("NOTHING COMPUTED: no two frames of all meshes follow each other in the recording")
         sys.stdout.flush()
+
+    def _tiers(self) -> str:
+        separated = [f"separation {text}" for text in sorted(self.separations)]
+        return "; ".join([f"accuracy {', '.join(sorted(self.accuracies))}", *separated])
+
+
+def _print_distances(distances) -> None:
+    if distances.diverged:
+        print(f"DIVERGED: {distances.diverged} of {distances.diverged + distances.verified} answers about distances "
+              f"differ, the first:\n  {distances.first}")
+    elif distances.unverified:
+        print(f"  {distances.unverified} answers about distances NOT VERIFIED, the first: {distances.first}")
+    elif distances.verified:
+        print(f"  {distances.verified} answers about distances are equal, points included")
 
 
 def _print_losses(replay) -> None:

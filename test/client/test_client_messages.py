@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Arrays to messages and back, and what is refused before it is sent."""
 
+import math
+
 import numpy as np
 import pytest
-from hpccd.msg import ContactArray
+from hpccd.msg import ContactArray, DistanceArray
 
 from hpccd_ros import client
 
@@ -104,13 +106,79 @@ def test_no_contacts():
     assert len(contacts) == 0 and contacts.features_a.shape == (0, 2)
 
 
+def test_contacts_with_a_separation():
+    message = two_contacts(
+        minimum_separation=0.1, separation_mesh_a=[1, 0], separation_mesh_b=[0, 0], separations=[0.2, 0.0],
+        closest=[float(k) for k in range(12)],
+    )  # fmt: skip
+    contacts = client.contacts_from_message(message)
+    assert contacts.minimum_separation == 0.1
+    assert contacts.pair_separation == {("a", "b"): 0.2, ("a", "a"): 0.0}, "names in the order of the scene"
+    assert contacts.closest.tolist() == [[[0, 1, 2], [3, 4, 5]], [[6, 7, 8], [9, 10, 11]]]
+    assert client.scene_contacts(message, layout("a", "b")).closest.shape == (2, 2, 3)
+    plain = client.contacts_from_message(two_contacts())
+    assert (plain.minimum_separation, plain.pair_separation, plain.closest.shape) == (0.0, {}, (0, 2, 3))
+
+
+def test_answers_of_one_snapshot():
+    near = client.contacts_from_message(two_contacts(toc=[], distance=[0.5, 0.25]))
+    assert (len(near), near.n_vertex_face, near.n_edge_edge, near.n_edge_face) == (2, 1, 1, 0)
+    assert near.distance.tolist() == [0.5, 0.25] and len(near.toc) == 0
+    scene = client.scene_contacts(two_contacts(toc=[], distance=[0.5, 0.25]), layout("a", "b"))
+    assert (scene.vf_distance.tolist(), scene.ee_distance.tolist(), len(scene.vf_toc)) == ([0.5], [0.25], 0)
+    edge_in_face = two_contacts(
+        toc=[], kind=[2, 2], features_a=[0, 1, 1, 2], features_b=[0, ContactArray.NONE, 0, ContactArray.NONE]
+    )
+    hits = client.contacts_from_message(edge_in_face)
+    assert (len(hits), hits.n_edge_face, hits.features_a.tolist()) == (2, 2, [[0, 1], [1, 2]])
+    assert client.scene_contacts(edge_in_face, layout("a", "b")).ef.tolist() == [[0, 1, 1], [1, 2, 1]]
+
+
+def three_distances(**changes):
+    none = DistanceArray.NONE
+    fields = dict(
+        mesh_names=["a", "b"], kind=[1, 0, 255], mesh_a=[0, 1, 1], mesh_b=[0, 0, 1], distance=[0.5, 0.25, math.inf],
+        features_a=[0, 1, 2, none, none, none], features_b=[3, 4, 0, none, none, none], points=[0.0] * 18,
+    )  # fmt: skip
+    return DistanceArray(**{**fields, **changes})
+
+
+def test_smallest_distances():
+    found = client.distances_from_message(three_distances())
+    assert (len(found), found.mesh_names, found.points.shape) == (3, ("a", "b"), (3, 2, 3))
+    assert found.features_a[0].tolist() == [0, 1] and found.features_b[1, 0] == 0
+    assert [found.between(*pair) for pair in ("aa", "ab", "ba", "bb")] == [0.5, 0.25, 0.25, math.inf]
+    with pytest.raises(ValueError, match="mesh_b: no mesh is named 'c'; there are a, b"):
+        found.between("a", "c")
+    nothing = client.distances_from_message(DistanceArray(mesh_names=["a", "b"]))
+    assert len(nothing) == 0 and nothing.between("a", "b") == math.inf, "not tested against each other"
+
+
+@pytest.mark.parametrize(
+    "changes, text",
+    [
+        (dict(distance=[0.5]), r"kind has 3 values, 1 were expected for shape \(1,\)"),
+        (dict(points=[0.0] * 6), r"points has 6 values, 18 were expected for shape \(3, 2, 3\)"),
+        (dict(mesh_a=[0, 1, 2]), "mesh_a names a mesh beyond the 2 of mesh_names"),
+    ],
+)
+def test_distances_whose_arrays_do_not_fit_together(changes, text):
+    with pytest.raises(ValueError, match=text):
+        client.distances_from_message(three_distances(**changes))
+
+
 @pytest.mark.parametrize(
     "changes, text",
     [
         (dict(kind=[1, 0]), "kind must hold"),
-        (dict(kind=[0, 2]), "kind must hold"),
+        (dict(kind=[0, 3]), "kind must hold"),
+        (dict(kind=[0, 2]), r"toc has 2 values, 0 were expected"),
         (dict(toc=[0.5]), r"toc has 1 values, 2 were expected for shape \(2,\)"),
         (dict(features_b=[1, 2]), r"features_b has 2 values, 4 were expected"),
+        (dict(separations=[0.5]), "separation_mesh_a, separation_mesh_b and separations have 0, 0 and 1 entries"),
+        (dict(minimum_separation=-1.0), "message: separation: a separation must be finite and not negative"),
+        (dict(distance=[0.5, 0.25]), r"toc has 2 values, 0 were expected"),
+        (dict(closest=[0.0] * 6), r"closest has 6 values, 12 were expected for shape \(2, 2, 3\)"),
         (dict(points=[0.0]), r"points has 1 values, 6 were expected for shape \(2, 3\)"),
         (dict(mesh_b=[1, 2]), "mesh_b names a mesh beyond the 2 of mesh_names"),
     ],

@@ -47,16 +47,17 @@ def message_of(fields):
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 def test_peer_gets_the_contacts_of_the_core(start_node, tmp_path, dtype):
-    n, outputs = 16, ("points", "normals")
-    node = start_node({"meshes": ["cloth"], "outputs": list(outputs)})
+    n, outputs, apart = 16, ("points", "normals"), 1e-5
+    node = start_node({"meshes": ["cloth"], "outputs": list(outputs), "pair_separation": [f"cloth:cloth:{apart}"]})
     frames = np.stack([sheet_positions(n, k, dtype=dtype) for k in range(6)])
     answers = play(node, tmp_path, sheet_faces(n), frames)
-    assert_all_but_one(answers, frames, sheet_faces(n), outputs=outputs)
+    assert_all_but_one(answers, frames, sheet_faces(n), outputs=outputs, minimum_separation=apart)
     assert answers[0].step == 1, "answers that fit one datagram are not lost"
     for answer in answers:
         assert len(answer.points) == len(answer.normals) == 3 * answer.total
         assert (answer.header.frame_id, list(answer.mesh_names)) == ("lab", ["cloth"])
         assert list(answer.topology_versions) == [3]
+        assert (answer.minimum_separation, list(answer.separations)) == (0.0, [apart])
     node.frames_status(received=6, answered=6, dropped=0)
 
 

@@ -92,23 +92,33 @@ def test_percentiles():
     assert percentiles(list(range(101))) == {"p50": "50.00", "p95": "95.00", "p99": "99.00", "max": "100.00"}
 
 
-def markers(n, n_vf, limit):
+def markers(n, n_vf, limit, near=False):
     points, normals = np.arange(3.0 * n).reshape(n, 3), np.tile([0.0, 0.0, 1.0], (n, 1))
-    out = contact_markers(points, normals, n_vf, stamp=Time(sec=1), frame_id="world", size=0.1, limit=limit).markers
-    assert [m.ns for m in out] == ["vertex_face", "edge_edge", "normals"]
-    assert len({(m.ns, m.id) for m in out}) == 3 and all(m.header.frame_id == "world" for m in out)
+    closest = np.stack([points, points + 0.5], axis=1) if near else np.empty((0, 2, 3))
+    how = {"stamp": Time(sec=1), "frame_id": "world", "size": 0.1, "limit": limit}
+    out = contact_markers(points, normals, closest, n_vf, **how).markers
+    assert [m.ns for m in out] == ["vertex_face", "edge_edge", "normals", "near"]
+    assert len({(m.ns, m.id) for m in out}) == 4 and all(m.header.frame_id == "world" for m in out)
     return out
 
 
 def test_markers_hold_every_contact():
-    vertex_face, edge_edge, normals = markers(5, 2, 100)
+    vertex_face, edge_edge, normals, near = markers(5, 2, 100)
     assert [(p.x, p.y, p.z) for p in vertex_face.points] == [(0, 1, 2), (3, 4, 5)]
     assert len(edge_edge.points) == 3 and len(normals.points) == 10
     assert normals.points[1].z - normals.points[0].z == 1.0
+    assert near.action == Marker.DELETE, "nothing is to stay apart"
+
+
+def test_a_line_joins_the_sides_of_a_near_pair():
+    near = markers(5, 2, 100, near=True)[3]
+    assert near.action == Marker.ADD and near.type == Marker.LINE_LIST
+    assert [(p.x, p.y, p.z) for p in near.points[2:4]] == [(3, 4, 5), (3.5, 4.5, 5.5)] and len(near.points) == 10
+    assert len(markers(1000, 500, 100, near=True)[3].points) == 200
 
 
 def test_markers_are_thinned_out_evenly():
-    vertex_face, edge_edge, _ = markers(1000, 500, 100)
+    vertex_face, edge_edge, *_ = markers(1000, 500, 100)
     assert len(vertex_face.points) == len(edge_edge.points) == 50
 
 

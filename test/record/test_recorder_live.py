@@ -99,8 +99,22 @@ def test_split_and_compressed(live, tmp_path):
         assert reader.message_count == sum(1 for _ in reader.messages())
     assert len(_verified(path)) == FRAMES - 1
     # Each file alone: the steps whose both frames it holds. A split may fall between a frame and its answer.
-    alone = [sum(step.missing is None for step in _verified_file(file)) for file in files]
-    assert sum(alone) >= FRAMES - 1 - 2 * (len(files) - 1)
+    for file in files:
+        assert sum(step.missing is None for step in _verified_file(file)) == _whole_steps(file)
+    assert sum(map(_whole_steps, files)) > 0
+
+
+def _whole_steps(file) -> int:
+    """Answers in the file whose both frames are in it too, as another reader finds them."""
+    stamp = lambda time: (time.sec, time.nanosec)  # noqa: E731
+    messages = [(topic.rpartition("/")[2], topic, message) for topic, _, _, message in read_by_rosbags(file)]
+    frames = {}
+    for kind, topic, message in messages:
+        if kind == "vertices":
+            frames.setdefault(topic, set()).add(stamp(message.header.stamp))
+    whole = set.intersection(*frames.values()) if len(frames) == 2 else set()
+    answers = [message for kind, _, message in messages if kind == "contacts"]
+    return sum({stamp(answer.start), stamp(answer.header.stamp)} <= whole for answer in answers)
 
 
 def _verified_file(file):

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from bag_tools import as_installed, rewrite, typestore
 
+from hpccd_ros.bag import message_definitions
 from hpccd_ros.bag.decode import completion, make_decoder
 from hpccd_ros.bag.reader import Recording, RecordingError
 from hpccd_ros.bag.writer import BagWriter, Topic
@@ -82,11 +83,34 @@ def test_definitions_that_only_lack_what_was_added(small_bag, with_hash):
         decoded = make_decoder(old)(message)
         assert list(decoded.mesh_names) == ["cloth", "ball"] and decoded.backend == "cpu"
         store = typestore()
-        complete = store.deserialize_cdr(message.data + completion(old), topic.type_name)
+        complete = store.deserialize_cdr(completion(old)(message.data), topic.type_name)
         assert complete.hash == decoded.hash and len(complete.topology_versions) == 0
         other = dataclasses.replace(old, definition=topic.definition.replace("uint64 total", "uint32 total"))
         with pytest.raises(RecordingError, match="another definition of hpccd/msg/ContactArray"):
             make_decoder(other)
+
+
+@pytest.mark.parametrize("versions", [0, 1, 2, 3])
+def test_answers_from_before_they_told_a_separation(small_bag, versions):
+    """The bytes that they lack depend on where they end: the first new field is aligned."""
+    store = typestore()
+    with Recording(small_bag) as recording:
+        topic = recording.topics["/contacts"]
+        message = next(recording.messages(["/contacts"]))
+        decoded = store.deserialize_cdr(completion(topic)(message.data), topic.type_name)
+    _set("topology_versions", np.arange(versions, dtype=np.uint32) + 7)(decoded)
+    now = message_definitions.definition_text(topic.type_name)
+    added = ("EDGE_FACE=2", "minimum_separation", "separation_mesh_a", "separation_mesh_b", "separations", "closest",
+             "distance")  # fmt: skip
+    then = "\n".join(line for line in now.splitlines() if not any(line.endswith(" " + name) for name in added))
+    data = bytes(store.serialize_cdr(decoded, topic.type_name))
+    end = len(data) - 5 * 4 - 8  # of the fields of then, and what aligned the next
+    end -= 4 if versions % 2 == 0 else 0
+    old = dataclasses.replace(topic, definition=then, type_hash="RIHS01_of_then")
+    assert completion(old)(data[:end]) == data
+    read = make_decoder(old)(dataclasses.replace(message, data=data[:end]))
+    assert list(read.topology_versions) == [7, 8, 9][:versions] and read.hash == decoded.hash
+    assert read.minimum_separation == 0 and len(read.separations) == len(read.closest) == len(read.distance) == 0
 
 
 def _first_edge_edge(decoded):

@@ -18,16 +18,21 @@ STRING = "std_msgs/msg/String"
 def typestore():
     """rosbags' own knowledge of the messages of this package, from the text of the .msg files."""
     store = get_typestore(Stores.ROS2_JAZZY)
-    for name in ("MeshTopology", "MeshVertices", "ContactArray"):
+    for name in ("MeshTopology", "MeshVertices", "ContactArray", "DistanceArray"):
         text = message_definitions.definition_text(f"hpccd/msg/{name}").split(message_definitions.SEPARATOR)[0]
         store.register(get_types_from_msg(text, f"hpccd/msg/{name}"))
     return store
 
 
-def missing_tail(schema):
-    """What an answer recorded with this MCAP schema lacks of one of today: before topology_versions, an empty list."""
-    old = schema.name == "hpccd/msg/ContactArray" and b"topology_versions" not in schema.data
-    return b"\0\0\0\0" if old else b""
+def completed(schema, data):
+    """A message recorded with this MCAP schema as one of today: fields that answers did not have then are zeros."""
+    if schema.name != "hpccd/msg/ContactArray":
+        return data
+    if b"topology_versions" not in schema.data:
+        data += bytes(4)
+    if b"minimum_separation" not in schema.data:
+        data += bytes(-(len(data) - 4) % 8) + bytes(8 + 5 * 4)
+    return data
 
 
 def read_by_rosbags(path):
@@ -56,9 +61,9 @@ def raw_messages(path):
 
 def as_installed(recording):
     """Messages of a recording that may be older than the package, with the fields that their types have got since."""
-    tails = {topic.name: completion(topic) for topic in recording.topics.values()}
+    complete = {topic.name: completion(topic) for topic in recording.topics.values()}
     for message in recording.messages():
-        yield dataclasses.replace(message, data=message.data + tails[message.topic])
+        yield dataclasses.replace(message, data=complete[message.topic](message.data))
 
 
 def rewrite(source, target, change=lambda index, message, decoded: decoded, info=...):

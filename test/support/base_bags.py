@@ -8,7 +8,8 @@ from sources import ROOT
 
 from hpccd_ros.bag.reader import Recording
 from hpccd_ros.bag.writer import BagWriter, Topic
-from hpccd_ros.middleware import contact_messages
+from hpccd_ros.detect.step_detector import StepDetector
+from hpccd_ros.middleware import contact_messages, separation_fields, snapshot_messages
 from hpccd_ros.replay import recorded_setup
 from hpccd_ros.replay.recomputed import Replay
 
@@ -16,6 +17,7 @@ SECOND = 1_000_000_000
 FIRST, FRAMES = 55, 8  # of the recording of the repository: its contacts are of both kinds
 SCENE = {
     "meshes": ["cloth", "net", "floor"], "frame_id": "world", "outputs": ["points", "normals"],
+    "minimum_separation": 1e-3, "pair_separation": ["cloth:net:0.002"],
     "mesh.floor.static": True, "mesh.floor.file": "somewhere/floor.obj", "mesh.floor.self_collision": False,
     "mesh.floor.pose": [0.0, 0.0, -0.1, 0.0, 0.0, 0.6, 0.8],
     "mesh.net.input": "points", "mesh.net.transform": "tf", "mesh.net.frame": "hand",
@@ -61,6 +63,7 @@ def _write(path, answers):
         "/meshes/net/topology": ("meshes/net/topology", "hpccd/msg/MeshTopology"),
         "/meshes/net/points": ("meshes/net/points", "sensor_msgs/msg/PointCloud2"),
         "/contacts": ("contacts", "hpccd/msg/ContactArray"),
+        "/distances": ("distances", "hpccd/msg/DistanceArray"),
     }
     info = {"format": 1, "hpccd": "0", "node": "/hpccd", "parameters": SCENE,
             "topics": {name: role for name, (role, _) in topics.items()}}  # fmt: skip
@@ -75,8 +78,9 @@ def _write(path, answers):
 
     for message in _inputs(Maker(store)):
         write(*message)
-    for message in answers:
-        write("/contacts", message)
+    for contacts, distances in answers:
+        write("/contacts", contacts)
+        write("/distances", distances)
     bag.close()
 
 
@@ -131,21 +135,28 @@ def _inputs(make):
 
 
 def _answers(path):
-    """What the node would have answered, as rosbags' messages."""
-    from hpccd.msg import ContactArray
+    """What the node would have answered, as rosbags' messages: contacts and smallest distances of each step."""
+    from hpccd.msg import ContactArray, DistanceArray
 
     store = typestore()
     make = Maker(store)
+
+    def plain(message, **given):
+        values = {
+            name: np.array(value) if kind.startswith("sequence<") and "string" not in kind else value
+            for name, kind in message.get_fields_and_field_types().items()
+            for value in [getattr(message, name)]
+        }
+        return store.types[f"hpccd/msg/{type(message).__name__}"](**values | given)
+
     with Recording(path) as recording:
         setup = recorded_setup.of_recording(recording)
+        detector = StepDetector(setup.builder, setup.options("exact", "cpu", 1))
         for step in Replay(recording, setup, outputs=("points", "normals"), backend="cpu").steps():
-            message = ContactArray(step=step.step, accuracy="exact", backend="cpu")
-            contact_messages.fill_contacts(message, step.contacts, step.layout)
-            plain = {
-                name: np.array(value) if kind.startswith("sequence<") and "string" not in kind else value
-                for name, kind in message.get_fields_and_field_types().items()
-                for value in [getattr(message, name)]
-            }
-            plain |= {"header": make.header(step.end, "world"), "start": make.time(step.start)}
-            cls = store.types["hpccd/msg/ContactArray"]
-            yield cls(**plain)
+            contacts = ContactArray(step=step.step, accuracy="exact", backend="cpu")
+            contact_messages.fill_contacts(contacts, step.contacts, step.layout)
+            separation_fields.fill_separation(contacts, step.separation)
+            distances = DistanceArray(step=step.step, accuracy="exact", backend="cpu")
+            snapshot_messages.fill_distances(distances, detector.distances(step.end_frame), step.layout)
+            header = make.header(step.end, "world")
+            yield plain(contacts, header=header, start=make.time(step.start)), plain(distances, header=header)

@@ -64,3 +64,9 @@ class ContactArray(IdlStruct, typename="hpccd::msg::dds_::ContactArray_"):
     backend: str
     dropped_frames: uint64
     topology_versions: sequence[uint32]
+    minimum_separation: float64
+    separation_mesh_a: sequence[uint32]
+    separation_mesh_b: sequence[uint32]
+    separations: sequence[float64]
+    closest: sequence[float64]
+    distance: sequence[float64]

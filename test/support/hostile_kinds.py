@@ -6,7 +6,7 @@ Each kind is a function of a random generator and a `Bag`, in which it changes o
 
 import json
 
-from bag_tools import missing_tail, typestore
+from bag_tools import completed, typestore
 
 KINDS = {}
 NUMBERS = (0, 1, 2, 7, 255, 2**16 - 1, 2**31 - 1, 2**31, 2**32 - 1)
@@ -31,10 +31,11 @@ def decoded(bag, topic, rng, change, all_of_them=False):
     store = typestore()
     channel = bag.channel(topic)
     schema = next(schema for schema in bag.schemas if schema.id == channel.schema_id)
-    tail = missing_tail(schema)
     messages = bag.of_topic(topic)
     for message in messages if all_of_them else [rng.choice(messages)]:
-        thing = store.deserialize_cdr(message.data + tail, schema.name)
+        whole = completed(schema, message.data)
+        tail = whole[len(message.data) :]
+        thing = store.deserialize_cdr(whole, schema.name)
         change(lambda name, value, thing=thing: object.__setattr__(thing, name, value), thing)
         message.data = bytes(store.serialize_cdr(thing, schema.name)).removesuffix(tail)
 

@@ -82,6 +82,47 @@ def changed_answer(rng, bag):
 
 
 @kind
+def changed_separation(rng, bag):
+    """Other margins than those with which the contacts were found, or none that can be."""
+
+    def change(put, answer):
+        name = rng.choice(("minimum_separation", "separation_mesh_a", "separation_mesh_b", "separations", "all"))
+        length = rng.choice((0.0, -0.0, 5e-324, 1e-3, 0.002, 0.5, 1e150, 1e300, -1.0, math.nan, math.inf))
+        if name == "minimum_separation":
+            put(name, length)
+        elif name == "all":
+            put("separation_mesh_a", np.array([0, 1], np.uint32))
+            put("separation_mesh_b", np.array([1, rng.choice((0, 1))], np.uint32))
+            put("separations", np.array([length, rng.choice((0.0, 1e-3))]))
+        else:
+            value = getattr(answer, name)
+            count = rng.choice((0, len(value), len(value) + 1, 1000))
+            wrong = length if name == "separations" else rng.choice(NUMBERS)
+            put(name, np.full(count, wrong, value.dtype))
+
+    decoded(bag, topic_of(bag, "contacts"), rng, change)
+
+
+@kind
+def changed_distances(rng, bag):
+    """Of bags that tell any; of others the contacts are of no mesh that there is."""
+
+    def change(put, answer):
+        name = rng.choice(("kind", "mesh_a", "mesh_b", "features_a", "features_b", "distance", "points"))
+        value = getattr(answer, name).copy()
+        if rng.random() < 0.5 and len(value):
+            value[rng.randrange(len(value))] = rng.choice((0, 1, 2, 255) if value.dtype == np.uint8 else NUMBERS)
+        else:
+            value = value[: rng.randrange(len(value) + 1)]
+        put(name, value)
+
+    topic = next((channel.topic for channel in bag.channels if channel.topic.endswith("distances")), None)
+    if topic is None:
+        return decoded(bag, topic_of(bag, "contacts"), rng, lambda put, answer: put("mesh_names", ["cloth", ""]))
+    return decoded(bag, topic, rng, change)
+
+
+@kind
 def contact_under_another_name(rng, bag):
     """A contact whose mesh and feature are others that add up to the same number in the scene."""
     store = typestore()

@@ -10,7 +10,7 @@ from collections import defaultdict
 from pathlib import Path
 
 import numpy as np
-from bag_tools import missing_tail, typestore
+from bag_tools import completed, typestore
 from base_bags import SECOND
 from mcap_model import Bag
 from rosbags.serde import SerdeError
@@ -44,7 +44,7 @@ class Oracle:
             channel = channels[message.channel_id]
             if channel.topic in roles:
                 schema = schemas[channel.schema_id]
-                data = message.data + missing_tail(schema)
+                data = completed(schema, message.data)
                 self.found[str(roles[channel.topic])].append(_decode(store, data, schema.name))
         self.answers = self.found["contacts"]
         self.transforms = TransformBuffer()
@@ -141,8 +141,18 @@ class Oracle:
         for entry in self.given.get("pair_accuracy") or []:
             scene.set_accuracy(*entry.split(":"))
         report = self.given.get("report", "all")
-        detector = hc.Detector(scene, accuracy=answer.accuracy, backend="cpu",
-        report="all" if report == "any" else report)
+        if list(answer.mesh_names) != self.meshes:
+            return "other meshes"
+        separated = [np.asarray(getattr(answer, f"separation{part}")).tolist() for part in ("_mesh_a", "_mesh_b", "s")]
+        if len({len(part) for part in separated}) > 1:
+            return "no such separation"
+        try:
+            detector = hc.Detector(scene, accuracy=answer.accuracy, backend="cpu",
+            report="all" if report == "any" else report, minimum_separation=answer.minimum_separation)
+            for a, b, distance in zip(*separated, strict=True):
+                detector.set_separation(a, b, distance)
+        except ValueError:
+            return "no such separation"
         t1 = np.concatenate([positions for *_, positions in last])
         still = [self._of(mesh, "static", False) for mesh in self.meshes]
         t0 = np.concatenate([b[2] if s else a[2] for s, a, b in zip(still, first, last, strict=True)])
@@ -166,8 +176,6 @@ class Oracle:
             return "other contacts"
         if (answer.total, answer.first_toc, answer.hash) != (len(rows), found.first_toc, found.hash):
             return "another total, first time or hash"
-        if list(answer.mesh_names) != self.meshes:
-            return "other meshes"
         return None
 
     def _rows(self, found, parts):

@@ -4,7 +4,9 @@
 #include <cmath>
 #include <utility>
 
+#include "contacts/meeting_point.h"
 #include "contacts/nearest_points.h"
+#include "elementary/exact/distance.h"
 #include "elementary/inside.h"
 #include "elementary/intersection_batch.h"
 
@@ -15,20 +17,28 @@ using V = Vec3<double>;
 
 std::array<double, 3> row(const V& v) { return {v.x, v.y, v.z}; }
 
-// Where an edge meets a face: where it passes through the plane, or where it touches an edge or the face's inside.
-V meeting_point(const V q[5]) {
-  const V a = q[3] - q[2], b = q[4] - q[2], n = cross(a, b);
-  const double before = dot(q[0] - q[2], n), after = dot(q[1] - q[2], n);
-  if (before * after < 0) return interpolate(q[0], q[1], before / (before - after));
-  NearestPoints best{INFINITY, q[0], q[0], {}};
+// Where an edge meets a face: in the plane of the face, if that is known well enough; else at one of its ends, or where
+// it meets an edge of the face.
+exact::Nearest meeting_place(const V q[5]) {
+  const V n = unit(cross(unit(q[3] - q[2]), unit(q[4] - q[2]))), from = q[0] - q[2], to = q[1] - q[2];
+  const double size = std::max(largest(from), largest(to));
+  const double before = dot(V{from.x / size, from.y / size, from.z / size}, n),
+               after = dot(V{to.x / size, to.y / size, to.z / size}, n);
+  const double place = before / (before - after);
+  const double rounding = 1e-14 * size + 1e-15 * std::max(largest(q[0]), largest(q[1]));
+  exact::Nearest best{INFINITY, q[0], q[0]};
   const auto keep = [&](Kind kind, const V& q0, const V& q1, const V& q2, const V& q3) {
-    const NearestPoints found = nearest_points({kind, {q0, q1, q2, q3}, {q0, q1, q2, q3}, 0}, 0);
+    const V pair[4] = {q0, q1, q2, q3};
+    const exact::Nearest found = exact::nearest(kind, pair);
     if (found.distance < best.distance) best = found;
   };
+  const V point = interpolate(q[0], q[1], place);
+  if (place >= 0 && place <= 1) keep(Kind::vertex_face, point, q[2], q[3], q[4]);
+  if (best.distance <= rounding) return best;
   keep(Kind::vertex_face, q[0], q[2], q[3], q[4]);
   keep(Kind::vertex_face, q[1], q[2], q[3], q[4]);
   for (int i = 2; i < 5; ++i) keep(Kind::edge_edge, q[0], q[1], q[i], q[i < 4 ? i + 1 : 2]);
-  return best.on_first;
+  return best;
 }
 
 Gap gap_of(std::uint32_t mesh_a, std::uint32_t mesh_b, const NearestPair& found, const Geometry& g) {
@@ -40,7 +50,8 @@ Gap gap_of(std::uint32_t mesh_a, std::uint32_t mesh_b, const NearestPair& found,
     gap.features = {g.edges[found.first][0], g.edges[found.first][1], found.second};
     V q[5];
     edge_face_positions(g, found.first, found.second, q);
-    gap.points[0] = gap.points[1] = row(meeting_point(q));
+    const exact::Nearest meet = meeting_place(q);
+    gap.points = {row(meet.on_first), row(meet.on_second)};
     return gap;
   }
   if (found.kind == Kind::vertex_face) {

@@ -27,7 +27,7 @@ NearestPoints nearest_points_of(const V q[4]) {
     return {x.distance, x.on_first, x.on_second, x.distance > 0 ? unit(across) : V{0, 0, 0}};
   }
   const Nearest<double> found = nearest<kind>(now);
-  const V direction = unit(found.gap);
+  const V direction = unit(found.straight);
   const double distance = std::sqrt(found.square);
   if constexpr (kind == Kind::vertex_face) return {distance, q[0], q[1] + found.x * now.a + found.y * now.b, direction};
   return {distance, q[0] + found.x * now.a, q[2] - found.y * now.b, direction};

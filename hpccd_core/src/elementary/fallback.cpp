@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "elementary/coincidence.h"
 #include "elementary/distance/extended_separation.h"
 #include "elementary/distance/nearest.h"
 #include "elementary/exact/contact.h"
@@ -65,6 +66,8 @@ std::optional<double> decide_proximity(Accuracy accuracy, const UndecidedPair& q
                                                         : computed_distance<Kind::edge_edge>(q);
     return distance <= q.separation ? std::optional(distance) : std::nullopt;
   }
+  const bool touch = q.kind == Kind::vertex_face ? share_a_place<1>(q.t0) : share_a_place<2>(q.t0);
+  if (touch) return 0;
   ++counts.integers;
   if (!exact::within(q.kind, q.t0, q.separation)) return std::nullopt;
   // Rounded it may come out above what it is known not to exceed.

@@ -10,6 +10,17 @@
 
 namespace hpccd::gpu {
 
+// Whether integers would find at once that they touch; the tiers that promise no answer compute a distance instead.
+template <Kind kind, class T>
+__device__ inline bool certainly_touch(const LaunchParams<T>& params, uint4 v) {
+  const Accuracy accuracy = accuracy_of(params, v);
+  if (accuracy != Accuracy::exact && accuracy != Accuracy::conservative) return false;
+  const u32 vertex[4] = {v.x, v.y, v.z, v.w};
+  Vec3<double> q[4];
+  for (int i = 0; i < 4; ++i) q[i] = load_ends(params.vertices, vertex[i]).t0;
+  return share_a_place<kind == Kind::vertex_face ? 1 : 2>(q);
+}
+
 // Distances stand where contacts have their times.
 template <Kind kind, class T>
 __global__ __launch_bounds__(128) void proximity_kernel(const __grid_constant__ LaunchParams<T> params) {
@@ -19,11 +30,13 @@ __global__ __launch_bounds__(128) void proximity_kernel(const __grid_constant__ 
     bool near = false, undecided = false;
     double distance = 0;
     if (valid) {
-      const Motion<double> m = load_motion<kind>(params.vertices, vertices_of<kind>(params, pair.x, pair.y));
+      const uint4 v = vertices_of<kind>(params, pair.x, pair.y);
+      const Motion<double> m = load_motion<kind>(params.vertices, v);
       const NearOrFar<double> o = proximity_test<kind>(Snapshot<double>{m.p0, m.a0, m.b0}, params.separation);
-      near = o.near;
-      undecided = !o.near && !o.far;
-      distance = o.distance;
+      const bool touch = !o.near && !o.far && certainly_touch<kind>(params, v);
+      near = o.near || touch;
+      undecided = !near && !o.far;
+      distance = touch ? 0 : o.distance;
       n_far += o.far;
     }
     append_found(params, kind, near, pair, distance);

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <chrono>
 
+#include "elementary/coincidence.h"
 #include "elementary/exact/intersection.h"
 #include "elementary/undecided.h"
 #include "elementary/policy.h"
@@ -106,8 +107,11 @@ void Worker::resolve(const Candidate& candidate, Rule rule) {
   if (kind == Kind::edge_face) {
     Vec3<double> q[5];
     edge_face_positions(search_->geometry, a, b, q);
-    ++count.integers;
-    if (exact::intersect(q)) report(kind, {a, b, 0});
+    if (!share_a_place<2>(q)) {
+      ++count.integers;
+      if (!exact::intersect(q)) return;
+    }
+    report(kind, {a, b, 0});
     return;
   }
   UndecidedPair pair = undecided_pair(search_->geometry, candidate);

@@ -8,14 +8,17 @@
 
 namespace hpccd {
 
-// No proof needs more of the places than that they are some of the features: doubles will do (a sixth of the time).
+// No proof needs more of the places than that they are some of the features: doubles will do (a sixth of the time), if
+// they are not beyond the border by a rounding.
 template <Kind kind>
 HPCCD_HD Nearest<DoubleDouble> nearest(const Snapshot<DoubleDouble>& s) {
   using R = DoubleDouble;
   const auto rounded = [](const Vec3<R>& v) { return Vec3<double>{v.x.high, v.y.high, v.z.high}; };
   const detail::Place<double> best = detail::best_place<kind>(Snapshot<double>{rounded(s.p), rounded(s.a), rounded(s.b)});
-  return detail::straightened(
-      detail::Place<R>{R(best.x), R(best.y), R(best.over_a), R(best.over_b), best.inside, R(best.square)}, s);
+  R x(best.x), y(best.y);
+  if (kind == Kind::vertex_face && x + y > R(1)) y = R((1 - best.x) * (1 - 2.220446049250313e-16));
+  const detail::Place<R> place{x, y, R(best.over_a), R(best.over_b), best.inside, detail::square_at(s, x, y)};
+  return detail::straightened(place, s);
 }
 
 namespace extended_precision {

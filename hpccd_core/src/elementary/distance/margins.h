@@ -13,7 +13,7 @@ namespace hpccd {
 // 1 + 4 u. A corner's gap along it is the sum of three dot products with vectors whose coordinates were rounded once:
 // at most 6 roundings of at most sqrt(3) S, 11 u S. Its value at a time adds three (6 u S), the time at which it falls
 // to a limit another three (6 u S): 23 u S. The coordinates of the gap between two points at a time carry 8 roundings
-// of S; straightening moves them by as much again: 28 u S. Relative to d: the direction's length and the products with d, 8 u. The rest is room for
+// of S and an inexact place as much again: 28 u S. Relative to d: the direction's length and the products with d, 8 u. The rest is room for
 // terms of second order and for the rounding of these limits.
 template <class R>
 struct Margins {
@@ -29,6 +29,12 @@ template <class R>
 HPCCD_HD Margins<R> margins(R d, R s) {
   const R u(half_ulp<R>());
   return {d + R(12) * (u * d) + R(32) * (u * s), d - R(12) * (u * d) - R(32) * (u * s)};
+}
+
+// The square of a distance between two points; its roundings are among those relative to d.
+template <class R>
+HPCCD_HD typename RealTraits<R>::Mask is_within(R square, const Margins<R>& margin) {
+  return margin.below > R(0) && square <= margin.below * margin.below;
 }
 
 // Whether squares and products of two squares neither overflow nor lose the bits of what is not negligible beside s.

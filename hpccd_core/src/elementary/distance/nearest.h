@@ -20,9 +20,11 @@ HPCCD_HD Snapshot<R> snapshot_at(const Motion<R>& m, R t) {
 
 template <class R>
 struct Nearest {
-  R x, y;       // where the gap is smallest, as well as rounding allows: a place of the features, up to rounding
-  Vec3<R> gap;  // there
-  R square;     // |gap|^2
+  R x, y;    // where the gap is smallest, as well as rounding allows: a place of the features, up to rounding
+  R square;  // of the gap there: no less than that of the features' distance
+  // In its direction, straightened: of a needle and of parallel edges it may be far too short.
+  Vec3<R> straight;
+  R straight_square;
 };
 
 namespace detail {
@@ -109,7 +111,7 @@ HPCCD_HD Nearest<R> straightened(const Place<R>& best, const Snapshot<R>& s) {
   const Vec3<R> on_plane = by_n * n, on_border = given - select(square > R(0), dot(given, along) / square, R(0)) * along;
   const Vec3<R> gap{select(best.inside, on_plane.x, on_border.x), select(best.inside, on_plane.y, on_border.y),
                     select(best.inside, on_plane.z, on_border.z)};
-  return {best.x, best.y, gap, dot(gap, gap)};
+  return {best.x, best.y, best.square, gap, dot(gap, gap)};
 }
 
 }  // namespace detail

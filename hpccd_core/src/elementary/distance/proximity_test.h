@@ -14,8 +14,8 @@ struct NearOrFar {
   R distance;
 };
 
-// Relative to the size of the pair: the contract promises 1e-12 of the scene's. A distance below it is known well
-// enough whatever its direction.
+// Relative to the size of the pair: the contract promises 1e-12 of the scene's. Below it features may touch, which is
+// for integers to say.
 inline constexpr double distance_radius = 2e-13;
 
 template <Kind kind, class R>
@@ -25,12 +25,12 @@ HPCCD_HD NearOrFar<R> proximity_test(const Snapshot<R>& at, R d) {
   const Nearest<R> found = nearest<kind>(at);
   const R length = square_root(found.square);
   R gaps[4];
-  corner_gaps<kind>((R(1) / length) * found.gap, at, gaps);
+  corner_gaps<kind>((R(1) / square_root(found.straight_square)) * found.straight, at, gaps);
   R least = gaps[0];
   for (int i = 1; i < n_corners<kind>; ++i) least = lesser(least, gaps[i]);
   const R radius = R(distance_radius) * s;
-  const auto usable = squares_in_range(s), known = length - least <= radius || length <= radius;
-  return {usable && length <= margin.below && known, usable && least > margin.above, length};
+  const auto usable = squares_in_range(s) && length > R(2) * radius, known = length - least <= radius;
+  return {usable && is_within(found.square, margin) && known, usable && least > margin.above, length};
 }
 
 }  // namespace hpccd

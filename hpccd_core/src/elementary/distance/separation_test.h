@@ -19,7 +19,8 @@ struct Look {
   R t;
   Snapshot<R> at;
   Vec3<R> direction;  // of the gap, of length one
-  R length, slope;    // of the gap, and how fast it changes
+  R length, slope;    // of the gap, as far as it is known, and how fast it changes
+  R square;           // between two points of the features
   typename RealTraits<R>::Mask known;  // the direction is
 };
 
@@ -27,10 +28,10 @@ template <Kind kind, class R>
 HPCCD_HD Look<kind, R> look(const Motion<R>& m, R s, R t) {
   const Snapshot<R> at = snapshot_at(m, t);
   const Nearest<R> near = nearest<kind>(at);
-  const R length = square_root(near.square);
-  const Vec3<R> direction = (R(1) / length) * near.gap;
+  const R length = square_root(near.straight_square);
+  const Vec3<R> direction = (R(1) / length) * near.straight;
   const Vec3<R> velocity = (m.p1 - m.p0) - near.x * (m.a1 - m.a0) - near.y * (m.b1 - m.b0);
-  return {t, at, direction, length, dot(direction, velocity), has_direction(near.square, s)};
+  return {t, at, direction, length, dot(direction, velocity), near.square, has_direction(near.straight_square, s)};
 }
 
 // Whether the features are certainly farther apart than d from one time to the other; limit: Margins::above.
@@ -57,6 +58,7 @@ HPCCD_HD Look<kind, R> select(typename RealTraits<R>::Mask m, const Look<kind, R
           vector(a.direction, b.direction),
           select(m, a.length, b.length),
           select(m, a.slope, b.slope),
+          select(m, a.square, b.square),
           (m && a.known) || (!m && b.known)};
 }
 
@@ -83,7 +85,7 @@ HPCCD_HD Outcome<R> separation_filter(const Motion<R>& m, R d) {
   const Margins<R> margin = margins(d, s);
   const auto usable = squares_in_range(s);
   const Look<kind, R> start = look<kind>(m, s, R(0)), end = look<kind>(m, s, R(1));
-  return {usable && start.length <= margin.below, usable && free_between(start, end, margin.above), R(0), R(0)};
+  return {usable && is_within(start.square, margin), usable && free_between(start, end, margin.above), R(0), R(0)};
 }
 
 template <Kind kind, class R>
@@ -94,7 +96,7 @@ HPCCD_HD Outcome<R> separation_test(const Motion<R>& m, R d) {
   // Between these two distances rounding hides the answer; trials aim as far before it.
   const R aim = margin.above + (margin.above - margin.below);
   Look<kind, R> from = look<kind>(m, s, R(0));  // certainly farther apart than d up to here
-  Mask contact = squares_in_range(s) && from.length <= margin.below;
+  Mask contact = squares_in_range(s) && is_within(from.square, margin);
   Mask running = squares_in_range(s) && !contact, none = R(1) < R(0);
   R high(2), length_at_high(0);  // certainly within d here, once that is found
   R reach(1);                    // so far ahead trials have succeeded lately
@@ -103,7 +105,7 @@ HPCCD_HD Outcome<R> separation_test(const Motion<R>& m, R d) {
   constexpr int most_steps = 60;
   for (int i = 0; i < most_steps && any(running); ++i) {
     const Look<kind, R> to = look<kind>(m, s, trial);
-    const Mask within = running && to.length <= margin.below;
+    const Mask within = running && is_within(to.square, margin);
     const Mask free = running && !within && free_between(from, to, margin.above);
     const Mask blocked = !within && !free;
     const R ahead = trial - from.t;

@@ -17,7 +17,9 @@ inline int sign(const Big& x) { return x.sign(); }
 
 // Of a number that is not zero.
 inline int highest_bit(const Big& x) {
-  return static_cast<int>(boost::multiprecision::msb(x.sign() < 0 ? Big(-x) : x));
+  const auto& limbs = x.backend();
+  const int top = static_cast<int>(limbs.size()) - 1;
+  return 64 * top + 63 - std::countl_zero(static_cast<std::uint64_t>(limbs.limbs()[top]));
 }
 
 inline Big to_big(const Big& x) { return x; }
@@ -25,7 +27,9 @@ template <int N>
 Big to_big(const Integer<N>& x) {
   const Integer<N> size = x.negative() ? -x : x;
   Big y = 0;
-  import_bits(y, size.limbs.begin(), size.limbs.end(), 64, false);
+  y.backend().resize(N, N);
+  std::copy(size.limbs.begin(), size.limbs.end(), y.backend().limbs());
+  y.backend().normalize();
   return x.negative() ? Big(-y) : y;
 }
 

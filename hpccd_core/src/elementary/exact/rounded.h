@@ -11,7 +11,7 @@
 
 namespace hpccd::exact {
 
-// By its Bernstein coefficients, the largest of which is between 1/4 and 1.
+// By its Bernstein coefficients, the largest of which is between 1/2 and 1.
 template <int D>
 struct Rounded {
   std::array<double, D + 1> b;
@@ -61,7 +61,7 @@ struct Rounded {
   }
 };
 
-// Nothing for a polynomial that vanishes throughout.
+// False for a polynomial that vanishes throughout.
 template <class Z, int D>
 bool round(const Polynomial<Z, D>& p, Rounded<D>& rounded) {
   using W = Plus<Z, 1>;

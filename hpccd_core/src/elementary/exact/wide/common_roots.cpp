@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "elementary/exact/wide/common_roots.h"
 
+#include <algorithm>
+
 #include "elementary/exact/wide/residue.h"
 
 namespace hpccd::exact::wide {
@@ -33,6 +35,21 @@ void drop_content(Numbers& p) {
   for (Big& c : p) c /= content;
 }
 
+}  // namespace
+
+bool certainly_no_common_root(Coefficients f, Coefficients g) {
+  auto a = copied<Residue>(f), b = copied<Residue>(g);
+  if (a.back().zero() || b.back().zero()) return false;
+  return last_remainder(std::move(a), std::move(b), [](Residue x) { return x.zero(); }, [](auto&) {}).size() == 1;
+}
+
+Numbers common_factor(Coefficients f, Coefficients g) {
+  if (certainly_no_common_root(f, g)) return {1};
+  Numbers a = copied<Big>(f), b = copied<Big>(g);
+  drop_content(a), drop_content(b);
+  return last_remainder(std::move(a), std::move(b), [](const Big& x) { return x.is_zero(); }, drop_content);
+}
+
 Numbers quotient(Numbers f, const Numbers& g) {
   Numbers q(f.size() - g.size() + 1);
   // A multiple of f that the leading number of g divides at every step.
@@ -47,19 +64,9 @@ Numbers quotient(Numbers f, const Numbers& g) {
   return q;
 }
 
-}  // namespace
-
-bool certainly_no_common_root(Coefficients f, Coefficients g) {
-  auto a = copied<Residue>(f), b = copied<Residue>(g);
-  if (a.back().zero() || b.back().zero()) return false;
-  return last_remainder(std::move(a), std::move(b), [](Residue x) { return x.zero(); }, [](auto&) {}).size() == 1;
-}
-
-Numbers common_factor(Coefficients f, Coefficients g) {
-  if (certainly_no_common_root(f, g)) return {1};
-  Numbers a = copied<Big>(f), b = copied<Big>(g);
-  drop_content(a), drop_content(b);
-  return last_remainder(std::move(a), std::move(b), [](const Big& x) { return x.is_zero(); }, drop_content);
+bool divides(const Numbers& g, Coefficients f) {
+  const Numbers rest = pseudo_remainder(copied<Big>(f), g);
+  return std::ranges::all_of(rest, [](const Big& x) { return x.is_zero(); });
 }
 
 Numbers square_free(Coefficients p) {

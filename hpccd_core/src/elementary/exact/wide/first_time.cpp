@@ -29,6 +29,11 @@ void narrow(Part& part, std::optional<Dyadic>& exact) {
   part = halves.first.variations() ? std::move(halves.first) : std::move(halves.second);
 }
 
+// Whether the one root in the part, a simple one, is that of a factor: then the number of its roots there is odd.
+bool holds_root(const Numbers& factor, const Part& part) {
+  return factor.size() > 1 && Part(factor, part.window()).variations() % 2 == 1;
+}
+
 }  // namespace
 
 FirstTime::FirstTime(const Event& event)
@@ -70,8 +75,11 @@ std::optional<std::int64_t> FirstTime::within(Part part, Open open) {
 }
 
 void FirstTime::remove_repeated_roots() {
-  of_ = square_free(of_);
   square_free_ = true;
+  const Numbers repeated = common_factor(of_, derivative(of_));
+  if (repeated.size() == 1) return;
+  of_ = quotient(std::move(of_), repeated);
+  repeated_ = square_free(repeated);
   // Factors of what it was may have roots twice.
   not_zero_.shared.reset();
   for (Condition& condition : at_least_zero_) condition.shared.reset();
@@ -111,9 +119,10 @@ int FirstTime::sign_at(Condition& condition, Part& part, std::optional<Dyadic>& 
     if (const int s = sign_inside(seen(condition.q, part.window()))) return s;
     if (asked || part.window().w < patience) continue;
     asked = true;
+    // Mostly those roots at which n vanishes, and with it all conditions.
+    if (holds_root(repeated_, part) && divides(repeated_, condition.q)) return 0;
     if (!condition.shared) condition.shared = common_factor(of_, condition.q);
-    // The part holds one root of of_, a simple one: a factor has it if its number of roots there is odd.
-    if (condition.shared->size() > 1 && Part(*condition.shared, part.window()).variations() % 2 == 1) return 0;
+    if (holds_root(*condition.shared, part)) return 0;
   }
 }
 

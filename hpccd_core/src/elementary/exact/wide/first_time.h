@@ -39,6 +39,7 @@ class FirstTime {
 
   Numbers of_;
   bool square_free_ = false;
+  Numbers repeated_;  // the roots that of_ had more than once, each once
   Condition not_zero_;
   std::vector<Condition> at_least_zero_;
   std::int64_t from_ = 0, limit_ = 0;

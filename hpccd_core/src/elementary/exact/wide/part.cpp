@@ -34,7 +34,7 @@ bool rounded_signs(const Numbers& a, int* signs) {
   rounded(a, b);
   signs[0] = sign(a[0]);
   to_bernstein(b, static_cast<int>(n));
-  // Each is a sum of at most 64 numbers below 1, added up with at most 6 roundings.
+  // Each is a sum of at most 35 numbers below 1, each rounded once and added up with at most 12 roundings.
   constexpr double error = 64 * 8 * 0x1p-52;
   for (std::size_t i = 1; i <= n; ++i) {
     if (std::fabs(b[i]) <= error) return false;

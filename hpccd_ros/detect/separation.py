@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How far apart the meshes of a scene are to stay. No ROS."""
+
+import math
+from collections.abc import Collection
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+import hpccd_core as hc
+from hpccd_ros.detect.layout import Layout
+
+
+@dataclass(frozen=True)
+class Separation:
+    """``minimum``: of the whole scene, 0 for contacts that touch. ``pairs``: (mesh, mesh, distance), which hold instead
+    for these two meshes; the same name twice: within the mesh. In the unit of the scene.
+    """
+
+    minimum: float = 0.0
+    pairs: tuple[tuple[str, str, float], ...] = ()
+
+    @property
+    def text(self) -> str:
+        """In words, empty where contacts touch."""
+        if self == Separation():
+            return ""
+        return ", ".join([f"{self.minimum:g}", *(f"{a}:{b}:{distance:g}" for a, b, distance in self.pairs)])
+
+    def among(self, names: Collection[str]) -> "Separation":
+        """That of the scene of these meshes."""
+        kept = tuple(entry for entry in self.pairs if entry[0] in names and entry[1] in names)
+        return Separation(self.minimum, kept)
+
+    def table(self, names: tuple[str, ...]) -> NDArray[np.float64]:
+        """(K, K): the distance in force for each pair of the K meshes."""
+        index = {name: number for number, name in enumerate(names)}
+        values = np.full((len(names), len(names)), self.minimum)
+        for mesh_a, mesh_b, distance in self.pairs:
+            a, b = index[mesh_a], index[mesh_b]
+            values[a, b] = values[b, a] = distance
+        return values
+
+    def unusable(self) -> str | None:
+        """Why no scene can have it, or None."""
+        for what, distance in [("", self.minimum), *((f"{a}:{b}: ", d) for a, b, d in self.pairs)]:
+            if not (math.isfinite(distance) and distance >= 0):
+                return f"{what}a separation must be finite and not negative, not {distance}"
+        return None
+
+
+#: Contacts touch.
+NONE = Separation()
+
+
+def change_separation(detector: hc.Detector, names: tuple[str, ...], old: Separation, new: Separation) -> None:
+    """From the next call of ``detector`` on ``new`` holds instead of ``old``; nothing of its scene is built anew."""
+    before, after = old.table(names), new.table(names)
+    for a, b in np.argwhere(np.triu(before != after)).tolist():
+        detector.set_separation(names[a], names[b], float(after[a, b]))
+
+
+def count_near(contacts: hc.Contacts, layout: Layout, separation: Separation) -> int:
+    """How many of the contacts are of meshes that have a separation: they came near, whether they touch or not."""
+    if not separation.pairs:  # what is so at nearly all times costs nothing
+        return len(contacts) if separation.minimum > 0 else 0
+    apart = separation.table(layout.mesh_names) > 0
+    of_vertices, of_faces = layout.vertex_offsets, layout.face_offsets
+    near = 0
+    for first, offsets_a, second, offsets_b in (
+        (contacts.vf[:, 0], of_vertices, contacts.vf[:, 1], of_faces),
+        (contacts.ee[:, 0], of_vertices, contacts.ee[:, 2], of_vertices),
+    ):
+        mesh_a, mesh_b = (np.searchsorted(o, i, side="right") - 1 for o, i in ((offsets_a, first), (offsets_b, second)))
+        near += int(np.count_nonzero(apart[mesh_a, mesh_b]))
+    return near

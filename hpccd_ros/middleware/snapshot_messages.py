@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the core tells of one snapshot -> messages: near pairs and intersections as ContactArray, smallest distances as
+DistanceArray."""
+
+import math
+
+import numpy as np
+from hpccd.msg import ContactArray, DistanceArray
+
+import hpccd_core as hc
+from hpccd_ros.detect.layout import Layout
+from hpccd_ros.middleware.contact_messages import fill_names, lowest
+from hpccd_ros.middleware.feature_pairs import FeaturePairs, fill_pairs
+from hpccd_ros.middleware.fields import to_field
+
+KINDS = {
+    "vertex-face": DistanceArray.VERTEX_FACE,
+    "edge-edge": DistanceArray.EDGE_EDGE,
+    "edge-face": DistanceArray.EDGE_FACE,
+}
+
+
+def fill_proximity(
+    message: ContactArray, near: hc.Proximity, layout: Layout, *, max_contacts: int, outputs: tuple[str, ...]
+) -> None:
+    """Write all but header, start, step, accuracy and backend. max_contacts: 0: all; else so many of the nearest, in
+    canonical order. outputs: whether to send closest, where the core has computed it."""
+    pairs, distance = FeaturePairs.of(near.vf, near.ee), np.concatenate([near.vf_distance, near.ee_distance])
+    closest = near.closest if "closest" in outputs and len(near.closest) == len(pairs) else None
+    keep = lowest(distance, max_contacts) if 0 < max_contacts < len(pairs) else None
+    _fill(message, pairs, layout, near.hash, keep)
+    message.distance = to_field(distance if keep is None else distance[keep])
+    if closest is not None:
+        message.closest = to_field(closest if keep is None else closest[keep])
+
+
+def fill_intersections(message: ContactArray, hits: hc.Intersections, layout: Layout, *, max_contacts: int) -> None:
+    """As `fill_proximity`; max_contacts: 0: all; else the first ones."""
+    keep = np.arange(max_contacts) if 0 < max_contacts < len(hits.ef) else None
+    _fill(message, FeaturePairs.of(ef=hits.ef), layout, hits.hash, keep)
+
+
+def _fill(message, pairs, layout, found_hash, keep) -> None:
+    fill_pairs(message, pairs if keep is None else pairs.keep(keep), layout)
+    fill_names(message, layout)
+    message.first_toc = math.inf
+    message.total, message.truncated, message.hash = len(pairs), keep is not None, int(found_hash)
+
+
+def fill_distances(message: DistanceArray, gaps: list[hc.Gap], layout: Layout) -> None:
+    """Write all but header, step, accuracy and backend."""
+    count = len(gaps)
+    kind, meshes = np.empty(count, np.uint8), np.empty((count, 2), np.uint32)
+    features, points = np.full((count, 2, 2), DistanceArray.NONE, np.uint32), np.zeros((count, 2, 3))
+    for row, gap in enumerate(gaps):
+        if not gap.kind:
+            kind[row] = DistanceArray.NO_PAIR
+            meshes[row] = layout.mesh_names.index(gap.mesh_a), layout.mesh_names.index(gap.mesh_b)
+            continue
+        kind[row], points[row] = KINDS[gap.kind], gap.points
+        for side, (indices, offsets) in enumerate(_sides(gap, layout)):
+            meshes[row, side] = mesh = int(np.searchsorted(offsets, indices[0], side="right")) - 1
+            features[row, side, : len(indices)] = [index - offsets[mesh] for index in indices]
+    fill_names(message, layout)
+    message.kind, message.distance = to_field(kind), to_field(np.array([gap.distance for gap in gaps]))
+    message.mesh_a, message.mesh_b = to_field(meshes[:, 0]), to_field(meshes[:, 1])
+    message.features_a, message.features_b = to_field(features[:, 0]), to_field(features[:, 1])
+    message.points = to_field(points)
+
+
+def _sides(gap: hc.Gap, layout: Layout):
+    """((indices, offsets of their numbering) of the first side, that of the second)."""
+    width = 1 if gap.kind == "vertex-face" else 2
+    of_second = layout.vertex_offsets if gap.kind == "edge-edge" else layout.face_offsets
+    return (gap.features[:width], layout.vertex_offsets), (gap.features[width:], of_second)

@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The queries of ``~/detect``: what each takes, and its answer."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from hpccd.msg import ContactArray, DistanceArray
+from hpccd.srv import Detect
+
+import hpccd_core as hc
+from hpccd_ros.base.quoting import quoted
+from hpccd_ros.detect.core import Options
+from hpccd_ros.detect.layout import Layout
+from hpccd_ros.detect.separation import NONE, Separation
+from hpccd_ros.middleware import contact_messages, separation_fields, snapshot_messages
+
+
+class RequestError(ValueError):
+    """A request that cannot be answered; the text says what to mend."""
+
+
+@dataclass(frozen=True)
+class Query:
+    """``separation``: None where the node's is to hold. ``distance``: of query proximity."""
+
+    name: str
+    separation: Separation | None = None
+    distance: float = 0.0
+
+    @property
+    def of_snapshot(self) -> bool:
+        return self.name != "contacts"
+
+
+def requested_query(request: Detect.Request) -> Query:
+    """Raises RequestError: no such query, or an argument that it has no use for."""
+    name = request.query or "contacts"
+    if name not in ANSWERS:
+        raise RequestError(f"query: {quoted(name)} is none of {', '.join(ANSWERS)}")
+    separation = _length(request, "minimum_separation", name, of="contacts")
+    distance = _length(request, "distance", name, of="proximity")
+    if name == "contacts":
+        return Query(name, None if separation is None else Separation(separation))
+    if request.report not in ("", "all"):
+        raise RequestError(f"report: only query contacts has one, leave it empty for {name}")
+    if name == "proximity" and distance is None:
+        raise RequestError("distance: empty; query proximity needs one")
+    return Query(name, NONE, distance or 0.0)
+
+
+def _length(request: Detect.Request, field: str, query: str, of: str) -> float | None:
+    """The number in a field that only the query ``of`` has, None where it is empty."""
+    given = getattr(request, field)
+    if not len(given):
+        return None
+    if query != of:
+        raise RequestError(f"{field}: only query {of} has one, leave it empty for {query}")
+    if not (math.isfinite(given[0]) and given[0] >= 0):
+        raise RequestError(f"{field}: {given[0]} must be finite and not negative")
+    return given[0]
+
+
+@dataclass(frozen=True, eq=False)
+class Asked:
+    """A scene and its positions; ``start`` is ``end`` where there is only one snapshot."""
+
+    start: np.ndarray
+    end: np.ndarray
+    detector: hc.Detector
+    layout: Layout
+    options: Options
+    max_contacts: int
+
+
+@dataclass(frozen=True)
+class Answer:
+    """``text``: in words what was found."""
+
+    text: str
+    contacts: ContactArray | None = None
+    distances: DistanceArray | None = None
+
+
+def _contacts(asked: Asked, query: Query) -> Answer:
+    message = ContactArray()
+    found = asked.detector.detect(asked.start, asked.end)
+    contact_messages.fill_contacts(
+        message, found, asked.layout, max_contacts=asked.max_contacts, outputs=asked.options.outputs
+    )
+    separation_fields.fill_separation(message, asked.options.separation)
+    return Answer(f"{message.total} contacts", contacts=message)
+
+
+def _proximity(asked: Asked, query: Query) -> Answer:
+    message = ContactArray()
+    near = asked.detector.proximity(asked.end, query.distance)
+    snapshot_messages.fill_proximity(
+        message, near, asked.layout, max_contacts=asked.max_contacts, outputs=asked.options.outputs
+    )
+    return Answer(f"{message.total} pairs within {query.distance:g}", contacts=message)
+
+
+def _intersections(asked: Asked, query: Query) -> Answer:
+    message = ContactArray()
+    hits = asked.detector.intersections(asked.end)
+    snapshot_messages.fill_intersections(message, hits, asked.layout, max_contacts=asked.max_contacts)
+    return Answer(f"{message.total} edges in faces", contacts=message)
+
+
+def _distances(asked: Asked, query: Query) -> Answer:
+    message = DistanceArray()
+    gaps = asked.detector.distances(asked.end)
+    snapshot_messages.fill_distances(message, gaps, asked.layout)
+    return Answer(f"{len(gaps)} pairs of meshes", distances=message)
+
+
+ANSWERS: dict[str, Callable[[Asked, Query], Answer]] = {
+    "contacts": _contacts,
+    "proximity": _proximity,
+    "intersections": _intersections,
+    "distances": _distances,
+}

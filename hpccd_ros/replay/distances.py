@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The smallest distances that the node told (topic distances), computed again."""
+
+import dataclasses
+
+import numpy as np
+
+from hpccd_core.options import ACCURACIES
+from hpccd_ros.bag.decode import make_decoder
+from hpccd_ros.bag.reader import RecordedTopic
+from hpccd_ros.detect.core import CORE_ERRORS
+from hpccd_ros.detect.layout import Layout
+from hpccd_ros.detect.step_detector import StepDetector
+from hpccd_ros.middleware import fields
+from hpccd_ros.middleware.fields import InvalidMessageError
+from hpccd_ros.middleware.snapshot_messages import fill_distances
+from hpccd_ros.replay.frames import PATIENCE, FrameWindow
+
+# Fields of DistanceArray, and how many entries each has for a pair of meshes.
+_PER_PAIR = {"mesh_a": 1, "mesh_b": 1, "kind": 1, "distance": 1, "features_a": 2, "features_b": 2, "points": 6}
+
+
+class DistanceCheck:
+    """Compares each answer with the snapshot that it is of, bit for bit. accuracy: "": that of each answer.
+
+    topics: to be read. verified, diverged, unverified: answers so far; first: what is wrong with the first of the
+    diverged, or else of the unverified ones, in words. Those of before the recording began are not counted.
+    """
+
+    def __init__(self, topic: RecordedTopic | None, detector: StepDetector, accuracy: str) -> None:
+        self.topics = [topic.name] if topic is not None else []
+        self._decode = make_decoder(topic) if topic is not None else None
+        self._detector = detector
+        self._accuracy = accuracy
+        self._waiting: list[tuple[int, object]] = []
+        self.verified = self.diverged = self.unverified = 0
+        self._divergence = self._lack = ""
+
+    @property
+    def first(self) -> str:
+        return self._divergence or self._lack
+
+    def put(self, message, frames: int) -> None:
+        """An answer, after so many frames: it may have been written before the last of its positions."""
+        self._waiting.append((frames, self._decode(message)))
+
+    def settle(self, window: FrameWindow, frames: int | None = None) -> None:
+        """Look at what waits, of which the frame is there or will not come any more. frames: so far; None: all."""
+        still = []
+        for came, answer in self._waiting:
+            try:
+                stamp = fields.stamp_to_ns(answer.header.stamp)
+            except InvalidMessageError as error:
+                self._lacks(f"the answer is malformed: {error}")
+                continue
+            frame = window.get(stamp)
+            if frame is not None:
+                self._look_at(answer, stamp, frame)
+            elif frames is not None and frames < came + PATIENCE:
+                still.append((came, answer))
+            elif window.first is None or stamp >= window.first:
+                self._lacks(f"distances at {stamp} ns: the recording has no frame of all meshes with this stamp")
+        self._waiting = still
+
+    def _look_at(self, answer, stamp, frame) -> None:
+        accuracy = self._accuracy or answer.accuracy
+        if accuracy not in ACCURACIES:
+            self._differs(f"distances at {stamp} ns: accuracy {accuracy[:20]!r} is none of {', '.join(ACCURACIES)}")
+            return
+        self._detector.options = dataclasses.replace(self._detector.options, accuracy=accuracy)
+        try:
+            gaps = self._detector.distances(frame)
+        except CORE_ERRORS as error:
+            self._lacks(f"distances at {stamp} ns: the core refuses it: {error}")
+            return
+        expected = type(answer)()
+        fill_distances(expected, gaps, Layout.of(self._detector.mesh_names, frame.topologies))
+        if (why := difference(answer, expected)) is None:
+            self.verified += 1
+        else:
+            self._differs(f"distances at {stamp} ns: {why}")
+
+    def _differs(self, text: str) -> None:
+        self.diverged += 1
+        self._divergence = self._divergence or text
+
+    def _lacks(self, text: str) -> None:
+        self.unverified += 1
+        self._lack = self._lack or text
+
+
+def difference(recorded, now) -> str | None:
+    """None where two DistanceArrays tell the same of the same meshes, bit for bit; else the first difference."""
+    for name in ("mesh_names", "topology_versions"):
+        if list(getattr(recorded, name)) != list(getattr(now, name)):
+            return f"{name} {list(getattr(recorded, name))} were recorded, now they are {list(getattr(now, name))}"
+    rows = len(now.distance)
+    columns = {}
+    for name, per_pair in _PER_PAIR.items():
+        then, new = (np.asarray(getattr(message, name)) for message in (recorded, now))
+        if len(then) != rows * per_pair:
+            return f"{name} has {len(then)} entries, {rows * per_pair} belong to {rows} pairs of meshes"
+        columns[name] = then.reshape(rows, -1), new.reshape(rows, -1)
+    for row in range(rows):
+        for name, (then, new) in columns.items():
+            if then[row].tobytes() != new[row].tobytes():
+                a, b = (now.mesh_names[getattr(now, side)[row]] for side in ("mesh_a", "mesh_b"))
+                return f"{a} - {b}: {name} {then[row].tolist()} was recorded, now it is {new[row].tolist()}"
+    return None

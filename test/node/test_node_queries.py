@@ -1,0 +1,194 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Queries of ~/detect: contacts with a separation, what is near, intersects or is nearest in one snapshot."""
+
+import math
+
+import numpy as np
+import pytest
+from hpccd.msg import ContactArray, DistanceArray
+from hpccd.srv import Detect
+from node_process import NodeProcess, assert_same_contacts
+from waving_sheet import scene_of, sheet_faces, sheet_positions
+
+import hpccd_core as hc
+from hpccd_ros import client
+from hpccd_ros.middleware import mesh_messages
+
+N = 8
+FACES = sheet_faces(N)
+MESHES = ("cloth", "net")
+
+
+def positions(k):
+    return sheet_positions(N, k), sheet_positions(N, k + 2, offset=0.02)
+
+
+def frame(k):
+    return np.concatenate(positions(k))
+
+
+def request(*, start=True, **fields):
+    out = Detect.Request(mesh_names=list(MESHES), **fields)
+    out.topologies = [mesh_messages.topology_message(FACES, N * N, version=4) for _ in MESHES]
+    for k, target in enumerate((out.start, out.end)):
+        if start or k:
+            for part in positions(k):
+                message = mesh_messages.vertices_message(part, 5 + k, step=k, frame_id="lab", topology_version=4)
+                target.append(message)
+    return out
+
+
+def snapshot(query, **fields):
+    return request(start=False, query=query, **fields)
+
+
+@pytest.fixture(scope="module")
+def node(tmp_path_factory):
+    given = {"minimum_separation": 1e-3, "pair_separation": ["cloth:net:0.004", "wall:cloth:0.5"]}
+    node = NodeProcess(
+        tmp_path_factory.mktemp("queries"),
+        {"meshes": [*MESHES, "wall"], "outputs": ["closest"], "max_contacts": 0, **given},
+    )
+    yield node
+    node.close()
+
+
+def ask(node, asked):
+    client = node.peer.client()
+    future = client.call_async(asked)
+    node.wait_until(future.done, "answer")
+    node.peer.node.destroy_client(client)
+    return future.result()
+
+
+def separated(*pairs):
+    scene = scene_of(cloth=FACES, net=FACES)
+    for pair in pairs:
+        scene.set_separation(*pair)
+    return scene
+
+
+@pytest.mark.parametrize("query", ["", "contacts"])
+def test_contacts_with_the_separation_of_the_node(node, query):
+    """Of its pairs only those whose meshes are asked for."""
+    answer = ask(node, request(query=query))
+    assert answer.success and answer.message.endswith("contacts"), answer.message
+    scene = separated(("cloth", "net", 0.004))
+    assert_same_contacts(answer.contacts, frame(0), frame(1), scene, minimum_separation=1e-3)
+    told = client.contacts_from_message(answer.contacts)
+    assert (told.minimum_separation, told.pair_separation) == (1e-3, {("cloth", "net"): 0.004})
+    assert told.closest.shape == (len(told), 2, 3)
+    assert len(answer.distances.distance) == 0
+
+
+@pytest.mark.parametrize("distance", [0.0, 0.002])
+def test_contacts_with_the_separation_of_the_request(node, distance):
+    answer = ask(node, request(minimum_separation=[distance]))
+    assert_same_contacts(answer.contacts, frame(0), frame(1), separated(), minimum_separation=distance)
+    told = client.contacts_from_message(answer.contacts)
+    assert (told.minimum_separation, told.pair_separation) == (distance, {})
+
+
+def of_snapshot(message):
+    """Header, start and step are those of the snapshot."""
+    assert (message.header.frame_id, message.header.stamp.nanosec, message.step) == ("lab", 6, 1)
+    assert list(message.mesh_names) == list(MESHES) and list(message.topology_versions) == [4, 4]
+    assert message.accuracy == "exact" and message.backend
+    if hasattr(message, "start"):
+        assert message.start == message.header.stamp and math.isinf(message.first_toc) and len(message.toc) == 0
+
+
+def layout():
+    topology = client.topology_from_message(client.topology_message(FACES, N * N, version=4))
+    return client.Layout.of(MESHES, (topology, topology))
+
+
+@pytest.mark.parametrize("distance", [0.0, 0.004])
+def test_near_pairs(node, distance):
+    answer = ask(node, snapshot("proximity", distance=[distance]))
+    assert answer.success, answer.message
+    of_snapshot(answer.contacts)
+    expected = hc.Detector(separated(), outputs=("closest",)).proximity(frame(1), distance)
+    got = client.scene_contacts(answer.contacts, layout())
+    for name in ("vf", "vf_distance", "ee", "ee_distance", "closest"):
+        assert np.array_equal(getattr(got, name), getattr(expected, name)), name
+    assert answer.contacts.hash == expected.hash and answer.contacts.total == len(expected)
+    assert answer.message == f"{len(expected)} pairs within {distance:g}"
+    assert len(expected) > 10 or distance == 0
+
+
+def test_edges_in_faces(node):
+    answer = ask(node, snapshot("intersections"))
+    assert answer.success and answer.message.endswith("edges in faces"), answer.message
+    of_snapshot(answer.contacts)
+    expected = hc.Detector(separated()).intersections(frame(1))
+    got = client.scene_contacts(answer.contacts, layout())
+    assert np.array_equal(got.ef, expected.ef) and len(got.vf) == len(got.ee) == 0
+    assert answer.contacts.hash == expected.hash and len(expected) > 0
+    assert set(answer.contacts.kind) == {ContactArray.EDGE_FACE}
+
+
+def test_smallest_distances(node):
+    answer = ask(node, snapshot("distances"))
+    assert (answer.success, answer.message) == (True, "3 pairs of meshes")
+    of_snapshot(answer.distances)
+    got = client.distances_from_message(answer.distances)
+    expected = hc.Detector(separated()).distances(frame(1))
+    assert [got.between(gap.mesh_a, gap.mesh_b) for gap in expected] == [gap.distance for gap in expected]
+    assert np.array_equal(got.points, [gap.points for gap in expected])
+    assert len(answer.contacts.kind) == answer.contacts.total == 0
+
+
+def test_meshes_that_intersect_and_meshes_far_apart(node):
+    """A needle through a triangle, and another triangle above them."""
+    triangle = np.array([[-1, -1, 0], [1, -1, 0], [0, 1, 0]], np.float64)
+    needle = np.array([[0, 0, -1], [0, 0, 1], [0.01, 0, 1]])
+    asked = Detect.Request(query="distances", mesh_names=["a", "b", "c"])
+    for part in (triangle, needle, triangle + [0, 0, 3]):
+        asked.topologies.append(mesh_messages.topology_message(np.array([[0, 1, 2]]), 3))
+        asked.end.append(mesh_messages.vertices_message(part, 1))
+    got = client.distances_from_message(ask(node, asked).distances)
+    assert [got.between(*pair) for pair in ("ab", "ba", "ac", "bc")] == [0.0, 0.0, 3.0, 2.0]
+    assert [got.between(*pair) for pair in ("aa", "bb", "cc")] == [math.inf] * 3
+    rows = {tuple(sorted(pair)): row for row, pair in enumerate(zip(got.mesh_a, got.mesh_b, strict=True))}
+    crossing, within = rows[0, 1], rows[0, 0]
+    assert got.kind[crossing] == DistanceArray.EDGE_FACE and got.kind[within] == DistanceArray.NO_PAIR
+    assert (got.mesh_a[crossing], got.features_a[crossing].tolist(), got.features_b[crossing, 0]) == (1, [0, 1], 0)
+    asked.query = "intersections"
+    hits = client.contacts_from_message(ask(node, asked).contacts)
+    assert hits.n_edge_face == len(hits) == 2 and hits.mesh_a.tolist() == [1, 1] and len(hits.toc) == 0
+
+
+@pytest.mark.parametrize(
+    "asked, text",
+    [
+        (request(query="nearest"), "query: 'nearest' is none of contacts, proximity, intersections, distances"),
+        (snapshot("proximity"), "distance: empty; query proximity needs one"),
+        (snapshot("proximity", distance=[-1.0]), "distance: -1.0 must be finite and not negative"),
+        (snapshot("proximity", distance=[math.nan]), "distance: nan must be finite"),
+        (snapshot("distances", distance=[1.0]), "distance: only query proximity has one, leave it empty for distances"),
+        (request(distance=[1.0]), "distance: only query proximity has one, leave it empty for contacts"),
+        (request(minimum_separation=[math.inf]), "minimum_separation: inf must be finite and not negative"),
+        (request(minimum_separation=[-0.5]), "minimum_separation: -0.5 must be finite and not negative"),
+        (
+            snapshot("intersections", minimum_separation=[0.1]),
+            "minimum_separation: only query contacts has one, leave it empty for intersections",
+        ),
+        (snapshot("distances", report="first"), "report: only query contacts has one, leave it empty for distances"),
+        (request(start=False), "start: 0 entries for 2 meshes"),
+    ],
+)
+def test_bad_requests_are_refused_with_a_reason(node, asked, text):
+    answer = ask(node, asked)
+    assert not answer.success and text in answer.message, answer.message
+    assert answer.contacts.total == len(answer.distances.distance) == 0
+
+
+def test_only_the_nearest_of_many(start_node):
+    node = start_node({"max_contacts": 7})
+    answer = ask(node, snapshot("proximity", distance=[0.01]))
+    found = hc.Detector(separated()).proximity(frame(1), 0.01)
+    got = client.contacts_from_message(answer.contacts)
+    nearest = np.sort(np.concatenate([found.vf_distance, found.ee_distance]))[:7]
+    assert np.sort(got.distance).tolist() == nearest.tolist()
+    assert (answer.contacts.total, answer.contacts.truncated) == (len(found), True)

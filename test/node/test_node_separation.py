@@ -1,0 +1,194 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Meshes that are to stay apart, and the smallest distances between them: streamed, changed while the node runs,
+recorded and computed again from the file."""
+
+import math
+
+import numpy as np
+import pytest
+from hpccd.msg import DistanceArray
+from node_calls import set_parameter
+from node_process import assert_same_contacts
+from visualization_msgs.msg import MarkerArray
+from waving_sheet import scene_of, sheet_faces, sheet_positions
+
+import hpccd_core as hc
+from hpccd_ros import client
+from hpccd_ros.bag.reader import Recording
+from hpccd_ros.middleware import qos
+from hpccd_ros.replay import recorded_setup
+from hpccd_ros.replay.recomputed import Replay
+
+N = 8
+FACES = sheet_faces(N)
+MESHES = ("cloth", "net")
+
+
+def positions(k):
+    return sheet_positions(N, k), sheet_positions(N, k + 2, offset=0.02)
+
+
+def frame(k):
+    return np.concatenate(positions(k))
+
+
+class Stream:
+    """Frames of both meshes, each answered before the next is sent."""
+
+    def __init__(self, node):
+        self.node, self.sent = node, 0
+        for name in MESHES:
+            node.peer.topology(name, FACES, N * N)
+        self.send()
+
+    def send(self):
+        """The answer to the step, or None to the first frame."""
+        for name, part in zip(MESHES, positions(self.sent), strict=True):
+            self.node.peer.vertices(name, part, stamp=self.sent, frame_id="world")
+        self.sent += 1
+        self.node.frames_status(answered=2 * self.sent)
+        return self.node.contacts(self.sent - 1)[-1] if self.sent > 1 else None
+
+    def expect(self, minimum=0.0, **pairs):
+        """Send a frame; its answer is that of the core with these separations, and tells them."""
+        scene = scene_of(cloth=FACES, net=FACES)
+        for pair, distance in pairs.items():
+            scene.set_separation(*pair.split("_"), distance)
+        answer = self.send()
+        frames = frame(self.sent - 2), frame(self.sent - 1)
+        assert_same_contacts(answer, *frames, scene, minimum_separation=minimum)
+        told = client.contacts_from_message(answer)
+        assert told.minimum_separation == minimum
+        assert told.pair_separation == {tuple(pair.split("_")): distance for pair, distance in pairs.items()}
+        return answer
+
+    def set(self, name, value):
+        return set_parameter(self.node, name, value)
+
+
+def detection_values(stream, **expected):
+    """Wait until the status `detection` holds these values; all of them."""
+    wanted = {key: str(value) for key, value in expected.items()}
+
+    def matches():
+        values = stream.node.peer.statuses["detection"][2]
+        return values if wanted.items() <= values.items() else None
+
+    return stream.node.wait_until(matches, f"detection status with {wanted}")
+
+
+def test_given_at_the_start_and_changed_from_step_to_step(start_node):
+    given = {"minimum_separation": 1e-3, "pair_separation": ["net:cloth:5e-3"]}
+    stream = Stream(start_node({"meshes": list(MESHES), **given}))
+    first = stream.expect(1e-3, cloth_net=5e-3)
+    assert first.total > len(hc.Detector(scene_of(cloth=FACES, net=FACES)).detect(frame(0), frame(1)))
+    near = detection_values(stream, near=first.total, minimum_separation=0.001)
+    assert stream.set("minimum_separation", 0.0).successful
+    second = stream.expect(cloth_net=5e-3)
+    near = int(detection_values(stream, minimum_separation=0.0, detections=2)["near"])
+    sides = np.frombuffer(second.mesh_a, np.uint32), np.frombuffer(second.mesh_b, np.uint32)
+    assert near == np.count_nonzero(sides[0] != sides[1]) > 0, "only those pairs that have a separation"
+    detection_values(stream, near_total=first.total + near)
+    assert stream.set("pair_separation", ["cloth:cloth:0.002", "cloth:net:0.0"]).successful
+    stream.expect(cloth_cloth=2e-3, cloth_net=0.0)
+    assert stream.set("pair_separation", [""]).successful
+    stream.expect()
+    detection_values(stream, near=0, detections=4)
+
+
+@pytest.mark.parametrize(
+    "name, value, reason",
+    [
+        ("minimum_separation", -1.0, "range"),
+        ("minimum_separation", math.nan, "minimum_separation out of range Min: 0.0"),
+        ("minimum_separation", "wide", "type"),
+        ("pair_separation", ["cloth:wall:0.1"], "pair_separation: 'cloth:wall:0.1' must be NAME:NAME:DISTANCE with"),
+        ("pair_separation", ["cloth:net:-1"], "a distance from 0 to 1e+150"),
+        ("pair_separation", ["cloth:net:1", "net:cloth:2"], "contradicts 'cloth:net:1.0'"),
+    ],
+)
+def test_bad_values_are_refused_with_a_reason(shared_stream, name, value, reason):
+    answer = shared_stream.set(name, value)
+    assert not answer.successful and reason in answer.reason, answer.reason
+    shared_stream.expect(1e-3)
+
+
+@pytest.fixture(scope="module")
+def shared_stream(tmp_path_factory):
+    from node_process import NodeProcess
+
+    given = {"meshes": list(MESHES), "minimum_separation": 1e-3}
+    node = NodeProcess(tmp_path_factory.mktemp("separation"), given)
+    yield Stream(node)
+    node.close()
+
+
+def listen(node, kind, topic, profile):
+    """What is published there from now on; there is a publisher."""
+    heard = []
+    node.peer.node.create_subscription(kind, topic, heard.append, profile)
+    node.wait_until(lambda: node.peer.node.count_publishers(topic), f"publisher of {topic}")
+    return heard
+
+
+def test_distances_on_request(start_node):
+    node = start_node({"meshes": list(MESHES)})
+    heard = listen(node, DistanceArray, client.DISTANCES_TOPIC, client.DISTANCES_QOS)
+    stream = Stream(node)
+    stream.send()
+    assert stream.set("distances", True).successful
+    step = stream.sent
+    stream.send()
+    assert stream.set("distances", False).successful
+    stream.send()
+    detection_values(stream, detections=3)
+    node.wait_until(lambda: heard, "distances")
+    (message,) = heard
+    assert (message.header.stamp.nanosec, message.header.frame_id, message.accuracy) == (step, "world", "exact")
+    got = client.distances_from_message(message)
+    expected = hc.Detector(scene_of(cloth=FACES, net=FACES)).distances(frame(step))
+    assert len(expected) == len(got) == 3
+    for gap, distance, points in zip(expected, got.distance, got.points, strict=True):
+        assert got.between(gap.mesh_a, gap.mesh_b) == gap.distance == distance
+        assert np.array_equal(points, gap.points)
+
+
+def test_the_sides_of_near_pairs_are_marked(start_node):
+    node = start_node({"meshes": list(MESHES), "markers": True, "markers_rate": 1000.0, "markers_max": 10})
+    heard = listen(node, MarkerArray, "markers", qos.MARKERS)
+    stream = Stream(node)
+    stream.send()
+    assert stream.set("minimum_separation", 5e-3).successful
+    answer = stream.send()
+    assert len(answer.closest) == 0, "the contacts carry nearest points only where asked for (outputs)"
+    near = [markers.markers[3] for markers in node.wait_until(lambda: len(heard) == 2 and heard, "two marker arrays")]
+    assert [(len(marker.points), marker.ns) for marker in near] == [(0, "near"), (20, "near")]
+    ends = np.array([[point.x, point.y, point.z] for point in near[1].points]).reshape(-1, 2, 3)
+    lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    assert lengths.max() > 1e-3 and lengths.max() <= 5e-3 * (1 + 1e-9)
+
+
+def test_recorded_with_all_its_changes_and_verified(start_node, tmp_path, hpccd):
+    path = tmp_path / "run.mcap"
+    node = start_node({"meshes": list(MESHES), "distances": True, "outputs": ["closest"], "record": str(path)})
+    stream = Stream(node)
+    stream.expect()
+    assert stream.set("minimum_separation", 1e-3).successful
+    assert len(stream.expect(1e-3).closest) > 0
+    assert stream.set("pair_separation", ["net:net:0.004", "cloth:net:0.002"]).successful
+    stream.expect(1e-3, cloth_net=2e-3, net_net=4e-3)
+    assert stream.set("distances", False).successful
+    stream.expect(1e-3, cloth_net=2e-3, net_net=4e-3)
+    assert node.stop() == 0
+    with Recording(path) as recording:
+        replay = Replay(recording, recorded_setup.of_recording(recording))
+        steps = list(replay.steps())
+    assert (replay.verified, replay.diverged, replay.unverified) == (4, 0, 0)
+    told = "0.001, net:net:0.004, cloth:net:0.002"
+    assert [step.separation.text for step in steps] == ["", "0.001", told, told]
+    found = replay.distances
+    assert (found.verified, found.diverged, found.unverified, found.first) == (3, 0, 0, "")
+    done = hpccd("replay", path)
+    assert done.returncode == 0 and "  3 answers about distances are equal" in done.stdout, done.stdout
+    equal = "VERIFIED: 4 answers are equal in every contact, time and hash"
+    assert f"{equal} (accuracy exact; separation 0.001; separation {told})" in done.stdout, done.stdout
