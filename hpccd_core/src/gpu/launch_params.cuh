@@ -7,8 +7,8 @@
 #include "base/hd.h"
 #include "elementary/pair_vertices.h"
 #include "gpu/counters.cuh"
+#include "gpu/device_box.cuh"
 #include "gpu/pair_keys.h"
-#include "gpu/query.h"
 #include "hpccd/hpccd.h"
 
 namespace hpccd::gpu {
@@ -29,27 +29,6 @@ struct alignas(32) GivenEnds<float> {
 template <>
 struct alignas(64) GivenEnds<double> {
   double2 t0[2], t1[2];
-};
-
-// A 16-byte word; what the tags of a box hold depends on the list.
-struct alignas(16) Bound {
-  float x[3];
-  u32 tag;
-};
-
-// Where a vertex is at both ends of its motion; of a snapshot, where it is along the axes, and along the slanted
-// directions (bvh/kdop.h). The tags hold by how much its box grows there (a float).
-struct alignas(32) DevicePoint {
-  Bound at[2];
-};
-
-// Bounds at both ends of the motion (bvh/motion_box.h).
-struct alignas(64) DeviceBox {
-  Bound low[2], high[2];
-  HPCCD_HD u32& tag_low() { return low[0].tag; }
-  HPCCD_HD u32& tag_high() { return high[0].tag; }
-  HPCCD_HD u32 tag_low() const { return low[0].tag; }
-  HPCCD_HD u32 tag_high() const { return high[0].tag; }
 };
 
 struct alignas(16) DeviceLeaf {
@@ -130,62 +109,6 @@ __device__ inline u64 warp_append(u64* counter, bool wants) {
   if (lane == leader) base = atomicAdd(counter, static_cast<u64>(__popc(mask)));
   base = __shfl_sync(all_lanes, base, leader);
   return base + __popc(mask & ((1u << lane) - 1));
-}
-
-__device__ inline Bound bound_of(float4 v) { return {{v.x, v.y, v.z}, __float_as_uint(v.w)}; }
-
-__device__ inline DeviceBox load_box(const DeviceBox* b) {
-  const float4* v = reinterpret_cast<const float4*>(b);
-  return {{bound_of(v[0]), bound_of(v[1])}, {bound_of(v[2]), bound_of(v[3])}};
-}
-
-// Past this multiprocessor's own cache: written by another one in the same kernel.
-__device__ inline DeviceBox load_box_fresh(const DeviceBox* b) {
-  const float4* v = reinterpret_cast<const float4*>(b);
-  return {{bound_of(__ldcg(v)), bound_of(__ldcg(v + 1))}, {bound_of(__ldcg(v + 2)), bound_of(__ldcg(v + 3))}};
-}
-
-// The box of one vertex. The tags of a grown one are to be set.
-template <bool grown>
-__device__ inline DeviceBox load_point(const DevicePoint* p) {
-  const float4* v = reinterpret_cast<const float4*>(p);
-  const Bound t0 = bound_of(v[0]), t1 = bound_of(v[1]);
-  DeviceBox b{{t0, t1}, {t0, t1}};
-  if constexpr (grown) {
-    const float reach[2] = {__uint_as_float(t0.tag), __uint_as_float(t1.tag)};
-    for (int end = 0; end < 2; ++end)
-      for (int k = 0; k < 3; ++k) b.low[end].x[k] -= reach[end], b.high[end].x[k] += reach[end];
-  }
-  return b;
-}
-
-__device__ inline void store(Bound* to, const Bound& b) {
-  *reinterpret_cast<float4*>(to) = {b.x[0], b.x[1], b.x[2], __uint_as_float(b.tag)};
-}
-__device__ inline void store_box(DeviceBox* to, const DeviceBox& b) {
-  for (int end = 0; end < 2; ++end) store(&to->low[end], b.low[end]), store(&to->high[end], b.high[end]);
-}
-
-__device__ inline void include(DeviceBox& a, const DeviceBox& b) {
-  for (int end = 0; end < 2; ++end)
-    for (int k = 0; k < 3; ++k) {
-      a.low[end].x[k] = b.low[end].x[k] < a.low[end].x[k] ? b.low[end].x[k] : a.low[end].x[k];
-      a.high[end].x[k] = a.high[end].x[k] < b.high[end].x[k] ? b.high[end].x[k] : a.high[end].x[k];
-    }
-}
-
-// Of a motion: not in the same order along an axis at both ends. Of a snapshot: along no direction apart.
-template <Query query>
-__device__ inline bool overlap(const DeviceBox& a, const DeviceBox& b) {
-  bool apart = false;
-  for (int k = 0; k < 3; ++k)
-    if constexpr (of_snapshot(query))
-      apart |= (a.high[0].x[k] < b.low[0].x[k]) | (b.high[0].x[k] < a.low[0].x[k]) | (a.high[1].x[k] < b.low[1].x[k]) |
-               (b.high[1].x[k] < a.low[1].x[k]);
-    else
-      apart |= ((a.high[0].x[k] < b.low[0].x[k]) & (a.high[1].x[k] < b.low[1].x[k])) |
-               ((b.high[0].x[k] < a.low[0].x[k]) & (b.high[1].x[k] < a.low[1].x[k]));
-  return !apart;
 }
 
 // One vertex at both ends, widened.
