@@ -13,7 +13,7 @@ std::optional<Contacts> CpuBackend::proximity(Positions vertices, double distanc
   see_snapshot(vertices);
   search_.geometry.separations = {distance};
   search_.leaf_pairs_in_snapshot = leaf_pairs_in_snapshot(o.simd);
-  search_.reach = reach_of(distance, shared_.tree.motion().map.scale);
+  search_.reach = reach_of(distance, shared_.tree.motion().rounding, shared_.tree.motion().map.scale);
   walk_tree();
   return collect({false, false, o.closest, AtTime::start});
 }

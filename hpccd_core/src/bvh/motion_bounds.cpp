@@ -147,6 +147,9 @@ void MotionBounds::update(const Real* t0, const Real* t1, std::size_t n, std::sp
 
   const CoordinateMap old_map = map;
   if (n > 0) map = CoordinateMap::around(whole.low, whole.high);
+  double most = 0;
+  for (int k = 0; n > 0 && k < 3; ++k) most = std::max({most, std::fabs(whole.low[k]), std::fabs(whole.high[k])});
+  rounding = 1e-15 * most;
   std::vector<double> margins(parts_.size(), 0);
   if (!separations.empty() && n > 0)
     for (std::size_t p = 0; p < parts_.size(); ++p) margins[p] = margin_for(separations[p], whole);

@@ -20,6 +20,7 @@ NearestPairs::NearestPairs(const Scene& scene, const MotionBounds& motion)
     : n_(scene.meshes().size()),
       entries_(std::make_unique<Entry[]>(n_ * n_)),
       scale_(motion.map.scale),
+      sums_(motion.rounding),
       // The margins of the test (margins.h), of a pair as large as the scene: boxes lie within 2.25 of zero, so p, a and
       // b together are below 14.
       rounding_(14 * 1e-14 / motion.map.scale) {
@@ -35,7 +36,7 @@ void NearestPairs::offer(std::uint32_t mesh_a, std::uint32_t mesh_b, const Neare
   const bool intersects = pair.kind == Kind::edge_face;
   // Pairs at the same distance are still wanted, one of which is the first in order.
   entry.limit.store(intersects ? -1 : pair.distance * (1 + 1e-14) + rounding_, std::memory_order_relaxed);
-  entry.reach.store(intersects ? 0 : reach_of(pair.distance * (1 + 1e-14) + rounding_, scale_),
+  entry.reach.store(intersects ? 0 : reach_of(pair.distance * (1 + 1e-14) + rounding_, sums_, scale_),
                     std::memory_order_relaxed);
 }
 

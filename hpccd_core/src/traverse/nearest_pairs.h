@@ -51,7 +51,7 @@ class NearestPairs {
   std::size_t n_;
   std::unique_ptr<Entry[]> entries_;
   std::vector<std::uint32_t> mesh_of_vertex_;
-  double scale_, rounding_;
+  double scale_, sums_, rounding_;
 };
 
 }  // namespace hpccd
