@@ -105,8 +105,8 @@ struct Contacts {
   // before toc, or from edge a to the side on which edge b is then; for contact at t = 0, to where the straight-line
   // motion would have come from. Zero where the motion is coplanar throughout, and where at toc features are degenerate
   // or parallel.
-  // With a minimum separation a point is the midpoint of the nearest points at toc, and a normal the direction from face
-  // to vertex or from edge a to edge b.
+  // With a minimum separation a point is the midpoint of the nearest points at toc, and a normal the direction from
+  // face to vertex or from edge a to edge b.
   std::vector<std::array<double, 3>> points, normals;
   std::vector<std::array<std::array<double, 3>, 2>> closest;  // the nearest points of both sides at toc
   double first_toc = std::numeric_limits<double>::infinity();
@@ -134,7 +134,7 @@ enum class GapKind : std::uint8_t { none, vertex_face, edge_edge, edge_face };
 struct Gap {
   std::uint32_t mesh_a, mesh_b;
   double distance = std::numeric_limits<double>::infinity();
-  GapKind kind = GapKind::none;  // edge_face: they intersect, the distance is 0
+  GapKind kind = GapKind::none;             // edge_face: they intersect, the distance is 0
   std::array<std::uint32_t, 4> features{};  // as in vf, ee or ef
   std::array<std::array<double, 3>, 2> points{};
 };

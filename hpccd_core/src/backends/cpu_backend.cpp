@@ -29,7 +29,8 @@ void CpuBackend::update(Positions t0, Positions t1, Tests tests) {
   shared_.tree.bound(t0, t1, shared_.separations.largest());
   begin_query();
   search_.geometry.separations = shared_.separations_now();
-  search_.geometry.margin = {shared_.separations.most() + shared_.tree.motion().rounding, shared_.tree.motion().map.scale};
+  search_.geometry.margin = {shared_.separations.most() + shared_.tree.motion().rounding,
+                             shared_.tree.motion().map.scale};
   search_.leaf_pairs = leaf_pairs(o.simd);
   const bool here = tests == Tests::all_here;
   search_.report = !here && o.report == Report::any ? Report::all : o.report;

@@ -44,8 +44,8 @@ template <class Real>
       const std::string where = std::string(name) + "[" + std::to_string(i) + ", " + std::to_string(k) + "] is ";
       if (!std::isfinite(value))
         throw InvalidArgument(where + (std::isnan(value) ? "NaN" : "infinite") + "; all coordinates must be finite");
-      throw InvalidArgument(where + shortest(value) +
-                            ", beyond " + shortest(largest) + ": intermediate results could overflow; scale the scene down");
+      throw InvalidArgument(where + shortest(value) + ", beyond " + shortest(largest) +
+                            ": intermediate results could overflow; scale the scene down");
     }
   throw InvalidArgument(std::string(name) + " changed while it was being read");
 }
@@ -167,7 +167,8 @@ void MotionBounds::update(const Real* t0, const Real* t1, std::size_t n, std::sp
       if (snapshot_)
         copy_snapshot(t0, map, pieces[i].begin, pieces[i].end, vertices.data(), boxes.data());
       else
-        copy_motion(t0, t1, map, margins_[pieces[i].part], pieces[i].begin, pieces[i].end, vertices.data(), boxes.data(), kdops.data());
+        copy_motion(t0, t1, map, margins_[pieces[i].part], pieces[i].begin, pieces[i].end, vertices.data(),
+                    boxes.data(), kdops.data());
   });
 }
 

@@ -32,8 +32,8 @@ struct MotionBounds {
   std::vector<MotionBox> boxes;
   std::vector<VertexKdop> kdops;
   CoordinateMap map;
-  // What sums of two coordinates may lose, in those of the scene: 2.2e-16 of the largest for each of two vertices, 3.4e-16
-  // where one is doubled. Far from the origin that is more than rounding to floats.
+  // What sums of two coordinates may lose, in those of the scene: 2.2e-16 of the largest for each of two
+  // vertices, 3.4e-16 where one is doubled. Far from the origin that is more than rounding to floats.
   double rounding = 0;
   // By mesh: its vertices and boxes are still those of the call before. Empty: of none.
   std::vector<char> resting;

@@ -19,7 +19,8 @@ NearestPoints nearest_points_of(const V q[4]) {
   const V n = cross(now.a, now.b);
   // Below this sine of their angle the place along two edges is a matter of rounding.
   constexpr double parallel = 1e-7;
-  const bool place_is_known = kind == Kind::vertex_face || dot(n, n) > parallel * parallel * (dot(now.a, now.a) * dot(now.b, now.b));
+  const bool place_is_known =
+      kind == Kind::vertex_face || dot(n, n) > parallel * parallel * (dot(now.a, now.a) * dot(now.b, now.b));
   const NearOrFar<double> checked = proximity_test<kind>(now, 0.0);
   if (!place_is_known || !checked.far) {
     const exact::Nearest x = exact::nearest(kind, q);

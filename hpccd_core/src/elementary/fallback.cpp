@@ -49,8 +49,7 @@ std::optional<double> decide_contact(Accuracy accuracy, const UndecidedPair& q, 
     return exact::earliest_contact(q.kind, q.t0, q.t1);
   }
   ++counts.tolerance;
-  return q.kind == Kind::vertex_face ? tolerance_contact<Kind::vertex_face>(q)
-                                     : tolerance_contact<Kind::edge_edge>(q);
+  return q.kind == Kind::vertex_face ? tolerance_contact<Kind::vertex_face>(q) : tolerance_contact<Kind::edge_edge>(q);
 }
 
 std::optional<double> decide_separation(Accuracy accuracy, const UndecidedPair& q, FallbackCounts& counts) {
@@ -62,8 +61,8 @@ std::optional<double> decide_separation(Accuracy accuracy, const UndecidedPair& 
 std::optional<double> decide_proximity(Accuracy accuracy, const UndecidedPair& q, FallbackCounts& counts) {
   if (!promises_answers(accuracy)) {
     ++counts.tolerance;
-    const double distance = q.kind == Kind::vertex_face ? computed_distance<Kind::vertex_face>(q)
-                                                        : computed_distance<Kind::edge_edge>(q);
+    const double distance =
+        q.kind == Kind::vertex_face ? computed_distance<Kind::vertex_face>(q) : computed_distance<Kind::edge_edge>(q);
     return distance <= q.separation ? std::optional(distance) : std::nullopt;
   }
   const bool touch = q.kind == Kind::vertex_face ? share_a_place<1>(q.t0) : share_a_place<2>(q.t0);

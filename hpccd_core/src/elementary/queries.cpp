@@ -26,7 +26,8 @@ double power_of_two_scale(const Query& q) {
 void test_queries(Kind kind, std::span<const Query> queries, const Options& options, bool* hit, double* toc) {
   const Accuracy accuracy = options.accuracy;
   const double separation = options.minimum_separation;
-  const BatchTest test = separation > 0 ? separation_batch(resolve(options.simd)) : batch_test(resolve(options.simd), accuracy);
+  const BatchTest test =
+      separation > 0 ? separation_batch(resolve(options.simd)) : batch_test(resolve(options.simd), accuracy);
   const Fallback fallback = separation > 0 ? decide_separation : decide_contact;
   auto result = std::make_unique<BatchResult>();
   FallbackCounts counts;

@@ -7,16 +7,16 @@ namespace hpccd {
 namespace scalar {
 void leaf_pairs(const Tree&, const LeafRange&, const LeafRange&, CandidateBuffer&, CandidateBuffer&);
 void leaf_pairs_in_snapshot(const Tree&, const LeafRange&, const LeafRange&, float, CandidateBuffer&, CandidateBuffer&);
-}
+}  // namespace scalar
 #if defined(HPCCD_X86)
 namespace avx2 {
 void leaf_pairs(const Tree&, const LeafRange&, const LeafRange&, CandidateBuffer&, CandidateBuffer&);
 void leaf_pairs_in_snapshot(const Tree&, const LeafRange&, const LeafRange&, float, CandidateBuffer&, CandidateBuffer&);
-}
+}  // namespace avx2
 namespace avx512 {
 void leaf_pairs(const Tree&, const LeafRange&, const LeafRange&, CandidateBuffer&, CandidateBuffer&);
 void leaf_pairs_in_snapshot(const Tree&, const LeafRange&, const LeafRange&, float, CandidateBuffer&, CandidateBuffer&);
-}
+}  // namespace avx512
 #endif
 
 LeafPairs leaf_pairs([[maybe_unused]] Simd simd) {

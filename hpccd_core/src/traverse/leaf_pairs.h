@@ -24,7 +24,7 @@ LeafPairs leaf_pairs(Simd simd);
 
 // The same of one snapshot: features whose boxes at t = 0 are no farther apart than `reach` along any axis.
 using LeafPairsInSnapshot = void (*)(const Tree& tree, const LeafRange& a, const LeafRange& b, float reach,
-                                  CandidateBuffer& edge_edge, CandidateBuffer& vertex_face);
+                                     CandidateBuffer& edge_edge, CandidateBuffer& vertex_face);
 
 LeafPairsInSnapshot leaf_pairs_in_snapshot(Simd simd);
 

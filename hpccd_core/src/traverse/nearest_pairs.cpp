@@ -21,11 +21,10 @@ NearestPairs::NearestPairs(const Scene& scene, const MotionBounds& motion)
       entries_(std::make_unique<Entry[]>(n_ * n_)),
       scale_(motion.map.scale),
       sums_(motion.rounding),
-      // The margins of the test (margins.h), of a pair as large as the scene: boxes lie within 2.25 of zero, so p, a and
-      // b together are below 14.
+      // The margins of the test (margins.h), of a pair as large as the scene: boxes lie within 2.25 of zero, so p, a
+      // and b together are below 14.
       rounding_(14 * 1e-14 / motion.map.scale) {
-  for (std::uint32_t m = 0; m < n_; ++m)
-    mesh_of_vertex_.insert(mesh_of_vertex_.end(), scene.meshes()[m].n_vertices, m);
+  for (std::uint32_t m = 0; m < n_; ++m) mesh_of_vertex_.insert(mesh_of_vertex_.end(), scene.meshes()[m].n_vertices, m);
 }
 
 void NearestPairs::offer(std::uint32_t mesh_a, std::uint32_t mesh_b, const NearestPair& pair) {

@@ -6,8 +6,8 @@
 
 namespace hpccd {
 
-// A distance in the coordinates of the boxes, rounded up; `rounding` as MotionBounds has it. These lie within 2.25 of zero and were rounded once to a
-// float (coordinate_map.h): 2.4e-7 for two of them, and as much for their difference.
+// A distance in the coordinates of the boxes, rounded up; `rounding` as MotionBounds has it. These lie within 2.25 of
+// zero and were rounded once to a float (coordinate_map.h): 2.4e-7 for two of them, and as much for their difference.
 inline float reach_of(double distance, double rounding, double scale) {
   return distance > 0 ? static_cast<float>((distance + rounding) * scale * (1 + 1e-6) + 1e-6) : 0;
 }

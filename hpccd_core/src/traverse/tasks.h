@@ -93,7 +93,8 @@ bool worth_visiting(const std::vector<Node>& nodes, const PairRules& rules, cons
 
 // All of them worth visiting.
 template <class Boxes>
-std::vector<NodePair> traversal_tasks(const Tree& tree, const PairRules& rules, const Boxes& boxes, std::size_t enough) {
+std::vector<NodePair> traversal_tasks(const Tree& tree, const PairRules& rules, const Boxes& boxes,
+                                      std::size_t enough) {
   std::vector<NodePair> level, next;
   // The root may be all there is: a mesh of one leaf, which the scene may forbid to touch itself.
   constexpr NodePair root{0, 0};

@@ -6,8 +6,8 @@
 
 #include "elementary/coincidence.h"
 #include "elementary/exact/intersection.h"
-#include "elementary/undecided.h"
 #include "elementary/policy.h"
+#include "elementary/undecided.h"
 
 namespace hpccd {
 namespace {
@@ -75,8 +75,7 @@ void Worker::drain(CandidateBuffer& buffer, Kind kind, Rule rule, std::uint32_t 
   elementary_seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-void Worker::test(const std::uint32_t* first, const std::uint32_t* second, std::uint32_t n, Kind kind,
-                  Rule rule) {
+void Worker::test(const std::uint32_t* first, const std::uint32_t* second, std::uint32_t n, Kind kind, Rule rule) {
   heed_cancellation();
   std::vector<Contact>& list = found(kind);
   constexpr std::size_t many = 1 << 16;

@@ -41,8 +41,7 @@ class alignas(128) Worker {
     Waiting& waiting = waiting_by(rule);
     add(waiting.edge_edge, waiting.vertex_face);
     if (waiting.edge_edge.n >= batch_capacity) drain(waiting.edge_edge, Kind::edge_edge, rule, batch_capacity);
-    if (waiting.vertex_face.n >= batch_capacity)
-      drain(waiting.vertex_face, Kind::vertex_face, rule, batch_capacity);
+    if (waiting.vertex_face.n >= batch_capacity) drain(waiting.vertex_face, Kind::vertex_face, rule, batch_capacity);
   }
   // The same of edges against faces: add(edge_face).
   template <class Add>

@@ -82,9 +82,7 @@ struct LeafEdgeFacesTest : testing::Test {
   }
 };
 
-TEST_F(LeafEdgeFacesTest, AreThoseThatOverlapAndShareNoVertex) {
-  expect_all(1000);
-}
+TEST_F(LeafEdgeFacesTest, AreThoseThatOverlapAndShareNoVertex) { expect_all(1000); }
 
 }  // namespace
 }  // namespace hpccd

@@ -14,7 +14,8 @@ template <Kind kind>
 HPCCD_HD Nearest<DoubleDouble> nearest(const Snapshot<DoubleDouble>& s) {
   using R = DoubleDouble;
   const auto rounded = [](const Vec3<R>& v) { return Vec3<double>{v.x.high, v.y.high, v.z.high}; };
-  const detail::Place<double> best = detail::best_place<kind>(Snapshot<double>{rounded(s.p), rounded(s.a), rounded(s.b)});
+  const detail::Place<double> best =
+      detail::best_place<kind>(Snapshot<double>{rounded(s.p), rounded(s.a), rounded(s.b)});
   R x(best.x), y(best.y);
   if (kind == Kind::vertex_face && x + y > R(1)) y = R((1 - best.x) * (1 - 2.220446049250313e-16));
   const detail::Place<R> place{x, y, R(best.over_a), R(best.over_b), best.inside, detail::square_at(s, x, y)};

@@ -13,8 +13,8 @@ namespace hpccd {
 // 1 + 4 u. A corner's gap along it is the sum of three dot products with vectors whose coordinates were rounded once:
 // at most 6 roundings of at most sqrt(3) S, 11 u S. Its value at a time adds three (6 u S), the time at which it falls
 // to a limit another three (6 u S): 23 u S. The coordinates of the gap between two points at a time carry 8 roundings
-// of S and an inexact place as much again: 28 u S. Relative to d: the direction's length and the products with d, 8 u. The rest is room for
-// terms of second order and for the rounding of these limits.
+// of S and an inexact place as much again: 28 u S. Relative to d: the direction's length and the products with d, 8 u.
+// The rest is room for terms of second order and for the rounding of these limits.
 template <class R>
 struct Margins {
   R above, below;

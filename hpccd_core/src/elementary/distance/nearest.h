@@ -108,7 +108,8 @@ HPCCD_HD Nearest<R> straightened(const Place<R>& best, const Snapshot<R>& s) {
   const Vec3<R> given = gap_at(s, best.x, best.y), n = cross(s.a, s.b);
   const Vec3<R> along = best.over_a * s.a + best.over_b * s.b;
   const R square = dot(along, along), by_n = dot(given, n) / dot(n, n);
-  const Vec3<R> on_plane = by_n * n, on_border = given - select(square > R(0), dot(given, along) / square, R(0)) * along;
+  const Vec3<R> on_plane = by_n * n,
+                on_border = given - select(square > R(0), dot(given, along) / square, R(0)) * along;
   const Vec3<R> gap{select(best.inside, on_plane.x, on_border.x), select(best.inside, on_plane.y, on_border.y),
                     select(best.inside, on_plane.z, on_border.z)};
   return {best.x, best.y, best.square, gap, dot(gap, gap)};

@@ -18,9 +18,9 @@ template <Kind kind, class R>
 struct Look {
   R t;
   Snapshot<R> at;
-  Vec3<R> direction;  // of the gap, of length one
-  R length, slope;    // of the gap, as far as it is known, and how fast it changes
-  R square;           // between two points of the features
+  Vec3<R> direction;                   // of the gap, of length one
+  R length, slope;                     // of the gap, as far as it is known, and how fast it changes
+  R square;                            // between two points of the features
   typename RealTraits<R>::Mask known;  // the direction is
 };
 
@@ -66,8 +66,9 @@ HPCCD_HD Look<kind, R> select(typename RealTraits<R>::Mask m, const Look<kind, R
 inline constexpr double separation_toc_radius = 8e-13;
 
 // With a gap of at most d between the features, p . n for n = a x b is at most d |n|. So where the cubic stays beyond d
-// times the largest |n| of the step, which is one of its Bernstein coefficients' (they bound it as they bound the cubic),
-// so do the features. The roundings of n, 20 u |a||b| a coordinate, count as much as those of the cubic at most.
+// times the largest |n| of the step, which is one of its Bernstein coefficients' (they bound it as they bound the
+// cubic), so do the features. The roundings of n, 20 u |a||b| a coordinate, count as much as those of the cubic at
+// most.
 template <class R>
 HPCCD_HD typename RealTraits<R>::Mask planes_stay_apart(const Motion<R>& m, R d) {
   const Magnitudes<R> size = magnitudes(m);

@@ -54,7 +54,8 @@ Outcome<double> filtered(const Pair& q) {
 TEST_P(Separation, WhatTheFilterProvesIsWhatIntegersDecide) {
   int decided = 0, contacts = 0;
   for (const Pair& q : pairs(20000)) {
-    const Outcome<double> o = kind() == Kind::vertex_face ? filtered<Kind::vertex_face>(q) : filtered<Kind::edge_edge>(q);
+    const Outcome<double> o =
+        kind() == Kind::vertex_face ? filtered<Kind::vertex_face>(q) : filtered<Kind::edge_edge>(q);
     if (!o.contact && !o.none) continue;
     ++decided;
     const auto exact = exact::earliest_within(kind(), q.t0, q.t1, q.d);
