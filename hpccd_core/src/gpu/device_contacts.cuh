@@ -18,8 +18,9 @@ class DeviceContacts {
 
   // Room for n to be found.
   void reserve(std::size_t n, cudaStream_t stream) {
-    if (n <= capacity()) return;
+    if (n <= capacity_) return;
     if (n > 0x7FFFFFFF) throw Error("more than 2^31 contacts; use backend=\"cpu\"");
+    capacity_ = 0;  // should one of these fail, the others have changed
     keys_.reserve(n);
     tocs_.reserve(n);
     sorted_keys_.reserve(n);
@@ -27,19 +28,20 @@ class DeviceContacts {
     workspace_.reserve(sort_workspace(static_cast<int>(n), key_bits_));
     number_kernel<<<blocks_for(n, 256), 256, 0, stream>>>(numbers_.data(), static_cast<u32>(n));
     check_launch("number_kernel");
-    order_.reserve(n);  // last: its size says that all of these are there
+    order_.reserve(n);
+    capacity_ = n;
   }
 
   // Makes room where there was too little. True where the frame must run again.
   bool grow(const Counters& c, cudaStream_t stream) {
-    if (c.found_all <= capacity()) return false;
+    if (c.found_all <= capacity_) return false;
     reserve(c.found_all + c.found_all / 4, stream);
     return true;
   }
 
   template <class T>
   void fill(LaunchParams<T>& params) const {
-    params.found_keys = keys_.data(), params.found_tocs = tocs_.data(), params.found_capacity = capacity();
+    params.found_keys = keys_.data(), params.found_tocs = tocs_.data(), params.found_capacity = capacity_;
   }
 
   // Sorts what the frame has found, and writes it out.
@@ -91,9 +93,8 @@ class DeviceContacts {
   }
 
  private:
-  std::size_t capacity() const { return order_.size(); }
-
   const int key_bits_;
+  std::size_t capacity_ = 0;  // of all lists together
   DeviceBuffer<u64> keys_, sorted_keys_;
   DeviceBuffer<double> tocs_;
   DeviceBuffer<u32> numbers_, order_;
