@@ -90,7 +90,7 @@ void leaf_pairs(const Tree& tree, const LeafRange& a, const LeafRange& b, Candid
 }
 
 void leaf_pairs_in_snapshot(const Tree& tree, const LeafRange& a, const LeafRange& b, float reach,
-                         CandidateBuffer& edge_edge, CandidateBuffer& vertex_face) {
+                            CandidateBuffer& edge_edge, CandidateBuffer& vertex_face) {
   pairs_of_leaves(InSnapshot{reach}, tree, a, b, edge_edge, vertex_face);
 }
 

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <memory>
+#include <random>
 
 #include "base/simd.h"
 #include "bvh/motion_bounds.h"
@@ -25,9 +26,12 @@ struct LeafEdgeFacesTest : testing::Test {
   MotionBounds motion;
   Tree tree;
 
-  // The sheets cross halfway.
+  // The sheets cross halfway, crumpled: in flat ones no edge comes near a face of its own leaf.
   LeafEdgeFacesTest() {
-    const auto positions = test::sheet_positions(side, 0.5, lone);
+    auto positions = test::sheet_positions(side, 0.5, lone);
+    std::mt19937 random(7);
+    std::uniform_real_distribution<double> crumple(-0.5, 0.5);
+    for (double& x : positions) x += crumple(random);
     motion.update(*scene, test::view(positions), pool);
     build(tree, *scene, features, motion.boxes, pool);
   }
@@ -77,7 +81,7 @@ struct LeafEdgeFacesTest : testing::Test {
           ASSERT_EQ(by(simd, a, b), expected)
               << "leaves " << &a - tree.leaves.data() << " and " << &b - tree.leaves.data() << ", " << name_of(simd);
       }
-    EXPECT_GT(within, least / 10);
+    EXPECT_GT(within, least / 50);
     EXPECT_GT(between, least);
   }
 };
