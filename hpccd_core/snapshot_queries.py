@@ -25,7 +25,7 @@ class SnapshotQueries:
 
         vertices: (V, 3) float32 or float64, taken as by detect(). distance: Euclidean, between closed features, in
         units of the coordinates; 0 gives those that touch. "exact" and "conservative" report exactly the pairs that
-        rational arithmetic would, "balanced" and "fast" decide within about 1e-15 of the distance by rounding;
+        rational arithmetic would; "balanced" and "fast" promise it not, but are computed alike today;
         distances are within 1e-12 of the scene's size. Neighbours that share no vertex count like all others: with a
         distance beyond the shortest edge all of them are reported.
         """

@@ -170,3 +170,38 @@ def test_bad_positions_are_refused():
     detector = hc.Detector(random_scenes.single_mesh(np.random.default_rng(84)).scene(), backend="cpu")
     with pytest.raises(ValueError, match="vertices"):
         detector.distances(np.zeros((3, 3)))
+
+
+@pytest.mark.parametrize("scale", [2.0**500, 2.0**665, 2.0**990])
+def test_of_features_farther_apart_than_any_motion_may_be(scale):
+    scene = hc.Scene()
+    for name in ("low", "high"):
+        scene.add_mesh(name, np.array([[0, 1, 2]]))
+    triangle = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0.0]])
+    gaps = hc.Detector(scene).distances(scale * np.vstack([triangle, triangle + [0, 0, 1]]))
+    assert [(gap.distance, gap.kind) for gap in gaps] == [(np.inf, ""), (scale, "vertex-face"), (np.inf, "")]
+
+
+def test_nearly_equal_distances_are_told_apart_alike_by_any_number_of_threads():
+    """The computed distance of nearly parallel edges may be 7e-13 too large: whether it is looked at more closely must
+    not depend on what was found before."""
+    edges = [
+        [(-0.98, -0.078511770838512698, 0.029717224115102591), (0.98, 0.076687388690095559, -0.016361988652355004)],
+        [
+            (-0.68613416291667206, -0.055293725235369004, 0.022859892167323963),
+            (0.97710321374143183, 0.076536540607882952, -0.01636096752392438),
+        ],
+    ]
+    vertex, face = [(0.25, -0.75, -0.49999658065152497)], [(0, -1, -0.5), (1, -1, -0.5), (0, 0, -0.5)]
+    scene = hc.Scene()
+    scene.add_mesh("one", np.array([[0, 1, 1]]), n_vertices=3)
+    scene.add_mesh("other", np.array([[0, 1, 1], [2, 3, 4]]))
+    vertices = np.array([*edges[0], *vertex, *edges[1], *face], float)
+    found = {
+        (gap.distance, gap.kind)
+        for threads in (1, 2, 4)
+        for _ in range(5)
+        for gap in hc.Detector(scene, threads=threads).distances(vertices)
+        if gap.mesh_a != gap.mesh_b
+    }
+    assert found == {(3.419348225013685e-06, "edge-edge")}

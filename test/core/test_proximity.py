@@ -226,3 +226,30 @@ def test_bad_positions_are_refused():
             detector.proximity(bad, 1.0)
     with pytest.raises(TypeError, match="distance"):
         detector.proximity(np.zeros((detector.n_vertices, 3)), "1")
+
+
+@pytest.mark.parametrize(
+    "ends",
+    [  # their sine is 1e-6 and 1e-5
+        [
+            (-1, -0.96218562573116317, 0.32371781429920021),
+            (-0.79999688281033798, -0.76975068144014014, 0.25897470573039311),
+            (0.90000107262872064, 0.8659663285821696, -0.29134259457809203),
+        ],
+        [
+            (-1, -0.70318786564103752, -0.98020985512058156),
+            (-0.79999325414364797, -0.56255246588041485, -0.7841669782573405),
+            (0.89999420271630803, 0.63287091026921427, 0.88218813133834206),
+        ],
+    ],
+)
+def test_nearest_points_of_nearly_parallel_edges_are_as_near_as_the_edges(ends):
+    start, *other = np.array(ends)
+    scene = hc.Scene()
+    for name in ("one", "other"):
+        scene.add_mesh(name, np.array([[0, 1, 1]]))
+    detector = hc.Detector(scene, outputs="closest")
+    near = detector.proximity(np.array([start, -start, *other]), 1e-4)
+    apart = np.linalg.norm(near.closest[:, 0] - near.closest[:, 1], axis=1)
+    assert [0, 1, 2, 3] in near.ee.tolist()
+    np.testing.assert_allclose(apart, [*near.vf_distance, *near.ee_distance], rtol=0, atol=1e-15)

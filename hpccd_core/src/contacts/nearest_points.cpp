@@ -17,10 +17,10 @@ NearestPoints nearest_points_of(const V q[4]) {
   const Motion<double> m = motion_of<kind>(q, q);
   const Snapshot<double> now{m.p0, m.a0, m.b0};
   const V n = cross(now.a, now.b);
-  // Below this sine of their angle the place along two edges is a matter of rounding.
-  constexpr double parallel = 1e-7;
-  const bool place_is_known =
-      kind == Kind::vertex_face || dot(n, n) > parallel * parallel * (dot(now.a, now.a) * dot(now.b, now.b));
+  // Of a small angle between a and b the places lose the square of its sine: below this they would be known to less
+  // than 1e-12 of the features' size.
+  constexpr double flat = 1e-2;
+  const bool place_is_known = dot(n, n) > flat * flat * (dot(now.a, now.a) * dot(now.b, now.b));
   const NearOrFar<double> checked = proximity_test<kind>(now, 0.0);
   if (!place_is_known || !checked.far) {
     const exact::Nearest x = exact::nearest(kind, q);

@@ -6,7 +6,6 @@
 
 #include "elementary/coincidence.h"
 #include "elementary/distance/extended_separation.h"
-#include "elementary/distance/nearest.h"
 #include "elementary/exact/contact.h"
 #include "elementary/exact/distance.h"
 #include "elementary/exact/separation.h"
@@ -34,12 +33,6 @@ std::optional<double> extended_or_exact(const UndecidedPair& q, FallbackCounts& 
   return exact::earliest_within(kind, q.t0, q.t1, q.separation);
 }
 
-template <Kind kind>
-double computed_distance(const UndecidedPair& q) {
-  const Motion<double> m = motion_of<kind>(q.t0, q.t0);
-  return std::sqrt(nearest<kind>(Snapshot<double>{m.p0, m.a0, m.b0}).square);
-}
-
 }  // namespace
 
 std::optional<double> decide_contact(Accuracy accuracy, const UndecidedPair& q, FallbackCounts& counts) {
@@ -52,19 +45,12 @@ std::optional<double> decide_contact(Accuracy accuracy, const UndecidedPair& q, 
   return q.kind == Kind::vertex_face ? tolerance_contact<Kind::vertex_face>(q) : tolerance_contact<Kind::edge_edge>(q);
 }
 
-std::optional<double> decide_separation(Accuracy accuracy, const UndecidedPair& q, FallbackCounts& counts) {
-  static_cast<void>(accuracy);  // what stays open is rare: no tier gains by a guess
+std::optional<double> decide_separation(Accuracy, const UndecidedPair& q, FallbackCounts& counts) {
   return q.kind == Kind::vertex_face ? extended_or_exact<Kind::vertex_face>(q, counts)
                                      : extended_or_exact<Kind::edge_edge>(q, counts);
 }
 
-std::optional<double> decide_proximity(Accuracy accuracy, const UndecidedPair& q, FallbackCounts& counts) {
-  if (!promises_answers(accuracy)) {
-    ++counts.tolerance;
-    const double distance =
-        q.kind == Kind::vertex_face ? computed_distance<Kind::vertex_face>(q) : computed_distance<Kind::edge_edge>(q);
-    return distance <= q.separation ? std::optional(distance) : std::nullopt;
-  }
+std::optional<double> decide_proximity(Accuracy, const UndecidedPair& q, FallbackCounts& counts) {
   const bool touch = q.kind == Kind::vertex_face ? share_a_place<1>(q.t0) : share_a_place<2>(q.t0);
   if (touch) return 0;
   ++counts.integers;

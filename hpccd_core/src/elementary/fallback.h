@@ -28,7 +28,7 @@ struct UndecidedPair {
 using Fallback = std::optional<double> (*)(Accuracy, const UndecidedPair&, FallbackCounts&);
 
 std::optional<double> decide_contact(Accuracy accuracy, const UndecidedPair& pair, FallbackCounts& counts);
-// The earliest time within a separation above 0.
+// The earliest time within a separation above 0. Here and below what stays open is rare: no tier gains by a guess.
 std::optional<double> decide_separation(Accuracy accuracy, const UndecidedPair& pair, FallbackCounts& counts);
 // Of t0 alone: the distance, where it is no larger than the separation.
 std::optional<double> decide_proximity(Accuracy accuracy, const UndecidedPair& pair, FallbackCounts& counts);

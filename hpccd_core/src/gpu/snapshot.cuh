@@ -10,11 +10,9 @@
 
 namespace hpccd::gpu {
 
-// Whether integers would find at once that they touch; the tiers that promise no answer compute a distance instead.
+// Whether the fallback would find at once that they touch.
 template <Kind kind, class T>
 __device__ inline bool certainly_touch(const LaunchParams<T>& params, uint4 v) {
-  const Accuracy accuracy = accuracy_of(params, v);
-  if (accuracy != Accuracy::exact && accuracy != Accuracy::conservative) return false;
   const u32 vertex[4] = {v.x, v.y, v.z, v.w};
   Vec3<double> q[4];
   for (int i = 0; i < 4; ++i) q[i] = load_ends(params.vertices, vertex[i]).t0;

@@ -4,6 +4,7 @@
 #include <mutex>
 #include <tuple>
 
+#include "elementary/distance/proximity_test.h"
 #include "traverse/snapshot.h"
 
 namespace hpccd {
@@ -21,9 +22,10 @@ NearestPairs::NearestPairs(const Scene& scene, const MotionBounds& motion)
       entries_(std::make_unique<Entry[]>(n_ * n_)),
       scale_(motion.map.scale),
       sums_(motion.rounding),
-      // The margins of the test (margins.h), of a pair as large as the scene: boxes lie within 2.25 of zero, so p, a
-      // and b together are below 14.
-      rounding_(14 * 1e-14 / motion.map.scale) {
+      // By how much the test may report a pair beyond its distance (proximity_test.h), and its margins, of a pair as
+      // large as the scene: boxes lie within 2.25 of zero, so p, a and b together are below 14. With less, which of two
+      // pairs is found would depend on which came first.
+      rounding_(14 * (distance_radius + 1e-14) / motion.map.scale) {
   for (std::uint32_t m = 0; m < n_; ++m) mesh_of_vertex_.insert(mesh_of_vertex_.end(), scene.meshes()[m].n_vertices, m);
 }
 

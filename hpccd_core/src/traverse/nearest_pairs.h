@@ -42,7 +42,7 @@ class NearestPairs {
  private:
   struct Entry {
     std::atomic<float> reach{std::numeric_limits<float>::infinity()};
-    std::atomic<double> limit{1e200};  // finite: margins are computed with it
+    std::atomic<double> limit{1e307};  // beyond all coordinates; finite: margins are computed with it
     SpinLock lock;
     NearestPair best;
   };

@@ -14,9 +14,9 @@ struct NearOrFar {
   R distance;
 };
 
-// Relative to the size of the pair: the contract promises 1e-12 of the scene's. Below it features may touch, which is
-// for integers to say.
-inline constexpr double distance_radius = 2e-13;
+// Relative to the size of the pair: the contract promises 1e-12 of the scene's, whose largest coordinate may be a sixth
+// of it. Below it features may touch, which is for integers to say.
+inline constexpr double distance_radius = 1.5e-13;
 
 template <Kind kind, class R>
 HPCCD_HD NearOrFar<R> proximity_test(const Snapshot<R>& at, R d) {
