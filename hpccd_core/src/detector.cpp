@@ -127,7 +127,6 @@ Contacts Detector::detect(Positions t0, Positions t1) {
 
 namespace {
 
-// The last call's numbers are those of a snapshot.
 Proximity as_proximity(Contacts&& c) {
   return {std::move(c.vf), std::move(c.vf_toc), std::move(c.ee), std::move(c.ee_toc), std::move(c.closest), c.hash};
 }
