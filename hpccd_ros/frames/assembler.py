@@ -3,8 +3,9 @@
 
 Rules, in the order in which they are applied to a vertex message:
 
-1. Its topology version must be the one in force (topology_version.py). An older one is refused; a newer one waits for
-   its topology (topology and vertices are separate topics, nothing orders them), at most ``max_pending`` frames a mesh.
+1. Its topology version must be the one in force (topology_version.py). Topology and vertices are separate topics,
+   nothing orders them: a newer one waits for its topology, at most ``max_pending`` frames a mesh; an older one is
+   taken with its own topology until a frame of a later one was accepted, then refused.
 2. The number of vertices must be that of the topology.
 3. The frame_id must equal that of the scene (an empty one fits all): the one demanded, else that of the first
    message. Where none is demanded, a stream that goes on in another one is a restart, as in 4, for neither a stray
@@ -30,7 +31,7 @@ from hpccd_ros.frames.outcome import Outcome
 from hpccd_ros.frames.restart import Restart
 from hpccd_ros.frames.stamp_order import StampOrder
 from hpccd_ros.frames.static_positions import StaticPositions
-from hpccd_ros.frames.topology_version import check_frame, check_successor, is_early
+from hpccd_ros.frames.topology_version import TopologyHistory, check_frame, check_successor, is_early
 from hpccd_ros.frames.types import AssemblyRules, MeshFrame, MeshSettings, SceneFrame, Topology
 
 
@@ -40,7 +41,7 @@ class _MeshState:
     def __init__(self, settings: MeshSettings) -> None:
         self.name = settings.name
         self.static = settings.static
-        self.topology: Topology | None = None
+        self.topologies = TopologyHistory()
         self.early: deque[MeshFrame] = deque()  # their topology has not come
         self.positions = StaticPositions()
         self.stamps = StampOrder(settings.name)
@@ -93,7 +94,7 @@ class FrameAssembler:
 
     def topology(self, mesh: str) -> Topology | None:
         """The topology in force, or None."""
-        return self._meshes[mesh].topology
+        return self._meshes[mesh].topologies.current
 
     def set_topology(self, mesh: str, topology: Topology, new_publisher: bool = False) -> Outcome:
         """Put a topology in force; frames that waited for it go on.
@@ -104,12 +105,12 @@ class FrameAssembler:
         state = self._meshes.get(mesh)
         if state is None:
             return self._unknown(mesh, Input.TOPOLOGY)
-        current = state.topology
+        current = state.topologies.current
         if current is not None and topology.version == current.version and topology.same_content(current):
             return Outcome()
         if current is not None and not new_publisher and (refusal := check_successor(mesh, topology, current)):
             return Outcome(refusals=[refusal])
-        state.topology = topology
+        state.topologies.put(topology)
         state.positions.clear()
         early, state.early = state.early, deque()
         outcome = Outcome()
@@ -140,11 +141,12 @@ class FrameAssembler:
         return Outcome(refusals=[Refusal(mesh, Reason.UNKNOWN_MESH, text, what=what)])
 
     def _admit(self, state: _MeshState, frame: MeshFrame) -> Outcome:
-        if is_early(frame, state.topology):
+        if is_early(frame, state.topologies.current):
             return Outcome(refusals=self._hold(state, frame))
-        if refusal := check_frame(state.name, frame, state.topology):
+        topology = state.topologies.current if state.static else state.topologies.of(frame)
+        if refusal := check_frame(state.name, frame, topology):
             return Outcome(refusals=[refusal])
-        frame = replace(frame, topology=state.topology)
+        frame = replace(frame, topology=topology)
         return self._keep_positions(state, frame) if state.static else self._join(state, frame)
 
     def _hold(self, state: _MeshState, frame: MeshFrame) -> list[Refusal]:
@@ -178,6 +180,7 @@ class FrameAssembler:
                 outcome.refusals += self.clear(Reason.RESTART)
         self._frame.adopt(state.name, frame.frame_id)
         state.stamps.accept(frame.stamp)
+        state.topologies.accept(frame)
         state.new_publisher = False
         matches, refusals = self._matcher.add(state.name, frame)
         outcome.refusals += refusals

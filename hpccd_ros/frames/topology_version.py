@@ -1,8 +1,46 @@
 # SPDX-License-Identifier: Apache-2.0
 """Which topology follows another, and which frame belongs to it: rules 1 and 2 of the assembler. No ROS."""
 
+from collections import deque
+
 from hpccd_ros.frames.drops import Input, Reason, Refusal
 from hpccd_ros.frames.types import MeshFrame, Topology
+
+
+# As many as the node's subscription to topologies holds (middleware/qos.py): no more can have overtaken a frame there.
+_SUPERSEDED = 10
+
+
+class TopologyHistory:
+    """The topology of a mesh that is in force, and those before it whose frames may still come.
+
+    Topologies and vertices are separate topics: a node that was busy for the length of a frame may read the next
+    topology before the last vertices of the one before.
+    """
+
+    def __init__(self) -> None:
+        self.current: Topology | None = None
+        self._superseded: deque[Topology] = deque(maxlen=_SUPERSEDED)
+
+    def put(self, topology: Topology) -> None:
+        """Put a topology in force; a lower version than the one before is a new beginning."""
+        if self.current is not None and self.current.version < topology.version:
+            self._superseded.append(self.current)
+        else:
+            self._superseded.clear()
+        self.current = topology
+
+    def of(self, frame: MeshFrame) -> Topology | None:
+        """The one that the frame names, where it was in force after the last accepted frame; else the current one."""
+        named = (t for t in self._superseded if t.version == frame.version)
+        return next(named, self.current)
+
+    def accept(self, frame: MeshFrame) -> None:
+        """A frame was accepted: those after it belong to its topology or to a later one."""
+        if frame.topology is self.current:
+            self._superseded.clear()
+        while self._superseded and self._superseded[0] is not frame.topology:
+            self._superseded.popleft()
 
 
 def check_successor(mesh: str, topology: Topology, current: Topology) -> Refusal | None:
@@ -22,7 +60,7 @@ def is_early(frame: MeshFrame, topology: Topology | None) -> bool:
 
 
 def check_frame(mesh: str, frame: MeshFrame, topology: Topology) -> Refusal | None:
-    """None where a frame that is not early belongs to the topology in force."""
+    """None where a frame that is not early belongs to ``topology``, of its history."""
     if frame.version is not None and frame.version < topology.version:
         text = f"vertices belong to topology version {frame.version}, version {topology.version} is in force"
         return Refusal(mesh, Reason.OLD_TOPOLOGY, text)

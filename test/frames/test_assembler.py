@@ -153,6 +153,50 @@ def test_topology_change_in_mid_stream():
     assert scene.dropped() == {"old_topology": 1}
 
 
+def test_topologies_that_overtake_vertices_lose_none():
+    """A node that was busy reads all topologies first, then the vertices (nothing orders the two topics)."""
+    scene = Scene("cloth").topologies("cloth")
+    for version in (1, 2, 3):
+        assert scene.set_topology("cloth", topology(version, 3 + version)) == []
+    frames = [f for stamp in range(8) for f in scene.add("cloth", stamp, version=stamp // 2, n=3 + stamp // 2)]
+    assert [f.stamp for f in frames] == list(range(8))
+    assert [f.topologies[0].version for f in frames] == [0, 0, 1, 1, 2, 2, 3, 3]
+    assert [a.same_scene(b) for a, b in zip(frames, frames[1:], strict=False)] == [True, False] * 3 + [True]
+    assert scene.add("cloth", 9, version=2, n=5) == []
+    assert scene.dropped() == {"old_topology": 1}
+
+
+def test_a_frame_skips_topologies_that_overtook_it():
+    scene = Scene("cloth").topologies("cloth")
+    for version in (1, 2, 3):
+        scene.set_topology("cloth", topology(version))
+    assert len(scene.add("cloth", 1, version=2)) == 1
+    assert scene.add("cloth", 2, version=1) == [], "a frame of a later topology was accepted"
+    assert len(scene.add("cloth", 3, version=2)) == 1
+    assert scene.add("cloth", 4, version=2, n=4) == []
+    assert len(scene.add("cloth", 5, version=3)) == 1
+    assert scene.dropped() == {"old_topology": 1, "wrong_vertex_count": 1}
+
+
+def test_how_many_superseded_topologies_are_kept_is_bounded():
+    scene = Scene("cloth").topologies("cloth")
+    for version in range(1, 12):
+        scene.set_topology("cloth", topology(version))
+    assert scene.add("cloth", 1, version=0) == []
+    assert len(scene.add("cloth", 2, version=1)) == 1
+    assert scene.dropped() == {"old_topology": 1}
+
+
+def test_a_lower_version_of_a_new_publisher_begins_anew():
+    scene = Scene("cloth").topologies("cloth")
+    for version in (5, 6):
+        scene.set_topology("cloth", topology(version))
+    scene.set_topology("cloth", topology(2), new_publisher=True)
+    assert len(scene.add("cloth", 1, version=2)) == 1
+    assert scene.add("cloth", 2, version=0) == []
+    assert scene.dropped() == {"old_topology": 1}
+
+
 def test_old_and_conflicting_topologies_are_refused():
     scene = Scene("cloth")
     scene.set_topology("cloth", topology(5))
