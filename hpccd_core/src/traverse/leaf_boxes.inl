@@ -38,21 +38,32 @@ struct BothEnds {
   }
 };
 
-// In one snapshot, where boxes may also be as far apart as `reach` (Node::near_in_snapshot).
+// In one snapshot, where boxes may also be as far apart as `reach` (Node::near_in_snapshot): those of the group grow by
+// it once, when they are loaded.
 struct InSnapshot {
   float reach;
-  using Group = Rows16<n_bounds>;
-  HPCCD_HD static Group load(const BoxGroup& group) { return load_rows(group.rows); }
-  template <class Bounds>
-  HPCCD_HD unsigned overlapping(const Group& g, Bounds b) const {
-    Mask16 apart;
+  struct Group {
+    Floats16 rows[n_bounds];
+  };
+  HPCCD_HD Group load(const BoxGroup& group) const {
+    Group grown;
     for (std::uint32_t end = 0; end < 2; ++end) {
       const float by = end == 0 ? reach : slanted_reach(reach);
       for (std::uint32_t axis = 0; axis < 3; ++axis) {
-        apart = apart | less(g[high(end, axis)], all16(b[low(end, axis)] - by));
-        apart = apart | less(all16(b[high(end, axis)] + by), g[low(end, axis)]);
+        grown.rows[low(end, axis)] = load16(group.rows[low(end, axis)]) + all16(-by);
+        grown.rows[high(end, axis)] = load16(group.rows[high(end, axis)]) + all16(by);
       }
     }
+    return grown;
+  }
+  template <class Bounds>
+  HPCCD_HD unsigned overlapping(const Group& g, Bounds b) const {
+    Mask16 apart;
+    for (std::uint32_t end = 0; end < 2; ++end)
+      for (std::uint32_t axis = 0; axis < 3; ++axis) {
+        apart = apart | less(g.rows[high(end, axis)], all16(b[low(end, axis)]));
+        apart = apart | less(all16(b[high(end, axis)]), g.rows[low(end, axis)]);
+      }
     return ~apart.bits() & 0xFFFF;
   }
 };
@@ -82,7 +93,7 @@ template <class When>
 HPCCD_HD Near near(When when, const BoxGroup* groups, std::uint32_t begin, std::uint32_t end, const Node& other) {
   Near n;
   for (std::uint32_t i = 0, group = 0; i < end; i += BoxGroup::width, ++group)
-    n.lanes[group] = when.overlapping(When::load(groups[group]), bounds_of(other)) & lanes_in(i, begin, end),
+    n.lanes[group] = when.overlapping(when.load(groups[group]), bounds_of(other)) & lanes_in(i, begin, end),
     n.count += static_cast<unsigned>(__builtin_popcount(n.lanes[group]));
   return n;
 }

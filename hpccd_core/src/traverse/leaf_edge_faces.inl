@@ -17,15 +17,14 @@ HPCCD_HD void edges_against_faces(const Tree& tree, const LeafRange& a, const Le
   const BoxGroup *edge_groups = all + a.first_group, *face_group = all + b.surface_group();
   static_assert(Tree::leaf_size <= BoxGroup::width);
   constexpr InSnapshot when{0};
-  const unsigned near_faces =
-      when.overlapping(InSnapshot::load(*face_group), bounds_of(node_a)) & lanes_in(0, 0, n_faces);
+  const unsigned near_faces = when.overlapping(when.load(*face_group), bounds_of(node_a)) & lanes_in(0, 0, n_faces);
   if (!near_faces) return;
   const std::uint32_t* face = tree.face_of_slot.data() + b.first_face;
   const std::uint32_t *c0 = tree.face_corners[0].data() + b.first_face,
                       *c1 = tree.face_corners[1].data() + b.first_face,
                       *c2 = tree.face_corners[2].data() + b.first_face;
   for (std::uint32_t i = 0; i < n_edges; i += BoxGroup::width) {
-    const InSnapshot::Group edges = InSnapshot::load(edge_groups[i / BoxGroup::width]);
+    const auto edges = when.load(edge_groups[i / BoxGroup::width]);
     const unsigned near_edges = when.overlapping(edges, bounds_of(node_b)) & lanes_in(i, 0, n_edges);
     if (!near_edges) continue;
     const std::uint32_t slot = a.first_edge + i;

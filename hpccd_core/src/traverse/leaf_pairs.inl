@@ -19,7 +19,7 @@ HPCCD_HD void near_edges(When when, const Tree& tree, const Near& near_a, const 
   const std::uint32_t *end0 = tree.edge_ends[0].data(), *end1 = tree.edge_ends[1].data();
   const std::uint32_t* edge = tree.edge_of_slot.data();
   for (std::uint32_t i = 0; i < n_b; i += BoxGroup::width) {
-    const typename When::Group group = When::load(groups_b[i / BoxGroup::width]);
+    const auto group = when.load(groups_b[i / BoxGroup::width]);
     const std::uint32_t slot = b.first_edge + i;
     for_each(near_a, n_a, [&](std::uint32_t k) {
       unsigned m = when.overlapping(group, bounds_at(groups_a, k)) & lanes_in(i, same ? k + 1 : 0, n_b);
@@ -61,7 +61,7 @@ HPCCD_HD void vertex_face_pairs(When when, const Tree& tree, const LeafRange& a,
   const std::uint32_t *c0 = tree.face_corners[0].data() + b.first_face,
                       *c1 = tree.face_corners[1].data() + b.first_face,
                       *c2 = tree.face_corners[2].data() + b.first_face;
-  const typename When::Group faces = When::load(group_b);
+  const auto faces = when.load(group_b);
   for_each(near_a, end_a, [&](std::uint32_t k) {
     unsigned m = when.overlapping(faces, bounds_at(groups_a, k)) & lanes_in(0, 0, b.n_faces());
     if (!m) return;

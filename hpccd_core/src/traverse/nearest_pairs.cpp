@@ -17,8 +17,9 @@ bool NearestPair::before(const NearestPair& other) const {
   return key(*this) < key(other);
 }
 
-NearestPairs::NearestPairs(const Scene& scene, const MotionBounds& motion)
+NearestPairs::NearestPairs(const Scene& scene, const MotionBounds& motion, const Tree& tree)
     : n_(scene.meshes().size()),
+      tree_(tree),
       entries_(std::make_unique<Entry[]>(n_ * n_)),
       scale_(motion.map.scale),
       sums_(motion.rounding),
@@ -27,6 +28,17 @@ NearestPairs::NearestPairs(const Scene& scene, const MotionBounds& motion)
       // pairs is found would depend on which came first.
       rounding_(14 * (distance_radius + 1e-14) / motion.map.scale) {
   for (std::uint32_t m = 0; m < n_; ++m) mesh_of_vertex_.insert(mesh_of_vertex_.end(), scene.meshes()[m].n_vertices, m);
+  least_edge_.resize(tree.nodes.size(), Tree::none);
+  for (std::size_t i = tree.nodes.size(); i-- > 0;) {  // children come after their parents
+    const Node& node = tree.nodes[i];
+    if (node.children) {
+      least_edge_[i] = least_edge(node.children, node.children + 1);
+      continue;
+    }
+    const LeafRange& leaf = tree.leaves[node.leaf];
+    for (std::uint32_t slot = leaf.first_edge; slot < leaf.end_edge; ++slot)
+      least_edge_[i] = std::min(least_edge_[i], tree.edge_of_slot[slot]);
+  }
 }
 
 void NearestPairs::offer(std::uint32_t mesh_a, std::uint32_t mesh_b, const NearestPair& pair) {
@@ -36,6 +48,7 @@ void NearestPairs::offer(std::uint32_t mesh_a, std::uint32_t mesh_b, const Neare
   entry.best = pair;
   const bool intersects = pair.kind == Kind::edge_face;
   // Pairs at the same distance are still wanted, one of which is the first in order.
+  if (intersects) entry.piercing_edge.store(pair.first, std::memory_order_relaxed);
   entry.limit.store(intersects ? -1 : pair.distance * (1 + 1e-14) + rounding_, std::memory_order_relaxed);
   entry.reach.store(intersects ? 0 : reach_of(pair.distance * (1 + 1e-14) + rounding_, sums_, scale_),
                     std::memory_order_relaxed);

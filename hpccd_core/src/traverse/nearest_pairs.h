@@ -3,8 +3,10 @@
 // leaves to be looked at. Shared by all threads.
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <memory>
+#include <vector>
 
 #include "base/spin_lock.h"
 #include "bvh/motion_bounds.h"
@@ -24,7 +26,7 @@ struct NearestPair {
 
 class NearestPairs {
  public:
-  NearestPairs(const Scene& scene, const MotionBounds& motion);
+  NearestPairs(const Scene& scene, const MotionBounds& motion, const Tree& tree);
 
   // Farther apart along an axis than this, in coordinates of the boxes, is nothing that could come before.
   float reach(std::uint32_t mesh_a, std::uint32_t mesh_b) const {
@@ -35,6 +37,15 @@ class NearestPairs {
   double limit(std::uint32_t mesh_a, std::uint32_t mesh_b) const {
     return at(mesh_a, mesh_b).limit.load(std::memory_order_relaxed);
   }
+  // Whether two nodes of the tree, by number, hold an edge that would come before one that was found to pierce a face.
+  // Where much pierces, this ends the search soon.
+  bool may_come_before(std::uint32_t a, std::uint32_t b) const {
+    const std::uint32_t mesh_a = tree_.nodes[a].mesh, mesh_b = tree_.nodes[b].mesh;
+    if (mesh_a == mixed_meshes || mesh_b == mixed_meshes) return true;
+    return least_edge(a, b) <= at(mesh_a, mesh_b).piercing_edge.load(std::memory_order_relaxed);
+  }
+  // The lowest number of an edge in either.
+  std::uint32_t least_edge(std::uint32_t a, std::uint32_t b) const { return std::min(least_edge_[a], least_edge_[b]); }
   std::uint32_t mesh_of(std::uint32_t vertex) const { return mesh_of_vertex_[vertex]; }
   void offer(std::uint32_t mesh_a, std::uint32_t mesh_b, const NearestPair& pair);
   const NearestPair& found(std::uint32_t mesh_a, std::uint32_t mesh_b) const { return at(mesh_a, mesh_b).best; }
@@ -43,13 +54,16 @@ class NearestPairs {
   struct Entry {
     std::atomic<float> reach{std::numeric_limits<float>::infinity()};
     std::atomic<double> limit{1e307};  // beyond all coordinates; finite: margins are computed with it
+    std::atomic<std::uint32_t> piercing_edge{0xFFFFFFFFu};  // of the pair of edge and face that comes first so far
     SpinLock lock;
     NearestPair best;
   };
   Entry& at(std::uint32_t a, std::uint32_t b) const { return entries_[a < b ? a * n_ + b : b * n_ + a]; }
 
   std::size_t n_;
+  const Tree& tree_;
   std::unique_ptr<Entry[]> entries_;
+  std::vector<std::uint32_t> least_edge_;  // by node
   std::vector<std::uint32_t> mesh_of_vertex_;
   double scale_, sums_, rounding_;
 };

@@ -9,28 +9,33 @@
 namespace hpccd {
 namespace {
 
-// Nodes that may hold a pair nearer than what was found so far.
+// Nodes that may hold a pair that comes before what was found so far.
 struct NearerBoxes {
   static constexpr bool shrink = true;
+  const Tree& tree;
   const NearestPairs& nearest;
-  bool overlap(const Node& a, const Node& b) const { return a.near_in_snapshot(b, nearest.reach(a.mesh, b.mesh)); }
-};
+  bool overlap(const Node& a, const Node& b) const {
+    return a.near_in_snapshot(b, nearest.reach(a.mesh, b.mesh)) && open({number(a), number(b)});
+  }
+  bool open(NodePair p) const { return nearest.may_come_before(p.a, p.b); }
+  // So that the nearest is taken first, of what overlaps the lowest edge.
+  void sort(std::vector<NodePair>& stack, std::size_t begin) const {
+    std::sort(stack.begin() + static_cast<std::ptrdiff_t>(begin), stack.end(),
+              [&](NodePair p, NodePair q) { return key(p) > key(q); });
+  }
 
-// What lies on the stack from `begin` on, so that the nearest is taken first.
-void nearest_last(const Tree& tree, std::vector<NodePair>& stack, std::size_t begin) {
-  const auto distance = [&](NodePair p) {
-    if (p.a == p.b) return 0.0f;
+ private:
+  std::uint32_t number(const Node& node) const { return static_cast<std::uint32_t>(&node - tree.nodes.data()); }
+  std::pair<float, std::uint32_t> key(NodePair p) const {
     const Box &a = tree.nodes[p.a].box.t0, &b = tree.nodes[p.b].box.t0;
     float sum = 0;
-    for (int k = 0; k < 3; ++k) {
+    for (int k = 0; p.a != p.b && k < 3; ++k) {
       const float gap = std::max({0.0f, a.low[k] - b.high[k], b.low[k] - a.high[k]});
       sum += gap * gap;
     }
-    return sum;
-  };
-  std::sort(stack.begin() + static_cast<std::ptrdiff_t>(begin), stack.end(),
-            [&](NodePair p, NodePair q) { return distance(p) > distance(q); });
-}
+    return {sum, nearest.least_edge(p.a, p.b)};
+  }
+};
 
 // From pairs that are worth visiting. `between` is called between two of them and may take from the stack.
 template <class Boxes, class Between>
@@ -40,7 +45,8 @@ void walk(const Tree& tree, const PairRules& rules, const Boxes& boxes, const Ca
     cancellation.heed();
     const NodePair p = stack.back();
     stack.pop_back();
-    if (Boxes::shrink && !worth_visiting(tree.nodes, rules, boxes, p)) continue;
+    if constexpr (Boxes::shrink)
+      if (!boxes.open(p) || !worth_visiting(tree.nodes, rules, boxes, p)) continue;
     if (is_leaf_pair(tree.nodes, p)) {
       const LeafPair leaves{tree.nodes[p.a].leaf, tree.nodes[p.b].leaf};
       ++worker.leaf_pairs;
@@ -54,7 +60,7 @@ void walk(const Tree& tree, const PairRules& rules, const Boxes& boxes, const Ca
         ++worker.node_pairs;
         if (worth_visiting(tree.nodes, rules, boxes, q)) stack.push_back(q);
       });
-      if (Boxes::shrink) nearest_last(tree, stack, below);
+      if constexpr (Boxes::shrink) boxes.sort(stack, below);
     }
     between();
   }
@@ -169,7 +175,7 @@ void traverse_all(const Tree& tree, const PairRules& rules, const Boxes& boxes, 
 void traverse(const Tree& tree, const PairRules& rules, Search& search, ThreadPool& pool,
               std::vector<Worker>& workers) {
   if (search.nearest)
-    traverse_all(tree, rules, NearerBoxes{*search.nearest}, search, pool, workers);
+    traverse_all(tree, rules, NearerBoxes{tree, *search.nearest}, search, pool, workers);
   else if (!search.leaf_pairs)
     traverse_all(tree, rules, SnapshotBoxes{search.reach}, search, pool, workers);
   else if (search.report == Report::any)

@@ -89,19 +89,28 @@ HPCCD_HD Outcome<R> separation_filter(const Motion<R>& m, R d) {
   return {usable && is_within(start.square, margin), usable && free_between(start, end, margin.above), R(0), R(0)};
 }
 
+// When the gap would be `aim` long if it went on to change as it does; the end of the step where it does not shrink.
 template <Kind kind, class R>
-HPCCD_HD Outcome<R> separation_test(const Motion<R>& m, R d) {
+HPCCD_HD R newton(const Look<kind, R>& at, R aim) {
+  return select(at.slope < R(0), at.t + (at.length - aim) / (R(0) - at.slope), R(1));
+}
+
+// From a time on up to which the features are certainly farther apart than d. Undecided, toc is the latest such time.
+template <Kind kind, class R>
+HPCCD_HD Outcome<R> separation_test(const Motion<R>& m, R d, R start = R(0)) {
   using Mask = typename RealTraits<R>::Mask;
   const R s = extent(magnitudes(m)), radius(separation_toc_radius);
   const Margins<R> margin = margins(d, s);
   // Between these two distances rounding hides the answer; trials aim as far before it.
   const R aim = margin.above + (margin.above - margin.below);
-  Look<kind, R> from = look<kind>(m, s, R(0));  // certainly farther apart than d up to here
+  Look<kind, R> from = look<kind>(m, s, start);  // certainly farther apart than d up to here
   Mask contact = squares_in_range(s) && is_within(from.square, margin);
   Mask running = squares_in_range(s) && !contact, none = R(1) < R(0);
   R high(2), length_at_high(0);  // certainly within d here, once that is found
   R reach(1);                    // so far ahead trials have succeeded lately
-  R trial = R(0.5) + R(0) * s;
+  R guess = newton(from, aim);   // by the last look that told anything, on whichever side of the answer
+  R slow(0);                     // trials in a row that were too late and not much earlier than the one before
+  R trial = lesser(greater(guess, R(0.5) * radius), R(1));
   // A near miss by a relative 1e-15 takes 25 steps to pass.
   constexpr int most_steps = 60;
   for (int i = 0; i < most_steps && any(running); ++i) {
@@ -109,19 +118,24 @@ HPCCD_HD Outcome<R> separation_test(const Motion<R>& m, R d) {
     const Mask within = running && is_within(to.square, margin);
     const Mask free = running && !within && free_between(from, to, margin.above);
     const Mask blocked = !within && !free;
-    const R ahead = trial - from.t;
+    const R ahead = trial - from.t, room_before = high - from.t;
     reach = select(blocked, R(0.5) * ahead, R(3) * ahead);
     from = select(free, to, from);
     high = select(within, trial, high);
     length_at_high = select(within, to.length, length_at_high);
+    guess = select(blocked, guess, newton(to, aim));
     none = none || (free && trial >= R(1));
     contact = contact || (running && high - from.t <= radius);
-    running = running && !none && !contact && !(blocked && ahead <= R(0.25) * radius);
+    // The limits are farther apart than what happens in that time.
+    const Mask hidden = free && from.length < aim + margin.above - margin.below &&
+                        (R(0) - from.slope) * radius < margin.above - margin.below;
+    running = running && !none && !contact && !hidden && !(blocked && ahead <= R(0.25) * radius);
 
-    const R left = from.length - aim;
-    const R newton = left / (R(0) - from.slope), secant = (high - from.t) * (left / (from.length - length_at_high));
-    R step = select(from.slope < R(0), newton, R(1));
-    step = select(step < R(0.99) * (high - from.t), step, secant);  // a trial that was too late would come again
+    const R room = high - from.t, secant = room * ((from.length - aim) / (from.length - length_at_high));
+    slow = select(within && room > R(0.5) * room_before, slow + R(1), R(0));
+    R step = guess - from.t;
+    step = select(step > R(0) && step < room, step, secant);
+    step = select(slow < R(5), step, R(0.5) * room);
     step = lesser(greater(step, R(0.5) * radius), reach);
     trial = lesser(from.t + step, R(1));
   }
