@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Record what goes into a running node (mesh topologies, vertices, points, transforms that it applies) and what comes
-out of it (contacts), exactly as it goes over the wire, with the node's parameters beside it.
+out of it (contacts, smallest distances), exactly as it goes over the wire, with the node's parameters beside it.
 
   hpccd record                          the node /hpccd, into ./hpccd-<date>.mcap, until Ctrl-C
   hpccd record -o run.mcap --node /arm/hpccd --duration 60

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Compute recordings again, without DDS and as fast as it goes, and compare every contact, every time and the
-hash with what the node had answered. Or play one over DDS instead, to a node (--publish).
+"""Compute recordings again, without DDS and as fast as it goes, and compare every contact, every time, the hash
+and every smallest distance with what the node had answered. Or play one over DDS instead, to a node (--publish).
 
   hpccd replay run.mcap                     verify; exit status 1 names the first frame and pair that differ
   hpccd replay run.mcap --threads 1 --backend cpu
                                             the contacts may not depend on either
-  hpccd replay run.mcap --csv steps.csv     one row for each step: contacts, first time, ms, hash
+  hpccd replay run.mcap --csv steps.csv     one row for each step: contacts, first time, separation, ms, hash
   hpccd replay run.mcap --from 10 --step    from the tenth second, one step at each Enter
   hpccd replay bugs/*.mcap --json all.json  many at once, in processes of this machine, as one table
   hpccd replay bugs/*.mcap --scheduler tcp://head:8786

@@ -23,10 +23,10 @@ class Separation:
 
     @property
     def text(self) -> str:
-        """In words, empty where contacts touch."""
+        """In words, each distance in as many digits as tell it from all others; empty where contacts touch."""
         if self == Separation():
             return ""
-        return ", ".join([f"{self.minimum:g}", *(f"{a}:{b}:{distance:g}" for a, b, distance in self.pairs)])
+        return ", ".join([_number(self.minimum), *(f"{a}:{b}:{_number(distance)}" for a, b, distance in self.pairs)])
 
     def among(self, names: Collection[str]) -> "Separation":
         """That of the scene of these meshes."""
@@ -48,6 +48,11 @@ class Separation:
             if not (math.isfinite(distance) and distance >= 0):
                 return f"{what}a separation must be finite and not negative, not {distance}"
         return None
+
+
+def _number(distance: float) -> str:
+    short = f"{distance:g}"
+    return short if float(short) == distance else repr(float(distance))
 
 
 #: Contacts touch.

@@ -27,7 +27,7 @@ _OF_RCL = ("RCLError", "NodeError", "UnknownROSArgsError")
 _REMEDIES = {
     "params file": "a parameter file is YAML as config/hpccd.yaml: node name or /**, ros__parameters, names and values",
     "remap rule": "write -r FROM:=TO",
-    "parameter override rule": "write -p NAME:=VALUE",
+    "parameter override rule": "write -p NAME:=VALUE, and texts with a colon in quotes: -p NAME:=\"['a:b']\"",
     "--params-file flag": "write --params-file FILE",
     "ROS_DOMAIN_ID": "set it to 0 .. 232, or unset it",
     "resolve peer": "set ROS_STATIC_PEERS to names or addresses with ; between them, or unset it",

@@ -29,7 +29,9 @@ A value that is not allowed ends the start with one sentence (status 2). An unkn
 - *unconfigured*: it is read when the node is configured. Deactivate, clean up, set it, configure and activate again.
 - *start*: only given at the start.
 
-An empty list of strings is written `[""]`: YAML parameters know no empty one.
+An empty list of strings is written `[""]`: YAML parameters know no empty one. A text with colons is quoted, on the
+command line twice: `-p pair_separation:="['robot:cloth:0.01']"`. A float is written with a point, 0 as `0.0`, for
+`ros2 param set` too.
 """
 
 _QUALITY_OF_SERVICE = """\

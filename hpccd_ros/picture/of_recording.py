@@ -3,6 +3,7 @@
 
 import numpy as np
 
+from hpccd_ros.detect.separation import Separation
 from hpccd_ros.picture import contacts as picture
 from hpccd_ros.replay.recomputed import ReplayedStep
 
@@ -29,8 +30,7 @@ def draw_step(step: ReplayedStep, path, history: History | None = None, *, title
     of = f" of {max(history.steps)}" if history is not None else ""
     facts = [
         f"{triangles:,} triangles", f"{len(found.vf):,} vertex-face", f"{len(found.ee):,} edge-edge", first,
-        f"{step.milliseconds:.1f} ms", accuracy, step.separation.text and f"separation {step.separation.text}",
-        f"hash {found.hash:016x}",
+        f"{step.milliseconds:.1f} ms", accuracy, separation_fact(step.separation), f"hash {found.hash:016x}",
     ]  # fmt: skip
     drawn = picture.Picture(
         meshes,
@@ -47,6 +47,13 @@ def draw_step(step: ReplayedStep, path, history: History | None = None, *, title
             np.array(history.steps), np.array(history.contacts), np.array(history.milliseconds), step.step
         )
     picture.draw(drawn, path, context, **view)
+
+
+def separation_fact(separation: Separation) -> str | None:
+    """In a few words, whatever the number of pairs and the length of their names; None where contacts touch."""
+    count = len(separation.pairs)
+    others = f", another for {count:,} pair{'' if count == 1 else 's'}" if count else ""
+    return f"separation {separation.minimum:g}{others}" if separation.text else None
 
 
 def meshes_in_the_middle(step: ReplayedStep):

@@ -18,6 +18,7 @@ from hpccd_ros import client
 FOLDER = Path(__file__).resolve().parent
 PUBLISHER = FOLDER / "ten_line_publisher.py"
 SUBSCRIBER = FOLDER / "ten_line_subscriber.py"
+REQUEST = FOLDER / "ten_line_request.py"
 FACES = np.array([[0, 1, 2], [3, 4, 5]])
 
 
@@ -82,11 +83,20 @@ def test_the_programs_of_the_documentation(start, start_node):
     assert publisher.wait(PATIENCE) == 0, said.read_text()
 
 
+def test_the_request_of_the_documentation(start, start_node):
+    node = start_node({"meshes": ["cloth"]})
+    request, said = start(REQUEST, node.namespace)
+    assert request.wait(PATIENCE) == 0, said.read_text()
+    first, second = said.read_text().splitlines()
+    assert first == "True 1 pairs within 0.3"
+    assert second == "[0.2] [[         0 4294967295]] [[         0 4294967295]]"
+
+
 def test_the_documentation_shows_programs_that_are_run_here():
     """Each whole program in README and docs that uses the client is one of those above, to the letter."""
     pages = [ROOT / "README.md", *(ROOT / "docs").rglob("*.md")]
     blocks = [block for page in pages for block in re.findall(r"```python\n(.*?)```", page.read_text(), re.DOTALL)]
-    run = [statements(program.read_text()) for program in (PUBLISHER, SUBSCRIBER)]
+    run = [statements(program.read_text()) for program in (PUBLISHER, SUBSCRIBER, REQUEST)]
     for block in blocks:
         if "client.prepare_environment()" in block:
             assert statements(block) in run, f"the tests run no such program:\n{block}"

@@ -110,6 +110,7 @@ def test_of_some_meshes():
     assert whole.among(["c", "b"]) == Separation(1.0, (("b", "c", 3.0), ("c", "c", 4.0)))
     assert whole.table(("c", "a", "b")).tolist() == [[4, 1, 3], [1, 1, 2], [3, 2, 1]]
     assert (NONE.text, whole.text) == ("", "1, a:b:2, b:c:3, c:c:4")
+    assert Separation(0.001234567, (("a", "b", 1e-9 + 1),)).text == "0.001234567, a:b:1.000000001"
 
 
 @pytest.mark.parametrize("distance", [-1e-9, math.nan, math.inf])

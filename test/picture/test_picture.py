@@ -4,8 +4,10 @@
 import numpy as np
 import pytest
 
+from hpccd_ros.detect.separation import NONE, Separation
 from hpccd_ros.picture import contacts
 from hpccd_ros.picture.camera import Camera
+from hpccd_ros.picture.of_recording import separation_fact
 from hpccd_ros.picture.raster import rasterize
 from hpccd_ros.picture.shading import blur, vertex_normals
 
@@ -118,3 +120,10 @@ def test_times_of_contact_are_counted_beside_the_scene(count):
     assert sum(bar.get_width() for bar in times.patches) == count
     assert bool(scene.collections) == (count > 0)
     assert curve.lines[0].get_ydata().tolist() == [0, 7, 14, 21, 28] and curve.lines[1].get_xdata()[0] == 3
+
+
+def test_a_separation_of_many_pairs_takes_no_more_room():
+    pairs = [(f"left_arm_link_{k}", "tool_changer", 0.005) for k in range(1000)]
+    assert separation_fact(NONE) is None and separation_fact(Separation(0.25)) == "separation 0.25"
+    assert separation_fact(Separation(0.0, tuple(pairs[:1]))) == "separation 0, another for 1 pair"
+    assert separation_fact(Separation(0.001, tuple(pairs))) == "separation 0.001, another for 1,000 pairs"

@@ -181,6 +181,7 @@ def test_distances_that_differ_are_named(changed, near_bag, hpccd):
         ({"mesh_names": ["cloth", "sphere"]}, "mesh_names ['cloth', 'sphere'] were recorded"),
         ({"topology_versions": [0, 7]}, "topology_versions [0, 7] were recorded, now they are [0, 0]"),
         ({"kind": [0]}, "kind has 1 entries, 2 belong to 2 pairs of meshes"),
+        ({"distance": [0.5]}, "1 pairs of meshes were recorded, now there are 2; are the parameters those of the node"),
         ({"accuracy": "best"}, "accuracy 'best' is none of fast"),
         ({"points": [0.0] * 12}, "points ["),
     ],

@@ -7,7 +7,8 @@ intersections and smallest distances. With --peer, the same questions to ipctk i
   hpccd bench distance data --peer ipctk     side by side with ipctk (pip install ipctk)
   hpccd bench distance run.mcap --queries proximity --steps 8
 
-Choose d by the scene: in its own units, below its shortest edges. "/ plain" is the time over that of plain detection of
+Choose d by the scene: in its own units, below its shortest edges. Where none is given, those beyond the median edge of
+a scene are left out there: nearly all neighbours are that near. "/ plain" is the time over that of plain detection of
 the same step. More pairs take longer by themselves. So where an answer holds more of them than there are contacts (of a
 separation: than 1.5 times the contacts), "us a pair more" is what each further one takes of a thread, of the time above
 half of plain detection (of a separation: above twice of it). Queries of one snapshot read the end of the step. All run
@@ -31,12 +32,14 @@ from hpccd_ros.bench.report.machine import cores
 from hpccd_ros.bench.steps import Step
 
 SCENES = ("rod-twist-like", "armadillo-like")
+SEPARATIONS = "1e-5,1e-4,1e-3,1e-2"
 
 
 def configure(parser):
     command.configure(parser, default=("data", *SCENES), steps=2)
-    parser.add_argument("--separations", default="1e-5,1e-4,1e-3,1e-2", metavar="D,...",
-                        help="distances, of proximity too, in units of the scene (default: %(default)s)")
+    parser.add_argument("--separations", metavar="D,...",
+                        help="distances, of proximity too, in units of the scene (default: of "
+                             f"{SEPARATIONS} those up to its median edge)")
     parser.add_argument("--queries", default=",".join(QUERIES), metavar="NAME,...", help="default: %(default)s")
     parser.add_argument("--backend", default="cpu", choices=BACKENDS, help="default: %(default)s")
     command.tier_option(parser, default="exact")
@@ -45,7 +48,7 @@ def configure(parser):
 
 
 def run(args) -> int:
-    distances = _distances(args.separations)
+    distances = _distances(SEPARATIONS if args.separations is None else args.separations)
     queries = command.listed("--queries", args.queries, QUERIES)
     _, refused = usable("backend", [args.backend], accuracy=args.accuracy)
     if refused:
@@ -56,9 +59,10 @@ def run(args) -> int:
         report.note(peer_ipctk_distance.NOTE)
     threads = args.threads or cores()
     options = {"accuracy": args.accuracy, "backend": args.backend, "threads": args.threads}
-    asked = questions(queries, distances)
-    of_peer = [q for q in asked if q.query in peer_ipctk_distance.QUERIES] if args.peer else []
     for source in sources:
+        chosen = distances if args.separations is not None else _up_to_the_median_edge(source, distances, report)
+        asked = questions(queries, chosen)
+        of_peer = [q for q in asked if q.query in peer_ipctk_distance.QUERIES] if args.peer else []
         change = Step.as_one_mesh if args.peer else None
         runners = [measure.CoreRunner(question.variant(options, change), question.ask) for question in asked]
         runners += [DistancePeer(question, threads) for question in of_peer]
@@ -80,6 +84,15 @@ def _distances(text):
     if not all(0 < d < math.inf for d in found):
         raise UserError(f"--separations {text}: each distance must be above 0 and finite")
     return found
+
+
+def _up_to_the_median_edge(source, distances, report):
+    step = next(step for step in map(source.step, source.spread(0)) if step is not None)
+    edge = _median_edge(step)
+    if beyond := [f"{d:g}" for d in distances if d > edge]:
+        report.note(f"{source.name}: d {', '.join(beyond)} left out, beyond its median edge of {edge:.2g}; "
+                    "--separations asks for any")
+    return [d for d in distances if d <= edge]
 
 
 def _row(source, question, series, args):

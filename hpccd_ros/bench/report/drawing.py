@@ -16,6 +16,7 @@ BLUE, ORANGE, GREEN, RED = "#0072B2", "#E69F00", "#009E73", "#D55E00"
 PURPLE, SKY, GREY = "#CC79A7", "#56B4E9", "#888888"
 SERIES = (BLUE, ORANGE, GREEN, RED, PURPLE, SKY, "#000000", "#A6761D")
 MARKERS = "osD^vP*X"
+_LEGEND_WIDTH = 1.4  # inches
 
 
 @dataclasses.dataclass(frozen=True)
@@ -51,6 +52,9 @@ class Figure:
             return None
         groups = by(rows, *self.panel)
         page, axes = _page(len(groups) + bool(self.overview), *self.size)
+        narrow = self.legend == "right" and len(axes) == 1  # the title would stand above the legend too, or on it
+        if narrow:
+            page.set_figwidth(page.get_figwidth() + _LEGEND_WIDTH)
         if self.overview:
             self.overview(axes[0], rows)
         handles: dict = {}
@@ -61,7 +65,8 @@ class Figure:
         for axis in axes[:with_legend]:
             axis.legend(fontsize=7, frameon=False, handlelength=4)  # so long that dashes show
         if self.legend == "right":
-            page.legend(handles.values(), handles, loc=f"outside right {self.right}", fontsize=8, frameon=False)
+            place = f"outside right {'center' if narrow else self.right}"
+            page.legend(handles.values(), handles, loc=place, fontsize=8, frameon=False)
         page.suptitle(self.title.format_map(rows[0]), fontsize=11, fontweight="bold")
         page.supxlabel(machine.short(result.machine), fontsize=6.5, color="#666666")
         return page

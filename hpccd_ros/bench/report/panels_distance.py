@@ -36,11 +36,27 @@ def against_distance(axis, rows: list[dict]) -> dict:
         if theirs := [row for row in of[query] if "ipctk_ms" in row]:
             style = style | {"linestyle": "--", "fillstyle": "none", "label": f"ipctk: {query}"}
             handles[f"ipctk: {query}"] = drawing.line(axis, theirs, "distance", "ipctk_ms", **style)
-    axis.set_xscale("log")
     axis.set_yscale("log")
     axis.yaxis.set_major_formatter(lambda value, _: f"{value:,g}")
-    drawing.labels(axis, "d, units of the scene", "ms a step")
+    axis.yaxis.set_minor_formatter(_between_powers())
+    axis.tick_params(which="minor", labelsize=7)
+    if of.keys() & BY_DISTANCE.keys():
+        axis.set_xscale("log")
+    else:  # level lines alone
+        axis.set_xticks([])
+    drawing.labels(axis, "d, units of the scene" if of.keys() & BY_DISTANCE.keys() else "", "ms a step")
     return handles
+
+
+def _between_powers():
+    """Plain numbers where matplotlib labels ticks between powers of ten: where the axis spans few of these."""
+    from matplotlib.ticker import LogFormatter
+
+    class Plain(LogFormatter):
+        def __call__(self, value, place=None):
+            return f"{value:,g}" if super().__call__(value, place) else ""
+
+    return Plain()
 
 
 def queries(rows: list[dict]) -> str:

@@ -49,6 +49,34 @@ def test_its_table_and_picture_show_its_numbers(bench):
     assert drawn["plain detection"] == [of["plain", None]["step_ms"]] * 2
 
 
+def test_the_title_of_one_panel_leaves_the_legend_alone(bench):
+    _, _, folder = bench("distance", *STRIP, "--separations", "0.02,0.002")
+    figure = next(f for f in figures.FIGURES if f.name == "distance")
+    page = figure.compose(Kept.read(folder / "distance-test.json", "distance"))
+    page.canvas.draw()
+    (legend,) = page.legends
+    assert not legend.get_window_extent().overlaps(page._suptitle.get_window_extent())
+    assert legend.get_window_extent().x0 > page.axes[0].get_window_extent().x1
+
+
+def test_level_lines_alone_have_no_axis_of_distances(bench):
+    _, _, folder = bench("distance", *STRIP, "--queries", "intersections,distances")
+    figure = next(f for f in figures.FIGURES if f.name == "distance")
+    (axis,) = figure.compose(Kept.read(folder / "distance-test.json", "distance")).axes
+    assert not axis.get_xlabel() and not len(axis.get_xticks())
+
+
+def test_distances_beyond_the_edges_are_left_out_where_none_is_given(bench):
+    status, result, _ = bench("distance", *STRIP, "--queries", "proximity", "--size", "20")
+    edge = result["rows"][0]["median_edge"]
+    assert status == 0 and 1e-3 < edge < 1e-2
+    assert [row["distance"] for row in result["rows"]] == [None, 1e-5, 1e-4, 1e-3]
+    left_out = "folding-strip x 20: d 0.01 left out, beyond its median edge"
+    assert any(note.startswith(left_out) for note in result["notes"])
+    _, result, _ = bench("distance", *STRIP, "--queries", "proximity", "--separations", "1")
+    assert result["rows"][1]["distance"] == 1 > result["rows"][1]["median_edge"]
+
+
 def test_a_peer_is_asked_the_same(bench):
     pytest.importorskip("ipctk", reason="ipctk is not installed: an optional extra (pip install 'hpccd[bench]')")
     status, result, _ = bench("distance", *STRIP, "--steps", "1", "--separations", "0.002", "--peer", "ipctk")

@@ -1,0 +1,28 @@
+# SPDX-License-Identifier: Apache-2.0
+import numpy as np
+import rclpy
+from hpccd.srv import Detect
+
+from hpccd_ros import client
+
+client.prepare_environment()
+rclpy.init()
+node = rclpy.create_node("asking")
+service = node.create_client(Detect, "hpccd/detect")
+assert service.wait_for_service(10.0)
+triangle = client.topology_message(np.array([[0, 1, 2]]), n_vertices=3)
+hand = np.array([[0, 0, 0.2], [1, 0, 1], [0, 1, 1]])
+table = np.array([[-5.0, -5, 0], [5, -5, 0], [0, 5, 0]])
+request = Detect.Request(
+    mesh_names=["hand", "table"],  # of meshes of the node: without topologies
+    topologies=[triangle, triangle],
+    end=[client.vertices_message(x, stamp_ns=0) for x in (hand, table)],
+    query="proximity",
+    distance=[0.3],
+)
+future = service.call_async(request)
+rclpy.spin_until_future_complete(node, future)
+answer = future.result()
+print(answer.success, answer.message)  # True 1 pairs within 0.3
+near = client.contacts_from_message(answer.contacts)
+print(near.distance, near.features_a, near.features_b)  # vertex 0 of the hand is 0.2 from face 0 of the table
