@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Checks what it is given, picks where a step is computed, and falls back to the CPU where that fails.
 #include <atomic>
-#include <cmath>
 #include <mutex>
 #include <optional>
 #include <thread>
@@ -9,6 +8,7 @@
 
 #include "backends/available.h"
 #include "backends/tuner.h"
+#include "base/length.h"
 
 namespace hpccd {
 namespace {
@@ -134,8 +134,7 @@ Proximity as_proximity(Contacts&& c) {
 }  // namespace
 
 Proximity Detector::proximity(Positions vertices, double distance) {
-  if (!(distance >= 0) || !std::isfinite(distance))
-    throw InvalidArgument("distance: must be finite and not negative, got " + std::to_string(distance));
+  check_length("distance", distance);
   return as_proximity(impl_->snapshot(vertices, [&](DetectionBackend& backend, Positions v, Counts& found) {
     auto near = backend.proximity(v, distance);
     if (near) found = {{"vf_near", near->vf.size()}, {"ee_near", near->ee.size()}};
@@ -164,8 +163,7 @@ void Detector::set_separation(std::uint32_t mesh_a, std::uint32_t mesh_b, double
   const std::size_t n = shared.scene->meshes().size();
   if (mesh_a >= n || mesh_b >= n)
     throw InvalidArgument("mesh_a, mesh_b: the scene has " + std::to_string(n) + " meshes, numbered from 0");
-  if (!(separation >= 0) || !std::isfinite(separation))
-    throw InvalidArgument("separation: must be finite and not negative, got " + std::to_string(separation));
+  check_length("separation", separation);
   const std::lock_guard lock(impl_->one_call);
   shared.set_separation(mesh_a, mesh_b, separation);
 }

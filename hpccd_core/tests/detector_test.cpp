@@ -155,5 +155,28 @@ TEST(Detector, RefusesPositionsThatDoNotFitTheScene) {
   EXPECT_NO_THROW(detector.detect(test::view(right), test::view(right)));
 }
 
+TEST(Detector, RefusesSeparationsThatAreNoLengths) {
+  constexpr double infinity = std::numeric_limits<double>::infinity();
+  const auto still = test::sheet_positions(side, 0);
+  for (const double bad : {std::numeric_limits<double>::quiet_NaN(), -1e-300, infinity, -infinity}) {
+    const Options options{.backend = Backend::cpu, .minimum_separation = bad};
+    EXPECT_THROW(Detector(test::two_sheets(side), options), InvalidArgument) << bad;
+    Query query{};
+    bool hit;
+    double toc;
+    EXPECT_THROW(test_vertex_face({&query, 1}, options, &hit, &toc), InvalidArgument) << bad;
+    EXPECT_THROW(test_edge_edge({&query, 1}, options, &hit, &toc), InvalidArgument) << bad;
+    Scene scene = *test::two_sheets(side);
+    EXPECT_THROW(scene.set_separation(0, 1, bad), InvalidArgument) << bad;
+    Detector detector(test::two_sheets(side), {.backend = Backend::cpu});
+    EXPECT_THROW(detector.set_separation(0, 1, bad), InvalidArgument) << bad;
+    EXPECT_THROW(detector.proximity(test::view(still), bad), InvalidArgument) << bad;
+  }
+  Scene scene = *test::two_sheets(side);
+  EXPECT_THROW(scene.set_separation(0, test::sheets, 0.1), InvalidArgument);
+  EXPECT_THROW(scene.set_separation(test::sheets, 0, 0.1), InvalidArgument);
+  EXPECT_NO_THROW(scene.set_separation(0, 1, -0.0));
+}
+
 }  // namespace
 }  // namespace hpccd

@@ -35,6 +35,8 @@ FAREWELL = 0.5
 # s that the service outlives its last answer: DDS tells a client of the end by another way, which on a busy machine
 # overtook 4 of 610 answers, and a reader takes nothing of a writer that is gone.
 DELIVERY = 0.2
+# How to ask for less: of queries that can.
+_LESS = {"contacts": "ask for less (report first), or ", "proximity": "ask for a smaller distance, or "}
 STOPPED = "stopped: the node was shut down or cleaned up before the answer was ready; ask again when it is active"
 
 
@@ -152,7 +154,7 @@ class DetectService:
                 response,
                 "timed_out",
                 f"time limit of {limit:g} s passed before the answer was ready; "
-                "ask for less (report first), or set a longer time_limit",
+                f"{_LESS.get(request.query or 'contacts', '')}set a longer time_limit",
             )
         try:
             answer = job.result()

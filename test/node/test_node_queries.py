@@ -184,6 +184,26 @@ def test_bad_requests_are_refused_with_a_reason(node, asked, text):
     assert answer.contacts.total == len(answer.distances.distance) == 0
 
 
+@pytest.mark.parametrize(
+    "query, help_",
+    [
+        ("contacts", "ask for less (report first), or set a longer time_limit"),
+        ("proximity", "ask for a smaller distance, or set a longer time_limit"),
+        ("intersections", "set a longer time_limit"),
+        ("distances", "set a longer time_limit"),
+    ],
+)
+def test_a_late_answer_says_what_this_query_can_do(node, query, help_):
+    large = 150
+    asked = Detect.Request(query=query, mesh_names=["sheet"], time_limit=1e-4)
+    asked.distance = [0.1] if query == "proximity" else []
+    asked.topologies = [mesh_messages.topology_message(sheet_faces(large), large**2)]
+    asked.start = [mesh_messages.vertices_message(sheet_positions(large, 0), 5)] if query == "contacts" else []
+    asked.end = [mesh_messages.vertices_message(sheet_positions(large, 1), 6)]
+    answer = ask(node, asked)
+    assert not answer.success and answer.message.endswith(f"before the answer was ready; {help_}"), answer.message
+
+
 def test_only_the_nearest_of_many(start_node):
     node = start_node({"max_contacts": 7})
     answer = ask(node, snapshot("proximity", distance=[0.01]))

@@ -5,6 +5,7 @@
 #include <memory>
 #include <vector>
 
+#include "base/length.h"
 #include "base/simd.h"
 #include "elementary/distance/distance_batch.h"
 #include "elementary/policy.h"
@@ -26,6 +27,7 @@ double power_of_two_scale(const Query& q) {
 void test_queries(Kind kind, std::span<const Query> queries, const Options& options, bool* hit, double* toc) {
   const Accuracy accuracy = options.accuracy;
   const double separation = options.minimum_separation;
+  check_length("minimum_separation", separation);
   const BatchTest test =
       separation > 0 ? separation_batch(resolve(options.simd)) : batch_test(resolve(options.simd), accuracy);
   const Fallback fallback = separation > 0 ? decide_separation : decide_contact;

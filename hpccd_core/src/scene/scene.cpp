@@ -1,4 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+
+#include "base/length.h"
 #include "hpccd/hpccd.h"
 
 namespace hpccd {
@@ -33,6 +36,10 @@ void Scene::set_accuracy(std::uint32_t mesh_a, std::uint32_t mesh_b, Accuracy ac
 }
 
 void Scene::set_separation(std::uint32_t mesh_a, std::uint32_t mesh_b, double separation) {
+  if (std::max(mesh_a, mesh_b) >= meshes_.size())
+    throw InvalidArgument("mesh_a, mesh_b: the scene has " + std::to_string(meshes_.size()) +
+                          " meshes, numbered from 0");
+  check_length("separation", separation);
   separation_[ordered(mesh_a, mesh_b)] = separation;
 }
 

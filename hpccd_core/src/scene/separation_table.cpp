@@ -3,9 +3,12 @@
 
 #include <algorithm>
 
+#include "base/length.h"
+
 namespace hpccd {
 
 SeparationTable::SeparationTable(const Scene& scene, double otherwise) : n_(scene.meshes().size()) {
+  check_length("minimum_separation", otherwise);
   of_.resize(n_ * n_);
   for (std::uint32_t a = 0; a < n_; ++a)
     for (std::uint32_t b = 0; b < n_; ++b) of_[a * n_ + b] = scene.pair_separation(a, b, otherwise);
