@@ -52,6 +52,13 @@ def through_a_point(rng: np.random.Generator, n: int) -> np.ndarray:
     return disturb_still(rng, np.concatenate([ends, corners], axis=1).astype(float))
 
 
+def needles_on_a_line(rng: np.random.Generator, n: int) -> np.ndarray:
+    """Five points of one line, rounded to single precision: a needle in a plane that double precision hardly knows."""
+    start, along = rng.standard_normal((2, n, 1, 3))
+    return (start + rng.uniform(-1, 1, size=(n, 5, 1)) * along).astype(np.float32).astype(float)
+
+
 SNAPSHOTS = {kind: {name: near_snapshot(kind, name) for name in names} for kind, names in NEAR_GENERATORS.items()}
 EDGE_FACE_POINTS = {name: path_of_a_vertex(name) for name in GENERATORS[VERTEX_FACE]}
 EDGE_FACE_POINTS[through_a_point.__name__] = through_a_point
+EDGE_FACE_POINTS[needles_on_a_line.__name__] = needles_on_a_line

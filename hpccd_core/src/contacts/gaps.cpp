@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "base/double_double.h"
 #include "contacts/meeting_point.h"
 #include "contacts/nearest_points.h"
 #include "elementary/exact/distance.h"
@@ -17,14 +18,33 @@ using V = Vec3<double>;
 
 std::array<double, 3> row(const V& v) { return {v.x, v.y, v.z}; }
 
+// b - a without rounding, times 2^-exponent.
+Vec3<DoubleDouble> spanned(const V& a, const V& b, int exponent) {
+  const auto along = [&](double from, double to) {
+    const DoubleDouble d = detail::two_sum(to, -from);
+    return DoubleDouble{std::scalbn(d.high, -exponent), std::scalbn(d.low, -exponent)};
+  };
+  return {along(a.x, b.x), along(a.y, b.y), along(a.z, b.z)};
+}
+
+int exponent_of(double size) { return size > 0 ? std::ilogb(size) : 0; }
+
+// Where on the edge the plane of the face is, with 106 bits: a double knows the normal of a needle too badly. NaN where
+// the edge lies in that plane, or the face has none.
+double place_in_plane(const V q[5], double size) {
+  const V &origin = q[2], &first = q[3], &second = q[4];
+  const Vec3<DoubleDouble> n = cross(spanned(origin, first, exponent_of(largest(first - origin))),
+                                     spanned(origin, second, exponent_of(largest(second - origin))));
+  const int exponent = exponent_of(size);
+  const DoubleDouble before = dot(spanned(origin, q[0], exponent), n), after = dot(spanned(origin, q[1], exponent), n);
+  return (before / (before - after)).high;
+}
+
 // Where an edge meets a face: in the plane of the face, if that is known well enough; else at one of its ends, or where
 // it meets an edge of the face.
 exact::Nearest meeting_place(const V q[5]) {
-  const V n = unit(cross(unit(q[3] - q[2]), unit(q[4] - q[2]))), from = q[0] - q[2], to = q[1] - q[2];
-  const double size = std::max(largest(from), largest(to));
-  const double before = dot(V{from.x / size, from.y / size, from.z / size}, n),
-               after = dot(V{to.x / size, to.y / size, to.z / size}, n);
-  const double place = before / (before - after);
+  const double size = std::max(largest(q[0] - q[2]), largest(q[1] - q[2]));
+  const double place = place_in_plane(q, size);
   const double rounding = 1e-14 * size + 1e-15 * std::max(largest(q[0]), largest(q[1]));
   exact::Nearest best{INFINITY, q[0], q[0]};
   const auto keep = [&](Kind kind, const V& q0, const V& q1, const V& q2, const V& q3) {
