@@ -50,7 +50,8 @@ def main(arguments: list[str] | None = None) -> int:
             console.print("Stopped early; what was done:")
     console.print(_table(tallies))
     console.print(
-        "error: largest error of a time, or of a distance in sizes of its query; late: largest beyond the true one; "
+        "error: largest error of a time, or of a distance in sizes of its query; true: hits, or scenes in which meshes "
+        "touch; late: largest beyond the true one; "
         "uneven:\nan instruction set differs; broken: promises of exact and conservative, and agreement of instruction "
         "sets."
     )
@@ -66,16 +67,19 @@ def main(arguments: list[str] | None = None) -> int:
 def _parser() -> argparse.ArgumentParser:
     p = argparse.ArgumentParser(
         prog="python -m hpccd_core.fuzz",
-        description="Compare contact, separation, proximity and intersections of single pairs with the exact oracle "
-        "on degenerate queries. Exit status 1 where exact differs (time or distance: by more than 1e-12), where "
-        "conservative misses a pair or reports it late, or where an instruction set's answer differs; fast and "
-        "balanced promise no more and are only counted.",
+        description="Compare contact, separation, proximity and intersections of single pairs, and smallest distances "
+        "of the meshes of small scenes, with the exact oracle on degenerate queries. Exit status 1 where exact differs "
+        "(time or distance: by more than 1e-12), where conservative misses a pair, reports it late or, distances in "
+        "question, differs, or where an instruction set's answer differs; fast and balanced promise no more and are "
+        "only counted.",
     )
     length = p.add_mutually_exclusive_group()
     length.add_argument("--seconds", type=float, default=60.0, help="how long (default 60)")
     length.add_argument("--count", type=int, help="how many queries instead")
     p.add_argument("--seed", type=int, default=0, help="the same seed and batch give the same queries")
-    p.add_argument("--batch", type=int, default=10_000, help="queries in a batch (default 10000)")
+    p.add_argument(
+        "--batch", type=int, default=10_000, help="queries in a batch (default 10000); a tenth as many scenes"
+    )
     for name, choices in (("question", QUESTIONS), ("accuracy", ACCURACIES)):
         text = f"comma-separated (default: {','.join(choices)})"
         p.add_argument(f"--{name}", type=_some_of(choices), default=choices, help=text)

@@ -12,15 +12,16 @@ import numpy as np
 import hpccd_core as hc
 
 from . import questions
-from .questions import CONTACT, INTERSECTIONS, PROXIMITY, SEPARATION, Answers, Batch
+from .questions import CONTACT, DISTANCES, INTERSECTIONS, PROXIMITY, SEPARATION, Answers, Batch
 
 SIMD = ("scalar", "avx2", "avx512")
-QUESTIONS = (CONTACT, SEPARATION, PROXIMITY, INTERSECTIONS)
+QUESTIONS = (CONTACT, SEPARATION, PROXIMITY, INTERSECTIONS, DISTANCES)
 
 # Promised by `exact`: within this of the true time; within this, times the size of the query, of the true distance.
 TOLERANCE = 1e-12
 # The oracle's distances are rounded to the nearest double, the core's may be off by another unit: not later than that.
-ROUNDING = {CONTACT: 0.0, SEPARATION: 0.0, PROXIMITY: 1e-15, INTERSECTIONS: 0.0}
+# Smallest distances are promised no better by `conservative` than by `exact`.
+ROUNDING = {CONTACT: 0.0, SEPARATION: 0.0, PROXIMITY: 1e-15, INTERSECTIONS: 0.0, DISTANCES: TOLERANCE}
 
 Tallies = dict[tuple[str, str, str], "Tally"]  # by question, accuracy and kind
 
@@ -45,9 +46,14 @@ class Disagreement:
         """
         if accuracy == "exact":
             return self.uneven | self.missed | self.invented | (np.abs(self.late) > TOLERANCE)
-        if accuracy == "conservative":
-            return self.uneven | self.missed | (self.late > ROUNDING[self.question])
-        return self.uneven
+        if accuracy != "conservative":
+            return self.uneven
+        broken = self.uneven | self.missed | (self.late > ROUNDING[self.question])
+        if self.question != CONTACT:  # the same pairs as exact
+            broken |= self.invented
+        if self.question not in (CONTACT, SEPARATION):  # times may be early, distances may not be too small
+            broken |= np.abs(self.late) > TOLERANCE
+        return broken
 
 
 @dataclass
@@ -101,15 +107,25 @@ def compare(batch: Batch, accuracy: str, simd: Sequence[str], truth: Answers) ->
     """
     true_hit, true_value = truth
     (hit, value), *others = (questions.answers(batch, accuracy, s) for s in simd)
+    # A distance of meshes is told whether or not they touch; it is infinite where they have no pair of features.
+    always = batch.question == DISTANCES
+    told = np.ones_like(hit) if always else hit
     largest = 1.0 if batch.question in (CONTACT, SEPARATION) else np.inf
-    if not ((value[hit] >= 0) & (value[hit] <= largest)).all():
-        raise AssertionError(f"{accuracy} {batch.question} {batch.kind}: value out of range: {value[hit][:5]}")
-    uneven = np.zeros(len(hit), bool)
+    if not ((value[told] >= 0) & (value[told] <= largest)).all():
+        raise AssertionError(f"{accuracy} {batch.question} {batch.kind}: value out of range: {value[told][:5]}")
+    uneven = np.zeros(hit.shape, bool)
     for other_hit, other_value in others:
-        uneven |= (other_hit != hit) | (hit & (other_value != value))
-    both = hit & true_hit
-    late = (np.where(both, value, np.nan) - np.where(both, true_value, np.nan)) / questions.size_of(batch)
-    return Disagreement(true_hit & ~hit, hit & ~true_hit, late, uneven, batch.question)
+        uneven |= (other_hit != hit) | (told & (other_value != value))
+    different = told & (always | true_hit) & (value != true_value)
+    late = np.where(told & (always | true_hit), 0.0, np.nan)
+    late[different] = value[different] - true_value[different]
+    late = (late.T / questions.size_of(batch)).T
+    missed, invented = true_hit & ~hit, hit & ~true_hit
+    if always:  # of several answers for each scene the worst
+        worst = np.abs(late).argmax(axis=1)[:, None]
+        late = np.take_along_axis(late, worst, axis=1)[:, 0]
+        missed, invented, uneven = (answers.any(axis=1) for answers in (missed, invented, uneven))
+    return Disagreement(missed, invented, late, uneven, batch.question)
 
 
 def add_batch(
@@ -119,7 +135,8 @@ def add_batch(
     truth = questions.truth(batch, threads)
     for accuracy in accuracies:
         difference = compare(batch, accuracy, simd, truth)
-        tallies[batch.question, accuracy, batch.kind].add(batch, truth[0], difference, accuracy)
+        hit = truth[0].reshape(len(batch.queries), -1).any(axis=1)
+        tallies[batch.question, accuracy, batch.kind].add(batch, hit, difference, accuracy)
 
 
 def new_tallies() -> Tallies:

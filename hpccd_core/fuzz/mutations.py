@@ -11,7 +11,7 @@ from .near_generators import DISTANCE
 
 LOWEST, HIGHEST = -1074, 497  # binary exponents: from the smallest number to 1e150, the largest coordinate accepted
 
-Query = tuple[np.ndarray, float]  # points (8,3), distance; 0 where contact is asked for
+Query = tuple[np.ndarray, float]  # points (8,3), of a snapshot (4,3) or (5,3); distance, 0 where none is asked for
 
 
 def within_range(query: Query, span: int) -> Query:
@@ -48,50 +48,52 @@ def other_distance(rng: np.random.Generator, kind: str, points: np.ndarray, dist
     else:
         time = rng.choice([0.0, 0.25, 0.5, 1.0])
         with np.errstate(over="ignore"):
-            now = (1 - time) * points[:4] + time * points[4:]
+            now = (1 - time) * points[:4] + time * points[4:] if len(points) == 8 else points
         distance = DISTANCE[kind](now[None])[0]
     return float(np.clip(distance, 2.0**LOWEST, 2.0**HIGHEST))
 
 
 def new_exponent(rng: np.random.Generator, query: np.ndarray, _: np.ndarray) -> None:
-    point, axis = _place(rng)
+    point, axis = _place(rng, query)
     query[point, axis] = np.ldexp(np.frexp(query[point, axis])[0] or 1.0, rng.integers(LOWEST, HIGHEST))
 
 
 def next_exponent(rng: np.random.Generator, query: np.ndarray, _: np.ndarray) -> None:
-    place = _place(rng)
+    place = _place(rng, query)
     query[place] = np.ldexp(query[place], rng.integers(-3, 4))
 
 
 def new_value(rng: np.random.Generator, query: np.ndarray, _: np.ndarray) -> None:
-    query[_place(rng)] = np.ldexp(rng.choice([-1.0, 0.0, 1.0, rng.uniform(-1, 1)]), rng.integers(LOWEST, HIGHEST))
+    query[_place(rng, query)] = np.ldexp(
+        rng.choice([-1.0, 0.0, 1.0, rng.uniform(-1, 1)]), rng.integers(LOWEST, HIGHEST)
+    )
 
 
 def other_mantissa(rng: np.random.Generator, query: np.ndarray, _: np.ndarray) -> None:
-    place = _place(rng)
+    place = _place(rng, query)
     bits = query[place].view(np.uint64) ^ np.uint64(1 << int(rng.integers(52)))
     query[place] = bits.view(np.float64)
 
 
 def negative(rng: np.random.Generator, query: np.ndarray, _: np.ndarray) -> None:
-    query[_place(rng)] *= -1
+    query[_place(rng, query)] *= -1
 
 
 def one_ulp(rng: np.random.Generator, query: np.ndarray, _: np.ndarray) -> None:
-    place = _place(rng)
+    place = _place(rng, query)
     query[place] = np.nextafter(query[place], rng.choice([-np.inf, np.inf]))
 
 
 def same_number(rng: np.random.Generator, query: np.ndarray, _: np.ndarray) -> None:
-    query[_place(rng)] = rng.choice([-1.0, 1.0]) * query[_place(rng)]
+    query[_place(rng, query)] = rng.choice([-1.0, 1.0]) * query[_place(rng, query)]
 
 
 def same_point(rng: np.random.Generator, query: np.ndarray, _: np.ndarray) -> None:
-    query[rng.integers(8)] = query[rng.integers(8)]
+    query[rng.integers(len(query))] = query[rng.integers(len(query))]
 
 
 def scaled_axis(rng: np.random.Generator, query: np.ndarray, _: np.ndarray) -> None:
-    query[rng.integers(8), :] *= np.ldexp(1.0, rng.integers(-60, 61, size=3))
+    query[rng.integers(len(query)), :] *= np.ldexp(1.0, rng.integers(-60, 61, size=3))
 
 
 def flat(rng: np.random.Generator, query: np.ndarray, _: np.ndarray) -> None:
@@ -100,7 +102,7 @@ def flat(rng: np.random.Generator, query: np.ndarray, _: np.ndarray) -> None:
 
 
 def crossed(rng: np.random.Generator, query: np.ndarray, other: np.ndarray) -> None:
-    mask = rng.random((8, 3)) < 0.3 if rng.random() < 0.5 else rng.random((8, 1)) < 0.3
+    mask = rng.random((len(query), 3)) < 0.3 if rng.random() < 0.5 else rng.random((len(query), 1)) < 0.3
     query[:] = np.where(mask, other, query)
 
 
@@ -111,5 +113,5 @@ CHANGES: tuple[Change, ...] = (
 )  # fmt: skip
 
 
-def _place(rng: np.random.Generator) -> tuple[int, int]:
-    return int(rng.integers(8)), int(rng.integers(3))
+def _place(rng: np.random.Generator, query: np.ndarray) -> tuple[int, int]:
+    return int(rng.integers(len(query))), int(rng.integers(3))

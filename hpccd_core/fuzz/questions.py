@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the core and the oracle are asked: contact, separation, proximity, intersections; of single pairs."""
+"""What the core and the oracle are asked: contact, separation, proximity, intersections of single pairs; distances of
+the meshes of small scenes."""
 
 from __future__ import annotations
 
@@ -13,13 +14,17 @@ import hpccd_core as hc
 from hpccd_core import reference
 
 from .disturbances import disturb, disturb_near
+from .gaps import GAP_POINTS, TOPOLOGIES, core_gaps, true_gaps
 from .generators import EDGE_EDGE, GENERATORS, VERTEX_FACE
 from .near_generators import NEAR_GENERATORS
 from .snapshots import EDGE_FACE, EDGE_FACE_POINTS, SNAPSHOTS
 
 CONTACT, SEPARATION, PROXIMITY, INTERSECTIONS = "contact", "separation", "proximity", "intersections"
+DISTANCES = "distances"
+PAIRS_OF_A_SCENE = 10  # so many fewer scenes than single pairs are in a batch: each asks about dozens of pairs
 
-Answers = tuple[np.ndarray, np.ndarray]  # hit (Q,) bool; value (Q,) float64: time, distance, or 0
+# hit (Q,) bool; value (Q,) float64: time, distance, or 0. Of distances (Q,N): several answers for each scene.
+Answers = tuple[np.ndarray, np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -37,17 +42,20 @@ class Batch:
 
 
 def kinds_of(question: str) -> tuple[str, ...]:
+    if question == DISTANCES:
+        return tuple(TOPOLOGIES)
     return (EDGE_FACE,) if question == INTERSECTIONS else (VERTEX_FACE, EDGE_EDGE)
 
 
 def generators_of(question: str, kind: str) -> dict[str, Callable]:
     return {
         CONTACT: GENERATORS, SEPARATION: NEAR_GENERATORS, PROXIMITY: SNAPSHOTS,
-        INTERSECTIONS: {EDGE_FACE: EDGE_FACE_POINTS},
+        INTERSECTIONS: {EDGE_FACE: EDGE_FACE_POINTS}, DISTANCES: dict.fromkeys(TOPOLOGIES, GAP_POINTS),
     }[question][kind]  # fmt: skip
 
 
 def generated(question: str, kind: str, generator: str, rng: np.random.Generator, size: int) -> Batch:
+    size = max(1, size // PAIRS_OF_A_SCENE) if question == DISTANCES else size
     made = generators_of(question, kind)[generator](rng, size)
     if question == CONTACT:
         made = disturb(rng, made, kind)
@@ -59,6 +67,8 @@ def generated(question: str, kind: str, generator: str, rng: np.random.Generator
 
 def truth(batch: Batch, threads: int = 0) -> Answers:
     """What the oracle says, on so many threads."""
+    if batch.question == DISTANCES:
+        return true_gaps(batch.kind, batch.queries)
     vertex_face = batch.kind == VERTEX_FACE
     if batch.question == CONTACT:
         return (reference.vertex_face if vertex_face else reference.edge_edge)(batch.queries, threads)
@@ -76,12 +86,14 @@ def answers(batch: Batch, accuracy: str, simd: str) -> Answers:
     """What the core says."""
     if batch.question in (CONTACT, SEPARATION):
         return _times(batch, accuracy, simd)
+    if batch.question == DISTANCES:
+        return core_gaps(batch.kind, batch.queries, accuracy, simd)
     return _of_snapshots(batch, accuracy, simd)
 
 
 def size_of(batch: Batch) -> np.ndarray:
     """What an error of a value is measured by: a step, or the largest coordinate."""
-    if batch.question != PROXIMITY:
+    if batch.question not in (PROXIMITY, DISTANCES):
         return np.ones(len(batch.queries))
     return np.maximum(np.abs(batch.queries).max(axis=(1, 2)), np.finfo(float).tiny)
 
@@ -102,7 +114,7 @@ def _times(batch: Batch, accuracy: str, simd: str) -> Answers:
 
 
 def _of_snapshots(batch: Batch, accuracy: str, simd: str) -> Answers:
-    detector = _detector(batch.kind, accuracy, simd)
+    detector = detector_of_pair(batch.kind, accuracy, simd)
     hit, value = np.zeros(len(batch.queries), bool), np.full(len(batch.queries), np.inf)
     for i, (points, distance) in enumerate(zip(batch.queries, batch.distances, strict=True)):
         if batch.question == INTERSECTIONS:
@@ -119,7 +131,7 @@ def _of_snapshots(batch: Batch, accuracy: str, simd: str) -> Answers:
 
 
 @functools.cache
-def _detector(kind: str, accuracy: str, simd: str) -> hc.Detector:
+def detector_of_pair(kind: str, accuracy: str, simd: str) -> hc.Detector:
     """For the points of one pair: a vertex and a face, or two edges, in one mesh; an edge and a face in two."""
     scene = hc.Scene()
     if kind == EDGE_FACE:

@@ -79,8 +79,17 @@ CASES = {
     ]
 }
 
+# Of one snapshot. Distances are asked of meshes whose features are all but equally near, so that much is looked at.
+SNAPSHOTS = {
+    "proximity": (lambda: soup(10_000, 0.03), lambda detector, points: detector.proximity(points, 0.02)),
+    "proximity, last resorts": (lambda: layers(40, 0), lambda detector, points: detector.proximity(points, 1.0)),
+    "intersections": (lambda: soup(10_000, 0.03), lambda detector, points: detector.intersections(points)),
+    "intersections, last resorts": (lambda: layers(60, 0), lambda detector, points: detector.intersections(0 * points)),
+    "distances": (lambda: layers(100, 0), lambda detector, points: detector.distances(points)),
+}
 
-def cancelled_after(detector, start, end, delay):
+
+def cancelled_after(detector, ask, delay):
     """Milliseconds of processor time from cancel() to Cancelled; None where the call had ended before."""
     times = []
 
@@ -93,7 +102,7 @@ def cancelled_after(detector, start, end, delay):
     under_way = threading.Thread(target=cancel)
     under_way.start()
     try:
-        detector.detect(start, end)
+        ask()
         was_cancelled = False
     except hc.Cancelled:
         was_cancelled = True
@@ -104,15 +113,12 @@ def cancelled_after(detector, start, end, delay):
     return 1e3 * (ended - before) if was_cancelled else None
 
 
-@pytest.mark.parametrize("case", CASES)
-def test_within_10_ms(case):
-    make, options = CASES[case]
-    motion = make()
-    new_detector = lambda: hc.Detector(motion[0], backend="cpu", threads=1, **options)  # noqa: E731
+def assert_within_10_ms(new_detector, ask):
     # At places all over a call, whose length is found out by the way: half of what ended before is tried next.
     whole, latencies = 1.0, []
     for place in np.tile([0.1, 0.3, 0.5, 0.7, 0.9], 4):
-        took = cancelled_after(new_detector(), *motion[1:], place * whole)
+        detector = new_detector()
+        took = cancelled_after(detector, lambda: ask(detector), place * whole)  # noqa: B023
         if took is None:
             whole /= 2
         else:
@@ -121,3 +127,31 @@ def test_within_10_ms(case):
             break
     assert len(latencies) >= 3, "it ends before it can be cancelled"
     assert np.median(latencies) < 10, latencies
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_within_10_ms(case):
+    make, options = CASES[case]
+    scene, start, end = make()
+    assert_within_10_ms(
+        lambda: hc.Detector(scene, backend="cpu", threads=1, **options), lambda detector: detector.detect(start, end)
+    )
+
+
+@pytest.mark.parametrize("case", SNAPSHOTS)
+def test_snapshots_within_10_ms(case):
+    make, ask = SNAPSHOTS[case]
+    scene, points, _ = make()
+    assert_within_10_ms(lambda: hc.Detector(scene, backend="cpu", threads=1), lambda detector: ask(detector, points))
+
+
+def test_a_cancelled_detector_answers_no_query():
+    scene, points, end = layers(3, 0)
+    detector = hc.Detector(scene, backend="cpu", minimum_separation=0.1)
+    detector.cancel()
+    for ask in (
+        lambda: detector.detect(points, end), lambda: detector.proximity(points, 0.1),
+        lambda: detector.intersections(points), lambda: detector.distances(points),
+    ):  # fmt: skip
+        with pytest.raises(hc.Cancelled):
+            ask()

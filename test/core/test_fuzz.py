@@ -1,15 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """The fuzzer for a few seconds; `make fuzz` runs it for as long as asked."""
 
+import dataclasses
 import itertools
 
 import numpy as np
 import pytest
 
+import hpccd_core as hc
 from hpccd_core.fuzz import __main__ as command
-from hpccd_core.fuzz import differential, questions
+from hpccd_core.fuzz import differential, questions, slowest
 from hpccd_core.fuzz.generators import GENERATORS, VERTEX_FACE
-from hpccd_core.fuzz.questions import CONTACT, INTERSECTIONS, PROXIMITY, SEPARATION
+from hpccd_core.fuzz.questions import CONTACT, DISTANCES, INTERSECTIONS, PROXIMITY, SEPARATION
 
 ACCURACIES = ("fast", "balanced", "conservative", "exact")
 TURNS = sum(map(len, GENERATORS.values()))
@@ -21,7 +23,7 @@ def n_batches(question):
 
 @pytest.mark.parametrize(
     ("question", "size", "rounds"),
-    [(CONTACT, 600, 2), (SEPARATION, 100, 1), (PROXIMITY, 40, 1), (INTERSECTIONS, 60, 1)],
+    [(CONTACT, 600, 2), (SEPARATION, 100, 1), (PROXIMITY, 40, 1), (INTERSECTIONS, 60, 1), (DISTANCES, 60, 1)],
 )
 def test_promises_are_kept(question, size, rounds):
     tallies = differential.new_tallies()
@@ -67,6 +69,34 @@ def test_broken_promises_are_seen_saved_and_replayed(question, tmp_path, monkeyp
     assert command.main(["--replay", str(saved), "--accuracy", "exact", "--save", str(tmp_path / "again.npz")]) == 0
 
 
+def farther(gaps):
+    return [dataclasses.replace(gap, distance=gap.distance * (1 + 1e-9)) for gap in gaps]
+
+
+def of_other_meshes(gaps):
+    """Each with the features of the last pair of meshes that has some."""
+    last = [gap for gap in gaps if gap.kind][-1]
+    return [dataclasses.replace(gap, kind=last.kind, features=last.features) if gap.kind else gap for gap in gaps]
+
+
+def touching(gaps):
+    return [dataclasses.replace(gap, distance=min(gap.distance, 0.0)) for gap in gaps]
+
+
+@pytest.mark.parametrize("mistake", [farther, of_other_meshes, touching])
+def test_wrong_distances_of_meshes_are_seen_saved_and_replayed(mistake, tmp_path, monkeypatch, capsys):
+    saved = tmp_path / "failures.npz"
+    with monkeypatch.context() as patch:
+        patch.setattr(
+            hc.Detector, "distances", lambda self, points: mistake(super(hc.Detector, self).distances(points))
+        )
+        arguments = ["--count", "40", "--batch", "200", "--accuracy", "exact,conservative", "--question", DISTANCES]
+        assert command.main([*arguments, "--save", str(saved)]) == 1
+    with np.load(saved) as file:
+        assert {key.split("|")[1] for key in file.files} == {"exact", "conservative"}
+    assert command.main(["--replay", str(saved), "--accuracy", "exact", "--save", str(tmp_path / "again.npz")]) == 0
+
+
 def test_a_late_toc_breaks_the_promise_of_conservative_only_beyond_the_true_one():
     zero = np.zeros(3, bool)
     late = np.array([-1e-9, 0.0, 1e-300])
@@ -81,3 +111,20 @@ def test_unknown_names_are_refused(option, capsys):
     with pytest.raises(SystemExit):
         command.main([option, "precise"])
     assert "choose from" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("question", slowest.QUESTIONS)
+def test_the_slowest_of_each_question_are_kept(question, tmp_path, monkeypatch):
+    saved = tmp_path / "slowest.npz"
+    arguments = ["--seconds", "0.1", "--keep", "3", "--span", "60", "--question", question, "--save", str(saved)]
+    assert slowest.main(arguments) == 0
+    with np.load(saved) as kept:
+        for kind in questions.kinds_of(question):
+            points = kept[kind if question == CONTACT else f"{question}|{kind}"]
+            assert len(points) == 3 and np.isfinite(points).all()
+            distances = kept.get(f"{question}|{kind}|distances", np.zeros(3))
+            herd = slowest.Herd(question, kind, 3, list(zip(points, distances, strict=True)), [0.0] * 3)
+            assert slowest._different_from_oracle(herd) == 0
+            with monkeypatch.context() as patch:
+                patch.setattr(slowest, "truth", lambda batch: (~questions.truth(batch)[0], questions.truth(batch)[1]))
+                assert slowest._different_from_oracle(herd) == 3, "the oracle is not asked"

@@ -87,11 +87,26 @@ def test_bad_separation(options, error, text):
         hc.test_vertex_face(np.zeros((1, 8, 3)), **options)
 
 
+@pytest.mark.parametrize("separation", [0.0, 0.3])
 @pytest.mark.parametrize("accuracy", ["fast", "balanced", "conservative", "exact"])
-def test_a_tolerance_means_nothing(accuracy):
+def test_a_tolerance_means_nothing(accuracy, separation):
     meshes = random_scenes.single_mesh(np.random.default_rng(5))
     found = [
-        hc.Detector(meshes.scene(), accuracy=accuracy, **options).detect(meshes.vertices_t0, meshes.vertices_t1).hash
-        for options in ({}, {"tolerance": 0}, {"tolerance": 0.0, "minimum_separation": 0})
+        hc.Detector(meshes.scene(), accuracy=accuracy, minimum_separation=separation, **options).detect(
+            meshes.vertices_t0, meshes.vertices_t1
+        )
+        for options in ({}, {"tolerance": 0}, {"tolerance": 0.0}, {"tolerance": 0.25}, {"tolerance": 1e9})
     ]
-    assert found[1:] == found[:1] * 2
+    assert len(found[0]) and {contacts.hash for contacts in found} == {found[0].hash}
+
+
+@KINDS
+@pytest.mark.parametrize("accuracy", ["fast", "balanced", "conservative", "exact"])
+def test_a_tolerance_means_nothing_to_single_pairs(kind, accuracy):
+    queries = GENERATORS[kind]["lattice"](np.random.default_rng(6), 300)
+    given = {"accuracy": accuracy, "minimum_separation": 0.5}
+    hit, toc = CORE[kind](queries, **given)
+    assert hit.any() and not hit.all()
+    for tolerance in (0, 1e-3, 1.0):
+        other_hit, other_toc = CORE[kind](queries, **given, tolerance=tolerance)
+        assert hit.tobytes() == other_hit.tobytes() and toc.tobytes() == other_toc.tobytes()

@@ -70,24 +70,36 @@ TEST_P(Separation, WhatTheFilterProvesIsWhatIntegersDecide) {
   EXPECT_GT(contacts, 2000);
 }
 
+// The features move together, at a distance that is a few units of rounding more or less than the separation.
+std::vector<Pair> pairs_that_move_together(Kind kind, std::size_t n) {
+  std::mt19937_64 random(7);
+  std::vector<Pair> pairs = random_pairs(n, false);
+  for (Pair& q : pairs) {
+    const V motion = q.t1[0] - q.t0[0];
+    for (int i = 0; i < 4; ++i) q.t1[i] = q.t0[i] + motion;
+    q.d = exact::distance(kind, q.t0) * (1 + 0x1p-50 * (static_cast<double>(random() % 17) - 8));
+  }
+  return pairs;
+}
+
 TEST_P(Separation, TwiceThePrecisionDecidesMore) {
-  int open = 0, still_open = 0;
-  for (const Pair& q : pairs(20000)) {
-    const bool vf = kind() == Kind::vertex_face;
+  const bool vf = kind() == Kind::vertex_face, lattice = std::get<1>(GetParam());
+  int open = 0, decided = 0;
+  for (const Pair& q : lattice ? random_pairs(20000, true) : pairs_that_move_together(kind(), 5000)) {
     const Outcome<double> o = vf ? filtered<Kind::vertex_face>(q) : filtered<Kind::edge_edge>(q);
     if (o.contact || o.none) continue;
     ++open;
     const auto a = vf ? extended_precision::earliest_within<Kind::vertex_face>(q.t0, q.t1, q.d)
                       : extended_precision::earliest_within<Kind::edge_edge>(q.t0, q.t1, q.d);
-    if (!a.contact && !a.none) {
-      ++still_open;
-      continue;
-    }
+    if (!a.contact && !a.none) continue;
+    ++decided;
     const auto exact = exact::earliest_within(kind(), q.t0, q.t1, q.d);
     ASSERT_EQ(a.contact, exact.has_value());
     if (exact) EXPECT_NEAR(a.toc, *exact, separation_toc_radius);
   }
-  EXPECT_LE(still_open, open);
+  // On the lattice most of them are the separation exactly, which only integers can tell.
+  EXPECT_GT(open, lattice ? 0 : 2500) << "was aimed at";
+  EXPECT_GT(decided, lattice ? 0 : open / 2);
 }
 
 TEST_P(Separation, InstructionSetsGiveTheSameBits) {

@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: Apache-2.0
+// The separations of pairs of meshes: what the scene says, else the detector; changed later; the largest of each mesh.
+#include "scene/separation_table.h"
+
+#include <gtest/gtest.h>
+
+#include <set>
+
+namespace hpccd {
+namespace {
+
+// Meshes of one triangle each.
+Scene scene_of(std::uint32_t n_meshes) {
+  Scene scene;
+  for (std::uint32_t m = 0; m < n_meshes; ++m)
+    scene.add_mesh("mesh" + std::to_string(m), std::vector<std::uint32_t>{0, 1, 2}, 3, {});
+  return scene;
+}
+
+TEST(SeparationTable, OfAPairIsWhatTheSceneSaysElseTheDetector) {
+  Scene scene = scene_of(3);
+  scene.set_separation(2, 0, 0.5);
+  scene.set_separation(1, 1, 0);
+  const SeparationTable table(scene, 0.125);
+  EXPECT_EQ(table.of(0, 2), 0.5);
+  EXPECT_EQ(table.of(2, 0), 0.5);
+  EXPECT_EQ(table.of(1, 1), 0);
+  for (const auto& [a, b] : {std::pair{0u, 0u}, {0u, 1u}, {1u, 2u}, {2u, 1u}, {2u, 2u}})
+    EXPECT_EQ(table.of(a, b), 0.125) << a << " and " << b;
+  EXPECT_EQ(table.most(), 0.5);
+  EXPECT_TRUE(table.any());
+  EXPECT_FALSE(table.uniform());
+}
+
+TEST(SeparationTable, OfAChangedPairIsTheLastInBothOrders) {
+  const Scene scene = scene_of(3);
+  SeparationTable table(scene, 0.25);
+  table.set(2, 1, 1);
+  table.set(1, 2, 0.75);
+  EXPECT_EQ(table.of(1, 2), 0.75);
+  EXPECT_EQ(table.of(2, 1), 0.75);
+  EXPECT_EQ(table.of(1, 1), 0.25);
+  EXPECT_EQ(table.of(2, 2), 0.25);
+}
+
+TEST(SeparationTable, UniformIsWhereAllPairsAreTheSame) {
+  const Scene scene = scene_of(2);
+  SeparationTable table(scene, 0.25);
+  EXPECT_TRUE(table.uniform());
+  EXPECT_EQ(table.first(), 0.25);
+  table.set(0, 1, 0.5);
+  EXPECT_FALSE(table.uniform());
+  table.set(0, 0, 0.5);
+  EXPECT_FALSE(table.uniform());
+  table.set(1, 1, 0.5);
+  EXPECT_TRUE(table.uniform());
+  EXPECT_EQ(table.first(), 0.5);
+}
+
+TEST(SeparationTable, WithoutAnySeparationNothingGrows) {
+  const Scene scene = scene_of(2);
+  SeparationTable table(scene, 0);
+  EXPECT_FALSE(table.any());
+  EXPECT_TRUE(table.uniform());
+  EXPECT_TRUE(table.largest().empty());
+  EXPECT_EQ(table.most(), 0);
+  table.set(1, 1, 0.5);
+  EXPECT_TRUE(table.any());
+  EXPECT_EQ(table.most(), 0.5);
+  table.set(1, 1, 0);
+  EXPECT_FALSE(table.any());
+  EXPECT_TRUE(table.largest().empty());
+}
+
+// Boxes of a mesh grow by this: by no less than any of its pairs needs.
+TEST(SeparationTable, LargestOfEachMeshCoversAllItsPairs) {
+  Scene scene = scene_of(4);
+  scene.set_separation(0, 3, 2);
+  scene.set_separation(1, 2, 0);
+  SeparationTable table(scene, 0.5);
+  const auto expect_covered = [&] {
+    ASSERT_EQ(table.largest().size(), 4u);
+    for (std::uint32_t a = 0; a < 4; ++a) {
+      double largest = 0;
+      for (std::uint32_t b = 0; b < 4; ++b) largest = std::max(largest, table.of(a, b));
+      EXPECT_EQ(table.largest()[a], largest) << "mesh " << a;
+    }
+  };
+  expect_covered();
+  EXPECT_EQ(table.largest(), (std::vector<double>{2, 0.5, 0.5, 2}));
+  table.set(1, 2, 3);
+  expect_covered();
+  table.set(3, 0, 0.25);  // a pair that was the largest of both
+  expect_covered();
+  EXPECT_EQ(table.largest(), (std::vector<double>{0.5, 3, 3, 0.5}));
+}
+
+TEST(SeparationTable, NoTwoStatesHaveTheSameVersion) {
+  const Scene scene = scene_of(2);
+  SeparationTable table(scene, 0.5);
+  std::set<std::uint64_t> versions{table.version()};
+  for (const double d : {0.25, 0.5, 0.0, 0.25}) {
+    table.set(0, 1, d);
+    EXPECT_TRUE(versions.insert(table.version()).second) << d;
+  }
+}
+
+TEST(SeparationTable, OfASceneWithoutMeshes) {
+  const SeparationTable table(Scene{}, 0.5);
+  EXPECT_EQ(table.most(), 0);
+  EXPECT_EQ(table.first(), 0);
+  EXPECT_FALSE(table.any());
+  EXPECT_TRUE(table.uniform());
+}
+
+}  // namespace
+}  // namespace hpccd

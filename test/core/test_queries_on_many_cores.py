@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Detection with separation and queries of one snapshot: the same bytes and hash with any instruction set and any
+number of threads, on a new detector and on one that has answered other queries before."""
+
+import numpy as np
+import pytest
+import random_scenes
+
+import hpccd_core as hc
+from hpccd_core.fuzz.differential import usable_simd
+
+OUTPUTS = ("points", "normals", "closest")
+ARRAYS = (
+    "vf", "vf_toc", "ee", "ee_toc", "points", "normals", "closest", "vf_distance", "ee_distance", "ef",
+)  # fmt: skip
+
+
+def as_bytes(answer):
+    """All that an answer holds."""
+    if isinstance(answer, list):
+        return [
+            (g.mesh_a, g.mesh_b, float(g.distance).hex(), g.kind, tuple(g.features), g.points.tobytes()) for g in answer
+        ]
+    arrays = {name: getattr(answer, name) for name in ARRAYS if hasattr(answer, name)}
+    return answer.hash, {name: (a.shape, a.dtype.str, a.tobytes()) for name, a in arrays.items()}
+
+
+QUERIES = {
+    "separation": lambda detector, v0, v1: detector.detect(v0, v1),
+    "proximity": lambda detector, v0, v1: detector.proximity(v1, 0.25),
+    "intersections": lambda detector, v0, v1: detector.intersections(v1),
+    "distances": lambda detector, v0, v1: detector.distances(v1),
+}
+
+
+def crowd(rng):
+    """So many blocks of triangles that there is work for many threads."""
+    return random_scenes.combine(
+        random_scenes.crumpled_sheet(rng, 14), random_scenes.lattice_sheet(rng, 9), random_scenes.soup(rng, 60)
+    )
+
+
+@pytest.mark.parametrize("generate", [crowd, random_scenes.lone_vertices, random_scenes.huge_and_tiny])
+def test_the_same_bytes(generate):
+    meshes = generate(np.random.default_rng(51))
+    answers = {query: [] for query in QUERIES}
+    for simd in usable_simd():
+        for threads in (1, 2, 16):
+            options = {"simd": simd, "threads": threads, "backend": "cpu", "outputs": OUTPUTS}
+            detector = hc.Detector(meshes.scene(), minimum_separation=0.125, **options)
+            for _ in range(2):
+                for query, ask in QUERIES.items():
+                    answers[query].append(as_bytes(ask(detector, meshes.vertices_t0, meshes.vertices_t1)))
+    for query, given in answers.items():
+        assert all(answer == given[0] for answer in given), query
+    found = QUERIES["separation"](detector, meshes.vertices_t0, meshes.vertices_t1)
+    assert len(found.vf) and len(found.ee) and len(QUERIES["intersections"](detector, None, meshes.vertices_t1).ef)
+
+
+def test_what_is_compared_tells_answers_apart():
+    meshes = crowd(np.random.default_rng(52))
+    detector = hc.Detector(meshes.scene(), minimum_separation=0.125, backend="cpu", outputs=OUTPUTS)
+    for ask in QUERIES.values():
+        before = as_bytes(ask(detector, meshes.vertices_t0, meshes.vertices_t1))
+        assert before == as_bytes(ask(detector, meshes.vertices_t0, meshes.vertices_t1))
+        assert before != as_bytes(ask(detector, meshes.vertices_t0, 0.9 * meshes.vertices_t1))
