@@ -60,8 +60,8 @@ class Gap:
     mesh_a, mesh_b: names; mesh_a was added before mesh_b, or is the same.
     distance: Euclidean; 0 where they touch or intersect; +inf where no pair of features exists.
     kind: "vertex-face", "edge-edge", "edge-face" (they intersect) or "" (no pair exists).
-    features: scene-wide indices as in Contacts.vf, Contacts.ee or Intersections.ef; of pairs that are equally near the
-    first in order, vertex-face before edge-edge; of those that intersect the first in order.
+    features: scene-wide indices as in Contacts.vf, Contacts.ee or Intersections.ef; of pairs whose
+    distances are the same double the first in order, vertex-face before edge-edge; of those that intersect the first.
     points: (2, 3) float64, the nearest points of both sides, in the order of the features; (0, 3) where there are none.
     """
 

@@ -164,7 +164,7 @@ class Detector {
   // Edges and faces that share a point but no vertex.
   Intersections intersections(Positions vertices);
   // The smallest distance of each enabled pair of meshes, by (mesh_a, mesh_b), mesh_a <= mesh_b. Of pairs of features
-  // that are equally near the first in order, vertex-face before edge-edge.
+  // whose distances are the same double the first in order, vertex-face before edge-edge.
   std::vector<Gap> distances(Positions vertices);
 
   // As Scene::set_separation, from the next call on. Nothing is rebuilt.
