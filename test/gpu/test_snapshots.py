@@ -150,6 +150,26 @@ def test_device_arrays(library, dtype):
         assert (found.distance, found.features) == (expected.distance, expected.features)
 
 
+@pytest.mark.parametrize("dtype", (np.float32, np.float64))
+@pytest.mark.parametrize("library", ("cupy", "torch"))
+@pytest.mark.parametrize("query", ("proximity", "intersections", "distances"))
+def test_device_arrays_in_the_first_call(query, library, dtype):
+    """Distances are the CPU's: they are asked for before the detector has anything on the device."""
+    module = pytest.importorskip(library)
+    scene, _, vertices = scenes.join([scenes.crumpled(np.random.default_rng(12), 12) for _ in range(2)])
+    vertices = vertices.astype(dtype)
+    there = module.asarray(vertices) if library == "cupy" else module.from_numpy(vertices).cuda()
+    more = (0.5,) if query == "proximity" else ()
+    found, expected = (
+        getattr(detector, query)(where, *more)
+        for detector, where in zip(detectors(scene)[::-1], (there, vertices), strict=True)
+    )
+    if query == "distances":
+        assert [(g.distance, g.features) for g in found] == [(g.distance, g.features) for g in expected]
+    else:
+        assert found.hash == expected.hash
+
+
 def test_nothing_and_little():
     for faces, n in ((np.empty((0, 3), int), 0), (np.empty((0, 3), int), 2), ([[0, 1, 2]], 3), ([[0, 1, 2]], 5)):
         scene = hc.Scene()

@@ -3,6 +3,7 @@
 
 #include "backends/gpu_undecided.h"
 #include "elementary/exact/intersection.h"
+#include "gpu/download.h"
 #include "scene/static_meshes.h"
 
 namespace hpccd {
@@ -172,8 +173,10 @@ Accuracy GpuBackend::accuracy_of(const Candidate& pair) const {
 
 Positions GpuBackend::on_host(Positions p, int which) {
   if (!p.on_device) return p;
-  if (!pipeline_) throw gpu::Error("positions on the device, but no device is in use");
-  return pipeline_->download(p, which);
+  std::vector<unsigned char>& to = downloaded_[which];
+  to.resize(3 * p.n * (p.is_double ? sizeof(double) : sizeof(float)));
+  gpu::download(p.data, to.data(), to.size());
+  return {to.data(), p.n, p.is_double};
 }
 
 void GpuBackend::count(std::map<std::string, std::uint64_t>& stats) const {

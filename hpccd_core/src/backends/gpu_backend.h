@@ -6,6 +6,7 @@
 #include <memory>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "backends/backend.h"
 #include "backends/gpu_contacts.h"
@@ -56,6 +57,7 @@ class GpuBackend final : public DetectionBackend {
   std::map<Boxes, double> area_when_built_;
   Boxes last_boxes_;
   DecidedContacts decided_;
+  std::vector<unsigned char> downloaded_[2];
 };
 
 }  // namespace hpccd
