@@ -32,7 +32,7 @@ std::optional<Intersections> CpuBackend::intersections(Positions vertices) {
 std::optional<std::vector<Gap>> CpuBackend::distances(Positions vertices) {
   const Options& o = shared_.options;
   see_snapshot(vertices);
-  NearestPairs nearest(*shared_.scene, shared_.tree.motion());
+  NearestPairs nearest(*shared_.scene, shared_.features, shared_.tree.motion());
   search_.nearest = &nearest;
   search_.leaf_pairs_in_snapshot = leaf_pairs_in_snapshot(o.simd);
   search_.leaf_edge_faces = leaf_edge_faces(o.simd);

@@ -162,13 +162,7 @@ Accuracy GpuBackend::accuracy_of(const Candidate& pair) const {
   const bool edges = pair.kind == Kind::edge_edge;
   const std::uint32_t first = edges ? f.edges[pair.first][0] : pair.first;
   const std::uint32_t second = edges ? f.edges[pair.second][0] : f.faces[pair.second][0];
-  const auto& meshes = shared_.scene->meshes();
-  const auto mesh_of = [&](std::uint32_t vertex) {
-    std::uint32_t m = 0;
-    while (vertex - meshes[m].first_vertex >= meshes[m].n_vertices) ++m;
-    return m;
-  };
-  return shared_.rules.rule(mesh_of(first), mesh_of(second)).accuracy;
+  return shared_.rules.rule(f.mesh_of_vertex[first], f.mesh_of_vertex[second]).accuracy;
 }
 
 Positions GpuBackend::on_host(Positions p, int which) {

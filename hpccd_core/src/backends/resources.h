@@ -32,10 +32,6 @@ struct Resources {
   void set_separation(std::uint32_t mesh_a, std::uint32_t mesh_b, double separation);
   // Of this moment, for tests.
   Separations separations_now() const;
-
- private:
-  std::vector<std::uint32_t> mesh_of_vertex_;  // filled when pairs differ
-  void list_meshes();
 };
 
 }  // namespace hpccd

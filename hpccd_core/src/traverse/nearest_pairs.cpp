@@ -17,17 +17,16 @@ bool NearestPair::before(const NearestPair& other) const {
   return key(*this) < key(other);
 }
 
-NearestPairs::NearestPairs(const Scene& scene, const MotionBounds& motion)
+NearestPairs::NearestPairs(const Scene& scene, const Features& features, const MotionBounds& motion)
     : n_(scene.meshes().size()),
       entries_(std::make_unique<Entry[]>(n_ * n_)),
+      features_(features),
       scale_(motion.map.scale),
       sums_(motion.rounding),
       // By how much the test may report a pair beyond its distance (proximity_test.h), and its margins, of a pair as
       // large as the scene: boxes lie within 2.25 of zero, so p, a and b together are below 14. With less, which of two
       // pairs is found would depend on which came first.
-      rounding_(14 * (distance_radius + 1e-14) / motion.map.scale) {
-  for (std::uint32_t m = 0; m < n_; ++m) mesh_of_vertex_.insert(mesh_of_vertex_.end(), scene.meshes()[m].n_vertices, m);
-}
+      rounding_(14 * (distance_radius + 1e-14) / motion.map.scale) {}
 
 void NearestPairs::offer(std::uint32_t mesh_a, std::uint32_t mesh_b, const NearestPair& pair) {
   Entry& entry = at(mesh_a, mesh_b);

@@ -24,7 +24,8 @@ struct NearestPair {
 
 class NearestPairs {
  public:
-  NearestPairs(const Scene& scene, const MotionBounds& motion);
+  // The features must outlive it.
+  NearestPairs(const Scene& scene, const Features& features, const MotionBounds& motion);
 
   // Farther apart along an axis than this, in coordinates of the boxes, is nothing that could come before.
   float reach(std::uint32_t mesh_a, std::uint32_t mesh_b) const {
@@ -35,7 +36,7 @@ class NearestPairs {
   double limit(std::uint32_t mesh_a, std::uint32_t mesh_b) const {
     return at(mesh_a, mesh_b).limit.load(std::memory_order_relaxed);
   }
-  std::uint32_t mesh_of(std::uint32_t vertex) const { return mesh_of_vertex_[vertex]; }
+  std::uint32_t mesh_of(std::uint32_t vertex) const { return features_.mesh_of_vertex[vertex]; }
   void offer(std::uint32_t mesh_a, std::uint32_t mesh_b, const NearestPair& pair);
   const NearestPair& found(std::uint32_t mesh_a, std::uint32_t mesh_b) const { return at(mesh_a, mesh_b).best; }
 
@@ -50,7 +51,7 @@ class NearestPairs {
 
   std::size_t n_;
   std::unique_ptr<Entry[]> entries_;
-  std::vector<std::uint32_t> mesh_of_vertex_;
+  const Features& features_;
   double scale_, sums_, rounding_;
 };
 
