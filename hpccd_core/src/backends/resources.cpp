@@ -14,15 +14,18 @@ Resources::Resources(std::shared_ptr<const Scene> of, const Options& wanted, int
       features(features_of(*scene, pool)),
       separations(*scene, wanted.minimum_separation),
       rules(*scene, wanted.accuracy, separations),
-      tree(*scene, features, pool) {
+      tree(*scene, features, pool),
+      settled_(separations.version()) {
   options.simd = resolve(wanted.simd);
   options.threads = pool.size();
   pool.heed(cancellation);
 }
 
-void Resources::set_separation(std::uint32_t mesh_a, std::uint32_t mesh_b, double separation) {
-  separations.set(mesh_a, mesh_b, separation);
+void Resources::settle() {
+  if (settled_ == separations.version()) return;
+  separations.settle();
   rules.change(separations);
+  settled_ = separations.version();
 }
 
 Separations Resources::separations_now() const {
