@@ -109,7 +109,9 @@ Contacts CpuBackend::collect(Outputs outputs) {
 }
 
 void CpuBackend::count(std::map<std::string, std::uint64_t>& stats) const {
-  std::uint64_t bytes = order_.bytes() + (method_ ? method_->bytes() : 0);
+  std::uint64_t bytes = order_.bytes();
+  if (method_) bytes += method_->bytes();
+  if (mesh_pairs_) bytes += mesh_pairs_->bytes();
   const char* kinds[3] = {"vf", "ee", "ef"};
   for (const Worker& w : workers_) {
     stats["node_pairs"] += w.node_pairs;

@@ -17,9 +17,9 @@ bool NearestPair::before(const NearestPair& other) const {
   return key(*this) < key(other);
 }
 
-NearestPairs::NearestPairs(const Scene& scene, const Features& features, const MotionBounds& motion)
-    : n_(scene.meshes().size()),
-      entries_(std::make_unique<Entry[]>(n_ * n_)),
+NearestPairs::NearestPairs(const MeshPairs& pairs, const Features& features, const MotionBounds& motion)
+    : pairs_(pairs),
+      entries_(std::make_unique<Entry[]>(pairs.size())),
       features_(features),
       scale_(motion.map.scale),
       sums_(motion.rounding),

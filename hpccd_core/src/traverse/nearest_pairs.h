@@ -10,6 +10,7 @@
 #include "bvh/motion_bounds.h"
 #include "bvh/tree.h"
 #include "elementary/pair.h"
+#include "traverse/mesh_pairs.h"
 
 namespace hpccd {
 
@@ -24,8 +25,8 @@ struct NearestPair {
 
 class NearestPairs {
  public:
-  // The features must outlive it.
-  NearestPairs(const Scene& scene, const Features& features, const MotionBounds& motion);
+  // Pairs and features must outlive it.
+  NearestPairs(const MeshPairs& pairs, const Features& features, const MotionBounds& motion);
 
   // Farther apart along an axis than this, in coordinates of the boxes, is nothing that could come before.
   float reach(std::uint32_t mesh_a, std::uint32_t mesh_b) const {
@@ -38,7 +39,9 @@ class NearestPairs {
   }
   std::uint32_t mesh_of(std::uint32_t vertex) const { return features_.mesh_of_vertex[vertex]; }
   void offer(std::uint32_t mesh_a, std::uint32_t mesh_b, const NearestPair& pair);
-  const NearestPair& found(std::uint32_t mesh_a, std::uint32_t mesh_b) const { return at(mesh_a, mesh_b).best; }
+  // After the search, in the order of the pairs.
+  const MeshPairs& pairs() const { return pairs_; }
+  const NearestPair& found(std::size_t number) const { return entries_[number].best; }
 
  private:
   struct Entry {
@@ -47,10 +50,10 @@ class NearestPairs {
     SpinLock lock;
     NearestPair best;
   };
-  Entry& at(std::uint32_t a, std::uint32_t b) const { return entries_[a < b ? a * n_ + b : b * n_ + a]; }
+  Entry& at(std::uint32_t a, std::uint32_t b) const { return entries_[pairs_.number(a, b)]; }
 
-  std::size_t n_;
-  std::unique_ptr<Entry[]> entries_;
+  const MeshPairs& pairs_;
+  std::unique_ptr<Entry[]> entries_;  // by number of the pair
   const Features& features_;
   double scale_, sums_, rounding_;
 };
