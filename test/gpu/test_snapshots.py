@@ -74,6 +74,16 @@ def test_scales_and_offsets(scale, offset):
     assert len(assert_hits_same(cpu, gpu, vertices)) > 0
 
 
+def test_intersections_are_counted_under_the_same_names():
+    """What the GPU has beside them is named after it."""
+    scene, _, vertices = scenes.join([scenes.lattice(np.random.default_rng(13), 14)])
+    cpu, gpu = detectors(scene)
+    assert_hits_same(cpu, gpu, vertices)
+    names = [{name for name in d.stats if not name.startswith("gpu_")} for d in (cpu, gpu)]
+    assert names[0] == names[1]
+    assert cpu.stats["ef_candidates"] > 0 and not any(name.startswith(("vf_", "ee_")) for name in names[0])
+
+
 def test_faces_that_are_segments():
     rng = np.random.default_rng(4)
     scene = hc.Scene()

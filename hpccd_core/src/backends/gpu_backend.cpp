@@ -177,6 +177,7 @@ void GpuBackend::count(std::map<std::string, std::uint64_t>& stats) const {
   if (!pipeline_) return;
   stats.merge(pipeline_->stats());
   stats["gpu_exact_on_cpu"] = pipeline_->undecided().size();
+  if (last_boxes_.first == gpu::Query::intersections) stats["ef_by_integers"] = pipeline_->undecided().size();
 }
 
 void GpuBackend::add_stages(std::map<std::string, double>& stages) const {

@@ -206,6 +206,7 @@ std::map<std::string, std::uint64_t> DevicePipeline::stats() const {
     s[kind + "_rejected_separated"] = b.separated;
     s[kind + "_proven_contacts"] = b.contacts;
     s[kind + "_undecided"] = b.undecided;
+    if (edges_and_faces) continue;
     s[kind + "_single_root"] = c.all_single[k];
     s[kind + "_many_roots"] = c.all_many[k];
   }
