@@ -135,6 +135,19 @@ def test_queries_in_turn():
     assert gpu.stats["gpu_fallbacks"] == 0, gpu.last_gpu_error
 
 
+def test_a_tree_wears_out_whatever_the_distances():
+    """Each frame asks for a little more than the last one; from the second on, neighbours in the tree lie anywhere."""
+    rng = np.random.default_rng(14)
+    scene, v, _ = scenes.join([scenes.crumpled(rng, 32)])
+    w = rng.permutation(v)
+    gpu, built = hc.Detector(scene, backend="gpu"), []
+    for frame in range(5):
+        gpu.proximity(w if frame else v, 0.1 + 1e-6 * frame)
+        assert_on_gpu(gpu)
+        built.append(gpu.profile.get("build", 0) > 0)
+    assert built == [True, False, True, False, False]  # the device tells of a frame when the next one begins
+
+
 def test_the_hybrid_leaves_them_to_the_cpu():
     scene, vertices, _ = scenes.join([scenes.crumpled(np.random.default_rng(8), 12)])
     cpu, hybrid = hc.Detector(scene, backend="cpu"), hc.Detector(scene, backend="hybrid")

@@ -1,12 +1,25 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "backends/gpu_backend.h"
 
+#include <cmath>
+#include <limits>
+
 #include "backends/gpu_undecided.h"
 #include "elementary/exact/intersection.h"
 #include "gpu/download.h"
 #include "scene/static_meshes.h"
 
 namespace hpccd {
+
+namespace {
+
+// The same for boxes grown by nearly the same, of which a tree is worn out alike: within an eighth of a factor of two
+// areas differ by a fifth at most. Who asks for another distance in each frame has worn out trees too.
+int growth_of(double distance) {
+  return distance > 0 ? static_cast<int>(std::floor(8 * std::log2(distance))) : std::numeric_limits<int>::min();
+}
+
+}  // namespace
 
 std::string GpuBackend::unsupported(const Options& options) {
   if (options.method != Method::standard)
@@ -46,7 +59,7 @@ std::optional<Intersections> GpuBackend::intersections(Positions vertices) {
 Contacts GpuBackend::contacts(Positions t0, Positions t1) {
   const Options& o = shared_.options;
   const SeparationTable& table = shared_.separations;
-  prepare({table.any() ? gpu::Query::separations : gpu::Query::contacts, static_cast<double>(table.version())},
+  prepare({table.any() ? gpu::Query::separations : gpu::Query::contacts, growth_of(table.most())},
           [&] { shared_.tree.bound(on_host(t0, 0), on_host(t1, 1), {}); });
   if (!pipeline_->run(t0, t1, shared_.pool)) {
     MotionBounds().update(on_host(t0, 0), on_host(t1, 1), shared_.pool);  // throws, and names the coordinate
@@ -101,7 +114,7 @@ Intersections GpuBackend::pierced_faces(Positions vertices) {
 }
 
 void GpuBackend::run_snapshot(gpu::Query query, Positions vertices, double distance) {
-  prepare({query, distance}, [&] { shared_.tree.bound(on_host(vertices, 0)); });
+  prepare({query, growth_of(distance)}, [&] { shared_.tree.bound(on_host(vertices, 0)); });
   if (!pipeline_->run_snapshot(query, vertices, distance, shared_.pool)) {
     MotionBounds().update(*shared_.scene, on_host(vertices, 0), shared_.pool);  // throws, and names the coordinate
     throw gpu::Error("the device found bad coordinates where the host finds none");
@@ -132,9 +145,7 @@ void GpuBackend::prepare(Boxes boxes, Bound&& bound) {
 // By the last frame, against the first one whose boxes were of the same kind.
 bool GpuBackend::worn_out_on_device() {
   const double area = pipeline_->relative_area();
-  if (!(area > 0)) return false;          // the frame was refused
-  constexpr std::size_t most_kinds = 64;  // who asks for another distance in each frame shall not fill the memory
-  if (area_when_built_.size() > most_kinds) area_when_built_.clear();
+  if (!(area > 0)) return false;  // the frame was refused
   return worn_out(area, area_when_built_.try_emplace(last_boxes_, area).first->second);
 }
 

@@ -33,8 +33,8 @@ class GpuBackend final : public DetectionBackend {
   static std::string unsupported(const Options& options);
 
  private:
-  // What a tree is refitted to: boxes of a query, grown by so much.
-  using Boxes = std::pair<gpu::Query, double>;
+  // What a tree is refitted to: boxes of a query, and how large a distance they are grown by (growth_of).
+  using Boxes = std::pair<gpu::Query, int>;
 
   template <class Compute>
   auto attempt(Compute&& compute) -> std::optional<decltype(compute())>;
