@@ -191,7 +191,8 @@ class Detector(SnapshotQueries):
     def set_separation(self, mesh_a: str | int, mesh_b: str | int, separation: float) -> None:
         """From the next call on, report pairs of these two meshes (names or numbers) that come within this distance.
 
-        The same mesh twice: within it. 0: those that touch. Nothing is rebuilt. A call under way ends first.
+        The same mesh twice: within it. 0: those that touch. A call under way ends first. The next one fits its boxes to
+        the new distances as it does to any motion; before it, any number of pairs may be set.
         """
         a, b = (arguments.mesh_number(n, m, self._mesh_names) for n, m in (("mesh_a", mesh_a), ("mesh_b", mesh_b)))
         self._core.set_separation(a, b, arguments.length("separation", separation))
@@ -211,7 +212,9 @@ class Detector(SnapshotQueries):
 
     @property
     def backend(self) -> str:
-        """Where frames are computed; for "auto" and after failures of the GPU: where the last one was."""
+        """Where frames are computed; for "auto", after failures of the GPU, and after queries that only CPUs answer:
+        where the last one was.
+        """
         return self._backend if self._backend == "cpu" else self._core.last_backend
 
     @property

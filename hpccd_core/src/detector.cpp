@@ -78,6 +78,7 @@ struct Detector::Impl {
     const std::lock_guard lock(one_call);
     cancellation().heed();
     found.reset();
+    shared.settle();
     std::optional<gpu::CallersDevice> callers;
     if (backends.use_devices()) callers.emplace();
     shared.profiler.begin();
@@ -116,6 +117,7 @@ Contacts Detector::detect(Positions t0, Positions t1) {
   const std::lock_guard lock(d.one_call);
   d.cancellation().heed();
   d.found.reset();
+  d.shared.settle();
   std::optional<gpu::CallersDevice> callers;
   if (d.backends.use_devices()) callers.emplace();
   d.shared.profiler.begin();
@@ -165,7 +167,7 @@ void Detector::set_separation(std::uint32_t mesh_a, std::uint32_t mesh_b, double
     throw InvalidArgument("mesh_a, mesh_b: the scene has " + std::to_string(n) + " meshes, numbered from 0");
   check_length("separation", separation);
   const std::lock_guard lock(impl_->one_call);
-  shared.set_separation(mesh_a, mesh_b, separation);
+  shared.separations.set(mesh_a, mesh_b, separation);
 }
 
 void Detector::cancel() { impl_->cancellation().request(); }

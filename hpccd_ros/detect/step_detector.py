@@ -18,7 +18,8 @@ class Detection:
     """The contacts of one step and how they were found.
 
     ``backend``, ``threads``: what was used. ``detect_ms``: wall time of the core's call. ``gaps``: the smallest
-    distance of each pair of meshes at the end, where the options ask for it.
+    distance of each pair of meshes at the end, where the options ask for it; ``gaps_backend``: what found them, which
+    may be another one.
     """
 
     start: SceneFrame
@@ -32,6 +33,7 @@ class Detection:
     profile: dict[str, float] = field(default_factory=dict)
     stats: dict[str, float] = field(default_factory=dict)
     gaps: list[hc.Gap] | None = None
+    gaps_backend: str = ""
 
     @property
     def near(self) -> int:
@@ -93,8 +95,9 @@ class StepDetector:
         """The contacts on the way from ``start`` to ``end``, of the same scene. Raises what the core raises."""
         self.prepare_scene(end)
         self.prepare_detector()
+        t0, t1 = self._builder.concatenate(start, end), self._builder.concatenate(end, end)
         began = time.perf_counter()
-        contacts = self._detector.detect(self._builder.concatenate(start, end), self._builder.concatenate(end, end))
+        contacts = self._detector.detect(t0, t1)
         detect_ms = 1e3 * (time.perf_counter() - began)
         found = Detection(
             start,
@@ -108,5 +111,7 @@ class StepDetector:
             dict(self._detector.profile),
             dict(self._detector.stats),
         )
-        # Only now: profile and stats are of the last call.
-        return replace(found, gaps=self.distances(end)) if found.options.distances else found
+        if not found.options.distances:
+            return found
+        # Only now: backend, profile and stats are of the last call.
+        return replace(found, gaps=self._detector.distances(t1), gaps_backend=self._detector.backend)

@@ -56,7 +56,7 @@ class ContactsPublisher:
 
     def _publish_distances(self, found: Detection, header: Header) -> None:
         message = DistanceArray(
-            header=header, step=found.end.step, accuracy=found.options.accuracy, backend=found.backend
+            header=header, step=found.end.step, accuracy=found.options.accuracy, backend=found.gaps_backend
         )
         snapshot_messages.fill_distances(message, found.gaps, found.layout)
         self._distances.publish(message)

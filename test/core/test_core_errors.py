@@ -257,6 +257,16 @@ def test_vertices(detector, argument, bad, error, text):
     assert detector.detect(*arguments).hash == good.hash, "goes on as before"
 
 
+@pytest.mark.parametrize("query", ["proximity", "intersections", "distances"])
+def test_queries_of_one_time_take_larger_coordinates(detector, query):
+    def ask(vertices):
+        return getattr(detector, query)(vertices, *((1.0,) if query == "proximity" else ()))
+
+    ask(changed(VERTICES, 1, 1, 1e300))
+    with pytest.raises(ValueError, match=r"^vertices\[1, 1\] is 1.1e\+300, beyond 1e\+300.*scale"):
+        ask(changed(VERTICES, 1, 1, 1.1e300))
+
+
 BAD_STEPS = [
     (VERTICES[:3], ValueError, r"vertices: .*\(4, 3\).*\(3, 3\)"),
     (VERTICES.astype(int), TypeError, r"vertices: .*float32 or float64"),

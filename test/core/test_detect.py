@@ -309,6 +309,22 @@ def test_offsets_of_meshes():
     assert [scene.face_offset(f"mesh{i}") for i in range(5)] == [0, *np.cumsum([len(f) for f in meshes.faces])[:-1]]
 
 
+def test_stats_are_of_the_pairs_that_a_query_looks_at():
+    meshes = random_scenes.many_meshes(np.random.default_rng(65))
+    detector, vertices = hc.Detector(meshes.scene(), backend="cpu"), meshes.vertices_t0
+    kinds = []
+    for ask in (
+        lambda: detector.detect(vertices, vertices),
+        lambda: detector.proximity(vertices, 0.1),
+        lambda: detector.intersections(vertices),
+        lambda: detector.distances(vertices),
+        lambda: detector.detect(vertices, vertices),
+    ):
+        ask()
+        kinds.append({name.split("_")[0] for name in detector.stats if name.endswith("_candidates")})
+    assert kinds == [{"vf", "ee"}, {"vf", "ee"}, {"ef"}, {"vf", "ee", "ef"}, {"vf", "ee"}]
+
+
 def test_profile_and_stats():
     meshes = random_scenes.many_meshes(np.random.default_rng(64))
     detector = hc.Detector(meshes.scene())

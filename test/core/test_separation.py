@@ -51,6 +51,22 @@ def test_no_separation_gives_exactly_the_contacts(kind):
             assert np.array_equal(a, b)
 
 
+@pytest.mark.parametrize("units", (1, 2, 3, 5))
+def test_separations_of_the_least_numbers_there_are(units):
+    """Half of such a number may be none. A vertex above a triangle, so far that the floor of half is too little."""
+    least = np.nextafter(0.0, 1.0)
+    scene = hc.Scene()
+    scene.add_mesh("triangle", [[0, 1, 2]], n_vertices=3)
+    scene.add_mesh("point", np.empty((0, 3), int), n_vertices=1)
+    vertices = least * np.array([[0, 0, 0], [40, 0, 0], [0, 40, 0], [9, 9, units]])
+    for method in ("default", "published"):
+        found = [
+            hc.Detector(scene, backend="cpu", method=method, minimum_separation=separation).detect(vertices, vertices)
+            for separation in least * np.arange(1, units + 2)
+        ]
+        assert [len(contacts) for contacts in found] == [0] * (units - 1) + [1, 1]
+
+
 def test_separation_of_a_scene():
     """Candidates must be gathered within the separation too: compared with all pairs of a small scene."""
     meshes = random_scenes.combine(

@@ -89,6 +89,24 @@ def test_distances_at_the_end_of_the_step(detector):
         (g.distance, g.kind, g.features) for g in expected
     ]
     assert found.stats["vf_candidates"] > 0, "stats are those of the detection"
+    assert (found.backend, found.gaps_backend) == ("cpu", "cpu")
+
+
+def test_one_step_has_the_same_options_throughout(detector, monkeypatch):
+    """Set while its contacts were looked for, others hold from the next step on: distances are of the same detector."""
+    detector.options = replace(detector.options, distances=True)
+    detector.detect(frame(0), frame(1))
+    detect, first = hc.Detector.detect, detector._detector
+
+    def changed_meanwhile(core, *ends):
+        detector.options = replace(detector.options, accuracy="balanced", distances=False)
+        return detect(core, *ends)
+
+    monkeypatch.setattr(hc.Detector, "detect", changed_meanwhile)
+    found = detector.detect(frame(1), frame(2))
+    assert detector._detector is first and found.options.accuracy == "exact"
+    assert len(found.gaps) == 3
+    assert detector.detect(frame(2), frame(3)).gaps is None and detector._detector is not first
 
 
 def test_near_pairs_are_counted_by_the_meshes_that_have_a_separation(detector):

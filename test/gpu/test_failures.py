@@ -63,6 +63,23 @@ def test_every_call_of_a_distance_query_may_fail(ask):
     assert failures > 30
 
 
+@pytest.mark.parametrize(
+    "ask",
+    (lambda d, v: d.proximity(v, 0.1), lambda d, v: d.intersections(v), lambda d, v: d.detect(v, v)),
+    ids=("proximity", "intersections", "contacts"),
+)
+def test_a_device_that_does_not_start_leaves_device_arrays_to_the_cpu(ask):
+    cupy = pytest.importorskip("cupy")
+    scene, _, vertices = scenes.join([scenes.crumpled(np.random.default_rng(4), 12)])
+    expected = ask(hc.Detector(scene, backend="cpu"), vertices).hash
+    detector, there = hc.Detector(scene, backend="gpu"), cupy.asarray(vertices)
+    _core.gpu_fail_after(1)
+    assert ask(detector, there).hash == expected
+    assert detector.stats["gpu_fallbacks"] == 1 and detector.backend == "cpu"
+    assert ask(detector, there).hash == expected  # the device is back
+    assert detector.backend == "gpu"
+
+
 @pytest.mark.parametrize("seed", range(3, 9))
 def test_every_call_of_a_hybrid_frame_on_warm_devices_may_fail(seed):
     scene, t0, t1 = scenes.join([scenes.crumpled(np.random.default_rng(seed), 40)])

@@ -74,6 +74,16 @@ def test_scales_and_offsets(scale, offset):
     assert len(assert_hits_same(cpu, gpu, vertices)) > 0
 
 
+def test_intersections_are_counted_under_the_same_names():
+    """What the GPU has beside them is named after it."""
+    scene, _, vertices = scenes.join([scenes.lattice(np.random.default_rng(13), 14)])
+    cpu, gpu = detectors(scene)
+    assert_hits_same(cpu, gpu, vertices)
+    names = [{name for name in d.stats if not name.startswith("gpu_")} for d in (cpu, gpu)]
+    assert names[0] == names[1]
+    assert cpu.stats["ef_candidates"] > 0 and not any(name.startswith(("vf_", "ee_")) for name in names[0])
+
+
 def test_faces_that_are_segments():
     rng = np.random.default_rng(4)
     scene = hc.Scene()
@@ -125,6 +135,19 @@ def test_queries_in_turn():
     assert gpu.stats["gpu_fallbacks"] == 0, gpu.last_gpu_error
 
 
+def test_a_tree_wears_out_whatever_the_distances():
+    """Each frame asks for a little more than the last one; from the second on, neighbours in the tree lie anywhere."""
+    rng = np.random.default_rng(14)
+    scene, v, _ = scenes.join([scenes.crumpled(rng, 32)])
+    w = rng.permutation(v)
+    gpu, built = hc.Detector(scene, backend="gpu"), []
+    for frame in range(5):
+        gpu.proximity(w if frame else v, 0.1 + 1e-6 * frame)
+        assert_on_gpu(gpu)
+        built.append(gpu.profile.get("build", 0) > 0)
+    assert built == [True, False, True, False, False]  # the device tells of a frame when the next one begins
+
+
 def test_the_hybrid_leaves_them_to_the_cpu():
     scene, vertices, _ = scenes.join([scenes.crumpled(np.random.default_rng(8), 12)])
     cpu, hybrid = hc.Detector(scene, backend="cpu"), hc.Detector(scene, backend="hybrid")
@@ -148,6 +171,26 @@ def test_device_arrays(library, dtype):
         assert_on_gpu(gpu)
     for found, expected in zip(gpu.distances(there), cpu.distances(vertices), strict=True):
         assert (found.distance, found.features) == (expected.distance, expected.features)
+
+
+@pytest.mark.parametrize("dtype", (np.float32, np.float64))
+@pytest.mark.parametrize("library", ("cupy", "torch"))
+@pytest.mark.parametrize("query", ("proximity", "intersections", "distances"))
+def test_device_arrays_in_the_first_call(query, library, dtype):
+    """Distances are the CPU's: they are asked for before the detector has anything on the device."""
+    module = pytest.importorskip(library)
+    scene, _, vertices = scenes.join([scenes.crumpled(np.random.default_rng(12), 12) for _ in range(2)])
+    vertices = vertices.astype(dtype)
+    there = module.asarray(vertices) if library == "cupy" else module.from_numpy(vertices).cuda()
+    more = (0.5,) if query == "proximity" else ()
+    found, expected = (
+        getattr(detector, query)(where, *more)
+        for detector, where in zip(detectors(scene)[::-1], (there, vertices), strict=True)
+    )
+    if query == "distances":
+        assert [(g.distance, g.features) for g in found] == [(g.distance, g.features) for g in expected]
+    else:
+        assert found.hash == expected.hash
 
 
 def test_nothing_and_little():

@@ -167,7 +167,7 @@ class Detector {
   // whose distances are the same double the first in order, vertex-face before edge-edge.
   std::vector<Gap> distances(Positions vertices);
 
-  // As Scene::set_separation, from the next call on. Nothing is rebuilt.
+  // As Scene::set_separation, from the next call on, which fits its boxes to it as to any motion.
   void set_separation(std::uint32_t mesh_a, std::uint32_t mesh_b, double separation);
 
   // From any thread, without waiting: a call under way, those that wait for it, and all later ones throw Cancelled,

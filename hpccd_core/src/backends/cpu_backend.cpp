@@ -109,8 +109,12 @@ Contacts CpuBackend::collect(Outputs outputs) {
 }
 
 void CpuBackend::count(std::map<std::string, std::uint64_t>& stats) const {
-  std::uint64_t bytes = order_.bytes() + (method_ ? method_->bytes() : 0);
+  std::uint64_t bytes = order_.bytes();
+  if (method_) bytes += method_->bytes();
+  if (mesh_pairs_) bytes += mesh_pairs_->bytes();
   const char* kinds[3] = {"vf", "ee", "ef"};
+  const bool pairs = search_.leaf_pairs || search_.leaf_pairs_in_snapshot;
+  const bool asked[3] = {pairs, pairs, search_.leaf_edge_faces != nullptr};
   for (const Worker& w : workers_) {
     stats["node_pairs"] += w.node_pairs;
     stats["leaf_pairs"] += w.leaf_pairs;
@@ -118,9 +122,8 @@ void CpuBackend::count(std::map<std::string, std::uint64_t>& stats) const {
     for (int k = 0; k < 3; ++k) {
       const std::string kind = kinds[k];
       const BatchCounts& c = w.counts[k];
-      if (k == 2 && !search_.leaf_edge_faces) continue;
+      if (!asked[k]) continue;
       stats[kind + "_candidates"] += c.tested;
-      stats[kind + "_rejected_slabs"] += c.kdop;  // users read it under its first name
       stats[kind + "_rejected_coplanarity"] += c.coplanarity;
       stats[kind + "_rejected_projection"] += c.projection;
       stats[kind + "_rejected_roots"] += c.roots;
@@ -128,9 +131,11 @@ void CpuBackend::count(std::map<std::string, std::uint64_t>& stats) const {
       stats[kind + "_proven_contacts"] += c.contacts;
       stats[kind + "_undecided"] += c.undecided;
       const FallbackCounts& last = w.fallbacks[k];
+      stats[kind + "_by_integers"] += last.integers;
+      if (k == 2) continue;                       // an edge and a face have neither k-DOPs nor another fallback
+      stats[kind + "_rejected_slabs"] += c.kdop;  // users read it under its first name
       stats[kind + "_by_tolerance"] += last.tolerance;
       stats[kind + "_by_extended"] += last.extended;
-      stats[kind + "_by_integers"] += last.integers;
     }
   }
   stats["bytes"] += bytes;

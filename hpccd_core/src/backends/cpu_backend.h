@@ -51,6 +51,7 @@ class CpuBackend final : public DetectionBackend {
   std::vector<Worker> workers_;
   Search search_;
   ContactOrder order_;
+  std::optional<MeshPairs> mesh_pairs_;  // from the first search for smallest distances on
   // Kept by a call that is cancelled: to give the memory of 10 million back to the system takes longer than to end it.
   Contacts contacts_;
 };

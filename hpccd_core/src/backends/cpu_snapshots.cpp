@@ -32,12 +32,13 @@ std::optional<Intersections> CpuBackend::intersections(Positions vertices) {
 std::optional<std::vector<Gap>> CpuBackend::distances(Positions vertices) {
   const Options& o = shared_.options;
   see_snapshot(vertices);
-  NearestPairs nearest(*shared_.scene, shared_.tree.motion(), shared_.tree.tree());
-  search_.nearest = &nearest;
+  if (!mesh_pairs_) mesh_pairs_.emplace(shared_.rules, shared_.scene->meshes().size());
+  search_.nearest =
+      std::make_unique<NearestPairs>(*mesh_pairs_, shared_.features, shared_.tree.motion(), shared_.tree.tree());
   search_.leaf_pairs_in_snapshot = leaf_pairs_in_snapshot(o.simd);
   search_.leaf_edge_faces = leaf_edge_faces(o.simd);
   walk_tree();
-  std::vector<Gap> gaps = collect_gaps(*shared_.scene, shared_.rules, nearest, search_.geometry);
+  std::vector<Gap> gaps = collect_gaps(*search_.nearest, search_.geometry, shared_.cancellation);
   search_.nearest = nullptr;
   shared_.profiler.mark("contacts");
   shared_.cancellation.heed();

@@ -1,11 +1,25 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "backends/gpu_backend.h"
 
+#include <cmath>
+#include <limits>
+
 #include "backends/gpu_undecided.h"
 #include "elementary/exact/intersection.h"
+#include "gpu/download.h"
 #include "scene/static_meshes.h"
 
 namespace hpccd {
+
+namespace {
+
+// The same for boxes grown by nearly the same, of which a tree is worn out alike: within an eighth of a factor of two
+// areas differ by a fifth at most. Who asks for another distance in each frame has worn out trees too.
+int growth_of(double distance) {
+  return distance > 0 ? static_cast<int>(std::floor(8 * std::log2(distance))) : std::numeric_limits<int>::min();
+}
+
+}  // namespace
 
 std::string GpuBackend::unsupported(const Options& options) {
   if (options.method != Method::standard)
@@ -45,7 +59,7 @@ std::optional<Intersections> GpuBackend::intersections(Positions vertices) {
 Contacts GpuBackend::contacts(Positions t0, Positions t1) {
   const Options& o = shared_.options;
   const SeparationTable& table = shared_.separations;
-  prepare({table.any() ? gpu::Query::separations : gpu::Query::contacts, static_cast<double>(table.version())},
+  prepare({table.any() ? gpu::Query::separations : gpu::Query::contacts, growth_of(table.most())},
           [&] { shared_.tree.bound(on_host(t0, 0), on_host(t1, 1), {}); });
   if (!pipeline_->run(t0, t1, shared_.pool)) {
     MotionBounds().update(on_host(t0, 0), on_host(t1, 1), shared_.pool);  // throws, and names the coordinate
@@ -100,7 +114,7 @@ Intersections GpuBackend::pierced_faces(Positions vertices) {
 }
 
 void GpuBackend::run_snapshot(gpu::Query query, Positions vertices, double distance) {
-  prepare({query, distance}, [&] { shared_.tree.bound(on_host(vertices, 0)); });
+  prepare({query, growth_of(distance)}, [&] { shared_.tree.bound(on_host(vertices, 0)); });
   if (!pipeline_->run_snapshot(query, vertices, distance, shared_.pool)) {
     MotionBounds().update(*shared_.scene, on_host(vertices, 0), shared_.pool);  // throws, and names the coordinate
     throw gpu::Error("the device found bad coordinates where the host finds none");
@@ -131,9 +145,7 @@ void GpuBackend::prepare(Boxes boxes, Bound&& bound) {
 // By the last frame, against the first one whose boxes were of the same kind.
 bool GpuBackend::worn_out_on_device() {
   const double area = pipeline_->relative_area();
-  if (!(area > 0)) return false;          // the frame was refused
-  constexpr std::size_t most_kinds = 64;  // who asks for another distance in each frame shall not fill the memory
-  if (area_when_built_.size() > most_kinds) area_when_built_.clear();
+  if (!(area > 0)) return false;  // the frame was refused
   return worn_out(area, area_when_built_.try_emplace(last_boxes_, area).first->second);
 }
 
@@ -161,25 +173,22 @@ Accuracy GpuBackend::accuracy_of(const Candidate& pair) const {
   const bool edges = pair.kind == Kind::edge_edge;
   const std::uint32_t first = edges ? f.edges[pair.first][0] : pair.first;
   const std::uint32_t second = edges ? f.edges[pair.second][0] : f.faces[pair.second][0];
-  const auto& meshes = shared_.scene->meshes();
-  const auto mesh_of = [&](std::uint32_t vertex) {
-    std::uint32_t m = 0;
-    while (vertex - meshes[m].first_vertex >= meshes[m].n_vertices) ++m;
-    return m;
-  };
-  return shared_.rules.rule(mesh_of(first), mesh_of(second)).accuracy;
+  return shared_.rules.rule(f.mesh_of_vertex[first], f.mesh_of_vertex[second]).accuracy;
 }
 
 Positions GpuBackend::on_host(Positions p, int which) {
   if (!p.on_device) return p;
-  if (!pipeline_) throw gpu::Error("positions on the device, but no device is in use");
-  return pipeline_->download(p, which);
+  std::vector<unsigned char>& to = downloaded_[which];
+  to.resize(3 * p.n * (p.is_double ? sizeof(double) : sizeof(float)));
+  gpu::download(p.data, to.data(), to.size());
+  return {to.data(), p.n, p.is_double};
 }
 
 void GpuBackend::count(std::map<std::string, std::uint64_t>& stats) const {
   if (!pipeline_) return;
   stats.merge(pipeline_->stats());
   stats["gpu_exact_on_cpu"] = pipeline_->undecided().size();
+  if (last_boxes_.first == gpu::Query::intersections) stats["ef_by_integers"] = pipeline_->undecided().size();
 }
 
 void GpuBackend::add_stages(std::map<std::string, double>& stages) const {

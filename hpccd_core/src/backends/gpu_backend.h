@@ -6,6 +6,7 @@
 #include <memory>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "backends/backend.h"
 #include "backends/gpu_contacts.h"
@@ -32,8 +33,8 @@ class GpuBackend final : public DetectionBackend {
   static std::string unsupported(const Options& options);
 
  private:
-  // What a tree is refitted to: boxes of a query, grown by so much.
-  using Boxes = std::pair<gpu::Query, double>;
+  // What a tree is refitted to: boxes of a query, and how large a distance they are grown by (growth_of).
+  using Boxes = std::pair<gpu::Query, int>;
 
   template <class Compute>
   auto attempt(Compute&& compute) -> std::optional<decltype(compute())>;
@@ -56,6 +57,7 @@ class GpuBackend final : public DetectionBackend {
   std::map<Boxes, double> area_when_built_;
   Boxes last_boxes_;
   DecidedContacts decided_;
+  std::vector<unsigned char> downloaded_[2];
 };
 
 }  // namespace hpccd

@@ -14,29 +14,24 @@ Resources::Resources(std::shared_ptr<const Scene> of, const Options& wanted, int
       features(features_of(*scene, pool)),
       separations(*scene, wanted.minimum_separation),
       rules(*scene, wanted.accuracy, separations),
-      tree(*scene, features, pool) {
+      tree(*scene, features, pool),
+      settled_(separations.version()) {
   options.simd = resolve(wanted.simd);
   options.threads = pool.size();
   pool.heed(cancellation);
-  list_meshes();
 }
 
-void Resources::set_separation(std::uint32_t mesh_a, std::uint32_t mesh_b, double separation) {
-  separations.set(mesh_a, mesh_b, separation);
+void Resources::settle() {
+  if (settled_ == separations.version()) return;
+  separations.settle();
   rules.change(separations);
-  list_meshes();
+  settled_ = separations.version();
 }
 
 Separations Resources::separations_now() const {
   if (separations.uniform()) return {separations.first()};
-  return {0, separations.all().data(), mesh_of_vertex_.data(), static_cast<std::uint32_t>(scene->meshes().size())};
-}
-
-void Resources::list_meshes() {
-  if (separations.uniform() || !mesh_of_vertex_.empty()) return;
-  const auto& meshes = scene->meshes();
-  for (std::uint32_t m = 0; m < meshes.size(); ++m)
-    mesh_of_vertex_.insert(mesh_of_vertex_.end(), meshes[m].n_vertices, m);
+  return {0, separations.all().data(), features.mesh_of_vertex.data(),
+          static_cast<std::uint32_t>(scene->meshes().size())};
 }
 
 }  // namespace hpccd

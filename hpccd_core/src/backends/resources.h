@@ -29,13 +29,13 @@ struct Resources {
   MovingTree tree;
   Profiler profiler;
 
-  void set_separation(std::uint32_t mesh_a, std::uint32_t mesh_b, double separation);
+  // At the beginning of each call: what follows from separations that were set since the last one.
+  void settle();
   // Of this moment, for tests.
   Separations separations_now() const;
 
  private:
-  std::vector<std::uint32_t> mesh_of_vertex_;  // filled when pairs differ
-  void list_meshes();
+  std::uint64_t settled_;  // version of the separations
 };
 
 }  // namespace hpccd

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <limits>
 #include <string>
 #include <utility>
 
@@ -84,8 +85,9 @@ void copy_snapshot(const Real* x, const CoordinateMap& map, std::size_t begin, s
   }
 }
 
-// By how much the boxes of a mesh grow: half the separation, and what rounding x - margin and x + margin can lose. More
-// than the scene is large would not bring more pairs, but boxes without an area.
+// By how much the boxes of a mesh grow: half the separation, of which halving a denormal number may lose one half of
+// the least, and what rounding x - margin and x + margin can lose. More than the scene is large would not bring more
+// pairs, but boxes without an area.
 double margin_for(double separation, const Extent& scene) {
   if (!(separation > 0)) return 0;
   double most = 0, size = 0;
@@ -93,7 +95,7 @@ double margin_for(double separation, const Extent& scene) {
     most = std::max({most, std::fabs(scene.low[k]), std::fabs(scene.high[k])});
     size = std::max(size, scene.high[k] - scene.low[k]);
   }
-  const double reach = std::min(0.5 * separation, size);
+  const double reach = std::min(0.5 * separation + std::numeric_limits<double>::denorm_min(), size);
   return reach + 4.5e-16 * (most + reach);
 }
 

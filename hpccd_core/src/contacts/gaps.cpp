@@ -89,13 +89,14 @@ Gap gap_of(std::uint32_t mesh_a, std::uint32_t mesh_b, const NearestPair& found,
 
 }  // namespace
 
-std::vector<Gap> collect_gaps(const Scene& scene, const PairRules& rules, const NearestPairs& nearest,
-                              const Geometry& geometry) {
+std::vector<Gap> collect_gaps(const NearestPairs& nearest, const Geometry& geometry, const Cancellation& cancellation) {
+  const MeshPairs& pairs = nearest.pairs();
   std::vector<Gap> gaps;
-  const auto n = static_cast<std::uint32_t>(scene.meshes().size());
-  for (std::uint32_t a = 0; a < n; ++a)
-    for (std::uint32_t b = a; b < n; ++b)
-      if (rules.enabled(a, b)) gaps.push_back(gap_of(a, b, nearest.found(a, b), geometry));
+  gaps.reserve(pairs.size());
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    cancellation.heed();
+    gaps.push_back(gap_of(pairs[i][0], pairs[i][1], nearest.found(i), geometry));
+  }
   return gaps;
 }
 

@@ -2,14 +2,13 @@
 // From the nearest pairs of features to the public result.
 #pragma once
 
+#include "base/cancellation.h"
 #include "elementary/batch.h"
 #include "traverse/nearest_pairs.h"
-#include "traverse/tasks.h"
 
 namespace hpccd {
 
-// One for each enabled pair of meshes, by (mesh_a, mesh_b), mesh_a <= mesh_b.
-std::vector<Gap> collect_gaps(const Scene& scene, const PairRules& rules, const NearestPairs& nearest,
-                              const Geometry& geometry);
+// One for each pair, in their order. Throws Cancelled.
+std::vector<Gap> collect_gaps(const NearestPairs& nearest, const Geometry& geometry, const Cancellation& cancellation);
 
 }  // namespace hpccd

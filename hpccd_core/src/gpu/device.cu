@@ -2,6 +2,7 @@
 #include <atomic>
 
 #include "gpu/cuda_call.h"
+#include "gpu/download.h"
 #include "gpu/memory_on_device.h"
 
 #ifndef HPCCD_CUDA_ARCHITECTURES_TEXT
@@ -83,6 +84,16 @@ class DeviceCopy final : public MemoryOnDevice {
 std::unique_ptr<MemoryOnDevice> MemoryOnDevice::create() {
   if (status().devices.empty()) throw Error(status().reason);
   return std::make_unique<DeviceCopy>();
+}
+
+void download(const void* from, void* to, std::size_t bytes) {
+  if (bytes == 0) return;
+  const CallersDevice callers;
+  cudaPointerAttributes a;
+  check(cudaPointerGetAttributes(&a, from), "cudaPointerGetAttributes");
+  if (a.device >= 0) check(cudaSetDevice(a.device), "cudaSetDevice");
+  check(cudaDeviceSynchronize(), "cudaDeviceSynchronize");  // the producer may use any stream
+  check(cudaMemcpy(to, from, bytes, cudaMemcpyDefault), "cudaMemcpy");
 }
 
 const Status& status() {

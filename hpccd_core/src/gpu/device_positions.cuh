@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// The caller's positions, from wherever they are to the device of a pipeline, and back to the host.
+// The caller's positions, from wherever they are to the device of a pipeline.
 #pragma once
 
 #include <algorithm>
 #include <cstring>
-#include <vector>
 
 #include "base/parallel.h"
 #include "gpu/stream.h"
@@ -54,18 +53,6 @@ class DevicePositions {
         check(cudaMemcpyAsync(given_[i].data(), to[i], bytes, cudaMemcpyHostToDevice, stream), "cudaMemcpyAsync");
   }
 
-  // As host arrays; each of the two places keeps the last array that was downloaded to it.
-  Positions download(Positions p, int which) {
-    const std::size_t bytes = 3 * p.n * (p.is_double ? 8 : 4);
-    std::vector<unsigned char>& to = downloaded_[which];
-    to.resize(bytes);
-    if (bytes) {
-      settled_device(p.data);
-      check(cudaMemcpy(to.data(), p.data, bytes, cudaMemcpyDefault), "cudaMemcpy");
-    }
-    return {to.data(), p.n, p.is_double};
-  }
-
   std::size_t bytes() const { return given_[0].bytes() + given_[1].bytes(); }
 
  private:
@@ -84,7 +71,6 @@ class DevicePositions {
   const int device_;
   PinnedBuffer<double> staging_[2];
   DeviceBuffer<double> given_[2];
-  std::vector<unsigned char> downloaded_[2];
 };
 
 }  // namespace hpccd::gpu

@@ -2,7 +2,6 @@
 // What stays on the device as long as the scene: features, meshes, rules between them, and how pairs are numbered.
 #pragma once
 
-#include <algorithm>
 #include <vector>
 
 #include "gpu/device.h"
@@ -23,6 +22,7 @@ class DeviceScene {
       throw Error("the scene has 2^31 or more features of one kind; use backend=\"cpu\"");
     upload(edges_, features.edges.data(), n_edges);
     upload(faces_, features.faces.data(), 3 * features.faces.size());
+    upload(mesh_of_vertex_, features.mesh_of_vertex.data(), features.mesh_of_vertex.size());
     upload_rules(scene, accuracy);
     keys_ = PairKeys::of(features.n_vertices, n_edges, features.n_faces());
   }
@@ -60,7 +60,10 @@ class DeviceScene {
   u64 separations_version() const { return separations_.version(); }
 
   const PairKeys& keys() const { return keys_; }
-  std::size_t bytes() const { return edges_.bytes() + faces_.bytes() + mesh_of_vertex_.bytes(); }
+  std::size_t bytes() const {
+    return edges_.bytes() + faces_.bytes() + mesh_of_vertex_.bytes() + enabled_.bytes() + accuracy_.bytes() +
+           pair_separation_.bytes() + largest_separation_.bytes();
+  }
 
  private:
   void upload_rules(const Scene& scene, Accuracy accuracy) {
@@ -75,12 +78,8 @@ class DeviceScene {
         all_enabled_ = all_enabled_ && enabled[i];
         one_accuracy_ = one_accuracy_ && tiers[i] == static_cast<unsigned char>(accuracy);
       }
-    std::vector<u32> mesh(scene.n_vertices());
-    for (u32 m = 0; m < n_meshes_; ++m)
-      std::fill_n(mesh.begin() + scene.meshes()[m].first_vertex, scene.meshes()[m].n_vertices, m);
     upload(enabled_, enabled.data(), enabled.size());
     upload(accuracy_, tiers.data(), tiers.size());
-    upload(mesh_of_vertex_, mesh.data(), mesh.size());
   }
 
   const Features& features_;

@@ -59,7 +59,6 @@ class DevicePipeline : public Pipeline {
     return contacts_.result(query_, *host_counters_.data());
   }
 
-  Positions download(Positions p, int which) override { return positions_.download(p, which); }
   double relative_area() const override { return host_counters_.data()->area; }
   std::map<std::string, std::uint64_t> stats() const override;
   std::map<std::string, double> stages() const override { return timer_.stages(); }
@@ -207,6 +206,7 @@ std::map<std::string, std::uint64_t> DevicePipeline::stats() const {
     s[kind + "_rejected_separated"] = b.separated;
     s[kind + "_proven_contacts"] = b.contacts;
     s[kind + "_undecided"] = b.undecided;
+    if (edges_and_faces) continue;
     s[kind + "_single_root"] = c.all_single[k];
     s[kind + "_many_roots"] = c.all_many[k];
   }

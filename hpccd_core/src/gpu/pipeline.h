@@ -48,8 +48,6 @@ class Pipeline {
   // After run(): the pairs left for the exact fallback on the CPU. Sorting goes on meanwhile.
   virtual const std::vector<Candidate>& undecided() const = 0;
   virtual FrameResult finish() = 0;
-  // Positions that live on the device, as host arrays.
-  virtual Positions download(Positions on_device, int which) = 0;
 
   virtual double relative_area() const = 0;  // of the refitted tree, as in tree.h
   virtual std::map<std::string, std::uint64_t> stats() const = 0;

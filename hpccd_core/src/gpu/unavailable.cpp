@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // In builds without CUDA.
 #include "gpu/device.h"
+#include "gpu/download.h"
 #include "gpu/memory_on_device.h"
 #include "gpu/pipeline.h"
 
@@ -15,6 +16,8 @@ CallersDevice::CallersDevice() = default;
 CallersDevice::~CallersDevice() = default;
 
 void fail_after(int) {}
+
+void download(const void*, void*, std::size_t) { throw Error(status().reason); }
 
 std::unique_ptr<Pipeline> Pipeline::create(const Scene&, const Features&, Accuracy, const SeparationTable&, int, bool) {
   throw Error(status().reason);

@@ -36,9 +36,11 @@ Features features_of(const Scene& scene, ThreadPool& pool) {
     }
 
   x.mesh_of_primitive.resize(x.faces.size() + x.lone_vertices.size());
+  x.mesh_of_vertex.resize(x.n_vertices);
   for (std::uint32_t m = 0; m < scene.meshes().size(); ++m) {
     const auto& mesh = scene.meshes()[m];
     std::fill_n(x.mesh_of_primitive.begin() + mesh.first_face, mesh.n_faces, m);
+    std::fill_n(x.mesh_of_vertex.begin() + mesh.first_vertex, mesh.n_vertices, m);
     const auto end = std::ranges::lower_bound(x.lone_vertices, mesh.first_vertex + mesh.n_vertices);
     for (auto v = std::ranges::lower_bound(x.lone_vertices, mesh.first_vertex); v < end; ++v)
       x.mesh_of_primitive[x.faces.size() + static_cast<std::size_t>(v - x.lone_vertices.begin())] = m;

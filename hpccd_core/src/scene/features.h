@@ -18,15 +18,15 @@ struct Features {
   // The primitives of the hierarchy, by number: all triangles (the paper's representative triangles, to which features
   // are assigned), then the vertices that are in no triangle.
   std::vector<std::uint32_t> lone_vertices;
-  std::vector<std::uint32_t> mesh_of_primitive;
+  std::vector<std::uint32_t> mesh_of_primitive, mesh_of_vertex;
   // What primitive p represents: edges owned_edges[first_edge[p] .. first_edge[p+1]), vertices likewise.
   std::vector<std::uint32_t> first_edge, owned_edges, first_vertex, owned_vertices;
   std::uint32_t n_vertices = 0;
 
   std::size_t bytes() const {
     return edges.capacity() * sizeof(edges[0]) + faces.capacity() * sizeof(faces[0]) +
-           4 * (lone_vertices.capacity() + mesh_of_primitive.capacity() + first_edge.capacity() +
-                owned_edges.capacity() + first_vertex.capacity() + owned_vertices.capacity());
+           4 * (lone_vertices.capacity() + mesh_of_primitive.capacity() + mesh_of_vertex.capacity() +
+                first_edge.capacity() + owned_edges.capacity() + first_vertex.capacity() + owned_vertices.capacity());
   }
   std::uint32_t n_faces() const { return static_cast<std::uint32_t>(faces.size()); }
   std::uint32_t n_primitives() const { return static_cast<std::uint32_t>(mesh_of_primitive.size()); }

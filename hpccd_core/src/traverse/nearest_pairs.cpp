@@ -17,18 +17,19 @@ bool NearestPair::before(const NearestPair& other) const {
   return key(*this) < key(other);
 }
 
-NearestPairs::NearestPairs(const Scene& scene, const MotionBounds& motion, const Tree& tree)
-    : n_(scene.meshes().size()),
+NearestPairs::NearestPairs(const MeshPairs& pairs, const Features& features, const MotionBounds& motion,
+                           const Tree& tree)
+    : pairs_(pairs),
+      features_(features),
       tree_(tree),
-      entries_(std::make_unique<Entry[]>(n_ * n_)),
+      entries_(std::make_unique<Entry[]>(pairs.size())),
+      least_edge_(tree.nodes.size(), Tree::none),
       scale_(motion.map.scale),
       sums_(motion.rounding),
       // By how much the test may report a pair beyond its distance (proximity_test.h), and its margins, of a pair as
       // large as the scene: boxes lie within 2.25 of zero, so p, a and b together are below 14. With less, which of two
       // pairs is found would depend on which came first.
       rounding_(14 * (distance_radius + 1e-14) / motion.map.scale) {
-  for (std::uint32_t m = 0; m < n_; ++m) mesh_of_vertex_.insert(mesh_of_vertex_.end(), scene.meshes()[m].n_vertices, m);
-  least_edge_.resize(tree.nodes.size(), Tree::none);
   for (std::size_t i = tree.nodes.size(); i-- > 0;) {  // children come after their parents
     const Node& node = tree.nodes[i];
     if (node.children) {

@@ -12,6 +12,7 @@
 #include "bvh/motion_bounds.h"
 #include "bvh/tree.h"
 #include "elementary/pair.h"
+#include "traverse/mesh_pairs.h"
 
 namespace hpccd {
 
@@ -26,7 +27,8 @@ struct NearestPair {
 
 class NearestPairs {
  public:
-  NearestPairs(const Scene& scene, const MotionBounds& motion, const Tree& tree);
+  // All of them must outlive it.
+  NearestPairs(const MeshPairs& pairs, const Features& features, const MotionBounds& motion, const Tree& tree);
 
   // Farther apart along an axis than this, in coordinates of the boxes, is nothing that could come before.
   float reach(std::uint32_t mesh_a, std::uint32_t mesh_b) const {
@@ -46,9 +48,11 @@ class NearestPairs {
   }
   // The lowest number of an edge in either.
   std::uint32_t least_edge(std::uint32_t a, std::uint32_t b) const { return std::min(least_edge_[a], least_edge_[b]); }
-  std::uint32_t mesh_of(std::uint32_t vertex) const { return mesh_of_vertex_[vertex]; }
+  std::uint32_t mesh_of(std::uint32_t vertex) const { return features_.mesh_of_vertex[vertex]; }
   void offer(std::uint32_t mesh_a, std::uint32_t mesh_b, const NearestPair& pair);
-  const NearestPair& found(std::uint32_t mesh_a, std::uint32_t mesh_b) const { return at(mesh_a, mesh_b).best; }
+  // After the search, in the order of the pairs.
+  const MeshPairs& pairs() const { return pairs_; }
+  const NearestPair& found(std::size_t number) const { return entries_[number].best; }
 
  private:
   struct Entry {
@@ -58,13 +62,13 @@ class NearestPairs {
     SpinLock lock;
     NearestPair best;
   };
-  Entry& at(std::uint32_t a, std::uint32_t b) const { return entries_[a < b ? a * n_ + b : b * n_ + a]; }
+  Entry& at(std::uint32_t a, std::uint32_t b) const { return entries_[pairs_.number(a, b)]; }
 
-  std::size_t n_;
+  const MeshPairs& pairs_;
+  const Features& features_;
   const Tree& tree_;
-  std::unique_ptr<Entry[]> entries_;
+  std::unique_ptr<Entry[]> entries_;       // by number of the pair
   std::vector<std::uint32_t> least_edge_;  // by node
-  std::vector<std::uint32_t> mesh_of_vertex_;
   double scale_, sums_, rounding_;
 };
 

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <atomic>
+#include <memory>
 
 #include "base/cancellation.h"
 #include "elementary/batch.h"
@@ -28,7 +29,7 @@ struct Search {
   Fallback fallback[n_rules];
   IntersectionBatch intersection_batch = nullptr;
   // Where what is found goes; null: to the workers' lists.
-  NearestPairs* nearest = nullptr;
+  std::unique_ptr<NearestPairs> nearest;
   Report report;
   std::atomic<double> earliest;  // best time so far, where report is first
   const Cancellation* cancellation = &never_cancelled;

@@ -114,7 +114,7 @@ void Worker::resolve(const Candidate& candidate, Rule rule) {
     return;
   }
   UndecidedPair pair = undecided_pair(search_->geometry, candidate);
-  if (const NearestPairs* nearest = search_->nearest) {
+  if (const NearestPairs* nearest = search_->nearest.get()) {
     pair.separation = limit_of(*nearest, search_->geometry, kind, a, b);
     if (pair.separation < 0) return;
   }

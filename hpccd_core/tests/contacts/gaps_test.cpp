@@ -9,6 +9,7 @@
 
 #include "elementary/exact/distance.h"
 #include "elementary/exact/intersection.h"
+#include "grid_scene.h"
 
 namespace hpccd {
 namespace {
@@ -89,6 +90,33 @@ TEST(Gaps, WhereAnEdgeMeetsAFaceThePointsLieOnBoth) {
   }
   EXPECT_GT(meeting, 500);
   EXPECT_GT(flat, 100);
+}
+
+struct Nothing {
+  std::shared_ptr<const Scene> scene = test::two_sheets(3);
+  Features features = features_of(*scene);
+  MeshPairs pairs{PairRules(*scene, Accuracy::exact, SeparationTable(*scene, 0)), scene->meshes().size()};
+  Tree tree;
+  NearestPairs nearest{pairs, features, MotionBounds(), tree};
+  Cancellation cancellation;
+
+  std::vector<Gap> gaps() const { return collect_gaps(nearest, {}, cancellation); }
+};
+
+TEST(Gaps, OneForEachPairOfMeshesWhetherSomethingWasFoundOrNot) {
+  const std::vector<Gap> gaps = Nothing().gaps();
+  ASSERT_EQ(gaps.size(), 3u);
+  for (std::size_t i = 0; i < gaps.size(); ++i) {
+    EXPECT_EQ((std::array{gaps[i].mesh_a, gaps[i].mesh_b}), Nothing().pairs[i]);
+    EXPECT_EQ(gaps[i].kind, GapKind::none);
+    EXPECT_EQ(gaps[i].distance, std::numeric_limits<double>::infinity());
+  }
+}
+
+TEST(Gaps, AreNotCollectedForOneWhoCancelled) {
+  Nothing nothing;
+  nothing.cancellation.request();
+  EXPECT_THROW(nothing.gaps(), Cancelled);
 }
 
 }  // namespace

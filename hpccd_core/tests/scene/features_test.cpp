@@ -54,6 +54,15 @@ TEST(Features, EachFeatureIsRepresentedOnceByATriangleThatHasIt) {
   EXPECT_EQ(features.lone_vertices.size(), lone * test::sheets);
 }
 
+TEST(Features, KnowTheMeshOfEachVertex) {
+  Scene scene;
+  const std::uint32_t triangle[] = {0, 1, 2};
+  scene.add_mesh("points", {}, 2, {});
+  scene.add_mesh("nothing", {}, 0, {});
+  scene.add_mesh("triangle and a point", triangle, 4, {});
+  EXPECT_EQ(features_of(scene).mesh_of_vertex, (std::vector<std::uint32_t>{0, 0, 2, 2, 2, 2}));
+}
+
 TEST(Features, AreTheSameWithAnyNumberOfThreads) {
   for (const std::uint32_t n : {2u, 3u, side, 80u}) {
     const auto sheets = test::two_sheets(n, lone);

@@ -37,6 +37,7 @@ TEST(SeparationTable, OfAChangedPairIsTheLastInBothOrders) {
   SeparationTable table(scene, 0.25);
   table.set(2, 1, 1);
   table.set(1, 2, 0.75);
+  table.settle();
   EXPECT_EQ(table.of(1, 2), 0.75);
   EXPECT_EQ(table.of(2, 1), 0.75);
   EXPECT_EQ(table.of(1, 1), 0.25);
@@ -49,10 +50,13 @@ TEST(SeparationTable, UniformIsWhereAllPairsAreTheSame) {
   EXPECT_TRUE(table.uniform());
   EXPECT_EQ(table.first(), 0.25);
   table.set(0, 1, 0.5);
+  table.settle();
   EXPECT_FALSE(table.uniform());
   table.set(0, 0, 0.5);
+  table.settle();
   EXPECT_FALSE(table.uniform());
   table.set(1, 1, 0.5);
+  table.settle();
   EXPECT_TRUE(table.uniform());
   EXPECT_EQ(table.first(), 0.5);
 }
@@ -65,9 +69,11 @@ TEST(SeparationTable, WithoutAnySeparationNothingGrows) {
   EXPECT_TRUE(table.largest().empty());
   EXPECT_EQ(table.most(), 0);
   table.set(1, 1, 0.5);
+  table.settle();
   EXPECT_TRUE(table.any());
   EXPECT_EQ(table.most(), 0.5);
   table.set(1, 1, 0);
+  table.settle();
   EXPECT_FALSE(table.any());
   EXPECT_TRUE(table.largest().empty());
 }
@@ -89,8 +95,10 @@ TEST(SeparationTable, LargestOfEachMeshCoversAllItsPairs) {
   expect_covered();
   EXPECT_EQ(table.largest(), (std::vector<double>{2, 0.5, 0.5, 2}));
   table.set(1, 2, 3);
+  table.settle();
   expect_covered();
   table.set(3, 0, 0.25);  // a pair that was the largest of both
+  table.settle();
   expect_covered();
   EXPECT_EQ(table.largest(), (std::vector<double>{0.5, 3, 3, 0.5}));
 }
@@ -103,6 +111,20 @@ TEST(SeparationTable, NoTwoStatesHaveTheSameVersion) {
     table.set(0, 1, d);
     EXPECT_TRUE(versions.insert(table.version()).second) << d;
   }
+}
+
+// What is said of all pairs costs a look at all of them: only once after many changes.
+TEST(SeparationTable, WhatIsSaidOfAllPairsFollowsWhenItSettles) {
+  SeparationTable table(scene_of(3), 0);
+  const std::uint64_t before = table.version();
+  table.set(0, 1, 3);
+  table.set(1, 1, 2);
+  EXPECT_EQ(table.of(1, 0), 3);
+  EXPECT_NE(table.version(), before);
+  EXPECT_FALSE(table.any());
+  table.settle();
+  EXPECT_TRUE(table.any());
+  EXPECT_EQ(table.largest(), (std::vector<double>{3, 3, 0}));
 }
 
 TEST(SeparationTable, OfASceneWithoutMeshes) {
