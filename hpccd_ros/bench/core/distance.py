@@ -6,6 +6,7 @@ intersections and smallest distances. With --peer, the same questions to ipctk i
   hpccd bench distance cloth-ball --separations 1e-3,1e-2
   hpccd bench distance data --peer ipctk     side by side with ipctk (pip install ipctk)
   hpccd bench distance run.mcap --queries proximity --steps 8
+  hpccd bench distance data --backend gpu --arrays device   positions lie on the GPU (cupy or torch), answers come back
 
 Choose d by the scene: in its own units, below its shortest edges. Where none is given, those beyond the median edge of
 a scene are left out there: nearly all neighbours are that near. "/ plain" is the time over that of plain detection of
@@ -24,6 +25,7 @@ import numpy as np
 from hpccd_ros.base.errors import UserError
 from hpccd_ros.bench import command
 from hpccd_ros.bench.core import measure, peer_ipctk_distance
+from hpccd_ros.bench.core.device_arrays import to_device
 from hpccd_ros.bench.core.distance_queries import ALLOWED, PLAIN, QUERIES, questions
 from hpccd_ros.bench.core.peer_ipctk_distance import DistancePeer
 from hpccd_ros.bench.core.variants import BACKENDS, usable
@@ -42,6 +44,8 @@ def configure(parser):
                              f"{SEPARATIONS} those up to its median edge)")
     parser.add_argument("--queries", default=",".join(QUERIES), metavar="NAME,...", help="default: %(default)s")
     parser.add_argument("--backend", default="cpu", choices=BACKENDS, help="default: %(default)s")
+    parser.add_argument("--arrays", choices=("host", "device"), default="host",
+                        help="where the positions lie (default: %(default)s)")
     command.tier_option(parser, default="exact")
     command.threads_option(parser)
     parser.add_argument("--peer", choices=("ipctk",), help="ask this peer the same of the same steps, in turn")
@@ -50,6 +54,8 @@ def configure(parser):
 def run(args) -> int:
     distances = _distances(SEPARATIONS if args.separations is None else args.separations)
     queries = command.listed("--queries", args.queries, QUERIES)
+    if args.arrays == "device" and (args.backend != "gpu" or args.peer):
+        raise UserError("--arrays device: needs --backend gpu, and no --peer: only a device reads them there")
     _, refused = usable("backend", [args.backend], accuracy=args.accuracy)
     if refused:
         raise UserError(f"--backend {args.backend}: {refused[args.backend]}")
@@ -63,7 +69,7 @@ def run(args) -> int:
         chosen = distances if args.separations is not None else _up_to_the_median_edge(source, distances, report)
         asked = questions(queries, chosen)
         of_peer = [q for q in asked if q.query in peer_ipctk_distance.QUERIES] if args.peer else []
-        change = Step.as_one_mesh if args.peer else None
+        change = Step.as_one_mesh if args.peer else to_device if args.arrays == "device" else None
         runners = [measure.CoreRunner(question.variant(options, change), question.ask) for question in asked]
         runners += [DistancePeer(question, threads) for question in of_peer]
         series = measure.measure(source, runners, args.repeat, args.steps)
@@ -104,6 +110,7 @@ def _row(source, question, series, args):
         "query": question.query,
         "distance": question.distance,
         "backend": args.backend,
+        "arrays": args.arrays,
         "accuracy": args.accuracy,
         "threads": threads,
         "triangles": step.triangles,

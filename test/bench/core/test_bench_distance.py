@@ -97,6 +97,13 @@ def test_a_peer_that_is_not_there_is_named(bench, capsys, monkeypatch):
     assert "pip install" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("more", [("--backend", "cpu"), ("--backend", "gpu", "--peer", "ipctk")])
+def test_arrays_on_a_device_need_one_that_reads_them(bench, capsys, more):
+    status, result, _ = bench("distance", *STRIP, "--arrays", "device", *more)
+    assert status == 2 and result is None
+    assert "--arrays device: needs --backend gpu" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("text", ["one", "0", "1e-3,-1", "inf", ""])
 def test_wrong_distances_are_explained(bench, capsys, text):
     status, result, _ = bench("distance", *STRIP, "--separations", text)
