@@ -6,7 +6,6 @@ from collections import deque
 from hpccd_ros.frames.drops import Input, Reason, Refusal
 from hpccd_ros.frames.types import MeshFrame, Topology
 
-
 # As many as the node's subscription to topologies holds (middleware/qos.py): no more can have overtaken a frame there.
 _SUPERSEDED = 10
 

@@ -4,23 +4,31 @@
 from __future__ import annotations
 
 import dataclasses
-import importlib
 
 import numpy as np
 
 from hpccd_ros.base.errors import UserError
 from hpccd_ros.bench.steps import Step
 
-LIBRARIES = ("cupy", "torch")
+
+def _with_torch(xyz):
+    import torch
+
+    return torch.from_numpy(np.ascontiguousarray(xyz)).cuda()
+
+
+def _with_cupy(xyz):
+    import cupy
+
+    return cupy.asarray(xyz)
 
 
 def to_device(step: Step) -> Step:
     """The same step with arrays of whichever library is installed."""
-    for name in LIBRARIES:
+    for move in (_with_torch, _with_cupy):
         try:
-            library = importlib.import_module(name)
+            moved = {name: move(getattr(step, name)) for name in ("vertices_t0", "vertices_t1")}
         except ImportError:
             continue
-        move = library.asarray if name == "cupy" else lambda xyz: library.from_numpy(np.ascontiguousarray(xyz)).cuda()
-        return dataclasses.replace(step, vertices_t0=move(step.vertices_t0), vertices_t1=move(step.vertices_t1))
-    raise UserError("--arrays device: neither cupy nor torch is installed; install the one for this machine's CUDA")
+        return dataclasses.replace(step, **moved)
+    raise UserError("--arrays device: neither torch nor cupy is installed; install the one for this machine's CUDA")

@@ -6,7 +6,7 @@ intersections and smallest distances. With --peer, the same questions to ipctk i
   hpccd bench distance cloth-ball --separations 1e-3,1e-2
   hpccd bench distance data --peer ipctk     side by side with ipctk (pip install ipctk)
   hpccd bench distance run.mcap --queries proximity --steps 8
-  hpccd bench distance data --backend gpu --arrays device   positions lie on the GPU (cupy or torch), answers come back
+  hpccd bench distance data --backend gpu --arrays device   positions lie on the GPU (torch or cupy), answers come back
 
 Choose d by the scene: in its own units, below its shortest edges. Where none is given, those beyond the median edge of
 a scene are left out there: nearly all neighbours are that near. "/ plain" is the time over that of plain detection of
