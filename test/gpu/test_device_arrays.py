@@ -1,6 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Positions that already live on the device."""
 
+import importlib.util
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 import scenes
@@ -20,6 +24,14 @@ def test_same_contacts_as_from_the_host(library, dtype):
     for _ in range(2):
         assert detector.detect(to_device(t0), to_device(t1)).hash == expected
     assert detector.stats["gpu_fallbacks"] == 0
+
+
+@pytest.mark.parametrize("library", ("cupy", "torch"))
+def test_libraries_of_arrays_can_be_imported_after_the_core(library):
+    if importlib.util.find_spec(library) is None:
+        pytest.skip(f"{library} is not installed")
+    done = subprocess.run([sys.executable, "-c", f"import hpccd_core, {library}"], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
 
 
 @pytest.mark.parametrize("library", ("cupy", "torch"))
