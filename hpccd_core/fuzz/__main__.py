@@ -69,9 +69,9 @@ def _parser() -> argparse.ArgumentParser:
         prog="python -m hpccd_core.fuzz",
         description="Compare contact, separation, proximity and intersections of single pairs, and smallest distances "
         "of the meshes of small scenes, with the exact oracle on degenerate queries. Exit status 1 where exact differs "
-        "(time or distance: by more than 1e-12), where conservative misses a pair, reports it late or, distances in "
-        "question, differs, or where an instruction set's answer differs; fast and balanced promise no more and are "
-        "only counted.",
+        "(time or distance: by more than 1e-12), where conservative misses a pair, reports it late or, where distances "
+        "count, differs in the same way, or where an instruction set's answer differs; fast and balanced promise no "
+        "more and are only counted.",
     )
     length = p.add_mutually_exclusive_group()
     length.add_argument("--seconds", type=float, default=60.0, help="how long (default 60)")

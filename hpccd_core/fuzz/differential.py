@@ -19,9 +19,8 @@ QUESTIONS = (CONTACT, SEPARATION, PROXIMITY, INTERSECTIONS, DISTANCES)
 
 # Promised by `exact`: within this of the true time; within this, times the size of the query, of the true distance.
 TOLERANCE = 1e-12
-# The oracle's distances are rounded to the nearest double, the core's may be off by another unit: not later than that.
-# Smallest distances are promised no better by `conservative` than by `exact`.
-ROUNDING = {CONTACT: 0.0, SEPARATION: 0.0, PROXIMITY: 1e-15, INTERSECTIONS: 0.0, DISTANCES: TOLERANCE}
+# Their answers are times, which `conservative` may report too early but not too late.
+OF_A_STEP = (CONTACT, SEPARATION)
 
 Tallies = dict[tuple[str, str, str], "Tally"]  # by question, accuracy and kind
 
@@ -48,11 +47,10 @@ class Disagreement:
             return self.uneven | self.missed | self.invented | (np.abs(self.late) > TOLERANCE)
         if accuracy != "conservative":
             return self.uneven
-        broken = self.uneven | self.missed | (self.late > ROUNDING[self.question])
+        broken = self.uneven | self.missed
+        broken |= self.late > 0 if self.question in OF_A_STEP else np.abs(self.late) > TOLERANCE
         if self.question != CONTACT:  # the same pairs as exact
             broken |= self.invented
-        if self.question not in (CONTACT, SEPARATION):  # times may be early, distances may not be too small
-            broken |= np.abs(self.late) > TOLERANCE
         return broken
 
 

@@ -76,7 +76,7 @@ __global__ void vertices_kernel(LaunchParams<T> params) {
   }
   const double separation =
       params.largest_separation ? params.largest_separation[params.mesh_of_vertex[i]] : params.separation;
-  const float reach = reach_of(separation, map.scale, largest);
+  const float reach = reach_on_device(separation, map.scale, largest);
   point.at[0].tag = point.at[1].tag = __float_as_uint(reach);
   if constexpr (snapshot) {
     const SlantedCoordinates slanted({a[0], a[1], a[2]}, map);

@@ -38,7 +38,7 @@ void expect_overlap(double size, double offset, double separation) {
   const double low[3] = {offset - size, offset - size, offset - size},
                high[3] = {offset + size, offset + size, offset + size};
   const CoordinateMap map = CoordinateMap::around(low, high);
-  const float reach = gpu::reach_of(separation, map.scale, std::abs(offset) + size);
+  const float reach = gpu::reach_on_device(separation, map.scale, std::abs(offset) + size);
   // Displacements along which the coordinates differ by as much as they can.
   const Vec3<double> along[] = {{1, 0, 0}, {0, 0, -1}, {1, 1, 0}, {1, 0, 1}, {0, -1, -1}, {0, 1, -1}, {1, -1, 0}};
   for (int i = 0; i < 20000; ++i) {
@@ -60,9 +60,9 @@ TEST(Reach, CoversTheSeparation) {
 }
 
 TEST(Reach, IsNothingWithoutASeparationAndNeverInfinite) {
-  EXPECT_EQ(gpu::reach_of(0, 1, 1e6), 0.0f);
-  EXPECT_LT(gpu::reach_of(1e300, 1e250, 1), 5.0f);
-  EXPECT_GE(gpu::reach_of(1e300, 1, 1), 4.5f);
+  EXPECT_EQ(gpu::reach_on_device(0, 1, 1e6), 0.0f);
+  EXPECT_LT(gpu::reach_on_device(1e300, 1e250, 1), 5.0f);
+  EXPECT_GE(gpu::reach_on_device(1e300, 1, 1), 4.5f);
 }
 
 }  // namespace

@@ -1,33 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "elementary/exact/intersection.h"
 
+#include "elementary/exact/boxes.h"
 #include "elementary/exact/integers.h"
+#include "elementary/exact/vector.h"
 
 namespace hpccd::exact {
 namespace {
-
-// Bits, for coordinates of b bits: a difference has b + 1, a component of a cross product 2 b + 3, a volume 3 b + 6, a
-// difference of volumes one more. All fit their types where b is at most Widths::coordinate_bits.
-template <class Z>
-using Vector = std::array<Z, 3>;
-
-template <class Z>
-Vector<Z> operator-(const Vector<Z>& a, const Vector<Z>& b) {
-  return {Z(a[0] - b[0]), Z(a[1] - b[1]), Z(a[2] - b[2])};
-}
-template <class Z>
-auto cross(const Vector<Z>& a, const Vector<Z>& b, int k) {
-  const int i = (k + 1) % 3, j = (k + 2) % 3;
-  return a[i] * b[j] - a[j] * b[i];
-}
-template <class Z>
-auto cross(const Vector<Z>& a, const Vector<Z>& b) {
-  return Vector<decltype(Z() * Z())>{cross(a, b, 0), cross(a, b, 1), cross(a, b, 2)};
-}
-template <class Z, class Square>
-auto dot(const Vector<Z>& a, const Vector<Square>& b) {
-  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
 
 // A coordinate that is not zero, or none: 3.
 template <class Z>
@@ -46,10 +25,11 @@ bool before(const Vec3<double>& a, const Vec3<double>& b) {
   return a.x != b.x ? a.x < b.x : a.y != b.y ? a.y < b.y : a.z < b.z;
 }
 
-double coordinate(const Vec3<double>& v, int k) { return k == 0 ? v.x : k == 1 ? v.y : v.z; }
-
 // The five points as integers. Each axis may have a scale of its own: no sign below notices, nor does the order on a
 // line.
+//
+// Bits, for coordinates of b bits: a difference has b + 1, a component of a cross product 2 b + 3, a volume 3 b + 6, a
+// difference of volumes one more. All fit their types where b is at most Widths::coordinate_bits.
 template <class Z>
 class Points {
  public:

@@ -35,9 +35,12 @@ struct Resting {
 
   // Calls visit for all that may be nearest, until it returns false; i numbers the points and segments above. The
   // squared distance is the ratio of the first two arguments.
-  //   visit.planes(f^2, n . n, alpha n . n, beta n . n): both inside, at p = alpha a + beta b + f n / n . n; nothing
-  //   else then visit.line(num, length^2, along length^2, i): the point's foot lies between the ends visit.points(num,
-  //   i, end): nearest to the start (0) or the end (1) of the segment
+  //   visit.planes(f^2, n . n, alpha n . n, beta n . n)
+  //     both inside, at p = alpha a + beta b + f n / n . n; nothing else then
+  //   visit.line(num, length^2, along length^2, i)
+  //     the point's foot lies between the ends
+  //   visit.points(num, i, end)
+  //     nearest to the start (0) or the end (1) of the segment
   template <class Visit>
   void for_nearest(Visit&& visit) const {
     const auto [p, a, b] = spanned();
