@@ -38,10 +38,10 @@ from hpccd_ros.frames.types import AssemblyRules, MeshFrame, MeshSettings, Scene
 class _MeshState:
     """What is known of one mesh."""
 
-    def __init__(self, settings: MeshSettings) -> None:
+    def __init__(self, settings: MeshSettings, max_pending: int) -> None:
         self.name = settings.name
         self.static = settings.static
-        self.topologies = TopologyHistory()
+        self.topologies = TopologyHistory(max_pending)
         self.early: deque[MeshFrame] = deque()  # their topology has not come
         self.positions = StaticPositions()
         self.stamps = StampOrder(settings.name)
@@ -60,7 +60,7 @@ class FrameAssembler:
             raise ValueError("meshes: at least one mesh must not be static, or nothing ever moves")
         if len({m.name for m in meshes}) != len(meshes):
             raise ValueError(f"meshes: names must differ, got {[m.name for m in meshes]}")
-        self._meshes = {m.name: _MeshState(m) for m in meshes}
+        self._meshes = {m.name: _MeshState(m, rules.max_pending) for m in meshes}
         self._max_early = rules.max_pending
         self.restart_after = rules.restart_after
         self._frame = CoordinateFrame(rules.frame_id)
@@ -165,6 +165,7 @@ class FrameAssembler:
         if refusal := self._frame.check_static(state.name, frame):
             return Outcome(refusals=[refusal])
         state.positions.keep(frame)
+        state.topologies.accept(frame)
         state.new_publisher = False
         return Outcome(static_taken=1)
 

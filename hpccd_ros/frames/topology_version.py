@@ -6,20 +6,20 @@ from collections import deque
 from hpccd_ros.frames.drops import Input, Reason, Refusal
 from hpccd_ros.frames.types import MeshFrame, Topology
 
-# As many as the node's subscription to topologies holds (middleware/qos.py): no more can have overtaken a frame there.
-_SUPERSEDED = 10
+# As many as the node's subscription to topologies holds (middleware/qos.py): so many can have overtaken a frame there.
+_IN_THE_SUBSCRIPTION = 10
 
 
 class TopologyHistory:
     """The topology of a mesh that is in force, and those before it whose frames may still come.
 
     Topologies and vertices are separate topics: a node that was busy for the length of a frame may read the next
-    topology before the last vertices of the one before.
+    topology before the last vertices of the one before. waiting: frames that may wait for a transform meanwhile.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, waiting: int) -> None:
         self.current: Topology | None = None
-        self._superseded: deque[Topology] = deque(maxlen=_SUPERSEDED)
+        self._superseded: deque[Topology] = deque(maxlen=_IN_THE_SUBSCRIPTION + waiting)
 
     def put(self, topology: Topology) -> None:
         """Put a topology in force; a lower version than the one before is a new beginning."""

@@ -179,12 +179,21 @@ def test_a_frame_skips_topologies_that_overtook_it():
 
 
 def test_how_many_superseded_topologies_are_kept_is_bounded():
-    scene = Scene("cloth").topologies("cloth")
-    for version in range(1, 12):
+    """By what the subscription holds (10) and the frames that may wait for a transform."""
+    scene = Scene("cloth", max_pending=3).topologies("cloth")
+    for version in range(1, 15):
         scene.set_topology("cloth", topology(version))
     assert scene.add("cloth", 1, version=0) == []
     assert len(scene.add("cloth", 2, version=1)) == 1
     assert scene.dropped() == {"old_topology": 1}
+
+
+def test_positions_of_a_static_mesh_end_the_topologies_before():
+    scene = Scene("cloth", MeshSettings("floor", static=True)).topologies("cloth")
+    for version in range(5):
+        scene.set_topology("floor", topology(version))
+        scene.add("floor", version, version=version)
+    assert not scene.assembler._meshes["floor"].topologies._superseded
 
 
 def test_a_lower_version_of_a_new_publisher_begins_anew():

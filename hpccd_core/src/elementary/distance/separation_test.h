@@ -110,7 +110,7 @@ HPCCD_HD Outcome<R> separation_test(const Motion<R>& m, R d, R start = R(0)) {
   R reach(1);                    // so far ahead trials have succeeded lately
   R guess = newton(from, aim);   // by the last look that told anything, on whichever side of the answer
   R slow(0);                     // trials in a row that were too late and not much earlier than the one before
-  R trial = lesser(greater(guess, R(0.5) * radius), R(1));
+  R trial = lesser(greater(guess, start + R(0.5) * radius), R(1));
   // A near miss by a relative 1e-15 takes 25 steps to pass.
   constexpr int most_steps = 60;
   for (int i = 0; i < most_steps && any(running); ++i) {
