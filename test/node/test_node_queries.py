@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 import pytest
+from cloth_and_net import FACES, MESHES, N, frame, positions
 from hpccd.msg import ContactArray, DistanceArray
 from hpccd.srv import Detect
 from node_process import NodeProcess, assert_same_contacts
@@ -13,18 +14,6 @@ from waving_sheet import scene_of, sheet_faces, sheet_positions
 import hpccd_core as hc
 from hpccd_ros import client
 from hpccd_ros.middleware import mesh_messages
-
-N = 8
-FACES = sheet_faces(N)
-MESHES = ("cloth", "net")
-
-
-def positions(k):
-    return sheet_positions(N, k), sheet_positions(N, k + 2, offset=0.02)
-
-
-def frame(k):
-    return np.concatenate(positions(k))
 
 
 def request(*, start=True, **fields):

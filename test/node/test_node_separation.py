@@ -6,11 +6,12 @@ import math
 
 import numpy as np
 import pytest
+from cloth_and_net import FACES, MESHES, N, frame, positions
 from hpccd.msg import DistanceArray
 from node_calls import set_parameter
 from node_process import assert_same_contacts
 from visualization_msgs.msg import MarkerArray
-from waving_sheet import scene_of, sheet_faces, sheet_positions
+from waving_sheet import scene_of
 
 import hpccd_core as hc
 from hpccd_ros import client
@@ -18,18 +19,6 @@ from hpccd_ros.bag.reader import Recording
 from hpccd_ros.middleware import qos
 from hpccd_ros.replay import recorded_setup
 from hpccd_ros.replay.recomputed import Replay
-
-N = 8
-FACES = sheet_faces(N)
-MESHES = ("cloth", "net")
-
-
-def positions(k):
-    return sheet_positions(N, k), sheet_positions(N, k + 2, offset=0.02)
-
-
-def frame(k):
-    return np.concatenate(positions(k))
 
 
 class Stream:
