@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Continuous collision detection of deforming triangle meshes, with contacts that can be proven.
 
-    scene = Scene(); scene.add_mesh("cloth", faces)
-    contacts = Detector(scene).detect(vertices_t0, vertices_t1)
+scene = Scene(); scene.add_mesh("cloth", faces)
+contacts = Detector(scene).detect(vertices_t0, vertices_t1)
 """
 
 from . import _find_core  # noqa: F401  (lets a source checkout use the installed extension modules)

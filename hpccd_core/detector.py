@@ -5,19 +5,19 @@ import threading
 from collections.abc import Iterable
 from typing import Any
 
-import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _core, arguments, device_arrays
 from .contacts import Contacts
-from .device_arrays import DeviceArray, DevicePositions
+from .device_arrays import DeviceArray
 from .devices import backends, gpu_status
+from .motion_queries import MotionQueries
 from .options import ACCURACIES, BACKENDS, METHODS, REPORTS, SIMD, Accuracy, Backend, Method, Output, Report, Simd
 from .scene import Scene
 from .snapshot_queries import SnapshotQueries, names_of_one_argument
 
 
-class Detector(SnapshotQueries):
+class Detector(MotionQueries, SnapshotQueries):
     """Finds every contact of a scene's straight-line motion from one set of positions to the next.
 
     accuracy: "fast", "balanced", "conservative" or "exact"; backend: "auto", "cpu", "hybrid" or "gpu"; threads: 0 for
@@ -118,36 +118,6 @@ class Detector(SnapshotQueries):
         self._last: NDArray[Any] | None = None
         self._last_on_device = device_arrays.LastStep()
 
-    def detect(self, vertices_t0: ArrayLike | DeviceArray, vertices_t1: ArrayLike | DeviceArray) -> Contacts:
-        """Contacts of the motion from vertices_t0 to vertices_t1, each (V, 3) float32 or float64.
-
-        C-contiguous arrays are read in place. Arrays in a GPU's memory (CUDA array interface or DLPack: CuPy, PyTorch,
-        Warp; C-contiguous, backend "gpu" or "auto") are used there without a copy. Raises TypeError for a wrong dtype
-        or a masked element, ValueError for a wrong shape or a coordinate that is NaN, infinite or beyond 1e150.
-        """
-        on_device = [device_arrays.is_on_device(v) for v in (vertices_t0, vertices_t1)]
-        if all(on_device):
-            return self._detect_on_device(vertices_t0, vertices_t1)
-        if any(on_device):
-            raise TypeError("vertices_t0, vertices_t1: one is a device array, the other is not; give both in one place")
-        first = arguments.vertices("vertices_t0", vertices_t0, self.n_vertices)
-        second = arguments.vertices("vertices_t1", vertices_t1, self.n_vertices)
-        if first.dtype != second.dtype:  # widening a float32 is exact
-            first, second = first.astype(np.float64), second.astype(np.float64)
-        return Contacts(**self._core.detect(first, second))
-
-    def _detect_on_device(self, vertices_t0: object, vertices_t1: object) -> Contacts:
-        first = device_arrays.positions("vertices_t0", vertices_t0, self.n_vertices)
-        second = device_arrays.positions("vertices_t1", vertices_t1, self.n_vertices)
-        return self._detect_places(first, second)
-
-    def _detect_places(self, first: DevicePositions, second: DevicePositions) -> Contacts:
-        if first.is_double != second.is_double:
-            raise TypeError("vertices_t0, vertices_t1: device arrays must both be float32 or both be float64")
-        return Contacts(
-            **self._core.detect_on_device(first.pointer, second.pointer, self.n_vertices, first.is_double)
-        )
-
     def step(self, vertices: ArrayLike | DeviceArray) -> Contacts:
         """Streaming: the end of the last step is the start of this one. The first call returns no contacts.
 
@@ -184,7 +154,7 @@ class Detector(SnapshotQueries):
             kind = "float64" if last.is_double else "float32"
             raise TypeError(f"vertices: the last step was {kind} on the device; give that again, or call reset() first")
         with names_of_one_argument():  # the device checks the first one too, as a step that goes nowhere
-            contacts = self._detect_places(place if last is None else last, place)
+            contacts = Contacts(**self._of_places("detect", place if last is None else last, place))
         self._last_on_device.keep(place, self.n_vertices)
         return Contacts.none() if last is None else contacts
 
@@ -242,4 +212,3 @@ class Detector(SnapshotQueries):
         """Counts of the last call: candidate pairs, those that each filter rejected, contacts, bytes used, ... Empty
         where it failed."""
         return self._core.stats()
-

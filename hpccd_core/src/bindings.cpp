@@ -210,6 +210,21 @@ PYBIND11_MODULE(_core, m) {
           },
           "pointer_t0"_a, "pointer_t1"_a, "n_vertices"_a, "is_double"_a)
       .def(
+          "collision_free_step",
+          [](Detector& d, const py::array& t0, const py::array& t1) {
+            const Positions a = positions(t0), b = positions(t1);
+            py::gil_scoped_release release;
+            return d.collision_free_step(a, b);
+          },
+          "vertices_t0"_a, "vertices_t1"_a)
+      .def(
+          "collision_free_step_on_device",
+          [](Detector& d, std::uintptr_t t0, std::uintptr_t t1, std::size_t n, bool is_double) {
+            py::gil_scoped_release release;
+            return d.collision_free_step(on_device(t0, n, is_double), on_device(t1, n, is_double));
+          },
+          "pointer_t0"_a, "pointer_t1"_a, "n_vertices"_a, "is_double"_a)
+      .def(
           "proximity",
           [](Detector& d, const py::array& vertices, double distance) {
             return to_dict(of_snapshot(d, positions(vertices),

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Checks what it is given, picks where a step is computed, and falls back to the CPU where that fails.
+#include <algorithm>
 #include <atomic>
 #include <mutex>
 #include <optional>
@@ -71,10 +72,10 @@ struct Detector::Impl {
     throw std::logic_error("the CPU has left a step to others");
   }
 
-  // A query of one snapshot: where it is offered and works, else on the CPU.
+  // A query of a motion, or of a snapshot given twice: where it is offered and works, else on the CPU.
   template <class Query>
-  auto snapshot(Positions vertices, Query&& query) {
-    check(vertices, vertices);
+  auto ask(Positions t0, Positions t1, Query&& query) {
+    check(t0, t1);
     const std::lock_guard lock(one_call);
     cancellation().heed();
     found.reset();
@@ -84,8 +85,8 @@ struct Detector::Impl {
     shared.profiler.begin();
     Counts counts;
     for (const Backend b : {backends.works(Backend::gpu) ? Backend::gpu : Backend::cpu, Backend::cpu}) {
-      const Positions there = b == Backend::gpu ? vertices : backends.on_host(vertices, 0);
-      if (auto answer = query(backends.at(b), there, counts)) {
+      if (b != Backend::gpu) t0 = backends.on_host(t0, 0), t1 = backends.on_host(t1, 1);
+      if (auto answer = query(backends.at(b), t0, t1, counts)) {
         shared.profiler.end();
         last_backend = b;
         found = counts;
@@ -93,6 +94,13 @@ struct Detector::Impl {
       }
     }
     throw std::logic_error("the CPU has left a query to others");
+  }
+
+  template <class Query>
+  auto snapshot(Positions vertices, Query&& query) {
+    return ask(vertices, vertices, [&](DetectionBackend& backend, Positions v, Positions, Counts& counts) {
+      return query(backend, v, counts);
+    });
   }
 
   void note(Backend picked, const Detection& d) {
@@ -125,6 +133,13 @@ Contacts Detector::detect(Positions t0, Positions t1) {
   Detection detection = d.compute(picked, t0, t1);
   d.note(picked, detection);
   return std::move(detection.contacts);
+}
+
+double Detector::collision_free_step(Positions t0, Positions t1) {
+  const double first = impl_->ask(t0, t1, [](DetectionBackend& backend, Positions a, Positions b, Counts&) {
+    return backend.earliest(a, b);
+  });
+  return std::min(first, 1.0);
 }
 
 namespace {

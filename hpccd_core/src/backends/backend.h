@@ -25,6 +25,10 @@ class DetectionBackend {
   // Throws InvalidArgument for bad coordinates, and Cancelled.
   virtual std::optional<Detection> detect(Positions t0, Positions t1) = 0;
 
+  // The earliest time, of contacts that are reported no later than they are where their tier can; infinity where there
+  // is none. Nothing as well where a backend leaves the query to the CPU.
+  virtual std::optional<double> earliest(Positions, Positions) { return std::nullopt; }
+
   // Of one snapshot. Nothing as well where a backend leaves the query to the CPU.
   virtual std::optional<Contacts> proximity(Positions, double) { return std::nullopt; }  // distances in place of times
   virtual std::optional<Intersections> intersections(Positions) { return std::nullopt; }

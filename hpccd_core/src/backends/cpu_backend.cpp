@@ -24,8 +24,28 @@ std::optional<Detection> CpuBackend::detect(Positions t0, Positions t1) {
 }
 
 void CpuBackend::update(Positions t0, Positions t1, Tests tests) {
-  const Options& o = shared_.options;
   Profiler& profiler = shared_.profiler;
+  see_motion(t0, t1, tests);
+  if (method_) {
+    swept_ = &shared_.tree.swept();
+    method_->update(*swept_, profiler);
+  } else {
+    shared_.tree.fit(profiler);
+  }
+}
+
+std::optional<double> CpuBackend::earliest(Positions t0, Positions t1) {
+  see_motion(t0, t1, Tests::all_here);
+  search_.report = Report::first;
+  search_.time_only = true;
+  shared_.tree.fit(shared_.profiler);
+  walk_tree();
+  shared_.cancellation.heed();
+  return search_.earliest;
+}
+
+void CpuBackend::see_motion(Positions t0, Positions t1, Tests tests) {
+  const Options& o = shared_.options;
   shared_.tree.bound(t0, t1, shared_.separations.largest());
   begin_query();
   search_.geometry.separations = shared_.separations_now();
@@ -41,12 +61,6 @@ void CpuBackend::update(Positions t0, Positions t1, Tests tests) {
                                            : batch_test(o.simd, as_balanced ? Accuracy::balanced : rule.accuracy);
     search_.fallback[i] = rule.separated ? decide_separation : decide_contact;
   }
-  if (method_) {
-    swept_ = &shared_.tree.swept();
-    method_->update(*swept_, profiler);
-  } else {
-    shared_.tree.fit(profiler);
-  }
 }
 
 // With new bounds, nothing is looked at yet.
@@ -58,6 +72,7 @@ void CpuBackend::begin_query() {
   search_.earliest = std::numeric_limits<double>::infinity();
   search_.leaf_pairs = nullptr, search_.leaf_pairs_in_snapshot = nullptr, search_.leaf_edge_faces = nullptr;
   search_.nearest = nullptr;
+  search_.time_only = false;
 }
 
 void CpuBackend::traverse() {

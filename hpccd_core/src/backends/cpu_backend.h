@@ -21,6 +21,7 @@ class CpuBackend final : public DetectionBackend {
   void count(std::map<std::string, std::uint64_t>& stats) const override;
 
   // By the default traversal, whatever the method.
+  std::optional<double> earliest(Positions t0, Positions t1) override;
   std::optional<Contacts> proximity(Positions vertices, double distance) override;
   std::optional<Intersections> intersections(Positions vertices) override;
   std::optional<std::vector<Gap>> distances(Positions vertices) override;
@@ -39,6 +40,7 @@ class CpuBackend final : public DetectionBackend {
 
  private:
   void begin_query();
+  void see_motion(Positions t0, Positions t1, Tests tests);
   void see_snapshot(Positions vertices);
   void walk_tree();
   void mark_traversal();

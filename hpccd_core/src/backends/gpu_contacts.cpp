@@ -105,8 +105,8 @@ void reduce(Contacts& c, Report report) {
     keep_until(c.ee, c.ee_toc, any_time, 1 - c.vf.size());
     c.first_toc = std::min(earliest(c.vf_toc), earliest(c.ee_toc));
   } else {
-    keep_until(c.vf, c.vf_toc, c.first_toc + simultaneous, c.vf.size());
-    keep_until(c.ee, c.ee_toc, c.first_toc + simultaneous, c.ee.size());
+    keep_until(c.vf, c.vf_toc, c.first_toc, c.vf.size());
+    keep_until(c.ee, c.ee_toc, c.first_toc, c.ee.size());
   }
   c.hash = 0;
   for (std::size_t i = 0; i < c.vf.size(); ++i) c.hash += hash_of_row(c.vf[i], c.vf_toc[i]);

@@ -28,7 +28,7 @@ void keep_earliest(std::vector<Worker>& workers, const Cancellation& cancellatio
   for (Worker& w : workers)
     for (auto* list : {&w.vertex_face, &w.edge_edge}) {
       cancellation.heed();
-      std::erase_if(*list, [&](const Contact& f) { return f.toc > first + simultaneous; });
+      std::erase_if(*list, [&](const Contact& f) { return f.toc > first; });
     }
 }
 

@@ -32,6 +32,7 @@ struct Search {
   std::unique_ptr<NearestPairs> nearest;
   Report report;
   std::atomic<double> earliest;  // best time so far, where report is first
+  bool time_only = false;        // the earliest time is all that is asked for, never a late one
   const Cancellation* cancellation = &never_cancelled;
 };
 

@@ -91,8 +91,10 @@ void Worker::test(const std::uint32_t* first, const std::uint32_t* second, std::
     search_->batch_test[rule.number()](geometry_of(first, second, n, kind), kind, first, second, n, r);
   }
   count = r.counts;
+  const bool rounds_down = search_->time_only && rule.accuracy == Accuracy::exact;
+  const Accuracy reported_as = rounds_down ? Accuracy::conservative : rule.accuracy;
   for (std::uint32_t i = 0; i < r.n_contacts; ++i) {
-    const double toc = reported_time(rule.accuracy, r.toc[i], r.delta[i]);
+    const double toc = reported_time(reported_as, r.toc[i], r.delta[i]);
     report(kind, {first[r.contact[i]], second[r.contact[i]], toc});
   }
   for (std::uint32_t i = 0; i < r.n_undecided; ++i)
@@ -147,12 +149,12 @@ void Worker::report(Kind kind, const Contact& contact) {
   if (search_->nearest) return offer(kind, contact);
   if (search_->report == Report::first) {
     double best = search_->earliest.load(std::memory_order_relaxed);
-    if (contact.toc > best + simultaneous) return;
+    if (contact.toc > best) return;
     while (contact.toc < best &&
            !search_->earliest.compare_exchange_weak(best, contact.toc, std::memory_order_relaxed)) {
     }
   }
-  found(kind).push_back(contact);
+  if (!search_->time_only) found(kind).push_back(contact);
 }
 
 }  // namespace hpccd

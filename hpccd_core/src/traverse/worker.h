@@ -27,9 +27,6 @@ class PairSink {
   virtual void flush() = 0;  // no more for now
 };
 
-// Contacts within this of the earliest count as simultaneous: the accuracy promised for times of contact.
-inline constexpr double simultaneous = 1e-12;
-
 // Aligned: counters of two threads on one cache line cost a fifth of a small scene's traversal.
 class alignas(128) Worker {
  public:

@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Queries of one motion, a part of Detector."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from . import _core, arguments, device_arrays
+from .contacts import Contacts
+from .device_arrays import DeviceArray, DevicePositions
+
+
+class MotionQueries:
+    """What touches on the way from one set of positions to the next, and when first."""
+
+    n_vertices: int
+    _core: _core.Detector
+
+    def detect(self, vertices_t0: ArrayLike | DeviceArray, vertices_t1: ArrayLike | DeviceArray) -> Contacts:
+        """Contacts of the motion from vertices_t0 to vertices_t1, each (V, 3) float32 or float64.
+
+        C-contiguous arrays are read in place. Arrays in a GPU's memory (CUDA array interface or DLPack: CuPy, PyTorch,
+        Warp; C-contiguous, backend "gpu" or "auto") are used there without a copy. Raises TypeError for a wrong dtype
+        or a masked element, ValueError for a wrong shape or a coordinate that is NaN, infinite or beyond 1e150.
+        """
+        return Contacts(**self._of_motion("detect", vertices_t0, vertices_t1))
+
+    def collision_free_step(self, vertices_t0: ArrayLike | DeviceArray, vertices_t1: ArrayLike | DeviceArray) -> float:
+        """The largest part of the motion, in [0, 1], that is certainly free of contacts; 1.0 where nothing touches.
+
+        vertices_t0, vertices_t1: as for detect(), with the same errors. Up to, not including, the time returned nothing
+        touches, or comes within the separation; 0.0 where something does so at the start. "exact" and "conservative":
+        never larger than the true earliest time, at most 1e-9 smaller. "balanced" and "fast": the earliest of the times
+        that detect() gives. Costs a fraction of detect(), whatever `report` is: what cannot touch before the best time
+        so far is not looked at.
+        """
+        return float(self._of_motion("collision_free_step", vertices_t0, vertices_t1))
+
+    def _of_motion(self, query: str, vertices_t0: object, vertices_t1: object) -> Any:
+        on_device = [device_arrays.is_on_device(v) for v in (vertices_t0, vertices_t1)]
+        if all(on_device):
+            first, second = (
+                device_arrays.positions(name, vertices, self.n_vertices)
+                for name, vertices in (("vertices_t0", vertices_t0), ("vertices_t1", vertices_t1))
+            )
+            return self._of_places(query, first, second)
+        if any(on_device):
+            raise TypeError("vertices_t0, vertices_t1: one is a device array, the other is not; give both in one place")
+        start = arguments.vertices("vertices_t0", vertices_t0, self.n_vertices)
+        end = arguments.vertices("vertices_t1", vertices_t1, self.n_vertices)
+        if start.dtype != end.dtype:  # widening a float32 is exact
+            start, end = start.astype(np.float64), end.astype(np.float64)
+        return getattr(self._core, query)(start, end)
+
+    def _of_places(self, query: str, first: DevicePositions, second: DevicePositions) -> Any:
+        if first.is_double != second.is_double:
+            raise TypeError("vertices_t0, vertices_t1: device arrays must both be float32 or both be float64")
+        ask = getattr(self._core, f"{query}_on_device")
+        return ask(first.pointer, second.pointer, self.n_vertices, first.is_double)
