@@ -136,9 +136,8 @@ Contacts Detector::detect(Positions t0, Positions t1) {
 }
 
 double Detector::collision_free_step(Positions t0, Positions t1) {
-  const double first = impl_->ask(t0, t1, [](DetectionBackend& backend, Positions a, Positions b, Counts&) {
-    return backend.earliest(a, b);
-  });
+  const double first = impl_->ask(
+      t0, t1, [](DetectionBackend& backend, Positions a, Positions b, Counts&) { return backend.earliest(a, b); });
   return std::min(first, 1.0);
 }
 
