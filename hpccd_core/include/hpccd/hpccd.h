@@ -159,9 +159,9 @@ class Detector {
   // Contacts of the straight-line motion from t0 to t1 (Kim et al. 2009, section 3.1).
   Contacts detect(Positions vertices_t0, Positions vertices_t1);
 
-  // The largest part of the motion that is certainly free of contacts, whatever Options::report says: at the tiers exact
-  // and conservative never beyond the earliest one and at most 1e-9 before it, else that of the earliest one found.
-  // 1 where nothing touches.
+  // The largest part of the motion that is certainly free of contacts, whatever Options::report says: at the tiers
+  // exact and conservative never beyond the earliest one and at most 1e-9 before it, else that of the earliest one
+  // found. 1 where nothing touches.
   double collision_free_step(Positions vertices_t0, Positions vertices_t1);
 
   // Vertex-face and edge-edge pairs within this distance of each other, Euclidean, between closed features.
