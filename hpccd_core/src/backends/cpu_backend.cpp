@@ -47,6 +47,7 @@ void CpuBackend::see_motion(Positions t0, Positions t1, Tests tests) {
                              shared_.tree.motion().map.scale};
   search_.leaf_pairs = leaf_pairs(o.simd);
   search_.leaf_pairs_until = leaf_pairs_until(o.simd);
+  search_.leaf_pairs_at_start = leaf_pairs_at_start(o.simd);
   const bool here = tests == Tests::all_here;
   search_.report = !here && o.report == Report::any ? Report::all : o.report;
   for (unsigned i = 0; i < n_rules; ++i) {

@@ -63,6 +63,7 @@ class CpuBackend final : public DetectionBackend {
   NearList near_;                        // for the earliest contacts of motions that begin alike
   std::uint64_t near_separations_ = 0;   // the version of the separations that it is for
   Travel travel_;                        // of the motion, as the list sees it
+  double edge_ = 0;                      // a typical length
   std::optional<MeshPairs> mesh_pairs_;  // from the first search for smallest distances on
   // Kept by a call that is cancelled: to give the memory of 10 million back to the system takes longer than to end it.
   Contacts contacts_;

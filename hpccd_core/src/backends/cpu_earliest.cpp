@@ -9,18 +9,6 @@
 #include "traverse/snapshot.h"
 
 namespace hpccd {
-namespace {
-
-// Times within this of the earliest may be reported as earlier (policy.h).
-constexpr double same_time = 2e-12;
-
-// Of a typical edge: pairs that vertices of so short ways can bring together are mostly not neighbours in a mesh, of
-// which there are more than of all others.
-constexpr double longest_way = 1.0 / 8;
-// A list is good for this as well, whatever the motion that it is made for: for the next steps of a slow scene.
-constexpr double least_radius = 1.0 / 64;
-
-}  // namespace
 
 std::optional<double> CpuBackend::earliest(Positions t0, Positions t1) {
   find_earliest(t0, t1, true);
@@ -37,6 +25,11 @@ void CpuBackend::find_earliest(Positions t0, Positions t1, bool time_only) {
       begin_earliest(t0, t1, time_only);
       if (known_from_near_pairs()) return mark_traversal();
     }
+  }
+  if (search_.prunes) {
+    const double scale = shared_.tree.motion().map.scale;
+    search_.two_ways = static_cast<float>(2 * travel_.way * scale);
+    search_.most_reach = static_cast<float>(edge_ / 4 * scale);
   }
   shared_.tree.fit(shared_.profiler);
   walk_tree();
@@ -56,7 +49,7 @@ bool CpuBackend::known_from_near_pairs() {
   test_near_pairs();
   if (search_.over()) return true;
   travel_ = near_.travel(shared_.tree.motion().vertices, shared_.pool);
-  return near_.complete_until(std::min(search_.earliest + same_time, 1.0), travel_);
+  return near_.radius().answers(search_.earliest, travel_);
 }
 
 void CpuBackend::test_near_pairs() {
@@ -71,14 +64,14 @@ void CpuBackend::test_near_pairs() {
   }
 }
 
-// Lists all pairs that the motion can bring together up to the best time so far, where these are few.
+// Lists all pairs that the motion can bring together up to the best time so far, where these are few and asked for
+// again.
 bool CpuBackend::list_near_pairs(Positions t0) {
-  const double way = travel_.way * std::min(search_.earliest + same_time, 1.0);
-  const double edge = typical_length(shared_.features, shared_.tree.motion().vertices);
-  if (!(way <= longest_way * edge)) return false;
-  // Room for motions that go farther, or begin elsewhere.
-  const double radius = std::max(2 * way, least_radius * edge);
-  const double distance = (shared_.separations.most() + 2 * radius) * (1 + 1e-9);
+  edge_ = typical_length(shared_.features, shared_.tree.motion().vertices);
+  if (!near_.radius().next_would_pay(travel_, edge_)) return false;
+  const std::optional<double> radius = radius_for(travel_, search_.earliest, edge_);
+  if (!radius) return false;
+  const double distance = listed_distance(*radius, shared_.separations.most());
   if (!std::isfinite(distance)) return false;
   see_snapshot(t0);
   search_.geometry.separations = {distance};
@@ -105,7 +98,7 @@ void CpuBackend::remember_earliest() {
          {std::pair(&w.vertex_face, Kind::vertex_face), std::pair(&w.edge_edge, Kind::edge_edge)})
       for (const Contact& c : *list)
         if (c.toc <= search_.earliest && n++ < enough) near.add({c.first, c.second, kind});
-  if (n > 0) near_.keep(std::move(near.groups), shared_.tree.motion().vertices, -1, shared_.pool);
+  near_.keep(std::move(near.groups), shared_.tree.motion().vertices, std::nullopt, shared_.pool);
 }
 
 }  // namespace hpccd

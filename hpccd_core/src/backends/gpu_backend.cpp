@@ -38,6 +38,7 @@ auto GpuBackend::attempt(Compute&& compute) -> std::optional<decltype(compute())
   } catch (const gpu::Error& e) {
     failures_.failed(e.what());
     has_tree_ = false;  // nothing on the device is relied on after a failure
+    near_.forget();
     shared_.profiler.mark("gpu_failed");
     return std::nullopt;
   }
@@ -48,6 +49,11 @@ std::optional<Detection> GpuBackend::detect(Positions t0, Positions t1) {
   return attempt([&] { return Detection{contacts(t0, t1), Backend::gpu}; });
 }
 
+std::optional<double> GpuBackend::earliest(Positions t0, Positions t1) {
+  if (!t0.on_device && !t1.on_device) require_static_meshes_rest(*shared_.scene, t0, t1);
+  return attempt([&] { return earliest_time(t0, t1); });
+}
+
 std::optional<Contacts> GpuBackend::proximity(Positions vertices, double distance) {
   return attempt([&] { return near_pairs(vertices, distance); });
 }
@@ -56,19 +62,23 @@ std::optional<Intersections> GpuBackend::intersections(Positions vertices) {
   return attempt([&] { return pierced_faces(vertices); });
 }
 
-Contacts GpuBackend::contacts(Positions t0, Positions t1) {
-  const Options& o = shared_.options;
+void GpuBackend::prepare_motion(Positions t0, Positions t1) {
   const SeparationTable& table = shared_.separations;
   prepare({table.any() ? gpu::Query::separations : gpu::Query::contacts, growth_of(table.most())},
           [&] { shared_.tree.bound(on_host(t0, 0), on_host(t1, 1), {}); });
-  if (!pipeline_->run(t0, t1, shared_.pool)) {
-    MotionBounds().update(on_host(t0, 0), on_host(t1, 1), shared_.pool);  // throws, and names the coordinate
+}
+
+// Throws where the device has found bad coordinates, and names them.
+void GpuBackend::require_good(bool good, Positions t0, Positions t1) {
+  if (!good) {
+    MotionBounds().update(on_host(t0, 0), on_host(t1, 1), shared_.pool);
     throw gpu::Error("the device found bad coordinates where the host finds none");
   }
   shared_.profiler.mark("gpu");
-  const Outputs outputs{o.points, o.normals, o.closest, AtTime::contact};
-  const bool places = o.points || o.normals || o.closest;
-  if (places || !pipeline_->undecided().empty()) t0 = on_host(t0, 0), t1 = on_host(t1, 1);
+}
+
+void GpuBackend::decide_motion(Positions t0, Positions t1) {
+  if (!pipeline_->undecided().empty()) t0 = on_host(t0, 0), t1 = on_host(t1, 1);
   const Separations separations = shared_.separations_now();
   decide([&](const Candidate& u) {
     const UndecidedPair pair = undecided_pair(shared_.features, separations, u, t0, t1);
@@ -76,9 +86,19 @@ Contacts GpuBackend::contacts(Positions t0, Positions t1) {
     return pair.separation > 0 ? decide_separation(Accuracy::exact, pair, counts)
                                : decide_contact(Accuracy::exact, pair, counts);
   });
+}
+
+Contacts GpuBackend::contacts(Positions t0, Positions t1) {
+  const Options& o = shared_.options;
+  prepare_motion(t0, t1);
+  require_good(pipeline_->run(t0, t1, shared_.pool), t0, t1);
+  const Outputs outputs{o.points, o.normals, o.closest, AtTime::contact};
+  const bool places = o.points || o.normals || o.closest;
+  if (places) t0 = on_host(t0, 0), t1 = on_host(t1, 1);
+  decide_motion(t0, t1);
   Contacts found = join(finish(), decided_, shared_.features, shared_.pool);
   reduce(found, o.report);
-  if (places) add_places(found, outputs, shared_.features, separations, t0, t1, shared_.pool);
+  if (places) add_places(found, outputs, shared_.features, shared_.separations_now(), t0, t1, shared_.pool);
   shared_.profiler.mark("contacts");
   return found;
 }
@@ -113,8 +133,12 @@ Intersections GpuBackend::pierced_faces(Positions vertices) {
   return found;
 }
 
-void GpuBackend::run_snapshot(gpu::Query query, Positions vertices, double distance) {
+void GpuBackend::prepare_snapshot(gpu::Query query, Positions vertices, double distance) {
   prepare({query, growth_of(distance)}, [&] { shared_.tree.bound(on_host(vertices, 0)); });
+}
+
+void GpuBackend::run_snapshot(gpu::Query query, Positions vertices, double distance) {
+  prepare_snapshot(query, vertices, distance);
   if (!pipeline_->run_snapshot(query, vertices, distance, shared_.pool)) {
     MotionBounds().update(*shared_.scene, on_host(vertices, 0), shared_.pool);  // throws, and names the coordinate
     throw gpu::Error("the device found bad coordinates where the host finds none");
@@ -136,6 +160,7 @@ void GpuBackend::prepare(Boxes boxes, Bound&& bound) {
   has_tree_ = false;  // should this fail
   bound();
   shared_.tree.build_anew();
+  edge_ = typical_length(shared_.features, shared_.tree.motion().vertices);
   pipeline_->set_tree(shared_.tree.tree());
   area_when_built_.clear();  // known when the device has refitted it
   has_tree_ = true;

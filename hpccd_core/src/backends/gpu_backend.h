@@ -10,6 +10,7 @@
 
 #include "backends/backend.h"
 #include "backends/gpu_contacts.h"
+#include "backends/near_list.h"
 #include "backends/resources.h"
 #include "gpu/device.h"
 #include "gpu/pipeline.h"
@@ -22,6 +23,7 @@ class GpuBackend final : public DetectionBackend {
 
   std::optional<Detection> detect(Positions t0, Positions t1) override;
   void count(std::map<std::string, std::uint64_t>& stats) const override;
+  std::optional<double> earliest(Positions t0, Positions t1) override;
   std::optional<Contacts> proximity(Positions vertices, double distance) override;
   std::optional<Intersections> intersections(Positions vertices) override;
   void add_stages(std::map<std::string, double>& stages) const override;
@@ -39,8 +41,16 @@ class GpuBackend final : public DetectionBackend {
   template <class Compute>
   auto attempt(Compute&& compute) -> std::optional<decltype(compute())>;
   Contacts contacts(Positions t0, Positions t1);
+  double earliest_time(Positions t0, Positions t1);
+  double run_for_earliest(Positions t0, Positions t1, gpu::Pipeline::Pairs pairs);
+  bool list_near_pairs(Positions t0, double time);
+  Travel travel_of_frame() const;
+  void prepare_motion(Positions t0, Positions t1);
+  void require_good(bool good, Positions t0, Positions t1);
+  void decide_motion(Positions t0, Positions t1);
   Contacts near_pairs(Positions vertices, double distance);
   Intersections pierced_faces(Positions vertices);
+  void prepare_snapshot(gpu::Query query, Positions vertices, double distance);
   void run_snapshot(gpu::Query query, Positions vertices, double distance);
   template <class Bound>
   void prepare(Boxes boxes, Bound&& bound);
@@ -57,6 +67,9 @@ class GpuBackend final : public DetectionBackend {
   std::map<Boxes, double> area_when_built_;
   Boxes last_boxes_;
   DecidedContacts decided_;
+  NearRadius near_;                     // of the pipeline's near list
+  std::uint64_t near_separations_ = 0;  // the version of the separations that it is for
+  double edge_ = 0;                     // a typical length, when the tree was built
   std::vector<unsigned char> downloaded_[2];
 };
 

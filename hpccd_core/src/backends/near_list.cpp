@@ -16,15 +16,26 @@ double largest(const Vec3<double>& x) { return std::max({std::fabs(x.x), std::fa
 
 }  // namespace
 
-void NearList::keep(std::vector<Group> groups, const std::vector<VertexMotion>& starts, double radius,
+std::optional<double> radius_for(const Travel& travel, double time, double edge) {
+  constexpr double longest_way = 1.0 / 8;  // of an edge
+  const double way = travel.way * std::min(time + same_time, 1.0);
+  if (!(way <= longest_way * edge)) return std::nullopt;
+  return std::max(2 * way, NearRadius::least_radius * edge);
+}
+
+double listed_distance(double radius, double largest_separation) {
+  return (largest_separation + 2 * radius) * (1 + 1e-9);
+}
+
+void NearList::keep(std::vector<Group> groups, const std::vector<VertexMotion>& starts, std::optional<double> radius,
                     ThreadPool& pool) {
-  radius_ = -1;
+  radius_.forget();
   groups_ = std::move(groups);
   resize(snapshot_, starts.size(), pool.cancellation());
   parallel_for(pool, starts.size(), grain, [&](std::size_t begin, std::size_t end, int) {
     for (std::size_t i = begin; i < end; ++i) snapshot_[i] = at(starts[i].t0);
   });
-  radius_ = radius;
+  if (radius) radius_.set(*radius);
 }
 
 Travel NearList::travel(const std::vector<VertexMotion>& vertices, ThreadPool& pool) const {

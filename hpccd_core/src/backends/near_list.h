@@ -4,7 +4,9 @@
 // snapshot than the list's radius, no other pair touches: features move no farther than their vertices.
 #pragma once
 
+#include <algorithm>
 #include <limits>
+#include <optional>
 #include <vector>
 
 #include "base/parallel.h"
@@ -23,6 +25,41 @@ struct Travel {
   double until(double time) const { return (away + time * way) * (1 + 1e-9); }
 };
 
+// Times within this of the earliest may be reported as earlier (policy.h).
+inline constexpr double same_time = 2e-12;
+
+// Up to when a list answers, and whether the next is worth its price.
+class NearRadius {
+ public:
+  // Of all pairs within listed_distance() of each other.
+  void set(double radius) { radius_ = radius, answers_ = 0; }
+  void forget() { radius_ = -1; }
+  // Whether no pair that is not listed touches up to this time, or is reported to.
+  bool answers(double time, const Travel& travel) {
+    const bool complete = travel.until(std::min(time + same_time, 1.0)) <= radius_;
+    answers_ += complete;
+    return complete;
+  }
+  // A list costs about what a search costs, so it pays where motions begin where one began before: where this one does,
+  // or the last list has answered more than the motion that it was made for. Edge: a typical length.
+  bool next_would_pay(const Travel& travel, double edge) const {
+    return answers_ > 1 || travel.away <= least_radius * edge / 2;
+  }
+
+  static constexpr double least_radius = 1.0 / 64;  // of an edge
+
+ private:
+  double radius_ = -1;
+  int answers_ = 0;
+};
+
+// The radius of a list that is to answer up to a time, with room for motions that go farther or begin elsewhere.
+// Nothing where the motion goes so far that it could bring neighbours of a mesh together, of which there are more than
+// of all other pairs. Edge: a typical length.
+std::optional<double> radius_for(const Travel& travel, double time, double edge);
+// How far apart the pairs of such a list may be at most.
+double listed_distance(double radius, double largest_separation);
+
 class NearList {
  public:
   // Pairs of one kind that are tested by one rule.
@@ -32,20 +69,20 @@ class NearList {
     std::vector<std::uint32_t> first, second;
   };
 
-  // Replaces the list. Radius below 0: of pairs that are worth a look, but not of all.
-  void keep(std::vector<Group> groups, const std::vector<VertexMotion>& starts, double radius, ThreadPool& pool);
+  // Replaces the list. Without a radius: of pairs that are worth a look, but not of all.
+  void keep(std::vector<Group> groups, const std::vector<VertexMotion>& starts, std::optional<double> radius,
+            ThreadPool& pool);
   const std::vector<Group>& groups() const { return groups_; }
   std::size_t size() const;
 
   Travel travel(const std::vector<VertexMotion>& vertices, ThreadPool& pool) const;
-  // Whether no pair that is not listed touches up to this time.
-  bool complete_until(double time, const Travel& travel) const { return travel.until(time) <= radius_; }
+  NearRadius& radius() { return radius_; }
   std::size_t bytes() const;
 
  private:
   std::vector<Group> groups_;
   std::vector<Vec3<double>> snapshot_;
-  double radius_ = -1;
+  NearRadius radius_;
 };
 
 // Sorts pairs into groups.

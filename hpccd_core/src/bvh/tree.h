@@ -33,6 +33,8 @@ struct alignas(64) Node {
   bool overlaps(const Node& other) const;  // as MotionBox::overlaps
   // The same up to a time below 1, from the start on.
   bool overlap_until(const Node& other, float time) const;
+  // At the start, no farther apart than `reach` along any axis.
+  bool near_at_start(const Node& other, float reach) const;
   // Of one snapshot: no farther apart than `reach` along any axis and any of the slanted directions (kdop.h).
   bool near_in_snapshot(const Node& other, float reach) const;
 };
@@ -57,6 +59,13 @@ inline bool Node::overlap_until(const Node& other, float time) const {
     return (gap_t0 > zero) & (gap_t0 + t * (gap_t1 - gap_t0) > by);
   };
   return (bits4(below(box, other.box) | below(other.box, box)) & 7) == 0;
+}
+
+inline bool Node::near_at_start(const Node& other, float reach) const {
+  const Floats4 by = {reach, reach, reach, reach};
+  const Mask4 apart =
+      (load4(box.t0.high) + by < load4(other.box.t0.low)) | (load4(other.box.t0.high) + by < load4(box.t0.low));
+  return (bits4(apart) & 7) == 0;
 }
 
 inline bool Node::near_in_snapshot(const Node& other, float reach) const {

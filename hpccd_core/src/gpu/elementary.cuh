@@ -54,7 +54,7 @@ __global__ __launch_bounds__(128) void roots_kernel(const __grid_constant__ Laun
       const Outcome<double> o = single ? single_root_test<kind, Proven>(m) : many_roots_test<kind, Proven>(m);
       contact = o.contact;
       undecided = !o.contact && !o.none;
-      toc = reported_time(accuracy_of(params, v), o.toc, o.delta);
+      toc = reported_time(reported_as(params, v), o.toc, o.delta);
     }
     append_found(params, kind, contact, pair, toc);
     append_undecided(params, kind, undecided, pair);

@@ -94,6 +94,7 @@ struct LaunchParams {
   u64 undecided_capacity;
   u64* to_host;  // keys that need exact arithmetic
   u64 to_host_capacity;
+  bool rounds_down;         // exact times are reported as conservative ones are
   u32 segment, n_segments;  // leaf pairs of this pass: n * segment / n_segments ...
   Counters* counters;
 };
@@ -164,6 +165,12 @@ __device__ inline Accuracy accuracy_of(const LaunchParams<T>& params, uint4 v) {
   // The second vertex belongs to the first edge or to the face, the third to the other edge or the face.
   return static_cast<Accuracy>(
       params.accuracy[params.mesh_of_vertex[v.x] * params.n_meshes + params.mesh_of_vertex[v.z]]);
+}
+
+template <class T>
+__device__ inline Accuracy reported_as(const LaunchParams<T>& params, uint4 v) {
+  const Accuracy accuracy = accuracy_of(params, v);
+  return params.rounds_down && accuracy == Accuracy::exact ? Accuracy::conservative : accuracy;
 }
 
 // Of two features by one vertex of each.

@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <bit>
+#include <limits>
+
 #include "gpu/device_contacts.cuh"
 #include "gpu/device_motion.cuh"
+#include "gpu/device_near_list.cuh"
 #include "gpu/device_positions.cuh"
 #include "gpu/device_scene.cuh"
 #include "gpu/device_tree.cuh"
@@ -52,6 +56,19 @@ class DevicePipeline : public Pipeline {
     begin();
     return run_frame(query, vertices, vertices, distance, pool);
   }
+  bool run_for_earliest(Positions t0, Positions t1, Pairs pairs, ThreadPool& pool) override {
+    begin();
+    scene_.update_separations();
+    goal_ = pairs == Pairs::all ? Goal::earliest : Goal::earliest_of_near;
+    return run_frame(scene_.query_now(), t0, t1, 0, pool);
+  }
+  EarliestTime earliest() const override;
+  bool list_near(Positions vertices, double distance, ThreadPool& pool) override {
+    begin();
+    goal_ = Goal::near_list;
+    return run_frame(Query::proximity, vertices, vertices, distance, pool);
+  }
+  void list_found(double until) override;
   const std::vector<Candidate>& undecided() const override { return undecided_; }
 
   FrameResult finish() override {
@@ -67,6 +84,7 @@ class DevicePipeline : public Pipeline {
   // Lists begin with room for so many times the scene's primitives that most scenes outgrow them once or never.
   std::size_t typical_size() const { return std::max<std::size_t>(features_.n_primitives(), 1024); }
   void begin() {
+    goal_ = Goal::results;
     check(cudaSetDevice(device_), "cudaSetDevice");
     // Work of a frame that failed may still be under way on these buffers.
     check(cudaStreamSynchronize(stream_), "cudaStreamSynchronize");
@@ -80,7 +98,13 @@ class DevicePipeline : public Pipeline {
   template <class T>
   void launch(LaunchParams<T>& params);
   template <class T>
+  void launch_tree(LaunchParams<T>& params);
+  template <class T>
   void launch_results(const LaunchParams<T>& params);
+  template <class T>
+  void launch_area(const LaunchParams<T>& params);
+  template <class T>
+  void list_found(double until);
   void copy_counters();
   bool grow_overflowed();
 
@@ -100,6 +124,13 @@ class DevicePipeline : public Pipeline {
   DeviceBuffer<Counters> counters_;
   PinnedBuffer<Counters> host_counters_;
 
+  // What a frame is for: contacts as the caller sees them, or less.
+  enum class Goal : unsigned char { results, earliest, earliest_of_near, near_list };
+  bool for_earliest() const { return goal_ == Goal::earliest || goal_ == Goal::earliest_of_near; }
+
+  DeviceNearList near_;
+  Positions given_t0_;  // of the last frame, while its caller waits
+  Goal goal_ = Goal::results;
   Query query_ = Query::contacts;
   u64 passes_ = 0, exact_last_time_ = 0;
   std::vector<Candidate> undecided_;
@@ -116,6 +147,7 @@ bool DevicePipeline::run_frame(Positions t0, Positions t1, double distance, Thre
   }
   LaunchParams<T> params{};
   scene_.fill(params);
+  params.rounds_down = for_earliest();
   if (of_snapshot(query_))
     params.separation = distance;
   else
@@ -126,9 +158,11 @@ bool DevicePipeline::run_frame(Positions t0, Positions t1, double distance, Thre
   const T* given[2];
   positions_.bring(t0, t1, given, pool, stream_);
   params.given_t0 = given[0], params.given_t1 = given[1];
+  given_t0_ = {given[0], t0.n, t0.is_double, true};
   params.counters = counters_.data();
   timer_.mark("upload", stream_);
   const Counters& c = *host_counters_.data();
+  if (goal_ == Goal::earliest_of_near) lists_.make_room(near_.most());
   for (bool again = true; again;) {
     ++passes_;
     launch(params);
@@ -143,7 +177,8 @@ bool DevicePipeline::run_frame(Positions t0, Positions t1, double distance, Thre
   undecided_.reserve(c.to_host);
   // Before the results: their kernels bring the counters to the host once more.
   const u64 n_to_host = exact_last_time_ = c.to_host;
-  launch_results(params);
+  if (goal_ == Goal::results) launch_results(params);
+  if (goal_ == Goal::near_list) near_.collect(params, c, std::numeric_limits<double>::infinity(), stream_);
   for (u64 i = 0; i < n_to_host; ++i) undecided_.push_back(scene_.keys().pair_of(lists_.to_host()[i]));
   return true;
 }
@@ -154,6 +189,25 @@ void DevicePipeline::launch(LaunchParams<T>& params) {
   contacts_.fill(params);
   motion_.launch(query_, params, multiprocessors_, stream_);
   timer_.mark("bounds", stream_);
+  if (for_earliest()) near_.measure(params, stream_);
+  if (goal_ == Goal::earliest_of_near) {
+    lists_.fill(params);
+    near_.take(params, stream_);
+    timer_.mark("near_list", stream_);
+    lists_.launch(query_, TestLists::From::near_list, params, multiprocessors_, stream_, timer_);
+  } else {
+    launch_tree(params);
+  }
+  if (for_earliest()) {
+    soonest_kernel<<<static_cast<unsigned>(multiprocessors_), 256, 0, stream_>>>(params);
+    check_launch("soonest_kernel");
+    timer_.mark("earliest", stream_);
+  }
+  if (goal_ == Goal::earliest) launch_area(params);
+}
+
+template <class T>
+void DevicePipeline::launch_tree(LaunchParams<T>& params) {
   const auto refit = grows_boxes(query_) ? refit_kernel<true, T> : refit_kernel<false, T>;
   refit<<<blocks_for(std::size_t{params.n_leaves} * 32, 128), 128, 0, stream_>>>(params);
   check_launch("refit_kernel");
@@ -162,22 +216,47 @@ void DevicePipeline::launch(LaunchParams<T>& params) {
   traverse<<<blocks_for(params.n_leaves, traverse_warps), 32 * traverse_warps, 0, stream_>>>(params);
   check_launch("traverse_kernel");
   timer_.mark("traverse", stream_);
-  lists_.launch(query_, params, multiprocessors_, stream_, timer_);
+  lists_.launch(query_, TestLists::From::leaves, params, multiprocessors_, stream_, timer_);
 }
 
 template <class T>
 void DevicePipeline::launch_results(const LaunchParams<T>& params) {
   contacts_.launch(query_, params, *host_counters_.data(), multiprocessors_, stream_, timer_);
+  launch_area(params);
+  copy_counters();
+}
+
+template <class T>
+void DevicePipeline::launch_area(const LaunchParams<T>& params) {
   area_kernel<<<std::min(blocks_for(params.n_nodes, 256), static_cast<unsigned>(multiprocessors_)), 256, 0, stream_>>>(
       params);
   check_launch("area_kernel");
-  copy_counters();
   timer_.mark("area", stream_);
 }
 
-void DevicePipeline::copy_counters() {
-  check(cudaMemcpyAsync(host_counters_.data(), counters_.data(), sizeof(Counters), cudaMemcpyDeviceToHost, stream_),
-        "cudaMemcpyAsync");
+EarliestTime DevicePipeline::earliest() const {
+  const Counters& c = *host_counters_.data();
+  constexpr double none = std::numeric_limits<double>::infinity();
+  const auto number = [](u64 bits) { return std::bit_cast<double>(bits); };
+  return {c.soonest ? number(~c.soonest) : none, near_.has_snapshot() ? number(c.away) : none, number(c.way)};
+}
+
+void DevicePipeline::list_found(double until) {
+  if (given_t0_.is_double)
+    list_found<double>(until);
+  else
+    list_found<float>(until);
+}
+
+template <class T>
+void DevicePipeline::list_found(double until) {
+  LaunchParams<T> params{};
+  scene_.fill(params);
+  contacts_.fill(params);
+  lists_.fill(params);
+  params.given_t0 = static_cast<const T*>(given_t0_.data);
+  params.counters = counters_.data();
+  near_.collect(params, *host_counters_.data(), until, stream_);
 }
 
 // Makes room where a list was too short. True where the frame must run again.
@@ -215,7 +294,8 @@ std::map<std::string, std::uint64_t> DevicePipeline::stats() const {
   s["gpu_passes"] = passes_;
   s["gpu_segments"] = lists_.n_segments();
   s["gpu_bytes"] = scene_.bytes() + tree_.bytes() + positions_.bytes() + motion_.bytes() + leaf_pairs_.bytes() +
-                   lists_.bytes() + contacts_.bytes();
+                   lists_.bytes() + contacts_.bytes() + near_.bytes();
+  if (for_earliest()) s["near_pairs"] = near_.size();
   return s;
 }
 

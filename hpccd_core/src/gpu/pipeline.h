@@ -29,6 +29,12 @@ struct FrameResult {
   std::uint64_t hash = 0;
 };
 
+// The earliest time of a frame, undecided pairs aside, and how far its vertices are from the near list's snapshot and
+// how far they go, along an axis.
+struct EarliestTime {
+  double time, away, way;
+};
+
 class Pipeline {
  public:
   // Throws Error where the device has not enough memory or the scene has too many features for 31-bit numbers. The
@@ -48,6 +54,16 @@ class Pipeline {
   // After run(): the pairs left for the exact fallback on the CPU. Sorting goes on meanwhile.
   virtual const std::vector<Candidate>& undecided() const = 0;
   virtual FrameResult finish() = 0;
+
+  // The same for the earliest time alone, which is never late at the tiers that promise it: of all pairs, or of those
+  // in the near list. Then undecided() and earliest().
+  enum class Pairs : bool { all, near_list };
+  virtual bool run_for_earliest(Positions t0, Positions t1, Pairs pairs, ThreadPool& pool) = 0;
+  virtual EarliestTime earliest() const = 0;
+  // Lists all pairs that come within a distance in a snapshot. Returns false as run().
+  virtual bool list_near(Positions vertices, double distance, ThreadPool& pool) = 0;
+  // Lists what the last run_for_earliest() found up to a time, and what it left undecided, to begin with.
+  virtual void list_found(double until) = 0;
 
   virtual double relative_area() const = 0;  // of the refitted tree, as in tree.h
   virtual std::map<std::string, std::uint64_t> stats() const = 0;

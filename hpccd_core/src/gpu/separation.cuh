@@ -50,7 +50,7 @@ __global__ __launch_bounds__(128) void separation_kernel(const __grid_constant__
           separation_test<kind>(load_motion<kind>(params.vertices, v), separation_of(params, v.x, v.z));
       contact = o.contact;
       undecided = !o.contact && !o.none;
-      toc = reported_time(accuracy_of(params, v), o.toc, o.delta);
+      toc = reported_time(reported_as(params, v), o.toc, o.delta);
       n_apart += o.none;
     }
     append_found(params, kind, contact, pair, toc);

@@ -30,6 +30,8 @@ struct Stages {
 // From pairs of leaves to survivors of the first filter, and the tests that know a distance. Defined for float and
 // double.
 template <class T>
+void launch_separation_candidates(const LaunchParams<T>& params, const Stages& stages);
+template <class T>
 void launch_separations(const LaunchParams<T>& params, const Stages& stages);
 template <class T>
 void launch_snapshot(Query query, const LaunchParams<T>& params, const Stages& stages);

@@ -35,34 +35,36 @@ void launch_root_tests(const LaunchParams<T>& params, const Stages& stages) {
 
 template <class T>
 void launch_contacts(const LaunchParams<T>& params, const Stages& stages) {
-  stages.persistent(candidates_kernel<Query::contacts, T>, 32 * candidate_warps, params, "candidates_kernel");
-  stages.mark("candidates");
   stages.persistent(projection_kernel<Kind::vertex_face, T>, 128, params, "projection_kernel");
   stages.persistent(projection_kernel<Kind::edge_edge, T>, 128, params, "projection_kernel");
   stages.mark("projection");
 }
 
+template <class T>
+void launch_contact_candidates(const LaunchParams<T>& params, const Stages& stages) {
+  stages.persistent(candidates_kernel<Query::contacts, T>, 32 * candidate_warps, params, "candidates_kernel");
+  stages.mark("candidates");
+}
+
 }  // namespace
 
 template <class T>
-void TestLists::launch(Query query, LaunchParams<T>& params, int multiprocessors, cudaStream_t stream,
+void TestLists::launch(Query query, From from, LaunchParams<T>& params, int multiprocessors, cudaStream_t stream,
                        StageTimer& timer) {
-  const auto list = [](const DeviceBuffer<uint2>& b) { return PairList{b.data(), b.size()}; };
-  for (int k = 0; k < 2; ++k) {
-    params.survivors[k] = list(survivors_[k]), params.separated[k] = list(separated_[k]);
-    params.single[k] = list(single_[k]), params.many[k] = list(many_[k]);
-  }
-  params.undecided = undecided_.data(), params.undecided_capacity = undecided_.size();
-  params.to_host = to_host_.data(), params.to_host_capacity = to_host_.size();
-  params.n_segments = n_segments_;
+  fill(params);
+  params.n_segments = from == From::leaves ? n_segments_ : 1;
   const Stages stages{multiprocessors, stream, timer};
-  for (params.segment = 0; params.segment < n_segments_; ++params.segment) {
-    if (query == Query::contacts)
+  for (params.segment = 0; params.segment < params.n_segments; ++params.segment) {
+    const bool leaves = from == From::leaves;
+    if (query == Query::contacts) {
+      if (leaves) launch_contact_candidates(params, stages);
       launch_contacts(params, stages);
-    else if (query == Query::separations)
+    } else if (query == Query::separations) {
+      if (leaves) launch_separation_candidates(params, stages);
       launch_separations(params, stages);
-    else
+    } else {
       launch_snapshot(query, params, stages);
+    }
     if (!of_snapshot(query)) launch_root_tests(params, stages);
     end_segment_kernel<<<1, 1, 0, stream>>>(params);
     check_launch("end_segment_kernel");
@@ -74,7 +76,7 @@ void TestLists::launch(Query query, LaunchParams<T>& params, int multiprocessors
   timer.mark("last_resort", stream);  // the fallbacks' first name, under which kept results have it
 }
 
-template void TestLists::launch(Query, LaunchParams<float>&, int, cudaStream_t, StageTimer&);
-template void TestLists::launch(Query, LaunchParams<double>&, int, cudaStream_t, StageTimer&);
+template void TestLists::launch(Query, From, LaunchParams<float>&, int, cudaStream_t, StageTimer&);
+template void TestLists::launch(Query, From, LaunchParams<double>&, int, cudaStream_t, StageTimer&);
 
 }  // namespace hpccd::gpu

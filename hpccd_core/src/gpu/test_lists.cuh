@@ -49,11 +49,29 @@ class TestLists {
     visit(undecided_), visit(to_host_);
   }
 
-  // All stages on pairs of leaves that the frame lists; the frame's counters were cleared, its contacts have a place.
-  // Defined for float and double.
+  // Where the pairs come from that pass the first filter.
+  enum class From : bool { leaves, near_list };
+  // All stages on pairs of leaves that the frame lists, or on the survivors that are there already; the frame's
+  // counters were cleared, its contacts have a place. Defined for float and double.
   template <class T>
-  void launch(Query query, LaunchParams<T>& params, int multiprocessors, cudaStream_t stream, StageTimer& timer);
+  void launch(Query query, From from, LaunchParams<T>& params, int multiprocessors, cudaStream_t stream,
+              StageTimer& timer);
+  // Where they are to be found.
+  template <class T>
+  void fill(LaunchParams<T>& params) const {
+    const auto list = [](const DeviceBuffer<uint2>& b) { return PairList{b.data(), b.size()}; };
+    for (int k = 0; k < 2; ++k) {
+      params.survivors[k] = list(survivors_[k]), params.separated[k] = list(separated_[k]);
+      params.single[k] = list(single_[k]), params.many[k] = list(many_[k]);
+    }
+    params.undecided = undecided_.data(), params.undecided_capacity = undecided_.size();
+    params.to_host = to_host_.data(), params.to_host_capacity = to_host_.size();
+  }
 
+  // For so many survivors of one kind.
+  void make_room(std::size_t n) {
+    for (auto& list : survivors_) list.reserve(n);
+  }
   // Makes room where a list was too short. True where the pairs must be tested again.
   bool grow(const Counters& c) {
     bool again = false;

@@ -153,7 +153,7 @@ class Slot {
     graph_.record(stream_, [&] {
       begin_submission_kernel<<<1, 32, 0, stream_>>>(params.counters, submission_.data());
       check_launch("begin_submission_kernel");
-      lists_.launch(scene.query_now(), params, multiprocessors, stream_, no_timer);
+      lists_.launch(scene.query_now(), TestLists::From::leaves, params, multiprocessors, stream_, no_timer);
       data_ready_kernel<<<1, 1, 0, stream_>>>(params.counters, host_counters_.data(), state_.data(),
                                               submission_.data());
       check_launch("data_ready_kernel");

@@ -12,13 +12,16 @@ namespace hpccd {
 struct BoxesUntil {
   static constexpr bool shrink = true;
   const Search& search;
-  float until = search.until();  // when it was looked at last
+  PartOfMotion part = search.part();  // when it was looked at last
 
   bool changed() {
-    const float now = search.until();
-    return std::exchange(until, now) != now;
+    const PartOfMotion now = search.part();
+    return std::exchange(part, now).until != now.until;
   }
-  bool overlap(const Node& a, const Node& b) const { return until < 1 ? a.overlap_until(b, until) : a.overlaps(b); }
+  bool overlap(const Node& a, const Node& b) const {
+    if (part.until >= 1) return a.overlaps(b);
+    return part.reach >= 0 ? a.near_at_start(b, part.reach) : a.overlap_until(b, part.until);
+  }
   bool open(NodePair) const { return !search.over(); }
   void sort(std::vector<NodePair>&, std::size_t) const {}
 };

@@ -85,6 +85,35 @@ struct Until {
   }
 };
 
+// At the start, where boxes may also be as far apart as `reach` (Node::near_at_start).
+struct AtStart {
+  float reach;
+  struct Group {
+    Floats16 rows[n_bounds / 2];
+  };
+  HPCCD_HD Group load(const BoxGroup& group) const {
+    Group grown;
+    for (std::uint32_t axis = 0; axis < 3; ++axis) {
+      grown.rows[low(0, axis)] = load16(group.rows[low(0, axis)]) + all16(-reach);
+      grown.rows[high(0, axis)] = load16(group.rows[high(0, axis)]) + all16(reach);
+    }
+    return grown;
+  }
+  template <class Bounds>
+  HPCCD_HD Bounds bounds(Bounds b) const {
+    return b;
+  }
+  template <class Bounds>
+  HPCCD_HD unsigned overlapping(const Group& g, Bounds b) const {
+    Mask16 apart;
+    for (std::uint32_t axis = 0; axis < 3; ++axis) {
+      apart = apart | less(g.rows[high(0, axis)], all16(b[low(0, axis)]));
+      apart = apart | less(all16(b[high(0, axis)]), g.rows[low(0, axis)]);
+    }
+    return ~apart.bits() & 0xFFFF;
+  }
+};
+
 // In one snapshot, where boxes may also be as far apart as `reach` (Node::near_in_snapshot): those of the group grow by
 // it once, when they are loaded.
 struct InSnapshot {

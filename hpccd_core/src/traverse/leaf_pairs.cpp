@@ -7,17 +7,20 @@ namespace hpccd {
 namespace scalar {
 void leaf_pairs(const Tree&, const LeafRange&, const LeafRange&, CandidateBuffer&, CandidateBuffer&);
 void leaf_pairs_until(const Tree&, const LeafRange&, const LeafRange&, float, CandidateBuffer&, CandidateBuffer&);
+void leaf_pairs_at_start(const Tree&, const LeafRange&, const LeafRange&, float, CandidateBuffer&, CandidateBuffer&);
 void leaf_pairs_in_snapshot(const Tree&, const LeafRange&, const LeafRange&, float, CandidateBuffer&, CandidateBuffer&);
 }  // namespace scalar
 #if defined(HPCCD_X86)
 namespace avx2 {
 void leaf_pairs(const Tree&, const LeafRange&, const LeafRange&, CandidateBuffer&, CandidateBuffer&);
 void leaf_pairs_until(const Tree&, const LeafRange&, const LeafRange&, float, CandidateBuffer&, CandidateBuffer&);
+void leaf_pairs_at_start(const Tree&, const LeafRange&, const LeafRange&, float, CandidateBuffer&, CandidateBuffer&);
 void leaf_pairs_in_snapshot(const Tree&, const LeafRange&, const LeafRange&, float, CandidateBuffer&, CandidateBuffer&);
 }  // namespace avx2
 namespace avx512 {
 void leaf_pairs(const Tree&, const LeafRange&, const LeafRange&, CandidateBuffer&, CandidateBuffer&);
 void leaf_pairs_until(const Tree&, const LeafRange&, const LeafRange&, float, CandidateBuffer&, CandidateBuffer&);
+void leaf_pairs_at_start(const Tree&, const LeafRange&, const LeafRange&, float, CandidateBuffer&, CandidateBuffer&);
 void leaf_pairs_in_snapshot(const Tree&, const LeafRange&, const LeafRange&, float, CandidateBuffer&, CandidateBuffer&);
 }  // namespace avx512
 #endif
@@ -36,6 +39,14 @@ LeafPairsUntil leaf_pairs_until([[maybe_unused]] Simd simd) {
   if (simd == Simd::avx2) return avx2::leaf_pairs_until;
 #endif
   return scalar::leaf_pairs_until;
+}
+
+LeafPairsInSnapshot leaf_pairs_at_start([[maybe_unused]] Simd simd) {
+#if defined(HPCCD_X86)
+  if (simd == Simd::avx512) return avx512::leaf_pairs_at_start;
+  if (simd == Simd::avx2) return avx2::leaf_pairs_at_start;
+#endif
+  return scalar::leaf_pairs_at_start;
 }
 
 LeafPairsInSnapshot leaf_pairs_in_snapshot([[maybe_unused]] Simd simd) {

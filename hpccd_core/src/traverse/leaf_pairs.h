@@ -33,5 +33,7 @@ using LeafPairsInSnapshot = void (*)(const Tree& tree, const LeafRange& a, const
                                      CandidateBuffer& edge_edge, CandidateBuffer& vertex_face);
 
 LeafPairsInSnapshot leaf_pairs_in_snapshot(Simd simd);
+// The same of the start of a motion.
+LeafPairsInSnapshot leaf_pairs_at_start(Simd simd);
 
 }  // namespace hpccd

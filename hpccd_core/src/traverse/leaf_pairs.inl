@@ -94,6 +94,11 @@ void leaf_pairs_until(const Tree& tree, const LeafRange& a, const LeafRange& b, 
   pairs_of_leaves(Until{until}, tree, a, b, edge_edge, vertex_face);
 }
 
+void leaf_pairs_at_start(const Tree& tree, const LeafRange& a, const LeafRange& b, float reach,
+                         CandidateBuffer& edge_edge, CandidateBuffer& vertex_face) {
+  pairs_of_leaves(AtStart{reach}, tree, a, b, edge_edge, vertex_face);
+}
+
 void leaf_pairs_in_snapshot(const Tree& tree, const LeafRange& a, const LeafRange& b, float reach,
                             CandidateBuffer& edge_edge, CandidateBuffer& vertex_face) {
   pairs_of_leaves(InSnapshot{reach}, tree, a, b, edge_edge, vertex_face);

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <atomic>
+#include <limits>
 #include <memory>
 
 #include "base/cancellation.h"
@@ -17,11 +18,19 @@
 
 namespace hpccd {
 
+// How much of a motion matters.
+struct PartOfMotion {
+  float until;  // 1 or more: the whole
+  float reach;  // up to then features stay within boxes at the start that are so far apart; below 0: too far
+};
+
 struct Search {
   Geometry geometry;
   // Which pairs of features of two leaves; null: none.
   LeafPairs leaf_pairs = nullptr;
-  LeafPairsUntil leaf_pairs_until = nullptr;  // of a part of the motion, where the earliest contacts are looked for
+  // Of a part of the motion, where the earliest contacts are looked for; also by boxes at the start alone.
+  LeafPairsUntil leaf_pairs_until = nullptr;
+  LeafPairsInSnapshot leaf_pairs_at_start = nullptr;
   LeafPairsInSnapshot leaf_pairs_in_snapshot = nullptr;  // of one snapshot, within `reach` or what `nearest` leaves
   LeafEdgeFaces leaf_edge_faces = nullptr;
   float reach = 0;
@@ -35,10 +44,17 @@ struct Search {
   std::atomic<double> earliest;  // best time so far, where report is first
   bool time_only = false;        // the earliest time is all that is asked for, never a late one
   bool prunes = false;           // what cannot touch up to the best time is left out
+  // In coordinates of the boxes: twice the longest way of a vertex along an axis, and how much of it boxes at the start
+  // may grow by without reaching their neighbours' neighbours.
+  float two_ways = std::numeric_limits<float>::infinity(), most_reach = 0;
   // Pairs that touch later do not matter; 1 or more: all do. Times that are reported as equal may be apart by 2e-12.
   float until() const {
     const double best = earliest.load(std::memory_order_relaxed);
     return prunes && best < 1 ? static_cast<float>(best + 2e-12) * (1 + 2e-7f) : 2;
+  }
+  PartOfMotion part() const {
+    const float time = until(), reach = time * two_ways * (1 + 1e-6f) + 1e-6f;
+    return {time, reach <= most_reach ? reach : -1};
   }
   // Nothing that is found could matter any more.
   bool over() const { return time_only && earliest.load(std::memory_order_relaxed) <= 0; }

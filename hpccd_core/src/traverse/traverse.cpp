@@ -133,10 +133,12 @@ void test_leaves(const Tree& tree, const PairRules& rules, LeafPair pair, Worker
   const Search& search = worker.search();
   const Rule rule = rules.rule(node_a, node_b);
   if (search.leaf_pairs) {
-    const float until = search.until();
+    const PartOfMotion part = search.part();
     worker.test_candidates(rule, [&](CandidateBuffer& edge_edge, CandidateBuffer& vertex_face) {
-      if (until < 1)
-        search.leaf_pairs_until(tree, a, b, until, edge_edge, vertex_face);
+      if (part.until < 1 && part.reach >= 0)
+        search.leaf_pairs_at_start(tree, a, b, part.reach, edge_edge, vertex_face);
+      else if (part.until < 1)
+        search.leaf_pairs_until(tree, a, b, part.until, edge_edge, vertex_face);
       else
         search.leaf_pairs(tree, a, b, edge_edge, vertex_face);
     });

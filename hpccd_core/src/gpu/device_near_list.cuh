@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: Apache-2.0
+// backends/near_list.h on the device: pairs that are near each other in one snapshot, and how far from it and how far
+// at all a motion takes its vertices.
+#pragma once
+
+#include <algorithm>
+
+#include "gpu/launch_params.cuh"
+#include "gpu/pair_lists.cuh"
+#include "gpu/stream.h"
+
+namespace hpccd::gpu {
+
+// Bits of numbers of at least zero are in the order of the numbers.
+__device__ inline u64 bits_of(double x) { return static_cast<u64>(__double_as_longlong(x)); }
+
+template <class T>
+__global__ void take_list_kernel(LaunchParams<T> params, u32 kind, const uint2* pairs, u64 n) {
+  const u64 stride = static_cast<u64>(gridDim.x) * blockDim.x, first = static_cast<u64>(blockIdx.x) * blockDim.x;
+  for (u64 i = first + threadIdx.x; i < n && i < params.survivors[kind].capacity; i += stride)
+    params.survivors[kind].pairs[i] = pairs[i];
+  if (first + threadIdx.x == 0) params.counters->survivors[kind] = params.counters->candidates[kind] = n;
+}
+
+// snapshot: of the list; null where there is none.
+template <class T>
+__global__ void travel_kernel(LaunchParams<T> params, const double* snapshot) {
+  double way = 0, away = 0;
+  const u64 n = 3 * static_cast<u64>(params.n_vertices), stride = static_cast<u64>(gridDim.x) * blockDim.x;
+  for (u64 i = static_cast<u64>(blockIdx.x) * blockDim.x + threadIdx.x; i < n; i += stride) {
+    const double start = params.given_t0[i], end = params.given_t1[i];
+    way = fmax(way, fabs(end - start));
+    if (snapshot) away = fmax(away, fabs(start - snapshot[i]));
+  }
+  for (int d = 16; d > 0; d /= 2) {
+    way = fmax(way, __shfl_xor_sync(all_lanes, way, d));
+    away = fmax(away, __shfl_xor_sync(all_lanes, away, d));
+  }
+  if (lane_number() != 0) return;
+  atomicMax(&params.counters->way, bits_of(way));
+  atomicMax(&params.counters->away, bits_of(away));
+}
+
+template <class T>
+__global__ void snapshot_kernel(LaunchParams<T> params, double* snapshot) {
+  const u64 i = static_cast<u64>(blockIdx.x) * blockDim.x + threadIdx.x;
+  if (i < 3 * static_cast<u64>(params.n_vertices)) snapshot[i] = params.given_t0[i];
+}
+
+// The earliest time that was found.
+template <class T>
+__global__ void soonest_kernel(LaunchParams<T> params) {
+  const u64 n = length(params.counters->found_all, params.found_capacity),
+            stride = static_cast<u64>(gridDim.x) * blockDim.x;
+  u64 soonest = 0;
+  for (u64 i = static_cast<u64>(blockIdx.x) * blockDim.x + threadIdx.x; i - lane_number() < n; i += stride)
+    if (i < n) soonest = max(soonest, ~bits_of(params.found_tocs[i]));
+  for (int d = 16; d > 0; d /= 2) soonest = max(soonest, __shfl_xor_sync(all_lanes, soonest, d));
+  if (lane_number() == 0 && soonest) atomicMax(&params.counters->soonest, soonest);
+}
+
+// Of what a frame found, all up to this time (or distance), and of what it left to the host all.
+template <class T>
+__global__ void collect_kernel(LaunchParams<T> params, double until, u64 n_found, u64 n_to_host, PairList vf,
+                               PairList ee) {
+  const u64 n = n_found + n_to_host, stride = static_cast<u64>(gridDim.x) * blockDim.x;
+  for (u64 i = static_cast<u64>(blockIdx.x) * blockDim.x + threadIdx.x; i - lane_number() < n; i += stride) {
+    const bool valid = i < n && (i >= n_found || params.found_tocs[i] <= until);
+    const u64 key = !valid ? 0 : i < n_found ? params.found_keys[i] : params.to_host[i - n_found];
+    const Candidate pair = params.keys.pair_of(key);
+    const bool edges = pair.kind == Kind::edge_edge;
+    append_pair(vf, &params.counters->listed[0], valid && !edges, {pair.first, pair.second});
+    append_pair(ee, &params.counters->listed[1], valid && edges, {pair.first, pair.second});
+  }
+}
+
+class DeviceNearList {
+ public:
+  u64 size() const { return n_[0] + n_[1]; }
+  u64 most() const { return std::max(n_[0], n_[1]); }
+  bool has_snapshot() const { return has_snapshot_; }
+
+  // In place of what a traversal finds.
+  template <class T>
+  void take(const LaunchParams<T>& params, cudaStream_t stream) const {
+    for (u32 k = 0; k < 2; ++k) {
+      take_list_kernel<<<std::min(blocks_for(n_[k], 256), 1024u), 256, 0, stream>>>(params, k, pairs_[k].data(), n_[k]);
+      check_launch("take_list_kernel");
+    }
+  }
+  template <class T>
+  void measure(const LaunchParams<T>& params, cudaStream_t stream) const {
+    const unsigned blocks = std::min(blocks_for(std::size_t{params.n_vertices} * 3, 256), 512u);
+    travel_kernel<<<blocks, 256, 0, stream>>>(params, has_snapshot_ ? snapshot_.data() : nullptr);
+    check_launch("travel_kernel");
+  }
+
+  // From the last frame, whose counters are `c`, and whose start becomes the snapshot. Waits for the stream.
+  template <class T>
+  void collect(const LaunchParams<T>& params, const Counters& c, double until, cudaStream_t stream) {
+    n_[0] = n_[1] = 0, has_snapshot_ = false;
+    const u64 n = c.found_all + c.to_host;
+    for (auto& pairs : pairs_) pairs.reserve(static_cast<std::size_t>(n + n / 4 + 1));
+    const PairList lists[2] = {{pairs_[0].data(), pairs_[0].size()}, {pairs_[1].data(), pairs_[1].size()}};
+    check(cudaMemsetAsync(&params.counters->listed, 0, sizeof params.counters->listed, stream), "cudaMemsetAsync");
+    collect_kernel<<<std::min(blocks_for(n, 256), 1024u), 256, 0, stream>>>(params, until, c.found_all, c.to_host,
+                                                                            lists[0], lists[1]);
+    check_launch("collect_kernel");
+    u64 listed[2];
+    check(cudaMemcpyAsync(listed, &params.counters->listed, sizeof listed, cudaMemcpyDeviceToHost, stream),
+          "cudaMemcpyAsync");
+    const std::size_t n_coordinates = std::size_t{params.n_vertices} * 3;
+    snapshot_.reserve(std::max<std::size_t>(n_coordinates, 1));
+    snapshot_kernel<<<blocks_for(n_coordinates, 256), 256, 0, stream>>>(params, snapshot_.data());
+    check_launch("snapshot_kernel");
+    check(cudaStreamSynchronize(stream), "cudaStreamSynchronize");
+    for (int k = 0; k < 2; ++k) n_[k] = listed[k];
+    has_snapshot_ = true;
+  }
+
+  std::size_t bytes() const { return pairs_[0].bytes() + pairs_[1].bytes() + snapshot_.bytes(); }
+
+ private:
+  DeviceBuffer<uint2> pairs_[2];  // by kind
+  DeviceBuffer<double> snapshot_;
+  u64 n_[2] = {0, 0};
+  bool has_snapshot_ = false;
+};
+
+}  // namespace hpccd::gpu

@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How far a motion may go, asked of the GPU: bit for bit what the CPU answers, whatever was asked before."""
+
+import numpy as np
+import pytest
+import scenes
+
+import hpccd_core as hc
+
+TIERS = ("exact", "conservative", "balanced")
+
+
+def moved(rng):
+    return scenes.join([scenes.crumpled(rng, 16), scenes.lattice(rng, 6)])
+
+
+def on_device(array):
+    return pytest.importorskip("torch").from_numpy(np.ascontiguousarray(array)).cuda()
+
+
+@pytest.mark.parametrize("separation", (0.0, 1e-3))
+@pytest.mark.parametrize("accuracy", TIERS)
+@pytest.mark.parametrize("seed", range(4))
+def test_as_the_cpu_in_a_stream_of_trials(seed, accuracy, separation):
+    rng = np.random.default_rng(seed)
+    scene, t0, t1 = moved(rng)
+    here = hc.Detector(scene, backend="cpu", accuracy=accuracy, minimum_separation=separation)
+    there = hc.Detector(scene, backend="gpu", accuracy=accuracy, minimum_separation=separation)
+    start = t0
+    for trial in range(24):
+        size = 10.0 ** rng.uniform(-6, 0)
+        end = start + size * (t1 - t0) * rng.uniform(0.5, 1.5, size=(len(t0), 1))
+        expected = here.collision_free_step(start, end)
+        assert there.collision_free_step(start, end) == expected, (trial, size)
+        assert expected <= min(1.0, there.detect(start, end).first_toc)
+        if trial % 4 == 3:  # elsewhere
+            start = start + min(expected, 0.9) * size * (t1 - t0)
+    assert there.stats["gpu_fallbacks"] == 0
+
+
+def test_arrays_on_the_device_and_changed_separations():
+    scene, t0, t1 = moved(np.random.default_rng(9))
+    here, there = (hc.Detector(scene, backend=b) for b in ("cpu", "gpu"))
+    given = [on_device(t) for t in (t0, t1)]
+    for separation in (0.0, 1e-4, 1e-2, 0.0, 0.0):
+        for detector in (here, there):
+            detector.set_separation(0, 1, separation)
+        for _ in range(3):
+            assert there.collision_free_step(*given) == here.collision_free_step(t0, t1)
+    assert there.backend == "gpu" and there.stats["gpu_fallbacks"] == 0
+    assert there.stats["near_pairs"] >= 0
+
+
+def test_nothing_moves_and_nothing_touches():
+    scene, t0, _ = moved(np.random.default_rng(9))
+    there = hc.Detector(scene, backend="gpu")
+    for scale in (1.0, 0.5, 1.0):
+        assert there.collision_free_step(scale * t0, scale * t0) in (0.0, 1.0)
+    with pytest.raises(ValueError, match="vertices_t1"):
+        there.collision_free_step(t0, np.full_like(t0, np.nan))
+    assert there.collision_free_step(t0, t0) == hc.Detector(scene, backend="cpu").collision_free_step(t0, t0)
