@@ -51,7 +51,7 @@ def main(arguments: list[str] | None = None) -> int:
     console.print(_table(tallies))
     console.print(
         "error: largest error of a time, or of a distance in sizes of its query; true: hits, or scenes in which meshes "
-        "touch; late: largest beyond the true one; uneven:\nan instruction set differs, or queries of the same step do; "
+        "touch; late: largest beyond the true one; uneven:\nan instruction set, or a query of the same step, differs; "
         "broken: promises of exact and conservative, and what is uneven."
     )
     source_text = f"replay of {a.replay}" if a.replay else f"seed {a.seed}, batches of {a.batch}"
