@@ -16,14 +16,15 @@ ACCURACIES = pytest.mark.parametrize("accuracy", ["fast", "balanced", "conservat
 
 
 def apart_at_first(generate, seed):
-    """Meshes that are free at the start or nearly so: flat sheets and bodies, one above the other."""
+    """Other scenes than those free at first are flattened and lifted, which leaves fewer contacts at the start."""
     meshes = generate(np.random.default_rng([70, seed]))
-    mesh = np.repeat(np.arange(len(meshes.faces)), meshes.n_vertices)
-    meshes.vertices_t0[:, 2] = 0.125 * meshes.vertices_t0[:, 2] + 4 * mesh
+    if generate is not random_scenes.free_at_first:
+        mesh = np.repeat(np.arange(len(meshes.faces)), meshes.n_vertices)
+        meshes.vertices_t0[:, 2] = 0.125 * meshes.vertices_t0[:, 2] + 4 * mesh
     return meshes
 
 
-SCENES = [*(generate for generate in random_scenes.ALL if generate is not random_scenes.huge_and_tiny)]
+SCENES = [random_scenes.free_at_first, *random_scenes.ALL[:-1]]
 
 
 def detector(scene, report, **options):
@@ -80,7 +81,7 @@ def test_any_method(method, accuracy):
 def test_separations(accuracy):
     """One for all, one for pairs of meshes, none for some; a large one reaches before a small one's contacts."""
     for seed in range(4):
-        meshes = apart_at_first(random_scenes.many_meshes, seed)
+        meshes = apart_at_first((random_scenes.many_meshes, random_scenes.free_at_first)[seed % 2], seed)
         scene = meshes.scene()
         scene.set_separation("mesh0", "mesh1", 0.0)
         scene.set_separation("mesh2", "mesh2", 0.0)
@@ -96,7 +97,7 @@ def test_accuracies_of_pairs_of_meshes():
     tiers = ("fast", "exact", "conservative", "balanced")
     for seed in range(6):
         rng = np.random.default_rng([71, seed])
-        meshes = apart_at_first(random_scenes.many_meshes, seed)
+        meshes = apart_at_first((random_scenes.many_meshes, random_scenes.free_at_first)[seed % 2], seed)
         scene = meshes.scene()
         for a in range(5):
             for b in range(a, 5):
@@ -123,7 +124,7 @@ def test_accuracies_of_pairs_of_meshes():
 )  # fmt: skip
 def test_what_the_scene_rules_out(rules, accuracy):
     for seed in range(2):
-        meshes = apart_at_first(random_scenes.many_meshes, seed)
+        meshes = apart_at_first((random_scenes.many_meshes, random_scenes.free_at_first)[seed], seed)
         mesh = np.repeat(np.arange(5), meshes.n_vertices)
         for still in rules.get("static", ()):
             meshes.vertices_t1[mesh == still] = meshes.vertices_t0[mesh == still]
@@ -162,7 +163,7 @@ def test_many_contacts_at_one_time(accuracy):
     flat = np.stack([*np.meshgrid(np.arange(20.0), np.arange(20.0)), np.zeros((20, 20))], 2).reshape(-1, 3)
     meshes = random_scenes.combine(
         (faces, flat + [0.25, 0.5, 1], flat + [0.25, 0.5, -1]), (faces, flat, flat),
-        (np.array([[0, 1, 2]]), [[0, 0, 9.0], [9, 0, 9], [0, 9, 9]], [[0, 0, -9.0], [9, 0, -9], [0, 9, -9]]),
+        (np.array([[0, 1, 2]]), [[0, 0, 9.0], [9, 0, 9], [0, 9, 9]], [[0, 0, -1.0], [9, 0, -1], [0, 9, -1]]),
     )  # fmt: skip
     answers = {assert_first(meshes.scene(), meshes, accuracy=accuracy, threads=t) for t in (1, 2, 3, 7)}
     ((n, n_first, _, step),) = answers
