@@ -12,10 +12,11 @@ import numpy as np
 import hpccd_core as hc
 
 from . import questions
-from .questions import CONTACT, DISTANCES, INTERSECTIONS, PROXIMITY, SEPARATION, Answers, Batch
+from .questions import CONTACT, DISTANCES, INTERSECTIONS, PROXIMITY, SEPARATION, STEP, Answers, Batch
+from .steps import EARLY, contradict
 
 SIMD = ("scalar", "avx2", "avx512")
-QUESTIONS = (CONTACT, SEPARATION, PROXIMITY, INTERSECTIONS, DISTANCES)
+QUESTIONS = (CONTACT, SEPARATION, PROXIMITY, INTERSECTIONS, DISTANCES, STEP)
 
 # Promised by `exact`: within this of the true time; within this, times the size of the query, of the true distance.
 TOLERANCE = 1e-12
@@ -35,7 +36,7 @@ class Disagreement:
     missed: np.ndarray
     invented: np.ndarray
     late: np.ndarray
-    uneven: np.ndarray  # instruction sets that should agree to the bit do not
+    uneven: np.ndarray  # instruction sets, or queries of the same step, that should agree to the bit do not
     question: str = CONTACT
 
     def broken_promises(self, accuracy: str) -> np.ndarray:
@@ -43,6 +44,8 @@ class Disagreement:
 
         fast and balanced promise nothing but the same answer from all instruction sets.
         """
+        if self.question == STEP and accuracy in ("exact", "conservative"):
+            return self.uneven | self.invented | ~((self.late <= 0) & (self.late >= -EARLY))
         if accuracy == "exact":
             return self.uneven | self.missed | self.invented | (np.abs(self.late) > TOLERANCE)
         if accuracy != "conservative":
@@ -106,9 +109,10 @@ def compare(batch: Batch, accuracy: str, simd: Sequence[str], truth: Answers) ->
     true_hit, true_value = truth
     (hit, value), *others = (questions.answers(batch, accuracy, s) for s in simd)
     # A distance of meshes is told whether or not they touch; it is infinite where they have no pair of features.
-    always = batch.question == DISTANCES
+    # A step is told where nothing touches too.
+    always = batch.question in (DISTANCES, STEP)
     told = np.ones_like(hit) if always else hit
-    largest = 1.0 if batch.question in (CONTACT, SEPARATION) else np.inf
+    largest = 1.0 if batch.question in (CONTACT, SEPARATION, STEP) else np.inf
     if not ((value[told] >= 0) & (value[told] <= largest)).all():
         raise AssertionError(f"{accuracy} {batch.question} {batch.kind}: value out of range: {value[told][:5]}")
     uneven = np.zeros(hit.shape, bool)
@@ -119,7 +123,11 @@ def compare(batch: Batch, accuracy: str, simd: Sequence[str], truth: Answers) ->
     late[different] = value[different] - true_value[different]
     late = (late.T / questions.size_of(batch)).T
     missed, invented = true_hit & ~hit, hit & ~true_hit
-    if always:  # of several answers for each scene the worst
+    if batch.question == STEP:
+        missed &= true_value < 1  # a contact just at the end
+        for s in simd:
+            uneven |= contradict(batch.kind, batch.queries, batch.distances, accuracy, s)
+    if batch.question == DISTANCES:  # of several answers for each scene the worst
         worst = np.abs(late).argmax(axis=1)[:, None]
         late = np.take_along_axis(late, worst, axis=1)[:, 0]
         missed, invented, uneven = (answers.any(axis=1) for answers in (missed, invented, uneven))

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the core and the oracle are asked: contact, separation, proximity, intersections of single pairs; distances of
-the meshes of small scenes."""
+the meshes of small scenes, and how far these may go."""
 
 from __future__ import annotations
 
@@ -18,9 +18,11 @@ from .gaps import GAP_POINTS, TOPOLOGIES, core_gaps, true_gaps
 from .generators import EDGE_EDGE, GENERATORS, VERTEX_FACE
 from .near_generators import NEAR_GENERATORS
 from .snapshots import EDGE_FACE, EDGE_FACE_POINTS, SNAPSHOTS
+from .steps import STEP_MOTIONS, core_steps, true_steps
 
 CONTACT, SEPARATION, PROXIMITY, INTERSECTIONS = "contact", "separation", "proximity", "intersections"
-DISTANCES = "distances"
+DISTANCES, STEP = "distances", "step"
+OF_SCENES = (DISTANCES, STEP)
 PAIRS_OF_A_SCENE = 10  # so many fewer scenes than single pairs are in a batch: each asks about dozens of pairs
 
 # hit (Q,) bool; value (Q,) float64: time, distance, or 0. Of distances (Q,N): several answers for each scene.
@@ -29,7 +31,7 @@ Answers = tuple[np.ndarray, np.ndarray]
 
 @dataclass(frozen=True)
 class Batch:
-    """Queries of one kind from one generator. distances: (Q,); zero where the question has none."""
+    """Queries of one kind from one generator, (Q,N,3). distances: (Q,); zero where the question has none."""
 
     question: str
     kind: str
@@ -42,8 +44,8 @@ class Batch:
 
 
 def kinds_of(question: str) -> tuple[str, ...]:
-    if question == DISTANCES:
-        return tuple(TOPOLOGIES)
+    if question in OF_SCENES:
+        return tuple(TOPOLOGIES if question == DISTANCES else STEP_MOTIONS)
     return (EDGE_FACE,) if question == INTERSECTIONS else (VERTEX_FACE, EDGE_EDGE)
 
 
@@ -51,11 +53,12 @@ def generators_of(question: str, kind: str) -> dict[str, Callable]:
     return {
         CONTACT: GENERATORS, SEPARATION: NEAR_GENERATORS, PROXIMITY: SNAPSHOTS,
         INTERSECTIONS: {EDGE_FACE: EDGE_FACE_POINTS}, DISTANCES: dict.fromkeys(TOPOLOGIES, GAP_POINTS),
+        STEP: STEP_MOTIONS,
     }[question][kind]  # fmt: skip
 
 
 def generated(question: str, kind: str, generator: str, rng: np.random.Generator, size: int) -> Batch:
-    size = max(1, size // PAIRS_OF_A_SCENE) if question == DISTANCES else size
+    size = max(1, size // PAIRS_OF_A_SCENE) if question in OF_SCENES else size
     made = generators_of(question, kind)[generator](rng, size)
     if question == CONTACT:
         made = disturb(rng, made, kind)
@@ -69,6 +72,8 @@ def truth(batch: Batch, threads: int = 0) -> Answers:
     """What the oracle says, on so many threads."""
     if batch.question == DISTANCES:
         return true_gaps(batch.kind, batch.queries)
+    if batch.question == STEP:
+        return true_steps(batch.kind, batch.queries, batch.distances, threads)
     vertex_face = batch.kind == VERTEX_FACE
     if batch.question == CONTACT:
         return (reference.vertex_face if vertex_face else reference.edge_edge)(batch.queries, threads)
@@ -88,6 +93,8 @@ def answers(batch: Batch, accuracy: str, simd: str) -> Answers:
         return _times(batch, accuracy, simd)
     if batch.question == DISTANCES:
         return core_gaps(batch.kind, batch.queries, accuracy, simd)
+    if batch.question == STEP:
+        return core_steps(batch.kind, batch.queries, batch.distances, accuracy, simd)
     return _of_snapshots(batch, accuracy, simd)
 
 

@@ -19,7 +19,16 @@ from .elementary import (
     within_edge_edge,
     within_vertex_face,
 )
-from .scenes import Contacts, Gap, Proximity, brute_force, intersections, proximity, smallest_distances
+from .scenes import (
+    Contacts,
+    Gap,
+    Proximity,
+    brute_force,
+    earliest_contacts,
+    intersections,
+    proximity,
+    smallest_distances,
+)
 
 __all__ = [
     "Contacts",
@@ -28,6 +37,7 @@ __all__ = [
     "brute_force",
     "distance_edge_edge",
     "distance_vertex_face",
+    "earliest_contacts",
     "edge_edge",
     "edge_face_intersect",
     "intersections",

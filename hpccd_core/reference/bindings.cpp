@@ -11,6 +11,7 @@
 
 #include "brute_force.h"
 #include "distance.h"
+#include "earliest.h"
 #include "elementary.h"
 #include "intersection.h"
 #include "parallel.h"
@@ -148,6 +149,19 @@ PYBIND11_MODULE(_reference, m) {
                        const reference::Separations& separations, unsigned threads) {
     const auto first = rows<Point>(t0), second = rows<Point>(t1);
     return arrays(without_gil([&] { return reference::contacts(meshes, first, second, separations, threads); }));
+  });
+  // Positions (N,V,3) of N steps, and a distance for each.
+  m.def("earliest_contacts", [](const Meshes& meshes, const Array<double>& t0, const Array<double>& t1,
+                                const Array<double>& distances, unsigned threads) {
+    const auto n_vertices = static_cast<std::size_t>(t0.shape(1));
+    const auto of_step = [n_vertices](const Array<double>& positions, std::size_t i) {
+      std::vector<Point> points(n_vertices);
+      std::memcpy(points.data(), positions.data() + 3 * n_vertices * i, n_vertices * sizeof(Point));
+      return points;
+    };
+    return computed<double>(static_cast<std::size_t>(t0.shape(0)), threads, [&](std::size_t i) {
+      return reference::earliest_contact(meshes, of_step(t0, i), of_step(t1, i), distances.data()[i]);
+    });
   });
   m.def("proximity", [](const Meshes& meshes, const Array<double>& vertices, double distance, unsigned threads) {
     const auto positions = rows<Point>(vertices);

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from .. import _reference
 
@@ -78,6 +79,33 @@ def brute_force(
         raise ValueError("minimum_separation, pair_separation: negative, NaN or Inf")
     v0, v1 = parts.positions("vertices_t0", vertices_t0), parts.positions("vertices_t1", vertices_t1)
     return Contacts(*_reference.contacts(parts.meshes, v0, v1, separations.tolist(), threads))
+
+
+def earliest_contacts(
+    vertices_t0: np.ndarray,
+    vertices_t1: np.ndarray,
+    faces_per_mesh: Sequence[np.ndarray],
+    *,
+    minimum_separation: ArrayLike = 0.0,
+    threads: int = 0,
+    **scene: Any,
+) -> np.ndarray:
+    """The earliest contact times (N,) of N steps (N,V,3) of one scene, rounded down; +inf where nothing touches.
+
+    minimum_separation: one for all, or (N,), one for each step.
+    """
+    parts = _Scene(faces_per_mesh, **scene)
+    starts, ends = (np.asarray(v, dtype=np.float64) for v in (vertices_t0, vertices_t1))
+    for name, vertices in (("vertices_t0", starts), ("vertices_t1", ends)):
+        if vertices.ndim != 3 or vertices.shape != starts.shape:
+            raise ValueError(f"{name}: shape {vertices.shape}, expected (N, V, 3), the same for both")
+        parts.positions(name, vertices.reshape(-1, 3)[: vertices.shape[1]])
+        if not np.isfinite(vertices).all():
+            raise ValueError(f"{name}: NaN or Inf")
+    distances = np.ascontiguousarray(np.broadcast_to(np.asarray(minimum_separation, np.float64), (len(starts),)))
+    if not np.isfinite(distances).all() or (distances < 0).any():
+        raise ValueError("minimum_separation: negative, NaN or Inf")
+    return _reference.earliest_contacts(parts.meshes, starts, ends, distances, threads)
 
 
 def proximity(

@@ -5,6 +5,7 @@
   hpccd bench cpu data --peer ipctk         side by side with ipctk
   hpccd bench scaling                       speed-up against threads, for each method
   hpccd bench distance                      what a separation, proximity, intersections cost
+  hpccd bench step                          how far a step may go: first contacts, collision-free step, trial steps
   hpccd bench accuracy                      what each tier costs, and where it errs
   hpccd bench <benchmark> --help            scenes, options and examples of one benchmark
 
@@ -25,6 +26,7 @@ BENCHMARKS = {
     "memory": ("core.memory", "peak memory and bytes per triangle"),
     "options": ("core.options", "what each way to model less saves"),
     "distance": ("core.distance", "separation, proximity, intersections, smallest distances beside plain detection"),
+    "step": ("core.step", "how far a step may go: first contacts, free step and trial steps beside all contacts"),
     "ros": ("ros.node", "the node over DDS: latency beside that of an echo, sustained rate, overload"),
     "soak": ("ros.soak.command", "half an hour of mixed load on the node: memory, counts, answers"),
     "accuracy": ("core.accuracy", "the tiers: time, wrong answers, error of times; sweeps of scale and offset"),

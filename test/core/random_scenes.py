@@ -75,6 +75,19 @@ def combine(*meshes):
     )
 
 
+def free_at_first(rng):
+    """Flat sheets and bodies above each other, which touch nothing before they have moved."""
+    layers = []
+    for level, n in enumerate((9, 5)):
+        flat = np.stack([*np.meshgrid(np.arange(n), np.arange(n)), np.full((n, n), 4 * level)], axis=2)
+        flat = flat.reshape(-1, 3).astype(float)
+        layers.append((sheet(n), flat + rng.normal(0, 0.05, flat.shape), flat + rng.normal(0, 1.5, flat.shape)))
+    for level in (2, 3, 4):
+        faces, _, end = tetrahedron(rng)
+        layers.append((faces, 0.5 * rng.normal(0, 1, (4, 3)) + [4, 4, 4 * level], end + [4, 4, 0]))
+    return combine(*layers)
+
+
 def single_mesh(rng):
     return combine(crumpled_sheet(rng))
 

@@ -11,7 +11,7 @@ import hpccd_core as hc
 from hpccd_core.fuzz import __main__ as command
 from hpccd_core.fuzz import differential, questions, slowest
 from hpccd_core.fuzz.generators import GENERATORS, VERTEX_FACE
-from hpccd_core.fuzz.questions import CONTACT, DISTANCES, INTERSECTIONS, PROXIMITY, SEPARATION
+from hpccd_core.fuzz.questions import CONTACT, DISTANCES, INTERSECTIONS, PROXIMITY, SEPARATION, STEP
 
 ACCURACIES = ("fast", "balanced", "conservative", "exact")
 TURNS = sum(map(len, GENERATORS.values()))
@@ -23,7 +23,10 @@ def n_batches(question):
 
 @pytest.mark.parametrize(
     ("question", "size", "rounds"),
-    [(CONTACT, 600, 2), (SEPARATION, 100, 1), (PROXIMITY, 40, 1), (INTERSECTIONS, 60, 1), (DISTANCES, 60, 1)],
+    [
+        (CONTACT, 600, 2), (SEPARATION, 100, 1), (PROXIMITY, 40, 1), (INTERSECTIONS, 60, 1), (DISTANCES, 60, 1),
+        (STEP, 60, 2),
+    ],
 )
 def test_promises_are_kept(question, size, rounds):
     tallies = differential.new_tallies()
@@ -38,7 +41,7 @@ def test_promises_are_kept(question, size, rounds):
         exact, conservative = (tallies[question, accuracy, kind] for accuracy in ("exact", "conservative"))
         assert exact.missed == exact.invented == conservative.missed == 0
         assert exact.worst_error <= 1e-12
-        assert conservative.latest <= (0 if question in differential.OF_A_STEP else 1e-12)
+        assert conservative.latest <= (0 if question in (*differential.OF_A_STEP, STEP) else 1e-12)
 
 
 def test_the_same_seed_gives_the_same_queries():
@@ -92,6 +95,49 @@ def test_wrong_distances_of_meshes_are_seen_saved_and_replayed(mistake, tmp_path
         )
         arguments = ["--count", "40", "--batch", "200", "--accuracy", "exact,conservative", "--question", DISTANCES]
         assert command.main([*arguments, "--save", str(saved)]) == 1
+    with np.load(saved) as file:
+        assert {key.split("|")[1] for key in file.files} == {"exact", "conservative"}
+    assert command.main(["--replay", str(saved), "--accuracy", "exact", "--save", str(tmp_path / "again.npz")]) == 0
+
+
+class Mistakes:
+    """Detector methods that are wrong in one way each."""
+
+    @staticmethod
+    def late(self, start, end):
+        step = super(hc.Detector, self).collision_free_step(start, end)
+        return step if step in (0, 1) else np.nextafter(step, 1) + 1e-11
+
+    @staticmethod
+    def early(self, start, end):
+        return max(0.0, super(hc.Detector, self).collision_free_step(start, end) - 2e-9)
+
+    @staticmethod
+    def stale(self, start, end):
+        """Answers for the same start as it did for another end."""
+        step = super(hc.Detector, self).collision_free_step(start, end)
+        key = start.tobytes()
+        if getattr(self, "kept", (None, 0))[0] != key:
+            self.kept = key, step
+        return self.kept[1]
+
+    @staticmethod
+    def only_one(self, start, end):
+        """Of several first contacts one is left out."""
+        found = super(hc.Detector, self).detect(start, end)
+        if self.report != "first" or len(found.vf) < 2:
+            return found
+        return dataclasses.replace(found, vf=found.vf[1:], vf_toc=found.vf_toc[1:])
+
+
+@pytest.mark.parametrize("mistake", ["late", "early", "stale", "only_one"])
+def test_wrong_steps_are_seen_saved_and_replayed(mistake, tmp_path, monkeypatch, capsys):
+    saved = tmp_path / "failures.npz"
+    method = "detect" if mistake == "only_one" else "collision_free_step"
+    with monkeypatch.context() as patch:
+        patch.setattr(hc.Detector, method, getattr(Mistakes, mistake))
+        arguments = ["--count", "400", "--batch", "60", "--simd", "auto", "--accuracy", "exact,conservative"]
+        assert command.main([*arguments, "--question", STEP, "--save", str(saved)]) == 1
     with np.load(saved) as file:
         assert {key.split("|")[1] for key in file.files} == {"exact", "conservative"}
     assert command.main(["--replay", str(saved), "--accuracy", "exact", "--save", str(tmp_path / "again.npz")]) == 0

@@ -2,7 +2,7 @@
 """docs/performance.md: its text is written by hand, its tables are made from the kept results.
 
 A table stands between `<!-- NAME -->` and `<!-- end -->`; what is there is replaced, with command, machine and commit
-of each result above it.
+of each result above it; or the words that it is not measured, where no result is kept.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from hpccd_ros.bench.report import (
     performance_distance,
     performance_gpu,
     performance_node,
+    performance_step,
 )
 from hpccd_ros.bench.report.results import Kept
 
@@ -36,6 +37,7 @@ TABLES = {
     "wrong-answers": (performance_core.wrong_answers, "accuracy-4-cores"),
     "separations": (performance_distance.by_distance, "distance-2-cores"),
     "snapshots": (performance_distance.of_a_snapshot, "distance-2-cores"),
+    "steps": (performance_step.steps, "step-2-cores"),
     "distance-truth": (performance_distance.on_scenes, "accuracy-distance-2-cores"),
     "distance-wrong-answers": (performance_distance.hard_queries, "accuracy-distance-2-cores"),
     "backends": (performance_gpu.backends, "gpu-h100-16-cores"),
@@ -62,6 +64,8 @@ def page(text: str, results: Path) -> str:
         if found["name"] not in TABLES:
             raise UserError(f"<!-- {found['name']} -->: there is no such table; there are {', '.join(TABLES)}")
         make, *names = TABLES[found["name"]]
+        if missing := [name for name in names if not (results / f"{name}.json").exists()]:
+            return f"{found[1]}\nNot measured yet: no result {', '.join(missing)} is kept.\n\n{found[3]}"
         of = {name: read(results, name) for name in names}
         sources = "  \n".join(markdown.source(*item) for item in of.items())
         table = "\n".join(make(*of.values()))

@@ -1,0 +1,25 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Table of docs/performance.md about how far a step may go."""
+
+from __future__ import annotations
+
+from hpccd_ros.bench.report import markdown
+from hpccd_ros.bench.report.drawing import by
+from hpccd_ros.bench.report.results import Kept
+from hpccd_ros.bench.report.table import text
+
+
+def steps(result: Kept) -> list[str]:
+    """A line for each scene: all contacts, and what part of it the other questions take."""
+    lines = []
+    for mine in by(result.rows, "scene"):
+        of = {row["query"]: row for row in mine}
+        every = of["all"]
+        faster = of["step"].get("times_faster_than_ipctk")
+        lines.append([mine[0]["scene"], round(every["contacts"]), f"{every['earliest']:.4g}", every["step_ms"],
+                      *(f"{text(of[query]['step_ms'])} ({of[query]['over_all']:.2f})"
+                        for query in ("first", "step", "trial")),
+                      "" if faster is None else f"{faster:,.0f}"])  # fmt: skip
+    columns = ["scene", "contacts", "earliest at", "all, ms", "first, ms (/ all)", "`collision_free_step`, ms (/ all)",
+               "trial steps, ms (/ all)", "step x ipctk"]  # fmt: skip
+    return markdown.table(columns, lines)

@@ -1,0 +1,230 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Steps asked for again and again of one detector, as line searches do: what it keeps of a start, which it knows by its
+contents, never shows in an answer."""
+
+import threading
+import time
+
+import numpy as np
+import pytest
+import random_scenes
+from folded_patches import SHAPES
+
+import hpccd_core as hc
+
+ACCURACIES = pytest.mark.parametrize("accuracy", ["fast", "balanced", "conservative", "exact"])
+
+
+# Other queries that a detector may be asked between trial steps.
+BETWEEN = (
+    lambda detector, start, end: detector.detect(start, end), lambda detector, start, end: detector.detect(end, start),
+    lambda detector, start, end: detector.step(end), lambda detector, start, end: detector.proximity(start, 0.125),
+    lambda detector, start, end: detector.distances(end), lambda detector, start, end: detector.intersections(end),
+    lambda detector, start, end: detector.collision_free_step(end, start), lambda detector, start, end: None,
+)  # fmt: skip
+
+
+def lifted(seed):
+    return random_scenes.free_at_first(np.random.default_rng([80, seed]))
+
+
+def is_half(step):
+    return 0.5 - 1e-9 <= step <= 0.5
+
+
+def fresh_step(scene, v0, v1, separation=0.0, **options):
+    detector = hc.Detector(scene, minimum_separation=separation, backend="cpu", threads=1, **options)
+    return detector.collision_free_step(v0, v1)
+
+
+@ACCURACIES
+@pytest.mark.parametrize("threads", [1, 3])
+def test_shorter_longer_and_turned_steps(accuracy, threads):
+    """Each as a new detector answers it, in any order, between other queries."""
+    rng = np.random.default_rng(81)
+    for seed in range(4):
+        meshes = lifted(seed)
+        scene, v0, v1 = meshes.scene(), meshes.vertices_t0, meshes.vertices_t1
+        ends = [v0 + part * (v1 - v0) for part in (1.0, 0.5, 0.25, 2.0, 0.0, 1e-9)]
+        ends += [v1 + rng.normal(0, size, v1.shape) for size in (1e-6, 0.1, 2.0)]
+        expected = [fresh_step(scene, v0, end, accuracy=accuracy) for end in ends]
+        assert len(set(expected)) > 3
+        detector = hc.Detector(scene, accuracy=accuracy, backend="cpu", threads=threads)
+        for number in rng.permutation(np.tile(np.arange(len(ends)), 4)):
+            assert detector.collision_free_step(v0, ends[number]) == expected[number]
+            BETWEEN[rng.integers(len(BETWEEN))](detector, v0, ends[rng.integers(len(ends))])
+
+
+@ACCURACIES
+def test_a_start_that_is_all_but_the_same(accuracy):
+    """One coordinate differs, by an ulp or by half the scene; in place, in an array that was seen before."""
+    rng = np.random.default_rng(82)
+    for seed in range(3):
+        meshes = lifted(seed)
+        scene, v0, v1 = meshes.scene(), meshes.vertices_t0.copy(), meshes.vertices_t1
+        detector = hc.Detector(scene, accuracy=accuracy, backend="cpu", threads=2)
+        for _ in range(30):
+            detector.collision_free_step(v0, v1)
+            kept = v0.copy()
+            at = rng.integers(len(v0)), rng.integers(3)
+            v0[at] = np.nextafter(v0[at], 99) if rng.random() < 0.5 else v0[at] + rng.normal(0, 4)
+            expected = fresh_step(scene, v0, v1, accuracy=accuracy)
+            assert detector.collision_free_step(v0, v1) == expected
+            assert detector.collision_free_step(v0, v0 + 0.5 * (v1 - v0)) == fresh_step(
+                scene, v0, v0 + 0.5 * (v1 - v0), accuracy=accuracy
+            )
+            if rng.random() < 0.5:
+                v0[:] = kept
+
+
+def flat_fall(height):
+    """A triangle that falls onto another, parallel to it: contact where the height is gone."""
+    corners = np.array([[0, 0, 0], [4, 0, 0], [0, 4, 0]], float)
+    faces = np.array([[0, 1, 2]])
+    return random_scenes.combine((faces, corners + [1, 1, height], corners + [1, 1, -1]), (faces, corners, corners))
+
+
+def test_one_vertex_that_makes_the_contact_earlier():
+    """All that is known of a start is worthless when a single corner of it moves towards the other mesh."""
+    meshes = flat_fall(1.0)
+    detector = hc.Detector(meshes.scene(), backend="cpu")
+    v0, v1 = meshes.vertices_t0, meshes.vertices_t1
+    assert is_half(detector.collision_free_step(v0, v1))
+    v0[0, 2] = 0.25
+    assert detector.collision_free_step(v0, v1) == pytest.approx(0.2, abs=1e-9)
+    v0[0, 2] = 0.0
+    assert detector.collision_free_step(v0, v1) == 0.0
+    v0[0, 2] = np.nextafter(0.0, 1.0)
+    assert 0 < detector.collision_free_step(v0, v0) == 1.0
+    v0[0, 2] = 1.0
+    assert is_half(detector.collision_free_step(v0, v1))
+
+
+def test_signs_of_zero_and_types_of_numbers():
+    meshes = flat_fall(1.0)
+    detector = hc.Detector(meshes.scene(), backend="cpu")
+    v0, v1 = meshes.vertices_t0, meshes.vertices_t1
+    negative = np.where(v0 == 0, -0.0, v0)
+    for start, end in ((v0, v1), (negative, v1), (v0.astype(np.float32), v1.astype(np.float32)),
+                       (v0.astype(np.float32), v1), (v0[:, ::-1][:, ::-1], v1), (v0.tolist(), v1)):  # fmt: skip
+        assert is_half(detector.collision_free_step(start, end))
+    rounded = np.nextafter(v0, 9).astype(np.float32).astype(float)
+    assert is_half(detector.collision_free_step(v0, v1)) and is_half(detector.collision_free_step(rounded, v1))
+
+
+def test_separations_that_change_between_trials():
+    """What is free of contacts may lie within a separation that was smaller, or 0, when the start was seen first."""
+    meshes = flat_fall(1.0)
+    scene, v0, v1 = meshes.scene(), meshes.vertices_t0, meshes.vertices_t1
+    detector = hc.Detector(scene, backend="cpu")
+    for separation, step in ((0.0, 0.5), (0.5, 0.25), (0.75, 0.125), (1.0, 0.0), (0.0, 0.5), (2.0, 0.0), (0.5, 0.25)):
+        detector.set_separation("mesh0", "mesh1", separation)
+        for _ in range(2):
+            assert step - 1e-9 <= detector.collision_free_step(v0, v1) <= step
+    for seed in range(3):
+        meshes = lifted(seed)
+        v0, v1 = meshes.vertices_t0, meshes.vertices_t1
+        detector = hc.Detector(meshes.scene(), backend="cpu", threads=2)
+        now = {}
+        rng = np.random.default_rng(83)
+        for _ in range(25):
+            pair, separation = tuple(sorted(rng.integers(0, 5, 2).tolist())), float(rng.choice([0, 0.01, 0.5, 3]))
+            now[pair] = separation
+            detector.set_separation(*pair, separation)
+            scene = meshes.scene()
+            for (a, b), d in now.items():
+                scene.set_separation(a, b, d)
+            end = v0 + rng.choice([0.25, 1.0]) * (v1 - v0)
+            assert detector.collision_free_step(v0, end) == fresh_step(scene, v0, end)
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, 1e200])
+def test_a_refused_call_leaves_nothing_behind(bad):
+    meshes = flat_fall(1.0)
+    detector = hc.Detector(meshes.scene(), backend="cpu")
+    v0, v1 = meshes.vertices_t0.copy(), meshes.vertices_t1.copy()
+    for name, broken in (("vertices_t0", v0), ("vertices_t1", v1)):
+        assert is_half(detector.collision_free_step(v0, v1))
+        kept = broken[5, 2]
+        broken[5, 2] = bad
+        with pytest.raises(ValueError, match=name):
+            detector.collision_free_step(v0, v1)
+        broken[5, 2] = kept
+        assert is_half(detector.collision_free_step(v0, v1))
+    v0[5, 2] = bad
+    with pytest.raises(ValueError, match="vertices_t0"):
+        detector.collision_free_step(v0, v1)
+    v0[5, 2] = 0.25  # the other triangle's corner: at the same height when the first has fallen by 0.75
+    assert detector.collision_free_step(v0, v1) == fresh_step(meshes.scene(), v0, v1)
+
+
+@pytest.mark.parametrize(
+    ("change", "error", "text"),
+    [
+        (lambda v: v[:-1], ValueError, "vertices_t1"),
+        (lambda v: v.astype(int), TypeError, "vertices_t1"),
+        (lambda v: v[:, :2], ValueError, "vertices_t1"),
+        (lambda v: np.ma.masked_array(v, mask=v > 2), TypeError, "vertices_t1"),
+    ],
+)
+def test_wrong_arguments_are_named(change, error, text):
+    meshes = flat_fall(1.0)
+    detector = hc.Detector(meshes.scene(), backend="cpu")
+    with pytest.raises(error, match=text):
+        detector.collision_free_step(meshes.vertices_t0, change(meshes.vertices_t1))
+
+
+def test_cancelled():
+    """Heard under way and by the next call; another detector of the same scene goes on."""
+    n = 60
+    faces, rng = random_scenes.sheet(n), np.random.default_rng(84)
+    flat = np.stack([*np.meshgrid(np.arange(n), np.arange(n)), np.zeros((n, n))], axis=2).reshape(-1, 3)
+    layers = [(faces, flat + [0, 0, k] + rng.normal(0, 0.1, flat.shape), flat - [0, 0, k]) for k in range(4)]
+    meshes = random_scenes.combine(*layers)
+    scene, v0, v1 = meshes.scene(), meshes.vertices_t0, meshes.vertices_t1
+    detector = hc.Detector(scene, backend="cpu", threads=2)
+    expected = detector.collision_free_step(v0, v1)
+    thread = threading.Thread(target=lambda: (time.sleep(0.05), detector.cancel()))
+    thread.start()
+    with pytest.raises(hc.Cancelled):
+        while True:
+            detector.collision_free_step(v0, v1)
+    thread.join()
+    with pytest.raises(hc.Cancelled):
+        detector.collision_free_step(v0, v1)
+    assert fresh_step(scene, v0, v1) == expected
+
+
+def test_threads_that_share_a_detector():
+    meshes = lifted(5)
+    scene, v0, v1 = meshes.scene(), meshes.vertices_t0, meshes.vertices_t1
+    motions = [(v0, v1), (v0, 0.5 * (v0 + v1)), (v1, v0), (0.5 * (v0 + v1), v1)]
+    expected = [fresh_step(scene, *motion) for motion in motions]
+    detector = hc.Detector(scene, backend="cpu", threads=2)
+    wrong = []
+
+    def ask(first):
+        for turn in range(40):
+            number = (first + turn) % len(motions)
+            if detector.collision_free_step(*motions[number]) != expected[number]:
+                wrong.append(number)
+
+    threads = [threading.Thread(target=ask, args=(first,)) for first in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert not wrong
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_patches_whose_freedom_was_proven_for_another_step(name):
+    """Proven free for a short step, then asked for the whole one, then for another start."""
+    faces, start, end, _ = SHAPES[name]()
+    scene = hc.Scene()
+    scene.add_mesh("patch", faces, n_vertices=len(start))
+    detector = hc.Detector(scene, backend="cpu", threads=2)
+    for _ in range(2):
+        for first, last in ((start, start + 0.125 * (end - start)), (start, end), (start, start), (end, start),
+                            (0.5 * (start + end), end), (start, 2 * end - start)):  # fmt: skip
+            assert detector.collision_free_step(first, last) == fresh_step(scene, first, last)
