@@ -31,6 +31,6 @@ def energy(hand):
 hand = np.array([[0, 0, 0.2], [1, 0, 0.5], [0, 1, 0.5]])
 direction = np.array([0, 0, -0.8])
 step = 0.9 * free_step(hand, hand + direction)  # not quite to where it touches
-while energy(hand + step * direction) >= energy(hand):  # a shorter step is free too: no need to ask again
+while energy(hand + step * direction) > energy(hand):  # a shorter step is free too: no need to ask again
     step /= 2
 print(f"{step:.6f}")  # 0.225000: the table is in the way at a quarter
