@@ -8,6 +8,7 @@ import pytest
 from hpccd.srv import Detect
 from node_calls import set_parameter
 from node_process import NodeProcess
+from rclpy.serialization import deserialize_message, serialize_message
 from waving_sheet import sheet_faces, sheet_positions
 
 import hpccd_core as hc
@@ -216,6 +217,8 @@ def test_requests_at_the_same_time(start_node):
     node.wait_until(lambda: node.peer.statuses["service"][2]["answered"] == str(len(wanted)), "count of answers")
 
 
-def test_it_stands_at_the_end_of_the_response():
-    """Whoever knows an older definition reads all the rest as it was."""
+def test_who_knows_an_older_definition_reads_all_the_rest():
+    """It is the last field, and what comes behind the fields that a reader knows is passed over."""
     assert list(Detect.Response.get_fields_and_field_types())[-1] == "collision_free_step"
+    response = Detect.Response(message="text", collision_free_step=0.25)
+    assert deserialize_message(serialize_message(response) + b"\1" * 8, Detect.Response) == response
