@@ -28,3 +28,13 @@ class Cancellation:
             self._cancelled = True
             if self._detector is not None:
                 self._detector.cancel()
+
+    def release(self) -> bool:
+        """Whether the guarded detector may go on to other work: `cancel` came too late for it, and no longer ends it.
+
+        False: it is ended.
+        """
+        with self._lock:
+            if not self._cancelled:
+                self._detector = None
+            return not self._cancelled

@@ -43,6 +43,14 @@ class SceneBuilder:
             tuple(entry for entry in self.pair_accuracies if set(entry[:2]) <= set(names)),
         )
 
+    def same_scene(self, other: "SceneBuilder") -> bool:
+        """Whether equal topologies make equal scenes."""
+        return (self.meshes, self.ignored_pairs, self.pair_accuracies) == (
+            other.meshes,
+            other.ignored_pairs,
+            other.pair_accuracies,
+        )
+
     def concatenate(self, frame: SceneFrame, static_of: SceneFrame) -> np.ndarray:
         """(V,3) positions of all meshes; those of static meshes from ``static_of``. No copy of a single mesh.
 

@@ -23,7 +23,7 @@ class RequestError(ValueError):
 
 @dataclass(frozen=True)
 class Query:
-    """``separation``: None where the node's is to hold. ``distance``: of query proximity."""
+    """``separation``: of the whole scene; None where the node's is to hold. ``distance``: of query proximity."""
 
     name: str
     separation: Separation | None = None
@@ -31,7 +31,11 @@ class Query:
 
     @property
     def of_snapshot(self) -> bool:
-        return self.name != "contacts"
+        return self.name not in OF_MOTION
+
+
+# Queries that read `start` too, and that a separation has a meaning for.
+OF_MOTION = ("contacts", "collision_free_step")
 
 
 def requested_query(request: Detect.Request) -> Query:
@@ -39,24 +43,25 @@ def requested_query(request: Detect.Request) -> Query:
     name = request.query or "contacts"
     if name not in ANSWERS:
         raise RequestError(f"query: {quoted(name)} is none of {', '.join(ANSWERS)}")
-    separation = _length(request, "minimum_separation", name, of="contacts")
-    distance = _length(request, "distance", name, of="proximity")
-    if name == "contacts":
-        return Query(name, None if separation is None else Separation(separation))
-    if request.report not in ("", "all"):
+    separation = _length(request, "minimum_separation", name, of=OF_MOTION)
+    distance = _length(request, "distance", name, of=("proximity",))
+    if name != "contacts" and request.report not in ("", "all"):
         raise RequestError(f"report: only query contacts has one, leave it empty for {name}")
+    if name in OF_MOTION:
+        return Query(name, None if separation is None else Separation(separation))
     if name == "proximity" and distance is None:
         raise RequestError("distance: empty; query proximity needs one")
     return Query(name, NONE, distance or 0.0)
 
 
-def _length(request: Detect.Request, field: str, query: str, of: str) -> float | None:
-    """The number in a field that only the query ``of`` has, None where it is empty."""
+def _length(request: Detect.Request, field: str, query: str, of: tuple[str, ...]) -> float | None:
+    """The number in a field that only the queries ``of`` have, None where it is empty."""
     given = getattr(request, field)
     if not len(given):
         return None
-    if query != of:
-        raise RequestError(f"{field}: only query {of} has one, leave it empty for {query}")
+    if query not in of:
+        who = f"only query {of[0]} has one" if len(of) == 1 else f"only queries {' and '.join(of)} have one"
+        raise RequestError(f"{field}: {who}, leave it empty for {query}")
     if not (math.isfinite(given[0]) and given[0] >= 0):
         raise RequestError(f"{field}: {given[0]} must be finite and not negative")
     return given[0]
@@ -76,11 +81,12 @@ class Asked:
 
 @dataclass(frozen=True)
 class Answer:
-    """``text``: in words what was found."""
+    """``text``: in words what was found. The rest: the fields of the response that the query fills."""
 
     text: str
     contacts: ContactArray | None = None
     distances: DistanceArray | None = None
+    collision_free_step: float = math.nan
 
 
 def _contacts(asked: Asked, query: Query) -> Answer:
@@ -91,6 +97,11 @@ def _contacts(asked: Asked, query: Query) -> Answer:
     )
     separation_fields.fill_separation(message, asked.options.separation)
     return Answer(f"{message.total} contacts", contacts=message)
+
+
+def _collision_free_step(asked: Asked, query: Query) -> Answer:
+    step = asked.detector.collision_free_step(asked.start, asked.end)
+    return Answer(f"{step!r} of the motion is free of contacts", collision_free_step=step)
 
 
 def _proximity(asked: Asked, query: Query) -> Answer:
@@ -118,6 +129,7 @@ def _distances(asked: Asked, query: Query) -> Answer:
 
 ANSWERS: dict[str, Callable[[Asked, Query], Answer]] = {
     "contacts": _contacts,
+    "collision_free_step": _collision_free_step,
     "proximity": _proximity,
     "intersections": _intersections,
     "distances": _distances,

@@ -11,6 +11,7 @@ from hpccd.srv import Detect
 from hpccd_ros.base.quoting import listed, quoted, repeated, shortened
 from hpccd_ros.detect.cancellation import Cancellation
 from hpccd_ros.detect.core import Options, make_detector
+from hpccd_ros.detect.kept_detectors import DetectorOf, KeptDetectors
 from hpccd_ros.detect.layout import Layout
 from hpccd_ros.detect.scene import SceneBuilder
 from hpccd_ros.frames.types import Topology
@@ -31,9 +32,12 @@ def compute(
     scene: NodeScene,
     options: Options,
     limits: dict[str, Any],
+    kept: KeptDetectors,
     cancellation: Cancellation,
 ) -> Answer:
-    """limits: max_meshes, max_vertices, max_faces, max_contacts. Raises RequestError, and what the core raises."""
+    """limits: max_meshes, max_vertices, max_faces, max_contacts. kept: of earlier requests; this one adds to them.
+    Raises RequestError, and what the core raises.
+    """
     query = requested_query(request)
     names = _names(request, scene, limits["max_meshes"])
     for field in ("topologies", "end") if query.of_snapshot else ("topologies", "start", "end"):
@@ -51,13 +55,20 @@ def compute(
         report=request.report or "all",
         separation=query.separation or options.separation.among(names),
     )
-    detector = cancellation.guard(make_detector(scene.builder.among(names).build(topologies), options))
+    builder = scene.builder.among(names)
+    used = kept.take(builder, topologies, options) or DetectorOf(
+        builder, topologies, options, make_detector(builder.build(topologies), options)
+    )
+    detector = cancellation.guard(used.detector)
     asked = Asked(start, end, detector, Layout.of(tuple(names), topologies), options, limits["max_contacts"])
     answer = ANSWERS[query.name](asked, query)
+    backend = detector.backend
+    if cancellation.release():
+        kept.keep(used)
     for message in (answer.contacts, answer.distances):
         if message is not None:
             message.header, message.step = request.end[0].header, request.end[0].step
-            message.accuracy, message.backend = options.accuracy, detector.backend
+            message.accuracy, message.backend = options.accuracy, backend
     if answer.contacts is not None:
         first = request.end if query.of_snapshot else request.start
         answer.contacts.start = first[0].header.stamp

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Service ``~/detect``: snapshots in, contacts or distances out; computed outside of the executor."""
+"""Service ``~/detect``: snapshots in, contacts, a step or distances out; computed outside of the executor."""
 
 import math
 import threading
@@ -18,6 +18,7 @@ from hpccd_core import Cancelled
 from hpccd_ros.base.quoting import LONGEST_MESSAGE, shortened
 from hpccd_ros.detect.cancellation import Cancellation
 from hpccd_ros.detect.core import CORE_ERRORS
+from hpccd_ros.detect.kept_detectors import KeptDetectors
 from hpccd_ros.middleware import qos, topic_names
 from hpccd_ros.node.accounts import Accounts
 from hpccd_ros.node.configuration import Configuration
@@ -62,6 +63,7 @@ class DetectService:
         self._scene = scene
         self._ended = accounts.requests
         self._capacity = settings["detect_jobs"] + settings["detect_waiting"]
+        self._kept = KeptDetectors(settings["detect_jobs"])
         self._pool = ThreadPoolExecutor(settings["detect_jobs"], thread_name_prefix="detect")
         self._lock = threading.Lock()
         self._open = 0
@@ -83,6 +85,10 @@ class DetectService:
     def counts(self) -> dict[str, int]:
         """How requests ended, and how many hold a place now."""
         return {**self._ended, "open": self._open}
+
+    def forget_scenes(self, unused_for: float) -> None:
+        """Give back what is held for further requests about scenes that nobody asked about for so many seconds."""
+        self._kept.forget(unused_for)
 
     def close(self) -> None:
         """Answer whoever still waits, then end. In the thread of the executor; its next turn comes too late."""
@@ -137,7 +143,9 @@ class DetectService:
         cancellation = Cancellation()
         self._ongoing.add(cancellation)
         try:
-            job = self._pool.submit(compute, request, scene, self._configuration.options, self._settings, cancellation)
+            job = self._pool.submit(
+                compute, request, scene, self._configuration.options, self._settings, self._kept, cancellation
+            )
         except RuntimeError:  # the system gives no further thread
             self._ongoing.discard(cancellation)
             self._leave()
@@ -168,6 +176,7 @@ class DetectService:
             response.contacts = answer.contacts
         if answer.distances is not None:
             response.distances = answer.distances
+        response.collision_free_step = answer.collision_free_step
         response.success, response.message = True, answer.text
         self._ended["answered"] += 1
         return response
@@ -196,6 +205,7 @@ class DetectService:
     def _refuse(self, response: Detect.Response, kind: str, text: str) -> Detect.Response:
         self._ended[kind] += 1
         response.success, response.message = False, shortened(text, LONGEST_MESSAGE)
+        response.collision_free_step = math.nan
         return response
 
     def _enter(self) -> bool:

@@ -60,7 +60,7 @@ class HpccdNode(GuardedLifecycleNode):
         self._diagnostics = self.configured_publisher(DiagnosticArray, topic_names.DIAGNOSTICS, qos.DIAGNOSTICS)
         self._service = DetectService(self, self._configuration, self._scene_for_service, self._accounts)
         self.configured_timer(settings["diagnostics_period"], self._report)
-        self.configured_timer(GIVE_BACK_EVERY, environment.give_back_freed_memory)
+        self.configured_timer(GIVE_BACK_EVERY, self._give_back)
         return SUCCESS
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -130,6 +130,10 @@ class HpccdNode(GuardedLifecycleNode):
         message = self._contacts.publish(found, self._accounts.dropped.most_of(self._deforming))
         self._accounts.answered(found, message.total, len(message.kind))
         self._contacts.show(found, message.header)
+
+    def _give_back(self) -> None:
+        self._service.forget_scenes(unused_for=GIVE_BACK_EVERY)
+        environment.give_back_freed_memory()
 
     def _report(self) -> None:
         message = self._reporter.report(

@@ -199,7 +199,14 @@ INPUT_ROWS = (
 
 SERVICE_ROWS = (
     Row("max_meshes", "int", 1000, "Most meshes in a request of ~/detect", span=(1, 1_000_000)),
-    Row("detect_jobs", "int", 2, "Requests of ~/detect that are computed at the same time", span=(1, 256)),
+    Row(
+        "detect_jobs",
+        "int",
+        2,
+        "Requests of ~/detect that are computed at the same time; of as many scenes what was built is kept for further "
+        "requests, until nobody asks about them for a minute",
+        span=(1, 256),
+    ),
     Row(
         "detect_waiting",
         "int",

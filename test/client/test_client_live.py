@@ -19,6 +19,7 @@ FOLDER = Path(__file__).resolve().parent
 PUBLISHER = FOLDER / "ten_line_publisher.py"
 SUBSCRIBER = FOLDER / "ten_line_subscriber.py"
 REQUEST = FOLDER / "ten_line_request.py"
+LINE_SEARCH = FOLDER / "ten_line_line_search.py"
 FACES = np.array([[0, 1, 2], [3, 4, 5]])
 
 
@@ -92,11 +93,19 @@ def test_the_request_of_the_documentation(start, start_node):
     assert second == "[0.2] [[         0 4294967295]] [[         0 4294967295]]"
 
 
+def test_the_line_search_of_the_documentation(start, start_node):
+    """With the profile for it, as the page says."""
+    node = start_node({"meshes": ["cloth"]}, profiles=(ROOT / "config" / "profiles" / "step_size_control.yaml",))
+    search, said = start(LINE_SEARCH, node.namespace)
+    assert search.wait(PATIENCE) == 0, said.read_text()
+    assert said.read_text() == "0.225000\n"
+
+
 def test_the_documentation_shows_programs_that_are_run_here():
     """Each whole program in README and docs that uses the client is one of those above, to the letter."""
     pages = [ROOT / "README.md", *(ROOT / "docs").rglob("*.md")]
     blocks = [block for page in pages for block in re.findall(r"```python\n(.*?)```", page.read_text(), re.DOTALL)]
-    run = [statements(program.read_text()) for program in (PUBLISHER, SUBSCRIBER, REQUEST)]
+    run = [statements(program.read_text()) for program in (PUBLISHER, SUBSCRIBER, REQUEST, LINE_SEARCH)]
     for block in blocks:
         if "client.prepare_environment()" in block:
             assert statements(block) in run, f"the tests run no such program:\n{block}"

@@ -151,7 +151,7 @@ def test_meshes_that_intersect_and_meshes_far_apart(node):
 @pytest.mark.parametrize(
     "asked, text",
     [
-        (request(query="nearest"), "query: 'nearest' is none of contacts, proximity, intersections, distances"),
+        (request(query="nearest"), "query: 'nearest' is none of contacts, collision_free_step, proximity, inters"),
         (snapshot("proximity"), "distance: empty; query proximity needs one"),
         (snapshot("proximity", distance=[-1.0]), "distance: -1.0 must be finite and not negative"),
         (snapshot("proximity", distance=[math.nan]), "distance: nan must be finite"),
@@ -161,7 +161,7 @@ def test_meshes_that_intersect_and_meshes_far_apart(node):
         (request(minimum_separation=[-0.5]), "minimum_separation: -0.5 must be finite and not negative"),
         (
             snapshot("intersections", minimum_separation=[0.1]),
-            "minimum_separation: only query contacts has one, leave it empty for intersections",
+            "minimum_separation: only queries contacts and collision_free_step have one, leave it empty for inters",
         ),
         (snapshot("distances", report="first"), "report: only query contacts has one, leave it empty for distances"),
         (request(start=False), "start: 0 entries for 2 meshes"),

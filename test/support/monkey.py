@@ -128,6 +128,7 @@ class Monkey:
             mesh_names=names,
             accuracy=choose(("", "", "fast", "balanced", "conservative", "exact", "sloppy" if odd else "")),
             report=choose(("", "all", "first", "any", "some" if odd else "")),
+            query=choose(("", "contacts", "collision_free_step", "distances", "nearest" if odd else "")),
             time_limit=choose(FLOATS if odd else (0.0, 5.0, 1e10)),
         )
         many = len(names or self._meshes)

@@ -47,6 +47,7 @@ TABLES = {
     "segments": (performance_gpu.segments, "gpu-h100-16-cores"),
     "gpu-tiers": (performance_gpu.tiers, "accuracy-h100-16-cores"),
     "latency": (performance_node.latency, "ros-4-cores"),
+    "step-loop": (performance_node.step_loop, "ros-2-cores"),
     "rates": (performance_node.rates, "ros-4-cores"),
     "soak": (performance_node.soak, "soak-4-cores"),
 }

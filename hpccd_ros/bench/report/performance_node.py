@@ -21,6 +21,17 @@ def latency(result: Kept) -> list[str]:
     return markdown.table(columns, lines)
 
 
+def step_loop(result: Kept) -> list[str]:
+    lines = [
+        [r["scene"], r["triangles"], f"{r['mb_sent']:.2g}",
+         *(", ".join(f"{r[f'{who}_{key}_ms']:.2f}" for key in PERCENTILES) for who in ("loop", "core", "more"))]
+        for r in result.rows if r["what"] == "step loop"
+    ]  # fmt: skip
+    columns = ["scene", "triangles", "MB sent", "asked over DDS, ms: median, p95, p99",
+               "the same call in process, ms: median, p95, p99", "DDS more, ms: median, p95, p99"]  # fmt: skip
+    return markdown.table(columns, lines)
+
+
 def rates(result: Kept) -> list[str]:
     names = {"sustained rate": "highest rate without drops", "twice that rate": "twice that"}
     lines = [

@@ -57,12 +57,12 @@ class Link:
     def __init__(self, node: Node, step: Step, options: dict):
         whole = step.as_one_mesh()
         self._faces = whole.meshes[0].faces
-        positions = [np.asarray(v, np.float32) for v in (step.vertices_t0, step.vertices_t1)]
+        positions = self.positions = [np.asarray(v, np.float32) for v in (step.vertices_t0, step.vertices_t1)]
         self._frames = [mesh_messages.vertices_message(p, 0, frame_id="world") for p in positions]
         self.bytes_in = positions[0].nbytes
         self.triangles, self.n_vertices = len(self._faces), len(positions[0])
-        detector = hc.Detector(whole.scene(), **options)
-        found = [detector.detect(positions[1 - k], positions[k]) for k in (0, 1)]
+        self.detector = hc.Detector(whole.scene(), **options)
+        found = [self.detector.detect(positions[1 - k], positions[k]) for k in (0, 1)]
         self._expected = [contacts.hash for contacts in found]
         self.contacts = len(found[1])
         self.answers = [self._answer(contacts, k) for k, contacts in enumerate(found)]

@@ -1,14 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """The node over DDS, as a process of its own: latency from publish to contacts less the core's time, beside an echo
-that moves messages of the same types and sizes in and out (in turn, in one run); the highest rate without drops; and
-what happens at twice that rate: latest frames answered, every drop counted, memory flat.
+that moves messages of the same types and sizes in and out (in turn, in one run); the loop of a solver that asks
+~/detect how far it may go and waits for the answer, beside the same call in process; the highest rate without drops;
+and what happens at twice that rate: latest frames answered, every drop counted, memory flat.
 
   hpccd bench ros                           cloth-ball (the file in HPCCD_DATA, else the generated one), cloth-drop
   hpccd bench ros cloth-drop --repeat 1000
-  hpccd bench ros data --seconds 0          latency alone
+  hpccd bench ros data --seconds 0          latency and loop alone
 
-A step is played there and back again; its meshes are sent as one, in single precision. Fails where contacts differ from
-the core's own, a frame is unaccounted for, or the latency exceeds twice that of the echo (--limit).
+A step is played there and back again; its meshes are sent as one, in single precision. Fails where contacts or
+steps differ from the core's own, a frame is unaccounted for, or the latency exceeds twice that of the echo (--limit).
 """
 
 from __future__ import annotations
@@ -66,7 +67,7 @@ def _measure(report, args, name, step, folder: Path) -> None:
     import rclpy
     from rclpy.signals import SignalHandlerOptions
 
-    from hpccd_ros.bench.ros import node_process, timed_node
+    from hpccd_ros.bench.ros import node_process, step_loop, timed_node
     from hpccd_ros.bench.ros.link import MESH, Link
     from hpccd_ros.demo.children import Children
     from hpccd_ros.middleware import environment
@@ -88,6 +89,7 @@ def _measure(report, args, name, step, folder: Path) -> None:
             link.connect(children.check)
             _turns(link, args.repeat, name)
             lanes = {lane.name: (dict(lane.sent), dict(lane.came)) for lane in (link.node, link.echo)}
+            loop = step_loop.measure(node, link, name, args.repeat, children.check)
             if args.seconds:
                 median = float(np.median(link.node.latencies_ms()))
                 _rates(report, args, row, link, status, child.process.pid, children.check, 1e3 / median)
@@ -101,7 +103,10 @@ def _measure(report, args, name, step, folder: Path) -> None:
     if link.wrong:
         report.failure(f"{name}: contacts of {len(link.wrong)} steps differ from the core's own")
     latency = _latency(row, lanes, {entry[0]: entry[1:] for entry in times})
-    report.rows.insert(len(report.rows) - 2 if args.seconds else len(report.rows), latency)
+    rates = len(report.rows) - (2 if args.seconds else 0)  # they stand at the end
+    report.rows[rates:rates] = [latency, {"what": "step loop", **row, **loop}]
+    if loop["wrong"]:
+        report.failure(f"{name}: {loop['wrong']} collision-free steps of ~/detect differ from the core's own")
     if latency["ratio"] > args.limit:
         ratio = f"{latency['ratio']:.2f} times as long as the echo, more than {args.limit:g}"
         report.failure(f"{name}: beside its core the node takes {ratio}")
@@ -174,6 +179,8 @@ def _rates(report, args, row, link, status, pid, alive, guess) -> None:
 
 
 def _tables(report) -> None:
+    from hpccd_ros.bench.ros import step_loop
+
     latency = [row for row in report.rows if row["what"] == "latency"]
     table.show(
         "publish to contacts, ms: the node less its core, and an echo of the same bytes, in turn",
@@ -187,7 +194,8 @@ def _tables(report) -> None:
         ["scene", *latency[0]["parts_ms"]],
         [[r["scene"], *r["parts_ms"].values()] for r in latency],
     )
-    rates = [row for row in report.rows if row["what"] != "latency"]
+    step_loop.show([row for row in report.rows if row["what"] == "step loop"])
+    rates = [row for row in report.rows if "rate_hz" in row]
     if rates:
         table.show(
             "at a fixed rate",

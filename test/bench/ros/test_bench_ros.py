@@ -13,10 +13,21 @@ import hpccd_ros
 ROOT = Path(hpccd_ros.__file__).resolve().parents[1]
 
 
-def bench(folder, *arguments):
+# The benchmark in a process whose core gives other steps than that of the node.
+OTHER_STEPS = """
+import sys
+import hpccd_core as hc
+from hpccd_ros import cli
+right = hc.Detector.collision_free_step
+hc.Detector.collision_free_step = lambda *motion: right(*motion) + 1
+sys.exit(cli.main(sys.argv[1:]))
+"""
+
+
+def bench(folder, *arguments, program=("-m", "hpccd_ros.cli")):
     """(exit status, the result as written, what was printed)."""
     done = subprocess.run(
-        [sys.executable, "-m", "hpccd_ros.cli", "bench", *arguments, "--out", str(folder), "--label", "test"],
+        [sys.executable, *program, "bench", *arguments, "--out", str(folder), "--label", "test"],
         cwd=ROOT, capture_output=True, text=True, timeout=550,
     )  # fmt: skip
     said = done.stdout + done.stderr
@@ -25,16 +36,30 @@ def bench(folder, *arguments):
     return done.returncode, json.loads(files[0].read_text()), said
 
 
-def test_latency_beside_the_echo(tmp_path):
+def test_latency_beside_the_echo_and_the_loop_beside_the_core(tmp_path):
     # No limit on times here: other tests may keep the machine busy.
     options = ("cloth-drop", "--size", "0.2", "--repeat", "20", "--seconds", "0", "--limit", "1e9")
     status, result, said = bench(tmp_path, "ros", *options)
     assert status == 0, said
-    (row,) = result["rows"]
+    row, loop = result["rows"]
+    assert (row["what"], loop["what"]) == ("latency", "step loop")
     assert row["rounds"] == 20 and row["contacts"] > 100
     whole = sum(row["parts_mean_ms"].values()) + row["core_mean_ms"]
     assert whole == pytest.approx(row["whole_mean_ms"]), "the parts make up the whole"
     assert (tmp_path / "ros.png").exists()
+    assert (loop["rounds"], loop["wrong"]) == (20, 0) and 0 <= loop["least_step"] < 1
+    for who in ("loop", "core"):
+        assert 0 < loop[f"{who}_median_ms"] <= loop[f"{who}_p95_ms"] <= loop[f"{who}_p99_ms"]
+    assert loop["core_median_ms"] < loop["loop_median_ms"] > loop["request_median_ms"]
+    assert loop["mb_sent"] == 2 * row["mb_in"]
+    assert "how far may I go, ms: asked of the node over DDS, and of the core in this process, in turn" in said
+
+
+def test_a_wrong_step_fails(tmp_path):
+    options = ("cloth-drop", "--size", "0.1", "--repeat", "5", "--seconds", "0", "--limit", "1e9")
+    status, result, said = bench(tmp_path, "ros", *options, program=("-c", OTHER_STEPS))
+    # Those of the warm-up, from both ends of the motion, count too.
+    assert status == 1 and "13 collision-free steps of ~/detect differ from the core's" in result["failures"][0], said
 
 
 def test_latency_above_the_limit_fails(tmp_path):

@@ -27,6 +27,7 @@ INPUT_DEPTH = 50  # frames that may wait for the node
 HISTORY = 10_000  # frames that an answer may name: what a busy machine holds up comes late
 WRONG_EVERY = 7  # frames
 REQUEST_EVERY = 20  # frames
+QUERIES = ("contacts", "collision_free_step")  # of requests, in turn
 UNKNOWN_EVERY = 50  # frames
 SEGMENT = 16 << 20  # bytes of shared memory that a publisher has (config/fastdds*.xml)
 
@@ -147,7 +148,8 @@ class SoakLoad:
         return frame, stamp
 
     def _request(self, right: bool) -> None:
-        k = self._count // REQUEST_EVERY % (self._strip.n_frames - 1)
+        number = self._count // REQUEST_EVERY
+        k, query = number % (self._strip.n_frames - 1), QUERIES[number % len(QUERIES)]
         faces = self._strip.meshes[0].faces
         start, end = (self._strip.frame(i)[0] for i in (k, k + 1))
         request = Detect.Request(
@@ -155,24 +157,27 @@ class SoakLoad:
             topologies=[mesh_messages.topology_message(faces, len(start))],
             start=[mesh_messages.vertices_message(start, 1)],
             end=[mesh_messages.vertices_message(end if right else end[:-1], 2)],
+            query=query,
         )
         self.requests += 1
-        self._replies.append((self._client.call_async(request), k, right))
+        self._replies.append((self._client.call_async(request), k, query, right))
 
     def look_at_replies(self) -> None:
         """Check the replies that have come."""
-        for future, k, right in [r for r in self._replies if r[0].done()]:
+        for future, k, query, right in [r for r in self._replies if r[0].done()]:
             reply = future.result()
             self.replies += 1
             if reply.success != right:
                 self.wrong.append(f"request for frame {k}: success {reply.success}: {reply.message}")
             elif right:
-                scene = scenes.core_scene(self._strip)
-                expected = hc.Detector(scene, accuracy=TIER, threads=1).detect(
-                    *(self._strip.frame(i)[0] for i in (k, k + 1))
-                )
-                if reply.contacts.hash != expected.hash:
-                    self.wrong.append(f"reply for frame {k} has other contacts than the core")
+                detector = hc.Detector(scenes.core_scene(self._strip), accuracy=TIER, threads=1)
+                motion = [self._strip.frame(i)[0] for i in (k, k + 1)]
+                if query == "contacts":
+                    same = reply.contacts.hash == detector.detect(*motion).hash
+                else:
+                    same = reply.collision_free_step == detector.collision_free_step(*motion)
+                if not same:
+                    self.wrong.append(f"reply for frame {k} is not the core's, query {query}")
         self._replies = [r for r in self._replies if not r[0].done()]
 
     @property

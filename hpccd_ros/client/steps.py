@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How far a motion may go: a request to ``~/detect`` from numpy arrays, and the number in its answer."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from hpccd.msg import MeshTopology, MeshVertices
+from hpccd.srv import Detect
+from numpy.typing import NDArray
+
+from hpccd_core import arguments
+from hpccd_core.options import ACCURACIES
+from hpccd_ros.client.meshes import vertices_message
+
+_QUERY = "collision_free_step"
+
+
+def collision_free_step_request(
+    start: Mapping[str, NDArray[Any]],
+    end: Mapping[str, NDArray[Any]],
+    *,
+    topologies: Mapping[str, MeshTopology] | None = None,
+    topology_versions: Mapping[str, int] | None = None,
+    accuracy: str = "",
+    minimum_separation: float | None = None,
+    time_limit: float = 0.0,
+) -> Detect.Request:
+    """The request that asks how far the motion from ``start`` to ``end`` may go until something touches.
+
+    start, end: mesh name -> (n, 3) float32 or float64, sent in that precision, in the unit of the scene; the same
+    meshes in both. topologies: mesh name -> its :func:`topology_message`; None: those that the node has for these names
+    (published to it, or from its mesh files). topology_versions: of the latter, where they are not 0. accuracy: "":
+    the node's parameter. minimum_separation: of all pairs of meshes, in the unit of the scene; None: what the node's
+    parameters say. time_limit: s until the node gives up; 0: its parameter ``detect_time_limit``.
+    Raises TypeError or ValueError naming the argument.
+    """
+    names = list(start)
+    if not names:
+        raise ValueError("start: no meshes; give the positions of one at least")
+    _check_meshes("end", end, names)
+    versions = dict.fromkeys(names, 0)
+    if topologies is not None:
+        if topology_versions is not None:
+            raise ValueError("topology_versions: the topologies that are sent have theirs; give one of both")
+        _check_meshes("topologies", topologies, names)
+        versions = {name: topologies[name].version for name in names}
+    elif topology_versions is not None:
+        if beyond := [name for name in topology_versions if name not in versions]:
+            raise ValueError(f"topology_versions: start has no mesh {', '.join(beyond)}; name those of start only")
+        versions |= topology_versions
+    if accuracy:
+        arguments.choice("accuracy", accuracy, ACCURACIES)
+    return Detect.Request(
+        mesh_names=names,
+        topologies=[] if topologies is None else [topologies[name] for name in names],
+        start=_snapshot("start", start, names, versions),
+        end=_snapshot("end", end, names, versions),
+        query=_QUERY,
+        accuracy=accuracy,
+        minimum_separation=(
+            [] if minimum_separation is None else [arguments.length("minimum_separation", minimum_separation)]
+        ),
+        time_limit=arguments.length("time_limit", time_limit),
+    )
+
+
+def collision_free_step_from_response(response: Detect.Response) -> float:
+    """The largest part of the motion, 0 .. 1, that is certainly free of contacts; 1.0 where nothing touches.
+
+    Raises RuntimeError with the node's own words where it did not compute it (refused, busy, out of time, stopped), and
+    ValueError where something else was asked for: no number comes back that a step must not be taken by.
+    """
+    if not response.success:
+        raise RuntimeError(f"the node did not answer: {response.message}")
+    step = float(response.collision_free_step)
+    if not 0 <= step <= 1:
+        raise ValueError(f"response: collision_free_step is {step}; it is the answer to query {_QUERY} only")
+    return step
+
+
+def _check_meshes(argument: str, given: Mapping[str, object], names: list[str]) -> None:
+    if set(given) != set(names):
+        raise ValueError(
+            f"{argument}: of meshes {', '.join(given) or 'none'}, start is of {', '.join(names)}; give the same ones"
+        )
+
+
+def _snapshot(
+    argument: str, positions: Mapping[str, NDArray[Any]], names: list[str], versions: Mapping[str, int]
+) -> list[MeshVertices]:
+    messages = []
+    for name in names:
+        try:
+            messages.append(vertices_message(positions[name], 0, topology_version=versions[name]))
+        except (TypeError, ValueError) as error:
+            raise type(error)(f"{argument}[{name!r}]: {error}") from None
+    return messages
