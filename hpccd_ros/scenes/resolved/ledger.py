@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hpccd_ros.scenes.resolved.response import FromBall
+from hpccd_ros.scenes.resolved.response import FromBall, ToAir
 from hpccd_ros.scenes.resolved.setup import Setup
 from hpccd_ros.scenes.resolved.springs import Springs
 
@@ -30,26 +30,27 @@ class State:
 class Ledger:
     """What came in since the start, beside what is there.
 
-    gravity, ball, air: (3,) momentum that each gave. ball_spin: angular momentum about z. work: that the ball did, J.
+    gravity, ball, air: (3,) momentum that each gave. ball_spin, air_spin: angular momentum about z. work: that the ball did, J.
     """
 
     def __init__(self, setup: Setup, n_cloth: int):
         self._setup, self._n = setup, n_cloth
         self._springs = Springs(setup, setup.period / setup.substeps)
         self.gravity, self.ball, self.air = np.zeros(3), np.zeros(3), np.zeros(3)
-        self.ball_spin = self.work = 0.0
+        self.ball_spin = self.air_spin = self.work = 0.0
 
     def open(self, positions: np.ndarray, velocity: np.ndarray) -> None:
         """The state at the start."""
         self.start = self.state(positions, velocity)
 
-    def enter(self, part: float, period: float, ball: FromBall, air: np.ndarray) -> None:
+    def enter(self, part: float, period: float, ball: FromBall, air: ToAir) -> None:
         """A move of `period` seconds, of which what came in counts to this part."""
         self.gravity[2] -= self._n * self._setup.mass * self._setup.gravity * period
         self.ball += part * ball.impulse
         self.ball_spin += part * ball.spin
         self.work += part * ball.work
-        self.air += part * air
+        self.air -= part * air.impulse
+        self.air_spin -= part * air.spin
 
     def state(self, positions: np.ndarray, velocity: np.ndarray) -> State:
         setup, n = self._setup, self._n

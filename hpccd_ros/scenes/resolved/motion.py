@@ -16,7 +16,7 @@ import numpy as np
 from hpccd_ros.scenes.resolved.ledger import Ledger
 from hpccd_ros.scenes.resolved.pairs import Pairs
 from hpccd_ros.scenes.resolved.queries import Queries
-from hpccd_ros.scenes.resolved.response import FromBall, goals, respond
+from hpccd_ros.scenes.resolved.response import FromBall, ToAir, goals, respond
 from hpccd_ros.scenes.resolved.setup import Setup
 from hpccd_ros.scenes.resolved.springs import Springs
 
@@ -76,7 +76,7 @@ class Simulation:
         trial = self._trial(ball, period)
         pairs = self._pairs(start, trial)
         for attempt in range(1, ATTEMPTS + 1):  # noqa: B007
-            end, velocity, ball_gave, drag = self._solve(ball, pairs, period, SWEEPS * attempt)
+            end, velocity, ball_gave, air = self._solve(ball, pairs, period, SWEEPS * attempt)
             free = self._queries.free_part(start, end)
             if free == 1.0:
                 break
@@ -95,7 +95,7 @@ class Simulation:
         if part == 1.0:
             self._ticks += 1
             self.time = self._ticks * setup.period
-        self.ledger.enter(part, part * period, ball_gave, drag)
+        self.ledger.enter(part, part * period, ball_gave, air)
         return Move(end, trial, self.time, attempt, part, len(pairs))
 
     def _trial(self, ball: np.ndarray, period: float) -> np.ndarray:
@@ -109,7 +109,7 @@ class Simulation:
         return Pairs.of(near, self._faces, start.astype(np.float64), end.astype(np.float64), self.setup, self._n_cloth)
 
     def _solve(self, ball: np.ndarray, pairs: Pairs, period: float, sweeps: int):
-        """(end, velocity, what the ball gave, momentum lost to the air) of the move, solved in small steps."""
+        """(end, velocity, what the ball gave, what the air took) of the move, solved in small steps."""
         setup, n = self.setup, self._n_cloth
         step = period / setup.substeps
         springs = Springs(setup, step)
@@ -118,12 +118,12 @@ class Simulation:
         assert np.shares_memory(grid, x)
         velocity = self.velocity.copy()
         ball_step = (ball.T - x[:, n:]) / setup.substeps
-        ball_gave, drag = FromBall(np.zeros(3)), np.zeros(3)
+        ball_gave, air = FromBall(np.zeros(3)), ToAir(np.zeros(3))
         gap = pairs.gap(x)
         for small in range(setup.substeps):
             before = x.copy()
             slowed = setup.drag * step * velocity
-            drag -= setup.mass * slowed.sum(axis=1)
+            air.take(setup.mass * slowed, x[:, :n])
             velocity -= slowed
             velocity[2] -= setup.gravity * step
             x[:, :n] += step * velocity
@@ -135,4 +135,4 @@ class Simulation:
             velocity = (x[:, :n] - before[:, :n]) / step
         end = np.ascontiguousarray(x.T, dtype=np.float32)
         end[n:] = ball
-        return end, velocity, ball_gave, drag
+        return end, velocity, ball_gave, air

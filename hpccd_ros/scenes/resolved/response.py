@@ -19,11 +19,24 @@ RELAXATION = 1.5
 
 @dataclass
 class FromBall:
-    """What the ball did to the cloth: momentum (3,), angular momentum about z, work."""
+    """What the ball gave the cloth: momentum (3,), angular momentum about z, work."""
 
     impulse: np.ndarray
     spin: float = 0.0
     work: float = 0.0
+
+
+@dataclass
+class ToAir:
+    """What the air took from the cloth: momentum (3,), angular momentum about z."""
+
+    impulse: np.ndarray
+    spin: float = 0.0
+
+    def take(self, impulse: np.ndarray, x: np.ndarray) -> None:
+        """impulse (3,V) from vertices at x (3,V)."""
+        self.impulse += impulse.sum(axis=1)
+        self.spin += float((x[0] * impulse[1] - x[1] * impulse[0]).sum())
 
 
 def respond(

@@ -3,12 +3,16 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from hpccd_ros.scenes import shapes
 from hpccd_ros.scenes.exactmath import axis_angle, random_stream, rotate
+
+# Largest small step times the frequency of a vertex on one spring.
+STIFFNESS = 0.8
 
 
 @dataclass(frozen=True)
@@ -17,12 +21,12 @@ class Setup:
 
     cells: int  # along a side of the cloth: 2 * cells**2 triangles
     ball_frequency: int = 10  # 20 * ball_frequency**2 triangles
-    side: float = 2.0
+    side: float = 2.4
     density: float = 0.2  # kg/m^2, of a light cotton
-    stretch: float = 300.0  # N/m, of the springs along the threads
+    stretch: float = 150.0  # N/m, of the springs along the threads
     shear: float = 20.0  # along the diagonals
     bend: float = 0.5  # between every second vertex
-    drag: float = 0.5  # 1/s, of the air
+    drag: float = 3.0  # 1/s, of the air
     gravity: float = 9.81
     ball_radius: float = 0.5
     spin: float = 6.0  # rad/s about z, reached at spin_ramp
@@ -32,7 +36,6 @@ class Setup:
     friction_ball: float = 0.8
     friction_cloth: float = 0.3
     period: float = 0.01  # of a move
-    substeps: int = 10
 
     @property
     def spacing(self) -> float:
@@ -43,6 +46,12 @@ class Setup:
     def mass(self) -> float:
         """Of a vertex."""
         return self.density * self.side * self.side / (self.cells + 1) ** 2
+
+    @property
+    def substeps(self) -> int:
+        """Small steps of a move: one sweep over the springs follows waves that take no less than a step a thread, and
+        no energy is made. So a finer cloth needs more of them."""
+        return math.ceil(self.period * math.sqrt(self.stretch / self.mass) / STIFFNESS)
 
     @property
     def thickness(self) -> float:
