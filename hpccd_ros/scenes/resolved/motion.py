@@ -8,7 +8,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,8 +23,12 @@ from hpccd_ros.scenes.resolved.springs import Springs
 CAUTION = 0.9
 # Attempts to solve a move, each with the pairs that the one before ran into.
 ATTEMPTS = 4
-# Jacobi sweeps over the pairs a small step.
+# Jacobi sweeps over the pairs a small step, in the first attempt; each later one takes as many more.
 SWEEPS = 2
+# Pairs of a failed attempt are new to the next where it left them nearer than this part of the thickness.
+PRESSED = 0.6
+# Moves in a row of which less than this part could be made, before it is an error.
+STUCK, PATIENCE = 0.01, 20
 
 
 @dataclass(frozen=True)
@@ -38,7 +41,6 @@ class Move:
     """
 
     positions: np.ndarray
-    trial: np.ndarray
     time: float
     attempts: int
     part: float
@@ -59,29 +61,27 @@ class Simulation:
         self._faces = np.concatenate([cloth_faces.astype(np.int64), ball_faces.astype(np.int64) + len(cloth)])
         self.positions = np.concatenate([cloth, self._ball]).astype(np.float32)
         self.velocity = np.zeros((3, self._n_cloth))
-        self.time = 0.0
+        self.time, self._stuck = 0.0, 0
         self._ticks = 0  # whole periods
         self.ledger = Ledger(setup, self._n_cloth)
         self.ledger.open(self.positions, self.velocity)
 
-    def moves(self) -> Iterator[Move]:
-        """Move after move, without an end."""
-        while True:
-            yield self._move()
+    def move(self) -> Move:
+        """Make the next move.
 
-    def _move(self) -> Move:
+        Raises RuntimeError where many moves in a row were shortened to nearly nothing.
+        """
         setup, start = self.setup, self.positions
         period = (self._ticks + 1) * setup.period - self.time
-        ball = setup.turned(self._ball, self.time + period).astype(np.float32)
-        trial = self._trial(ball, period)
-        pairs = self._pairs(start, trial)
+        trial = self.trial(period)
+        ball, pairs = trial[self._n_cloth :], self._pairs(start, trial)
         for attempt in range(1, ATTEMPTS + 1):  # noqa: B007
             end, velocity, ball_gave, air = self._solve(ball, pairs, period, SWEEPS * attempt)
             free = self._queries.free_part(start, end)
             if free == 1.0:
                 break
             new = self._pairs(start, end)
-            pairs = pairs.and_those_of(new.only(new.gap(end.T.astype(np.float64)) < 0.6 * setup.thickness))
+            pairs = pairs.and_those_of(new.only(new.gap(end.T.astype(np.float64)) < PRESSED * setup.thickness))
         part = 1.0
         while free < 1.0:  # what is made is what is asked about, its rounding to float32 included
             part *= CAUTION * free
@@ -89,6 +89,12 @@ class Simulation:
             free = self._queries.free_part(start, shorter)
             if free == 1.0:
                 end = shorter
+        self._stuck = self._stuck + 1 if part < STUCK else 0
+        if self._stuck > PATIENCE:
+            raise RuntimeError(
+                f"the cloth is stuck at {self.time:.3f} s: {PATIENCE} moves in a row were shortened to less than {STUCK}; "
+                "take a finer cloth or a shorter period"
+            )
         self.positions = end
         self.velocity += part * (velocity - self.velocity)
         self.time += part * period
@@ -96,9 +102,11 @@ class Simulation:
             self._ticks += 1
             self.time = self._ticks * setup.period
         self.ledger.enter(part, part * period, ball_gave, air)
-        return Move(end, trial, self.time, attempt, part, len(pairs))
+        return Move(end, self.time, attempt, part, len(pairs))
 
-    def _trial(self, ball: np.ndarray, period: float) -> np.ndarray:
+    def trial(self, period: float) -> np.ndarray:
+        """(V,3) float32: where all would be in `period` seconds if nothing were in the cloth's way."""
+        ball = self.setup.turned(self._ball, self.time + period).astype(np.float32)
         velocity = self.velocity.copy()
         velocity[2] -= self.setup.gravity * period
         cloth = self.positions[: self._n_cloth] + (period * velocity).T

@@ -26,10 +26,10 @@ class Setup:
     stretch: float = 150.0  # N/m, of the springs along the threads
     shear: float = 20.0  # along the diagonals
     bend: float = 0.5  # between every second vertex
-    drag: float = 3.0  # 1/s, of the air
+    drag: float = 5.0  # 1/s, of the air: it holds back what hangs free, so that the cloth winds round the ball
     gravity: float = 9.81
     ball_radius: float = 0.5
-    spin: float = 6.0  # rad/s about z, reached at spin_ramp
+    spin: float = 5.0  # rad/s about z, reached at spin_ramp
     spin_ramp: float = 0.3
     drop_height: float = 0.05
     offset: tuple[float, float] = (0.06, -0.03)  # of the cloth's centre: the folds fall unevenly
