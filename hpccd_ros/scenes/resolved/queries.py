@@ -17,13 +17,15 @@ class Near(Protocol):
     """Pairs that come near: as hpccd_core.Contacts names them, with normals and closest points at their toc."""
 
     vf: np.ndarray
+    vf_toc: np.ndarray
     ee: np.ndarray
+    ee_toc: np.ndarray
     normals: np.ndarray
     closest: np.ndarray
 
 
 class Queries:
-    """The three questions. Positions are (V,3) float32, the cloth's vertices first, then the ball's.
+    """The three questions, and what follows from the answers. Positions are (V,3) float32, the cloth's vertices first, then the ball's.
 
     seconds: spent in answers so far, ways to and fro included.
     """
@@ -42,6 +44,9 @@ class Queries:
     def intersections(self, positions: np.ndarray) -> int:
         """Edges that pierce or touch a face."""
         raise NotImplementedError
+
+    def made(self, positions: np.ndarray) -> None:
+        """Told of each frame: for who listens."""
 
     @contextmanager
     def _timed(self) -> Iterator[None]:
