@@ -11,7 +11,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from hpccd_ros.scenes import cache, exactmath, shapes
+from hpccd_ros.scenes import cache, shapes
 from hpccd_ros.scenes.progress import track
 from hpccd_ros.scenes.resolved import motion, pairs, queries, response, setup, springs
 from hpccd_ros.scenes.scene import Frame, Mesh, Scene
@@ -20,7 +20,7 @@ from hpccd_ros.scenes.scene import Frame, Mesh, Scene
 TRIAL = 0.04
 
 # What the numbers depend on.
-SOURCES = [motion, pairs, queries, response, setup, springs, shapes, exactmath]
+SOURCES = [motion, pairs, queries, response, setup, springs, shapes]
 
 
 def resolved(name, title, triangles: int, size: float, frames: int, seed: int, progress: bool) -> Scene:
