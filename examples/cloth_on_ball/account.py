@@ -85,8 +85,8 @@ class Account:
             f"momentum       what gravity, ball and air gave explains it but for {self._unexplained:.1e} N s at most",
             f"spin           {state.spin:.4f} kg m2/s, of which ball and air gave "
             f"{ledger.ball_spin + ledger.air_spin:.4f}",
-            f"energy         {start:.3f} J at the start + {ledger.work:.3f} J from the ball = {state.energy:.3f} J there "
-            f"+ {self._lost[-1]:.3f} J lost",
+            f"energy         {start:.3f} J at the start + {ledger.work:.3f} J from the ball = "
+            f"{state.energy:.3f} J there + {self._lost[-1]:.3f} J lost",
             f"               to friction, air and impacts: in no move less than {min(np.diff(self._lost)):.1e} J",
             f"time           {1e3 * took / frames:.1f} ms a frame (median {1e3 * np.median(self._seconds):.1f}), "
             f"{100 * asked / took:.0f} % of it in hpccd",

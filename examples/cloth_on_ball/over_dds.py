@@ -46,8 +46,9 @@ def started_node(scene, threads: int, recording: Path | None):
         write_parameters(scene, parameters)
         record = ["-p", f"record:={recording.resolve()}"] if recording else []
         child = children.start(
-            "node", "hpccd_ros.node", "--ros-args", "--params-file", str(parameters), "-p", f"threads:={threads}", *record
-        )
+            "node", "hpccd_ros.node", "--ros-args", "--params-file", str(parameters),
+            "-p", f"threads:={threads}", *record,
+        )  # fmt: skip
         yield "hpccd"
         children.check()
         if children.end(child) != 0:

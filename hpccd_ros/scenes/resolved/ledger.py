@@ -30,7 +30,7 @@ class State:
 class Ledger:
     """What came in since the start, beside what is there.
 
-    gravity, ball, air: (3,) momentum that each gave. ball_spin, air_spin: angular momentum about z. work: that the ball did, J.
+    gravity, ball, air: (3,) momentum that each gave; ball_spin, air_spin: angular momentum about z; work: of the ball.
     """
 
     def __init__(self, setup: Setup, n_cloth: int):

@@ -75,7 +75,7 @@ class Simulation:
         period = (self._ticks + 1) * setup.period - self.time
         trial = self.trial(period)
         ball, pairs = trial[self._n_cloth :], self._pairs(start, trial)
-        for attempt in range(1, ATTEMPTS + 1):  # noqa: B007
+        for attempt in range(1, ATTEMPTS + 1):
             end, velocity, ball_gave, air = self._solve(ball, pairs, period, SWEEPS * attempt)
             free = self._queries.free_part(start, end)
             if free == 1.0:
@@ -92,8 +92,8 @@ class Simulation:
         self._stuck = self._stuck + 1 if part < STUCK else 0
         if self._stuck > PATIENCE:
             raise RuntimeError(
-                f"the cloth is stuck at {self.time:.3f} s: {PATIENCE} moves in a row were shortened to less than {STUCK}; "
-                "take a finer cloth or a shorter period"
+                f"the cloth is stuck at {self.time:.3f} s: {PATIENCE} moves in a row were shortened to less than "
+                f"{STUCK}; take a finer cloth or a shorter period"
             )
         self.positions = end
         self.velocity += part * (velocity - self.velocity)
@@ -122,8 +122,7 @@ class Simulation:
         step = period / setup.substeps
         springs = Springs(setup, step)
         x = np.ascontiguousarray(self.positions.T, dtype=np.float64)
-        grid = x[:, :n].reshape(3, setup.cells + 1, setup.cells + 1)
-        assert np.shares_memory(grid, x)
+        grid = x[:, :n].reshape(3, setup.cells + 1, setup.cells + 1)  # a view
         velocity = self.velocity.copy()
         ball_step = (ball.T - x[:, n:]) / setup.substeps
         ball_gave, air = FromBall(np.zeros(3)), ToAir(np.zeros(3))

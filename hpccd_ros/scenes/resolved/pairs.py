@@ -16,7 +16,6 @@ from hpccd_ros.scenes.resolved.queries import Near
 from hpccd_ros.scenes.resolved.setup import Setup
 
 
-
 @dataclass(frozen=True)
 class Pairs:
     """N pairs. With x (3,V): the gap along `normal` (3,N) is normal . sum of weight[k] * x[:, vertex[k]], k = 0 .. 3.

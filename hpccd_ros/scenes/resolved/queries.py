@@ -25,7 +25,7 @@ class Near(Protocol):
 
 
 class Queries:
-    """The three questions, and what follows from the answers. Positions are (V,3) float32, the cloth's vertices first, then the ball's.
+    """The three questions. Positions are (V,3) float32, the cloth's vertices first, then the ball's.
 
     seconds: spent in answers so far, ways to and fro included.
     """
