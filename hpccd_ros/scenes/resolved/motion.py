@@ -35,8 +35,8 @@ STUCK, PATIENCE = 0.01, 20
 class Move:
     """A move that was made, from the end of the one before.
 
-    positions: (V,3) float32 at its end, cloth and ball. time: s, at its end. attempts: how often it was solved; part: how
-    much of it was made. pairs: that it was solved with.
+    positions: (V,3) float32 at its end, cloth and ball. time: s, at its end. attempts: how often it was solved. part:
+    how much of it was made. pairs: that it was solved with.
     """
 
     positions: np.ndarray
