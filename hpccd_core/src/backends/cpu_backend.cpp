@@ -18,6 +18,10 @@ CpuBackend::CpuBackend(Resources& shared)
 }
 
 std::optional<Detection> CpuBackend::detect(Positions t0, Positions t1) {
+  if (shared_.options.report == Report::first && !method_) {
+    find_earliest(t0, t1, false);
+    return Detection{collect(), Backend::cpu};
+  }
   update(t0, t1, Tests::all_here);
   traverse();
   return Detection{collect(), Backend::cpu};
@@ -34,16 +38,6 @@ void CpuBackend::update(Positions t0, Positions t1, Tests tests) {
   }
 }
 
-std::optional<double> CpuBackend::earliest(Positions t0, Positions t1) {
-  see_motion(t0, t1, Tests::all_here);
-  search_.report = Report::first;
-  search_.time_only = true;
-  shared_.tree.fit(shared_.profiler);
-  walk_tree();
-  shared_.cancellation.heed();
-  return search_.earliest;
-}
-
 void CpuBackend::see_motion(Positions t0, Positions t1, Tests tests) {
   const Options& o = shared_.options;
   shared_.tree.bound(t0, t1, shared_.separations.largest());
@@ -52,6 +46,7 @@ void CpuBackend::see_motion(Positions t0, Positions t1, Tests tests) {
   search_.geometry.margin = {shared_.separations.most() + shared_.tree.motion().rounding,
                              shared_.tree.motion().map.scale};
   search_.leaf_pairs = leaf_pairs(o.simd);
+  search_.leaf_pairs_until = leaf_pairs_until(o.simd);
   const bool here = tests == Tests::all_here;
   search_.report = !here && o.report == Report::any ? Report::all : o.report;
   for (unsigned i = 0; i < n_rules; ++i) {
@@ -72,7 +67,7 @@ void CpuBackend::begin_query() {
   search_.earliest = std::numeric_limits<double>::infinity();
   search_.leaf_pairs = nullptr, search_.leaf_pairs_in_snapshot = nullptr, search_.leaf_edge_faces = nullptr;
   search_.nearest = nullptr;
-  search_.time_only = false;
+  search_.time_only = search_.prunes = false;
 }
 
 void CpuBackend::traverse() {
@@ -127,6 +122,8 @@ void CpuBackend::count(std::map<std::string, std::uint64_t>& stats) const {
   std::uint64_t bytes = order_.bytes();
   if (method_) bytes += method_->bytes();
   if (mesh_pairs_) bytes += mesh_pairs_->bytes();
+  bytes += near_.bytes();
+  if (search_.report == Report::first) stats["near_pairs"] = near_.size();
   const char* kinds[3] = {"vf", "ee", "ef"};
   const bool pairs = search_.leaf_pairs || search_.leaf_pairs_in_snapshot;
   const bool asked[3] = {pairs, pairs, search_.leaf_edge_faces != nullptr};

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "backends/backend.h"
+#include "backends/near_list.h"
 #include "backends/resources.h"
 #include "contacts/canonical.h"
 #include "paper/method.h"
@@ -40,6 +41,12 @@ class CpuBackend final : public DetectionBackend {
 
  private:
   void begin_query();
+  void find_earliest(Positions t0, Positions t1, bool time_only);
+  void begin_earliest(Positions t0, Positions t1, bool time_only);
+  bool known_from_near_pairs();
+  bool list_near_pairs(Positions t0);
+  void test_near_pairs();
+  void remember_earliest();
   void see_motion(Positions t0, Positions t1, Tests tests);
   void see_snapshot(Positions vertices);
   void walk_tree();
@@ -53,6 +60,9 @@ class CpuBackend final : public DetectionBackend {
   std::vector<Worker> workers_;
   Search search_;
   ContactOrder order_;
+  NearList near_;                        // for the earliest contacts of motions that begin alike
+  std::uint64_t near_separations_ = 0;   // the version of the separations that it is for
+  Travel travel_;                        // of the motion, as the list sees it
   std::optional<MeshPairs> mesh_pairs_;  // from the first search for smallest distances on
   // Kept by a call that is cancelled: to give the memory of 10 million back to the system takes longer than to end it.
   Contacts contacts_;

@@ -20,6 +20,7 @@ struct Geometry {
   double scale = 1;                   // power of two that brings the scene to about one; only single precision needs it
   Separations separations = {};       // for tests of distances
   KdopMargin margin = {};             // of the largest of them
+  float until = 2;                    // below 1: pairs that cannot touch up to this time may be left out
 };
 
 template <Kind kind>

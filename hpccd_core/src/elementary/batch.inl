@@ -18,7 +18,9 @@ void test(const Geometry& g, const std::uint32_t* first, const std::uint32_t* se
   std::uint32_t near[batch_capacity], survivors[batch_capacity], single[batch_capacity], many[batch_capacity];
   std::uint32_t n_survivors = 0, n_single = 0, n_many = 0;
 
-  const std::uint32_t n_near = g.kdops ? near_pairs<kind>(Apart(), g, first, second, n, near) : n;
+  const std::uint32_t n_near = !g.kdops      ? n
+                               : g.until < 1 ? near_pairs<kind>(until(g), g, first, second, n, near)
+                                             : near_pairs<kind>(Apart(), g, first, second, n, near);
   for_lanes<kind, R>(g, first, second, g.kdops ? near : nullptr, n_near,
                      [&](Lanes m, const std::uint32_t* at, unsigned valid) {
                        append(survivors, n_survivors, at, valid & ~bits(coplanarity_filter<Policy>(m).none));

@@ -29,6 +29,20 @@ struct ApartByMore {
   }
 };
 
+// Apart by more than a margin in each direction up to a time below 1.
+struct ApartUntil {
+  Floats16 margin, time;
+  HPCCD_HD bool operator()(const Kdop& a, const Kdop& b) const {
+    return any_in_both_halves(less(at(a.high) + margin, at(b.low)), less(at(b.high) + margin, at(a.low)));
+  }
+  HPCCD_HD Floats16 at(Floats16 x) const {
+    const Floats16 start = first_half_twice(x);
+    return start + time * (x - start);
+  }
+};
+// Values below eight, interpolated in floats, are off by 1.5e-6 each.
+HPCCD_HD ApartUntil until(const Geometry& g) { return {load16(g.margin.in) + all16(4e-6f), all16(g.until)}; }
+
 // Positions of the pairs that are not apart, in `near`; how many there are.
 template <Kind kind, class AreApart>
 HPCCD_HD std::uint32_t near_pairs(const AreApart& apart, const Geometry& g, const std::uint32_t* first,

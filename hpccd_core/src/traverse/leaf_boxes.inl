@@ -24,6 +24,10 @@ HPCCD_HD Bounds<1> bounds_of(const Node& node) { return {node.box.t0.low}; }
 // Bit j: box j of the group overlaps b. Through the whole motion (MotionBox::overlaps):
 struct BothEnds {
   using Group = Rows16<n_bounds>;
+  template <class Bounds>
+  HPCCD_HD Bounds bounds(Bounds b) const {
+    return b;
+  }
   HPCCD_HD static Group load(const BoxGroup& group) { return load_rows(group.rows); }
   template <class Bounds>
   HPCCD_HD unsigned overlapping(const Group& g, Bounds b) const {
@@ -38,10 +42,57 @@ struct BothEnds {
   }
 };
 
+// Up to a time (Node::overlap_until): in place of the second end boxes are those of that time, of which the group's
+// grow once, when they are loaded.
+struct Until {
+  float time;
+  struct Group {
+    Floats16 rows[n_bounds];
+  };
+  struct At {
+    float value[n_bounds];
+    HPCCD_HD float operator[](std::uint32_t row) const { return value[row]; }
+  };
+  HPCCD_HD Group load(const BoxGroup& group) const {
+    Group g;
+    const Floats16 t = all16(time), lower = all16(-between_ends), higher = all16(between_ends);
+    for (std::uint32_t i = 0; i < n_bounds / 2; ++i) {
+      const Floats16 start = load16(group.rows[i]), end = load16(group.rows[i + n_bounds / 2]);
+      g.rows[i] = start;
+      g.rows[i + n_bounds / 2] = start + t * (end - start) + (side_of_bound(i) == Side::low ? lower : higher);
+    }
+    return g;
+  }
+  template <class Bounds>
+  HPCCD_HD At bounds(Bounds b) const {
+    At at;
+    for (std::uint32_t i = 0; i < n_bounds / 2; ++i) {
+      at.value[i] = b[i];
+      at.value[i + n_bounds / 2] = b[i] + time * (b[i + n_bounds / 2] - b[i]);
+    }
+    return at;
+  }
+  template <class Bounds>
+  HPCCD_HD unsigned overlapping(const Group& g, const Bounds& b) const {
+    Mask16 apart;
+    for (std::uint32_t axis = 0; axis < 3; ++axis) {
+      const Mask16 below = less(g.rows[high(0, axis)], all16(b[low(0, axis)]));
+      const Mask16 above = less(all16(b[high(0, axis)]), g.rows[low(0, axis)]);
+      apart = apart | (below & less(g.rows[high(1, axis)], all16(b[low(1, axis)])));
+      apart = apart | (above & less(all16(b[high(1, axis)]), g.rows[low(1, axis)]));
+    }
+    return ~apart.bits() & 0xFFFF;
+  }
+};
+
 // In one snapshot, where boxes may also be as far apart as `reach` (Node::near_in_snapshot): those of the group grow by
 // it once, when they are loaded.
 struct InSnapshot {
   float reach;
+  template <class Bounds>
+  HPCCD_HD Bounds bounds(Bounds b) const {
+    return b;
+  }
   struct Group {
     Floats16 rows[n_bounds];
   };
@@ -93,7 +144,8 @@ template <class When>
 HPCCD_HD Near near(When when, const BoxGroup* groups, std::uint32_t begin, std::uint32_t end, const Node& other) {
   Near n;
   for (std::uint32_t i = 0, group = 0; i < end; i += BoxGroup::width, ++group)
-    n.lanes[group] = when.overlapping(when.load(groups[group]), bounds_of(other)) & lanes_in(i, begin, end),
+    n.lanes[group] =
+        when.overlapping(when.load(groups[group]), when.bounds(bounds_of(other))) & lanes_in(i, begin, end),
     n.count += static_cast<unsigned>(__builtin_popcount(n.lanes[group]));
   return n;
 }

@@ -6,15 +6,18 @@ namespace hpccd {
 // Of leaf_pairs.inl, compiled for each instruction set.
 namespace scalar {
 void leaf_pairs(const Tree&, const LeafRange&, const LeafRange&, CandidateBuffer&, CandidateBuffer&);
+void leaf_pairs_until(const Tree&, const LeafRange&, const LeafRange&, float, CandidateBuffer&, CandidateBuffer&);
 void leaf_pairs_in_snapshot(const Tree&, const LeafRange&, const LeafRange&, float, CandidateBuffer&, CandidateBuffer&);
 }  // namespace scalar
 #if defined(HPCCD_X86)
 namespace avx2 {
 void leaf_pairs(const Tree&, const LeafRange&, const LeafRange&, CandidateBuffer&, CandidateBuffer&);
+void leaf_pairs_until(const Tree&, const LeafRange&, const LeafRange&, float, CandidateBuffer&, CandidateBuffer&);
 void leaf_pairs_in_snapshot(const Tree&, const LeafRange&, const LeafRange&, float, CandidateBuffer&, CandidateBuffer&);
 }  // namespace avx2
 namespace avx512 {
 void leaf_pairs(const Tree&, const LeafRange&, const LeafRange&, CandidateBuffer&, CandidateBuffer&);
+void leaf_pairs_until(const Tree&, const LeafRange&, const LeafRange&, float, CandidateBuffer&, CandidateBuffer&);
 void leaf_pairs_in_snapshot(const Tree&, const LeafRange&, const LeafRange&, float, CandidateBuffer&, CandidateBuffer&);
 }  // namespace avx512
 #endif
@@ -25,6 +28,14 @@ LeafPairs leaf_pairs([[maybe_unused]] Simd simd) {
   if (simd == Simd::avx2) return avx2::leaf_pairs;
 #endif
   return scalar::leaf_pairs;
+}
+
+LeafPairsUntil leaf_pairs_until([[maybe_unused]] Simd simd) {
+#if defined(HPCCD_X86)
+  if (simd == Simd::avx512) return avx512::leaf_pairs_until;
+  if (simd == Simd::avx2) return avx2::leaf_pairs_until;
+#endif
+  return scalar::leaf_pairs_until;
 }
 
 LeafPairsInSnapshot leaf_pairs_in_snapshot([[maybe_unused]] Simd simd) {

@@ -22,6 +22,12 @@ using LeafPairs = void (*)(const Tree& tree, const LeafRange& a, const LeafRange
 
 LeafPairs leaf_pairs(Simd simd);
 
+// The same of the motion up to a time below 1.
+using LeafPairsUntil = void (*)(const Tree& tree, const LeafRange& a, const LeafRange& b, float until,
+                                CandidateBuffer& edge_edge, CandidateBuffer& vertex_face);
+
+LeafPairsUntil leaf_pairs_until(Simd simd);
+
 // The same of one snapshot: features whose boxes at t = 0 are no farther apart than `reach` along any axis.
 using LeafPairsInSnapshot = void (*)(const Tree& tree, const LeafRange& a, const LeafRange& b, float reach,
                                      CandidateBuffer& edge_edge, CandidateBuffer& vertex_face);

@@ -22,7 +22,7 @@ HPCCD_HD void near_edges(When when, const Tree& tree, const Near& near_a, const 
     const auto group = when.load(groups_b[i / BoxGroup::width]);
     const std::uint32_t slot = b.first_edge + i;
     for_each(near_a, n_a, [&](std::uint32_t k) {
-      unsigned m = when.overlapping(group, bounds_at(groups_a, k)) & lanes_in(i, same ? k + 1 : 0, n_b);
+      unsigned m = when.overlapping(group, when.bounds(bounds_at(groups_a, k))) & lanes_in(i, same ? k + 1 : 0, n_b);
       if (!m) return;
       const std::uint32_t v0 = end0[a.first_edge + k], v1 = end1[a.first_edge + k];
       m &= ~(equal16(end0 + slot, v0) | equal16(end0 + slot, v1) | equal16(end1 + slot, v0) | equal16(end1 + slot, v1));
@@ -63,7 +63,7 @@ HPCCD_HD void vertex_face_pairs(When when, const Tree& tree, const LeafRange& a,
                       *c2 = tree.face_corners[2].data() + b.first_face;
   const auto faces = when.load(group_b);
   for_each(near_a, end_a, [&](std::uint32_t k) {
-    unsigned m = when.overlapping(faces, bounds_at(groups_a, k)) & lanes_in(0, 0, b.n_faces());
+    unsigned m = when.overlapping(faces, when.bounds(bounds_at(groups_a, k))) & lanes_in(0, 0, b.n_faces());
     if (!m) return;
     const std::uint32_t v = vertex[k - first_a];
     m &= ~(equal16(c0, v) | equal16(c1, v) | equal16(c2, v));
@@ -87,6 +87,11 @@ HPCCD_HD void pairs_of_leaves(When when, const Tree& tree, const LeafRange& a, c
 void leaf_pairs(const Tree& tree, const LeafRange& a, const LeafRange& b, CandidateBuffer& edge_edge,
                 CandidateBuffer& vertex_face) {
   pairs_of_leaves(BothEnds(), tree, a, b, edge_edge, vertex_face);
+}
+
+void leaf_pairs_until(const Tree& tree, const LeafRange& a, const LeafRange& b, float until, CandidateBuffer& edge_edge,
+                      CandidateBuffer& vertex_face) {
+  pairs_of_leaves(Until{until}, tree, a, b, edge_edge, vertex_face);
 }
 
 void leaf_pairs_in_snapshot(const Tree& tree, const LeafRange& a, const LeafRange& b, float reach,

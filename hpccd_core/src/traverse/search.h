@@ -21,6 +21,7 @@ struct Search {
   Geometry geometry;
   // Which pairs of features of two leaves; null: none.
   LeafPairs leaf_pairs = nullptr;
+  LeafPairsUntil leaf_pairs_until = nullptr;  // of a part of the motion, where the earliest contacts are looked for
   LeafPairsInSnapshot leaf_pairs_in_snapshot = nullptr;  // of one snapshot, within `reach` or what `nearest` leaves
   LeafEdgeFaces leaf_edge_faces = nullptr;
   float reach = 0;
@@ -33,6 +34,14 @@ struct Search {
   Report report;
   std::atomic<double> earliest;  // best time so far, where report is first
   bool time_only = false;        // the earliest time is all that is asked for, never a late one
+  bool prunes = false;           // what cannot touch up to the best time is left out
+  // Pairs that touch later do not matter; 1 or more: all do. Times that are reported as equal may be apart by 2e-12.
+  float until() const {
+    const double best = earliest.load(std::memory_order_relaxed);
+    return prunes && best < 1 ? static_cast<float>(best + 2e-12) * (1 + 2e-7f) : 2;
+  }
+  // Nothing that is found could matter any more.
+  bool over() const { return time_only && earliest.load(std::memory_order_relaxed) <= 0; }
   const Cancellation* cancellation = &never_cancelled;
 };
 

@@ -2,6 +2,14 @@
 #include "traverse/tasks.h"
 
 namespace hpccd {
+namespace {
+
+// At the other tiers what is reported may not touch at all.
+bool tells_times(Rule rule) {
+  return rule.separated || rule.accuracy == Accuracy::exact || rule.accuracy == Accuracy::conservative;
+}
+
+}  // namespace
 
 PairRules::PairRules(const Scene& scene, Accuracy accuracy, const SeparationTable& separations)
     : n_(scene.meshes().size()) {
@@ -19,10 +27,12 @@ PairRules::PairRules(const Scene& scene, Accuracy accuracy, const SeparationTabl
 void PairRules::change(const SeparationTable& separations) {
   rules_.resize(n_ * n_);
   bool all_default = true;
+  promise_times_ = true;
   for (std::uint32_t a = 0; a < n_; ++a)
     for (std::uint32_t b = 0; b < n_; ++b) {
       const std::size_t i = a * n_ + b;
       rules_[i] = {accuracy_[i], separations.of(a, b) > 0};
+      if (enabled(a, b)) promise_times_ = promise_times_ && tells_times(rules_[i]);
       all_default = all_default && rules_[i].number() == rules_[0].number();
     }
   if (!rules_.empty()) default_ = rules_[0];

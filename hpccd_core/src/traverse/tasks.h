@@ -41,11 +41,13 @@ class PairRules {
   Rule rule(std::uint32_t mesh_a, std::uint32_t mesh_b) const {
     return rules_.empty() ? default_ : rules_[mesh_a * n_ + mesh_b];
   }
+  // Whether every pair that touches has a time of contact, to 1e-12, so that one that cannot touch until then has none.
+  bool promise_times() const { return promise_times_; }
   Rule rule(const Node& a, const Node& b) const { return rule(a.mesh, b.mesh); }
 
  private:
   std::size_t n_;
-  bool all_enabled_ = true;
+  bool all_enabled_ = true, promise_times_ = true;
   std::vector<char> enabled_;
   std::vector<Accuracy> accuracy_;
   Rule default_{};

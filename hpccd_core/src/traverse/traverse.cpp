@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "traverse/boxes_until.h"
 #include "traverse/pair_pool.h"
 #include "traverse/snapshot.h"
 
@@ -14,6 +15,7 @@ struct NearerBoxes {
   static constexpr bool shrink = true;
   const Tree& tree;
   const NearestPairs& nearest;
+  bool changed() { return true; }
   bool overlap(const Node& a, const Node& b) const {
     return a.near_in_snapshot(b, nearest.reach(a.mesh, b.mesh)) && open({number(a), number(b)});
   }
@@ -39,14 +41,20 @@ struct NearerBoxes {
 
 // From pairs that are worth visiting. `between` is called between two of them and may take from the stack.
 template <class Boxes, class Between>
-void walk(const Tree& tree, const PairRules& rules, const Boxes& boxes, const Cancellation& cancellation,
+void walk(const Tree& tree, const PairRules& rules, Boxes boxes, const Cancellation& cancellation,
           std::vector<NodePair>& stack, Worker& worker, Between&& between) {
+  std::size_t stale = 0;  // so many at the bottom were put there when boxes were larger
   while (!stack.empty()) {
     cancellation.heed();
     const NodePair p = stack.back();
     stack.pop_back();
-    if constexpr (Boxes::shrink)
-      if (!boxes.open(p) || !worth_visiting(tree.nodes, rules, boxes, p)) continue;
+    if constexpr (Boxes::shrink) {
+      if (boxes.changed()) stale = stack.size() + 1;
+      if (stack.size() < stale) {
+        stale = stack.size();
+        if (!boxes.open(p) || !worth_visiting(tree.nodes, rules, boxes, p)) continue;
+      }
+    }
     if (is_leaf_pair(tree.nodes, p)) {
       const LeafPair leaves{tree.nodes[p.a].leaf, tree.nodes[p.b].leaf};
       ++worker.leaf_pairs;
@@ -124,10 +132,15 @@ void test_leaves(const Tree& tree, const PairRules& rules, LeafPair pair, Worker
   const LeafRange &a = tree.leaves[pair.first], &b = tree.leaves[pair.second];
   const Search& search = worker.search();
   const Rule rule = rules.rule(node_a, node_b);
-  if (search.leaf_pairs)
+  if (search.leaf_pairs) {
+    const float until = search.until();
     worker.test_candidates(rule, [&](CandidateBuffer& edge_edge, CandidateBuffer& vertex_face) {
-      search.leaf_pairs(tree, a, b, edge_edge, vertex_face);
+      if (until < 1)
+        search.leaf_pairs_until(tree, a, b, until, edge_edge, vertex_face);
+      else
+        search.leaf_pairs(tree, a, b, edge_edge, vertex_face);
     });
+  }
   if (search.leaf_edge_faces)
     worker.test_edge_faces([&](CandidateBuffer& edge_face) { search.leaf_edge_faces(tree, a, b, edge_face); });
   if (!search.leaf_pairs_in_snapshot) return;
@@ -180,6 +193,8 @@ void traverse(const Tree& tree, const PairRules& rules, Search& search, ThreadPo
     traverse_all(tree, rules, SnapshotBoxes{search.reach}, search, pool, workers);
   else if (search.report == Report::any)
     traverse_any(tree, rules, search, pool, workers);
+  else if (search.prunes)
+    traverse_all(tree, rules, BoxesUntil{search}, search, pool, workers);
   else
     traverse_all(tree, rules, MotionBoxes(), search, pool, workers);
 }

@@ -36,6 +36,7 @@ void Worker::begin(Search& search) {
   for (FallbackCounts& c : fallbacks) c = {};
   node_pairs = leaf_pairs = 0;
   elementary_seconds = 0;
+  first_batches_ = search.prunes ? first_batches : 0;
   for (auto& w : waiting_)  // what an exception left behind
     if (w) w->edge_edge.n = w->vertex_face.n = 0;
   if (edge_faces_) edge_faces_->n = 0;
@@ -62,6 +63,7 @@ std::size_t Worker::bytes() const {
 void Worker::drain(CandidateBuffer& buffer, Kind kind, Rule rule, std::uint32_t keep_below) {
   static_assert(batch_capacity - 1 + CandidateBuffer::most_per_call <= CandidateBuffer::capacity);
   if (buffer.n < keep_below) return;
+  first_batches_ -= first_batches_ > 0;
   const auto start = std::chrono::steady_clock::now();
   std::uint32_t done = 0;
   while (buffer.n - done >= keep_below && done < buffer.n) {
@@ -73,6 +75,14 @@ void Worker::drain(CandidateBuffer& buffer, Kind kind, Rule rule, std::uint32_t 
   std::copy(buffer.second + done, buffer.second + buffer.n, buffer.second);
   buffer.n -= done;
   elementary_seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+void Worker::test_pairs(std::span<const std::uint32_t> first, std::span<const std::uint32_t> second, Kind kind,
+                        Rule rule) {
+  for (std::size_t i = 0; i < first.size(); i += batch_capacity) {
+    const auto n = static_cast<std::uint32_t>(std::min<std::size_t>(first.size() - i, batch_capacity));
+    test(first.data() + i, second.data() + i, n, kind, rule);
+  }
 }
 
 void Worker::test(const std::uint32_t* first, const std::uint32_t* second, std::uint32_t n, Kind kind, Rule rule) {
@@ -123,9 +133,14 @@ void Worker::resolve(const Candidate& candidate, Rule rule) {
   if (const auto value = search_->fallback[rule.number()](rule.accuracy, pair, count)) report(kind, {a, b, *value});
 }
 
-// With the limit of each pair of the batch, where the nearest pairs are looked for.
+// With the time up to which pairs matter, and with the limit of each pair of the batch, where such are looked for.
 const Geometry& Worker::geometry_of(const std::uint32_t* first, const std::uint32_t* second, std::uint32_t n,
                                     Kind kind) {
+  if (const float until = search_->until(); until < 1) {
+    limited_ = search_->geometry;
+    limited_.until = until;
+    return limited_;
+  }
   if (!search_->nearest) return search_->geometry;
   limits_.resize(batch_capacity);
   for (std::uint32_t i = 0; i < n; ++i)
@@ -154,7 +169,7 @@ void Worker::report(Kind kind, const Contact& contact) {
            !search_->earliest.compare_exchange_weak(best, contact.toc, std::memory_order_relaxed)) {
     }
   }
-  if (!search_->time_only) found(kind).push_back(contact);
+  found(kind).push_back(contact);
 }
 
 }  // namespace hpccd

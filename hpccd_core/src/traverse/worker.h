@@ -27,6 +27,9 @@ class PairSink {
   virtual void flush() = 0;  // no more for now
 };
 
+// Where contacts bound the search, any is better than none: the first batches are small.
+inline constexpr std::uint32_t first_batch = 64, first_batches = 32;
+
 // Aligned: counters of two threads on one cache line cost a fifth of a small scene's traversal.
 class alignas(128) Worker {
  public:
@@ -37,8 +40,9 @@ class alignas(128) Worker {
   void test_candidates(Rule rule, Add&& add) {
     Waiting& waiting = waiting_by(rule);
     add(waiting.edge_edge, waiting.vertex_face);
-    if (waiting.edge_edge.n >= batch_capacity) drain(waiting.edge_edge, Kind::edge_edge, rule, batch_capacity);
-    if (waiting.vertex_face.n >= batch_capacity) drain(waiting.vertex_face, Kind::vertex_face, rule, batch_capacity);
+    const std::uint32_t full = first_batches_ > 0 ? first_batch : batch_capacity;
+    if (waiting.edge_edge.n >= full) drain(waiting.edge_edge, Kind::edge_edge, rule, full);
+    if (waiting.vertex_face.n >= full) drain(waiting.vertex_face, Kind::vertex_face, rule, full);
   }
   // The same of edges against faces: add(edge_face).
   template <class Add>
@@ -47,6 +51,8 @@ class alignas(128) Worker {
     add(*edge_faces_);
     if (edge_faces_->n >= batch_capacity) drain(*edge_faces_, Kind::edge_face, {}, batch_capacity);
   }
+  // Tests pairs of one kind at once.
+  void test_pairs(std::span<const std::uint32_t> first, std::span<const std::uint32_t> second, Kind kind, Rule rule);
   const Search& search() const { return *search_; }
   void flush();  // tests what waits
   // The tier's fallback on a pair that nothing else decides, and a contact found elsewhere.
@@ -84,6 +90,7 @@ class alignas(128) Worker {
   std::unique_ptr<Waiting> waiting_[n_rules];
   std::unique_ptr<CandidateBuffer> edge_faces_;
   std::unique_ptr<BatchResult> result_;
+  std::uint32_t first_batches_ = 0;
   std::vector<double> limits_;  // of the batch, in the search for nearest pairs
 };
 

@@ -74,6 +74,13 @@ HPCCD_HD Floats16 all16(float x) { return {{_mm256_set1_ps(x), _mm256_set1_ps(x)
 HPCCD_HD Floats16 operator+(const Floats16& a, const Floats16& b) {
   return {{_mm256_add_ps(a.half[0], b.half[0]), _mm256_add_ps(a.half[1], b.half[1])}};
 }
+HPCCD_HD Floats16 operator-(const Floats16& a, const Floats16& b) {
+  return {{_mm256_sub_ps(a.half[0], b.half[0]), _mm256_sub_ps(a.half[1], b.half[1])}};
+}
+HPCCD_HD Floats16 operator*(const Floats16& a, const Floats16& b) {
+  return {{_mm256_mul_ps(a.half[0], b.half[0]), _mm256_mul_ps(a.half[1], b.half[1])}};
+}
+HPCCD_HD Floats16 first_half_twice(const Floats16& x) { return {{x.half[0], x.half[0]}}; }
 HPCCD_HD Floats16 min(const Floats16& a, const Floats16& b) {
   return {{_mm256_min_ps(a.half[0], b.half[0]), _mm256_min_ps(a.half[1], b.half[1])}};
 }

@@ -91,6 +91,9 @@ struct Floats16 {
 HPCCD_HD Floats16 load16(const float* x) { return {_mm512_load_ps(x)}; }
 HPCCD_HD Floats16 all16(float x) { return {_mm512_set1_ps(x)}; }
 HPCCD_HD Floats16 operator+(Floats16 a, Floats16 b) { return {_mm512_add_ps(a.v, b.v)}; }
+HPCCD_HD Floats16 operator-(Floats16 a, Floats16 b) { return {_mm512_sub_ps(a.v, b.v)}; }
+HPCCD_HD Floats16 operator*(Floats16 a, Floats16 b) { return {_mm512_mul_ps(a.v, b.v)}; }
+HPCCD_HD Floats16 first_half_twice(Floats16 x) { return {_mm512_broadcast_f32x8(_mm512_castps512_ps256(x.v))}; }
 HPCCD_HD Floats16 min(Floats16 a, Floats16 b) { return {_mm512_min_ps(a.v, b.v)}; }
 HPCCD_HD Floats16 max(Floats16 a, Floats16 b) { return {_mm512_max_ps(a.v, b.v)}; }
 

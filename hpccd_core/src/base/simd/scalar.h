@@ -55,6 +55,18 @@ HPCCD_HD Floats16 operator+(const Floats16& a, const Floats16& b) {
   for (int i = 0; i < 4; ++i) r.part[i] = a.part[i] + b.part[i];
   return r;
 }
+HPCCD_HD Floats16 operator-(const Floats16& a, const Floats16& b) {
+  Floats16 r;
+  for (int i = 0; i < 4; ++i) r.part[i] = a.part[i] - b.part[i];
+  return r;
+}
+HPCCD_HD Floats16 operator*(const Floats16& a, const Floats16& b) {
+  Floats16 r;
+  for (int i = 0; i < 4; ++i) r.part[i] = a.part[i] * b.part[i];
+  return r;
+}
+// The first eight, twice.
+HPCCD_HD Floats16 first_half_twice(const Floats16& x) { return {{x.part[0], x.part[1], x.part[0], x.part[1]}}; }
 HPCCD_HD Floats16 min(const Floats16& a, const Floats16& b) {
   Floats16 r;
   for (int i = 0; i < 4; ++i) r.part[i] = min4(a.part[i], b.part[i]);

@@ -42,8 +42,10 @@ void test_separation(const Geometry& g, const std::uint32_t* first, const std::u
   std::uint32_t near[batch_capacity], beside[batch_capacity], open[batch_capacity], n_beside = 0, n_open = 0;
   std::uint64_t none = 0;
 
-  const std::uint32_t n_near =
-      g.kdops ? near_pairs<kind>(ApartByMore{load16(g.margin.in)}, g, first, second, n, near) : n;
+  const std::uint32_t n_near = !g.kdops ? n
+                               : g.until < 1
+                                   ? near_pairs<kind>(until(g), g, first, second, n, near)
+                                   : near_pairs<kind>(ApartByMore{load16(g.margin.in)}, g, first, second, n, near);
   const std::uint32_t* const where = g.kdops ? near : nullptr;
   for_lanes<kind, Double>(g, first, second, where, n_near, [&](Lanes m, const std::uint32_t* at, unsigned valid) {
     const Double d = separations_at<kind>(g, first, second, at);

@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "backends/near_list.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace hpccd {
+namespace {
+
+constexpr std::size_t grain = 4096;
+
+Vec3<double> at(const double x[3]) { return {x[0], x[1], x[2]}; }
+
+// Not its length, whose square could vanish or overflow.
+double largest(const Vec3<double>& x) { return std::max({std::fabs(x.x), std::fabs(x.y), std::fabs(x.z)}); }
+
+}  // namespace
+
+void NearList::keep(std::vector<Group> groups, const std::vector<VertexMotion>& starts, double radius,
+                    ThreadPool& pool) {
+  radius_ = -1;
+  groups_ = std::move(groups);
+  resize(snapshot_, starts.size(), pool.cancellation());
+  parallel_for(pool, starts.size(), grain, [&](std::size_t begin, std::size_t end, int) {
+    for (std::size_t i = begin; i < end; ++i) snapshot_[i] = at(starts[i].t0);
+  });
+  radius_ = radius;
+}
+
+Travel NearList::travel(const std::vector<VertexMotion>& vertices, ThreadPool& pool) const {
+  std::vector<Travel> most(static_cast<std::size_t>(pool.size()));
+  const bool known = snapshot_.size() == vertices.size();
+  parallel_for(pool, vertices.size(), grain, [&](std::size_t begin, std::size_t end, int thread) {
+    Travel t = most[static_cast<std::size_t>(thread)];
+    for (std::size_t i = begin; i < end; ++i) {
+      t.way = std::max(t.way, largest(at(vertices[i].t1) - at(vertices[i].t0)));
+      if (known) t.away = std::max(t.away, largest(at(vertices[i].t0) - snapshot_[i]));
+    }
+    most[static_cast<std::size_t>(thread)] = t;
+  });
+  Travel t;
+  for (const Travel& s : most) t.away = std::max(t.away, s.away), t.way = std::max(t.way, s.way);
+  constexpr double root_of_three = 1.7320508075688774;
+  return {known ? root_of_three * t.away : std::numeric_limits<double>::infinity(), root_of_three * t.way};
+}
+
+std::size_t NearList::size() const {
+  std::size_t n = 0;
+  for (const Group& g : groups_) n += g.first.size();
+  return n;
+}
+
+std::size_t NearList::bytes() const {
+  std::size_t n = snapshot_.capacity() * sizeof(snapshot_[0]);
+  for (const Group& g : groups_) n += sizeof g + 4 * (g.first.capacity() + g.second.capacity());
+  return n;
+}
+
+void Grouping::add(const Candidate& pair) {
+  const bool edges = pair.kind == Kind::edge_edge;
+  const std::uint32_t a = edges ? features_.edges[pair.first][0] : pair.first;
+  const std::uint32_t b = edges ? features_.edges[pair.second][0] : features_.faces[pair.second][0];
+  const Rule rule = rules_.rule(features_.mesh_of_vertex[a], features_.mesh_of_vertex[b]);
+  auto group = std::find_if(groups.begin(), groups.end(), [&](const NearList::Group& g) {
+    return g.kind == pair.kind && g.rule.number() == rule.number();
+  });
+  if (group == groups.end()) group = groups.insert(groups.end(), {pair.kind, rule, {}, {}});
+  group->first.push_back(pair.first);
+  group->second.push_back(pair.second);
+}
+
+double typical_length(const Features& features, const std::vector<VertexMotion>& vertices) {
+  constexpr std::size_t some = 1024;
+  const std::size_t n = features.edges.size(), stride = std::max<std::size_t>(1, n / some);
+  double sum = 0;
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < n; i += stride, ++count)
+    sum += largest(at(vertices[features.edges[i][0]].t0) - at(vertices[features.edges[i][1]].t0));
+  return count > 0 ? sum / static_cast<double>(count) : 0;
+}
+
+}  // namespace hpccd
