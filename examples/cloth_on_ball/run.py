@@ -58,6 +58,8 @@ def _arguments(argv):
                         help="moves to make, each of 10 ms unless it is shortened (default: %(default)s)")
     parser.add_argument("--cells", type=int, default=100, metavar="N",
                         help="along a side of the cloth, 2 N^2 triangles (default: %(default)s)")
+    parser.add_argument("--spin", type=float, default=Setup.spin, metavar="RAD/S",
+                        help="of the ball (default: %(default)s); at 12 some moves are solved again and again")
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the cloth's unevenness (default: 0)")
     parser.add_argument("--threads", type=int, default=0, metavar="N", help="of the detector; 0: all cores (default)")
     parser.add_argument("--node", nargs="?", const="", metavar="NAME",
@@ -68,18 +70,24 @@ def _arguments(argv):
     parser.add_argument("--npz", type=Path, metavar="FILE", help="all frames as numpy arrays; must not exist yet")
     parser.add_argument("--params", type=Path, metavar="FILE", help="write the parameters of a node for this, and end")
     args = parser.parse_args(argv)
-    for name, least, most in (("frames", 2, 100_000), ("cells", 4, 1000), ("seed", 0, 2**32 - 1), ("threads", 0, 1024)):
+    for name, least, most in (("frames", 2, 100_000), ("cells", 4, 1000), ("spin", 0, 30),
+                              ("seed", 0, 2**32 - 1), ("threads", 0, 1024)):
         if not least <= getattr(args, name) <= most:
             parser.error(f"--{name} {getattr(args, name)}: from {least} to {most}")
     for path, suffix in ((args.mcap, ".mcap"), (args.npz, ".npz"), (args.params, ".yaml")):
         if path and (path.suffix != suffix or path.exists()):
             parser.error(f"{path}: name a file that ends in {suffix} and does not exist yet")
+    if args.picture.name and args.picture.suffix not in (".png", ".pdf", ".svg"):
+        parser.error(f"--picture {args.picture}: name a file that ends in .png, .pdf or .svg")
+    for path in (args.mcap, args.npz, args.params, args.picture):  # not found out after the simulation
+        if path and not path.parent.is_dir():
+            parser.error(f"{path}: there is no folder {path.parent}")
     return args
 
 
 def run(args) -> int:
     """Simulate, write what was asked for, and tell how it went."""
-    setup = Setup(cells=args.cells)
+    setup = Setup(cells=args.cells, spin=args.spin)
     meshes = _meshes(setup, args.seed)
     positions: list[np.ndarray] = []
     times: list[float] = []

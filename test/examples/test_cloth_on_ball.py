@@ -72,6 +72,9 @@ def test_with_a_node_that_runs_already(tmp_path):
     ("words", "message"),
     [
         (("--frames", "1"), "--frames 1: from 2 to 100000"),
+        (("--spin", "nan"), "--spin nan: from 0 to 30"),
+        (("--picture", "a.xyz"), "--picture a.xyz: name a file that ends in .png"),
+        (("--npz", "no/a.npz"), "there is no folder no"),
         (("--mcap", "a.bag"), "a.bag: name a file that ends in .mcap"),
         (("--npz", "there.npz"), "there.npz: name a file that ends in .npz and does not exist yet"),
     ],
