@@ -95,6 +95,25 @@ def test_breaking_pieces_collide():
     assert found[40] > 1000, "debris lies in a heap"
 
 
+def test_resolved_cloth_never_touches_and_is_near():
+    scene = scenes.make("cloth-ball-resolved", size=0.0625)
+    steps = range(1, len(scene), 3)
+    assert not any(counts(contacts_of_steps(scene, steps)).values())
+    detector = hpccd_core.Detector(scenes.core_scene(scene))
+    for k in (100, 219):
+        vertices = scene.frame(k).stacked()
+        assert len(detector.intersections(vertices)) == 0
+        assert len(detector.proximity(vertices, 0.03)) > 2_000, "the reach of the solver at this size"
+
+
+def test_trials_start_where_resolved_steps_do_and_touch():
+    resolved, trial = (scenes.make(f"cloth-ball-{kind}", size=0.0625) for kind in ("resolved", "trial"))
+    for k in (0, 120, 218):
+        np.testing.assert_array_equal(resolved.frame(k).stacked(), trial.frame(2 * k).stacked())
+        assert trial.frame(2 * k).time == resolved.frame(k).time < trial.frame(2 * k + 1).time
+    assert min(counts(contacts_of_steps(trial, [121, 241, 361])).values()) > 5
+
+
 GROWING = [("cloth-ball-like", [48, 80]), ("n-body-like-hr", [24, 48]), ("rod-twist-like", [150, 240])]
 
 

@@ -30,6 +30,8 @@ GOLDEN = {
     "rod-twist-like:0.0625:241": "1fe79321ffb60ee8",
     "armadillo-like:1:3": "11e3be9bf74d0b9c",
     "armadillo-like:0.0625:191": "ef07568c210e674e",
+    "cloth-ball-resolved:0.03125:80": "b199c478cdfbd62a",
+    "cloth-ball-trial:0.03125:81": "b6c48b78abe5990c",
 }
 
 
@@ -55,7 +57,7 @@ def test_instruction_sets_do_not_change_the_numbers(tmp_path):
     }
     words = [
         "folding-strip:1:61", "cloth-drop:1:40", "breaking-like:0.25:10", "n-body-like-lr:1:20",
-        "rod-twist-like:0.0625:241", "armadillo-like:0.0625:191",
+        "rod-twist-like:0.0625:241", "armadillo-like:0.0625:191", "cloth-ball-resolved:0.03125:80",
     ]  # fmt: skip
     program = Path(__file__).with_name("scene_digest.py")
     result = subprocess.run(
@@ -74,7 +76,10 @@ def test_more_frames_continue_the_same_motion(name):
             np.testing.assert_array_equal(a, b)
 
 
-@pytest.mark.parametrize("name", ["cloth-drop", "breaking-like", "n-body-like-lr", "rod-twist-like", "armadillo-like"])
+SEEDED = ["cloth-drop", "breaking-like", "n-body-like-lr", "rod-twist-like", "armadillo-like", "cloth-ball-resolved"]
+
+
+@pytest.mark.parametrize("name", SEEDED)
 def test_seed_changes_the_motion(name):
     a, b = (scenes.make(name, size=0.25, frames=12, seed=seed).frame(11).stacked() for seed in (0, 1))
     assert a.shape != b.shape or np.abs(a - b).max() > 1e-4

@@ -1,0 +1,155 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The solver's questions to an hpccd node over DDS: its service ~/detect, and each frame on its topics."""
+
+import contextlib
+import os
+import tempfile
+import time
+from pathlib import Path
+
+import rclpy
+from hpccd.msg import ContactArray, MeshTopology, MeshVertices
+from hpccd.srv import Detect
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.qos import QoSProfile
+from rclpy.signals import SignalHandlerOptions
+
+from hpccd_ros import client
+from hpccd_ros.base.errors import UserError
+from hpccd_ros.demo.children import Children
+from hpccd_ros.middleware.fields import stamp_to_ns
+from hpccd_ros.scenes import files
+from hpccd_ros.scenes.resolved.queries import Queries
+
+# s for the node to be there, or to answer.
+PATIENCE = 60.0
+# What the node computes beside the contacts, and that it sends all of them.
+PARAMETERS = {"outputs": ["normals", "closest"], "max_contacts": 0}
+# A time that is later than the true one by its last digits is brought before it.
+CAUTION = 1e-9
+
+
+def write_parameters(scene, path: Path) -> None:
+    """Write parameters of a node that knows the meshes and answers these questions."""
+    files.write_parameters(scene, path)
+    with open(path, "a", encoding="utf-8") as file:
+        for name, value in PARAMETERS.items():
+            file.write(f"    {name}: {value}\n")
+
+
+@contextlib.contextmanager
+def started_node(scene, threads: int, recording: Path | None):
+    """Start a node for these meshes in a DDS domain of its own, and end it; its name."""
+    os.environ.setdefault("ROS_DOMAIN_ID", str(1 + os.getpid() % 100))
+    with tempfile.TemporaryDirectory(prefix="cloth_on_ball") as folder, Children(Path(folder)) as children:
+        parameters = Path(folder) / "node.yaml"
+        write_parameters(scene, parameters)
+        record = ["-p", f"record:={recording.resolve()}"] if recording else []
+        child = children.start(
+            "node", "hpccd_ros.node", "--ros-args", "--params-file", str(parameters),
+            "-p", f"threads:={threads}", *record,
+        )  # fmt: skip
+        yield "hpccd"
+        children.check()
+        if children.end(child) != 0:
+            children.check()
+
+
+class OverDds(Queries):
+    """Asks the node of this name. Each frame that is made is streamed to it, and its answer awaited."""
+
+    def __init__(self, setup, meshes, name: str):
+        super().__init__()
+        self._setup, self._meshes, self._name = setup, meshes, name
+        self._ends = (meshes[0].n_vertices, sum(mesh.n_vertices for mesh in meshes))
+        topologies = tuple(client.Topology(0, mesh.n_vertices, mesh.faces) for mesh in meshes)
+        self._layout = client.Layout.of(tuple(mesh.name for mesh in meshes), topologies)
+        client.prepare_environment()
+        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+        self._node = rclpy.create_node("cloth_on_ball", start_parameter_services=False)
+        self._executor = SingleThreadedExecutor()
+        self._executor.add_node(self._node)
+        self._service = self._node.create_client(Detect, f"{name}/detect")
+        self._answered = -1
+        self._node.create_subscription(ContactArray, client.CONTACTS_TOPIC, self._take, QoSProfile(depth=10))
+        self._vertices = [
+            self._node.create_publisher(MeshVertices, client.vertices_topic(mesh.name), client.VERTICES_QOS)
+            for mesh in meshes
+        ]
+        self._topologies = [
+            self._node.create_publisher(MeshTopology, client.topology_topic(mesh.name), client.TOPOLOGY_QOS)
+            for mesh in meshes
+        ]
+        for publisher, mesh in zip(self._topologies, meshes, strict=True):
+            publisher.publish(client.topology_message(mesh.faces, mesh.n_vertices))
+        self._frames, self._begin = 0, self._node.get_clock().now().nanoseconds
+
+    def __enter__(self):
+        self._await(self._service.service_is_ready, f"no node {self._name} answers: start one, or name another")
+        self._await(
+            lambda: all(p.get_subscription_count() for p in (*self._topologies, *self._vertices)),
+            f"node {self._name} does not listen to these meshes: start it with the file that --params writes",
+        )
+        return self
+
+    def __exit__(self, *_):
+        self._executor.shutdown()
+        self._node.destroy_node()
+        rclpy.try_shutdown()
+
+    def near(self, start, end):
+        with self._timed():
+            answer = self._ask(start, end, query="contacts", minimum_separation=[self._setup.reach])
+            return client.scene_contacts(answer, self._layout)
+
+    def free_part(self, start, end):
+        with self._timed():
+            answer = self._ask(
+                start, end, query="contacts", report="first", minimum_separation=[self._setup.clearance]
+            )
+            return 1.0 if answer.first_toc > 1.0 else max(0.0, answer.first_toc - CAUTION)
+
+    def intersections(self, positions):
+        with self._timed():
+            return self._ask(positions, positions, query="intersections").total
+
+    def made(self, positions):
+        """Stream the frame, and wait for the node's answer to the step that it ends: nothing is dropped."""
+        stamp = self._begin + round(self._frames * self._setup.period * 1e9)
+        for publisher, message in zip(self._vertices, self._messages(positions, stamp), strict=True):
+            publisher.publish(message)
+        if self._frames:  # the first frame only begins a step
+            self._await(lambda: self._answered >= stamp, f"node {self._name} did not answer frame {self._frames}")
+        self._frames += 1
+
+    def _messages(self, positions, stamp):
+        first, last = self._ends
+        parts = positions[:first], positions[first:last]
+        return [client.vertices_message(part, stamp, step=self._frames) for part in parts]
+
+    def _ask(self, start, end, **question):
+        names = [mesh.name for mesh in self._meshes]
+        request = Detect.Request(
+            mesh_names=names, start=self._messages(start, 0), end=self._messages(end, 1), accuracy="exact", **question
+        )
+        deadline = time.monotonic() + PATIENCE
+        while True:
+            future = self._service.call_async(request)
+            self._executor.spin_until_future_complete(future, timeout_sec=PATIENCE)
+            answer = future.result() if future.done() else None
+            if answer is not None and answer.success:
+                return answer.contacts
+            # At first it may not have the topologies yet.
+            if answer is None or self._frames or time.monotonic() > deadline:
+                raise UserError(f"node {self._name}: {answer.message if answer else f'no answer in {PATIENCE:.0f} s'}")
+            time.sleep(0.1)
+
+    def _await(self, ready, otherwise):
+        deadline = time.monotonic() + PATIENCE
+        while not ready():
+            if time.monotonic() > deadline:
+                raise UserError(otherwise)
+            self._executor.spin_once(timeout_sec=0.05)
+
+    def _take(self, message):
+        self._answered = max(self._answered, stamp_to_ns(message.header.stamp))

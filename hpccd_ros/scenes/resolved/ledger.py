@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Momentum and energy of the cloth, and what changed them: gravity, the ball, the air."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hpccd_ros.scenes.resolved.response import FromBall, ToAir
+from hpccd_ros.scenes.resolved.setup import Setup
+from hpccd_ros.scenes.resolved.springs import Springs
+
+
+@dataclass(frozen=True)
+class State:
+    """Of the cloth: momentum (3,) kg m/s, energies in J, angular momentum about z in kg m^2/s."""
+
+    momentum: np.ndarray
+    spin: float
+    kinetic: float
+    height: float  # energy of
+    elastic: float
+
+    @property
+    def energy(self) -> float:
+        return self.kinetic + self.height + self.elastic
+
+
+class Ledger:
+    """What came in since the start, beside what is there.
+
+    gravity, ball, air: (3,) momentum that each gave; ball_spin, air_spin: angular momentum about z; work: of the ball.
+    """
+
+    def __init__(self, setup: Setup, n_cloth: int):
+        self._setup, self._n = setup, n_cloth
+        self._springs = Springs(setup, setup.period / setup.substeps)
+        self.gravity, self.ball, self.air = np.zeros(3), np.zeros(3), np.zeros(3)
+        self.ball_spin = self.air_spin = self.work = 0.0
+
+    def open(self, positions: np.ndarray, velocity: np.ndarray) -> None:
+        """The state at the start."""
+        self.start = self.state(positions, velocity)
+
+    def enter(self, part: float, period: float, ball: FromBall, air: ToAir) -> None:
+        """A move of `period` seconds, of which what came in counts to this part."""
+        self.gravity[2] -= self._n * self._setup.mass * self._setup.gravity * period
+        self.ball += part * ball.impulse
+        self.ball_spin += part * ball.spin
+        self.work += part * ball.work
+        self.air -= part * air.impulse
+        self.air_spin -= part * air.spin
+
+    def state(self, positions: np.ndarray, velocity: np.ndarray) -> State:
+        setup, n = self._setup, self._n
+        x = np.ascontiguousarray(positions[:n].T, dtype=np.float64)
+        return State(
+            setup.mass * velocity.sum(axis=1),
+            setup.mass * float((x[0] * velocity[1] - x[1] * velocity[0]).sum()),
+            0.5 * setup.mass * float((velocity * velocity).sum()),
+            setup.mass * setup.gravity * float(x[2].sum()),
+            self._springs.energy(x.reshape(3, setup.cells + 1, setup.cells + 1)),
+        )
+
+    def unexplained_momentum(self, now: State) -> float:
+        """Length of the momentum that nothing in the ledger explains, kg m/s."""
+        rest = now.momentum - self.start.momentum - self.gravity - self.ball - self.air
+        return float(np.sqrt((rest * rest).sum()))
+
+    def lost(self, now: State) -> float:
+        """J that friction, the air, impacts and the springs' own damping took: what came in less what is there."""
+        return self.start.energy + self.work - now.energy

@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: Apache-2.0
+"""examples/cloth_on_ball as its users run it, in one process and with a node over DDS."""
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import hpccd_ros
+from hpccd_ros import cli
+
+ROOT = Path(__file__).resolve().parents[2]
+PROGRAM = ROOT / "examples" / "cloth_on_ball" / "run.py"
+SMALL = ("--cells", "16", "--frames", "30", "--picture", "")
+
+
+def run(folder, *words, status=0):
+    """What the example says."""
+    environment = {**os.environ, "PYTHONPATH": str(Path(hpccd_ros.__file__).parents[1])}
+    done = subprocess.run(
+        [sys.executable, PROGRAM, *words], cwd=folder, env=environment, capture_output=True, text=True, timeout=300
+    )
+    assert done.returncode == status, done.stdout + done.stderr
+    return done.stdout + done.stderr
+
+
+def frames(path):
+    with np.load(path) as archive:
+        return archive["cloth/0/vertices"], archive["ball/0/vertices"]
+
+
+def test_in_one_process(tmp_path, capsys):
+    said = run(tmp_path, "--cells", "16", "--frames", "12", "--mcap", "a.mcap", "--picture", "a.png")
+    assert "intersections  0 in all 12 frames" in said
+    assert re.search(r"plausible +yes", said) and re.search(r"\d+ % of it in hpccd", said)
+    assert (tmp_path / "a.png").read_bytes().startswith(b"\x89PNG")
+    assert cli.main(["replay", str(tmp_path / "a.mcap")]) == 0
+    assert "11 steps computed, 0 contacts" in capsys.readouterr().out
+
+
+def test_with_a_node_in_the_loop(tmp_path, capsys):
+    """The same motion to the bit, and a recording of the node that is verified."""
+    run(tmp_path, *SMALL, "--npz", "here.npz")
+    said = run(tmp_path, *SMALL, "--node", "--npz", "dds.npz", "--mcap", "dds.mcap")
+    assert "intersections  0 in all 30 frames" in said
+    for here, dds in zip(frames(tmp_path / "here.npz"), frames(tmp_path / "dds.npz"), strict=True):
+        np.testing.assert_array_equal(here, dds)
+    assert cli.main(["replay", str(tmp_path / "dds.mcap")]) == 0
+    assert "VERIFIED: 29 answers are equal" in capsys.readouterr().out
+
+
+def test_with_a_node_that_runs_already(tmp_path):
+    run(tmp_path, *SMALL, "--params", "cloth.yaml")
+    name = f"exa{os.getpid()}"
+    node = subprocess.Popen(
+        [sys.executable, "-m", "hpccd_ros.node", "--ros-args", "--params-file", tmp_path / "cloth.yaml",
+         "-r", f"__node:={name}"],
+        cwd=Path(hpccd_ros.__file__).parents[1], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+    )  # fmt: skip
+    try:
+        assert "intersections  0 in all 30 frames" in run(tmp_path, *SMALL, "--node", name)
+    finally:
+        node.terminate()
+        assert node.wait(60) == 0
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("--frames", "1"), "--frames 1: from 2 to 100000"),
+        (("--spin", "nan"), "--spin nan: from 0 to 30"),
+        (("--picture", "a.xyz"), "--picture a.xyz: name a file that ends in .png"),
+        (("--npz", "no/a.npz"), "there is no folder no"),
+        (("--mcap", "a.bag"), "a.bag: name a file that ends in .mcap"),
+        (("--npz", "there.npz"), "there.npz: name a file that ends in .npz and does not exist yet"),
+    ],
+)
+def test_wrong_use_is_named(tmp_path, words, message):
+    (tmp_path / "there.npz").touch()
+    assert message in run(tmp_path, *words, status=2)

@@ -1,0 +1,148 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The solver behind examples/cloth_on_ball: free of intersections, and physics."""
+
+import dataclasses
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hpccd_core import reference
+from hpccd_ros.scenes.resolved.motion import Simulation
+from hpccd_ros.scenes.resolved.queries import InProcess
+from hpccd_ros.scenes.resolved.setup import Setup
+from hpccd_ros.scenes.resolved.springs import Springs
+
+EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "cloth_on_ball"
+# Coarse, and the ball turns at once: wound round it within 80 moves.
+SETUP = Setup(cells=20, ball_frequency=5, side=2.0)
+MOVES = 80
+
+
+def queries_of(setup, threads=1, kind=InProcess):
+    _, cloth_faces = setup.cloth(0)
+    ball, ball_faces = setup.ball()
+    return kind(setup, cloth_faces, ball_faces, len(ball), threads)
+
+
+def faces_of(setup):
+    return [setup.cloth(0)[1], setup.ball()[1]]
+
+
+def run(moves=MOVES, setup=SETUP, **options):
+    """(simulation, positions of all frames, moves)."""
+    simulation = Simulation(setup, queries_of(setup, **options))
+    positions, made = [simulation.positions], []
+    for _ in range(moves):
+        made.append(simulation.move())
+        positions.append(simulation.positions)
+    return simulation, positions, made
+
+
+@pytest.fixture(scope="module")
+def wound():
+    return run()
+
+
+def test_cloth_winds_round_the_ball(wound):
+    simulation, positions, made = wound
+    n_cloth = (SETUP.cells + 1) ** 2
+    cloth = positions[-1][:n_cloth]
+    assert np.linalg.norm(cloth.astype(float), axis=1).min() > 0.97 * SETUP.ball_radius
+    assert cloth[:, 2].min() < 0.0, "it hangs down to the middle of the ball"
+    assert made[-1].pairs > 500
+    assert simulation.ledger.ball_spin > 0.1, "taken along by friction"
+
+
+def test_no_move_touches_anything(wound):
+    """By the exact oracle, which shares nothing with the detector that the solver asked."""
+    _, positions, _ = wound
+    for start, end in zip(positions[20:], positions[21:], strict=False):
+        contacts = reference.brute_force(start, end, faces_of(SETUP), no_self_collision=[1])
+        assert len(contacts.vf) == len(contacts.ee) == 0
+    assert len(reference.intersections(positions[-1], faces_of(SETUP), no_self_collision=[1])) == 0
+
+
+def test_what_is_unresolved_would_touch(wound):
+    """Else the test above would test nothing."""
+    simulation, positions, _ = wound
+    end = simulation.trial(10 * SETUP.period)
+    contacts = reference.brute_force(positions[-1], end, faces_of(SETUP), no_self_collision=[1])
+    assert len(contacts.vf) > 10
+
+
+def test_momentum_and_energy_are_accounted_for(monkeypatch):
+    monkeypatch.syspath_prepend(str(EXAMPLE))
+    monkeypatch.delitem(sys.modules, "account", raising=False)
+    from account import Account
+
+    queries = queries_of(SETUP)
+    simulation = Simulation(SETUP, queries)
+    account = Account(simulation, queries)
+    account.enter(None, 0.0)
+    for _ in range(MOVES):
+        account.enter(simulation.move(), 0.01)
+    assert account.plausible, account.lines()
+    assert simulation.ledger.work > 1.0, "the ball gave energy"
+    # And it would notice: momentum from nowhere, energy from nowhere.
+    simulation.velocity[0] += 1e-6
+    account.enter(simulation.move(), 0.01)
+    assert not account.plausible
+
+
+def test_the_same_bits_with_any_number_of_threads(wound):
+    _, positions, _ = wound
+    for one, other in zip(positions, run(threads=3)[1], strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+class Blind(InProcess):
+    """Sees no pairs while it is `blind`: the solver runs into things."""
+
+    blind = True
+
+    def near(self, start, end):
+        found = super().near(start, end)
+        if not self.blind:
+            return found
+        none = slice(0, 0)
+        return dataclasses.replace(
+            found, vf=found.vf[none], vf_toc=found.vf_toc[none], ee=found.ee[none], ee_toc=found.ee_toc[none],
+            normals=found.normals[none], closest=found.closest[none],
+        )  # fmt: skip
+
+
+def test_a_solver_that_misses_pairs_is_slow_but_never_touches():
+    """The guarantee is the guard's alone; and what has come as near as it lets it comes off again."""
+    queries = queries_of(SETUP, kind=Blind)
+    simulation = Simulation(SETUP, queries)
+    positions, parts = [simulation.positions], []
+    for move in range(MOVES):
+        queries.blind = move in (20, 21, 22, 23, 45, 46, 47, 48, 49)
+        parts.append(simulation.move().part)
+        positions.append(simulation.positions)
+    assert sum(part < 1.0 for part in parts) >= 6
+    assert simulation.time > 0.8 * MOVES * SETUP.period, "it goes on"
+    for start, end in zip(positions, positions[1:], strict=False):
+        contacts = reference.brute_force(start, end, faces_of(SETUP), no_self_collision=[1])
+        assert len(contacts.vf) == len(contacts.ee) == 0
+
+
+def test_a_solver_that_is_stuck_says_so():
+    with pytest.raises(RuntimeError, match="the cloth is stuck at 0[.].* s: 20 moves in a row"):
+        run(300, kind=Blind)
+
+
+def test_springs_make_no_momentum_and_lose_energy():
+    springs = Springs(SETUP, 1e-3)
+    n = SETUP.cells + 1
+    random = np.random.default_rng(1)
+    rest = np.zeros((3, n, n))
+    rest[0], rest[1] = (SETUP.spacing * axis for axis in np.meshgrid(np.arange(n), np.arange(n)))
+    assert springs.energy(rest) < 1e-20
+    x = rest + 0.1 * SETUP.spacing * random.random((3, n, n))
+    before, middle = springs.energy(x), x.mean(axis=(1, 2))
+    springs.relax(x)
+    assert 0.0 < springs.energy(x) < before
+    assert x.mean(axis=(1, 2)) == pytest.approx(middle, abs=1e-14)
