@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "backends/gpu_backend.h"
 
+#include <atomic>
 #include <cmath>
 #include <limits>
 
@@ -77,14 +78,19 @@ void GpuBackend::require_good(bool good, Positions t0, Positions t1) {
   shared_.profiler.mark("gpu");
 }
 
-void GpuBackend::decide_motion(Positions t0, Positions t1) {
+// Up to the first contact at the start, where the earliest time is all that is asked for.
+void GpuBackend::decide_motion(Positions t0, Positions t1, bool time_only) {
   if (!pipeline_->undecided().empty()) t0 = on_host(t0, 0), t1 = on_host(t1, 1);
   const Separations separations = shared_.separations_now();
-  decide([&](const Candidate& u) {
+  std::atomic<bool> over{false};
+  decide([&](const Candidate& u) -> std::optional<double> {
+    if (over.load(std::memory_order_relaxed)) return std::nullopt;
     const UndecidedPair pair = undecided_pair(shared_.features, separations, u, t0, t1);
     FallbackCounts counts;
-    return pair.separation > 0 ? decide_separation(Accuracy::exact, pair, counts)
-                               : decide_contact(Accuracy::exact, pair, counts);
+    const auto time = pair.separation > 0 ? decide_separation(Accuracy::exact, pair, counts)
+                                          : decide_contact(Accuracy::exact, pair, counts);
+    if (time_only && time && *time <= 0) over = true;
+    return time;
   });
 }
 
@@ -95,7 +101,7 @@ Contacts GpuBackend::contacts(Positions t0, Positions t1) {
   const Outputs outputs{o.points, o.normals, o.closest, AtTime::contact};
   const bool places = o.points || o.normals || o.closest;
   if (places) t0 = on_host(t0, 0), t1 = on_host(t1, 1);
-  decide_motion(t0, t1);
+  decide_motion(t0, t1, false);
   Contacts found = join(finish(), decided_, shared_.features, shared_.pool);
   reduce(found, o.report);
   if (places) add_places(found, outputs, shared_.features, shared_.separations_now(), t0, t1, shared_.pool);

@@ -47,7 +47,7 @@ class GpuBackend final : public DetectionBackend {
   Travel travel_of_frame() const;
   void prepare_motion(Positions t0, Positions t1);
   void require_good(bool good, Positions t0, Positions t1);
-  void decide_motion(Positions t0, Positions t1);
+  void decide_motion(Positions t0, Positions t1, bool time_only);
   Contacts near_pairs(Positions vertices, double distance);
   Intersections pierced_faces(Positions vertices);
   void prepare_snapshot(gpu::Query query, Positions vertices, double distance);

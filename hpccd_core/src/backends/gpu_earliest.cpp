@@ -29,8 +29,9 @@ double GpuBackend::earliest_time(Positions t0, Positions t1) {
 
 double GpuBackend::run_for_earliest(Positions t0, Positions t1, Pairs pairs) {
   require_good(pipeline_->run_for_earliest(t0, t1, pairs, shared_.pool), t0, t1);
-  decide_motion(t0, t1);
   double time = pipeline_->earliest().time;
+  if (time <= 0) return time;
+  decide_motion(t0, t1, true);
   for (const auto* list : {&decided_.vertex_face, &decided_.edge_edge})
     for (const Contact& c : *list) time = std::min(time, c.toc);
   return time;

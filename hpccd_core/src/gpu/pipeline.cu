@@ -259,6 +259,11 @@ void DevicePipeline::list_found(double until) {
   near_.collect(params, *host_counters_.data(), until, stream_);
 }
 
+void DevicePipeline::copy_counters() {
+  check(cudaMemcpyAsync(host_counters_.data(), counters_.data(), sizeof(Counters), cudaMemcpyDeviceToHost, stream_),
+        "cudaMemcpyAsync");
+}
+
 // Makes room where a list was too short. True where the frame must run again.
 bool DevicePipeline::grow_overflowed() {
   const Counters& c = *host_counters_.data();

@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: Apache-2.0
+// When a list of near pairs answers, and when the next is worth its price.
+#include "backends/near_list.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+namespace hpccd {
+namespace {
+
+constexpr double inf = std::numeric_limits<double>::infinity();
+
+VertexMotion vertex(Vec3<double> t0, Vec3<double> t1) { return {{t0.x, t0.y, t0.z, 0}, {t1.x, t1.y, t1.z, 0}}; }
+
+TEST(NearList, TravelBoundsEveryWay) {
+  ThreadPool pool{2};
+  NearList list;
+  const std::vector<VertexMotion> motion{vertex({0, 0, 0}, {3, 4, 0}), vertex({1, 1, 1}, {1, 1, 1})};
+  const Travel unknown = list.travel(motion, pool);
+  EXPECT_EQ(unknown.away, inf);
+  EXPECT_GE(unknown.way, 5);
+  list.keep({}, motion, 0.5, pool);
+  EXPECT_EQ(list.travel(motion, pool).away, 0);
+  const std::vector<VertexMotion> elsewhere{vertex({0, 0, 0}, {0, 0, 0}), vertex({1, 1.25, 1}, {1, 1, 1})};
+  const Travel moved = list.travel(elsewhere, pool);
+  EXPECT_GE(moved.away, 0.25);
+  EXPECT_GE(moved.way, 0.25);
+  EXPECT_EQ(list.travel({}, pool).away, inf);  // another scene
+}
+
+TEST(NearList, WaysTooSmallToSquareCount) {
+  ThreadPool pool{1};
+  NearList list;
+  list.keep({}, {vertex({0, 0, 0}, {0, 0, 0})}, 0, pool);
+  const Travel t = list.travel({vertex({1e-300, 0, 0}, {2e-300, 0, 0})}, pool);
+  EXPECT_GE(t.away, 1e-300);
+  EXPECT_GE(t.way, 1e-300);
+  EXPECT_FALSE(list.radius().answers(1, t));
+}
+
+TEST(NearRadius, AnswersAsFarAsItReaches) {
+  NearRadius radius;
+  EXPECT_FALSE(radius.answers(0, {0, 0}));
+  radius.set(1);
+  EXPECT_TRUE(radius.answers(0.5, {0, 1.9}));
+  EXPECT_TRUE(radius.answers(inf, {0, 0.9}));  // nothing touches: up to the end
+  EXPECT_FALSE(radius.answers(inf, {0, 1}));   // what is reported at the very end may touch within its rounding
+  EXPECT_FALSE(radius.answers(0.5, {0.6, 1}));
+  EXPECT_FALSE(radius.answers(0, {inf, 0}));
+  radius.forget();
+  EXPECT_FALSE(radius.answers(0, {0, 0}));
+}
+
+TEST(NearRadius, PaysWhereStartsComeAgain) {
+  NearRadius radius;
+  EXPECT_TRUE(radius.next_would_pay({0, 5}, 1));  // where the last motion began
+  EXPECT_FALSE(radius.next_would_pay({0.1, 5}, 1));
+  EXPECT_FALSE(radius.next_would_pay({inf, 5}, 1));
+  radius.set(1);
+  EXPECT_TRUE(radius.answers(1, {0, 0.1}));  // what it was made for
+  EXPECT_FALSE(radius.next_would_pay({0.1, 5}, 1));
+  EXPECT_TRUE(radius.answers(1, {0, 0.1}));
+  EXPECT_TRUE(radius.next_would_pay({0.1, 5}, 1));
+}
+
+TEST(NearRadius, IsAtLeastTheWayAndNoneWhereNeighboursCouldMeet) {
+  EXPECT_GE(radius_for({0, 1}, 0.1, 1).value(), 0.1);
+  EXPECT_GT(radius_for({0, 0}, 1, 1).value(), 0);
+  EXPECT_FALSE(radius_for({0, 1}, 0.2, 1));
+  EXPECT_FALSE(radius_for({0, 1}, inf, 1));
+  EXPECT_FALSE(radius_for({0, inf}, 0.1, 1));
+  EXPECT_GT(listed_distance(0.5, 0.25), 1.25);
+}
+
+}  // namespace
+}  // namespace hpccd
