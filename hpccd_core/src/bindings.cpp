@@ -98,6 +98,12 @@ py::list to_list(const std::vector<Gap>& gaps) {
   return l;
 }
 
+template <auto query>
+auto of_motion(Detector& d, Positions t0, Positions t1) {
+  py::gil_scoped_release release;
+  return (d.*query)(t0, t1);
+}
+
 // The answer to a query of one snapshot, on the host or on a device.
 template <class Query>
 auto of_snapshot(Detector& d, Positions vertices, Query&& query) {
@@ -189,39 +195,26 @@ PYBIND11_MODULE(_core, m) {
       .def(
           "detect",
           [](Detector& d, const py::array& t0, const py::array& t1) {
-            const Positions a = positions(t0), b = positions(t1);
-            Contacts c;
-            {
-              py::gil_scoped_release release;
-              c = d.detect(a, b);
-            }
-            return to_dict(std::move(c));
+            return to_dict(of_motion<&Detector::detect>(d, positions(t0), positions(t1)));
           },
           "vertices_t0"_a, "vertices_t1"_a)
       .def(
           "detect_on_device",
           [](Detector& d, std::uintptr_t t0, std::uintptr_t t1, std::size_t n, bool is_double) {
-            Contacts c;
-            {
-              py::gil_scoped_release release;
-              c = d.detect(on_device(t0, n, is_double), on_device(t1, n, is_double));
-            }
-            return to_dict(std::move(c));
+            return to_dict(of_motion<&Detector::detect>(d, on_device(t0, n, is_double), on_device(t1, n, is_double)));
           },
           "pointer_t0"_a, "pointer_t1"_a, "n_vertices"_a, "is_double"_a)
       .def(
           "collision_free_step",
           [](Detector& d, const py::array& t0, const py::array& t1) {
-            const Positions a = positions(t0), b = positions(t1);
-            py::gil_scoped_release release;
-            return d.collision_free_step(a, b);
+            return of_motion<&Detector::collision_free_step>(d, positions(t0), positions(t1));
           },
           "vertices_t0"_a, "vertices_t1"_a)
       .def(
           "collision_free_step_on_device",
           [](Detector& d, std::uintptr_t t0, std::uintptr_t t1, std::size_t n, bool is_double) {
-            py::gil_scoped_release release;
-            return d.collision_free_step(on_device(t0, n, is_double), on_device(t1, n, is_double));
+            return of_motion<&Detector::collision_free_step>(d, on_device(t0, n, is_double),
+                                                             on_device(t1, n, is_double));
           },
           "pointer_t0"_a, "pointer_t1"_a, "n_vertices"_a, "is_double"_a)
       .def(
