@@ -228,3 +228,22 @@ def test_patches_whose_freedom_was_proven_for_another_step(name):
         for first, last in ((start, start + 0.125 * (end - start)), (start, end), (start, start), (end, start),
                             (0.5 * (start + end), end), (start, 2 * end - start)):  # fmt: skip
             assert detector.collision_free_step(first, last) == fresh_step(scene, first, last)
+
+
+@pytest.mark.parametrize("plane", [False, True], ids=["separation", "long edges"])
+def test_a_scene_all_of_which_counts_as_near(plane):
+    """Other meshes' separation, or edges, are larger than a whole sheet: not all pairs within the sheet are listed."""
+    n, rng = 40, np.random.default_rng(85)
+    flat = np.stack([*np.meshgrid(np.arange(n), np.arange(n)), np.zeros((n, n))], axis=2).reshape(-1, 3) / n
+    faces, corners = np.array([[0, 1, 2]]), np.eye(3) * (1e6 if plane else 1)
+    far = [(faces, corners + [0, 0, height], corners + [0, 0, height]) for height in (-50.0, -100.0)]
+    sheet = random_scenes.sheet(n), flat, flat + rng.normal(0, 1e-5, flat.shape)
+    meshes = random_scenes.combine(*far, sheet)
+    scene, v0, v1 = meshes.scene(), meshes.vertices_t0, meshes.vertices_t1
+    if not plane:
+        scene.set_separation("mesh0", "mesh1", 2.0)
+    detector = hc.Detector(scene, backend="cpu", threads=2)
+    for part in (1.0, 0.5, 1.0, 300.0, 1.0, 300.0):
+        end = v0 + part * (v1 - v0)
+        assert detector.collision_free_step(v0, end) == fresh_step(scene, v0, end)
+        assert detector.stats["bytes"] < 64e6

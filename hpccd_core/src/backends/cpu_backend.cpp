@@ -69,6 +69,7 @@ void CpuBackend::begin_query() {
   search_.leaf_pairs = nullptr, search_.leaf_pairs_in_snapshot = nullptr, search_.leaf_edge_faces = nullptr;
   search_.nearest = nullptr;
   search_.time_only = search_.prunes = false;
+  search_.most_found = std::numeric_limits<std::size_t>::max();
 }
 
 void CpuBackend::traverse() {

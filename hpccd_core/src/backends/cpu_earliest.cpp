@@ -65,7 +65,7 @@ void CpuBackend::test_near_pairs() {
 }
 
 // Lists all pairs that the motion can bring together up to the best time so far, where these are few and asked for
-// again.
+// again. True: it looked, found few or not, and the motion is to be seen again.
 bool CpuBackend::list_near_pairs(Positions t0) {
   edge_ = typical_length(shared_.features, shared_.tree.motion().vertices);
   if (!near_.radius().next_would_pay(travel_, edge_)) return false;
@@ -77,7 +77,12 @@ bool CpuBackend::list_near_pairs(Positions t0) {
   search_.geometry.separations = {distance};
   search_.leaf_pairs_in_snapshot = leaf_pairs_in_snapshot(shared_.options.simd);
   search_.reach = reach_of(distance, shared_.tree.motion().rounding, shared_.tree.motion().map.scale);
+  search_.most_found = most_listed(shared_.features), search_.n_found = 0;
   walk_tree();
+  if (search_.gave_up()) {
+    near_.radius().gave_up();
+    return true;
+  }
   Grouping near(shared_.features, shared_.rules);
   for (const Worker& w : workers_) {
     for (const Contact& c : w.vertex_face) near.add({c.first, c.second, Kind::vertex_face});

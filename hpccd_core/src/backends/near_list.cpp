@@ -27,6 +27,11 @@ double listed_distance(double radius, double largest_separation) {
   return (largest_separation + 2 * radius) * (1 + 1e-9);
 }
 
+std::size_t most_listed(const Features& features) {
+  constexpr std::size_t of_each = 8, few = 1 << 16;
+  return few + of_each * (features.n_vertices + features.edges.size() + features.faces.size());
+}
+
 void NearList::keep(std::vector<Group> groups, const std::vector<VertexMotion>& starts, std::optional<double> radius,
                     ThreadPool& pool) {
   radius_.forget();

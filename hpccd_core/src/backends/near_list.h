@@ -34,6 +34,8 @@ class NearRadius {
   // Of all pairs within listed_distance() of each other.
   void set(double radius) { radius_ = radius, answers_ = 0; }
   void forget() { radius_ = -1; }
+  // The last list was given up: it had more pairs than most_listed().
+  void gave_up() { rests_ = rests; }
   // Whether no pair that is not listed touches up to this time, or is reported to.
   bool answers(double time, const Travel& travel) {
     const bool complete = travel.until(std::min(time + same_time, 1.0)) <= radius_;
@@ -42,15 +44,18 @@ class NearRadius {
   }
   // A list costs about what a search costs, so it pays where motions begin where one began before: where this one does,
   // or the last list has answered more than the motion that it was made for. Edge: a typical length.
-  bool next_would_pay(const Travel& travel, double edge) const {
+  bool next_would_pay(const Travel& travel, double edge) {
+    if (rests_ > 0) return --rests_, false;
     return answers_ > 1 || travel.away <= least_radius * edge / 2;
   }
 
   static constexpr double least_radius = 1.0 / 64;  // of an edge
 
  private:
+  static constexpr int rests = 64;  // so many motions before another try, whose price is that of a few searches
+
   double radius_ = -1;
-  int answers_ = 0;
+  int answers_ = 0, rests_ = 0;
 };
 
 // The radius of a list that is to answer up to a time, with room for motions that go farther or begin elsewhere.
@@ -59,6 +64,9 @@ class NearRadius {
 std::optional<double> radius_for(const Travel& travel, double time, double edge);
 // How far apart the pairs of such a list may be at most.
 double listed_distance(double radius, double largest_separation);
+// How many they may be at most. More are looked at in more time than a search takes, and may be all pairs of a mesh:
+// where others have a separation that is larger than it, or edges that are.
+std::size_t most_listed(const Features& features);
 
 class NearList {
  public:

@@ -56,6 +56,11 @@ struct Search {
     const float time = until(), reach = time * two_ways * (1 + 1e-6f) + 1e-6f;
     return {time, reach <= most_reach ? reach : -1};
   }
+  // Of a search that is worth its price only where it finds few: so many at most, and so many it found.
+  std::size_t most_found = std::numeric_limits<std::size_t>::max();
+  std::atomic<std::size_t> n_found = 0;
+  bool bounded() const { return most_found < std::numeric_limits<std::size_t>::max(); }
+  bool gave_up() const { return bounded() && n_found.load(std::memory_order_relaxed) > most_found; }
   // Nothing that is found could matter any more.
   bool over() const { return time_only && earliest.load(std::memory_order_relaxed) <= 0; }
   const Cancellation* cancellation = &never_cancelled;

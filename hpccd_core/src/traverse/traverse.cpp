@@ -46,6 +46,7 @@ void walk(const Tree& tree, const PairRules& rules, Boxes boxes, const Cancellat
   std::size_t stale = 0;  // so many at the bottom were put there when boxes were larger
   while (!stack.empty()) {
     cancellation.heed();
+    if (worker.search().gave_up()) return stack.clear();
     const NodePair p = stack.back();
     stack.pop_back();
     if constexpr (Boxes::shrink) {

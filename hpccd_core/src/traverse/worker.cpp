@@ -107,6 +107,7 @@ void Worker::test(const std::uint32_t* first, const std::uint32_t* second, std::
     const double toc = reported_time(reported_as, r.toc[i], r.delta[i]);
     report(kind, {first[r.contact[i]], second[r.contact[i]], toc});
   }
+  if (search_->bounded()) search_->n_found += r.n_contacts + r.n_undecided;
   for (std::uint32_t i = 0; i < r.n_undecided; ++i)
     resolve({first[r.undecided[i]], second[r.undecided[i]], kind}, rule);
 }
