@@ -33,6 +33,11 @@ def frames(path):
         return archive["cloth/0/vertices"], archive["ball/0/vertices"]
 
 
+def check_same_frames(one, other):
+    for here, dds in zip(frames(one), frames(other), strict=True):
+        np.testing.assert_array_equal(here, dds)
+
+
 def test_in_one_process(tmp_path, capsys):
     said = run(tmp_path, "--cells", "16", "--frames", "12", "--mcap", "a.mcap", "--picture", "a.png")
     assert "intersections  0 in all 12 frames" in said
@@ -47,10 +52,18 @@ def test_with_a_node_in_the_loop(tmp_path, capsys):
     run(tmp_path, *SMALL, "--npz", "here.npz")
     said = run(tmp_path, *SMALL, "--node", "--npz", "dds.npz", "--mcap", "dds.mcap")
     assert "intersections  0 in all 30 frames" in said
-    for here, dds in zip(frames(tmp_path / "here.npz"), frames(tmp_path / "dds.npz"), strict=True):
-        np.testing.assert_array_equal(here, dds)
+    check_same_frames(tmp_path / "here.npz", tmp_path / "dds.npz")
     assert cli.main(["replay", str(tmp_path / "dds.mcap")]) == 0
     assert "VERIFIED: 29 answers are equal" in capsys.readouterr().out
+
+
+def test_moves_that_are_shortened_are_the_same_over_dds(tmp_path):
+    """To the bit: how much of a move is free is asked as the detector of this process is."""
+    fast = ("--cells", "20", "--seed", "1", "--spin", "30", "--frames", "74", "--picture", "")
+    for words in (("--npz", "here.npz"), ("--node", "--npz", "dds.npz")):
+        said = run(tmp_path, *fast, *words)
+        assert int(re.search(r"(\d+) of them shortened", said)[1]) > 0
+    check_same_frames(tmp_path / "here.npz", tmp_path / "dds.npz")
 
 
 def test_with_a_node_that_runs_already(tmp_path):
