@@ -82,6 +82,15 @@ def test_with_a_node_that_runs_already(tmp_path):
 
 
 @pytest.mark.parametrize(
+    "words",
+    [("--frames", "2"), ("--frames", "8"), ("--frames", "100", "--spin", "0")],
+    ids=["one move", "ball not met yet", "ball at rest"],
+)
+def test_where_the_ball_gives_next_to_no_spin(tmp_path, words):
+    assert re.search(r"plausible +yes", run(tmp_path, "--cells", "16", "--picture", "", *words))
+
+
+@pytest.mark.parametrize(
     ("words", "message"),
     [
         (("--frames", "1"), "--frames 1: from 2 to 100000"),
