@@ -90,6 +90,12 @@ def test_where_the_ball_gives_next_to_no_spin(tmp_path, words):
     assert re.search(r"plausible +yes", run(tmp_path, "--cells", "16", "--picture", "", *words))
 
 
+def test_a_cloth_that_is_stuck_ends_with_one_sentence(tmp_path):
+    said = run(tmp_path, "--cells", "12", "--spin", "30", "--frames", "150", "--picture", "", status=1)
+    assert re.search(r"^cloth_on_ball: the cloth is stuck at .* a slower ball", said, re.MULTILINE)
+    assert "Traceback" not in said
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [
