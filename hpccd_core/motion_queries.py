@@ -34,6 +34,12 @@ class MotionQueries:
         never larger than the true earliest time, at most 1e-9 smaller. "balanced" and "fast": the earliest of the times
         that detect() gives. Costs a fraction of detect(), whatever `report` is: what cannot touch before the best time
         so far is not looked at.
+
+        Trial steps, shorter or turned, from one start: at "exact" and "conservative" the second call from there (the
+        first, where the start before came again too) lists the pairs that are near, and later ones test these only. A
+        start is known by its coordinates, wherever they lie, and taken for the same up to about a hundredth of an edge.
+        The list is of use while vertices go no farther, until the time returned, than about an eighth of an edge.
+        Other queries in between do no harm; a new separation ends it.
         """
         return float(self._of_motion("collision_free_step", vertices_t0, vertices_t1))
 
