@@ -100,7 +100,14 @@ class OverDds(Queries):
     def near(self, start, end):
         with self._timed():
             question = {"query": "contacts", "minimum_separation": [self._setup.reach]}
-            return client.scene_contacts(self._ask(self._request(start, end, **question)).contacts, self._layout)
+            answer = self._ask(self._request(start, end, **question)).contacts
+            found = client.scene_contacts(answer, self._layout)
+            if not answer.total == len(found.normals) == len(found.closest):
+                raise UserError(
+                    f"node {self._name} leaves out pairs, normals or nearest points: start it with the file that "
+                    "--params writes"
+                )
+            return found
 
     def free_part(self, start, end):
         with self._timed():

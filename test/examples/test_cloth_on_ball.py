@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """examples/cloth_on_ball as its users run it, in one process and with a node over DDS."""
 
+import contextlib
 import os
 import re
 import subprocess
@@ -66,19 +67,36 @@ def test_moves_that_are_shortened_are_the_same_over_dds(tmp_path):
     check_same_frames(tmp_path / "here.npz", tmp_path / "dds.npz")
 
 
-def test_with_a_node_that_runs_already(tmp_path):
-    run(tmp_path, *SMALL, "--params", "cloth.yaml")
+@contextlib.contextmanager
+def running_node(*words):
+    """A node with these ROS arguments; its name."""
     name = f"exa{os.getpid()}"
     node = subprocess.Popen(
-        [sys.executable, "-m", "hpccd_ros.node", "--ros-args", "--params-file", tmp_path / "cloth.yaml",
-         "-r", f"__node:={name}"],
+        [sys.executable, "-m", "hpccd_ros.node", "--ros-args", *words, "-r", f"__node:={name}"],
         cwd=Path(hpccd_ros.__file__).parents[1], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
     )  # fmt: skip
     try:
-        assert "intersections  0 in all 30 frames" in run(tmp_path, *SMALL, "--node", name)
+        yield name
     finally:
         node.terminate()
         assert node.wait(60) == 0
+
+
+def test_with_a_node_that_runs_already(tmp_path):
+    run(tmp_path, *SMALL, "--params", "cloth.yaml")
+    with running_node("--params-file", tmp_path / "cloth.yaml") as name:
+        assert "intersections  0 in all 30 frames" in run(tmp_path, *SMALL, "--node", name)
+
+
+@pytest.mark.parametrize(
+    "words",
+    [("-p", "max_contacts:=0"), ("-p", "outputs:=[normals, closest]", "-p", "max_contacts:=1")],
+    ids=["no outputs", "not all pairs"],
+)
+def test_a_node_that_leaves_out_what_the_solver_needs(tmp_path, words):
+    with running_node("-p", "meshes:=[cloth, ball]", *words) as name:
+        said = run(tmp_path, *SMALL, "--node", name, status=2)
+    assert "leaves out pairs, normals or nearest points: start it with the file that --params writes" in said
 
 
 @pytest.mark.parametrize(
