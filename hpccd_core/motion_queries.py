@@ -33,14 +33,14 @@ class MotionQueries:
         touches, or comes within the separation; 0.0 where something does so at the start. "exact" and "conservative":
         never larger than the true earliest time, at most 1e-9 smaller. "balanced" and "fast": the earliest of the times
         that detect() gives. Surfaces that pierce each other at the start without touching anywhere are no contact
-        there: ask intersections().
+        there: ask intersections(). What cannot touch before the best time so far is not looked at, whatever `report` is.
 
-        What cannot touch before the best time so far is not looked at ("exact", "conservative"), whatever `report` is.
-        Trial steps from one start (shorter, turned) cost a thirtieth of detect() from the third call on: the second
-        lists the pairs that are near each other there. A list is for all motions whose vertices stay within its radius
-        of that start, by their coordinates: at least a sixty-fourth of an edge, and twice the way up to the contact
-        that it was made for. No list is made where a motion goes farther than an eighth of an edge before its first
-        contact, nor where each call begins elsewhere, until a start comes again.
+        Trial steps, shorter or turned, from one start: at "exact" and "conservative" the second call from there (the
+        first, where the start before came again too) lists the pairs that are near, and later ones test these only. A
+        start is known by its coordinates, wherever they lie, and taken for the same up to about a hundredth of an edge.
+        The list is of use while vertices go no farther, until the time returned, than about an eighth of an edge; where
+        the first contact comes later, each call searches anew. Other queries in between do no harm; a new separation
+        ends it.
         """
         return float(self._of_motion("collision_free_step", vertices_t0, vertices_t1))
 

@@ -23,10 +23,10 @@ from hpccd_ros.scenes.resolved.queries import Queries
 
 # s for the node to be there, or to answer.
 PATIENCE = 60.0
+# Of every answer.
+ACCURACY = "exact"
 # What the node computes beside the contacts, and that it sends all of them.
 PARAMETERS = {"outputs": ["normals", "closest"], "max_contacts": 0}
-# A time that is later than the true one by its last digits is brought before it.
-CAUTION = 1e-9
 
 
 def write_parameters(scene, path: Path) -> None:
@@ -99,19 +99,26 @@ class OverDds(Queries):
 
     def near(self, start, end):
         with self._timed():
-            answer = self._ask(start, end, query="contacts", minimum_separation=[self._setup.reach])
-            return client.scene_contacts(answer, self._layout)
+            question = {"query": "contacts", "minimum_separation": [self._setup.reach]}
+            answer = self._ask(self._request(start, end, **question)).contacts
+            found = client.scene_contacts(answer, self._layout)
+            if not answer.total == len(found.normals) == len(found.closest):
+                raise UserError(
+                    f"node {self._name} leaves out pairs, normals or nearest points: start it with the file that "
+                    "--params writes"
+                )
+            return found
 
     def free_part(self, start, end):
         with self._timed():
-            answer = self._ask(
-                start, end, query="contacts", report="first", minimum_separation=[self._setup.clearance]
+            request = client.collision_free_step_request(
+                self._by_mesh(start), self._by_mesh(end), accuracy=ACCURACY, minimum_separation=self._setup.clearance
             )
-            return 1.0 if answer.first_toc > 1.0 else max(0.0, answer.first_toc - CAUTION)
+            return client.collision_free_step_from_response(self._ask(request))
 
     def intersections(self, positions):
         with self._timed():
-            return self._ask(positions, positions, query="intersections").total
+            return self._ask(self._request(positions, positions, query="intersections")).contacts.total
 
     def made(self, positions):
         """Stream the frame, and wait for the node's answer to the step that it ends: nothing is dropped."""
@@ -122,23 +129,27 @@ class OverDds(Queries):
             self._await(lambda: self._answered >= stamp, f"node {self._name} did not answer frame {self._frames}")
         self._frames += 1
 
-    def _messages(self, positions, stamp):
+    def _by_mesh(self, positions):
         first, last = self._ends
-        parts = positions[:first], positions[first:last]
-        return [client.vertices_message(part, stamp, step=self._frames) for part in parts]
+        return dict(zip((mesh.name for mesh in self._meshes), (positions[:first], positions[first:last]), strict=True))
 
-    def _ask(self, start, end, **question):
+    def _messages(self, positions, stamp):
+        return [client.vertices_message(x, stamp, step=self._frames) for x in self._by_mesh(positions).values()]
+
+    def _request(self, start, end, **question):
         names = [mesh.name for mesh in self._meshes]
-        request = Detect.Request(
-            mesh_names=names, start=self._messages(start, 0), end=self._messages(end, 1), accuracy="exact", **question
+        return Detect.Request(
+            mesh_names=names, start=self._messages(start, 0), end=self._messages(end, 1), accuracy=ACCURACY, **question
         )
+
+    def _ask(self, request):
         deadline = time.monotonic() + PATIENCE
         while True:
             future = self._service.call_async(request)
             self._executor.spin_until_future_complete(future, timeout_sec=PATIENCE)
             answer = future.result() if future.done() else None
             if answer is not None and answer.success:
-                return answer.contacts
+                return answer
             # At first it may not have the topologies yet.
             if answer is None or self._frames or time.monotonic() > deadline:
                 raise UserError(f"node {self._name}: {answer.message if answer else f'no answer in {PATIENCE:.0f} s'}")

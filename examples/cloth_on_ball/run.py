@@ -18,9 +18,10 @@ hpccd_ros/scenes/resolved; docs/simulators.md tells how it works.
   python examples/cloth_on_ball/run.py --params cloth.yaml
   hpccd_node --ros-args --params-file cloth.yaml &
   python examples/cloth_on_ball/run.py --node hpccd
-                        a node that you have started yourself: same --cells for both
+                        a node that you have started yourself
 
-Exit status: 0 where nothing intersected and momentum and energy are accounted for, 1 where not, 2 for wrong use.
+Exit status: 0 where nothing intersected and momentum and energy are accounted for, 1 where not or where the cloth is
+stuck, 2 for wrong use.
 """
 
 import argparse
@@ -34,7 +35,7 @@ from account import Account
 
 from hpccd_ros.base.errors import UserError
 from hpccd_ros.scenes.progress import track
-from hpccd_ros.scenes.resolved.motion import Simulation
+from hpccd_ros.scenes.resolved.motion import Simulation, Stuck
 from hpccd_ros.scenes.resolved.queries import InProcess
 from hpccd_ros.scenes.resolved.setup import Setup
 from hpccd_ros.scenes.scene import Frame, Mesh, Scene
@@ -47,6 +48,9 @@ def main(argv=None) -> int:
     except UserError as error:
         print(f"cloth_on_ball: {error}", file=sys.stderr)
         return 2
+    except Stuck as error:
+        print(f"cloth_on_ball: {error}", file=sys.stderr)
+        return 1
     except KeyboardInterrupt:
         print("cloth_on_ball: interrupted", file=sys.stderr)
         return 130
@@ -55,7 +59,7 @@ def main(argv=None) -> int:
 def _arguments(argv):
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--frames", type=int, default=240, metavar="N",
-                        help="moves to make, each of 10 ms unless it is shortened (default: %(default)s)")
+                        help="the start and N - 1 moves, each of 10 ms unless it is shortened (default: %(default)s)")
     parser.add_argument("--cells", type=int, default=100, metavar="N",
                         help="along a side of the cloth, 2 N^2 triangles (default: %(default)s)")
     parser.add_argument("--spin", type=float, default=Setup.spin, metavar="RAD/S",

@@ -100,6 +100,36 @@ def test_one_vertex_that_makes_the_contact_earlier():
     assert is_half(detector.collision_free_step(v0, v1))
 
 
+@pytest.mark.parametrize("accuracy", ["conservative", "exact"])
+def test_a_start_that_comes_again_is_not_searched_again(accuracy):
+    """As the docstring says: listed in the second call, used in the later ones, wherever the arrays lie; and the next
+    start is listed at once."""
+    number = np.arange(81).reshape(9, 9)  # vertices of a sheet, a quarter apart
+    sheet = np.stack([*np.divmod(number.ravel(), 9), np.zeros(81)], axis=1) / 4
+    a, b, c, d = (number[i : i + 8, j : j + 8].ravel() for i, j in ((0, 0), (1, 0), (1, 1), (0, 1)))
+    faces = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
+    start = np.concatenate([sheet, sheet + [0.01, 0.02, 0.0125]])
+    ways = [np.where(np.arange(len(start)) < len(sheet), 0.0, way)[:, None] * [0.1, 0, -1] for way in (0.025, 0.02)]
+    scene = hc.Scene()
+    for name in ("below", "above"):
+        scene.add_mesh(name, faces, self_collision=False)
+    detector = hc.Detector(scene, accuracy=accuracy, backend="cpu", threads=1)
+
+    def stages(way, start=start):
+        free = detector.collision_free_step(start.copy(), start + way)
+        assert free == fresh_step(scene, start, start + way, accuracy=accuracy)
+        return {"build", "refit", "near_pairs"} & set(detector.profile)
+
+    assert stages(ways[0]) == {"build"}
+    assert "near_pairs" in stages(ways[0])
+    assert stages(ways[0]) == stages(ways[1]) == stages(0.5 * ways[0]) == set()
+    detector.detect(start, start + ways[0])
+    assert stages(ways[1]) == set()
+    elsewhere = start + [0, 0, 0.125]
+    assert "near_pairs" in stages(ways[1], elsewhere)
+    assert stages(ways[0], elsewhere) == set()
+
+
 def test_signs_of_zero_and_types_of_numbers():
     meshes = flat_fall(1.0)
     detector = hc.Detector(meshes.scene(), backend="cpu")

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """examples/cloth_on_ball as its users run it, in one process and with a node over DDS."""
 
+import contextlib
 import os
 import re
 import subprocess
@@ -33,6 +34,11 @@ def frames(path):
         return archive["cloth/0/vertices"], archive["ball/0/vertices"]
 
 
+def check_same_frames(one, other):
+    for here, dds in zip(frames(one), frames(other), strict=True):
+        np.testing.assert_array_equal(here, dds)
+
+
 def test_in_one_process(tmp_path, capsys):
     said = run(tmp_path, "--cells", "16", "--frames", "12", "--mcap", "a.mcap", "--picture", "a.png")
     assert "intersections  0 in all 12 frames" in said
@@ -47,25 +53,65 @@ def test_with_a_node_in_the_loop(tmp_path, capsys):
     run(tmp_path, *SMALL, "--npz", "here.npz")
     said = run(tmp_path, *SMALL, "--node", "--npz", "dds.npz", "--mcap", "dds.mcap")
     assert "intersections  0 in all 30 frames" in said
-    for here, dds in zip(frames(tmp_path / "here.npz"), frames(tmp_path / "dds.npz"), strict=True):
-        np.testing.assert_array_equal(here, dds)
+    check_same_frames(tmp_path / "here.npz", tmp_path / "dds.npz")
     assert cli.main(["replay", str(tmp_path / "dds.mcap")]) == 0
     assert "VERIFIED: 29 answers are equal" in capsys.readouterr().out
 
 
-def test_with_a_node_that_runs_already(tmp_path):
-    run(tmp_path, *SMALL, "--params", "cloth.yaml")
+def test_moves_that_are_shortened_are_the_same_over_dds(tmp_path):
+    """To the bit: how much of a move is free is asked as the detector of this process is."""
+    fast = ("--cells", "20", "--seed", "1", "--spin", "30", "--frames", "74", "--picture", "")
+    for words in (("--npz", "here.npz"), ("--node", "--npz", "dds.npz")):
+        said = run(tmp_path, *fast, *words)
+        assert int(re.search(r"(\d+) of them shortened", said)[1]) > 0
+    check_same_frames(tmp_path / "here.npz", tmp_path / "dds.npz")
+
+
+@contextlib.contextmanager
+def running_node(*words):
+    """A node with these ROS arguments; its name."""
     name = f"exa{os.getpid()}"
     node = subprocess.Popen(
-        [sys.executable, "-m", "hpccd_ros.node", "--ros-args", "--params-file", tmp_path / "cloth.yaml",
-         "-r", f"__node:={name}"],
+        [sys.executable, "-m", "hpccd_ros.node", "--ros-args", *words, "-r", f"__node:={name}"],
         cwd=Path(hpccd_ros.__file__).parents[1], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
     )  # fmt: skip
     try:
-        assert "intersections  0 in all 30 frames" in run(tmp_path, *SMALL, "--node", name)
+        yield name
     finally:
         node.terminate()
         assert node.wait(60) == 0
+
+
+def test_with_a_node_that_runs_already(tmp_path):
+    run(tmp_path, *SMALL, "--params", "cloth.yaml")
+    with running_node("--params-file", tmp_path / "cloth.yaml") as name:
+        assert "intersections  0 in all 30 frames" in run(tmp_path, *SMALL, "--node", name)
+
+
+@pytest.mark.parametrize(
+    "words",
+    [("-p", "max_contacts:=0"), ("-p", "outputs:=[normals, closest]", "-p", "max_contacts:=1")],
+    ids=["no outputs", "not all pairs"],
+)
+def test_a_node_that_leaves_out_what_the_solver_needs(tmp_path, words):
+    with running_node("-p", "meshes:=[cloth, ball]", *words) as name:
+        said = run(tmp_path, *SMALL, "--node", name, status=2)
+    assert "leaves out pairs, normals or nearest points: start it with the file that --params writes" in said
+
+
+@pytest.mark.parametrize(
+    "words",
+    [("--frames", "2"), ("--frames", "8"), ("--frames", "100", "--spin", "0")],
+    ids=["one move", "ball not met yet", "ball at rest"],
+)
+def test_where_the_ball_gives_next_to_no_spin(tmp_path, words):
+    assert re.search(r"plausible +yes", run(tmp_path, "--cells", "16", "--picture", "", *words))
+
+
+def test_a_cloth_that_is_stuck_ends_with_one_sentence(tmp_path):
+    said = run(tmp_path, "--cells", "12", "--spin", "30", "--frames", "150", "--picture", "", status=1)
+    assert re.search(r"^cloth_on_ball: the cloth is stuck at .* a slower ball", said, re.MULTILINE)
+    assert "Traceback" not in said
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from hpccd_core import reference
-from hpccd_ros.scenes.resolved.motion import Simulation
+from hpccd_ros.scenes.resolved.motion import Simulation, Stuck
 from hpccd_ros.scenes.resolved.queries import InProcess
 from hpccd_ros.scenes.resolved.setup import Setup
 from hpccd_ros.scenes.resolved.springs import Springs
@@ -130,7 +130,7 @@ def test_a_solver_that_misses_pairs_is_slow_but_never_touches():
 
 
 def test_a_solver_that_is_stuck_says_so():
-    with pytest.raises(RuntimeError, match="the cloth is stuck at 0[.].* s: 20 moves in a row"):
+    with pytest.raises(Stuck, match="the cloth is stuck at 0[.].* s: 20 moves in a row"):
         run(300, kind=Blind)
 
 

@@ -119,6 +119,12 @@ def test_readme_is_two_screens():
     assert len((ROOT / "README.md").read_text().splitlines()) <= 200
 
 
+def test_readme_names_every_page():
+    text = (ROOT / "README.md").read_text()
+    missing = [page.name for page in (ROOT / "docs").glob("*.md") if f"](docs/{page.name}) |" not in text]
+    assert not missing
+
+
 def test_results_in_readme_are_those_of_the_page_of_figures():
     results = (ROOT / "README.md").read_text().partition("## Results")[2].partition("\n#")[0]
     figures = set(re.findall(r"[\d,.]+\d", (ROOT / "docs" / "performance.md").read_text()))

@@ -14,10 +14,14 @@ from hpccd_ros.scenes.resolved.springs import Springs
 
 @dataclass(frozen=True)
 class State:
-    """Of the cloth: momentum (3,) kg m/s, energies in J, angular momentum about z in kg m^2/s."""
+    """Of the cloth: momentum (3,) kg m/s, energies in J, angular momentum about z in kg m^2/s.
+
+    turning: the same with what turns the one way and the other added up, not set off.
+    """
 
     momentum: np.ndarray
     spin: float
+    turning: float
     kinetic: float
     height: float  # energy of
     elastic: float
@@ -55,9 +59,11 @@ class Ledger:
     def state(self, positions: np.ndarray, velocity: np.ndarray) -> State:
         setup, n = self._setup, self._n
         x = np.ascontiguousarray(positions[:n].T, dtype=np.float64)
+        spins = x[0] * velocity[1] - x[1] * velocity[0]
         return State(
             setup.mass * velocity.sum(axis=1),
-            setup.mass * float((x[0] * velocity[1] - x[1] * velocity[0]).sum()),
+            setup.mass * float(spins.sum()),
+            setup.mass * float(np.abs(spins).sum()),
             0.5 * setup.mass * float((velocity * velocity).sum()),
             setup.mass * setup.gravity * float(x[2].sum()),
             self._springs.energy(x.reshape(3, setup.cells + 1, setup.cells + 1)),

@@ -31,6 +31,10 @@ PRESSED = 0.6
 STUCK, PATIENCE = 0.01, 20
 
 
+class Stuck(RuntimeError):
+    """Many moves in a row were shortened to nearly nothing."""
+
+
 @dataclass(frozen=True)
 class Move:
     """A move that was made, from the end of the one before.
@@ -66,10 +70,7 @@ class Simulation:
         self.ledger.open(self.positions, self.velocity)
 
     def move(self) -> Move:
-        """Make the next move.
-
-        Raises RuntimeError where many moves in a row were shortened to nearly nothing.
-        """
+        """Make the next move. Raises Stuck."""
         setup, start = self.setup, self.positions
         period = (self._ticks + 1) * setup.period - self.time
         trial = self.trial(period)
@@ -90,9 +91,9 @@ class Simulation:
                 end = shorter
         self._stuck = self._stuck + 1 if part < STUCK else 0
         if self._stuck > PATIENCE:
-            raise RuntimeError(
+            raise Stuck(
                 f"the cloth is stuck at {self.time:.3f} s: {PATIENCE} moves in a row were shortened to less than "
-                f"{STUCK}; take a finer cloth or a shorter period"
+                f"{STUCK}; take a finer cloth, a slower ball or a shorter period"
             )
         self.positions = end
         self.velocity += part * (velocity - self.velocity)
