@@ -59,3 +59,20 @@ def test_nothing_moves_and_nothing_touches():
     with pytest.raises(ValueError, match="vertices_t1"):
         there.collision_free_step(t0, np.full_like(t0, np.nan))
     assert there.collision_free_step(t0, t0) == hc.Detector(scene, backend="cpu").collision_free_step(t0, t0)
+
+
+def test_a_scene_all_of_which_counts_as_near():
+    """A separation that others have, larger than a sheet that may touch itself: nearly all of its pairs are near."""
+    faces, flat = scenes.sheet(90), scenes.flat(90)
+    triangle = np.array([[0, 1, 2]])
+    far = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
+    scene = hc.Scene()
+    for name, of_faces, vertices in (("sheet", faces, flat), ("a", triangle, far), ("b", triangle, far)):
+        scene.add_mesh(name, of_faces, n_vertices=len(vertices))
+    scene.set_separation("a", "b", 40.0)
+    t0 = np.concatenate([flat, far + [0, 0, 1000], far + [0, 0, 2000]])
+    t1 = t0 + [0, 0, 1e-3]
+    there = hc.Detector(scene, backend="gpu")
+    assert [there.collision_free_step(t0, t1) for _ in range(6)] == [1.0] * 6
+    assert there.stats["gpu_fallbacks"] == 0 and there.stats["near_pairs"] < 10**6
+    assert there.stats["gpu_bytes"] < 2**30

@@ -45,9 +45,12 @@ bool GpuBackend::list_near_pairs(Positions t0, double time) {
   if (!radius || !std::isfinite(distance)) return false;
   near_.forget();
   prepare_snapshot(gpu::Query::proximity, t0, distance);
-  require_good(pipeline_->list_near(t0, distance, shared_.pool), t0, t0);
-  near_.set(*radius);
-  return true;
+  require_good(pipeline_->list_near(t0, distance, most_listed(shared_.features), shared_.pool), t0, t0);
+  if (pipeline_->gave_up_listing())
+    near_.gave_up();
+  else
+    near_.set(*radius);
+  return !pipeline_->gave_up_listing();
 }
 
 Travel GpuBackend::travel_of_frame() const {

@@ -63,11 +63,13 @@ class DevicePipeline : public Pipeline {
     return run_frame(scene_.query_now(), t0, t1, 0, pool);
   }
   EarliestTime earliest() const override;
-  bool list_near(Positions vertices, double distance, ThreadPool& pool) override {
+  bool list_near(Positions vertices, double distance, std::size_t most, ThreadPool& pool) override {
     begin();
     goal_ = Goal::near_list;
+    most_near_ = most, gave_up_listing_ = false;
     return run_frame(Query::proximity, vertices, vertices, distance, pool);
   }
+  bool gave_up_listing() const override { return gave_up_listing_; }
   void list_found(double until) override;
   const std::vector<Candidate>& undecided() const override { return undecided_; }
 
@@ -107,6 +109,7 @@ class DevicePipeline : public Pipeline {
   void list_found(double until);
   void copy_counters();
   bool grow_overflowed();
+  bool lists_too_many() const;
 
   int device_, multiprocessors_ = 1;
   Stream stream_;
@@ -129,6 +132,8 @@ class DevicePipeline : public Pipeline {
   bool for_earliest() const { return goal_ == Goal::earliest || goal_ == Goal::earliest_of_near; }
 
   DeviceNearList near_;
+  std::size_t most_near_ = 0;
+  bool gave_up_listing_ = false;
   Positions given_t0_;  // of the last frame, while its caller waits
   Goal goal_ = Goal::results;
   Query query_ = Query::contacts;
@@ -172,6 +177,7 @@ bool DevicePipeline::run_frame(Positions t0, Positions t1, double distance, Thre
     if (exact_last_time_ > 1) pool.share([](int) {});
     check(cudaEventSynchronize(counted_), "cudaEventSynchronize");
     if (c.bad) return false;
+    if ((gave_up_listing_ = lists_too_many())) return true;
     again = grow_overflowed();
   }
   undecided_.reserve(c.to_host);
@@ -262,6 +268,13 @@ void DevicePipeline::list_found(double until) {
 void DevicePipeline::copy_counters() {
   check(cudaMemcpyAsync(host_counters_.data(), counters_.data(), sizeof(Counters), cudaMemcpyDeviceToHost, stream_),
         "cudaMemcpyAsync");
+}
+
+// Before room is made for what is not wanted. Of the candidates of ordinary lists an eighth is near.
+bool DevicePipeline::lists_too_many() const {
+  const Counters& c = *host_counters_.data();
+  return goal_ == Goal::near_list && (c.found_all + c.to_host > most_near_ || c.leaf_pairs > 8 * most_near_ ||
+                                      c.all_survivors[0] + c.all_survivors[1] > 32 * most_near_);
 }
 
 // Makes room where a list was too short. True where the frame must run again.

@@ -60,8 +60,10 @@ class Pipeline {
   enum class Pairs : bool { all, near_list };
   virtual bool run_for_earliest(Positions t0, Positions t1, Pairs pairs, ThreadPool& pool) = 0;
   virtual EarliestTime earliest() const = 0;
-  // Lists all pairs that come within a distance in a snapshot. Returns false as run().
-  virtual bool list_near(Positions vertices, double distance, ThreadPool& pool) = 0;
+  // Lists all pairs that come within a distance in a snapshot, if there are not many more than `most`; else the list
+  // stays what it was. Returns false as run().
+  virtual bool list_near(Positions vertices, double distance, std::size_t most, ThreadPool& pool) = 0;
+  virtual bool gave_up_listing() const = 0;  // by the last list_near()
   // Lists what the last run_for_earliest() found up to a time, and what it left undecided, to begin with.
   virtual void list_found(double until) = 0;
 
