@@ -43,10 +43,11 @@ struct NearerBoxes {
 template <class Boxes, class Between>
 void walk(const Tree& tree, const PairRules& rules, Boxes boxes, const Cancellation& cancellation,
           std::vector<NodePair>& stack, Worker& worker, Between&& between) {
+  const bool bounded = worker.search().bounded();
   std::size_t stale = 0;  // so many at the bottom were put there when boxes were larger
   while (!stack.empty()) {
     cancellation.heed();
-    if (worker.search().gave_up()) return stack.clear();
+    if (bounded && worker.search().gave_up()) return stack.clear();
     const NodePair p = stack.back();
     stack.pop_back();
     if constexpr (Boxes::shrink) {
