@@ -33,7 +33,8 @@ class MotionQueries:
         touches, or comes within the separation; 0.0 where something does so at the start. "exact" and "conservative":
         never larger than the true earliest time, at most 1e-9 smaller. "balanced" and "fast": the earliest of the times
         that detect() gives. Surfaces that pierce each other at the start without touching anywhere are no contact
-        there: ask intersections(). What cannot touch before the best time so far is not looked at, whatever `report` is.
+        there: ask intersections(). What cannot touch before the best time so far is not looked at, whatever `report`
+        is.
 
         Trial steps, shorter or turned, from one start: at "exact" and "conservative" the second call from there (the
         first, where the start before came again too) lists the pairs that are near, and later ones test these only. A
