@@ -12,11 +12,15 @@ namespace hpccd {
 struct BoxesUntil {
   static constexpr bool shrink = true;
   const Search& search;
-  PartOfMotion part = search.part();  // when it was looked at last
+  // When it was looked at last.
+  double best = search.earliest.load(std::memory_order_relaxed);
+  PartOfMotion part = search.part();
 
   bool changed() {
-    const PartOfMotion now = search.part();
-    return std::exchange(part, now).until != now.until;
+    const double now = search.earliest.load(std::memory_order_relaxed);
+    if (std::exchange(best, now) == now) return false;
+    part = search.part();
+    return true;
   }
   bool overlap(const Node& a, const Node& b) const {
     if (part.until >= 1) return a.overlaps(b);

@@ -53,7 +53,7 @@ struct Search {
     return prunes && best < 1 ? static_cast<float>(best + 2e-12) * (1 + 2e-7f) : 2;
   }
   PartOfMotion part() const {
-    if (!prunes) return {2, -1};
+    if (!prunes || !(earliest.load(std::memory_order_relaxed) < 1)) return {2, -1};
     const float time = until(), reach = time * two_ways * (1 + 1e-6f) + 1e-6f;
     return {time, reach <= most_reach ? reach : -1};
   }
