@@ -25,8 +25,6 @@ void CpuBackend::find_earliest(Positions t0, Positions t1, bool time_only) {
       begin_earliest(t0, t1, time_only);
       if (known_from_near_pairs()) return mark_traversal();
     }
-  }
-  if (search_.prunes) {
     const double scale = shared_.tree.motion().map.scale;
     search_.two_ways = static_cast<float>(2 * travel_.way * scale);
     search_.most_reach = static_cast<float>(edge_ / 4 * scale);

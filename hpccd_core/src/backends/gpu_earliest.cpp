@@ -54,9 +54,8 @@ bool GpuBackend::list_near_pairs(Positions t0, double time) {
 }
 
 Travel GpuBackend::travel_of_frame() const {
-  constexpr double root_of_three = 1.7320508075688774;
   const gpu::EarliestTime frame = pipeline_->earliest();
-  return {root_of_three * frame.away, root_of_three * frame.way};
+  return Travel::along_axes(frame.away, frame.way);
 }
 
 }  // namespace hpccd

@@ -16,6 +16,11 @@ double largest(const Vec3<double>& x) { return std::max({std::fabs(x.x), std::fa
 
 }  // namespace
 
+Travel Travel::along_axes(double away, double way) {
+  constexpr double root_of_three = 1.7320508075688774;
+  return {root_of_three * away, root_of_three * way};
+}
+
 std::optional<double> radius_for(const Travel& travel, double time, double edge) {
   constexpr double longest_way = 1.0 / 8;  // of an edge
   const double way = travel.way * std::min(time + same_time, 1.0);
@@ -56,8 +61,7 @@ Travel NearList::travel(const std::vector<VertexMotion>& vertices, ThreadPool& p
   });
   Travel t;
   for (const Travel& s : most) t.away = std::max(t.away, s.away), t.way = std::max(t.way, s.way);
-  constexpr double root_of_three = 1.7320508075688774;
-  return {known ? root_of_three * t.away : std::numeric_limits<double>::infinity(), root_of_three * t.way};
+  return Travel::along_axes(known ? t.away : std::numeric_limits<double>::infinity(), t.way);
 }
 
 std::size_t NearList::size() const {

@@ -21,6 +21,8 @@ namespace hpccd {
 // How far vertices are from a list's snapshot at most, and how far they go: bounds of Euclidean distances.
 struct Travel {
   double away = 0, way = 0;
+  // From the largest differences along an axis.
+  static Travel along_axes(double away, double way);
   // The farthest that any of them is up to a time.
   double until(double time) const { return (away + time * way) * (1 + 1e-9); }
 };
