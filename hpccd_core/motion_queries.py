@@ -39,9 +39,10 @@ class MotionQueries:
         Trial steps, shorter or turned, from one start: at "exact" and "conservative" the second call from there (the
         first, where the start before came again too) lists the pairs that are near, and later ones test these only. A
         start is known by its coordinates, wherever they lie, and taken for the same up to about a hundredth of an edge.
-        The list is of use while vertices go no farther, until the time returned, than about an eighth of an edge; where
-        the first contact comes later, each call searches anew. Other queries in between do no harm; a new separation
-        ends it.
+        The list is of use while vertices go no farther, until the time returned, than about an eighth of an edge; or
+        farther, where neighbours go the same way: a mesh may fall, turn and bend as long as those near each other go
+        apart by less than half an edge. Where they do not, each call searches anew. Other queries in between do no
+        harm; a new separation ends it.
         """
         return float(self._of_motion("collision_free_step", vertices_t0, vertices_t1))
 

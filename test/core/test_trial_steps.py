@@ -125,9 +125,74 @@ def test_a_start_that_comes_again_is_not_searched_again(accuracy):
     assert stages(ways[0]) == stages(ways[1]) == stages(0.5 * ways[0]) == set()
     detector.detect(start, start + ways[0])
     assert stages(ways[1]) == set()
-    elsewhere = start + [0, 0, 0.125]
+    moved = start + [0, 0, 0.125]  # as a whole: nothing is nearer than it was
+    assert stages(ways[1], moved) == {"near_pairs"} and detector.stats["leaf_pairs"] == 0
+    elsewhere = start + np.random.default_rng(88).normal(0, 0.05, start.shape) * [1, 1, 0]
     assert "near_pairs" in stages(ways[1], elsewhere)
     assert stages(ways[0], elsewhere) == set()
+
+
+def waving_sheets(rng, n=24):
+    """Two bent sheets above each other, and motions that turn, drop and bend them by several edges."""
+    flat = np.stack([*np.meshgrid(np.arange(n), np.arange(n)), np.zeros((n, n))], axis=2).reshape(-1, 3).astype(float)
+    bent = flat + np.sin(0.3 * flat[:, :1] + 0.2 * flat[:, 1:2]) * [0, 0, 1.0]
+    start = np.concatenate([bent, bent + [0.3, 0.2, 0.3]])
+    scene = hc.Scene()
+    for name in ("below", "above"):
+        scene.add_mesh(name, random_scenes.sheet(n), n_vertices=len(flat))
+
+    def way(size):
+        turn = np.cross(rng.normal(0, 0.02, 3), start - start.mean(axis=0))
+        wave = np.sin(start @ rng.normal(0, 0.1, 3))[:, None] * rng.normal(0, 0.2, 3)
+        fall = np.where(np.arange(len(start)) < len(flat), 0.0, -1.0)[:, None] * [0.1, 0, 1]
+        return size * (rng.normal(0, 3, 3) + turn + wave + fall)
+
+    return scene, start, way
+
+
+@pytest.mark.parametrize("accuracy", ["conservative", "exact"])
+@pytest.mark.parametrize("threads", [1, 3])
+@pytest.mark.parametrize("separation", [0.0, 0.125])
+def test_steps_that_go_far_where_neighbours_stay_together(accuracy, threads, separation):
+    """Several edges until the first contact, from one start and from others nearby: as a new detector answers them, by
+    few pairs of leaves."""
+    rng = np.random.default_rng(86)
+    scene, start, way = waving_sheets(rng)
+    options = {"accuracy": accuracy, "minimum_separation": separation, "backend": "cpu"}
+    step, first = (hc.Detector(scene, threads=threads, report=report, **options) for report in ("all", "first"))
+    searched, steps, leaf_pairs = None, set(), []
+    for call in range(30):
+        begin = start + (rng.normal(0, 1.0, 3) if call > 4 else 0)
+        end = begin + way(rng.choice([1.0, 0.8, 0.2]))
+        new = hc.Detector(scene, threads=1, **options)
+        found = new.detect(begin, end)
+        searched = new.stats["leaf_pairs"] if searched is None else searched
+        expected = new.collision_free_step(begin, end)
+        assert step.collision_free_step(begin, end) == expected
+        steps.add(expected)
+        leaf_pairs.append(step.stats["leaf_pairs"])
+        earliest = first.detect(begin, end)
+        assert earliest.first_toc == found.first_toc
+        if found.first_toc <= 1:
+            at_first = found.vf_toc == found.first_toc, found.ee_toc == found.first_toc
+            np.testing.assert_array_equal(earliest.vf, found.vf[at_first[0]])
+            np.testing.assert_array_equal(earliest.ee, found.ee[at_first[1]])
+    assert len(steps) > 8 and min(steps) < 0.5
+    assert np.median(leaf_pairs) < searched / 4
+
+
+def test_a_vertex_that_leaves_its_neighbours():
+    """One corner of a sheet that falls as a whole goes its own way, through what was far from it."""
+    scene, start, _ = waving_sheets(np.random.default_rng(87))
+    detector = hc.Detector(scene, backend="cpu", threads=1)
+    together = start + [0, 0, 20]
+    for _ in range(3):
+        assert detector.collision_free_step(start, together) == 1.0
+    for vertex in (0, 300, len(start) - 1):
+        apart = together.copy()
+        apart[vertex, 2] += 8 if vertex < 576 else -8
+        step = fresh_step(scene, start, apart)
+        assert detector.collision_free_step(start, apart) == step < 1
 
 
 def test_signs_of_zero_and_types_of_numbers():

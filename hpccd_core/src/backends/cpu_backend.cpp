@@ -69,6 +69,7 @@ void CpuBackend::begin_query() {
   search_.leaf_pairs = nullptr, search_.leaf_pairs_in_snapshot = nullptr, search_.leaf_edge_faces = nullptr;
   search_.nearest = nullptr;
   search_.time_only = search_.prunes = false;
+  search_.drift = nullptr;
   search_.most_found = std::numeric_limits<std::size_t>::max();
 }
 
@@ -124,7 +125,7 @@ void CpuBackend::count(std::map<std::string, std::uint64_t>& stats) const {
   std::uint64_t bytes = order_.bytes();
   if (method_) bytes += method_->bytes();
   if (mesh_pairs_) bytes += mesh_pairs_->bytes();
-  bytes += near_.bytes();
+  bytes += near_.bytes() + drift_.bytes();
   if (search_.report == Report::first) stats["near_pairs"] = near_.size();
   const char* kinds[3] = {"vf", "ee", "ef"};
   const bool pairs = search_.leaf_pairs || search_.leaf_pairs_in_snapshot;

@@ -45,7 +45,12 @@ class CpuBackend final : public DetectionBackend {
   void begin_earliest(Positions t0, Positions t1, bool time_only);
   bool known_from_near_pairs();
   bool list_near_pairs(Positions t0);
-  void test_near_pairs();
+  void test_groups(const std::vector<NearList::Group>& groups);
+  void limit_reach();
+  bool known_from_the_unlisted(bool time_only);
+  std::optional<double> wide_radius();
+  void see_drift();
+  std::optional<std::vector<LeafPair>> open_pairs();
   void remember_earliest();
   void see_motion(Positions t0, Positions t1, Tests tests);
   void see_snapshot(Positions vertices);
@@ -62,9 +67,12 @@ class CpuBackend final : public DetectionBackend {
   ContactOrder order_;
   NearList near_;                        // for the earliest contacts of motions that begin alike
   std::uint64_t near_separations_ = 0;   // the version of the separations that it is for
+  Drift drift_;                          // from where it was made
   Travel travel_;                        // of the motion, as the list sees it
   double edge_ = 0;                      // a typical length
   std::optional<MeshPairs> mesh_pairs_;  // from the first search for smallest distances on
+  // What the drift begins at: the numbers of that snapshot and of the tree.
+  std::optional<std::pair<std::uint64_t, std::uint64_t>> drift_of_;
   // Kept by a call that is cancelled: to give the memory of 10 million back to the system takes longer than to end it.
   Contacts contacts_;
 };

@@ -20,18 +20,23 @@ std::optional<double> CpuBackend::earliest(Positions t0, Positions t1) {
 void CpuBackend::find_earliest(Positions t0, Positions t1, bool time_only) {
   begin_earliest(t0, t1, time_only);
   if (search_.prunes) {
-    if (known_from_near_pairs()) return mark_traversal();
-    if (list_near_pairs(t0)) {
+    if (known_from_near_pairs() || known_from_the_unlisted(time_only)) return;
+    if (near_.radius().failed(travel_)) near_.forget();
+    if (!near_.radius().known() && list_near_pairs(t0)) {
       begin_earliest(t0, t1, time_only);
-      if (known_from_near_pairs()) return mark_traversal();
+      if (known_from_near_pairs() || known_from_the_unlisted(time_only)) return;
     }
-    const double scale = shared_.tree.motion().map.scale;
-    search_.two_ways = static_cast<float>(2 * travel_.way * scale);
-    search_.most_reach = static_cast<float>(edge_ / 4 * scale);
+    limit_reach();
   }
   shared_.tree.fit(shared_.profiler);
   walk_tree();
   if (search_.prunes) remember_earliest();
+}
+
+void CpuBackend::limit_reach() {
+  const double scale = shared_.tree.motion().map.scale;
+  search_.two_ways = static_cast<float>(2 * travel_.way * scale);
+  search_.most_reach = static_cast<float>(edge_ / 4 * scale);
 }
 
 void CpuBackend::begin_earliest(Positions t0, Positions t1, bool time_only) {
@@ -43,16 +48,20 @@ void CpuBackend::begin_earliest(Positions t0, Positions t1, bool time_only) {
 
 // Tests the pairs that are near, and says whether that was enough. The best time so far is known then in any case.
 bool CpuBackend::known_from_near_pairs() {
-  if (std::exchange(near_separations_, shared_.separations.version()) != shared_.separations.version()) near_ = {};
-  test_near_pairs();
+  if (std::exchange(near_separations_, shared_.separations.version()) != shared_.separations.version())
+    near_ = {}, drift_of_.reset();
+  test_groups(near_.hints);
+  if (!search_.over()) test_groups(near_.groups());
+  mark_traversal();
   if (search_.over()) return true;
   travel_ = near_.travel(shared_.tree.motion().vertices, shared_.pool);
   return near_.radius().answers(search_.earliest, travel_);
 }
 
-void CpuBackend::test_near_pairs() {
+// Leaves what it found in the workers, and nothing else.
+void CpuBackend::test_groups(const std::vector<NearList::Group>& groups) {
   for (Worker& w : workers_) w.begin(search_);
-  for (const NearList::Group& group : near_.groups()) {
+  for (const NearList::Group& group : groups) {
     constexpr std::size_t grain = 256;  // 10 us, as long as it takes to wake a thread
     parallel_for(shared_.pool, group.first.size(), grain, [&](std::size_t begin, std::size_t end, int thread) {
       const std::span first(group.first), second(group.second);
@@ -67,7 +76,8 @@ void CpuBackend::test_near_pairs() {
 bool CpuBackend::list_near_pairs(Positions t0) {
   edge_ = typical_length(shared_.features, shared_.tree.motion().vertices);
   if (!near_.radius().next_would_pay(travel_, edge_)) return false;
-  const std::optional<double> radius = radius_for(travel_, search_.earliest, edge_);
+  std::optional<double> radius = radius_for(travel_, search_.earliest, edge_);
+  if (!radius && near_.radius().wider_would_pay()) radius = wide_radius();
   if (!radius) return false;
   const double distance = listed_distance(*radius, shared_.separations.most());
   if (!std::isfinite(distance)) return false;
@@ -86,7 +96,7 @@ bool CpuBackend::list_near_pairs(Positions t0) {
     for (const Contact& c : w.vertex_face) near.add({c.first, c.second, Kind::vertex_face});
     for (const Contact& c : w.edge_edge) near.add({c.first, c.second, Kind::edge_edge});
   }
-  near_.keep(std::move(near.groups), shared_.tree.motion().vertices, radius, shared_.pool);
+  near_.keep(std::move(near.groups), *radius, shared_.tree.motion().vertices, shared_.pool);
   shared_.profiler.mark("near_pairs");
   return true;
 }
@@ -101,7 +111,8 @@ void CpuBackend::remember_earliest() {
          {std::pair(&w.vertex_face, Kind::vertex_face), std::pair(&w.edge_edge, Kind::edge_edge)})
       for (const Contact& c : *list)
         if (c.toc <= search_.earliest && n++ < enough) near.add({c.first, c.second, kind});
-  near_.keep(std::move(near.groups), shared_.tree.motion().vertices, std::nullopt, shared_.pool);
+  near_.hints = std::move(near.groups);
+  if (!near_.radius().known()) near_.begin_at(shared_.tree.motion().vertices, shared_.pool);
 }
 
 }  // namespace hpccd

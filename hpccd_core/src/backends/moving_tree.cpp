@@ -26,6 +26,11 @@ void MovingTree::fit(Profiler& profiler) {
   profiler.mark("build");
 }
 
+void MovingTree::fit_leaves(std::span<const std::uint32_t> leaves) {
+  fits_ = false;
+  refit_leaves(tree_, motion_.boxes, leaves, pool_);
+}
+
 void MovingTree::build_anew() {
   fits_ = false;  // should this be cancelled
   ++builds_;

@@ -22,6 +22,8 @@ class MovingTree {
   // A tree that fits it: refitted, or built anew where refitting has lost too much. Marked as "refit" and "build".
   void fit(Profiler& profiler);
   void build_anew();
+  // Boxes of the motion for these leaves alone.
+  void fit_leaves(std::span<const std::uint32_t> leaves);
   // Boxes of the whole sweep, for methods with a hierarchy of their own.
   const std::vector<Box>& swept();
 

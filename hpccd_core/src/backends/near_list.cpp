@@ -37,15 +37,25 @@ std::size_t most_listed(const Features& features) {
   return few + of_each * (features.n_vertices + features.edges.size() + features.faces.size());
 }
 
-void NearList::keep(std::vector<Group> groups, const std::vector<VertexMotion>& starts, std::optional<double> radius,
+void NearList::keep(std::vector<Group> groups, double radius, const std::vector<VertexMotion>& starts,
                     ThreadPool& pool) {
-  radius_.forget();
+  begin_at(starts, pool);
   groups_ = std::move(groups);
+  radius_.set(radius);
+}
+
+void NearList::forget() {
+  groups_.clear();
+  radius_.forget();
+}
+
+void NearList::begin_at(const std::vector<VertexMotion>& starts, ThreadPool& pool) {
+  forget();
+  ++number_;
   resize(snapshot_, starts.size(), pool.cancellation());
   parallel_for(pool, starts.size(), grain, [&](std::size_t begin, std::size_t end, int) {
     for (std::size_t i = begin; i < end; ++i) snapshot_[i] = at(starts[i].t0);
   });
-  if (radius) radius_.set(*radius);
 }
 
 Travel NearList::travel(const std::vector<VertexMotion>& vertices, ThreadPool& pool) const {
@@ -72,7 +82,8 @@ std::size_t NearList::size() const {
 
 std::size_t NearList::bytes() const {
   std::size_t n = snapshot_.capacity() * sizeof(snapshot_[0]);
-  for (const Group& g : groups_) n += sizeof g + 4 * (g.first.capacity() + g.second.capacity());
+  for (const auto* groups : {&groups_, &hints})
+    for (const Group& g : *groups) n += sizeof g + 4 * (g.first.capacity() + g.second.capacity());
   return n;
 }
 

@@ -34,14 +34,21 @@ inline constexpr double same_time = 2e-12;
 class NearRadius {
  public:
   // Of all pairs within listed_distance() of each other.
-  void set(double radius) { radius_ = radius, answers_ = 0; }
+  void set(double radius) { radius_ = radius, answers_ = 0, failures_ = 0; }
   void forget() { radius_ = -1; }
+  bool known() const { return radius_ > 0; }
+  // Pairs that are not listed touch only where they go so far apart.
+  double listed() const { return 2 * radius_; }
+  // The list was most of the search, with what it left open.
+  void helped() { ++answers_, last_rests_ = 1, failures_ = 0; }
+  // It was not. True: it is worth no look more, as motions begin elsewhere, or too many have gone too far.
+  bool failed(const Travel& travel) { return !known() || travel.away > radius_ || ++failures_ >= most_failures; }
   // The last list was given up: it had more pairs than most_listed().
   void gave_up() { rests_ = rests; }
   // Whether no pair that is not listed touches up to this time, or is reported to.
   bool answers(double time, const Travel& travel) {
     const bool complete = travel.until(std::min(time + same_time, 1.0)) <= radius_;
-    answers_ += complete;
+    if (complete) ++answers_, failures_ = 0;
     return complete;
   }
   // A list costs about what a search costs, so it pays where motions begin where one began before: where this one does,
@@ -50,14 +57,19 @@ class NearRadius {
     if (rests_ > 0) return --rests_, false;
     return answers_ > 1 || travel.away <= least_radius * edge / 2;
   }
+  // The same of one that has most of what can touch, where the first does not reach. A motion for which there is none
+  // says little of the next: a short rest, and longer ones after more of them.
+  bool wider_would_pay() { return wider_rests_ == 0 || --wider_rests_ == 0; }
+  void gave_up_wider() { wider_rests_ = last_rests_ = std::min(2 * last_rests_, rests); }
 
   static constexpr double least_radius = 1.0 / 64;  // of an edge
 
  private:
+  static constexpr int most_failures = 3;
   static constexpr int rests = 64;  // so many motions before another try, whose price is that of a few searches
 
   double radius_ = -1;
-  int answers_ = 0, rests_ = 0;
+  int answers_ = 0, rests_ = 0, wider_rests_ = 0, last_rests_ = 1, failures_ = 0;
 };
 
 // The radius of a list that is to answer up to a time, with room for motions that go farther or begin elsewhere.
@@ -79,11 +91,17 @@ class NearList {
     std::vector<std::uint32_t> first, second;
   };
 
-  // Replaces the list. Without a radius: of pairs that are worth a look, but not of all.
-  void keep(std::vector<Group> groups, const std::vector<VertexMotion>& starts, std::optional<double> radius,
-            ThreadPool& pool);
+  // All pairs that are near in the snapshot where these motions begin, for as far as the radius.
+  void keep(std::vector<Group> groups, double radius, const std::vector<VertexMotion>& starts, ThreadPool& pool);
+  // That snapshot alone.
+  void begin_at(const std::vector<VertexMotion>& starts, ThreadPool& pool);
+  void forget();
   const std::vector<Group>& groups() const { return groups_; }
   std::size_t size() const;
+  const std::vector<Vec3<double>>& snapshot() const { return snapshot_; }
+  std::uint64_t number() const { return number_; }  // of the snapshot: another for each
+  // A few pairs that touched first in the last motion: they give the next one its first bound.
+  std::vector<Group> hints;
 
   Travel travel(const std::vector<VertexMotion>& vertices, ThreadPool& pool) const;
   NearRadius& radius() { return radius_; }
@@ -92,6 +110,7 @@ class NearList {
  private:
   std::vector<Group> groups_;
   std::vector<Vec3<double>> snapshot_;
+  std::uint64_t number_ = 0;
   NearRadius radius_;
 };
 

@@ -136,6 +136,15 @@ void refit(Tree& tree, const std::vector<MotionBox>& vertex_boxes, const std::ve
   tree.area = root > 0 ? area / root : 0;
 }
 
+void refit_leaves(Tree& tree, const std::vector<MotionBox>& vertex_boxes, std::span<const std::uint32_t> leaves,
+                  ThreadPool& pool) {
+  constexpr std::size_t grain = 64;
+  parallel_for(pool, leaves.size(), grain, [&](std::size_t begin, std::size_t end, int) {
+    for (std::size_t i = begin; i < end; ++i)
+      tree.nodes[tree.leaf_nodes[leaves[i]]].box = leaf_bounds(tree, tree.leaves[leaves[i]], vertex_boxes);
+  });
+}
+
 std::size_t Tree::bytes() const {
   const std::size_t faces = face_of_slot.capacity(), edges = edge_of_slot.capacity(),
                     vertices = vertex_of_slot.capacity();

@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "base/hd.h"
@@ -151,5 +152,9 @@ void build(Tree& tree, const Scene& scene, const Features& features, const std::
 // The same tree with new bounds, bottom up (Kim et al. 2009, section 6, parallel BVH update). `resting`: by mesh, true
 // where vertex boxes are as they were at the last call; empty: of none.
 void refit(Tree& tree, const std::vector<MotionBox>& vertex_boxes, const std::vector<char>& resting, ThreadPool& pool);
+
+// The boxes of some leaves alone.
+void refit_leaves(Tree& tree, const std::vector<MotionBox>& vertex_boxes, std::span<const std::uint32_t> leaves,
+                  ThreadPool& pool);
 
 }  // namespace hpccd

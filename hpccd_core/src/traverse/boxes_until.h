@@ -26,6 +26,7 @@ struct BoxesUntil {
     if (part.until >= 1) return a.overlaps(b);
     return part.reach >= 0 ? a.near_at_start(b, part.reach) : a.overlap_until(b, part.until);
   }
+  bool within(const Node&) const { return true; }
   bool open(NodePair) const { return !search.over(); }
   void sort(std::vector<NodePair>&, std::size_t) const {}
 };

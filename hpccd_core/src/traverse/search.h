@@ -11,6 +11,7 @@
 #include "elementary/batch.h"
 #include "elementary/fallback.h"
 #include "elementary/intersection_batch.h"
+#include "traverse/drift.h"
 #include "traverse/leaf_edge_faces.h"
 #include "traverse/leaf_pairs.h"
 #include "traverse/nearest_pairs.h"
@@ -44,6 +45,8 @@ struct Search {
   std::atomic<double> earliest;  // best time so far, where report is first
   bool time_only = false;        // the earliest time is all that is asked for, never a late one
   bool prunes = false;           // what cannot touch up to the best time is left out
+  // Where pairs that are near in a snapshot are listed: how far the motion leaves it. Null: all pairs are looked at.
+  const Drift* drift = nullptr;
   // In coordinates of the boxes: twice the longest way of a vertex along an axis, and how much of it boxes at the start
   // may grow by without reaching their neighbours' neighbours.
   float two_ways = std::numeric_limits<float>::infinity(), most_reach = 0;

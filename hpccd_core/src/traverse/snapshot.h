@@ -16,6 +16,7 @@ struct SnapshotBoxes {
   static constexpr bool shrink = false;
   float reach;
   bool overlap(const Node& a, const Node& b) const { return a.near_in_snapshot(b, reach); }
+  bool within(const Node&) const { return true; }
 };
 
 }  // namespace hpccd

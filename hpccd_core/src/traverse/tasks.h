@@ -85,12 +85,13 @@ inline bool is_leaf_pair(const std::vector<Node>& nodes, NodePair p) {
 struct MotionBoxes {
   static constexpr bool shrink = false;  // whether pairs that were worth visiting may be so no longer
   bool overlap(const Node& a, const Node& b) const { return a.overlaps(b); }
+  bool within(const Node&) const { return true; }  // the same of one node
 };
 
 template <class Boxes>
 bool worth_visiting(const std::vector<Node>& nodes, const PairRules& rules, const Boxes& boxes, NodePair p) {
   const Node &a = nodes[p.a], &b = nodes[p.b];
-  return rules.enabled(a, b) && (p.a == p.b || boxes.overlap(a, b));
+  return rules.enabled(a, b) && (p.a == p.b ? boxes.within(a) : boxes.overlap(a, b));
 }
 
 // All of them worth visiting.

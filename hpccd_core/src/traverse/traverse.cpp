@@ -19,6 +19,7 @@ struct NearerBoxes {
   bool overlap(const Node& a, const Node& b) const {
     return a.near_in_snapshot(b, nearest.reach(a.mesh, b.mesh)) && open({number(a), number(b)});
   }
+  bool within(const Node&) const { return true; }
   bool open(NodePair p) const { return nearest.may_come_before(p.a, p.b); }
   // So that the nearest is taken first, of what overlaps the lowest edge.
   void sort(std::vector<NodePair>& stack, std::size_t begin) const {
@@ -37,6 +38,19 @@ struct NearerBoxes {
     }
     return {sum, nearest.least_edge(p.a, p.b)};
   }
+};
+
+// Nodes that may hold a pair that touches and is not listed.
+struct UnlistedBoxes {
+  static constexpr bool shrink = false;
+  const Tree& tree;
+  const Drift& drift;
+  float until;
+  bool overlap(const Node& a, const Node& b) const { return drift.may_touch(number(a), number(b), until); }
+  bool within(const Node& a) const { return overlap(a, a); }
+
+ private:
+  std::uint32_t number(const Node& node) const { return static_cast<std::uint32_t>(&node - tree.nodes.data()); }
 };
 
 // From pairs that are worth visiting. `between` is called between two of them and may take from the stack.
@@ -197,6 +211,9 @@ void traverse(const Tree& tree, const PairRules& rules, Search& search, ThreadPo
     traverse_all(tree, rules, SnapshotBoxes{search.reach}, search, pool, workers);
   else if (search.report == Report::any)
     traverse_any(tree, rules, search, pool, workers);
+  else if (search.drift)
+    traverse_all(tree, rules, UnlistedBoxes{tree, *search.drift, std::min(search.until(), 1.0f)}, search, pool,
+                 workers);
   else if (search.prunes)
     traverse_all(tree, rules, BoxesUntil{search}, search, pool, workers);
   else

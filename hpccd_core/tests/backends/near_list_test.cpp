@@ -21,7 +21,7 @@ TEST(NearList, TravelBoundsEveryWay) {
   const Travel unknown = list.travel(motion, pool);
   EXPECT_EQ(unknown.away, inf);
   EXPECT_GE(unknown.way, 5);
-  list.keep({}, motion, 0.5, pool);
+  list.keep({}, 0.5, motion, pool);
   EXPECT_EQ(list.travel(motion, pool).away, 0);
   const std::vector<VertexMotion> elsewhere{vertex({0, 0, 0}, {0, 0, 0}), vertex({1, 1.25, 1}, {1, 1, 1})};
   const Travel moved = list.travel(elsewhere, pool);
@@ -33,7 +33,7 @@ TEST(NearList, TravelBoundsEveryWay) {
 TEST(NearList, WaysTooSmallToSquareCount) {
   ThreadPool pool{1};
   NearList list;
-  list.keep({}, {vertex({0, 0, 0}, {0, 0, 0})}, 0, pool);
+  list.keep({}, 0, {vertex({0, 0, 0}, {0, 0, 0})}, pool);
   const Travel t = list.travel({vertex({1e-300, 0, 0}, {2e-300, 0, 0})}, pool);
   EXPECT_GE(t.away, 1e-300);
   EXPECT_GE(t.way, 1e-300);
@@ -63,6 +63,21 @@ TEST(NearRadius, PaysWhereStartsComeAgain) {
   EXPECT_FALSE(radius.next_would_pay({0.1, 5}, 1));
   EXPECT_TRUE(radius.answers(1, {0, 0.1}));
   EXPECT_TRUE(radius.next_would_pay({0.1, 5}, 1));
+}
+
+TEST(NearRadius, IsKeptWhereSomeMotionsGoTooFar) {
+  NearRadius radius;
+  EXPECT_TRUE(radius.failed({0, 5}));  // there is none
+  radius.set(1);
+  EXPECT_FALSE(radius.failed({0, 5}));
+  EXPECT_FALSE(radius.failed({0.5, 5}));
+  EXPECT_TRUE(radius.answers(0.1, {0, 5}));
+  for (int i = 0; i < 2; ++i) EXPECT_FALSE(radius.failed({0, 5}));
+  radius.helped();
+  for (int i = 0; i < 2; ++i) EXPECT_FALSE(radius.failed({0, 5}));
+  EXPECT_TRUE(radius.failed({0, 5}));
+  radius.set(1);
+  EXPECT_TRUE(radius.failed({1.5, 5}));  // motions begin elsewhere
 }
 
 TEST(NearRadius, IsAtLeastTheWayAndNoneWhereNeighboursCouldMeet) {
