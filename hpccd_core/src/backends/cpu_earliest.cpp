@@ -54,7 +54,7 @@ bool CpuBackend::known_from_near_pairs() {
   if (!search_.over()) test_groups(near_.groups());
   mark_traversal();
   if (search_.over()) return true;
-  travel_ = near_.travel(shared_.tree.motion().vertices, shared_.pool);
+  travel_ = near_.see(shared_.tree.motion().vertices, shared_.pool);
   return near_.radius().answers(search_.earliest, travel_);
 }
 
@@ -112,7 +112,6 @@ void CpuBackend::remember_earliest() {
       for (const Contact& c : *list)
         if (c.toc <= search_.earliest && n++ < enough) near.add({c.first, c.second, kind});
   near_.hints = std::move(near.groups);
-  if (!near_.radius().known()) near_.begin_at(shared_.tree.motion().vertices, shared_.pool);
 }
 
 }  // namespace hpccd

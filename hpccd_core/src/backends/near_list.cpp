@@ -58,20 +58,26 @@ void NearList::begin_at(const std::vector<VertexMotion>& starts, ThreadPool& poo
   });
 }
 
-Travel NearList::travel(const std::vector<VertexMotion>& vertices, ThreadPool& pool) const {
+Travel NearList::see(const std::vector<VertexMotion>& vertices, ThreadPool& pool) {
   std::vector<Travel> most(static_cast<std::size_t>(pool.size()));
-  const bool known = snapshot_.size() == vertices.size();
+  const bool compares = snapshot_.size() == vertices.size(), begins = !radius_.known();
+  if (begins) {
+    ++number_;
+    resize(snapshot_, vertices.size(), pool.cancellation());
+  }
   parallel_for(pool, vertices.size(), grain, [&](std::size_t begin, std::size_t end, int thread) {
     Travel t = most[static_cast<std::size_t>(thread)];
     for (std::size_t i = begin; i < end; ++i) {
-      t.way = std::max(t.way, largest(at(vertices[i].t1) - at(vertices[i].t0)));
-      if (known) t.away = std::max(t.away, largest(at(vertices[i].t0) - snapshot_[i]));
+      const Vec3<double> start = at(vertices[i].t0);
+      t.way = std::max(t.way, largest(at(vertices[i].t1) - start));
+      if (compares) t.away = std::max(t.away, largest(start - snapshot_[i]));
+      if (begins) snapshot_[i] = start;
     }
     most[static_cast<std::size_t>(thread)] = t;
   });
   Travel t;
   for (const Travel& s : most) t.away = std::max(t.away, s.away), t.way = std::max(t.way, s.way);
-  return Travel::along_axes(known ? t.away : std::numeric_limits<double>::infinity(), t.way);
+  return Travel::along_axes(compares ? t.away : std::numeric_limits<double>::infinity(), t.way);
 }
 
 std::size_t NearList::size() const {

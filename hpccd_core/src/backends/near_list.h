@@ -103,7 +103,8 @@ class NearList {
   // A few pairs that touched first in the last motion: they give the next one its first bound.
   std::vector<Group> hints;
 
-  Travel travel(const std::vector<VertexMotion>& vertices, ThreadPool& pool) const;
+  // How far a motion goes from the snapshot, which is the motion's start from then on where nothing is listed.
+  Travel see(const std::vector<VertexMotion>& vertices, ThreadPool& pool);
   NearRadius& radius() { return radius_; }
   std::size_t bytes() const;
 

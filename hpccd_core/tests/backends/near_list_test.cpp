@@ -18,23 +18,38 @@ TEST(NearList, TravelBoundsEveryWay) {
   ThreadPool pool{2};
   NearList list;
   const std::vector<VertexMotion> motion{vertex({0, 0, 0}, {3, 4, 0}), vertex({1, 1, 1}, {1, 1, 1})};
-  const Travel unknown = list.travel(motion, pool);
+  const Travel unknown = list.see(motion, pool);
   EXPECT_EQ(unknown.away, inf);
   EXPECT_GE(unknown.way, 5);
   list.keep({}, 0.5, motion, pool);
-  EXPECT_EQ(list.travel(motion, pool).away, 0);
+  EXPECT_EQ(list.see(motion, pool).away, 0);
   const std::vector<VertexMotion> elsewhere{vertex({0, 0, 0}, {0, 0, 0}), vertex({1, 1.25, 1}, {1, 1, 1})};
-  const Travel moved = list.travel(elsewhere, pool);
+  const Travel moved = list.see(elsewhere, pool);
   EXPECT_GE(moved.away, 0.25);
   EXPECT_GE(moved.way, 0.25);
-  EXPECT_EQ(list.travel({}, pool).away, inf);  // another scene
+  EXPECT_EQ(list.see({}, pool).away, inf);  // another scene
+}
+
+TEST(NearList, WithoutAListTheSnapshotIsTheLastStart) {
+  ThreadPool pool{2};
+  NearList list;
+  const std::vector<VertexMotion> here{vertex({0, 0, 0}, {1, 0, 0})}, there{vertex({0, 2, 0}, {1, 2, 0})};
+  list.see(here, pool);
+  EXPECT_EQ(list.see(here, pool).away, 0);
+  EXPECT_GE(list.see(there, pool).away, 2);
+  EXPECT_EQ(list.see(there, pool).away, 0);
+  list.keep({}, 0.5, here, pool);
+  for (int i = 0; i < 2; ++i) EXPECT_GE(list.see(there, pool).away, 2);
+  list.forget();
+  EXPECT_GE(list.see(there, pool).away, 2);
+  EXPECT_EQ(list.see(there, pool).away, 0);
 }
 
 TEST(NearList, WaysTooSmallToSquareCount) {
   ThreadPool pool{1};
   NearList list;
   list.keep({}, 0, {vertex({0, 0, 0}, {0, 0, 0})}, pool);
-  const Travel t = list.travel({vertex({1e-300, 0, 0}, {2e-300, 0, 0})}, pool);
+  const Travel t = list.see({vertex({1e-300, 0, 0}, {2e-300, 0, 0})}, pool);
   EXPECT_GE(t.away, 1e-300);
   EXPECT_GE(t.way, 1e-300);
   EXPECT_FALSE(list.radius().answers(1, t));

@@ -10,11 +10,13 @@ a start that is known. With --peer, the earliest time of ipctk in turn.
 all: detect() with report="all"; first: with report="first"; step: collision_free_step(). Of these no call begins where
 the one before did: two starts take turns, the step as it is and the same shifted by a sixteenth of its size, so that a
 detector cannot use what it knows of a start. trial: collision_free_step() as a line search asks, from one start all the
-time: the whole step, three quarters and half of it, and one turned by 5 degrees, in turn, after a call that is not
-timed. "/ all" is the time over that of all. A step with contacts at its start ends at once: look at "earliest".
+time: the whole step, three quarters and half of it, and one turned by 5 degrees, in turn, after two calls that are not
+among them: the second lists what is near, "listing". "/ all" is the time over that of all. A step with contacts at its start ends at once: look at "earliest".
 """
 
 from __future__ import annotations
+
+import statistics
 
 from hpccd_ros.base.errors import UserError
 from hpccd_ros.bench import command
@@ -85,6 +87,8 @@ def _row(source, runner, series, args):
         "least_over_all": one.least_ms() / every.least_ms(),
         "stages_ms": one.stages(),
     }
+    if runner.listing_ms:
+        row |= {"listing_ms": statistics.median(runner.listing_ms)}
     if peer and runner.query != ALL:
         row |= {
             "ipctk_ms": peer.step_ms(),
@@ -97,12 +101,12 @@ def _row(source, runner, series, args):
 def _print(report, args):
     table.show(
         f"how far a step may go, {args.accuracy}, {args.backend}, {args.threads or cores()} threads",
-        ["scene", "query", "contacts", "earliest", "ms", "least", "/ all", "least",
+        ["scene", "query", "contacts", "earliest", "ms", "least", "/ all", "least", "listing",
          *(["ipctk ms", "x ipctk"] if args.peer else [])],
         [
             [
                 row["scene"], row["query"], row["contacts"] if row["query"] in ("all", "first") else None,
-                row["earliest"], row["step_ms"], row["least_ms"], row["over_all"], row["least_over_all"],
+                row["earliest"], row["step_ms"], row["least_ms"], row["over_all"], row["least_over_all"], row.get("listing_ms"),
                 *([row.get("ipctk_ms"), row.get("times_faster_than_ipctk")] if args.peer else []),
             ]
             for row in report.rows

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import time
 from collections import defaultdict
 
 import numpy as np
@@ -44,6 +45,7 @@ class StepRunner(measure.CoreRunner):
         self.query = query
         self.hashes: dict[tuple[int, int], set[int]] = defaultdict(set)  # by step and place in its turns
         self.earliest: dict[tuple[int, int], float] = {}
+        self.listing_ms: list[float] = []  # of TRIAL: what the second call from a start takes
         self._step: Step | None = None
         self._name = 0  # of its contents: a source may make a step anew
         self._turns: list[Step] = []
@@ -55,7 +57,10 @@ class StepRunner(measure.CoreRunner):
             self._turns = [self._variant.change(turn) for turn in turns] if self._variant.change else turns
             self._step, self._name = step, hash((step.vertices_t0.tobytes(), step.vertices_t1.tobytes()))
             if self.query == TRIAL and self._detector is not None and self._topology == step.topology:
-                self._asked(self._detector, self._turns[0])  # not timed: now the start is known
+                for turn in self._turns[:2]:  # the first call from a start sees it, the second lists what is near
+                    begin = time.perf_counter()
+                    self._asked(self._detector, turn)
+                self.listing_ms.append(1e3 * (time.perf_counter() - begin))
         self._calls += 1
         return self._turns[self._calls % len(self._turns)]
 

@@ -19,7 +19,7 @@ def steps(result: Kept) -> list[str]:
         lines.append([mine[0]["scene"], round(every["contacts"]), f"{every['earliest']:.4g}", every["step_ms"],
                       *(f"{text(of[query]['step_ms'])} ({of[query]['over_all']:.2f})"
                         for query in ("first", "step", "trial")),
-                      "" if faster is None else f"{faster:,.0f}"])  # fmt: skip
+                      text(of["trial"].get("listing_ms")), "" if faster is None else f"{faster:,.0f}"])  # fmt: skip
     columns = ["scene", "contacts", "earliest at", "all, ms", "first, ms (/ all)", "`collision_free_step`, ms (/ all)",
-               "trial steps, ms (/ all)", "step x ipctk"]  # fmt: skip
+               "trial steps, ms (/ all)", "listing, ms", "step x ipctk"]  # fmt: skip
     return markdown.table(columns, lines)

@@ -33,6 +33,7 @@ def test_a_row_for_each_question_and_a_line_for_each_scene(bench):
     for row in result["rows"]:
         assert 0 < row["least_ms"] <= row["step_ms"] and row["stages_ms"]["total"] > 0
         assert row["over_all"] == pytest.approx(row["step_ms"] / every["step_ms"], rel=1e-4)
+    assert result["rows"][3]["listing_ms"] > 0
     cells = performance_step.steps(Kept.read(folder / "step-test.json", "step"))[2].split(" | ")
     assert cells[1] == f"{round(every['contacts']):,}" and f"({step['over_all']:.2f})" in cells[5]
 
