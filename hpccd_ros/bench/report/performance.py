@@ -38,6 +38,7 @@ TABLES = {
     "separations": (performance_distance.by_distance, "distance-2-cores"),
     "snapshots": (performance_distance.of_a_snapshot, "distance-2-cores"),
     "steps": (performance_step.steps, "step-2-cores"),
+    "device-steps": (performance_step.steps, "step-h100-16-cores"),
     "distance-truth": (performance_distance.on_scenes, "accuracy-distance-2-cores"),
     "distance-wrong-answers": (performance_distance.hard_queries, "accuracy-distance-2-cores"),
     "backends": (performance_gpu.backends, "gpu-h100-16-cores"),
