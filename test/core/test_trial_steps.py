@@ -195,6 +195,26 @@ def test_a_vertex_that_leaves_its_neighbours():
         assert detector.collision_free_step(start, apart) == step < 1
 
 
+@pytest.mark.parametrize("far", [2.0**10, 2.0**15])
+def test_a_start_that_comes_again_after_one_far_away(far):
+    """The list's snapshot is as sharp as before, not as floats around the far one have it: a gap just above their grid
+    is closed by a way that is longer by less than a grid step."""
+    grid = far / 2**23
+    gap = (np.floor(0.7 / grid) + 0.6) * grid
+    scene, start, _ = waving_sheets(np.random.default_rng(89), 12)
+    above = np.arange(len(start)) >= len(start) // 2
+    start[:, 2] = np.where(above, gap, 0)
+    detector = hc.Detector(scene, backend="cpu", threads=1)
+    for _ in range(2):
+        assert detector.collision_free_step(start, start + [0.06, 0, 0]) == 1.0
+    away = start + [0, 0, 1.25 * far]
+    assert detector.collision_free_step(away, away + [1, 0, 0]) == 1.0
+    assert "near_pairs" in detector.profile and "build" not in detector.profile
+    end = start - np.where(above, gap + 0.1 * grid, 0)[:, None] * [0, 0, 1]
+    step = fresh_step(scene, start, end)
+    assert detector.collision_free_step(start, end) == step < 1
+
+
 def test_signs_of_zero_and_types_of_numbers():
     meshes = flat_fall(1.0)
     detector = hc.Detector(meshes.scene(), backend="cpu")

@@ -4,11 +4,23 @@
 #include <algorithm>
 #include <cmath>
 
+#include "bvh/coordinate_map.h"
+
 namespace hpccd {
 namespace {
 
 constexpr std::size_t vertex_grain = 1024, leaf_grain = 128;
 const Floats4 none = {Box::inf, Box::inf, Box::inf, Box::inf};
+
+CoordinateMap map_around(const std::vector<Vec3<double>>& snapshot) {
+  Vec3<double> low = snapshot.front(), high = low;
+  for (const Vec3<double>& x : snapshot) {
+    low = {std::min(low.x, x.x), std::min(low.y, x.y), std::min(low.z, x.z)};
+    high = {std::max(high.x, x.x), std::max(high.y, x.y), std::max(high.z, x.z)};
+  }
+  const double from[3] = {low.x, low.y, low.z}, to[3] = {high.x, high.y, high.z};
+  return CoordinateMap::around(from, to);
+}
 
 }  // namespace
 
@@ -35,8 +47,8 @@ void Drift::join(const Tree& tree, std::vector<Box>& boxes, Box none, OfVertex&&
     }
 }
 
-void Drift::begin(const Tree& tree, const std::vector<Vec3<double>>& snapshot, const CoordinateMap& map,
-                  ThreadPool& pool) {
+void Drift::begin(const Tree& tree, const std::vector<Vec3<double>>& snapshot, ThreadPool& pool) {
+  const CoordinateMap map = map_around(snapshot);
   scale_ = map.scale;
   const auto of_vertex = [&](std::uint32_t v) {
     const Vec3<double>& x = snapshot[v];

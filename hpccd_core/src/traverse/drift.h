@@ -9,7 +9,6 @@
 
 #include "base/parallel.h"
 #include "base/vec3.h"
-#include "bvh/coordinate_map.h"
 #include "bvh/tree.h"
 #include "scene/vertex_motion.h"
 
@@ -17,8 +16,8 @@ namespace hpccd {
 
 class Drift {
  public:
-  // From a snapshot, whose boxes have these coordinates.
-  void begin(const Tree& tree, const std::vector<Vec3<double>>& snapshot, const CoordinateMap& map, ThreadPool& pool);
+  // From a snapshot. In coordinates of its own: motions that begin far away, whose boxes have others, come in between.
+  void begin(const Tree& tree, const std::vector<Vec3<double>>& snapshot, ThreadPool& pool);
   // Of a motion of the same vertices.
   void fit(const Tree& tree, const std::vector<VertexMotion>& motion, const std::vector<Vec3<double>>& snapshot,
            ThreadPool& pool);

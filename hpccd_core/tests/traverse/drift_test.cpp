@@ -32,7 +32,7 @@ struct DriftOfSheets : testing::Test {
       places.push_back({snapshot[i], snapshot[i + 1], snapshot[i + 2]});
     bounds.update(test::view(snapshot), test::view(snapshot), pool);
     build(tree, *scene, features, bounds.boxes, pool);
-    drift.begin(tree, places, bounds.map, pool);
+    drift.begin(tree, places, pool);
   }
 
   void see(const std::vector<double>& start, const std::vector<double>& end, double distance, double separation) {
@@ -122,7 +122,7 @@ TEST(Drift, IsOpenFromTheWayOnThatItTakes) {
   Tree tree;
   build(tree, *scene, features, bounds.boxes, pool);
   Drift drift;
-  drift.begin(tree, places, bounds.map, pool);
+  drift.begin(tree, places, pool);
   ASSERT_EQ(tree.leaf_nodes.size(), 2u);
   const auto open = [&](double end, double listed, double separation, float until) {
     bounds.update(test::view(start), test::view(at(end)), pool);
