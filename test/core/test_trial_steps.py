@@ -215,6 +215,19 @@ def test_a_start_that_comes_again_after_one_far_away(far):
     assert detector.collision_free_step(start, end) == step < 1
 
 
+def test_no_list_where_no_edge_has_a_length():
+    """One that reaches nowhere would be made again in each call."""
+    rng = np.random.default_rng(89)
+    scene = hc.Scene()
+    scene.add_mesh("points", np.array([[0, 1, 2]]), n_vertices=500)
+    start = np.concatenate([np.zeros((3, 3)), rng.normal(0, 10, (497, 3))])
+    detector = hc.Detector(scene, backend="cpu", threads=1)
+    for _ in range(5):
+        end = start + rng.normal(0, 3, 3)
+        assert detector.collision_free_step(start, end) == fresh_step(scene, start, end)
+        assert "near_pairs" not in detector.profile
+
+
 def test_signs_of_zero_and_types_of_numbers():
     meshes = flat_fall(1.0)
     detector = hc.Detector(meshes.scene(), backend="cpu")

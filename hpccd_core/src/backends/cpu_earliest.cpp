@@ -77,7 +77,7 @@ bool CpuBackend::list_near_pairs(Positions t0) {
   edge_ = typical_length(shared_.features, shared_.tree.motion().vertices);
   if (!near_.radius().next_would_pay(travel_, edge_)) return false;
   std::optional<double> radius = radius_for(travel_, search_.earliest, edge_);
-  if (!radius && near_.radius().wider_would_pay()) radius = wide_radius();
+  if (!radius && edge_ > 0 && near_.radius().wider_would_pay()) radius = wide_radius();
   if (!radius) return false;
   const double distance = listed_distance(*radius, shared_.separations.most());
   if (!std::isfinite(distance)) return false;
