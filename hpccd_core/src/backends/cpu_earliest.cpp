@@ -77,7 +77,8 @@ bool CpuBackend::list_near_pairs(Positions t0) {
   edge_ = typical_length(shared_.features, shared_.tree.motion().vertices);
   if (!near_.radius().next_would_pay(travel_, edge_)) return false;
   std::optional<double> radius = radius_for(travel_, search_.earliest, edge_);
-  if (!radius && edge_ > 0 && near_.radius().wider_would_pay()) radius = wide_radius();
+  const bool wide = !radius && edge_ > 0 && near_.radius().wider_would_pay();
+  if (wide) radius = wide_radius();
   if (!radius) return false;
   const double distance = listed_distance(*radius, shared_.separations.most());
   if (!std::isfinite(distance)) return false;
@@ -85,10 +86,10 @@ bool CpuBackend::list_near_pairs(Positions t0) {
   search_.geometry.separations = {distance};
   search_.leaf_pairs_in_snapshot = leaf_pairs_in_snapshot(shared_.options.simd);
   search_.reach = reach_of(distance, shared_.tree.motion().rounding, shared_.tree.motion().map.scale);
-  search_.most_found = most_listed(shared_.features), search_.n_found = 0;
+  search_.most_found = wide ? most_listed_wide(shared_.features) : most_listed(shared_.features), search_.n_found = 0;
   walk_tree();
   if (search_.gave_up()) {
-    near_.radius().gave_up();
+    wide ? near_.radius().gave_up_wider() : near_.radius().gave_up();
     return true;
   }
   Grouping near(shared_.features, shared_.rules);

@@ -32,9 +32,22 @@ double listed_distance(double radius, double largest_separation) {
   return (largest_separation + 2 * radius) * (1 + 1e-9);
 }
 
+namespace {
+
+std::size_t n_features(const Features& features) {
+  return features.n_vertices + features.edges.size() + features.faces.size();
+}
+
+}  // namespace
+
 std::size_t most_listed(const Features& features) {
   constexpr std::size_t of_each = 8, few = 1 << 16;
-  return few + of_each * (features.n_vertices + features.edges.size() + features.faces.size());
+  return few + of_each * n_features(features);
+}
+
+std::size_t most_listed_wide(const Features& features) {
+  constexpr std::size_t of_each = 2, few = 1 << 10;
+  return few + of_each * n_features(features);
 }
 
 void NearList::keep(std::vector<Group> groups, double radius, const std::vector<VertexMotion>& starts,

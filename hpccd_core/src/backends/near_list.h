@@ -81,6 +81,8 @@ double listed_distance(double radius, double largest_separation);
 // How many they may be at most. More are looked at in more time than a search takes, and may be all pairs of a mesh:
 // where others have a separation that is larger than it, or edges that are.
 std::size_t most_listed(const Features& features);
+// The same of a list that leaves some of the search to be done: that is to be little beside it.
+std::size_t most_listed_wide(const Features& features);
 
 class NearList {
  public:
