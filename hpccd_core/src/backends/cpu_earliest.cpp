@@ -21,7 +21,8 @@ void CpuBackend::find_earliest(Positions t0, Positions t1, bool time_only) {
   begin_earliest(t0, t1, time_only);
   if (search_.prunes) {
     if (known_from_near_pairs() || known_from_the_unlisted(time_only)) return;
-    if (near_.radius().failed(travel_)) near_.forget();
+    if (near_.radius().known() && near_.radius().failed(travel_))
+      near_.begin_at(shared_.tree.motion().vertices, shared_.pool);
     if (!near_.radius().known() && list_near_pairs(t0)) {
       begin_earliest(t0, t1, time_only);
       if (known_from_near_pairs() || known_from_the_unlisted(time_only)) return;

@@ -121,10 +121,12 @@ bool CpuBackend::known_from_the_unlisted(bool time_only) {
 std::optional<double> CpuBackend::wide_radius() {
   near_.begin_at(shared_.tree.motion().vertices, shared_.pool);
   see_drift();
-  for (const double part : {0.25, 0.4, 0.6}) {  // of an edge; at 0.7 all neighbours of a regular mesh are near
+  constexpr double longest = 0.6;  // of an edge; at 0.7 all neighbours of a regular mesh are near
+  const std::size_t n_leaves = shared_.tree.tree().leaves.size();
+  for (const double part : {0.25, 0.4, longest}) {
     drift_.listed_within(part * edge_, shared_.separations.most());
     const std::optional<std::vector<LeafPair>> open = open_pairs();
-    if (open && open->size() <= shared_.tree.tree().leaves.size() / 2) return part * edge_ / 2;
+    if (open && open->size() <= (part < longest ? n_leaves / 2 : n_leaves)) return part * edge_ / 2;
   }
   near_.radius().gave_up_wider();
   return std::nullopt;
