@@ -54,11 +54,13 @@ class NearRadius {
   // A list costs about what a search costs, so it pays where motions begin where one began before: where this one does,
   // or the last list has answered more than the motion that it was made for. Edge: a typical length.
   bool next_would_pay(const Travel& travel, double edge) {
+    const bool again = travel.away <= least_radius * edge / 2;
+    if (!again) wider_rests_ = 0, last_rests_ = 1;
     if (rests_ > 0) return --rests_, false;
-    return answers_ > 1 || travel.away <= least_radius * edge / 2;
+    return answers_ > 1 || again;
   }
   // The same of one that has most of what can touch, where the first does not reach. A motion for which there is none
-  // says little of the next: a short rest, and longer ones after more of them.
+  // says little of the next: a short rest, and longer ones after more of them from the same start.
   bool wider_would_pay() { return wider_rests_ == 0 || --wider_rests_ == 0; }
   void gave_up_wider() { wider_rests_ = last_rests_ = std::min(2 * last_rests_, rests); }
 

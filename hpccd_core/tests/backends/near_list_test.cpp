@@ -95,6 +95,16 @@ TEST(NearRadius, IsKeptWhereSomeMotionsGoTooFar) {
   EXPECT_TRUE(radius.failed({1.5, 5}));  // motions begin elsewhere
 }
 
+TEST(NearRadius, RestsLongerTheMoreWiderOnesWereGivenUpFromOneStart) {
+  NearRadius radius;
+  int calls = 0, tries = 0;
+  for (; calls < 200; ++calls)
+    if (radius.next_would_pay({0, 5}, 1) && radius.wider_would_pay()) ++tries, radius.gave_up_wider();
+  EXPECT_TRUE(tries > 4 && tries < 12) << tries;
+  EXPECT_FALSE(radius.next_would_pay({1, 5}, 1));  // another start
+  EXPECT_TRUE(radius.wider_would_pay());
+}
+
 TEST(NearRadius, IsAtLeastTheWayAndNoneWhereNeighboursCouldMeet) {
   EXPECT_GE(radius_for({0, 1}, 0.1, 1).value(), 0.1);
   EXPECT_GT(radius_for({0, 0}, 1, 1).value(), 0);

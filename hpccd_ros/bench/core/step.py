@@ -10,9 +10,9 @@ a start that is known. With --peer, the earliest time of ipctk in turn.
 all: detect() with report="all"; first: with report="first"; step: collision_free_step(). Of these no call begins where
 the one before did: two starts take turns, the step as it is and the same shifted by a sixteenth of its size, so that a
 detector cannot use what it knows of a start. trial: collision_free_step() as a line search asks, from one start all the
-time: the whole step, three quarters and half of it, and one turned by 5 degrees, in turn, after a few that are not timed,
-of which the second lists what is near: "listing". "/ all" is the time over that of all. A step with contacts at its start
-ends at once: look at "earliest".
+time: the whole step, three quarters and half of it, and one turned by 5 degrees, in turn, after a few that are not
+timed, of which the second lists what is near: "listing". "/ all" is the time over that of all. A step with contacts at
+its start ends at once: look at "earliest".
 """
 
 from __future__ import annotations
@@ -107,7 +107,8 @@ def _print(report, args):
         [
             [
                 row["scene"], row["query"], row["contacts"] if row["query"] in ("all", "first") else None,
-                row["earliest"], row["step_ms"], row["least_ms"], row["over_all"], row["least_over_all"], row.get("listing_ms"),
+                row["earliest"], row["step_ms"], row["least_ms"], row["over_all"], row["least_over_all"],
+                row.get("listing_ms"),
                 *([row.get("ipctk_ms"), row.get("times_faster_than_ipctk")] if args.peer else []),
             ]
             for row in report.rows

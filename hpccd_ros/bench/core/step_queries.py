@@ -100,8 +100,8 @@ def contradictions(runners: list[StepRunner], accuracy: str) -> list[str]:
     early = 1e-9 if accuracy in ("exact", "conservative") else 0.0
     times = {runner.query: runner.earliest for runner in runners}
     for query in (FIRST, STEP):
-        for place, time in times.get(query, {}).items():
-            of_all = times[ALL].get(place, time)
-            if not of_all - (early if query == STEP else 0.0) <= time <= of_all:
-                said.append(f"{query}: {time!r}, but the earliest contact of all is at {of_all!r}")
+        for place, mine in times.get(query, {}).items():
+            of_all = times[ALL].get(place, mine)
+            if not of_all - (early if query == STEP else 0.0) <= mine <= of_all:
+                said.append(f"{query}: {mine!r}, but the earliest contact of all is at {of_all!r}")
     return said
