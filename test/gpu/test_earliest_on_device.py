@@ -76,3 +76,46 @@ def test_a_scene_all_of_which_counts_as_near():
     assert [there.collision_free_step(t0, t1) for _ in range(6)] == [1.0] * 6
     assert there.stats["gpu_fallbacks"] == 0 and there.stats["near_pairs"] < 10**6
     assert there.stats["gpu_bytes"] < 2**30
+
+
+@pytest.mark.parametrize("dtype", (np.float32, np.float64))
+@pytest.mark.parametrize("separation", (0.0, 1e-3))
+@pytest.mark.parametrize("seed", range(4))
+def test_as_the_cpu_where_each_motion_begins_elsewhere(seed, separation, dtype):
+    """What touched first last time bounds the next frame, wherever it begins, and whatever touches there."""
+    rng = np.random.default_rng(100 + seed)
+    scene, t0, t1 = moved(rng)
+    options = {"accuracy": ("exact", "conservative")[seed % 2], "minimum_separation": separation}
+    here, there = (hc.Detector(scene, backend=b, **options) for b in ("cpu", "gpu"))
+    first = hc.Detector(scene, backend="gpu", report="first", **options)
+    every = hc.Detector(scene, backend="cpu", **options)
+    for trial in range(24):
+        far = rng.normal(size=3) * 10.0 ** rng.uniform(-2, 4)
+        start = (t0 + 0.1 * rng.normal(size=t0.shape) + far).astype(dtype)
+        end = (start + 10.0 ** rng.uniform(-5, 0) * (t1 - t0)).astype(dtype)
+        if trial % 6 == 5:  # nothing moves, and the meshes are far apart
+            start[:, 2] += np.where(np.arange(len(t0)) < 256, 50, 0).astype(dtype)
+            end = start
+        assert there.collision_free_step(start, end) == here.collision_free_step(start, end), trial
+        found, all_found = first.detect(start, end), every.detect(start, end)
+        assert found.first_toc == all_found.first_toc, trial
+        for kind in ("vf", "ee"):
+            toc = getattr(all_found, f"{kind}_toc")
+            np.testing.assert_array_equal(getattr(found, kind), getattr(all_found, kind)[toc == all_found.first_toc])
+    assert there.stats["gpu_fallbacks"] == 0 and first.stats["gpu_fallbacks"] == 0
+
+
+def test_an_early_contact_leaves_out_most_of_the_search():
+    """Two flat sheets that pass through each other, one corner of which touches first: from the second frame on, the
+    boxes reach up to that."""
+    n = 64
+    faces, flat = scenes.sheet(n), scenes.flat(n)
+    tilted = flat + [0.3, 0.2, 1.0] + flat[:, :1] * [0, 0, 0.25]
+    scene, t0, t1 = scenes.join([(faces, flat, flat), (faces, tilted, tilted - [0, 0, 40])], no_self=(0, 1))
+    detector = hc.Detector(scene, backend="gpu")
+    candidates = []
+    for step in range(4):
+        shift = [0, 0, 0.01 * step]
+        assert 0 < detector.collision_free_step(t0 + shift, t1 + shift) < 0.05
+        candidates.append(detector.stats["vf_candidates"] + detector.stats["ee_candidates"])
+    assert max(candidates[1:]) < candidates[0] / 4

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "backends/gpu_undecided.h"
+#include "elementary/apart_until.h"
 #include "elementary/exact/intersection.h"
 #include "gpu/download.h"
 #include "scene/static_meshes.h"
@@ -18,6 +19,11 @@ namespace {
 // areas differ by a fifth at most. Who asks for another distance in each frame has worn out trees too.
 int growth_of(double distance) {
   return distance > 0 ? static_cast<int>(std::floor(8 * std::log2(distance))) : std::numeric_limits<int>::min();
+}
+
+bool stays_apart(const UndecidedPair& pair, double until) {
+  return pair.kind == Kind::edge_edge ? apart_until<Kind::edge_edge>(pair.t0, pair.t1, until, pair.separation)
+                                      : apart_until<Kind::vertex_face>(pair.t0, pair.t1, until, pair.separation);
 }
 
 }  // namespace
@@ -63,9 +69,9 @@ std::optional<Intersections> GpuBackend::intersections(Positions vertices) {
   return attempt([&] { return pierced_faces(vertices); });
 }
 
-void GpuBackend::prepare_motion(Positions t0, Positions t1) {
+void GpuBackend::prepare_motion(Positions t0, Positions t1, bool until_best) {
   const SeparationTable& table = shared_.separations;
-  prepare({table.any() ? gpu::Query::separations : gpu::Query::contacts, growth_of(table.most())},
+  prepare({table.any() ? gpu::Query::separations : gpu::Query::contacts, growth_of(table.most()), until_best},
           [&] { shared_.tree.bound(on_host(t0, 0), on_host(t1, 1), {}); });
 }
 
@@ -78,32 +84,36 @@ void GpuBackend::require_good(bool good, Positions t0, Positions t1) {
   shared_.profiler.mark("gpu");
 }
 
-// Up to the first contact at the start, where the earliest time is all that is asked for.
-void GpuBackend::decide_motion(Positions t0, Positions t1, bool time_only) {
+// Where nothing matters after a time, up to that, and up to the first contact at the start.
+void GpuBackend::decide_motion(Positions t0, Positions t1, std::optional<double> until) {
   if (!pipeline_->undecided().empty()) t0 = on_host(t0, 0), t1 = on_host(t1, 1);
   const Separations separations = shared_.separations_now();
   std::atomic<bool> over{false};
   decide([&](const Candidate& u) -> std::optional<double> {
     if (over.load(std::memory_order_relaxed)) return std::nullopt;
     const UndecidedPair pair = undecided_pair(shared_.features, separations, u, t0, t1);
+    if (until && stays_apart(pair, *until)) return std::nullopt;
     FallbackCounts counts;
     const auto time = pair.separation > 0 ? decide_separation(Accuracy::exact, pair, counts)
                                           : decide_contact(Accuracy::exact, pair, counts);
-    if (time_only && time && *time <= 0) over = true;
+    if (until && time && *time <= 0) over = true;
     return time;
   });
 }
 
 Contacts GpuBackend::contacts(Positions t0, Positions t1) {
   const Options& o = shared_.options;
-  prepare_motion(t0, t1);
-  require_good(pipeline_->run(t0, t1, shared_.pool), t0, t1);
+  const bool first = o.report == Report::first && shared_.rules.promise_times();
+  prepare_motion(t0, t1, first);
+  const gpu::Pipeline::Best best = first ? gpu::Pipeline::Best(std::numeric_limits<double>::infinity()) : std::nullopt;
+  require_good(pipeline_->run(t0, t1, best, shared_.pool), t0, t1);
   const Outputs outputs{o.points, o.normals, o.closest, AtTime::contact};
   const bool places = o.points || o.normals || o.closest;
   if (places) t0 = on_host(t0, 0), t1 = on_host(t1, 1);
-  decide_motion(t0, t1, false);
+  decide_motion(t0, t1, std::nullopt);
   Contacts found = join(finish(), decided_, shared_.features, shared_.pool);
   reduce(found, o.report);
+  if (first) pipeline_->choose_hints(found.first_toc);
   if (places) add_places(found, outputs, shared_.features, shared_.separations_now(), t0, t1, shared_.pool);
   shared_.profiler.mark("contacts");
   return found;
@@ -140,7 +150,7 @@ Intersections GpuBackend::pierced_faces(Positions vertices) {
 }
 
 void GpuBackend::prepare_snapshot(gpu::Query query, Positions vertices, double distance) {
-  prepare({query, growth_of(distance)}, [&] { shared_.tree.bound(on_host(vertices, 0)); });
+  prepare({query, growth_of(distance), false}, [&] { shared_.tree.bound(on_host(vertices, 0)); });
 }
 
 void GpuBackend::run_snapshot(gpu::Query query, Positions vertices, double distance) {
@@ -219,7 +229,7 @@ void GpuBackend::count(std::map<std::string, std::uint64_t>& stats) const {
   if (!pipeline_) return;
   stats.merge(pipeline_->stats());
   stats["gpu_exact_on_cpu"] = pipeline_->undecided().size();
-  if (last_boxes_.first == gpu::Query::intersections) stats["ef_by_integers"] = pipeline_->undecided().size();
+  if (last_boxes_.query == gpu::Query::intersections) stats["ef_by_integers"] = pipeline_->undecided().size();
 }
 
 void GpuBackend::add_stages(std::map<std::string, double>& stages) const {

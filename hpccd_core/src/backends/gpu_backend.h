@@ -2,10 +2,10 @@
 // A whole step on one GPU; the CPU's exact fallback beside it.
 #pragma once
 
+#include <compare>
 #include <map>
 #include <memory>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "backends/backend.h"
@@ -35,19 +35,25 @@ class GpuBackend final : public DetectionBackend {
   static std::string unsupported(const Options& options);
 
  private:
-  // What a tree is refitted to: boxes of a query, and how large a distance they are grown by (growth_of).
-  using Boxes = std::pair<gpu::Query, int>;
+  // What a tree is refitted to: boxes of a query, how large a distance they are grown by (growth_of), and whether they
+  // reach up to the best time so far.
+  struct Boxes {
+    gpu::Query query;
+    int growth;
+    bool until_best;
+    auto operator<=>(const Boxes&) const = default;
+  };
 
   template <class Compute>
   auto attempt(Compute&& compute) -> std::optional<decltype(compute())>;
   Contacts contacts(Positions t0, Positions t1);
   double earliest_time(Positions t0, Positions t1);
-  double run_for_earliest(Positions t0, Positions t1, gpu::Pipeline::Pairs pairs);
-  bool list_near_pairs(Positions t0, double time);
+  double run_for_earliest(Positions t0, Positions t1, gpu::Pipeline::Pairs pairs, gpu::Pipeline::Best best);
+  bool list_near_pairs(Positions t0, double time, const Travel& travel);
   Travel travel_of_frame() const;
-  void prepare_motion(Positions t0, Positions t1);
+  void prepare_motion(Positions t0, Positions t1, bool until_best);
   void require_good(bool good, Positions t0, Positions t1);
-  void decide_motion(Positions t0, Positions t1, bool time_only);
+  void decide_motion(Positions t0, Positions t1, std::optional<double> until);
   Contacts near_pairs(Positions vertices, double distance);
   Intersections pierced_faces(Positions vertices);
   void prepare_snapshot(gpu::Query query, Positions vertices, double distance);

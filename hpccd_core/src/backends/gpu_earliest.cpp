@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // The earliest contact on one GPU, as cpu_earliest.cpp finds it: from pairs known to be near, which stay on the device.
-// Where these do not suffice, from all pairs: a frame without its results.
+// Where these do not suffice, from all pairs: a frame without its results, whose boxes reach up to the best time so
+// far.
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "backends/gpu_backend.h"
@@ -12,38 +14,40 @@ namespace hpccd {
 using Pairs = gpu::Pipeline::Pairs;
 
 double GpuBackend::earliest_time(Positions t0, Positions t1) {
-  prepare_motion(t0, t1);
-  if (!shared_.rules.promise_times()) return run_for_earliest(t0, t1, Pairs::all);
+  const bool prunes = shared_.rules.promise_times();
+  prepare_motion(t0, t1, prunes);
+  if (!prunes) return run_for_earliest(t0, t1, Pairs::all, std::nullopt);
   if (std::exchange(near_separations_, shared_.separations.version()) != shared_.separations.version()) near_.forget();
-  double time = run_for_earliest(t0, t1, Pairs::near_list);
-  if (time <= 0 || near_.answers(time, travel_of_frame())) return time;
-  if (list_near_pairs(t0, time)) {
-    time = run_for_earliest(t0, t1, Pairs::near_list);
+  constexpr double none = std::numeric_limits<double>::infinity();
+  double time = none;
+  if (near_.known()) {
+    time = run_for_earliest(t0, t1, Pairs::near_list, none);
     if (time <= 0 || near_.answers(time, travel_of_frame())) return time;
+    near_.forget();
   }
-  near_.forget();
-  time = run_for_earliest(t0, t1, Pairs::all);
-  pipeline_->list_found(time);  // gives the next motion its first bound
+  time = std::min(time, run_for_earliest(t0, t1, Pairs::all, time));
+  pipeline_->choose_hints(time);
+  const Travel travel = travel_of_frame();
+  if (time <= 0 || !list_near_pairs(t0, time, travel)) pipeline_->forget_near();
   return time;
 }
 
-double GpuBackend::run_for_earliest(Positions t0, Positions t1, Pairs pairs) {
-  require_good(pipeline_->run_for_earliest(t0, t1, pairs, shared_.pool), t0, t1);
+double GpuBackend::run_for_earliest(Positions t0, Positions t1, Pairs pairs, gpu::Pipeline::Best best) {
+  require_good(pipeline_->run_for_earliest(t0, t1, pairs, best, shared_.pool), t0, t1);
   double time = pipeline_->earliest().time;
   if (time <= 0) return time;
-  decide_motion(t0, t1, true);
+  decide_motion(t0, t1, best ? std::min({time + same_time, *best + same_time, 1.0}) : 1.0);
   for (const auto* list : {&decided_.vertex_face, &decided_.edge_edge})
     for (const Contact& c : *list) time = std::min(time, c.toc);
   return time;
 }
 
-bool GpuBackend::list_near_pairs(Positions t0, double time) {
-  const Travel travel = travel_of_frame();
+// For the motions to come, where these may begin as this one does.
+bool GpuBackend::list_near_pairs(Positions t0, double time, const Travel& travel) {
   if (!near_.next_would_pay(travel, edge_)) return false;
   const std::optional<double> radius = radius_for(travel, time, edge_);
   const double distance = radius ? listed_distance(*radius, shared_.separations.most()) : 0;
   if (!radius || !std::isfinite(distance)) return false;
-  near_.forget();
   prepare_snapshot(gpu::Query::proximity, t0, distance);
   require_good(pipeline_->list_near(t0, distance, most_listed(shared_.features), shared_.pool), t0, t0);
   if (pipeline_->gave_up_listing())

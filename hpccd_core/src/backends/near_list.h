@@ -12,6 +12,7 @@
 #include "base/parallel.h"
 #include "base/vec3.h"
 #include "elementary/pair.h"
+#include "elementary/policy.h"
 #include "scene/features.h"
 #include "scene/vertex_motion.h"
 #include "traverse/tasks.h"
@@ -26,9 +27,6 @@ struct Travel {
   // The farthest that any of them is up to a time.
   double until(double time) const { return (away + time * way) * (1 + 1e-9); }
 };
-
-// Times within this of the earliest may be reported as earlier (policy.h).
-inline constexpr double same_time = 2e-12;
 
 // Up to when a list answers, and whether the next is worth its price.
 class NearRadius {

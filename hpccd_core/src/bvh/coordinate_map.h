@@ -39,7 +39,8 @@ struct CoordinateMap {
     return m;
   }
 
-  HPCCD_HD float operator()(double x, int k) const { return static_cast<float>((x - center[k]) * scale); }
+  HPCCD_HD double precise(double x, int k) const { return (x - center[k]) * scale; }
+  HPCCD_HD float operator()(double x, int k) const { return static_cast<float>(precise(x, k)); }
 
   bool operator==(const CoordinateMap&) const = default;
 };

@@ -12,6 +12,9 @@ HPCCD_HD double reported_time(Accuracy accuracy, double toc, double delta) {
   return accuracy == Accuracy::conservative ? greater(toc - delta, 0.0) : toc;
 }
 
+// Times of one step that are as far apart may be reported as equal, or in the other order.
+inline constexpr double same_time = 2e-12;
+
 // By the bounds of worst-case rounding. A time of contact is accepted only where it is known to 9e-13: the contract
 // promises 1e-12.
 struct Proven {

@@ -5,7 +5,7 @@
 #include "bvh/coordinate_map.h"
 #include "bvh/kdop.h"
 #include "bvh/tree.h"
-#include "gpu/launch_params.cuh"
+#include "gpu/best_time.cuh"
 #include "gpu/reach.h"
 
 namespace hpccd::gpu {
@@ -57,6 +57,13 @@ __device__ inline void set_ends(GivenEnds<double>& r, const double* a, const dou
   r.t0[0] = {a[0], a[1]}, r.t0[1] = {a[2], 0}, r.t1[0] = {b[0], b[1]}, r.t1[1] = {b[2], 0};
 }
 
+// Where a vertex is at a time between its ends, and what rounding this to a float, once more where the box of another
+// grows by it, can lose: half of 2^-22 each of the three times for coordinates up to 2.25.
+__device__ inline float place_at(double time, double t0, double t1) {
+  return static_cast<float>(t0 + time * (t1 - t0));
+}
+inline constexpr float lost_by_place = 4.8e-7f;
+
 template <bool snapshot, class T>
 __global__ void vertices_kernel(LaunchParams<T> params) {
   const u32 i = blockIdx.x * blockDim.x + threadIdx.x;
@@ -68,16 +75,19 @@ __global__ void vertices_kernel(LaunchParams<T> params) {
     largest = greater(largest, greater(magnitude(low[k]), magnitude(high[k])));
   }
   const CoordinateMap map = CoordinateMap::around(low, high);
+  const double part = params.until_best ? until(params) : 1;
   T a[3], b[3];
   DevicePoint point;
   for (int k = 0; k < 3; ++k) {
     a[k] = params.given_t0[3 * static_cast<u64>(i) + k], b[k] = params.given_t1[3 * static_cast<u64>(i) + k];
-    point.at[0].x[k] = map(a[k], k), point.at[1].x[k] = map(b[k], k);
+    point.at[0].x[k] = map(a[k], k);
+    point.at[1].x[k] = part < 1 ? place_at(part, map.precise(a[k], k), map.precise(b[k], k)) : map(b[k], k);
   }
   const double separation =
       params.largest_separation ? params.largest_separation[params.mesh_of_vertex[i]] : params.separation;
   const float reach = reach_on_device(separation, map.scale, largest);
-  point.at[0].tag = point.at[1].tag = __float_as_uint(reach);
+  point.at[0].tag = __float_as_uint(reach);
+  point.at[1].tag = __float_as_uint(part < 1 ? reach + lost_by_place : reach);
   if constexpr (snapshot) {
     const SlantedCoordinates slanted({a[0], a[1], a[2]}, map);
     for (int k = 0; k < 3; ++k) point.at[1].x[k] = slanted.along[k];

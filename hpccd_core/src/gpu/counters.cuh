@@ -24,8 +24,8 @@ struct Counters {
   u64 found[2];                                     // by kind, after the fallback on the device
   u64 found_all, undecided, to_host;
   u64 hash;
-  u64 soonest;    // complement of the bits of the earliest time
-  u64 way, away;  // bits of the longest ways of a coordinate (device_near_list.cuh)
+  u64 soonest, soonest_proven;  // complements of the bits of earliest times
+  u64 way, away;                // bits of the longest ways of a coordinate (device_near_list.cuh)
   u64 listed[2];
   double area;
 };

@@ -21,12 +21,16 @@ class DeviceMotion {
     params.vertices = reinterpret_cast<GivenEnds<T>*>(vertices_.data()), params.points = points_.data();
   }
 
-  // From the positions that the frame names; clears its counters.
+  // How far the positions reach that the frame names; clears its counters.
   template <class T>
-  void launch(Query query, const LaunchParams<T>& params, int multiprocessors, cudaStream_t stream) const {
+  void begin(const LaunchParams<T>& params, int multiprocessors, cudaStream_t stream) const {
     check(cudaMemsetAsync(params.counters, 0, sizeof(Counters), stream), "cudaMemsetAsync");
     extent_kernel<<<std::min(blocks_for(params.n_vertices, 256), 2u * multiprocessors), 256, 0, stream>>>(params);
     check_launch("extent_kernel");
+  }
+  // Then the motion itself.
+  template <class T>
+  void launch(Query query, const LaunchParams<T>& params, cudaStream_t stream) const {
     const auto kernel = of_snapshot(query) ? vertices_kernel<true, T> : vertices_kernel<false, T>;
     kernel<<<blocks_for(params.n_vertices, 256), 256, 0, stream>>>(params);
     check_launch("vertices_kernel");

@@ -5,14 +5,11 @@
 
 #include <algorithm>
 
-#include "gpu/launch_params.cuh"
+#include "gpu/best_time.cuh"
 #include "gpu/pair_lists.cuh"
 #include "gpu/stream.h"
 
 namespace hpccd::gpu {
-
-// Bits of numbers of at least zero are in the order of the numbers.
-__device__ inline u64 bits_of(double x) { return static_cast<u64>(__double_as_longlong(x)); }
 
 template <class T>
 __global__ void take_list_kernel(LaunchParams<T> params, u32 kind, const uint2* pairs, u64 n) {
@@ -43,29 +40,19 @@ __global__ void travel_kernel(LaunchParams<T> params, const double* snapshot) {
 
 template <class T>
 __global__ void snapshot_kernel(LaunchParams<T> params, double* snapshot) {
-  const u64 i = static_cast<u64>(blockIdx.x) * blockDim.x + threadIdx.x;
-  if (i < 3 * static_cast<u64>(params.n_vertices)) snapshot[i] = params.given_t0[i];
+  const u32 i = blockIdx.x * blockDim.x + threadIdx.x;
+  if (i >= params.n_vertices) return;
+  const Vec3<double> start = load_ends(params.vertices, i).t0;  // what the caller gave may change
+  double* to = snapshot + 3 * static_cast<u64>(i);
+  to[0] = start.x, to[1] = start.y, to[2] = start.z;
 }
 
-// The earliest time that was found.
+// All that a frame found, and all that it left to the host.
 template <class T>
-__global__ void soonest_kernel(LaunchParams<T> params) {
-  const u64 n = length(params.counters->found_all, params.found_capacity),
-            stride = static_cast<u64>(gridDim.x) * blockDim.x;
-  u64 soonest = 0;
-  for (u64 i = static_cast<u64>(blockIdx.x) * blockDim.x + threadIdx.x; i - lane_number() < n; i += stride)
-    if (i < n) soonest = max(soonest, ~bits_of(params.found_tocs[i]));
-  for (int d = 16; d > 0; d /= 2) soonest = max(soonest, __shfl_xor_sync(all_lanes, soonest, d));
-  if (lane_number() == 0 && soonest) atomicMax(&params.counters->soonest, soonest);
-}
-
-// Of what a frame found, all up to this time (or distance), and of what it left to the host all.
-template <class T>
-__global__ void collect_kernel(LaunchParams<T> params, double until, u64 n_found, u64 n_to_host, PairList vf,
-                               PairList ee) {
+__global__ void collect_kernel(LaunchParams<T> params, u64 n_found, u64 n_to_host, PairList vf, PairList ee) {
   const u64 n = n_found + n_to_host, stride = static_cast<u64>(gridDim.x) * blockDim.x;
   for (u64 i = static_cast<u64>(blockIdx.x) * blockDim.x + threadIdx.x; i - lane_number() < n; i += stride) {
-    const bool valid = i < n && (i >= n_found || params.found_tocs[i] <= until);
+    const bool valid = i < n;
     const u64 key = !valid ? 0 : i < n_found ? params.found_keys[i] : params.to_host[i - n_found];
     const Candidate pair = params.keys.pair_of(key);
     const bool edges = pair.kind == Kind::edge_edge;
@@ -97,24 +84,28 @@ class DeviceNearList {
 
   // From the last frame, whose counters are `c`, and whose start becomes the snapshot. Waits for the stream.
   template <class T>
-  void collect(const LaunchParams<T>& params, const Counters& c, double until, cudaStream_t stream) {
-    n_[0] = n_[1] = 0, has_snapshot_ = false;
+  void collect(const LaunchParams<T>& params, const Counters& c, cudaStream_t stream) {
     const u64 n = c.found_all + c.to_host;
     for (auto& pairs : pairs_) pairs.reserve(static_cast<std::size_t>(n + n / 4 + 1));
     const PairList lists[2] = {{pairs_[0].data(), pairs_[0].size()}, {pairs_[1].data(), pairs_[1].size()}};
     check(cudaMemsetAsync(&params.counters->listed, 0, sizeof params.counters->listed, stream), "cudaMemsetAsync");
-    collect_kernel<<<std::min(blocks_for(n, 256), 1024u), 256, 0, stream>>>(params, until, c.found_all, c.to_host,
-                                                                            lists[0], lists[1]);
+    collect_kernel<<<std::min(blocks_for(n, 256), 1024u), 256, 0, stream>>>(params, c.found_all, c.to_host, lists[0],
+                                                                            lists[1]);
     check_launch("collect_kernel");
     u64 listed[2];
     check(cudaMemcpyAsync(listed, &params.counters->listed, sizeof listed, cudaMemcpyDeviceToHost, stream),
           "cudaMemcpyAsync");
-    const std::size_t n_coordinates = std::size_t{params.n_vertices} * 3;
-    snapshot_.reserve(std::max<std::size_t>(n_coordinates, 1));
-    snapshot_kernel<<<blocks_for(n_coordinates, 256), 256, 0, stream>>>(params, snapshot_.data());
-    check_launch("snapshot_kernel");
+    begin_at(params, stream);
     check(cudaStreamSynchronize(stream), "cudaStreamSynchronize");
     for (int k = 0; k < 2; ++k) n_[k] = listed[k];
+  }
+  // The last frame's start, alone, becomes the snapshot. Does not wait for the stream.
+  template <class T>
+  void begin_at(const LaunchParams<T>& params, cudaStream_t stream) {
+    n_[0] = n_[1] = 0, has_snapshot_ = false;
+    snapshot_.reserve(std::max<std::size_t>(std::size_t{params.n_vertices} * 3, 1));
+    snapshot_kernel<<<blocks_for(params.n_vertices, 256), 256, 0, stream>>>(params, snapshot_.data());
+    check_launch("snapshot_kernel");
     has_snapshot_ = true;
   }
 

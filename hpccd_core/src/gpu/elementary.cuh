@@ -3,10 +3,11 @@
 // survivors of the one before.
 #pragma once
 
+#include "elementary/apart_until.h"
 #include "elementary/distance/extended_separation.h"
 #include "elementary/filtered_test.h"
 #include "elementary/tolerance_test.h"
-#include "gpu/pair_lists.cuh"
+#include "gpu/best_time.cuh"
 
 namespace hpccd::gpu {
 
@@ -15,14 +16,18 @@ struct RootTests {
   bool one, many;
 };
 
-template <Kind kind, class T>
-__device__ __forceinline__ RootTests root_tests(const LaunchParams<T>& params, uint2 pair) {
-  const Motion<double> m = load_motion<kind>(params.vertices, vertices_of<kind>(params, pair.x, pair.y));
+template <Kind kind>
+__device__ __forceinline__ RootTests root_tests(const Motion<double>& m) {
   const Magnitudes<double> size = magnitudes(m);
   const bool usable = in_range(size);
   const bool passes = !(certainly_outside<kind>(m, size) && usable);
   const bool single = certainly_one_root(coplanarity(m), error_of<Proven>(size).coefficient) && usable;
   return {passes && single, passes && !single};
+}
+
+template <Kind kind, class T>
+__device__ __forceinline__ RootTests root_tests(const LaunchParams<T>& params, uint2 pair) {
+  return root_tests<kind>(load_motion<kind>(params.vertices, vertices_of<kind>(params, pair.x, pair.y)));
 }
 
 template <class T>
@@ -44,7 +49,7 @@ template <Kind kind, bool single, class T>
 __global__ __launch_bounds__(128) void roots_kernel(const __grid_constant__ LaunchParams<T> params) {
   constexpr u32 k = kind == Kind::edge_edge;
   const PairList& list = single ? params.single[k] : params.many[k];
-  u32 proven = 0, doubtful = 0;
+  u32 proven = 0, kept = 0, doubtful = 0;
   for_pairs(list, single ? params.counters->single[k] : params.counters->many[k], [&](bool valid, uint2 pair) {
     bool contact = false, undecided = false;
     double toc = 0;
@@ -56,20 +61,21 @@ __global__ __launch_bounds__(128) void roots_kernel(const __grid_constant__ Laun
       undecided = !o.contact && !o.none;
       toc = reported_time(reported_as(params, v), o.toc, o.delta);
     }
-    append_found(params, kind, contact, pair, toc);
+    const bool counts = contact && counts_at(params, toc);
+    append_found(params, kind, counts, pair, toc);
     append_undecided(params, kind, undecided, pair);
     proven += contact;
+    kept += counts;
     doubtful += undecided;
   });
   for (int d = 16; d > 0; d /= 2) {
     proven += __shfl_xor_sync(all_lanes, proven, d);
+    kept += __shfl_xor_sync(all_lanes, kept, d);
     doubtful += __shfl_xor_sync(all_lanes, doubtful, d);
   }
   if (lane_number() != 0) return;
-  if (proven) {
-    atomicAdd(&params.counters->proven[k], static_cast<u64>(proven));
-    atomicAdd(&params.counters->found[k], static_cast<u64>(proven));
-  }
+  if (proven) atomicAdd(&params.counters->proven[k], static_cast<u64>(proven));
+  if (kept) atomicAdd(&params.counters->found[k], static_cast<u64>(kept));
   if (doubtful) atomicAdd(&params.counters->undecided_of[k], static_cast<u64>(doubtful));
 }
 
@@ -90,15 +96,49 @@ __global__ void end_segment_kernel(LaunchParams<T> params) {
   }
 }
 
-// The tier's fallback for what the error bounds left open: here where double precision or twice that is enough, else on
-// the host. A kernel of its own where some pairs have a separation: the others' would be slower for its registers.
+// A pair at both ends of its motion, in the order of pair_vertices.
+struct PairEnds {
+  Vec3<double> t0[4], t1[4];
+};
+
+// The answer of the tier's fallback where double precision or twice that is enough; else it is the host's to give.
+struct FallbackAnswer {
+  bool contact, host;
+  double toc;
+};
+
+template <Kind kind>
+__device__ FallbackAnswer decide_on_device(const PairEnds& q, Accuracy accuracy, double separation) {
+  if (separation > 0) {
+    const extended_precision::Answer a = extended_precision::earliest_within<kind>(q.t0, q.t1, separation);
+    return {a.contact, !a.contact && !a.none, a.toc};
+  }
+  if (accuracy == Accuracy::exact || accuracy == Accuracy::conservative) {
+    const extended_precision::Answer a = extended_precision::decide<kind>(q.t0, q.t1);
+    return {a.contact, !a.contact && !a.none, a.toc};
+  }
+  const tolerance_test::Answer a = tolerance_test::contact<kind>(q.t0, q.t1);
+  return {a.contact, false, a.toc};
+}
+
+template <Kind kind, bool separations, class T>
+__device__ FallbackAnswer fallback(const LaunchParams<T>& params, uint4 v) {
+  const Ends r[4] = {load_ends(params.vertices, v.x), load_ends(params.vertices, v.y), load_ends(params.vertices, v.z),
+                     load_ends(params.vertices, v.w)};
+  const PairEnds q{{r[0].t0, r[1].t0, r[2].t0, r[3].t0}, {r[0].t1, r[1].t1, r[2].t1, r[3].t1}};
+  const double separation = separations ? separation_of(params, v.x, v.z) : 0;
+  if (params.time_only && params.until_best && apart_until<kind>(q.t0, q.t1, until(params), separation)) return {};
+  return decide_on_device<kind>(q, accuracy_of(params, v), separation);
+}
+
+// What the error bounds left open. A kernel of its own where some pairs have a separation: the others' would be slower
+// for its registers.
 template <bool separations, class T>
 __global__ __launch_bounds__(32) void fallback_kernel(const __grid_constant__ LaunchParams<T> params) {
   const u64 n = length(params.counters->undecided, params.undecided_capacity),
             stride = static_cast<u64>(gridDim.x) * blockDim.x;
   for (u64 i = static_cast<u64>(blockIdx.x) * blockDim.x + threadIdx.x; i - lane_number() < n; i += stride) {
-    bool contact = false, host = false;
-    double toc = 0;
+    FallbackAnswer answer{false, false, 0};
     u64 key = 0;
     uint2 pair{0, 0};
     Kind kind = Kind::vertex_face;
@@ -108,36 +148,14 @@ __global__ __launch_bounds__(32) void fallback_kernel(const __grid_constant__ La
       kind = candidate.kind, pair = {candidate.first, candidate.second};
       const uint4 v = kind == Kind::edge_edge ? vertices_of<Kind::edge_edge>(params, pair.x, pair.y)
                                               : vertices_of<Kind::vertex_face>(params, pair.x, pair.y);
-      const Accuracy accuracy = accuracy_of(params, v);
-      const Ends r[4] = {load_ends(params.vertices, v.x), load_ends(params.vertices, v.y),
-                         load_ends(params.vertices, v.z), load_ends(params.vertices, v.w)};
-      const Vec3<double> q0[4] = {r[0].t0, r[1].t0, r[2].t0, r[3].t0}, q1[4] = {r[0].t1, r[1].t1, r[2].t1, r[3].t1};
-      const double separation = separations ? separation_of(params, v.x, v.z) : 0;
-      if (separations && separation > 0) {
-        const extended_precision::Answer a =
-            kind == Kind::edge_edge ? extended_precision::earliest_within<Kind::edge_edge>(q0, q1, separation)
-                                    : extended_precision::earliest_within<Kind::vertex_face>(q0, q1, separation);
-        contact = a.contact;
-        host = !a.contact && !a.none;
-        toc = a.toc;
-      } else if (accuracy == Accuracy::exact || accuracy == Accuracy::conservative) {
-        const extended_precision::Answer a = kind == Kind::edge_edge
-                                                 ? extended_precision::decide<Kind::edge_edge>(q0, q1)
-                                                 : extended_precision::decide<Kind::vertex_face>(q0, q1);
-        contact = a.contact;
-        host = !a.contact && !a.none;
-        toc = a.toc;
-      } else {
-        const tolerance_test::Answer a = kind == Kind::edge_edge ? tolerance_test::contact<Kind::edge_edge>(q0, q1)
-                                                                 : tolerance_test::contact<Kind::vertex_face>(q0, q1);
-        contact = a.contact;
-        toc = a.toc;
-      }
+      answer = kind == Kind::edge_edge ? fallback<Kind::edge_edge, separations>(params, v)
+                                       : fallback<Kind::vertex_face, separations>(params, v);
     }
-    append_found(params, kind, contact, pair, toc);
-    if (contact) atomicAdd(&params.counters->found[kind == Kind::edge_edge], u64{1});
-    const u64 at = warp_append(&params.counters->to_host, host);
-    if (host && at < params.to_host_capacity) params.to_host[at] = key;
+    append_found(params, kind, answer.contact, pair, answer.toc);
+    if (answer.contact) atomicAdd(&params.counters->found[kind == Kind::edge_edge], u64{1});
+    if (params.time_only) keep_soonest(&params.counters->soonest, answer.contact ? answer.toc : INFINITY);
+    const u64 at = warp_append(&params.counters->to_host, answer.host);
+    if (answer.host && at < params.to_host_capacity) params.to_host[at] = key;
   }
 }
 

@@ -85,6 +85,14 @@ struct LaunchParams {
   GivenEnds<T>* vertices;
   DevicePoint* points;  // of the vertices
 
+  // Of a frame that looks for the earliest contacts (best_time.cuh).
+  bool until_best;  // what touches after the best time so far does not matter
+  bool time_only;   // the earliest time is all that is asked for: exact times are reported as conservative ones are
+  double best;      // time so far, when the frame begins
+  PairList hints[2];
+  u64* n_hints;
+  bool hints_decided;  // by the fallback, where the error bounds leave them open
+
   // Lists.
   PairList leaf_pairs, survivors[2], single[2], many[2], separated[2];
   u64* found_keys;
@@ -94,7 +102,6 @@ struct LaunchParams {
   u64 undecided_capacity;
   u64* to_host;  // keys that need exact arithmetic
   u64 to_host_capacity;
-  bool rounds_down;         // exact times are reported as conservative ones are
   u32 segment, n_segments;  // leaf pairs of this pass: n * segment / n_segments ...
   Counters* counters;
 };
@@ -170,7 +177,7 @@ __device__ inline Accuracy accuracy_of(const LaunchParams<T>& params, uint4 v) {
 template <class T>
 __device__ inline Accuracy reported_as(const LaunchParams<T>& params, uint4 v) {
   const Accuracy accuracy = accuracy_of(params, v);
-  return params.rounds_down && accuracy == Accuracy::exact ? Accuracy::conservative : accuracy;
+  return params.time_only && accuracy == Accuracy::exact ? Accuracy::conservative : accuracy;
 }
 
 // Of two features by one vertex of each.

@@ -8,12 +8,18 @@
 #include "gpu/device_positions.cuh"
 #include "gpu/device_scene.cuh"
 #include "gpu/device_tree.cuh"
+#include "gpu/hints.cuh"
 #include "gpu/pipeline.h"
 #include "gpu/refit.cuh"
+#include "gpu/stages.cuh"
 #include "gpu/test_lists.cuh"
 
 namespace hpccd::gpu {
 namespace {
+
+constexpr double no_time = std::numeric_limits<double>::infinity();
+// As the counters have it (counters.cuh).
+double time_of(u64 soonest) { return soonest ? std::bit_cast<double>(~soonest) : no_time; }
 
 class DevicePipeline : public Pipeline {
  public:
@@ -33,6 +39,7 @@ class DevicePipeline : public Pipeline {
     leaf_pairs_.reserve(4 * typical_size());
     contacts_.reserve(typical_size(), stream_);
     motion_.reserve(features.n_vertices);
+    hints_.reserve(stream_);
   }
 
   ~DevicePipeline() override {
@@ -47,8 +54,9 @@ class DevicePipeline : public Pipeline {
     tree_.set(features_, tree);
   }
 
-  bool run(Positions t0, Positions t1, ThreadPool& pool) override {
+  bool run(Positions t0, Positions t1, Best best, ThreadPool& pool) override {
     begin();
+    best_ = best;
     scene_.update_separations();
     return run_frame(scene_.query_now(), t0, t1, 0, pool);
   }
@@ -56,8 +64,9 @@ class DevicePipeline : public Pipeline {
     begin();
     return run_frame(query, vertices, vertices, distance, pool);
   }
-  bool run_for_earliest(Positions t0, Positions t1, Pairs pairs, ThreadPool& pool) override {
+  bool run_for_earliest(Positions t0, Positions t1, Pairs pairs, Best best, ThreadPool& pool) override {
     begin();
+    best_ = best;
     scene_.update_separations();
     goal_ = pairs == Pairs::all ? Goal::earliest : Goal::earliest_of_near;
     return run_frame(scene_.query_now(), t0, t1, 0, pool);
@@ -70,7 +79,8 @@ class DevicePipeline : public Pipeline {
     return run_frame(Query::proximity, vertices, vertices, distance, pool);
   }
   bool gave_up_listing() const override { return gave_up_listing_; }
-  void list_found(double until) override;
+  void choose_hints(double earliest) override;
+  void forget_near() override;
   const std::vector<Candidate>& undecided() const override { return undecided_; }
 
   FrameResult finish() override {
@@ -86,7 +96,7 @@ class DevicePipeline : public Pipeline {
   // Lists begin with room for so many times the scene's primitives that most scenes outgrow them once or never.
   std::size_t typical_size() const { return std::max<std::size_t>(features_.n_primitives(), 1024); }
   void begin() {
-    goal_ = Goal::results;
+    goal_ = Goal::results, best_.reset();
     check(cudaSetDevice(device_), "cudaSetDevice");
     // Work of a frame that failed may still be under way on these buffers.
     check(cudaStreamSynchronize(stream_), "cudaStreamSynchronize");
@@ -105,8 +115,10 @@ class DevicePipeline : public Pipeline {
   void launch_results(const LaunchParams<T>& params);
   template <class T>
   void launch_area(const LaunchParams<T>& params);
+  template <class Use>
+  void with_last_frame(Use&& use);
   template <class T>
-  void list_found(double until);
+  LaunchParams<T> last_frame() const;
   void copy_counters();
   bool grow_overflowed();
   bool lists_too_many() const;
@@ -131,11 +143,13 @@ class DevicePipeline : public Pipeline {
   enum class Goal : unsigned char { results, earliest, earliest_of_near, near_list };
   bool for_earliest() const { return goal_ == Goal::earliest || goal_ == Goal::earliest_of_near; }
 
+  Hints hints_;
   DeviceNearList near_;
   std::size_t most_near_ = 0;
   bool gave_up_listing_ = false;
-  Positions given_t0_;  // of the last frame, while its caller waits
+  bool given_doubles_ = true;  // in the last frame
   Goal goal_ = Goal::results;
+  Best best_;
   Query query_ = Query::contacts;
   u64 passes_ = 0, exact_last_time_ = 0;
   std::vector<Candidate> undecided_;
@@ -152,7 +166,8 @@ bool DevicePipeline::run_frame(Positions t0, Positions t1, double distance, Thre
   }
   LaunchParams<T> params{};
   scene_.fill(params);
-  params.rounds_down = for_earliest();
+  params.time_only = for_earliest();
+  params.until_best = best_.has_value(), params.best = best_.value_or(no_time);
   if (of_snapshot(query_))
     params.separation = distance;
   else
@@ -163,7 +178,7 @@ bool DevicePipeline::run_frame(Positions t0, Positions t1, double distance, Thre
   const T* given[2];
   positions_.bring(t0, t1, given, pool, stream_);
   params.given_t0 = given[0], params.given_t1 = given[1];
-  given_t0_ = {given[0], t0.n, t0.is_double, true};
+  given_doubles_ = t0.is_double;
   params.counters = counters_.data();
   timer_.mark("upload", stream_);
   const Counters& c = *host_counters_.data();
@@ -184,7 +199,7 @@ bool DevicePipeline::run_frame(Positions t0, Positions t1, double distance, Thre
   // Before the results: their kernels bring the counters to the host once more.
   const u64 n_to_host = exact_last_time_ = c.to_host;
   if (goal_ == Goal::results) launch_results(params);
-  if (goal_ == Goal::near_list) near_.collect(params, c, std::numeric_limits<double>::infinity(), stream_);
+  if (goal_ == Goal::near_list) near_.collect(params, c, stream_);
   for (u64 i = 0; i < n_to_host; ++i) undecided_.push_back(scene_.keys().pair_of(lists_.to_host()[i]));
   return true;
 }
@@ -193,9 +208,12 @@ template <class T>
 void DevicePipeline::launch(LaunchParams<T>& params) {
   params.leaf_pairs = {leaf_pairs_.data(), leaf_pairs_.size()};
   contacts_.fill(params);
-  motion_.launch(query_, params, multiprocessors_, stream_);
-  timer_.mark("bounds", stream_);
+  hints_.fill(params);
+  motion_.begin(params, multiprocessors_, stream_);
   if (for_earliest()) near_.measure(params, stream_);
+  if (best_ && goal_ != Goal::earliest_of_near) launch_hints(query_, params, {multiprocessors_, stream_, timer_});
+  motion_.launch(query_, params, stream_);
+  timer_.mark("bounds", stream_);
   if (goal_ == Goal::earliest_of_near) {
     lists_.fill(params);
     near_.take(params, stream_);
@@ -204,17 +222,12 @@ void DevicePipeline::launch(LaunchParams<T>& params) {
   } else {
     launch_tree(params);
   }
-  if (for_earliest()) {
-    soonest_kernel<<<static_cast<unsigned>(multiprocessors_), 256, 0, stream_>>>(params);
-    check_launch("soonest_kernel");
-    timer_.mark("earliest", stream_);
-  }
   if (goal_ == Goal::earliest) launch_area(params);
 }
 
 template <class T>
 void DevicePipeline::launch_tree(LaunchParams<T>& params) {
-  const auto refit = grows_boxes(query_) ? refit_kernel<true, T> : refit_kernel<false, T>;
+  const auto refit = grows_boxes(query_) || best_ ? refit_kernel<true, T> : refit_kernel<false, T>;
   refit<<<blocks_for(std::size_t{params.n_leaves} * 32, 128), 128, 0, stream_>>>(params);
   check_launch("refit_kernel");
   timer_.mark("refit", stream_);
@@ -242,27 +255,39 @@ void DevicePipeline::launch_area(const LaunchParams<T>& params) {
 
 EarliestTime DevicePipeline::earliest() const {
   const Counters& c = *host_counters_.data();
-  constexpr double none = std::numeric_limits<double>::infinity();
-  const auto number = [](u64 bits) { return std::bit_cast<double>(bits); };
-  return {c.soonest ? number(~c.soonest) : none, near_.has_snapshot() ? number(c.away) : none, number(c.way)};
+  return {time_of(c.soonest), near_.has_snapshot() ? std::bit_cast<double>(c.away) : no_time,
+          std::bit_cast<double>(c.way)};
 }
 
-void DevicePipeline::list_found(double until) {
-  if (given_t0_.is_double)
-    list_found<double>(until);
+void DevicePipeline::choose_hints(double earliest) {
+  const Counters& c = *host_counters_.data();
+  with_last_frame([&](auto params) {
+    params.until_best = true, params.best = earliest;
+    hints_.choose(params, time_of(c.soonest_proven), c.found_all, stream_);
+  });
+}
+
+void DevicePipeline::forget_near() {
+  with_last_frame([&](const auto& params) { near_.begin_at(params, stream_); });
+}
+
+template <class Use>
+void DevicePipeline::with_last_frame(Use&& use) {
+  if (given_doubles_)
+    use(last_frame<double>());
   else
-    list_found<float>(until);
+    use(last_frame<float>());
 }
 
 template <class T>
-void DevicePipeline::list_found(double until) {
+LaunchParams<T> DevicePipeline::last_frame() const {
   LaunchParams<T> params{};
   scene_.fill(params);
+  motion_.fill(params);
   contacts_.fill(params);
-  lists_.fill(params);
-  params.given_t0 = static_cast<const T*>(given_t0_.data);
+  hints_.fill(params);
   params.counters = counters_.data();
-  near_.collect(params, *host_counters_.data(), until, stream_);
+  return params;
 }
 
 void DevicePipeline::copy_counters() {
@@ -312,7 +337,7 @@ std::map<std::string, std::uint64_t> DevicePipeline::stats() const {
   s["gpu_passes"] = passes_;
   s["gpu_segments"] = lists_.n_segments();
   s["gpu_bytes"] = scene_.bytes() + tree_.bytes() + positions_.bytes() + motion_.bytes() + leaf_pairs_.bytes() +
-                   lists_.bytes() + contacts_.bytes() + near_.bytes();
+                   lists_.bytes() + contacts_.bytes() + near_.bytes() + hints_.bytes();
   if (for_earliest()) s["near_pairs"] = near_.size();
   return s;
 }

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -46,9 +47,12 @@ class Pipeline {
   // The tree whose boxes are refitted in every frame.
   virtual void set_tree(const Tree& tree) = 0;
 
+  // A time after which contacts do not matter; where it is given, none does that comes after another. Only where all
+  // tiers promise their times.
+  using Best = std::optional<double>;
   // All work up to the undecided pairs; host arrays may be changed by the caller after finish() only.
   // Returns false where a coordinate is not finite or too large.
-  virtual bool run(Positions t0, Positions t1, ThreadPool& pool) = 0;
+  virtual bool run(Positions t0, Positions t1, Best best, ThreadPool& pool) = 0;
   // The same of one snapshot. distance: for proximity.
   virtual bool run_snapshot(Query query, Positions vertices, double distance, ThreadPool& pool) = 0;
   // After run(): the pairs left for the exact fallback on the CPU. Sorting goes on meanwhile.
@@ -58,14 +62,16 @@ class Pipeline {
   // The same for the earliest time alone, which is never late at the tiers that promise it: of all pairs, or of those
   // in the near list. Then undecided() and earliest().
   enum class Pairs : bool { all, near_list };
-  virtual bool run_for_earliest(Positions t0, Positions t1, Pairs pairs, ThreadPool& pool) = 0;
+  virtual bool run_for_earliest(Positions t0, Positions t1, Pairs pairs, Best best, ThreadPool& pool) = 0;
   virtual EarliestTime earliest() const = 0;
   // Lists all pairs that come within a distance in a snapshot, if there are not many more than `most`; else the list
   // stays what it was. Returns false as run().
   virtual bool list_near(Positions vertices, double distance, std::size_t most, ThreadPool& pool) = 0;
   virtual bool gave_up_listing() const = 0;  // by the last list_near()
-  // Lists what the last run_for_earliest() found up to a time, and what it left undecided, to begin with.
-  virtual void list_found(double until) = 0;
+  // Some of the earliest pairs of the last frame, whose earliest time this is, give those to come their first bound.
+  virtual void choose_hints(double earliest) = 0;
+  // There is no near list any more: how far vertices are is said of the start of the last frame.
+  virtual void forget_near() = 0;
 
   virtual double relative_area() const = 0;  // of the refitted tree, as in tree.h
   virtual std::map<std::string, std::uint64_t> stats() const = 0;

@@ -2,7 +2,7 @@
 // bvh/refit.cpp on the device: a warp a leaf; the last to arrive at a node carries on to its parent (Karras 2012).
 #pragma once
 
-#include "gpu/launch_params.cuh"
+#include "gpu/best_time.cuh"
 
 namespace hpccd::gpu {
 
@@ -56,7 +56,7 @@ __global__ void refit_leaves_kernel(LaunchParams<T> params) {
 template <bool grown, class T>
 __global__ void refit_kernel(LaunchParams<T> params) {
   const u32 leaf = (blockIdx.x * blockDim.x + threadIdx.x) / 32;
-  if (leaf >= params.n_leaves) return;
+  if (leaf >= params.n_leaves || over(params)) return;
   const DeviceBox whole = refit_leaf<grown>(params, leaf);
   if (lane_number() != 0) return;
   u32 node = params.leaf_nodes[leaf];
@@ -76,10 +76,10 @@ __global__ void refit_kernel(LaunchParams<T> params) {
   }
 }
 
-// The mean of both ends, times two (motion_box.h).
-__device__ inline float area_of(const DeviceBox& b) {
+// The mean of both ends, times two (motion_box.h), or of the start alone.
+__device__ inline float area_of(const DeviceBox& b, bool start_alone) {
   float sum = 0;
-  for (int end = 0; end < 2; ++end) {
+  for (int end = 0; end < (start_alone ? 1 : 2); ++end) {
     const float *low = b.low[end].x, *high = b.high[end].x;
     const float x = high[0] - low[0], y = high[1] - low[1], z = high[2] - low[2];
     sum += x * y + y * z + z * x;
@@ -87,14 +87,15 @@ __device__ inline float area_of(const DeviceBox& b) {
   return sum;
 }
 
-// Sum of the nodes' areas over the root's (Tree::area).
+// Sum of the nodes' areas over the root's (Tree::area). Where boxes reach up to some time, their other end says nothing
+// of the tree.
 template <class T>
 __global__ void area_kernel(LaunchParams<T> params) {
   double sum = 0;
   for (u32 i = blockIdx.x * blockDim.x + threadIdx.x; i < params.n_nodes; i += gridDim.x * blockDim.x)
-    sum += area_of(load_box(&params.node_boxes[i]));
+    sum += area_of(load_box(&params.node_boxes[i]), params.until_best);
   for (int d = 16; d > 0; d /= 2) sum += __shfl_xor_sync(all_lanes, sum, d);
-  const float area = area_of(load_box(&params.node_boxes[0]));
+  const float area = area_of(load_box(&params.node_boxes[0]), params.until_best);
   if (lane_number() == 0 && area > 0) atomicAdd(&params.counters->area, sum / area);
 }
 

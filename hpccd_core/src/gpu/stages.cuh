@@ -27,6 +27,10 @@ struct Stages {
   void mark(const char* name) const { timer.mark(name, stream); }
 };
 
+// What the hints say of the best time. Defined for float and double.
+template <class T>
+void launch_hints(Query query, const LaunchParams<T>& params, const Stages& stages);
+
 // From pairs of leaves to survivors of the first filter, and the tests that know a distance. Defined for float and
 // double.
 template <class T>

@@ -70,6 +70,11 @@ void TestLists::launch(Query query, From from, LaunchParams<T>& params, int mult
     check_launch("end_segment_kernel");
   }
   if (of_snapshot(query)) return;
+  if (params.time_only || params.until_best) {
+    soonest_kernel<<<static_cast<unsigned>(multiprocessors), 256, 0, stream>>>(params);
+    check_launch("soonest_kernel");
+    timer.mark("earliest", stream);
+  }
   const auto fallback = query == Query::separations ? fallback_kernel<true, T> : fallback_kernel<false, T>;
   fallback<<<static_cast<unsigned>(2 * multiprocessors), 32, 0, stream>>>(params);
   check_launch("fallback_kernel");

@@ -4,7 +4,7 @@
 // overlap is reached whatever the way down.
 #pragma once
 
-#include "gpu/launch_params.cuh"
+#include "gpu/best_time.cuh"
 
 namespace hpccd::gpu {
 
@@ -26,7 +26,7 @@ __global__ __launch_bounds__(32 * traverse_warps) void traverse_kernel(LaunchPar
   __shared__ u32 founds[traverse_warps][traverse_found];
   const u32 lane = lane_number(), warp = threadIdx.x / 32, below = (1u << lane) - 1;
   const u32 leaf = blockIdx.x * traverse_warps + warp;
-  if (leaf >= params.n_leaves) return;
+  if (leaf >= params.n_leaves || over(params)) return;
   u32* stack = stacks[warp];
   u32* found = founds[warp];
   u32 n_stack = 0, n_found = 0;

@@ -125,7 +125,8 @@ class CudaTestDevice final : public TestDevice {
     }
     params.given_t0 = reinterpret_cast<const T*>(given_[0].data());
     params.given_t1 = reinterpret_cast<const T*>(given_[1].data());
-    motion_.launch(scene_.query_now(), params, multiprocessors_, upload_);
+    motion_.begin(params, multiprocessors_, upload_);
+    motion_.launch(scene_.query_now(), params, upload_);
     check(cudaEventRecord(ready_, upload_), "cudaEventRecord");
   }
 

@@ -11,6 +11,7 @@
 #include "elementary/batch.h"
 #include "elementary/fallback.h"
 #include "elementary/intersection_batch.h"
+#include "elementary/policy.h"
 #include "traverse/drift.h"
 #include "traverse/leaf_edge_faces.h"
 #include "traverse/leaf_pairs.h"
@@ -50,10 +51,10 @@ struct Search {
   // In coordinates of the boxes: twice the longest way of a vertex along an axis, and how much of it boxes at the start
   // may grow by without reaching their neighbours' neighbours.
   float two_ways = std::numeric_limits<float>::infinity(), most_reach = 0;
-  // Pairs that touch later do not matter; 1 or more: all do. Times that are reported as equal may be apart by 2e-12.
+  // Pairs that touch later do not matter; 1 or more: all do.
   float until() const {
     const double best = earliest.load(std::memory_order_relaxed);
-    return prunes && best < 1 ? static_cast<float>(best + 2e-12) * (1 + 2e-7f) : 2;
+    return prunes && best < 1 ? static_cast<float>(best + same_time) * (1 + 2e-7f) : 2;
   }
   PartOfMotion part() const {
     if (!prunes || !(earliest.load(std::memory_order_relaxed) < 1)) return {2, -1};
