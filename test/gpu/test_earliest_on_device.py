@@ -119,3 +119,83 @@ def test_an_early_contact_leaves_out_most_of_the_search():
         assert 0 < detector.collision_free_step(t0 + shift, t1 + shift) < 0.05
         candidates.append(detector.stats["vf_candidates"] + detector.stats["ee_candidates"])
     assert max(candidates[1:]) < candidates[0] / 4
+
+
+def test_what_is_told_of_a_call_that_lists_for_those_to_come():
+    scene, t0, t1 = scenes.join([scenes.crumpled(np.random.default_rng(4), 16)])
+    t1 = t0 + 1e-5 * (t1 - t0)
+    there = hc.Detector(scene, backend="gpu")
+    told = []
+    for _ in range(3):
+        assert there.collision_free_step(t0, t1) == hc.Detector(scene, backend="cpu").collision_free_step(t0, t1)
+        told.append(there.stats)
+    assert told[0]["near_pairs"] == 0 and told[1]["near_pairs"] > 0 and told[2]["near_pairs"] == told[1]["near_pairs"]
+    assert 0 < told[1]["leaf_pairs"] <= told[0]["leaf_pairs"]  # of the search, not of the listing
+    assert told[2]["leaf_pairs"] == 0  # the list alone
+
+
+def test_hints_of_a_frame_before_one_whose_lists_overflow():
+    """A few contacts, then hundreds of thousands: lists that were long enough are not, and the frame runs again."""
+    n = 120
+    faces, flat = scenes.sheet(n), scenes.flat(n)
+    rng = np.random.default_rng(8)
+    scene, t0, t1 = scenes.join([(faces, flat, flat), (faces, flat, flat)])
+    here, there = (hc.Detector(scene, backend=b) for b in ("cpu", "gpu"))
+    first = hc.Detector(scene, backend="gpu", report="first")
+    for height, spread in ((1.0, 0.0), (1.0, 2.0), (1.0, 0.0), (0.01, 3.0)):
+        start = t0 + [0.3, 0.2, 0.0] * (np.arange(len(t0)) >= n * n)[:, None]
+        start[n * n :, 2] = height + 1e-3 * np.arange(n * n)
+        end = start + spread * rng.normal(size=t0.shape)
+        end[n * n :, 2] -= 1.5
+        expected = here.collision_free_step(start, end)
+        assert there.collision_free_step(start, end) == expected < 1
+        assert 0 <= first.detect(start, end).first_toc - expected <= 1e-9
+    assert there.stats["gpu_fallbacks"] == first.stats["gpu_fallbacks"] == 0
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_one_detector_asked_everything_in_any_order(seed):
+    """Hints, lists, separations and trees of one query are no other's: not after contacts at the start, either."""
+    rng = np.random.default_rng(seed)
+    parts = [scenes.crumpled(rng, 12), scenes.lattice(rng, 6), scenes.soup(rng, 20)]
+    scene, t0, t1 = scenes.join(parts)
+    far_apart = t0 + 1000.0 * np.repeat(np.arange(3), [len(t) for _, t, _ in parts])[:, None]
+    here, there = ([hc.Detector(scene, backend=b, report=r) for r in ("all", "first")] for b in ("cpu", "gpu"))
+    starts = [t0, t0 + 0.1 * rng.normal(size=t0.shape), far_apart, far_apart + 0.1 * rng.normal(size=t0.shape)]
+    motion = t1 - t0
+    for call in range(120):
+        start = starts[rng.integers(len(starts))]
+        end = start + 10.0 ** rng.uniform(-6, 0) * motion if call % 7 else start
+        dtype = (np.float32, np.float64)[rng.integers(2)]
+        given = [start.astype(dtype), end.astype(dtype)]
+        asked = [on_device(x) for x in given] if rng.random() < 0.3 else given
+        which, question = rng.integers(2), rng.integers(6)
+        if question == 0:
+            separation = float(rng.choice([0.0, 0.01, 0.3]))
+            for detector in (*here, *there):
+                detector.set_separation(0, 1, separation)
+        elif question == 1:
+            distance = float(rng.choice([1e-3, 0.5, 3.0]))
+            assert there[which].proximity(asked[0], distance).hash == here[0].proximity(given[0], distance).hash
+        elif question == 2:
+            assert there[which].intersections(asked[0]).hash == here[0].intersections(given[0]).hash
+        elif question == 3:
+            assert there[which].detect(*asked).hash == here[which].detect(*given).hash, call
+        else:
+            assert there[which].collision_free_step(*asked) == here[which].collision_free_step(*given), call
+    assert all(detector.stats["gpu_fallbacks"] == 0 for detector in there)
+
+
+def test_a_pair_whose_tier_promises_times_only_with_a_separation():
+    """Where the separation is switched off, nothing may be left out; on again, it may."""
+    rng = np.random.default_rng(3)
+    scene, t0, t1 = scenes.join(
+        [scenes.crumpled(rng, 12), scenes.lattice(rng, 6)], accuracy=[("mesh0", "mesh1", "balanced")]
+    )
+    here, there = (hc.Detector(scene, backend=b) for b in ("cpu", "gpu"))
+    for separation in (0.0, 0.05, 0.05, 0.0, 0.0, 0.05):
+        for detector in (here, there):
+            detector.set_separation(0, 1, separation)
+        for part in (1.0, 1e-4, 1e-4, 1e-4):
+            end = t0 + part * (t1 - t0)
+            assert there.collision_free_step(t0, end) == here.collision_free_step(t0, end), (separation, part)

@@ -53,7 +53,7 @@ bool GpuBackend::list_near_pairs(Positions t0, double time, const Travel& travel
   if (pipeline_->gave_up_listing())
     near_.gave_up();
   else
-    near_.set(*radius);
+    near_.set(*radius, true);
   return !pipeline_->gave_up_listing();
 }
 

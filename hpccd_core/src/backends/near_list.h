@@ -31,8 +31,8 @@ struct Travel {
 // Up to when a list answers, and whether the next is worth its price.
 class NearRadius {
  public:
-  // Of all pairs within listed_distance() of each other.
-  void set(double radius) { radius_ = radius, answers_ = 0, failures_ = 0; }
+  // Of all pairs within listed_distance() of each other. for_later: the motion that it was made for has its answer.
+  void set(double radius, bool for_later = false) { radius_ = radius, answers_ = for_later, failures_ = 0; }
   void forget() { radius_ = -1; }
   bool known() const { return radius_ > 0; }
   // Pairs that are not listed touch only where they go so far apart.

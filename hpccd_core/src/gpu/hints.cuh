@@ -59,8 +59,8 @@ __global__ __launch_bounds__(32) void hints_kernel(const __grid_constant__ Launc
   });
 }
 
-// Which pairs of what was found are the next hints: some of the first ones, with others that touch soon after, as a
-// motion may take the first ones apart.
+// Which pairs of what was found are the next hints: as many as there is room for of those that touch first and soon
+// after, as a motion may take the first ones apart.
 template <class T>
 __global__ void choose_hints_kernel(LaunchParams<T> params) {
   const u64 n = length(params.counters->found_all, params.found_capacity),
@@ -91,8 +91,8 @@ class Hints {
   // count. Does not wait for the stream.
   template <class T>
   void choose(const LaunchParams<T>& params, double proven, u64 n_found, cudaStream_t stream) {
-    decided_ = proven > params.best + (params.best > 0 ? soon : 0);
     if (n_found == 0) return;  // where all was over before it was searched, too: they have shown to be good ones
+    decided_ = proven > params.best + (params.best > 0 ? soon : 0);
     forget(stream);
     choose_hints_kernel<<<std::min(blocks_for(n_found, 256), 256u), 256, 0, stream>>>(params);
     check_launch("choose_hints_kernel");

@@ -73,6 +73,7 @@ class DevicePipeline : public Pipeline {
   }
   EarliestTime earliest() const override;
   bool list_near(Positions vertices, double distance, std::size_t most, ThreadPool& pool) override {
+    if (for_earliest()) told_ = *host_counters_.data();
     begin();
     goal_ = Goal::near_list;
     most_near_ = most, gave_up_listing_ = false;
@@ -138,6 +139,7 @@ class DevicePipeline : public Pipeline {
   DeviceContacts contacts_;
   DeviceBuffer<Counters> counters_;
   PinnedBuffer<Counters> host_counters_;
+  Counters told_{};  // of the frame before the one that lists for those to come: what stats() tells
 
   // What a frame is for: contacts as the caller sees them, or less.
   enum class Goal : unsigned char { results, earliest, earliest_of_near, near_list };
@@ -157,8 +159,7 @@ class DevicePipeline : public Pipeline {
 
 template <class T>
 bool DevicePipeline::run_frame(Positions t0, Positions t1, double distance, ThreadPool& pool) {
-  undecided_.clear();
-  passes_ = 0;
+  if (goal_ != Goal::near_list) undecided_.clear(), passes_ = 0;
   timer_.begin(stream_);
   if (tree_.empty()) {
     *host_counters_.data() = {};
@@ -184,7 +185,7 @@ bool DevicePipeline::run_frame(Positions t0, Positions t1, double distance, Thre
   const Counters& c = *host_counters_.data();
   if (goal_ == Goal::earliest_of_near) lists_.make_room(near_.most());
   for (bool again = true; again;) {
-    ++passes_;
+    if (goal_ != Goal::near_list) ++passes_;
     launch(params);
     copy_counters();
     check(cudaEventRecord(counted_, stream_), "cudaEventRecord");
@@ -195,11 +196,12 @@ bool DevicePipeline::run_frame(Positions t0, Positions t1, double distance, Thre
     if ((gave_up_listing_ = lists_too_many())) return true;
     again = grow_overflowed();
   }
-  undecided_.reserve(c.to_host);
   // Before the results: their kernels bring the counters to the host once more.
   const u64 n_to_host = exact_last_time_ = c.to_host;
   if (goal_ == Goal::results) launch_results(params);
   if (goal_ == Goal::near_list) near_.collect(params, c, stream_);
+  if (goal_ == Goal::near_list) return true;
+  undecided_.reserve(n_to_host);
   for (u64 i = 0; i < n_to_host; ++i) undecided_.push_back(scene_.keys().pair_of(lists_.to_host()[i]));
   return true;
 }
@@ -314,7 +316,7 @@ bool DevicePipeline::grow_overflowed() {
 }
 
 std::map<std::string, std::uint64_t> DevicePipeline::stats() const {
-  const Counters& c = *host_counters_.data();
+  const Counters& c = goal_ == Goal::near_list ? told_ : *host_counters_.data();
   std::map<std::string, std::uint64_t> s;
   const bool edges_and_faces = query_ == Query::intersections;  // in the place of the first kind
   const char* kinds[2] = {edges_and_faces ? "ef" : "vf", "ee"};
@@ -338,7 +340,7 @@ std::map<std::string, std::uint64_t> DevicePipeline::stats() const {
   s["gpu_segments"] = lists_.n_segments();
   s["gpu_bytes"] = scene_.bytes() + tree_.bytes() + positions_.bytes() + motion_.bytes() + leaf_pairs_.bytes() +
                    lists_.bytes() + contacts_.bytes() + near_.bytes() + hints_.bytes();
-  if (for_earliest()) s["near_pairs"] = near_.size();
+  if (for_earliest() || goal_ == Goal::near_list) s["near_pairs"] = near_.size();
   return s;
 }
 

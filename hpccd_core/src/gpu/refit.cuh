@@ -91,6 +91,7 @@ __device__ inline float area_of(const DeviceBox& b, bool start_alone) {
 // of the tree.
 template <class T>
 __global__ void area_kernel(LaunchParams<T> params) {
+  if (over(params)) return;  // nothing was refitted: none is measured
   double sum = 0;
   for (u32 i = blockIdx.x * blockDim.x + threadIdx.x; i < params.n_nodes; i += gridDim.x * blockDim.x)
     sum += area_of(load_box(&params.node_boxes[i]), params.until_best);
