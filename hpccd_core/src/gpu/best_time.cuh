@@ -30,8 +30,10 @@ __device__ double until(const LaunchParams<T>& params) {
   return fmin((best_time(params) + same_time) * (1 + 1e-12), 1.0);
 }
 
-// Whether a contact is kept: it may be among the earliest, or soon after them and a good hint for the next frame.
+// What touches so soon after the earliest is a good hint for the next frame.
 inline constexpr double soon = 1.0 / 64;
+
+// Whether a contact is kept: it may be among the earliest, or is such a hint.
 template <class T>
 __device__ bool counts_at(const LaunchParams<T>& params, double time) {
   return !params.until_best || time <= best_time(params) + soon;

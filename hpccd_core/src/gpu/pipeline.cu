@@ -19,7 +19,7 @@ namespace {
 
 constexpr double no_time = std::numeric_limits<double>::infinity();
 // As the counters have it (counters.cuh).
-double time_of(u64 soonest) { return soonest ? std::bit_cast<double>(~soonest) : no_time; }
+double as_time(u64 soonest) { return soonest ? std::bit_cast<double>(~soonest) : no_time; }
 
 class DevicePipeline : public Pipeline {
  public:
@@ -257,7 +257,7 @@ void DevicePipeline::launch_area(const LaunchParams<T>& params) {
 
 EarliestTime DevicePipeline::earliest() const {
   const Counters& c = *host_counters_.data();
-  return {time_of(c.soonest), near_.has_snapshot() ? std::bit_cast<double>(c.away) : no_time,
+  return {as_time(c.soonest), near_.has_snapshot() ? std::bit_cast<double>(c.away) : no_time,
           std::bit_cast<double>(c.way)};
 }
 
@@ -265,7 +265,7 @@ void DevicePipeline::choose_hints(double earliest) {
   const Counters& c = *host_counters_.data();
   with_last_frame([&](auto params) {
     params.until_best = true, params.best = earliest;
-    hints_.choose(params, time_of(c.soonest_proven), c.found_all, stream_);
+    hints_.choose(params, as_time(c.soonest_proven), c.found_all, stream_);
   });
 }
 
