@@ -17,7 +17,7 @@ void MovingTree::bound(Positions vertices) {
 
 void MovingTree::fit(Profiler& profiler) {
   if (!tree_.nodes.empty()) {
-    refit(tree_, motion_.boxes, followed_ ? motion_.resting : std::vector<char>(), pool_);
+    refit(tree_, motion_, followed_ ? motion_.resting : std::vector<char>(), pool_);
     profiler.mark("refit");
     fits_ = true;
     if (!worn_out(tree_.area, tree_.area_when_built)) return;
@@ -28,13 +28,13 @@ void MovingTree::fit(Profiler& profiler) {
 
 void MovingTree::fit_leaves(std::span<const std::uint32_t> leaves) {
   fits_ = false;
-  refit_leaves(tree_, motion_.boxes, leaves, pool_);
+  refit_leaves(tree_, motion_, leaves, pool_);
 }
 
 void MovingTree::build_anew() {
   fits_ = false;  // should this be cancelled
   ++builds_;
-  build(tree_, scene_, features_, motion_.boxes, pool_);
+  build(tree_, scene_, features_, motion_, pool_);
   fits_ = true;
 }
 

@@ -170,20 +170,20 @@ class Builder {
     const auto make_room = [this](auto& slots, std::size_t n) { resize(slots, n, cancellation_); };
     make_room(tree_.leaves, n_leaves);
     make_room(tree_.leaf_nodes, n_leaves);
+    make_room(tree_.corners_of, n_leaves);
+    parallel_for(pool_, n_leaves, 64, [&](std::size_t begin, std::size_t end, int) {
+      for (std::size_t i = begin; i < end; ++i) tree_.leaves[i] = size_of_leaf(leaf_ranges_[i]);
+    });
     LeafRange at{};
     in_pieces(cancellation_, n_leaves, some, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t i = begin; i < end; ++i) tree_.leaves[i] = at = leaf_behind(at, leaf_ranges_[i]);
+      for (std::size_t i = begin; i < end; ++i) tree_.leaves[i] = at = leaf_behind(at, tree_.leaves[i]);
     });
     // Room behind the last slot, so that a full vector can be loaded anywhere.
-    const std::size_t n_faces = at.end_face + Tree::load_width, n_edges = at.end_edge + Tree::load_width,
-                      n_vertices = at.end_vertex + Tree::load_width;
-    make_room(tree_.face_of_slot, n_faces);
-    make_room(tree_.edge_of_slot, n_edges);
-    make_room(tree_.vertex_of_slot, n_vertices);
-    for (auto& corner : tree_.face_corners) make_room(corner, n_faces);
-    for (auto& end : tree_.edge_ends) make_room(end, n_edges);
-    tree_.n_box_groups = n_leaves ? at.end_group() : 0;
-    tree_.box_groups = std::make_unique_for_overwrite<BoxGroup[]>(tree_.n_box_groups);
+    make_room(tree_.face_of_slot, at.end_face + Tree::load_width);
+    make_room(tree_.edge_of_slot, at.end_edge + Tree::load_width);
+    make_room(tree_.vertex_of_slot, at.end_vertex + Tree::load_width);
+    make_room(tree_.corners, at.end_corner + 2 * Tree::load_width);
+    tree_.n_groups = n_leaves ? at.first_group + at.n_groups() : 0;
     parallel_for(pool_, n_leaves, 64, [&](std::size_t begin, std::size_t end, int) {
       for (std::size_t i = begin; i < end; ++i) fill_leaf(i);
     });
@@ -221,17 +221,54 @@ class Builder {
     }
   }
 
-  // The slots of a leaf that follows another.
-  LeafRange leaf_behind(const LeafRange& before, const Range& r) const {
-    LeafRange leaf{before.end_face,   before.end_face,   before.end_edge,   before.end_edge,
-                   before.end_vertex, before.end_vertex, before.end_group()};
+  // The distinct vertices of a leaf, those that it represents first.
+  class Corners {
+   public:
+    std::uint8_t add(std::uint32_t vertex) {
+      const auto at = static_cast<std::uint8_t>(std::find(list_, list_ + n_, vertex) - list_);
+      if (at == n_) list_[n_++] = vertex;
+      return at;
+    }
+    std::uint32_t size() const { return n_; }
+    const std::uint32_t* begin() const { return list_; }
+
+   private:
+    std::uint8_t n_ = 0;
+    std::uint32_t list_[3 * Tree::leaf_size];
+  };
+
+  Corners corners_of(const Range& r) const {
+    Corners corners;
+    for (std::uint32_t i = r.begin; i < r.end; ++i) {
+      const std::uint32_t c = primitives_[i].number;
+      for (auto v = features_.first_vertex[c]; v < features_.first_vertex[c + 1]; ++v)
+        corners.add(features_.owned_vertices[v]);
+    }
+    for (std::uint32_t i = r.begin; i < r.end; ++i)
+      if (const std::uint32_t c = primitives_[i].number; c < features_.n_faces())
+        for (const std::uint32_t v : features_.faces[c]) corners.add(v);
+    return corners;
+  }
+
+  // Its numbers of slots, as if it were the first.
+  LeafRange size_of_leaf(const Range& r) const {
+    LeafRange leaf{};
     for (std::uint32_t i = r.begin; i < r.end; ++i) {
       const std::uint32_t c = primitives_[i].number;
       leaf.end_face += c < features_.n_faces();
       leaf.end_edge += features_.first_edge[c + 1] - features_.first_edge[c];
       leaf.end_vertex += features_.first_vertex[c + 1] - features_.first_vertex[c];
     }
+    leaf.end_corner = corners_of(r).size();
     return leaf;
+  }
+
+  static LeafRange leaf_behind(const LeafRange& before, const LeafRange& size) {
+    return {before.end_face,     before.end_face + size.end_face,
+            before.end_edge,     before.end_edge + size.end_edge,
+            before.end_vertex,   before.end_vertex + size.end_vertex,
+            before.end_corner,   before.end_corner + size.end_corner,
+            before.first_group + before.n_groups()};
   }
 
   void fill_leaf(std::size_t i) {
@@ -243,18 +280,21 @@ class Builder {
     const LeafRange& leaf = tree_.leaves[i];
     std::uint32_t face = leaf.first_face, edge = leaf.first_edge, vertex = leaf.first_vertex;
     node.only_points = leaf.n_faces() == 0;
-    std::fill(&tree_.box_groups[leaf.first_group], &tree_.box_groups[leaf.end_group()], BoxGroup{});
     std::sort(&primitives_[r.begin], &primitives_[r.end],
               [](const Centroid& a, const Centroid& b) { return a.number < b.number; });
+    Corners corners = corners_of(r);
+    std::copy_n(corners.begin(), corners.size(), &tree_.corners[leaf.first_corner]);
+    CornersOf& corners_of = tree_.corners_of[i];
     for (std::uint32_t k = r.begin; k < r.end; ++k) {
       const std::uint32_t c = primitives_[k].number;
       if (c < features_.n_faces()) {
-        for (int j = 0; j < 3; ++j) tree_.face_corners[j][face] = features_.faces[c][j];
+        for (int j = 0; j < 3; ++j) corners_of.face[j][face - leaf.first_face] = corners.add(features_.faces[c][j]);
         tree_.face_of_slot[face++] = c;
       }
       for (auto e = features_.first_edge[c]; e < features_.first_edge[c + 1]; ++e) {
         const std::uint32_t number = features_.owned_edges[e];
-        for (int j = 0; j < 2; ++j) tree_.edge_ends[j][edge] = features_.edges[number][j];
+        for (int j = 0; j < 2; ++j)
+          corners_of.edge[j][edge - leaf.first_edge] = corners.add(features_.edges[number][j]);
         tree_.edge_of_slot[edge++] = number;
       }
       for (auto v = features_.first_vertex[c]; v < features_.first_vertex[c + 1]; ++v)
@@ -277,11 +317,10 @@ class Builder {
 
 }  // namespace
 
-void build(Tree& tree, const Scene& scene, const Features& features, const std::vector<MotionBox>& vertex_boxes,
-           ThreadPool& pool) {
+void build(Tree& tree, const Scene& scene, const Features& features, const MotionBounds& motion, ThreadPool& pool) {
   tree = {};
-  Builder(tree, scene, features, vertex_boxes, pool).run();
-  refit(tree, vertex_boxes, {}, pool);
+  Builder(tree, scene, features, motion.boxes, pool).run();
+  refit(tree, motion, {}, pool);
   tree.area_when_built = tree.area;
 }
 

@@ -160,6 +160,7 @@ void MotionBounds::update(const Real* t0, const Real* t1, std::size_t n, std::sp
     pieces = pieces_of(parts_, moves);
   }
   margins_ = std::move(margins);
+  grown = std::ranges::any_of(margins_, [](double margin) { return margin > 0; });
   was_snapshot_ = snapshot_;
   resize(vertices, n, pool.cancellation());
   resize(boxes, n, pool.cancellation());

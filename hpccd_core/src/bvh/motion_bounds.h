@@ -30,6 +30,7 @@ struct Extent {
 struct MotionBounds {
   std::vector<VertexMotion> vertices;
   std::vector<MotionBox> boxes;
+  bool grown = false;  // some of them hold more than their vertex: half a separation around it
   std::vector<VertexKdop> kdops;
   CoordinateMap map;
   // What sums of two coordinates may lose, in those of the scene: 2.2e-16 of the largest for each of two

@@ -31,54 +31,52 @@ Bounds join(const Bounds& a, const Bounds& b) {
   return {{join_part<0>(a.part[0], b.part[0]), join_part<1>(a.part[1], b.part[1]), join_part<2>(a.part[2], b.part[2])}};
 }
 
-// Boxes of n features in a leaf's groups, four at a time, from a lane on that is a multiple of four; the last ones are
-// filled up with copies.
-template <class BoxOf>
-void fill(BoxGroup* groups, std::uint32_t lane, std::uint32_t n, BoxOf&& box_of) {
-  for (std::uint32_t i = 0; i < n; i += 4, lane += 4) {
-    Bounds b[4];
-    for (std::uint32_t j = 0; j < 4; ++j) b[j] = i + j < n ? box_of(i + j) : b[j - 1];
-    auto& rows = groups[lane / BoxGroup::width].rows;
-    for (std::uint32_t part = 0; part < 3; ++part) {
-      const Floats4 ab_low = __builtin_shufflevector(b[0].part[part], b[1].part[part], 0, 4, 1, 5),
-                    ab_high = __builtin_shufflevector(b[0].part[part], b[1].part[part], 2, 6, 3, 7),
-                    cd_low = __builtin_shufflevector(b[2].part[part], b[3].part[part], 0, 4, 1, 5),
-                    cd_high = __builtin_shufflevector(b[2].part[part], b[3].part[part], 2, 6, 3, 7);
-      const Floats4 row[4] = {
-          __builtin_shufflevector(ab_low, cd_low, 0, 1, 4, 5), __builtin_shufflevector(ab_low, cd_low, 2, 3, 6, 7),
-          __builtin_shufflevector(ab_high, cd_high, 0, 1, 4, 5), __builtin_shufflevector(ab_high, cd_high, 2, 3, 6, 7)};
-      for (std::uint32_t k = 0; k < 4; ++k)
-        std::memcpy(&rows[4 * part + k][lane % BoxGroup::width], &row[k], sizeof row[k]);
-    }
-  }
+struct Columns {
+  Floats4 row[4];
+};
+Columns transposed(const Floats4 (&r)[4]) {
+  const Floats4 ab_low = __builtin_shufflevector(r[0], r[1], 0, 4, 1, 5),
+                ab_high = __builtin_shufflevector(r[0], r[1], 2, 6, 3, 7),
+                cd_low = __builtin_shufflevector(r[2], r[3], 0, 4, 1, 5),
+                cd_high = __builtin_shufflevector(r[2], r[3], 2, 6, 3, 7);
+  return {{__builtin_shufflevector(ab_low, cd_low, 0, 1, 4, 5), __builtin_shufflevector(ab_low, cd_low, 2, 3, 6, 7),
+           __builtin_shufflevector(ab_high, cd_high, 0, 1, 4, 5), __builtin_shufflevector(ab_high, cd_high, 2, 3, 6, 7)}};
 }
 
-// Where the vertices of a leaf lie the processor cannot guess, and other cores have written there last: a tenth of the
-// refit of 18 K triangles on four cores, a fiftieth on one. To fetch the groups of boxes ahead as well brought nothing.
+// Three coordinates of four corners, from where they begin in a box on; `skip`: after so many others.
+template <std::uint32_t skip>
+void fill_rows(const MotionBox* const (&corner)[4], std::uint32_t from, CornerRow* rows, std::uint32_t lane) {
+  Floats4 r[4];
+  for (int j = 0; j < 4; ++j) r[j] = load4(corner[j]->t0.low + from - skip);
+  const Columns c = transposed(r);
+  for (std::uint32_t k = 0; k < 3; ++k) std::memcpy(&rows[k].lane[lane], &c.row[k + skip], sizeof c.row[k]);
+}
+
+// Where the corners of a leaf lie the processor cannot guess, and other cores have written there last: a tenth of the
+// refit of 18 K triangles on four cores, a fiftieth on one.
 void fetch_ahead(const Tree& tree, const LeafRange& leaf, const std::vector<MotionBox>& vertex_boxes) {
-  for (std::uint32_t s = leaf.first_face; s < leaf.end_face; ++s)
-    for (const auto& corner : tree.face_corners) __builtin_prefetch(&vertex_boxes[corner[s]]);
+  for (std::uint32_t c = leaf.first_corner; c < leaf.end_corner; ++c)
+    __builtin_prefetch(&vertex_boxes[tree.corners[c]]);
 }
 
+// Rows are filled four corners at a time, the last ones up with copies.
 MotionBox leaf_bounds(const Tree& tree, const LeafRange& leaf, const std::vector<MotionBox>& vertex_boxes) {
+  constexpr std::uint32_t t1 = n_bounds / 2, high = 3, n = Tree::coordinates;
   Bounds whole = load(MotionBox());
-  const auto vertex_box = [&](std::uint32_t v) { return load(vertex_boxes[v]); };
-  fill(&tree.box_groups[leaf.surface_group()], 0, leaf.n_faces(), [&](std::uint32_t i) {
-    const std::uint32_t s = leaf.first_face + i;
-    const Bounds b = join(join(vertex_box(tree.face_corners[0][s]), vertex_box(tree.face_corners[1][s])),
-                          vertex_box(tree.face_corners[2][s]));
-    whole = join(whole, b);
-    return b;
-  });
-  fill(&tree.box_groups[leaf.first_group], 0, leaf.n_edges(), [&](std::uint32_t i) {
-    const std::uint32_t s = leaf.first_edge + i;
-    return join(vertex_box(tree.edge_ends[0][s]), vertex_box(tree.edge_ends[1][s]));  // inside its triangle's box
-  });
-  fill(&tree.box_groups[leaf.surface_group()], leaf.first_vertex_lane(), leaf.n_vertices(), [&](std::uint32_t i) {
-    const Bounds b = vertex_box(tree.vertex_of_slot[leaf.first_vertex + i]);
-    whole = join(whole, b);  // a lone vertex has no triangle
-    return b;
-  });
+  CornerRow* rows = tree.rows_of(leaf);
+  for (std::uint32_t c = leaf.first_corner, lane = 0; c < leaf.end_corner; c += 4, lane += 4) {
+    if (lane == CornerRow::width) lane = 0, rows += tree.rows_per_group();
+    const MotionBox* corner[4];
+    for (std::uint32_t j = 0; j < 4; ++j) {
+      corner[j] = c + j < leaf.end_corner ? &vertex_boxes[tree.corners[c + j]] : corner[j - 1];
+      whole = join(whole, load(*corner[j]));
+    }
+    fill_rows<0>(corner, 0, rows, lane);
+    fill_rows<0>(corner, t1, rows + 3, lane);
+    if (!tree.grown) continue;
+    fill_rows<0>(corner, high, rows + n, lane);
+    fill_rows<1>(corner, t1 + high, rows + n + 3, lane);  // not beyond the end of a box
+  }
   MotionBox box;
   std::memcpy(static_cast<void*>(&box), &whole, sizeof box);
   return box;
@@ -120,11 +118,17 @@ void refit_above(Tree& tree, std::uint32_t number) {
 
 }  // namespace
 
-void refit(Tree& tree, const std::vector<MotionBox>& vertex_boxes, const std::vector<char>& resting, ThreadPool& pool) {
+void refit(Tree& tree, const MotionBounds& motion, const std::vector<char>& resting, ThreadPool& pool) {
+  const std::vector<MotionBox>& vertex_boxes = motion.boxes;
+  const bool same_rows = tree.rows && tree.grown == motion.grown;
+  if (!same_rows) {
+    tree.grown = motion.grown;
+    tree.rows = std::make_unique_for_overwrite<CornerRow[]>(tree.n_groups * tree.rows_per_group());
+  }
   parallel_for(pool, tree.front.size(), 1, [&](std::size_t begin, std::size_t end, int) {
     for (std::size_t i = begin; i < end; ++i) {
       Tree::Subtree& subtree = tree.front[i];
-      const bool rests = !resting.empty() && resting[tree.nodes[subtree.root].mesh];
+      const bool rests = same_rows && !resting.empty() && resting[tree.nodes[subtree.root].mesh];
       if (!rests) subtree.area = refit_subtree(tree, subtree.root, vertex_boxes);
       refit_above(tree, subtree.above);
     }
@@ -136,12 +140,11 @@ void refit(Tree& tree, const std::vector<MotionBox>& vertex_boxes, const std::ve
   tree.area = root > 0 ? area / root : 0;
 }
 
-void refit_leaves(Tree& tree, const std::vector<MotionBox>& vertex_boxes, std::span<const std::uint32_t> leaves,
-                  ThreadPool& pool) {
+void refit_leaves(Tree& tree, const MotionBounds& motion, std::span<const std::uint32_t> leaves, ThreadPool& pool) {
   constexpr std::size_t grain = 64;
   parallel_for(pool, leaves.size(), grain, [&](std::size_t begin, std::size_t end, int) {
     for (std::size_t i = begin; i < end; ++i)
-      tree.nodes[tree.leaf_nodes[leaves[i]]].box = leaf_bounds(tree, tree.leaves[leaves[i]], vertex_boxes);
+      tree.nodes[tree.leaf_nodes[leaves[i]]].box = leaf_bounds(tree, tree.leaves[leaves[i]], motion.boxes);
   });
 }
 
@@ -149,8 +152,9 @@ std::size_t Tree::bytes() const {
   const std::size_t faces = face_of_slot.capacity(), edges = edge_of_slot.capacity(),
                     vertices = vertex_of_slot.capacity();
   return nodes.capacity() * sizeof(Node) + front.capacity() * sizeof(Subtree) +
-         above_front.capacity() * sizeof(AboveFront) + leaves.capacity() * (sizeof(LeafRange) + 4) + faces * 16 +
-         edges * 12 + vertices * 4 + n_box_groups * sizeof(BoxGroup);
+         above_front.capacity() * sizeof(AboveFront) + leaves.capacity() * (sizeof(LeafRange) + 4) +
+         corners_of.capacity() * sizeof(CornersOf) + (faces + edges + vertices + corners.capacity()) * 4 +
+         n_groups * rows_per_group() * sizeof(CornerRow);
 }
 
 }  // namespace hpccd

@@ -11,6 +11,7 @@
 #include "base/hd.h"
 #include "base/parallel.h"
 #include "base/simd/four.h"
+#include "bvh/motion_bounds.h"
 #include "bvh/motion_box.h"
 #include "scene/features.h"
 
@@ -79,35 +80,41 @@ inline bool Node::near_in_snapshot(const Node& other, float reach) const {
   return (bits4(apart) & 7) == 0;
 }
 
-// Boxes of up to 16 features of a leaf, a row for each of the twelve bounds (bound_number). Every row is a cache line,
-// and the rows of a group lie together.
-struct alignas(64) BoxGroup {
+// The corners of a leaf are the distinct vertices of its features: nine or ten where eight triangles hang together. All
+// that is kept of a leaf's geometry is where they are, a row for each coordinate, sixteen in the lanes of a row; boxes of
+// features are made from them where two leaves overlap (leaf_boxes.inl). That is a quarter of the memory that boxes of
+// all features take, and a third of the time to refit them.
+struct alignas(64) CornerRow {
   static constexpr std::uint32_t width = 16;
-  float rows[n_bounds][width];
+  float lane[width];
 };
 
 struct LeafRange {
   std::uint32_t first_face, end_face, first_edge, end_edge, first_vertex, end_vertex;  // slots
-  std::uint32_t first_group = 0;
+  std::uint32_t first_corner = 0, end_corner = 0;
+  std::uint32_t first_group = 0;  // of rows: one for every sixteen corners
 
   HPCCD_HD std::uint32_t n_faces() const { return end_face - first_face; }
   HPCCD_HD std::uint32_t n_edges() const { return end_edge - first_edge; }
   HPCCD_HD std::uint32_t n_vertices() const { return end_vertex - first_vertex; }
-  // Groups of boxes: first those of the edges, then those of the faces and, from a lane on that is a multiple of four,
-  // the vertices.
-  HPCCD_HD std::uint32_t first_vertex_lane() const { return (n_faces() + 3) / 4 * 4; }
-  HPCCD_HD std::uint32_t surface_group() const { return first_group + groups_for(n_edges()); }
-  HPCCD_HD std::uint32_t end_group() const { return surface_group() + groups_for(first_vertex_lane() + n_vertices()); }
+  HPCCD_HD std::uint32_t n_corners() const { return end_corner - first_corner; }
+  HPCCD_HD std::uint32_t n_groups() const { return (n_corners() + CornerRow::width - 1) / CornerRow::width; }
+};
 
- private:
-  HPCCD_HD static std::uint32_t groups_for(std::uint32_t n) { return (n + BoxGroup::width - 1) / BoxGroup::width; }
+// Which corners of their leaf its features have, by number within the leaf; zeros behind the last. Its vertices are the
+// first corners themselves.
+struct alignas(64) CornersOf {
+  static constexpr std::uint32_t most_edges = 32, most_faces = 16;  // multiples of CornerRow::width
+  std::uint8_t edge[2][most_edges] = {}, face[3][most_faces] = {};
 };
 
 struct Tree {
-  // Primitives of a leaf. With 8, its faces and vertices mostly fill one group of boxes and its edges another, and each
-  // of at most 24 edges has a lane of a GPU's warp.
+  // Primitives of a leaf. With 8, its corners and its edges mostly fill a row each, and each of at most 24 edges has a
+  // lane of a GPU's warp.
   static constexpr std::uint32_t leaf_size = 8;
-  static constexpr std::uint32_t load_width = BoxGroup::width;  // numbers of features are loaded as many at a time
+  static constexpr std::uint32_t load_width = CornerRow::width;  // numbers of features are loaded as many at a time
+  static_assert(3 * leaf_size <= 2 * CornerRow::width && 3 * leaf_size <= CornersOf::most_edges &&
+                leaf_size <= CornersOf::most_faces);
 
   std::vector<Node> nodes;  // breadth first: children come after their parents
   static constexpr std::uint32_t none = 0xFFFFFFFFu;
@@ -132,9 +139,16 @@ struct Tree {
   std::vector<std::uint32_t> leaf_nodes;
   // Slots: features in the order of the leaves; each array ends with load_width slots of padding.
   std::vector<std::uint32_t> face_of_slot, edge_of_slot, vertex_of_slot;
-  std::vector<std::uint32_t> face_corners[3], edge_ends[2];  // vertex numbers by slot
-  std::unique_ptr<BoxGroup[]> box_groups;
-  std::size_t n_box_groups = 0;
+  std::vector<std::uint32_t> corners;  // vertex numbers, leaf by leaf: first those of its vertices
+  std::vector<CornersOf> corners_of;   // by leaf
+  // Of each group a row for each coordinate at both ends; where boxes of vertices are grown these are the low bounds,
+  // and the high bounds follow.
+  std::unique_ptr<CornerRow[]> rows;
+  std::size_t n_groups = 0;
+  bool grown = false;
+  static constexpr std::uint32_t coordinates = 6;
+  std::uint32_t rows_per_group() const { return grown ? 2 * coordinates : coordinates; }
+  CornerRow* rows_of(const LeafRange& leaf) const { return rows.get() + std::size_t{leaf.first_group} * rows_per_group(); }
   double area = 0;  // sum over nodes, relative to the root's: what traversal pays grows with it
   double area_when_built = 0;
 
@@ -145,16 +159,14 @@ struct Tree {
 // nodes' area, and half as much again costs more than a build. Areas relative to the root's.
 inline bool worn_out(double area, double area_when_built) { return area > 1.5 * area_when_built; }
 
-// A new tree over the current vertex boxes (bounds of the motion of each vertex).
-void build(Tree& tree, const Scene& scene, const Features& features, const std::vector<MotionBox>& vertex_boxes,
-           ThreadPool& pool);
+// A new tree over the current bounds of the motion of each vertex.
+void build(Tree& tree, const Scene& scene, const Features& features, const MotionBounds& motion, ThreadPool& pool);
 
 // The same tree with new bounds, bottom up (Kim et al. 2009, section 6, parallel BVH update). `resting`: by mesh, true
 // where vertex boxes are as they were at the last call; empty: of none.
-void refit(Tree& tree, const std::vector<MotionBox>& vertex_boxes, const std::vector<char>& resting, ThreadPool& pool);
+void refit(Tree& tree, const MotionBounds& motion, const std::vector<char>& resting, ThreadPool& pool);
 
 // The boxes of some leaves alone.
-void refit_leaves(Tree& tree, const std::vector<MotionBox>& vertex_boxes, std::span<const std::uint32_t> leaves,
-                  ThreadPool& pool);
+void refit_leaves(Tree& tree, const MotionBounds& motion, std::span<const std::uint32_t> leaves, ThreadPool& pool);
 
 }  // namespace hpccd

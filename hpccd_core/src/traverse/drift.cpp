@@ -24,8 +24,7 @@ CoordinateMap map_around(const std::vector<Vec3<double>>& snapshot) {
 
 }  // namespace
 
-// Boxes of all nodes, from those of the vertices. (A list of each leaf's vertices, half as many as its triangles'
-// corners, brought nothing.)
+// Boxes of all nodes, from those of the vertices.
 template <class Box, class OfVertex>
 void Drift::join(const Tree& tree, std::vector<Box>& boxes, Box none, OfVertex&& of_vertex, ThreadPool& pool) {
   resize(boxes, tree.nodes.size(), pool.cancellation());
@@ -33,10 +32,7 @@ void Drift::join(const Tree& tree, std::vector<Box>& boxes, Box none, OfVertex&&
     for (std::size_t i = begin; i < end; ++i) {
       const LeafRange& leaf = tree.leaves[i];
       Box box = none;
-      for (const auto& corner : tree.face_corners)
-        for (std::uint32_t s = leaf.first_face; s < leaf.end_face; ++s) box.include(of_vertex(corner[s]));
-      for (std::uint32_t s = leaf.first_vertex; s < leaf.end_vertex; ++s)
-        box.include(of_vertex(tree.vertex_of_slot[s]));
+      for (std::uint32_t c = leaf.first_corner; c < leaf.end_corner; ++c) box.include(of_vertex(tree.corners[c]));
       boxes[tree.leaf_nodes[i]] = box;
     }
   });

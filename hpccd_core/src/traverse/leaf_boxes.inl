@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Boxes of a leaf's features, compared 16 at a time. Part of leaf_pairs.inl and leaf_edge_faces.inl.
+// Boxes of a leaf's features, made from its corners and compared 16 at a time. Part of leaf_pairs.inl and
+// leaf_edge_faces.inl.
 
 HPCCD_HD constexpr std::uint32_t low(std::uint32_t end, std::uint32_t axis) {
   return bound_number(end, Side::low, axis);
@@ -8,6 +9,100 @@ HPCCD_HD constexpr std::uint32_t high(std::uint32_t end, std::uint32_t axis) {
   return bound_number(end, Side::high, axis);
 }
 
+// Boxes of up to 16 features of a leaf, a row for each of the twelve bounds.
+struct alignas(64) BoxGroup {
+  static constexpr std::uint32_t width = CornerRow::width;
+  float rows[n_bounds][width];
+};
+
+// A leaf's corners. Plain pointers: methods of std::vector compiled here could be linked into code for older processors.
+struct LeafCorners {
+  const CornerRow* rows;
+  const CornersOf* of;
+  const std::uint32_t* numbers;
+  bool many, grown;  // more than one group of rows; rows for low and for high bounds
+
+  HPCCD_HD LeafCorners(const Tree& tree, const LeafRange& leaf)
+      : rows(tree.rows_of(leaf)),
+        of(tree.corners_of.data() + (&leaf - tree.leaves.data())),
+        numbers(tree.corners.data() + leaf.first_corner),
+        many(leaf.n_groups() > 1),
+        grown(tree.grown) {}
+};
+
+// Boxes of 16 features, each of n corners.
+template <bool many, bool grown, std::uint32_t n>
+HPCCD_HD void join_corners(const CornerRow* rows, const std::uint8_t* const (&which)[n], BoxGroup& out) {
+  constexpr std::uint32_t high_rows = grown ? Tree::coordinates : 0, next = high_rows + Tree::coordinates;
+  Picks16 p[n];
+  for (std::uint32_t j = 0; j < n; ++j) p[j] = picks(which[j]);
+  const auto at = [&](std::uint32_t row, std::uint32_t j) {
+    if constexpr (many) return picked(rows[row].lane, rows[row + next].lane, p[j]);
+    return picked(rows[row].lane, p[j]);
+  };
+  for (std::uint32_t end = 0; end < 2; ++end)
+    for (std::uint32_t axis = 0; axis < 3; ++axis) {
+      const std::uint32_t row = 3 * end + axis;
+      Floats16 least = at(row, 0), most = grown ? at(row + high_rows, 0) : least;
+      for (std::uint32_t j = 1; j < n; ++j) {
+        const Floats16 x = at(row, j);
+        least = min(least, x), most = max(most, grown ? at(row + high_rows, j) : x);
+      }
+      store16(out.rows[low(end, axis)], least), store16(out.rows[high(end, axis)], most);
+    }
+}
+
+template <std::uint32_t n>
+HPCCD_HD void boxes_of(const LeafCorners& c, const std::uint8_t* const (&which)[n], BoxGroup& out) {
+  if (c.many)
+    c.grown ? join_corners<true, true>(c.rows, which, out) : join_corners<true, false>(c.rows, which, out);
+  else
+    c.grown ? join_corners<false, true>(c.rows, which, out) : join_corners<false, false>(c.rows, which, out);
+}
+
+struct EdgeBoxes {
+  static constexpr std::uint32_t n = CornersOf::most_edges / BoxGroup::width;
+  BoxGroup groups[n];
+  HPCCD_HD EdgeBoxes(const LeafCorners& c, std::uint32_t n_edges) {
+    for (std::uint32_t i = 0; i < n_edges; i += BoxGroup::width)
+      boxes_of<2>(c, {c.of->edge[0] + i, c.of->edge[1] + i}, groups[i / BoxGroup::width]);
+  }
+};
+
+struct FaceBoxes {
+  BoxGroup group;
+  HPCCD_HD explicit FaceBoxes(const LeafCorners& c) {
+    boxes_of<3>(c, {c.of->face[0], c.of->face[1], c.of->face[2]}, group);
+  }
+};
+
+// Those of all corners, of which the first ones are the leaf's vertices.
+struct VertexBoxes {
+  BoxGroup groups[2];
+  HPCCD_HD VertexBoxes(const LeafCorners& c, std::uint32_t n_vertices) {
+    const std::uint32_t high_rows = c.grown ? Tree::coordinates : 0;
+    const CornerRow* rows = c.rows;
+    for (std::uint32_t i = 0; i < n_vertices; i += BoxGroup::width, rows += high_rows + Tree::coordinates)
+      for (std::uint32_t row = 0; row < Tree::coordinates; ++row) {
+        auto& out = groups[i / BoxGroup::width].rows;
+        store16(out[low(row / 3, row % 3)], load16(rows[row].lane));
+        store16(out[high(row / 3, row % 3)], load16(rows[row + high_rows].lane));
+      }
+  }
+};
+
+// Vertex numbers of both ends of the edges, or of the three corners of the faces.
+template <std::uint32_t n, std::uint32_t most>
+struct alignas(64) CornerNumbers {
+  std::uint32_t of[n][most];
+  HPCCD_HD CornerNumbers(const LeafCorners& c, const std::uint8_t (&which)[n][most], std::uint32_t n_features) {
+    for (std::uint32_t i = 0; i < n_features; i += CornerRow::width)
+      for (std::uint32_t j = 0; j < n; ++j) pick(of[j] + i, c.numbers, picks(which[j] + i));
+  }
+};
+using EdgeEnds = CornerNumbers<2, CornersOf::most_edges>;
+using FaceCorners = CornerNumbers<3, CornersOf::most_faces>;
+
 // A box to compare with: its bounds, in the order of a group's rows, each `stride` numbers behind the one before.
 template <std::uint32_t stride>
 struct Bounds {
@@ -15,7 +110,6 @@ struct Bounds {
   HPCCD_HD float operator[](std::uint32_t row) const { return at[row * stride]; }
 };
 
-// Plain pointers: methods of std::vector compiled here could be linked into code for older processors.
 HPCCD_HD Bounds<BoxGroup::width> bounds_at(const BoxGroup* groups, std::uint32_t i) {
   return {groups[i / BoxGroup::width].rows[0] + i % BoxGroup::width};
 }

@@ -13,28 +13,30 @@ HPCCD_HD void edges_against_faces(const Tree& tree, const LeafRange& a, const Le
                                   const Node& node_b, CandidateBuffer& out) {
   const std::uint32_t n_edges = a.n_edges(), n_faces = b.n_faces();
   if (!n_edges || !n_faces) return;
-  const BoxGroup* all = tree.box_groups.get();
-  const BoxGroup *edge_groups = all + a.first_group, *face_group = all + b.surface_group();
+  const LeafCorners corners_a(tree, a), corners_b(tree, b);
   static_assert(Tree::leaf_size <= BoxGroup::width);
   constexpr InSnapshot when{0};
-  const unsigned near_faces = when.overlapping(when.load(*face_group), bounds_of(node_a)) & lanes_in(0, 0, n_faces);
+  const FaceBoxes face_boxes(corners_b);
+  const unsigned near_faces =
+      when.overlapping(when.load(face_boxes.group), bounds_of(node_a)) & lanes_in(0, 0, n_faces);
   if (!near_faces) return;
+  const EdgeBoxes edge_boxes(corners_a, n_edges);
+  const EdgeEnds ends(corners_a, corners_a.of->edge, n_edges);
   const std::uint32_t* face = tree.face_of_slot.data() + b.first_face;
-  const std::uint32_t *c0 = tree.face_corners[0].data() + b.first_face,
-                      *c1 = tree.face_corners[1].data() + b.first_face,
-                      *c2 = tree.face_corners[2].data() + b.first_face;
   for (std::uint32_t i = 0; i < n_edges; i += BoxGroup::width) {
-    const auto edges = when.load(edge_groups[i / BoxGroup::width]);
+    const auto edges = when.load(edge_boxes.groups[i / BoxGroup::width]);
     const unsigned near_edges = when.overlapping(edges, bounds_of(node_b)) & lanes_in(i, 0, n_edges);
     if (!near_edges) continue;
     const std::uint32_t slot = a.first_edge + i;
-    const std::uint32_t *end0 = tree.edge_ends[0].data() + slot, *end1 = tree.edge_ends[1].data() + slot;
+    const std::uint32_t *end0 = ends.of[0] + i, *end1 = ends.of[1] + i;
     for (unsigned lanes = near_faces; lanes; lanes &= lanes - 1) {
       const auto k = static_cast<std::uint32_t>(__builtin_ctz(lanes));
-      unsigned m = when.overlapping(edges, bounds_at(face_group, k)) & near_edges;
+      unsigned m = when.overlapping(edges, bounds_at(&face_boxes.group, k)) & near_edges;
       if (!m) continue;
-      const std::uint32_t corners[] = {c0[k], c1[k], c2[k]};
-      for (const std::uint32_t v : corners) m &= ~(equal16(end0, v) | equal16(end1, v));
+      for (const auto& corner : corners_b.of->face) {
+        const std::uint32_t v = corners_b.numbers[corner[k]];
+        m &= ~(equal16(end0, v) | equal16(end1, v));
+      }
       append_pairs<false>(out.second, out.first, out.n, face[k], tree.edge_of_slot.data() + slot, m);
     }
   }

@@ -67,7 +67,7 @@ struct TreeTest : Sheets {
 
 TEST_F(TreeTest, EachFeatureLiesInOneLeaf) {
   update(0, 0.3);
-  build(tree, *scene, features, motion.boxes, pool);
+  build(tree, *scene, features, motion, pool);
   std::vector<int> faces(features.n_faces()), edges(features.edges.size()), vertices(features.n_vertices);
   for (const LeafRange& leaf : tree.leaves) {
     for (auto slot = leaf.first_face; slot < leaf.end_face; ++slot) ++faces[tree.face_of_slot[slot]];
@@ -81,23 +81,23 @@ TEST_F(TreeTest, EachFeatureLiesInOneLeaf) {
 
 TEST_F(TreeTest, BoxesBoundTheMotionAfterBuild) {
   update(0, 0.3);
-  build(tree, *scene, features, motion.boxes, pool);
+  build(tree, *scene, features, motion, pool);
   expect_bounds();
 }
 
 TEST_F(TreeTest, BoxesBoundTheMotionAfterRefit) {
   update(0, 0.3);
-  build(tree, *scene, features, motion.boxes, pool);
+  build(tree, *scene, features, motion, pool);
   update(0.3, 1);
-  refit(tree, motion.boxes, {}, pool);
+  refit(tree, motion, {}, pool);
   expect_bounds();
 }
 
 TEST_F(TreeTest, RefitToTheSameMotionChangesNothing) {
   update(0, 0.3);
-  build(tree, *scene, features, motion.boxes, pool);
+  build(tree, *scene, features, motion, pool);
   const std::vector<Node> built = tree.nodes;
-  refit(tree, motion.boxes, {}, pool);
+  refit(tree, motion, {}, pool);
   for (std::size_t i = 0; i < built.size(); ++i) {
     EXPECT_TRUE(contains(tree.nodes[i].box, built[i].box)) << "node " << i;
     EXPECT_TRUE(contains(built[i].box, tree.nodes[i].box)) << "node " << i;
@@ -121,11 +121,11 @@ struct LargeTreeTest : Sheets {
 TEST_F(LargeTreeTest, IsBuiltAlikeByAnyNumberOfThreads) {
   update(0, 0.3);
   Tree alone;
-  build(alone, *scene, features, motion.boxes, one);
+  build(alone, *scene, features, motion, one);
   for (int threads : {2, 4, 16}) {
     ThreadPool many(threads);
     Tree shared;
-    build(shared, *scene, features, motion.boxes, many);
+    build(shared, *scene, features, motion, many);
     EXPECT_EQ(alone.area, shared.area);
     EXPECT_EQ(alone.face_of_slot, shared.face_of_slot);
     EXPECT_EQ(alone.edge_of_slot, shared.edge_of_slot);
@@ -139,14 +139,14 @@ TEST_F(LargeTreeTest, IsBuiltAlikeByAnyNumberOfThreads) {
 TEST_F(LargeTreeTest, IsRefittedAlikeByAnyNumberOfThreads) {
   update(0, 0.1);
   Tree alone, shared;
-  build(alone, *scene, features, motion.boxes, one);
-  build(shared, *scene, features, motion.boxes, one);
+  build(alone, *scene, features, motion, one);
+  build(shared, *scene, features, motion, one);
   ASSERT_GT(shared.above_front.size(), 64u);
   for (int round = 0; round < 200; ++round) {
     const double t = 0.005 * (round % 100);
     update(t, t + 0.1);
-    refit(alone, motion.boxes, {}, one);
-    refit(shared, motion.boxes, {}, four);
+    refit(alone, motion, {}, one);
+    refit(shared, motion, {}, four);
     ASSERT_NO_FATAL_FAILURE(expect_equal_boxes(alone, shared, "round " + std::to_string(round)));
   }
 }
@@ -154,13 +154,13 @@ TEST_F(LargeTreeTest, IsRefittedAlikeByAnyNumberOfThreads) {
 TEST_F(LargeTreeTest, RefitLeavesOutWhatRestsAndNothingAboveIt) {
   update(0, 0.1);
   Tree whole, part;
-  build(whole, *scene, features, motion.boxes, one);
-  build(part, *scene, features, motion.boxes, one);
+  build(whole, *scene, features, motion, one);
+  build(part, *scene, features, motion, one);
   const std::vector<MotionBox> before = motion.boxes;
   update(0.1, 0.2);
   std::copy_n(before.begin(), n * n + lone, motion.boxes.begin());  // the first sheet
-  refit(whole, motion.boxes, {}, four);
-  refit(part, motion.boxes, {1, 0}, four);
+  refit(whole, motion, {}, four);
+  refit(part, motion, {1, 0}, four);
   expect_equal_boxes(whole, part, "at rest");
 }
 

@@ -31,7 +31,7 @@ struct DriftOfSheets : testing::Test {
     for (std::size_t i = 0; i < snapshot.size(); i += 3)
       places.push_back({snapshot[i], snapshot[i + 1], snapshot[i + 2]});
     bounds.update(test::view(snapshot), test::view(snapshot), pool);
-    build(tree, *scene, features, bounds.boxes, pool);
+    build(tree, *scene, features, bounds, pool);
     drift.begin(tree, places, pool);
   }
 
@@ -65,7 +65,10 @@ TEST_F(DriftOfSheets, NoContactIsInLeavesThatAreClosed) {
     for (auto s = leaf.first_face; s < leaf.end_face; ++s) leaf_of_face[tree.face_of_slot[s]] = node;
     for (auto s = leaf.first_vertex; s < leaf.end_vertex; ++s) leaf_of_vertex[tree.vertex_of_slot[s]] = node;
     for (auto s = leaf.first_edge; s < leaf.end_edge; ++s)
-      leaf_of_edge[std::minmax(tree.edge_ends[0][s], tree.edge_ends[1][s])] = node;
+      {
+      const auto [a, b] = features.edges[tree.edge_of_slot[s]];
+      leaf_of_edge[{a, b}] = node;
+    }
   }
   std::size_t n_looked_at = 0, n_closed = 0;
   for (const double separation : {0.0, 0.05}) {
@@ -120,7 +123,7 @@ TEST(Drift, IsOpenFromTheWayOnThatItTakes) {
   MotionBounds bounds;
   bounds.update(test::view(start), test::view(start), pool);
   Tree tree;
-  build(tree, *scene, features, bounds.boxes, pool);
+  build(tree, *scene, features, bounds, pool);
   Drift drift;
   drift.begin(tree, places, pool);
   ASSERT_EQ(tree.leaf_nodes.size(), 2u);

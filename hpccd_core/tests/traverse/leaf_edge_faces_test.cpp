@@ -33,7 +33,7 @@ struct LeafEdgeFacesTest : testing::Test {
     std::uniform_real_distribution<double> crumple(-0.5, 0.5);
     for (double& x : positions) x += crumple(random);
     motion.update(*scene, test::view(positions), pool);
-    build(tree, *scene, features, motion.boxes, pool);
+    build(tree, *scene, features, motion, pool);
   }
 
   bool are_candidates(std::uint32_t edge, std::uint32_t face) const {

@@ -34,7 +34,7 @@ struct LeafPairsInPart : testing::Test {
   LeafPairsInPart() {
     const auto start = test::sheet_positions(side, 0, 0), end = test::sheet_positions(side, 1, 0);
     motion.update(test::view(start), test::view(end), pool);
-    build(tree, *scene, features, motion.boxes, pool);
+    build(tree, *scene, features, motion, pool);
   }
 
   // Apart at the start and apart in the same order at this time, along an axis.

@@ -33,7 +33,7 @@ struct LeafPairsTest : testing::Test {
   LeafPairsTest() {
     const auto start = test::sheet_positions(side, 0, lone), end = test::sheet_positions(side, 1, lone);
     motion.update(test::view(start), test::view(end), pool);
-    build(tree, *scene, features, motion.boxes, pool);
+    build(tree, *scene, features, motion, pool);
   }
 
   template <class VerticesA, class VerticesB>

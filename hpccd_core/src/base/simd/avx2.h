@@ -118,6 +118,42 @@ HPCCD_HD Rows16<n> load_rows(const float (&rows)[n][16]) {
   return {rows};
 }
 
+struct Picks16 {
+  __m256i half[2];
+};
+HPCCD_HD Picks16 picks(const std::uint8_t* which) {
+  const __m128i all = _mm_load_si128(reinterpret_cast<const __m128i*>(which));
+  return {{_mm256_cvtepu8_epi32(all), _mm256_cvtepu8_epi32(_mm_srli_si128(all, 8))}};
+}
+// Bit `bit` of each pick decides between two.
+template <int bit>
+HPCCD_HD __m256 by_bit(__m256i pick, __m256 zero, __m256 one) {
+  return _mm256_blendv_ps(zero, one, _mm256_castsi256_ps(_mm256_slli_epi32(pick, 31 - bit)));
+}
+HPCCD_HD __m256 of_row(__m256 low, __m256 high, __m256i pick) {
+  return by_bit<3>(pick, _mm256_permutevar8x32_ps(low, pick), _mm256_permutevar8x32_ps(high, pick));
+}
+HPCCD_HD Floats16 picked(const float* row, const Picks16& p) {
+  const __m256 low = _mm256_load_ps(row), high = _mm256_load_ps(row + 8);
+  return {{of_row(low, high, p.half[0]), of_row(low, high, p.half[1])}};
+}
+HPCCD_HD Floats16 picked(const float* row, const float* next, const Picks16& p) {
+  const Floats16 a = picked(row, p), b = picked(next, p);
+  return {{by_bit<4>(p.half[0], a.half[0], b.half[0]), by_bit<4>(p.half[1], a.half[1], b.half[1])}};
+}
+HPCCD_HD void store16(float* out, const Floats16& x) {
+  _mm256_store_ps(out, x.half[0]);
+  _mm256_store_ps(out + 8, x.half[1]);
+}
+HPCCD_HD void pick(std::uint32_t* out, const std::uint32_t* numbers, const Picks16& p) {
+  const auto part = [&](int i) { return _mm256_castsi256_ps(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(numbers + 8 * i))); };
+  for (int half = 0; half < 2; ++half) {
+    const __m256i which = p.half[half];
+    const __m256 x = by_bit<4>(which, of_row(part(0), part(1), which), of_row(part(2), part(3), which));
+    _mm256_store_ps(reinterpret_cast<float*>(out + 8 * half), x);
+  }
+}
+
 HPCCD_HD unsigned equal16(const std::uint32_t* numbers, std::uint32_t x) {
   unsigned bits = 0;
   for (int half = 0; half < 2; ++half) {

@@ -121,6 +121,23 @@ HPCCD_HD Rows16<n> load_rows(const float (&rows)[n][16]) {
   return r;
 }
 
+// Which of 16 numbers, or of 32 in two rows, each lane takes.
+struct Picks16 {
+  __m512i v;
+};
+HPCCD_HD Picks16 picks(const std::uint8_t* which) {
+  return {_mm512_cvtepu8_epi32(_mm_load_si128(reinterpret_cast<const __m128i*>(which)))};
+}
+HPCCD_HD Floats16 picked(const float* row, Picks16 p) { return {_mm512_permutexvar_ps(p.v, _mm512_load_ps(row))}; }
+HPCCD_HD Floats16 picked(const float* row, const float* next, Picks16 p) {
+  return {_mm512_permutex2var_ps(_mm512_load_ps(row), p.v, _mm512_load_ps(next))};
+}
+// The same of whole numbers, from any address, to a full row.
+HPCCD_HD void pick(std::uint32_t* out, const std::uint32_t* numbers, Picks16 p) {
+  _mm512_store_si512(out, _mm512_permutex2var_epi32(_mm512_loadu_si512(numbers), p.v, _mm512_loadu_si512(numbers + 16)));
+}
+HPCCD_HD void store16(float* out, Floats16 x) { _mm512_store_ps(out, x.v); }
+
 HPCCD_HD unsigned equal16(const std::uint32_t* numbers, std::uint32_t x) {
   return _mm512_cmpeq_epi32_mask(_mm512_loadu_si512(numbers), _mm512_set1_epi32(static_cast<int>(x)));
 }

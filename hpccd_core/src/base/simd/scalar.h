@@ -118,6 +118,30 @@ HPCCD_HD Rows16<n> load_rows(const float (&rows)[n][16]) {
   return {rows};
 }
 
+// Which of 16 numbers, or of 32 in two rows, each lane takes.
+struct Picks16 {
+  const std::uint8_t* which;
+};
+HPCCD_HD Picks16 picks(const std::uint8_t* which) { return {which}; }
+HPCCD_HD Floats16 picked(const float* row, Picks16 p) {
+  Floats16 r;
+  for (int i = 0; i < 4; ++i) {
+    const std::uint8_t* w = p.which + 4 * i;
+    r.part[i] = Floats4{row[w[0]], row[w[1]], row[w[2]], row[w[3]]};
+  }
+  return r;
+}
+HPCCD_HD Floats16 picked(const float* row, const float* next, Picks16 p) {
+  Floats16 r;
+  for (int j = 0; j < 16; ++j) r.part[j / 4][j % 4] = p.which[j] < 16 ? row[p.which[j]] : next[p.which[j] - 16];
+  return r;
+}
+// The same of whole numbers, from any address, to a full row.
+HPCCD_HD void pick(std::uint32_t* out, const std::uint32_t* numbers, Picks16 p) {
+  for (int j = 0; j < 16; ++j) out[j] = numbers[p.which[j]];
+}
+HPCCD_HD void store16(float* out, const Floats16& x) { __builtin_memcpy(out, &x, sizeof x); }
+
 // Bit j: number j of sixteen equals x.
 HPCCD_HD unsigned equal16(const std::uint32_t* numbers, std::uint32_t x) {
   unsigned bits = 0;
