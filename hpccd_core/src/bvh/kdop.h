@@ -15,6 +15,11 @@ struct alignas(64) VertexKdop {
   float t0[n_kdop_directions], t1[n_kdop_directions];
 };
 
+// The k-DOP of some vertices, at t = 0 and then at t = 1.
+struct alignas(64) Kdop {
+  float low[2 * n_kdop_directions], high[2 * n_kdop_directions];
+};
+
 // By how much k-DOPs of features may lie apart in each direction that come within a separation of each other.
 struct alignas(64) KdopMargin {
   float in[2 * n_kdop_directions] = {};

@@ -82,21 +82,37 @@ MotionBox leaf_bounds(const Tree& tree, const LeafRange& leaf, const std::vector
   return box;
 }
 
+void join_kdops(Tree& tree, const LeafRange& leaf, const std::vector<VertexKdop>& vertex_kdops) {
+  constexpr int parts = 4;
+  static_assert(sizeof(VertexKdop) == parts * sizeof(Floats4));
+  Floats4 low[parts], high[parts];
+  for (std::uint32_t c = leaf.first_corner; c < leaf.end_corner; ++c)
+    for (int i = 0; i < parts; ++i) {
+      const Floats4 x = load4(vertex_kdops[tree.corners[c]].t0 + 4 * i);
+      low[i] = c == leaf.first_corner ? x : min4(low[i], x);
+      high[i] = c == leaf.first_corner ? x : max4(high[i], x);
+    }
+  Kdop& k = tree.kdops[static_cast<std::size_t>(&leaf - tree.leaves.data())];
+  std::memcpy(k.low, low, sizeof low);
+  std::memcpy(k.high, high, sizeof high);
+}
+
 void join_children(Tree& tree, Node& node) {
   node.box = tree.nodes[node.children].box;
   node.box.include(tree.nodes[node.children + 1].box);
 }
 
 // Returns the sum of the areas of its nodes.
-double refit_subtree(Tree& tree, std::uint32_t root, const std::vector<MotionBox>& vertex_boxes) {
+double refit_subtree(Tree& tree, std::uint32_t root, const MotionBounds& motion) {
   Node& node = tree.nodes[root];
   if (!node.children) {
-    if (node.leaf + 1 < tree.leaves.size()) fetch_ahead(tree, tree.leaves[node.leaf + 1], vertex_boxes);
-    node.box = leaf_bounds(tree, tree.leaves[node.leaf], vertex_boxes);
+    if (node.leaf + 1 < tree.leaves.size()) fetch_ahead(tree, tree.leaves[node.leaf + 1], motion.boxes);
+    node.box = leaf_bounds(tree, tree.leaves[node.leaf], motion.boxes);
+    if (!tree.kdops.empty()) join_kdops(tree, tree.leaves[node.leaf], motion.kdops);
     return node.box.area();
   }
-  const double left = refit_subtree(tree, node.children, vertex_boxes);
-  const double right = refit_subtree(tree, node.children + 1, vertex_boxes);
+  const double left = refit_subtree(tree, node.children, motion);
+  const double right = refit_subtree(tree, node.children + 1, motion);
   join_children(tree, node);
   return left + right + node.box.area();
 }
@@ -119,17 +135,18 @@ void refit_above(Tree& tree, std::uint32_t number) {
 }  // namespace
 
 void refit(Tree& tree, const MotionBounds& motion, const std::vector<char>& resting, ThreadPool& pool) {
-  const std::vector<MotionBox>& vertex_boxes = motion.boxes;
-  const bool same_rows = tree.rows && tree.grown == motion.grown;
+  const bool with_kdops = motion.has_kdops() && !motion.grown;
+  const bool same_rows = tree.rows && tree.grown == motion.grown && (with_kdops ? !tree.kdops.empty() : tree.kdops.empty());
   if (!same_rows) {
     tree.grown = motion.grown;
+    tree.kdops.resize(with_kdops ? tree.leaves.size() : 0);
     tree.rows = std::make_unique_for_overwrite<CornerRow[]>(tree.n_groups * tree.rows_per_group());
   }
   parallel_for(pool, tree.front.size(), 1, [&](std::size_t begin, std::size_t end, int) {
     for (std::size_t i = begin; i < end; ++i) {
       Tree::Subtree& subtree = tree.front[i];
       const bool rests = same_rows && !resting.empty() && resting[tree.nodes[subtree.root].mesh];
-      if (!rests) subtree.area = refit_subtree(tree, subtree.root, vertex_boxes);
+      if (!rests) subtree.area = refit_subtree(tree, subtree.root, motion);
       refit_above(tree, subtree.above);
     }
   });
@@ -153,7 +170,7 @@ std::size_t Tree::bytes() const {
                     vertices = vertex_of_slot.capacity();
   return nodes.capacity() * sizeof(Node) + front.capacity() * sizeof(Subtree) +
          above_front.capacity() * sizeof(AboveFront) + leaves.capacity() * (sizeof(LeafRange) + 4) +
-         corners_of.capacity() * sizeof(CornersOf) + (faces + edges + vertices + corners.capacity()) * 4 +
+         corners_of.capacity() * sizeof(CornersOf) + kdops.capacity() * sizeof(Kdop) + (faces + edges + vertices + corners.capacity()) * 4 +
          n_groups * rows_per_group() * sizeof(CornerRow);
 }
 

@@ -4,27 +4,26 @@
 // here. Part of batch.inl
 // and distance_batch.inl.
 
-// The k-DOP of some vertices, at t = 0 and then at t = 1.
-struct Kdop {
+struct KdopLanes {
   Floats16 low, high;
 };
 static_assert(sizeof(VertexKdop) == 16 * sizeof(float) && n_kdop_directions == 8);
-HPCCD_HD Kdop kdop_at(const VertexKdop* kdops, std::uint32_t v) {
+HPCCD_HD KdopLanes kdop_at(const VertexKdop* kdops, std::uint32_t v) {
   const Floats16 row = load16(reinterpret_cast<const float*>(kdops + v));
   return {row, row};
 }
-HPCCD_HD Kdop both(const Kdop& a, const Kdop& b) { return {min(a.low, b.low), max(a.high, b.high)}; }
-HPCCD_HD bool are_apart(const Kdop& a, const Kdop& b) {
+HPCCD_HD KdopLanes both(const KdopLanes& a, const KdopLanes& b) { return {min(a.low, b.low), max(a.high, b.high)}; }
+HPCCD_HD bool are_apart(const KdopLanes& a, const KdopLanes& b) {
   return any_in_both_halves(less(a.high, b.low), less(b.high, a.low));
 }
 
 // Whether two features are apart, exactly or by more than a margin in each direction.
 struct Apart {
-  HPCCD_HD bool operator()(const Kdop& a, const Kdop& b) const { return are_apart(a, b); }
+  HPCCD_HD bool operator()(const KdopLanes& a, const KdopLanes& b) const { return are_apart(a, b); }
 };
 struct ApartByMore {
   Floats16 margin;
-  HPCCD_HD bool operator()(const Kdop& a, const Kdop& b) const {
+  HPCCD_HD bool operator()(const KdopLanes& a, const KdopLanes& b) const {
     return any_in_both_halves(less(a.high + margin, b.low), less(b.high + margin, a.low));
   }
 };
@@ -32,7 +31,7 @@ struct ApartByMore {
 // Apart by more than a margin in each direction up to a time below 1.
 struct ApartUntil {
   Floats16 margin, time;
-  HPCCD_HD bool operator()(const Kdop& a, const Kdop& b) const {
+  HPCCD_HD bool operator()(const KdopLanes& a, const KdopLanes& b) const {
     return any_in_both_halves(less(at(a.high) + margin, at(b.low)), less(at(b.high) + margin, at(a.low)));
   }
   HPCCD_HD Floats16 at(Floats16 x) const {

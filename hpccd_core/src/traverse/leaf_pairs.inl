@@ -73,6 +73,13 @@ HPCCD_HD void vertex_face_pairs(When when, const Tree& tree, const LeafRange& a,
   });
 }
 
+// Along a direction of their k-DOPs, which takes a tenth of the time of all that follows.
+HPCCD_HD bool are_apart(const Tree& tree, const LeafRange& a, const LeafRange& b) {
+  const Kdop *kdops = tree.kdops.data(), *kdop_a = kdops + (&a - tree.leaves.data()), *kdop_b = kdops + (&b - tree.leaves.data());
+  if (!kdops || kdop_a == kdop_b) return false;
+  return any_in_both_halves(less(load16(kdop_a->high), load16(kdop_b->low)), less(load16(kdop_b->high), load16(kdop_a->low)));
+}
+
 template <class When>
 HPCCD_HD void pairs_of_leaves(When when, const Tree& tree, const LeafRange& a, const LeafRange& b,
                               CandidateBuffer& edge_edge, CandidateBuffer& vertex_face) {
@@ -89,6 +96,7 @@ HPCCD_HD void pairs_of_leaves(When when, const Tree& tree, const LeafRange& a, c
 
 void leaf_pairs(const Tree& tree, const LeafRange& a, const LeafRange& b, CandidateBuffer& edge_edge,
                 CandidateBuffer& vertex_face) {
+  if (are_apart(tree, a, b)) return;
   pairs_of_leaves(BothEnds(), tree, a, b, edge_edge, vertex_face);
 }
 
