@@ -15,23 +15,30 @@ void test(const Geometry& g, const std::uint32_t* first, const std::uint32_t* se
           BatchResult& result) {
   using Lanes = const Motion<R>&;
   result.n_contacts = result.n_undecided = 0;
-  std::uint32_t near[batch_capacity], survivors[batch_capacity], single[batch_capacity], many[batch_capacity];
+  std::uint32_t near[batch_capacity], single[batch_capacity], many[batch_capacity];
   std::uint32_t n_survivors = 0, n_single = 0, n_many = 0;
 
   const std::uint32_t n_near = !g.kdops      ? n
                                : g.until < 1 ? near_pairs<kind>(until(g), g, first, second, n, near)
                                              : near_pairs<kind>(Apart(), g, first, second, n, near);
+  std::uint32_t n_apart = 0;
   for_lanes<kind, R>(g, first, second, g.kdops ? near : nullptr, n_near,
                      [&](Lanes m, const std::uint32_t* at, unsigned valid) {
-                       append(survivors, n_survivors, at, valid & ~bits(coplanarity_filter<Policy>(m).none));
-                     });
-  for_lanes<kind, R>(g, first, second, survivors, n_survivors, [&](Lanes m, const std::uint32_t* at, unsigned valid) {
     const Magnitudes<R> size = magnitudes(m);
+    const CubicError<R> error = error_of<Policy>(size);
+    const Cubic<R> f = coplanarity(m);
     const unsigned usable = bits(in_range(size));
-    const unsigned outside = bits(certainly_outside<kind>(m, size)) & usable;
-    const unsigned one = bits(certainly_one_root(coplanarity(m), error_of<Policy>(size).coefficient)) & usable;
-    append(single, n_single, at, valid & ~outside & one);
-    append(many, n_many, at, valid & ~outside & ~one);
+    const unsigned open = valid & ~(bits(certainly_no_root(f, error.coefficient)) & usable);
+    if (!open) return;
+    n_survivors += static_cast<unsigned>(__builtin_popcount(open));
+    const unsigned reach = open & ~(bits(certainly_outside<kind>(m, size)) & usable);
+    if (!reach) return;
+    const unsigned one = bits(certainly_one_root(f, error.coefficient)) & usable & reach;
+    unsigned apart = 0;
+    if (one) apart = bits(certainly_apart_at_root<kind, Policy>(m, size, f, error.value)) & one;
+    n_apart += static_cast<unsigned>(__builtin_popcount(apart));
+    append(single, n_single, at, one & ~apart);
+    append(many, n_many, at, reach & ~one);
   });
   for_lanes<kind, R>(g, first, second, single, n_single, [&](Lanes m, const std::uint32_t* at, unsigned valid) {
     collect(single_root_test<kind, Policy>(m), at, valid, result);
@@ -43,7 +50,7 @@ void test(const Geometry& g, const std::uint32_t* first, const std::uint32_t* se
   result.counts.tested += n;
   result.counts.kdop += n - n_near;
   result.counts.coplanarity += n_near - n_survivors;
-  result.counts.projection += n_survivors - n_single - n_many;
+  result.counts.projection += n_survivors - n_single - n_many - n_apart;
   result.counts.contacts += result.n_contacts;
   result.counts.undecided += result.n_undecided;
 }

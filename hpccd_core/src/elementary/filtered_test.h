@@ -40,6 +40,24 @@ HPCCD_HD Outcome<R> piece_with_one_root(const Motion<R>& m, const Magnitudes<R>&
   return {sure && v.yes && root.delta <= R(Policy::toc_radius), sure && v.no, root.t, root.delta};
 }
 
+// Of f with certainly one root in [0, 1], quickly: whether the features are certainly apart there. Newton's method, a few
+// steps of it, leaves the root somewhere within `delta`, and most pairs that do not touch miss each other by far more.
+template <Kind kind, class Policy, class R>
+HPCCD_HD typename RealTraits<R>::Mask certainly_apart_at_root(const Motion<R>& m, const Magnitudes<R>& size,
+                                                              const Cubic<R>& f, R error) {
+  const R sign = select(f.c0 < R(0), R(-1), R(1));
+  R t = f.c0 / (f.c0 - f.c3), step(0);
+  for (int i = 0; i < 2; ++i) {
+    const R next = lesser(greater(t - value(f, t) / slope(f, t), R(0)), R(1));
+    step = magnitude(next - t);
+    t = next;
+  }
+  const R delta = greater(R(0.25) * step, R(1e-5));
+  const R left = t - delta, right = t + delta;
+  const auto sure = (left <= R(0) || sign * value(f, left) > error) && (right >= R(1) || sign * value(f, right) < R(0) - error);
+  return sure && inside<kind, Policy>(m, size, t, delta).no;
+}
+
 // The common case: f certainly has one root in [0, 1].
 template <Kind kind, class Policy, class R>
 HPCCD_HD Outcome<R> single_root_test(const Motion<R>& m) {
