@@ -45,6 +45,7 @@ void CpuBackend::see_motion(Positions t0, Positions t1, Tests tests) {
   search_.geometry.separations = shared_.separations_now();
   search_.geometry.margin = {shared_.separations.most() + shared_.tree.motion().rounding,
                              shared_.tree.motion().map.scale};
+  search_.block_pairs = block_pairs(o.simd);
   search_.leaf_pairs = leaf_pairs(o.simd);
   search_.leaf_pairs_until = leaf_pairs_until(o.simd);
   search_.leaf_pairs_at_start = leaf_pairs_at_start(o.simd);

@@ -194,8 +194,32 @@ class Builder {
           const Node &left = tree_.nodes[c], &right = tree_.nodes[c + 1];
           tree_.nodes[i].primitives = left.primitives + right.primitives;
           tree_.nodes[i].only_points = left.only_points && right.only_points;
+          tree_.nodes[i].leaf = left.leaf;
         }
     });
+    gather_blocks(n_leaves);
+  }
+
+  // In the order of their leaves.
+  void gather_blocks(std::size_t n_leaves) {
+    resize(tree_.block_of_leaf, n_leaves, cancellation_);
+    std::vector<std::uint32_t> stack;
+    if (!tree_.nodes.empty()) stack.push_back(0);
+    while (!stack.empty()) {
+      cancellation_.heed();
+      const std::uint32_t at = stack.back();
+      stack.pop_back();
+      const Node& node = tree_.nodes[at];
+      if (!Tree::in_block(node)) {
+        stack.push_back(node.children + 1);
+        stack.push_back(node.children);
+        continue;
+      }
+      const std::uint32_t n = (node.primitives + Tree::leaf_size - 1) / Tree::leaf_size;
+      std::fill_n(&tree_.block_of_leaf[node.leaf], n, static_cast<std::uint32_t>(tree_.blocks.size()));
+      Block& block = tree_.blocks.emplace_back();
+      block.node = at, block.first_leaf = node.leaf, block.n_leaves = n;
+    }
   }
 
   void choose_front() {

@@ -97,6 +97,27 @@ void join_kdops(Tree& tree, const LeafRange& leaf, const std::vector<VertexKdop>
   std::memcpy(k.high, high, sizeof high);
 }
 
+void fit_leaf(Tree& tree, std::uint32_t number, const MotionBounds& motion) {
+  const LeafRange& leaf = tree.leaves[number];
+  Node& node = tree.nodes[tree.leaf_nodes[number]];
+  node.box = leaf_bounds(tree, leaf, motion.boxes);
+  if (!tree.kdops.empty()) join_kdops(tree, leaf, motion.kdops);
+  Block& block = tree.blocks[tree.block_of_leaf[number]];
+  float bounds[n_bounds];
+  std::memcpy(bounds, &node.box, sizeof bounds);
+  for (std::uint32_t i = 0; i < n_bounds; ++i) block.rows[i][number - block.first_leaf] = bounds[i];
+}
+
+// For bounds of this kind: with separations or without, of a motion or a snapshot. True where it held such before.
+bool make_room(Tree& tree, const MotionBounds& motion) {
+  const bool with_kdops = motion.has_kdops() && !motion.grown;
+  if (tree.rows && tree.grown == motion.grown && with_kdops == !tree.kdops.empty()) return true;
+  tree.grown = motion.grown;
+  tree.kdops.resize(with_kdops ? tree.leaves.size() : 0);
+  tree.rows = std::make_unique_for_overwrite<CornerRow[]>(tree.n_groups * tree.rows_per_group());
+  return false;
+}
+
 void join_children(Tree& tree, Node& node) {
   node.box = tree.nodes[node.children].box;
   node.box.include(tree.nodes[node.children + 1].box);
@@ -107,8 +128,7 @@ double refit_subtree(Tree& tree, std::uint32_t root, const MotionBounds& motion)
   Node& node = tree.nodes[root];
   if (!node.children) {
     if (node.leaf + 1 < tree.leaves.size()) fetch_ahead(tree, tree.leaves[node.leaf + 1], motion.boxes);
-    node.box = leaf_bounds(tree, tree.leaves[node.leaf], motion.boxes);
-    if (!tree.kdops.empty()) join_kdops(tree, tree.leaves[node.leaf], motion.kdops);
+    fit_leaf(tree, node.leaf, motion);
     return node.box.area();
   }
   const double left = refit_subtree(tree, node.children, motion);
@@ -135,13 +155,7 @@ void refit_above(Tree& tree, std::uint32_t number) {
 }  // namespace
 
 void refit(Tree& tree, const MotionBounds& motion, const std::vector<char>& resting, ThreadPool& pool) {
-  const bool with_kdops = motion.has_kdops() && !motion.grown;
-  const bool same_rows = tree.rows && tree.grown == motion.grown && (with_kdops ? !tree.kdops.empty() : tree.kdops.empty());
-  if (!same_rows) {
-    tree.grown = motion.grown;
-    tree.kdops.resize(with_kdops ? tree.leaves.size() : 0);
-    tree.rows = std::make_unique_for_overwrite<CornerRow[]>(tree.n_groups * tree.rows_per_group());
-  }
+  const bool same_rows = make_room(tree, motion);
   parallel_for(pool, tree.front.size(), 1, [&](std::size_t begin, std::size_t end, int) {
     for (std::size_t i = begin; i < end; ++i) {
       Tree::Subtree& subtree = tree.front[i];
@@ -159,9 +173,9 @@ void refit(Tree& tree, const MotionBounds& motion, const std::vector<char>& rest
 
 void refit_leaves(Tree& tree, const MotionBounds& motion, std::span<const std::uint32_t> leaves, ThreadPool& pool) {
   constexpr std::size_t grain = 64;
+  make_room(tree, motion);
   parallel_for(pool, leaves.size(), grain, [&](std::size_t begin, std::size_t end, int) {
-    for (std::size_t i = begin; i < end; ++i)
-      tree.nodes[tree.leaf_nodes[leaves[i]]].box = leaf_bounds(tree, tree.leaves[leaves[i]], motion.boxes);
+    for (std::size_t i = begin; i < end; ++i) fit_leaf(tree, leaves[i], motion);
   });
 }
 
@@ -169,7 +183,7 @@ std::size_t Tree::bytes() const {
   const std::size_t faces = face_of_slot.capacity(), edges = edge_of_slot.capacity(),
                     vertices = vertex_of_slot.capacity();
   return nodes.capacity() * sizeof(Node) + front.capacity() * sizeof(Subtree) +
-         above_front.capacity() * sizeof(AboveFront) + leaves.capacity() * (sizeof(LeafRange) + 4) +
+         above_front.capacity() * sizeof(AboveFront) + leaves.capacity() * (sizeof(LeafRange) + 8) + blocks.capacity() * sizeof(Block) +
          corners_of.capacity() * sizeof(CornersOf) + kdops.capacity() * sizeof(Kdop) + (faces + edges + vertices + corners.capacity()) * 4 +
          n_groups * rows_per_group() * sizeof(CornerRow);
 }

@@ -27,7 +27,7 @@ HPCCD_HD float slanted_reach(float reach) { return 1.41422f * reach; }
 struct alignas(64) Node {
   MotionBox box;
   std::uint32_t children = 0;  // the left one; the right one follows. 0: a leaf
-  std::uint32_t leaf = 0;      // where a leaf: its number
+  std::uint32_t leaf = 0;      // its number; of an inner node the first one below it
   std::uint32_t mesh = mixed_meshes;
   std::uint32_t primitives : 31 = 0;  // in the whole subtree
   std::uint32_t only_points : 1 = 0;  // no triangle in the whole subtree, so nothing that another such node could touch
@@ -108,6 +108,14 @@ struct alignas(64) CornersOf {
   std::uint8_t edge[2][most_edges] = {}, face[3][most_faces] = {};
 };
 
+// The leaves below one node, up to sixteen of one mesh, with their boxes in lanes, a row for each bound: pairs of
+// leaves are looked for sixteen at a time, in place of the last four levels of the tree.
+struct alignas(64) Block {
+  static constexpr std::uint32_t width = 16;
+  float rows[n_bounds][width];
+  std::uint32_t node, first_leaf, n_leaves;
+};
+
 struct Tree {
   // Primitives of a leaf. With 8, its corners and its edges mostly fill a row each, and each of at most 24 edges has a
   // lane of a GPU's warp.
@@ -137,6 +145,12 @@ struct Tree {
   std::vector<AboveFront> above_front;
   std::vector<LeafRange> leaves;
   std::vector<std::uint32_t> leaf_nodes;
+  std::vector<Block> blocks;
+  std::vector<std::uint32_t> block_of_leaf;
+  // Whether a node is a block's, or below one.
+  static bool in_block(const Node& node) {
+    return node.mesh != mixed_meshes && node.primitives <= Block::width * leaf_size;
+  }
   // Slots: features in the order of the leaves; each array ends with load_width slots of padding.
   std::vector<std::uint32_t> face_of_slot, edge_of_slot, vertex_of_slot;
   std::vector<std::uint32_t> corners;  // vertex numbers, leaf by leaf: first those of its vertices

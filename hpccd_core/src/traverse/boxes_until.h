@@ -10,6 +10,7 @@
 namespace hpccd {
 
 struct BoxesUntil {
+  using Ends = AtLeaves;
   static constexpr bool shrink = true;
   const Search& search;
   // When it was looked at last.

@@ -5,6 +5,7 @@ namespace hpccd {
 
 // Of leaf_pairs.inl, compiled for each instruction set.
 namespace scalar {
+std::uint32_t block_pairs(const Tree&, const Block&, const Block&, LeafPair*);
 void leaf_pairs(const Tree&, const LeafRange&, const LeafRange&, CandidateBuffer&, CandidateBuffer&);
 void leaf_pairs_until(const Tree&, const LeafRange&, const LeafRange&, float, CandidateBuffer&, CandidateBuffer&);
 void leaf_pairs_at_start(const Tree&, const LeafRange&, const LeafRange&, float, CandidateBuffer&, CandidateBuffer&);
@@ -12,18 +13,28 @@ void leaf_pairs_in_snapshot(const Tree&, const LeafRange&, const LeafRange&, flo
 }  // namespace scalar
 #if defined(HPCCD_X86)
 namespace avx2 {
+std::uint32_t block_pairs(const Tree&, const Block&, const Block&, LeafPair*);
 void leaf_pairs(const Tree&, const LeafRange&, const LeafRange&, CandidateBuffer&, CandidateBuffer&);
 void leaf_pairs_until(const Tree&, const LeafRange&, const LeafRange&, float, CandidateBuffer&, CandidateBuffer&);
 void leaf_pairs_at_start(const Tree&, const LeafRange&, const LeafRange&, float, CandidateBuffer&, CandidateBuffer&);
 void leaf_pairs_in_snapshot(const Tree&, const LeafRange&, const LeafRange&, float, CandidateBuffer&, CandidateBuffer&);
 }  // namespace avx2
 namespace avx512 {
+std::uint32_t block_pairs(const Tree&, const Block&, const Block&, LeafPair*);
 void leaf_pairs(const Tree&, const LeafRange&, const LeafRange&, CandidateBuffer&, CandidateBuffer&);
 void leaf_pairs_until(const Tree&, const LeafRange&, const LeafRange&, float, CandidateBuffer&, CandidateBuffer&);
 void leaf_pairs_at_start(const Tree&, const LeafRange&, const LeafRange&, float, CandidateBuffer&, CandidateBuffer&);
 void leaf_pairs_in_snapshot(const Tree&, const LeafRange&, const LeafRange&, float, CandidateBuffer&, CandidateBuffer&);
 }  // namespace avx512
 #endif
+
+BlockPairs block_pairs([[maybe_unused]] Simd simd) {
+#if defined(HPCCD_X86)
+  if (simd == Simd::avx512) return avx512::block_pairs;
+  if (simd == Simd::avx2) return avx2::block_pairs;
+#endif
+  return scalar::block_pairs;
+}
 
 LeafPairs leaf_pairs([[maybe_unused]] Simd simd) {
 #if defined(HPCCD_X86)

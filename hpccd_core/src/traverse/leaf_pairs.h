@@ -22,6 +22,19 @@ using LeafPairs = void (*)(const Tree& tree, const LeafRange& a, const LeafRange
 
 LeafPairs leaf_pairs(Simd simd);
 
+// Two leaves whose boxes overlap, by number. For the published methods a leaf is one triangle: the paper's triangle
+// indices.
+struct LeafPair {
+  std::uint32_t first, second;
+};
+
+// Pairs of leaves of two blocks, or of one, whose boxes and k-DOPs overlap; how many there are. Room for a full vector
+// store beyond the last pair.
+inline constexpr std::uint32_t block_pairs_capacity = (Block::width + 1) * Block::width;
+using BlockPairs = std::uint32_t (*)(const Tree& tree, const Block& a, const Block& b, LeafPair* pairs);
+
+BlockPairs block_pairs(Simd simd);
+
 // The same of the motion up to a time below 1.
 using LeafPairsUntil = void (*)(const Tree& tree, const LeafRange& a, const LeafRange& b, float until,
                                 CandidateBuffer& edge_edge, CandidateBuffer& vertex_face);

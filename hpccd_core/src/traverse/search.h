@@ -28,6 +28,7 @@ struct PartOfMotion {
 
 struct Search {
   Geometry geometry;
+  BlockPairs block_pairs = nullptr;
   // Which pairs of features of two leaves; null: none.
   LeafPairs leaf_pairs = nullptr;
   // Of a part of the motion, where the earliest contacts are looked for; also by boxes at the start alone.

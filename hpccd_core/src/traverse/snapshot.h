@@ -13,6 +13,7 @@ inline float reach_of(double distance, double rounding, double scale) {
 }
 
 struct SnapshotBoxes {
+  using Ends = AtLeaves;
   static constexpr bool shrink = false;
   float reach;
   bool overlap(const Node& a, const Node& b) const { return a.near_in_snapshot(b, reach); }

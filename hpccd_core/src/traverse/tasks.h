@@ -54,9 +54,17 @@ class PairRules {
   std::vector<Rule> rules_;  // empty where all are the default
 };
 
-// The pairs that follow from one whose boxes overlap and which is not two leaves.
-template <class Push>
-void refine(const std::vector<Node>& nodes, NodePair p, Push&& push) {
+// Where a walk over the tree ends.
+struct AtLeaves {
+  bool operator()(const Node& node) const { return !node.children; }
+};
+struct AtBlocks {
+  bool operator()(const Node& node) const { return Tree::in_block(node); }
+};
+
+// The pairs that follow from one whose boxes overlap and where the walk does not end.
+template <class Ends, class Push>
+void refine(const std::vector<Node>& nodes, NodePair p, Ends ends, Push&& push) {
   const Node &a = nodes[p.a], &b = nodes[p.b];
   if (p.a == p.b) {
     push(NodePair{a.children, a.children});
@@ -65,8 +73,8 @@ void refine(const std::vector<Node>& nodes, NodePair p, Push&& push) {
     return;
   }
   // The larger node gives way; equal ones go down together.
-  const bool split_a = a.children && (!b.children || a.primitives * 2 > b.primitives);
-  const bool split_b = b.children && (!a.children || b.primitives * 2 > a.primitives);
+  const bool split_a = !ends(a) && (ends(b) || a.primitives * 2 > b.primitives);
+  const bool split_b = !ends(b) && (ends(a) || b.primitives * 2 > a.primitives);
   if (split_a && split_b) {
     for (std::uint32_t i = 0; i < 2; ++i)
       for (std::uint32_t j = 0; j < 2; ++j) push(NodePair{a.children + i, b.children + j});
@@ -77,15 +85,22 @@ void refine(const std::vector<Node>& nodes, NodePair p, Push&& push) {
   }
 }
 
-inline bool is_leaf_pair(const std::vector<Node>& nodes, NodePair p) {
-  return !nodes[p.a].children && !nodes[p.b].children;
+template <class Ends>
+bool is_end(const std::vector<Node>& nodes, NodePair p, Ends ends) {
+  return ends(nodes[p.a]) && ends(nodes[p.b]);
 }
 
 // Which boxes count: overlap(node, node) says whether two nodes may hold a pair. Through the whole motion:
 struct MotionBoxes {
+  using Ends = AtLeaves;
   static constexpr bool shrink = false;  // whether pairs that were worth visiting may be so no longer
   bool overlap(const Node& a, const Node& b) const { return a.overlaps(b); }
   bool within(const Node&) const { return true; }  // the same of one node
+};
+
+// The same down to blocks alone, where the boxes of leaves wait in lanes.
+struct MotionBoxesOfBlocks : MotionBoxes {
+  using Ends = AtBlocks;
 };
 
 template <class Boxes>
@@ -101,17 +116,18 @@ std::vector<NodePair> traversal_tasks(const Tree& tree, const PairRules& rules, 
   std::vector<NodePair> level, next;
   // The root may be all there is: a mesh of one leaf, which the scene may forbid to touch itself.
   constexpr NodePair root{0, 0};
+  constexpr typename Boxes::Ends ends;
   if (tree.nodes.empty() || !worth_visiting(tree.nodes, rules, boxes, root)) return level;
   level.push_back(root);
   for (bool progress = true; progress && level.size() < enough;) {
     progress = false;
     next.clear();
     for (const NodePair& p : level) {
-      if (is_leaf_pair(tree.nodes, p)) {
+      if (is_end(tree.nodes, p, ends)) {
         next.push_back(p);
         continue;
       }
-      refine(tree.nodes, p, [&](NodePair q) {
+      refine(tree.nodes, p, ends, [&](NodePair q) {
         if (worth_visiting(tree.nodes, rules, boxes, q)) next.push_back(q);
       });
       progress = true;

@@ -12,6 +12,7 @@ namespace {
 
 // Nodes that may hold a pair that comes before what was found so far.
 struct NearerBoxes {
+  using Ends = AtLeaves;
   static constexpr bool shrink = true;
   const Tree& tree;
   const NearestPairs& nearest;
@@ -42,6 +43,7 @@ struct NearerBoxes {
 
 // Nodes that may hold a pair that touches and is not listed.
 struct UnlistedBoxes {
+  using Ends = AtLeaves;
   static constexpr bool shrink = false;
   const Tree& tree;
   const Drift& drift;
@@ -53,11 +55,23 @@ struct UnlistedBoxes {
   std::uint32_t number(const Node& node) const { return static_cast<std::uint32_t>(&node - tree.nodes.data()); }
 };
 
+const Block& block_of(const Tree& tree, std::uint32_t node) {
+  return tree.blocks[tree.block_of_leaf[tree.nodes[node].leaf]];
+}
+
 // From pairs that are worth visiting. `between` is called between two of them and may take from the stack.
 template <class Boxes, class Between>
 void walk(const Tree& tree, const PairRules& rules, Boxes boxes, const Cancellation& cancellation,
           std::vector<NodePair>& stack, Worker& worker, Between&& between) {
   const bool bounded = worker.search().bounded();
+  constexpr typename Boxes::Ends ends;
+  const auto at_leaves = [&](LeafPair leaves) {
+    ++worker.leaf_pairs;
+    if (!worker.sink)
+      test_leaves(tree, rules, leaves, worker);
+    else
+      for (const LeafPair left : worker.sink->push(leaves)) test_leaves(tree, rules, left, worker);
+  };
   std::size_t stale = 0;  // so many at the bottom were put there when boxes were larger
   while (!stack.empty()) {
     cancellation.heed();
@@ -71,16 +85,17 @@ void walk(const Tree& tree, const PairRules& rules, Boxes boxes, const Cancellat
         if (!boxes.open(p) || !worth_visiting(tree.nodes, rules, boxes, p)) continue;
       }
     }
-    if (is_leaf_pair(tree.nodes, p)) {
-      const LeafPair leaves{tree.nodes[p.a].leaf, tree.nodes[p.b].leaf};
-      ++worker.leaf_pairs;
-      if (!worker.sink)
-        test_leaves(tree, rules, leaves, worker);
-      else
-        for (const LeafPair left : worker.sink->push(leaves)) test_leaves(tree, rules, left, worker);
+    if (is_end(tree.nodes, p, ends)) {
+      if constexpr (std::is_same_v<typename Boxes::Ends, AtBlocks>) {
+        LeafPair found[block_pairs_capacity];
+        const std::uint32_t n = worker.search().block_pairs(tree, block_of(tree, p.a), block_of(tree, p.b), found);
+        for (std::uint32_t i = 0; i < n; ++i) at_leaves(found[i]);
+      } else {
+        at_leaves({tree.nodes[p.a].leaf, tree.nodes[p.b].leaf});
+      }
     } else {
       const std::size_t below = stack.size();
-      refine(tree.nodes, p, [&](NodePair q) {
+      refine(tree.nodes, p, ends, [&](NodePair q) {
         ++worker.node_pairs;
         if (worth_visiting(tree.nodes, rules, boxes, q)) stack.push_back(q);
       });
@@ -217,7 +232,7 @@ void traverse(const Tree& tree, const PairRules& rules, Search& search, ThreadPo
   else if (search.prunes)
     traverse_all(tree, rules, BoxesUntil{search}, search, pool, workers);
   else
-    traverse_all(tree, rules, MotionBoxes(), search, pool, workers);
+    traverse_all(tree, rules, MotionBoxesOfBlocks(), search, pool, workers);
 }
 
 }  // namespace hpccd

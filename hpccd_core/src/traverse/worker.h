@@ -12,12 +12,6 @@
 
 namespace hpccd {
 
-// Two leaves whose boxes overlap, by number. For the published methods a leaf is one triangle: the paper's triangle
-// indices.
-struct LeafPair {
-  std::uint32_t first, second;
-};
-
 // Takes pairs of leaves that somebody else shall test.
 class PairSink {
  public:
