@@ -114,7 +114,8 @@ bool make_room(Tree& tree, const MotionBounds& motion) {
   if (tree.rows && tree.grown == motion.grown && with_kdops == !tree.kdops.empty()) return true;
   tree.grown = motion.grown;
   tree.kdops.resize(with_kdops ? tree.leaves.size() : 0);
-  tree.rows = std::make_unique_for_overwrite<CornerRow[]>(tree.n_groups * tree.rows_per_group());
+  // Kernels read two groups where one of two leaves has as many.
+  tree.rows = std::make_unique_for_overwrite<CornerRow[]>((tree.n_groups + 1) * tree.rows_per_group());
   return false;
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Included once per instruction set, after its header (base/simd/scalar.h). Boxes are compared 16 at a time.
+// Included once per instruction set, after its header (base/simd/scalar.h). Corners are compared 16 at a time.
 
 #include "traverse/leaf_pairs.h"
 
@@ -8,70 +8,81 @@ namespace {
 
 #include "traverse/leaf_boxes.inl"
 
-// Edges of a that are near b, against all edges of b.
-template <class When>
-HPCCD_HD void near_edges(When when, const Tree& tree, const Near& near_a, const LeafRange& a, const LeafCorners& corners_a,
-                         const EdgeBoxes& boxes_a, const LeafRange& b, const LeafCorners& corners_b,
-                         const EdgeBoxes& boxes_b, CandidateBuffer& out) {
-  const bool same = &a == &b;
-  const std::uint32_t n_a = a.n_edges(), n_b = b.n_edges();
-  const EdgeEnds ends(corners_b, corners_b.of->edge, n_b);
-  const std::uint32_t* edge = tree.edge_of_slot.data();
-  for (std::uint32_t i = 0; i < n_b; i += BoxGroup::width) {
-    const auto group = when.load(boxes_b.groups[i / BoxGroup::width]);
-    const std::uint32_t slot = b.first_edge + i;
-    const std::uint32_t *end0 = ends.of[0] + i, *end1 = ends.of[1] + i;
-    for_each(near_a, n_a, [&](std::uint32_t k) {
-      unsigned m =
-          when.overlapping(group, when.bounds(bounds_at(boxes_a.groups, k))) & lanes_in(i, same ? k + 1 : 0, n_b);
-      if (!m) return;
-      const std::uint32_t v0 = corners_a.numbers[corners_a.of->edge[0][k]],
-                          v1 = corners_a.numbers[corners_a.of->edge[1][k]];
-      m &= ~(equal16(end0, v0) | equal16(end0, v1) | equal16(end1, v0) | equal16(end1, v1));
-      append<true>(out, edge[a.first_edge + k], edge + slot, m);
-    });
-  }
-}
-
-template <class When>
-HPCCD_HD void edge_pairs(When when, const Tree& tree, const LeafRange& a, const LeafRange& b, const LeafCorners& corners_a,
-                         const LeafCorners& corners_b, const Node& node_a, const Node& node_b, CandidateBuffer& out) {
-  const EdgeBoxes boxes_a(corners_a, a.n_edges());
-  const Near near_a = near(when, boxes_a.groups, 0, a.n_edges(), node_b);
-  if (!near_a.count) return;
-  if (&a == &b) return near_edges(when, tree, near_a, a, corners_a, boxes_a, a, corners_a, boxes_a, out);
-  const EdgeBoxes boxes_b(corners_b, b.n_edges());
-  const Near near_b = near(when, boxes_b.groups, 0, b.n_edges(), node_a);
-  if (!near_b.count) return;
-  // One by one the fewer, in groups the others.
-  if (near_a.count <= near_b.count)
-    near_edges(when, tree, near_a, a, corners_a, boxes_a, b, corners_b, boxes_b, out);
-  else
-    near_edges(when, tree, near_b, b, corners_b, boxes_b, a, corners_a, boxes_a, out);
-}
-
-// Vertices of a against faces of b.
-template <class When>
-HPCCD_HD void vertex_face_pairs(When when, const Tree& tree, const LeafRange& a, const LeafRange& b,
-                                const LeafCorners& corners_a, const LeafCorners& corners_b, const Node& node_b,
-                                CandidateBuffer& out) {
-  const std::uint32_t n_a = a.n_vertices();
-  const VertexBoxes boxes(corners_a, n_a);
-  static_assert(Tree::leaf_size <= BoxGroup::width);
-  const Near near_a = near(when, boxes.groups, 0, n_a, node_b);
-  if (!near_a.count) return;
-  const FaceBoxes face_boxes(corners_b);
-  const FaceCorners corners(corners_b, corners_b.of->face, b.n_faces());
-  const std::uint32_t* face = tree.face_of_slot.data() + b.first_face;
-  const auto faces = when.load(face_boxes.group);
-  for_each(near_a, n_a, [&](std::uint32_t k) {
-    unsigned m = when.overlapping(faces, when.bounds(bounds_at(boxes.groups, k))) & lanes_in(0, 0, b.n_faces());
+// These edges of a, one by one, against these of b.
+template <class Kernel, class When>
+HPCCD_HD void edge_pairs(When when, const LeafFeatures& a, const LeafFeatures& b, const typename Kernel::Lanes& lanes_b,
+                         unsigned edges_a, unsigned edges_b, CandidateBuffer& out) {
+  const bool same = a.rows == b.rows;
+  for_each(edges_a, [&](std::uint32_t k) {
+    unsigned m = typename Kernel::Outcodes(when, lanes_b, Kernel::edge_box(a, k)).edges(b) & edges_b;
+    if (same) m &= ~first_bits(k + 1);
     if (!m) return;
-    const std::uint32_t v = corners_a.numbers[k];
-    m &= ~(equal16(corners.of[0], v) | equal16(corners.of[1], v) | equal16(corners.of[2], v));
-    append<false>(out, v, face, m);
+    const auto& end = a.corners_of->edge;
+    const typename Kernel::Shared shared(b, a.corners[end[0][k]], a.corners[end[1][k]]);
+    if (shared.any) m &= shared.edges_without(b);
+    append<true>(out, a.edges[k], b.edges, m);
   });
 }
+
+// These vertices of a, one by one, against these faces of b.
+template <class Kernel, class When>
+HPCCD_HD void vertex_face_pairs(When when, const LeafFeatures& a, const LeafFeatures& b,
+                                const typename Kernel::Lanes& lanes_b, unsigned vertices_a, unsigned faces_b,
+                                CandidateBuffer& out) {
+  for_each(vertices_a, [&](std::uint32_t k) {
+    unsigned m = typename Kernel::Outcodes(when, lanes_b, Kernel::box_of(a, k)).faces(b) & faces_b;
+    if (!m) return;
+    const typename Kernel::Shared shared(b, a.corners[k]);
+    if (shared.any) m &= shared.faces_without(b);
+    append<false>(out, a.corners[k], b.faces, m);
+  });
+}
+
+template <class Kernel, class When>
+HPCCD_HD void pairs_within(When when, const LeafFeatures& leaf, CandidateBuffer& edge_edge,
+                           CandidateBuffer& vertex_face) {
+  const typename Kernel::Lanes lanes(when, leaf);
+  const unsigned edges = first_bits(leaf.n_edges);
+  edge_pairs<Kernel>(when, leaf, leaf, lanes, edges, edges, edge_edge);
+  vertex_face_pairs<Kernel>(when, leaf, leaf, lanes, first_bits(leaf.n_vertices), first_bits(leaf.n_faces), vertex_face);
+}
+
+// Only what is near the other leaf's box is looked at one by one.
+template <class Kernel, class When>
+HPCCD_HD void pairs_between(When when, const LeafFeatures& a, const LeafFeatures& b, const Node& node_a,
+                            const Node& node_b, CandidateBuffer& edge_edge, CandidateBuffer& vertex_face) {
+  const typename Kernel::Lanes lanes_a(when, a), lanes_b(when, b);
+  const typename Kernel::Outcodes near_a(when, lanes_a, bounds_of(node_b)), near_b(when, lanes_b, bounds_of(node_a));
+  const unsigned edges_a = near_a.edges(a), edges_b = near_b.edges(b);
+  if (edges_a && edges_b) {
+    // One by one the fewer.
+    if (__builtin_popcount(edges_a) <= __builtin_popcount(edges_b))
+      edge_pairs<Kernel>(when, a, b, lanes_b, edges_a, edges_b, edge_edge);
+    else
+      edge_pairs<Kernel>(when, b, a, lanes_a, edges_b, edges_a, edge_edge);
+  }
+  const unsigned faces_a = near_a.faces(a), faces_b = near_b.faces(b);
+  if (faces_b) vertex_face_pairs<Kernel>(when, a, b, lanes_b, near_a.vertices(a), faces_b, vertex_face);
+  if (faces_a) vertex_face_pairs<Kernel>(when, b, a, lanes_a, near_b.vertices(b), faces_a, vertex_face);
+}
+
+// Sixteen boxes of leaves.
+struct BoxLanes {
+  Rows16<n_bounds> rows;
+  HPCCD_HD explicit BoxLanes(const float (&at)[n_bounds][Block::width]) : rows(load_rows(at)) {}
+  // Bit j: box j overlaps b (MotionBox::overlaps).
+  template <class Box>
+  HPCCD_HD unsigned overlapping(const Box& b) const {
+    Mask16 apart;
+    for (std::uint32_t axis = 0; axis < 3; ++axis) {
+      const Mask16 below = less(rows[high(0, axis)], all16(b[low(0, axis)]));
+      const Mask16 above = less(all16(b[high(0, axis)]), rows[low(0, axis)]);
+      apart = apart | (below & less(rows[high(1, axis)], all16(b[low(1, axis)])));
+      apart = apart | (above & less(all16(b[high(1, axis)]), rows[low(1, axis)]));
+    }
+    return ~apart.bits() & 0xFFFF;
+  }
+};
 
 // Along a direction of their k-DOPs.
 HPCCD_HD bool are_apart(const Kdop& a, const Kdop& b) {
@@ -84,30 +95,33 @@ HPCCD_HD void pairs_of_leaves(When when, const Tree& tree, const LeafRange& a, c
   const std::uint32_t* leaf_nodes = tree.leaf_nodes.data();
   const LeafRange* leaves = tree.leaves.data();
   const Node &node_a = tree.nodes.data()[leaf_nodes[&a - leaves]], &node_b = tree.nodes.data()[leaf_nodes[&b - leaves]];
-  const LeafCorners corners_a(tree, a), corners_b(tree, b);
-  edge_pairs(when, tree, a, b, corners_a, corners_b, node_a, node_b, edge_edge);
-  vertex_face_pairs(when, tree, a, b, corners_a, corners_b, node_b, vertex_face);
-  if (&a != &b) vertex_face_pairs(when, tree, b, a, corners_b, corners_a, node_a, vertex_face);
+  const LeafFeatures leaf_a(tree, a), leaf_b(tree, b);
+  with_leaves<When>(tree, leaf_a, leaf_b, [&](auto kernel) {
+    using Kernel = decltype(kernel);
+    if (&a == &b)
+      pairs_within<Kernel>(when, leaf_a, edge_edge, vertex_face);
+    else
+      pairs_between<Kernel>(when, leaf_a, leaf_b, node_a, node_b, edge_edge, vertex_face);
+  });
 }
 
 }  // namespace
 
 std::uint32_t block_pairs(const Tree& tree, const Block& a, const Block& b, LeafPair* pairs) {
-  constexpr BothEnds when;
   const Node* nodes = tree.nodes.data();
   const Kdop* kdops = tree.kdops.data();
   const bool same = &a == &b;
-  const auto group = load_rows(b.rows);
-  unsigned near_a = lanes_in(0, 0, a.n_leaves), near_b = lanes_in(0, 0, b.n_leaves);
+  const BoxLanes boxes_b(b.rows);
+  unsigned near_a = first_bits(a.n_leaves), near_b = first_bits(b.n_leaves);
   if (!same) {
-    near_a &= when.overlapping(load_rows(a.rows), bounds_of(nodes[b.node]));
-    near_b &= when.overlapping(group, bounds_of(nodes[a.node]));
+    near_a &= BoxLanes(a.rows).overlapping(bounds_of(nodes[b.node]));
+    near_b &= boxes_b.overlapping(bounds_of(nodes[a.node]));
   }
   std::uint32_t n = 0;
   for (unsigned left = near_a; left; left &= left - 1) {
     const auto i = static_cast<std::uint32_t>(__builtin_ctz(left));
     const std::uint32_t number = a.first_leaf + i;
-    unsigned m = when.overlapping(group, Bounds<Block::width>{a.rows[0] + i}) & near_b;
+    unsigned m = boxes_b.overlapping(Bounds<Block::width>{a.rows[0] + i}) & near_b;
     if (same) m &= ~0u << i;
     for (; m; m &= m - 1) {
       const std::uint32_t other = b.first_leaf + static_cast<std::uint32_t>(__builtin_ctz(m));

@@ -118,40 +118,34 @@ HPCCD_HD Rows16<n> load_rows(const float (&rows)[n][16]) {
   return {rows};
 }
 
-struct Picks16 {
-  __m256i half[2];
+struct Bytes16 {
+  __m128i v;
 };
-HPCCD_HD Picks16 picks(const std::uint8_t* which) {
-  const __m128i all = _mm_load_si128(reinterpret_cast<const __m128i*>(which));
-  return {{_mm256_cvtepu8_epi32(all), _mm256_cvtepu8_epi32(_mm_srli_si128(all, 8))}};
+HPCCD_HD Bytes16 load_bytes(const std::uint8_t* x) { return {_mm_load_si128(reinterpret_cast<const __m128i*>(x))}; }
+HPCCD_HD Bytes16 operator&(Bytes16 a, Bytes16 b) { return {_mm_and_si128(a.v, b.v)}; }
+HPCCD_HD Bytes16 operator|(Bytes16 a, Bytes16 b) { return {_mm_or_si128(a.v, b.v)}; }
+HPCCD_HD Bytes16 bits_to_bytes(const Mask16 m[6]) {
+  __m256i half[2] = {_mm256_setzero_si256(), _mm256_setzero_si256()};
+  for (int i = 0; i < 6; ++i)
+    for (int h = 0; h < 2; ++h)
+      half[h] = _mm256_or_si256(half[h], _mm256_and_si256(_mm256_castps_si256(m[i].half[h]), _mm256_set1_epi32(1 << i)));
+  // Quarters of eight numbers each: 0 2 1 3.
+  const __m256i words = _mm256_permute4x64_epi64(_mm256_packs_epi32(half[0], half[1]), 0xD8);
+  return {_mm_packus_epi16(_mm256_castsi256_si128(words), _mm256_extracti128_si256(words, 1))};
 }
-// Bit `bit` of each pick decides between two.
-template <int bit>
-HPCCD_HD __m256 by_bit(__m256i pick, __m256 zero, __m256 one) {
-  return _mm256_blendv_ps(zero, one, _mm256_castsi256_ps(_mm256_slli_epi32(pick, 31 - bit)));
+HPCCD_HD Bytes16 to_bytes(unsigned bits) {
+  const __m128i bit = _mm_set1_epi64x(static_cast<long long>(0x8040201008040201ull));
+  const __m128i twice = _mm_shuffle_epi8(_mm_cvtsi32_si128(static_cast<int>(bits)),
+                                         _mm_set_epi64x(0x0101010101010101, 0));
+  return {_mm_and_si128(_mm_cmpeq_epi8(_mm_and_si128(twice, bit), bit), _mm_set1_epi8(1))};
 }
-HPCCD_HD __m256 of_row(__m256 low, __m256 high, __m256i pick) {
-  return by_bit<3>(pick, _mm256_permutevar8x32_ps(low, pick), _mm256_permutevar8x32_ps(high, pick));
+HPCCD_HD Bytes16 picked(Bytes16 bytes, Bytes16 which) { return {_mm_shuffle_epi8(bytes.v, which.v)}; }
+HPCCD_HD Bytes16 picked(Bytes16 bytes, Bytes16 next, Bytes16 which) {
+  return {_mm_blendv_epi8(_mm_shuffle_epi8(bytes.v, which.v), _mm_shuffle_epi8(next.v, which.v),
+                          _mm_slli_epi16(which.v, 3))};
 }
-HPCCD_HD Floats16 picked(const float* row, const Picks16& p) {
-  const __m256 low = _mm256_load_ps(row), high = _mm256_load_ps(row + 8);
-  return {{of_row(low, high, p.half[0]), of_row(low, high, p.half[1])}};
-}
-HPCCD_HD Floats16 picked(const float* row, const float* next, const Picks16& p) {
-  const Floats16 a = picked(row, p), b = picked(next, p);
-  return {{by_bit<4>(p.half[0], a.half[0], b.half[0]), by_bit<4>(p.half[1], a.half[1], b.half[1])}};
-}
-HPCCD_HD void store16(float* out, const Floats16& x) {
-  _mm256_store_ps(out, x.half[0]);
-  _mm256_store_ps(out + 8, x.half[1]);
-}
-HPCCD_HD void pick(std::uint32_t* out, const std::uint32_t* numbers, const Picks16& p) {
-  const auto part = [&](int i) { return _mm256_castsi256_ps(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(numbers + 8 * i))); };
-  for (int half = 0; half < 2; ++half) {
-    const __m256i which = p.half[half];
-    const __m256 x = by_bit<4>(which, of_row(part(0), part(1), which), of_row(part(2), part(3), which));
-    _mm256_store_ps(reinterpret_cast<float*>(out + 8 * half), x);
-  }
+HPCCD_HD unsigned zeros(Bytes16 x) {
+  return static_cast<unsigned>(_mm_movemask_epi8(_mm_cmpeq_epi8(x.v, _mm_setzero_si128())));
 }
 
 HPCCD_HD unsigned equal16(const std::uint32_t* numbers, std::uint32_t x) {

@@ -121,22 +121,28 @@ HPCCD_HD Rows16<n> load_rows(const float (&rows)[n][16]) {
   return r;
 }
 
-// Which of 16 numbers, or of 32 in two rows, each lane takes.
-struct Picks16 {
-  __m512i v;
+// Sixteen bytes.
+struct Bytes16 {
+  __m128i v;
 };
-HPCCD_HD Picks16 picks(const std::uint8_t* which) {
-  return {_mm512_cvtepu8_epi32(_mm_load_si128(reinterpret_cast<const __m128i*>(which)))};
+HPCCD_HD Bytes16 load_bytes(const std::uint8_t* x) { return {_mm_load_si128(reinterpret_cast<const __m128i*>(x))}; }
+HPCCD_HD Bytes16 operator&(Bytes16 a, Bytes16 b) { return {_mm_and_si128(a.v, b.v)}; }
+HPCCD_HD Bytes16 operator|(Bytes16 a, Bytes16 b) { return {_mm_or_si128(a.v, b.v)}; }
+// Bit i of byte j: lane j of m[i].
+HPCCD_HD Bytes16 bits_to_bytes(const Mask16 m[6]) {
+  __m128i all = _mm_maskz_set1_epi8(m[0].m, 1);
+  for (int i = 1; i < 6; ++i) all = _mm_mask_add_epi8(all, m[i].m, all, _mm_set1_epi8(static_cast<char>(1 << i)));
+  return {all};
 }
-HPCCD_HD Floats16 picked(const float* row, Picks16 p) { return {_mm512_permutexvar_ps(p.v, _mm512_load_ps(row))}; }
-HPCCD_HD Floats16 picked(const float* row, const float* next, Picks16 p) {
-  return {_mm512_permutex2var_ps(_mm512_load_ps(row), p.v, _mm512_load_ps(next))};
+// One, or zero.
+HPCCD_HD Bytes16 to_bytes(unsigned bits) { return {_mm_maskz_set1_epi8(static_cast<__mmask16>(bits), 1)}; }
+// Byte j: that of number which[j], out of 16 or of 32.
+HPCCD_HD Bytes16 picked(Bytes16 bytes, Bytes16 which) { return {_mm_shuffle_epi8(bytes.v, which.v)}; }
+HPCCD_HD Bytes16 picked(Bytes16 bytes, Bytes16 next, Bytes16 which) {
+  return {_mm_mask_shuffle_epi8(_mm_shuffle_epi8(bytes.v, which.v), _mm_test_epi8_mask(which.v, _mm_set1_epi8(16)),
+                                next.v, which.v)};
 }
-// The same of whole numbers, from any address, to a full row.
-HPCCD_HD void pick(std::uint32_t* out, const std::uint32_t* numbers, Picks16 p) {
-  _mm512_store_si512(out, _mm512_permutex2var_epi32(_mm512_loadu_si512(numbers), p.v, _mm512_loadu_si512(numbers + 16)));
-}
-HPCCD_HD void store16(float* out, Floats16 x) { _mm512_store_ps(out, x.v); }
+HPCCD_HD unsigned zeros(Bytes16 x) { return _mm_testn_epi8_mask(x.v, x.v); }
 
 HPCCD_HD unsigned equal16(const std::uint32_t* numbers, std::uint32_t x) {
   return _mm512_cmpeq_epi32_mask(_mm512_loadu_si512(numbers), _mm512_set1_epi32(static_cast<int>(x)));

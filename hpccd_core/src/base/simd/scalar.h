@@ -118,29 +118,56 @@ HPCCD_HD Rows16<n> load_rows(const float (&rows)[n][16]) {
   return {rows};
 }
 
-// Which of 16 numbers, or of 32 in two rows, each lane takes.
-struct Picks16 {
-  const std::uint8_t* which;
+// Sixteen bytes.
+struct Bytes16 {
+  typedef std::uint8_t Vec __attribute__((vector_size(16)));
+  Vec v;
 };
-HPCCD_HD Picks16 picks(const std::uint8_t* which) { return {which}; }
-HPCCD_HD Floats16 picked(const float* row, Picks16 p) {
-  Floats16 r;
-  for (int i = 0; i < 4; ++i) {
-    const std::uint8_t* w = p.which + 4 * i;
-    r.part[i] = Floats4{row[w[0]], row[w[1]], row[w[2]], row[w[3]]};
+HPCCD_HD Bytes16 load_bytes(const std::uint8_t* x) {
+  Bytes16 r;
+  __builtin_memcpy(&r, x, sizeof r);
+  return r;
+}
+HPCCD_HD Bytes16 operator&(Bytes16 a, Bytes16 b) { return {a.v & b.v}; }
+HPCCD_HD Bytes16 operator|(Bytes16 a, Bytes16 b) { return {a.v | b.v}; }
+// Bit i of byte j: lane j of m[i].
+HPCCD_HD Bytes16 bits_to_bytes(const Mask16* m) {
+  Bytes16 r;
+  for (int part = 0; part < 4; ++part) {
+    Mask4 all{};
+    for (int i = 0; i < 6; ++i) all |= m[i].part[part] & (1 << i);
+    for (int j = 0; j < 4; ++j) r.v[4 * part + j] = static_cast<std::uint8_t>(all[j]);
   }
   return r;
 }
-HPCCD_HD Floats16 picked(const float* row, const float* next, Picks16 p) {
-  Floats16 r;
-  for (int j = 0; j < 16; ++j) r.part[j / 4][j % 4] = p.which[j] < 16 ? row[p.which[j]] : next[p.which[j] - 16];
+// One, or zero.
+HPCCD_HD Bytes16 to_bytes(unsigned bits) {
+  Bytes16 r;
+  for (int j = 0; j < 16; ++j) r.v[j] = bits >> j & 1;
   return r;
 }
-// The same of whole numbers, from any address, to a full row.
-HPCCD_HD void pick(std::uint32_t* out, const std::uint32_t* numbers, Picks16 p) {
-  for (int j = 0; j < 16; ++j) out[j] = numbers[p.which[j]];
+// Byte j: that of number which[j], out of 16 or of 32.
+HPCCD_HD Bytes16 picked(Bytes16 bytes, Bytes16 which) {
+  std::uint8_t of[16], w[16];
+  __builtin_memcpy(of, &bytes, 16), __builtin_memcpy(w, &which, 16);
+  for (auto& x : w) x = of[x];
+  return load_bytes(w);
 }
-HPCCD_HD void store16(float* out, const Floats16& x) { __builtin_memcpy(out, &x, sizeof x); }
+HPCCD_HD Bytes16 picked(Bytes16 bytes, Bytes16 next, Bytes16 which) {
+  std::uint8_t of[32], w[16];
+  __builtin_memcpy(of, &bytes, 16), __builtin_memcpy(of + 16, &next, 16), __builtin_memcpy(w, &which, 16);
+  for (auto& x : w) x = of[x];
+  return load_bytes(w);
+}
+HPCCD_HD unsigned zeros(Bytes16 x) {
+#if defined(__SSE2__)
+  return static_cast<unsigned>(_mm_movemask_epi8(_mm_cmpeq_epi8((__m128i)x.v, _mm_setzero_si128())));
+#else
+  unsigned bits = 0;
+  for (unsigned j = 0; j < 16; ++j) bits |= static_cast<unsigned>(x.v[j] == 0) << j;
+  return bits;
+#endif
+}
 
 // Bit j: number j of sixteen equals x.
 HPCCD_HD unsigned equal16(const std::uint32_t* numbers, std::uint32_t x) {
