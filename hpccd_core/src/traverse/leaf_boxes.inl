@@ -143,7 +143,7 @@ struct LeafFeatures {
 
 HPCCD_HD constexpr std::uint32_t first_bits(std::uint32_t n) { return n >= 32 ? ~0u : (1u << n) - 1; }
 
-// How a kernel reads leaves: with one or two groups of corners, whose boxes have grown or not (Tree::grown).
+// How a leaf is read: with one or two groups of corners, whose boxes have grown or not (Tree::grown).
 template <class When, bool many, bool grown>
 struct Leaves {
   static constexpr std::uint32_t groups = many ? 2 : 1, sides = grown || When::grows ? 2 : 1;
@@ -242,30 +242,73 @@ struct Leaves {
     }
   };
 
-  // The box of corner, or of several.
-  template <class... Corner>
-  HPCCD_HD static FeatureBox box_of(const LeafFeatures& leaf, Corner... corner) {
-    FeatureBox box;
-    for (std::uint32_t end = 0; end < 2; ++end)
-      for (std::uint32_t axis = 0; axis < 3; ++axis) {
-        const auto at = [&](std::uint32_t c, std::uint32_t first_row) {
-          const CornerRow* rows = leaf.rows + first_row + 3 * end + axis;
-          if constexpr (many) return rows[c / 16 * next_group].lane[c % 16];
-          return rows->lane[c];
-        };
-        float least = INFINITY, most = -INFINITY;
-        ((least = lesser(at(corner, 0), least), most = greater(at(corner, high_rows), most)), ...);
-        box.at[low(end, axis)] = least, box.at[high(end, axis)] = most;
-      }
-    return box;
+  // The box of one corner, where it lies.
+  struct CornerBox {
+    const CornerRow* rows;
+    std::uint32_t lane;
+    HPCCD_HD const float& row_of(std::uint32_t bound) const {
+      const std::uint32_t row = bound / 6 * 3 + bound % 3;
+      return rows[side_of_bound(bound) == Side::low ? row : row + high_rows].lane[lane];
+    }
+    HPCCD_HD float operator[](std::uint32_t bound) const { return row_of(bound); }
+  };
+  HPCCD_HD static Floats16 picked_of(const float* row, Picks16 p) {
+    if constexpr (many)
+      return picked(row, row + next_group * CornerRow::width, p);
+    else
+      return picked(row, p);
   }
-  HPCCD_HD static FeatureBox edge_box(const LeafFeatures& leaf, std::uint32_t k) {
-    return box_of(leaf, leaf.corners_of->edge[0][k], leaf.corners_of->edge[1][k]);
+  HPCCD_HD static CornerBox box_of(const LeafFeatures& leaf, std::uint32_t corner) {
+    if constexpr (many) return {leaf.rows + corner / 16 * next_group, corner % 16};
+    return {leaf.rows, corner};
+  }
+  template <class... Boxes>
+  HPCCD_HD static FeatureBox joined(const Boxes&... of) {
+    FeatureBox box;
+    for (std::uint32_t i = 0; i < n_bounds; ++i) {
+      const bool is_low = side_of_bound(i) == Side::low;
+      float x = is_low ? INFINITY : -INFINITY;
+      ((x = is_low ? lesser(of[i], x) : greater(of[i], x)), ...);
+      box.at[i] = x;
+    }
+    return box;
   }
   HPCCD_HD static FeatureBox face_box(const LeafFeatures& leaf, std::uint32_t k) {
     const auto& corner = leaf.corners_of->face;
-    return box_of(leaf, corner[0][k], corner[1][k], corner[2][k]);
+    return joined(box_of(leaf, corner[0][k]), box_of(leaf, corner[1][k]), box_of(leaf, corner[2][k]));
   }
+};
+
+// The boxes of a leaf's edges: where lanes can be picked at once all of them, else one by one.
+template <class Kernel>
+class EdgeBoxes {
+ public:
+  HPCCD_HD explicit EdgeBoxes(const LeafFeatures& leaf) : leaf_(leaf) {
+    if constexpr (picks_at_once)
+      for (std::uint32_t i = 0; i < leaf.n_edges; i += 16) join(i);
+  }
+  HPCCD_HD auto operator[](std::uint32_t k) const {
+    if constexpr (picks_at_once) {
+      return Bounds<CornersOf::most_edges>{bounds_[0] + k};
+    } else {
+      const auto& end = leaf_.corners_of->edge;
+      return Kernel::joined(Kernel::box_of(leaf_, end[0][k]), Kernel::box_of(leaf_, end[1][k]));
+    }
+  }
+
+ private:
+  HPCCD_HD void join(std::uint32_t i) {
+    const auto& end = leaf_.corners_of->edge;
+    const Picks16 first = picks(end[0] + i), second = picks(end[1] + i);
+    for (std::uint32_t bound = 0; bound < n_bounds; ++bound) {
+      const float* row = &Kernel::box_of(leaf_, 0).row_of(bound);
+      const Floats16 a = Kernel::picked_of(row, first), b = Kernel::picked_of(row, second);
+      store16(bounds_[bound] + i, side_of_bound(bound) == Side::low ? min(a, b) : max(a, b));
+    }
+  }
+
+  const LeafFeatures& leaf_;
+  alignas(64) float bounds_[picks_at_once ? n_bounds : 1][CornersOf::most_edges];
 };
 
 // Appends the pairs of `number` with those of the features from `others` on that are in m.
@@ -281,12 +324,16 @@ HPCCD_HD void for_each(unsigned bits, Function&& f) {
   for (; bits; bits &= bits - 1) f(static_cast<std::uint32_t>(__builtin_ctz(bits)));
 }
 
-// Calls f with the Leaves that these two need.
+// Calls f with how each of them is to be read.
 template <class When, class Function>
-HPCCD_HD void with_leaves(const Tree& tree, const LeafFeatures& a, const LeafFeatures& b, Function&& f) {
-  const bool many = a.many || b.many;
-  if (tree.grown)
-    many ? f(Leaves<When, true, true>()) : f(Leaves<When, false, true>());
-  else
-    many ? f(Leaves<When, true, false>()) : f(Leaves<When, false, false>());
+HPCCD_HD void with_kernels(const Tree& tree, const LeafFeatures& a, const LeafFeatures& b, Function&& f) {
+  const auto with = [&](auto grown) {
+    using One = Leaves<When, false, decltype(grown)::value>;
+    using Many = Leaves<When, true, decltype(grown)::value>;
+    if (a.many)
+      b.many ? f(Many(), Many()) : f(Many(), One());
+    else
+      b.many ? f(One(), Many()) : f(One(), One());
+  };
+  tree.grown ? with(std::true_type()) : with(std::false_type());
 }

@@ -9,20 +9,21 @@ namespace {
 #include "traverse/leaf_boxes.inl"
 
 // Edges of a against faces of b: one by one the faces, of which a leaf has fewer.
-template <class Kernel>
+template <class A, class B>
 HPCCD_HD void edges_against_faces(const LeafFeatures& a, const LeafFeatures& b, const Node& node_a, const Node& node_b,
                                   CandidateBuffer& out) {
   constexpr InSnapshot when{0};
-  const typename Kernel::Lanes lanes_a(when, a), lanes_b(when, b);
-  const unsigned faces = typename Kernel::Outcodes(when, lanes_b, bounds_of(node_a)).faces(b);
+  const typename A::Lanes lanes_a(when, a);
+  const typename B::Lanes lanes_b(when, b);
+  const unsigned faces = typename B::Outcodes(when, lanes_b, bounds_of(node_a)).faces(b);
   if (!faces) return;
-  const unsigned edges = typename Kernel::Outcodes(when, lanes_a, bounds_of(node_b)).edges(a);
+  const unsigned edges = typename A::Outcodes(when, lanes_a, bounds_of(node_b)).edges(a);
   if (!edges) return;
   for_each(faces, [&](std::uint32_t k) {
-    unsigned m = typename Kernel::Outcodes(when, lanes_a, Kernel::face_box(b, k)).edges(a) & edges;
+    unsigned m = typename A::Outcodes(when, lanes_a, B::face_box(b, k)).edges(a) & edges;
     if (!m) return;
     const auto& corner = b.corners_of->face;
-    const typename Kernel::Shared shared(a, b.corners[corner[0][k]], b.corners[corner[1][k]], b.corners[corner[2][k]]);
+    const typename A::Shared shared(a, b.corners[corner[0][k]], b.corners[corner[1][k]], b.corners[corner[2][k]]);
     if (shared.any) m &= shared.edges_without(a);
     for (std::uint32_t i = 0; i < 32 && m >> i; i += 16)
       append_pairs<false>(out.second, out.first, out.n, b.faces[k], a.edges + i, m >> i & 0xFFFF);
@@ -36,10 +37,11 @@ void leaf_edge_faces(const Tree& tree, const LeafRange& a, const LeafRange& b, C
   const LeafRange* leaves = tree.leaves.data();
   const Node &node_a = tree.nodes.data()[leaf_nodes[&a - leaves]], &node_b = tree.nodes.data()[leaf_nodes[&b - leaves]];
   const LeafFeatures leaf_a(tree, a), leaf_b(tree, b);
-  with_leaves<InSnapshot>(tree, leaf_a, leaf_b, [&](auto kernel) {
-    using Kernel = decltype(kernel);
-    edges_against_faces<Kernel>(leaf_a, leaf_b, node_a, node_b, edge_face);
-    if (&a != &b) edges_against_faces<Kernel>(leaf_b, leaf_a, node_b, node_a, edge_face);
+  with_kernels<InSnapshot>(tree, leaf_a, leaf_b, [&](auto of_a, auto of_b) {
+    using A = decltype(of_a);
+    using B = decltype(of_b);
+    edges_against_faces<A, B>(leaf_a, leaf_b, node_a, node_b, edge_face);
+    if (&a != &b) edges_against_faces<B, A>(leaf_b, leaf_a, node_b, node_a, edge_face);
   });
 }
 

@@ -9,30 +9,31 @@ namespace {
 #include "traverse/leaf_boxes.inl"
 
 // These edges of a, one by one, against these of b.
-template <class Kernel, class When>
-HPCCD_HD void edge_pairs(When when, const LeafFeatures& a, const LeafFeatures& b, const typename Kernel::Lanes& lanes_b,
+template <class A, class B, class When>
+HPCCD_HD void edge_pairs(When when, const LeafFeatures& a, const LeafFeatures& b, const typename B::Lanes& lanes_b,
                          unsigned edges_a, unsigned edges_b, CandidateBuffer& out) {
   const bool same = a.rows == b.rows;
+  const EdgeBoxes<A> boxes(a);
   for_each(edges_a, [&](std::uint32_t k) {
-    unsigned m = typename Kernel::Outcodes(when, lanes_b, Kernel::edge_box(a, k)).edges(b) & edges_b;
+    unsigned m = typename B::Outcodes(when, lanes_b, boxes[k]).edges(b) & edges_b;
     if (same) m &= ~first_bits(k + 1);
     if (!m) return;
     const auto& end = a.corners_of->edge;
-    const typename Kernel::Shared shared(b, a.corners[end[0][k]], a.corners[end[1][k]]);
+    const typename B::Shared shared(b, a.corners[end[0][k]], a.corners[end[1][k]]);
     if (shared.any) m &= shared.edges_without(b);
     append<true>(out, a.edges[k], b.edges, m);
   });
 }
 
 // These vertices of a, one by one, against these faces of b.
-template <class Kernel, class When>
+template <class A, class B, class When>
 HPCCD_HD void vertex_face_pairs(When when, const LeafFeatures& a, const LeafFeatures& b,
-                                const typename Kernel::Lanes& lanes_b, unsigned vertices_a, unsigned faces_b,
+                                const typename B::Lanes& lanes_b, unsigned vertices_a, unsigned faces_b,
                                 CandidateBuffer& out) {
   for_each(vertices_a, [&](std::uint32_t k) {
-    unsigned m = typename Kernel::Outcodes(when, lanes_b, Kernel::box_of(a, k)).faces(b) & faces_b;
+    unsigned m = typename B::Outcodes(when, lanes_b, A::box_of(a, k)).faces(b) & faces_b;
     if (!m) return;
-    const typename Kernel::Shared shared(b, a.corners[k]);
+    const typename B::Shared shared(b, a.corners[k]);
     if (shared.any) m &= shared.faces_without(b);
     append<false>(out, a.corners[k], b.faces, m);
   });
@@ -43,27 +44,29 @@ HPCCD_HD void pairs_within(When when, const LeafFeatures& leaf, CandidateBuffer&
                            CandidateBuffer& vertex_face) {
   const typename Kernel::Lanes lanes(when, leaf);
   const unsigned edges = first_bits(leaf.n_edges);
-  edge_pairs<Kernel>(when, leaf, leaf, lanes, edges, edges, edge_edge);
-  vertex_face_pairs<Kernel>(when, leaf, leaf, lanes, first_bits(leaf.n_vertices), first_bits(leaf.n_faces), vertex_face);
+  edge_pairs<Kernel, Kernel>(when, leaf, leaf, lanes, edges, edges, edge_edge);
+  vertex_face_pairs<Kernel, Kernel>(when, leaf, leaf, lanes, first_bits(leaf.n_vertices), first_bits(leaf.n_faces), vertex_face);
 }
 
 // Only what is near the other leaf's box is looked at one by one.
-template <class Kernel, class When>
+template <class A, class B, class When>
 HPCCD_HD void pairs_between(When when, const LeafFeatures& a, const LeafFeatures& b, const Node& node_a,
                             const Node& node_b, CandidateBuffer& edge_edge, CandidateBuffer& vertex_face) {
-  const typename Kernel::Lanes lanes_a(when, a), lanes_b(when, b);
-  const typename Kernel::Outcodes near_a(when, lanes_a, bounds_of(node_b)), near_b(when, lanes_b, bounds_of(node_a));
+  const typename A::Lanes lanes_a(when, a);
+  const typename B::Lanes lanes_b(when, b);
+  const typename A::Outcodes near_a(when, lanes_a, bounds_of(node_b));
+  const typename B::Outcodes near_b(when, lanes_b, bounds_of(node_a));
   const unsigned edges_a = near_a.edges(a), edges_b = near_b.edges(b);
   if (edges_a && edges_b) {
     // One by one the fewer.
     if (__builtin_popcount(edges_a) <= __builtin_popcount(edges_b))
-      edge_pairs<Kernel>(when, a, b, lanes_b, edges_a, edges_b, edge_edge);
+      edge_pairs<A, B>(when, a, b, lanes_b, edges_a, edges_b, edge_edge);
     else
-      edge_pairs<Kernel>(when, b, a, lanes_a, edges_b, edges_a, edge_edge);
+      edge_pairs<B, A>(when, b, a, lanes_a, edges_b, edges_a, edge_edge);
   }
   const unsigned faces_a = near_a.faces(a), faces_b = near_b.faces(b);
-  if (faces_b) vertex_face_pairs<Kernel>(when, a, b, lanes_b, near_a.vertices(a), faces_b, vertex_face);
-  if (faces_a) vertex_face_pairs<Kernel>(when, b, a, lanes_a, near_b.vertices(b), faces_a, vertex_face);
+  if (faces_b) vertex_face_pairs<A, B>(when, a, b, lanes_b, near_a.vertices(a), faces_b, vertex_face);
+  if (faces_a) vertex_face_pairs<B, A>(when, b, a, lanes_a, near_b.vertices(b), faces_a, vertex_face);
 }
 
 // Sixteen boxes of leaves.
@@ -96,12 +99,13 @@ HPCCD_HD void pairs_of_leaves(When when, const Tree& tree, const LeafRange& a, c
   const LeafRange* leaves = tree.leaves.data();
   const Node &node_a = tree.nodes.data()[leaf_nodes[&a - leaves]], &node_b = tree.nodes.data()[leaf_nodes[&b - leaves]];
   const LeafFeatures leaf_a(tree, a), leaf_b(tree, b);
-  with_leaves<When>(tree, leaf_a, leaf_b, [&](auto kernel) {
-    using Kernel = decltype(kernel);
+  with_kernels<When>(tree, leaf_a, leaf_b, [&](auto of_a, auto of_b) {
+    using A = decltype(of_a);
+    using B = decltype(of_b);
     if (&a == &b)
-      pairs_within<Kernel>(when, leaf_a, edge_edge, vertex_face);
+      pairs_within<A>(when, leaf_a, edge_edge, vertex_face);
     else
-      pairs_between<Kernel>(when, leaf_a, leaf_b, node_a, node_b, edge_edge, vertex_face);
+      pairs_between<A, B>(when, leaf_a, leaf_b, node_a, node_b, edge_edge, vertex_face);
   });
 }
 

@@ -118,6 +118,14 @@ HPCCD_HD Rows16<n> load_rows(const float (&rows)[n][16]) {
   return {rows};
 }
 
+// Lanes are not picked at once: declared only.
+inline constexpr bool picks_at_once = false;
+struct Picks16 {};
+Picks16 picks(const std::uint8_t* which);
+Floats16 picked(const float* row, Picks16 p);
+Floats16 picked(const float* row, const float* next, Picks16 p);
+void store16(float* out, const Floats16& x);
+
 struct Bytes16 {
   __m128i v;
 };

@@ -4,6 +4,10 @@
 // of it is inlined: a function compiled for one set must not be linked into code for another.
 #pragma once
 
+#if defined(__aarch64__)
+#include <arm_neon.h>
+#endif
+
 #include "base/simd/four.h"
 #include "base/simd/one_by_one.h"
 #include "base/vec3.h"
@@ -118,6 +122,14 @@ HPCCD_HD Rows16<n> load_rows(const float (&rows)[n][16]) {
   return {rows};
 }
 
+// Lanes are not picked at once: declared only.
+inline constexpr bool picks_at_once = false;
+struct Picks16 {};
+Picks16 picks(const std::uint8_t* which);
+Floats16 picked(const float* row, Picks16 p);
+Floats16 picked(const float* row, const float* next, Picks16 p);
+void store16(float* out, const Floats16& x);
+
 // Sixteen bytes.
 struct Bytes16 {
   typedef std::uint8_t Vec __attribute__((vector_size(16)));
@@ -132,13 +144,20 @@ HPCCD_HD Bytes16 operator&(Bytes16 a, Bytes16 b) { return {a.v & b.v}; }
 HPCCD_HD Bytes16 operator|(Bytes16 a, Bytes16 b) { return {a.v | b.v}; }
 // Bit i of byte j: lane j of m[i].
 HPCCD_HD Bytes16 bits_to_bytes(const Mask16* m) {
-  Bytes16 r;
+  Mask4 all[4];
   for (int part = 0; part < 4; ++part) {
-    Mask4 all{};
-    for (int i = 0; i < 6; ++i) all |= m[i].part[part] & (1 << i);
-    for (int j = 0; j < 4; ++j) r.v[4 * part + j] = static_cast<std::uint8_t>(all[j]);
+    all[part] = m[0].part[part] & 1;
+    for (int i = 1; i < 6; ++i) all[part] |= m[i].part[part] & (1 << i);
   }
+#if defined(__SSE2__)
+  const __m128i low = _mm_packs_epi32((__m128i)all[0], (__m128i)all[1]),
+                high = _mm_packs_epi32((__m128i)all[2], (__m128i)all[3]);
+  return {(Bytes16::Vec)_mm_packus_epi16(low, high)};
+#else
+  Bytes16 r;
+  for (int j = 0; j < 16; ++j) r.v[j] = static_cast<std::uint8_t>(all[j / 4][j % 4]);
   return r;
+#endif
 }
 // One, or zero.
 HPCCD_HD Bytes16 to_bytes(unsigned bits) {
@@ -147,17 +166,23 @@ HPCCD_HD Bytes16 to_bytes(unsigned bits) {
   return r;
 }
 // Byte j: that of number which[j], out of 16 or of 32.
-HPCCD_HD Bytes16 picked(Bytes16 bytes, Bytes16 which) {
-  std::uint8_t of[16], w[16];
-  __builtin_memcpy(of, &bytes, 16), __builtin_memcpy(w, &which, 16);
-  for (auto& x : w) x = of[x];
-  return load_bytes(w);
+HPCCD_HD Bytes16 picked_from(const std::uint8_t* of, Bytes16 which) {
+  std::uint64_t w[2], r[2] = {};
+  __builtin_memcpy(w, &which, sizeof w);
+  for (int half = 0; half < 2; ++half)
+    for (int j = 0; j < 64; j += 8) r[half] |= std::uint64_t{of[w[half] >> j & 0xFF]} << j;
+  return load_bytes(reinterpret_cast<const std::uint8_t*>(r));
 }
-HPCCD_HD Bytes16 picked(Bytes16 bytes, Bytes16 next, Bytes16 which) {
-  std::uint8_t of[32], w[16];
-  __builtin_memcpy(of, &bytes, 16), __builtin_memcpy(of + 16, &next, 16), __builtin_memcpy(w, &which, 16);
-  for (auto& x : w) x = of[x];
-  return load_bytes(w);
+HPCCD_HD Bytes16 picked(const Bytes16& bytes, Bytes16 which) {
+#if defined(__aarch64__)
+  return {(Bytes16::Vec)vqtbl1q_u8((uint8x16_t)bytes.v, (uint8x16_t)which.v)};
+#else
+  return picked_from(reinterpret_cast<const std::uint8_t*>(&bytes), which);
+#endif
+}
+HPCCD_HD Bytes16 picked(const Bytes16& bytes, const Bytes16& next, Bytes16 which) {
+  const Bytes16 both[2] = {bytes, next};
+  return picked_from(reinterpret_cast<const std::uint8_t*>(both), which);
 }
 HPCCD_HD unsigned zeros(Bytes16 x) {
 #if defined(__SSE2__)
