@@ -10,9 +10,6 @@ HPCCD_HD constexpr std::uint32_t high(std::uint32_t end, std::uint32_t axis) {
   return bound_number(end, Side::high, axis);
 }
 
-// Rows of corners that are compared: by number 3 * end + axis.
-using CornerRows = Floats16[Tree::coordinates];
-
 // A box to compare with: its bounds, in the order of bound_number, each `stride` numbers behind the one before.
 template <std::uint32_t stride>
 struct Bounds {
@@ -27,20 +24,25 @@ struct FeatureBox {
   HPCCD_HD float operator[](std::uint32_t row) const { return at[row]; }
 };
 
+// Some corners: low and high bounds by 3 * end + axis; the same where nothing has grown.
+struct Corners {
+  Row low[Tree::coordinates], high[Tree::coordinates];
+};
+
 // What it means to lie beyond a box, below or above it along each axis. Through the whole motion (MotionBox::overlaps):
 struct BothEnds {
-  static constexpr bool grows = false;  // whether corners become boxes when they are loaded
+  static constexpr bool grows = false;      // whether corners become boxes when they are loaded
   static constexpr std::uint32_t sets = 1;  // of six sides
-  HPCCD_HD void grow(CornerRows&, CornerRows&) const {}
   template <class Box>
-  HPCCD_HD Box bounds(const Box& b) const {
+  HPCCD_HD const Box& bounds(const Box& b) const {
     return b;
   }
   template <class Box>
-  HPCCD_HD void sides(const CornerRows& lows, const CornerRows& highs, const Box& b, Mask16 (&beyond)[6 * sets]) const {
+  HPCCD_HD static void sides(const Corners& c, const Box& b, RowMask (&beyond)[6]) {
     for (std::uint32_t axis = 0; axis < 3; ++axis) {
-      beyond[axis] = less(highs[axis], all16(b[low(0, axis)])) & less(highs[3 + axis], all16(b[low(1, axis)]));
-      beyond[3 + axis] = less(all16(b[high(0, axis)]), lows[axis]) & less(all16(b[high(1, axis)]), lows[3 + axis]);
+      beyond[axis] = less(c.high[axis], all_lanes(b[low(0, axis)])) & less(c.high[3 + axis], all_lanes(b[low(1, axis)]));
+      beyond[3 + axis] =
+          less(all_lanes(b[high(0, axis)]), c.low[axis]) & less(all_lanes(b[high(1, axis)]), c.low[3 + axis]);
     }
   }
 };
@@ -51,11 +53,11 @@ struct Until {
   static constexpr bool grows = true;
   static constexpr std::uint32_t sets = 1;
   float time;
-  HPCCD_HD void grow(CornerRows& lows, CornerRows& highs) const {
-    const Floats16 t = all16(time);
+  HPCCD_HD void grow(Corners& c) const {
+    const Row t = all_lanes(time);
     for (std::uint32_t axis = 0; axis < 3; ++axis) {
-      lows[3 + axis] = lows[axis] + t * (lows[3 + axis] - lows[axis]) + all16(-between_ends);
-      highs[3 + axis] = highs[axis] + t * (highs[3 + axis] - highs[axis]) + all16(between_ends);
+      c.low[3 + axis] = c.low[axis] + t * (c.low[3 + axis] - c.low[axis]) + all_lanes(-between_ends);
+      c.high[3 + axis] = c.high[axis] + t * (c.high[3 + axis] - c.high[axis]) + all_lanes(between_ends);
     }
   }
   template <class Box>
@@ -68,8 +70,8 @@ struct Until {
     return at;
   }
   template <class Box>
-  HPCCD_HD void sides(const CornerRows& lows, const CornerRows& highs, const Box& b, Mask16 (&beyond)[6]) const {
-    BothEnds().sides(lows, highs, b, beyond);
+  HPCCD_HD static void sides(const Corners& c, const Box& b, RowMask (&beyond)[6]) {
+    BothEnds::sides(c, b, beyond);
   }
 };
 
@@ -78,19 +80,19 @@ struct AtStart {
   static constexpr bool grows = true;
   static constexpr std::uint32_t sets = 1;
   float reach;
-  HPCCD_HD void grow(CornerRows& lows, CornerRows& highs) const {
+  HPCCD_HD void grow(Corners& c) const {
     for (std::uint32_t axis = 0; axis < 3; ++axis)
-      lows[axis] = lows[axis] + all16(-reach), highs[axis] = highs[axis] + all16(reach);
+      c.low[axis] = c.low[axis] + all_lanes(-reach), c.high[axis] = c.high[axis] + all_lanes(reach);
   }
   template <class Box>
-  HPCCD_HD Box bounds(const Box& b) const {
+  HPCCD_HD const Box& bounds(const Box& b) const {
     return b;
   }
   template <class Box>
-  HPCCD_HD void sides(const CornerRows& lows, const CornerRows& highs, const Box& b, Mask16 (&beyond)[6]) const {
+  HPCCD_HD static void sides(const Corners& c, const Box& b, RowMask (&beyond)[6]) {
     for (std::uint32_t axis = 0; axis < 3; ++axis) {
-      beyond[axis] = less(highs[axis], all16(b[low(0, axis)]));
-      beyond[3 + axis] = less(all16(b[high(0, axis)]), lows[axis]);
+      beyond[axis] = less(c.high[axis], all_lanes(b[low(0, axis)]));
+      beyond[3 + axis] = less(all_lanes(b[high(0, axis)]), c.low[axis]);
     }
   }
 };
@@ -101,22 +103,22 @@ struct InSnapshot {
   static constexpr bool grows = true;
   static constexpr std::uint32_t sets = 2;
   float reach;
-  HPCCD_HD void grow(CornerRows& lows, CornerRows& highs) const {
+  HPCCD_HD void grow(Corners& c) const {
     for (std::uint32_t row = 0; row < Tree::coordinates; ++row) {
       const float by = row < 3 ? reach : slanted_reach(reach);
-      lows[row] = lows[row] + all16(-by), highs[row] = highs[row] + all16(by);
+      c.low[row] = c.low[row] + all_lanes(-by), c.high[row] = c.high[row] + all_lanes(by);
     }
   }
   template <class Box>
-  HPCCD_HD Box bounds(const Box& b) const {
+  HPCCD_HD const Box& bounds(const Box& b) const {
     return b;
   }
   template <class Box>
-  HPCCD_HD void sides(const CornerRows& lows, const CornerRows& highs, const Box& b, Mask16 (&beyond)[12]) const {
+  HPCCD_HD static void sides(const Corners& c, const Box& b, RowMask (&beyond)[12]) {
     for (std::uint32_t end = 0; end < 2; ++end)
       for (std::uint32_t axis = 0; axis < 3; ++axis) {
-        beyond[6 * end + axis] = less(highs[3 * end + axis], all16(b[low(end, axis)]));
-        beyond[6 * end + 3 + axis] = less(all16(b[high(end, axis)]), lows[3 * end + axis]);
+        beyond[6 * end + axis] = less(c.high[3 * end + axis], all_lanes(b[low(end, axis)]));
+        beyond[6 * end + 3 + axis] = less(all_lanes(b[high(end, axis)]), c.low[3 * end + axis]);
       }
   }
 };
@@ -126,7 +128,7 @@ struct LeafFeatures {
   const CornerRow* rows;
   const CornersOf* corners_of;
   const std::uint32_t *corners, *edges, *faces;  // numbers
-  std::uint32_t n_edges, n_faces, n_vertices;
+  std::uint32_t n_edges, n_faces, n_vertices, n_corners;
   bool many;  // more than one group of rows
 
   HPCCD_HD LeafFeatures(const Tree& tree, const LeafRange& leaf)
@@ -138,6 +140,7 @@ struct LeafFeatures {
         n_edges(leaf.n_edges()),
         n_faces(leaf.n_faces()),
         n_vertices(leaf.n_vertices()),
+        n_corners(leaf.n_corners()),
         many(leaf.n_groups() > 1) {}
 };
 
@@ -146,20 +149,40 @@ HPCCD_HD constexpr std::uint32_t first_bits(std::uint32_t n) { return n >= 32 ? 
 // How a leaf is read: with one or two groups of corners, whose boxes have grown or not (Tree::grown).
 template <class When, bool many, bool grown>
 struct Leaves {
-  static constexpr std::uint32_t groups = many ? 2 : 1, sides = grown || When::grows ? 2 : 1;
+  static constexpr std::uint32_t groups = many ? 2 : 1;
   static constexpr std::uint32_t high_rows = grown ? Tree::coordinates : 0, next_group = high_rows + Tree::coordinates;
 
-  // Its corners in lanes.
+  // Its corners, as boxes where they grow when they are loaded.
   struct Lanes {
-    CornerRows at[groups][sides];
-    HPCCD_HD Lanes(When when, const LeafFeatures& leaf) {
-      for (std::uint32_t g = 0; g < groups; ++g) {
-        const CornerRow* rows = leaf.rows + g * next_group;
-        for (std::uint32_t s = 0; s < sides; ++s)
-          for (std::uint32_t row = 0; row < Tree::coordinates; ++row)
-            at[g][s][row] = load16(rows[row + s * high_rows].lane);
-        if constexpr (When::grows) when.grow(at[g][0], at[g][1]);
+    static constexpr bool own = When::grows;
+    static constexpr std::uint32_t high_rows = own ? Tree::coordinates : Leaves::high_rows,
+                                   next_group = high_rows + Tree::coordinates;
+    CornerRow grown_rows[own ? groups * next_group : 1];
+    const CornerRow* rows;
+
+    HPCCD_HD Lanes(When when, const LeafFeatures& leaf) : rows(own ? grown_rows : leaf.rows) {
+      if constexpr (own)
+        for (std::uint32_t g = 0; g < groups; ++g)
+          for (std::uint32_t i = 0; i < 16; i += row_width) {
+            Corners c = load<Leaves::high_rows>(leaf.rows + g * Leaves::next_group, i);
+            when.grow(c);
+            for (std::uint32_t row = 0; row < Tree::coordinates; ++row) {
+              store(grown_rows[g * next_group + row].lane + i, c.low[row]);
+              store(grown_rows[g * next_group + high_rows + row].lane + i, c.high[row]);
+            }
+          }
+    }
+    template <std::uint32_t high_rows>
+    HPCCD_HD static Corners load(const CornerRow* rows, std::uint32_t i) {
+      Corners c;
+      for (std::uint32_t row = 0; row < Tree::coordinates; ++row) {
+        c.low[row] = load_row(rows[row].lane + i);
+        c.high[row] = high_rows ? load_row(rows[row + high_rows].lane + i) : c.low[row];
       }
+      return c;
+    }
+    HPCCD_HD Corners at(std::uint32_t group, std::uint32_t i) const {
+      return load<high_rows>(rows + group * next_group, i);
     }
   };
 
@@ -168,11 +191,16 @@ struct Leaves {
     Bytes16 of[When::sets][groups];
 
     template <class Box>
-    HPCCD_HD Outcodes(When when, const Lanes& lanes, const Box& box) {
+    HPCCD_HD Outcodes(When when, const LeafFeatures& leaf, const Lanes& lanes, const Box& box) {
+      const auto& b = when.bounds(box);
       for (std::uint32_t g = 0; g < groups; ++g) {
-        Mask16 beyond[6 * When::sets];
-        when.sides(lanes.at[g][0], lanes.at[g][sides - 1], when.bounds(box), beyond);
-        for (std::uint32_t s = 0; s < When::sets; ++s) of[s][g] = bits_to_bytes(beyond + 6 * s);
+        SideBits bits[When::sets][16 / row_width];
+        for (std::uint32_t i = 0; i < 16 && (row_width == 16 || 16 * g + i < leaf.n_corners); i += row_width) {
+          RowMask beyond[6 * When::sets];
+          When::sides(lanes.at(g, i), b, beyond);
+          for (std::uint32_t s = 0; s < When::sets; ++s) bits[s][i / row_width] = side_bits(beyond + 6 * s);
+        }
+        for (std::uint32_t s = 0; s < When::sets; ++s) of[s][g] = to_bytes(bits[s]);
       }
     }
     // Bit j: feature j of sixteen, whose corners stand in `which`, lies beyond no side.
@@ -223,7 +251,7 @@ struct Leaves {
       unsigned bits[groups], all = 0;
       for (std::uint32_t g = 0; g < groups; ++g) all |= bits[g] = (equal16(leaf.corners + 16 * g, v) | ...);
       if (!(any = all != 0)) return;
-      for (std::uint32_t g = 0; g < groups; ++g) of[g] = to_bytes(bits[g]);
+      for (std::uint32_t g = 0; g < groups; ++g) of[g] = bits_to_bytes(bits[g]);
     }
     template <std::uint32_t n>
     HPCCD_HD unsigned none16(const std::uint8_t* const (&which)[n]) const {
@@ -252,7 +280,7 @@ struct Leaves {
     }
     HPCCD_HD float operator[](std::uint32_t bound) const { return row_of(bound); }
   };
-  HPCCD_HD static Floats16 picked_of(const float* row, Picks16 p) {
+  HPCCD_HD static Row picked_of(const float* row, Picks16 p) {
     if constexpr (many)
       return picked(row, row + next_group * CornerRow::width, p);
     else
@@ -302,8 +330,8 @@ class EdgeBoxes {
     const Picks16 first = picks(end[0] + i), second = picks(end[1] + i);
     for (std::uint32_t bound = 0; bound < n_bounds; ++bound) {
       const float* row = &Kernel::box_of(leaf_, 0).row_of(bound);
-      const Floats16 a = Kernel::picked_of(row, first), b = Kernel::picked_of(row, second);
-      store16(bounds_[bound] + i, side_of_bound(bound) == Side::low ? min(a, b) : max(a, b));
+      const Row a = Kernel::picked_of(row, first), b = Kernel::picked_of(row, second);
+      store(bounds_[bound] + i, side_of_bound(bound) == Side::low ? min(a, b) : max(a, b));
     }
   }
 

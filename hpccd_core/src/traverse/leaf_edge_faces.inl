@@ -15,12 +15,12 @@ HPCCD_HD void edges_against_faces(const LeafFeatures& a, const LeafFeatures& b, 
   constexpr InSnapshot when{0};
   const typename A::Lanes lanes_a(when, a);
   const typename B::Lanes lanes_b(when, b);
-  const unsigned faces = typename B::Outcodes(when, lanes_b, bounds_of(node_a)).faces(b);
+  const unsigned faces = typename B::Outcodes(when, b, lanes_b, bounds_of(node_a)).faces(b);
   if (!faces) return;
-  const unsigned edges = typename A::Outcodes(when, lanes_a, bounds_of(node_b)).edges(a);
+  const unsigned edges = typename A::Outcodes(when, a, lanes_a, bounds_of(node_b)).edges(a);
   if (!edges) return;
   for_each(faces, [&](std::uint32_t k) {
-    unsigned m = typename A::Outcodes(when, lanes_a, B::face_box(b, k)).edges(a) & edges;
+    unsigned m = typename A::Outcodes(when, a, lanes_a, B::face_box(b, k)).edges(a) & edges;
     if (!m) return;
     const auto& corner = b.corners_of->face;
     const typename A::Shared shared(a, b.corners[corner[0][k]], b.corners[corner[1][k]], b.corners[corner[2][k]]);

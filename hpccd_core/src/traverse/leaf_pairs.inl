@@ -15,7 +15,7 @@ HPCCD_HD void edge_pairs(When when, const LeafFeatures& a, const LeafFeatures& b
   const bool same = a.rows == b.rows;
   const EdgeBoxes<A> boxes(a);
   for_each(edges_a, [&](std::uint32_t k) {
-    unsigned m = typename B::Outcodes(when, lanes_b, boxes[k]).edges(b) & edges_b;
+    unsigned m = typename B::Outcodes(when, b, lanes_b, boxes[k]).edges(b) & edges_b;
     if (same) m &= ~first_bits(k + 1);
     if (!m) return;
     const auto& end = a.corners_of->edge;
@@ -31,7 +31,7 @@ HPCCD_HD void vertex_face_pairs(When when, const LeafFeatures& a, const LeafFeat
                                 const typename B::Lanes& lanes_b, unsigned vertices_a, unsigned faces_b,
                                 CandidateBuffer& out) {
   for_each(vertices_a, [&](std::uint32_t k) {
-    unsigned m = typename B::Outcodes(when, lanes_b, A::box_of(a, k)).faces(b) & faces_b;
+    unsigned m = typename B::Outcodes(when, b, lanes_b, A::box_of(a, k)).faces(b) & faces_b;
     if (!m) return;
     const typename B::Shared shared(b, a.corners[k]);
     if (shared.any) m &= shared.faces_without(b);
@@ -54,8 +54,8 @@ HPCCD_HD void pairs_between(When when, const LeafFeatures& a, const LeafFeatures
                             const Node& node_b, CandidateBuffer& edge_edge, CandidateBuffer& vertex_face) {
   const typename A::Lanes lanes_a(when, a);
   const typename B::Lanes lanes_b(when, b);
-  const typename A::Outcodes near_a(when, lanes_a, bounds_of(node_b));
-  const typename B::Outcodes near_b(when, lanes_b, bounds_of(node_a));
+  const typename A::Outcodes near_a(when, a, lanes_a, bounds_of(node_b));
+  const typename B::Outcodes near_b(when, b, lanes_b, bounds_of(node_a));
   const unsigned edges_a = near_a.edges(a), edges_b = near_b.edges(b);
   if (edges_a && edges_b) {
     // One by one the fewer.

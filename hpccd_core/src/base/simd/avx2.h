@@ -108,6 +108,40 @@ HPCCD_HD bool any_in_both_halves(const Mask16& a, const Mask16& b) {
   return _mm256_movemask_ps(_mm256_or_ps(in_a, in_b)) != 0;
 }
 
+struct Row {
+  __m256 v;
+};
+struct RowMask {
+  __m256 v;
+};
+inline constexpr std::uint32_t row_width = 8;
+HPCCD_HD Row load_row(const float* x) { return {_mm256_load_ps(x)}; }
+HPCCD_HD Row all_lanes(float x) { return {_mm256_set1_ps(x)}; }
+HPCCD_HD void store(float* out, Row x) { _mm256_store_ps(out, x.v); }
+HPCCD_HD Row operator+(Row a, Row b) { return {_mm256_add_ps(a.v, b.v)}; }
+HPCCD_HD Row operator-(Row a, Row b) { return {_mm256_sub_ps(a.v, b.v)}; }
+HPCCD_HD Row operator*(Row a, Row b) { return {_mm256_mul_ps(a.v, b.v)}; }
+HPCCD_HD Row min(Row a, Row b) { return {_mm256_min_ps(a.v, b.v)}; }
+HPCCD_HD Row max(Row a, Row b) { return {_mm256_max_ps(a.v, b.v)}; }
+HPCCD_HD RowMask less(Row a, Row b) { return {_mm256_cmp_ps(a.v, b.v, _CMP_LT_OQ)}; }
+HPCCD_HD RowMask operator&(RowMask a, RowMask b) { return {_mm256_and_ps(a.v, b.v)}; }
+// Lanes are not picked at once: declared only.
+inline constexpr bool picks_at_once = false;
+struct Picks16 {};
+Picks16 picks(const std::uint8_t* which);
+Row picked(const float* row, Picks16 p);
+Row picked(const float* row, const float* next, Picks16 p);
+
+struct SideBits {
+  __m256i v;
+};
+HPCCD_HD SideBits side_bits(const RowMask m[6]) {
+  __m256i all = _mm256_setzero_si256();
+  for (int i = 0; i < 6; ++i)
+    all = _mm256_or_si256(all, _mm256_and_si256(_mm256_castps_si256(m[i].v), _mm256_set1_epi32(1 << i)));
+  return {all};
+}
+
 template <std::uint32_t n>
 struct Rows16 {
   const float (*rows)[16];
@@ -118,30 +152,18 @@ HPCCD_HD Rows16<n> load_rows(const float (&rows)[n][16]) {
   return {rows};
 }
 
-// Lanes are not picked at once: declared only.
-inline constexpr bool picks_at_once = false;
-struct Picks16 {};
-Picks16 picks(const std::uint8_t* which);
-Floats16 picked(const float* row, Picks16 p);
-Floats16 picked(const float* row, const float* next, Picks16 p);
-void store16(float* out, const Floats16& x);
-
 struct Bytes16 {
   __m128i v;
 };
 HPCCD_HD Bytes16 load_bytes(const std::uint8_t* x) { return {_mm_load_si128(reinterpret_cast<const __m128i*>(x))}; }
 HPCCD_HD Bytes16 operator&(Bytes16 a, Bytes16 b) { return {_mm_and_si128(a.v, b.v)}; }
 HPCCD_HD Bytes16 operator|(Bytes16 a, Bytes16 b) { return {_mm_or_si128(a.v, b.v)}; }
-HPCCD_HD Bytes16 bits_to_bytes(const Mask16 m[6]) {
-  __m256i half[2] = {_mm256_setzero_si256(), _mm256_setzero_si256()};
-  for (int i = 0; i < 6; ++i)
-    for (int h = 0; h < 2; ++h)
-      half[h] = _mm256_or_si256(half[h], _mm256_and_si256(_mm256_castps_si256(m[i].half[h]), _mm256_set1_epi32(1 << i)));
+HPCCD_HD Bytes16 to_bytes(const SideBits (&of)[2]) {
   // Quarters of eight numbers each: 0 2 1 3.
-  const __m256i words = _mm256_permute4x64_epi64(_mm256_packs_epi32(half[0], half[1]), 0xD8);
+  const __m256i words = _mm256_permute4x64_epi64(_mm256_packs_epi32(of[0].v, of[1].v), 0xD8);
   return {_mm_packus_epi16(_mm256_castsi256_si128(words), _mm256_extracti128_si256(words, 1))};
 }
-HPCCD_HD Bytes16 to_bytes(unsigned bits) {
+HPCCD_HD Bytes16 bits_to_bytes(unsigned bits) {
   const __m128i bit = _mm_set1_epi64x(static_cast<long long>(0x8040201008040201ull));
   const __m128i twice = _mm_shuffle_epi8(_mm_cvtsi32_si128(static_cast<int>(bits)),
                                          _mm_set_epi64x(0x0101010101010101, 0));

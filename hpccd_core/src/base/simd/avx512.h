@@ -109,6 +109,22 @@ HPCCD_HD bool any_in_both_halves(Mask16 a, Mask16 b) {
   return ((in_a & in_a >> 8) | (in_b & in_b >> 8)) != 0;
 }
 
+// As many floats as a register holds, and what comparing six pairs of them gives.
+using Row = Floats16;
+using RowMask = Mask16;
+inline constexpr std::uint32_t row_width = 16;
+HPCCD_HD Row load_row(const float* x) { return load16(x); }
+HPCCD_HD Row all_lanes(float x) { return all16(x); }
+HPCCD_HD void store(float* out, Row x) { _mm512_store_ps(out, x.v); }
+struct SideBits {
+  __m128i v;
+};
+HPCCD_HD SideBits side_bits(const RowMask m[6]) {
+  __m128i all = _mm_maskz_set1_epi8(m[0].m, 1);
+  for (int i = 1; i < 6; ++i) all = _mm_mask_add_epi8(all, m[i].m, all, _mm_set1_epi8(static_cast<char>(1 << i)));
+  return {all};
+}
+
 template <std::uint32_t n>
 struct Rows16 {
   Floats16 rows[n];
@@ -133,7 +149,6 @@ HPCCD_HD Floats16 picked(const float* row, Picks16 p) { return {_mm512_permutexv
 HPCCD_HD Floats16 picked(const float* row, const float* next, Picks16 p) {
   return {_mm512_permutex2var_ps(_mm512_load_ps(row), p.v, _mm512_load_ps(next))};
 }
-HPCCD_HD void store16(float* out, Floats16 x) { _mm512_store_ps(out, x.v); }
 
 // Sixteen bytes.
 struct Bytes16 {
@@ -142,14 +157,10 @@ struct Bytes16 {
 HPCCD_HD Bytes16 load_bytes(const std::uint8_t* x) { return {_mm_load_si128(reinterpret_cast<const __m128i*>(x))}; }
 HPCCD_HD Bytes16 operator&(Bytes16 a, Bytes16 b) { return {_mm_and_si128(a.v, b.v)}; }
 HPCCD_HD Bytes16 operator|(Bytes16 a, Bytes16 b) { return {_mm_or_si128(a.v, b.v)}; }
-// Bit i of byte j: lane j of m[i].
-HPCCD_HD Bytes16 bits_to_bytes(const Mask16 m[6]) {
-  __m128i all = _mm_maskz_set1_epi8(m[0].m, 1);
-  for (int i = 1; i < 6; ++i) all = _mm_mask_add_epi8(all, m[i].m, all, _mm_set1_epi8(static_cast<char>(1 << i)));
-  return {all};
-}
-// One, or zero.
-HPCCD_HD Bytes16 to_bytes(unsigned bits) { return {_mm_maskz_set1_epi8(static_cast<__mmask16>(bits), 1)}; }
+// Bit i of byte j: lane j of mask i.
+HPCCD_HD Bytes16 to_bytes(const SideBits (&of)[1]) { return {of[0].v}; }
+// Byte j: one where bit j is set, else zero.
+HPCCD_HD Bytes16 bits_to_bytes(unsigned bits) { return {_mm_maskz_set1_epi8(static_cast<__mmask16>(bits), 1)}; }
 // Byte j: that of number which[j], out of 16 or of 32.
 HPCCD_HD Bytes16 picked(Bytes16 bytes, Bytes16 which) { return {_mm_shuffle_epi8(bytes.v, which.v)}; }
 HPCCD_HD Bytes16 picked(Bytes16 bytes, Bytes16 next, Bytes16 which) {

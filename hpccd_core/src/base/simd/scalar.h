@@ -4,10 +4,6 @@
 // of it is inlined: a function compiled for one set must not be linked into code for another.
 #pragma once
 
-#if defined(__aarch64__)
-#include <arm_neon.h>
-#endif
-
 #include "base/simd/four.h"
 #include "base/simd/one_by_one.h"
 #include "base/vec3.h"
@@ -111,6 +107,40 @@ HPCCD_HD bool any_in_both_halves(const Mask16& a, const Mask16& b) {
   return bits4(low | (a.part[1] & a.part[3]) | (b.part[1] & b.part[3])) != 0;
 }
 
+// As many floats as a register holds, and what comparing six pairs of them gives.
+struct Row {
+  Floats4 v;
+};
+struct RowMask {
+  Mask4 v;
+};
+inline constexpr std::uint32_t row_width = 4;
+HPCCD_HD Row load_row(const float* x) { return {load4(x)}; }
+HPCCD_HD Row all_lanes(float x) { return {Floats4{x, x, x, x}}; }
+HPCCD_HD void store(float* out, Row x) { __builtin_memcpy(out, &x, sizeof x); }
+HPCCD_HD Row operator+(Row a, Row b) { return {a.v + b.v}; }
+HPCCD_HD Row operator-(Row a, Row b) { return {a.v - b.v}; }
+HPCCD_HD Row operator*(Row a, Row b) { return {a.v * b.v}; }
+HPCCD_HD Row min(Row a, Row b) { return {min4(a.v, b.v)}; }
+HPCCD_HD Row max(Row a, Row b) { return {max4(a.v, b.v)}; }
+HPCCD_HD RowMask less(Row a, Row b) { return {a.v < b.v}; }
+HPCCD_HD RowMask operator&(RowMask a, RowMask b) { return {a.v & b.v}; }
+// Lanes are not picked at once: declared only.
+inline constexpr bool picks_at_once = false;
+struct Picks16 {};
+Picks16 picks(const std::uint8_t* which);
+Row picked(const float* row, Picks16 p);
+Row picked(const float* row, const float* next, Picks16 p);
+
+struct SideBits {
+  Mask4 v;
+};
+HPCCD_HD SideBits side_bits(const RowMask* m) {
+  Mask4 all = m[0].v & 1;
+  for (int i = 1; i < 6; ++i) all |= m[i].v & (1 << i);
+  return {all};
+}
+
 // Rows of sixteen floats that are used again and again: in registers where these are as long as a row.
 template <std::uint32_t n>
 struct Rows16 {
@@ -122,76 +152,70 @@ HPCCD_HD Rows16<n> load_rows(const float (&rows)[n][16]) {
   return {rows};
 }
 
-// Lanes are not picked at once: declared only.
-inline constexpr bool picks_at_once = false;
-struct Picks16 {};
-Picks16 picks(const std::uint8_t* which);
-Floats16 picked(const float* row, Picks16 p);
-Floats16 picked(const float* row, const float* next, Picks16 p);
-void store16(float* out, const Floats16& x);
-
-// Sixteen bytes.
+// Sixteen bytes. In two whole numbers: bytes are picked one by one, and a register that is read as a whole after its
+// parts were written waits for them.
 struct Bytes16 {
-  typedef std::uint8_t Vec __attribute__((vector_size(16)));
-  Vec v;
+  std::uint64_t half[2];
 };
 HPCCD_HD Bytes16 load_bytes(const std::uint8_t* x) {
   Bytes16 r;
   __builtin_memcpy(&r, x, sizeof r);
   return r;
 }
-HPCCD_HD Bytes16 operator&(Bytes16 a, Bytes16 b) { return {a.v & b.v}; }
-HPCCD_HD Bytes16 operator|(Bytes16 a, Bytes16 b) { return {a.v | b.v}; }
-// Bit i of byte j: lane j of m[i].
-HPCCD_HD Bytes16 bits_to_bytes(const Mask16* m) {
-  Mask4 all[4];
-  for (int part = 0; part < 4; ++part) {
-    all[part] = m[0].part[part] & 1;
-    for (int i = 1; i < 6; ++i) all[part] |= m[i].part[part] & (1 << i);
-  }
-#if defined(__SSE2__)
-  const __m128i low = _mm_packs_epi32((__m128i)all[0], (__m128i)all[1]),
-                high = _mm_packs_epi32((__m128i)all[2], (__m128i)all[3]);
-  return {(Bytes16::Vec)_mm_packus_epi16(low, high)};
-#else
-  Bytes16 r;
-  for (int j = 0; j < 16; ++j) r.v[j] = static_cast<std::uint8_t>(all[j / 4][j % 4]);
-  return r;
-#endif
+HPCCD_HD Bytes16 operator&(const Bytes16& a, const Bytes16& b) {
+  return {{a.half[0] & b.half[0], a.half[1] & b.half[1]}};
 }
-// One, or zero.
-HPCCD_HD Bytes16 to_bytes(unsigned bits) {
+HPCCD_HD Bytes16 operator|(const Bytes16& a, const Bytes16& b) {
+  return {{a.half[0] | b.half[0], a.half[1] | b.half[1]}};
+}
+// Bit i of byte j: lane j of mask i.
+HPCCD_HD Bytes16 to_bytes(const SideBits (&of)[4]) {
   Bytes16 r;
-  for (int j = 0; j < 16; ++j) r.v[j] = bits >> j & 1;
+#if defined(__SSE2__)
+  const __m128i low = _mm_packs_epi32((__m128i)of[0].v, (__m128i)of[1].v),
+                high = _mm_packs_epi32((__m128i)of[2].v, (__m128i)of[3].v);
+  const __m128i bytes = _mm_packus_epi16(low, high);
+  __builtin_memcpy(&r, &bytes, sizeof r);
+#else
+  for (int j = 0; j < 16; ++j) {
+    const auto byte = static_cast<std::uint64_t>(of[j / 4].v[j % 4]) << (8 * (j % 8));
+    r.half[j / 8] = j % 8 == 0 ? byte : r.half[j / 8] | byte;
+  }
+#endif
+  return r;
+}
+// Byte j: one where bit j is set, else zero.
+HPCCD_HD Bytes16 bits_to_bytes(unsigned bits) {
+  Bytes16 r{};
+  for (int j = 0; j < 16; ++j) r.half[j / 8] |= std::uint64_t{bits >> j & 1} << (8 * (j % 8));
   return r;
 }
 // Byte j: that of number which[j], out of 16 or of 32.
-HPCCD_HD Bytes16 picked_from(const std::uint8_t* of, Bytes16 which) {
-  std::uint64_t w[2], r[2] = {};
-  __builtin_memcpy(w, &which, sizeof w);
-  for (int half = 0; half < 2; ++half)
-    for (int j = 0; j < 64; j += 8) r[half] |= std::uint64_t{of[w[half] >> j & 0xFF]} << j;
-  return load_bytes(reinterpret_cast<const std::uint8_t*>(r));
+HPCCD_HD Bytes16 picked_from(const std::uint8_t* of, const Bytes16& which) {
+  Bytes16 r;
+  for (int i = 0; i < 2; ++i) {
+    std::uint64_t bytes = 0;
+    for (int j = 0; j < 64; j += 8) bytes |= std::uint64_t{of[which.half[i] >> j & 0xFF]} << j;
+    r.half[i] = bytes;
+  }
+  return r;
 }
-HPCCD_HD Bytes16 picked(const Bytes16& bytes, Bytes16 which) {
-#if defined(__aarch64__)
-  return {(Bytes16::Vec)vqtbl1q_u8((uint8x16_t)bytes.v, (uint8x16_t)which.v)};
-#else
+HPCCD_HD Bytes16 picked(const Bytes16& bytes, const Bytes16& which) {
   return picked_from(reinterpret_cast<const std::uint8_t*>(&bytes), which);
-#endif
 }
-HPCCD_HD Bytes16 picked(const Bytes16& bytes, const Bytes16& next, Bytes16 which) {
+HPCCD_HD Bytes16 picked(const Bytes16& bytes, const Bytes16& next, const Bytes16& which) {
   const Bytes16 both[2] = {bytes, next};
   return picked_from(reinterpret_cast<const std::uint8_t*>(both), which);
 }
-HPCCD_HD unsigned zeros(Bytes16 x) {
-#if defined(__SSE2__)
-  return static_cast<unsigned>(_mm_movemask_epi8(_mm_cmpeq_epi8((__m128i)x.v, _mm_setzero_si128())));
-#else
+// Bit j: byte j is zero.
+HPCCD_HD unsigned zeros(const Bytes16& x) {
   unsigned bits = 0;
-  for (unsigned j = 0; j < 16; ++j) bits |= static_cast<unsigned>(x.v[j] == 0) << j;
+  for (int i = 0; i < 2; ++i) {
+    constexpr std::uint64_t low = 0x7F7F7F7F7F7F7F7Full;
+    const std::uint64_t zero = ~(((x.half[i] & low) + low) | x.half[i] | low) >> 7;  // one in each such byte
+    bits |= static_cast<unsigned>(zero * 0x0102040810204080ull >> 56) << (8 * i);
+  }
   return bits;
-#endif
 }
 
 // Bit j: number j of sixteen equals x.
