@@ -194,7 +194,7 @@ struct Leaves {
     HPCCD_HD Outcodes(When when, const LeafFeatures& leaf, const Lanes& lanes, const Box& box) {
       const auto& b = when.bounds(box);
       for (std::uint32_t g = 0; g < groups; ++g) {
-        SideBits bits[When::sets][16 / row_width];
+        SideBits bits[When::sets][16 / row_width] = {};
         for (std::uint32_t i = 0; i < 16 && (row_width == 16 || 16 * g + i < leaf.n_corners); i += row_width) {
           RowMask beyond[6 * When::sets];
           When::sides(lanes.at(g, i), b, beyond);
