@@ -79,7 +79,7 @@ void collect_contacts(std::vector<Worker>& workers, const Geometry& geometry, Re
     }
   });
   std::vector<Summary> summary(static_cast<std::size_t>(pool.size()));
-  parallel_for(pool, order.buckets(), 4, [&](std::size_t begin, std::size_t end, int thread) {
+  parallel_for(pool, order.buckets(), 64, [&](std::size_t begin, std::size_t end, int thread) {
     for (std::size_t bucket = begin; bucket < end; ++bucket) {
       order.sort(bucket, cancellation);
       const std::size_t first = order.begin(bucket);
