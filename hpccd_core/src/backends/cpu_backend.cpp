@@ -34,7 +34,7 @@ void CpuBackend::update(Positions t0, Positions t1, Tests tests) {
     swept_ = &shared_.tree.swept();
     method_->update(*swept_, profiler);
   } else {
-    shared_.tree.fit(profiler);
+    shared_.tree.fit(profiler, shared_.rules.test_edges());
   }
 }
 

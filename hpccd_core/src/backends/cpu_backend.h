@@ -53,7 +53,7 @@ class CpuBackend final : public DetectionBackend {
   std::optional<std::vector<LeafPair>> open_pairs();
   void remember_earliest();
   void see_motion(Positions t0, Positions t1, Tests tests);
-  void see_snapshot(Positions vertices);
+  void see_snapshot(Positions vertices, bool edges);
   void walk_tree();
   void mark_traversal();
   Contacts collect(Outputs outputs);

@@ -29,7 +29,7 @@ void CpuBackend::find_earliest(Positions t0, Positions t1, bool time_only) {
     }
     limit_reach();
   }
-  shared_.tree.fit(shared_.profiler);
+  shared_.tree.fit(shared_.profiler, shared_.rules.test_edges());
   walk_tree();
   if (search_.prunes) remember_earliest();
 }
@@ -83,7 +83,7 @@ bool CpuBackend::list_near_pairs(Positions t0) {
   if (!radius) return false;
   const double distance = listed_distance(*radius, shared_.separations.most());
   if (!std::isfinite(distance)) return false;
-  see_snapshot(t0);
+  see_snapshot(t0, shared_.rules.test_edges());
   search_.geometry.separations = {distance};
   search_.leaf_pairs_in_snapshot = leaf_pairs_in_snapshot(shared_.options.simd);
   search_.reach = reach_of(distance, shared_.tree.motion().rounding, shared_.tree.motion().map.scale);

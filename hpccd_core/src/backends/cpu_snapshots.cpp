@@ -10,7 +10,7 @@ namespace hpccd {
 
 std::optional<Contacts> CpuBackend::proximity(Positions vertices, double distance) {
   const Options& o = shared_.options;
-  see_snapshot(vertices);
+  see_snapshot(vertices, shared_.rules.test_edges());
   search_.geometry.separations = {distance};
   search_.leaf_pairs_in_snapshot = leaf_pairs_in_snapshot(o.simd);
   search_.reach = reach_of(distance, shared_.tree.motion().rounding, shared_.tree.motion().map.scale);
@@ -19,7 +19,7 @@ std::optional<Contacts> CpuBackend::proximity(Positions vertices, double distanc
 }
 
 std::optional<Intersections> CpuBackend::intersections(Positions vertices) {
-  see_snapshot(vertices);
+  see_snapshot(vertices, true);
   search_.leaf_edge_faces = leaf_edge_faces(shared_.options.simd);
   search_.reach = 0;
   walk_tree();
@@ -31,7 +31,7 @@ std::optional<Intersections> CpuBackend::intersections(Positions vertices) {
 
 std::optional<std::vector<Gap>> CpuBackend::distances(Positions vertices) {
   const Options& o = shared_.options;
-  see_snapshot(vertices);
+  see_snapshot(vertices, true);
   if (!mesh_pairs_) mesh_pairs_.emplace(shared_.rules, shared_.scene->meshes().size());
   search_.nearest =
       std::make_unique<NearestPairs>(*mesh_pairs_, shared_.features, shared_.tree.motion(), shared_.tree.tree());
@@ -45,11 +45,11 @@ std::optional<std::vector<Gap>> CpuBackend::distances(Positions vertices) {
   return gaps;
 }
 
-void CpuBackend::see_snapshot(Positions vertices) {
+void CpuBackend::see_snapshot(Positions vertices, bool edges) {
   const Simd simd = shared_.options.simd;
   shared_.tree.bound(vertices);
   begin_query();
-  shared_.tree.fit(shared_.profiler);
+  shared_.tree.fit(shared_.profiler, edges);
   search_.report = Report::all;
   for (unsigned i = 0; i < n_rules; ++i)
     search_.batch_test[i] = proximity_batch(simd), search_.fallback[i] = decide_proximity;

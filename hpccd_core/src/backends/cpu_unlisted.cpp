@@ -107,7 +107,7 @@ bool CpuBackend::known_from_the_unlisted(bool time_only) {
   if (!open) return false;
   near_.radius().helped();
   if (!open->empty()) {
-    shared_.tree.fit_leaves(leaves_of(*open, shared_.tree.tree().leaves.size()));
+    shared_.tree.fit_leaves(leaves_of(*open, shared_.tree.tree().leaves.size()), shared_.rules.test_edges());
     shared_.profiler.mark("refit");
     limit_reach();
     test(*open);

@@ -15,9 +15,11 @@ void MovingTree::bound(Positions vertices) {
   motion_.update(scene_, vertices, pool_);
 }
 
-void MovingTree::fit(Profiler& profiler) {
+void MovingTree::fit(Profiler& profiler, bool edges) {
   if (!tree_.nodes.empty()) {
-    refit(tree_, motion_.boxes, followed_ ? motion_.resting : std::vector<char>(), pool_);
+    const bool stays = followed_ && (edges_fit_ || !edges);
+    tree_.fits_edges = edges_fit_ = edges;
+    refit(tree_, motion_.boxes, stays ? motion_.resting : std::vector<char>(), pool_);
     profiler.mark("refit");
     fits_ = true;
     if (!worn_out(tree_.area, tree_.area_when_built)) return;
@@ -26,8 +28,9 @@ void MovingTree::fit(Profiler& profiler) {
   profiler.mark("build");
 }
 
-void MovingTree::fit_leaves(std::span<const std::uint32_t> leaves) {
+void MovingTree::fit_leaves(std::span<const std::uint32_t> leaves, bool edges) {
   fits_ = false;
+  tree_.fits_edges = edges;
   refit_leaves(tree_, motion_.boxes, leaves, pool_);
 }
 
@@ -35,7 +38,7 @@ void MovingTree::build_anew() {
   fits_ = false;  // should this be cancelled
   ++builds_;
   build(tree_, scene_, features_, motion_.boxes, pool_);
-  fits_ = true;
+  fits_ = edges_fit_ = true;
 }
 
 const std::vector<Box>& MovingTree::swept() {

@@ -20,10 +20,11 @@ class MovingTree {
   // The same of one snapshot.
   void bound(Positions vertices);
   // A tree that fits it: refitted, or built anew where refitting has lost too much. Marked as "refit" and "build".
-  void fit(Profiler& profiler);
+  // Boxes of edges may be left as they were where the query does not look at them.
+  void fit(Profiler& profiler, bool edges);
   void build_anew();
   // Boxes of the motion for these leaves alone.
-  void fit_leaves(std::span<const std::uint32_t> leaves);
+  void fit_leaves(std::span<const std::uint32_t> leaves, bool edges);
   // Boxes of the whole sweep, for methods with a hierarchy of their own.
   const std::vector<Box>& swept();
 
@@ -39,8 +40,9 @@ class MovingTree {
   ThreadPool& pool_;
   MotionBounds motion_;
   Tree tree_;
-  bool fits_ = false;      // the tree's boxes are those of the last motion
-  bool followed_ = false;  // ... of the motion before, so that what rests can stay
+  bool fits_ = false;       // the tree's boxes are those of the last motion
+  bool followed_ = false;   // ... of the motion before, so that what rests can stay
+  bool edges_fit_ = false;  // and those of all edges are, too
   std::uint64_t builds_ = 0;
 };
 

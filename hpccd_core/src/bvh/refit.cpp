@@ -70,7 +70,8 @@ MotionBox leaf_bounds(const Tree& tree, const LeafRange& leaf, const std::vector
     whole = join(whole, b);
     return b;
   });
-  fill(&tree.box_groups[leaf.first_group], 0, leaf.n_edges(), [&](std::uint32_t i) {
+  const std::uint32_t n_edges = tree.fits_edges ? leaf.n_edges() : 0;
+  fill(&tree.box_groups[leaf.first_group], 0, n_edges, [&](std::uint32_t i) {
     const std::uint32_t s = leaf.first_edge + i;
     return join(vertex_box(tree.edge_ends[0][s]), vertex_box(tree.edge_ends[1][s]));  // inside its triangle's box
   });

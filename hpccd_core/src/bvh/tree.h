@@ -137,6 +137,7 @@ struct Tree {
   std::size_t n_box_groups = 0;
   double area = 0;  // sum over nodes, relative to the root's: what traversal pays grows with it
   double area_when_built = 0;
+  bool fits_edges = true;  // whether refitting makes the boxes of edges too: those of nodes do not depend on them
 
   std::size_t bytes() const;
 };

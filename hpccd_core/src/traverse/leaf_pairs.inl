@@ -73,35 +73,36 @@ HPCCD_HD void vertex_face_pairs(When when, const Tree& tree, const LeafRange& a,
 
 template <class When>
 HPCCD_HD void pairs_of_leaves(When when, const Tree& tree, const LeafRange& a, const LeafRange& b,
-                              CandidateBuffer& edge_edge, CandidateBuffer& vertex_face) {
+                              TestedFeatures tested, CandidateBuffer& edge_edge, CandidateBuffer& vertex_face) {
   const std::uint32_t* leaf_nodes = tree.leaf_nodes.data();
   const LeafRange* leaves = tree.leaves.data();
   const Node &node_a = tree.nodes.data()[leaf_nodes[&a - leaves]], &node_b = tree.nodes.data()[leaf_nodes[&b - leaves]];
-  edge_pairs(when, tree, a, b, node_a, node_b, edge_edge);
+  if (tested.edge_edge) edge_pairs(when, tree, a, b, node_a, node_b, edge_edge);
+  if (!tested.vertex_face) return;
   vertex_face_pairs(when, tree, a, b, node_b, vertex_face);
   if (&a != &b) vertex_face_pairs(when, tree, b, a, node_a, vertex_face);
 }
 
 }  // namespace
 
-void leaf_pairs(const Tree& tree, const LeafRange& a, const LeafRange& b, CandidateBuffer& edge_edge,
-                CandidateBuffer& vertex_face) {
-  pairs_of_leaves(BothEnds(), tree, a, b, edge_edge, vertex_face);
+void leaf_pairs(const Tree& tree, const LeafRange& a, const LeafRange& b, TestedFeatures tested,
+                CandidateBuffer& edge_edge, CandidateBuffer& vertex_face) {
+  pairs_of_leaves(BothEnds(), tree, a, b, tested, edge_edge, vertex_face);
 }
 
-void leaf_pairs_until(const Tree& tree, const LeafRange& a, const LeafRange& b, float until, CandidateBuffer& edge_edge,
-                      CandidateBuffer& vertex_face) {
-  pairs_of_leaves(Until{until}, tree, a, b, edge_edge, vertex_face);
+void leaf_pairs_until(const Tree& tree, const LeafRange& a, const LeafRange& b, TestedFeatures tested, float until,
+                      CandidateBuffer& edge_edge, CandidateBuffer& vertex_face) {
+  pairs_of_leaves(Until{until}, tree, a, b, tested, edge_edge, vertex_face);
 }
 
-void leaf_pairs_at_start(const Tree& tree, const LeafRange& a, const LeafRange& b, float reach,
+void leaf_pairs_at_start(const Tree& tree, const LeafRange& a, const LeafRange& b, TestedFeatures tested, float reach,
                          CandidateBuffer& edge_edge, CandidateBuffer& vertex_face) {
-  pairs_of_leaves(AtStart{reach}, tree, a, b, edge_edge, vertex_face);
+  pairs_of_leaves(AtStart{reach}, tree, a, b, tested, edge_edge, vertex_face);
 }
 
-void leaf_pairs_in_snapshot(const Tree& tree, const LeafRange& a, const LeafRange& b, float reach,
-                            CandidateBuffer& edge_edge, CandidateBuffer& vertex_face) {
-  pairs_of_leaves(InSnapshot{reach}, tree, a, b, edge_edge, vertex_face);
+void leaf_pairs_in_snapshot(const Tree& tree, const LeafRange& a, const LeafRange& b, TestedFeatures tested,
+                            float reach, CandidateBuffer& edge_edge, CandidateBuffer& vertex_face) {
+  pairs_of_leaves(InSnapshot{reach}, tree, a, b, tested, edge_edge, vertex_face);
 }
 
 }  // namespace hpccd::HPCCD_ISA
