@@ -4,7 +4,6 @@
 import argparse
 
 
-
 def feature_list(text: str) -> tuple[str, ...]:
     """KIND[,KIND] as names of features. Raises argparse.ArgumentTypeError."""
     from hpccd_core import arguments  # numpy comes with it, which --help can do without

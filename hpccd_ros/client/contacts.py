@@ -34,8 +34,8 @@ class ContactArrays:
     else (0,).
     minimum_separation: in force in the whole scene, in its unit; 0 where contacts touch. pair_separation: for the pairs
     of meshes that have one of their own, by their names in the order of the scene.
-    features: what was tested at all: "vertex_face", "edge_edge" or both, but for pairs of meshes of which the node tests
-    other ones (its parameter ``pair_features``).
+    features: what was tested at all: "vertex_face", "edge_edge" or both, but for pairs of meshes of which the node
+    tests other ones (its parameter ``pair_features``).
     points, normals and closest are (0, 3) and (0, 2, 3) where the node does not send them (its parameter ``outputs``).
     All are views of the message, which they keep alive.
     """

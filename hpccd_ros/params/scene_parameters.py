@@ -67,8 +67,8 @@ def features(settings: dict[str, Any]) -> tuple[str, ...]:
     """Parameter ``features``, in the order of FEATURES. Raises ParameterError."""
     if not settings["features"]:
         raise ParameterError(
-            f"features: empty, so nothing would be tested; name {' or '.join(FEATURES)}, or both; meshes that shall not "
-            "be tested against each other are named by ignored_pairs"
+            f"features: empty, so nothing would be tested; name {' or '.join(FEATURES)}, or both; meshes that shall "
+            "not be tested against each other are named by ignored_pairs"
         )
     return tuple(name for name in FEATURES if name in settings["features"])
 

@@ -31,7 +31,8 @@ def draw_step(step: ReplayedStep, path, history: History | None = None, *, title
     of = f" of {max(history.steps)}" if history is not None else ""
     facts = [
         f"{triangles:,} triangles", f"{len(found.vf):,} vertex-face", f"{len(found.ee):,} edge-edge", first,
-        f"{step.milliseconds:.1f} ms", accuracy, separation_fact(step.separation), features_fact(step.features), f"hash {found.hash:016x}",
+        f"{step.milliseconds:.1f} ms", accuracy, separation_fact(step.separation), features_fact(step.features),
+        f"hash {found.hash:016x}",
     ]  # fmt: skip
     drawn = picture.Picture(
         meshes,

@@ -38,7 +38,8 @@ class Table:
         self._writer.writerow([
             step.number, step.step, step.start, step.end,
             *([step.total, len(found.vf), len(found.ee), repr(float(found.first_toc)), step.separation.text,
-               " ".join(step.features), f"{step.milliseconds:.3f}", f"{found.hash:#018x}"] if found is not None else [""] * 8),
+               " ".join(step.features), f"{step.milliseconds:.3f}", f"{found.hash:#018x}"]
+              if found is not None else [""] * 8),
             *([recorded.total, f"{recorded.hash:#018x}"] if recorded is not None else [""] * 2),
             step.missing or step.difference or ("equal" if recorded is not None else ""),
         ])  # fmt: skip

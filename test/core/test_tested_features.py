@@ -103,7 +103,7 @@ def test_by_pair_of_meshes(method, seed):
 @pytest.mark.parametrize("threads", [1, 3])
 @pytest.mark.parametrize("seed", range(3))
 def test_how_far_a_step_may_go(threads, seed):
-    """From starts asked for again and again, with other queries between: what is kept of a start is of what is tested."""
+    """From starts that come again, with other queries between: what is kept of a start is of what is tested."""
     rng = np.random.default_rng([93, seed])
     meshes = random_scenes.free_at_first(rng)
     v0, v1 = meshes.vertices_t0, meshes.vertices_t1
