@@ -86,7 +86,7 @@ def test_changed_from_step_to_step_recorded_and_verified(start_node, tmp_path, h
     done = hpccd("replay", path, "--features", "vertex_face")
     assert done.returncode == 1 and "DIVERGED: 4 of 5 answers differ" in done.stdout, done.stdout
     done = hpccd("replay", path, "--features", "vertex_face,faces")
-    assert done.returncode == 2 and "--features: 'faces' is not known; use one of vertex_face" in done.stderr, done.stderr
+    assert done.returncode == 2 and "features: 'faces' is not known; use one of vertex_face" in done.stderr, done.stderr
 
 
 def test_by_pair_of_meshes_and_only_vertices_against_faces(start_node, tmp_path, hpccd):
