@@ -8,7 +8,7 @@ from typing import Any, SupportsIndex, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from .options import OUTPUTS
+from .options import FEATURES, OUTPUTS
 
 REALS = frozenset({np.dtype(np.float32), np.dtype(np.float64)})  # in this machine's byte order
 LARGEST_COORDINATE = 1e150  # largest_coordinate in src/bvh/coordinate_map.h
@@ -113,11 +113,26 @@ def _integers_of_any_size(value: object, array: NDArray[Any]) -> NDArray[Any]:
 
 def output_names(value: Iterable[str]) -> tuple[str, ...]:
     """A tuple of output names from one name or several."""
+    return _names("outputs", value, OUTPUTS)
+
+
+def feature_names(value: Iterable[str]) -> tuple[str, ...]:
+    """What is to be tested, from one name or both: in the order of FEATURES, each once."""
+    names = _names("features", value, FEATURES)
+    if not names:
+        raise ValueError(
+            f"features: none is named, so nothing would be tested; use {' or '.join(FEATURES)}, or both; meshes that "
+            "shall not be tested at all are left out by scene.ignore_pair"
+        )
+    return tuple(name for name in FEATURES if name in names)
+
+
+def _names(argument: str, value: Iterable[str], choices: tuple[str, ...]) -> tuple[str, ...]:
     try:
         names = (value,) if isinstance(value, str) else tuple(value)
     except TypeError:
-        raise TypeError(f"outputs: expected names of outputs, got {type(value).__name__}") from None
-    return tuple(choice("outputs", name, OUTPUTS) for name in names)
+        raise TypeError(f"{argument}: expected names of {argument}, got {type(value).__name__}") from None
+    return tuple(choice(argument, name, choices) for name in names)
 
 
 def vertices(name: str, value: object, n_vertices: int) -> NDArray[Any]:

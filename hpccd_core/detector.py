@@ -12,7 +12,20 @@ from .contacts import Contacts
 from .device_arrays import DeviceArray
 from .devices import backends, gpu_status
 from .motion_queries import MotionQueries
-from .options import ACCURACIES, BACKENDS, METHODS, REPORTS, SIMD, Accuracy, Backend, Method, Output, Report, Simd
+from .options import (
+    ACCURACIES,
+    BACKENDS,
+    METHODS,
+    REPORTS,
+    SIMD,
+    Accuracy,
+    Backend,
+    Feature,
+    Method,
+    Output,
+    Report,
+    Simd,
+)
 from .scene import Scene
 from .snapshot_queries import SnapshotQueries, names_of_one_argument
 
@@ -29,6 +42,9 @@ class Detector(MotionQueries, SnapshotQueries):
     pair of meshes. Neighbours that share no vertex count like all others: keep it below the shortest edge. "exact":
     as rational arithmetic would decide, times within 1e-12; "conservative": the same, no time late; "balanced", "fast":
     computed as "exact". tolerance: no longer of any effect: no pair beyond the separation is reported.
+    features: what is tested at all: "vertex_face", "edge_edge" or both (default). What is left out costs nothing; what
+    is left is found as ever. scene.set_features says it for a pair of meshes. It counts for detect(), step(),
+    collision_free_step() and proximity(); intersections() and distances() look at whole surfaces.
     method: how CPUs find the pairs to test. Contacts, their order and hash are the same with each, "all" or "first";
     "any" (one contact, whichever comes first) is offered by "default" only.
         "default": blocks of eight triangles, boxes compared in SIMD lanes, independent tasks.
@@ -68,6 +84,7 @@ class Detector(MotionQueries, SnapshotQueries):
         hybrid_segments: int = 128,
         hybrid_segment_pairs: int = 2048,
         gpus: int = 0,
+        features: Feature | Iterable[Feature] = ("vertex_face", "edge_edge"),
     ) -> None:
         if not isinstance(scene, Scene):
             raise TypeError(f"scene: expected hpccd_core.Scene, got {type(scene).__name__}")
@@ -80,6 +97,7 @@ class Detector(MotionQueries, SnapshotQueries):
             raise ValueError(f"backend: {backend!r} is not usable here ({why}); use one of {usable}")
         self._backend = backend
         computed = arguments.output_names(outputs)
+        self.features = arguments.feature_names(features)
         threads = arguments.whole_number("threads", threads, 0, 1024)
         arguments.choice("simd", simd, SIMD)
         self.method = arguments.choice("method", method, METHODS)
@@ -113,6 +131,8 @@ class Detector(MotionQueries, SnapshotQueries):
             hybrid_segment_pairs=hybrid_segment_pairs,
             gpus=gpus,
             gpu_stages=self._gpu_stages,
+            vertex_face="vertex_face" in self.features,
+            edge_edge="edge_edge" in self.features,
         )
         self._stepping = threading.RLock()  # of the positions of the last step
         self._last: NDArray[Any] | None = None

@@ -5,6 +5,7 @@ from typing import Literal, get_args
 
 Accuracy = Literal["fast", "balanced", "conservative", "exact"]
 Backend = Literal["auto", "cpu", "hybrid", "gpu"]
+Feature = Literal["vertex_face", "edge_edge"]
 Method = Literal["default", "published", "naive", "front"]
 Output = Literal["points", "normals", "closest"]
 Report = Literal["all", "first", "any"]
@@ -12,6 +13,7 @@ Simd = Literal["auto", "scalar", "avx2", "avx512"]
 
 ACCURACIES: tuple[str, ...] = get_args(Accuracy)
 BACKENDS: tuple[str, ...] = get_args(Backend)
+FEATURES: tuple[str, ...] = get_args(Feature)
 METHODS: tuple[str, ...] = get_args(Method)
 OUTPUTS: tuple[str, ...] = get_args(Output)
 REPORTS: tuple[str, ...] = get_args(Report)

@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Meshes, and which pairs of them matter."""
 
+from collections.abc import Iterable
+
 from numpy.typing import ArrayLike
 
 from . import _core, arguments
-from .options import ACCURACIES, Accuracy
+from .options import ACCURACIES, Accuracy, Feature
 
 
 class Scene:
@@ -62,6 +64,20 @@ class Scene:
         the coordinates, instead of the detector's minimum_separation; the same mesh twice: within it; 0: that touch."""
         self._core.set_separation(
             self._number("mesh_a", mesh_a), self._number("mesh_b", mesh_b), arguments.length("separation", separation)
+        )
+
+    def set_features(self, mesh_a: str | int, mesh_b: str | int, features: Feature | Iterable[Feature]) -> None:
+        """Test only these pairs of features between two meshes (names or numbers), instead of the detector's features.
+
+        features: "vertex_face", "edge_edge" or both; the same mesh twice: within it. What is left out costs nothing.
+        Intersections and smallest distances look at whole surfaces all the same. To test nothing: ignore_pair.
+        """
+        tested = arguments.feature_names(features)
+        self._core.set_features(
+            self._number("mesh_a", mesh_a),
+            self._number("mesh_b", mesh_b),
+            vertex_face="vertex_face" in tested,
+            edge_edge="edge_edge" in tested,
         )
 
     def _number(self, name: str, mesh: str | int) -> int:

@@ -13,6 +13,7 @@ import numpy as np
 import hpccd_core as hc
 from hpccd_core import reference
 
+from ..options import FEATURES
 from .step_motions import MOTIONS, motions_of
 from .step_scenes import SMALL_SCENES
 
@@ -45,7 +46,8 @@ def core_steps(
 
 def contradict(kind: str, queries: np.ndarray, distances: np.ndarray, accuracy: str, simd: str) -> np.ndarray:
     """Mask of the scenes of which the core says what does not fit together: `first` is not the earliest contacts of
-    `all`; the step is not theirs; or it is another one when the same start was seen before."""
+    `all`; the step is not theirs; it is another one when the same start was seen before; or, where one kind of contact
+    is all that is tested, contacts and step are not those that the full answer has of it."""
     ask = _Asked(kind, accuracy, simd)
     starts, ends = _ends(queries)
     return np.array([not ask.agrees(*scene) for scene in zip(starts, ends, distances, strict=True)], bool)
@@ -67,12 +69,24 @@ class _Asked:
         trials = [
             self.step(start, shorter, separation), self._with(separation, "first").collision_free_step(start, shorter)
         ]  # fmt: skip
-        earliest = min(every.first_toc, 1.0)
-        fits = earliest - EARLY <= steps[0] <= earliest if self._promised else steps[0] == earliest
-        return fits and steps[0] == steps[1] and trials[0] == trials[1] and is_first(first, every)
+        fits = self._is_free(steps[0], every.first_toc) and steps[0] == steps[1] and trials[0] == trials[1]
+        return fits and is_first(first, every) and all(
+            self._agrees_alone(feature, start, end, separation, every) for feature in FEATURES
+        )  # fmt: skip
 
-    def _with(self, separation: float, report: str) -> hc.Detector:
-        detector, now = self._of(report)
+    def _agrees_alone(
+        self, feature: str, start: np.ndarray, end: np.ndarray, separation: float, every: hc.Contacts
+    ) -> bool:
+        detector = self._with(separation, "all", (feature,))
+        step, alone = detector.collision_free_step(start, end), detector.detect(start, end)
+        return is_alone(alone, feature, every) and self._is_free(step, alone.first_toc)
+
+    def _is_free(self, step: float, first_toc: float) -> bool:
+        earliest = min(first_toc, 1.0)
+        return earliest - EARLY <= step <= earliest if self._promised else step == earliest
+
+    def _with(self, separation: float, report: str, features: tuple[str, ...] = FEATURES) -> hc.Detector:
+        detector, now = self._of(report, features)
         if now != [separation]:
             for a in range(self._n_meshes):
                 for b in range(a, self._n_meshes):
@@ -92,16 +106,32 @@ def is_first(first: hc.Contacts, every: hc.Contacts) -> bool:
     return same
 
 
+def is_alone(alone: hc.Contacts, feature: str, every: hc.Contacts) -> bool:
+    """Whether `alone` holds exactly those contacts of `every` that are of this feature."""
+    for name, kind in zip(FEATURES, ("vf", "ee"), strict=True):
+        pairs, toc = getattr(every, kind), getattr(every, f"{kind}_toc")
+        kept = slice(None) if name == feature else slice(0)
+        same = np.array_equal(getattr(alone, kind), pairs[kept])
+        if not same or getattr(alone, f"{kind}_toc").tobytes() != toc[kept].tobytes():
+            return False
+    return True
+
+
 def _ends(queries: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     half = queries.shape[1] // 2
     return np.ascontiguousarray(queries[:, :half]), np.ascontiguousarray(queries[:, half:])
 
 
 @functools.cache
-def _detector(kind: str, accuracy: str, simd: str, report: str) -> tuple[hc.Detector, list[float]]:
+def _detector(
+    kind: str, accuracy: str, simd: str, report: str, features: tuple[str, ...]
+) -> tuple[hc.Detector, list[float]]:
     """And the separation that it has now."""
     small = SMALL_SCENES[kind]
     scene = hc.Scene()
     for number, (faces, n) in enumerate(zip(small.faces, small.n_vertices, strict=True)):
         scene.add_mesh(f"mesh{number}", np.asarray(faces, np.uint32).reshape(-1, 3), n_vertices=n)
-    return hc.Detector(scene, accuracy=accuracy, simd=simd, report=report, backend="cpu", threads=1), [0.0]
+    detector = hc.Detector(
+        scene, accuracy=accuracy, simd=simd, report=report, features=features, backend="cpu", threads=1
+    )
+    return detector, [0.0]

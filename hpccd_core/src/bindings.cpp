@@ -169,6 +169,12 @@ PYBIND11_MODULE(_core, m) {
       .def("ignore_pair", &Scene::ignore_pair, "mesh_a"_a, "mesh_b"_a)
       .def("set_accuracy", &Scene::set_accuracy, "mesh_a"_a, "mesh_b"_a, "accuracy"_a)
       .def("set_separation", &Scene::set_separation, "mesh_a"_a, "mesh_b"_a, "separation"_a)
+      .def(
+          "set_features",
+          [](Scene& s, std::uint32_t mesh_a, std::uint32_t mesh_b, bool vertex_face, bool edge_edge) {
+            s.set_features(mesh_a, mesh_b, {vertex_face, edge_edge});
+          },
+          "mesh_a"_a, "mesh_b"_a, "vertex_face"_a, "edge_edge"_a)
       .def_property_readonly("n_vertices", &Scene::n_vertices)
       .def_property_readonly("n_faces", [](const Scene& s) { return s.faces().size(); })
       .def_property_readonly("meshes", [](const Scene& s) {
@@ -179,19 +185,32 @@ PYBIND11_MODULE(_core, m) {
       });
 
   py::class_<Detector>(m, "Detector")
-      .def(py::init([](std::shared_ptr<Scene> scene, Accuracy accuracy, Backend backend, Report report, Simd simd,
-                       int threads, bool points, bool normals, bool closest, double separation, Method method,
-                       bool restructure, std::size_t hybrid_segments, std::size_t hybrid_segment_pairs, int gpus,
-                       bool gpu_stages) {
-             // A copy: what is added to the caller's scene later does not reach this detector.
-             return std::make_unique<Detector>(
-                 std::make_shared<const Scene>(*scene),
-                 Options{accuracy, backend, report, simd, threads, points, normals, closest, separation, method,
-                         restructure, hybrid_segments, hybrid_segment_pairs, gpus, gpu_stages});
-           }),
-           "scene"_a, "accuracy"_a, "backend"_a, "report"_a, "simd"_a, "threads"_a, "points"_a, "normals"_a,
-           "closest"_a, "minimum_separation"_a, "method"_a, "restructure"_a, "hybrid_segments"_a,
-           "hybrid_segment_pairs"_a, "gpus"_a, "gpu_stages"_a)
+      .def(
+          py::init([](std::shared_ptr<Scene> scene, Accuracy accuracy, Backend backend, Report report, Simd simd,
+                      int threads, bool points, bool normals, bool closest, double separation, Method method,
+                      bool restructure, std::size_t hybrid_segments, std::size_t hybrid_segment_pairs, int gpus,
+                      bool gpu_stages, bool vertex_face, bool edge_edge) {
+            // A copy: what is added to the caller's scene later does not reach this detector.
+            return std::make_unique<Detector>(std::make_shared<const Scene>(*scene), Options{accuracy,
+                                                                                             backend,
+                                                                                             report,
+                                                                                             simd,
+                                                                                             threads,
+                                                                                             points,
+                                                                                             normals,
+                                                                                             closest,
+                                                                                             separation,
+                                                                                             method,
+                                                                                             restructure,
+                                                                                             hybrid_segments,
+                                                                                             hybrid_segment_pairs,
+                                                                                             gpus,
+                                                                                             gpu_stages,
+                                                                                             {vertex_face, edge_edge}});
+          }),
+          "scene"_a, "accuracy"_a, "backend"_a, "report"_a, "simd"_a, "threads"_a, "points"_a, "normals"_a, "closest"_a,
+          "minimum_separation"_a, "method"_a, "restructure"_a, "hybrid_segments"_a, "hybrid_segment_pairs"_a, "gpus"_a,
+          "gpu_stages"_a, "vertex_face"_a, "edge_edge"_a)
       .def(
           "detect",
           [](Detector& d, const py::array& t0, const py::array& t1) {

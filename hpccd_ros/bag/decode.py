@@ -6,6 +6,7 @@ import functools
 from collections.abc import Callable
 
 from hpccd_ros.bag import message_definitions
+from hpccd_ros.bag.contact_padding import without_features
 from hpccd_ros.bag.reader import RecordedTopic, RecordingError
 from hpccd_ros.middleware.message_types import message_class
 
@@ -15,12 +16,14 @@ _HEADER = 4
 
 @dataclasses.dataclass(frozen=True)
 class _Addition:
-    """Lines that a definition has got, all fields behind those it had; the CDR of their values in a recording from
-    before, and to how many bytes the first of them is aligned."""
+    """Lines that a definition has got, fields behind those it had; the CDR of their values in a recording from
+    before, and to how many bytes the first of them is aligned. clear: of one that took unused bytes instead, what
+    makes them empty."""
 
     lines: frozenset[str]
-    value: bytes
-    alignment: int
+    value: bytes = b""
+    alignment: int = 1
+    clear: Callable[[bytes], bytes] = bytes
 
 
 # Oldest first.
@@ -35,6 +38,7 @@ _ADDED = {
             bytes(8 + 5 * 4),
             8,
         ),
+        _Addition(frozenset({"uint8 tested_features"}), clear=without_features),
     ),
 }  # fmt: skip
 
@@ -63,6 +67,7 @@ def completion(topic: RecordedTopic) -> Callable[[bytes], bytes] | None:
 
 def _completed(data: bytes, lacking: tuple[_Addition, ...]) -> bytes:
     for addition in lacking:
+        data = addition.clear(data)
         data += bytes(-(len(data) - _HEADER) % addition.alignment) + addition.value
     return data
 

@@ -12,6 +12,7 @@ from hpccd_ros.detect.layout import Layout
 from hpccd_ros.detect.separation import Separation
 from hpccd_ros.middleware import contact_messages, separation_fields
 from hpccd_ros.middleware.contact_messages import SceneContacts
+from hpccd_ros.middleware.tested_features import read_features
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +34,8 @@ class ContactArrays:
     else (0,).
     minimum_separation: in force in the whole scene, in its unit; 0 where contacts touch. pair_separation: for the pairs
     of meshes that have one of their own, by their names in the order of the scene.
+    features: what was tested at all: "vertex_face", "edge_edge" or both, but for pairs of meshes of which the node
+    tests other ones (its parameter ``pair_features``).
     points, normals and closest are (0, 3) and (0, 2, 3) where the node does not send them (its parameter ``outputs``).
     All are views of the message, which they keep alive.
     """
@@ -52,6 +55,7 @@ class ContactArrays:
     distance: NDArray[np.float64]
     minimum_separation: float
     pair_separation: dict[tuple[str, str], float]
+    features: tuple[str, ...]
 
     def __len__(self) -> int:
         return len(self.mesh_a)
@@ -92,6 +96,7 @@ def contacts_from_message(message: ContactArray) -> ContactArrays:
         pair_separation={
             (a, b) if order[a] <= order[b] else (b, a): distance for a, b, distance in separation.pairs
         },
+        features=read_features(message),
     )
 
 

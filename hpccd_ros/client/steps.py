@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """How far a motion may go: a request to ``~/detect`` from numpy arrays, and the number in its answer."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from hpccd.msg import MeshTopology, MeshVertices
@@ -23,6 +23,7 @@ def collision_free_step_request(
     topology_versions: Mapping[str, int] | None = None,
     accuracy: str = "",
     minimum_separation: float | None = None,
+    features: str | Iterable[str] = (),
     time_limit: float = 0.0,
 ) -> Detect.Request:
     """The request that asks how far the motion from ``start`` to ``end`` may go until something touches.
@@ -31,7 +32,8 @@ def collision_free_step_request(
     meshes in both. topologies: mesh name -> its :func:`topology_message`; None: those that the node has for these names
     (published to it, or from its mesh files). topology_versions: of the latter, where they are not 0. accuracy: "":
     the node's parameter. minimum_separation: of all pairs of meshes, in the unit of the scene; None: what the node's
-    parameters say. time_limit: s until the node gives up; 0: its parameter ``detect_time_limit``.
+    parameters say. features: "vertex_face", "edge_edge" or both, what is tested; (): what the node's parameter says.
+    time_limit: s until the node gives up; 0: its parameter ``detect_time_limit``.
     Raises TypeError or ValueError naming the argument.
     """
     names = list(start)
@@ -50,6 +52,7 @@ def collision_free_step_request(
         versions |= topology_versions
     if accuracy:
         arguments.choice("accuracy", accuracy, ACCURACIES)
+    tested = (features,) if isinstance(features, str) else tuple(features)
     return Detect.Request(
         mesh_names=names,
         topologies=[] if topologies is None else [topologies[name] for name in names],
@@ -60,6 +63,7 @@ def collision_free_step_request(
         minimum_separation=(
             [] if minimum_separation is None else [arguments.length("minimum_separation", minimum_separation)]
         ),
+        features=list(arguments.feature_names(tested)) if tested else [],
         time_limit=arguments.length("time_limit", time_limit),
     )
 

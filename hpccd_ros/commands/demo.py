@@ -13,6 +13,7 @@ Uses a DDS domain of its own unless ROS_DOMAIN_ID is set. Ctrl-C ends all proces
 """
 
 from hpccd_ros.base.errors import UserError
+from hpccd_ros.base.feature_list import feature_list
 
 
 def configure(parser):
@@ -25,6 +26,8 @@ def configure(parser):
     parser.add_argument("--frames", type=int, metavar="N", help="number of frames (default: the scene's own)")
     parser.add_argument("--rate", type=float, default=15.0, metavar="HZ", help="frames a second (default: %(default)s)")
     parser.add_argument("--accuracy", metavar="TIER", help="of the node (default: the node's own)")
+    parser.add_argument("--features", default=(), type=feature_list, metavar="KIND[,KIND]",
+                        help="what the node tests: vertex_face, edge_edge or both (default: the node's own)")
     parser.add_argument("--threads", type=int, default=0, metavar="N", help="of the node; 0: all cores (default)")
     parser.add_argument("--compression", choices=("none", "lz4", "zstd"), default="none",
                         help="of the recording (default: %(default)s)")

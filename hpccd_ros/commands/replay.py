@@ -20,6 +20,7 @@ only, from each frame to the next. Many at once need the extra "cluster" (Dask).
 import math
 
 from hpccd_ros.base.errors import UserError
+from hpccd_ros.base.feature_list import feature_list
 
 
 def configure(parser):
@@ -30,6 +31,8 @@ def configure(parser):
     verify.add_argument("--threads", type=int, default=0, metavar="N", help="0: all cores (default)")
     verify.add_argument("--accuracy", default="", metavar="TIER",
                         help="fast, balanced, conservative, exact (default: as recorded); another one may differ")
+    verify.add_argument("--features", default=(), type=feature_list, metavar="KIND[,KIND]",
+                        help="test vertex_face, edge_edge or both (default: as recorded); other ones differ")
     verify.add_argument("--csv", metavar="FILE",
                         help="write a table with one row for each step, or of many recordings one for each")
     verify.add_argument("--json", metavar="FILE", help="write what came of each recording")

@@ -77,6 +77,7 @@ def _stream(args, scene, folder, console):
             "node", "hpccd_ros.node", "--ros-args", "--params-file", str(folder / PARAMETERS),
             "-p", f"threads:={args.threads}", "-p", "diagnostics_period:=0.25",
             *(["-p", f"accuracy:={args.accuracy}"] if args.accuracy else []),
+            *(["-p", f"features:=[{', '.join(args.features)}]"] if args.features else []),
         )  # fmt: skip
         recorder = children.start(
             "recorder", "hpccd_ros.cli", "record", "-o", str(folder / RECORDING), "--compression", args.compression,

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 import hpccd_core as hc
+from hpccd_core.options import FEATURES
 from hpccd_ros.detect.separation import NONE, Separation
 from hpccd_ros.frames.types import Topology
 
@@ -26,6 +27,7 @@ class Options:
     outputs: tuple[str, ...] = ()
     separation: Separation = NONE
     distances: bool = False
+    features: tuple[str, ...] = FEATURES
 
     def same_detector(self, other: "Options") -> bool:
         """Whether a detector made with one may go on with the other."""
@@ -42,6 +44,7 @@ def make_detector(scene: hc.Scene, options: Options) -> hc.Detector:
         report=options.report,
         outputs=options.outputs,
         minimum_separation=options.separation.minimum,
+        features=options.features,
     )
     for mesh_a, mesh_b, distance in options.separation.pairs:
         detector.set_separation(mesh_a, mesh_b, distance)

@@ -16,6 +16,7 @@ class SceneBuilder:
     meshes: tuple[MeshSettings, ...]
     ignored_pairs: tuple[tuple[str, str], ...] = ()
     pair_accuracies: tuple[tuple[str, str, str], ...] = ()
+    pair_features: tuple[tuple[str, str, tuple[str, ...]], ...] = ()
 
     def build(self, topologies: tuple[Topology, ...]) -> hc.Scene:
         """One topology for each mesh, in order. Raises what the core raises."""
@@ -32,6 +33,8 @@ class SceneBuilder:
             scene.ignore_pair(a, b)
         for a, b, accuracy in self.pair_accuracies:
             scene.set_accuracy(a, b, accuracy)
+        for a, b, features in self.pair_features:
+            scene.set_features(a, b, features)
         return scene
 
     def among(self, names: list[str]) -> "SceneBuilder":
@@ -41,14 +44,16 @@ class SceneBuilder:
             tuple(known.get(name, MeshSettings(name)) for name in names),
             tuple(pair for pair in self.ignored_pairs if set(pair) <= set(names)),
             tuple(entry for entry in self.pair_accuracies if set(entry[:2]) <= set(names)),
+            tuple(entry for entry in self.pair_features if set(entry[:2]) <= set(names)),
         )
 
     def same_scene(self, other: "SceneBuilder") -> bool:
         """Whether equal topologies make equal scenes."""
-        return (self.meshes, self.ignored_pairs, self.pair_accuracies) == (
+        return (self.meshes, self.ignored_pairs, self.pair_accuracies, self.pair_features) == (
             other.meshes,
             other.ignored_pairs,
             other.pair_accuracies,
+            other.pair_features,
         )
 
     def concatenate(self, frame: SceneFrame, static_of: SceneFrame) -> np.ndarray:

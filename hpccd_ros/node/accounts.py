@@ -54,6 +54,7 @@ class Accounts:
         near = found.near
         last = {
             "accuracy": found.options.accuracy,
+            "features": ", ".join(found.options.features),
             "backend": found.backend,
             "threads": found.threads,
             "contacts": total,

@@ -11,7 +11,15 @@ from std_msgs.msg import Header
 from visualization_msgs.msg import MarkerArray
 
 from hpccd_ros.detect.step_detector import Detection
-from hpccd_ros.middleware import contact_messages, fields, qos, separation_fields, snapshot_messages, topic_names
+from hpccd_ros.middleware import (
+    contact_messages,
+    fields,
+    qos,
+    separation_fields,
+    snapshot_messages,
+    tested_features,
+    topic_names,
+)
 from hpccd_ros.node.life_cycle import GuardedLifecycleNode
 from hpccd_ros.node.markers import contact_markers, surface_cloud
 
@@ -48,6 +56,7 @@ class ContactsPublisher:
             outputs=tuple(self._settings["outputs"]),
         )
         separation_fields.fill_separation(message, found.options.separation)
+        tested_features.fill_features(message, found.options.features)
         message.dropped_frames = dropped_frames
         self._contacts.publish(message)
         if found.gaps is not None:

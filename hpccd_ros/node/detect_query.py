@@ -10,11 +10,12 @@ from hpccd.msg import ContactArray, DistanceArray
 from hpccd.srv import Detect
 
 import hpccd_core as hc
-from hpccd_ros.base.quoting import quoted
+from hpccd_core import arguments
+from hpccd_ros.base.quoting import quoted, shortened
 from hpccd_ros.detect.core import Options
 from hpccd_ros.detect.layout import Layout
 from hpccd_ros.detect.separation import NONE, Separation
-from hpccd_ros.middleware import contact_messages, separation_fields, snapshot_messages
+from hpccd_ros.middleware import contact_messages, separation_fields, snapshot_messages, tested_features
 
 
 class RequestError(ValueError):
@@ -23,11 +24,13 @@ class RequestError(ValueError):
 
 @dataclass(frozen=True)
 class Query:
-    """``separation``: of the whole scene; None where the node's is to hold. ``distance``: of query proximity."""
+    """``separation``: of the whole scene; None where the node's is to hold. ``distance``: of query proximity.
+    ``features``: what is tested; empty where the node's are to be."""
 
     name: str
     separation: Separation | None = None
     distance: float = 0.0
+    features: tuple[str, ...] = ()
 
     @property
     def of_snapshot(self) -> bool:
@@ -36,6 +39,8 @@ class Query:
 
 # Queries that read `start` too, and that a separation has a meaning for.
 OF_MOTION = ("contacts", "collision_free_step")
+# Those that look at pairs of features, not at whole surfaces.
+OF_FEATURES = (*OF_MOTION, "proximity")
 
 
 def requested_query(request: Detect.Request) -> Query:
@@ -47,11 +52,23 @@ def requested_query(request: Detect.Request) -> Query:
     distance = _length(request, "distance", name, of=("proximity",))
     if name != "contacts" and request.report not in ("", "all"):
         raise RequestError(f"report: only query contacts has one, leave it empty for {name}")
+    features = _features(request, name)
     if name in OF_MOTION:
-        return Query(name, None if separation is None else Separation(separation))
+        return Query(name, None if separation is None else Separation(separation), features=features)
     if name == "proximity" and distance is None:
         raise RequestError("distance: empty; query proximity needs one")
-    return Query(name, NONE, distance or 0.0)
+    return Query(name, NONE, distance or 0.0, features)
+
+
+def _features(request: Detect.Request, query: str) -> tuple[str, ...]:
+    if not request.features:
+        return ()
+    if query not in OF_FEATURES:
+        raise RequestError(f"features: only queries {', '.join(OF_FEATURES)} have some, leave them empty for {query}")
+    try:
+        return arguments.feature_names(map(shortened, request.features))
+    except ValueError as error:
+        raise RequestError(str(error)) from error
 
 
 def _length(request: Detect.Request, field: str, query: str, of: tuple[str, ...]) -> float | None:
@@ -96,6 +113,7 @@ def _contacts(asked: Asked, query: Query) -> Answer:
         message, found, asked.layout, max_contacts=asked.max_contacts, outputs=asked.options.outputs
     )
     separation_fields.fill_separation(message, asked.options.separation)
+    tested_features.fill_features(message, asked.options.features)
     return Answer(f"{message.total} contacts", contacts=message)
 
 
@@ -110,6 +128,7 @@ def _proximity(asked: Asked, query: Query) -> Answer:
     snapshot_messages.fill_proximity(
         message, near, asked.layout, max_contacts=asked.max_contacts, outputs=asked.options.outputs
     )
+    tested_features.fill_features(message, asked.options.features)
     return Answer(f"{message.total} pairs within {query.distance:g}", contacts=message)
 
 

@@ -54,6 +54,7 @@ def compute(
         accuracy=request.accuracy or options.accuracy,
         report=request.report or "all",
         separation=query.separation or options.separation.among(names),
+        features=query.features or options.features,
     )
     builder = scene.builder.among(names)
     used = kept.take(builder, topologies, options) or DetectorOf(

@@ -3,7 +3,7 @@
 
 from typing import Any
 
-from hpccd_core.options import ACCURACIES, OUTPUTS
+from hpccd_core.options import ACCURACIES, FEATURES, OUTPUTS
 from hpccd_ros.base.quoting import listed, quoted, shortened
 from hpccd_ros.detect.core import Options
 from hpccd_ros.detect.scene import SceneBuilder
@@ -18,8 +18,10 @@ MeshValues = dict[str, dict[str, Any]]
 
 
 def scene_builder(settings: dict[str, Any], meshes: MeshValues) -> SceneBuilder:
-    """The scene without its topologies. Raises ParameterError: an unknown mesh or tier in a pair."""
-    return SceneBuilder(mesh_settings(meshes), ignored_pairs(settings), pair_accuracies(settings))
+    """The scene without its topologies. Raises ParameterError: an unknown mesh, tier or kind in a pair."""
+    return SceneBuilder(
+        mesh_settings(meshes), ignored_pairs(settings), pair_accuracies(settings), pair_features(settings)
+    )
 
 
 def mesh_settings(meshes: MeshValues) -> tuple[MeshSettings, ...]:
@@ -57,7 +59,18 @@ def detector_options(settings: dict[str, Any]) -> Options:
         tuple(name for name in OUTPUTS if name in outputs),
         wanted,
         settings["distances"],
+        features(settings),
     )
+
+
+def features(settings: dict[str, Any]) -> tuple[str, ...]:
+    """Parameter ``features``, in the order of FEATURES. Raises ParameterError."""
+    if not settings["features"]:
+        raise ParameterError(
+            f"features: empty, so nothing would be tested; name {' or '.join(FEATURES)}, or both; meshes that shall "
+            "not be tested against each other are named by ignored_pairs"
+        )
+    return tuple(name for name in FEATURES if name in settings["features"])
 
 
 def separation(settings: dict[str, Any]) -> Separation:
@@ -117,6 +130,21 @@ def pair_accuracies(settings: dict[str, Any]) -> tuple[tuple[str, str, str], ...
     return tuple(found.values())
 
 
+def pair_features(settings: dict[str, Any]) -> tuple[tuple[str, str, tuple[str, ...]], ...]:
+    """Parameter ``pair_features`` as (mesh name, mesh name, features); entries of one pair add up. Raises
+    ParameterError."""
+    found: dict[frozenset[str], tuple[str, str, set[str]]] = {}
+    for text in settings["pair_features"]:
+        *names, kind = text.split(":")
+        if len(names) != 2 or not set(names) <= set(settings["meshes"]) or kind not in FEATURES:
+            raise ParameterError(
+                f"pair_features: {quoted(text)} must be NAME:NAME:KIND with meshes out of {_names(settings)} "
+                f"and a kind out of {', '.join(FEATURES)}"
+            )
+        found.setdefault(frozenset(names), (*names, set()))[2].add(kind)
+    return tuple((a, b, tuple(name for name in FEATURES if name in kinds)) for a, b, kinds in found.values())
+
+
 def poses(meshes: MeshValues) -> dict[str, Rigid]:
     """``mesh.NAME.pose`` of each mesh. Raises ParameterError."""
     found = {}
@@ -132,6 +160,7 @@ def check(settings: dict[str, Any], meshes: MeshValues) -> None:
     """What the values cannot tell one by one. Raises ParameterError."""
     scene_builder(settings, meshes)
     separation(settings)
+    features(settings)
     poses(meshes)
     for name, values in meshes.items():
         if values["transform"] == "tf" and not settings["frame_id"]:

@@ -4,7 +4,7 @@
 from dataclasses import dataclass
 from typing import Any
 
-from hpccd_core.options import ACCURACIES, BACKENDS, OUTPUTS, REPORTS
+from hpccd_core.options import ACCURACIES, BACKENDS, FEATURES, OUTPUTS, REPORTS
 
 # When a parameter may be changed.
 ALWAYS, UNCONFIGURED, NEVER = "always", "unconfigured", "never"
@@ -61,6 +61,13 @@ SCENE_ROWS = (
         "Pairs of meshes that are tested at another accuracy, each as NAME:NAME:TIER; the same name twice: within it",
     ),
     Row(
+        "pair_features",
+        "string[]",
+        [],
+        "Pairs of meshes of which other features are tested, each as NAME:NAME:KIND with vertex_face or edge_edge; two "
+        "entries of a pair: both; the same name twice: within it",
+    ),
+    Row(
         "autostart",
         "bool",
         True,
@@ -79,6 +86,14 @@ DETECTION_ROWS = (
         "all",
         "Every contact, those at the earliest time, or any one",
         choices=REPORTS,
+        change=ALWAYS,
+    ),
+    Row(
+        "features",
+        "string[]",
+        list(FEATURES),
+        "What is tested at all: vertices against faces, edges against edges, or both",
+        choices=FEATURES,
         change=ALWAYS,
     ),
     Row("outputs", "string[]", [], "Computed and sent beside the contacts", choices=OUTPUTS, change=ALWAYS),

@@ -3,6 +3,7 @@
 
 import numpy as np
 
+from hpccd_core.options import FEATURES
 from hpccd_ros.detect.separation import Separation
 from hpccd_ros.picture import contacts as picture
 from hpccd_ros.replay.recomputed import ReplayedStep
@@ -30,7 +31,8 @@ def draw_step(step: ReplayedStep, path, history: History | None = None, *, title
     of = f" of {max(history.steps)}" if history is not None else ""
     facts = [
         f"{triangles:,} triangles", f"{len(found.vf):,} vertex-face", f"{len(found.ee):,} edge-edge", first,
-        f"{step.milliseconds:.1f} ms", accuracy, separation_fact(step.separation), f"hash {found.hash:016x}",
+        f"{step.milliseconds:.1f} ms", accuracy, separation_fact(step.separation), features_fact(step.features),
+        f"hash {found.hash:016x}",
     ]  # fmt: skip
     drawn = picture.Picture(
         meshes,
@@ -54,6 +56,11 @@ def separation_fact(separation: Separation) -> str | None:
     count = len(separation.pairs)
     others = f", another for {count:,} pair{'' if count == 1 else 's'}" if count else ""
     return f"separation {separation.minimum:g}{others}" if separation.text else None
+
+
+def features_fact(features: tuple[str, ...]) -> str | None:
+    """None where all are tested."""
+    return None if features == FEATURES else f"only {' '.join(features).replace('_', '-')}"
 
 
 def meshes_in_the_middle(step: ReplayedStep):

@@ -49,7 +49,8 @@ def main(args) -> int:
     paths = [str(Path(path).absolute()) for path in args.files]
     with _cluster(distributed, args, len(paths)) as (client, threads):
         options = {"params": args.params and str(Path(args.params).absolute()), "backend": args.backend,
-                   "threads": args.threads or threads, "accuracy": args.accuracy, "begin": args.begin, "end": args.end}
+                   "threads": args.threads or threads, "accuracy": args.accuracy,
+                   "features": args.features, "begin": args.begin, "end": args.end}
         futures = [client.submit(replay_one, path, pure=False, **options) for path in paths]
         rows = _gather(distributed, futures, paths)
     _print(rows)
@@ -125,7 +126,7 @@ def _write_csv(path, rows) -> None:
         with open(path, "x", newline="", encoding="utf-8") as stream:
             writer = csv.DictWriter(stream, columns)
             writer.writeheader()
-            lists = ("accuracy", "separation")
+            lists = ("accuracy", "separation", "features")
             writer.writerows(row | {name: " ".join(row.get(name, [])) for name in lists} for row in rows)
     except OSError as error:
         raise UserError(f"--csv {path}: {error.strerror}") from error

@@ -4,7 +4,7 @@
 import dataclasses
 from collections.abc import Iterator
 
-from hpccd_core.options import ACCURACIES
+from hpccd_core.options import ACCURACIES, FEATURES
 from hpccd_ros.bag.decode import make_decoder
 from hpccd_ros.bag.reader import Recording, RecordingError
 from hpccd_ros.detect.core import CORE_ERRORS
@@ -15,6 +15,7 @@ from hpccd_ros.frames.types import SceneFrame
 from hpccd_ros.middleware import fields
 from hpccd_ros.middleware.fields import InvalidMessageError
 from hpccd_ros.middleware.separation_fields import read_separation
+from hpccd_ros.middleware.tested_features import read_features
 from hpccd_ros.replay.compare import difference
 from hpccd_ros.replay.distances import DistanceCheck
 from hpccd_ros.replay.frames import PATIENCE, FrameSource, FrameWindow
@@ -39,6 +40,7 @@ class ReplayedStep:
     contacts: object | None = None  # of the core, or None where a frame is missing
     layout: Layout | None = None
     separation: Separation = NONE  # in force
+    features: tuple[str, ...] = FEATURES  # that were tested
     milliseconds: float = 0.0  # the core's call, wall time
     difference: str | None = None  # first difference from what was recorded
     missing: str | None = None  # why it could not be computed
@@ -53,7 +55,7 @@ class Replay:
     """Goes once through a recording. Iterate over `steps()`; afterwards, or in between, look at the counts.
 
     backend, threads: as of hpccd_core.Detector; the contacts must not depend on them.
-    accuracy: "": that with which each answer was found. The separation is always that of the answer.
+    accuracy, features: empty: those with which each answer was found. The separation is always that of the answer.
     outputs: computed beside the contacts (they are not compared).
     distances: whether to check the answers of topic distances too.
     begin, end: seconds into the recording; steps outside are neither computed nor counted.
@@ -61,10 +63,11 @@ class Replay:
     """
 
     def __init__(self, recording: Recording, setup: ReplaySetup, *, backend="auto", threads=0, accuracy="",
-                 outputs=(), distances=True, begin=0.0, end=float("inf")):
+                 features=(), outputs=(), distances=True, begin=0.0, end=float("inf")):
         self._recording = recording
         self._setup = setup
         self._backend, self._threads, self._accuracy = backend, threads, accuracy
+        self._features = tuple(features)
         self._outputs = tuple(outputs)
         self._begin, self._end = begin, end
         self._at = 0.0  # seconds into the recording, of the message read last
@@ -193,7 +196,7 @@ class Replay:
             step.missing = f"the core refuses it: {error}"  # as in the node, which goes on with the next one
             return
         step.contacts, step.layout, step.milliseconds = found.contacts, found.layout, found.detect_ms
-        step.separation = found.options.separation
+        step.separation, step.features = found.options.separation, found.options.features
 
     def _options(self, recorded):
         """As the answer was found, if there is one; an accuracy or a separation that is none diverges: compare.py."""
@@ -201,7 +204,10 @@ class Replay:
         if recorded is not None:
             if not self._accuracy and recorded.accuracy in ACCURACIES:
                 options = dataclasses.replace(options, accuracy=recorded.accuracy)
-            options = dataclasses.replace(options, separation=self._separation_of(recorded))
+            separation, features = self._separation_of(recorded), read_features(recorded)
+            options = dataclasses.replace(options, separation=separation, features=features)
+        if self._features:
+            options = dataclasses.replace(options, features=self._features)
         return dataclasses.replace(options, outputs=self._outputs)
 
     def _separation_of(self, recorded) -> Separation:

@@ -41,7 +41,7 @@ class ReplaySetup:
         """Detector options of the recorded node, but for what may differ without a change of the result."""
         return Options(
             accuracy or self.settings["accuracy"], backend, threads, self.settings["report"],
-            separation=scene_parameters.separation(self.settings),
+            separation=scene_parameters.separation(self.settings), features=scene_parameters.features(self.settings),
         )  # fmt: skip
 
 

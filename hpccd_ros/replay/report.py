@@ -11,6 +11,7 @@ import time
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
+from hpccd_core.options import FEATURES
 from hpccd_ros.bag.reader import Recording
 from hpccd_ros.base.errors import UserError
 from hpccd_ros.replay import recorded_setup
@@ -18,7 +19,7 @@ from hpccd_ros.replay.pacing import Pace, next_wanted
 from hpccd_ros.replay.recomputed import Replay, ReplayedStep
 
 COLUMNS = ("number", "step", "start_ns", "end_ns", "contacts", "vertex_face", "edge_edge", "first_toc", "separation",
-           "ms", "hash", "recorded_contacts", "recorded_hash", "result")  # fmt: skip
+           "features", "ms", "hash", "recorded_contacts", "recorded_hash", "result")  # fmt: skip
 
 
 class Table:
@@ -37,7 +38,8 @@ class Table:
         self._writer.writerow([
             step.number, step.step, step.start, step.end,
             *([step.total, len(found.vf), len(found.ee), repr(float(found.first_toc)), step.separation.text,
-               f"{step.milliseconds:.3f}", f"{found.hash:#018x}"] if found is not None else [""] * 7),
+               " ".join(step.features), f"{step.milliseconds:.3f}", f"{found.hash:#018x}"]
+              if found is not None else [""] * 8),
             *([recorded.total, f"{recorded.hash:#018x}"] if recorded is not None else [""] * 2),
             step.missing or step.difference or ("equal" if recorded is not None else ""),
         ])  # fmt: skip
@@ -63,7 +65,7 @@ def main(args) -> int:
         table = stack.enter_context(contextlib.closing(Table(args.csv))) if args.csv else None
         progress = stack.enter_context(_progress_bar())
         replay = Replay(recording, setup, backend=args.backend, threads=args.threads, accuracy=args.accuracy,
-                        begin=args.begin, end=args.end)
+                        features=args.features, begin=args.begin, end=args.end)
         bar = progress.add_task("replay", total=replay.message_count, said="")
         summary = Summary()
         pace = Pace(args.rate or 0.0)
@@ -111,6 +113,7 @@ class Summary:
         self.seconds_recorded = 0.0
         self.accuracies = set()
         self.separations = set()
+        self.features = set()
         self.missing: ReplayedStep | None = None
         self.before = 0
 
@@ -125,6 +128,7 @@ class Summary:
         self.milliseconds += step.milliseconds
         self.seconds_recorded += (step.end - step.start) * 1e-9
         self.separations |= {step.separation.text} - {""}
+        self.features.add(" ".join(step.features))
         if step.recorded is not None:
             self.accuracies.add(step.recorded.accuracy)
 
@@ -150,7 +154,8 @@ class Summary:
             "unverified": replay.unverified, "frames": replay.frames, "steps": self.computed,
             "contacts": self.contacts, "core_ms": round(self.milliseconds, 3),
             "seconds": round(time.perf_counter() - self.began, 3), "accuracy": sorted(self.accuracies),
-            "separation": sorted(self.separations), "distances_verified": distances.verified, "why": why,
+            "separation": sorted(self.separations), "features": sorted(self.features),
+            "distances_verified": distances.verified, "why": why,
         }  # fmt: skip
 
     def print(self, args, recording, replay) -> None:
@@ -188,7 +193,8 @@ class Summary:
 
     def _tiers(self) -> str:
         separated = [f"separation {text}" for text in sorted(self.separations)]
-        return "; ".join([f"accuracy {', '.join(sorted(self.accuracies))}", *separated])
+        tested = [f"only {text}" for text in sorted(self.features) if text in FEATURES]
+        return "; ".join([f"accuracy {', '.join(sorted(self.accuracies))}", *separated, *tested])
 
 
 def _print_distances(distances) -> None:

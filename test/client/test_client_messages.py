@@ -120,6 +120,12 @@ def test_contacts_with_a_separation():
     assert (plain.minimum_separation, plain.pair_separation, plain.closest.shape) == (0.0, {}, (0, 2, 3))
 
 
+def test_contacts_tell_what_was_tested():
+    assert client.contacts_from_message(two_contacts()).features == ("vertex_face", "edge_edge")
+    assert client.contacts_from_message(two_contacts(tested_features=1)).features == ("vertex_face",)
+    assert client.contacts_from_message(two_contacts(tested_features=2)).features == ("edge_edge",)
+
+
 def test_answers_of_one_snapshot():
     near = client.contacts_from_message(two_contacts(toc=[], distance=[0.5, 0.25]))
     assert (len(near), near.n_vertex_face, near.n_edge_edge, near.n_edge_face) == (2, 1, 1, 0)

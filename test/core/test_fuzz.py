@@ -130,10 +130,19 @@ class Mistakes:
         return dataclasses.replace(found, vf=found.vf[1:], vf_toc=found.vf_toc[1:])
 
 
-@pytest.mark.parametrize("mistake", ["late", "early", "stale", "only_one"])
+    @staticmethod
+    def one_too_many(self, start, end):
+        """Where one kind is tested alone, a contact of the other is there."""
+        found = super(hc.Detector, self).detect(start, end)
+        if self.features != ("vertex_face",) or len(found.vf) == 0:
+            return found
+        return dataclasses.replace(found, ee=np.array([[0, 1, 2, 3]], np.uint32), ee_toc=found.vf_toc[:1])
+
+
+@pytest.mark.parametrize("mistake", ["late", "early", "stale", "only_one", "one_too_many"])
 def test_wrong_steps_are_seen_saved_and_replayed(mistake, tmp_path, monkeypatch, capsys):
     saved = tmp_path / "failures.npz"
-    method = "detect" if mistake == "only_one" else "collision_free_step"
+    method = "detect" if mistake.startswith("on") else "collision_free_step"
     with monkeypatch.context() as patch:
         patch.setattr(hc.Detector, method, getattr(Mistakes, mistake))
         arguments = ["--count", "400", "--batch", "60", "--simd", "auto", "--accuracy", "exact,conservative"]

@@ -59,6 +59,7 @@ class ContactArray(IdlStruct, typename="hpccd::msg::dds_::ContactArray_"):
     first_toc: float64
     total: uint64
     truncated: bool
+    tested_features: uint8
     hash: uint64
     accuracy: str
     backend: str

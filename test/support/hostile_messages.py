@@ -51,12 +51,14 @@ def changed_answer(rng, bag):
     def change(put, answer):
         name = rng.choice((
             "kind", "mesh_a", "mesh_b", "features_a", "features_b", "toc", "points", "normals", "first_toc", "total",
-            "truncated", "hash", "accuracy", "mesh_names", "step",
+            "truncated", "hash", "accuracy", "mesh_names", "step", "tested_features",
         ))  # fmt: skip
         value = getattr(answer, name)
         if name in ("first_toc", "total", "truncated", "hash", "step"):
             put(name, {"first_toc": rng.choice((math.nan, -1.0, 0.0, math.inf)), "truncated": not value}.get(
                 name, rng.choice((0, 1, 2**63, 2**64 - 1))))  # fmt: skip
+        elif name == "tested_features":
+            put(name, rng.choice((0, 1, 2, 3, 4, 255)))
         elif name == "accuracy":
             put(name, rng.choice(("", "fast", "wrong", "balanced", "conservative", "\n", "x" * 1000, "exact ")))
         elif name == "mesh_names":

@@ -47,8 +47,9 @@ def parameter_of_another_kind(rng, bag):
 @kind
 def parameter_that_a_replay_uses(rng, bag):
     info = info_of(bag)
-    names = ["meshes", "ignored_pairs", "pair_accuracy", "accuracy", "report", "frame_id", "frame_queue", "stamp_match",
-             "pending_frames", "stamp_tolerance", "restart_after", "max_vertices", "max_faces"]  # fmt: skip
+    names = ["meshes", "ignored_pairs", "pair_accuracy", "pair_features", "accuracy", "features", "report", "frame_id",
+             "frame_queue", "stamp_match", "pending_frames", "stamp_tolerance", "restart_after", "max_vertices",
+             "max_faces"]  # fmt: skip
     names += [f"mesh.{mesh}.{row.name}" for mesh in info["parameters"]["meshes"] for row in rows()[1]]
     info["parameters"][rng.choice(names)] = junk(rng)
     set_info(bag, info)
@@ -125,9 +126,9 @@ def mesh_names(rng, bag):
 def pairs(rng, bag):
     info = info_of(bag)
     one, *_, two = info["parameters"]["meshes"]
-    info["parameters"][rng.choice(("ignored_pairs", "pair_accuracy"))] = [rng.choice((
+    info["parameters"][rng.choice(("ignored_pairs", "pair_accuracy", "pair_features"))] = [rng.choice((
         f"{one}:{two}", f"{one}:{one}", f"{one}:{two}:fast", f"{one}:{two}:wrong", f"{one}:x", ":", "::", one,
-        f"{one}:{one}:exact",
+        f"{one}:{one}:exact", f"{one}:{two}:vertex_face",
         f"{two}:{one}:balanced",
     )) for _ in range(rng.choice((1, 2)))]  # fmt: skip
     set_info(bag, info)
@@ -164,6 +165,7 @@ def another_question(rng, bag):
     info = info_of(bag)
     name, values = rng.choice((
         ("report", ("any", "first", "all")), ("accuracy", ("fast", "balanced", "conservative")),
+        ("features", ([], ["vertex_face"], ["edge_edge"], ["edges"])),
         ("max_vertices", (1, 10)),
         ("max_faces", (1, 10)), ("stamp_match", ("nearest",)), ("frame_id", ("elsewhere",)),
         ("pending_frames", (1, 10_000)),

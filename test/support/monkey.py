@@ -111,6 +111,8 @@ class Monkey:
             return choose(([], [":".join(self._meshes)], ["cloth:nothing"]))
         if name == "pair_accuracy":
             return choose(([], [":".join((*self._meshes, "fast"))], ["cloth:cloth:exact"], ["cloth"]))
+        if name == "pair_features":
+            return choose(([], [":".join((*self._meshes, "vertex_face"))], ["cloth:cloth:edge_edge"], ["cloth:cloth"]))
         return sensible(row, self.random)
 
     def _place(self) -> str:
@@ -129,6 +131,7 @@ class Monkey:
             accuracy=choose(("", "", "fast", "balanced", "conservative", "exact", "sloppy" if odd else "")),
             report=choose(("", "all", "first", "any", "some" if odd else "")),
             query=choose(("", "contacts", "collision_free_step", "distances", "nearest" if odd else "")),
+            features=choose(([], [], ["vertex_face"], ["edge_edge", "vertex_face"], [""] if odd else [])),
             time_limit=choose(FLOATS if odd else (0.0, 5.0, 1e10)),
         )
         many = len(names or self._meshes)

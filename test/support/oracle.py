@@ -45,7 +45,10 @@ class Oracle:
             if channel.topic in roles:
                 schema = schemas[channel.schema_id]
                 data = completed(schema, message.data)
-                self.found[str(roles[channel.topic])].append(_decode(store, data, schema.name))
+                found = _decode(store, data, schema.name)
+                if schema.name == "hpccd/msg/ContactArray" and b"tested_features" not in schema.data:
+                    found.tested_features = 0  # of what then was no field
+                self.found[str(roles[channel.topic])].append(found)
         self.answers = self.found["contacts"]
         self.transforms = TransformBuffer()
         for role in ("transforms_static", "transforms"):
@@ -140,6 +143,11 @@ class Oracle:
             scene.ignore_pair(*pair.split(":"))
         for entry in self.given.get("pair_accuracy") or []:
             scene.set_accuracy(*entry.split(":"))
+        kinds = defaultdict(list)
+        for a, b, kind in (entry.split(":") for entry in self.given.get("pair_features") or []):
+            kinds[min(a, b), max(a, b)].append(kind)
+        for pair, named in kinds.items():
+            scene.set_features(*pair, named)
         report = self.given.get("report", "all")
         if list(answer.mesh_names) != self.meshes:
             return "other meshes"
@@ -148,7 +156,8 @@ class Oracle:
             return "no such separation"
         try:
             detector = hc.Detector(scene, accuracy=answer.accuracy, backend="cpu",
-            report="all" if report == "any" else report, minimum_separation=answer.minimum_separation)
+            report="all" if report == "any" else report, minimum_separation=answer.minimum_separation,
+            features={1: "vertex_face", 2: "edge_edge"}.get(answer.tested_features, ("vertex_face", "edge_edge")))
             for a, b, distance in zip(*separated, strict=True):
                 detector.set_separation(a, b, distance)
         except ValueError:

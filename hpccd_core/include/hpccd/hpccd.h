@@ -34,6 +34,13 @@ enum class Report : std::uint8_t { all, first, any };
 enum class Method : std::uint8_t { standard, published, naive, front };
 enum class Simd : std::uint8_t { automatic, scalar, avx2, avx512 };
 
+// Which pairs of features are tested at all. To test neither is refused: Scene::ignore_pair says that of two meshes.
+struct TestedFeatures {
+  bool vertex_face = true;
+  bool edge_edge = true;
+  bool operator==(const TestedFeatures&) const = default;
+};
+
 struct MeshOptions {
   bool self_collision = true;
   bool is_static = false;  // promised not to move; pairs of two static meshes are never tested
@@ -50,6 +57,8 @@ class Scene {
   void set_accuracy(std::uint32_t mesh_a, std::uint32_t mesh_b, Accuracy accuracy);
   // How far apart the two shall stay, instead of Options::minimum_separation; the same mesh twice: within it. >= 0.
   void set_separation(std::uint32_t mesh_a, std::uint32_t mesh_b, double separation);
+  // What is tested between the two, instead of Options::features; the same mesh twice: within it.
+  void set_features(std::uint32_t mesh_a, std::uint32_t mesh_b, TestedFeatures features);
 
   struct Mesh {
     std::string name;
@@ -63,6 +72,7 @@ class Scene {
   bool pair_enabled(std::uint32_t mesh_a, std::uint32_t mesh_b) const;
   Accuracy pair_accuracy(std::uint32_t mesh_a, std::uint32_t mesh_b, Accuracy otherwise) const;
   double pair_separation(std::uint32_t mesh_a, std::uint32_t mesh_b, double otherwise) const;
+  TestedFeatures pair_features(std::uint32_t mesh_a, std::uint32_t mesh_b, TestedFeatures otherwise) const;
 
  private:
   using Pair = std::pair<std::uint32_t, std::uint32_t>;
@@ -73,6 +83,7 @@ class Scene {
   std::map<Pair, bool> ignored_;
   std::map<Pair, Accuracy> accuracy_;
   std::map<Pair, double> separation_;
+  std::map<Pair, TestedFeatures> features_;
 };
 
 struct Options {
@@ -93,6 +104,8 @@ struct Options {
   int gpus = 0;
   // Of backend `gpu`: profile() tells the time on the device too, by stage. The events for it cost 1 us each.
   bool gpu_stages = false;
+  // Of detect, collision_free_step and proximity. Intersections and smallest distances are of whole surfaces.
+  TestedFeatures features;
 };
 
 // Contacts of one motion step in canonical order: vertex-face by (vertex, face), then edge-edge by (a0, a1, b0, b1).

@@ -166,8 +166,9 @@ void GpuBackend::run_snapshot(gpu::Query query, Positions vertices, double dista
 template <class Bound>
 void GpuBackend::prepare(Boxes boxes, Bound&& bound) {
   if (!pipeline_) {
-    pipeline_ = gpu::Pipeline::create(*shared_.scene, shared_.features, shared_.options.accuracy, shared_.separations,
-                                      gpu::status().devices.at(0).number, shared_.options.gpu_stages);
+    pipeline_ =
+        gpu::Pipeline::create(*shared_.scene, shared_.features, shared_.options.accuracy, shared_.options.features,
+                              shared_.separations, gpu::status().devices.at(0).number, shared_.options.gpu_stages);
     shared_.profiler.mark("gpu_start");
   }
   const bool worn = has_tree_ && worn_out_on_device();

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "base/simd.h"
+#include "scene/tested_features.h"
 
 namespace hpccd {
 
@@ -13,9 +14,10 @@ Resources::Resources(std::shared_ptr<const Scene> of, const Options& wanted, int
       pool(threads),
       features(features_of(*scene, pool)),
       separations(*scene, wanted.minimum_separation),
-      rules(*scene, wanted.accuracy, separations),
+      rules(*scene, wanted.accuracy, separations, wanted.features),
       tree(*scene, features, pool),
       settled_(separations.version()) {
+  require_some("features", wanted.features);
   options.simd = resolve(wanted.simd);
   options.threads = pool.size();
   pool.heed(cancellation);

@@ -157,9 +157,14 @@ __device__ __forceinline__ void leaf_pair_candidates(const LaunchParams<T>& para
                                                      CandidateState& state, uint2 pair) {
   constexpr bool edges_and_faces = query == Query::intersections;
   const bool same = pair.x == pair.y;
-  const u32 n_phases = (same ? 2 : 3) - (edges_and_faces ? 1 : 0);
+  u32 phase = 0, end = (same ? 2 : 3) - (edges_and_faces ? 1 : 0);
+  if constexpr (!edges_and_faces) {
+    const u32 tested = tested_features(params, pair);
+    if (!(tested & tests_edge_edge)) phase = 1;
+    if (!(tested & tests_vertex_face)) end = 1;
+  }
 #pragma unroll 1
-  for (u32 phase = 0; phase < n_phases; ++phase) {
+  for (; phase < end; ++phase) {
     const uint2 n = stage_phase<query>(params, s, pair, phase);
     __syncwarp();
     const u32 total = n.x * n.y, magic = magic_of(n.y ? n.y : 1);

@@ -15,7 +15,8 @@ namespace hpccd::gpu {
 class DeviceScene {
  public:
   // On the current device. Throws Error where the scene has too many features for 31-bit numbers.
-  DeviceScene(const Scene& scene, const Features& features, Accuracy accuracy, const SeparationTable& separations)
+  DeviceScene(const Scene& scene, const Features& features, Accuracy accuracy, TestedFeatures tested,
+              const SeparationTable& separations)
       : features_(features), separations_(separations) {
     const auto n_edges = features.edges.size();
     if (features.n_vertices >= kind_bit || n_edges >= kind_bit || features.n_faces() >= kind_bit)
@@ -24,6 +25,7 @@ class DeviceScene {
     upload(faces_, features.faces.data(), 3 * features.faces.size());
     upload(mesh_of_vertex_, features.mesh_of_vertex.data(), features.mesh_of_vertex.size());
     upload_rules(scene, accuracy);
+    upload_tested(scene, tested);
     keys_ = PairKeys::of(features.n_vertices, n_edges, features.n_faces());
   }
 
@@ -35,6 +37,9 @@ class DeviceScene {
     params.enabled = all_enabled_ ? nullptr : enabled_.data();
     params.accuracy = one_accuracy_ ? nullptr : accuracy_.data();
     params.default_accuracy = default_accuracy_;
+    params.features = one_tested_ ? nullptr : tested_.data();
+    params.default_features = default_tested_;
+    params.fits_edges = test_edges_;
     params.keys = keys_;
   }
 
@@ -62,7 +67,7 @@ class DeviceScene {
   const PairKeys& keys() const { return keys_; }
   std::size_t bytes() const {
     return edges_.bytes() + faces_.bytes() + mesh_of_vertex_.bytes() + enabled_.bytes() + accuracy_.bytes() +
-           pair_separation_.bytes() + largest_separation_.bytes();
+           tested_.bytes() + pair_separation_.bytes() + largest_separation_.bytes();
   }
 
  private:
@@ -82,14 +87,31 @@ class DeviceScene {
     upload(accuracy_, tiers.data(), tiers.size());
   }
 
+  void upload_tested(const Scene& scene, TestedFeatures otherwise) {
+    const auto bits = [](TestedFeatures f) {
+      return static_cast<unsigned char>((f.vertex_face ? tests_vertex_face : 0) | (f.edge_edge ? tests_edge_edge : 0));
+    };
+    default_tested_ = bits(otherwise);
+    std::vector<unsigned char> tested(std::size_t{n_meshes_} * n_meshes_);
+    for (u32 a = 0; a < n_meshes_; ++a)
+      for (u32 b = 0; b < n_meshes_; ++b) {
+        const TestedFeatures f = scene.pair_features(a, b, otherwise);
+        tested[std::size_t{a} * n_meshes_ + b] = bits(f);
+        one_tested_ = one_tested_ && f == otherwise;
+        test_edges_ = test_edges_ || (f.edge_edge && scene.pair_enabled(a, b));
+      }
+    upload(tested_, tested.data(), tested.size());
+  }
+
   const Features& features_;
   const SeparationTable& separations_;
   std::uint64_t uploaded_ = 0;  // version of the separations there
   DeviceBuffer<uint2> edges_;
   DeviceBuffer<u32> faces_, mesh_of_vertex_;
-  DeviceBuffer<unsigned char> enabled_, accuracy_;
+  DeviceBuffer<unsigned char> enabled_, accuracy_, tested_;
   DeviceBuffer<double> pair_separation_, largest_separation_;
-  bool all_enabled_ = true, one_accuracy_ = true;
+  bool all_enabled_ = true, one_accuracy_ = true, one_tested_ = true, test_edges_ = false;
+  unsigned char default_tested_ = 0;
   u32 n_meshes_ = 0;
   PairKeys keys_;
   Accuracy default_accuracy_ = Accuracy::exact;

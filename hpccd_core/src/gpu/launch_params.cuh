@@ -31,6 +31,9 @@ struct alignas(64) GivenEnds<double> {
   double2 t0[2], t1[2];
 };
 
+// What is tested between two meshes: a bit for each kind, by its number.
+inline constexpr u32 tests_vertex_face = 1, tests_edge_edge = 2;
+
 struct alignas(16) DeviceLeaf {
   u32 first_face, first_edge, first_vertex;
   u32 counts;
@@ -59,6 +62,8 @@ struct LaunchParams {
   const unsigned char* enabled;   // n_meshes^2; null: all pairs
   const unsigned char* accuracy;  // n_meshes^2; null: the default
   Accuracy default_accuracy;
+  const unsigned char* features;  // n_meshes^2, tests_vertex_face and tests_edge_edge; null: the default
+  unsigned char default_features;
   PairKeys keys;
   // How far apart features shall stay, or how near they are looked for.
   double separation;                 // where there is no table
@@ -71,6 +76,7 @@ struct LaunchParams {
   const u32* node_mesh;
   const u32* node_parent;
   u32* node_arrivals;
+  bool fits_edges;  // whether anybody looks at this frame's boxes of edges
   DeviceBox* leaf_boxes;
   const u32* leaf_nodes;
   const DeviceLeaf* leaves;
@@ -172,6 +178,22 @@ __device__ inline Accuracy accuracy_of(const LaunchParams<T>& params, uint4 v) {
   // The second vertex belongs to the first edge or to the face, the third to the other edge or the face.
   return static_cast<Accuracy>(
       params.accuracy[params.mesh_of_vertex[v.x] * params.n_meshes + params.mesh_of_vertex[v.z]]);
+}
+
+// All features of a leaf are of one mesh.
+template <class T>
+__device__ inline u32 mesh_of_leaf(const LaunchParams<T>& params, u32 leaf) {
+  const DeviceLeaf l = params.leaves[leaf];
+  const u32 v = l.n_faces() > 0 ? params.faces[3 * static_cast<u64>(params.face_of_slot[l.first_face])]
+                                : params.vertex_of_slot[l.first_vertex];
+  return params.mesh_of_vertex[v];
+}
+
+// What is tested between two leaves.
+template <class T>
+__device__ inline u32 tested_features(const LaunchParams<T>& params, uint2 leaves) {
+  if (!params.features) return params.default_features;
+  return params.features[mesh_of_leaf(params, leaves.x) * params.n_meshes + mesh_of_leaf(params, leaves.y)];
 }
 
 template <class T>

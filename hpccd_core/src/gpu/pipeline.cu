@@ -23,12 +23,12 @@ double as_time(u64 soonest) { return soonest ? std::bit_cast<double>(~soonest) :
 
 class DevicePipeline : public Pipeline {
  public:
-  DevicePipeline(const Scene& scene, const Features& features, Accuracy accuracy, const SeparationTable& separations,
-                 int device, bool time_stages)
+  DevicePipeline(const Scene& scene, const Features& features, Accuracy accuracy, TestedFeatures tested,
+                 const SeparationTable& separations, int device, bool time_stages)
       : device_((check(cudaSetDevice(device), "cudaSetDevice"), device)),
         timer_(time_stages),
         features_(features),
-        scene_(scene, features, accuracy, separations),
+        scene_(scene, features, accuracy, tested, separations),
         positions_(device),
         lists_(16 * typical_size(), 4 * typical_size(), typical_size() / 2),
         contacts_(scene_.keys().bits()) {
@@ -167,6 +167,7 @@ bool DevicePipeline::run_frame(Positions t0, Positions t1, double distance, Thre
   }
   LaunchParams<T> params{};
   scene_.fill(params);
+  if (query_ == Query::intersections) params.fits_edges = true;
   params.time_only = for_earliest();
   params.until_best = best_.has_value(), params.best = best_.value_or(no_time);
   if (of_snapshot(query_))
@@ -347,9 +348,10 @@ std::map<std::string, std::uint64_t> DevicePipeline::stats() const {
 }  // namespace
 
 std::unique_ptr<Pipeline> Pipeline::create(const Scene& scene, const Features& features, Accuracy accuracy,
-                                           const SeparationTable& separations, int device, bool time_stages) {
+                                           TestedFeatures tested, const SeparationTable& separations, int device,
+                                           bool time_stages) {
   if (status().devices.empty()) throw Error(status().reason);
-  return std::make_unique<DevicePipeline>(scene, features, accuracy, separations, device, time_stages);
+  return std::make_unique<DevicePipeline>(scene, features, accuracy, tested, separations, device, time_stages);
 }
 
 }  // namespace hpccd::gpu

@@ -41,7 +41,8 @@ class Pipeline {
   // Throws Error where the device has not enough memory or the scene has too many features for 31-bit numbers. The
   // separations may change between frames.
   static std::unique_ptr<Pipeline> create(const Scene& scene, const Features& features, Accuracy accuracy,
-                                          const SeparationTable& separations, int device, bool time_stages);
+                                          TestedFeatures tested, const SeparationTable& separations, int device,
+                                          bool time_stages);
   virtual ~Pipeline() = default;
 
   // The tree whose boxes are refitted in every frame.

@@ -23,7 +23,7 @@ __device__ DeviceBox refit_leaf(const LaunchParams<T>& params, u32 leaf) {
     store_box(&face, b);
     include(whole, b);
   }
-  if (lane < l.n_edges()) {
+  if (params.fits_edges && lane < l.n_edges()) {
     DeviceBox& edge = params.edge_boxes[l.first_edge + lane];
     const u32 v0 = edge.tag_low(), v1 = edge.tag_high();
     DeviceBox b = load_point<grown>(&params.points[v0]);

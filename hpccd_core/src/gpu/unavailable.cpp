@@ -19,7 +19,8 @@ void fail_after(int) {}
 
 void download(const void*, void*, std::size_t) { throw Error(status().reason); }
 
-std::unique_ptr<Pipeline> Pipeline::create(const Scene&, const Features&, Accuracy, const SeparationTable&, int, bool) {
+std::unique_ptr<Pipeline> Pipeline::create(const Scene&, const Features&, Accuracy, TestedFeatures,
+                                           const SeparationTable&, int, bool) {
   throw Error(status().reason);
 }
 

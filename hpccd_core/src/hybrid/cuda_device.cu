@@ -12,11 +12,11 @@ namespace {
 
 class CudaTestDevice final : public TestDevice {
  public:
-  CudaTestDevice(const Scene& scene, const Features& features, Accuracy accuracy, const SeparationTable& separations,
-                 int device)
+  CudaTestDevice(const Scene& scene, const Features& features, Accuracy accuracy, TestedFeatures tested,
+                 const SeparationTable& separations, int device)
       : device_((check(cudaSetDevice(device), "cudaSetDevice"), device)),
         features_(features),
-        scene_(scene, features, accuracy, separations),
+        scene_(scene, features, accuracy, tested, separations),
         slots_(n_slots) {
     check(cudaDeviceGetAttribute(&multiprocessors_, cudaDevAttrMultiProcessorCount, device), "cudaDeviceGetAttribute");
     counters_.reserve(1);
@@ -168,13 +168,15 @@ class CudaTestDevice final : public TestDevice {
 }  // namespace
 
 std::vector<std::unique_ptr<TestDevice>> cuda_devices(const Scene& scene, const Features& features, Accuracy accuracy,
-                                                      const SeparationTable& separations, int gpus) {
+                                                      TestedFeatures tested, const SeparationTable& separations,
+                                                      int gpus) {
   const auto& devices = status().devices;
   if (devices.empty()) throw Error(status().reason);
   const std::size_t n = gpus > 0 ? static_cast<std::size_t>(gpus) : devices.size();
   std::vector<std::unique_ptr<TestDevice>> found;
   for (std::size_t i = 0; i < std::min(n, devices.size()); ++i)
-    found.push_back(std::make_unique<CudaTestDevice>(scene, features, accuracy, separations, devices[i].number));
+    found.push_back(
+        std::make_unique<CudaTestDevice>(scene, features, accuracy, tested, separations, devices[i].number));
   return found;
 }
 

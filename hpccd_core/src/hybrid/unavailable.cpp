@@ -5,8 +5,8 @@
 
 namespace hpccd::hybrid {
 
-std::vector<std::unique_ptr<TestDevice>> cuda_devices(const Scene&, const Features&, Accuracy, const SeparationTable&,
-                                                      int) {
+std::vector<std::unique_ptr<TestDevice>> cuda_devices(const Scene&, const Features&, Accuracy, TestedFeatures,
+                                                      const SeparationTable&, int) {
   throw gpu::Error(gpu::status().reason);
 }
 

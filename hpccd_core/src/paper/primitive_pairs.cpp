@@ -56,8 +56,10 @@ void vertex_face_pairs(const Features& features, const std::vector<Box>& vertex_
 }  // namespace
 
 void primitive_pairs(const Features& features, const std::vector<Box>& vertex_boxes, BoundedPrimitive a,
-                     BoundedPrimitive b, CandidateBuffer& edge_edge, CandidateBuffer& vertex_face) {
-  edge_pairs(features, vertex_boxes, a, b, edge_edge);
+                     BoundedPrimitive b, TestedFeatures tested, CandidateBuffer& edge_edge,
+                     CandidateBuffer& vertex_face) {
+  if (tested.edge_edge) edge_pairs(features, vertex_boxes, a, b, edge_edge);
+  if (!tested.vertex_face) return;
   vertex_face_pairs(features, vertex_boxes, a, b, vertex_face);
   vertex_face_pairs(features, vertex_boxes, b, a, vertex_face);
 }

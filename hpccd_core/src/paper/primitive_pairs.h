@@ -21,13 +21,14 @@ struct BoundedPrimitive {
 // Appends the feature pairs of two different primitives whose boxes overlap and that share no vertex: the rule of
 // traverse/leaf_pairs.inl, so that all methods test the same pairs.
 void primitive_pairs(const Features& features, const std::vector<Box>& vertex_boxes, BoundedPrimitive a,
-                     BoundedPrimitive b, CandidateBuffer& edge_edge, CandidateBuffer& vertex_face);
+                     BoundedPrimitive b, TestedFeatures tested, CandidateBuffer& edge_edge,
+                     CandidateBuffer& vertex_face);
 
 // Their elementary tests. Inline: it is called for each pair of leaves (out of line the traversal took 5 % longer).
 inline void test_primitives(const Features& features, Rule rule, const std::vector<Box>& vertex_boxes,
                             BoundedPrimitive a, BoundedPrimitive b, Worker& worker) {
   worker.test_candidates(rule, [&](CandidateBuffer& edge_edge, CandidateBuffer& vertex_face) {
-    primitive_pairs(features, vertex_boxes, a, b, edge_edge, vertex_face);
+    primitive_pairs(features, vertex_boxes, a, b, rule.features, edge_edge, vertex_face);
   });
 }
 // The same of two primitives by number, by the rule of their meshes.

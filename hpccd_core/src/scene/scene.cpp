@@ -3,6 +3,7 @@
 
 #include "base/length.h"
 #include "hpccd/hpccd.h"
+#include "scene/tested_features.h"
 
 namespace hpccd {
 
@@ -43,6 +44,14 @@ void Scene::set_separation(std::uint32_t mesh_a, std::uint32_t mesh_b, double se
   separation_[ordered(mesh_a, mesh_b)] = separation;
 }
 
+void Scene::set_features(std::uint32_t mesh_a, std::uint32_t mesh_b, TestedFeatures features) {
+  if (std::max(mesh_a, mesh_b) >= meshes_.size())
+    throw InvalidArgument("mesh_a, mesh_b: the scene has " + std::to_string(meshes_.size()) +
+                          " meshes, numbered from 0");
+  require_some("features", features);
+  features_[ordered(mesh_a, mesh_b)] = features;
+}
+
 bool Scene::pair_enabled(std::uint32_t a, std::uint32_t b) const {
   const MeshOptions &oa = meshes_[a].options, &ob = meshes_[b].options;
   if (a == b && !oa.self_collision) return false;
@@ -58,6 +67,11 @@ Accuracy Scene::pair_accuracy(std::uint32_t a, std::uint32_t b, Accuracy otherwi
 double Scene::pair_separation(std::uint32_t a, std::uint32_t b, double otherwise) const {
   const auto found = separation_.find(ordered(a, b));
   return found == separation_.end() ? otherwise : found->second;
+}
+
+TestedFeatures Scene::pair_features(std::uint32_t a, std::uint32_t b, TestedFeatures otherwise) const {
+  const auto found = features_.find(ordered(a, b));
+  return found == features_.end() ? otherwise : found->second;
 }
 
 }  // namespace hpccd

@@ -6,25 +6,34 @@ namespace hpccd {
 // Of leaf_pairs.inl, compiled for each instruction set.
 namespace scalar {
 std::uint32_t block_pairs(const Tree&, const Block&, const Block&, LeafPair*);
-void leaf_pairs(const Tree&, const LeafRange&, const LeafRange&, CandidateBuffer&, CandidateBuffer&);
-void leaf_pairs_until(const Tree&, const LeafRange&, const LeafRange&, float, CandidateBuffer&, CandidateBuffer&);
-void leaf_pairs_at_start(const Tree&, const LeafRange&, const LeafRange&, float, CandidateBuffer&, CandidateBuffer&);
-void leaf_pairs_in_snapshot(const Tree&, const LeafRange&, const LeafRange&, float, CandidateBuffer&, CandidateBuffer&);
+void leaf_pairs(const Tree&, const LeafRange&, const LeafRange&, TestedFeatures, CandidateBuffer&, CandidateBuffer&);
+void leaf_pairs_until(const Tree&, const LeafRange&, const LeafRange&, TestedFeatures, float, CandidateBuffer&,
+                      CandidateBuffer&);
+void leaf_pairs_at_start(const Tree&, const LeafRange&, const LeafRange&, TestedFeatures, float, CandidateBuffer&,
+                         CandidateBuffer&);
+void leaf_pairs_in_snapshot(const Tree&, const LeafRange&, const LeafRange&, TestedFeatures, float, CandidateBuffer&,
+                            CandidateBuffer&);
 }  // namespace scalar
 #if defined(HPCCD_X86)
 namespace avx2 {
 std::uint32_t block_pairs(const Tree&, const Block&, const Block&, LeafPair*);
-void leaf_pairs(const Tree&, const LeafRange&, const LeafRange&, CandidateBuffer&, CandidateBuffer&);
-void leaf_pairs_until(const Tree&, const LeafRange&, const LeafRange&, float, CandidateBuffer&, CandidateBuffer&);
-void leaf_pairs_at_start(const Tree&, const LeafRange&, const LeafRange&, float, CandidateBuffer&, CandidateBuffer&);
-void leaf_pairs_in_snapshot(const Tree&, const LeafRange&, const LeafRange&, float, CandidateBuffer&, CandidateBuffer&);
+void leaf_pairs(const Tree&, const LeafRange&, const LeafRange&, TestedFeatures, CandidateBuffer&, CandidateBuffer&);
+void leaf_pairs_until(const Tree&, const LeafRange&, const LeafRange&, TestedFeatures, float, CandidateBuffer&,
+                      CandidateBuffer&);
+void leaf_pairs_at_start(const Tree&, const LeafRange&, const LeafRange&, TestedFeatures, float, CandidateBuffer&,
+                         CandidateBuffer&);
+void leaf_pairs_in_snapshot(const Tree&, const LeafRange&, const LeafRange&, TestedFeatures, float, CandidateBuffer&,
+                            CandidateBuffer&);
 }  // namespace avx2
 namespace avx512 {
 std::uint32_t block_pairs(const Tree&, const Block&, const Block&, LeafPair*);
-void leaf_pairs(const Tree&, const LeafRange&, const LeafRange&, CandidateBuffer&, CandidateBuffer&);
-void leaf_pairs_until(const Tree&, const LeafRange&, const LeafRange&, float, CandidateBuffer&, CandidateBuffer&);
-void leaf_pairs_at_start(const Tree&, const LeafRange&, const LeafRange&, float, CandidateBuffer&, CandidateBuffer&);
-void leaf_pairs_in_snapshot(const Tree&, const LeafRange&, const LeafRange&, float, CandidateBuffer&, CandidateBuffer&);
+void leaf_pairs(const Tree&, const LeafRange&, const LeafRange&, TestedFeatures, CandidateBuffer&, CandidateBuffer&);
+void leaf_pairs_until(const Tree&, const LeafRange&, const LeafRange&, TestedFeatures, float, CandidateBuffer&,
+                      CandidateBuffer&);
+void leaf_pairs_at_start(const Tree&, const LeafRange&, const LeafRange&, TestedFeatures, float, CandidateBuffer&,
+                         CandidateBuffer&);
+void leaf_pairs_in_snapshot(const Tree&, const LeafRange&, const LeafRange&, TestedFeatures, float, CandidateBuffer&,
+                            CandidateBuffer&);
 }  // namespace avx512
 #endif
 

@@ -16,9 +16,10 @@ struct CandidateBuffer {
   std::uint32_t first[capacity + Tree::load_width], second[capacity + Tree::load_width];
 };
 
-// Edges a, b with a < b to `edge_edge`, vertex and face to `vertex_face`. a == b: pairs within one leaf.
-using LeafPairs = void (*)(const Tree& tree, const LeafRange& a, const LeafRange& b, CandidateBuffer& edge_edge,
-                           CandidateBuffer& vertex_face);
+// Edges a, b with a < b to `edge_edge`, vertex and face to `vertex_face`, as far as they are tested. a == b: pairs
+// within one leaf.
+using LeafPairs = void (*)(const Tree& tree, const LeafRange& a, const LeafRange& b, TestedFeatures tested,
+                           CandidateBuffer& edge_edge, CandidateBuffer& vertex_face);
 
 LeafPairs leaf_pairs(Simd simd);
 
@@ -36,14 +37,14 @@ using BlockPairs = std::uint32_t (*)(const Tree& tree, const Block& a, const Blo
 BlockPairs block_pairs(Simd simd);
 
 // The same of the motion up to a time below 1.
-using LeafPairsUntil = void (*)(const Tree& tree, const LeafRange& a, const LeafRange& b, float until,
-                                CandidateBuffer& edge_edge, CandidateBuffer& vertex_face);
+using LeafPairsUntil = void (*)(const Tree& tree, const LeafRange& a, const LeafRange& b, TestedFeatures tested,
+                                float until, CandidateBuffer& edge_edge, CandidateBuffer& vertex_face);
 
 LeafPairsUntil leaf_pairs_until(Simd simd);
 
 // The same of one snapshot: features whose boxes at t = 0 are no farther apart than `reach` along any axis.
-using LeafPairsInSnapshot = void (*)(const Tree& tree, const LeafRange& a, const LeafRange& b, float reach,
-                                     CandidateBuffer& edge_edge, CandidateBuffer& vertex_face);
+using LeafPairsInSnapshot = void (*)(const Tree& tree, const LeafRange& a, const LeafRange& b, TestedFeatures tested,
+                                     float reach, CandidateBuffer& edge_edge, CandidateBuffer& vertex_face);
 
 LeafPairsInSnapshot leaf_pairs_in_snapshot(Simd simd);
 // The same of the start of a motion.

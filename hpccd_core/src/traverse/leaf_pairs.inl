@@ -40,23 +40,25 @@ HPCCD_HD void vertex_face_pairs(When when, const LeafFeatures& a, const LeafFeat
 }
 
 template <class Kernel, class When>
-HPCCD_HD void pairs_within(When when, const LeafFeatures& leaf, CandidateBuffer& edge_edge,
+HPCCD_HD void pairs_within(When when, const LeafFeatures& leaf, TestedFeatures tested, CandidateBuffer& edge_edge,
                            CandidateBuffer& vertex_face) {
   const typename Kernel::Lanes lanes(when, leaf);
-  const unsigned edges = first_bits(leaf.n_edges);
-  edge_pairs<Kernel, Kernel>(when, leaf, leaf, lanes, edges, edges, edge_edge);
-  vertex_face_pairs<Kernel, Kernel>(when, leaf, leaf, lanes, first_bits(leaf.n_vertices), first_bits(leaf.n_faces), vertex_face);
+  const unsigned edges = first_bits(leaf.n_edges), vertices = first_bits(leaf.n_vertices);
+  if (tested.edge_edge) edge_pairs<Kernel, Kernel>(when, leaf, leaf, lanes, edges, edges, edge_edge);
+  if (!tested.vertex_face) return;
+  vertex_face_pairs<Kernel, Kernel>(when, leaf, leaf, lanes, vertices, first_bits(leaf.n_faces), vertex_face);
 }
 
 // Only what is near the other leaf's box is looked at one by one.
 template <class A, class B, class When>
 HPCCD_HD void pairs_between(When when, const LeafFeatures& a, const LeafFeatures& b, const Node& node_a,
-                            const Node& node_b, CandidateBuffer& edge_edge, CandidateBuffer& vertex_face) {
+                            const Node& node_b, TestedFeatures tested, CandidateBuffer& edge_edge,
+                            CandidateBuffer& vertex_face) {
   const typename A::Lanes lanes_a(when, a);
   const typename B::Lanes lanes_b(when, b);
   const typename A::Outcodes near_a(when, a, lanes_a, bounds_of(node_b));
   const typename B::Outcodes near_b(when, b, lanes_b, bounds_of(node_a));
-  const unsigned edges_a = near_a.edges(a), edges_b = near_b.edges(b);
+  const unsigned edges_a = tested.edge_edge ? near_a.edges(a) : 0, edges_b = near_b.edges(b);
   if (edges_a && edges_b) {
     // One by one the fewer.
     if (__builtin_popcount(edges_a) <= __builtin_popcount(edges_b))
@@ -64,6 +66,7 @@ HPCCD_HD void pairs_between(When when, const LeafFeatures& a, const LeafFeatures
     else
       edge_pairs<B, A>(when, b, a, lanes_a, edges_b, edges_a, edge_edge);
   }
+  if (!tested.vertex_face) return;
   const unsigned faces_a = near_a.faces(a), faces_b = near_b.faces(b);
   if (faces_b) vertex_face_pairs<A, B>(when, a, b, lanes_b, near_a.vertices(a), faces_b, vertex_face);
   if (faces_a) vertex_face_pairs<B, A>(when, b, a, lanes_a, near_b.vertices(b), faces_a, vertex_face);
@@ -94,7 +97,7 @@ HPCCD_HD bool are_apart(const Kdop& a, const Kdop& b) {
 
 template <class When>
 HPCCD_HD void pairs_of_leaves(When when, const Tree& tree, const LeafRange& a, const LeafRange& b,
-                              CandidateBuffer& edge_edge, CandidateBuffer& vertex_face) {
+                              TestedFeatures tested, CandidateBuffer& edge_edge, CandidateBuffer& vertex_face) {
   const std::uint32_t* leaf_nodes = tree.leaf_nodes.data();
   const LeafRange* leaves = tree.leaves.data();
   const Node &node_a = tree.nodes.data()[leaf_nodes[&a - leaves]], &node_b = tree.nodes.data()[leaf_nodes[&b - leaves]];
@@ -103,9 +106,9 @@ HPCCD_HD void pairs_of_leaves(When when, const Tree& tree, const LeafRange& a, c
     using A = decltype(of_a);
     using B = decltype(of_b);
     if (&a == &b)
-      pairs_within<A>(when, leaf_a, edge_edge, vertex_face);
+      pairs_within<A>(when, leaf_a, tested, edge_edge, vertex_face);
     else
-      pairs_between<A, B>(when, leaf_a, leaf_b, node_a, node_b, edge_edge, vertex_face);
+      pairs_between<A, B>(when, leaf_a, leaf_b, node_a, node_b, tested, edge_edge, vertex_face);
   });
 }
 
@@ -136,24 +139,24 @@ std::uint32_t block_pairs(const Tree& tree, const Block& a, const Block& b, Leaf
   return n;
 }
 
-void leaf_pairs(const Tree& tree, const LeafRange& a, const LeafRange& b, CandidateBuffer& edge_edge,
-                CandidateBuffer& vertex_face) {
-  pairs_of_leaves(BothEnds(), tree, a, b, edge_edge, vertex_face);
+void leaf_pairs(const Tree& tree, const LeafRange& a, const LeafRange& b, TestedFeatures tested,
+                CandidateBuffer& edge_edge, CandidateBuffer& vertex_face) {
+  pairs_of_leaves(BothEnds(), tree, a, b, tested, edge_edge, vertex_face);
 }
 
-void leaf_pairs_until(const Tree& tree, const LeafRange& a, const LeafRange& b, float until, CandidateBuffer& edge_edge,
-                      CandidateBuffer& vertex_face) {
-  pairs_of_leaves(Until{until}, tree, a, b, edge_edge, vertex_face);
+void leaf_pairs_until(const Tree& tree, const LeafRange& a, const LeafRange& b, TestedFeatures tested, float until,
+                      CandidateBuffer& edge_edge, CandidateBuffer& vertex_face) {
+  pairs_of_leaves(Until{until}, tree, a, b, tested, edge_edge, vertex_face);
 }
 
-void leaf_pairs_at_start(const Tree& tree, const LeafRange& a, const LeafRange& b, float reach,
+void leaf_pairs_at_start(const Tree& tree, const LeafRange& a, const LeafRange& b, TestedFeatures tested, float reach,
                          CandidateBuffer& edge_edge, CandidateBuffer& vertex_face) {
-  pairs_of_leaves(AtStart{reach}, tree, a, b, edge_edge, vertex_face);
+  pairs_of_leaves(AtStart{reach}, tree, a, b, tested, edge_edge, vertex_face);
 }
 
-void leaf_pairs_in_snapshot(const Tree& tree, const LeafRange& a, const LeafRange& b, float reach,
-                            CandidateBuffer& edge_edge, CandidateBuffer& vertex_face) {
-  pairs_of_leaves(InSnapshot{reach}, tree, a, b, edge_edge, vertex_face);
+void leaf_pairs_in_snapshot(const Tree& tree, const LeafRange& a, const LeafRange& b, TestedFeatures tested,
+                            float reach, CandidateBuffer& edge_edge, CandidateBuffer& vertex_face) {
+  pairs_of_leaves(InSnapshot{reach}, tree, a, b, tested, edge_edge, vertex_face);
 }
 
 }  // namespace hpccd::HPCCD_ISA

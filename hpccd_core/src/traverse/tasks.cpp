@@ -11,14 +11,16 @@ bool tells_times(Rule rule) {
 
 }  // namespace
 
-PairRules::PairRules(const Scene& scene, Accuracy accuracy, const SeparationTable& separations)
+PairRules::PairRules(const Scene& scene, Accuracy accuracy, const SeparationTable& separations, TestedFeatures features)
     : n_(scene.meshes().size()) {
   enabled_.resize(n_ * n_);
   accuracy_.resize(n_ * n_);
+  features_.resize(n_ * n_);
   for (std::uint32_t a = 0; a < n_; ++a)
     for (std::uint32_t b = 0; b < n_; ++b) {
       enabled_[a * n_ + b] = scene.pair_enabled(a, b);
       accuracy_[a * n_ + b] = scene.pair_accuracy(a, b, accuracy);
+      features_[a * n_ + b] = scene.pair_features(a, b, features);
       all_enabled_ = all_enabled_ && enabled_[a * n_ + b];
     }
   change(separations);
@@ -31,9 +33,9 @@ void PairRules::change(const SeparationTable& separations) {
   for (std::uint32_t a = 0; a < n_; ++a)
     for (std::uint32_t b = 0; b < n_; ++b) {
       const std::size_t i = a * n_ + b;
-      rules_[i] = {accuracy_[i], separations.of(a, b) > 0};
+      rules_[i] = {accuracy_[i], separations.of(a, b) > 0, features_[i]};
       if (enabled(a, b)) promise_times_ = promise_times_ && tells_times(rules_[i]);
-      all_default = all_default && rules_[i].number() == rules_[0].number();
+      all_default = all_default && rules_[i] == rules_[0];
     }
   if (!rules_.empty()) default_ = rules_[0];
   if (all_default) rules_.clear();

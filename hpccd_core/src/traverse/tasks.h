@@ -19,16 +19,19 @@ struct NodePair {
 struct Rule {
   Accuracy accuracy;
   bool separated;  // for a minimum separation above 0
+  TestedFeatures features = {};
 
+  // Of the test: it does not ask which candidates there are.
   unsigned number() const { return static_cast<unsigned>(accuracy) + (separated ? 4 : 0); }
   static Rule of_number(unsigned i) { return {static_cast<Accuracy>(i % 4), i >= 4}; }
+  bool operator==(const Rule&) const = default;
 };
 inline constexpr unsigned n_rules = 8;
 
 // What the scene says of two meshes, looked up once per call.
 class PairRules {
  public:
-  PairRules(const Scene& scene, Accuracy accuracy, const SeparationTable& separations);
+  PairRules(const Scene& scene, Accuracy accuracy, const SeparationTable& separations, TestedFeatures features = {});
   void change(const SeparationTable& separations);
   // Meshes by number, or mixed_meshes: then some of their pairs may be enabled.
   bool enabled(std::uint32_t mesh_a, std::uint32_t mesh_b) const {
@@ -50,6 +53,7 @@ class PairRules {
   bool all_enabled_ = true, promise_times_ = true;
   std::vector<char> enabled_;
   std::vector<Accuracy> accuracy_;
+  std::vector<TestedFeatures> features_;
   Rule default_{};
   std::vector<Rule> rules_;  // empty where all are the default
 };

@@ -167,11 +167,11 @@ void test_leaves(const Tree& tree, const PairRules& rules, LeafPair pair, Worker
     const PartOfMotion part = search.part();
     worker.test_candidates(rule, [&](CandidateBuffer& edge_edge, CandidateBuffer& vertex_face) {
       if (part.until < 1 && part.reach >= 0)
-        search.leaf_pairs_at_start(tree, a, b, part.reach, edge_edge, vertex_face);
+        search.leaf_pairs_at_start(tree, a, b, rule.features, part.reach, edge_edge, vertex_face);
       else if (part.until < 1)
-        search.leaf_pairs_until(tree, a, b, part.until, edge_edge, vertex_face);
+        search.leaf_pairs_until(tree, a, b, rule.features, part.until, edge_edge, vertex_face);
       else
-        search.leaf_pairs(tree, a, b, edge_edge, vertex_face);
+        search.leaf_pairs(tree, a, b, rule.features, edge_edge, vertex_face);
     });
   }
   if (search.leaf_edge_faces)
@@ -185,8 +185,10 @@ void test_leaves(const Tree& tree, const PairRules& rules, LeafPair pair, Worker
     reach = search.nearest->reach(node_a.mesh, node_b.mesh);
     first_look = reach == std::numeric_limits<float>::infinity();
   }
+  // Smallest distances are of whole surfaces.
+  const TestedFeatures tested = search.nearest ? TestedFeatures{} : rule.features;
   worker.test_candidates(rule, [&](CandidateBuffer& edge_edge, CandidateBuffer& vertex_face) {
-    search.leaf_pairs_in_snapshot(tree, a, b, reach, edge_edge, vertex_face);
+    search.leaf_pairs_in_snapshot(tree, a, b, tested, reach, edge_edge, vertex_face);
   });
   if (first_look) worker.flush();  // any bound is better than none
 }

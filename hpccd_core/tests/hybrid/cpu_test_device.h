@@ -131,6 +131,7 @@ class CpuTestDevice final : public hybrid::TestDevice {
     Search search;
     for (auto& test : search.batch_test) test = test_;
     for (auto& fallback : search.fallback) fallback = separation_ > 0 ? decide_separation : decide_contact;
+    search.block_pairs = block_pairs(Simd::scalar);
     search.leaf_pairs = leaf_pairs(Simd::scalar);
     search.report = Report::all;
     search.geometry = {motion_.vertices.data(), features_.edges.data(), features_.faces.data(), nullptr,

@@ -29,6 +29,7 @@ struct Bench {
     for (auto& test : search.batch_test) test = batch_test;
     for (unsigned i = 0; i < n_rules; ++i)
       search.fallback[i] = Rule::of_number(i).separated ? decide_separation : decide_contact;
+    search.block_pairs = block_pairs(Simd::scalar);
     search.leaf_pairs = leaf_pairs(Simd::scalar);
     search.report = Report::all;
   }

@@ -78,7 +78,7 @@ struct LeafPairsInPart : testing::Test {
   template <class LeafPairsOfPart>
   Found by(LeafPairsOfPart leaf_pairs, const LeafRange& a, const LeafRange& b, float part) const {
     const auto edge_edge = std::make_unique<CandidateBuffer>(), vertex_face = std::make_unique<CandidateBuffer>();
-    leaf_pairs(tree, a, b, part, *edge_edge, *vertex_face);
+    leaf_pairs(tree, a, b, TestedFeatures{}, part, *edge_edge, *vertex_face);
     Found found;
     for (std::uint32_t i = 0; i < edge_edge->n; ++i)
       found.edge_edge.insert({edge_edge->first[i], edge_edge->second[i]});

@@ -64,9 +64,9 @@ struct LeafPairsTest : testing::Test {
     return sorted(found);
   }
 
-  Found by(LeafPairs leaf_pairs, const LeafRange& a, const LeafRange& b) const {
+  Found by(LeafPairs leaf_pairs, const LeafRange& a, const LeafRange& b, TestedFeatures tested = {}) const {
     const auto edge_edge = std::make_unique<CandidateBuffer>(), vertex_face = std::make_unique<CandidateBuffer>();
-    leaf_pairs(tree, a, b, *edge_edge, *vertex_face);
+    leaf_pairs(tree, a, b, tested, *edge_edge, *vertex_face);
     return sorted({pairs_of(*edge_edge), pairs_of(*vertex_face)});
   }
 
@@ -88,9 +88,14 @@ TEST_F(LeafPairsTest, AreThoseThatOverlapAndShareNoVertex) {
     for (std::size_t b = a; b < tree.leaves.size(); ++b) {
       const Found expected = one_by_one(tree.leaves[a], tree.leaves[b]);
       edge_edge += expected.edge_edge.size(), vertex_face += expected.vertex_face.size();
-      for (const Simd simd : simd_levels())
+      for (const Simd simd : simd_levels()) {
         ASSERT_EQ(by(leaf_pairs(simd), tree.leaves[a], tree.leaves[b]), expected)
             << "leaves " << a << " and " << b << ", " << name_of(simd);
+        ASSERT_EQ(by(leaf_pairs(simd), tree.leaves[a], tree.leaves[b], {.edge_edge = false}),
+                  (Found{{}, expected.vertex_face}));
+        ASSERT_EQ(by(leaf_pairs(simd), tree.leaves[a], tree.leaves[b], {.vertex_face = false}),
+                  (Found{expected.edge_edge, {}}));
+      }
     }
   EXPECT_GT(edge_edge, 1000u);
   EXPECT_GT(vertex_face, 500u);

@@ -60,6 +60,8 @@ def _variants(step: Step, args) -> list[Variant]:
             Variant("fast between meshes", base, _full, lambda scene: _between(scene, len(step.meshes), "fast")),
         ]
     found += [
+        Variant("vertex-face only", {**base, "features": ("vertex_face",)}, _full),
+        Variant("edge-edge only", {**base, "features": ("edge_edge",)}, _full),
         Variant("report first", {**base, "report": "first"}, _full),
         Variant("report any", {**base, "report": "any"}, _full),
         Variant("with points", {**base, "outputs": ("points",)}, _full),

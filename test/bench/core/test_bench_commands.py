@@ -102,6 +102,9 @@ def test_options(bench):
     assert full["over_full"] == 1
     assert rows["no self-collision"]["candidates"] < full["candidates"]
     assert rows["largest mesh ignored by all"]["candidates"] < full["candidates"]
+    faces, edges = rows["vertex-face only"], rows["edge-edge only"]
+    assert faces["contacts"] + edges["contacts"] == full["contacts"]
+    assert faces["candidates"] + edges["candidates"] == full["candidates"]
     assert rows["report any"]["contacts"] <= 1
     assert rows["the same, static"]["contacts"] == rows["landscape around it"]["contacts"] == full["contacts"]
     assert rows["the same, static"]["candidates"] < rows["landscape around it"]["candidates"]
