@@ -7,6 +7,7 @@ from pathlib import Path
 
 from hpccd_ros.bench.report import drawing, panels_distance, table
 from hpccd_ros.bench.report.drawing import BLUE, GREEN, GREY, MARKERS, ORANGE, PURPLE, RED, SERIES, SKY, Figure
+from hpccd_ros.bench.report.results import whole_scene
 
 METHOD = {"default": BLUE, "published": GREEN, "naive": RED, "front": PURPLE, "independent": GREY}
 TIER = {"fast": ORANGE, "balanced": SKY, "conservative": GREEN, "exact": BLUE}
@@ -213,7 +214,7 @@ FIGURES = (
            rows=lambda row: row["part"] == "threads and GPUs", kept="gpu-2-h200-32-cores", size=(3, 3.8, 3.4),
            legend="first"),
     Figure("accuracy", "accuracy", "What each tier costs and how far its times are off, {threads} threads", _tiers,
-           rows=lambda row: row["part"] == "scene", kept="accuracy-4-cores", size=(3, 3.9, 3.2), legend="right",
+           rows=whole_scene, kept="accuracy-4-cores", size=(3, 3.9, 3.2), legend="right",
            heading=lambda rows: f"{rows[0]['scene']}, {rows[0]['contacts']:,.0f} contacts", right="center"),
     Figure("accuracy-sweeps", "accuracy", "Where each tier begins to err (rational arithmetic is the truth)", _sweep,
            rows=lambda row: row["part"] == "sweep", kept="accuracy-4-cores", panel=("queries", "sweep"),
