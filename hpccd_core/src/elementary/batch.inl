@@ -2,6 +2,7 @@
 // Included once per instruction set, after its header (base/simd/scalar.h). Uses nothing from the standard library at
 // run time: an inline function compiled here could be linked into code for older processors.
 
+#include "base/ticks.h"
 #include "elementary/batch.h"
 #include "elementary/filtered_test.h"
 
@@ -18,9 +19,11 @@ void test(const Geometry& g, const std::uint32_t* first, const std::uint32_t* se
   std::uint32_t near[batch_capacity], survivors[batch_capacity], single[batch_capacity], many[batch_capacity];
   std::uint32_t n_survivors = 0, n_single = 0, n_many = 0;
 
+  const std::uint64_t began = ticks();
   const std::uint32_t n_near = !g.kdops      ? n
                                : g.until < 1 ? near_pairs<kind>(until(g), g, first, second, n, near)
                                              : near_pairs<kind>(Apart(), g, first, second, n, near);
+  result.counts.kdop_ticks += ticks() - began;
   for_lanes<kind, R>(g, first, second, g.kdops ? near : nullptr, n_near,
                      [&](Lanes m, const std::uint32_t* at, unsigned valid) {
                        append(survivors, n_survivors, at, valid & ~bits(coplanarity_filter<Policy>(m).none));
