@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cstring>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <new>
 #include <vector>
@@ -62,12 +63,17 @@ class Buffer {
 // Work of one thread: so often again, over its own data.
 using Work = std::function<double(Buffer&, Buffer&, std::uint64_t)>;
 
+// The least of several tries: others on the machine make it longer, never shorter.
 double seconds(ThreadPool& pool, const Work& work, std::vector<std::unique_ptr<Buffer>> (&buffers)[2],
-               std::uint64_t repeats) {
-  std::atomic<double> used{0};
-  const auto begin = std::chrono::steady_clock::now();
-  pool.run([&](int thread) { used = used + work(*buffers[0][thread], *buffers[1][thread], repeats); });
-  return Seconds(std::chrono::steady_clock::now() - begin).count();
+               std::uint64_t repeats, int tries) {
+  double least = std::numeric_limits<double>::infinity();
+  for (int i = 0; i < tries; ++i) {
+    std::atomic<double> used{0};
+    const auto begin = std::chrono::steady_clock::now();
+    pool.run([&](int thread) { used = used + work(*buffers[0][thread], *buffers[1][thread], repeats); });
+    least = std::min(least, Seconds(std::chrono::steady_clock::now() - begin).count());
+  }
+  return least;
 }
 
 }  // namespace
@@ -114,13 +120,11 @@ double machine_rate(Rate rate, Simd simd, int threads, std::size_t bytes) {
     buffers[0][thread] = std::make_unique<Buffer>(own);
     buffers[1][thread] = std::make_unique<Buffer>(rate == Rate::copy ? own : 1);
   });
-  // So long that waking the threads (50 us) does not show; others on the machine make it longer, never shorter.
-  constexpr double long_enough = 5e-3;
+  // So long that waking the threads (50 us) does not show.
+  constexpr double long_enough = 4e-3;
   std::uint64_t repeats = 1;
-  double took = seconds(pool, work, buffers, repeats);
-  while ((took = seconds(pool, work, buffers, repeats)) < long_enough) repeats *= 2;
-  constexpr int tries = 10;
-  for (int i = 0; i < tries; ++i) took = std::min(took, seconds(pool, work, buffers, repeats));
+  while (seconds(pool, work, buffers, repeats, 3) < long_enough) repeats *= 2;
+  const double took = seconds(pool, work, buffers, repeats, 10);
   return static_cast<double>(pool.size()) * static_cast<double>(repeats) * in_one / took;
 }
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from hpccd_ros.bench.report import drawing, panels_distance, table
+from hpccd_ros.bench.report import drawing, panels_distance, panels_limit, table
 from hpccd_ros.bench.report.drawing import BLUE, GREEN, GREY, MARKERS, ORANGE, PURPLE, RED, SERIES, SKY, Figure
 from hpccd_ros.bench.report.results import whole_scene
 
@@ -224,6 +224,9 @@ FIGURES = (
     Figure("accuracy-distance", "accuracy", "Where each tier errs in distance queries made to be hard",
            panels_distance.wrong_answers, rows=lambda row: row["part"] == "hard distance", panel=("query",),
            kept="accuracy-distance-2-cores", heading=panels_distance.queries, size=(3, 3.9, 1.7), legend="right"),
+    Figure("limit", "limit", "Where the time goes, and the least that this machine needs for the same work",
+           panels_limit.stages, rows=lambda row: row["part"] == "stage" and row.get("least_ms"), kept="limit-2-cores",
+           panel=("scene", "threads"), heading=panels_limit.heading, size=(2, 4.4, 2.2), legend="right"),
     Figure("methods", "methods", "Methods and instruction sets, {accuracy}, {threads} threads", _variants,
            size=(3, 3.8, 2.8)),
     Figure("options", "options", "What each option saves, {accuracy}, {threads} threads", _options, size=(3, 4.4, 2.9)),
