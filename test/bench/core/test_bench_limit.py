@@ -37,6 +37,8 @@ def test_a_row_for_each_stage_the_farthest_first(bench):
     page = performance_limit.stages(Kept.read(folder / "limit-test.json", "limit"))
     assert len(page) == 2 + 9 and page[0].count("| least |") == 2
     assert (folder / "limit.png").exists()
+    rated = performance_limit.rates(Kept.read(folder / "limit-test.json", "limit"))
+    assert any(line.startswith("| comparisons | ") for line in rated)
 
 
 def test_work_is_counted_by_the_program_and_the_scene():
