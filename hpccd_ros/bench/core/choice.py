@@ -10,6 +10,7 @@ from collections.abc import Sequence
 
 from hpccd_ros.base.errors import UserError
 from hpccd_ros.bench.core.settings import ALL, Setting
+from hpccd_ros.bench.report import pareto
 
 # What may be bounded. Of several scenes the worst counts.
 QUANTITIES = {
@@ -111,13 +112,9 @@ def _value(row, quantity) -> float:
 
 def front(found: Sequence[Outcome]) -> list[Outcome]:
     """Those that no other one which asks for the same beats in time, in wrong answers and in the error of times."""
-
-    def beats(a: Outcome, b: Outcome) -> bool:
-        mine, other = ((o.ms, o.wrong, o.values["error"]) for o in (a, b))
-        no_worse = all(x <= y for x, y in zip(mine, other, strict=True))
-        return a.setting.asked == b.setting.asked and mine != other and no_worse
-
-    return [o for o in found if not any(beats(other, o) for other in found)]
+    asked = dict.fromkeys(o.setting.asked for o in found)
+    alike = ([o for o in found if o.setting.asked == what] for what in asked)
+    return [o for mine in alike for o in pareto.front(mine, lambda o: (o.ms, o.wrong, o.values["error"]))]
 
 
 def cheapest(found: Sequence[Outcome], bounds: Sequence[Bound]) -> Outcome | None:

@@ -5,13 +5,24 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from hpccd_ros.bench.report import drawing, panels_distance, panels_limit, table
-from hpccd_ros.bench.report.drawing import BLUE, GREEN, GREY, MARKERS, ORANGE, PURPLE, RED, SERIES, SKY, Figure
+from hpccd_ros.bench.report import drawing, panels_distance, panels_limit, panels_trade, table
+from hpccd_ros.bench.report.drawing import (
+    BACKEND,
+    BLUE,
+    GREEN,
+    GREY,
+    MARKERS,
+    ORANGE,
+    PURPLE,
+    RED,
+    SERIES,
+    SKY,
+    TIER,
+    Figure,
+)
 from hpccd_ros.bench.report.results import whole_scene
 
 METHOD = {"default": BLUE, "published": GREEN, "naive": RED, "front": PURPLE, "independent": GREY}
-TIER = {"fast": ORANGE, "balanced": SKY, "conservative": GREEN, "exact": BLUE}
-BACKEND = {"cpu": "o", "hybrid": "D", "gpu": "^"}
 GPUS = (GREY, BLUE, ORANGE, GREEN, RED)
 # Stages in the order in which they run; the paper's four components (section 6.2) have four families of colour.
 STAGE = {
@@ -219,6 +230,9 @@ FIGURES = (
     Figure("accuracy-sweeps", "accuracy", "Where each tier begins to err (rational arithmetic is the truth)", _sweep,
            rows=lambda row: row["part"] == "sweep", kept="accuracy-4-cores", panel=("queries", "sweep"),
            heading=lambda rows: f"{rows[0]['queries']} queries", size=(2, 4.6, 2.8), legend="first"),
+    Figure("trade", "accuracy", "What each setting costs and how wrong it is", panels_trade.panel,
+           rows=lambda row: row["part"] == "scene", kept="accuracy-trade-2-cores", points=panels_trade.points,
+           panel=("quantity",), heading=panels_trade.heading, size=(2, 4.6, 4.2), legend="right", right="center"),
     Figure("distance", "distance", "Distance queries, {accuracy}, {threads} threads", panels_distance.against_distance,
            kept="distance-2-cores", heading=panels_distance.heading, size=(3, 3.5, 3.0), legend="right"),
     Figure("accuracy-distance", "accuracy", "Where each tier errs in distance queries made to be hard",
@@ -239,4 +253,4 @@ FIGURES = (
 def draw(result, folder: Path) -> list[Path]:
     """Every picture that the result has rows for; the files."""
     mine = [figure for figure in FIGURES if figure.benchmark == result.benchmark]
-    return [figure.save(result, folder) for figure in mine if any(map(figure.rows, result.rows))]
+    return [figure.save(result, folder) for figure in mine if figure.shown(result)]
