@@ -108,13 +108,15 @@ def test_the_trade_has_a_point_for_each_setting_and_one_for_each_scene():
         ("error", "exact", "all"): (1, 1e-15), ("error", "fast", "all"): (0.5, 1e-4),
         ("error", "exact", "any"): (pytest.approx(0.1), 0),
     } | {("wrong", "exact", "any"): (pytest.approx(0.1), 0)}  # fmt: skip
-    wrong, error = trade.compose(result).axes
+    wrong, error, *less = trade.compose(result).axes
+    assert [axis.get_title() for axis in less] == ["less: any one contact"] * 2
     for axis, heights in ((wrong, [0.02, panels_trade.QUANTITIES["wrong"][1]]), (error, [1e-4, 1e-15])):
         (front,) = (line for line in axis.get_lines() if line.get_gid() == "front")
         corners = list(zip(*front.get_data(), strict=True))[1:-1]
         assert [x for x, _ in corners] == pytest.approx([0.5, 1.0])
         assert corners[0][1] == heights[0] and corners[1][1] <= heights[1]
-        assert {text.get_text() for text in axis.texts} == {"fast, cpu", "exact, cpu", "any"}
+        assert {text.get_text() for text in axis.texts} == {"fast, cpu", "exact, cpu"}
+        assert axis.get_xlim() == less[0].get_xlim()
 
 
 def test_sweeps_show_errors_of_zero_at_the_lower_end():
