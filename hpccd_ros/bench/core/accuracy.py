@@ -8,7 +8,8 @@
   hpccd bench accuracy run.mcap --steps 0 --choose "misses<1e-4, late<1e-3"
                                               the cheapest setting for what you recorded
 
-Scenes may be recordings of `hpccd record`, or of the node itself: nothing else tells so well what you need.
+Scenes may be recordings of `hpccd record`, or of the node itself: nothing else tells so well what you need. They are
+asked for plain contacts; separations that were set in the node are left out.
 
 --choose tests tiers, backends and what --ask names on the scenes, shows all of them and the front (the settings that
 none beats in everything), and names the cheapest one that keeps the bounds, to be copied into a program or a start of

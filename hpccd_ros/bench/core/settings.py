@@ -33,7 +33,8 @@ class Asked:
         return truth.of_one(found, wanted, self.one == "earliest") if self.one else truth.of_scene(found, wanted)
 
 
-# A further option that asks for less is a line here, such as one kind of contact alone: kinds=("vf",).
+# A further option that asks for less is a line here, such as one kind of contact alone, with its kinds. Its values are
+# words, or tuples of words.
 ASKED = (
     Asked("all"),
     Asked("first", {"report": "first"}, one="earliest"),
@@ -64,9 +65,13 @@ class Setting:
     def as_written(self) -> str:
         """In Python and as parameters of the node."""
         python = ", ".join(f"{name}={_quoted(value)}" for name, value in self.options().items())
-        node = " ".join(f"-p {name}:={value}" for name, value in self.options().items())
+        node = " ".join(f"-p {name}:={_as_parameter(value)}" for name, value in self.options().items())
         return f"hc.Detector(scene, {python}); hpccd_node --ros-args {node}"
 
 
 def _quoted(value) -> str:
     return f'"{value}"' if isinstance(value, str) else repr(value)
+
+
+def _as_parameter(value) -> str:
+    return value if isinstance(value, str) else f'"[{", ".join(value)}]"'

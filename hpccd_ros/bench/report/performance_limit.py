@@ -16,6 +16,8 @@ def stages(result: Kept) -> list[str]:
     threads = sorted({r["threads"] for r in rows})
 
     def cells(row):
+        if row is None:  # there told with another stage
+            return [None] * 3
         least = row.get("least_ms")
         return [row["ms"], least, f"{row['over_least']:.1f}" if least else None]
 
@@ -25,7 +27,7 @@ def stages(result: Kept) -> list[str]:
         for row in (r for r in mine if r["threads"] == threads[0]):
             limits = row.get("limited_by", "")
             lines.append([f"{row['scene']}: {row['stage']}", limits,
-                          *(cell for n in threads for cell in cells(of[n, row["stage"]]))])  # fmt: skip
+                          *(cell for n in threads for cell in cells(of.get((n, row["stage"]))))])  # fmt: skip
     heads = (f"{n} thread{'s' * (n > 1)}: ms" for n in threads)
     columns = ["scene: stage", "limited by", *(head for first in heads for head in (first, "least", "times"))]
     return markdown.table(columns, lines)

@@ -116,6 +116,14 @@ def test_a_setting_is_written_for_python_and_for_the_node():
     assert node == "hpccd_node --ros-args -p accuracy:=balanced -p backend:=cpu -p report:=first"
 
 
+def test_an_option_of_several_words_is_written_as_a_list(monkeypatch):
+    some = settings.Asked("some", {"outputs": ("points", "normals")})
+    monkeypatch.setattr(settings, "ASKED", (*ASKED, some))
+    python, node = Setting("exact", "cpu", "some").as_written().split("; ")
+    assert python.endswith('backend="cpu", outputs=(\'points\', \'normals\'))')
+    assert node.endswith(' -p outputs:="[points, normals]"')
+
+
 def test_a_recording_is_a_scene_to_choose_for(bench, capsys):
     recording = str(ROOT / "bags" / "cloth-drop-small.mcap")
     few = ("--steps", "2", "--repeat", "1", "--ask", "all,first", "--choose", "misses<=0, late<1e-9")

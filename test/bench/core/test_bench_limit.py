@@ -4,10 +4,11 @@
 import numpy as np
 import pytest
 
-from hpccd_ros.bench.core import limit_work
+from hpccd_ros.bench.core import limit, limit_work
 from hpccd_ros.bench.core.limit_rates import Rates
 from hpccd_ros.bench.core.limit_work import STAGES, TABLE, Work
 from hpccd_ros.bench.report import performance_limit
+from hpccd_ros.bench.report.drawing import by
 from hpccd_ros.bench.report.results import Kept
 from hpccd_ros.bench.steps import Step
 from hpccd_ros.scenes.scene import Mesh
@@ -24,10 +25,11 @@ def test_a_row_for_each_stage_the_farthest_first(bench):
     status, result, folder = bench("limit", *STRIP, "--threads-list", "2,1")
     assert status == 0 and result["failures"] == []
     rows = [row for row in result["rows"] if row["part"] == "stage"]
-    assert [row["threads"] for row in rows] == [1] * 9 + [2] * 9
-    for mine in (rows[:9], rows[9:]):
+    assert [mine[0]["threads"] for mine in by(rows, "threads")] == [1, 2]
+    for mine in by(rows, "threads"):
         *stages, rest, step = mine
-        assert {row["stage"] for row in stages} == set(STAGES) and rest["stage"] == "rest"
+        # What is too short to be timed is told with another one.
+        assert {name for row in stages for name in row["stage"].split(", ")} == set(STAGES) and rest["stage"] == "rest"
         distances = [row["distance_ms"] for row in stages]
         assert distances == sorted(distances, reverse=True)
         assert sum(row["ms"] for row in [*stages, rest]) == pytest.approx(step["ms"], abs=1e-4)
@@ -35,10 +37,19 @@ def test_a_row_for_each_stage_the_farthest_first(bench):
     rates = {(row["rate"], row["threads"]) for row in result["rows"] if row["part"] == "rate"}
     assert rates >= {(rate, n) for rate in ("comparisons", "doubles", "read", "copy") for n in (1, 2)}
     page = performance_limit.stages(Kept.read(folder / "limit-test.json", "limit"))
-    assert len(page) == 2 + 9 and page[0].count("| least |") == 2
+    assert len(page) == 2 + len(by(rows, "threads")[0]) and page[0].count("| least |") == 2
     assert (folder / "limit.png").exists()
     rated = performance_limit.rates(Kept.read(folder / "limit-test.json", "limit"))
     assert any(line.startswith("| comparisons | ") for line in rated)
+
+
+def test_a_part_that_is_not_timed_is_told_with_the_whole(bench, monkeypatch):
+    asked = limit._stages
+    monkeypatch.setattr(limit, "_stages", lambda *given: asked(*given) | {"k-DOPs": 0.0})
+    status, result, _ = bench("limit", *STRIP, "--threads-list", "1")
+    rows = {row["stage"]: row for row in result["rows"] if row["part"] == "stage"}
+    assert status == 0 and "k-DOPs" not in rows
+    assert {"candidates", "tested"} <= rows["tests, k-DOPs"]["items"].keys()
 
 
 def test_work_is_counted_by_the_program_and_the_scene():
