@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import argparse
+import shlex
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -113,7 +114,7 @@ def _command(args, options: dict) -> str:
     words = ["hpccd bench", args.benchmark, *(Path(source).name for source in getattr(args, "sources", ()))]
     for name, value in options.items():
         if value != args.parser.get_default(name):
-            words += [f"--{name.replace('_', '-')}", str(value)]
+            words += [f"--{name.replace('_', '-')}", shlex.quote(str(value))]
     return " ".join(words)
 
 

@@ -129,6 +129,7 @@ def test_a_recording_is_a_scene_to_choose_for(bench, capsys):
     few = ("--steps", "2", "--repeat", "1", "--ask", "all,first", "--choose", "misses<=0, late<1e-9")
     status, result, _ = bench("accuracy", recording, *few)
     assert status == 0 and result["failures"] == []
+    assert result["command"].endswith("--choose 'misses<=0, late<1e-9'")
     rows = result["rows"]
     assert {row["part"] for row in rows} == {"scene"} and {row["asked"] for row in rows} == {"all", "first"}
     (chosen,) = (row for row in rows if row["chosen"])
