@@ -129,7 +129,7 @@ def test_a_recording_is_a_scene_to_choose_for(bench, capsys):
     few = ("--steps", "2", "--repeat", "1", "--ask", "all,first", "--choose", "misses<=0, late<1e-9")
     status, result, _ = bench("accuracy", recording, *few)
     assert status == 0 and result["failures"] == []
-    assert result["command"].endswith("--choose 'misses<=0, late<1e-9'")
+    assert "--choose 'misses<=0, late<1e-9'" in result["command"]
     rows = result["rows"]
     assert {row["part"] for row in rows} == {"scene"} and {row["asked"] for row in rows} == {"all", "first"}
     (chosen,) = (row for row in rows if row["chosen"])
@@ -148,3 +148,8 @@ def test_where_none_keeps_the_bounds_the_nearest_is_named(bench, capsys, monkeyp
 def test_a_choice_needs_scenes(bench, capsys):
     assert bench("accuracy", *STRIP, "--choose", "error<1", "--parts", "sweeps")[0] == 2
     assert "--parts sweeps: --choose needs the scenes" in capsys.readouterr().err
+
+
+def test_without_what_times_are_compared_with_there_is_no_picture_of_the_trade(bench):
+    status, _, folder = bench("accuracy", *STRIP, "--parts", "scenes", "--tiers", "fast,balanced")
+    assert status == 0 and {path.stem for path in folder.glob("*.png")} == {"accuracy"}
