@@ -51,6 +51,13 @@ class Simd(_Enumeration):
     avx2: ClassVar[Simd]
     avx512: ClassVar[Simd]
 
+class Rate(_Enumeration):
+    comparisons: ClassVar[Rate]
+    floats: ClassVar[Rate]
+    doubles: ClassVar[Rate]
+    read: ClassVar[Rate]
+    copy: ClassVar[Rate]
+
 class Scene:
     def __init__(self) -> None: ...
     def add_mesh(
@@ -153,4 +160,5 @@ def test_edge_edge(
 ) -> tuple[NDArray[np.bool_], NDArray[np.float64]]: ...
 def gpu_status() -> GpuStatus: ...
 def gpu_fail_after(calls: int) -> None: ...
+def machine_rate(rate: Rate, simd: Simd, threads: int, bytes: int) -> float: ...
 def simd_levels() -> list[str]: ...

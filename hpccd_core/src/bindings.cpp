@@ -4,6 +4,7 @@
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 
+#include "base/machine_rate.h"
 #include "base/simd.h"
 #include "gpu/device.h"
 #include "gpu/memory_on_device.h"
@@ -155,6 +156,12 @@ PYBIND11_MODULE(_core, m) {
       .value("scalar", Simd::scalar)
       .value("avx2", Simd::avx2)
       .value("avx512", Simd::avx512);
+  py::enum_<Rate>(m, "Rate")
+      .value("comparisons", Rate::comparisons)
+      .value("floats", Rate::floats)
+      .value("doubles", Rate::doubles)
+      .value("read", Rate::read)
+      .value("copy", Rate::copy);
 
   py::class_<Scene, std::shared_ptr<Scene>>(m, "Scene")
       .def(py::init<>())
@@ -317,6 +324,8 @@ PYBIND11_MODULE(_core, m) {
     return py::dict("compiled"_a = s.compiled, "toolkit"_a = s.toolkit, "devices"_a = devices, "reason"_a = s.reason);
   });
   m.def("gpu_fail_after", &gpu::fail_after, "calls"_a);  // for tests
+  m.def("machine_rate", &machine_rate, "rate"_a, "simd"_a, "threads"_a, "bytes"_a,
+        py::call_guard<py::gil_scoped_release>());  // for benchmarks
   m.def("simd_levels", [] {
     std::vector<std::string> names;
     for (Simd s : simd_levels()) names.push_back(name_of(s));

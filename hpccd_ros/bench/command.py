@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import argparse
+import shlex
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -76,6 +77,17 @@ def listed(option: str, text: str, choices: Sequence[str]) -> list[str]:
     return words
 
 
+def numbers(option: str, text: str, kind: type) -> list:
+    """Numbers above 0 with commas between, by rising size, each once."""
+    try:
+        found = sorted({kind(word) for word in text.split(",")})
+    except ValueError as error:
+        raise UserError(f"{option} {text}: numbers with commas between, for example 1,4") from error
+    if found[0] <= 0:
+        raise UserError(f"{option} {text}: each number must be above 0")
+    return found
+
+
 def begin(args) -> tuple[Report, list[Source]]:
     """The report to fill and the sources that were asked for."""
     found = sources.resolve(args.sources, sources.data_folder(args.data), args.default_sources, args.size)
@@ -102,7 +114,7 @@ def _command(args, options: dict) -> str:
     words = ["hpccd bench", args.benchmark, *(Path(source).name for source in getattr(args, "sources", ()))]
     for name, value in options.items():
         if value != args.parser.get_default(name):
-            words += [f"--{name.replace('_', '-')}", str(value)]
+            words += [f"--{name.replace('_', '-')}", shlex.quote(str(value))]
     return " ".join(words)
 
 

@@ -7,6 +7,9 @@
   hpccd bench distance                      what a separation, proximity, intersections cost
   hpccd bench step                          how far a step may go: first contacts, collision-free step, trial steps
   hpccd bench accuracy                      what each tier costs, and where it errs
+  hpccd bench accuracy run.mcap --choose "misses<1e-4"
+                                            the cheapest setting that is good enough for what you recorded
+  hpccd bench limit                         where the time goes, beside the least that this machine needs
   hpccd bench <benchmark> --help            scenes, options and examples of one benchmark
 
 Every benchmark takes generated scenes (`hpccd scene --list`), the files of the folder HPCCD_DATA, or any recording of
@@ -24,6 +27,7 @@ BENCHMARKS = {
     "methods": ("core.methods", "the methods and instruction sets compared: time, and equality of the results"),
     "size": ("core.size", "how time and memory grow with the number of triangles"),
     "memory": ("core.memory", "peak memory and bytes per triangle"),
+    "limit": ("core.limit", "where the time of a step goes, beside the least that this machine needs for the work"),
     "options": ("core.options", "what each way to model less saves"),
     "distance": ("core.distance", "separation, proximity, intersections, smallest distances beside plain detection"),
     "step": ("core.step", "how far a step may go: first contacts, free step and trial steps beside all contacts"),

@@ -122,12 +122,24 @@ Contacts CpuBackend::collect(Outputs outputs) {
   return std::move(contacts_);
 }
 
+void CpuBackend::count_times(std::map<std::string, std::uint64_t>& stats) const {
+  constexpr double ns = 1e9;
+  for (const Worker& w : workers_) {
+    stats["leaf_pairs_ns"] += static_cast<std::uint64_t>(ns * w.leaf_pairs_time.seconds());
+    if (w.elementary_ticks == 0) continue;
+    const double a_tick = w.elementary_seconds / static_cast<double>(w.elementary_ticks);
+    for (const BatchCounts& c : w.counts)
+      stats["slabs_ns"] += static_cast<std::uint64_t>(ns * a_tick * static_cast<double>(c.kdop_ticks));
+  }
+}
+
 void CpuBackend::count(std::map<std::string, std::uint64_t>& stats) const {
   std::uint64_t bytes = order_.bytes();
   if (method_) bytes += method_->bytes();
   if (mesh_pairs_) bytes += mesh_pairs_->bytes();
   bytes += near_.bytes() + drift_.bytes();
   if (search_.report == Report::first) stats["near_pairs"] = near_.size();
+  if (search_.leaf_pairs && walks_tree()) count_times(stats);
   const char* kinds[3] = {"vf", "ee", "ef"};
   const bool pairs = search_.leaf_pairs || search_.leaf_pairs_in_snapshot;
   const bool asked[3] = {pairs, pairs, search_.leaf_edge_faces != nullptr};

@@ -56,6 +56,7 @@ class CpuBackend final : public DetectionBackend {
   void see_snapshot(Positions vertices);
   void walk_tree();
   void mark_traversal();
+  void count_times(std::map<std::string, std::uint64_t>& stats) const;
   Contacts collect(Outputs outputs);
 
   Resources& shared_;

@@ -62,10 +62,12 @@ struct BatchCounts {
   std::uint64_t separated = 0;    // rejected because a direction keeps them farther apart than their separation
   std::uint64_t contacts = 0;     // proven contacts
   std::uint64_t undecided = 0;    // handed to the tier's fallback
+  std::uint64_t kdop_ticks = 0;   // of the k-DOP filter (base/ticks.h)
 
   BatchCounts& operator+=(const BatchCounts& c) {
     tested += c.tested, kdop += c.kdop, coplanarity += c.coplanarity, projection += c.projection;
     roots += c.roots, separated += c.separated, contacts += c.contacts, undecided += c.undecided;
+    kdop_ticks += c.kdop_ticks;
     return *this;
   }
 };

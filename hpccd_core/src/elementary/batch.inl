@@ -2,6 +2,7 @@
 // Included once per instruction set, after its header (base/simd/scalar.h). Uses nothing from the standard library at
 // run time: an inline function compiled here could be linked into code for older processors.
 
+#include "base/ticks.h"
 #include "elementary/batch.h"
 #include "elementary/filtered_test.h"
 
@@ -18,9 +19,11 @@ void test(const Geometry& g, const std::uint32_t* first, const std::uint32_t* se
   std::uint32_t near[batch_capacity], single[batch_capacity], many[batch_capacity];
   std::uint32_t n_survivors = 0, n_single = 0, n_many = 0;
 
+  const std::uint64_t began = ticks();
   const std::uint32_t n_near = !g.kdops      ? n
                                : g.until < 1 ? near_pairs<kind>(until(g), g, first, second, n, near)
                                              : near_pairs<kind>(Apart(), g, first, second, n, near);
+  result.counts.kdop_ticks += ticks() - began;
   std::uint32_t n_apart = 0;
   for_lanes<kind, R>(g, first, second, g.kdops ? near : nullptr, n_near,
                      [&](Lanes m, const std::uint32_t* at, unsigned valid) {
@@ -51,6 +54,7 @@ void test(const Geometry& g, const std::uint32_t* first, const std::uint32_t* se
   result.counts.kdop += n - n_near;
   result.counts.coplanarity += n_near - n_survivors;
   result.counts.projection += n_survivors - n_single - n_many - n_apart;
+  result.counts.roots += n_apart;
   result.counts.contacts += result.n_contacts;
   result.counts.undecided += result.n_undecided;
 }

@@ -68,7 +68,8 @@ void walk(const Tree& tree, const PairRules& rules, Boxes boxes, const Cancellat
   const auto at_leaves = [&](LeafPair leaves) {
     ++worker.leaf_pairs;
     if (!worker.sink)
-      test_leaves(tree, rules, leaves, worker);
+      worker.leaf_pairs_time.run(worker.leaf_pairs, worker.elementary_seconds,
+                                 [&] { test_leaves(tree, rules, leaves, worker); });
     else
       for (const LeafPair left : worker.sink->push(leaves)) test_leaves(tree, rules, left, worker);
   };

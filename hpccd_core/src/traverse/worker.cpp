@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <chrono>
 
+#include "base/ticks.h"
 #include "elementary/coincidence.h"
 #include "elementary/exact/intersection.h"
 #include "elementary/policy.h"
@@ -36,6 +37,8 @@ void Worker::begin(Search& search) {
   for (FallbackCounts& c : fallbacks) c = {};
   node_pairs = leaf_pairs = 0;
   elementary_seconds = 0;
+  elementary_ticks = 0;
+  leaf_pairs_time = {};
   first_batches_ = search.prunes ? first_batches : 0;
   for (auto& w : waiting_)  // what an exception left behind
     if (w) w->edge_edge.n = w->vertex_face.n = 0;
@@ -65,6 +68,7 @@ void Worker::drain(CandidateBuffer& buffer, Kind kind, Rule rule, std::uint32_t 
   if (buffer.n < keep_below) return;
   first_batches_ -= first_batches_ > 0;
   const auto start = std::chrono::steady_clock::now();
+  const std::uint64_t start_ticks = ticks();
   std::uint32_t done = 0;
   while (buffer.n - done >= keep_below && done < buffer.n) {
     const std::uint32_t n = std::min(buffer.n - done, batch_capacity);
@@ -74,6 +78,7 @@ void Worker::drain(CandidateBuffer& buffer, Kind kind, Rule rule, std::uint32_t 
   std::copy(buffer.first + done, buffer.first + buffer.n, buffer.first);
   std::copy(buffer.second + done, buffer.second + buffer.n, buffer.second);
   buffer.n -= done;
+  elementary_ticks += ticks() - start_ticks;
   elementary_seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 

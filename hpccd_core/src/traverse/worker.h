@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "elementary/pair.h"
+#include "traverse/sampled_time.h"
 #include "traverse/search.h"
 
 namespace hpccd {
@@ -61,8 +62,10 @@ class alignas(128) Worker {
   FallbackCounts fallbacks[3];
   std::uint64_t node_pairs = 0, leaf_pairs = 0;
   double elementary_seconds = 0;
-  PairSink* sink = nullptr;   // where pairs of leaves are left to somebody else
-  std::size_t best_task = 0;  // where report is any: the task these contacts come from
+  std::uint64_t elementary_ticks = 0;  // the same time, for the share of the k-DOP filter in it
+  SampledTime leaf_pairs_time;         // without the tests of what they found
+  PairSink* sink = nullptr;            // where pairs of leaves are left to somebody else
+  std::size_t best_task = 0;           // where report is any: the task these contacts come from
 
  private:
   struct Waiting {

@@ -93,13 +93,7 @@ def _thread_counts(text):
     if text is None:
         doubling = [1 << k for k in range(cores().bit_length()) if 1 << k <= cores()]
         return sorted({*doubling, cores()})
-    try:
-        counts = sorted({int(word) for word in text.split(",")})
-    except ValueError as error:
-        raise UserError(f"--threads-list {text}: numbers with commas between, for example 1,2,4") from error
-    if counts[0] < 1:
-        raise UserError(f"--threads-list {text}: each number must be at least 1")
-    return counts
+    return command.numbers("--threads-list", text, int)
 
 
 def _row(source, method, threads, series, alone, args):

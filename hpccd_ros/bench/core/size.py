@@ -36,8 +36,8 @@ def configure(parser):
 
 
 def run(args) -> int:
-    sizes = _numbers("--sizes", args.sizes, float)
-    threads = _numbers("--threads-list", args.threads_list or f"1,{cores()}", int)
+    sizes = command.numbers("--sizes", args.sizes, float)
+    threads = command.numbers("--threads-list", args.threads_list or f"1,{cores()}", int)
     names = args.sources or list(DEFAULT)
     unknown = [name for name in names if name not in scenes.names()]
     if unknown:
@@ -66,16 +66,6 @@ def run(args) -> int:
         report.note("{scene}, {threads} threads: time ~ triangles^{time:.3f}, contacts ~ triangles^{contacts:.3f}"
                     .format(**entry))  # fmt: skip
     return command.end(args, report)
-
-
-def _numbers(option, text, kind):
-    try:
-        numbers = sorted({kind(word) for word in text.split(",")})
-    except ValueError as error:
-        raise UserError(f"{option} {text}: numbers with commas between, for example 1,4") from error
-    if numbers[0] <= 0:
-        raise UserError(f"{option} {text}: each number must be above 0")
-    return numbers
 
 
 def _last_part(source, part):

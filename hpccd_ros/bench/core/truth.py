@@ -11,7 +11,8 @@ import numpy as np
 @dataclasses.dataclass(frozen=True)
 class Errors:
     """missed, invented: numbers of pairs. toc_worst, toc_p99: of |toc - true toc| over pairs found and true, 0 where
-    there are none; latest: of toc - true toc. Of distances likewise, over the size of what they were measured in."""
+    there are none; latest: of toc - true toc; earliest: of true toc - toc. Of distances likewise, over the size of what
+    they were measured in."""
 
     true: int
     missed: int
@@ -19,6 +20,7 @@ class Errors:
     toc_worst: float
     toc_p99: float
     latest: float
+    earliest: float
 
 
 def of_scene(found, truth: dict[str, np.ndarray], value: str = "toc", size: float = 1.0) -> Errors:
@@ -37,6 +39,18 @@ def of_scene(found, truth: dict[str, np.ndarray], value: str = "toc", size: floa
     return _errors(sum(len(truth[kind]) for kind in kinds), missed, invented, np.concatenate(off))
 
 
+def of_one(found, truth: dict[str, np.ndarray], earliest: bool) -> Errors:
+    """Of an answer that is to name one contact, the earliest or any, where there is one. Missed: it named none; times:
+    of the earliest one, or of the one that it named."""
+    of_named = of_scene(found, truth)
+    true = np.concatenate([toc for key, toc in truth.items() if key.endswith("_toc")])
+    there, missed = min(1, len(true)), int(len(true) > 0 and len(found) == 0)
+    if not earliest:
+        return dataclasses.replace(of_named, true=there, missed=missed)
+    late = np.array([found.first_toc - true.min()] if there and not missed else [])
+    return _errors(there, missed, of_named.invented, late)
+
+
 def of_queries(hit, toc, true_hit, true_toc, sizes=1.0) -> Errors:
     """All (Q,): answers to queries and what is true. toc: of proximity the distances, with the sizes of the queries."""
     both = hit & true_hit
@@ -48,7 +62,8 @@ def of_queries(hit, toc, true_hit, true_toc, sizes=1.0) -> Errors:
 def _errors(true, missed, invented, late):
     off = np.abs(late)
     worst, p99 = (float(off.max()), float(np.percentile(off, 99))) if len(off) else (0.0, 0.0)
-    return Errors(true, missed, invented, worst, p99, float(late.max(initial=0.0)))
+    latest, earliest = float(late.max(initial=0.0)), float((-late).max(initial=0.0))
+    return Errors(true, missed, invented, worst, p99, latest, earliest)
 
 
 def _keys(pairs):

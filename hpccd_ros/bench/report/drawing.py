@@ -16,6 +16,9 @@ BLUE, ORANGE, GREEN, RED = "#0072B2", "#E69F00", "#009E73", "#D55E00"
 PURPLE, SKY, GREY = "#CC79A7", "#56B4E9", "#888888"
 SERIES = (BLUE, ORANGE, GREEN, RED, PURPLE, SKY, "#000000", "#A6761D")
 MARKERS = "osD^vP*X"
+# Of the core's tiers and backends.
+TIER = {"fast": ORANGE, "balanced": SKY, "conservative": GREEN, "exact": BLUE}
+BACKEND = {"cpu": "o", "hybrid": "D", "gpu": "^"}
 _LEGEND_WIDTH = 1.4  # inches
 
 
@@ -27,6 +30,7 @@ class Figure:
     benchmark whose results it shows; kept: the one of hpccd_core/bench/results that docs/figures shows, if any
     title     may name keys of the first row in braces
     draw      fills a panel: (axis, rows) -> {label: artist} for the legend of the whole picture
+    points    what is drawn of these rows, where it is not the rows themselves
     overview  fills a panel before the others with all rows
     heading   of a panel, from its rows
     legend    "first": in the first panel (behind an overview in that too); "each"; "right": of the whole picture
@@ -38,6 +42,7 @@ class Figure:
     draw: Callable[..., dict | None]
     rows: Callable[[dict], bool] = lambda row: True
     kept: str | None = None
+    points: Callable[[list[dict]], list[dict]] = lambda rows: rows
     panel: tuple[str, ...] = ("scene",)
     overview: Callable | None = None
     heading: Callable[[list[dict]], str] = lambda rows: rows[0]["scene"]
@@ -45,9 +50,12 @@ class Figure:
     legend: str | None = None
     right: str = "upper"  # end of the side at which the legend of the whole picture stands
 
+    def shown(self, result) -> list[dict]:
+        return self.points([row for row in result.rows if self.rows(row)])
+
     def compose(self, result):
         """The picture of a result (`machine`, `rows`) as a matplotlib figure, or None where it has no such rows."""
-        rows = [row for row in result.rows if self.rows(row)]
+        rows = self.shown(result)
         if not rows:
             return None
         groups = by(rows, *self.panel)

@@ -5,12 +5,24 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from hpccd_ros.bench.report import drawing, panels_distance, table
-from hpccd_ros.bench.report.drawing import BLUE, GREEN, GREY, MARKERS, ORANGE, PURPLE, RED, SERIES, SKY, Figure
+from hpccd_ros.bench.report import drawing, panels_distance, panels_limit, panels_trade, table
+from hpccd_ros.bench.report.drawing import (
+    BACKEND,
+    BLUE,
+    GREEN,
+    GREY,
+    MARKERS,
+    ORANGE,
+    PURPLE,
+    RED,
+    SERIES,
+    SKY,
+    TIER,
+    Figure,
+)
+from hpccd_ros.bench.report.results import whole_scene
 
 METHOD = {"default": BLUE, "published": GREEN, "naive": RED, "front": PURPLE, "independent": GREY}
-TIER = {"fast": ORANGE, "balanced": SKY, "conservative": GREEN, "exact": BLUE}
-BACKEND = {"cpu": "o", "hybrid": "D", "gpu": "^"}
 GPUS = (GREY, BLUE, ORANGE, GREEN, RED)
 # Stages in the order in which they run; the paper's four components (section 6.2) have four families of colour.
 STAGE = {
@@ -213,16 +225,23 @@ FIGURES = (
            rows=lambda row: row["part"] == "threads and GPUs", kept="gpu-2-h200-32-cores", size=(3, 3.8, 3.4),
            legend="first"),
     Figure("accuracy", "accuracy", "What each tier costs and how far its times are off, {threads} threads", _tiers,
-           rows=lambda row: row["part"] == "scene", kept="accuracy-4-cores", size=(3, 3.9, 3.2), legend="right",
+           rows=whole_scene, kept="accuracy-4-cores", size=(3, 3.9, 3.2), legend="right",
            heading=lambda rows: f"{rows[0]['scene']}, {rows[0]['contacts']:,.0f} contacts", right="center"),
     Figure("accuracy-sweeps", "accuracy", "Where each tier begins to err (rational arithmetic is the truth)", _sweep,
            rows=lambda row: row["part"] == "sweep", kept="accuracy-4-cores", panel=("queries", "sweep"),
            heading=lambda rows: f"{rows[0]['queries']} queries", size=(2, 4.6, 2.8), legend="first"),
+    Figure("trade", "accuracy", "What each setting costs and how wrong it is", panels_trade.panel,
+           rows=lambda row: row["part"] == "scene", kept="accuracy-trade-2-cores", points=panels_trade.points,
+           panel=("asked", "quantity"), heading=panels_trade.heading, size=(2, 4.6, 2.7), legend="right",
+           right="center"),
     Figure("distance", "distance", "Distance queries, {accuracy}, {threads} threads", panels_distance.against_distance,
            kept="distance-2-cores", heading=panels_distance.heading, size=(3, 3.5, 3.0), legend="right"),
     Figure("accuracy-distance", "accuracy", "Where each tier errs in distance queries made to be hard",
            panels_distance.wrong_answers, rows=lambda row: row["part"] == "hard distance", panel=("query",),
            kept="accuracy-distance-2-cores", heading=panels_distance.queries, size=(3, 3.9, 1.7), legend="right"),
+    Figure("limit", "limit", "Where the time goes; blue: the least that this machine needs for the same work",
+           panels_limit.stages, rows=panels_limit.of_a_stage, kept="limit-2-cores", panel=("scene", "threads"),
+           heading=panels_limit.heading, size=(2, 4.4, 2.1)),
     Figure("methods", "methods", "Methods and instruction sets, {accuracy}, {threads} threads", _variants,
            size=(3, 3.8, 2.8)),
     Figure("options", "options", "What each option saves, {accuracy}, {threads} threads", _options, size=(3, 4.4, 2.9)),
@@ -235,4 +254,4 @@ FIGURES = (
 def draw(result, folder: Path) -> list[Path]:
     """Every picture that the result has rows for; the files."""
     mine = [figure for figure in FIGURES if figure.benchmark == result.benchmark]
-    return [figure.save(result, folder) for figure in mine if any(map(figure.rows, result.rows))]
+    return [figure.save(result, folder) for figure in mine if figure.shown(result)]

@@ -17,6 +17,7 @@ from hpccd_ros.bench.report import (
     performance_core,
     performance_distance,
     performance_gpu,
+    performance_limit,
     performance_node,
     performance_step,
 )
@@ -28,6 +29,8 @@ TABLES = {
     "sequences": (performance_core.sequences, "cpu-table-1-4-cores"),
     "scaling": (performance_core.scaling, "scaling-4-cores", "scaling-generated-4-cores"),
     "many-cores": (performance_core.many_cores, "scaling-h100-16-cores", "scaling-generated-h100-16-cores"),
+    "where-time-goes": (performance_limit.stages, "limit-2-cores"),
+    "machine-rates": (performance_limit.rates, "limit-2-cores"),
     "methods": (performance_core.methods, "methods-4-cores"),
     "decided": (performance_core.decided, "accuracy-4-cores"),
     "size": (performance_core.size, "size-4-cores"),

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from hpccd_ros.bench.report import markdown, paper
 from hpccd_ros.bench.report.drawing import by
-from hpccd_ros.bench.report.results import Kept
+from hpccd_ros.bench.report.results import Kept, whole_scene
 from hpccd_ros.bench.report.table import text
 from hpccd_ros.bench.report.timing import slope
 
@@ -118,7 +118,7 @@ def options(result: Kept) -> list[str]:
 
 def tiers(result: Kept) -> list[str]:
     """ms and worst error of toc."""
-    rows = [r for r in result.rows if r["part"] == "scene" and r["simd"] == "auto"]
+    rows = [r for r in result.rows if whole_scene(r) and r["simd"] == "auto"]
 
     def cell(row):
         early = " early" if row["latest"] == 0 and row["toc_worst"] > 0 else ""
@@ -145,7 +145,7 @@ def wrong_answers(result: Kept) -> list[str]:
 
 
 def decided(result: Kept) -> list[str]:
-    rows = [r for r in result.rows if r["part"] == "scene" and (r["accuracy"], r["simd"]) == ("exact", "auto")]
+    rows = [r for r in result.rows if whole_scene(r) and (r["accuracy"], r["simd"]) == ("exact", "auto")]
     keys = ("slabs", "coplanarity", "projection", "roots", "proven", "integers")
     heads = ["scene", "candidate pairs", "k-DOPs", "coplanarity", "projections", "roots",
              "contacts by bounds", "by integers"]  # fmt: skip

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from hpccd_ros.bench.report import markdown
 from hpccd_ros.bench.report.drawing import by
-from hpccd_ros.bench.report.results import Kept
+from hpccd_ros.bench.report.results import Kept, whole_scene
 from hpccd_ros.bench.report.table import text
 
 
@@ -65,6 +65,6 @@ def segments(result: Kept) -> list[str]:
 def tiers(result: Kept) -> list[str]:
     lines = [[f"{mine[0]['scene']}, `{mine[0]['backend']}`", *(r["step_ms"] for r in mine),
               " + ".join(str(sum(r[key] for r in mine)) for key in ("missed", "invented"))]
-             for mine in by(result.rows, "scene", "backend")]  # fmt: skip
+             for mine in by(filter(whole_scene, result.rows), "scene", "backend")]  # fmt: skip
     tiers = dict.fromkeys(r["accuracy"] for r in result.rows)
     return markdown.table(["ms a step", *(f"`{t}`" for t in tiers), "missed + invented"], lines)

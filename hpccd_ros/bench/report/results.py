@@ -38,6 +38,11 @@ class Kept:
             raise UserError(f"{path}: not a JSON file that `hpccd bench {benchmark}` wrote ({e})") from e
 
 
+def whole_scene(row: dict) -> bool:
+    """Of `hpccd bench accuracy`: about a whole scene that was asked for all contacts."""
+    return row["part"] == "scene" and row.get("asked", "all") == "all"
+
+
 class Report:
     """Rows of one benchmark with the command, the machine, the commit and the notes that belong to them."""
 

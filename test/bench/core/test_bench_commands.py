@@ -80,7 +80,7 @@ def test_accuracy(bench):
     few = ("--parts", "scenes,sweeps", "--sweep-queries", "40", "--simd", "auto,scalar")
     status, result, folder = bench("accuracy", *STRIP, *few)
     assert status == 0
-    check_files(result, folder, "accuracy", "accuracy-sweeps")
+    check_files(result, folder, "accuracy", "accuracy-sweeps", "trade")
     parts = {name: [r for r in result["rows"] if r["part"] == name] for name in ("scene", "adversarial", "sweep")}
     assert len(parts["scene"]) == 4 * 2
     for row in parts["scene"]:

@@ -7,7 +7,7 @@ import pytest
 from sources import ROOT
 
 from hpccd_ros.base.errors import UserError
-from hpccd_ros.bench.report import drawing, figures
+from hpccd_ros.bench.report import drawing, figures, panels_trade
 from hpccd_ros.bench.report.results import Kept
 
 RESULTS = ROOT / "hpccd_core" / "bench" / "results"
@@ -36,7 +36,7 @@ def widths(axis):
 def test_committed_pictures_can_be_drawn_again(figure):
     result = kept(figure)
     page = figure.compose(result)
-    headings = [figure.heading(rows) for rows in drawing.by(filter(figure.rows, result.rows), *figure.panel)]
+    headings = [figure.heading(rows) for rows in drawing.by(figure.shown(result), *figure.panel)]
     titles = [axis.get_title() for axis in page.axes if axis.axison]
     assert titles[bool(figure.overview) :] == headings and len(headings) > 1
     assert (ROOT / "docs" / "figures" / f"{figure.name}.png").exists()
@@ -85,6 +85,38 @@ def test_wrong_contacts_stand_in_the_picture():
     (axis,) = methods.compose(dataclasses.replace(kept(BY_NAME["cpu"]), rows=rows)).axes
     assert widths(axis) == {0: [4.0], 1: [4.0]}
     assert [text.get_text().strip() for text in axis.texts] == ["4", "4  OTHER CONTACTS"]
+
+
+def test_the_trade_has_a_point_for_each_setting_and_one_for_each_scene():
+    def row(scene, accuracy, asked, ms, missed, error):
+        return {"part": "scene", "scene": scene, "accuracy": accuracy, "backend": "cpu", "simd": "auto", "asked": asked,
+                "step_ms": ms, "contacts": 100, "true": 100, "reported": 100 - missed, "missed": missed, "invented": 0,
+                "toc_worst": error}  # fmt: skip
+
+    rows = [
+        row("a", "exact", "all", 10.0, 0, 0.0), row("b", "exact", "all", 1.0, 0, 1e-15),
+        row("a", "fast", "all", 5.0, 1, 1e-5), row("b", "fast", "all", 0.5, 2, 1e-4),
+        row("a", "exact", "any", 1.0, 0, 0.0), row("b", "exact", "any", 0.1, 0, 0.0),
+        row("c", "fast", "all", 1.0, 0, 0.0),  # nothing to compare with
+    ]  # fmt: skip
+    trade = BY_NAME["trade"]
+    result = dataclasses.replace(kept(trade), rows=[*rows, rows[0] | {"simd": "scalar", "step_ms": 99.0}])
+    whole = {(p["quantity"], p["accuracy"], p["asked"]): (p["x"], p["y"])
+             for p in trade.shown(result) if p["scene"] is None}  # fmt: skip
+    assert whole == {
+        ("wrong", "exact", "all"): (1, 0), ("wrong", "fast", "all"): (0.5, 0.02), ("wrong", "exact", "any"): (0.1, 0),
+        ("error", "exact", "all"): (1, 1e-15), ("error", "fast", "all"): (0.5, 1e-4),
+        ("error", "exact", "any"): (pytest.approx(0.1), 0),
+    } | {("wrong", "exact", "any"): (pytest.approx(0.1), 0)}  # fmt: skip
+    wrong, error, *less = trade.compose(result).axes
+    assert [axis.get_title() for axis in less] == ["less: any one contact"] * 2
+    for axis, heights in ((wrong, [0.02, panels_trade.QUANTITIES["wrong"][1]]), (error, [1e-4, 1e-15])):
+        (front,) = (line for line in axis.get_lines() if line.get_gid() == "front")
+        corners = list(zip(*front.get_data(), strict=True))[1:-1]
+        assert [x for x, _ in corners] == pytest.approx([0.5, 1.0])
+        assert corners[0][1] == heights[0] and corners[1][1] <= heights[1]
+        assert {text.get_text() for text in axis.texts} == {"fast, cpu", "exact, cpu"}
+        assert axis.get_xlim() == less[0].get_xlim()
 
 
 def test_sweeps_show_errors_of_zero_at_the_lower_end():
