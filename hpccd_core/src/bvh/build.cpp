@@ -288,10 +288,14 @@ class Builder {
   }
 
   static LeafRange leaf_behind(const LeafRange& before, const LeafRange& size) {
-    return {before.end_face,     before.end_face + size.end_face,
-            before.end_edge,     before.end_edge + size.end_edge,
-            before.end_vertex,   before.end_vertex + size.end_vertex,
-            before.end_corner,   before.end_corner + size.end_corner,
+    return {before.end_face,
+            before.end_face + size.end_face,
+            before.end_edge,
+            before.end_edge + size.end_edge,
+            before.end_vertex,
+            before.end_vertex + size.end_vertex,
+            before.end_corner,
+            before.end_corner + size.end_corner,
             before.first_group + before.n_groups()};
   }
 

@@ -40,7 +40,8 @@ Columns transposed(const Floats4 (&r)[4]) {
                 cd_low = __builtin_shufflevector(r[2], r[3], 0, 4, 1, 5),
                 cd_high = __builtin_shufflevector(r[2], r[3], 2, 6, 3, 7);
   return {{__builtin_shufflevector(ab_low, cd_low, 0, 1, 4, 5), __builtin_shufflevector(ab_low, cd_low, 2, 3, 6, 7),
-           __builtin_shufflevector(ab_high, cd_high, 0, 1, 4, 5), __builtin_shufflevector(ab_high, cd_high, 2, 3, 6, 7)}};
+           __builtin_shufflevector(ab_high, cd_high, 0, 1, 4, 5),
+           __builtin_shufflevector(ab_high, cd_high, 2, 3, 6, 7)}};
 }
 
 // Three coordinates of four corners, from where they begin in a box on; `skip`: after so many others.
@@ -184,8 +185,9 @@ std::size_t Tree::bytes() const {
   const std::size_t faces = face_of_slot.capacity(), edges = edge_of_slot.capacity(),
                     vertices = vertex_of_slot.capacity();
   return nodes.capacity() * sizeof(Node) + front.capacity() * sizeof(Subtree) +
-         above_front.capacity() * sizeof(AboveFront) + leaves.capacity() * (sizeof(LeafRange) + 8) + blocks.capacity() * sizeof(Block) +
-         corners_of.capacity() * sizeof(CornersOf) + kdops.capacity() * sizeof(Kdop) + (faces + edges + vertices + corners.capacity()) * 4 +
+         above_front.capacity() * sizeof(AboveFront) + leaves.capacity() * (sizeof(LeafRange) + 8) +
+         blocks.capacity() * sizeof(Block) + corners_of.capacity() * sizeof(CornersOf) +
+         kdops.capacity() * sizeof(Kdop) + (faces + edges + vertices + corners.capacity()) * 4 +
          n_groups * rows_per_group() * sizeof(CornerRow);
 }
 

@@ -81,9 +81,9 @@ inline bool Node::near_in_snapshot(const Node& other, float reach) const {
 }
 
 // The corners of a leaf are the distinct vertices of its features: nine or ten where eight triangles hang together. All
-// that is kept of a leaf's geometry is where they are, a row for each coordinate, sixteen in the lanes of a row; boxes of
-// features are made from them where two leaves overlap (leaf_boxes.inl). That is a quarter of the memory that boxes of
-// all features take, and a third of the time to refit them.
+// that is kept of a leaf's geometry is where they are, a row for each coordinate, sixteen in the lanes of a row; boxes
+// of features are made from them where two leaves overlap (leaf_features.inl). That is a quarter of the memory that
+// boxes of all features take, and a third of the time to refit them.
 struct alignas(64) CornerRow {
   static constexpr std::uint32_t width = 16;
   float lane[width];
@@ -163,7 +163,9 @@ struct Tree {
   static constexpr std::uint32_t coordinates = 6;
   std::vector<Kdop> kdops;  // by leaf; empty where features need not touch to count
   std::uint32_t rows_per_group() const { return grown ? 2 * coordinates : coordinates; }
-  CornerRow* rows_of(const LeafRange& leaf) const { return rows.get() + std::size_t{leaf.first_group} * rows_per_group(); }
+  CornerRow* rows_of(const LeafRange& leaf) const {
+    return rows.get() + std::size_t{leaf.first_group} * rows_per_group();
+  }
   double area = 0;  // sum over nodes, relative to the root's: what traversal pays grows with it
   double area_when_built = 0;
 

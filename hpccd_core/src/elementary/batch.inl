@@ -27,22 +27,22 @@ void test(const Geometry& g, const std::uint32_t* first, const std::uint32_t* se
   std::uint32_t n_apart = 0;
   for_lanes<kind, R>(g, first, second, g.kdops ? near : nullptr, n_near,
                      [&](Lanes m, const std::uint32_t* at, unsigned valid) {
-    const Magnitudes<R> size = magnitudes(m);
-    const CubicError<R> error = error_of<Policy>(size);
-    const Cubic<R> f = coplanarity(m);
-    const unsigned usable = bits(in_range(size));
-    const unsigned open = valid & ~(bits(certainly_no_root(f, error.coefficient)) & usable);
-    if (!open) return;
-    n_survivors += static_cast<unsigned>(__builtin_popcount(open));
-    const unsigned reach = open & ~(bits(certainly_outside<kind>(m, size)) & usable);
-    if (!reach) return;
-    const unsigned one = bits(certainly_one_root(f, error.coefficient)) & usable & reach;
-    unsigned apart = 0;
-    if (one) apart = bits(certainly_apart_at_root<kind, Policy>(m, size, f, error.value)) & one;
-    n_apart += static_cast<unsigned>(__builtin_popcount(apart));
-    append(single, n_single, at, one & ~apart);
-    append(many, n_many, at, reach & ~one);
-  });
+                       const Magnitudes<R> size = magnitudes(m);
+                       const CubicError<R> error = error_of<Policy>(size);
+                       const Cubic<R> f = coplanarity(m);
+                       const unsigned usable = bits(in_range(size));
+                       const unsigned open = valid & ~(bits(certainly_no_root(f, error.coefficient)) & usable);
+                       if (!open) return;
+                       n_survivors += static_cast<unsigned>(__builtin_popcount(open));
+                       const unsigned reach = open & ~(bits(certainly_outside<kind>(m, size)) & usable);
+                       if (!reach) return;
+                       const unsigned one = bits(certainly_one_root(f, error.coefficient)) & usable & reach;
+                       unsigned apart = 0;
+                       if (one) apart = bits(certainly_apart_at_root<kind, Policy>(m, size, f, error.value)) & one;
+                       n_apart += static_cast<unsigned>(__builtin_popcount(apart));
+                       append(single, n_single, at, one & ~apart);
+                       append(many, n_many, at, reach & ~one);
+                     });
   for_lanes<kind, R>(g, first, second, single, n_single, [&](Lanes m, const std::uint32_t* at, unsigned valid) {
     collect(single_root_test<kind, Policy>(m), at, valid, result);
   });

@@ -40,8 +40,9 @@ HPCCD_HD Outcome<R> piece_with_one_root(const Motion<R>& m, const Magnitudes<R>&
   return {sure && v.yes && root.delta <= R(Policy::toc_radius), sure && v.no, root.t, root.delta};
 }
 
-// Of f with certainly one root in [0, 1], quickly: whether the features are certainly apart there. Newton's method, a few
-// steps of it, leaves the root somewhere within `delta`, and most pairs that do not touch miss each other by far more.
+// Of f with certainly one root in [0, 1], quickly: whether the features are certainly apart there. Newton's method, a
+// few steps of it, leaves the root somewhere within `delta`, and most pairs that do not touch miss each other by far
+// more.
 template <Kind kind, class Policy, class R>
 HPCCD_HD typename RealTraits<R>::Mask certainly_apart_at_root(const Motion<R>& m, const Magnitudes<R>& size,
                                                               const Cubic<R>& f, R error) {
@@ -54,7 +55,8 @@ HPCCD_HD typename RealTraits<R>::Mask certainly_apart_at_root(const Motion<R>& m
   }
   const R delta = greater(R(0.25) * step, R(1e-5));
   const R left = t - delta, right = t + delta;
-  const auto sure = (left <= R(0) || sign * value(f, left) > error) && (right >= R(1) || sign * value(f, right) < R(0) - error);
+  const auto sure =
+      (left <= R(0) || sign * value(f, left) > error) && (right >= R(1) || sign * value(f, right) < R(0) - error);
   return sure && inside<kind, Policy>(m, size, t, delta).no;
 }
 

@@ -6,7 +6,7 @@
 namespace hpccd::HPCCD_ISA {
 namespace {
 
-#include "traverse/leaf_boxes.inl"
+#include "traverse/leaf_features.inl"
 
 // Edges of a against faces of b: one by one the faces, of which a leaf has fewer.
 template <class A, class B>

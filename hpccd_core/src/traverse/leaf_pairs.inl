@@ -6,7 +6,7 @@
 namespace hpccd::HPCCD_ISA {
 namespace {
 
-#include "traverse/leaf_boxes.inl"
+#include "traverse/leaf_features.inl"
 
 // These edges of a, one by one, against these of b.
 template <class A, class B, class When>

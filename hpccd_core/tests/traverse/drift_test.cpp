@@ -64,8 +64,7 @@ TEST_F(DriftOfSheets, NoContactIsInLeavesThatAreClosed) {
     const LeafRange& leaf = tree.leaves[tree.nodes[node].leaf];
     for (auto s = leaf.first_face; s < leaf.end_face; ++s) leaf_of_face[tree.face_of_slot[s]] = node;
     for (auto s = leaf.first_vertex; s < leaf.end_vertex; ++s) leaf_of_vertex[tree.vertex_of_slot[s]] = node;
-    for (auto s = leaf.first_edge; s < leaf.end_edge; ++s)
-      {
+    for (auto s = leaf.first_edge; s < leaf.end_edge; ++s) {
       const auto [a, b] = features.edges[tree.edge_of_slot[s]];
       leaf_of_edge[{a, b}] = node;
     }

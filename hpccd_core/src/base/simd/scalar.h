@@ -26,9 +26,9 @@ HPCCD_HD unsigned bits(LaneMask<double, 2> m) {
 
 namespace hpccd::scalar {
 
-// Real numbers in lanes, with the operations of real.h: so many doubles, and twice as many floats. Two and four are what
-// every 64-bit processor has registers for. Where a number stands alone g++ makes branches of `select`, and what comes
-// next the processor cannot guess: the whole step of 92 K triangles took 1.5 times as long as by clang++.
+// Real numbers in lanes, with the operations of real.h: so many doubles, and twice as many floats. Two and four are
+// what every 64-bit processor has registers for. Where a number stands alone g++ makes branches of `select`, and what
+// comes next the processor cannot guess: the whole step of 92 K triangles took 1.5 times as long as by clang++.
 using Double = Lanes<double, 2>;
 using Single = Lanes<float, 4>;
 inline constexpr int double_width = 2;
@@ -47,7 +47,8 @@ HPCCD_HD Double load2(const double* x) {
 }
 // x y z and padding of two points, a row each.
 HPCCD_HD Vec3<Double> transposed(const Double xy[2], const Double z[2]) {
-  return {Double(__builtin_shufflevector(xy[0].v, xy[1].v, 0, 2)), Double(__builtin_shufflevector(xy[0].v, xy[1].v, 1, 3)),
+  return {Double(__builtin_shufflevector(xy[0].v, xy[1].v, 0, 2)),
+          Double(__builtin_shufflevector(xy[0].v, xy[1].v, 1, 3)),
           Double(__builtin_shufflevector(z[0].v, z[1].v, 0, 2))};
 }
 

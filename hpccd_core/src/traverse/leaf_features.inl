@@ -40,7 +40,8 @@ struct BothEnds {
   template <class Box>
   HPCCD_HD static void sides(const Corners& c, const Box& b, RowMask (&beyond)[6]) {
     for (std::uint32_t axis = 0; axis < 3; ++axis) {
-      beyond[axis] = less(c.high[axis], all_lanes(b[low(0, axis)])) & less(c.high[3 + axis], all_lanes(b[low(1, axis)]));
+      beyond[axis] =
+          less(c.high[axis], all_lanes(b[low(0, axis)])) & less(c.high[3 + axis], all_lanes(b[low(1, axis)]));
       beyond[3 + axis] =
           less(all_lanes(b[high(0, axis)]), c.low[axis]) & less(all_lanes(b[high(1, axis)]), c.low[3 + axis]);
     }
@@ -123,7 +124,8 @@ struct InSnapshot {
   }
 };
 
-// A leaf's features. Plain pointers: methods of std::vector compiled here could be linked into code for older processors.
+// A leaf's features. Plain pointers: methods of std::vector compiled here could be linked into code for older
+// processors.
 struct LeafFeatures {
   const CornerRow* rows;
   const CornersOf* corners_of;
