@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <cstring>
+#include <functional>
+#include <numeric>
 #include <string>
 
 #include "bvh/motion_bounds.h"
@@ -102,6 +104,77 @@ TEST_F(TreeTest, RefitToTheSameMotionChangesNothing) {
     EXPECT_TRUE(contains(tree.nodes[i].box, built[i].box)) << "node " << i;
     EXPECT_TRUE(contains(built[i].box, tree.nodes[i].box)) << "node " << i;
   }
+}
+
+// What kernels read: rows of corners, and boxes of leaves in lanes.
+struct RowsTest : TreeTest {
+  void update_with(double separation, double t0, double t1) {
+    const auto start = test::sheet_positions(n, t0, lone), end = test::sheet_positions(n, t1, lone);
+    motion.update(*scene, test::view(start), test::view(end), std::vector<double>(2, separation), pool);
+  }
+  void update_snapshot(double t) { motion.update(*scene, test::view(test::sheet_positions(n, t, lone)), pool); }
+
+  void expect_rows() const {
+    for (std::uint32_t i = 0; i < tree.leaves.size(); ++i) {
+      const LeafRange& leaf = tree.leaves[i];
+      for (std::uint32_t c = 0; c < leaf.n_corners(); ++c) {
+        const CornerRow* rows = tree.rows_of(leaf) + c / 16 * tree.rows_per_group();
+        const CornerRow* high = rows + (tree.grown ? Tree::coordinates : 0);
+        const MotionBox& box = motion.boxes[tree.corners[leaf.first_corner + c]];
+        for (int k = 0; k < 3; ++k) {
+          ASSERT_EQ(rows[k].lane[c % 16], box.t0.low[k]);
+          ASSERT_EQ(rows[3 + k].lane[c % 16], box.t1.low[k]);
+          ASSERT_EQ(high[k].lane[c % 16], box.t0.high[k]);
+          ASSERT_EQ(high[3 + k].lane[c % 16], box.t1.high[k]);
+        }
+      }
+      const Block& block = tree.blocks[tree.block_of_leaf[i]];
+      float bounds[n_bounds];
+      std::memcpy(bounds, &tree.nodes[tree.leaf_nodes[i]].box, sizeof bounds);
+      for (std::uint32_t k = 0; k < n_bounds; ++k) ASSERT_EQ(block.rows[k][i - block.first_leaf], bounds[k]);
+    }
+    ASSERT_EQ(tree.kdops.empty(), motion.grown || !motion.has_kdops());
+    for (std::uint32_t i = 0; i < tree.kdops.size(); ++i)
+      for (std::uint32_t c = tree.leaves[i].first_corner; c < tree.leaves[i].end_corner; ++c)
+        for (int k = 0; k < 2 * n_kdop_directions; ++k) {
+          const VertexKdop& v = motion.kdops[tree.corners[c]];
+          const float x = k < n_kdop_directions ? v.t0[k] : v.t1[k - n_kdop_directions];
+          ASSERT_LE(tree.kdops[i].low[k], x);
+          ASSERT_GE(tree.kdops[i].high[k], x);
+        }
+  }
+};
+
+TEST_F(RowsTest, FollowEveryKindOfBounds) {
+  update_with(0, 0, 0.3);
+  build(tree, *scene, features, motion, pool);
+  ASSERT_NO_FATAL_FAILURE(expect_rows());
+  const std::function<void()> kinds[] = {[&] { update_with(0, 0.1, 0.2); }, [&] { update_with(0.2, 0.2, 0.5); },
+                                         [&] { update_snapshot(0.4); }};
+  for (int from = 0; from < 3; ++from)
+    for (int to = 0; to < 3; ++to)
+      for (const bool leaves_alone : {false, true}) {
+        kinds[from]();
+        refit(tree, motion, {}, pool);
+        ASSERT_NO_FATAL_FAILURE(expect_rows()) << from;
+        kinds[to]();
+        std::vector<std::uint32_t> all(tree.leaves.size());
+        std::iota(all.begin(), all.end(), 0u);
+        if (leaves_alone)
+          refit_leaves(tree, motion, all, pool);
+        else
+          refit(tree, motion, {}, pool);
+        ASSERT_NO_FATAL_FAILURE(expect_rows()) << from << " to " << to << (leaves_alone ? ", leaves" : "");
+      }
+}
+
+// What rests is left as it was, but where the rows are of another kind.
+TEST_F(RowsTest, OfWhatRestsComeWithAnotherKindOfBounds) {
+  update_with(0, 0, 0.3);
+  build(tree, *scene, features, motion, pool);
+  update_with(0.2, 0, 0.3);
+  refit(tree, motion, {1, 1}, pool);
+  expect_rows();
 }
 
 // So many triangles that threads split the upper ranges together and that many nodes lie above the front.

@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 // The candidates of two leaves: with every instruction set just the pairs of features whose boxes overlap and that
-// share no vertex.
+// share no vertex; and the pairs of leaves of two blocks: just those whose boxes and k-DOPs overlap.
 #include "traverse/leaf_pairs.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <memory>
+#include <random>
+#include <string>
 
 #include "base/simd.h"
 #include "bvh/motion_bounds.h"
@@ -22,17 +25,50 @@ struct Found {
   bool operator==(const Found&) const = default;
 };
 
-struct LeafPairsTest : testing::Test {
-  static constexpr std::uint32_t side = 13, lone = 3;
-  std::shared_ptr<const Scene> scene = test::two_sheets(side, lone);
+// Sheets, whose leaves have some ten corners, or triangles that hang together by twos at most, whose leaves have up to
+// twenty-four; with a separation, so that boxes of vertices are more than points, or without.
+struct Case {
+  bool soup;
+  double separation;
+};
+
+std::shared_ptr<const Scene> soup_scene(std::uint32_t n) {
+  auto scene = std::make_shared<Scene>();
+  for (std::uint32_t mesh = 0; mesh < 2; ++mesh) {
+    std::vector<std::uint32_t> faces;
+    for (std::uint32_t i = 0; i < 3 * n; ++i) faces.push_back(i);
+    for (std::uint32_t i = 0; i + 1 < n; i += 7) faces[3 * (i + 1)] = faces[3 * i + 2];
+    scene->add_mesh("soup" + std::to_string(mesh), faces, 3 * n, {});
+  }
+  return scene;
+}
+
+std::vector<double> soup_positions(std::uint32_t n, unsigned seed) {
+  std::mt19937 random(5), drift(seed);
+  std::uniform_real_distribution<double> place(-3, 3), size(-0.5, 0.5), way(-0.2, 0.2);
+  std::vector<double> positions;
+  for (std::uint32_t triangle = 0; triangle < 2 * n; ++triangle) {
+    const double x = place(random), y = place(random), z = 0.2 * place(random);
+    for (int corner = 0; corner < 3; ++corner)
+      for (const double center : {x, y, z}) positions.push_back(center + size(random) + way(drift));
+  }
+  return positions;
+}
+
+struct LeafPairsTest : testing::TestWithParam<Case> {
+  static constexpr std::uint32_t side = 13, lone = 3, triangles = 300;
+  std::shared_ptr<const Scene> scene = GetParam().soup ? soup_scene(triangles) : test::two_sheets(side, lone);
   Features features = features_of(*scene);
   ThreadPool pool{1};
   MotionBounds motion;
   Tree tree;
 
   LeafPairsTest() {
-    const auto start = test::sheet_positions(side, 0, lone), end = test::sheet_positions(side, 1, lone);
-    motion.update(test::view(start), test::view(end), pool);
+    const bool soup = GetParam().soup;
+    const auto start = soup ? soup_positions(triangles, 1) : test::sheet_positions(side, 0, lone),
+               end = soup ? soup_positions(triangles, 2) : test::sheet_positions(side, 1, lone);
+    const std::vector<double> separations(2, GetParam().separation);
+    motion.update(*scene, test::view(start), test::view(end), separations, pool);
     build(tree, *scene, features, motion, pool);
   }
 
@@ -82,7 +118,7 @@ struct LeafPairsTest : testing::Test {
   }
 };
 
-TEST_F(LeafPairsTest, AreThoseThatOverlapAndShareNoVertex) {
+TEST_P(LeafPairsTest, AreThoseThatOverlapAndShareNoVertex) {
   std::size_t edge_edge = 0, vertex_face = 0;
   for (std::size_t a = 0; a < tree.leaves.size(); ++a)
     for (std::size_t b = a; b < tree.leaves.size(); ++b) {
@@ -100,6 +136,67 @@ TEST_F(LeafPairsTest, AreThoseThatOverlapAndShareNoVertex) {
   EXPECT_GT(edge_edge, 1000u);
   EXPECT_GT(vertex_face, 500u);
 }
+
+TEST_P(LeafPairsTest, OfOneKindAlone) {
+  const LeafRange &a = tree.leaves[0], &b = tree.leaves[tree.leaves.size() / 2];
+  for (const LeafRange* other : {&a, &b})
+    for (const Simd simd : simd_levels()) {
+      const auto edge_edge = std::make_unique<CandidateBuffer>(), vertex_face = std::make_unique<CandidateBuffer>();
+      const Found both = by(leaf_pairs(simd), a, *other);
+      leaf_pairs(simd)(tree, a, *other, {.vertex_face = true, .edge_edge = false}, *edge_edge, *vertex_face);
+      EXPECT_EQ(sorted({pairs_of(*edge_edge), pairs_of(*vertex_face)}), (Found{{}, both.vertex_face}));
+      edge_edge->n = vertex_face->n = 0;
+      leaf_pairs(simd)(tree, a, *other, {.vertex_face = false, .edge_edge = true}, *edge_edge, *vertex_face);
+      EXPECT_EQ(sorted({pairs_of(*edge_edge), pairs_of(*vertex_face)}), (Found{both.edge_edge, {}}));
+    }
+}
+
+TEST_P(LeafPairsTest, OfBlocksAreTheLeavesThatOverlap) {
+  ASSERT_GT(tree.blocks.size(), 2u);
+  const auto kdop_of = [&](const LeafRange& leaf) {
+    Kdop k;
+    std::fill_n(k.low, 16, INFINITY);
+    std::fill_n(k.high, 16, -INFINITY);
+    for (auto c = leaf.first_corner; c < leaf.end_corner; ++c)
+      for (int i = 0; i < 16; ++i) {
+        const float x = motion.kdops[tree.corners[c]].t0[i % 8 + i / 8 * 8];
+        k.low[i] = std::min(k.low[i], x), k.high[i] = std::max(k.high[i], x);
+      }
+    return k;
+  };
+  const auto apart = [&](const Kdop& a, const Kdop& b) {
+    for (int i = 0; i < 8; ++i)
+      if ((a.high[i] < b.low[i] && a.high[i + 8] < b.low[i + 8]) ||
+          (b.high[i] < a.low[i] && b.high[i + 8] < a.low[i + 8]))
+        return true;
+    return false;
+  };
+  Pairs expected;
+  for (std::uint32_t a = 0; a < tree.leaves.size(); ++a)
+    for (std::uint32_t b = a; b < tree.leaves.size(); ++b) {
+      const Node &node_a = tree.nodes[tree.leaf_nodes[a]], &node_b = tree.nodes[tree.leaf_nodes[b]];
+      const bool touch = motion.grown || a == b || !apart(kdop_of(tree.leaves[a]), kdop_of(tree.leaves[b]));
+      if (node_a.box.overlaps(node_b.box) && touch) expected.push_back({a, b});
+    }
+  for (const Simd simd : simd_levels()) {
+    Pairs found;
+    for (std::size_t a = 0; a < tree.blocks.size(); ++a)
+      for (std::size_t b = a; b < tree.blocks.size(); ++b) {
+        LeafPair pairs[block_pairs_capacity];
+        const std::uint32_t n = block_pairs(simd)(tree, tree.blocks[a], tree.blocks[b], pairs);
+        for (std::uint32_t i = 0; i < n; ++i) found.push_back(std::minmax(pairs[i].first, pairs[i].second));
+      }
+    std::ranges::sort(found);
+    EXPECT_EQ(found, expected) << name_of(simd);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Scenes, LeafPairsTest,
+                         testing::Values(Case{false, 0}, Case{false, 0.3}, Case{true, 0}, Case{true, 0.3}),
+                         [](const auto& info) {
+                           return std::string(info.param.soup ? "Soup" : "Sheets") +
+                                  (info.param.separation > 0 ? "Apart" : "");
+                         });
 
 }  // namespace
 }  // namespace hpccd
