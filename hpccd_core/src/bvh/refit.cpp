@@ -102,7 +102,7 @@ void fit_leaf(Tree& tree, std::uint32_t number, const MotionBounds& motion) {
   const LeafRange& leaf = tree.leaves[number];
   Node& node = tree.nodes[tree.leaf_nodes[number]];
   node.box = leaf_bounds(tree, leaf, motion.boxes);
-  if (!tree.kdops.empty()) join_kdops(tree, leaf, motion.kdops);
+  if (tree.by_kdops) join_kdops(tree, leaf, motion.kdops);
   Block& block = tree.blocks[tree.block_of_leaf[number]];
   float bounds[n_bounds];
   std::memcpy(bounds, &node.box, sizeof bounds);
@@ -112,8 +112,9 @@ void fit_leaf(Tree& tree, std::uint32_t number, const MotionBounds& motion) {
 // For bounds of this kind: with separations or without, of a motion or a snapshot. True where it held such before.
 bool make_room(Tree& tree, const MotionBounds& motion) {
   const bool with_kdops = motion.has_kdops() && !motion.grown;
-  if (tree.rows && tree.grown == motion.grown && with_kdops == !tree.kdops.empty()) return true;
+  if (tree.rows && tree.grown == motion.grown && tree.by_kdops == with_kdops) return true;
   tree.grown = motion.grown;
+  tree.by_kdops = with_kdops;
   tree.kdops.resize(with_kdops ? tree.leaves.size() : 0);
   // Kernels read two groups where one of two leaves has as many.
   tree.rows = std::make_unique_for_overwrite<CornerRow[]>((tree.n_groups + 1) * tree.rows_per_group());

@@ -161,7 +161,8 @@ struct Tree {
   std::size_t n_groups = 0;
   bool grown = false;
   static constexpr std::uint32_t coordinates = 6;
-  std::vector<Kdop> kdops;  // by leaf; empty where features need not touch to count
+  bool by_kdops = false;    // whether there are any: not where features need not touch to count
+  std::vector<Kdop> kdops;  // by leaf
   std::uint32_t rows_per_group() const { return grown ? 2 * coordinates : coordinates; }
   CornerRow* rows_of(const LeafRange& leaf) const {
     return rows.get() + std::size_t{leaf.first_group} * rows_per_group();

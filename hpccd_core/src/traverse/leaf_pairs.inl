@@ -116,7 +116,7 @@ HPCCD_HD void pairs_of_leaves(When when, const Tree& tree, const LeafRange& a, c
 
 std::uint32_t block_pairs(const Tree& tree, const Block& a, const Block& b, LeafPair* pairs) {
   const Node* nodes = tree.nodes.data();
-  const Kdop* kdops = tree.kdops.data();
+  const Kdop* kdops = tree.by_kdops ? tree.kdops.data() : nullptr;
   const bool same = &a == &b;
   const BoxLanes boxes_b(b.rows);
   unsigned near_a = first_bits(a.n_leaves), near_b = first_bits(b.n_leaves);

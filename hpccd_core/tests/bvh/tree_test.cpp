@@ -133,7 +133,9 @@ struct RowsTest : TreeTest {
       std::memcpy(bounds, &tree.nodes[tree.leaf_nodes[i]].box, sizeof bounds);
       for (std::uint32_t k = 0; k < n_bounds; ++k) ASSERT_EQ(block.rows[k][i - block.first_leaf], bounds[k]);
     }
-    ASSERT_EQ(tree.kdops.empty(), motion.grown || !motion.has_kdops());
+    ASSERT_EQ(tree.by_kdops, !motion.grown && motion.has_kdops());
+    if (!tree.by_kdops) return;
+    ASSERT_EQ(tree.kdops.size(), tree.leaves.size());
     for (std::uint32_t i = 0; i < tree.kdops.size(); ++i)
       for (std::uint32_t c = tree.leaves[i].first_corner; c < tree.leaves[i].end_corner; ++c)
         for (int k = 0; k < 2 * n_kdop_directions; ++k) {

@@ -55,6 +55,10 @@ std::vector<double> soup_positions(std::uint32_t n, unsigned seed) {
   return positions;
 }
 
+std::string name_of_case(const testing::TestParamInfo<Case>& info) {
+  return std::string(info.param.soup ? "Soup" : "Sheets") + (info.param.separation > 0 ? "Apart" : "");
+}
+
 struct LeafPairsTest : testing::TestWithParam<Case> {
   static constexpr std::uint32_t side = 13, lone = 3, triangles = 300;
   std::shared_ptr<const Scene> scene = GetParam().soup ? soup_scene(triangles) : test::two_sheets(side, lone);
@@ -63,12 +67,14 @@ struct LeafPairsTest : testing::TestWithParam<Case> {
   MotionBounds motion;
   Tree tree;
 
+  std::vector<double> first, last;  // positions at both ends
+
   LeafPairsTest() {
     const bool soup = GetParam().soup;
-    const auto start = soup ? soup_positions(triangles, 1) : test::sheet_positions(side, 0, lone),
-               end = soup ? soup_positions(triangles, 2) : test::sheet_positions(side, 1, lone);
+    first = soup ? soup_positions(triangles, 1) : test::sheet_positions(side, 0, lone);
+    last = soup ? soup_positions(triangles, 2) : test::sheet_positions(side, 1, lone);
     const std::vector<double> separations(2, GetParam().separation);
-    motion.update(*scene, test::view(start), test::view(end), separations, pool);
+    motion.update(*scene, test::view(first), test::view(last), separations, pool);
     build(tree, *scene, features, motion, pool);
   }
 
@@ -151,52 +157,70 @@ TEST_P(LeafPairsTest, OfOneKindAlone) {
     }
 }
 
-TEST_P(LeafPairsTest, OfBlocksAreTheLeavesThatOverlap) {
-  ASSERT_GT(tree.blocks.size(), 2u);
-  const auto kdop_of = [&](const LeafRange& leaf) {
+struct BlockPairsTest : LeafPairsTest {
+  Kdop kdop_of(const LeafRange& leaf) const {
     Kdop k;
     std::fill_n(k.low, 16, INFINITY);
     std::fill_n(k.high, 16, -INFINITY);
     for (auto c = leaf.first_corner; c < leaf.end_corner; ++c)
       for (int i = 0; i < 16; ++i) {
-        const float x = motion.kdops[tree.corners[c]].t0[i % 8 + i / 8 * 8];
+        const VertexKdop& v = motion.kdops[tree.corners[c]];
+        const float x = i < 8 ? v.t0[i] : v.t1[i - 8];
         k.low[i] = std::min(k.low[i], x), k.high[i] = std::max(k.high[i], x);
       }
     return k;
-  };
-  const auto apart = [&](const Kdop& a, const Kdop& b) {
+  }
+  static bool apart(const Kdop& a, const Kdop& b) {
     for (int i = 0; i < 8; ++i)
       if ((a.high[i] < b.low[i] && a.high[i + 8] < b.low[i + 8]) ||
           (b.high[i] < a.low[i] && b.high[i + 8] < a.low[i + 8]))
         return true;
     return false;
-  };
-  Pairs expected;
-  for (std::uint32_t a = 0; a < tree.leaves.size(); ++a)
-    for (std::uint32_t b = a; b < tree.leaves.size(); ++b) {
-      const Node &node_a = tree.nodes[tree.leaf_nodes[a]], &node_b = tree.nodes[tree.leaf_nodes[b]];
-      const bool touch = motion.grown || a == b || !apart(kdop_of(tree.leaves[a]), kdop_of(tree.leaves[b]));
-      if (node_a.box.overlaps(node_b.box) && touch) expected.push_back({a, b});
-    }
-  for (const Simd simd : simd_levels()) {
-    Pairs found;
-    for (std::size_t a = 0; a < tree.blocks.size(); ++a)
-      for (std::size_t b = a; b < tree.blocks.size(); ++b) {
-        LeafPair pairs[block_pairs_capacity];
-        const std::uint32_t n = block_pairs(simd)(tree, tree.blocks[a], tree.blocks[b], pairs);
-        for (std::uint32_t i = 0; i < n; ++i) found.push_back(std::minmax(pairs[i].first, pairs[i].second));
+  }
+  void expect_leaves_that_overlap() const {
+    Pairs expected;
+    for (std::uint32_t a = 0; a < tree.leaves.size(); ++a)
+      for (std::uint32_t b = a; b < tree.leaves.size(); ++b) {
+        const Node &node_a = tree.nodes[tree.leaf_nodes[a]], &node_b = tree.nodes[tree.leaf_nodes[b]];
+        const bool touch = motion.grown || a == b || !apart(kdop_of(tree.leaves[a]), kdop_of(tree.leaves[b]));
+        if (node_a.box.overlaps(node_b.box) && touch) expected.push_back({a, b});
       }
-    std::ranges::sort(found);
-    EXPECT_EQ(found, expected) << name_of(simd);
+    for (const Simd simd : simd_levels()) {
+      Pairs found;
+      for (std::size_t a = 0; a < tree.blocks.size(); ++a)
+        for (std::size_t b = a; b < tree.blocks.size(); ++b) {
+          LeafPair pairs[block_pairs_capacity];
+          const std::uint32_t n = block_pairs(simd)(tree, tree.blocks[a], tree.blocks[b], pairs);
+          for (std::uint32_t i = 0; i < n; ++i) found.push_back(std::minmax(pairs[i].first, pairs[i].second));
+        }
+      std::ranges::sort(found);
+      EXPECT_EQ(found, expected) << name_of(simd);
+    }
+  }
+};
+
+TEST_P(BlockPairsTest, AreTheLeavesThatOverlap) {
+  ASSERT_GT(tree.blocks.size(), 2u);
+  expect_leaves_that_overlap();
+}
+
+// k-DOPs are of plain motion: those of a motion before, with another separation, say nothing.
+TEST_P(BlockPairsTest, AreThoseOfTheLastBounds) {
+  for (const double separation : {0.4, 0.0, 0.2, 0.1, 0.0}) {
+    for (auto* end : {&last, &first}) {
+      motion.update(*scene, test::view(first), test::view(*end), std::vector<double>(2, separation), pool);
+      refit(tree, motion, {}, pool);
+      ASSERT_NO_FATAL_FAILURE(expect_leaves_that_overlap());
+    }
   }
 }
 
+INSTANTIATE_TEST_SUITE_P(Scenes, BlockPairsTest,
+                         testing::Values(Case{false, 0}, Case{false, 0.3}, Case{true, 0}, Case{true, 0.3}),
+                         name_of_case);
 INSTANTIATE_TEST_SUITE_P(Scenes, LeafPairsTest,
                          testing::Values(Case{false, 0}, Case{false, 0.3}, Case{true, 0}, Case{true, 0.3}),
-                         [](const auto& info) {
-                           return std::string(info.param.soup ? "Soup" : "Sheets") +
-                                  (info.param.separation > 0 ? "Apart" : "");
-                         });
+                         name_of_case);
 
 }  // namespace
 }  // namespace hpccd
