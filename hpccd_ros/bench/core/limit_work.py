@@ -10,8 +10,6 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 
-import numpy as np
-
 from hpccd_ros.bench.steps import Step
 
 STAGES = ("bounds", "refit", "nodes", "leaf pairs", "k-DOPs", "tests", "contacts")
@@ -47,8 +45,11 @@ class Item:
 
 
 # Sizes of the core's structures, in bytes.
-VERTEX_MOTION, VERTEX_KDOP, BOX, NODE, BOX_GROUP, CONTACT, NUMBER = 64, 64, 48, 64, 768, 16, 4
+VERTEX_MOTION, VERTEX_KDOP, BOX, NODE, CONTACT, NUMBER = 64, 64, 48, 64, 16, 4
+COORDINATES = 6 * 4  # of a corner, at both ends
+LEAF_ROWS, LEAF_CORNERS, LEAF_KDOP = 16 * COORDINATES, 128, 128
 BOX_COMPARISONS = 12  # below and above, three axes, both ends: MotionBox::overlaps
+KDOP_COMPARISONS = 2 * 16
 # Operations of vec3.h and motion.h.
 CROSS, DOT, VECTOR = 9, 5, 3
 LOAD = 6 * VECTOR  # p, a, b at both ends
@@ -62,6 +63,7 @@ BEYOND = {"vf": 3 * 20 + 10, "ee": 2 * 20 + 5}
 ONE_ROOT = 10  # certainly_one_root()
 NEWTON, NEWTON_STEPS = 13 + 14 + 11, 4  # value(), slope() and the bracket: from one half to 1e-16 in no less than four
 ROOT_END = 14 + 2 * 13 + 12  # delta, and signs on both sides
+QUICK_STEPS = 2 * (13 + 14 + 4) + 5 + 2 * 13 + 6  # certainly_apart_at_root(): two steps, delta, signs on both sides
 # inside(): interpolation, cross products, the largest coordinate, signs, errors, and 11 for each condition.
 INSIDE = {"vf": 28 + 3 * CROSS + 9 + 4 + 8 + 3 * 11 + 4, "ee": 28 + 3 * CROSS + 9 + 4 + 8 + 2 * 11 + 4}
 VERTICES = 4 * VERTEX_MOTION
@@ -73,37 +75,40 @@ TABLE = (
     Item("bounds", "vertices", Work(written=VERTEX_MOTION + BOX + VERTEX_KDOP, comparisons=18, flops=36 + 52),
          "copy_motion(): 12 bounds of 3 operations, 16 values of a k-DOP of 3 and 4 doublings; extent_of(): minimum, "
          "maximum and range of 6 coordinates"),
-    Item("refit", "vertices", Work(read=BOX + NUMBER, written=BOX, comparisons=BOX_COMPARISONS),
-         "leaf_bounds(): the box, its number, its lane of a group, joined with the leaf's"),
-    Item("refit", "edges", Work(read=2 * NUMBER, written=BOX, comparisons=BOX_COMPARISONS),
-         "leaf_bounds(): two ends joined"),
-    Item("refit", "faces", Work(read=3 * NUMBER, written=BOX, comparisons=3 * BOX_COMPARISONS),
-         "leaf_bounds(): three corners joined, and with the leaf's"),
+    Item("refit", "vertices",
+         Work(read=BOX + VERTEX_KDOP + NUMBER, written=COORDINATES, comparisons=BOX_COMPARISONS + KDOP_COMPARISONS),
+         "leaf_bounds(), join_kdops(): box and k-DOP joined with the leaf's, coordinates written to their lanes; most "
+         "vertices are corners of several leaves"),
+    Item("refit", "leaves", Work(written=LEAF_KDOP + BOX), "fit_leaf(): its k-DOP, and its lane of a block"),
     Item("refit", "nodes", Work(written=NODE, comparisons=BOX_COMPARISONS), "join_children()"),
     Item("nodes", "nodes", Work(read=NODE), "all of them once"),
     Item("nodes", "node_pairs", Work(touched=2 * NODE, comparisons=BOX_COMPARISONS), "Node::overlaps()"),
-    Item("leaf pairs", "leaves", Work(read=2 * BOX_GROUP + NODE), "groups of edges, and of vertices and faces, once"),
-    Item("leaf pairs", "leaf_visits", Work(touched=2 * BOX_GROUP + NODE, comparisons=2 * 16 * BOX_COMPARISONS),
-         "near() of leaf_boxes.inl: both groups of a leaf against the other leaf's box; what is near is then compared "
-         "one by one, which nobody counts"),
+    Item("nodes", "leaf_pairs", Work(touched=BOX + 2 * LEAF_KDOP, comparisons=BOX_COMPARISONS + KDOP_COMPARISONS),
+         "block_pairs(): those that are found; nobody counts what was compared for nothing"),
+    Item("leaf pairs", "leaves", Work(read=LEAF_ROWS + LEAF_CORNERS + NODE), "rows of corners, once"),
+    Item("leaf pairs", "leaf_visits",
+         Work(touched=LEAF_ROWS + LEAF_CORNERS + NODE, comparisons=16 * BOX_COMPARISONS),
+         "leaf_features.inl: on which sides of the other leaf's box the corners lie; what is near is then compared one "
+         "by one, which nobody counts"),
     Item("leaf pairs", "candidates", Work(touched=2 * NUMBER), "two numbers written"),
     Item("k-DOPs", "vertices", Work(read=VERTEX_KDOP), "all of them once"),
     Item("k-DOPs", "candidates", Work(touched=4 * VERTEX_KDOP + 2 * NUMBER, comparisons=4 * 16 + 2 * 16),
          "near_pairs(): four rows of 16, joined two and two by minimum and maximum, compared twice"),
     Item("tests", "vertices", Work(read=VERTEX_MOTION), "all of them once"),
     Item("tests", "tested", Work(touched=VERTICES, flops=LOAD + MAGNITUDES + CUBIC + ERROR + 12),
-         "coplanarity_filter(): the cubic, its error bound, the signs of its coefficients"),
-    *(Item("tests", f"{kind}_survivors",
-           Work(touched=VERTICES, flops=LOAD + MAGNITUDES + PROJECTION + BEYOND[kind] + CUBIC + ERROR + ONE_ROOT),
+         "batch.inl: the cubic, its error bound, the signs of its coefficients"),
+    *(Item("tests", f"{kind}_survivors", Work(flops=PROJECTION + BEYOND[kind] + ONE_ROOT),
            "certainly_outside() and certainly_one_root()") for kind in ("vf", "ee")),
-    *(Item("tests", f"{kind}_rooted",
+    *(Item("tests", f"{kind}_rooted", Work(flops=QUICK_STEPS + INSIDE[kind]),
+           "certainly_apart_at_root(); many_roots_test() does more") for kind in ("vf", "ee")),
+    *(Item("tests", f"{kind}_contacts",
            Work(touched=VERTICES, flops=LOAD + MAGNITUDES + CUBIC + ERROR + NEWTON * NEWTON_STEPS + ROOT_END
                 + INSIDE[kind]),
            "single_root_test(): four steps of Newton's method, then inside(); many_roots_test() does more")
       for kind in ("vf", "ee")),
     *(Item("contacts", f"{kind}_contacts",
-           Work(read=2 * CONTACT, written=CONTACT + HANDED_OUT[kind], comparisons=7),
-           "order.cpp: distributed, read again and handed out; a bucket of 128 is sorted") for kind in ("vf", "ee")),
+           Work(read=2 * CONTACT, written=CONTACT + HANDED_OUT[kind], comparisons=3),
+           "order.cpp: distributed, read again and handed out; a bucket of eight is sorted") for kind in ("vf", "ee")),
 )  # fmt: skip
 
 
@@ -117,10 +122,10 @@ def counts(step: Step, stats: dict[str, float]) -> dict[str, float]:
     vertices, faces = (sum(n) for n in (map(_n_vertices, moving), (len(mesh.faces) for mesh in moving)))
     leaves = -(-faces // 8)  # at least: a leaf holds at most eight triangles
     found = {
-        "vertices": vertices, "faces": faces, "edges": sum(_edges(mesh.faces) for mesh in moving), "leaves": leaves,
+        "vertices": vertices, "leaves": leaves,
         "nodes": 2 * leaves - 1 if leaves else 0,
         "position_bytes": 2 * 3 * step.vertices_t0.dtype.itemsize * vertices,
-        "node_pairs": stats["node_pairs"],
+        "node_pairs": stats["node_pairs"], "leaf_pairs": stats["leaf_pairs"],
         # A leaf with itself is one.
         "leaf_visits": 2 * stats["leaf_pairs"] - min(leaves, stats["leaf_pairs"]),
         "candidates": _both(stats, "candidates"),
@@ -144,9 +149,3 @@ def _n_vertices(mesh) -> int:
 
 def _both(stats, name) -> float:
     return stats[f"vf_{name}"] + stats[f"ee_{name}"]
-
-
-def _edges(faces: np.ndarray) -> int:
-    """Number of different ones."""
-    ends = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]).astype(np.int64), axis=1)
-    return len(np.unique(ends[:, 0] << 32 | ends[:, 1]))
