@@ -80,3 +80,17 @@ def test_the_largest_coordinates_are_taken(query):
             len(detector.intersections(small))
             and detector.intersections(large).hash == detector.intersections(small).hash
         )
+
+
+def test_what_a_snapshot_may_hold_a_motion_may_not_even_at_rest():
+    """A static mesh that proximity has taken is refused by detect all the same, as a new detector refuses it."""
+    scene = hc.Scene()
+    scene.add_mesh("moving", [[0, 1, 2]])
+    scene.add_mesh("static", [[0, 1, 2]], static=True)
+    triangle = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], float)
+    far = np.vstack([triangle, triangle + [0, 0, 1e200]])
+    detector = hc.Detector(scene, backend="cpu")
+    for _ in range(2):
+        assert len(detector.proximity(far, 0.1)) == 0
+        with pytest.raises(ValueError, match=r"vertices_t0\[3, 2\] is 1e\+200, beyond 1e\+150"):
+            detector.detect(far, far)

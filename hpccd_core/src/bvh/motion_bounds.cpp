@@ -127,6 +127,7 @@ void Extent::include(const Extent& e) {
 template <class Real>
 void MotionBounds::update(const Real* t0, const Real* t1, std::size_t n, std::span<const double> separations,
                           ThreadPool& pool) {
+  if (snapshot_ != was_snapshot_) resting.clear();  // what one takes may be too large for the other
   const auto moves = [&](std::size_t part) { return resting.empty() || !resting[part]; };
   std::vector<Piece> pieces = pieces_of(parts_, moves);
   std::vector<Extent> extents(pieces.size());
@@ -155,7 +156,7 @@ void MotionBounds::update(const Real* t0, const Real* t1, std::size_t n, std::sp
   std::vector<double> margins(parts_.size(), 0);
   if (!separations.empty() && n > 0)
     for (std::size_t p = 0; p < parts_.size(); ++p) margins[p] = margin_for(separations[p], whole);
-  if (!resting.empty() && (!(map == old_map) || margins != margins_ || snapshot_ != was_snapshot_)) {
+  if (!resting.empty() && (!(map == old_map) || margins != margins_)) {
     resting.clear();
     pieces = pieces_of(parts_, moves);
   }

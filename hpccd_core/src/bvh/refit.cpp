@@ -113,6 +113,7 @@ void fit_leaf(Tree& tree, std::uint32_t number, const MotionBounds& motion) {
 bool make_room(Tree& tree, const MotionBounds& motion) {
   const bool with_kdops = motion.has_kdops() && !motion.grown;
   if (tree.rows && tree.grown == motion.grown && tree.by_kdops == with_kdops) return true;
+  tree.rows.reset();  // what it holds is of another kind, also should there be no memory for the new ones
   tree.grown = motion.grown;
   tree.by_kdops = with_kdops;
   tree.kdops.resize(with_kdops ? tree.leaves.size() : 0);
