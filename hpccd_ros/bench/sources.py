@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 from collections.abc import Sequence
 from functools import lru_cache
@@ -49,10 +50,22 @@ def resolve(words: Sequence[str], data: Path | None, default: Sequence[str], siz
             found += [of_npz(path) for path in data_files(data)]
         else:
             found.append(_one(word, data, size))
+    found = _told_apart(words or default, found)
     if not found:
         raise UserError("nothing to measure: name a scene (see `hpccd scene --list`), an .npz or .mcap file, or set "
                         "HPCCD_DATA")
     return found
+
+
+def _told_apart(words, found):
+    """Files of one name in several folders get names of their own: results are kept by name."""
+    names = [source.name for source in found]
+    if len(words) != len(found) or len(set(names)) == len(names):
+        return found
+    return [
+        dataclasses.replace(source, name=str(Path(word).with_suffix(""))) if names.count(source.name) > 1 else source
+        for word, source in zip(words, found, strict=True)
+    ]
 
 
 def _one(word, data, size):

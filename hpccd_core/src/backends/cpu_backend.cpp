@@ -93,13 +93,22 @@ void CpuBackend::mark_traversal() {
 }
 
 void CpuBackend::test(const std::vector<LeafPair>& pairs) {
+  if (!method_) return test_leaves_of_tree(pairs);
+  test_each(pairs, [&](LeafPair pair, Worker& worker) {
+    paper::test_primitives(shared_.features, shared_.rules, *swept_, pair, worker);
+  });
+}
+
+void CpuBackend::test_leaves_of_tree(const std::vector<LeafPair>& pairs) {
+  test_each(pairs,
+            [&](LeafPair pair, Worker& worker) { test_leaves(shared_.tree.tree(), shared_.rules, pair, worker); });
+}
+
+template <class Test>
+void CpuBackend::test_each(const std::vector<LeafPair>& pairs, Test&& test) {
   constexpr std::size_t grain = 64;  // small beside a segment: all threads share what one leaves
   parallel_for(shared_.pool, pairs.size(), grain, [&](std::size_t begin, std::size_t end, int thread) {
-    for (std::size_t i = begin; i < end; ++i)
-      if (method_)
-        paper::test_primitives(shared_.features, shared_.rules, *swept_, pairs[i], workers_[thread]);
-      else
-        test_leaves(shared_.tree.tree(), shared_.rules, pairs[i], workers_[thread]);
+    for (std::size_t i = begin; i < end; ++i) test(pairs[i], workers_[static_cast<std::size_t>(thread)]);
   });
   for (Worker& w : workers_) w.flush();
 }

@@ -36,6 +36,7 @@ class CpuBackend final : public DetectionBackend {
 
   // The elementary tests of pairs of leaves that a traversal named, of the tree or of a published method's hierarchy.
   void test(const std::vector<LeafPair>& pairs);
+  void test_leaves_of_tree(const std::vector<LeafPair>& pairs);
   bool walks_tree() const { return method_ == nullptr; }
   std::vector<Worker>& workers() { return workers_; }
 
@@ -55,6 +56,8 @@ class CpuBackend final : public DetectionBackend {
   void see_motion(Positions t0, Positions t1, Tests tests);
   void see_snapshot(Positions vertices);
   void walk_tree();
+  template <class Test>
+  void test_each(const std::vector<LeafPair>& pairs, Test&& test);
   void mark_traversal();
   void count_times(std::map<std::string, std::uint64_t>& stats) const;
   Contacts collect(Outputs outputs);

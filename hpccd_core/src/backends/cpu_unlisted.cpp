@@ -110,7 +110,7 @@ bool CpuBackend::known_from_the_unlisted(bool time_only) {
     shared_.tree.fit_leaves(leaves_of(*open, shared_.tree.tree().leaves.size()));
     shared_.profiler.mark("refit");
     limit_reach();
-    test(*open);
+    test_leaves_of_tree(*open);
   }
   if (!time_only) join_found(std::move(found), search_.earliest, workers_);
   mark_traversal();

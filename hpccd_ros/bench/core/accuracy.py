@@ -82,6 +82,8 @@ def run(args) -> int:
     backends, refused = usable("backend", names)
     if args.backend:
         command.skipped(report, "backend", refused)
+    if not backends:
+        raise UserError(f"--backend {args.backend}: none of these works here; see `hpccd info`")
     sets, refused = usable("simd", command.listed("--simd", args.simd, ("auto", "scalar", "avx2", "avx512")))
     command.skipped(report, "instruction set", refused)
     for source in sources:

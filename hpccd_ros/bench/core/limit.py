@@ -13,9 +13,9 @@ be faster than that without doing less; rows with the largest distance are those
 averages over the fastest third of the calls.
 
   bounds      positions checked, and boxes and k-DOPs of the motion of each vertex
-  refit       boxes of features, leaves and nodes
+  refit       corners and k-DOPs of leaves, boxes of leaves and nodes
   nodes       pairs of nodes, and what threads wait for each other
-  leaf pairs  boxes of the features of two leaves (timed for one pair in 64)
+  leaf pairs  features of two leaves whose boxes overlap (timed for one pair in 64)
   k-DOPs      the filter of bounds along eight more directions, on each candidate pair of features
   tests       all other filters, the elementary tests and their fallbacks
   contacts    sorted, hashed, handed out
