@@ -58,6 +58,19 @@ def test_balanced(data_folder, name, missed):
 
 
 @SCENES
+@pytest.mark.parametrize("simd", [*hc.simd_levels()])
+def test_fast(data_folder, name, simd):
+    """It promises nothing, and yet: at most one contact in a thousand wrong."""
+    with np.load(data_folder / f"{name}.npz") as truth:
+        contacts = detect(truth, "fast", backend="cpu", simd=simd)
+        true = sum(len(truth[kind]) for kind in ("vf", "ee"))
+        wheres = [matched(getattr(contacts, kind), truth[kind]) for kind in ("vf", "ee")]
+        missed = sum(int((where < 0).sum()) for where in wheres)
+        assert missed <= 1e-3 * true
+        assert len(contacts) - (true - missed) <= 1e-3 * true
+
+
+@SCENES
 def test_report_first(data_folder, name):
     with np.load(data_folder / f"{name}.npz") as truth:
         every, first = detect(truth, "exact"), detect(truth, "exact", report="first")

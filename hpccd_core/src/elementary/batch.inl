@@ -38,7 +38,7 @@ void test(const Geometry& g, const std::uint32_t* first, const std::uint32_t* se
                        if (!reach) return;
                        const unsigned one = bits(certainly_one_root(f, error.coefficient)) & usable & reach;
                        unsigned apart = 0;
-                       if (one) apart = bits(certainly_apart_at_root<kind, Policy>(m, size, f, error.value)) & one;
+                       if (one) apart = bits(certainly_apart_at_root<kind>(m, size, f, error.value)) & one;
                        n_apart += static_cast<unsigned>(__builtin_popcount(apart));
                        append(single, n_single, at, one & ~apart);
                        append(many, n_many, at, reach & ~one);

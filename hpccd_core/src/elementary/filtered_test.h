@@ -43,7 +43,7 @@ HPCCD_HD Outcome<R> piece_with_one_root(const Motion<R>& m, const Magnitudes<R>&
 // Of f with certainly one root in [0, 1], quickly: whether the features are certainly apart there. Newton's method, a
 // few steps of it, leaves the root somewhere within `delta`, and most pairs that do not touch miss each other by far
 // more.
-template <Kind kind, class Policy, class R>
+template <Kind kind, class R>
 HPCCD_HD typename RealTraits<R>::Mask certainly_apart_at_root(const Motion<R>& m, const Magnitudes<R>& size,
                                                               const Cubic<R>& f, R error) {
   const R sign = select(f.c0 < R(0), R(-1), R(1));
@@ -57,7 +57,7 @@ HPCCD_HD typename RealTraits<R>::Mask certainly_apart_at_root(const Motion<R>& m
   const R left = t - delta, right = t + delta;
   const auto sure =
       (left <= R(0) || sign * value(f, left) > error) && (right >= R(1) || sign * value(f, right) < R(0) - error);
-  return sure && inside<kind, Policy>(m, size, t, delta).no;
+  return sure && inside<kind, Proven>(m, size, t, delta).no;  // of every tier: `delta` is wide
 }
 
 // The common case: f certainly has one root in [0, 1].
