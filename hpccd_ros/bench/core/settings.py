@@ -33,12 +33,13 @@ class Asked:
         return truth.of_one(found, wanted, self.one == "earliest") if self.one else truth.of_scene(found, wanted)
 
 
-# A further option that asks for less is a line here, such as one kind of contact alone, with its kinds. Its values are
-# words, or tuples of words.
+# A further option that asks for less is a line here. Its values are words, or tuples of words.
 ASKED = (
     Asked("all"),
     Asked("first", {"report": "first"}, one="earliest"),
     Asked("any", {"report": "any"}, one="any"),
+    Asked("vertex_face", {"features": ("vertex_face",)}, kinds=("vf",)),
+    Asked("edge_edge", {"features": ("edge_edge",)}, kinds=("ee",)),
 )
 ALL = ASKED[0].name
 

@@ -19,7 +19,8 @@ QUANTITIES = {
     "error": ("worst error of times (step = 1)", 1e-19),
 }
 SETTING = ("accuracy", "backend", "asked")
-ASKED = {"all": "all contacts", "first": "less: the earliest contact alone", "any": "less: any one contact"}
+ASKED = {"all": "all contacts", "first": "less: the earliest contact alone", "any": "less: any one contact",
+         "vertex_face": "less: vertices against faces", "edge_edge": "less: edges against edges"}  # fmt: skip
 
 
 def points(rows: Sequence[dict]) -> list[dict]:

@@ -83,7 +83,7 @@ def test_outcomes_are_of_the_worst_scene_and_of_settings_that_all_were_tested_wi
 
 
 def test_wrong_answers_count_against_what_is_asked():
-    every, first, any_ = ASKED
+    every, first, any_, faces, _ = ASKED
     true = {"vf": np.array([[0, 1], [2, 3]]), "vf_toc": np.array([0.25, 0.5]), "ee": np.empty((0, 4), np.uint32),
             "ee_toc": np.empty(0)}  # fmt: skip
     empty = {"ee": np.empty((0, 4), np.uint32), "ee_toc": np.empty(0)}
@@ -95,6 +95,7 @@ def test_wrong_answers_count_against_what_is_asked():
     assert errors(first, none, true) == errors(any_, none, true) == (1, 1, 0, 0.0)
     one_kind = settings.Asked("ee", kinds=("ee",))
     assert errors(one_kind, none, true) == (0, 0, 0, 0.0)
+    assert errors(faces, late, true) == (2, 1, 0, 0.125)
 
 
 def found(**values):
