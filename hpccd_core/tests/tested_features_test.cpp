@@ -161,8 +161,8 @@ TEST(TestedFeatures, ComparesNoEdgesWhereNoneAreTested) {
   }
 }
 
-// Static meshes keep their boxes from call to call, and those of their edges may be older than the others.
-TEST(TestedFeatures, BoxesOfEdgesThatRestAreMadeWhenTheyAreAskedFor) {
+// Static meshes keep their bounds from call to call: of queries of another kind they have others.
+TEST(TestedFeatures, WhatRestsIsAskedForAllFeaturesToo) {
   auto scene = std::make_shared<Scene>();
   scene->add_mesh("floor", test::sheet_faces(side), side * side, {.is_static = true});
   scene->add_mesh("sheet", test::sheet_faces(side), side * side, {});
@@ -179,7 +179,7 @@ TEST(TestedFeatures, BoxesOfEdgesThatRestAreMadeWhenTheyAreAskedFor) {
   const double gap = both.distances(test::view(start)).at(0).distance;
   for (int round = 0; round < 2; ++round) {
     d.detect(test::view(start), test::view(end));
-    d.proximity(test::view(middle), 0.01);  // boxes of a snapshot, but for edges
+    d.proximity(test::view(middle), 0.01);
     EXPECT_EQ(d.intersections(test::view(middle)).ef, expected);
     d.detect(test::view(start), test::view(end));
     d.proximity(test::view(start), 0.01);

@@ -16,7 +16,7 @@ void MovingTree::bound(Positions vertices) {
 }
 
 void MovingTree::fit(Profiler& profiler) {
-  if (!tree_.nodes.empty()) {
+  if (built_) {
     refit(tree_, motion_, followed_ ? motion_.resting : std::vector<char>(), pool_);
     profiler.mark("refit");
     fits_ = true;
@@ -32,10 +32,10 @@ void MovingTree::fit_leaves(std::span<const std::uint32_t> leaves) {
 }
 
 void MovingTree::build_anew() {
-  fits_ = false;  // should this be cancelled
+  fits_ = built_ = false;  // should this be cancelled, or find no memory
   ++builds_;
   build(tree_, scene_, features_, motion_, pool_);
-  fits_ = true;
+  fits_ = built_ = true;
 }
 
 const std::vector<Box>& MovingTree::swept() {

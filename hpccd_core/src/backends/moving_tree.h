@@ -39,6 +39,7 @@ class MovingTree {
   ThreadPool& pool_;
   MotionBounds motion_;
   Tree tree_;
+  bool built_ = false;     // the tree is whole
   bool fits_ = false;      // the tree's boxes are those of the last motion
   bool followed_ = false;  // ... of the motion before, so that what rests can stay
   std::uint64_t builds_ = 0;

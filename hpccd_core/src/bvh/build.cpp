@@ -203,6 +203,8 @@ class Builder {
   // In the order of their leaves.
   void gather_blocks(std::size_t n_leaves) {
     resize(tree_.block_of_leaf, n_leaves, cancellation_);
+    // A node with more than sixteen leaves has two children of eight at least.
+    tree_.blocks.reserve(n_leaves / (Block::width / 2) + scene_.meshes().size());
     std::vector<std::uint32_t> stack;
     if (!tree_.nodes.empty()) stack.push_back(0);
     while (!stack.empty()) {

@@ -110,15 +110,18 @@ void fit_leaf(Tree& tree, std::uint32_t number, const MotionBounds& motion) {
 }
 
 // For bounds of this kind: with separations or without, of a motion or a snapshot. True where it held such before.
-bool make_room(Tree& tree, const MotionBounds& motion) {
+bool make_room(Tree& tree, const MotionBounds& motion, const Cancellation& cancellation) {
   const bool with_kdops = motion.has_kdops() && !motion.grown;
-  if (tree.rows && tree.grown == motion.grown && tree.by_kdops == with_kdops) return true;
-  tree.rows.reset();  // what it holds is of another kind, also should there be no memory for the new ones
-  tree.grown = motion.grown;
+  const bool same_rows = tree.rows && tree.grown == motion.grown;
+  if (same_rows && tree.by_kdops == with_kdops) return true;
+  tree.by_kdops = false;  // should there be no memory
+  if (!same_rows) {
+    tree.rows.reset();
+    tree.grown = motion.grown;
+    tree.rows = std::make_unique<CornerRow[]>(tree.n_groups * tree.rows_per_group());
+  }
+  if (with_kdops) resize(tree.kdops, tree.leaves.size(), cancellation);
   tree.by_kdops = with_kdops;
-  tree.kdops.resize(with_kdops ? tree.leaves.size() : 0);
-  // Kernels read two groups where one of two leaves has as many.
-  tree.rows = std::make_unique_for_overwrite<CornerRow[]>((tree.n_groups + 1) * tree.rows_per_group());
   return false;
 }
 
@@ -159,7 +162,7 @@ void refit_above(Tree& tree, std::uint32_t number) {
 }  // namespace
 
 void refit(Tree& tree, const MotionBounds& motion, const std::vector<char>& resting, ThreadPool& pool) {
-  const bool same_rows = make_room(tree, motion);
+  const bool same_rows = make_room(tree, motion, pool.cancellation());
   parallel_for(pool, tree.front.size(), 1, [&](std::size_t begin, std::size_t end, int) {
     for (std::size_t i = begin; i < end; ++i) {
       Tree::Subtree& subtree = tree.front[i];
@@ -177,7 +180,7 @@ void refit(Tree& tree, const MotionBounds& motion, const std::vector<char>& rest
 
 void refit_leaves(Tree& tree, const MotionBounds& motion, std::span<const std::uint32_t> leaves, ThreadPool& pool) {
   constexpr std::size_t grain = 64;
-  make_room(tree, motion);
+  make_room(tree, motion, pool.cancellation());
   parallel_for(pool, leaves.size(), grain, [&](std::size_t begin, std::size_t end, int) {
     for (std::size_t i = begin; i < end; ++i) fit_leaf(tree, leaves[i], motion);
   });

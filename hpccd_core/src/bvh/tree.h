@@ -163,8 +163,8 @@ struct Tree {
   static constexpr std::uint32_t coordinates = 6;
   bool by_kdops = false;    // whether there are any: not where features need not touch to count
   std::vector<Kdop> kdops;  // by leaf
-  std::uint32_t rows_per_group() const { return grown ? 2 * coordinates : coordinates; }
-  CornerRow* rows_of(const LeafRange& leaf) const {
+  HPCCD_HD std::uint32_t rows_per_group() const { return grown ? 2 * coordinates : coordinates; }
+  HPCCD_HD CornerRow* rows_of(const LeafRange& leaf) const {
     return rows.get() + std::size_t{leaf.first_group} * rows_per_group();
   }
   double area = 0;  // sum over nodes, relative to the root's: what traversal pays grows with it

@@ -22,7 +22,7 @@ HPCCD_HD CubicError<R> error_of(const Magnitudes<R>& size) {
   return {by * e.coefficient, by * e.value, by * e.subdivided};
 }
 
-// Filter 1, on every candidate pair: the sign test on the coplanarity cubic.
+// The sign test on the coplanarity cubic, alone: where it has a pass of its own (gpu/candidates.cuh).
 template <class Policy, class R>
 HPCCD_HD Outcome<R> coplanarity_filter(const Motion<R>& m) {
   const Magnitudes<R> size = magnitudes(m);
@@ -40,9 +40,9 @@ HPCCD_HD Outcome<R> piece_with_one_root(const Motion<R>& m, const Magnitudes<R>&
   return {sure && v.yes && root.delta <= R(Policy::toc_radius), sure && v.no, root.t, root.delta};
 }
 
-// Of f with certainly one root in [0, 1], quickly: whether the features are certainly apart there. Newton's method, a
-// few steps of it, leaves the root somewhere within `delta`, and most pairs that do not touch miss each other by far
-// more.
+// Of f with certainly one root in [0, 1], quickly: whether the features are certainly apart there. Two steps of
+// Newton's method lead near it, and most pairs that do not touch miss each other by far more than is left. `delta` is a
+// guess: that the root lies within it is proven by the signs of f on both sides.
 template <Kind kind, class R>
 HPCCD_HD typename RealTraits<R>::Mask certainly_apart_at_root(const Motion<R>& m, const Magnitudes<R>& size,
                                                               const Cubic<R>& f, R error) {

@@ -52,7 +52,8 @@ HPCCD_HD std::uint32_t near_pairs(const AreApart& apart, const Geometry& g, cons
     pair_vertices<kind>(g, first[i], second[i], v);
     const auto at = [&](int k) { return kdop_at(g.kdops, v[k]); };
     near[count] = i;  // kept only if counted
-    // What is kept is read next, and the processor does not see it come: a twentieth of a step's time.
+    // What is kept is read next, and the processor does not see it come: a twentieth of a step's time, though as much
+    // is fetched for what is not.
     for (int k = 0; k < 4; ++k) __builtin_prefetch(g.vertices + v[k]);
     if constexpr (kind == Kind::vertex_face)
       count += !apart(at(0), both(at(1), both(at(2), at(3))));

@@ -124,8 +124,8 @@ struct InSnapshot {
   }
 };
 
-// A leaf's features. Plain pointers: methods of std::vector compiled here could be linked into code for older
-// processors.
+// A leaf's features. Plain pointers: what is more than data() of a std::vector, compiled here, could be linked into
+// code for older processors.
 struct LeafFeatures {
   const CornerRow* rows;
   const CornersOf* corners_of;

@@ -29,9 +29,8 @@ struct LeafPair {
   std::uint32_t first, second;
 };
 
-// Pairs of leaves of two blocks, or of one, whose boxes and k-DOPs overlap; how many there are. Room for a full vector
-// store beyond the last pair.
-inline constexpr std::uint32_t block_pairs_capacity = (Block::width + 1) * Block::width;
+// Pairs of leaves of two blocks, or of one, whose boxes and k-DOPs overlap; how many there are.
+inline constexpr std::uint32_t block_pairs_capacity = Block::width * Block::width + 1;  // one more is written, not kept
 using BlockPairs = std::uint32_t (*)(const Tree& tree, const Block& a, const Block& b, LeafPair* pairs);
 
 BlockPairs block_pairs(Simd simd);

@@ -66,10 +66,9 @@ void walk(const Tree& tree, const PairRules& rules, Boxes boxes, const Cancellat
   const bool bounded = worker.search().bounded();
   constexpr typename Boxes::Ends ends;
   const auto at_leaves = [&](LeafPair leaves) {
-    ++worker.leaf_pairs;
+    const std::uint64_t before = worker.leaf_pairs++;
     if (!worker.sink)
-      worker.leaf_pairs_time.run(worker.leaf_pairs, worker.elementary_seconds,
-                                 [&] { test_leaves(tree, rules, leaves, worker); });
+      worker.leaf_pairs_time.run(before, worker.elementary_seconds, [&] { test_leaves(tree, rules, leaves, worker); });
     else
       for (const LeafPair left : worker.sink->push(leaves)) test_leaves(tree, rules, left, worker);
   };

@@ -6,10 +6,12 @@
 #include <algorithm>
 #include <memory>
 #include <set>
+#include <string>
 
 #include "base/simd.h"
 #include "bvh/motion_bounds.h"
 #include "grid_scene.h"
+#include "soup_scene.h"
 #include "traverse/leaf_pairs.h"
 #include "traverse/search.h"
 
@@ -23,16 +25,18 @@ struct Found {
   bool operator==(const Found&) const = default;
 };
 
-struct LeafPairsInPart : testing::Test {
-  static constexpr std::uint32_t side = 13;
-  std::shared_ptr<const Scene> scene = test::two_sheets(side, 0);
+// Of sheets, or of a soup, whose leaves have more corners than a row has lanes.
+struct LeafPairsInPart : testing::TestWithParam<bool> {
+  static constexpr std::uint32_t side = 13, triangles = 150;
+  std::shared_ptr<const Scene> scene = GetParam() ? test::soup_scene(triangles) : test::two_sheets(side, 0);
   Features features = features_of(*scene);
   ThreadPool pool{1};
   MotionBounds motion;
   Tree tree;
 
   LeafPairsInPart() {
-    const auto start = test::sheet_positions(side, 0, 0), end = test::sheet_positions(side, 1, 0);
+    const auto start = GetParam() ? test::soup_positions(triangles, 1) : test::sheet_positions(side, 0, 0),
+               end = GetParam() ? test::soup_positions(triangles, 2) : test::sheet_positions(side, 1, 0);
     motion.update(test::view(start), test::view(end), pool);
     build(tree, *scene, features, motion, pool);
   }
@@ -108,7 +112,7 @@ struct LeafPairsInPart : testing::Test {
   }
 };
 
-TEST_F(LeafPairsInPart, UpToATimeNoneIsMissed) {
+TEST_P(LeafPairsInPart, UpToATimeNoneIsMissed) {
   std::size_t last = 0;
   for (const float time : {1e-6f, 1e-3f, 0.1f, 0.5f, 0.999f}) {
     const std::size_t n = expect_all([](Simd simd) { return leaf_pairs_until(simd); }, time, double{time});
@@ -118,7 +122,7 @@ TEST_F(LeafPairsInPart, UpToATimeNoneIsMissed) {
   EXPECT_GT(last, 1000u);
 }
 
-TEST_F(LeafPairsInPart, AtTheStartBoxesGrowByTheWay) {
+TEST_P(LeafPairsInPart, AtTheStartBoxesGrowByTheWay) {
   double way = 0;
   for (const VertexMotion& v : motion.vertices)
     for (int k = 0; k < 3; ++k) way = std::max(way, std::fabs(v.t1[k] - v.t0[k]));
@@ -136,7 +140,7 @@ TEST_F(LeafPairsInPart, AtTheStartBoxesGrowByTheWay) {
   EXPECT_GE(search.part().until, 1);
 }
 
-TEST_F(LeafPairsInPart, WhatAChildOverlapsItsParentDoes) {
+TEST_P(LeafPairsInPart, WhatAChildOverlapsItsParentDoes) {
   std::size_t n = 0;
   for (const float time : {1e-6f, 1e-3f, 0.3f})
     for (const Node& a : tree.nodes) {
@@ -151,6 +155,9 @@ TEST_F(LeafPairsInPart, WhatAChildOverlapsItsParentDoes) {
     }
   EXPECT_GT(n, 1000u);
 }
+
+INSTANTIATE_TEST_SUITE_P(Scenes, LeafPairsInPart, testing::Bool(),
+                         [](const auto& info) { return std::string(info.param ? "Soup" : "Sheets"); });
 
 }  // namespace
 }  // namespace hpccd

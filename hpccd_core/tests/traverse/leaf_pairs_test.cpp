@@ -8,12 +8,12 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
-#include <random>
 #include <string>
 
 #include "base/simd.h"
 #include "bvh/motion_bounds.h"
 #include "grid_scene.h"
+#include "soup_scene.h"
 
 namespace hpccd {
 namespace {
@@ -32,36 +32,13 @@ struct Case {
   double separation;
 };
 
-std::shared_ptr<const Scene> soup_scene(std::uint32_t n) {
-  auto scene = std::make_shared<Scene>();
-  for (std::uint32_t mesh = 0; mesh < 2; ++mesh) {
-    std::vector<std::uint32_t> faces;
-    for (std::uint32_t i = 0; i < 3 * n; ++i) faces.push_back(i);
-    for (std::uint32_t i = 0; i + 1 < n; i += 7) faces[3 * (i + 1)] = faces[3 * i + 2];
-    scene->add_mesh("soup" + std::to_string(mesh), faces, 3 * n, {});
-  }
-  return scene;
-}
-
-std::vector<double> soup_positions(std::uint32_t n, unsigned seed) {
-  std::mt19937 random(5), drift(seed);
-  std::uniform_real_distribution<double> place(-3, 3), size(-0.5, 0.5), way(-0.2, 0.2);
-  std::vector<double> positions;
-  for (std::uint32_t triangle = 0; triangle < 2 * n; ++triangle) {
-    const double x = place(random), y = place(random), z = 0.2 * place(random);
-    for (int corner = 0; corner < 3; ++corner)
-      for (const double center : {x, y, z}) positions.push_back(center + size(random) + way(drift));
-  }
-  return positions;
-}
-
 std::string name_of_case(const testing::TestParamInfo<Case>& info) {
   return std::string(info.param.soup ? "Soup" : "Sheets") + (info.param.separation > 0 ? "Apart" : "");
 }
 
 struct LeafPairsTest : testing::TestWithParam<Case> {
   static constexpr std::uint32_t side = 13, lone = 3, triangles = 300;
-  std::shared_ptr<const Scene> scene = GetParam().soup ? soup_scene(triangles) : test::two_sheets(side, lone);
+  std::shared_ptr<const Scene> scene = GetParam().soup ? test::soup_scene(triangles) : test::two_sheets(side, lone);
   Features features = features_of(*scene);
   ThreadPool pool{1};
   MotionBounds motion;
@@ -71,8 +48,8 @@ struct LeafPairsTest : testing::TestWithParam<Case> {
 
   LeafPairsTest() {
     const bool soup = GetParam().soup;
-    first = soup ? soup_positions(triangles, 1) : test::sheet_positions(side, 0, lone);
-    last = soup ? soup_positions(triangles, 2) : test::sheet_positions(side, 1, lone);
+    first = soup ? test::soup_positions(triangles, 1) : test::sheet_positions(side, 0, lone);
+    last = soup ? test::soup_positions(triangles, 2) : test::sheet_positions(side, 1, lone);
     const std::vector<double> separations(2, GetParam().separation);
     motion.update(*scene, test::view(first), test::view(last), separations, pool);
     build(tree, *scene, features, motion, pool);
@@ -141,20 +118,6 @@ TEST_P(LeafPairsTest, AreThoseThatOverlapAndShareNoVertex) {
     }
   EXPECT_GT(edge_edge, 1000u);
   EXPECT_GT(vertex_face, 500u);
-}
-
-TEST_P(LeafPairsTest, OfOneKindAlone) {
-  const LeafRange &a = tree.leaves[0], &b = tree.leaves[tree.leaves.size() / 2];
-  for (const LeafRange* other : {&a, &b})
-    for (const Simd simd : simd_levels()) {
-      const auto edge_edge = std::make_unique<CandidateBuffer>(), vertex_face = std::make_unique<CandidateBuffer>();
-      const Found both = by(leaf_pairs(simd), a, *other);
-      leaf_pairs(simd)(tree, a, *other, {.vertex_face = true, .edge_edge = false}, *edge_edge, *vertex_face);
-      EXPECT_EQ(sorted({pairs_of(*edge_edge), pairs_of(*vertex_face)}), (Found{{}, both.vertex_face}));
-      edge_edge->n = vertex_face->n = 0;
-      leaf_pairs(simd)(tree, a, *other, {.vertex_face = false, .edge_edge = true}, *edge_edge, *vertex_face);
-      EXPECT_EQ(sorted({pairs_of(*edge_edge), pairs_of(*vertex_face)}), (Found{both.edge_edge, {}}));
-    }
 }
 
 struct BlockPairsTest : LeafPairsTest {

@@ -159,7 +159,7 @@ HPCCD_HD Bytes16 load_bytes(const std::uint8_t* x) { return {_mm_load_si128(rein
 HPCCD_HD Bytes16 operator&(Bytes16 a, Bytes16 b) { return {_mm_and_si128(a.v, b.v)}; }
 HPCCD_HD Bytes16 operator|(Bytes16 a, Bytes16 b) { return {_mm_or_si128(a.v, b.v)}; }
 HPCCD_HD Bytes16 to_bytes(const SideBits (&of)[2]) {
-  // Quarters of eight numbers each: 0 2 1 3.
+  // Quarters of four numbers each: 0 2 1 3.
   const __m256i words = _mm256_permute4x64_epi64(_mm256_packs_epi32(of[0].v, of[1].v), 0xD8);
   return {_mm_packus_epi16(_mm256_castsi256_si128(words), _mm256_extracti128_si256(words, 1))};
 }

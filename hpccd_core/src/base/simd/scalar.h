@@ -4,6 +4,8 @@
 // of it is inlined: a function compiled for one set must not be linked into code for another.
 #pragma once
 
+#include <bit>
+
 #include "base/simd/four.h"
 #include "base/simd/lanes.h"
 #include "base/simd/one_by_one.h"
@@ -196,6 +198,7 @@ HPCCD_HD Rows16<n> load_rows(const float (&rows)[n][16]) {
 // Sixteen bytes. In two whole numbers: bytes are picked one by one, and a register that is read as a whole after its
 // parts were written waits for them.
 struct Bytes16 {
+  static_assert(std::endian::native == std::endian::little);  // byte j of a number is byte j in memory
   std::uint64_t half[2];
 };
 HPCCD_HD Bytes16 load_bytes(const std::uint8_t* x) {
