@@ -8,19 +8,13 @@ namespace {
 
 #include "traverse/leaf_features.inl"
 
-// Edges of a against faces of b: one by one the faces, of which a leaf has fewer.
+// These edges of a against these faces of b: one by one the faces, of which a leaf has fewer.
 template <class A, class B>
-HPCCD_HD void edges_against_faces(const LeafFeatures& a, const LeafFeatures& b, const Node& node_a, const Node& node_b,
-                                  CandidateBuffer& out) {
-  constexpr InSnapshot when{0};
-  const typename A::Lanes lanes_a(when, a);
-  const typename B::Lanes lanes_b(when, b);
-  const unsigned faces = typename B::Outcodes(when, b, lanes_b, bounds_of(node_a)).faces(b);
-  if (!faces) return;
-  const unsigned edges = typename A::Outcodes(when, a, lanes_a, bounds_of(node_b)).edges(a);
-  if (!edges) return;
-  for_each(faces, [&](std::uint32_t k) {
-    unsigned m = typename A::Outcodes(when, a, lanes_a, B::face_box(b, k)).edges(a) & edges;
+HPCCD_HD void edges_against_faces(const LeafFeatures& a, const LeafFeatures& b, const typename A::Lanes& lanes_a,
+                                  unsigned edges_a, unsigned faces_b, CandidateBuffer& out) {
+  if (!edges_a) return;
+  for_each(faces_b, [&](std::uint32_t k) {
+    unsigned m = typename A::Outcodes({}, a, lanes_a, B::face_box(b, k)).edges(a) & edges_a;
     if (!m) return;
     const auto& corner = b.corners_of->face;
     const typename A::Shared shared(a, b.corners[corner[0][k]], b.corners[corner[1][k]], b.corners[corner[2][k]]);
@@ -37,11 +31,17 @@ void leaf_edge_faces(const Tree& tree, const LeafRange& a, const LeafRange& b, C
   const LeafRange* leaves = tree.leaves.data();
   const Node &node_a = tree.nodes.data()[leaf_nodes[&a - leaves]], &node_b = tree.nodes.data()[leaf_nodes[&b - leaves]];
   const LeafFeatures leaf_a(tree, a), leaf_b(tree, b);
-  with_kernels<InSnapshot>(tree, leaf_a, leaf_b, [&](auto of_a, auto of_b) {
+  with_kernels<TouchingInSnapshot>(tree, leaf_a, leaf_b, [&](auto of_a, auto of_b) {
     using A = decltype(of_a);
     using B = decltype(of_b);
-    edges_against_faces<A, B>(leaf_a, leaf_b, node_a, node_b, edge_face);
-    if (&a != &b) edges_against_faces<B, A>(leaf_b, leaf_a, node_b, node_a, edge_face);
+    const typename A::Lanes lanes_a({}, leaf_a);
+    const typename A::Outcodes near_a({}, leaf_a, lanes_a, bounds_of(node_b));
+    const unsigned edges_a = near_a.edges(leaf_a), faces_a = near_a.faces(leaf_a);
+    if (&a == &b) return edges_against_faces<A, A>(leaf_a, leaf_a, lanes_a, edges_a, faces_a, edge_face);
+    const typename B::Lanes lanes_b({}, leaf_b);
+    const typename B::Outcodes near_b({}, leaf_b, lanes_b, bounds_of(node_a));
+    edges_against_faces<A, B>(leaf_a, leaf_b, lanes_a, edges_a, near_b.faces(leaf_b), edge_face);
+    edges_against_faces<B, A>(leaf_b, leaf_a, lanes_b, near_b.edges(leaf_b), faces_a, edge_face);
   });
 }
 

@@ -124,6 +124,11 @@ struct InSnapshot {
   }
 };
 
+// The same where they must touch.
+struct TouchingInSnapshot : InSnapshot {
+  static constexpr bool grows = false;
+};
+
 // A leaf's features. Plain pointers: what is more than data() of a std::vector, compiled here, could be linked into
 // code for older processors.
 struct LeafFeatures {
