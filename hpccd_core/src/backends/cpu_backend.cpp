@@ -8,6 +8,13 @@
 #include "traverse/traverse.h"
 
 namespace hpccd {
+namespace {
+
+// Of a typical edge, in the coordinates of the boxes. Where edges are shorter, floats are too coarse for a scene: it is
+// so large, or so fine, that too much would be left to the tests in double precision.
+constexpr double least_rounded_edge = 5e-4;
+
+}  // namespace
 
 CpuBackend::CpuBackend(Resources& shared)
     : shared_(shared),
@@ -49,11 +56,15 @@ void CpuBackend::see_motion(Positions t0, Positions t1, Tests tests) {
   search_.leaf_pairs = leaf_pairs(o.simd);
   search_.leaf_pairs_until = leaf_pairs_until(o.simd);
   search_.leaf_pairs_at_start = leaf_pairs_at_start(o.simd);
+  const MotionBounds& motion = shared_.tree.motion();
+  constexpr std::size_t few = 64;  // each is a page of memory that nothing else needs now
+  const bool rounds = motion.map.scale * typical_length(shared_.features, motion.vertices, few) > least_rounded_edge;
+  search_.geometry.rounded = rounds ? motion.rounded.data() : nullptr;
   const bool here = tests == Tests::all_here;
   search_.report = !here && o.report == Report::any ? Report::all : o.report;
   for (unsigned i = 0; i < n_rules; ++i) {
     const Rule rule = Rule::of_number(i);
-    const bool as_balanced = rule.accuracy == Accuracy::fast && !here;
+    const bool as_balanced = rule.accuracy == Accuracy::fast && !(here && rounds);
     search_.batch_test[i] = rule.separated ? separation_batch(o.simd)
                                            : batch_test(o.simd, as_balanced ? Accuracy::balanced : rule.accuracy);
     search_.fallback[i] = rule.separated ? decide_separation : decide_contact;
@@ -65,7 +76,7 @@ void CpuBackend::begin_query() {
   shared_.profiler.mark("bounds");
   const MotionBounds& motion = shared_.tree.motion();
   search_.geometry = {motion.vertices.data(), shared_.features.edges.data(), shared_.features.faces.data(),
-                      motion.kdops.data(), motion.map.scale};
+                      motion.kdops.data()};
   search_.earliest = std::numeric_limits<double>::infinity();
   search_.leaf_pairs = nullptr, search_.leaf_pairs_in_snapshot = nullptr, search_.leaf_edge_faces = nullptr;
   search_.nearest = nullptr;

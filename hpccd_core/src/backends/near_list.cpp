@@ -119,9 +119,8 @@ void Grouping::add(const Candidate& pair) {
   group->second.push_back(pair.second);
 }
 
-double typical_length(const Features& features, const std::vector<VertexMotion>& vertices) {
-  constexpr std::size_t some = 1024;
-  const std::size_t n = features.edges.size(), stride = std::max<std::size_t>(1, n / some);
+double typical_length(const Features& features, const std::vector<VertexMotion>& vertices, std::size_t looked_at) {
+  const std::size_t n = features.edges.size(), stride = std::max<std::size_t>(1, n / looked_at);
   double sum = 0;
   std::size_t count = 0;
   for (std::size_t i = 0; i < n; i += stride, ++count)

@@ -130,6 +130,7 @@ class Grouping {
 };
 
 // The mean of some edges' largest extents: what counts as near in a scene.
-double typical_length(const Features& features, const std::vector<VertexMotion>& vertices);
+double typical_length(const Features& features, const std::vector<VertexMotion>& vertices,
+                      std::size_t looked_at = 1024);
 
 }  // namespace hpccd

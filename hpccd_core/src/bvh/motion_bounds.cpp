@@ -51,18 +51,21 @@ template <class Real>
   throw InvalidArgument(std::string(name) + " changed while it was being read");
 }
 
-template <class Real>
+template <bool grown, class Real>
 void copy_motion(const Real* t0, const Real* t1, const CoordinateMap& map, double margin, std::size_t begin,
-                 std::size_t end, VertexMotion* vertices, MotionBox* boxes, VertexKdop* kdops) {
+                 std::size_t end, VertexMotion* vertices, RoundedMotion* rounded, MotionBox* boxes, VertexKdop* kdops) {
   for (std::size_t i = begin; i < end; ++i) {
     for (int k = 0; k < 3; ++k) {
       const double a = t0[3 * i + k], b = t1[3 * i + k];
+      const float at_t0 = map(a, k), at_t1 = map(b, k);
       vertices[i].t0[k] = a;
       vertices[i].t1[k] = b;
-      boxes[i].t0.low[k] = map(a - margin, k);
-      boxes[i].t0.high[k] = map(a + margin, k);
-      boxes[i].t1.low[k] = map(b - margin, k);
-      boxes[i].t1.high[k] = map(b + margin, k);
+      rounded[i].t0[k] = at_t0;
+      rounded[i].t1[k] = at_t1;
+      boxes[i].t0.low[k] = grown ? map(a - margin, k) : at_t0;
+      boxes[i].t0.high[k] = grown ? map(a + margin, k) : at_t0;
+      boxes[i].t1.low[k] = grown ? map(b - margin, k) : at_t1;
+      boxes[i].t1.high[k] = grown ? map(b + margin, k) : at_t1;
     }
     kdops[i] = vertex_kdop({vertices[i].t0[0], vertices[i].t0[1], vertices[i].t0[2]},
                            {vertices[i].t1[0], vertices[i].t1[1], vertices[i].t1[2]}, map);
@@ -166,13 +169,20 @@ void MotionBounds::update(const Real* t0, const Real* t1, std::size_t n, std::sp
   resize(vertices, n, pool.cancellation());
   resize(boxes, n, pool.cancellation());
   resize(kdops, n, pool.cancellation());
+  if (!snapshot_) resize(rounded, n, pool.cancellation());
   parallel_for(pool, pieces.size(), 1, [&](std::size_t from, std::size_t to, int) {
-    for (std::size_t i = from; i < to; ++i)
+    for (std::size_t i = from; i < to; ++i) {
+      const auto [begin, end, part] = pieces[i];
+      const auto copy = [&](auto&& copied) {
+        copied(t0, t1, map, margins_[part], begin, end, vertices.data(), rounded.data(), boxes.data(), kdops.data());
+      };
       if (snapshot_)
-        copy_snapshot(t0, map, pieces[i].begin, pieces[i].end, vertices.data(), boxes.data());
+        copy_snapshot(t0, map, begin, end, vertices.data(), boxes.data());
+      else if (margins_[part] > 0)
+        copy(copy_motion<true, Real>);
       else
-        copy_motion(t0, t1, map, margins_[pieces[i].part], pieces[i].begin, pieces[i].end, vertices.data(),
-                    boxes.data(), kdops.data());
+        copy(copy_motion<false, Real>);
+    }
   });
 }
 
@@ -223,7 +233,8 @@ void MotionBounds::sweep(ThreadPool& pool) {
 
 std::size_t MotionBounds::bytes() const {
   return vertices.capacity() * sizeof(VertexMotion) + boxes.capacity() * sizeof(MotionBox) +
-         swept.capacity() * sizeof(Box) + kdops.capacity() * sizeof(VertexKdop) + statics_.bytes();
+         swept.capacity() * sizeof(Box) + kdops.capacity() * sizeof(VertexKdop) +
+         rounded.capacity() * sizeof(RoundedMotion) + statics_.bytes();
 }
 
 }  // namespace hpccd

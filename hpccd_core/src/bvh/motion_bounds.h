@@ -32,6 +32,7 @@ struct MotionBounds {
   std::vector<MotionBox> boxes;
   bool grown = false;  // some of them hold more than their vertex: half a separation around it
   std::vector<VertexKdop> kdops;
+  std::vector<RoundedMotion> rounded;  // where there are k-DOPs
   bool has_kdops() const { return !snapshot_; }
   CoordinateMap map;
   // What sums of two coordinates may lose, in those of the scene: 2.2e-16 of the largest for each of two

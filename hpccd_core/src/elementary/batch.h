@@ -16,11 +16,11 @@ struct Geometry {
   const VertexMotion* vertices;
   const std::array<std::uint32_t, 2>* edges;
   const std::array<std::uint32_t, 3>* faces;
-  const VertexKdop* kdops = nullptr;  // of each vertex; none where features need not touch to count
-  double scale = 1;                   // power of two that brings the scene to about one; only single precision needs it
-  Separations separations = {};       // for tests of distances
-  KdopMargin margin = {};             // of the largest of them
-  float until = 2;                    // below 1: pairs that cannot touch up to this time may be left out
+  const VertexKdop* kdops = nullptr;       // of each vertex; none where features need not touch to count
+  const RoundedMotion* rounded = nullptr;  // for single precision; none where floats are too coarse for the scene
+  Separations separations = {};            // for tests of distances
+  KdopMargin margin = {};                  // of the largest of them
+  float until = 2;                         // below 1: pairs that cannot touch up to this time may be left out
 };
 
 template <Kind kind>

@@ -2,6 +2,7 @@
 // Included once per instruction set, after its header (base/simd/scalar.h). Uses nothing from the standard library at
 // run time: an inline function compiled here could be linked into code for older processors.
 
+#include "base/simd/twice.h"
 #include "base/ticks.h"
 #include "elementary/batch.h"
 #include "elementary/filtered_test.h"
@@ -11,70 +12,141 @@ namespace hpccd::HPCCD_ISA {
 #include "elementary/kdop_filter.inl"
 #include "elementary/pair_lanes.inl"
 
+// Pairs that may touch, by how much is to be done for them.
+struct Sorted {
+  Chosen single, many;
+};
+
+// All that is cheap, for the chosen pairs: what is certainly apart goes, the rest is sorted by the roots it may have.
+template <Kind kind, class Policy, class R, class Numbers>
+HPCCD_HD void sort_out(const Geometry& g, const PairList& list, Numbers& chosen, Sorted& out, BatchCounts& counts) {
+  std::uint32_t n_survivors = 0, n_apart = 0;
+  for_lanes<kind, R>(g, list, chosen, [&](const Motion<R>& m, const LaneNumbers<Numbers>& of) {
+    const Magnitudes<R> size = magnitudes(m);
+    const CubicError<R> error = error_of<Policy>(size);
+    const Cubic<R> f = coplanarity(m);
+    const unsigned usable = bits(in_range(size));
+    const unsigned open = of.valid & ~(bits(certainly_no_root(f, error.coefficient)) & usable);
+    if (!open) return;
+    n_survivors += static_cast<unsigned>(__builtin_popcount(open));
+    const unsigned one = bits(certainly_one_root(f, error.coefficient)) & usable & open;
+    unsigned apart = 0;
+    if (one) apart = bits(certainly_apart_at_root<kind>(m, size, f, error.value)) & one;
+    n_apart += static_cast<unsigned>(__builtin_popcount(apart));
+    append(out.single, of, one & ~apart);
+    append(out.many, of, open & ~one);
+  });
+  counts.coplanarity += chosen.n - n_survivors;
+  counts.roots += n_apart;
+}
+
+// Of pairs with none or several roots: those that do not stay outside in a projection. (Of those with one most are
+// certainly apart there, which costs less.)
+template <Kind kind, class R>
+HPCCD_HD void leave_out_outside(const Geometry& g, const PairList& list, Chosen& many, BatchCounts& counts) {
+  Chosen left;
+  for_lanes<kind, R>(g, list, many, [&](const Motion<R>& m, const LaneNumbers<Chosen>& of) {
+    const Magnitudes<R> size = magnitudes(m);
+    append(left, of, of.valid & ~bits(certainly_outside<kind>(m, size) && in_range(size)));
+  });
+  counts.projection += many.n - left.n;
+  many.n = left.n;
+  __builtin_memcpy(many.of, left.of, left.n * sizeof *left.of);
+}
+
+// Contacts and undecided pairs of those that were sorted. R: what roots are sought in.
 template <Kind kind, class Policy, class R>
-void test(const Geometry& g, const std::uint32_t* first, const std::uint32_t* second, std::uint32_t n,
-          BatchResult& result) {
-  using Lanes = const Motion<R>&;
-  result.n_contacts = result.n_undecided = 0;
-  std::uint32_t near[batch_capacity], single[batch_capacity], many[batch_capacity];
-  std::uint32_t n_survivors = 0, n_single = 0, n_many = 0;
+HPCCD_HD void seek_roots(const Geometry& g, const PairList& list, Sorted& sorted, Chosen& undecided,
+                         BatchResult& result) {
+  const auto take = [&](const Outcome<R>& o, const LaneNumbers<Chosen>& of) {
+    collect(o, list, of, undecided, result);
+  };
+  for_lanes<kind, R>(g, list, sorted.single, [&](const Motion<R>& m, const LaneNumbers<Chosen>& of) {
+    take(single_root_test<kind, Policy>(m), of);
+  });
+  for_lanes<kind, R>(g, list, sorted.many, [&](const Motion<R>& m, const LaneNumbers<Chosen>& of) {
+    take(many_roots_test<kind, Policy>(m), of);
+  });
+}
 
+template <Kind kind>
+void list_pairs(const Geometry& g, const std::uint32_t* first, const std::uint32_t* second, std::uint32_t n,
+                PairList& list, BatchCounts& counts) {
   const std::uint64_t began = ticks();
-  const std::uint32_t n_near = !g.kdops      ? n
-                               : g.until < 1 ? near_pairs<kind>(until(g), g, first, second, n, near)
-                                             : near_pairs<kind>(Apart(), g, first, second, n, near);
-  if (const std::uint64_t now = ticks(); now > began) result.counts.kdop_ticks += now - began;  // else on another core
-  std::uint32_t n_apart = 0;
-  for_lanes<kind, R>(g, first, second, g.kdops ? near : nullptr, n_near,
-                     [&](Lanes m, const std::uint32_t* at, unsigned valid) {
-                       const Magnitudes<R> size = magnitudes(m);
-                       const CubicError<R> error = error_of<Policy>(size);
-                       const Cubic<R> f = coplanarity(m);
-                       const unsigned usable = bits(in_range(size));
-                       const unsigned open = valid & ~(bits(certainly_no_root(f, error.coefficient)) & usable);
-                       if (!open) return;
-                       n_survivors += static_cast<unsigned>(__builtin_popcount(open));
-                       const unsigned reach = open & ~(bits(certainly_outside<kind>(m, size)) & usable);
-                       if (!reach) return;
-                       const unsigned one = bits(certainly_one_root(f, error.coefficient)) & usable & reach;
-                       unsigned apart = 0;
-                       if (one) apart = bits(certainly_apart_at_root<kind>(m, size, f, error.value)) & one;
-                       n_apart += static_cast<unsigned>(__builtin_popcount(apart));
-                       append(single, n_single, at, one & ~apart);
-                       append(many, n_many, at, reach & ~one);
-                     });
-  for_lanes<kind, R>(g, first, second, single, n_single, [&](Lanes m, const std::uint32_t* at, unsigned valid) {
-    collect(single_root_test<kind, Policy>(m), at, valid, result);
-  });
-  for_lanes<kind, R>(g, first, second, many, n_many, [&](Lanes m, const std::uint32_t* at, unsigned valid) {
-    collect(many_roots_test<kind, Policy>(m), at, valid, result);
-  });
+  if (!g.kdops)
+    list_all<kind>(g, first, second, n, list);
+  else if (g.until < 1)
+    list_near<kind>(until(g), g, first, second, n, list);
+  else
+    list_near<kind>(Apart(), g, first, second, n, list);
+  if (const std::uint64_t now = ticks(); now > began) counts.kdop_ticks += now - began;  // else on another core
+  counts.tested += n;
+  counts.kdop += n - list.n;
+}
 
-  result.counts.tested += n;
-  result.counts.kdop += n - n_near;
-  result.counts.coplanarity += n_near - n_survivors;
-  result.counts.projection += n_survivors - n_single - n_many - n_apart;
-  result.counts.roots += n_apart;
-  result.counts.contacts += result.n_contacts;
-  result.counts.undecided += result.n_undecided;
+// Roots in double precision wait for each other's steps, division by division: two registers of pairs side by side take
+// three quarters of the time of one after the other.
+template <Kind kind, class Numbers>
+void test_in_doubles(const Geometry& g, const PairList& list, Numbers& chosen, Chosen& undecided, BatchResult& result) {
+  Sorted sorted;
+  sort_out<kind, Proven, Double>(g, list, chosen, sorted, result.counts);
+  leave_out_outside<kind, Double>(g, list, sorted.many, result.counts);
+  seek_roots<kind, Proven, Twice<Double>>(g, list, sorted, undecided, result);
+}
+
+// Where there are rounded coordinates they say of most pairs that they are apart, at half the price.
+template <Kind kind>
+void test_proven(const Geometry& g, const std::uint32_t* first, const std::uint32_t* second, std::uint32_t n,
+                 BatchResult& result) {
+  result.n_contacts = 0;
+  PairList list;
+  list_pairs<kind>(g, first, second, n, list, result.counts);
+  Chosen undecided;
+  All all{list.n};
+  if (g.rounded) {
+    Sorted sieved;
+    sort_out<kind, Sieve, Single>(g, list, all, sieved, result.counts);
+    leave_out_outside<kind, Single>(g, list, sieved.many, result.counts);
+    Sorted sorted;
+    sort_out<kind, Proven, Double>(g, list, sieved.many, sorted, result.counts);
+    append(sorted.single, sieved.single);
+    seek_roots<kind, Proven, Twice<Double>>(g, list, sorted, undecided, result);
+    leave_out_outside<kind, Double>(g, list, undecided, result.counts);  // so few that only they are worth it
+  } else {
+    test_in_doubles<kind>(g, list, all, undecided, result);
+  }
+  report_undecided(list, undecided, result);
+}
+
+// What single precision cannot tell, such as motions that are coplanar throughout, is asked in double precision.
+template <Kind kind>
+void test_likely(const Geometry& g, const std::uint32_t* first, const std::uint32_t* second, std::uint32_t n,
+                 BatchResult& result) {
+  result.n_contacts = 0;
+  PairList list;
+  list_pairs<kind>(g, first, second, n, list, result.counts);
+  Chosen open, undecided;
+  All all{list.n};
+  Sorted sorted;
+  sort_out<kind, Likely, Single>(g, list, all, sorted, result.counts);
+  leave_out_outside<kind, Single>(g, list, sorted.many, result.counts);
+  seek_roots<kind, Likely, Single>(g, list, sorted, open, result);
+  test_in_doubles<kind>(g, list, open, undecided, result);
+  report_undecided(list, undecided, result);
 }
 
 namespace {
 
 void run(const Geometry& g, Kind kind, const std::uint32_t* first, const std::uint32_t* second, std::uint32_t n,
          BatchResult& result) {
-  if (kind == Kind::vertex_face)
-    test<Kind::vertex_face, Proven, Double>(g, first, second, n, result);
-  else
-    test<Kind::edge_edge, Proven, Double>(g, first, second, n, result);
+  kind == Kind::vertex_face ? test_proven<Kind::vertex_face>(g, first, second, n, result)
+                            : test_proven<Kind::edge_edge>(g, first, second, n, result);
 }
 
 void run_fast(const Geometry& g, Kind kind, const std::uint32_t* first, const std::uint32_t* second, std::uint32_t n,
               BatchResult& result) {
-  if (kind == Kind::vertex_face)
-    test<Kind::vertex_face, Likely, Single>(g, first, second, n, result);
-  else
-    test<Kind::edge_edge, Likely, Single>(g, first, second, n, result);
+  kind == Kind::vertex_face ? test_likely<Kind::vertex_face>(g, first, second, n, result)
+                            : test_likely<Kind::edge_edge>(g, first, second, n, result);
 }
 
 }  // namespace

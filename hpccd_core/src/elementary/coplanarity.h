@@ -45,7 +45,14 @@ HPCCD_HD CubicError<R> coplanarity_error(const Magnitudes<R>& m) {
   // most 9 roundings on terms whose magnitudes sum up to 6 M: 54 u M. Together 110 u M.
   // Two subdivisions: 64 u M, 12 u M for thirds of k1 and k2, two times three interpolations with 4 roundings of 6 M:
   // 220 u M; the second split point is rounded by 3 u, where |f'| <= 36 M: 328 u M in all.
-  return {R(64 * half_ulp<R>()) * scale, R(112 * half_ulp<R>()) * scale, R(400 * half_ulp<R>()) * scale};
+  CubicError<R> e{R(64 * half_ulp<R>()) * scale, R(112 * half_ulp<R>()) * scale, R(400 * half_ulp<R>()) * scale};
+  if constexpr (coordinate_error<R>() > 0) {
+    // Of a determinant's six products, each with one factor that is off, at most; a Bernstein coefficient is a mean of
+    // such, and a value of f a mean of these.
+    const R off = R(6 * coordinate_error<R>()) * (m.p * m.a + m.p * m.b + m.a * m.b);
+    e = {e.coefficient + off, e.value + off, e.subdivided + off};
+  }
+  return e;
 }
 
 template <class R>

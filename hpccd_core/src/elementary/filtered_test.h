@@ -34,7 +34,7 @@ HPCCD_HD Outcome<R> coplanarity_filter(const Motion<R>& m) {
 template <Kind kind, class Policy, class R>
 HPCCD_HD Outcome<R> piece_with_one_root(const Motion<R>& m, const Magnitudes<R>& size, const Cubic<R>& f, R error,
                                         R low, R high, R sign, typename RealTraits<R>::Mask active) {
-  const Root<R> root = bracketed_root(f, error, low, high, sign, active);
+  const Root<R> root = bracketed_root(f, error, low, high, sign, active, Policy::time_step);
   const Verdict<R> v = inside<kind, Policy>(m, size, root.t, root.delta);
   const auto sure = active && (root.certain || R(0) < R(Policy::trust_roots ? 1 : 0));
   return {sure && v.yes && root.delta <= R(Policy::toc_radius), sure && v.no, root.t, root.delta};
@@ -53,7 +53,8 @@ HPCCD_HD typename RealTraits<R>::Mask certainly_apart_at_root(const Motion<R>& m
     step = magnitude(next - t);
     t = next;
   }
-  const R delta = greater(R(0.25) * step, R(1e-5));
+  R delta = greater(R(0.25) * step, R(1e-5));
+  if constexpr (coordinate_error<R>() > 0) delta = greater(delta, R(2.1) * error / magnitude(slope(f, t)));
   const R left = t - delta, right = t + delta;
   const auto sure =
       (left <= R(0) || sign * value(f, left) > error) && (right >= R(1) || sign * value(f, right) < R(0) - error);

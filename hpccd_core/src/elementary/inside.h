@@ -47,7 +47,8 @@ struct LargestCoordinate {
 // within delta of t.
 //
 // Bounds: interpolated coordinates carry 4 roundings, a component of a cross product two products of 10: 20 u MM; it
-// moves by at most 8 MM per unit of time. What is left of 24 u and 9 delta covers the roundings of sums.
+// moves by at most 8 MM per unit of time. What is left of 24 u and 9 delta covers the roundings of sums. Of each of the
+// two products one factor may be off from the start (coordinate_error).
 template <Kind kind, class Policy, class R>
 HPCCD_HD Verdict<R> inside(const Motion<R>& m, const Magnitudes<R>& size, R t, R delta) {
   const Vec3<R> p = interpolate(m.p0, m.p1, t), a = interpolate(m.a0, m.a1, t), b = interpolate(m.b0, m.b1, t);
@@ -59,7 +60,12 @@ HPCCD_HD Verdict<R> inside(const Motion<R>& m, const Magnitudes<R>& size, R t, R
   const R n = sign * signed_n, alpha = sign * component(pb), beta = sign * component(ap);
   const R relative =
       Policy::borders_inside ? R(-24 * Policy::bound * half_ulp<R>()) : R(24 * half_ulp<R>()) + R(9) * delta;
-  const R e_n = relative * size.a * size.b, e_alpha = relative * size.p * size.b, e_beta = relative * size.a * size.p;
+  R e_n = relative * size.a * size.b, e_alpha = relative * size.p * size.b, e_beta = relative * size.a * size.p;
+  if constexpr (coordinate_error<R>() > 0) {
+    const R off(2 * coordinate_error<R>() * (Policy::borders_inside ? -Policy::bound : 1));
+    e_n = e_n + off * (size.a + size.b), e_alpha = e_alpha + off * (size.p + size.b);
+    e_beta = e_beta + off * (size.a + size.p);
+  }
   Verdict<R> v{n > magnitude(e_n), R(1) < R(0)};
   if constexpr (kind == Kind::vertex_face) {
     require_between(v, alpha, n, e_n + e_alpha);
@@ -120,7 +126,12 @@ HPCCD_HD typename RealTraits<R>::Mask certainly_outside(const Motion<R>& m, cons
   const Quadratic<R> beta = planar_cross(ax0, ay0, ax1, ay1, px0, py0, px1, py1);
   // 10 u for each Bernstein coefficient, doubled for the roundings of sums.
   const R u(32 * half_ulp<R>());
-  const R e_n = u * size.a * size.b, e_alpha = u * size.p * size.b, e_beta = u * size.a * size.p;
+  R e_n = u * size.a * size.b, e_alpha = u * size.p * size.b, e_beta = u * size.a * size.p;
+  if constexpr (coordinate_error<R>() > 0) {
+    const R off(2 * coordinate_error<R>());
+    e_n = e_n + off * (size.a + size.b), e_alpha = e_alpha + off * (size.p + size.b);
+    e_beta = e_beta + off * (size.a + size.p);
+  }
   const Quadratic<R> zero{R(0), R(0), R(0)};
   if constexpr (kind == Kind::vertex_face)
     return beyond(alpha, n, e_n + e_alpha) || beyond(beta, n, e_n + e_beta) ||

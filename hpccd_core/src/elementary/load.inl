@@ -5,13 +5,13 @@
 // Both ends: a row of eight.
 HPCCD_HD const double* row_of(const VertexMotion& v) { return reinterpret_cast<const double*>(&v); }
 
+// vertices[lane]: of a pair, in the order of the public queries.
 template <Kind kind>
-HPCCD_HD Motion<Double> load(const Geometry& g, const std::uint32_t* first, const std::uint32_t* second, Double*) {
+HPCCD_HD Motion<Double> load(const Geometry& g, const std::uint32_t* const* vertices, Double*) {
   using S = Spans<kind>;
   MotionRow p[double_width], a[double_width], b[double_width];
   for (int lane = 0; lane < double_width; ++lane) {
-    std::uint32_t v[4];
-    pair_vertices<kind>(g, first[lane], second[lane], v);
+    const std::uint32_t* v = vertices[lane];
     const auto span = [&](int to, int from) {
       return difference(row_of(g.vertices[v[to]]), row_of(g.vertices[v[from]]));
     };
@@ -21,18 +21,27 @@ HPCCD_HD Motion<Double> load(const Geometry& g, const std::uint32_t* first, cons
   return {p_lanes.t0, a_lanes.t0, b_lanes.t0, p_lanes.t1, a_lanes.t1, b_lanes.t1};
 }
 
-// In single precision: differences are taken in double precision and brought to about one by the scene's scale first.
+// In single precision, from rounded coordinates.
+HPCCD_HD const float* row_of(const RoundedMotion& v) { return v.t0; }
+
 template <Kind kind>
-HPCCD_HD Motion<Single> load(const Geometry& g, const std::uint32_t* first, const std::uint32_t* second, Single*) {
-  constexpr int n = RealTraits<Single>::width / double_width;
-  Motion<Double> parts[n];
-  for (int i = 0; i < n; ++i)
-    parts[i] = load<kind>(g, first + i * double_width, second + i * double_width, static_cast<Double*>(nullptr));
-  const auto vector = [&](Vec3<Double> Motion<Double>::* v) {
-    Double x[n], y[n], z[n];
-    for (int i = 0; i < n; ++i) x[i] = (parts[i].*v).x, y[i] = (parts[i].*v).y, z[i] = (parts[i].*v).z;
-    return Vec3<Single>{narrowed(x, g.scale), narrowed(y, g.scale), narrowed(z, g.scale)};
+HPCCD_HD Motion<Single> load(const Geometry& g, const std::uint32_t* const* vertices, Single*) {
+  using S = Spans<kind>;
+  RoundedRows rows[4];
+  for (int i = 0; i < 4; ++i) rows[i] = rounded_rows([&](int lane) { return row_of(g.rounded[vertices[lane][i]]); });
+  const auto span = [&](int to, int from) { return transposed(difference(rows[to], rows[from])); };
+  const RoundedLanes p = span(S::p_to, S::p_from), a = span(S::a_to, S::a_from), b = span(S::b_to, S::b_from);
+  return {p.t0, a.t0, b.t0, p.t1, a.t1, b.t1};
+}
+
+template <Kind kind, class R>
+HPCCD_HD Motion<Twice<R>> load(const Geometry& g, const std::uint32_t* const* vertices, Twice<R>*) {
+  constexpr int width = RealTraits<R>::width;
+  const Motion<R> one = load<kind>(g, vertices, static_cast<R*>(nullptr));
+  const Motion<R> other = load<kind>(g, vertices + width, static_cast<R*>(nullptr));
+  const auto both = [](const Vec3<R>& a, const Vec3<R>& b) {
+    return Vec3<Twice<R>>{{a.x, b.x}, {a.y, b.y}, {a.z, b.z}};
   };
-  using M = Motion<Double>;
-  return {vector(&M::p0), vector(&M::a0), vector(&M::b0), vector(&M::p1), vector(&M::a1), vector(&M::b1)};
+  return {both(one.p0, other.p0), both(one.a0, other.a0), both(one.b0, other.b0),
+          both(one.p1, other.p1), both(one.a1, other.a1), both(one.b1, other.b1)};
 }

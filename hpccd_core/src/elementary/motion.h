@@ -47,6 +47,14 @@ HPCCD_HD Motion<R> motion_of(const Vec3<R> q_t0[4], const Vec3<R> q_t1[4]) {
   });
 }
 
+// By how much a coordinate of p, a or b may be off before any arithmetic, beside the rounding of the difference itself.
+// Doubles are the caller's coordinates. Floats are rounded ones (scene/vertex_motion.h): they lie below 2.25, so each
+// of two is off by half a unit in the last place of four.
+template <class R>
+HPCCD_HD constexpr double coordinate_error() {
+  return sizeof(typename RealTraits<R>::Scalar) == 4 ? 2.4e-7 : 0;
+}
+
 // Largest coordinates of p, a and b over the motion: the scale of every error bound.
 template <class R>
 struct Magnitudes {
@@ -55,8 +63,13 @@ struct Magnitudes {
 
 template <class R>
 HPCCD_HD Magnitudes<R> magnitudes(const Motion<R>& m) {
-  return {greater(max_norm(m.p0), max_norm(m.p1)), greater(max_norm(m.a0), max_norm(m.a1)),
-          greater(max_norm(m.b0), max_norm(m.b1))};
+  Magnitudes<R> size{greater(max_norm(m.p0), max_norm(m.p1)), greater(max_norm(m.a0), max_norm(m.a1)),
+                     greater(max_norm(m.b0), max_norm(m.b1))};
+  if constexpr (coordinate_error<R>() > 0) {  // of the true ones
+    const R by(coordinate_error<R>());
+    size = {size.p + by, size.a + by, size.b + by};
+  }
+  return size;
 }
 
 // Whether products of four magnitudes neither overflow nor lose bits to underflow, so that the relative error bounds
@@ -65,8 +78,9 @@ HPCCD_HD Magnitudes<R> magnitudes(const Motion<R>& m) {
 template <class R>
 HPCCD_HD typename RealTraits<R>::Mask in_range(const Magnitudes<R>& m) {
   using Traits = RealTraits<R>;
-  double low = sizeof(typename Traits::Scalar) == 8 ? 5.7e-73 : 4.7e-10;  // 2^-240, 2^-31
-  double high = sizeof(typename Traits::Scalar) == 8 ? 1.7e72 : 2.1e9;    // 2^240, 2^31
+  // Beside the error of rounded coordinates, which lie in a range of their own, what is lost to underflow is nothing.
+  if constexpr (coordinate_error<R>() > 0) return R(0) < R(1);
+  double low = 5.7e-73, high = 1.7e72;  // 2^-240, 2^240
   if constexpr (requires { Traits::least_usable; }) low = Traits::least_usable, high = Traits::most_usable;
   const R least = lesser(lesser(m.p, m.a), m.b);
   const R most = greater(greater(m.p, m.a), m.b);

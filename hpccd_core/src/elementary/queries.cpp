@@ -7,6 +7,7 @@
 
 #include "base/length.h"
 #include "base/simd.h"
+#include "bvh/coordinate_map.h"
 #include "elementary/distance/distance_batch.h"
 #include "elementary/policy.h"
 #include "elementary/undecided.h"
@@ -16,12 +17,15 @@ namespace {
 
 Vec3<double> point(const Query& q, int row) { return {q[3 * row], q[3 * row + 1], q[3 * row + 2]}; }
 
-// The power of two that brings the query's largest coordinate to about one: what single precision needs. Each query has
-// its own, so that no answer depends on the queries beside it.
-double power_of_two_scale(const Query& q) {
-  double most = 0;
-  for (double x : q) most = std::max(most, std::fabs(x));
-  return most > 0 ? std::ldexp(1.0, -std::clamp(std::ilogb(most), -1000, 1000)) : 1;
+// Where single precision begins. Each query has a map of its own, so that no answer depends on the queries beside it.
+CoordinateMap map_of(const Query& q) {
+  double low[3], high[3];
+  for (int k = 0; k < 3; ++k) {
+    low[k] = high[k] = q[k];
+    for (int row = 1; row < 8; ++row)
+      low[k] = std::min(low[k], q[3 * row + k]), high[k] = std::max(high[k], q[3 * row + k]);
+  }
+  return CoordinateMap::around(low, high);
 }
 
 void test_queries(Kind kind, std::span<const Query> queries, const Options& options, bool* hit, double* toc) {
@@ -34,6 +38,8 @@ void test_queries(Kind kind, std::span<const Query> queries, const Options& opti
   auto result = std::make_unique<BatchResult>();
   FallbackCounts counts;
   std::vector<VertexMotion> rows(4 * batch_capacity);
+  const bool rounds = accuracy == Accuracy::fast && separation == 0;
+  std::vector<RoundedMotion> rounded(rounds ? rows.size() : 0);
   std::vector<std::array<std::uint32_t, 2>> edges(2 * batch_capacity);
   std::vector<std::array<std::uint32_t, 3>> faces(batch_capacity);
   std::vector<std::uint32_t> first(batch_capacity), second(batch_capacity);
@@ -44,16 +50,17 @@ void test_queries(Kind kind, std::span<const Query> queries, const Options& opti
     first[i] = kind == Kind::vertex_face ? 4 * i : 2 * i;
     second[i] = kind == Kind::vertex_face ? i : 2 * i + 1;
   }
-  const Geometry geometry{rows.data(), edges.data(), faces.data(), nullptr, 1, {separation}};
+  const Geometry geometry{rows.data(), edges.data(), faces.data(), nullptr, rounded.data(), {separation}};
   for (std::size_t begin = 0; begin < queries.size(); begin += batch_capacity) {
     const auto n = static_cast<std::uint32_t>(std::min<std::size_t>(queries.size() - begin, batch_capacity));
     for (std::uint32_t i = 0; i < n; ++i) {
       const Query& q = queries[begin + i];
-      const double scale = accuracy == Accuracy::fast && separation == 0 ? power_of_two_scale(q) : 1;
+      const CoordinateMap map = rounds ? map_of(q) : CoordinateMap();
       for (int row = 0; row < 4; ++row)
         for (int k = 0; k < 3; ++k) {
-          rows[4 * i + row].t0[k] = scale * q[3 * row + k];
-          rows[4 * i + row].t1[k] = scale * q[12 + 3 * row + k];
+          const double x0 = rows[4 * i + row].t0[k] = q[3 * row + k];
+          const double x1 = rows[4 * i + row].t1[k] = q[12 + 3 * row + k];
+          if (rounds) rounded[4 * i + row].t0[k] = map(x0, k), rounded[4 * i + row].t1[k] = map(x1, k);
         }
     }
     test(geometry, kind, first.data(), second.data(), n, *result);

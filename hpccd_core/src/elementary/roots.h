@@ -69,12 +69,13 @@ struct Root {
 };
 
 // The root of f in [low, high], which holds exactly one, with f(low) of sign `sign`. Newton's method kept inside the
-// shrinking bracket; each lane stops by its own criterion, so its result does not depend on its neighbours.
+// shrinking bracket; each lane stops by its own criterion, so its result does not depend on its neighbours: where a
+// step is rounding, or below `enough`.
 template <class R>
-HPCCD_HD Root<R> bracketed_root(const Cubic<R>& f, R error, R low, R high, R sign,
-                                typename RealTraits<R>::Mask active) {
+HPCCD_HD Root<R> bracketed_root(const Cubic<R>& f, R error, R low, R high, R sign, typename RealTraits<R>::Mask active,
+                                double enough = 0) {
   using Mask = typename RealTraits<R>::Mask;
-  const R eps(half_ulp<R>());
+  const R eps(half_ulp<R>()), least_step = greater(R(2) * eps, R(enough));
   const R begin = low, end = high;
   R t = R(0.5) * (low + high);
   R step = high - low;
@@ -88,14 +89,14 @@ HPCCD_HD Root<R> bracketed_root(const Cubic<R>& f, R error, R low, R high, R sig
     low = select(running && before, t, low);
     high = select(running && !before, t, high);
     const R guess = t - newton;
-    const Mask converged = magnitude(newton) <= R(2) * eps;
+    const Mask converged = magnitude(newton) <= least_step;
     // Newton's step must stay inside and halve the last step; written so that NaN bisects.
     const Mask good = converged || (guess > low && guess < high && magnitude(newton) < R(0.5) * step);
     const R next = select(good, guess, R(0.5) * (low + high));
     const R moved = magnitude(next - t);
     t = select(running, next, t);
     step = select(running, moved, step);
-    running = running && !converged && moved > R(2) * eps;
+    running = running && !converged && moved > least_step;
   }
   t = lesser(greater(t, begin), end);
   const R flat = magnitude(slope(f, t));

@@ -12,9 +12,10 @@ namespace {
 template <class A, class B>
 HPCCD_HD void edges_against_faces(const LeafFeatures& a, const LeafFeatures& b, const typename A::Lanes& lanes_a,
                                   unsigned edges_a, unsigned faces_b, CandidateBuffer& out) {
-  if (!edges_a) return;
+  if (!edges_a || !faces_b) return;
+  const FeatureBoxes<B, 3> boxes(b);
   for_each(faces_b, [&](std::uint32_t k) {
-    unsigned m = typename A::Outcodes({}, a, lanes_a, B::face_box(b, k)).edges(a) & edges_a;
+    unsigned m = typename A::Outcodes({}, a, lanes_a, boxes[k]).edges(a) & edges_a;
     if (!m) return;
     const auto& corner = b.corners_of->face;
     const typename A::Shared shared(a, b.corners[corner[0][k]], b.corners[corner[1][k]], b.corners[corner[2][k]]);

@@ -308,42 +308,48 @@ struct Leaves {
     }
     return box;
   }
-  HPCCD_HD static FeatureBox face_box(const LeafFeatures& leaf, std::uint32_t k) {
-    const auto& corner = leaf.corners_of->face;
-    return joined(box_of(leaf, corner[0][k]), box_of(leaf, corner[1][k]), box_of(leaf, corner[2][k]));
-  }
 };
 
-// The boxes of a leaf's edges: where lanes can be picked at once all of them, else one by one.
-template <class Kernel>
-class EdgeBoxes {
+// The boxes of a leaf's edges or faces, which have n corners each: where lanes can be picked at once all of them, else
+// one by one.
+template <class Kernel, std::uint32_t n>
+class FeatureBoxes {
+  static constexpr std::uint32_t most = n == 2 ? CornersOf::most_edges : CornersOf::most_faces;
+
  public:
-  HPCCD_HD explicit EdgeBoxes(const LeafFeatures& leaf) : leaf_(leaf) {
+  HPCCD_HD explicit FeatureBoxes(const LeafFeatures& leaf)
+      : leaf_(leaf), corner_(n == 2 ? leaf.corners_of->edge[0] : leaf.corners_of->face[0]) {
     if constexpr (picks_at_once)
-      for (std::uint32_t i = 0; i < leaf.n_edges; i += 16) join(i);
+      for (std::uint32_t i = 0; i < (n == 2 ? leaf.n_edges : leaf.n_faces); i += 16) join(i);
   }
   HPCCD_HD auto operator[](std::uint32_t k) const {
-    if constexpr (picks_at_once) {
-      return Bounds<CornersOf::most_edges>{bounds_[0] + k};
-    } else {
-      const auto& end = leaf_.corners_of->edge;
-      return Kernel::joined(Kernel::box_of(leaf_, end[0][k]), Kernel::box_of(leaf_, end[1][k]));
-    }
+    if constexpr (picks_at_once)
+      return Bounds<most>{bounds_[0] + k};
+    else if constexpr (n == 2)
+      return Kernel::joined(box(0, k), box(1, k));
+    else
+      return Kernel::joined(box(0, k), box(1, k), box(2, k));
   }
 
  private:
+  HPCCD_HD auto box(std::uint32_t j, std::uint32_t k) const { return Kernel::box_of(leaf_, corner_[j * most + k]); }
   HPCCD_HD void join(std::uint32_t i) {
-    const auto& end = leaf_.corners_of->edge;
-    const Picks16 first = picks(end[0] + i), second = picks(end[1] + i);
+    Picks16 of[n];
+    for (std::uint32_t j = 0; j < n; ++j) of[j] = picks(corner_ + j * most + i);
     for (std::uint32_t bound = 0; bound < n_bounds; ++bound) {
       const float* row = &Kernel::box_of(leaf_, 0).row_of(bound);
-      const Row a = Kernel::picked_of(row, first), b = Kernel::picked_of(row, second);
-      store(bounds_[bound] + i, side_of_bound(bound) == Side::low ? min(a, b) : max(a, b));
+      Row x = Kernel::picked_of(row, of[0]);
+      for (std::uint32_t j = 1; j < n; ++j) {
+        const Row y = Kernel::picked_of(row, of[j]);
+        x = side_of_bound(bound) == Side::low ? min(x, y) : max(x, y);
+      }
+      store(bounds_[bound] + i, x);
     }
   }
 
   const LeafFeatures& leaf_;
-  alignas(64) float bounds_[picks_at_once ? n_bounds : 1][CornersOf::most_edges];
+  const std::uint8_t* corner_;  // row by row, `most` in each
+  alignas(64) float bounds_[picks_at_once ? n_bounds : 1][most];
 };
 
 // Appends the pairs of `number` with those of the features from `others` on that are in m.

@@ -13,7 +13,7 @@ template <class A, class B, class When>
 HPCCD_HD void edge_pairs(When when, const LeafFeatures& a, const LeafFeatures& b, const typename B::Lanes& lanes_b,
                          unsigned edges_a, unsigned edges_b, CandidateBuffer& out) {
   const bool same = a.rows == b.rows;
-  const EdgeBoxes<A> boxes(a);
+  const FeatureBoxes<A, 2> boxes(a);
   for_each(edges_a, [&](std::uint32_t k) {
     unsigned m = typename B::Outcodes(when, b, lanes_b, boxes[k]).edges(b) & edges_b;
     if (same) m &= ~first_bits(k + 1);

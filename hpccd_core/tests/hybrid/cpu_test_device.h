@@ -134,8 +134,7 @@ class CpuTestDevice final : public hybrid::TestDevice {
     search.block_pairs = block_pairs(Simd::scalar);
     search.leaf_pairs = leaf_pairs(Simd::scalar);
     search.report = Report::all;
-    search.geometry = {motion_.vertices.data(), features_.edges.data(), features_.faces.data(), nullptr,
-                       motion_.map.scale};
+    search.geometry = {motion_.vertices.data(), features_.edges.data(), features_.faces.data(), nullptr};
     search.geometry.separations = {separation_};
     Worker worker;
     worker.begin(search);

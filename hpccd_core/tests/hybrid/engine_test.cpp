@@ -38,7 +38,7 @@ struct Bench {
     start = test::sheet_positions(side, from), end = test::sheet_positions(side, to);
     motion.update(*scene, test::view(start), test::view(end), separations.largest(), pool);
     build(tree, *scene, features, motion, pool);
-    search.geometry = {motion.vertices.data(), features.edges.data(), features.faces.data(), nullptr, motion.map.scale};
+    search.geometry = {motion.vertices.data(), features.edges.data(), features.faces.data(), nullptr};
     search.geometry.separations = {separations.first()};
     search.earliest = std::numeric_limits<double>::infinity();
   }

@@ -29,8 +29,7 @@ struct FrontTest : PaperTest {
   Scenery scenery() const { return {h, features, rules, motion.swept}; }
 
   std::vector<FrontSegment> update(const std::vector<FrontSegment>& front) {
-    search.geometry = {motion.vertices.data(), features.edges.data(), features.faces.data(), motion.kdops.data(),
-                       motion.map.scale};
+    search.geometry = {motion.vertices.data(), features.edges.data(), features.faces.data(), motion.kdops.data()};
     worker.begin(search);
     const Scenery s = scenery();
     std::vector<std::vector<FrontSegment>> kept;

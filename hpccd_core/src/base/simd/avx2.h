@@ -23,13 +23,6 @@ using Double = Lanes<double, 4>;
 using Single = Lanes<float, 8>;
 inline constexpr int double_width = 4;
 
-HPCCD_HD Single narrowed(const Double* parts, double scale) {
-  const __m256d s = _mm256_set1_pd(scale);
-  const __m128 low = _mm256_cvtpd_ps(_mm256_mul_pd((__m256d)parts[0].v, s));
-  const __m128 high = _mm256_cvtpd_ps(_mm256_mul_pd((__m256d)parts[1].v, s));
-  return Single((Single::Vec)_mm256_insertf128_ps(_mm256_castps128_ps256(low), high, 1));
-}
-
 struct MotionRow {
   __m256d t0, t1;
 };
@@ -65,6 +58,43 @@ HPCCD_HD PointRows difference(const PointRows& to, const PointRows& from) {
   return d;
 }
 HPCCD_HD Vec3<Double> transposed(const PointRows& r) { return transposed(r.row[0], r.row[1], r.row[2], r.row[3]); }
+
+struct RoundedRows {
+  __m256 row[8];
+};
+template <class Row>
+HPCCD_HD RoundedRows rounded_rows(Row&& at) {
+  RoundedRows r;
+  for (int i = 0; i < 8; ++i) r.row[i] = _mm256_load_ps(at(i));
+  return r;
+}
+HPCCD_HD RoundedRows difference(const RoundedRows& to, const RoundedRows& from) {
+  RoundedRows d;
+  for (int i = 0; i < 8; ++i) d.row[i] = _mm256_sub_ps(to.row[i], from.row[i]);
+  return d;
+}
+struct RoundedLanes {
+  Vec3<Single> t0, t1;
+};
+HPCCD_HD RoundedLanes transposed(const RoundedRows& r) {
+  // Of four rows: t0 in the low half, t1 in the high one.
+  __m256 x[2], y[2], z[2];
+  for (int i = 0; i < 2; ++i) {
+    const __m256* p = r.row + 4 * i;
+    const __m256d xy_a = _mm256_castps_pd(_mm256_unpacklo_ps(p[0], p[1])),
+                  z_a = _mm256_castps_pd(_mm256_unpackhi_ps(p[0], p[1])),
+                  xy_b = _mm256_castps_pd(_mm256_unpacklo_ps(p[2], p[3])),
+                  z_b = _mm256_castps_pd(_mm256_unpackhi_ps(p[2], p[3]));
+    x[i] = _mm256_castpd_ps(_mm256_unpacklo_pd(xy_a, xy_b));
+    y[i] = _mm256_castpd_ps(_mm256_unpackhi_pd(xy_a, xy_b));
+    z[i] = _mm256_castpd_ps(_mm256_unpacklo_pd(z_a, z_b));
+  }
+  const auto lanes = [](__m256 v) { return Single((Single::Vec)v); };
+  return {{lanes(_mm256_permute2f128_ps(x[0], x[1], 0x20)), lanes(_mm256_permute2f128_ps(y[0], y[1], 0x20)),
+           lanes(_mm256_permute2f128_ps(z[0], z[1], 0x20))},
+          {lanes(_mm256_permute2f128_ps(x[0], x[1], 0x31)), lanes(_mm256_permute2f128_ps(y[0], y[1], 0x31)),
+           lanes(_mm256_permute2f128_ps(z[0], z[1], 0x31))}};
+}
 
 struct Floats16 {
   __m256 half[2];

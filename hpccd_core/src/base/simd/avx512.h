@@ -25,13 +25,6 @@ using Double = Lanes<double, 8>;
 using Single = Lanes<float, 16>;
 inline constexpr int double_width = 8;
 
-HPCCD_HD Single narrowed(const Double* parts, double scale) {
-  const __m512d s = _mm512_set1_pd(scale);
-  const __m256 low = _mm512_cvtpd_ps(_mm512_mul_pd((__m512d)parts[0].v, s));
-  const __m256 high = _mm512_cvtpd_ps(_mm512_mul_pd((__m512d)parts[1].v, s));
-  return Single((Single::Vec)_mm512_insertf32x8(_mm512_castps256_ps512(low), high, 1));
-}
-
 struct MotionRow {
   __m512d v;
 };
@@ -83,6 +76,47 @@ HPCCD_HD Vec3<Double> transposed(const PointRows& r) {
   const auto lanes = [](__m512d v) { return Double((Double::Vec)v); };
   return {lanes(_mm512_shuffle_f64x2(xz_a, xz_b, 0x88)), lanes(_mm512_shuffle_f64x2(y_a, y_b, 0x88)),
           lanes(_mm512_shuffle_f64x2(xz_a, xz_b, 0xDD))};
+}
+
+// Rows of eight floats, x y z and padding at both ends: rows 0 and 4, 1 and 5, up to 11 and 15.
+struct RoundedRows {
+  __m512 pair[8];
+};
+template <class Row>
+HPCCD_HD RoundedRows rounded_rows(Row&& at) {
+  RoundedRows r;
+  for (int i = 0; i < 8; ++i) {
+    const int row = 8 * (i / 4) + i % 4;
+    r.pair[i] = _mm512_insertf32x8(_mm512_castps256_ps512(_mm256_load_ps(at(row))), _mm256_load_ps(at(row + 4)), 1);
+  }
+  return r;
+}
+HPCCD_HD RoundedRows difference(const RoundedRows& to, const RoundedRows& from) {
+  RoundedRows d;
+  for (int i = 0; i < 8; ++i) d.pair[i] = _mm512_sub_ps(to.pair[i], from.pair[i]);
+  return d;
+}
+struct RoundedLanes {
+  Vec3<Single> t0, t1;
+};
+HPCCD_HD RoundedLanes transposed(const RoundedRows& r) {
+  // Of rows i to i + 3 in turn: x, y and z of four, at t0 and at t1, and the same of the four rows behind them.
+  __m512 x[2], y[2], z[2];
+  for (int i = 0; i < 2; ++i) {
+    const __m512* p = r.pair + 4 * i;
+    const __m512d xy_a = _mm512_castps_pd(_mm512_unpacklo_ps(p[0], p[1])),
+                  z_a = _mm512_castps_pd(_mm512_unpackhi_ps(p[0], p[1])),
+                  xy_b = _mm512_castps_pd(_mm512_unpacklo_ps(p[2], p[3])),
+                  z_b = _mm512_castps_pd(_mm512_unpackhi_ps(p[2], p[3]));
+    x[i] = _mm512_castpd_ps(_mm512_unpacklo_pd(xy_a, xy_b));
+    y[i] = _mm512_castpd_ps(_mm512_unpackhi_pd(xy_a, xy_b));
+    z[i] = _mm512_castpd_ps(_mm512_unpacklo_pd(z_a, z_b));
+  }
+  const auto lanes = [](__m512 v) { return Single((Single::Vec)v); };
+  return {{lanes(_mm512_shuffle_f32x4(x[0], x[1], 0x88)), lanes(_mm512_shuffle_f32x4(y[0], y[1], 0x88)),
+           lanes(_mm512_shuffle_f32x4(z[0], z[1], 0x88))},
+          {lanes(_mm512_shuffle_f32x4(x[0], x[1], 0xDD)), lanes(_mm512_shuffle_f32x4(y[0], y[1], 0xDD)),
+           lanes(_mm512_shuffle_f32x4(z[0], z[1], 0xDD))}};
 }
 
 struct Floats16 {

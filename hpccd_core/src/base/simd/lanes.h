@@ -6,6 +6,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <type_traits>
 
 #include "base/real.h"
@@ -44,6 +45,14 @@ struct Lanes {
 template <class T, int W>
 HPCCD_HD Lanes<T, W> select(LaneMask<T, W> m, Lanes<T, W> a, Lanes<T, W> b) {
   return Lanes<T, W>(m.v ? a.v : b.v);
+}
+
+// The same but for the sign of zero, in one operation in place of three.
+template <class T, int W>
+HPCCD_HD Lanes<T, W> magnitude(Lanes<T, W> a) {
+  using Bits = typename LaneMask<T, W>::Vec;
+  constexpr auto all_but_sign = std::numeric_limits<typename LaneMask<T, W>::Int>::max();
+  return Lanes<T, W>((typename Lanes<T, W>::Vec)((Bits)a.v & all_but_sign));
 }
 
 // bits(mask) and, where a set has it for a whole register, square_root(lanes) come with the instruction set.

@@ -35,13 +35,6 @@ using Double = Lanes<double, 2>;
 using Single = Lanes<float, 4>;
 inline constexpr int double_width = 2;
 
-// In single precision, scaled first.
-HPCCD_HD Single narrowed(const Double* parts, double scale) {
-  const Double low = parts[0] * Double(scale), high = parts[1] * Double(scale);
-  return Single(Single::Vec{static_cast<float>(low.v[0]), static_cast<float>(low.v[1]), static_cast<float>(high.v[0]),
-                            static_cast<float>(high.v[1])});
-}
-
 HPCCD_HD Double load2(const double* x) {
   Double::Vec v;
   __builtin_memcpy(&v, x, sizeof v);
@@ -83,6 +76,35 @@ HPCCD_HD PointRows difference(const PointRows& to, const PointRows& from) {
   return {{to.xy[0] - from.xy[0], to.xy[1] - from.xy[1]}, {to.z[0] - from.z[0], to.z[1] - from.z[1]}};
 }
 HPCCD_HD Vec3<Double> transposed(const PointRows& r) { return transposed(r.xy, r.z); }
+
+// Rows of eight floats, x y z and padding at t = 0, then at t = 1: as many as Single has lanes.
+struct RoundedRows {
+  Single t0[4], t1[4];
+};
+template <class Row>
+HPCCD_HD RoundedRows rounded_rows(Row&& at) {
+  RoundedRows r;
+  for (int i = 0; i < 4; ++i) r.t0[i] = Single(load4(at(i))), r.t1[i] = Single(load4(at(i) + 4));
+  return r;
+}
+HPCCD_HD RoundedRows difference(const RoundedRows& to, const RoundedRows& from) {
+  RoundedRows d;
+  for (int i = 0; i < 4; ++i) d.t0[i] = to.t0[i] - from.t0[i], d.t1[i] = to.t1[i] - from.t1[i];
+  return d;
+}
+HPCCD_HD Vec3<Single> transposed(const Single r[4]) {
+  const Floats4 xy_a = __builtin_shufflevector(r[0].v, r[1].v, 0, 4, 1, 5),
+                z_a = __builtin_shufflevector(r[0].v, r[1].v, 2, 6, 3, 7),
+                xy_b = __builtin_shufflevector(r[2].v, r[3].v, 0, 4, 1, 5),
+                z_b = __builtin_shufflevector(r[2].v, r[3].v, 2, 6, 3, 7);
+  return {Single(__builtin_shufflevector(xy_a, xy_b, 0, 1, 4, 5)),
+          Single(__builtin_shufflevector(xy_a, xy_b, 2, 3, 6, 7)),
+          Single(__builtin_shufflevector(z_a, z_b, 0, 1, 4, 5))};
+}
+struct RoundedLanes {
+  Vec3<Single> t0, t1;
+};
+HPCCD_HD RoundedLanes transposed(const RoundedRows& r) { return {transposed(r.t0), transposed(r.t1)}; }
 
 // A cache line of sixteen floats.
 struct Floats16 {

@@ -2,6 +2,7 @@
 // Included once per instruction set, after its header (base/simd/scalar.h). As batch.inl, uses nothing from the
 // standard library at run time.
 
+#include "base/simd/twice.h"
 #include "elementary/distance/distance_batch.h"
 #include "elementary/distance/proximity_test.h"
 #include "elementary/distance/separation_test.h"
@@ -9,26 +10,22 @@
 namespace hpccd::HPCCD_ISA {
 
 #include "elementary/kdop_filter.inl"
+#include "elementary/lane_groups.inl"
 #include "elementary/pair_lanes.inl"
 
 namespace {
 
-// Of the pairs at `at`, which the batch names by their positions.
-template <Kind kind>
-HPCCD_HD Double separations_at(const Geometry& g, const std::uint32_t* first, const std::uint32_t* second,
-                               const std::uint32_t* at) {
-  const bool listed = g.separations.of_candidates;
-  if (!listed && !g.separations.of_meshes) return Double(g.separations.uniform);
+// Of a pair, by its place in the batch and its vertices.
+HPCCD_HD double separation_at(const Geometry& g, std::uint32_t at, const std::uint32_t* v) {
+  return g.separations.of_candidates ? g.separations.of_candidates[at] : g.separations.between(v[0], v[2]);
+}
+
+// of_lane(lane): of a lane's pair, where not all are the same.
+template <class OfLane>
+HPCCD_HD Double separations(const Geometry& g, OfLane&& of_lane) {
+  if (!g.separations.of_candidates && !g.separations.of_meshes) return Double(g.separations.uniform);
   alignas(64) double d[double_width];
-  for (int lane = 0; lane < double_width; ++lane) {
-    if (listed) {
-      d[lane] = g.separations.of_candidates[at[lane]];
-      continue;
-    }
-    std::uint32_t v[4];
-    pair_vertices<kind>(g, first[at[lane]], second[at[lane]], v);
-    d[lane] = g.separations.between(v[0], v[2]);
-  }
+  for (int lane = 0; lane < double_width; ++lane) d[lane] = of_lane(lane);
   Double r;
   __builtin_memcpy(&r, d, sizeof r);
   return r;
@@ -37,41 +34,45 @@ HPCCD_HD Double separations_at(const Geometry& g, const std::uint32_t* first, co
 template <Kind kind>
 void test_separation(const Geometry& g, const std::uint32_t* first, const std::uint32_t* second, std::uint32_t n,
                      BatchResult& result) {
-  using Lanes = const Motion<Double>&;
-  result.n_contacts = result.n_undecided = 0;
-  std::uint32_t near[batch_capacity], beside[batch_capacity], open[batch_capacity], n_beside = 0, n_open = 0;
-  std::uint64_t none = 0;
+  result.n_contacts = 0;
+  PairList list;
+  if (!g.kdops)
+    list_all<kind>(g, first, second, n, list);
+  else if (g.until < 1)
+    list_near<kind>(until(g), g, first, second, n, list);
+  else
+    list_near<kind>(ApartByMore{load16(g.margin.in)}, g, first, second, n, list);
+  const auto separations_of = [&](const auto& of) {
+    return separations(g, [&](int lane) { return separation_at(g, list.at[of[lane]], list.vertices[of[lane]]); });
+  };
 
-  const std::uint32_t n_near = !g.kdops ? n
-                               : g.until < 1
-                                   ? near_pairs<kind>(until(g), g, first, second, n, near)
-                                   : near_pairs<kind>(ApartByMore{load16(g.margin.in)}, g, first, second, n, near);
-  const std::uint32_t* const where = g.kdops ? near : nullptr;
-  for_lanes<kind, Double>(g, first, second, where, n_near, [&](Lanes m, const std::uint32_t* at, unsigned valid) {
-    const Double d = separations_at<kind>(g, first, second, at);
-    append(beside, n_beside, at, valid & ~bits(planes_stay_apart(m, d)));
+  std::uint64_t none = 0;
+  All all{list.n};
+  Chosen beside, open, undecided;
+  using Lanes = const Motion<Double>&;
+  for_lanes<kind, Double>(g, list, all, [&](Lanes m, const LaneNumbers<All>& of) {
+    append(beside, of, of.valid & ~bits(planes_stay_apart(m, separations_of(of))));
   });
-  for_lanes<kind, Double>(g, first, second, beside, n_beside, [&](Lanes m, const std::uint32_t* at, unsigned valid) {
-    const Outcome<Double> o = separation_filter<kind>(m, separations_at<kind>(g, first, second, at));
-    const unsigned within = bits(o.contact) & valid, apart = bits(o.none) & valid;
+  for_lanes<kind, Double>(g, list, beside, [&](Lanes m, const LaneNumbers<Chosen>& of) {
+    const Outcome<Double> o = separation_filter<kind>(m, separations_of(of));
+    const unsigned within = bits(o.contact) & of.valid, apart = bits(o.none) & of.valid;
     for (unsigned lanes = within; lanes; lanes &= lanes - 1) {
-      result.contact[result.n_contacts] = at[__builtin_ctz(lanes)];
+      result.contact[result.n_contacts] = list.at[of[__builtin_ctz(lanes)]];
       result.toc[result.n_contacts] = result.delta[result.n_contacts] = 0;
       ++result.n_contacts;
     }
-    append(open, n_open, at, valid & ~within & ~apart);
+    append(open, of, of.valid & ~within & ~apart);
     none += static_cast<unsigned>(__builtin_popcount(apart));
   });
-  for_lanes<kind, Double>(g, first, second, open, n_open, [&](Lanes m, const std::uint32_t* at, unsigned valid) {
-    collect(separation_test<kind>(m, separations_at<kind>(g, first, second, at)), at, valid, result);
+  for_lanes<kind, Double>(g, list, open, [&](Lanes m, const LaneNumbers<Chosen>& of) {
+    collect(separation_test<kind>(m, separations_of(of)), list, of, undecided, result);
   });
 
   result.counts.tested += n;
-  result.counts.kdop += n - n_near;
-  result.counts.coplanarity += n_near - n_beside;
+  result.counts.kdop += n - list.n;
+  result.counts.coplanarity += list.n - beside.n;
   result.counts.separated += none;
-  result.counts.contacts += result.n_contacts;
-  result.counts.undecided += result.n_undecided;
+  report_undecided(list, undecided, result);
 }
 
 template <Kind kind>
@@ -97,21 +98,26 @@ void test_proximity(const Geometry& g, const std::uint32_t* first, const std::ui
                     BatchResult& result) {
   result.n_contacts = result.n_undecided = 0;
   std::uint64_t none = 0;
-  for_groups<FeaturesInSnapshot<kind>>(
-      g, first, second, nullptr, n, [&](const Snapshot<Double>& s, const std::uint32_t* at, unsigned valid) {
-        const NearOrFar<Double> found = proximity_test<kind>(s, separations_at<kind>(g, first, second, at));
-        const unsigned near = bits(found.near) & valid, far = bits(found.far) & valid;
-        alignas(64) double distance[double_width];
-        __builtin_memcpy(distance, &found.distance, sizeof distance);
-        for (unsigned lanes = near; lanes; lanes &= lanes - 1) {
-          const int lane = __builtin_ctz(lanes);
-          result.contact[result.n_contacts] = at[lane];
-          result.toc[result.n_contacts] = distance[lane];
-          result.delta[result.n_contacts++] = 0;
-        }
-        append(result.undecided, result.n_undecided, at, valid & ~near & ~far);
-        none += static_cast<unsigned>(__builtin_popcount(far));
-      });
+  for_groups<FeaturesInSnapshot<kind>>(g, first, second, nullptr, n,
+                                       [&](const Snapshot<Double>& s, const std::uint32_t* at, unsigned valid) {
+                                         const Double limits = separations(g, [&](int lane) {
+                                           std::uint32_t v[4];
+                                           pair_vertices<kind>(g, first[at[lane]], second[at[lane]], v);
+                                           return separation_at(g, at[lane], v);
+                                         });
+                                         const NearOrFar<Double> found = proximity_test<kind>(s, limits);
+                                         const unsigned near = bits(found.near) & valid, far = bits(found.far) & valid;
+                                         alignas(64) double distance[double_width];
+                                         __builtin_memcpy(distance, &found.distance, sizeof distance);
+                                         for (unsigned lanes = near; lanes; lanes &= lanes - 1) {
+                                           const int lane = __builtin_ctz(lanes);
+                                           result.contact[result.n_contacts] = at[lane];
+                                           result.toc[result.n_contacts] = distance[lane];
+                                           result.delta[result.n_contacts++] = 0;
+                                         }
+                                         append(result.undecided, result.n_undecided, at, valid & ~near & ~far);
+                                         none += static_cast<unsigned>(__builtin_popcount(far));
+                                       });
   result.counts.tested += n;
   result.counts.separated += none;
   result.counts.contacts += result.n_contacts;

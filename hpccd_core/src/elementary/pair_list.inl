@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+// The pairs of a batch that are still looked at, by the vertices of their features: found once, for all the filters to
+// come. Part of kdop_filter.inl.
+
+inline constexpr std::uint32_t most_lanes = 32;  // and so many copies of the last one behind it, to fill up lanes
+
+struct PairList {
+  std::uint32_t n = 0;
+  std::uint32_t at[batch_capacity + most_lanes];  // in the batch
+  std::uint32_t vertices[batch_capacity + most_lanes][4];
+
+  // The first n of `at` are there.
+  template <Kind kind>
+  HPCCD_HD void find_vertices(const Geometry& g, const std::uint32_t* first, const std::uint32_t* second) {
+    for (std::uint32_t j = 0; n > 0 && j < most_lanes; ++j) at[n + j] = at[n - 1];
+    for (std::uint32_t j = 0; n > 0 && j < n + most_lanes; ++j)
+      pair_vertices<kind>(g, first[at[j]], second[at[j]], vertices[j]);
+  }
+};
+
+// Of a list, by number.
+struct Chosen {
+  std::uint32_t n = 0;
+  std::uint32_t of[batch_capacity + most_lanes];
+  HPCCD_HD std::uint32_t operator[](std::uint32_t i) const { return of[i]; }
+  HPCCD_HD void fill_up() {
+    for (std::uint32_t j = 0; n > 0 && j < most_lanes; ++j) of[n + j] = of[n - 1];
+  }
+};
+struct All {
+  std::uint32_t n;
+  HPCCD_HD std::uint32_t operator[](std::uint32_t i) const { return i; }
+  HPCCD_HD void fill_up() {}
+};
+
+template <Kind kind>
+HPCCD_HD void list_all(const Geometry& g, const std::uint32_t* first, const std::uint32_t* second, std::uint32_t n,
+                       PairList& list) {
+  for (std::uint32_t i = 0; i < n; ++i) list.at[i] = i;
+  list.n = n;
+  list.find_vertices<kind>(g, first, second);
+}
