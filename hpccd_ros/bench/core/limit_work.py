@@ -18,8 +18,8 @@ STAGES = ("bounds", "refit", "nodes", "leaf pairs", "k-DOPs", "tests", "contacts
 @dataclasses.dataclass(frozen=True)
 class Work:
     """read, written: bytes that come from, and go to, wherever the stage's data lie, once a step; touched: bytes that
-    come again and again, at best from a core's second cache; comparisons of floats, minima among them; flops:
-    additions, multiplications and comparisons in the tier's precision."""
+    come again and again, at best from a core's second cache; comparisons: operations on floats, comparisons and minima
+    most of them, and the arithmetic that every tier begins with; flops: the same in the tier's precision."""
 
     read: float = 0
     written: float = 0
@@ -45,7 +45,7 @@ class Item:
 
 
 # Sizes of the core's structures, in bytes.
-VERTEX_MOTION, VERTEX_KDOP, BOX, NODE, CONTACT, NUMBER = 64, 64, 48, 64, 16, 4
+VERTEX_MOTION, ROUNDED_MOTION, VERTEX_KDOP, BOX, NODE, CONTACT, NUMBER = 64, 32, 64, 48, 64, 16, 4
 COORDINATES = 6 * 4  # of a corner, at both ends
 LEAF_ROWS, LEAF_CORNERS, LEAF_KDOP = 16 * COORDINATES, 128, 128
 BOX_COMPARISONS = 12  # below and above, three axes, both ends: MotionBox::overlaps
@@ -66,14 +66,14 @@ ROOT_END = 14 + 2 * 13 + 12  # delta, and signs on both sides
 QUICK_STEPS = 2 * (13 + 14 + 4) + 5 + 2 * 13 + 6  # certainly_apart_at_root(): two steps, delta, signs on both sides
 # inside(): interpolation, cross products, the largest coordinate, signs, errors, and 11 for each condition.
 INSIDE = {"vf": 28 + 3 * CROSS + 9 + 4 + 8 + 3 * 11 + 4, "ee": 28 + 3 * CROSS + 9 + 4 + 8 + 2 * 11 + 4}
-VERTICES = 4 * VERTEX_MOTION
+VERTICES = 4 * VERTEX_MOTION  # in double precision, of those that are left
 # Contacts as they are handed out: pairs or quadruples of numbers, and a time.
 HANDED_OUT = {"vf": 2 * NUMBER + 8, "ee": 4 * NUMBER + 8}
 
 TABLE = (
     Item("bounds", "position_bytes", Work(read=1), "motion_bounds.cpp: both ends, as they were given"),
-    Item("bounds", "vertices", Work(written=VERTEX_MOTION + BOX + VERTEX_KDOP, comparisons=18, flops=36 + 52),
-         "copy_motion(): 12 bounds of 3 operations, 16 values of a k-DOP of 3 and 4 doublings; extent_of(): minimum, "
+    Item("bounds", "vertices", Work(written=VERTEX_MOTION + ROUNDED_MOTION + BOX + VERTEX_KDOP, comparisons=18, flops=12 + 52),
+         "copy_motion(): 6 coordinates of 2 operations, 16 values of a k-DOP of 3 and 4 doublings; extent_of(): minimum, "
          "maximum and range of 6 coordinates"),
     Item("refit", "vertices",
          Work(read=BOX + VERTEX_KDOP + NUMBER, written=COORDINATES, comparisons=BOX_COMPARISONS + KDOP_COMPARISONS),
@@ -93,13 +93,15 @@ TABLE = (
     Item("leaf pairs", "candidates", Work(touched=2 * NUMBER), "two numbers written"),
     Item("k-DOPs", "vertices", Work(read=VERTEX_KDOP), "all of them once"),
     Item("k-DOPs", "candidates", Work(touched=4 * VERTEX_KDOP + 2 * NUMBER, comparisons=4 * 16 + 2 * 16),
-         "near_pairs(): four rows of 16, joined two and two by minimum and maximum, compared twice"),
-    Item("tests", "vertices", Work(read=VERTEX_MOTION), "all of them once"),
-    Item("tests", "tested", Work(touched=VERTICES, flops=LOAD + MAGNITUDES + CUBIC + ERROR + 12),
-         "batch.inl: the cubic, its error bound, the signs of its coefficients"),
-    *(Item("tests", f"{kind}_survivors", Work(flops=PROJECTION + BEYOND[kind] + ONE_ROOT),
-           "certainly_outside() and certainly_one_root()") for kind in ("vf", "ee")),
-    *(Item("tests", f"{kind}_rooted", Work(flops=QUICK_STEPS + INSIDE[kind]),
+         "list_near(): four rows of 16, joined two and two by minimum and maximum, compared twice"),
+    Item("tests", "vertices", Work(read=ROUNDED_MOTION), "all of them once"),
+    Item("tests", "tested",
+         Work(touched=4 * ROUNDED_MOTION, comparisons=LOAD + MAGNITUDES + CUBIC + ERROR + 12 + ONE_ROOT),
+         "sort_out(), in single precision: the cubic, its error bound, the signs of its coefficients"),
+    *(Item("tests", f"{kind}_outside", Work(comparisons=PROJECTION + BEYOND[kind]),
+           "certainly_outside(); those that are not found outside cost as much, which nobody counts")
+      for kind in ("vf", "ee")),
+    *(Item("tests", f"{kind}_rooted", Work(comparisons=QUICK_STEPS + INSIDE[kind]),
            "certainly_apart_at_root(); many_roots_test() does more") for kind in ("vf", "ee")),
     *(Item("tests", f"{kind}_contacts",
            Work(touched=VERTICES, flops=LOAD + MAGNITUDES + CUBIC + ERROR + NEWTON * NEWTON_STEPS + ROOT_END
@@ -133,8 +135,8 @@ def counts(step: Step, stats: dict[str, float]) -> dict[str, float]:
     }  # fmt: skip
     for kind in ("vf", "ee"):
         after = stats[f"{kind}_candidates"] - stats[f"{kind}_rejected_slabs"]
-        found[f"{kind}_survivors"] = after - stats[f"{kind}_rejected_coplanarity"]
-        found[f"{kind}_rooted"] = found[f"{kind}_survivors"] - stats[f"{kind}_rejected_projection"]
+        found[f"{kind}_outside"] = stats[f"{kind}_rejected_projection"]
+        found[f"{kind}_rooted"] = after - stats[f"{kind}_rejected_coplanarity"] - found[f"{kind}_outside"]
         found[f"{kind}_contacts"] = stats[f"{kind}_contacts"]
     return found
 
