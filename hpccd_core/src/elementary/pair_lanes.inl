@@ -17,7 +17,7 @@ struct LaneNumbers {
 template <Kind kind, class R, class Numbers, class Function>
 HPCCD_HD void for_lanes(const Geometry& g, const PairList& list, Numbers& chosen, Function&& function) {
   constexpr std::uint32_t W = RealTraits<R>::width;
-  static_assert(W < most_lanes);
+  static_assert(W <= most_lanes);
   chosen.fill_up();
   for (std::uint32_t i = 0; i < chosen.n; i += W) {
     const std::uint32_t* v[W];

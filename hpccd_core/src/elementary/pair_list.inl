@@ -2,7 +2,7 @@
 // The pairs of a batch that are still looked at, by the vertices of their features: found once, for all the filters to
 // come. Part of kdop_filter.inl.
 
-inline constexpr std::uint32_t most_lanes = 32;  // and so many copies of the last one behind it, to fill up lanes
+inline constexpr std::uint32_t most_lanes = 16;  // and so many copies of the last one behind it, to fill up lanes
 
 struct PairList {
   std::uint32_t n = 0;
@@ -12,9 +12,9 @@ struct PairList {
   // The first n of `at` are there.
   template <Kind kind>
   HPCCD_HD void find_vertices(const Geometry& g, const std::uint32_t* first, const std::uint32_t* second) {
-    for (std::uint32_t j = 0; n > 0 && j < most_lanes; ++j) at[n + j] = at[n - 1];
-    for (std::uint32_t j = 0; n > 0 && j < n + most_lanes; ++j)
-      pair_vertices<kind>(g, first[at[j]], second[at[j]], vertices[j]);
+    const std::uint32_t filled = (n + most_lanes - 1) / most_lanes * most_lanes;
+    for (std::uint32_t j = n; j < filled; ++j) at[j] = at[n - 1];
+    for (std::uint32_t j = 0; j < filled; ++j) pair_vertices<kind>(g, first[at[j]], second[at[j]], vertices[j]);
   }
 };
 
