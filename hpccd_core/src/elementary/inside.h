@@ -59,10 +59,10 @@ HPCCD_HD Verdict<R> inside(const Motion<R>& m, const Magnitudes<R>& size, R t, R
   const R sign = select(signed_n < R(0), R(-1), R(1));
   const R n = sign * signed_n, alpha = sign * component(pb), beta = sign * component(ap);
   const R relative =
-      Policy::borders_inside ? R(-24 * Policy::bound * half_ulp<R>()) : R(24 * half_ulp<R>()) + R(9) * delta;
+      Policy::borders_inside ? R(-24 * Policy::border * half_ulp<R>()) : R(24 * half_ulp<R>()) + R(9) * delta;
   R e_n = relative * size.a * size.b, e_alpha = relative * size.p * size.b, e_beta = relative * size.a * size.p;
   if constexpr (coordinate_error<R>() > 0) {
-    const R off(2 * coordinate_error<R>() * (Policy::borders_inside ? -Policy::bound : 1));
+    const R off(2 * coordinate_error<R>() * (Policy::borders_inside ? -Policy::border : 1));
     e_n = e_n + off * (size.a + size.b), e_alpha = e_alpha + off * (size.p + size.b);
     e_beta = e_beta + off * (size.a + size.p);
   }
