@@ -72,9 +72,10 @@ HANDED_OUT = {"vf": 2 * NUMBER + 8, "ee": 4 * NUMBER + 8}
 
 TABLE = (
     Item("bounds", "position_bytes", Work(read=1), "motion_bounds.cpp: both ends, as they were given"),
-    Item("bounds", "vertices", Work(written=VERTEX_MOTION + ROUNDED_MOTION + BOX + VERTEX_KDOP, comparisons=18, flops=12 + 52),
-         "copy_motion(): 6 coordinates of 2 operations, 16 values of a k-DOP of 3 and 4 doublings; extent_of(): minimum, "
-         "maximum and range of 6 coordinates"),
+    Item("bounds", "vertices",
+         Work(written=VERTEX_MOTION + ROUNDED_MOTION + BOX + VERTEX_KDOP, comparisons=18, flops=12 + 52),
+         "copy_motion(): 6 coordinates of 2 operations, 16 values of a k-DOP of 3 and 4 doublings; extent_of(): "
+         "minimum, maximum and range of 6 coordinates"),
     Item("refit", "vertices",
          Work(read=BOX + VERTEX_KDOP + NUMBER, written=COORDINATES, comparisons=BOX_COMPARISONS + KDOP_COMPARISONS),
          "leaf_bounds(), join_kdops(): box and k-DOP joined with the leaf's, coordinates written to their lanes; most "
