@@ -61,7 +61,7 @@ def test_work_is_counted_by_the_program_and_the_scene():
     assert found["position_bytes"] == 2 * 4 * 12
     assert found["leaf_visits"] == 2 * 10 - 1
     assert (found["candidates"], found["tested"]) == (96, 48)
-    assert (found["vf_survivors"], found["vf_rooted"], found["ee_rooted"], found["ee_contacts"]) == (16, 8, 4, 2)
+    assert (found["vf_outside"], found["vf_rooted"], found["ee_rooted"], found["ee_contacts"]) == (8, 8, 4, 2)
     assert {item.count for item in TABLE} <= found.keys() and all(item.how for item in TABLE)
     nodes = limit_work.of_stage("nodes", found)
     assert (nodes.read, nodes.touched, nodes.comparisons) == (64, 100 * 128 + 10 * 304, 100 * 12 + 10 * 44)
