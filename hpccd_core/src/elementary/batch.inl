@@ -70,15 +70,10 @@ HPCCD_HD void seek_roots(const Geometry& g, const PairList& list, Sorted& sorted
 }
 
 template <Kind kind>
-void list_pairs(const Geometry& g, const std::uint32_t* first, const std::uint32_t* second, std::uint32_t n,
-                PairList& list, BatchCounts& counts) {
+void list_touching(const Geometry& g, const std::uint32_t* first, const std::uint32_t* second, std::uint32_t n,
+                   PairList& list, BatchCounts& counts) {
   const std::uint64_t began = ticks();
-  if (!g.kdops)
-    list_all<kind>(g, first, second, n, list);
-  else if (g.until < 1)
-    list_near<kind>(until(g), g, first, second, n, list);
-  else
-    list_near<kind>(Apart(), g, first, second, n, list);
+  list_pairs<kind>(Apart(), g, g.rounded ? Rows(g.rounded) : Rows(g.vertices), first, second, n, list);
   if (const std::uint64_t now = ticks(); now > began) counts.kdop_ticks += now - began;  // else on another core
   counts.tested += n;
   counts.kdop += n - list.n;
@@ -100,7 +95,7 @@ void test_proven(const Geometry& g, const std::uint32_t* first, const std::uint3
                  BatchResult& result) {
   result.n_contacts = 0;
   PairList list;
-  list_pairs<kind>(g, first, second, n, list, result.counts);
+  list_touching<kind>(g, first, second, n, list, result.counts);
   Chosen undecided;
   All all{list.n};
   if (g.rounded) {
@@ -124,7 +119,7 @@ void test_likely(const Geometry& g, const std::uint32_t* first, const std::uint3
                  BatchResult& result) {
   result.n_contacts = 0;
   PairList list;
-  list_pairs<kind>(g, first, second, n, list, result.counts);
+  list_touching<kind>(g, first, second, n, list, result.counts);
   Chosen open, undecided;
   All all{list.n};
   Sorted sorted;

@@ -36,12 +36,7 @@ void test_separation(const Geometry& g, const std::uint32_t* first, const std::u
                      BatchResult& result) {
   result.n_contacts = 0;
   PairList list;
-  if (!g.kdops)
-    list_all<kind>(g, first, second, n, list);
-  else if (g.until < 1)
-    list_near<kind>(until(g), g, first, second, n, list);
-  else
-    list_near<kind>(ApartByMore{load16(g.margin.in)}, g, first, second, n, list);
+  list_pairs<kind>(ApartByMore{load16(g.margin.in)}, g, Rows(g.vertices), first, second, n, list);
   const auto separations_of = [&](const auto& of) {
     return separations(g, [&](int lane) { return separation_at(g, list.at[of[lane]], list.vertices[of[lane]]); });
   };
@@ -98,26 +93,28 @@ void test_proximity(const Geometry& g, const std::uint32_t* first, const std::ui
                     BatchResult& result) {
   result.n_contacts = result.n_undecided = 0;
   std::uint64_t none = 0;
-  for_groups<FeaturesInSnapshot<kind>>(g, first, second, nullptr, n,
-                                       [&](const Snapshot<Double>& s, const std::uint32_t* at, unsigned valid) {
-                                         const Double limits = separations(g, [&](int lane) {
-                                           std::uint32_t v[4];
-                                           pair_vertices<kind>(g, first[at[lane]], second[at[lane]], v);
-                                           return separation_at(g, at[lane], v);
-                                         });
-                                         const NearOrFar<Double> found = proximity_test<kind>(s, limits);
-                                         const unsigned near = bits(found.near) & valid, far = bits(found.far) & valid;
-                                         alignas(64) double distance[double_width];
-                                         __builtin_memcpy(distance, &found.distance, sizeof distance);
-                                         for (unsigned lanes = near; lanes; lanes &= lanes - 1) {
-                                           const int lane = __builtin_ctz(lanes);
-                                           result.contact[result.n_contacts] = at[lane];
-                                           result.toc[result.n_contacts] = distance[lane];
-                                           result.delta[result.n_contacts++] = 0;
-                                         }
-                                         append(result.undecided, result.n_undecided, at, valid & ~near & ~far);
-                                         none += static_cast<unsigned>(__builtin_popcount(far));
-                                       });
+  const auto limits_of = [&](const std::uint32_t* at) {
+    return separations(g, [&](int lane) {
+      std::uint32_t v[4];
+      pair_vertices<kind>(g, first[at[lane]], second[at[lane]], v);
+      return separation_at(g, at[lane], v);
+    });
+  };
+  const auto test = [&](const Snapshot<Double>& s, const std::uint32_t* at, unsigned valid) {
+    const NearOrFar<Double> found = proximity_test<kind>(s, limits_of(at));
+    const unsigned near = bits(found.near) & valid, far = bits(found.far) & valid;
+    alignas(64) double distance[double_width];
+    __builtin_memcpy(distance, &found.distance, sizeof distance);
+    for (unsigned lanes = near; lanes; lanes &= lanes - 1) {
+      const int lane = __builtin_ctz(lanes);
+      result.contact[result.n_contacts] = at[lane];
+      result.toc[result.n_contacts] = distance[lane];
+      result.delta[result.n_contacts++] = 0;
+    }
+    append(result.undecided, result.n_undecided, at, valid & ~near & ~far);
+    none += static_cast<unsigned>(__builtin_popcount(far));
+  };
+  for_groups<FeaturesInSnapshot<kind>>(g, first, second, nullptr, n, test);
   result.counts.tested += n;
   result.counts.separated += none;
   result.counts.contacts += result.n_contacts;
