@@ -314,17 +314,24 @@ class Builder {
               [](const Centroid& a, const Centroid& b) { return a.number < b.number; });
     Corners corners = corners_of(r);
     std::copy_n(corners.begin(), corners.size(), &tree_.corners[leaf.first_corner]);
-    CornersOf& corners_of = tree_.corners_of[i];
-    for (std::uint32_t k = r.begin; k < r.end; ++k) {
-      const std::uint32_t c = primitives_[k].number;
+    CornersOf& corners_of = tree_.corners_of[i] = {};
+    for (std::uint32_t p = r.begin; p < r.end; ++p) {
+      const std::uint32_t c = primitives_[p].number;
       if (c < features_.n_faces()) {
-        for (int j = 0; j < 3; ++j) corners_of.face[j][face - leaf.first_face] = corners.add(features_.faces[c][j]);
+        const std::uint32_t k = face - leaf.first_face;
+        for (int j = 0; j < 3; ++j) {
+          const std::uint8_t corner = corners_of.face[j][k] = corners.add(features_.faces[c][j]);
+          corners_of.faces_at[corner] |= static_cast<std::uint16_t>(1u << k);
+        }
         tree_.face_of_slot[face++] = c;
       }
       for (auto e = features_.first_edge[c]; e < features_.first_edge[c + 1]; ++e) {
         const std::uint32_t number = features_.owned_edges[e];
-        for (int j = 0; j < 2; ++j)
-          corners_of.edge[j][edge - leaf.first_edge] = corners.add(features_.edges[number][j]);
+        const std::uint32_t k = edge - leaf.first_edge;
+        for (int j = 0; j < 2; ++j) {
+          const std::uint8_t corner = corners_of.edge[j][k] = corners.add(features_.edges[number][j]);
+          corners_of.edges_at[corner] |= 1u << k;
+        }
         tree_.edge_of_slot[edge++] = number;
       }
       for (auto v = features_.first_vertex[c]; v < features_.first_vertex[c + 1]; ++v)

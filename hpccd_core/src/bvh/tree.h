@@ -102,11 +102,15 @@ struct LeafRange {
 };
 
 // Which corners of their leaf its features have, by number within the leaf; zeros behind the last. Its vertices are the
-// first corners themselves.
+// first corners themselves. And the other way round: a bit for each feature that has a corner.
 struct alignas(64) CornersOf {
   static constexpr std::uint32_t most_edges = 32, most_faces = 16;  // multiples of CornerRow::width
+  static constexpr std::uint32_t most_corners = 24;
   std::uint8_t edge[2][most_edges] = {}, face[3][most_faces] = {};
+  std::uint32_t edges_at[most_corners] = {};
+  std::uint16_t faces_at[most_corners] = {};
 };
+static_assert(sizeof(CornersOf) == 256);
 
 // The leaves below one node, up to sixteen of one mesh, with their boxes in lanes, a row for each bound: pairs of
 // leaves are looked for sixteen at a time, in place of the last four levels of the tree.
@@ -122,7 +126,7 @@ struct Tree {
   static constexpr std::uint32_t leaf_size = 8;
   static constexpr std::uint32_t load_width = CornerRow::width;  // numbers of features are loaded as many at a time
   static_assert(3 * leaf_size <= 2 * CornerRow::width && 3 * leaf_size <= CornersOf::most_edges &&
-                leaf_size <= CornersOf::most_faces);
+                leaf_size <= CornersOf::most_faces && 3 * leaf_size <= CornersOf::most_corners);
 
   std::vector<Node> nodes;  // breadth first: children come after their parents
   static constexpr std::uint32_t none = 0xFFFFFFFFu;

@@ -73,7 +73,8 @@ template <Kind kind>
 void list_touching(const Geometry& g, const std::uint32_t* first, const std::uint32_t* second, std::uint32_t n,
                    PairList& list, BatchCounts& counts) {
   const std::uint64_t began = ticks();
-  list_pairs<kind>(Apart(), g, g.rounded ? Rows(g.rounded) : Rows(g.vertices), first, second, n, list);
+  const auto list_before = [&](const auto* next) { list_pairs<kind>(Apart(), g, next, first, second, n, list); };
+  g.rounded ? list_before(g.rounded) : list_before(g.vertices);
   if (const std::uint64_t now = ticks(); now > began) counts.kdop_ticks += now - began;  // else on another core
   counts.tested += n;
   counts.kdop += n - list.n;

@@ -43,18 +43,9 @@ struct ApartUntil {
 // Values below eight, interpolated in floats, are off by 1.5e-6 each.
 HPCCD_HD ApartUntil until(const Geometry& g) { return {load16(g.margin.in) + all16(4e-6f), all16(g.until)}; }
 
-// Rows of vertices, of which those of a pair are fetched ahead.
-struct Rows {
-  const char* begin;
-  std::size_t size;
-  template <class Row>
-  HPCCD_HD explicit Rows(const Row* rows) : begin(reinterpret_cast<const char*>(rows)), size(sizeof *rows) {}
-  HPCCD_HD void fetch(std::uint32_t number) const { __builtin_prefetch(begin + size * number); }
-};
-
-// The pairs that are not apart. `next`: what the test after this one reads of them.
-template <Kind kind, class AreApart>
-HPCCD_HD void list_near(const AreApart& apart, const Geometry& g, Rows next, const std::uint32_t* first,
+// The pairs that are not apart. `next`: what the test after this one reads of them, by vertex.
+template <Kind kind, class AreApart, class Row>
+HPCCD_HD void list_near(const AreApart& apart, const Geometry& g, const Row* next, const std::uint32_t* first,
                         const std::uint32_t* second, std::uint32_t n, PairList& near) {
   std::uint32_t count = 0;
   for (std::uint32_t i = 0; i < n; ++i) {
@@ -63,7 +54,7 @@ HPCCD_HD void list_near(const AreApart& apart, const Geometry& g, Rows next, con
     const auto at = [&](int k) { return kdop_at(g.kdops, v[k]); };
     near.at[count] = i;  // kept only if counted
     // The processor does not see it come: a twentieth of a step's time, though as much is fetched for what is not kept.
-    for (int k = 0; k < 4; ++k) next.fetch(v[k]);
+    for (int k = 0; k < 4; ++k) __builtin_prefetch(next + v[k]);
     if constexpr (kind == Kind::vertex_face)
       count += !apart(at(0), both(at(1), both(at(2), at(3))));
     else
@@ -74,8 +65,8 @@ HPCCD_HD void list_near(const AreApart& apart, const Geometry& g, Rows next, con
 }
 
 // All pairs where there are no k-DOPs, else those that may be near up to the time that matters.
-template <Kind kind, class AreApart>
-HPCCD_HD void list_pairs(const AreApart& apart, const Geometry& g, Rows next, const std::uint32_t* first,
+template <Kind kind, class AreApart, class Row>
+HPCCD_HD void list_pairs(const AreApart& apart, const Geometry& g, const Row* next, const std::uint32_t* first,
                          const std::uint32_t* second, std::uint32_t n, PairList& list) {
   if (!g.kdops)
     list_all<kind>(g, first, second, n, list);

@@ -6,23 +6,24 @@
 namespace hpccd::HPCCD_ISA {
 namespace {
 
-#include "traverse/leaf_features.inl"
+#include "traverse/candidate_rows.inl"
+#include "traverse/sharing.inl"
 
 // These edges of a against these faces of b: one by one the faces, of which a leaf has fewer.
 template <class A, class B>
 HPCCD_HD void edges_against_faces(const LeafFeatures& a, const LeafFeatures& b, const typename A::Lanes& lanes_a,
-                                  unsigned edges_a, unsigned faces_b, CandidateBuffer& out) {
+                                  const Sharing& shared, unsigned edges_a, unsigned faces_b, CandidateBuffer& out) {
   if (!edges_a || !faces_b) return;
   const FeatureBoxes<B, 3> boxes(b);
+  CandidateRows rows;
   for_each(faces_b, [&](std::uint32_t k) {
-    unsigned m = typename A::Outcodes({}, a, lanes_a, boxes[k]).edges(a) & edges_a;
-    if (!m) return;
     const auto& corner = b.corners_of->face;
-    const typename A::Shared shared(a, b.corners[corner[0][k]], b.corners[corner[1][k]], b.corners[corner[2][k]]);
-    if (shared.any) m &= shared.edges_without(a);
-    for (std::uint32_t i = 0; i < 32 && m >> i; i += 16)
-      append_pairs<false>(out.second, out.first, out.n, b.faces[k], a.edges + i, m >> i & 0xFFFF);
+    const unsigned m = edges_a &
+                       ~(shared.edges[corner[0][k]] | shared.edges[corner[1][k]] | shared.edges[corner[2][k]]) &
+                       typename A::Outcodes({}, a, lanes_a, boxes[k]).edges(a);
+    rows.add(b.faces[k], m);
   });
+  rows.append_to(out.second, out.first, out.n, a.edges, a.n_edges);
 }
 
 }  // namespace
@@ -38,11 +39,17 @@ void leaf_edge_faces(const Tree& tree, const LeafRange& a, const LeafRange& b, C
     const typename A::Lanes lanes_a({}, leaf_a);
     const typename A::Outcodes near_a({}, leaf_a, lanes_a, bounds_of(node_b));
     const unsigned edges_a = near_a.edges(leaf_a), faces_a = near_a.faces(leaf_a);
-    if (&a == &b) return edges_against_faces<A, A>(leaf_a, leaf_a, lanes_a, edges_a, faces_a, edge_face);
+    Sharing a_with_b, b_with_a;
+    if (&a == &b) {
+      find_own(leaf_a, a_with_b);
+      return edges_against_faces<A, A>(leaf_a, leaf_a, lanes_a, a_with_b, edges_a, faces_a, edge_face);
+    }
     const typename B::Lanes lanes_b({}, leaf_b);
     const typename B::Outcodes near_b({}, leaf_b, lanes_b, bounds_of(node_a));
-    edges_against_faces<A, B>(leaf_a, leaf_b, lanes_a, edges_a, near_b.faces(leaf_b), edge_face);
-    edges_against_faces<B, A>(leaf_b, leaf_a, lanes_b, near_b.edges(leaf_b), faces_a, edge_face);
+    if (node_a.mesh == node_b.mesh)
+      find_shared(leaf_a, near_a.corners(leaf_a), leaf_b, near_b.corners(leaf_b), a_with_b, b_with_a);
+    edges_against_faces<A, B>(leaf_a, leaf_b, lanes_a, b_with_a, edges_a, near_b.faces(leaf_b), edge_face);
+    edges_against_faces<B, A>(leaf_b, leaf_a, lanes_b, a_with_b, near_b.edges(leaf_b), faces_a, edge_face);
   });
 }
 

@@ -153,6 +153,12 @@ struct LeafFeatures {
 
 HPCCD_HD constexpr std::uint32_t first_bits(std::uint32_t n) { return n >= 32 ? ~0u : (1u << n) - 1; }
 
+// f(number) for each bit.
+template <class Function>
+HPCCD_HD void for_each(unsigned bits, Function&& f) {
+  for (; bits; bits &= bits - 1) f(static_cast<std::uint32_t>(__builtin_ctz(bits)));
+}
+
 // How a leaf is read: with one or two groups of corners, whose boxes have grown or not (Tree::grown).
 template <class When, bool many, bool grown>
 struct Leaves {
@@ -231,14 +237,15 @@ struct Leaves {
       const auto& corner = leaf.corners_of->face;
       return near16<3>({corner[0], corner[1], corner[2]}) & first_bits(leaf.n_faces);
     }
-    HPCCD_HD unsigned vertices(const LeafFeatures& leaf) const {
+    HPCCD_HD unsigned vertices(const LeafFeatures& leaf) const { return corners(leaf) & first_bits(leaf.n_vertices); }
+    HPCCD_HD unsigned corners(const LeafFeatures& leaf) const {
       unsigned m = 0;
       for (std::uint32_t g = 0; g < groups; ++g) {
         Bytes16 beyond = of[0][g];
         if constexpr (When::sets > 1) beyond = beyond | of[1][g];
         m |= zeros(beyond) << (16 * g);
       }
-      return m & first_bits(leaf.n_vertices);
+      return m & first_bits(leaf.n_corners);
     }
   };
 
@@ -248,34 +255,6 @@ struct Leaves {
     else
       return picked(of[0], load_bytes(which));
   }
-
-  // Which corners are one of these vertices, a byte each; false: none.
-  struct Shared {
-    Bytes16 of[groups];
-    bool any = false;
-    template <class... Vertex>
-    HPCCD_HD Shared(const LeafFeatures& leaf, Vertex... v) {
-      unsigned bits[groups], all = 0;
-      for (std::uint32_t g = 0; g < groups; ++g) all |= bits[g] = (equal16(leaf.corners + 16 * g, v) | ...);
-      if (!(any = all != 0)) return;
-      for (std::uint32_t g = 0; g < groups; ++g) of[g] = bits_to_bytes(bits[g]);
-    }
-    template <std::uint32_t n>
-    HPCCD_HD unsigned none16(const std::uint8_t* const (&which)[n]) const {
-      Bytes16 one = corner_bytes(of, which[0]);
-      for (std::uint32_t j = 1; j < n; ++j) one = one | corner_bytes(of, which[j]);
-      return zeros(one);
-    }
-    HPCCD_HD unsigned edges_without(const LeafFeatures& leaf) const {
-      const auto& end = leaf.corners_of->edge;
-      const unsigned m = none16<2>({end[0], end[1]});
-      return leaf.n_edges > 16 ? m | none16<2>({end[0] + 16, end[1] + 16}) << 16 : m;
-    }
-    HPCCD_HD unsigned faces_without(const LeafFeatures& leaf) const {
-      const auto& corner = leaf.corners_of->face;
-      return none16<3>({corner[0], corner[1], corner[2]});
-    }
-  };
 
   // The box of one corner, where it lies.
   struct CornerBox {
@@ -351,19 +330,6 @@ class FeatureBoxes {
   const std::uint8_t* corner_;  // row by row, `most` in each
   alignas(64) float bounds_[picks_at_once ? n_bounds : 1][most];
 };
-
-// Appends the pairs of `number` with those of the features from `others` on that are in m.
-template <bool ascending>
-HPCCD_HD void append(CandidateBuffer& out, std::uint32_t number, const std::uint32_t* others, unsigned m) {
-  append_pairs<ascending>(out.first, out.second, out.n, number, others, m & 0xFFFF);
-  if (m >> 16) append_pairs<ascending>(out.first, out.second, out.n, number, others + 16, m >> 16);
-}
-
-// f(number) for each bit.
-template <class Function>
-HPCCD_HD void for_each(unsigned bits, Function&& f) {
-  for (; bits; bits &= bits - 1) f(static_cast<std::uint32_t>(__builtin_ctz(bits)));
-}
 
 // Calls f with how each of them is to be read.
 template <class When, class Function>

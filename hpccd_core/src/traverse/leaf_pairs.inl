@@ -6,47 +6,62 @@
 namespace hpccd::HPCCD_ISA {
 namespace {
 
-#include "traverse/leaf_features.inl"
+#include "traverse/candidate_rows.inl"
+#include "traverse/sharing.inl"
 
-// These edges of a, one by one, against these of b.
-template <class A, class B, class When>
-HPCCD_HD void edge_pairs(When when, const LeafFeatures& a, const LeafFeatures& b, const typename B::Lanes& lanes_b,
-                         unsigned edges_a, unsigned edges_b, CandidateBuffer& out) {
-  const bool same = a.rows == b.rows;
-  const FeatureBoxes<A, 2> boxes(a);
-  for_each(edges_a, [&](std::uint32_t k) {
-    unsigned m = typename B::Outcodes(when, b, lanes_b, boxes[k]).edges(b) & edges_b;
-    if (same) m &= ~first_bits(k + 1);
-    if (!m) return;
-    const auto& end = a.corners_of->edge;
-    const typename B::Shared shared(b, a.corners[end[0][k]], a.corners[end[1][k]]);
-    if (shared.any) m &= shared.edges_without(b);
-    append<true>(out, a.edges[k], b.edges, m);
-  });
+// From pair `begin` on: of two edges the one with the lower number comes first. By whole rows, into the room behind the
+// last pair: loops of a few turns cost more than what they do.
+HPCCD_HD void put_in_order(CandidateBuffer& out, std::uint32_t begin) {
+  for (std::uint32_t row = begin; row < out.n; row += Tree::load_width)
+    for (std::uint32_t i = row; i < row + Tree::load_width; ++i) {
+      const std::uint32_t x = out.first[i], y = out.second[i];
+      out.first[i] = x < y ? x : y, out.second[i] = x < y ? y : x;
+    }
 }
 
-// These vertices of a, one by one, against these faces of b.
+// These edges of a, one by one, against these edges of b.
+template <class A, class B, class When>
+HPCCD_HD void edge_pairs(When when, const LeafFeatures& a, const LeafFeatures& b, const typename B::Lanes& lanes_b,
+                         const Sharing& shared, unsigned edges_a, unsigned edges_b, CandidateBuffer& out) {
+  const bool same = a.rows == b.rows;
+  const FeatureBoxes<A, 2> boxes(a);
+  const auto& end = a.corners_of->edge;
+  CandidateRows rows;
+  for_each(edges_a, [&](std::uint32_t k) {
+    unsigned m = edges_b & ~(shared.edges[end[0][k]] | shared.edges[end[1][k]]);
+    if (same) m &= ~first_bits(k + 1);
+    rows.add(a.edges[k], typename B::Outcodes(when, b, lanes_b, boxes[k]).edges(b) & m);
+  });
+  const std::uint32_t begin = out.n;
+  rows.append_to(out.first, out.second, out.n, b.edges, b.n_edges);
+  put_in_order(out, begin);
+}
+
+// These vertices of a, one by one, against these faces of b. `shared` may be missing.
 template <class A, class B, class When>
 HPCCD_HD void vertex_face_pairs(When when, const LeafFeatures& a, const LeafFeatures& b,
-                                const typename B::Lanes& lanes_b, unsigned vertices_a, unsigned faces_b,
-                                CandidateBuffer& out) {
+                                const typename B::Lanes& lanes_b, const Sharing* shared, unsigned vertices_a,
+                                unsigned faces_b, CandidateBuffer& out) {
+  CandidateRows rows;
   for_each(vertices_a, [&](std::uint32_t k) {
-    unsigned m = typename B::Outcodes(when, b, lanes_b, A::box_of(a, k)).faces(b) & faces_b;
-    if (!m) return;
-    const typename B::Shared shared(b, a.corners[k]);
-    if (shared.any) m &= shared.faces_without(b);
-    append<false>(out, a.corners[k], b.faces, m);
+    const std::uint32_t vertex = a.corners[k];
+    const unsigned others =
+        faces_b & ~(shared ? shared->faces[k] : FeaturesAt(b, first_bits(b.n_corners), vertex).faces);
+    rows.add(vertex, others & typename B::Outcodes(when, b, lanes_b, A::box_of(a, k)).faces(b));
   });
+  rows.append_to(out.first, out.second, out.n, b.faces, b.n_faces);
 }
 
 template <class Kernel, class When>
 HPCCD_HD void pairs_within(When when, const LeafFeatures& leaf, TestedFeatures tested, CandidateBuffer& edge_edge,
                            CandidateBuffer& vertex_face) {
   const typename Kernel::Lanes lanes(when, leaf);
+  Sharing own;
+  find_own(leaf, own);
   const unsigned edges = first_bits(leaf.n_edges), vertices = first_bits(leaf.n_vertices);
-  if (tested.edge_edge) edge_pairs<Kernel, Kernel>(when, leaf, leaf, lanes, edges, edges, edge_edge);
+  if (tested.edge_edge) edge_pairs<Kernel, Kernel>(when, leaf, leaf, lanes, own, edges, edges, edge_edge);
   if (!tested.vertex_face) return;
-  vertex_face_pairs<Kernel, Kernel>(when, leaf, leaf, lanes, vertices, first_bits(leaf.n_faces), vertex_face);
+  vertex_face_pairs<Kernel, Kernel>(when, leaf, leaf, lanes, &own, vertices, first_bits(leaf.n_faces), vertex_face);
 }
 
 // Only what is near the other leaf's box is looked at one by one.
@@ -59,17 +74,23 @@ HPCCD_HD void pairs_between(When when, const LeafFeatures& a, const LeafFeatures
   const typename A::Outcodes near_a(when, a, lanes_a, bounds_of(node_b));
   const typename B::Outcodes near_b(when, b, lanes_b, bounds_of(node_a));
   const unsigned edges_a = tested.edge_edge ? near_a.edges(a) : 0, edges_b = near_b.edges(b);
-  if (edges_a && edges_b) {
+  const bool edges = edges_a && edges_b, neighbours = node_a.mesh == node_b.mesh;
+  Sharing a_with_b, b_with_a;
+  if (edges) {
+    if (neighbours) find_shared(a, near_a.corners(a), b, near_b.corners(b), a_with_b, b_with_a);
     // One by one the fewer.
     if (__builtin_popcount(edges_a) <= __builtin_popcount(edges_b))
-      edge_pairs<A, B>(when, a, b, lanes_b, edges_a, edges_b, edge_edge);
+      edge_pairs<A, B>(when, a, b, lanes_b, a_with_b, edges_a, edges_b, edge_edge);
     else
-      edge_pairs<B, A>(when, b, a, lanes_a, edges_b, edges_a, edge_edge);
+      edge_pairs<B, A>(when, b, a, lanes_a, b_with_a, edges_b, edges_a, edge_edge);
   }
   if (!tested.vertex_face) return;
+  const bool known = edges || !neighbours;  // not worth finding for a few vertices
   const unsigned faces_a = near_a.faces(a), faces_b = near_b.faces(b);
-  if (faces_b) vertex_face_pairs<A, B>(when, a, b, lanes_b, near_a.vertices(a), faces_b, vertex_face);
-  if (faces_a) vertex_face_pairs<B, A>(when, b, a, lanes_a, near_b.vertices(b), faces_a, vertex_face);
+  if (faces_b)
+    vertex_face_pairs<A, B>(when, a, b, lanes_b, known ? &a_with_b : nullptr, near_a.vertices(a), faces_b, vertex_face);
+  if (faces_a)
+    vertex_face_pairs<B, A>(when, b, a, lanes_a, known ? &b_with_a : nullptr, near_b.vertices(b), faces_a, vertex_face);
 }
 
 // Sixteen boxes of leaves.

@@ -207,14 +207,22 @@ HPCCD_HD unsigned equal16(const std::uint32_t* numbers, std::uint32_t x) {
   return _mm512_cmpeq_epi32_mask(_mm512_loadu_si512(numbers), _mm512_set1_epi32(static_cast<int>(x)));
 }
 
-template <bool ascending>
+struct Numbers16 {
+  __m512i v;
+};
+HPCCD_HD Numbers16 load_numbers(const std::uint32_t* numbers) { return {_mm512_loadu_si512(numbers)}; }
 HPCCD_HD void append_pairs(std::uint32_t* first, std::uint32_t* second, std::uint32_t& n, std::uint32_t number,
-                           const std::uint32_t* others, unsigned lanes) {
-  const __m512i x = _mm512_set1_epi32(static_cast<int>(number)), y = _mm512_loadu_si512(others);
-  const auto kept = static_cast<__mmask16>(lanes);
-  _mm512_storeu_si512(first + n, _mm512_maskz_compress_epi32(kept, ascending ? _mm512_min_epu32(x, y) : x));
-  _mm512_storeu_si512(second + n, _mm512_maskz_compress_epi32(kept, ascending ? _mm512_max_epu32(x, y) : y));
-  n += static_cast<unsigned>(__builtin_popcount(lanes));
+                           const Numbers16& others, unsigned lanes) {
+  const __m512i of_lanes = _mm512_maskz_compress_epi32(static_cast<__mmask16>(lanes), others.v);
+  const __m256i x = _mm256_set1_epi32(static_cast<int>(number));
+  const auto put = [&](std::uint32_t at, __m256i y) {
+    _mm256_storeu_si256(reinterpret_cast<__m256i*>(first + at), x);
+    _mm256_storeu_si256(reinterpret_cast<__m256i*>(second + at), y);
+  };
+  const auto count = static_cast<unsigned>(__builtin_popcount(lanes));
+  put(n, _mm512_castsi512_si256(of_lanes));
+  if (count > 8) put(n + 8, _mm512_extracti64x4_epi64(of_lanes, 1));  // seldom: three is the mean
+  n += count;
 }
 
 }  // namespace hpccd::avx512

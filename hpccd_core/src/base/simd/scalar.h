@@ -8,7 +8,7 @@
 
 #include "base/simd/four.h"
 #include "base/simd/lanes.h"
-#include "base/simd/one_by_one.h"
+#include "base/simd/numbers.h"
 #include "base/vec3.h"
 
 #define HPCCD_ISA scalar
@@ -291,11 +291,8 @@ HPCCD_HD unsigned equal16(const std::uint32_t* numbers, std::uint32_t x) {
   return bits;
 }
 
-// As append_one_by_one, with room for sixteen more behind the last pair.
-template <bool ascending>
-HPCCD_HD void append_pairs(std::uint32_t* first, std::uint32_t* second, std::uint32_t& n, std::uint32_t number,
-                           const std::uint32_t* others, unsigned lanes) {
-  append_one_by_one<ascending>(first, second, n, number, others, lanes);
-}
+// Sixteen numbers.
+using Numbers16 = NumbersInMemory;
+HPCCD_HD Numbers16 load_numbers(const std::uint32_t* numbers) { return {numbers}; }
 
 }  // namespace hpccd::scalar

@@ -36,7 +36,7 @@ void test_separation(const Geometry& g, const std::uint32_t* first, const std::u
                      BatchResult& result) {
   result.n_contacts = 0;
   PairList list;
-  list_pairs<kind>(ApartByMore{load16(g.margin.in)}, g, Rows(g.vertices), first, second, n, list);
+  list_pairs<kind>(ApartByMore{load16(g.margin.in)}, g, g.vertices, first, second, n, list);
   const auto separations_of = [&](const auto& of) {
     return separations(g, [&](int lane) { return separation_at(g, list.at[of[lane]], list.vertices[of[lane]]); });
   };

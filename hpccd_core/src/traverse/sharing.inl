@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+// Features of two leaves that have a vertex in common: they are no candidates. Most pairs of leaves are neighbours on a
+// mesh (60 to 80 % on the published scenes), so what they share is found once, not feature by feature. Without branches:
+// which corners are shared no processor can guess. Part of leaf_pairs.inl and leaf_edge_faces.inl.
+
+#include "traverse/leaf_features.inl"
+
+// The features of a leaf that have a vertex, if that is one of these corners of it.
+struct FeaturesAt {
+  std::uint32_t corner;  // or one that no leaf has
+  std::uint32_t edges, faces;
+
+  HPCCD_HD FeaturesAt(const LeafFeatures& leaf, unsigned corners, std::uint32_t vertex) {
+    unsigned same = equal16(leaf.corners, vertex);
+    if (leaf.many) same |= equal16(leaf.corners + 16, vertex) << 16;
+    same &= corners;
+    const std::uint32_t number = static_cast<std::uint32_t>(__builtin_ctz(same | 1u << none)),
+                        all = same ? ~0u : 0, at = number & all;
+    corner = number, edges = leaf.corners_of->edges_at[at] & all, faces = leaf.corners_of->faces_at[at] & all;
+  }
+  static constexpr std::uint32_t none = 31;
+  static_assert(none >= CornersOf::most_corners);
+};
+
+// By corner of one leaf, the features of another that have it.
+struct Sharing {
+  std::uint32_t edges[FeaturesAt::none + 1] = {}, faces[FeaturesAt::none + 1] = {};
+  HPCCD_HD void set(std::uint32_t corner, std::uint32_t with_edges, std::uint32_t with_faces) {
+    edges[corner] = with_edges, faces[corner] = with_faces;
+  }
+};
+
+// What two leaves share, of these corners of each.
+HPCCD_HD void find_shared(const LeafFeatures& a, unsigned corners_a, const LeafFeatures& b, unsigned corners_b,
+                          Sharing& a_with_b, Sharing& b_with_a) {
+  for_each(corners_a, [&](std::uint32_t i) {
+    const FeaturesAt of_b(b, corners_b, a.corners[i]);
+    a_with_b.set(i, of_b.edges, of_b.faces);
+    b_with_a.set(of_b.corner, a.corners_of->edges_at[i], a.corners_of->faces_at[i]);
+  });
+}
+
+// What a leaf shares with itself.
+HPCCD_HD void find_own(const LeafFeatures& leaf, Sharing& own) {
+  for (std::uint32_t i = 0; i < leaf.n_corners; ++i) own.set(i, leaf.corners_of->edges_at[i], leaf.corners_of->faces_at[i]);
+}
