@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <bit>
 #include <limits>
+#include <utility>
 
 #include "gpu/device_contacts.cuh"
 #include "gpu/device_motion.cuh"
@@ -38,7 +39,7 @@ class DevicePipeline : public Pipeline {
     *host_counters_.data() = {};
     leaf_pairs_.reserve(4 * typical_size());
     contacts_.reserve(typical_size(), stream_);
-    motion_.reserve(features.n_vertices);
+    motion_.reserve(features.n_vertices, scene_.all_fast());
     hints_.reserve(stream_);
   }
 
@@ -121,6 +122,8 @@ class DevicePipeline : public Pipeline {
   template <class T>
   LaunchParams<T> last_frame() const;
   void copy_counters();
+  bool is_fast() const;
+  bool guessed_wrong(bool fast);
   bool grow_overflowed();
   bool lists_too_many() const;
 
@@ -149,7 +152,8 @@ class DevicePipeline : public Pipeline {
   DeviceNearList near_;
   std::size_t most_near_ = 0;
   bool gave_up_listing_ = false;
-  bool given_doubles_ = true;  // in the last frame
+  bool given_doubles_ = true;   // in the last frame
+  bool floats_suffice_ = true;  // in the last frame that asked
   Goal goal_ = Goal::results;
   Best best_;
   Query query_ = Query::contacts;
@@ -168,6 +172,7 @@ bool DevicePipeline::run_frame(Positions t0, Positions t1, double distance, Thre
   LaunchParams<T> params{};
   scene_.fill(params);
   if (query_ == Query::intersections) params.fits_edges = true;
+  params.fast = is_fast();
   params.time_only = for_earliest();
   params.until_best = best_.has_value(), params.best = best_.value_or(no_time);
   if (of_snapshot(query_))
@@ -187,6 +192,7 @@ bool DevicePipeline::run_frame(Positions t0, Positions t1, double distance, Thre
   if (goal_ == Goal::earliest_of_near) lists_.make_room(near_.most());
   for (bool again = true; again;) {
     if (goal_ != Goal::near_list) ++passes_;
+    params.in_floats = params.fast && floats_suffice_;
     launch(params);
     copy_counters();
     check(cudaEventRecord(counted_, stream_), "cudaEventRecord");
@@ -195,7 +201,8 @@ bool DevicePipeline::run_frame(Positions t0, Positions t1, double distance, Thre
     check(cudaEventSynchronize(counted_), "cudaEventSynchronize");
     if (c.bad) return false;
     if ((gave_up_listing_ = lists_too_many())) return true;
-    again = grow_overflowed();
+    again = guessed_wrong(params.fast);
+    again = grow_overflowed() || again;
   }
   // Before the results: their kernels bring the counters to the host once more.
   const u64 n_to_host = exact_last_time_ = c.to_host;
@@ -303,6 +310,18 @@ bool DevicePipeline::lists_too_many() const {
   const Counters& c = *host_counters_.data();
   return goal_ == Goal::near_list && (c.found_all + c.to_host > most_near_ || c.leaf_pairs > 8 * most_near_ ||
                                       c.all_survivors[0] + c.all_survivors[1] > 32 * most_near_);
+}
+
+// Whether all that the frame tests may be tested in single precision first.
+bool DevicePipeline::is_fast() const {
+  return query_ == Query::contacts && !best_ && goal_ != Goal::earliest_of_near && scene_.all_fast();
+}
+
+// Whether floats suffice only the device knows, and the kernels are launched before it says so: as in the last frame.
+// True where the frame must run again.
+bool DevicePipeline::guessed_wrong(bool fast) {
+  const bool suffice = host_counters_.data()->floats_suffice != 0;
+  return fast && std::exchange(floats_suffice_, suffice) != suffice;
 }
 
 // Makes room where a list was too short. True where the frame must run again.
