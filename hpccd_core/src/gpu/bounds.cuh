@@ -64,7 +64,8 @@ __device__ void see_whether_floats_suffice(const LaunchParams<T>& params) {
   const auto [stride, count] = EdgeSample::of(params.n_edges, edges_of_a_step);
   for (std::size_t i = threadIdx.x; i < count; i += blockDim.x) {
     const uint2 edge = params.edges[i * stride];
-    const T *from = params.given_t0 + 3 * static_cast<u64>(edge.x), *to = params.given_t0 + 3 * static_cast<u64>(edge.y);
+    const T *from = params.given_t0 + 3 * static_cast<u64>(edge.x),
+            *to = params.given_t0 + 3 * static_cast<u64>(edge.y);
     double length = 0;
     for (int k = 0; k < 3; ++k) length = fmax(length, fabs(double{from[k]} - double{to[k]}));
     lengths[i] = length;

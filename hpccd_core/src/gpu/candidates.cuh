@@ -17,7 +17,7 @@ struct CandidateState {
 };
 
 template <class T>
-__device__ void flush_survivors(const LaunchParams<T>& params, CandidateSpace& s, u32 kind, u32 n) {
+__device__ void flush_survivors(const LaunchParams<T>& params, CandidateQueue& s, u32 kind, u32 n) {
   __syncwarp();
   u64 base = 0;
   if (lane_number() == 0) base = atomicAdd(&params.counters->survivors[kind], static_cast<u64>(n));
@@ -36,14 +36,12 @@ __device__ __forceinline__ uint4 span_ends(u32 v0, u32 v1, u32 v2, u32 v3) {
   return {v[S::p_from], v[S::p_to], v[S::a_to], v[S::b_to]};
 }
 
-// What the first filter computes in: the motion of one vertex, how sure it must be, and how many blocks shall fit on a
-// multiprocessor.
+// What the first filter computes in: the motion of one vertex, and how sure it must be.
 template <class R>
 struct FilterIn;
 template <>
 struct FilterIn<double> {
   using Policy = Proven;
-  static constexpr int blocks = 5;
   template <class T>
   __device__ static Ends load(const LaunchParams<T>& params, u32 v) {
     return load_ends(params.vertices, v);
@@ -52,7 +50,6 @@ struct FilterIn<double> {
 template <>
 struct FilterIn<float> {
   using Policy = Likely;
-  static constexpr int blocks = 8;
   template <class T>
   __device__ static RoundedEnds load(const LaunchParams<T>& params, u32 v) {
     return load_rounded_ends(params.points, v);
@@ -74,7 +71,7 @@ __device__ __forceinline__ bool passes_filter(const LaunchParams<T>& params, uin
 
 // The last up to 32 candidates.
 template <Query query, class R, class T>
-__device__ __forceinline__ void filter_candidates(const LaunchParams<T>& params, CandidateSpace& s,
+__device__ __forceinline__ void filter_candidates(const LaunchParams<T>& params, CandidateQueue& s,
                                                   CandidateState& state) {
   __syncwarp();
   const u32 lane = lane_number(), n = state.n < 32 ? state.n : 32;
@@ -175,7 +172,7 @@ __device__ __forceinline__ uint2 stage_phase(const LaunchParams<T>& params, Cand
 
 // The filter stands in one place in the innermost loop: called as a function it costs 30 million spills on n-body,
 // repeated it overflows the code cache.
-template <Query query, class R, class T>
+template <Query query, class T>
 __device__ __forceinline__ void leaf_pair_candidates(const LaunchParams<T>& params, CandidateSpace& s,
                                                      CandidateState& state, uint2 pair) {
   constexpr bool edges_and_faces = query == Query::intersections;
@@ -206,21 +203,27 @@ __device__ __forceinline__ void leaf_pair_candidates(const LaunchParams<T>& para
         s.features[at] = pushed.features;
       }
       state.n += __popc(mask);
-      if (state.n >= 32) filter_candidates<query, R>(params, s, state);
+      if (state.n >= 32) filter_candidates<query, double>(params, s, state);
     }
     __syncwarp();
   }
 }
 
-template <Query query, class T, class R = double>
-__global__ __launch_bounds__(32 * candidate_warps,
-                             FilterIn<R>::blocks) void candidates_kernel(const __grid_constant__ LaunchParams<T>
-                                                                             params) {
-  if constexpr (sizeof(R) == sizeof(float))
-    if (!params.counters->floats_suffice) return;
-  __shared__ CandidateSpace spaces[candidate_warps];
-  CandidateSpace& s = spaces[threadIdx.x / 32];
-  CandidateState state;
+// What is left when there are no more pairs of leaves.
+template <Query query, class R, class T>
+__device__ __forceinline__ void finish_candidates(const LaunchParams<T>& params, CandidateQueue& s,
+                                                  CandidateState& state) {
+  if (state.n > 0) filter_candidates<query, R>(params, s, state);
+  for (u32 kind = 0; kind < 2; ++kind)
+    if (state.n_survivors[kind] > 0) flush_survivors(params, s, kind, state.n_survivors[kind]);
+  if (lane_number() == 0)
+    for (u32 kind = 0; kind < 2; ++kind)
+      atomicAdd(&params.counters->candidates[kind], static_cast<u64>(state.tested[kind]));
+}
+
+// A few pairs of leaves at a time, for as long as there are some in this segment.
+template <class T, class Function>
+__device__ __forceinline__ void for_leaf_pairs(const LaunchParams<T>& params, Function&& function) {
   constexpr u32 grain = 8;
   const u64 all = params.counters->leaf_pairs < params.leaf_pairs.capacity ? params.counters->leaf_pairs
                                                                            : params.leaf_pairs.capacity;
@@ -231,16 +234,21 @@ __global__ __launch_bounds__(32 * candidate_warps,
     if (lane_number() == 0) begin = from + atomicAdd(&params.counters->next_leaf_pair, static_cast<u64>(grain));
     begin = __shfl_sync(all_lanes, begin, 0);
     if (begin >= to) break;
-#pragma unroll 1
-    for (u64 k = begin; k < begin + grain && k < to; ++k)
-      leaf_pair_candidates<query, R>(params, s, state, params.leaf_pairs.pairs[k]);
+    function(begin, begin + grain < to ? begin + grain : to);
   }
-  if (state.n > 0) filter_candidates<query, R>(params, s, state);
-  for (u32 kind = 0; kind < 2; ++kind)
-    if (state.n_survivors[kind] > 0) flush_survivors(params, s, kind, state.n_survivors[kind]);
-  if (lane_number() == 0)
-    for (u32 kind = 0; kind < 2; ++kind)
-      atomicAdd(&params.counters->candidates[kind], static_cast<u64>(state.tested[kind]));
+}
+
+template <Query query, class T>
+__global__ __launch_bounds__(32 * candidate_warps,
+                             5) void candidates_kernel(const __grid_constant__ LaunchParams<T> params) {
+  __shared__ CandidateSpace spaces[candidate_warps];
+  CandidateSpace& s = spaces[threadIdx.x / 32];
+  CandidateState state;
+  for_leaf_pairs(params, [&](u64 begin, u64 end) {
+#pragma unroll 1
+    for (u64 k = begin; k < end; ++k) leaf_pair_candidates<query>(params, s, state, params.leaf_pairs.pairs[k]);
+  });
+  finish_candidates<query, double>(params, s, state);
 }
 
 }  // namespace hpccd::gpu

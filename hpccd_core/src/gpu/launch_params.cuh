@@ -95,6 +95,7 @@ struct LaunchParams {
   // Of a frame all of whose pairs are of the tier of that name, and touch or do not.
   bool fast;
   VertexKdop* kdops;
+  Kdop* leaf_kdops;
   bool in_floats;  // and which floats suffice for: the host's guess, before the counters say so
 
   // Of a frame that looks for the earliest contacts (best_time.cuh).

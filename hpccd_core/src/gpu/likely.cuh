@@ -61,8 +61,9 @@ __device__ __forceinline__ bool kdops_apart(const VertexKdop* kdops, uint4 v) {
   return apart;
 }
 
-// What is found to touch must not be what k-DOPs say is apart: the CPU asks them first, of all pairs. What is left open
-// takes the place of the survivors, which nobody reads any more.
+// What is found to touch must not be what k-DOPs say is apart: the CPU asks them first, of all pairs; here they cost
+// more than the other filters, and come last. What is left open takes the place of the survivors, which nobody reads
+// any more.
 template <Kind kind, bool single, class T>
 __device__ __forceinline__ void seek_likely_roots(const LaunchParams<T>& params) {
   constexpr u32 k = kind == Kind::edge_edge;

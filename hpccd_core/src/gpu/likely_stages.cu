@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "gpu/candidates.cuh"
+#include "gpu/contact_candidates.cuh"
 #include "gpu/likely.cuh"
 #include "gpu/stages.cuh"
 
@@ -7,7 +7,7 @@ namespace hpccd::gpu {
 
 template <class T>
 void launch_likely(const LaunchParams<T>& params, const Stages& stages) {
-  stages.persistent(candidates_kernel<Query::contacts, T, float>, 32 * candidate_warps, params, "candidates_kernel");
+  stages.persistent(contact_candidates_kernel<float, T>, 32 * candidate_warps, params, "contact_candidates_kernel");
   stages.mark("candidates");
   stages.persistent(sort_survivors_kernel<T>, 128, params, "sort_survivors_kernel", 2);
   stages.mark("sort_survivors");

@@ -10,6 +10,7 @@
 #include "gpu/device_scene.cuh"
 #include "gpu/device_tree.cuh"
 #include "gpu/hints.cuh"
+#include "gpu/leaf_kdops.cuh"
 #include "gpu/pipeline.h"
 #include "gpu/refit.cuh"
 #include "gpu/stages.cuh"
@@ -52,7 +53,7 @@ class DevicePipeline : public Pipeline {
   void set_tree(const Tree& tree) override {
     check(cudaSetDevice(device_), "cudaSetDevice");
     check(cudaStreamSynchronize(stream_), "cudaStreamSynchronize");
-    tree_.set(features_, tree);
+    tree_.set(features_, tree, scene_.all_fast());
   }
 
   bool run(Positions t0, Positions t1, Best best, ThreadPool& pool) override {
@@ -240,6 +241,10 @@ void DevicePipeline::launch_tree(LaunchParams<T>& params) {
   const auto refit = grows_boxes(query_) || best_ ? refit_kernel<true, T> : refit_kernel<false, T>;
   refit<<<blocks_for(std::size_t{params.n_leaves} * 32, 128), 128, 0, stream_>>>(params);
   check_launch("refit_kernel");
+  if (params.in_floats) {
+    leaf_kdops_kernel<<<blocks_for(std::size_t{params.n_leaves} * 32, 128), 128, 0, stream_>>>(params);
+    check_launch("leaf_kdops_kernel");
+  }
   timer_.mark("refit", stream_);
   const auto traverse = of_snapshot(query_) ? traverse_kernel<true, T> : traverse_kernel<false, T>;
   traverse<<<blocks_for(params.n_leaves, traverse_warps), 32 * traverse_warps, 0, stream_>>>(params);
