@@ -140,9 +140,11 @@ __device__ FallbackAnswer fallback(const LaunchParams<T>& params, uint4 v) {
 // for its registers.
 template <bool separations, class T>
 __global__ __launch_bounds__(32) void fallback_kernel(const __grid_constant__ LaunchParams<T> params) {
-  const u64 n = length(params.counters->undecided, params.undecided_capacity),
-            stride = static_cast<u64>(gridDim.x) * blockDim.x;
-  for (u64 i = static_cast<u64>(blockIdx.x) * blockDim.x + threadIdx.x; i - lane_number() < n; i += stride) {
+  const u64 n = length(params.counters->undecided, params.undecided_capacity), n_warps = gridDim.x;
+  // A warp goes the ways of all its pairs: few are spread over many warps. Of many, neighbours go similar ways.
+  const bool few = n <= 8 * n_warps;
+  for (u64 begin = 0; begin < n; begin += 32 * n_warps) {
+    const u64 i = begin + (few ? lane_number() * n_warps + blockIdx.x : u64{blockIdx.x} * 32 + lane_number());
     FallbackAnswer answer{false, false, 0};
     u64 key = 0;
     uint2 pair{0, 0};
