@@ -5,16 +5,10 @@
 
 #include "elementary/distance/distance_batch.h"
 #include "paper/primitive_pairs.h"
+#include "scene/typical_edge.h"
 #include "traverse/traverse.h"
 
 namespace hpccd {
-namespace {
-
-// Of a typical edge, in the coordinates of the boxes. Where edges are shorter, floats are too coarse for a scene: it is
-// so large, or so fine, that too much would be left to the tests in double precision.
-constexpr double least_rounded_edge = 5e-4;
-
-}  // namespace
 
 CpuBackend::CpuBackend(Resources& shared)
     : shared_(shared),
@@ -57,8 +51,8 @@ void CpuBackend::see_motion(Positions t0, Positions t1, Tests tests) {
   search_.leaf_pairs_until = leaf_pairs_until(o.simd);
   search_.leaf_pairs_at_start = leaf_pairs_at_start(o.simd);
   const MotionBounds& motion = shared_.tree.motion();
-  constexpr std::size_t few = 64;  // each is a page of memory that nothing else needs now
-  const bool rounds = motion.map.scale * typical_length(shared_.features, motion.vertices, few) > least_rounded_edge;
+  const bool rounds =
+      floats_suffice(typical_length(shared_.features, motion.vertices, edges_of_a_step), motion.map.scale);
   search_.geometry.rounded = rounds ? motion.rounded.data() : nullptr;
   const bool here = tests == Tests::all_here;
   search_.report = !here && o.report == Report::any ? Report::all : o.report;

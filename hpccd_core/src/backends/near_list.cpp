@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "scene/typical_edge.h"
+
 namespace hpccd {
 namespace {
 
@@ -120,11 +122,12 @@ void Grouping::add(const Candidate& pair) {
 }
 
 double typical_length(const Features& features, const std::vector<VertexMotion>& vertices, std::size_t looked_at) {
-  const std::size_t n = features.edges.size(), stride = std::max<std::size_t>(1, n / looked_at);
+  const auto [stride, count] = EdgeSample::of(features.edges.size(), looked_at);
   double sum = 0;
-  std::size_t count = 0;
-  for (std::size_t i = 0; i < n; i += stride, ++count)
-    sum += largest(at(vertices[features.edges[i][0]].t0) - at(vertices[features.edges[i][1]].t0));
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto& [from, to] = features.edges[i * stride];
+    sum += largest(at(vertices[from].t0) - at(vertices[to].t0));
+  }
   return count > 0 ? sum / static_cast<double>(count) : 0;
 }
 

@@ -8,27 +8,34 @@
 
 namespace hpccd {
 
+// Whether two features are in the same order along a direction at both ends of the motion. place(end, i): where vertex
+// i is along it at that end.
+template <Kind kind, class Place>
+HPCCD_HD bool in_order(Place&& place) {
+  using R = decltype(place(0, 0));
+  constexpr int n_first = kind == Kind::vertex_face ? 1 : 2;
+  bool below = true, above = true;  // the first feature at both ends
+  for (int end = 0; end < 2; ++end) {
+    R low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY};
+    for (int i = 0; i < 4; ++i) {
+      const R x = place(end, i);
+      const int feature = i >= n_first;
+      low[feature] = lesser(low[feature], x);
+      high[feature] = greater(high[feature], x);
+    }
+    below = below && high[0] < low[1];
+    above = above && high[1] < low[0];
+  }
+  return below || above;
+}
+
 // Whether two features are apart along a direction of their k-DOPs or along an axis, in double precision. Whatever
 // boxes and k-DOPs of floats say is apart, this does: a tier whose fallback has a tolerance asks it first, so that its
 // answer does not depend on who filtered before.
 template <Kind kind>
 HPCCD_HD bool apart(const Vec3<double> t0[4], const Vec3<double> t1[4]) {
-  constexpr int n_first = kind == Kind::vertex_face ? 1 : 2;
-  for (int k = 0; k < n_kdop_directions + 3; ++k) {
-    bool below = true, above = true;  // the first feature at both ends
-    for (int end = 0; end < 2; ++end) {
-      double low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY};
-      for (int i = 0; i < 4; ++i) {
-        const double x = along(k, (end == 0 ? t0 : t1)[i]);
-        const int feature = i >= n_first;
-        low[feature] = lesser(low[feature], x);
-        high[feature] = greater(high[feature], x);
-      }
-      below = below && high[0] < low[1];
-      above = above && high[1] < low[0];
-    }
-    if (below || above) return true;
-  }
+  for (int k = 0; k < n_kdop_directions + 3; ++k)
+    if (in_order<kind>([&](int end, int i) { return along(k, (end == 0 ? t0 : t1)[i]); })) return true;
   return false;
 }
 

@@ -2,22 +2,14 @@
 // bvh/motion_bounds.cpp on the device: extent of the scene, then both ends and the box of each vertex. Same arithmetic.
 #pragma once
 
-#include "bvh/coordinate_map.h"
 #include "bvh/kdop.h"
 #include "bvh/tree.h"
 #include "gpu/best_time.cuh"
+#include "gpu/extent.cuh"
 #include "gpu/reach.h"
+#include "scene/typical_edge.h"
 
 namespace hpccd::gpu {
-
-// Bits of a double whose order as integers is the order of the numbers.
-__device__ inline u64 ordered_bits(double x) {
-  const u64 b = static_cast<u64>(__double_as_longlong(x));
-  return b >> 63 ? ~b : b | (u64{1} << 63);
-}
-__device__ inline double from_ordered_bits(u64 b) {
-  return __longlong_as_double(static_cast<long long>(b >> 63 ? b & ~(u64{1} << 63) : ~b));
-}
 
 template <class T>
 __global__ void extent_kernel(LaunchParams<T> params) {
@@ -64,17 +56,38 @@ __device__ inline float place_at(double time, double t0, double t1) {
 }
 inline constexpr float lost_by_place = 4.8e-7f;
 
-template <bool snapshot, class T>
+// backends/near_list.cpp, typical_length: one thread adds up what the threads of a block have looked up.
+template <class T>
+__device__ void see_whether_floats_suffice(const LaunchParams<T>& params) {
+  constexpr std::size_t most = 2 * edges_of_a_step;
+  __shared__ double lengths[most];
+  const auto [stride, count] = EdgeSample::of(params.n_edges, edges_of_a_step);
+  for (std::size_t i = threadIdx.x; i < count; i += blockDim.x) {
+    const uint2 edge = params.edges[i * stride];
+    const T *from = params.given_t0 + 3 * static_cast<u64>(edge.x),
+            *to = params.given_t0 + 3 * static_cast<u64>(edge.y);
+    double length = 0;
+    for (int k = 0; k < 3; ++k) length = fmax(length, fabs(double{from[k]} - double{to[k]}));
+    lengths[i] = length;
+  }
+  __syncthreads();
+  if (threadIdx.x != 0 || count == 0) return;
+  double sum = 0;
+  for (std::size_t i = 0; i < count; ++i) sum += lengths[i];
+  const double scale = SceneExtent(*params.counters).map().scale;
+  params.counters->floats_suffice = floats_suffice(sum / static_cast<double>(count), scale);
+}
+
+// fast: of a frame that asks for k-DOPs, and whether floats suffice.
+template <bool snapshot, bool fast, class T>
 __global__ void vertices_kernel(LaunchParams<T> params) {
+  if constexpr (fast)
+    if (blockIdx.x == 0) see_whether_floats_suffice(params);
   const u32 i = blockIdx.x * blockDim.x + threadIdx.x;
   if (i >= params.n_vertices) return;
-  double low[3], high[3], largest = 0;
-  for (int k = 0; k < 3; ++k) {
-    low[k] = from_ordered_bits(~params.counters->extent_low[k]);
-    high[k] = from_ordered_bits(params.counters->extent_high[k]);
-    largest = greater(largest, greater(magnitude(low[k]), magnitude(high[k])));
-  }
-  const CoordinateMap map = CoordinateMap::around(low, high);
+  const SceneExtent extent(*params.counters);
+  const CoordinateMap map = extent.map();
+  const double largest = extent.largest();
   const double part = params.until_best ? until(params) : 1;
   T a[3], b[3];
   DevicePoint point;
@@ -93,6 +106,7 @@ __global__ void vertices_kernel(LaunchParams<T> params) {
     for (int k = 0; k < 3; ++k) point.at[1].x[k] = slanted.along[k];
     point.at[1].tag = __float_as_uint(slanted_reach(reach));
   }
+  if constexpr (fast) params.kdops[i] = vertex_kdop({a[0], a[1], a[2]}, {b[0], b[1], b[2]}, map);
   set_ends(params.vertices[i], a, b);
   for (int end = 0; end < 2; ++end) store(&params.points[i].at[end], point.at[end]);
 }

@@ -10,16 +10,19 @@ namespace hpccd::gpu {
 inline constexpr u32 candidate_warps = 4;
 static_assert(3 * Tree::leaf_size <= 32, "a lane for each feature of a leaf");
 
-struct CandidateSpace {
+// Candidates that wait for the filter, and those that passed it.
+struct CandidateQueue {
+  uint4 vertices[64];  // those that p, a and b lead from and to (span_ends); not of a snapshot
+  uint2 features[64];
+  uint2 survivors[2][96];
+};
+
+struct CandidateSpace : CandidateQueue {
   // Features of the two leaves that overlap the other leaf, and their numbers. The four words of a box lie apart, so
   // that neighbouring lanes read neighbouring words.
   Bound bound[2][4][3 * Tree::leaf_size];
   u32 number[2][3 * Tree::leaf_size];
   u32 corner2[Tree::leaf_size];
-  // Candidates: the vertices that p, a and b lead from and to (span_ends; not of a snapshot), and the features.
-  uint4 vertices[64];
-  uint2 features[64];
-  uint2 survivors[2][96];
 
   __device__ void put(u32 side, u32 at, const DeviceBox& b) {
     for (int end = 0; end < 2; ++end)

@@ -17,7 +17,7 @@ struct CandidateState {
 };
 
 template <class T>
-__device__ void flush_survivors(const LaunchParams<T>& params, CandidateSpace& s, u32 kind, u32 n) {
+__device__ void flush_survivors(const LaunchParams<T>& params, CandidateQueue& s, u32 kind, u32 n) {
   __syncwarp();
   u64 base = 0;
   if (lane_number() == 0) base = atomicAdd(&params.counters->survivors[kind], static_cast<u64>(n));
@@ -36,22 +36,42 @@ __device__ __forceinline__ uint4 span_ends(u32 v0, u32 v1, u32 v2, u32 v3) {
   return {v[S::p_from], v[S::p_to], v[S::a_to], v[S::b_to]};
 }
 
+// What the first filter computes in: the motion of one vertex, and how sure it must be.
+template <class R>
+struct FilterIn;
+template <>
+struct FilterIn<double> {
+  using Policy = Proven;
+  template <class T>
+  __device__ static Ends load(const LaunchParams<T>& params, u32 v) {
+    return load_ends(params.vertices, v);
+  }
+};
+template <>
+struct FilterIn<float> {
+  using Policy = Likely;
+  template <class T>
+  __device__ static RoundedEnds load(const LaunchParams<T>& params, u32 v) {
+    return load_rounded_ends(params.points, v);
+  }
+};
+
 // Whether the first filter lets a pair pass. One piece of code for both kinds: they differ in where b starts.
-template <Query query, class T>
+template <Query query, class R, class T>
 __device__ __forceinline__ bool passes_filter(const LaunchParams<T>& params, uint4 v, bool edges) {
-  const Ends from = load_ends(params.vertices, v.x), p = load_ends(params.vertices, v.y),
-             a = load_ends(params.vertices, v.z), b = load_ends(params.vertices, v.w);
-  const Vec3<double> b_from0 = edges ? p.t0 : from.t0, b_from1 = edges ? p.t1 : from.t1;
-  const Motion<double> m{p.t0 - from.t0, a.t0 - from.t0, b.t0 - b_from0,
-                         p.t1 - from.t1, a.t1 - from.t1, b.t1 - b_from1};
+  using In = FilterIn<R>;
+  const auto from = In::load(params, v.x), p = In::load(params, v.y), a = In::load(params, v.z),
+             b = In::load(params, v.w);
+  const Vec3<R> b_from0 = edges ? p.t0 : from.t0, b_from1 = edges ? p.t1 : from.t1;
+  const Motion<R> m{p.t0 - from.t0, a.t0 - from.t0, b.t0 - b_from0, p.t1 - from.t1, a.t1 - from.t1, b.t1 - b_from1};
   // Without a separation both say the same, in every bit.
   if constexpr (query == Query::separations) return !planes_stay_apart(m, separation_of(params, v.x, v.y));
-  return !coplanarity_filter<Proven>(m).none;
+  return !coplanarity_filter<typename In::Policy>(m).none;
 }
 
 // The last up to 32 candidates.
-template <Query query, class T>
-__device__ __forceinline__ void filter_candidates(const LaunchParams<T>& params, CandidateSpace& s,
+template <Query query, class R, class T>
+__device__ __forceinline__ void filter_candidates(const LaunchParams<T>& params, CandidateQueue& s,
                                                   CandidateState& state) {
   __syncwarp();
   const u32 lane = lane_number(), n = state.n < 32 ? state.n : 32;
@@ -62,7 +82,7 @@ __device__ __forceinline__ void filter_candidates(const LaunchParams<T>& params,
     features = s.features[state.n + lane];
     edges = features.y & kind_bit;
     features.y &= ~kind_bit;
-    survives = of_snapshot(query) || passes_filter<query>(params, s.vertices[state.n + lane], edges);
+    survives = of_snapshot(query) || passes_filter<query, R>(params, s.vertices[state.n + lane], edges);
   }
 #pragma unroll
   for (u32 kind = 0; kind < 2; ++kind) {
@@ -183,18 +203,27 @@ __device__ __forceinline__ void leaf_pair_candidates(const LaunchParams<T>& para
         s.features[at] = pushed.features;
       }
       state.n += __popc(mask);
-      if (state.n >= 32) filter_candidates<query>(params, s, state);
+      if (state.n >= 32) filter_candidates<query, double>(params, s, state);
     }
     __syncwarp();
   }
 }
 
-template <Query query, class T>
-__global__ __launch_bounds__(32 * candidate_warps,
-                             5) void candidates_kernel(const __grid_constant__ LaunchParams<T> params) {
-  __shared__ CandidateSpace spaces[candidate_warps];
-  CandidateSpace& s = spaces[threadIdx.x / 32];
-  CandidateState state;
+// What is left when there are no more pairs of leaves.
+template <Query query, class R, class T>
+__device__ __forceinline__ void finish_candidates(const LaunchParams<T>& params, CandidateQueue& s,
+                                                  CandidateState& state) {
+  if (state.n > 0) filter_candidates<query, R>(params, s, state);
+  for (u32 kind = 0; kind < 2; ++kind)
+    if (state.n_survivors[kind] > 0) flush_survivors(params, s, kind, state.n_survivors[kind]);
+  if (lane_number() == 0)
+    for (u32 kind = 0; kind < 2; ++kind)
+      atomicAdd(&params.counters->candidates[kind], static_cast<u64>(state.tested[kind]));
+}
+
+// A few pairs of leaves at a time, for as long as there are some in this segment.
+template <class T, class Function>
+__device__ __forceinline__ void for_leaf_pairs(const LaunchParams<T>& params, Function&& function) {
   constexpr u32 grain = 8;
   const u64 all = params.counters->leaf_pairs < params.leaf_pairs.capacity ? params.counters->leaf_pairs
                                                                            : params.leaf_pairs.capacity;
@@ -205,16 +234,21 @@ __global__ __launch_bounds__(32 * candidate_warps,
     if (lane_number() == 0) begin = from + atomicAdd(&params.counters->next_leaf_pair, static_cast<u64>(grain));
     begin = __shfl_sync(all_lanes, begin, 0);
     if (begin >= to) break;
-#pragma unroll 1
-    for (u64 k = begin; k < begin + grain && k < to; ++k)
-      leaf_pair_candidates<query>(params, s, state, params.leaf_pairs.pairs[k]);
+    function(begin, begin + grain < to ? begin + grain : to);
   }
-  if (state.n > 0) filter_candidates<query>(params, s, state);
-  for (u32 kind = 0; kind < 2; ++kind)
-    if (state.n_survivors[kind] > 0) flush_survivors(params, s, kind, state.n_survivors[kind]);
-  if (lane_number() == 0)
-    for (u32 kind = 0; kind < 2; ++kind)
-      atomicAdd(&params.counters->candidates[kind], static_cast<u64>(state.tested[kind]));
+}
+
+template <Query query, class T>
+__global__ __launch_bounds__(32 * candidate_warps,
+                             5) void candidates_kernel(const __grid_constant__ LaunchParams<T> params) {
+  __shared__ CandidateSpace spaces[candidate_warps];
+  CandidateSpace& s = spaces[threadIdx.x / 32];
+  CandidateState state;
+  for_leaf_pairs(params, [&](u64 begin, u64 end) {
+#pragma unroll 1
+    for (u64 k = begin; k < end; ++k) leaf_pair_candidates<query>(params, s, state, params.leaf_pairs.pairs[k]);
+  });
+  finish_candidates<query, double>(params, s, state);
 }
 
 }  // namespace hpccd::gpu

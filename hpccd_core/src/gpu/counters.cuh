@@ -14,12 +14,15 @@ using u64 = unsigned long long;
 struct Counters {
   u64 extent_low[3], extent_high[3];  // largest of the ordered bits, low ones negated: zero is neutral
   u64 bad;                            // coordinates that are not acceptable
+  u64 floats_suffice;                 // of a fast frame: whether (scene/typical_edge.h)
   u64 node_tests;
   u64 leaf_pairs, next_leaf_pair;
   u64 survivors[2], single[2], many[2], separated[2];                                        // of the segment at work
   u64 all_survivors[2], all_single[2], all_many[2], most_survivors, most_single, most_many;  // of all segments
   u64 most_separated;
   u64 candidates[2], proven[2], undecided_of[2];
+  u64 open[2];    // of the segment at work: what single precision cannot tell
+  u64 missed[2];  // apart at their only root, as single precision has it: none of the lists that follow
   u64 apart[2], proven_near[2], undecided_near[2];  // of the tests that know a distance
   u64 found[2];                                     // by kind, after the fallback on the device
   u64 found_all, undecided, to_host;
@@ -37,8 +40,9 @@ inline BatchCounts batch_counts(const Counters& c, int kind) {
   b.coplanarity = c.candidates[kind] - c.all_survivors[kind];
   b.separated = c.apart[kind];
   const u64 by_distance = c.apart[kind] + c.proven_near[kind] + c.undecided_near[kind];
-  b.projection = c.all_survivors[kind] - by_distance - c.all_single[kind] - c.all_many[kind];
-  b.roots = c.all_single[kind] + c.all_many[kind] - c.proven[kind] - c.undecided_of[kind];
+  const u64 at_roots = c.all_single[kind] + c.all_many[kind] + c.missed[kind];
+  b.projection = c.all_survivors[kind] - by_distance - at_roots;
+  b.roots = at_roots - c.proven[kind] - c.undecided_of[kind];
   b.contacts = c.proven[kind] + c.proven_near[kind];
   b.undecided = c.undecided_of[kind] + c.undecided_near[kind];
   return b;

@@ -14,8 +14,8 @@ struct alignas(16) Bound {
   u32 tag;
 };
 
-// Where a vertex is at both ends of its motion; of a snapshot, where it is along the axes, and along the slanted
-// directions (bvh/kdop.h). The tags hold by how much its box grows there (a float).
+// Where a vertex is at both ends of its motion, or of the part of it that matters; of a snapshot, where it is along the
+// axes, and along the slanted directions (bvh/kdop.h). The tags hold by how much its box grows there (a float).
 struct alignas(32) DevicePoint {
   Bound at[2];
 };

@@ -11,7 +11,9 @@ namespace hpccd::gpu {
 
 class DeviceMotion {
  public:
-  void reserve(std::size_t n_vertices) {
+  // fast: where all that is tested is of that tier.
+  void reserve(std::size_t n_vertices, bool fast) {
+    if (fast) kdops_.reserve(std::max<std::size_t>(n_vertices, 1));
     points_.reserve(std::max<std::size_t>(n_vertices, 1));
     vertices_.reserve(std::max<std::size_t>(n_vertices, 1));
   }
@@ -19,6 +21,7 @@ class DeviceMotion {
   template <class T>
   void fill(LaunchParams<T>& params) const {
     params.vertices = reinterpret_cast<GivenEnds<T>*>(vertices_.data()), params.points = points_.data();
+    params.kdops = kdops_.data();
   }
 
   // How far the positions reach that the frame names; clears its counters.
@@ -31,16 +34,19 @@ class DeviceMotion {
   // Then the motion itself.
   template <class T>
   void launch(Query query, const LaunchParams<T>& params, cudaStream_t stream) const {
-    const auto kernel = of_snapshot(query) ? vertices_kernel<true, T> : vertices_kernel<false, T>;
+    const auto kernel = of_snapshot(query) ? vertices_kernel<true, false, T>
+                        : params.fast      ? vertices_kernel<false, true, T>
+                                           : vertices_kernel<false, false, T>;
     kernel<<<blocks_for(params.n_vertices, 256), 256, 0, stream>>>(params);
     check_launch("vertices_kernel");
   }
 
-  std::size_t bytes() const { return points_.bytes() + vertices_.bytes(); }
+  std::size_t bytes() const { return points_.bytes() + vertices_.bytes() + kdops_.bytes(); }
 
  private:
   DeviceBuffer<GivenEnds<double>> vertices_;  // room for floats, too
   DeviceBuffer<DevicePoint> points_;
+  DeviceBuffer<VertexKdop> kdops_;
 };
 
 }  // namespace hpccd::gpu

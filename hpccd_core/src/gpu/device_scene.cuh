@@ -31,7 +31,7 @@ class DeviceScene {
 
   template <class T>
   void fill(LaunchParams<T>& params) const {
-    params.n_vertices = features_.n_vertices;
+    params.n_vertices = features_.n_vertices, params.n_edges = static_cast<u32>(features_.edges.size());
     params.edges = edges_.data(), params.faces = faces_.data(), params.mesh_of_vertex = mesh_of_vertex_.data();
     params.n_meshes = n_meshes_;
     params.enabled = all_enabled_ ? nullptr : enabled_.data();
@@ -45,6 +45,7 @@ class DeviceScene {
 
   // What a frame of motions looks for.
   Query query_now() const { return separations_.any() ? Query::separations : Query::contacts; }
+  bool all_fast() const { return all_fast_; }  // all that is tested
   // Brings the separations to the device, where they have changed; to be called before a frame of motions.
   void update_separations() {
     if (!separations_.any() || separations_.version() == uploaded_) return;
@@ -82,6 +83,7 @@ class DeviceScene {
         tiers[i] = static_cast<unsigned char>(scene.pair_accuracy(a, b, accuracy));
         all_enabled_ = all_enabled_ && enabled[i];
         one_accuracy_ = one_accuracy_ && tiers[i] == static_cast<unsigned char>(accuracy);
+        all_fast_ = all_fast_ && (!enabled[i] || tiers[i] == static_cast<unsigned char>(Accuracy::fast));
       }
     upload(enabled_, enabled.data(), enabled.size());
     upload(accuracy_, tiers.data(), tiers.size());
@@ -110,7 +112,7 @@ class DeviceScene {
   DeviceBuffer<u32> faces_, mesh_of_vertex_;
   DeviceBuffer<unsigned char> enabled_, accuracy_, tested_;
   DeviceBuffer<double> pair_separation_, largest_separation_;
-  bool all_enabled_ = true, one_accuracy_ = true, one_tested_ = true, test_edges_ = false;
+  bool all_enabled_ = true, one_accuracy_ = true, all_fast_ = true, one_tested_ = true, test_edges_ = false;
   unsigned char default_tested_ = 0;
   u32 n_meshes_ = 0;
   PairKeys keys_;

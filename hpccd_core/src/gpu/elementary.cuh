@@ -92,7 +92,7 @@ __global__ void end_segment_kernel(LaunchParams<T> params) {
     c.all_survivors[k] += c.survivors[k];
     c.all_single[k] += c.single[k];
     c.all_many[k] += c.many[k];
-    c.survivors[k] = c.single[k] = c.many[k] = c.separated[k] = 0;
+    c.survivors[k] = c.single[k] = c.many[k] = c.separated[k] = c.open[k] = 0;
   }
 }
 
@@ -100,6 +100,13 @@ __global__ void end_segment_kernel(LaunchParams<T> params) {
 struct PairEnds {
   Vec3<double> t0[4], t1[4];
 };
+
+template <class T>
+__device__ __forceinline__ PairEnds load_pair_ends(const GivenEnds<T>* vertices, uint4 v) {
+  const Ends r[4] = {load_ends(vertices, v.x), load_ends(vertices, v.y), load_ends(vertices, v.z),
+                     load_ends(vertices, v.w)};
+  return {{r[0].t0, r[1].t0, r[2].t0, r[3].t0}, {r[0].t1, r[1].t1, r[2].t1, r[3].t1}};
+}
 
 // The answer of the tier's fallback where double precision or twice that is enough; else it is the host's to give.
 struct FallbackAnswer {
@@ -123,9 +130,7 @@ __device__ FallbackAnswer decide_on_device(const PairEnds& q, Accuracy accuracy,
 
 template <Kind kind, bool separations, class T>
 __device__ FallbackAnswer fallback(const LaunchParams<T>& params, uint4 v) {
-  const Ends r[4] = {load_ends(params.vertices, v.x), load_ends(params.vertices, v.y), load_ends(params.vertices, v.z),
-                     load_ends(params.vertices, v.w)};
-  const PairEnds q{{r[0].t0, r[1].t0, r[2].t0, r[3].t0}, {r[0].t1, r[1].t1, r[2].t1, r[3].t1}};
+  const PairEnds q = load_pair_ends(params.vertices, v);
   const double separation = separations ? separation_of(params, v.x, v.z) : 0;
   if (params.time_only && params.until_best && apart_until<kind>(q.t0, q.t1, until(params), separation)) return {};
   return decide_on_device<kind>(q, accuracy_of(params, v), separation);
@@ -135,9 +140,11 @@ __device__ FallbackAnswer fallback(const LaunchParams<T>& params, uint4 v) {
 // for its registers.
 template <bool separations, class T>
 __global__ __launch_bounds__(32) void fallback_kernel(const __grid_constant__ LaunchParams<T> params) {
-  const u64 n = length(params.counters->undecided, params.undecided_capacity),
-            stride = static_cast<u64>(gridDim.x) * blockDim.x;
-  for (u64 i = static_cast<u64>(blockIdx.x) * blockDim.x + threadIdx.x; i - lane_number() < n; i += stride) {
+  const u64 n = length(params.counters->undecided, params.undecided_capacity), n_warps = gridDim.x;
+  // A warp goes the ways of all its pairs: few are spread over many warps. Of many, neighbours go similar ways.
+  const bool few = n <= 8 * n_warps;
+  for (u64 begin = 0; begin < n; begin += 32 * n_warps) {
+    const u64 i = begin + (few ? lane_number() * n_warps + blockIdx.x : u64{blockIdx.x} * 32 + lane_number());
     FallbackAnswer answer{false, false, 0};
     u64 key = 0;
     uint2 pair{0, 0};

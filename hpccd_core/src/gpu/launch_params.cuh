@@ -5,6 +5,7 @@
 #include <cstdint>
 
 #include "base/hd.h"
+#include "bvh/kdop.h"
 #include "elementary/pair_vertices.h"
 #include "gpu/counters.cuh"
 #include "gpu/device_box.cuh"
@@ -54,7 +55,7 @@ struct PairList {
 template <class T>
 struct LaunchParams {
   // The scene.
-  u32 n_vertices;
+  u32 n_vertices, n_edges;
   const uint2* edges;
   const u32* faces;  // three vertices each
   const u32* mesh_of_vertex;
@@ -90,6 +91,12 @@ struct LaunchParams {
   double largest;  // coordinate that is acceptable
   GivenEnds<T>* vertices;
   DevicePoint* points;  // of the vertices
+
+  // Of a frame all of whose pairs are of the tier of that name, and touch or do not.
+  bool fast;
+  VertexKdop* kdops;
+  Kdop* leaf_kdops;
+  bool in_floats;  // and which floats suffice for: the host's guess, before the counters say so
 
   // Of a frame that looks for the earliest contacts (best_time.cuh).
   bool until_best;  // what touches after the best time so far does not matter
@@ -147,6 +154,25 @@ __device__ inline Motion<double> load_motion(const GivenEnds<T>* vertices, uint4
   const Ends q0 = load_ends(vertices, v.x), q1 = load_ends(vertices, v.y), q2 = load_ends(vertices, v.z),
              q3 = load_ends(vertices, v.w);
   const Vec3<double> t0[4] = {q0.t0, q1.t0, q2.t0, q3.t0}, t1[4] = {q0.t1, q1.t1, q2.t1, q3.t1};
+  return motion_of<kind>(t0, t1);
+}
+
+// One vertex at both ends, as floats in the coordinates of the boxes: what the CPU keeps as RoundedMotion.
+struct RoundedEnds {
+  Vec3<float> t0, t1;
+};
+
+__device__ inline RoundedEnds load_rounded_ends(const DevicePoint* points, u32 v) {
+  const float4* at = reinterpret_cast<const float4*>(points + v);
+  const float4 a = __ldg(at), b = __ldg(at + 1);
+  return {{a.x, a.y, a.z}, {b.x, b.y, b.z}};
+}
+
+template <Kind kind>
+__device__ inline Motion<float> load_rounded_motion(const DevicePoint* points, uint4 v) {
+  const RoundedEnds q0 = load_rounded_ends(points, v.x), q1 = load_rounded_ends(points, v.y),
+                    q2 = load_rounded_ends(points, v.z), q3 = load_rounded_ends(points, v.w);
+  const Vec3<float> t0[4] = {q0.t0, q1.t0, q2.t0, q3.t0}, t1[4] = {q0.t1, q1.t1, q2.t1, q3.t1};
   return motion_of<kind>(t0, t1);
 }
 

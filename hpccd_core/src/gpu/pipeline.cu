@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <bit>
 #include <limits>
+#include <utility>
 
 #include "gpu/device_contacts.cuh"
 #include "gpu/device_motion.cuh"
@@ -9,6 +10,7 @@
 #include "gpu/device_scene.cuh"
 #include "gpu/device_tree.cuh"
 #include "gpu/hints.cuh"
+#include "gpu/leaf_kdops.cuh"
 #include "gpu/pipeline.h"
 #include "gpu/refit.cuh"
 #include "gpu/stages.cuh"
@@ -38,7 +40,7 @@ class DevicePipeline : public Pipeline {
     *host_counters_.data() = {};
     leaf_pairs_.reserve(4 * typical_size());
     contacts_.reserve(typical_size(), stream_);
-    motion_.reserve(features.n_vertices);
+    motion_.reserve(features.n_vertices, scene_.all_fast());
     hints_.reserve(stream_);
   }
 
@@ -51,7 +53,7 @@ class DevicePipeline : public Pipeline {
   void set_tree(const Tree& tree) override {
     check(cudaSetDevice(device_), "cudaSetDevice");
     check(cudaStreamSynchronize(stream_), "cudaStreamSynchronize");
-    tree_.set(features_, tree);
+    tree_.set(features_, tree, scene_.all_fast());
   }
 
   bool run(Positions t0, Positions t1, Best best, ThreadPool& pool) override {
@@ -121,6 +123,8 @@ class DevicePipeline : public Pipeline {
   template <class T>
   LaunchParams<T> last_frame() const;
   void copy_counters();
+  bool is_fast() const;
+  bool guessed_wrong(bool fast);
   bool grow_overflowed();
   bool lists_too_many() const;
 
@@ -149,7 +153,8 @@ class DevicePipeline : public Pipeline {
   DeviceNearList near_;
   std::size_t most_near_ = 0;
   bool gave_up_listing_ = false;
-  bool given_doubles_ = true;  // in the last frame
+  bool given_doubles_ = true;   // in the last frame
+  bool floats_suffice_ = true;  // in the last frame that asked
   Goal goal_ = Goal::results;
   Best best_;
   Query query_ = Query::contacts;
@@ -168,6 +173,7 @@ bool DevicePipeline::run_frame(Positions t0, Positions t1, double distance, Thre
   LaunchParams<T> params{};
   scene_.fill(params);
   if (query_ == Query::intersections) params.fits_edges = true;
+  params.fast = is_fast();
   params.time_only = for_earliest();
   params.until_best = best_.has_value(), params.best = best_.value_or(no_time);
   if (of_snapshot(query_))
@@ -187,6 +193,7 @@ bool DevicePipeline::run_frame(Positions t0, Positions t1, double distance, Thre
   if (goal_ == Goal::earliest_of_near) lists_.make_room(near_.most());
   for (bool again = true; again;) {
     if (goal_ != Goal::near_list) ++passes_;
+    params.in_floats = params.fast && floats_suffice_;
     launch(params);
     copy_counters();
     check(cudaEventRecord(counted_, stream_), "cudaEventRecord");
@@ -195,7 +202,8 @@ bool DevicePipeline::run_frame(Positions t0, Positions t1, double distance, Thre
     check(cudaEventSynchronize(counted_), "cudaEventSynchronize");
     if (c.bad) return false;
     if ((gave_up_listing_ = lists_too_many())) return true;
-    again = grow_overflowed();
+    again = guessed_wrong(params.fast);
+    again = grow_overflowed() || again;
   }
   // Before the results: their kernels bring the counters to the host once more.
   const u64 n_to_host = exact_last_time_ = c.to_host;
@@ -233,6 +241,10 @@ void DevicePipeline::launch_tree(LaunchParams<T>& params) {
   const auto refit = grows_boxes(query_) || best_ ? refit_kernel<true, T> : refit_kernel<false, T>;
   refit<<<blocks_for(std::size_t{params.n_leaves} * 32, 128), 128, 0, stream_>>>(params);
   check_launch("refit_kernel");
+  if (params.in_floats) {
+    leaf_kdops_kernel<<<blocks_for(std::size_t{params.n_leaves} * 32, 128), 128, 0, stream_>>>(params);
+    check_launch("leaf_kdops_kernel");
+  }
   timer_.mark("refit", stream_);
   const auto traverse = of_snapshot(query_) ? traverse_kernel<true, T> : traverse_kernel<false, T>;
   traverse<<<blocks_for(params.n_leaves, traverse_warps), 32 * traverse_warps, 0, stream_>>>(params);
@@ -303,6 +315,18 @@ bool DevicePipeline::lists_too_many() const {
   const Counters& c = *host_counters_.data();
   return goal_ == Goal::near_list && (c.found_all + c.to_host > most_near_ || c.leaf_pairs > 8 * most_near_ ||
                                       c.all_survivors[0] + c.all_survivors[1] > 32 * most_near_);
+}
+
+// Whether all that the frame tests may be tested in single precision first.
+bool DevicePipeline::is_fast() const {
+  return query_ == Query::contacts && !best_ && goal_ != Goal::earliest_of_near && scene_.all_fast();
+}
+
+// Whether floats suffice only the device knows, and the kernels are launched before it says so: as in the last frame.
+// True where the frame must run again.
+bool DevicePipeline::guessed_wrong(bool fast) {
+  const bool suffice = host_counters_.data()->floats_suffice != 0;
+  return fast && std::exchange(floats_suffice_, suffice) != suffice;
 }
 
 // Makes room where a list was too short. True where the frame must run again.

@@ -17,11 +17,12 @@ struct Stages {
   cudaStream_t stream;
   StageTimer& timer;
 
-  // As many blocks as fit take work until there is none.
+  // As many blocks as fit take work until there is none. Rows: of so many lists, each has as many.
   template <class Kernel, class T>
-  void persistent(Kernel kernel, unsigned threads, const LaunchParams<T>& params, const char* name) const {
+  void persistent(Kernel kernel, unsigned threads, const LaunchParams<T>& params, const char* name,
+                  unsigned rows = 1) const {
     const int blocks = blocks_that_fit(reinterpret_cast<const void*>(kernel), threads, name);
-    kernel<<<static_cast<unsigned>(blocks * multiprocessors), threads, 0, stream>>>(params);
+    kernel<<<dim3(static_cast<unsigned>(blocks * multiprocessors), rows), threads, 0, stream>>>(params);
     check_launch(name);
   }
   void mark(const char* name) const { timer.mark(name, stream); }
@@ -30,6 +31,11 @@ struct Stages {
 // What the hints say of the best time. Defined for float and double.
 template <class T>
 void launch_hints(Query query, const LaunchParams<T>& params, const Stages& stages);
+
+// From pairs of leaves to contacts and what the fallback decides, in single precision first. Defined for float and
+// double.
+template <class T>
+void launch_likely(const LaunchParams<T>& params, const Stages& stages);
 
 // From pairs of leaves to survivors of the first filter, and the tests that know a distance. Defined for float and
 // double.

@@ -56,7 +56,9 @@ void TestLists::launch(Query query, From from, LaunchParams<T>& params, int mult
   const Stages stages{multiprocessors, stream, timer};
   for (params.segment = 0; params.segment < params.n_segments; ++params.segment) {
     const bool leaves = from == From::leaves;
-    if (query == Query::contacts) {
+    if (params.in_floats) {
+      launch_likely(params, stages);
+    } else if (query == Query::contacts) {
       if (leaves) launch_contact_candidates(params, stages);
       launch_contacts(params, stages);
     } else if (query == Query::separations) {
@@ -65,7 +67,7 @@ void TestLists::launch(Query query, From from, LaunchParams<T>& params, int mult
     } else {
       launch_snapshot(query, params, stages);
     }
-    if (!of_snapshot(query)) launch_root_tests(params, stages);
+    if (!of_snapshot(query) && !params.in_floats) launch_root_tests(params, stages);
     end_segment_kernel<<<1, 1, 0, stream>>>(params);
     check_launch("end_segment_kernel");
   }

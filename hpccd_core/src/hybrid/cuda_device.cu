@@ -20,7 +20,7 @@ class CudaTestDevice final : public TestDevice {
         slots_(n_slots) {
     check(cudaDeviceGetAttribute(&multiprocessors_, cudaDevAttrMultiProcessorCount, device), "cudaDeviceGetAttribute");
     counters_.reserve(1);
-    motion_.reserve(features.n_vertices);
+    motion_.reserve(features.n_vertices, false);
   }
   ~CudaTestDevice() override { cancel(); }
 

@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: Apache-2.0
+// What follows the first filter for the tier that promises nothing: in single precision, then in double precision what
+// that cannot tell (elementary/batch.inl, test_likely). By these bounds a filter is no proof of what another would have
+// said, so they stand in the CPU's order, and both find the same. One kernel for all lists of a stage, a row of blocks
+// a list: so they run side by side.
+#pragma once
+
+#include "elementary/kdop_filter.h"
+#include "gpu/elementary.cuh"
+
+namespace hpccd::gpu {
+
+struct SortedPair {
+  RootTests wanted;
+  bool missed;  // apart at the only root
+};
+
+// Of a pair whose cubic may have a root.
+template <Kind kind, class Policy, class R>
+__device__ __forceinline__ SortedPair sort_out(const Motion<R>& m) {
+  const Magnitudes<R> size = magnitudes(m);
+  const Cubic<R> f = coplanarity(m);
+  const CubicError<R> error = error_of<Policy>(size);
+  const bool usable = in_range(size);
+  if (certainly_one_root(f, error.coefficient) && usable) {
+    const bool missed = certainly_apart_at_root<kind>(m, size, f, error.value);
+    return {{!missed, false}, missed};
+  }
+  return {{false, !(certainly_outside<kind>(m, size) && usable)}, false};
+}
+
+template <Kind kind, class T>
+__device__ __forceinline__ void sort_survivors(const LaunchParams<T>& params) {
+  constexpr u32 k = kind == Kind::edge_edge;
+  Counters& c = *params.counters;
+  u32 n_missed = 0;
+  for_pairs(params.survivors[k], c.survivors[k], [&](bool valid, uint2 pair) {
+    SortedPair sorted{{false, false}, false};
+    if (valid) {
+      const uint4 v = vertices_of<kind>(params, pair.x, pair.y);
+      sorted = sort_out<kind, Likely>(load_rounded_motion<kind>(params.points, v));
+    }
+    append_to_root_tests(params, k, pair, sorted.wanted);
+    n_missed += sorted.missed;
+  });
+  add_up(&c.missed[k], n_missed);
+}
+
+template <class T>
+__global__ __launch_bounds__(128) void sort_survivors_kernel(const __grid_constant__ LaunchParams<T> params) {
+  blockIdx.y == 0 ? sort_survivors<Kind::edge_edge>(params) : sort_survivors<Kind::vertex_face>(params);
+}
+
+// What kdop_filter.inl says of a pair.
+template <Kind kind>
+__device__ __forceinline__ bool kdops_apart(const VertexKdop* kdops, uint4 v) {
+  const VertexKdop of[4] = {kdops[v.x], kdops[v.y], kdops[v.z], kdops[v.w]};
+  bool apart = false;
+  for (int k = 0; k < n_kdop_directions; ++k)
+    apart = apart || in_order<kind>([&](int end, int i) { return end == 0 ? of[i].t0[k] : of[i].t1[k]; });
+  return apart;
+}
+
+// What is found to touch must not be what k-DOPs say is apart: the CPU asks them first, of all pairs; here they cost
+// more than the other filters, and come last. What is left open takes the place of the survivors, which nobody reads
+// any more.
+template <Kind kind, bool single, class T>
+__device__ __forceinline__ void seek_likely_roots(const LaunchParams<T>& params) {
+  constexpr u32 k = kind == Kind::edge_edge;
+  Counters& c = *params.counters;
+  u32 n_contacts = 0;
+  for_pairs(single ? params.single[k] : params.many[k], single ? c.single[k] : c.many[k], [&](bool valid, uint2 pair) {
+    bool contact = false, open = false;
+    double toc = 0;
+    if (valid) {
+      const uint4 v = vertices_of<kind>(params, pair.x, pair.y);
+      const Motion<float> m = load_rounded_motion<kind>(params.points, v);
+      const Outcome<float> o = single ? single_root_test<kind, Likely>(m) : many_roots_test<kind, Likely>(m);
+      open = !o.contact && !o.none;
+      toc = o.toc;
+      contact = o.contact && !kdops_apart<kind>(params.kdops, v);
+    }
+    append_found(params, kind, contact, pair, toc);
+    append_pair(params.survivors[k], &c.open[k], open, pair);
+    n_contacts += contact;
+  });
+  add_up(&c.proven[k], n_contacts);
+  add_up(&c.found[k], n_contacts);
+}
+
+template <class T>
+__global__ __launch_bounds__(128) void likely_roots_kernel(const __grid_constant__ LaunchParams<T> params) {
+  switch (blockIdx.y) {
+    case 0:
+      return seek_likely_roots<Kind::edge_edge, true>(params);
+    case 1:
+      return seek_likely_roots<Kind::edge_edge, false>(params);
+    case 2:
+      return seek_likely_roots<Kind::vertex_face, true>(params);
+    default:
+      return seek_likely_roots<Kind::vertex_face, false>(params);
+  }
+}
+
+template <Kind kind>
+__device__ __forceinline__ Outcome<double> test_in_doubles(const Motion<double>& m) {
+  const Outcome<double> first = coplanarity_filter<Proven>(m);
+  if (first.none) return first;
+  const RootTests wanted = sort_out<kind, Proven>(m).wanted;
+  if (wanted.one) return single_root_test<kind, Proven>(m);
+  if (wanted.many) return many_roots_test<kind, Proven>(m);
+  return {false, true, 0, 0};
+}
+
+template <Kind kind, class T>
+__device__ __forceinline__ void decide_open(const LaunchParams<T>& params) {
+  constexpr u32 k = kind == Kind::edge_edge;
+  Counters& c = *params.counters;
+  u32 n_contacts = 0, n_undecided = 0;
+  for_pairs(params.survivors[k], c.open[k], [&](bool valid, uint2 pair) {
+    Outcome<double> o{false, true, 0, 0};
+    if (valid) {
+      const uint4 v = vertices_of<kind>(params, pair.x, pair.y);
+      o = test_in_doubles<kind>(load_motion<kind>(params.vertices, v));
+    }
+    const bool undecided = !o.contact && !o.none;
+    append_found(params, kind, o.contact, pair, o.toc);
+    append_undecided(params, kind, undecided, pair);
+    n_contacts += o.contact, n_undecided += undecided;
+  });
+  add_up(&c.proven[k], n_contacts);
+  add_up(&c.found[k], n_contacts);
+  add_up(&c.undecided_of[k], n_undecided);
+}
+
+template <class T>
+__global__ __launch_bounds__(128) void open_pairs_kernel(const __grid_constant__ LaunchParams<T> params) {
+  blockIdx.y == 0 ? decide_open<Kind::edge_edge>(params) : decide_open<Kind::vertex_face>(params);
+}
+
+}  // namespace hpccd::gpu
