@@ -60,7 +60,7 @@ struct Detector::Impl {
     if (asked != Backend::automatic) return backends.works(asked) ? asked : Backend::cpu;
     std::vector<Backend> usable;
     for (const Backend b : {Backend::cpu, Backend::gpu, Backend::hybrid})
-      if (backends.works(b)) usable.push_back(b);
+      if (backends.works(b) && !(b == Backend::hybrid && shared.rules.any_fast())) usable.push_back(b);
     return tuner.next(usable);
   }
 

@@ -29,12 +29,15 @@ PairRules::PairRules(const Scene& scene, Accuracy accuracy, const SeparationTabl
 void PairRules::change(const SeparationTable& separations) {
   rules_.resize(n_ * n_);
   bool all_default = true;
-  promise_times_ = true;
+  promise_times_ = true, any_fast_ = false;
   for (std::uint32_t a = 0; a < n_; ++a)
     for (std::uint32_t b = 0; b < n_; ++b) {
       const std::size_t i = a * n_ + b;
       rules_[i] = {accuracy_[i], separations.of(a, b) > 0, features_[i]};
-      if (enabled(a, b)) promise_times_ = promise_times_ && tells_times(rules_[i]);
+      if (enabled(a, b)) {
+        promise_times_ = promise_times_ && tells_times(rules_[i]);
+        any_fast_ = any_fast_ || (rules_[i].accuracy == Accuracy::fast && !rules_[i].separated);
+      }
       all_default = all_default && rules_[i] == rules_[0];
     }
   if (!rules_.empty()) default_ = rules_[0];

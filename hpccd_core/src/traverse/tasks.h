@@ -46,11 +46,13 @@ class PairRules {
   }
   // Whether every pair that touches has a time of contact, to 1e-12, so that one that cannot touch until then has none.
   bool promise_times() const { return promise_times_; }
+  // Whether a pair is tested for which backends answer differently: "fast", without a separation.
+  bool any_fast() const { return any_fast_; }
   Rule rule(const Node& a, const Node& b) const { return rule(a.mesh, b.mesh); }
 
  private:
   std::size_t n_;
-  bool all_enabled_ = true, promise_times_ = true;
+  bool all_enabled_ = true, promise_times_ = true, any_fast_ = false;
   std::vector<char> enabled_;
   std::vector<Accuracy> accuracy_;
   std::vector<TestedFeatures> features_;
