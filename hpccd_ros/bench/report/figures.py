@@ -231,7 +231,7 @@ FIGURES = (
            rows=lambda row: row["part"] == "sweep", kept="accuracy-4-cores", panel=("queries", "sweep"),
            heading=lambda rows: f"{rows[0]['queries']} queries", size=(2, 4.6, 2.8), legend="first"),
     Figure("trade", "accuracy", "What each setting costs and how wrong it is", panels_trade.panel,
-           rows=lambda row: row["part"] == "scene", kept="accuracy-trade-h100-16-cores", points=panels_trade.points,
+           rows=lambda row: row["part"] == "scene", kept="accuracy-trade-h200-16-cores", points=panels_trade.points,
            panel=("asked", "quantity"), heading=panels_trade.heading, size=(2, 4.6, 2.7), legend="right",
            right="center"),
     Figure("distance", "distance", "Distance queries, {accuracy}, {threads} threads", panels_distance.against_distance,

@@ -49,7 +49,7 @@ TABLES = {
     "hybrid": (performance_gpu.hybrid, "gpu-h100-16-cores"),
     "second-gpu": (performance_gpu.second_gpu, "gpu-2-h200-32-cores"),
     "segments": (performance_gpu.segments, "gpu-h100-16-cores"),
-    "gpu-tiers": (performance_gpu.tiers, "accuracy-h100-16-cores"),
+    "gpu-tiers": (performance_gpu.tiers, "accuracy-trade-h200-16-cores"),
     "latency": (performance_node.latency, "ros-4-cores"),
     "step-loop": (performance_node.step_loop, "ros-2-cores"),
     "rates": (performance_node.rates, "ros-4-cores"),

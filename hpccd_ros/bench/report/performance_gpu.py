@@ -63,8 +63,9 @@ def segments(result: Kept) -> list[str]:
 
 
 def tiers(result: Kept) -> list[str]:
+    all_contacts = [r for r in result.rows if whole_scene(r) and r.get("asked", "all") == "all"]
     lines = [[f"{mine[0]['scene']}, `{mine[0]['backend']}`", *(r["step_ms"] for r in mine),
               " + ".join(str(sum(r[key] for r in mine)) for key in ("missed", "invented"))]
-             for mine in by(filter(whole_scene, result.rows), "scene", "backend")]  # fmt: skip
+             for mine in by(all_contacts, "scene", "backend")]  # fmt: skip
     tiers = dict.fromkeys(r["accuracy"] for r in result.rows)
     return markdown.table(["ms a step", *(f"`{t}`" for t in tiers), "missed + invented"], lines)
