@@ -127,11 +127,20 @@ def feature_names(value: Iterable[str]) -> tuple[str, ...]:
     return tuple(name for name in FEATURES if name in names)
 
 
+def _no_names(argument: str, value: object, choices: tuple[str, ...]) -> TypeError:
+    return TypeError(
+        f"{argument}: expected one or several of {', '.join(choices)}, got {type(value).__name__}; write, for example, "
+        f"{argument}=({choices[0]!r},)"
+    )
+
+
 def _names(argument: str, value: Iterable[str], choices: tuple[str, ...]) -> tuple[str, ...]:
     try:
         names = (value,) if isinstance(value, str) else tuple(value)
     except TypeError:
-        raise TypeError(f"{argument}: expected names of {argument}, got {type(value).__name__}") from None
+        raise _no_names(argument, value, choices) from None
+    if isinstance(value, (bytes, bytearray)):
+        raise _no_names(argument, value, choices)
     return tuple(choice(argument, name, choices) for name in names)
 
 

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import shlex
 from collections.abc import Sequence
 from pathlib import Path
@@ -15,6 +16,7 @@ from hpccd_ros.bench.report import figures, machine
 from hpccd_ros.bench.report.results import Report
 from hpccd_ros.bench.steps import Source
 
+MOST_THREADS = 1024  # of a detector
 FEWEST_ROUNDS = 5  # below that a median means little, and the result says so
 
 
@@ -101,12 +103,36 @@ def begin_report(args, names: Sequence[str] = ()) -> Report:
     for name in ("steps", "threads"):
         if getattr(args, name, 0) < 0:
             raise UserError(f"--{name} {getattr(args, name)}: must not be negative")
+    for count in (getattr(args, "threads", 0), *_numbers_in(getattr(args, "threads_list", None))):
+        if count > MOST_THREADS:
+            raise UserError(f"{count} threads: a detector takes at most {MOST_THREADS}; name fewer")
+    _require_writable(args)
     options = {k: v for k, v in vars(args).items() if k not in ("command", "benchmark", *PLACES)
                and isinstance(v, (int, float, str, type(None)))}
     report = Report(args.benchmark, _command(args, options), {**options, "sources": list(names)})
     if getattr(args, "repeat", FEWEST_ROUNDS) < FEWEST_ROUNDS:
         report.note(f"only {args.repeat} timed rounds: take --repeat {FEWEST_ROUNDS} or more for numbers to rely on")
     return report
+
+
+def _numbers_in(text: str | None) -> list[int]:
+    return [int(word) for word in text.split(",") if word.strip().isdecimal()] if text else []
+
+
+def _require_writable(args) -> None:
+    """Before anything is measured: what cannot be written would be lost."""
+    if Path(args.label).name != args.label:
+        raise UserError(f"--label {args.label}: ends the names of files; write it without folders")
+    for option, folder in (("--out", args.out), ("--figures", args.figures)):
+        if folder is None:
+            continue
+        try:
+            Path(folder).mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            why = f"no folder can be made there ({error.strerror})"
+            raise UserError(f"{option} {folder}: {why}; name another") from error
+        if not os.access(folder, os.W_OK):
+            raise UserError(f"{option} {folder}: must not be written; name another folder")
 
 
 def _command(args, options: dict) -> str:

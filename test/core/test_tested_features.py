@@ -194,9 +194,10 @@ def test_names_in_any_form():
         ((), ValueError, "features: none is named.*use vertex_face or edge_edge, or both.*scene.ignore_pair"),
         ("vertex-face", ValueError, "features: 'vertex-face' is not known; use one of vertex_face, edge_edge"),
         ("", ValueError, "features: '' is not known"),
-        (3, TypeError, "features: expected names of features, got int"),
+        (3, TypeError, "features: expected one or several of vertex_face, edge_edge, got int"),
+        (b"vertex_face", TypeError, "features: expected one or several of vertex_face, edge_edge, got bytes"),
         ((3,), TypeError, "features: expected a string, got int"),
-        (None, TypeError, "features: expected names of features, got NoneType"),
+        (None, TypeError, "features: expected one or several of vertex_face, edge_edge, got NoneType"),
     ],
 )
 def test_errors_name_the_remedy(features, error, text):

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "scene/typical_edge.h"
+#include "scene/edge_sample.h"
 
 namespace hpccd {
 namespace {
@@ -121,8 +121,8 @@ void Grouping::add(const Candidate& pair) {
   group->second.push_back(pair.second);
 }
 
-double typical_length(const Features& features, const std::vector<VertexMotion>& vertices, std::size_t looked_at) {
-  const auto [stride, count] = EdgeSample::of(features.edges.size(), looked_at);
+double typical_length(const Features& features, const std::vector<VertexMotion>& vertices) {
+  const auto [stride, count] = EdgeSample::of(features.edges.size(), 1024);
   double sum = 0;
   for (std::size_t i = 0; i < count; ++i) {
     const auto& [from, to] = features.edges[i * stride];

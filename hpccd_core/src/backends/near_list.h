@@ -130,7 +130,6 @@ class Grouping {
 };
 
 // The mean of some edges' largest extents: what counts as near in a scene.
-double typical_length(const Features& features, const std::vector<VertexMotion>& vertices,
-                      std::size_t looked_at = 1024);
+double typical_length(const Features& features, const std::vector<VertexMotion>& vertices);
 
 }  // namespace hpccd

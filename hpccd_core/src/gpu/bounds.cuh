@@ -7,7 +7,7 @@
 #include "gpu/best_time.cuh"
 #include "gpu/extent.cuh"
 #include "gpu/reach.h"
-#include "scene/typical_edge.h"
+#include "scene/edge_sample.h"
 
 namespace hpccd::gpu {
 
@@ -56,26 +56,32 @@ __device__ inline float place_at(double time, double t0, double t1) {
 }
 inline constexpr float lost_by_place = 4.8e-7f;
 
-// backends/near_list.cpp, typical_length: one thread adds up what the threads of a block have looked up.
+template <class T>
+__device__ double extent_of(const T* from, const T* to) {
+  double length = 0;
+  for (int k = 0; k < 3; ++k) length = fmax(length, fabs(double{from[k]} - double{to[k]}));
+  return length;
+}
+
+// backends/short_edge.cpp, by one block: whose length has the right number below it says what follows.
 template <class T>
 __device__ void see_whether_floats_suffice(const LaunchParams<T>& params) {
-  constexpr std::size_t most = 2 * edges_of_a_step;
-  __shared__ double lengths[most];
-  const auto [stride, count] = EdgeSample::of(params.n_edges, edges_of_a_step);
-  for (std::size_t i = threadIdx.x; i < count; i += blockDim.x) {
-    const uint2 edge = params.edges[i * stride];
-    const T *from = params.given_t0 + 3 * static_cast<u64>(edge.x),
-            *to = params.given_t0 + 3 * static_cast<u64>(edge.y);
-    double length = 0;
-    for (int k = 0; k < 3; ++k) length = fmax(length, fabs(double{from[k]} - double{to[k]}));
-    lengths[i] = length;
+  __shared__ double lengths[2 * edges_of_a_step];
+  const EdgeSample sample = EdgeSample::of(params.n_edges, edges_of_a_step);
+  for (std::size_t i = threadIdx.x; i < sample.count; i += blockDim.x) {
+    const uint2 edge = params.edges[i * sample.stride];
+    const u64 a = 3 * static_cast<u64>(edge.x), b = 3 * static_cast<u64>(edge.y);
+    lengths[i] =
+        fmin(extent_of(params.given_t0 + a, params.given_t0 + b), extent_of(params.given_t1 + a, params.given_t1 + b));
   }
   __syncthreads();
-  if (threadIdx.x != 0 || count == 0) return;
-  double sum = 0;
-  for (std::size_t i = 0; i < count; ++i) sum += lengths[i];
-  const double scale = SceneExtent(*params.counters).map().scale;
-  params.counters->floats_suffice = floats_suffice(sum / static_cast<double>(count), scale);
+  for (std::size_t i = threadIdx.x; i < sample.count; i += blockDim.x) {
+    std::size_t below = 0;
+    for (std::size_t j = 0; j < sample.count; ++j)
+      below += lengths[j] < lengths[i] || (lengths[j] == lengths[i] && j < i);
+    if (below == sample.short_one())
+      params.counters->floats_suffice = floats_suffice(lengths[i], SceneExtent(*params.counters).map().scale);
+  }
 }
 
 // fast: of a frame that asks for k-DOPs, and whether floats suffice.

@@ -14,7 +14,7 @@ using u64 = unsigned long long;
 struct Counters {
   u64 extent_low[3], extent_high[3];  // largest of the ordered bits, low ones negated: zero is neutral
   u64 bad;                            // coordinates that are not acceptable
-  u64 floats_suffice;                 // of a fast frame: whether (scene/typical_edge.h)
+  u64 floats_suffice;                 // of a fast frame: whether (scene/edge_sample.h)
   u64 node_tests;
   u64 leaf_pairs, next_leaf_pair;
   u64 survivors[2], single[2], many[2], separated[2];                                        // of the segment at work

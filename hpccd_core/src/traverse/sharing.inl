@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Features of two leaves that have a vertex in common: they are no candidates. Most pairs of leaves are neighbours on a
-// mesh (60 to 80 % on the published scenes), so what they share is found once, not feature by feature. Without branches:
-// which corners are shared no processor can guess. Part of leaf_pairs.inl and leaf_edge_faces.inl.
+// mesh (60 to 80 % on the published scenes), so what they share is found once, not feature by feature. Without
+// branches: which corners are shared no processor can guess. Part of leaf_pairs.inl and leaf_edge_faces.inl.
 
 #include "traverse/leaf_features.inl"
 
@@ -14,8 +14,8 @@ struct FeaturesAt {
     unsigned same = equal16(leaf.corners, vertex);
     if (leaf.many) same |= equal16(leaf.corners + 16, vertex) << 16;
     same &= corners;
-    const std::uint32_t number = static_cast<std::uint32_t>(__builtin_ctz(same | 1u << none)),
-                        all = same ? ~0u : 0, at = number & all;
+    const std::uint32_t number = static_cast<std::uint32_t>(__builtin_ctz(same | 1u << none)), all = same ? ~0u : 0,
+                        at = number & all;
     corner = number, edges = leaf.corners_of->edges_at[at] & all, faces = leaf.corners_of->faces_at[at] & all;
   }
   static constexpr std::uint32_t none = 31;
@@ -42,5 +42,6 @@ HPCCD_HD void find_shared(const LeafFeatures& a, unsigned corners_a, const LeafF
 
 // What a leaf shares with itself.
 HPCCD_HD void find_own(const LeafFeatures& leaf, Sharing& own) {
-  for (std::uint32_t i = 0; i < leaf.n_corners; ++i) own.set(i, leaf.corners_of->edges_at[i], leaf.corners_of->faces_at[i]);
+  for (std::uint32_t i = 0; i < leaf.n_corners; ++i)
+    own.set(i, leaf.corners_of->edges_at[i], leaf.corners_of->faces_at[i]);
 }

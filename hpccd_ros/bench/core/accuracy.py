@@ -221,7 +221,8 @@ def _print_scenes(rows):
         ["scene", "backend", "accuracy", "candidates", *DECIDED],
         [[r["scene"], r["backend"], r["accuracy"], round(r["candidates"]), *(round(n) for n in r["decided"].values())]
          for r in rows if r["simd"] in ("auto", rows[0]["simd"]) and r["asked"] == rows[0]["asked"]],
-        "slabs to roots: dropped by error bounds; proven: contacts by error bounds; the rest: the tier's fallback",
+        "slabs to roots: dropped, proven: contacts, by error bounds (fast: as single precision says); the rest: the "
+        "tier's fallback",
     )  # fmt: skip
 
 

@@ -15,9 +15,19 @@ def choose(report, bounds: Sequence[Bound]) -> None:
     """Prints, and marks the rows of the chosen setting in the report, which fails where none keeps the bounds."""
     rows = [row for row in report.rows if row["part"] == "scene"]
     found = choice.outcomes(rows)
-    taken = choice.cheapest(found, bounds)
+    asked, contacts = _most_contacts(rows)
+    taken = choice.cheapest(found, bounds) if contacts > 0 else None
     _show(found, taken, bounds)
     wanted = ", ".join(map(str, bounds))
+    if contacts == 0:
+        report.failure(f"--choose: no contact in the steps measured (asked for: {asked}), so nothing tells the "
+                       "settings apart; take --steps 0 for all steps, or record more")  # fmt: skip
+        return
+    # A share smaller than one in all true contacts cannot be seen.
+    unseen = [str(b) for b in bounds if b.quantity in ("misses", "inventions") and 0 < b.limit < 1 / contacts]
+    if unseen:
+        report.note(f"at most {contacts:g} true contacts (asked for: {asked}): whether {', '.join(unseen)} holds shows "
+                    "in more of them only; take --steps 0 for all steps, or record more")  # fmt: skip
     if taken is None:
         near = choice.nearest(found, bounds)
         broken = ", ".join(f"{b.quantity} {near.values[b.quantity]:.2g}" for b in near.broken(bounds))
@@ -27,6 +37,14 @@ def choose(report, bounds: Sequence[Bound]) -> None:
     for row in rows:
         row["chosen"] = Setting(row["accuracy"], row["backend"], row["asked"]) == taken.setting
     print(f"{wanted}: {taken.setting.as_written()}")
+
+
+def _most_contacts(rows) -> tuple[str, float]:
+    """What was asked for with the fewest true contacts in the scene that has most of them, and how many."""
+    most: dict[str, float] = {}
+    for row in rows:
+        most[row["asked"]] = max(most.get(row["asked"], 0), row["true"])
+    return min(most.items(), key=lambda item: item[1])
 
 
 def _show(found: Sequence[Outcome], taken: Outcome | None, bounds: Sequence[Bound]) -> None:

@@ -92,7 +92,7 @@ def _rows(source, series, rates, args, bar) -> list[dict]:
         *rows,
         {"stage": "rest", "ms": rest, "distance_ms": rest},
         {"stage": "step", "ms": whole, "least_ms": least_of_all, "distance_ms": whole - least_of_all,
-         "over_least": whole / least_of_all},
+         "over_least": whole / least_of_all if least_of_all else None},
     ]  # fmt: skip
 
 

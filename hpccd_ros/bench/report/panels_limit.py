@@ -19,7 +19,8 @@ def stages(axis, rows) -> None:
         return {"least": (least, BLUE), "more": (row["ms"] - least, "#d0d0d0")}
 
     def said(row, ms):
-        return f" {table.text(ms)} ms, {row['over_least']:.3g} x"
+        times = f", {row['over_least']:.3g} x" if row["over_least"] is not None else ""  # nothing was to be done
+        return f" {table.text(ms)} ms{times}"
 
     drawing.bars(axis, rows, "stage", parts, said, room=1.45)
 

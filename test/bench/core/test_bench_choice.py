@@ -33,6 +33,8 @@ def test_bounds_are_read():
         ("", "name at least one bound"),
         ("misses", "write QUANTITY<NUMBER"),
         ("misses>1e-4", "write QUANTITY<NUMBER"),
+        ("misses=0", "QUANTITY<=NUMBER"),
+        ("misses<1e-4; late<1", "with commas between"),
         ("mises<1e-4", "choose from misses, inventions, late, early, error"),
         ("misses<few", "few is not a number"),
         ("late<nan", "bounds nothing"),
@@ -144,6 +146,20 @@ def test_where_none_keeps_the_bounds_the_nearest_is_named(bench, capsys, monkeyp
     assert status == 1
     (said,) = result["failures"]
     assert "no setting keeps error<1e-20; the nearest is" in said and "-p accuracy:=" in said
+
+
+def test_where_nothing_touches_nothing_is_chosen(bench):
+    status, result, _ = bench("accuracy", "two-triangles", "--steps", "1", "--repeat", "1", "--choose", "misses<1e-4")
+    assert status == 1 and not any(row.get("chosen") for row in result["rows"])
+    (said,) = result["failures"]
+    assert "no contact in the steps measured" in said and "--steps 0" in said
+
+
+def test_what_too_few_contacts_cannot_show_is_said(bench):
+    status, result, _ = bench("accuracy", *STRIP, "--tiers", "exact", "--choose", "misses<1e-9, late<1e-3")
+    assert status == 0
+    (said,) = (note for note in result["notes"] if "true contacts" in note)
+    assert "misses<1e-09" in said and "late" not in said
 
 
 def test_a_choice_needs_scenes(bench, capsys):

@@ -6,6 +6,8 @@ import csv
 import pytest
 from sources import ROOT
 
+from hpccd_ros import cli
+
 STRIP = ("folding-strip", "--size", "0.1", "--steps", "2", "--repeat", "1")
 
 
@@ -120,12 +122,22 @@ def test_options(bench):
         (("size", "cloth-ball"), "generated"),
         (("accuracy", *STRIP, "--tiers", "best"), "best"),
         (("memory", "folding-strip", "--methods", ","), "--methods"),
+        (("accuracy", *STRIP, "--threads", "100000"), "at most 1024"),
+        (("limit", *STRIP, "--threads-list", "1,100000"), "at most 1024"),
+        (("limit", *STRIP, "--figures", "/proc/no-folder"), "--figures"),
     ],
 )
 def test_wrong_use_is_explained(bench, capsys, arguments, text):
     status, result, _ = bench(*arguments)
     assert status == 2 and result is None
     assert text in capsys.readouterr().err
+
+
+def test_where_nothing_can_be_written_nothing_is_measured(tmp_path, capsys):
+    (tmp_path / "file").touch()
+    for option, text in (("--label", "a/b"), ("--out", str(tmp_path / "file" / "folder"))):
+        assert cli.main(["bench", "cpu", *STRIP, "--out", str(tmp_path / "new"), option, text]) == 2
+        assert f"{option} {text}" in capsys.readouterr().err
 
 
 def test_gpu_redraws_a_kept_result(bench, tmp_path):

@@ -21,6 +21,11 @@ STATS = {
 }  # fmt: skip
 
 
+def test_a_step_without_work_is_drawn(bench):
+    status, _, folder = bench("limit", "two-triangles", "--steps", "1", "--repeat", "1", "--threads-list", "1")
+    assert status == 0 and (folder / "limit.png").exists()
+
+
 def test_a_row_for_each_stage_the_farthest_first(bench):
     status, result, folder = bench("limit", *STRIP, "--threads-list", "2,1")
     assert status == 0 and result["failures"] == []
