@@ -31,6 +31,10 @@ def in_a_room(faces, cloths, floor_first):
     return scene, lambda both: np.concatenate([FLOOR, *both] if floor_first else [*both, FLOOR])
 
 
+def by_tiers(scene, t0, t1, *tiers):
+    return [hc.Detector(scene, accuracy=tier, backend="cpu").detect(t0, t1) for tier in tiers]
+
+
 @pytest.mark.parametrize("floor_first", [True, False])
 @pytest.mark.parametrize("edge", [3e-5, 3e-4])
 def test_a_fine_cloth_in_a_large_room(floor_first, edge):
@@ -39,9 +43,7 @@ def test_a_fine_cloth_in_a_large_room(floor_first, edge):
     scene, whole = in_a_room(faces, start, floor_first)
     size = edge * n / 2
     t0, t1 = (whole([cloth * size + [0.31, 0.22, 0.4] for cloth in both]) for both in (start, end))
-    fast, balanced = (
-        hc.Detector(scene, accuracy=tier, backend="cpu").detect(t0, t1) for tier in ("fast", "balanced")
-    )
+    fast, balanced = by_tiers(scene, t0, t1, "fast", "balanced")
     assert len(balanced) > 1000 and fast.hash == balanced.hash
 
 
@@ -51,18 +53,14 @@ def test_meshes_that_shrink_in_the_step():
     scene, whole = in_a_room(faces, start, True)
     t0 = whole([cloth * 0.9 for cloth in start])
     t1 = whole([cloth * 1e-3 for cloth in end])
-    fast, balanced = (
-        hc.Detector(scene, accuracy=tier, backend="cpu").detect(t0, t1) for tier in ("fast", "balanced")
-    )
+    fast, balanced = by_tiers(scene, t0, t1, "fast", "balanced")
     assert len(balanced) > 100 and fast.hash == balanced.hash
 
 
 def test_few_wrong_answers_on_ordinary_motion():
     faces, start, end = wrinkled(np.random.default_rng(5), 60)
     scene, whole = in_a_room(faces, start, True)
-    fast, exact = (
-        hc.Detector(scene, accuracy=tier, backend="cpu").detect(whole(start), whole(end)) for tier in ("fast", "exact")
-    )
+    fast, exact = by_tiers(scene, whole(start), whole(end), "fast", "exact")
     pairs = [{*map(tuple, found.vf), *map(tuple, found.ee)} for found in (fast, exact)]
     assert fast.hash != exact.hash  # single precision was at work: no time is the same to the last bit
     assert len(pairs[1]) > 5000 and len(pairs[0] ^ pairs[1]) <= 1e-3 * len(pairs[1])

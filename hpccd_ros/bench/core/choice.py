@@ -48,8 +48,8 @@ def parse(text: str) -> list[Bound]:
     for word in words:
         found = _BOUND.fullmatch(word)
         if not found:
-            raise UserError(f"--choose {word!r}: write QUANTITY<NUMBER or QUANTITY<=NUMBER, bounds with commas between, as "
-                            f"in {EXAMPLE}; quantities: {', '.join(QUANTITIES)}")  # fmt: skip
+            raise UserError(f"--choose {word!r}: write QUANTITY<NUMBER or QUANTITY<=NUMBER, bounds with commas "
+                            f"between, as in {EXAMPLE}; quantities: {', '.join(QUANTITIES)}")  # fmt: skip
         quantity, strict = found["quantity"], found["sign"] == "<"
         if quantity not in QUANTITIES:
             raise UserError(f"--choose {word!r}: {quantity} is not known; choose from {', '.join(QUANTITIES)}")
