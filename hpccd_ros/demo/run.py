@@ -197,6 +197,6 @@ def _last_words(folder, console, worst):
 
 try next
   {command} replay {recording}            compute it again, compare every contact
-  {command} view {recording} --step 30    draw another frame
+  {command} view {recording} --step {worst.step}    draw a frame of your choice
   {command} scene --list                          more scenes: {command} demo --scene n-body-like-lr
   {command} --help                                all commands""", markup=True, soft_wrap=True)

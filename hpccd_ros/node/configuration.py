@@ -48,10 +48,11 @@ class Configuration:
 
     def summary(self, contacts: str) -> str:
         """For the log, in one line. contacts: name of the topic."""
+        tested = listed(self.options.features)
         where = f"on this host only ({environment.DISCOVERY}=SUBNET opens it)"
         return (
             f"meshes {listed(self.meshes) or 'none (service only)'}; "
-            f"accuracy {self.options.accuracy}, backend {self.options.backend}, contacts on {contacts}; "
+            f"tests {tested}; accuracy {self.options.accuracy}, backend {self.options.backend}, contacts on {contacts}; "
             f"discovery {where if environment.this_host_only() else 'beyond this host'}"
         )
 
