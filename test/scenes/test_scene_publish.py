@@ -191,7 +191,7 @@ def test_node_reports_the_contacts_of_a_scene(name, size, listen, children, tmp_
     assert sum(len(c) for c in expected.values()) > 100
     listener.wait(lambda: len(answers) >= 2, publisher)
     node.send_signal(signal.SIGSTOP)
-    time.sleep(0.2)  # four frames: when the statue breaks each has a topology, of which a node's queue holds ten
+    time.sleep(0.2)  # four frames; while the statue breaks each has a topology, and the queue of these holds ten
     node.send_signal(signal.SIGCONT)
     listener.wait(lambda: len(answers) >= len(expected), publisher)
     assert {a.step: a.hash for a in answers} == {k: c.hash for k, c in expected.items()}
