@@ -48,11 +48,12 @@ class Configuration:
 
     def summary(self, contacts: str) -> str:
         """For the log, in one line. contacts: name of the topic."""
-        tested = listed(self.options.features)
+        options = self.options
         where = f"on this host only ({environment.DISCOVERY}=SUBNET opens it)"
         return (
             f"meshes {listed(self.meshes) or 'none (service only)'}; "
-            f"tests {tested}; accuracy {self.options.accuracy}, backend {self.options.backend}, contacts on {contacts}; "
+            f"tests {listed(options.features)}; accuracy {options.accuracy}, backend {options.backend}, "
+            f"contacts on {contacts}; "
             f"discovery {where if environment.this_host_only() else 'beyond this host'}"
         )
 
