@@ -193,12 +193,6 @@ HPCCD_HD Bytes16 to_bytes(const SideBits (&of)[2]) {
   const __m256i words = _mm256_permute4x64_epi64(_mm256_packs_epi32(of[0].v, of[1].v), 0xD8);
   return {_mm_packus_epi16(_mm256_castsi256_si128(words), _mm256_extracti128_si256(words, 1))};
 }
-HPCCD_HD Bytes16 bits_to_bytes(unsigned bits) {
-  const __m128i bit = _mm_set1_epi64x(static_cast<long long>(0x8040201008040201ull));
-  const __m128i twice =
-      _mm_shuffle_epi8(_mm_cvtsi32_si128(static_cast<int>(bits)), _mm_set_epi64x(0x0101010101010101, 0));
-  return {_mm_and_si128(_mm_cmpeq_epi8(_mm_and_si128(twice, bit), bit), _mm_set1_epi8(1))};
-}
 HPCCD_HD Bytes16 picked(Bytes16 bytes, Bytes16 which) { return {_mm_shuffle_epi8(bytes.v, which.v)}; }
 HPCCD_HD Bytes16 picked(Bytes16 bytes, Bytes16 next, Bytes16 which) {
   return {_mm_blendv_epi8(_mm_shuffle_epi8(bytes.v, which.v), _mm_shuffle_epi8(next.v, which.v),

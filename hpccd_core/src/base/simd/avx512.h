@@ -193,8 +193,6 @@ HPCCD_HD Bytes16 operator&(Bytes16 a, Bytes16 b) { return {_mm_and_si128(a.v, b.
 HPCCD_HD Bytes16 operator|(Bytes16 a, Bytes16 b) { return {_mm_or_si128(a.v, b.v)}; }
 // Bit i of byte j: lane j of mask i.
 HPCCD_HD Bytes16 to_bytes(const SideBits (&of)[1]) { return {of[0].v}; }
-// Byte j: one where bit j is set, else zero.
-HPCCD_HD Bytes16 bits_to_bytes(unsigned bits) { return {_mm_maskz_set1_epi8(static_cast<__mmask16>(bits), 1)}; }
 // Byte j: that of number which[j], out of 16 or of 32.
 HPCCD_HD Bytes16 picked(Bytes16 bytes, Bytes16 which) { return {_mm_shuffle_epi8(bytes.v, which.v)}; }
 HPCCD_HD Bytes16 picked(Bytes16 bytes, Bytes16 next, Bytes16 which) {

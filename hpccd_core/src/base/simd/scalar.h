@@ -250,12 +250,6 @@ HPCCD_HD Bytes16 to_bytes(const SideBits (&of)[4]) {
 #endif
   return r;
 }
-// Byte j: one where bit j is set, else zero.
-HPCCD_HD Bytes16 bits_to_bytes(unsigned bits) {
-  Bytes16 r{};
-  for (int j = 0; j < 16; ++j) r.half[j / 8] |= std::uint64_t{bits >> j & 1} << (8 * (j % 8));
-  return r;
-}
 // Byte j: that of number which[j], out of 16 or of 32.
 HPCCD_HD Bytes16 picked_from(const std::uint8_t* of, const Bytes16& which) {
   Bytes16 r;
