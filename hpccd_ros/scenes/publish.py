@@ -18,13 +18,13 @@ from hpccd_ros.scenes.messages import Player
 from hpccd_ros.scenes.progress import track
 from hpccd_ros.scenes.scene import Scene
 
-# Seconds between the static meshes and the first frame.
+# Seconds between the arrival of the static meshes and the first frame.
 SETTLE = 0.2
 # Seconds that the last frame may take on its way.
 LAST = 2.0
 STREAM = qos.vertices("reliable", 10)
 
-# Where each frame is awaited: a history that one message fills makes the middleware ask for its acknowledgement at
+# Where each message is awaited: a history that one message fills makes the middleware ask for its acknowledgement at
 # once, and not with its next heartbeat (3 s).
 AWAITED = qos.vertices("reliable", 1)
 
@@ -42,7 +42,7 @@ def publish(
     """Publish all frames at `rate` Hz (over and over if `loop`); return how many. SIGINT and SIGTERM end it.
 
     Before the first frame, waits up to `wait` seconds until every mesh's vertices have `subscribers`; before the
-    second, until these have acknowledged the first.
+    moving meshes, until these have acknowledged the static ones; before the second frame, the first.
     answered: no frame before all have the one before and the node has answered its step, each awaited up to `wait`
     seconds: where the machine is too slow for `rate`, the scene plays slower and nothing is dropped.
     """
@@ -55,11 +55,12 @@ def publish(
         answers = Answers(node) if answered else None
         try:
             publishers = {}
-            for mesh in scene.mesh_names:
-                name = topic_names.topology(mesh)
+            for mesh in scene.meshes:
+                name = topic_names.topology(mesh.name)
                 publishers[name] = node.create_publisher(MeshTopology, name, qos.TOPOLOGY)
-                name = topic_names.vertices(mesh)
-                publishers[name] = node.create_publisher(MeshVertices, name, AWAITED if answered else STREAM)
+                name = topic_names.vertices(mesh.name)
+                profile = AWAITED if answered or mesh.static else STREAM
+                publishers[name] = node.create_publisher(MeshVertices, name, profile)
             listened = {topic_names.vertices(mesh): publishers[topic_names.vertices(mesh)] for mesh in scene.mesh_names}
             if await_subscribers(listened, subscribers, wait, stop) and not stop:
                 text = f"not every mesh has {subscribers} subscriber(s) yet: publishing all the same"
@@ -94,8 +95,9 @@ def _play(node, scene, publishers, answers, rate, loop, wait, stop, progress) ->
             for message in messages:
                 if count == 0 and message.topic == first_moving:
                     # Nothing orders topics among one another: let the ground arrive before what falls on it.
+                    arrived = await_acknowledged(publishers.values(), wait, stop)
                     _sleep_until(time.monotonic() + SETTLE, stop)
-                    begin += SETTLE
+                    begin += arrived + SETTLE
                 publishers[message.topic].publish(message.data)
             if count == 0:
                 begin += await_acknowledged(publishers.values(), wait, stop)
