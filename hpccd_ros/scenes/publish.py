@@ -24,7 +24,7 @@ SETTLE = 0.2
 LAST = 2.0
 STREAM = qos.vertices("reliable", 10)
 
-# Where each message is awaited: a history that one message fills makes the middleware ask for its acknowledgement at
+# Where each frame is awaited: a history that one message fills makes the middleware ask for its acknowledgement at
 # once, and not with its next heartbeat (3 s).
 AWAITED = qos.vertices("reliable", 1)
 
@@ -55,12 +55,11 @@ def publish(
         answers = Answers(node) if answered else None
         try:
             publishers = {}
-            for mesh in scene.meshes:
-                name = topic_names.topology(mesh.name)
+            for mesh in scene.mesh_names:
+                name = topic_names.topology(mesh)
                 publishers[name] = node.create_publisher(MeshTopology, name, qos.TOPOLOGY)
-                name = topic_names.vertices(mesh.name)
-                profile = AWAITED if answered or mesh.static else STREAM
-                publishers[name] = node.create_publisher(MeshVertices, name, profile)
+                name = topic_names.vertices(mesh)
+                publishers[name] = node.create_publisher(MeshVertices, name, AWAITED if answered else STREAM)
             listened = {topic_names.vertices(mesh): publishers[topic_names.vertices(mesh)] for mesh in scene.mesh_names}
             if await_subscribers(listened, subscribers, wait, stop) and not stop:
                 text = f"not every mesh has {subscribers} subscriber(s) yet: publishing all the same"
