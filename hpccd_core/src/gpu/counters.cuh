@@ -11,6 +11,9 @@ namespace hpccd::gpu {
 using u32 = std::uint32_t;
 using u64 = unsigned long long;
 
+// The device's integers have one or two limbs a coordinate, as the CPU's of fixed size.
+inline constexpr int integer_sizes = 2;
+
 struct Counters {
   u64 extent_low[3], extent_high[3];  // largest of the ordered bits, low ones negated: zero is neutral
   u64 bad;                            // coordinates that are not acceptable
@@ -23,9 +26,10 @@ struct Counters {
   u64 candidates[2], proven[2], undecided_of[2];
   u64 open[2];    // of the segment at work: what single precision cannot tell
   u64 missed[2];  // apart at their only root, as single precision has it: none of the lists that follow
-  u64 apart[2], proven_near[2], undecided_near[2];  // of the tests that know a distance
-  u64 found[2];                                     // by kind, after the fallback on the device
-  u64 found_all, undecided, to_host;
+  u64 by_tolerance[2], by_extended[2], by_integers[2];  // of what the error bounds left open: who decided
+  u64 apart[2], proven_near[2], undecided_near[2];      // of the tests that know a distance
+  u64 found[2];                                         // by kind, after the fallback on the device
+  u64 found_all, undecided, open_in_integers[integer_sizes], to_host;
   u64 hash;
   u64 soonest, soonest_proven;  // complements of the bits of earliest times
   u64 way, away;                // bits of the longest ways of a coordinate (device_near_list.cuh)

@@ -8,6 +8,7 @@
 #include "elementary/filtered_test.h"
 #include "elementary/tolerance_test.h"
 #include "gpu/best_time.cuh"
+#include "gpu/pair_ends.cuh"
 
 namespace hpccd::gpu {
 
@@ -96,22 +97,11 @@ __global__ void end_segment_kernel(LaunchParams<T> params) {
   }
 }
 
-// A pair at both ends of its motion, in the order of pair_vertices.
-struct PairEnds {
-  Vec3<double> t0[4], t1[4];
-};
-
-template <class T>
-__device__ __forceinline__ PairEnds load_pair_ends(const GivenEnds<T>* vertices, uint4 v) {
-  const Ends r[4] = {load_ends(vertices, v.x), load_ends(vertices, v.y), load_ends(vertices, v.z),
-                     load_ends(vertices, v.w)};
-  return {{r[0].t0, r[1].t0, r[2].t0, r[3].t0}, {r[0].t1, r[1].t1, r[2].t1, r[3].t1}};
-}
-
-// The answer of the tier's fallback where double precision or twice that is enough; else it is the host's to give.
+// The answer of the tier's fallback where double precision or twice that is enough; else it stays open.
 struct FallbackAnswer {
-  bool contact, host;
+  bool contact, open;
   double toc;
+  bool tolerant = false;  // within a tolerance, where the tier promises no more
 };
 
 template <Kind kind>
@@ -125,13 +115,12 @@ __device__ FallbackAnswer decide_on_device(const PairEnds& q, Accuracy accuracy,
     return {a.contact, !a.contact && !a.none, a.toc};
   }
   const tolerance_test::Answer a = tolerance_test::contact<kind>(q.t0, q.t1);
-  return {a.contact, false, a.toc};
+  return {a.contact, false, a.toc, true};
 }
 
-template <Kind kind, bool separations, class T>
-__device__ FallbackAnswer fallback(const LaunchParams<T>& params, uint4 v) {
+template <Kind kind, class T>
+__device__ FallbackAnswer fallback(const LaunchParams<T>& params, uint4 v, double separation) {
   const PairEnds q = load_pair_ends(params.vertices, v);
-  const double separation = separations ? separation_of(params, v.x, v.z) : 0;
   if (params.time_only && params.until_best && apart_until<kind>(q.t0, q.t1, until(params), separation)) return {};
   return decide_on_device<kind>(q, accuracy_of(params, v), separation);
 }
@@ -140,29 +129,34 @@ __device__ FallbackAnswer fallback(const LaunchParams<T>& params, uint4 v) {
 // for its registers.
 template <bool separations, class T>
 __global__ __launch_bounds__(32) void fallback_kernel(const __grid_constant__ LaunchParams<T> params) {
-  const u64 n = length(params.counters->undecided, params.undecided_capacity), n_warps = gridDim.x;
+  Counters& c = *params.counters;
+  const u64 n = length(c.undecided, params.undecided_capacity), n_warps = gridDim.x;
   // A warp goes the ways of all its pairs: few are spread over many warps. Of many, neighbours go similar ways.
   const bool few = n <= 8 * n_warps;
   for (u64 begin = 0; begin < n; begin += 32 * n_warps) {
     const u64 i = begin + (few ? lane_number() * n_warps + blockIdx.x : u64{blockIdx.x} * 32 + lane_number());
     FallbackAnswer answer{false, false, 0};
     u64 key = 0;
-    uint2 pair{0, 0};
-    Kind kind = Kind::vertex_face;
+    double separation = 0;
     if (i < n) {
       key = params.undecided[i];
-      const Candidate candidate = params.keys.pair_of(key);
-      kind = candidate.kind, pair = {candidate.first, candidate.second};
-      const uint4 v = kind == Kind::edge_edge ? vertices_of<Kind::edge_edge>(params, pair.x, pair.y)
-                                              : vertices_of<Kind::vertex_face>(params, pair.x, pair.y);
-      answer = kind == Kind::edge_edge ? fallback<Kind::edge_edge, separations>(params, v)
-                                       : fallback<Kind::vertex_face, separations>(params, v);
+      const Kind kind = params.keys.pair_of(key).kind;
+      const uint4 v = vertices_of(params, params.keys.pair_of(key));
+      if constexpr (separations) separation = separation_of(params, v.x, v.z);
+      answer = kind == Kind::edge_edge ? fallback<Kind::edge_edge>(params, v, separation)
+                                       : fallback<Kind::vertex_face>(params, v, separation);
     }
-    append_found(params, kind, answer.contact, pair, answer.toc);
-    if (answer.contact) atomicAdd(&params.counters->found[kind == Kind::edge_edge], u64{1});
-    if (params.time_only) keep_soonest(&params.counters->soonest, answer.contact ? answer.toc : INFINITY);
-    const u64 at = warp_append(&params.counters->to_host, answer.host);
-    if (answer.host && at < params.to_host_capacity) params.to_host[at] = key;
+    const Candidate pair = params.keys.pair_of(key);
+    append_found(params, pair.kind, answer.contact, {pair.first, pair.second}, answer.toc);
+    count_lanes(c.found, answer.contact, pair.kind);
+    count_lanes(c.by_tolerance, answer.tolerant, pair.kind);
+    count_lanes(c.by_extended, i < n && !answer.open && !answer.tolerant, pair.kind);
+    if (params.time_only) keep_soonest(&c.soonest, answer.contact ? answer.toc : INFINITY);
+    // The device's integers know of contacts only.
+    const bool near = separations && separation > 0;
+    append_key(params.open_in_integers[0], params.open_capacity, &c.open_in_integers[0], answer.open && !near, key);
+    if constexpr (separations)
+      append_key(params.to_host, params.to_host_capacity, &c.to_host, answer.open && near, key);
   }
 }
 

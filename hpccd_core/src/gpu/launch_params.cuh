@@ -113,7 +113,9 @@ struct LaunchParams {
   u64 found_capacity;
   u64* undecided;  // keys
   u64 undecided_capacity;
-  u64* to_host;  // keys that need exact arithmetic
+  u64* open_in_integers[integer_sizes];  // keys that need integers of one limb a coordinate, of two
+  u64 open_capacity;                     // of each
+  u64* to_host;                          // keys that need the CPU's exact arithmetic
   u64 to_host_capacity;
   u32 segment, n_segments;  // leaf pairs of this pass: n * segment / n_segments ...
   Counters* counters;

@@ -35,18 +35,32 @@ __device__ void append_found(const LaunchParams<T>& params, Kind kind, bool want
   }
 }
 
+// All lanes must call.
+__device__ inline void append_key(u64* keys, u64 capacity, u64* counter, bool wanted, u64 key) {
+  const u64 at = warp_append(counter, wanted);
+  if (wanted && at < capacity) keys[at] = key;
+}
+
 // Left to the fallback.
 template <class T>
 __device__ void append_undecided(const LaunchParams<T>& params, Kind kind, bool wanted, uint2 pair) {
-  const u64 at = warp_append(&params.counters->undecided, wanted);
-  if (wanted && at < params.undecided_capacity) params.undecided[at] = params.keys.key_of(kind, pair.x, pair.y);
+  append_key(params.undecided, params.undecided_capacity, &params.counters->undecided, wanted,
+             params.keys.key_of(kind, pair.x, pair.y));
 }
 
-// Left to exact arithmetic.
+// Left to the CPU.
 template <class T>
 __device__ void append_to_host(const LaunchParams<T>& params, Kind kind, bool wanted, uint2 pair) {
-  const u64 at = warp_append(&params.counters->to_host, wanted);
-  if (wanted && at < params.to_host_capacity) params.to_host[at] = params.keys.key_of(kind, pair.x, pair.y);
+  append_key(params.to_host, params.to_host_capacity, &params.counters->to_host, wanted,
+             params.keys.key_of(kind, pair.x, pair.y));
+}
+
+// Counts lanes by the kind of their pairs. All lanes must call.
+__device__ inline void count_lanes(u64 counters[2], bool counts, Kind kind) {
+  for (u32 k = 0; k < 2; ++k) {
+    const u32 mask = __ballot_sync(all_lanes, counts && (kind == Kind::edge_edge) == (k == 1));
+    if (lane_number() == 0 && mask) atomicAdd(&counters[k], static_cast<u64>(__popc(mask)));
+  }
 }
 
 // Adds what all lanes counted.

@@ -356,6 +356,9 @@ std::map<std::string, std::uint64_t> DevicePipeline::stats() const {
     s[kind + "_proven_contacts"] = b.contacts;
     s[kind + "_undecided"] = b.undecided;
     if (edges_and_faces) continue;
+    s[kind + "_by_tolerance"] = c.by_tolerance[k];
+    s[kind + "_by_extended"] = c.by_extended[k];
+    s[kind + "_by_integers"] = c.by_integers[k];
     s[kind + "_single_root"] = c.all_single[k];
     s[kind + "_many_roots"] = c.all_many[k];
   }

@@ -25,6 +25,11 @@ struct Stages {
     kernel<<<dim3(static_cast<unsigned>(blocks * multiprocessors), rows), threads, 0, stream>>>(params);
     check_launch(name);
   }
+  // The same, of blocks of a warp.
+  template <class Kernel, class T>
+  void one_warp_blocks(Kernel kernel, const LaunchParams<T>& params, const char* name) const {
+    persistent(kernel, 32, params, name);
+  }
   void mark(const char* name) const { timer.mark(name, stream); }
 };
 
@@ -36,6 +41,10 @@ void launch_hints(Query query, const LaunchParams<T>& params, const Stages& stag
 // double.
 template <class T>
 void launch_likely(const LaunchParams<T>& params, const Stages& stages);
+
+// What the fallback leaves open. Defined for float and double.
+template <class T>
+void launch_integers(const LaunchParams<T>& params, const Stages& stages);
 
 // From pairs of leaves to survivors of the first filter, and the tests that know a distance. Defined for float and
 // double.

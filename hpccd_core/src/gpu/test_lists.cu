@@ -77,10 +77,10 @@ void TestLists::launch(Query query, From from, LaunchParams<T>& params, int mult
     check_launch("soonest_kernel");
     timer.mark("earliest", stream);
   }
-  const auto fallback = query == Query::separations ? fallback_kernel<true, T> : fallback_kernel<false, T>;
-  fallback<<<static_cast<unsigned>(2 * multiprocessors), 32, 0, stream>>>(params);
-  check_launch("fallback_kernel");
+  stages.one_warp_blocks(query == Query::separations ? fallback_kernel<true, T> : fallback_kernel<false, T>, params,
+                         "fallback_kernel");
   timer.mark("last_resort", stream);  // the fallbacks' first name, under which kept results have it
+  launch_integers(params, stages);
 }
 
 template void TestLists::launch(Query, From, LaunchParams<float>&, int, cudaStream_t, StageTimer&);

@@ -10,7 +10,7 @@ namespace hpccd::gpu {
 class TestLists {
  public:
   struct Sizes {
-    std::size_t survivors[2], single[2], many[2], separated[2], undecided, to_host;
+    std::size_t survivors[2], single[2], many[2], separated[2], undecided, open, to_host;
     void include(const Sizes& s) {
       for (int k = 0; k < 2; ++k) {
         survivors[k] = std::max(survivors[k], s.survivors[k]);
@@ -19,12 +19,13 @@ class TestLists {
         separated[k] = std::max(separated[k], s.separated[k]);
       }
       undecided = std::max(undecided, s.undecided);
+      open = std::max(open, s.open);
       to_host = std::max(to_host, s.to_host);
     }
   };
   // A start that most scenes outgrow once or never; lists grow where they overflow.
   TestLists(std::size_t survivors, std::size_t later, std::size_t undecided) {
-    reserve({{survivors, survivors}, {later, later}, {later, later}, {0, 0}, undecided, undecided});
+    reserve({{survivors, survivors}, {later, later}, {later, later}, {0, 0}, undecided, undecided, undecided});
   }
 
   void reserve(const Sizes& s) {
@@ -32,6 +33,7 @@ class TestLists {
       survivors_[k].reserve(s.survivors[k]), single_[k].reserve(s.single[k]), many_[k].reserve(s.many[k]),
           separated_[k].reserve(s.separated[k]);
     undecided_.reserve(s.undecided);
+    for (auto& list : open_) list.reserve(s.open);
     to_host_.reserve(s.to_host);
   }
   Sizes sizes() const {
@@ -40,12 +42,14 @@ class TestLists {
             {many_[0].size(), many_[1].size()},
             {separated_[0].size(), separated_[1].size()},
             undecided_.size(),
+            open_[0].size(),
             to_host_.size()};
   }
 
   template <class Visit>
   void for_buffers(Visit&& visit) const {
     for (int k = 0; k < 2; ++k) visit(survivors_[k]), visit(single_[k]), visit(many_[k]), visit(separated_[k]);
+    for (const auto& list : open_) visit(list);
     visit(undecided_), visit(to_host_);
   }
 
@@ -65,6 +69,8 @@ class TestLists {
       params.single[k] = list(single_[k]), params.many[k] = list(many_[k]);
     }
     params.undecided = undecided_.data(), params.undecided_capacity = undecided_.size();
+    for (int i = 0; i < integer_sizes; ++i) params.open_in_integers[i] = open_[i].data();
+    params.open_capacity = open_[0].size();
     params.to_host = to_host_.data(), params.to_host_capacity = to_host_.size();
   }
 
@@ -92,6 +98,7 @@ class TestLists {
       grow(separated_[k], c.most_separated, true);
     }
     grow(undecided_, c.undecided, false);
+    for (auto& list : open_) grow(list, c.open_in_integers[0], false);  // no list is longer than the first
     grow(to_host_, c.to_host, false);
     return again;
   }
@@ -100,7 +107,7 @@ class TestLists {
   const u64* to_host() const { return to_host_.data(); }
   u32 n_segments() const { return n_segments_; }
   std::size_t bytes() const {
-    std::size_t b = undecided_.bytes();
+    std::size_t b = undecided_.bytes() + integer_sizes * open_[0].bytes();
     for (int k = 0; k < 2; ++k)
       b += survivors_[k].bytes() + single_[k].bytes() + many_[k].bytes() + separated_[k].bytes();
     return b;
@@ -108,7 +115,7 @@ class TestLists {
 
  private:
   DeviceBuffer<uint2> survivors_[2], single_[2], many_[2], separated_[2];
-  DeviceBuffer<u64> undecided_;
+  DeviceBuffer<u64> undecided_, open_[integer_sizes];
   PinnedBuffer<u64> to_host_;
   // Lists of one pass stay below this; larger frames take several segments.
   static constexpr std::size_t most_listed = std::size_t{1} << 26;

@@ -1,47 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "elementary/exact/contact.h"
 
-#include "elementary/exact/boxes.h"
+#include "elementary/exact/given_motion.h"
 #include "elementary/exact/wide/approach.h"
 #include "elementary/exact/wide/earliest.h"
 
 namespace hpccd::exact {
-namespace {
-
-// The coordinates of a query, by axis, and the power of two that makes each axis integers.
-struct Given {
-  OddMantissa begin[3][4], end[3][4];
-  int low[3], bits = 1;
-
-  Given(const Vec3<double> q_t0[4], const Vec3<double> q_t1[4]) {
-    for (int k = 0; k < 3; ++k) {
-      BitRange range;
-      for (int i = 0; i < 4; ++i) {
-        range.include(begin[k][i] = OddMantissa(coordinate(q_t0[i], k)));
-        range.include(end[k][i] = OddMantissa(coordinate(q_t1[i], k)));
-      }
-      low[k] = range.low;
-      bits = std::max(bits, range.bits());
-    }
-  }
-
-  template <class Z>
-  Query<Z> query(Kind kind) const {
-    Coordinates<Z> points[4];
-    for (int i = 0; i < 4; ++i)
-      for (int k = 0; k < 3; ++k) {
-        const Z z0 = scaled_integer<Z>(begin[k][i], low[k]), z1 = scaled_integer<Z>(end[k][i], low[k]);
-        points[i][k] = {{z0, z1 - z0}};
-      }
-    return {kind, points};
-  }
-};
-
-}  // namespace
 
 std::optional<double> earliest_contact(Kind kind, const Vec3<double> q_t0[4], const Vec3<double> q_t1[4]) {
   if (boxes_apart(kind, q_t0, q_t1, 0)) return std::nullopt;
-  const Given given(q_t0, q_t1);
+  const GivenMotion given(q_t0, q_t1);
   Answer answer{false, {}};
   if (given.bits <= Widths<Integer<1>>::coordinate_bits)
     answer = earliest(given.query<Integer<1>>(kind));
@@ -52,7 +20,7 @@ std::optional<double> earliest_contact(Kind kind, const Vec3<double> q_t0[4], co
 }
 
 Approach approach(Kind kind, const Vec3<double> q_t0[4], const Vec3<double> q_t1[4], double toc) {
-  const Given given(q_t0, q_t1);
+  const GivenMotion given(q_t0, q_t1);
   std::optional<Approach> answer;  // nothing: undecided
   if (given.bits <= Widths<Integer<1>>::coordinate_bits)
     answer = approach(given.query<Integer<1>>(kind), given.low, toc);

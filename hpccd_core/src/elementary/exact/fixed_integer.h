@@ -8,6 +8,8 @@
 #include <cmath>
 #include <cstdint>
 
+#include "base/hd.h"
+
 namespace hpccd::exact {
 
 __extension__ typedef unsigned __int128 DoubleLimb;
@@ -18,23 +20,27 @@ struct Integer {
   std::array<std::uint64_t, N> limbs;  // least significant first
 
   Integer() = default;
-  Integer(std::int64_t x) {
-    limbs.fill(static_cast<std::uint64_t>(x >> 63));
+  HPCCD_HOST_DEVICE Integer(std::int64_t x) {
+    fill(static_cast<std::uint64_t>(x >> 63));
     limbs[0] = static_cast<std::uint64_t>(x);
   }
   template <int M>
     requires(M < N)
-  Integer(const Integer<M>& x) {
-    limbs.fill(x.extension());
-    std::copy(x.limbs.begin(), x.limbs.end(), limbs.begin());
+  HPCCD_HOST_DEVICE Integer(const Integer<M>& x) {
+    for (int i = 0; i < M; ++i) limbs[i] = x.limbs[i];
+    for (int i = M; i < N; ++i) limbs[i] = x.extension();
   }
 
-  bool negative() const { return static_cast<std::int64_t>(limbs[N - 1]) < 0; }
-  std::uint64_t extension() const { return negative() ? ~std::uint64_t{0} : 0; }  // what all limbs further up would be
+  HPCCD_HOST_DEVICE void fill(std::uint64_t x) {
+    for (std::uint64_t& limb : limbs) limb = x;
+  }
+  HPCCD_HOST_DEVICE bool negative() const { return static_cast<std::int64_t>(limbs[N - 1]) < 0; }
+  // What all limbs further up would be.
+  HPCCD_HOST_DEVICE std::uint64_t extension() const { return negative() ? ~std::uint64_t{0} : 0; }
 };
 
 template <int N>
-int sign(const Integer<N>& x) {
+HPCCD_HOST_DEVICE int sign(const Integer<N>& x) {
   if (x.negative()) return -1;
   std::uint64_t any = 0;
   for (std::uint64_t limb : x.limbs) any |= limb;
@@ -45,7 +51,7 @@ namespace detail {
 
 // a + b, or a - b as a + ~b + 1.
 template <bool subtract, int N>
-Integer<N> sum(const Integer<N>& a, const Integer<N>& b) {
+HPCCD_HOST_DEVICE Integer<N> sum(const Integer<N>& a, const Integer<N>& b) {
   Integer<N> s;
   std::uint64_t carry = subtract;
   for (int i = 0; i < N; ++i) {
@@ -59,7 +65,7 @@ Integer<N> sum(const Integer<N>& a, const Integer<N>& b) {
 
 // high -= x where the flag is set: turns an unsigned product into a signed one.
 template <int N, int M>
-void subtract_high(Integer<N>& from, const Integer<M>& x, std::uint64_t mask) {
+HPCCD_HOST_DEVICE void subtract_high(Integer<N>& from, const Integer<M>& x, std::uint64_t mask) {
   std::uint64_t borrow = 0;
   for (int i = 0; i < M; ++i) {
     const DoubleLimb d = DoubleLimb{from.limbs[N - M + i]} - (x.limbs[i] & mask) - borrow;
@@ -71,24 +77,24 @@ void subtract_high(Integer<N>& from, const Integer<M>& x, std::uint64_t mask) {
 }  // namespace detail
 
 template <int A, int B>
-Integer<std::max(A, B)> operator+(const Integer<A>& a, const Integer<B>& b) {
+HPCCD_HOST_DEVICE Integer<std::max(A, B)> operator+(const Integer<A>& a, const Integer<B>& b) {
   return detail::sum<false, std::max(A, B)>(a, b);
 }
 template <int A, int B>
-Integer<std::max(A, B)> operator-(const Integer<A>& a, const Integer<B>& b) {
+HPCCD_HOST_DEVICE Integer<std::max(A, B)> operator-(const Integer<A>& a, const Integer<B>& b) {
   return detail::sum<true, std::max(A, B)>(a, b);
 }
 template <int N>
-Integer<N>& operator+=(Integer<N>& a, const Integer<N>& b) {
+HPCCD_HOST_DEVICE Integer<N>& operator+=(Integer<N>& a, const Integer<N>& b) {
   return a = a + b;
 }
 template <int N>
-Integer<N> operator-(const Integer<N>& a) {
+HPCCD_HOST_DEVICE Integer<N> operator-(const Integer<N>& a) {
   return Integer<N>(0) - a;
 }
 
 template <int A, int B>
-Integer<A + B> operator*(const Integer<A>& a, const Integer<B>& b) {
+HPCCD_HOST_DEVICE_CALL Integer<A + B> operator*(const Integer<A>& a, const Integer<B>& b) {
   Integer<A + B> product;
   if constexpr (A == 1 && B == 1) {
     const SignedDoubleLimb x =
@@ -96,7 +102,8 @@ Integer<A + B> operator*(const Integer<A>& a, const Integer<B>& b) {
     product.limbs = {static_cast<std::uint64_t>(x), static_cast<std::uint64_t>(x >> 64)};
     return product;
   }
-  product.limbs.fill(0);
+  product.fill(0);
+  HPCCD_ROLLED_ON_DEVICE
   for (int i = 0; i < A; ++i) {
     std::uint64_t carry = 0;
     for (int j = 0; j < B; ++j) {
@@ -113,7 +120,7 @@ Integer<A + B> operator*(const Integer<A>& a, const Integer<B>& b) {
 
 // x * 2^bits in `More` limbs more than x has.
 template <int More, int N>
-Integer<N + More> shifted(const Integer<N>& x, int bits) {
+HPCCD_HOST_DEVICE_CALL Integer<N + More> shifted(const Integer<N>& x, int bits) {
   Integer<N + More> y;
   const int whole = bits / 64, part = bits % 64;
   const std::uint64_t extension = x.extension();
@@ -125,9 +132,22 @@ Integer<N + More> shifted(const Integer<N>& x, int bits) {
   return y;
 }
 
+// x * m, which must fit its type, by its lowest limbs alone.
+template <int N>
+HPCCD_HOST_DEVICE Integer<N> scaled(const Integer<N>& x, std::uint64_t m) {
+  Integer<N> y;
+  std::uint64_t carry = 0;
+  for (int i = 0; i < N; ++i) {
+    const DoubleLimb z = DoubleLimb{x.limbs[i]} * m + carry;
+    y.limbs[i] = static_cast<std::uint64_t>(z);
+    carry = static_cast<std::uint64_t>(z >> 64);
+  }
+  return y;
+}
+
 // About |x|, as a fraction in [0.5, 1) or 0 times a power of two.
 template <int N>
-double magnitude_of(const Integer<N>& x, int& exponent) {
+HPCCD_HOST_DEVICE_CALL double magnitude_of(const Integer<N>& x, int& exponent) {
   const Integer<N> y = x.negative() ? -x : x;
   int top = N - 1;
   while (top > 0 && y.limbs[top] == 0) --top;

@@ -12,12 +12,12 @@ template <class Z>
 struct Bernstein {
   int n;
   std::array<Z, 4> b;
-  int first_sign() const {
+  HPCCD_HOST_DEVICE int first_sign() const {
     for (int i = 0; i <= n; ++i)
       if (const int s = sign(b[i])) return s;
     return 0;
   }
-  int variations() const {
+  HPCCD_HOST_DEVICE int variations() const {
     int v = 0, last = 0;
     for (int i = 0; i <= n; ++i) {
       const int s = sign(b[i]);
@@ -32,35 +32,52 @@ inline constexpr int isolation_limbs = 2;
 // 40 halvings cost 120 bits and separate roots 1e-12 apart; what is still together probably coincides.
 inline constexpr int isolation_depth = 40;
 
-template <class Z, int D>
-auto to_bernstein(const Polynomial<Z, D>& p, int degree) {
-  using W = Plus<Z, isolation_limbs>;
-  const W c0(p.c[0]), c1(p.c[1]);
-  if constexpr (D == 3)
-    if (degree == 3) {
-      const W c2(p.c[2]), c3(p.c[3]), c0_3 = c0 + c0 + c0, sum = c0 + c1 + c2 + c3;
-      return Bernstein<W>{3, {c0_3, c0_3 + c1, c0_3 + c1 + c1 + c2, sum + sum + sum}};
-    }
-  if (degree == 2) {
-    const W c2(p.c[2]), c0_2 = c0 + c0, sum = c0 + c1 + c2;
-    return Bernstein<W>{2, {c0_2, c0_2 + c1, sum + sum}};
+// Of the polynomial of this degree with coefficients c, times the least number that keeps all integers.
+template <class W>
+HPCCD_HOST_DEVICE Bernstein<W> bernstein_of(const std::array<W, 4>& c, int degree) {
+  const W &c0 = c[0], &c1 = c[1], &c2 = c[2];
+  if (degree == 3) {
+    const W c0_3 = c0 + c0 + c0, sum = c0 + c1 + c2 + c[3];
+    return {3, {c0_3, c0_3 + c1, c0_3 + c1 + c1 + c2, sum + sum + sum}};
   }
-  return Bernstein<W>{1, {c0, c0 + c1}};
+  if (degree == 2) {
+    const W c0_2 = c0 + c0, sum = c0 + c1 + c2;
+    return {2, {c0_2, c0_2 + c1, sum + sum}};
+  }
+  return {1, {c0, c0 + c1}};
 }
 
-// Halves of the interval; each is scaled by 2^n, which no sign notices.
+template <class Z, int D>
+HPCCD_HOST_DEVICE auto to_bernstein(const Polynomial<Z, D>& p, int degree) {
+  using W = Plus<Z, isolation_limbs>;
+  std::array<W, 4> c;
+  for (int i = 0; i <= D; ++i) c[i] = W(p.c[i]);
+  return bernstein_of(c, degree);
+}
+
+// Of [m, m+1] / 2^k. Each halving scales by 2^degree, which no sign notices.
+template <class Z, int D>
+HPCCD_HOST_DEVICE_CALL auto to_bernstein(const Polynomial<Z, D>& p, int degree, std::int64_t m, int k) {
+  using W = Plus<Z, isolation_limbs>;
+  std::array<W, 4> c;
+  for (int i = 0; i <= degree; ++i) c[i] = shifted<0>(W(p.c[i]), (degree - i) * k);
+  for (int i = 0; i < degree; ++i)
+    for (int j = degree - 1; j >= i; --j) c[j] += scaled(c[j + 1], static_cast<std::uint64_t>(m));
+  return bernstein_of(c, degree);
+}
+
 template <class Z>
-void halve(const Bernstein<Z>& whole, Bernstein<Z>& left, Bernstein<Z>& right) {
+HPCCD_HOST_DEVICE Bernstein<Z> first_half(const Bernstein<Z>& whole) {
   const int n = whole.n;
-  left.n = right.n = n;
+  Bernstein<Z> first;
+  first.n = n;
   std::array<Z, 4> row = whole.b;
-  left.b[0] = shifted<0>(row[0], n);
-  right.b[n] = shifted<0>(row[n], n);
+  first.b[0] = shifted<0>(row[0], n);
   for (int level = 1; level <= n; ++level) {
     for (int i = 0; i <= n - level; ++i) row[i] = row[i] + row[i + 1];
-    left.b[level] = shifted<0>(row[0], n - level);
-    right.b[n - level] = shifted<0>(row[n - level], n - level);
+    first.b[level] = shifted<0>(row[0], n - level);
   }
+  return first;
 }
 
 }  // namespace detail
@@ -73,42 +90,54 @@ struct Roots {
   bool complete = true;  // false: some were too close to tell apart with integers of this size
 
   // p must not be constant.
-  explicit Roots(const Polynomial<Z, D>& p) { complete = add_all(p, p.degree()); }
+  HPCCD_HOST_DEVICE explicit Roots(const Polynomial<Z, D>& p) {
+    const int degree = p.degree();
+    if (degree != 2 || discriminant_sign(p) != 0) {
+      complete = add_all(p, degree);
+      return;
+    }
+    Polynomial<Z, D> derivative{};
+    derivative.c[0] = p.c[1], derivative.c[1] = p.c[2] + p.c[2];
+    complete = add_all(derivative, 1);
+  }
 
  private:
-  bool add_all(const Polynomial<Z, D>& p, int degree) {
-    if (degree == 2 && discriminant_sign(p) == 0) {
-      Polynomial<Z, D> derivative{};
-      derivative.c[0] = p.c[1], derivative.c[1] = p.c[2] + p.c[2];
-      return add_all(derivative, 1);
-    }
+  HPCCD_HOST_DEVICE_CALL bool add_all(const Polynomial<Z, D>& p, int degree) {
     const auto b = detail::to_bernstein(p, degree);
-    if (sign(b.b[0]) == 0) add(p, Time<Z>(0), 0, true, 0, degree);
-    if (!isolate(p, b, Time<Z>(0), 0)) return false;
-    if (sign(b.b[b.n]) == 0) add(p, Time<Z>(1), 0, true, 0, degree);
+    if (sign(b.b[0]) == 0) add(p, 0, 0, true, 0, degree);
+    if (!isolate(p, b)) return false;
+    if (sign(b.b[b.n]) == 0) add(p, 1, 0, true, 0, degree);
     return true;
   }
 
-  void add(const Polynomial<Z, D>& p, const Time<Z>& m, int k, bool exact, int before, int degree) {
-    root[n++] = {p, m, k, exact, before, degree == 1};
+  HPCCD_HOST_DEVICE void add(const Polynomial<Z, D>& p, std::int64_t m, int k, bool exact, int before, int degree) {
+    root[n++] = {p, Time<Z>(m), k, exact, before, degree == 1};
   }
 
-  // Those strictly inside. False where a piece still shows several roots after all halvings.
+  // Those strictly inside, part after part; without recursion, for which a GPU has no stack. False where a part still
+  // shows several roots after all halvings.
   template <class W>
-  bool isolate(const Polynomial<Z, D>& p, const detail::Bernstein<W>& b, const Time<Z>& m, int k) {
-    const int v = b.variations();
-    if (v == 1) add(p, m, k, false, b.first_sign(), b.n);
-    if (v <= 1) return true;
-    if (k == detail::isolation_depth) return false;
-    detail::Bernstein<W> left, right;
-    detail::halve(b, left, right);
-    const Time<Z> first = shifted<0>(m, 1), second = first + Time<Z>(1);
-    if (!isolate(p, left, first, k + 1)) return false;
-    if (sign(right.b[0]) == 0) add(p, second, k + 1, true, 0, b.n);
-    return isolate(p, right, second, k + 1);
+  HPCCD_HOST_DEVICE_CALL bool isolate(const Polynomial<Z, D>& p, detail::Bernstein<W> b) {
+    const int degree = b.n;
+    std::int64_t m = 0;  // the part is [m, m+1] / 2^k
+    for (int k = 0;;) {
+      const int v = b.variations();
+      if (v > 1) {
+        if (k == detail::isolation_depth) return false;
+        b = detail::first_half(b);
+        m *= 2, ++k;
+        continue;
+      }
+      if (v == 1) add(p, m, k, false, b.first_sign(), degree);
+      for (; m % 2 != 0; m /= 2) --k;
+      if (k == 0) return true;
+      ++m;
+      b = detail::to_bernstein(p, degree, m, k);
+      if (sign(b.b[0]) == 0) add(p, m, k, true, 0, degree);
+    }
   }
 
-  static int discriminant_sign(const Polynomial<Z, D>& p) {
+  HPCCD_HOST_DEVICE static int discriminant_sign(const Polynomial<Z, D>& p) {
     return sign(p.c[1] * p.c[1] - shifted<0>(p.c[0] * p.c[2], 2));
   }
 };

@@ -29,10 +29,10 @@ struct Query {
   Cubic f;
 
   // Of p x b and a x p. Large numbers are not multiplied twice.
-  decltype(auto) pb(int k) const { return product<0>(p, b, k); }
-  decltype(auto) ap(int k) const { return product<3>(a, p, k); }
+  HPCCD_HOST_DEVICE decltype(auto) pb(int k) const { return product<0>(p, b, k); }
+  HPCCD_HOST_DEVICE decltype(auto) ap(int k) const { return product<3>(a, p, k); }
 
-  Query(Kind kind_, const Coordinates<Z> q[4]) : kind(kind_) {
+  HPCCD_HOST_DEVICE_CALL Query(Kind kind_, const Coordinates<Z> q[4]) : kind(kind_) {
     if (kind == Kind::vertex_face)
       set_spans<Kind::vertex_face>(q);
     else
@@ -44,7 +44,7 @@ struct Query {
   // The features touch where all conditions of a coordinate k, times the sign of n_k, are at least 0: alpha n and so
   // on.
   template <class Visit>
-  void conditions(int k, Visit&& visit) const {
+  HPCCD_HOST_DEVICE void conditions(int k, Visit&& visit) const {
     const Quadratic &pb_k = pb(k), &ap_k = ap(k);
     if (kind == Kind::vertex_face)
       (void)(visit(pb_k) && visit(ap_k) && visit(n[k] - pb_k - ap_k));
@@ -57,8 +57,8 @@ struct Query {
   struct PointOnSegment {
     Coordinates<Z> from_start, from_end;
   };
-  int n_degenerate() const { return kind == Kind::vertex_face ? 3 : 4; }
-  PointOnSegment degenerate(int i) const {
+  HPCCD_HOST_DEVICE int n_degenerate() const { return kind == Kind::vertex_face ? 3 : 4; }
+  HPCCD_HOST_DEVICE_CALL PointOnSegment degenerate(int i) const {
     if (kind == Kind::vertex_face) {
       if (i == 0) return {p, p - b};
       if (i == 1) return {p, p - a};
@@ -69,14 +69,14 @@ struct Query {
     return i == 2 ? PointOnSegment{p, p - a} : PointOnSegment{p + b, p + b - a};
   }
   // Coordinate k of their cross product, up to its sign: condition i.
-  Quadratic beside_line(int i, int k) const {
+  HPCCD_HOST_DEVICE_CALL Quadratic beside_line(int i, int k) const {
     if (kind == Kind::vertex_face) return i == 0 ? pb(k) : i == 1 ? ap(k) : n[k] - pb(k) - ap(k);
     return i == 0 ? pb(k) : i == 1 ? n[k] - pb(k) : i == 2 ? ap(k) : n[k] + ap(k);
   }
 
  private:
   template <Kind k>
-  void set_spans(const Coordinates<Z> q[4]) {
+  HPCCD_HOST_DEVICE void set_spans(const Coordinates<Z> q[4]) {
     using S = Spans<k>;
     p = q[S::p_to] - q[S::p_from], a = q[S::a_to] - q[S::a_from], b = q[S::b_to] - q[S::b_from];
   }
@@ -86,7 +86,7 @@ struct Query {
   mutable std::conditional_t<remembers, std::array<std::optional<Quadratic>, 6>, Nothing> products_;
 
   template <int first>
-  decltype(auto) product(const Coordinates<Z>& x, const Coordinates<Z>& y, int k) const {
+  HPCCD_HOST_DEVICE decltype(auto) product(const Coordinates<Z>& x, const Coordinates<Z>& y, int k) const {
     if constexpr (remembers) {
       auto& known = products_[first + k];
       if (!known) known = cross(x, y, k);
@@ -99,7 +99,7 @@ struct Query {
 
 // sign_of(q) tells the sign of a polynomial at the time in question.
 template <class Z, class Sign>
-bool touches(const Query<Z>& q, Sign&& sign_of) {
+HPCCD_HOST_DEVICE bool touches(const Query<Z>& q, Sign&& sign_of) {
   for (int k = 0; k < 3; ++k) {
     const int s = sign_of(q.n[k]);
     if (s == 0) continue;
@@ -122,7 +122,7 @@ bool touches(const Query<Z>& q, Sign&& sign_of) {
 // coordinate of n does not vanish throughout, its conditions alone decide between its roots, and the set of times at
 // which they touch is closed. Where n does, each point is on its line at roots of one polynomial only, or always.
 template <class Z, class Visit>
-void for_event_polynomials(const Query<Z>& q, Visit&& visit) {
+HPCCD_HOST_DEVICE void for_event_polynomials(const Query<Z>& q, Visit&& visit) {
   for (int k = 0; k < 3; ++k) {
     if (q.n[k].degree() < 0) continue;
     visit(q.n[k]);

@@ -2,6 +2,8 @@
 // A real root in [0, 1] of an integer polynomial, located to 2^-62 by Newton's method on exact values.
 #pragma once
 
+#include <limits>
+
 #include "elementary/exact/polynomial.h"
 #include "elementary/roots.h"
 
@@ -9,7 +11,7 @@ namespace hpccd::exact {
 
 inline constexpr int time_bits = 62;
 
-inline std::int64_t to_int64(const Integer<1>& x) { return static_cast<std::int64_t>(x.limbs[0]); }
+HPCCD_HOST_DEVICE inline std::int64_t to_int64(const Integer<1>& x) { return static_cast<std::int64_t>(x.limbs[0]); }
 
 // The only root of `of` within (m, m+1) / 2^k, simple; or, where `exact`, the number m / 2^k itself.
 template <class Z, int D>
@@ -22,12 +24,12 @@ struct Root {
   bool linear;  // whether `of` is of degree 1
 
   // floor(root * 2^62), for a root that is located.
-  std::int64_t time() const { return to_int64(m) << (time_bits - k); }
+  HPCCD_HOST_DEVICE std::int64_t time() const { return to_int64(m) << (time_bits - k); }
 };
 
 // The coefficients times 2^-exponent, the largest about one, in Bernstein form: for guesses.
 template <class Z, int D>
-Cubic<double> approximate(const Polynomial<Z, D>& p, int& exponent) {
+HPCCD_HOST_DEVICE_CALL Cubic<double> approximate(const Polynomial<Z, D>& p, int& exponent) {
   double c[4] = {};
   int e[4] = {};
   exponent = std::numeric_limits<int>::min();
@@ -43,7 +45,8 @@ Cubic<double> approximate(const Polynomial<Z, D>& p, int& exponent) {
 // an exact sign; where Newton's do not get there, bisection does. value(x) is exact; newton(value, x) tells how far
 // above the root x is about. True where `low` is the root itself.
 template <class Value, class Newton>
-bool close_in(std::int64_t& low, std::int64_t& high, int before, std::int64_t x, Value&& value_there, Newton&& newton) {
+HPCCD_HOST_DEVICE bool close_in(std::int64_t& low, std::int64_t& high, int before, std::int64_t x, Value&& value_there,
+                                Newton&& newton) {
   constexpr double most = 0x1p62;
   for (int turn = 0; high - low > 1; ++turn) {
     constexpr int patience = 6;
@@ -67,7 +70,7 @@ bool close_in(std::int64_t& low, std::int64_t& high, int before, std::int64_t x,
 
 // Narrows the interval to 2^-62.
 template <class Z, int D>
-void locate(Root<Z, D>& r) {
+HPCCD_HOST_DEVICE_CALL void locate(Root<Z, D>& r) {
   if (r.exact || r.k >= time_bits) return;
   constexpr double unit = 1.0 / (std::int64_t{1} << time_bits);
   std::int64_t low = to_int64(r.m) << (time_bits - r.k), high = low + (std::int64_t{1} << (time_bits - r.k));

@@ -10,13 +10,13 @@ enum class Known { no, yes, unknown };
 
 // Whether p, of degree 1, vanishes strictly inside (m, m+1) / 2^k.
 template <class P, class M>
-bool vanishes_inside(const P& p, const M& m, int k) {
+HPCCD_HOST_DEVICE bool vanishes_inside(const P& p, const M& m, int k) {
   return sign_at_dyadic(p, m, k) * sign_at_dyadic(p, M(m + M(1)), k) < 0;
 }
 
 // Whether q, not constant, vanishes at the root, which is not exact. Unknown where the root's interval is too wide.
 template <class Y, class Z, int D>
-Known vanishes_at(const Polynomial<Y, 2>& q, const Root<Z, D>& root) {
+HPCCD_HOST_DEVICE_CALL Known vanishes_at(const Polynomial<Y, 2>& q, const Root<Z, D>& root) {
   Polynomial<Z, 3> f{};
   for (int i = 0; i <= 3; ++i) f.c[i] = i <= D ? root.of.c[std::min(i, D)] : Z(0);
   const auto known = [](bool b) { return b ? Known::yes : Known::no; };
@@ -38,7 +38,7 @@ Known vanishes_at(const Polynomial<Y, 2>& q, const Root<Z, D>& root) {
 
 // Narrows the root where that helps. There are signs that stay open: `open` is set then.
 template <class Y, class Z, int D>
-int sign_at(const Polynomial<Y, 2>& q, Root<Z, D>& root, bool& open) {
+HPCCD_HOST_DEVICE_CALL int sign_at(const Polynomial<Y, 2>& q, Root<Z, D>& root, bool& open) {
   const int degree = q.degree();
   if (degree <= 0) return degree < 0 ? 0 : sign(q.c[0]);
   if (root.exact) return sign_at_dyadic(q, root.m, root.k);

@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "gpu/integers.cuh"
+#include "gpu/stages.cuh"
+
+namespace hpccd::gpu {
+
+template <class T>
+void launch_integers(const LaunchParams<T>& params, const Stages& stages) {
+  static_assert(integer_sizes == 2);
+  stages.one_warp_blocks(integers_kernel<1, T>, params, "integers_kernel<1>");
+  stages.one_warp_blocks(integers_kernel<2, T>, params, "integers_kernel<2>");
+  stages.mark("integers");
+}
+
+template void launch_integers(const LaunchParams<float>&, const Stages&);
+template void launch_integers(const LaunchParams<double>&, const Stages&);
+
+}  // namespace hpccd::gpu

@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Pairs that floating point leaves open are decided on the device, in the CPU's integers: the same bits."""
+
+import numpy as np
+import pytest
+import scenes
+
+import hpccd_core as hc
+
+
+def nets(rng, n):
+    """Two regular sheets that meet nearly edge on edge: parallel edges by the thousand."""
+    v0 = scenes.flat(n)
+    v0[:, 2] = 3 * np.sin(v0[:, 0] / 20) * np.cos(v0[:, 1] / 17)
+    v1 = v0.copy()
+    v1[:, 2] += rng.normal(0, 0.05, len(v0))
+    below, above = (scenes.sheet(n), v0, v1), (scenes.sheet(n), v0 + [0.3, 0.4, 0.2], v1 + [0.3, 0.4, -0.1])
+    return scenes.join([below, above])
+
+
+def of_one(faces, t0, t1):
+    return scenes.join([(faces, t0, t1)])
+
+
+def assert_same(scene, t0, t1, **options):
+    """The statistics of the GPU, which found what the CPU finds."""
+    expected = hc.Detector(scene, backend="cpu", **options).detect(t0, t1)
+    detector = hc.Detector(scene, backend="gpu", **options)
+    for _ in range(2):  # with lists that have to grow, and with those that have
+        found = detector.detect(t0, t1)
+        assert detector.stats["gpu_fallbacks"] == 0, detector.last_gpu_error
+        for name in ("vf", "ee", "vf_toc", "ee_toc"):
+            np.testing.assert_array_equal(getattr(found, name), getattr(expected, name), err_msg=name)
+        assert found.hash == expected.hash
+    return detector.stats
+
+
+@pytest.mark.parametrize("accuracy", ("exact", "conservative"))
+@pytest.mark.parametrize("dtype", (np.float32, np.float64))
+def test_nets_edge_on_edge(dtype, accuracy):
+    scene, t0, t1 = nets(np.random.default_rng(0), 40)
+    stats = assert_same(scene, t0.astype(dtype), t1.astype(dtype), accuracy=accuracy)
+    assert stats["gpu_exact_on_cpu"] == 0
+    if dtype is np.float32:
+        assert stats["ee_by_integers"] > 0
+
+
+@pytest.mark.parametrize("make", (scenes.lattice, scenes.soup))
+def test_degenerate_features_and_coplanar_motion(make):
+    decided = 0
+    for seed in range(10):
+        scene, t0, t1 = of_one(*make(np.random.default_rng(seed), 30))
+        stats = assert_same(scene, t0, t1)
+        assert stats["gpu_exact_on_cpu"] == 0
+        decided += stats["vf_by_integers"] + stats["ee_by_integers"]
+    assert decided > 1000
+
+
+@pytest.mark.parametrize("report", ("first", "any"))
+def test_reports(report):
+    scene, t0, t1 = nets(np.random.default_rng(1), 30)
+    assert assert_same(scene, t0, t1, report=report)["gpu_exact_on_cpu"] == 0 or report == "any"
+
+
+def test_earliest_time():
+    for seed in range(5):
+        scene, t0, t1 = of_one(*scenes.lattice(np.random.default_rng(seed), 20))
+        times = [hc.Detector(scene, backend=b).collision_free_step(t0, t1) for b in ("cpu", "gpu")]
+        assert times[0] == times[1]
+
+
+@pytest.mark.parametrize("spread", (50, 100, 300))
+def test_coordinates_of_many_bits(spread):
+    """Integers of one limb do not hold them, nor of two; from some spread on the CPU's of any size are asked."""
+    rng = np.random.default_rng(spread)
+    for seed in range(4):
+        faces, t0, t1 = scenes.lattice(np.random.default_rng(seed), 20)
+        small = rng.integers(-3, 4, t0.shape) * 2.0**-spread
+        stats = assert_same(*of_one(faces, t0 + 0 * small, np.where(rng.random(t1.shape) < 0.2, small, t1)))
+        assert stats["gpu_exact_on_cpu"] == 0 or spread > 100
