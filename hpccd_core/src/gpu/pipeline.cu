@@ -180,6 +180,7 @@ bool DevicePipeline::run_frame(Positions t0, Positions t1, double distance, Thre
     params.separation = distance;
   else
     scene_.fill_separations(params);
+  params.few_open = few_open_a_thread * static_cast<u64>(pool.size());
   params.largest = of_snapshot(query_) ? largest_in_snapshot : largest_coordinate;
   tree_.fill(params);
   motion_.fill(params);
