@@ -26,7 +26,7 @@ def assert_same(scene, t0, t1, **options):
     """The statistics of the GPU, which found what the CPU finds."""
     expected = hc.Detector(scene, backend="cpu", **options).detect(t0, t1)
     detector = hc.Detector(scene, backend="gpu", threads=1, **options)
-    for _ in range(2):  # with lists that have to grow, and with those that have
+    for _ in range(3):  # on the CPU; on the device, with lists that have to grow; with those that have
         found = detector.detect(t0, t1)
         assert detector.stats["gpu_fallbacks"] == 0, detector.last_gpu_error
         for name in ("vf", "ee", "vf_toc", "ee_toc"):
@@ -35,7 +35,7 @@ def assert_same(scene, t0, t1, **options):
     return detector.stats
 
 
-FEW = 64  # pairs that a thread of the CPU decides sooner (gpu/launch_params.cuh)
+FEW = 64  # pairs that a thread of the CPU decides sooner (gpu/pipeline.cu)
 
 
 @pytest.mark.parametrize("accuracy", ("exact", "conservative"))

@@ -153,10 +153,9 @@ __global__ __launch_bounds__(32) void fallback_kernel(const __grid_constant__ La
     count_lanes(c.by_extended, i < n && !answer.open && !answer.tolerant, pair.kind);
     if (params.time_only) keep_soonest(&c.soonest, answer.contact ? answer.toc : INFINITY);
     // The device's integers know of contacts only.
-    const bool near = separations && separation > 0;
-    append_key(params.open_in_integers[0], params.open_capacity, &c.open_in_integers[0], answer.open && !near, key);
-    if constexpr (separations)
-      append_key(params.to_host, params.to_host_capacity, &c.to_host, answer.open && near, key);
+    const bool here = params.integers_on_device && !(separations && separation > 0);
+    append_key(params.open_in_integers[0], params.open_capacity, &c.open_in_integers[0], answer.open && here, key);
+    append_key(params.to_host, params.to_host_capacity, &c.to_host, answer.open && !here, key);
   }
 }
 

@@ -15,9 +15,6 @@
 namespace hpccd::gpu {
 
 inline constexpr u32 all_lanes = 0xFFFFFFFFu;
-// So many pairs a thread of the CPU are left to its integers: the device takes 70 to 260 us for any number up to a
-// thousand, 16 threads take 34 us for 91, 105 for 252 and 243 for 916 (H200).
-inline constexpr u64 few_open_a_thread = 64;
 inline constexpr u32 no_mesh = 0xFFFFFFFFu;
 // Features are numbered in 31 bits, so that the kind of a pair fits beside them.
 inline constexpr u32 kind_bit = 0x80000000u;
@@ -118,7 +115,7 @@ struct LaunchParams {
   u64 undecided_capacity;
   u64* open_in_integers[integer_sizes];  // keys that need integers of one limb a coordinate, of two
   u64 open_capacity;                     // of each
-  u64 few_open;                          // up to so many are left to the CPU
+  bool integers_on_device;               // else these go to the CPU as well
   u64* to_host;                          // keys that need the CPU's exact arithmetic
   u64 to_host_capacity;
   u32 segment, n_segments;  // leaf pairs of this pass: n * segment / n_segments ...

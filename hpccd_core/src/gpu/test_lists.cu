@@ -80,7 +80,7 @@ void TestLists::launch(Query query, From from, LaunchParams<T>& params, int mult
   stages.one_warp_blocks(query == Query::separations ? fallback_kernel<true, T> : fallback_kernel<false, T>, params,
                          "fallback_kernel");
   timer.mark("last_resort", stream);  // the fallbacks' first name, under which kept results have it
-  launch_integers(params, stages);
+  if (params.integers_on_device) launch_integers(params, stages);
 }
 
 template void TestLists::launch(Query, From, LaunchParams<float>&, int, cudaStream_t, StageTimer&);

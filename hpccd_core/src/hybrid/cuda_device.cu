@@ -103,7 +103,6 @@ class CudaTestDevice final : public TestDevice {
     params.largest = largest_coordinate;
     leaves_.fill(params);
     motion_.fill(params);
-    params.few_open = few_open_a_thread;  // its own: the others traverse
     params.counters = counters_.data();
     return params;
   }
