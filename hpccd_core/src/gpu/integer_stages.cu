@@ -7,8 +7,8 @@ namespace hpccd::gpu {
 template <class T>
 void launch_integers(const LaunchParams<T>& params, const Stages& stages) {
   static_assert(integer_sizes == 2);
-  stages.one_warp_blocks(integers_kernel<1, T>, params, "integers_kernel<1>");
-  stages.one_warp_blocks(integers_kernel<2, T>, params, "integers_kernel<2>");
+  stages.persistent(integers_kernel<1, T>, 32, params, "integers_kernel<1>");
+  stages.persistent(integers_kernel<2, T>, 32, params, "integers_kernel<2>");
   stages.mark("integers");
 }
 

@@ -25,11 +25,6 @@ struct Stages {
     kernel<<<dim3(static_cast<unsigned>(blocks * multiprocessors), rows), threads, 0, stream>>>(params);
     check_launch(name);
   }
-  // The same, of blocks of a warp.
-  template <class Kernel, class T>
-  void one_warp_blocks(Kernel kernel, const LaunchParams<T>& params, const char* name) const {
-    persistent(kernel, 32, params, name);
-  }
   void mark(const char* name) const { timer.mark(name, stream); }
 };
 

@@ -77,8 +77,8 @@ void TestLists::launch(Query query, From from, LaunchParams<T>& params, int mult
     check_launch("soonest_kernel");
     timer.mark("earliest", stream);
   }
-  stages.one_warp_blocks(query == Query::separations ? fallback_kernel<true, T> : fallback_kernel<false, T>, params,
-                         "fallback_kernel");
+  stages.persistent(query == Query::separations ? fallback_kernel<true, T> : fallback_kernel<false, T>, 32, params,
+                    "fallback_kernel");
   timer.mark("last_resort", stream);  // the fallbacks' first name, under which kept results have it
   if (params.integers_on_device) launch_integers(params, stages);
 }
