@@ -106,6 +106,16 @@ struct Options {
   bool gpu_stages = false;
   // Of detect, collision_free_step and proximity. Intersections and smallest distances are of whole surfaces.
   TestedFeatures features;
+  // So many copies of the scene, which know nothing of each other: positions hold all vertices of the first, then those
+  // of the second, ... Each is answered as if it were alone, in every bit.
+  std::uint32_t worlds = 1;
+};
+
+// Where the rows of each world stand among those of all; each of worlds + 1 numbers, the last that of all rows.
+// Empty for a detector of one world.
+struct WorldSlices {
+  std::vector<std::uint64_t> vf, ee, ef;
+  std::vector<std::uint64_t> hashes;  // of each world's rows
 };
 
 // Contacts of one motion step in canonical order: vertex-face by (vertex, face), then edge-edge by (a0, a1, b0, b1).
@@ -123,7 +133,11 @@ struct Contacts {
   std::vector<std::array<double, 3>> points, normals;
   std::vector<std::array<std::array<double, 3>, 2>> closest;  // the nearest points of both sides at toc
   double first_toc = std::numeric_limits<double>::infinity();
+  // Of several worlds the sum of each one's hash times 2 k + 1, k its number.
   std::uint64_t hash = 0;
+  // Of several worlds, whose rows stand one after the other: first those of the first world.
+  WorldSlices slices;
+  std::vector<double> first_tocs;  // of each world; empty for a detector of one
 };
 
 // Pairs of features within a distance of each other at one time; order as in Contacts.
@@ -134,12 +148,14 @@ struct Proximity {
   std::vector<double> ee_distance;
   std::vector<std::array<std::array<double, 3>, 2>> closest;  // vf first; empty unless asked for
   std::uint64_t hash = 0;
+  WorldSlices slices;
 };
 
 // Edges that pierce or touch faces at one time, in lexicographic order.
 struct Intersections {
   std::vector<std::array<std::uint32_t, 3>> ef;  // a0 < a1, face
   std::uint64_t hash = 0;
+  WorldSlices slices;
 };
 
 // What two meshes have nearest to each other.
