@@ -15,8 +15,10 @@ template <class T>
 __global__ void extent_kernel(LaunchParams<T> params) {
   double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
   bool bad = false;
-  const u32 stride = gridDim.x * blockDim.x;
-  for (u32 i = blockIdx.x * blockDim.x + threadIdx.x; i < params.n_vertices; i += stride)
+  const u32 stride = gridDim.x * blockDim.x, own = blockIdx.x * blockDim.x + threadIdx.x;
+  if (params.n_of_group)
+    for (u32 i = own; i < params.n_vertices + params.n_edges; i += stride) params.n_of_group[i] = 0;
+  for (u32 i = own; i < params.n_vertices; i += stride)
     for (int k = 0; k < 3; ++k) {
       const double a = params.given_t0[3 * static_cast<u64>(i) + k], b = params.given_t1[3 * static_cast<u64>(i) + k];
       bad = bad || !(fabs(a) <= params.largest) || !(fabs(b) <= params.largest);
@@ -84,11 +86,11 @@ __device__ void see_whether_floats_suffice(const LaunchParams<T>& params) {
   }
 }
 
-// fast: of a frame that asks for k-DOPs, and whether floats suffice.
-template <bool snapshot, bool fast, class T>
+// kdops: of a frame that asks for them.
+template <bool snapshot, bool kdops, class T>
 __global__ void vertices_kernel(LaunchParams<T> params) {
-  if constexpr (fast)
-    if (blockIdx.x == 0) see_whether_floats_suffice(params);
+  if constexpr (kdops)
+    if (params.fast && blockIdx.x == 0) see_whether_floats_suffice(params);
   const u32 i = blockIdx.x * blockDim.x + threadIdx.x;
   if (i >= params.n_vertices) return;
   const SceneExtent extent(*params.counters);
@@ -112,7 +114,7 @@ __global__ void vertices_kernel(LaunchParams<T> params) {
     for (int k = 0; k < 3; ++k) point.at[1].x[k] = slanted.along[k];
     point.at[1].tag = __float_as_uint(slanted_reach(reach));
   }
-  if constexpr (fast) params.kdops[i] = vertex_kdop({a[0], a[1], a[2]}, {b[0], b[1], b[2]}, map);
+  if constexpr (kdops) params.kdops[i] = vertex_kdop({a[0], a[1], a[2]}, {b[0], b[1], b[2]}, map);
   set_ends(params.vertices[i], a, b);
   for (int end = 0; end < 2; ++end) store(&params.points[i].at[end], point.at[end]);
 }

@@ -4,6 +4,8 @@
 // cloth-ball, a fifth on n-body).
 #pragma once
 
+#include <type_traits>
+
 #include "elementary/distance/separation_test.h"
 #include "elementary/filtered_test.h"
 #include "gpu/candidate_space.cuh"
@@ -36,41 +38,31 @@ __device__ __forceinline__ uint4 span_ends(u32 v0, u32 v1, u32 v2, u32 v3) {
   return {v[S::p_from], v[S::p_to], v[S::a_to], v[S::b_to]};
 }
 
-// What the first filter computes in: the motion of one vertex, and how sure it must be.
-template <class R>
-struct FilterIn;
-template <>
-struct FilterIn<double> {
-  using Policy = Proven;
-  template <class T>
-  __device__ static Ends load(const LaunchParams<T>& params, u32 v) {
+// The motion of one vertex as the first filter sees it: it is proven in double precision, all else is asked in single
+// precision first.
+template <class Policy, class T>
+__device__ __forceinline__ auto load_for_filter(const LaunchParams<T>& params, u32 v) {
+  if constexpr (std::is_same_v<Policy, Proven>)
     return load_ends(params.vertices, v);
-  }
-};
-template <>
-struct FilterIn<float> {
-  using Policy = Likely;
-  template <class T>
-  __device__ static RoundedEnds load(const LaunchParams<T>& params, u32 v) {
+  else
     return load_rounded_ends(params.points, v);
-  }
-};
+}
 
 // Whether the first filter lets a pair pass. One piece of code for both kinds: they differ in where b starts.
-template <Query query, class R, class T>
+template <Query query, class Policy, class T>
 __device__ __forceinline__ bool passes_filter(const LaunchParams<T>& params, uint4 v, bool edges) {
-  using In = FilterIn<R>;
-  const auto from = In::load(params, v.x), p = In::load(params, v.y), a = In::load(params, v.z),
-             b = In::load(params, v.w);
+  const auto from = load_for_filter<Policy>(params, v.x), p = load_for_filter<Policy>(params, v.y),
+             a = load_for_filter<Policy>(params, v.z), b = load_for_filter<Policy>(params, v.w);
+  using R = decltype(from.t0.x);
   const Vec3<R> b_from0 = edges ? p.t0 : from.t0, b_from1 = edges ? p.t1 : from.t1;
   const Motion<R> m{p.t0 - from.t0, a.t0 - from.t0, b.t0 - b_from0, p.t1 - from.t1, a.t1 - from.t1, b.t1 - b_from1};
   // Without a separation both say the same, in every bit.
   if constexpr (query == Query::separations) return !planes_stay_apart(m, separation_of(params, v.x, v.y));
-  return !coplanarity_filter<typename In::Policy>(m).none;
+  return !coplanarity_filter<Policy>(m).none;
 }
 
 // The last up to 32 candidates.
-template <Query query, class R, class T>
+template <Query query, class Policy, class T>
 __device__ __forceinline__ void filter_candidates(const LaunchParams<T>& params, CandidateQueue& s,
                                                   CandidateState& state) {
   __syncwarp();
@@ -82,7 +74,7 @@ __device__ __forceinline__ void filter_candidates(const LaunchParams<T>& params,
     features = s.features[state.n + lane];
     edges = features.y & kind_bit;
     features.y &= ~kind_bit;
-    survives = of_snapshot(query) || passes_filter<query, R>(params, s.vertices[state.n + lane], edges);
+    survives = of_snapshot(query) || passes_filter<query, Policy>(params, s.vertices[state.n + lane], edges);
   }
 #pragma unroll
   for (u32 kind = 0; kind < 2; ++kind) {
@@ -203,17 +195,17 @@ __device__ __forceinline__ void leaf_pair_candidates(const LaunchParams<T>& para
         s.features[at] = pushed.features;
       }
       state.n += __popc(mask);
-      if (state.n >= 32) filter_candidates<query, double>(params, s, state);
+      if (state.n >= 32) filter_candidates<query, Proven>(params, s, state);
     }
     __syncwarp();
   }
 }
 
 // What is left when there are no more pairs of leaves.
-template <Query query, class R, class T>
+template <Query query, class Policy, class T>
 __device__ __forceinline__ void finish_candidates(const LaunchParams<T>& params, CandidateQueue& s,
                                                   CandidateState& state) {
-  if (state.n > 0) filter_candidates<query, R>(params, s, state);
+  if (state.n > 0) filter_candidates<query, Policy>(params, s, state);
   for (u32 kind = 0; kind < 2; ++kind)
     if (state.n_survivors[kind] > 0) flush_survivors(params, s, kind, state.n_survivors[kind]);
   if (lane_number() == 0)
@@ -248,7 +240,7 @@ __global__ __launch_bounds__(32 * candidate_warps,
 #pragma unroll 1
     for (u64 k = begin; k < end; ++k) leaf_pair_candidates<query>(params, s, state, params.leaf_pairs.pairs[k]);
   });
-  finish_candidates<query, double>(params, s, state);
+  finish_candidates<query, Proven>(params, s, state);
 }
 
 }  // namespace hpccd::gpu

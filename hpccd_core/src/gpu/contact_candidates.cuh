@@ -44,7 +44,7 @@ __device__ __forceinline__ LanePair staged_pair(const StagedLeaves& s, const Sta
   return pair;
 }
 
-template <class R, class T>
+template <class Policy, class T>
 __device__ __forceinline__ void contact_candidates(const LaunchParams<T>& params, StagedLeaves& s,
                                                    CandidateState& state, uint2 leaves) {
   const bool same = leaves.x == leaves.y;
@@ -76,15 +76,15 @@ __device__ __forceinline__ void contact_candidates(const LaunchParams<T>& params
       s.features[at] = pushed.features;
     }
     state.n += __popc(mask);
-    if (state.n >= 32) filter_candidates<Query::contacts, R>(params, s, state);
+    if (state.n >= 32) filter_candidates<Query::contacts, Policy>(params, s, state);
   }
   __syncwarp();
 }
 
-template <class R, class T>
+template <class Policy, class T>
 __global__ __launch_bounds__(32 * candidate_warps,
                              6) void contact_candidates_kernel(const __grid_constant__ LaunchParams<T> params) {
-  if constexpr (sizeof(R) == sizeof(float))
+  if constexpr (std::is_same_v<Policy, Likely>)
     if (!params.counters->floats_suffice) return;
   __shared__ StagedLeaves spaces[candidate_warps];
   StagedLeaves& s = spaces[threadIdx.x / 32];
@@ -99,9 +99,9 @@ __global__ __launch_bounds__(32 * candidate_warps,
     for (u32 k = 0; k < 8; ++k)
       if (leaf_kdops_apart(params, pair(k))) near &= ~(1u << k);
 #pragma unroll 1
-    for (; near; near &= near - 1) contact_candidates<R>(params, s, state, pair(__ffs(near) - 1));
+    for (; near; near &= near - 1) contact_candidates<Policy>(params, s, state, pair(__ffs(near) - 1));
   });
-  finish_candidates<Query::contacts, R>(params, s, state);
+  finish_candidates<Query::contacts, Policy>(params, s, state);
 }
 
 }  // namespace hpccd::gpu

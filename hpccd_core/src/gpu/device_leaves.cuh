@@ -35,6 +35,7 @@ class DeviceLeaves {
       face[s].tag_low() = corners[0], face[s].tag_high() = corners[1], corner2[s] = corners[2];
     }
     boxes_.reserve(std::max<std::size_t>(leaves.size(), 1));
+    kdops_.reserve(std::max<std::size_t>(leaves.size(), 1));
     upload(leaves_, packed.data(), packed.size());
     upload(vertex_of_slot_, vertex_of_slot.data(), features.n_vertices);
     upload(edge_of_slot_, edge_of_slot.data(), n_edges);
@@ -50,19 +51,21 @@ class DeviceLeaves {
   template <class T>
   void fill(LaunchParams<T>& params) const {
     params.n_leaves = n_, params.leaves = leaves_.data(), params.leaf_boxes = boxes_.data();
+    params.leaf_kdops = kdops_.data();
     params.vertex_of_slot = vertex_of_slot_.data(), params.edge_of_slot = edge_of_slot_.data();
     params.face_of_slot = face_of_slot_.data(), params.face_corner2 = face_corner2_.data();
     params.edge_boxes = edge_boxes_.data(), params.face_boxes = face_boxes_.data();
   }
 
   std::size_t bytes() const {
-    return boxes_.bytes() + edge_boxes_.bytes() + face_boxes_.bytes() + leaves_.bytes() + vertex_of_slot_.bytes() +
+    return boxes_.bytes() + kdops_.bytes() + edge_boxes_.bytes() + face_boxes_.bytes() + leaves_.bytes() + vertex_of_slot_.bytes() +
            edge_of_slot_.bytes() + face_of_slot_.bytes() + face_corner2_.bytes();
   }
 
  private:
   u32 n_ = 0;
   DeviceBuffer<DeviceBox> boxes_, edge_boxes_, face_boxes_;
+  DeviceBuffer<Kdop> kdops_;
   DeviceBuffer<DeviceLeaf> leaves_;
   DeviceBuffer<u32> vertex_of_slot_, edge_of_slot_, face_of_slot_, face_corner2_;
 };

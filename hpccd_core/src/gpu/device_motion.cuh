@@ -11,9 +11,8 @@ namespace hpccd::gpu {
 
 class DeviceMotion {
  public:
-  // fast: where all that is tested is of that tier.
-  void reserve(std::size_t n_vertices, bool fast) {
-    if (fast) kdops_.reserve(std::max<std::size_t>(n_vertices, 1));
+  void reserve(std::size_t n_vertices) {
+    kdops_.reserve(std::max<std::size_t>(n_vertices, 1));
     points_.reserve(std::max<std::size_t>(n_vertices, 1));
     vertices_.reserve(std::max<std::size_t>(n_vertices, 1));
   }
@@ -34,9 +33,9 @@ class DeviceMotion {
   // Then the motion itself.
   template <class T>
   void launch(Query query, const LaunchParams<T>& params, cudaStream_t stream) const {
-    const auto kernel = of_snapshot(query) ? vertices_kernel<true, false, T>
-                        : params.fast      ? vertices_kernel<false, true, T>
-                                           : vertices_kernel<false, false, T>;
+    const auto kernel = of_snapshot(query)           ? vertices_kernel<true, false, T>
+                        : query == Query::contacts ? vertices_kernel<false, true, T>
+                                                   : vertices_kernel<false, false, T>;
     kernel<<<blocks_for(params.n_vertices, 256), 256, 0, stream>>>(params);
     check_launch("vertices_kernel");
   }

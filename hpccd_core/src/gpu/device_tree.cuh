@@ -13,10 +13,9 @@ namespace hpccd::gpu {
 
 class DeviceTree {
  public:
-  // Throws Error where it is deeper than the device's traversal goes. fast: where all that is tested is of that tier.
-  void set(const Features& features, const Tree& tree, bool fast) {
+  // Throws Error where it is deeper than the device's traversal goes.
+  void set(const Features& features, const Tree& tree) {
     n_ = 0;  // no tree, should anything below fail
-    if (fast) leaf_kdops_.reserve(std::max<std::size_t>(tree.leaves.size(), 1));
     const std::size_t n = tree.nodes.size();
     std::vector<u32> parent(n, 0), mesh(n), last_leaf(n, 0), depth(n, 0);
     std::vector<DeviceBox> boxes(n);
@@ -48,16 +47,14 @@ class DeviceTree {
     params.n_nodes = n_;
     params.node_boxes = boxes_.data(), params.node_mesh = mesh_.data(), params.node_parent = parent_.data();
     params.node_arrivals = arrivals_.data(), params.leaf_nodes = leaf_nodes_.data();
-    params.leaf_kdops = leaf_kdops_.data();
   }
 
-  std::size_t bytes() const { return boxes_.bytes() + leaves_.bytes() + leaf_kdops_.bytes(); }
+  std::size_t bytes() const { return boxes_.bytes() + leaves_.bytes(); }
 
  private:
   u32 n_ = 0;
   DeviceLeaves leaves_;
   DeviceBuffer<DeviceBox> boxes_;
-  DeviceBuffer<Kdop> leaf_kdops_;
   DeviceBuffer<u32> mesh_, parent_, arrivals_, leaf_nodes_;
 };
 

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The later filters and the elementary tests (elementary/batch.inl), a thread a pair, each stage over the compacted
-// survivors of the one before.
+// Which root tests a pair needs in double precision, and what decides where its error bounds do not: a thread a pair.
 #pragma once
 
 #include "elementary/apart_until.h"
@@ -36,65 +35,6 @@ __device__ __forceinline__ void append_to_root_tests(const LaunchParams<T>& para
                                                      RootTests wanted) {
   append_pair(params.single[k], &params.counters->single[k], wanted.one, pair);
   append_pair(params.many[k], &params.counters->many[k], wanted.many, pair);
-}
-
-template <Kind kind, class T>
-__global__ __launch_bounds__(128) void projection_kernel(const __grid_constant__ LaunchParams<T> params) {
-  constexpr u32 k = kind == Kind::edge_edge;
-  for_pairs(params.survivors[k], params.counters->survivors[k], [&](bool valid, uint2 pair) {
-    append_to_root_tests(params, k, pair, valid ? root_tests<kind>(params, pair) : RootTests{false, false});
-  });
-}
-
-template <Kind kind, bool single, class T>
-__global__ __launch_bounds__(128) void roots_kernel(const __grid_constant__ LaunchParams<T> params) {
-  constexpr u32 k = kind == Kind::edge_edge;
-  const PairList& list = single ? params.single[k] : params.many[k];
-  u32 proven = 0, kept = 0, doubtful = 0;
-  for_pairs(list, single ? params.counters->single[k] : params.counters->many[k], [&](bool valid, uint2 pair) {
-    bool contact = false, undecided = false;
-    double toc = 0;
-    if (valid) {
-      const uint4 v = vertices_of<kind>(params, pair.x, pair.y);
-      const Motion<double> m = load_motion<kind>(params.vertices, v);
-      const Outcome<double> o = single ? single_root_test<kind, Proven>(m) : many_roots_test<kind, Proven>(m);
-      contact = o.contact;
-      undecided = !o.contact && !o.none;
-      toc = reported_time(reported_as(params, v), o.toc, o.delta);
-    }
-    const bool counts = contact && counts_at(params, toc);
-    append_found(params, kind, counts, pair, toc);
-    append_undecided(params, kind, undecided, pair);
-    proven += contact;
-    kept += counts;
-    doubtful += undecided;
-  });
-  for (int d = 16; d > 0; d /= 2) {
-    proven += __shfl_xor_sync(all_lanes, proven, d);
-    kept += __shfl_xor_sync(all_lanes, kept, d);
-    doubtful += __shfl_xor_sync(all_lanes, doubtful, d);
-  }
-  if (lane_number() != 0) return;
-  if (proven) atomicAdd(&params.counters->proven[k], static_cast<u64>(proven));
-  if (kept) atomicAdd(&params.counters->found[k], static_cast<u64>(kept));
-  if (doubtful) atomicAdd(&params.counters->undecided_of[k], static_cast<u64>(doubtful));
-}
-
-// Clears the lists of one segment for the next; remembers how long they were and how long they had to be.
-template <class T>
-__global__ void end_segment_kernel(LaunchParams<T> params) {
-  Counters& c = *params.counters;
-  c.next_leaf_pair = 0;
-  for (int k = 0; k < 2; ++k) {
-    c.most_survivors = c.survivors[k] > c.most_survivors ? c.survivors[k] : c.most_survivors;
-    c.most_single = c.single[k] > c.most_single ? c.single[k] : c.most_single;
-    c.most_many = c.many[k] > c.most_many ? c.many[k] : c.most_many;
-    c.most_separated = c.separated[k] > c.most_separated ? c.separated[k] : c.most_separated;
-    c.all_survivors[k] += c.survivors[k];
-    c.all_single[k] += c.single[k];
-    c.all_many[k] += c.many[k];
-    c.survivors[k] = c.single[k] = c.many[k] = c.separated[k] = c.open[k] = 0;
-  }
 }
 
 // The answer of the tier's fallback where double precision or twice that is enough; else it stays open.

@@ -111,6 +111,7 @@ struct LaunchParams {
   u64* found_keys;
   double* found_tocs;
   u64 found_capacity;
+  u32* n_of_group;  // how many were found of each first feature: of vertices, then of edges; null: nobody asks
   u64* undecided;  // keys
   u64 undecided_capacity;
   u64* open_in_integers[integer_sizes];  // keys that need integers of one limb a coordinate, of two

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// k-DOPs of leaves: pairs of leaves that are apart along one of their directions are not looked at (H200, candidates:
-// cloth-ball 0.23 to 0.20 ms, n-body 0.28 to 0.19, for 0.01 here).
+// k-DOPs of leaves: pairs of leaves that are apart along one of their directions are not looked at (H200, candidates of
+// `fast`: cloth-ball 0.23 to 0.20 ms, n-body 0.28 to 0.19, for 0.01 here).
 #pragma once
 
 #include "gpu/pair_lists.cuh"
+#include "gpu/stream.h"
 
 namespace hpccd::gpu {
 
@@ -37,6 +38,12 @@ __global__ __launch_bounds__(128) void leaf_kdops_kernel(const __grid_constant__
     kdop.low[lane] = other_low < low ? other_low : low;
   else
     kdop.high[lane - n] = high < other_high ? other_high : high;
+}
+
+template <class T>
+void launch_leaf_kdops(const LaunchParams<T>& params, cudaStream_t stream) {
+  leaf_kdops_kernel<<<blocks_for(std::size_t{params.n_leaves} * 32, 128), 128, 0, stream>>>(params);
+  check_launch("leaf_kdops_kernel");
 }
 
 // By a whole warp: the first half looks whether the first leaf is below, the other whether it is above.

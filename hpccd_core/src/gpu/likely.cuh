@@ -6,50 +6,9 @@
 #pragma once
 
 #include "elementary/kdop_filter.h"
-#include "gpu/elementary.cuh"
+#include "gpu/sieve.cuh"
 
 namespace hpccd::gpu {
-
-struct SortedPair {
-  RootTests wanted;
-  bool missed;  // apart at the only root
-};
-
-// Of a pair whose cubic may have a root.
-template <Kind kind, class Policy, class R>
-__device__ __forceinline__ SortedPair sort_out(const Motion<R>& m) {
-  const Magnitudes<R> size = magnitudes(m);
-  const Cubic<R> f = coplanarity(m);
-  const CubicError<R> error = error_of<Policy>(size);
-  const bool usable = in_range(size);
-  if (certainly_one_root(f, error.coefficient) && usable) {
-    const bool missed = certainly_apart_at_root<kind>(m, size, f, error.value);
-    return {{!missed, false}, missed};
-  }
-  return {{false, !(certainly_outside<kind>(m, size) && usable)}, false};
-}
-
-template <Kind kind, class T>
-__device__ __forceinline__ void sort_survivors(const LaunchParams<T>& params) {
-  constexpr u32 k = kind == Kind::edge_edge;
-  Counters& c = *params.counters;
-  u32 n_missed = 0;
-  for_pairs(params.survivors[k], c.survivors[k], [&](bool valid, uint2 pair) {
-    SortedPair sorted{{false, false}, false};
-    if (valid) {
-      const uint4 v = vertices_of<kind>(params, pair.x, pair.y);
-      sorted = sort_out<kind, Likely>(load_rounded_motion<kind>(params.points, v));
-    }
-    append_to_root_tests(params, k, pair, sorted.wanted);
-    n_missed += sorted.missed;
-  });
-  add_up(&c.missed[k], n_missed);
-}
-
-template <class T>
-__global__ __launch_bounds__(128) void sort_survivors_kernel(const __grid_constant__ LaunchParams<T> params) {
-  blockIdx.y == 0 ? sort_survivors<Kind::edge_edge>(params) : sort_survivors<Kind::vertex_face>(params);
-}
 
 // What kdop_filter.inl says of a pair.
 template <Kind kind>
@@ -100,16 +59,6 @@ __global__ __launch_bounds__(128) void likely_roots_kernel(const __grid_constant
     default:
       return seek_likely_roots<Kind::vertex_face, false>(params);
   }
-}
-
-template <Kind kind>
-__device__ __forceinline__ Outcome<double> test_in_doubles(const Motion<double>& m) {
-  const Outcome<double> first = coplanarity_filter<Proven>(m);
-  if (first.none) return first;
-  const RootTests wanted = sort_out<kind, Proven>(m).wanted;
-  if (wanted.one) return single_root_test<kind, Proven>(m);
-  if (wanted.many) return many_roots_test<kind, Proven>(m);
-  return {false, true, 0, 0};
 }
 
 template <Kind kind, class T>

@@ -7,9 +7,9 @@ namespace hpccd::gpu {
 
 template <class T>
 void launch_likely(const LaunchParams<T>& params, const Stages& stages) {
-  stages.persistent(contact_candidates_kernel<float, T>, 32 * candidate_warps, params, "contact_candidates_kernel");
+  stages.persistent(contact_candidates_kernel<Likely, T>, 32 * candidate_warps, params, "contact_candidates_kernel");
   stages.mark("candidates");
-  stages.persistent(sort_survivors_kernel<T>, 128, params, "sort_survivors_kernel", 2);
+  stages.persistent(sort_survivors_kernel<Likely, T>, 128, params, "sort_survivors_kernel", 2);
   stages.mark("sort_survivors");
   stages.persistent(likely_roots_kernel<T>, 128, params, "likely_roots_kernel", 4);
   stages.mark("likely_roots");

@@ -33,14 +33,14 @@ class DevicePipeline : public Pipeline {
         scene_(scene, features, accuracy, tested, separations),
         positions_(device),
         lists_(16 * typical_size(), 4 * typical_size(), typical_size() / 2),
-        contacts_(scene_.keys().bits()) {
+        contacts_(scene_.keys().bits(), std::size_t{features.n_vertices} + features.edges.size()) {
     check(cudaDeviceGetAttribute(&multiprocessors_, cudaDevAttrMultiProcessorCount, device), "cudaDeviceGetAttribute");
     counters_.reserve(1);
     host_counters_.reserve(1);
     *host_counters_.data() = {};
     leaf_pairs_.reserve(4 * typical_size());
-    contacts_.reserve(typical_size(), stream_);
-    motion_.reserve(features.n_vertices, scene_.all_fast());
+    contacts_.reserve(typical_size());
+    motion_.reserve(features.n_vertices);
     hints_.reserve(stream_);
   }
 
@@ -53,7 +53,7 @@ class DevicePipeline : public Pipeline {
   void set_tree(const Tree& tree) override {
     check(cudaSetDevice(device_), "cudaSetDevice");
     check(cudaStreamSynchronize(stream_), "cudaStreamSynchronize");
-    tree_.set(features_, tree, scene_.all_fast());
+    tree_.set(features_, tree);
   }
 
   bool run(Positions t0, Positions t1, Best best, ThreadPool& pool) override {
@@ -200,6 +200,7 @@ bool DevicePipeline::run_frame(Positions t0, Positions t1, double distance, Thre
     if (goal_ != Goal::near_list) ++passes_;
     params.in_floats = params.fast && floats_suffice_;
     launch(params);
+    if (goal_ == Goal::results) launch_results(params);
     copy_counters();
     check(cudaEventRecord(counted_, stream_), "cudaEventRecord");
     // Pairs for exact arithmetic came last time too: threads that sleep take longer to wake than these take.
@@ -210,12 +211,12 @@ bool DevicePipeline::run_frame(Positions t0, Positions t1, double distance, Thre
     again = guessed_wrong(params.fast);
     again = grow_overflowed() || again;
   }
-  // Before the results: their kernels bring the counters to the host once more.
   const u64 n_to_host = exact_last_time_ = c.to_host;
   if (!of_snapshot(query_))
     integers_on_device_ =
         std::max(c.open_in_integers[0], c.to_host) > decided_sooner_a_thread * static_cast<u64>(pool.size());
-  if (goal_ == Goal::results) launch_results(params);
+  if (goal_ == Goal::results && contacts_.complete(query_, params, c, multiprocessors_, stream_, timer_))
+    copy_counters();
   if (goal_ == Goal::near_list) near_.collect(params, c, stream_);
   if (goal_ == Goal::near_list) return true;
   undecided_.reserve(n_to_host);
@@ -226,7 +227,7 @@ bool DevicePipeline::run_frame(Positions t0, Positions t1, double distance, Thre
 template <class T>
 void DevicePipeline::launch(LaunchParams<T>& params) {
   params.leaf_pairs = {leaf_pairs_.data(), leaf_pairs_.size()};
-  contacts_.fill(params);
+  contacts_.fill(params, goal_ == Goal::results);
   hints_.fill(params);
   motion_.begin(params, multiprocessors_, stream_);
   if (for_earliest()) near_.measure(params, stream_);
@@ -249,10 +250,7 @@ void DevicePipeline::launch_tree(LaunchParams<T>& params) {
   const auto refit = grows_boxes(query_) || best_ ? refit_kernel<true, T> : refit_kernel<false, T>;
   refit<<<blocks_for(std::size_t{params.n_leaves} * 32, 128), 128, 0, stream_>>>(params);
   check_launch("refit_kernel");
-  if (params.in_floats) {
-    leaf_kdops_kernel<<<blocks_for(std::size_t{params.n_leaves} * 32, 128), 128, 0, stream_>>>(params);
-    check_launch("leaf_kdops_kernel");
-  }
+  if (query_ == Query::contacts) launch_leaf_kdops(params, stream_);
   timer_.mark("refit", stream_);
   const auto traverse = of_snapshot(query_) ? traverse_kernel<true, T> : traverse_kernel<false, T>;
   traverse<<<blocks_for(params.n_leaves, traverse_warps), 32 * traverse_warps, 0, stream_>>>(params);
@@ -263,9 +261,8 @@ void DevicePipeline::launch_tree(LaunchParams<T>& params) {
 
 template <class T>
 void DevicePipeline::launch_results(const LaunchParams<T>& params) {
-  contacts_.launch(query_, params, *host_counters_.data(), multiprocessors_, stream_, timer_);
+  contacts_.launch(query_, params, multiprocessors_, stream_, timer_);
   launch_area(params);
-  copy_counters();
 }
 
 template <class T>
@@ -307,7 +304,7 @@ LaunchParams<T> DevicePipeline::last_frame() const {
   LaunchParams<T> params{};
   scene_.fill(params);
   motion_.fill(params);
-  contacts_.fill(params);
+  contacts_.fill(params, false);
   hints_.fill(params);
   params.counters = counters_.data();
   return params;
@@ -345,7 +342,7 @@ bool DevicePipeline::grow_overflowed() {
     again = true;
     leaf_pairs_.reserve(c.leaf_pairs + c.leaf_pairs / 4);
   }
-  return contacts_.grow(c, stream_) || again;
+  return contacts_.grow(c) || again;
 }
 
 std::map<std::string, std::uint64_t> DevicePipeline::stats() const {

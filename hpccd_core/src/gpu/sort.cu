@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Apart from the other kernels: CUB's headers take longer to compile than all of these.
 #include <cub/device/device_radix_sort.cuh>
+#include <cub/device/device_scan.cuh>
 
 #include "gpu/cuda_call.h"
 #include "gpu/sort.h"
@@ -23,6 +24,19 @@ void sort_pairs(void* workspace, std::size_t workspace_bytes, const unsigned lon
   check(cub::DeviceRadixSort::SortPairs(workspace, workspace_bytes, keys, sorted_keys, values, sorted_values, n, 0,
                                         key_bits, stream),
         "cub::DeviceRadixSort");
+}
+
+std::size_t sum_workspace(int n) {
+  std::size_t bytes = 0;
+  const std::uint32_t* numbers = nullptr;
+  check(cub::DeviceScan::ExclusiveSum(nullptr, bytes, numbers, const_cast<std::uint32_t*>(numbers), n),
+        "cub::DeviceScan (size)");
+  return bytes;
+}
+
+void sum_before(void* workspace, std::size_t workspace_bytes, const std::uint32_t* numbers, std::uint32_t* sums, int n,
+                cudaStream_t stream) {
+  check(cub::DeviceScan::ExclusiveSum(workspace, workspace_bytes, numbers, sums, n, stream), "cub::DeviceScan");
 }
 
 }  // namespace hpccd::gpu

@@ -16,4 +16,11 @@ void sort_pairs(void* workspace, std::size_t workspace_bytes, const unsigned lon
                 unsigned long long* sorted_keys, const std::uint32_t* values, std::uint32_t* sorted_values, int n,
                 int key_bits, cudaStream_t stream);
 
+// Device memory that sums of n numbers need.
+std::size_t sum_workspace(int n);
+
+// sums[i] = numbers[0] + ... + numbers[i - 1].
+void sum_before(void* workspace, std::size_t workspace_bytes, const std::uint32_t* numbers, std::uint32_t* sums, int n,
+                cudaStream_t stream);
+
 }  // namespace hpccd::gpu

@@ -2,8 +2,8 @@
 #include <map>
 #include <mutex>
 
-#include "gpu/candidates.cuh"
-#include "gpu/elementary.cuh"
+#include "gpu/contact_candidates.cuh"
+#include "gpu/roots.cuh"
 #include "gpu/stages.cuh"
 #include "gpu/test_lists.cuh"
 
@@ -25,25 +25,22 @@ namespace {
 
 template <class T>
 void launch_root_tests(const LaunchParams<T>& params, const Stages& stages) {
-  stages.persistent(roots_kernel<Kind::vertex_face, true, T>, 128, params, "roots_kernel");
-  stages.persistent(roots_kernel<Kind::edge_edge, true, T>, 128, params, "roots_kernel");
+  stages.persistent(roots_kernel<true, T>, 128, params, "roots_kernel", 2);
   stages.mark("single_root");
-  stages.persistent(roots_kernel<Kind::vertex_face, false, T>, 128, params, "roots_kernel");
-  stages.persistent(roots_kernel<Kind::edge_edge, false, T>, 128, params, "roots_kernel");
+  stages.persistent(roots_kernel<false, T>, 128, params, "roots_kernel", 2);
   stages.mark("many_roots");
 }
 
 template <class T>
-void launch_contacts(const LaunchParams<T>& params, const Stages& stages) {
-  stages.persistent(projection_kernel<Kind::vertex_face, T>, 128, params, "projection_kernel");
-  stages.persistent(projection_kernel<Kind::edge_edge, T>, 128, params, "projection_kernel");
-  stages.mark("projection");
+void launch_contact_candidates(const LaunchParams<T>& params, const Stages& stages) {
+  stages.persistent(contact_candidates_kernel<Sieve, T>, 32 * candidate_warps, params, "contact_candidates_kernel");
+  stages.mark("candidates");
 }
 
 template <class T>
-void launch_contact_candidates(const LaunchParams<T>& params, const Stages& stages) {
-  stages.persistent(candidates_kernel<Query::contacts, T>, 32 * candidate_warps, params, "candidates_kernel");
-  stages.mark("candidates");
+void launch_sieve(const LaunchParams<T>& params, const Stages& stages) {
+  stages.persistent(sort_survivors_kernel<Sieve, T>, 128, params, "sort_survivors_kernel", 2);
+  stages.mark("sort_survivors");
 }
 
 }  // namespace
@@ -60,7 +57,7 @@ void TestLists::launch(Query query, From from, LaunchParams<T>& params, int mult
       launch_likely(params, stages);
     } else if (query == Query::contacts) {
       if (leaves) launch_contact_candidates(params, stages);
-      launch_contacts(params, stages);
+      launch_sieve(params, stages);
     } else if (query == Query::separations) {
       if (leaves) launch_separation_candidates(params, stages);
       launch_separations(params, stages);

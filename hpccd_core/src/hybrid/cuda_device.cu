@@ -3,6 +3,7 @@
 
 #include "gpu/device_leaves.cuh"
 #include "gpu/device_motion.cuh"
+#include "gpu/leaf_kdops.cuh"
 #include "gpu/refit.cuh"
 #include "hybrid/cuda_slot.cuh"
 #include "hybrid/devices.h"
@@ -20,7 +21,7 @@ class CudaTestDevice final : public TestDevice {
         slots_(n_slots) {
     check(cudaDeviceGetAttribute(&multiprocessors_, cudaDevAttrMultiProcessorCount, device), "cudaDeviceGetAttribute");
     counters_.reserve(1);
-    motion_.reserve(features.n_vertices, false);
+    motion_.reserve(features.n_vertices);
   }
   ~CudaTestDevice() override { cancel(); }
 
@@ -136,6 +137,7 @@ class CudaTestDevice final : public TestDevice {
     const auto refit = grows_boxes(scene_.query_now()) ? refit_leaves_kernel<true, T> : refit_leaves_kernel<false, T>;
     refit<<<blocks_for(std::size_t{params.n_leaves} * 32, 128), 128, 0, upload_>>>(params);
     check_launch("refit_leaves_kernel");
+    if (scene_.query_now() == gpu::Query::contacts) launch_leaf_kdops(params, upload_);
     check(cudaEventRecord(ready_, upload_), "cudaEventRecord");
   }
 
