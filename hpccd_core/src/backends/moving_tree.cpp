@@ -16,11 +16,12 @@ void MovingTree::bound(Positions vertices) {
 }
 
 void MovingTree::fit(Profiler& profiler) {
-  if (built_) {
-    refit(tree_, motion_, followed_ ? motion_.resting : std::vector<char>(), pool_);
+  if (kept_.built) {
+    refit(kept_.tree, motion_, followed_ ? motion_.resting : std::vector<char>(), pool_);
     profiler.mark("refit");
     fits_ = true;
-    if (!worn_out(tree_.area, tree_.area_when_built)) return;
+    if (!worn_out(kept_.tree.area, kept_.tree.area_when_built)) return;
+    if (own_ && !*own_ && common_is_new_ && own_trees_->room_for(kept_.tree.bytes())) set_common_aside();
   }
   build_anew();
   profiler.mark("build");
@@ -28,14 +29,39 @@ void MovingTree::fit(Profiler& profiler) {
 
 void MovingTree::fit_leaves(std::span<const std::uint32_t> leaves) {
   fits_ = false;
-  refit_leaves(tree_, motion_, leaves, pool_);
+  refit_leaves(kept_.tree, motion_, leaves, pool_);
 }
 
 void MovingTree::build_anew() {
-  fits_ = built_ = false;  // should this be cancelled, or find no memory
-  ++builds_;
-  build(tree_, scene_, features_, motion_, pool_);
-  fits_ = built_ = true;
+  static std::atomic<std::uint64_t> number{0};
+  fits_ = kept_.built = false;  // should this be cancelled, or find no memory
+  if (own_ && !*own_) common_is_new_ = true;
+  kept_.number = ++number;
+  build(kept_.tree, scene_, features_, motion_, pool_);
+  fits_ = kept_.built = true;
+}
+
+void MovingTree::set_common_aside() {
+  own_trees_->add(kept_.tree.bytes());
+  *own_ = std::make_unique<Kept>();
+  std::swap(kept_, **own_);
+  fits_ = false;
+}
+
+void MovingTree::begin_world(std::unique_ptr<Kept>& own, OwnTrees& all, bool always) {
+  own_ = &own, own_trees_ = &all;
+  if (!own && always) own = std::make_unique<Kept>();
+  if (!own) return;
+  std::swap(kept_, *own);
+  fits_ = false;
+}
+
+void MovingTree::end_world() {
+  if (*own_) {
+    std::swap(kept_, **own_);
+    fits_ = false;
+  }
+  own_ = nullptr, own_trees_ = nullptr;
 }
 
 const std::vector<Box>& MovingTree::swept() {
