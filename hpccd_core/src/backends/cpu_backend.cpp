@@ -160,10 +160,9 @@ void CpuBackend::count(std::map<std::string, std::uint64_t>& stats) const {
 
 void CpuBackend::begin_worlds() {
   counts_of_worlds_.emplace();
-  shared_.tree.begin_worlds();
 }
 
-void CpuBackend::begin_world(WorldMemory& memory, OwnTrees& trees) {
+void CpuBackend::begin_world(WorldMemory& memory, TreeBudget& trees) {
   // Of several contacts any may be the one that is found, but the same one as by a detector of this world alone.
   shared_.tree.begin_world(memory.tree, trees, shared_.options.report == Report::any);
   exchange(memory);

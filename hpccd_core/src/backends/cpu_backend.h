@@ -31,7 +31,7 @@ class CpuBackend final : public DetectionBackend {
 
   // Of several worlds: at the beginning of a call, and around what one of them asks. count() is of all since then.
   void begin_worlds();
-  void begin_world(WorldMemory& memory, OwnTrees& trees);
+  void begin_world(WorldMemory& memory, TreeBudget& trees);
   void end_world(WorldMemory& memory);
 
   // In this order in each step; the workers hold what was found when it is collected. Devices find all contacts, and

@@ -12,26 +12,37 @@
 
 namespace hpccd {
 
-// Worlds share a tree as long as it serves them: their topology is the same, and refitting takes a twentieth of the
-// time of building. A world whose pose it does not fit gets a tree of its own.
-class OwnTrees {
+// How much memory the own trees of all worlds may take.
+class TreeBudget {
  public:
-  bool room_for(std::size_t bytes) const { return bytes_.load(std::memory_order_relaxed) + bytes <= most_bytes; }
-  void add(std::size_t bytes) { bytes_.fetch_add(bytes, std::memory_order_relaxed); }
+  bool take(std::size_t bytes) {
+    if (taken_.fetch_add(bytes, std::memory_order_relaxed) + bytes <= most) return true;
+    give_back(bytes);
+    return false;
+  }
+  void give_back(std::size_t bytes) { taken_.fetch_sub(bytes, std::memory_order_relaxed); }
 
  private:
-  static constexpr std::size_t most_bytes = std::size_t{1} << 30;
-  std::atomic<std::size_t> bytes_{0};
+  static constexpr std::size_t most = std::size_t{1} << 30;
+  std::atomic<std::size_t> taken_{0};
+};
+
+struct KeptTree {
+  Tree tree;
+  bool built = false;  // the tree is whole
+  std::uint64_t number = 0;
+};
+
+// Worlds have one topology, so a thread's worlds share a tree, which stays in its core's cache: refitting takes a
+// twentieth of the time of building. A world whose pose has worn it out twice in a row gets a tree of its own.
+struct OwnTree {
+  std::unique_ptr<KeptTree> kept;  // while that world is looked at: the common one
+  std::size_t bytes = 0;           // of the budget
+  bool wore_out_common = false;    // last time
 };
 
 class MovingTree {
  public:
-  struct Kept {
-    Tree tree;
-    bool built = false;  // the tree is whole
-    std::uint64_t number = 0;
-  };
-
   // All of them must outlive it.
   MovingTree(const Scene& scene, const Features& features, ThreadPool& pool)
       : scene_(scene), features_(features), pool_(pool) {}
@@ -48,10 +59,8 @@ class MovingTree {
   // Boxes of the whole sweep, for methods with a hierarchy of their own.
   const std::vector<Box>& swept();
 
-  // Of several worlds, at the beginning of a call: the tree that they share may be built anew, once.
-  void begin_worlds() { common_is_new_ = false; }
-  // From here on the motions are those of one world, whose own tree is used, if it has one. `always`: it gets one.
-  void begin_world(std::unique_ptr<Kept>& own, OwnTrees& all, bool always);
+  // From here on the motions are those of one world among several, until end_world(). `always`: by a tree of its own.
+  void begin_world(OwnTree& own, TreeBudget& budget, bool always);
   void end_world();
 
   const MotionBounds& motion() const { return motion_; }
@@ -61,19 +70,20 @@ class MovingTree {
   std::size_t bytes() const { return motion_.bytes() + kept_.tree.bytes(); }
 
  private:
-  void set_common_aside();
+  bool refitted(Profiler& profiler);
+  void take_own();
+  void give_up_own();
 
   const Scene& scene_;
   const Features& features_;
   ThreadPool& pool_;
   MotionBounds motion_;
-  Kept kept_;
+  KeptTree kept_;
   bool fits_ = false;      // the tree's boxes are those of the last motion
   bool followed_ = false;  // ... of the motion before, so that what rests can stay
-  // Of several worlds: where the own tree of this one is kept, and meanwhile the common one.
-  std::unique_ptr<Kept>* own_ = nullptr;
-  OwnTrees* own_trees_ = nullptr;
-  bool common_is_new_ = false;
+  OwnTree* own_ = nullptr;  // of the world that is looked at
+  TreeBudget* budget_ = nullptr;
+  bool always_own_ = false;
 };
 
 }  // namespace hpccd

@@ -14,7 +14,7 @@ namespace hpccd {
 struct WorldMemories {
   explicit WorldMemories(std::size_t worlds) : of_world(worlds) {}
   std::vector<WorldMemory> of_world;
-  OwnTrees trees;
+  TreeBudget trees;
   std::size_t bytes() const;
 };
 
