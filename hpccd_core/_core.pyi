@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 
 from .devices import GpuStatus
 
+MOST_WORLDS: int
+
 class InvalidArgument(ValueError): ...
 class Cancelled(RuntimeError): ...
 
@@ -74,6 +76,13 @@ class Scene:
     @property
     def meshes(self) -> list[tuple[str, int, int, int, int]]: ...
 
+class _Slices(TypedDict):
+    vf: NDArray[np.int64]
+    ee: NDArray[np.int64]
+    ef: NDArray[np.int64]
+    hashes: NDArray[np.uint64]
+    first_tocs: NDArray[np.float64]
+
 class _Contacts(TypedDict):
     vf: NDArray[np.uint32]
     vf_toc: NDArray[np.float64]
@@ -84,6 +93,7 @@ class _Contacts(TypedDict):
     closest: NDArray[np.float64]
     first_toc: float
     hash: int
+    slices: _Slices | None  # of several worlds
 
 class _Proximity(TypedDict):
     vf: NDArray[np.uint32]
@@ -92,10 +102,12 @@ class _Proximity(TypedDict):
     ee_distance: NDArray[np.float64]
     closest: NDArray[np.float64]
     hash: int
+    slices: _Slices | None  # of several worlds
 
 class _Intersections(TypedDict):
     ef: NDArray[np.uint32]
     hash: int
+    slices: _Slices | None  # of several worlds
 
 _Gap = tuple[int, int, float, str, list[int], NDArray[np.float64]]
 
@@ -120,6 +132,7 @@ class Detector:
         gpu_stages: bool,
         vertex_face: bool,
         edge_edge: bool,
+        worlds: int,
     ) -> None: ...
     def detect(self, vertices_t0: NDArray[Any], vertices_t1: NDArray[Any]) -> _Contacts: ...
     def detect_on_device(self, pointer_t0: int, pointer_t1: int, n_vertices: int, is_double: bool) -> _Contacts: ...
@@ -127,6 +140,10 @@ class Detector:
     def collision_free_step_on_device(
         self, pointer_t0: int, pointer_t1: int, n_vertices: int, is_double: bool
     ) -> float: ...
+    def collision_free_steps(self, vertices_t0: NDArray[Any], vertices_t1: NDArray[Any]) -> NDArray[np.float64]: ...
+    def collision_free_steps_on_device(
+        self, pointer_t0: int, pointer_t1: int, n_vertices: int, is_double: bool
+    ) -> NDArray[np.float64]: ...
     def proximity(self, vertices: NDArray[Any], distance: float) -> _Proximity: ...
     def proximity_on_device(self, pointer: int, n_vertices: int, is_double: bool, distance: float) -> _Proximity: ...
     def intersections(self, vertices: NDArray[Any]) -> _Intersections: ...

@@ -144,13 +144,13 @@ def _names(argument: str, value: Iterable[str], choices: tuple[str, ...]) -> tup
     return tuple(choice(argument, name, choices) for name in names)
 
 
-def vertices(name: str, value: object, n_vertices: int) -> NDArray[Any]:
-    """(V, 3) float32 or float64; C-contiguous arrays are taken without a copy."""
+def vertices(name: str, value: object, shape: tuple[int, ...]) -> NDArray[Any]:
+    """(V, 3), or of many worlds (W, V, 3), float32 or float64; C-contiguous arrays are taken without a copy."""
     array = _reals(name, _array(name, value), value)
-    if array.shape != (n_vertices, 3):
+    if array.shape != shape:
         raise ValueError(
-            f"{name}: expected shape ({n_vertices}, 3), one row a vertex of the scene's meshes in the order added, "
-            f"got {array.shape}"
+            f"{name}: expected shape {shape}, {'for each world ' if len(shape) > 2 else ''}one row a vertex of the "
+            f"scene's meshes in the order added, got {array.shape}"
         )
     usable_in_place = array.flags.c_contiguous and array.flags.aligned
     return array if usable_in_place else np.require(array, None, ["C", "A"])

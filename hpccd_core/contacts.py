@@ -6,9 +6,11 @@ import dataclasses
 import numpy as np
 from numpy.typing import NDArray
 
+from .worlds import PairsOfWorlds, Slices
+
 
 @dataclasses.dataclass(frozen=True)
-class Contacts:
+class Contacts(PairsOfWorlds):
     """Contacts in canonical order: vertex-face by (vertex, face), then edge-edge by (a0, a1, b0, b1).
 
     vf: (N, 2) uint32, vertex and face, scene-wide indices. vf_toc: (N,) float64, times of contact in [0, 1].
@@ -28,6 +30,11 @@ class Contacts:
     edge b; empty (0, 2, 3) unless "closest" is among the detector's outputs.
     first_toc: the earliest time, +inf where nothing touches.
     hash: 64-bit, the same for the same contacts on any backend and any number of threads.
+    Of a detector of W worlds: the rows of the first world, then those of the second, ...; in points, normals and closest
+    first the vertex-face rows of all worlds. Indices are those of one world. vf_offsets, ee_offsets: (W+1,) int64, where
+    those of each world begin. first_tocs: (W,) float64; first_toc is the least of them. hash: the sum of each world's
+    hash times 2 k + 1, modulo 2**64. world(k): the contacts of one world, as a detector of its own gives them. Without
+    worlds it is as with one: offsets [0, N] and [0, M], one first_tocs, world(0).
     """
 
     vf: NDArray[np.uint32]
@@ -39,6 +46,30 @@ class Contacts:
     closest: NDArray[np.float64]
     first_toc: float
     hash: int
+    slices: Slices | None = dataclasses.field(default=None, repr=False)
+
+    @property
+    def first_tocs(self) -> NDArray[np.float64]:
+        """(W,): the earliest time of each world, +inf where nothing touches."""
+        return np.array([self.first_toc]) if self.slices is None else self.slices.first_tocs
+
+    def world(self, k: int) -> "Contacts":
+        """The contacts of world k, 0 <= k < W: every array and the hash as a detector of this world alone gives them."""
+        k = self._world_number(k)
+        if self.slices is None:
+            return self
+        vf, ee = self._rows_of(k)
+        return Contacts(
+            vf=self.vf[vf],
+            vf_toc=self.vf_toc[vf],
+            ee=self.ee[ee],
+            ee_toc=self.ee_toc[ee],
+            points=self._places_of(k, self.points),
+            normals=self._places_of(k, self.normals),
+            closest=self._places_of(k, self.closest),
+            first_toc=float(self.slices.first_tocs[k]),
+            hash=int(self.slices.hashes[k]),
+        )
 
     def __len__(self) -> int:
         return len(self.vf) + len(self.ee)
@@ -47,8 +78,8 @@ class Contacts:
         return f"Contacts({len(self.vf)} vertex-face, {len(self.ee)} edge-edge, first at {self.first_toc:.6g})"
 
     @classmethod
-    def none(cls) -> "Contacts":
-        """No contacts at all."""
+    def none(cls, worlds: int | None = None) -> "Contacts":
+        """No contacts at all, of one world or of so many."""
         empty = np.empty
         return cls(
             vf=empty((0, 2), np.uint32),
@@ -60,4 +91,5 @@ class Contacts:
             closest=empty((0, 2, 3)),
             first_toc=np.inf,
             hash=0,
+            slices=None if worlds is None else Slices.of_none(worlds),
         )

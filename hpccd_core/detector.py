@@ -61,6 +61,9 @@ class Detector(MotionQueries, SnapshotQueries):
         one triangle. The communication thread comes on top of `threads`; with as many as cores it takes the last one's
         place.
     restructure: of "published" and "naive", whether they restructure; False only to measure what it brings.
+    worlds: so many copies of the scene, 1 to 65,536, that know nothing of each other. Positions are (W, V, 3), and each
+        world is answered, by every query, bit for bit as by a detector of its own; Contacts tells how the answers of
+        all stand together. CPUs take a world a thread, the other backends one after the other. None: one scene, (V, 3).
     The scene is copied: meshes added to it later do not reach this detector.
     One call at a time: of the calls that several Python threads make of one detector each waits until the one before
     has ended, and profile and stats are those of the last. Only cancel() never waits. Threads that are to work side by
@@ -87,6 +90,7 @@ class Detector(MotionQueries, SnapshotQueries):
         hybrid_segment_pairs: int = 2048,
         gpus: int = 0,
         features: Feature | Iterable[Feature] = ("vertex_face", "edge_edge"),
+        worlds: int | None = None,
     ) -> None:
         if not isinstance(scene, Scene):
             raise TypeError(f"scene: expected hpccd_core.Scene, got {type(scene).__name__}")
@@ -114,7 +118,10 @@ class Detector(MotionQueries, SnapshotQueries):
             raise ValueError(f"gpus: {gpus} were asked for, {here} are usable here; give at most {here}, or 0 for all")
         minimum_separation = arguments.length("minimum_separation", minimum_separation)
         arguments.length("tolerance", tolerance)
+        self.worlds = None if worlds is None else arguments.whole_number("worlds", worlds, 1, _core.MOST_WORLDS)
         self.n_vertices = scene.n_vertices
+        self._shape = (self.n_vertices, 3) if self.worlds is None else (self.worlds, self.n_vertices, 3)
+        self._rows = self.n_vertices * (self.worlds or 1)
         self._mesh_names = tuple(scene.mesh_names)
         self._core = _core.Detector(
             scene=scene._core,
@@ -135,6 +142,7 @@ class Detector(MotionQueries, SnapshotQueries):
             gpu_stages=self._gpu_stages,
             vertex_face="vertex_face" in self.features,
             edge_edge="edge_edge" in self.features,
+            worlds=self.worlds or 1,
         )
         self._stepping = threading.RLock()  # of the positions of the last step
         self._last: NDArray[Any] | None = None
@@ -157,10 +165,10 @@ class Detector(MotionQueries, SnapshotQueries):
         if self._last_on_device:
             raise TypeError("vertices: the last step was a device array; give another one, or call reset() first")
         # Checked, used and kept as it is now, whatever the caller writes there meanwhile.
-        end = arguments.vertices("vertices", vertices, self.n_vertices).copy()
+        end = arguments.vertices("vertices", vertices, self._shape).copy()
         if self._last is None:
             arguments.usable("vertices", end)
-            contacts = Contacts.none()
+            contacts = Contacts.none(self.worlds)
         else:
             with names_of_one_argument():
                 contacts = self.detect(self._last, end)
@@ -170,15 +178,15 @@ class Detector(MotionQueries, SnapshotQueries):
     def _step_on_device(self, vertices: object) -> Contacts:
         if self._last is not None:
             raise TypeError("vertices: the last step was a host array; give another one, or call reset() first")
-        place = device_arrays.positions("vertices", vertices, self.n_vertices)
+        place = device_arrays.positions("vertices", vertices, self._shape)
         last = self._last_on_device.place
         if last is not None and last.is_double != place.is_double:
             kind = "float64" if last.is_double else "float32"
             raise TypeError(f"vertices: the last step was {kind} on the device; give that again, or call reset() first")
         with names_of_one_argument():  # the device checks the first one too, as a step that goes nowhere
-            contacts = Contacts(**self._of_places("detect", place if last is None else last, place))
-        self._last_on_device.keep(place, self.n_vertices)
-        return Contacts.none() if last is None else contacts
+            contacts = self._contacts(self._of_places("detect", place if last is None else last, place))
+        self._last_on_device.keep(place, self._rows)
+        return Contacts.none(self.worlds) if last is None else contacts
 
     def set_separation(self, mesh_a: str | int, mesh_b: str | int, separation: float) -> None:
         """From the next call on, report pairs of these two meshes (names or numbers) that come within this distance.

@@ -2,6 +2,7 @@
 """Positions that live in a GPU's memory: CUDA array interface (CuPy, PyTorch, Numba, Warp) or DLPack."""
 
 import ctypes
+import math
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -31,7 +32,7 @@ _Layout = tuple[tuple[int, ...], tuple[int, ...] | None, str, int | None]
 
 
 class DevicePositions(NamedTuple):
-    """A C-contiguous (V, 3) array on the device."""
+    """A C-contiguous (V, 3) or (W, V, 3) array on the device."""
 
     pointer: int
     is_double: bool
@@ -57,8 +58,8 @@ def _interface_of(value: object) -> Any:
         return None
 
 
-def positions(name: str, value: Any, n_vertices: int) -> DevicePositions:
-    """The array's place and type. Raises TypeError or ValueError naming the argument."""
+def positions(name: str, value: Any, expected: tuple[int, ...]) -> DevicePositions:
+    """The place and type of an array of this shape. Raises TypeError or ValueError naming the argument."""
     interface = _interface_of(value)
     if interface is not None:
         shape, strides, kind, pointer = _from_interface(name, interface)
@@ -66,14 +67,21 @@ def positions(name: str, value: Any, n_vertices: int) -> DevicePositions:
         shape, strides, kind, pointer = _from_dlpack(name, value)
     if kind not in ("<f4", "<f8"):
         raise TypeError(f"{name}: expected float32 or float64 on the device, got type {kind}")
-    if shape != (n_vertices, 3):
-        raise ValueError(f"{name}: expected shape ({n_vertices}, 3), one row a vertex of the scene, got {shape}")
-    size = int(kind[2])
-    if strides is not None and n_vertices and strides != (3 * size, size):
+    if shape != expected:
+        rows = f"{'for each world ' if len(expected) > 2 else ''}one row a vertex of the scene"
+        raise ValueError(f"{name}: expected shape {expected}, {rows}, got {shape}")
+    size, some = int(kind[2]), math.prod(shape) > 0
+    if strides is not None and some and not _in_order(shape, strides, size):
         raise ValueError(f"{name}: must be C-contiguous, got strides {strides} bytes; copy it first")
-    if n_vertices and not pointer:
+    if some and not pointer:
         raise ValueError(f"{name}: its address on the device is null; give an array that holds memory")
     return DevicePositions(int(pointer or 0), size == 8)
+
+
+def _in_order(shape: tuple[int, ...], strides: tuple[int, ...], size: int) -> bool:
+    """C-contiguous: along an axis of one element, as of one world, any stride will do."""
+    steps = (math.prod(shape[i + 1 :]) * size for i in range(len(shape)))
+    return all(n == 1 or step == stride for n, step, stride in zip(shape, steps, strides, strict=True))
 
 
 def _from_interface(name: str, interface: Any) -> _Layout:
@@ -98,12 +106,12 @@ class LastStep:
     def __bool__(self) -> bool:
         return self.place is not None
 
-    def keep(self, place: DevicePositions, n_vertices: int) -> None:
+    def keep(self, place: DevicePositions, rows: int) -> None:
         """Copies what is at this place now. Raises RuntimeError where the device fails."""
         if self._memory is None:
             self._memory = _core.MemoryOnDevice()
         self.place = None
-        self._memory.assign(place.pointer, n_vertices * 3 * (8 if place.is_double else 4))
+        self._memory.assign(place.pointer, rows * 3 * (8 if place.is_double else 4))
         self.place = DevicePositions(self._memory.pointer, place.is_double)
 
     def forget(self) -> None:

@@ -4,30 +4,36 @@
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from . import _core, arguments, device_arrays
 from .contacts import Contacts
 from .device_arrays import DeviceArray, DevicePositions
+from .worlds import Slices
 
 
 class MotionQueries:
     """What touches on the way from one set of positions to the next, and when first."""
 
-    n_vertices: int
+    worlds: int | None
+    _shape: tuple[int, ...]  # of all positions
+    _rows: int
     _core: _core.Detector
 
     def detect(self, vertices_t0: ArrayLike | DeviceArray, vertices_t1: ArrayLike | DeviceArray) -> Contacts:
-        """Contacts of the motion from vertices_t0 to vertices_t1, each (V, 3) float32 or float64.
+        """Contacts of the motion from vertices_t0 to vertices_t1, each (V, 3) float32 or float64; of W worlds (W, V, 3).
 
         C-contiguous arrays are read in place. Arrays in a GPU's memory (CUDA array interface or DLPack: CuPy, PyTorch,
         Warp; C-contiguous, backend "gpu" or "auto") are used there without a copy. Raises TypeError for a wrong dtype
         or a masked element, ValueError for a wrong shape or a coordinate that is NaN, infinite or beyond 1e150.
         """
-        return Contacts(**self._of_motion("detect", vertices_t0, vertices_t1))
+        return self._contacts(self._of_motion("detect", vertices_t0, vertices_t1))
 
-    def collision_free_step(self, vertices_t0: ArrayLike | DeviceArray, vertices_t1: ArrayLike | DeviceArray) -> float:
-        """The largest part of the motion, in [0, 1], that is certainly free of contacts; 1.0 where nothing touches.
+    def collision_free_step(
+        self, vertices_t0: ArrayLike | DeviceArray, vertices_t1: ArrayLike | DeviceArray
+    ) -> float | NDArray[np.float64]:
+        """The largest part of the motion, in [0, 1], that is certainly free of contacts; 1.0 where nothing touches. Of W
+        worlds (W,) float64, that of each.
 
         vertices_t0, vertices_t1: as for detect(), with the same errors. Up to, not including, the time returned nothing
         touches, or comes within the separation; 0.0 where something does so at the start. "exact" and "conservative":
@@ -44,20 +50,27 @@ class MotionQueries:
         apart by less than half an edge. Where they do not, each call searches anew. Other queries in between do no
         harm; a new separation ends it.
         """
-        return float(self._of_motion("collision_free_step", vertices_t0, vertices_t1))
+        if self.worlds is None:
+            return float(self._of_motion("collision_free_step", vertices_t0, vertices_t1))
+        return self._of_motion("collision_free_steps", vertices_t0, vertices_t1)
+
+    @staticmethod
+    def _contacts(found: Any) -> Contacts:
+        slices = found.pop("slices")
+        return Contacts(**found, slices=slices and Slices(**slices))
 
     def _of_motion(self, query: str, vertices_t0: object, vertices_t1: object) -> Any:
         on_device = [device_arrays.is_on_device(v) for v in (vertices_t0, vertices_t1)]
         if all(on_device):
             first, second = (
-                device_arrays.positions(name, vertices, self.n_vertices)
+                device_arrays.positions(name, vertices, self._shape)
                 for name, vertices in (("vertices_t0", vertices_t0), ("vertices_t1", vertices_t1))
             )
             return self._of_places(query, first, second)
         if any(on_device):
             raise TypeError("vertices_t0, vertices_t1: one is a device array, the other is not; give both in one place")
-        start = arguments.vertices("vertices_t0", vertices_t0, self.n_vertices)
-        end = arguments.vertices("vertices_t1", vertices_t1, self.n_vertices)
+        start = arguments.vertices("vertices_t0", vertices_t0, self._shape)
+        end = arguments.vertices("vertices_t1", vertices_t1, self._shape)
         if start.dtype != end.dtype:  # widening a float32 is exact
             start, end = start.astype(np.float64), end.astype(np.float64)
         return getattr(self._core, query)(start, end)
@@ -66,4 +79,4 @@ class MotionQueries:
         if first.is_double != second.is_double:
             raise TypeError("vertices_t0, vertices_t1: device arrays must both be float32 or both be float64")
         ask = getattr(self._core, f"{query}_on_device")
-        return ask(first.pointer, second.pointer, self.n_vertices, first.is_double)
+        return ask(first.pointer, second.pointer, self._rows, first.is_double)

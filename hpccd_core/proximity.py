@@ -7,9 +7,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from .worlds import OfWorlds, PairsOfWorlds, Slices
+
 
 @dataclasses.dataclass(frozen=True)
-class Proximity:
+class Proximity(PairsOfWorlds):
     """Pairs of features within a distance of each other at one time, in the order of Contacts.
 
     vf: (N, 2) uint32, vertex and face, scene-wide indices. vf_distance: (N,) float64, their Euclidean distance.
@@ -18,6 +20,7 @@ class Proximity:
     of edge a and edge b; where edges are parallel, in the middle of the stretch along which they are nearest. Empty
     (0, 2, 3) unless "closest" is among the detector's outputs.
     hash: 64-bit, the same for the same pairs and distances on any backend and any number of threads.
+    Of a detector of many worlds: vf_offsets, ee_offsets, world(k), and rows and hash, as in Contacts.
     """
 
     vf: NDArray[np.uint32]
@@ -26,6 +29,22 @@ class Proximity:
     ee_distance: NDArray[np.float64]
     closest: NDArray[np.float64]
     hash: int
+    slices: Slices | None = dataclasses.field(default=None, repr=False)
+
+    def world(self, k: int) -> "Proximity":
+        """The pairs of world k, 0 <= k < W: every array and the hash as a detector of this world alone gives them."""
+        k = self._world_number(k)
+        if self.slices is None:
+            return self
+        vf, ee = self._rows_of(k)
+        return Proximity(
+            vf=self.vf[vf],
+            vf_distance=self.vf_distance[vf],
+            ee=self.ee[ee],
+            ee_distance=self.ee_distance[ee],
+            closest=self._places_of(k, self.closest),
+            hash=int(self.slices.hashes[k]),
+        )
 
     def __len__(self) -> int:
         return len(self.vf) + len(self.ee)
@@ -35,16 +54,32 @@ class Proximity:
 
 
 @dataclasses.dataclass(frozen=True)
-class Intersections:
+class Intersections(OfWorlds):
     """Edges that pierce or touch faces at one time.
 
     ef: (K, 3) uint32, the edge's vertices a0<a1 and the face, scene-wide indices, sorted lexicographically. An edge and
     a face that share a vertex do not count.
     hash: 64-bit, the same for the same pairs on any backend and any number of threads.
+    Of a detector of W worlds: the rows of the first world, then those of the second, ... ef_offsets: (W+1,) int64, where
+    those of each world begin; world(k), and hash, as in Contacts.
     """
 
     ef: NDArray[np.uint32]
     hash: int
+    slices: Slices | None = dataclasses.field(default=None, repr=False)
+
+    @property
+    def ef_offsets(self) -> NDArray[np.int64]:
+        """(W+1,): the pairs of world k are the rows ef_offsets[k] to ef_offsets[k + 1]."""
+        return self._offsets("ef", len(self.ef))
+
+    def world(self, k: int) -> "Intersections":
+        """The pairs of world k, 0 <= k < W: the array and the hash as a detector of this world alone gives them."""
+        k = self._world_number(k)
+        if self.slices is None:
+            return self
+        begin, end = self.slices.ef[k : k + 2]
+        return Intersections(ef=self.ef[begin:end], hash=int(self.slices.hashes[k]))
 
     def __len__(self) -> int:
         return len(self.ef)

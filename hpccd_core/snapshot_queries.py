@@ -11,54 +11,66 @@ from numpy.typing import ArrayLike
 from . import _core, arguments, device_arrays
 from .device_arrays import DeviceArray
 from .proximity import Gap, Intersections, Proximity
+from .worlds import Slices
 
 
 class SnapshotQueries:
     """What is near, pierced, or nearest at one time. Coordinates may be as large as 1e300."""
 
-    n_vertices: int
+    worlds: int | None
+    _shape: tuple[int, ...]  # of all positions
+    _rows: int
     _core: _core.Detector
     _mesh_names: tuple[str, ...]
 
     def proximity(self, vertices: ArrayLike | DeviceArray, distance: float) -> Proximity:
         """All vertex-face and edge-edge pairs within a distance of each other, features that share a vertex apart.
 
-        vertices: (V, 3) float32 or float64, taken as by detect(), but up to 1e300. distance: Euclidean, between closed
+        vertices: (V, 3), of W worlds (W, V, 3), float32 or float64, taken as by detect(), but up to 1e300. distance: Euclidean, between closed
         features, in units of the coordinates; 0 gives those that touch. "exact" and "conservative" report exactly the
         pairs that rational arithmetic would; "balanced" and "fast" promise it not, but are computed alike today;
         distances are within 1e-12 of the scene's size. Neighbours that share no vertex count like all others: with a
         distance beyond the shortest edge all of them are reported.
         """
         distance = arguments.length("distance", distance)
-        return Proximity(**self._ask("proximity", vertices, distance))
+        found = self._ask("proximity", vertices, distance)
+        slices = found.pop("slices")
+        return Proximity(**found, slices=slices and Slices(**slices))
 
     def intersections(self, vertices: ArrayLike | DeviceArray) -> Intersections:
         """All edges that pierce or touch a face with which they share no vertex, coplanar ones included.
 
-        vertices: (V, 3) float32 or float64, taken as by detect(), but up to 1e300. Decided as rational arithmetic
+        vertices: (V, 3), of W worlds (W, V, 3), float32 or float64, taken as by detect(), but up to 1e300. Decided as rational arithmetic
         would, at every accuracy.
         """
-        return Intersections(**self._ask("intersections", vertices))
+        found = self._ask("intersections", vertices)
+        slices = found.pop("slices")
+        return Intersections(**found, slices=slices and Slices(**slices))
 
-    def distances(self, vertices: ArrayLike | DeviceArray) -> list[Gap]:
+    def distances(self, vertices: ArrayLike | DeviceArray) -> list[Gap] | list[list[Gap]]:
         """The smallest distance of each pair of meshes that the scene enables, within a mesh too.
 
-        vertices: (V, 3) float32 or float64, taken as by detect(), but up to 1e300. One Gap for each pair, in the order
-        in which the meshes were added: (0, 0), (0, 1), ... Found by branch and bound, without a list of pairs.
+        vertices: (V, 3), of W worlds (W, V, 3), float32 or float64, taken as by detect(), but up to 1e300. One Gap for each pair, in the order
+        in which the meshes were added: (0, 0), (0, 1), ... Of W worlds a list of W such lists. Found by branch and
+        bound, without a list of pairs.
         """
         names = self._mesh_names
-        return [
+        gaps = [
             Gap(names[a], names[b], distance, kind, tuple(features), points)
             for a, b, distance, kind, features, points in self._ask("distances", vertices)
         ]
+        if self.worlds is None:
+            return gaps
+        n = len(gaps) // self.worlds
+        return [gaps[k * n : (k + 1) * n] for k in range(self.worlds)]
 
     def _ask(self, query: str, vertices: object, *more: float) -> Any:
         with names_of_one_argument():
             if device_arrays.is_on_device(vertices):
-                place = device_arrays.positions("vertices", vertices, self.n_vertices)
+                place = device_arrays.positions("vertices", vertices, self._shape)
                 ask = getattr(self._core, f"{query}_on_device")
-                return ask(place.pointer, self.n_vertices, place.is_double, *more)
-            return getattr(self._core, query)(arguments.vertices("vertices", vertices, self.n_vertices), *more)
+                return ask(place.pointer, self._rows, place.is_double, *more)
+            return getattr(self._core, query)(arguments.vertices("vertices", vertices, self._shape), *more)
 
 
 @contextlib.contextmanager

@@ -29,11 +29,22 @@ py::array hand_over(std::vector<Row>&& rows, Columns... columns) {
 }
 
 Positions positions(const py::array& a) {
-  return {a.data(), static_cast<std::size_t>(a.shape(0)), py::isinstance<py::array_t<double>>(a)};
+  return {a.data(), static_cast<std::size_t>(a.size()) / 3, py::isinstance<py::array_t<double>>(a)};
 }
 
 Positions on_device(std::uintptr_t pointer, std::size_t n, bool is_double) {
   return {reinterpret_cast<const void*>(pointer), n, is_double, true};
+}
+
+py::object slices_of(WorldSlices&& s, std::vector<double>&& first_tocs) {
+  if (s.hashes.empty()) return py::none();
+  py::dict d;
+  d["vf"] = hand_over<std::int64_t>(std::move(s.vf));
+  d["ee"] = hand_over<std::int64_t>(std::move(s.ee));
+  d["ef"] = hand_over<std::int64_t>(std::move(s.ef));
+  d["hashes"] = hand_over<std::uint64_t>(std::move(s.hashes));
+  d["first_tocs"] = hand_over<double>(std::move(first_tocs));
+  return d;
 }
 
 py::dict to_dict(Contacts&& c) {
@@ -47,6 +58,7 @@ py::dict to_dict(Contacts&& c) {
   d["closest"] = hand_over<double>(std::move(c.closest), 2, 3);
   d["first_toc"] = c.first_toc;
   d["hash"] = c.hash;
+  d["slices"] = slices_of(std::move(c.slices), std::move(c.first_tocs));
   return d;
 }
 
@@ -58,6 +70,7 @@ py::dict to_dict(Proximity&& c) {
   d["ee_distance"] = hand_over<double>(std::move(c.ee_distance));
   d["closest"] = hand_over<double>(std::move(c.closest), 2, 3);
   d["hash"] = c.hash;
+  d["slices"] = slices_of(std::move(c.slices), {});
   return d;
 }
 
@@ -65,6 +78,7 @@ py::dict to_dict(Intersections&& c) {
   py::dict d;
   d["ef"] = hand_over<std::uint32_t>(std::move(c.ef), 3);
   d["hash"] = c.hash;
+  d["slices"] = slices_of(std::move(c.slices), {});
   return d;
 }
 
@@ -196,7 +210,7 @@ PYBIND11_MODULE(_core, m) {
           py::init([](std::shared_ptr<Scene> scene, Accuracy accuracy, Backend backend, Report report, Simd simd,
                       int threads, bool points, bool normals, bool closest, double separation, Method method,
                       bool restructure, std::size_t hybrid_segments, std::size_t hybrid_segment_pairs, int gpus,
-                      bool gpu_stages, bool vertex_face, bool edge_edge) {
+                      bool gpu_stages, bool vertex_face, bool edge_edge, std::uint32_t worlds) {
             // A copy: what is added to the caller's scene later does not reach this detector.
             return std::make_unique<Detector>(std::make_shared<const Scene>(*scene), Options{accuracy,
                                                                                              backend,
@@ -213,11 +227,12 @@ PYBIND11_MODULE(_core, m) {
                                                                                              hybrid_segment_pairs,
                                                                                              gpus,
                                                                                              gpu_stages,
-                                                                                             {vertex_face, edge_edge}});
+                                                                                             {vertex_face, edge_edge},
+                                                                                             worlds});
           }),
           "scene"_a, "accuracy"_a, "backend"_a, "report"_a, "simd"_a, "threads"_a, "points"_a, "normals"_a, "closest"_a,
           "minimum_separation"_a, "method"_a, "restructure"_a, "hybrid_segments"_a, "hybrid_segment_pairs"_a, "gpus"_a,
-          "gpu_stages"_a, "vertex_face"_a, "edge_edge"_a)
+          "gpu_stages"_a, "vertex_face"_a, "edge_edge"_a, "worlds"_a)
       .def(
           "detect",
           [](Detector& d, const py::array& t0, const py::array& t1) {
@@ -241,6 +256,19 @@ PYBIND11_MODULE(_core, m) {
           [](Detector& d, std::uintptr_t t0, std::uintptr_t t1, std::size_t n, bool is_double) {
             return of_motion<&Detector::collision_free_step>(d, on_device(t0, n, is_double),
                                                              on_device(t1, n, is_double));
+          },
+          "pointer_t0"_a, "pointer_t1"_a, "n_vertices"_a, "is_double"_a)
+      .def(
+          "collision_free_steps",
+          [](Detector& d, const py::array& t0, const py::array& t1) {
+            return hand_over<double>(of_motion<&Detector::collision_free_steps>(d, positions(t0), positions(t1)));
+          },
+          "vertices_t0"_a, "vertices_t1"_a)
+      .def(
+          "collision_free_steps_on_device",
+          [](Detector& d, std::uintptr_t t0, std::uintptr_t t1, std::size_t n, bool is_double) {
+            return hand_over<double>(of_motion<&Detector::collision_free_steps>(d, on_device(t0, n, is_double),
+                                                                                on_device(t1, n, is_double)));
           },
           "pointer_t0"_a, "pointer_t1"_a, "n_vertices"_a, "is_double"_a)
       .def(
@@ -312,6 +340,7 @@ PYBIND11_MODULE(_core, m) {
       .def_property_readonly("pointer",
                              [](const gpu::MemoryOnDevice& m) { return reinterpret_cast<std::uintptr_t>(m.data()); });
 
+  m.attr("MOST_WORLDS") = Options::most_worlds;
   m.def("test_vertex_face", &run_queries<&test_vertex_face>, "queries"_a, "accuracy"_a, "simd"_a,
         "minimum_separation"_a);
   m.def("test_edge_edge", &run_queries<&test_edge_edge>, "queries"_a, "accuracy"_a, "simd"_a, "minimum_separation"_a);

@@ -28,23 +28,26 @@ using Counts = std::map<std::string, std::uint64_t>;
 
 struct Detector::Impl {
   Impl(std::shared_ptr<const Scene> scene, const Options& options)
-      : shared(std::move(scene), options, pool_threads(options)), backends(shared) {}
+      : common(std::move(scene), options, pool_threads(options)), shared(common, common.pool), backends(shared) {}
 
   // All that a call changes is one call's at a time, on whatever thread. Only these two are not:
   std::atomic<Backend> last_backend{Backend::cpu};
-  Cancellation& cancellation() { return shared.cancellation; }
+  Cancellation& cancellation() { return common.cancellation; }
 
   mutable std::mutex one_call;
+  Common common;
   Resources shared;
   AvailableBackends backends;
   Tuner tuner;
   // Of the last call. Its other counts stay where they were made until somebody asks.
   std::optional<Counts> found;
+  Backend asked = Backend::cpu;  // which may have left the rest to the CPU
 
   void check(Positions t0, Positions t1) const {
-    const std::size_t n = shared.features.n_vertices;
-    if (t0.n != n || t1.n != n)
-      throw InvalidArgument("vertices_t0, vertices_t1: the scene has " + std::to_string(n) + " vertices, but " +
+    const std::size_t n = shared.features.n_vertices, worlds = shared.options.worlds;
+    if (t0.n != n * worlds || t1.n != n * worlds)
+      throw InvalidArgument("vertices_t0, vertices_t1: the scene has " + std::to_string(n) + " vertices" +
+                            (worlds > 1 ? " in each of " + std::to_string(worlds) + " worlds" : "") + ", but " +
                             std::to_string(t0.n) + " and " + std::to_string(t1.n) + " were given");
     if (t0.is_double != t1.is_double)
       throw InvalidArgument("vertices_t0, vertices_t1: must both be float32 or both be float64");
@@ -67,6 +70,7 @@ struct Detector::Impl {
   Detection compute(Backend picked, Positions t0, Positions t1) {
     for (const Backend b : {picked, Backend::cpu}) {
       if (b != Backend::gpu) t0 = backends.on_host(t0, 0), t1 = backends.on_host(t1, 1);
+      asked = b;
       if (auto detection = backends.at(b).detect(t0, t1)) return std::move(*detection);
     }
     throw std::logic_error("the CPU has left a step to others");
@@ -79,7 +83,7 @@ struct Detector::Impl {
     const std::lock_guard lock(one_call);
     cancellation().heed();
     found.reset();
-    shared.settle();
+    common.settle();
     std::optional<gpu::CallersDevice> callers;
     if (backends.use_devices()) callers.emplace();
     shared.profiler.begin();
@@ -88,7 +92,7 @@ struct Detector::Impl {
       if (b != Backend::gpu) t0 = backends.on_host(t0, 0), t1 = backends.on_host(t1, 1);
       if (auto answer = query(backends.at(b), t0, t1, counts)) {
         shared.profiler.end();
-        last_backend = b;
+        last_backend = asked = b;
         found = counts;
         return std::move(*answer);
       }
@@ -125,7 +129,7 @@ Contacts Detector::detect(Positions t0, Positions t1) {
   const std::lock_guard lock(d.one_call);
   d.cancellation().heed();
   d.found.reset();
-  d.shared.settle();
+  d.common.settle();
   std::optional<gpu::CallersDevice> callers;
   if (d.backends.use_devices()) callers.emplace();
   d.shared.profiler.begin();
@@ -136,15 +140,20 @@ Contacts Detector::detect(Positions t0, Positions t1) {
 }
 
 double Detector::collision_free_step(Positions t0, Positions t1) {
-  const double first = impl_->ask(
+  return std::ranges::min(collision_free_steps(t0, t1));
+}
+
+std::vector<double> Detector::collision_free_steps(Positions t0, Positions t1) {
+  std::vector<double> first = impl_->ask(
       t0, t1, [](DetectionBackend& backend, Positions a, Positions b, Counts&) { return backend.earliest(a, b); });
-  return std::min(first, 1.0);
+  for (double& time : first) time = std::min(time, 1.0);
+  return first;
 }
 
 namespace {
 
 Proximity as_proximity(Contacts&& c) {
-  return {std::move(c.vf), std::move(c.vf_toc), std::move(c.ee), std::move(c.ee_toc), std::move(c.closest), c.hash};
+  return {std::move(c.vf), std::move(c.vf_toc), std::move(c.ee), std::move(c.ee_toc), std::move(c.closest), c.hash, std::move(c.slices)};
 }
 
 }  // namespace
@@ -175,13 +184,12 @@ std::vector<Gap> Detector::distances(Positions vertices) {
 }
 
 void Detector::set_separation(std::uint32_t mesh_a, std::uint32_t mesh_b, double separation) {
-  Resources& shared = impl_->shared;
-  const std::size_t n = shared.scene->meshes().size();
+  const std::size_t n = impl_->common.scene->meshes().size();
   if (mesh_a >= n || mesh_b >= n)
     throw InvalidArgument("mesh_a, mesh_b: the scene has " + std::to_string(n) + " meshes, numbered from 0");
   check_length("separation", separation);
   const std::lock_guard lock(impl_->one_call);
-  shared.separations.set(mesh_a, mesh_b, separation);
+  impl_->common.separations.set(mesh_a, mesh_b, separation);
 }
 
 void Detector::cancel() { impl_->cancellation().request(); }
@@ -195,13 +203,14 @@ std::map<std::string, double> Detector::profile() const {
 
 std::map<std::string, std::uint64_t> Detector::stats() const {
   const std::lock_guard lock(impl_->one_call);
-  const Impl& d = *impl_;
+  Impl& d = *impl_;
   if (!d.found) return {};
   std::map<std::string, std::uint64_t> stats;
-  d.backends.count(d.last_backend, stats);
+  d.backends.count(d.asked, stats);
   stats.insert(d.found->begin(), d.found->end());
   stats["triangles"] = d.shared.features.n_faces();
   stats["bytes"] += d.shared.tree.bytes() + d.shared.features.bytes();
+  if (d.shared.options.worlds > 1) stats["worlds"] = d.shared.options.worlds;
   return stats;
 }
 

@@ -107,8 +107,9 @@ struct Options {
   // Of detect, collision_free_step and proximity. Intersections and smallest distances are of whole surfaces.
   TestedFeatures features;
   // So many copies of the scene, which know nothing of each other: positions hold all vertices of the first, then those
-  // of the second, ... Each is answered as if it were alone, in every bit.
+  // of the second, ... Each is answered as if it were alone, in every bit. 1 to most_worlds.
   std::uint32_t worlds = 1;
+  static constexpr std::uint32_t most_worlds = 65536;
 };
 
 // Where the rows of each world stand among those of all; each of worlds + 1 numbers, the last that of all rows.
@@ -190,15 +191,18 @@ class Detector {
 
   // The largest part of the motion that is certainly free of contacts, whatever Options::report says: at the tiers
   // exact and conservative never beyond the earliest one and at most 1e-9 before it, else that of the earliest one
-  // found. 1 where nothing touches.
+  // found. 1 where nothing touches. Of several worlds: of all of them.
   double collision_free_step(Positions vertices_t0, Positions vertices_t1);
+  // The same of each world by itself.
+  std::vector<double> collision_free_steps(Positions vertices_t0, Positions vertices_t1);
 
   // Vertex-face and edge-edge pairs within this distance of each other, Euclidean, between closed features.
   Proximity proximity(Positions vertices, double distance);
   // Edges and faces that share a point but no vertex.
   Intersections intersections(Positions vertices);
   // The smallest distance of each enabled pair of meshes, by (mesh_a, mesh_b), mesh_a <= mesh_b. Of pairs of features
-  // whose distances are the same double the first in order, vertex-face before edge-edge.
+  // whose distances are the same double the first in order, vertex-face before edge-edge. Of several worlds those of the
+  // first, then those of the second, ...: as many of each.
   std::vector<Gap> distances(Positions vertices);
 
   // As Scene::set_separation, from the next call on, which fits its boxes to it as to any motion.

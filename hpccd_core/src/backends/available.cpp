@@ -22,9 +22,19 @@ AvailableBackends::AvailableBackends(Resources& shared) : cpu_(shared) {
   const Options& o = shared.options;
   if (wanted(Backend::gpu, "gpu", GpuBackend::unsupported(o), o)) gpu_.emplace(shared);
   if (wanted(Backend::hybrid, "hybrid", "", o)) hybrid_.emplace(shared, cpu_);
+  if (o.worlds == 1) return;
+  memories_.emplace(o.worlds);
+  worlds_on_cpus_.emplace(shared, cpu_, *memories_);
+  if (gpu_) worlds_on_gpu_.emplace(shared, *gpu_, nullptr, *memories_);
+  if (hybrid_) worlds_on_hybrid_.emplace(shared, *hybrid_, &cpu_, *memories_);
 }
 
 DetectionBackend& AvailableBackends::at(Backend backend) {
+  if (worlds_on_cpus_) {
+    if (backend == Backend::gpu) return worlds_on_gpu_.value();
+    if (backend == Backend::hybrid) return worlds_on_hybrid_.value();
+    return *worlds_on_cpus_;
+  }
   if (backend == Backend::gpu) return gpu_.value();
   if (backend == Backend::hybrid) return hybrid_.value();
   return cpu_;
@@ -36,8 +46,10 @@ bool AvailableBackends::works(Backend backend) const {
   return backend == Backend::cpu;
 }
 
-void AvailableBackends::count(Backend computed_by, std::map<std::string, std::uint64_t>& stats) const {
-  if (computed_by == Backend::gpu) {
+void AvailableBackends::count(Backend asked, std::map<std::string, std::uint64_t>& stats) {
+  if (worlds_on_cpus_) {
+    at(asked).count(stats);
+  } else if (asked == Backend::gpu) {
     gpu_->count(stats);
   } else {
     cpu_.count(stats);

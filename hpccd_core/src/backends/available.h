@@ -9,6 +9,8 @@
 #include "backends/cpu_backend.h"
 #include "backends/gpu_backend.h"
 #include "backends/hybrid_backend.h"
+#include "backends/one_by_one.h"
+#include "backends/worlds_on_cpus.h"
 
 namespace hpccd {
 
@@ -17,6 +19,7 @@ class AvailableBackends {
   // Throws InvalidArgument where the options ask for a backend that is not usable.
   explicit AvailableBackends(Resources& shared);
 
+  // It takes all worlds.
   DetectionBackend& at(Backend backend);
   // Whether it is here, and its devices have not failed too often.
   bool works(Backend backend) const;
@@ -25,8 +28,8 @@ class AvailableBackends {
   // Host arrays with the same positions. which: 0 or 1, the place where a copy is kept.
   Positions on_host(Positions p, int which) { return gpu_ ? gpu_->on_host(p, which) : p; }
 
-  // Of a last step that was computed there.
-  void count(Backend computed_by, std::map<std::string, std::uint64_t>& stats) const;
+  // Of a last step for which this one was asked.
+  void count(Backend asked, std::map<std::string, std::uint64_t>& stats);
   // Why a step was left to the CPU.
   std::string last_error() const;
 
@@ -34,6 +37,10 @@ class AvailableBackends {
   CpuBackend cpu_;
   std::optional<GpuBackend> gpu_;
   std::optional<HybridBackend> hybrid_;
+  // Of several worlds, what makes of each of them one that takes all.
+  std::optional<WorldMemories> memories_;
+  std::optional<WorldsOnCpus> worlds_on_cpus_;
+  std::optional<OneByOne> worlds_on_gpu_, worlds_on_hybrid_;
 };
 
 }  // namespace hpccd

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the detector asks of each place where a step can be computed.
+// What the detector asks of each place where a step can be computed. Positions are those of all its worlds, one world
+// after the other, and so are the answers, with their slices where there are several. A backend of one world takes those
+// of one; WorldByWorld makes of it one of many.
 #pragma once
 
 #include <map>
@@ -25,9 +27,9 @@ class DetectionBackend {
   // Throws InvalidArgument for bad coordinates, and Cancelled.
   virtual std::optional<Detection> detect(Positions t0, Positions t1) = 0;
 
-  // The earliest time, of contacts that are reported no later than they are where their tier can; infinity where there
-  // is none. Nothing as well where a backend leaves the query to the CPU.
-  virtual std::optional<double> earliest(Positions, Positions) { return std::nullopt; }
+  // By world: the earliest time, of contacts that are reported no later than they are where their tier can; infinity
+  // where there is none. Nothing as well where a backend leaves the query to the CPU.
+  virtual std::optional<std::vector<double>> earliest(Positions, Positions) { return std::nullopt; }
 
   // Of one snapshot. Nothing as well where a backend leaves the query to the CPU.
   virtual std::optional<Contacts> proximity(Positions, double) { return std::nullopt; }  // distances in place of times

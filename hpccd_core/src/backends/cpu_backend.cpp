@@ -136,52 +136,48 @@ Contacts CpuBackend::collect(Outputs outputs) {
   return std::move(contacts_);
 }
 
-void CpuBackend::count_times(std::map<std::string, std::uint64_t>& stats) const {
-  constexpr double ns = 1e9;
-  for (const Worker& w : workers_) {
-    stats["leaf_pairs_ns"] += static_cast<std::uint64_t>(ns * w.leaf_pairs_time.seconds());
-    if (w.elementary_ticks == 0) continue;
-    const double a_tick = w.elementary_seconds / static_cast<double>(w.elementary_ticks);
-    for (const BatchCounts& c : w.counts)
-      stats["slabs_ns"] += static_cast<std::uint64_t>(ns * a_tick * static_cast<double>(c.kdop_ticks));
-  }
+WorkCounts CpuBackend::last_counts() const {
+  WorkCounts counts;
+  counts.add(workers_);
+  counts.near_pairs = near_.size();
+  counts.asked[0] = counts.asked[1] = search_.leaf_pairs || search_.leaf_pairs_in_snapshot;
+  counts.asked[2] = search_.leaf_edge_faces != nullptr;
+  counts.earliest = search_.report == Report::first;
+  counts.timed = search_.leaf_pairs && walks_tree();
+  return counts;
 }
 
 void CpuBackend::count(std::map<std::string, std::uint64_t>& stats) const {
-  std::uint64_t bytes = order_.bytes();
+  std::uint64_t bytes = order_.bytes() + near_.bytes() + drift_.bytes();
   if (method_) bytes += method_->bytes();
   if (mesh_pairs_) bytes += mesh_pairs_->bytes();
-  bytes += near_.bytes() + drift_.bytes();
-  if (search_.report == Report::first) stats["near_pairs"] = near_.size();
-  if (search_.leaf_pairs && walks_tree()) count_times(stats);
-  const char* kinds[3] = {"vf", "ee", "ef"};
-  const bool pairs = search_.leaf_pairs || search_.leaf_pairs_in_snapshot;
-  const bool asked[3] = {pairs, pairs, search_.leaf_edge_faces != nullptr};
-  for (const Worker& w : workers_) {
-    stats["node_pairs"] += w.node_pairs;
-    stats["leaf_pairs"] += w.leaf_pairs;
-    bytes += sizeof(Worker) + w.bytes();
-    for (int k = 0; k < 3; ++k) {
-      const std::string kind = kinds[k];
-      const BatchCounts& c = w.counts[k];
-      if (!asked[k]) continue;
-      stats[kind + "_candidates"] += c.tested;
-      stats[kind + "_rejected_coplanarity"] += c.coplanarity;
-      stats[kind + "_rejected_projection"] += c.projection;
-      stats[kind + "_rejected_roots"] += c.roots;
-      stats[kind + "_rejected_separated"] += c.separated;
-      stats[kind + "_proven_contacts"] += c.contacts;
-      stats[kind + "_undecided"] += c.undecided;
-      const FallbackCounts& last = w.fallbacks[k];
-      stats[kind + "_by_integers"] += last.integers;
-      if (k == 2) continue;                       // an edge and a face have neither k-DOPs nor another fallback
-      stats[kind + "_rejected_slabs"] += c.kdop;  // users read it under its first name
-      stats[kind + "_by_tolerance"] += last.tolerance;
-      stats[kind + "_by_extended"] += last.extended;
-    }
-  }
+  for (const Worker& w : workers_) bytes += sizeof(Worker) + w.bytes();
   stats["bytes"] += bytes;
+  if (counts_of_worlds_) return counts_of_worlds_->write(stats);
+  last_counts().write(stats);
   if (method_) method_->count(stats);
+}
+
+void CpuBackend::begin_worlds() {
+  counts_of_worlds_.emplace();
+}
+
+void CpuBackend::begin_world(WorldMemory& memory, TreeBudget& trees) {
+  // Of several contacts any may be the one that is found, but the same one as by a detector of this world alone.
+  shared_.tree.begin_world(memory.tree, trees, shared_.options.report == Report::any);
+  exchange(memory);
+}
+
+void CpuBackend::end_world(WorldMemory& memory) {
+  *counts_of_worlds_ += last_counts();
+  exchange(memory);
+  shared_.tree.end_world();
+}
+
+void CpuBackend::exchange(WorldMemory& memory) {
+  std::swap(near_, memory.near);
+  std::swap(near_separations_, memory.near_separations);
+  std::swap(edge_, memory.edge);
 }
 
 }  // namespace hpccd

@@ -8,6 +8,8 @@
 #include "backends/backend.h"
 #include "backends/near_list.h"
 #include "backends/resources.h"
+#include "backends/work_counts.h"
+#include "backends/world_memory.h"
 #include "contacts/canonical.h"
 #include "paper/method.h"
 #include "traverse/worker.h"
@@ -22,10 +24,15 @@ class CpuBackend final : public DetectionBackend {
   void count(std::map<std::string, std::uint64_t>& stats) const override;
 
   // By the default traversal, whatever the method.
-  std::optional<double> earliest(Positions t0, Positions t1) override;
+  std::optional<std::vector<double>> earliest(Positions t0, Positions t1) override;
   std::optional<Contacts> proximity(Positions vertices, double distance) override;
   std::optional<Intersections> intersections(Positions vertices) override;
   std::optional<std::vector<Gap>> distances(Positions vertices) override;
+
+  // Of several worlds: at the beginning of a call, and around what one of them asks. count() is of all since then.
+  void begin_worlds();
+  void begin_world(WorldMemory& memory, TreeBudget& trees);
+  void end_world(WorldMemory& memory);
 
   // In this order in each step; the workers hold what was found when it is collected. Devices find all contacts, and
   // test "fast" as "balanced": beside them the CPU does so as well.
@@ -59,7 +66,8 @@ class CpuBackend final : public DetectionBackend {
   template <class Test>
   void test_each(const std::vector<LeafPair>& pairs, Test&& test);
   void mark_traversal();
-  void count_times(std::map<std::string, std::uint64_t>& stats) const;
+  WorkCounts last_counts() const;
+  void exchange(WorldMemory& memory);
   Contacts collect(Outputs outputs);
 
   Resources& shared_;
@@ -67,7 +75,7 @@ class CpuBackend final : public DetectionBackend {
   std::unique_ptr<paper::MethodEngine> method_;  // published; none for the default traversal
   const std::vector<Box>* swept_ = nullptr;      // for a published method
   std::vector<Worker> workers_;
-  Search search_;
+  Search search_{};
   ContactOrder order_;
   NearList near_;                        // for the earliest contacts of motions that begin alike
   std::uint64_t near_separations_ = 0;   // the version of the separations that it is for
@@ -79,6 +87,7 @@ class CpuBackend final : public DetectionBackend {
   std::optional<std::pair<std::uint64_t, std::uint64_t>> drift_of_;
   // Kept by a call that is cancelled: to give the memory of 10 million back to the system takes longer than to end it.
   Contacts contacts_;
+  std::optional<WorkCounts> counts_of_worlds_;  // none for a detector of one
 };
 
 }  // namespace hpccd

@@ -10,10 +10,10 @@
 
 namespace hpccd {
 
-std::optional<double> CpuBackend::earliest(Positions t0, Positions t1) {
+std::optional<std::vector<double>> CpuBackend::earliest(Positions t0, Positions t1) {
   find_earliest(t0, t1, true);
   shared_.cancellation.heed();
-  return search_.earliest;
+  return std::vector<double>{search_.earliest};
 }
 
 // Leaves what it found in the workers.

@@ -134,7 +134,7 @@ std::optional<double> CpuBackend::wide_radius() {
 
 void CpuBackend::see_drift() {
   const Tree& tree = shared_.tree.tree();
-  if (const std::pair now(near_.number(), shared_.tree.builds()); drift_of_ != now) {
+  if (const std::pair now(near_.number(), shared_.tree.number()); drift_of_ != now) {
     drift_of_.reset();  // should this be cancelled
     drift_.begin(tree, near_.snapshot(), shared_.pool);
     drift_of_ = now;

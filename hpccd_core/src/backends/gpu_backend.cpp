@@ -56,9 +56,9 @@ std::optional<Detection> GpuBackend::detect(Positions t0, Positions t1) {
   return attempt([&] { return Detection{contacts(t0, t1), Backend::gpu}; });
 }
 
-std::optional<double> GpuBackend::earliest(Positions t0, Positions t1) {
+std::optional<std::vector<double>> GpuBackend::earliest(Positions t0, Positions t1) {
   if (!t0.on_device && !t1.on_device) require_static_meshes_rest(*shared_.scene, t0, t1);
-  return attempt([&] { return earliest_time(t0, t1); });
+  return attempt([&] { return std::vector<double>{earliest_time(t0, t1)}; });
 }
 
 std::optional<Contacts> GpuBackend::proximity(Positions vertices, double distance) {

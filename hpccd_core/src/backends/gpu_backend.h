@@ -23,7 +23,7 @@ class GpuBackend final : public DetectionBackend {
 
   std::optional<Detection> detect(Positions t0, Positions t1) override;
   void count(std::map<std::string, std::uint64_t>& stats) const override;
-  std::optional<double> earliest(Positions t0, Positions t1) override;
+  std::optional<std::vector<double>> earliest(Positions t0, Positions t1) override;
   std::optional<Contacts> proximity(Positions vertices, double distance) override;
   std::optional<Intersections> intersections(Positions vertices) override;
   void add_stages(std::map<std::string, double>& stages) const override;

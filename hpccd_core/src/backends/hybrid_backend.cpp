@@ -66,7 +66,7 @@ hybrid::LeafTable HybridBackend::leaves() {
   const Features& f = shared_.features;
   if (cpu_.walks_tree()) {
     const Tree& tree = shared_.tree.tree();
-    return {&tree.leaves, &tree.face_of_slot, &tree.edge_of_slot, &tree.vertex_of_slot, shared_.tree.builds()};
+    return {&tree.leaves, &tree.face_of_slot, &tree.edge_of_slot, &tree.vertex_of_slot, shared_.tree.number()};
   }
   if (primitives_.empty()) list_primitives();
   return {&primitives_, &face_of_primitive_, &f.owned_edges, &f.owned_vertices, 1};

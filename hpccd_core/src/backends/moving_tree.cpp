@@ -16,26 +16,70 @@ void MovingTree::bound(Positions vertices) {
 }
 
 void MovingTree::fit(Profiler& profiler) {
-  if (built_) {
-    refit(tree_, motion_, followed_ ? motion_.resting : std::vector<char>(), pool_);
-    profiler.mark("refit");
-    fits_ = true;
-    if (!worn_out(tree_.area, tree_.area_when_built)) return;
+  if (refitted(profiler)) return;
+  if (own_ && own_->kept && !always_own_) {
+    give_up_own();
+    if (refitted(profiler)) return;
   }
+  if (own_ && !own_->kept && kept_.built && std::exchange(own_->wore_out_common, true)) take_own();
   build_anew();
   profiler.mark("build");
 }
 
+// Whether the tree serves.
+bool MovingTree::refitted(Profiler& profiler) {
+  if (!kept_.built) return false;
+  refit(kept_.tree, motion_, followed_ ? motion_.resting : std::vector<char>(), pool_);
+  profiler.mark("refit");
+  fits_ = true;
+  const bool serves = !worn_out(kept_.tree.area, kept_.tree.area_when_built);
+  if (serves && own_ && !own_->kept) own_->wore_out_common = false;
+  return serves;
+}
+
 void MovingTree::fit_leaves(std::span<const std::uint32_t> leaves) {
   fits_ = false;
-  refit_leaves(tree_, motion_, leaves, pool_);
+  refit_leaves(kept_.tree, motion_, leaves, pool_);
 }
 
 void MovingTree::build_anew() {
-  fits_ = built_ = false;  // should this be cancelled, or find no memory
-  ++builds_;
-  build(tree_, scene_, features_, motion_, pool_);
-  fits_ = built_ = true;
+  static std::atomic<std::uint64_t> number{0};
+  fits_ = kept_.built = false;  // should this be cancelled, or find no memory
+  kept_.number = ++number;
+  build(kept_.tree, scene_, features_, motion_, pool_);
+  fits_ = kept_.built = true;
+}
+
+void MovingTree::take_own() {
+  const std::size_t bytes = kept_.tree.bytes();
+  if (!budget_->take(bytes)) return;
+  own_->bytes = bytes;
+  own_->kept = std::make_unique<KeptTree>();
+  std::swap(kept_, *own_->kept);
+  fits_ = followed_ = false;
+}
+
+void MovingTree::give_up_own() {
+  std::swap(kept_, *own_->kept);
+  budget_->give_back(std::exchange(own_->bytes, 0));
+  own_->kept.reset();
+  fits_ = followed_ = false;
+}
+
+void MovingTree::begin_world(OwnTree& own, TreeBudget& budget, bool always) {
+  own_ = &own, budget_ = &budget, always_own_ = always;
+  if (!own.kept && always) own.kept = std::make_unique<KeptTree>();
+  if (!own.kept) return;
+  std::swap(kept_, *own.kept);
+  fits_ = false;
+}
+
+void MovingTree::end_world() {
+  if (own_->kept) {
+    std::swap(kept_, *own_->kept);
+    fits_ = false;
+  }
+  own_ = nullptr, budget_ = nullptr;
 }
 
 const std::vector<Box>& MovingTree::swept() {

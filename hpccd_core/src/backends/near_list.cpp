@@ -2,6 +2,7 @@
 #include "backends/near_list.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 
 #include "scene/edge_sample.h"
@@ -15,6 +16,11 @@ Vec3<double> at(const double x[3]) { return {x[0], x[1], x[2]}; }
 
 // Not its length, whose square could vanish or overflow.
 double largest(const Vec3<double>& x) { return std::max({std::fabs(x.x), std::fabs(x.y), std::fabs(x.z)}); }
+
+std::uint64_t next_number() {
+  static std::atomic<std::uint64_t> last{0};
+  return ++last;
+}
 
 }  // namespace
 
@@ -66,7 +72,7 @@ void NearList::forget() {
 
 void NearList::begin_at(const std::vector<VertexMotion>& starts, ThreadPool& pool) {
   forget();
-  ++number_;
+  number_ = next_number();
   resize(snapshot_, starts.size(), pool.cancellation());
   parallel_for(pool, starts.size(), grain, [&](std::size_t begin, std::size_t end, int) {
     for (std::size_t i = begin; i < end; ++i) snapshot_[i] = at(starts[i].t0);
@@ -77,7 +83,7 @@ Travel NearList::see(const std::vector<VertexMotion>& vertices, ThreadPool& pool
   std::vector<Travel> most(static_cast<std::size_t>(pool.size()));
   const bool compares = snapshot_.size() == vertices.size(), begins = !radius_.known();
   if (begins) {
-    ++number_;
+    number_ = next_number();
     resize(snapshot_, vertices.size(), pool.cancellation());
   }
   parallel_for(pool, vertices.size(), grain, [&](std::size_t begin, std::size_t end, int thread) {

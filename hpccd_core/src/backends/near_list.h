@@ -101,7 +101,7 @@ class NearList {
   const std::vector<Group>& groups() const { return groups_; }
   std::size_t size() const;
   const std::vector<Vec3<double>>& snapshot() const { return snapshot_; }
-  std::uint64_t number() const { return number_; }  // of the snapshot: another for each
+  std::uint64_t number() const { return number_; }  // of the snapshot: another for each of this process
   // A few pairs that touched first in the last motion: they give the next one its first bound.
   std::vector<Group> hints;
 

@@ -8,32 +8,45 @@
 
 namespace hpccd {
 
-Resources::Resources(std::shared_ptr<const Scene> of, const Options& wanted, int threads)
+Common::Common(std::shared_ptr<const Scene> of, const Options& wanted, int threads)
     : scene(std::move(of)),
       options(wanted),
       pool(threads),
       features(features_of(*scene, pool)),
       separations(*scene, wanted.minimum_separation),
       rules(*scene, wanted.accuracy, separations, wanted.features),
-      tree(*scene, features, pool),
       settled_(separations.version()) {
   require_some("features", wanted.features);
+  if (wanted.worlds < 1 || wanted.worlds > Options::most_worlds)
+    throw InvalidArgument("worlds: must lie in [1, " + std::to_string(Options::most_worlds) + "], got " +
+                          std::to_string(wanted.worlds));
   options.simd = resolve(wanted.simd);
   options.threads = pool.size();
   pool.heed(cancellation);
 }
 
-void Resources::settle() {
+void Common::settle() {
   if (settled_ == separations.version()) return;
   separations.settle();
   rules.change(separations);
   settled_ = separations.version();
 }
 
-Separations Resources::separations_now() const {
+Separations Common::separations_now() const {
   if (separations.uniform()) return {separations.first()};
   return {0, separations.all().data(), features.mesh_of_vertex.data(),
           static_cast<std::uint32_t>(scene->meshes().size())};
 }
+
+Resources::Resources(Common& all, ThreadPool& threads)
+    : common(all),
+      scene(all.scene),
+      options(all.options),
+      cancellation(all.cancellation),
+      pool(threads),
+      features(all.features),
+      separations(all.separations),
+      rules(all.rules),
+      tree(*all.scene, all.features, threads) {}
 
 }  // namespace hpccd

@@ -15,9 +15,10 @@
 
 namespace hpccd {
 
-struct Resources {
+// Of all worlds of a detector alike.
+struct Common {
   // `threads` as for ThreadPool; the options say how many there are.
-  Resources(std::shared_ptr<const Scene> of, const Options& wanted, int threads);
+  Common(std::shared_ptr<const Scene> of, const Options& wanted, int threads);
 
   std::shared_ptr<const Scene> scene;
   Options options;
@@ -26,8 +27,6 @@ struct Resources {
   Features features;
   SeparationTable separations;
   PairRules rules;
-  MovingTree tree;
-  Profiler profiler;
 
   // At the beginning of each call: what follows from separations that were set since the last one.
   void settle();
@@ -36,6 +35,26 @@ struct Resources {
 
  private:
   std::uint64_t settled_;  // version of the separations
+};
+
+// Of the world that is computed now, by the threads of this pool.
+struct Resources {
+  Resources(Common& all, ThreadPool& threads);
+  Resources(const Resources&) = delete;
+  Resources& operator=(const Resources&) = delete;
+
+  Common& common;
+  const std::shared_ptr<const Scene>& scene;
+  const Options& options;
+  const Cancellation& cancellation;
+  ThreadPool& pool;
+  const Features& features;
+  const SeparationTable& separations;
+  const PairRules& rules;
+  MovingTree tree;
+  Profiler profiler;
+
+  Separations separations_now() const { return common.separations_now(); }
 };
 
 }  // namespace hpccd

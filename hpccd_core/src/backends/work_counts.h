@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the workers of one query counted, or those of several: numbers alone, as they are added up for each world.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "traverse/worker.h"
+
+namespace hpccd {
+
+struct WorkCounts {
+  std::uint64_t node_pairs = 0, leaf_pairs = 0, near_pairs = 0;
+  BatchCounts batches[3];  // by kind
+  FallbackCounts fallbacks[3];
+  double leaf_pairs_seconds = 0, slabs_seconds = 0;
+  // What the query looked at, by kind; whether for the earliest contacts; and whether it took the time of its parts.
+  bool asked[3] = {}, earliest = false, timed = false;
+
+  void add(const std::vector<Worker>& workers);
+  WorkCounts& operator+=(const WorkCounts& other);
+  void write(std::map<std::string, std::uint64_t>& stats) const;
+};
+
+}  // namespace hpccd

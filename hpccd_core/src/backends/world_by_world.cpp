@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "backends/world_by_world.h"
+
+#include <atomic>
+#include <string>
+#include <utility>
+
+#include "base/spin_lock.h"
+#include "contacts/worlds.h"
+
+namespace hpccd {
+namespace {
+
+// "vertices_t1[17, 2] is NaN" of world 3 is vertices_t1[3, 17, 2].
+std::string with_world(std::string text, std::size_t world) {
+  for (const char* name : {"vertices_t0[", "vertices_t1["})
+    if (const std::size_t at = text.find(name); at != std::string::npos)
+      return text.insert(at + std::string(name).size(), std::to_string(world) + ", ");
+  return "world " + std::to_string(world) + ": " + text;
+}
+
+// The first bad world is the one that is named, however the worlds are spread over threads.
+class FirstBadWorld {
+ public:
+  // True: what the world answers does not matter any more.
+  bool before(std::size_t world) const { return first_.load(std::memory_order_relaxed) < world; }
+  void note(std::size_t world, std::string why) {
+    const std::lock_guard lock(lock_);
+    if (before(world)) return;
+    first_ = world, why_ = std::move(why);
+  }
+  void report() const {
+    if (first_ != none) throw InvalidArgument(why_);
+  }
+
+ private:
+  static constexpr std::size_t none = ~std::size_t{0};
+  std::atomic<std::size_t> first_{none};
+  SpinLock lock_;
+  std::string why_;
+};
+
+}  // namespace
+
+Positions WorldByWorld::of_world(Positions all, std::size_t world) const {
+  const std::size_t n = shared_.features.n_vertices, row = 3 * (all.is_double ? sizeof(double) : sizeof(float));
+  all.data = static_cast<const std::byte*>(all.data) + world * n * row;
+  all.n = n;
+  return all;
+}
+
+// True: each world has its answer.
+template <class Answer, class Query>
+bool WorldByWorld::answer(std::vector<Answer>& answers, Query&& query) {
+  answers.clear();
+  answers.resize(n_worlds());
+  FirstBadWorld bad;
+  const bool complete = each_world([&](DetectionBackend& backend, std::size_t world) {
+    if (bad.before(world)) return true;
+    try {
+      auto found = query(backend, world);
+      if (found) answers[world] = std::move(*found);
+      return found.has_value();
+    } catch (const InvalidArgument& error) {
+      bad.note(world, with_world(error.what(), world));
+      return true;
+    }
+  });
+  bad.report();
+  return complete;
+}
+
+std::optional<Detection> WorldByWorld::detect(Positions t0, Positions t1) {
+  std::atomic<bool> all_there{true};
+  Backend there = Backend::cpu;
+  const bool complete = answer(contacts_of_worlds_, [&](DetectionBackend& backend, std::size_t world) {
+    auto found = backend.detect(of_world(t0, world), of_world(t1, world));
+    if (!found) return std::optional<Contacts>();
+    if (found->computed_by == Backend::cpu)
+      all_there = false;
+    else
+      there = found->computed_by;
+    return std::optional(std::move(found->contacts));
+  });
+  if (!complete) return std::nullopt;
+  contacts_ = {};
+  join_worlds(contacts_of_worlds_, shared_.pool, contacts_);
+  shared_.profiler.mark("contacts");
+  return Detection{std::move(contacts_), all_there ? there : Backend::cpu};
+}
+
+std::optional<std::vector<double>> WorldByWorld::earliest(Positions t0, Positions t1) {
+  std::vector<double> times;
+  const bool complete = answer(times, [&](DetectionBackend& backend, std::size_t world) {
+    const auto found = backend.earliest(of_world(t0, world), of_world(t1, world));
+    return found ? std::optional(found->front()) : std::nullopt;
+  });
+  return complete ? std::optional(std::move(times)) : std::nullopt;
+}
+
+std::optional<Contacts> WorldByWorld::proximity(Positions vertices, double distance) {
+  const bool complete = answer(contacts_of_worlds_, [&](DetectionBackend& backend, std::size_t world) {
+    return backend.proximity(of_world(vertices, world), distance);
+  });
+  if (!complete) return std::nullopt;
+  contacts_ = {};
+  join_worlds(contacts_of_worlds_, shared_.pool, contacts_);
+  shared_.profiler.mark("contacts");
+  return std::move(contacts_);
+}
+
+std::optional<Intersections> WorldByWorld::intersections(Positions vertices) {
+  std::vector<Intersections> found;
+  const bool complete = answer(found, [&](DetectionBackend& backend, std::size_t world) {
+    return backend.intersections(of_world(vertices, world));
+  });
+  if (!complete) return std::nullopt;
+  Intersections all = join_worlds(found, shared_.pool);
+  shared_.profiler.mark("contacts");
+  return all;
+}
+
+std::optional<std::vector<Gap>> WorldByWorld::distances(Positions vertices) {
+  std::vector<std::vector<Gap>> found;
+  const bool complete = answer(found, [&](DetectionBackend& backend, std::size_t world) {
+    return backend.distances(of_world(vertices, world));
+  });
+  if (!complete) return std::nullopt;
+  std::vector<Gap> all;
+  for (const auto& gaps : found) all.insert(all.end(), gaps.begin(), gaps.end());
+  return all;
+}
+
+}  // namespace hpccd

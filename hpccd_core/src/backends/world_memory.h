@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the motions of one world among many leave for its next one; all else lasts a call, and is a thread's.
+#pragma once
+
+#include "backends/moving_tree.h"
+#include "backends/near_list.h"
+
+namespace hpccd {
+
+struct WorldMemory {
+  OwnTree tree;
+  NearList near;
+  std::uint64_t near_separations = 0;  // the version of the separations that it is for
+  double edge = 0;                     // a typical length
+
+  std::size_t bytes() const { return sizeof *this + near.bytes() + (tree.kept ? tree.kept->tree.bytes() : 0); }
+};
+
+}  // namespace hpccd

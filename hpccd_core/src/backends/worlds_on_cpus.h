@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+// Many worlds on CPU threads, each by one thread. What a step needs is the thread's, and stays in its core's cache; of a
+// world only little is kept from call to call (world_memory.h).
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "backends/cpu_backend.h"
+#include "backends/world_by_world.h"
+
+namespace hpccd {
+
+struct WorldMemories {
+  explicit WorldMemories(std::size_t worlds) : of_world(worlds) {}
+  std::vector<WorldMemory> of_world;
+  TreeBudget trees;
+  std::size_t bytes() const;
+};
+
+// While a CPU backend is at one world.
+class WorldVisit {
+ public:
+  WorldVisit(CpuBackend& backend, WorldMemories& memories, std::size_t world)
+      : backend_(backend), memory_(memories.of_world[world]) {
+    backend_.begin_world(memory_, memories.trees);
+  }
+  ~WorldVisit() { backend_.end_world(memory_); }
+  WorldVisit(const WorldVisit&) = delete;
+  WorldVisit& operator=(const WorldVisit&) = delete;
+
+ private:
+  CpuBackend& backend_;
+  WorldMemory& memory_;
+};
+
+class WorldsOnCpus final : public WorldByWorld {
+ public:
+  // `on_all_threads`: for worlds that are fewer than the threads.
+  WorldsOnCpus(Resources& shared, CpuBackend& on_all_threads, WorldMemories& memories);
+
+  void count(std::map<std::string, std::uint64_t>& stats) const override;
+
+ private:
+  // A world at a time, by one thread.
+  struct Engine {
+    Engine(Common& common, ThreadPool& one_thread) : resources(common, one_thread), backend(resources) {}
+    Resources resources;
+    CpuBackend backend;
+    bool working = false;  // in this call
+  };
+
+  bool each_world(const Ask& ask) override;
+  Engine& engine_of(int thread);
+  void mark_stages();
+
+  CpuBackend& on_all_threads_;
+  WorldMemories& memories_;
+  ThreadPool one_thread_{1};  // of each engine: it runs a job where it is called
+  std::vector<std::unique_ptr<Engine>> engines_;  // by thread, from its first world on
+};
+
+}  // namespace hpccd

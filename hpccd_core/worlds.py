@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The answers of many worlds in one: where the rows of each stand among those of all."""
+
+import dataclasses
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import arguments
+
+Row = TypeVar("Row", bound=np.generic)
+
+
+@dataclasses.dataclass(frozen=True)
+class Slices:
+    """Of W worlds; what an answer does not have is empty.
+
+    vf, ee, ef: (W+1,) int64, where the rows of each world begin, and how many there are. hashes: (W,) uint64, of each
+    world's rows. first_tocs: (W,) float64.
+    """
+
+    vf: NDArray[np.int64]
+    ee: NDArray[np.int64]
+    ef: NDArray[np.int64]
+    hashes: NDArray[np.uint64]
+    first_tocs: NDArray[np.float64]
+
+    @classmethod
+    def of_none(cls, worlds: int) -> "Slices":
+        """Of worlds without contacts."""
+        begin = np.zeros(worlds + 1, np.int64)
+        return cls(begin, begin.copy(), np.empty(0, np.int64), np.zeros(worlds, np.uint64), np.full(worlds, np.inf))
+
+
+class OfWorlds:
+    """An answer that may be of many worlds. Without `slices` it is of one, whose rows are all."""
+
+    slices: Slices | None
+
+    def _offsets(self, kind: str, rows: int) -> NDArray[np.int64]:
+        return np.array([0, rows]) if self.slices is None else getattr(self.slices, kind)
+
+    def _world_number(self, k: int) -> int:
+        return arguments.whole_number("world", k, 0, 0 if self.slices is None else len(self.slices.hashes) - 1)
+
+
+class PairsOfWorlds(OfWorlds):
+    """One with vertex-face and edge-edge pairs."""
+
+    vf: NDArray[np.uint32]
+    ee: NDArray[np.uint32]
+
+    @property
+    def vf_offsets(self) -> NDArray[np.int64]:
+        """(W+1,): the vertex-face pairs of world k are the rows vf_offsets[k] to vf_offsets[k + 1]."""
+        return self._offsets("vf", len(self.vf))
+
+    @property
+    def ee_offsets(self) -> NDArray[np.int64]:
+        """(W+1,): the same of edge-edge pairs."""
+        return self._offsets("ee", len(self.ee))
+
+    def _rows_of(self, k: int) -> tuple[slice, slice]:
+        """Of world k, vertex-face and edge-edge."""
+        vf, ee = self.vf_offsets, self.ee_offsets
+        return slice(int(vf[k]), int(vf[k + 1])), slice(int(ee[k]), int(ee[k + 1]))
+
+    def _places_of(self, k: int, places: NDArray[Row]) -> NDArray[Row]:
+        """Of an array with the rows of all vertex-face pairs, then of all edge-edge pairs; or of no pairs at all."""
+        vf, ee = self._rows_of(k)
+        n = len(self.vf)
+        return np.concatenate([places[vf], places[n + ee.start : n + ee.stop]])
