@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from . import _core, arguments, device_arrays
 from .contacts import Contacts
 from .device_arrays import DeviceArray
+from .device_results import DeviceContacts
 from .devices import backends, gpu_status
 from .motion_queries import MotionQueries
 from .options import (
@@ -17,6 +18,7 @@ from .options import (
     BACKENDS,
     METHODS,
     REPORTS,
+    RESULTS,
     SIMD,
     Accuracy,
     Backend,
@@ -24,10 +26,22 @@ from .options import (
     Method,
     Output,
     Report,
+    Results,
     Simd,
 )
 from .scene import Scene
 from .snapshot_queries import SnapshotQueries, names_of_one_argument
+
+
+def _require_device(backend: str, method: str) -> None:
+    """Raises ValueError where results cannot stay on a device."""
+    if "gpu" not in backends():
+        why = gpu_status()["reason"] or "the GPU backend is not part of this build"
+        raise ValueError(f"results: 'device' needs a usable GPU, and there is none here ({why}); use results='host'")
+    if backend not in ("auto", "gpu"):
+        raise ValueError(f"results: 'device' is not offered by backend {backend!r}; use backend='gpu' or 'auto'")
+    if method != "default":
+        raise ValueError(f"results: 'device' is not offered by method {method!r}, which runs on CPUs; use 'default'")
 
 
 class Detector(MotionQueries, SnapshotQueries):
@@ -90,6 +104,7 @@ class Detector(MotionQueries, SnapshotQueries):
         hybrid_segment_pairs: int = 2048,
         gpus: int = 0,
         features: Feature | Iterable[Feature] = ("vertex_face", "edge_edge"),
+        results: Results = "host",
         worlds: int | None = None,
     ) -> None:
         if not isinstance(scene, Scene):
@@ -101,6 +116,9 @@ class Detector(MotionQueries, SnapshotQueries):
             why = gpu_status()["reason"] or "it is not part of this build"
             usable = ", ".join(["auto", *backends()])
             raise ValueError(f"backend: {backend!r} is not usable here ({why}); use one of {usable}")
+        self.results = arguments.choice("results", results, RESULTS)
+        if results == "device":
+            _require_device(backend, method)
         self._backend = backend
         computed = arguments.output_names(outputs)
         self.features = arguments.feature_names(features)
@@ -142,51 +160,52 @@ class Detector(MotionQueries, SnapshotQueries):
             gpu_stages=self._gpu_stages,
             vertex_face="vertex_face" in self.features,
             edge_edge="edge_edge" in self.features,
+            results_on_device=results == "device",
             worlds=self.worlds or 1,
         )
         self._stepping = threading.RLock()  # of the positions of the last step
         self._last: NDArray[Any] | None = None
         self._last_on_device = device_arrays.LastStep()
 
-    def step(self, vertices: ArrayLike | DeviceArray) -> Contacts:
+    def step(self, vertices: ArrayLike | DeviceArray, stream: object = None) -> Contacts | DeviceContacts:
         """Streaming: the end of the last step is the start of this one. The first call returns no contacts.
 
         vertices: as for detect(), and refused with the same errors, the first ones too; what was refused does not
         count: the next step starts where this one would have. Device arrays are taken as by detect(); the last one is
         kept in a copy on the device. A step from a host array to a device array, or back, raises TypeError; reset()
-        first.
+        first. stream: as for detect(). With results="device" the first call returns no contacts on the device.
         """
         with self._stepping:
             if device_arrays.is_on_device(vertices):
-                return self._step_on_device(vertices)
+                return self._step_on_device(vertices, device_arrays.stream_number(stream))
             return self._step_on_host(vertices)
 
-    def _step_on_host(self, vertices: object) -> Contacts:
+    def _step_on_host(self, vertices: object) -> Contacts | DeviceContacts:
         if self._last_on_device:
             raise TypeError("vertices: the last step was a device array; give another one, or call reset() first")
         # Checked, used and kept as it is now, whatever the caller writes there meanwhile.
         end = arguments.vertices("vertices", vertices, self._shape).copy()
-        if self._last is None:
+        if self._last is None and self.results == "host":
             arguments.usable("vertices", end)
-            contacts = Contacts.none(self.worlds)
+            contacts: Contacts | DeviceContacts = Contacts.none(self.worlds)
         else:
             with names_of_one_argument():
-                contacts = self.detect(self._last, end)
+                contacts = self.detect(end if self._last is None else self._last, end)
         self._last = end
         return contacts
 
-    def _step_on_device(self, vertices: object) -> Contacts:
+    def _step_on_device(self, vertices: object, stream: int | None) -> Contacts | DeviceContacts:
         if self._last is not None:
             raise TypeError("vertices: the last step was a host array; give another one, or call reset() first")
-        place = device_arrays.positions("vertices", vertices, self._shape)
+        place = device_arrays.positions("vertices", vertices, self._shape, stream)
         last = self._last_on_device.place
         if last is not None and last.is_double != place.is_double:
             kind = "float64" if last.is_double else "float32"
             raise TypeError(f"vertices: the last step was {kind} on the device; give that again, or call reset() first")
         with names_of_one_argument():  # the device checks the first one too, as a step that goes nowhere
-            contacts = self._contacts(self._of_places("detect", place if last is None else last, place))
+            contacts = self._contacts(self._of_places(self._asked("detect"), place if last is None else last, place))
         self._last_on_device.keep(place, self._rows)
-        return Contacts.none(self.worlds) if last is None else contacts
+        return Contacts.none(self.worlds) if last is None and self.results == "host" else contacts
 
     def set_separation(self, mesh_a: str | int, mesh_b: str | int, separation: float) -> None:
         """From the next call on, report pairs of these two meshes (names or numbers) that come within this distance.

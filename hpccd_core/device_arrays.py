@@ -3,6 +3,7 @@
 
 import ctypes
 import math
+import operator
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -32,10 +33,15 @@ _Layout = tuple[tuple[int, ...], tuple[int, ...] | None, str, int | None]
 
 
 class DevicePositions(NamedTuple):
-    """A C-contiguous (V, 3) or (W, V, 3) array on the device."""
+    """A C-contiguous (V, 3) or (W, V, 3) array on the device. made_on: the stream after whose work it is there; None:
+    after all of the device's."""
 
     pointer: int
     is_double: bool
+    made_on: int | None = None
+
+    def for_core(self, rows: int) -> _core.Positions:
+        return _core.Positions(self.pointer, rows, self.is_double, self.made_on)
 
 
 def is_on_device(value: object) -> bool:
@@ -58,13 +64,33 @@ def _interface_of(value: object) -> Any:
         return None
 
 
-def positions(name: str, value: Any, expected: tuple[int, ...]) -> DevicePositions:
+def stream_number(stream: object) -> int | None:
+    """A cudaStream_t as a number, from one, or from a stream of CuPy (ptr), PyTorch or Warp (cuda_stream)."""
+    if stream is None:
+        return None
+    for name in ("ptr", "cuda_stream"):
+        stream = getattr(stream, name, stream)
+    try:
+        if isinstance(stream, bool):
+            raise TypeError
+        number = operator.index(stream)  # type: ignore[arg-type]
+    except TypeError:
+        raise TypeError(
+            f"stream: expected a cudaStream_t as an integer, or an object with .ptr or .cuda_stream, got "
+            f"{type(stream).__name__}"
+        ) from None
+    if not 0 <= number < 1 << 64:
+        raise ValueError(f"stream: a cudaStream_t is an address, 0 (the default stream) or more, got {number}")
+    return number
+
+
+def positions(name: str, value: Any, expected: tuple[int, ...], stream: int | None = None) -> DevicePositions:
     """The place and type of an array of this shape. Raises TypeError or ValueError naming the argument."""
     interface = _interface_of(value)
     if interface is not None:
         shape, strides, kind, pointer = _from_interface(name, interface)
     else:
-        shape, strides, kind, pointer = _from_dlpack(name, value)
+        shape, strides, kind, pointer = _from_dlpack(name, value, stream)
     if kind not in ("<f4", "<f8"):
         raise TypeError(f"{name}: expected float32 or float64 on the device, got type {kind}")
     if shape != expected:
@@ -75,7 +101,7 @@ def positions(name: str, value: Any, expected: tuple[int, ...]) -> DevicePositio
         raise ValueError(f"{name}: must be C-contiguous, got strides {strides} bytes; copy it first")
     if some and not pointer:
         raise ValueError(f"{name}: its address on the device is null; give an array that holds memory")
-    return DevicePositions(int(pointer or 0), size == 8)
+    return DevicePositions(int(pointer or 0), size == 8, stream)
 
 
 def _in_order(shape: tuple[int, ...], strides: tuple[int, ...], size: int) -> bool:
@@ -135,11 +161,11 @@ class _Tensor(ctypes.Structure):
     ]
 
 
-def _from_dlpack(name: str, value: Any) -> _Layout:
+def _from_dlpack(name: str, value: Any, stream: int | None) -> _Layout:
     # Stream 1 is the legacy default stream: the producer's work is done before ours starts there. The capsule stays
     # unconsumed, so the producer's own destructor frees it; the caller keeps the array itself alive.
     try:
-        capsule = value.__dlpack__(stream=1)
+        capsule = value.__dlpack__(stream=stream or 1)
     except Exception as error:
         raise TypeError(f"{name}: {type(value).__name__} is not given out by DLPack ({error})") from error
     get = ctypes.pythonapi.PyCapsule_GetPointer

@@ -6,9 +6,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from . import _core, arguments, device_arrays
+from . import _core, arguments, device_arrays, device_results
 from .contacts import Contacts
 from .device_arrays import DeviceArray, DevicePositions
+from .device_results import DeviceContacts
+from .options import Results
 from .worlds import Slices
 
 
@@ -16,21 +18,28 @@ class MotionQueries:
     """What touches on the way from one set of positions to the next, and when first."""
 
     worlds: int | None
+    results: Results
     _shape: tuple[int, ...]  # of all positions
     _rows: int
     _core: _core.Detector
 
-    def detect(self, vertices_t0: ArrayLike | DeviceArray, vertices_t1: ArrayLike | DeviceArray) -> Contacts:
+    def detect(
+        self, vertices_t0: ArrayLike | DeviceArray, vertices_t1: ArrayLike | DeviceArray, stream: object = None
+    ) -> Contacts | DeviceContacts:
         """Contacts of the motion from vertices_t0 to vertices_t1, each (V, 3) float32 or float64; of W worlds (W, V, 3).
 
         C-contiguous arrays are read in place. Arrays in a GPU's memory (CUDA array interface or DLPack: CuPy, PyTorch,
         Warp; C-contiguous, backend "gpu" or "auto") are used there without a copy. Raises TypeError for a wrong dtype
         or a masked element, ValueError for a wrong shape or a coordinate that is NaN, infinite or beyond 1e150.
+        stream: of device arrays, the CUDA stream on which they were made, a cudaStream_t as int, or an object with .ptr
+        (CuPy) or .cuda_stream (PyTorch, Warp): its work so far comes first. Without it, all work on the device does. In
+        both cases the answer is complete when the call returns.
+        With results="device" the answer is a DeviceContacts.
         """
-        return self._contacts(self._of_motion("detect", vertices_t0, vertices_t1))
+        return self._contacts(self._of_motion(self._asked("detect"), vertices_t0, vertices_t1, stream))
 
     def collision_free_step(
-        self, vertices_t0: ArrayLike | DeviceArray, vertices_t1: ArrayLike | DeviceArray
+        self, vertices_t0: ArrayLike | DeviceArray, vertices_t1: ArrayLike | DeviceArray, stream: object = None
     ) -> float | NDArray[np.float64]:
         """The largest part of the motion, in [0, 1], that is certainly free of contacts; 1.0 where nothing touches. Of W
         worlds (W,) float64, that of each.
@@ -50,20 +59,24 @@ class MotionQueries:
         apart by less than half an edge. Where they do not, each call searches anew. Other queries in between do no
         harm; a new separation ends it.
         """
-        if self.worlds is None:
-            return float(self._of_motion("collision_free_step", vertices_t0, vertices_t1))
-        return self._of_motion("collision_free_steps", vertices_t0, vertices_t1)
+        times = self._of_motion("collision_free_steps", vertices_t0, vertices_t1, stream)
+        return float(times[0]) if self.worlds is None else times
 
-    @staticmethod
-    def _contacts(found: Any) -> Contacts:
+    def _asked(self, query: str) -> str:
+        return f"{query}_on_device" if self.results == "device" else query
+
+    def _contacts(self, found: Any) -> Contacts | DeviceContacts:
+        if self.results == "device":
+            return device_results.contacts_of(found)
         slices = found.pop("slices")
         return Contacts(**found, slices=slices and Slices(**slices))
 
-    def _of_motion(self, query: str, vertices_t0: object, vertices_t1: object) -> Any:
+    def _of_motion(self, query: str, vertices_t0: object, vertices_t1: object, stream: object = None) -> Any:
         on_device = [device_arrays.is_on_device(v) for v in (vertices_t0, vertices_t1)]
+        made_on = device_arrays.stream_number(stream)
         if all(on_device):
             first, second = (
-                device_arrays.positions(name, vertices, self._shape)
+                device_arrays.positions(name, vertices, self._shape, made_on)
                 for name, vertices in (("vertices_t0", vertices_t0), ("vertices_t1", vertices_t1))
             )
             return self._of_places(query, first, second)
@@ -78,5 +91,4 @@ class MotionQueries:
     def _of_places(self, query: str, first: DevicePositions, second: DevicePositions) -> Any:
         if first.is_double != second.is_double:
             raise TypeError("vertices_t0, vertices_t1: device arrays must both be float32 or both be float64")
-        ask = getattr(self._core, f"{query}_on_device")
-        return ask(first.pointer, second.pointer, self._rows, first.is_double)
+        return getattr(self._core, query)(first.for_core(self._rows), second.for_core(self._rows))

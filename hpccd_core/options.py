@@ -9,6 +9,7 @@ Feature = Literal["vertex_face", "edge_edge"]
 Method = Literal["default", "published", "naive", "front"]
 Output = Literal["points", "normals", "closest"]
 Report = Literal["all", "first", "any"]
+Results = Literal["host", "device"]
 Simd = Literal["auto", "scalar", "avx2", "avx512"]
 
 ACCURACIES: tuple[str, ...] = get_args(Accuracy)
@@ -17,4 +18,5 @@ FEATURES: tuple[str, ...] = get_args(Feature)
 METHODS: tuple[str, ...] = get_args(Method)
 OUTPUTS: tuple[str, ...] = get_args(Output)
 REPORTS: tuple[str, ...] = get_args(Report)
+RESULTS: tuple[str, ...] = get_args(Results)
 SIMD: tuple[str, ...] = get_args(Simd)

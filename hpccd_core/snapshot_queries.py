@@ -8,8 +8,10 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
-from . import _core, arguments, device_arrays
+from . import _core, arguments, device_arrays, device_results
 from .device_arrays import DeviceArray
+from .device_results import DeviceIntersections, DeviceProximity
+from .options import Results
 from .proximity import Gap, Intersections, Proximity
 from .worlds import Slices
 
@@ -18,12 +20,15 @@ class SnapshotQueries:
     """What is near, pierced, or nearest at one time. Coordinates may be as large as 1e300."""
 
     worlds: int | None
+    results: Results
     _shape: tuple[int, ...]  # of all positions
     _rows: int
     _core: _core.Detector
     _mesh_names: tuple[str, ...]
 
-    def proximity(self, vertices: ArrayLike | DeviceArray, distance: float) -> Proximity:
+    def proximity(
+        self, vertices: ArrayLike | DeviceArray, distance: float, stream: object = None
+    ) -> Proximity | DeviceProximity:
         """All vertex-face and edge-edge pairs within a distance of each other, features that share a vertex apart.
 
         vertices: (V, 3), of W worlds (W, V, 3), float32 or float64, taken as by detect(), but up to 1e300. distance: Euclidean, between closed
@@ -37,7 +42,9 @@ class SnapshotQueries:
         slices = found.pop("slices")
         return Proximity(**found, slices=slices and Slices(**slices))
 
-    def intersections(self, vertices: ArrayLike | DeviceArray) -> Intersections:
+    def intersections(
+        self, vertices: ArrayLike | DeviceArray, stream: object = None
+    ) -> Intersections | DeviceIntersections:
         """All edges that pierce or touch a face with which they share no vertex, coplanar ones included.
 
         vertices: (V, 3), of W worlds (W, V, 3), float32 or float64, taken as by detect(), but up to 1e300. Decided as rational arithmetic
@@ -47,7 +54,9 @@ class SnapshotQueries:
         slices = found.pop("slices")
         return Intersections(**found, slices=slices and Slices(**slices))
 
-    def distances(self, vertices: ArrayLike | DeviceArray) -> list[Gap] | list[list[Gap]]:
+    def distances(
+        self, vertices: ArrayLike | DeviceArray, stream: object = None
+    ) -> list[Gap] | list[list[Gap]]:
         """The smallest distance of each pair of meshes that the scene enables, within a mesh too.
 
         vertices: (V, 3), of W worlds (W, V, 3), float32 or float64, taken as by detect(), but up to 1e300. One Gap for each pair, in the order
@@ -57,20 +66,21 @@ class SnapshotQueries:
         names = self._mesh_names
         gaps = [
             Gap(names[a], names[b], distance, kind, tuple(features), points)
-            for a, b, distance, kind, features, points in self._ask("distances", vertices)
+            for a, b, distance, kind, features, points in self._ask("distances", vertices, stream)
         ]
         if self.worlds is None:
             return gaps
         n = len(gaps) // self.worlds
         return [gaps[k * n : (k + 1) * n] for k in range(self.worlds)]
 
-    def _ask(self, query: str, vertices: object, *more: float) -> Any:
+    def _ask(self, query: str, vertices: object, stream: object, *more: float) -> Any:
+        made_on = device_arrays.stream_number(stream)
+        ask = getattr(self._core, query)
         with names_of_one_argument():
             if device_arrays.is_on_device(vertices):
-                place = device_arrays.positions("vertices", vertices, self._shape)
-                ask = getattr(self._core, f"{query}_on_device")
-                return ask(place.pointer, self._rows, place.is_double, *more)
-            return getattr(self._core, query)(arguments.vertices("vertices", vertices, self._shape), *more)
+                place = device_arrays.positions("vertices", vertices, self._shape, made_on)
+                return ask(place.for_core(self._rows), *more)
+            return ask(arguments.vertices("vertices", vertices, self._shape), *more)
 
 
 @contextlib.contextmanager

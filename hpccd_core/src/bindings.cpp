@@ -6,6 +6,7 @@
 
 #include "base/machine_rate.h"
 #include "base/simd.h"
+#include "bindings_device.h"
 #include "gpu/device.h"
 #include "gpu/memory_on_device.h"
 #include "hpccd/hpccd.h"
@@ -28,13 +29,17 @@ py::array hand_over(std::vector<Row>&& rows, Columns... columns) {
   return py::array_t<T>(shape, reinterpret_cast<const T*>(owner->data()), free);
 }
 
-Positions positions(const py::array& a) {
-  return {a.data(), static_cast<std::size_t>(a.size()) / 3, py::isinstance<py::array_t<double>>(a)};
-}
+// Of a numpy array, or of an array on a device, which the caller keeps.
+struct GivenPositions {
+  Positions positions;
 
-Positions on_device(std::uintptr_t pointer, std::size_t n, bool is_double) {
-  return {reinterpret_cast<const void*>(pointer), n, is_double, true};
-}
+  explicit GivenPositions(const py::array& a)
+      : positions{a.data(), static_cast<std::size_t>(a.size()) / 3, py::isinstance<py::array_t<double>>(a)} {}
+  GivenPositions(std::uintptr_t pointer, std::size_t n, bool is_double, std::optional<std::uintptr_t> made_on)
+      : positions{reinterpret_cast<const void*>(pointer), n, is_double, true} {
+    if (made_on) positions.made_on = reinterpret_cast<void*>(*made_on);
+  }
+};
 
 py::object slices_of(WorldSlices&& s, std::vector<double>&& first_tocs) {
   if (s.hashes.empty()) return py::none();
@@ -113,17 +118,10 @@ py::list to_list(const std::vector<Gap>& gaps) {
   return l;
 }
 
-template <auto query>
-auto of_motion(Detector& d, Positions t0, Positions t1) {
-  py::gil_scoped_release release;
-  return (d.*query)(t0, t1);
-}
-
-// The answer to a query of one snapshot, on the host or on a device.
 template <class Query>
-auto of_snapshot(Detector& d, Positions vertices, Query&& query) {
+auto unlocked(Query&& query) {
   py::gil_scoped_release release;
-  return query(d, vertices);
+  return query();
 }
 
 template <auto test>
@@ -205,12 +203,19 @@ PYBIND11_MODULE(_core, m) {
         return l;
       });
 
+  py::class_<GivenPositions>(m, "Positions")
+      .def(py::init<const py::array&>(), "array"_a)
+      .def(py::init<std::uintptr_t, std::size_t, bool, std::optional<std::uintptr_t>>(), "pointer"_a, "n"_a,
+           "is_double"_a, "made_on"_a);
+  py::implicitly_convertible<py::array, GivenPositions>();
+  bind_device_array(m);
+
   py::class_<Detector>(m, "Detector")
       .def(
           py::init([](std::shared_ptr<Scene> scene, Accuracy accuracy, Backend backend, Report report, Simd simd,
                       int threads, bool points, bool normals, bool closest, double separation, Method method,
                       bool restructure, std::size_t hybrid_segments, std::size_t hybrid_segment_pairs, int gpus,
-                      bool gpu_stages, bool vertex_face, bool edge_edge, std::uint32_t worlds) {
+                      bool gpu_stages, bool vertex_face, bool edge_edge, bool results_on_device, std::uint32_t worlds) {
             // A copy: what is added to the caller's scene later does not reach this detector.
             return std::make_unique<Detector>(std::make_shared<const Scene>(*scene), Options{accuracy,
                                                                                              backend,
@@ -228,91 +233,63 @@ PYBIND11_MODULE(_core, m) {
                                                                                              gpus,
                                                                                              gpu_stages,
                                                                                              {vertex_face, edge_edge},
+                                                                                             results_on_device,
                                                                                              worlds});
           }),
           "scene"_a, "accuracy"_a, "backend"_a, "report"_a, "simd"_a, "threads"_a, "points"_a, "normals"_a, "closest"_a,
           "minimum_separation"_a, "method"_a, "restructure"_a, "hybrid_segments"_a, "hybrid_segment_pairs"_a, "gpus"_a,
-          "gpu_stages"_a, "vertex_face"_a, "edge_edge"_a, "worlds"_a)
+          "gpu_stages"_a, "vertex_face"_a, "edge_edge"_a, "results_on_device"_a, "worlds"_a)
       .def(
           "detect",
-          [](Detector& d, const py::array& t0, const py::array& t1) {
-            return to_dict(of_motion<&Detector::detect>(d, positions(t0), positions(t1)));
+          [](Detector& d, const GivenPositions& t0, const GivenPositions& t1) {
+            return to_dict(unlocked([&] { return d.detect(t0.positions, t1.positions); }));
           },
           "vertices_t0"_a, "vertices_t1"_a)
       .def(
           "detect_on_device",
-          [](Detector& d, std::uintptr_t t0, std::uintptr_t t1, std::size_t n, bool is_double) {
-            return to_dict(of_motion<&Detector::detect>(d, on_device(t0, n, is_double), on_device(t1, n, is_double)));
-          },
-          "pointer_t0"_a, "pointer_t1"_a, "n_vertices"_a, "is_double"_a)
-      .def(
-          "collision_free_step",
-          [](Detector& d, const py::array& t0, const py::array& t1) {
-            return of_motion<&Detector::collision_free_step>(d, positions(t0), positions(t1));
+          [](Detector& d, const GivenPositions& t0, const GivenPositions& t1) {
+            return to_dict(unlocked([&] { return d.detect_on_device(t0.positions, t1.positions); }),
+                           d.options().worlds);
           },
           "vertices_t0"_a, "vertices_t1"_a)
-      .def(
-          "collision_free_step_on_device",
-          [](Detector& d, std::uintptr_t t0, std::uintptr_t t1, std::size_t n, bool is_double) {
-            return of_motion<&Detector::collision_free_step>(d, on_device(t0, n, is_double),
-                                                             on_device(t1, n, is_double));
-          },
-          "pointer_t0"_a, "pointer_t1"_a, "n_vertices"_a, "is_double"_a)
       .def(
           "collision_free_steps",
-          [](Detector& d, const py::array& t0, const py::array& t1) {
-            return hand_over<double>(of_motion<&Detector::collision_free_steps>(d, positions(t0), positions(t1)));
+          [](Detector& d, const GivenPositions& t0, const GivenPositions& t1) {
+            return hand_over<double>(unlocked([&] { return d.collision_free_steps(t0.positions, t1.positions); }));
           },
           "vertices_t0"_a, "vertices_t1"_a)
       .def(
-          "collision_free_steps_on_device",
-          [](Detector& d, std::uintptr_t t0, std::uintptr_t t1, std::size_t n, bool is_double) {
-            return hand_over<double>(of_motion<&Detector::collision_free_steps>(d, on_device(t0, n, is_double),
-                                                                                on_device(t1, n, is_double)));
-          },
-          "pointer_t0"_a, "pointer_t1"_a, "n_vertices"_a, "is_double"_a)
-      .def(
           "proximity",
-          [](Detector& d, const py::array& vertices, double distance) {
-            return to_dict(of_snapshot(d, positions(vertices),
-                                       [&](Detector& on, Positions v) { return on.proximity(v, distance); }));
+          [](Detector& d, const GivenPositions& vertices, double distance) {
+            return to_dict(unlocked([&] { return d.proximity(vertices.positions, distance); }));
           },
           "vertices"_a, "distance"_a)
       .def(
           "proximity_on_device",
-          [](Detector& d, std::uintptr_t pointer, std::size_t n, bool is_double, double distance) {
-            return to_dict(of_snapshot(d, on_device(pointer, n, is_double),
-                                       [&](Detector& on, Positions v) { return on.proximity(v, distance); }));
+          [](Detector& d, const GivenPositions& vertices, double distance) {
+            return to_dict(unlocked([&] { return d.proximity_on_device(vertices.positions, distance); }),
+                           d.options().worlds);
           },
-          "pointer"_a, "n_vertices"_a, "is_double"_a, "distance"_a)
+          "vertices"_a, "distance"_a)
       .def(
           "intersections",
-          [](Detector& d, const py::array& vertices) {
-            return to_dict(
-                of_snapshot(d, positions(vertices), [](Detector& on, Positions v) { return on.intersections(v); }));
+          [](Detector& d, const GivenPositions& vertices) {
+            return to_dict(unlocked([&] { return d.intersections(vertices.positions); }));
           },
           "vertices"_a)
       .def(
           "intersections_on_device",
-          [](Detector& d, std::uintptr_t pointer, std::size_t n, bool is_double) {
-            return to_dict(of_snapshot(d, on_device(pointer, n, is_double),
-                                       [](Detector& on, Positions v) { return on.intersections(v); }));
-          },
-          "pointer"_a, "n_vertices"_a, "is_double"_a)
-      .def(
-          "distances",
-          [](Detector& d, const py::array& vertices) {
-            return to_list(
-                of_snapshot(d, positions(vertices), [](Detector& on, Positions v) { return on.distances(v); }));
+          [](Detector& d, const GivenPositions& vertices) {
+            return to_dict(unlocked([&] { return d.intersections_on_device(vertices.positions); }),
+                           d.options().worlds);
           },
           "vertices"_a)
       .def(
-          "distances_on_device",
-          [](Detector& d, std::uintptr_t pointer, std::size_t n, bool is_double) {
-            return to_list(of_snapshot(d, on_device(pointer, n, is_double),
-                                       [](Detector& on, Positions v) { return on.distances(v); }));
+          "distances",
+          [](Detector& d, const GivenPositions& vertices) {
+            return to_list(unlocked([&] { return d.distances(vertices.positions); }));
           },
-          "pointer"_a, "n_vertices"_a, "is_double"_a)
+          "vertices"_a)
       .def("set_separation", &Detector::set_separation, "mesh_a"_a, "mesh_b"_a, "separation"_a,
            py::call_guard<py::gil_scoped_release>())  // may wait for a call under way
       .def("cancel", &Detector::cancel)

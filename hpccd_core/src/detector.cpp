@@ -10,6 +10,7 @@
 #include "backends/available.h"
 #include "backends/tuner.h"
 #include "base/length.h"
+#include "gpu/results_to_device.h"
 
 namespace hpccd {
 namespace {
@@ -100,6 +101,30 @@ struct Detector::Impl {
     throw std::logic_error("the CPU has left a query to others");
   }
 
+  // Where results stay on the device. at_once(backend): there, or nothing where it failed; then what the CPU answers is
+  // brought there.
+  template <class AtOnce, class OnHost>
+  DeviceResults on_device(Positions t0, Positions t1, AtOnce&& at_once, OnHost&& on_host) {
+    check(t0, t1);
+    if (!shared.options.results_on_device)
+      throw InvalidArgument("results: this detector brings its results to the host");
+    const std::lock_guard lock(one_call);
+    cancellation().heed();
+    found.reset();
+    common.settle();
+    const gpu::CallersDevice callers;
+    shared.profiler.begin();
+    std::optional<DeviceResults> results;
+    if (backends.works(Backend::gpu)) results = at_once(backends.gpu());
+    last_backend = asked = results ? Backend::gpu : Backend::cpu;
+    if (!results) {
+      t0 = backends.on_host(t0, 0), t1 = backends.on_host(t1, 1);
+      results = gpu::to_device(on_host(backends.at(Backend::cpu), t0, t1), gpu::status().devices.at(0).number);
+    }
+    shared.profiler.end();
+    return *results;
+  }
+
   template <class Query>
   auto snapshot(Positions vertices, Query&& query) {
     return ask(vertices, vertices, [&](DetectionBackend& backend, Positions v, Positions, Counts& counts) {
@@ -139,6 +164,14 @@ Contacts Detector::detect(Positions t0, Positions t1) {
   return std::move(detection.contacts);
 }
 
+DeviceResults Detector::detect_on_device(Positions t0, Positions t1) {
+  DeviceResults r = impl_->on_device(
+      t0, t1, [&](GpuBackend& gpu) { return gpu.detect_on_device(t0, t1); },
+      [](DetectionBackend& cpu, Positions a, Positions b) { return cpu.detect(a, b).value().contacts; });
+  impl_->found = {{"vf_contacts", r.n_vf}, {"ee_contacts", r.n_ee}};
+  return r;
+}
+
 double Detector::collision_free_step(Positions t0, Positions t1) {
   return std::ranges::min(collision_free_steps(t0, t1));
 }
@@ -173,6 +206,23 @@ Intersections Detector::intersections(Positions vertices) {
     if (hits) found = {{"ef_intersections", hits->ef.size()}};
     return hits;
   });
+}
+
+DeviceResults Detector::proximity_on_device(Positions vertices, double distance) {
+  check_length("distance", distance);
+  DeviceResults r = impl_->on_device(
+      vertices, vertices, [&](GpuBackend& gpu) { return gpu.proximity_on_device(vertices, distance); },
+      [&](DetectionBackend& cpu, Positions v, Positions) { return as_proximity(cpu.proximity(v, distance).value()); });
+  impl_->found = {{"vf_near", r.n_vf}, {"ee_near", r.n_ee}};
+  return r;
+}
+
+DeviceResults Detector::intersections_on_device(Positions vertices) {
+  DeviceResults r = impl_->on_device(
+      vertices, vertices, [&](GpuBackend& gpu) { return gpu.intersections_on_device(vertices); },
+      [](DetectionBackend& cpu, Positions v, Positions) { return cpu.intersections(v).value(); });
+  impl_->found = {{"ef_intersections", r.n_ef}};
+  return r;
 }
 
 std::vector<Gap> Detector::distances(Positions vertices) {

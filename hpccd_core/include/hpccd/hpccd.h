@@ -8,6 +8,7 @@
 #include <limits>
 #include <map>
 #include <memory>
+#include <optional>
 #include <span>
 #include <stdexcept>
 #include <string>
@@ -106,6 +107,8 @@ struct Options {
   bool gpu_stages = false;
   // Of detect, collision_free_step and proximity. Intersections and smallest distances are of whole surfaces.
   TestedFeatures features;
+  // Of backend `gpu`: its results may be asked for on the device, which then decides all pairs that it can.
+  bool results_on_device = false;
   // So many copies of the scene, which know nothing of each other: positions hold all vertices of the first, then those
   // of the second, ... Each is answered as if it were alone, in every bit. 1 to most_worlds.
   std::uint32_t worlds = 1;
@@ -175,6 +178,29 @@ struct Positions {
   std::size_t n = 0;
   bool is_double = true;
   bool on_device = false;  // data is in a GPU's memory
+  // On a device: the stream (cudaStream_t) after whose work so far they are there; without one, after all of the
+  // device's.
+  std::optional<void*> made_on = std::nullopt;
+};
+
+// Results that stay in a GPU's memory, complete when the call returns; rows and order as in Contacts, Proximity and
+// Intersections. The memory is that of no later call while anybody holds it, and is taken again afterwards.
+struct DeviceResults {
+  std::shared_ptr<const void> memory;  // of all that follows
+  int device = -1;
+  std::uint64_t n_vf = 0, n_ee = 0, n_ef = 0;
+  const std::array<std::uint32_t, 2>* vf = nullptr;
+  const std::array<std::uint32_t, 4>* ee = nullptr;
+  const std::array<std::uint32_t, 3>* ef = nullptr;
+  const double* values = nullptr;  // times of contact, or distances: n_vf, then n_ee
+  // n_vf + n_ee rows; null unless asked for.
+  const std::array<double, 3>*points = nullptr, *normals = nullptr;
+  const std::array<std::array<double, 3>, 2>* closest = nullptr;
+  double first_toc = std::numeric_limits<double>::infinity();
+  std::uint64_t hash = 0;
+  // Of several worlds, else null: as in WorldSlices and Contacts::first_tocs.
+  const std::uint64_t *vf_offsets = nullptr, *ee_offsets = nullptr, *ef_offsets = nullptr, *hashes = nullptr;
+  const double* first_tocs = nullptr;
 };
 
 // One call at a time: of those that several threads make of one detector, each waits until the one before has ended.
@@ -200,6 +226,12 @@ class Detector {
   Proximity proximity(Positions vertices, double distance);
   // Edges and faces that share a point but no vertex.
   Intersections intersections(Positions vertices);
+
+  // The same three, whose results stay on the device, of a detector whose Options::results_on_device says so. What the
+  // CPU had to compute, after a failure of the device, is brought there. Throws std::runtime_error where that fails too.
+  DeviceResults detect_on_device(Positions vertices_t0, Positions vertices_t1);
+  DeviceResults proximity_on_device(Positions vertices, double distance);
+  DeviceResults intersections_on_device(Positions vertices);
   // The smallest distance of each enabled pair of meshes, by (mesh_a, mesh_b), mesh_a <= mesh_b. Of pairs of features
   // whose distances are the same double the first in order, vertex-face before edge-edge. Of several worlds those of the
   // first, then those of the second, ...: as many of each.

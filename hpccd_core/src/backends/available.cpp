@@ -25,17 +25,13 @@ AvailableBackends::AvailableBackends(Resources& shared) : cpu_(shared) {
   if (o.worlds == 1) return;
   memories_.emplace(o.worlds);
   worlds_on_cpus_.emplace(shared, cpu_, *memories_);
-  if (gpu_) worlds_on_gpu_.emplace(shared, *gpu_, nullptr, *memories_);
-  if (hybrid_) worlds_on_hybrid_.emplace(shared, *hybrid_, &cpu_, *memories_);
+  if (hybrid_) worlds_on_hybrid_.emplace(shared, *hybrid_, cpu_, *memories_);
 }
 
 DetectionBackend& AvailableBackends::at(Backend backend) {
-  if (worlds_on_cpus_) {
-    if (backend == Backend::gpu) return worlds_on_gpu_.value();
-    if (backend == Backend::hybrid) return worlds_on_hybrid_.value();
-    return *worlds_on_cpus_;
-  }
   if (backend == Backend::gpu) return gpu_.value();
+  if (worlds_on_cpus_ && backend == Backend::hybrid) return worlds_on_hybrid_.value();
+  if (worlds_on_cpus_) return *worlds_on_cpus_;
   if (backend == Backend::hybrid) return hybrid_.value();
   return cpu_;
 }

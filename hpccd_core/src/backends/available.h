@@ -21,6 +21,7 @@ class AvailableBackends {
 
   // It takes all worlds.
   DetectionBackend& at(Backend backend);
+  GpuBackend& gpu() { return gpu_.value(); }
   // Whether it is here, and its devices have not failed too often.
   bool works(Backend backend) const;
   bool use_devices() const { return gpu_ || hybrid_; }
@@ -37,10 +38,10 @@ class AvailableBackends {
   CpuBackend cpu_;
   std::optional<GpuBackend> gpu_;
   std::optional<HybridBackend> hybrid_;
-  // Of several worlds, what makes of each of them one that takes all.
+  // Of several worlds, what makes of those that take one backends that take all.
   std::optional<WorldMemories> memories_;
   std::optional<WorldsOnCpus> worlds_on_cpus_;
-  std::optional<OneByOne> worlds_on_gpu_, worlds_on_hybrid_;
+  std::optional<OneByOne> worlds_on_hybrid_;
 };
 
 }  // namespace hpccd

@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "backends/gpu_backend.h"
 
+#include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <limits>
 
 #include "backends/gpu_undecided.h"
+#include "backends/gpu_worlds.h"
+#include "backends/world_positions.h"
 #include "elementary/apart_until.h"
 #include "elementary/exact/intersection.h"
 #include "gpu/download.h"
@@ -52,13 +55,14 @@ auto GpuBackend::attempt(Compute&& compute) -> std::optional<decltype(compute())
 }
 
 std::optional<Detection> GpuBackend::detect(Positions t0, Positions t1) {
-  if (!t0.on_device && !t1.on_device) require_static_meshes_rest(*shared_.scene, t0, t1);
+  require_rest(t0, t1);
   return attempt([&] { return Detection{contacts(t0, t1), Backend::gpu}; });
 }
 
 std::optional<std::vector<double>> GpuBackend::earliest(Positions t0, Positions t1) {
-  if (!t0.on_device && !t1.on_device) require_static_meshes_rest(*shared_.scene, t0, t1);
-  return attempt([&] { return std::vector<double>{earliest_time(t0, t1)}; });
+  require_rest(t0, t1);
+  if (n_worlds() > 1) return attempt([&] { return earliest_times(t0, t1); });
+  return attempt([&] { return std::vector{earliest_time(t0, t1)}; });
 }
 
 std::optional<Contacts> GpuBackend::proximity(Positions vertices, double distance) {
@@ -69,16 +73,56 @@ std::optional<Intersections> GpuBackend::intersections(Positions vertices) {
   return attempt([&] { return pierced_faces(vertices); });
 }
 
+std::optional<DeviceResults> GpuBackend::detect_on_device(Positions t0, Positions t1) {
+  require_rest(t0, t1);
+  return attempt([&] {
+    run_contacts(t0, t1);
+    return on_device(finish_on_device());
+  });
+}
+
+std::optional<DeviceResults> GpuBackend::proximity_on_device(Positions vertices, double distance) {
+  return attempt([&] {
+    run_near_pairs(vertices, distance);
+    return on_device(finish_on_device());
+  });
+}
+
+std::optional<DeviceResults> GpuBackend::intersections_on_device(Positions vertices) {
+  return attempt([&] {
+    run_pierced_faces(vertices);
+    return on_device(finish_on_device());
+  });
+}
+
+// Those on a device are not looked at.
+void GpuBackend::require_rest(Positions t0, Positions t1) const {
+  if (t0.on_device || t1.on_device) return;
+  each_world([&](std::size_t k) { require_static_meshes_rest(*shared_.scene, of_world(t0, k), of_world(t1, k)); });
+}
+
+// f(world), whose errors name the world where there are several.
+template <class Function>
+void GpuBackend::each_world(Function&& f) const {
+  for (std::size_t k = 0; k < n_worlds(); ++k) try {
+      f(k);
+    } catch (const InvalidArgument& error) {
+      if (n_worlds() == 1) throw;
+      throw InvalidArgument(with_world(error.what(), k));
+    }
+}
+
 void GpuBackend::prepare_motion(Positions t0, Positions t1, bool until_best) {
   const SeparationTable& table = shared_.separations;
   prepare({table.any() ? gpu::Query::separations : gpu::Query::contacts, growth_of(table.most()), until_best},
-          [&] { shared_.tree.bound(on_host(t0, 0), on_host(t1, 1), {}); });
+          [&] { shared_.tree.bound(on_host(of_world(t0, 0), 0), on_host(of_world(t1, 0), 1), {}); });
 }
 
 // Throws where the device has found bad coordinates, and names them.
 void GpuBackend::require_good(bool good, Positions t0, Positions t1) {
   if (!good) {
-    MotionBounds().update(on_host(t0, 0), on_host(t1, 1), shared_.pool);
+    t0 = on_host(t0, 0), t1 = on_host(t1, 1);
+    each_world([&](std::size_t k) { MotionBounds().update(of_world(t0, k), of_world(t1, k), shared_.pool); });
     throw gpu::Error("the device found bad coordinates where the host finds none");
   }
   shared_.profiler.mark("gpu");
@@ -91,7 +135,7 @@ void GpuBackend::decide_motion(Positions t0, Positions t1, std::optional<double>
   std::atomic<bool> over{false};
   decide([&](const Candidate& u) -> std::optional<double> {
     if (over.load(std::memory_order_relaxed)) return std::nullopt;
-    const UndecidedPair pair = undecided_pair(shared_.features, separations, u, t0, t1);
+    const UndecidedPair pair = undecided(separations, u, t0, t1);
     if (until && stays_apart(pair, *until)) return std::nullopt;
     FallbackCounts counts;
     const auto time = pair.separation > 0 ? decide_separation(Accuracy::exact, pair, counts)
@@ -101,62 +145,140 @@ void GpuBackend::decide_motion(Positions t0, Positions t1, std::optional<double>
   });
 }
 
+// What was found is on the device, or decided by the CPU.
+void GpuBackend::run_contacts(Positions t0, Positions t1) {
+  const bool prunes = shared_.options.report == Report::first && shared_.rules.promise_times() && n_worlds() == 1;
+  prepare_motion(t0, t1, prunes);
+  const gpu::Pipeline::Best best =
+      prunes ? gpu::Pipeline::Best(std::numeric_limits<double>::infinity()) : std::nullopt;
+  require_good(pipeline_->run(t0, t1, best, shared_.pool), t0, t1);
+  decide_motion(t0, t1, std::nullopt);
+}
+
 Contacts GpuBackend::contacts(Positions t0, Positions t1) {
   const Options& o = shared_.options;
-  const bool first = o.report == Report::first && shared_.rules.promise_times();
-  prepare_motion(t0, t1, first);
-  const gpu::Pipeline::Best best = first ? gpu::Pipeline::Best(std::numeric_limits<double>::infinity()) : std::nullopt;
-  require_good(pipeline_->run(t0, t1, best, shared_.pool), t0, t1);
-  const Outputs outputs{o.points, o.normals, o.closest, AtTime::contact};
-  const bool places = o.points || o.normals || o.closest;
-  if (places) t0 = on_host(t0, 0), t1 = on_host(t1, 1);
-  decide_motion(t0, t1, std::nullopt);
-  Contacts found = join(finish(), decided_, shared_.features, shared_.pool);
-  reduce(found, o.report);
-  if (first) pipeline_->choose_hints(found.first_toc);
-  if (places) add_places(found, outputs, shared_.features, shared_.separations_now(), t0, t1, shared_.pool);
+  run_contacts(t0, t1);
+  Contacts found = finish_on_host(o.report);
+  if (last_boxes_.until_best) pipeline_->choose_hints(found.first_toc);
+  add_places(found, {o.points, o.normals, o.closest, AtTime::contact}, shared_.separations_now(), t0, t1);
   shared_.profiler.mark("contacts");
   return found;
 }
 
-Contacts GpuBackend::near_pairs(Positions vertices, double distance) {
+void GpuBackend::run_near_pairs(Positions vertices, double distance) {
   run_snapshot(gpu::Query::proximity, vertices, distance);
-  const bool places = shared_.options.closest;
-  if (places || !pipeline_->undecided().empty()) vertices = on_host(vertices, 0);
+  if (!pipeline_->undecided().empty()) vertices = on_host(vertices, 0);
   const Separations separations{distance};
   decide([&](const Candidate& u) {
-    const UndecidedPair pair = undecided_pair(shared_.features, separations, u, vertices, vertices);
+    const UndecidedPair pair = undecided(separations, u, vertices, vertices);
     FallbackCounts counts;
     return decide_proximity(accuracy_of(u), pair, counts);
   });
-  Contacts found = join(finish(), decided_, shared_.features, shared_.pool);
-  const Outputs outputs{false, false, places, AtTime::start};
-  if (places) add_places(found, outputs, shared_.features, separations, vertices, vertices, shared_.pool);
+}
+
+Contacts GpuBackend::near_pairs(Positions vertices, double distance) {
+  run_near_pairs(vertices, distance);
+  Contacts found = finish_on_host(Report::all);
+  add_places(found, {false, false, shared_.options.closest, AtTime::start}, {distance}, vertices, vertices);
   shared_.profiler.mark("contacts");
   return found;
 }
 
-Intersections GpuBackend::pierced_faces(Positions vertices) {
+void GpuBackend::run_pierced_faces(Positions vertices) {
   run_snapshot(gpu::Query::intersections, vertices, 0);
   if (!pipeline_->undecided().empty()) vertices = on_host(vertices, 0);
   decide([&](const Candidate& u) {
     Vec3<double> q[5];
-    edge_face_positions(shared_.features, u, vertices, q);
+    edge_face_positions(shared_.features, in_its_world(u), of_world(vertices, world_of(u)), q);
     return exact::intersect(q) ? std::optional(0.0) : std::nullopt;
   });
-  Intersections found = join_intersections(finish(), decided_, shared_.features);
+}
+
+Intersections GpuBackend::pierced_faces(Positions vertices) {
+  run_pierced_faces(vertices);
+  Intersections found = n_worlds() > 1 ? intersections_of(finish_on_device(), n_worlds())
+                                       : join_intersections(finish(), decided_, shared_.features);
   shared_.profiler.mark("contacts");
   return found;
 }
 
+// Of many worlds the device joins what the CPU has decided.
+Contacts GpuBackend::finish_on_host(Report report) {
+  if (n_worlds() > 1) return contacts_of(finish_on_device(), n_worlds(), shared_.pool);
+  Contacts found = join(finish(), decided_, shared_.features, shared_.pool);
+  reduce(found, report);
+  return found;
+}
+
+gpu::FrameResult GpuBackend::finish_on_device() {
+  if (!decided_.vertex_face.empty() || !decided_.edge_edge.empty())
+    pipeline_->add(decided_.vertex_face, decided_.edge_edge);
+  return finish();
+}
+
+DeviceResults GpuBackend::on_device(const gpu::FrameResult& f) {
+  DeviceResults r;
+  r.memory = f.memory, r.device = gpu::status().devices.at(0).number;
+  r.n_vf = f.n_vf, r.n_ee = f.n_ee, r.n_ef = f.n_ef;
+  r.vf = f.vf, r.ee = f.ee, r.ef = f.ef, r.values = f.toc;
+  r.vf_offsets = f.vf_offsets, r.ee_offsets = f.ee_offsets, r.ef_offsets = f.ef_offsets;
+  r.hashes = f.hashes, r.first_tocs = f.first_tocs;
+  r.hash = f.hash, r.first_toc = f.first_toc;
+  if (last_boxes_.until_best) pipeline_->choose_hints(r.first_toc);
+  if (n_worlds() > 1) {
+    std::vector<std::uint64_t> hashes(n_worlds());
+    gpu::download(f.hashes, hashes.data(), hashes.size() * sizeof hashes[0]);
+    r.hash = hash_of_worlds(hashes);
+    if (f.first_tocs) {
+      std::vector<double> times(n_worlds());
+      gpu::download(f.first_tocs, times.data(), times.size() * sizeof times[0]);
+      r.first_toc = std::ranges::min(times);
+    }
+  }
+  shared_.profiler.mark("contacts");
+  return r;
+}
+
+void GpuBackend::add_places(Contacts& found, Outputs outputs, const Separations& separations, Positions t0,
+                            Positions t1) {
+  if (!outputs.points && !outputs.normals && !outputs.closest) return;
+  const bool snapshot = t0.data == t1.data;
+  t0 = on_host(t0, 0), t1 = snapshot ? t0 : on_host(t1, 1);
+  if (n_worlds() == 1)
+    hpccd::add_places(found, outputs, shared_.features, separations, t0, t1, shared_.pool);
+  else
+    add_places_of_worlds(found, outputs, shared_.features, separations, t0, t1, shared_.pool);
+}
+
+std::size_t GpuBackend::world_of(const Candidate& pair) const {
+  const Features& f = shared_.features;
+  return pair.first / (pair.kind == Kind::edge_edge || last_boxes_.query == gpu::Query::intersections
+                           ? f.edges.size()
+                           : std::size_t{f.n_vertices});
+}
+
+Candidate GpuBackend::in_its_world(Candidate pair) const {
+  const Features& f = shared_.features;
+  const bool edge = pair.kind == Kind::edge_edge || last_boxes_.query == gpu::Query::intersections;
+  pair.first %= edge ? static_cast<std::uint32_t>(f.edges.size()) : f.n_vertices;
+  return pair;
+}
+
+UndecidedPair GpuBackend::undecided(const Separations& separations, const Candidate& pair, Positions t0,
+                                    Positions t1) const {
+  const std::size_t world = world_of(pair);
+  return undecided_pair(shared_.features, separations, in_its_world(pair), of_world(t0, world), of_world(t1, world));
+}
+
 void GpuBackend::prepare_snapshot(gpu::Query query, Positions vertices, double distance) {
-  prepare({query, growth_of(distance), false}, [&] { shared_.tree.bound(on_host(vertices, 0)); });
+  prepare({query, growth_of(distance), false}, [&] { shared_.tree.bound(on_host(of_world(vertices, 0), 0)); });
 }
 
 void GpuBackend::run_snapshot(gpu::Query query, Positions vertices, double distance) {
   prepare_snapshot(query, vertices, distance);
   if (!pipeline_->run_snapshot(query, vertices, distance, shared_.pool)) {
-    MotionBounds().update(*shared_.scene, on_host(vertices, 0), shared_.pool);  // throws, and names the coordinate
+    vertices = on_host(vertices, 0);
+    each_world([&](std::size_t k) { MotionBounds().update(*shared_.scene, of_world(vertices, k), shared_.pool); });
     throw gpu::Error("the device found bad coordinates where the host finds none");
   }
   shared_.profiler.mark("gpu");
@@ -167,8 +289,8 @@ template <class Bound>
 void GpuBackend::prepare(Boxes boxes, Bound&& bound) {
   if (!pipeline_) {
     pipeline_ =
-        gpu::Pipeline::create(*shared_.scene, shared_.features, shared_.options.accuracy, shared_.options.features,
-                              shared_.separations, gpu::status().devices.at(0).number, shared_.options.gpu_stages);
+        gpu::Pipeline::create(*shared_.scene, shared_.features, shared_.options, shared_.separations,
+                              gpu::status().devices.at(0).number);
     shared_.profiler.mark("gpu_start");
   }
   const bool worn = has_tree_ && worn_out_on_device();
@@ -210,8 +332,9 @@ gpu::FrameResult GpuBackend::finish() {
   return found;
 }
 
-Accuracy GpuBackend::accuracy_of(const Candidate& pair) const {
+Accuracy GpuBackend::accuracy_of(const Candidate& of) const {
   const Features& f = shared_.features;
+  const Candidate pair = in_its_world(of);
   const bool edges = pair.kind == Kind::edge_edge;
   const std::uint32_t first = edges ? f.edges[pair.first][0] : pair.first;
   const std::uint32_t second = edges ? f.edges[pair.second][0] : f.faces[pair.second][0];

@@ -10,8 +10,10 @@
 
 #include "backends/backend.h"
 #include "backends/gpu_contacts.h"
+#include "backends/gpu_undecided.h"
 #include "backends/near_list.h"
 #include "backends/resources.h"
+#include "backends/world_positions.h"
 #include "gpu/device.h"
 #include "gpu/pipeline.h"
 
@@ -26,6 +28,10 @@ class GpuBackend final : public DetectionBackend {
   std::optional<std::vector<double>> earliest(Positions t0, Positions t1) override;
   std::optional<Contacts> proximity(Positions vertices, double distance) override;
   std::optional<Intersections> intersections(Positions vertices) override;
+  // The same for results that stay on the device.
+  std::optional<DeviceResults> detect_on_device(Positions t0, Positions t1);
+  std::optional<DeviceResults> proximity_on_device(Positions vertices, double distance);
+  std::optional<DeviceResults> intersections_on_device(Positions vertices);
   void add_stages(std::map<std::string, double>& stages) const override;
 
   // Host arrays with the same positions. which: 0 or 1, the place where a copy is kept.
@@ -46,15 +52,29 @@ class GpuBackend final : public DetectionBackend {
 
   template <class Compute>
   auto attempt(Compute&& compute) -> std::optional<decltype(compute())>;
+  std::size_t n_worlds() const { return shared_.options.worlds; }
+  Positions of_world(Positions all, std::size_t world) const {
+    return hpccd::of_world(all, shared_.features.n_vertices, world);
+  }
+  template <class Function>
+  void each_world(Function&& f) const;
+  std::size_t world_of(const Candidate& pair) const;
+  Candidate in_its_world(Candidate pair) const;
+  UndecidedPair undecided(const Separations& separations, const Candidate& pair, Positions t0, Positions t1) const;
+  void require_rest(Positions t0, Positions t1) const;
+  void run_contacts(Positions t0, Positions t1);
   Contacts contacts(Positions t0, Positions t1);
   double earliest_time(Positions t0, Positions t1);
+  std::vector<double> earliest_times(Positions t0, Positions t1);
   double run_for_earliest(Positions t0, Positions t1, gpu::Pipeline::Pairs pairs, gpu::Pipeline::Best best);
   bool list_near_pairs(Positions t0, double time, const Travel& travel);
   Travel travel_of_frame() const;
   void prepare_motion(Positions t0, Positions t1, bool until_best);
   void require_good(bool good, Positions t0, Positions t1);
   void decide_motion(Positions t0, Positions t1, std::optional<double> until);
+  void run_near_pairs(Positions vertices, double distance);
   Contacts near_pairs(Positions vertices, double distance);
+  void run_pierced_faces(Positions vertices);
   Intersections pierced_faces(Positions vertices);
   void prepare_snapshot(gpu::Query query, Positions vertices, double distance);
   void run_snapshot(gpu::Query query, Positions vertices, double distance);
@@ -64,6 +84,10 @@ class GpuBackend final : public DetectionBackend {
   template <class Decide>
   void decide(Decide&& decide);
   gpu::FrameResult finish();
+  gpu::FrameResult finish_on_device();
+  Contacts finish_on_host(Report report);
+  DeviceResults on_device(const gpu::FrameResult& found);
+  void add_places(Contacts& found, Outputs outputs, const Separations& separations, Positions t0, Positions t1);
   Accuracy accuracy_of(const Candidate& pair) const;
 
   Resources& shared_;

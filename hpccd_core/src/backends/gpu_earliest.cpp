@@ -32,6 +32,21 @@ double GpuBackend::earliest_time(Positions t0, Positions t1) {
   return time;
 }
 
+// Where a world is alone its search is pruned: the times are the same.
+std::vector<double> GpuBackend::earliest_times(Positions t0, Positions t1) {
+  prepare_motion(t0, t1, false);
+  require_good(pipeline_->run_for_earliest(t0, t1, Pairs::all, std::nullopt, shared_.pool), t0, t1);
+  std::vector<double> times = pipeline_->earliest_of_worlds();
+  decide_motion(t0, t1, std::nullopt);
+  for (const auto* list : {&decided_.vertex_face, &decided_.edge_edge})
+    for (const Contact& c : *list) {
+      const Kind kind = list == &decided_.edge_edge ? Kind::edge_edge : Kind::vertex_face;
+      double& time = times[world_of({c.first, c.second, kind})];
+      time = std::min(time, c.toc);
+    }
+  return times;
+}
+
 double GpuBackend::run_for_earliest(Positions t0, Positions t1, Pairs pairs, gpu::Pipeline::Best best) {
   require_good(pipeline_->run_for_earliest(t0, t1, pairs, best, shared_.pool), t0, t1);
   double time = pipeline_->earliest().time;

@@ -8,11 +8,10 @@ namespace hpccd {
 
 bool OneByOne::each_world(const Ask& ask) {
   counts_.clear(), stages_.clear();
-  if (beside_) beside_->begin_worlds();
+  beside_.begin_worlds();
   for (std::size_t k = 0; k < n_worlds(); ++k) {
     shared_.cancellation.heed();
-    std::optional<WorldVisit> visit;
-    if (beside_) visit.emplace(*beside_, memories_, k);
+    const WorldVisit visit(beside_, memories_, k);
     if (!ask(one_, k)) return false;
     add_counts();
   }
@@ -35,7 +34,7 @@ void OneByOne::add_counts() {
 
 void OneByOne::count(std::map<std::string, std::uint64_t>& stats) const {
   for (const auto& [name, n] : counts_) stats[name] += n;
-  if (beside_) beside_->count(stats);
+  beside_.count(stats);
   stats["bytes"] += memories_.bytes();
 }
 

@@ -12,8 +12,8 @@ namespace hpccd {
 
 class OneByOne final : public WorldByWorld {
  public:
-  // `beside`: the CPU backend that works beside the device, with its memories of the worlds; null: none does.
-  OneByOne(Resources& shared, DetectionBackend& one, CpuBackend* beside, WorldMemories& memories)
+  // `beside`: the CPU backend that works beside the device, with its memories of the worlds.
+  OneByOne(Resources& shared, DetectionBackend& one, CpuBackend& beside, WorldMemories& memories)
       : WorldByWorld(shared), one_(one), beside_(beside), memories_(memories) {}
 
   void count(std::map<std::string, std::uint64_t>& stats) const override;
@@ -24,7 +24,7 @@ class OneByOne final : public WorldByWorld {
   void add_counts();
 
   DetectionBackend& one_;
-  CpuBackend* beside_;
+  CpuBackend& beside_;
   WorldMemories& memories_;
   std::map<std::string, std::uint64_t> counts_;  // of the device, for all worlds
   std::map<std::string, double> stages_;

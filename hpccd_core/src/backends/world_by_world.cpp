@@ -5,19 +5,12 @@
 #include <string>
 #include <utility>
 
+#include "backends/world_positions.h"
 #include "base/spin_lock.h"
 #include "contacts/worlds.h"
 
 namespace hpccd {
 namespace {
-
-// "vertices_t1[17, 2] is NaN" of world 3 is vertices_t1[3, 17, 2].
-std::string with_world(std::string text, std::size_t world) {
-  for (const char* name : {"vertices_t0[", "vertices_t1["})
-    if (const std::size_t at = text.find(name); at != std::string::npos)
-      return text.insert(at + std::string(name).size(), std::to_string(world) + ", ");
-  return "world " + std::to_string(world) + ": " + text;
-}
 
 // The first bad world is the one that is named, however the worlds are spread over threads.
 class FirstBadWorld {
@@ -43,10 +36,7 @@ class FirstBadWorld {
 }  // namespace
 
 Positions WorldByWorld::of_world(Positions all, std::size_t world) const {
-  const std::size_t n = shared_.features.n_vertices, row = 3 * (all.is_double ? sizeof(double) : sizeof(float));
-  all.data = static_cast<const std::byte*>(all.data) + world * n * row;
-  all.n = n;
-  return all;
+  return hpccd::of_world(all, shared_.features.n_vertices, world);
 }
 
 // True: each world has its answer.

@@ -11,16 +11,19 @@
 
 namespace hpccd::gpu {
 
+// The same number of blocks for each world.
 template <class T>
 __global__ void extent_kernel(LaunchParams<T> params) {
   double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
   bool bad = false;
-  const u32 stride = gridDim.x * blockDim.x, own = blockIdx.x * blockDim.x + threadIdx.x;
+  const u32 all = gridDim.x * blockDim.x, own = blockIdx.x * blockDim.x + threadIdx.x;
   if (params.n_of_group)
-    for (u32 i = own; i < params.n_vertices + params.n_edges; i += stride) params.n_of_group[i] = 0;
-  for (u32 i = own; i < params.n_vertices; i += stride)
+    for (u32 i = own; i < params.all_vertices() + params.all_edges(); i += all) params.n_of_group[i] = 0;
+  const u32 blocks = gridDim.x / params.n_worlds, world = blockIdx.x / blocks;
+  const u64 base = static_cast<u64>(world) * params.n_vertices;
+  for (u32 i = (blockIdx.x - world * blocks) * blockDim.x + threadIdx.x; i < params.n_vertices; i += blocks * blockDim.x)
     for (int k = 0; k < 3; ++k) {
-      const double a = params.given_t0[3 * static_cast<u64>(i) + k], b = params.given_t1[3 * static_cast<u64>(i) + k];
+      const double a = params.given_t0[3 * (base + i) + k], b = params.given_t1[3 * (base + i) + k];
       bad = bad || !(fabs(a) <= params.largest) || !(fabs(b) <= params.largest);
       low[k] = fmin(low[k], fmin(a, b));
       high[k] = fmax(high[k], fmax(a, b));
@@ -40,8 +43,8 @@ __global__ void extent_kernel(LaunchParams<T> params) {
   const u32 k = threadIdx.x;
   for (u32 w = 0; w < n_warps; ++w)
     low[0] = fmin(w ? low[0] : INFINITY, part[w][k]), high[0] = fmax(w ? high[0] : -INFINITY, part[w][3 + k]);
-  atomicMax(&params.counters->extent_low[k], ~ordered_bits(low[0]));
-  atomicMax(&params.counters->extent_high[k], ordered_bits(high[0]));
+  atomicMax(&params.worlds[world].extent_low[k], ~ordered_bits(low[0]));
+  atomicMax(&params.worlds[world].extent_high[k], ordered_bits(high[0]));
 }
 
 __device__ inline void set_ends(GivenEnds<float>& r, const float* a, const float* b) {
@@ -65,14 +68,16 @@ __device__ double extent_of(const T* from, const T* to) {
   return length;
 }
 
-// backends/short_edge.cpp, by one block: whose length has the right number below it says what follows.
+// backends/short_edge.cpp, a block a world: whose length has the right number below it says what follows.
 template <class T>
-__device__ void see_whether_floats_suffice(const LaunchParams<T>& params) {
+__global__ void floats_suffice_kernel(LaunchParams<T> params) {
   __shared__ double lengths[2 * edges_of_a_step];
   const EdgeSample sample = EdgeSample::of(params.n_edges, edges_of_a_step);
+  const u64 base = static_cast<u64>(blockIdx.x) * params.n_vertices;
+  WorldCounters& world = params.worlds[blockIdx.x];
   for (std::size_t i = threadIdx.x; i < sample.count; i += blockDim.x) {
     const uint2 edge = params.edges[i * sample.stride];
-    const u64 a = 3 * static_cast<u64>(edge.x), b = 3 * static_cast<u64>(edge.y);
+    const u64 a = 3 * (base + edge.x), b = 3 * (base + edge.y);
     lengths[i] =
         fmin(extent_of(params.given_t0 + a, params.given_t0 + b), extent_of(params.given_t1 + a, params.given_t1 + b));
   }
@@ -81,19 +86,19 @@ __device__ void see_whether_floats_suffice(const LaunchParams<T>& params) {
     std::size_t below = 0;
     for (std::size_t j = 0; j < sample.count; ++j)
       below += lengths[j] < lengths[i] || (lengths[j] == lengths[i] && j < i);
-    if (below == sample.short_one())
-      params.counters->floats_suffice = floats_suffice(lengths[i], SceneExtent(*params.counters).map().scale);
+    if (below != sample.short_one() || !floats_suffice(lengths[i], SceneExtent(world).map().scale)) continue;
+    world.floats_suffice = 1;
+    atomicAdd(&params.counters->floats_suffice, u64{1});
   }
 }
 
 // kdops: of a frame that asks for them.
 template <bool snapshot, bool kdops, class T>
 __global__ void vertices_kernel(LaunchParams<T> params) {
-  if constexpr (kdops)
-    if (params.fast && blockIdx.x == 0) see_whether_floats_suffice(params);
   const u32 i = blockIdx.x * blockDim.x + threadIdx.x;
-  if (i >= params.n_vertices) return;
-  const SceneExtent extent(*params.counters);
+  if (i >= params.all_vertices()) return;
+  const u32 world = params.by_vertices(i);
+  const SceneExtent extent(params.worlds[world]);
   const CoordinateMap map = extent.map();
   const double largest = extent.largest();
   const double part = params.until_best ? until(params) : 1;
@@ -105,7 +110,7 @@ __global__ void vertices_kernel(LaunchParams<T> params) {
     point.at[1].x[k] = part < 1 ? place_at(part, map.precise(a[k], k), map.precise(b[k], k)) : map(b[k], k);
   }
   const double separation =
-      params.largest_separation ? params.largest_separation[params.mesh_of_vertex[i]] : params.separation;
+      params.largest_separation ? params.largest_separation[params.mesh_of_vertex[i - world * params.n_vertices]] : params.separation;
   const float reach = reach_on_device(separation, map.scale, largest);
   point.at[0].tag = __float_as_uint(reach);
   point.at[1].tag = __float_as_uint(part < 1 ? reach + lost_by_place : reach);

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "bvh/tree.h"
-#include "gpu/launch_params.cuh"
+#include "gpu/leaf_features.cuh"
 
 namespace hpccd::gpu {
 
@@ -18,7 +18,7 @@ struct CandidateQueue {
 };
 
 struct CandidateSpace : CandidateQueue {
-  // Features of the two leaves that overlap the other leaf, and their numbers. The four words of a box lie apart, so
+  // Features of the two leaves that overlap the other leaf, and their numbers in their world. The four words of a box lie apart, so
   // that neighbouring lanes read neighbouring words.
   Bound bound[2][4][3 * Tree::leaf_size];
   u32 number[2][3 * Tree::leaf_size];
@@ -36,55 +36,58 @@ struct CandidateSpace : CandidateQueue {
 
 // Edges of a leaf that overlap the leaf `other`, one after the other in list `side`.
 template <Query query, class T>
-__device__ u32 stage_edges(const LaunchParams<T>& params, const DeviceLeaf& l, u32 other, CandidateSpace& s, u32 side) {
-  const u32 lane = lane_number(), slot = l.first_edge + lane;
+__device__ u32 stage_edges(const LaunchParams<T>& params, const LeafCorners& l, u32 other, CandidateSpace& s,
+                           u32 side) {
+  const u32 lane = lane_number();
+  bool near = lane < l.leaf.n_edges();
+  const LeafFeature edge = near ? load_feature(params.leaf_edges, l.leaf.first_edge + lane) : LeafFeature{0, 0};
+  const VertexNumbers v = vertices_of_corners(l, edge.corners);
   DeviceBox b;
-  bool near = lane < l.n_edges();
   if (near) {
-    b = load_box(&params.edge_boxes[slot]);
+    b = feature_box(params, v, false);
     near = overlap<query>(b, load_box(&params.leaf_boxes[other]));
   }
   const u32 mask = __ballot_sync(all_lanes, near), at = __popc(mask & ((1u << lane) - 1));
   if (near) {
     s.put(side, at, b);
-    s.number[side][at] = __ldg(&params.edge_of_slot[slot]);
+    s.number[side][at] = edge.number;
   }
   return __popc(mask);
 }
 
 template <Query query, class T>
-__device__ u32 stage_vertices(const LaunchParams<T>& params, const DeviceLeaf& l, u32 other, CandidateSpace& s) {
+__device__ u32 stage_vertices(const LaunchParams<T>& params, const LeafCorners& l, u32 other, CandidateSpace& s) {
   const u32 lane = lane_number();
   DeviceBox b;
-  u32 v = 0;
-  bool near = lane < l.n_vertices();
+  bool near = lane < l.leaf.n_vertices();
   if (near) {
-    v = __ldg(&params.vertex_of_slot[l.first_vertex + lane]);
-    b = load_point<grows_boxes(query)>(&params.points[v]);
+    b = load_point<grows_boxes(query)>(&params.points[l.corner]);
     near = overlap<query>(b, load_box(&params.leaf_boxes[other]));
   }
   const u32 mask = __ballot_sync(all_lanes, near), at = __popc(mask & ((1u << lane) - 1));
   if (near) {
-    b.tag_low() = v;
+    b.tag_low() = l.corner;
     s.put(0, at, b);
   }
   return __popc(mask);
 }
 
 template <Query query, class T>
-__device__ u32 stage_faces(const LaunchParams<T>& params, const DeviceLeaf& l, u32 other, CandidateSpace& s) {
-  const u32 lane = lane_number(), slot = l.first_face + lane;
+__device__ u32 stage_faces(const LaunchParams<T>& params, const LeafCorners& l, u32 other, CandidateSpace& s) {
+  const u32 lane = lane_number();
+  bool near = lane < l.leaf.n_faces();
+  const LeafFeature face = near ? load_feature(params.leaf_faces, l.leaf.first_face + lane) : LeafFeature{0, 0};
+  const VertexNumbers v = vertices_of_corners(l, face.corners);
   DeviceBox b;
-  bool near = lane < l.n_faces();
   if (near) {
-    b = load_box(&params.face_boxes[slot]);
+    b = feature_box(params, v, true);
     near = overlap<query>(b, load_box(&params.leaf_boxes[other]));
   }
   const u32 mask = __ballot_sync(all_lanes, near), at = __popc(mask & ((1u << lane) - 1));
   if (near) {
     s.put(1, at, b);
-    s.corner2[at] = __ldg(&params.face_corner2[slot]);
-    s.number[1][at] = __ldg(&params.face_of_slot[slot]);
+    s.corner2[at] = v[2];
+    s.number[1][at] = face.number;
   }
   return __popc(mask);
 }

@@ -101,8 +101,10 @@ struct LanePair {
 // i / n for i < 1024 and n <= 32: exact, since the error i (magic n - 65536) / (65536 n) stays below 1 / n.
 __device__ inline u32 magic_of(u32 n) { return (65536 + n - 1) / n; }
 
+// first_edge: the number of their world's first one.
 template <Query query>
-__device__ __forceinline__ LanePair edge_pair(const CandidateSpace& s, u32 i, u32 j, bool same, bool valid) {
+__device__ __forceinline__ LanePair edge_pair(const CandidateSpace& s, u32 first_edge, u32 i, u32 j, bool same,
+                                              bool valid) {
   LanePair c{valid && (!same || i < j), {0, 0, 0, 0}, {0, 0}};
   if (!c.wanted) return c;
   const u32 side = same ? 0 : 1;
@@ -113,7 +115,7 @@ __device__ __forceinline__ LanePair edge_pair(const CandidateSpace& s, u32 i, u3
   const uint2 ends_a{a.tag_low(), a.tag_high()}, ends_b{b.tag_low(), b.tag_high()};
   const uint2 lower = x < y ? ends_a : ends_b, upper = x < y ? ends_b : ends_a;
   c.vertices = span_ends<Kind::edge_edge>(lower.x, lower.y, upper.x, upper.y);
-  c.features = {x < y ? x : y, (x < y ? y : x) | kind_bit};
+  c.features = {first_edge + (x < y ? x : y), (x < y ? y : x) | kind_bit};
   return c;
 }
 
@@ -131,14 +133,15 @@ __device__ __forceinline__ LanePair vertex_face_pair(const CandidateSpace& s, u3
 
 // Intersections have no order of edge and face to choose.
 template <Query query>
-__device__ __forceinline__ LanePair edge_face_pair(const CandidateSpace& s, u32 i, u32 j, bool valid) {
+__device__ __forceinline__ LanePair edge_face_pair(const CandidateSpace& s, u32 first_edge, u32 i, u32 j,
+                                                   bool valid) {
   LanePair c{valid, {0, 0, 0, 0}, {0, 0}};
   if (!valid) return c;
   const DeviceBox edge = s.box(0, i), face = s.box(1, j);
   const u32 f[3] = {face.tag_low(), face.tag_high(), s.corner2[j]};
   c.wanted = overlap<query>(edge, face);
   for (const u32 v : f) c.wanted = c.wanted && edge.tag_low() != v && edge.tag_high() != v;
-  c.features = {s.number[0][i], s.number[1][j]};
+  c.features = {first_edge + s.number[0][i], s.number[1][j]};
   return c;
 }
 
@@ -147,9 +150,12 @@ __device__ __forceinline__ LanePair edge_face_pair(const CandidateSpace& s, u32 
 template <Query query, class T>
 __device__ __forceinline__ uint2 stage_phase(const LaunchParams<T>& params, CandidateSpace& s, uint2 pair, u32 phase) {
   constexpr bool edges_and_faces = query == Query::intersections;
-  const bool same = pair.x == pair.y, swapped = phase == (edges_and_faces ? 1 : 2);
-  const u32 x = swapped ? pair.y : pair.x, y = swapped ? pair.x : pair.y;
-  const DeviceLeaf a = params.leaves[x], b = params.leaves[y];
+  const u32 world = world_of_leaves(params, pair), first_leaf = world * params.n_leaves;
+  const uint2 own{pair.x - first_leaf, pair.y};
+  const bool same = own.x == own.y, swapped = phase == (edges_and_faces ? 1 : 2);
+  const u32 x = first_leaf + (swapped ? own.y : own.x), y = first_leaf + (swapped ? own.x : own.y);
+  const LeafCorners a = leaf_corners(params, swapped ? own.y : own.x, world),
+                    b = leaf_corners(params, swapped ? own.x : own.y, world);
   u32 n_first;
   if constexpr (edges_and_faces) {
     n_first = stage_edges<query>(params, a, y, s, 0);
@@ -168,10 +174,11 @@ template <Query query, class T>
 __device__ __forceinline__ void leaf_pair_candidates(const LaunchParams<T>& params, CandidateSpace& s,
                                                      CandidateState& state, uint2 pair) {
   constexpr bool edges_and_faces = query == Query::intersections;
-  const bool same = pair.x == pair.y;
+  const u32 world = world_of_leaves(params, pair), own = pair.x - world * params.n_leaves;
+  const bool same = own == pair.y;
   u32 phase = 0, end = (same ? 2 : 3) - (edges_and_faces ? 1 : 0);
   if constexpr (!edges_and_faces) {
-    const u32 tested = tested_features(params, pair);
+    const u32 tested = tested_features(params, params.leaves[own], params.leaves[pair.y]);
     if (!(tested & tests_edge_edge)) phase = 1;
     if (!(tested & tests_vertex_face)) end = 1;
   }
@@ -185,9 +192,10 @@ __device__ __forceinline__ void leaf_pair_candidates(const LaunchParams<T>& para
       const u32 c = base + lane_number(), i = c * magic >> 16, j = c - i * n.y;
       LanePair pushed;
       if constexpr (edges_and_faces)
-        pushed = edge_face_pair<query>(s, i, j, c < total);
+        pushed = edge_face_pair<query>(s, world * params.n_edges, i, j, c < total);
       else
-        pushed = phase == 0 ? edge_pair<query>(s, i, j, same, c < total) : vertex_face_pair<query>(s, i, j, c < total);
+        pushed = phase == 0 ? edge_pair<query>(s, world * params.n_edges, i, j, same, c < total)
+                            : vertex_face_pair<query>(s, i, j, c < total);
       const u32 mask = __ballot_sync(all_lanes, pushed.wanted);
       const u32 at = state.n + __popc(mask & ((1u << lane_number()) - 1));
       if (pushed.wanted) {

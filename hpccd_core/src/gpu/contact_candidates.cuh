@@ -20,9 +20,9 @@ __device__ inline u32 quotient(u32 i, u32 n) {
   return static_cast<u32>((static_cast<float>(i) + 0.5f) * __frcp_rn(static_cast<float>(n)));
 }
 
-// same: of a leaf with itself, where pairs of edges come twice.
-__device__ __forceinline__ LanePair staged_pair(const StagedLeaves& s, const StagedPairs& of, u32 c, bool edges,
-                                                bool same) {
+// first_edge: the number of their world's first one. same: of a leaf with itself, where pairs of edges come twice.
+__device__ __forceinline__ LanePair staged_pair(const StagedLeaves& s, const StagedPairs& of, u32 first_edge, u32 c,
+                                                bool edges, bool same) {
   const u32 i = quotient(c, of.n_second), j = c - i * of.n_second;
   LanePair pair{!edges || !same || i < j, {0, 0, 0, 0}, {0, 0}};
   if (!pair.wanted) return pair;
@@ -36,7 +36,7 @@ __device__ __forceinline__ LanePair staged_pair(const StagedLeaves& s, const Sta
     const u32 own = s.first_number[x];
     const bool ordered = own < number;
     pair.vertices = ordered ? span_ends<Kind::edge_edge>(a0, a1, b0, b1) : span_ends<Kind::edge_edge>(b0, b1, a0, a1);
-    pair.features = {ordered ? own : number, (ordered ? number : own) | kind_bit};
+    pair.features = {first_edge + (ordered ? own : number), (ordered ? number : own) | kind_bit};
   } else {
     pair.vertices = span_ends<Kind::vertex_face>(a0, b0, b1, b2);
     pair.features = {a0, number};
@@ -47,13 +47,16 @@ __device__ __forceinline__ LanePair staged_pair(const StagedLeaves& s, const Sta
 template <class Policy, class T>
 __device__ __forceinline__ void contact_candidates(const LaunchParams<T>& params, StagedLeaves& s,
                                                    CandidateState& state, uint2 leaves) {
-  const bool same = leaves.x == leaves.y;
-  const u32 tested = tested_features(params, leaves);
-  const DeviceLeaf a = params.leaves[leaves.x], b = params.leaves[leaves.y];
+  const u32 world = world_of_leaves(params, leaves), first_leaf = world * params.n_leaves;
+  const u32 x = leaves.x, y = first_leaf + leaves.y;
+  const bool same = x == y;
+  const LeafCorners a = leaf_corners(params, x - first_leaf, world), b = leaf_corners(params, leaves.y, world);
+  const u32 tested = tested_features(params, a.leaf, b.leaf);
   StagedCounts n;
-  stage_edges_and_faces<0>(params, s, a, leaves.y, tested, n);
-  stage_edges_and_faces<1>(params, s, b, leaves.x, tested, n);
-  stage_both_vertices(params, s, a, b, leaves, tested, n);
+  stage_edges_and_faces<0>(params, s, a, y, tested, n);
+  stage_edges_and_faces<1>(params, s, b, x, tested, n);
+  stage_vertices_of<0>(params, s, a, y, tested, n);
+  stage_vertices_of<1>(params, s, b, x, tested, n);
   __syncwarp();
   const StagedPairs edge_edge{0, 0, n.edges[0], n.edges[1]};
   const StagedPairs vertex_face[2] = {
@@ -68,7 +71,7 @@ __device__ __forceinline__ void contact_candidates(const LaunchParams<T>& params
     const StagedPairs of = edges ? edge_edge : other ? vertex_face[1] : vertex_face[0];
     const u32 begin = edges ? 0 : other ? until_other : n_edges;
     LanePair pushed{false, {0, 0, 0, 0}, {0, 0}};
-    if (c < total) pushed = staged_pair(s, of, c - begin, edges, same);
+    if (c < total) pushed = staged_pair(s, of, world * params.n_edges, c - begin, edges, same);
     const u32 mask = __ballot_sync(all_lanes, pushed.wanted);
     if (pushed.wanted) {
       const u32 at = state.n + __popc(mask & ((1u << lane_number()) - 1));
@@ -81,11 +84,15 @@ __device__ __forceinline__ void contact_candidates(const LaunchParams<T>& params
   __syncwarp();
 }
 
+// Of a fast frame, whether the pair is one for this kernel: floats suffice for some worlds, for others not.
+template <class Policy, class T>
+__device__ bool is_for(const LaunchParams<T>& params, u32 world) {
+  return !params.fast || (params.worlds[world].floats_suffice != 0) == std::is_same_v<Policy, Likely>;
+}
+
 template <class Policy, class T>
 __global__ __launch_bounds__(32 * candidate_warps,
                              6) void contact_candidates_kernel(const __grid_constant__ LaunchParams<T> params) {
-  if constexpr (std::is_same_v<Policy, Likely>)
-    if (!params.counters->floats_suffice) return;
   __shared__ StagedLeaves spaces[candidate_warps];
   StagedLeaves& s = spaces[threadIdx.x / 32];
   CandidateState state;
@@ -96,8 +103,12 @@ __global__ __launch_bounds__(32 * candidate_warps,
       return uint2{__shfl_sync(all_lanes, ahead.x, k), __shfl_sync(all_lanes, ahead.y, k)};
     };
     u32 near = (1u << (end - begin)) - 1;
-    for (u32 k = 0; k < 8; ++k)
-      if (leaf_kdops_apart(params, pair(k))) near &= ~(1u << k);
+    for (u32 k = 0; k < 8; ++k) {
+      const uint2 leaves = pair(k);
+      const u32 world = world_of_leaves(params, leaves);
+      if (leaf_kdops_apart(params, {leaves.x, world * params.n_leaves + leaves.y}) || !is_for<Policy>(params, world))
+        near &= ~(1u << k);
+    }
 #pragma unroll 1
     for (; near; near &= near - 1) contact_candidates<Policy>(params, s, state, pair(__ffs(near) - 1));
   });

@@ -14,10 +14,18 @@ using u64 = unsigned long long;
 // The device's integers have one or two limbs a coordinate, as the CPU's of fixed size.
 inline constexpr int integer_sizes = 2;
 
-struct Counters {
+// Of one world.
+struct WorldCounters {
   u64 extent_low[3], extent_high[3];  // largest of the ordered bits, low ones negated: zero is neutral
-  u64 bad;                            // coordinates that are not acceptable
   u64 floats_suffice;                 // of a fast frame: whether (scene/edge_sample.h)
+  // Of the results; first_toc is the complement of the bits of the earliest time, first_key that of the first key.
+  u64 hash, first_toc, first_key;
+};
+
+struct Counters {
+  WorldCounters world;  // of the first one; others have theirs elsewhere
+  u64 bad;              // coordinates that are not acceptable
+  u64 floats_suffice;   // of a fast frame: in how many worlds
   u64 node_tests;
   u64 leaf_pairs, next_leaf_pair;
   u64 survivors[2], single[2], many[2], separated[2];                                        // of the segment at work
@@ -30,8 +38,8 @@ struct Counters {
   u64 apart[2], proven_near[2], undecided_near[2];      // of the tests that know a distance
   u64 found[2];                                         // by kind, after the fallback on the device
   u64 found_all, undecided, open_in_integers[integer_sizes], to_host;
-  u64 hash, first_toc;     // of the results: first_toc as `soonest`
-  u64 most_of_a_feature;   // pairs, where it comes first
+  u64 rows[2];            // of the results, by kind
+  u64 most_of_a_feature;  // rows with the same first one
   u64 soonest, soonest_proven;  // complements of the bits of earliest times
   u64 way, away;                // bits of the longest ways of a coordinate (device_near_list.cuh)
   u64 listed[2];

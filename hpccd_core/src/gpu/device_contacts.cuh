@@ -5,21 +5,26 @@
 #include <algorithm>
 #include <array>
 #include <utility>
+#include <vector>
 
 #include "gpu/ordering.cuh"
 #include "gpu/pipeline.h"
 #include "gpu/result_rows.cuh"
 #include "gpu/sort.h"
-#include "gpu/stream.h"
+#include "gpu/stages.cuh"
 
 namespace hpccd::gpu {
 
 class DeviceContacts {
  public:
-  // n_groups: vertices and edges.
-  DeviceContacts(u32 key_bits, std::size_t n_groups)
-      : key_bits_(static_cast<int>(key_bits)), n_groups_(n_groups), rows_(std::make_shared<RowsIn<PinnedMemory>>()) {
-    if (n_groups >= 0x7FFFFFFF) throw Error("2^31 or more vertices and edges; use backend=\"cpu\"");
+  // n_groups: vertices and edges of all worlds. on_device: rows stay there, and are handed out.
+  DeviceContacts(u32 key_bits, std::size_t n_groups, u32 n_worlds, bool on_device)
+      : key_bits_(static_cast<int>(key_bits)),
+        n_groups_(n_groups),
+        n_worlds_(n_worlds),
+        on_device_(on_device),
+        rows_(std::make_shared<RowsIn<PinnedMemory>>()) {
+    if (n_groups >= 0x7FFFFFFF) throw Error("2^31 or more vertices and edges in all worlds; use backend=\"cpu\"");
     n_of_group_.reserve(n_groups + 1);
     check(cudaMemset(n_of_group_.data(), 0, n_of_group_.bytes()), "cudaMemset");
     first_of_group_.reserve(n_groups + 1);
@@ -44,101 +49,164 @@ class DeviceContacts {
     return true;
   }
 
-  // ordered: the frame wants results, not only what was found.
+  // Places for the rows of one more frame.
+  void begin() {
+    if (on_device_) rows_ = nullptr, rows_ = pool_.take();
+    if (n_worlds_ > 1) rows_->reserve_worlds(n_worlds_);
+  }
+  // counted: pairs are counted as they are found.
   template <class T>
-  void fill(LaunchParams<T>& params, bool ordered) const {
+  void fill(LaunchParams<T>& params, bool counted) const {
     params.found_keys = keys_.data(), params.found_tocs = tocs_.data(), params.found_capacity = capacity_;
-    params.n_of_group = ordered ? n_of_group_.data() : nullptr;
+    params.n_of_group = counted && params.wanted == Wanted::all ? n_of_group_.data() : nullptr;
   }
 
   // After all that finds contacts: brings them in order, and writes them out if there is room for them.
   template <class T>
-  void launch(Query query, const LaunchParams<T>& params, int multiprocessors, cudaStream_t stream, StageTimer& timer) {
+  void launch(Query query, const LaunchParams<T>& params, const Stages& stages) {
+    if (params.wanted != Wanted::all) launch_firsts(params, stages);
+    if (!params.n_of_group) {
+      check(cudaMemsetAsync(n_of_group_.data(), 0, n_of_group_.bytes(), stages.stream), "cudaMemsetAsync");
+      count_kernel<<<blocks(stages), 256, 0, stages.stream>>>(params, n_of_group_.data());
+      check_launch("count_kernel");
+    }
     sum_before(sum_workspace_.data(), sum_workspace_.bytes(), n_of_group_.data(), first_of_group_.data(),
-               static_cast<int>(n_groups_ + 1), stream);
-    place_kernel<<<static_cast<unsigned>(4 * multiprocessors), 256, 0, stream>>>(params, first_of_group_.data(),
-                                                                                 placed_.data());
+               static_cast<int>(n_groups_ + 1), stages.stream);
+    place_kernel<<<blocks(stages), 256, 0, stages.stream>>>(params, n_of_group_.data(), first_of_group_.data(),
+                                                            placed_.data());
     check_launch("place_kernel");
-    timer.mark("sort", stream);
-    launch_results(query, params, multiprocessors, stream, timer);
+    stages.mark("sort");
+    launch_results(query, params, stages);
   }
 
-  // When the host has the counters: whether they must be written out again, now that there is room, or keys are sorted.
-  // Then the counters change once more.
+  // The earliest time of each world, of all that was found.
   template <class T>
-  bool complete(Query query, const LaunchParams<T>& params, const Counters& c, int multiprocessors, cudaStream_t stream,
-                StageTimer& timer) {
+  void launch_firsts(const LaunchParams<T>& params, const Stages& stages) {
+    firsts_kernel<<<blocks(stages), 256, 0, stages.stream>>>(params);
+    check_launch("firsts_kernel");
+  }
+
+  // When the host has the counters: true where rows had to be written out once more, now that there is room or keys
+  // are sorted. Then the counters change again.
+  template <class T>
+  bool complete(Query query, const LaunchParams<T>& params, const Counters& c, const Stages& stages) {
     const auto roomy = [](u64 x) { return static_cast<std::size_t>(x + x / 4 + 1024); };
-    const ResultPlaces to = rows_->places();
     const bool sorts = c.most_of_a_feature > most_of_a_feature;
-    bool short_of_room = false;
+    bool fits = true;
     if (query == Query::intersections) {
-      if ((short_of_room = c.found_all > to.most_ef)) rows_->reserve_intersections(roomy(c.found_all));
-    } else if ((short_of_room = c.found[0] > to.most_vf || c.found[1] > to.most_ee)) {
-      rows_->reserve(roomy(c.found[0]), roomy(c.found[1]));
+      if (fits = fit<true>(c, rows_->places()); !fits) rows_->reserve_intersections(roomy(c.rows[0] + c.rows[1]));
+    } else {
+      if (fits = fit<false>(c, rows_->places()); !fits) rows_->reserve(roomy(c.rows[0]), roomy(c.rows[1]));
     }
     if (sorts)
-      launch_sorted(query, params, static_cast<int>(c.found_all), multiprocessors, stream, timer);
-    else if (short_of_room)
-      launch_results(query, params, multiprocessors, stream, timer);
-    return sorts || short_of_room;
+      launch_sorted(query, params, static_cast<int>(c.found_all), stages);
+    else if (!fits)
+      launch_results(query, params, stages);
+    return sorts || !fits;
+  }
+
+  // Behind the n that were found; waits for the stream.
+  void append(std::size_t n, const std::vector<u64>& keys, const std::vector<double>& tocs, cudaStream_t stream) {
+    const std::size_t more = keys.size();
+    if (n + more > capacity_) {
+      std::vector<u64> all_keys(n);
+      std::vector<double> all_tocs(n);
+      copy(all_keys.data(), keys_.data(), n, cudaMemcpyDeviceToHost, stream);
+      copy(all_tocs.data(), tocs_.data(), n, cudaMemcpyDeviceToHost, stream);
+      reserve(n + more);
+      copy(keys_.data(), all_keys.data(), n, cudaMemcpyHostToDevice, stream);
+      copy(tocs_.data(), all_tocs.data(), n, cudaMemcpyHostToDevice, stream);
+    }
+    copy(keys_.data() + n, keys.data(), more, cudaMemcpyHostToDevice, stream);
+    copy(tocs_.data() + n, tocs.data(), more, cudaMemcpyHostToDevice, stream);
+  }
+
+  template <class T>
+  void forget_results(const LaunchParams<T>& params, cudaStream_t stream) const {
+    forget_results_kernel<<<blocks_for(n_worlds_, 256), 256, 0, stream>>>(params);
+    check_launch("forget_results_kernel");
   }
 
   // When the stream has come to its end.
   FrameResult result(Query query, const Counters& c) const {
     const ResultPlaces from = rows_->places();
     FrameResult r;
-    r.hash = c.hash;
+    if (on_device_) r.memory = rows_;
+    r.hash = c.world.hash;
+    if (n_worlds_ > 1) {
+      const auto given = [](const u64* p) { return reinterpret_cast<const std::uint64_t*>(p); };
+      r.vf_offsets = given(from.vf_offsets), r.ee_offsets = given(from.ee_offsets), r.hashes = given(from.hashes);
+      r.first_tocs = from.first_tocs;
+    }
     if (query == Query::intersections) {
-      r.n_ef = c.found_all;
+      r.n_ef = c.rows[0] + c.rows[1];
+      r.ef_offsets = std::exchange(r.vf_offsets, nullptr), r.ee_offsets = nullptr, r.first_tocs = nullptr;
       r.ef = reinterpret_cast<const std::array<u32, 3>*>(from.ef);
       return r;
     }
-    r.n_vf = c.found[0], r.n_ee = c.found[1];
+    r.n_vf = c.rows[0], r.n_ee = c.rows[1];
     r.vf = reinterpret_cast<const std::array<u32, 2>*>(from.vf);
     r.ee = reinterpret_cast<const std::array<u32, 4>*>(from.ee);
     r.toc = from.toc;
+    if (c.world.first_toc) r.first_toc = std::bit_cast<double>(~c.world.first_toc);
     return r;
   }
 
   std::size_t bytes() const {
     return keys_.bytes() + tocs_.bytes() + placed_.bytes() + n_of_group_.bytes() + first_of_group_.bytes() +
-           sum_workspace_.bytes() + sorted_keys_.bytes() + numbers_.bytes() + order_.bytes() + sort_workspace_.bytes() +
-           rows_->device_bytes();
+           sum_workspace_.bytes() + sortable_keys_.bytes() + sorted_keys_.bytes() + numbers_.bytes() + order_.bytes() +
+           sort_workspace_.bytes() + pool_.device_bytes();
   }
 
  private:
-  template <class T>
-  void launch_results(Query query, const LaunchParams<T>& params, int multiprocessors, cudaStream_t stream,
-                      StageTimer& timer) {
-    const auto kernel = query == Query::intersections ? results_kernel<true, T> : results_kernel<false, T>;
-    kernel<<<static_cast<unsigned>(8 * multiprocessors), 128, 0, stream>>>(params, first_of_group_.data(),
-                                                                           placed_.data(), rows_->places());
-    check_launch("results_kernel");
-    timer.mark("results", stream);
+  static unsigned blocks(const Stages& stages) { return 4 * static_cast<unsigned>(stages.multiprocessors); }
+
+  template <class X>
+  static void copy(X* to, const X* from, std::size_t n, cudaMemcpyKind kind, cudaStream_t stream) {
+    check(cudaMemcpyAsync(to, from, n * sizeof(X), kind, stream), "cudaMemcpyAsync");
+    check(cudaStreamSynchronize(stream), "cudaStreamSynchronize");
   }
 
   template <class T>
-  void launch_sorted(Query query, const LaunchParams<T>& params, int n, int multiprocessors, cudaStream_t stream,
-                     StageTimer& timer) {
+  void launch_results(Query query, const LaunchParams<T>& params, const Stages& stages) {
+    const auto kernel = query == Query::intersections ? results_kernel<true, T> : results_kernel<false, T>;
+    kernel<<<2 * blocks(stages), 128, 0, stages.stream>>>(params, first_of_group_.data(), placed_.data(),
+                                                          rows_->places());
+    check_launch("results_kernel");
+    launch_worlds(query, params, stages);
+    stages.mark("results");
+  }
+
+  template <class T>
+  void launch_worlds(Query query, const LaunchParams<T>& params, const Stages& stages) {
+    if (n_worlds_ == 1) return;
+    const auto kernel = query == Query::intersections ? worlds_kernel<true, T> : worlds_kernel<false, T>;
+    kernel<<<blocks_for(n_worlds_ + 1, 256), 256, 0, stages.stream>>>(params, first_of_group_.data(), rows_->places());
+    check_launch("worlds_kernel");
+  }
+
+  template <class T>
+  void launch_sorted(Query query, const LaunchParams<T>& params, int n, const Stages& stages) {
     const auto size = static_cast<std::size_t>(n);
-    sorted_keys_.reserve(size), numbers_.reserve(size), order_.reserve(size);
-    sort_workspace_.reserve(sort_workspace(n, key_bits_));
-    number_kernel<<<blocks_for(size, 256), 256, 0, stream>>>(numbers_.data(), static_cast<u32>(n));
-    check_launch("number_kernel");
-    sort_pairs(sort_workspace_.data(), sort_workspace_.bytes(), keys_.data(), sorted_keys_.data(), numbers_.data(),
-               order_.data(), n, key_bits_, stream);
-    timer.mark("sort", stream);
+    sortable_keys_.reserve(size), sorted_keys_.reserve(size), numbers_.reserve(size), order_.reserve(size);
+    sort_workspace_.reserve(sort_workspace(n, key_bits_ + 1));
+    sortable_kernel<<<blocks(stages), 256, 0, stages.stream>>>(params, sortable_keys_.data(), numbers_.data());
+    check_launch("sortable_kernel");
+    sort_pairs(sort_workspace_.data(), sort_workspace_.bytes(), sortable_keys_.data(), sorted_keys_.data(),
+               numbers_.data(), order_.data(), n, key_bits_ + 1, stages.stream);
+    stages.mark("sort");
     const auto kernel =
         query == Query::intersections ? sorted_results_kernel<true, T> : sorted_results_kernel<false, T>;
-    kernel<<<static_cast<unsigned>(8 * multiprocessors), 128, 0, stream>>>(params, sorted_keys_.data(), order_.data(),
-                                                                           rows_->places());
+    kernel<<<2 * blocks(stages), 128, 0, stages.stream>>>(params, sorted_keys_.data(), order_.data(), rows_->places());
     check_launch("sorted_results_kernel");
-    timer.mark("results", stream);
+    launch_worlds(query, params, stages);
+    stages.mark("results");
   }
 
   const int key_bits_;
   const std::size_t n_groups_;
+  const u32 n_worlds_;
+  const bool on_device_;
   std::size_t capacity_ = 0;  // of what is found
   DeviceBuffer<u64> keys_;
   DeviceBuffer<double> tocs_;
@@ -146,9 +214,10 @@ class DeviceContacts {
   DeviceBuffer<u32> n_of_group_, first_of_group_;
   DeviceBuffer<unsigned char> sum_workspace_;
   // Where a feature has more than most_of_a_feature.
-  DeviceBuffer<u64> sorted_keys_;
+  DeviceBuffer<u64> sortable_keys_, sorted_keys_;
   DeviceBuffer<u32> numbers_, order_;
   DeviceBuffer<unsigned char> sort_workspace_;
+  DeviceRowsPool pool_;
   std::shared_ptr<ResultRows> rows_;
 };
 

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// The leaves of a hierarchy on the device: which features lie in each, and this frame's boxes of all of them.
+// The leaves of a hierarchy on the device: which features lie in each, and this frame's boxes of them, in each world.
 #pragma once
 
+#include <algorithm>
 #include <vector>
 
 #include "bvh/tree.h"
@@ -13,36 +14,47 @@ namespace hpccd::gpu {
 
 class DeviceLeaves {
  public:
+  explicit DeviceLeaves(u32 n_worlds) : n_worlds_(n_worlds) {}
+
   // Slots may be padded.
   void set(const Features& features, const std::vector<LeafRange>& leaves, const std::vector<u32>& face_of_slot,
            const std::vector<u32>& edge_of_slot, const std::vector<u32>& vertex_of_slot) {
     n_ = 0;  // none, should anything below fail
-    const std::size_t n_edges = features.edges.size(), n_faces = features.faces.size();
-    std::vector<DeviceLeaf> packed(leaves.size());
-    for (std::size_t i = 0; i < leaves.size(); ++i) {
-      const LeafRange& l = leaves[i];
-      packed[i] = {l.first_face, l.first_edge, l.first_vertex,
-                   DeviceLeaf::counts_of(l.n_faces(), l.n_edges(), l.n_vertices())};
+    std::vector<DeviceLeaf> packed;
+    std::vector<u32> corners;
+    std::vector<LeafFeature> edges(features.edges.size()), faces(features.faces.size());
+    packed.reserve(leaves.size());
+    for (const LeafRange& l : leaves) {
+      const auto first_corner = static_cast<u32>(corners.size());
+      const auto place = [&](u32 vertex) {
+        const auto at = std::find(corners.begin() + first_corner, corners.end(), vertex);
+        const auto k = static_cast<u32>(at - corners.begin()) - first_corner;
+        if (at == corners.end()) corners.push_back(vertex);
+        return k;
+      };
+      for (u32 s = l.first_vertex; s < l.end_vertex; ++s) corners.push_back(vertex_of_slot[s]);
+      for (u32 s = l.first_face; s < l.end_face; ++s) {
+        const auto& f = features.faces[face_of_slot[s]];
+        const u32 a = place(f[0]), b = place(f[1]), c = place(f[2]);
+        faces[s] = {face_of_slot[s], a | b << 8 | c << 16};
+      }
+      for (u32 s = l.first_edge; s < l.end_edge; ++s) {
+        const auto& e = features.edges[edge_of_slot[s]];
+        const u32 a = place(e[0]), b = place(e[1]);
+        edges[s] = {edge_of_slot[s], a | b << 8};
+      }
+      const auto n_corners = static_cast<u32>(corners.size()) - first_corner;
+      if (n_corners > 32) throw Error("a leaf has more corners than a warp has lanes; use backend=\"cpu\"");
+      packed.push_back({first_corner, l.first_edge, l.first_face,
+                        DeviceLeaf::counts_of(n_corners, l.n_edges(), l.n_faces(), l.n_vertices())});
     }
-    std::vector<DeviceBox> edge(n_edges), face(n_faces);
-    std::vector<u32> corner2(n_faces);
-    for (std::size_t s = 0; s < n_edges; ++s) {
-      const auto& e = features.edges[edge_of_slot[s]];
-      edge[s].tag_low() = e[0], edge[s].tag_high() = e[1];
-    }
-    for (std::size_t s = 0; s < n_faces; ++s) {
-      const auto& corners = features.faces[face_of_slot[s]];
-      face[s].tag_low() = corners[0], face[s].tag_high() = corners[1], corner2[s] = corners[2];
-    }
-    boxes_.reserve(std::max<std::size_t>(leaves.size(), 1));
-    kdops_.reserve(std::max<std::size_t>(leaves.size(), 1));
+    const std::size_t boxes = std::max<std::size_t>(leaves.size() * n_worlds_, 1);
+    boxes_.reserve(boxes);
+    kdops_.reserve(boxes);
     upload(leaves_, packed.data(), packed.size());
-    upload(vertex_of_slot_, vertex_of_slot.data(), features.n_vertices);
-    upload(edge_of_slot_, edge_of_slot.data(), n_edges);
-    upload(face_of_slot_, face_of_slot.data(), n_faces);
-    upload(face_corner2_, corner2.data(), n_faces);
-    upload(edge_boxes_, edge.data(), n_edges);
-    upload(face_boxes_, face.data(), n_faces);
+    upload(corners_, corners.data(), corners.size());
+    upload(edges_, edges.data(), edges.size());
+    upload(faces_, faces.data(), faces.size());
     n_ = static_cast<u32>(leaves.size());
   }
 
@@ -50,24 +62,25 @@ class DeviceLeaves {
 
   template <class T>
   void fill(LaunchParams<T>& params) const {
-    params.n_leaves = n_, params.leaves = leaves_.data(), params.leaf_boxes = boxes_.data();
-    params.leaf_kdops = kdops_.data();
-    params.vertex_of_slot = vertex_of_slot_.data(), params.edge_of_slot = edge_of_slot_.data();
-    params.face_of_slot = face_of_slot_.data(), params.face_corner2 = face_corner2_.data();
-    params.edge_boxes = edge_boxes_.data(), params.face_boxes = face_boxes_.data();
+    params.n_leaves = n_;
+    params.by_leaves = n_worlds_ > 1 ? Division::by(n_) : Division{0};
+    params.leaves = leaves_.data(), params.corners = corners_.data();
+    params.leaf_edges = edges_.data(), params.leaf_faces = faces_.data();
+    params.leaf_boxes = boxes_.data(), params.leaf_kdops = kdops_.data();
   }
 
   std::size_t bytes() const {
-    return boxes_.bytes() + kdops_.bytes() + edge_boxes_.bytes() + face_boxes_.bytes() + leaves_.bytes() + vertex_of_slot_.bytes() +
-           edge_of_slot_.bytes() + face_of_slot_.bytes() + face_corner2_.bytes();
+    return boxes_.bytes() + kdops_.bytes() + leaves_.bytes() + corners_.bytes() + edges_.bytes() + faces_.bytes();
   }
 
  private:
+  const u32 n_worlds_;
   u32 n_ = 0;
-  DeviceBuffer<DeviceBox> boxes_, edge_boxes_, face_boxes_;
-  DeviceBuffer<Kdop> kdops_;
   DeviceBuffer<DeviceLeaf> leaves_;
-  DeviceBuffer<u32> vertex_of_slot_, edge_of_slot_, face_of_slot_, face_corner2_;
+  DeviceBuffer<u32> corners_;
+  DeviceBuffer<LeafFeature> edges_, faces_;
+  DeviceBuffer<DeviceBox> boxes_;
+  DeviceBuffer<Kdop> kdops_;
 };
 
 }  // namespace hpccd::gpu

@@ -30,7 +30,7 @@ class DevicePositions {
       }
       given[i] = static_cast<const T*>(ends[i].data);
       const bool on_device = ends[i].on_device;
-      if (on_device && (bytes == 0 || settled_device(given[i]) == device_)) continue;
+      if (on_device && (bytes == 0 || settled_device(ends[i], stream) == device_)) continue;
       given_[i].reserve(words);
       given[i] = reinterpret_cast<const T*>(given_[i].data());
       if (on_device) {
@@ -44,6 +44,7 @@ class DevicePositions {
       for (int i = 0; i < 2; ++i)
         if (to[i]) std::memcpy(to[i] + begin, static_cast<const char*>(ends[i].data) + begin, end - begin);
     };
+    if (!to[0] && !to[1]) return;
     if (bytes < (std::size_t{1} << 19))
       copy(0, bytes, 0);
     else
@@ -56,12 +57,17 @@ class DevicePositions {
   std::size_t bytes() const { return given_[0].bytes() + given_[1].bytes(); }
 
  private:
-  // The device on which an array of the caller lies. Its producer may still be at work on a stream of its own: it is
-  // not when this returns.
-  int settled_device(const void* array) const {
+  // The device on which an array of the caller lies. Its producer may still be at work: the stream's later work waits
+  // for it, or it has ended when this returns.
+  int settled_device(const Positions& array, cudaStream_t stream) {
     cudaPointerAttributes a;
-    check(cudaPointerGetAttributes(&a, array), "cudaPointerGetAttributes");
+    check(cudaPointerGetAttributes(&a, array.data), "cudaPointerGetAttributes");
     const int where = a.type == cudaMemoryTypeDevice ? a.device : device_;
+    if (array.made_on && where == device_) {
+      check(cudaEventRecord(made_, static_cast<cudaStream_t>(*array.made_on)), "cudaEventRecord");
+      check(cudaStreamWaitEvent(stream, made_, 0), "cudaStreamWaitEvent");
+      return where;
+    }
     check(cudaSetDevice(where), "cudaSetDevice");
     check(cudaDeviceSynchronize(), "cudaDeviceSynchronize");
     check(cudaSetDevice(device_), "cudaSetDevice");
@@ -69,6 +75,7 @@ class DevicePositions {
   }
 
   const int device_;
+  Event made_;
   PinnedBuffer<double> staging_[2];
   DeviceBuffer<double> given_[2];
 };

@@ -2,6 +2,7 @@
 // What stays on the device as long as the scene: features, meshes, rules between them, and how pairs are numbered.
 #pragma once
 
+#include <algorithm>
 #include <vector>
 
 #include "gpu/device.h"
@@ -16,22 +17,27 @@ class DeviceScene {
  public:
   // On the current device. Throws Error where the scene has too many features for 31-bit numbers.
   DeviceScene(const Scene& scene, const Features& features, Accuracy accuracy, TestedFeatures tested,
-              const SeparationTable& separations)
-      : features_(features), separations_(separations) {
+              const SeparationTable& separations, u32 n_worlds)
+      : features_(features), separations_(separations), n_worlds_(n_worlds) {
     const auto n_edges = features.edges.size();
-    if (features.n_vertices >= kind_bit || n_edges >= kind_bit || features.n_faces() >= kind_bit)
-      throw Error("the scene has 2^31 or more features of one kind; use backend=\"cpu\"");
+    if (std::max<std::size_t>({features.n_vertices, n_edges, features.n_faces()}) * n_worlds >= kind_bit)
+      throw Error("the scene has 2^31 or more features of one kind in all worlds; use backend=\"cpu\"");
     upload(edges_, features.edges.data(), n_edges);
     upload(faces_, features.faces.data(), 3 * features.faces.size());
     upload(mesh_of_vertex_, features.mesh_of_vertex.data(), features.mesh_of_vertex.size());
     upload_rules(scene, accuracy);
     upload_tested(scene, tested);
-    keys_ = PairKeys::of(features.n_vertices, n_edges, features.n_faces());
+    keys_ = PairKeys::of(features.n_vertices, n_edges, features.n_faces(), n_worlds);
   }
 
   template <class T>
   void fill(LaunchParams<T>& params) const {
+    params.n_worlds = n_worlds_;
     params.n_vertices = features_.n_vertices, params.n_edges = static_cast<u32>(features_.edges.size());
+    if (n_worlds_ > 1) {
+      params.by_vertices = Division::by(std::max(params.n_vertices, 1u));
+      params.by_edges = Division::by(std::max(params.n_edges, 1u));
+    }
     params.edges = edges_.data(), params.faces = faces_.data(), params.mesh_of_vertex = mesh_of_vertex_.data();
     params.n_meshes = n_meshes_;
     params.enabled = all_enabled_ ? nullptr : enabled_.data();
@@ -39,7 +45,6 @@ class DeviceScene {
     params.default_accuracy = default_accuracy_;
     params.features = one_tested_ ? nullptr : tested_.data();
     params.default_features = default_tested_;
-    params.fits_edges = test_edges_;
     params.keys = keys_;
   }
 
@@ -100,19 +105,19 @@ class DeviceScene {
         const TestedFeatures f = scene.pair_features(a, b, otherwise);
         tested[std::size_t{a} * n_meshes_ + b] = bits(f);
         one_tested_ = one_tested_ && f == otherwise;
-        test_edges_ = test_edges_ || (f.edge_edge && scene.pair_enabled(a, b));
       }
     upload(tested_, tested.data(), tested.size());
   }
 
   const Features& features_;
   const SeparationTable& separations_;
+  const u32 n_worlds_;
   std::uint64_t uploaded_ = 0;  // version of the separations there
   DeviceBuffer<uint2> edges_;
   DeviceBuffer<u32> faces_, mesh_of_vertex_;
   DeviceBuffer<unsigned char> enabled_, accuracy_, tested_;
   DeviceBuffer<double> pair_separation_, largest_separation_;
-  bool all_enabled_ = true, one_accuracy_ = true, all_fast_ = true, one_tested_ = true, test_edges_ = false;
+  bool all_enabled_ = true, one_accuracy_ = true, all_fast_ = true, one_tested_ = true;
   unsigned char default_tested_ = 0;
   u32 n_meshes_ = 0;
   PairKeys keys_;

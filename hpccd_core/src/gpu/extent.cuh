@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How far the scene reaches in a frame, as the counters have it, and the map of its coordinates that follows.
+// How far a world reaches in a frame, as its counters have it, and the map of its coordinates that follows.
 #pragma once
 
 #include "bvh/coordinate_map.h"
@@ -19,7 +19,7 @@ __device__ inline double from_ordered_bits(u64 b) {
 struct SceneExtent {
   double low[3], high[3];
 
-  __device__ explicit SceneExtent(const Counters& c) {
+  __device__ explicit SceneExtent(const WorldCounters& c) {
     for (int k = 0; k < 3; ++k)
       low[k] = from_ordered_bits(~c.extent_low[k]), high[k] = from_ordered_bits(c.extent_high[k]);
   }

@@ -35,14 +35,24 @@ struct alignas(64) GivenEnds<double> {
 // What is tested between two meshes: a bit for each kind, by its number.
 inline constexpr u32 tests_vertex_face = 1, tests_edge_edge = 2;
 
+// Of a leaf, the same in all worlds. Its corners are its own vertices, then the others of its triangles: features name
+// them by their place among these.
 struct alignas(16) DeviceLeaf {
-  u32 first_face, first_edge, first_vertex;
+  u32 first_corner, first_edge, first_face;
   u32 counts;
 
-  static u32 counts_of(u32 faces, u32 edges, u32 vertices) { return faces | edges << 8 | vertices << 16; }
-  HPCCD_HD u32 n_faces() const { return counts & 0xFF; }
+  static u32 counts_of(u32 corners, u32 edges, u32 faces, u32 vertices) {
+    return corners | edges << 8 | faces << 16 | vertices << 24;
+  }
+  HPCCD_HD u32 n_corners() const { return counts & 0xFF; }
   HPCCD_HD u32 n_edges() const { return counts >> 8 & 0xFF; }
-  HPCCD_HD u32 n_vertices() const { return counts >> 16; }
+  HPCCD_HD u32 n_faces() const { return counts >> 16 & 0xFF; }
+  HPCCD_HD u32 n_vertices() const { return counts >> 24; }
+};
+
+// An edge or a face of a leaf: its number, and the places of its two or three corners, 8 bits each.
+struct alignas(8) LeafFeature {
+  u32 number, corners;
 };
 
 // Pairs of leaves, or of features of one kind. How many there are stands in the counters, which count on where the
@@ -52,10 +62,25 @@ struct PairList {
   u64 capacity;
 };
 
+// The quotient of numbers below 2^32 by one below 2^31: m = ceil(2^63 / d) is off by less than d, so n m / 2^63 by less
+// than 1 / d.
+struct Division {
+  u64 magic;  // 0: every quotient is 0
+
+  static Division by(u32 d) { return {((u64{1} << 63) + d - 1) / d}; }
+  __device__ u32 operator()(u32 n) const { return static_cast<u32>(__umul64hi(magic, u64{n} << 1)); }
+};
+
+// Which of what is found are results, of each world.
+enum class Wanted : unsigned char { all, earliest, first };
+
 template <class T>
 struct LaunchParams {
-  // The scene.
+  // The scene, once for all its worlds. Vertices, edges and leaves are numbered through all of them, where they are of
+  // a motion, or the first of a pair; of the scene itself, or the second of a pair, in one.
+  u32 n_worlds;
   u32 n_vertices, n_edges;
+  Division by_vertices, by_edges, by_nodes, by_leaves;  // to the world of a number; 0 where there is one world
   const uint2* edges;
   const u32* faces;  // three vertices each
   const u32* mesh_of_vertex;
@@ -71,20 +96,18 @@ struct LaunchParams {
   const double* separations;         // n_meshes^2
   const double* largest_separation;  // of each mesh, where there is a table
 
-  // The tree: topology, and boxes of this frame.
+  // The tree: topology, and this frame's boxes of each world.
   u32 n_nodes, n_leaves;
-  DeviceBox* node_boxes;  // tags: left child (0: leaf), last leaf of the subtree
+  const uint2* node_links;  // left child (0: leaf), last leaf of the subtree
   const u32* node_mesh;
   const u32* node_parent;
-  u32* node_arrivals;
-  bool fits_edges;  // whether anybody looks at this frame's boxes of edges
-  DeviceBox* leaf_boxes;
   const u32* leaf_nodes;
   const DeviceLeaf* leaves;
-  const u32 *vertex_of_slot, *edge_of_slot, *face_of_slot;
-  DeviceBox* edge_boxes;  // tags: the two vertices
-  DeviceBox* face_boxes;  // tags: the first two corners
-  const u32* face_corner2;
+  const u32* corners;  // vertices
+  const LeafFeature *leaf_edges, *leaf_faces;
+  DeviceBox* node_boxes;  // tags: the links
+  u32* node_arrivals;
+  DeviceBox* leaf_boxes;
 
   // This frame's motion.
   const T *given_t0, *given_t1;
@@ -96,7 +119,8 @@ struct LaunchParams {
   bool fast;
   VertexKdop* kdops;
   Kdop* leaf_kdops;
-  bool in_floats;  // and which floats suffice for: the host's guess, before the counters say so
+  // Whether there are worlds for which floats suffice, and others: the host's guess, before the counters say so.
+  bool in_floats, in_doubles;
 
   // Of a frame that looks for the earliest contacts (best_time.cuh).
   bool until_best;  // what touches after the best time so far does not matter
@@ -111,7 +135,8 @@ struct LaunchParams {
   u64* found_keys;
   double* found_tocs;
   u64 found_capacity;
-  u32* n_of_group;  // how many were found of each first feature: of vertices, then of edges; null: nobody asks
+  u32* n_of_group;  // how many were found of each first feature: of vertices, then of edges; null: not counted here
+  Wanted wanted;
   u64* undecided;  // keys
   u64 undecided_capacity;
   u64* open_in_integers[integer_sizes];  // keys that need integers of one limb a coordinate, of two
@@ -121,7 +146,22 @@ struct LaunchParams {
   u64 to_host_capacity;
   u32 segment, n_segments;  // leaf pairs of this pass: n * segment / n_segments ...
   Counters* counters;
+  WorldCounters* worlds;
+
+  HPCCD_HD u32 all_vertices() const { return n_worlds * n_vertices; }
+  HPCCD_HD u32 all_edges() const { return n_worlds * n_edges; }
+  HPCCD_HD u32 all_leaves() const { return n_worlds * n_leaves; }
 };
+
+// Pairs by their first feature: vertices, then edges.
+template <class T>
+__device__ inline u32 group_of(const LaunchParams<T>& params, Kind kind, u32 first) {
+  return kind == Kind::edge_edge ? params.all_vertices() + first : first;
+}
+template <class T>
+__device__ inline u32 world_of(const LaunchParams<T>& params, Kind kind, u32 first) {
+  return kind == Kind::edge_edge ? params.by_edges(first) : params.by_vertices(first);
+}
 
 __device__ inline u32 lane_number() { return threadIdx.x & 31; }
 
@@ -186,44 +226,48 @@ struct VertexNumbers {
   __device__ u32 operator[](int i) const { return v[i]; }
 };
 
+// Of a pair, numbered through all worlds.
 template <Kind kind, class T>
 __device__ inline uint4 vertices_of(const LaunchParams<T>& params, u32 first, u32 second) {
+  const u32 world = world_of(params, kind, first), base = world * params.n_vertices;
   // Through the cache for what no kernel writes.
   const auto edge = [&](u32 e) {
     const uint2 v = __ldg(params.edges + e);
-    return VertexNumbers{{v.x, v.y}};
+    return VertexNumbers{{v.x + base, v.y + base}};
   };
   const auto face = [&](u32 i) {
     const u32* v = params.faces + 3 * static_cast<u64>(i);
-    return VertexNumbers{{__ldg(v), __ldg(v + 1), __ldg(v + 2)}};
+    return VertexNumbers{{__ldg(v) + base, __ldg(v + 1) + base, __ldg(v + 2) + base}};
   };
   u32 v[4];
-  pair_vertices<kind>(first, second, edge, face, v);
+  pair_vertices<kind>(kind == Kind::edge_edge ? first - world * params.n_edges : first, second, edge, face, v);
   return {v[0], v[1], v[2], v[3]};
+}
+
+template <class T>
+__device__ inline u32 mesh_of(const LaunchParams<T>& params, u32 vertex) {
+  return params.mesh_of_vertex[vertex - params.by_vertices(vertex) * params.n_vertices];
 }
 
 template <class T>
 __device__ inline Accuracy accuracy_of(const LaunchParams<T>& params, uint4 v) {
   if (!params.accuracy) return params.default_accuracy;
   // The second vertex belongs to the first edge or to the face, the third to the other edge or the face.
-  return static_cast<Accuracy>(
-      params.accuracy[params.mesh_of_vertex[v.x] * params.n_meshes + params.mesh_of_vertex[v.z]]);
+  return static_cast<Accuracy>(params.accuracy[mesh_of(params, v.x) * params.n_meshes + mesh_of(params, v.z)]);
 }
 
-// All features of a leaf are of one mesh.
+// Of a pair of leaves: the first one is numbered through all worlds.
 template <class T>
-__device__ inline u32 mesh_of_leaf(const LaunchParams<T>& params, u32 leaf) {
-  const DeviceLeaf l = params.leaves[leaf];
-  const u32 v = l.n_faces() > 0 ? params.faces[3 * static_cast<u64>(params.face_of_slot[l.first_face])]
-                                : params.vertex_of_slot[l.first_vertex];
-  return params.mesh_of_vertex[v];
+__device__ inline u32 world_of_leaves(const LaunchParams<T>& params, uint2 leaves) {
+  return params.by_leaves(leaves.x);
 }
 
-// What is tested between two leaves.
+// What is tested between two leaves, each with features of one mesh alone.
 template <class T>
-__device__ inline u32 tested_features(const LaunchParams<T>& params, uint2 leaves) {
+__device__ inline u32 tested_features(const LaunchParams<T>& params, const DeviceLeaf& a, const DeviceLeaf& b) {
   if (!params.features) return params.default_features;
-  return params.features[mesh_of_leaf(params, leaves.x) * params.n_meshes + mesh_of_leaf(params, leaves.y)];
+  const auto mesh = [&](const DeviceLeaf& l) { return params.mesh_of_vertex[params.corners[l.first_corner]]; };
+  return params.features[mesh(a) * params.n_meshes + mesh(b)];
 }
 
 template <class T>
@@ -236,7 +280,7 @@ __device__ inline Accuracy reported_as(const LaunchParams<T>& params, uint4 v) {
 template <class T>
 __device__ inline double separation_of(const LaunchParams<T>& params, u32 first, u32 second) {
   if (!params.separations) return params.separation;
-  return params.separations[params.mesh_of_vertex[first] * params.n_meshes + params.mesh_of_vertex[second]];
+  return params.separations[mesh_of(params, first) * params.n_meshes + mesh_of(params, second)];
 }
 
 }  // namespace hpccd::gpu

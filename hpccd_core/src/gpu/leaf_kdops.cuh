@@ -14,24 +14,19 @@ __global__ __launch_bounds__(128) void leaf_kdops_kernel(const __grid_constant__
   constexpr u32 n = 2 * n_kdop_directions;
   static_assert(n == 16);
   const u32 leaf = (blockIdx.x * blockDim.x + threadIdx.x) / 32, lane = lane_number();
-  if (leaf >= params.n_leaves) return;
-  const DeviceLeaf l = params.leaves[leaf];
-  u32 corner = 0;
-  const u32 n_corners = 3 * l.n_faces();
-  if (lane < n_corners)
-    corner = __ldg(params.faces + 3 * static_cast<u64>(params.face_of_slot[l.first_face + lane / 3]) + lane % 3);
+  if (leaf >= params.all_leaves()) return;
+  const u32 world = params.by_leaves(leaf);
+  const DeviceLeaf l = params.leaves[leaf - world * params.n_leaves];
+  const u32 n_corners = l.n_corners();
+  const u32 corner =
+      lane < n_corners ? world * params.n_vertices + __ldg(params.corners + l.first_corner + lane) : 0;
   float low = INFINITY, high = -INFINITY;
   const auto include = [&](u32 v) {
     const float x = reinterpret_cast<const float*>(params.kdops + v)[lane % n];
     low = x < low ? x : low, high = high < x ? x : high;
   };
-  for (u32 i = 0; i < n_corners; i += 2) {
-    const u32 v = __shfl_sync(all_lanes, corner, i + lane / n < n_corners ? i + lane / n : i);
-    include(v);
-  }
-  // Of a leaf with triangles they are corners, but for vertices that are in none.
-  for (u32 i = lane / n; i < l.n_vertices(); i += 2) include(params.vertex_of_slot[l.first_vertex + i]);
-  __syncwarp();
+  for (u32 i = 0; i < n_corners; i += 2)
+    include(__shfl_sync(all_lanes, corner, i + lane / n < n_corners ? i + lane / n : i));
   const float other_low = __shfl_xor_sync(all_lanes, low, n), other_high = __shfl_xor_sync(all_lanes, high, n);
   Kdop& kdop = params.leaf_kdops[leaf];
   if (lane < n)
@@ -42,11 +37,12 @@ __global__ __launch_bounds__(128) void leaf_kdops_kernel(const __grid_constant__
 
 template <class T>
 void launch_leaf_kdops(const LaunchParams<T>& params, cudaStream_t stream) {
-  leaf_kdops_kernel<<<blocks_for(std::size_t{params.n_leaves} * 32, 128), 128, 0, stream>>>(params);
+  leaf_kdops_kernel<<<blocks_for(std::size_t{params.all_leaves()} * 32, 128), 128, 0, stream>>>(params);
   check_launch("leaf_kdops_kernel");
 }
 
-// By a whole warp: the first half looks whether the first leaf is below, the other whether it is above.
+// Both numbered through all worlds. By a whole warp: the first half looks whether the first leaf is below, the other
+// whether it is above.
 template <class T>
 __device__ __forceinline__ bool leaf_kdops_apart(const LaunchParams<T>& params, uint2 leaves) {
   constexpr u32 n = 2 * n_kdop_directions;

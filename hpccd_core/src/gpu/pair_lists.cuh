@@ -32,7 +32,7 @@ __device__ void append_found(const LaunchParams<T>& params, Kind kind, bool want
   if (wanted && at < params.found_capacity) {
     params.found_keys[at] = params.keys.key_of(kind, pair.x, pair.y);
     params.found_tocs[at] = toc;
-    if (params.n_of_group) atomicAdd(&params.n_of_group[kind == Kind::edge_edge ? params.n_vertices + pair.x : pair.x], 1u);
+    if (params.n_of_group) atomicAdd(&params.n_of_group[group_of(params, kind, pair.x)], 1u);
   }
 }
 

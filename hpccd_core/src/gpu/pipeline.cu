@@ -25,22 +25,25 @@ double as_time(u64 soonest) { return soonest ? std::bit_cast<double>(~soonest) :
 
 class DevicePipeline : public Pipeline {
  public:
-  DevicePipeline(const Scene& scene, const Features& features, Accuracy accuracy, TestedFeatures tested,
-                 const SeparationTable& separations, int device, bool time_stages)
+  DevicePipeline(const Scene& scene, const Features& features, const Options& options,
+                 const SeparationTable& separations, int device)
       : device_((check(cudaSetDevice(device), "cudaSetDevice"), device)),
-        timer_(time_stages),
+        options_(options),
+        timer_(options.gpu_stages),
         features_(features),
-        scene_(scene, features, accuracy, tested, separations),
+        scene_(scene, features, options.accuracy, options.features, separations, options.worlds),
+        tree_(options.worlds),
         positions_(device),
         lists_(16 * typical_size(), 4 * typical_size(), typical_size() / 2),
-        contacts_(scene_.keys().bits(), std::size_t{features.n_vertices} + features.edges.size()) {
+        contacts_(scene_.keys().bits(), options.worlds * (std::size_t{features.n_vertices} + features.edges.size()),
+                  options.worlds, options.results_on_device) {
     check(cudaDeviceGetAttribute(&multiprocessors_, cudaDevAttrMultiProcessorCount, device), "cudaDeviceGetAttribute");
     counters_.reserve(1);
     host_counters_.reserve(1);
     *host_counters_.data() = {};
     leaf_pairs_.reserve(4 * typical_size());
     contacts_.reserve(typical_size());
-    motion_.reserve(features.n_vertices);
+    motion_.reserve(features.n_vertices, options.worlds);
     hints_.reserve(stream_);
   }
 
@@ -74,6 +77,7 @@ class DevicePipeline : public Pipeline {
     return run_frame(scene_.query_now(), t0, t1, 0, pool);
   }
   EarliestTime earliest() const override;
+  std::vector<double> earliest_of_worlds() override;
   bool list_near(Positions vertices, double distance, std::size_t most, ThreadPool& pool) override {
     if (for_earliest()) told_ = *host_counters_.data();
     begin();
@@ -86,6 +90,7 @@ class DevicePipeline : public Pipeline {
   void forget_near() override;
   const std::vector<Candidate>& undecided() const override { return undecided_; }
 
+  void add(const std::vector<Contact>& vertex_face, const std::vector<Contact>& edge_edge) override;
   FrameResult finish() override {
     check(cudaStreamSynchronize(stream_), "cudaStreamSynchronize");
     return contacts_.result(query_, *host_counters_.data());
@@ -97,7 +102,9 @@ class DevicePipeline : public Pipeline {
 
  private:
   // Lists begin with room for so many times the scene's primitives that most scenes outgrow them once or never.
-  std::size_t typical_size() const { return std::max<std::size_t>(features_.n_primitives(), 1024); }
+  std::size_t typical_size() const {
+    return std::max<std::size_t>(std::size_t{features_.n_primitives()} * options_.worlds, 1024);
+  }
   void begin() {
     goal_ = Goal::results, best_.reset();
     check(cudaSetDevice(device_), "cudaSetDevice");
@@ -118,17 +125,24 @@ class DevicePipeline : public Pipeline {
   void launch_results(const LaunchParams<T>& params);
   template <class T>
   void launch_area(const LaunchParams<T>& params);
+  Stages on_stream() { return {multiprocessors_, stream_, timer_}; }
   template <class Use>
   void with_last_frame(Use&& use);
   template <class T>
   LaunchParams<T> last_frame() const;
   void copy_counters();
   bool is_fast() const;
-  bool guessed_wrong(bool fast);
+  template <class T>
+  bool guessed_wrong(const LaunchParams<T>& params);
+  Wanted wanted() const {
+    if (goal_ != Goal::results || of_snapshot(query_) || options_.report == Report::all) return Wanted::all;
+    return options_.report == Report::first ? Wanted::earliest : Wanted::first;
+  }
   bool grow_overflowed();
   bool lists_too_many() const;
 
   int device_, multiprocessors_ = 1;
+  const Options options_;
   Stream stream_;
   Event counted_;
   StageTimer timer_;
@@ -154,7 +168,7 @@ class DevicePipeline : public Pipeline {
   std::size_t most_near_ = 0;
   bool gave_up_listing_ = false;
   bool given_doubles_ = true;   // in the last frame
-  bool floats_suffice_ = true;  // in the last frame that asked
+  u64 floats_suffice_ = options_.worlds;  // in so many worlds of the last frame that asked
   // Where the last frame had few pairs for integers, the CPU decides those of this one. For any number up to a thousand
   // the device takes 70 to 260 us; 16 threads take 34 us for 91, 105 for 252 and 243 for 916 (H200).
   static constexpr u64 decided_sooner_a_thread = 64;
@@ -176,7 +190,6 @@ bool DevicePipeline::run_frame(Positions t0, Positions t1, double distance, Thre
   }
   LaunchParams<T> params{};
   scene_.fill(params);
-  if (query_ == Query::intersections) params.fits_edges = true;
   params.fast = is_fast();
   params.time_only = for_earliest();
   params.until_best = best_.has_value(), params.best = best_.value_or(no_time);
@@ -184,7 +197,8 @@ bool DevicePipeline::run_frame(Positions t0, Positions t1, double distance, Thre
     params.separation = distance;
   else
     scene_.fill_separations(params);
-  params.integers_on_device = integers_on_device_;
+  params.integers_on_device = options_.results_on_device || integers_on_device_;
+  params.wanted = wanted();
   params.largest = of_snapshot(query_) ? largest_in_snapshot : largest_coordinate;
   tree_.fill(params);
   motion_.fill(params);
@@ -192,13 +206,15 @@ bool DevicePipeline::run_frame(Positions t0, Positions t1, double distance, Thre
   positions_.bring(t0, t1, given, pool, stream_);
   params.given_t0 = given[0], params.given_t1 = given[1];
   given_doubles_ = t0.is_double;
-  params.counters = counters_.data();
+  motion_.fill_counters(params, counters_.data());
   timer_.mark("upload", stream_);
   const Counters& c = *host_counters_.data();
+  if (goal_ == Goal::results) contacts_.begin();
   if (goal_ == Goal::earliest_of_near) lists_.make_room(near_.most());
   for (bool again = true; again;) {
     if (goal_ != Goal::near_list) ++passes_;
-    params.in_floats = params.fast && floats_suffice_;
+    params.in_floats = params.fast && floats_suffice_ > 0;
+    params.in_doubles = !params.fast || floats_suffice_ < options_.worlds;
     launch(params);
     if (goal_ == Goal::results) launch_results(params);
     copy_counters();
@@ -208,14 +224,14 @@ bool DevicePipeline::run_frame(Positions t0, Positions t1, double distance, Thre
     check(cudaEventSynchronize(counted_), "cudaEventSynchronize");
     if (c.bad) return false;
     if ((gave_up_listing_ = lists_too_many())) return true;
-    again = guessed_wrong(params.fast);
+    again = guessed_wrong(params);
     again = grow_overflowed() || again;
   }
   const u64 n_to_host = exact_last_time_ = c.to_host;
   if (!of_snapshot(query_))
     integers_on_device_ =
         std::max(c.open_in_integers[0], c.to_host) > decided_sooner_a_thread * static_cast<u64>(pool.size());
-  if (goal_ == Goal::results && contacts_.complete(query_, params, c, multiprocessors_, stream_, timer_))
+  if (goal_ == Goal::results && contacts_.complete(query_, params, c, on_stream()))
     copy_counters();
   if (goal_ == Goal::near_list) near_.collect(params, c, stream_);
   if (goal_ == Goal::near_list) return true;
@@ -230,8 +246,8 @@ void DevicePipeline::launch(LaunchParams<T>& params) {
   contacts_.fill(params, goal_ == Goal::results);
   hints_.fill(params);
   motion_.begin(params, multiprocessors_, stream_);
-  if (for_earliest()) near_.measure(params, stream_);
-  if (best_ && goal_ != Goal::earliest_of_near) launch_hints(query_, params, {multiprocessors_, stream_, timer_});
+  if (for_earliest() && options_.worlds == 1) near_.measure(params, stream_);
+  if (best_ && goal_ != Goal::earliest_of_near) launch_hints(query_, params, on_stream());
   motion_.launch(query_, params, stream_);
   timer_.mark("bounds", stream_);
   if (goal_ == Goal::earliest_of_near) {
@@ -242,18 +258,19 @@ void DevicePipeline::launch(LaunchParams<T>& params) {
   } else {
     launch_tree(params);
   }
-  if (goal_ == Goal::earliest) launch_area(params);
+  if (goal_ != Goal::earliest) return;
+  if (options_.worlds > 1) contacts_.launch_firsts(params, on_stream());
+  launch_area(params);
 }
 
 template <class T>
 void DevicePipeline::launch_tree(LaunchParams<T>& params) {
-  const auto refit = grows_boxes(query_) || best_ ? refit_kernel<true, T> : refit_kernel<false, T>;
-  refit<<<blocks_for(std::size_t{params.n_leaves} * 32, 128), 128, 0, stream_>>>(params);
+  refit_kernel<<<blocks_for(std::size_t{params.all_leaves()} * 32, 128), 128, 0, stream_>>>(params);
   check_launch("refit_kernel");
   if (query_ == Query::contacts) launch_leaf_kdops(params, stream_);
   timer_.mark("refit", stream_);
   const auto traverse = of_snapshot(query_) ? traverse_kernel<true, T> : traverse_kernel<false, T>;
-  traverse<<<blocks_for(params.n_leaves, traverse_warps), 32 * traverse_warps, 0, stream_>>>(params);
+  traverse<<<blocks_for(params.all_leaves(), traverse_warps), 32 * traverse_warps, 0, stream_>>>(params);
   check_launch("traverse_kernel");
   timer_.mark("traverse", stream_);
   lists_.launch(query_, TestLists::From::leaves, params, multiprocessors_, stream_, timer_);
@@ -261,22 +278,58 @@ void DevicePipeline::launch_tree(LaunchParams<T>& params) {
 
 template <class T>
 void DevicePipeline::launch_results(const LaunchParams<T>& params) {
-  contacts_.launch(query_, params, multiprocessors_, stream_, timer_);
+  contacts_.launch(query_, params, on_stream());
   launch_area(params);
 }
 
 template <class T>
 void DevicePipeline::launch_area(const LaunchParams<T>& params) {
-  area_kernel<<<std::min(blocks_for(params.n_nodes, 256), static_cast<unsigned>(multiprocessors_)), 256, 0, stream_>>>(
+  area_kernel<<<std::min(blocks_for(std::size_t{params.n_worlds} * params.n_nodes, 256), static_cast<unsigned>(multiprocessors_)), 256, 0, stream_>>>(
       params);
   check_launch("area_kernel");
   timer_.mark("area", stream_);
+}
+
+void DevicePipeline::add(const std::vector<Contact>& vertex_face, const std::vector<Contact>& edge_edge) {
+  check(cudaStreamSynchronize(stream_), "cudaStreamSynchronize");
+  std::vector<u64> keys;
+  std::vector<double> tocs;
+  for (const auto* list : {&vertex_face, &edge_edge})
+    for (const Contact& c : *list) {
+      keys.push_back(scene_.keys().key_of(list == &edge_edge ? Kind::edge_edge : Kind::vertex_face, c.first, c.second));
+      tocs.push_back(c.toc);
+    }
+  Counters& c = *host_counters_.data();
+  contacts_.append(c.found_all, keys, tocs, stream_);
+  c.found[0] += vertex_face.size(), c.found[1] += edge_edge.size(), c.found_all += keys.size();
+  check(cudaMemcpyAsync(counters_.data(), &c, sizeof c, cudaMemcpyHostToDevice, stream_), "cudaMemcpyAsync");
+  with_last_frame([&](auto params) {
+    params.wanted = wanted();
+    contacts_.forget_results(params, stream_);
+    contacts_.launch(query_, params, on_stream());
+    copy_counters();
+    check(cudaStreamSynchronize(stream_), "cudaStreamSynchronize");
+    if (contacts_.complete(query_, params, c, on_stream())) copy_counters();
+  });
 }
 
 EarliestTime DevicePipeline::earliest() const {
   const Counters& c = *host_counters_.data();
   return {as_time(c.soonest), near_.has_snapshot() ? std::bit_cast<double>(c.away) : no_time,
           std::bit_cast<double>(c.way)};
+}
+
+std::vector<double> DevicePipeline::earliest_of_worlds() {
+  std::vector<WorldCounters> worlds(options_.worlds);
+  with_last_frame([&](const auto& params) {
+    check(cudaMemcpyAsync(worlds.data(), params.worlds, worlds.size() * sizeof worlds[0], cudaMemcpyDeviceToHost,
+                          stream_),
+          "cudaMemcpyAsync");
+  });
+  check(cudaStreamSynchronize(stream_), "cudaStreamSynchronize");
+  std::vector<double> times;
+  for (const WorldCounters& w : worlds) times.push_back(as_time(w.first_toc));
+  return times;
 }
 
 void DevicePipeline::choose_hints(double earliest) {
@@ -306,7 +359,7 @@ LaunchParams<T> DevicePipeline::last_frame() const {
   motion_.fill(params);
   contacts_.fill(params, false);
   hints_.fill(params);
-  params.counters = counters_.data();
+  motion_.fill_counters(params, counters_.data());
   return params;
 }
 
@@ -327,11 +380,13 @@ bool DevicePipeline::is_fast() const {
   return query_ == Query::contacts && !best_ && goal_ != Goal::earliest_of_near && scene_.all_fast();
 }
 
-// Whether floats suffice only the device knows, and the kernels are launched before it says so: as in the last frame.
-// True where the frame must run again.
-bool DevicePipeline::guessed_wrong(bool fast) {
-  const bool suffice = host_counters_.data()->floats_suffice != 0;
-  return fast && std::exchange(floats_suffice_, suffice) != suffice;
+// Where floats suffice only the device knows, and the kernels are launched before it says so: as in the last frame. True
+// where the frame must run again.
+template <class T>
+bool DevicePipeline::guessed_wrong(const LaunchParams<T>& params) {
+  if (!params.fast) return false;
+  floats_suffice_ = host_counters_.data()->floats_suffice;
+  return (floats_suffice_ > 0 && !params.in_floats) || (floats_suffice_ < options_.worlds && !params.in_doubles);
 }
 
 // Makes room where a list was too short. True where the frame must run again.
@@ -379,11 +434,10 @@ std::map<std::string, std::uint64_t> DevicePipeline::stats() const {
 
 }  // namespace
 
-std::unique_ptr<Pipeline> Pipeline::create(const Scene& scene, const Features& features, Accuracy accuracy,
-                                           TestedFeatures tested, const SeparationTable& separations, int device,
-                                           bool time_stages) {
+std::unique_ptr<Pipeline> Pipeline::create(const Scene& scene, const Features& features, const Options& options,
+                                           const SeparationTable& separations, int device) {
   if (status().devices.empty()) throw Error(status().reason);
-  return std::make_unique<DevicePipeline>(scene, features, accuracy, tested, separations, device, time_stages);
+  return std::make_unique<DevicePipeline>(scene, features, options, separations, device);
 }
 
 }  // namespace hpccd::gpu

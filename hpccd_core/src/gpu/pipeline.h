@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <map>
 #include <memory>
 #include <optional>
@@ -19,8 +20,10 @@
 
 namespace hpccd::gpu {
 
-// What a frame found, in page-locked memory that stays valid until the next frame.
+// What a frame found: in page-locked memory that stays valid until the next frame, or on the device as long as somebody
+// holds it.
 struct FrameResult {
+  std::shared_ptr<const void> memory;  // on the device
   std::uint64_t n_vf = 0, n_ee = 0;
   const std::array<std::uint32_t, 2>* vf = nullptr;  // in canonical order
   const std::array<std::uint32_t, 4>* ee = nullptr;
@@ -28,6 +31,10 @@ struct FrameResult {
   std::uint64_t n_ef = 0;
   const std::array<std::uint32_t, 3>* ef = nullptr;  // where edges and faces were looked for, alone
   std::uint64_t hash = 0;
+  double first_toc = std::numeric_limits<double>::infinity();
+  // Of several worlds, whose hash and earliest time stand here alone (WorldSlices, Contacts::first_tocs).
+  const std::uint64_t *vf_offsets = nullptr, *ee_offsets = nullptr, *ef_offsets = nullptr, *hashes = nullptr;
+  const double* first_tocs = nullptr;
 };
 
 // The earliest time of a frame, undecided pairs aside, and how far its vertices are from the near list's snapshot and
@@ -40,9 +47,8 @@ class Pipeline {
  public:
   // Throws Error where the device has not enough memory or the scene has too many features for 31-bit numbers. The
   // separations may change between frames.
-  static std::unique_ptr<Pipeline> create(const Scene& scene, const Features& features, Accuracy accuracy,
-                                          TestedFeatures tested, const SeparationTable& separations, int device,
-                                          bool time_stages);
+  static std::unique_ptr<Pipeline> create(const Scene& scene, const Features& features, const Options& options,
+                                          const SeparationTable& separations, int device);
   virtual ~Pipeline() = default;
 
   // The tree whose boxes are refitted in every frame.
@@ -56,8 +62,11 @@ class Pipeline {
   virtual bool run(Positions t0, Positions t1, Best best, ThreadPool& pool) = 0;
   // The same of one snapshot. distance: for proximity.
   virtual bool run_snapshot(Query query, Positions vertices, double distance, ThreadPool& pool) = 0;
-  // After run(): the pairs left for the exact fallback on the CPU. Sorting goes on meanwhile.
+  // After run(): the pairs left for the exact fallback on the CPU, the first feature of each numbered through all
+  // worlds.
   virtual const std::vector<Candidate>& undecided() const = 0;
+  // Adds what the CPU found of these, where results stay on the device.
+  virtual void add(const std::vector<Contact>& vertex_face, const std::vector<Contact>& edge_edge) = 0;
   virtual FrameResult finish() = 0;
 
   // The same for the earliest time alone, which is never late at the tiers that promise it: of all pairs, or of those
@@ -65,6 +74,8 @@ class Pipeline {
   enum class Pairs : bool { all, near_list };
   virtual bool run_for_earliest(Positions t0, Positions t1, Pairs pairs, Best best, ThreadPool& pool) = 0;
   virtual EarliestTime earliest() const = 0;
+  // The same of each world, where there are several: of all pairs, without a best time.
+  virtual std::vector<double> earliest_of_worlds() = 0;
   // Lists all pairs that come within a distance in a snapshot, if there are not many more than `most`; else the list
   // stays what it was. Returns false as run().
   virtual bool list_near(Positions vertices, double distance, std::size_t most, ThreadPool& pool) = 0;

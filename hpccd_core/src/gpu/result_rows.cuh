@@ -3,6 +3,8 @@
 #pragma once
 
 #include <memory>
+#include <type_traits>
+#include <vector>
 
 #include "gpu/memory.h"
 #include "gpu/ordering.cuh"
@@ -16,6 +18,7 @@ class ResultRows {
   // Room for so many; where it grows what was there is lost.
   virtual void reserve(u64 n_vf, u64 n_ee) = 0;
   virtual void reserve_intersections(u64 n_ef) = 0;
+  virtual void reserve_worlds(std::size_t n) = 0;
   virtual std::size_t device_bytes() const = 0;
 };
 
@@ -23,7 +26,13 @@ template <class Memory>
 class RowsIn final : public ResultRows {
  public:
   ResultPlaces places() const override {
-    return {vf_.data(), ee_.data(), ef_.data(), toc_.data(), vf_.size(), ee_.size(), ef_.size()};
+    return {vf_.data(), ee_.data(), ef_.data(), toc_.data(), vf_.size(), ee_.size(), ef_.size(), offsets_[0].data(),
+            offsets_[1].data(), hashes_.data(), first_tocs_.data()};
+  }
+  void reserve_worlds(std::size_t n) override {
+    for (auto& offsets : offsets_) offsets.reserve(n + 1);
+    hashes_.reserve(n);
+    first_tocs_.reserve(n);
   }
   void reserve(u64 n_vf, u64 n_ee) override {
     vf_.reserve(n_vf), ee_.reserve(n_ee);
@@ -31,7 +40,9 @@ class RowsIn final : public ResultRows {
   }
   void reserve_intersections(u64 n_ef) override { ef_.reserve(n_ef); }
   std::size_t device_bytes() const override {
-    return std::is_same_v<Memory, DeviceMemory> ? vf_.bytes() + ee_.bytes() + ef_.bytes() + toc_.bytes() : 0;
+    return std::is_same_v<Memory, DeviceMemory> ? vf_.bytes() + ee_.bytes() + ef_.bytes() + toc_.bytes() +
+                                                         2 * offsets_[0].bytes() + hashes_.bytes() + first_tocs_.bytes()
+                                                   : 0;
   }
 
  private:
@@ -39,6 +50,27 @@ class RowsIn final : public ResultRows {
   Buffer<uint4, Memory> ee_;
   Buffer<uint3, Memory> ef_;
   Buffer<double, Memory> toc_;
+  Buffer<u64, Memory> offsets_[2], hashes_;
+  Buffer<double, Memory> first_tocs_;
+};
+
+// Rows that are handed out: they are taken for another frame when nobody holds them any more.
+class DeviceRowsPool {
+ public:
+  std::shared_ptr<ResultRows> take() {
+    for (const auto& rows : rows_)
+      if (rows.use_count() == 1) return rows;
+    rows_.push_back(std::make_shared<RowsIn<DeviceMemory>>());
+    return rows_.back();
+  }
+  std::size_t device_bytes() const {
+    std::size_t bytes = 0;
+    for (const auto& rows : rows_) bytes += rows->device_bytes();
+    return bytes;
+  }
+
+ private:
+  std::vector<std::shared_ptr<ResultRows>> rows_;
 };
 
 }  // namespace hpccd::gpu

@@ -50,10 +50,11 @@ __global__ __launch_bounds__(128) void proximity_kernel(const __grid_constant__ 
 
 template <class T>
 __device__ inline void load_edge_face(const LaunchParams<T>& params, u32 edge, u32 face, Vec3<double> (&q)[5]) {
-  const uint2 e = __ldg(params.edges + edge);
+  const u32 world = params.by_edges(edge);
+  const uint2 e = __ldg(params.edges + edge - world * params.n_edges);
   const u32* f = params.faces + 3 * static_cast<u64>(face);
   const u32 v[5] = {e.x, e.y, __ldg(f), __ldg(f + 1), __ldg(f + 2)};
-  for (int i = 0; i < 5; ++i) q[i] = load_ends(params.vertices, v[i]).t0;
+  for (int i = 0; i < 5; ++i) q[i] = load_ends(params.vertices, world * params.n_vertices + v[i]).t0;
 }
 
 // Pairs of edge and face use the lists of the first kind.

@@ -47,19 +47,20 @@ struct StagedCounts {
 // Edges and faces of one of the two leaves that overlap the other.
 template <u32 side, class T>
 __device__ __forceinline__ void stage_edges_and_faces(const LaunchParams<T>& params, StagedLeaves& s,
-                                                      const DeviceLeaf& l, u32 other, u32 tested, StagedCounts& n) {
+                                                      const LeafCorners& l, u32 other, u32 tested, StagedCounts& n) {
   constexpr u32 most = StagedLeaves::most_edges, edge_lanes = (1u << most) - 1;
   const u32 lane = lane_number();
   const bool is_edge = lane < most;
-  const u32 slot = is_edge ? l.first_edge + lane : l.first_face + lane - most;
-  bool near = is_edge ? (tested & tests_edge_edge) && lane < l.n_edges()
-                      : (tested & tests_vertex_face) && lane - most < l.n_faces();
+  bool near = is_edge ? (tested & tests_edge_edge) && lane < l.leaf.n_edges()
+                      : (tested & tests_vertex_face) && lane - most < l.leaf.n_faces();
+  LeafFeature feature{0, 0};
+  if (near)
+    feature = is_edge ? load_feature(params.leaf_edges, l.leaf.first_edge + lane)
+                      : load_feature(params.leaf_faces, l.leaf.first_face + lane - most);
+  const VertexNumbers v = vertices_of_corners(l, feature.corners);
   DeviceBox b;
-  u32 number = 0, corner2 = 0;
   if (near) {
-    b = load_box((is_edge ? params.edge_boxes : params.face_boxes) + slot);
-    number = __ldg((is_edge ? params.edge_of_slot : params.face_of_slot) + slot);
-    if (!is_edge) corner2 = __ldg(params.face_corner2 + slot);
+    b = feature_box(params, v, !is_edge);
     near = overlap<Query::contacts>(b, load_box(&params.leaf_boxes[other]));
   }
   const u32 mask = __ballot_sync(all_lanes, near), below = mask & ((1u << lane) - 1);
@@ -68,41 +69,29 @@ __device__ __forceinline__ void stage_edges_and_faces(const LaunchParams<T>& par
   const u32 at = is_edge ? __popc(below) : StagedLeaves::faces_at(side) + __popc(below & ~edge_lanes);
   if (side == 0 && is_edge) {
     s.put_edge(at, b);
-    s.first_number[at] = number;
+    s.first_number[at] = feature.number;
   } else {
     s.put_second(at, b);
-    s.second_number[at] = number;
-    if (!is_edge) s.corner2[at - most] = corner2;
+    s.second_number[at] = feature.number;
+    if (!is_edge) s.corner2[at - most] = v[2];
   }
 }
 
-// Vertices of both leaves that overlap the other, half a warp each.
-template <class T>
-__device__ __forceinline__ void stage_both_vertices(const LaunchParams<T>& params, StagedLeaves& s, const DeviceLeaf& a,
-                                                    const DeviceLeaf& b, uint2 leaves, u32 tested, StagedCounts& n) {
-  const u32 lane = lane_number(), side = lane >> 4, n_own = side ? b.n_vertices() : a.n_vertices();
-  const u32 first = side ? b.first_vertex : a.first_vertex, other = side ? leaves.x : leaves.y;
-  const u32 most = max(a.n_vertices(), b.n_vertices());
-  n.vertices[0] = n.vertices[1] = 0;
-#pragma unroll 1
-  for (u32 begin = 0; begin < most; begin += 16) {
-    const u32 i = begin + (lane & 15);
-    bool near = (tested & tests_vertex_face) && i < n_own;
-    DeviceBox box;
-    u32 v = 0;
-    if (near) {
-      v = __ldg(&params.vertex_of_slot[first + i]);
-      box = load_point<false>(&params.points[v]);
-      near = overlap<Query::contacts>(box, load_box(&params.leaf_boxes[other]));
-    }
-    const u32 mask = __ballot_sync(all_lanes, near), own = side ? 0xFFFF0000u : 0xFFFFu;
-    if (near) {
-      box.tag_low() = v;
-      const u32 before = side ? n.vertices[1] : n.vertices[0];
-      s.put_vertex(StagedLeaves::vertices_at(side) + before + __popc(mask & own & ((1u << lane) - 1)), box);
-    }
-    n.vertices[0] += __popc(mask & 0xFFFF), n.vertices[1] += __popc(mask >> 16);
+// Vertices of one of them, its first corners.
+template <u32 side, class T>
+__device__ __forceinline__ void stage_vertices_of(const LaunchParams<T>& params, StagedLeaves& s, const LeafCorners& l,
+                                                  u32 other, u32 tested, StagedCounts& n) {
+  bool near = (tested & tests_vertex_face) && lane_number() < l.leaf.n_vertices();
+  DeviceBox box;
+  if (near) {
+    box = load_point<false>(&params.points[l.corner]);
+    near = overlap<Query::contacts>(box, load_box(&params.leaf_boxes[other]));
   }
+  const u32 mask = __ballot_sync(all_lanes, near);
+  n.vertices[side] = __popc(mask);
+  if (!near) return;
+  box.tag_low() = l.corner;
+  s.put_vertex(StagedLeaves::vertices_at(side) + __popc(mask & ((1u << lane_number()) - 1)), box);
 }
 
 }  // namespace hpccd::gpu

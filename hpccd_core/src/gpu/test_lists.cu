@@ -51,11 +51,18 @@ void TestLists::launch(Query query, From from, LaunchParams<T>& params, int mult
   fill(params);
   params.n_segments = from == From::leaves ? n_segments_ : 1;
   const Stages stages{multiprocessors, stream, timer};
+  const auto end_segment = [&] {
+    end_segment_kernel<<<1, 1, 0, stream>>>(params);
+    check_launch("end_segment_kernel");
+  };
   for (params.segment = 0; params.segment < params.n_segments; ++params.segment) {
     const bool leaves = from == From::leaves;
     if (params.in_floats) {
       launch_likely(params, stages);
-    } else if (query == Query::contacts) {
+      end_segment();
+      if (!params.in_doubles) continue;
+    }
+    if (query == Query::contacts) {
       if (leaves) launch_contact_candidates(params, stages);
       launch_sieve(params, stages);
     } else if (query == Query::separations) {
@@ -64,9 +71,8 @@ void TestLists::launch(Query query, From from, LaunchParams<T>& params, int mult
     } else {
       launch_snapshot(query, params, stages);
     }
-    if (!of_snapshot(query) && !params.in_floats) launch_root_tests(params, stages);
-    end_segment_kernel<<<1, 1, 0, stream>>>(params);
-    check_launch("end_segment_kernel");
+    if (!of_snapshot(query)) launch_root_tests(params, stages);
+    end_segment();
   }
   if (of_snapshot(query)) return;
   if (params.time_only || params.until_best) {

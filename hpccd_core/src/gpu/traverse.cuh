@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Pairs of leaves whose boxes overlap: one warp a leaf goes down the tree, 32 nodes at a time, depth first. It looks
-// only at leaves from its own number on, so that each pair comes once. The pairs are the CPU's: a pair of leaves that
+// only at leaves of its world from its own number on, so that each pair comes once. The pairs are the CPU's: a pair of leaves that
 // overlap is reached whatever the way down.
 #pragma once
 
@@ -26,13 +26,15 @@ __global__ __launch_bounds__(32 * traverse_warps) void traverse_kernel(LaunchPar
   __shared__ u32 founds[traverse_warps][traverse_found];
   const u32 lane = lane_number(), warp = threadIdx.x / 32, below = (1u << lane) - 1;
   const u32 leaf = blockIdx.x * traverse_warps + warp;
-  if (leaf >= params.n_leaves || over(params)) return;
+  if (leaf >= params.all_leaves() || over(params)) return;
+  const u32 world = params.by_leaves(leaf), own = leaf - world * params.n_leaves;
+  const DeviceBox* boxes = params.node_boxes + static_cast<u64>(world) * params.n_nodes;
   u32* stack = stacks[warp];
   u32* found = founds[warp];
   u32 n_stack = 0, n_found = 0;
   u64 tests = 0;
   const DeviceBox box = load_box(&params.leaf_boxes[leaf]);
-  const u32 mesh = params.enabled ? params.node_mesh[params.leaf_nodes[leaf]] : no_mesh;
+  const u32 mesh = params.enabled ? params.node_mesh[params.leaf_nodes[own]] : no_mesh;
 
   const auto flush = [&] {
     __syncwarp();
@@ -46,7 +48,7 @@ __global__ __launch_bounds__(32 * traverse_warps) void traverse_kernel(LaunchPar
   };
   // Keeps a node of the lane: leaves go to the list, others on the stack.
   const auto keep = [&](bool wanted, u32 node, const DeviceBox& b) {
-    const bool hit = wanted && b.tag_high() >= leaf && overlap<snapshot ? Query::proximity : Query::contacts>(box, b) &&
+    const bool hit = wanted && b.tag_high() >= own && overlap<snapshot ? Query::proximity : Query::contacts>(box, b) &&
                      (!params.enabled || meshes_enabled(params, mesh, params.node_mesh[node]));
     const u32 leaves = __ballot_sync(all_lanes, hit && b.tag_low() == 0),
               inner = __ballot_sync(all_lanes, hit && b.tag_low() != 0);
@@ -57,7 +59,7 @@ __global__ __launch_bounds__(32 * traverse_warps) void traverse_kernel(LaunchPar
     if (n_found > traverse_found - 32) flush();
   };
 
-  keep(lane == 0, 0, load_box(&params.node_boxes[0]));
+  keep(lane == 0, 0, load_box(&boxes[0]));
   while (n_stack > 0) {
     __syncwarp();
     const u32 n = n_stack < 32 ? n_stack : 32;
@@ -66,8 +68,8 @@ __global__ __launch_bounds__(32 * traverse_warps) void traverse_kernel(LaunchPar
     __syncwarp();
     n_stack -= n;
     tests += 2 * n;
-    const DeviceBox left = load_box(&params.node_boxes[child]),
-                    right = load_box(&params.node_boxes[active ? child + 1 : 0]);
+    const DeviceBox left = load_box(&boxes[child]),
+                    right = load_box(&boxes[active ? child + 1 : 0]);
     keep(active, child, left);
     keep(active, child + 1, right);
   }

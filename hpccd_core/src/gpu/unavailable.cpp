@@ -4,6 +4,7 @@
 #include "gpu/download.h"
 #include "gpu/memory_on_device.h"
 #include "gpu/pipeline.h"
+#include "gpu/results_to_device.h"
 
 namespace hpccd::gpu {
 
@@ -19,8 +20,15 @@ void fail_after(int) {}
 
 void download(const void*, void*, std::size_t) { throw Error(status().reason); }
 
-std::unique_ptr<Pipeline> Pipeline::create(const Scene&, const Features&, Accuracy, TestedFeatures,
-                                           const SeparationTable&, int, bool) {
+std::unique_ptr<Pipeline> Pipeline::create(const Scene&, const Features&, const Options&, const SeparationTable&, int) {
+  throw Error(status().reason);
+}
+
+DeviceResults to_device(const Contacts&, int) { throw Error(status().reason); }
+DeviceResults to_device(const Proximity&, int) { throw Error(status().reason); }
+DeviceResults to_device(const Intersections&, int) { throw Error(status().reason); }
+
+std::shared_ptr<const void> joined_on_device(const void*, std::size_t, const void*, std::size_t, int) {
   throw Error(status().reason);
 }
 

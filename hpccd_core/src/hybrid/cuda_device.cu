@@ -17,11 +17,12 @@ class CudaTestDevice final : public TestDevice {
                  const SeparationTable& separations, int device)
       : device_((check(cudaSetDevice(device), "cudaSetDevice"), device)),
         features_(features),
-        scene_(scene, features, accuracy, tested, separations),
+        scene_(scene, features, accuracy, tested, separations, 1),
+        leaves_(1),
         slots_(n_slots) {
     check(cudaDeviceGetAttribute(&multiprocessors_, cudaDevAttrMultiProcessorCount, device), "cudaDeviceGetAttribute");
     counters_.reserve(1);
-    motion_.reserve(features.n_vertices);
+    motion_.reserve(features.n_vertices, 1);
   }
   ~CudaTestDevice() override { cancel(); }
 
@@ -104,7 +105,8 @@ class CudaTestDevice final : public TestDevice {
     params.largest = largest_coordinate;
     leaves_.fill(params);
     motion_.fill(params);
-    params.counters = counters_.data();
+    motion_.fill_counters(params, counters_.data());
+    params.in_doubles = true;
     return params;
   }
 
@@ -134,8 +136,7 @@ class CudaTestDevice final : public TestDevice {
   template <class T>
   void refit() {
     const LaunchParams<T> params = launch_params<T>();
-    const auto refit = grows_boxes(scene_.query_now()) ? refit_leaves_kernel<true, T> : refit_leaves_kernel<false, T>;
-    refit<<<blocks_for(std::size_t{params.n_leaves} * 32, 128), 128, 0, upload_>>>(params);
+    refit_leaves_kernel<<<blocks_for(std::size_t{params.n_leaves} * 32, 128), 128, 0, upload_>>>(params);
     check_launch("refit_leaves_kernel");
     if (scene_.query_now() == gpu::Query::contacts) launch_leaf_kdops(params, upload_);
     check(cudaEventRecord(ready_, upload_), "cudaEventRecord");

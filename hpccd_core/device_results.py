@@ -1,0 +1,190 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Answers that stay in a GPU's memory (results="device")."""
+
+import dataclasses
+import functools
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import arguments
+from ._core import DeviceArray, integers_on_device
+from .contacts import Contacts
+from .proximity import Intersections, Proximity
+from .worlds import Slices
+
+
+@dataclasses.dataclass(frozen=True)
+class _OnDevice:
+    """What all of them share. slices: of many worlds, by name as in worlds.Slices."""
+
+    hash: int
+    slices: dict[str, DeviceArray | None] | None = dataclasses.field(repr=False)
+
+    def _offsets(self, kind: str, rows: DeviceArray) -> DeviceArray:
+        if self.slices is None:
+            return integers_on_device([0, len(rows)], rows.device)
+        offsets = self.slices[kind]
+        assert offsets is not None
+        return offsets
+
+    @functools.cached_property
+    def _slices_on_host(self) -> Slices | None:
+        if self.slices is None:
+            return None
+        return Slices(**{name: np.empty(0) if a is None else a.to_host() for name, a in self.slices.items()})
+
+    def _world_number(self, k: int) -> int:
+        of_worlds = self._slices_on_host
+        return arguments.whole_number("world", k, 0, 0 if of_worlds is None else len(of_worlds.hashes) - 1)
+
+
+@dataclasses.dataclass(frozen=True)
+class _PairsOnDevice(_OnDevice):
+    vf: DeviceArray
+    ee: DeviceArray
+    closest: DeviceArray
+
+    @property
+    def vf_offsets(self) -> DeviceArray:
+        """(W+1,) int64: the vertex-face pairs of world k are the rows vf_offsets[k] to vf_offsets[k + 1]."""
+        return self._offsets("vf", self.vf)
+
+    @property
+    def ee_offsets(self) -> DeviceArray:
+        """(W+1,) int64: the same of edge-edge pairs."""
+        return self._offsets("ee", self.ee)
+
+    def _of_world(self, k: int, of_pairs: tuple[str, ...], of_vf: str, of_ee: str) -> dict[str, Any]:
+        """The fields of one world; of_pairs: arrays with the rows of all vertex-face pairs, then of all others."""
+        of_worlds = self._slices_on_host
+        assert of_worlds is not None
+        vf, ee = ([int(x) for x in offsets[k : k + 2]] for offsets in (of_worlds.vf, of_worlds.ee))
+        n = len(self.vf)
+        fields = {name: getattr(self, name).rows(*vf) for name in ("vf", of_vf)}
+        fields |= {name: getattr(self, name).rows(*ee) for name in ("ee", of_ee)}
+        for name in of_pairs:
+            rows = getattr(self, name)
+            if len(rows):
+                rows = rows.rows(*vf).joined(rows.rows(n + ee[0], n + ee[1]))
+            fields[name] = rows
+        return fields | {"hash": int(of_worlds.hashes[k]), "slices": None}
+
+    def __len__(self) -> int:
+        return len(self.vf) + len(self.ee)
+
+
+@dataclasses.dataclass(frozen=True)
+class DeviceContacts(_PairsOnDevice):
+    """Contacts, all of them, in a GPU's memory: names, shapes, dtypes and order as in Contacts.
+
+    Arrays are hpccd_core.DeviceArray: __cuda_array_interface__ and DLPack, in place, complete when the call returns
+    (cupy.asarray(c.vf), torch.from_dlpack(c.vf_toc), wp.from_dlpack(...)). Their memory is used again by a later call
+    only when nobody holds one of them, or what was made of one, any more. first_toc and hash are on the host.
+    vf_offsets, ee_offsets, first_tocs: arrays on the device, of many worlds. world(k): rows of these arrays, in place,
+    but for points, normals and closest, which are copied there. to_host(): the same as Contacts.
+    """
+
+    vf_toc: DeviceArray
+    ee_toc: DeviceArray
+    points: DeviceArray
+    normals: DeviceArray
+    first_toc: float
+
+    @property
+    def first_tocs(self) -> DeviceArray:
+        """(W,) float64: the earliest time of each world, +inf where nothing touches. Of a detector with worlds."""
+        if self.slices is None or (times := self.slices["first_tocs"]) is None:
+            raise ValueError("first_tocs: this detector has one world; first_toc is its earliest time")
+        return times
+
+    def world(self, k: int) -> "DeviceContacts":
+        """The contacts of world k, 0 <= k < W."""
+        k = self._world_number(k)
+        if (of_worlds := self._slices_on_host) is None:
+            return self
+        fields = self._of_world(k, ("points", "normals", "closest"), "vf_toc", "ee_toc")
+        return DeviceContacts(**fields, first_toc=float(of_worlds.first_tocs[k]))
+
+    def to_host(self) -> Contacts:
+        """A copy in numpy arrays."""
+        return Contacts(**_arrays_on_host(self), first_toc=self.first_toc, hash=self.hash, slices=self._slices_on_host)
+
+    def __repr__(self) -> str:
+        return f"DeviceContacts({len(self.vf)} vertex-face, {len(self.ee)} edge-edge, first at {self.first_toc:.6g})"
+
+
+@dataclasses.dataclass(frozen=True)
+class DeviceProximity(_PairsOnDevice):
+    """Proximity in a GPU's memory, as DeviceContacts is to Contacts."""
+
+    vf_distance: DeviceArray
+    ee_distance: DeviceArray
+
+    def world(self, k: int) -> "DeviceProximity":
+        """The pairs of world k, 0 <= k < W."""
+        k = self._world_number(k)
+        if self._slices_on_host is None:
+            return self
+        return DeviceProximity(**self._of_world(k, ("closest",), "vf_distance", "ee_distance"))
+
+    def to_host(self) -> Proximity:
+        """A copy in numpy arrays."""
+        return Proximity(**_arrays_on_host(self), hash=self.hash, slices=self._slices_on_host)
+
+    def __repr__(self) -> str:
+        return f"DeviceProximity({len(self.vf)} vertex-face, {len(self.ee)} edge-edge)"
+
+
+@dataclasses.dataclass(frozen=True)
+class DeviceIntersections(_OnDevice):
+    """Intersections in a GPU's memory, as DeviceContacts is to Contacts."""
+
+    ef: DeviceArray
+
+    @property
+    def ef_offsets(self) -> DeviceArray:
+        """(W+1,) int64: the pairs of world k are the rows ef_offsets[k] to ef_offsets[k + 1]."""
+        return self._offsets("ef", self.ef)
+
+    def world(self, k: int) -> "DeviceIntersections":
+        """The pairs of world k, 0 <= k < W."""
+        k = self._world_number(k)
+        if (of_worlds := self._slices_on_host) is None:
+            return self
+        rows = self.ef.rows(*(int(x) for x in of_worlds.ef[k : k + 2]))
+        return DeviceIntersections(ef=rows, hash=int(of_worlds.hashes[k]), slices=None)
+
+    def to_host(self) -> Intersections:
+        """A copy in numpy arrays."""
+        return Intersections(**_arrays_on_host(self), hash=self.hash, slices=self._slices_on_host)
+
+    def __len__(self) -> int:
+        return len(self.ef)
+
+    def __repr__(self) -> str:
+        return f"DeviceIntersections({len(self.ef)} edge-face)"
+
+
+def _arrays_on_host(found: _OnDevice) -> dict[str, NDArray[Any]]:
+    values = ((f.name, getattr(found, f.name)) for f in dataclasses.fields(found))
+    return {name: value.to_host() for name, value in values if isinstance(value, DeviceArray)}
+
+
+def contacts_of(found: dict[str, Any]) -> DeviceContacts:
+    """From what the core gives out."""
+    del found["ef"]
+    return DeviceContacts(vf_toc=found.pop("vf_values"), ee_toc=found.pop("ee_values"), **found)
+
+
+def proximity_of(found: dict[str, Any]) -> DeviceProximity:
+    """From what the core gives out."""
+    for name in ("ef", "points", "normals", "first_toc"):
+        del found[name]
+    return DeviceProximity(vf_distance=found.pop("vf_values"), ee_distance=found.pop("ee_values"), **found)
+
+
+def intersections_of(found: dict[str, Any]) -> DeviceIntersections:
+    """From what the core gives out."""
+    return DeviceIntersections(ef=found["ef"], hash=found["hash"], slices=found["slices"])

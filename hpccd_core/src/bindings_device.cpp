@@ -1,0 +1,197 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "bindings_device.h"
+
+#include <pybind11/numpy.h>
+#include <pybind11/stl.h>
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "gpu/download.h"
+#include "gpu/results_to_device.h"
+
+namespace py = pybind11;
+
+namespace hpccd {
+namespace {
+
+// DLPack's structures, version 0.x (the ABI of capsules named "dltensor").
+struct DLDevice {
+  std::int32_t type, id;
+};
+struct DLTensor {
+  void* data;
+  DLDevice device;
+  std::int32_t ndim;
+  struct {
+    std::uint8_t code, bits;
+    std::uint16_t lanes;
+  } dtype;
+  std::int64_t *shape, *strides;
+  std::uint64_t byte_offset;
+};
+struct DLManagedTensor {
+  DLTensor tensor;
+  void* context;
+  void (*deleter)(DLManagedTensor*);
+};
+constexpr std::int32_t on_cuda = 2;
+
+// A C-contiguous array in a device's memory, which is held as long as anybody looks at it.
+struct DeviceArray {
+  std::shared_ptr<const void> memory;
+  const void* data;
+  std::vector<std::int64_t> shape;
+  char kind;  // 'u', 'i' or 'f'
+  int item_bytes, device;
+
+  std::int64_t size() const {
+    std::int64_t n = 1;
+    for (const std::int64_t s : shape) n *= s;
+    return n;
+  }
+  std::string type() const { return std::string("<") + kind + std::to_string(item_bytes); }
+};
+
+py::dict interface_of(const DeviceArray& a) {
+  py::dict d;
+  d["shape"] = py::tuple(py::cast(a.shape));
+  d["typestr"] = a.type();
+  d["data"] = py::make_tuple(a.size() ? reinterpret_cast<std::uintptr_t>(a.data) : 0, false);
+  d["version"] = 3;
+  d["strides"] = py::none();
+  d["stream"] = py::none();  // what it holds is complete
+  return d;
+}
+
+struct Exported {
+  DeviceArray array;
+  DLManagedTensor managed;
+};
+
+py::capsule dlpack_of(const DeviceArray& a) {
+  auto* e = new Exported{a, {}};
+  const std::uint8_t code = a.kind == 'f' ? 2 : a.kind == 'u' ? 1 : 0;
+  e->managed.tensor = {const_cast<void*>(a.data),
+                       {on_cuda, a.device},
+                       static_cast<std::int32_t>(a.shape.size()),
+                       {code, static_cast<std::uint8_t>(8 * a.item_bytes), 1},
+                       e->array.shape.data(),
+                       nullptr,
+                       0};
+  e->managed.context = e;
+  e->managed.deleter = [](DLManagedTensor* m) { delete static_cast<Exported*>(m->context); };
+  return py::capsule(&e->managed, "dltensor", [](PyObject* capsule) {
+    // A consumer renames what it has taken, and calls the deleter itself.
+    if (!PyCapsule_IsValid(capsule, "dltensor")) return;
+    auto* m = static_cast<DLManagedTensor*>(PyCapsule_GetPointer(capsule, "dltensor"));
+    m->deleter(m);
+  });
+}
+
+// Rows [begin, end), without a copy.
+DeviceArray rows_of(const DeviceArray& a, std::int64_t begin, std::int64_t end) {
+  if (begin < 0 || end < begin || a.shape.empty() || end > a.shape[0]) throw py::index_error("rows: out of range");
+  DeviceArray part = a;
+  const std::int64_t row = a.shape[0] ? a.size() / a.shape[0] * a.item_bytes : 0;
+  part.data = static_cast<const unsigned char*>(a.data) + begin * row;
+  part.shape[0] = end - begin;
+  return part;
+}
+
+DeviceArray joined(const DeviceArray& a, const DeviceArray& b) {
+  const auto bytes = [](const DeviceArray& x) {
+    return static_cast<std::size_t>(x.size()) * static_cast<std::size_t>(x.item_bytes);
+  };
+  DeviceArray both = a;
+  both.memory = gpu::joined_on_device(a.data, bytes(a), b.data, bytes(b), a.device);
+  both.data = both.memory.get();
+  both.shape[0] += b.shape[0];
+  return both;
+}
+
+DeviceArray of_integers(const std::vector<std::int64_t>& numbers, int device) {
+  auto memory = gpu::joined_on_device(numbers.data(), numbers.size() * sizeof numbers[0], nullptr, 0, device);
+  const void* data = memory.get();
+  return {std::move(memory), data, {static_cast<std::int64_t>(numbers.size())}, 'i', 8, device};
+}
+
+py::array to_host(const DeviceArray& a) {
+  py::array to(py::dtype(a.type()), std::vector<py::ssize_t>(a.shape.begin(), a.shape.end()));
+  void* p = to.mutable_data();
+  {
+    py::gil_scoped_release release;
+    gpu::download(a.data, p, static_cast<std::size_t>(a.size()) * static_cast<std::size_t>(a.item_bytes));
+  }
+  return to;
+}
+
+}  // namespace
+
+void bind_device_array(py::module_& m) {
+  m.def("integers_on_device", &of_integers, py::arg("numbers"), py::arg("device"));
+  py::class_<DeviceArray>(m, "DeviceArray")
+      .def_property_readonly("shape", [](const DeviceArray& a) { return py::tuple(py::cast(a.shape)); })
+      .def_property_readonly("dtype", [](const DeviceArray& a) { return py::dtype(a.type()); })
+      .def_property_readonly("device", [](const DeviceArray& a) { return a.device; })
+      .def("__len__", [](const DeviceArray& a) { return a.shape[0]; })
+      .def_property_readonly("__cuda_array_interface__", &interface_of)
+      .def("__dlpack_device__", [](const DeviceArray& a) { return py::make_tuple(on_cuda, a.device); })
+      .def(
+          "__dlpack__",
+          [](const DeviceArray& a, const py::object&, const py::object&, const py::object& device,
+             const py::object& copy) {
+            if (!copy.is_none() && copy.cast<bool>())
+              throw py::buffer_error("copy: these arrays are given out as they are; copy what from_dlpack returns");
+            if (!device.is_none() && !device.equal(py::make_tuple(on_cuda, a.device)))
+              throw py::buffer_error("dl_device: the array stays on its device; to_host() gives a numpy array");
+            return dlpack_of(a);
+          },
+          py::kw_only(), py::arg("stream") = py::none(), py::arg("max_version") = py::none(),
+          py::arg("dl_device") = py::none(), py::arg("copy") = py::none())
+      .def("rows", &rows_of, py::arg("begin"), py::arg("end"))
+      .def("joined", &joined, py::arg("other"))
+      .def("to_host", &to_host)
+      .def("__repr__", [](const DeviceArray& a) {
+        return "DeviceArray(shape=" + std::string(py::str(py::tuple(py::cast(a.shape)))) + ", dtype=" +
+               std::string(py::str(py::dtype(a.type()))) + ", device=" + std::to_string(a.device) + ")";
+      });
+}
+
+py::dict to_dict(const DeviceResults& r, std::uint32_t n_worlds) {
+  const auto array = [&](const void* data, char kind, int item_bytes, std::vector<std::int64_t> shape) {
+    return py::cast(DeviceArray{r.memory, data, std::move(shape), kind, item_bytes, r.device});
+  };
+  const auto n_vf = static_cast<std::int64_t>(r.n_vf), n_ee = static_cast<std::int64_t>(r.n_ee),
+             n_ef = static_cast<std::int64_t>(r.n_ef);
+  py::dict d;
+  d["vf"] = array(r.vf, 'u', 4, {n_vf, 2});
+  d["ee"] = array(r.ee, 'u', 4, {n_ee, 4});
+  d["ef"] = array(r.ef, 'u', 4, {n_ef, 3});
+  d["vf_values"] = array(r.values, 'f', 8, {n_vf});
+  d["ee_values"] = array(r.values ? r.values + n_vf : nullptr, 'f', 8, {n_ee});
+  const auto places = [&](const void* p, std::vector<std::int64_t> row) {
+    row.insert(row.begin(), p ? n_vf + n_ee : 0);
+    return array(p, 'f', 8, std::move(row));
+  };
+  d["points"] = places(r.points, {3});
+  d["normals"] = places(r.normals, {3});
+  d["closest"] = places(r.closest, {2, 3});
+  d["first_toc"] = r.first_toc;
+  d["hash"] = r.hash;
+  d["slices"] = py::none();
+  if (!r.hashes) return d;
+  const std::int64_t worlds = n_worlds;
+  const auto of_worlds = [&](const void* p, char kind, std::int64_t n) -> py::object {
+    return p ? array(p, kind, 8, {n}) : py::none();
+  };
+  d["slices"] = py::dict(py::arg("vf") = of_worlds(r.vf_offsets, 'i', worlds + 1),
+                         py::arg("ee") = of_worlds(r.ee_offsets, 'i', worlds + 1),
+                         py::arg("ef") = of_worlds(r.ef_offsets, 'i', worlds + 1),
+                         py::arg("hashes") = of_worlds(r.hashes, 'u', worlds),
+                         py::arg("first_tocs") = of_worlds(r.first_tocs, 'f', worlds));
+  return d;
+}
+
+}  // namespace hpccd

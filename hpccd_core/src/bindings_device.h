@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: Apache-2.0
+// Results that stay on a device, for Python.
+#pragma once
+
+#include <pybind11/pybind11.h>
+
+#include "hpccd/hpccd.h"
+
+namespace hpccd {
+
+void bind_device_array(pybind11::module_& m);
+
+// Arrays by name, as of results on the host; what a query does not give is left out.
+pybind11::dict to_dict(const DeviceResults& results, std::uint32_t n_worlds);
+
+}  // namespace hpccd
