@@ -21,8 +21,9 @@ class MotionQueries:
     _core: _core.Detector
 
     def detect(self, vertices_t0: ArrayLike | DeviceArray, vertices_t1: ArrayLike | DeviceArray) -> Contacts:
-        """Contacts of the motion from vertices_t0 to vertices_t1, each (V, 3) float32 or float64; of W worlds (W, V, 3).
+        """Contacts of the motion from vertices_t0 to vertices_t1, each (V, 3) float32 or float64.
 
+        Of W worlds (W, V, 3).
         C-contiguous arrays are read in place. Arrays in a GPU's memory (CUDA array interface or DLPack: CuPy, PyTorch,
         Warp; C-contiguous, backend "gpu" or "auto") are used there without a copy. Raises TypeError for a wrong dtype
         or a masked element, ValueError for a wrong shape or a coordinate that is NaN, infinite or beyond 1e150.
@@ -32,8 +33,9 @@ class MotionQueries:
     def collision_free_step(
         self, vertices_t0: ArrayLike | DeviceArray, vertices_t1: ArrayLike | DeviceArray
     ) -> float | NDArray[np.float64]:
-        """The largest part of the motion, in [0, 1], that is certainly free of contacts; 1.0 where nothing touches. Of W
-        worlds (W,) float64, that of each.
+        """The largest part of the motion, in [0, 1], that is certainly free of contacts; 1.0 where nothing touches.
+
+        Of W worlds (W,) float64, that of each.
 
         vertices_t0, vertices_t1: as for detect(), with the same errors. Up to, not including, the time returned nothing
         touches, or comes within the separation; 0.0 where something does so at the start. "exact" and "conservative":

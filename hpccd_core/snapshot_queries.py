@@ -26,11 +26,11 @@ class SnapshotQueries:
     def proximity(self, vertices: ArrayLike | DeviceArray, distance: float) -> Proximity:
         """All vertex-face and edge-edge pairs within a distance of each other, features that share a vertex apart.
 
-        vertices: (V, 3), of W worlds (W, V, 3), float32 or float64, taken as by detect(), but up to 1e300. distance: Euclidean, between closed
-        features, in units of the coordinates; 0 gives those that touch. "exact" and "conservative" report exactly the
-        pairs that rational arithmetic would; "balanced" and "fast" promise it not, but are computed alike today;
-        distances are within 1e-12 of the scene's size. Neighbours that share no vertex count like all others: with a
-        distance beyond the shortest edge all of them are reported.
+        vertices: (V, 3), of W worlds (W, V, 3), float32 or float64, taken as by detect(), but up to 1e300. distance:
+        Euclidean, between closed features, in units of the coordinates; 0 gives those that touch. "exact" and
+        "conservative" report exactly the pairs that rational arithmetic would; "balanced" and "fast" promise it not,
+        but are computed alike today; distances are within 1e-12 of the scene's size. Neighbours that share no vertex
+        count like all others: with a distance beyond the shortest edge all of them are reported.
         """
         distance = arguments.length("distance", distance)
         found = self._ask("proximity", vertices, distance)
@@ -40,8 +40,8 @@ class SnapshotQueries:
     def intersections(self, vertices: ArrayLike | DeviceArray) -> Intersections:
         """All edges that pierce or touch a face with which they share no vertex, coplanar ones included.
 
-        vertices: (V, 3), of W worlds (W, V, 3), float32 or float64, taken as by detect(), but up to 1e300. Decided as rational arithmetic
-        would, at every accuracy.
+        vertices: (V, 3), of W worlds (W, V, 3), float32 or float64, taken as by detect(), but up to 1e300. Decided as
+        rational arithmetic would, at every accuracy.
         """
         found = self._ask("intersections", vertices)
         slices = found.pop("slices")
@@ -50,9 +50,9 @@ class SnapshotQueries:
     def distances(self, vertices: ArrayLike | DeviceArray) -> list[Gap] | list[list[Gap]]:
         """The smallest distance of each pair of meshes that the scene enables, within a mesh too.
 
-        vertices: (V, 3), of W worlds (W, V, 3), float32 or float64, taken as by detect(), but up to 1e300. One Gap for each pair, in the order
-        in which the meshes were added: (0, 0), (0, 1), ... Of W worlds a list of W such lists. Found by branch and
-        bound, without a list of pairs.
+        vertices: (V, 3), of W worlds (W, V, 3), float32 or float64, taken as by detect(), but up to 1e300. One Gap for
+        each pair, in the order in which the meshes were added: (0, 0), (0, 1), ... Of W worlds a list of W such lists.
+        Found by branch and bound, without a list of pairs.
         """
         names = self._mesh_names
         gaps = [

@@ -206,33 +206,32 @@ PYBIND11_MODULE(_core, m) {
       });
 
   py::class_<Detector>(m, "Detector")
-      .def(
-          py::init([](std::shared_ptr<Scene> scene, Accuracy accuracy, Backend backend, Report report, Simd simd,
-                      int threads, bool points, bool normals, bool closest, double separation, Method method,
-                      bool restructure, std::size_t hybrid_segments, std::size_t hybrid_segment_pairs, int gpus,
-                      bool gpu_stages, bool vertex_face, bool edge_edge, std::uint32_t worlds) {
-            // A copy: what is added to the caller's scene later does not reach this detector.
-            return std::make_unique<Detector>(std::make_shared<const Scene>(*scene), Options{accuracy,
-                                                                                             backend,
-                                                                                             report,
-                                                                                             simd,
-                                                                                             threads,
-                                                                                             points,
-                                                                                             normals,
-                                                                                             closest,
-                                                                                             separation,
-                                                                                             method,
-                                                                                             restructure,
-                                                                                             hybrid_segments,
-                                                                                             hybrid_segment_pairs,
-                                                                                             gpus,
-                                                                                             gpu_stages,
-                                                                                             {vertex_face, edge_edge},
-                                                                                             worlds});
-          }),
-          "scene"_a, "accuracy"_a, "backend"_a, "report"_a, "simd"_a, "threads"_a, "points"_a, "normals"_a, "closest"_a,
-          "minimum_separation"_a, "method"_a, "restructure"_a, "hybrid_segments"_a, "hybrid_segment_pairs"_a, "gpus"_a,
-          "gpu_stages"_a, "vertex_face"_a, "edge_edge"_a, "worlds"_a)
+      .def(py::init([](std::shared_ptr<Scene> scene, Accuracy accuracy, Backend backend, Report report, Simd simd,
+                       int threads, bool points, bool normals, bool closest, double separation, Method method,
+                       bool restructure, std::size_t hybrid_segments, std::size_t hybrid_segment_pairs, int gpus,
+                       bool gpu_stages, bool vertex_face, bool edge_edge, std::uint32_t worlds) {
+             // A copy: what is added to the caller's scene later does not reach this detector.
+             return std::make_unique<Detector>(std::make_shared<const Scene>(*scene), Options{accuracy,
+                                                                                              backend,
+                                                                                              report,
+                                                                                              simd,
+                                                                                              threads,
+                                                                                              points,
+                                                                                              normals,
+                                                                                              closest,
+                                                                                              separation,
+                                                                                              method,
+                                                                                              restructure,
+                                                                                              hybrid_segments,
+                                                                                              hybrid_segment_pairs,
+                                                                                              gpus,
+                                                                                              gpu_stages,
+                                                                                              {vertex_face, edge_edge},
+                                                                                              worlds});
+           }),
+           "scene"_a, "accuracy"_a, "backend"_a, "report"_a, "simd"_a, "threads"_a, "points"_a, "normals"_a,
+           "closest"_a, "minimum_separation"_a, "method"_a, "restructure"_a, "hybrid_segments"_a,
+           "hybrid_segment_pairs"_a, "gpus"_a, "gpu_stages"_a, "vertex_face"_a, "edge_edge"_a, "worlds"_a)
       .def(
           "detect",
           [](Detector& d, const py::array& t0, const py::array& t1) {

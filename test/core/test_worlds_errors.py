@@ -51,7 +51,7 @@ def test_shapes(worlds):
             lambda x: detector.proximity(x, 0.1),
             lambda x: detector.collision_free_step(x, v),
         ):
-            with pytest.raises(ValueError, match=rf"vertices\S*: expected shape \(9, {v.shape[1]}, 3\), for each world"):
+            with pytest.raises(ValueError, match=rf"vertices\S*: expected shape \(9, {v.shape[1]}, 3\), for each"):
                 ask(wrong)
     with pytest.raises(ValueError, match=rf"expected shape \({v.shape[1]}, 3\), one row"):
         hc.Detector(worlds.scene, backend="cpu").detect(v, v)

@@ -39,6 +39,8 @@ void OneByOne::count(std::map<std::string, std::uint64_t>& stats) const {
   stats["bytes"] += memories_.bytes();
 }
 
-void OneByOne::add_stages(std::map<std::string, double>& stages) const { stages.insert(stages_.begin(), stages_.end()); }
+void OneByOne::add_stages(std::map<std::string, double>& stages) const {
+  stages.insert(stages_.begin(), stages_.end());
+}
 
 }  // namespace hpccd
