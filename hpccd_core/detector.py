@@ -28,6 +28,7 @@ from .options import (
 )
 from .scene import Scene
 from .snapshot_queries import SnapshotQueries, names_of_one_argument
+from .worlds import answer_of
 
 
 class Detector(MotionQueries, SnapshotQueries):
@@ -184,7 +185,7 @@ class Detector(MotionQueries, SnapshotQueries):
             kind = "float64" if last.is_double else "float32"
             raise TypeError(f"vertices: the last step was {kind} on the device; give that again, or call reset() first")
         with names_of_one_argument():  # the device checks the first one too, as a step that goes nowhere
-            contacts = self._contacts(self._of_places("detect", place if last is None else last, place))
+            contacts = answer_of(Contacts, self._of_places("detect", place if last is None else last, place))
         self._last_on_device.keep(place, self._rows)
         return Contacts.none(self.worlds) if last is None else contacts
 

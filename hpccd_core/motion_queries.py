@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from . import _core, arguments, device_arrays
 from .contacts import Contacts
 from .device_arrays import DeviceArray, DevicePositions
-from .worlds import Slices
+from .worlds import answer_of
 
 
 class MotionQueries:
@@ -28,7 +28,7 @@ class MotionQueries:
         Warp; C-contiguous, backend "gpu" or "auto") are used there without a copy. Raises TypeError for a wrong dtype
         or a masked element, ValueError for a wrong shape or a coordinate that is NaN, infinite or beyond 1e150.
         """
-        return self._contacts(self._of_motion("detect", vertices_t0, vertices_t1))
+        return answer_of(Contacts, self._of_motion("detect", vertices_t0, vertices_t1))
 
     def collision_free_step(
         self, vertices_t0: ArrayLike | DeviceArray, vertices_t1: ArrayLike | DeviceArray
@@ -54,12 +54,8 @@ class MotionQueries:
         """
         if self.worlds is None:
             return float(self._of_motion("collision_free_step", vertices_t0, vertices_t1))
-        return self._of_motion("collision_free_steps", vertices_t0, vertices_t1)
-
-    @staticmethod
-    def _contacts(found: Any) -> Contacts:
-        slices = found.pop("slices")
-        return Contacts(**found, slices=slices and Slices(**slices))
+        steps: NDArray[np.float64] = self._of_motion("collision_free_steps", vertices_t0, vertices_t1)
+        return steps
 
     def _of_motion(self, query: str, vertices_t0: object, vertices_t1: object) -> Any:
         on_device = [device_arrays.is_on_device(v) for v in (vertices_t0, vertices_t1)]

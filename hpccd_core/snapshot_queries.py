@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from . import _core, arguments, device_arrays
 from .device_arrays import DeviceArray
 from .proximity import Gap, Intersections, Proximity
-from .worlds import Slices
+from .worlds import answer_of
 
 
 class SnapshotQueries:
@@ -33,9 +33,7 @@ class SnapshotQueries:
         count like all others: with a distance beyond the shortest edge all of them are reported.
         """
         distance = arguments.length("distance", distance)
-        found = self._ask("proximity", vertices, distance)
-        slices = found.pop("slices")
-        return Proximity(**found, slices=slices and Slices(**slices))
+        return answer_of(Proximity, self._ask("proximity", vertices, distance))
 
     def intersections(self, vertices: ArrayLike | DeviceArray) -> Intersections:
         """All edges that pierce or touch a face with which they share no vertex, coplanar ones included.
@@ -43,9 +41,7 @@ class SnapshotQueries:
         vertices: (V, 3), of W worlds (W, V, 3), float32 or float64, taken as by detect(), but up to 1e300. Decided as
         rational arithmetic would, at every accuracy.
         """
-        found = self._ask("intersections", vertices)
-        slices = found.pop("slices")
-        return Intersections(**found, slices=slices and Slices(**slices))
+        return answer_of(Intersections, self._ask("intersections", vertices))
 
     def distances(self, vertices: ArrayLike | DeviceArray) -> list[Gap] | list[list[Gap]]:
         """The smallest distance of each pair of meshes that the scene enables, within a mesh too.

@@ -2,7 +2,8 @@
 """The answers of many worlds in one: where the rows of each stand among those of all."""
 
 import dataclasses
-from typing import TypeVar
+from collections.abc import Callable
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 from . import arguments
 
 Row = TypeVar("Row", bound=np.generic)
+Answer = TypeVar("Answer", bound="OfWorlds")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -31,6 +33,13 @@ class Slices:
         """Of worlds without contacts."""
         begin = np.zeros(worlds + 1, np.int64)
         return cls(begin, begin.copy(), np.empty(0, np.int64), np.zeros(worlds, np.uint64), np.full(worlds, np.inf))
+
+
+def answer_of(kind: Callable[..., Answer], found: Any) -> Answer:
+    """The answer of this kind that the core gives as a dict."""
+    if slices := found.get("slices"):
+        found["slices"] = Slices(**slices)
+    return kind(**found)
 
 
 class OfWorlds:

@@ -36,15 +36,15 @@ Positions on_device(std::uintptr_t pointer, std::size_t n, bool is_double) {
   return {reinterpret_cast<const void*>(pointer), n, is_double, true};
 }
 
-py::object slices_of(WorldSlices&& s, std::vector<double>&& first_tocs) {
-  if (s.hashes.empty()) return py::none();
+void add_slices(py::dict& answer, WorldSlices&& s, std::vector<double>&& first_tocs = {}) {
+  if (s.hashes.empty()) return;
   py::dict d;
   d["vf"] = hand_over<std::int64_t>(std::move(s.vf));
   d["ee"] = hand_over<std::int64_t>(std::move(s.ee));
   d["ef"] = hand_over<std::int64_t>(std::move(s.ef));
   d["hashes"] = hand_over<std::uint64_t>(std::move(s.hashes));
   d["first_tocs"] = hand_over<double>(std::move(first_tocs));
-  return d;
+  answer["slices"] = std::move(d);
 }
 
 py::dict to_dict(Contacts&& c) {
@@ -58,7 +58,7 @@ py::dict to_dict(Contacts&& c) {
   d["closest"] = hand_over<double>(std::move(c.closest), 2, 3);
   d["first_toc"] = c.first_toc;
   d["hash"] = c.hash;
-  d["slices"] = slices_of(std::move(c.slices), std::move(c.first_tocs));
+  add_slices(d, std::move(c.slices), std::move(c.first_tocs));
   return d;
 }
 
@@ -70,7 +70,7 @@ py::dict to_dict(Proximity&& c) {
   d["ee_distance"] = hand_over<double>(std::move(c.ee_distance));
   d["closest"] = hand_over<double>(std::move(c.closest), 2, 3);
   d["hash"] = c.hash;
-  d["slices"] = slices_of(std::move(c.slices), {});
+  add_slices(d, std::move(c.slices));
   return d;
 }
 
@@ -78,7 +78,7 @@ py::dict to_dict(Intersections&& c) {
   py::dict d;
   d["ef"] = hand_over<std::uint32_t>(std::move(c.ef), 3);
   d["hash"] = c.hash;
-  d["slices"] = slices_of(std::move(c.slices), {});
+  add_slices(d, std::move(c.slices));
   return d;
 }
 
