@@ -48,7 +48,7 @@ class OfWorlds:
     slices: Slices | None
 
     def _offsets(self, kind: str, rows: int) -> NDArray[np.int64]:
-        return np.array([0, rows]) if self.slices is None else getattr(self.slices, kind)
+        return np.array([0, rows], np.int64) if self.slices is None else getattr(self.slices, kind)
 
     def _world_number(self, k: int) -> int:
         return arguments.whole_number("world", k, 0, 0 if self.slices is None else len(self.slices.hashes) - 1)

@@ -11,6 +11,7 @@ bool OneByOne::each_world(const Ask& ask) {
   if (beside_) beside_->begin_worlds();
   for (std::size_t k = 0; k < n_worlds(); ++k) {
     shared_.cancellation.heed();
+    if (one_.failures().gave_up()) return false;
     std::optional<WorldVisit> visit;
     if (beside_) visit.emplace(*beside_, memories_, k);
     if (!ask(one_, k)) return false;

@@ -16,9 +16,11 @@ class Device final : public DetectionBackend {
  public:
   std::size_t fails_at = n_worlds, refuses_at = n_worlds, on_cpu_at = n_worlds;
   std::size_t asked = 0;
+  bool breaks_down = false;  // and leaves it to the CPU beside it
 
   std::optional<Detection> detect(Positions t0, Positions) override {
     const std::size_t call = asked++;
+    if (breaks_down) failures_.failed("for a test");
     if (call == fails_at) return std::nullopt;
     if (call == refuses_at) throw InvalidArgument("vertices_t1[5]: moves");
     const double x = static_cast<const double*>(t0.data)[0];
@@ -59,8 +61,8 @@ struct ManyOnDevice {
 };
 
 TEST(OneByOne, RowsOfEachWorldStandTogether) {
-  ManyOnDevice s;
-  const auto found = s.detect();
+  ManyOnDevice m;
+  const auto found = m.detect();
   ASSERT_TRUE(found);
   EXPECT_EQ(found->computed_by, Backend::gpu);
   const Contacts& c = found->contacts;
@@ -71,31 +73,38 @@ TEST(OneByOne, RowsOfEachWorldStandTogether) {
   EXPECT_EQ(c.first_toc, 0.25);
   EXPECT_EQ(c.first_tocs[1], 0.5);
   std::map<std::string, std::uint64_t> stats;
-  s.many.count(stats);
+  m.many.count(stats);
   EXPECT_EQ(stats["pairs"], 10 * n_worlds);
   std::map<std::string, double> stages;
-  s.many.add_stages(stages);
+  m.many.add_stages(stages);
   EXPECT_EQ(stages["gpu/boxes"], 0.5 * n_worlds);
 }
 
 TEST(OneByOne, AFailureLeavesAllWorldsToTheCpu) {
-  ManyOnDevice s;
-  s.device.fails_at = 2;
-  EXPECT_FALSE(s.detect());
-  EXPECT_EQ(s.device.asked, 3u);
+  ManyOnDevice m;
+  m.device.fails_at = 2;
+  EXPECT_FALSE(m.detect());
+  EXPECT_EQ(m.device.asked, 3u);
+}
+
+TEST(OneByOne, AfterThreeFailuresInARowTheDeviceIsLeftAlone) {
+  ManyOnDevice m;
+  m.device.breaks_down = true;
+  EXPECT_FALSE(m.detect());
+  EXPECT_EQ(m.device.asked, 3u);
 }
 
 TEST(OneByOne, WhatTheCpuDidOfOneWorldIsSaidOfAll) {
-  ManyOnDevice s;
-  s.device.on_cpu_at = 1;
-  EXPECT_EQ(s.detect()->computed_by, Backend::cpu);
+  ManyOnDevice m;
+  m.device.on_cpu_at = 1;
+  EXPECT_EQ(m.detect()->computed_by, Backend::cpu);
 }
 
 TEST(OneByOne, ARefusalNamesTheWorld) {
-  ManyOnDevice s;
-  s.device.refuses_at = 1;
+  ManyOnDevice m;
+  m.device.refuses_at = 1;
   try {
-    s.detect();
+    m.detect();
     FAIL();
   } catch (const InvalidArgument& error) {
     EXPECT_EQ(std::string(error.what()), "vertices_t1[1, 5]: moves");
@@ -103,11 +112,11 @@ TEST(OneByOne, ARefusalNamesTheWorld) {
 }
 
 TEST(OneByOne, AQueryThatIsNotOfferedIsLeftToTheCpu) {
-  ManyOnDevice s;
-  EXPECT_FALSE(s.many.distances(test::view(s.positions)));
-  EXPECT_FALSE(s.many.earliest(test::view(s.positions), test::view(s.positions)));
-  EXPECT_FALSE(s.many.proximity(test::view(s.positions), 0.1));
-  EXPECT_FALSE(s.many.intersections(test::view(s.positions)));
+  ManyOnDevice m;
+  EXPECT_FALSE(m.many.distances(test::view(m.positions)));
+  EXPECT_FALSE(m.many.earliest(test::view(m.positions), test::view(m.positions)));
+  EXPECT_FALSE(m.many.proximity(test::view(m.positions), 0.1));
+  EXPECT_FALSE(m.many.intersections(test::view(m.positions)));
 }
 
 }  // namespace
