@@ -2,7 +2,7 @@
 """The compiled module (src/bindings.cpp). Names and arguments are compared with it by test/packaging/test_core_stub.py,
 which tells how to draw up anew what pybind11 itself says of them."""
 
-from typing import Any, ClassVar, TypedDict
+from typing import Any, ClassVar, NotRequired, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
@@ -93,7 +93,7 @@ class _Contacts(TypedDict):
     closest: NDArray[np.float64]
     first_toc: float
     hash: int
-    slices: _Slices | None  # of several worlds
+    slices: NotRequired[_Slices]  # of several worlds
 
 class _Proximity(TypedDict):
     vf: NDArray[np.uint32]
@@ -102,12 +102,12 @@ class _Proximity(TypedDict):
     ee_distance: NDArray[np.float64]
     closest: NDArray[np.float64]
     hash: int
-    slices: _Slices | None  # of several worlds
+    slices: NotRequired[_Slices]  # of several worlds
 
 class _Intersections(TypedDict):
     ef: NDArray[np.uint32]
     hash: int
-    slices: _Slices | None  # of several worlds
+    slices: NotRequired[_Slices]  # of several worlds
 
 _Gap = tuple[int, int, float, str, list[int], NDArray[np.float64]]
 

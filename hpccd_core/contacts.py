@@ -30,11 +30,11 @@ class Contacts(PairsOfWorlds):
     edge b; empty (0, 2, 3) unless "closest" is among the detector's outputs.
     first_toc: the earliest time, +inf where nothing touches.
     hash: 64-bit, the same for the same contacts on any backend and any number of threads.
-    Of a detector of W worlds: the rows of the first world, then those of the second, ...; in points, normals and closest
-    first the vertex-face rows of all worlds. Indices are those of one world. vf_offsets, ee_offsets: (W+1,) int64, where
-    those of each world begin. first_tocs: (W,) float64; first_toc is the least of them. hash: the sum of each world's
-    hash times 2 k + 1, modulo 2**64. world(k): the contacts of one world, as a detector of its own gives them. Without
-    worlds it is as with one: offsets [0, N] and [0, M], one first_tocs, world(0).
+    Of a detector of W worlds: the rows of the first world, then those of the second, ...; in points, normals and
+    closest first the vertex-face rows of all worlds. Indices are those of one world. vf_offsets, ee_offsets: (W+1,)
+    int64, where the rows of each world begin, and N or M. first_tocs: (W,) float64; first_toc is the least of them.
+    hash: the sum of each world's hash times 2 k + 1, modulo 2**64. world(k): the contacts of one world, as a detector
+    of its own gives them. Without worlds it is as with one: offsets [0, N] and [0, M], one of first_tocs, world(0).
     """
 
     vf: NDArray[np.uint32]
@@ -54,7 +54,7 @@ class Contacts(PairsOfWorlds):
         return np.array([self.first_toc]) if self.slices is None else self.slices.first_tocs
 
     def world(self, k: int) -> "Contacts":
-        """The contacts of world k, 0 <= k < W: every array and the hash as a detector of this world alone gives them."""
+        """The contacts of world k, 0 <= k < W: every array and the hash as a detector of it alone gives them."""
         k = self._world_number(k)
         if self.slices is None:
             return self

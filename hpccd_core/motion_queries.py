@@ -11,7 +11,7 @@ from .contacts import Contacts
 from .device_arrays import DeviceArray, DevicePositions
 from .device_results import DeviceContacts
 from .options import Results
-from .worlds import Slices
+from .worlds import answer_of
 
 
 class MotionQueries:
@@ -26,8 +26,9 @@ class MotionQueries:
     def detect(
         self, vertices_t0: ArrayLike | DeviceArray, vertices_t1: ArrayLike | DeviceArray, stream: object = None
     ) -> Contacts | DeviceContacts:
-        """Contacts of the motion from vertices_t0 to vertices_t1, each (V, 3) float32 or float64; of W worlds (W, V, 3).
+        """Contacts of the motion from vertices_t0 to vertices_t1, each (V, 3) float32 or float64.
 
+        Of W worlds (W, V, 3).
         C-contiguous arrays are read in place. Arrays in a GPU's memory (CUDA array interface or DLPack: CuPy, PyTorch,
         Warp; C-contiguous, backend "gpu" or "auto") are used there without a copy. Raises TypeError for a wrong dtype
         or a masked element, ValueError for a wrong shape or a coordinate that is NaN, infinite or beyond 1e150.
@@ -41,8 +42,9 @@ class MotionQueries:
     def collision_free_step(
         self, vertices_t0: ArrayLike | DeviceArray, vertices_t1: ArrayLike | DeviceArray, stream: object = None
     ) -> float | NDArray[np.float64]:
-        """The largest part of the motion, in [0, 1], that is certainly free of contacts; 1.0 where nothing touches. Of W
-        worlds (W,) float64, that of each.
+        """The largest part of the motion, in [0, 1], that is certainly free of contacts; 1.0 where nothing touches.
+
+        Of W worlds (W,) float64, that of each.
 
         vertices_t0, vertices_t1: as for detect(), with the same errors. Up to, not including, the time returned nothing
         touches, or comes within the separation; 0.0 where something does so at the start. "exact" and "conservative":
@@ -59,17 +61,14 @@ class MotionQueries:
         apart by less than half an edge. Where they do not, each call searches anew. Other queries in between do no
         harm; a new separation ends it.
         """
-        times = self._of_motion("collision_free_steps", vertices_t0, vertices_t1, stream)
+        times: NDArray[np.float64] = self._of_motion("collision_free_steps", vertices_t0, vertices_t1, stream)
         return float(times[0]) if self.worlds is None else times
 
     def _asked(self, query: str) -> str:
         return f"{query}_on_device" if self.results == "device" else query
 
     def _contacts(self, found: Any) -> Contacts | DeviceContacts:
-        if self.results == "device":
-            return device_results.contacts_of(found)
-        slices = found.pop("slices")
-        return Contacts(**found, slices=slices and Slices(**slices))
+        return device_results.contacts_of(found) if self.results == "device" else answer_of(Contacts, found)
 
     def _of_motion(self, query: str, vertices_t0: object, vertices_t1: object, stream: object = None) -> Any:
         on_device = [device_arrays.is_on_device(v) for v in (vertices_t0, vertices_t1)]

@@ -32,7 +32,7 @@ class Proximity(PairsOfWorlds):
     slices: Slices | None = dataclasses.field(default=None, repr=False)
 
     def world(self, k: int) -> "Proximity":
-        """The pairs of world k, 0 <= k < W: every array and the hash as a detector of this world alone gives them."""
+        """The pairs of world k, 0 <= k < W: every array and the hash as a detector of it alone gives them."""
         k = self._world_number(k)
         if self.slices is None:
             return self
@@ -60,8 +60,8 @@ class Intersections(OfWorlds):
     ef: (K, 3) uint32, the edge's vertices a0<a1 and the face, scene-wide indices, sorted lexicographically. An edge and
     a face that share a vertex do not count.
     hash: 64-bit, the same for the same pairs on any backend and any number of threads.
-    Of a detector of W worlds: the rows of the first world, then those of the second, ... ef_offsets: (W+1,) int64, where
-    those of each world begin; world(k), and hash, as in Contacts.
+    Of a detector of W worlds: the rows of the first world, then those of the second, ... ef_offsets: (W+1,) int64,
+    where those of each world begin; world(k), and hash, as in Contacts.
     """
 
     ef: NDArray[np.uint32]
@@ -74,7 +74,7 @@ class Intersections(OfWorlds):
         return self._offsets("ef", len(self.ef))
 
     def world(self, k: int) -> "Intersections":
-        """The pairs of world k, 0 <= k < W: the array and the hash as a detector of this world alone gives them."""
+        """The pairs of world k, 0 <= k < W: the array and the hash as a detector of it alone gives them."""
         k = self._world_number(k)
         if self.slices is None:
             return self

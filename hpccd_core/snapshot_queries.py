@@ -13,7 +13,7 @@ from .device_arrays import DeviceArray
 from .device_results import DeviceIntersections, DeviceProximity
 from .options import Results
 from .proximity import Gap, Intersections, Proximity
-from .worlds import Slices
+from .worlds import answer_of
 
 
 class SnapshotQueries:
@@ -31,37 +31,39 @@ class SnapshotQueries:
     ) -> Proximity | DeviceProximity:
         """All vertex-face and edge-edge pairs within a distance of each other, features that share a vertex apart.
 
-        vertices: (V, 3), of W worlds (W, V, 3), float32 or float64, taken as by detect(), but up to 1e300. distance: Euclidean, between closed
-        features, in units of the coordinates; 0 gives those that touch. "exact" and "conservative" report exactly the
-        pairs that rational arithmetic would; "balanced" and "fast" promise it not, but are computed alike today;
-        distances are within 1e-12 of the scene's size. Neighbours that share no vertex count like all others: with a
-        distance beyond the shortest edge all of them are reported.
+        vertices: (V, 3), of W worlds (W, V, 3), float32 or float64, taken as by detect(), but up to 1e300. distance:
+        Euclidean, between closed features, in units of the coordinates; 0 gives those that touch. "exact" and
+        "conservative" report exactly the pairs that rational arithmetic would; "balanced" and "fast" promise it not,
+        but are computed alike today; distances are within 1e-12 of the scene's size. Neighbours that share no vertex
+        count like all others: with a distance beyond the shortest edge all of them are reported. stream: as for
+        detect(). With results="device" the answer is a DeviceProximity.
         """
         distance = arguments.length("distance", distance)
-        found = self._ask("proximity", vertices, distance)
-        slices = found.pop("slices")
-        return Proximity(**found, slices=slices and Slices(**slices))
+        if self.results == "device":
+            return device_results.proximity_of(self._ask("proximity_on_device", vertices, stream, distance))
+        return answer_of(Proximity, self._ask("proximity", vertices, stream, distance))
 
     def intersections(
         self, vertices: ArrayLike | DeviceArray, stream: object = None
     ) -> Intersections | DeviceIntersections:
         """All edges that pierce or touch a face with which they share no vertex, coplanar ones included.
 
-        vertices: (V, 3), of W worlds (W, V, 3), float32 or float64, taken as by detect(), but up to 1e300. Decided as rational arithmetic
-        would, at every accuracy.
+        vertices: (V, 3), of W worlds (W, V, 3), float32 or float64, taken as by detect(), but up to 1e300. Decided as
+        rational arithmetic would, at every accuracy. stream: as for detect(). With results="device" the answer is a
+        DeviceIntersections.
         """
-        found = self._ask("intersections", vertices)
-        slices = found.pop("slices")
-        return Intersections(**found, slices=slices and Slices(**slices))
+        if self.results == "device":
+            return device_results.intersections_of(self._ask("intersections_on_device", vertices, stream))
+        return answer_of(Intersections, self._ask("intersections", vertices, stream))
 
     def distances(
         self, vertices: ArrayLike | DeviceArray, stream: object = None
     ) -> list[Gap] | list[list[Gap]]:
         """The smallest distance of each pair of meshes that the scene enables, within a mesh too.
 
-        vertices: (V, 3), of W worlds (W, V, 3), float32 or float64, taken as by detect(), but up to 1e300. One Gap for each pair, in the order
-        in which the meshes were added: (0, 0), (0, 1), ... Of W worlds a list of W such lists. Found by branch and
-        bound, without a list of pairs.
+        vertices: (V, 3), of W worlds (W, V, 3), float32 or float64, taken as by detect(), but up to 1e300. One Gap for
+        each pair, in the order in which the meshes were added: (0, 0), (0, 1), ... Of W worlds a list of W such lists.
+        Found by branch and bound, without a list of pairs.
         """
         names = self._mesh_names
         gaps = [

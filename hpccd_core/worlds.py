@@ -2,7 +2,8 @@
 """The answers of many worlds in one: where the rows of each stand among those of all."""
 
 import dataclasses
-from typing import TypeVar
+from collections.abc import Callable
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 from . import arguments
 
 Row = TypeVar("Row", bound=np.generic)
+Answer = TypeVar("Answer", bound="OfWorlds")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -33,13 +35,20 @@ class Slices:
         return cls(begin, begin.copy(), np.empty(0, np.int64), np.zeros(worlds, np.uint64), np.full(worlds, np.inf))
 
 
+def answer_of(kind: Callable[..., Answer], found: Any) -> Answer:
+    """The answer of this kind that the core gives as a dict."""
+    if slices := found.get("slices"):
+        found["slices"] = Slices(**slices)
+    return kind(**found)
+
+
 class OfWorlds:
     """An answer that may be of many worlds. Without `slices` it is of one, whose rows are all."""
 
     slices: Slices | None
 
     def _offsets(self, kind: str, rows: int) -> NDArray[np.int64]:
-        return np.array([0, rows]) if self.slices is None else getattr(self.slices, kind)
+        return np.array([0, rows], np.int64) if self.slices is None else getattr(self.slices, kind)
 
     def _world_number(self, k: int) -> int:
         return arguments.whole_number("world", k, 0, 0 if self.slices is None else len(self.slices.hashes) - 1)

@@ -41,15 +41,15 @@ struct GivenPositions {
   }
 };
 
-py::object slices_of(WorldSlices&& s, std::vector<double>&& first_tocs) {
-  if (s.hashes.empty()) return py::none();
+void add_slices(py::dict& answer, WorldSlices&& s, std::vector<double>&& first_tocs = {}) {
+  if (s.hashes.empty()) return;
   py::dict d;
   d["vf"] = hand_over<std::int64_t>(std::move(s.vf));
   d["ee"] = hand_over<std::int64_t>(std::move(s.ee));
   d["ef"] = hand_over<std::int64_t>(std::move(s.ef));
   d["hashes"] = hand_over<std::uint64_t>(std::move(s.hashes));
   d["first_tocs"] = hand_over<double>(std::move(first_tocs));
-  return d;
+  answer["slices"] = std::move(d);
 }
 
 py::dict to_dict(Contacts&& c) {
@@ -63,7 +63,7 @@ py::dict to_dict(Contacts&& c) {
   d["closest"] = hand_over<double>(std::move(c.closest), 2, 3);
   d["first_toc"] = c.first_toc;
   d["hash"] = c.hash;
-  d["slices"] = slices_of(std::move(c.slices), std::move(c.first_tocs));
+  add_slices(d, std::move(c.slices), std::move(c.first_tocs));
   return d;
 }
 
@@ -75,7 +75,7 @@ py::dict to_dict(Proximity&& c) {
   d["ee_distance"] = hand_over<double>(std::move(c.ee_distance));
   d["closest"] = hand_over<double>(std::move(c.closest), 2, 3);
   d["hash"] = c.hash;
-  d["slices"] = slices_of(std::move(c.slices), {});
+  add_slices(d, std::move(c.slices));
   return d;
 }
 
@@ -83,7 +83,7 @@ py::dict to_dict(Intersections&& c) {
   py::dict d;
   d["ef"] = hand_over<std::uint32_t>(std::move(c.ef), 3);
   d["hash"] = c.hash;
-  d["slices"] = slices_of(std::move(c.slices), {});
+  add_slices(d, std::move(c.slices));
   return d;
 }
 
@@ -211,34 +211,34 @@ PYBIND11_MODULE(_core, m) {
   bind_device_array(m);
 
   py::class_<Detector>(m, "Detector")
-      .def(
-          py::init([](std::shared_ptr<Scene> scene, Accuracy accuracy, Backend backend, Report report, Simd simd,
-                      int threads, bool points, bool normals, bool closest, double separation, Method method,
-                      bool restructure, std::size_t hybrid_segments, std::size_t hybrid_segment_pairs, int gpus,
-                      bool gpu_stages, bool vertex_face, bool edge_edge, bool results_on_device, std::uint32_t worlds) {
-            // A copy: what is added to the caller's scene later does not reach this detector.
-            return std::make_unique<Detector>(std::make_shared<const Scene>(*scene), Options{accuracy,
-                                                                                             backend,
-                                                                                             report,
-                                                                                             simd,
-                                                                                             threads,
-                                                                                             points,
-                                                                                             normals,
-                                                                                             closest,
-                                                                                             separation,
-                                                                                             method,
-                                                                                             restructure,
-                                                                                             hybrid_segments,
-                                                                                             hybrid_segment_pairs,
-                                                                                             gpus,
-                                                                                             gpu_stages,
-                                                                                             {vertex_face, edge_edge},
-                                                                                             results_on_device,
-                                                                                             worlds});
-          }),
-          "scene"_a, "accuracy"_a, "backend"_a, "report"_a, "simd"_a, "threads"_a, "points"_a, "normals"_a, "closest"_a,
-          "minimum_separation"_a, "method"_a, "restructure"_a, "hybrid_segments"_a, "hybrid_segment_pairs"_a, "gpus"_a,
-          "gpu_stages"_a, "vertex_face"_a, "edge_edge"_a, "results_on_device"_a, "worlds"_a)
+      .def(py::init([](std::shared_ptr<Scene> scene, Accuracy accuracy, Backend backend, Report report, Simd simd,
+                       int threads, bool points, bool normals, bool closest, double separation, Method method,
+                       bool restructure, std::size_t hybrid_segments, std::size_t hybrid_segment_pairs, int gpus,
+                       bool gpu_stages, bool vertex_face, bool edge_edge, bool results_on_device, std::uint32_t worlds) {
+             // A copy: what is added to the caller's scene later does not reach this detector.
+             return std::make_unique<Detector>(std::make_shared<const Scene>(*scene), Options{accuracy,
+                                                                                              backend,
+                                                                                              report,
+                                                                                              simd,
+                                                                                              threads,
+                                                                                              points,
+                                                                                              normals,
+                                                                                              closest,
+                                                                                              separation,
+                                                                                              method,
+                                                                                              restructure,
+                                                                                              hybrid_segments,
+                                                                                              hybrid_segment_pairs,
+                                                                                              gpus,
+                                                                                              gpu_stages,
+                                                                                              {vertex_face, edge_edge},
+                                                                                              results_on_device,
+                                                                                              worlds});
+           }),
+           "scene"_a, "accuracy"_a, "backend"_a, "report"_a, "simd"_a, "threads"_a, "points"_a, "normals"_a,
+           "closest"_a, "minimum_separation"_a, "method"_a, "restructure"_a, "hybrid_segments"_a,
+           "hybrid_segment_pairs"_a, "gpus"_a, "gpu_stages"_a, "vertex_face"_a, "edge_edge"_a,
+           "results_on_device"_a, "worlds"_a)
       .def(
           "detect",
           [](Detector& d, const GivenPositions& t0, const GivenPositions& t1) {

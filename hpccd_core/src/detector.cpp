@@ -186,7 +186,8 @@ std::vector<double> Detector::collision_free_steps(Positions t0, Positions t1) {
 namespace {
 
 Proximity as_proximity(Contacts&& c) {
-  return {std::move(c.vf), std::move(c.vf_toc), std::move(c.ee), std::move(c.ee_toc), std::move(c.closest), c.hash, std::move(c.slices)};
+  return {std::move(c.vf), std::move(c.vf_toc), std::move(c.ee), std::move(c.ee_toc), std::move(c.closest),
+          c.hash,          std::move(c.slices)};
 }
 
 }  // namespace

@@ -51,7 +51,8 @@ def test_on_any_number_of_threads(threads, n):
     together = worlds.detector(threads=threads)
     found = together.collision_free_step(worlds.start, worlds.end)
     assert_proximity(
-        together.proximity(worlds.start, 0.1), [d.proximity(v, 0.1) for d, v in zip(worlds.alone(), worlds.start)]
+        together.proximity(worlds.start, 0.1),
+        [d.proximity(v, 0.1) for d, v in zip(worlds.alone(), worlds.start, strict=True)],
     )
     alone = [d.collision_free_step(a, b) for d, a, b in zip(worlds.alone(), worlds.start, worlds.end, strict=True)]
     np.testing.assert_array_equal(found, alone)

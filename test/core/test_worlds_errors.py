@@ -9,6 +9,7 @@ import pytest
 from many_worlds import assert_contacts
 
 import hpccd_core as hc
+from hpccd_core import device_arrays
 
 
 @pytest.fixture
@@ -51,7 +52,7 @@ def test_shapes(worlds):
             lambda x: detector.proximity(x, 0.1),
             lambda x: detector.collision_free_step(x, v),
         ):
-            with pytest.raises(ValueError, match=rf"vertices\S*: expected shape \(9, {v.shape[1]}, 3\), for each world"):
+            with pytest.raises(ValueError, match=rf"vertices\S*: expected shape \(9, {v.shape[1]}, 3\), for each"):
                 ask(wrong)
     with pytest.raises(ValueError, match=rf"expected shape \({v.shape[1]}, 3\), one row"):
         hc.Detector(worlds.scene, backend="cpu").detect(v, v)
@@ -132,6 +133,41 @@ def test_a_separation_from_the_next_call_on_in_every_world(worlds):
             detector.set_separation(0, 0, separation)
         expected = [d.detect(a, b) for d, a, b in zip(alone, worlds.start, worlds.end, strict=True)]
         assert_contacts(together.detect(worlds.start, worlds.end), expected)
+
+
+class OnDevice:
+    """Stands for an array in a GPU's memory; nobody looks there."""
+
+    def __init__(self, shape, strides=None):
+        self.__cuda_array_interface__ = {"shape": shape, "typestr": "<f8", "data": (4096, False), "strides": strides}
+
+
+@pytest.mark.parametrize(
+    ("shape", "strides"),
+    [
+        ((4, 5, 3), None),
+        ((4, 5, 3), (120, 24, 8)),
+        ((1, 5, 3), (7, 24, 8)),
+        ((4, 1, 3), (24, 0, 8)),
+        ((0, 5, 3), (1,) * 3),
+    ],
+)
+def test_arrays_on_the_device(shape, strides):
+    place = device_arrays.positions("vertices", OnDevice(shape, strides), shape)
+    assert place == (4096, True)
+
+
+@pytest.mark.parametrize(
+    ("array", "why"),
+    [
+        (OnDevice((5, 3)), r"expected shape \(4, 5, 3\), for each world one row a vertex of the scene, got \(5, 3\)"),
+        (OnDevice((3, 5, 3)), r"got \(3, 5, 3\)"),
+        (OnDevice((4, 5, 3), (240, 24, 8)), "must be C-contiguous"),
+    ],
+)
+def test_other_arrays_on_the_device(array, why):
+    with pytest.raises(ValueError, match=f"vertices: {why}" if why.startswith("exp") else why):
+        device_arrays.positions("vertices", array, (4, 5, 3))
 
 
 def test_a_scene_without_vertices():

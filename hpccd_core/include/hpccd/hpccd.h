@@ -233,8 +233,8 @@ class Detector {
   DeviceResults proximity_on_device(Positions vertices, double distance);
   DeviceResults intersections_on_device(Positions vertices);
   // The smallest distance of each enabled pair of meshes, by (mesh_a, mesh_b), mesh_a <= mesh_b. Of pairs of features
-  // whose distances are the same double the first in order, vertex-face before edge-edge. Of several worlds those of the
-  // first, then those of the second, ...: as many of each.
+  // whose distances are the same double the first in order, vertex-face before edge-edge. Of several worlds those of
+  // the first, then those of the second, ...: as many of each.
   std::vector<Gap> distances(Positions vertices);
 
   // As Scene::set_separation, from the next call on, which fits its boxes to it as to any motion.

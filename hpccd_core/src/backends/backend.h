@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the detector asks of each place where a step can be computed. Positions are those of all its worlds, one world
-// after the other, and so are the answers, with their slices where there are several. A backend of one world takes those
-// of one; WorldByWorld makes of it one of many.
+// after the other, and so are the answers, with their slices where there are several. A backend of one world takes
+// those of one; WorldByWorld makes of it one of many.
 #pragma once
 
 #include <map>

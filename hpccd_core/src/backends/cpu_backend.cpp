@@ -158,9 +158,7 @@ void CpuBackend::count(std::map<std::string, std::uint64_t>& stats) const {
   if (method_) method_->count(stats);
 }
 
-void CpuBackend::begin_worlds() {
-  counts_of_worlds_.emplace();
-}
+void CpuBackend::begin_worlds() { counts_of_worlds_.emplace(); }
 
 void CpuBackend::begin_world(WorldMemory& memory, TreeBudget& trees) {
   // Of several contacts any may be the one that is found, but the same one as by a detector of this world alone.

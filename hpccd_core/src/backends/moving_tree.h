@@ -79,8 +79,8 @@ class MovingTree {
   ThreadPool& pool_;
   MotionBounds motion_;
   KeptTree kept_;
-  bool fits_ = false;      // the tree's boxes are those of the last motion
-  bool followed_ = false;  // ... of the motion before, so that what rests can stay
+  bool fits_ = false;       // the tree's boxes are those of the last motion
+  bool followed_ = false;   // ... of the motion before, so that what rests can stay
   OwnTree* own_ = nullptr;  // of the world that is looked at
   TreeBudget* budget_ = nullptr;
   bool always_own_ = false;

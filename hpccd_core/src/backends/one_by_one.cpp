@@ -11,6 +11,7 @@ bool OneByOne::each_world(const Ask& ask) {
   beside_.begin_worlds();
   for (std::size_t k = 0; k < n_worlds(); ++k) {
     shared_.cancellation.heed();
+    if (one_.failures().gave_up()) return false;
     const WorldVisit visit(beside_, memories_, k);
     if (!ask(one_, k)) return false;
     add_counts();
@@ -38,6 +39,8 @@ void OneByOne::count(std::map<std::string, std::uint64_t>& stats) const {
   stats["bytes"] += memories_.bytes();
 }
 
-void OneByOne::add_stages(std::map<std::string, double>& stages) const { stages.insert(stages_.begin(), stages_.end()); }
+void OneByOne::add_stages(std::map<std::string, double>& stages) const {
+  stages.insert(stages_.begin(), stages_.end());
+}
 
 }  // namespace hpccd

@@ -14,8 +14,7 @@ void WorkCounts::add(const std::vector<Worker>& workers) {
   for (const Worker& w : workers) {
     node_pairs += w.node_pairs, leaf_pairs += w.leaf_pairs;
     leaf_pairs_seconds += w.leaf_pairs_time.seconds();
-    const double a_tick =
-        w.elementary_ticks == 0 ? 0 : w.elementary_seconds / static_cast<double>(w.elementary_ticks);
+    const double a_tick = w.elementary_ticks == 0 ? 0 : w.elementary_seconds / static_cast<double>(w.elementary_ticks);
     for (int k = 0; k < 3; ++k) {
       batches[k] += w.counts[k];
       add_fallbacks(fallbacks[k], w.fallbacks[k]);

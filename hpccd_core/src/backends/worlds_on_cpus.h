@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Many worlds on CPU threads, each by one thread. What a step needs is the thread's, and stays in its core's cache; of a
-// world only little is kept from call to call (world_memory.h).
+// Many worlds on CPU threads, each by one thread. What a step needs is the thread's, and stays in its core's cache; of
+// a world only little is kept from call to call (world_memory.h).
 #pragma once
 
 #include <memory>
@@ -56,7 +56,7 @@ class WorldsOnCpus final : public WorldByWorld {
 
   CpuBackend& on_all_threads_;
   WorldMemories& memories_;
-  ThreadPool one_thread_{1};  // of each engine: it runs a job where it is called
+  ThreadPool one_thread_{1};                      // of each engine: it runs a job where it is called
   std::vector<std::unique_ptr<Engine>> engines_;  // by thread, from its first world on
 };
 

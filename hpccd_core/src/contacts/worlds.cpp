@@ -32,7 +32,8 @@ void copy_rows(const std::vector<Row>& from, std::size_t first, std::size_t n, s
                const Cancellation& cancellation) {
   in_pieces(cancellation, n, 1 << 14, [&](std::size_t begin, std::size_t end) {
     std::copy(from.begin() + static_cast<std::ptrdiff_t>(first + begin),
-              from.begin() + static_cast<std::ptrdiff_t>(first + end), to.begin() + static_cast<std::ptrdiff_t>(at + begin));
+              from.begin() + static_cast<std::ptrdiff_t>(first + end),
+              to.begin() + static_cast<std::ptrdiff_t>(at + begin));
   });
 }
 
