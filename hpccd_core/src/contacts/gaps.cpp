@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "contacts/gaps.h"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -10,6 +11,7 @@
 #include "elementary/exact/distance.h"
 #include "elementary/inside.h"
 #include "elementary/intersection_batch.h"
+#include "elementary/undecided.h"
 
 namespace hpccd {
 namespace {

@@ -1,41 +1,42 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where two segments that touch meet: parallel ones, points and any two lengths included.
+// Where two segments that touch meet: parallel ones, points and any two lengths included. On CPUs and devices.
 #pragma once
 
-#include <algorithm>
-#include <cmath>
+#include <math.h>
 
 #include "base/vec3.h"
 
 namespace hpccd {
 
 // max_norm by instructions rather than by comparisons, whose outcomes no processor can predict.
-inline double largest(Vec3<double> v) { return std::max(std::max(std::fabs(v.x), std::fabs(v.y)), std::fabs(v.z)); }
+HPCCD_HD double largest(Vec3<double> v) { return greater(fabs(v.z), greater(fabs(v.y), fabs(v.x))); }
+
+HPCCD_HD double clamped(double place) { return lesser(1.0, greater(0.0, place)); }
 
 // Scaled first, so that lengths near the ends of the number range survive being squared. Zero stays zero.
-inline Vec3<double> unit(Vec3<double> v) {
+HPCCD_HD Vec3<double> unit(Vec3<double> v) {
   const double most = largest(v);
   if (!(most > 0)) return {0, 0, 0};
   v = {v.x / most, v.y / most, v.z / most};
-  return (1 / std::sqrt(dot(v, v))) * v;
+  return (1 / sqrt(dot(v, v))) * v;
 }
 
 struct Segment {
   Vec3<double> start, along;
-  Vec3<double> at(double place) const { return start + place * along; }
+  HPCCD_HD Vec3<double> at(double place) const { return start + place * along; }
 };
 
 // The place of the segment nearest to x. The length divides on its own: its square may underflow.
-inline double nearest_place(const Segment& s, Vec3<double> x) {
+HPCCD_HOST_DEVICE inline double nearest_place(const Segment& s, Vec3<double> x) {
   const double size = largest(s.along);
   if (!(size > 0)) return 0;
   const Vec3<double> u{s.along.x / size, s.along.y / size, s.along.z / size};
-  return std::clamp(dot(x - s.start, u) / dot(u, u) / size, 0.0, 1.0);
+  return clamped(dot(x - s.start, u) / dot(u, u) / size);
 }
 
 // The place on `longer`, which is no point, where the lines cross; the middle of what `shorter` covers of it where they
 // are parallel.
-inline double crossing_place(const Segment& longer, const Segment& shorter) {
+HPCCD_HOST_DEVICE inline double crossing_place(const Segment& longer, const Segment& shorter) {
   // Below this sine all of the overlap lies within 1e-10 of both; above it a crossing is rounded by 1e-6 of the length
   // along them, and so by 1e-16 across.
   constexpr double parallel = 1e-10;
@@ -49,7 +50,7 @@ inline double crossing_place(const Segment& longer, const Segment& shorter) {
 }
 
 // The place on `shorter` nearest to `longer`.
-inline double meeting_place(const Segment& longer, const Segment& shorter) {
+HPCCD_HOST_DEVICE inline double meeting_place(const Segment& longer, const Segment& shorter) {
   const double size = largest(longer.along);
   if (!(size > 0)) return 0;
   const auto gap = [&](double place) {
@@ -59,7 +60,8 @@ inline double meeting_place(const Segment& longer, const Segment& shorter) {
   double best = nearest_place(shorter, longer.at(crossing_place(longer, shorter))), least = gap(best);
   if (least <= 1e-10 * size) return best;
   // Two segments that do not cross are nearest at an end of one of them.
-  for (const double place : {0.0, 1.0, nearest_place(shorter, longer.at(0)), nearest_place(shorter, longer.at(1))})
+  const double ends[4] = {0, 1, nearest_place(shorter, longer.at(0)), nearest_place(shorter, longer.at(1))};
+  for (const double place : ends)
     if (const double g = gap(place); g < least) least = g, best = place;
   return best;
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "contacts/places.h"
 
-#include "contacts/nearest_points.h"
+#include "elementary/undecided.h"
 
 namespace hpccd {
 namespace {
@@ -10,23 +10,24 @@ std::array<double, 3> row(const Vec3<double>& v) { return {v.x, v.y, v.z}; }
 
 }  // namespace
 
+PairPlaces pair_places(const UndecidedPair& q, double toc, Outputs outputs) {
+  ByIntegers integers;
+  return q.kind == Kind::vertex_face
+             ? pair_places<Kind::vertex_face>(q.t0, q.t1, toc, q.separation, outputs, integers)
+             : pair_places<Kind::edge_edge>(q.t0, q.t1, toc, q.separation, outputs, integers);
+}
+
+void write_places(Contacts& c, std::size_t i, const UndecidedPair& pair, double toc, Outputs outputs) {
+  const PairPlaces places = pair_places(pair, toc, outputs);
+  if (outputs.points) c.points[i] = row(places.point);
+  if (outputs.normals) c.normals[i] = row(places.normal);
+  if (outputs.closest) c.closest[i] = {row(places.closest[0]), row(places.closest[1])};
+}
+
 void write_places(Contacts& c, std::size_t i, const Candidate& pair, double toc, const Geometry& geometry,
                   Outputs outputs) {
-  if (!outputs.points && !outputs.normals && !outputs.closest) return;
-  const UndecidedPair q = undecided_pair(geometry, pair);
-  const bool separated = outputs.at == AtTime::contact && q.separation > 0;
-  std::optional<NearestPoints> nearest;
-  if (outputs.closest || separated) nearest = nearest_points(q, outputs.at == AtTime::contact ? toc : 0);
-  if (outputs.closest) c.closest[i] = {row(nearest->on_first), row(nearest->on_second)};
-  if (!outputs.points && !outputs.normals) return;
-  // At no distance as in plain contact: there is no direction between the points.
-  const bool apart = separated && nearest->distance > 0;
-  const ContactPoint p = apart ? ContactPoint{} : contact_point(geometry, pair.kind, pair.first, pair.second, toc);
-  if (outputs.points)
-    c.points[i] = apart ? row(0.5 * nearest->on_first + 0.5 * nearest->on_second)
-                        : std::array<double, 3>{p.point[0], p.point[1], p.point[2]};
-  if (outputs.normals)
-    c.normals[i] = apart ? row(nearest->direction) : std::array<double, 3>{p.normal[0], p.normal[1], p.normal[2]};
+  if (outputs.points || outputs.normals || outputs.closest)
+    write_places(c, i, undecided_pair(geometry, pair), toc, outputs);
 }
 
 }  // namespace hpccd

@@ -2,21 +2,16 @@
 // Points, normals and nearest points of a contact, as far as they were asked for.
 #pragma once
 
-#include "contacts/geometry.h"
+#include "contacts/pair_places.h"
+#include "elementary/batch.h"
 #include "elementary/pair.h"
-#include "hpccd/hpccd.h"
 
 namespace hpccd {
 
-// When the features are looked at for points and directions.
-enum class AtTime : bool { contact, start };
-
-struct Outputs {
-  bool points, normals, closest;
-  AtTime at;
-};
+PairPlaces pair_places(const UndecidedPair& pair, double toc, Outputs outputs);
 
 // Into entry i of lists that have room for it.
+void write_places(Contacts& contacts, std::size_t i, const UndecidedPair& pair, double toc, Outputs outputs);
 void write_places(Contacts& contacts, std::size_t i, const Candidate& pair, double toc, const Geometry& geometry,
                   Outputs outputs);
 

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // Sides of contacts: those that doubles are sure of against exact arithmetic, and exact arithmetic itself.
-#include "contacts/geometry.h"
+#include "contacts/contact_point.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <random>
 
-#include "contacts/meeting_point.h"
+#include "contacts/places.h"
 #include "elementary/exact/contact.h"
 
 namespace hpccd {
@@ -19,16 +19,11 @@ struct Moving {
   V t0[4], t1[4];
 };
 
-ContactPoint contact_point_of(Kind kind, const Moving& q, double toc) {
-  VertexMotion rows[4] = {};
-  for (int i = 0; i < 4; ++i) {
-    const V &x = q.t0[i], &y = q.t1[i];
-    rows[i] = {{x.x, x.y, x.z}, {y.x, y.y, y.z}};
-  }
-  const std::array<std::uint32_t, 2> edges[2] = {{0, 1}, {2, 3}};
-  const std::array<std::uint32_t, 3> face[1] = {{1, 2, 3}};
-  const Geometry geometry{rows, edges, face};
-  return contact_point(geometry, kind, 0, kind == Kind::vertex_face ? 0 : 1, toc);
+// Of plain contact.
+PairPlaces places_of(Kind kind, const Moving& q, double toc) {
+  UndecidedPair pair{kind, {}, {}, 0};
+  for (int i = 0; i < 4; ++i) pair.t0[i] = q.t0[i], pair.t1[i] = q.t1[i];
+  return pair_places(pair, toc, {true, true, false, AtTime::contact});
 }
 
 // Steps of any length: the shorter, the more often the side at t = 0 is not that before the contact.
@@ -46,10 +41,8 @@ TEST_P(RandomContacts, SidesAreThoseOfExactArithmetic) {
     const auto toc = exact::earliest_contact(kind, q.t0, q.t1);
     if (!toc) continue;
     ++contacts;
-    const ContactPoint found = contact_point_of(kind, q, *toc);
     const exact::Approach a = exact::approach(kind, q.t0, q.t1, *toc);
-    const V normal{found.normal[0], found.normal[1], found.normal[2]};
-    EXPECT_LE(largest(normal - a.side * unit(a.n)), 1e-9) << "query " << i;
+    EXPECT_LE(largest(places_of(kind, q, *toc).normal - a.side * unit(a.n)), 1e-9) << "query " << i;
   }
   EXPECT_GT(contacts, 100);
 }

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+// Who answers where doubles are not sure of a place or a direction: the integers; or nobody yet, on devices.
+#pragma once
+
+#include "elementary/exact/contact.h"
+#include "elementary/exact/distance.h"
+
+namespace hpccd {
+
+struct ByIntegers {
+  exact::Nearest nearest(Kind kind, const Vec3<double> q[4]) const { return exact::nearest(kind, q); }
+  exact::Approach approach(Kind kind, const Vec3<double> q_t0[4], const Vec3<double> q_t1[4], double toc) const {
+    return exact::approach(kind, q_t0, q_t1, toc);
+  }
+};
+
+// What was answered with means nothing once anything is open.
+struct LeftOpen {
+  bool open = false;
+
+  HPCCD_HD exact::Nearest nearest(Kind, const Vec3<double>*) {
+    open = true;
+    return {};
+  }
+  HPCCD_HD exact::Approach approach(Kind, const Vec3<double>*, const Vec3<double>*, double) {
+    open = true;
+    return {};
+  }
+};
+
+}  // namespace hpccd

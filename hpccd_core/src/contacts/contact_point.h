@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: Apache-2.0
+// Where two features touch and along which direction, at their time of contact: on CPUs and devices.
+#pragma once
+
+#include "contacts/arbiters.h"
+#include "contacts/meeting_point.h"
+#include "elementary/inside.h"
+
+namespace hpccd {
+
+// Of vertices as in motion.h, which it keeps by address.
+template <Kind kind>
+class ContactPoint {
+  using V = Vec3<double>;
+
+ public:
+  HPCCD_HD ContactPoint(const V t0[4], const V t1[4], double toc)
+      : t0_(t0),
+        t1_(t1),
+        t_(toc),
+        m_(motion_of<kind>(t0, t1)),
+        p_(interpolate(m_.p0, m_.p1, toc)),
+        a_(interpolate(m_.a0, m_.a1, toc)),
+        b_(interpolate(m_.b0, m_.b1, toc)),
+        n_(cross(a_, b_)),
+        nn_(dot(n_, n_)) {
+    const Magnitudes<double> size{greater(largest(m_.p1), largest(m_.p0)), greater(largest(m_.a1), largest(m_.a0)),
+                                  greater(largest(m_.b1), largest(m_.b0))};
+    product_ = size.p * size.a * size.b;
+    // Below this sine of the angle between a and b, relative to their largest lengths in the step, the roundings of n
+    // (20 u) are no longer small beside it.
+    constexpr double flat = 1e-6;
+    regular_ = in_range(size) && largest(n_) > flat * (size.a * size.b);
+  }
+
+  // The vertex; or on the shorter edge where the other crosses it, in the middle of what they share where they are
+  // parallel. Neither names nor their order matter to this or the normal.
+  HPCCD_HOST_DEVICE V point() const {
+    if constexpr (kind == Kind::vertex_face) return at(0);
+    return crossing();
+  }
+
+  // Unit length, at toc: of the face towards the side on which the vertex is just before toc, or a x b from a towards
+  // the side on which b is then. With contact at t = 0 just before it is where the straight-line motion would have come
+  // from. Zero where there is no such side, because the motion is coplanar throughout, or no direction, because
+  // features are degenerate or parallel at toc.
+  template <class Arbiter>
+  HPCCD_HOST_DEVICE V normal(Arbiter& arbiter) const {
+    if (const int side = regular_ ? certain_side() : 0) return (side / sqrt(nn_)) * n_;
+    const exact::Approach a = arbiter.approach(kind, t0_, t1_, t_);
+    return a.side * unit(a.n);
+  }
+
+ private:
+  HPCCD_HD V at(int i) const { return interpolate(t0_[i], t1_[i], t_); }
+
+  // The side of n on which p is just before the contact; 0: not certain. With f = p . n and M = |p||a||b|, |f| <= 6 M,
+  // |f'| <= 36 M, |f''| <= 144 M; counting roundings as in coplanarity.h, f is known to 108 u M and f' to 600 u M.
+  HPCCD_HD int certain_side() const {
+    const double f = dot(p_, n_), error = 1.5e-14 * product_;
+    const V da = m_.a1 - m_.a0, db = m_.b1 - m_.b0;
+    const double slope = dot(m_.p1 - m_.p0, n_) + dot(p_, cross(da, b_) + cross(a_, db));
+    // The root of f that belongs to the contact lies within the rounding of its time, or, in the tiers that promise no
+    // time, about f / f' away. Up to twice as far (Kantorovich) f' shall keep its sign: then f comes from the other
+    // side.
+    constexpr double time_error = 4e-12;
+    const double steep = fabs(slope) - 1.2e-13 * product_;
+    if (!(steep > 0 && steep * steep > 150 * product_ * (time_error * steep + 2 * (fabs(f) + error)))) return 0;
+    return slope < 0 ? 1 : -1;
+  }
+
+  // On the shorter edge: what is within rounding of it need not be within 1e-9 of its length on the longer one.
+  HPCCD_HOST_DEVICE V crossing() const {
+    const double size_a = largest(a_), size_b = largest(b_);
+    const bool a_shorter = size_a < size_b;
+    const auto on_shorter = [&](double place) { return a_shorter ? at(0) + place * a_ : at(2) + place * b_; };
+    if (regular_) {
+      const double per_nn = 1 / nn_;
+      const double on_a = clamped(per_nn * dot(cross(p_, b_), n_)), on_b = clamped(per_nn * dot(cross(p_, a_), n_));
+      // What is left across both is no matter of the places.
+      const V gap = p_ + on_b * b_ - on_a * a_, along = gap - (per_nn * dot(gap, n_)) * n_;
+      if (largest(along) <= 1e-10 * greater(size_b, size_a)) return on_shorter(a_shorter ? on_a : on_b);
+    }
+    const Segment a{{0, 0, 0}, a_}, b{p_, b_};
+    return on_shorter(a_shorter ? meeting_place(b, a) : meeting_place(a, b));
+  }
+
+  const V *t0_, *t1_;
+  double t_;
+  Motion<double> m_;
+  V p_, a_, b_, n_;  // at the time of contact: as in motion.h, and a x b
+  double nn_;        // |n|^2
+  double product_;   // |p||a||b|, the largest of the step in the maximum norm
+  bool regular_;     // doubles hold all products, and n is known well
+};
+
+}  // namespace hpccd

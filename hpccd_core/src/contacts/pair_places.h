@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+// Point, normal and nearest points of one pair, as far as they were asked for: on CPUs and devices.
+#pragma once
+
+#include "contacts/contact_point.h"
+#include "contacts/nearest_points.h"
+
+namespace hpccd {
+
+// When the features are looked at for points and directions.
+enum class AtTime : bool { contact, start };
+
+struct Outputs {
+  bool points, normals, closest;
+  AtTime at;
+};
+
+struct PairPlaces {
+  Vec3<double> point, normal;
+  Vec3<double> closest[2];  // on the first feature, on the second
+};
+
+// Vertices as in motion.h. What nobody asked for is zero.
+template <Kind kind, class Arbiter>
+HPCCD_HD PairPlaces pair_places(const Vec3<double> t0[4], const Vec3<double> t1[4], double toc, double separation,
+                                Outputs outputs, Arbiter& arbiter) {
+  PairPlaces places{};
+  const double time = outputs.at == AtTime::contact ? toc : 0;
+  const bool separated = outputs.at == AtTime::contact && separation > 0;
+  if (outputs.closest || separated) {
+    const NearestPoints nearest = nearest_points<kind>(t0, t1, time, arbiter);
+    if (outputs.closest) places.closest[0] = nearest.on_first, places.closest[1] = nearest.on_second;
+    // At no distance as in plain contact: there is no direction between the points.
+    if (separated && nearest.distance > 0) {
+      if (outputs.points) places.point = 0.5 * nearest.on_first + 0.5 * nearest.on_second;
+      if (outputs.normals) places.normal = nearest.direction;
+      return places;
+    }
+  }
+  if (!outputs.points && !outputs.normals) return places;
+  const ContactPoint<kind> contact(t0, t1, time);
+  if (outputs.points) places.point = contact.point();
+  if (outputs.normals) places.normal = contact.normal(arbiter);
+  return places;
+}
+
+}  // namespace hpccd
