@@ -12,6 +12,7 @@
 #include "elementary/apart_until.h"
 #include "elementary/exact/intersection.h"
 #include "gpu/download.h"
+#include "gpu/results_to_device.h"
 #include "scene/static_meshes.h"
 
 namespace hpccd {
@@ -77,14 +78,19 @@ std::optional<DeviceResults> GpuBackend::detect_on_device(Positions t0, Position
   require_rest(t0, t1);
   return attempt([&] {
     run_contacts(t0, t1);
-    return on_device(finish_on_device());
+    DeviceResults found = on_device(finish_on_device());
+    const Options& o = shared_.options;
+    add_places(found, {o.points, o.normals, o.closest, AtTime::contact}, shared_.separations_now(), t0, t1);
+    return found;
   });
 }
 
 std::optional<DeviceResults> GpuBackend::proximity_on_device(Positions vertices, double distance) {
   return attempt([&] {
     run_near_pairs(vertices, distance);
-    return on_device(finish_on_device());
+    DeviceResults found = on_device(finish_on_device());
+    add_places(found, {false, false, shared_.options.closest, AtTime::start}, {distance}, vertices, vertices);
+    return found;
   });
 }
 
@@ -248,6 +254,26 @@ void GpuBackend::add_places(Contacts& found, Outputs outputs, const Separations&
     hpccd::add_places(found, outputs, shared_.features, separations, t0, t1, shared_.pool);
   else
     add_places_of_worlds(found, outputs, shared_.features, separations, t0, t1, shared_.pool);
+}
+
+// By the CPU: where features are parallel or degenerate they take its integers.
+void GpuBackend::add_places(DeviceResults& found, Outputs outputs, const Separations& separations, Positions t0,
+                            Positions t1) {
+  if (!outputs.points && !outputs.normals && !outputs.closest) return;
+  const auto fetch = [](auto& to, const auto* from, std::size_t n) {
+    to.resize(n);
+    gpu::download(from, to.data(), n * sizeof to[0]);
+  };
+  Contacts c;
+  fetch(c.vf, found.vf, found.n_vf), fetch(c.vf_toc, found.values, found.n_vf);
+  fetch(c.ee, found.ee, found.n_ee), fetch(c.ee_toc, found.values + found.n_vf, found.n_ee);
+  if (n_worlds() > 1) {
+    fetch(c.slices.vf, found.vf_offsets, n_worlds() + 1);
+    fetch(c.slices.ee, found.ee_offsets, n_worlds() + 1);
+  }
+  add_places(c, outputs, separations, t0, t1);
+  gpu::add_places(found, c);
+  shared_.profiler.mark("places");
 }
 
 std::size_t GpuBackend::world_of(const Candidate& pair) const {

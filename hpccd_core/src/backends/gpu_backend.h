@@ -87,6 +87,7 @@ class GpuBackend final : public DetectionBackend {
   gpu::FrameResult finish_on_device();
   Contacts finish_on_host(Report report);
   DeviceResults on_device(const gpu::FrameResult& found);
+  void add_places(DeviceResults& found, Outputs outputs, const Separations& separations, Positions t0, Positions t1);
   void add_places(Contacts& found, Outputs outputs, const Separations& separations, Positions t0, Positions t1);
   Accuracy accuracy_of(const Candidate& pair) const;
 

@@ -71,13 +71,17 @@ struct Root {
 // The root of f in [low, high], which holds exactly one, with f(low) of sign `sign`. Newton's method kept inside the
 // shrinking bracket; each lane stops by its own criterion, so its result does not depend on its neighbours: where a
 // step is rounding, or below `enough`.
+// Where Newton's method begins: with more bits than doubles have at the root as doubles have it, two steps from its own.
+template <class R>
+HPCCD_HD R first_guess(const Cubic<R>& f, R low, R high, R sign);
+
 template <class R>
 HPCCD_HD Root<R> bracketed_root(const Cubic<R>& f, R error, R low, R high, R sign, typename RealTraits<R>::Mask active,
                                 double enough = 0) {
   using Mask = typename RealTraits<R>::Mask;
   const R eps(half_ulp<R>()), least_step = greater(R(2) * eps, R(enough));
   const R begin = low, end = high;
-  R t = R(0.5) * (low + high);
+  R t = first_guess(f, low, high, sign);
   R step = high - low;
   Mask running = active;
   // As many bisections as a double has bits, and some more: a root that is not there by then shows below as uncertain.
@@ -105,6 +109,17 @@ HPCCD_HD Root<R> bracketed_root(const Cubic<R>& f, R error, R low, R high, R sig
   const Mask left_sure = left <= begin || sign * value(f, left) > error;
   const Mask right_sure = right >= end || sign * value(f, right) < R(0) - error;
   return {t, delta, left_sure && right_sure};
+}
+
+template <class R>
+HPCCD_HD R first_guess(const Cubic<R>& f, R low, R high, R sign) {
+  const R middle = R(0.5) * (low + high);
+  if constexpr (requires { RealTraits<R>::half_ulp; }) {
+    const Cubic<double> g{f.c0.high, f.k1.high, f.k2.high, f.c3.high};
+    const R root(bracketed_root(g, 0.0, low.high, high.high, sign.high, true).t);
+    return root > low && root < high ? root : middle;
+  }
+  return middle;
 }
 
 }  // namespace hpccd

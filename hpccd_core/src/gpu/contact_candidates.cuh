@@ -9,9 +9,9 @@
 
 namespace hpccd::gpu {
 
-// Pairs of one kind between two lists of staged features: where the lists begin, and how long they are.
+// Pairs of one kind between two lists of staged features: where the second list begins, and how long they are.
 struct StagedPairs {
-  u32 first, second, n_first, n_second;
+  u32 second, n_first, n_second;
   __device__ u32 count() const { return n_first * n_second; }
 };
 
@@ -20,20 +20,21 @@ __device__ inline u32 quotient(u32 i, u32 n) {
   return static_cast<u32>((static_cast<float>(i) + 0.5f) * __frcp_rn(static_cast<float>(n)));
 }
 
-// first_edge: the number of their world's first one. same: of a leaf with itself, where pairs of edges come twice.
-__device__ __forceinline__ LanePair staged_pair(const StagedLeaves& s, const StagedPairs& of, u32 first_edge, u32 c,
-                                                bool edges, bool same) {
+// side: of the first features, where these are vertices. first_edge: the number of their world's first one. same: of a
+// leaf with itself, where pairs of edges come twice.
+__device__ __forceinline__ LanePair staged_pair(const StagedLeaves& s, const StagedPairs& of, u32 side, u32 first_edge,
+                                                u32 c, bool edges, bool same) {
   const u32 i = quotient(c, of.n_second), j = c - i * of.n_second;
   LanePair pair{!edges || !same || i < j, {0, 0, 0, 0}, {0, 0}};
   if (!pair.wanted) return pair;
-  const u32 x = of.first + i, y = of.second + j;
-  const DeviceBox a = s.first_box(x, edges), b = s.second_box(y);
+  const u32 y = of.second + j;
+  const DeviceBox a = edges ? s.edge_box(i) : s.vertex_box(side, i), b = s.second_box(y);
   const u32 a0 = a.tag_low(), a1 = a.tag_high(), b0 = b.tag_low(), b1 = b.tag_high();
   const u32 b2 = edges ? b1 : s.corner2[y - StagedLeaves::most_edges];
   pair.wanted = overlap<Query::contacts>(a, b) && a0 != b0 && a0 != b1 && a0 != b2 && a1 != b0 && a1 != b1;
   const u32 number = s.second_number[y];
   if (edges) {
-    const u32 own = s.first_number[x];
+    const u32 own = s.first_number[i];
     const bool ordered = own < number;
     pair.vertices = ordered ? span_ends<Kind::edge_edge>(a0, a1, b0, b1) : span_ends<Kind::edge_edge>(b0, b1, a0, a1);
     pair.features = {first_edge + (ordered ? own : number), (ordered ? number : own) | kind_bit};
@@ -44,24 +45,32 @@ __device__ __forceinline__ LanePair staged_pair(const StagedLeaves& s, const Sta
   return pair;
 }
 
+// A pair of leaves, the first numbered through all worlds, and both as the tree has them.
+struct LeavesOfPair {
+  uint2 numbers;
+  DeviceLeaf first, second;
+};
+
 template <class Policy, class T>
 __device__ __forceinline__ void contact_candidates(const LaunchParams<T>& params, StagedLeaves& s,
-                                                   CandidateState& state, uint2 leaves) {
-  const u32 world = world_of_leaves(params, leaves), first_leaf = world * params.n_leaves;
-  const u32 x = leaves.x, y = first_leaf + leaves.y;
+                                                   CandidateState& state, const LeavesOfPair& leaves) {
+  const u32 world = world_of_leaves(params, leaves.numbers);
+  const u32 x = leaves.numbers.x, y = world * params.n_leaves + leaves.numbers.y;
   const bool same = x == y;
-  const LeafCorners a = leaf_corners(params, x - first_leaf, world), b = leaf_corners(params, leaves.y, world);
-  const u32 tested = tested_features(params, a.leaf, b.leaf);
-  StagedCounts n;
-  stage_edges_and_faces<0>(params, s, a, y, tested, n);
-  stage_edges_and_faces<1>(params, s, b, x, tested, n);
-  stage_vertices_of<0>(params, s, a, y, tested, n);
-  stage_vertices_of<1>(params, s, b, x, tested, n);
+  FetchedLeaf a = begin_leaf(params, leaves.first, world), b = begin_leaf(params, leaves.second, world);
+  const u32 tested = tested_features(params, leaves.first, leaves.second);
+  fetch_corners(params, a);
+  fetch_corners(params, b);
+  stage_corners(s, a, 0);
+  stage_corners(s, b, 1);
   __syncwarp();
-  const StagedPairs edge_edge{0, 0, n.edges[0], n.edges[1]};
-  const StagedPairs vertex_face[2] = {
-      {StagedLeaves::vertices_at(0), StagedLeaves::faces_at(1), n.vertices[0], n.faces[1]},
-      {StagedLeaves::vertices_at(1), StagedLeaves::faces_at(0), n.vertices[1], same ? 0 : n.faces[0]}};
+  StagedCounts n;
+  stage_features<0>(s, a, load_box(&params.leaf_boxes[y]), tested, n);
+  stage_features<1>(s, b, load_box(&params.leaf_boxes[x]), tested, n);
+  __syncwarp();
+  const StagedPairs edge_edge{0, n.edges[0], n.edges[1]};
+  const StagedPairs vertex_face[2] = {{StagedLeaves::faces_at(1), n.vertices[0], n.faces[1]},
+                                      {StagedLeaves::faces_at(0), n.vertices[1], same ? 0 : n.faces[0]}};
   const u32 n_edges = edge_edge.count(), until_other = n_edges + vertex_face[0].count(),
             total = until_other + vertex_face[1].count();
 #pragma unroll 1
@@ -71,7 +80,7 @@ __device__ __forceinline__ void contact_candidates(const LaunchParams<T>& params
     const StagedPairs of = edges ? edge_edge : other ? vertex_face[1] : vertex_face[0];
     const u32 begin = edges ? 0 : other ? until_other : n_edges;
     LanePair pushed{false, {0, 0, 0, 0}, {0, 0}};
-    if (c < total) pushed = staged_pair(s, of, world * params.n_edges, c - begin, edges, same);
+    if (c < total) pushed = staged_pair(s, of, other, world * params.n_edges, c - begin, edges, same);
     const u32 mask = __ballot_sync(all_lanes, pushed.wanted);
     if (pushed.wanted) {
       const u32 at = state.n + __popc(mask & ((1u << lane_number()) - 1));
@@ -97,8 +106,16 @@ __global__ __launch_bounds__(32 * candidate_warps,
   StagedLeaves& s = spaces[threadIdx.x / 32];
   CandidateState state;
   for_leaf_pairs(params, [&](u64 begin, u64 end) {
+    // A lane a pair, and one more for its second leaf: what the pairs need first is fetched for all of them at once.
     const u64 own = begin + (lane_number() & 7);
     const uint2 ahead = own < end ? params.leaf_pairs.pairs[own] : uint2{0, 0};
+    const u32 first_leaf = world_of_leaves(params, ahead) * params.n_leaves;
+    const uint4 record =
+        __ldg(reinterpret_cast<const uint4*>(params.leaves + (lane_number() & 8 ? ahead.y : ahead.x - first_leaf)));
+    const auto leaf = [&](u32 lane) {
+      return DeviceLeaf{__shfl_sync(all_lanes, record.x, lane), __shfl_sync(all_lanes, record.y, lane),
+                        __shfl_sync(all_lanes, record.z, lane), __shfl_sync(all_lanes, record.w, lane)};
+    };
     const auto pair = [&](u32 k) {
       return uint2{__shfl_sync(all_lanes, ahead.x, k), __shfl_sync(all_lanes, ahead.y, k)};
     };
@@ -110,7 +127,10 @@ __global__ __launch_bounds__(32 * candidate_warps,
         near &= ~(1u << k);
     }
 #pragma unroll 1
-    for (; near; near &= near - 1) contact_candidates<Policy>(params, s, state, pair(__ffs(near) - 1));
+    for (; near; near &= near - 1) {
+      const u32 k = __ffs(near) - 1;
+      contact_candidates<Policy>(params, s, state, {pair(k), leaf(k), leaf(k + 8)});
+    }
   });
   finish_candidates<Query::contacts, Policy>(params, s, state);
 }

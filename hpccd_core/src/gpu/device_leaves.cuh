@@ -44,7 +44,6 @@ class DeviceLeaves {
         edges[s] = {edge_of_slot[s], a | b << 8};
       }
       const auto n_corners = static_cast<u32>(corners.size()) - first_corner;
-      if (n_corners > 32) throw Error("a leaf has more corners than a warp has lanes; use backend=\"cpu\"");
       packed.push_back({first_corner, l.first_edge, l.first_face,
                         DeviceLeaf::counts_of(n_corners, l.n_edges(), l.n_faces(), l.n_vertices())});
     }

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "gpu/results_to_device.h"
 
+#include <algorithm>
+#include <memory>
+#include <utility>
 #include <vector>
 
 #include "gpu/stream.h"
@@ -82,6 +85,16 @@ DeviceResults to_device(const Intersections& p, int device) {
   r.n_ef = p.ef.size(), r.ef = memory.keep(p.ef), r.hash = p.hash;
   r.ef_offsets = memory.keep_if_any(p.slices.ef), r.hashes = memory.keep_if_any(p.slices.hashes);
   return r;
+}
+
+void add_places(DeviceResults& r, const Contacts& c) {
+  const CallersDevice callers;
+  Memory memory(r.device);
+  r.points = memory.keep_if_any(c.points), r.normals = memory.keep_if_any(c.normals);
+  r.closest = memory.keep_if_any(c.closest);
+  // One owner of both.
+  r.memory = std::make_shared<std::pair<std::shared_ptr<const void>, std::shared_ptr<const void>>>(
+      r.memory, memory.begin().memory);
 }
 
 std::shared_ptr<const void> joined_on_device(const void* a, std::size_t a_bytes, const void* b, std::size_t b_bytes,

@@ -28,6 +28,7 @@ DeviceResults to_device(const Contacts&, int) { throw Error(status().reason); }
 DeviceResults to_device(const Proximity&, int) { throw Error(status().reason); }
 DeviceResults to_device(const Intersections&, int) { throw Error(status().reason); }
 
+void add_places(DeviceResults&, const Contacts&) { throw Error(status().reason); }
 std::shared_ptr<const void> joined_on_device(const void*, std::size_t, const void*, std::size_t, int) {
   throw Error(status().reason);
 }
