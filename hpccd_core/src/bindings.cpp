@@ -118,6 +118,26 @@ py::list to_list(const std::vector<Gap>& gaps) {
   return l;
 }
 
+// Arrays of rows where they are, which hold their memory.
+py::dict in_place(const DeviceResults& r) {
+  const py::capsule owner(new std::shared_ptr<const void>(r.memory),
+                          [](void* p) { delete static_cast<std::shared_ptr<const void>*>(p); });
+  const auto rows = [&](const auto* data, std::uint64_t n, auto... columns) {
+    return py::array_t<std::remove_const_t<std::remove_pointer_t<decltype(data)>>>(
+        std::vector<py::ssize_t>{static_cast<py::ssize_t>(n), py::ssize_t{columns}...}, data, owner);
+  };
+  py::dict d;
+  d["vf"] = rows(reinterpret_cast<const std::uint32_t*>(r.vf), r.n_vf, 2);
+  d["vf_toc"] = rows(r.values, r.n_vf);
+  d["ee"] = rows(reinterpret_cast<const std::uint32_t*>(r.ee), r.n_ee, 4);
+  d["ee_toc"] = rows(r.values + r.n_vf, r.n_ee);
+  for (const char* name : {"points", "normals"}) d[name] = py::array_t<double>(std::vector<py::ssize_t>{0, 3});
+  d["closest"] = py::array_t<double>(std::vector<py::ssize_t>{0, 2, 3});
+  d["first_toc"] = r.first_toc;
+  d["hash"] = r.hash;
+  return d;
+}
+
 template <class Query>
 auto unlocked(Query&& query) {
   py::gil_scoped_release release;
@@ -242,7 +262,8 @@ PYBIND11_MODULE(_core, m) {
       .def(
           "detect",
           [](Detector& d, const GivenPositions& t0, const GivenPositions& t1) {
-            return to_dict(unlocked([&] { return d.detect(t0.positions, t1.positions); }));
+            Detected found = unlocked([&] { return d.detect_in_place(t0.positions, t1.positions); });
+            return found.in_place ? in_place(*found.in_place) : to_dict(std::move(found.contacts));
           },
           "vertices_t0"_a, "vertices_t1"_a)
       .def(

@@ -68,6 +68,12 @@ struct Detector::Impl {
     return tuner.next(usable);
   }
 
+  // Whether rows may be given out where a GPU has written them.
+  bool gives_in_place(Backend picked) const {
+    const Options& o = shared.options;
+    return picked == Backend::gpu && o.worlds == 1 && !o.points && !o.normals && !o.closest;
+  }
+
   Detection compute(Backend picked, Positions t0, Positions t1) {
     for (const Backend b : {picked, Backend::cpu}) {
       if (b != Backend::gpu) t0 = backends.on_host(t0, 0), t1 = backends.on_host(t1, 1);
@@ -75,6 +81,31 @@ struct Detector::Impl {
       if (auto detection = backends.at(b).detect(t0, t1)) return std::move(*detection);
     }
     throw std::logic_error("the CPU has left a step to others");
+  }
+
+  template <bool may_be_in_place>
+  Detected detect(Positions t0, Positions t1) {
+    check(t0, t1);
+    const std::lock_guard lock(one_call);
+    cancellation().heed();
+    found.reset();
+    common.settle();
+    std::optional<gpu::CallersDevice> callers;
+    if (backends.use_devices()) callers.emplace();
+    shared.profiler.begin();
+    const Backend picked = pick(t0.on_device || t1.on_device);
+    const bool in_place = may_be_in_place && gives_in_place(picked);
+    if (in_place) {
+      asked = picked;
+      if (auto d = backends.gpu().detect_in_place(t0, t1)) {
+        note(picked, picked, d->in_place ? d->in_place->n_vf : d->contacts.vf.size(),
+             d->in_place ? d->in_place->n_ee : d->contacts.ee.size());
+        return std::move(*d);
+      }
+    }
+    Detection d = compute(in_place ? Backend::cpu : picked, t0, t1);
+    note(picked, d.computed_by, d.contacts.vf.size(), d.contacts.ee.size());
+    return {std::nullopt, std::move(d.contacts)};
   }
 
   // A query of a motion, or of a snapshot given twice: where it is offered and works, else on the CPU.
@@ -132,11 +163,11 @@ struct Detector::Impl {
     });
   }
 
-  void note(Backend picked, const Detection& d) {
-    found = {{"vf_contacts", d.contacts.vf.size()}, {"ee_contacts", d.contacts.ee.size()}};
+  void note(Backend picked, Backend computed_by, std::uint64_t n_vf, std::uint64_t n_ee) {
+    found = {{"vf_contacts", n_vf}, {"ee_contacts", n_ee}};
     shared.profiler.end();
-    last_backend = d.computed_by;
-    if (picked == d.computed_by)
+    last_backend = computed_by;
+    if (picked == computed_by)
       tuner.took(picked, shared.profiler.stages().at("total"));
     else
       tuner.failed(picked);
@@ -148,21 +179,9 @@ Detector::Detector(std::shared_ptr<const Scene> scene, Options options)
 
 Detector::~Detector() = default;
 
-Contacts Detector::detect(Positions t0, Positions t1) {
-  Impl& d = *impl_;
-  d.check(t0, t1);
-  const std::lock_guard lock(d.one_call);
-  d.cancellation().heed();
-  d.found.reset();
-  d.common.settle();
-  std::optional<gpu::CallersDevice> callers;
-  if (d.backends.use_devices()) callers.emplace();
-  d.shared.profiler.begin();
-  const Backend picked = d.pick(t0.on_device || t1.on_device);
-  Detection detection = d.compute(picked, t0, t1);
-  d.note(picked, detection);
-  return std::move(detection.contacts);
-}
+Contacts Detector::detect(Positions t0, Positions t1) { return impl_->detect<false>(t0, t1).contacts; }
+
+Detected Detector::detect_in_place(Positions t0, Positions t1) { return impl_->detect<true>(t0, t1); }
 
 DeviceResults Detector::detect_on_device(Positions t0, Positions t1) {
   DeviceResults r = impl_->on_device(

@@ -178,7 +178,7 @@ def test_one_detector_for_what_floats_suffice_for_and_what_not():
         assert_equal(there.detect(a, b), here.detect(a, b))
         passes.append(there.stats["gpu_passes"])
     assert there.stats["gpu_fallbacks"] == 0, there.last_gpu_error
-    assert passes[1] == passes[3] == 2
+    assert passes[1] >= passes[3] == 2  # the first time lists may have to grow, too
     assert passes[2] == passes[4] == 1
 
 

@@ -187,7 +187,7 @@ struct Positions {
 // Intersections. The memory is that of no later call while anybody holds it, and is taken again afterwards.
 struct DeviceResults {
   std::shared_ptr<const void> memory;  // of all that follows
-  int device = -1;
+  int device = -1;                     // -1: page-locked memory of the host
   std::uint64_t n_vf = 0, n_ee = 0, n_ef = 0;
   const std::array<std::uint32_t, 2>* vf = nullptr;
   const std::array<std::uint32_t, 4>* ee = nullptr;
@@ -203,6 +203,12 @@ struct DeviceResults {
   const double* first_tocs = nullptr;
 };
 
+// Contacts where they are already: rows in page-locked memory, as a GPU has written them, or else in vectors.
+struct Detected {
+  std::optional<DeviceResults> in_place;
+  Contacts contacts;  // where it is not
+};
+
 // One call at a time: of those that several threads make of one detector, each waits until the one before has ended.
 // Threads that are to work side by side need a detector each; the scene may be the same.
 class Detector {
@@ -214,6 +220,8 @@ class Detector {
 
   // Contacts of the straight-line motion from t0 to t1 (Kim et al. 2009, section 3.1).
   Contacts detect(Positions vertices_t0, Positions vertices_t1);
+  // The same, without a copy where there need be none.
+  Detected detect_in_place(Positions vertices_t0, Positions vertices_t1);
 
   // The largest part of the motion that is certainly free of contacts, whatever Options::report says: at the tiers
   // exact and conservative never beyond the earliest one and at most 1e-9 before it, else that of the earliest one

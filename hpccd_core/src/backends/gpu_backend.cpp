@@ -74,6 +74,18 @@ std::optional<Intersections> GpuBackend::intersections(Positions vertices) {
   return attempt([&] { return pierced_faces(vertices); });
 }
 
+std::optional<Detected> GpuBackend::detect_in_place(Positions t0, Positions t1) {
+  require_rest(t0, t1);
+  return attempt([&] {
+    run_contacts(t0, t1);
+    const gpu::FrameResult found = finish_on_device();
+    Detected d{on_device(found), {}};
+    d.in_place->device = -1;
+    if (found.memory) return d;
+    return Detected{std::nullopt, join(found, {}, shared_.features, shared_.pool)};
+  });
+}
+
 std::optional<DeviceResults> GpuBackend::detect_on_device(Positions t0, Positions t1) {
   require_rest(t0, t1);
   return attempt([&] {

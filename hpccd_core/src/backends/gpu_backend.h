@@ -28,6 +28,9 @@ class GpuBackend final : public DetectionBackend {
   std::optional<std::vector<double>> earliest(Positions t0, Positions t1) override;
   std::optional<Contacts> proximity(Positions vertices, double distance) override;
   std::optional<Intersections> intersections(Positions vertices) override;
+  // As detect, of one world, without places: rows where the device has written them, or nothing there after all: then
+  // they are in `contacts`. Nothing at all where it failed.
+  std::optional<Detected> detect_in_place(Positions t0, Positions t1);
   // The same for results that stay on the device.
   std::optional<DeviceResults> detect_on_device(Positions t0, Positions t1);
   std::optional<DeviceResults> proximity_on_device(Positions vertices, double distance);

@@ -22,8 +22,7 @@ class DeviceContacts {
       : key_bits_(static_cast<int>(key_bits)),
         n_groups_(n_groups),
         n_worlds_(n_worlds),
-        on_device_(on_device),
-        rows_(std::make_shared<RowsIn<PinnedMemory>>()) {
+        pool_(on_device) {
     if (n_groups >= 0x7FFFFFFF) throw Error("2^31 or more vertices and edges in all worlds; use backend=\"cpu\"");
     n_of_group_.reserve(n_groups + 1);
     check(cudaMemset(n_of_group_.data(), 0, n_of_group_.bytes()), "cudaMemset");
@@ -51,7 +50,11 @@ class DeviceContacts {
 
   // Places for the rows of one more frame.
   void begin() {
-    if (on_device_) rows_ = nullptr, rows_ = pool_.take();
+    rows_ = nullptr, rows_ = pool_.take();
+    if ((handed_out_ = rows_ != nullptr); !handed_out_) {
+      if (!own_) own_ = std::make_shared<RowsIn<PinnedMemory>>();
+      rows_ = own_;
+    }
     if (n_worlds_ > 1) rows_->reserve_worlds(n_worlds_);
   }
   // counted: pairs are counted as they are found.
@@ -131,7 +134,7 @@ class DeviceContacts {
   FrameResult result(Query query, const Counters& c) const {
     const ResultPlaces from = rows_->places();
     FrameResult r;
-    if (on_device_) r.memory = rows_;
+    if (handed_out_) r.memory = rows_;
     r.hash = c.world.hash;
     if (n_worlds_ > 1) {
       const auto given = [](const u64* p) { return reinterpret_cast<const std::uint64_t*>(p); };
@@ -159,7 +162,8 @@ class DeviceContacts {
   }
 
  private:
-  static unsigned blocks(const Stages& stages) { return 4 * static_cast<unsigned>(stages.multiprocessors); }
+  // Of 256 threads: as many as a multiprocessor holds at a time.
+  static unsigned blocks(const Stages& stages) { return 8 * static_cast<unsigned>(stages.multiprocessors); }
 
   template <class X>
   static void copy(X* to, const X* from, std::size_t n, cudaMemcpyKind kind, cudaStream_t stream) {
@@ -206,7 +210,6 @@ class DeviceContacts {
   const int key_bits_;
   const std::size_t n_groups_;
   const u32 n_worlds_;
-  const bool on_device_;
   std::size_t capacity_ = 0;  // of what is found
   DeviceBuffer<u64> keys_;
   DeviceBuffer<double> tocs_;
@@ -217,8 +220,9 @@ class DeviceContacts {
   DeviceBuffer<u64> sortable_keys_, sorted_keys_;
   DeviceBuffer<u32> numbers_, order_;
   DeviceBuffer<unsigned char> sort_workspace_;
-  DeviceRowsPool pool_;
-  std::shared_ptr<ResultRows> rows_;
+  RowsPool pool_;
+  std::shared_ptr<ResultRows> rows_, own_;  // of the frame; those that are not handed out
+  bool handed_out_ = false;
 };
 
 }  // namespace hpccd::gpu

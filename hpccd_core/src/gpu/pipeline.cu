@@ -169,10 +169,6 @@ class DevicePipeline : public Pipeline {
   bool gave_up_listing_ = false;
   bool given_doubles_ = true;   // in the last frame
   u64 floats_suffice_ = options_.worlds;  // in so many worlds of the last frame that asked
-  // Where the last frame had few pairs for integers, the CPU decides those of this one. For any number up to a thousand
-  // the device takes 70 to 260 us; 16 threads take 34 us for 91, 105 for 252 and 243 for 916 (H200).
-  static constexpr u64 decided_sooner_a_thread = 64;
-  bool integers_on_device_ = false;
   Goal goal_ = Goal::results;
   Best best_;
   Query query_ = Query::contacts;
@@ -197,7 +193,7 @@ bool DevicePipeline::run_frame(Positions t0, Positions t1, double distance, Thre
     params.separation = distance;
   else
     scene_.fill_separations(params);
-  params.integers_on_device = options_.results_on_device || integers_on_device_;
+  params.integers_on_device = true;
   params.wanted = wanted();
   params.largest = of_snapshot(query_) ? largest_in_snapshot : largest_coordinate;
   tree_.fill(params);
@@ -228,9 +224,6 @@ bool DevicePipeline::run_frame(Positions t0, Positions t1, double distance, Thre
     again = grow_overflowed() || again;
   }
   const u64 n_to_host = exact_last_time_ = c.to_host;
-  if (!of_snapshot(query_))
-    integers_on_device_ =
-        std::max(c.open_in_integers[0], c.to_host) > decided_sooner_a_thread * static_cast<u64>(pool.size());
   if (goal_ == Goal::results && contacts_.complete(query_, params, c, on_stream()))
     copy_counters();
   if (goal_ == Goal::near_list) near_.collect(params, c, stream_);

@@ -20,10 +20,10 @@
 
 namespace hpccd::gpu {
 
-// What a frame found: in page-locked memory that stays valid until the next frame, or on the device as long as somebody
-// holds it.
+// What a frame found, in page-locked memory or on the device: valid as long as somebody holds that memory, or, where
+// there is no such, until the next frame.
 struct FrameResult {
-  std::shared_ptr<const void> memory;  // on the device
+  std::shared_ptr<const void> memory;
   std::uint64_t n_vf = 0, n_ee = 0;
   const std::array<std::uint32_t, 2>* vf = nullptr;  // in canonical order
   const std::array<std::uint32_t, 4>* ee = nullptr;

@@ -26,8 +26,11 @@ template <class Memory>
 class RowsIn final : public ResultRows {
  public:
   ResultPlaces places() const override {
-    return {vf_.data(), ee_.data(), ef_.data(), toc_.data(), vf_.size(), ee_.size(), ef_.size(), offsets_[0].data(),
-            offsets_[1].data(), hashes_.data(), first_tocs_.data()};
+    // After a failed allocation there may be rows without times.
+    const bool whole = toc_.size() >= vf_.size() + ee_.size();
+    return {vf_.data(),         ee_.data(),         ef_.data(),     toc_.data(),
+            whole ? vf_.size() : 0, whole ? ee_.size() : 0, ef_.size(),     offsets_[0].data(),
+            offsets_[1].data(), hashes_.data(),     first_tocs_.data()};
   }
   void reserve_worlds(std::size_t n) override {
     for (auto& offsets : offsets_) offsets.reserve(n + 1);
@@ -55,12 +58,20 @@ class RowsIn final : public ResultRows {
 };
 
 // Rows that are handed out: they are taken for another frame when nobody holds them any more.
-class DeviceRowsPool {
+class RowsPool {
  public:
+  explicit RowsPool(bool on_device) : on_device_(on_device) {}
+
+  // Nothing where so many of the host's are held that page-locked memory would become scarce.
   std::shared_ptr<ResultRows> take() {
     for (const auto& rows : rows_)
       if (rows.use_count() == 1) return rows;
-    rows_.push_back(std::make_shared<RowsIn<DeviceMemory>>());
+    if (on_device_)
+      rows_.push_back(std::make_shared<RowsIn<DeviceMemory>>());
+    else if (rows_.size() < most_on_host)
+      rows_.push_back(std::make_shared<RowsIn<PinnedMemory>>());
+    else
+      return nullptr;
     return rows_.back();
   }
   std::size_t device_bytes() const {
@@ -70,6 +81,8 @@ class DeviceRowsPool {
   }
 
  private:
+  static constexpr std::size_t most_on_host = 4;
+  const bool on_device_;
   std::vector<std::shared_ptr<ResultRows>> rows_;
 };
 
