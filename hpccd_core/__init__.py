@@ -6,9 +6,10 @@ contacts = Detector(scene).detect(vertices_t0, vertices_t1)
 """
 
 from . import _find_core  # noqa: F401  (lets a source checkout use the installed extension modules)
-from ._core import Cancelled, InvalidArgument
+from ._core import Cancelled, DeviceArray, InvalidArgument
 from .contacts import Contacts
 from .detector import Detector
+from .device_results import DeviceContacts, DeviceIntersections, DeviceProximity
 from .devices import backends, gpu_status
 from .elementary import test_edge_edge, test_vertex_face
 from .proximity import Gap, Intersections, Proximity
@@ -18,6 +19,10 @@ __all__ = [
     "Cancelled",
     "Contacts",
     "Detector",
+    "DeviceArray",
+    "DeviceContacts",
+    "DeviceIntersections",
+    "DeviceProximity",
     "Gap",
     "Intersections",
     "InvalidArgument",

@@ -3,14 +3,15 @@
 
 import threading
 from collections.abc import Iterable
-from typing import Any
+from typing import Any, Literal, Unpack, cast, overload
 
 from numpy.typing import ArrayLike, NDArray
 
 from . import _core, arguments, device_arrays
+from .answers import OfMotion, OfNear, OfPierced, Options
 from .contacts import Contacts
-from .device_arrays import DeviceArray
-from .device_results import DeviceContacts
+from .device_arrays import DeviceArrayLike
+from .device_results import DeviceContacts, DeviceIntersections, DeviceProximity
 from .devices import backends, gpu_status
 from .motion_queries import MotionQueries
 from .options import (
@@ -29,6 +30,7 @@ from .options import (
     Results,
     Simd,
 )
+from .proximity import Intersections, Proximity
 from .scene import Scene
 from .snapshot_queries import SnapshotQueries, names_of_one_argument
 
@@ -44,7 +46,7 @@ def _require_device(backend: str, method: str) -> None:
         raise ValueError(f"results: 'device' is not offered by method {method!r}, which runs on CPUs; use 'default'")
 
 
-class Detector(MotionQueries, SnapshotQueries):
+class Detector(MotionQueries[OfMotion], SnapshotQueries[OfNear, OfPierced]):
     """Finds every contact of a scene's straight-line motion from one set of positions to the next.
 
     accuracy: "fast", "balanced", "conservative" or "exact"; backend: "auto", "cpu", "hybrid" or "gpu"; threads: 0 for
@@ -75,9 +77,14 @@ class Detector(MotionQueries, SnapshotQueries):
         one triangle. The communication thread comes on top of `threads`; with as many as cores it takes the last one's
         place.
     restructure: of "published" and "naive", whether they restructure; False only to measure what it brings.
+    results: where answers lie. "host" (default): numpy arrays. "device": detect(), step(), proximity() and
+        intersections() give DeviceContacts, DeviceProximity and DeviceIntersections, whose arrays stay in the memory of
+        the GPU; collision_free_step() and distances() answer on the host as ever. Needs backend "gpu" or "auto", a
+        usable GPU, and method "default". Where the GPU fails, CPUs compute and the answer is brought to the device.
     worlds: so many copies of the scene, 1 to 65,536, that know nothing of each other. Positions are (W, V, 3), and each
         world is answered, by every query, bit for bit as by a detector of its own; Contacts tells how the answers of
-        all stand together. CPUs take a world a thread, the other backends one after the other. None: one scene, (V, 3).
+        all stand together. CPUs take a world a thread, the GPU takes all worlds at once, "hybrid" one after the other.
+        None: one scene, (V, 3).
     The scene is copied: meshes added to it later do not reach this detector.
     One call at a time: of the calls that several Python threads make of one detector each waits until the one before
     has ended, and profile and stats are those of the last. Only cancel() never waits. Threads that are to work side by
@@ -85,6 +92,24 @@ class Detector(MotionQueries, SnapshotQueries):
     """
 
     _gpu_stages = False  # for measuring, in a class derived from this one: `profile` tells device time by stage too
+
+    @overload
+    def __init__(
+        self: "Detector[Contacts, Proximity, Intersections]",
+        scene: Scene,
+        *,
+        results: Literal["host"] = "host",
+        **options: Unpack[Options],
+    ) -> None: ...
+
+    @overload
+    def __init__(
+        self: "Detector[DeviceContacts, DeviceProximity, DeviceIntersections]",
+        scene: Scene,
+        *,
+        results: Literal["device"],
+        **options: Unpack[Options],
+    ) -> None: ...
 
     def __init__(
         self,
@@ -167,7 +192,7 @@ class Detector(MotionQueries, SnapshotQueries):
         self._last: NDArray[Any] | None = None
         self._last_on_device = device_arrays.LastStep()
 
-    def step(self, vertices: ArrayLike | DeviceArray, stream: object = None) -> Contacts | DeviceContacts:
+    def step(self, vertices: ArrayLike | DeviceArrayLike, stream: object = None) -> OfMotion:
         """Streaming: the end of the last step is the start of this one. The first call returns no contacts.
 
         vertices: as for detect(), and refused with the same errors, the first ones too; what was refused does not
@@ -177,24 +202,26 @@ class Detector(MotionQueries, SnapshotQueries):
         """
         with self._stepping:
             if device_arrays.is_on_device(vertices):
-                return self._step_on_device(vertices, device_arrays.stream_number(stream))
-            return self._step_on_host(vertices)
+                found = self._step_on_device(vertices, device_arrays.stream_number(stream))
+            else:
+                found = self._step_on_host(vertices)
+            return cast(OfMotion, found)
 
-    def _step_on_host(self, vertices: object) -> Contacts | DeviceContacts:
+    def _step_on_host(self, vertices: object) -> Any:
         if self._last_on_device:
             raise TypeError("vertices: the last step was a device array; give another one, or call reset() first")
         # Checked, used and kept as it is now, whatever the caller writes there meanwhile.
         end = arguments.vertices("vertices", vertices, self._shape).copy()
         if self._last is None and self.results == "host":
             arguments.usable("vertices", end)
-            contacts: Contacts | DeviceContacts = Contacts.none(self.worlds)
+            contacts: Any = Contacts.none(self.worlds)
         else:
             with names_of_one_argument():
                 contacts = self.detect(end if self._last is None else self._last, end)
         self._last = end
         return contacts
 
-    def _step_on_device(self, vertices: object, stream: int | None) -> Contacts | DeviceContacts:
+    def _step_on_device(self, vertices: object, stream: int | None) -> Any:
         if self._last is not None:
             raise TypeError("vertices: the last step was a host array; give another one, or call reset() first")
         place = device_arrays.positions("vertices", vertices, self._shape, stream)

@@ -26,7 +26,7 @@ class DlpackArray(Protocol):
     def __dlpack_device__(self) -> tuple[Any, int]: ...
 
 
-DeviceArray = CudaArray | DlpackArray
+DeviceArrayLike = CudaArray | DlpackArray
 
 # shape, strides in bytes (None: C-contiguous), type as in "<f4", address (None: no memory).
 _Layout = tuple[tuple[int, ...], tuple[int, ...] | None, str, int | None]

@@ -33,7 +33,9 @@ class _OnDevice:
     def _slices_on_host(self) -> Slices | None:
         if self.slices is None:
             return None
-        return Slices(**{name: np.empty(0) if a is None else a.to_host() for name, a in self.slices.items()})
+        empty = np.empty(0, np.int64)
+        arrays: dict[str, Any] = {name: empty if a is None else a.to_host() for name, a in self.slices.items()}
+        return Slices(**arrays)
 
     def _world_number(self, k: int) -> int:
         of_worlds = self._slices_on_host

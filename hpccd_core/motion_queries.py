@@ -1,20 +1,20 @@
 # SPDX-License-Identifier: Apache-2.0
 """Queries of one motion, a part of Detector."""
 
-from typing import Any
+from typing import Any, Generic, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _core, arguments, device_arrays, device_results
+from .answers import OfMotion
 from .contacts import Contacts
-from .device_arrays import DeviceArray, DevicePositions
-from .device_results import DeviceContacts
+from .device_arrays import DeviceArrayLike, DevicePositions
 from .options import Results
 from .worlds import answer_of
 
 
-class MotionQueries:
+class MotionQueries(Generic[OfMotion]):
     """What touches on the way from one set of positions to the next, and when first."""
 
     worlds: int | None
@@ -24,8 +24,8 @@ class MotionQueries:
     _core: _core.Detector
 
     def detect(
-        self, vertices_t0: ArrayLike | DeviceArray, vertices_t1: ArrayLike | DeviceArray, stream: object = None
-    ) -> Contacts | DeviceContacts:
+        self, vertices_t0: ArrayLike | DeviceArrayLike, vertices_t1: ArrayLike | DeviceArrayLike, stream: object = None
+    ) -> OfMotion:
         """Contacts of the motion from vertices_t0 to vertices_t1, each (V, 3) float32 or float64.
 
         Of W worlds (W, V, 3).
@@ -37,10 +37,11 @@ class MotionQueries:
         both cases the answer is complete when the call returns.
         With results="device" the answer is a DeviceContacts.
         """
-        return self._contacts(self._of_motion(self._asked("detect"), vertices_t0, vertices_t1, stream))
+        found = self._of_motion(self._asked("detect"), vertices_t0, vertices_t1, stream)
+        return cast(OfMotion, self._contacts(found))
 
     def collision_free_step(
-        self, vertices_t0: ArrayLike | DeviceArray, vertices_t1: ArrayLike | DeviceArray, stream: object = None
+        self, vertices_t0: ArrayLike | DeviceArrayLike, vertices_t1: ArrayLike | DeviceArrayLike, stream: object = None
     ) -> float | NDArray[np.float64]:
         """The largest part of the motion, in [0, 1], that is certainly free of contacts; 1.0 where nothing touches.
 
@@ -67,7 +68,7 @@ class MotionQueries:
     def _asked(self, query: str) -> str:
         return f"{query}_on_device" if self.results == "device" else query
 
-    def _contacts(self, found: Any) -> Contacts | DeviceContacts:
+    def _contacts(self, found: Any) -> Any:
         return device_results.contacts_of(found) if self.results == "device" else answer_of(Contacts, found)
 
     def _of_motion(self, query: str, vertices_t0: object, vertices_t1: object, stream: object = None) -> Any:

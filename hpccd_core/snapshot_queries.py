@@ -4,19 +4,19 @@
 import contextlib
 import re
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, Generic, cast
 
 from numpy.typing import ArrayLike
 
 from . import _core, arguments, device_arrays, device_results
-from .device_arrays import DeviceArray
-from .device_results import DeviceIntersections, DeviceProximity
+from .answers import OfNear, OfPierced
+from .device_arrays import DeviceArrayLike
 from .options import Results
 from .proximity import Gap, Intersections, Proximity
 from .worlds import answer_of
 
 
-class SnapshotQueries:
+class SnapshotQueries(Generic[OfNear, OfPierced]):
     """What is near, pierced, or nearest at one time. Coordinates may be as large as 1e300."""
 
     worlds: int | None
@@ -27,8 +27,8 @@ class SnapshotQueries:
     _mesh_names: tuple[str, ...]
 
     def proximity(
-        self, vertices: ArrayLike | DeviceArray, distance: float, stream: object = None
-    ) -> Proximity | DeviceProximity:
+        self, vertices: ArrayLike | DeviceArrayLike, distance: float, stream: object = None
+    ) -> OfNear:
         """All vertex-face and edge-edge pairs within a distance of each other, features that share a vertex apart.
 
         vertices: (V, 3), of W worlds (W, V, 3), float32 or float64, taken as by detect(), but up to 1e300. distance:
@@ -40,12 +40,13 @@ class SnapshotQueries:
         """
         distance = arguments.length("distance", distance)
         if self.results == "device":
-            return device_results.proximity_of(self._ask("proximity_on_device", vertices, stream, distance))
-        return answer_of(Proximity, self._ask("proximity", vertices, stream, distance))
+            on_device = device_results.proximity_of(self._ask("proximity_on_device", vertices, stream, distance))
+            return cast(OfNear, on_device)
+        return cast(OfNear, answer_of(Proximity, self._ask("proximity", vertices, stream, distance)))
 
     def intersections(
-        self, vertices: ArrayLike | DeviceArray, stream: object = None
-    ) -> Intersections | DeviceIntersections:
+        self, vertices: ArrayLike | DeviceArrayLike, stream: object = None
+    ) -> OfPierced:
         """All edges that pierce or touch a face with which they share no vertex, coplanar ones included.
 
         vertices: (V, 3), of W worlds (W, V, 3), float32 or float64, taken as by detect(), but up to 1e300. Decided as
@@ -53,11 +54,12 @@ class SnapshotQueries:
         DeviceIntersections.
         """
         if self.results == "device":
-            return device_results.intersections_of(self._ask("intersections_on_device", vertices, stream))
-        return answer_of(Intersections, self._ask("intersections", vertices, stream))
+            on_device = device_results.intersections_of(self._ask("intersections_on_device", vertices, stream))
+            return cast(OfPierced, on_device)
+        return cast(OfPierced, answer_of(Intersections, self._ask("intersections", vertices, stream)))
 
     def distances(
-        self, vertices: ArrayLike | DeviceArray, stream: object = None
+        self, vertices: ArrayLike | DeviceArrayLike, stream: object = None
     ) -> list[Gap] | list[list[Gap]]:
         """The smallest distance of each pair of meshes that the scene enables, within a mesh too.
 

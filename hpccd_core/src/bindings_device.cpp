@@ -130,7 +130,6 @@ py::array to_host(const DeviceArray& a) {
 }  // namespace
 
 void bind_device_array(py::module_& m) {
-  m.def("integers_on_device", &of_integers, py::arg("numbers"), py::arg("device"));
   py::class_<DeviceArray>(m, "DeviceArray")
       .def_property_readonly("shape", [](const DeviceArray& a) { return py::tuple(py::cast(a.shape)); })
       .def_property_readonly("dtype", [](const DeviceArray& a) { return py::dtype(a.type()); })
@@ -154,9 +153,10 @@ void bind_device_array(py::module_& m) {
       .def("joined", &joined, py::arg("other"))
       .def("to_host", &to_host)
       .def("__repr__", [](const DeviceArray& a) {
-        return "DeviceArray(shape=" + std::string(py::str(py::tuple(py::cast(a.shape)))) + ", dtype=" +
-               std::string(py::str(py::dtype(a.type()))) + ", device=" + std::to_string(a.device) + ")";
+        return "DeviceArray(shape=" + std::string(py::str(py::tuple(py::cast(a.shape)))) +
+               ", dtype=" + std::string(py::str(py::dtype(a.type()))) + ", device=" + std::to_string(a.device) + ")";
       });
+  m.def("integers_on_device", &of_integers, py::arg("numbers"), py::arg("device"));
 }
 
 py::dict to_dict(const DeviceResults& r, std::uint32_t n_worlds) {

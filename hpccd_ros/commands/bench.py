@@ -6,6 +6,8 @@
   hpccd bench scaling                       speed-up against threads, for each method
   hpccd bench distance                      what a separation, proximity, intersections cost
   hpccd bench step                          how far a step may go: first contacts, collision-free step, trial steps
+  hpccd bench gpu data --parts device,worlds
+                                            results that stay on the GPU, many worlds in one call
   hpccd bench accuracy                      what each tier costs, and where it errs
   hpccd bench accuracy run.mcap --choose "misses<1e-4"
                                             the cheapest setting that is good enough for what you recorded
@@ -22,7 +24,7 @@ import importlib
 # The module of each, in hpccd_ros.bench, and what it measures.
 BENCHMARKS = {
     "cpu": ("core.cpu", "ms a frame of each scene (Table 1), its components, and a peer beside it"),
-    "gpu": ("core.gpu", "the GPU backend: ms a frame with transfers, device time by stage, floors"),
+    "gpu": ("core.gpu", "the GPU backend: ms a frame, with transfers and without, many worlds, stages, floors"),
     "scaling": ("core.scaling", "speed-up over one thread against threads (Fig. 6 and 7), for each method"),
     "methods": ("core.methods", "the methods and instruction sets compared: time, and equality of the results"),
     "size": ("core.size", "how time and memory grow with the number of triangles"),

@@ -154,7 +154,7 @@ class OnDevice:
 )
 def test_arrays_on_the_device(shape, strides):
     place = device_arrays.positions("vertices", OnDevice(shape, strides), shape)
-    assert place == (4096, True)
+    assert place == (4096, True, None)
 
 
 @pytest.mark.parametrize(

@@ -11,6 +11,7 @@ import sys
 import pytest
 from sources import ROOT
 
+import hpccd_core as hc
 from hpccd_ros import cli
 from hpccd_ros.commands.bench import BENCHMARKS
 
@@ -109,9 +110,11 @@ def options(command):
 
 @each_page
 def test_programs(page, tmp_path):
-    """But those of the client, which need a node: test/client."""
+    """But those of the client, which need a node: test/client; and of GPUs where there is none, or not the library."""
     for program in re.findall(r"```python\n(.*?)```", page.read_text(), re.DOTALL):
-        if "client." not in program:
+        on_device = [name for name in ("cupy", "torch", "warp") if f"import {name}" in program]
+        usable = "gpu" in hc.backends() and all(map(importlib.util.find_spec, on_device))
+        if "client." not in program and (usable or not on_device):
             assert output_of(program, tmp_path)
 
 

@@ -29,6 +29,10 @@ topic: str = client.topology_topic("cloth")
 wrong: NDArray[np.float64] = contacts.vf  # line 12
 topic.encode(client.vertices_topic(3))
 hc.Detector(scene, accuracy="exakt")
+on_device = hc.Detector(scene, results="device").detect(np.zeros((3, 3)), np.ones((3, 3)))
+copied: hc.Contacts = on_device.to_host()
+place: hc.DeviceArray = on_device.vf
+also_wrong: hc.Contacts = on_device  # line 18
 """
 
 
@@ -51,4 +55,4 @@ def test_a_program_of_a_user_gets_types(tmp_path):
     (tmp_path / "program.py").write_text(PROGRAM)
     said = mypy("--strict", "--ignore-missing-imports", "program.py", folder=tmp_path).stdout
     found = [line.split(": error: ")[0] for line in said.splitlines() if ": error: " in line]
-    assert found == ["program.py:12", "program.py:13", "program.py:14"], said
+    assert found == ["program.py:12", "program.py:13", "program.py:14", "program.py:18"], said

@@ -11,24 +11,50 @@ from hpccd_ros.base.errors import UserError
 from hpccd_ros.bench.steps import Step
 
 
-def _with_torch(xyz):
-    import torch
+class _Torch:
+    def __init__(self):
+        import torch
 
-    return torch.from_numpy(np.ascontiguousarray(xyz)).cuda()
+        self._torch = torch
+
+    def array(self, xyz: np.ndarray):
+        """A copy on the device, complete when this returns."""
+        copy = self._torch.from_numpy(np.ascontiguousarray(xyz)).cuda()
+        self._torch.cuda.synchronize()
+        return copy
+
+    def stream(self):
+        """One of its own, as simulators have."""
+        return self._torch.cuda.Stream()
 
 
-def _with_cupy(xyz):
-    import cupy
+class _Cupy:
+    def __init__(self):
+        import cupy
 
-    return cupy.asarray(xyz)
+        self._cupy = cupy
+
+    def array(self, xyz: np.ndarray):
+        copy = self._cupy.asarray(xyz)
+        self._cupy.cuda.Device().synchronize()
+        return copy
+
+    def stream(self):
+        return self._cupy.cuda.Stream(non_blocking=True)
+
+
+def library(option: str = "--arrays device"):
+    """Whichever library of arrays is installed. option: that needs one."""
+    for kind in (_Torch, _Cupy):
+        try:
+            return kind()
+        except ImportError:
+            continue
+    raise UserError(f"{option}: neither torch nor cupy is installed; install the one for this machine's CUDA")
 
 
 def to_device(step: Step) -> Step:
-    """The same step with arrays of whichever library is installed."""
-    for move in (_with_torch, _with_cupy):
-        try:
-            moved = {name: move(getattr(step, name)) for name in ("vertices_t0", "vertices_t1")}
-        except ImportError:
-            continue
-        return dataclasses.replace(step, **moved)
-    raise UserError("--arrays device: neither torch nor cupy is installed; install the one for this machine's CUDA")
+    """The same step with arrays on the device."""
+    arrays = library()
+    moved = {name: arrays.array(getattr(step, name)) for name in ("vertices_t0", "vertices_t1")}
+    return dataclasses.replace(step, **moved)

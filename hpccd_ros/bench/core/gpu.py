@@ -3,11 +3,20 @@
 time by stage, and the two floors, bytes over bandwidth and operations over rate; then Fig. 6 of Kim et al. 2009
 (threads by GPUs) and the segment sizes of their section 6.2. Needs a machine with a usable GPU.
 
+Further parts, by name, with positions in PyTorch's or CuPy's arrays on the device and results that stay there:
+  device   each scene, beside the ways from and to the host; device time by stage beside the floor of each (bytes and
+           operations of one table, hpccd_ros/bench/core/gpu_work.py); which arithmetic decided how many pairs
+  large    the same of two nets that meet nearly edge on edge (--sizes)
+  worlds   contacts of a folded garment, and what is near in a folded sheet, many times in one call (--worlds)
+
   hpccd bench gpu data                      the scene files of HPCCD_DATA, balanced and exact
   hpccd bench gpu cloth-ball --repeat 100 --parts frames
+  hpccd bench gpu data --parts device,large,worlds --label device-h100
+  hpccd bench gpu --parts worlds --worlds 64,1024 --repeat 20
   hpccd bench gpu --redraw gpu-16-cores.json --figures docs/figures
 
-Contacts of all backends are compared; a difference, or a frame that a device left to the CPU, fails the command.
+Answers are compared with the CPU's, those of many worlds one by one; a difference, or a frame that a device left to
+the CPU, fails the command.
 """
 
 from __future__ import annotations
@@ -15,14 +24,19 @@ from __future__ import annotations
 from pathlib import Path
 
 import hpccd_core as hc
+from hpccd_core._core import MOST_WORLDS
 from hpccd_ros.base.errors import UserError
 from hpccd_ros.bench import command
-from hpccd_ros.bench.core import gpu_hybrid
-from hpccd_ros.bench.core.gpu_hybrid import detector_times
+from hpccd_ros.bench.core import gpu_device, gpu_hybrid, gpu_worlds
+from hpccd_ros.bench.core.device_arrays import library
+from hpccd_ros.bench.core.gpu_times import StagesDetector, check, detector_times, device_stages
 from hpccd_ros.bench.report import figures, table
 from hpccd_ros.bench.report.results import Kept
 
-PARTS = ("frames", "threads", "segments")
+OF_SCENES = ("frames", "threads", "segments", "device")
+GENERATED = ("large", "worlds")  # whatever scenes are named
+PARTS = (*OF_SCENES, *GENERATED)
+IN_PYTORCH_OR_CUPY = ("device", *GENERATED)
 TIERS = ("balanced", "exact")
 # Double-precision operations of a pair in each stage, counted in the source: differences, cross products, bounds.
 OPERATIONS = {"candidates": 170, "survivors": 400, "roots": 1500}
@@ -31,13 +45,22 @@ OPERATIONS = {"candidates": 170, "survivors": 400, "roots": 1500}
 def configure(parser):
     command.configure(parser, default=("data",), steps=None, rounds=50)
     command.threads_option(parser)
-    parser.add_argument("--parts", default=",".join(PARTS), metavar="NAME,...",
-                        help="of frames, threads (Fig. 6) and segments (default: %(default)s)")  # fmt: skip
+    parser.add_argument("--parts", default="frames,threads,segments", metavar="NAME,...",
+                        help="of frames, threads (Fig. 6), segments, device (results that stay there), large (two nets "
+                        "of millions of triangles) and worlds; the last three need PyTorch or CuPy "
+                        "(default: %(default)s)")  # fmt: skip
+    parser.add_argument("--sizes", default="224,708,1415", metavar="N,...",
+                        help="large: vertices along a side of each net (default: %(default)s: 0.2, 2 and 8 million "
+                        "triangles)")  # fmt: skip
+    parser.add_argument("--worlds", default="64,1024,4096,8192", metavar="W,...",
+                        help="worlds: how many in a call (default: %(default)s)")  # fmt: skip
     parser.add_argument("--pcie", type=float, default=53.0, metavar="GB/s", help="host link (default: %(default)s)")
     parser.add_argument("--memory", type=float, default=2800.0, metavar="GB/s",
                         help="device memory (default: %(default)s, H100)")  # fmt: skip
     parser.add_argument("--rate", type=float, default=16.0, metavar="T/s",
                         help="10^12 double-precision operations a second, not fused (default: %(default)s, H100)")
+    parser.add_argument("--single-rate", type=float, default=29.0, metavar="T/s",
+                        help="10^12 single-precision operations a second, not fused (default: %(default)s, H100)")
     parser.add_argument("--redraw", metavar="JSON", help="draw Fig. 6 from this kept result; measure nothing")
 
 
@@ -48,10 +71,20 @@ def run(args) -> int:
             raise UserError(f"{args.redraw}: no times by threads and GPUs in it: measure with --parts threads")
         print(f"wrote {drawn[0]}")
         return 0
+    parts = command.listed("--parts", args.parts, PARTS)
+    sizes, worlds = (command.numbers(f"--{name}", getattr(args, name), int) for name in ("sizes", "worlds"))
+    if sizes[0] < 2:
+        raise UserError(f"--sizes {args.sizes}: a net has at least 2 vertices along a side")
+    if worlds[-1] > MOST_WORLDS:
+        raise UserError(f"--worlds {args.worlds}: a detector takes at most {MOST_WORLDS:,}; name fewer")
     if "gpu" not in hc.backends():
         raise UserError(f"no usable GPU: {hc.gpu_status()['reason']}")
-    parts = command.listed("--parts", args.parts, PARTS)
-    report, sources = command.begin(args)
+    if needing := [part for part in parts if part in IN_PYTORCH_OR_CUPY]:
+        library(f"--parts {needing[0]}")
+    if any(part in OF_SCENES for part in parts):
+        report, sources = command.begin(args)
+    else:
+        report, sources = command.begin_report(args), []
     report.note("floors: PCIe bytes of positions and contacts; device bytes of the lists that stages hand on; "
                 "operations counted from the source for each pair of each stage; rates are options")
     for source in sources:
@@ -59,15 +92,29 @@ def run(args) -> int:
         if "frames" in parts:
             for accuracy in TIERS:
                 _measure(report, args, source.name, step, accuracy)
+        if "device" in parts:
+            for accuracy in TIERS:
+                gpu_device.measure(report, args, "device", source.name, step, accuracy)
         if "threads" in parts:
             gpu_hybrid.figure_6(report, args, source.name, step)
         if "segments" in parts:
             gpu_hybrid.segment_sizes(report, args, source.name, step)
-    if "frames" in parts:
-        _show_frames([r for r in report.rows if r["part"] == "frame"])
-    if len(parts) > 1 or "frames" not in parts:
-        gpu_hybrid.show(report)
+    if "large" in parts:
+        gpu_device.measure_large(report, args, sizes)
+    if "worlds" in parts:
+        for count in worlds:
+            gpu_worlds.measure(report, args, count)
+    show(report.rows)
+    gpu_hybrid.show(report)
     return command.end(args, report)
+
+
+def show(rows):
+    """Tables of all parts but those of the hybrid."""
+    for print_, parts in ((_show_frames, ("frame",)), (gpu_device.show, ("device", "large")),
+                          (gpu_worlds.show, ("worlds",))):  # fmt: skip
+        if chosen := [r for r in rows if r["part"] in parts]:
+            print_(chosen)
 
 
 def _show_frames(rows):
@@ -87,18 +134,6 @@ def _show_frames(rows):
     )
 
 
-class _StagesDetector(hc.Detector):
-    _gpu_stages = True
-
-
-def _stages(scene, options, step):
-    """Device time by stage: events cost time themselves, so these frames are not the ones that count."""
-    detector = _StagesDetector(scene, backend="gpu", **options)
-    for _ in range(20):
-        detector.detect(step.vertices_t0, step.vertices_t1)
-    return {name: ms for name, ms in detector.profile.items() if name.startswith("gpu/")}
-
-
 def _measure(report, args, name, step, accuracy):
     options = {"accuracy": accuracy, "threads": args.threads}
     scene = step.scene()
@@ -106,17 +141,13 @@ def _measure(report, args, name, step, accuracy):
     detector = hc.Detector(scene, backend="hybrid", **options)
     hybrid, contacts = detector_times(detector, step, args.repeat)
     hybrid_stages = {f"hybrid/{stage}": ms for stage, ms in detector.profile.items()}
-    if contacts.hash != expected.hash:
-        report.failure(f"{name}, {accuracy}: contacts of hybrid and CPU differ")
-    if detector.stats["gpu_fallbacks"]:
-        report.failure(f"{name}, {accuracy}: hybrid frames left to the CPU: {detector.last_gpu_error}")
+    check(report, f"{name}, {accuracy}, hybrid", detector, contacts.hash == expected.hash)
     detector = hc.Detector(scene, backend="gpu", **options)
     on_gpu, contacts = detector_times(detector, step, args.repeat)
     stats, profile = detector.stats, detector.profile
-    if contacts.hash != expected.hash:
-        report.failure(f"{name}, {accuracy}: contacts of GPU and CPU differ")
-    if stats["gpu_fallbacks"]:
-        report.failure(f"{name}, {accuracy}: frames left to the CPU: {detector.last_gpu_error}")
+    check(report, f"{name}, {accuracy}", detector, contacts.hash == expected.hash)
+    staged = StagesDetector(scene, backend="gpu", **options)
+    stages = device_stages(staged, lambda: staged.detect(step.vertices_t0, step.vertices_t1))
     report.add(
         part="frame",
         scene=name,
@@ -127,7 +158,7 @@ def _measure(report, args, name, step, accuracy):
         hybrid_median_ms=hybrid.median,
         **on_gpu.as_row(),
         **_floors(args, step, stats, contacts),
-        stages_ms={**profile, **_stages(scene, options, step), **hybrid_stages},
+        stages_ms={**profile, **stages, **hybrid_stages},
     )
 
 

@@ -3,33 +3,13 @@
 
 from __future__ import annotations
 
-import time
-
 import hpccd_core as hc
+from hpccd_ros.bench.core.gpu_times import detector_times
 from hpccd_ros.bench.report import table
 from hpccd_ros.bench.report.machine import cores
 from hpccd_ros.bench.report.progress import bar
-from hpccd_ros.bench.report.timing import times
 
 SEGMENT_PAIRS = (128, 256, 512, 1024, 2048, 4096, 8192, 16384)
-FEWEST, SECONDS = 5, 1.0  # rounds of each variant: at least so many, and no more once this time has passed
-WARM_UP = 8  # the lists on the devices reach their size
-
-
-def detector_times(detector, step, repeat):
-    """(Times of detect() in ms, the last contacts) after a warm-up; rounds end early where they take long."""
-    began = time.perf_counter()
-    for _ in range(WARM_UP):
-        contacts = detector.detect(step.vertices_t0, step.vertices_t1)
-        if time.perf_counter() - began > SECONDS:
-            break
-    ms = []
-    began = time.perf_counter()
-    while len(ms) < repeat and (len(ms) < FEWEST or time.perf_counter() - began < SECONDS):
-        start = time.perf_counter()
-        contacts = detector.detect(step.vertices_t0, step.vertices_t1)
-        ms.append(1e3 * (time.perf_counter() - start))
-    return times(ms), contacts
 
 
 def figure_6(report, args, name, step, accuracy="balanced"):

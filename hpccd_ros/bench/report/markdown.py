@@ -15,7 +15,7 @@ def table(columns: Sequence[str], rows: Sequence[Sequence]) -> list[str]:
     """The lines of a table; a column with a number in its first row stands to the right. None: an empty cell."""
     numbers = [bool(rows) and not isinstance(cell, str) for cell in rows[0]]
     lines = [columns, ["---:" if number else "---" for number in numbers]]
-    lines += [["" if cell is None else _number(cell) for cell in row] for row in rows]
+    lines += [["" if cell is None else shown(cell) for cell in row] for row in rows]
     return [f"| {' | '.join(line)} |" for line in lines]
 
 
@@ -30,6 +30,7 @@ def source(name: str, result: Kept) -> str:
     return f"`{result.command}`; {where}{busy}; {commit}; [JSON]({RESULTS}/{name}.json)"
 
 
-def _number(cell) -> str:
+def shown(cell) -> str:
+    """As tables show it."""
     small = isinstance(cell, float) and 1e-4 <= abs(cell) < 0.01
     return f"{cell:.2g}" if small else text(cell)
