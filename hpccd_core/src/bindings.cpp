@@ -231,34 +231,34 @@ PYBIND11_MODULE(_core, m) {
   bind_device_array(m);
 
   py::class_<Detector>(m, "Detector")
-      .def(py::init([](std::shared_ptr<Scene> scene, Accuracy accuracy, Backend backend, Report report, Simd simd,
-                       int threads, bool points, bool normals, bool closest, double separation, Method method,
-                       bool restructure, std::size_t hybrid_segments, std::size_t hybrid_segment_pairs, int gpus,
-                       bool gpu_stages, bool vertex_face, bool edge_edge, bool results_on_device, std::uint32_t worlds) {
-             // A copy: what is added to the caller's scene later does not reach this detector.
-             return std::make_unique<Detector>(std::make_shared<const Scene>(*scene), Options{accuracy,
-                                                                                              backend,
-                                                                                              report,
-                                                                                              simd,
-                                                                                              threads,
-                                                                                              points,
-                                                                                              normals,
-                                                                                              closest,
-                                                                                              separation,
-                                                                                              method,
-                                                                                              restructure,
-                                                                                              hybrid_segments,
-                                                                                              hybrid_segment_pairs,
-                                                                                              gpus,
-                                                                                              gpu_stages,
-                                                                                              {vertex_face, edge_edge},
-                                                                                              results_on_device,
-                                                                                              worlds});
-           }),
-           "scene"_a, "accuracy"_a, "backend"_a, "report"_a, "simd"_a, "threads"_a, "points"_a, "normals"_a,
-           "closest"_a, "minimum_separation"_a, "method"_a, "restructure"_a, "hybrid_segments"_a,
-           "hybrid_segment_pairs"_a, "gpus"_a, "gpu_stages"_a, "vertex_face"_a, "edge_edge"_a,
-           "results_on_device"_a, "worlds"_a)
+      .def(
+          py::init([](std::shared_ptr<Scene> scene, Accuracy accuracy, Backend backend, Report report, Simd simd,
+                      int threads, bool points, bool normals, bool closest, double separation, Method method,
+                      bool restructure, std::size_t hybrid_segments, std::size_t hybrid_segment_pairs, int gpus,
+                      bool gpu_stages, bool vertex_face, bool edge_edge, bool results_on_device, std::uint32_t worlds) {
+            // A copy: what is added to the caller's scene later does not reach this detector.
+            return std::make_unique<Detector>(std::make_shared<const Scene>(*scene), Options{accuracy,
+                                                                                             backend,
+                                                                                             report,
+                                                                                             simd,
+                                                                                             threads,
+                                                                                             points,
+                                                                                             normals,
+                                                                                             closest,
+                                                                                             separation,
+                                                                                             method,
+                                                                                             restructure,
+                                                                                             hybrid_segments,
+                                                                                             hybrid_segment_pairs,
+                                                                                             gpus,
+                                                                                             gpu_stages,
+                                                                                             {vertex_face, edge_edge},
+                                                                                             results_on_device,
+                                                                                             worlds});
+          }),
+          "scene"_a, "accuracy"_a, "backend"_a, "report"_a, "simd"_a, "threads"_a, "points"_a, "normals"_a, "closest"_a,
+          "minimum_separation"_a, "method"_a, "restructure"_a, "hybrid_segments"_a, "hybrid_segment_pairs"_a, "gpus"_a,
+          "gpu_stages"_a, "vertex_face"_a, "edge_edge"_a, "results_on_device"_a, "worlds"_a)
       .def(
           "detect",
           [](Detector& d, const GivenPositions& t0, const GivenPositions& t1) {
@@ -301,8 +301,7 @@ PYBIND11_MODULE(_core, m) {
       .def(
           "intersections_on_device",
           [](Detector& d, const GivenPositions& vertices) {
-            return to_dict(unlocked([&] { return d.intersections_on_device(vertices.positions); }),
-                           d.options().worlds);
+            return to_dict(unlocked([&] { return d.intersections_on_device(vertices.positions); }), d.options().worlds);
           },
           "vertices"_a)
       .def(

@@ -236,7 +236,8 @@ class Detector {
   Intersections intersections(Positions vertices);
 
   // The same three, whose results stay on the device, of a detector whose Options::results_on_device says so. What the
-  // CPU had to compute, after a failure of the device, is brought there. Throws std::runtime_error where that fails too.
+  // CPU had to compute, after a failure of the device, is brought there. Throws std::runtime_error where that fails
+  // too.
   DeviceResults detect_on_device(Positions vertices_t0, Positions vertices_t1);
   DeviceResults proximity_on_device(Positions vertices, double distance);
   DeviceResults intersections_on_device(Positions vertices);

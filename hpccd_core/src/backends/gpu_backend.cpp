@@ -167,8 +167,7 @@ void GpuBackend::decide_motion(Positions t0, Positions t1, std::optional<double>
 void GpuBackend::run_contacts(Positions t0, Positions t1) {
   const bool prunes = shared_.options.report == Report::first && shared_.rules.promise_times() && n_worlds() == 1;
   prepare_motion(t0, t1, prunes);
-  const gpu::Pipeline::Best best =
-      prunes ? gpu::Pipeline::Best(std::numeric_limits<double>::infinity()) : std::nullopt;
+  const gpu::Pipeline::Best best = prunes ? gpu::Pipeline::Best(std::numeric_limits<double>::infinity()) : std::nullopt;
   require_good(pipeline_->run(t0, t1, best, shared_.pool), t0, t1);
   decide_motion(t0, t1, std::nullopt);
 }
@@ -326,9 +325,8 @@ void GpuBackend::run_snapshot(gpu::Query query, Positions vertices, double dista
 template <class Bound>
 void GpuBackend::prepare(Boxes boxes, Bound&& bound) {
   if (!pipeline_) {
-    pipeline_ =
-        gpu::Pipeline::create(*shared_.scene, shared_.features, shared_.options, shared_.separations,
-                              gpu::status().devices.at(0).number);
+    pipeline_ = gpu::Pipeline::create(*shared_.scene, shared_.features, shared_.options, shared_.separations,
+                                      gpu::status().devices.at(0).number);
     shared_.profiler.mark("gpu_start");
   }
   const bool worn = has_tree_ && worn_out_on_device();

@@ -26,10 +26,9 @@ std::uint64_t hash_of_worlds(const std::vector<std::uint64_t>& hashes) {
 
 Contacts contacts_of(const gpu::FrameResult& f, std::size_t n_worlds, ThreadPool& pool) {
   Contacts c;
-  const std::function<void()> parts[] = {[&] { c.ee = copied(f.ee, f.n_ee); },
-                                         [&] { c.ee_toc = copied(f.toc + f.n_vf, f.n_ee); },
-                                         [&] { c.vf = copied(f.vf, f.n_vf); },
-                                         [&] { c.vf_toc = copied(f.toc, f.n_vf); }};
+  const std::function<void()> parts[] = {
+      [&] { c.ee = copied(f.ee, f.n_ee); }, [&] { c.ee_toc = copied(f.toc + f.n_vf, f.n_ee); },
+      [&] { c.vf = copied(f.vf, f.n_vf); }, [&] { c.vf_toc = copied(f.toc, f.n_vf); }};
   parallel_for(pool, std::size(parts), 1, [&](std::size_t begin, std::size_t end, int) {
     for (std::size_t i = begin; i < end; ++i) parts[i]();
   });

@@ -12,9 +12,8 @@ std::array<double, 3> row(const Vec3<double>& v) { return {v.x, v.y, v.z}; }
 
 PairPlaces pair_places(const UndecidedPair& q, double toc, Outputs outputs) {
   ByIntegers integers;
-  return q.kind == Kind::vertex_face
-             ? pair_places<Kind::vertex_face>(q.t0, q.t1, toc, q.separation, outputs, integers)
-             : pair_places<Kind::edge_edge>(q.t0, q.t1, toc, q.separation, outputs, integers);
+  return q.kind == Kind::vertex_face ? pair_places<Kind::vertex_face>(q.t0, q.t1, toc, q.separation, outputs, integers)
+                                     : pair_places<Kind::edge_edge>(q.t0, q.t1, toc, q.separation, outputs, integers);
 }
 
 void write_places(Contacts& c, std::size_t i, const UndecidedPair& pair, double toc, Outputs outputs) {

@@ -71,7 +71,8 @@ struct Root {
 // The root of f in [low, high], which holds exactly one, with f(low) of sign `sign`. Newton's method kept inside the
 // shrinking bracket; each lane stops by its own criterion, so its result does not depend on its neighbours: where a
 // step is rounding, or below `enough`.
-// Where Newton's method begins: with more bits than doubles have at the root as doubles have it, two steps from its own.
+// Where Newton's method begins: with more bits than doubles have at the root as doubles have it, two steps from its
+// own.
 template <class R>
 HPCCD_HD R first_guess(const Cubic<R>& f, R low, R high, R sign);
 

@@ -21,7 +21,8 @@ __global__ void extent_kernel(LaunchParams<T> params) {
     for (u32 i = own; i < params.all_vertices() + params.all_edges(); i += all) params.n_of_group[i] = 0;
   const u32 blocks = gridDim.x / params.n_worlds, world = blockIdx.x / blocks;
   const u64 base = static_cast<u64>(world) * params.n_vertices;
-  for (u32 i = (blockIdx.x - world * blocks) * blockDim.x + threadIdx.x; i < params.n_vertices; i += blocks * blockDim.x)
+  for (u32 i = (blockIdx.x - world * blocks) * blockDim.x + threadIdx.x; i < params.n_vertices;
+       i += blocks * blockDim.x)
     for (int k = 0; k < 3; ++k) {
       const double a = params.given_t0[3 * (base + i) + k], b = params.given_t1[3 * (base + i) + k];
       bad = bad || !(fabs(a) <= params.largest) || !(fabs(b) <= params.largest);
@@ -109,8 +110,9 @@ __global__ void vertices_kernel(LaunchParams<T> params) {
     point.at[0].x[k] = map(a[k], k);
     point.at[1].x[k] = part < 1 ? place_at(part, map.precise(a[k], k), map.precise(b[k], k)) : map(b[k], k);
   }
-  const double separation =
-      params.largest_separation ? params.largest_separation[params.mesh_of_vertex[i - world * params.n_vertices]] : params.separation;
+  const double separation = params.largest_separation
+                                ? params.largest_separation[params.mesh_of_vertex[i - world * params.n_vertices]]
+                                : params.separation;
   const float reach = reach_on_device(separation, map.scale, largest);
   point.at[0].tag = __float_as_uint(reach);
   point.at[1].tag = __float_as_uint(part < 1 ? reach + lost_by_place : reach);

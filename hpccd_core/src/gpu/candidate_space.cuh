@@ -18,8 +18,8 @@ struct CandidateQueue {
 };
 
 struct CandidateSpace : CandidateQueue {
-  // Features of the two leaves that overlap the other leaf, and their numbers in their world. The four words of a box lie apart, so
-  // that neighbouring lanes read neighbouring words.
+  // Features of the two leaves that overlap the other leaf, and their numbers in their world. The four words of a box
+  // lie apart, so that neighbouring lanes read neighbouring words.
   Bound bound[2][4][3 * Tree::leaf_size];
   u32 number[2][3 * Tree::leaf_size];
   u32 corner2[Tree::leaf_size];

@@ -133,8 +133,7 @@ __device__ __forceinline__ LanePair vertex_face_pair(const CandidateSpace& s, u3
 
 // Intersections have no order of edge and face to choose.
 template <Query query>
-__device__ __forceinline__ LanePair edge_face_pair(const CandidateSpace& s, u32 first_edge, u32 i, u32 j,
-                                                   bool valid) {
+__device__ __forceinline__ LanePair edge_face_pair(const CandidateSpace& s, u32 first_edge, u32 i, u32 j, bool valid) {
   LanePair c{valid, {0, 0, 0, 0}, {0, 0}};
   if (!valid) return c;
   const DeviceBox edge = s.box(0, i), face = s.box(1, j);

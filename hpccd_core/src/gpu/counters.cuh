@@ -38,8 +38,8 @@ struct Counters {
   u64 apart[2], proven_near[2], undecided_near[2];      // of the tests that know a distance
   u64 found[2];                                         // by kind, after the fallback on the device
   u64 found_all, undecided, open_in_integers[integer_sizes], to_host;
-  u64 rows[2];            // of the results, by kind
-  u64 most_of_a_feature;  // rows with the same first one
+  u64 rows[2];                  // of the results, by kind
+  u64 most_of_a_feature;        // rows with the same first one
   u64 soonest, soonest_proven;  // complements of the bits of earliest times
   u64 way, away;                // bits of the longest ways of a coordinate (device_near_list.cuh)
   u64 listed[2];

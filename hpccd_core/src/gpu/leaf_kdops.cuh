@@ -18,8 +18,7 @@ __global__ __launch_bounds__(128) void leaf_kdops_kernel(const __grid_constant__
   const u32 world = params.by_leaves(leaf);
   const DeviceLeaf l = params.leaves[leaf - world * params.n_leaves];
   const u32 n_corners = l.n_corners();
-  const u32 corner =
-      lane < n_corners ? world * params.n_vertices + __ldg(params.corners + l.first_corner + lane) : 0;
+  const u32 corner = lane < n_corners ? world * params.n_vertices + __ldg(params.corners + l.first_corner + lane) : 0;
   float low = INFINITY, high = -INFINITY;
   const auto include = [&](u32 v) {
     const float x = reinterpret_cast<const float*>(params.kdops + v)[lane % n];

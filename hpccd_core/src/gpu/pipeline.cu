@@ -167,7 +167,7 @@ class DevicePipeline : public Pipeline {
   DeviceNearList near_;
   std::size_t most_near_ = 0;
   bool gave_up_listing_ = false;
-  bool given_doubles_ = true;   // in the last frame
+  bool given_doubles_ = true;             // in the last frame
   u64 floats_suffice_ = options_.worlds;  // in so many worlds of the last frame that asked
   Goal goal_ = Goal::results;
   Best best_;
@@ -224,8 +224,7 @@ bool DevicePipeline::run_frame(Positions t0, Positions t1, double distance, Thre
     again = grow_overflowed() || again;
   }
   const u64 n_to_host = exact_last_time_ = c.to_host;
-  if (goal_ == Goal::results && contacts_.complete(query_, params, c, on_stream()))
-    copy_counters();
+  if (goal_ == Goal::results && contacts_.complete(query_, params, c, on_stream())) copy_counters();
   if (goal_ == Goal::near_list) near_.collect(params, c, stream_);
   if (goal_ == Goal::near_list) return true;
   undecided_.reserve(n_to_host);
@@ -277,8 +276,9 @@ void DevicePipeline::launch_results(const LaunchParams<T>& params) {
 
 template <class T>
 void DevicePipeline::launch_area(const LaunchParams<T>& params) {
-  area_kernel<<<std::min(blocks_for(std::size_t{params.n_worlds} * params.n_nodes, 256), static_cast<unsigned>(multiprocessors_)), 256, 0, stream_>>>(
-      params);
+  area_kernel<<<std::min(blocks_for(std::size_t{params.n_worlds} * params.n_nodes, 256),
+                         static_cast<unsigned>(multiprocessors_)),
+                256, 0, stream_>>>(params);
   check_launch("area_kernel");
   timer_.mark("area", stream_);
 }
@@ -373,8 +373,8 @@ bool DevicePipeline::is_fast() const {
   return query_ == Query::contacts && !best_ && goal_ != Goal::earliest_of_near && scene_.all_fast();
 }
 
-// Where floats suffice only the device knows, and the kernels are launched before it says so: as in the last frame. True
-// where the frame must run again.
+// Where floats suffice only the device knows, and the kernels are launched before it says so: as in the last frame.
+// True where the frame must run again.
 template <class T>
 bool DevicePipeline::guessed_wrong(const LaunchParams<T>& params) {
   if (!params.fast) return false;

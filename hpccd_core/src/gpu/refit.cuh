@@ -71,13 +71,14 @@ __device__ inline float area_of(const DeviceBox& b, bool start_alone) {
   return sum;
 }
 
-// Sum of the nodes' areas over the root's (Tree::area), the mean of all worlds. Where boxes reach up to some time, their
-// other end says nothing of the tree.
+// Sum of the nodes' areas over the root's (Tree::area), the mean of all worlds. Where boxes reach up to some time,
+// their other end says nothing of the tree.
 template <class T>
 __global__ void area_kernel(LaunchParams<T> params) {
   if (over(params)) return;  // nothing was refitted: none is measured
   double sum = 0;
-  for (u32 i = blockIdx.x * blockDim.x + threadIdx.x; i < params.n_worlds * params.n_nodes; i += gridDim.x * blockDim.x) {
+  for (u32 i = blockIdx.x * blockDim.x + threadIdx.x; i < params.n_worlds * params.n_nodes;
+       i += gridDim.x * blockDim.x) {
     const u32 root = params.by_nodes(i) * params.n_nodes;
     const float area = area_of(load_box(&params.node_boxes[root]), params.until_best);
     if (area > 0) sum += area_of(load_box(&params.node_boxes[i]), params.until_best) / area;

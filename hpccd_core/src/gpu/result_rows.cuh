@@ -28,9 +28,17 @@ class RowsIn final : public ResultRows {
   ResultPlaces places() const override {
     // After a failed allocation there may be rows without times.
     const bool whole = toc_.size() >= vf_.size() + ee_.size();
-    return {vf_.data(),         ee_.data(),         ef_.data(),     toc_.data(),
-            whole ? vf_.size() : 0, whole ? ee_.size() : 0, ef_.size(),     offsets_[0].data(),
-            offsets_[1].data(), hashes_.data(),     first_tocs_.data()};
+    return {vf_.data(),
+            ee_.data(),
+            ef_.data(),
+            toc_.data(),
+            whole ? vf_.size() : 0,
+            whole ? ee_.size() : 0,
+            ef_.size(),
+            offsets_[0].data(),
+            offsets_[1].data(),
+            hashes_.data(),
+            first_tocs_.data()};
   }
   void reserve_worlds(std::size_t n) override {
     for (auto& offsets : offsets_) offsets.reserve(n + 1);
@@ -44,8 +52,8 @@ class RowsIn final : public ResultRows {
   void reserve_intersections(u64 n_ef) override { ef_.reserve(n_ef); }
   std::size_t device_bytes() const override {
     return std::is_same_v<Memory, DeviceMemory> ? vf_.bytes() + ee_.bytes() + ef_.bytes() + toc_.bytes() +
-                                                         2 * offsets_[0].bytes() + hashes_.bytes() + first_tocs_.bytes()
-                                                   : 0;
+                                                      2 * offsets_[0].bytes() + hashes_.bytes() + first_tocs_.bytes()
+                                                : 0;
   }
 
  private:

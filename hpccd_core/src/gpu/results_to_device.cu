@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "gpu/results_to_device.h"
-
 #include <algorithm>
 #include <memory>
 #include <utility>
 #include <vector>
 
+#include "gpu/results_to_device.h"
 #include "gpu/stream.h"
 
 namespace hpccd::gpu {

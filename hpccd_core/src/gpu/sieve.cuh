@@ -50,8 +50,7 @@ __device__ __forceinline__ void sort_survivors(const LaunchParams<T>& params) {
 // A row of blocks a kind: both at once.
 template <class Policy, class T>
 __global__ __launch_bounds__(128) void sort_survivors_kernel(const __grid_constant__ LaunchParams<T> params) {
-  blockIdx.y == 0 ? sort_survivors<Kind::edge_edge, Policy>(params)
-                  : sort_survivors<Kind::vertex_face, Policy>(params);
+  blockIdx.y == 0 ? sort_survivors<Kind::edge_edge, Policy>(params) : sort_survivors<Kind::vertex_face, Policy>(params);
 }
 
 // From no information on. The bits of its time do not depend on who asked before.

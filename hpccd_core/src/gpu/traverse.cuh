@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Pairs of leaves whose boxes overlap: one warp a leaf goes down the tree, 32 nodes at a time, depth first. It looks
-// only at leaves of its world from its own number on, so that each pair comes once. The pairs are the CPU's: a pair of leaves that
-// overlap is reached whatever the way down.
+// only at leaves of its world from its own number on, so that each pair comes once. The pairs are the CPU's: a pair of
+// leaves that overlap is reached whatever the way down.
 #pragma once
 
 #include "gpu/best_time.cuh"
@@ -68,8 +68,7 @@ __global__ __launch_bounds__(32 * traverse_warps) void traverse_kernel(LaunchPar
     __syncwarp();
     n_stack -= n;
     tests += 2 * n;
-    const DeviceBox left = load_box(&boxes[child]),
-                    right = load_box(&boxes[active ? child + 1 : 0]);
+    const DeviceBox left = load_box(&boxes[child]), right = load_box(&boxes[active ? child + 1 : 0]);
     keep(active, child, left);
     keep(active, child + 1, right);
   }
