@@ -54,6 +54,12 @@ class DeviceContacts {
     }
     if (n_worlds_ > 1) rows_->reserve_worlds(n_worlds_);
   }
+  // Of a scene without features.
+  void find_nothing(cudaStream_t stream) const {
+    if (n_worlds_ == 1) return;
+    no_rows_kernel<<<blocks_for(n_worlds_ + 1, 256), 256, 0, stream>>>(n_worlds_, rows_->places());
+    check_launch("no_rows_kernel");
+  }
   // counted: pairs are counted as they are found.
   template <class T>
   void fill(LaunchParams<T>& params, bool counted) const {

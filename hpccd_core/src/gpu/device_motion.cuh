@@ -32,11 +32,15 @@ class DeviceMotion {
     params.worlds = worlds_.size() ? worlds_.data() : &counters->world;
   }
 
+  // Counters of worlds as before anything is found.
+  void forget(cudaStream_t stream) const {
+    if (worlds_.size()) check(cudaMemsetAsync(worlds_.data(), 0, worlds_.bytes(), stream), "cudaMemsetAsync");
+  }
   // How far the positions reach that the frame names; clears its counters.
   template <class T>
   void begin(const LaunchParams<T>& params, int multiprocessors, cudaStream_t stream) const {
     check(cudaMemsetAsync(params.counters, 0, sizeof(Counters), stream), "cudaMemsetAsync");
-    if (worlds_.size()) check(cudaMemsetAsync(worlds_.data(), 0, worlds_.bytes(), stream), "cudaMemsetAsync");
+    forget(stream);
     const unsigned most = std::max(2u * static_cast<unsigned>(multiprocessors) / params.n_worlds, 1u);
     extent_kernel<<<params.n_worlds * std::min(blocks_for(params.n_vertices, 256), most), 256, 0, stream>>>(params);
     check_launch("extent_kernel");

@@ -210,6 +210,13 @@ __global__ void worlds_kernel(const __grid_constant__ LaunchParams<T> params, co
   to.first_tocs[k] = world.first_toc ? __longlong_as_double(static_cast<long long>(~world.first_toc)) : INFINITY;
 }
 
+// Where there is nothing to look at.
+__global__ void no_rows_kernel(u32 n_worlds, const __grid_constant__ ResultPlaces to) {
+  const u32 k = blockIdx.x * blockDim.x + threadIdx.x;
+  if (k <= n_worlds) to.vf_offsets[k] = to.ee_offsets[k] = 0;
+  if (k < n_worlds) to.hashes[k] = 0, to.first_tocs[k] = INFINITY;
+}
+
 // What is not wanted goes to the end, beyond the largest key.
 template <class T>
 __global__ void sortable_kernel(const __grid_constant__ LaunchParams<T> params, u64* keys, u32* numbers) {

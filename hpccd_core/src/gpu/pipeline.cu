@@ -180,8 +180,11 @@ template <class T>
 bool DevicePipeline::run_frame(Positions t0, Positions t1, double distance, ThreadPool& pool) {
   if (goal_ != Goal::near_list) undecided_.clear(), passes_ = 0;
   timer_.begin(stream_);
+  if (goal_ == Goal::results) contacts_.begin();
   if (tree_.empty()) {
     *host_counters_.data() = {};
+    motion_.forget(stream_);
+    if (goal_ == Goal::results) contacts_.find_nothing(stream_);
     return true;
   }
   LaunchParams<T> params{};
@@ -205,7 +208,6 @@ bool DevicePipeline::run_frame(Positions t0, Positions t1, double distance, Thre
   motion_.fill_counters(params, counters_.data());
   timer_.mark("upload", stream_);
   const Counters& c = *host_counters_.data();
-  if (goal_ == Goal::results) contacts_.begin();
   if (goal_ == Goal::earliest_of_near) lists_.make_room(near_.most());
   for (bool again = true; again;) {
     if (goal_ != Goal::near_list) ++passes_;
