@@ -29,7 +29,7 @@ def assert_on_gpu(detector):
 
 
 def garments(worlds, n=14, seed=0, dtype=np.float32):
-    """(scene, t0, t1) of a crumpling sheet in so many worlds, of different scale and place; nothing moves in the last."""
+    """(scene, t0, t1) of a crumpling sheet in so many worlds, of different scale and place; the last of many rests."""
     rng = np.random.default_rng(seed)
     scene = hc.Scene()
     scene.add_mesh("sheet", scenes.sheet(n))
@@ -46,7 +46,8 @@ def needle_through_plates(n):
     """A needle goes through n triangles: its three corners and edges have as many contacts each."""
     angle = np.linspace(0, 2 * np.pi, n, endpoint=False)
     height = 0.001 * np.arange(n)
-    plates = np.stack([np.stack([np.cos(angle + a), np.sin(angle + a), height], 1) for a in (0, 2, 4)], 1).reshape(-1, 3)
+    corners = [np.stack([np.cos(angle + a), np.sin(angle + a), height], axis=1) for a in (0, 2, 4)]
+    plates = np.stack(corners, axis=1).reshape(-1, 3)
     needle = np.array([[0, 0, -1], [0.01, 0, -1], [0, 0.01, -1]])
     scene = hc.Scene()
     scene.add_mesh("plates", np.arange(3 * n).reshape(-1, 3), self_collision=False)

@@ -98,8 +98,7 @@ def test_bad_coordinates_name_their_world():
     scene, t0, t1 = garments(4)
     detector = hc.Detector(scene, backend="gpu", worlds=4)
     t1[2, 17, 1] = np.nan
-    with pytest.raises(ValueError, match=r"vertices_t1\[2, 17, 1\] is nan"):
+    with pytest.raises(ValueError, match=r"vertices_t1\[2, 17, 1\] is NaN"):
         detector.detect(t0, t1)
     t1[2, 17, 1] = 0
     assert_same(detector.detect(t0, t1), hc.Detector(scene, backend="cpu", worlds=4).detect(t0, t1))
-
