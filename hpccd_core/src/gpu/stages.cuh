@@ -5,7 +5,6 @@
 #include <algorithm>
 
 #include "gpu/launch_params.cuh"
-#include "gpu/places_task.cuh"
 #include "gpu/stream.h"
 
 namespace hpccd::gpu {
@@ -50,9 +49,5 @@ template <class T>
 void launch_separations(const LaunchParams<T>& params, const Stages& stages);
 template <class T>
 void launch_snapshot(Query query, const LaunchParams<T>& params, const Stages& stages);
-
-// After the rows are there: what else was asked for. Defined for float and double.
-template <class T>
-void launch_places(const LaunchParams<T>& params, const PlacesTask& task, const Stages& stages);
 
 }  // namespace hpccd::gpu
