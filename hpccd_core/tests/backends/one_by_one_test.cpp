@@ -55,8 +55,9 @@ struct ManyOnDevice {
   Common common;
   Resources shared;
   Device device;
+  CpuBackend cpu{shared};
   WorldMemories memories{n_worlds};
-  OneByOne many{shared, device, nullptr, memories};
+  OneByOne many{shared, device, cpu, memories};
   std::vector<double> positions;
 };
 
