@@ -20,24 +20,30 @@ std::vector<std::uint32_t> some_below(std::uint32_t n) {
   return numbers;
 }
 
-// In the canonical order: vertex-face before edge-edge, by first and then second feature.
-std::vector<Candidate> some_pairs(const Sizes& n) {
+// In the canonical order: vertex-face before edge-edge, by first and then second feature. First ones are numbered
+// through all worlds.
+std::vector<Candidate> some_pairs(const Sizes& n, std::uint32_t worlds) {
   std::vector<Candidate> pairs;
-  for (const auto v : some_below(n.vertices))
+  for (const auto v : some_below(worlds * n.vertices))
     for (const auto f : some_below(n.faces)) pairs.push_back({v, f, Kind::vertex_face});
-  for (const auto a : some_below(n.edges))
+  for (const auto a : some_below(worlds * n.edges))
     for (const auto b : some_below(n.edges)) pairs.push_back({a, b, Kind::edge_edge});
   return pairs;
 }
 
 TEST(PairKeys, AscendInTheCanonicalOrderAndGiveTheirPairsBack) {
   constexpr std::uint32_t most = 0x7FFFFFFF;
-  for (const Sizes n :
-       {Sizes{3, 3, 1}, Sizes{100, 4, 7}, Sizes{4, 100, 1}, Sizes{5, 9, 5000}, Sizes{most, most, most}}) {
-    const PairKeys keys = PairKeys::of(n.vertices, n.edges, n.faces);
+  struct Case {
+    Sizes n;
+    std::uint32_t worlds;
+  };
+  for (const auto& [n, worlds] :
+       {Case{{3, 3, 1}, 1}, Case{{100, 4, 7}, 1}, Case{{4, 100, 1}, 1}, Case{{5, 9, 5000}, 1},
+        Case{{most, most, most}, 1}, Case{{3, 3, 1}, 65536}, Case{{1350, 4050, 2700}, 8192}}) {
+    const PairKeys keys = PairKeys::of(n.vertices, n.edges, n.faces, worlds);
     u64 last = 0;
     bool first = true;
-    for (const Candidate& pair : some_pairs(n)) {
+    for (const Candidate& pair : some_pairs(n, worlds)) {
       const u64 key = keys.key_of(pair.kind, pair.first, pair.second);
       EXPECT_TRUE(first || last < key);
       EXPECT_LT(key, u64{1} << keys.bits());
