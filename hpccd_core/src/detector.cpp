@@ -44,6 +44,19 @@ struct Detector::Impl {
   std::optional<Counts> found;
   Backend asked = Backend::cpu;  // which may have left the rest to the CPU
 
+  // One call, from its turn to its end.
+  struct Call {
+    explicit Call(Impl& d) : lock(d.one_call) {
+      d.cancellation().heed();
+      d.found.reset();
+      d.common.settle();
+      if (d.backends.use_devices()) callers.emplace();
+      d.shared.profiler.begin();
+    }
+    const std::lock_guard<std::mutex> lock;
+    std::optional<gpu::CallersDevice> callers;
+  };
+
   void check(Positions t0, Positions t1) const {
     const std::size_t n = shared.features.n_vertices, worlds = shared.options.worlds;
     if (t0.n != n * worlds || t1.n != n * worlds)
@@ -86,13 +99,7 @@ struct Detector::Impl {
   template <bool may_be_in_place>
   Detected detect(Positions t0, Positions t1) {
     check(t0, t1);
-    const std::lock_guard lock(one_call);
-    cancellation().heed();
-    found.reset();
-    common.settle();
-    std::optional<gpu::CallersDevice> callers;
-    if (backends.use_devices()) callers.emplace();
-    shared.profiler.begin();
+    const Call call(*this);
     const Backend picked = pick(t0.on_device || t1.on_device);
     const bool in_place = may_be_in_place && gives_in_place(picked);
     if (in_place) {
@@ -112,13 +119,7 @@ struct Detector::Impl {
   template <class Query>
   auto ask(Positions t0, Positions t1, Query&& query) {
     check(t0, t1);
-    const std::lock_guard lock(one_call);
-    cancellation().heed();
-    found.reset();
-    common.settle();
-    std::optional<gpu::CallersDevice> callers;
-    if (backends.use_devices()) callers.emplace();
-    shared.profiler.begin();
+    const Call call(*this);
     Counts counts;
     for (const Backend b : {backends.works(Backend::gpu) ? Backend::gpu : Backend::cpu, Backend::cpu}) {
       if (b != Backend::gpu) t0 = backends.on_host(t0, 0), t1 = backends.on_host(t1, 1);
@@ -139,12 +140,7 @@ struct Detector::Impl {
     check(t0, t1);
     if (!shared.options.results_on_device)
       throw InvalidArgument("results: this detector brings its results to the host");
-    const std::lock_guard lock(one_call);
-    cancellation().heed();
-    found.reset();
-    common.settle();
-    const gpu::CallersDevice callers;
-    shared.profiler.begin();
+    const Call call(*this);
     std::optional<DeviceResults> results;
     if (backends.works(Backend::gpu)) results = at_once(backends.gpu());
     last_backend = asked = results ? Backend::gpu : Backend::cpu;
