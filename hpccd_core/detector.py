@@ -200,9 +200,10 @@ class Detector(MotionQueries[OfMotion], SnapshotQueries[OfNear, OfPierced]):
         kept in a copy on the device. A step from a host array to a device array, or back, raises TypeError; reset()
         first. stream: as for detect(). With results="device" the first call returns no contacts on the device.
         """
+        made_on = device_arrays.stream_number(stream)
         with self._stepping:
             if device_arrays.is_on_device(vertices):
-                found = self._step_on_device(vertices, device_arrays.stream_number(stream))
+                found = self._step_on_device(vertices, made_on)
             else:
                 found = self._step_on_host(vertices)
             return cast(OfMotion, found)
@@ -218,6 +219,8 @@ class Detector(MotionQueries[OfMotion], SnapshotQueries[OfNear, OfPierced]):
         else:
             with names_of_one_argument():
                 contacts = self.detect(end if self._last is None else self._last, end)
+            if self._last is None:
+                contacts = contacts.without_rows()
         self._last = end
         return contacts
 
@@ -232,7 +235,9 @@ class Detector(MotionQueries[OfMotion], SnapshotQueries[OfNear, OfPierced]):
         with names_of_one_argument():  # the device checks the first one too, as a step that goes nowhere
             contacts = self._contacts(self._of_places(self._asked("detect"), place if last is None else last, place))
         self._last_on_device.keep(place, self._rows)
-        return Contacts.none(self.worlds) if last is None and self.results == "host" else contacts
+        if last is not None:
+            return contacts
+        return Contacts.none(self.worlds) if self.results == "host" else contacts.without_rows()
 
     def set_separation(self, mesh_a: str | int, mesh_b: str | int, separation: float) -> None:
         """From the next call on, report pairs of these two meshes (names or numbers) that come within this distance.

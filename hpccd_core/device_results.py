@@ -109,6 +109,19 @@ class DeviceContacts(_PairsOnDevice):
         fields = self._of_world(k, ("points", "normals", "closest"), "vf_toc", "ee_toc")
         return DeviceContacts(**fields, first_toc=float(of_worlds.first_tocs[k]))
 
+    def without_rows(self) -> "DeviceContacts":
+        """No contacts at all, of as many worlds, on the same device."""
+        rows = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
+        none = {name: a.rows(0, 0) for name, a in rows.items() if isinstance(a, DeviceArray)}
+        slices = self.slices
+        if slices is not None and (hashes := slices["hashes"]) is not None:
+            worlds, device = len(hashes), hashes.device
+            begins = integers_on_device([0] * (worlds + 1), device)
+            times = integers_on_device([int(np.float64(np.inf).view(np.int64))] * worlds, device).seen_as("f")
+            hashes = integers_on_device([0] * worlds, device).seen_as("u")
+            slices = {"vf": begins, "ee": begins, "ef": None, "hashes": hashes, "first_tocs": times}
+        return DeviceContacts(**none, first_toc=float("inf"), hash=0, slices=slices)
+
     def to_host(self) -> Contacts:
         """A copy in numpy arrays."""
         return Contacts(**_arrays_on_host(self), first_toc=self.first_toc, hash=self.hash, slices=self._slices_on_host)

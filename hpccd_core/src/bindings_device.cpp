@@ -150,6 +150,8 @@ void bind_device_array(py::module_& m) {
           py::kw_only(), py::arg("stream") = py::none(), py::arg("max_version") = py::none(),
           py::arg("dl_device") = py::none(), py::arg("copy") = py::none())
       .def("rows", &rows_of, py::arg("begin"), py::arg("end"))
+      .def(
+          "seen_as", [](DeviceArray a, char kind) { return a.kind = kind, a; }, py::arg("kind"))
       .def("joined", &joined, py::arg("other"))
       .def("to_host", &to_host)
       .def("__repr__", [](const DeviceArray& a) {

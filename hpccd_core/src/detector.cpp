@@ -135,8 +135,8 @@ struct Detector::Impl {
 
   // Where results stay on the device. at_once(backend): there, or nothing where it failed; then what the CPU answers is
   // brought there.
-  template <class AtOnce, class OnHost>
-  DeviceResults on_device(Positions t0, Positions t1, AtOnce&& at_once, OnHost&& on_host) {
+  template <class AtOnce, class OnHost, class Count>
+  DeviceResults on_device(Positions t0, Positions t1, AtOnce&& at_once, OnHost&& on_host, Count&& count) {
     check(t0, t1);
     if (!shared.options.results_on_device)
       throw InvalidArgument("results: this detector brings its results to the host");
@@ -149,6 +149,7 @@ struct Detector::Impl {
       results = gpu::to_device(on_host(backends.at(Backend::cpu), t0, t1), gpu::status().devices.at(0).number);
     }
     shared.profiler.end();
+    found = count(*results);
     return *results;
   }
 
@@ -180,11 +181,10 @@ Contacts Detector::detect(Positions t0, Positions t1) { return impl_->detect<fal
 Detected Detector::detect_in_place(Positions t0, Positions t1) { return impl_->detect<true>(t0, t1); }
 
 DeviceResults Detector::detect_on_device(Positions t0, Positions t1) {
-  DeviceResults r = impl_->on_device(
+  return impl_->on_device(
       t0, t1, [&](GpuBackend& gpu) { return gpu.detect_on_device(t0, t1); },
-      [](DetectionBackend& cpu, Positions a, Positions b) { return cpu.detect(a, b).value().contacts; });
-  impl_->found = {{"vf_contacts", r.n_vf}, {"ee_contacts", r.n_ee}};
-  return r;
+      [](DetectionBackend& cpu, Positions a, Positions b) { return cpu.detect(a, b).value().contacts; },
+      [](const DeviceResults& r) { return Counts{{"vf_contacts", r.n_vf}, {"ee_contacts", r.n_ee}}; });
 }
 
 double Detector::collision_free_step(Positions t0, Positions t1) {
@@ -226,19 +226,17 @@ Intersections Detector::intersections(Positions vertices) {
 
 DeviceResults Detector::proximity_on_device(Positions vertices, double distance) {
   check_length("distance", distance);
-  DeviceResults r = impl_->on_device(
+  return impl_->on_device(
       vertices, vertices, [&](GpuBackend& gpu) { return gpu.proximity_on_device(vertices, distance); },
-      [&](DetectionBackend& cpu, Positions v, Positions) { return as_proximity(cpu.proximity(v, distance).value()); });
-  impl_->found = {{"vf_near", r.n_vf}, {"ee_near", r.n_ee}};
-  return r;
+      [&](DetectionBackend& cpu, Positions v, Positions) { return as_proximity(cpu.proximity(v, distance).value()); },
+      [](const DeviceResults& r) { return Counts{{"vf_near", r.n_vf}, {"ee_near", r.n_ee}}; });
 }
 
 DeviceResults Detector::intersections_on_device(Positions vertices) {
-  DeviceResults r = impl_->on_device(
+  return impl_->on_device(
       vertices, vertices, [&](GpuBackend& gpu) { return gpu.intersections_on_device(vertices); },
-      [](DetectionBackend& cpu, Positions v, Positions) { return cpu.intersections(v).value(); });
-  impl_->found = {{"ef_intersections", r.n_ef}};
-  return r;
+      [](DetectionBackend& cpu, Positions v, Positions) { return cpu.intersections(v).value(); },
+      [](const DeviceResults& r) { return Counts{{"ef_intersections", r.n_ef}}; });
 }
 
 std::vector<Gap> Detector::distances(Positions vertices) {

@@ -26,6 +26,8 @@ class Memory {
     if (!rows.empty())
       check(cudaMemcpy(const_cast<Row*>(begin) + at, rows.data(), rows.size() * sizeof(Row), cudaMemcpyHostToDevice),
             "cudaMemcpy");
+    check(cudaStreamSynchronize(nullptr),
+          "cudaStreamSynchronize");  // from pageable memory it may return before its end
     return begin;
   }
   template <class Row>
