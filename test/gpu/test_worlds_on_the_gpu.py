@@ -18,9 +18,7 @@ def on_host(found):
 
 
 def each_alone(scene, t0, t1, **options):
-    return [
-        hc.Detector(scene, backend="cpu", threads=1, **options).detect(a, b) for a, b in zip(t0, t1, strict=True)
-    ]
+    return [hc.Detector(scene, backend="cpu", threads=1, **options).detect(a, b) for a, b in zip(t0, t1, strict=True)]
 
 
 def assert_each_alone(found, alone):
@@ -71,6 +69,38 @@ def test_each_is_as_alone(worlds, accuracy, dtype):
             for _ in range(2):
                 assert_each_alone(detector.detect(t0, t1), alone)
                 assert_on_gpu(detector)
+
+
+@pytest.mark.parametrize("dtype", (np.float32, np.float64))
+@pytest.mark.parametrize("accuracy", TIERS)
+@pytest.mark.parametrize("worlds", (1, 2, 9))
+def test_how_far_each_may_go(worlds, accuracy, dtype):
+    scene, t0, t1 = garments(worlds, n=9, dtype=dtype)
+    there = hc.Detector(scene, backend="gpu", worlds=worlds, accuracy=accuracy)
+    for part in (1.0, 0.1, 1e-3):
+        end = (t0 + part * (t1 - t0)).astype(dtype)
+        alone = [hc.Detector(scene, backend="cpu", accuracy=accuracy, threads=1) for _ in range(worlds)]
+        expected = [d.collision_free_step(a, b) for d, a, b in zip(alone, t0, end, strict=True)]
+        for _ in range(3):  # of one world from the near list, too
+            found = there.collision_free_step(t0, end)
+            assert found.shape == (worlds,) and found.dtype == np.float64
+            np.testing.assert_array_equal(found, expected)
+        assert_on_gpu(there)
+
+
+@pytest.mark.parametrize("results", RESULTS)
+def test_the_first_world_says_little_of_the_others(results):
+    """The tree is made where the first world stands: in one place, or in another order than all others."""
+    scene, t0, t1 = garments(4, n=7)
+    rng = np.random.default_rng(9)
+    for first in (np.zeros_like(t0[0]), t0[0] + 1e-6 * t1[0], 100 * rng.normal(size=t0[0].shape)):
+        t0[0] = first
+        t1[0] = first + 1
+        alone = each_alone(scene, t0, t1)
+        detector = hc.Detector(scene, backend="gpu", worlds=4, results=results)
+        for _ in range(2):
+            assert_each_alone(detector.detect(t0, t1), alone)
+            assert_on_gpu(detector)
 
 
 @pytest.mark.parametrize("results", RESULTS)
