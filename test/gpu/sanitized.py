@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
+import device_results
 import scenes
 
 import hpccd_core as hc
@@ -46,3 +47,56 @@ for make in (scenes.crumpled, scenes.lattice, scenes.soup):
     for backend in ("gpu", "hybrid"):
         if detectors[backend].stats["gpu_fallbacks"]:
             sys.exit(f"{make.__name__}, {backend}: {detectors[backend].last_gpu_error}")
+
+
+def answers(detector, t0, t1):
+    """What it says to everything, on the host, in small arrays that can be compared."""
+    found = [detector.detect(t0, t1), detector.proximity(t0, 0.1), detector.intersections(t1)]
+    hashes = [answer.hash for answer in found]
+    on_host = [answer.to_host() if hasattr(answer, "to_host") else answer for answer in found]
+    rows = [np.concatenate([a.vf_toc, a.ee_toc]) for a in on_host[:1]] + [a.vf_distance for a in on_host[1:2]]
+    free = np.atleast_1d(detector.collision_free_step(t0, t1))
+    return hashes, [*rows, on_host[2].ef.ravel(), on_host[0].vf_offsets, on_host[0].first_tocs, free]
+
+
+def check(what, scene, t0, t1, **options):
+    """Results on the host and on the device, twice: with lists that have to grow, and with those that have."""
+    host = {name: value for name, value in options.items() if name != "outputs"}
+    expected = answers(hc.Detector(scene, backend="cpu", threads=1, **host), t0, t1)
+    for results in ("host", "device"):
+        detector = hc.Detector(scene, backend="gpu", threads=2, results=results, **options)
+        for _ in range(2):
+            found = answers(detector, t0, t1)
+            same = all(map(np.array_equal, found[1], expected[1]))
+            if found[0] != expected[0] or not same:
+                sys.exit(f"{what}, {results}, {options}: answers differ")
+            if detector.stats["gpu_fallbacks"]:
+                sys.exit(f"{what}, {results}, {options}: {detector.last_gpu_error}")
+    print(what, options, found[0])
+
+
+sheet, lattice = (scenes.join([make(np.random.default_rng(3), 8)]) for make in (scenes.crumpled, scenes.lattice))
+for report in ("all", "first"):
+    check("sheet", *sheet, report=report)
+    check("lattice", *lattice, report=report)  # by integers
+    check("worlds", *device_results.garments(3, n=7), worlds=3, report=report)
+check("places", *sheet, outputs=("points", "normals", "closest"))
+for accuracy in ("fast", "balanced"):
+    check("worlds", *device_results.garments(4, n=7), worlds=4, accuracy=accuracy)
+
+# Of one feature more pairs than are ordered by looking at all of them, in one world and in two of three.
+scene, t0, t1 = device_results.needle_through_plates(2100)
+for worlds in (None, 3):
+    start, end = (t0, t1) if worlds is None else (np.stack([t0, t0, t1]), np.stack([t1, t0, t0]))
+    expected = hc.Detector(scene, backend="cpu", worlds=worlds).detect(start, end)
+    found = hc.Detector(scene, backend="gpu", worlds=worlds, results="device").detect(start, end)
+    if found.hash != expected.hash:
+        sys.exit(f"needle, {worlds} worlds: contacts differ")
+
+# Coordinates of so many bits that the CPU decides: what it finds is added on the device.
+rng = np.random.default_rng(300)
+faces, t0, t1 = scenes.lattice(rng, 10)
+t1 = np.where(rng.random(t1.shape) < 0.2, rng.integers(-3, 4, t0.shape) * 2.0**-300, t1)
+scene, t0, t1 = scenes.join([(faces, t0, t1)])
+check("many bits", scene, t0, t1)
+check("many bits", scene, np.stack([t0, t1]), np.stack([t1, t0]), worlds=2)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""compute-sanitizer finds neither bad memory accesses nor races in the kernels."""
+"""compute-sanitizer finds no bad or uninitialized memory accesses, no races and no wrong barriers in the kernels."""
 
 import os
 import shutil
@@ -12,7 +12,7 @@ import pytest
 import hpccd_core as hc
 
 
-@pytest.mark.parametrize("tool", ("memcheck", "racecheck"))
+@pytest.mark.parametrize("tool", ("memcheck", "racecheck", "initcheck", "synccheck"))
 def test_clean(tool):
     program = shutil.which("compute-sanitizer") or shutil.which("compute-sanitizer", path="/usr/local/cuda/bin")
     if not program:
