@@ -142,6 +142,7 @@ class Detector(MotionQueries[OfMotion], SnapshotQueries[OfNear, OfPierced]):
             usable = ", ".join(["auto", *backends()])
             raise ValueError(f"backend: {backend!r} is not usable here ({why}); use one of {usable}")
         self.results = arguments.choice("results", results, RESULTS)
+        arguments.choice("method", method, METHODS)
         if results == "device":
             _require_device(backend, method)
         self._backend = backend
