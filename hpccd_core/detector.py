@@ -142,7 +142,7 @@ class Detector(MotionQueries[OfMotion], SnapshotQueries[OfNear, OfPierced]):
             usable = ", ".join(["auto", *backends()])
             raise ValueError(f"backend: {backend!r} is not usable here ({why}); use one of {usable}")
         self.results = arguments.choice("results", results, RESULTS)
-        arguments.choice("method", method, METHODS)
+        self.method = arguments.choice("method", method, METHODS)
         if results == "device":
             _require_device(backend, method)
         self._backend = backend
@@ -150,7 +150,6 @@ class Detector(MotionQueries[OfMotion], SnapshotQueries[OfNear, OfPierced]):
         self.features = arguments.feature_names(features)
         threads = arguments.whole_number("threads", threads, 0, 1024)
         arguments.choice("simd", simd, SIMD)
-        self.method = arguments.choice("method", method, METHODS)
         if method != "default" and report == "any":
             raise ValueError(
                 f"report: 'any' is not offered by method {method!r}; use method='default', or report='all' or 'first'"
