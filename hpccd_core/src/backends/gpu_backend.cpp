@@ -41,6 +41,7 @@ std::string GpuBackend::unsupported(const Options& options) {
 // What the device computes with the CPU beside it, or nothing after a failure.
 template <class Compute>
 auto GpuBackend::attempt(Compute&& compute) -> std::optional<decltype(compute())> {
+  places_on_cpu_ = 0;
   try {
     std::optional found(compute());
     failures_.succeeded();
@@ -90,19 +91,17 @@ std::optional<DeviceResults> GpuBackend::detect_on_device(Positions t0, Position
   require_rest(t0, t1);
   return attempt([&] {
     run_contacts(t0, t1);
-    DeviceResults found = on_device(finish_on_device());
     const Options& o = shared_.options;
-    add_places(found, {o.points, o.normals, o.closest, AtTime::contact}, shared_.separations_now(), t0, t1);
-    return found;
+    return with_places(finish_on_device(), {o.points, o.normals, o.closest, AtTime::contact}, shared_.separations_now(),
+                       t0, t1);
   });
 }
 
 std::optional<DeviceResults> GpuBackend::proximity_on_device(Positions vertices, double distance) {
   return attempt([&] {
     run_near_pairs(vertices, distance);
-    DeviceResults found = on_device(finish_on_device());
-    add_places(found, {false, false, shared_.options.closest, AtTime::start}, {distance}, vertices, vertices);
-    return found;
+    return with_places(finish_on_device(), {false, false, shared_.options.closest, AtTime::start}, {distance}, vertices,
+                       vertices);
   });
 }
 
@@ -241,6 +240,8 @@ DeviceResults GpuBackend::on_device(const gpu::FrameResult& f) {
   r.vf_offsets = f.vf_offsets, r.ee_offsets = f.ee_offsets, r.ef_offsets = f.ef_offsets;
   r.hashes = f.hashes, r.first_tocs = f.first_tocs;
   r.hash = f.hash, r.first_toc = f.first_toc;
+  r.points = reinterpret_cast<decltype(r.points)>(f.points), r.normals = reinterpret_cast<decltype(r.normals)>(f.normals);
+  r.closest = reinterpret_cast<decltype(r.closest)>(f.closest);
   if (last_boxes_.until_best) pipeline_->choose_hints(r.first_toc);
   if (n_worlds() > 1) {
     std::vector<std::uint64_t> hashes(n_worlds());
@@ -254,37 +255,6 @@ DeviceResults GpuBackend::on_device(const gpu::FrameResult& f) {
   }
   shared_.profiler.mark("contacts");
   return r;
-}
-
-void GpuBackend::add_places(Contacts& found, Outputs outputs, const Separations& separations, Positions t0,
-                            Positions t1) {
-  if (!outputs.points && !outputs.normals && !outputs.closest) return;
-  const bool snapshot = t0.data == t1.data;
-  t0 = on_host(t0, 0), t1 = snapshot ? t0 : on_host(t1, 1);
-  if (n_worlds() == 1)
-    hpccd::add_places(found, outputs, shared_.features, separations, t0, t1, shared_.pool);
-  else
-    add_places_of_worlds(found, outputs, shared_.features, separations, t0, t1, shared_.pool);
-}
-
-// By the CPU: where features are parallel or degenerate they take its integers.
-void GpuBackend::add_places(DeviceResults& found, Outputs outputs, const Separations& separations, Positions t0,
-                            Positions t1) {
-  if (!outputs.points && !outputs.normals && !outputs.closest) return;
-  const auto fetch = [](auto& to, const auto* from, std::size_t n) {
-    to.resize(n);
-    gpu::download(from, to.data(), n * sizeof to[0]);
-  };
-  Contacts c;
-  fetch(c.vf, found.vf, found.n_vf), fetch(c.vf_toc, found.values, found.n_vf);
-  fetch(c.ee, found.ee, found.n_ee), fetch(c.ee_toc, found.values + found.n_vf, found.n_ee);
-  if (n_worlds() > 1) {
-    fetch(c.slices.vf, found.vf_offsets, n_worlds() + 1);
-    fetch(c.slices.ee, found.ee_offsets, n_worlds() + 1);
-  }
-  add_places(c, outputs, separations, t0, t1);
-  gpu::add_places(found, c);
-  shared_.profiler.mark("places");
 }
 
 std::size_t GpuBackend::world_of(const Candidate& pair) const {
@@ -389,6 +359,7 @@ void GpuBackend::count(std::map<std::string, std::uint64_t>& stats) const {
   if (!pipeline_) return;
   stats.merge(pipeline_->stats());
   stats["gpu_exact_on_cpu"] = pipeline_->undecided().size();
+  stats["gpu_places_on_cpu"] = places_on_cpu_;
   if (last_boxes_.query == gpu::Query::intersections) stats["ef_by_integers"] = pipeline_->undecided().size();
 }
 

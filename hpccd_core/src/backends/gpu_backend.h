@@ -90,6 +90,8 @@ class GpuBackend final : public DetectionBackend {
   gpu::FrameResult finish_on_device();
   Contacts finish_on_host(Report report);
   DeviceResults on_device(const gpu::FrameResult& found);
+  DeviceResults with_places(gpu::FrameResult found, Outputs outputs, const Separations& separations, Positions t0,
+                            Positions t1);
   void add_places(DeviceResults& found, Outputs outputs, const Separations& separations, Positions t0, Positions t1);
   void add_places(Contacts& found, Outputs outputs, const Separations& separations, Positions t0, Positions t1);
   Accuracy accuracy_of(const Candidate& pair) const;
@@ -104,6 +106,7 @@ class GpuBackend final : public DetectionBackend {
   NearRadius near_;                     // of the pipeline's near list
   std::uint64_t near_separations_ = 0;  // the version of the separations that it is for
   double edge_ = 0;                     // a typical length, when the tree was built
+  std::uint64_t places_on_cpu_ = 0;     // rows whose places the CPU computed for results on the device
   std::vector<unsigned char> downloaded_[2];
 };
 

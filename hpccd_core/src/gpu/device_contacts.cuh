@@ -133,6 +133,8 @@ class DeviceContacts {
     check_launch("forget_results_kernel");
   }
 
+  PlacesOut reserve_places(u64 n_rows, Outputs outputs) const { return rows_->reserve_places(n_rows, outputs); }
+
   // When the stream has come to its end.
   FrameResult result(Query query, const Counters& c) const {
     const ResultPlaces from = rows_->places();

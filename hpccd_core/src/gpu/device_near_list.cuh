@@ -86,6 +86,7 @@ class DeviceNearList {
   template <class T>
   void collect(const LaunchParams<T>& params, const Counters& c, cudaStream_t stream) {
     const u64 n = c.found_all + c.to_host;
+    n_[0] = n_[1] = 0;  // no list, should this fail
     for (auto& pairs : pairs_) pairs.reserve(static_cast<std::size_t>(n + n / 4 + 1));
     const PairList lists[2] = {{pairs_[0].data(), pairs_[0].size()}, {pairs_[1].data(), pairs_[1].size()}};
     check(cudaMemsetAsync(&params.counters->listed, 0, sizeof params.counters->listed, stream), "cudaMemsetAsync");

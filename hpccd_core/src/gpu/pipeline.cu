@@ -6,6 +6,7 @@
 #include "gpu/device_contacts.cuh"
 #include "gpu/device_motion.cuh"
 #include "gpu/device_near_list.cuh"
+#include "gpu/device_places.cuh"
 #include "gpu/device_positions.cuh"
 #include "gpu/device_scene.cuh"
 #include "gpu/device_tree.cuh"
@@ -95,6 +96,8 @@ class DevicePipeline : public Pipeline {
     check(cudaStreamSynchronize(stream_), "cudaStreamSynchronize");
     return contacts_.result(query_, *host_counters_.data());
   }
+  std::optional<std::vector<OpenRow>> find_places(FrameResult& result, Outputs outputs) override;
+  void put_places(const std::vector<PairPlaces>& places) override { places_.put(places_out_, places, on_stream()); }
 
   double relative_area() const override { return host_counters_.data()->area; }
   std::map<std::string, std::uint64_t> stats() const override;
@@ -155,6 +158,8 @@ class DevicePipeline : public Pipeline {
   DeviceBuffer<uint2> leaf_pairs_;
   TestLists lists_;
   DeviceContacts contacts_;
+  DevicePlaces places_;
+  PlacesOut places_out_{};
   DeviceBuffer<Counters> counters_;
   PinnedBuffer<Counters> host_counters_;
   Counters told_{};  // of the frame before the one that lists for those to come: what stats() tells
@@ -308,6 +313,19 @@ void DevicePipeline::add(const std::vector<Contact>& vertex_face, const std::vec
   });
 }
 
+std::optional<std::vector<OpenRow>> DevicePipeline::find_places(FrameResult& r, Outputs outputs) {
+  places_out_ = contacts_.reserve_places(r.n_vf + r.n_ee, outputs);
+  if (outputs.points) r.points = places_out_.points;
+  if (outputs.normals) r.normals = places_out_.normals;
+  if (outputs.closest) r.closest = places_out_.closest;
+  std::optional<std::vector<OpenRow>> open;
+  with_last_frame([&](auto params) {
+    if (!of_snapshot(query_)) scene_.fill_separations(params);
+    open = places_.find(params, r, places_out_, on_stream());
+  });
+  return open;
+}
+
 EarliestTime DevicePipeline::earliest() const {
   const Counters& c = *host_counters_.data();
   return {as_time(c.soonest), near_.has_snapshot() ? std::bit_cast<double>(c.away) : no_time,
@@ -422,7 +440,7 @@ std::map<std::string, std::uint64_t> DevicePipeline::stats() const {
   s["gpu_passes"] = passes_;
   s["gpu_segments"] = lists_.n_segments();
   s["gpu_bytes"] = scene_.bytes() + tree_.bytes() + positions_.bytes() + motion_.bytes() + leaf_pairs_.bytes() +
-                   lists_.bytes() + contacts_.bytes() + near_.bytes() + hints_.bytes();
+                   lists_.bytes() + contacts_.bytes() + places_.bytes() + near_.bytes() + hints_.bytes();
   if (for_earliest() || goal_ == Goal::near_list) s["near_pairs"] = near_.size();
   return s;
 }

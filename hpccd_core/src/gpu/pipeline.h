@@ -12,7 +12,9 @@
 #include <vector>
 
 #include "bvh/tree.h"
+#include "contacts/pair_places.h"
 #include "elementary/pair.h"
+#include "gpu/places.h"
 #include "gpu/query.h"
 #include "hpccd/hpccd.h"
 #include "scene/features.h"
@@ -32,6 +34,8 @@ struct FrameResult {
   const std::array<std::uint32_t, 3>* ef = nullptr;  // where edges and faces were looked for, alone
   std::uint64_t hash = 0;
   double first_toc = std::numeric_limits<double>::infinity();
+  // Of each row of vf, then of ee, as far as they were asked for.
+  const double *points = nullptr, *normals = nullptr, *closest = nullptr;
   // Of several worlds, whose hash and earliest time stand here alone (WorldSlices, Contacts::first_tocs).
   const std::uint64_t *vf_offsets = nullptr, *ee_offsets = nullptr, *ef_offsets = nullptr, *hashes = nullptr;
   const double* first_tocs = nullptr;
@@ -68,6 +72,11 @@ class Pipeline {
   // Adds what the CPU found of these, where results stay on the device.
   virtual void add(const std::vector<Contact>& vertex_face, const std::vector<Contact>& edge_edge) = 0;
   virtual FrameResult finish() = 0;
+  // After finish(), of results that stay on the device: writes what else is asked for of each row, but of those that
+  // come back, which only integers can tell. Nothing where these are too many to be worth it.
+  virtual std::optional<std::vector<OpenRow>> find_places(FrameResult& result, Outputs outputs) = 0;
+  // What the host has found of these.
+  virtual void put_places(const std::vector<PairPlaces>& places) = 0;
 
   // The same for the earliest time alone, which is never late at the tiers that promise it: of all pairs, or of those
   // in the near list. Then undecided() and earliest().

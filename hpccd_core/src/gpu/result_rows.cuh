@@ -2,12 +2,14 @@
 // The rows of a frame's results as the caller sees them, in page-locked memory or on the device.
 #pragma once
 
+#include <algorithm>
 #include <memory>
 #include <type_traits>
 #include <vector>
 
 #include "gpu/memory.h"
 #include "gpu/ordering.cuh"
+#include "gpu/places_task.cuh"
 
 namespace hpccd::gpu {
 
@@ -19,6 +21,8 @@ class ResultRows {
   virtual void reserve(u64 n_vf, u64 n_ee) = 0;
   virtual void reserve_intersections(u64 n_ef) = 0;
   virtual void reserve_worlds(std::size_t n) = 0;
+  // Room for the places of as many rows as there are, and where it is.
+  virtual PlacesOut reserve_places(u64 n_rows, Outputs outputs) = 0;
   virtual std::size_t device_bytes() const = 0;
 };
 
@@ -50,9 +54,18 @@ class RowsIn final : public ResultRows {
     toc_.reserve(vf_.size() + ee_.size());
   }
   void reserve_intersections(u64 n_ef) override { ef_.reserve(n_ef); }
+  PlacesOut reserve_places(u64 n_rows, Outputs outputs) override {
+    // As for the rows, and room for more of them.
+    const u64 n = std::max<u64>(n_rows, vf_.size() + ee_.size());
+    if (outputs.points) points_.reserve(3 * n);
+    if (outputs.normals) normals_.reserve(3 * n);
+    if (outputs.closest) closest_.reserve(6 * n);
+    return {outputs, points_.data(), normals_.data(), closest_.data()};
+  }
   std::size_t device_bytes() const override {
     return std::is_same_v<Memory, DeviceMemory> ? vf_.bytes() + ee_.bytes() + ef_.bytes() + toc_.bytes() +
-                                                      2 * offsets_[0].bytes() + hashes_.bytes() + first_tocs_.bytes()
+                                                      2 * offsets_[0].bytes() + hashes_.bytes() + first_tocs_.bytes() +
+                                                      points_.bytes() + normals_.bytes() + closest_.bytes()
                                                 : 0;
   }
 
@@ -63,6 +76,7 @@ class RowsIn final : public ResultRows {
   Buffer<double, Memory> toc_;
   Buffer<u64, Memory> offsets_[2], hashes_;
   Buffer<double, Memory> first_tocs_;
+  Buffer<double, Memory> points_, normals_, closest_;
 };
 
 // Rows that are handed out: they are taken for another frame when nobody holds them any more.

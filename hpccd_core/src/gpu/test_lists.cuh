@@ -2,6 +2,9 @@
 // The lists between the stages of the elementary tests, and the stages themselves: from pairs of leaves to contacts.
 #pragma once
 
+#include <algorithm>
+#include <iterator>
+
 #include "gpu/launch_params.cuh"
 #include "gpu/stream.h"
 
@@ -70,7 +73,8 @@ class TestLists {
     }
     params.undecided = undecided_.data(), params.undecided_capacity = undecided_.size();
     for (int i = 0; i < integer_sizes; ++i) params.open_in_integers[i] = open_[i].data();
-    params.open_capacity = open_[0].size();
+    // After a failed allocation one may be shorter.
+    params.open_capacity = std::min_element(std::begin(open_), std::end(open_), shorter)->size();
     params.to_host = to_host_.data(), params.to_host_capacity = to_host_.size();
   }
 
@@ -120,6 +124,8 @@ class TestLists {
   // Lists of one pass stay below this; larger frames take several segments.
   static constexpr std::size_t most_listed = std::size_t{1} << 26;
   u32 n_segments_ = 1;
+
+  static bool shorter(const DeviceBuffer<u64>& a, const DeviceBuffer<u64>& b) { return a.size() < b.size(); }
 };
 
 }  // namespace hpccd::gpu

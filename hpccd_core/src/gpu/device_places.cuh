@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+// Points, normals and nearest points of results that stay on the device.
+#pragma once
+
+#include <algorithm>
+#include <optional>
+#include <vector>
+
+#include "gpu/pipeline.h"
+#include "gpu/places_task.cuh"
+
+namespace hpccd::gpu {
+
+class DevicePlaces {
+ public:
+  // Of the rows of a result; to: where there is room for all. Comes back with those that only integers can tell, whose
+  // places are not written; or with nothing where they are so many that the host had better compute all of them. Waits
+  // for the stream.
+  template <class T>
+  std::optional<std::vector<OpenRow>> find(const LaunchParams<T>& params, const FrameResult& r, const PlacesOut& to,
+                                           const Stages& stages) {
+    const u64 n = r.n_vf + r.n_ee;
+    n_open_.reserve(1);
+    open_.reserve(static_cast<std::size_t>(std::max<u64>(n / most_open, 1024)));
+    check(cudaMemsetAsync(n_open_.data(), 0, n_open_.bytes(), stages.stream), "cudaMemsetAsync");
+    const auto offsets = [](const std::uint64_t* p) { return reinterpret_cast<const u64*>(p); };
+    launch_places(params,
+                  {r.n_vf, r.n_ee, reinterpret_cast<const uint2*>(r.vf), reinterpret_cast<const uint4*>(r.ee), r.toc,
+                   offsets(r.vf_offsets), offsets(r.ee_offsets), to, open_.data(), open_.size(), n_open_.data()},
+                  stages);
+    u64 n_open = 0;
+    fetch(&n_open, n_open_.data(), 1, stages.stream);
+    if (n_open > open_.size()) return std::nullopt;
+    std::vector<OpenRow> open(n_open);
+    fetch(open.data(), open_.data(), n_open, stages.stream);
+    return open;
+  }
+
+  // What the host has found of the rows that came back last.
+  void put(const PlacesOut& to, const std::vector<PairPlaces>& places, const Stages& stages) {
+    if (places.empty()) return;
+    places_.reserve(places.size());
+    check(cudaMemcpyAsync(places_.data(), places.data(), places.size() * sizeof places[0], cudaMemcpyHostToDevice,
+                          stages.stream),
+          "cudaMemcpyAsync");
+    launch_put(to, open_.data(), places_.data(), places.size(), stages);
+    check(cudaStreamSynchronize(stages.stream), "cudaStreamSynchronize");
+  }
+
+  std::size_t bytes() const { return open_.bytes() + n_open_.bytes() + places_.bytes(); }
+
+ private:
+  static constexpr u64 most_open = 8;  // of so many rows one, at most
+
+  template <class X>
+  static void fetch(X* to, const X* from, u64 n, cudaStream_t stream) {
+    if (n) check(cudaMemcpyAsync(to, from, n * sizeof(X), cudaMemcpyDeviceToHost, stream), "cudaMemcpyAsync");
+    check(cudaStreamSynchronize(stream), "cudaStreamSynchronize");
+  }
+
+  DeviceBuffer<OpenRow> open_;
+  DeviceBuffer<u64> n_open_;
+  DeviceBuffer<PairPlaces> places_;
+};
+
+}  // namespace hpccd::gpu
