@@ -217,15 +217,15 @@ for ask in (there.detect, lambda a, b: there.proximity(a, 0.2), lambda a, b: the
     try:
         found = ask(t0, t1)
     except ValueError as error:
-        assert "results" in str(error)
+        assert "results_on_device" in str(error) and "_on_device()" in str(error), error
     else:
         [np.array(rows) for rows in found.values() if isinstance(rows, np.ndarray)]
+        raise AssertionError("answered")
 """
 
 
-@pytest.mark.xfail(reason="the host reads rows that are on the device")
 def test_the_core_asked_for_results_on_the_host_after_all():
-    """As a program in C++ may: Options::results_on_device says that they may be asked for there, not that they are."""
+    """As a program in C++ may: it is refused, and nothing reads on the host what is on the device."""
     folders = [Path(hc.__file__).parents[1], Path(__file__).parent]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join([*map(str, folders), os.environ.get("PYTHONPATH", "")])}
     done = subprocess.run([sys.executable, "-c", OF_THE_CORE], env=environment, capture_output=True, text=True)
