@@ -114,12 +114,13 @@ def test_what_dlpack_may_ask_for():
         np.from_dlpack(found.vf)
 
 
-@pytest.mark.xfail(reason="numpy makes an array of one object of it")
 def test_numpy_is_told_how_to_get_them():
     scene, t0, t1 = crumpled()
     found = hc.Detector(scene, backend="gpu", results="device").detect(t0, t1)
-    with pytest.raises(TypeError, match="to_host"):
-        np.asarray(found.vf)
+    for array in (found.vf, found.vf_toc, found.vf_offsets):
+        for ask in (np.asarray, np.array, lambda a: np.asarray(a, np.float64), lambda a: np.add(a, 1), np.concatenate):
+            with pytest.raises(TypeError, match="to_host"):
+                ask(array if ask is not np.concatenate else [array, array])
 
 
 def test_capsules_that_nobody_takes_give_memory_back():
