@@ -242,16 +242,6 @@ DeviceResults GpuBackend::on_device(const gpu::FrameResult& f) {
   r.hashes = f.hashes, r.first_tocs = f.first_tocs;
   r.hash = f.hash, r.first_toc = f.first_toc;
   if (last_boxes_.until_best) pipeline_->choose_hints(r.first_toc);
-  if (n_worlds() > 1) {
-    std::vector<std::uint64_t> hashes(n_worlds());
-    gpu::download(f.hashes, hashes.data(), hashes.size() * sizeof hashes[0]);
-    r.hash = hash_of_worlds(hashes);
-    if (f.first_tocs) {
-      std::vector<double> times(n_worlds());
-      gpu::download(f.first_tocs, times.data(), times.size() * sizeof times[0]);
-      r.first_toc = std::ranges::min(times);
-    }
-  }
   shared_.profiler.mark("contacts");
   return r;
 }

@@ -32,7 +32,7 @@ struct FrameResult {
   const std::array<std::uint32_t, 3>* ef = nullptr;  // where edges and faces were looked for, alone
   std::uint64_t hash = 0;
   double first_toc = std::numeric_limits<double>::infinity();
-  // Of several worlds, whose hash and earliest time stand here alone (WorldSlices, Contacts::first_tocs).
+  // Of several worlds (WorldSlices, Contacts::first_tocs).
   const std::uint64_t *vf_offsets = nullptr, *ee_offsets = nullptr, *ef_offsets = nullptr, *hashes = nullptr;
   const double* first_tocs = nullptr;
 };
