@@ -180,7 +180,9 @@ struct Positions {
   bool is_double = true;
   bool on_device = false;  // data is in a GPU's memory
   // On a device: the stream (cudaStream_t) after whose work so far they are there; without one, after all of the
-  // device's.
+  // device's. On the host it counts where results stay on the device: rows of earlier ones that nobody holds any more
+  // are written when that work, which may still read them, has ended. One that is no stream of that device is refused
+  // where CUDA says so; an address at which there is no stream at all may crash in CUDA.
   std::optional<void*> made_on = std::nullopt;
 };
 
