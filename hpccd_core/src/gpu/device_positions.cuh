@@ -70,7 +70,7 @@ class DevicePositions {
   std::size_t bytes() const { return given_[0].bytes() + given_[1].bytes(); }
 
  private:
-  // Where the same event can be recorded on a stream of ours, not the device has failed: the caller's stream is none.
+  // Where the same event can be recorded on a stream of ours, the device has not failed: the caller's stream is none.
   void record(cudaStream_t callers, cudaStream_t ours) {
     cudaStreamCaptureStatus captured = cudaStreamCaptureStatusNone;
     cudaError_t result = cudaStreamIsCapturing(callers, &captured);
@@ -81,10 +81,9 @@ class DevicePositions {
     if (result == cudaSuccess) result = cudaEventRecord(made_, callers);
     if (result != cudaSuccess && result != cudaErrorMemoryAllocation && cudaEventRecord(made_, ours) == cudaSuccess) {
       cudaGetLastError();  // the next call starts clean
-      throw InvalidArgument("stream: is no stream of CUDA device " + std::to_string(device_) +
-                            ", where this detector "
-                            "works (" +
-                            cudaGetErrorString(result) + "); give one of that device, or none");
+      const std::string why = cudaGetErrorString(result), device = std::to_string(device_);
+      throw InvalidArgument("stream: is no stream of CUDA device " + device + ", where this detector works (" + why +
+                            "); give one of that device, or none");
     }
     check(result, "cudaEventRecord");
   }
@@ -102,6 +101,7 @@ class DevicePositions {
     check(cudaSetDevice(where), "cudaSetDevice");
     check(cudaDeviceSynchronize(), "cudaDeviceSynchronize");
     check(cudaSetDevice(device_), "cudaSetDevice");
+    check(cudaDeviceSynchronize(), "cudaDeviceSynchronize");  // rows here may still be read
     return where;
   }
 
