@@ -3,7 +3,7 @@
 test/packaging/test_core_stub.py, which tells how to draw up anew what pybind11 itself says of them."""
 
 from collections.abc import Sequence
-from typing import Any, ClassVar, NotRequired, TypedDict, overload
+from typing import Any, ClassVar, NoReturn, NotRequired, TypedDict, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -114,7 +114,7 @@ _Gap = tuple[int, int, float, str, list[int], NDArray[np.float64]]
 
 class Positions:
     @overload
-    def __init__(self, array: NDArray[Any]) -> None: ...
+    def __init__(self, array: NDArray[Any], made_on: int | None = ...) -> None: ...
     @overload
     def __init__(self, pointer: int, n: int, is_double: bool, made_on: int | None) -> None: ...
 
@@ -125,6 +125,7 @@ class DeviceArray:
 
     def __init__(self, *args: Any, **kwargs: Any) -> None: ...  # raises TypeError: answers hold them
     def __len__(self) -> int: ...
+    def __array__(self, dtype: object = ..., copy: object = ...) -> NoReturn: ...  # numpy is told of to_host
     def __dlpack__(
         self, *, stream: object = ..., max_version: object = ..., dl_device: object = ..., copy: object = ...
     ) -> Any: ...

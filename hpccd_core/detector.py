@@ -205,10 +205,10 @@ class Detector(MotionQueries[OfMotion], SnapshotQueries[OfNear, OfPierced]):
             if device_arrays.is_on_device(vertices):
                 found = self._step_on_device(vertices, made_on)
             else:
-                found = self._step_on_host(vertices)
+                found = self._step_on_host(vertices, made_on)
             return cast(OfMotion, found)
 
-    def _step_on_host(self, vertices: object) -> Any:
+    def _step_on_host(self, vertices: object, stream: int | None) -> Any:
         if self._last_on_device:
             raise TypeError("vertices: the last step was a device array; give another one, or call reset() first")
         # Checked, used and kept as it is now, whatever the caller writes there meanwhile.
@@ -218,7 +218,7 @@ class Detector(MotionQueries[OfMotion], SnapshotQueries[OfNear, OfPierced]):
             contacts: Any = Contacts.none(self.worlds)
         else:
             with names_of_one_argument():
-                contacts = self.detect(end if self._last is None else self._last, end)
+                contacts = self.detect(end if self._last is None else self._last, end, stream)
             if self._last is None:
                 contacts = contacts.without_rows()
         self._last = end
@@ -232,8 +232,11 @@ class Detector(MotionQueries[OfMotion], SnapshotQueries[OfNear, OfPierced]):
         if last is not None and last.is_double != place.is_double:
             kind = "float64" if last.is_double else "float32"
             raise TypeError(f"vertices: the last step was {kind} on the device; give that again, or call reset() first")
-        with names_of_one_argument():  # the device checks the first one too, as a step that goes nowhere
-            contacts = self._contacts(self._of_places(self._asked("detect"), place if last is None else last, place))
+        # The device checks the first one too, as a step that goes nowhere. The last one is complete: it needs no more
+        # waiting than this one.
+        start = place if last is None else last._replace(made_on=stream)
+        with names_of_one_argument():
+            contacts = self._contacts(self._of_places(self._asked("detect"), start, place))
         self._last_on_device.keep(place, self._rows)
         if last is not None:
             return contacts

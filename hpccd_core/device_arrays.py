@@ -7,6 +7,7 @@ import operator
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from . import _core
 
@@ -84,6 +85,11 @@ def stream_number(stream: object) -> int | None:
     return number
 
 
+def on_host(vertices: NDArray[Any], stream: int | None) -> _core.Positions | NDArray[Any]:
+    """For the core: with a stream that may still read rows of an answer on the device that nobody holds any more."""
+    return vertices if stream is None else _core.Positions(vertices, stream)
+
+
 def positions(name: str, value: Any, expected: tuple[int, ...], stream: int | None = None) -> DevicePositions:
     """The place and type of an array of this shape. Raises TypeError or ValueError naming the argument."""
     interface = _interface_of(value)
@@ -133,7 +139,8 @@ class LastStep:
         return self.place is not None
 
     def keep(self, place: DevicePositions, rows: int) -> None:
-        """Copies what is at this place now. Raises RuntimeError where the device fails."""
+        """Copies what is at this place, after a query of it: whoever made it has ended. Raises RuntimeError where the
+        device fails."""
         if self._memory is None:
             self._memory = _core.MemoryOnDevice()
         self.place = None

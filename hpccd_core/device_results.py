@@ -15,6 +15,11 @@ from .proximity import Intersections, Proximity
 from .worlds import Slices
 
 
+def _floats_on_device(numbers: list[float], device: int) -> DeviceArray:
+    """float64 there: their bits, which the core takes as integers."""
+    return integers_on_device(np.array(numbers, np.float64).view(np.int64).tolist(), device).seen_as("f")
+
+
 @dataclasses.dataclass(frozen=True)
 class _OnDevice:
     """What all of them share. slices: of many worlds, by name as in worlds.Slices."""
@@ -84,7 +89,7 @@ class DeviceContacts(_PairsOnDevice):
     Arrays are hpccd_core.DeviceArray: __cuda_array_interface__ and DLPack, in place, complete when the call returns
     (cupy.asarray(c.vf), torch.from_dlpack(c.vf_toc), wp.from_dlpack(...)). Their memory is used again by a later call
     only when nobody holds one of them, or what was made of one, any more. first_toc and hash are on the host.
-    vf_offsets, ee_offsets, first_tocs: arrays on the device, of many worlds. world(k): rows of these arrays, in place,
+    vf_offsets, ee_offsets, first_tocs: on the device, of one world too. world(k): rows of these arrays, in place,
     but for points, normals and closest, which are copied there. to_host(): the same as Contacts.
     """
 
@@ -96,9 +101,11 @@ class DeviceContacts(_PairsOnDevice):
 
     @property
     def first_tocs(self) -> DeviceArray:
-        """(W,) float64: the earliest time of each world, +inf where nothing touches. Of a detector with worlds."""
-        if self.slices is None or (times := self.slices["first_tocs"]) is None:
-            raise ValueError("first_tocs: this detector has one world; first_toc is its earliest time")
+        """(W,) float64: the earliest time of each world, +inf where nothing touches."""
+        if self.slices is None:
+            return _floats_on_device([self.first_toc], self.vf.device)
+        times = self.slices["first_tocs"]
+        assert times is not None
         return times
 
     def world(self, k: int) -> "DeviceContacts":
@@ -117,7 +124,7 @@ class DeviceContacts(_PairsOnDevice):
         if slices is not None and (hashes := slices["hashes"]) is not None:
             worlds, device = len(hashes), hashes.device
             begins = integers_on_device([0] * (worlds + 1), device)
-            times = integers_on_device([int(np.float64(np.inf).view(np.int64))] * worlds, device).seen_as("f")
+            times = _floats_on_device([np.inf] * worlds, device)
             hashes = integers_on_device([0] * worlds, device).seen_as("u")
             slices = {"vf": begins, "ee": begins, "ef": None, "hashes": hashes, "first_tocs": times}
         return DeviceContacts(**none, first_toc=float("inf"), hash=0, slices=slices)

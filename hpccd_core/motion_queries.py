@@ -34,7 +34,10 @@ class MotionQueries(Generic[OfMotion]):
         or a masked element, ValueError for a wrong shape or a coordinate that is NaN, infinite or beyond 1e150.
         stream: of device arrays, the CUDA stream on which they were made, a cudaStream_t as int, or an object with .ptr
         (CuPy) or .cuda_stream (PyTorch, Warp): its work so far comes first. Without it, all work on the device does. In
-        both cases the answer is complete when the call returns.
+        both cases the answer is complete when the call returns. With results="device" it counts for arrays on the host
+        too: what it still reads of an answer that nobody holds any more is not written before. A stream of another
+        device, or one that is being captured into a graph, raises ValueError; so does one that is no more, where CUDA
+        notices: a number that was never a stream may crash in CUDA.
         With results="device" the answer is a DeviceContacts.
         """
         found = self._of_motion(self._asked("detect"), vertices_t0, vertices_t1, stream)
@@ -86,7 +89,7 @@ class MotionQueries(Generic[OfMotion]):
         end = arguments.vertices("vertices_t1", vertices_t1, self._shape)
         if start.dtype != end.dtype:  # widening a float32 is exact
             start, end = start.astype(np.float64), end.astype(np.float64)
-        return getattr(self._core, query)(start, end)
+        return getattr(self._core, query)(*(device_arrays.on_host(end, made_on) for end in (start, end)))
 
     def _of_places(self, query: str, first: DevicePositions, second: DevicePositions) -> Any:
         if first.is_double != second.is_double:

@@ -26,9 +26,7 @@ class SnapshotQueries(Generic[OfNear, OfPierced]):
     _core: _core.Detector
     _mesh_names: tuple[str, ...]
 
-    def proximity(
-        self, vertices: ArrayLike | DeviceArrayLike, distance: float, stream: object = None
-    ) -> OfNear:
+    def proximity(self, vertices: ArrayLike | DeviceArrayLike, distance: float, stream: object = None) -> OfNear:
         """All vertex-face and edge-edge pairs within a distance of each other, features that share a vertex apart.
 
         vertices: (V, 3), of W worlds (W, V, 3), float32 or float64, taken as by detect(), but up to 1e300. distance:
@@ -44,9 +42,7 @@ class SnapshotQueries(Generic[OfNear, OfPierced]):
             return cast(OfNear, on_device)
         return cast(OfNear, answer_of(Proximity, self._ask("proximity", vertices, stream, distance)))
 
-    def intersections(
-        self, vertices: ArrayLike | DeviceArrayLike, stream: object = None
-    ) -> OfPierced:
+    def intersections(self, vertices: ArrayLike | DeviceArrayLike, stream: object = None) -> OfPierced:
         """All edges that pierce or touch a face with which they share no vertex, coplanar ones included.
 
         vertices: (V, 3), of W worlds (W, V, 3), float32 or float64, taken as by detect(), but up to 1e300. Decided as
@@ -58,9 +54,7 @@ class SnapshotQueries(Generic[OfNear, OfPierced]):
             return cast(OfPierced, on_device)
         return cast(OfPierced, answer_of(Intersections, self._ask("intersections", vertices, stream)))
 
-    def distances(
-        self, vertices: ArrayLike | DeviceArrayLike, stream: object = None
-    ) -> list[Gap] | list[list[Gap]]:
+    def distances(self, vertices: ArrayLike | DeviceArrayLike, stream: object = None) -> list[Gap] | list[list[Gap]]:
         """The smallest distance of each pair of meshes that the scene enables, within a mesh too.
 
         vertices: (V, 3), of W worlds (W, V, 3), float32 or float64, taken as by detect(), but up to 1e300. One Gap for
@@ -84,7 +78,8 @@ class SnapshotQueries(Generic[OfNear, OfPierced]):
             if device_arrays.is_on_device(vertices):
                 place = device_arrays.positions("vertices", vertices, self._shape, made_on)
                 return ask(place.for_core(self._rows), *more)
-            return ask(arguments.vertices("vertices", vertices, self._shape), *more)
+            there = arguments.vertices("vertices", vertices, self._shape)
+            return ask(device_arrays.on_host(there, made_on), *more)
 
 
 @contextlib.contextmanager

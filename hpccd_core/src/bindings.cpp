@@ -33,9 +33,12 @@ py::array hand_over(std::vector<Row>&& rows, Columns... columns) {
 struct GivenPositions {
   Positions positions;
 
-  explicit GivenPositions(const py::array& a)
-      : positions{a.data(), static_cast<std::size_t>(a.size()) / 3, py::isinstance<py::array_t<double>>(a)} {}
-  GivenPositions(std::uintptr_t pointer, std::size_t n, bool is_double, std::optional<std::uintptr_t> made_on)
+  using Stream = std::optional<std::uintptr_t>;
+  explicit GivenPositions(const py::array& a, Stream made_on = std::nullopt)
+      : positions{a.data(), static_cast<std::size_t>(a.size()) / 3, py::isinstance<py::array_t<double>>(a)} {
+    if (made_on) positions.made_on = reinterpret_cast<void*>(*made_on);
+  }
+  GivenPositions(std::uintptr_t pointer, std::size_t n, bool is_double, Stream made_on)
       : positions{reinterpret_cast<const void*>(pointer), n, is_double, true} {
     if (made_on) positions.made_on = reinterpret_cast<void*>(*made_on);
   }
@@ -224,9 +227,10 @@ PYBIND11_MODULE(_core, m) {
       });
 
   py::class_<GivenPositions>(m, "Positions")
-      .def(py::init<const py::array&>(), "array"_a)
-      .def(py::init<std::uintptr_t, std::size_t, bool, std::optional<std::uintptr_t>>(), "pointer"_a, "n"_a,
-           "is_double"_a, "made_on"_a);
+      .def(py::init<const py::array&, GivenPositions::Stream>(), "array"_a, "made_on"_a = py::none(),
+           py::keep_alive<1, 2>())
+      .def(py::init<std::uintptr_t, std::size_t, bool, GivenPositions::Stream>(), "pointer"_a, "n"_a, "is_double"_a,
+           "made_on"_a);
   py::implicitly_convertible<py::array, GivenPositions>();
   bind_device_array(m);
 

@@ -100,19 +100,26 @@ DeviceArray rows_of(const DeviceArray& a, std::int64_t begin, std::int64_t end) 
   return part;
 }
 
+// To take memory and to copy may wait for the device: other threads of Python go on meanwhile.
+std::shared_ptr<const void> copied_there(const void* a, std::size_t a_bytes, const void* b, std::size_t b_bytes,
+                                         int device) {
+  py::gil_scoped_release release;
+  return gpu::joined_on_device(a, a_bytes, b, b_bytes, device);
+}
+
 DeviceArray joined(const DeviceArray& a, const DeviceArray& b) {
   const auto bytes = [](const DeviceArray& x) {
     return static_cast<std::size_t>(x.size()) * static_cast<std::size_t>(x.item_bytes);
   };
   DeviceArray both = a;
-  both.memory = gpu::joined_on_device(a.data, bytes(a), b.data, bytes(b), a.device);
+  both.memory = copied_there(a.data, bytes(a), b.data, bytes(b), a.device);
   both.data = both.memory.get();
   both.shape[0] += b.shape[0];
   return both;
 }
 
 DeviceArray of_integers(const std::vector<std::int64_t>& numbers, int device) {
-  auto memory = gpu::joined_on_device(numbers.data(), numbers.size() * sizeof numbers[0], nullptr, 0, device);
+  auto memory = copied_there(numbers.data(), numbers.size() * sizeof numbers[0], nullptr, 0, device);
   const void* data = memory.get();
   return {std::move(memory), data, {static_cast<std::int64_t>(numbers.size())}, 'i', 8, device};
 }
@@ -127,6 +134,11 @@ py::array to_host(const DeviceArray& a) {
   return to;
 }
 
+// Else numpy makes an array of one object, silently.
+[[noreturn]] void refuse_numpy(const DeviceArray&, const py::object&, const py::object&) {
+  throw py::type_error("numpy: this array is in a GPU's memory, which numpy cannot read; .to_host() gives a copy");
+}
+
 }  // namespace
 
 void bind_device_array(py::module_& m) {
@@ -136,6 +148,7 @@ void bind_device_array(py::module_& m) {
       .def_property_readonly("device", [](const DeviceArray& a) { return a.device; })
       .def("__len__", [](const DeviceArray& a) { return a.shape[0]; })
       .def_property_readonly("__cuda_array_interface__", &interface_of)
+      .def("__array__", &refuse_numpy, py::arg("dtype") = py::none(), py::arg("copy") = py::none())
       .def("__dlpack_device__", [](const DeviceArray& a) { return py::make_tuple(on_cuda, a.device); })
       .def(
           "__dlpack__",

@@ -71,6 +71,13 @@ struct Detector::Impl {
           "to the host, or use backend=\"gpu\"");
   }
 
+  // Its rows are on the device, where the host cannot read them.
+  void require_results_on_host(const char* remedy) const {
+    if (shared.options.results_on_device)
+      throw InvalidArgument("results_on_device: this detector leaves its results on the device; call " +
+                            std::string(remedy) + "(), or make a detector without results_on_device");
+  }
+
   Backend pick(bool given_on_device) const {
     const Backend asked = shared.options.backend;
     if (backends.works(Backend::gpu) && given_on_device) return Backend::gpu;
@@ -98,6 +105,7 @@ struct Detector::Impl {
 
   template <bool may_be_in_place>
   Detected detect(Positions t0, Positions t1) {
+    require_results_on_host("detect_on_device");
     check(t0, t1);
     const Call call(*this);
     const Backend picked = pick(t0.on_device || t1.on_device);
@@ -139,7 +147,9 @@ struct Detector::Impl {
   DeviceResults on_device(Positions t0, Positions t1, AtOnce&& at_once, OnHost&& on_host, Count&& count) {
     check(t0, t1);
     if (!shared.options.results_on_device)
-      throw InvalidArgument("results: this detector brings its results to the host");
+      throw InvalidArgument(
+          "results_on_device: this detector brings its results to the host; set the option, or call the query without "
+          "_on_device");
     const Call call(*this);
     std::optional<DeviceResults> results;
     if (backends.works(Backend::gpu)) results = at_once(backends.gpu());
@@ -208,6 +218,7 @@ Proximity as_proximity(Contacts&& c) {
 }  // namespace
 
 Proximity Detector::proximity(Positions vertices, double distance) {
+  impl_->require_results_on_host("proximity_on_device");
   check_length("distance", distance);
   return as_proximity(impl_->snapshot(vertices, [&](DetectionBackend& backend, Positions v, Counts& found) {
     auto near = backend.proximity(v, distance);
@@ -217,6 +228,7 @@ Proximity Detector::proximity(Positions vertices, double distance) {
 }
 
 Intersections Detector::intersections(Positions vertices) {
+  impl_->require_results_on_host("intersections_on_device");
   return impl_->snapshot(vertices, [](DetectionBackend& backend, Positions v, Counts& found) {
     auto hits = backend.intersections(v);
     if (hits) found = {{"ef_intersections", hits->ef.size()}};

@@ -6,7 +6,7 @@ import pytest
 import random_scenes
 
 import hpccd_core as hc
-from hpccd_core import device_arrays, devices
+from hpccd_core import device_arrays, device_results, devices
 
 
 @pytest.fixture
@@ -148,6 +148,37 @@ def test_numbers_of_streams():
     for stream, number in ((None, None), (0, 0), (Stream(5), 5), (TorchStream(6), 6), (Stream(TorchStream(7)), 7)):
         assert device_arrays.stream_number(stream) == number
     assert type(device_arrays.stream_number(np.int64(3))) is int
+
+
+@pytest.mark.parametrize("dtype", (np.float32, np.float64))
+def test_arrays_on_the_host_reach_the_core_with_their_stream(meshes, dtype):
+    a, b = (v.astype(dtype) for v in (meshes.vertices_t0, meshes.vertices_t1))
+    core = hc.Detector(meshes.scene(), backend="cpu")._core
+    assert device_arrays.on_host(a, None) is a
+    held = [device_arrays.on_host(v.copy(), 3) for v in (a, b)]  # the only one to hold them
+    assert core.detect(*held)["hash"] == core.detect(a, b)["hash"]
+
+
+class There:
+    """A DeviceArray, for what is done with any without looking into it."""
+
+    device = 0
+
+    def __init__(self, values):
+        self.values = np.array(values)
+
+    def seen_as(self, kind):
+        return There(self.values.view(f"<{kind}8"))
+
+
+@pytest.mark.parametrize("time", (0.0, 0.1, 1.0, np.inf))
+def test_first_tocs_of_one_world_on_a_device(monkeypatch, time):
+    monkeypatch.setattr(
+        device_results, "integers_on_device", lambda numbers, device: There(np.array(numbers, np.int64))
+    )
+    rows = dict.fromkeys(("vf", "ee", "closest", "vf_toc", "ee_toc", "points", "normals"), There([]))
+    times = hc.DeviceContacts(**rows, first_toc=time, hash=0, slices=None).first_tocs.values
+    assert times.dtype == np.float64 and times.tolist() == [time]
 
 
 def test_arrays_on_a_device_still_need_one(meshes):

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Failures where answers stay on the device: of arrays on streams, steps, places, sorted rows, and of all memory."""
 
+import os
+
 import device_results
 import numpy as np
 import pytest
@@ -81,8 +83,9 @@ def test_a_held_answer_survives_the_failures_that_follow():
     held = detector.detect(t0, t1)
     for n in range(1, 60):
         _core.gpu_fail_after(n)
-        assert_same(detector.detect(t1, t0), back)
+        found = detector.detect(t1, t0)
         _core.gpu_fail_after(0)
+        assert_same(found, back)
         assert_same(detector.detect(t1, t0), back)
     assert_same(held, expected)
 
@@ -100,12 +103,14 @@ def test_a_step_that_fails_is_answered_or_refused_and_the_next_are_right():
         detector.step(given[0])
         _core.gpu_fail_after(n)
         try:
-            assert_same(detector.step(given[1]), expected)
+            found = detector.step(given[1])
+            _core.gpu_fail_after(0)
+            assert_same(found, expected)
             answered += 1
         except RuntimeError as error:
+            _core.gpu_fail_after(0)
             assert "asked for by a test" in str(error)
             refused += 1
-        _core.gpu_fail_after(0)
         detector.reset()
         detector.step(given[0])
         assert_same(detector.step(given[1]), expected)
@@ -137,6 +142,7 @@ def all_memory():
     return taken
 
 
+@pytest.mark.skipif("PYTEST_XDIST_WORKER" in os.environ, reason="takes all memory: not beside other tests; without -n")
 @pytest.mark.parametrize("results", ("host", "device"))
 @pytest.mark.parametrize("worlds", (None, 8))
 def test_without_memory_the_cpu_answers_and_says_why_where_it_cannot(worlds, results):

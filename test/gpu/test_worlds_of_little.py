@@ -88,19 +88,19 @@ def test_one_world_says_what_a_detector_without_worlds_says(results):
                 found.world(wrong)
 
 
-ON_DEVICE_NOT_YET = pytest.param(
-    "device", marks=pytest.mark.xfail(reason="DeviceContacts.first_tocs refuses one world")
-)
-
-
-@pytest.mark.parametrize("results", ("host", ON_DEVICE_NOT_YET))
+@pytest.mark.parametrize("results", RESULTS)
 @pytest.mark.parametrize("worlds", (None, 1))
 def test_first_tocs_of_one_world(worlds, results):
     """(W,), of one world too, wherever results lie."""
     scene, t0, t1 = garments(1)
-    t0, t1 = (t0[0], t1[0]) if worlds is None else (t0, t1)
+    garment = t0[0], t1[0]
+    t0, t1 = garment if worlds is None else (t0, t1)
     found = hc.Detector(scene, backend="gpu", worlds=worlds, results=results).detect(t0, t1)
     np.testing.assert_array_equal(values(found.first_tocs), [found.first_toc])
+    many = hc.Detector(scene, backend="gpu", worlds=2, results=results).detect(*(np.stack([t, t]) for t in garment))
+    for one in (found, many.world(1)):
+        assert values(one.first_tocs).dtype == np.float64 and np.isfinite(one.first_toc)
+        np.testing.assert_array_equal(values(one.first_tocs), [found.first_toc])
 
 
 @pytest.mark.parametrize("results", RESULTS)

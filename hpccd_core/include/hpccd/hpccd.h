@@ -107,7 +107,8 @@ struct Options {
   bool gpu_stages = false;
   // Of detect, collision_free_step and proximity. Intersections and smallest distances are of whole surfaces.
   TestedFeatures features;
-  // Of backend `gpu`: its results may be asked for on the device, which then decides all pairs that it can.
+  // Results are asked for on the device, by detect_on_device, proximity_on_device and intersections_on_device alone; it
+  // decides all pairs that it can. Refused where there is no usable GPU.
   bool results_on_device = false;
   // So many copies of the scene, which know nothing of each other: positions hold all vertices of the first, then those
   // of the second, ... Each is answered as if it were alone, in every bit. 1 to most_worlds.
@@ -179,7 +180,9 @@ struct Positions {
   bool is_double = true;
   bool on_device = false;  // data is in a GPU's memory
   // On a device: the stream (cudaStream_t) after whose work so far they are there; without one, after all of the
-  // device's.
+  // device's. On the host it counts where results stay on the device: rows of earlier ones that nobody holds any more
+  // are written when that work, which may still read them, has ended. One that is no stream of that device is refused
+  // where CUDA says so; an address at which there is no stream at all may crash in CUDA.
   std::optional<void*> made_on = std::nullopt;
 };
 
@@ -220,7 +223,8 @@ class Detector {
 
   // Contacts of the straight-line motion from t0 to t1 (Kim et al. 2009, section 3.1).
   Contacts detect(Positions vertices_t0, Positions vertices_t1);
-  // The same, without a copy where there need be none.
+  // The same, without a copy where there need be none. Both refuse, as proximity and intersections do, a detector whose
+  // results stay on the device.
   Detected detect_in_place(Positions vertices_t0, Positions vertices_t1);
 
   // The largest part of the motion that is certainly free of contacts, whatever Options::report says: at the tiers

@@ -16,10 +16,18 @@ bool wanted(Backend backend, const char* name, const std::string& unsupported, c
   return true;
 }
 
+// Not even what the CPU computes could be brought to a device that is not there.
+void require_device_for_results(const Options& o) {
+  if (o.results_on_device && gpu::status().devices.empty())
+    throw InvalidArgument("results_on_device: needs a usable GPU, and there is none here (" + gpu::status().reason +
+                          "); leave it false");
+}
+
 }  // namespace
 
 AvailableBackends::AvailableBackends(Resources& shared) : cpu_(shared) {
   const Options& o = shared.options;
+  require_device_for_results(o);
   if (wanted(Backend::gpu, "gpu", GpuBackend::unsupported(o), o)) gpu_.emplace(shared);
   if (wanted(Backend::hybrid, "hybrid", "", o)) hybrid_.emplace(shared, cpu_);
   if (o.worlds == 1) return;

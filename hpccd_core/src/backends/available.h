@@ -16,7 +16,8 @@ namespace hpccd {
 
 class AvailableBackends {
  public:
-  // Throws InvalidArgument where the options ask for a backend that is not usable.
+  // Throws InvalidArgument where the options ask for a backend that is not usable, or for results on a device that is
+  // not there.
   explicit AvailableBackends(Resources& shared);
 
   // It takes all worlds.

@@ -243,16 +243,6 @@ DeviceResults GpuBackend::on_device(const gpu::FrameResult& f) {
   r.points = reinterpret_cast<decltype(r.points)>(f.points), r.normals = reinterpret_cast<decltype(r.normals)>(f.normals);
   r.closest = reinterpret_cast<decltype(r.closest)>(f.closest);
   if (last_boxes_.until_best) pipeline_->choose_hints(r.first_toc);
-  if (n_worlds() > 1) {
-    std::vector<std::uint64_t> hashes(n_worlds());
-    gpu::download(f.hashes, hashes.data(), hashes.size() * sizeof hashes[0]);
-    r.hash = hash_of_worlds(hashes);
-    if (f.first_tocs) {
-      std::vector<double> times(n_worlds());
-      gpu::download(f.first_tocs, times.data(), times.size() * sizeof times[0]);
-      r.first_toc = std::ranges::min(times);
-    }
-  }
   shared_.profiler.mark("contacts");
   return r;
 }

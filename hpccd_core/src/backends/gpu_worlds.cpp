@@ -6,7 +6,6 @@
 
 #include "backends/gpu_contacts.h"
 #include "backends/world_positions.h"
-#include "contacts/worlds.h"
 
 namespace hpccd {
 namespace {
@@ -18,12 +17,6 @@ std::vector<X> copied(const X* from, std::size_t n) {
 
 }  // namespace
 
-std::uint64_t hash_of_worlds(const std::vector<std::uint64_t>& hashes) {
-  std::uint64_t hash = 0;
-  for (std::size_t k = 0; k < hashes.size(); ++k) hash += hash_weight(k) * hashes[k];
-  return hash;
-}
-
 Contacts contacts_of(const gpu::FrameResult& f, std::size_t n_worlds, ThreadPool& pool) {
   Contacts c;
   const std::function<void()> parts[] = {
@@ -34,9 +27,9 @@ Contacts contacts_of(const gpu::FrameResult& f, std::size_t n_worlds, ThreadPool
   });
   c.slices.vf = copied(f.vf_offsets, n_worlds + 1), c.slices.ee = copied(f.ee_offsets, n_worlds + 1);
   c.slices.hashes = copied(f.hashes, n_worlds);
-  c.hash = hash_of_worlds(c.slices.hashes);
+  c.hash = f.hash;
   c.first_tocs = copied(f.first_tocs, n_worlds);
-  c.first_toc = std::ranges::min(c.first_tocs);
+  c.first_toc = f.first_toc;
   return c;
 }
 
@@ -45,7 +38,7 @@ Intersections intersections_of(const gpu::FrameResult& f, std::size_t n_worlds) 
   found.ef = copied(f.ef, f.n_ef);
   found.slices.ef = copied(f.ef_offsets, n_worlds + 1);
   found.slices.hashes = copied(f.hashes, n_worlds);
-  found.hash = hash_of_worlds(found.slices.hashes);
+  found.hash = f.hash;
   return found;
 }
 

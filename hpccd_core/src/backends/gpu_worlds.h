@@ -2,9 +2,6 @@
 // What a frame of many worlds found, as the caller sees it.
 #pragma once
 
-#include <cstdint>
-#include <vector>
-
 #include "base/parallel.h"
 #include "contacts/places.h"
 #include "gpu/pipeline.h"
@@ -15,8 +12,6 @@ namespace hpccd {
 // From page-locked memory.
 Contacts contacts_of(const gpu::FrameResult& frame, std::size_t n_worlds, ThreadPool& pool);
 Intersections intersections_of(const gpu::FrameResult& frame, std::size_t n_worlds);
-
-std::uint64_t hash_of_worlds(const std::vector<std::uint64_t>& hashes);
 
 // Positions of all worlds.
 void add_places_of_worlds(Contacts& contacts, Outputs outputs, const Features& features, const Separations& separations,

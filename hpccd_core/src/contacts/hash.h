@@ -33,6 +33,9 @@ HPCCD_HD std::uint64_t hash_of(Kind kind, std::uint64_t a, std::uint64_t b, doub
   return mix(mix(mix(a + salt_of(kind)) ^ b) ^ bits_of(toc));
 }
 
+// What the hash of a world counts in the hash of all: the same answers in other worlds are another answer.
+HPCCD_HD std::uint64_t hash_weight(std::uint64_t world) { return 2 * world + 1; }
+
 HPCCD_HD std::uint64_t pack(std::uint32_t high, std::uint32_t low) { return (std::uint64_t{high} << 32) | low; }
 
 }  // namespace hpccd

@@ -5,6 +5,8 @@
 #include <functional>
 #include <utility>
 
+#include "contacts/hash.h"
+
 namespace hpccd {
 namespace {
 

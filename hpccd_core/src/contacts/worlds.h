@@ -9,9 +9,6 @@
 
 namespace hpccd {
 
-// What the hash of a world counts in the hash of all: the same answers in other worlds are another answer.
-constexpr std::uint64_t hash_weight(std::size_t world) { return 2 * std::uint64_t{world} + 1; }
-
 // Into `all`, which is kept by a call that is cancelled. The worlds' rows are given up as they are copied.
 void join_worlds(std::vector<Contacts>& worlds, ThreadPool& pool, Contacts& all);
 Intersections join_worlds(std::vector<Intersections>& worlds, ThreadPool& pool);

@@ -23,9 +23,10 @@ struct WorldCounters {
 };
 
 struct Counters {
-  WorldCounters world;  // of the first one; others have theirs elsewhere
-  u64 bad;              // coordinates that are not acceptable
-  u64 floats_suffice;   // of a fast frame: in how many worlds
+  // Of the only one. Several have theirs elsewhere: then hash and first_toc stand here for all of them together.
+  WorldCounters world;
+  u64 bad;             // coordinates that are not acceptable
+  u64 floats_suffice;  // of a fast frame: in how many worlds
   u64 node_tests;
   u64 leaf_pairs, next_leaf_pair;
   u64 survivors[2], single[2], many[2], separated[2];                                        // of the segment at work

@@ -55,13 +55,15 @@ Status look() {
 
 class DeviceCopy final : public MemoryOnDevice {
  public:
-  ~DeviceCopy() override { cudaFree(data_); }
+  ~DeviceCopy() override {
+    cudaFree(data_);
+    if (stream_) cudaStreamDestroy(stream_);
+  }
   void assign(const void* from, std::size_t bytes) override {
     const CallersDevice callers;
     cudaPointerAttributes a;
     check(cudaPointerGetAttributes(&a, from), "cudaPointerGetAttributes");
     check(cudaSetDevice(a.device), "cudaSetDevice");
-    check(cudaDeviceSynchronize(), "cudaDeviceSynchronize");  // the producer may use any stream
     if (bytes > size_) {
       check(cudaFree(data_), "cudaFree");
       data_ = nullptr, size_ = 0;
@@ -69,14 +71,17 @@ class DeviceCopy final : public MemoryOnDevice {
       size_ = bytes;
     }
     if (bytes == 0) return;
-    check(cudaMemcpy(data_, from, bytes, cudaMemcpyDeviceToDevice), "cudaMemcpy");
-    check(cudaDeviceSynchronize(), "cudaDeviceSynchronize");  // device to device, it returns before the end
+    // The default stream would wait for those of the caller.
+    if (!stream_) check(cudaStreamCreateWithFlags(&stream_, cudaStreamNonBlocking), "cudaStreamCreateWithFlags");
+    check(cudaMemcpyAsync(data_, from, bytes, cudaMemcpyDefault, stream_), "cudaMemcpyAsync");
+    check(cudaStreamSynchronize(stream_), "cudaStreamSynchronize");
   }
   const void* data() const override { return data_; }
 
  private:
   void* data_ = nullptr;
   std::size_t size_ = 0;
+  cudaStream_t stream_ = nullptr;
 };
 
 }  // namespace

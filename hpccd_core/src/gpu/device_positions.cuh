@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cstring>
+#include <optional>
+#include <string>
 
 #include "base/parallel.h"
 #include "gpu/stream.h"
@@ -54,23 +56,52 @@ class DevicePositions {
         check(cudaMemcpyAsync(given_[i].data(), to[i], bytes, cudaMemcpyHostToDevice, stream), "cudaMemcpyAsync");
   }
 
+  // Later work of the stream waits for what the caller's has been given so far. Without one all work on the device has
+  // ended when this returns. Throws InvalidArgument where it is no stream of this device.
+  void wait_for(std::optional<void*> callers, cudaStream_t stream) {
+    if (!callers) {
+      check(cudaDeviceSynchronize(), "cudaDeviceSynchronize");
+      return;
+    }
+    record(static_cast<cudaStream_t>(*callers), stream);
+    check(cudaStreamWaitEvent(stream, made_, 0), "cudaStreamWaitEvent");
+  }
+
   std::size_t bytes() const { return given_[0].bytes() + given_[1].bytes(); }
 
  private:
+  // Where the same event can be recorded on a stream of ours, the device has not failed: the caller's stream is none.
+  void record(cudaStream_t callers, cudaStream_t ours) {
+    cudaStreamCaptureStatus captured = cudaStreamCaptureStatusNone;
+    cudaError_t result = cudaStreamIsCapturing(callers, &captured);
+    if (result == cudaSuccess && captured != cudaStreamCaptureStatusNone)
+      throw InvalidArgument(
+          "stream: is being captured into a graph, so that its work is not done yet; end the capture, or give another "
+          "stream");
+    if (result == cudaSuccess) result = cudaEventRecord(made_, callers);
+    if (result != cudaSuccess && result != cudaErrorMemoryAllocation && cudaEventRecord(made_, ours) == cudaSuccess) {
+      cudaGetLastError();  // the next call starts clean
+      const std::string why = cudaGetErrorString(result), device = std::to_string(device_);
+      throw InvalidArgument("stream: is no stream of CUDA device " + device + ", where this detector works (" + why +
+                            "); give one of that device, or none");
+    }
+    check(result, "cudaEventRecord");
+  }
+
   // The device on which an array of the caller lies. Its producer may still be at work: the stream's later work waits
   // for it, or it has ended when this returns.
   int settled_device(const Positions& array, cudaStream_t stream) {
     cudaPointerAttributes a;
     check(cudaPointerGetAttributes(&a, array.data), "cudaPointerGetAttributes");
     const int where = a.type == cudaMemoryTypeDevice ? a.device : device_;
-    if (array.made_on && where == device_) {
-      check(cudaEventRecord(made_, static_cast<cudaStream_t>(*array.made_on)), "cudaEventRecord");
-      check(cudaStreamWaitEvent(stream, made_, 0), "cudaStreamWaitEvent");
+    if (where == device_) {
+      wait_for(array.made_on, stream);
       return where;
     }
     check(cudaSetDevice(where), "cudaSetDevice");
     check(cudaDeviceSynchronize(), "cudaDeviceSynchronize");
     check(cudaSetDevice(device_), "cudaSetDevice");
+    check(cudaDeviceSynchronize(), "cudaDeviceSynchronize");  // rows here may still be read
     return where;
   }
 

@@ -12,7 +12,8 @@ class MemoryOnDevice {
   // Throws Error where there is no device.
   static std::unique_ptr<MemoryOnDevice> create();
   virtual ~MemoryOnDevice() = default;
-  // Copies what is there now, when all work on the device has ended. Throws Error.
+  // Copies what is there; whoever wrote it has ended, as after a query of these positions. Other work on the device is
+  // not waited for. Throws Error.
   virtual void assign(const void* on_device, std::size_t bytes) = 0;
   virtual const void* data() const = 0;
 };

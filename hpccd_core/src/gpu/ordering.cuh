@@ -72,7 +72,10 @@ __global__ void firsts_kernel(const __grid_constant__ LaunchParams<T> params) {
 template <class T>
 __global__ void forget_results_kernel(const __grid_constant__ LaunchParams<T> params) {
   const u32 k = blockIdx.x * blockDim.x + threadIdx.x;
-  if (k == 0) params.counters->most_of_a_feature = 0;
+  if (k == 0) {
+    params.counters->most_of_a_feature = 0;
+    params.counters->world.hash = params.counters->world.first_toc = 0;  // of all worlds together
+  }
   if (k < params.n_worlds) params.worlds[k].hash = params.worlds[k].first_toc = params.worlds[k].first_key = 0;
 }
 
@@ -192,22 +195,35 @@ __global__ void results_kernel(const __grid_constant__ LaunchParams<T> params, c
   rows.finish();
 }
 
+// Of several worlds: where the rows of each begin, what is known of each, and of all together. Where rows were not
+// written for want of room, hashes are zero still: launched again with the rows, it adds to nothing.
 template <bool edges_and_faces, class T>
 __global__ void worlds_kernel(const __grid_constant__ LaunchParams<T> params, const u32* first_of_group,
                               const __grid_constant__ ResultPlaces to) {
-  const u64 n_vf = params.counters->rows[0];
+  Counters& c = *params.counters;
+  const u64 n_vf = c.rows[0];
   const u32 k = blockIdx.x * blockDim.x + threadIdx.x;
-  if (k > params.n_worlds) return;
-  if constexpr (edges_and_faces) {
-    to.vf_offsets[k] = k < params.n_worlds ? first_of_group[k * params.n_edges] : n_vf + params.counters->rows[1];
-  } else {
-    to.vf_offsets[k] = first_of_group[k * params.n_vertices];
-    to.ee_offsets[k] = first_of_group[params.all_vertices() + k * params.n_edges] - n_vf;
+  if (k <= params.n_worlds) {
+    if constexpr (edges_and_faces) {
+      to.vf_offsets[k] = k < params.n_worlds ? first_of_group[k * params.n_edges] : n_vf + c.rows[1];
+    } else {
+      to.vf_offsets[k] = first_of_group[k * params.n_vertices];
+      to.ee_offsets[k] = first_of_group[params.all_vertices() + k * params.n_edges] - n_vf;
+    }
   }
-  if (k == params.n_worlds) return;
-  const WorldCounters& world = params.worlds[k];
-  to.hashes[k] = world.hash;
-  to.first_tocs[k] = world.first_toc ? __longlong_as_double(static_cast<long long>(~world.first_toc)) : INFINITY;
+  u64 hash = 0;
+  double soonest = INFINITY;
+  if (k < params.n_worlds) {
+    const WorldCounters& world = params.worlds[k];
+    if (world.first_toc) soonest = __longlong_as_double(static_cast<long long>(~world.first_toc));
+    to.hashes[k] = world.hash;
+    to.first_tocs[k] = soonest;
+    hash = hash_weight(k) * world.hash;
+  }
+  __syncwarp();
+  for (int d = 16; d > 0; d /= 2) hash += __shfl_xor_sync(all_lanes, hash, d);
+  if (lane_number() == 0 && hash) atomicAdd(&c.world.hash, hash);
+  keep_soonest(&c.world.first_toc, soonest);
 }
 
 // Where there is nothing to look at.

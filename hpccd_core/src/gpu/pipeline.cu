@@ -113,6 +113,7 @@ class DevicePipeline : public Pipeline {
     check(cudaSetDevice(device_), "cudaSetDevice");
     // Work of a frame that failed may still be under way on these buffers.
     check(cudaStreamSynchronize(stream_), "cudaStreamSynchronize");
+    host_counters_.data()->area = 0;  // of this frame it is not known yet, and never where it is refused
   }
   bool run_frame(Query query, Positions t0, Positions t1, double distance, ThreadPool& pool) {
     query_ = query;
@@ -186,6 +187,9 @@ bool DevicePipeline::run_frame(Positions t0, Positions t1, double distance, Thre
   if (goal_ != Goal::near_list) undecided_.clear(), passes_ = 0;
   timer_.begin(stream_);
   if (goal_ == Goal::results) contacts_.begin();
+  // The caller's stream may still read these rows. To bring positions from the device waits for it too.
+  if (goal_ == Goal::results && (tree_.empty() || (options_.results_on_device && !t0.on_device)))
+    positions_.wait_for(t0.made_on, stream_);
   if (tree_.empty()) {
     *host_counters_.data() = {};
     motion_.forget(stream_);

@@ -36,7 +36,7 @@ struct FrameResult {
   double first_toc = std::numeric_limits<double>::infinity();
   // Of each row of vf, then of ee, as far as they were asked for.
   const double *points = nullptr, *normals = nullptr, *closest = nullptr;
-  // Of several worlds, whose hash and earliest time stand here alone (WorldSlices, Contacts::first_tocs).
+  // Of several worlds (WorldSlices, Contacts::first_tocs).
   const std::uint64_t *vf_offsets = nullptr, *ee_offsets = nullptr, *ef_offsets = nullptr, *hashes = nullptr;
   const double* first_tocs = nullptr;
 };

@@ -106,7 +106,8 @@ std::shared_ptr<const void> joined_on_device(const void* a, std::size_t a_bytes,
   memory->reserve(std::max<std::size_t>(a_bytes + b_bytes, 1));
   if (a_bytes) check(cudaMemcpy(memory->data(), a, a_bytes, cudaMemcpyDefault), "cudaMemcpy");
   if (b_bytes) check(cudaMemcpy(memory->data() + a_bytes, b, b_bytes, cudaMemcpyDefault), "cudaMemcpy");
-  check(cudaDeviceSynchronize(), "cudaDeviceSynchronize");  // device to device, a copy returns before its end
+  // Device to device, a copy returns before its end: its stream, the default one, is waited for, and no other.
+  check(cudaStreamSynchronize(nullptr), "cudaStreamSynchronize");
   return {memory, memory->data()};
 }
 

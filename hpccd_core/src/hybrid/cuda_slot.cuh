@@ -97,13 +97,13 @@ class Slot {
   bool grow(LargestLists& largest) {
     const Counters& c = *host_counters_.data();
     bool again = lists_.grow(c);
-    if (c.found_all > keys_.size()) {
+    if (c.found_all > found_capacity_) {
       again = true;
       reserve_found(c.found_all + c.found_all / 4);
     }
     if (again) {
       largest.lists.include(lists_.sizes());
-      largest.found = std::max(largest.found, keys_.size());
+      largest.found = std::max(largest.found, found_capacity_);
     }
     return again;
   }
@@ -129,8 +129,11 @@ class Slot {
 
  private:
   void reserve_found(std::size_t n) {
+    if (n <= found_capacity_) return;
+    found_capacity_ = 0;  // should one of these fail, the others have changed
     keys_.reserve(n);
     tocs_.reserve(n);
+    found_capacity_ = n;
   }
 
   // The kernels between the copy and "data ready", anew where something that they name has changed.
@@ -143,12 +146,13 @@ class Slot {
       now.push_back(buffer.size());
     };
     depends_on(pairs_), depends_on(keys_), depends_on(tocs_);
+    now.push_back(found_capacity_);
     lists_.for_buffers(depends_on);
     if (now == recorded_) return;
     recorded_.clear();
     params.counters = counters_.data();
     params.leaf_pairs = {pairs_.data(), pairs_.size()};
-    params.found_keys = keys_.data(), params.found_tocs = tocs_.data(), params.found_capacity = keys_.size();
+    params.found_keys = keys_.data(), params.found_tocs = tocs_.data(), params.found_capacity = found_capacity_;
     StageTimer no_timer(false);
     graph_.record(stream_, [&] {
       begin_submission_kernel<<<1, 32, 0, stream_>>>(params.counters, submission_.data());
@@ -166,6 +170,7 @@ class Slot {
   DeviceBuffer<uint2> pairs_;
   DeviceBuffer<Counters> counters_;
   PinnedBuffer<Counters> host_counters_;
+  std::size_t found_capacity_ = 0;  // of both that follow
   PinnedBuffer<u64> keys_;
   PinnedBuffer<double> tocs_;
   PinnedBuffer<u32> state_;
