@@ -12,6 +12,7 @@ from .detector import Detector
 from .device_results import DeviceContacts, DeviceIntersections, DeviceProximity
 from .devices import backends, gpu_status
 from .elementary import test_edge_edge, test_vertex_face
+from .prepared import PreparedDetection
 from .proximity import Gap, Intersections, Proximity
 from .scene import Scene
 
@@ -26,6 +27,7 @@ __all__ = [
     "Gap",
     "Intersections",
     "InvalidArgument",
+    "PreparedDetection",
     "Proximity",
     "Scene",
     "backends",

@@ -11,6 +11,7 @@ from .answers import OfMotion
 from .contacts import Contacts
 from .device_arrays import DeviceArrayLike, DevicePositions
 from .options import Results
+from .prepared import PreparedDetection
 from .worlds import answer_of
 
 
@@ -67,6 +68,32 @@ class MotionQueries(Generic[OfMotion]):
         """
         times: NDArray[np.float64] = self._of_motion("collision_free_steps", vertices_t0, vertices_t1, stream)
         return float(times[0]) if self.worlds is None else times
+
+    def prepare(
+        self, vertices_t0: DeviceArrayLike, vertices_t1: DeviceArrayLike, room: float = 2.0, stream: object = None
+    ) -> PreparedDetection:
+        """detect() of these two arrays on the device without a look from the host: for CUDA graphs.
+
+        Only with results="device", and without outputs. The arrays are read where they are each time: they must stay
+        there. room: lists and rows hold so many times, 1 to 1000, what the motion that the arrays hold now takes; it is
+        detected once for that. stream: as for detect(). Accuracy, rules and separations are those of now. Raises as
+        detect() does, and RuntimeError where the GPU fails: no CPU stands in.
+        """
+        if self.results != "device":
+            raise ValueError("results: prepare() leaves its results on the device; use a detector with results='device'")
+        for name, vertices in (("vertices_t0", vertices_t0), ("vertices_t1", vertices_t1)):
+            if not device_arrays.is_on_device(vertices):
+                raise TypeError(f"{name}: must be in the memory of the GPU, where it is read each time")
+        room = arguments.length("room", room)
+        made_on = device_arrays.stream_number(stream)
+        first, second = (
+            device_arrays.positions(name, vertices, self._shape, made_on)
+            for name, vertices in (("vertices_t0", vertices_t0), ("vertices_t1", vertices_t1))
+        )
+        if first.is_double != second.is_double:
+            raise TypeError("vertices_t0, vertices_t1: device arrays must both be float32 or both be float64")
+        prepared = self._core.prepare(first.for_core(self._rows), second.for_core(self._rows), room)
+        return PreparedDetection(prepared, self.worlds, (vertices_t0, vertices_t1))
 
     def _asked(self, query: str) -> str:
         return f"{query}_on_device" if self.results == "device" else query

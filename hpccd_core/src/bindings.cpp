@@ -233,6 +233,7 @@ PYBIND11_MODULE(_core, m) {
            "made_on"_a);
   py::implicitly_convertible<py::array, GivenPositions>();
   bind_device_array(m);
+  bind_prepared(m);
 
   py::class_<Detector>(m, "Detector")
       .def(
@@ -277,6 +278,12 @@ PYBIND11_MODULE(_core, m) {
                            d.options().worlds);
           },
           "vertices_t0"_a, "vertices_t1"_a)
+      .def(
+          "prepare",
+          [](Detector& d, const GivenPositions& t0, const GivenPositions& t1, double room) {
+            return unlocked([&] { return d.prepare(t0.positions, t1.positions, room); });
+          },
+          "vertices_t0"_a, "vertices_t1"_a, "room"_a)
       .def(
           "collision_free_steps",
           [](Detector& d, const GivenPositions& t0, const GivenPositions& t1) {

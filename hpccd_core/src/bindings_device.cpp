@@ -12,6 +12,7 @@
 #include "gpu/results_to_device.h"
 
 namespace py = pybind11;
+using namespace pybind11::literals;
 
 namespace hpccd {
 namespace {
@@ -207,6 +208,53 @@ py::dict to_dict(const DeviceResults& r, std::uint32_t n_worlds) {
                          py::arg("hashes") = of_worlds(r.hashes, 'u', worlds),
                          py::arg("first_tocs") = of_worlds(r.first_tocs, 'f', worlds));
   return d;
+}
+
+namespace {
+
+// Where a prepared detection writes, each time.
+py::dict arrays_of(const PreparedDetection& d, std::uint32_t n_worlds) {
+  const PreparedResults& p = d.results();
+  const auto array = [&](const void* data, char kind, int item_bytes, std::vector<std::int64_t> shape) {
+    return py::cast(DeviceArray{p.memory, data, std::move(shape), kind, item_bytes, p.device});
+  };
+  const auto n_vf = static_cast<std::int64_t>(p.room_vf), n_ee = static_cast<std::int64_t>(p.room_ee);
+  const auto* counts = reinterpret_cast<const unsigned char*>(p.counts);
+  py::dict a("vf"_a = array(p.vf, 'u', 4, {n_vf, 2}), "ee"_a = array(p.ee, 'u', 4, {n_ee, 4}),
+             "toc"_a = array(p.tocs, 'f', 8, {n_vf + n_ee}),
+             "counts"_a = array(counts + offsetof(PreparedCounts, vertex_face), 'i', 8, {3}),
+             "hash"_a = array(counts + offsetof(PreparedCounts, hash), 'u', 8, {1}),
+             "first_toc"_a = array(counts + offsetof(PreparedCounts, first_toc), 'f', 8, {1}));
+  const std::int64_t worlds = n_worlds;
+  const auto of_worlds = [&](const void* data, char kind, std::int64_t n) -> py::object {
+    return data ? array(data, kind, 8, {n}) : py::none();
+  };
+  a["vf_offsets"] = of_worlds(p.vf_offsets, 'i', worlds + 1);
+  a["ee_offsets"] = of_worlds(p.ee_offsets, 'i', worlds + 1);
+  a["hashes"] = of_worlds(p.hashes, 'u', worlds);
+  a["first_tocs"] = of_worlds(p.first_tocs, 'f', worlds);
+  return a;
+}
+
+}  // namespace
+
+void bind_prepared(py::module_& m) {
+  py::class_<PreparedDetection>(m, "PreparedDetection")
+      .def(
+          "enqueue",
+          [](PreparedDetection& d, std::uintptr_t stream) { d.enqueue(reinterpret_cast<void*>(stream)); }, "stream"_a,
+          py::call_guard<py::gil_scoped_release>())
+      .def(
+          "contacts",
+          [](const PreparedDetection& d, std::uint32_t n_worlds) {
+            const DeviceResults r = [&] {
+              py::gil_scoped_release release;
+              return d.contacts();
+            }();
+            return to_dict(r, n_worlds);
+          },
+          "n_worlds"_a)
+      .def("arrays", &arrays_of, "n_worlds"_a);
 }
 
 }  // namespace hpccd

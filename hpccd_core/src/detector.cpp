@@ -11,6 +11,7 @@
 #include "backends/tuner.h"
 #include "base/length.h"
 #include "gpu/results_to_device.h"
+#include "prepared_impl.h"
 
 namespace hpccd {
 namespace {
@@ -182,7 +183,7 @@ struct Detector::Impl {
 };
 
 Detector::Detector(std::shared_ptr<const Scene> scene, Options options)
-    : impl_(std::make_unique<Impl>(std::move(scene), options)) {}
+    : impl_(std::make_shared<Impl>(std::move(scene), options)) {}
 
 Detector::~Detector() = default;
 
@@ -242,6 +243,27 @@ DeviceResults Detector::proximity_on_device(Positions vertices, double distance)
       vertices, vertices, [&](GpuBackend& gpu) { return gpu.proximity_on_device(vertices, distance); },
       [&](DetectionBackend& cpu, Positions v, Positions) { return as_proximity(cpu.proximity(v, distance).value()); },
       [](const DeviceResults& r) { return Counts{{"vf_near", r.n_vf}, {"ee_near", r.n_ee}}; });
+}
+
+std::unique_ptr<PreparedDetection> Detector::prepare(Positions t0, Positions t1, double room) {
+  const Options& o = options();
+  if (!o.results_on_device)
+    throw InvalidArgument("results_on_device: this detector brings its results to the host; set the option");
+  if (o.points || o.normals || o.closest)
+    throw InvalidArgument("outputs: not offered by prepare(); use a detector without them, or detect()");
+  if (!(room >= 1 && room <= 1000))
+    throw InvalidArgument("room: how many times what this motion takes, 1 to 1000, got " + std::to_string(room));
+  if (!t0.on_device || !t1.on_device)
+    throw InvalidArgument("vertices_t0, vertices_t1: must be in the memory of the GPU, where they are read each time");
+  impl_->check(t0, t1);
+  const Impl::Call call(*impl_);
+  if (!impl_->backends.works(Backend::gpu))
+    throw std::runtime_error("the GPU was given up after failures: " + impl_->backends.last_error());
+  GpuBackend::Prepared p = impl_->backends.gpu().prepare(t0, t1, room);
+  impl_->shared.profiler.end();
+  auto prepared = std::make_unique<PreparedDetection::Impl>();
+  *prepared = {impl_, std::move(p.pipeline), std::move(p.results)};
+  return std::unique_ptr<PreparedDetection>(new PreparedDetection(std::move(prepared)));
 }
 
 DeviceResults Detector::intersections_on_device(Positions vertices) {

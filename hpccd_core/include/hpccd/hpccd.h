@@ -14,6 +14,8 @@
 #include <string>
 #include <vector>
 
+#include "hpccd/prepared.h"
+
 namespace hpccd {
 
 // A mistake of the caller: the text names the argument and the remedy.
@@ -245,6 +247,10 @@ class Detector {
   DeviceResults detect_on_device(Positions vertices_t0, Positions vertices_t1);
   DeviceResults proximity_on_device(Positions vertices, double distance);
   DeviceResults intersections_on_device(Positions vertices);
+  // For detect_on_device() of arrays on the device that stay where they are, without a look from the host: with room for
+  // `room` times, 1 to 1000, what the motion that they hold now takes. Throws InvalidArgument where outputs were asked
+  // for, std::runtime_error where the device fails.
+  std::unique_ptr<PreparedDetection> prepare(Positions vertices_t0, Positions vertices_t1, double room);
   // The smallest distance of each enabled pair of meshes, by (mesh_a, mesh_b), mesh_a <= mesh_b. Of pairs of features
   // whose distances are the same double the first in order, vertex-face before edge-edge. Of several worlds those of
   // the first, then those of the second, ...: as many of each.
@@ -267,7 +273,7 @@ class Detector {
 
  private:
   struct Impl;
-  std::unique_ptr<Impl> impl_;
+  std::shared_ptr<Impl> impl_;  // also of what it has prepared
 };
 
 // Elementary queries one by one; of the options only accuracy, simd and minimum_separation matter.

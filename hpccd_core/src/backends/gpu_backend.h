@@ -35,6 +35,13 @@ class GpuBackend final : public DetectionBackend {
   std::optional<DeviceResults> detect_on_device(Positions t0, Positions t1);
   std::optional<DeviceResults> proximity_on_device(Positions vertices, double distance);
   std::optional<DeviceResults> intersections_on_device(Positions vertices);
+  // The same for detect_on_device, of positions on the device: a pipeline of its own, that refers to what the backend
+  // refers to. Throws gpu::Error.
+  struct Prepared {
+    std::unique_ptr<gpu::Pipeline> pipeline;
+    PreparedResults results;
+  };
+  Prepared prepare(Positions t0, Positions t1, double room);
   void add_stages(std::map<std::string, double>& stages) const override;
 
   // Host arrays with the same positions. which: 0 or 1, the place where a copy is kept.

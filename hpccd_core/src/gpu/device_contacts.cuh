@@ -133,6 +133,13 @@ class DeviceContacts {
     check_launch("forget_results_kernel");
   }
 
+  // For so many rows, of the last frame's result.
+  ResultPlaces reserve_rows(u64 n_vf, u64 n_ee) const {
+    rows_->reserve(n_vf, n_ee);
+    return rows_->places();
+  }
+  ResultPlaces places() const { return rows_->places(); }
+  std::size_t capacity() const { return capacity_; }
   PlacesOut reserve_places(u64 n_rows, Outputs outputs) const { return rows_->reserve_places(n_rows, outputs); }
 
   // When the stream has come to its end.

@@ -67,6 +67,14 @@ class DevicePositions {
     check(cudaStreamWaitEvent(stream, made_, 0), "cudaStreamWaitEvent");
   }
 
+  // Throws InvalidArgument where the caller's stream is none of this device; it may be captured.
+  void require_stream(cudaStream_t callers, cudaStream_t ours) const {
+    cudaStreamCaptureStatus captured = cudaStreamCaptureStatusNone;
+    const cudaError_t result = cudaStreamIsCapturing(callers, &captured);
+    if (result != cudaSuccess && cudaStreamIsCapturing(ours, &captured) == cudaSuccess) throw no_stream(result);
+    check(result, "cudaStreamIsCapturing");
+  }
+
   std::size_t bytes() const { return given_[0].bytes() + given_[1].bytes(); }
 
  private:
@@ -79,13 +87,16 @@ class DevicePositions {
           "stream: is being captured into a graph, so that its work is not done yet; end the capture, or give another "
           "stream");
     if (result == cudaSuccess) result = cudaEventRecord(made_, callers);
-    if (result != cudaSuccess && result != cudaErrorMemoryAllocation && cudaEventRecord(made_, ours) == cudaSuccess) {
-      cudaGetLastError();  // the next call starts clean
-      const std::string why = cudaGetErrorString(result), device = std::to_string(device_);
-      throw InvalidArgument("stream: is no stream of CUDA device " + device + ", where this detector works (" + why +
-                            "); give one of that device, or none");
-    }
+    if (result != cudaSuccess && result != cudaErrorMemoryAllocation && cudaEventRecord(made_, ours) == cudaSuccess)
+      throw no_stream(result);
     check(result, "cudaEventRecord");
+  }
+
+  InvalidArgument no_stream(cudaError_t result) const {
+    cudaGetLastError();  // the next call starts clean
+    return InvalidArgument("stream: is no stream of CUDA device " + std::to_string(device_) +
+                           ", where this detector works (" + cudaGetErrorString(result) +
+                           "); give one of that device, or none");
   }
 
   // The device on which an array of the caller lies. Its producer may still be at work: the stream's later work waits

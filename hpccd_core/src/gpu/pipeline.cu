@@ -13,6 +13,7 @@
 #include "gpu/hints.cuh"
 #include "gpu/leaf_kdops.cuh"
 #include "gpu/pipeline.h"
+#include "gpu/prepared.cuh"
 #include "gpu/refit.cuh"
 #include "gpu/stages.cuh"
 #include "gpu/test_lists.cuh"
@@ -97,6 +98,8 @@ class DevicePipeline : public Pipeline {
     return contacts_.result(query_, *host_counters_.data());
   }
   std::optional<std::vector<OpenRow>> find_places(FrameResult& result, Outputs outputs) override;
+  PreparedResults prepare(Positions t0, Positions t1, double room) override;
+  void enqueue(void* stream) override;
   void put_places(const std::vector<PairPlaces>& places) override { places_.put(places_out_, places, on_stream()); }
 
   double relative_area() const override { return host_counters_.data()->area; }
@@ -122,6 +125,8 @@ class DevicePipeline : public Pipeline {
   template <class T>
   bool run_frame(Positions t0, Positions t1, double distance, ThreadPool& pool);
   template <class T>
+  LaunchParams<T> frame_params(double distance, const T* given_t0, const T* given_t1);
+  template <class T>
   void launch(LaunchParams<T>& params);
   template <class T>
   void launch_tree(LaunchParams<T>& params);
@@ -129,7 +134,9 @@ class DevicePipeline : public Pipeline {
   void launch_results(const LaunchParams<T>& params);
   template <class T>
   void launch_area(const LaunchParams<T>& params);
-  Stages on_stream() { return {multiprocessors_, stream_, timer_}; }
+  template <class T>
+  void enqueue_frame();
+  Stages on_stream() { return {multiprocessors_, on_, timer_}; }
   template <class Use>
   void with_last_frame(Use&& use);
   template <class T>
@@ -148,6 +155,7 @@ class DevicePipeline : public Pipeline {
   int device_, multiprocessors_ = 1;
   const Options options_;
   Stream stream_;
+  cudaStream_t on_ = stream_;  // where kernels are launched
   Event counted_;
   StageTimer timer_;
   const Features& features_;
@@ -180,6 +188,9 @@ class DevicePipeline : public Pipeline {
   Query query_ = Query::contacts;
   u64 passes_ = 0, exact_last_time_ = 0;
   std::vector<Candidate> undecided_;
+  // Of a prepared frame: the caller's positions.
+  const void *prepared_t0_ = nullptr, *prepared_t1_ = nullptr;
+  std::shared_ptr<DeviceBuffer<PreparedCounts>> told_of_prepared_;
 };
 
 template <class T>
@@ -196,25 +207,11 @@ bool DevicePipeline::run_frame(Positions t0, Positions t1, double distance, Thre
     if (goal_ == Goal::results) contacts_.find_nothing(stream_);
     return true;
   }
-  LaunchParams<T> params{};
-  scene_.fill(params);
-  params.fast = is_fast();
-  params.time_only = for_earliest();
-  params.until_best = best_.has_value(), params.best = best_.value_or(no_time);
-  if (of_snapshot(query_))
-    params.separation = distance;
-  else
-    scene_.fill_separations(params);
-  params.integers_on_device = true;
-  params.wanted = wanted();
-  params.largest = of_snapshot(query_) ? largest_in_snapshot : largest_coordinate;
-  tree_.fill(params);
-  motion_.fill(params);
   const T* given[2];
   positions_.bring(t0, t1, given, pool, stream_);
-  params.given_t0 = given[0], params.given_t1 = given[1];
   given_doubles_ = t0.is_double;
-  motion_.fill_counters(params, counters_.data());
+  prepared_t0_ = given[0], prepared_t1_ = given[1];
+  LaunchParams<T> params = frame_params(distance, given[0], given[1]);
   timer_.mark("upload", stream_);
   const Counters& c = *host_counters_.data();
   if (goal_ == Goal::earliest_of_near) lists_.make_room(near_.most());
@@ -244,20 +241,41 @@ bool DevicePipeline::run_frame(Positions t0, Positions t1, double distance, Thre
 }
 
 template <class T>
+LaunchParams<T> DevicePipeline::frame_params(double distance, const T* given_t0, const T* given_t1) {
+  LaunchParams<T> params{};
+  scene_.fill(params);
+  params.fast = is_fast();
+  params.time_only = for_earliest();
+  params.until_best = best_.has_value(), params.best = best_.value_or(no_time);
+  if (of_snapshot(query_))
+    params.separation = distance;
+  else
+    scene_.fill_separations(params);
+  params.integers_on_device = true;
+  params.wanted = wanted();
+  params.largest = of_snapshot(query_) ? largest_in_snapshot : largest_coordinate;
+  tree_.fill(params);
+  motion_.fill(params);
+  params.given_t0 = given_t0, params.given_t1 = given_t1;
+  motion_.fill_counters(params, counters_.data());
+  return params;
+}
+
+template <class T>
 void DevicePipeline::launch(LaunchParams<T>& params) {
   params.leaf_pairs = {leaf_pairs_.data(), leaf_pairs_.size()};
   contacts_.fill(params, goal_ == Goal::results);
   hints_.fill(params);
-  motion_.begin(params, multiprocessors_, stream_);
-  if (for_earliest() && options_.worlds == 1) near_.measure(params, stream_);
+  motion_.begin(params, multiprocessors_, on_);
+  if (for_earliest() && options_.worlds == 1) near_.measure(params, on_);
   if (best_ && goal_ != Goal::earliest_of_near) launch_hints(query_, params, on_stream());
-  motion_.launch(query_, params, stream_);
-  timer_.mark("bounds", stream_);
+  motion_.launch(query_, params, on_);
+  timer_.mark("bounds", on_);
   if (goal_ == Goal::earliest_of_near) {
     lists_.fill(params);
-    near_.take(params, stream_);
-    timer_.mark("near_list", stream_);
-    lists_.launch(query_, TestLists::From::near_list, params, multiprocessors_, stream_, timer_);
+    near_.take(params, on_);
+    timer_.mark("near_list", on_);
+    lists_.launch(query_, TestLists::From::near_list, params, multiprocessors_, on_, timer_);
   } else {
     launch_tree(params);
   }
@@ -268,15 +286,15 @@ void DevicePipeline::launch(LaunchParams<T>& params) {
 
 template <class T>
 void DevicePipeline::launch_tree(LaunchParams<T>& params) {
-  refit_kernel<<<blocks_for(std::size_t{params.all_leaves()} * 32, 128), 128, 0, stream_>>>(params);
+  refit_kernel<<<blocks_for(std::size_t{params.all_leaves()} * 32, 128), 128, 0, on_>>>(params);
   check_launch("refit_kernel");
-  if (query_ == Query::contacts) launch_leaf_kdops(params, stream_);
-  timer_.mark("refit", stream_);
+  if (query_ == Query::contacts) launch_leaf_kdops(params, on_);
+  timer_.mark("refit", on_);
   const auto traverse = of_snapshot(query_) ? traverse_kernel<true, T> : traverse_kernel<false, T>;
-  traverse<<<blocks_for(params.all_leaves(), traverse_warps), 32 * traverse_warps, 0, stream_>>>(params);
+  traverse<<<blocks_for(params.all_leaves(), traverse_warps), 32 * traverse_warps, 0, on_>>>(params);
   check_launch("traverse_kernel");
-  timer_.mark("traverse", stream_);
-  lists_.launch(query_, TestLists::From::leaves, params, multiprocessors_, stream_, timer_);
+  timer_.mark("traverse", on_);
+  lists_.launch(query_, TestLists::From::leaves, params, multiprocessors_, on_, timer_);
 }
 
 template <class T>
@@ -289,9 +307,9 @@ template <class T>
 void DevicePipeline::launch_area(const LaunchParams<T>& params) {
   area_kernel<<<std::min(blocks_for(std::size_t{params.n_worlds} * params.n_nodes, 256),
                          static_cast<unsigned>(multiprocessors_)),
-                256, 0, stream_>>>(params);
+                256, 0, on_>>>(params);
   check_launch("area_kernel");
-  timer_.mark("area", stream_);
+  timer_.mark("area", on_);
 }
 
 void DevicePipeline::add(const std::vector<Contact>& vertex_face, const std::vector<Contact>& edge_edge) {
@@ -315,6 +333,72 @@ void DevicePipeline::add(const std::vector<Contact>& vertex_face, const std::vec
     check(cudaStreamSynchronize(stream_), "cudaStreamSynchronize");
     if (contacts_.complete(query_, params, c, on_stream())) copy_counters();
   });
+}
+
+PreparedResults DevicePipeline::prepare(Positions t0, Positions t1, double room) {
+  if (!tree_.empty() && (prepared_t0_ != t0.data || prepared_t1_ != t1.data))
+    throw InvalidArgument("vertices_t0, vertices_t1: must be on CUDA device " + std::to_string(device_) +
+                          ", where this detector works, so that they can be read in place");
+  const Counters& c = *host_counters_.data();
+  const auto roomy = [&](u64 n) { return static_cast<std::size_t>(room * static_cast<double>(n)) + 1024; };
+  TestLists::Sizes sizes = lists_.sizes();
+  const auto each = [&](std::size_t (&of)[2], u64 most) {
+    for (std::size_t& size : of) size = std::max(size, roomy(most));
+  };
+  each(sizes.survivors, c.most_survivors), each(sizes.single, c.most_single), each(sizes.many, c.most_many);
+  if (query_ == Query::separations) each(sizes.separated, c.most_separated);
+  sizes.undecided = std::max(sizes.undecided, roomy(c.undecided));
+  sizes.open = std::max(sizes.open, roomy(c.open_in_integers[0]));
+  lists_.reserve(sizes);
+  leaf_pairs_.reserve(roomy(c.leaf_pairs));
+  contacts_.reserve(roomy(c.found_all));
+  told_of_prepared_ = std::make_shared<DeviceBuffer<PreparedCounts>>();
+  told_of_prepared_->reserve(1);
+  const ResultPlaces to = contacts_.reserve_rows(roomy(c.rows[0]), roomy(c.rows[1]));
+  enqueue(stream_);  // what is loaded, or looked up, when it is first used cannot be captured
+  check(cudaStreamSynchronize(stream_), "cudaStreamSynchronize");
+  const FrameResult r = contacts_.result(query_, c);
+  PreparedResults p;
+  using Owner = std::shared_ptr<const void>;
+  p.memory = std::make_shared<std::pair<Owner, Owner>>(r.memory, told_of_prepared_), p.device = device_;
+  p.room_vf = to.most_vf, p.room_ee = to.most_ee;
+  p.vf = r.vf, p.ee = r.ee, p.tocs = r.toc, p.counts = told_of_prepared_->data();
+  p.vf_offsets = r.vf_offsets, p.ee_offsets = r.ee_offsets, p.hashes = r.hashes, p.first_tocs = r.first_tocs;
+  return p;
+}
+
+void DevicePipeline::enqueue(void* stream) {
+  const CallersDevice callers;
+  check(cudaSetDevice(device_), "cudaSetDevice");
+  const auto restore = [this](cudaStream_t* on) { *on = stream_; };
+  const std::unique_ptr<cudaStream_t, decltype(restore)> launched_there(&on_, restore);
+  on_ = static_cast<cudaStream_t>(stream);
+  positions_.require_stream(on_, stream_);
+  given_doubles_ ? enqueue_frame<double>() : enqueue_frame<float>();
+}
+
+template <class T>
+void DevicePipeline::enqueue_frame() {
+  const ResultPlaces to = contacts_.places();
+  LaunchParams<T> params{};
+  if (tree_.empty()) {
+    motion_.fill_counters(params, counters_.data());
+    check(cudaMemsetAsync(counters_.data(), 0, sizeof(Counters), on_), "cudaMemsetAsync");
+    contacts_.find_nothing(on_);
+  } else {
+    params = frame_params(0, static_cast<const T*>(prepared_t0_), static_cast<const T*>(prepared_t1_));
+    // In which worlds floats suffice only the device will know.
+    params.in_floats = params.fast, params.in_doubles = true;
+    launch(params);
+    launch_results(params);
+  }
+  const TestLists::Sizes s = lists_.sizes();
+  tell_kernel<<<1, 1, 0, on_>>>(params,
+                                {leaf_pairs_.size(), std::min(s.survivors[0], s.survivors[1]),
+                                 std::min(s.single[0], s.single[1]), std::min(s.many[0], s.many[1]),
+                                 std::min(s.separated[0], s.separated[1]), s.undecided, s.open, contacts_.capacity()},
+                                to, told_of_prepared_->data());
+  check_launch("tell_kernel");
 }
 
 std::optional<std::vector<OpenRow>> DevicePipeline::find_places(FrameResult& r, Outputs outputs) {

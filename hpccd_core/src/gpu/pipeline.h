@@ -17,6 +17,7 @@
 #include "gpu/places.h"
 #include "gpu/query.h"
 #include "hpccd/hpccd.h"
+#include "hpccd/prepared.h"
 #include "scene/features.h"
 #include "scene/separation_table.h"
 
@@ -77,6 +78,12 @@ class Pipeline {
   virtual std::optional<std::vector<OpenRow>> find_places(FrameResult& result, Outputs outputs) = 0;
   // What the host has found of these.
   virtual void put_places(const std::vector<PairPlaces>& places) = 0;
+
+  // After run() of these positions, on this device, and finish(), of results that stay there: from now on enqueue() puts
+  // the same frame, of what the positions are then, on any stream. Lists and rows get room for so many times what this
+  // one needed.
+  virtual PreparedResults prepare(Positions t0, Positions t1, double room) = 0;
+  virtual void enqueue(void* stream) = 0;
 
   // The same for the earliest time alone, which is never late at the tiers that promise it: of all pairs, or of those
   // in the near list. Then undecided() and earliest().

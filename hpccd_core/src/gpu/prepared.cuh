@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+// Frames that no host looks at: what they tell of themselves.
+#pragma once
+
+#include "gpu/ordering.cuh"
+#include "hpccd/prepared.h"
+
+namespace hpccd::gpu {
+
+// How much each list of such a frame holds.
+struct PreparedRoom {
+  u64 leaf_pairs, survivors, single, many, separated, undecided, open, found;
+};
+
+// After all other work of the frame.
+template <class T>
+__global__ void tell_kernel(const __grid_constant__ LaunchParams<T> params, const __grid_constant__ PreparedRoom room,
+                            const __grid_constant__ ResultPlaces to, PreparedCounts* told) {
+  const Counters& c = *params.counters;
+  const bool too_long = c.leaf_pairs > room.leaf_pairs || c.most_survivors > room.survivors ||
+                        c.most_single > room.single || c.most_many > room.many || c.most_separated > room.separated ||
+                        c.undecided > room.undecided || c.open_in_integers[0] > room.open || c.found_all > room.found ||
+                        !fit<false>(c, to) || c.most_of_a_feature > most_of_a_feature;
+  const u64 state = (too_long ? PreparedCounts::no_room : 0) | (c.to_host ? PreparedCounts::left_to_cpu : 0) |
+                    (c.bad ? PreparedCounts::bad_coordinates : 0);
+  const bool good = state == PreparedCounts::complete;
+  told->vertex_face = good ? c.rows[0] : 0, told->edge_edge = good ? c.rows[1] : 0, told->state = state;
+  told->hash = good ? c.world.hash : 0;
+  const u64 soonest = c.world.first_toc;
+  told->first_toc = good && soonest ? __longlong_as_double(static_cast<long long>(~soonest)) : INFINITY;
+}
+
+}  // namespace hpccd::gpu

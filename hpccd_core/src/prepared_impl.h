@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+
+#include "gpu/pipeline.h"
+#include "hpccd/prepared.h"
+
+namespace hpccd {
+
+struct PreparedDetection::Impl {
+  std::shared_ptr<const void> detector;  // whose scene and rules the pipeline reads
+  std::unique_ptr<gpu::Pipeline> pipeline;
+  PreparedResults results;
+};
+
+}  // namespace hpccd
