@@ -224,7 +224,7 @@ def test_many_small_worlds():
     assert np.count_nonzero(np.isfinite(found.first_tocs)) == 4096
     for k in range(0, 8192, 97):
         assert found.world(k).hash == alone.detect(start[k], end[k]).hash
-    assert detector.stats["bytes"] < 8192 * 2000
+    assert detector.stats["bytes"] < 8192 * 5000  # with a tree each
 
 
 def test_without_worlds_an_answer_is_of_one():

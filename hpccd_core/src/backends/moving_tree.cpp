@@ -67,8 +67,9 @@ void MovingTree::give_up_own() {
 }
 
 void MovingTree::begin_world(OwnTree& own, TreeBudget& budget, bool always) {
-  own_ = &own, budget_ = &budget, always_own_ = always;
-  if (!own.kept && always) own.kept = std::make_unique<KeptTree>();
+  // How large a tree is, the first one tells, which all may share.
+  own_ = &own, budget_ = &budget, always_own_ = always || (kept_.built && budget.holds_all(kept_.tree.bytes()));
+  if (!own.kept && always_own_) own.kept = std::make_unique<KeptTree>();
   if (!own.kept) return;
   std::swap(kept_, *own.kept);
   fits_ = false;

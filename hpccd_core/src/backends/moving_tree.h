@@ -15,6 +15,9 @@ namespace hpccd {
 // How much memory the own trees of all worlds may take.
 class TreeBudget {
  public:
+  explicit TreeBudget(std::size_t n_worlds) : n_worlds_(n_worlds) {}
+  // Trees of this size for all.
+  bool holds_all(std::size_t bytes) const { return bytes <= most / n_worlds_; }
   bool take(std::size_t bytes) {
     if (taken_.fetch_add(bytes, std::memory_order_relaxed) + bytes <= most) return true;
     give_back(bytes);
@@ -24,6 +27,7 @@ class TreeBudget {
 
  private:
   static constexpr std::size_t most = std::size_t{1} << 30;
+  const std::size_t n_worlds_;
   std::atomic<std::size_t> taken_{0};
 };
 
@@ -33,8 +37,9 @@ struct KeptTree {
   std::uint64_t number = 0;
 };
 
-// Worlds have one topology, so a thread's worlds share a tree, which stays in its core's cache: refitting takes a
-// twentieth of the time of building. A world whose pose has worn it out twice in a row gets a tree of its own.
+// Worlds have one topology, so that where there is no room for a tree each, a thread's worlds share one: refitting takes
+// a twentieth of the time of building. Then a world whose pose has worn it out twice in a row gets a tree of its own.
+// (64 worlds of cloth-drop, 2 threads: with a tree each 0.97 of two detectors, with one a thread 0.89.)
 struct OwnTree {
   std::unique_ptr<KeptTree> kept;  // while that world is looked at: the common one
   std::size_t bytes = 0;           // of the budget

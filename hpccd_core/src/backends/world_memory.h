@@ -12,6 +12,7 @@ struct WorldMemory {
   NearList near;
   std::uint64_t near_separations = 0;  // the version of the separations that it is for
   double edge = 0;                     // a typical length
+  double seconds = 0;                  // that its last call took
 
   std::size_t bytes() const { return sizeof *this + near.bytes() + (tree.kept ? tree.kept->tree.bytes() : 0); }
 };

@@ -1,6 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "backends/worlds_on_cpus.h"
 
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <functional>
+#include <numeric>
 #include <utility>
 
 namespace hpccd {
@@ -34,11 +39,17 @@ bool WorldsOnCpus::each_world(const Ask& ask) {
   for (const auto& e : engines_)
     if (e) e->backend.begin_worlds(), e->working = false;
   const std::size_t side_by_side = n_side_by_side(n_worlds(), engines_.size());
-  parallel_for(shared_.pool, side_by_side, 1, [&](std::size_t begin, std::size_t end, int thread) {
-    Engine& engine = engine_of(thread);
-    for (std::size_t k = begin; k < end; ++k) {
+  order(side_by_side);
+  std::atomic<std::size_t> next{0};
+  shared_.pool.share([&](int thread) {
+    for (std::size_t i; (i = next.fetch_add(1, std::memory_order_relaxed)) < side_by_side;) {
+      shared_.cancellation.heed();
+      const std::size_t k = order_[i];
+      Engine& engine = engine_of(thread);
+      const auto begin = std::chrono::steady_clock::now();
       const WorldVisit visit(engine.backend, memories_, k);
       ask(engine.backend, k);
+      memories_.of_world[k].seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
     }
   });
   mark_stages();
@@ -47,6 +58,13 @@ bool WorldsOnCpus::each_world(const Ask& ask) {
     ask(on_all_threads_, k);
   }
   return true;  // the CPU answers all
+}
+
+// Those that took longest last time come first, so that what comes last, when threads run out of worlds, is short.
+void WorldsOnCpus::order(std::size_t side_by_side) {
+  order_.resize(side_by_side);
+  std::iota(order_.begin(), order_.end(), std::size_t{0});
+  std::ranges::stable_sort(order_, std::greater<>(), [&](std::size_t k) { return memories_.of_world[k].seconds; });
 }
 
 WorldsOnCpus::Engine& WorldsOnCpus::engine_of(int thread) {

@@ -12,7 +12,7 @@
 namespace hpccd {
 
 struct WorldMemories {
-  explicit WorldMemories(std::size_t worlds) : of_world(worlds) {}
+  explicit WorldMemories(std::size_t worlds) : of_world(worlds), trees(worlds) {}
   std::vector<WorldMemory> of_world;
   TreeBudget trees;
   std::size_t bytes() const;
@@ -52,12 +52,14 @@ class WorldsOnCpus final : public WorldByWorld {
 
   bool each_world(const Ask& ask) override;
   Engine& engine_of(int thread);
+  void order(std::size_t side_by_side);
   void mark_stages();
 
   CpuBackend& on_all_threads_;
   WorldMemories& memories_;
   ThreadPool one_thread_{1};                      // of each engine: it runs a job where it is called
   std::vector<std::unique_ptr<Engine>> engines_;  // by thread, from its first world on
+  std::vector<std::size_t> order_;                // of those that get a thread each
 };
 
 }  // namespace hpccd
