@@ -72,7 +72,7 @@ function(hpccd_find_cuda)
 
   file(GLOB headers CONFIGURE_DEPENDS "${CMAKE_CURRENT_SOURCE_DIR}/src/*/*.h" "${CMAKE_CURRENT_SOURCE_DIR}/src/*/*.cuh"
     "${CMAKE_CURRENT_SOURCE_DIR}/include/hpccd/*.h")
-  foreach(source gpu/pipeline gpu/test_lists gpu/likely_stages gpu/separation_stages gpu/integer_stages gpu/snapshot_stages gpu/places_stages gpu/hints gpu/device gpu/results_to_device gpu/sort hybrid/cuda_device)
+  foreach(source gpu/pipeline gpu/test_lists gpu/likely_stages gpu/separation_stages gpu/integer_stages gpu/snapshot_stages gpu/places_stages gpu/places_in_integers gpu/hints gpu/device gpu/results_to_device gpu/sort hybrid/cuda_device)
     string(REPLACE "/" "_" name "${source}")
     set(object "${CMAKE_CURRENT_BINARY_DIR}/${name}.o")
     add_custom_command(OUTPUT "${object}"

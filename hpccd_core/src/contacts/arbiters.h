@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// Who answers where doubles are not sure of a place or a direction: the integers; or nobody yet, on devices.
+// Who answers where doubles are not sure of a place or a direction: integers of any size; on devices those of a fixed
+// size, or nobody yet.
 #pragma once
 
 #include "elementary/exact/contact.h"
 #include "elementary/exact/distance.h"
+#include "elementary/exact/fixed_approach.h"
 
 namespace hpccd {
 
@@ -14,7 +16,7 @@ struct ByIntegers {
   }
 };
 
-// What was answered with means nothing once anything is open.
+// What was answered with means nothing once anything is open, here and below.
 struct LeftOpen {
   bool open = false;
 
@@ -25,6 +27,22 @@ struct LeftOpen {
   HPCCD_HD exact::Approach approach(Kind, const Vec3<double>*, const Vec3<double>*, double) {
     open = true;
     return {};
+  }
+};
+
+// As exact::approach, up to where that goes on to integers of any size.
+struct ByFixedIntegers {
+  bool open = false;
+
+  HPCCD_HD exact::Nearest nearest(Kind, const Vec3<double>*) {
+    open = true;
+    return {};
+  }
+  HPCCD_HOST_DEVICE exact::Approach approach(Kind kind, const Vec3<double> q_t0[4], const Vec3<double> q_t1[4],
+                                             double toc) {
+    const std::optional<exact::Approach> answer = exact::fixed_approach(kind, exact::GivenMotion(q_t0, q_t1), toc);
+    open = open || !answer;
+    return answer.value_or(exact::Approach{});
   }
 };
 

@@ -20,19 +20,31 @@ class DevicePlaces {
   std::optional<std::vector<OpenRow>> find(const LaunchParams<T>& params, const FrameResult& r, const PlacesOut& to,
                                            const Stages& stages) {
     const u64 n = r.n_vf + r.n_ee;
-    n_open_.reserve(1);
-    open_.reserve(static_cast<std::size_t>(std::max<u64>(n / most_open, 1024)));
+    n_open_.reserve(2);
+    const auto room = static_cast<std::size_t>(std::max<u64>(n / most_open, 16384));
+    open_.reserve(room);
+    to_host_.reserve(open_.size());
     check(cudaMemsetAsync(n_open_.data(), 0, n_open_.bytes(), stages.stream), "cudaMemsetAsync");
     const auto offsets = [](const std::uint64_t* p) { return reinterpret_cast<const u64*>(p); };
-    launch_places(params,
-                  {r.n_vf, r.n_ee, reinterpret_cast<const uint2*>(r.vf), reinterpret_cast<const uint4*>(r.ee), r.toc,
-                   offsets(r.vf_offsets), offsets(r.ee_offsets), to, open_.data(), open_.size(), n_open_.data()},
-                  stages);
-    u64 n_open = 0;
-    fetch(&n_open, n_open_.data(), 1, stages.stream);
-    if (n_open > open_.size()) return std::nullopt;
-    std::vector<OpenRow> open(n_open);
-    fetch(open.data(), open_.data(), n_open, stages.stream);
+    const PlacesTask task{r.n_vf,
+                          r.n_ee,
+                          reinterpret_cast<const uint2*>(r.vf),
+                          reinterpret_cast<const uint4*>(r.ee),
+                          r.toc,
+                          offsets(r.vf_offsets),
+                          offsets(r.ee_offsets),
+                          to,
+                          open_.data(),
+                          to_host_.data(),
+                          std::min(open_.size(), to_host_.size()),
+                          n_open_.data()};
+    launch_places(params, task, stages);
+    launch_places_in_integers(task, stages);
+    u64 n_open[2] = {};
+    fetch(n_open, n_open_.data(), 2, stages.stream);
+    if (n_open[0] > task.open_capacity) return std::nullopt;
+    std::vector<OpenRow> open(n_open[1]);
+    fetch(open.data(), to_host_.data(), n_open[1], stages.stream);
     return open;
   }
 
@@ -43,11 +55,11 @@ class DevicePlaces {
     check(cudaMemcpyAsync(places_.data(), places.data(), places.size() * sizeof places[0], cudaMemcpyHostToDevice,
                           stages.stream),
           "cudaMemcpyAsync");
-    launch_put(to, open_.data(), places_.data(), places.size(), stages);
+    launch_put(to, to_host_.data(), places_.data(), places.size(), stages);
     check(cudaStreamSynchronize(stages.stream), "cudaStreamSynchronize");
   }
 
-  std::size_t bytes() const { return open_.bytes() + n_open_.bytes() + places_.bytes(); }
+  std::size_t bytes() const { return open_.bytes() + to_host_.bytes() + n_open_.bytes() + places_.bytes(); }
 
  private:
   static constexpr u64 most_open = 8;  // of so many rows one, at most
@@ -58,7 +70,7 @@ class DevicePlaces {
     check(cudaStreamSynchronize(stream), "cudaStreamSynchronize");
   }
 
-  DeviceBuffer<OpenRow> open_;
+  DeviceBuffer<OpenRow> open_, to_host_;
   DeviceBuffer<u64> n_open_;
   DeviceBuffer<PairPlaces> places_;
 };

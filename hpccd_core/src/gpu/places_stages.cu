@@ -2,7 +2,7 @@
 // Points, normals and nearest points with the CPU's bits, a thread a row.
 #include "gpu/pair_ends.cuh"
 #include "gpu/pair_lists.cuh"
-#include "gpu/places_task.cuh"
+#include "gpu/write_places.cuh"
 
 namespace hpccd::gpu {
 namespace {
@@ -15,15 +15,6 @@ __device__ u32 world_of_row(const u64* offsets, u32 n_worlds, u64 row) {
     (offsets[middle] <= row ? low : high) = middle;
   }
   return low;
-}
-
-__device__ void write_vector(double* to, const Vec3<double>& v) { to[0] = v.x, to[1] = v.y, to[2] = v.z; }
-
-__device__ void write_places(const PlacesOut& out, u64 row, const PairPlaces& places) {
-  if (out.outputs.points) write_vector(out.points + 3 * row, places.point);
-  if (out.outputs.normals) write_vector(out.normals + 3 * row, places.normal);
-  if (!out.outputs.closest) return;
-  for (int i = 0; i < 2; ++i) write_vector(out.closest + 6 * row + 3 * i, places.closest[i]);
 }
 
 // The vertices of a row as those of pairs, numbered through all worlds.
@@ -44,15 +35,6 @@ __device__ uint4 vertices_of_row(const LaunchParams<T>& params, const PlacesTask
   return {v.x + base, v.y + base, v.z + base, v.w + base};
 }
 
-template <Kind kind>
-__device__ bool find_places(const PlacesTask& task, const OpenRow& row) {
-  LeftOpen arbiter;
-  const UndecidedPair& q = row.pair;
-  const PairPlaces places = pair_places<kind>(q.t0, q.t1, row.toc, q.separation, task.out.outputs, arbiter);
-  if (!arbiter.open) write_places(task.out, row.row, places);
-  return arbiter.open;
-}
-
 template <class T>
 __global__ __launch_bounds__(128) void places_kernel(const __grid_constant__ LaunchParams<T> params,
                                                      const __grid_constant__ PlacesTask task) {
@@ -67,7 +49,7 @@ __global__ __launch_bounds__(128) void places_kernel(const __grid_constant__ Lau
       row.pair.kind = i < task.n_vf ? Kind::vertex_face : Kind::edge_edge;
       row.pair.separation = separation_of(params, v.x, v.z);
       for (int k = 0; k < 4; ++k) row.pair.t0[k] = q.t0[k], row.pair.t1[k] = q.t1[k];
-      open = i < task.n_vf ? find_places<Kind::vertex_face>(task, row) : find_places<Kind::edge_edge>(task, row);
+      open = !find_places<LeftOpen>(task.out, row);
     }
     const u64 at = warp_append(task.n_open, open);
     if (open && at < task.open_capacity) task.open[at] = row;

@@ -3,8 +3,7 @@
 // contact, and n at the contact.
 #pragma once
 
-#include <cstdlib>
-#include <span>
+#include <optional>
 
 #include "elementary/exact/contact.h"
 #include "elementary/exact/isolate.h"
@@ -18,7 +17,7 @@ namespace detail {
 // The sign of f beside m / 2^k, where its lowest derivative that does not vanish decides; direction is 1 or -1. Before
 // t = 0 and after t = 1 the motion goes on in its straight lines.
 template <class Z, class M>
-int sign_beside(const Polynomial<Z, 3>& f, const M& m, int k, int direction) {
+HPCCD_HOST_DEVICE_CALL int sign_beside(const Polynomial<Z, 3>& f, const M& m, int k, int direction) {
   if (const int s = sign_at_dyadic(f, m, k)) return s;
   using W = Plus<Z, 1>;  // three times a coefficient may need a bit more than it
   const W c1(f.c[1]), c2(f.c[2]), c3(f.c[3]);
@@ -30,7 +29,7 @@ int sign_beside(const Polynomial<Z, 3>& f, const M& m, int k, int direction) {
 }
 
 template <class Z, int D>
-int sign_before(const Polynomial<Z, 3>& f, const Root<Z, D>& root) {
+HPCCD_HOST_DEVICE int sign_before(const Polynomial<Z, 3>& f, const Root<Z, D>& root) {
   // The interval of a root that is not exact holds no other.
   return root.exact ? sign_beside(f, root.m, root.k, -1) : sign_beside(f, root.m, root.k, 1);
 }
@@ -38,7 +37,7 @@ int sign_before(const Polynomial<Z, 3>& f, const Root<Z, D>& root) {
 // n_k as floating-point numbers with one common scale; `low` is the power of two of each axis. sign_of(k) is the sign
 // of n_k.
 template <class Z, class M, class Sign>
-Vec3<double> direction(const Query<Z>& q, const int low[3], const M& m, int k, Sign&& sign_of) {
+HPCCD_HOST_DEVICE Vec3<double> direction(const Query<Z>& q, const int low[3], const M& m, int k, Sign&& sign_of) {
   double fraction[3] = {};
   int exponent[3] = {}, most = std::numeric_limits<int>::min();
   for (int axis = 0; axis < 3; ++axis) {
@@ -57,12 +56,11 @@ Vec3<double> direction(const Query<Z>& q, const int low[3], const M& m, int k, S
 // Which of the roots of f, whose times are given, the contact at `toc` is: of those within `same_time` the first at
 // which the features touch; else the nearest, where the features are known to touch. -1: none.
 template <class Touches>
-int root_of_contact(std::span<const std::int64_t> times, std::int64_t toc, Touches&& touches_at) {
+HPCCD_HOST_DEVICE int root_of_contact(const std::int64_t* times, int n, std::int64_t toc, Touches&& touches_at) {
   // More than twice the radius of a proven time of contact (Proven::toc_radius), by which the conservative tier reports
   // it early.
   constexpr std::int64_t same_time = std::int64_t{1} << (time_bits - 38);  // 3.6e-12
-  const auto distance = [&](int i) { return std::abs(times[i] - toc); };
-  const int n = static_cast<int>(times.size());
+  const auto distance = [&](int i) { return times[i] < toc ? toc - times[i] : times[i] - toc; };
   int nearest = -1;
   for (int i = 0; i < n; ++i)
     if (nearest < 0 || distance(i) < distance(nearest)) nearest = i;
@@ -73,7 +71,7 @@ int root_of_contact(std::span<const std::int64_t> times, std::int64_t toc, Touch
 
 // Where no root of f belongs to the contact: features that are apart.
 template <class Z>
-Approach approach_between_roots(const Query<Z>& q, const int low[3], std::int64_t toc) {
+HPCCD_HOST_DEVICE Approach approach_between_roots(const Query<Z>& q, const int low[3], std::int64_t toc) {
   const Time<Z> m(toc);
   return {sign_beside(q.f, m, time_bits, -1),
           direction(q, low, m, time_bits, [&](int k) { return sign_at_dyadic(q.n[k], m, time_bits); })};
@@ -81,11 +79,11 @@ Approach approach_between_roots(const Query<Z>& q, const int low[3], std::int64_
 
 }  // namespace detail
 
-inline std::int64_t time_of(double toc) { return static_cast<std::int64_t>(std::ldexp(toc, time_bits)); }
+HPCCD_HOST_DEVICE inline std::int64_t time_of(double toc) { return static_cast<std::int64_t>(std::ldexp(toc, time_bits)); }
 
 // Nothing where it stays open with integers of this size.
 template <class Z>
-std::optional<Approach> approach(const Query<Z>& q, const int low[3], double toc) {
+HPCCD_HOST_DEVICE_CALL std::optional<Approach> approach(const Query<Z>& q, const int low[3], double toc) {
   const int degree = q.f.degree();
   if (degree < 0) return Approach{0, {0, 0, 0}};
   if (degree == 0) return detail::approach_between_roots(q, low, time_of(toc));
@@ -99,7 +97,7 @@ std::optional<Approach> approach(const Query<Z>& q, const int low[3], double toc
   bool open = false;
   const auto sign_there = [&](const auto& p, int i) { return open ? 0 : sign_at(p, roots.root[i], open); };
   const auto touches_at = [&](int i) { return touches(q, [&](const auto& p) { return sign_there(p, i); }) || open; };
-  const int i = detail::root_of_contact({times, static_cast<std::size_t>(roots.n)}, time_of(toc), touches_at);
+  const int i = detail::root_of_contact(times, roots.n, time_of(toc), touches_at);
   if (i < 0) return detail::approach_between_roots(q, low, time_of(toc));
   int sign_of_n[3];
   for (int k = 0; k < 3; ++k) sign_of_n[k] = sign_there(q.n[k], i);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "elementary/exact/contact.h"
 
-#include "elementary/exact/given_motion.h"
+#include "elementary/exact/fixed_approach.h"
 #include "elementary/exact/wide/approach.h"
 #include "elementary/exact/wide/earliest.h"
 
@@ -21,11 +21,7 @@ std::optional<double> earliest_contact(Kind kind, const Vec3<double> q_t0[4], co
 
 Approach approach(Kind kind, const Vec3<double> q_t0[4], const Vec3<double> q_t1[4], double toc) {
   const GivenMotion given(q_t0, q_t1);
-  std::optional<Approach> answer;  // nothing: undecided
-  if (given.bits <= Widths<Integer<1>>::coordinate_bits)
-    answer = approach(given.query<Integer<1>>(kind), given.low, toc);
-  else if (given.bits <= Widths<Integer<2>>::coordinate_bits)
-    answer = approach(given.query<Integer<2>>(kind), given.low, toc);
+  std::optional<Approach> answer = fixed_approach(kind, given, toc);
   if (!answer) answer = approach(given.query<Big>(kind), given.low, toc);
   return *answer;
 }

@@ -50,7 +50,7 @@ Approach approach(const Query<Big>& q, const int low[3], double toc) {
   const auto touches_at = [&](int i) {
     return touches(q, [&](const auto& p) { return wide::sign_at(wide::coefficients(p), roots[i]); });
   };
-  const int i = detail::root_of_contact(times, time_of(toc), touches_at);
+  const int i = detail::root_of_contact(times.data(), static_cast<int>(times.size()), time_of(toc), touches_at);
   return i < 0 ? detail::approach_between_roots(q, low, time_of(toc)) : approach_at(q, low, roots[i]);
 }
 

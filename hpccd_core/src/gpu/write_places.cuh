@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+// The places of one row.
+#pragma once
+
+#include "gpu/places_task.cuh"
+
+namespace hpccd::gpu {
+
+__device__ inline void write_vector(double* to, const Vec3<double>& v) { to[0] = v.x, to[1] = v.y, to[2] = v.z; }
+
+__device__ inline void write_places(const PlacesOut& out, u64 row, const PairPlaces& places) {
+  if (out.outputs.points) write_vector(out.points + 3 * row, places.point);
+  if (out.outputs.normals) write_vector(out.normals + 3 * row, places.normal);
+  if (!out.outputs.closest) return;
+  for (int i = 0; i < 2; ++i) write_vector(out.closest + 6 * row + 3 * i, places.closest[i]);
+}
+
+template <class Arbiter, Kind kind>
+__device__ bool find_places(const PlacesOut& out, const OpenRow& row) {
+  Arbiter arbiter;
+  const UndecidedPair& q = row.pair;
+  const PairPlaces places = pair_places<kind>(q.t0, q.t1, row.toc, q.separation, out.outputs, arbiter);
+  if (!arbiter.open) write_places(out, row.row, places);
+  return !arbiter.open;
+}
+
+// False where they stay open.
+template <class Arbiter>
+__device__ bool find_places(const PlacesOut& out, const OpenRow& row) {
+  return row.pair.kind == Kind::edge_edge ? find_places<Arbiter, Kind::edge_edge>(out, row)
+                                          : find_places<Arbiter, Kind::vertex_face>(out, row);
+}
+
+}  // namespace hpccd::gpu
