@@ -105,10 +105,10 @@ def test_worlds(worlds):
 
 def test_where_most_rows_need_integers_the_cpu_computes_all():
     """Where features touch their nearest points are for integers; more rows than there is room for."""
-    scene, t0, t1 = crumpled(6, 60)
+    scene, t0, t1 = crumpled(6, 90)
     options = {"outputs": ("closest",)}
     expected = hc.Detector(scene, backend="cpu", **options).detect(t0, t1)
-    assert len(expected) > 1024
+    assert len(expected) > 16384
     detector = hc.Detector(scene, backend="gpu", results="device", **options)
     assert_same_places(detector.detect(t0, t1), expected)
     assert_on_gpu(detector)

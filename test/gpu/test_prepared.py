@@ -208,3 +208,21 @@ def test_refused():
         hc.Detector(scene, backend="gpu").prepare(*ends)
     with pytest.raises(TypeError, match="stream"):
         detector.prepare(*ends).enqueue("mine")
+
+
+def test_in_a_graph_of_torch():
+    torch = pytest.importorskip("torch")
+    scene, t0, t1 = crumpled(7)
+    expected = hc.Detector(scene, backend="cpu").detect(t0, t1)
+    ends = [torch.from_numpy(t).cuda() for t in (t0, t1)]
+    torch.cuda.synchronize()
+    detection = hc.Detector(scene, results="device").prepare(*ends)
+    stream, graph = torch.cuda.Stream(), torch.cuda.CUDAGraph()
+    with torch.cuda.graph(graph, stream=stream):
+        detection.enqueue(stream)
+    ends[1].copy_(ends[0])
+    graph.replay()
+    assert len(detection.contacts()) == 0
+    ends[1].copy_(torch.from_numpy(t1))
+    graph.replay()
+    assert_same(detection.contacts(), expected)

@@ -27,6 +27,19 @@ class _Torch:
         """One of its own, as simulators have."""
         return self._torch.cuda.Stream()
 
+    def graph(self, enqueue, stream):
+        """What enqueue(stream) puts there, as a graph: a function that runs it and waits for its end."""
+        graph = self._torch.cuda.CUDAGraph()
+        with self._torch.cuda.graph(graph, stream=stream):
+            enqueue(stream)
+
+        def run():
+            with self._torch.cuda.stream(stream):
+                graph.replay()
+            stream.synchronize()
+
+        return run
+
 
 class _Cupy:
     def __init__(self):
@@ -41,6 +54,18 @@ class _Cupy:
 
     def stream(self):
         return self._cupy.cuda.Stream(non_blocking=True)
+
+    def graph(self, enqueue, stream):
+        with stream:
+            stream.begin_capture()
+            enqueue(stream)
+            graph = stream.end_capture()
+
+        def run():
+            graph.launch(stream)
+            stream.synchronize()
+
+        return run
 
 
 def library(option: str = "--arrays device"):

@@ -14,7 +14,7 @@ from hpccd_ros.bench.report import table
 
 
 def measure(report, args, part, name, step, accuracy):
-    """Adds a row: one step from host to host, from the device to the host, and on the device alone."""
+    """Adds a row: one step from host to host, from the device to the host, on the device, and in a graph."""
     what = f"{part}, {name}, {accuracy}"
     options, scene = {"accuracy": accuracy, "threads": args.threads}, step.scene()
     arrays = library(f"--parts {part}")
@@ -32,7 +32,11 @@ def measure(report, args, part, name, step, accuracy):
     on_device, found = call_times(ask, args.repeat)
     check(report, f"{what}, device", detector, found.hash == expected.hash == found.to_host().hash)
     stats = detector.stats
-    del detector, ask, found  # lists of millions of pairs, which the next one needs too
+    prepared = detector.prepare(there.vertices_t0, there.vertices_t1)
+    in_graph, _ = call_times(arrays.graph(prepared.enqueue, stream), args.repeat)
+    if prepared.contacts().hash != expected.hash:
+        report.failure(f"{what}, graph: answers of GPU and CPU differ")
+    del prepared, detector, ask, found  # lists of millions of pairs, which the next one needs too
     staged = StagesDetector(scene, backend="gpu", results="device", **options)
     report.add(
         part=part,
@@ -44,6 +48,7 @@ def measure(report, args, part, name, step, accuracy):
         host_median_ms=ways["host"].median,
         to_host_median_ms=ways["to_host"].median,
         **on_device.as_row(),
+        graph_median_ms=in_graph.median,
         bytes=stats["gpu_bytes"],
         candidates=stats["vf_candidates"] + stats["ee_candidates"],
         decided=gpu_work.decided(stats),
@@ -64,10 +69,10 @@ def measure_large(report, args, sizes):
 def show(rows):
     table.show(
         "ms a call, by where positions and results lie",
-        ["scene", "accuracy", "triangles", "contacts", "CPU", "host to host", "device to host", "device", "p95", "best",
+        ["scene", "accuracy", "triangles", "contacts", "CPU", "host to host", "device to host", "device", "p95", "best", "graph",
          "bytes a triangle"],
         [[r["scene"], r["accuracy"], r["triangles"], r["contacts"], r["cpu_median_ms"], r["host_median_ms"],
-          r["to_host_median_ms"], r["median_ms"], r["p95_ms"], r["best_ms"], r["bytes"] / r["triangles"]]
+          r["to_host_median_ms"], r["median_ms"], r["p95_ms"], r["best_ms"], r["graph_median_ms"], r["bytes"] / r["triangles"]]
          for r in rows],
     )  # fmt: skip
     show_stages(rows)
