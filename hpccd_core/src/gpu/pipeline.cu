@@ -264,7 +264,8 @@ void DevicePipeline::launch_tree(LaunchParams<T>& params) {
   if (query_ == Query::contacts) launch_leaf_kdops(params, stream_);
   timer_.mark("refit", stream_);
   const auto traverse = of_snapshot(query_) ? traverse_kernel<true, T> : traverse_kernel<false, T>;
-  traverse<<<blocks_for(params.all_leaves(), traverse_warps), 32 * traverse_warps, 0, stream_>>>(params);
+  traverse<<<blocks_for(params.all_leaves(), traverse_warps * traverse_leaves), 32 * traverse_warps, 0, stream_>>>(
+      params);
   check_launch("traverse_kernel");
   timer_.mark("traverse", stream_);
   lists_.launch(query_, TestLists::From::leaves, params, multiprocessors_, stream_, timer_);
