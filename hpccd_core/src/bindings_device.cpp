@@ -241,9 +241,8 @@ py::dict arrays_of(const PreparedDetection& d, std::uint32_t n_worlds) {
 void bind_prepared(py::module_& m) {
   py::class_<PreparedDetection>(m, "PreparedDetection")
       .def(
-          "enqueue",
-          [](PreparedDetection& d, std::uintptr_t stream) { d.enqueue(reinterpret_cast<void*>(stream)); }, "stream"_a,
-          py::call_guard<py::gil_scoped_release>())
+          "enqueue", [](PreparedDetection& d, std::uintptr_t stream) { d.enqueue(reinterpret_cast<void*>(stream)); },
+          "stream"_a, py::call_guard<py::gil_scoped_release>())
       .def(
           "contacts",
           [](const PreparedDetection& d, std::uint32_t n_worlds) {

@@ -33,8 +33,9 @@ DeviceResults PreparedDetection::contacts() const {
   PreparedCounts c;
   gpu::download(p.counts, &c, sizeof c);
   if (c.state != PreparedCounts::complete)
-    throw std::runtime_error("the last detection is not complete" + why_incomplete(c.state) +
-                             "; detect() answers any motion, and prepare() with that one, or with more room, makes room");
+    throw std::runtime_error(
+        "the last detection is not complete" + why_incomplete(c.state) +
+        "; detect() answers any motion, and prepare() with that one, or with more room, makes room");
   DeviceResults r;
   r.memory = p.memory, r.device = p.device;
   r.n_vf = c.vertex_face, r.n_ee = c.edge_edge;

@@ -247,9 +247,9 @@ class Detector {
   DeviceResults detect_on_device(Positions vertices_t0, Positions vertices_t1);
   DeviceResults proximity_on_device(Positions vertices, double distance);
   DeviceResults intersections_on_device(Positions vertices);
-  // For detect_on_device() of arrays on the device that stay where they are, without a look from the host: with room for
-  // `room` times, 1 to 1000, what the motion that they hold now takes. Throws InvalidArgument where outputs were asked
-  // for, std::runtime_error where the device fails.
+  // For detect_on_device() of arrays on the device that stay where they are, without a look from the host: with room
+  // for `room` times, 1 to 1000, what the motion that they hold now takes. Throws InvalidArgument where outputs were
+  // asked for, std::runtime_error where the device fails.
   std::unique_ptr<PreparedDetection> prepare(Positions vertices_t0, Positions vertices_t1, double room);
   // The smallest distance of each enabled pair of meshes, by (mesh_a, mesh_b), mesh_a <= mesh_b. Of pairs of features
   // whose distances are the same double the first in order, vertex-face before edge-edge. Of several worlds those of

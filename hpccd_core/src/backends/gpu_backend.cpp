@@ -240,7 +240,8 @@ DeviceResults GpuBackend::on_device(const gpu::FrameResult& f) {
   r.vf_offsets = f.vf_offsets, r.ee_offsets = f.ee_offsets, r.ef_offsets = f.ef_offsets;
   r.hashes = f.hashes, r.first_tocs = f.first_tocs;
   r.hash = f.hash, r.first_toc = f.first_toc;
-  r.points = reinterpret_cast<decltype(r.points)>(f.points), r.normals = reinterpret_cast<decltype(r.normals)>(f.normals);
+  r.points = reinterpret_cast<decltype(r.points)>(f.points),
+  r.normals = reinterpret_cast<decltype(r.normals)>(f.normals);
   r.closest = reinterpret_cast<decltype(r.closest)>(f.closest);
   if (last_boxes_.until_best) pipeline_->choose_hints(r.first_toc);
   shared_.profiler.mark("contacts");

@@ -37,9 +37,9 @@ struct KeptTree {
   std::uint64_t number = 0;
 };
 
-// Worlds have one topology, so that where there is no room for a tree each, a thread's worlds share one: refitting takes
-// a twentieth of the time of building. Then a world whose pose has worn it out twice in a row gets a tree of its own.
-// (64 worlds of cloth-drop, 2 threads: with a tree each 0.97 of two detectors, with one a thread 0.89.)
+// Worlds have one topology, so that where there is no room for a tree each, a thread's worlds share one: refitting
+// takes a twentieth of the time of building. Then a world whose pose has worn it out twice in a row gets a tree of its
+// own. (64 worlds of cloth-drop, 2 threads: with a tree each 0.97 of two detectors, with one a thread 0.89.)
 struct OwnTree {
   std::unique_ptr<KeptTree> kept;  // while that world is looked at: the common one
   std::size_t bytes = 0;           // of the budget

@@ -5,6 +5,7 @@
 
 #include "gpu/candidates.cuh"
 #include "gpu/leaf_kdops.cuh"
+#include "gpu/leaf_pairs_ahead.cuh"
 #include "gpu/staged_leaves.cuh"
 
 namespace hpccd::gpu {
@@ -106,22 +107,10 @@ __global__ __launch_bounds__(32 * candidate_warps,
   StagedLeaves& s = spaces[threadIdx.x / 32];
   CandidateState state;
   for_leaf_pairs(params, [&](u64 begin, u64 end) {
-    // A lane a pair, and one more for its second leaf: what the pairs need first is fetched for all of them at once.
-    const u64 own = begin + (lane_number() & 7);
-    const uint2 ahead = own < end ? params.leaf_pairs.pairs[own] : uint2{0, 0};
-    const u32 first_leaf = world_of_leaves(params, ahead) * params.n_leaves;
-    const uint4 record =
-        __ldg(reinterpret_cast<const uint4*>(params.leaves + (lane_number() & 8 ? ahead.y : ahead.x - first_leaf)));
-    const auto leaf = [&](u32 lane) {
-      return DeviceLeaf{__shfl_sync(all_lanes, record.x, lane), __shfl_sync(all_lanes, record.y, lane),
-                        __shfl_sync(all_lanes, record.z, lane), __shfl_sync(all_lanes, record.w, lane)};
-    };
-    const auto pair = [&](u32 k) {
-      return uint2{__shfl_sync(all_lanes, ahead.x, k), __shfl_sync(all_lanes, ahead.y, k)};
-    };
+    const LeafPairsAhead ahead(params, begin, end);
     u32 near = (1u << (end - begin)) - 1;
-    for (u32 k = 0; k < 8; ++k) {
-      const uint2 leaves = pair(k);
+    for (u32 k = 0; k < LeafPairsAhead::most; ++k) {
+      const uint2 leaves = ahead.pair(k);
       const u32 world = world_of_leaves(params, leaves);
       if (leaf_kdops_apart(params, {leaves.x, world * params.n_leaves + leaves.y}) || !is_for<Policy>(params, world))
         near &= ~(1u << k);
@@ -129,7 +118,7 @@ __global__ __launch_bounds__(32 * candidate_warps,
 #pragma unroll 1
     for (; near; near &= near - 1) {
       const u32 k = __ffs(near) - 1;
-      contact_candidates<Policy>(params, s, state, {pair(k), leaf(k), leaf(k + 8)});
+      contact_candidates<Policy>(params, s, state, {ahead.pair(k), ahead.first(k), ahead.second(k)});
     }
   });
   finish_candidates<Query::contacts, Policy>(params, s, state);

@@ -30,6 +30,7 @@ class DeviceTree {
     }
     u32 deepest = 0;
     for (std::size_t i = 1; i < n; ++i) deepest = std::max(deepest, depth[i] = depth[parent[i]] + 1);
+    if (n > most_nodes) throw Error("the tree is too large for the device; use backend=\"cpu\"");
     if (deepest > traverse_depth) throw Error("the tree is too deep for the device; use backend=\"cpu\"");
     const std::size_t in_all = std::max<std::size_t>(n * n_worlds_, 1);
     boxes_.reserve(in_all);

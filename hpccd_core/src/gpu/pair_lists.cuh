@@ -20,6 +20,27 @@ __device__ void for_pairs(const PairList& list, u64 counted, Function&& function
   }
 }
 
+// The same, with load(numbers(pair)), both asked for early: numbers while the pair before is at work, and what they
+// name where it calls its last argument. Where there is no pair, they are asked for the first features of all.
+template <class Numbers, class Load, class Function>
+__device__ __forceinline__ void for_pairs_loaded_ahead(const PairList& list, u64 counted, Numbers&& numbers,
+                                                       Load&& load, Function&& function) {
+  const u64 n = length(counted, list.capacity), stride = static_cast<u64>(gridDim.x) * blockDim.x;
+  u64 i = static_cast<u64>(blockIdx.x) * blockDim.x + threadIdx.x;
+  if (i - lane_number() >= n) return;
+  const auto pair_at = [&](u64 at) { return at < n ? list.pairs[at] : uint2{0, 0}; };
+  uint2 pair = pair_at(i), next = pair_at(i + stride);
+  auto loaded = load(numbers(pair));
+  for (;;) {
+    const auto next_numbers = numbers(next);
+    const uint2 later = pair_at(i + 2 * stride);
+    function(i < n, pair, loaded, [&] { loaded = load(next_numbers); });
+    i += stride;
+    if (i - lane_number() >= n) return;
+    pair = next, next = later;
+  }
+}
+
 // All lanes must call.
 __device__ inline void append_pair(const PairList& list, u64* counter, bool wanted, uint2 pair) {
   const u64 at = warp_append(counter, wanted);

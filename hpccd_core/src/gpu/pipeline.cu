@@ -291,7 +291,7 @@ void DevicePipeline::launch_tree(LaunchParams<T>& params) {
   if (query_ == Query::contacts) launch_leaf_kdops(params, on_);
   timer_.mark("refit", on_);
   const auto traverse = of_snapshot(query_) ? traverse_kernel<true, T> : traverse_kernel<false, T>;
-  traverse<<<blocks_for(params.all_leaves(), traverse_warps), 32 * traverse_warps, 0, on_>>>(params);
+  traverse<<<blocks_for(params.all_leaves(), traverse_warps * traverse_leaves), 32 * traverse_warps, 0, on_>>>(params);
   check_launch("traverse_kernel");
   timer_.mark("traverse", on_);
   lists_.launch(query_, TestLists::From::leaves, params, multiprocessors_, on_, timer_);

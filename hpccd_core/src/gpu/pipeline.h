@@ -79,9 +79,9 @@ class Pipeline {
   // What the host has found of these.
   virtual void put_places(const std::vector<PairPlaces>& places) = 0;
 
-  // After run() of these positions, on this device, and finish(), of results that stay there: from now on enqueue() puts
-  // the same frame, of what the positions are then, on any stream. Lists and rows get room for so many times what this
-  // one needed.
+  // After run() of these positions, on this device, and finish(), of results that stay there: from now on enqueue()
+  // puts the same frame, of what the positions are then, on any stream. Lists and rows get room for so many times what
+  // this one needed.
   virtual PreparedResults prepare(Positions t0, Positions t1, double room) = 0;
   virtual void enqueue(void* stream) = 0;
 

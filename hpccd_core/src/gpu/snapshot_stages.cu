@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "gpu/candidates.cuh"
+#include "gpu/near_candidates.cuh"
 #include "gpu/snapshot.cuh"
 #include "gpu/stages.cuh"
 
@@ -9,10 +10,9 @@ template <class T>
 void launch_snapshot(Query query, const LaunchParams<T>& params, const Stages& stages) {
   constexpr unsigned threads = 32 * candidate_warps;
   if (query == Query::proximity) {
-    stages.persistent(candidates_kernel<Query::proximity, T>, threads, params, "candidates_kernel");
+    stages.persistent(near_candidates_kernel<T>, threads, params, "near_candidates_kernel");
     stages.mark("candidates");
-    stages.persistent(proximity_kernel<Kind::vertex_face, T>, 128, params, "proximity_kernel");
-    stages.persistent(proximity_kernel<Kind::edge_edge, T>, 128, params, "proximity_kernel");
+    stages.persistent(proximity_kernel<T>, proximity_threads, params, "proximity_kernel", 2);
     stages.mark("proximity");
   } else {
     stages.persistent(candidates_kernel<Query::intersections, T>, threads, params, "candidates_kernel");

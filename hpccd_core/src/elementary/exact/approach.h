@@ -79,7 +79,9 @@ HPCCD_HOST_DEVICE Approach approach_between_roots(const Query<Z>& q, const int l
 
 }  // namespace detail
 
-HPCCD_HOST_DEVICE inline std::int64_t time_of(double toc) { return static_cast<std::int64_t>(std::ldexp(toc, time_bits)); }
+HPCCD_HOST_DEVICE inline std::int64_t time_of(double toc) {
+  return static_cast<std::int64_t>(std::ldexp(toc, time_bits));
+}
 
 // Nothing where it stays open with integers of this size.
 template <class Z>
