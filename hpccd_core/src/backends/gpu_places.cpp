@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Points, normals and nearest points of what the GPU found.
+#include <algorithm>
+
 #include "backends/gpu_backend.h"
 #include "backends/gpu_worlds.h"
 #include "contacts/places.h"
@@ -26,7 +28,13 @@ DeviceResults GpuBackend::with_places(gpu::FrameResult found, Outputs outputs, c
   std::vector<PairPlaces> places(open->size());
   constexpr std::size_t rows_a_piece = 8;  // as of pairs that are left to the CPU
   parallel_for(shared_.pool, places.size(), rows_a_piece, [&](std::size_t begin, std::size_t end, int) {
-    for (std::size_t i = begin; i < end; ++i) places[i] = pair_places((*open)[i].pair, (*open)[i].toc, outputs);
+    for (std::size_t i = begin; i < end; ++i) {
+      const gpu::OpenRow& row = (*open)[i];
+      UndecidedPair pair{row.row < found.n_vf ? Kind::vertex_face : Kind::edge_edge, {}, {}, row.separation};
+      std::ranges::copy(row.t0, pair.t0);
+      std::ranges::copy(row.t1, pair.t1);
+      places[i] = pair_places(pair, row.toc, outputs);
+    }
   });
   pipeline_->put_places(places);
   places_on_cpu_ = places.size();

@@ -4,15 +4,16 @@
 
 #include <cstdint>
 
-#include "elementary/fallback.h"
+#include "elementary/motion.h"
 
 namespace hpccd::gpu {
 
-// A row whose places only integers can tell.
+// A row whose places only integers can tell. Words alone: what a struct's gaps hold nobody writes, and copies read it.
 struct OpenRow {
   std::uint64_t row;  // vertex-face, then edge-edge
-  double toc;
-  UndecidedPair pair;
+  double toc, separation;
+  Vec3<double> t0[4], t1[4];
 };
+static_assert(sizeof(OpenRow) == 8 * (3 + 2 * 4 * 3));
 
 }  // namespace hpccd::gpu

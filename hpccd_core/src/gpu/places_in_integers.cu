@@ -11,7 +11,7 @@ __global__ __launch_bounds__(32) void places_in_integers_kernel(const __grid_con
   const u64 n = length(task.n_open[0], task.open_capacity), n_warps = gridDim.x;
   for (u64 begin = 0; begin < n; begin += 32 * n_warps) {
     const u64 i = begin + lane_number() * n_warps + blockIdx.x;
-    const bool open = i < n && !find_places<ByFixedIntegers>(task.out, task.open[i]);
+    const bool open = i < n && !find_places<ByFixedIntegers>(task, task.open[i]);
     const u64 at = warp_append(task.n_open + 1, open);
     if (open) task.to_host[at] = task.open[i];
   }

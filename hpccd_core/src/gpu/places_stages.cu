@@ -45,11 +45,9 @@ __global__ __launch_bounds__(128) void places_kernel(const __grid_constant__ Lau
     if (i < n) {
       const uint4 v = vertices_of_row(params, task, i);
       const PairEnds q = load_pair_ends(params.vertices, v);
-      row.row = i, row.toc = task.tocs[i];
-      row.pair.kind = i < task.n_vf ? Kind::vertex_face : Kind::edge_edge;
-      row.pair.separation = separation_of(params, v.x, v.z);
-      for (int k = 0; k < 4; ++k) row.pair.t0[k] = q.t0[k], row.pair.t1[k] = q.t1[k];
-      open = !find_places<LeftOpen>(task.out, row);
+      row.row = i, row.toc = task.tocs[i], row.separation = separation_of(params, v.x, v.z);
+      for (int k = 0; k < 4; ++k) row.t0[k] = q.t0[k], row.t1[k] = q.t1[k];
+      open = !find_places<LeftOpen>(task, row);
     }
     const u64 at = warp_append(task.n_open, open);
     if (open && at < task.open_capacity) task.open[at] = row;

@@ -18,17 +18,16 @@ __device__ inline void write_places(const PlacesOut& out, u64 row, const PairPla
 template <class Arbiter, Kind kind>
 __device__ bool find_places(const PlacesOut& out, const OpenRow& row) {
   Arbiter arbiter;
-  const UndecidedPair& q = row.pair;
-  const PairPlaces places = pair_places<kind>(q.t0, q.t1, row.toc, q.separation, out.outputs, arbiter);
+  const PairPlaces places = pair_places<kind>(row.t0, row.t1, row.toc, row.separation, out.outputs, arbiter);
   if (!arbiter.open) write_places(out, row.row, places);
   return !arbiter.open;
 }
 
 // False where they stay open.
 template <class Arbiter>
-__device__ bool find_places(const PlacesOut& out, const OpenRow& row) {
-  return row.pair.kind == Kind::edge_edge ? find_places<Arbiter, Kind::edge_edge>(out, row)
-                                          : find_places<Arbiter, Kind::vertex_face>(out, row);
+__device__ bool find_places(const PlacesTask& task, const OpenRow& row) {
+  return row.row < task.n_vf ? find_places<Arbiter, Kind::vertex_face>(task.out, row)
+                             : find_places<Arbiter, Kind::edge_edge>(task.out, row);
 }
 
 }  // namespace hpccd::gpu

@@ -19,10 +19,12 @@ def _part(result: Kept, *parts: str) -> list[dict]:
 def ways(result: Kept) -> list[str]:
     lines = [
         [r["scene"], f"`{r['accuracy']}`", r["contacts"], r["host_median_ms"], r["to_host_median_ms"], r["median_ms"],
-         r["p95_ms"], r["graph_median_ms"]]
+         r["p95_ms"], r.get("graph_median_ms", "")]
         for r in _part(result, "device")
     ]  # fmt: skip
     columns = ["scene", "accuracy", "contacts", "host to host, ms", "device to host", "device to device", "p95", "graph"]
+    if not any(r.get("graph_median_ms") for r in _part(result, "device")):  # kept before graphs were measured
+        columns, lines = columns[:-1], [line[:-1] for line in lines]
     return markdown.table(columns, lines)
 
 
