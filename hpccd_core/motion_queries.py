@@ -80,7 +80,7 @@ class MotionQueries(Generic[OfMotion]):
         detect() does, and RuntimeError where the GPU fails: no CPU stands in.
         """
         if self.results != "device":
-            raise ValueError("results: prepare() leaves its results on the device; use a detector with results='device'")
+            raise ValueError("results: prepare() leaves results on the device; use a detector with results='device'")
         for name, vertices in (("vertices_t0", vertices_t0), ("vertices_t1", vertices_t1)):
             if not device_arrays.is_on_device(vertices):
                 raise TypeError(f"{name}: must be in the memory of the GPU, where it is read each time")

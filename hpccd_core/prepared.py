@@ -49,7 +49,7 @@ class PreparedDetection:
         self._core.enqueue(device_arrays.stream_number(stream) or 0)
 
     def contacts(self) -> DeviceContacts:
-        """Waits for the device; then the last detection, in these arrays. Raises RuntimeError where it is not complete."""
+        """Waits for the device; then the last detection, in these arrays. Raises RuntimeError if it is not complete."""
         return device_results.contacts_of(self._core.contacts(self._n_worlds))
 
     def __repr__(self) -> str:

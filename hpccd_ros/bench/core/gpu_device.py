@@ -69,10 +69,11 @@ def measure_large(report, args, sizes):
 def show(rows):
     table.show(
         "ms a call, by where positions and results lie",
-        ["scene", "accuracy", "triangles", "contacts", "CPU", "host to host", "device to host", "device", "p95", "best", "graph",
-         "bytes a triangle"],
+        ["scene", "accuracy", "triangles", "contacts", "CPU", "host to host", "device to host", "device", "p95", "best",
+         "graph", "bytes a triangle"],
         [[r["scene"], r["accuracy"], r["triangles"], r["contacts"], r["cpu_median_ms"], r["host_median_ms"],
-          r["to_host_median_ms"], r["median_ms"], r["p95_ms"], r["best_ms"], r["graph_median_ms"], r["bytes"] / r["triangles"]]
+          r["to_host_median_ms"], r["median_ms"], r["p95_ms"], r["best_ms"], r["graph_median_ms"],
+          r["bytes"] / r["triangles"]]
          for r in rows],
     )  # fmt: skip
     show_stages(rows)

@@ -22,7 +22,8 @@ def ways(result: Kept) -> list[str]:
          r["p95_ms"], r.get("graph_median_ms", "")]
         for r in _part(result, "device")
     ]  # fmt: skip
-    columns = ["scene", "accuracy", "contacts", "host to host, ms", "device to host", "device to device", "p95", "graph"]
+    columns = ["scene", "accuracy", "contacts", "host to host, ms", "device to host", "device to device", "p95",
+               "graph"]  # fmt: skip
     if not any(r.get("graph_median_ms") for r in _part(result, "device")):  # kept before graphs were measured
         columns, lines = columns[:-1], [line[:-1] for line in lines]
     return markdown.table(columns, lines)
