@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Detections whose work is known beforehand, so that a CUDA graph can hold it."""
 
+from typing import Any
+
 from . import _core, device_arrays, device_results
 from ._core import DeviceArray
 from .device_results import DeviceContacts
@@ -50,7 +52,8 @@ class PreparedDetection:
 
     def contacts(self) -> DeviceContacts:
         """Waits for the device; then the last detection, in these arrays. Raises RuntimeError if it is not complete."""
-        return device_results.contacts_of(self._core.contacts(self._n_worlds))
+        found: Any = self._core.contacts(self._n_worlds)
+        return device_results.contacts_of(found)
 
     def __repr__(self) -> str:
         return f"PreparedDetection(room for {len(self.vf)} vertex-face, {len(self.ee)} edge-edge)"

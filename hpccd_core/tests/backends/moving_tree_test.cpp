@@ -49,8 +49,22 @@ struct Trees {
   ThreadPool pool{1};
   Features features = features_of(*scene);
   MovingTree moving{*scene, features, pool};
-  TreeBudget budget;
+  // As of so many worlds that there is no room for a tree each.
+  TreeBudget budget{std::size_t{1} << 30};
   Profiler profiler;
+};
+
+struct RoomyTrees : Trees {
+  RoomyTrees() : budget_for_all{3} {}
+  std::uint64_t ask(OwnTree& own, const std::vector<double>& positions) {
+    moving.begin_world(own, budget_for_all, false);
+    moving.bound(test::view(positions), test::view(positions), {});
+    moving.fit(profiler);
+    const std::uint64_t number = moving.number();
+    moving.end_world();
+    return number;
+  }
+  TreeBudget budget_for_all;
 };
 
 const std::vector<double> flat = pose(1);
@@ -105,6 +119,23 @@ TEST(MovingTree, WithoutRoomTheCommonOneIsBuiltAnew) {
   trees.budget.give_back(all);
   trees.ask(a, pose(1));
   EXPECT_TRUE(a.kept);
+}
+
+// How large a tree is, the first one tells, which its world gives up for one of its own.
+TEST(MovingTree, WhereThereIsRoomEachWorldKeepsItsOwn) {
+  RoomyTrees trees;
+  OwnTree a, b, c;
+  trees.ask(a, pose(1));
+  const auto of_b = trees.ask(b, pose(2)), of_c = trees.ask(c, flat), of_a = trees.ask(a, pose(1));
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_EQ(trees.ask(b, pose(2)), of_b);
+    EXPECT_EQ(trees.ask(c, pose(1, 0.5)), of_c);
+    EXPECT_EQ(trees.ask(a, pose(1)), of_a);
+  }
+  const auto anew = trees.ask(b, pose(1));  // worn out: another one of its own
+  EXPECT_NE(anew, of_b);
+  EXPECT_NE(anew, of_a);
+  EXPECT_EQ(trees.ask(b, pose(1)), anew);
 }
 
 TEST(MovingTree, AlwaysItsOwn) {

@@ -37,6 +37,10 @@ class CpuAsGpu(hc.Detector):
     def proximity(self, vertices, distance, stream=None):
         return self._there(super().proximity(vertices, distance))
 
+    def prepare(self, start, end):
+        found = types.SimpleNamespace(hash=self.detect(start, end).hash)
+        return types.SimpleNamespace(enqueue=lambda stream: None, contacts=lambda: found)
+
     def _there(self, found):
         if not self._device:
             return found
@@ -58,6 +62,9 @@ class OnHost:
 
     def stream(self):
         return 1
+
+    def graph(self, enqueue, stream):
+        return lambda: enqueue(stream)
 
 
 @pytest.fixture
@@ -83,7 +90,7 @@ def test_results_on_the_device(bench, device):
     assert [(row["part"], row["accuracy"]) for row in result["rows"]] == [("device", "balanced"), ("device", "exact")]
     for row in result["rows"]:
         assert row["candidates"] > 0 and row["bytes"] == 7000
-        assert min(row[f"{key}_ms"] for key in ("cpu_median", "host_median", "to_host_median", "median")) > 0
+        assert min(row[f"{key}_ms"] for key in ("cpu_median", "host_median", "to_host_median", "median", "graph_median")) > 0
         assert row["stages_ms"] == {"gpu/bounds": 0.5, "gpu/upload": 0.25}
         assert row["floors"]["bounds"]["ms"] > 0
 
@@ -105,7 +112,7 @@ def test_another_answer_fails(bench, device, monkeypatch):
     status, result, _ = bench("gpu", "--parts", "large,worlds", "--sizes", "8", "--worlds", "2", "--repeat", "5")
     assert status == 1
     assert [text.split(":")[0] for text in result["failures"]] == [
-        "large, nets 8, exact, device", "worlds, detect in 2", "worlds, proximity in 2",
+        "large, nets 8, exact, device", "large, nets 8, exact, graph", "worlds, detect in 2", "worlds, proximity in 2",
     ]  # fmt: skip
 
 
