@@ -42,6 +42,10 @@ class _OnDevice:
         arrays: dict[str, Any] = {name: empty if a is None else a.to_host() for name, a in self.slices.items()}
         return Slices(**arrays)
 
+    def read_slices(self) -> None:
+        """Where the rows of each world begin, now rather than when they are first asked for."""
+        _ = self._slices_on_host
+
     def _world_number(self, k: int) -> int:
         of_worlds = self._slices_on_host
         return arguments.whole_number("world", k, 0, 0 if of_worlds is None else len(of_worlds.hashes) - 1)

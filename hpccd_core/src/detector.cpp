@@ -262,7 +262,7 @@ std::unique_ptr<PreparedDetection> Detector::prepare(Positions t0, Positions t1,
   GpuBackend::Prepared p = impl_->backends.gpu().prepare(t0, t1, room);
   impl_->shared.profiler.end();
   auto prepared = std::make_unique<PreparedDetection::Impl>();
-  *prepared = {impl_, std::move(p.pipeline), std::move(p.results)};
+  prepared->detector = impl_, prepared->pipeline = std::move(p.pipeline), prepared->results = std::move(p.results);
   return std::unique_ptr<PreparedDetection>(new PreparedDetection(std::move(prepared)));
 }
 

@@ -16,6 +16,7 @@ std::string why_incomplete(std::uint64_t state) {
   if (state & PreparedCounts::no_room) why += "; it needs more room than the motion it was prepared for";
   if (state & PreparedCounts::left_to_cpu) why += "; some of its pairs are for the CPU's integers";
   if (state & PreparedCounts::bad_coordinates) why += "; a coordinate is NaN, infinite or too large";
+  if (state & PreparedCounts::too_many_of_one) why += "; one of its features touches more than 2,048 others";
   return why;
 }
 
@@ -24,18 +25,22 @@ std::string why_incomplete(std::uint64_t state) {
 PreparedDetection::PreparedDetection(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 PreparedDetection::~PreparedDetection() = default;
 
-void PreparedDetection::enqueue(void* stream) { impl_->pipeline->enqueue(stream); }
+void PreparedDetection::enqueue(void* stream) {
+  const std::lock_guard lock(impl_->one_call);
+  impl_->pipeline->enqueue(stream);
+}
 
 const PreparedResults& PreparedDetection::results() const { return impl_->results; }
 
 DeviceResults PreparedDetection::contacts() const {
+  const std::lock_guard lock(impl_->one_call);
   const PreparedResults& p = impl_->results;
   PreparedCounts c;
   gpu::download(p.counts, &c, sizeof c);
   if (c.state != PreparedCounts::complete)
-    throw std::runtime_error(
-        "the last detection is not complete" + why_incomplete(c.state) +
-        "; detect() answers any motion, and prepare() with that one, or with more room, makes room");
+    throw std::runtime_error("the last detection is not complete" + why_incomplete(c.state) +
+                             ". detect() answers any motion; where room is all that lacks, prepare() with that motion, "
+                             "or with more room");
   DeviceResults r;
   r.memory = p.memory, r.device = p.device;
   r.n_vf = c.vertex_face, r.n_ee = c.edge_edge;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <mutex>
 
 #include "gpu/pipeline.h"
 #include "hpccd/prepared.h"
@@ -9,6 +10,7 @@
 namespace hpccd {
 
 struct PreparedDetection::Impl {
+  std::mutex one_call;
   std::shared_ptr<const void> detector;  // whose scene and rules the pipeline reads
   std::unique_ptr<gpu::Pipeline> pipeline;
   PreparedResults results;

@@ -227,6 +227,37 @@ def test_many_small_worlds():
     assert detector.stats["bytes"] < 8192 * 5000  # with a tree each
 
 
+@pytest.mark.parametrize("report", ("all", "first"))
+def test_what_is_near_is_known_but_no_tree_is_there_yet(report):
+    """A world takes what it remembers along to any thread, and has a tree of its own only after its first search. Which
+    world meets which thread is chance: many detectors."""
+    side = np.arange(25).reshape(5, 5)
+    a, b, c, d = side[:-1, :-1].ravel(), side[1:, :-1].ravel(), side[:-1, 1:].ravel(), side[1:, 1:].ravel()
+    faces = np.concatenate([np.stack([a, b, d], axis=1), np.stack([a, d, c], axis=1)])
+    x, y = np.meshgrid(np.linspace(0, 1, 5), np.linspace(0, 1, 5))
+    sheet = np.stack([x.ravel(), y.ravel(), 0 * x.ravel()], axis=1)
+    scene = hc.Scene()
+    scene.add_mesh("falls", faces, self_collision=False)
+    scene.add_mesh("ground", faces, static=True)
+    start = np.tile(np.concatenate([sheet + [0.01, 0.013, 0.2], sheet]), (16, 1, 1))
+
+    def fallen(by):
+        end = start.copy()
+        end[:, :25, 2] -= by
+        return end
+
+    for _ in range(60):
+        detector = hc.Detector(scene, backend="cpu", worlds=16, threads=7, report=report)
+
+        def first(end, detector=detector):
+            if report == "first":
+                return detector.detect(start, end).first_tocs
+            return detector.collision_free_step(start, end)
+
+        first(fallen(1e-4)), first(fallen(1e-4))
+        assert first(fallen(0.4)).max() <= 0.5
+
+
 def test_without_worlds_an_answer_is_of_one():
     worlds = many_worlds.crumpled(1)
     one, single = worlds.detector(), hc.Detector(worlds.scene, backend="cpu")

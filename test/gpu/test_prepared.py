@@ -87,9 +87,11 @@ def test_a_separation_is_that_of_the_preparation():
     detector = hc.Detector(scene, backend="gpu", results="device", minimum_separation=0.05)
     ends = [cupy.asarray(t) for t in (t0, t1)]
     detection = detector.prepare(*ends)
-    detector.set_separation(0, 0, 0.2)
-    detection.enqueue()
-    assert_same(detection.contacts(), cpu.detect(t0, t1))
+    for later in (0.2, 0.0):
+        detector.set_separation(0, 0, later)
+        detector.detect(*ends)
+        detection.enqueue()
+        assert_same(detection.contacts(), cpu.detect(t0, t1))
 
 
 def test_too_little_room_is_told_and_gives_no_rows():
@@ -109,6 +111,16 @@ def test_too_little_room_is_told_and_gives_no_rows():
     assert len(detection.contacts()) == 0
 
 
+def test_worlds_have_no_rows_either_where_there_is_too_little_room():
+    scene, t0, t1 = garments(5, n=40)
+    detection, ends = prepared(scene, t0, t0, room=1, worlds=5)
+    ends[1].set(5 * t1[:, ::-1].copy())
+    detection.enqueue()
+    assert detection.counts.to_host().tolist() == [0, 0, 1]
+    assert not detection.vf_offsets.to_host().any() and not detection.ee_offsets.to_host().any()
+    assert np.isinf(detection.first_tocs.to_host()).all()
+
+
 def test_what_needs_the_cpu_is_told():
     rng = np.random.default_rng(300)
     faces, t0, t1 = scenes.lattice(rng, 20)
@@ -123,8 +135,8 @@ def test_what_needs_the_cpu_is_told():
 def test_many_pairs_of_one_feature_are_no_matter_of_room():
     scene, t0, t1 = needle_through_plates(3000)
     detection, _ = prepared(scene, t0, t1)
-    assert detection.counts.to_host()[2] == 1
-    with pytest.raises(RuntimeError):
+    assert detection.counts.to_host().tolist() == [0, 0, 8]
+    with pytest.raises(RuntimeError, match="2,048"):
         detection.contacts()
 
 

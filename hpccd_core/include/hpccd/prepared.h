@@ -21,6 +21,7 @@ struct PreparedCounts {
   static constexpr std::uint64_t no_room = 1;          // some list was too short
   static constexpr std::uint64_t left_to_cpu = 2;      // some pairs are for the CPU's integers
   static constexpr std::uint64_t bad_coordinates = 4;  // NaN, infinite, or too large
+  static constexpr std::uint64_t too_many_of_one = 8;  // one feature touches more than 2,048 others: room is no help
 };
 
 // Where it writes: the same places each time. All pointers but `memory` are to the device's memory.
@@ -32,13 +33,13 @@ struct PreparedResults {
   const std::array<std::uint32_t, 4>* ee = nullptr;
   const double* tocs = nullptr;  // of the vertex-face rows there are, then of the others
   const PreparedCounts* counts = nullptr;
-  // Of several worlds, else null: as in DeviceResults.
+  // Of several worlds, else null: as in DeviceResults; of no rows unless it is complete.
   const std::uint64_t *vf_offsets = nullptr, *ee_offsets = nullptr, *hashes = nullptr;
   const double* first_tocs = nullptr;
 };
 
-// Made by Detector::prepare, whose options and separations of that time it keeps; it may outlive the detector. One
-// thread at a time.
+// Made by Detector::prepare, whose options and separations of that time it keeps; it may outlive the detector, and must
+// outlive the graphs that hold it. Calls of several threads wait for each other.
 class PreparedDetection {
  public:
   ~PreparedDetection();
@@ -47,8 +48,8 @@ class PreparedDetection {
 
   // Puts one detection, of what the positions are then, on a cudaStream_t of the device; or into the graph that the
   // stream is captured into. Does not wait, allocates nothing, never asks the CPU. All of them write to the same
-  // places: one after the other. Throws InvalidArgument for a stream that is none of this device, std::runtime_error
-  // where the device fails.
+  // places: one after the other. Throws InvalidArgument for what CUDA knows as no stream, std::runtime_error where the
+  // device fails, or the stream is another device's.
   void enqueue(void* stream);
   const PreparedResults& results() const;
   // Waits for the device; then the results of the last one, in place. Throws std::runtime_error where it was not

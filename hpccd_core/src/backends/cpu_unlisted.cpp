@@ -96,8 +96,10 @@ void join_found(FoundContacts found, double earliest, std::vector<Worker>& worke
 
 }  // namespace
 
-// After the pairs of the list: what it leaves open. False where that is too much, or there is no list.
+// After the pairs of the list: what it leaves open. False where that is too much, where there is no list, or no tree to
+// look with: a world takes its list along to whatever thread's tree is there.
 bool CpuBackend::known_from_the_unlisted(bool time_only) {
+  if (!shared_.tree.built()) return false;
   if (!near_.radius().known() || near_.snapshot().size() != shared_.tree.motion().vertices.size()) return false;
   see_drift();
   drift_.listed_within(near_.radius().listed(), shared_.separations.most());

@@ -118,15 +118,21 @@ void GpuBackend::require_rest(Positions t0, Positions t1) const {
   each_world([&](std::size_t k) { require_static_meshes_rest(*shared_.scene, of_world(t0, k), of_world(t1, k)); });
 }
 
-// f(world), whose errors name the world where there are several.
+// f(), whose errors name the world where there are several.
+template <class Function>
+void GpuBackend::in_world(std::size_t world, Function&& f) const {
+  try {
+    f();
+  } catch (const InvalidArgument& error) {
+    if (n_worlds() == 1) throw;
+    throw InvalidArgument(with_world(error.what(), world));
+  }
+}
+
+// f(world), likewise.
 template <class Function>
 void GpuBackend::each_world(Function&& f) const {
-  for (std::size_t k = 0; k < n_worlds(); ++k) try {
-      f(k);
-    } catch (const InvalidArgument& error) {
-      if (n_worlds() == 1) throw;
-      throw InvalidArgument(with_world(error.what(), k));
-    }
+  for (std::size_t k = 0; k < n_worlds(); ++k) in_world(k, [&] { f(k); });
 }
 
 void GpuBackend::prepare_motion(Positions t0, Positions t1, bool until_best) {
@@ -294,7 +300,7 @@ void GpuBackend::prepare(Boxes boxes, Bound&& bound) {
   last_boxes_ = boxes;
   if (has_tree_ && !worn) return;
   has_tree_ = false;  // should this fail
-  bound();
+  in_world(0, bound);
   shared_.tree.build_anew();
   edge_ = typical_length(shared_.features, shared_.tree.motion().vertices);
   pipeline_->set_tree(shared_.tree.tree());

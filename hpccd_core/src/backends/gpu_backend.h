@@ -67,6 +67,8 @@ class GpuBackend final : public DetectionBackend {
     return hpccd::of_world(all, shared_.features.n_vertices, world);
   }
   template <class Function>
+  void in_world(std::size_t world, Function&& f) const;
+  template <class Function>
   void each_world(Function&& f) const;
   std::size_t world_of(const Candidate& pair) const;
   Candidate in_its_world(Candidate pair) const;

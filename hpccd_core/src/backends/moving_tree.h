@@ -68,6 +68,8 @@ class MovingTree {
   void begin_world(OwnTree& own, TreeBudget& budget, bool always);
   void end_world();
 
+  // Whether there is a tree at all: a world's own is there from its first search on.
+  bool built() const { return kept_.built; }
   const MotionBounds& motion() const { return motion_; }
   const Tree& tree() const { return kept_.tree; }
   // Another one for each tree of this process: the leaves are those of the last look where this is.

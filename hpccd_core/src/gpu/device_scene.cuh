@@ -48,11 +48,12 @@ class DeviceScene {
     params.keys = keys_;
   }
 
-  // What a frame of motions looks for.
-  Query query_now() const { return separations_.any() ? Query::separations : Query::contacts; }
+  // What a frame of motions looks for, by the separations of the last update_separations().
+  Query query_now() const { return any_separation_ ? Query::separations : Query::contacts; }
   bool all_fast() const { return all_fast_; }  // all that is tested
   // Brings the separations to the device, where they have changed; to be called before a frame of motions.
   void update_separations() {
+    any_separation_ = separations_.any();
     if (!separations_.any() || separations_.version() == uploaded_) return;
     uploaded_ = 0;  // none, should this fail
     upload(pair_separation_, separations_.all().data(), separations_.all().size());
@@ -113,6 +114,7 @@ class DeviceScene {
   const SeparationTable& separations_;
   const u32 n_worlds_;
   std::uint64_t uploaded_ = 0;  // version of the separations there
+  bool any_separation_ = false;
   DeviceBuffer<uint2> edges_;
   DeviceBuffer<u32> faces_, mesh_of_vertex_;
   DeviceBuffer<unsigned char> enabled_, accuracy_, tested_;

@@ -382,6 +382,7 @@ void DevicePipeline::enqueue_frame() {
   const ResultPlaces to = contacts_.places();
   LaunchParams<T> params{};
   if (tree_.empty()) {
+    params.n_worlds = options_.worlds;
     motion_.fill_counters(params, counters_.data());
     check(cudaMemsetAsync(counters_.data(), 0, sizeof(Counters), on_), "cudaMemsetAsync");
     contacts_.find_nothing(on_);
@@ -393,11 +394,12 @@ void DevicePipeline::enqueue_frame() {
     launch_results(params);
   }
   const TestLists::Sizes s = lists_.sizes();
-  tell_kernel<<<1, 1, 0, on_>>>(params,
-                                {leaf_pairs_.size(), std::min(s.survivors[0], s.survivors[1]),
-                                 std::min(s.single[0], s.single[1]), std::min(s.many[0], s.many[1]),
-                                 std::min(s.separated[0], s.separated[1]), s.undecided, s.open, contacts_.capacity()},
-                                to, told_of_prepared_->data());
+  tell_kernel<<<blocks_for(options_.worlds + 1, 256), 256, 0, on_>>>(
+      params,
+      {leaf_pairs_.size(), std::min(s.survivors[0], s.survivors[1]), std::min(s.single[0], s.single[1]),
+       std::min(s.many[0], s.many[1]), std::min(s.separated[0], s.separated[1]), s.undecided, s.open,
+       contacts_.capacity()},
+      to, told_of_prepared_->data());
   check_launch("tell_kernel");
 }
 

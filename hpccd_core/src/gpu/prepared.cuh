@@ -20,10 +20,18 @@ __global__ void tell_kernel(const __grid_constant__ LaunchParams<T> params, cons
   const bool too_long = c.leaf_pairs > room.leaf_pairs || c.most_survivors > room.survivors ||
                         c.most_single > room.single || c.most_many > room.many || c.most_separated > room.separated ||
                         c.undecided > room.undecided || c.open_in_integers[0] > room.open || c.found_all > room.found ||
-                        !fit<false>(c, to) || c.most_of_a_feature > most_of_a_feature;
+                        !fit<false>(c, to);
   const u64 state = (too_long ? PreparedCounts::no_room : 0) | (c.to_host ? PreparedCounts::left_to_cpu : 0) |
-                    (c.bad ? PreparedCounts::bad_coordinates : 0);
+                    (c.bad ? PreparedCounts::bad_coordinates : 0) |
+                    (c.most_of_a_feature > most_of_a_feature ? PreparedCounts::too_many_of_one : 0);
   const bool good = state == PreparedCounts::complete;
+  const u32 k = blockIdx.x * blockDim.x + threadIdx.x;
+  // Who trusts the offsets of worlds must find no rows either.
+  if (!good && params.n_worlds > 1 && k <= params.n_worlds) {
+    to.vf_offsets[k] = to.ee_offsets[k] = 0;
+    if (k < params.n_worlds) to.hashes[k] = 0, to.first_tocs[k] = INFINITY;
+  }
+  if (k > 0) return;
   told->vertex_face = good ? c.rows[0] : 0, told->edge_edge = good ? c.rows[1] : 0, told->state = state;
   told->hash = good ? c.world.hash : 0;
   const u64 soonest = c.world.first_toc;

@@ -90,7 +90,8 @@ def test_results_on_the_device(bench, device):
     assert [(row["part"], row["accuracy"]) for row in result["rows"]] == [("device", "balanced"), ("device", "exact")]
     for row in result["rows"]:
         assert row["candidates"] > 0 and row["bytes"] == 7000
-        assert min(row[f"{key}_ms"] for key in ("cpu_median", "host_median", "to_host_median", "median", "graph_median")) > 0
+        medians = ("cpu_median", "host_median", "to_host_median", "median", "graph_median")
+        assert min(row[f"{key}_ms"] for key in medians) > 0
         assert row["stages_ms"] == {"gpu/bounds": 0.5, "gpu/upload": 0.25}
         assert row["floors"]["bounds"]["ms"] > 0
 
@@ -112,7 +113,8 @@ def test_another_answer_fails(bench, device, monkeypatch):
     status, result, _ = bench("gpu", "--parts", "large,worlds", "--sizes", "8", "--worlds", "2", "--repeat", "5")
     assert status == 1
     assert [text.split(":")[0] for text in result["failures"]] == [
-        "large, nets 8, exact, device", "large, nets 8, exact, graph", "worlds, detect in 2", "worlds, proximity in 2",
+        "large, nets 8, exact, device", "large, nets 8, exact, graph", "worlds, detect in 2",
+        "worlds, proximity in 2",
     ]  # fmt: skip
 
 
