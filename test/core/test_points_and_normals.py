@@ -73,3 +73,21 @@ def test_degenerate_features_give_no_nan():
         assert np.isfinite(c.points).all() and np.isfinite(c.normals).all()
         length = np.linalg.norm(c.normals, axis=1)
         assert (np.isclose(length, 1, atol=1e-9) | (length == 0)).all()
+
+
+def test_signs_of_zeros_do_not_outlast_their_frame():
+    """A static mesh that came with -0 at one end and 0 at the other is not the one that has -0 at both."""
+    scene = hc.Scene()
+    scene.add_mesh("falls", np.array([[0, 1, 2]]))
+    scene.add_mesh("rests", np.array([[0, 1, 2]]), static=True)
+    falls = np.array([[-5.0, -5, 2], [5, -5, 2], [0, 5, 2]])
+    rests = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])
+    minus = rests.copy()
+    minus[0, :2] = -0.0
+    options = {"backend": "cpu", "threads": 1, "outputs": ("closest", "points")}
+    end = falls - [0, 0, 1.5]
+    detector = hc.Detector(scene, **options)
+    detector.detect(np.vstack([falls, minus]), np.vstack([end, rests]))
+    again = np.vstack([falls, minus]), np.vstack([end, minus])
+    found, alone = detector.detect(*again), hc.Detector(scene, **options).detect(*again)
+    assert found.points.tobytes() == alone.points.tobytes() and found.closest.tobytes() == alone.closest.tobytes()

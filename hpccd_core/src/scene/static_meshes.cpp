@@ -67,6 +67,8 @@ std::vector<char> StaticMeshes::unchanged(const Scene& scene, Positions t0, Posi
     resize(last_[m], bytes_of(meshes[m].n_vertices, t0), pool.cancellation());
     parallel_for(pool, last_[m].size(), 1 << 16,
                  [&](std::size_t begin, std::size_t end, int) { std::copy(all + begin, all + end, &last_[m][begin]); });
+    // Where the ends differ in signs of zeros, boxes and places have those of one of them: the next frame begins anew.
+    if (!equal(last_[m], all, begin_of(meshes[m], t1), pool)) last_[m].clear();
   }
   return same;
 }
