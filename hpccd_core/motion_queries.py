@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _core, arguments, device_arrays, device_results
+from ._core import Positions
 from .answers import OfMotion
 from .contacts import Contacts
 from .device_arrays import DeviceArrayLike, DevicePositions
@@ -85,14 +86,8 @@ class MotionQueries(Generic[OfMotion]):
             if not device_arrays.is_on_device(vertices):
                 raise TypeError(f"{name}: must be in the memory of the GPU, where it is read each time")
         room = arguments.length("room", room)
-        made_on = device_arrays.stream_number(stream)
-        first, second = (
-            device_arrays.positions(name, vertices, self._shape, made_on)
-            for name, vertices in (("vertices_t0", vertices_t0), ("vertices_t1", vertices_t1))
-        )
-        if first.is_double != second.is_double:
-            raise TypeError("vertices_t0, vertices_t1: device arrays must both be float32 or both be float64")
-        prepared = self._core.prepare(first.for_core(self._rows), second.for_core(self._rows), room)
+        ends = self._places(vertices_t0, vertices_t1, device_arrays.stream_number(stream))
+        prepared = self._core.prepare(*self._for_core(*ends), room)
         return PreparedDetection(prepared, self.worlds, (vertices_t0, vertices_t1))
 
     def _asked(self, query: str) -> str:
@@ -105,11 +100,7 @@ class MotionQueries(Generic[OfMotion]):
         on_device = [device_arrays.is_on_device(v) for v in (vertices_t0, vertices_t1)]
         made_on = device_arrays.stream_number(stream)
         if all(on_device):
-            first, second = (
-                device_arrays.positions(name, vertices, self._shape, made_on)
-                for name, vertices in (("vertices_t0", vertices_t0), ("vertices_t1", vertices_t1))
-            )
-            return self._of_places(query, first, second)
+            return self._of_places(query, *self._places(vertices_t0, vertices_t1, made_on))
         if any(on_device):
             raise TypeError("vertices_t0, vertices_t1: one is a device array, the other is not; give both in one place")
         start = arguments.vertices("vertices_t0", vertices_t0, self._shape)
@@ -118,7 +109,18 @@ class MotionQueries(Generic[OfMotion]):
             start, end = start.astype(np.float64), end.astype(np.float64)
         return getattr(self._core, query)(*(device_arrays.on_host(end, made_on) for end in (start, end)))
 
+    def _places(
+        self, vertices_t0: object, vertices_t1: object, made_on: int | None
+    ) -> tuple[DevicePositions, DevicePositions]:
+        return (
+            device_arrays.positions("vertices_t0", vertices_t0, self._shape, made_on),
+            device_arrays.positions("vertices_t1", vertices_t1, self._shape, made_on),
+        )
+
     def _of_places(self, query: str, first: DevicePositions, second: DevicePositions) -> Any:
+        return getattr(self._core, query)(*self._for_core(first, second))
+
+    def _for_core(self, first: DevicePositions, second: DevicePositions) -> tuple[Positions, Positions]:
         if first.is_double != second.is_double:
             raise TypeError("vertices_t0, vertices_t1: device arrays must both be float32 or both be float64")
-        return getattr(self._core, query)(first.for_core(self._rows), second.for_core(self._rows))
+        return first.for_core(self._rows), second.for_core(self._rows)

@@ -34,7 +34,9 @@ std::vector<double> pose(unsigned number, double shifted = 0) {
   return positions;
 }
 
+// As of so many worlds that there is no room for a tree each, unless the number says otherwise.
 struct Trees {
+  explicit Trees(std::size_t n_worlds = std::size_t{1} << 30) : budget(n_worlds) {}
   // A query of this world. Returns the number of the tree that served it.
   std::uint64_t ask(OwnTree& own, const std::vector<double>& positions, bool always = false) {
     moving.begin_world(own, budget, always);
@@ -49,22 +51,8 @@ struct Trees {
   ThreadPool pool{1};
   Features features = features_of(*scene);
   MovingTree moving{*scene, features, pool};
-  // As of so many worlds that there is no room for a tree each.
-  TreeBudget budget{std::size_t{1} << 30};
+  TreeBudget budget;
   Profiler profiler;
-};
-
-struct RoomyTrees : Trees {
-  RoomyTrees() : budget_for_all{3} {}
-  std::uint64_t ask(OwnTree& own, const std::vector<double>& positions) {
-    moving.begin_world(own, budget_for_all, false);
-    moving.bound(test::view(positions), test::view(positions), {});
-    moving.fit(profiler);
-    const std::uint64_t number = moving.number();
-    moving.end_world();
-    return number;
-  }
-  TreeBudget budget_for_all;
 };
 
 const std::vector<double> flat = pose(1);
@@ -123,7 +111,7 @@ TEST(MovingTree, WithoutRoomTheCommonOneIsBuiltAnew) {
 
 // How large a tree is, the first one tells, which its world gives up for one of its own.
 TEST(MovingTree, WhereThereIsRoomEachWorldKeepsItsOwn) {
-  RoomyTrees trees;
+  Trees trees(3);
   OwnTree a, b, c;
   trees.ask(a, pose(1));
   const auto of_b = trees.ask(b, pose(2)), of_c = trees.ask(c, flat), of_a = trees.ask(a, pose(1));
