@@ -4,6 +4,7 @@
 import sys
 from pathlib import Path
 
+import cupy
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -92,6 +93,22 @@ for worlds in (None, 3):
     found = hc.Detector(scene, backend="gpu", worlds=worlds, results="device").detect(start, end)
     if found.hash != expected.hash:
         sys.exit(f"needle, {worlds} worlds: contacts differ")
+
+# Detections that are prepared, on a stream of the caller's: of one world and of three, with room and without.
+for worlds in (None, 3):
+    scene, t0, t1 = sheet if worlds is None else device_results.garments(3, n=7)
+    ends = [cupy.asarray(t) for t in (t0, t1)]
+    cupy.cuda.Device().synchronize()
+    detection = hc.Detector(scene, backend="gpu", worlds=worlds, results="device").prepare(*ends, room=1)
+    for part in (1, 0.5):
+        ends[1].set(t0 + part * (t1 - t0))
+        detection.enqueue()
+        expected = hc.Detector(scene, backend="cpu", worlds=worlds).detect(t0, ends[1].get())
+        if detection.contacts().hash != expected.hash:
+            sys.exit(f"prepared, {worlds} worlds: contacts differ")
+    ends[1].set(np.float32(30) * t1[..., ::-1, :] if worlds else 30 * t1[::-1])
+    detection.enqueue()
+    print("prepared", worlds, detection.counts.to_host())
 
 # Coordinates of so many bits that the CPU decides: what it finds is added on the device.
 rng = np.random.default_rng(300)

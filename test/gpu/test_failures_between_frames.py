@@ -131,6 +131,42 @@ def test_bad_coordinates_between_failures():
         assert_same(detector.detect(t0, t1), expected)
 
 
+@pytest.mark.parametrize("worlds", (None, 3))
+def test_every_call_of_a_preparation_may_fail(worlds):
+    scene, t0, t1 = garments(3, n=8) if worlds else sheet()
+    expected = hc.Detector(scene, backend="cpu", worlds=worlds).detect(t0, t1)
+    ends = [cupy.asarray(t) for t in (t0, t1)]
+    cupy.cuda.Device().synchronize()
+    detector = hc.Detector(scene, backend="gpu", threads=2, results="device", worlds=worlds)
+    for n in range(1, 600):
+        _core.gpu_fail_after(n)
+        try:
+            detection = detector.prepare(*ends)
+            failed = False
+        except RuntimeError as error:
+            assert "asked for by a test" in str(error)
+            failed = True
+        _core.gpu_fail_after(0)
+        assert_same(detector.detect(*ends), expected)
+        assert detector.backend == "gpu"
+        if not failed:
+            break
+    assert 30 < n < 599
+    assert_same(detection.contacts(), expected)
+    for n in range(1, 100):
+        _core.gpu_fail_after(n)
+        try:
+            detection.enqueue()
+            break
+        except RuntimeError as error:
+            assert "asked for by a test" in str(error)
+        finally:
+            _core.gpu_fail_after(0)
+        detection.enqueue()
+        assert_same(detection.contacts(), expected)
+    assert 10 < n < 99
+
+
 def all_memory():
     """Takes what there is, down to a few pieces of 1 MiB that the driver may keep for itself."""
     taken, size = [], cupy.cuda.runtime.memGetInfo()[0]

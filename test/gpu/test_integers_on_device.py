@@ -91,3 +91,16 @@ def test_coordinates_of_many_bits(spread):
         faces, t0, t1 = scenes.lattice(np.random.default_rng(seed), 20)
         small = rng.integers(-3, 4, t0.shape) * 2.0**-spread
         assert_same(*of_one(faces, t0, np.where(rng.random(t1.shape) < 0.2, small, t1)))
+
+
+def test_no_pair_is_lost_in_many_frames():
+    """Where whole warps were asked behind code as deep as that of integers, one in 100 frames lost pairs."""
+    rng = np.random.default_rng(100)
+    faces, t0, t1 = scenes.lattice(np.random.default_rng(0), 20)
+    small = rng.integers(-3, 4, t0.shape) * 2.0**-100
+    scene, t0, t1 = of_one(faces, t0, np.where(rng.random(t1.shape) < 0.2, small, t1))
+    expected = hc.Detector(scene, backend="cpu").detect(t0, t1)
+    detector = hc.Detector(scene, backend="gpu")
+    for _ in range(200):
+        assert detector.detect(t0, t1).hash == expected.hash
+        assert detector.stats["gpu_fallbacks"] == 0, detector.last_gpu_error

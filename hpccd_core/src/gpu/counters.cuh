@@ -4,7 +4,9 @@
 
 #include <cstdint>
 
+#include "base/hd.h"
 #include "elementary/batch.h"
+#include "gpu/device.h"
 
 namespace hpccd::gpu {
 
@@ -46,6 +48,18 @@ struct Counters {
   u64 listed[2];
   double area;
 };
+
+// Whether each pair that the error bounds left open was decided by someone, or goes to the CPU; of motions, where no
+// list was too short. If it is not so, the device has lost pairs.
+HPCCD_HD bool books_balance(const Counters& c) {
+  u64 settled = c.to_host;
+  for (int k = 0; k < 2; ++k) settled += c.by_tolerance[k] + c.by_extended[k] + c.by_integers[k];
+  return settled == c.undecided && c.found[0] + c.found[1] == c.found_all;
+}
+
+inline void require_balance(const Counters& c) {
+  if (!books_balance(c)) throw Error("the device has lost pairs that it had to decide; please report it");
+}
 
 // Where the pairs of one kind went; on the host.
 inline BatchCounts batch_counts(const Counters& c, int kind) {

@@ -7,6 +7,7 @@
 #include "elementary/exact/earliest.h"
 #include "elementary/exact/given_motion.h"
 #include "gpu/best_time.cuh"
+#include "gpu/own_item.cuh"
 #include "gpu/pair_ends.cuh"
 
 namespace hpccd::gpu {
@@ -21,33 +22,40 @@ __device__ exact::Answer decide_in_integers(Kind kind, const PairEnds& q) {
   return exact::earliest(given.query<Z>(kind));
 }
 
-// Few pairs are spread over many warps, which go the ways of all their pairs.
+// An answer as one number: the time of a contact, or one of these.
+inline constexpr double no_contact = 2, stays_open = 3;
+
 template <int limbs, class T>
-__global__ __launch_bounds__(32) void integers_kernel(const __grid_constant__ LaunchParams<T> params) {
+__global__ __launch_bounds__(32) void integers_kernel(const __grid_constant__ LaunchParams<T> params,
+                                                      u32 resident_warps) {
+  const u64 n = length(params.counters->open_in_integers[limbs - 1], params.open_capacity);
+  const u64 i = own_item(n, resident_warps);
+  if (i >= n) return;
+  const Candidate pair = params.keys.pair_of(params.open_in_integers[limbs - 1][i]);
+  const exact::Answer answer =
+      decide_in_integers<limbs>(pair.kind, load_pair_ends(params.vertices, vertices_of(params, pair)));
+  params.answers[i] = !answer.decided ? stays_open : answer.toc ? *answer.toc : no_contact;
+}
+
+template <int limbs, class T>
+__global__ __launch_bounds__(128) void collect_answers_kernel(const __grid_constant__ LaunchParams<T> params) {
   Counters& c = *params.counters;
-  const u64 n = length(c.open_in_integers[limbs - 1], params.open_capacity), n_warps = gridDim.x;
-  const bool few = n <= 8 * n_warps;
-  for (u64 begin = 0; begin < n; begin += 32 * n_warps) {
-    const u64 i = begin + (few ? lane_number() * n_warps + blockIdx.x : u64{blockIdx.x} * 32 + lane_number());
-    exact::Answer answer{true, {}};
-    u64 key = 0;
-    if (i < n) {
-      key = params.open_in_integers[limbs - 1][i];
-      const Candidate pair = params.keys.pair_of(key);
-      answer = decide_in_integers<limbs>(pair.kind, load_pair_ends(params.vertices, vertices_of(params, pair)));
-    }
-    const bool contact = answer.decided && answer.toc;
-    const double toc = contact ? *answer.toc : INFINITY;
+  const u64 n = length(c.open_in_integers[limbs - 1], params.open_capacity),
+            stride = static_cast<u64>(gridDim.x) * blockDim.x;
+  for (u64 i = static_cast<u64>(blockIdx.x) * blockDim.x + threadIdx.x; i - lane_number() < n; i += stride) {
+    const bool valid = i < n;
+    const u64 key = valid ? params.open_in_integers[limbs - 1][i] : 0;
+    const double answer = valid ? params.answers[i] : no_contact;
+    const bool open = answer == stays_open, contact = !open && answer != no_contact;
     const Candidate pair = params.keys.pair_of(key);
-    append_found(params, pair.kind, contact, {pair.first, pair.second}, toc);
+    append_found(params, pair.kind, contact, {pair.first, pair.second}, answer);
     count_lanes(c.found, contact, pair.kind);
-    count_lanes(c.by_integers, i < n && answer.decided, pair.kind);
-    if (params.time_only) keep_soonest(&c.soonest, toc);
+    count_lanes(c.by_integers, valid && !open, pair.kind);
+    if (params.time_only) keep_soonest(&c.soonest, contact ? answer : INFINITY);
     if constexpr (limbs < integer_sizes)
-      append_key(params.open_in_integers[limbs], params.open_capacity, &c.open_in_integers[limbs], !answer.decided,
-                 key);
+      append_key(params.open_in_integers[limbs], params.open_capacity, &c.open_in_integers[limbs], open, key);
     else
-      append_key(params.to_host, params.to_host_capacity, &c.to_host, !answer.decided, key);
+      append_key(params.to_host, params.to_host_capacity, &c.to_host, open, key);
   }
 }
 

@@ -231,6 +231,7 @@ bool DevicePipeline::run_frame(Positions t0, Positions t1, double distance, Thre
     again = guessed_wrong(params);
     again = grow_overflowed() || again;
   }
+  if (!of_snapshot(query_)) require_balance(c);
   const u64 n_to_host = exact_last_time_ = c.to_host;
   if (goal_ == Goal::results && contacts_.complete(query_, params, c, on_stream())) copy_counters();
   if (goal_ == Goal::near_list) near_.collect(params, c, stream_);

@@ -25,6 +25,15 @@ struct Stages {
     kernel<<<dim3(static_cast<unsigned>(blocks * multiprocessors), rows), threads, 0, stream>>>(params);
     check_launch(name);
   }
+  // A thread an item of up to `most`; its last argument is how many warps are at work at a time (own_item.cuh).
+  template <class Kernel, class Task>
+  void one_item_each(Kernel kernel, unsigned threads, u64 most, const char* name, const Task& task) const {
+    if (most == 0) return;
+    const int blocks = blocks_that_fit(reinterpret_cast<const void*>(kernel), threads, name);
+    const unsigned resident = static_cast<unsigned>(blocks * multiprocessors);
+    kernel<<<std::max(blocks_for(most, threads), resident), threads, 0, stream>>>(task, resident * (threads / 32));
+    check_launch(name);
+  }
   void mark(const char* name) const { timer.mark(name, stream); }
 };
 

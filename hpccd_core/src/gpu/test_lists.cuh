@@ -37,6 +37,7 @@ class TestLists {
           separated_[k].reserve(s.separated[k]);
     undecided_.reserve(s.undecided);
     for (auto& list : open_) list.reserve(s.open);
+    answers_.reserve(s.open);
     to_host_.reserve(s.to_host);
   }
   Sizes sizes() const {
@@ -53,7 +54,7 @@ class TestLists {
   void for_buffers(Visit&& visit) const {
     for (int k = 0; k < 2; ++k) visit(survivors_[k]), visit(single_[k]), visit(many_[k]), visit(separated_[k]);
     for (const auto& list : open_) visit(list);
-    visit(undecided_), visit(to_host_);
+    visit(answers_), visit(undecided_), visit(to_host_);
   }
 
   // Where the pairs come from that pass the first filter.
@@ -73,8 +74,10 @@ class TestLists {
     }
     params.undecided = undecided_.data(), params.undecided_capacity = undecided_.size();
     for (int i = 0; i < integer_sizes; ++i) params.open_in_integers[i] = open_[i].data();
+    params.answers = answers_.data();
     // After a failed allocation one may be shorter.
-    params.open_capacity = std::min_element(std::begin(open_), std::end(open_), shorter)->size();
+    params.open_capacity =
+        std::min(std::min_element(std::begin(open_), std::end(open_), shorter)->size(), answers_.size());
     params.to_host = to_host_.data(), params.to_host_capacity = to_host_.size();
   }
 
@@ -103,6 +106,7 @@ class TestLists {
     }
     grow(undecided_, c.undecided, false);
     for (auto& list : open_) grow(list, c.open_in_integers[0], false);  // no list is longer than the first
+    grow(answers_, c.open_in_integers[0], false);
     grow(to_host_, c.to_host, false);
     return again;
   }
@@ -111,7 +115,7 @@ class TestLists {
   const u64* to_host() const { return to_host_.data(); }
   u32 n_segments() const { return n_segments_; }
   std::size_t bytes() const {
-    std::size_t b = undecided_.bytes() + integer_sizes * open_[0].bytes();
+    std::size_t b = undecided_.bytes() + integer_sizes * open_[0].bytes() + answers_.bytes();
     for (int k = 0; k < 2; ++k)
       b += survivors_[k].bytes() + single_[k].bytes() + many_[k].bytes() + separated_[k].bytes();
     return b;
@@ -120,6 +124,7 @@ class TestLists {
  private:
   DeviceBuffer<uint2> survivors_[2], single_[2], many_[2], separated_[2];
   DeviceBuffer<u64> undecided_, open_[integer_sizes];
+  DeviceBuffer<double> answers_;
   PinnedBuffer<u64> to_host_;
   // Lists of one pass stay below this; larger frames take several segments.
   static constexpr std::size_t most_listed = std::size_t{1} << 26;

@@ -110,6 +110,7 @@ class Slot {
 
   void append_to(Output& output, const DeviceScene& scene) const {
     const Counters& c = *host_counters_.data();
+    gpu::require_balance(c);
     for (u64 i = 0; i < c.found_all; ++i) {
       const Candidate p = scene.keys().pair_of(keys_.data()[i]);
       auto& list = p.kind == Kind::vertex_face ? output.vertex_face : output.edge_edge;
