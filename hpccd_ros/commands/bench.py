@@ -28,6 +28,7 @@ BENCHMARKS = {
     "scaling": ("core.scaling", "speed-up over one thread against threads (Fig. 6 and 7), for each method"),
     "methods": ("core.methods", "the methods and instruction sets compared: time, and equality of the results"),
     "size": ("core.size", "how time and memory grow with the number of triangles"),
+    "worlds": ("core.worlds", "many worlds in one call on CPUs, beside detectors that are asked one world at a time"),
     "memory": ("core.memory", "peak memory and bytes per triangle"),
     "limit": ("core.limit", "where the time of a step goes, beside the least that this machine needs for the work"),
     "options": ("core.options", "what each way to model less saves"),

@@ -104,6 +104,17 @@ def memory(result: Kept) -> list[str]:
     return markdown.table(["scene", "triangles", "contacts", "detector, MB", "bytes a triangle", "process, MB"], lines)
 
 
+def worlds(*results: Kept) -> list[str]:
+    lines = [
+        [r["scene"], r["triangles"], r["worlds"], r["one_call_ms"], f"{r['of_all_threads']:.2f}", r["one_thread_ms"],
+         r["one_detector_ms"], r["detectors_ms"], round(r["bytes_a_world"] / r["triangles"])]
+        for result in results for r in result.rows
+    ]  # fmt: skip
+    columns = ["scene", "triangles", "worlds", "one call, ms", "of all threads", "1 thread, ms", "one detector",
+               "a detector each", "bytes a triangle"]  # fmt: skip
+    return markdown.table(columns, lines)
+
+
 def options(result: Kept) -> list[str]:
     scenes = by(result.rows, "scene")
     names = dict.fromkeys(r["option"] for r in result.rows)

@@ -78,6 +78,17 @@ def test_memory(bench):
     assert default["all_candidates_bytes"] == 8 * default["candidates"] > 0
 
 
+def test_worlds(bench):
+    status, result, folder = bench("worlds", "two-triangles", "--worlds", "3,12", "--repeat", "1", "--threads", "2")
+    assert status == 0
+    check_files(result, folder)
+    few, many = result["rows"]
+    assert (few["worlds"], many["worlds"]) == (3, 12) and few["threads"] == 2
+    assert many["contacts"] > few["contacts"]
+    assert few["of_all_threads"] == pytest.approx(few["one_detector_ms"] / few["one_call_ms"] / 2)
+    assert many["bytes_a_world"] > 100
+
+
 def test_accuracy(bench):
     few = ("--parts", "scenes,sweeps", "--sweep-queries", "40", "--simd", "auto,scalar")
     status, result, folder = bench("accuracy", *STRIP, *few)
@@ -122,6 +133,8 @@ def test_options(bench):
         (("size", "cloth-ball"), "generated"),
         (("accuracy", *STRIP, "--tiers", "best"), "best"),
         (("memory", "folding-strip", "--methods", ","), "--methods"),
+        (("worlds", "breaking-like", "--size", "0.02", "--worlds", "8"), "topology changes"),
+        (("worlds", "two-triangles", "--worlds", "65537"), "at most 65,536"),
         (("accuracy", *STRIP, "--threads", "100000"), "at most 1024"),
         (("limit", *STRIP, "--threads-list", "1,100000"), "at most 1024"),
         (("limit", *STRIP, "--figures", "/proc/no-folder"), "--figures"),
