@@ -9,7 +9,7 @@ import pytest
 
 from hpccd_core import _core
 
-WHOLE_WARPS = re.compile(r"\b(VOTE|SHFL|MATCH|REDUX|BAR)\b")
+WHOLE_WARPS = re.compile(r"\b(VOTEU?|SHFL|MATCH|REDUX|BAR)\b")
 KEPT_BARRIER = re.compile(r"BMOV\.32(\.\w+)? B\d+, R\d+")
 
 

@@ -107,11 +107,11 @@ def memory(result: Kept) -> list[str]:
 def worlds(*results: Kept) -> list[str]:
     lines = [
         [r["scene"], r["triangles"], r["worlds"], r["one_call_ms"], f"{r['of_all_threads']:.2f}", r["one_thread_ms"],
-         r["one_detector_ms"], r["detectors_ms"], round(r["bytes_a_world"] / r["triangles"])]
+         r["one_detector_ms"], r.get("detectors_ms"), round(r["bytes_a_world"])]
         for result in results for r in result.rows
     ]  # fmt: skip
     columns = ["scene", "triangles", "worlds", "one call, ms", "of all threads", "1 thread, ms", "one detector",
-               "a detector each", "bytes a triangle"]  # fmt: skip
+               "a detector each", "bytes a world"]  # fmt: skip
     return markdown.table(columns, lines)
 
 

@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """`hpccd bench ...`: each command runs, checks what it promises to check, and writes what it says."""
 
+import collections
 import csv
 
 import pytest
 from sources import ROOT
 
+import hpccd_core as hc
 from hpccd_ros import cli
 
 STRIP = ("folding-strip", "--size", "0.1", "--steps", "2", "--repeat", "1")
@@ -85,9 +87,31 @@ def test_worlds(bench):
     few, many = result["rows"]
     assert (few["worlds"], many["worlds"]) == (3, 12) and few["threads"] == 2
     assert many["contacts"] > few["contacts"]
-    of_all = few["one_detector_ms"] / few["one_call_ms"] / 2
+    assert (few["steps"], many["steps"]) == (3, 10)
+    of_all = few["one_detector_core_ms"] / few["one_call_core_ms"] / 2
     assert few["of_all_threads"] == pytest.approx(of_all, rel=1e-3), "kept with six digits after the point"
     assert many["bytes_a_world"] > 100
+
+
+def test_worlds_whose_answers_differ_fail(bench, monkeypatch):
+    """The last round is looked at as well, and rows beside hashes."""
+    detect, calls = hc.Detector.detect, collections.Counter()
+
+    def from_the_second_call_on(self, *args, **options):
+        found = detect(self, *args, **options)
+        calls[id(self)] += 1
+        return detect(self, args[0], args[0]) if self.worlds and calls[id(self)] > 1 else found
+
+    monkeypatch.setattr(hc.Detector, "detect", from_the_second_call_on)
+    status, result, _ = bench("worlds", "two-triangles", "--worlds", "12", "--repeat", "2", "--threads", "1")
+    assert status == 1 and any("one_thread: contacts of world" in text for text in result["failures"])
+
+
+def test_nothing_is_measured_where_a_later_scene_will_not_do(bench, capsys, monkeypatch):
+    monkeypatch.setattr(hc, "Detector", None)
+    status, result, _ = bench("worlds", "two-triangles", "breaking-like", "--size", "0.02", "--worlds", "8")
+    assert status == 2 and result is None
+    assert "breaking-like x 0.02: its topology changes" in capsys.readouterr().err
 
 
 def test_accuracy(bench):
