@@ -8,7 +8,7 @@ namespace {
 
 template <int limbs, class T>
 void launch_integers_of(const LaunchParams<T>& params, const Stages& stages) {
-  stages.one_item_each(integers_kernel<limbs, T>, 32, params.open_capacity, "integers_kernel", params);
+  stages.one_item_each(integers_kernel<limbs, T>, 128, params.open_capacity, "integers_kernel", params);
   stages.persistent(collect_answers_kernel<limbs, T>, 128, params, "collect_answers_kernel");
 }
 

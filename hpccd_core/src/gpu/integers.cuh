@@ -26,8 +26,8 @@ __device__ exact::Answer decide_in_integers(Kind kind, const PairEnds& q) {
 inline constexpr double no_contact = 2, stays_open = 3;
 
 template <int limbs, class T>
-__global__ __launch_bounds__(32) void integers_kernel(const __grid_constant__ LaunchParams<T> params,
-                                                      u32 resident_warps) {
+__global__ __launch_bounds__(128) void integers_kernel(const __grid_constant__ LaunchParams<T> params,
+                                                       u32 resident_warps) {
   const u64 n = length(params.counters->open_in_integers[limbs - 1], params.open_capacity);
   const u64 i = own_item(n, resident_warps);
   if (i >= n) return;

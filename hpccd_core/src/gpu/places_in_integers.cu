@@ -10,8 +10,8 @@ namespace {
 // In place of the number of a row whose places are written.
 constexpr u64 written = ~u64{0};
 
-__global__ __launch_bounds__(32) void places_in_integers_kernel(const __grid_constant__ PlacesTask task,
-                                                                u32 resident_warps) {
+__global__ __launch_bounds__(128) void places_in_integers_kernel(const __grid_constant__ PlacesTask task,
+                                                                 u32 resident_warps) {
   const u64 n = length(task.n_open[0], task.open_capacity), i = own_item(n, resident_warps);
   if (i < n && find_places<ByFixedIntegers>(task, task.open[i])) task.open[i].row = written;
 }
@@ -29,7 +29,7 @@ __global__ void collect_open_rows_kernel(const __grid_constant__ PlacesTask task
 
 void launch_places_in_integers(const PlacesTask& task, const Stages& stages) {
   if (task.out.outputs.normals)
-    stages.one_item_each(places_in_integers_kernel, 32, task.open_capacity, "places_in_integers_kernel", task);
+    stages.one_item_each(places_in_integers_kernel, 128, task.open_capacity, "places_in_integers_kernel", task);
   collect_open_rows_kernel<<<static_cast<unsigned>(stages.multiprocessors), 256, 0, stages.stream>>>(task);
   check_launch("collect_open_rows_kernel");
   stages.mark("places");
