@@ -39,10 +39,10 @@ __device__ bool counts_at(const LaunchParams<T>& params, double time) {
   return !params.until_best || time <= best_time(params) + soon;
 }
 
-// Nothing that is found could matter any more.
+// Nothing that is found could matter any more; or the frame is refused, where all boxes may overlap.
 template <class T>
 __device__ bool over(const LaunchParams<T>& params) {
-  return params.time_only && best_time(params) <= 0;
+  return params.counters->bad != 0 || (params.time_only && best_time(params) <= 0);
 }
 
 // Of what the error bounds have proven, before the fallback goes on.

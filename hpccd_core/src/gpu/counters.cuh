@@ -49,16 +49,23 @@ struct Counters {
   double area;
 };
 
-// Whether each pair that the error bounds left open was decided by someone, or goes to the CPU; of motions, where no
-// list was too short. If it is not so, the device has lost pairs.
-HPCCD_HD bool books_balance(const Counters& c) {
-  u64 settled = c.to_host;
-  for (int k = 0; k < 2; ++k) settled += c.by_tolerance[k] + c.by_extended[k] + c.by_integers[k];
-  return settled == c.undecided && c.found[0] + c.found[1] == c.found_all;
+// Whether each pair that the error bounds left open was decided by someone, or goes to the CPU; of a snapshot, whether
+// each that was tested was told near, apart or open. Where no list was too short. If it is not so, the device has lost
+// pairs.
+HPCCD_HD bool books_balance(const Counters& c, bool of_snapshot) {
+  u64 open = 0, settled = c.to_host;
+  bool tested = true;
+  for (int k = 0; k < 2; ++k) {
+    open += c.undecided_of[k] + c.undecided_near[k];
+    settled += c.by_tolerance[k] + c.by_extended[k] + c.by_integers[k];
+    tested = tested && c.apart[k] + c.proven_near[k] + c.undecided_near[k] == c.all_survivors[k];
+  }
+  const bool decided = of_snapshot ? tested && open == c.to_host : open == c.undecided && settled == open;
+  return decided && c.found[0] + c.found[1] == c.found_all;
 }
 
-inline void require_balance(const Counters& c) {
-  if (!books_balance(c)) throw Error("the device has lost pairs that it had to decide; please report it");
+inline void require_balance(const Counters& c, bool of_snapshot) {
+  if (!books_balance(c, of_snapshot)) throw Error("the device has lost pairs that it had to decide; please report it");
 }
 
 // Where the pairs of one kind went; on the host.

@@ -55,7 +55,8 @@ __global__ __launch_bounds__(32) void hints_kernel(const __grid_constant__ Launc
     const double time = !valid   ? INFINITY
                         : k == 0 ? time_of<query, Kind::vertex_face>(params, pair)
                                  : time_of<query, Kind::edge_edge>(params, pair);
-    keep_soonest(&params.counters->soonest, time);
+    // Lane by lane: a warp may come out of this in parts (own_item.cuh).
+    if (time < INFINITY) atomicMax(&params.counters->soonest, ~bits_of(time));
   });
 }
 

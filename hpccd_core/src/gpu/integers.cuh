@@ -22,7 +22,8 @@ __device__ exact::Answer decide_in_integers(Kind kind, const PairEnds& q) {
   return exact::earliest(given.query<Z>(kind));
 }
 
-// An answer as one number: the time of a contact, or one of these.
+// An answer as one number: the time of a contact, or one of these. Anything else, as where nobody has answered, is
+// taken for an open pair.
 inline constexpr double no_contact = 2, stays_open = 3;
 
 template <int limbs, class T>
@@ -46,7 +47,7 @@ __global__ __launch_bounds__(128) void collect_answers_kernel(const __grid_const
     const bool valid = i < n;
     const u64 key = valid ? params.open_in_integers[limbs - 1][i] : 0;
     const double answer = valid ? params.answers[i] : no_contact;
-    const bool open = answer == stays_open, contact = !open && answer != no_contact;
+    const bool contact = answer <= 1, open = !contact && answer != no_contact;
     const Candidate pair = params.keys.pair_of(key);
     append_found(params, pair.kind, contact, {pair.first, pair.second}, answer);
     count_lanes(c.found, contact, pair.kind);

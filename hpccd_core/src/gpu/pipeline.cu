@@ -231,7 +231,7 @@ bool DevicePipeline::run_frame(Positions t0, Positions t1, double distance, Thre
     again = guessed_wrong(params);
     again = grow_overflowed() || again;
   }
-  if (!of_snapshot(query_)) require_balance(c);
+  require_balance(c, of_snapshot(query_));
   const u64 n_to_host = exact_last_time_ = c.to_host;
   if (goal_ == Goal::results && contacts_.complete(query_, params, c, on_stream())) copy_counters();
   if (goal_ == Goal::near_list) near_.collect(params, c, stream_);
@@ -496,7 +496,7 @@ bool DevicePipeline::guessed_wrong(const LaunchParams<T>& params) {
 // Makes room where a list was too short. True where the frame must run again.
 bool DevicePipeline::grow_overflowed() {
   const Counters& c = *host_counters_.data();
-  bool again = lists_.grow(c);
+  bool again = lists_.grow(c, goal_ == Goal::earliest_of_near ? TestLists::From::near_list : TestLists::From::leaves);
   if (c.leaf_pairs > leaf_pairs_.size()) {
     again = true;
     leaf_pairs_.reserve(c.leaf_pairs + c.leaf_pairs / 4);

@@ -39,18 +39,16 @@ template <class T>
 __global__ __launch_bounds__(128) void places_kernel(const __grid_constant__ LaunchParams<T> params,
                                                      const __grid_constant__ PlacesTask task) {
   const u64 n = task.n_vf + task.n_ee, stride = static_cast<u64>(gridDim.x) * blockDim.x;
-  for (u64 i = static_cast<u64>(blockIdx.x) * blockDim.x + threadIdx.x; i - lane_number() < n; i += stride) {
-    bool open = false;
+  for (u64 i = static_cast<u64>(blockIdx.x) * blockDim.x + threadIdx.x; i < n; i += stride) {
+    const uint4 v = vertices_of_row(params, task, i);
+    const PairEnds q = load_pair_ends(params.vertices, v);
     OpenRow row;
-    if (i < n) {
-      const uint4 v = vertices_of_row(params, task, i);
-      const PairEnds q = load_pair_ends(params.vertices, v);
-      row.row = i, row.toc = task.tocs[i], row.separation = separation_of(params, v.x, v.z);
-      for (int k = 0; k < 4; ++k) row.t0[k] = q.t0[k], row.t1[k] = q.t1[k];
-      open = !find_places<LeftOpen>(task, row);
-    }
-    const u64 at = warp_append(task.n_open, open);
-    if (open && at < task.open_capacity) task.open[at] = row;
+    row.row = i, row.toc = task.tocs[i], row.separation = separation_of(params, v.x, v.z);
+    for (int k = 0; k < 4; ++k) row.t0[k] = q.t0[k], row.t1[k] = q.t1[k];
+    if (find_places<LeftOpen>(task, row)) continue;
+    // Lane by lane: a warp may come out of this in parts (own_item.cuh).
+    const u64 at = atomicAdd(task.n_open, u64{1});
+    if (at < task.open_capacity) task.open[at] = row;
   }
 }
 

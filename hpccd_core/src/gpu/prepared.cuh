@@ -21,7 +21,7 @@ __global__ void tell_kernel(const __grid_constant__ LaunchParams<T> params, cons
                         c.most_single > room.single || c.most_many > room.many || c.most_separated > room.separated ||
                         c.undecided > room.undecided || c.open_in_integers[0] > room.open || c.found_all > room.found ||
                         !fit<false>(c, to);
-  const bool left = c.to_host || (!too_long && !books_balance(c));
+  const bool left = c.to_host || (!too_long && !books_balance(c, false));
   const u64 state = (too_long ? PreparedCounts::no_room : 0) | (left ? PreparedCounts::left_to_cpu : 0) |
                     (c.bad ? PreparedCounts::bad_coordinates : 0) |
                     (c.most_of_a_feature > most_of_a_feature ? PreparedCounts::too_many_of_one : 0);

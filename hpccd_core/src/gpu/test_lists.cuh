@@ -87,14 +87,14 @@ class TestLists {
     for (auto& list : survivors_) list.reserve(n);
   }
   // Makes room where a list was too short. True where the pairs must be tested again.
-  bool grow(const Counters& c) {
-    bool again = false;
+  bool grow(const Counters& c, From from) {
+    bool again = false, more_segments = false;
     const auto grow = [&](auto& buffer, u64 needed, bool divisible) {
       if (needed <= buffer.size()) return;
       again = true;
-      if (divisible && needed > most_listed) {
+      if (divisible && from == From::leaves && needed > most_listed) {
         buffer.reserve(most_listed);
-        n_segments_ *= 2;  // one list may want this for several; the next pass shows
+        more_segments = true;  // twice as many; the next pass shows whether that is enough
       } else {
         buffer.reserve(needed + needed / 4);
       }
@@ -109,6 +109,7 @@ class TestLists {
     for (auto& list : open_) grow(list, c.open_in_integers[0], false);  // no list is longer than the first
     grow(answers_, c.open_in_integers[0], false);
     grow(to_host_, c.to_host, false);
+    if (more_segments) n_segments_ *= 2;
     return again;
   }
 

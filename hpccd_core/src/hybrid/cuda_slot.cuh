@@ -96,7 +96,7 @@ class Slot {
   // When data is ready: makes room where a list was too short. True where the pairs must be tested again.
   bool grow(LargestLists& largest) {
     const Counters& c = *host_counters_.data();
-    bool again = lists_.grow(c);
+    bool again = lists_.grow(c, TestLists::From::leaves);
     if (c.found_all > found_capacity_) {
       again = true;
       reserve_found(c.found_all + c.found_all / 4);
@@ -110,7 +110,11 @@ class Slot {
 
   void append_to(Output& output, const DeviceScene& scene) const {
     const Counters& c = *host_counters_.data();
-    gpu::require_balance(c);
+    gpu::require_balance(c, false);
+    // All or nothing: what fails here is tested again by the CPU.
+    output.vertex_face.reserve(output.vertex_face.size() + c.found[0]);
+    output.edge_edge.reserve(output.edge_edge.size() + c.found[1]);
+    output.undecided.reserve(output.undecided.size() + c.to_host);
     for (u64 i = 0; i < c.found_all; ++i) {
       const Candidate p = scene.keys().pair_of(keys_.data()[i]);
       auto& list = p.kind == Kind::vertex_face ? output.vertex_face : output.edge_edge;
