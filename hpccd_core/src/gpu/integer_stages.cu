@@ -8,9 +8,6 @@ namespace {
 
 template <int limbs, class T>
 void launch_integers_of(const LaunchParams<T>& params, const Stages& stages) {
-  // No number: from every pair an answer is awaited.
-  check(cudaMemsetAsync(params.answers, 0xFF, params.open_capacity * sizeof *params.answers, stages.stream),
-        "cudaMemsetAsync");
   stages.one_item_each(integers_kernel<limbs, T>, 128, params.open_capacity, "integers_kernel", params);
   stages.persistent(collect_answers_kernel<limbs, T>, 128, params, "collect_answers_kernel");
 }

@@ -38,7 +38,7 @@ class TestLists {
           separated_[k].reserve(s.separated[k]);
     undecided_.reserve(s.undecided);
     for (auto& list : open_) list.reserve(s.open);
-    answers_.reserve(s.open);
+    reserve_answers(s.open);
     to_host_.reserve(s.to_host);
   }
   Sizes sizes() const {
@@ -107,7 +107,10 @@ class TestLists {
     }
     grow(undecided_, c.undecided, false);
     for (auto& list : open_) grow(list, c.open_in_integers[0], false);  // no list is longer than the first
-    grow(answers_, c.open_in_integers[0], false);
+    if (c.open_in_integers[0] > answers_.size()) {
+      again = true;
+      reserve_answers(c.open_in_integers[0] + c.open_in_integers[0] / 4);
+    }
     grow(to_host_, c.to_host, false);
     if (more_segments) n_segments_ *= 2;
     return again;
@@ -131,6 +134,14 @@ class TestLists {
   // Lists of one pass stay below this; larger frames take several segments.
   static constexpr std::size_t most_listed = std::size_t{1} << 26;
   u32 n_segments_ = 1;
+
+  // Full of answers that are awaited (integers.cuh); done when this returns, whatever stream the kernels are on.
+  void reserve_answers(std::size_t n) {
+    if (n <= answers_.size()) return;
+    answers_.reserve(n);
+    check(cudaMemset(answers_.data(), 0xFF, answers_.size() * sizeof(double)), "cudaMemset");
+    check(cudaStreamSynchronize(nullptr), "cudaStreamSynchronize");
+  }
 
   static bool shorter(const DeviceBuffer<u64>& a, const DeviceBuffer<u64>& b) { return a.size() < b.size(); }
 };
