@@ -23,7 +23,8 @@ __device__ exact::Answer decide_in_integers(Kind kind, const PairEnds& q) {
 }
 
 // An answer as one number: the time of a contact, or one of these. Anything else is taken for an open pair, as is what
-// stands wherever an answer is awaited (test_lists.cuh): a memset in each frame took 4 us of the funnel's 260.
+// stands wherever an answer is awaited: put there with the memory (test_lists.cuh), and by who collects answers, which
+// costs less than a memset in each frame.
 inline constexpr double no_contact = 2, stays_open = 3;
 __device__ inline double awaited() { return __longlong_as_double(-1); }  // not a number
 
