@@ -145,6 +145,26 @@ def test_single_precision_positions(accuracy):
         assert narrow == assert_first(meshes.scene(), meshes, accuracy=accuracy)
 
 
+def test_motions_of_a_few_of_the_least_numbers():
+    """From starts that come again, so that what was near is known: products of such numbers are rounded to none."""
+    least, between = np.finfo(float).smallest_subnormal, 0
+    for seed in range(12):
+        rng = np.random.default_rng([71, seed])
+        scene = hc.Scene()
+        scene.add_mesh("soup", np.array([rng.choice(14, 3, replace=False) for _ in range(9)]), n_vertices=14)
+        every, first = detector(scene, "all"), detector(scene, "first")
+        start = rng.integers(-20, 21, (14, 3))
+        for step in range(12):
+            start = start if step % 4 else start + rng.integers(-1, 2, (14, 3))
+            motion = [at * least for at in (start, start + rng.integers(-27, 28, (14, 3)))]
+            contacts = every.detect(*motion)
+            assert is_first(first.detect(*motion), contacts), (seed, step)
+            time = min(contacts.first_toc, 1.0)
+            assert time - EARLY <= first.collision_free_step(*motion) <= time, (seed, step)
+            between += 0 < time < 1
+    assert between > 50
+
+
 def test_outputs_belong_to_the_first_contacts():
     meshes = apart_at_first(random_scenes.many_meshes, 7)
     v0, v1 = meshes.vertices_t0, meshes.vertices_t1

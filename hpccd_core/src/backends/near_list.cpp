@@ -25,8 +25,11 @@ std::uint64_t next_number() {
 }  // namespace
 
 Travel Travel::along_axes(double away, double way) {
-  constexpr double root_of_three = 1.7320508075688774;
-  return {root_of_three * away, root_of_three * way};
+  const auto length = [](double along_axis) {
+    constexpr double root_of_three = 1.7320508075688774;
+    return along_axis > 0 ? root_of_three * along_axis + least : 0;
+  };
+  return {length(away), length(way)};
 }
 
 std::optional<double> radius_for(const Travel& travel, double time, double edge) {

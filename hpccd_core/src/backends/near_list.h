@@ -25,7 +25,10 @@ struct Travel {
   // From the largest differences along an axis.
   static Travel along_axes(double away, double way);
   // The farthest that any of them is up to a time.
-  double until(double time) const { return (away + time * way) * (1 + 1e-9); }
+  double until(double time) const { return (away + time * way) * (1 + 1e-9) + least; }
+
+  // A product of denormal numbers is off by as much, which no factor makes up for.
+  static constexpr double least = std::numeric_limits<double>::denorm_min();
 };
 
 // Up to when a list answers, and whether the next is worth its price.

@@ -2,7 +2,11 @@
 #include "base/parallel.h"
 
 #include <algorithm>
+#include <exception>
 #include <mutex>
+#include <stdexcept>
+#include <string>
+#include <system_error>
 #include <utility>
 
 #include "base/active_wait.h"
@@ -53,15 +57,29 @@ std::uint64_t ThreadPool::Entry::word() const {
   return std::uint64_t{job} << 32 | std::uint64_t{closed} << 31 | std::uint64_t{joined} << 16 | finished;
 }
 
-ThreadPool::ThreadPool(int threads) : affinity_(threads > 0 ? threads : hardware_threads()) {
+ThreadPool::ThreadPool(int threads)
+    : affinity_(threads > 0 ? threads : hardware_threads()), begun_((threads > 0 ? threads : hardware_threads()) - 1) {
   const int cores = hardware_threads(), n = threads > 0 ? threads : cores;
   // Longer than the serial parts between two jobs of a call, and than a program takes from one call to the next if it
   // does nothing else. More threads than cores would only keep each other from working.
   if (n <= cores) awake_for_ = std::chrono::microseconds(200);
-  for (int i = 1; i < n; ++i) workers_.emplace_back([this, i] { work(i); });
+  try {
+    for (int i = 1; i < n; ++i) workers_.emplace_back([this, i] { work(i); });
+  } catch (const std::system_error& e) {
+    const int begun = size();
+    end();
+    throw std::runtime_error("threads: the system starts " + std::to_string(begun) + " of " + std::to_string(n) + " (" +
+                             e.code().message() + "); ask for fewer, or let this user have more (ulimit -u)");
+  } catch (...) {
+    end();
+    throw;
+  }
+  begun_.wait();
 }
 
-ThreadPool::~ThreadPool() {
+ThreadPool::~ThreadPool() { end(); }
+
+void ThreadPool::end() {
   stop_ = true;
   wake(starts_);
   for (auto& w : workers_) w.join();
@@ -106,6 +124,10 @@ bool ThreadPool::join(std::uint32_t& seen) {
 }
 
 void ThreadPool::work(int thread) {
+  // What the run-time library keeps of a thread's exceptions is allocated when it is first asked for. Not at the first
+  // throw, which may be that of a failed allocation: it would end the process.
+  (void)std::current_exception();
+  begun_.count_down();
   std::uint32_t seen = 0;
   while (!stop_) {
     wait_for_job(thread, seen);

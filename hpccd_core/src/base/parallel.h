@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <exception>
 #include <functional>
+#include <latch>
 #include <thread>
 #include <vector>
 
@@ -20,7 +21,8 @@ namespace hpccd {
 
 class ThreadPool {
  public:
-  explicit ThreadPool(int threads);  // the caller's thread is one of them; 0: all cores
+  // The caller's thread is one of them; 0: all cores. Throws std::runtime_error where the system does not start as many.
+  explicit ThreadPool(int threads);
   ~ThreadPool();
   ThreadPool(const ThreadPool&) = delete;
   ThreadPool& operator=(const ThreadPool&) = delete;
@@ -55,6 +57,7 @@ class ThreadPool {
   };
 
   void run(const std::function<void(int)>& job, Join join);
+  void end();
   void work(int thread);
   void call(int thread);
   bool join(std::uint32_t& seen);
@@ -72,6 +75,7 @@ class ThreadPool {
   std::atomic<int> starts_{0}, ends_{0};  // change when there is something to wake up for
   std::atomic<int> sleeping_{0};
   ThreadAffinity affinity_;
+  std::latch begun_;  // each of the workers
   std::atomic<bool> caller_sleeps_{false};
   SpinLock error_lock_;
   std::exception_ptr error_;

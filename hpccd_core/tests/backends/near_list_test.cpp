@@ -55,6 +55,14 @@ TEST(NearList, WaysTooSmallToSquareCount) {
   EXPECT_FALSE(list.radius().answers(1, t));
 }
 
+// Where 0.006 of 27 rounds to none, and the root of 27 to 5.
+TEST(Travel, IsABoundAmongDenormalNumbers) {
+  const double least = std::numeric_limits<double>::denorm_min();
+  EXPECT_GE(Travel::along_axes(3 * least, 0).away, 6 * least);
+  EXPECT_GE((Travel{0, 27 * least}).until(0.006), least);
+  EXPECT_EQ(Travel::along_axes(0, 0).way, 0);
+}
+
 TEST(NearRadius, AnswersAsFarAsItReaches) {
   NearRadius radius;
   EXPECT_FALSE(radius.answers(0, {0, 0}));
