@@ -21,7 +21,7 @@ namespace hpccd {
 
 class ThreadPool {
  public:
-  // The caller's thread is one of them; 0: all cores. Throws std::runtime_error where the system does not start as many.
+  // The caller's thread is one of them; 0: all cores. Throws std::runtime_error where the system starts fewer.
   explicit ThreadPool(int threads);
   ~ThreadPool();
   ThreadPool(const ThreadPool&) = delete;
