@@ -27,7 +27,7 @@ std::uint64_t next_number() {
 Travel Travel::along_axes(double away, double way) {
   const auto length = [](double along_axis) {
     constexpr double root_of_three = 1.7320508075688774;
-    return along_axis > 0 ? root_of_three * along_axis + least : 0;
+    return along_axis == 0 ? 0 : root_of_three * along_axis + least;
   };
   return {length(away), length(way)};
 }

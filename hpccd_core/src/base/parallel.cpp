@@ -46,6 +46,8 @@ void wake(std::atomic<int>& changes) {
 
 int hardware_threads() { return static_cast<int>(std::max(1u, std::thread::hardware_concurrency())); }
 
+int count_of(int threads) { return threads > 0 ? threads : hardware_threads(); }
+
 }  // namespace
 
 ThreadPool::Entry ThreadPool::Entry::of(std::uint64_t w) {
@@ -57,12 +59,11 @@ std::uint64_t ThreadPool::Entry::word() const {
   return std::uint64_t{job} << 32 | std::uint64_t{closed} << 31 | std::uint64_t{joined} << 16 | finished;
 }
 
-ThreadPool::ThreadPool(int threads)
-    : affinity_(threads > 0 ? threads : hardware_threads()), begun_((threads > 0 ? threads : hardware_threads()) - 1) {
-  const int cores = hardware_threads(), n = threads > 0 ? threads : cores;
+ThreadPool::ThreadPool(int threads) : affinity_(count_of(threads)), begun_(count_of(threads) - 1) {
+  const int n = count_of(threads);
   // Longer than the serial parts between two jobs of a call, and than a program takes from one call to the next if it
   // does nothing else. More threads than cores would only keep each other from working.
-  if (n <= cores) awake_for_ = std::chrono::microseconds(200);
+  if (n <= hardware_threads()) awake_for_ = std::chrono::microseconds(200);
   try {
     for (int i = 1; i < n; ++i) workers_.emplace_back([this, i] { work(i); });
   } catch (const std::system_error& e) {
