@@ -86,7 +86,8 @@ class Detector(MotionQueries[OfMotion], SnapshotQueries[OfNear, OfPierced]):
         all stand together. CPUs take a world a thread, the GPU takes all worlds at once, "hybrid" one after the other.
         None: one scene, (V, 3).
     The scene is copied: meshes added to it later do not reach this detector.
-    Raises ValueError or TypeError for an option that will not do, RuntimeError where the system starts fewer threads.
+    Raises ValueError or TypeError for an option that will not do, RuntimeError where the system starts fewer threads. A
+    child process made by os.fork() has none of its threads: calls raise RuntimeError there, unless it has one alone.
     One call at a time: of the calls that several Python threads make of one detector each waits until the one before
     has ended, and profile and stats are those of the last. Only cancel() never waits. Threads that are to work side by
     side need a detector each, of one scene if they like.

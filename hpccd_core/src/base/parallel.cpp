@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "base/parallel.h"
 
+#include <pthread.h>
+
 #include <algorithm>
 #include <exception>
 #include <mutex>
@@ -46,7 +48,9 @@ void wake(std::atomic<int>& changes) {
 
 int hardware_threads() { return static_cast<int>(std::max(1u, std::thread::hardware_concurrency())); }
 
-int count_of(int threads) { return threads > 0 ? threads : hardware_threads(); }
+// How often this process was a child made by fork(), which has no thread of its parent's pools.
+std::atomic<int> forks{0};
+[[maybe_unused]] const int counting_forks = pthread_atfork(nullptr, nullptr, [] { ++forks; });
 
 }  // namespace
 
@@ -59,18 +63,19 @@ std::uint64_t ThreadPool::Entry::word() const {
   return std::uint64_t{job} << 32 | std::uint64_t{closed} << 31 | std::uint64_t{joined} << 16 | finished;
 }
 
-ThreadPool::ThreadPool(int threads) : affinity_(count_of(threads)), begun_(count_of(threads) - 1) {
-  const int n = count_of(threads);
+ThreadPool::ThreadPool(int threads)
+    : count_(threads > 0 ? threads : hardware_threads()), forks_(forks), affinity_(count_), begun_(count_ - 1) {
   // Longer than the serial parts between two jobs of a call, and than a program takes from one call to the next if it
   // does nothing else. More threads than cores would only keep each other from working.
-  if (n <= hardware_threads()) awake_for_ = std::chrono::microseconds(200);
+  if (count_ <= hardware_threads()) awake_for_ = std::chrono::microseconds(200);
   try {
-    for (int i = 1; i < n; ++i) workers_.emplace_back([this, i] { work(i); });
+    for (int i = 1; i < count_; ++i) workers_.emplace_back([this, i] { work(i); });
   } catch (const std::system_error& e) {
-    const int begun = size();
+    const std::size_t begun = workers_.size() + 1;
     end();
-    throw std::runtime_error("threads: the system starts " + std::to_string(begun) + " of " + std::to_string(n) + " (" +
-                             e.code().message() + "); ask for fewer, or let this user have more (ulimit -u)");
+    throw std::runtime_error("threads: the system starts " + std::to_string(begun) + " of " + std::to_string(count_) +
+                             " (" + e.code().message() +
+                             "); ask for fewer, or let this process have more threads and memory (ulimit -u, -v)");
   } catch (...) {
     end();
     throw;
@@ -81,6 +86,8 @@ ThreadPool::ThreadPool(int threads) : affinity_(count_of(threads)), begun_(count
 ThreadPool::~ThreadPool() { end(); }
 
 void ThreadPool::end() {
+  // Threads that are not there can neither be joined nor detached: their memory may be gone.
+  if (forks_ != forks) new auto(std::move(workers_));
   stop_ = true;
   wake(starts_);
   for (auto& w : workers_) w.join();
@@ -153,6 +160,8 @@ void ThreadPool::wait_for_threads(Join join) {
 
 void ThreadPool::run(const std::function<void(int)>& job, Join join) {
   if (workers_.empty()) return job(0);
+  if (forks_ != forks)
+    throw std::runtime_error("this detector's threads stayed in the process that made it; make one after the fork");
   job_ = &job;
   error_ = nullptr;
   entry_ = Entry{Entry::of(entry_.load()).job + 1, false, 0, 0}.word();

@@ -32,7 +32,7 @@ class ThreadPool {
     std::atomic<std::size_t> value{0};
   };
 
-  int size() const { return static_cast<int>(workers_.size()) + 1; }
+  int size() const { return count_; }
 
   // From here on parallel_for ends with Cancelled where that is requested.
   void heed(const Cancellation& cancellation) { cancellation_ = &cancellation; }
@@ -66,6 +66,7 @@ class ThreadPool {
   void wait_for_threads(Join join);
   bool finished(Join join) const;
 
+  int count_, forks_;  // of its threads; of this process when it was made
   std::vector<std::thread> workers_;
   const Cancellation* cancellation_ = &never_cancelled;
   const std::function<void(int)>* job_ = nullptr;

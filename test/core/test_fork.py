@@ -1,0 +1,47 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A child made by os.fork() has the detectors of its parent, but none of their threads."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="this system has no fork")
+
+PROGRAM = """
+import os, sys
+import numpy as np
+import hpccd_core as hc
+
+scene = hc.Scene()
+scene.add_mesh("soup", np.arange(3000).reshape(-1, 3))
+start, end = np.random.default_rng(1).standard_normal((2, 3000, 3))
+alone, several = (hc.Detector(scene, backend="cpu", threads=threads) for threads in (1, 8))
+expected = several.detect(start, end).hash
+
+def child():
+    global several
+    assert alone.detect(start, end).hash == expected
+    assert hc.Detector(scene, backend="cpu", threads=8).detect(start, end).hash == expected
+    try:
+        several.detect(start, end)
+    except RuntimeError as error:
+        assert "make one after the fork" in str(error)
+    else:
+        raise AssertionError("a detector without its threads has answered")
+    several = None
+
+if os.fork() == 0:
+    child()
+    print("child ended", flush=True)
+    sys.exit(0)
+_, status = os.wait()
+assert several.detect(start, end).hash == expected
+print("status", os.waitstatus_to_exitcode(status))
+"""
+
+
+def test_a_child_is_told_and_may_end():
+    done = subprocess.run([sys.executable, "-c", PROGRAM], capture_output=True, text=True, timeout=120, check=False)
+    assert done.stdout.splitlines() == ["child ended", "status 0"], done.stderr
