@@ -7,6 +7,7 @@ import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
 import pytest
+import yaml
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
@@ -20,7 +21,12 @@ def test_one_version():
     cmake = re.search(r"project\(hpccd VERSION (\S+)", (ROOT / "CMakeLists.txt").read_text()).group(1)
     xml = ElementTree.parse(ROOT / "package.xml").findtext("version")
     changelog = re.search(r"^(\d+\.\d+\.\d+) \(", (ROOT / "CHANGELOG.rst").read_text(), re.MULTILINE).group(1)
-    assert {cmake, xml, changelog} == {PYPROJECT["project"]["version"]}
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text())["version"]
+    versions = {cmake, xml, changelog, citation}
+    header = ROOT / "hpccd_core" / "include" / "hpccd" / "version.h"
+    numbers = re.findall(r"#define HPCCD_VERSION_(?:MAJOR|MINOR|PATCH) (\d+)", header.read_text())
+    versions |= {".".join(numbers), re.search(r'#define HPCCD_VERSION "(.+)"', header.read_text()).group(1)}
+    assert versions == {PYPROJECT["project"]["version"]}
 
 
 @pytest.mark.parametrize("python", ["3.11", "3.12"])
