@@ -23,10 +23,13 @@ def test_one_version():
     changelog = re.search(r"^(\d+\.\d+\.\d+) \(", (ROOT / "CHANGELOG.rst").read_text(), re.MULTILINE).group(1)
     citation = yaml.safe_load((ROOT / "CITATION.cff").read_text())["version"]
     versions = {cmake, xml, changelog, citation}
-    header = ROOT / "hpccd_core" / "include" / "hpccd" / "version.h"
-    numbers = re.findall(r"#define HPCCD_VERSION_(?:MAJOR|MINOR|PATCH) (\d+)", header.read_text())
-    versions |= {".".join(numbers), re.search(r'#define HPCCD_VERSION "(.+)"', header.read_text()).group(1)}
+    headers = ROOT / "hpccd_core" / "include" / "hpccd"
+    header = (headers / "version.h").read_text()
+    numbers = re.findall(r"#define HPCCD_VERSION_(?:MAJOR|MINOR|PATCH) (\d+)", header)
+    versions |= {".".join(numbers), re.search(r'#define HPCCD_VERSION "(.+)"', header).group(1)}
     assert versions == {PYPROJECT["project"]["version"]}
+    public = "".join(file.read_text() for file in headers.glob("*.h"))
+    assert set(re.findall(r"inline namespace (\w+)", public)) == {f"v{numbers[0]}_{numbers[1]}"}
 
 
 @pytest.mark.parametrize("python", ["3.11", "3.12"])
