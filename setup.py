@@ -140,7 +140,7 @@ class BinaryDistribution(Distribution):
 
 setup(
     distclass=BinaryDistribution,
-    packages=find_packages(include=["hpccd_ros", "hpccd_ros.*", "hpccd_core", "hpccd_core.*"]),
+    packages=find_packages(include=["hpccd_ros", "hpccd_ros.*"]),
     package_data={"": ["*.pyi", "py.typed", "*.yaml", "*.json"]},
     cmdclass={
         "build_py": FreshPythonFiles,

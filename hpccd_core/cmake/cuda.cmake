@@ -16,9 +16,7 @@ function(hpccd_find_cuda)
   endif()
 
   # The nvidia-cuda-nvcc wheel puts the compiler beside the Python packages.
-  execute_process(COMMAND ${Python3_EXECUTABLE} -c
-    "import sys; print(';'.join(p + '/nvidia/cu13/bin' for p in sys.path if p))"
-    OUTPUT_VARIABLE wheels OUTPUT_STRIP_TRAILING_WHITESPACE)
+  hpccd_python_folders(wheels nvidia/cu13/bin)
   find_program(HPCCD_NVCC nvcc HINTS ENV CUDA_HOME PATH_SUFFIXES bin PATHS ${wheels} /usr/local/cuda/bin)
   set(problem "")
   if(NOT HPCCD_NVCC)
@@ -85,4 +83,6 @@ function(hpccd_find_cuda)
   endforeach()
   set(hpccd_cuda_objects "${objects}" PARENT_SCOPE)
   set(hpccd_cuda_libraries "${runtime};${CMAKE_DL_LIBS};rt" PARENT_SCOPE)
+  get_filename_component(folder "${runtime}" DIRECTORY)
+  set(cuda_runtime_folder "${folder}" PARENT_SCOPE)
 endfunction()

@@ -10,6 +10,7 @@
 #include "backends/available.h"
 #include "backends/tuner.h"
 #include "base/length.h"
+#include "checked.h"
 #include "gpu/results_to_device.h"
 #include "prepared_impl.h"
 
@@ -30,7 +31,7 @@ using Counts = std::map<std::string, std::uint64_t>;
 
 struct Detector::Impl {
   Impl(std::shared_ptr<const Scene> scene, const Options& options)
-      : common(std::move(scene), options, pool_threads(options)), shared(common, common.pool), backends(shared) {}
+      : common(checked(std::move(scene), options), options, pool_threads(options)), shared(common, common.pool), backends(shared) {}
 
   // All that a call changes is one call's at a time, on whatever thread. Only these two are not:
   std::atomic<Backend> last_backend{Backend::cpu};
@@ -64,6 +65,7 @@ struct Detector::Impl {
       throw InvalidArgument("vertices_t0, vertices_t1: the scene has " + std::to_string(n) + " vertices" +
                             (worlds > 1 ? " in each of " + std::to_string(worlds) + " worlds" : "") + ", but " +
                             std::to_string(t0.n) + " and " + std::to_string(t1.n) + " were given");
+    check_memory("vertices_t0", t0), check_memory("vertices_t1", t1);
     if (t0.is_double != t1.is_double)
       throw InvalidArgument("vertices_t0, vertices_t1: must both be float32 or both be float64");
     if ((t0.on_device || t1.on_device) && !backends.take_device_arrays())

@@ -5,17 +5,6 @@
 
 namespace hpccd {
 
-std::vector<Simd> simd_levels() {
-  std::vector<Simd> levels{Simd::scalar};
-#if defined(HPCCD_X86)
-  if (__builtin_cpu_supports("avx2")) levels.push_back(Simd::avx2);
-  if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512bw") &&
-      __builtin_cpu_supports("avx512vl"))
-    levels.push_back(Simd::avx512);
-#endif
-  return levels;
-}
-
 const char* name_of(Simd simd) {
   switch (simd) {
     case Simd::automatic:
@@ -39,3 +28,15 @@ Simd resolve(Simd wanted) {
 }
 
 }  // namespace hpccd
+
+// Outside of the namespace: what is declared in its inline one would be declared anew inside.
+std::vector<hpccd::Simd> hpccd::simd_levels() {
+  std::vector<Simd> levels{Simd::scalar};
+#if defined(HPCCD_X86)
+  if (__builtin_cpu_supports("avx2")) levels.push_back(Simd::avx2);
+  if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512bw") &&
+      __builtin_cpu_supports("avx512vl"))
+    levels.push_back(Simd::avx512);
+#endif
+  return levels;
+}

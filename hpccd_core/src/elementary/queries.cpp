@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "base/length.h"
@@ -28,10 +29,21 @@ CoordinateMap map_of(const Query& q) {
   return CoordinateMap::around(low, high);
 }
 
+void check_coordinates(std::span<const Query> queries) {
+  for (std::size_t i = 0; i < queries.size(); ++i) {
+    bool good = true;
+    for (const double x : queries[i]) good &= std::fabs(x) <= largest_coordinate;
+    if (!good)
+      throw InvalidArgument("queries[" + std::to_string(i) +
+                            "]: a coordinate is NaN, infinite, or beyond 1e150; move or scale the query");
+  }
+}
+
 void test_queries(Kind kind, std::span<const Query> queries, const Options& options, bool* hit, double* toc) {
   const Accuracy accuracy = options.accuracy;
   const double separation = options.minimum_separation;
   check_length("minimum_separation", separation);
+  check_coordinates(queries);
   const BatchTest test =
       separation > 0 ? separation_batch(resolve(options.simd)) : batch_test(resolve(options.simd), accuracy);
   const Fallback fallback = separation > 0 ? decide_separation : decide_contact;
@@ -84,13 +96,13 @@ void test_queries(Kind kind, std::span<const Query> queries, const Options& opti
 }
 
 }  // namespace
+}  // namespace hpccd
 
-void test_vertex_face(std::span<const Query> queries, const Options& options, bool* hit, double* toc) {
+// Outside of the namespace: what is declared in its inline one would be declared anew inside.
+void hpccd::test_vertex_face(std::span<const Query> queries, const Options& options, bool* hit, double* toc) {
   test_queries(Kind::vertex_face, queries, options, hit, toc);
 }
 
-void test_edge_edge(std::span<const Query> queries, const Options& options, bool* hit, double* toc) {
+void hpccd::test_edge_edge(std::span<const Query> queries, const Options& options, bool* hit, double* toc) {
   test_queries(Kind::edge_edge, queries, options, hit, toc);
 }
-
-}  // namespace hpccd

@@ -30,26 +30,29 @@ std::uint32_t Scene::add_mesh(std::string name, std::span<const std::uint32_t> f
   return static_cast<std::uint32_t>(meshes_.size() - 1);
 }
 
-void Scene::ignore_pair(std::uint32_t mesh_a, std::uint32_t mesh_b) { ignored_[ordered(mesh_a, mesh_b)] = true; }
+Scene::Pair Scene::known(std::uint32_t mesh_a, std::uint32_t mesh_b) const {
+  if (std::max(mesh_a, mesh_b) >= meshes_.size())
+    throw InvalidArgument("mesh_a, mesh_b: the scene has " + std::to_string(meshes_.size()) +
+                          " meshes, numbered from 0");
+  return ordered(mesh_a, mesh_b);
+}
+
+void Scene::ignore_pair(std::uint32_t mesh_a, std::uint32_t mesh_b) { ignored_[known(mesh_a, mesh_b)] = true; }
 
 void Scene::set_accuracy(std::uint32_t mesh_a, std::uint32_t mesh_b, Accuracy accuracy) {
-  accuracy_[ordered(mesh_a, mesh_b)] = accuracy;
+  accuracy_[known(mesh_a, mesh_b)] = accuracy;
 }
 
 void Scene::set_separation(std::uint32_t mesh_a, std::uint32_t mesh_b, double separation) {
-  if (std::max(mesh_a, mesh_b) >= meshes_.size())
-    throw InvalidArgument("mesh_a, mesh_b: the scene has " + std::to_string(meshes_.size()) +
-                          " meshes, numbered from 0");
+  const Pair pair = known(mesh_a, mesh_b);
   check_length("separation", separation);
-  separation_[ordered(mesh_a, mesh_b)] = separation;
+  separation_[pair] = separation;
 }
 
 void Scene::set_features(std::uint32_t mesh_a, std::uint32_t mesh_b, TestedFeatures features) {
-  if (std::max(mesh_a, mesh_b) >= meshes_.size())
-    throw InvalidArgument("mesh_a, mesh_b: the scene has " + std::to_string(meshes_.size()) +
-                          " meshes, numbered from 0");
+  const Pair pair = known(mesh_a, mesh_b);
   require_some("features", features);
-  features_[ordered(mesh_a, mesh_b)] = features;
+  features_[pair] = features;
 }
 
 bool Scene::pair_enabled(std::uint32_t a, std::uint32_t b) const {

@@ -1,0 +1,30 @@
+# SPDX-License-Identifier: Apache-2.0
+# The C++ package: headers, both libraries, and what find_package(hpccd_core) reads.
+include(CMakePackageConfigHelpers)
+set(package_dir "${CMAKE_INSTALL_LIBDIR}/cmake/hpccd_core")
+
+install(DIRECTORY include/hpccd DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}" COMPONENT development
+  FILES_MATCHING PATTERN "*.h")
+foreach(kind static shared)
+  install(TARGETS hpccd_core_${kind} EXPORT hpccd_core_${kind}
+    LIBRARY DESTINATION "${CMAKE_INSTALL_LIBDIR}" COMPONENT runtime NAMELINK_COMPONENT development
+    ARCHIVE DESTINATION "${CMAKE_INSTALL_LIBDIR}" COMPONENT development)
+  install(EXPORT hpccd_core_${kind} NAMESPACE hpccd:: FILE hpccd_core-${kind}.cmake
+    DESTINATION "${package_dir}" COMPONENT development)
+endforeach()
+
+set(built_with_cuda OFF)
+if(hpccd_cuda_objects)
+  set(built_with_cuda ON)
+endif()
+configure_package_config_file(cmake/hpccd_coreConfig.cmake.in "${CMAKE_CURRENT_BINARY_DIR}/hpccd_coreConfig.cmake"
+  INSTALL_DESTINATION "${package_dir}")
+set(compatible SameMajorVersion)
+if(PROJECT_VERSION_MAJOR EQUAL 0)
+  set(compatible SameMinorVersion)
+endif()
+write_basic_package_version_file("${CMAKE_CURRENT_BINARY_DIR}/hpccd_coreConfigVersion.cmake"
+  VERSION ${PROJECT_VERSION} COMPATIBILITY ${compatible})
+install(FILES "${CMAKE_CURRENT_BINARY_DIR}/hpccd_coreConfig.cmake"
+  "${CMAKE_CURRENT_BINARY_DIR}/hpccd_coreConfigVersion.cmake"
+  DESTINATION "${package_dir}" COMPONENT development)

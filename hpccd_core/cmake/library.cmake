@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: Apache-2.0
+# The library: compiled once, put together as an archive and as a shared library.
+add_library(hpccd_core_objects OBJECT ${hpccd_sources})
+hpccd_compile_all_kernels(hpccd_core_objects)
+target_include_directories(hpccd_core_objects PUBLIC include src)
+target_include_directories(hpccd_core_objects SYSTEM PRIVATE ${BOOST_INCLUDE})
+target_link_libraries(hpccd_core_objects PUBLIC Threads::Threads)
+# Contraction of a*b+c would give different bits on machines with and without it. errno of sqrt is nobody's business.
+target_compile_options(hpccd_core_objects PUBLIC -ffp-contract=off PRIVATE -Wall -Wextra -fno-math-errno)
+set_target_properties(hpccd_core_objects PROPERTIES
+  CXX_VISIBILITY_PRESET hidden VISIBILITY_INLINES_HIDDEN ON POSITION_INDEPENDENT_CODE ON)
+
+hpccd_find_cuda()
+if(hpccd_cuda_objects)
+  set_source_files_properties(${hpccd_cuda_objects} PROPERTIES EXTERNAL_OBJECT ON GENERATED ON)
+  # One target makes them, so that two that link them do not make them at the same time.
+  add_custom_target(hpccd_cuda DEPENDS ${hpccd_cuda_objects})
+else()
+  target_sources(hpccd_core_objects PRIVATE src/gpu/unavailable.cpp src/hybrid/unavailable.cpp)
+endif()
+
+# hpccd_add_library(target kind)
+function(hpccd_add_library target kind)
+  add_library(${target} ${kind} $<TARGET_OBJECTS:hpccd_core_objects> ${hpccd_cuda_objects})
+  if(hpccd_cuda_objects)
+    add_dependencies(${target} hpccd_cuda)
+  endif()
+  set_target_properties(${target} PROPERTIES OUTPUT_NAME hpccd_core LINKER_LANGUAGE CXX)
+  target_compile_features(${target} PUBLIC cxx_std_20)
+  target_include_directories(${target} PUBLIC
+    $<BUILD_INTERFACE:${CMAKE_CURRENT_SOURCE_DIR}/include> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
+endfunction()
+
+hpccd_add_library(hpccd_core_static STATIC)
+set_target_properties(hpccd_core_static PROPERTIES EXPORT_NAME core_static)
+# Consumers of an installed archive find the CUDA run-time library anew: it lies elsewhere on their machine.
+target_link_libraries(hpccd_core_static PUBLIC Threads::Threads)
+foreach(library IN LISTS hpccd_cuda_libraries)
+  target_link_libraries(hpccd_core_static PUBLIC "$<BUILD_INTERFACE:${library}>")
+endforeach()
+
+if(NOT HPCCD_INSTALL_CPP)
+  return()
+endif()
+hpccd_add_library(hpccd_core_shared SHARED)
+# Before 1.0 a minor version may change the binary interface.
+set(soversion ${PROJECT_VERSION_MAJOR})
+if(PROJECT_VERSION_MAJOR EQUAL 0)
+  set(soversion ${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR})
+endif()
+set_target_properties(hpccd_core_shared PROPERTIES
+  EXPORT_NAME core_shared VERSION ${PROJECT_VERSION} SOVERSION ${soversion})
+target_link_libraries(hpccd_core_shared PRIVATE Threads::Threads ${hpccd_cuda_libraries})
+# Compiled hidden, the standard library's templates and CUDA's run time would still be shown.
+set(script "${CMAKE_CURRENT_BINARY_DIR}/exported_names.map")
+configure_file(cmake/exported_names.map.in "${script}" @ONLY)
+target_link_options(hpccd_core_shared PRIVATE "LINKER:--version-script=${script}")
+if(NOT HPCCD_SANITIZE)  # whose run time is the program's
+  target_link_options(hpccd_core_shared PRIVATE LINKER:--no-undefined)
+endif()
+set_target_properties(hpccd_core_shared PROPERTIES LINK_DEPENDS "${script}")

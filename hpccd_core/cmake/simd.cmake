@@ -1,0 +1,24 @@
+# SPDX-License-Identifier: Apache-2.0
+# Kernels once per instruction set; which one runs is chosen at run time (src/base/simd.cpp).
+set(hpccd_kernels
+  src/base/machine_rate src/elementary/batch src/elementary/distance/distance_batch src/elementary/intersection_batch
+  src/traverse/leaf_pairs src/traverse/leaf_edge_faces)
+
+# hpccd_compile_kernels(target instruction_set [option ...])
+function(hpccd_compile_kernels target set)
+  list(TRANSFORM hpccd_kernels APPEND "_${set}.cpp" OUTPUT_VARIABLE sources)
+  target_sources(${target} PRIVATE ${sources})
+  set_source_files_properties(${sources} PROPERTIES COMPILE_OPTIONS "${ARGN}")
+endfunction()
+
+# hpccd_compile_all_kernels(target): for every set that the processor's family may have.
+function(hpccd_compile_all_kernels target)
+  hpccd_compile_kernels(${target} scalar)
+  if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64|amd64")
+    hpccd_compile_kernels(${target} avx2 -mavx2 -mbmi -Wno-psabi)
+    # g++ 12 warns of _mm512_undefined_pd() in its own header (GCC bug 105593), and of subscript 1 of an array of two.
+    hpccd_compile_kernels(${target} avx512 -mavx512f -mavx512dq -mavx512bw -mavx512vl -mbmi
+      -mprefer-vector-width=512 -Wno-psabi -Wno-maybe-uninitialized -Wno-array-bounds)
+    target_compile_definitions(${target} PRIVATE HPCCD_X86)
+  endif()
+endfunction()

@@ -1,0 +1,32 @@
+# SPDX-License-Identifier: Apache-2.0
+# What the library is made of on every machine; room by room, as data goes.
+set(hpccd_sources
+  src/base/machine_rate.cpp src/base/parallel.cpp src/base/simd.cpp src/base/thread_affinity.cpp
+  src/scene/edges.cpp src/scene/features.cpp src/scene/scene.cpp src/scene/separation_table.cpp
+  src/scene/static_meshes.cpp
+  src/bvh/build.cpp src/bvh/motion_bounds.cpp src/bvh/refit.cpp src/bvh/split.cpp
+  src/elementary/batch.cpp src/elementary/distance/distance_batch.cpp src/elementary/exact/contact.cpp
+  src/elementary/exact/distance.cpp src/elementary/exact/intersection.cpp src/elementary/exact/separation.cpp
+  src/elementary/exact/wide/approach.cpp src/elementary/exact/wide/common_roots.cpp
+  src/elementary/exact/wide/earliest.cpp src/elementary/exact/wide/first_time.cpp
+  src/elementary/exact/wide/isolate.cpp src/elementary/exact/wide/part.cpp src/elementary/exact/wide/root.cpp
+  src/elementary/exact/wide/sign_at_root.cpp src/elementary/fallback.cpp src/elementary/intersection_batch.cpp
+  src/elementary/queries.cpp
+  src/traverse/drift.cpp src/traverse/leaf_edge_faces.cpp src/traverse/leaf_pairs.cpp src/traverse/mesh_pairs.cpp
+  src/traverse/nearest_pairs.cpp src/traverse/pair_pool.cpp src/traverse/tasks.cpp src/traverse/traverse.cpp
+  src/traverse/worker.cpp
+  src/contacts/canonical.cpp src/contacts/gaps.cpp src/contacts/intersections.cpp src/contacts/nearest_points.cpp
+  src/contacts/order.cpp src/contacts/places.cpp src/contacts/worlds.cpp
+  src/paper/ancestry.cpp src/paper/build.cpp src/paper/front.cpp src/paper/front_based.cpp src/paper/hierarchy.cpp
+  src/paper/high_level.cpp src/paper/method.cpp src/paper/naive.cpp src/paper/primitive_pairs.cpp
+  src/paper/published.cpp src/paper/refit.cpp src/paper/scheduling.cpp src/paper/shared_pairs.cpp
+  src/paper/task_units.cpp src/paper/upkeep.cpp
+  src/hybrid/communication.cpp src/hybrid/engine.cpp src/hybrid/segments.cpp src/hybrid/sink.cpp
+  src/backends/available.cpp src/backends/cpu_backend.cpp src/backends/cpu_earliest.cpp
+  src/backends/cpu_snapshots.cpp src/backends/cpu_unlisted.cpp src/backends/gpu_backend.cpp
+  src/backends/gpu_contacts.cpp src/backends/gpu_earliest.cpp src/backends/gpu_places.cpp
+  src/backends/gpu_prepare.cpp src/backends/gpu_undecided.cpp src/backends/gpu_worlds.cpp
+  src/backends/hybrid_backend.cpp src/backends/moving_tree.cpp src/backends/near_list.cpp
+  src/backends/one_by_one.cpp src/backends/resources.cpp src/backends/short_edge.cpp src/backends/tuner.cpp
+  src/backends/work_counts.cpp src/backends/world_by_world.cpp src/backends/worlds_on_cpus.cpp
+  src/checked.cpp src/detector.cpp src/errors.cpp src/prepared.cpp src/version.cpp)

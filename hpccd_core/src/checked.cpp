@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "checked.h"
+
+#include <string>
+
+#include "gpu/device.h"
+
+namespace hpccd {
+namespace {
+
+void check_range(const char* name, long long value, long long least, long long most) {
+  if (value < least || value > most)
+    throw InvalidArgument(std::string(name) + ": must lie in [" + std::to_string(least) + ", " + std::to_string(most) +
+                          "], got " + std::to_string(value));
+}
+
+}  // namespace
+
+std::shared_ptr<const Scene> checked(std::shared_ptr<const Scene> scene, const Options& o) {
+  if (!scene) throw InvalidArgument("scene: is null; make one by std::make_shared<hpccd::Scene>()");
+  check_range("threads", o.threads, 0, 1024);
+  check_range("hybrid_segments", static_cast<long long>(o.hybrid_segments), 1, 65536);
+  check_range("hybrid_segment_pairs", static_cast<long long>(o.hybrid_segment_pairs), 1, 1 << 20);
+  check_range("gpus", o.gpus, 0, 1024);
+  if (o.gpus == 0 || (o.backend != Backend::hybrid && o.backend != Backend::automatic)) return scene;
+  const auto here = static_cast<int>(gpu::status().devices.size());
+  if (o.gpus > here)
+    throw InvalidArgument("gpus: " + std::to_string(o.gpus) + " were asked for, " + std::to_string(here) +
+                          " are usable here; give at most so many, or 0 for all");
+  return scene;
+}
+
+void check_memory(const char* name, Positions vertices) {
+  if (vertices.n > 0 && !vertices.data)
+    throw InvalidArgument(std::string(name) + ": data is null, but " + std::to_string(vertices.n) + " rows were named");
+}
+
+}  // namespace hpccd
