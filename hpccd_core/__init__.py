@@ -6,7 +6,8 @@ contacts = Detector(scene).detect(vertices_t0, vertices_t1)
 """
 
 from . import _find_core  # noqa: F401  (lets a source checkout use the installed extension modules)
-from ._core import Cancelled, DeviceArray, InvalidArgument
+from ._core import Cancelled, DeviceArray, InvalidArgument, __version__
+from ._installations import warn_of_several as _warn_of_several
 from .contacts import Contacts
 from .detector import Detector
 from .device_results import DeviceContacts, DeviceIntersections, DeviceProximity
@@ -30,8 +31,11 @@ __all__ = [
     "PreparedDetection",
     "Proximity",
     "Scene",
+    "__version__",
     "backends",
     "gpu_status",
     "test_edge_edge",
     "test_vertex_face",
 ]
+
+_warn_of_several()

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from .devices import GpuStatus
 
+__version__: str
 MOST_WORLDS: int
 
 class InvalidArgument(ValueError): ...

@@ -3,7 +3,7 @@
 
 import threading
 from collections.abc import Iterable
-from typing import Any, Literal, Unpack, cast, overload
+from typing import TYPE_CHECKING, Any, Literal, cast, overload
 
 from numpy.typing import ArrayLike, NDArray
 
@@ -33,6 +33,9 @@ from .options import (
 from .proximity import Intersections, Proximity
 from .scene import Scene
 from .snapshot_queries import SnapshotQueries, names_of_one_argument
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack  # typing has it from Python 3.11 on
 
 
 def _require_device(backend: str, method: str) -> None:
@@ -101,7 +104,7 @@ class Detector(MotionQueries[OfMotion], SnapshotQueries[OfNear, OfPierced]):
         scene: Scene,
         *,
         results: Literal["host"] = "host",
-        **options: Unpack[Options],
+        **options: "Unpack[Options]",
     ) -> None: ...
 
     @overload
@@ -110,7 +113,7 @@ class Detector(MotionQueries[OfMotion], SnapshotQueries[OfNear, OfPierced]):
         scene: Scene,
         *,
         results: Literal["device"],
-        **options: Unpack[Options],
+        **options: "Unpack[Options]",
     ) -> None: ...
 
     def __init__(

@@ -348,6 +348,7 @@ PYBIND11_MODULE(_core, m) {
       .def_property_readonly("pointer",
                              [](const gpu::MemoryOnDevice& m) { return reinterpret_cast<std::uintptr_t>(m.data()); });
 
+  m.attr("__version__") = version();
   m.attr("MOST_WORLDS") = Options::most_worlds;
   m.def("test_vertex_face", &run_queries<&test_vertex_face>, "queries"_a, "accuracy"_a, "simd"_a,
         "minimum_separation"_a);

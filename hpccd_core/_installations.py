@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The package comes with two distributions: hpccd-core (the core alone) and hpccd (with the ROS node).
+
+Where both are installed the one that came last has overwritten the other, and which of two folders Python takes is a
+matter of the order of its path: neither should go unnoticed.
+"""
+
+import sys
+import warnings
+from pathlib import Path
+
+REMEDY = "Remedy: keep one of them; pip uninstall hpccd-core hpccd, then install the one you want"
+
+
+def folders() -> list[Path]:
+    """The folders on Python's path that hold a compiled hpccd_core, the one that is taken first."""
+    found = [Path(entry or ".").resolve() / "hpccd_core" for entry in sys.path]
+    return [folder for folder in dict.fromkeys(found) if any(folder.glob("_core.*.so"))]
+
+
+def distributions() -> list[str]:
+    """Which of hpccd-core and hpccd are installed, with version and folder. Their names only are looked at: to read
+    what importlib.metadata knows would take longer than to import this package."""
+    return [
+        f"{info.name.removesuffix('.dist-info')} in {folder.parent}"
+        for folder in folders()
+        for name in ("hpccd_core", "hpccd")
+        for info in sorted(folder.parent.glob(f"{name}-*.dist-info"))
+    ]
+
+
+def warn_of_several() -> None:
+    """A RuntimeWarning where more than one is installed."""
+    names = distributions()
+    places = folders()
+    if len(names) > 1:
+        warnings.warn(f"hpccd_core is installed more than once: {', '.join(names)}. {REMEDY}", RuntimeWarning, 3)
+    elif len(places) > 1:
+        found = ", ".join(map(str, places))
+        warnings.warn(f"hpccd_core is installed more than once: {found}; the first is used. {REMEDY}", RuntimeWarning, 3)
