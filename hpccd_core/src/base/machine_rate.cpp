@@ -14,33 +14,18 @@
 #include "base/machine_rate_kernels.h"
 #include "base/parallel.h"
 #include "base/simd.h"
+#include "base/simd/sets.h"
 
 namespace hpccd {
 
 // Of machine_rate.inl, compiled for each instruction set.
-namespace scalar {
-RateKernels rate_kernels();
-}
-#if defined(HPCCD_X86)
-namespace avx2 {
-RateKernels rate_kernels();
-}
-namespace avx512 {
-RateKernels rate_kernels();
-}
-#endif
+HPCCD_IN_EACH_SET(RateKernels rate_kernels();)
 
 namespace {
 
 using Seconds = std::chrono::duration<double>;
 
-RateKernels kernels([[maybe_unused]] Simd simd) {
-#if defined(HPCCD_X86)
-  if (simd == Simd::avx512) return avx512::rate_kernels();
-  if (simd == Simd::avx2) return avx2::rate_kernels();
-#endif
-  return scalar::rate_kernels();
-}
+RateKernels kernels(Simd simd) { return HPCCD_OF_SET(simd, rate_kernels)(); }
 
 // Of one thread, written by it: so its pages lie in the memory next to its core.
 class Buffer {
