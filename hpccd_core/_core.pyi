@@ -54,6 +54,7 @@ class Simd(_Enumeration):
     scalar: ClassVar[Simd]
     avx2: ClassVar[Simd]
     avx512: ClassVar[Simd]
+    neon: ClassVar[Simd]
 
 class Rate(_Enumeration):
     comparisons: ClassVar[Rate]

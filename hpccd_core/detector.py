@@ -54,10 +54,10 @@ class Detector(MotionQueries[OfMotion], SnapshotQueries[OfNear, OfPierced]):
 
     accuracy: "fast", "balanced", "conservative" or "exact"; backend: "auto", "cpu", "hybrid" or "gpu"; threads: 0 for
     all cores; report: "all" contacts, those at the earliest time only ("first"), or one contact ("any"); outputs: any
-    of "points", "normals", "closest"; simd: "auto", "scalar", "avx2" or "avx512" (the result is the same). On the GPU
-    "any" gives the first contact in canonical order. "fast" is computed as "balanced" by "hybrid" (which "auto"
-    leaves out then), on the GPU where other pairs of meshes have another tier or a separation, and where edges are
-    shorter than a 2,000th to a 4,000th of the scene. What each tier promises: docs/accuracy.md.
+    of "points", "normals", "closest"; simd: "auto", "scalar", "avx2", "avx512" (x86-64) or "neon" (aarch64); the result
+    is the same. On the GPU "any" gives the first contact in canonical order. "fast" is computed as "balanced" by
+    "hybrid" (which "auto" leaves out then), on the GPU where other pairs of meshes have another tier or a separation,
+    and where edges are shorter than a 2,000th to a 4,000th of the scene. What each tier promises: docs/accuracy.md.
     minimum_separation (in coordinate units): report every pair whose Euclidean distance is at most this at some time of
     the step, and the earliest such time; 0: those that touch. scene.set_separation and set_separation() say it for a
     pair of meshes. Neighbours that share no vertex count like all others: keep it below the shortest edge. "exact":

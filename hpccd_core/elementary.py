@@ -21,9 +21,9 @@ def test_vertex_face(
     """Whether and when moving vertices touch moving triangles.
 
     queries: (Q, 8, 3) float32 or float64, rows v f0 f1 f2 at t=0, then the same at t=1. accuracy: as for Detector.
-    simd: "auto", "scalar", "avx2" or "avx512"; the result is the same. minimum_separation, tolerance: as for Detector.
-    Returns hit (Q,) bool and toc (Q,) float64,
-    +inf where there is no contact.
+    simd: "auto", "scalar", "avx2", "avx512" (x86-64) or "neon" (aarch64); the result is the same.
+    minimum_separation, tolerance: as for Detector. Returns hit (Q,) bool and toc (Q,) float64, +inf where there is no
+    contact.
     """
     return _test(_core.test_vertex_face, queries, accuracy, simd, minimum_separation, tolerance)
 

@@ -10,7 +10,7 @@ Method = Literal["default", "published", "naive", "front"]
 Output = Literal["points", "normals", "closest"]
 Report = Literal["all", "first", "any"]
 Results = Literal["host", "device"]
-Simd = Literal["auto", "scalar", "avx2", "avx512"]
+Simd = Literal["auto", "scalar", "avx2", "avx512", "neon"]
 
 ACCURACIES: tuple[str, ...] = get_args(Accuracy)
 BACKENDS: tuple[str, ...] = get_args(Backend)

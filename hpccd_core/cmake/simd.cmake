@@ -20,5 +20,8 @@ function(hpccd_compile_all_kernels target)
     hpccd_compile_kernels(${target} avx512 -mavx512f -mavx512dq -mavx512bw -mavx512vl -mbmi
       -mprefer-vector-width=512 -Wno-psabi -Wno-maybe-uninitialized -Wno-array-bounds)
     target_compile_definitions(${target} PRIVATE HPCCD_X86)
+  elseif(CMAKE_SYSTEM_PROCESSOR MATCHES "aarch64|AARCH64|arm64|ARM64")
+    hpccd_compile_kernels(${target} neon)
+    target_compile_definitions(${target} PRIVATE HPCCD_ARM64)
   endif()
 endfunction()

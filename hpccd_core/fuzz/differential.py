@@ -15,7 +15,7 @@ from . import questions
 from .questions import CONTACT, DISTANCES, INTERSECTIONS, PROXIMITY, SEPARATION, STEP, Answers, Batch
 from .steps import EARLY, contradict
 
-SIMD = ("scalar", "avx2", "avx512")
+SIMD = ("scalar", "avx2", "avx512", "neon")
 QUESTIONS = (CONTACT, SEPARATION, PROXIMITY, INTERSECTIONS, DISTANCES, STEP)
 
 # Promised by `exact`: within this of the true time; within this, times the size of the query, of the true distance.

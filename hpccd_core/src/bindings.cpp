@@ -190,7 +190,8 @@ PYBIND11_MODULE(_core, m) {
       .value("auto", Simd::automatic)
       .value("scalar", Simd::scalar)
       .value("avx2", Simd::avx2)
-      .value("avx512", Simd::avx512);
+      .value("avx512", Simd::avx512)
+      .value("neon", Simd::neon);
   py::enum_<Rate>(m, "Rate")
       .value("comparisons", Rate::comparisons)
       .value("floats", Rate::floats)

@@ -151,7 +151,7 @@ def test_thread_counts_change_nothing(make, accuracy):
 
 
 @SCENES
-@pytest.mark.parametrize("simd", ["avx2", "avx512"])
+@pytest.mark.parametrize("simd", ["avx2", "avx512", "neon"])
 def test_instruction_sets_change_nothing(make, simd):
     meshes = make(np.random.default_rng(31))
     try:

@@ -156,7 +156,7 @@ def test_tiers_without_promise_err_little_where_nothing_is_degenerate(kind, accu
 
 @KINDS
 @pytest.mark.parametrize("accuracy", ACCURACIES)
-@pytest.mark.parametrize("simd", ["avx2", "avx512"])
+@pytest.mark.parametrize("simd", ["avx2", "avx512", "neon"])
 def test_instruction_sets_agree_to_the_bit(kind, accuracy, simd):
     rng = np.random.default_rng(7)
     queries = np.concatenate([disturb(rng, g(rng, 301), kind) for g in GENERATORS[kind].values()])

@@ -13,7 +13,7 @@ from hpccd_core.options import FEATURES
 
 METHODS = ("default", "published", "naive", "front")
 SELECTIONS = (("vertex_face",), ("edge_edge",), FEATURES)
-SIMD = tuple(level for level in ("scalar", "avx2", "avx512") if level in hc._core.simd_levels())
+SIMD = tuple(hc._core.simd_levels())
 
 
 def mesh_of(meshes):

@@ -24,8 +24,8 @@ enum class Report : std::uint8_t { all, first, any };
 /// Tang et al. 2009). Contacts are the same.
 enum class Method : std::uint8_t { standard, published, naive, front };
 
-/// Instruction sets. The answers are the same with each.
-enum class Simd : std::uint8_t { automatic, scalar, avx2, avx512 };
+/// Instruction sets: avx2 and avx512 of x86-64, neon of aarch64. The answers are the same with each.
+enum class Simd : std::uint8_t { automatic, scalar, avx2, avx512, neon };
 
 /// Those usable on this machine, best last. From any thread.
 HPCCD_API std::vector<Simd> simd_levels();

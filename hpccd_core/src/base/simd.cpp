@@ -3,6 +3,10 @@
 
 #include <algorithm>
 
+#if defined(HPCCD_ARM64) && defined(__linux__)
+#include <sys/auxv.h>
+#endif
+
 namespace hpccd {
 
 const char* name_of(Simd simd) {
@@ -15,6 +19,8 @@ const char* name_of(Simd simd) {
       return "avx2";
     case Simd::avx512:
       return "avx512";
+    case Simd::neon:
+      return "neon";
   }
   return "?";
 }
@@ -37,6 +43,10 @@ std::vector<hpccd::Simd> hpccd::simd_levels() {
   if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512bw") &&
       __builtin_cpu_supports("avx512vl"))
     levels.push_back(Simd::avx512);
+#elif defined(HPCCD_ARM64) && defined(__linux__)
+  if (getauxval(AT_HWCAP) & HWCAP_ASIMD) levels.push_back(Simd::neon);
+#elif defined(HPCCD_ARM64)
+  levels.push_back(Simd::neon);
 #endif
   return levels;
 }

@@ -32,7 +32,7 @@ known, and on hard queries.
 
 from __future__ import annotations
 
-from hpccd_core.options import ACCURACIES
+from hpccd_core.options import ACCURACIES, SIMD
 from hpccd_ros.base.errors import UserError
 from hpccd_ros.bench import command
 from hpccd_ros.bench.core import accuracy_choice, accuracy_distance, accuracy_sweep, choice, measure, settings
@@ -62,7 +62,7 @@ def configure(parser):
     what = tuple(asked.name for asked in settings.ASKED)
     parser.add_argument("--ask", default=settings.ALL, metavar="NAME,...",
                         help=f"for which contacts scenes are asked: {', '.join(what)} (default: %(default)s)")
-    parser.add_argument("--simd", default="auto", metavar="NAME,...", help="of auto, scalar, avx2, avx512")
+    parser.add_argument("--simd", default="auto", metavar="NAME,...", help=f"of {', '.join(SIMD)}")
     parser.add_argument("--sweep-queries", type=int, default=2000, metavar="N",
                         help="queries of each kind at each point of the sweeps; 0: none (default: %(default)s)")
     parser.add_argument("--seed", type=int, default=1, metavar="N", help="of the sweeps (default: %(default)s)")
@@ -84,7 +84,7 @@ def run(args) -> int:
         command.skipped(report, "backend", refused)
     if not backends:
         raise UserError(f"--backend {args.backend}: none of these works here; see `hpccd info`")
-    sets, refused = usable("simd", command.listed("--simd", args.simd, ("auto", "scalar", "avx2", "avx512")))
+    sets, refused = usable("simd", command.listed("--simd", args.simd, SIMD))
     command.skipped(report, "instruction set", refused)
     for source in sources:
         _measure_scene(report, source, asked, _options(tiers, backends, sets, args), args)

@@ -2,7 +2,7 @@
 """The methods and the instruction sets side by side, with all threads and with one: what each brings, and that none
 changes a contact.
 
-  hpccd bench methods                        default, published, naive, front; scalar, avx2, avx512
+  hpccd bench methods                        default, published, naive, front; scalar, avx2, avx512, neon
   hpccd bench methods cloth-ball --repeat 11
 
 Each row is compared with the first one, the default. The number of node pairs visited and of candidates tested tells
@@ -11,20 +11,19 @@ whether a method is faster because it does less, or because it does the same in 
 
 from __future__ import annotations
 
-from hpccd_core.options import METHODS
+from hpccd_core import _core
+from hpccd_core.options import METHODS, SIMD
 from hpccd_ros.bench import command
 from hpccd_ros.bench.core import measure
 from hpccd_ros.bench.core.variants import Variant, usable
 from hpccd_ros.bench.report import table
 from hpccd_ros.bench.report.machine import cores
 
-SETS = ("scalar", "avx2", "avx512")
-
 
 def configure(parser):
     command.configure(parser, default=("data", "n-body-like-lr", "cloth-drop"), steps=6)
     parser.add_argument("--methods", default=",".join(METHODS), metavar="NAME,...", help="default: %(default)s")
-    parser.add_argument("--simd", default=",".join(SETS), metavar="NAME,...", help="default: %(default)s")
+    parser.add_argument("--simd", metavar="NAME,...", help="default: all that are usable here")
     command.tier_option(parser)
     command.threads_option(parser)
 
@@ -34,7 +33,8 @@ def run(args) -> int:
     report.note(measure.NOTE)
     methods, refused = usable("method", command.listed("--methods", args.methods, METHODS), accuracy=args.accuracy)
     command.skipped(report, "method", refused)
-    sets, refused = usable("simd", command.listed("--simd", args.simd, SETS), accuracy=args.accuracy)
+    sets = command.listed("--simd", args.simd, SIMD) if args.simd else _core.simd_levels()
+    sets, refused = usable("simd", sets, accuracy=args.accuracy)
     command.skipped(report, "instruction set", refused)
     threads = args.threads or cores()
     for source in sources:

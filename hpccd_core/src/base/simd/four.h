@@ -7,6 +7,8 @@
 #include <cstring>
 #if defined(__SSE2__)
 #include <emmintrin.h>
+#elif defined(__aarch64__)
+#include <arm_neon.h>
 #endif
 
 namespace hpccd {
@@ -28,10 +30,20 @@ typedef std::int32_t Mask4 __attribute__((vector_size(16)));  // of a comparison
 [[gnu::always_inline]] inline unsigned bits4(Mask4 m) {
 #if defined(__SSE2__)
   return static_cast<unsigned>(_mm_movemask_ps((__m128)m));
+#elif defined(__aarch64__)
+  return vaddvq_u32((uint32x4_t)(m & Mask4{1, 2, 4, 8}));
 #else
   unsigned r = 0;
   for (int i = 0; i < 4; ++i) r |= (m[i] ? 1u : 0u) << i;
   return r;
+#endif
+}
+
+[[gnu::always_inline]] inline bool any4(Mask4 m) {
+#if defined(__aarch64__)
+  return vmaxvq_u32((uint32x4_t)m) != 0;
+#else
+  return bits4(m) != 0;
 #endif
 }
 
