@@ -17,6 +17,7 @@ target_link_libraries(_core PRIVATE hpccd_core_static)
 file(GLOB reference_sources CONFIGURE_DEPENDS reference/*.cpp)
 pybind11_add_module(_reference ${reference_sources})
 target_include_directories(_reference SYSTEM PRIVATE ${BOOST_INCLUDE})
+target_compile_options(_reference PRIVATE -ffp-contract=off)
 target_link_libraries(_reference PRIVATE Threads::Threads)
 
 # Where a toolchain links the C++ library into the module, its symbols stay inside: shared with a module that is loaded

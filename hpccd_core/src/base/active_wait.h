@@ -5,10 +5,13 @@
 
 namespace hpccd {
 
-// One turn of active waiting: 15 to 50 ns on x86-64, leaving the core's resources to a sibling thread.
+// One turn of active waiting: 15 to 50 ns on x86-64, leaving the core's resources to a sibling thread. On aarch64 isb:
+// what stands for it there, yield, does nothing on most cores, and a turn would be over at once.
 inline void pause() {
 #if defined(__x86_64__)
   __builtin_ia32_pause();
+#elif defined(__aarch64__)
+  __asm__ __volatile__("isb" ::: "memory");
 #else
   std::this_thread::yield();
 #endif

@@ -12,6 +12,10 @@ namespace hpccd {
 HPCCD_HD std::uint64_t ticks() {
 #if defined(__x86_64__)
   return __builtin_ia32_rdtsc();
+#elif defined(__aarch64__)
+  std::uint64_t now;
+  __asm__ __volatile__("mrs %0, cntvct_el0" : "=r"(now));
+  return now;
 #else
   return 0;
 #endif
