@@ -11,6 +11,7 @@ VENV        ?= .venv
 JOBS        ?= $(shell nproc)
 EXTRAS      ?= test lint interop
 PYTEST_ARGS ?=
+AARCH64_TESTS ?= *
 DEMO_ARGS   ?=
 FUZZ_ARGS   ?= --seconds 60
 
@@ -36,13 +37,13 @@ INSTALLED   := $(VENV)/.hpccd-installed
 SOURCES := $(sort $(shell find CMakeLists.txt setup.py package.xml cmake config msg srv scripts hpccd_ros hpccd_core \
   \( -name __pycache__ -o -path hpccd_core/tests \) -prune -o -type f -print))
 
-.PHONY: help venv demo test test-core test-python test-gpu sanitize fuzz lint format pin clean distclean FORCE
+.PHONY: help venv demo test test-core test-python test-gpu test-aarch64 sanitize fuzz lint format pin clean distclean FORCE
 
 help: ## Show this list
 	@echo "hpccd: continuous collision detection of deforming triangle meshes, as a ROS 2 node."
 	@echo "New here? make demo"
 	@echo
-	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
+	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
 	@echo
 	@echo "Variables, e.g. make test PYTEST_ARGS='-k replay':"
 	@echo "  PYTHON=python3.12   which Python for .venv: 3.11 or 3.12 (default: the first found)"
@@ -50,6 +51,7 @@ help: ## Show this list
 	@echo "  JOBS=4              compile jobs (default: all cores)"
 	@echo "  CMAKE_ARGS=...      passed on to CMake"
 	@echo "  PYTEST_ARGS=...     passed on to pytest      DEMO_ARGS=...  passed on to hpccd demo"
+	@echo "  AARCH64_TESTS='GoldenHashes.*'   which tests test-aarch64 runs (default: all of the core)"
 	@echo "  HPCCD_DATA=folder   scenes with ground truth; without it the tests that need them are skipped"
 
 venv: $(INSTALLED) ## Create .venv, build and install the package (again, where sources have changed)
@@ -69,6 +71,9 @@ test-gpu: venv ## Only the tests of the GPU backends, on a machine with an NVIDI
 	@$(BIN)/python -c 'import sys, hpccd_core as hc; "gpu" in hc.backends() or sys.exit(sys.argv[1])' \
 	  "hpccd: no GPU backend here. Is there an NVIDIA GPU? Without a CUDA toolkit: make venv EXTRAS='test cuda'"
 	$(BIN)/pytest test/gpu $(PYTEST_ARGS)
+
+test-aarch64: $(ENVIRONMENT) ## The C++ tests compiled for aarch64, in an emulator (g++-aarch64-linux-gnu, qemu-user)
+	@bash scripts/test_aarch64.sh $(VENV) '$(AARCH64_TESTS)'
 
 sanitize: $(ENVIRONMENT) ## C++ tests under AddressSanitizer + UndefinedBehaviorSanitizer, then ThreadSanitizer
 	@$(call run_core_tests,build/core-asan,-DCMAKE_BUILD_TYPE=RelWithDebInfo -DHPCCD_SANITIZE=address$(comma)undefined)

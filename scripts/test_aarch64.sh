@@ -1,0 +1,35 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+# test_aarch64.sh VENV FILTER: C++ tests of the core, compiled for aarch64 and run in an emulator, whose speed says
+# nothing. FILTER: which, as GoogleTest writes it; of golden hashes only, nothing else is compiled.
+# test_aarch64.sh --check: only whether this machine can.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+missing=()
+command -v aarch64-linux-gnu-g++ >/dev/null || missing+=(g++-aarch64-linux-gnu)
+command -v qemu-aarch64 >/dev/null || command -v qemu-aarch64-static >/dev/null || missing+=(qemu-user)
+if [ ${#missing[@]} -gt 0 ]; then
+  echo "hpccd: tests for aarch64 need what is missing here: ${missing[*]}" >&2
+  echo "Remedy on Debian or Ubuntu: sudo apt install ${missing[*]}" >&2
+  exit 1
+fi
+[ "$1" != --check ] || exit 0
+
+venv=$(cd "$1" && pwd) filter=$2
+case $filter in
+  GoldenHashes.*) tests=hpccd_core_golden_tests ;;
+  *) tests=hpccd_core_tests ;;
+esac
+
+build=build/core-aarch64
+mkdir -p build
+# shellcheck source=/dev/null
+. "$venv/build.env"
+cmake -S hpccd_core -B $build -G Ninja --toolchain "$PWD/cmake/toolchains/aarch64-linux-gnu.cmake" \
+  -DCMAKE_BUILD_TYPE=Release -DHPCCD_BUILD_TESTS=ON -DHPCCD_CUDA=OFF -DGTest_DIR="$PWD/cmake/gtest" \
+  -DHPCCD_GTEST_SOURCE="$venv/src/gtest_vendor" -DPython3_EXECUTABLE="$venv/bin/python" \
+  >$build.log 2>&1 || { cat $build.log; exit 1; }
+cmake --build $build --target $tests
+emulator=$(command -v qemu-aarch64 || command -v qemu-aarch64-static)
+"$emulator" -L /usr/aarch64-linux-gnu $build/$tests --gtest_filter="$filter" --gtest_brief=1
