@@ -37,4 +37,5 @@ def warn_of_several() -> None:
         warnings.warn(f"hpccd_core is installed more than once: {', '.join(names)}. {REMEDY}", RuntimeWarning, 3)
     elif len(places) > 1:
         found = ", ".join(map(str, places))
-        warnings.warn(f"hpccd_core is installed more than once: {found}; the first is used. {REMEDY}", RuntimeWarning, 3)
+        text = f"hpccd_core is installed more than once: {found}; the first is used. {REMEDY}"
+        warnings.warn(text, RuntimeWarning, 3)

@@ -15,7 +15,7 @@ endfunction()
 function(hpccd_compile_all_kernels target)
   hpccd_compile_kernels(${target} scalar)
   if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64|amd64")
-    hpccd_compile_kernels(${target} avx2 -mavx2 -mbmi -Wno-psabi)
+    hpccd_compile_kernels(${target} avx2 -mavx2 -mbmi -Wno-psabi -Wno-array-bounds)
     # g++ 12 warns of _mm512_undefined_pd() in its own header (GCC bug 105593), and of subscript 1 of an array of two.
     hpccd_compile_kernels(${target} avx512 -mavx512f -mavx512dq -mavx512bw -mavx512vl -mbmi
       -mprefer-vector-width=512 -Wno-psabi -Wno-maybe-uninitialized -Wno-array-bounds)

@@ -31,7 +31,9 @@ using Counts = std::map<std::string, std::uint64_t>;
 
 struct Detector::Impl {
   Impl(std::shared_ptr<const Scene> scene, const Options& options)
-      : common(checked(std::move(scene), options), options, pool_threads(options)), shared(common, common.pool), backends(shared) {}
+      : common(checked(std::move(scene), options), options, pool_threads(options)),
+        shared(common, common.pool),
+        backends(shared) {}
 
   // All that a call changes is one call's at a time, on whatever thread. Only these two are not:
   std::atomic<Backend> last_backend{Backend::cpu};

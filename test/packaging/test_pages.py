@@ -51,7 +51,7 @@ def test_links(page):
 @each_page
 def test_files(page):
     for word in code(page):
-        for path in re.findall(r"(?<![\w./~-])[\w.-]+(?:/[\w.-]+)+/?", word):
+        for path in re.findall(r"(?<![\w./~-])(?:\./)?([\w-][\w.-]*(?:/[\w.-]+)+/?)", word):
             first = path.partition("/")[0]
             if first in FOLDERS:
                 assert (ROOT / path).exists(), path

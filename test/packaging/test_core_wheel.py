@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The core as a distribution of its own, hpccd-core, beside the one with the ROS node."""
+
+import subprocess
+import sys
+import tomllib
+
+import pytest
+from sources import ROOT
+
+import hpccd_core as hc
+from hpccd_core import _installations
+
+CORE = tomllib.loads((ROOT / "hpccd_core" / "pyproject.toml").read_text())
+
+
+def test_numpy_is_all_that_it_needs():
+    assert [requirement.split(">")[0] for requirement in CORE["project"]["dependencies"]] == ["numpy"]
+
+
+def test_the_licence_is_the_same():
+    assert (ROOT / "hpccd_core" / "LICENSE").read_text() == (ROOT / "LICENSE").read_text()
+
+
+def test_nothing_but_numpy_is_imported():
+    """Nor what later Pythons only have: the core is for Python 3.10 too."""
+    code = (
+        "import sys; before = set(sys.modules); import numpy, hpccd_core, hpccd_core.fuzz, hpccd_core.reference\n"
+        "tops = {name.split('.')[0] for name in set(sys.modules) - before}\n"
+        "print(*sorted(tops - sys.stdlib_module_names - {'numpy', 'hpccd_core'}))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], text=True, capture_output=True, timeout=100, cwd="/")
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.strip() == ""
+
+
+@pytest.fixture
+def environment(tmp_path, monkeypatch):
+    """A folder on Python's path that looks as if the core were installed there."""
+
+    def install(*distributions, folder=tmp_path / "site-packages"):
+        (folder / "hpccd_core").mkdir(parents=True, exist_ok=True)
+        (folder / "hpccd_core" / "_core.cpython-311-x86_64-linux-gnu.so").touch()
+        for name in distributions:
+            (folder / f"{name}.dist-info").mkdir()
+        sys.path.append(str(folder))
+
+    monkeypatch.setattr(sys, "path", [])
+    return install
+
+
+def test_one_installation_is_silent(environment, recwarn):
+    environment("hpccd_core-0.1.0")
+    _installations.warn_of_several()
+    assert not recwarn.list
+
+
+def test_both_distributions_in_one_environment_are_noticed(environment):
+    environment("hpccd_core-0.1.0", "hpccd-0.1.0")
+    with pytest.warns(RuntimeWarning, match="more than once: hpccd_core-0.1.0 in .*, hpccd-0.1.0 in .*Remedy"):
+        _installations.warn_of_several()
+
+
+def test_two_folders_are_noticed(environment, tmp_path):
+    environment("hpccd_core-0.1.0")
+    environment(folder=tmp_path / "workspace")  # of colcon, which leaves no record
+    with pytest.warns(RuntimeWarning, match="more than once: .*site-packages.*workspace.*the first is used"):
+        _installations.warn_of_several()
+
+
+def test_this_environment_holds_one():
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-c", "import hpccd_core"], text=True, capture_output=True, timeout=100
+    )
+    assert done.returncode == 0, done.stderr
+    assert len(_installations.folders()) == 1
+
+
+def test_the_version_is_that_of_the_headers():
+    assert f'#define HPCCD_VERSION "{hc.__version__}"' in (
+        ROOT / "hpccd_core" / "include" / "hpccd" / "version.h"
+    ).read_text()
+
+
+def test_readme_of_the_core(tmp_path):
+    """Its program runs as it stands there, and the whole README has the same."""
+    text = (ROOT / "hpccd_core" / "README.md").read_text()
+    program = text.split("```python\n")[1].split("```")[0]
+    done = subprocess.run([sys.executable, "-c", program], text=True, capture_output=True, timeout=100, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "first at 0.5" in done.stdout
