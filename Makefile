@@ -37,7 +37,8 @@ INSTALLED   := $(VENV)/.hpccd-installed
 SOURCES := $(sort $(shell find CMakeLists.txt setup.py package.xml cmake config msg srv scripts hpccd_ros hpccd_core \
   \( -name __pycache__ -o -path hpccd_core/tests \) -prune -o -type f -print))
 
-.PHONY: help venv demo test test-core test-python test-gpu test-aarch64 sanitize fuzz lint format pin clean distclean FORCE
+.PHONY: help venv demo test test-core test-python test-gpu test-aarch64 sanitize fuzz lint format pin clean distclean \
+  FORCE
 
 help: ## Show this list
 	@echo "hpccd: continuous collision detection of deforming triangle meshes, as a ROS 2 node."

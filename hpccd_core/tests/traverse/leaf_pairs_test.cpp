@@ -128,7 +128,7 @@ struct BlockPairsTest : LeafPairsTest {
     for (auto c = leaf.first_corner; c < leaf.end_corner; ++c)
       for (int i = 0; i < 16; ++i) {
         const VertexKdop& v = motion.kdops[tree.corners[c]];
-        const float x = i < 8 ? v.t0[i] : v.t1[i - 8];
+        const float x = (i < 8 ? v.t0 : v.t1)[i % 8];
         k.low[i] = std::min(k.low[i], x), k.high[i] = std::max(k.high[i], x);
       }
     return k;
