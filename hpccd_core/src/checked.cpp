@@ -3,6 +3,7 @@
 
 #include <string>
 
+#include "base/names.h"
 #include "gpu/device.h"
 
 namespace hpccd {
@@ -18,6 +19,11 @@ void check_range(const char* name, long long value, long long least, long long m
 
 std::shared_ptr<const Scene> checked(std::shared_ptr<const Scene> scene, const Options& o) {
   if (!scene) throw InvalidArgument("scene: is null; make one by std::make_shared<hpccd::Scene>()");
+  check_accuracy(o.accuracy);
+  check_name("backend", o.backend, Backend::gpu);
+  check_name("report", o.report, Report::any);
+  check_name("method", o.method, Method::front);
+  check_name("simd", o.simd, Simd::neon);
   check_range("threads", o.threads, 0, 1024);
   check_range("hybrid_segments", static_cast<long long>(o.hybrid_segments), 1, 65536);
   check_range("hybrid_segment_pairs", static_cast<long long>(o.hybrid_segment_pairs), 1, 1 << 20);

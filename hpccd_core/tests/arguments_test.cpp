@@ -58,6 +58,26 @@ TEST(Arguments, OptionsOutOfRange) {
   EXPECT_EQ(with([](Options&) {}), "nothing");
 }
 
+TEST(Arguments, NumbersThatAreNoNames) {
+  const auto with = [](auto change) {
+    return refused([&] {
+      Options options;
+      change(options);
+      Detector(two_triangles(), options);
+    });
+  };
+  for (const int n : {8, 200, 255}) {
+    EXPECT_EQ(with([&](Options& o) { o.accuracy = static_cast<Accuracy>(n); }), "accuracy");
+    EXPECT_EQ(with([&](Options& o) { o.backend = static_cast<Backend>(n); }), "backend");
+    EXPECT_EQ(with([&](Options& o) { o.report = static_cast<Report>(n); }), "report");
+    EXPECT_EQ(with([&](Options& o) { o.method = static_cast<Method>(n); }), "method");
+    EXPECT_EQ(with([&](Options& o) { o.simd = static_cast<Simd>(n); }), "simd");
+    EXPECT_EQ(refused([&] { two_triangles()->set_accuracy(0, 1, static_cast<Accuracy>(n)); }), "accuracy");
+    EXPECT_EQ(refused([&] { test_vertex_face({}, {.accuracy = static_cast<Accuracy>(n)}, nullptr, nullptr); }),
+              "accuracy");
+  }
+}
+
 TEST(Arguments, NoScene) {
   EXPECT_EQ(refused([] { Detector(nullptr, {}); }), "scene");
 }

@@ -138,6 +138,29 @@ def test_a_component_that_is_not_there(prefix, tmp_path):
         configure(wrong, tmp_path / "build", prefix)
 
 
+@pytest.mark.parametrize(
+    "calls, says",
+    [
+        (
+            "find_package(hpccd_core REQUIRED)\nfind_package(hpccd_core REQUIRED COMPONENTS static)",
+            "core_shared already",
+        ),
+        ("find_package(hpccd_core REQUIRED COMPONENTS static shared)", "is one library"),
+        (
+            "find_package(hpccd_core QUIET COMPONENTS gpu)\nif(hpccd_core_FOUND OR TARGET hpccd::core)\n"
+            'message(FATAL_ERROR "found")\nendif()\nfind_package(hpccd_core REQUIRED COMPONENTS static)\n'
+            "get_target_property(kind hpccd::core INTERFACE_LINK_LIBRARIES)\n"
+            'message(FATAL_ERROR "at last ${kind}")',
+            "at last hpccd::core_static",
+        ),
+    ],
+)
+def test_one_program_gets_one_library(calls, says, prefix, tmp_path):
+    source = project(tmp_path / "user", calls)
+    with pytest.raises(AssertionError, match=r"\s+".join(says.split())):
+        configure(source, tmp_path / "build", prefix)
+
+
 def test_errors_are_caught_across_the_library(prefix, tmp_path):
     """By a program that hides its own names."""
     source = project(

@@ -26,12 +26,12 @@ inline namespace v0_1 {
 ///
 /// Threads: one call at a time; of those that several threads make of one detector, each waits until the one before has
 /// ended. Threads that are to work side by side need a detector each; the scene may be the same. Only cancel(),
-/// options() and last_backend() do not wait. A child made by fork() has none of a detector's threads: its calls throw
-/// std::runtime_error there unless it has one thread only; it may be destroyed.
+/// options() and last_backend() do not wait. A child made by fork(), while no call is under way, has none of a
+/// detector's threads: its calls throw std::runtime_error there unless it has one thread only; it may be destroyed.
 ///
-/// Errors: every call throws InvalidArgument for positions whose number, type or values will not do (see Positions),
-/// Cancelled after cancel(), std::bad_alloc where memory ends. The detector can be used on after each. Failures of a
-/// GPU are no errors: the step is computed on the CPU, and last_gpu_error() tells why.
+/// Errors: every query throws InvalidArgument for positions whose number, type or values will not do (see Positions),
+/// and Cancelled after cancel(); the detector can be used on after the former. After std::bad_alloc make a new one.
+/// Failures of a GPU are no errors: the step is computed on the CPU, and last_gpu_error() tells why.
 class HPCCD_API Detector {
  public:
   /// Throws InvalidArgument for a null scene and an option that will not do here, std::runtime_error where the system
@@ -79,7 +79,7 @@ class HPCCD_API Detector {
   /// As Scene::set_separation, from the next call on, which fits its boxes to it as to any motion.
   void set_separation(std::uint32_t mesh_a, std::uint32_t mesh_b, double separation);
 
-  /// From any thread, without waiting: a call under way, those that wait for it, and all later ones throw Cancelled,
+  /// From any thread, without waiting: a query under way, those that wait for it, and all later ones throw Cancelled,
   /// within 10 ms. What is on a GPU already comes to its end first.
   void cancel();
 
@@ -88,7 +88,7 @@ class HPCCD_API Detector {
   std::map<std::string, std::uint64_t> stats() const;  ///< counts of pairs, tests, contacts, bytes
   std::string last_gpu_error() const;                  ///< why a step meant for the GPU was computed on the CPU, or ""
   // These do not wait.
-  const Options& options() const;  ///< with "automatic" resolved
+  const Options& options() const;  ///< with the number of threads and the instruction set that were chosen
   Backend last_backend() const;    ///< where the last step was computed
 
  private:

@@ -52,7 +52,7 @@ struct Options {
   /// Of Backend::gpu: profile() tells the time on the device too, by stage. The events for it cost 1 us each.
   bool gpu_stages = false;
   /// Of detect, collision_free_step and proximity. Intersections and smallest distances are of whole surfaces.
-  TestedFeatures features;
+  TestedFeatures features{};
   /// Results are asked for on the device, by detect_on_device, proximity_on_device and intersections_on_device alone;
   /// it decides all pairs that it can. Refused where there is no usable GPU.
   bool results_on_device = false;

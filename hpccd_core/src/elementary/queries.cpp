@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "base/length.h"
+#include "base/names.h"
 #include "base/simd.h"
 #include "bvh/coordinate_map.h"
 #include "elementary/distance/distance_batch.h"
@@ -42,6 +43,7 @@ void check_coordinates(std::span<const Query> queries) {
 void test_queries(Kind kind, std::span<const Query> queries, const Options& options, bool* hit, double* toc) {
   const Accuracy accuracy = options.accuracy;
   const double separation = options.minimum_separation;
+  check_accuracy(accuracy);
   check_length("minimum_separation", separation);
   check_coordinates(queries);
   const BatchTest test =

@@ -2,6 +2,7 @@
 #include <algorithm>
 
 #include "base/length.h"
+#include "base/names.h"
 #include "hpccd/hpccd.h"
 #include "scene/tested_features.h"
 
@@ -40,7 +41,9 @@ Scene::Pair Scene::known(std::uint32_t mesh_a, std::uint32_t mesh_b) const {
 void Scene::ignore_pair(std::uint32_t mesh_a, std::uint32_t mesh_b) { ignored_[known(mesh_a, mesh_b)] = true; }
 
 void Scene::set_accuracy(std::uint32_t mesh_a, std::uint32_t mesh_b, Accuracy accuracy) {
-  accuracy_[known(mesh_a, mesh_b)] = accuracy;
+  const Pair pair = known(mesh_a, mesh_b);
+  check_accuracy(accuracy);
+  accuracy_[pair] = accuracy;
 }
 
 void Scene::set_separation(std::uint32_t mesh_a, std::uint32_t mesh_b, double separation) {

@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+// Options that are one of several names: what comes from a file or another language may be any number.
+#pragma once
+
+#include <string>
+
+#include "hpccd/hpccd.h"
+
+namespace hpccd {
+
+// Throws InvalidArgument where `value` is none of the names, of which `last` is the last.
+template <class Enum>
+void check_name(const char* name, Enum value, Enum last) {
+  if (value > last)
+    throw InvalidArgument(std::string(name) + ": " + std::to_string(static_cast<unsigned>(value)) +
+                          " is none of its names; see hpccd/options.h");
+}
+
+inline void check_accuracy(Accuracy accuracy) { check_name("accuracy", accuracy, Accuracy::exact); }
+
+}  // namespace hpccd
