@@ -27,6 +27,9 @@ endfunction()
 # in there. Nobody compiles against the exported target of a wheel: keep such folders for this build only.
 function(_hpccd_keep_own_environment_to_this_build)
   set(target ${PROJECT_NAME}__rosidl_generator_py)
+  if(NOT TARGET ${target})
+    return()  # another package of a workspace, without messages of its own
+  endif()
   get_target_property(folders ${target} INTERFACE_INCLUDE_DIRECTORIES)
   list(TRANSFORM folders REPLACE "^(${CMAKE_SOURCE_DIR}/.*)$" "$<BUILD_INTERFACE:\\1>")
   set_target_properties(${target} PROPERTIES INTERFACE_INCLUDE_DIRECTORIES "${folders}")

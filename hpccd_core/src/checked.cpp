@@ -2,6 +2,7 @@
 #include "checked.h"
 
 #include <string>
+#include <type_traits>
 
 #include "base/names.h"
 #include "gpu/device.h"
@@ -9,7 +10,8 @@
 namespace hpccd {
 namespace {
 
-void check_range(const char* name, long long value, long long least, long long most) {
+template <class T>
+void check_range(const char* name, T value, std::type_identity_t<T> least, std::type_identity_t<T> most) {
   if (value < least || value > most)
     throw InvalidArgument(std::string(name) + ": must lie in [" + std::to_string(least) + ", " + std::to_string(most) +
                           "], got " + std::to_string(value));
@@ -25,8 +27,8 @@ std::shared_ptr<const Scene> checked(std::shared_ptr<const Scene> scene, const O
   check_name("method", o.method, Method::front);
   check_name("simd", o.simd, Simd::neon);
   check_range("threads", o.threads, 0, 1024);
-  check_range("hybrid_segments", static_cast<long long>(o.hybrid_segments), 1, 65536);
-  check_range("hybrid_segment_pairs", static_cast<long long>(o.hybrid_segment_pairs), 1, 1 << 20);
+  check_range("hybrid_segments", o.hybrid_segments, 1, 65536);
+  check_range("hybrid_segment_pairs", o.hybrid_segment_pairs, 1, 1 << 20);
   check_range("gpus", o.gpus, 0, 1024);
   if (o.gpus == 0 || (o.backend != Backend::hybrid && o.backend != Backend::automatic)) return scene;
   const auto here = static_cast<int>(gpu::status().devices.size());

@@ -2,6 +2,7 @@
 // Checks what it is given, picks where a step is computed, and falls back to the CPU where that fails.
 #include <algorithm>
 #include <atomic>
+#include <memory>
 #include <mutex>
 #include <optional>
 #include <thread>
@@ -10,6 +11,7 @@
 #include "backends/available.h"
 #include "backends/tuner.h"
 #include "base/length.h"
+#include "base/one_call.h"
 #include "checked.h"
 #include "gpu/results_to_device.h"
 #include "prepared_impl.h"
@@ -32,78 +34,107 @@ using Counts = std::map<std::string, std::uint64_t>;
 struct Detector::Impl {
   Impl(std::shared_ptr<const Scene> scene, const Options& options)
       : common(checked(std::move(scene), options), options, pool_threads(options)),
-        shared(common, common.pool),
-        backends(shared) {}
+        engine(std::make_unique<Engine>(common)),
+        takes_device_arrays(engine->backends.take_device_arrays()) {}
 
-  // All that a call changes is one call's at a time, on whatever thread. Only these two are not:
+  // All that calls keep from one to the next.
+  struct Engine {
+    explicit Engine(Common& common) : shared(common, common.pool), backends(shared) {}
+    Resources shared;
+    AvailableBackends backends;
+  };
+
+  // All that a call changes is one call's at a time. Only these two are not:
   std::atomic<Backend> last_backend{Backend::cpu};
   Cancellation& cancellation() { return common.cancellation; }
 
-  mutable std::mutex one_call;
+  mutable OneCall one_call;
   Common common;
-  Resources shared;
-  AvailableBackends backends;
+  std::unique_ptr<Engine> engine;  // none after a call that ended unforeseen, as where memory ended
+  const bool takes_device_arrays;
   Tuner tuner;
   // Of the last call. Its other counts stay where they were made until somebody asks.
   std::optional<Counts> found;
   Backend asked = Backend::cpu;  // which may have left the rest to the CPU
 
-  // One call, from its turn to its end.
-  struct Call {
-    explicit Call(Impl& d) : lock(d.one_call) {
-      d.cancellation().heed();
-      d.found.reset();
-      d.common.settle();
-      if (d.backends.use_devices()) callers.emplace();
-      d.shared.profiler.begin();
+  const Options& options() const { return common.options; }
+  AvailableBackends& backends() { return engine->backends; }
+  Profiler& profiler() { return engine->shared.profiler; }
+
+  // One call, from its turn to its end. What is kept may be half of what it should be where something is thrown that
+  // no check foresees: then the next call begins as the first did.
+  template <class Answer>
+  auto call(Answer&& answer) {
+    common.pool.require_threads();
+    const std::lock_guard turn(one_call);
+    cancellation().heed();
+    found.reset();
+    try {
+      common.settle();
+      if (!engine) engine = std::make_unique<Engine>(common);
+      std::optional<gpu::CallersDevice> callers;
+      if (backends().use_devices()) callers.emplace();
+      profiler().begin();
+      return answer();
+    } catch (const InvalidArgument&) {
+      throw;
+    } catch (const Cancelled&) {
+      throw;
+    } catch (const gpu::Error&) {
+      throw;
+    } catch (...) {
+      engine.reset();
+      throw;
     }
-    const std::lock_guard<std::mutex> lock;
-    std::optional<gpu::CallersDevice> callers;
-  };
+  }
+
+  void check(const char* name, Positions vertices) const {
+    const std::size_t n = common.features.n_vertices, worlds = options().worlds;
+    if (vertices.n != n * worlds)
+      throw InvalidArgument(std::string(name) + ": the scene has " + std::to_string(n) + " vertices" +
+                            (worlds > 1 ? " in each of " + std::to_string(worlds) + " worlds" : "") + ", but " +
+                            std::to_string(vertices.n) + " were given; give those of all meshes, in the order added");
+    check_memory(name, vertices);
+    if (vertices.on_device && !takes_device_arrays)
+      throw InvalidArgument(std::string(name) +
+                            ": is in a GPU's memory, which this detector does not use; copy it to the host, or choose "
+                            "the GPU as backend");
+  }
 
   void check(Positions t0, Positions t1) const {
-    const std::size_t n = shared.features.n_vertices, worlds = shared.options.worlds;
-    if (t0.n != n * worlds || t1.n != n * worlds)
-      throw InvalidArgument("vertices_t0, vertices_t1: the scene has " + std::to_string(n) + " vertices" +
-                            (worlds > 1 ? " in each of " + std::to_string(worlds) + " worlds" : "") + ", but " +
-                            std::to_string(t0.n) + " and " + std::to_string(t1.n) + " were given");
-    check_memory("vertices_t0", t0), check_memory("vertices_t1", t1);
+    check("vertices_t0", t0), check("vertices_t1", t1);
     if (t0.is_double != t1.is_double)
-      throw InvalidArgument("vertices_t0, vertices_t1: must both be float32 or both be float64");
-    if ((t0.on_device || t1.on_device) && !backends.take_device_arrays())
-      throw InvalidArgument(
-          "vertices_t0, vertices_t1: are in a GPU's memory, which this detector does not use; copy them "
-          "to the host, or use backend=\"gpu\"");
+      throw InvalidArgument("vertices_t0, vertices_t1: must both be float32 or both be float64; convert one of them");
   }
 
   // Its rows are on the device, where the host cannot read them.
   void require_results_on_host(const char* remedy) const {
-    if (shared.options.results_on_device)
+    if (options().results_on_device)
       throw InvalidArgument("results_on_device: this detector leaves its results on the device; call " +
                             std::string(remedy) + "(), or make a detector without results_on_device");
   }
 
-  Backend pick(bool given_on_device) const {
-    const Backend asked = shared.options.backend;
-    if (backends.works(Backend::gpu) && given_on_device) return Backend::gpu;
-    if (asked != Backend::automatic) return backends.works(asked) ? asked : Backend::cpu;
+  Backend pick(bool given_on_device) {
+    const Backend wanted = options().backend;
+    if (backends().works(Backend::gpu) && given_on_device) return Backend::gpu;
+    if (wanted != Backend::automatic) return backends().works(wanted) ? wanted : Backend::cpu;
     std::vector<Backend> usable;
     for (const Backend b : {Backend::cpu, Backend::gpu, Backend::hybrid})
-      if (backends.works(b) && !(b == Backend::hybrid && shared.rules.any_fast())) usable.push_back(b);
+      if (backends().works(b) && !(b == Backend::hybrid && common.rules.any_fast())) usable.push_back(b);
     return tuner.next(usable);
   }
 
   // Whether rows may be given out where a GPU has written them.
   bool gives_in_place(Backend picked) const {
-    const Options& o = shared.options;
+    const Options& o = options();
     return picked == Backend::gpu && o.worlds == 1 && !o.points && !o.normals && !o.closest;
   }
 
   Detection compute(Backend picked, Positions t0, Positions t1) {
     for (const Backend b : {picked, Backend::cpu}) {
-      if (b != Backend::gpu) t0 = backends.on_host(t0, 0), t1 = backends.on_host(t1, 1);
+      if (b != Backend::gpu) t0 = backends().on_host(t0, 0), t1 = backends().on_host(t1, 1);
       asked = b;
-      if (auto detection = backends.at(b).detect(t0, t1)) return std::move(*detection);
+      if (auto detection = backends().at(b).detect(t0, t1)) return std::move(*detection);
     }
     throw std::logic_error("the CPU has left a step to others");
   }
@@ -112,64 +143,66 @@ struct Detector::Impl {
   Detected detect(Positions t0, Positions t1) {
     require_results_on_host("detect_on_device");
     check(t0, t1);
-    const Call call(*this);
-    const Backend picked = pick(t0.on_device || t1.on_device);
-    const bool in_place = may_be_in_place && gives_in_place(picked);
-    if (in_place) {
-      asked = picked;
-      if (auto d = backends.gpu().detect_in_place(t0, t1)) {
-        note(picked, picked, d->in_place ? d->in_place->n_vf : d->contacts.vf.size(),
-             d->in_place ? d->in_place->n_ee : d->contacts.ee.size());
-        return std::move(*d);
+    return call([&]() -> Detected {
+      const Backend picked = pick(t0.on_device || t1.on_device);
+      const bool in_place = may_be_in_place && gives_in_place(picked);
+      if (in_place) {
+        asked = picked;
+        if (auto d = backends().gpu().detect_in_place(t0, t1)) {
+          note(picked, picked, d->in_place ? d->in_place->n_vf : d->contacts.vf.size(),
+               d->in_place ? d->in_place->n_ee : d->contacts.ee.size());
+          return std::move(*d);
+        }
       }
-    }
-    Detection d = compute(in_place ? Backend::cpu : picked, t0, t1);
-    note(picked, d.computed_by, d.contacts.vf.size(), d.contacts.ee.size());
-    return {std::nullopt, std::move(d.contacts)};
+      Detection d = compute(in_place ? Backend::cpu : picked, t0, t1);
+      note(picked, d.computed_by, d.contacts.vf.size(), d.contacts.ee.size());
+      return {std::nullopt, std::move(d.contacts)};
+    });
   }
 
   // A query of a motion, or of a snapshot given twice: where it is offered and works, else on the CPU.
   template <class Query>
   auto ask(Positions t0, Positions t1, Query&& query) {
-    check(t0, t1);
-    const Call call(*this);
-    Counts counts;
-    for (const Backend b : {backends.works(Backend::gpu) ? Backend::gpu : Backend::cpu, Backend::cpu}) {
-      if (b != Backend::gpu) t0 = backends.on_host(t0, 0), t1 = backends.on_host(t1, 1);
-      if (auto answer = query(backends.at(b), t0, t1, counts)) {
-        shared.profiler.end();
-        last_backend = asked = b;
-        found = counts;
-        return std::move(*answer);
+    return call([&] {
+      Counts counts;
+      for (const Backend b : {backends().works(Backend::gpu) ? Backend::gpu : Backend::cpu, Backend::cpu}) {
+        if (b != Backend::gpu) t0 = backends().on_host(t0, 0), t1 = backends().on_host(t1, 1);
+        if (auto answer = query(backends().at(b), t0, t1, counts)) {
+          profiler().end();
+          last_backend = asked = b;
+          found = counts;
+          return std::move(*answer);
+        }
       }
-    }
-    throw std::logic_error("the CPU has left a query to others");
+      throw std::logic_error("the CPU has left a query to others");
+    });
   }
 
   // Where results stay on the device. at_once(backend): there, or nothing where it failed; then what the CPU answers is
   // brought there.
   template <class AtOnce, class OnHost, class Count>
   DeviceResults on_device(Positions t0, Positions t1, AtOnce&& at_once, OnHost&& on_host, Count&& count) {
-    check(t0, t1);
-    if (!shared.options.results_on_device)
+    if (!options().results_on_device)
       throw InvalidArgument(
           "results_on_device: this detector brings its results to the host; set the option, or call the query without "
           "_on_device");
-    const Call call(*this);
-    std::optional<DeviceResults> results;
-    if (backends.works(Backend::gpu)) results = at_once(backends.gpu());
-    last_backend = asked = results ? Backend::gpu : Backend::cpu;
-    if (!results) {
-      t0 = backends.on_host(t0, 0), t1 = backends.on_host(t1, 1);
-      results = gpu::to_device(on_host(backends.at(Backend::cpu), t0, t1), gpu::status().devices.at(0).number);
-    }
-    shared.profiler.end();
-    found = count(*results);
-    return *results;
+    return call([&] {
+      std::optional<DeviceResults> results;
+      if (backends().works(Backend::gpu)) results = at_once(backends().gpu());
+      last_backend = asked = results ? Backend::gpu : Backend::cpu;
+      if (!results) {
+        t0 = backends().on_host(t0, 0), t1 = backends().on_host(t1, 1);
+        results = gpu::to_device(on_host(backends().at(Backend::cpu), t0, t1), gpu::status().devices.at(0).number);
+      }
+      profiler().end();
+      found = count(*results);
+      return *results;
+    });
   }
 
   template <class Query>
   auto snapshot(Positions vertices, Query&& query) {
+    check("vertices", vertices);
     return ask(vertices, vertices, [&](DetectionBackend& backend, Positions v, Positions, Counts& counts) {
       return query(backend, v, counts);
     });
@@ -177,10 +210,10 @@ struct Detector::Impl {
 
   void note(Backend picked, Backend computed_by, std::uint64_t n_vf, std::uint64_t n_ee) {
     found = {{"vf_contacts", n_vf}, {"ee_contacts", n_ee}};
-    shared.profiler.end();
+    profiler().end();
     last_backend = computed_by;
     if (picked == computed_by)
-      tuner.took(picked, shared.profiler.stages().at("total"));
+      tuner.took(picked, profiler().stages().at("total"));
     else
       tuner.failed(picked);
   }
@@ -189,13 +222,17 @@ struct Detector::Impl {
 Detector::Detector(std::shared_ptr<const Scene> scene, Options options)
     : impl_(std::make_shared<Impl>(std::move(scene), options)) {}
 
-Detector::~Detector() = default;
+// In a child made by fork() the memory of a call that was under way is in the middle of a change: better left alone.
+Detector::~Detector() {
+  if (impl_->one_call.abandoned()) new auto(std::move(impl_));
+}
 
 Contacts Detector::detect(Positions t0, Positions t1) { return impl_->detect<false>(t0, t1).contacts; }
 
 Detected Detector::detect_in_place(Positions t0, Positions t1) { return impl_->detect<true>(t0, t1); }
 
 DeviceResults Detector::detect_on_device(Positions t0, Positions t1) {
+  impl_->check(t0, t1);
   return impl_->on_device(
       t0, t1, [&](GpuBackend& gpu) { return gpu.detect_on_device(t0, t1); },
       [](DetectionBackend& cpu, Positions a, Positions b) { return cpu.detect(a, b).value().contacts; },
@@ -207,6 +244,7 @@ double Detector::collision_free_step(Positions t0, Positions t1) {
 }
 
 std::vector<double> Detector::collision_free_steps(Positions t0, Positions t1) {
+  impl_->check(t0, t1);
   std::vector<double> first = impl_->ask(
       t0, t1, [](DetectionBackend& backend, Positions a, Positions b, Counts&) { return backend.earliest(a, b); });
   for (double& time : first) time = std::min(time, 1.0);
@@ -243,6 +281,7 @@ Intersections Detector::intersections(Positions vertices) {
 
 DeviceResults Detector::proximity_on_device(Positions vertices, double distance) {
   check_length("distance", distance);
+  impl_->check("vertices", vertices);
   return impl_->on_device(
       vertices, vertices, [&](GpuBackend& gpu) { return gpu.proximity_on_device(vertices, distance); },
       [&](DetectionBackend& cpu, Positions v, Positions) { return as_proximity(cpu.proximity(v, distance).value()); },
@@ -260,17 +299,20 @@ std::unique_ptr<PreparedDetection> Detector::prepare(Positions t0, Positions t1,
   if (!t0.on_device || !t1.on_device)
     throw InvalidArgument("vertices_t0, vertices_t1: must be in the memory of the GPU, where they are read each time");
   impl_->check(t0, t1);
-  const Impl::Call call(*impl_);
-  if (!impl_->backends.works(Backend::gpu))
-    throw std::runtime_error("the GPU was given up after failures: " + impl_->backends.last_error());
-  GpuBackend::Prepared p = impl_->backends.gpu().prepare(t0, t1, room);
-  impl_->shared.profiler.end();
   auto prepared = std::make_unique<PreparedDetection::Impl>();
-  prepared->detector = impl_, prepared->pipeline = std::move(p.pipeline), prepared->results = std::move(p.results);
+  impl_->call([&] {
+    AvailableBackends& backends = impl_->backends();
+    if (!backends.works(Backend::gpu))
+      throw gpu::Error("the GPU was given up after failures: " + backends.last_error());
+    GpuBackend::Prepared p = backends.gpu().prepare(t0, t1, room);
+    impl_->profiler().end();
+    prepared->detector = impl_, prepared->pipeline = std::move(p.pipeline), prepared->results = std::move(p.results);
+  });
   return std::unique_ptr<PreparedDetection>(new PreparedDetection(std::move(prepared)));
 }
 
 DeviceResults Detector::intersections_on_device(Positions vertices) {
+  impl_->check("vertices", vertices);
   return impl_->on_device(
       vertices, vertices, [&](GpuBackend& gpu) { return gpu.intersections_on_device(vertices); },
       [](DetectionBackend& cpu, Positions v, Positions) { return cpu.intersections(v).value(); },
@@ -298,30 +340,31 @@ void Detector::cancel() { impl_->cancellation().request(); }
 
 std::map<std::string, double> Detector::profile() const {
   const std::lock_guard lock(impl_->one_call);
-  auto stages = impl_->shared.profiler.stages();
-  impl_->backends.at(impl_->last_backend).add_stages(stages);
+  if (!impl_->engine) return {};
+  auto stages = impl_->profiler().stages();
+  impl_->backends().at(impl_->last_backend).add_stages(stages);
   return stages;
 }
 
 std::map<std::string, std::uint64_t> Detector::stats() const {
   const std::lock_guard lock(impl_->one_call);
   Impl& d = *impl_;
-  if (!d.found) return {};
+  if (!d.found || !d.engine) return {};
   std::map<std::string, std::uint64_t> stats;
-  d.backends.count(d.asked, stats);
+  d.backends().count(d.asked, stats);
   stats.insert(d.found->begin(), d.found->end());
-  stats["triangles"] = d.shared.features.n_faces();
-  stats["bytes"] += d.shared.tree.bytes() + d.shared.features.bytes();
-  if (d.shared.options.worlds > 1) stats["worlds"] = d.shared.options.worlds;
+  stats["triangles"] = d.common.features.n_faces();
+  stats["bytes"] += d.engine->shared.tree.bytes() + d.common.features.bytes();
+  if (d.options().worlds > 1) stats["worlds"] = d.options().worlds;
   return stats;
 }
 
-const Options& Detector::options() const { return impl_->shared.options; }
+const Options& Detector::options() const { return impl_->options(); }
 Backend Detector::last_backend() const { return impl_->last_backend; }
 
 std::string Detector::last_gpu_error() const {
   const std::lock_guard lock(impl_->one_call);
-  return impl_->backends.last_error();
+  return impl_->engine ? impl_->backends().last_error() : std::string();
 }
 
 }  // namespace hpccd

@@ -102,7 +102,10 @@ TEST(Arguments, PositionsThatWillNotDo) {
   const std::vector<double> start = positions(1), end = positions(-1);
   const std::vector<float> single(18);
   const auto detect = [&](Positions t0, Positions t1) { return refused([&] { detector.detect(t0, t1); }); };
-  EXPECT_EQ(detect(Positions::of(start), {}), "vertices_t0, vertices_t1");
+  EXPECT_EQ(detect(Positions::of(start), {}), "vertices_t1");
+  EXPECT_EQ(detect({}, Positions::of(end)), "vertices_t0");
+  EXPECT_EQ(refused([&] { detector.proximity({}, 1); }), "vertices");
+  EXPECT_EQ(refused([&] { detector.intersections({nullptr, 6}); }), "vertices");
   EXPECT_EQ(detect(Positions::of(start), Positions::of(single)), "vertices_t0, vertices_t1");
   EXPECT_EQ(detect(Positions::of(start), {nullptr, 6}), "vertices_t1");
   EXPECT_EQ(detect({nullptr, 6}, Positions::of(end)), "vertices_t0");

@@ -26,11 +26,12 @@ inline namespace v0_1 {
 ///
 /// Threads: one call at a time; of those that several threads make of one detector, each waits until the one before has
 /// ended. Threads that are to work side by side need a detector each; the scene may be the same. Only cancel(),
-/// options() and last_backend() do not wait. A child made by fork(), while no call is under way, has none of a
-/// detector's threads: its calls throw std::runtime_error there unless it has one thread only; it may be destroyed.
+/// options() and last_backend() do not wait. A child made by fork() has none of a detector's threads: its calls throw
+/// std::runtime_error there unless it has one thread only and was in no call; it may be destroyed.
 ///
 /// Errors: every query throws InvalidArgument for positions whose number, type or values will not do (see Positions),
-/// and Cancelled after cancel(); the detector can be used on after the former. After std::bad_alloc make a new one.
+/// and Cancelled after cancel(). The detector can be used on after the former, and after std::bad_alloc, when the next
+/// call takes as long as a first one.
 /// Failures of a GPU are no errors: the step is computed on the CPU, and last_gpu_error() tells why.
 class HPCCD_API Detector {
  public:

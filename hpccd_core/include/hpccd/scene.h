@@ -47,7 +47,7 @@ class HPCCD_API Scene {
   /// Adds a mesh and returns its number.
   /// name: one that no other mesh has. faces: 3 indices a triangle into this mesh's own vertices, [0, n_vertices).
   /// Throws InvalidArgument for a name that is taken, a length that is no multiple of 3, an index out of range (it says
-  /// which), and where the scene would have more than 2^32 - 2 vertices.
+  /// which), and where the scene would have more than 2^32 - 2 vertices. Whatever is thrown, the scene is as it was.
   std::uint32_t add_mesh(std::string name, std::span<const std::uint32_t> faces, std::uint32_t n_vertices,
                          MeshOptions options = {});
 

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "base/parallel.h"
 
-#include <pthread.h>
-
 #include <algorithm>
 #include <exception>
 #include <mutex>
@@ -12,6 +10,7 @@
 #include <utility>
 
 #include "base/active_wait.h"
+#include "base/forks.h"
 
 namespace hpccd {
 namespace {
@@ -48,10 +47,6 @@ void wake(std::atomic<int>& changes) {
 
 int hardware_threads() { return static_cast<int>(std::max(1u, std::thread::hardware_concurrency())); }
 
-// How often this process was a child made by fork(), which has no thread of its parent's pools.
-std::atomic<int> forks{0};
-[[maybe_unused]] const int counting_forks = pthread_atfork(nullptr, nullptr, [] { ++forks; });
-
 }  // namespace
 
 ThreadPool::Entry ThreadPool::Entry::of(std::uint64_t w) {
@@ -64,7 +59,7 @@ std::uint64_t ThreadPool::Entry::word() const {
 }
 
 ThreadPool::ThreadPool(int threads)
-    : count_(threads > 0 ? threads : hardware_threads()), forks_(forks), affinity_(count_), begun_(count_ - 1) {
+    : count_(threads > 0 ? threads : hardware_threads()), forks_(forks()), affinity_(count_), begun_(count_ - 1) {
   // Longer than the serial parts between two jobs of a call, and than a program takes from one call to the next if it
   // does nothing else. More threads than cores would only keep each other from working.
   if (count_ <= hardware_threads()) awake_for_ = std::chrono::microseconds(200);
@@ -87,7 +82,7 @@ ThreadPool::~ThreadPool() { end(); }
 
 void ThreadPool::end() {
   // Threads that are not there can neither be joined nor detached: their memory may be gone.
-  if (forks_ != forks) new auto(std::move(workers_));
+  if (forks_ != forks()) new auto(std::move(workers_));
   stop_ = true;
   wake(starts_);
   for (auto& w : workers_) w.join();
@@ -146,6 +141,11 @@ void ThreadPool::work(int thread) {
   }
 }
 
+void ThreadPool::require_threads() const {
+  if (!workers_.empty() && forks_ != forks())
+    throw std::runtime_error("this detector's threads stayed in the process that made it; make one after the fork");
+}
+
 bool ThreadPool::finished(Join join) const {
   const Entry e = Entry::of(entry_.load());
   return e.finished == (join == Join::all ? workers_.size() : e.joined);
@@ -160,8 +160,7 @@ void ThreadPool::wait_for_threads(Join join) {
 
 void ThreadPool::run(const std::function<void(int)>& job, Join join) {
   if (workers_.empty()) return job(0);
-  if (forks_ != forks)
-    throw std::runtime_error("this detector's threads stayed in the process that made it; make one after the fork");
+  require_threads();
   job_ = &job;
   error_ = nullptr;
   entry_ = Entry{Entry::of(entry_.load()).job + 1, false, 0, 0}.word();

@@ -33,6 +33,8 @@ class ThreadPool {
   };
 
   int size() const { return count_; }
+  // Throws std::runtime_error in a child made by fork(), which has none of them but the caller's.
+  void require_threads() const;
 
   // From here on parallel_for ends with Cancelled where that is requested.
   void heed(const Cancellation& cancellation) { cancellation_ = &cancellation; }

@@ -29,9 +29,9 @@ class Naive final : public MethodEngine {
     const int k = context_.pool.size();
     shared_.begin(k);
     context_.pool.run([&](int thread) {
-      PairQueue own;
-      for (std::size_t i = thread; i < first.size(); i += static_cast<std::size_t>(k)) own.push_back(first[i]);
       try {
+        PairQueue own;
+        for (std::size_t i = thread; i < first.size(); i += static_cast<std::size_t>(k)) own.push_back(first[i]);
         perform(scenery, own, workers[thread], counts_[thread]);
       } catch (...) {
         shared_.leave();  // nobody may wait for this thread

@@ -1,13 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "paper/scheduling.h"
 
+#include <algorithm>
 #include <thread>
 #include <utility>
 
 namespace hpccd::paper {
 
 Scheduling::Scheduling(int threads) {
-  for (int i = 0; i < threads; ++i) slots_.push_back(std::make_unique<Slot>());
+  for (int i = 0; i < threads; ++i) {
+    slots_.push_back(std::make_unique<Slot>());
+    slots_.back()->requests.reserve(static_cast<std::size_t>(threads));
+  }
 }
 
 void Scheduling::begin() {
@@ -15,7 +19,7 @@ void Scheduling::begin() {
     slot->front_triangles = 0;
     slot->n_requests = 0;
     slot->requests.clear();
-    slot->messages.clear();
+    slot->message.reset();
     slot->open = true;
   }
   active_ = static_cast<int>(slots_.size());
@@ -29,13 +33,15 @@ bool Scheduling::requested(int thread) const { return slots_[thread]->n_requests
 
 std::uint32_t Scheduling::distribute(int thread, TaskUnitQueue& units) {
   Slot& own = *slots_[thread];
+  const std::size_t spare = units.empty() ? 0 : units.size() - 1;
   std::vector<int> served;
+  served.reserve(slots_.size());
   {
     std::lock_guard lock(own.mutex);
-    while (!own.requests.empty() && units.size() > served.size() + 1) {
-      served.push_back(own.requests.front());
-      own.requests.pop_front();
-    }
+    const auto first = own.requests.begin();
+    const auto end = first + static_cast<std::ptrdiff_t>(std::min(own.requests.size(), spare));
+    served.assign(first, end);
+    own.requests.erase(first, end);
     own.n_requests = static_cast<std::uint32_t>(own.requests.size());
   }
   for (int other : served) {
@@ -63,9 +69,8 @@ bool Scheduling::request(int thread, TaskUnitQueue& units) {
     if (!place_request(thread, distributing)) continue;
     Slot& own = *slots_[thread];
     std::unique_lock lock(own.message_mutex);
-    own.woken.wait(lock, [&] { return !own.messages.empty(); });
-    const Message message = own.messages.front();
-    own.messages.pop_front();
+    own.woken.wait(lock, [&] { return own.message.has_value(); });
+    const Message message = *std::exchange(own.message, std::nullopt);
     if (!message.has_node) continue;
     units.push_back(message.node);
     return true;
@@ -74,17 +79,17 @@ bool Scheduling::request(int thread, TaskUnitQueue& units) {
 
 void Scheduling::leave(int thread) {
   Slot& own = *slots_[thread];
-  std::deque<int> unserved;
   {
     std::lock_guard lock(own.mutex);
     if (!own.open) return;
     own.open = false;
     own.front_triangles = 0;
     own.n_requests = 0;
-    unserved.swap(own.requests);
   }
   --active_;
-  for (int other : unserved) wake(other, {false, 0});
+  // Nobody adds to them any more: that needs an open slot. It opens again where this thread has asked.
+  for (int other : own.requests) wake(other, {false, 0});
+  own.requests.clear();
 }
 
 int Scheduling::distribution_thread(int requesting) const {
@@ -111,7 +116,7 @@ void Scheduling::wake(int thread, Message message) {
   Slot& slot = *slots_[thread];
   {
     std::lock_guard lock(slot.message_mutex);
-    slot.messages.push_back(message);
+    slot.message = message;
   }
   slot.woken.notify_one();
 }

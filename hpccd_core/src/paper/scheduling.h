@@ -9,6 +9,7 @@
 #include <deque>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <vector>
 
 #include "paper/hierarchy.h"
@@ -32,7 +33,7 @@ class Scheduling {
   std::uint32_t distribute(int thread, TaskUnitQueue& units);
   // For a thread whose queue is empty: waits for nodes; false when no thread has any left.
   bool request(int thread, TaskUnitQueue& units);
-  // For a thread that ends early: nobody waits for it any longer.
+  // For a thread that ends early: nobody waits for it any longer. Takes no memory, which may be why it ends.
   void leave(int thread);
 
  private:
@@ -45,10 +46,10 @@ class Scheduling {
     std::atomic<std::uint32_t> n_requests{0};
     std::atomic<bool> open{false};  // has work, answers requests; changed under the mutex
     std::mutex mutex;               // of the scheduling queue
-    std::deque<int> requests;       // the scheduling queue: the threads that asked
+    std::vector<int> requests;      // the scheduling queue: the threads that asked, each once; has room for all
     std::mutex message_mutex;
     std::condition_variable woken;
-    std::deque<Message> messages;
+    std::optional<Message> message;  // to a thread that has asked one other
   };
 
   int distribution_thread(int requesting) const;

@@ -24,9 +24,11 @@ std::uint32_t Scene::add_mesh(std::string name, std::span<const std::uint32_t> f
     throw InvalidArgument("n_vertices: the scene would have more than 2^32 - 2 vertices");
   const auto first_face = static_cast<std::uint32_t>(faces_.size());
   const auto n_faces = static_cast<std::uint32_t>(faces.size() / 3);
+  if (faces_.capacity() < faces_.size() + n_faces) faces_.reserve(std::max(faces_.size() + n_faces, 2 * faces_.size()));
+  meshes_.push_back({std::move(name), options, n_vertices_, n_vertices, first_face, n_faces});
+  // From here on nothing throws: a mesh is there in full or not at all.
   for (std::uint32_t f = 0; f < n_faces; ++f)
     faces_.push_back({n_vertices_ + faces[3 * f], n_vertices_ + faces[3 * f + 1], n_vertices_ + faces[3 * f + 2]});
-  meshes_.push_back({std::move(name), options, n_vertices_, n_vertices, first_face, n_faces});
   n_vertices_ += n_vertices;
   return static_cast<std::uint32_t>(meshes_.size() - 1);
 }

@@ -16,7 +16,7 @@ void require_rest(const Scene::Mesh& mesh, const Real* t0, const Real* t1) {
     // 0 and -0 differ in bits only; NaN is reported where all coordinates are checked.
     if (t0[i] < t1[i] || t0[i] > t1[i])
       throw InvalidArgument("vertices_t1[" + std::to_string(i / 3) + "]: moves, but it belongs to mesh '" + mesh.name +
-                            "', which was added as static; add the mesh without static=True, or keep its vertices");
+                            "', which was added as static; add it as one that moves, or keep its vertices");
 }
 
 // Of so many vertices, in the precision of p.
