@@ -47,7 +47,8 @@ set +u
 # shellcheck source=/dev/null
 . install/setup.bash
 set -u
-install/falling_sheet/lib/falling_sheet/falling_sheet | head -4
+sheet=$(install/falling_sheet/lib/falling_sheet/falling_sheet)
+sed -n 1,4p <<<"$sheet"
 [ "${COLCON_TEST:-yes}" != no ] || exit 0
 colcon test --packages-select hpccd --return-code-on-test-failure || failed=$?
 colcon test-result --all

@@ -3,6 +3,7 @@
 // kernels write themselves: nothing has to be copied back.
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <vector>
 
@@ -112,9 +113,13 @@ class Slot {
     const Counters& c = *host_counters_.data();
     gpu::require_balance(c, false);
     // All or nothing: what fails here is tested again by the CPU.
-    output.vertex_face.reserve(output.vertex_face.size() + c.found[0]);
-    output.edge_edge.reserve(output.edge_edge.size() + c.found[1]);
-    output.undecided.reserve(output.undecided.size() + c.to_host);
+    const auto make_room = [](auto& list, std::size_t more) {
+      // Twice as much at least: segments are many, and each would copy those before it.
+      if (const std::size_t n = list.size() + more; n > list.capacity()) list.reserve(std::max(n, 2 * list.capacity()));
+    };
+    make_room(output.vertex_face, c.found[0]);
+    make_room(output.edge_edge, c.found[1]);
+    make_room(output.undecided, c.to_host);
     for (u64 i = 0; i < c.found_all; ++i) {
       const Candidate p = scene.keys().pair_of(keys_.data()[i]);
       auto& list = p.kind == Kind::vertex_face ? output.vertex_face : output.edge_edge;
