@@ -3,8 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
-#include <cstdlib>
 #include <cstddef>
+#include <cstdlib>
 #include <functional>
 #include <memory>
 #include <new>
@@ -12,8 +12,9 @@
 #include <string>
 #include <vector>
 
-#include "hpccd/hpccd.h"
 #include "grid_scene.h"
+#include "hpccd/hpccd.h"
+#include "paper/shared_pairs.h"
 #include "soup_scene.h"
 
 namespace {
@@ -79,7 +80,8 @@ struct Case {
 };
 
 std::vector<Case> cases() {
-  static const std::vector<double> start = test::soup_positions(n_triangles, 1), end = test::soup_positions(n_triangles, 2);
+  static const std::vector<double> start = test::soup_positions(n_triangles, 1),
+                                   end = test::soup_positions(n_triangles, 2);
   const auto detect = [](Detector& d) { return d.detect(view(start), view(end)).hash; };
   const auto time = [](Detector& d) {
     return static_cast<std::uint64_t>(1e15 * d.collision_free_step(view(start), view(start)));
@@ -112,8 +114,8 @@ std::vector<Case> cases() {
     add("proximity", [](Detector& d) { return d.proximity(view(start), 0.3).hash; }, as_it_is);
     add("intersections", [](Detector& d) { return d.intersections(view(start)).hash; }, as_it_is);
     add(
-        "distances",
-        [](Detector& d) { return static_cast<std::uint64_t>(1e9 * d.distances(view(start))[0].distance); }, as_it_is);
+        "distances", [](Detector& d) { return static_cast<std::uint64_t>(1e9 * d.distances(view(start))[0].distance); },
+        as_it_is);
   }
   return all;
 }
@@ -191,6 +193,18 @@ TEST(MemoryEnds, InACallOfManyWorlds) {
     if (!e) break;
   }
   EXPECT_GT(n, some);
+}
+
+// Whose thread takes pairs from all and has no room for them: it leaves, and nobody waits for it.
+TEST(MemoryEnds, WherePairsAreShared) {
+  paper::SharedPairs shared;
+  paper::PairQueue given(10000, {0, 1});
+  shared.begin(2);
+  shared.push_half(given);
+  paper::PairQueue first, second;
+  EXPECT_EQ(ends(0, [&] { shared.pop(first); }), true);
+  shared.leave();
+  while (shared.pop(second)) second.clear();
 }
 
 // A mesh is there in full or not at all.

@@ -35,12 +35,12 @@ bool SharedPairs::pop(PairQueue& own) {
   // A share for every thread that waits.
   const std::size_t share =
       (pairs_.size() + static_cast<std::size_t>(waiting_) - 1) / static_cast<std::size_t>(waiting_);
+  --waiting_;  // before anything can throw: whoever leaves may not stay counted
   for (std::size_t i = 0; i < share; ++i) {
     own.push_back(pairs_.front());
     pairs_.pop_front();
   }
   size_ = pairs_.size();
-  --waiting_;
   return true;
 }
 
