@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """The detector: motion of a scene in, contacts out."""
 
+import contextlib
+import re
 import threading
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING, Any, Literal, cast, overload
 
 from numpy.typing import ArrayLike, NDArray
@@ -32,10 +34,20 @@ from .options import (
 )
 from .proximity import Intersections, Proximity
 from .scene import Scene
-from .snapshot_queries import SnapshotQueries, names_of_one_argument
+from .snapshot_queries import SnapshotQueries
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack  # typing has it from Python 3.11 on
+
+
+@contextlib.contextmanager
+def _names_of_a_step() -> Iterator[None]:
+    """Errors of the core speak of both ends of a motion; step() is given one."""
+    try:
+        yield
+    except _core.InvalidArgument as error:
+        text = re.sub("vertices_t0, vertices_t1|vertices_t[01]", "vertices", str(error), count=1)
+        raise _core.InvalidArgument(text) from None
 
 
 def _require_device(backend: str, method: str) -> None:
@@ -222,7 +234,7 @@ class Detector(MotionQueries[OfMotion], SnapshotQueries[OfNear, OfPierced]):
             arguments.usable("vertices", end)
             contacts: Any = Contacts.none(self.worlds)
         else:
-            with names_of_one_argument():
+            with _names_of_a_step():
                 contacts = self.detect(end if self._last is None else self._last, end, stream)
             if self._last is None:
                 contacts = contacts.without_rows()
@@ -240,7 +252,7 @@ class Detector(MotionQueries[OfMotion], SnapshotQueries[OfNear, OfPierced]):
         # The device checks the first one too, as a step that goes nowhere. The last one is complete: it needs no more
         # waiting than this one.
         start = place if last is None else last._replace(made_on=stream)
-        with names_of_one_argument():
+        with _names_of_a_step():
             contacts = self._contacts(self._of_places(self._asked("detect"), start, place))
         self._last_on_device.keep(place, self._rows)
         if last is not None:

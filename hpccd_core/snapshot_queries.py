@@ -1,9 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Queries of one snapshot, a part of Detector."""
 
-import contextlib
-import re
-from collections.abc import Iterator
 from typing import Any, Generic, cast
 
 from numpy.typing import ArrayLike
@@ -74,19 +71,8 @@ class SnapshotQueries(Generic[OfNear, OfPierced]):
     def _ask(self, query: str, vertices: object, stream: object, *more: float) -> Any:
         made_on = device_arrays.stream_number(stream)
         ask = getattr(self._core, query)
-        with names_of_one_argument():
-            if device_arrays.is_on_device(vertices):
-                place = device_arrays.positions("vertices", vertices, self._shape, made_on)
-                return ask(place.for_core(self._rows), *more)
-            there = arguments.vertices("vertices", vertices, self._shape)
-            return ask(device_arrays.on_host(there, made_on), *more)
-
-
-@contextlib.contextmanager
-def names_of_one_argument() -> Iterator[None]:
-    """Errors of the core speak of both ends of a motion; here there is one argument."""
-    try:
-        yield
-    except _core.InvalidArgument as error:
-        text = re.sub("vertices_t0, vertices_t1|vertices_t[01]", "vertices", str(error), count=1)
-        raise _core.InvalidArgument(text) from None
+        if device_arrays.is_on_device(vertices):
+            place = device_arrays.positions("vertices", vertices, self._shape, made_on)
+            return ask(place.for_core(self._rows), *more)
+        there = arguments.vertices("vertices", vertices, self._shape)
+        return ask(device_arrays.on_host(there, made_on), *more)

@@ -113,6 +113,7 @@ TEST(Arguments, PositionsThatWillNotDo) {
   std::vector<double> bad = end;
   bad[4] = std::numeric_limits<double>::infinity();
   EXPECT_EQ(detect(Positions::of(start), Positions::of(bad)).substr(0, 11), "vertices_t1");
+  EXPECT_EQ(refused([&] { detector.distances(Positions::of(bad)); }).substr(0, 12), "vertices[1, ");
   EXPECT_EQ(refused([&] { detector.set_separation(0, 2, 1); }), "mesh_a, mesh_b");
   EXPECT_EQ(refused([&] { detector.proximity(Positions::of(start), -1); }), "distance");
   // And all the while:

@@ -339,7 +339,7 @@ GOOD_INTERFACE = {"shape": (4, 3), "typestr": "<f8", "data": (4096, False), "ver
         (GOOD_INTERFACE | {"mask": object()}, TypeError, "mask"),
         (GOOD_INTERFACE | {"shape": (3, 4)}, ValueError, r"\(4, 3\).*\(3, 4\)"),
         (GOOD_INTERFACE | {"typestr": "<i4"}, TypeError, "float32 or float64"),
-        (GOOD_INTERFACE, ValueError, "are in a GPU's memory.*copy them to the host"),
+        (GOOD_INTERFACE, ValueError, "is in a GPU's memory.*copy it to the host"),
     ],
 )
 def test_device_arrays(scene, interface, error, text):

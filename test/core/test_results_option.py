@@ -188,7 +188,7 @@ def test_arrays_on_a_device_still_need_one(meshes):
         }  # fmt: skip
 
     detector = hc.Detector(meshes.scene(), backend="cpu")
-    with pytest.raises(ValueError, match="are in a GPU's memory, which this detector does not use; copy them"):
+    with pytest.raises(ValueError, match="is in a GPU's memory, which this detector does not use; copy it"):
         detector.detect(OnDevice(), OnDevice(), stream=3)
 
 

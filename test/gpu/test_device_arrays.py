@@ -100,7 +100,7 @@ def test_mistakes_are_named():
         detector.detect(d0, cupy.asfortranarray(d1))
     with pytest.raises(TypeError, match="vertices_t0: expected float32 or float64"):
         detector.detect(d0.astype("i4"), d1)
-    with pytest.raises(ValueError, match="copy them to the host"):
+    with pytest.raises(ValueError, match="copy it to the host"):
         hc.Detector(scene, backend="cpu").detect(d0, d1)
 
 
@@ -139,5 +139,5 @@ def test_a_refused_step_does_not_count():
     with pytest.raises(TypeError, match="the last step was float64 on the device"):
         detector.step(cupy.asarray(t1.astype(np.float32)))
     assert detector.step(cupy.asarray(t1)).hash == hc.Detector(scene, backend="cpu").detect(t0, t1).hash
-    with pytest.raises(ValueError, match="^vertices: are in a GPU's memory"):
+    with pytest.raises(ValueError, match="^vertices: is in a GPU's memory"):
         hc.Detector(scene, backend="cpu").step(cupy.asarray(t0))

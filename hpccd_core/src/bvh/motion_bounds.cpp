@@ -147,7 +147,7 @@ void MotionBounds::update(const Real* t0, const Real* t1, std::size_t n, std::sp
   Extent whole;
   for (const Extent& e : extents_) whole.include(e);
   if (!whole.good) {
-    if (!extent_of(t0, 0, n, largest_).good) report_bad("vertices_t0", t0, n, largest_);
+    if (!extent_of(t0, 0, n, largest_).good) report_bad(snapshot_ ? "vertices" : "vertices_t0", t0, n, largest_);
     report_bad("vertices_t1", t1, n, largest_);
   }
 
