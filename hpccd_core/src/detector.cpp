@@ -37,6 +37,8 @@ struct Detector::Impl {
         engine(std::make_unique<Engine>(common)),
         takes_device_arrays(engine->backends.take_device_arrays()) {}
 
+  std::shared_ptr<Impl> left_alone;  // itself, where nobody may touch it any more
+
   // All that calls keep from one to the next.
   struct Engine {
     explicit Engine(Common& common) : shared(common, common.pool), backends(shared) {}
@@ -224,7 +226,7 @@ Detector::Detector(std::shared_ptr<const Scene> scene, Options options)
 
 // In a child made by fork() the memory of a call that was under way is in the middle of a change: better left alone.
 Detector::~Detector() {
-  if (impl_->one_call.abandoned()) new auto(std::move(impl_));
+  if (impl_->one_call.abandoned()) impl_->left_alone = impl_;
 }
 
 Contacts Detector::detect(Positions t0, Positions t1) { return impl_->detect<false>(t0, t1).contacts; }
@@ -330,7 +332,8 @@ std::vector<Gap> Detector::distances(Positions vertices) {
 void Detector::set_separation(std::uint32_t mesh_a, std::uint32_t mesh_b, double separation) {
   const std::size_t n = impl_->common.scene->meshes().size();
   if (mesh_a >= n || mesh_b >= n)
-    throw InvalidArgument("mesh_a, mesh_b: the scene has " + std::to_string(n) + " meshes, numbered from 0");
+    throw InvalidArgument("mesh_a, mesh_b: the scene has " + std::to_string(n) +
+                          " meshes; give the numbers that Scene::add_mesh() returned");
   check_length("separation", separation);
   const std::lock_guard lock(impl_->one_call);
   impl_->common.separations.set(mesh_a, mesh_b, separation);

@@ -97,6 +97,15 @@ TEST(Arguments, MeshesThatTheSceneHasNot) {
   EXPECT_EQ(scene->meshes().size(), 2u);
 }
 
+// Of the scene's own list, which moves while it grows.
+TEST(Arguments, FacesOfTheSceneItself) {
+  const auto scene = two_triangles();
+  for (std::uint32_t mesh = 2; mesh < 40; ++mesh)
+    scene->add_mesh("again " + std::to_string(mesh), std::span(scene->faces()[0]), 3);
+  for (std::uint32_t mesh = 0; mesh < 40; ++mesh)
+    EXPECT_EQ(scene->faces()[mesh], (std::array{3 * mesh, 3 * mesh + 1, 3 * mesh + 2}));
+}
+
 TEST(Arguments, PositionsThatWillNotDo) {
   Detector detector(two_triangles(), {});
   const std::vector<double> start = positions(1), end = positions(-1);

@@ -26,7 +26,7 @@ inline namespace v0_1 {
 ///
 /// Threads: one call at a time; of those that several threads make of one detector, each waits until the one before has
 /// ended. Threads that are to work side by side need a detector each; the scene may be the same. Only cancel(),
-/// options() and last_backend() do not wait. A child made by fork() has none of a detector's threads: its calls throw
+/// options() and last_backend() do not wait. A child made by fork() has none of a detector's threads: its queries throw
 /// std::runtime_error there unless it has one thread only and was in no call; it may be destroyed.
 ///
 /// Errors: every query throws InvalidArgument for positions whose number, type or values will not do (see Positions),
@@ -84,7 +84,7 @@ class HPCCD_API Detector {
   /// within 10 ms. What is on a GPU already comes to its end first.
   void cancel();
 
-  // Of the last call; while one is under way, of that one when it has ended.
+  // Of the last call; while one is under way, of that one when it has ended. Empty, or less, after one that has thrown.
   std::map<std::string, double> profile() const;       ///< stage -> ms, with "total" and the remainder
   std::map<std::string, std::uint64_t> stats() const;  ///< counts of pairs, tests, contacts, bytes
   std::string last_gpu_error() const;                  ///< why a step meant for the GPU was computed on the CPU, or ""

@@ -10,7 +10,7 @@ namespace hpccd {
 inline namespace v0_1 {
 
 /// A mistake of the caller. what() begins with the name of the argument and ends with the remedy. A call that throws it
-/// has changed nothing: the scene or the detector can be used on.
+/// has changed nothing but what Detector::stats() and profile() say: the scene or the detector can be used on.
 class HPCCD_API InvalidArgument : public std::invalid_argument {
  public:
   using std::invalid_argument::invalid_argument;

@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// One call at a time, on whatever thread; a mutex for std::lock_guard that a child made by fork() can tell was held by
-// a thread that it does not have.
+// One call at a time, on whatever thread: a lock for std::lock_guard. It says of which process its holder is, in the
+// same word: a child made by fork() can tell that it was held by a thread which the child does not have.
 #pragma once
 
 #include <atomic>
-#include <mutex>
 #include <stdexcept>
 
 #include "base/forks.h"
@@ -14,26 +13,27 @@ namespace hpccd {
 class OneCall {
  public:
   void lock() {
-    if (abandoned())
-      throw std::runtime_error(
-          "this detector was in a call of another thread when this process was forked; make one after the fork");
-    turn_.lock();
-    process_.store(forks(), std::memory_order_relaxed);
+    const int mine = forks() + 1;
+    for (int holder = none; !holder_.compare_exchange_strong(holder, mine, std::memory_order_acquire); holder = none) {
+      if (holder != mine)
+        throw std::runtime_error(
+            "this detector was in a call of another thread when this process was forked; make one after the fork");
+      holder_.wait(holder);
+    }
   }
   void unlock() {
-    process_.store(none, std::memory_order_relaxed);
-    turn_.unlock();
+    holder_.store(none, std::memory_order_release);
+    holder_.notify_one();
   }
   // What it protects was left in the middle of a change.
   bool abandoned() const {
-    const int process = process_.load(std::memory_order_relaxed);
-    return process != none && process != forks();
+    const int holder = holder_.load(std::memory_order_relaxed);
+    return holder != none && holder != forks() + 1;
   }
 
  private:
-  static constexpr int none = -1;
-  std::mutex turn_;
-  std::atomic<int> process_{none};  // of the call under way
+  static constexpr int none = 0;
+  std::atomic<int> holder_{none};
 };
 
 }  // namespace hpccd

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <exception>
+#include <memory>
 #include <mutex>
 #include <stdexcept>
 #include <string>
@@ -81,8 +82,11 @@ ThreadPool::ThreadPool(int threads)
 ThreadPool::~ThreadPool() { end(); }
 
 void ThreadPool::end() {
-  // Threads that are not there can neither be joined nor detached: their memory may be gone.
-  if (forks_ != forks()) new auto(std::move(workers_));
+  if (forks_ != forks()) {
+    // Threads that are not there can neither be joined nor detached, their memory may be gone: only their handles end.
+    for (auto& w : workers_) std::construct_at(&w);
+    return;
+  }
   stop_ = true;
   wake(starts_);
   for (auto& w : workers_) w.join();

@@ -8,7 +8,7 @@ std::unique_ptr<MethodEngine> engine_of(const Options& options, const Context& c
   // One contact of many is a matter of order, and the order is the method's: it could not be the default's answer.
   if (options.report == Report::any)
     throw InvalidArgument(
-        "report: 'any' is offered by method 'default' only; use method 'default', or report 'all' or 'first'");
+        "report: 'any' is offered by method 'default' only; leave the method as it is, or report 'all' or 'first'");
   if (options.method == Method::front) return front_based(context);
   return options.method == Method::naive ? naive(context, options.restructure)
                                          : published(context, options.restructure);

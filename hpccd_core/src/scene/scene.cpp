@@ -21,14 +21,21 @@ std::uint32_t Scene::add_mesh(std::string name, std::span<const std::uint32_t> f
                             " vertices; indices count this mesh's own vertices from 0");
   // One index is kept free as "none".
   if (std::uint64_t{n_vertices_} + n_vertices >= 0xFFFFFFFFu)
-    throw InvalidArgument("n_vertices: the scene would have more than 2^32 - 2 vertices");
+    throw InvalidArgument("n_vertices: the scene would have more than 2^32 - 2 vertices; divide it");
   const auto first_face = static_cast<std::uint32_t>(faces_.size());
   const auto n_faces = static_cast<std::uint32_t>(faces.size() / 3);
-  if (faces_.capacity() < faces_.size() + n_faces) faces_.reserve(std::max(faces_.size() + n_faces, 2 * faces_.size()));
+  std::vector<std::array<std::uint32_t, 3>> larger;  // beside the old one: `faces` may be a part of that
+  const bool grows = faces_.capacity() < faces_.size() + n_faces;
+  if (grows) {
+    larger.reserve(std::max(faces_.size() + n_faces, 2 * faces_.size()));
+    larger.assign(faces_.begin(), faces_.end());
+  }
   meshes_.push_back({std::move(name), options, n_vertices_, n_vertices, first_face, n_faces});
   // From here on nothing throws: a mesh is there in full or not at all.
+  auto& all = grows ? larger : faces_;
   for (std::uint32_t f = 0; f < n_faces; ++f)
-    faces_.push_back({n_vertices_ + faces[3 * f], n_vertices_ + faces[3 * f + 1], n_vertices_ + faces[3 * f + 2]});
+    all.push_back({n_vertices_ + faces[3 * f], n_vertices_ + faces[3 * f + 1], n_vertices_ + faces[3 * f + 2]});
+  if (grows) faces_.swap(larger);
   n_vertices_ += n_vertices;
   return static_cast<std::uint32_t>(meshes_.size() - 1);
 }
@@ -36,7 +43,7 @@ std::uint32_t Scene::add_mesh(std::string name, std::span<const std::uint32_t> f
 Scene::Pair Scene::known(std::uint32_t mesh_a, std::uint32_t mesh_b) const {
   if (std::max(mesh_a, mesh_b) >= meshes_.size())
     throw InvalidArgument("mesh_a, mesh_b: the scene has " + std::to_string(meshes_.size()) +
-                          " meshes, numbered from 0");
+                          " meshes; give the numbers that add_mesh() returned");
   return ordered(mesh_a, mesh_b);
 }
 
