@@ -13,9 +13,16 @@ REMEDY = "Remedy: keep one of them; pip uninstall hpccd-core hpccd, then install
 
 
 def folders() -> list[Path]:
-    """The folders on Python's path that hold a compiled hpccd_core, the one that is taken first."""
+    """The folders on Python's path that hold a compiled hpccd_core, the one that is taken first.
+
+    Not what a build has left, which holds no package: colcon puts that on the path of its tests.
+    """
     found = [Path(entry or ".").resolve() / "hpccd_core" for entry in sys.path]
-    return [folder for folder in dict.fromkeys(found) if any(folder.glob("_core.*.so"))]
+    return [folder for folder in dict.fromkeys(found) if is_whole(folder)]
+
+
+def is_whole(folder: Path) -> bool:
+    return (folder / "__init__.py").is_file() and any(folder.glob("_core.*.so"))
 
 
 def distributions() -> list[str]:

@@ -18,9 +18,11 @@ ROOT = Path(hpccd_ros.__file__).resolve().parents[1]
 HERE = Path(__file__).resolve().parents[2]
 WAYS = {
     "module": [sys.executable, "-m", "hpccd_ros.node"],
-    "console": [str(Path(sys.executable).with_name("hpccd_node"))],
     "ros2-run": [sys.executable, str(HERE / "scripts" / "hpccd_node")],
 }
+CONSOLE = Path(sys.executable).with_name("hpccd_node")
+if CONSOLE.exists():  # pip installs it; colcon does not
+    WAYS["console"] = [str(CONSOLE)]
 
 
 def looks_out(pid):

@@ -41,6 +41,7 @@ def environment(tmp_path, monkeypatch):
     def install(*distributions, folder=tmp_path / "site-packages"):
         (folder / "hpccd_core").mkdir(parents=True, exist_ok=True)
         (folder / "hpccd_core" / "_core.cpython-311-x86_64-linux-gnu.so").touch()
+        (folder / "hpccd_core" / "__init__.py").touch()
         for name in distributions:
             (folder / f"{name}.dist-info").mkdir()
         sys.path.append(str(folder))
@@ -66,6 +67,14 @@ def test_two_folders_are_noticed(environment, tmp_path):
     environment(folder=tmp_path / "workspace")  # of colcon, which leaves no record
     with pytest.warns(RuntimeWarning, match="more than once: .*site-packages.*workspace.*the first is used"):
         _installations.warn_of_several()
+
+
+def test_what_a_build_has_left_is_no_installation(environment, tmp_path, recwarn):
+    environment("hpccd_core-0.1.0")
+    environment(folder=tmp_path / "build")
+    (tmp_path / "build" / "hpccd_core" / "__init__.py").unlink()
+    _installations.warn_of_several()
+    assert not recwarn.list
 
 
 def test_this_environment_holds_one():
