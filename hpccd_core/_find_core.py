@@ -19,7 +19,8 @@ def _compiled_folder() -> Path:
             return folder
     raise ImportError(
         "hpccd_core: the compiled module _core is not installed for this Python "
-        f"({sys.executable}); run `make venv` in the checkout, or `pip install .`, and use that environment"
+        f"({sys.executable}); run `make venv` in the checkout, `pip install .`, or `pip install ./hpccd_core` (the "
+        "core alone, Python 3.10 to 3.13), and use that environment"
     )
 
 

@@ -25,7 +25,7 @@ git clone --quiet "$here" "$workspace/src/hpccd"
 # In a workspace of its own it would be found; inside of another package colcon does not look for one.
 cp -r "$workspace/src/hpccd/examples/cpp" "$workspace/src/falling_sheet"
 # From a workspace one asks for the package; what ROS exports with it wants C as well.
-sed -i "s/find_package(hpccd_core 0.1 REQUIRED).*/find_package(hpccd REQUIRED)/; s/LANGUAGES CXX/LANGUAGES C CXX/" \
+sed -i "s/find_package(hpccd_core [0-9.]* REQUIRED).*/find_package(hpccd REQUIRED)/; s/LANGUAGES CXX/LANGUAGES C CXX/" \
   "$workspace/src/falling_sheet/CMakeLists.txt"
 venv=$workspace/venv
 bash "$workspace/src/hpccd/scripts/create_venv.sh" "$venv" test

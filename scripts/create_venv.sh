@@ -69,7 +69,7 @@ else
   "$python" -c 'from ensurepip import bootstrap; import venv' 2>/dev/null || fail \
     "$python cannot create virtual environments (module ensurepip is missing)." \
     "Remedy on Debian and Ubuntu: sudo apt install python$(version_of "$python")-venv"
-  echo "hpccd: creating $venv with Python $(version_of "$python"); the package index is needed, 800 MB of disk, and one to three minutes"
+  echo "hpccd: creating $venv with Python $(version_of "$python"); the package index is needed, 1 GB of disk, and one to three minutes"
   "$python" -m venv --clear "$venv"
 fi
 

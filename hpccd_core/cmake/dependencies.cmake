@@ -24,5 +24,7 @@ endfunction()
 hpccd_python_folders(boost_hints cmeel.prefix/include)
 find_path(BOOST_INCLUDE boost/multiprecision/cpp_int.hpp HINTS ${boost_hints} NO_CMAKE_FIND_ROOT_PATH)
 if(NOT BOOST_INCLUDE)
-  message(FATAL_ERROR "Boost headers not found: pip install cmeel-boost, or install libboost-dev")
+  unset(_Python3_EXECUTABLE CACHE)  # so that the next look finds the Python of an environment activated meanwhile
+  message(FATAL_ERROR "Boost headers not found: install libboost-dev, or pip install cmeel-boost into the Python "
+    "environment that is active here")
 endif()

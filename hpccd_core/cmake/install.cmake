@@ -17,14 +17,16 @@ set(built_with_cuda OFF)
 if(hpccd_cuda_objects)
   set(built_with_cuda ON)
 endif()
-configure_package_config_file(cmake/hpccd_coreConfig.cmake.in "${CMAKE_CURRENT_BINARY_DIR}/hpccd_coreConfig.cmake"
+# In a folder where find_package() does not look: what is only built is no package.
+set(package_files "${CMAKE_CURRENT_BINARY_DIR}/to_install")
+configure_package_config_file(cmake/hpccd_coreConfig.cmake.in "${package_files}/hpccd_coreConfig.cmake"
   INSTALL_DESTINATION "${package_dir}")
 set(compatible SameMajorVersion)
 if(PROJECT_VERSION_MAJOR EQUAL 0)
   set(compatible SameMinorVersion)
 endif()
-write_basic_package_version_file("${CMAKE_CURRENT_BINARY_DIR}/hpccd_coreConfigVersion.cmake"
+write_basic_package_version_file("${package_files}/hpccd_coreConfigVersion.cmake"
   VERSION ${PROJECT_VERSION} COMPATIBILITY ${compatible})
-install(FILES "${CMAKE_CURRENT_BINARY_DIR}/hpccd_coreConfig.cmake"
-  "${CMAKE_CURRENT_BINARY_DIR}/hpccd_coreConfigVersion.cmake"
+install(FILES "${package_files}/hpccd_coreConfig.cmake"
+  "${package_files}/hpccd_coreConfigVersion.cmake"
   DESTINATION "${package_dir}" COMPONENT development)

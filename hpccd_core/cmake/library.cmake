@@ -40,9 +40,11 @@ foreach(library IN LISTS hpccd_cuda_libraries)
 endforeach()
 
 if(NOT HPCCD_INSTALL_CPP)
+  add_library(hpccd::core ALIAS hpccd_core_static)  # for a project that has this one as a subfolder
   return()
 endif()
 hpccd_add_library(hpccd_core_shared SHARED)
+add_library(hpccd::core ALIAS hpccd_core_shared)
 # Before 1.0 a minor version may change the binary interface.
 set(soversion ${PROJECT_VERSION_MAJOR})
 if(PROJECT_VERSION_MAJOR EQUAL 0)

@@ -138,6 +138,50 @@ def test_a_component_that_is_not_there(prefix, tmp_path):
         configure(wrong, tmp_path / "build", prefix)
 
 
+def test_an_optional_component_that_is_not_there(prefix, tmp_path):
+    user = project(
+        tmp_path / "user",
+        "find_package(hpccd_core REQUIRED OPTIONAL_COMPONENTS gpu)\n"
+        "if(hpccd_core_gpu_FOUND)\nmessage(FATAL_ERROR gpu)\nendif()",
+    )
+    configure(user, tmp_path / "build", prefix)
+
+
+def test_what_is_only_built_is_no_package(tmp_path):
+    user = project(tmp_path / "user", "find_package(hpccd_core REQUIRED)")
+    with pytest.raises(AssertionError, match="Could not find a package configuration file"):
+        configure(user, tmp_path / "build", BUILD)
+
+
+def test_a_program_that_links_both(prefix, tmp_path):
+    """In a folder of its own each asks for another one, which nobody would notice."""
+    user = project(
+        tmp_path / "user",
+        "add_subdirectory(a)\nadd_subdirectory(b)\nadd_executable(user user.cpp)\ntarget_link_libraries(user a b)",
+    )
+    (user / "user.cpp").write_text("int main() {}\n")
+    for name, component in (("a", "shared"), ("b", "static")):
+        (user / name).mkdir()
+        (user / name / "CMakeLists.txt").write_text(
+            f"find_package(hpccd_core REQUIRED COMPONENTS {component})\nadd_library({name} INTERFACE)\n"
+            f"target_link_libraries({name} INTERFACE hpccd::core_{component})\n"
+        )
+    with pytest.raises(AssertionError, match="HPCCD_CORE_LIBRARY"):
+        configure(user, tmp_path / "build", prefix)
+
+
+def test_a_subfolder_of_another_project(tmp_path):
+    """Configured only: it compiles the same files with the same flags."""
+    user = project(
+        tmp_path / "user",
+        f'add_subdirectory("{ROOT / "hpccd_core"}" core)\n'
+        "get_target_property(kind hpccd::core TYPE)\nget_target_property(name hpccd::core ALIASED_TARGET)\n"
+        'message(STATUS "it is ${kind} ${name}")\ninstall(CODE "message(STATUS nothing)")\n',
+    )
+    options = ["-DHPCCD_CUDA=OFF", f"-DPython3_EXECUTABLE={sys.executable}", "-DCMAKE_BUILD_TYPE=Release"]
+    assert "it is STATIC_LIBRARY hpccd_core_static" in run("cmake", "-S", user, "-B", tmp_path / "build", *options)
+
+
 @pytest.mark.parametrize(
     "calls, says",
     [

@@ -29,7 +29,17 @@ def test_one_version():
     versions |= {".".join(numbers), re.search(r'#define HPCCD_VERSION "(.+)"', header).group(1)}
     assert versions == {PYPROJECT["project"]["version"]}
     public = "".join(file.read_text() for file in headers.glob("*.h"))
-    assert set(re.findall(r"inline namespace (\w+)", public)) == {f"v{numbers[0]}_{numbers[1]}"}
+    namespace, short = f"v{numbers[0]}_{numbers[1]}", ".".join(numbers[:2])
+    assert set(re.findall(r"inline namespace (\w+)", public)) == {namespace}
+    for file, pattern in [
+        ("hpccd_core/include/hpccd/hpccd.h", r"libhpccd_core\.so\.([\d.]+\d)"),
+        ("docs/cpp.md", r"libhpccd_core\.so\.([\d.]+\d)|find_package\(hpccd_core ([\d.]+) |hpccd::v([\d_]+)"),
+        ("examples/cpp/CMakeLists.txt", r"find_package\(hpccd_core ([\d.]+) "),
+        ("examples/cpp/package.xml", r"<version>(\d+\.\d+)"),
+        ("SECURITY.md", r"\| (\d+\.\d+)\.x"),
+    ]:
+        found = {next(filter(None, m.groups())) for m in re.finditer(pattern, (ROOT / file).read_text())}
+        assert {text.replace("_", ".") for text in found} == {short}, file
 
 
 @pytest.mark.parametrize("python", ["3.11", "3.12"])

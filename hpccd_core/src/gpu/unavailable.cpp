@@ -9,7 +9,7 @@
 namespace hpccd::gpu {
 
 const Status& status() {
-  static const Status s{false, "", {}, "this build holds no CUDA code: no nvcc was found when it was compiled"};
+  static const Status s{false, "", {}, "this build holds no CUDA code: nvcc was not found, or HPCCD_CUDA was OFF, when it was compiled"};
   return s;
 }
 
