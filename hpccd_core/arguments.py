@@ -168,14 +168,12 @@ def usable(name: str, array: NDArray[Any]) -> None:
 
 
 def queries(value: object) -> NDArray[np.float64]:
-    """(Q, 8, 3) float64: four points at t=0, then the same at t=1; finite."""
+    """(Q, 8, 3) float64: four points at t=0, then the same at t=1. The core says which is not finite."""
     array = _reals("queries", _array("queries", value), value)
     if array.ndim != 3 or array.shape[1:] != (8, 3):
         expected = "(Q, 8, 3), four points at t=0 and the same at t=1"
         raise ValueError(f"queries: expected shape {expected}, got {array.shape}")
-    array = np.ascontiguousarray(array, np.float64)
-    usable("queries", array)
-    return array
+    return np.ascontiguousarray(array, np.float64)
 
 
 def _reals(name: str, array: NDArray[Any], value: object) -> NDArray[Any]:

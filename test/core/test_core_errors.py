@@ -310,8 +310,8 @@ def test_a_step_of_a_static_mesh():
         (np.zeros((1, 8, 3), int), TypeError, r"queries.*float32 or float64.*int64"),
         (np.zeros((1, 8, 3), complex), TypeError, r"queries.*float32 or float64.*complex128; coordinates are real"),
         (np.ma.masked_equal(np.zeros((1, 8, 3)), 0), TypeError, r"queries.*masked"),
-        (np.full((2, 8, 3), np.nan), ValueError, r"queries\[0, 0, 0\] is nan.*finite"),
-        (np.full((2, 8, 3), np.inf), ValueError, r"queries\[0, 0, 0\] is inf.*finite"),
+        (np.full((2, 8, 3), np.nan), ValueError, r"queries\[0, 0, 0\] is NaN.*finite"),
+        (np.full((2, 8, 3), np.inf), ValueError, r"queries\[0, 0, 0\] is infinite.*finite"),
         (np.full((2, 8, 3), 1e300), ValueError, r"queries\[0, 0, 0\].*scale"),
     ],
 )

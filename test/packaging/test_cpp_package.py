@@ -147,6 +147,7 @@ def test_an_optional_component_that_is_not_there(prefix, tmp_path):
     configure(user, tmp_path / "build", prefix)
 
 
+@pytest.mark.usefixtures("prefix")  # the library is built
 def test_what_is_only_built_is_no_package(tmp_path):
     user = project(tmp_path / "user", "find_package(hpccd_core REQUIRED)")
     with pytest.raises(AssertionError, match="Could not find a package configuration file"):

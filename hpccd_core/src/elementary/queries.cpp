@@ -30,13 +30,21 @@ CoordinateMap map_of(const Query& q) {
   return CoordinateMap::around(low, high);
 }
 
+[[noreturn]] void report_bad(const Query& query, std::size_t i) {
+  std::size_t k = 0;
+  while (std::fabs(query[k]) <= largest_coordinate) ++k;
+  const std::string where =
+      "queries[" + std::to_string(i) + ", " + std::to_string(k / 3) + ", " + std::to_string(k % 3) + "] is ";
+  if (std::isnan(query[k])) throw InvalidArgument(where + "NaN; all coordinates must be finite");
+  if (std::isinf(query[k])) throw InvalidArgument(where + "infinite; all coordinates must be finite");
+  throw InvalidArgument(where + "beyond 1e150: intermediate results could overflow; scale the coordinates down");
+}
+
 void check_coordinates(std::span<const Query> queries) {
   for (std::size_t i = 0; i < queries.size(); ++i) {
     bool good = true;
     for (const double x : queries[i]) good &= std::fabs(x) <= largest_coordinate;
-    if (!good)
-      throw InvalidArgument("queries[" + std::to_string(i) +
-                            "]: a coordinate is NaN, infinite, or beyond 1e150; move or scale the query");
+    if (!good) report_bad(queries[i], i);
   }
 }
 
