@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which classes answer, those of the host or those of the device: for type checkers and editors."""
+"""Which classes answer, of the host or of the device, of one world or of several: for type checkers and editors."""
 
 from typing import TYPE_CHECKING, TypedDict
 
 from .contacts import Contacts
 from .options import Accuracy, Backend, Feature, Method, Output, Report, Simd
-from .proximity import Intersections, Proximity
+from .proximity import Gap, Intersections, Proximity
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -21,10 +21,13 @@ else:
 OfMotion = TypeVar("OfMotion", default=Contacts)
 OfNear = TypeVar("OfNear", default=Proximity)
 OfPierced = TypeVar("OfPierced", default=Intersections)
+# list[list[Gap]] and an array where there are worlds.
+OfNearest = TypeVar("OfNearest", default=list[Gap])
+OfStep = TypeVar("OfStep", default=float)
 
 
 class Options(TypedDict, total=False):
-    """What a detector takes wherever its results are."""
+    """What a detector takes wherever its results are, and of whatever worlds."""
 
     accuracy: Accuracy
     backend: Backend
@@ -40,4 +43,3 @@ class Options(TypedDict, total=False):
     hybrid_segment_pairs: int
     gpus: int
     features: "Feature | Iterable[Feature]"
-    worlds: int | None

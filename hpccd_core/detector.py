@@ -7,10 +7,11 @@ import threading
 from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING, Any, Literal, cast, overload
 
+import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _core, arguments, device_arrays
-from .answers import OfMotion, OfNear, OfPierced, Options
+from .answers import OfMotion, OfNear, OfNearest, OfPierced, OfStep, Options
 from .contacts import Contacts
 from .device_arrays import DeviceArrayLike
 from .device_results import DeviceContacts, DeviceIntersections, DeviceProximity
@@ -32,7 +33,7 @@ from .options import (
     Results,
     Simd,
 )
-from .proximity import Intersections, Proximity
+from .proximity import Gap, Intersections, Proximity
 from .scene import Scene
 from .snapshot_queries import SnapshotQueries
 
@@ -61,7 +62,7 @@ def _require_device(backend: str, method: str) -> None:
         raise ValueError(f"results: 'device' is not offered by method {method!r}, which runs on CPUs; use 'default'")
 
 
-class Detector(MotionQueries[OfMotion], SnapshotQueries[OfNear, OfPierced]):
+class Detector(MotionQueries[OfMotion, OfStep], SnapshotQueries[OfNear, OfPierced, OfNearest]):
     """Finds every contact of a scene's straight-line motion from one set of positions to the next.
 
     accuracy: "fast", "balanced", "conservative" or "exact"; backend: "auto", "cpu", "hybrid" or "gpu"; threads: 0 for
@@ -112,19 +113,41 @@ class Detector(MotionQueries[OfMotion], SnapshotQueries[OfNear, OfPierced]):
 
     @overload
     def __init__(
-        self: "Detector[Contacts, Proximity, Intersections]",
+        self: "Detector[Contacts, float, Proximity, Intersections, list[Gap]]",
         scene: Scene,
         *,
         results: Literal["host"] = "host",
+        worlds: None = None,
         **options: "Unpack[Options]",
     ) -> None: ...
 
     @overload
     def __init__(
-        self: "Detector[DeviceContacts, DeviceProximity, DeviceIntersections]",
+        self: "Detector[Contacts, NDArray[np.float64], Proximity, Intersections, list[list[Gap]]]",
+        scene: Scene,
+        *,
+        results: Literal["host"] = "host",
+        worlds: int,
+        **options: "Unpack[Options]",
+    ) -> None: ...
+
+    @overload
+    def __init__(
+        self: "Detector[DeviceContacts, float, DeviceProximity, DeviceIntersections, list[Gap]]",
         scene: Scene,
         *,
         results: Literal["device"],
+        worlds: None = None,
+        **options: "Unpack[Options]",
+    ) -> None: ...
+
+    @overload
+    def __init__(
+        self: "Detector[DeviceContacts, NDArray[np.float64], DeviceProximity, DeviceIntersections, list[list[Gap]]]",
+        scene: Scene,
+        *,
+        results: Literal["device"],
+        worlds: int,
         **options: "Unpack[Options]",
     ) -> None: ...
 

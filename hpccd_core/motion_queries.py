@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _core, arguments, device_arrays, device_results
 from ._core import Positions
-from .answers import OfMotion
+from .answers import OfMotion, OfStep
 from .contacts import Contacts
 from .device_arrays import DeviceArrayLike, DevicePositions
 from .options import Results
@@ -16,7 +16,7 @@ from .prepared import PreparedDetection
 from .worlds import answer_of
 
 
-class MotionQueries(Generic[OfMotion]):
+class MotionQueries(Generic[OfMotion, OfStep]):
     """What touches on the way from one set of positions to the next, and when first."""
 
     worlds: int | None
@@ -47,7 +47,7 @@ class MotionQueries(Generic[OfMotion]):
 
     def collision_free_step(
         self, vertices_t0: ArrayLike | DeviceArrayLike, vertices_t1: ArrayLike | DeviceArrayLike, stream: object = None
-    ) -> float | NDArray[np.float64]:
+    ) -> OfStep:
         """The largest part of the motion, in [0, 1], that is certainly free of contacts; 1.0 where nothing touches.
 
         Of W worlds (W,) float64, that of each.
@@ -68,7 +68,7 @@ class MotionQueries(Generic[OfMotion]):
         harm; a new separation ends it.
         """
         times: NDArray[np.float64] = self._of_motion("collision_free_steps", vertices_t0, vertices_t1, stream)
-        return float(times[0]) if self.worlds is None else times
+        return cast(OfStep, float(times[0]) if self.worlds is None else times)
 
     def prepare(
         self, vertices_t0: DeviceArrayLike, vertices_t1: DeviceArrayLike, room: float = 2.0, stream: object = None

@@ -6,14 +6,14 @@ from typing import Any, Generic, cast
 from numpy.typing import ArrayLike
 
 from . import _core, arguments, device_arrays, device_results
-from .answers import OfNear, OfPierced
+from .answers import OfNear, OfNearest, OfPierced
 from .device_arrays import DeviceArrayLike
 from .options import Results
 from .proximity import Gap, Intersections, Proximity
 from .worlds import answer_of
 
 
-class SnapshotQueries(Generic[OfNear, OfPierced]):
+class SnapshotQueries(Generic[OfNear, OfPierced, OfNearest]):
     """What is near, pierced, or nearest at one time. Coordinates may be as large as 1e300."""
 
     worlds: int | None
@@ -51,7 +51,7 @@ class SnapshotQueries(Generic[OfNear, OfPierced]):
             return cast(OfPierced, on_device)
         return cast(OfPierced, answer_of(Intersections, self._ask("intersections", vertices, stream)))
 
-    def distances(self, vertices: ArrayLike | DeviceArrayLike, stream: object = None) -> list[Gap] | list[list[Gap]]:
+    def distances(self, vertices: ArrayLike | DeviceArrayLike, stream: object = None) -> OfNearest:
         """The smallest distance of each pair of meshes that the scene enables, within a mesh too.
 
         vertices: (V, 3), of W worlds (W, V, 3), float32 or float64, taken as by detect(), but up to 1e300. One Gap for
@@ -64,9 +64,9 @@ class SnapshotQueries(Generic[OfNear, OfPierced]):
             for a, b, distance, kind, features, points in self._ask("distances", vertices, stream)
         ]
         if self.worlds is None:
-            return gaps
+            return cast(OfNearest, gaps)
         n = len(gaps) // self.worlds
-        return [gaps[k * n : (k + 1) * n] for k in range(self.worlds)]
+        return cast(OfNearest, [gaps[k * n : (k + 1) * n] for k in range(self.worlds)])
 
     def _ask(self, query: str, vertices: object, stream: object, *more: float) -> Any:
         made_on = device_arrays.stream_number(stream)

@@ -33,6 +33,17 @@ on_device = hc.Detector(scene, results="device").detect(np.zeros((3, 3)), np.one
 copied: hc.Contacts = on_device.to_host()
 place: hc.DeviceArray = on_device.vf
 also_wrong: hc.Contacts = on_device  # line 18
+one, many = hc.Detector(scene), hc.Detector(scene, worlds=3, accuracy="fast")
+gap: float = one.distances(np.zeros((3, 3)))[0].distance
+step: float = one.collision_free_step(np.zeros((3, 3)), np.ones((3, 3)))
+gaps: list[list[hc.Gap]] = many.distances(np.zeros((3, 3, 3)))
+steps: NDArray[np.float64] = many.collision_free_step(np.zeros((3, 3, 3)), np.ones((3, 3, 3)))
+neither: list[hc.Gap] = many.distances(np.zeros((3, 3, 3)))  # line 24
+device_step: float = hc.Detector(scene, results="device").collision_free_step(np.zeros((3, 3)), np.ones((3, 3)))
+
+
+def as_asked(worlds: int | None) -> None:
+    hc.Detector(scene, worlds=worlds).detect(np.zeros((3, 3)), np.ones((3, 3)))
 """
 
 
@@ -55,4 +66,4 @@ def test_a_program_of_a_user_gets_types(tmp_path):
     (tmp_path / "program.py").write_text(PROGRAM)
     said = mypy("--strict", "--ignore-missing-imports", "program.py", folder=tmp_path).stdout
     found = [line.split(": error: ")[0] for line in said.splitlines() if ": error: " in line]
-    assert found == ["program.py:12", "program.py:13", "program.py:14", "program.py:18"], said
+    assert found == ["program.py:12", "program.py:13", "program.py:14", "program.py:18", "program.py:24"], said
