@@ -40,7 +40,8 @@ std::shared_ptr<const Scene> checked(std::shared_ptr<const Scene> scene, const O
 
 void check_memory(const char* name, Positions vertices) {
   if (vertices.n > 0 && !vertices.data)
-    throw InvalidArgument(std::string(name) + ": data is null, but " + std::to_string(vertices.n) + " rows were named; give the address of the first");
+    throw InvalidArgument(std::string(name) + ": data is null, but " + std::to_string(vertices.n) +
+                          " rows were named; give the address of the first");
 }
 
 }  // namespace hpccd

@@ -12,7 +12,8 @@ bool wanted(Backend backend, const char* name, const std::string& unsupported, c
   if (o.backend != backend) return false;
   if (!unsupported.empty()) throw InvalidArgument(unsupported);
   if (!usable)
-    throw InvalidArgument(std::string("backend: \"") + name + "\" is not usable here: " + gpu::status().reason + "; use the CPU");
+    throw InvalidArgument(std::string("backend: \"") + name + "\" is not usable here: " + gpu::status().reason +
+                          "; use the CPU");
   return true;
 }
 

@@ -29,7 +29,8 @@ Simd resolve(Simd wanted) {
   const auto levels = simd_levels();
   if (wanted == Simd::automatic) return levels.back();
   if (std::find(levels.begin(), levels.end(), wanted) == levels.end())
-    throw InvalidArgument(std::string("simd: this machine or build has no ") + name_of(wanted) + "; leave the choice to the detector (\"auto\")");
+    throw InvalidArgument(std::string("simd: this machine or build has no ") + name_of(wanted) +
+                          "; leave the choice to the detector (\"auto\")");
   return wanted;
 }
 

@@ -9,7 +9,8 @@
 namespace hpccd::gpu {
 
 const Status& status() {
-  static const Status s{false, "", {}, "this build holds no CUDA code: nvcc was not found, or HPCCD_CUDA was OFF, when it was compiled"};
+  static const Status s{
+      false, "", {}, "this build holds no CUDA code: nvcc was not found, or HPCCD_CUDA was OFF, when it was compiled"};
   return s;
 }
 
