@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
 # colcon_check.sh FOLDER: builds and tests what is committed with colcon, on the ROS wheels, in a clean workspace in
-# FOLDER, which must lie outside the checkout and is made anew. Takes half an hour on two cores.
+# FOLDER, which must lie outside the checkout and is made anew. Takes 25 minutes on two cores.
 # PYTHON in the environment: which one, 3.11 or 3.12. COLCON_TEST=no: build only.
 set -euo pipefail
 
