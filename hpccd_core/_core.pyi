@@ -66,7 +66,13 @@ class Rate(_Enumeration):
 class Scene:
     def __init__(self) -> None: ...
     def add_mesh(
-        self, name: str, faces: NDArray[np.uint32], n_vertices: int, self_collision: bool, static: bool
+        self,
+        name: str,
+        faces: NDArray[np.uint32],
+        n_vertices: int,
+        self_collision: bool,
+        static: bool,
+        edges: NDArray[np.uint32],
     ) -> int: ...
     def ignore_pair(self, mesh_a: int, mesh_b: int) -> None: ...
     def set_accuracy(self, mesh_a: int, mesh_b: int, accuracy: Accuracy) -> None: ...

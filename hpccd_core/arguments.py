@@ -84,20 +84,29 @@ def length(name: str, value: object) -> float:
 
 def faces(value: object) -> NDArray[np.uint32]:
     """(F, 3) integers -> (F, 3) uint32, C-contiguous."""
-    array = _array("faces", value)
+    return _indices("faces", value, "F", 3)
+
+
+def edges(value: object) -> NDArray[np.uint32]:
+    """(E, 2) integers -> (E, 2) uint32, C-contiguous."""
+    return _indices("edges", value, "E", 2)
+
+
+def _indices(name: str, value: object, rows: str, columns: int) -> NDArray[np.uint32]:
+    array = _array(name, value)
     if array.size == 0 and array.ndim in (1, 2):
-        return np.empty((0, 3), np.uint32)
+        return np.empty((0, columns), np.uint32)
     integers = _integers_of_any_size(value, array) if array.dtype.kind in "fO" else array
     if array.dtype.kind not in "iu" and integers is array:
-        remedy = "; convert with faces.astype(numpy.uint32)" if array.dtype.kind == "f" else ": indices of vertices"
-        raise TypeError(f"faces: expected integers, got {_kind(value, array)}{remedy}")
-    if array.ndim != 2 or array.shape[1] != 3:
-        raise ValueError(f"faces: expected shape (F, 3), got {array.shape}")
+        remedy = f"; convert with {name}.astype(numpy.uint32)" if array.dtype.kind == "f" else ": indices of vertices"
+        raise TypeError(f"{name}: expected integers, got {_kind(value, array)}{remedy}")
+    if array.ndim != 2 or array.shape[1] != columns:
+        raise ValueError(f"{name}: expected shape ({rows}, {columns}), got {array.shape}")
     for bad, what in ((integers < 0, "is negative"), (integers > 0xFFFFFFFE, "is beyond 2**32 - 2")):
         if bad.any():
             row, column = np.argwhere(bad)[0]
             raise ValueError(
-                f"faces[{row}, {column}] is {_shown(integers[row, column])}, which {what}; "
+                f"{name}[{row}, {column}] is {_shown(integers[row, column])}, which {what}; "
                 "indices count this mesh's vertices from 0"
             )
     return np.ascontiguousarray(integers, np.uint32)

@@ -10,7 +10,7 @@ from .options import ACCURACIES, Accuracy, Feature
 
 
 class Scene:
-    """Triangle meshes with fixed topology; their vertices are concatenated in the order added.
+    """Meshes of triangles and of edges alone, with fixed topology; their vertices are concatenated in the order added.
 
     Model only what the scene requires: ``self_collision=False`` for bodies that keep their shape, ``static=True`` for
     meshes that never move, :meth:`ignore_pair` for pairs that cannot or may touch.
@@ -23,17 +23,20 @@ class Scene:
     def add_mesh(
         self,
         name: str,
-        faces: ArrayLike,
+        faces: ArrayLike = (),
         *,
+        edges: ArrayLike = (),
         n_vertices: int | None = None,
         self_collision: bool = True,
         static: bool = False,
     ) -> int:
         """Add a mesh and return its number.
 
-        name: unique string. faces: (F, 3) integers, indices into this mesh's own vertices. n_vertices: how many
-        vertices the mesh has; by default the largest index + 1; give it where trailing vertices are in no face (such
-        vertices are tested against faces too). self_collision: whether contacts within the mesh matter. static: a
+        name: unique string. faces: (F, 3) integers, indices into this mesh's own vertices. edges: (E, 2) integers,
+        likewise: edges beside those of the faces, as of a rope or a rod. They are tested as all edges are, their
+        vertices as all vertices. One that is given twice, or is a face's too, counts once. n_vertices: how many
+        vertices the mesh has; by default the largest index + 1; give it where trailing vertices are in no face and no
+        edge (such vertices are tested against faces too). self_collision: whether contacts within the mesh matter. static: a
         promise that the mesh does not move during a step (detect() refuses one that does); pairs of static meshes are
         never tested.
 
@@ -41,10 +44,10 @@ class Scene:
         """
         name = arguments.text("name", name)
         self_collision, static = arguments.flag("self_collision", self_collision), arguments.flag("static", static)
-        indices = arguments.faces(faces)
-        used = int(indices.max()) + 1 if indices.size else 0
+        indices, segments = arguments.faces(faces), arguments.edges(edges)
+        used = max(int(array.max()) + 1 if array.size else 0 for array in (indices, segments))
         n_vertices = used if n_vertices is None else arguments.whole_number("n_vertices", n_vertices, 0, 2**32 - 2)
-        number = self._core.add_mesh(name, indices, n_vertices, self_collision, static)
+        number = self._core.add_mesh(name, indices, n_vertices, self_collision, static, segments)
         self._ids[name] = number
         return number
 

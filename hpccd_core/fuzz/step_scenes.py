@@ -11,9 +11,11 @@ import numpy as np
 
 @dataclass(frozen=True)
 class SmallScene:
-    """faces: of each mesh, its own indices; rest: (V,3), all meshes one after the other."""
+    """faces: of each mesh, its own indices; edges: those beside the faces' own, likewise; rest: (V,3), all meshes one
+    after the other."""
 
     faces: list[np.ndarray]
+    edges: list[np.ndarray]
     n_vertices: list[int]
     rest: np.ndarray
 
@@ -63,10 +65,20 @@ def points(n: int) -> tuple[np.ndarray, np.ndarray]:
     return np.empty((0, 3), int), np.stack([np.cos(angle), np.sin(angle), 0 * angle], 1)
 
 
+def rope(n: int) -> tuple[np.ndarray, np.ndarray]:
+    """Edges of length 1 in a straight line: indices in twos."""
+    along = np.arange(n) - (n - 1) / 2
+    return np.stack([np.arange(n - 1), np.arange(1, n)], 1), np.stack([along, 0 * along, 0 * along], 1)
+
+
 def scene(*meshes: tuple[np.ndarray, np.ndarray], apart: float = 2.5) -> SmallScene:
-    """The meshes one above the other."""
+    """The meshes one above the other; each has its indices in threes or in twos."""
     rest = [vertices + [0, 0, apart * level] for level, (_, vertices) in enumerate(meshes)]
-    return SmallScene([faces for faces, _ in meshes], [len(v) for v in rest], np.concatenate(rest))
+    by_corners = [
+        [indices if indices.shape[1] == corners else np.empty((0, corners), int) for indices, _ in meshes]
+        for corners in (3, 2)
+    ]
+    return SmallScene(*by_corners, [len(v) for v in rest], np.concatenate(rest))
 
 
 SMALL_SCENES = {
@@ -77,6 +89,7 @@ SMALL_SCENES = {
     "moebius": scene(ring(9, 0.5)),
     "bodies": scene(octahedron(), octahedron()),
     "sheet-body-points": scene(grid(3, 3), octahedron(), points(3)),
+    "sheet-ropes": scene(grid(3, 3), rope(6), rope(3), apart=0.5),
     "careless": scene(careless()),
     "layers": scene(grid(2, 4), grid(3, 2), grid(2, 2), apart=0.25),
 }

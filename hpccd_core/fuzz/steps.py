@@ -29,8 +29,9 @@ def true_steps(kind: str, queries: np.ndarray, distances: np.ndarray, threads: i
     scene = SMALL_SCENES[kind]
     starts, ends = _ends(queries)
     toc = reference.earliest_contacts(
-        starts, ends, scene.faces, n_vertices=scene.n_vertices, minimum_separation=distances, threads=threads
-    )
+        starts, ends, scene.faces, edges_per_mesh=scene.edges, n_vertices=scene.n_vertices,
+        minimum_separation=distances, threads=threads,
+    )  # fmt: skip
     return np.isfinite(toc), np.minimum(toc, 1.0)
 
 
@@ -129,8 +130,8 @@ def _detector(
     """And the separation that it has now."""
     small = SMALL_SCENES[kind]
     scene = hc.Scene()
-    for number, (faces, n) in enumerate(zip(small.faces, small.n_vertices, strict=True)):
-        scene.add_mesh(f"mesh{number}", np.asarray(faces, np.uint32).reshape(-1, 3), n_vertices=n)
+    for number, (faces, edges, n) in enumerate(zip(small.faces, small.edges, small.n_vertices, strict=True)):
+        scene.add_mesh(f"mesh{number}", faces, edges=edges, n_vertices=n)
     detector = hc.Detector(
         scene, accuracy=accuracy, simd=simd, report=report, features=features, backend="cpu", threads=1
     )

@@ -11,9 +11,12 @@ std::vector<Vertex> vertices_of(const Meshes& meshes) {
 
 std::vector<Edge> edges_of(const Meshes& meshes) {
   std::vector<Edge> edges;
+  const auto add = [&](const Edge& e) {
+    if (e[0] != e[1]) edges.push_back({std::min(e[0], e[1]), std::max(e[0], e[1])});
+  };
   for (const Face& f : meshes.faces)
-    for (const Edge e : {Edge{f[0], f[1]}, Edge{f[1], f[2]}, Edge{f[2], f[0]}})
-      if (e[0] != e[1]) edges.push_back({std::min(e[0], e[1]), std::max(e[0], e[1])});
+    for (const Edge& e : {Edge{f[0], f[1]}, Edge{f[1], f[2]}, Edge{f[2], f[0]}}) add(e);
+  for (const Edge& e : meshes.edges) add(e);
   std::sort(edges.begin(), edges.end());
   edges.erase(std::unique(edges.begin(), edges.end()), edges.end());
   return edges;

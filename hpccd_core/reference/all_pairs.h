@@ -20,6 +20,7 @@ using Face = std::array<std::uint32_t, 3>;
 
 struct Meshes {
   std::vector<Face> faces;                        // scene-wide vertex indices
+  std::vector<Edge> edges;                        // those beside the faces' own, likewise
   std::vector<std::uint32_t> mesh_of_vertex;      // all vertices of a face lie in one mesh
   std::vector<std::vector<std::uint8_t>> tested;  // tested[a][b]: pairs of meshes a and b are asked for
 
@@ -29,7 +30,7 @@ struct Meshes {
 // Every vertex, in a face or not.
 std::vector<Vertex> vertices_of(const Meshes& meshes);
 
-// The edges of all faces, each once, lower index first, in lexicographic order; one from a vertex to itself is none.
+// The edges of all faces and those beside, each once, lower index first, in lexicographic order; one from a vertex to itself is none.
 std::vector<Edge> edges_of(const Meshes& meshes);
 
 // Box of a feature's vertices at both ends of the step. A vertex on a straight line stays in the box of its

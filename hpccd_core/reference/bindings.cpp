@@ -113,9 +113,9 @@ auto squared(Of of) {
 
 using Tested = std::vector<std::vector<std::uint8_t>>;
 
-reference::Meshes meshes_of(const Array<std::uint32_t>& faces, const std::vector<std::uint32_t>& mesh_of_vertex,
-                            const Tested& tested) {
-  return {rows<reference::Face>(faces), mesh_of_vertex, tested};
+reference::Meshes meshes_of(const Array<std::uint32_t>& faces, const Array<std::uint32_t>& edges,
+                            const std::vector<std::uint32_t>& mesh_of_vertex, const Tested& tested) {
+  return {rows<reference::Face>(faces), rows<reference::Edge>(edges), mesh_of_vertex, tested};
 }
 
 template <class Of>

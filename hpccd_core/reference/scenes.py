@@ -2,7 +2,8 @@
 """All answers of a scene, by the exact tests on every pair whose boxes do not rule it out.
 
 Arguments of all: faces_per_mesh: for each mesh (F,3) integers, indices into its own vertices. n_vertices: for each
-mesh, by default one more than its largest index. Not tested: features that share a vertex, meshes in
+mesh, by default one more than its largest index. edges_per_mesh: for each mesh (E,2) integers, likewise: edges beside
+those of its faces. Not tested: features that share a vertex, meshes in
 `no_self_collision` against themselves, `static` ones against themselves and each other, and `ignored_pairs` (all by
 position in faces_per_mesh). Vertices that belong to no face are tested against faces too; an edge from a vertex to
 itself is none. Positions are (V,3), finite, all meshes' vertices one after the other. Raise ValueError where shapes or
@@ -142,17 +143,24 @@ class _Scene:
         self,
         faces_per_mesh: Sequence[np.ndarray],
         *,
+        edges_per_mesh: Sequence[np.ndarray] | None = None,
         n_vertices: Sequence[int] | None = None,
         no_self_collision: Iterable[int] = (),
         static: Iterable[int] = (),
         ignored_pairs: Iterable[tuple[int, int]] = (),
     ) -> None:
         faces_per_mesh = [np.asarray(f, dtype=np.int64).reshape(-1, 3) for f in faces_per_mesh]
+        given = edges_per_mesh if edges_per_mesh is not None else [()] * len(faces_per_mesh)
+        edges_per_mesh = [np.asarray(e, dtype=np.int64).reshape(-1, 2) for e in given]
         if n_vertices is None:
-            n_vertices = [int(f.max()) + 1 if len(f) else 0 for f in faces_per_mesh]
-        for mesh, (faces, count) in enumerate(zip(faces_per_mesh, n_vertices, strict=True)):
-            if len(faces) and not 0 <= faces.min() <= faces.max() < count:
-                raise ValueError(f"faces_per_mesh[{mesh}]: indices must lie in 0..{count - 1}")
+            n_vertices = [
+                max(int(a.max()) + 1 if len(a) else 0 for a in both)
+                for both in zip(faces_per_mesh, edges_per_mesh, strict=True)
+            ]
+        for name, features in (("faces_per_mesh", faces_per_mesh), ("edges_per_mesh", edges_per_mesh)):
+            for mesh, (indices, count) in enumerate(zip(features, n_vertices, strict=True)):
+                if len(indices) and not 0 <= indices.min() <= indices.max() < count:
+                    raise ValueError(f"{name}[{mesh}]: indices must lie in 0..{count - 1}")
         self.n_vertices = sum(n_vertices)
         offsets = np.concatenate([[0], np.cumsum(n_vertices)])
         tested = np.ones((len(faces_per_mesh), len(faces_per_mesh)), dtype=np.uint8)
@@ -163,6 +171,7 @@ class _Scene:
         tested[np.ix_(list(static), list(static))] = 0
         self.meshes = _reference.Meshes(
             np.concatenate([f + o for f, o in zip(faces_per_mesh, offsets, strict=False)]).astype(np.uint32),
+            np.concatenate([e + o for e, o in zip(edges_per_mesh, offsets, strict=False)]).astype(np.uint32),
             np.repeat(np.arange(len(n_vertices)), n_vertices).tolist(),
             tested.tolist(),
         )

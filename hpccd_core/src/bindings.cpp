@@ -204,11 +204,11 @@ PYBIND11_MODULE(_core, m) {
       .def(
           "add_mesh",
           [](Scene& s, const std::string& name, const Array<std::uint32_t>& faces, std::uint32_t n_vertices,
-             bool self_collision, bool is_static) {
+             bool self_collision, bool is_static, const Array<std::uint32_t>& edges) {
             return s.add_mesh(name, {faces.data(), static_cast<std::size_t>(faces.size())}, n_vertices,
-                              {self_collision, is_static});
+                              {self_collision, is_static}, {edges.data(), static_cast<std::size_t>(edges.size())});
           },
-          "name"_a, "faces"_a, "n_vertices"_a, "self_collision"_a, "static"_a)
+          "name"_a, "faces"_a, "n_vertices"_a, "self_collision"_a, "static"_a, "edges"_a)
       .def("ignore_pair", &Scene::ignore_pair, "mesh_a"_a, "mesh_b"_a)
       .def("set_accuracy", &Scene::set_accuracy, "mesh_a"_a, "mesh_b"_a, "accuracy"_a)
       .def("set_separation", &Scene::set_separation, "mesh_a"_a, "mesh_b"_a, "separation"_a)

@@ -94,16 +94,27 @@ TEST(Arguments, MeshesThatTheSceneHasNot) {
             "faces[0, 2] is 3, but mesh 'c' has 3 vertices; indices "
             "count this mesh's own vertices from 0");
   EXPECT_EQ(refused([&] { scene->add_mesh("c", std::span(face).first(2), 3); }), "faces");
+  EXPECT_EQ(refused([&] { scene->add_mesh("c", {}, 3, {}, face); }), "edges");
+  EXPECT_EQ(refused([&] { scene->add_mesh("c", {}, 3, {}, std::span(face).last(2)); }),
+            "edges[0, 1] is 3, but mesh 'c' has 3 vertices; indices "
+            "count this mesh's own vertices from 0");
+  EXPECT_TRUE(scene->edges().empty());
   EXPECT_EQ(scene->meshes().size(), 2u);
 }
 
-// Of the scene's own list, which moves while it grows.
-TEST(Arguments, FacesOfTheSceneItself) {
-  const auto scene = two_triangles();
-  for (std::uint32_t mesh = 2; mesh < 40; ++mesh)
-    scene->add_mesh("again " + std::to_string(mesh), std::span(scene->faces()[0]), 3);
-  for (std::uint32_t mesh = 0; mesh < 40; ++mesh)
+// Of the scene's own lists, which move while they grow.
+TEST(Arguments, FeaturesOfTheSceneItself) {
+  const auto scene = std::make_shared<Scene>();
+  const std::uint32_t face[3] = {0, 1, 2};
+  scene->add_mesh("first", face, 3, {}, std::span(face).last(2));
+  for (std::uint32_t mesh = 1; mesh < 40; ++mesh)
+    scene->add_mesh("again " + std::to_string(mesh), scene->faces()[0], 3, {}, scene->edges()[0]);
+  for (std::uint32_t mesh = 0; mesh < 40; ++mesh) {
     EXPECT_EQ(scene->faces()[mesh], (std::array{3 * mesh, 3 * mesh + 1, 3 * mesh + 2}));
+    EXPECT_EQ(scene->edges()[mesh], (std::array{3 * mesh + 1, 3 * mesh + 2}));
+    EXPECT_EQ(scene->meshes()[mesh].first_edge, mesh);
+    EXPECT_EQ(scene->meshes()[mesh].n_edges, 1u);
+  }
 }
 
 TEST(Arguments, PositionsThatWillNotDo) {

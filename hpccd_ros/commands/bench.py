@@ -29,6 +29,7 @@ BENCHMARKS = {
     "methods": ("core.methods", "the methods and instruction sets compared: time, and equality of the results"),
     "size": ("core.size", "how time and memory grow with the number of triangles"),
     "worlds": ("core.worlds", "many worlds in one call on CPUs, beside detectors that are asked one world at a time"),
+    "ropes": ("core.ropes", "ropes as edges, beside thin triangles and beside cloth with as many edges"),
     "memory": ("core.memory", "peak memory and bytes per triangle"),
     "limit": ("core.limit", "where the time of a step goes, beside the least that this machine needs for the work"),
     "options": ("core.options", "what each way to model less saves"),

@@ -9,29 +9,36 @@ import hpccd_core as hc
 from hpccd_core import reference
 
 
+NO_FACES, NO_EDGES = np.empty((0, 3), int), np.empty((0, 2), int)
+
+
 @dataclasses.dataclass
 class Meshes:
-    """faces: for each mesh (F,3), its own indices; vertices_t0, vertices_t1: (V,3), all meshes one after the other."""
+    """faces: for each mesh (F,3), its own indices; edges: those beside the faces' own, (E,2) likewise; vertices_t0,
+    vertices_t1: (V,3), all meshes one after the other."""
 
     faces: list
     vertices_t0: np.ndarray
     vertices_t1: np.ndarray
     n_vertices: list
+    edges: list
 
     def scene(self, *, no_self_collision=(), static=(), ignored_pairs=()):
         scene = hc.Scene()
-        for i, (faces, n) in enumerate(zip(self.faces, self.n_vertices, strict=True)):
-            scene.add_mesh(
-                f"mesh{i}", faces, n_vertices=n, self_collision=i not in no_self_collision, static=i in static
-            )
+        for i, (faces, edges, n) in enumerate(zip(self.faces, self.edges, self.n_vertices, strict=True)):
+            rules = {"self_collision": i not in no_self_collision, "static": i in static}
+            scene.add_mesh(f"mesh{i}", faces, edges=edges, n_vertices=n, **rules)
         for a, b in ignored_pairs:
             scene.ignore_pair(f"mesh{a}", f"mesh{b}")
         return scene
 
+    @property
+    def beside_faces(self):
+        """What the oracles want to know of the meshes beside their faces."""
+        return {"n_vertices": self.n_vertices, "edges_per_mesh": self.edges}
+
     def truth(self, **options):
-        return reference.brute_force(
-            self.vertices_t0, self.vertices_t1, self.faces, n_vertices=self.n_vertices, **options
-        )
+        return reference.brute_force(self.vertices_t0, self.vertices_t1, self.faces, **self.beside_faces, **options)
 
 
 def sheet(n):
@@ -66,12 +73,40 @@ def tetrahedron(rng):
     return faces, body + rng.normal(0, 2, 3), body + rng.normal(0, 2, 3)
 
 
+def rope(rng, n=30):
+    """Edges one after the other in a tangle, some given twice or from a vertex to itself."""
+    edges = np.stack([np.arange(n - 1), np.arange(1, n)], axis=1)
+    again = rng.integers(0, n - 1, 5)
+    edges = np.concatenate([edges, edges[again, ::-1], np.stack([again, again], axis=1)])
+    start = np.cumsum(rng.normal(0, 0.6, (n, 3)), axis=0)
+    start -= start.mean(axis=0)
+    return NO_FACES, start, start + rng.normal(0, 1, (n, 3)), rng.permutation(edges)
+
+
+def lattice_rope(rng, n=24):
+    """Edges between any two vertices of a coarse lattice: coincident, parallel, at rest."""
+    return NO_FACES, *rng.integers(0, 4, (2, n, 3)), rng.integers(0, n, (n, 2))
+
+
+def fringed_sheet(rng, n=5):
+    """A sheet with threads at its border; some edges are the sheet's own, the last vertices are in nothing."""
+    faces, start, end = crumpled_sheet(rng, n)
+    n_sheet, n_threads = n * n, 2 * n
+    ends = rng.normal(0, 2, (2, n_threads + 2, 3)) + [n / 2, n / 2, 0]
+    border = rng.integers(0, n_sheet, n_threads)
+    threads = np.stack([border, n_sheet + np.arange(n_threads)], axis=1)
+    edges = rng.permutation(np.concatenate([threads, faces[:6, :2]]))
+    return faces, np.concatenate([start, ends[0]]), np.concatenate([end, ends[1]]), edges
+
+
 def combine(*meshes):
+    """Of (faces, vertices_t0, vertices_t1) or (faces, vertices_t0, vertices_t1, edges) each."""
     return Meshes(
         faces=[m[0] for m in meshes],
         vertices_t0=np.concatenate([m[1] for m in meshes]).astype(float),
         vertices_t1=np.concatenate([m[2] for m in meshes]).astype(float),
         n_vertices=[len(m[1]) for m in meshes],
+        edges=[m[3] if len(m) > 3 else NO_EDGES for m in meshes],
     )
 
 
@@ -106,7 +141,7 @@ def many_meshes(rng):
 
 def lone_vertices(rng):
     """Particles, which are in no face, among bodies."""
-    particles = np.empty((0, 3), int), *rng.normal(0, 2, (2, 40, 3))
+    particles = NO_FACES, *rng.normal(0, 2, (2, 40, 3))
     return combine(crumpled_sheet(rng, 5), particles, tetrahedron(rng))
 
 
@@ -125,4 +160,16 @@ def huge_and_tiny(rng):
     )
 
 
-ALL = (single_mesh, lattice, triangle_soup, many_meshes, lone_vertices, huge_and_tiny)
+def ropes(rng):
+    """Edges in no face, among sheets, bodies and particles."""
+    particles = NO_FACES, *rng.normal(0, 2, (2, 10, 3))
+    return combine(rope(rng), fringed_sheet(rng), rope(rng, 9), particles, tetrahedron(rng))
+
+
+def lattice_ropes(rng):
+    return combine(lattice_rope(rng), lattice_sheet(rng, 4), lattice_rope(rng, 12))
+
+
+ALL = (
+    single_mesh, lattice, triangle_soup, many_meshes, lone_vertices, huge_and_tiny, ropes, lattice_ropes
+)  # fmt: skip

@@ -62,17 +62,18 @@ class Renamed:
 
 
 def renamed(rng, meshes):
-    faces, vertex, face = [], [], []
+    faces, edges, vertex, face = [], [], [], []
     first_vertex = first_face = 0
-    for of_mesh, n in zip(meshes.faces, meshes.n_vertices, strict=True):
+    for of_mesh, edges_of_mesh, n in zip(meshes.faces, meshes.edges, meshes.n_vertices, strict=True):
         order, face_order = rng.permutation(n), rng.permutation(len(of_mesh))
         place = np.argsort(order)
         faces.append(rng.permuted(place[of_mesh[face_order]].reshape(-1, 3), axis=1))
+        edges.append(rng.permuted(place[rng.permutation(edges_of_mesh)].reshape(-1, 2), axis=1))
         vertex.append(order + first_vertex)
         face.append(face_order + first_face)
         first_vertex, first_face = first_vertex + n, first_face + len(of_mesh)
     vertex, face = np.concatenate(vertex), np.concatenate(face)
     same = dataclasses.replace(
-        meshes, faces=faces, vertices_t0=meshes.vertices_t0[vertex], vertices_t1=meshes.vertices_t1[vertex]
+        meshes, faces=faces, edges=edges, vertices_t0=meshes.vertices_t0[vertex], vertices_t1=meshes.vertices_t1[vertex]
     )
     return Renamed(same, vertex, face)

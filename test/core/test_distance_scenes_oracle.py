@@ -11,7 +11,7 @@ from hpccd_core import reference
 
 SEPARATIONS = {(0, 0): 0.5, (0, 1): 0.0, (1, 1): 2.0}
 RULES = {"no_self_collision": [2], "ignored_pairs": [(0, 2)]}
-SMALL = (random_scenes.lattice, random_scenes.triangle_soup, random_scenes.lone_vertices)
+SMALL = (random_scenes.lattice, random_scenes.triangle_soup, random_scenes.lone_vertices, random_scenes.lattice_ropes)
 
 
 def with_a_triangle(rng):
@@ -26,7 +26,9 @@ def scene_of(generate):
     offsets = np.concatenate([[0], np.cumsum(meshes.n_vertices)])
     faces = np.concatenate([f + o for f, o in zip(meshes.faces, offsets, strict=False)])
     mesh = np.repeat(np.arange(len(meshes.n_vertices)), meshes.n_vertices)
-    edges = {(min(e), max(e)) for f in faces.tolist() for e in itertools.combinations(f, 2) if e[0] != e[1]}
+    beside = np.concatenate([e + o for e, o in zip(meshes.edges, offsets, strict=False)]).tolist()
+    ends = beside + [e for f in faces.tolist() for e in itertools.combinations(f, 2)]
+    edges = {(min(e), max(e)) for e in ends if e[0] != e[1]}
     return meshes, faces, mesh, np.array(sorted(edges))
 
 
@@ -46,7 +48,7 @@ def named_pairs(faces, edges, n_vertices):
 def test_each_pair_by_itself(generate):
     meshes, faces, mesh, edges = scene_of(generate)
     v0, v1 = meshes.vertices_t0, meshes.vertices_t1
-    options = {"n_vertices": meshes.n_vertices}
+    options = meshes.beside_faces
     pairs = {k: v for k, v in SEPARATIONS.items() if max(k) < len(meshes.faces)}
     contacts = reference.brute_force(v0, v1, meshes.faces, minimum_separation=0.125, pair_separation=pairs, **options)
     proximity = reference.proximity(v1, 0.75, meshes.faces, **options)

@@ -16,7 +16,7 @@ KINDS = ("vertex-face", "edge-edge", "edge-face")
 
 
 def truth_of(meshes, vertices, **rules):
-    gaps = reference.smallest_distances(vertices, meshes.faces, n_vertices=meshes.n_vertices, **rules)
+    gaps = reference.smallest_distances(vertices, meshes.faces, **meshes.beside_faces, **rules)
     return {(gap.mesh_a, gap.mesh_b): gap for gap in gaps}
 
 

@@ -16,7 +16,7 @@ def assert_true(meshes, accuracy="exact", separation=0.0, **rules):
     """The step, after it was compared with the oracle's."""
     v0, v1 = meshes.vertices_t0, meshes.vertices_t1
     toc = reference.earliest_contacts(
-        v0[None], v1[None], meshes.faces, n_vertices=meshes.n_vertices, minimum_separation=separation, **rules
+        v0[None], v1[None], meshes.faces, **meshes.beside_faces, minimum_separation=separation, **rules
     )
     true = min(float(toc[0]), 1.0)
     steps = {

@@ -193,9 +193,7 @@ def test_many_contacts_at_one_time(accuracy):
 def test_published_scenes(data_folder):
     for name in ("cloth-ball", "n-body", "cloth-funnel"):
         with np.load(data_folder / f"{name}.npz") as truth:
-            meshes = random_scenes.Meshes(
-                [truth["faces"]], truth["vertices_t0"], truth["vertices_t1"], [len(truth["vertices_t0"])]
-            )
+            meshes = random_scenes.combine((truth["faces"], truth["vertices_t0"], truth["vertices_t1"]))
             true = min(truth["vf_toc"].min(), truth["ee_toc"].min())
             for accuracy in ("exact", "conservative"):
                 for threads in (1, 2):
@@ -206,9 +204,7 @@ def test_published_scenes(data_folder):
 def test_published_scenes_with_separations(data_folder):
     for name in ("cloth-ball", "cloth-funnel"):
         with np.load(data_folder / f"{name}.npz") as motion:
-            meshes = random_scenes.Meshes(
-                [motion["faces"]], motion["vertices_t0"], motion["vertices_t1"], [len(motion["vertices_t0"])]
-            )
+            meshes = random_scenes.combine((motion["faces"], motion["vertices_t0"], motion["vertices_t1"]))
         with np.load(data_folder / "distance" / f"{name}-distance.npz") as truth:
             distances = [key for key in ("s", "s2", "s3") if f"{key}_d" in truth.files]
             assert distances

@@ -20,7 +20,7 @@ def detector_of(meshes, rules=None, **options):
 
 
 def truth_of(meshes, **rules):
-    return reference.intersections(meshes.vertices_t1, meshes.faces, n_vertices=meshes.n_vertices, **rules)
+    return reference.intersections(meshes.vertices_t1, meshes.faces, **meshes.beside_faces, **rules)
 
 
 def assert_edges(found, truth):

@@ -25,7 +25,7 @@ def detector_of(meshes, rules=None, **options):
 
 
 def truth_of(meshes, distance, **rules):
-    return reference.proximity(meshes.vertices_t1, distance, meshes.faces, n_vertices=meshes.n_vertices, **rules)
+    return reference.proximity(meshes.vertices_t1, distance, meshes.faces, **meshes.beside_faces, **rules)
 
 
 @SCENES

@@ -17,20 +17,21 @@ def rows(array):
 
 
 def small_scene(rng):
-    """One to three meshes of 20 triangles together at most, some with vertices in no face, and rules for them."""
+    """One to three meshes of 20 triangles together at most, some with vertices in no face or with edges beside, and rules for them."""
     n_meshes = rng.integers(1, 4)
     meshes = []
     for n_faces in rng.multinomial(rng.integers(1, 21), np.full(n_meshes, 1 / n_meshes)):
         n_vertices = rng.integers(3, 4 + n_faces)
         start, end = rng.integers(-2, 3, (2, n_vertices, 3))
-        meshes.append((rng.integers(0, n_vertices, (n_faces, 3)), start, end))
+        edges = rng.integers(0, n_vertices, (rng.choice([0, 0, 8]), 2))
+        meshes.append((rng.integers(0, n_vertices, (n_faces, 3)), start, end, edges))
     rules = {
         "no_self_collision": [m for m in range(n_meshes) if rng.random() < 0.4],
         "static": [m for m in range(n_meshes) if rng.random() < 0.3],
         "ignored_pairs": [(a, b) for a in range(n_meshes) for b in range(a + 1) if rng.random() < 0.3],
     }
     for mesh in rules["static"]:
-        meshes[mesh] = (meshes[mesh][0], meshes[mesh][1], meshes[mesh][1])
+        meshes[mesh] = (meshes[mesh][0], meshes[mesh][1], meshes[mesh][1], meshes[mesh][3])
     return random_scenes.combine(*meshes), rules
 
 

@@ -34,8 +34,9 @@ struct MeshOptions {
   bool is_static = false;  ///< promised not to move; pairs of two static meshes are never tested
 };
 
-/// Triangle meshes with their topology. The vertices of all meshes are numbered one after the other, in the order
-/// added: so stand their positions in what a Detector is given, and so count the indices in its answers.
+/// Meshes of triangles and of edges alone, with their topology. The vertices of all meshes are numbered one after the
+/// other, in the order added: so stand their positions in what a Detector is given, and so count the indices in its
+/// answers.
 ///
 /// Mesh numbers count from 0 in the order added; a number that no mesh has is refused (InvalidArgument). Where two
 /// numbers are asked for, their order does not matter, and the same number twice means within that mesh.
@@ -46,10 +47,13 @@ class HPCCD_API Scene {
  public:
   /// Adds a mesh and returns its number.
   /// name: one that no other mesh has. faces: 3 indices a triangle into this mesh's own vertices, [0, n_vertices).
-  /// Throws InvalidArgument for a name that is taken, a length that is no multiple of 3, an index out of range (it says
-  /// which), and where the scene would have more than 2^32 - 2 vertices. Whatever is thrown, the scene is as it was.
+  /// edges: 2 indices each, likewise: those beside the triangles' own, as of a rope or a rod. One that is given twice,
+  /// or is a triangle's too, counts once; one from a vertex to itself is none.
+  /// Throws InvalidArgument for a name that is taken, a length that is no multiple of 3 (2), an index out of range (it
+  /// says which), and where the scene would have more than 2^32 - 2 vertices. Whatever is thrown, the scene is as it
+  /// was.
   std::uint32_t add_mesh(std::string name, std::span<const std::uint32_t> faces, std::uint32_t n_vertices,
-                         MeshOptions options = {});
+                         MeshOptions options = {}, std::span<const std::uint32_t> edges = {});
 
   /// Nothing is tested between the two.
   void ignore_pair(std::uint32_t mesh_a, std::uint32_t mesh_b);
@@ -65,10 +69,13 @@ class HPCCD_API Scene {
     std::string name;
     MeshOptions options;
     std::uint32_t first_vertex, n_vertices, first_face, n_faces;
+    std::uint32_t first_edge, n_edges;  ///< in edges()
   };
   const std::vector<Mesh>& meshes() const { return meshes_; }
   /// Vertices of each triangle of all meshes, as numbered in the scene.
   const std::vector<std::array<std::uint32_t, 3>>& faces() const { return faces_; }
+  /// Ends of each edge that was given, of all meshes, as numbered in the scene.
+  const std::vector<std::array<std::uint32_t, 2>>& edges() const { return edges_; }
   std::uint32_t n_vertices() const { return n_vertices_; }
 
   // What was set of a pair, or what holds otherwise. Numbers are not checked here.
@@ -83,6 +90,7 @@ class HPCCD_API Scene {
   HPCCD_HIDDEN Pair known(std::uint32_t mesh_a, std::uint32_t mesh_b) const;
   std::vector<Mesh> meshes_;
   std::vector<std::array<std::uint32_t, 3>> faces_;
+  std::vector<std::array<std::uint32_t, 2>> edges_;
   std::uint32_t n_vertices_ = 0;
   std::map<Pair, bool> ignored_;
   std::map<Pair, Accuracy> accuracy_;

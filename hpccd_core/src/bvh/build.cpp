@@ -15,12 +15,17 @@ struct Range {
 
 // A mesh's primitives: their numbers, and where they stand among those that are split.
 struct Part {
-  std::uint32_t first_face, n_faces, first_lone, n_lone;
+  struct Numbers {
+    std::uint32_t first, n;
+  };
+  Numbers faces, lone_edges, lone_vertices;  // ascending in this order
   std::uint32_t node = 0, begin = 0;
 
-  std::uint32_t size() const { return n_faces + n_lone; }
+  std::uint32_t size() const { return faces.n + lone_edges.n + lone_vertices.n; }
   std::uint32_t place_of(std::uint32_t c) const {
-    return begin + (c < first_face + n_faces ? c - first_face : n_faces + (c - first_lone));
+    if (c < faces.first + faces.n) return begin + (c - faces.first);
+    if (c < lone_edges.first + lone_edges.n) return begin + faces.n + (c - lone_edges.first);
+    return begin + faces.n + lone_edges.n + (c - lone_vertices.first);
   }
 };
 
@@ -48,13 +53,18 @@ class Builder {
 
  private:
   void find_parts() {
-    const auto lone_before = [&](std::uint32_t vertex) {
-      const auto& lone = features_.lone_vertices;
-      return static_cast<std::uint32_t>(std::ranges::lower_bound(lone, vertex) - lone.begin());
+    // Features in the order of their vertices, and those of a mesh: numbered from first_primitive on.
+    const auto numbers = [](const auto& lone, const auto& from, const auto& to, std::uint32_t first_primitive) {
+      const auto begin = std::ranges::lower_bound(lone, from), end = std::ranges::lower_bound(lone, to);
+      return Part::Numbers{first_primitive + static_cast<std::uint32_t>(begin - lone.begin()),
+                           static_cast<std::uint32_t>(end - begin)};
     };
+    using Edge = std::array<std::uint32_t, 2>;
     for (const Scene::Mesh& m : scene_.meshes()) {
-      const std::uint32_t first = lone_before(m.first_vertex), end = lone_before(m.first_vertex + m.n_vertices);
-      parts_.push_back({m.first_face, m.n_faces, features_.n_faces() + first, end - first});
+      const std::uint32_t from = m.first_vertex, to = m.first_vertex + m.n_vertices;
+      parts_.push_back({{m.first_face, m.n_faces},
+                        numbers(features_.lone_edges, Edge{from, 0}, Edge{to, 0}, features_.first_lone_edge()),
+                        numbers(features_.lone_vertices, from, to, features_.first_lone_vertex())});
     }
   }
 
@@ -270,9 +280,13 @@ class Builder {
       for (auto v = features_.first_vertex[c]; v < features_.first_vertex[c + 1]; ++v)
         corners.add(features_.owned_vertices[v]);
     }
-    for (std::uint32_t i = r.begin; i < r.end; ++i)
-      if (const std::uint32_t c = primitives_[i].number; c < features_.n_faces())
+    for (std::uint32_t i = r.begin; i < r.end; ++i) {
+      const std::uint32_t c = primitives_[i].number;
+      if (c < features_.n_faces())
         for (const std::uint32_t v : features_.faces[c]) corners.add(v);
+      else if (c < features_.first_lone_vertex())
+        for (const std::uint32_t v : features_.lone_edges[c - features_.first_lone_edge()]) corners.add(v);
+    }
     return corners;
   }
 
@@ -309,7 +323,7 @@ class Builder {
     node.primitives = r.end - r.begin;
     const LeafRange& leaf = tree_.leaves[i];
     std::uint32_t face = leaf.first_face, edge = leaf.first_edge, vertex = leaf.first_vertex;
-    node.only_points = leaf.n_faces() == 0;
+    node.only_points = leaf.n_faces() == 0 && leaf.n_edges() == 0;
     std::sort(&primitives_[r.begin], &primitives_[r.end],
               [](const Centroid& a, const Centroid& b) { return a.number < b.number; });
     Corners corners = corners_of(r);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The merged hierarchy of all meshes (Kim et al. 2009, section 3.2): a binary tree whose leaves hold a few triangles
+// The merged hierarchy of all meshes (Kim et al. 2009, section 3.2): a binary tree whose leaves hold a few primitives
 // each, together with the vertices and edges these represent, laid out for tests of many boxes at once.
 #pragma once
 
@@ -30,7 +30,7 @@ struct alignas(64) Node {
   std::uint32_t leaf = 0;      // its number; of an inner node the first one below it
   std::uint32_t mesh = mixed_meshes;
   std::uint32_t primitives : 31 = 0;  // in the whole subtree
-  std::uint32_t only_points : 1 = 0;  // no triangle in the whole subtree, so nothing that another such node could touch
+  std::uint32_t only_points : 1 = 0;  // no triangle and no edge in it, so nothing that another such node could touch
 
   bool overlaps(const Node& other) const;  // as MotionBox::overlaps
   // The same up to a time below 1, from the start on.

@@ -44,7 +44,7 @@ void edge_pairs(const Features& features, const std::vector<Box>& vertex_boxes, 
 
 void vertex_face_pairs(const Features& features, const std::vector<Box>& vertex_boxes, BoundedPrimitive vertices,
                        BoundedPrimitive face, CandidateBuffer& out) {
-  if (face.number >= features.n_faces()) return;  // a vertex that is in no triangle
+  if (face.number >= features.n_faces()) return;  // an edge or a vertex that is in no triangle
   const auto& corners = features.faces[face.number];
   for (auto i = features.first_vertex[vertices.number]; i < features.first_vertex[vertices.number + 1]; ++i) {
     const std::uint32_t v = features.owned_vertices[i];

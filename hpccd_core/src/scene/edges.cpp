@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <iterator>
 #include <numeric>
 
 namespace hpccd {
@@ -123,6 +124,32 @@ Edges find_edges(const Features& x, ThreadPool& pool, std::vector<std::uint32_t>
   constexpr std::uint32_t worth_sharing = 1 << 13;
   const bool shared = pool.size() > 2 && x.n_faces() >= worth_sharing;
   return shared ? find_together(x, pool, vertex_owner) : find_alone(x, vertex_owner);
+}
+
+std::vector<std::array<std::uint32_t, 2>> lone_edges(const std::vector<std::array<std::uint32_t, 2>>& given,
+                                                     const Edges& all) {
+  std::vector<std::array<std::uint32_t, 2>> lone;
+  for (const auto& [v, w] : given)
+    if (v != w) lone.push_back({std::min(v, w), std::max(v, w)});
+  std::ranges::sort(lone);
+  lone.erase(std::unique(lone.begin(), lone.end()), lone.end());
+  std::vector<std::array<std::uint32_t, 2>> missing;
+  std::ranges::set_difference(lone, all.edges, std::back_inserter(missing));
+  return missing;
+}
+
+Edges with_lone_edges(Edges all, const std::vector<std::array<std::uint32_t, 2>>& lone, std::uint32_t first) {
+  if (lone.empty()) return all;
+  Edges together;
+  together.edges.reserve(all.edges.size() + lone.size());
+  together.owner.reserve(all.edges.size() + lone.size());
+  for (std::size_t i = 0, j = 0; i < all.edges.size() || j < lone.size();) {
+    const bool from_lone = i == all.edges.size() || (j < lone.size() && lone[j] < all.edges[i]);
+    together.edges.push_back(from_lone ? lone[j] : all.edges[i]);
+    together.owner.push_back(from_lone ? first + static_cast<std::uint32_t>(j) : all.owner[i]);
+    ++(from_lone ? j : i);
+  }
+  return together;
 }
 
 }  // namespace hpccd

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The edges of all triangles of a scene, each once.
+// The edges of a scene, each once.
 #pragma once
 
 #include <array>
@@ -11,13 +11,21 @@
 
 namespace hpccd {
 
-// In lexicographic order, and of each the first triangle that has it.
+// In lexicographic order, and of each the primitive that represents it.
 struct Edges {
   std::vector<std::array<std::uint32_t, 2>> edges;
   std::vector<std::uint32_t> owner;
 };
 
-// Of x.faces. Of each vertex that is in a triangle it puts the first one into vertex_owner, which holds UINT32_MAX.
+// Those of x.faces, each represented by the first triangle that has it. Of each vertex that is in a triangle it puts
+// the first one into vertex_owner, which holds UINT32_MAX.
 Edges find_edges(const Features& x, ThreadPool& pool, std::vector<std::uint32_t>& vertex_owner);
+
+// Those of `given` that are not in `all`, in lexicographic order. One from a vertex to itself is none.
+std::vector<std::array<std::uint32_t, 2>> lone_edges(const std::vector<std::array<std::uint32_t, 2>>& given,
+                                                     const Edges& all);
+
+// Both together. first: the primitive that represents the first lone edge.
+Edges with_lone_edges(Edges all, const std::vector<std::array<std::uint32_t, 2>>& lone, std::uint32_t first);
 
 }  // namespace hpccd

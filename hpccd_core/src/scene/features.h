@@ -16,7 +16,8 @@ struct Features {
   std::vector<std::array<std::uint32_t, 2>> edges;  // v0 < v1, in lexicographic order: an edge's number is its rank
   std::vector<std::array<std::uint32_t, 3>> faces;
   // The primitives of the hierarchy, by number: all triangles (the paper's representative triangles, to which features
-  // are assigned), then the vertices that are in no triangle.
+  // are assigned), then the edges that are in no triangle, then the vertices that are in neither.
+  std::vector<std::array<std::uint32_t, 2>> lone_edges;
   std::vector<std::uint32_t> lone_vertices;
   std::vector<std::uint32_t> mesh_of_primitive, mesh_of_vertex;
   // What primitive p represents: edges owned_edges[first_edge[p] .. first_edge[p+1]), vertices likewise.
@@ -24,11 +25,13 @@ struct Features {
   std::uint32_t n_vertices = 0;
 
   std::size_t bytes() const {
-    return edges.capacity() * sizeof(edges[0]) + faces.capacity() * sizeof(faces[0]) +
+    return (edges.capacity() + lone_edges.capacity()) * sizeof(edges[0]) + faces.capacity() * sizeof(faces[0]) +
            4 * (lone_vertices.capacity() + mesh_of_primitive.capacity() + mesh_of_vertex.capacity() +
                 first_edge.capacity() + owned_edges.capacity() + first_vertex.capacity() + owned_vertices.capacity());
   }
   std::uint32_t n_faces() const { return static_cast<std::uint32_t>(faces.size()); }
+  std::uint32_t first_lone_edge() const { return n_faces(); }
+  std::uint32_t first_lone_vertex() const { return n_faces() + static_cast<std::uint32_t>(lone_edges.size()); }
   std::uint32_t n_primitives() const { return static_cast<std::uint32_t>(mesh_of_primitive.size()); }
 };
 

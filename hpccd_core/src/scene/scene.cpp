@@ -8,34 +8,72 @@
 
 namespace hpccd {
 
+namespace {
+
+// Throws InvalidArgument where `indices` are not so many a feature, each below n_vertices.
+template <std::size_t corners>
+void check_indices(const char* argument, const char* of_what, std::span<const std::uint32_t> indices,
+                   const std::string& mesh, std::uint32_t n_vertices) {
+  if (indices.size() % corners != 0) throw InvalidArgument(std::string(argument) + ": must hold " + of_what);
+  for (std::size_t i = 0; i < indices.size(); ++i)
+    if (indices[i] >= n_vertices)
+      throw InvalidArgument(std::string(argument) + "[" + std::to_string(i / corners) + ", " +
+                            std::to_string(i % corners) + "] is " + std::to_string(indices[i]) + ", but mesh '" + mesh +
+                            "' has " + std::to_string(n_vertices) +
+                            " vertices; indices count this mesh's own vertices from 0");
+}
+
+// A longer copy of all features, or nothing where there is room for n more. Beside the old one, so that what is added
+// may be a part of that.
+template <class Feature>
+std::vector<Feature> with_room(const std::vector<Feature>& all, std::size_t n) {
+  std::vector<Feature> larger;
+  if (all.capacity() >= all.size() + n) return larger;
+  larger.reserve(std::max(all.size() + n, 2 * all.size()));
+  larger.assign(all.begin(), all.end());
+  return larger;
+}
+
+// Does not throw.
+template <std::size_t corners>
+void append(std::vector<std::array<std::uint32_t, corners>>& all,
+            std::vector<std::array<std::uint32_t, corners>>& larger, std::span<const std::uint32_t> indices,
+            std::uint32_t first_vertex) {
+  auto& to = larger.capacity() > 0 ? larger : all;
+  for (std::size_t i = 0; i < indices.size(); i += corners) {
+    std::array<std::uint32_t, corners> feature;
+    for (std::size_t k = 0; k < corners; ++k) feature[k] = first_vertex + indices[i + k];
+    to.push_back(feature);
+  }
+  if (larger.capacity() > 0) all.swap(larger);
+}
+
+}  // namespace
+
 std::uint32_t Scene::add_mesh(std::string name, std::span<const std::uint32_t> faces, std::uint32_t n_vertices,
-                              MeshOptions options) {
+                              MeshOptions options, std::span<const std::uint32_t> edges) {
   for (const Mesh& m : meshes_)
     if (m.name == name)
       throw InvalidArgument("name: a mesh named '" + name + "' is already in the scene; choose another");
-  if (faces.size() % 3 != 0) throw InvalidArgument("faces: must hold three vertex indices a triangle");
-  for (std::size_t i = 0; i < faces.size(); ++i)
-    if (faces[i] >= n_vertices)
-      throw InvalidArgument("faces[" + std::to_string(i / 3) + ", " + std::to_string(i % 3) + "] is " +
-                            std::to_string(faces[i]) + ", but mesh '" + name + "' has " + std::to_string(n_vertices) +
-                            " vertices; indices count this mesh's own vertices from 0");
+  check_indices<3>("faces", "three vertex indices a triangle", faces, name, n_vertices);
+  check_indices<2>("edges", "two vertex indices an edge", edges, name, n_vertices);
   // One index is kept free as "none".
   if (std::uint64_t{n_vertices_} + n_vertices >= 0xFFFFFFFFu)
     throw InvalidArgument("n_vertices: the scene would have more than 2^32 - 2 vertices; divide it");
-  const auto first_face = static_cast<std::uint32_t>(faces_.size());
-  const auto n_faces = static_cast<std::uint32_t>(faces.size() / 3);
-  std::vector<std::array<std::uint32_t, 3>> larger;  // beside the old one: `faces` may be a part of that
-  const bool grows = faces_.capacity() < faces_.size() + n_faces;
-  if (grows) {
-    larger.reserve(std::max(faces_.size() + n_faces, 2 * faces_.size()));
-    larger.assign(faces_.begin(), faces_.end());
-  }
-  meshes_.push_back({std::move(name), options, n_vertices_, n_vertices, first_face, n_faces});
+  Mesh mesh{std::move(name),
+            options,
+            n_vertices_,
+            n_vertices,
+            static_cast<std::uint32_t>(faces_.size()),
+            static_cast<std::uint32_t>(faces.size() / 3),
+            static_cast<std::uint32_t>(edges_.size()),
+            static_cast<std::uint32_t>(edges.size() / 2)};
+  auto more_faces = with_room(faces_, mesh.n_faces);
+  auto more_edges = with_room(edges_, mesh.n_edges);
+  meshes_.push_back(std::move(mesh));
   // From here on nothing throws: a mesh is there in full or not at all.
-  auto& all = grows ? larger : faces_;
-  for (std::uint32_t f = 0; f < n_faces; ++f)
-    all.push_back({n_vertices_ + faces[3 * f], n_vertices_ + faces[3 * f + 1], n_vertices_ + faces[3 * f + 2]});
-  if (grows) faces_.swap(larger);
+  append(faces_, more_faces, faces, n_vertices_);
+  append(edges_, more_edges, edges, n_vertices_);
   n_vertices_ += n_vertices;
   return static_cast<std::uint32_t>(meshes_.size() - 1);
 }

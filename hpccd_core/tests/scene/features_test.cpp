@@ -54,6 +54,23 @@ TEST(Features, EachFeatureIsRepresentedOnceByATriangleThatHasIt) {
   EXPECT_EQ(features.lone_vertices.size(), lone * test::sheets);
 }
 
+TEST(Features, GivenEdgesThatAreInNoTriangleAreRepresentedByThemselves) {
+  Scene scene;
+  const std::uint32_t triangle[] = {2, 1, 0}, edges[] = {3, 2, 0, 1, 4, 4, 5, 3, 2, 3, 2, 0}, rope[] = {1, 0, 1, 2};
+  scene.add_mesh("fringed", triangle, 7, {}, edges);
+  scene.add_mesh("rope", {}, 3, {}, rope);
+  const Features x = features_of(scene);
+  EXPECT_EQ(x.edges,
+            (std::vector<std::array<std::uint32_t, 2>>{{0, 1}, {0, 2}, {1, 2}, {2, 3}, {3, 5}, {7, 8}, {8, 9}}));
+  EXPECT_EQ(x.lone_edges, (std::vector<std::array<std::uint32_t, 2>>{{2, 3}, {3, 5}, {7, 8}, {8, 9}}));
+  EXPECT_EQ(x.lone_vertices, (std::vector<std::uint32_t>{4, 6}));
+  EXPECT_EQ(x.mesh_of_primitive, (std::vector<std::uint32_t>{0, 0, 0, 1, 1, 0, 0}));
+  EXPECT_EQ(x.first_edge, (std::vector<std::uint32_t>{0, 3, 4, 5, 6, 7, 7, 7}));
+  EXPECT_EQ(x.owned_edges, (std::vector<std::uint32_t>{0, 1, 2, 3, 4, 5, 6}));
+  EXPECT_EQ(x.first_vertex, (std::vector<std::uint32_t>{0, 3, 4, 5, 7, 8, 9, 10}));
+  EXPECT_EQ(x.owned_vertices, (std::vector<std::uint32_t>{0, 1, 2, 3, 5, 7, 8, 9, 4, 6}));
+}
+
 TEST(Features, KnowTheMeshOfEachVertex) {
   Scene scene;
   const std::uint32_t triangle[] = {0, 1, 2};
@@ -65,9 +82,10 @@ TEST(Features, KnowTheMeshOfEachVertex) {
 
 TEST(Features, AreTheSameWithAnyNumberOfThreads) {
   for (const std::uint32_t n : {2u, 3u, side, 80u}) {
-    const auto sheets = test::two_sheets(n, lone);
-    auto scene = std::make_shared<Scene>(*sheets);
+    auto scene = std::make_shared<Scene>(*test::two_sheets(n, lone));
+    const std::uint32_t threads[] = {n * n, 0, 1, 0, n * n, 1};
     scene->add_mesh("none", {}, 0, {});
+    scene->add_mesh("fringed", test::sheet_faces(n), n * n + 2, {}, threads);
     const Features alone = features_of(*scene);
     for (int threads : {2, 3, 16}) {
       ThreadPool pool(threads);
@@ -77,6 +95,7 @@ TEST(Features, AreTheSameWithAnyNumberOfThreads) {
       EXPECT_EQ(alone.owned_edges, shared.owned_edges);
       EXPECT_EQ(alone.first_vertex, shared.first_vertex);
       EXPECT_EQ(alone.owned_vertices, shared.owned_vertices);
+      EXPECT_EQ(alone.lone_edges, shared.lone_edges);
       EXPECT_EQ(alone.lone_vertices, shared.lone_vertices);
       EXPECT_EQ(alone.mesh_of_primitive, shared.mesh_of_primitive);
     }
