@@ -36,9 +36,9 @@ class Scene:
         likewise: edges beside those of the faces, as of a rope or a rod. They are tested as all edges are, their
         vertices as all vertices. One that is given twice, or is a face's too, counts once. n_vertices: how many
         vertices the mesh has; by default the largest index + 1; give it where trailing vertices are in no face and no
-        edge (such vertices are tested against faces too). self_collision: whether contacts within the mesh matter. static: a
-        promise that the mesh does not move during a step (detect() refuses one that does); pairs of static meshes are
-        never tested.
+        edge (such vertices are tested against faces too). self_collision: whether contacts within the mesh matter.
+        static: a promise that the mesh does not move during a step (detect() refuses one that does); pairs of static
+        meshes are never tested.
 
         Raises TypeError or ValueError naming the argument, also where an index is out of range.
         """

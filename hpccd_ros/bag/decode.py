@@ -40,6 +40,7 @@ _ADDED = {
         ),
         _Addition(frozenset({"uint8 tested_features"}), clear=without_features),
     ),
+    "hpccd/msg/MeshTopology": (_Addition(frozenset({"uint32[] edges"}), bytes(4), 4),),
 }  # fmt: skip
 
 

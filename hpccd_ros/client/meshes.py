@@ -18,24 +18,28 @@ _LARGEST_UINT64 = 2**64 - 1
 _LAST_STAMP = 2**31 * 10**9 - 1
 
 
-def topology_message(faces: ArrayLike, n_vertices: int, *, version: int = 0, stamp_ns: int = 0) -> MeshTopology:
+def topology_message(
+    faces: ArrayLike, n_vertices: int, *, edges: ArrayLike = (), version: int = 0, stamp_ns: int = 0
+) -> MeshTopology:
     """The message that tells the node the triangles of a mesh: at the start, and again whenever they change.
 
     faces: (F, 3) integers, indices into this mesh's own vertices. n_vertices: how many it has, more than the largest
-    index. version: counts up with each change; vertices name the version that they belong to. stamp_ns: when it came
-    into force, ns since the epoch.
+    index. edges: (E, 2) integers, edges beside those of the faces; a rope has no faces: ``()``. version: counts up with
+    each change; vertices name the version that they belong to. stamp_ns: when it came into force, ns since the epoch.
     Raises TypeError or ValueError naming the argument.
     """
-    indices = arguments.faces(faces)
+    triangles, segments = arguments.faces(faces), arguments.edges(edges)
     n_vertices = arguments.whole_number("n_vertices", n_vertices, 0, _LARGEST_UINT32)
-    if indices.size and (highest := int(indices.max())) >= n_vertices:
-        raise ValueError(
-            f"faces: face {int(indices.argmax()) // 3} names vertex {highest}, n_vertices is {n_vertices}; indices "
-            "count this mesh's vertices from 0"
-        )
+    for what, indices in (("face", triangles), ("edge", segments)):
+        if indices.size and (highest := int(indices.max())) >= n_vertices:
+            raise ValueError(
+                f"{what}s: {what} {int(indices.argmax()) // indices.shape[1]} names vertex {highest}, n_vertices is "
+                f"{n_vertices}; indices count this mesh's vertices from 0"
+            )
     return mesh_messages.topology_message(
-        indices,
+        triangles,
         n_vertices,
+        edges=segments,
         version=arguments.whole_number("version", version, 0, _LARGEST_UINT32),
         stamp_ns=arguments.whole_number("stamp_ns", stamp_ns, 0, _LAST_STAMP),
     )
@@ -72,12 +76,13 @@ def vertices_message(
 
 
 def topology_from_message(message: MeshTopology) -> Topology:
-    """The triangles in a message: ``version``, ``n_vertices`` and ``faces``, (F, 3) uint32.
+    """What is in a message: ``version``, ``n_vertices``, ``faces``, (F, 3) uint32, and ``edges``, (E, 2).
 
-    ``faces`` is a view of the message, which it keeps alive: to change one is to change the other.
-    Raises ValueError where faces are no triples or name a vertex that is not there.
+    Both are views of the message, which they keep alive: to change one is to change the other.
+    Raises ValueError where faces are no triples, edges no pairs, or name a vertex that is not there.
     """
-    return mesh_messages.topology_from_message(message, _LARGEST_UINT32, _LARGEST_UINT32)
+    limits = dict.fromkeys(("max_vertices", "max_faces", "max_edges"), _LARGEST_UINT32)
+    return mesh_messages.topology_from_message(message, limits)
 
 
 def vertices_from_message(message: MeshVertices) -> NDArray[Any]:

@@ -67,7 +67,7 @@ def unusable_options(options: Options) -> str | None:
 def unusable_topology(topology: Topology) -> str | None:
     """Why the core cannot take this topology, or None."""
     try:
-        hc.Scene().add_mesh("mesh", topology.faces, n_vertices=topology.n_vertices)
+        hc.Scene().add_mesh("mesh", topology.faces, edges=topology.edges, n_vertices=topology.n_vertices)
     except CORE_ERRORS as error:
         return str(error)
     return None

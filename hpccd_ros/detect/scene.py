@@ -25,6 +25,7 @@ class SceneBuilder:
             scene.add_mesh(
                 mesh.name,
                 topology.faces,
+                edges=topology.edges,
                 n_vertices=topology.n_vertices,
                 self_collision=mesh.self_collision,
                 static=mesh.static,

@@ -22,7 +22,7 @@ class Reason(StrEnum):
     BIG_ENDIAN = "big_endian"
     NOT_FINITE = "not_finite"  # NaN or infinity
     OUT_OF_RANGE = "out_of_range"  # a coordinate beyond what the core computes with
-    TOO_LARGE = "too_large"  # above max_vertices or max_faces
+    TOO_LARGE = "too_large"  # above max_vertices, max_faces or max_edges
     INDEX_RANGE = "index_range"  # a face names a vertex that does not exist
     BAD_TOPOLOGY = "bad_topology"  # refused by the core in words of its own
     TOPOLOGY_CONFLICT = "topology_conflict"  # same version, other content

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the node knows of a message once it is checked: plain records of numpy arrays, no ROS."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,17 +37,27 @@ class AssemblyRules:
     frame_id: str = ""
 
 
+NO_EDGES = np.empty((0, 2), np.uint32)
+NO_EDGES.flags.writeable = False
+
+
 @dataclass(frozen=True, eq=False)
 class Topology:
-    """Triangles of one mesh: ``faces`` (F,3) uint32, all below ``n_vertices``."""
+    """Triangles of one mesh, ``faces`` (F,3) uint32, and edges beside theirs, ``edges`` (E,2) uint32; all below
+    ``n_vertices``."""
 
     version: int
     n_vertices: int
     faces: NDArray[np.uint32]
+    edges: NDArray[np.uint32] = field(default_factory=lambda: NO_EDGES)
 
     def same_content(self, other: "Topology") -> bool:
         """Equal but for the version."""
-        return self.n_vertices == other.n_vertices and np.array_equal(self.faces, other.faces)
+        return (
+            self.n_vertices == other.n_vertices
+            and np.array_equal(self.faces, other.faces)
+            and np.array_equal(self.edges, other.edges)
+        )
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,14 +12,19 @@ import struct
 
 import numpy as np
 
+from hpccd_ros.frames.types import NO_EDGES
+
 _LITTLE_ENDIAN = b"\x00\x01\x00\x00"
 
 
-def topology(stamp_ns: int, frame_id: str, version: int, faces: np.ndarray, n_vertices: int) -> bytes:
-    """hpccd/msg/MeshTopology; `faces` (F,3) unsigned integers below `n_vertices`."""
-    flat = np.ascontiguousarray(faces, dtype="<u4")
-    body = _header(stamp_ns, frame_id) + struct.pack("<III", version, n_vertices, flat.size)
-    return _LITTLE_ENDIAN + body + flat.tobytes()
+def topology(
+    stamp_ns: int, frame_id: str, version: int, faces: np.ndarray, n_vertices: int, edges: np.ndarray = NO_EDGES
+) -> bytes:
+    """hpccd/msg/MeshTopology; `faces` (F,3) and `edges` (E,2) unsigned integers below `n_vertices`."""
+    body = _header(stamp_ns, frame_id) + struct.pack("<II", version, n_vertices)
+    for indices in (faces, edges):
+        body += struct.pack("<I", indices.size) + np.ascontiguousarray(indices, dtype="<u4").tobytes()
+    return _LITTLE_ENDIAN + body
 
 
 def vertices(stamp_ns: int, frame_id: str, topology_version: int, step: int, xyz: np.ndarray) -> bytes:

@@ -20,11 +20,11 @@ def read(
 ) -> Topology | MeshFrame:
     """Arrays of the frame are views of the message's bytes where it allows that.
 
-    limits: max_vertices, max_faces. received, only_publisher: of the frame, as in `MeshFrame`.
+    limits: max_vertices, max_faces, max_edges. received, only_publisher: of the frame, as in `MeshFrame`.
     Raises InvalidMessageError.
     """
     if kind == TOPOLOGY:
-        return mesh_messages.topology_from_message(message, limits["max_vertices"], limits["max_faces"])
+        return mesh_messages.topology_from_message(message, limits)
     stamp, frame_id = fields.stamp_to_ns(message.header.stamp), message.header.frame_id
     if kind == VERTICES:
         vertices = mesh_messages.vertices_from_message(message, limits["max_vertices"])

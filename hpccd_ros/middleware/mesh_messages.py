@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Topologies and vertices of a mesh: messages <-> numpy arrays, checked."""
 
+import array
+from collections.abc import Mapping
+
 import numpy as np
 from hpccd.msg import MeshTopology, MeshVertices
 from sensor_msgs.msg import PointCloud2, PointField
@@ -8,29 +11,37 @@ from sensor_msgs.msg import PointCloud2, PointField
 from hpccd_ros.base.quoting import listed
 from hpccd_ros.frames.coordinates import unusable_coordinates
 from hpccd_ros.frames.drops import Reason
-from hpccd_ros.frames.types import Topology
+from hpccd_ros.frames.types import NO_EDGES, Topology
 from hpccd_ros.middleware.fields import InvalidMessageError, ns_to_stamp, stamp_to_ns, to_field
 
 _FIELD_TYPES = {PointField.FLOAT32: np.dtype(np.float32), PointField.FLOAT64: np.dtype(np.float64)}
 
 
-def topology_from_message(message: MeshTopology, max_vertices: int, max_faces: int) -> Topology:
-    """Checked topology; ``faces`` (F,3) uint32 is a view of the message's bytes.
+def topology_from_message(message: MeshTopology, limits: Mapping[str, int]) -> Topology:
+    """Checked topology; ``faces`` (F,3) and ``edges`` (E,2) uint32 are views of the message's bytes.
 
-    Raises InvalidMessageError: too large, no triples, an index out of range, a stamp that is no time.
+    limits: max_vertices, max_faces, max_edges.
+    Raises InvalidMessageError: too large, no triples or pairs, an index out of range, a stamp that is no time.
     """
     stamp_to_ns(message.header.stamp)  # not used, but wrong
-    flat = np.frombuffer(message.faces, np.uint32)
-    if len(flat) % 3:
-        raise InvalidMessageError(Reason.MALFORMED, f"faces has {len(flat)} indices, not a multiple of 3")
-    _limit("faces", len(flat) // 3, "max_faces", max_faces)
-    _limit("n_vertices", message.n_vertices, "max_vertices", max_vertices)
-    if len(flat) and (highest := int(flat.max())) >= message.n_vertices:
-        raise InvalidMessageError(
-            Reason.INDEX_RANGE,
-            f"face {int(flat.argmax()) // 3} names vertex {highest}, n_vertices is {message.n_vertices}",
-        )
-    return Topology(message.version, message.n_vertices, flat.reshape(-1, 3))
+    faces = _features("faces", message.faces, 3, limits)
+    edges = _features("edges", message.edges, 2, limits)
+    _limit("n_vertices", message.n_vertices, "max_vertices", limits["max_vertices"])
+    for what, indices in (("face", faces), ("edge", edges)):
+        if len(indices) and (highest := int(indices.max())) >= message.n_vertices:
+            number = int(indices.argmax()) // indices.shape[1]
+            raise InvalidMessageError(
+                Reason.INDEX_RANGE, f"{what} {number} names vertex {highest}, n_vertices is {message.n_vertices}"
+            )
+    return Topology(message.version, message.n_vertices, faces, edges)
+
+
+def _features(field: str, indices: array.array, corners: int, limits: Mapping[str, int]) -> np.ndarray:
+    flat = np.frombuffer(indices, np.uint32)
+    if len(flat) % corners:
+        raise InvalidMessageError(Reason.MALFORMED, f"{field} has {len(flat)} indices, not a multiple of {corners}")
+    _limit(field, len(flat) // corners, f"max_{field}", limits[f"max_{field}"])
+    return flat.reshape(-1, corners)
 
 
 def vertices_from_message(message: MeshVertices, max_vertices: int) -> np.ndarray:
@@ -132,11 +143,14 @@ def _usable(vertices: np.ndarray) -> np.ndarray:
     return vertices
 
 
-def topology_message(faces: np.ndarray, n_vertices: int, *, version: int = 0, stamp_ns: int = 0) -> MeshTopology:
-    """faces: (F,3) integers, indices of the mesh's own vertices."""
+def topology_message(
+    faces: np.ndarray, n_vertices: int, *, edges: np.ndarray = NO_EDGES, version: int = 0, stamp_ns: int = 0
+) -> MeshTopology:
+    """faces: (F,3) integers, indices of the mesh's own vertices. edges: (E,2), likewise."""
     message = MeshTopology(version=version, n_vertices=n_vertices, check_fields=True)
     message.header.stamp = ns_to_stamp(stamp_ns)
     message.faces = to_field(np.asarray(faces).astype(np.uint32, copy=False))
+    message.edges = to_field(np.asarray(edges).astype(np.uint32, copy=False))
     return message
 
 

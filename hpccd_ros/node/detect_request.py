@@ -35,8 +35,8 @@ def compute(
     kept: KeptDetectors,
     cancellation: Cancellation,
 ) -> Answer:
-    """limits: max_meshes, max_vertices, max_faces, max_contacts. kept: of earlier requests; this one adds to them.
-    Raises RequestError, and what the core raises.
+    """limits: max_meshes, max_vertices, max_faces, max_edges, max_contacts. kept: of earlier requests; this one adds to
+    them. Raises RequestError, and what the core raises.
     """
     query = requested_query(request)
     names = _names(request, scene, limits["max_meshes"])
@@ -90,9 +90,7 @@ def _names(request: Detect.Request, scene: NodeScene, most: int) -> list[str]:
 def _topology(request: Detect.Request, scene: NodeScene, limits: dict[str, Any], index: int, name: str) -> Topology:
     if request.topologies:
         try:
-            return mesh_messages.topology_from_message(
-                request.topologies[index], limits["max_vertices"], limits["max_faces"]
-            )
+            return mesh_messages.topology_from_message(request.topologies[index], limits)
         except fields.InvalidMessageError as error:
             raise RequestError(f"topologies[{index}] ({shortened(name)}): {error}") from error
     if name not in scene.topologies:

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from hpccd_ros.picture.camera import Camera
 from hpccd_ros.picture.raster import rasterize
 from hpccd_ros.picture.shading import shade
+from hpccd_ros.picture.tubes import RADIUS, tubes
 
 BACKGROUND = "#10141c"
 INK = "#e8ecf4"
@@ -27,12 +28,13 @@ LIGHT = np.array([0.35, -0.55, 1.25])
 
 @dataclasses.dataclass
 class Picture:
-    """What is drawn of a step: vertices and faces of each mesh in its middle; contacts at their points (N,3).
+    """What is drawn of a step: name of each mesh, its vertices in the middle of the step, its faces, and its edges
+    beside theirs; contacts at their points (N,3).
 
     touched: (V,) earliest time of contact of each vertex, all meshes one after the other; inf where it has none.
     """
 
-    meshes: list[tuple[str, np.ndarray, np.ndarray]]
+    meshes: list[tuple[str, np.ndarray, np.ndarray, np.ndarray]]
     touched: np.ndarray
     points: np.ndarray
     toc: np.ndarray
@@ -73,20 +75,24 @@ def compose(picture: Picture, history: History | None = None, *, azimuth=-60.0, 
 
 def _of_drawable_size(picture: Picture) -> Picture:
     """The same in another unit of length where single precision, in which the light is computed, would not hold it."""
-    largest = max(float(np.abs(vertices).max(initial=0.0)) for _, vertices, _ in picture.meshes)
+    largest = max(float(np.abs(vertices).max(initial=0.0)) for _, vertices, *_ in picture.meshes)
     if largest == 0.0 or 1e-6 < largest < 1e6:
         return picture
     exponent = -int(np.frexp(largest)[1])  # of two: no digit changes
-    meshes = [(name, np.ldexp(np.asarray(v, np.float64), exponent), faces) for name, v, faces in picture.meshes]
+    meshes = [(name, np.ldexp(np.asarray(v, np.float64), exponent), *of) for name, v, *of in picture.meshes]
     return dataclasses.replace(picture, meshes=meshes, points=np.ldexp(picture.points, exponent))
 
 
 def render(meshes, touched, size, azimuth, elevation):
-    """(image (h,w,4) sRGB with alpha, camera, depth (h,w)) of meshes [(name, vertices, faces)]."""
-    vertices = np.concatenate([np.asarray(v, dtype=np.float64) for _, v, _ in meshes])
-    offsets = np.cumsum([0] + [len(v) for _, v, _ in meshes])
-    faces = np.concatenate([np.asarray(f, dtype=np.int64) + o for (_, _, f), o in zip(meshes, offsets, strict=False)])
-    colours = vertex_colours([len(v) for _, v, _ in meshes], faces, touched)
+    """(image (h,w,4) sRGB with alpha, camera, depth (h,w)) of meshes [(name, vertices, faces, edges)]."""
+    vertices = np.concatenate([np.asarray(v, dtype=np.float64) for _, v, *_ in meshes])
+    sizes = [len(v) for _, v, *_ in meshes]
+    faces, edges = (scene_indices([mesh[i] for mesh in meshes], sizes) for i in (2, 3))
+    colours = vertex_colours(sizes, faces, edges, touched)
+    extent = float(np.ptp(vertices, axis=0).max())
+    around, sides, coloured_as = tubes(vertices, edges, RADIUS * extent)
+    faces = np.concatenate([faces, sides + len(vertices)])
+    vertices, colours = np.concatenate([vertices, around]), np.concatenate([colours, colours[coloured_as]])
     large = (size[0] * SUPERSAMPLING, size[1] * SUPERSAMPLING)
     camera = Camera(vertices, large, azimuth, elevation)
     buffers = rasterize(camera.project(vertices)[faces], large)
@@ -102,23 +108,29 @@ def render(meshes, touched, size, azimuth, elevation):
     return np.concatenate([rgb, alpha], axis=2), camera, buffers.depth
 
 
-def vertex_colours(sizes, faces, touched):
-    """(V,3) linear RGB: the meshes' own colours, tinted around the contacts. sizes: vertices of each mesh; faces (F,3)
-    and touched (V,) of all meshes together."""
+def scene_indices(indices, sizes):
+    """Indices of each mesh's own vertices -> (N,k) of the scene's. sizes: vertices of each mesh."""
+    offsets = np.cumsum([0, *sizes])
+    return np.concatenate([np.asarray(i, np.int64) + offset for i, offset in zip(indices, offsets, strict=False)])
+
+
+def vertex_colours(sizes, faces, edges, touched):
+    """(V,3) linear RGB: the meshes' own colours, tinted around the contacts. sizes: vertices of each mesh; faces (F,3),
+    edges (E,2) beside theirs and touched (V,) of all meshes together."""
     owner = np.repeat(np.arange(len(sizes)), sizes)
     own = np.array([linear(to_rgb(MESH_COLOURS[i % len(MESH_COLOURS)])) for i in range(len(sizes))])[owner]
-    glow, weight = _glow(touched, faces)
+    glow, weight = _glow(touched, faces, edges)
     return (1 - TINT * weight[:, None]) * own + TINT * glow
 
 
-def _glow(touched, faces):
+def _glow(touched, faces, edges):
     """(V,3) colour times weight, and (V,) weight 0..1 of a tint around the contacts, so that contacts between layers
     show on the outside of the layers. Spread twice over the edges, or single vertices would make stars."""
     contact = np.isfinite(touched)
     values = np.zeros((len(touched), 4))
     values[contact, :3] = linear(TOC_COLOURS(touched[contact])[:, :3])
     values[contact, 3] = 1.0
-    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]], edges])
     a, b = np.concatenate([edges, edges[:, ::-1]]).T
     degree = np.maximum(np.bincount(a, minlength=len(touched)), 1)[:, None]
     for _ in range(2):

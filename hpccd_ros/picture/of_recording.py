@@ -6,6 +6,7 @@ import numpy as np
 from hpccd_core.options import FEATURES
 from hpccd_ros.detect.separation import Separation
 from hpccd_ros.picture import contacts as picture
+from hpccd_ros.picture.contacts import scene_indices
 from hpccd_ros.replay.recomputed import ReplayedStep
 
 
@@ -25,18 +26,19 @@ def draw_step(step: ReplayedStep, path, history: History | None = None, *, title
     """Write a picture of `step`, which was computed with outputs=("points",). view: azimuth, elevation, size."""
     found = step.contacts
     meshes, offsets = meshes_in_the_middle(step), step.layout.vertex_offsets
-    triangles = sum(len(faces) for _, _, faces in meshes)
+    triangles, segments = (sum(len(mesh[i]) for mesh in meshes) for i in (2, 3))
     accuracy = f"accuracy {step.recorded.accuracy}" if step.recorded is not None else None
     first = f"first at t = {found.first_toc:.4f}" if step.total else None
     of = f" of {max(history.steps)}" if history is not None else ""
     facts = [
-        f"{triangles:,} triangles", f"{len(found.vf):,} vertex-face", f"{len(found.ee):,} edge-edge", first,
+        f"{triangles:,} triangles" if triangles else None, f"{segments:,} lone edges" if segments else None,
+        f"{len(found.vf):,} vertex-face", f"{len(found.ee):,} edge-edge", first,
         f"{step.milliseconds:.1f} ms", accuracy, separation_fact(step.separation), features_fact(step.features),
         f"hash {found.hash:016x}",
     ]  # fmt: skip
     drawn = picture.Picture(
         meshes,
-        touched(found, scene_faces(meshes, offsets), offsets[-1]),
+        touched(found, scene_indices([faces for _, _, faces, _ in meshes], np.diff(offsets)), offsets[-1]),
         np.asarray(found.points),
         np.concatenate([found.vf_toc, found.ee_toc]),
         f"{step.total:,} contact{'' if step.total == 1 else 's'} in step {step.step}" + of,
@@ -64,20 +66,15 @@ def features_fact(features: tuple[str, ...]) -> str | None:
 
 
 def meshes_in_the_middle(step: ReplayedStep):
-    """[(name, vertices (V,3), faces (F,3))] in the middle of the step, so that contacts at any time of it lie close to
-    the surfaces."""
+    """[(name, vertices (V,3), faces (F,3), edges (E,2) beside theirs)] in the middle of the step, so that contacts at
+    any time of it lie close to the surfaces."""
     start, end = step.start_frame, step.end_frame
     return [
-        (name, 0.5 * np.asarray(v0, np.float64) + 0.5 * np.asarray(v1, np.float64), topology.faces)
+        (name, 0.5 * np.asarray(v0, np.float64) + 0.5 * np.asarray(v1, np.float64), topology.faces, topology.edges)
         for name, v0, v1, topology in zip(
             step.layout.mesh_names, start.vertices, end.vertices, end.topologies, strict=True
         )
     ]
-
-
-def scene_faces(meshes, offsets):
-    """(F,3) of all meshes [(name, vertices, faces)], in vertex numbers of the scene."""
-    return np.concatenate([np.asarray(f, np.int64) + o for (_, _, f), o in zip(meshes, offsets, strict=False)])
 
 
 def touched(found, faces, n_vertices):

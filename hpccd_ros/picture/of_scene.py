@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from hpccd_ros.frames.types import NO_EDGES
 from hpccd_ros.scenes.scene import Scene
 
 
@@ -37,7 +38,7 @@ def save(
     FigureCanvasAgg(figure)
     for panel, index in enumerate(indices):
         frame = scene.frame(index)
-        parts = list(zip(scene.mesh_names, frame, scene.faces(index), strict=True))
+        parts = [(*part, NO_EDGES) for part in zip(scene.mesh_names, frame, scene.faces(index), strict=True)]
         untouched = np.full(sum(map(len, frame)), np.nan)
         image, _, _ = render(parts, untouched, size, azimuth, elevation)
         axes = figure.add_subplot(rows, columns, panel + 1)

@@ -4,9 +4,10 @@
 import numpy as np
 
 from hpccd_ros.base import extras
-from hpccd_ros.picture.contacts import TOC_COLOURS, srgb, vertex_colours
-from hpccd_ros.picture.of_recording import meshes_in_the_middle, scene_faces, touched
+from hpccd_ros.picture.contacts import TOC_COLOURS, scene_indices, srgb, vertex_colours
+from hpccd_ros.picture.of_recording import meshes_in_the_middle, touched
 from hpccd_ros.picture.shading import vertex_normals
+from hpccd_ros.picture.tubes import RADIUS
 from hpccd_ros.replay.recomputed import ReplayedStep
 
 # Parts of the largest extent of the first step's scene.
@@ -51,14 +52,19 @@ class RerunWriter:
         rr, stream = self._rr, self._stream
         meshes, offsets = meshes_in_the_middle(step), step.layout.vertex_offsets
         if not self._extent:
-            self._look_at(np.concatenate([vertices for _, vertices, _ in meshes]))
+            self._look_at(np.concatenate([vertices for _, vertices, *_ in meshes]))
         stream.set_time("step", sequence=min(step.step, np.iinfo(np.int64).max))  # a publisher may count to 2**64
         stream.set_time("stamp", timestamp=np.datetime64(step.end, "ns"))
-        faces = scene_faces(meshes, offsets)
-        colours = vertex_colours(np.diff(offsets), faces, touched(step.contacts, faces, offsets[-1]))
+        sizes = np.diff(offsets)
+        faces, edges = (scene_indices([mesh[i] for mesh in meshes], sizes) for i in (2, 3))
+        colours = vertex_colours(sizes, faces, edges, touched(step.contacts, faces, offsets[-1]))
         colours = (255 * srgb(colours)).astype(np.uint8)
-        for index, (name, vertices, own_faces) in enumerate(meshes):
-            self._add_mesh(name, vertices, own_faces, colours[offsets[index] : offsets[index + 1]])
+        for index, (name, vertices, own_faces, own_edges) in enumerate(meshes):
+            own_colours = colours[offsets[index] : offsets[index + 1]]
+            if len(own_faces):
+                self._add_mesh(name, vertices, own_faces, own_colours)
+            if len(own_edges):
+                self._add_edges(name, vertices, own_edges, own_colours)
         self._add_contacts(step)
         for name, value in (
             ("contacts", step.total),
@@ -85,6 +91,12 @@ class RerunWriter:
             entity, rr.Mesh3D.from_fields(vertex_positions=vertices, vertex_normals=normals, vertex_colors=colours)
         )
 
+    def _add_edges(self, name, vertices, edges, colours):
+        radius = RADIUS * self._extent
+        self._stream.log(
+            f"edges/{name}", self._rr.LineStrips3D(vertices[edges], colors=colours[edges[:, 0]], radii=radius)
+        )
+
     def _add_contacts(self, step):
         rr, found = self._rr, step.contacts
         points, normals, n_vf = np.asarray(found.points), np.asarray(found.normals), len(found.vf)
@@ -106,7 +118,7 @@ def _blueprint(eye, target):
     return rrb.Blueprint(
         rrb.Vertical(
             rrb.Spatial3DView(
-                name="meshes and contacts", origin="/", contents=["/meshes/**", "/contacts/**"],
+                name="meshes and contacts", origin="/", contents=["/meshes/**", "/edges/**", "/contacts/**"],
                 eye_controls=rrb.EyeControls3D(kind=rrb.Eye3DKind.Orbital, position=eye, look_target=target,
                                                eye_up=[0, 0, 1]),
             ),

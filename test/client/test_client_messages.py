@@ -14,10 +14,11 @@ VERTICES = np.arange(18.0).reshape(6, 3)
 
 
 def test_a_topology_comes_back():
-    message = client.topology_message(FACES.tolist(), 7, version=3, stamp_ns=5_000_000_007)
+    message = client.topology_message(FACES.tolist(), 7, edges=[(5, 6)], version=3, stamp_ns=5_000_000_007)
     topology = client.topology_from_message(message)
     assert (topology.version, topology.n_vertices) == (3, 7)
     assert topology.faces.dtype == np.uint32 and np.array_equal(topology.faces, FACES)
+    assert topology.edges.dtype == np.uint32 and topology.edges.tolist() == [[5, 6]]
     assert (message.header.stamp.sec, message.header.stamp.nanosec) == (5, 7)
 
 
@@ -40,6 +41,8 @@ def test_vertices_come_back_in_their_precision(dtype):
         (dict(faces=[[0.0, 1.0, 2.0]]), TypeError, "faces: expected integers"),
         (dict(faces=[[0, 1, -1]]), ValueError, r"faces\[0, 2\] is -1"),
         (dict(n_vertices=5), ValueError, "faces: face 1 names vertex 5, n_vertices is 5"),
+        (dict(edges=[[0, 1, 2]]), ValueError, r"edges: expected shape \(E, 2\)"),
+        (dict(edges=[[0, 1], [6, 2]]), ValueError, "edges: edge 1 names vertex 6, n_vertices is 6"),
         (dict(n_vertices=2.5), TypeError, "n_vertices: expected an integer"),
         (dict(version=2**32), ValueError, "version: must lie in"),
         (dict(stamp_ns=-1), ValueError, "stamp_ns: must lie in"),

@@ -8,7 +8,6 @@ import numpy as np
 import hpccd_core as hc
 from hpccd_core import reference
 
-
 NO_FACES, NO_EDGES = np.empty((0, 3), int), np.empty((0, 2), int)
 
 

@@ -17,7 +17,8 @@ def rows(array):
 
 
 def small_scene(rng):
-    """One to three meshes of 20 triangles together at most, some with vertices in no face or with edges beside, and rules for them."""
+    """One to three meshes of 20 triangles together at most, some with vertices in no face or edges beside, and rules
+    for them."""
     n_meshes = rng.integers(1, 4)
     meshes = []
     for n_faces in rng.multinomial(rng.integers(1, 21), np.full(n_meshes, 1 / n_meshes)):

@@ -23,9 +23,10 @@ def typestore():
 @pytest.mark.parametrize("count", [0, 1, 2, 5])
 def test_cdr_is_that_of_an_independent_writer(typestore, frame_id, count):
     faces = np.arange(3 * count, dtype=np.uint32).reshape(-1, 3)
+    edges = np.arange(2 * (count % 3), dtype=np.uint32).reshape(-1, 2)
     xyz = np.linspace(-1, 1, 3 * count, dtype=np.float32).reshape(-1, 3)
     for data, name in (
-        (mesh_cdr.topology(5_000_000_007, frame_id, 3, faces, 3 * count), message_types.TOPOLOGY),
+        (mesh_cdr.topology(5_000_000_007, frame_id, 3, faces, 3 * count, edges), message_types.TOPOLOGY),
         (mesh_cdr.vertices(5_000_000_007, frame_id, 3, 2**40, xyz), message_types.VERTICES),
     ):
         message = typestore.deserialize_cdr(data, name)
@@ -35,6 +36,7 @@ def test_cdr_is_that_of_an_independent_writer(typestore, frame_id, count):
         if name == message_types.TOPOLOGY:
             assert (message.version, message.n_vertices) == (3, 3 * count)
             np.testing.assert_array_equal(message.faces, faces.ravel())
+            np.testing.assert_array_equal(message.edges, edges.ravel())
         else:
             assert (message.topology_version, message.step) == (3, 2**40)
             np.testing.assert_array_equal(message.vertices_f32, xyz.ravel())

@@ -20,6 +20,7 @@ from hpccd_ros.frames.types import Topology
 from hpccd_ros.middleware import contact_messages, fields, mesh_messages
 from hpccd_ros.middleware.fields import InvalidMessageError
 
+LIMITS = {"max_vertices": 100, "max_faces": 100, "max_edges": 100}
 POINTS = np.arange(12, dtype=np.float32).reshape(4, 3) * 0.5
 
 
@@ -44,7 +45,7 @@ def test_stamps_that_are_no_time(stamp):
     assert str(stamp.sec) in refused(Reason.MALFORMED, fields.stamp_to_ns, stamp)
     topology = mesh_messages.topology_message(np.array([[0, 1, 2]]), 3)
     topology.header.stamp = stamp
-    refused(Reason.MALFORMED, mesh_messages.topology_from_message, topology, 100, 100)
+    refused(Reason.MALFORMED, mesh_messages.topology_from_message, topology, LIMITS)
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64, np.uint32, np.uint8])
@@ -57,22 +58,29 @@ def test_array_fields(dtype):
 
 def test_topology_is_a_view():
     faces = np.array([[0, 1, 2], [2, 1, 3]])
-    message = mesh_messages.topology_message(faces, 5, version=7)
-    topology = mesh_messages.topology_from_message(message, 100, 100)
+    edges = np.array([[3, 4], [4, 0]])
+    message = mesh_messages.topology_message(faces, 5, edges=edges, version=7)
+    topology = mesh_messages.topology_from_message(message, LIMITS)
     assert (topology.version, topology.n_vertices) == (7, 5)
     assert topology.faces.dtype == np.uint32 and np.array_equal(topology.faces, faces)
     assert np.shares_memory(topology.faces, np.frombuffer(message.faces, np.uint32))
+    assert topology.edges.dtype == np.uint32 and np.array_equal(topology.edges, edges)
+    assert np.shares_memory(topology.edges, np.frombuffer(message.edges, np.uint32))
 
 
 def test_bad_topologies():
-    def message(faces, n):
-        return MeshTopology(n_vertices=n, faces=array("I", faces))
+    read, limits = mesh_messages.topology_from_message, {**LIMITS, "max_faces": 2, "max_edges": 3}
 
-    text = refused(Reason.INDEX_RANGE, mesh_messages.topology_from_message, message([0, 1, 2, 0, 2, 3], 3), 100, 100)
-    assert "face 1 names vertex 3" in text
-    refused(Reason.MALFORMED, mesh_messages.topology_from_message, message([0, 1], 3), 100, 100)
-    refused(Reason.TOO_LARGE, mesh_messages.topology_from_message, message([0, 1, 2] * 3, 3), 100, 2)
-    refused(Reason.TOO_LARGE, mesh_messages.topology_from_message, message([0, 1, 2], 101), 100, 2)
+    def message(faces, n, edges=()):
+        return MeshTopology(n_vertices=n, faces=array("I", faces), edges=array("I", edges))
+
+    assert "face 1 names vertex 3" in refused(Reason.INDEX_RANGE, read, message([0, 1, 2, 0, 2, 3], 3), LIMITS)
+    assert "edge 1 names vertex 4" in refused(Reason.INDEX_RANGE, read, message([], 4, [0, 1, 4, 3]), LIMITS)
+    refused(Reason.MALFORMED, read, message([0, 1], 3), LIMITS)
+    assert "edges has 3 indices" in refused(Reason.MALFORMED, read, message([0, 1, 2], 3, [0, 1, 2]), LIMITS)
+    refused(Reason.TOO_LARGE, read, message([0, 1, 2] * 3, 3), limits)
+    assert "max_edges" in refused(Reason.TOO_LARGE, read, message([0, 1, 2] * 2, 3, [0, 1] * 4), limits)
+    refused(Reason.TOO_LARGE, read, message([0, 1, 2], 101), limits)
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])

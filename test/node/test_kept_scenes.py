@@ -18,7 +18,7 @@ N = 10
 FACES = sheet_faces(N)
 TOPOLOGY = client.topology_message(FACES, N * N)
 BUILDER, TOPOLOGIES, OPTIONS = SceneBuilder((MeshSettings("cloth"),)), (Topology(0, N * N, FACES),), Options()
-LIMITS = {"max_meshes": 4, "max_vertices": 1000, "max_faces": 1000, "max_contacts": 0}
+LIMITS = {"max_meshes": 4, "max_vertices": 1000, "max_faces": 1000, "max_edges": 1000, "max_contacts": 0}
 
 
 def request(step, query="collision_free_step"):

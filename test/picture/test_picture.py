@@ -5,11 +5,13 @@ import numpy as np
 import pytest
 
 from hpccd_ros.detect.separation import NONE, Separation
+from hpccd_ros.frames.types import NO_EDGES
 from hpccd_ros.picture import contacts
 from hpccd_ros.picture.camera import Camera
 from hpccd_ros.picture.of_recording import separation_fact
 from hpccd_ros.picture.raster import rasterize
 from hpccd_ros.picture.shading import blur, vertex_normals
+from hpccd_ros.picture.tubes import tubes
 
 
 def _nearest_by_hand(corners, x, y):
@@ -73,7 +75,8 @@ def test_normals_and_blur():
     assert spread.sum() == pytest.approx(1, rel=1e-5) and spread.argmax() == image.argmax() and spread.max() < 0.1
 
 
-PLANE = ("plane", np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0.0]]), np.array([[0, 1, 2], [0, 2, 3]]))
+CORNERS = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0.0]])
+PLANE = ("plane", CORNERS, np.array([[0, 1, 2], [0, 2, 3]]), NO_EDGES)
 
 
 def picture_of(places, toc):
@@ -86,6 +89,21 @@ def test_the_surface_is_rendered_within_the_range_of_colours():
     assert image.shape == (200, 320, 4) and 0 <= image.min() and image.max() <= 1
     seen = image[..., 3] > 0.5
     assert seen.mean() > 0.2 and np.isfinite(depth[::2, ::2][seen]).mean() > 0.98
+
+
+def test_edges_are_drawn_as_tubes_around_them():
+    points = np.random.default_rng(10).normal(size=(20, 3))
+    edges = np.array([[0, 1], [2, 2], [3, 4], [5, 3]])
+    around, faces, coloured_as = tubes(points, edges, 0.1)
+    with_length = edges[[0, 2, 3]]
+    assert sorted(set(coloured_as)) == [0, 1, 3, 4, 5] and len(around) == len(coloured_as)
+    assert np.allclose(np.linalg.norm(around - points[coloured_as], axis=1), 0.1)
+    along = np.repeat(points[with_length[:, 1]] - points[with_length[:, 0]], len(around) // len(with_length), axis=0)
+    assert np.allclose(np.einsum("nx,nx->n", around - points[coloured_as], along), 0, atol=1e-12)
+    assert faces.min() == 0 and faces.max() == len(around) - 1
+    rope = ("rope", np.array([[-1, 0, 0], [0, 0.5, 0], [1, 0, 0.0]]), np.empty((0, 3), int), np.array([[0, 1], [1, 2]]))
+    image, *_ = contacts.render([rope], np.full(3, np.inf), (320, 200), -60, 26)
+    assert 0.002 < (image[..., 3] > 0.5).mean() < 0.1
 
 
 def test_contacts_are_drawn_where_they_project_to_in_the_colour_of_their_time():

@@ -98,7 +98,8 @@ class Maker:
 
     def topology(self, faces, n_vertices):
         return self._types["hpccd/msg/MeshTopology"](
-            header=self.header(0, ""), version=0, n_vertices=n_vertices, faces=faces.astype(np.uint32).reshape(-1))
+            header=self.header(0, ""), version=0, n_vertices=n_vertices, faces=faces.astype(np.uint32).reshape(-1),
+            edges=np.empty(0, np.uint32))
 
     def vertices(self, stamp, step, xyz):
         return self._types["hpccd/msg/MeshVertices"](

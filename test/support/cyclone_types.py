@@ -29,6 +29,7 @@ class MeshTopology(IdlStruct, typename="hpccd::msg::dds_::MeshTopology_"):
     version: uint32
     n_vertices: uint32
     faces: sequence[uint32]
+    edges: sequence[uint32]
 
 
 @dataclass

@@ -49,7 +49,7 @@ def parameter_that_a_replay_uses(rng, bag):
     info = info_of(bag)
     names = ["meshes", "ignored_pairs", "pair_accuracy", "pair_features", "accuracy", "features", "report", "frame_id",
              "frame_queue", "stamp_match", "pending_frames", "stamp_tolerance", "restart_after", "max_vertices",
-             "max_faces"]  # fmt: skip
+             "max_faces", "max_edges"]  # fmt: skip
     names += [f"mesh.{mesh}.{row.name}" for mesh in info["parameters"]["meshes"] for row in rows()[1]]
     info["parameters"][rng.choice(names)] = junk(rng)
     set_info(bag, info)

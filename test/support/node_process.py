@@ -170,9 +170,9 @@ class Peer:
     def forget_publisher(self, topic: str) -> None:
         self.node.destroy_publisher(self._publishers.pop(topic))
 
-    def topology(self, mesh: str, faces: np.ndarray, n_vertices: int, version: int = 0) -> None:
+    def topology(self, mesh: str, faces: np.ndarray, n_vertices: int, version: int = 0, **edges: np.ndarray) -> None:
         publisher = self.publisher(MeshTopology, f"meshes/{mesh}/topology", qos.TOPOLOGY)
-        publisher.publish(mesh_messages.topology_message(faces, n_vertices, version=version))
+        publisher.publish(mesh_messages.topology_message(faces, n_vertices, version=version, **edges))
         # Nothing orders two topics: vertices that follow must not overtake it.
         assert publisher.wait_for_all_acked(Duration(seconds=PATIENCE))
 
