@@ -14,7 +14,7 @@ import scenes
 import hpccd_core as hc
 
 for accuracy in ("balanced", "exact"):
-    for make in (scenes.crumpled, scenes.lattice, scenes.soup):
+    for make in (scenes.crumpled, scenes.lattice, scenes.soup, scenes.fringed):
         for dtype in (np.float32, np.float64):
             rng = np.random.default_rng(1)
             scene, t0, t1 = scenes.join([make(rng, 14), make(rng, 14)], ignored=((0, 0),))
@@ -29,7 +29,7 @@ for accuracy in ("balanced", "exact"):
                     sys.exit(f"{make.__name__}, {accuracy}, {backend}: {detector.last_gpu_error}")
                 print(make.__name__, accuracy, dtype.__name__, backend, found)
 
-for make in (scenes.crumpled, scenes.lattice, scenes.soup):
+for make in (scenes.crumpled, scenes.lattice, scenes.soup, scenes.fringed):
     rng = np.random.default_rng(2)
     scene, t0, t1 = scenes.join([make(rng, 10), make(rng, 10)])
     scene.set_separation(0, 1, 0.1)

@@ -33,13 +33,29 @@ def soup(rng, n):
     return rng.integers(0, n, (2 * n, 3)), *rng.integers(-5, 6, (2, n + 3, 3)).astype(float)
 
 
+def rope(rng, n):
+    """Edges one after the other in a tangle."""
+    start = np.cumsum(rng.normal(0, 0.6, (n, 3)), axis=0)
+    start -= start.mean(axis=0)
+    edges = np.stack([np.arange(n - 1), np.arange(1, n)], axis=1)
+    return np.empty((0, 3), int), start, start + rng.normal(0, 1, (n, 3)), edges
+
+
+def fringed(rng, n):
+    """A sheet with as many threads as it has triangles, between any two vertices, on small integers."""
+    faces, start, end = lattice(rng, n)
+    return faces, start, end, rng.integers(0, n * n, (len(faces), 2))
+
+
 def join(parts, **rules):
-    """(scene, vertices_t0, vertices_t1) of meshes (faces, t0, t1). rules: no_self, static, ignored, accuracy."""
+    """(scene, vertices_t0, vertices_t1) of meshes (faces, t0, t1) or (faces, t0, t1, edges). rules: no_self, static,
+    ignored, accuracy."""
     scene = hc.Scene()
-    for i, (faces, t0, _) in enumerate(parts):
+    for i, (faces, t0, _, *edges) in enumerate(parts):
         scene.add_mesh(
             f"mesh{i}",
             faces,
+            edges=edges[0] if edges else (),
             n_vertices=len(t0),
             self_collision=i not in rules.get("no_self", ()),
             static=i in rules.get("static", ()),

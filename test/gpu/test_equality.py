@@ -35,7 +35,7 @@ def assert_backend_same(backend, scene, t0, t1, **options):
 
 @pytest.mark.parametrize("accuracy", TIERS)
 @pytest.mark.parametrize("dtype", (np.float32, np.float64))
-@pytest.mark.parametrize("make", (scenes.crumpled, scenes.lattice, scenes.soup))
+@pytest.mark.parametrize("make", (scenes.crumpled, scenes.lattice, scenes.soup, scenes.fringed))
 def test_random_scenes(make, dtype, accuracy):
     for seed in range(4):
         rng = np.random.default_rng(seed)
@@ -43,10 +43,19 @@ def test_random_scenes(make, dtype, accuracy):
         assert len(assert_same(scene, t0.astype(dtype), t1.astype(dtype), accuracy=accuracy)) > 0
 
 
+@pytest.mark.parametrize("accuracy", TIERS)
+def test_ropes_alone_and_beside_others(accuracy):
+    rng = np.random.default_rng(15)
+    for parts in ([scenes.rope(rng, 200)], [scenes.rope(rng, 90), scenes.crumpled(rng, 12), scenes.rope(rng, 2)]):
+        scene, t0, t1 = scenes.join(parts)
+        found = assert_same(scene, t0, t1, accuracy=accuracy, outputs=("points", "normals"))
+        assert len(found.ee) > 50 and (len(found.vf) > 0) == (len(parts) > 1)
+
+
 @pytest.mark.parametrize("method", ("published", "naive", "front"))
 def test_published_methods_send_triangles(method):
     rng = np.random.default_rng(11)
-    parts = [scenes.crumpled(rng, 24), scenes.soup(rng, 30)]
+    parts = [scenes.crumpled(rng, 24), scenes.soup(rng, 30), scenes.rope(rng, 40)]
     scene, t0, t1 = scenes.join(parts, accuracy=((0, 1, "balanced"),))
     assert_backend_same("hybrid", scene, t0, t1, method=method, restructure=True)
 

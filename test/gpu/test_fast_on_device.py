@@ -41,8 +41,8 @@ def in_floats(scene, t0, t1, **options):
     return "gpu/likely_roots" in detector.profile
 
 
-def of_one(faces, t0, t1):
-    return scenes.join([(faces, t0, t1)])
+def of_one(*mesh):
+    return scenes.join([mesh])
 
 
 def fine(rng, n, size):
@@ -53,7 +53,7 @@ def fine(rng, n, size):
 
 
 @pytest.mark.parametrize("dtype", DTYPES)
-@pytest.mark.parametrize("make", (scenes.crumpled, scenes.lattice, scenes.soup))
+@pytest.mark.parametrize("make", (scenes.crumpled, scenes.lattice, scenes.soup, scenes.fringed))
 def test_random_scenes(make, dtype):
     for seed in range(8):
         scene, t0, t1 = of_one(*make(np.random.default_rng(seed), 30))
@@ -221,7 +221,7 @@ def test_lists_that_overflow_grow():
 
 
 def test_every_pair_is_counted_once():
-    for make in (scenes.crumpled, scenes.lattice, scenes.soup):
+    for make in (scenes.crumpled, scenes.lattice, scenes.soup, scenes.fringed):
         scene, t0, t1 = of_one(*make(np.random.default_rng(34), 24))
         _, stats = assert_same(scene, t0, t1)
         for kind in ("vf", "ee"):

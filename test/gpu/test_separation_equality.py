@@ -32,7 +32,7 @@ def assert_same(scene, t0, t1, backends=BACKENDS, **options):
 
 @pytest.mark.parametrize("accuracy", TIERS)
 @pytest.mark.parametrize("dtype", (np.float32, np.float64))
-@pytest.mark.parametrize("make", (scenes.crumpled, scenes.lattice, scenes.soup))
+@pytest.mark.parametrize("make", (scenes.crumpled, scenes.lattice, scenes.soup, scenes.fringed))
 @pytest.mark.parametrize("separation", (1e-6, 0.05, 1.0))
 def test_random_scenes(make, dtype, accuracy, separation):
     if accuracy == "fast" and separation < 1:

@@ -49,7 +49,7 @@ def assert_gaps_same(cpu, gpu, vertices):
 
 @pytest.mark.parametrize("accuracy", TIERS)
 @pytest.mark.parametrize("dtype", (np.float32, np.float64))
-@pytest.mark.parametrize("make", (scenes.crumpled, scenes.lattice, scenes.soup))
+@pytest.mark.parametrize("make", (scenes.crumpled, scenes.lattice, scenes.soup, scenes.fringed))
 def test_random_scenes(make, dtype, accuracy):
     scene, vertices, _ = scenes.join([make(np.random.default_rng(1), 24)])
     vertices = vertices.astype(dtype)
@@ -59,7 +59,7 @@ def test_random_scenes(make, dtype, accuracy):
     assert_hits_same(cpu, gpu, vertices)
 
 
-@pytest.mark.parametrize("make", (scenes.crumpled, scenes.lattice, scenes.soup))
+@pytest.mark.parametrize("make", (scenes.crumpled, scenes.lattice, scenes.soup, scenes.fringed))
 def test_intersections_of_tangled_scenes(make):
     scene, _, vertices = scenes.join([make(np.random.default_rng(2), 24)])
     assert len(assert_hits_same(*detectors(scene), vertices)) > 0

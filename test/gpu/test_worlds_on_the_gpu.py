@@ -122,13 +122,12 @@ def test_any_is_the_first_pair_of_each(worlds, accuracy, results):
         assert_on_gpu(detector)
 
 
-@pytest.mark.parametrize("make", (scenes.lattice, scenes.soup))
+@pytest.mark.parametrize("make", (scenes.lattice, scenes.soup, scenes.fringed))
 @pytest.mark.parametrize("results", RESULTS)
 def test_degenerate_features(make, results):
     """Many of these pairs only integers can tell, and some only those of any size."""
     rng = np.random.default_rng(11)
-    faces, t0, t1 = make(rng, 14)
-    scene, _, _ = scenes.join([(faces, t0, t1)])
+    scene, t0, t1 = scenes.join([make(rng, 14)])
     starts = np.stack([t0, t0[::-1], t0 + 1, 2.0**-40 * t0])
     ends = np.stack([t1, t1[::-1], np.where(rng.random(t1.shape) < 0.2, 2.0**-300, t1), 2.0**-40 * t1])
     alone = each_alone(scene, starts, ends)

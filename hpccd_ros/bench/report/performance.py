@@ -36,6 +36,7 @@ TABLES = {
     "decided": (performance_core.decided, "accuracy-4-cores"),
     "size": (performance_core.size, "size-4-cores"),
     "memory": (performance_core.memory, "memory-2-cores"),
+    "ropes": (performance_core.ropes, "ropes-2-cores"),
     "worlds-on-cpus": (performance_core.worlds, "worlds-2-cores", "worlds-16-cores", "worlds-small-2-cores"),
     "options": (performance_core.options, "options-2-cores"),
     "tiers": (performance_core.tiers, "accuracy-4-cores"),

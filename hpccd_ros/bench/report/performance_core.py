@@ -104,6 +104,11 @@ def memory(result: Kept) -> list[str]:
     return markdown.table(["scene", "triangles", "contacts", "detector, MB", "bytes a triangle", "process, MB"], lines)
 
 
+def ropes(result: Kept) -> list[str]:
+    lines = [[r["way"], r["edges"], r["triangles"], r["contacts"], r["ms"], r["bytes"] / 1e6] for r in result.rows]
+    return markdown.table(["as", "edges", "triangles", "contacts", "ms a step", "detector, MB"], lines)
+
+
 def worlds(*results: Kept) -> list[str]:
     lines = [
         [r["scene"], r["triangles"], r["worlds"], r["one_call_ms"], f"{r['of_all_threads']:.2f}", r["one_thread_ms"],
