@@ -5,7 +5,7 @@
 """
 
 from hpccd_ros.middleware.qos_overrides import DEEPEST
-from hpccd_ros.params.table import ALWAYS, MESH_ROWS, NEVER, NODE_GROUPS, UNCONFIGURED, Row
+from hpccd_ros.params.table import ALWAYS, MESH_ROWS, NEVER, NODE_GROUPS, PAIR_ROWS, UNCONFIGURED, Row
 from hpccd_ros.params.values import allowed
 
 _HEAD = """\
@@ -57,6 +57,7 @@ def page() -> str:
     """The whole page in Markdown."""
     groups = [(heading, "", rows) for heading, rows in NODE_GROUPS.items()]
     groups.append(("Of each mesh NAME in `meshes`", "mesh.NAME.", MESH_ROWS))
+    groups.append(("Of pairs of meshes, each with a NAME of your choice", "pairs.NAME.", PAIR_ROWS))
     return "\n".join([_HEAD, *(_group(*group) for group in groups), _QUALITY_OF_SERVICE.format(deepest=DEEPEST)])
 
 
@@ -72,9 +73,14 @@ def _group(heading: str, prefix: str, rows: tuple[Row, ...]) -> str:
 
 
 def _line(prefix: str, row: Row) -> str:
-    default = f"`{str(row.default).lower()}`" if row.kind == "bool" else f"`{row.default!r}`".replace("'", '"')
-    cells = (f"`{prefix}{row.name}`", row.kind, default, allowed(row), row.unit, _CHANGE[row.change], row.text)
+    cells = (f"`{prefix}{row.name}`", row.kind, _default(row), allowed(row), row.unit, _CHANGE[row.change], row.text)
     return f"| {' | '.join(cells)} |"
+
+
+def _default(row: Row) -> str:
+    if row.default is None:
+        return "not set"
+    return f"`{str(row.default).lower()}`" if row.kind == "bool" else f"`{row.default!r}`".replace("'", '"')
 
 
 if __name__ == "__main__":

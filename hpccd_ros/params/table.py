@@ -336,6 +336,26 @@ NODE_GROUPS = {
 }
 NODE_ROWS = tuple(row for rows in NODE_GROUPS.values() for row in rows)
 
+# Of pairs of meshes: pairs.NAME.*, where NAME is any.
+PAIRS = "pairs"
+
+# None: not said; "" and [] say nothing either.
+PAIR_ROWS = (
+    Row("meshes", "string[]", [], "The two meshes of the pair; the same name twice: within it"),
+    Row("accuracy", "string", "", "Tier, instead of `accuracy`; empty: that one", choices=ACCURACIES),
+    Row(
+        "separation",
+        "float",
+        None,
+        "Contact from this distance on, instead of `minimum_separation`; not set: that one",
+        unit="unit of the vertices",
+        span=(0.0, FARTHEST),
+        change=ALWAYS,
+    ),
+    Row("features", "string[]", [], "What is tested, instead of `features`; empty: that", choices=FEATURES),
+    Row("ignored", "bool", None, "Never tested against each other; not set: what `ignored_pairs` says"),
+)
+
 MESH_ROWS = (
     Row(
         "input",

@@ -13,7 +13,7 @@ from hpccd_ros.detect.scene import SceneBuilder
 from hpccd_ros.frames.mesh_file import FORMATS, MeshFileError, load_mesh, mesh_of_file
 from hpccd_ros.frames.types import MeshFrame, Topology
 from hpccd_ros.middleware import topic_names, transform_topics
-from hpccd_ros.params import scene_parameters, values
+from hpccd_ros.params import pair_parameters, scene_parameters, values
 from hpccd_ros.params.parameter_file import read_parameters
 from hpccd_ros.params.values import ParameterError
 from hpccd_ros.record import recorded_topics
@@ -41,7 +41,7 @@ class ReplaySetup:
         """Detector options of the recorded node, but for what may differ without a change of the result."""
         return Options(
             accuracy or self.settings["accuracy"], backend, threads, self.settings["report"],
-            separation=scene_parameters.separation(self.settings), features=scene_parameters.features(self.settings),
+            separation=pair_parameters.separation(self.settings), features=scene_parameters.features(self.settings),
         )  # fmt: skip
 
 
