@@ -34,7 +34,7 @@ class HpccdNode(GuardedLifecycleNode):
 
     def __init__(self) -> None:
         super().__init__("hpccd")
-        parameter_services.refuse_unknown_types(self)
+        parameter_services.amend(self)
         self._configuration = Configuration(self)
         self._settings = self._configuration.settings
         self._recording = NodeRecording(self, self._settings, self.errors)

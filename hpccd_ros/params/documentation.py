@@ -30,8 +30,8 @@ A value that is not allowed ends the start with one sentence (status 2). An unkn
 - *start*: only given at the start.
 
 An empty list of strings is written `[""]`: YAML parameters know no empty one. A text with colons is quoted, on the
-command line twice: `-p pair_separation:="['robot:cloth:0.01']"`. A float is written with a point, 0 as `0.0`, for
-`ros2 param set` too.
+command line twice: `-p pair_separation:="['robot:cloth:0.01']"`. A float may be written without a point, and so may all
+numbers of a list: `[0, 0, 1, 0, 0, 0, 1]`. A list in which some have a point and some have none is refused by ROS.
 """
 
 _QUALITY_OF_SERVICE = """\

@@ -44,6 +44,10 @@ _TYPES = {
 }
 
 
+# A number without a point is an integer to ROS; where a float is wanted, it is one.
+_INTEGERS = {"float": Parameter.Type.INTEGER, "float[]": Parameter.Type.INTEGER_ARRAY}
+
+
 def descriptor(row: Row) -> ParameterDescriptor:
     """What ``describe_parameters`` shows."""
     out = ParameterDescriptor(name=row.name, type=_TYPES[row.kind], description=row.text, read_only=row.change == NEVER)
@@ -83,8 +87,12 @@ def _declare_one(node: Node, row: Row, name: str) -> Any:
     # that need not be set.
     typed = row.kind == "string[]" or row.default is None
     value = Parameter.Type(_TYPES[row.kind]) if typed else row.default
+    given = _given(node).get(name)
+    whole = given is not None and given.type_ == _INTEGERS.get(row.kind)
+    if whole:
+        value = normalise(row, given.value)
     try:
-        node.declare_parameter(name, value, descriptor(row))
+        node.declare_parameter(name, value, descriptor(row), ignore_override=whole)
         value = node.get_parameter(name).value
     except ParameterUninitializedException:
         return normalise(row, row.default)

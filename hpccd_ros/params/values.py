@@ -41,7 +41,9 @@ def normalise(row: Row, value: Any) -> Any:
     """Plain Python value. YAML and the command line cannot write an empty list of strings: [""] is one."""
     if row.kind == "string[]":
         return [entry for entry in value or [] if entry]
-    return list(value) if row.kind == "float[]" else value
+    if row.kind == "float[]":
+        return [float(entry) for entry in value]
+    return float(value) if row.kind == "float" and value is not None else value
 
 
 def expected(row: Row) -> str:
@@ -80,7 +82,7 @@ def checked(given: dict[str, Any]) -> tuple[dict[str, Any], dict[str, dict[str, 
     return settings, meshes
 
 
-_PLAIN = {"bool": bool, "int": int, "float": float, "string": str}
+_PLAIN = {"bool": (bool,), "int": (int,), "float": (float, int), "string": (str,)}
 
 
 def _checked_value(row: Row, name: str, value: Any) -> Any:
@@ -89,7 +91,7 @@ def _checked_value(row: Row, name: str, value: Any) -> Any:
     is_list = row.kind.endswith("[]") and isinstance(value, list)
     entries, kind = (value, row.kind[:-2]) if is_list else ([value], row.kind)
     # Not isinstance: True is an int.
-    if not all(type(entry) is _PLAIN.get(kind) for entry in entries):
+    if not all(type(entry) in _PLAIN.get(kind, ()) for entry in entries):
         raise ParameterError(f"{name}: {value!r} is of the wrong type; {expected(row)}")
     return usable(row, name, value)
 
