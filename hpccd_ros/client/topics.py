@@ -12,7 +12,9 @@ TOPOLOGY_QOS: QoSProfile = qos.TOPOLOGY
 VERTICES_QOS: QoSProfile = qos.vertices("reliable", 10)
 #: Subscription to contacts: reliable, the last 10 kept for a reader that is late now and then.
 CONTACTS_QOS: QoSProfile = qos.CONTACTS
-
+#: The same, with the last 10 that came before it first: of a node with ``contacts_durability: transient_local``, and
+#: of no other.
+LATCHED_CONTACTS_QOS: QoSProfile = qos.LATCHED_CONTACTS
 #: Subscription to distances, in the same way.
 DISTANCES_QOS: QoSProfile = qos.DISTANCES
 

@@ -29,7 +29,8 @@ class ContactsPublisher:
 
     def __init__(self, node: GuardedLifecycleNode, settings: dict[str, Any]) -> None:
         self._settings = settings
-        self._contacts = node.configured_publisher(ContactArray, topic_names.CONTACTS, qos.CONTACTS)
+        profile = qos.contacts(settings["contacts_durability"])
+        self._contacts = node.configured_publisher(ContactArray, topic_names.CONTACTS, profile)
         self._distances = node.configured_publisher(DistanceArray, topic_names.DISTANCES, qos.DISTANCES)
         self._markers = node.configured_publisher(MarkerArray, topic_names.MARKERS, qos.MARKERS)
         self._surface = node.configured_publisher(PointCloud2, topic_names.SURFACE, qos.MARKERS)

@@ -241,6 +241,13 @@ SERVICE_ROWS = (
 )
 
 OUTPUT_ROWS = (
+    Row(
+        "contacts_durability",
+        "string",
+        "volatile",
+        "QoS of contacts; transient_local also gives the last answers to subscribers that come later and ask for it",
+        choices=("volatile", "transient_local"),
+    ),
     Row("diagnostics_period", "float", 1.0, "Period of /diagnostics", unit="s", span=(0.05, 3600.0)),
     Row(
         "markers",
@@ -331,7 +338,7 @@ NODE_GROUPS = {
     "Detection": DETECTION_ROWS,
     "Input": INPUT_ROWS,
     "Service `~/detect`": SERVICE_ROWS,
-    "Diagnostics and markers": OUTPUT_ROWS,
+    "What is published": OUTPUT_ROWS,
     "Recording": RECORDING_ROWS,
 }
 NODE_ROWS = tuple(row for rows in NODE_GROUPS.values() for row in rows)
