@@ -14,6 +14,7 @@ a fraction of its step, from 0 (its start) to 1 (its end).
 from hpccd_ros.client.contacts import ContactArrays, contacts_from_message, scene_contacts
 from hpccd_ros.client.distances import DistanceArrays, distances_from_message
 from hpccd_ros.client.meshes import topology_from_message, topology_message, vertices_from_message, vertices_message
+from hpccd_ros.client.pairs import pair_summary
 from hpccd_ros.client.steps import collision_free_step_from_response, collision_free_step_request
 from hpccd_ros.client.topics import (
     CONTACTS_QOS,
@@ -21,6 +22,8 @@ from hpccd_ros.client.topics import (
     DISTANCES_QOS,
     DISTANCES_TOPIC,
     LATCHED_CONTACTS_QOS,
+    PAIRS_QOS,
+    PAIRS_TOPIC,
     TOPOLOGY_QOS,
     VERTICES_QOS,
     topology_topic,
@@ -40,6 +43,8 @@ __all__ = [
     "DistanceArrays",
     "LATCHED_CONTACTS_QOS",
     "Layout",
+    "PAIRS_QOS",
+    "PAIRS_TOPIC",
     "SceneContacts",
     "TOPOLOGY_QOS",
     "Topology",
@@ -48,6 +53,7 @@ __all__ = [
     "collision_free_step_request",
     "contacts_from_message",
     "distances_from_message",
+    "pair_summary",
     "prepare_environment",
     "scene_contacts",
     "topology_from_message",

@@ -18,10 +18,15 @@ LATCHED_CONTACTS_QOS: QoSProfile = qos.LATCHED_CONTACTS
 #: Subscription to distances, in the same way.
 DISTANCES_QOS: QoSProfile = qos.DISTANCES
 
+#: Subscription to pairs, in the same way.
+PAIRS_QOS: QoSProfile = qos.PAIRS
+
 #: Relative to the namespace of the node, as the names below.
 CONTACTS_TOPIC: str = topic_names.CONTACTS
 #: Published while the node's parameter ``distances`` is true.
 DISTANCES_TOPIC: str = topic_names.DISTANCES
+#: Published while the node's parameter ``pair_summaries`` is true.
+PAIRS_TOPIC: str = topic_names.PAIRS
 
 
 def topology_topic(mesh: str) -> str:

@@ -9,6 +9,7 @@ VERTICES = "hpccd/msg/MeshVertices"
 POINTS = "sensor_msgs/msg/PointCloud2"
 CONTACTS = "hpccd/msg/ContactArray"
 DISTANCES = "hpccd/msg/DistanceArray"
+PAIRS = "hpccd/msg/PairSummaryArray"
 
 # A name may come from a recording: it must not lead out of the folders of messages, nor to any other module.
 _TYPE_NAME = re.compile(r"([A-Za-z][A-Za-z0-9_]*)/([a-z]+)/([A-Za-z][A-Za-z0-9_]*)")

@@ -23,6 +23,7 @@ TOPOLOGY_INPUT = keep_last(10, latched=True)
 # Enough for a reader that is late now and then (a depth of 2 lost 3 % at 200 Hz); recorders ask for more.
 CONTACTS = keep_last(10)
 DISTANCES = CONTACTS
+PAIRS = CONTACTS
 # The reader's end, where parameter contacts_durability has them latched.
 LATCHED_CONTACTS = keep_last(10, latched=True)
 

@@ -56,7 +56,7 @@ class HpccdNode(GuardedLifecycleNode):
         except ValueError as error:
             self.get_logger().error(f"cannot configure: {error}")
             return TransitionCallbackReturn.FAILURE
-        self._contacts = ContactsPublisher(self, settings)
+        self._contacts = ContactsPublisher(self, settings, self._builder)
         self._diagnostics = self.configured_publisher(DiagnosticArray, topic_names.DIAGNOSTICS, qos.DIAGNOSTICS)
         self._service = DetectService(self, self._configuration, self._scene_for_service, self._accounts)
         self.configured_timer(settings["diagnostics_period"], self._report)

@@ -122,6 +122,14 @@ DETECTION_ROWS = (
         change=ALWAYS,
     ),
     Row(
+        "pair_summaries",
+        "bool",
+        False,
+        "Publish on pairs, for each pair of meshes, how many contacts the step has, the time of the first, and the "
+        "smallest distance where `distances` is true",
+        change=ALWAYS,
+    ),
+    Row(
         "max_contacts",
         "int",
         200_000,

@@ -6,10 +6,10 @@ import dataclasses
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 
 from hpccd_ros.middleware import qos, qos_overrides, topic_names, transform_topics
-from hpccd_ros.middleware.message_types import CONTACTS, DISTANCES, POINTS, TOPOLOGY, VERTICES
+from hpccd_ros.middleware.message_types import CONTACTS, DISTANCES, PAIRS, POINTS, TOPOLOGY, VERTICES
 
 # Relative name -> type of what the node computes.
-ANSWERS = {topic_names.CONTACTS: CONTACTS, topic_names.DISTANCES: DISTANCES}
+ANSWERS = {topic_names.CONTACTS: CONTACTS, topic_names.DISTANCES: DISTANCES, topic_names.PAIRS: PAIRS}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -38,7 +38,7 @@ def of_node(parameters: dict) -> list[Wanted]:
             wanted.append(Wanted(topic_names.points(mesh), POINTS))
         else:
             wanted.append(Wanted(topic_names.vertices(mesh), VERTICES))
-    # Distances whether they are asked for now or not: they may be at any time.
+    # Distances and summaries whether they are asked for now or not: they may be at any time.
     return [*wanted, *(Wanted(name, type_name) for name, type_name in ANSWERS.items())]
 
 
