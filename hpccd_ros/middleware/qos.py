@@ -27,6 +27,9 @@ PAIRS = CONTACTS
 # The reader's end, where parameter contacts_durability has them latched.
 LATCHED_CONTACTS = keep_last(10, latched=True)
 
+# The requests that a service got and its answers, where parameter service_introspection publishes them.
+SERVICE_EVENTS = keep_last(10)
+
 DIAGNOSTICS = keep_last(10)
 
 # As tf2's own listeners ask for them.

@@ -118,6 +118,8 @@ class HpccdNode(GuardedLifecycleNode):
     def _apply_change(self) -> None:
         if self._stream is not None:
             self._stream.apply_change()
+        if self._service is not None:
+            self._service.apply_change()
         self._recording.follow(active=self.state == "active")
 
     def _scene_for_service(self) -> NodeScene | str:

@@ -246,6 +246,14 @@ SERVICE_ROWS = (
         span=(0.001, 86_400.0),
         change=ALWAYS,
     ),
+    Row(
+        "service_introspection",
+        "string",
+        "off",
+        "Publish the events of ~/detect on ~/detect/_service_event: who asked and was answered when, or also what",
+        choices=("off", "metadata", "contents"),
+        change=ALWAYS,
+    ),
 )
 
 OUTPUT_ROWS = (
