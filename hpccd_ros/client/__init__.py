@@ -26,11 +26,15 @@ from hpccd_ros.client.topics import (
     PAIRS_TOPIC,
     TOPOLOGY_QOS,
     VERTICES_QOS,
+    marker_topic,
+    shape_topic,
     topology_topic,
     vertices_topic,
 )
+from hpccd_ros.client.whole_meshes import mesh_from_marker, mesh_from_shape
 from hpccd_ros.detect.layout import Layout
 from hpccd_ros.frames.types import Topology
+from hpccd_ros.frames.welding import Welding
 from hpccd_ros.middleware.contact_messages import SceneContacts
 from hpccd_ros.middleware.environment import prepare as prepare_environment
 
@@ -49,13 +53,18 @@ __all__ = [
     "TOPOLOGY_QOS",
     "Topology",
     "VERTICES_QOS",
+    "Welding",
     "collision_free_step_from_response",
     "collision_free_step_request",
     "contacts_from_message",
     "distances_from_message",
+    "marker_topic",
+    "mesh_from_marker",
+    "mesh_from_shape",
     "pair_summary",
     "prepare_environment",
     "scene_contacts",
+    "shape_topic",
     "topology_from_message",
     "topology_message",
     "topology_topic",

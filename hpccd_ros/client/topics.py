@@ -45,6 +45,22 @@ def vertices_topic(mesh: str) -> str:
     return topic_names.vertices(_mesh_name(mesh))
 
 
+def shape_topic(mesh: str) -> str:
+    """Where shape_msgs/Mesh of this mesh go, with ``mesh.MESH.input: shape``: ``meshes/MESH/shape``.
+
+    Raises TypeError or ValueError for what can be no name of a mesh.
+    """
+    return topic_names.of_mesh(_mesh_name(mesh), topic_names.SHAPE)
+
+
+def marker_topic(mesh: str) -> str:
+    """Where visualization_msgs/Marker of this mesh go, with ``mesh.MESH.input: marker``: ``meshes/MESH/marker``.
+
+    Raises TypeError or ValueError for what can be no name of a mesh.
+    """
+    return topic_names.of_mesh(_mesh_name(mesh), topic_names.MARKER)
+
+
 def _mesh_name(mesh: str) -> str:
     if not isinstance(mesh, str):
         raise TypeError(f"mesh: expected its name, got {type(mesh).__name__}")

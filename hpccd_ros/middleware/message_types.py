@@ -7,6 +7,8 @@ import re
 TOPOLOGY = "hpccd/msg/MeshTopology"
 VERTICES = "hpccd/msg/MeshVertices"
 POINTS = "sensor_msgs/msg/PointCloud2"
+SHAPE = "shape_msgs/msg/Mesh"
+MARKER = "visualization_msgs/msg/Marker"
 CONTACTS = "hpccd/msg/ContactArray"
 DISTANCES = "hpccd/msg/DistanceArray"
 PAIRS = "hpccd/msg/PairSummaryArray"

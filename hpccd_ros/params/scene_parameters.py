@@ -11,6 +11,7 @@ from hpccd_ros.detect.separation import NONE
 from hpccd_ros.frames.pipeline import FramePipeline
 from hpccd_ros.frames.rigid import Rigid
 from hpccd_ros.frames.types import AssemblyRules, MeshSettings
+from hpccd_ros.middleware.topic_names import WHOLE
 from hpccd_ros.params import pair_parameters
 from hpccd_ros.params.values import ParameterError
 
@@ -30,7 +31,15 @@ def scene_builder(settings: dict[str, Any], meshes: MeshValues) -> SceneBuilder:
 def mesh_settings(meshes: MeshValues) -> tuple[MeshSettings, ...]:
     """In the order of parameter ``meshes``."""
     return tuple(
-        MeshSettings(name, of["static"], of["self_collision"], of["transform"], of["frame"], tuple(of["pose"]))
+        MeshSettings(
+            name,
+            of["static"],
+            of["self_collision"],
+            of["transform"],
+            of["frame"],
+            tuple(of["pose"]),
+            whole=of["input"] in WHOLE,
+        )
         for name, of in meshes.items()
     )
 
@@ -93,6 +102,11 @@ def check(settings: dict[str, Any], meshes: MeshValues) -> None:
     features(settings)
     poses(meshes)
     for name, values in meshes.items():
+        if values["file"] and values["input"] in WHOLE:
+            raise ParameterError(
+                f"mesh.{name}.file: with mesh.{name}.input {values['input']} each message carries the triangles; leave "
+                "one of them out"
+            )
         if values["transform"] == "tf" and not settings["frame_id"]:
             raise ParameterError(f"mesh.{name}.transform: tf needs a frame to transform to; set parameter frame_id")
         if values["transform"] == "tf" and values["static"] and values["file"]:

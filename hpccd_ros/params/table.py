@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from hpccd_core.options import ACCURACIES, BACKENDS, FEATURES, OUTPUTS, REPORTS
+from hpccd_ros.middleware.topic_names import POSITIONS
 
 # When a parameter may be changed.
 ALWAYS, UNCONFIGURED, NEVER = "always", "unconfigured", "never"
@@ -384,8 +385,9 @@ MESH_ROWS = (
         "input",
         "string",
         "vertices",
-        "Topic of the positions: meshes/NAME/vertices (MeshVertices) or meshes/NAME/points (PointCloud2)",
-        choices=("vertices", "points"),
+        "Topic of the positions: meshes/NAME/vertices (MeshVertices) or meshes/NAME/points (PointCloud2); of positions "
+        "and topology: meshes/NAME/shape (shape_msgs/Mesh) or meshes/NAME/marker (Marker of type TRIANGLE_LIST)",
+        choices=POSITIONS,
     ),
     Row("static", "bool", False, "Does not move: positions from the file or from one message"),
     Row("self_collision", "bool", True, "Test the mesh against itself"),

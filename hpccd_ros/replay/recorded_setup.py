@@ -26,7 +26,7 @@ class ReplaySetup:
 
     settings: dict
     meshes: dict[str, dict]
-    # Topic name -> (mesh, "topology" | "vertices" | "points"), or ("", name in transform_topics.ALL).
+    # Topic name -> (mesh, "topology" or one of topic_names.POSITIONS), or ("", name in transform_topics.ALL).
     roles: dict[str, tuple[str, str]]
     contacts: str | None  # topic name; None: the recording has none
     distances: str | None  # as well
@@ -70,7 +70,7 @@ def of_recording(recording: Recording, parameter_file: str | None = None) -> Rep
     by_role = _by_role(recording, info, recorded_topics.types_by_role(meshes))
     roles = {topic: ("", role) if role in transform_topics.ALL else tuple(role.split("/")[1:])
              for role, topic in by_role.items() if role not in recorded_topics.ANSWERS}  # fmt: skip
-    if not any(kind in ("vertices", "points") for _, kind in roles.values()):
+    if not any(kind in topic_names.POSITIONS for _, kind in roles.values()):
         raise RecordingError(
             f"{recording.path} holds no vertices of the meshes {', '.join(meshes)}; its topics are "
             f"{', '.join(recording.topics) or 'none'}"
