@@ -90,6 +90,26 @@ def make_decoder(topic: RecordedTopic):
     """
     from rclpy.serialization import deserialize_message
 
+    cls, complete = _type_and_completion(topic)
+
+    def decode(message):
+        try:
+            return deserialize_message(complete(message.data), cls)
+        except Exception as error:  # rclpy raises RMWError, RCLError or MemoryError, by what is wrong in the bytes
+            raise RecordingError(
+                f"message of {topic.name} received at {message.log_time} ns is no valid {topic.type_name}: {error}"
+            ) from error
+
+    return decode
+
+
+def make_completer(topic: RecordedTopic):
+    """As `make_decoder`, for those who read the CDR bytes of the type that is installed here themselves."""
+    _, complete = _type_and_completion(topic)
+    return lambda message: complete(message.data)
+
+
+def _type_and_completion(topic: RecordedTopic):
     try:
         cls, complete = message_class(topic.type_name), completion(topic)
     except LookupError as error:
@@ -101,13 +121,4 @@ def make_decoder(topic: RecordedTopic):
             f"installed {message_definitions.type_hash(topic.type_name)}): "
             "replay it with the version of the package that recorded it"
         )
-
-    def decode(message):
-        try:
-            return deserialize_message(complete(message.data), cls)
-        except Exception as error:  # rclpy raises RMWError, RCLError or MemoryError, by what is wrong in the bytes
-            raise RecordingError(
-                f"message of {topic.name} received at {message.log_time} ns is no valid {topic.type_name}: {error}"
-            ) from error
-
-    return decode
+    return cls, complete

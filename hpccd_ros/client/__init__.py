@@ -14,19 +14,27 @@ a fraction of its step, from 0 (its start) to 1 (its end).
 from hpccd_ros.client.contacts import ContactArrays, contacts_from_message, scene_contacts
 from hpccd_ros.client.distances import DistanceArrays, distances_from_message
 from hpccd_ros.client.meshes import topology_from_message, topology_message, vertices_from_message, vertices_message
+from hpccd_ros.client.pairs import pair_summary
 from hpccd_ros.client.steps import collision_free_step_from_response, collision_free_step_request
 from hpccd_ros.client.topics import (
     CONTACTS_QOS,
     CONTACTS_TOPIC,
     DISTANCES_QOS,
     DISTANCES_TOPIC,
+    LATCHED_CONTACTS_QOS,
+    PAIRS_QOS,
+    PAIRS_TOPIC,
     TOPOLOGY_QOS,
     VERTICES_QOS,
+    marker_topic,
+    shape_topic,
     topology_topic,
     vertices_topic,
 )
+from hpccd_ros.client.whole_meshes import mesh_from_marker, mesh_from_shape
 from hpccd_ros.detect.layout import Layout
 from hpccd_ros.frames.types import Topology
+from hpccd_ros.frames.welding import Welding
 from hpccd_ros.middleware.contact_messages import SceneContacts
 from hpccd_ros.middleware.environment import prepare as prepare_environment
 
@@ -37,17 +45,26 @@ __all__ = [
     "DISTANCES_QOS",
     "DISTANCES_TOPIC",
     "DistanceArrays",
+    "LATCHED_CONTACTS_QOS",
     "Layout",
+    "PAIRS_QOS",
+    "PAIRS_TOPIC",
     "SceneContacts",
     "TOPOLOGY_QOS",
     "Topology",
     "VERTICES_QOS",
+    "Welding",
     "collision_free_step_from_response",
     "collision_free_step_request",
     "contacts_from_message",
     "distances_from_message",
+    "marker_topic",
+    "mesh_from_marker",
+    "mesh_from_shape",
+    "pair_summary",
     "prepare_environment",
     "scene_contacts",
+    "shape_topic",
     "topology_from_message",
     "topology_message",
     "topology_topic",

@@ -12,14 +12,21 @@ TOPOLOGY_QOS: QoSProfile = qos.TOPOLOGY
 VERTICES_QOS: QoSProfile = qos.vertices("reliable", 10)
 #: Subscription to contacts: reliable, the last 10 kept for a reader that is late now and then.
 CONTACTS_QOS: QoSProfile = qos.CONTACTS
-
+#: The same, with the last 10 that came before it first: of a node with ``contacts_durability: transient_local``, and
+#: of no other.
+LATCHED_CONTACTS_QOS: QoSProfile = qos.LATCHED_CONTACTS
 #: Subscription to distances, in the same way.
 DISTANCES_QOS: QoSProfile = qos.DISTANCES
+
+#: Subscription to pairs, in the same way.
+PAIRS_QOS: QoSProfile = qos.PAIRS
 
 #: Relative to the namespace of the node, as the names below.
 CONTACTS_TOPIC: str = topic_names.CONTACTS
 #: Published while the node's parameter ``distances`` is true.
 DISTANCES_TOPIC: str = topic_names.DISTANCES
+#: Published while the node's parameter ``pair_summaries`` is true.
+PAIRS_TOPIC: str = topic_names.PAIRS
 
 
 def topology_topic(mesh: str) -> str:
@@ -36,6 +43,22 @@ def vertices_topic(mesh: str) -> str:
     Raises TypeError or ValueError for what can be no name of a mesh.
     """
     return topic_names.vertices(_mesh_name(mesh))
+
+
+def shape_topic(mesh: str) -> str:
+    """Where shape_msgs/Mesh of this mesh go, with ``mesh.MESH.input: shape``: ``meshes/MESH/shape``.
+
+    Raises TypeError or ValueError for what can be no name of a mesh.
+    """
+    return topic_names.of_mesh(_mesh_name(mesh), topic_names.SHAPE)
+
+
+def marker_topic(mesh: str) -> str:
+    """Where visualization_msgs/Marker of this mesh go, with ``mesh.MESH.input: marker``: ``meshes/MESH/marker``.
+
+    Raises TypeError or ValueError for what can be no name of a mesh.
+    """
+    return topic_names.of_mesh(_mesh_name(mesh), topic_names.MARKER)
 
 
 def _mesh_name(mesh: str) -> str:

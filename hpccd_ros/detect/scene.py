@@ -38,6 +38,19 @@ class SceneBuilder:
             scene.set_features(a, b, features)
         return scene
 
+    def tested_pairs(self) -> list[tuple[str, str]]:
+        """Names of the meshes that are tested against each other, and of those within themselves twice; in the order of
+        the scene."""
+        ignored = {frozenset(pair) for pair in self.ignored_pairs}
+        found = []
+        for number, a in enumerate(self.meshes):
+            if a.self_collision and not a.static:
+                found.append((a.name, a.name))
+            for b in self.meshes[number + 1 :]:
+                if not (a.static and b.static) and frozenset((a.name, b.name)) not in ignored:
+                    found.append((a.name, b.name))
+        return found
+
     def among(self, names: list[str]) -> "SceneBuilder":
         """The scene of these meshes, in this order; names that it does not have are meshes of their own."""
         known = {mesh.name: mesh for mesh in self.meshes}

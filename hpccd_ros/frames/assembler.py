@@ -3,7 +3,8 @@
 
 Rules, in the order in which they are applied to a vertex message:
 
-1. Its topology version must be the one in force (topology_version.py). Topology and vertices are separate topics,
+1. Its topology version must be the one in force (topology_version.py); that of a whole mesh carries its topology,
+   which is in force from there on where it is another one. Else: Topology and vertices are separate topics,
    nothing orders them: a newer one waits for its topology, at most ``max_pending`` frames a mesh; an older one is
    taken with its own topology until a frame of a later one was accepted, then refused.
 2. The number of vertices must be that of the topology.
@@ -41,6 +42,7 @@ class _MeshState:
     def __init__(self, settings: MeshSettings, max_pending: int) -> None:
         self.name = settings.name
         self.static = settings.static
+        self.whole = settings.whole
         self.topologies = TopologyHistory(max_pending)
         self.early: deque[MeshFrame] = deque()  # their topology has not come
         self.positions = StaticPositions()
@@ -105,6 +107,9 @@ class FrameAssembler:
         state = self._meshes.get(mesh)
         if state is None:
             return self._unknown(mesh, Input.TOPOLOGY)
+        if state.whole:
+            text = f"the topology comes with the positions (parameter mesh.{mesh}.input); publish no other one"
+            return Outcome(refusals=[Refusal(mesh, Reason.TOPOLOGY_CONFLICT, text, what=Input.TOPOLOGY)])
         current = state.topologies.current
         if current is not None and topology.version == current.version and topology.same_content(current):
             return Outcome()
@@ -141,9 +146,12 @@ class FrameAssembler:
         return Outcome(refusals=[Refusal(mesh, Reason.UNKNOWN_MESH, text, what=what)])
 
     def _admit(self, state: _MeshState, frame: MeshFrame) -> Outcome:
-        if is_early(frame, state.topologies.current):
+        if frame.topology is not None:
+            topology = state.topologies.same_as(frame.topology)
+        elif is_early(frame, state.topologies.current):
             return Outcome(refusals=self._hold(state, frame))
-        topology = state.topologies.current if state.static else state.topologies.of(frame)
+        else:
+            topology = state.topologies.current if state.static else state.topologies.of(frame)
         if refusal := check_frame(state.name, frame, topology):
             return Outcome(refusals=[refusal])
         frame = replace(frame, topology=topology)
@@ -164,8 +172,9 @@ class FrameAssembler:
     def _keep_positions(self, state: _MeshState, frame: MeshFrame) -> Outcome:
         if refusal := self._frame.check_static(state.name, frame):
             return Outcome(refusals=[refusal])
+        if state.topologies.accept(frame):
+            state.positions.clear()
         state.positions.keep(frame)
-        state.topologies.accept(frame)
         state.new_publisher = False
         return Outcome(static_taken=1)
 

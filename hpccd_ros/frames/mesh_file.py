@@ -9,6 +9,7 @@ from hpccd_ros.base.quoting import shortened
 from hpccd_ros.frames.coordinates import unusable_coordinates
 from hpccd_ros.frames.rigid import Rigid
 from hpccd_ros.frames.types import MeshFrame, Topology
+from hpccd_ros.frames.welding import weld
 
 FORMATS = (".obj", ".ply", ".stl")
 
@@ -44,7 +45,8 @@ def load_mesh(path: str) -> tuple[np.ndarray, np.ndarray]:
     if len(faces) == 0:
         raise MeshFileError(f"{file}: has no triangles")
     if file.suffix.lower() == ".stl":
-        vertices, faces = _join_equal(vertices, faces)
+        first, vertex_of = weld(vertices)
+        vertices, faces = vertices[first], vertex_of[faces]
     if problem := unusable_coordinates(vertices):
         raise MeshFileError(f"{file}: {problem[1]}")
     return vertices, faces.astype(np.uint32)
@@ -102,12 +104,3 @@ def place(vertices: np.ndarray, pose: list[float]) -> np.ndarray:
     if problem := unusable_coordinates(placed):
         raise MeshFileError(f"pose: {shortened(pose)}: placed by it, {problem[1]}")
     return placed
-
-
-def _join_equal(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    # + 0.0 makes -0.0 equal to 0.0 in the comparison.
-    _, first, inverse = np.unique(vertices + 0.0, axis=0, return_index=True, return_inverse=True)
-    order = np.argsort(first)
-    rank = np.empty_like(order)
-    rank[order] = np.arange(len(order))
-    return vertices[first[order]], rank[inverse.reshape(-1)][faces]

@@ -34,12 +34,23 @@ class TopologyHistory:
         named = (t for t in self._superseded if t.version == frame.version)
         return next(named, self.current)
 
-    def accept(self, frame: MeshFrame) -> None:
-        """A frame was accepted: those after it belong to its topology or to a later one."""
+    def same_as(self, carried: Topology) -> Topology:
+        """The one in force where it is equal to that which a frame carries, else this one."""
+        if self.current is not None and carried.version == self.current.version and carried.same_content(self.current):
+            return self.current
+        return carried
+
+    def accept(self, frame: MeshFrame) -> bool:
+        """A frame was accepted: those after it belong to its topology or to a later one. Whether it carried a new one,
+        which is in force now."""
+        if frame.topology is not self.current and not any(frame.topology is t for t in self._superseded):
+            self.put(frame.topology)
+            return True
         if frame.topology is self.current:
             self._superseded.clear()
         while self._superseded and self._superseded[0] is not frame.topology:
             self._superseded.popleft()
+        return False
 
 
 def check_successor(mesh: str, topology: Topology, current: Topology) -> Refusal | None:

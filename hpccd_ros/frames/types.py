@@ -19,6 +19,7 @@ class MeshSettings:
     transform: str = "none"
     frame: str = ""
     pose: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+    whole: bool = False  # each message of its vertices carries its topology
 
 
 @dataclass(frozen=True)
@@ -67,7 +68,7 @@ class MeshFrame:
     ``stamp`` ns, end of the step. ``version``: of the topology it belongs to; None (PointCloud2 has none):
     the one in force. ``step``: the publisher's number, None where it gives none. ``vertices`` (n,3) float32
     or float64, finite. ``received``: time.monotonic() at its arrival; ``only_publisher``: its mesh had no other one of
-    vertices then. ``topology``: set by the assembler.
+    vertices then. ``topology``: carried by messages of whole meshes, else set by the assembler.
     """
 
     stamp: int

@@ -5,26 +5,47 @@ from typing import Any
 
 from hpccd.msg import MeshTopology, MeshVertices
 from sensor_msgs.msg import PointCloud2
+from shape_msgs.msg import Mesh
+from visualization_msgs.msg import Marker
 
 from hpccd_ros.frames.drops import Input
 from hpccd_ros.frames.types import MeshFrame, Topology
-from hpccd_ros.middleware import fields, mesh_messages
-from hpccd_ros.middleware.topic_names import POINTS, TOPOLOGY, VERTICES
+from hpccd_ros.frames.welding import Welding
+from hpccd_ros.middleware import fields, mesh_messages, whole_meshes
+from hpccd_ros.middleware.topic_names import MARKER, POINTS, POSITIONS, SHAPE, TOPOLOGY, VERTICES, WHOLE
 
-TYPES = {TOPOLOGY: MeshTopology, VERTICES: MeshVertices, POINTS: PointCloud2}
-INPUTS = {TOPOLOGY: Input.TOPOLOGY, VERTICES: Input.VERTICES, POINTS: Input.VERTICES}
+TYPES = {TOPOLOGY: MeshTopology, VERTICES: MeshVertices, POINTS: PointCloud2, SHAPE: Mesh, MARKER: Marker}
+INPUTS = {TOPOLOGY: Input.TOPOLOGY} | dict.fromkeys(POSITIONS, Input.VERTICES)
 
 
 def read(
-    kind: str, message: Any, limits: dict[str, Any], received: float = 0.0, only_publisher: bool = True
+    kind: str,
+    message: Any,
+    limits: dict[str, Any],
+    received: float = 0.0,
+    only_publisher: bool = True,
+    *,
+    sent: int = 0,
+    welding: Welding | None = None,
 ) -> Topology | MeshFrame:
     """Arrays of the frame are views of the message's bytes where it allows that.
 
-    limits: max_vertices, max_faces, max_edges. received, only_publisher: of the frame, as in `MeshFrame`.
-    Raises InvalidMessageError.
+    message: its CDR bytes where the kind is one of topic_names.WHOLE. limits: max_vertices, max_faces, max_edges.
+    received, only_publisher: of the frame, as in `MeshFrame`. sent: when its publisher sent it, ns, the stamp of a
+    message that has none. welding: of the markers of this mesh. Raises InvalidMessageError.
     """
+    most = limits["max_vertices"], limits["max_faces"]
     if kind == TOPOLOGY:
         return mesh_messages.topology_from_message(message, limits)
+    if kind in WHOLE:
+        if kind == SHAPE:
+            mesh = whole_meshes.mesh_from_shape(message, sent, *most)
+        else:
+            mesh = whole_meshes.mesh_from_marker(message, *most, welding or Welding())
+        version = mesh.topology.version
+        return MeshFrame(
+            mesh.stamp, mesh.vertices, version, None, mesh.frame_id, received, only_publisher, mesh.topology
+        )
     stamp, frame_id = fields.stamp_to_ns(message.header.stamp), message.header.frame_id
     if kind == VERTICES:
         vertices = mesh_messages.vertices_from_message(message, limits["max_vertices"])

@@ -26,7 +26,7 @@ def topology_from_message(message: MeshTopology, limits: Mapping[str, int]) -> T
     stamp_to_ns(message.header.stamp)  # not used, but wrong
     faces = _features("faces", message.faces, 3, limits)
     edges = _features("edges", message.edges, 2, limits)
-    _limit("n_vertices", message.n_vertices, "max_vertices", limits["max_vertices"])
+    check_size("n_vertices", message.n_vertices, "max_vertices", limits["max_vertices"])
     for what, indices in (("face", faces), ("edge", edges)):
         if len(indices) and (highest := int(indices.max())) >= message.n_vertices:
             number = int(indices.argmax()) // indices.shape[1]
@@ -40,7 +40,7 @@ def _features(field: str, indices: array.array, corners: int, limits: Mapping[st
     flat = np.frombuffer(indices, np.uint32)
     if len(flat) % corners:
         raise InvalidMessageError(Reason.MALFORMED, f"{field} has {len(flat)} indices, not a multiple of {corners}")
-    _limit(field, len(flat) // corners, f"max_{field}", limits[f"max_{field}"])
+    check_size(field, len(flat) // corners, f"max_{field}", limits[f"max_{field}"])
     return flat.reshape(-1, corners)
 
 
@@ -56,8 +56,8 @@ def vertices_from_message(message: MeshVertices, max_vertices: int) -> np.ndarra
     flat = np.frombuffer(single, np.float32) if len(single) else np.frombuffer(double, np.float64)
     if len(flat) % 3:
         raise InvalidMessageError(Reason.MALFORMED, f"vertices has {len(flat)} coordinates, not a multiple of 3")
-    _limit("vertices", len(flat) // 3, "max_vertices", max_vertices)
-    return _usable(flat.reshape(-1, 3))
+    check_size("vertices", len(flat) // 3, "max_vertices", max_vertices)
+    return usable(flat.reshape(-1, 3))
 
 
 def vertices_from_cloud(cloud: PointCloud2, max_vertices: int) -> np.ndarray:
@@ -75,7 +75,7 @@ def vertices_from_cloud(cloud: PointCloud2, max_vertices: int) -> np.ndarray:
         )
     offsets, types = zip(*(_cloud_field(cloud, axis) for axis in "xyz"), strict=True)
     count = cloud.width * cloud.height
-    _limit("width * height", count, "max_vertices", max_vertices)
+    check_size("width * height", count, "max_vertices", max_vertices)
     row_bytes = cloud.width * cloud.point_step
     # A cloud of one row may leave row_step at 0: there is no second row to step to.
     row_step = cloud.row_step if cloud.height > 1 else max(cloud.row_step, row_bytes)
@@ -99,13 +99,13 @@ def vertices_from_cloud(cloud: PointCloud2, max_vertices: int) -> np.ndarray:
         and cloud.point_step == 3 * size
         and (row_step == row_bytes or cloud.height == 1)
     ):
-        return _usable(data.view(types[0]).reshape(-1, 3))
+        return usable(data.view(types[0]).reshape(-1, 3))
     point = np.dtype({"names": list("xyz"), "formats": types, "offsets": offsets, "itemsize": cloud.point_step})
     rows = np.ndarray((cloud.height, cloud.width), point, data, strides=(row_step, cloud.point_step))
     points = np.empty((cloud.height, cloud.width, 3), np.result_type(*types))
     for axis, name in enumerate("xyz"):
         points[..., axis] = rows[name]
-    return _usable(points.reshape(-1, 3))
+    return usable(points.reshape(-1, 3))
 
 
 def _cloud_field(cloud: PointCloud2, axis: str) -> tuple[int, np.dtype]:
@@ -130,14 +130,16 @@ def _cloud_field(cloud: PointCloud2, axis: str) -> tuple[int, np.dtype]:
     return field.offset, kind
 
 
-def _limit(what: str, size: int, parameter: str, limit: int) -> None:
+def check_size(what: str, size: int, parameter: str, limit: int) -> None:
+    """Raises InvalidMessageError above the limit."""
     if size > limit:
         raise InvalidMessageError(
             Reason.TOO_LARGE, f"{what} is {size}, above the limit {limit} (parameter {parameter})"
         )
 
 
-def _usable(vertices: np.ndarray) -> np.ndarray:
+def usable(vertices: np.ndarray) -> np.ndarray:
+    """``vertices`` themselves. Raises InvalidMessageError: NaN, infinity or beyond 1e150."""
     if problem := unusable_coordinates(vertices):
         raise InvalidMessageError(*problem)
     return vertices

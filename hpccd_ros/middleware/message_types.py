@@ -7,8 +7,11 @@ import re
 TOPOLOGY = "hpccd/msg/MeshTopology"
 VERTICES = "hpccd/msg/MeshVertices"
 POINTS = "sensor_msgs/msg/PointCloud2"
+SHAPE = "shape_msgs/msg/Mesh"
+MARKER = "visualization_msgs/msg/Marker"
 CONTACTS = "hpccd/msg/ContactArray"
 DISTANCES = "hpccd/msg/DistanceArray"
+PAIRS = "hpccd/msg/PairSummaryArray"
 
 # A name may come from a recording: it must not lead out of the folders of messages, nor to any other module.
 _TYPE_NAME = re.compile(r"([A-Za-z][A-Za-z0-9_]*)/([a-z]+)/([A-Za-z][A-Za-z0-9_]*)")

@@ -23,6 +23,12 @@ TOPOLOGY_INPUT = keep_last(10, latched=True)
 # Enough for a reader that is late now and then (a depth of 2 lost 3 % at 200 Hz); recorders ask for more.
 CONTACTS = keep_last(10)
 DISTANCES = CONTACTS
+PAIRS = CONTACTS
+# The reader's end, where parameter contacts_durability has them latched.
+LATCHED_CONTACTS = keep_last(10, latched=True)
+
+# The requests that a service got and its answers, where parameter service_introspection publishes them.
+SERVICE_EVENTS = keep_last(10)
 
 DIAGNOSTICS = keep_last(10)
 
@@ -32,6 +38,12 @@ TRANSFORMS_STATIC = keep_last(100, latched=True)
 
 # A viewer wants the newest only.
 MARKERS = keep_last(1)
+
+
+def contacts(durability: str) -> QoSProfile:
+    """Publisher of contacts. durability: "volatile" or "transient_local"."""
+    # Not 1 where they are latched: a reader that is late now and then would lose what the publisher holds no longer.
+    return keep_last(CONTACTS.depth, latched=durability == "transient_local")
 
 
 def vertices(reliability: str, depth: int) -> QoSProfile:

@@ -14,10 +14,11 @@ if TYPE_CHECKING:  # writers of files need the names and no ROS
 
 CONTACTS = "contacts"
 DISTANCES = "distances"
+PAIRS = "pairs"
 MARKERS = "markers"
 SURFACE = "surface"
 DIAGNOSTICS = "/diagnostics"
-PUBLISHED = (CONTACTS, DISTANCES, MARKERS, SURFACE, DIAGNOSTICS)
+PUBLISHED = (CONTACTS, DISTANCES, PAIRS, MARKERS, SURFACE, DIAGNOSTICS)
 
 TRANSFORMS = "transforms"
 TRANSFORMS_STATIC = "transforms_static"
@@ -27,10 +28,15 @@ TF_STATIC = "/tf_static"
 DETECT = "~/detect"
 SERVICES = (DETECT,)
 
-# What is published of a mesh: its faces, and its positions as MeshVertices or as PointCloud2.
+# What is published of a mesh: its faces, and its positions as MeshVertices or as PointCloud2; or both at once, as
+# shape_msgs/Mesh or visualization_msgs/Marker.
 TOPOLOGY = "topology"
 VERTICES = "vertices"
 POINTS = "points"
+SHAPE = "shape"
+MARKER = "marker"
+WHOLE = (SHAPE, MARKER)
+POSITIONS = (VERTICES, POINTS, *WHOLE)
 
 # A mesh name becomes part of topic and parameter names.
 MESH_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
@@ -40,7 +46,7 @@ MESHES = "meshes/"
 
 
 def of_mesh(mesh: str, kind: str) -> str:
-    """kind: TOPOLOGY, VERTICES or POINTS."""
+    """kind: TOPOLOGY or one of POSITIONS."""
     return f"{MESHES}{mesh}/{kind}"
 
 
@@ -58,7 +64,7 @@ def points(mesh: str) -> str:
 
 def subscribed(meshes: Iterable[str]) -> list[str]:
     """All that the node may subscribe to."""
-    of_meshes = [of_mesh(mesh, kind) for mesh in meshes for kind in (TOPOLOGY, VERTICES, POINTS)]
+    of_meshes = [of_mesh(mesh, kind) for mesh in meshes for kind in (TOPOLOGY, *POSITIONS)]
     return [*of_meshes, TRANSFORMS, TRANSFORMS_STATIC, TF, TF_STATIC]
 
 

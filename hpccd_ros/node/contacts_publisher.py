@@ -1,15 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The answer to a step on its topics: contacts, smallest distances on request, and what viewers show of them."""
+"""The answer to a step on its topics: contacts; on request smallest distances, each pair of meshes in brief, and what
+viewers show of them."""
 
 import time
 from typing import Any
 
 import numpy as np
-from hpccd.msg import ContactArray, DistanceArray
+from hpccd.msg import ContactArray, DistanceArray, PairSummary, PairSummaryArray
 from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Header
 from visualization_msgs.msg import MarkerArray
 
+from hpccd_ros.detect.pair_summary import summarise
+from hpccd_ros.detect.scene import SceneBuilder
 from hpccd_ros.detect.step_detector import Detection
 from hpccd_ros.middleware import (
     contact_messages,
@@ -27,10 +30,13 @@ from hpccd_ros.node.markers import contact_markers, surface_cloud
 class ContactsPublisher:
     """Of a configured ``node``, until that is unconfigured."""
 
-    def __init__(self, node: GuardedLifecycleNode, settings: dict[str, Any]) -> None:
+    def __init__(self, node: GuardedLifecycleNode, settings: dict[str, Any], builder: SceneBuilder) -> None:
         self._settings = settings
-        self._contacts = node.configured_publisher(ContactArray, topic_names.CONTACTS, qos.CONTACTS)
+        self._tested_pairs = builder.tested_pairs()
+        profile = qos.contacts(settings["contacts_durability"])
+        self._contacts = node.configured_publisher(ContactArray, topic_names.CONTACTS, profile)
         self._distances = node.configured_publisher(DistanceArray, topic_names.DISTANCES, qos.DISTANCES)
+        self._pairs = node.configured_publisher(PairSummaryArray, topic_names.PAIRS, qos.PAIRS)
         self._markers = node.configured_publisher(MarkerArray, topic_names.MARKERS, qos.MARKERS)
         self._surface = node.configured_publisher(PointCloud2, topic_names.SURFACE, qos.MARKERS)
         self._show_after = 0.0
@@ -61,6 +67,8 @@ class ContactsPublisher:
         self._contacts.publish(message)
         if found.gaps is not None:
             self._publish_distances(found, message.header)
+        if self._settings["pair_summaries"] and self._pairs.get_subscription_count():
+            self._publish_pairs(found, message.header)
         return message
 
     def _publish_distances(self, found: Detection, header: Header) -> None:
@@ -69,6 +77,10 @@ class ContactsPublisher:
         )
         snapshot_messages.fill_distances(message, found.gaps, found.layout)
         self._distances.publish(message)
+
+    def _publish_pairs(self, found: Detection, header: Header) -> None:
+        pairs = [PairSummary(**vars(pair)) for pair in summarise(found, self._tested_pairs)]
+        self._pairs.publish(PairSummaryArray(header=header, step=found.end.step, pairs=pairs))
 
     def show(self, found: Detection, header: Header) -> None:
         """For viewers, where parameter markers is set: no more often than they want it."""

@@ -12,6 +12,7 @@ from typing import Any
 from hpccd.srv import Detect
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import Clock, ClockType
+from rclpy.service_introspection import ServiceIntrospectionState
 from rclpy.task import Future
 
 from hpccd_core import Cancelled
@@ -80,6 +81,18 @@ class DetectService:
             qos_profile=qos.requests(self._capacity + ROOM_TO_REFUSE),
             callback_group=self._group,
         )
+        self._introspection = "off"
+        self.apply_change()
+
+    def apply_change(self) -> None:
+        """Follow the parameter that may change at any time."""
+        wanted = self._settings["service_introspection"]
+        if wanted != self._introspection:
+            # In the node's time, as the stamps of its other reports.
+            self._service.configure_introspection(
+                self._node.get_clock(), qos.SERVICE_EVENTS, getattr(ServiceIntrospectionState, wanted.upper())
+            )
+            self._introspection = wanted
 
     @property
     def counts(self) -> dict[str, int]:

@@ -16,6 +16,7 @@ from hpccd_ros.frames.drops import Input, Reason, Refusal
 from hpccd_ros.frames.pipeline import FramePipeline
 from hpccd_ros.frames.rate_limit import RateLimit
 from hpccd_ros.frames.sequence import SequenceWatch
+from hpccd_ros.frames.welding import Welding
 from hpccd_ros.middleware import mesh_inputs, qos, qos_overrides, topic_names, unreadable
 from hpccd_ros.middleware.fields import InvalidMessageError
 from hpccd_ros.node.accounts import Accounts
@@ -27,7 +28,7 @@ _UNREADABLE = "a message cannot be deserialised; build its publisher with the sa
 class MeshSubscriptions:
     """Topology and vertices of one mesh, subscribed from construction until ``close``.
 
-    kind: "vertices" or "points", what its vertices come as.
+    kind: one of topic_names.POSITIONS, what its vertices come as.
     """
 
     def __init__(
@@ -47,6 +48,7 @@ class MeshSubscriptions:
         self._accounts = accounts
         self._topology_numbers, self._vertex_numbers = SequenceWatch(), SequenceWatch()
         self._topology_limit, self._vertex_limit = (RateLimit(settings["max_rate"]) for _ in range(2))
+        self._welding = Welding()
         self._unreadable = 0  # vertex messages counted as such since the last that was read
         vertex_qos = qos.vertices(settings["input_reliability"], settings["input_depth"])
         self._subscriptions = [
@@ -95,9 +97,13 @@ class MeshSubscriptions:
             self._refuse(Reason.RATE, self._too_fast())
             return
         # Asked only where it can matter, as it takes 4 us: of a frame in another frame_id, which may be a restart.
-        alone = message.header.frame_id == self._pipeline.coordinate_frame[0] or self._publishers() <= 1
+        here = hasattr(message, "header") and message.header.frame_id == self._pipeline.coordinate_frame[0]
+        alone = here or self._publishers() <= 1
+        sent = info["source_timestamp"]
         try:
-            frame = mesh_inputs.read(self._kind, message, self._settings, received, alone)
+            frame = mesh_inputs.read(
+                self._kind, message, self._settings, received, alone, sent=sent, welding=self._welding
+            )
         except InvalidMessageError as error:
             self._accounts.refused(error.refusal(self._mesh))
             return
@@ -152,6 +158,7 @@ class MeshSubscriptions:
             callback,
             profile,
             event_callbacks=self._events(topic, numbers),
+            raw=kind in topic_names.WHOLE,
         )
 
     def _events(self, topic: str, numbers: SequenceWatch) -> SubscriptionEventCallbacks:

@@ -34,7 +34,7 @@ class HpccdNode(GuardedLifecycleNode):
 
     def __init__(self) -> None:
         super().__init__("hpccd")
-        parameter_services.refuse_unknown_types(self)
+        parameter_services.amend(self)
         self._configuration = Configuration(self)
         self._settings = self._configuration.settings
         self._recording = NodeRecording(self, self._settings, self.errors)
@@ -56,7 +56,7 @@ class HpccdNode(GuardedLifecycleNode):
         except ValueError as error:
             self.get_logger().error(f"cannot configure: {error}")
             return TransitionCallbackReturn.FAILURE
-        self._contacts = ContactsPublisher(self, settings)
+        self._contacts = ContactsPublisher(self, settings, self._builder)
         self._diagnostics = self.configured_publisher(DiagnosticArray, topic_names.DIAGNOSTICS, qos.DIAGNOSTICS)
         self._service = DetectService(self, self._configuration, self._scene_for_service, self._accounts)
         self.configured_timer(settings["diagnostics_period"], self._report)
@@ -118,6 +118,8 @@ class HpccdNode(GuardedLifecycleNode):
     def _apply_change(self) -> None:
         if self._stream is not None:
             self._stream.apply_change()
+        if self._service is not None:
+            self._service.apply_change()
         self._recording.follow(active=self.state == "active")
 
     def _scene_for_service(self) -> NodeScene | str:

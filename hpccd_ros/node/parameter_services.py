@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""rclpy's services that set parameters, with a check that they lack: of the type that a value claims to have."""
+"""rclpy's services that set parameters, with what they lack: a check of the type that a value claims to have, and
+integers where floats are wanted."""
 
-from rcl_interfaces.msg import Parameter, SetParametersResult
+from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue, SetParametersResult
 from rcl_interfaces.srv import SetParameters, SetParametersAtomically
 from rclpy import parameter
 from rclpy.node import Node
@@ -9,20 +10,22 @@ from rclpy.node import Node
 TYPES = {kind.value for kind in parameter.Parameter.Type}
 
 
-def refuse_unknown_types(node: Node) -> None:
-    """Values of a type that does not exist are refused with a reason; rclpy 7.1 raises, and nobody is answered."""
+def amend(node: Node) -> None:
+    """Values of a type that does not exist are refused with a reason; rclpy 7.1 raises, and nobody is answered.
+    Integers become floats where the parameter is one: `ros2 param set` takes a number without a point for an integer.
+    """
     for service in node.services:
         if service.srv_type is SetParameters:
-            service.callback = _each(service.callback)
+            service.callback = _each(node, service.callback)
         elif service.srv_type is SetParametersAtomically:
-            service.callback = _all(service.callback)
+            service.callback = _all(node, service.callback)
 
 
-def _each(set_parameters):
+def _each(node, set_parameters):
     def answer(request: SetParameters.Request, response: SetParameters.Response) -> SetParameters.Response:
         for given in request.parameters:
             if (refused := _refusal(given)) is None:
-                one = SetParameters.Request(parameters=[given])
+                one = SetParameters.Request(parameters=[_as_declared(node, given)])
                 response.results += set_parameters(one, SetParameters.Response()).results
             else:
                 response.results.append(refused)
@@ -31,7 +34,7 @@ def _each(set_parameters):
     return answer
 
 
-def _all(set_atomically):
+def _all(node, set_atomically):
     def answer(
         request: SetParametersAtomically.Request, response: SetParametersAtomically.Response
     ) -> SetParametersAtomically.Response:
@@ -39,6 +42,7 @@ def _all(set_atomically):
             if (refused := _refusal(given)) is not None:
                 response.result = refused
                 return response
+        request.parameters = [_as_declared(node, given) for given in request.parameters]
         return set_atomically(request, response)
 
     return answer
@@ -49,3 +53,14 @@ def _refusal(given: Parameter) -> SetParametersResult | None:
         return None
     reason = f"{given.name}: {given.value.type} is no type of rcl_interfaces/msg/ParameterType"
     return SetParametersResult(successful=False, reason=reason)
+
+
+def _as_declared(node: Node, given: Parameter) -> Parameter:
+    wanted = node.describe_parameter(given.name).type if node.has_parameter(given.name) else None
+    value = given.value
+    if (wanted, value.type) == (ParameterType.PARAMETER_DOUBLE, ParameterType.PARAMETER_INTEGER):
+        return Parameter(name=given.name, value=ParameterValue(type=wanted, double_value=float(value.integer_value)))
+    if (wanted, value.type) == (ParameterType.PARAMETER_DOUBLE_ARRAY, ParameterType.PARAMETER_INTEGER_ARRAY):
+        floats = [float(entry) for entry in value.integer_array_value]
+        return Parameter(name=given.name, value=ParameterValue(type=wanted, double_array_value=floats))
+    return given

@@ -11,6 +11,8 @@ from rclpy.node import Node, NodeNameNonExistentError
 from rclpy.subscription import Subscription
 from rclpy.validate_full_topic_name import validate_full_topic_name
 from sensor_msgs.msg import PointCloud2
+from shape_msgs.msg import Mesh
+from visualization_msgs.msg import Marker
 
 from hpccd_ros.base.quoting import listed
 from hpccd_ros.frames.drops import Reason, Refusal
@@ -25,6 +27,8 @@ _OTHERS = "(others)"
 _TYPES = {
     topic_names.VERTICES: (message_types.VERTICES, MeshVertices),
     topic_names.POINTS: (message_types.POINTS, PointCloud2),
+    topic_names.SHAPE: (message_types.SHAPE, Mesh),
+    topic_names.MARKER: (message_types.MARKER, Marker),
 }
 _DETECT = "hpccd/srv/Detect"
 

@@ -5,7 +5,7 @@
 """
 
 from hpccd_ros.middleware.qos_overrides import DEEPEST
-from hpccd_ros.params.table import ALWAYS, MESH_ROWS, NEVER, NODE_GROUPS, UNCONFIGURED, Row
+from hpccd_ros.params.table import ALWAYS, MESH_ROWS, NEVER, NODE_GROUPS, PAIR_ROWS, UNCONFIGURED, Row
 from hpccd_ros.params.values import allowed
 
 _HEAD = """\
@@ -30,8 +30,8 @@ A value that is not allowed ends the start with one sentence (status 2). An unkn
 - *start*: only given at the start.
 
 An empty list of strings is written `[""]`: YAML parameters know no empty one. A text with colons is quoted, on the
-command line twice: `-p pair_separation:="['robot:cloth:0.01']"`. A float is written with a point, 0 as `0.0`, for
-`ros2 param set` too.
+command line twice: `-p pair_separation:="['robot:cloth:0.01']"`. A float may be written without a point, and so may all
+numbers of a list: `[0, 0, 1, 0, 0, 0, 1]`. A list in which some have a point and some have none is refused by ROS.
 """
 
 _QUALITY_OF_SERVICE = """\
@@ -57,6 +57,7 @@ def page() -> str:
     """The whole page in Markdown."""
     groups = [(heading, "", rows) for heading, rows in NODE_GROUPS.items()]
     groups.append(("Of each mesh NAME in `meshes`", "mesh.NAME.", MESH_ROWS))
+    groups.append(("Of pairs of meshes, each with a NAME of your choice", "pairs.NAME.", PAIR_ROWS))
     return "\n".join([_HEAD, *(_group(*group) for group in groups), _QUALITY_OF_SERVICE.format(deepest=DEEPEST)])
 
 
@@ -72,9 +73,14 @@ def _group(heading: str, prefix: str, rows: tuple[Row, ...]) -> str:
 
 
 def _line(prefix: str, row: Row) -> str:
-    default = f"`{str(row.default).lower()}`" if row.kind == "bool" else f"`{row.default!r}`".replace("'", '"')
-    cells = (f"`{prefix}{row.name}`", row.kind, default, allowed(row), row.unit, _CHANGE[row.change], row.text)
+    cells = (f"`{prefix}{row.name}`", row.kind, _default(row), allowed(row), row.unit, _CHANGE[row.change], row.text)
     return f"| {' | '.join(cells)} |"
+
+
+def _default(row: Row) -> str:
+    if row.default is None:
+        return "not set"
+    return f"`{str(row.default).lower()}`" if row.kind == "bool" else f"`{row.default!r}`".replace("'", '"')
 
 
 if __name__ == "__main__":

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The parameters of a node: declared with their descriptors, and watched while it runs. Made from table.py."""
 
+import copy
 from collections.abc import Callable, Container, Iterable
 from typing import Any
 
@@ -20,8 +21,18 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from hpccd_ros.base import quoting
-from hpccd_ros.params.table import MESH_ROWS, NEVER, NODE_ROWS, UNCONFIGURED, Row
-from hpccd_ros.params.values import ParameterError, allowed, check_mesh_names, normalise, unusable_value, usable
+from hpccd_ros.params.table import MESH_ROWS, NEVER, NODE_ROWS, PAIRS, UNCONFIGURED, Row
+from hpccd_ros.params.values import (
+    ParameterError,
+    allowed,
+    check_mesh_names,
+    expected,
+    normalise,
+    pair_names,
+    pair_rows,
+    unusable_value,
+    usable,
+)
 
 _TYPES = {
     "bool": ParameterType.PARAMETER_BOOL,
@@ -31,6 +42,10 @@ _TYPES = {
     "string[]": ParameterType.PARAMETER_STRING_ARRAY,
     "float[]": ParameterType.PARAMETER_DOUBLE_ARRAY,
 }
+
+
+# A number without a point is an integer to ROS; where a float is wanted, it is one.
+_INTEGERS = {"float": Parameter.Type.INTEGER, "float[]": Parameter.Type.INTEGER_ARRAY}
 
 
 def descriptor(row: Row) -> ParameterDescriptor:
@@ -50,13 +65,17 @@ def descriptor(row: Row) -> ParameterDescriptor:
 
 
 def declare(node: Node) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
-    """Declare all parameters of the table; return (node settings, mesh name -> mesh settings).
+    """Declare all parameters of the table; return (node settings, mesh name -> mesh settings) as `values.checked` does.
 
-    Raises ParameterError: wrong type, out of range, bad or repeated mesh name.
+    Raises ParameterError: wrong type, out of range, bad or repeated mesh name, unknown parameter of a pair.
     """
     settings = {row.name: _declare_one(node, row, row.name) for row in NODE_ROWS}
     names = settings["meshes"]
     check_mesh_names(names)
+    settings[PAIRS] = {
+        pair: {row.name: _declare_one(node, row, name) for row, name in pair_rows(pair)}
+        for pair in pair_names(_given(node))
+    }
     meshes = {
         name: {row.name: _declare_one(node, row, f"mesh.{name}.{row.name}") for row in MESH_ROWS} for name in names
     }
@@ -64,17 +83,21 @@ def declare(node: Node) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
 
 
 def _declare_one(node: Node, row: Row, name: str) -> Any:
-    # An empty list has no element type, so rclpy would declare it as a byte array: declare the type instead.
-    value = Parameter.Type.STRING_ARRAY if row.kind == "string[]" else row.default
+    # An empty list has no element type, so rclpy would declare it as a byte array: declare the type instead, as of one
+    # that need not be set.
+    typed = row.kind == "string[]" or row.default is None
+    value = Parameter.Type(_TYPES[row.kind]) if typed else row.default
+    given = _given(node).get(name)
+    whole = given is not None and given.type_ == _INTEGERS.get(row.kind)
+    if whole:
+        value = normalise(row, given.value)
     try:
-        node.declare_parameter(name, value, descriptor(row))
+        node.declare_parameter(name, value, descriptor(row), ignore_override=whole)
         value = node.get_parameter(name).value
     except ParameterUninitializedException:
-        return list(row.default)
+        return normalise(row, row.default)
     except InvalidParameterTypeException as error:
-        raise ParameterError(
-            f"{name}: {quoting.shortened(error, 300)}; expected {row.kind}, e.g. {row.default!r}"
-        ) from error
+        raise ParameterError(f"{name}: {quoting.shortened(error, 300)}; {expected(row)}") from error
     except InvalidParameterValueException as error:
         raise ParameterError(f"{name}: {quoting.shortened(error, 300)}; allowed {allowed(row)}") from error
     return usable(row, name, value)
@@ -85,8 +108,11 @@ def unknown_overrides(node: Node, qos_overrides: Container[str] = ()) -> list[st
 
     qos_overrides: names of those that are declared only when their topics are there.
     """
-    given = getattr(node, "_parameter_overrides", {})  # rclpy has no public list of what was given
-    return sorted(name for name in given if not node.has_parameter(name) and name not in qos_overrides)
+    return sorted(name for name in _given(node) if not node.has_parameter(name) and name not in qos_overrides)
+
+
+def _given(node: Node) -> dict[str, Parameter]:
+    return getattr(node, "_parameter_overrides", {})  # rclpy has no public list of what was given
 
 
 def watch(
@@ -104,17 +130,20 @@ def watch(
     check: called with settings and meshes as they would be; returns why they cannot be used, or None.
     on_change: called after each accepted change of a row; other parameters (qos_overrides, use_sim_time) are rclpy's.
     """
-    rows = {row.name: (None, row) for row in NODE_ROWS}
-    rows |= {f"mesh.{name}.{row.name}": (name, row) for name in meshes for row in MESH_ROWS}
+    rows = {row.name: (lambda wanted, _: wanted, row) for row in NODE_ROWS}
+    for mesh in meshes:
+        rows |= {f"mesh.{mesh}.{row.name}": (lambda _, of, mesh=mesh: of[mesh], row) for row in MESH_ROWS}
+    for pair in settings[PAIRS]:
+        rows |= {name: (lambda wanted, _, pair=pair: wanted[PAIRS][pair], row) for row, name in pair_rows(pair)}
 
     def on_set(parameters: Iterable[Parameter]) -> SetParametersResult:
-        wanted, wanted_meshes = dict(settings), {name: dict(values) for name, values in meshes.items()}
+        wanted, wanted_meshes = copy.deepcopy((settings, meshes))
         ours = [parameter for parameter in parameters if parameter.name in rows]
         if not ours:
             return SetParametersResult(successful=True)
         for parameter in ours:
-            mesh, row = rows[parameter.name]
-            values = wanted if mesh is None else wanted_meshes[mesh]
+            part, row = rows[parameter.name]
+            values = part(wanted, wanted_meshes)
             value = normalise(row, parameter.value)
             if row.change == UNCONFIGURED and configured() and value != values[row.name]:
                 reason = f"{parameter.name}: read-only while the node is configured; deactivate and clean up first"

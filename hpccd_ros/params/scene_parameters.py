@@ -1,17 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the parameters say of the scene: meshes, pairs, where positions are placed."""
+"""What the parameters say of the scene: meshes, what is computed of them, where positions are placed."""
 
 from typing import Any
 
-from hpccd_core.options import ACCURACIES, FEATURES, OUTPUTS
-from hpccd_ros.base.quoting import listed, quoted, shortened
+from hpccd_core.options import FEATURES, OUTPUTS
+from hpccd_ros.base.quoting import quoted, shortened
 from hpccd_ros.detect.core import Options
 from hpccd_ros.detect.scene import SceneBuilder
-from hpccd_ros.detect.separation import NONE, Separation
+from hpccd_ros.detect.separation import NONE
 from hpccd_ros.frames.pipeline import FramePipeline
 from hpccd_ros.frames.rigid import Rigid
 from hpccd_ros.frames.types import AssemblyRules, MeshSettings
-from hpccd_ros.params.table import FARTHEST
+from hpccd_ros.middleware.topic_names import WHOLE
+from hpccd_ros.params import pair_parameters
 from hpccd_ros.params.values import ParameterError
 
 MeshValues = dict[str, dict[str, Any]]
@@ -20,14 +21,25 @@ MeshValues = dict[str, dict[str, Any]]
 def scene_builder(settings: dict[str, Any], meshes: MeshValues) -> SceneBuilder:
     """The scene without its topologies. Raises ParameterError: an unknown mesh, tier or kind in a pair."""
     return SceneBuilder(
-        mesh_settings(meshes), ignored_pairs(settings), pair_accuracies(settings), pair_features(settings)
+        mesh_settings(meshes),
+        pair_parameters.ignored_pairs(settings),
+        pair_parameters.pair_accuracies(settings),
+        pair_parameters.pair_features(settings),
     )
 
 
 def mesh_settings(meshes: MeshValues) -> tuple[MeshSettings, ...]:
     """In the order of parameter ``meshes``."""
     return tuple(
-        MeshSettings(name, of["static"], of["self_collision"], of["transform"], of["frame"], tuple(of["pose"]))
+        MeshSettings(
+            name,
+            of["static"],
+            of["self_collision"],
+            of["transform"],
+            of["frame"],
+            tuple(of["pose"]),
+            whole=of["input"] in WHOLE,
+        )
         for name, of in meshes.items()
     )
 
@@ -46,7 +58,7 @@ def frame_pipeline(settings: dict[str, Any], meshes: MeshValues, max_pending: in
 
 def detector_options(settings: dict[str, Any]) -> Options:
     """What the node's detector computes, and how."""
-    outputs, wanted = set(settings["outputs"]), separation(settings)
+    outputs, wanted = set(settings["outputs"]), pair_parameters.separation(settings)
     if settings["markers"]:
         outputs |= {"points", "normals"}
         if wanted != NONE:
@@ -73,78 +85,6 @@ def features(settings: dict[str, Any]) -> tuple[str, ...]:
     return tuple(name for name in FEATURES if name in settings["features"])
 
 
-def separation(settings: dict[str, Any]) -> Separation:
-    """Parameters ``minimum_separation`` and ``pair_separation``. Raises ParameterError."""
-    found: dict[frozenset[str], tuple[str, str, float]] = {}
-    for text in settings["pair_separation"]:
-        *names, number = text.split(":")
-        distance = _distance(number)
-        if len(names) != 2 or not set(names) <= set(settings["meshes"]) or distance is None:
-            raise ParameterError(
-                f"pair_separation: {quoted(text)} must be NAME:NAME:DISTANCE with meshes out of {_names(settings)} "
-                f"and a distance from 0 to {FARTHEST:g}"
-            )
-        entry = (*names, distance)
-        pair = frozenset(names)
-        if found.setdefault(pair, entry)[2] != distance:
-            other = ":".join(map(str, found[pair]))
-            raise ParameterError(f"pair_separation: {text!r} contradicts {other!r}; leave one out")
-    return Separation(settings["minimum_separation"], tuple(found.values()))
-
-
-def _distance(text: str) -> float | None:
-    try:
-        number = float(text)
-    except ValueError:
-        return None
-    return number if 0 <= number <= FARTHEST else None
-
-
-def ignored_pairs(settings: dict[str, Any]) -> tuple[tuple[str, str], ...]:
-    """Parameter ``ignored_pairs`` as pairs of mesh names. Raises ParameterError."""
-    pairs = []
-    for text in settings["ignored_pairs"]:
-        pair = tuple(text.split(":"))
-        if len(pair) != 2 or not set(pair) <= set(settings["meshes"]) or pair[0] == pair[1]:
-            raise ParameterError(
-                f"ignored_pairs: {quoted(text)} must be NAME:NAME with two different meshes out of "
-                f"{_names(settings)}"
-            )
-        pairs.append(pair)
-    return tuple(pairs)
-
-
-def pair_accuracies(settings: dict[str, Any]) -> tuple[tuple[str, str, str], ...]:
-    """Parameter ``pair_accuracy`` as (mesh name, mesh name, tier). Raises ParameterError."""
-    found: dict[frozenset[str], tuple[str, str, str]] = {}
-    for text in settings["pair_accuracy"]:
-        entry = tuple(text.split(":"))
-        if len(entry) != 3 or not set(entry[:2]) <= set(settings["meshes"]) or entry[2] not in ACCURACIES:
-            raise ParameterError(
-                f"pair_accuracy: {quoted(text)} must be NAME:NAME:TIER with meshes out of {_names(settings)} "
-                f"and a tier out of {', '.join(ACCURACIES)}"
-            )
-        pair = frozenset(entry[:2])
-        if found.setdefault(pair, entry)[2] != entry[2]:
-            raise ParameterError(f"pair_accuracy: {text!r} contradicts {':'.join(found[pair])!r}; leave one out")
-    return tuple(found.values())
-
-
-def pair_features(settings: dict[str, Any]) -> tuple[tuple[str, str, tuple[str, ...]], ...]:
-    """Parameter ``pair_features`` as (mesh name, mesh name, features); entries of one pair add up. Raises
-    ParameterError."""
-    found: dict[frozenset[str], tuple[str, str, set[str]]] = {}
-    for text in settings["pair_features"]:
-        *names, kind = text.split(":")
-        if len(names) != 2 or not set(names) <= set(settings["meshes"]) or kind not in FEATURES:
-            raise ParameterError(
-                f"pair_features: {quoted(text)} must be NAME:NAME:KIND with meshes out of {_names(settings)} "
-                f"and a kind out of {', '.join(FEATURES)}"
-            )
-        found.setdefault(frozenset(names), (*names, set()))[2].add(kind)
-    return tuple((a, b, tuple(name for name in FEATURES if name in kinds)) for a, b, kinds in found.values())
-
-
 def poses(meshes: MeshValues) -> dict[str, Rigid]:
     """``mesh.NAME.pose`` of each mesh. Raises ParameterError."""
     found = {}
@@ -158,11 +98,15 @@ def poses(meshes: MeshValues) -> dict[str, Rigid]:
 
 def check(settings: dict[str, Any], meshes: MeshValues) -> None:
     """What the values cannot tell one by one. Raises ParameterError."""
-    scene_builder(settings, meshes)
-    separation(settings)
+    pair_parameters.check(settings)
     features(settings)
     poses(meshes)
     for name, values in meshes.items():
+        if values["file"] and values["input"] in WHOLE:
+            raise ParameterError(
+                f"mesh.{name}.file: with mesh.{name}.input {values['input']} each message carries the triangles; leave "
+                "one of them out"
+            )
         if values["transform"] == "tf" and not settings["frame_id"]:
             raise ParameterError(f"mesh.{name}.transform: tf needs a frame to transform to; set parameter frame_id")
         if values["transform"] == "tf" and values["static"] and values["file"]:
@@ -176,7 +120,3 @@ def check(settings: dict[str, Any], meshes: MeshValues) -> None:
                 f"{quoted(settings['frame_id'])}; set "
                 f"mesh.{name}.transform to pose or tf, or the parameter frame_id"
             )
-
-
-def _names(settings: dict[str, Any]) -> str:
-    return listed(settings["meshes"]) or "(none)"

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from hpccd_core.options import ACCURACIES, BACKENDS, FEATURES, OUTPUTS, REPORTS
+from hpccd_ros.middleware.topic_names import POSITIONS
 
 # When a parameter may be changed.
 ALWAYS, UNCONFIGURED, NEVER = "always", "unconfigured", "never"
@@ -119,6 +120,14 @@ DETECTION_ROWS = (
         "bool",
         False,
         "Publish on distances the smallest distance of each pair of meshes at the end of each step",
+        change=ALWAYS,
+    ),
+    Row(
+        "pair_summaries",
+        "bool",
+        False,
+        "Publish on pairs, for each pair of meshes, how many contacts the step has, the time of the first, and the "
+        "smallest distance where `distances` is true",
         change=ALWAYS,
     ),
     Row(
@@ -240,9 +249,24 @@ SERVICE_ROWS = (
         span=(0.001, 86_400.0),
         change=ALWAYS,
     ),
+    Row(
+        "service_introspection",
+        "string",
+        "off",
+        "Publish the events of ~/detect on ~/detect/_service_event: who asked and was answered when, or also what",
+        choices=("off", "metadata", "contents"),
+        change=ALWAYS,
+    ),
 )
 
 OUTPUT_ROWS = (
+    Row(
+        "contacts_durability",
+        "string",
+        "volatile",
+        "QoS of contacts; transient_local also gives the last answers to subscribers that come later and ask for it",
+        choices=("volatile", "transient_local"),
+    ),
     Row("diagnostics_period", "float", 1.0, "Period of /diagnostics", unit="s", span=(0.05, 3600.0)),
     Row(
         "markers",
@@ -333,18 +357,39 @@ NODE_GROUPS = {
     "Detection": DETECTION_ROWS,
     "Input": INPUT_ROWS,
     "Service `~/detect`": SERVICE_ROWS,
-    "Diagnostics and markers": OUTPUT_ROWS,
+    "What is published": OUTPUT_ROWS,
     "Recording": RECORDING_ROWS,
 }
 NODE_ROWS = tuple(row for rows in NODE_GROUPS.values() for row in rows)
+
+# Of pairs of meshes: pairs.NAME.*, where NAME is any.
+PAIRS = "pairs"
+
+# None: not said; "" and [] say nothing either.
+PAIR_ROWS = (
+    Row("meshes", "string[]", [], "The two meshes of the pair; the same name twice: within it"),
+    Row("accuracy", "string", "", "Tier, instead of `accuracy`; empty: that one", choices=ACCURACIES),
+    Row(
+        "separation",
+        "float",
+        None,
+        "Contact from this distance on, instead of `minimum_separation`; not set: that one",
+        unit="unit of the vertices",
+        span=(0.0, FARTHEST),
+        change=ALWAYS,
+    ),
+    Row("features", "string[]", [], "What is tested, instead of `features`; empty: that", choices=FEATURES),
+    Row("ignored", "bool", None, "Never tested against each other; not set: what `ignored_pairs` says"),
+)
 
 MESH_ROWS = (
     Row(
         "input",
         "string",
         "vertices",
-        "Topic of the positions: meshes/NAME/vertices (MeshVertices) or meshes/NAME/points (PointCloud2)",
-        choices=("vertices", "points"),
+        "Topic of the positions: meshes/NAME/vertices (MeshVertices) or meshes/NAME/points (PointCloud2); of positions "
+        "and topology: meshes/NAME/shape (shape_msgs/Mesh) or meshes/NAME/marker (Marker of type TRIANGLE_LIST)",
+        choices=POSITIONS,
     ),
     Row("static", "bool", False, "Does not move: positions from the file or from one message"),
     Row("self_collision", "bool", True, "Test the mesh against itself"),

@@ -6,7 +6,7 @@ from typing import Any
 
 from hpccd_ros.base import quoting
 from hpccd_ros.middleware import topic_names
-from hpccd_ros.params.table import MESH_ROWS, NODE_ROWS, Row
+from hpccd_ros.params.table import MESH_ROWS, NODE_ROWS, PAIR_ROWS, PAIRS, Row
 
 
 class ParameterError(ValueError):
@@ -14,7 +14,9 @@ class ParameterError(ValueError):
 
 
 def unusable_value(row: Row, value: Any) -> str | None:
-    """Why ``value`` (of the right type) cannot be used, or None."""
+    """Why ``value`` (of the right type; None: not set) cannot be used, or None."""
+    if value is None:
+        return None
     if row.span is not None and not row.span[0] <= value <= row.span[1]:
         return f"{row.name}: {value} is outside {row.span[0]} .. {row.span[1]}"
     if row.least and 0 < value < row.least:
@@ -22,7 +24,7 @@ def unusable_value(row: Row, value: Any) -> str | None:
     entries = value if row.kind == "string[]" else [value]
     if row.choices:
         for entry in entries:
-            if entry not in row.choices:
+            if entry not in row.choices and entry != row.default:
                 return f"{row.name}: {quoting.quoted(entry)} is none of {', '.join(row.choices)}"
     return None
 
@@ -39,7 +41,14 @@ def normalise(row: Row, value: Any) -> Any:
     """Plain Python value. YAML and the command line cannot write an empty list of strings: [""] is one."""
     if row.kind == "string[]":
         return [entry for entry in value or [] if entry]
-    return list(value) if row.kind == "float[]" else value
+    if row.kind == "float[]":
+        return [float(entry) for entry in value]
+    return float(value) if row.kind == "float" and value is not None else value
+
+
+def expected(row: Row) -> str:
+    """Which type, with an example."""
+    return f"expected {row.kind}" + (f", e.g. {row.default!r}" if row.default is not None else "")
 
 
 def allowed(row: Row) -> str:
@@ -56,10 +65,15 @@ def allowed(row: Row) -> str:
 def checked(given: dict[str, Any]) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
     """(node settings, mesh name -> mesh settings) of the parameters ``given`` by full name, as a file has them.
 
-    None: not set. Raises ParameterError: wrong type, out of range, bad or repeated mesh name.
+    settings["pairs"]: name of a pair -> its settings. None: not set. Raises ParameterError: wrong type, out of range,
+    bad or repeated mesh name, unknown parameter of a pair.
     """
     settings = {row.name: _checked_value(row, row.name, given.get(row.name)) for row in NODE_ROWS}
     check_mesh_names(settings["meshes"])
+    settings[PAIRS] = {
+        pair: {row.name: _checked_value(row, name, given.get(name)) for row, name in pair_rows(pair)}
+        for pair in pair_names(given)
+    }
     of_mesh = {mesh: f"mesh.{mesh}." for mesh in settings["meshes"]}
     meshes = {
         mesh: {row.name: _checked_value(row, prefix + row.name, given.get(prefix + row.name)) for row in MESH_ROWS}
@@ -68,7 +82,7 @@ def checked(given: dict[str, Any]) -> tuple[dict[str, Any], dict[str, dict[str, 
     return settings, meshes
 
 
-_PLAIN = {"bool": bool, "int": int, "float": float, "string": str}
+_PLAIN = {"bool": (bool,), "int": (int,), "float": (float, int), "string": (str,)}
 
 
 def _checked_value(row: Row, name: str, value: Any) -> Any:
@@ -77,8 +91,8 @@ def _checked_value(row: Row, name: str, value: Any) -> Any:
     is_list = row.kind.endswith("[]") and isinstance(value, list)
     entries, kind = (value, row.kind[:-2]) if is_list else ([value], row.kind)
     # Not isinstance: True is an int.
-    if not all(type(entry) is _PLAIN.get(kind) for entry in entries):
-        raise ParameterError(f"{name}: {value!r} is of the wrong type; expected {row.kind}, e.g. {row.default!r}")
+    if not all(type(entry) in _PLAIN.get(kind, ()) for entry in entries):
+        raise ParameterError(f"{name}: {value!r} is of the wrong type; {expected(row)}")
     return usable(row, name, value)
 
 
@@ -94,6 +108,29 @@ def check_mesh_names(names: list[str]) -> None:
         raise ParameterError(f"meshes: names must differ, {quoting.repeated(names)} is there twice")
 
 
+def pair_names(given: Iterable[str]) -> list[str]:
+    """Each NAME of parameters pairs.NAME.* among the full names ``given``. Raises ParameterError for one that is none
+    of them."""
+    keys, found = [row.name for row in PAIR_ROWS], set()
+    for name in sorted(given):
+        first, _, rest = name.partition(".")
+        if first != PAIRS:
+            continue
+        pair, _, key = rest.partition(".")
+        if not pair or key not in keys:
+            raise ParameterError(
+                f"{quoting.shortened(name)}: no parameter of a pair of meshes; there are {PAIRS}.NAME.KEY with a NAME "
+                f"without dots and a KEY out of {', '.join(keys)}"
+            )
+        found.add(pair)
+    return sorted(found)
+
+
+def pair_rows(pair: str) -> list[tuple[Row, str]]:
+    """The parameters of a pair, with their full names."""
+    return [(row, f"{PAIRS}.{pair}.{row.name}") for row in PAIR_ROWS]
+
+
 # Of every node.
 _ROS_OWN = ("use_sim_time", "start_type_description_service")
 
@@ -101,4 +138,6 @@ _ROS_OWN = ("use_sim_time", "start_type_description_service")
 def unknown(given: Iterable[str], meshes: Iterable[str]) -> list[str]:
     """Those of the names ``given`` that a node of these meshes would not have."""
     rows = {row.name for row in NODE_ROWS} | {f"mesh.{mesh}.{row.name}" for mesh in meshes for row in MESH_ROWS}
-    return sorted(n for n in given if n not in rows and n not in _ROS_OWN and not n.startswith("qos_overrides."))
+    of_pairs = {name for pair in pair_names(given) for _, name in pair_rows(pair)}
+    known = rows | of_pairs | set(_ROS_OWN)
+    return sorted(n for n in given if n not in known and not n.startswith("qos_overrides."))

@@ -6,10 +6,26 @@ import dataclasses
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 
 from hpccd_ros.middleware import qos, qos_overrides, topic_names, transform_topics
-from hpccd_ros.middleware.message_types import CONTACTS, DISTANCES, POINTS, TOPOLOGY, VERTICES
+from hpccd_ros.middleware.message_types import (
+    CONTACTS,
+    DISTANCES,
+    MARKER,
+    PAIRS,
+    POINTS,
+    SHAPE,
+    TOPOLOGY,
+    VERTICES,
+)
 
+# Last part of a mesh's topic -> type of its positions.
+POSITIONS = {
+    topic_names.VERTICES: VERTICES,
+    topic_names.POINTS: POINTS,
+    topic_names.SHAPE: SHAPE,
+    topic_names.MARKER: MARKER,
+}
 # Relative name -> type of what the node computes.
-ANSWERS = {topic_names.CONTACTS: CONTACTS, topic_names.DISTANCES: DISTANCES}
+ANSWERS = {topic_names.CONTACTS: CONTACTS, topic_names.DISTANCES: DISTANCES, topic_names.PAIRS: PAIRS}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -32,19 +48,16 @@ def of_node(parameters: dict) -> list[Wanted]:
         static = qos.TRANSFORMS_STATIC.depth
         wanted += [Wanted(t.name, t.type_name, static * t.static) for t in transform_topics.understood()]
     for mesh in meshes:
-        clouds = parameters.get(f"mesh.{mesh}.input") == "points"
         wanted.append(Wanted(topic_names.topology(mesh), TOPOLOGY, latched=1))
-        if clouds:
-            wanted.append(Wanted(topic_names.points(mesh), POINTS))
-        else:
-            wanted.append(Wanted(topic_names.vertices(mesh), VERTICES))
-    # Distances whether they are asked for now or not: they may be at any time.
+        kind = parameters.get(f"mesh.{mesh}.input") or topic_names.VERTICES
+        wanted.append(Wanted(topic_names.of_mesh(mesh, kind), POSITIONS[kind]))
+    # Distances and summaries whether they are asked for now or not: they may be at any time.
     return [*wanted, *(Wanted(name, type_name) for name, type_name in ANSWERS.items())]
 
 
 def types_by_role(meshes) -> dict[str, str]:
     """Relative name -> type of all topics from which a node of these meshes can be computed again."""
-    of_mesh = {topic_names.TOPOLOGY: TOPOLOGY, topic_names.VERTICES: VERTICES, topic_names.POINTS: POINTS}
+    of_mesh = {topic_names.TOPOLOGY: TOPOLOGY, **POSITIONS}
     return {
         **{topic_names.of_mesh(mesh, kind): type_name for mesh in meshes for kind, type_name in of_mesh.items()},
         **{topic.name: topic.type_name for topic in transform_topics.ALL.values()},
@@ -67,7 +80,7 @@ def as_node_asks(node, name: str, topic: Wanted, depth: int, *, recorded, vertic
     """For the own recording of the node `recorded`. vertices: what it asks of them; the others are reliable, unless
     parameters of the node (qos_overrides) say otherwise.
     """
-    default = vertices if topic.type_name in (VERTICES, POINTS) else ReliabilityPolicy.RELIABLE
+    default = vertices if topic.type_name in POSITIONS.values() else ReliabilityPolicy.RELIABLE
     entity = "publisher" if topic.type_name in ANSWERS.values() else "subscription"
     asked = qos_overrides.reliability(recorded, entity, name, default)
     return _profile(asked == ReliabilityPolicy.RELIABLE, topic, depth)

@@ -3,12 +3,13 @@
 
 from collections import OrderedDict
 
-from hpccd_ros.bag.decode import make_decoder
+from hpccd_ros.bag.decode import make_completer, make_decoder
 from hpccd_ros.frames.drops import Input, RefusalCounter
 from hpccd_ros.frames.outcome import Outcome
 from hpccd_ros.frames.sequence import SequenceWatch
 from hpccd_ros.frames.types import SceneFrame
-from hpccd_ros.middleware import mesh_inputs, transform_topics
+from hpccd_ros.frames.welding import Welding
+from hpccd_ros.middleware import mesh_inputs, topic_names, transform_topics
 from hpccd_ros.middleware.fields import InvalidMessageError
 from hpccd_ros.params import scene_parameters
 from hpccd_ros.replay.recorded_setup import ReplaySetup
@@ -27,8 +28,13 @@ class FrameSource:
     def __init__(self, setup: ReplaySetup, topics):
         self._setup = setup
         self.refused = {what: RefusalCounter() for what in Input}
-        self._decoders = {name: make_decoder(topics[name]) for name in setup.roles if name in topics}
+        self._decoders = {
+            name: make_completer(topics[name]) if kind in topic_names.WHOLE else make_decoder(topics[name])
+            for name, (_, kind) in setup.roles.items()
+            if name in topics
+        }
         self._watches = {name: SequenceWatch() for name in setup.roles}
+        self._weldings = {name: Welding() for name in setup.roles}
         # Messages of several topics may have reached the recorder in another order than the node.
         pending = 4 * setup.settings["pending_frames"]
         self._pipeline = scene_parameters.frame_pipeline(setup.settings, setup.meshes, pending)
@@ -46,16 +52,19 @@ class FrameSource:
         if kind in transform_topics.ALL:
             outcome = self._push_transforms(decoded, transform_topics.ALL[kind])
         else:
-            outcome = self._push_mesh(mesh, kind, decoded, self._watches[message.topic], message.sequence)
+            outcome = self._push_mesh(mesh, kind, decoded, message)
         for refusal in outcome.refusals:
             self.refused[refusal.what].count(refusal)
         return outcome.frames
 
-    def _push_mesh(self, mesh, kind, decoded, watch, sequence) -> Outcome:
+    def _push_mesh(self, mesh, kind, decoded, message) -> Outcome:
+        watch = self._watches[message.topic]
         # Sequence 0: the recorder was not told the publisher's numbers.
-        new_publisher = bool(sequence) and watch.next(sequence)[1]
+        new_publisher = bool(message.sequence) and watch.next(message.sequence)[1]
         try:
-            checked = mesh_inputs.read(kind, decoded, self._setup.settings)
+            checked = mesh_inputs.read(
+                kind, decoded, self._setup.settings, sent=message.publish_time, welding=self._weldings[message.topic]
+            )
         except InvalidMessageError as error:
             return Outcome(refusals=[error.refusal(mesh, mesh_inputs.INPUTS[kind])])
         if kind != "topology":

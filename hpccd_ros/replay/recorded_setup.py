@@ -13,7 +13,7 @@ from hpccd_ros.detect.scene import SceneBuilder
 from hpccd_ros.frames.mesh_file import FORMATS, MeshFileError, load_mesh, mesh_of_file
 from hpccd_ros.frames.types import MeshFrame, Topology
 from hpccd_ros.middleware import topic_names, transform_topics
-from hpccd_ros.params import scene_parameters, values
+from hpccd_ros.params import pair_parameters, scene_parameters, values
 from hpccd_ros.params.parameter_file import read_parameters
 from hpccd_ros.params.values import ParameterError
 from hpccd_ros.record import recorded_topics
@@ -26,7 +26,7 @@ class ReplaySetup:
 
     settings: dict
     meshes: dict[str, dict]
-    # Topic name -> (mesh, "topology" | "vertices" | "points"), or ("", name in transform_topics.ALL).
+    # Topic name -> (mesh, "topology" or one of topic_names.POSITIONS), or ("", name in transform_topics.ALL).
     roles: dict[str, tuple[str, str]]
     contacts: str | None  # topic name; None: the recording has none
     distances: str | None  # as well
@@ -41,7 +41,7 @@ class ReplaySetup:
         """Detector options of the recorded node, but for what may differ without a change of the result."""
         return Options(
             accuracy or self.settings["accuracy"], backend, threads, self.settings["report"],
-            separation=scene_parameters.separation(self.settings), features=scene_parameters.features(self.settings),
+            separation=pair_parameters.separation(self.settings), features=scene_parameters.features(self.settings),
         )  # fmt: skip
 
 
@@ -70,7 +70,7 @@ def of_recording(recording: Recording, parameter_file: str | None = None) -> Rep
     by_role = _by_role(recording, info, recorded_topics.types_by_role(meshes))
     roles = {topic: ("", role) if role in transform_topics.ALL else tuple(role.split("/")[1:])
              for role, topic in by_role.items() if role not in recorded_topics.ANSWERS}  # fmt: skip
-    if not any(kind in ("vertices", "points") for _, kind in roles.values()):
+    if not any(kind in topic_names.POSITIONS for _, kind in roles.values()):
         raise RecordingError(
             f"{recording.path} holds no vertices of the meshes {', '.join(meshes)}; its topics are "
             f"{', '.join(recording.topics) or 'none'}"

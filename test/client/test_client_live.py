@@ -18,6 +18,7 @@ from hpccd_ros import client
 FOLDER = Path(__file__).resolve().parent
 PUBLISHER = FOLDER / "ten_line_publisher.py"
 SUBSCRIBER = FOLDER / "ten_line_subscriber.py"
+MARKER = FOLDER / "ten_line_marker.py"
 REQUEST = FOLDER / "ten_line_request.py"
 LINE_SEARCH = FOLDER / "ten_line_line_search.py"
 FACES = np.array([[0, 1, 2], [3, 4, 5]])
@@ -84,6 +85,15 @@ def test_the_programs_of_the_documentation(start, start_node):
     assert publisher.wait(PATIENCE) == 0, said.read_text()
 
 
+def test_the_marker_of_the_documentation(start, start_node):
+    node = start_node({"meshes": ["cloth"], "mesh": {"cloth": {"input": "marker"}}})
+    publisher, said = start(MARKER, node.namespace)
+    assert publisher.wait(PATIENCE) == 0, said.read_text()
+    assert said.read_text() == "4 [[0, 1, 2], [1, 3, 2]]\n"
+    touching = node.wait_until(lambda: [m for m in node.peer.received if m.total], "contacts")
+    assert list(touching[0].mesh_names) == ["cloth"] and touching[0].header.frame_id == "world"
+
+
 def test_the_request_of_the_documentation(start, start_node):
     node = start_node({"meshes": ["cloth"]})
     request, said = start(REQUEST, node.namespace)
@@ -105,7 +115,7 @@ def test_the_documentation_shows_programs_that_are_run_here():
     """Each whole program in README and docs that uses the client is one of those above, to the letter."""
     pages = [ROOT / "README.md", *(ROOT / "docs").rglob("*.md")]
     blocks = [block for page in pages for block in re.findall(r"```python\n(.*?)```", page.read_text(), re.DOTALL)]
-    run = [statements(program.read_text()) for program in (PUBLISHER, SUBSCRIBER, REQUEST, LINE_SEARCH)]
+    run = [statements(program.read_text()) for program in (PUBLISHER, SUBSCRIBER, MARKER, REQUEST, LINE_SEARCH)]
     for block in blocks:
         if "client.prepare_environment()" in block:
             assert statements(block) in run, f"the tests run no such program:\n{block}"

@@ -54,6 +54,7 @@ def test_the_policy_allows_all_that_the_node_does(start_node):
             "frame_id": "world",
             "markers": True,
             "use_sim_time": True,
+            "service_introspection": "metadata",
             "mesh": {"net": {"input": "points", "transform": "tf"}},
         }
     )
@@ -76,7 +77,7 @@ def test_the_policy_allows_all_that_the_node_does(start_node):
         assert len(names) > 5
         for name in names:
             assert any(re.fullmatch(rule.replace("*", "[^/]+"), name) for rule in allowed), name
-    assert {"rt/contacts", "rt/markers", "rr/hpccd/detectReply"} <= published
+    assert {"rt/contacts", "rt/markers", "rr/hpccd/detectReply", "rt/hpccd/detect/_service_event"} <= published
     assert {"rt/meshes/net/points", "rt/clock", "rt/transforms"} <= subscribed
 
 

@@ -93,7 +93,7 @@ def test_given_at_the_start_and_changed_from_step_to_step(start_node):
         ("minimum_separation", "wide", "type"),
         ("pair_separation", ["cloth:wall:0.1"], "pair_separation: 'cloth:wall:0.1' must be NAME:NAME:DISTANCE with"),
         ("pair_separation", ["cloth:net:-1"], "a distance from 0 to 1e+150"),
-        ("pair_separation", ["cloth:net:1", "net:cloth:2"], "contradicts 'cloth:net:1.0'"),
+        ("pair_separation", ["cloth:net:1", "net:cloth:2"], "contradicts 'cloth:net:1'"),
     ],
 )
 def test_bad_values_are_refused_with_a_reason(shared_stream, name, value, reason):

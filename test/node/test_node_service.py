@@ -300,7 +300,8 @@ def service():
     executor = SingleThreadedExecutor(context=context)
     executor.add_node(node)
     settings = {"detect_jobs": 1, "detect_waiting": 1, "detect_time_limit": PATIENCE, "max_meshes": 4,
-                "max_vertices": 1000, "max_faces": 1000, "max_edges": 1000, "max_contacts": 0}  # fmt: skip
+                "max_vertices": 1000, "max_faces": 1000, "max_edges": 1000, "max_contacts": 0,
+                "service_introspection": "off"}  # fmt: skip
     errors = node.errors = Errors(lambda text: None)
     configuration = SimpleNamespace(settings=settings, options=Options())
     service = DetectService(node, configuration, lambda: NodeScene(SceneBuilder(()), {}), Accounts(print))

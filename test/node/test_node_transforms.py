@@ -4,7 +4,9 @@
 import numpy as np
 import pytest
 from geometry_msgs.msg import TransformStamped
+from lifecycle_msgs.msg import Transition
 from mesh_in_a_hand import FACES, HAND, SCENE, SECOND, parts, topologies, transform
+from node_calls import change_state, set_parameter
 from node_process import assert_same_contacts
 from waving_sheet import scene_of
 
@@ -36,6 +38,27 @@ def test_pose_of_a_stream(start_node):
     node.peer.vertices("net", parts(2)[2], 2 * SECOND, frame_id="foot")
     values = node.frames_status(dropped__net__frame_id=1)
     assert "mesh.net.frame demands 'hand'" in values["last_refusal"]
+
+
+def test_pose_of_integers(start_node):
+    """As YAML gives numbers without a point, at the start and at run time."""
+    net = {"transform": "pose", "pose": [0, 0, 1, 0, 0, 0, 1], "frame": "hand"}
+    node = start_node({**SCENE, "mesh": {"net": net}, "minimum_separation": 0, "autostart": False}, wait=False)
+    assert set_parameter(node, "mesh.net.pose", [1, 0, 0, 0, 0, 0, 1]).successful
+    assert set_parameter(node, "minimum_separation", 1).successful
+    assert set_parameter(node, "minimum_separation", 0).successful
+    refused = set_parameter(node, "minimum_separation", -1)
+    assert not refused.successful and "range" in refused.reason
+    refused = set_parameter(node, "mesh.net.pose", [1, 0, 0, 0, 0, 0, 0])
+    assert not refused.successful and "mesh.net.pose: [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]" in refused.reason
+    refused = set_parameter(node, "threads", 1.0)
+    assert not refused.successful and "Wrong parameter type" in refused.reason
+    assert change_state(node, Transition.TRANSITION_CONFIGURE) and change_state(node, Transition.TRANSITION_ACTIVATE)
+    topologies(node)
+    for k in range(2):
+        send(node, k, "hand")
+        node.frames_status(answered=2 * k + 2)
+    check(node.contacts(1)[0], 1, Rigid.of((1, 0, 0), (0, 0, 0, 1)))
 
 
 def through_topics(node, publish, publish_static, k):

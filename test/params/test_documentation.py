@@ -4,14 +4,15 @@
 from pathlib import Path
 
 from hpccd_ros.params import documentation
-from hpccd_ros.params.table import MESH_ROWS, NODE_ROWS
+from hpccd_ros.params.table import MESH_ROWS, NODE_ROWS, PAIR_ROWS
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "parameters.md"
 
 
 def test_page_names_every_parameter_once():
     page = documentation.page()
-    for name in [row.name for row in NODE_ROWS] + [f"mesh.NAME.{row.name}" for row in MESH_ROWS]:
+    of_parts = [f"mesh.NAME.{row.name}" for row in MESH_ROWS] + [f"pairs.NAME.{row.name}" for row in PAIR_ROWS]
+    for name in [row.name for row in NODE_ROWS] + of_parts:
         assert page.count(f"\n| `{name}` |") == 1, name
 
 

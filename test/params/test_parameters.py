@@ -10,7 +10,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from hpccd_ros.params import parameters, scene_parameters, values
-from hpccd_ros.params.table import MESH_ROWS, NEVER, NODE_ROWS
+from hpccd_ros.params.table import MESH_ROWS, NEVER, NODE_ROWS, PAIR_ROWS
 from hpccd_ros.params.values import ParameterError
 
 CONFIG = Path(__file__).resolve().parents[2] / "config"
@@ -34,7 +34,7 @@ def node_with():
     rclpy.shutdown(context=context)
 
 
-@pytest.mark.parametrize("row", [*NODE_ROWS, *MESH_ROWS], ids=lambda row: row.name)
+@pytest.mark.parametrize("row", [*NODE_ROWS, *MESH_ROWS, *PAIR_ROWS], ids=lambda row: row.name)
 def test_each_row_is_sound(row):
     assert values.unusable_value(row, row.default) is None
     assert row.text and not row.text.endswith(".")
@@ -50,7 +50,7 @@ def test_each_row_is_sound(row):
 
 def test_defaults(node_with):
     settings, meshes = parameters.declare(node_with())
-    assert settings == {row.name: row.default for row in NODE_ROWS}
+    assert settings == {row.name: row.default for row in NODE_ROWS} | {"pairs": {}}
     assert meshes == {}
 
 
@@ -93,7 +93,11 @@ def test_overrides_reach_the_settings(node_with):
         ({"record_split_size": 1e-6}, "record_split_size: 1e-06 is neither 0 nor at least 0.01"),
         ({"record_split_time": 1e-9}, "record_split_time: 1e-09 is neither 0 nor at least 0.1"),
         ({"threads": "many"}, "threads"),
-        ({"stamp_tolerance": 1}, "stamp_tolerance"),
+        ({"stamp_tolerance": True}, "stamp_tolerance"),
+        ({"stamp_tolerance": -1}, "stamp_tolerance"),
+        ({"stamp_tolerance": [1]}, "stamp_tolerance"),
+        ({"meshes": ["a"], "mesh__a__pose": ["0", "1"]}, "mesh.a.pose: "),
+        ({"meshes": ["a"], "mesh__a__pose": 1}, "mesh.a.pose: "),
         ({"meshes": ["a"], "mesh__a__input": "clouds"}, "mesh.a.input: 'clouds' is none of vertices, points"),
     ],
 )
@@ -101,6 +105,20 @@ def test_bad_values_are_named(node_with, overrides, text):
     with pytest.raises(ParameterError) as caught:
         scene_parameters.check(*parameters.declare(node_with(**overrides)))
     assert text in str(caught.value)
+
+
+def test_integers_are_floats_where_floats_are_wanted(node_with):
+    node = node_with(meshes=["a"], mesh__a__pose=[0, 0, 1, 0, 0, 0, 1], stamp_tolerance=2, minimum_separation=0)
+    settings, meshes = parameters.declare(node)
+    scene_parameters.check(settings, meshes)
+    assert meshes["a"]["pose"] == [0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]
+    assert all(type(entry) is float for entry in meshes["a"]["pose"])
+    assert (settings["stamp_tolerance"], type(settings["stamp_tolerance"])) == (2.0, float)
+    assert node.get_parameter("mesh.a.pose").type_ == Parameter.Type.DOUBLE_ARRAY
+    assert node.get_parameter("minimum_separation").type_ == Parameter.Type.DOUBLE
+    of_file = values.checked({"meshes": ["a"], "mesh.a.pose": [0, 0, 1, 0.5, 0, 0, 1], "max_rate": 5})
+    assert of_file[1]["a"]["pose"] == [0.0, 0.0, 1.0, 0.5, 0.0, 0.0, 1.0]
+    assert type(of_file[0]["max_rate"]) is float
 
 
 def test_unknown_parameters_are_noticed(node_with):

@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A step in brief: contacts and smallest distance of each pair of meshes. No ROS."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from hpccd_ros.detect.step_detector import Detection
+
+
+@dataclass(frozen=True)
+class PairSummary:
+    """``count`` contacts, the first at ``first_toc`` (+inf: none); ``distance`` at the step's end, NaN: unknown."""
+
+    mesh_a: str
+    mesh_b: str
+    count: int
+    first_toc: float
+    distance: float
+
+
+def summarise(found: Detection, pairs: Sequence[tuple[str, str]]) -> list[PairSummary]:
+    """One for each of ``pairs``, of all contacts that were found."""
+    names = found.layout.mesh_names
+    counts, earliest = _by_pair(found)
+    index = {name: number for number, name in enumerate(names)}
+    distances = {frozenset((gap.mesh_a, gap.mesh_b)): gap.distance for gap in found.gaps or ()}
+    return [
+        PairSummary(
+            a,
+            b,
+            int(counts[index[a], index[b]]),
+            float(earliest[index[a], index[b]]),
+            float(distances.get(frozenset((a, b)), math.nan)),
+        )
+        for a, b in pairs
+    ]
+
+
+def _by_pair(found: Detection) -> tuple[np.ndarray, np.ndarray]:
+    """(K, K): how many contacts of the meshes i <= j there are, and the earliest time of them."""
+    contacts, vertices, faces = found.contacts, found.layout.vertex_offsets, found.layout.face_offsets
+    meshes = len(found.layout.mesh_names)
+    counts, earliest = np.zeros(meshes * meshes, np.int64), np.full(meshes * meshes, math.inf)
+    for first, second, offsets, toc in (
+        (contacts.vf[:, 0], contacts.vf[:, 1], faces, contacts.vf_toc),
+        (contacts.ee[:, 0], contacts.ee[:, 2], vertices, contacts.ee_toc),
+    ):
+        a, b = _mesh_of(first, vertices), _mesh_of(second, offsets)
+        pair = np.minimum(a, b) * meshes + np.maximum(a, b)
+        counts += np.bincount(pair, minlength=meshes * meshes)
+        np.minimum.at(earliest, pair, toc)
+    return counts.reshape(meshes, meshes), earliest.reshape(meshes, meshes)
+
+
+def _mesh_of(indices: np.ndarray, offsets: np.ndarray) -> np.ndarray:
+    return np.searchsorted(offsets, indices, side="right") - 1

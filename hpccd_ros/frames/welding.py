@@ -1,0 +1,39 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Corners of loose triangles that lie at one place become one vertex. No ROS."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+def weld(points: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """(first, vertex_of): of each vertex the first of the (n,3) ``points`` that is it, and of each point its vertex.
+
+    Points are one vertex where they are equal number for number; vertices are in the order of their first points.
+    """
+    # + 0.0 makes -0.0 equal to 0.0 in the comparison.
+    _, first, inverse = np.unique(points + 0.0, axis=0, return_index=True, return_inverse=True)
+    order = np.argsort(first)
+    rank = np.empty_like(order)
+    rank[order] = np.arange(len(order))
+    return first[order], rank[inverse.reshape(-1)]
+
+
+class Welding:
+    """Of a stream of the same triangles: found in the first frame, and kept while what it joins stays together.
+
+    Vertices that only meet later stay two: a mesh that touches itself keeps its topology, and its contact is found.
+    """
+
+    def __init__(self) -> None:
+        self._first = np.empty(0, np.intp)
+        self._vertex_of = np.empty(0, np.intp)
+        self._faces = np.empty((0, 3), np.uint32)
+
+    def vertices_and_faces(self, points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.uint32]]:
+        """points: (3 F, 3), finite, the corners of F triangles. The faces are the same array as long as they hold."""
+        vertices = points[self._first] if len(points) == len(self._vertex_of) else None
+        if vertices is None or not np.array_equal(vertices[self._vertex_of], points):
+            self._first, self._vertex_of = weld(points)
+            self._faces = self._vertex_of.astype(np.uint32).reshape(-1, 3)
+            vertices = points[self._first]
+        return vertices, self._faces
