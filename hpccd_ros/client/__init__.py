@@ -15,13 +15,17 @@ from hpccd_ros.client.contacts import ContactArrays, contacts_from_message, scen
 from hpccd_ros.client.distances import DistanceArrays, distances_from_message
 from hpccd_ros.client.meshes import topology_from_message, topology_message, vertices_from_message, vertices_message
 from hpccd_ros.client.steps import collision_free_step_from_response, collision_free_step_request
+from hpccd_ros.client.stop import StopListener
 from hpccd_ros.client.topics import (
     CONTACTS_QOS,
     CONTACTS_TOPIC,
     DISTANCES_QOS,
     DISTANCES_TOPIC,
+    STOP_TIMEOUT,
+    STOP_TOPIC,
     TOPOLOGY_QOS,
     VERTICES_QOS,
+    stop_qos,
     topology_topic,
     vertices_topic,
 )
@@ -38,7 +42,10 @@ __all__ = [
     "DISTANCES_TOPIC",
     "DistanceArrays",
     "Layout",
+    "STOP_TIMEOUT",
+    "STOP_TOPIC",
     "SceneContacts",
+    "StopListener",
     "TOPOLOGY_QOS",
     "Topology",
     "VERTICES_QOS",
@@ -48,6 +55,7 @@ __all__ = [
     "distances_from_message",
     "prepare_environment",
     "scene_contacts",
+    "stop_qos",
     "topology_from_message",
     "topology_message",
     "topology_topic",

@@ -93,6 +93,12 @@ class StepDetector:
         self.prepare_detector()
         return self._detector.distances(self._builder.concatenate(frame, frame))
 
+    def intersect(self, frame: SceneFrame) -> bool:
+        """Whether an edge pierces or touches a face in ``frame``. Raises what the core raises."""
+        self.prepare_scene(frame)
+        self.prepare_detector()
+        return len(self._detector.intersections(self._builder.concatenate(frame, frame))) > 0
+
     def detect(self, start: SceneFrame, end: SceneFrame) -> Detection:
         """The contacts on the way from ``start`` to ``end``, of the same scene. Raises what the core raises."""
         self.prepare_scene(end)

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The quality of service of every topic, in one place."""
 
-from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.duration import Duration
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, LivelinessPolicy, QoSProfile, ReliabilityPolicy
 
 
 def keep_last(depth: int, *, reliable: bool = True, latched: bool = False) -> QoSProfile:
@@ -32,6 +33,20 @@ TRANSFORMS_STATIC = keep_last(100, latched=True)
 
 # A viewer wants the newest only.
 MARKERS = keep_last(1)
+
+
+def stop(timeout: float, depth: int = 1) -> QoSProfile:
+    """Of the topic stop: the reader hears of it where nothing came for `timeout` s. Writer and reader may differ: a
+    reader that asks for a shorter one than the writer offers is not served at all.
+
+    Liveliness by topic: it says that the thread which publishes goes on. An automatic one would be kept up by threads
+    of the middleware while that thread is stuck.
+    """
+    profile = keep_last(depth, latched=True)
+    profile.deadline = Duration(seconds=timeout)
+    profile.liveliness = LivelinessPolicy.MANUAL_BY_TOPIC
+    profile.liveliness_lease_duration = Duration(seconds=timeout)
+    return profile
 
 
 def vertices(reliability: str, depth: int) -> QoSProfile:

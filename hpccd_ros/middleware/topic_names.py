@@ -14,10 +14,11 @@ if TYPE_CHECKING:  # writers of files need the names and no ROS
 
 CONTACTS = "contacts"
 DISTANCES = "distances"
+STOP = "stop"
 MARKERS = "markers"
 SURFACE = "surface"
 DIAGNOSTICS = "/diagnostics"
-PUBLISHED = (CONTACTS, DISTANCES, MARKERS, SURFACE, DIAGNOSTICS)
+PUBLISHED = (CONTACTS, DISTANCES, STOP, MARKERS, SURFACE, DIAGNOSTICS)
 
 TRANSFORMS = "transforms"
 TRANSFORMS_STATIC = "transforms_static"
