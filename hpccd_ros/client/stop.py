@@ -82,7 +82,7 @@ class StopListener:
 
     def close(self) -> None:
         """Hear no more: ``stop`` is true from now on."""
-        self._lose("The listener was closed.")
+        self._lose("the listener was closed")
         self._node.destroy_timer(self._timer)
         self._node.destroy_subscription(self._subscription)
 
@@ -90,7 +90,7 @@ class StopListener:
         now = time.monotonic()
         with self._lock:
             if self._heard is None:
-                return f"{self._lost.rstrip('.')}."
+                return f"{self._lost[0].upper()}{self._lost[1:]}."
             if now - self._heard >= self._timeout:
                 return f"Nothing was heard on {self._topic} for {now - self._heard:.3g} s."
             if self._alive is not None and self._alive < self._publishers:

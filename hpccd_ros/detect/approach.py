@@ -23,9 +23,7 @@ def directions(gaps: Sequence[hc.Gap]) -> NDArray[np.float64]:
     return found
 
 
-def approach_speeds(
-    before: Sequence[hc.Gap] | None, now: Sequence[hc.Gap], seconds: float
-) -> NDArray[np.float64]:
+def approach_speeds(before: Sequence[hc.Gap] | None, now: Sequence[hc.Gap], seconds: float) -> NDArray[np.float64]:
     """(P,): how much smaller the distances have become in a second; > 0: nearing. NaN where it is not known.
 
     before: of the same pairs of meshes, so many ``seconds`` ago; None: not known.

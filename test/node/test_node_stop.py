@@ -1,100 +1,28 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The topic stop of a node as a process: true where meshes come near, and wherever that is not known to be otherwise."""
+"""The topic stop of a node as a process: true where meshes come near, and where nobody knows."""
 
+import contextlib
 import math
 import signal
-import threading
 import time
 
-import hand_and_table
 import numpy as np
 import pytest
+import stop_stream
 from hand_and_table import FACES, MESHES, TABLE, hand
 from lifecycle_msgs.msg import Transition
 from node_calls import change_state, set_parameter
-from rclpy.executors import SingleThreadedExecutor
-from std_msgs.msg import Bool
-
-from hpccd_ros import client
-
-NEAR = 0.25
-TIMEOUT = 5.0  # s: above what a busy machine makes of a frame
-SHORT = 0.5
-
-
-class Stream:
-    """Frames of the hand above the table, and all that was said on stop, heard in a thread of its own."""
-
-    def __init__(self, node, timeout=TIMEOUT):
-        self.node, self.sent = node, 0
-        self.heard: list[tuple[float, bool]] = []
-        self._node = _node_beside(node)
-        self._node.create_subscription(
-            Bool, client.STOP_TOPIC, lambda m: self.heard.append((time.monotonic(), m.data)), client.stop_qos(timeout)
-        )
-        self.listener = client.StopListener(self._node, stop_timeout=timeout)
-        self._executor = SingleThreadedExecutor(context=node.peer.context)
-        self._executor.add_node(self._node)
-        self._ended = threading.Event()
-        self._thread = threading.Thread(target=self._spin)
-        self._thread.start()
-
-    def _spin(self):
-        while not self._ended.is_set():
-            self._executor.spin_once(timeout_sec=0.05)
-
-    def close(self):
-        self._ended.set()
-        self._thread.join()
-        self._executor.shutdown()
-        self._node.destroy_node()
-
-    def topologies(self, **options):
-        for name in MESHES:
-            self.node.peer.topology(name, FACES, 3, **options)
-
-    def frame(self, height, **fields):
-        """Send it. height: of the hand, or its positions."""
-        hands = hand(height) if np.ndim(height) == 0 else height
-        self.sent += 1  # its stamp, ns
-        for name, positions in zip(MESHES, (hands, TABLE), strict=True):
-            self.node.peer.vertices(name, positions, stamp=self.sent, **fields)
-
-    def answered(self, count=None):
-        self.node.frames_status(answered=2 * (count or self.sent))
-
-    def expect(self, stop):
-        """Wait until it is said."""
-        self.node.wait_until(lambda: self.heard and self.heard[-1][1] == stop, f"stop {stop}")
-
-    def status(self, cause, text=""):
-        """Wait until the diagnostics tell this cause; their values."""
-
-        def told():
-            level, message, values = self.node.peer.statuses.get("stop", (b"", "", {}))
-            return values if values.get("cause") == cause and text in message else None
-
-        return self.node.wait_until(told, f"cause {cause!r} with {text!r}")
-
-
-def _node_beside(node):
-    from rclpy.node import Node
-
-    return Node("watcher", namespace=node.namespace, context=node.peer.context)
+from stop_stream import NEAR, SHORT, TIMEOUT
 
 
 @pytest.fixture
 def start_stream(start_node):
-    streams = []
+    with contextlib.ExitStack() as stack:
 
-    def start(timeout=TIMEOUT, **parameters):
-        given = {"meshes": list(MESHES), "stop_distance": NEAR, "stop_timeout": timeout, **parameters}
-        streams.append(Stream(start_node(given), timeout))
-        return streams[-1]
+        def start(timeout=TIMEOUT, **parameters):
+            return stack.enter_context(stop_stream.started(start_node, timeout, **parameters))
 
-    yield start
-    for stream in streams:
-        stream.close()
+        yield start
 
 
 def test_true_while_anything_is_near(start_stream):
@@ -163,10 +91,7 @@ def test_an_edge_in_the_middle_of_a_face_stays_near(start_stream):
 @pytest.mark.parametrize("what", ["not finite", "count", "backward", "topology"])
 def test_what_is_refused_is_true_until_the_next_answer(start_stream, what):
     stream = start_stream()
-    stream.topologies()
-    for height in (2.0, 1.0):
-        stream.frame(height)
-    stream.expect(False)
+    stream.start()
     if what == "topology":
         stream.node.peer.topology("hand", FACES[:, ::-1], 3)
     else:
@@ -182,10 +107,7 @@ def test_what_is_refused_is_true_until_the_next_answer(start_stream, what):
 
 def test_a_new_topology_is_true_until_a_step_with_it(start_stream):
     stream = start_stream()
-    stream.topologies()
-    for height in (2.0, 1.0):
-        stream.frame(height)
-    stream.expect(False)
+    stream.start()
     stream.topologies(version=1)
     stream.frame(1.0, topology_version=1)
     stream.expect(True)
@@ -197,17 +119,8 @@ def test_a_new_topology_is_true_until_a_step_with_it(start_stream):
 def test_dead_input_is_true(start_stream):
     stream = start_stream(SHORT)
     stream.topologies()
-    stop = threading.Event()
-
-    def send():
-        while not stop.wait(0.05):
-            stream.frame(2.0)
-
-    sender = threading.Thread(target=send)
-    sender.start()
-    stream.expect(False)
-    stop.set()
-    sender.join()
+    with stream.steady():
+        stream.expect(False)
     died = time.monotonic()
     stream.expect(True)
     rose = next(at for at, said in reversed(stream.heard) if at > died and said)
@@ -217,10 +130,7 @@ def test_dead_input_is_true(start_stream):
 
 def test_the_distance_may_change_and_not_be_switched_off(start_stream):
     stream = start_stream()
-    stream.topologies()
-    for height in (2.0, 1.0):
-        stream.frame(height)
-    stream.expect(False)
+    stream.start()
     for value in (-1.0, -0.5):
         answer = set_parameter(stream.node, "stop_distance", value)
         assert not answer.successful and "switch the topic stop on or off" in answer.reason
@@ -237,10 +147,7 @@ def test_the_distance_may_change_and_not_be_switched_off(start_stream):
 
 def test_the_life_cycle_makes_it_true(start_stream):
     stream = start_stream()
-    stream.topologies()
-    for height in (2.0, 1.0):
-        stream.frame(height)
-    stream.expect(False)
+    stream.start()
     assert change_state(stream.node, Transition.TRANSITION_DEACTIVATE)
     stream.expect(True)
     stream.status("inactive")
@@ -258,10 +165,7 @@ def test_the_life_cycle_makes_it_true(start_stream):
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_its_last_word_is_true(start_stream, number):
     stream = start_stream()
-    stream.topologies()
-    for height in (2.0, 1.0):
-        stream.frame(height)
-    stream.expect(False)
+    stream.start()
     assert stream.node.stop(number) == 0
     deadline = time.monotonic() + 60
     while not stream.heard[-1][1] and time.monotonic() < deadline:
@@ -276,6 +180,6 @@ def test_nothing_to_watch_is_refused(start_node):
 
 
 def test_off_unless_asked_for(start_node):
-    node = start_node({"meshes": list(hand_and_table.MESHES)})
+    node = start_node({"meshes": list(MESHES)})
     node.frames_status(received=0)
     assert node.peer.node.count_publishers("stop") == 0 and "stop" not in node.peer.statuses
