@@ -15,6 +15,8 @@ from std_msgs.msg import Bool
 
 from hpccd_ros.client.topics import STOP_TIMEOUT, STOP_TOPIC, stop_qos
 
+# Of the time-out, as the node takes it too: a silence reads as true before it is over.
+_IN_TIME = 0.95
 # Of each time-out the callback looks so often whether it has passed.
 _LOOKS = 4
 
@@ -91,7 +93,7 @@ class StopListener:
         with self._lock:
             if self._heard is None:
                 return f"{self._lost[0].upper()}{self._lost[1:]}."
-            if now - self._heard >= self._timeout:
+            if now - self._heard >= _IN_TIME * self._timeout:
                 return f"Nothing was heard on {self._topic} for {now - self._heard:.3g} s."
             if self._alive is not None and self._alive < self._publishers:
                 return f"{self._alive} of {self._publishers} publishers are alive on {self._topic}."

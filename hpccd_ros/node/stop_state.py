@@ -11,6 +11,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
 
+# Of the time-out: said so much earlier, a silence is heard of within it.
+IN_TIME = 0.95
+
 
 class Cause(StrEnum):
     """Why stop is true."""
@@ -34,14 +37,14 @@ class Why:
 class StopState:
     """Told by the threads that know something; read by the one that publishes, which waits in `next`.
 
-    distance: that asked for, may be set at any time; an answer for a smaller one does not count. timeout: s that an
-    answer holds, from the arrival of the frame that its step ends with. busy: whether a frame is being worked on.
+    distance: that asked for; an answer for a smaller one does not count. timeout: s within which it is to be heard that
+    an answer holds no more, from the arrival of the frame that its step ends with. busy: whether a frame is worked on.
     rises: how often stop became true, by cause.
     """
 
     def __init__(self, distance: float, timeout: float, busy: Callable[[], bool] = lambda: False) -> None:
         self.distance = distance
-        self._timeout = timeout
+        self._timeout = IN_TIME * timeout
         self._busy = busy
         self._condition = threading.Condition()
         self._active = self._closed = False

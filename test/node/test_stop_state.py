@@ -6,7 +6,7 @@ import time
 
 import pytest
 
-from hpccd_ros.node.stop_state import Cause, StopState
+from hpccd_ros.node.stop_state import IN_TIME, Cause, StopState
 
 LONG = 1000.0
 
@@ -100,7 +100,7 @@ def test_it_wakes_by_itself_when_the_time_is_over():
     clear(state, received=received)
     assert state.next(0.0) is None
     assert state.next(received + LONG).cause is Cause.SILENT
-    assert time.monotonic() >= received + 0.3
+    assert time.monotonic() >= received + 0.3 * IN_TIME
     began = time.monotonic()
     assert state.next(began + 0.1).cause is Cause.SILENT and time.monotonic() >= began + 0.1, "a repetition"
 
