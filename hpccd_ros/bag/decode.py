@@ -40,6 +40,9 @@ _ADDED = {
         ),
         _Addition(frozenset({"uint8 tested_features"}), clear=without_features),
     ),
+    "hpccd/msg/DistanceArray": (
+        _Addition(frozenset({"float64[] direction", "float64[] approach_speed"}), bytes(2 * 4), 4),
+    ),
     "hpccd/msg/MeshTopology": (_Addition(frozenset({"uint32[] edges"}), bytes(4), 4),),
 }  # fmt: skip
 

@@ -16,6 +16,7 @@ from hpccd_ros.client.distances import DistanceArrays, distances_from_message
 from hpccd_ros.client.meshes import topology_from_message, topology_message, vertices_from_message, vertices_message
 from hpccd_ros.client.pairs import pair_summary
 from hpccd_ros.client.steps import collision_free_step_from_response, collision_free_step_request
+from hpccd_ros.client.stop import StopListener
 from hpccd_ros.client.topics import (
     CONTACTS_QOS,
     CONTACTS_TOPIC,
@@ -24,10 +25,13 @@ from hpccd_ros.client.topics import (
     LATCHED_CONTACTS_QOS,
     PAIRS_QOS,
     PAIRS_TOPIC,
+    STOP_TIMEOUT,
+    STOP_TOPIC,
     TOPOLOGY_QOS,
     VERTICES_QOS,
     marker_topic,
     shape_topic,
+    stop_qos,
     topology_topic,
     vertices_topic,
 )
@@ -49,7 +53,10 @@ __all__ = [
     "Layout",
     "PAIRS_QOS",
     "PAIRS_TOPIC",
+    "STOP_TIMEOUT",
+    "STOP_TOPIC",
     "SceneContacts",
+    "StopListener",
     "TOPOLOGY_QOS",
     "Topology",
     "VERTICES_QOS",
@@ -65,6 +72,7 @@ __all__ = [
     "prepare_environment",
     "scene_contacts",
     "shape_topic",
+    "stop_qos",
     "topology_from_message",
     "topology_message",
     "topology_topic",

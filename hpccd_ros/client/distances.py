@@ -23,7 +23,10 @@ class DistanceArrays:
     features_a: (P, 2) uint32, of mesh_a: vertex and ``DistanceArray.NONE``, or the two vertices of the edge.
     features_b: (P, 2) uint32, of mesh_b: face and ``DistanceArray.NONE``, or the two vertices of the edge.
     points: (P, 2, 3) float64, the nearest points of both sides, in the unit of the scene.
-    All are views of the message, which they keep alive.
+    direction: (P, 3) float64, unit vector from the nearest point of mesh_a to that of mesh_b; 0 where it is not known.
+    approach_speed: (P,) float64, by how much the distance became smaller in a second, on the mean of the time since the
+    snapshot before; > 0: nearing; NaN where it is not known. Recordings from before the message had both tell neither.
+    All that the message has are views of it, which they keep alive.
     """
 
     mesh_names: tuple[str, ...]
@@ -34,6 +37,8 @@ class DistanceArrays:
     features_a: NDArray[np.uint32]
     features_b: NDArray[np.uint32]
     points: NDArray[np.float64]
+    direction: NDArray[np.float64]
+    approach_speed: NDArray[np.float64]
 
     def __len__(self) -> int:
         return len(self.distance)
@@ -59,6 +64,7 @@ def distances_from_message(message: DistanceArray) -> DistanceArrays:
     Raises ValueError where the arrays of the message do not fit together, which those of the node always do.
     """
     count = len(message.distance)
+    told = len(message.direction) or len(message.approach_speed)
     return DistanceArrays(
         tuple(message.mesh_names),
         distance=field(message, "distance", np.float64, (count,)),
@@ -68,4 +74,6 @@ def distances_from_message(message: DistanceArray) -> DistanceArrays:
         features_a=field(message, "features_a", np.uint32, (count, 2)),
         features_b=field(message, "features_b", np.uint32, (count, 2)),
         points=field(message, "points", np.float64, (count, 2, 3)),
+        direction=field(message, "direction", np.float64, (count, 3)) if told else np.zeros((count, 3)),
+        approach_speed=field(message, "approach_speed", np.float64, (count,)) if told else np.full(count, np.nan),
     )

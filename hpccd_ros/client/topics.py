@@ -20,6 +20,8 @@ DISTANCES_QOS: QoSProfile = qos.DISTANCES
 
 #: Subscription to pairs, in the same way.
 PAIRS_QOS: QoSProfile = qos.PAIRS
+#: Of the parameter ``stop_timeout``.
+STOP_TIMEOUT: float = 0.5
 
 #: Relative to the namespace of the node, as the names below.
 CONTACTS_TOPIC: str = topic_names.CONTACTS
@@ -27,6 +29,21 @@ CONTACTS_TOPIC: str = topic_names.CONTACTS
 DISTANCES_TOPIC: str = topic_names.DISTANCES
 #: Published while the node's parameter ``pair_summaries`` is true.
 PAIRS_TOPIC: str = topic_names.PAIRS
+#: Published where the node's parameter ``stop_distance`` is not negative; see StopListener.
+STOP_TOPIC: str = topic_names.STOP
+
+
+def stop_qos(stop_timeout: float = STOP_TIMEOUT) -> QoSProfile:
+    """Subscription to stop that hears of it where nothing came for so many seconds: at least those of the node's
+    parameter ``stop_timeout``, else nothing ever comes.
+
+    Raises TypeError or ValueError for what can be no such time.
+    """
+    if isinstance(stop_timeout, bool) or not isinstance(stop_timeout, (int, float)):
+        raise TypeError(f"stop_timeout: expected seconds, got {type(stop_timeout).__name__}")
+    if not 0 < stop_timeout <= 3600:
+        raise ValueError(f"stop_timeout: {stop_timeout} s; give more than 0 s and at most 3600 s")
+    return qos.stop(stop_timeout, depth=10)
 
 
 def topology_topic(mesh: str) -> str:

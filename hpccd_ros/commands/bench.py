@@ -36,6 +36,7 @@ BENCHMARKS = {
     "distance": ("core.distance", "separation, proximity, intersections, smallest distances beside plain detection"),
     "step": ("core.step", "how far a step may go: first contacts, free step and trial steps beside all contacts"),
     "ros": ("ros.node", "the node over DDS: latency beside that of an echo, sustained rate, overload"),
+    "stop": ("ros.stop", "the topic stop over DDS: random approaches, silence, publisher and node killed"),
     "soak": ("ros.soak.command", "half an hour of mixed load on the node: memory, counts, answers"),
     "accuracy": ("core.accuracy", "the tiers: time, wrong answers, error of times; sweeps of scale and offset"),
 }

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The core's scene of the meshes, whatever their topologies are at the time. No ROS."""
 
-from dataclasses import dataclass
+import itertools
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -60,6 +61,21 @@ class SceneBuilder:
             tuple(entry for entry in self.pair_accuracies if set(entry[:2]) <= set(names)),
             tuple(entry for entry in self.pair_features if set(entry[:2]) <= set(names)),
         )
+
+    @property
+    def between_meshes(self) -> "SceneBuilder":
+        """Pairs of different meshes alone, each tested in whole."""
+        return SceneBuilder(tuple(replace(mesh, self_collision=False) for mesh in self.meshes), self.ignored_pairs)
+
+    @property
+    def pairs(self) -> list[tuple[str, str]]:
+        """Different meshes that are tested against each other."""
+        ignored = {frozenset(pair) for pair in self.ignored_pairs}
+        return [
+            (a.name, b.name)
+            for a, b in itertools.combinations(self.meshes, 2)
+            if not (a.static and b.static) and frozenset((a.name, b.name)) not in ignored
+        ]
 
     def same_scene(self, other: "SceneBuilder") -> bool:
         """Whether equal topologies make equal scenes."""

@@ -19,7 +19,7 @@ class Detection:
 
     ``backend``, ``threads``: what was used. ``detect_ms``: wall time of the core's call. ``gaps``: the smallest
     distance of each pair of meshes at the end, where the options ask for it; ``gaps_backend``: what found them, which
-    may be another one.
+    may be another one; ``gaps_before``: those at the start, where they were asked for then.
     """
 
     start: SceneFrame
@@ -34,6 +34,7 @@ class Detection:
     stats: dict[str, float] = field(default_factory=dict)
     gaps: list[hc.Gap] | None = None
     gaps_backend: str = ""
+    gaps_before: list[hc.Gap] | None = None
 
     @property
     def near(self) -> int:
@@ -57,6 +58,7 @@ class StepDetector:
         self._detector: hc.Detector | None = None
         self._detector_options: Options | None = None
         self._cancellation = Cancellation()
+        self._last_gaps: tuple[SceneFrame, list[hc.Gap]] | None = None
 
     @property
     def mesh_names(self) -> tuple[str, ...]:
@@ -91,6 +93,12 @@ class StepDetector:
         self.prepare_detector()
         return self._detector.distances(self._builder.concatenate(frame, frame))
 
+    def intersect(self, frame: SceneFrame) -> bool:
+        """Whether an edge pierces or touches a face in ``frame``. Raises what the core raises."""
+        self.prepare_scene(frame)
+        self.prepare_detector()
+        return len(self._detector.intersections(self._builder.concatenate(frame, frame))) > 0
+
     def detect(self, start: SceneFrame, end: SceneFrame) -> Detection:
         """The contacts on the way from ``start`` to ``end``, of the same scene. Raises what the core raises."""
         self.prepare_scene(end)
@@ -114,4 +122,7 @@ class StepDetector:
         if not found.options.distances:
             return found
         # Only now: backend, profile and stats are of the last call.
-        return replace(found, gaps=self._detector.distances(t1), gaps_backend=self._detector.backend)
+        gaps, last = self._detector.distances(t1), self._last_gaps
+        self._last_gaps = end, gaps
+        before = last[1] if last is not None and last[0] is start else None
+        return replace(found, gaps=gaps, gaps_backend=self._detector.backend, gaps_before=before)

@@ -14,7 +14,8 @@ class DetectionThread(threading.Thread):
 
     The motion goes from the end of the last step that was answered to the new frame, so where frames were dropped
     between them, or their detection failed, no time is left unwatched. The first frame, and the first after a change
-    of topology, is only a start: ``on_first``. ``on_failure`` has the frames that were not answered, and why:
+    of topology, is only a start: ``on_first``. ``on_step`` has both frames of each step before it is detected.
+    ``on_failure`` has the frames that were not answered, and why:
     hc.Cancelled after `cancel`.
     """
 
@@ -23,6 +24,7 @@ class DetectionThread(threading.Thread):
         detector: StepDetector,
         queue: FrameQueue,
         *,
+        on_step: Callable[[SceneFrame, SceneFrame], None] = lambda start, end: None,
         on_detection: Callable[[Detection], None],
         on_first: Callable[[SceneFrame], None],
         on_failure: Callable[[SceneFrame, Exception], None],
@@ -30,6 +32,7 @@ class DetectionThread(threading.Thread):
         super().__init__(name="detection", daemon=True)
         self.detector = detector
         self._queue = queue
+        self._on_step = on_step
         self._on_detection = on_detection
         self._on_first = on_first
         self._on_failure = on_failure
@@ -48,6 +51,7 @@ class DetectionThread(threading.Thread):
                     self._start = frame
                     self._on_first(frame)
                 else:
+                    self._on_step(self._start, frame)
                     self._on_detection(self.detector.detect(self._start, frame))
                     self._start = frame  # only now: a step that failed is part of the next one
             except Exception as error:  # any: else it would end this thread, and no frame be answered again

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The quality of service of every topic, in one place."""
 
-from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.duration import Duration
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, LivelinessPolicy, QoSProfile, ReliabilityPolicy
 
 
 def keep_last(depth: int, *, reliable: bool = True, latched: bool = False) -> QoSProfile:
@@ -44,6 +45,20 @@ def contacts(durability: str) -> QoSProfile:
     """Publisher of contacts. durability: "volatile" or "transient_local"."""
     # Not 1 where they are latched: a reader that is late now and then would lose what the publisher holds no longer.
     return keep_last(CONTACTS.depth, latched=durability == "transient_local")
+
+
+def stop(timeout: float, depth: int = 1) -> QoSProfile:
+    """Of the topic stop: the reader hears of it where nothing came for `timeout` s. Writer and reader may differ: a
+    reader that asks for a shorter one than the writer offers is not served at all.
+
+    Liveliness by topic: it says that the thread which publishes goes on. An automatic one would be kept up by threads
+    of the middleware while that thread is stuck.
+    """
+    profile = keep_last(depth, latched=True)
+    profile.deadline = Duration(seconds=timeout)
+    profile.liveliness = LivelinessPolicy.MANUAL_BY_TOPIC
+    profile.liveliness_lease_duration = Duration(seconds=timeout)
+    return profile
 
 
 def vertices(reliability: str, depth: int) -> QoSProfile:

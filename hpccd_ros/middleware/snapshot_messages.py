@@ -8,6 +8,7 @@ import numpy as np
 from hpccd.msg import ContactArray, DistanceArray
 
 import hpccd_core as hc
+from hpccd_ros.detect.approach import approach_speeds, directions
 from hpccd_ros.detect.layout import Layout
 from hpccd_ros.middleware.contact_messages import fill_names, lowest
 from hpccd_ros.middleware.feature_pairs import FeaturePairs, fill_pairs
@@ -47,8 +48,10 @@ def _fill(message, pairs, layout, found_hash, keep) -> None:
     message.total, message.truncated, message.hash = len(pairs), keep is not None, int(found_hash)
 
 
-def fill_distances(message: DistanceArray, gaps: list[hc.Gap], layout: Layout) -> None:
-    """Write all but header, step, accuracy and backend."""
+def fill_distances(
+    message: DistanceArray, gaps: list[hc.Gap], layout: Layout, *, before: list[hc.Gap] | None = None, seconds=0.0
+) -> None:
+    """Write all but header, step, accuracy and backend. before: those of so many ``seconds`` earlier, if known."""
     count = len(gaps)
     kind, meshes = np.empty(count, np.uint8), np.empty((count, 2), np.uint32)
     features, points = np.full((count, 2, 2), DistanceArray.NONE, np.uint32), np.zeros((count, 2, 3))
@@ -66,6 +69,8 @@ def fill_distances(message: DistanceArray, gaps: list[hc.Gap], layout: Layout) -
     message.mesh_a, message.mesh_b = to_field(meshes[:, 0]), to_field(meshes[:, 1])
     message.features_a, message.features_b = to_field(features[:, 0]), to_field(features[:, 1])
     message.points = to_field(points)
+    message.direction = to_field(directions(gaps))
+    message.approach_speed = to_field(approach_speeds(before, gaps, seconds))
 
 
 def _sides(gap: hc.Gap, layout: Layout):

@@ -15,10 +15,11 @@ if TYPE_CHECKING:  # writers of files need the names and no ROS
 CONTACTS = "contacts"
 DISTANCES = "distances"
 PAIRS = "pairs"
+STOP = "stop"
 MARKERS = "markers"
 SURFACE = "surface"
 DIAGNOSTICS = "/diagnostics"
-PUBLISHED = (CONTACTS, DISTANCES, PAIRS, MARKERS, SURFACE, DIAGNOSTICS)
+PUBLISHED = (CONTACTS, DISTANCES, PAIRS, STOP, MARKERS, SURFACE, DIAGNOSTICS)
 
 TRANSFORMS = "transforms"
 TRANSFORMS_STATIC = "transforms_static"

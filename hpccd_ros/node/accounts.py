@@ -18,7 +18,7 @@ class Accounts:
     """``dropped``: vertex messages. ``connections``: what the middleware tells of its topics (name -> count).
 
     ``static_taken``: accepted messages of static meshes, which count as answered. ``requests``: to ~/detect, by how
-    they ended. warn: takes what is to be logged.
+    they ended. warn: takes what is to be logged. on_refused: hears of each refusal, in the thread that refuses.
     """
 
     def __init__(self, warn: Callable[[str], None]) -> None:
@@ -31,6 +31,7 @@ class Accounts:
         self.requests = Counter(answered=0, refused=0, busy=0, timed_out=0, failed=0, stopped=0)
         self.restarts = 0
         self.static_taken = 0
+        self.on_refused: Callable[[Refusal], None] = lambda refusal: None
 
     def add(self, outcome: Outcome) -> None:
         """What came of a message, but for the frames: those are counted when they are answered."""
@@ -45,6 +46,7 @@ class Accounts:
         """Counted, and logged where there is something to say."""
         counter = self.topologies_refused if refusal.what is Input.TOPOLOGY else self.dropped
         counter.count(refusal)
+        self.on_refused(refusal)
         if refusal.text:
             self.log(refusal.mesh, refusal.reason, refusal.text)
 

@@ -38,12 +38,20 @@ class Configuration:
     def follow(self, configured: Callable[[], bool], on_change: Callable[[], None]) -> None:
         """From now on parameters may be set. configured: whether the life cycle is past `unconfigured`."""
 
+        def check(wanted: dict[str, Any], meshes: Meshes) -> str | None:
+            if configured() and (wanted["stop_distance"] < 0) != (self.settings["stop_distance"] < 0):
+                return (
+                    f"stop_distance: {wanted['stop_distance']} would switch the topic stop on or off, which it may not "
+                    "be while the node is configured; deactivate and clean up first"
+                )
+            return self._check(wanted, meshes)
+
         def changed() -> None:
             self.options = scene_parameters.detector_options(self.settings)
             on_change()
 
         parameters.watch(
-            self._node, self.settings, self.meshes, configured=configured, check=self._check, on_change=changed
+            self._node, self.settings, self.meshes, configured=configured, check=check, on_change=changed
         )
 
     def summary(self, contacts: str) -> str:

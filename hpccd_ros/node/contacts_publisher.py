@@ -75,7 +75,13 @@ class ContactsPublisher:
         message = DistanceArray(
             header=header, step=found.end.step, accuracy=found.options.accuracy, backend=found.gaps_backend
         )
-        snapshot_messages.fill_distances(message, found.gaps, found.layout)
+        snapshot_messages.fill_distances(
+            message,
+            found.gaps,
+            found.layout,
+            before=found.gaps_before,
+            seconds=1e-9 * (found.end.stamp - found.start.stamp),
+        )
         self._distances.publish(message)
 
     def _publish_pairs(self, found: Detection, header: Header) -> None:

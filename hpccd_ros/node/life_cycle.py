@@ -45,6 +45,10 @@ class GuardedLifecycleNode(LifecycleNode):
         timer = self.create_timer(period, callback, clock=Clock(clock_type=ClockType.STEADY_TIME))
         self._configured.callback(self.destroy_timer, timer)
 
+    def when_unconfigured(self, callback: Callable[[], None]) -> None:
+        """Call it once at the next `unconfigure`, before what was made earlier is destroyed."""
+        self._configured.callback(callback)
+
     def unconfigure(self) -> None:
         self._configured.close()
 

@@ -15,6 +15,7 @@ from hpccd_ros.node.detect_service import DetectService
 from hpccd_ros.node.life_cycle import GuardedLifecycleNode
 from hpccd_ros.node.node_recording import NodeRecording
 from hpccd_ros.node.status_report import Reporter
+from hpccd_ros.node.stop_watch import StopWatch
 from hpccd_ros.node.stream_detection import StreamDetection
 from hpccd_ros.node.unknown_meshes import UnknownMeshWatch
 from hpccd_ros.params import scene_parameters
@@ -42,6 +43,7 @@ class HpccdNode(GuardedLifecycleNode):
         self._accounts = Accounts(self.get_logger().warning)
         self._reporter = Reporter(self.get_fully_qualified_name(), self._accounts)
         self._stream: StreamDetection | None = None  # none for a node without meshes
+        self._stop_watch: StopWatch | None = None
         self._unknown: UnknownMeshWatch | None = None
         self._service: DetectService | None = None
 
@@ -56,6 +58,8 @@ class HpccdNode(GuardedLifecycleNode):
         except ValueError as error:
             self.get_logger().error(f"cannot configure: {error}")
             return TransitionCallbackReturn.FAILURE
+        if self._stream is not None and settings["stop_distance"] >= 0:
+            self._stop_watch = StopWatch(self, self._configuration, self._builder, self._stream.works)
         self._contacts = ContactsPublisher(self, settings, self._builder)
         self._diagnostics = self.configured_publisher(DiagnosticArray, topic_names.DIAGNOSTICS, qos.DIAGNOSTICS)
         self._service = DetectService(self, self._configuration, self._scene_for_service, self._accounts)
@@ -67,7 +71,7 @@ class HpccdNode(GuardedLifecycleNode):
         """Subscribe and detect."""
         self._recording.follow(active=True)  # first: what the node hears, the recording shall have
         if self._stream is not None:
-            self._stream.open(self._publish)
+            self._stream.open(self._publish, self._stop_watch)
         self._unknown = UnknownMeshWatch(self, self._settings, self._accounts)
         self.get_logger().info(f"active: {self._configuration.summary(self._contacts.topic)}")
         return SUCCESS
@@ -95,12 +99,16 @@ class HpccdNode(GuardedLifecycleNode):
     def close(self) -> None:
         """End threads before the node is destroyed; needs no valid context."""
         self._stop()
+        if self._stop_watch is not None:
+            self._stop_watch.close()
         self._end_service()
 
     def _stop(self) -> None:
         if self._unknown is not None:
             self._unknown.close()
             self._unknown = None
+        if self._stop_watch is not None:
+            self._stop_watch.end()
         if self._stream is not None:
             self._stream.close()
         self._recording.end()
@@ -108,7 +116,7 @@ class HpccdNode(GuardedLifecycleNode):
     def _release(self) -> None:
         self._end_service()
         self.unconfigure()
-        self._stream = None
+        self._stream = self._stop_watch = None
 
     def _end_service(self) -> None:
         if self._service is not None:
@@ -120,6 +128,8 @@ class HpccdNode(GuardedLifecycleNode):
             self._stream.apply_change()
         if self._service is not None:
             self._service.apply_change()
+        if self._stop_watch is not None:
+            self._stop_watch.apply_change()
         self._recording.follow(active=self.state == "active")
 
     def _scene_for_service(self) -> NodeScene | str:
@@ -146,6 +156,7 @@ class HpccdNode(GuardedLifecycleNode):
             service=self._service.counts,
             errors=(self.errors.count, self.errors.last),
             recording=self._recording.status(),
+            stop=self._stop_watch.status() if self._stop_watch is not None else None,
             coordinate_frame=self._stream.coordinate_frame if self._stream is not None else ("", ""),
         )
         self._diagnostics.publish(message)

@@ -36,13 +36,15 @@ class Reporter:
         service: Mapping[str, int],
         errors: tuple[int, str] = (0, ""),
         recording: tuple[bytes, str, Mapping[str, object]] | None = None,
+        stop: tuple[bytes, str, Mapping[str, object]] | None = None,
         coordinate_frame: tuple[str, str] = ("", ""),
     ) -> DiagnosticArray:
         """coordinate_frame: that of the scene, and what determined it.
         errors: how many exceptions nothing expected, and the last one.
         recording: level, message and values of the node's own recording, where there is one.
+        stop: those of its topic stop, where there is one.
 
-        Message of the statuses frames, detection, service, process, errors, and recording where there is one."""
+        Message of the statuses frames, detection, service, process, errors; stop, recording where there is one."""
         now = time.monotonic()
         period, self._time = max(now - self._time, 1e-9), now
         data = self._accounts.metrics.snapshot()
@@ -55,6 +57,7 @@ class Reporter:
             self._status("service", DiagnosticStatus.OK, topic_names.DETECT, service),
             self._status("process", DiagnosticStatus.OK, state, {"state": state, **_memory()}),
             self._errors(*errors),
+            *([self._status("stop", *stop)] if stop is not None else []),
             *([self._status("recording", *recording)] if recording is not None else []),
         ]
         return out

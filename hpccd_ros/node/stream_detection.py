@@ -14,6 +14,7 @@ from hpccd_ros.node import mesh_files
 from hpccd_ros.node.accounts import Accounts
 from hpccd_ros.node.configuration import Configuration
 from hpccd_ros.node.life_cycle import GuardedLifecycleNode
+from hpccd_ros.node.stop_watch import StopWatch
 from hpccd_ros.node.subscriptions import Subscriptions
 from hpccd_ros.params import scene_parameters
 
@@ -37,13 +38,17 @@ class StreamDetection:
         self._subscriptions = Subscriptions(node, settings, meshes)
         self._thread: DetectionThread | None = None
 
-    def open(self, on_detection: Callable[[Detection], None]) -> None:
-        """Start the detection thread, which calls ``on_detection``, and subscribe."""
+    def open(self, on_detection: Callable[[Detection], None], stop: StopWatch | None = None) -> None:
+        """Start the detection thread, which calls ``on_detection``, and has ``stop`` look at each step; subscribe."""
+        if stop is not None:
+            stop.begin()
+            self._accounts.on_refused = stop.refused
         thread = DetectionThread(
             StepDetector(self._builder, self._configuration.options),
             self._pipeline.start(self._configuration.settings["frame_queue"]),
+            on_step=stop.look if stop is not None else lambda start, end: None,
             on_detection=on_detection,
-            on_first=lambda frame: self._accounts.metrics.first_frame(len(frame.fresh)),
+            on_first=lambda frame: self._first(frame, stop),
             on_failure=self._failed,
         )
         thread.start()
@@ -65,6 +70,11 @@ class StreamDetection:
         if self._thread is not None:
             self._thread.detector.options = self._configuration.options
 
+    def works(self) -> bool:
+        """Whether the detection thread has a frame now; from any thread."""
+        thread = self._thread
+        return thread is not None and thread.working_on is not None
+
     @property
     def waiting(self) -> int:
         """Messages received that are neither answered nor dropped yet."""
@@ -84,6 +94,12 @@ class StreamDetection:
     def warnings(self) -> list[str]:
         """What is odd about the publishers."""
         return self._subscriptions.warnings() + self._pipeline.warnings()
+
+    def _first(self, frame: SceneFrame, stop: StopWatch | None) -> None:
+        """Called by the detection thread."""
+        if stop is not None:
+            stop.first()
+        self._accounts.metrics.first_frame(len(frame.fresh))
 
     def _failed(self, frame: SceneFrame, error: Exception) -> None:
         """Called by the detection thread."""

@@ -101,6 +101,11 @@ def check(settings: dict[str, Any], meshes: MeshValues) -> None:
     pair_parameters.check(settings)
     features(settings)
     poses(meshes)
+    if settings["stop_distance"] >= 0 and not scene_builder(settings, meshes).pairs:
+        raise ParameterError(
+            "stop_distance: no two different meshes are tested against each other, so nothing could ever be near; name "
+            "two in meshes of which one moves and that ignored_pairs does not name, or leave stop_distance negative"
+        )
     for name, values in meshes.items():
         if values["file"] and values["input"] in WHOLE:
             raise ParameterError(

@@ -351,10 +351,34 @@ RECORDING_ROWS = (
     ),
 )
 
+STOP_ROWS = (
+    Row(
+        "stop_distance",
+        "float",
+        -1.0,
+        "Publish on stop whether different meshes came this near, or touched, on the last step, or nobody knows; 0: "
+        "only whether they touched; negative: no topic stop. It can be made larger or smaller at any time, but not be "
+        "switched on or off while the node is configured",
+        unit="unit of the vertices",
+        span=(-1.0, FARTHEST),
+        change=ALWAYS,
+    ),
+    Row(
+        "stop_timeout",
+        "float",
+        0.5,
+        "stop is true where no step was answered that ends with a frame of the last so many seconds, in steady time; "
+        "it is repeated four times as often, with this deadline and lease of liveliness",
+        unit="s",
+        span=(0.01, 3600.0),
+    ),
+)
+
 # Under the headings that the documentation gives them.
 NODE_GROUPS = {
     "Scene and start": SCENE_ROWS,
     "Detection": DETECTION_ROWS,
+    "Stop": STOP_ROWS,
     "Input": INPUT_ROWS,
     "Service `~/detect`": SERVICE_ROWS,
     "What is published": OUTPUT_ROWS,

@@ -17,7 +17,12 @@ from hpccd_ros.middleware.snapshot_messages import fill_distances
 from hpccd_ros.replay.frames import PATIENCE, FrameWindow
 
 # Fields of DistanceArray, and how many entries each has for a pair of meshes.
-_PER_PAIR = {"mesh_a": 1, "mesh_b": 1, "kind": 1, "distance": 1, "features_a": 2, "features_b": 2, "points": 6}
+# Not approach_speed: the snapshot before may be one that the recording does not hold.
+_PER_PAIR = {
+    "mesh_a": 1, "mesh_b": 1, "kind": 1, "distance": 1, "features_a": 2, "features_b": 2, "points": 6, "direction": 3,
+}  # fmt: skip
+# Empty where the recording is older than the field.
+_LATER = ("direction",)
 
 
 class DistanceCheck:
@@ -103,6 +108,8 @@ def difference(recorded, now) -> str | None:
     columns = {}
     for name, per_pair in _PER_PAIR.items():
         then, new = (np.asarray(getattr(message, name)) for message in (recorded, now))
+        if name in _LATER and not len(then):
+            continue
         if len(then) != rows * per_pair:
             return f"{name} has {len(then)} entries, {rows * per_pair} belong to {rows} pairs of meshes"
         columns[name] = then.reshape(rows, -1), new.reshape(rows, -1)

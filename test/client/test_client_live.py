@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """The programs that the documentation shows, as processes beside a real node."""
 
+import itertools
 import os
 import re
 import subprocess
 import sys
 from pathlib import Path
 
+import hand_and_table
 import numpy as np
 import pytest
 from node_process import PATIENCE
@@ -21,6 +23,7 @@ SUBSCRIBER = FOLDER / "ten_line_subscriber.py"
 MARKER = FOLDER / "ten_line_marker.py"
 REQUEST = FOLDER / "ten_line_request.py"
 LINE_SEARCH = FOLDER / "ten_line_line_search.py"
+STOP = FOLDER / "ten_line_stop.py"
 FACES = np.array([[0, 1, 2], [3, 4, 5]])
 
 
@@ -111,11 +114,28 @@ def test_the_line_search_of_the_documentation(start, start_node):
     assert said.read_text() == "0.225000\n"
 
 
+def test_the_stop_listener_of_the_documentation(start, start_node):
+    node = start_node({"meshes": list(hand_and_table.MESHES), "stop_distance": 0.1, "stop_timeout": 0.5})
+    _, said = start(STOP, node.namespace)
+    for name in hand_and_table.MESHES:
+        node.peer.topology(name, hand_and_table.FACES, 3)
+    stamps = itertools.count()
+
+    def heard_no():
+        for name, xyz in zip(hand_and_table.MESHES, (hand_and_table.hand(1.0), hand_and_table.TABLE), strict=True):
+            node.peer.vertices(name, xyz, stamp=next(stamps) // 2)
+        return said.read_text().endswith("stop: no\n")
+
+    node.wait_until(heard_no, "false")
+    node.wait_until(lambda: said.read_text().endswith(f"stop: It was said on {node.namespace}/stop.\n"), "silence")
+
+
 def test_the_documentation_shows_programs_that_are_run_here():
     """Each whole program in README and docs that uses the client is one of those above, to the letter."""
     pages = [ROOT / "README.md", *(ROOT / "docs").rglob("*.md")]
     blocks = [block for page in pages for block in re.findall(r"```python\n(.*?)```", page.read_text(), re.DOTALL)]
-    run = [statements(program.read_text()) for program in (PUBLISHER, SUBSCRIBER, MARKER, REQUEST, LINE_SEARCH)]
+    programs = (PUBLISHER, SUBSCRIBER, MARKER, REQUEST, LINE_SEARCH, STOP)
+    run = [statements(program.read_text()) for program in programs]
     for block in blocks:
         if "client.prepare_environment()" in block:
             assert statements(block) in run, f"the tests run no such program:\n{block}"

@@ -159,6 +159,11 @@ def test_smallest_distances():
     assert [found.between(*pair) for pair in ("aa", "ab", "ba", "bb")] == [0.5, 0.25, 0.25, math.inf]
     with pytest.raises(ValueError, match="mesh_b: no mesh is named 'c'; there are a, b"):
         found.between("a", "c")
+    assert found.direction.shape == (3, 3) and not found.direction.any(), "of a message from before it had them"
+    assert found.approach_speed.shape == (3,) and np.isnan(found.approach_speed).all()
+    told = three_distances(direction=[0.0, 0.6, 0.8] * 3, approach_speed=[1.0, -2.0, math.nan])
+    told = client.distances_from_message(told)
+    assert told.direction[1].tolist() == [0, 0.6, 0.8] and told.approach_speed[:2].tolist() == [1, -2]
     nothing = client.distances_from_message(DistanceArray(mesh_names=["a", "b"]))
     assert len(nothing) == 0 and nothing.between("a", "b") == math.inf, "not tested against each other"
 
@@ -169,6 +174,8 @@ def test_smallest_distances():
         (dict(distance=[0.5]), r"kind has 3 values, 1 were expected for shape \(1,\)"),
         (dict(points=[0.0] * 6), r"points has 6 values, 18 were expected for shape \(3, 2, 3\)"),
         (dict(mesh_a=[0, 1, 2]), "mesh_a names a mesh beyond the 2 of mesh_names"),
+        (dict(direction=[0.0] * 9), r"approach_speed has 0 values, 3 were expected for shape \(3,\)"),
+        (dict(approach_speed=[0.0] * 3), r"direction has 0 values, 9 were expected for shape \(3, 3\)"),
     ],
 )
 def test_distances_whose_arrays_do_not_fit_together(changes, text):

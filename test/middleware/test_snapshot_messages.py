@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Answers about one snapshot, and the separation in force, as messages."""
 
+import dataclasses
 import math
 
 import numpy as np
@@ -87,6 +88,13 @@ def test_smallest_distances():
     assert list(message.features_b) == [4, 5, 7, UNUSED, 3, UNUSED, UNUSED, UNUSED]
     assert np.array_equal(np.frombuffer(message.points)[:18].reshape(3, 2, 3), [points, points + 1, points + 2])
     assert not np.any(np.frombuffer(message.points)[18:])
+    assert np.frombuffer(message.direction).reshape(4, 3) == pytest.approx(
+        np.array([[1, 1, 1], [1, 1, 1], [0, 0, 0], [0, 0, 0]]) / math.sqrt(3)
+    )
+    assert np.isnan(message.approach_speed).all() and len(message.approach_speed) == 4
+    before = [dataclasses.replace(gap, distance=0.75) for gap in gaps]
+    snapshot_messages.fill_distances(message, gaps, LAYOUT, before=before, seconds=0.25)
+    assert list(message.approach_speed[:3]) == [1, 2, 3] and math.isnan(message.approach_speed[3])
     assert (message.mesh_names, list(message.topology_versions)) == (["cloth", "ball", "floor"], [3, 0, 9])
 
 

@@ -4,6 +4,7 @@ recorded and computed again from the file."""
 
 import math
 
+import hand_and_table
 import numpy as np
 import pytest
 from cloth_and_net import FACES, MESHES, N, frame, positions
@@ -141,6 +142,35 @@ def test_distances_on_request(start_node):
     for gap, distance, points in zip(expected, got.distance, got.points, strict=True):
         assert got.between(gap.mesh_a, gap.mesh_b) == gap.distance == distance
         assert np.array_equal(points, gap.points)
+
+
+def test_direction_and_speed_of_approach(start_node):
+    """From consecutive snapshots of the stream; after a pause of the distances the first knows of none before it."""
+    node = start_node({"meshes": list(hand_and_table.MESHES), "distances": True})
+    heard = listen(node, DistanceArray, client.DISTANCES_TOPIC, client.DISTANCES_QOS)
+    for name in hand_and_table.MESHES:
+        node.peer.topology(name, hand_and_table.FACES, 3)
+    half = 500_000_000
+
+    def send(k, height):
+        node.peer.vertices("hand", hand_and_table.hand(height), stamp=k * half)
+        node.peer.vertices("table", hand_and_table.TABLE, stamp=k * half)
+        node.frames_status(answered=2 * (k + 1))
+
+    for k, height in enumerate((1.0, 0.75, 0.5, 0.625, 0.0)):
+        send(k, height)
+    assert set_parameter(node, "distances", False).successful
+    send(5, 0.5)
+    assert set_parameter(node, "distances", True).successful
+    send(6, 0.25)
+    node.wait_until(lambda: len(heard) == 5, "distances of five steps")
+    told = [client.distances_from_message(message) for message in heard]
+    assert [arrays.between("hand", "table") for arrays in told] == [0.75, 0.5, 0.625, 0.0, 0.25]
+    rows = [next(row for row in range(3) if arrays.mesh_a[row] != arrays.mesh_b[row]) for arrays in told]
+    speeds = [arrays.approach_speed[row] for arrays, row in zip(told, rows, strict=True)]
+    assert speeds[1:4] == [0.5, -0.25, 1.25] and math.isnan(speeds[0]) and math.isnan(speeds[4])
+    down = [arrays.direction[row].tolist() for arrays, row in zip(told, rows, strict=True)]
+    assert down == [[0, 0, -1]] * 3 + [[0, 0, 0], [0, 0, -1]], "from the vertex of the hand; none where they touch"
 
 
 def test_the_sides_of_near_pairs_are_marked(start_node):

@@ -175,6 +175,10 @@ def test_distances_that_differ_are_named(changed, near_bag, hpccd):
     assert "  7 answers are equal in every contact" in done.stdout and "VERIFIED" not in done.stdout
 
 
+def test_answers_from_before_there_were_directions_are_verified(changed):
+    assert _counts(_replay(changed(1, direction=[], approach_speed=[]))[0].distances) == (7, 0, 0)
+
+
 @pytest.mark.parametrize(
     "changes, says",
     [
@@ -184,6 +188,8 @@ def test_distances_that_differ_are_named(changed, near_bag, hpccd):
         ({"distance": [0.5]}, "1 pairs of meshes were recorded, now there are 2; are the parameters those of the node"),
         ({"accuracy": "best"}, "accuracy 'best' is none of fast"),
         ({"points": [0.0] * 12}, "points ["),
+        ({"direction": [0.5] * 6}, "direction ["),
+        ({"direction": [0.5]}, "direction has 1 entries, 6 belong to 2 pairs of meshes"),
     ],
 )
 def test_malformed_distances_diverge(changed, changes, says):

@@ -21,6 +21,7 @@ from hpccd_ros.bench.report import (
     performance_limit,
     performance_node,
     performance_step,
+    performance_stop,
 )
 from hpccd_ros.bench.report.results import Kept
 
@@ -61,6 +62,9 @@ TABLES = {
     "latency": (performance_node.latency, "ros-4-cores"),
     "step-loop": (performance_node.step_loop, "ros-2-cores"),
     "rates": (performance_node.rates, "ros-4-cores"),
+    "stop": (performance_stop.approaches, "stop-2-cores"),
+    "stop-silence": (performance_stop.silences, "stop-2-cores"),
+    "stop-cost": (performance_stop.costs, "stop-2-cores"),
     "soak": (performance_node.soak, "soak-4-cores"),
 }
 TABLE = re.compile(r"(<!-- (?P<name>[a-z-]+) -->\n).*?(<!-- end -->)", re.DOTALL)

@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: Apache-2.0
+"""From steps, refusals and failures to the topic stop."""
+
+import time
+from collections.abc import Callable
+
+from diagnostic_msgs.msg import DiagnosticStatus
+
+from hpccd_core import Cancelled
+from hpccd_ros.detect.core import CORE_ERRORS
+from hpccd_ros.detect.nearness import Nearness
+from hpccd_ros.detect.scene import SceneBuilder
+from hpccd_ros.frames.drops import Input, Reason, Refusal
+from hpccd_ros.frames.types import SceneFrame
+from hpccd_ros.node.configuration import Configuration
+from hpccd_ros.node.life_cycle import GuardedLifecycleNode
+from hpccd_ros.node.stop_signal import StopSignal
+from hpccd_ros.node.stop_state import Cause, StopState
+
+# What was right but is not needed: a later frame covers the whole motion, or another mesh is meant.
+_DROPPED = {
+    Reason.UNKNOWN_MESH, Reason.RATE, Reason.LATE, Reason.INCOMPLETE, Reason.RESTART, Reason.OVERLOAD,
+    Reason.MIDDLEWARE, Reason.STOPPED,
+}  # fmt: skip
+_OF_INPUTS = {Cause.NEAR: DiagnosticStatus.WARN, Cause.UNANSWERED: DiagnosticStatus.WARN}
+
+
+class StopWatch:
+    """Of a configured ``node`` with parameter stop_distance. busy: whether a frame is being worked on.
+
+    `begin` and `end` by the life cycle; `first` and `look` by the detection thread; `refused` by any.
+    """
+
+    def __init__(
+        self,
+        node: GuardedLifecycleNode,
+        configuration: Configuration,
+        builder: SceneBuilder,
+        busy: Callable[[], bool],
+    ) -> None:
+        settings = configuration.settings
+        self._node = node
+        self._configuration = configuration
+        self._builder = builder
+        self._state = StopState(settings["stop_distance"], settings["stop_timeout"], busy)
+        self._nearness: Nearness | None = None
+        self._nearness_ms = 0.0
+        self._signal = StopSignal(node, self._state, settings["stop_timeout"])
+
+    def begin(self) -> None:
+        settings = self._configuration.settings
+        self._nearness = Nearness(self._builder, self._configuration.options, settings["stop_distance"])
+        self._state.begin()
+
+    def end(self) -> None:
+        """Before the detection thread is joined: a step that is looked at is given up."""
+        self._state.end()
+        if self._nearness is not None:
+            self._nearness.cancel()
+
+    def close(self) -> None:
+        """A last true; then nothing any more."""
+        self._signal.close()
+
+    def apply_change(self) -> None:
+        """Follow the parameters."""
+        distance = self._configuration.settings["stop_distance"]
+        if self._nearness is not None:
+            self._nearness.set(self._configuration.options, distance)
+        self._state.changed(distance)
+
+    def first(self) -> None:
+        self._state.first()
+
+    def look(self, start: SceneFrame, end: SceneFrame) -> None:
+        """Before the contacts of the step, so that stop rises before they are found. One that cannot be looked at makes
+        stop true, and contacts are looked for all the same."""
+        began = time.perf_counter()
+        try:
+            near, distance = self._nearness.within(start, end)
+        except Cancelled:
+            raise
+        except Exception as error:
+            self._state.failed(f"the step that ends at {end.stamp} ns could not be looked at: {error}")
+            if not isinstance(error, CORE_ERRORS):
+                self._node.errors.caught("stop", error)
+            return
+        self._nearness_ms = 1e3 * (time.perf_counter() - began)
+        self._state.answered(near, distance, end.received)
+
+    def refused(self, refusal: Refusal) -> None:
+        if refusal.reason is Reason.DETECTION_FAILED:
+            self._state.failed("the detection of the last step failed")
+        elif refusal.reason not in _DROPPED and refusal.what in (Input.VERTICES, Input.TOPOLOGY):
+            what = "positions" if refusal.what is Input.VERTICES else "a topology"
+            self._state.refused(f"{what} of mesh {refusal.mesh} were refused: {refusal.reason}")
+
+    def status(self) -> tuple[bytes, str, dict[str, object]]:
+        """(level, message, values) for the diagnostics."""
+        why, settings = self._state.why(), self._configuration.settings
+        values: dict[str, object] = {
+            "stop": why is not None,
+            "cause": why.cause if why is not None else "",
+            "stop_distance": settings["stop_distance"],
+            "stop_timeout": settings["stop_timeout"],
+            "look_ms": f"{self._nearness_ms:.3f}",
+        }
+        values |= {f"rises.{cause}": count for cause, count in sorted(self._state.rises.items())}
+        if why is None:
+            return DiagnosticStatus.OK, "false: nothing is near", values
+        return _OF_INPUTS.get(why.cause, DiagnosticStatus.ERROR), f"true: {why.text}", values

@@ -1,0 +1,213 @@
+# SPDX-License-Identifier: Apache-2.0
+"""StopListener beside publishers of stop, over DDS: whatever is missing reads as true."""
+
+import itertools
+import os
+import threading
+import time
+
+import pytest
+import rclpy
+from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
+from rclpy.node import Node
+from std_msgs.msg import Bool
+
+from hpccd_ros import client
+from hpccd_ros.middleware import environment, qos
+
+TIMEOUT = 1.0
+PATIENCE = 60.0
+_numbers = itertools.count()
+
+
+class Speaker:
+    """Publishes on stop in a context of its own, every tenth of the time-out, until it is silent or closed."""
+
+    def __init__(self, namespace, profile=None):
+        self.says = False
+        self.context = rclpy.Context()
+        rclpy.init(context=self.context)
+        self.node = Node("speaker", namespace=namespace, context=self.context)
+        self._publisher = self.node.create_publisher(Bool, "stop", profile or qos.stop(TIMEOUT))
+        self._ended = threading.Event()
+        self._silent = False
+        self._thread = threading.Thread(target=self._run)
+        self._thread.start()
+
+    def _run(self):
+        while not self._ended.wait(TIMEOUT / 10):
+            if not self._silent:
+                self._publisher.publish(Bool(data=self.says))
+
+    def silent(self, silent=True):
+        self._silent = silent
+
+    def close(self):
+        if not self._ended.is_set():
+            self._ended.set()
+            self._thread.join()
+            self.node.destroy_node()
+            rclpy.shutdown(context=self.context)
+
+
+class Place:
+    """A namespace with speakers, and a node with listeners that is spun here and now."""
+
+    def __init__(self, executor=SingleThreadedExecutor):
+        environment.prepare()
+        self.namespace = f"/l{os.getpid()}_{next(_numbers)}"
+        self.context = rclpy.Context()
+        rclpy.init(context=self.context)
+        self.node = Node("listener", namespace=self.namespace, context=self.context)
+        self.executor = executor(context=self.context)
+        self.executor.add_node(self.node)
+        self.speakers = []
+
+    def speaker(self, **options):
+        self.speakers.append(Speaker(self.namespace, **options))
+        return self.speakers[-1]
+
+    def listener(self, **options):
+        return client.StopListener(self.node, stop_timeout=TIMEOUT, **options)
+
+    def until(self, condition, what):
+        deadline = time.monotonic() + PATIENCE
+        while not condition():
+            assert time.monotonic() < deadline, f"no {what}"
+            self.executor.spin_once(timeout_sec=0.02)
+
+    def spin(self, seconds):
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            self.executor.spin_once(timeout_sec=0.02)
+
+    def close(self):
+        for speaker in self.speakers:
+            speaker.close()
+        self.executor.shutdown()
+        self.node.destroy_node()
+        rclpy.shutdown(context=self.context)
+
+
+@pytest.fixture(params=[SingleThreadedExecutor], ids=["single"])
+def place(request):
+    made = Place(request.param)
+    yield made
+    made.close()
+
+
+@pytest.mark.parametrize("place", [SingleThreadedExecutor, MultiThreadedExecutor], ids=["one", "many"], indirect=True)
+def test_true_unless_somebody_says_false(place):
+    changes = []
+    listener = place.listener(on_change=lambda of: changes.append(of.stop))
+    assert listener.stop and listener.reason == f"Nothing was heard yet on {place.namespace}/stop."
+    place.spin(0.1)
+    assert listener.stop
+    speaker = place.speaker()
+    place.until(lambda: not listener.stop, "false")
+    assert listener.reason == ""
+    speaker.says = True
+    place.until(lambda: listener.stop and "said" in listener.reason, "true")
+    speaker.says = False
+    place.until(lambda: not listener.stop, "false")
+    assert changes == [False, True, False]
+    listener.close()
+    assert listener.stop and listener.reason == "The listener was closed."
+
+
+def test_silence_is_true(place):
+    """Of a publisher whose process lives and whose thread does not: its DDS still sends signs of life."""
+    listener, speaker = place.listener(), place.speaker()
+    place.until(lambda: not listener.stop, "false")
+    speaker.silent()
+    place.until(lambda: listener.stop, "true")
+    assert "was heard" in listener.reason or "publishers are alive" in listener.reason
+    place.until(lambda: "0 of 1 publishers are alive" in listener.reason or "was heard" in listener.reason, "why")
+    speaker.silent(False)
+    place.until(lambda: not listener.stop, "false")
+
+
+def test_a_publisher_that_goes_away_is_true(place):
+    listener, speaker = place.listener(), place.speaker()
+    place.until(lambda: not listener.stop, "false")
+    speaker.close()
+    place.until(lambda: "0 of 1 publishers are alive" in listener.reason, "end of the publisher")
+    assert listener.stop
+    place.speaker()
+    place.until(lambda: not listener.stop, "another one")
+
+
+def test_an_executor_that_stands_still(place):
+    """What is read is true, and stays true when old messages are taken at last."""
+    listener, speaker = place.listener(), place.speaker()
+    place.until(lambda: not listener.stop, "false")
+    time.sleep(1.5 * TIMEOUT)
+    assert listener.stop and "Nothing was heard on" in listener.reason, "though it was said all the time"
+    speaker.close()
+    time.sleep(1.5 * TIMEOUT)
+    seen = []
+    end = time.monotonic() + TIMEOUT
+    while time.monotonic() < end:
+        place.executor.spin_once(timeout_sec=0.01)
+        seen.append(listener.stop)
+    assert len(seen) > 5 and all(seen)
+
+
+def test_system_time_that_jumps(place, monkeypatch):
+    """Nothing is false for it: a message that seems to have waited for an hour does not count, nor one from then."""
+    listener = place.listener()
+    place.speaker()
+    place.until(lambda: not listener.stop, "false")
+    now = time.time_ns
+    for jump in (3600 * 10**9, -3600 * 10**9):
+        monkeypatch.setattr(time, "time_ns", lambda jump=jump: now() + jump)
+        place.until(lambda: "waited too long" in listener.reason, "doubt")
+        monkeypatch.setattr(time, "time_ns", now)
+        place.until(lambda: not listener.stop, "false")
+
+
+def test_several_publishers(place):
+    """Any that says true counts, and all must be there."""
+    one, both = place.listener(), place.listener(publishers=2)
+    first = place.speaker()
+    place.until(lambda: not one.stop, "false of the first")
+    assert both.stop
+    place.until(lambda: "1 of 2 publishers are alive" in both.reason, "1 of 2")
+    second = place.speaker()
+    place.until(lambda: not both.stop, "false of both")
+    second.says = True
+    place.until(lambda: one.stop and both.stop, "true")
+    for _ in range(30):
+        place.spin(0.02)
+        assert one.stop and both.stop, "the first, which says false, does not matter"
+    second.says = False
+    place.until(lambda: not one.stop and not both.stop, "false of both again")
+    second.close()
+    place.until(lambda: both.stop, "true as one is gone")
+    place.until(lambda: not one.stop, "false of the one that is left")
+    assert both.stop and not first.says
+
+
+@pytest.mark.parametrize("profile", [qos.keep_last(10, latched=True), qos.stop(2 * TIMEOUT)], ids=["plain", "slower"])
+def test_a_publisher_that_promises_less_is_never_heard(place, profile):
+    listener = place.listener()
+    place.speaker(profile=profile)
+    place.until(lambda: "promises less than is asked for: its stop_timeout is above 1 s" in listener.reason, "why")
+    place.spin(0.5)
+    assert listener.stop
+
+
+@pytest.mark.parametrize(
+    "options, error, text",
+    [
+        (dict(stop_timeout=0.0), ValueError, "stop_timeout: 0.0 s; give more than 0 s"),
+        (dict(stop_timeout=float("nan")), ValueError, "stop_timeout: nan s"),
+        (dict(stop_timeout="1"), TypeError, "stop_timeout: expected seconds, got str"),
+        (dict(publishers=0), ValueError, "publishers: 0; at least one"),
+        (dict(publishers=1.5), TypeError, "publishers: expected how many, got float"),
+        (dict(publishers=True), TypeError, "publishers: expected how many, got bool"),
+    ],
+)
+def test_wrong_arguments(place, options, error, text):
+    with pytest.raises(error, match=text):
+        client.StopListener(place.node, **options)

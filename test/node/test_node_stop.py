@@ -1,0 +1,185 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The topic stop of a node as a process: true where meshes come near, and where nobody knows."""
+
+import contextlib
+import math
+import signal
+import time
+
+import numpy as np
+import pytest
+import stop_stream
+from hand_and_table import FACES, MESHES, TABLE, hand
+from lifecycle_msgs.msg import Transition
+from node_calls import change_state, set_parameter
+from stop_stream import NEAR, SHORT, TIMEOUT
+
+
+@pytest.fixture
+def start_stream(start_node):
+    with contextlib.ExitStack() as stack:
+
+        def start(timeout=TIMEOUT, **parameters):
+            return stack.enter_context(stop_stream.started(start_node, timeout, **parameters))
+
+        yield start
+
+
+def test_true_while_anything_is_near(start_stream):
+    """From before the first answer on; at any time of a step, whole surfaces, as near counts as nearer."""
+    stream = start_stream(features=["edge_edge"], accuracy="fast")
+    stream.expect(True)
+    stream.status("unanswered", "no step was answered since the node was activated")
+    stream.topologies()
+    stream.frame(2.0)
+    stream.status("unanswered", "no step was answered since the stream, or a topology, began anew")
+    stream.frame(1.0)
+    stream.expect(False)
+    assert stream.status("")["stop"] == "False"
+    just_above = NEAR * (1 + 1e-15)
+    for height, near in ((just_above, False), (NEAR, True), (1.0, True), (1.0, False), (-2.0, True)):
+        stream.frame(height)
+        stream.answered()
+        stream.expect(near)
+    stream.status("near", "came within 0.25")
+    stream.frame(-2.0)
+    stream.expect(False)
+    assert stream.status("")["rises.near"] == "2"
+
+
+def test_a_step_that_passes_through_is_true(start_stream):
+    stream = start_stream(stop_distance=0.0)
+    stream.topologies()
+    for height in (5.0, 4.0):
+        stream.frame(height)
+    stream.expect(False)
+    stream.heard.clear()
+    stream.frame(-4.0)
+    stream.node.wait_until(lambda: any(said for _, said in stream.heard), "stop")
+    stream.frame(-4.0)
+    stream.expect(False)
+
+
+def test_only_different_meshes_that_are_tested(start_stream):
+    """The hand alone folds so that parts of it are near each other all the time."""
+    fan = np.array([[0, 1, 2], [3, 4, 5]], np.uint32)
+    stream = start_stream(meshes=["hand", "table", "wall"], ignored_pairs=["hand:wall", "table:wall"])
+    stream.node.peer.topology("hand", fan, 6)
+    for name in ("table", "wall"):
+        stream.node.peer.topology(name, FACES, 3)
+    folded = np.concatenate([hand(2.0), hand(2.0) + (0, 0, 0.01)])
+    for stamp in (1, 2):
+        stream.node.peer.vertices("hand", folded, stamp=stamp)
+        stream.node.peer.vertices("table", TABLE, stamp=stamp)
+        stream.node.peer.vertices("wall", TABLE, stamp=stamp)
+    stream.expect(False)
+
+
+def test_an_edge_in_the_middle_of_a_face_stays_near(start_stream):
+    """No corner or border is near another: only the first step, from the stream's begin on, can tell."""
+    needle = np.array([[0, 0, -6.0], [0, 0, 6.0], [0.01, 0, 6.0]])
+    stream = start_stream()
+    stream.topologies()
+    for _ in range(3):
+        stream.frame(needle)
+    stream.answered()
+    stream.status("near")
+    assert stream.listener.stop
+    assert all(said for _, said in stream.heard)
+
+
+@pytest.mark.parametrize("what", ["not finite", "count", "backward", "topology"])
+def test_what_is_refused_is_true_until_the_next_answer(start_stream, what):
+    stream = start_stream()
+    stream.start()
+    if what == "topology":
+        stream.node.peer.topology("hand", FACES[:, ::-1], 3)
+    else:
+        bad = {"not finite": np.full((3, 3), math.nan), "count": np.zeros((4, 3)), "backward": hand(1.0)}[what]
+        stream.node.peer.vertices("hand", bad, stamp=stream.sent + 1 if what != "backward" else 1)
+    reason = {"not finite": "not_finite", "count": "wrong_vertex_count", "backward": "stamp_backward"}
+    stream.status("refused", f"of mesh hand were refused: {reason.get(what, 'topology_conflict')}")
+    stream.expect(True)
+    stream.sent += 1
+    stream.frame(1.0)
+    stream.expect(False)
+
+
+def test_a_new_topology_is_true_until_a_step_with_it(start_stream):
+    stream = start_stream()
+    stream.start()
+    stream.topologies(version=1)
+    stream.frame(1.0, topology_version=1)
+    stream.expect(True)
+    stream.status("unanswered")
+    stream.frame(1.0, topology_version=1)
+    stream.expect(False)
+
+
+def test_dead_input_is_true(start_stream):
+    stream = start_stream(SHORT)
+    stream.topologies()
+    with stream.steady():
+        stream.expect(False)
+    died = time.monotonic()
+    stream.expect(True)
+    rose = next(at for at, said in reversed(stream.heard) if at > died and said)
+    assert rose - died < SHORT + 5.0
+    stream.status("silent", "the last frame that was found clear came")
+
+
+def test_the_distance_may_change_and_not_be_switched_off(start_stream):
+    stream = start_stream()
+    stream.start()
+    for value in (-1.0, -0.5):
+        answer = set_parameter(stream.node, "stop_distance", value)
+        assert not answer.successful and "switch the topic stop on or off" in answer.reason
+    assert set_parameter(stream.node, "stop_distance", 1.5).successful
+    stream.expect(True)
+    stream.status("unanswered", "since stop_distance became 1.5")
+    stream.frame(1.0)
+    stream.status("near", "within 1.5")
+    assert set_parameter(stream.node, "stop_distance", 0.5).successful
+    stream.frame(1.0)
+    stream.expect(False)
+    assert stream.status("")["stop_distance"] == "0.5"
+
+
+def test_the_life_cycle_makes_it_true(start_stream):
+    stream = start_stream()
+    stream.start()
+    assert change_state(stream.node, Transition.TRANSITION_DEACTIVATE)
+    stream.expect(True)
+    stream.status("inactive")
+    assert change_state(stream.node, Transition.TRANSITION_ACTIVATE)
+    stream.status("unanswered")
+    for _ in range(2):
+        stream.frame(1.0)
+    stream.expect(False)
+    assert change_state(stream.node, Transition.TRANSITION_DEACTIVATE)
+    assert change_state(stream.node, Transition.TRANSITION_CLEANUP)
+    stream.expect(True)
+    stream.node.wait_until(lambda: stream.listener.reason.startswith("0 of 1 publishers"), "no publisher")
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_its_last_word_is_true(start_stream, number):
+    stream = start_stream()
+    stream.start()
+    assert stream.node.stop(number) == 0
+    deadline = time.monotonic() + 60
+    while not stream.heard[-1][1] and time.monotonic() < deadline:
+        time.sleep(0.01)
+    assert stream.heard[-1][1] and stream.listener.stop
+
+
+def test_nothing_to_watch_is_refused(start_node):
+    for given in ({"meshes": ["hand"]}, {"meshes": list(MESHES), "ignored_pairs": ["table:hand"]}, {"meshes": [""]}):
+        node = start_node({**given, "stop_distance": 0.1}, wait=False)
+        assert node.process.wait(60) == 2 and "stop_distance: no two different meshes" in node.output()
+
+
+def test_off_unless_asked_for(start_node):
+    node = start_node({"meshes": list(MESHES)})
+    node.frames_status(received=0)
+    assert node.peer.node.count_publishers("stop") == 0 and "stop" not in node.peer.statuses
