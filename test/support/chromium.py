@@ -8,6 +8,7 @@ import os
 import select
 import shutil
 import subprocess
+import sys
 import time
 from pathlib import Path
 
@@ -21,12 +22,26 @@ OPTIONS = (
     "--enable-unsafe-swiftshader", "--disable-dev-shm-usage", "--no-first-run", "--disable-background-networking",
     "--disable-component-update", "--disable-sync", "--force-device-scale-factor=1", "--hide-scrollbars",
 )  # fmt: skip
+# The protocol is spoken on descriptors 3 and 4; the pipes may have these numbers themselves, the other way round.
+EXECUTE = """
+import fcntl, os, sys
+ends = [fcntl.fcntl(int(end), fcntl.F_DUPFD, 10) for end in sys.argv[1:3]]
+for end, number in zip(ends, (3, 4)):
+    os.dup2(end, number)
+    os.close(end)
+os.execv(sys.argv[3], sys.argv[3:])
+"""
 
 
 def program() -> str | None:
     """Path of a Chromium, HPCCD_CHROMIUM if that is set."""
     named = os.environ.get("HPCCD_CHROMIUM")
     return named or next(filter(None, map(shutil.which, NAMES)), None)
+
+
+def _environment():
+    """Without the libraries of the ROS wheels, which are not those that a system's programs were built with."""
+    return {name: value for name, value in os.environ.items() if name != "LD_LIBRARY_PATH"}
 
 
 class Chromium:
@@ -39,9 +54,8 @@ class Chromium:
             program(), *OPTIONS, *options, f"--user-data-dir={folder}", f"--window-size={size[0]},{size[1]}",
             "about:blank",
         ]  # fmt: skip
-        # The protocol is spoken on descriptors 3 and 4, which the shell puts there.
         self._process = subprocess.Popen(
-            ["sh", "-c", f'exec "$@" 3<&{ends[0]} 4>&{ends[1]}', "sh", *arguments], pass_fds=ends,
+            [sys.executable, "-I", "-S", "-c", EXECUTE, *map(str, ends), *arguments], pass_fds=ends, env=_environment(),
             stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
         )  # fmt: skip
         for end in ends:
@@ -54,7 +68,8 @@ class Chromium:
         self._session = self._call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
         for domain in ("Page", "Runtime", "Log", "Network"):
             self._call(f"{domain}.enable")
-        self._call("Emulation.setDeviceMetricsOverride", width=size[0], height=size[1], deviceScaleFactor=1, mobile=False)
+        screen = {"width": size[0], "height": size[1], "deviceScaleFactor": 1, "mobile": False}
+        self._call("Emulation.setDeviceMetricsOverride", **screen)
 
     def __enter__(self):
         return self

@@ -8,7 +8,7 @@ from hpccd_ros.detect.layout import Layout
 from hpccd_ros.middleware.feature_pairs import FeaturePairs, fill_pairs
 from hpccd_ros.picture.page.packing import Grid, packed
 
-# Drawn of one step, the earliest ones: more could not be told apart, and would be most of the page.
+# Drawn of one step: more could not be told apart, and would be most of the page.
 MOST = 20_000
 # Of times of contact, which are 0..1.
 TIMES = 65535
@@ -23,9 +23,10 @@ class ContactColumns:
         self._toc, self._points = [np.empty(0)], [np.empty((0, 3))]
 
     def add(self, contacts, layout: Layout) -> tuple[int, int]:
-        """How many vertex-face and edge-edge contacts of this step are drawn."""
+        """How many vertex-face and edge-edge contacts of this step are drawn: at most MOST, evenly by time."""
         toc = np.concatenate([contacts.vf_toc, contacts.ee_toc])
-        kept = np.sort(np.argsort(toc, kind="stable")[:MOST])
+        by_time = np.argsort(toc, kind="stable")
+        kept = np.sort(by_time if len(toc) <= MOST else by_time[np.arange(MOST) * len(toc) // MOST])
         pairs = FeaturePairs.of(vf=contacts.vf, ee=contacts.ee).keep(kept)
         told = ContactArray()
         fill_pairs(told, pairs, layout)

@@ -11,7 +11,7 @@ import zipfile
 from hpccd_ros.base import extras
 from hpccd_ros.base.errors import UserError
 
-_BUILD = re.compile(r"/\*\*\n \* @license\n \* Copyright [^\n]*Three\.js Authors\n(?: \*[^\n]*\n)* \*/\n!function[^\n]+")
+_BUILD = re.compile(r"/\*\*\n \* @license\n \* Copyright [^\n]*Three\.js Authors\n( \*[^\n]*\n)+!function[^\n]+")
 _REVISION = re.compile(r'"use strict";const \w+="(\d+)"')
 
 
@@ -37,5 +37,5 @@ def three() -> Library:
     build = _BUILD.search(text)
     revision = build and _REVISION.search(build[0])
     if build is None or revision is None:
-        raise UserError(f"an HTML page needs the three.js that trimesh carries: {source} has none; known to have it: 5.2.0")
+        raise UserError(f"an HTML page needs the three.js that trimesh carries: {source} has none, 5.2.0 has it")
     return Library(build[0], revision[1], source)

@@ -11,11 +11,11 @@ LEVEL = 7
 
 
 def packed(values: NDArray[np.unsignedinteger]) -> bytes:
-    """(G,N,W) uint16 or uint32: differences from group to group, of these from row to row, folded so that small negative
-    ones are small too, then all lowest bytes, all second ones and so on, through zlib.
+    """(G,N,W) uint16 or uint32: differences from group to group, of these from row to row, folded so that small
+    negative ones are small too, then all lowest bytes, all second ones and so on, through zlib.
 
-    Groups are frames, rows are vertices: neighbours move alike, so most differences need one byte. All is computed modulo
-    2^16 or 2^32: nothing overflows.
+    Groups are frames, rows are vertices: neighbours move alike, so most differences need one byte. All is computed
+    modulo 2^16 or 2^32: nothing overflows.
     """
     differences = values.copy()
     differences[1:] -= values[:-1]

@@ -16,12 +16,14 @@ from hpccd_ros.replay.recomputed import Replay, ReplayedStep
 
 # Bytes of positions that a browser is asked to hold.
 MOST_POSITIONS = 1 << 29
+# Why there may be nothing of a step.
+GAP = "(dropped, not recorded, or begun with another topology)"
 # Colours of times of contact between which the page blends.
 TOC_SHADES = 33
 
 
 class RecordingPage:
-    """Collects steps, computed with outputs=("points",). every: those of a recording that are added, each so many-th."""
+    """Collects steps, computed with outputs=("points",). every: those that are shown, each so many-th."""
 
     def __init__(self, replay: Replay, mesh_names, title: str, *, every=1, azimuth=-60.0, elevation=26.0):
         self._replay = replay
@@ -98,7 +100,7 @@ class RecordingPage:
                    "(max_contacts).")  # fmt: skip
         if step.total > drawn:
             self._cut += 1
-            yield f"Drawn are the {drawn:,} earliest of {step.total:,} contacts."
+            yield f"Drawn are {drawn:,} of {step.total:,} contacts, evenly from the earliest on."
 
     def described(self) -> tuple[dict, dict[str, bytes]]:
         """(what the page says, as JSON can hold it, {name: bytes} of what it draws)."""
@@ -126,8 +128,8 @@ class RecordingPage:
 
     def _with_gap(self, step, gaps):
         missing = gaps[step["place"]]
-        notices = [f"{_count(missing, 'step')} right before this one {'is' if missing == 1 else 'are'} not in the recording."]
-        return {**step, "gap": missing, "notices": step["notices"] + notices * bool(missing)}
+        notices = [f"{_count(missing, 'step')} right before this one: no answer {GAP}."] if missing else []
+        return {**step, "gap": missing, "notices": step["notices"] + notices}
 
     def _notes(self, left_out):
         replay = self._replay
@@ -140,14 +142,14 @@ class RecordingPage:
             (self._missing, "could not be computed: their contacts are not shown"),
             (self._differ, "were recorded with other contacts than those computed again, which are shown"),
             (self._truncated, "had their recorded answer truncated (max_contacts); all contacts were computed again"),
-            (self._cut, f"have more than {MOST:,} contacts, of which the earliest are drawn"),
+            (self._cut, f"have more than {MOST:,} contacts, of which so many are drawn"),
         ):
             if count:
                 notes.append(f"{count:,} of {_count(len(self._steps), 'step')} {what}.")
         if left_out:
-            notes.append(f"{_count(left_out, 'step')} between the first and the last one are not in the recording.")
+            notes.append(f"{_count(left_out, 'step')} between the first and the last one: no answer {GAP}.")
         if self._dropped:
-            notes.append(f"The node had dropped {_count(self._dropped, 'frame')} when it gave the last of these answers.")
+            notes.append(f"The node had dropped {_count(self._dropped, 'frame')} when it gave the last answer.")
         return notes
 
 

@@ -71,7 +71,7 @@ class Chart {
     context.fillStyle = colours.faint;
     context.fillRect(Chart.LEFT, floor, width - Chart.LEFT - Chart.RIGHT, 1);
     context.textAlign = "center";
-    const every = ceiling([70 / wide]), counted = steps.every((step, i) => Number(step.step) - Number(steps[0].step) === i);
+    const every = ceiling([70 / wide], [1, 2, 5, 10]), counted = steps.every((step, i) => Number(step.step) - Number(steps[0].step) === i);
     steps.forEach((step, i) => {
       const number = counted ? Number(step.step) : i;
       if (number % Math.ceil(every) === 0) context.fillText(step.step, x(i + 0.5), floor + 13);
@@ -102,11 +102,11 @@ function axis(context, colour, name, align, x, most, top, floor) {
   context.fillText("0", x, floor);
 }
 
-// A round number that is not less than any of `values`.
-function ceiling(values) {
+// A round number that is not less than any of `values`: one of `digits` times a power of ten.
+function ceiling(values, digits = [1, 1.5, 2, 2.5, 3, 4, 5, 6, 8, 10]) {
   const most = values.reduce((a, b) => Math.max(a, b), 0) || 1;
   const unit = 10 ** Math.floor(Math.log10(most));
-  return [1, 1.5, 2, 2.5, 3, 4, 5, 6, 8, 10].map((k) => k * unit).find((value) => value >= most) ?? most;
+  return digits.map((k) => k * unit).find((value) => value >= most) ?? most;
 }
 
 // A canvas with as many pixels as the screen shows of it, empty, measured in CSS pixels.

@@ -177,6 +177,7 @@ class Viewer {
 
   play() {
     const last = this.recording.steps.length - 1;
+    if (!last) return;
     if (this.step === last) this.show(0);
     byId("play").textContent = "pause";
     let due = performance.now();
@@ -211,6 +212,7 @@ class Viewer {
       });
     }
     byId("slider").max = last;
+    byId("play").disabled = last === 0;
     byId("slider").addEventListener("input", (event) => this.choose(Number(event.target.value)));
     byId("show-contacts").addEventListener("change", (event) => {
       if (this.stage) this.stage.contacts.group.visible = event.target.checked;
@@ -247,7 +249,7 @@ class Viewer {
       });
       const swatch = element("span", "", "swatch");
       swatch.style.background = mesh.colour;
-      label.append(box, swatch, element("span", mesh.name, "of"), element("small", sizeOf(mesh)));
+      label.append(box, swatch, element("span", mesh.name, "of"), element("small", sizeOf(mesh, this.recording.steps.length)));
       const entry = document.createElement("li");
       entry.append(label);
       return entry;
@@ -331,11 +333,11 @@ class Viewer {
   }
 }
 
-function sizeOf(mesh) {
+function sizeOf(mesh, steps) {
   if (!mesh.topologies.length) return "no frame of it";
   const last = mesh.topologies.at(-1), versions = mesh.topologies.length;
   const what = last.faces ? `${last.faces.toLocaleString("en")} triangles` : `${last.vertices.toLocaleString("en")} points, no faces`;
-  const moves = mesh.topologies.some((topology) => topology.frames > 1) || versions > 1 ? "" : ", at rest";
+  const moves = steps === 1 || versions > 1 || last.frames > 1 ? "" : ", at rest";
   return what + moves + (versions > 1 ? `, ${versions} topologies` : "");
 }
 
