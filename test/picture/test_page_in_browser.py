@@ -4,6 +4,7 @@
 import chromium
 import numpy as np
 import pytest
+from bag_tools import rewrite
 from page_parts import Page
 from test_page import HOSTILE, page_of
 
@@ -52,8 +53,12 @@ class Scene:
 
     def drawn(self):
         """Which of the pixels show something."""
-        ground = [int(BACKGROUND[k : k + 2], 16) for k in (1, 3, 5)]
-        return np.abs(self.pixels() - ground).max(axis=2) > 12
+        return self.shows(self.pixels())
+
+    @staticmethod
+    def shows(pixels):
+        """Which are not of the background."""
+        return np.abs(pixels - [int(BACKGROUND[k : k + 2], 16) for k in (1, 3, 5)]).max(axis=-1) > 12
 
     def contacts_under_the_pointer(self, most):
         """(what is told, colour there) of some places at which contacts are drawn; all meshes must be hidden."""
@@ -82,8 +87,10 @@ def test_it_draws_and_steps_and_plays(browser, hpccd, small_bag, tmp_path):
     most = max(steps, key=lambda step: step["total"])
     assert browser.evaluate(STEP) == most["step"], "it opens with the step of most contacts"
     assert browser.evaluate(TITLE) == f"{most['total']} contacts in step {most['step']} of 89"
-    first = scene.pixels()
     assert 0.1 < scene.drawn().mean() < 0.9
+    browser.press("ArrowLeft", 37)  # the view widens where a step needs that
+    browser.press("ArrowRight", 39)
+    first = scene.pixels()
     browser.press("ArrowLeft", 37)
     assert browser.evaluate(STEP) == str(int(most["step"]) - 1)
     assert (np.abs(scene.pixels() - first).max(axis=2) > 30).mean() > 0.01, "another step looks different"
@@ -194,6 +201,50 @@ def test_what_moves_between_topologies_is_drawn(browser, hpccd, tmp_path):
         assert seen[-1].mean() > 0.05
     assert (seen[0] != seen[1]).mean() > 0.02
     assert browser.said == []
+
+
+def test_meshes_without_faces_are_drawn_as_points_and_missing_frames_not_at_all(browser, small_bag, tmp_path):
+    def change(index, message, decoded):
+        if message.topic == "/meshes/ball/topology":
+            decoded.faces = np.zeros(0, np.uint32)
+        return None if message.topic == "/meshes/ball/vertices" and index == 31 else decoded
+
+    rewrite(small_bag, tmp_path / "points.mcap", change)
+    page_of(tmp_path / "points.mcap", tmp_path / "points.html")
+    scene = opened(browser, tmp_path / "points.html")
+    assert "92 points, no faces" in browser.evaluate("document.getElementById('meshes').textContent")
+    browser.press("Home", 36)
+    scene.show(0, False)
+    points = scene.drawn()
+    assert 92 < points.sum() < 92 * 25
+    scene.show(0, True)
+    slider = "document.getElementById('slider')"
+    browser.evaluate(f"{slider}.value = 30; {slider}.dispatchEvent(new Event('input'))")
+    assert browser.evaluate(TITLE) == "No contacts known in step 31 of 89"
+    assert "Nothing is drawn" in browser.evaluate("document.getElementById('notices').textContent")
+    assert not scene.drawn()[100:].any(), "below the notices"
+    browser.press("ArrowLeft", 37)
+    assert scene.drawn().any()
+    assert browser.said == []
+
+
+def test_the_view_holds_each_step_until_it_is_moved_by_hand(browser, small_bag, tmp_path):
+    page_of(small_bag, tmp_path / "run.html")
+    scene = opened(browser, tmp_path / "run.html")
+    for key in (("Home", 36), ("End", 35)):
+        browser.press(*key)
+        assert scene.drawn().mean() > 0.1
+        left, right = (browser.picture()[scene.part[1] :, round(x)] for x in (scene.x + 3, scene.x + scene.width - 3))
+        height = round(0.85 * scene.height)
+        assert not scene.shows(left[100:height]).any() and not scene.shows(right[:height]).any()
+    middle = (scene.x + scene.width / 2, scene.y + scene.height / 2)
+    browser.drag(middle, (middle[0] + 3000, middle[1]))
+    before = scene.pixels()
+    browser.press("ArrowLeft", 37)
+    browser.press("ArrowRight", 39)
+    assert np.array_equal(scene.pixels(), before)
+    browser.press("f", 70)
+    assert not np.array_equal(scene.pixels(), before)
 
 
 def test_without_webgl_the_rest_of_it_works(small_bag, tmp_path):

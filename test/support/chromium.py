@@ -2,6 +2,7 @@
 """A page in a headless Chromium, driven over a pipe by the DevTools protocol: no driver has to be installed."""
 
 import base64
+import functools
 import io
 import json
 import os
@@ -33,10 +34,17 @@ os.execv(sys.argv[3], sys.argv[3:])
 """
 
 
+@functools.cache
 def program() -> str | None:
-    """Path of a Chromium, HPCCD_CHROMIUM if that is set."""
-    named = os.environ.get("HPCCD_CHROMIUM")
-    return named or next(filter(None, map(shutil.which, NAMES)), None)
+    """Path of a Chromium that runs, HPCCD_CHROMIUM if that is set. (Ubuntu's package is a program that only says where
+    to get one.)"""
+    if named := os.environ.get("HPCCD_CHROMIUM"):
+        return named
+    for path in filter(None, map(shutil.which, NAMES)):
+        told = subprocess.run([path, "--version"], env=_environment(), capture_output=True, timeout=60)
+        if told.returncode == 0:
+            return path
+    return None
 
 
 def _environment():

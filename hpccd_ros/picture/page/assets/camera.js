@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 "use strict";
 
-// A camera around a target, z up, moved by pointer and wheel. `changed` is called when it has moved.
+// A camera around a target, z up, moved by pointer and wheel. `changed` is called when it has moved; `touched`: by hand.
 class OrbitCamera {
   static FIELD_OF_VIEW = 24; // degrees, vertical; small ones flatten
   static MARGIN = 1.05;
@@ -15,6 +15,7 @@ class OrbitCamera {
     this.elevation = (elevation * Math.PI) / 180;
     this.canvas = canvas;
     this.changed = changed;
+    this.touched = false;
     this.pointers = new Map();
     canvas.addEventListener("pointerdown", (event) => this.down(event));
     canvas.addEventListener("pointermove", (event) => this.moved(event));
@@ -49,37 +50,49 @@ class OrbitCamera {
     this.three.updateMatrixWorld();
   }
 
-  // As near as all places, flat x y z, stay in view: each must lie between the side planes.
-  fit(places) {
-    if (!places.length) return;
-    const { right, up, backward } = this.axes();
-    const tall = Math.tan((OrbitCamera.FIELD_OF_VIEW * Math.PI) / 360) / OrbitCamera.MARGIN, wide = tall * this.three.aspect;
-    const most = { right: -Infinity, left: Infinity, top: -Infinity, bottom: Infinity, front: -Infinity, back: Infinity };
+  // How far places, flat x y z, reach towards each side of the view, and along it.
+  reach(places) {
+    const { right, up, backward } = this.axes(), { tall, wide } = this.slopes();
+    const most = { right: -Infinity, left: -Infinity, top: -Infinity, bottom: -Infinity, front: -Infinity, back: -Infinity };
     const place = new THREE.Vector3();
     for (let i = 0; i < places.length; i += 3) {
       place.fromArray(places, i);
       const x = place.dot(right), y = place.dot(up), z = place.dot(backward);
       most.right = Math.max(most.right, x + wide * z);
-      most.left = Math.min(most.left, x - wide * z);
+      most.left = Math.max(most.left, wide * z - x);
       most.top = Math.max(most.top, y + tall * z);
-      most.bottom = Math.min(most.bottom, y - tall * z);
+      most.bottom = Math.max(most.bottom, tall * z - y);
       most.front = Math.max(most.front, z);
-      most.back = Math.min(most.back, z);
+      most.back = Math.max(most.back, -z);
     }
-    const eye = Math.max((most.right - most.left) / (2 * wide), (most.top - most.bottom) / (2 * tall), most.front + 1e-3);
-    const middle = 0.5 * (most.front + most.back);
+    return most;
+  }
+
+  slopes() {
+    const tall = Math.tan((OrbitCamera.FIELD_OF_VIEW * Math.PI) / 360) / OrbitCamera.MARGIN;
+    return { tall, wide: tall * this.three.aspect };
+  }
+
+  // As near as all that reaches so far stays in view: it must lie between the side planes.
+  frame(most) {
+    if (most.front === -Infinity) return;
+    const { right, up, backward } = this.axes(), { tall, wide } = this.slopes();
+    const eye = Math.max((most.right + most.left) / (2 * wide), (most.top + most.bottom) / (2 * tall), most.front + 1e-3);
+    const middle = 0.5 * (most.front - most.back);
     this.distance = eye - middle;
-    this.target.set(0, 0, 0).addScaledVector(right, 0.5 * (most.right + most.left))
-      .addScaledVector(up, 0.5 * (most.top + most.bottom)).addScaledVector(backward, middle);
+    this.target.set(0, 0, 0).addScaledVector(right, 0.5 * (most.right - most.left))
+      .addScaledVector(up, 0.5 * (most.top - most.bottom)).addScaledVector(backward, middle);
     this.changed();
   }
 
   zoom(factor) {
+    this.touched = true;
     this.distance = Math.min(100, Math.max(1e-3, this.distance * factor));
     this.changed();
   }
 
   pan(dx, dy) {
+    this.touched = true;
     const { right, up } = this.axes();
     const size = (2 * this.distance * Math.tan((OrbitCamera.FIELD_OF_VIEW * Math.PI) / 360)) / this.canvas.clientHeight;
     this.target.addScaledVector(right, -dx * size).addScaledVector(up, dy * size);
@@ -87,6 +100,7 @@ class OrbitCamera {
   }
 
   turn(dx, dy) {
+    this.touched = true;
     this.azimuth -= dx * 0.007;
     this.elevation = Math.max(-1.55, Math.min(1.55, this.elevation + dy * 0.007));
     this.changed();

@@ -112,11 +112,6 @@ class Surfaces {
     }
     return values;
   }
-
-  // All that is drawn, flat x y z.
-  places() {
-    return this.group.children.flatMap((object) => [...object.geometry.attributes.position.array]);
-  }
 }
 
 function degrees(indices, vertices) {

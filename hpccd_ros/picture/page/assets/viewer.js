@@ -43,6 +43,7 @@ class Stage {
     this.step = step;
     this.surfaces.show(step, this.tint);
     this.contacts.show(step);
+    if (this.reach && !this.camera.touched && this.widen(step)) this.camera.frame(this.reach);
     this.later();
   }
 
@@ -63,25 +64,33 @@ class Stage {
     const { clientWidth: width, clientHeight: height } = this.canvas;
     this.renderer.setSize(width, height, false);
     this.camera.three.aspect = width / Math.max(height, 1);
-    this.camera.three.updateProjectionMatrix();
+    if (this.framed && !this.camera.touched) this.fit(this.framed);
     this.draw();
   }
 
-  // Frame the meshes that are shown, at these steps.
+  // Frame the meshes that are shown, at these steps; and from then on at others, too, unless the view is moved by hand.
   fit(steps) {
-    const places = [];
-    const { recording } = this;
+    this.framed = steps;
+    this.camera.touched = false;
+    this.reach = null;
+    for (const step of steps) this.widen(step);
+    if (this.reach) this.camera.frame(this.reach);
+  }
+
+  // True where the view has to be wider for this step.
+  widen(step) {
+    const { recording } = this, before = this.reach;
     for (const [mesh, visible] of this.surfaces.visible.entries()) {
-      for (const step of visible ? steps : []) {
-        const shown = recording.shown(mesh, step);
-        if (!shown || !shown.topology.vertices) continue;
-        const start = shown.frame * shown.topology.vertices;
-        const target = new Float32Array(3 * shown.topology.vertices);
-        recording.place(recording.meshes[mesh], shown.topology.positions, start, start + shown.topology.vertices, target);
-        for (const value of target) places.push(value);
-      }
+      const shown = visible && recording.shown(mesh, step);
+      if (!shown || !shown.topology.vertices) continue;
+      const start = shown.frame * shown.topology.vertices;
+      const places = new Float32Array(3 * shown.topology.vertices);
+      recording.place(recording.meshes[mesh], shown.topology.positions, start, start + shown.topology.vertices, places);
+      const reach = this.camera.reach(places);
+      for (const side of Object.keys(this.reach ?? {})) reach[side] = Math.max(reach[side], this.reach[side]);
+      this.reach = reach;
     }
-    this.camera.fit(places);
+    return Boolean(before) && Object.keys(before).some((side) => this.reach[side] > before[side] + 1e-6);
   }
 
   contactAt(x, y) {
@@ -130,7 +139,7 @@ class Viewer {
     this.show(this.worst);
     if (this.stage) {
       this.stage.resize();
-      this.stage.fit(this.sampled());
+      this.stage.fit(this.busy());
       this.stage.drawn = () => this.follow();
       this.stage.draw();
       this.bindPointer();
@@ -139,10 +148,12 @@ class Viewer {
     new ResizeObserver(() => { this.chart.draw(); this.times.show(this.step); }).observe(byId("chart"));
   }
 
-  sampled() {
-    const count = this.recording.steps.length;
-    const even = Array.from({ length: Viewer.FITTED }, (_, i) => Math.round((i * (count - 1)) / (Viewer.FITTED - 1)));
-    return [...new Set([this.step, ...even])];
+  // Some of those steps in which most happens.
+  busy() {
+    const totals = this.recording.steps.map((step) => step.total ?? 0), most = totals[this.worst];
+    const busy = [...totals.keys()].filter((step) => totals[step] >= 0.5 * most);
+    const even = Array.from({ length: Viewer.FITTED }, (_, i) => busy[Math.floor((i * (busy.length - 1)) / (Viewer.FITTED - 1))]);
+    return [...new Set([this.worst, ...even])];
   }
 
   show(step) {
