@@ -59,7 +59,7 @@ class RecordingPage:
             "total": None if step.contacts is None else step.total,
             "drawn": drawn,
             "milliseconds": None if step.contacts is None else step.milliseconds,
-            "facts": [] if step.contacts is None else facts(step),
+            "facts": [] if step.contacts is None else [shortened(fact, 100) for fact in facts(step)],
             "notices": [shortened(notice, 400) for notice in self._notices(step, sum(drawn))],
             "place": len(self._numbers) - 1,
         })  # fmt: skip

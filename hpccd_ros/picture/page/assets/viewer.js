@@ -370,7 +370,7 @@ function halt(text) {
 async function start() {
   if (typeof DecompressionStream === "undefined") {
     byId("title").textContent = "Not shown";
-    halt("This browser is too old for this page: it needs DecompressionStream (Chrome 80, Firefox 113, Safari 16.4).");
+    halt("This browser is too old for this page: it needs DecompressionStream (Chrome 92, Firefox 113, Safari 16.4).");
     return;
   }
   const recording = new Recording(JSON.parse(byId("content").textContent));
