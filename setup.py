@@ -141,7 +141,7 @@ class BinaryDistribution(Distribution):
 setup(
     distclass=BinaryDistribution,
     packages=find_packages(include=["hpccd_ros", "hpccd_ros.*"]),
-    package_data={"": ["*.pyi", "py.typed", "*.yaml", "*.json"]},
+    package_data={"": ["*.pyi", "py.typed", "*.yaml", "*.json", "assets/*"]},
     cmdclass={
         "build_py": FreshPythonFiles,
         "build_ext": CMakeBuild,

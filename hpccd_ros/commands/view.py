@@ -1,14 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Look at recorded steps: pictures of shaded meshes with contacts coloured by their time in the step, or all of it in
-the Rerun viewer.
+"""Look at recorded steps: pictures of shaded meshes with contacts coloured by their time in the step, a page for any
+browser, or all of it in the Rerun viewer.
 
   hpccd view run.mcap                       the step with most contacts, into run.png
   hpccd view run.mcap --step 30 -o frame.png
   hpccd view run.mcap --every 1 -o frames   a sequence frames/000000.png, ... of every step, for a film
+  hpccd view run.mcap --html run.html       one file to turn, play and step in a browser, without a network
   hpccd view run.mcap --rerun               opens the Rerun viewer; without a screen, writes run.rrd
   hpccd view run.mcap -o run.rrd            meshes, contacts, normals and curves on a timeline, to open elsewhere
 
-Pictures need no display and no graphics driver. Rerun comes with the extra "rerun".
+Pictures need no display and no graphics driver. Pages need the extra "page", Rerun the extra "rerun".
 """
 
 import math
@@ -19,13 +20,14 @@ from hpccd_ros.base.errors import UserError
 def configure(parser):
     parser.add_argument("file", metavar="FILE", help="recording: an .mcap file, or a folder of them")
     parser.add_argument("-o", "--output", metavar="PATH",
-                        help="picture (.png, .jpg, .pdf), Rerun recording (.rrd), or folder with --every")
+                        help="picture (.png, .jpg, .pdf), page (.html), Rerun recording (.rrd), or folder with --every")
+    parser.add_argument("--html", metavar="PATH", help="write a page that any browser opens, without a network")
     parser.add_argument("--rerun", action="store_true",
                         help="open the Rerun viewer; where there is no screen, write a Rerun recording")
     which = parser.add_mutually_exclusive_group()
     which.add_argument("--step", type=int, metavar="N", help="step number (default: the one with most contacts)")
     which.add_argument("--every", type=int, metavar="K",
-                       help="each K-th step, into a folder or the Rerun recording (there: default 1)")
+                       help="each K-th step, into a folder, the page or the Rerun recording (those: default 1)")
     parser.add_argument("--azimuth", type=float, default=-60.0, metavar="DEG",
                         help="from where to look, around z (default: %(default)s)")
     parser.add_argument("--elevation", type=float, default=26.0, metavar="DEG",
@@ -41,6 +43,8 @@ def run(args) -> int:
         raise UserError(f"--elevation {args.elevation}: must lie between -89.9 and 89.9 degrees")
     if not math.isfinite(args.azimuth):
         raise UserError(f"--azimuth {args.azimuth}: must be a number of degrees")
+    if args.html is not None and (args.rerun or args.output is not None):
+        raise UserError(f"--html {args.html}: takes neither --rerun nor --output")
     from hpccd_ros.picture import view
 
     return view.main(args)

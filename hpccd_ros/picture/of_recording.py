@@ -26,23 +26,14 @@ def draw_step(step: ReplayedStep, path, history: History | None = None, *, title
     """Write a picture of `step`, which was computed with outputs=("points",). view: azimuth, elevation, size."""
     found = step.contacts
     meshes, offsets = meshes_in_the_middle(step), step.layout.vertex_offsets
-    triangles, segments = (sum(len(mesh[i]) for mesh in meshes) for i in (2, 3))
-    accuracy = f"accuracy {step.recorded.accuracy}" if step.recorded is not None else None
-    first = f"first at t = {found.first_toc:.4f}" if step.total else None
     of = f" of {max(history.steps)}" if history is not None else ""
-    facts = [
-        f"{triangles:,} triangles" if triangles else None, f"{segments:,} lone edges" if segments else None,
-        f"{len(found.vf):,} vertex-face", f"{len(found.ee):,} edge-edge", first,
-        f"{step.milliseconds:.1f} ms", accuracy, separation_fact(step.separation), features_fact(step.features),
-        f"hash {found.hash:016x}",
-    ]  # fmt: skip
     drawn = picture.Picture(
         meshes,
         touched(found, scene_indices([faces for _, _, faces, _ in meshes], np.diff(offsets)), offsets[-1]),
         np.asarray(found.points),
         np.concatenate([found.vf_toc, found.ee_toc]),
         f"{step.total:,} contact{'' if step.total == 1 else 's'} in step {step.step}" + of,
-        [fact for fact in facts if fact],
+        facts(step),
         title,
     )
     context = None
@@ -51,6 +42,20 @@ def draw_step(step: ReplayedStep, path, history: History | None = None, *, title
             np.array(history.steps), np.array(history.contacts), np.array(history.milliseconds), step.step
         )
     picture.draw(drawn, path, context, **view)
+
+
+def facts(step: ReplayedStep) -> list[str]:
+    """What a line beneath the title says of a step that was computed."""
+    found = step.contacts
+    triangles, edges = (sum(len(getattr(t, kind)) for t in step.end_frame.topologies) for kind in ("faces", "edges"))
+    told = [
+        f"{triangles:,} triangles" if triangles else None, f"{edges:,} lone edges" if edges else None,
+        f"{len(found.vf):,} vertex-face", f"{len(found.ee):,} edge-edge",
+        f"first at t = {found.first_toc:.4f}" if step.total else None, f"{step.milliseconds:.1f} ms",
+        f"accuracy {step.recorded.accuracy}" if step.recorded is not None else None,
+        separation_fact(step.separation), features_fact(step.features), f"hash {found.hash:016x}",
+    ]  # fmt: skip
+    return [fact for fact in told if fact]
 
 
 def separation_fact(separation: Separation) -> str | None:

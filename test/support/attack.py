@@ -89,9 +89,9 @@ def work(folder: Path) -> None:
 
 def run_case(name: str, folder: Path) -> dict:
     """{command: outcome} and problems (texts) of one case."""
-    ends = ("in.mcap", "out.mcap", "x.png", "x.json", "x.csv")
-    path, saved, picture, table, steps = (folder / f"{os.getpid()}-{end}" for end in ends)
-    for leftover in (saved, picture, table):
+    ends = ("in.mcap", "out.mcap", "x.png", "x.html", "x.json", "x.csv")
+    path, saved, picture, page, table, steps = (folder / f"{os.getpid()}-{end}" for end in ends)
+    for leftover in (saved, picture, page, table):
         leftover.unlink(missing_ok=True)
     path.write_bytes(make_case(name, folder))
     problems, outcomes = [], {}
@@ -123,6 +123,7 @@ def run_case(name: str, folder: Path) -> dict:
     command("recover", "doctor", path, "--recover", saved)
     replayed = replay("replay", path)
     command("view", "view", path, "-o", picture)
+    command("page", "view", path, "--html", page)
     if name.split("/")[1] in PLAYED:
         command("play", "replay", path, "--publish", "--all", "--subscribers", 0, "--wait", 0, "--rate", 0)
     if outcomes["doctor"] == 0 and re.search(r" is damaged | is cut off", replayed.err):

@@ -1,0 +1,170 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a page holds of a replayed recording, and what it says about it in words."""
+
+import itertools
+from collections import Counter
+
+import numpy as np
+
+from hpccd_ros.base.errors import UserError
+from hpccd_ros.base.quoting import shortened
+from hpccd_ros.picture.contacts import BACKGROUND, FAINT, INK, MESH_COLOURS, TINT, TOC_COLOURS
+from hpccd_ros.picture.of_recording import facts
+from hpccd_ros.picture.page.contact_columns import MOST, ContactColumns
+from hpccd_ros.picture.page.positions import MeshPositions
+from hpccd_ros.replay.recomputed import Replay, ReplayedStep
+
+# Bytes of positions that a browser is asked to hold.
+MOST_POSITIONS = 1 << 29
+# Why there may be nothing of a step.
+GAP = "(dropped, not recorded, or begun with another topology)"
+# Colours of times of contact between which the page blends.
+TOC_SHADES = 33
+
+
+class RecordingPage:
+    """Collects steps, computed with outputs=("points",). every: those that are shown, each so many-th."""
+
+    def __init__(self, replay: Replay, mesh_names, title: str, *, every=1, azimuth=-60.0, elevation=26.0):
+        self._replay = replay
+        self._meshes = [MeshPositions(name) for name in mesh_names]
+        self._contacts = ContactColumns()
+        self._title, self._every = title, every
+        self._view = {"azimuth": azimuth, "elevation": elevation}
+        self._steps: list[dict] = []
+        self._first_end: int | None = None
+        self._numbers: list[int] = []  # of all steps of the recording
+        self._missing = self._differ = self._truncated = self._cut = 0
+        self._dropped = 0
+
+    @property
+    def steps(self) -> int:
+        return len(self._steps)
+
+    def add(self, step: ReplayedStep, shown: bool = True) -> None:
+        """The next step of the recording. shown: false for one that is only looked at for what is missing around it.
+
+        Raises UserError where the page would ask more of a browser than it can hold.
+        """
+        self._numbers.append(step.step)
+        if step.recorded is not None:
+            self._dropped = step.recorded.dropped_frames
+        if not shown:
+            return
+        self._add_positions(step)
+        drawn = (0, 0) if step.contacts is None else self._contacts.add(step.contacts, step.layout)
+        self._steps.append({
+            "step": str(step.step),  # a publisher may count to 2**64, more than a number of the page holds
+            "time": self._time(step),
+            "total": None if step.contacts is None else step.total,
+            "drawn": drawn,
+            "milliseconds": None if step.contacts is None else step.milliseconds,
+            "facts": [] if step.contacts is None else [shortened(fact, 100) for fact in facts(step)],
+            "notices": [shortened(notice, 400) for notice in self._notices(step, sum(drawn))],
+            "place": len(self._numbers) - 1,
+        })  # fmt: skip
+
+    def _add_positions(self, step):
+        frame = step.end_frame
+        for number, mesh in enumerate(self._meshes):
+            if frame is None:
+                mesh.add_nothing()
+            else:
+                mesh.add(frame.topologies[number], frame.vertices[number])
+        if sum(mesh.bytes for mesh in self._meshes) > MOST_POSITIONS:
+            raise UserError(
+                f"the positions of {self.steps} steps fill the {MOST_POSITIONS >> 20} MB that a page may hold; "
+                f"show fewer of them: --every {2 * self._every}"
+            )
+
+    def _time(self, step):
+        if step.end_frame is None:
+            return None
+        if self._first_end is None:
+            self._first_end = step.end
+        return (step.end - self._first_end) * 1e-9
+
+    def _notices(self, step, drawn):
+        if step.missing:
+            self._missing += 1
+            yield f"No contacts are shown for this step: {step.missing}."
+        if step.end_frame is None:
+            yield "Nothing is drawn: the recording holds no positions of all meshes at the end of this step."
+        if step.difference:
+            self._differ += 1
+            yield f"The recorded answer was another one: {step.difference}."
+        recorded = step.recorded
+        if recorded is not None and recorded.truncated:
+            self._truncated += 1
+            yield (f"The recorded answer held only the {len(recorded.kind):,} earliest of {recorded.total:,} contacts "
+                   "(max_contacts).")  # fmt: skip
+        if step.total > drawn:
+            self._cut += 1
+            yield f"Drawn are {drawn:,} of {step.total:,} contacts, evenly from the earliest on."
+
+    def described(self) -> tuple[dict, dict[str, bytes]]:
+        """(what the page says, as JSON can hold it, {name: bytes} of what it draws)."""
+        meshes, blobs = [], {}
+        for number, mesh in enumerate(self._meshes):
+            said, of_mesh = mesh.described()
+            meshes.append({**said, "colour": MESH_COLOURS[number % len(MESH_COLOURS)]})
+            blobs |= {f"mesh-{number}-{name}": data for name, data in of_mesh.items()}
+        gaps = _gaps(self._numbers)
+        contacts, columns = self._contacts.described()
+        blobs |= {f"contacts-{name}": data for name, data in columns.items()}
+        said = {
+            "title": shortened(self._title),
+            "view": self._view,
+            "colours": {
+                "background": BACKGROUND, "ink": INK, "faint": FAINT, "tint": TINT,
+                "toc": [[float(c) for c in TOC_COLOURS(t)[:3]] for t in np.linspace(0.0, 1.0, TOC_SHADES)],
+            },
+            "meshes": meshes,
+            "contacts": contacts,
+            "steps": [self._with_gap(step, gaps) for step in self._steps],
+            "notes": self._notes(sum(gaps)),
+        }  # fmt: skip
+        return said, blobs
+
+    def _with_gap(self, step, gaps):
+        missing = gaps[step["place"]]
+        notices = [f"{_count(missing, 'step')} right before this one: no answer {GAP}."] if missing else []
+        return {**step, "gap": missing, "notices": step["notices"] + notices}
+
+    def _notes(self, left_out):
+        replay = self._replay
+        notes = []
+        if not replay.recorded_answers:
+            notes.append("The recording holds no answers of a node: contacts were computed from its frames.")
+        if self._every > 1:
+            notes.append(f"Each {_ordinal(self._every)} step of the recording is shown (--every {self._every}).")
+        for count, what in (
+            (self._missing, "could not be computed: their contacts are not shown"),
+            (self._differ, "were recorded with other contacts than those computed again, which are shown"),
+            (self._truncated, "had their recorded answer truncated (max_contacts); all contacts were computed again"),
+            (self._cut, f"have more than {MOST:,} contacts, of which so many are drawn"),
+        ):
+            if count:
+                notes.append(f"{count:,} of {_count(len(self._steps), 'step')} {what}.")
+        if left_out:
+            notes.append(f"{_count(left_out, 'step')} between the first and the last one: no answer {GAP}.")
+        if self._dropped:
+            notes.append(f"The node had dropped {_count(self._dropped, 'frame')} when it gave the last answer.")
+        return notes
+
+
+def _gaps(numbers: list[int]) -> list[int]:
+    """For each step how many are missing right before it. A publisher may give every tenth step only: what is between
+    most of them is not missing."""
+    forward = [max(b - a, 0) for a, b in itertools.pairwise(numbers)]
+    usual = Counter(filter(None, forward)).most_common(1)
+    return [0] + [max(difference // usual[0][0] - 1, 0) if usual else 0 for difference in forward] if numbers else []
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number:,} {what}{'' if number == 1 else 's'}"
+
+
+def _ordinal(number: int) -> str:
+    ending = "th" if number % 100 in (11, 12, 13) else {1: "st", 2: "nd", 3: "rd"}.get(number % 10, "th")
+    return f"{number}{ending}"

@@ -1,0 +1,275 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The page in a real browser: it draws, plays and answers to the pointer, complains of nothing and asks for nothing."""
+
+import chromium
+import numpy as np
+import pytest
+from bag_tools import rewrite
+from page_parts import Page
+from test_page import HOSTILE, page_of
+
+from hpccd_ros.picture.contacts import BACKGROUND, TOC_COLOURS
+
+pytestmark = pytest.mark.skipif(
+    chromium.program() is None,
+    reason="no Chromium here to open the page in: apt install chromium, or HPCCD_CHROMIUM=PATH",
+)
+
+READY = "document.body?.dataset.ready === 'yes'"
+STEP = "document.body.dataset.step"
+TITLE = "document.getElementById('title').textContent"
+TIP = "document.getElementById('tip').hidden ? '' : document.getElementById('tip').textContent"
+
+
+@pytest.fixture
+def browser(tmp_path):
+    with chromium.Chromium(tmp_path / "profile") as opened:
+        yield opened
+
+
+def opened(browser, page):
+    browser.open(page)
+    browser.wait(READY)
+    return Scene(browser)
+
+
+class Scene:
+    """The part of the tab in which the step is drawn."""
+
+    def __init__(self, browser):
+        self.browser = browser
+        rectangle = "(({x, y, width, height}) => [x, y, width, height])"
+        self.x, self.y, self.width, self.height = browser.evaluate(
+            f"{rectangle}(document.getElementById('scene').getBoundingClientRect())"
+        )
+        self.part = [
+            round(self.x + 0.25 * self.width), round(self.y + 2), round(0.7 * self.width), round(0.9 * self.height)
+        ]  # fmt: skip
+
+    def pixels(self):
+        """Those of `part`, where no text stands."""
+        x, y, w, h = self.part
+        return self.browser.picture()[y : y + h, x : x + w]
+
+    def drawn(self):
+        """Which of the pixels show something."""
+        return self.shows(self.pixels())
+
+    @staticmethod
+    def shows(pixels):
+        """Which are not of the background."""
+        return np.abs(pixels - [int(BACKGROUND[k : k + 2], 16) for k in (1, 3, 5)]).max(axis=-1) > 12
+
+    def contacts_under_the_pointer(self, most):
+        """(what is told, colour there) of some places at which contacts are drawn; all meshes must be hidden."""
+        picture, drawn = self.pixels(), self.drawn()
+        rows, columns = np.nonzero(drawn)
+        chosen = []
+        for row, column in np.random.default_rng(4).permutation(np.stack([rows, columns], axis=1)):
+            whole = drawn[max(row - 1, 0) : row + 2, max(column - 1, 0) : column + 2].all()  # not the soft border
+            if whole and all(np.hypot(row - r, column - c) > 12 for r, c in chosen) and len(chosen) < most:
+                chosen.append((row, column))
+        for row, column in chosen:
+            self.browser.move(self.part[0] + column + 0.5, self.part[1] + row + 0.5)
+            yield self.browser.wait(TIP, 10), picture[row, column]
+
+    def show(self, mesh, on):
+        """Toggle a mesh in the legend."""
+        box = f"document.querySelectorAll('#meshes input')[{mesh}]"
+        assert self.browser.evaluate(f"{box}.checked") is not on
+        self.browser.evaluate(f"{box}.click()")
+
+
+def test_it_draws_and_steps_and_plays(browser, hpccd, small_bag, tmp_path):
+    assert hpccd("view", small_bag, "--html", "run.html").returncode == 0
+    scene = opened(browser, tmp_path / "run.html")
+    steps = Page(tmp_path / "run.html").said["steps"]
+    most = max(steps, key=lambda step: step["total"])
+    assert browser.evaluate(STEP) == most["step"], "it opens with the step of most contacts"
+    assert browser.evaluate(TITLE) == f"{most['total']} contacts in step {most['step']} of 89"
+    assert 0.1 < scene.drawn().mean() < 0.9
+    browser.press("ArrowLeft", 37)  # the view widens where a step needs that
+    browser.press("ArrowRight", 39)
+    first = scene.pixels()
+    browser.press("ArrowLeft", 37)
+    assert browser.evaluate(STEP) == str(int(most["step"]) - 1)
+    assert (np.abs(scene.pixels() - first).max(axis=2) > 30).mean() > 0.01, "another step looks different"
+    browser.press("ArrowRight", 39)
+    assert browser.evaluate(STEP) == most["step"] and np.array_equal(scene.pixels(), first), "and the same one the same"
+
+    browser.press("Home", 36)
+    assert browser.evaluate(STEP) == "1" and browser.evaluate("document.getElementById('back').disabled")
+    assert "Nothing touches in this step." in browser.evaluate("document.getElementById('notices').textContent")
+    browser.press(" ", 32)
+    browser.wait(f"Number({STEP}) > 5")
+    browser.press(" ", 32)
+    stopped = browser.evaluate(STEP)
+    scene.pixels()
+    assert browser.evaluate(STEP) == stopped, "space stops it again"
+    browser.press("End", 35)
+    assert browser.evaluate(STEP) == "89"
+    assert browser.said == [] and browser.asked == [(tmp_path / "run.html").as_uri()]
+
+
+def test_a_click_in_the_chart_shows_that_step(browser, small_bag, tmp_path):
+    page_of(small_bag, tmp_path / "run.html")
+    opened(browser, tmp_path / "run.html")
+    box = "(({x, y, width, height}) => [x, y, width, height])(document.getElementById('chart').getBoundingClientRect())"
+    x, y, width, height = browser.evaluate(box)
+    left, right = browser.evaluate("[Chart.LEFT, Chart.RIGHT]")
+    for step in (1, 20, 57, 89):
+        place = (x + left + (width - left - right) * (step - 0.5) / 89, y + height / 2)
+        browser.drag(place, place)
+        assert browser.evaluate(STEP) == str(step)
+        assert browser.evaluate("document.getElementById('slider').value") == str(step - 1)
+    assert browser.said == []
+
+
+def test_the_pointer_on_a_contact_tells_its_pair(browser, small_bag, tmp_path):
+    page = page_of(small_bag, tmp_path / "run.html", shown=lambda number: number == 79)
+    scene = opened(browser, tmp_path / "run.html")
+    contacts = page.contacts(0)
+    said = {}
+    for row, ((a, b), (a0, a1, b0, b1)) in enumerate(zip(contacts["meshes"], contacts["features"], strict=True)):
+        a, b = ("cloth", "ball")[a], ("cloth", "ball")[b]
+        vertex_face, edges = f"vertex {a}:{a0} – face {b}:{b0}", f"edge {a}:{a0}-{a1} – edge {b}:{b0}-{b1}"
+        said[vertex_face if row < contacts["vf"] else edges] = (contacts["toc"][row], contacts["points"][row])
+    for mesh in (0, 1):
+        scene.show(mesh, False)
+    told = set()
+    for text, _ in scene.contacts_under_the_pointer(30):
+        pair, time, where = text.split("\n")
+        toc, point = said[pair]
+        assert time == f"t = {toc:.4f} of the step"
+        shown = [float(value) for value in where.removeprefix("at ").split(",")]
+        assert np.abs(shown - point).max() < 2 * page.said["contacts"]["step"]
+        told.add(pair)
+    assert len(told) > 15 and {pair.split(" ")[0] for pair in told} == {"vertex", "edge"}
+    assert browser.said == []
+
+
+def test_contacts_are_drawn_in_the_colour_of_their_time(browser, small_bag, tmp_path):
+    page = page_of(small_bag, tmp_path / "run.html", shown=lambda number: number == 29)
+    scene = opened(browser, tmp_path / "run.html")
+    assert 3 <= page.said["steps"][0]["total"] <= 40, "few, so that one does not hide the other"
+    for mesh in (0, 1):
+        scene.show(mesh, False)
+    away = []
+    for text, colour in scene.contacts_under_the_pointer(10):
+        toc = float(text.split("\n")[1].split()[2])
+        away.append(np.abs(colour - 255 * np.array(TOC_COLOURS(toc)[:3])).max())
+    assert len(away) >= 3 and max(away) < 25, away
+
+
+def test_meshes_are_hidden_and_the_view_is_turned(browser, small_bag, tmp_path):
+    page_of(small_bag, tmp_path / "run.html", shown=lambda number: number == 0)
+    scene = opened(browser, tmp_path / "run.html")
+    both = scene.drawn()
+    scene.show(0, False)
+    ball = scene.drawn()
+    assert 0.01 < ball.mean() < 0.8 * both.mean()
+    scene.show(1, False)
+    assert scene.drawn().mean() == 0
+    scene.show(0, True)
+    before = scene.pixels()
+    middle = (scene.x + scene.width / 2, scene.y + scene.height / 2)
+    browser.drag(middle, (middle[0] + 150, middle[1] + 40))
+    assert (np.abs(scene.pixels() - before).max(axis=2) > 20).mean() > 0.02
+    assert browser.said == []
+
+
+def test_names_are_shown_and_never_run(browser, small_bag, tmp_path):
+    page_of(small_bag, tmp_path / "wild.html", shown=lambda number: number > 60, names=HOSTILE, title=HOSTILE[0])
+    opened(browser, tmp_path / "wild.html")
+    shown = browser.evaluate("[...document.querySelectorAll('#meshes .of')].map((name) => name.textContent)")
+    assert shown == list(HOSTILE)
+    assert browser.evaluate("document.getElementById('name').textContent") == HOSTILE[0]
+    assert browser.evaluate("document.title") == f"{HOSTILE[0]} · hpccd"
+    browser.evaluate("document.body.append(Object.assign(document.createElement('script'), {textContent: 'ran = 1'}))")
+    assert browser.evaluate("typeof ran") == "undefined", "its policy lets no other script run"
+    assert all("Content Security Policy" in line for line in browser.said) and browser.said
+
+
+def test_what_moves_between_topologies_is_drawn(browser, hpccd, tmp_path):
+    assert hpccd("scene", "breaking-like", "--size", 0.015625, "--mcap", "break.mcap").returncode == 0
+    page_of(tmp_path / "break.mcap", tmp_path / "break.html")
+    scene = opened(browser, tmp_path / "break.html")
+    seen = []
+    for key in (("Home", 36), ("End", 35)):
+        browser.press(*key)
+        seen.append(scene.drawn())
+        assert seen[-1].mean() > 0.05
+    assert (seen[0] != seen[1]).mean() > 0.02
+    assert browser.said == []
+
+
+def test_edges_are_drawn_as_lines(browser, small_bag, tmp_path):
+    seen = []
+    for name, edges in (("points", ()), ("rope", [k + end for k in range(91) for end in (0, 1)])):
+        def change(_, message, decoded, edges=edges):
+            if message.topic == "/meshes/ball/topology":
+                decoded.faces, decoded.edges = np.zeros(0, np.uint32), np.array(edges, np.uint32)
+            return decoded
+
+        rewrite(small_bag, tmp_path / f"{name}.mcap", change)
+        page_of(tmp_path / f"{name}.mcap", tmp_path / f"{name}.html")
+        scene = opened(browser, tmp_path / f"{name}.html")
+        browser.press("Home", 36)
+        scene.show(0, False)
+        seen.append(scene.drawn().sum())
+    assert seen[1] > 1.5 * seen[0]
+    assert "91 edges" in browser.evaluate("document.getElementById('meshes').textContent")
+
+
+def test_meshes_without_faces_are_drawn_as_points_and_missing_frames_not_at_all(browser, small_bag, tmp_path):
+    def change(index, message, decoded):
+        if message.topic == "/meshes/ball/topology":
+            decoded.faces = np.zeros(0, np.uint32)
+        return None if message.topic == "/meshes/ball/vertices" and index == 31 else decoded
+
+    rewrite(small_bag, tmp_path / "points.mcap", change)
+    page_of(tmp_path / "points.mcap", tmp_path / "points.html")
+    scene = opened(browser, tmp_path / "points.html")
+    assert "92 points, no faces" in browser.evaluate("document.getElementById('meshes').textContent")
+    browser.press("Home", 36)
+    scene.show(0, False)
+    points = scene.drawn()
+    assert 92 < points.sum() < 92 * 25
+    scene.show(0, True)
+    slider = "document.getElementById('slider')"
+    browser.evaluate(f"{slider}.value = 30; {slider}.dispatchEvent(new Event('input'))")
+    assert browser.evaluate(TITLE) == "No contacts known in step 31 of 89"
+    assert "Nothing is drawn" in browser.evaluate("document.getElementById('notices').textContent")
+    assert not scene.drawn()[100:].any(), "below the notices"
+    browser.press("ArrowLeft", 37)
+    assert scene.drawn().any()
+    assert browser.said == []
+
+
+def test_the_view_holds_each_step_until_it_is_moved_by_hand(browser, small_bag, tmp_path):
+    page_of(small_bag, tmp_path / "run.html")
+    scene = opened(browser, tmp_path / "run.html")
+    for key in (("Home", 36), ("End", 35)):
+        browser.press(*key)
+        assert scene.drawn().mean() > 0.1
+        left, right = (browser.picture()[scene.part[1] :, round(x)] for x in (scene.x + 3, scene.x + scene.width - 3))
+        height = round(0.85 * scene.height)
+        assert not scene.shows(left[100:height]).any() and not scene.shows(right[:height]).any()
+    middle = (scene.x + scene.width / 2, scene.y + scene.height / 2)
+    browser.drag(middle, (middle[0] + 3000, middle[1]))
+    before = scene.pixels()
+    browser.press("ArrowLeft", 37)
+    browser.press("ArrowRight", 39)
+    assert np.array_equal(scene.pixels(), before)
+    browser.press("f", 70)
+    assert not np.array_equal(scene.pixels(), before)
+
+
+def test_without_webgl_the_rest_of_it_works(small_bag, tmp_path):
+    page_of(small_bag, tmp_path / "run.html")
+    with chromium.Chromium(tmp_path / "profile", options=["--disable-3d-apis"]) as browser:
+        opened(browser, tmp_path / "run.html")
+        assert "gives no WebGL" in browser.evaluate("document.getElementById('halt').textContent")
+        browser.press("End", 35)
+        assert browser.evaluate(STEP) == "89" and "contacts in step 89 of 89" in browser.evaluate(TITLE)
+        assert browser.said == ["THREE.WebGLRenderer: Error creating WebGL context."]
