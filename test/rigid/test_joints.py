@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 
-from hpccd_ros.bench.core.rigid_queries import _links, _motion
+from hpccd_ros.bench.core.rigid_queries import random_motion, random_paths
 from hpccd_ros.rigid.body import Body
 from hpccd_ros.rigid.cuts import fewest_parts
 from hpccd_ros.rigid.joints import Joint, JointStep, LinkMotion
@@ -44,10 +44,10 @@ def deviation(motion, parts=1, samples=81):
 @pytest.mark.parametrize("parts", [1, 3])
 def test_random_chains_stay_within_the_bound(parts):
     rng = np.random.default_rng(8)
-    paths = _links(rng, 150, 3, np.ones(150))
+    paths = random_paths(rng, 150, 3, np.ones(150), "joints")
     ratios = []
     for k in range(150):
-        motion = _motion(paths, k)
+        motion = random_motion(paths, k)
         true, bound = deviation(motion, parts, 33), motion.deviation(parts)
         assert true <= bound + motion.rounding(parts)
         if bound > 1e-9:
@@ -58,11 +58,11 @@ def test_random_chains_stay_within_the_bound(parts):
 def test_the_samples_are_of_the_true_motion():
     """Forward kinematics against products of matrices that share no code with them."""
     rng = np.random.default_rng(9)
-    paths = _links(rng, 40, 3, np.ones(40))
+    paths = random_paths(rng, 40, 3, np.ones(40), "joints")
     for k in range(40):
         for t in (0.0, 0.3, 1.0):
             true = paths.at(np.array([k]), np.array([t]), np.longdouble)[0][0]
-            motion = _motion(paths, k)
+            motion = random_motion(paths, k)
             found = motion.step.poses(t)[motion.link].apply(motion.body.vertices)
             assert np.abs(found - true).max() < 1e-12
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from random_poses import random_screw, true_vertices
 
-from hpccd_ros.bench.core.rigid_queries import _links, _motion
+from hpccd_ros.bench.core.rigid_queries import random_motion, random_paths
 from hpccd_ros.rigid.body import Body
 from hpccd_ros.rigid.motion import Linear, ScrewMotion
 
@@ -39,10 +39,10 @@ def test_vertices_of_a_screw(far, kind):
 
 def test_vertices_of_links():
     rng = np.random.default_rng(6)
-    paths = _links(rng, 60, 3, np.ones(60))
+    paths = random_paths(rng, 60, 3, np.ones(60), "joints")
     ratios = []
     for k in range(60):
-        motion = _motion(paths, k)
+        motion = random_motion(paths, k)
         for parts in (1, 3):
             for cut in range(parts + 1):
                 true = paths.at(np.array([k]), np.array([LONG(cut) / parts]), LONG)[0][0]

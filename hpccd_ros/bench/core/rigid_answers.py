@@ -54,10 +54,11 @@ def ask(queries: Queries) -> Answers:
 class Verdict:
     """Counts of queries.
 
-    ``missed``: reported free, and proven to come within the distance. ``late``: reported later than that. ``beyond``: at
-    the time that is reported farther apart than the distance and twice the bound. ``open``: reported free or in time,
-    and not proven either way. ``excess``: reported, and proven not to come within the distance. ``worst_excess``: the
-    greatest distance at the time that is reported less that asked for, over the bound.
+    ``missed``: reported free, and proven to come within the distance. ``late``: reported later than that.
+    ``beyond``: at the time that is reported farther apart than the distance and twice the bound.
+    ``open``: reported free, or in time, and not proven either way.
+    ``excess``: reported, and proven not to come within the distance.
+    ``worst_excess``: the greatest distance at the time that is reported less that asked for, over the bound.
     """
 
     queries: int

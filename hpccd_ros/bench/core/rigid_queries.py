@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hpccd_ros.bench.core.rigid_paths import LinkPaths, ScrewPaths
+from hpccd_ros.bench.core.rigid_paths import LinkPaths, Paths, ScrewPaths
 from hpccd_ros.bench.core.rigid_truth import Pairs
 from hpccd_ros.rigid.body import Body
 from hpccd_ros.rigid.joints import Joint, JointStep, LinkMotion
@@ -31,18 +31,23 @@ class Queries:
 
     def motions(self, k: int) -> tuple[Motion, Motion]:
         """Of both sides of query k, as hpccd_ros.rigid has them."""
-        return _motion(self.pairs.a, k), _motion(self.pairs.b, k)
+        return random_motion(self.pairs.a, k), random_motion(self.pairs.b, k)
 
 
 def random_queries(rng: np.random.Generator, n: int, kind: str, motion: str) -> Queries:
     corners = (1, 3) if kind == "vf" else (2, 2)
     size = 10.0 ** rng.uniform(-1, 1, n)
-    b = _screws(rng, n, corners[1], size)
-    a = _screws(rng, n, corners[0], size) if motion == "screws" else _links(rng, n, corners[0], size)
+    b = random_paths(rng, n, corners[1], size, "screws")
+    a = random_paths(rng, n, corners[0], size, motion)
     distance = np.where(rng.random(n) < 0.25, 0.0, size * 10.0 ** rng.uniform(-6, -1, n))
     pairs = _brought_near(rng, Pairs(a, b, kind), distance, size)
     tolerance = size * 10.0 ** rng.uniform(-5, -0.5, n)
     return Queries(pairs, distance, tolerance)
+
+
+def random_paths(rng: np.random.Generator, n: int, corners: int, size: np.ndarray, motion: str) -> Paths:
+    """Of n times so many points within a body of this size (n,)."""
+    return _screws(rng, n, corners, size) if motion == "screws" else _links(rng, n, corners, size)
 
 
 def _screws(rng, n, corners, size):
@@ -138,7 +143,8 @@ def _nearest_time(pairs):
     return middle
 
 
-def _motion(paths, k) -> Motion:
+def random_motion(paths: Paths, k: int) -> Motion:
+    """Of query k, as hpccd_ros.rigid has it."""
     body = Body.of(paths.points[k])
     if isinstance(paths, ScrewPaths):
         start, end = (Rigid(q, shift) for q, shift in zip(paths.quaternions[k], paths.shifts[k], strict=True))
