@@ -6,6 +6,7 @@
   hpccd bench scaling                       speed-up against threads, for each method
   hpccd bench distance                      what a separation, proximity, intersections cost
   hpccd bench step                          how far a step may go: first contacts, collision-free step, trial steps
+  hpccd bench rigid                         meshes moved by poses and joints: the truth, the bounds, the cost
   hpccd bench gpu data --parts device,worlds
                                             results that stay on the GPU, many worlds in one call
   hpccd bench accuracy                      what each tier costs, and where it errs

@@ -19,8 +19,8 @@ def truth(result: Kept) -> list[str]:
          f"{row['worst_excess']:.3f}", f"{row['us_a_query']:.0f}"]
         for row in rows
     ]  # fmt: skip
-    columns = ["motion", "features", "queries", "come that near", "reported", "missed", "late", "beyond twice the bound",
-               "not proven", "in excess", "worst, of the bound", "us a query"]  # fmt: skip
+    columns = ["motion", "features", "queries", "come that near", "reported", "missed", "late",
+               "beyond twice the bound", "not proven", "in excess", "worst, of the bound", "us a query"]  # fmt: skip
     return markdown.table(columns, lines)
 
 
