@@ -6,6 +6,7 @@
   hpccd bench scaling                       speed-up against threads, for each method
   hpccd bench distance                      what a separation, proximity, intersections cost
   hpccd bench step                          how far a step may go: first contacts, collision-free step, trial steps
+  hpccd bench rigid                         meshes moved by poses and joints: the truth, the bounds, the cost
   hpccd bench gpu data --parts device,worlds
                                             results that stay on the GPU, many worlds in one call
   hpccd bench accuracy                      what each tier costs, and where it errs
@@ -35,6 +36,7 @@ BENCHMARKS = {
     "options": ("core.options", "what each way to model less saves"),
     "distance": ("core.distance", "separation, proximity, intersections, smallest distances beside plain detection"),
     "step": ("core.step", "how far a step may go: first contacts, free step and trial steps beside all contacts"),
+    "rigid": ("core.rigid", "meshes moved by poses and joints: found contacts against the truth, bounds, cost"),
     "ros": ("ros.node", "the node over DDS: latency beside that of an echo, sustained rate, overload"),
     "stop": ("ros.stop", "the topic stop over DDS: random approaches, silence, publisher and node killed"),
     "soak": ("ros.soak.command", "half an hour of mixed load on the node: memory, counts, answers"),
