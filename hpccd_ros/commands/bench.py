@@ -35,6 +35,7 @@ BENCHMARKS = {
     "options": ("core.options", "what each way to model less saves"),
     "distance": ("core.distance", "separation, proximity, intersections, smallest distances beside plain detection"),
     "step": ("core.step", "how far a step may go: first contacts, free step and trial steps beside all contacts"),
+    "rigid": ("core.rigid", "meshes moved by poses and joints: found contacts against the truth, bounds, cost"),
     "ros": ("ros.node", "the node over DDS: latency beside that of an echo, sustained rate, overload"),
     "soak": ("ros.soak.command", "half an hour of mixed load on the node: memory, counts, answers"),
     "accuracy": ("core.accuracy", "the tiers: time, wrong answers, error of times; sweeps of scale and offset"),

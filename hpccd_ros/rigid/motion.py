@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How the vertices of one mesh go through a step: what cuts and margins need of it, whatever moves it."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+
+from hpccd_ros.rigid import rounding
+from hpccd_ros.rigid.body import Body
+from hpccd_ros.rigid.screw import Screw
+
+
+class Motion(Protocol):
+    """Of one mesh, in one step that is cut into ``parts`` equal ones."""
+
+    def vertices(self, cut: int, parts: int) -> np.ndarray:
+        """(n,3) at the end of so many parts: 0 is the start of the step. Not to be written to."""
+
+    def deviation(self, parts: int) -> float:
+        """Not below how far the straight lines between exact cuts are from the motion, at the same time."""
+
+    def rounding(self, parts: int) -> float:
+        """Not below how far a vertex at a cut is from where it should be."""
+
+
+@dataclass(frozen=True, eq=False)
+class ScrewMotion:
+    """A rigid mesh between two poses."""
+
+    body: Body
+    screw: Screw
+
+    def vertices(self, cut: int, parts: int) -> np.ndarray:
+        return self.screw.vertices(self.body, cut / parts)
+
+    def deviation(self, parts: int) -> float:
+        return self.screw.deviation(self.body, parts, self._chord)
+
+    def rounding(self, parts: int) -> float:
+        start, end = self.screw.start.shift, self.screw.end.shift
+        far = max(rounding.length(start), rounding.length(end))
+        if parts == 1:
+            return rounding.at_pose(self.body.radius, far)
+        return rounding.at_cut(self.body.radius, far, rounding.length(end - start))
+
+    @cached_property
+    def _chord(self) -> float:
+        return self.screw.chord(self.body)
+
+
+@dataclass(frozen=True, eq=False)
+class Linear:
+    """A mesh whose vertices go straight from ``start`` to ``end``, (n,3) each: it deforms, or rests (the same
+    array)."""
+
+    start: np.ndarray
+    end: np.ndarray
+
+    def vertices(self, cut: int, parts: int) -> np.ndarray:
+        if cut == 0 or self.start is self.end:
+            return self.start
+        if cut == parts:
+            return self.end
+        start = self.start.astype(np.float64)
+        return start + (self.end.astype(np.float64) - start) * (cut / parts)
+
+    def deviation(self, parts: int) -> float:
+        return 0.0
+
+    def rounding(self, parts: int) -> float:
+        if parts == 1 or self.start is self.end or not len(self.start):
+            return 0.0
+        return self._rounding
+
+    @cached_property
+    def _rounding(self) -> float:
+        far = max(float(np.abs(self.start).max()), float(np.abs(self.end).max()))
+        way = float(np.abs(self.end.astype(np.float64) - self.start).max())
+        # The greatest coordinate, times sqrt(3), bounds the length: two passes without an array of squares.
+        return rounding.linear(1.7320509 * way, 1.7320509 * far)

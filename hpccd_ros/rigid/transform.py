@@ -1,0 +1,99 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Rigid motions of 3D space: a unit quaternion x y z w, then a translation. No ROS.
+
+Sums are written out and sines are those of the C library: matrix products and numpy's own sines have other last bits on
+other processors, and a recording must be computed again to the same contacts anywhere.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+# Quaternions come rounded, often to float32 or to a few digits: within this they are taken as of unit length.
+_LENGTH_TOLERANCE = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Rigid:
+    """x -> R x + shift. ``quaternion`` (4,) float64 x y z w of length 1, ``shift`` (3,) float64."""
+
+    quaternion: np.ndarray
+    shift: np.ndarray
+
+    @classmethod
+    def of(cls, shift: Sequence[float], quaternion: Sequence[float]) -> "Rigid":
+        """Checked. Raises ValueError: not 3 and 4 numbers, not finite, quaternion not of length 1 within 1e-3."""
+        shift, quaternion = np.array(shift, np.float64), np.array(quaternion, np.float64)
+        if shift.shape != (3,) or quaternion.shape != (4,) or not np.isfinite([*shift, *quaternion]).all():
+            raise ValueError("needs 7 finite numbers: x y z, quaternion x y z w")
+        length = _length(quaternion)
+        if abs(length - 1.0) > _LENGTH_TOLERANCE:
+            raise ValueError(f"the quaternion {quaternion.tolist()} has length {length:.4g}; it must be 1")
+        return cls(quaternion / length, shift)
+
+    def apply(self, vertices: np.ndarray) -> np.ndarray:
+        """(n,3) float64. Without a rotation, coordinates are only shifted; without a shift, returned as they are."""
+        if not self.quaternion[:3].any():
+            return vertices + self.shift if self.shift.any() else vertices
+        return rotated(self.rotation(), vertices) + self.shift
+
+    def after(self, first: "Rigid") -> "Rigid":
+        """``first``, then this one."""
+        return Rigid(product(self.quaternion, first.quaternion), rotated(self.rotation(), first.shift) + self.shift)
+
+    def inverse(self) -> "Rigid":
+        back = Rigid(self.quaternion * [-1, -1, -1, 1], np.zeros(3))
+        return Rigid(back.quaternion, -rotated(back.rotation(), self.shift))
+
+    def between(self, other: "Rigid", t: float) -> "Rigid":
+        """At t in [0, 1] on the way to ``other``: shifts linearly, rotation at constant speed the shorter way."""
+        a, b = self.quaternion, other.quaternion
+        cosine = sum((a * b).tolist())
+        if cosine < 0.0:
+            b, cosine = -b, -cosine
+        angle = math.acos(min(cosine, 1.0))
+        if angle < 1e-6:  # the sines vanish; linear is exact to rounding
+            mixed = (1 - t) * a + t * b
+        else:
+            mixed = math.sin((1 - t) * angle) * a + math.sin(t * angle) * b
+        return Rigid(mixed / _length(mixed), (1 - t) * self.shift + t * other.shift)
+
+    def rotation(self) -> np.ndarray:
+        """The matrix, (3,3)."""
+        x, y, z, w = self.quaternion
+        return np.array(
+            [
+                [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+                [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+                [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+            ]
+        )
+
+
+IDENTITY = Rigid(np.array([0.0, 0.0, 0.0, 1.0]), np.zeros(3))
+
+
+def product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """The turn of b, then that of a: a quaternion of length 1."""
+    (ax, ay, az, aw), (bx, by, bz, bw) = a, b
+    unscaled = np.array(
+        [
+            aw * bx + ax * bw + ay * bz - az * by,
+            aw * by - ax * bz + ay * bw + az * bx,
+            aw * bz + ax * by - ay * bx + az * bw,
+            aw * bw - ax * bx - ay * by - az * bz,
+        ]
+    )
+    return unscaled / _length(unscaled)
+
+
+def _length(quaternion: np.ndarray) -> float:
+    return math.sqrt(sum((quaternion * quaternion).tolist()))
+
+
+def rotated(rotation: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """points: (3,) or (n,3), each multiplied by the matrix (3,3)."""
+    x, y, z = points[..., 0:1], points[..., 1:2], points[..., 2:3]
+    return x * rotation[:, 0] + y * rotation[:, 1] + z * rotation[:, 2]
