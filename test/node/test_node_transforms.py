@@ -8,8 +8,8 @@ from mesh_in_a_hand import FACES, HAND, SCENE, SECOND, parts, topologies, transf
 from node_process import assert_same_contacts
 from waving_sheet import scene_of
 
-from hpccd_ros.frames.rigid import Rigid
 from hpccd_ros.middleware import qos
+from hpccd_ros.rigid.transform import Rigid
 
 
 def send(node, k, frame_id):
