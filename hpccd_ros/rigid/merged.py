@@ -11,32 +11,36 @@ import hpccd_core as hc
 _EDGE_EDGE_SALT = 0x9E3779B97F4A7C15  # of hpccd_core/src/contacts/hash.h, as all numbers of _mixed
 
 
-def merged(found: Sequence[hc.Contacts], parts: int) -> hc.Contacts:
+def merged(found: Sequence[hc.Contacts], parts: int, whole: hc.Contacts | None = None) -> hc.Contacts:
     """Each pair once, from the earliest part in which it is reported: its toc as a time of the step, point, normal and
     nearest points. Order and hash as the core's.
 
     found: of the first parts in their order, each of one world; fewer than ``parts`` where a detector that reports
-    "first" or "any" found some: give no later ones then.
+    "first" or "any" found some: give no later ones then. whole: of the whole step, about pairs of meshes that were not
+    cut, in the same numbering and with the same outputs.
     """
     if not 1 <= len(found) <= parts:
         raise ValueError(f"found: answers of {len(found)} parts, the step has {parts}")
-    if any(contacts.slices is not None for contacts in found):
+    answers = [(contacts, part, parts) for part, contacts in enumerate(found)]
+    if whole is not None:
+        answers.insert(0, (whole, 0, 1))
+    if any(contacts.slices is not None for contacts, _, _ in answers):
         raise ValueError("found: answers of many worlds; give those of each world by itself")
-    if parts == 1:
+    if len(answers) == parts == 1:
         return found[0]
-    vf = np.concatenate([contacts.vf for contacts in found])
-    ee = np.concatenate([contacts.ee for contacts in found])
-    vf_toc = np.concatenate([_as_of_step(contacts.vf_toc, part, parts) for part, contacts in enumerate(found)])
-    ee_toc = np.concatenate([_as_of_step(contacts.ee_toc, part, parts) for part, contacts in enumerate(found)])
+    vf = np.concatenate([contacts.vf for contacts, _, _ in answers])
+    ee = np.concatenate([contacts.ee for contacts, _, _ in answers])
+    vf_toc = np.concatenate([(part + contacts.vf_toc) / of for contacts, part, of in answers])
+    ee_toc = np.concatenate([(part + contacts.ee_toc) / of for contacts, part, of in answers])
     vf_rows = _first_of_each(vf)
     ee_rows = _first_of_each(ee)
 
     def places(name: str) -> NDArray[np.float64]:
-        arrays = [getattr(contacts, name) for contacts in found]
-        if not any(len(array) for array in arrays):
-            return arrays[0]  # not asked for, or no contacts
-        of_vf = np.concatenate([array[: len(contacts.vf)] for array, contacts in zip(arrays, found, strict=True)])
-        of_ee = np.concatenate([array[len(contacts.vf) :] for array, contacts in zip(arrays, found, strict=True)])
+        arrays = [(getattr(contacts, name), len(contacts.vf)) for contacts, _, _ in answers]
+        if not any(len(array) for array, _ in arrays):
+            return arrays[0][0]  # not asked for, or no contacts
+        of_vf = np.concatenate([array[:n] for array, n in arrays])
+        of_ee = np.concatenate([array[n:] for array, n in arrays])
         return np.concatenate([of_vf[vf_rows], of_ee[ee_rows]])
 
     vf, vf_toc, ee, ee_toc = vf[vf_rows], vf_toc[vf_rows], ee[ee_rows], ee_toc[ee_rows]
@@ -75,16 +79,15 @@ def contacts_hash(
     return (int(of_vf.sum(dtype=np.uint64)) + int(of_ee.sum(dtype=np.uint64))) % 2**64
 
 
-def _as_of_step(toc: NDArray[np.float64], part: int, parts: int) -> NDArray[np.float64]:
-    return (part + toc) / parts
-
-
 def _first_of_each(pairs: NDArray[np.uint32]) -> NDArray[np.int64]:
     """Rows of the first occurrence of each pair, in lexicographic order of the pairs."""
-    order = np.lexsort(pairs.T[::-1])  # stable: of equal pairs the first stays first
-    ordered = pairs[order]
-    new = np.ones(len(pairs), bool)
-    new[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
+    keys = [_packed(pairs[:, k : k + 2]) for k in range(0, pairs.shape[1], 2)]
+    order = np.lexsort(keys[::-1])  # stable: of equal pairs the first stays first
+    new = np.zeros(len(pairs), bool)
+    new[:1] = True
+    for key in keys:
+        ordered = key[order]
+        new[1:] |= ordered[1:] != ordered[:-1]
     return order[new]
 
 
