@@ -50,6 +50,7 @@ from hpccd_ros.rigid.transform import IDENTITY, Rigid, rotated
 
 TURNING = ("revolute", "continuous")
 KINDS = (*TURNING, "prismatic", "fixed")
+Vector = tuple[float, float, float]  # numpy takes longer for three numbers
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,6 +124,14 @@ class JointStep:
             self._poses[t] = poses
         return self._poses[t]
 
+    @cached_property
+    def middle(self) -> list[tuple[Vector, Vector]]:
+        """Of each joint in the middle of the step: its axis, and a point of it."""
+        return [
+            (_vector(rotated(pose.rotation(), joint.axis)), _vector(pose.shift))
+            for joint, pose in zip(self.joints, self.poses(0.5), strict=True)
+        ]
+
     def way(self, link: int) -> list[int]:
         """Numbers of the joints from the base to this link."""
         numbers = []
@@ -188,41 +197,44 @@ class LinkMotion:
 
     def _distances(self, moving: list[int], speed: list[float]) -> list[float]:
         """G of each moving joint."""
-        poses = self.step.poses(0.5)
-        centre = rotated(poses[self.link].rotation(), self.body.centre) + poses[self.link].shift
+        axes, centre = self.step.middle, self._centre
         found, swept = [], 0.0
         for k, d in zip(reversed(moving), reversed(speed), strict=True):
-            joint, pose = self.step.joints[k], poses[k]
             distance = 1.0
-            if joint.turns:
-                axis = rotated(pose.rotation(), joint.axis)
-                distance = rounding.length(_cross(axis, centre - pose.shift)) + self.body.girth + self._slack + swept
+            if self.step.joints[k].turns:
+                axis, origin = axes[k]
+                distance = _length(_cross(axis, _less(centre, origin))) + self.body.girth + self._slack + swept
             found.append(distance)
             swept += distance * d / 2
         return found[::-1]
 
     def _in_the_middle(self, moving: list[int]) -> float:
         """Not below |x''| of any of its points at t = 1/2."""
-        poses = self.step.poses(0.5)
-        centre = rotated(poses[self.link].rotation(), self.body.centre) + poses[self.link].shift
-        of_centre, turning, of_turning = np.zeros(3), np.zeros(3), np.zeros(3)
+        axes, centre = self.step.middle, self._centre
+        of_centre = turning = of_turning = (0.0, 0.0, 0.0)
         total = slides = 0.0
         for k in moving:
-            joint, pose, d = self.step.joints[k], poses[k], float(self.step.speed[k])
-            axis = rotated(pose.rotation(), joint.axis)
-            if joint.turns:
-                own = d * axis
-                of_centre += d * _cross(2 * turning + own, _cross(axis, centre - pose.shift))
-                of_turning += _cross(turning, own)
-                turning = turning + own
+            axis, origin = axes[k]
+            d = float(self.step.speed[k])
+            own = _times(d, axis)
+            if self.step.joints[k].turns:
+                column = _cross(own, _less(centre, origin))
+                of_centre = _plus(of_centre, _cross(_plus(_times(2.0, turning), own), column))
+                of_turning = _plus(of_turning, _cross(turning, own))
+                turning = _plus(turning, own)
                 total += abs(d)
             else:
-                of_centre += 2 * d * _cross(turning, axis)
+                of_centre = _plus(of_centre, _cross(_times(2.0, turning), own))
                 slides += abs(d)
-        spin = rounding.length(of_turning) + rounding.length(turning) ** 2
+        spin = _length(of_turning) + _length(turning) ** 2
         # An axis is off by the slack's part of the reach; each product of two of them by as much, times the turns.
         lost = self._slack * (total * total + 2 * total * slides / max(self._reach, 1e-100))
-        return rounding.up(rounding.length(of_centre) + spin * self.body.girth + lost)
+        return rounding.up(_length(of_centre) + spin * self.body.girth + lost)
+
+    @cached_property
+    def _centre(self) -> Vector:
+        pose = self.step.poses(0.5)[self.link]
+        return _vector(pose.apply(self.body.centre[None, :])[0])
 
 
 def _values(name: str, values: Sequence[float], joints: Sequence[Joint]) -> np.ndarray:
@@ -232,6 +244,28 @@ def _values(name: str, values: Sequence[float], joints: Sequence[Joint]) -> np.n
     return found
 
 
-def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    (ax, ay, az), (bx, by, bz) = a, b
-    return np.array([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])
+def _vector(array: np.ndarray) -> Vector:
+    x, y, z = array.tolist()
+    return x, y, z
+
+
+def _plus(a: Vector, b: Vector) -> Vector:
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+def _less(a: Vector, b: Vector) -> Vector:
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+def _times(k: float, a: Vector) -> Vector:
+    return k * a[0], k * a[1], k * a[2]
+
+
+def _cross(a: Vector, b: Vector) -> Vector:
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+def _length(a: Vector) -> float:
+    """Not below it."""
+    squared = a[0] * a[0] + a[1] * a[1] + a[2] * a[2]
+    return rounding.up(math.sqrt(squared)) + rounding.TINY if any(a) else 0.0

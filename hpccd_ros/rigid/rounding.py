@@ -3,7 +3,7 @@
 
 The model: u = 2**-53; +, -, *, / and sqrt err by a relative u at most; sin, cos, atan2 of the C library by 4 u (two
 units in the last place; glibc and musl state one). Terms in u**2 are a 1e-14 th of those kept, and the constants below
-leave more room than that. What underflows is below `_TINY`, which each bound contains. |.| is the Euclidean length; of
+leave more room than that. What underflows is below `TINY`, which each bound contains. |.| is the Euclidean length; of
 a matrix the spectral norm, at most the Frobenius norm.
 
 What a pose means: x = R v + p, with R the rotation of its quaternion brought to length one exactly, v the vertex as
@@ -53,7 +53,7 @@ import numpy as np
 
 U = 2.0**-53
 _UP = 1.0 + 2.0**-48  # more than what the sums and products of a bound itself may have lost
-_TINY = 1e-150  # lengths below it come from squares that underflow
+TINY = 1e-150  # lengths below it come from squares that underflow
 
 
 def up(bound: float) -> float:
@@ -71,24 +71,24 @@ def longest(vectors: np.ndarray) -> float:
     if not len(vectors):
         return 0.0
     x, y, z = vectors[:, 0], vectors[:, 1], vectors[:, 2]
-    return up(float(np.sqrt((x * x + y * y + z * z).max()))) + _TINY
+    return up(float(np.sqrt((x * x + y * y + z * z).max()))) + TINY
 
 
 def at_pose(radius: float, shift: float) -> float:
     """radius: of the mesh about its own origin; shift: length of the pose's."""
-    return up(U * (64.0 * radius + 4.0 * shift) + _TINY)
+    return up(U * (64.0 * radius + 4.0 * shift) + TINY)
 
 
 def at_cut(radius: float, shift: float, way: float) -> float:
     """shift: the greater of both ends'; way: length of the shifts' difference."""
-    return up(U * (256.0 * radius + 192.0 * way + 4.0 * shift) + _TINY)
+    return up(U * (256.0 * radius + 192.0 * way + 4.0 * shift) + TINY)
 
 
 def linear(way: float, far: float) -> float:
     """way: how far the farthest vertex goes; far: how far out the farthest is, at either end."""
-    return up(U * (4.0 * way + 2.0 * far) + _TINY)
+    return up(U * (4.0 * way + 2.0 * far) + TINY)
 
 
 def at_chain(joints: int, reach: float, values: float) -> float:
     """values: sum over all joints of |q_0| + |q_1 - q_0|; reach: from the world's origin, base included."""
-    return up(U * reach * (128.0 * joints + 256.0 + 4.0 * values) + _TINY)
+    return up(U * reach * (128.0 * joints + 256.0 + 4.0 * values) + TINY)

@@ -67,6 +67,31 @@ def test_each_pair_has_what_the_earliest_part_says():
     assert [seen[pair] for pair in mine] == [(toc, *normal) for toc, normal in said]
 
 
+def test_pairs_that_were_not_cut():
+    """Self-contacts from one call, those of two meshes from parts: together what the scene has."""
+    rng = np.random.default_rng(4)
+    start, end = rng.random((2, 120, 3))
+    faces = np.arange(60).reshape(-1, 3)
+
+    def detector(selves, between):
+        scene = hc.Scene()
+        for name in "ab":
+            scene.add_mesh(name, faces, self_collision=selves)
+        if not between:
+            scene.ignore_pair("a", "b")
+        return hc.Detector(scene, outputs=OUTPUTS)
+
+    whole = detector(True, True).detect(start, end)
+    own = detector(True, False).detect(start, end)
+    found = merged(in_parts(detector(False, True), start, end, 3), 3, own)
+    assert len(whole) > len(own) > 0
+    for name in ("vf", "ee"):
+        assert np.array_equal(getattr(found, name), getattr(whole, name))
+    for name in ("vf_toc", "ee_toc", "points"):
+        assert np.allclose(getattr(found, name), getattr(whole, name), rtol=0, atol=1e-9)
+    assert merged([detector(False, True).detect(start, end)], 1, own).hash == whole.hash
+
+
 def test_without_contacts_and_without_outputs():
     none = hc.Contacts.none()
     found = merged([none, none, none], 3)

@@ -78,19 +78,19 @@ class Verdict:
 
 
 def judge(queries: Queries, answers: Answers) -> Verdict:
+    """A contact at distance 0 cannot be proven by distances, nor need it be: what is proven is that nothing touches."""
     pairs, d = queries.pairs, queries.distance
-    truth = comes_within(pairs, d)
     free, found = np.flatnonzero(~answers.hit), np.flatnonzero(answers.hit)
-    # Of what is reported a contact at distance 0 cannot be proven, nor need it be.
-    open_free = int((truth[free] == OPEN).sum())
+    asked = np.flatnonzero(~answers.hit | (d > 0))
+    truth = np.full(len(d), OPEN)
+    truth[asked] = comes_within(pairs, d[asked], rows=asked)
     limit = d[found] + 2 * answers.bound[found]
     # As near as it says, when it says so: but for what the time may be off.
     apart = pairs.near(found, answers.toc[found])[0]
     speed = _speed(pairs, found, answers.toc[found])
     late_by = _TOC_ERROR * speed + 64 * np.finfo(float).eps * pairs.size()[found]
-    earlier = np.maximum(answers.toc[found] - _TOC_ERROR, 0.0)
-    before = comes_within(pairs, d[found], until=earlier, rows=found)
-    before[earlier == 0.0] = BEYOND
+    timed = np.flatnonzero(answers.hit & (d > 0) & (answers.toc > _TOC_ERROR))
+    before = comes_within(pairs, d[timed], until=answers.toc[timed] - _TOC_ERROR, rows=timed)
     excess = (apart - d[found]) / np.maximum(answers.bound[found], 1e-300)
     measurable = answers.bound[found] > 1e3 * late_by
     return Verdict(
@@ -101,7 +101,7 @@ def judge(queries: Queries, answers: Answers) -> Verdict:
         missed=int((truth[free] == WITHIN).sum()),
         late=int((before == WITHIN).sum()),
         beyond=int((apart > limit + late_by).sum()),
-        open=open_free + int(((before == OPEN) & (d[found] > 0)).sum()),
+        open=int((truth[free] == OPEN).sum() + (before == OPEN).sum()),
         excess=int((truth[found] == BEYOND).sum()),
         worst_excess=float(excess[measurable].max(initial=0.0)),
     )

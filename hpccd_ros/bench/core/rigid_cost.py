@@ -5,14 +5,14 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import combinations, pairwise
 
 import numpy as np
 
 import hpccd_core as hc
-from hpccd_ros import scenes
+from hpccd_ros import scenes as generated
 from hpccd_ros.bench.report.timing import times
 from hpccd_ros.rigid.body import Body
 from hpccd_ros.rigid.cuts import Margin, bound, fewest_parts, grown
@@ -21,6 +21,7 @@ from hpccd_ros.rigid.merged import merged
 from hpccd_ros.rigid.motion import Linear, Motion, ScrewMotion
 from hpccd_ros.rigid.screw import Screw
 from hpccd_ros.rigid.transform import IDENTITY, Rigid
+from hpccd_ros.scenes.scene import Mesh
 
 _SCENE = "cloth-ball-like"
 _LINKS = 7
@@ -29,38 +30,65 @@ _MOST_PARTS = 64
 
 @dataclass(frozen=True, eq=False)
 class _Subject:
-    """A cloth, then rigid meshes of these names, all with the faces of a ball. `motions(degrees)`: of all meshes; made
-    anew for each step, as a node has to."""
+    """A cloth, then so many rigid meshes with the faces of a ball; links in a row ignore their neighbours.
+
+    `motions(degrees)`: of all meshes, made anew for each step, as a node has to.
+    """
 
     name: str
-    scene: hc.Scene
-    triangles: int
-    motions: object
+    cloth: Mesh
+    ball: Mesh
+    rigid: int
+    motions: Callable[[float], list[Motion]]
+
+    @property
+    def triangles(self) -> int:
+        return len(self.cloth.faces) + self.rigid * len(self.ball.faces)
+
+    def scene(self, cloth_alone: bool = True, with_rigid: bool = True) -> hc.Scene:
+        """Of the cloth with itself, of all other pairs, or of both."""
+        scene = hc.Scene()
+        scene.add_mesh("cloth", self.cloth.faces, n_vertices=self.cloth.n_vertices, self_collision=cloth_alone)
+        names = [f"rigid {k}" for k in range(self.rigid)]
+        for name in names:
+            scene.add_mesh(name, self.ball.faces, n_vertices=self.ball.n_vertices, self_collision=False)
+        for a, b in combinations(names, 2) if not with_rigid else pairwise(names):
+            scene.ignore_pair(a, b)
+        for name in names if not with_rigid else ():
+            scene.ignore_pair("cloth", name)
+        return scene
+
+
+@dataclass(frozen=True, eq=False)
+class _Detectors:
+    """``line``: of all pairs, on straight lines. ``whole``: of the cloth with itself; ``cut``: of all other pairs."""
+
+    line: hc.Detector
+    whole: hc.Detector
+    cut: hc.Detector
 
 
 def rows(turns: list[float], tolerances: list[float], args) -> Iterator[dict]:
     for subject in _subjects(args.size):
-        detector = hc.Detector(subject.scene, accuracy=args.accuracy, backend="cpu", threads=args.threads)
+        scenes = (subject.scene(), subject.scene(with_rigid=False), subject.scene(cloth_alone=False))
+        options = {"accuracy": args.accuracy, "backend": "cpu", "threads": args.threads}
+        detectors = _Detectors(*(hc.Detector(scene, **options) for scene in scenes))
         for turn in turns:
             for tolerance in tolerances:
                 yield {"scene": subject.name, "triangles": subject.triangles, "turn": turn, "tolerance": tolerance,
-                       **_measure(detector, subject, turn, tolerance, args.repeat)}  # fmt: skip
+                       **_measure(detectors, subject, turn, tolerance, args.repeat)}  # fmt: skip
 
 
-def _measure(detector, subject, turn, tolerance, rounds):
+def _measure(detectors, subject, turn, tolerance, rounds):
     linear_ms, moved_ms, outside_ms = [], [], []
-    meshes = len(subject.motions(turn))
     for number in range(rounds + 1):
         motions = subject.motions(turn)
         start, end = (np.concatenate([m.vertices(k, 1) for m in motions]) for k in (0, 1))
-        for a in range(meshes):
-            for b in range(a + 1):
-                detector.set_separation(a, b, 0.0)
         began = time.perf_counter()
-        straight = detector.detect(start, end)
+        straight = detectors.line.detect(start, end)
         straight_ms = 1e3 * (time.perf_counter() - began)
         began = time.perf_counter()
-        found, cut, margins, in_core = _moved(detector, subject.motions(turn), tolerance)
+        found, cut, margins, in_core = _moved(detectors, subject.motions(turn), tolerance)
         ms = 1e3 * (time.perf_counter() - began)
         if number:
             linear_ms.append(straight_ms)
@@ -73,30 +101,33 @@ def _measure(detector, subject, turn, tolerance, rounds):
         "bound": max(bound((a, b)) for i, a in enumerate(margins) for b in margins[:i]),
         "linear_ms": linear.median,
         "moved_ms": moved.median,
+        "least_linear_ms": linear.best,
+        "least_moved_ms": moved.best,
         "over_linear": moved.median / linear.median,
         "least_over_linear": moved.best / linear.best,
-        "outside_ms": times(outside_ms).median,
+        "least_outside_ms": min(outside_ms),
         "linear_contacts": len(straight),
         "contacts": len(found),
     }
 
 
-def _moved(detector, motions: list[Motion], tolerance):
+def _moved(detectors, motions: list[Motion], tolerance):
     cut = fewest_parts(motions, tolerance, _MOST_PARTS)
     margins = [Margin.of(motion, cut.parts) for motion in motions]
     for a, mine in enumerate(margins):
-        for b, other in enumerate(margins[: a + 1]):
-            detector.set_separation(a, b, grown(0.0, mine, other))
+        for b, other in enumerate(margins[:a]):
+            detectors.cut.set_separation(a, b, grown(0.0, mine, other))
     frames = [np.concatenate([m.vertices(j, cut.parts) for m in motions]) for j in range(cut.parts + 1)]
     began = time.perf_counter()
-    found = [detector.detect(x, y) for x, y in pairwise(frames)]
+    whole = detectors.whole.detect(frames[0], frames[-1])
+    found = [detectors.cut.detect(x, y) for x, y in pairwise(frames)]
     in_core = 1e3 * (time.perf_counter() - began)
-    return merged(found, cut.parts), cut, margins, in_core
+    return merged(found, cut.parts, whole), cut, margins, in_core
 
 
 def _subjects(size):
     """A cloth draped on a ball that spins; and on an arm of seven links, as many balls, smaller."""
-    made = scenes.make(_SCENE, size, progress=True)
+    made = generated.make(_SCENE, size, progress=True)
     frame = made.n_frames * 2 // 3
     (cloth, ball), (cloth_next, _) = made.frame(frame), made.frame(frame + 1)
     centre = ball.astype(np.float64).mean(axis=0)
@@ -109,7 +140,7 @@ def _subjects(size):
         turned = Rigid.of(centre, (0.0, 0.6 * math.sin(half), 0.8 * math.sin(half), math.cos(half)))
         return [Linear(cloth, cloth_next), ScrewMotion(body, Screw.between(pose, turned))]
 
-    yield _Subject("spinning ball", _scene(made.meshes, ["ball"]), _triangles(made.meshes, 1), spun)
+    yield _Subject("spinning ball", *made.meshes, 1, spun)
 
     small = Body.of(0.3 * (ball - centre))
     joints = [
@@ -124,21 +155,4 @@ def _subjects(size):
         step = JointStep(joints, np.zeros(_LINKS), turn, base)
         return [Linear(cloth, cloth_next), *(LinkMotion(step, k, small) for k in range(_LINKS))]
 
-    names = [f"link {k}" for k in range(_LINKS)]
-    yield _Subject("arm of seven links", _scene(made.meshes, names, True), _triangles(made.meshes, _LINKS), swung)
-
-
-def _scene(meshes, names, neighbours_ignored=False):
-    scene = hc.Scene()
-    cloth, ball = meshes
-    scene.add_mesh("cloth", cloth.faces, n_vertices=cloth.n_vertices, self_collision=cloth.self_collision)
-    for name in names:
-        scene.add_mesh(name, ball.faces, n_vertices=ball.n_vertices, self_collision=False)
-    if neighbours_ignored:
-        for a, b in pairwise(names):
-            scene.ignore_pair(a, b)
-    return scene
-
-
-def _triangles(meshes, rigid):
-    return len(meshes[0].faces) + rigid * len(meshes[1].faces)
+    yield _Subject("arm of seven links", *made.meshes, _LINKS, swung)

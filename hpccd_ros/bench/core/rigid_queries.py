@@ -114,7 +114,7 @@ def _brought_near(rng, pairs, distance, size):
     aim = distance + size * rng.choice([-1.0, 1.0], n) * 10.0 ** rng.uniform(-9, -3, n)
     rows = np.arange(n)
     moved = pairs
-    for _ in range(4):
+    for _ in range(3):
         t = _nearest_time(moved)
         apart, direction, *_ = moved.near(rows, t)
         lost = apart < 1e-6 * size  # they cross: no direction
@@ -132,14 +132,14 @@ def _brought_near(rng, pairs, distance, size):
 
 
 def _nearest_time(pairs):
-    """About where in the step the features are nearest: samples, four times finer around the best of them."""
-    n, samples = len(pairs.a.origins), 33
+    """About where in the step the features are nearest: samples, ten times finer around the best of them each time."""
+    n, samples = len(pairs.a.origins), 25
     middle, half = np.full(n, 0.5), 0.5
-    for _ in range(5):
+    for _ in range(4):
         t = np.clip(middle[:, None] + half * np.linspace(-1, 1, samples), 0, 1)
         rows = np.repeat(np.arange(n), samples)
         apart = pairs.near(rows, t.ravel())[0].reshape(n, samples)
-        middle, half = t[np.arange(n), apart.argmin(axis=1)], half / 12
+        middle, half = t[np.arange(n), apart.argmin(axis=1)], half / 10
     return middle
 
 

@@ -20,6 +20,7 @@ from hpccd_ros.bench.report import (
     performance_gpu,
     performance_limit,
     performance_node,
+    performance_rigid,
     performance_step,
 )
 from hpccd_ros.bench.report.results import Kept
@@ -45,6 +46,9 @@ TABLES = {
     "snapshots": (performance_distance.of_a_snapshot, "distance-2-cores"),
     "steps": (performance_step.steps, "step-2-cores"),
     "device-steps": (performance_step.steps, "step-h100-16-cores"),
+    "rigid-truth": (performance_rigid.truth, "rigid-2-cores"),
+    "rigid-bounds": (performance_rigid.bounds, "rigid-2-cores"),
+    "rigid-cost": (performance_rigid.cost, "rigid-cost-2-cores"),
     "distance-truth": (performance_distance.on_scenes, "accuracy-distance-2-cores"),
     "distance-wrong-answers": (performance_distance.hard_queries, "accuracy-distance-2-cores"),
     "backends": (performance_gpu.backends, "gpu-h100-16-cores"),
