@@ -39,6 +39,7 @@ _ADDED = {
             8,
         ),
         _Addition(frozenset({"uint8 tested_features"}), clear=without_features),
+        _Addition(frozenset({"uint32 parts", "float64[] motion_bounds"}), bytes(4 + 4), 4),
     ),
     "hpccd/msg/DistanceArray": (
         _Addition(frozenset({"float64[] direction", "float64[] approach_speed"}), bytes(2 * 4), 4),

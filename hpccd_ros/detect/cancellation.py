@@ -7,27 +7,30 @@ import hpccd_core as hc
 
 
 class Cancellation:
-    """`guard` each detector before it works; `cancel` makes the last one, and all later ones, raise hc.Cancelled."""
+    """`guard` each detector before it works; `cancel` makes the last ones, and all later ones, raise hc.Cancelled."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._detector: hc.Detector | None = None
+        self._detectors: tuple[hc.Detector, ...] = ()
         self._cancelled = False
 
-    def guard(self, detector: hc.Detector) -> hc.Detector:
-        """`detector`, from now on the one that `cancel` ends."""
+    def guard(self, detector: hc.Detector, *others: hc.Detector) -> hc.Detector:
+        """`detector`; from now on it and the others are what `cancel` ends."""
         with self._lock:
-            self._detector = detector
+            self._detectors = (detector, *others)
             if self._cancelled:
-                detector.cancel()
+                self._cancel_all()
         return detector
 
     def cancel(self) -> None:
         """From any thread; for good."""
         with self._lock:
             self._cancelled = True
-            if self._detector is not None:
-                self._detector.cancel()
+            self._cancel_all()
+
+    def _cancel_all(self) -> None:
+        for detector in self._detectors:
+            detector.cancel()
 
     def release(self) -> bool:
         """Whether the guarded detector may go on to other work: `cancel` came too late for it, and no longer ends it.
@@ -36,5 +39,5 @@ class Cancellation:
         """
         with self._lock:
             if not self._cancelled:
-                self._detector = None
+                self._detectors = ()
             return not self._cancelled

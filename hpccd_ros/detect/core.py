@@ -2,11 +2,13 @@
 """The core's detector: its options, and what it cannot work with, in its own words. No ROS."""
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 import hpccd_core as hc
 from hpccd_core.options import FEATURES
+from hpccd_ros.detect.rigid_step import RigidOptions
 from hpccd_ros.detect.separation import NONE, Separation
 from hpccd_ros.frames.types import Topology
 
@@ -17,7 +19,8 @@ CORE_ERRORS = (ValueError, TypeError, RuntimeError, MemoryError)
 @dataclass(frozen=True)
 class Options:
     """Arguments of hpccd_core.Detector, and what may change without another one: the separation of pairs of meshes, and
-    whether the smallest ``distances`` at the end of a step are computed too.
+    whether the smallest ``distances`` at the end of a step are computed too, and how steps with meshes that move by
+    poses are cut.
     """
 
     accuracy: str = "exact"
@@ -28,10 +31,14 @@ class Options:
     separation: Separation = NONE
     distances: bool = False
     features: tuple[str, ...] = FEATURES
+    rigid: RigidOptions = RigidOptions()
 
     def same_detector(self, other: "Options") -> bool:
         """Whether a detector made with one may go on with the other."""
-        return replace(self, separation=NONE, distances=False) == replace(other, separation=NONE, distances=False)
+        return replace(self, **_CHANGEABLE) == replace(other, **_CHANGEABLE)
+
+
+_CHANGEABLE: dict[str, Any] = {"separation": NONE, "distances": False, "rigid": RigidOptions()}
 
 
 def make_detector(scene: hc.Scene, options: Options) -> hc.Detector:

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The core's scene of the meshes, whatever their topologies are at the time. No ROS."""
 
-import itertools
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 
@@ -52,6 +53,29 @@ class SceneBuilder:
                     found.append((a.name, b.name))
         return found
 
+    @property
+    def rigid(self) -> tuple[bool, ...]:
+        """Which meshes move by poses."""
+        return tuple(mesh.rigid for mesh in self.meshes)
+
+    def of_rigid_pairs(self) -> "SceneBuilder":
+        """Nothing is tested but pairs of meshes of which one moves by poses, or both do."""
+        meshes = tuple(replace(mesh, self_collision=False) for mesh in self.meshes)
+        return self._without(meshes, lambda a, b: not (a.rigid or b.rigid))
+
+    def of_other_pairs(self) -> "SceneBuilder | None":
+        """Nothing is tested but the other pairs; None where there are none."""
+        meshes = tuple(replace(mesh, self_collision=mesh.self_collision and not mesh.rigid) for mesh in self.meshes)
+        left = self._without(meshes, lambda a, b: a.rigid or b.rigid)
+        return left if left.tested_pairs() else None
+
+    def _without(
+        self, meshes: tuple[MeshSettings, ...], left_out: Callable[[MeshSettings, MeshSettings], bool]
+    ) -> "SceneBuilder":
+        """Without the pairs of different meshes that are to be left out."""
+        ignored = tuple((a.name, b.name) for a, b in combinations(meshes, 2) if left_out(a, b))
+        return replace(self, meshes=meshes, ignored_pairs=self.ignored_pairs + ignored)
+
     def among(self, names: list[str]) -> "SceneBuilder":
         """The scene of these meshes, in this order; names that it does not have are meshes of their own."""
         known = {mesh.name: mesh for mesh in self.meshes}
@@ -70,12 +94,7 @@ class SceneBuilder:
     @property
     def pairs(self) -> list[tuple[str, str]]:
         """Different meshes that are tested against each other."""
-        ignored = {frozenset(pair) for pair in self.ignored_pairs}
-        return [
-            (a.name, b.name)
-            for a, b in itertools.combinations(self.meshes, 2)
-            if not (a.static and b.static) and frozenset((a.name, b.name)) not in ignored
-        ]
+        return [(a, b) for a, b in self.tested_pairs() if a != b]
 
     def same_scene(self, other: "SceneBuilder") -> bool:
         """Whether equal topologies make equal scenes."""
@@ -86,10 +105,14 @@ class SceneBuilder:
             other.pair_features,
         )
 
+    def parts(self, frame: SceneFrame, static_of: SceneFrame) -> list[np.ndarray]:
+        """Positions of each mesh; those of static meshes from ``static_of``."""
+        return [static_of.vertices[i] if mesh.static else frame.vertices[i] for i, mesh in enumerate(self.meshes)]
+
     def concatenate(self, frame: SceneFrame, static_of: SceneFrame) -> np.ndarray:
         """(V,3) positions of all meshes; those of static meshes from ``static_of``. No copy of a single mesh.
 
         One float64 mesh makes the whole float64, which holds the others' float32 exactly.
         """
-        parts = [static_of.vertices[i] if mesh.static else frame.vertices[i] for i, mesh in enumerate(self.meshes)]
+        parts = self.parts(frame, static_of)
         return parts[0] if len(parts) == 1 else np.concatenate(parts)

@@ -8,6 +8,7 @@ import hpccd_core as hc
 from hpccd_ros.detect.cancellation import Cancellation
 from hpccd_ros.detect.core import Options, make_detector
 from hpccd_ros.detect.layout import Layout
+from hpccd_ros.detect.rigid_step import MotionBounds, RigidStep, motions
 from hpccd_ros.detect.scene import SceneBuilder
 from hpccd_ros.detect.separation import change_separation, count_near
 from hpccd_ros.frames.types import SceneFrame
@@ -19,7 +20,8 @@ class Detection:
 
     ``backend``, ``threads``: what was used. ``detect_ms``: wall time of the core's call. ``gaps``: the smallest
     distance of each pair of meshes at the end, where the options ask for it; ``gaps_backend``: what found them, which
-    may be another one; ``gaps_before``: those at the start, where they were asked for then.
+    may be another one; ``gaps_before``: those at the start, where they were asked for then. ``bounds``: of motions by
+    poses.
     """
 
     start: SceneFrame
@@ -35,6 +37,7 @@ class Detection:
     gaps: list[hc.Gap] | None = None
     gaps_backend: str = ""
     gaps_before: list[hc.Gap] | None = None
+    bounds: MotionBounds = MotionBounds()
 
     @property
     def near(self) -> int:
@@ -57,6 +60,7 @@ class StepDetector:
         self._layout: Layout | None = None
         self._detector: hc.Detector | None = None
         self._detector_options: Options | None = None
+        self._rigid_step: RigidStep | None = None  # where meshes move by poses; then the detector finds distances only
         self._cancellation = Cancellation()
         self._last_gaps: tuple[SceneFrame, list[hc.Gap]] | None = None
 
@@ -80,12 +84,29 @@ class StepDetector:
         """The detector of the scene, with the options of now. Raises what the core raises."""
         options = self.options
         if self._detector is None or not options.same_detector(self._detector_options):
-            self._detector = self._cancellation.guard(make_detector(self._scene, options))
+            detector = make_detector(self._scene, options)
+            self._rigid_step = self._made_rigid_step(options)
+            others = self._rigid_step.detectors if self._rigid_step is not None else ()
+            self._detector = self._cancellation.guard(detector, *others)
         elif options.separation != (before := self._detector_options.separation):
             detector, self._detector = self._detector, None  # none where only a part of the change is made
             change_separation(detector, self._names, before, options.separation)
+            if self._rigid_step is not None and self._rigid_step.straight is not None:
+                change_separation(self._rigid_step.straight, self._names, before, options.separation)
             self._detector = detector
         self._detector_options = options
+
+    def _made_rigid_step(self, options: Options) -> RigidStep | None:
+        builder, topologies = self._builder, self._scene_of.topologies
+        if not any(builder.rigid):
+            return None
+        bent, others = builder.of_rigid_pairs(), builder.of_other_pairs()
+        return RigidStep(
+            self._names,
+            builder.rigid,
+            make_detector(bent.build(topologies), options),
+            make_detector(others.build(topologies), options) if others is not None else None,
+        )
 
     def distances(self, frame: SceneFrame) -> list[hc.Gap]:
         """The smallest distance of each pair of meshes in ``frame``. Raises what the core raises."""
@@ -103,26 +124,50 @@ class StepDetector:
         """The contacts on the way from ``start`` to ``end``, of the same scene. Raises what the core raises."""
         self.prepare_scene(end)
         self.prepare_detector()
+        found = self._detect(start, end) if self._rigid_step is None else self._detect_rigid(start, end)
+        if not found.options.distances:
+            return found
+        # Only now: backend, profile and stats are of the last call.
+        gaps, last = self._detector.distances(self._builder.concatenate(end, end)), self._last_gaps
+        self._last_gaps = end, gaps
+        before = last[1] if last is not None and last[0] is start else None
+        return replace(found, gaps=gaps, gaps_backend=self._detector.backend, gaps_before=before)
+
+    def _detect(self, start: SceneFrame, end: SceneFrame) -> Detection:
+        detector = self._detector
         t0, t1 = self._builder.concatenate(start, end), self._builder.concatenate(end, end)
         began = time.perf_counter()
-        contacts = self._detector.detect(t0, t1)
+        contacts = detector.detect(t0, t1)
         detect_ms = 1e3 * (time.perf_counter() - began)
-        found = Detection(
+        return Detection(
             start,
             end,
             contacts,
             self._layout,
             self._detector_options,
-            self._detector.backend,
-            self._detector.threads,
+            detector.backend,
+            detector.threads,
             detect_ms,
-            dict(self._detector.profile),
-            dict(self._detector.stats),
+            dict(detector.profile),
+            dict(detector.stats),
         )
-        if not found.options.distances:
-            return found
-        # Only now: backend, profile and stats are of the last call.
-        gaps, last = self._detector.distances(t1), self._last_gaps
-        self._last_gaps = end, gaps
-        before = last[1] if last is not None and last[0] is start else None
-        return replace(found, gaps=gaps, gaps_backend=self._detector.backend, gaps_before=before)
+
+    def _detect_rigid(self, start: SceneFrame, end: SceneFrame) -> Detection:
+        step, options = self._rigid_step, self._detector_options
+        began = time.perf_counter()
+        moving = motions((self._builder.parts(start, end), self._builder.parts(end, end)), start, end)
+        contacts, bounds = step.detect(moving, options.separation, self.options.rigid, options.report)
+        detect_ms = 1e3 * (time.perf_counter() - began)
+        return Detection(
+            start,
+            end,
+            contacts,
+            self._layout,
+            options,
+            step.bent.backend,
+            step.bent.threads,
+            detect_ms,
+            dict(step.profile),
+            dict(step.stats),
+            bounds=bounds,
+        )

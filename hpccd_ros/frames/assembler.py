@@ -230,6 +230,7 @@ class FrameAssembler:
             vertices=tuple(f.vertices for f in frames),
             fresh=match.fresh,
             received=max(f.received for f in moving),
+            placements=tuple(f.placement for f in frames) if any(f.placement for f in frames) else (),
         )
 
 

@@ -28,6 +28,7 @@ class Reason(StrEnum):
     TOPOLOGY_CONFLICT = "topology_conflict"  # same version, other content
     OLD_TOPOLOGY = "old_topology"
     NO_TOPOLOGY = "no_topology"  # the topology that the frame names has not come (in time)
+    NO_SHAPE = "no_shape"  # of a mesh that moves by poses: its vertices have not come
     WRONG_COUNT = "wrong_vertex_count"
     FRAME_ID = "frame_id"
     NO_TRANSFORM = "no_transform"  # mesh.NAME.transform asks for one that did not come

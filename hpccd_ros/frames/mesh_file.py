@@ -2,14 +2,15 @@
 """Read a mesh file: vertices and triangles as they are numbered in the file, optionally placed by a pose."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from hpccd_ros.base.quoting import shortened
 from hpccd_ros.frames.coordinates import unusable_coordinates
-from hpccd_ros.frames.rigid import Rigid
-from hpccd_ros.frames.types import MeshFrame, Topology
+from hpccd_ros.frames.types import POSE, TF, MeshFrame, Topology
 from hpccd_ros.frames.welding import weld
+from hpccd_ros.rigid.transform import Rigid
 
 FORMATS = (".obj", ".ply", ".stl")
 
@@ -82,13 +83,18 @@ def _not_text(file: Path) -> str | None:
 
 
 def mesh_of_file(
-    vertices: np.ndarray, faces: np.ndarray, static: bool, pose: list[float]
+    vertices: np.ndarray, faces: np.ndarray, values: dict[str, Any]
 ) -> tuple[Topology, MeshFrame | None]:
-    """What `load_mesh` gave as topology version 0; of a static mesh the positions too, placed by its pose.
+    """What `load_mesh` gave as topology version 0; of a static mesh the positions too, placed by its pose; of one that
+    moves by poses the vertices as they are. values: parameters mesh.NAME.*.
 
     Raises MeshFileError: as `place`.
     """
-    frame = MeshFrame(0, place(vertices, pose), version=0) if static else None
+    frame = None
+    if values["static"]:
+        frame = MeshFrame(0, place(vertices, values["pose"]), version=0)
+    elif values["input"] in (POSE, TF):
+        frame = MeshFrame(0, vertices, version=0)
     return Topology(0, len(vertices), faces), frame
 
 

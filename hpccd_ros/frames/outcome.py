@@ -11,17 +11,21 @@ from hpccd_ros.frames.types import SceneFrame
 class Outcome:
     """``frames`` of the scene that a message completes (usually none or one), ``refusals``: what will not be used.
 
-    ``restarts``: in words, where the stream starts anew. ``static_taken``: accepted messages of static meshes.
+    ``restarts``: in words, where the stream starts anew. ``static_taken``: accepted messages of static meshes, and
+    shapes of those that move by poses. ``asked``: meshes that transforms move, of each frame that was asked of them: it
+    counts as a message.
     """
 
     frames: list[SceneFrame] = field(default_factory=list)
     refusals: list[Refusal] = field(default_factory=list)
     restarts: list[str] = field(default_factory=list)
     static_taken: int = 0
+    asked: list[str] = field(default_factory=list)
 
     def __iadd__(self, other: "Outcome") -> "Outcome":
         self.frames += other.frames
         self.refusals += other.refusals
         self.restarts += other.restarts
         self.static_taken += other.static_taken
+        self.asked += other.asked
         return self

@@ -1,15 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """The way of a checked message to frames of the scene: transform, assemble, queue. No ROS, no threads of its own."""
 
+import time
 from collections.abc import Sequence
 
 from hpccd_ros.frames.assembler import FrameAssembler
 from hpccd_ros.frames.drops import Reason, Refusal
 from hpccd_ros.frames.frame_queue import FrameQueue
 from hpccd_ros.frames.outcome import Outcome
+from hpccd_ros.frames.rigid_mesh import RigidMesh
 from hpccd_ros.frames.transform_buffer import TransformBuffer
 from hpccd_ros.frames.transformer import MeshTransformer, Transformed
-from hpccd_ros.frames.types import AssemblyRules, MeshFrame, MeshSettings, SceneFrame, Topology
+from hpccd_ros.frames.types import TF, AssemblyRules, MeshFrame, MeshSettings, PoseFrame, SceneFrame, Topology
+from hpccd_ros.rigid.transform import IDENTITY
 
 
 class FramePipeline:
@@ -23,28 +26,40 @@ class FramePipeline:
         self._rules = rules
         self._assembler = FrameAssembler(self._meshes, rules)
         self._queue: FrameQueue | None = None
+        self._rigid = {mesh.name: RigidMesh(mesh) for mesh in self._meshes if mesh.rigid}
+        self._by_transforms = [mesh for mesh in self._meshes if mesh.input == TF]
+        others = (mesh.name for mesh in self._meshes if not mesh.static and mesh.input != TF)
+        # Whose stamps are those of the scene's frames; None: none moves but by transforms.
+        self._leader = next(others, None)
         self._forget_transforms()
 
     def load(self, mesh: str, topology: Topology, positions: MeshFrame | None) -> Outcome:
-        """A mesh from a file. positions: of a static one, in the scene's frame already."""
+        """A mesh from a file. positions: of a static one, in the scene's frame already; of one that moves by poses, as
+        in the file."""
         outcome = self._assembler.set_topology(mesh, topology)
-        if positions is not None:
+        if positions is not None and mesh in self._rigid:
+            self._rigid[mesh].set_shape(positions)
+        elif positions is not None:
             outcome += self._assembler.add(mesh, positions)
         return outcome
 
-    def push(self, mesh: str, message: MeshFrame | Topology, new_publisher: bool = False) -> Outcome:
+    def push(self, mesh: str, message: MeshFrame | PoseFrame | Topology, new_publisher: bool = False) -> Outcome:
         """One message of ``mesh``. new_publisher: it is the first of its publisher, or the first that could be read."""
         if isinstance(message, Topology):
             return self._assembler.set_topology(mesh, message, new_publisher)
-        outcome = Outcome()
-        for part in self._assemble(mesh, self._transformers[mesh].transform(message, new_publisher)):
-            outcome += part
+        if isinstance(message, MeshFrame) and mesh in self._rigid:
+            self._rigid[mesh].set_shape(message)
+            return Outcome(static_taken=1)
+        # Asked first: what waits for a transform must not come behind frames that others complete.
+        outcome = self._ask_of_transforms(message) if mesh == self._leader else Outcome()
+        outcome += self._place(mesh, message, new_publisher)
         return outcome
 
     def retry(self) -> list[Outcome]:
         """Frames go on that waited for transforms which have come, each with an outcome of its own: a single transform
         may let many go on."""
-        return [
+        asked = [self._follow_transforms()] if self._leader is None else []
+        return asked + [
             outcome
             for mesh, transformer in self._transformers.items()
             for outcome in self._assemble(mesh, transformer.retry())
@@ -98,6 +113,32 @@ class FramePipeline:
         """Positions of static meshes that are not used."""
         return self._assembler.warnings()
 
+    def _place(self, mesh: str, message: MeshFrame | PoseFrame, new_publisher: bool = False) -> Outcome:
+        placed = self._rigid[mesh].place(message) if isinstance(message, PoseFrame) else message
+        if isinstance(placed, Refusal):
+            return Outcome(refusals=[placed])
+        outcome = Outcome()
+        for part in self._assemble(mesh, self._transformers[mesh].transform(placed, new_publisher)):
+            outcome += part
+        return outcome
+
+    def _ask_of_transforms(self, like: MeshFrame | PoseFrame) -> Outcome:
+        """A frame of each mesh that transforms move, at the stamp of ``like``."""
+        outcome = Outcome()
+        for mesh in self._by_transforms:
+            outcome.asked.append(mesh.name)
+            outcome += self._place(mesh.name, PoseFrame(like.stamp, IDENTITY, mesh.frame, like.received))
+        return outcome
+
+    def _follow_transforms(self) -> Outcome:
+        """Where nothing else moves: a frame for each time that all of their transforms have reached."""
+        reached = [self.transforms.latest(mesh.frame, self._rules.frame_id) for mesh in self._by_transforms]
+        stamps = [stamp for stamp in reached if stamp is not None]
+        if not stamps or min(stamps) == self._followed:
+            return Outcome()
+        self._followed = min(stamps)
+        return self._ask_of_transforms(PoseFrame(self._followed, IDENTITY, received=time.monotonic()))
+
     def _assemble(self, mesh: str, transformed: Transformed) -> list[Outcome]:
         outcomes = [Outcome(refusals=transformed.refusals)]
         outcomes += [self._assembler.add(mesh, frame, new_publisher) for frame, new_publisher in transformed.frames]
@@ -105,6 +146,7 @@ class FramePipeline:
 
     def _forget_transforms(self) -> None:
         self.transforms = TransformBuffer()
+        self._followed: int | None = None  # stamp of the last frame that no leader gave
         self._transformers = {
             mesh.name: MeshTransformer(mesh, self._rules.frame_id, self._rules.max_pending, self.transforms)
             for mesh in self._meshes

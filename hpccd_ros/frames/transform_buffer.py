@@ -8,7 +8,7 @@ extrapolation. Bounded, as anybody may publish transforms.
 from bisect import bisect_left
 
 from hpccd_ros.base.quoting import quoted
-from hpccd_ros.frames.rigid import IDENTITY, Rigid
+from hpccd_ros.rigid.transform import IDENTITY, Rigid
 
 HISTORY_NS = 10_000_000_000
 MOST_FRAMES = 1000
@@ -108,6 +108,19 @@ class TransformBuffer:
             text = f"no transform connects {quoted(source)} and {quoted(target)}"
             raise NoTransformError(text, final=False, connected=False)
         return self._to_ancestor(target, common, stamp).inverse().after(self._to_ancestor(source, common, stamp))
+
+    def latest(self, source: str, target: str) -> int | None:
+        """The last stamp, ns, that `lookup` knows between the two; None: it is bound to no time, or not connected."""
+        source, target = source.removeprefix("/"), target.removeprefix("/")
+        try:
+            up, down = self._ancestors(source), self._ancestors(target)
+        except NoTransformError:
+            return None
+        common = next((frame for frame in up if frame in set(down)), None)
+        if common is None:
+            return None
+        edges = [self._edges[frame] for path in (up, down) for frame in path[: path.index(common)]]
+        return min((edge.stamps[-1] for edge in edges if edge.always is None), default=None)
 
     def _ancestors(self, frame: str) -> list[str]:
         path = [frame]

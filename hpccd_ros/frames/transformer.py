@@ -16,9 +16,9 @@ import numpy as np
 from hpccd_ros.base.quoting import quoted
 from hpccd_ros.frames.coordinates import unusable_coordinates
 from hpccd_ros.frames.drops import Reason, Refusal
-from hpccd_ros.frames.rigid import IDENTITY, Rigid
 from hpccd_ros.frames.transform_buffer import NoTransformError, TransformBuffer
-from hpccd_ros.frames.types import MeshFrame, MeshSettings
+from hpccd_ros.frames.types import TF, MeshFrame, MeshSettings
+from hpccd_ros.rigid.transform import IDENTITY, Rigid
 
 
 class Transformed(NamedTuple):
@@ -45,7 +45,7 @@ class MeshTransformer:
 
     def __init__(self, mesh: MeshSettings, target: str, max_waiting: int, transforms: TransformBuffer) -> None:
         self._mesh = mesh.name
-        self._kind = mesh.transform
+        self._kind = "tf" if mesh.input == TF else mesh.transform
         self._frame = mesh.frame
         self._target = target
         self._max_waiting = max_waiting
@@ -124,12 +124,16 @@ class MeshTransformer:
         return None
 
     def _moved(self, frame: MeshFrame, rigid: Rigid, new_publisher: bool) -> MeshFrame | Refusal:
-        # Always double, with or without a rotation: the precision of a stream must not depend on its values.
-        vertices = frame.vertices if rigid is IDENTITY else rigid.apply(frame.vertices.astype(np.float64))
+        placement = frame.placement.moved(rigid) if frame.placement is not None else None
+        if placement is not None:
+            vertices = placement.vertices
+        else:
+            # Always double, with or without a rotation: the precision of a stream must not depend on its values.
+            vertices = frame.vertices if rigid is IDENTITY else rigid.apply(frame.vertices.astype(np.float64))
         if problem := unusable_coordinates(vertices):
             reason, text = problem
             return self._refuse(reason, f"after the transform {text}", new_publisher)
-        return replace(frame, vertices=vertices, frame_id=self._target)
+        return replace(frame, vertices=vertices, frame_id=self._target, placement=placement)
 
     def _noticed(self, new_publisher: bool) -> bool:
         new_publisher, self._unnoticed = new_publisher or self._unnoticed, False

@@ -2,16 +2,22 @@
 """What the node knows of a message once it is checked: plain records of numpy arrays, no ROS."""
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hpccd_ros.frames.drops import Reason, Refusal
+from hpccd_ros.rigid.body import Body
+from hpccd_ros.rigid.transform import Rigid
+
+# Values of parameter mesh.NAME.input for meshes that move by poses.
+POSE, TF = "pose", "tf"
 
 
 @dataclass(frozen=True)
 class MeshSettings:
-    """How a mesh takes part in the scene (parameters ``mesh.NAME.*``)."""
+    """How a mesh takes part in the scene (parameters ``mesh.NAME.*``). ``input``: "" where it does not matter."""
 
     name: str
     static: bool = False
@@ -19,7 +25,13 @@ class MeshSettings:
     transform: str = "none"
     frame: str = ""
     pose: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+    input: str = ""
     whole: bool = False  # each message of its vertices carries its topology
+
+    @property
+    def rigid(self) -> bool:
+        """It keeps its shape and moves by poses."""
+        return self.input in (POSE, TF)
 
 
 @dataclass(frozen=True)
@@ -62,13 +74,41 @@ class Topology:
 
 
 @dataclass(frozen=True, eq=False)
+class Placement:
+    """Where a mesh that keeps its shape is: ``pose`` takes the coordinates of ``body`` to those of the frame."""
+
+    body: Body
+    pose: Rigid
+
+    @cached_property
+    def vertices(self) -> NDArray[np.float64]:
+        """(n,3). Not to be written to."""
+        return self.pose.apply(self.body.vertices)
+
+    def moved(self, rigid: Rigid) -> "Placement":
+        return Placement(self.body, rigid.after(self.pose))
+
+
+@dataclass(frozen=True, eq=False)
+class PoseFrame:
+    """One pose message of one mesh: the other fields as of `MeshFrame`."""
+
+    stamp: int
+    pose: Rigid
+    frame_id: str = ""
+    received: float = 0.0
+    only_publisher: bool = True
+
+
+@dataclass(frozen=True, eq=False)
 class MeshFrame:
     """One vertex message of one mesh.
 
     ``stamp`` ns, end of the step. ``version``: of the topology it belongs to; None (PointCloud2 has none):
     the one in force. ``step``: the publisher's number, None where it gives none. ``vertices`` (n,3) float32
     or float64, finite. ``received``: time.monotonic() at its arrival; ``only_publisher``: its mesh had no other one of
-    vertices then. ``topology``: carried by messages of whole meshes, else set by the assembler.
+    vertices then. ``topology``: carried by messages of whole meshes, else set by the assembler. ``placement``: of a
+    mesh that moves by poses, which gives these vertices.
     """
 
     stamp: int
@@ -79,6 +119,7 @@ class MeshFrame:
     received: float = 0.0
     only_publisher: bool = True
     topology: Topology | None = None
+    placement: Placement | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,6 +128,7 @@ class SceneFrame:
 
     ``step``: of the first mesh that gives one, else a running number of complete frames.
     ``fresh``: meshes whose message is used for the first time here. ``received``: of the last message needed.
+    ``placements``: of meshes that move by poses, None of others; empty: none does.
     """
 
     stamp: int
@@ -96,6 +138,7 @@ class SceneFrame:
     vertices: tuple[np.ndarray, ...]
     fresh: tuple[str, ...]
     received: float
+    placements: tuple[Placement | None, ...] = ()
 
     def same_scene(self, other: "SceneFrame") -> bool:
         """True if a motion from one to the other exists: the same topology of every mesh, one coordinate frame."""

@@ -10,10 +10,10 @@ from typing import Any
 
 from hpccd_ros.base.quoting import quoted
 from hpccd_ros.frames.drops import Input, Reason, Refusal
-from hpccd_ros.frames.rigid import Rigid
 from hpccd_ros.frames.transform_buffer import TransformBuffer
 from hpccd_ros.middleware import fields, topic_names
 from hpccd_ros.middleware.message_types import message_class
+from hpccd_ros.rigid.transform import Rigid
 
 STAMPED = "geometry_msgs/msg/TransformStamped"
 TF2 = "tf2_msgs/msg/TFMessage"

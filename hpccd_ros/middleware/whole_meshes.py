@@ -10,12 +10,12 @@ from builtin_interfaces.msg import Time
 from visualization_msgs.msg import Marker
 
 from hpccd_ros.frames.drops import Reason
-from hpccd_ros.frames.rigid import Rigid
 from hpccd_ros.frames.types import Topology
 from hpccd_ros.frames.welding import Welding
 from hpccd_ros.middleware.cdr_reader import CdrReader
 from hpccd_ros.middleware.fields import InvalidMessageError, stamp_to_ns
 from hpccd_ros.middleware.mesh_messages import check_size, usable
+from hpccd_ros.rigid.transform import Rigid
 
 _ACTIONS = {Marker.ADD: "ADD", Marker.DELETE: "DELETE", Marker.DELETEALL: "DELETEALL"}
 

@@ -39,6 +39,8 @@ class Accounts:
             self.restarts += 1
             self._warn(text)
         self.static_taken += outcome.static_taken
+        for mesh in outcome.asked:
+            self.metrics.frame_received(mesh, None)
         for refusal in outcome.refusals:
             self.refused(refusal)
 

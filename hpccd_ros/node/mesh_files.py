@@ -15,7 +15,7 @@ def load(pipeline: FramePipeline, meshes: dict[str, dict[str, Any]]) -> Outcome:
     for name, mesh in meshes.items():
         if mesh["file"]:
             vertices, faces = load_mesh(mesh["file"])
-            topology, positions = mesh_of_file(vertices, faces, mesh["static"], mesh["pose"])
+            topology, positions = mesh_of_file(vertices, faces, mesh)
             if why := unusable_topology(topology):
                 raise MeshFileError(f"mesh.{name}.file {mesh['file']}: {why}")
             outcome += pipeline.load(name, topology, positions)

@@ -6,14 +6,15 @@ from typing import Any
 from hpccd_core.options import FEATURES, OUTPUTS
 from hpccd_ros.base.quoting import quoted, shortened
 from hpccd_ros.detect.core import Options
+from hpccd_ros.detect.rigid_step import RigidOptions
 from hpccd_ros.detect.scene import SceneBuilder
 from hpccd_ros.detect.separation import NONE
 from hpccd_ros.frames.pipeline import FramePipeline
-from hpccd_ros.frames.rigid import Rigid
-from hpccd_ros.frames.types import AssemblyRules, MeshSettings
+from hpccd_ros.frames.types import POSE, TF, AssemblyRules, MeshSettings
 from hpccd_ros.middleware.topic_names import WHOLE
 from hpccd_ros.params import pair_parameters
 from hpccd_ros.params.values import ParameterError
+from hpccd_ros.rigid.transform import Rigid
 
 MeshValues = dict[str, dict[str, Any]]
 
@@ -34,10 +35,11 @@ def mesh_settings(meshes: MeshValues) -> tuple[MeshSettings, ...]:
         MeshSettings(
             name,
             of["static"],
-            of["self_collision"],
+            of["self_collision"] and of["input"] not in (POSE, TF),
             of["transform"],
             of["frame"],
             tuple(of["pose"]),
+            of["input"],
             whole=of["input"] in WHOLE,
         )
         for name, of in meshes.items()
@@ -72,6 +74,7 @@ def detector_options(settings: dict[str, Any]) -> Options:
         wanted,
         settings["distances"],
         features(settings),
+        RigidOptions(settings["rigid_tolerance"], settings["rigid_parts"]),
     )
 
 
@@ -112,6 +115,8 @@ def check(settings: dict[str, Any], meshes: MeshValues) -> None:
                 f"mesh.{name}.file: with mesh.{name}.input {values['input']} each message carries the triangles; leave "
                 "one of them out"
             )
+        if values["input"] in (POSE, TF):
+            _check_rigid(name, values, settings)
         if values["transform"] == "tf" and not settings["frame_id"]:
             raise ParameterError(f"mesh.{name}.transform: tf needs a frame to transform to; set parameter frame_id")
         if values["transform"] == "tf" and values["static"] and values["file"]:
@@ -119,9 +124,25 @@ def check(settings: dict[str, Any], meshes: MeshValues) -> None:
                 f"mesh.{name}.transform: the positions of a static mesh from a file have no stamp to look a transform "
                 f"up for; give mesh.{name}.pose"
             )
-        if values["transform"] == "none" and values["frame"] not in ("", settings["frame_id"]):
+        moved = values["transform"] != "none" or values["input"] == TF
+        if not moved and values["frame"] not in ("", settings["frame_id"]):
             raise ParameterError(
                 f"mesh.{name}.frame: {quoted(values['frame'])} is not the scene's frame "
                 f"{quoted(settings['frame_id'])}; set "
                 f"mesh.{name}.transform to pose or tf, or the parameter frame_id"
             )
+
+
+def _check_rigid(name: str, values: dict[str, Any], settings: dict[str, Any]) -> None:
+    moved = f"mesh.{name}.input: {values['input']}"
+    if values["static"]:
+        raise ParameterError(f"{moved} moves a mesh, mesh.{name}.static says that it does not move; leave one out")
+    if values["transform"] == "pose":
+        raise ParameterError(
+            f"mesh.{name}.transform: pose is for vertices that are sent in each frame; of a mesh that moves by poses "
+            f"mesh.{name}.pose places its shape in the body's own frame, without a transform"
+        )
+    if values["input"] == TF and not settings["frame_id"]:
+        raise ParameterError(f"{moved} needs a frame to transform to; set parameter frame_id")
+    if values["input"] == TF and not values["frame"]:
+        raise ParameterError(f"{moved} needs the body's own frame to transform from; set mesh.{name}.frame")

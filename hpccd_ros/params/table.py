@@ -131,6 +131,25 @@ DETECTION_ROWS = (
         change=ALWAYS,
     ),
     Row(
+        "rigid_tolerance",
+        "float",
+        1e-4,
+        "Meshes that move by poses turn, and the core knows straight lines: a step is cut into as few parts as bring "
+        "the two this near to each other. Nothing is missed; what is reported comes within the separation and twice "
+        "the bounds of both meshes, which each answer tells",
+        unit="unit of the vertices",
+        span=(1e-9, FARTHEST),
+        change=ALWAYS,
+    ),
+    Row(
+        "rigid_parts",
+        "int",
+        16,
+        "Most parts of a step. Where more were needed, bounds exceed rigid_tolerance, and still nothing is missed",
+        span=(1, 1000),
+        change=ALWAYS,
+    ),
+    Row(
         "max_contacts",
         "int",
         200_000,

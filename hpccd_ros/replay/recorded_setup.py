@@ -146,7 +146,7 @@ def _files(recording, meshes):
                 vertices, faces = _load(attachment, recording.attachments[attachment])
             else:
                 vertices, faces = load_mesh(row["file"])
-            found[name] = mesh_of_file(vertices, faces, row["static"], row["pose"])
+            found[name] = mesh_of_file(vertices, faces, row)
         except MeshFileError as error:
             raise RecordingError(f"mesh {name} of the recording: {error}") from error
     return found

@@ -57,6 +57,19 @@ def merged(found: Sequence[hc.Contacts], parts: int, whole: hc.Contacts | None =
     )
 
 
+def earliest(contacts: hc.Contacts) -> hc.Contacts:
+    """Those at first_toc alone, as a detector that reports "first" gives them."""
+    of_vf, of_ee = (np.flatnonzero(toc == contacts.first_toc) for toc in (contacts.vf_toc, contacts.ee_toc))
+    rows = np.concatenate([of_vf, len(contacts.vf) + of_ee])
+    places = {
+        name: values[rows] if len(values := getattr(contacts, name)) else values
+        for name in ("points", "normals", "closest")
+    }
+    vf, vf_toc, ee, ee_toc = contacts.vf[of_vf], contacts.vf_toc[of_vf], contacts.ee[of_ee], contacts.ee_toc[of_ee]
+    first, hashed = contacts.first_toc, contacts_hash(vf, vf_toc, ee, ee_toc)
+    return hc.Contacts(vf=vf, vf_toc=vf_toc, ee=ee, ee_toc=ee_toc, **places, first_toc=first, hash=hashed)
+
+
 def contacts_hash(
     vf: NDArray[np.uint32], vf_toc: NDArray[np.float64], ee: NDArray[np.uint32], ee_toc: NDArray[np.float64]
 ) -> int:

@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 from hpccd_ros.frames import transform_buffer
 from hpccd_ros.frames.drops import Input, Reason
 from hpccd_ros.frames.rate_limit import RateLimit
-from hpccd_ros.frames.rigid import IDENTITY, Rigid
 from hpccd_ros.frames.transform_buffer import NoTransformError, TransformBuffer
 from hpccd_ros.frames.transformer import MeshTransformer
 from hpccd_ros.frames.types import MeshFrame, MeshSettings
 from hpccd_ros.middleware import transform_topics
+from hpccd_ros.rigid.transform import IDENTITY, Rigid
 
 POINTS = np.array([[0.0, 0, 0], [1, 0, 0], [0, 2, 0], [0, 0, 3]])
 SECOND = 10**9

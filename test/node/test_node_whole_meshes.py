@@ -13,7 +13,6 @@ from whole_meshes import marker_of, shape_of
 
 from hpccd_ros.bag.reader import Recording
 from hpccd_ros.bag.writer import BagWriter
-from hpccd_ros.frames.rigid import Rigid
 from hpccd_ros.frames.welding import weld
 from hpccd_ros.middleware import fields, mesh_messages, qos
 from hpccd_ros.record import recorded_topics
@@ -21,6 +20,7 @@ from hpccd_ros.record.recording_info import recording_info
 from hpccd_ros.record.topic_recorder import Recorder
 from hpccd_ros.replay import recorded_setup
 from hpccd_ros.replay.recomputed import Replay
+from hpccd_ros.rigid.transform import Rigid
 
 # As the node numbers the corners of a marker: vertices in the order of their first use.
 FIRST, VERTEX_OF = weld(sheet_positions(N, 0, dtype=np.float64)[FACES.reshape(-1)])

@@ -13,7 +13,6 @@ from waving_sheet import scene_of, sheet_positions
 
 from hpccd_ros.bag.reader import Recording, RecordingError
 from hpccd_ros.bag.writer import BagWriter, Topic
-from hpccd_ros.frames.rigid import Rigid
 from hpccd_ros.frames.transform_buffer import TransformBuffer
 from hpccd_ros.middleware import qos
 from hpccd_ros.record import recorded_topics
@@ -21,6 +20,7 @@ from hpccd_ros.record.recording_info import recording_info
 from hpccd_ros.record.topic_recorder import Recorder
 from hpccd_ros.replay import recorded_setup
 from hpccd_ros.replay.recomputed import Replay
+from hpccd_ros.rigid.transform import Rigid
 
 STEPS = 12
 NET = {"transform": "tf", "frame": "hand"}

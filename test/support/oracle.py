@@ -17,8 +17,8 @@ from rosbags.serde import SerdeError
 
 import hpccd_core as hc
 from hpccd_ros.frames.mesh_file import load_mesh, place
-from hpccd_ros.frames.rigid import Rigid
 from hpccd_ros.frames.transform_buffer import NoTransformError, TransformBuffer
+from hpccd_ros.rigid.transform import Rigid
 
 NOT_THERE = "its positions are not there"
 FIELDS = ("kind", "mesh_a", "mesh_b", "features_a", "features_b", "toc")

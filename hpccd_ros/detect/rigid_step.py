@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A step in which meshes move by poses: the core knows straight lines only. No ROS.
+
+rigid/__init__.py says how such a step is asked, and why nothing is missed. Pairs of meshes that both go straight are
+asked in a detector of their own, once for the whole step: cloth with itself need not pay for what a robot's turns cost.
+"""
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+import hpccd_core as hc
+from hpccd_ros.detect.separation import Separation
+from hpccd_ros.frames.types import SceneFrame
+from hpccd_ros.rigid import cuts
+from hpccd_ros.rigid.merged import earliest, merged
+from hpccd_ros.rigid.motion import Linear, Motion, ScrewMotion
+from hpccd_ros.rigid.screw import Screw
+
+# Of detector.stats: what calls do not add up.
+OF_THE_SCENE = ("triangles", "bytes")
+
+
+@dataclass(frozen=True)
+class RigidOptions:
+    """``tolerance``: the straight lines of a part of a step shall be no farther than this from the motion of poses, in
+    the unit of the scene. ``most_parts``: a step is cut into no more."""
+
+    tolerance: float = 1e-4
+    most_parts: int = 16
+
+
+@dataclass(frozen=True)
+class MotionBounds:
+    """``parts``: into how many the step was cut. ``of_meshes``: how far each mesh may have been from its motion."""
+
+    parts: int = 0
+    of_meshes: tuple[float, ...] = ()
+
+
+def motions(
+    parts: tuple[Sequence[np.ndarray], Sequence[np.ndarray]], start: SceneFrame, end: SceneFrame
+) -> list[Motion]:
+    """Of each mesh; ``parts``: its vertices at both ends. One whose shape was given anew in between goes straight."""
+    found: list[Motion] = []
+    for v0, v1, p0, p1 in zip(*parts, start.placements, end.placements, strict=True):
+        if p0 is not None and p1 is not None and p0.body is p1.body:
+            found.append(ScrewMotion(p1.body, Screw.between(p0.pose, p1.pose)))
+        else:
+            found.append(Linear(v0, v1))
+    return found
+
+
+class RigidStep:
+    """Asks two detectors about one step. bent: of the pairs of meshes of which one moves by poses; straight: of the
+    others, None where there are none. rigid: which meshes move by poses.
+    """
+
+    def __init__(
+        self, names: tuple[str, ...], rigid: Sequence[bool], bent: hc.Detector, straight: hc.Detector | None
+    ) -> None:
+        self.bent, self.straight = bent, straight
+        self._names, self._rigid = names, rigid
+        self._in_force: np.ndarray | None = None  # of bent, (K, K); None: not known
+        self.detectors = (bent,) if straight is None else (bent, straight)
+        self.profile: Counter[str] = Counter()  # ms of the last step, by stage
+        self.stats: Counter[str] = Counter()  # of the last step
+
+    def detect(
+        self, moving: Sequence[Motion], asked: Separation, options: RigidOptions, report: str
+    ) -> tuple[hc.Contacts, MotionBounds]:
+        """moving: of each mesh. asked: what is in force for the detector of straight pairs already. Raises what the
+        core raises."""
+        self.profile.clear()
+        self.stats.clear()
+        cut = cuts.fewest_parts(moving, options.tolerance, options.most_parts)
+        margins = [cuts.Margin.of(motion, cut.parts) for motion in moving]
+        self._separate(asked, margins)
+        positions = [
+            np.concatenate([motion.vertices(number, cut.parts) for motion in moving]) for number in range(cut.parts + 1)
+        ]
+        whole = self._ask(self.straight, positions[0], positions[-1]) if self.straight is not None else None
+        found = []
+        for start, end in pairwise(positions):
+            found.append(self._ask(self.bent, start, end))
+            if report != "all" and len(found[-1]):
+                break  # later parts have later times only
+        contacts = merged(found, cut.parts, whole)
+        if report == "first":
+            contacts = earliest(contacts)
+        return contacts, MotionBounds(cut.parts, tuple(margin.sum for margin in margins))
+
+    def _ask(self, detector: hc.Detector, start: np.ndarray, end: np.ndarray) -> hc.Contacts:
+        contacts = detector.detect(start, end)
+        self.profile.update(detector.profile)
+        of_scene = {name: self.stats[name] for name in OF_THE_SCENE}
+        self.stats.update(detector.stats)
+        for name, value in of_scene.items():
+            self.stats[name] = max(value, detector.stats.get(name, 0))
+        return contacts
+
+    def _separate(self, asked: Separation, margins: list[cuts.Margin]) -> None:
+        wanted, rigid = asked.table(self._names), self._rigid
+        for a in range(len(margins)):
+            for b in range(a + 1, len(margins)):
+                if rigid[a] or rigid[b]:
+                    wanted[a, b] = wanted[b, a] = cuts.grown(float(wanted[a, b]), margins[a], margins[b])
+        changed = np.ones(wanted.shape, bool) if self._in_force is None else wanted != self._in_force
+        self._in_force = None  # should only a part of it be done
+        for a, b in np.argwhere(np.triu(changed, 1)).tolist():
+            if rigid[a] or rigid[b]:
+                self.bent.set_separation(self._names[a], self._names[b], float(wanted[a, b]))
+        self._in_force = wanted

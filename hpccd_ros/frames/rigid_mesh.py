@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A mesh that keeps its shape and moves by poses: the shape is given once, each pose then makes a frame. No ROS."""
+
+import numpy as np
+
+from hpccd_ros.base.quoting import quoted
+from hpccd_ros.frames.coordinates import unusable_coordinates
+from hpccd_ros.frames.drops import Reason, Refusal
+from hpccd_ros.frames.types import MeshFrame, MeshSettings, Placement, PoseFrame
+from hpccd_ros.rigid.body import Body
+from hpccd_ros.rigid.transform import Rigid
+
+
+class RigidMesh:
+    """``mesh``: its settings; their ``pose`` says where vertices stand in the body's own frame."""
+
+    def __init__(self, mesh: MeshSettings) -> None:
+        self._mesh = mesh.name
+        self._stands = Rigid.of(mesh.pose[:3], mesh.pose[3:])
+        self._shape: MeshFrame | None = None
+        self._body: Body | None = None
+
+    def set_shape(self, shape: MeshFrame) -> None:
+        """Its vertices, before ``pose``. The same as before leave the motion from pose to pose whole."""
+        before = self._shape
+        if before is not None and before.version == shape.version and np.array_equal(before.vertices, shape.vertices):
+            return
+        self._shape = shape
+        self._body = Body.of(self._stands.apply(shape.vertices.astype(np.float64)))
+
+    def place(self, frame: PoseFrame) -> MeshFrame | Refusal:
+        """The vertices at a pose, as though they had been sent."""
+        if self._shape is None or self._body is None:
+            text = (
+                f"a pose came, and no vertices say what it moves; give a file (parameter mesh.{self._mesh}.file), or "
+                f"publish meshes/{self._mesh}/topology and once meshes/{self._mesh}/vertices, in the body's own frame"
+            )
+            return Refusal(self._mesh, Reason.NO_SHAPE, text)
+        placement = Placement(self._body, frame.pose)
+        if problem := unusable_coordinates(placement.vertices):
+            reason, text = problem
+            where = quoted(frame.pose.shift.tolist())
+            return Refusal(self._mesh, reason, f"at the pose {where} {text}")
+        return MeshFrame(
+            frame.stamp,
+            placement.vertices,
+            self._shape.version,
+            None,
+            frame.frame_id,
+            frame.received,
+            frame.only_publisher,
+            placement=placement,
+        )

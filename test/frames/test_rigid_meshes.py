@@ -1,0 +1,177 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Meshes that keep their shape: a shape once, then poses, or transforms alone. No ROS."""
+
+import numpy as np
+import pytest
+
+from hpccd_ros.frames.outcome import Outcome
+from hpccd_ros.frames.pipeline import FramePipeline
+from hpccd_ros.frames.types import AssemblyRules, MeshFrame, MeshSettings, PoseFrame, Topology
+from hpccd_ros.rigid.transform import IDENTITY, Rigid
+
+FACES = np.array([[0, 1, 2]], np.uint32)
+TRIANGLE = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32)
+QUARTER = Rigid.of((1, 2, 3), (0, 0, np.sqrt(0.5), np.sqrt(0.5)))  # about z, then to 1 2 3
+TURNED = [[1, 2, 3], [1, 3, 3], [0, 2, 3]]
+CLOTH, BOX = MeshSettings("cloth"), MeshSettings("box", self_collision=False, input="pose")
+LINK, TOOL = (MeshSettings(name, frame=f"{name}_frame", input="tf") for name in ("link", "tool"))
+
+
+def topology(version=0):
+    return Topology(version, 3, FACES)
+
+
+def shape(version=0, scale=1):
+    return MeshFrame(5, scale * TRIANGLE, version)
+
+
+def cloth(stamp):
+    return MeshFrame(stamp, TRIANGLE, 0)
+
+
+def pipeline_of(*meshes, shapes=True, **rules):
+    made = FramePipeline(meshes, AssemblyRules(frame_id="world", **rules))
+    for mesh in meshes:
+        made.push(mesh.name, topology())
+        if shapes and mesh.rigid:
+            assert made.push(mesh.name, shape()).static_taken == 1
+    return made
+
+
+def retried(pipeline):
+    outcome = Outcome()
+    for part in pipeline.retry():
+        outcome += part
+    return outcome
+
+
+def reasons(outcome):
+    return [(refusal.mesh, str(refusal.reason)) for refusal in outcome.refusals]
+
+
+def test_a_pose_makes_a_frame():
+    pipeline = pipeline_of(BOX)
+    (frame,) = pipeline.push("box", PoseFrame(7, QUARTER, received=2.5)).frames
+    assert (frame.stamp, frame.fresh, frame.received) == (7, ("box",), 2.5)
+    np.testing.assert_allclose(frame.vertices[0], TURNED, atol=1e-15)
+    assert frame.vertices[0].dtype == np.float64 and frame.placements[0].pose is QUARTER
+    (later,) = pipeline.push("box", PoseFrame(8, IDENTITY)).frames
+    assert later.placements[0].body is frame.placements[0].body and frame.same_scene(later)
+
+
+def test_poses_of_the_same_stamp_as_frames_of_others():
+    pipeline = pipeline_of(CLOTH, BOX)
+    assert not pipeline.push("box", PoseFrame(7, QUARTER)).frames
+    (frame,) = pipeline.push("cloth", cloth(7)).frames
+    assert frame.placements[0] is None and frame.placements[1].pose is QUARTER
+
+
+def test_without_a_shape_a_pose_is_refused():
+    pipeline = pipeline_of(BOX, shapes=False)
+    outcome = pipeline.push("box", PoseFrame(7, QUARTER))
+    assert reasons(outcome) == [("box", "no_shape")] and "mesh.box.file" in outcome.refusals[0].text
+    pipeline.push("box", shape())
+    assert pipeline.push("box", PoseFrame(8, QUARTER)).frames
+
+
+def test_a_shape_of_another_size_is_refused_with_each_pose():
+    pipeline = pipeline_of(BOX, shapes=False)
+    pipeline.push("box", MeshFrame(0, TRIANGLE[:2], 0))
+    assert reasons(pipeline.push("box", PoseFrame(7, QUARTER))) == [("box", "wrong_vertex_count")]
+
+
+def test_the_same_shape_again_is_the_same_body_and_another_one_is_not():
+    pipeline = pipeline_of(BOX)
+    bodies = []
+    for stamp, scale in ((1, 1), (2, 1), (3, 2)):
+        pipeline.push("box", shape(scale=scale))
+        (frame,) = pipeline.push("box", PoseFrame(stamp, QUARTER)).frames
+        bodies.append(frame.placements[0].body)
+    assert bodies[0] is bodies[1] is not bodies[2]
+
+
+def test_a_file_and_where_it_stands_in_the_body():
+    stands = MeshSettings("box", pose=(1, 2, 3, 0, 0, np.sqrt(0.5), np.sqrt(0.5)), input="pose")
+    pipeline = FramePipeline((stands,), AssemblyRules())
+    pipeline.load("box", topology(), MeshFrame(0, TRIANGLE, 0))
+    (frame,) = pipeline.push("box", PoseFrame(7, Rigid.of((0, 0, 10), (0, 0, 0, 1)))).frames
+    np.testing.assert_allclose(frame.vertices[0], np.array(TURNED) + [0, 0, 10], atol=1e-15)
+
+
+def test_poses_too_far_away():
+    outcome = pipeline_of(BOX).push("box", PoseFrame(7, Rigid.of((2e150, 0, 0), (0, 0, 0, 1))))
+    assert reasons(outcome) == [("box", "out_of_range")]
+
+
+def test_poses_in_another_frame_wait_for_its_transform():
+    pipeline = pipeline_of(MeshSettings("box", transform="tf", input="pose"))
+    assert not pipeline.push("box", PoseFrame(7, QUARTER, "hand")).frames and pipeline.waiting == 1
+    pipeline.transforms.add("world", "hand", Rigid.of((0, 0, 10), (0, 0, 0, 1)), None)
+    (frame,) = retried(pipeline).frames
+    np.testing.assert_allclose(frame.vertices[0], np.array(TURNED) + [0, 0, 10], atol=1e-15)
+    np.testing.assert_allclose(frame.placements[0].pose.shift, [1, 2, 13])
+
+
+def test_transforms_are_asked_at_the_stamps_of_the_others():
+    pipeline = pipeline_of(CLOTH, LINK)
+    outcome = pipeline.push("cloth", cloth(15))
+    assert outcome.asked == ["link"] and not outcome.frames and pipeline.waiting == 2
+    pipeline.transforms.add("world", "link_frame", IDENTITY, 10)
+    assert not retried(pipeline).frames
+    pipeline.transforms.add("world", "link_frame", Rigid.of((2, 0, 0), (0, 0, 0, 1)), 20)
+    (frame,) = retried(pipeline).frames
+    np.testing.assert_allclose(frame.placements[1].pose.shift, [1, 0, 0])
+    assert frame.stamp == 15 and set(frame.fresh) == {"cloth", "link"} and pipeline.waiting == 0
+
+
+def test_a_transform_that_does_not_come_is_told_and_gives_way():
+    pipeline = pipeline_of(CLOTH, LINK, max_pending=3)
+    outcome = Outcome()
+    for stamp in range(1, 8):
+        outcome += pipeline.push("cloth", cloth(stamp))
+    assert {("link", "no_transform"), ("cloth", "incomplete")} == set(reasons(outcome))
+    assert outcome.asked == ["link"] * 7 and pipeline.waiting + len(outcome.refusals) == 14
+    assert "no transform connects 'link_frame' and 'world'" in pipeline.awaited_transform("link")[0]
+
+
+def test_transforms_alone_give_a_frame_for_each_time_that_all_have_reached():
+    pipeline = pipeline_of(LINK, TOOL)
+    stamps = []
+    for stamp, child in ((10, "link"), (10, "tool"), (20, "tool"), (20, "link"), (30, "link"), (30, "tool")):
+        pose = Rigid.of((stamp, 0, 0), (0, 0, 0, 1))
+        parent = "world" if child == "link" else "link_frame"
+        pipeline.transforms.add(parent, f"{child}_frame", pose, stamp)
+        stamps += [
+            (frame.stamp, *(placement.pose.shift[0] for placement in frame.placements))
+            for frame in retried(pipeline).frames
+        ]
+    assert stamps == [(10, 10, 20), (20, 20, 40), (30, 30, 60)]
+
+
+def test_transforms_that_hold_at_all_times_move_nothing():
+    pipeline = pipeline_of(LINK)
+    pipeline.transforms.add("world", "link_frame", QUARTER, None)
+    outcome = retried(pipeline)
+    assert not outcome.frames and not outcome.asked and pipeline.waiting == 0
+
+
+@pytest.mark.parametrize("meshes", [(BOX,), (CLOTH, BOX), (CLOTH, LINK), (LINK,)])
+def test_a_stream_that_begins_anew(meshes):
+    """As with vertices: after a few frames of an earlier time."""
+    pipeline = pipeline_of(*meshes, restart_after=3)
+    pipeline.transforms.add("world", "link_frame", IDENTITY, 1)
+    frames, restarts = [], 0
+    for stamp in (100, 101, *range(10, 16)):
+        outcome = Outcome()
+        for mesh in meshes:
+            if mesh.input == "tf":
+                pipeline.transforms.add("world", "link_frame", QUARTER, stamp)
+            else:
+                outcome += pipeline.push(mesh.name, PoseFrame(stamp, QUARTER) if mesh.rigid else cloth(stamp))
+        outcome += retried(pipeline)
+        frames += [frame.stamp for frame in outcome.frames]
+        restarts += len(outcome.restarts)
+    if meshes != (LINK,):  # which goes on from the last stamp that is known
+        assert restarts >= 1 and frames[:2] == [100, 101] and frames[-1] == 15
+    else:
+        assert frames == [100, 101]
