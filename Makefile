@@ -34,10 +34,10 @@ ENVIRONMENT := $(VENV)/.hpccd-environment$(if $(PYTHON),-$(subst /,-,$(PYTHON)))
 INSTALLED   := $(VENV)/.hpccd-installed
 
 # What the installed package is made of.
-SOURCES := $(sort $(shell find CMakeLists.txt setup.py package.xml cmake config msg srv scripts hpccd_ros hpccd_core \
+SOURCES := $(sort $(shell find CMakeLists.txt setup.py package.xml action cmake config msg srv scripts hpccd_ros hpccd_core \
   \( -name __pycache__ -o -name dist -o -path hpccd_core/tests \) -prune -o -type f -print))
 
-.PHONY: help venv demo test test-core test-python test-gpu test-aarch64 sanitize fuzz lint format pin clean distclean \
+.PHONY: help venv demo test test-core test-python test-gpu test-aarch64 sanitize fuzz lint format release-check pin clean distclean \
   FORCE
 
 help: ## Show this list
@@ -93,6 +93,9 @@ lint: $(ENVIRONMENT) ## Check style, types, and who imports or includes whom: ru
 format: $(ENVIRONMENT) ## Mend the style where a tool can
 	$(BIN)/ruff check --fix .
 	@git ls-files -z '*.h' '*.cpp' '*.inl' '*.cu' '*.cuh' | xargs -0r $(BIN)/clang-format -i
+
+release-check: $(ENVIRONMENT) ## What must be settled before a release: placeholders, dates, versions
+	@$(BIN)/python scripts/release_check.py
 
 pin: $(ENVIRONMENT) ## Write the versions now in .venv to requirements/
 	@version=$$($(BIN)/python -c 'import sys; print("%d.%d" % sys.version_info[:2])'); \

@@ -13,6 +13,7 @@ a fraction of its step, from 0 (its start) to 1 (its end).
 
 from hpccd_ros.client.contacts import ContactArrays, contacts_from_message, scene_contacts
 from hpccd_ros.client.distances import DistanceArrays, distances_from_message
+from hpccd_ros.client.goals import goal_from_request
 from hpccd_ros.client.meshes import topology_from_message, topology_message, vertices_from_message, vertices_message
 from hpccd_ros.client.pairs import pair_summary
 from hpccd_ros.client.steps import collision_free_step_from_response, collision_free_step_request
@@ -65,6 +66,7 @@ __all__ = [
     "collision_free_step_request",
     "contacts_from_message",
     "distances_from_message",
+    "goal_from_request",
     "marker_topic",
     "mesh_from_marker",
     "mesh_from_shape",

@@ -4,6 +4,7 @@
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+from hpccd.action import Detect as DetectAction
 from hpccd.msg import MeshTopology, MeshVertices
 from hpccd.srv import Detect
 from numpy.typing import NDArray
@@ -68,8 +69,10 @@ def collision_free_step_request(
     )
 
 
-def collision_free_step_from_response(response: Detect.Response) -> float:
+def collision_free_step_from_response(response: Detect.Response | DetectAction.Result) -> float:
     """The largest part of the motion, 0 .. 1, that is certainly free of contacts; 1.0 where nothing touches.
+
+    response: of the service, or the result of a goal of the action.
 
     Raises RuntimeError with the node's own words where it did not compute it (refused, busy, out of time, stopped), and
     ValueError where something else was asked for: no number comes back that a step must not be taken by.

@@ -7,12 +7,13 @@ from typing import Any
 import numpy as np
 
 from hpccd_ros.base.quoting import shortened
+from hpccd_ros.frames import collada_file
 from hpccd_ros.frames.coordinates import unusable_coordinates
 from hpccd_ros.frames.types import POSE, TF, MeshFrame, Topology
 from hpccd_ros.frames.welding import weld
 from hpccd_ros.rigid.transform import Rigid
 
-FORMATS = (".obj", ".ply", ".stl")
+FORMATS = (".obj", ".ply", ".stl", ".dae")
 
 
 class MeshFileError(ValueError):
@@ -20,13 +21,33 @@ class MeshFileError(ValueError):
 
 
 def load_mesh(path: str) -> tuple[np.ndarray, np.ndarray]:
-    """(vertices (n,3) float64, faces (F,3) uint32) of an OBJ, PLY or STL file, in the file's own numbering.
+    """(vertices (n,3) float64, faces (F,3) uint32) of an OBJ, PLY, STL or DAE file, in the file's own numbering.
 
     STL repeats the corners of each triangle; equal ones (bit for bit) become one vertex, in order of first
-    use. Polygons become triangle fans. Raises MeshFileError: trimesh missing, no such file, other format, no
-    triangles.
+    use. Polygons become triangle fans. DAE: see collada_file.parse. Raises MeshFileError: trimesh or pycollada missing,
+    no such file, other format, no triangles.
     """
     file = _existing(path)
+    vertices, faces = _of_collada(file) if file.suffix.lower() == ".dae" else _by_trimesh(file)
+    if len(faces) == 0:
+        raise MeshFileError(f"{file}: has no triangles")
+    if file.suffix.lower() == ".stl":
+        first, vertex_of = weld(vertices)
+        vertices, faces = vertices[first], vertex_of[faces]
+    if problem := unusable_coordinates(vertices):
+        raise MeshFileError(f"{file}: {problem[1]}")
+    return vertices, faces.astype(np.uint32)
+
+
+def _of_collada(file: Path) -> tuple[np.ndarray, np.ndarray]:
+    try:
+        return collada_file.parse(file.read_bytes())
+    except Exception as error:  # pycollada raises whatever its parsers meet
+        why = shortened(" ".join(str(error).split())) or type(error).__name__
+        raise MeshFileError(f"{file}: cannot be read: {why}") from error
+
+
+def _by_trimesh(file: Path) -> tuple[np.ndarray, np.ndarray]:
     try:
         import trimesh
     except ImportError as error:
@@ -42,15 +63,7 @@ def load_mesh(path: str) -> tuple[np.ndarray, np.ndarray]:
     except Exception as error:  # trimesh raises whatever its parsers meet
         why = _not_text(file) or shortened(" ".join(str(error).split()))
         raise MeshFileError(f"{file}: cannot be read: {why}") from error
-    vertices, faces = np.asarray(mesh.vertices, np.float64), np.asarray(mesh.faces)
-    if len(faces) == 0:
-        raise MeshFileError(f"{file}: has no triangles")
-    if file.suffix.lower() == ".stl":
-        first, vertex_of = weld(vertices)
-        vertices, faces = vertices[first], vertex_of[faces]
-    if problem := unusable_coordinates(vertices):
-        raise MeshFileError(f"{file}: {problem[1]}")
-    return vertices, faces.astype(np.uint32)
+    return np.asarray(mesh.vertices, np.float64), np.asarray(mesh.faces)
 
 
 def _existing(path: str) -> Path:

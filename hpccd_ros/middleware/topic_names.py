@@ -26,8 +26,9 @@ TRANSFORMS_STATIC = "transforms_static"
 TF = "/tf"
 TF_STATIC = "/tf_static"
 
+# A service, and an action, which has services and topics below the name.
 DETECT = "~/detect"
-SERVICES = (DETECT,)
+SERVICES = (DETECT, *(f"{DETECT}/_action/{kind}" for kind in ("send_goal", "cancel_goal", "get_result")))
 
 # What is published of a mesh: its faces, and its positions as MeshVertices or as PointCloud2; or both at once, as
 # shape_msgs/Mesh or visualization_msgs/Marker.

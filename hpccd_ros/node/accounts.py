@@ -17,8 +17,9 @@ from hpccd_ros.node.refusal_log import RefusalLog
 class Accounts:
     """``dropped``: vertex messages. ``connections``: what the middleware tells of its topics (name -> count).
 
-    ``static_taken``: accepted messages of static meshes, which count as answered. ``requests``: to ~/detect, by how
-    they ended. warn: takes what is to be logged. on_refused: hears of each refusal, in the thread that refuses.
+    ``static_taken``: accepted messages of static meshes, which count as answered. ``requests``: to ~/detect, service
+    and action, by how they ended. warn: takes what is to be logged. on_refused: hears of each refusal, in the thread
+    that refuses.
     """
 
     def __init__(self, warn: Callable[[str], None]) -> None:
@@ -28,7 +29,7 @@ class Accounts:
         self.topologies_refused = RefusalCounter()
         self.metrics = Metrics()
         self.connections: Counter = Counter()
-        self.requests = Counter(answered=0, refused=0, busy=0, timed_out=0, failed=0, stopped=0)
+        self.requests = Counter(answered=0, refused=0, busy=0, timed_out=0, failed=0, stopped=0, canceled=0)
         self.restarts = 0
         self.static_taken = 0
         self.on_refused: Callable[[Refusal], None] = lambda refusal: None

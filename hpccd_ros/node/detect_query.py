@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The queries of ``~/detect``: what each takes, and its answer."""
+"""The queries of ``~/detect``, service and action: what each takes, and its answer."""
 
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from hpccd.action import Detect as DetectAction
 from hpccd.msg import ContactArray, DistanceArray
 from hpccd.srv import Detect
 
@@ -16,6 +17,17 @@ from hpccd_ros.detect.core import Options
 from hpccd_ros.detect.layout import Layout
 from hpccd_ros.detect.separation import NONE, Separation
 from hpccd_ros.middleware import contact_messages, separation_fields, snapshot_messages, tested_features
+
+# Of the service and of the action: the same fields.
+Request = Detect.Request | DetectAction.Goal
+Response = Detect.Response | DetectAction.Result
+
+# What is done for a request, in this order.
+WAITING = DetectAction.Feedback.WAITING
+READING = DetectAction.Feedback.READING
+BUILDING = DetectAction.Feedback.BUILDING
+DETECTING = DetectAction.Feedback.DETECTING
+WRITING = DetectAction.Feedback.WRITING
 
 
 class RequestError(ValueError):
@@ -43,7 +55,7 @@ OF_MOTION = ("contacts", "collision_free_step")
 OF_FEATURES = (*OF_MOTION, "proximity")
 
 
-def requested_query(request: Detect.Request) -> Query:
+def requested_query(request: Request) -> Query:
     """Raises RequestError: no such query, or an argument that it has no use for."""
     name = request.query or "contacts"
     if name not in ANSWERS:
@@ -60,7 +72,7 @@ def requested_query(request: Detect.Request) -> Query:
     return Query(name, NONE, distance or 0.0, features)
 
 
-def _features(request: Detect.Request, query: str) -> tuple[str, ...]:
+def _features(request: Request, query: str) -> tuple[str, ...]:
     if not request.features:
         return ()
     if query not in OF_FEATURES:
@@ -71,7 +83,7 @@ def _features(request: Detect.Request, query: str) -> tuple[str, ...]:
         raise RequestError(str(error)) from error
 
 
-def _length(request: Detect.Request, field: str, query: str, of: tuple[str, ...]) -> float | None:
+def _length(request: Request, field: str, query: str, of: tuple[str, ...]) -> float | None:
     """The number in a field that only the queries ``of`` have, None where it is empty."""
     given = getattr(request, field)
     if not len(given):
@@ -94,6 +106,7 @@ class Asked:
     layout: Layout
     options: Options
     max_contacts: int
+    enter: Callable[[str], None]  # takes the stage that begins
 
 
 @dataclass(frozen=True)
@@ -109,6 +122,7 @@ class Answer:
 def _contacts(asked: Asked, query: Query) -> Answer:
     message = ContactArray()
     found = asked.detector.detect(asked.start, asked.end)
+    asked.enter(WRITING)
     contact_messages.fill_contacts(
         message, found, asked.layout, max_contacts=asked.max_contacts, outputs=asked.options.outputs
     )
@@ -125,6 +139,7 @@ def _collision_free_step(asked: Asked, query: Query) -> Answer:
 def _proximity(asked: Asked, query: Query) -> Answer:
     message = ContactArray()
     near = asked.detector.proximity(asked.end, query.distance)
+    asked.enter(WRITING)
     snapshot_messages.fill_proximity(
         message, near, asked.layout, max_contacts=asked.max_contacts, outputs=asked.options.outputs
     )
@@ -135,6 +150,7 @@ def _proximity(asked: Asked, query: Query) -> Answer:
 def _intersections(asked: Asked, query: Query) -> Answer:
     message = ContactArray()
     hits = asked.detector.intersections(asked.end)
+    asked.enter(WRITING)
     snapshot_messages.fill_intersections(message, hits, asked.layout, max_contacts=asked.max_contacts)
     return Answer(f"{message.total} edges in faces", contacts=message)
 
@@ -142,6 +158,7 @@ def _intersections(asked: Asked, query: Query) -> Answer:
 def _distances(asked: Asked, query: Query) -> Answer:
     message = DistanceArray()
     gaps = asked.detector.distances(asked.end)
+    asked.enter(WRITING)
     snapshot_messages.fill_distances(message, gaps, asked.layout)
     return Answer(f"{len(gaps)} pairs of meshes", distances=message)
 

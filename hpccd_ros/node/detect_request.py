@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a request to ``~/detect`` brings: meshes, topologies and positions, checked; then its query is answered."""
+"""What a request to ``~/detect`` brings, be it of the service or of the action: meshes, topologies and positions,
+checked; then its query is answered."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from hpccd.msg import MeshVertices
-from hpccd.srv import Detect
 
 from hpccd_ros.base.quoting import listed, quoted, repeated, shortened
 from hpccd_ros.detect.cancellation import Cancellation
@@ -16,7 +17,17 @@ from hpccd_ros.detect.layout import Layout
 from hpccd_ros.detect.scene import SceneBuilder
 from hpccd_ros.frames.types import Topology
 from hpccd_ros.middleware import fields, mesh_messages
-from hpccd_ros.node.detect_query import ANSWERS, Answer, Asked, RequestError, requested_query
+from hpccd_ros.node.detect_query import (
+    ANSWERS,
+    BUILDING,
+    DETECTING,
+    READING,
+    Answer,
+    Asked,
+    Request,
+    RequestError,
+    requested_query,
+)
 
 
 @dataclass(frozen=True)
@@ -28,16 +39,18 @@ class NodeScene:
 
 
 def compute(
-    request: Detect.Request,
+    request: Request,
     scene: NodeScene,
     options: Options,
     limits: dict[str, Any],
     kept: KeptDetectors,
     cancellation: Cancellation,
+    enter: Callable[[str], None] = lambda stage: None,
 ) -> Answer:
     """limits: max_meshes, max_vertices, max_faces, max_edges, max_contacts. kept: of earlier requests; this one adds to
-    them. Raises RequestError, and what the core raises.
+    them. enter: told of each stage of the work when it begins. Raises RequestError, and what the core raises.
     """
+    enter(READING)
     query = requested_query(request)
     names = _names(request, scene, limits["max_meshes"])
     for field in ("topologies", "end") if query.of_snapshot else ("topologies", "start", "end"):
@@ -56,12 +69,15 @@ def compute(
         separation=query.separation or options.separation.among(names),
         features=query.features or options.features,
     )
+    enter(BUILDING)
     builder = scene.builder.among(names)
     used = kept.take(builder, topologies, options) or DetectorOf(
         builder, topologies, options, make_detector(builder.build(topologies), options)
     )
     detector = cancellation.guard(used.detector)
-    asked = Asked(start, end, detector, Layout.of(tuple(names), topologies), options, limits["max_contacts"])
+    layout = Layout.of(tuple(names), topologies)
+    asked = Asked(start, end, detector, layout, options, limits["max_contacts"], enter)
+    enter(DETECTING)
     answer = ANSWERS[query.name](asked, query)
     backend = detector.backend
     if cancellation.release():
@@ -76,7 +92,7 @@ def compute(
     return answer
 
 
-def _names(request: Detect.Request, scene: NodeScene, most: int) -> list[str]:
+def _names(request: Request, scene: NodeScene, most: int) -> list[str]:
     names = list(request.mesh_names) or list(scene.topologies)
     if not names:
         raise RequestError("mesh_names: empty, and the node has no meshes of its own")
@@ -87,7 +103,7 @@ def _names(request: Detect.Request, scene: NodeScene, most: int) -> list[str]:
     return names
 
 
-def _topology(request: Detect.Request, scene: NodeScene, limits: dict[str, Any], index: int, name: str) -> Topology:
+def _topology(request: Request, scene: NodeScene, limits: dict[str, Any], index: int, name: str) -> Topology:
     if request.topologies:
         try:
             return mesh_messages.topology_from_message(request.topologies[index], limits)

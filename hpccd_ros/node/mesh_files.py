@@ -7,6 +7,7 @@ from hpccd_ros.detect.core import unusable_topology
 from hpccd_ros.frames.mesh_file import MeshFileError, load_mesh, mesh_of_file
 from hpccd_ros.frames.outcome import Outcome
 from hpccd_ros.frames.pipeline import FramePipeline
+from hpccd_ros.middleware import resources
 
 
 def load(pipeline: FramePipeline, meshes: dict[str, dict[str, Any]]) -> Outcome:
@@ -14,7 +15,7 @@ def load(pipeline: FramePipeline, meshes: dict[str, dict[str, Any]]) -> Outcome:
     outcome = Outcome()
     for name, mesh in meshes.items():
         if mesh["file"]:
-            vertices, faces = load_mesh(mesh["file"])
+            vertices, faces = load_mesh(resources.local_path(mesh["file"]))
             topology, positions = mesh_of_file(vertices, faces, mesh)
             if why := unusable_topology(topology):
                 raise MeshFileError(f"mesh.{name}.file {mesh['file']}: {why}")

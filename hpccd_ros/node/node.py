@@ -10,6 +10,8 @@ from hpccd_ros.node import parameter_services
 from hpccd_ros.node.accounts import Accounts
 from hpccd_ros.node.configuration import Configuration
 from hpccd_ros.node.contacts_publisher import ContactsPublisher
+from hpccd_ros.node.detect_action import DetectAction
+from hpccd_ros.node.detect_jobs import DetectJobs
 from hpccd_ros.node.detect_request import NodeScene
 from hpccd_ros.node.detect_service import DetectService
 from hpccd_ros.node.life_cycle import GuardedLifecycleNode
@@ -29,7 +31,8 @@ SUCCESS = TransitionCallbackReturn.SUCCESS
 class HpccdNode(GuardedLifecycleNode):
     """Streams of vertices in, contacts out. To be run by a GuardedExecutor.
 
-    Configured: parameters checked, mesh files read, publishers and service there. Active: subscribed, detecting.
+    Configured: parameters checked, mesh files read, publishers, service and action there. Active: subscribed and
+    detecting.
     Raises ParameterError for parameters that it cannot start with.
     """
 
@@ -39,16 +42,18 @@ class HpccdNode(GuardedLifecycleNode):
         self._configuration = Configuration(self)
         self._settings = self._configuration.settings
         self._recording = NodeRecording(self, self._settings, self.errors)
-        self._configuration.follow(configured=lambda: self._service is not None, on_change=self._apply_change)
+        self._configuration.follow(configured=lambda: self._jobs is not None, on_change=self._apply_change)
         self._accounts = Accounts(self.get_logger().warning)
         self._reporter = Reporter(self.get_fully_qualified_name(), self._accounts)
         self._stream: StreamDetection | None = None  # none for a node without meshes
         self._stop_watch: StopWatch | None = None
         self._unknown: UnknownMeshWatch | None = None
+        self._jobs: DetectJobs | None = None
         self._service: DetectService | None = None
+        self._action: DetectAction | None = None
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Read mesh files, create publishers, service and diagnostics."""
+        """Read mesh files, create publishers, service, action and diagnostics."""
         settings, meshes = self._settings, self._configuration.meshes
         self._builder = scene_parameters.scene_builder(settings, meshes)
         self._deforming = [mesh.name for mesh in self._builder.meshes if not mesh.static]
@@ -62,7 +67,9 @@ class HpccdNode(GuardedLifecycleNode):
             self._stop_watch = StopWatch(self, self._configuration, self._builder, self._stream.works)
         self._contacts = ContactsPublisher(self, settings, self._builder)
         self._diagnostics = self.configured_publisher(DiagnosticArray, topic_names.DIAGNOSTICS, qos.DIAGNOSTICS)
-        self._service = DetectService(self, self._configuration, self._scene_for_service, self._accounts)
+        self._jobs = DetectJobs(self, self._configuration, self._scene_for_requests, self._accounts)
+        self._service = DetectService(self, self._jobs, settings)
+        self._action = DetectAction(self, self._jobs)
         self.configured_timer(settings["diagnostics_period"], self._report)
         self.configured_timer(GIVE_BACK_EVERY, self._give_back)
         return SUCCESS
@@ -77,8 +84,10 @@ class HpccdNode(GuardedLifecycleNode):
         return SUCCESS
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """No longer subscribed; frames that still waited are counted as dropped."""
+        """No longer subscribed; frames that still waited are counted as dropped, and goals that are open end."""
         self._stop()
+        if self._action is not None:
+            self._action.stop()
         return SUCCESS
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -101,7 +110,7 @@ class HpccdNode(GuardedLifecycleNode):
         self._stop()
         if self._stop_watch is not None:
             self._stop_watch.close()
-        self._end_service()
+        self._end_requests()
 
     def _stop(self) -> None:
         if self._unknown is not None:
@@ -114,14 +123,15 @@ class HpccdNode(GuardedLifecycleNode):
         self._recording.end()
 
     def _release(self) -> None:
-        self._end_service()
+        self._end_requests()
         self.unconfigure()
         self._stream = self._stop_watch = None
 
-    def _end_service(self) -> None:
-        if self._service is not None:
-            self._service.close()
-            self._service = None
+    def _end_requests(self) -> None:
+        for part in (self._jobs, self._service, self._action):
+            if part is not None:
+                part.close()
+        self._jobs = self._service = self._action = None
 
     def _apply_change(self) -> None:
         if self._stream is not None:
@@ -132,7 +142,7 @@ class HpccdNode(GuardedLifecycleNode):
             self._stop_watch.apply_change()
         self._recording.follow(active=self.state == "active")
 
-    def _scene_for_service(self) -> NodeScene | str:
+    def _scene_for_requests(self) -> NodeScene | str:
         if self.state != "active":
             return f"the node is {self.state}; activate it first"
         return NodeScene(self._builder, self._stream.topologies() if self._stream is not None else {})
@@ -144,7 +154,7 @@ class HpccdNode(GuardedLifecycleNode):
         self._contacts.show(found, message.header)
 
     def _give_back(self) -> None:
-        self._service.forget_scenes(unused_for=GIVE_BACK_EVERY)
+        self._jobs.forget_scenes(unused_for=GIVE_BACK_EVERY)
         environment.give_back_freed_memory()
 
     def _report(self) -> None:
@@ -153,7 +163,7 @@ class HpccdNode(GuardedLifecycleNode):
             state=self.state,
             waiting=self._stream.waiting if self._stream is not None else 0,
             warnings=[line for part in (self._stream, self._unknown) if part is not None for line in part.warnings()],
-            service=self._service.counts,
+            service=self._jobs.counts,
             errors=(self.errors.count, self.errors.last),
             recording=self._recording.status(),
             stop=self._stop_watch.status() if self._stop_watch is not None else None,

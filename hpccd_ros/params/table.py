@@ -440,7 +440,8 @@ MESH_ROWS = (
         "file",
         "string",
         "",
-        "Mesh file (OBJ, PLY, STL; needs trimesh) with the topology, version 0, and for a static mesh the positions",
+        "Mesh file (OBJ, PLY, STL, DAE; needs the extra meshes) with the topology, version 0, and for a static mesh "
+        "the positions: a path, package://PACKAGE/PATH or file:///PATH",
     ),
     Row(
         "transform",

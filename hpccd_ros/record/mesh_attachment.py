@@ -3,6 +3,9 @@
 
 from pathlib import Path
 
+from hpccd_ros.frames.mesh_file import MeshFileError
+from hpccd_ros.middleware.resources import local_path
+
 
 def attachment_name(mesh: str, path: str) -> str:
     """Name of the attachment with the file `path` of a mesh; its suffix tells the format."""
@@ -17,9 +20,8 @@ def mesh_files(parameters: dict) -> tuple[list[tuple[str, bytes]], list[str]]:
         if not path:
             continue
         try:
-            found.append((attachment_name(mesh, path), Path(path).expanduser().read_bytes()))
-        except OSError as error:
-            missing.append(
-                f"mesh file {path} is not in the recording ({error.strerror}): a replay will need it at that place"
-            )
+            found.append((attachment_name(mesh, path), Path(local_path(path)).expanduser().read_bytes()))
+        except (OSError, MeshFileError) as error:
+            why = error.strerror if isinstance(error, OSError) else error
+            missing.append(f"mesh file {path} is not in the recording ({why}): a replay will need it at that place")
     return found, missing

@@ -12,7 +12,7 @@ from hpccd_ros.detect.core import Options
 from hpccd_ros.detect.scene import SceneBuilder
 from hpccd_ros.frames.mesh_file import FORMATS, MeshFileError, load_mesh, mesh_of_file
 from hpccd_ros.frames.types import MeshFrame, Topology
-from hpccd_ros.middleware import topic_names, transform_topics
+from hpccd_ros.middleware import resources, topic_names, transform_topics
 from hpccd_ros.params import pair_parameters, scene_parameters, values
 from hpccd_ros.params.parameter_file import read_parameters
 from hpccd_ros.params.values import ParameterError
@@ -145,7 +145,7 @@ def _files(recording, meshes):
             if attachment in recording.attachments:
                 vertices, faces = _load(attachment, recording.attachments[attachment])
             else:
-                vertices, faces = load_mesh(row["file"])
+                vertices, faces = load_mesh(resources.local_path(row["file"]))
             found[name] = mesh_of_file(vertices, faces, row)
         except MeshFileError as error:
             raise RecordingError(f"mesh {name} of the recording: {error}") from error

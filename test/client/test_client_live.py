@@ -22,6 +22,7 @@ PUBLISHER = FOLDER / "ten_line_publisher.py"
 SUBSCRIBER = FOLDER / "ten_line_subscriber.py"
 MARKER = FOLDER / "ten_line_marker.py"
 REQUEST = FOLDER / "ten_line_request.py"
+GOAL = FOLDER / "ten_line_goal.py"
 LINE_SEARCH = FOLDER / "ten_line_line_search.py"
 STOP = FOLDER / "ten_line_stop.py"
 FACES = np.array([[0, 1, 2], [3, 4, 5]])
@@ -106,6 +107,16 @@ def test_the_request_of_the_documentation(start, start_node):
     assert second == "[0.2] [[         0 4294967295]] [[         0 4294967295]]"
 
 
+def test_the_goal_of_the_documentation(start, start_node):
+    node = start_node({"meshes": ["cloth"]})
+    goal, said = start(GOAL, node.namespace)
+    assert goal.wait(PATIENCE) == 0, said.read_text()
+    *feedback, last = said.read_text().splitlines()
+    found = re.fullmatch(r"True (\d+) contacts", last)
+    assert found and int(found[1]) > 0, last
+    assert feedback and all(re.fullmatch(r"\w+, 0 ahead, \d+\.\d of 600 s", line) for line in feedback), feedback
+
+
 def test_the_line_search_of_the_documentation(start, start_node):
     """With the profile for it, as the page says."""
     node = start_node({"meshes": ["cloth"]}, profiles=(ROOT / "config" / "profiles" / "step_size_control.yaml",))
@@ -134,7 +145,7 @@ def test_the_documentation_shows_programs_that_are_run_here():
     """Each whole program in README and docs that uses the client is one of those above, to the letter."""
     pages = [ROOT / "README.md", *(ROOT / "docs").rglob("*.md")]
     blocks = [block for page in pages for block in re.findall(r"```python\n(.*?)```", page.read_text(), re.DOTALL)]
-    programs = (PUBLISHER, SUBSCRIBER, MARKER, REQUEST, LINE_SEARCH, STOP)
+    programs = (PUBLISHER, SUBSCRIBER, MARKER, REQUEST, GOAL, LINE_SEARCH, STOP)
     run = [statements(program.read_text()) for program in programs]
     for block in blocks:
         if "client.prepare_environment()" in block:

@@ -24,7 +24,12 @@ def policy_names():
         for entry in group:
             name = entry.text.replace("~", ENCLAVE) if entry.text[0] == "~" else entry.text
             name = name if name[0] == "/" else f"/{name}"
-            if group.tag == "services":
+            if group.tag == "actions":
+                for kind in ("cancel_goal", "get_result", "send_goal"):
+                    published.add(f"rr{name}/_action/{kind}Reply")
+                    subscribed.add(f"rq{name}/_action/{kind}Request")
+                published |= {f"rt{name}/_action/{kind}" for kind in ("feedback", "status")}
+            elif group.tag == "services":
                 published.add(f"rr{name}Reply")
                 subscribed.add(f"rq{name}Request")
             else:
@@ -78,6 +83,7 @@ def test_the_policy_allows_all_that_the_node_does(start_node):
         for name in names:
             assert any(re.fullmatch(rule.replace("*", "[^/]+"), name) for rule in allowed), name
     assert {"rt/contacts", "rt/markers", "rr/hpccd/detectReply", "rt/hpccd/detect/_service_event"} <= published
+    assert "rt/hpccd/detect/_action/feedback" in published
     assert {"rt/meshes/net/points", "rt/clock", "rt/transforms"} <= subscribed
 
 

@@ -224,7 +224,7 @@ def test_anything_in_any_order(start_node, tmp_path):
 
     assert caller.now("detect", Detect.Request()).message
     caller.settle()
-    ends = {"answered", "refused", "busy", "timed_out", "failed", "stopped"}
+    ends = {"answered", "refused", "busy", "timed_out", "failed", "stopped", "canceled"}
 
     def counted():
         values = node.peer.statuses.get("service", (b"", "", {}))[2]

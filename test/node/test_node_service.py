@@ -2,7 +2,6 @@
 """~/detect: two snapshots in, contacts out, for several clients at once."""
 
 import gc
-import math
 import os
 import time
 from types import SimpleNamespace
@@ -10,35 +9,23 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import rclpy
+from detect_requests import BAD, BAD_IDS, FACES, LARGE, N, request
 from hpccd.srv import Detect
 from lifecycle_msgs.msg import Transition
 from node_calls import change_state
 from node_process import PATIENCE, assert_same_contacts
 from rclpy.executors import SingleThreadedExecutor
-from waving_sheet import scene_of, sheet_faces, sheet_positions
+from waving_sheet import scene_of, sheet_positions
 
 import hpccd_core as hc
 from hpccd_ros.detect.core import Options
 from hpccd_ros.detect.scene import SceneBuilder
-from hpccd_ros.middleware import fields, mesh_messages
+from hpccd_ros.middleware import fields
 from hpccd_ros.middleware.guard import Errors
 from hpccd_ros.node.accounts import Accounts
+from hpccd_ros.node.detect_jobs import DetectJobs
 from hpccd_ros.node.detect_request import NodeScene
 from hpccd_ros.node.detect_service import DetectService
-
-N = 16
-FACES = sheet_faces(N)
-
-
-def request(step=0, *, n=N, names=("cloth",), topologies=True, dtype=np.float32, **fields):
-    out = Detect.Request(mesh_names=list(names), **fields)
-    if topologies:
-        out.topologies = [mesh_messages.topology_message(sheet_faces(n), n * n) for _ in names]
-    for i, _ in enumerate(names):
-        for target, k in ((out.start, step), (out.end, step + 1)):
-            positions = sheet_positions(n, k + 2 * i, offset=0.003 * i, dtype=dtype)
-            target.append(mesh_messages.vertices_message(positions, k, step=k, frame_id="lab"))
-    return out
 
 
 def ask(node, *requests):
@@ -120,82 +107,12 @@ def test_options_of_the_request(node):
     assert_same_contacts(answer.contacts, *frames, scene_of(cloth=FACES), report="first")
 
 
-def changed(change, **options):
-    out = request(**options)
-    change(out)
-    return out
-
-
-def many_names(r):
-    r.mesh_names = [f"mesh{k}" for k in range(1001)]
-
-
-def cut_end(r):
-    r.end = []
-
-
-def cut_vertices(r):
-    r.end[0].vertices_f32 = r.end[0].vertices_f32[:-3]
-
-
-def put_nan(r):
-    r.start[0].vertices_f32[5] = math.nan
-
-
-def put_far(r):
-    points = sheet_positions(N, 1, dtype=np.float64)
-    points[7, 2] = 1e151
-    r.end[0] = mesh_messages.vertices_message(points, 1)
-
-
-def bad_stamp(r):
-    r.start[0].header.stamp.nanosec = 10**9
-
-
-def other_version(r):
-    r.start[0].topology_version = 4
-
-
-def bad_index(r):
-    r.topologies[0].faces[0] = N * N
-
-
-@pytest.mark.parametrize(
-    "bad, text",
-    [
-        (request(names=("ghost",), topologies=False), "unknown mesh 'ghost'"),
-        (request(names=("a", "a")), "names must differ"),
-        (changed(many_names), "1001 meshes, at most 1000 are taken (parameter max_meshes)"),
-        (changed(cut_end), "end: 0 entries for 1 meshes"),
-        (changed(cut_vertices), "end[0] (cloth): 255 vertices, the topology has 256"),
-        (changed(put_nan), "start[0] (cloth): vertex 1 is"),
-        (changed(put_far), "end[0] (cloth): vertex 7 is"),
-        (changed(bad_stamp), "start[0] (cloth): stamp has sec 0 and nanosec 1000000000"),
-        (changed(other_version), "start[0] (cloth): topology_version 4"),
-        (changed(bad_index), "topologies[0] (cloth): face 0 names vertex 256"),
-        (request(names=("g" * 2_000_000,), topologies=False), "unknown mesh 'ggg"),
-        (request(names=("a" * 1_000_000, "b", "a" * 1_000_000)), "names must differ"),
-        (changed(cut_end, names=("a" * 1_000_000, "b" * 1_000_000)), "end: 0 entries for 2 meshes"),
-        (changed(bad_index, names=("a" * 2_000_000,)), "face 0 names vertex 256"),
-        (request(accuracy="s" * 2_000_000), "accuracy"),
-        (request(accuracy="sloppy"), "accuracy"),
-        (request(report="some"), "report"),
-        (request(time_limit=-1.0), "time_limit"),
-        (request(time_limit=math.nan), "time_limit"),
-    ],
-    ids=(
-        "mesh names many count vertices nan far stamp version index mesh-2MB names-2MB count-2MB index-2MB "
-        "accuracy-2MB accuracy report limit nan-limit"
-    ).split(),
-)
+@pytest.mark.parametrize("bad, text", BAD, ids=BAD_IDS)
 def test_bad_requests_are_refused_with_a_reason(node, bad, text):
     refused, good = ask(node, bad, request())
     assert not refused.success and text in refused.message, refused.message
     assert len(refused.contacts.toc) == 0 and len(refused.message) < 1200
     assert good.success, "the node goes on"
-
-
-LARGE = 300  # a million contacts in this step: far longer to compute than small requests and steps take
 
 
 def test_busy_node_refuses_at_once(start_node):
@@ -304,7 +221,8 @@ def service():
                 "service_introspection": "off"}  # fmt: skip
     errors = node.errors = Errors(lambda text: None)
     configuration = SimpleNamespace(settings=settings, options=Options())
-    service = DetectService(node, configuration, lambda: NodeScene(SceneBuilder(()), {}), Accounts(print))
+    jobs = DetectJobs(node, configuration, lambda: NodeScene(SceneBuilder(()), {}), Accounts(print))
+    service = DetectService(node, jobs, settings)
     client = node.create_client(Detect, "service/detect")
     assert client.wait_for_service(PATIENCE)
 
@@ -318,6 +236,7 @@ def service():
 
     yield ask_once
     assert errors.count == 0, errors.last
+    jobs.close()
     service.close()
     executor.shutdown()
     node.destroy_node()

@@ -3,22 +3,14 @@
 
 import resource
 import signal
-import threading
-import time
 
-import numpy as np
 import pytest
-from hpccd.srv import Detect
+from long_step import END, MESHES, START, N, long_request, step_needs_more_than
 from node_process import PATIENCE
-from waving_sheet import scene_of, sheet_faces, sheet_positions
+from waving_sheet import sheet_faces
 
-import hpccd_core as hc
 from hpccd_ros.bag.examine import examine
-from hpccd_ros.middleware import mesh_messages
 
-# Two sheets that lie on each other and move as one: millions of contacts, most of them degenerate, on one thread.
-N, MESHES = 260, ("a", "b")
-START, END = (sheet_positions(N, k) for k in (2, 3))
 ALONE = {"meshes": list(MESHES), "threads": 1, "accuracy": "exact"}
 
 
@@ -42,12 +34,7 @@ def test_of_the_stream(start_node, tmp_path, number):
 
 def test_of_a_request(start_node):
     node = start_node({**ALONE, "detect_time_limit": 600.0})
-    request = Detect.Request(mesh_names=MESHES)
-    for _ in MESHES:
-        request.topologies.append(mesh_messages.topology_message(sheet_faces(N), N * N))
-        request.start.append(mesh_messages.vertices_message(START, 0))
-        request.end.append(mesh_messages.vertices_message(END, 1))
-    reply = node.peer.client().call_async(request)
+    reply = node.peer.client().call_async(long_request())
     node.wait_until(lambda: node.peer.statuses["service"][2]["open"] == "1", "request under way")
     before = cpu_of_ended_children()
     assert node.stop() == 0, node.output()
@@ -62,26 +49,3 @@ def cpu_of_ended_children():
     """Seconds of a core, which unlike the time on a clock hardly depend on how busy the machine is."""
     usage = resource.getrusage(resource.RUSAGE_CHILDREN)
     return usage.ru_utime + usage.ru_stime
-
-
-def step_needs_more_than(seconds):
-    """Whether the step, computed here, is still under way after so many seconds of a core."""
-    scene = scene_of(**{mesh: sheet_faces(N) for mesh in MESHES})
-    detector = hc.Detector(scene, threads=1, accuracy="exact")
-    given_up = []
-
-    def detect():
-        try:
-            detector.detect(*(np.concatenate([positions] * len(MESHES)) for positions in (START, END)))
-            given_up.append(False)
-        except hc.Cancelled:
-            given_up.append(True)
-
-    begin = time.process_time()
-    under_way = threading.Thread(target=detect)
-    under_way.start()
-    while under_way.is_alive() and time.process_time() - begin < seconds:
-        time.sleep(0.05)
-    detector.cancel()
-    under_way.join()
-    return given_up == [True]
