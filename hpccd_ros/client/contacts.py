@@ -36,6 +36,8 @@ class ContactArrays:
     of meshes that have one of their own, by their names in the order of the scene.
     features: what was tested at all: "vertex_face", "edge_edge" or both, but for pairs of meshes of which the node
     tests other ones (its parameter ``pair_features``).
+    parts: into how many the step was cut, because meshes move by poses; 0 where none does. motion_bounds: (K,) float64,
+    for each of mesh_names how far it may have been from its motion, or (0,); what that means is in ContactArray.msg.
     points, normals and closest are (0, 3) and (0, 2, 3) where the node does not send them (its parameter ``outputs``).
     All are views of the message, which they keep alive.
     """
@@ -56,6 +58,8 @@ class ContactArrays:
     minimum_separation: float
     pair_separation: dict[tuple[str, str], float]
     features: tuple[str, ...]
+    parts: int
+    motion_bounds: NDArray[np.float64]
 
     def __len__(self) -> int:
         return len(self.mesh_a)
@@ -97,6 +101,8 @@ def contacts_from_message(message: ContactArray) -> ContactArrays:
             (a, b) if order[a] <= order[b] else (b, a): distance for a, b, distance in separation.pairs
         },
         features=read_features(message),
+        parts=message.parts,
+        motion_bounds=field(message, "motion_bounds", np.float64, (len(order) if message.parts else 0,)),
     )
 
 

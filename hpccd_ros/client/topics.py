@@ -78,6 +78,14 @@ def marker_topic(mesh: str) -> str:
     return topic_names.of_mesh(_mesh_name(mesh), topic_names.MARKER)
 
 
+def pose_topic(mesh: str) -> str:
+    """Where geometry_msgs/PoseStamped of this mesh go, with ``mesh.MESH.input: pose``: ``meshes/MESH/pose``.
+
+    Raises TypeError or ValueError for what can be no name of a mesh.
+    """
+    return topic_names.of_mesh(_mesh_name(mesh), topic_names.POSE)
+
+
 def _mesh_name(mesh: str) -> str:
     if not isinstance(mesh, str):
         raise TypeError(f"mesh: expected its name, got {type(mesh).__name__}")

@@ -27,10 +27,12 @@ OF_THE_SCENE = ("triangles", "bytes")
 @dataclass(frozen=True)
 class RigidOptions:
     """``tolerance``: the straight lines of a part of a step shall be no farther than this from the motion of poses, in
-    the unit of the scene. ``most_parts``: a step is cut into no more."""
+    the unit of the scene. ``most_parts``: a step is cut into no more. ``parts``: into just so many, whatever the
+    tolerance; 0: as few as it asks for."""
 
     tolerance: float = 1e-4
     most_parts: int = 16
+    parts: int = 0
 
 
 @dataclass(frozen=True)
@@ -76,11 +78,11 @@ class RigidStep:
         core raises."""
         self.profile.clear()
         self.stats.clear()
-        cut = cuts.fewest_parts(moving, options.tolerance, options.most_parts)
-        margins = [cuts.Margin.of(motion, cut.parts) for motion in moving]
+        parts = options.parts or cuts.fewest_parts(moving, options.tolerance, options.most_parts).parts
+        margins = [cuts.Margin.of(motion, parts) for motion in moving]
         self._separate(asked, margins)
         positions = [
-            np.concatenate([motion.vertices(number, cut.parts) for motion in moving]) for number in range(cut.parts + 1)
+            np.concatenate([motion.vertices(number, parts) for motion in moving]) for number in range(parts + 1)
         ]
         whole = self._ask(self.straight, positions[0], positions[-1]) if self.straight is not None else None
         found = []
@@ -88,10 +90,10 @@ class RigidStep:
             found.append(self._ask(self.bent, start, end))
             if report != "all" and len(found[-1]):
                 break  # later parts have later times only
-        contacts = merged(found, cut.parts, whole)
+        contacts = merged(found, parts, whole)
         if report == "first":
             contacts = earliest(contacts)
-        return contacts, MotionBounds(cut.parts, tuple(margin.sum for margin in margins))
+        return contacts, MotionBounds(parts, tuple(margin.sum for margin in margins))
 
     def _ask(self, detector: hc.Detector, start: np.ndarray, end: np.ndarray) -> hc.Contacts:
         contacts = detector.detect(start, end)

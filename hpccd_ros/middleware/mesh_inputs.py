@@ -3,18 +3,26 @@
 
 from typing import Any
 
+from geometry_msgs.msg import PoseStamped
 from hpccd.msg import MeshTopology, MeshVertices
 from sensor_msgs.msg import PointCloud2
 from shape_msgs.msg import Mesh
 from visualization_msgs.msg import Marker
 
 from hpccd_ros.frames.drops import Input
-from hpccd_ros.frames.types import MeshFrame, Topology
+from hpccd_ros.frames.types import MeshFrame, PoseFrame, Topology
 from hpccd_ros.frames.welding import Welding
 from hpccd_ros.middleware import fields, mesh_messages, whole_meshes
-from hpccd_ros.middleware.topic_names import MARKER, POINTS, POSITIONS, SHAPE, TOPOLOGY, VERTICES, WHOLE
+from hpccd_ros.middleware.topic_names import MARKER, POINTS, POSE, POSITIONS, SHAPE, TOPOLOGY, VERTICES, WHOLE
 
-TYPES = {TOPOLOGY: MeshTopology, VERTICES: MeshVertices, POINTS: PointCloud2, SHAPE: Mesh, MARKER: Marker}
+TYPES = {
+    TOPOLOGY: MeshTopology,
+    VERTICES: MeshVertices,
+    POINTS: PointCloud2,
+    SHAPE: Mesh,
+    MARKER: Marker,
+    POSE: PoseStamped,
+}
 INPUTS = {TOPOLOGY: Input.TOPOLOGY} | dict.fromkeys(POSITIONS, Input.VERTICES)
 
 
@@ -27,7 +35,7 @@ def read(
     *,
     sent: int = 0,
     welding: Welding | None = None,
-) -> Topology | MeshFrame:
+) -> Topology | MeshFrame | PoseFrame:
     """Arrays of the frame are views of the message's bytes where it allows that.
 
     message: its CDR bytes where the kind is one of topic_names.WHOLE. limits: max_vertices, max_faces, max_edges.
@@ -47,6 +55,8 @@ def read(
             mesh.stamp, mesh.vertices, version, None, mesh.frame_id, received, only_publisher, mesh.topology
         )
     stamp, frame_id = fields.stamp_to_ns(message.header.stamp), message.header.frame_id
+    if kind == POSE:
+        return PoseFrame(stamp, mesh_messages.pose_from_message(message), frame_id, received, only_publisher)
     if kind == VERTICES:
         vertices = mesh_messages.vertices_from_message(message, limits["max_vertices"])
         version, step = message.topology_version, message.step

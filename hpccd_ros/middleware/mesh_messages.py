@@ -5,6 +5,7 @@ import array
 from collections.abc import Mapping
 
 import numpy as np
+from geometry_msgs.msg import PoseStamped
 from hpccd.msg import MeshTopology, MeshVertices
 from sensor_msgs.msg import PointCloud2, PointField
 
@@ -13,6 +14,7 @@ from hpccd_ros.frames.coordinates import unusable_coordinates
 from hpccd_ros.frames.drops import Reason
 from hpccd_ros.frames.types import NO_EDGES, Topology
 from hpccd_ros.middleware.fields import InvalidMessageError, ns_to_stamp, stamp_to_ns, to_field
+from hpccd_ros.rigid.transform import Rigid
 
 _FIELD_TYPES = {PointField.FLOAT32: np.dtype(np.float32), PointField.FLOAT64: np.dtype(np.float64)}
 
@@ -106,6 +108,15 @@ def vertices_from_cloud(cloud: PointCloud2, max_vertices: int) -> np.ndarray:
     for axis, name in enumerate("xyz"):
         points[..., axis] = rows[name]
     return usable(points.reshape(-1, 3))
+
+
+def pose_from_message(message: PoseStamped) -> Rigid:
+    """Raises InvalidMessageError: not finite, or a quaternion that is not of length 1."""
+    place, turn = message.pose.position, message.pose.orientation
+    try:
+        return Rigid.of((place.x, place.y, place.z), (turn.x, turn.y, turn.z, turn.w))
+    except ValueError as error:
+        raise InvalidMessageError(Reason.MALFORMED, f"pose: {error}") from error
 
 
 def _cloud_field(cloud: PointCloud2, axis: str) -> tuple[int, np.dtype]:

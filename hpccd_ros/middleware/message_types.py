@@ -7,6 +7,7 @@ import re
 TOPOLOGY = "hpccd/msg/MeshTopology"
 VERTICES = "hpccd/msg/MeshVertices"
 POINTS = "sensor_msgs/msg/PointCloud2"
+POSE = "geometry_msgs/msg/PoseStamped"
 SHAPE = "shape_msgs/msg/Mesh"
 MARKER = "visualization_msgs/msg/Marker"
 CONTACTS = "hpccd/msg/ContactArray"

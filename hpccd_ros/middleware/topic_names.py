@@ -31,14 +31,25 @@ DETECT = "~/detect"
 SERVICES = (DETECT, *(f"{DETECT}/_action/{kind}" for kind in ("send_goal", "cancel_goal", "get_result")))
 
 # What is published of a mesh: its faces, and its positions as MeshVertices or as PointCloud2; or both at once, as
-# shape_msgs/Mesh or visualization_msgs/Marker.
+# shape_msgs/Mesh or visualization_msgs/Marker; or, where it keeps its shape, where that is, as PoseStamped.
 TOPOLOGY = "topology"
 VERTICES = "vertices"
 POINTS = "points"
 SHAPE = "shape"
 MARKER = "marker"
 WHOLE = (SHAPE, MARKER)
-POSITIONS = (VERTICES, POINTS, *WHOLE)
+POSE = "pose"
+POSITIONS = (VERTICES, POINTS, *WHOLE, POSE)
+# Of a mesh that keeps its shape and that transforms move: nothing but the shape is published.
+BY_TRANSFORMS = "tf"
+INPUTS = (*POSITIONS, BY_TRANSFORMS)
+
+
+def positions(given_as: str) -> tuple[str, ...]:
+    """Those of POSITIONS that a mesh of this parameter ``input``, one of INPUTS, takes; one that keeps its shape has
+    this from its vertices."""
+    return {POSE: (POSE, VERTICES), BY_TRANSFORMS: (VERTICES,)}.get(given_as, (given_as,))
+
 
 # A mesh name becomes part of topic and parameter names.
 MESH_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")

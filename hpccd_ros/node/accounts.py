@@ -70,6 +70,8 @@ class Accounts:
             "step": found.end.step,
             **{f"core.{name}": value for name, value in found.stats.items()},
         }
+        if found.bounds.parts:
+            last |= {"parts": found.bounds.parts, "motion_bound": max(found.bounds.of_meshes)}
         if found.gaps is not None:
             last["smallest_distance"] = min((gap.distance for gap in found.gaps), default=math.inf)
         self.metrics.detected(len(found.end.fresh), latency_ms, found.detect_ms, found.profile, last, near)

@@ -17,6 +17,7 @@ from hpccd_ros.detect.step_detector import Detection
 from hpccd_ros.middleware import (
     contact_messages,
     fields,
+    motion_bounds,
     qos,
     separation_fields,
     snapshot_messages,
@@ -63,6 +64,7 @@ class ContactsPublisher:
         )
         separation_fields.fill_separation(message, found.options.separation)
         tested_features.fill_features(message, found.options.features)
+        motion_bounds.fill_bounds(message, found.bounds)
         message.dropped_frames = dropped_frames
         self._contacts.publish(message)
         if found.gaps is not None:

@@ -8,6 +8,7 @@ from rclpy.node import Node
 from hpccd_ros.frames.pipeline import FramePipeline
 from hpccd_ros.node.accounts import Accounts
 from hpccd_ros.node.mesh_subscriptions import MeshSubscriptions
+from hpccd_ros.node.mesh_topic import Reception
 from hpccd_ros.node.transform_subscriptions import TransformSubscriptions
 
 
@@ -25,12 +26,12 @@ class Subscriptions:
         self._of_transforms: list[TransformSubscriptions] = []
 
     def open(self, pipeline: FramePipeline, accounts: Accounts) -> None:
-        if any(mesh["transform"] == "tf" for mesh in self._meshes.values()):
+        if any("tf" in (mesh["transform"], mesh["input"]) for mesh in self._meshes.values()):
             transforms = TransformSubscriptions(self._node, pipeline, accounts, self._settings["max_rate"])
             self._of_transforms.append(transforms)
         for name, mesh in self._meshes.items():
-            subscriptions = MeshSubscriptions(self._node, name, mesh["input"], self._settings, pipeline, accounts)
-            self._of_meshes.append(subscriptions)
+            reception = Reception(self._node, name, self._settings, pipeline, accounts)
+            self._of_meshes.append(MeshSubscriptions(reception, mesh["input"]))
 
     def close(self) -> None:
         for subscriptions in (*self._of_meshes, *self._of_transforms):

@@ -3,6 +3,7 @@
 
 from typing import Any
 
+from geometry_msgs.msg import PoseStamped
 from hpccd.msg import MeshVertices
 from rclpy._rclpy_pybind11 import RCLError
 from rclpy.clock import Clock, ClockType
@@ -29,6 +30,7 @@ _TYPES = {
     topic_names.POINTS: (message_types.POINTS, PointCloud2),
     topic_names.SHAPE: (message_types.SHAPE, Mesh),
     topic_names.MARKER: (message_types.MARKER, Marker),
+    topic_names.POSE: (message_types.POSE, PoseStamped),
 }
 _DETECT = "hpccd/srv/Detect"
 

@@ -74,8 +74,13 @@ def detector_options(settings: dict[str, Any]) -> Options:
         wanted,
         settings["distances"],
         features(settings),
-        RigidOptions(settings["rigid_tolerance"], settings["rigid_parts"]),
+        rigid(settings),
     )
+
+
+def rigid(settings: dict[str, Any]) -> RigidOptions:
+    """How steps are cut in which meshes move by poses."""
+    return RigidOptions(settings["rigid_tolerance"], settings["rigid_parts"])
 
 
 def features(settings: dict[str, Any]) -> tuple[str, ...]:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from hpccd_core.options import ACCURACIES, BACKENDS, FEATURES, OUTPUTS, REPORTS
-from hpccd_ros.middleware.topic_names import POSITIONS
+from hpccd_ros.middleware.topic_names import INPUTS
 
 # When a parameter may be changed.
 ALWAYS, UNCONFIGURED, NEVER = "always", "unconfigured", "never"
@@ -39,6 +39,8 @@ MOST_SPLIT = 1e9  # MB, s
 
 # The largest coordinate that the core takes: no distance between two points is worth asking for beyond a few of it.
 FARTHEST = 1e150
+# Of a step that is cut.
+MOST_PARTS = 1000
 
 SCENE_ROWS = (
     Row(
@@ -146,7 +148,7 @@ DETECTION_ROWS = (
         "int",
         16,
         "Most parts of a step. Where more were needed, bounds exceed rigid_tolerance, and still nothing is missed",
-        span=(1, 1000),
+        span=(1, MOST_PARTS),
         change=ALWAYS,
     ),
     Row(
@@ -431,8 +433,10 @@ MESH_ROWS = (
         "string",
         "vertices",
         "Topic of the positions: meshes/NAME/vertices (MeshVertices) or meshes/NAME/points (PointCloud2); of positions "
-        "and topology: meshes/NAME/shape (shape_msgs/Mesh) or meshes/NAME/marker (Marker of type TRIANGLE_LIST)",
-        choices=POSITIONS,
+        "and topology: meshes/NAME/shape (shape_msgs/Mesh) or meshes/NAME/marker (Marker of type TRIANGLE_LIST); of a "
+        "mesh that keeps its shape: meshes/NAME/pose (PoseStamped), or tf: no topic, the transform from `frame` to "
+        "frame_id moves it",
+        choices=INPUTS,
     ),
     Row("static", "bool", False, "Does not move: positions from the file or from one message"),
     Row("self_collision", "bool", True, "Test the mesh against itself"),

@@ -12,6 +12,7 @@ from hpccd_ros.middleware.message_types import (
     MARKER,
     PAIRS,
     POINTS,
+    POSE,
     SHAPE,
     TOPOLOGY,
     VERTICES,
@@ -23,6 +24,7 @@ POSITIONS = {
     topic_names.POINTS: POINTS,
     topic_names.SHAPE: SHAPE,
     topic_names.MARKER: MARKER,
+    topic_names.POSE: POSE,
 }
 # Relative name -> type of what the node computes.
 ANSWERS = {topic_names.CONTACTS: CONTACTS, topic_names.DISTANCES: DISTANCES, topic_names.PAIRS: PAIRS}
@@ -44,13 +46,14 @@ def of_node(parameters: dict) -> list[Wanted]:
     """The topics of a node with these parameters, inputs before outputs."""
     wanted = []
     meshes = parameters["meshes"] or []  # None: never set
-    if any(parameters.get(f"mesh.{mesh}.transform") == "tf" for mesh in meshes):
+    if any("tf" in (parameters.get(f"mesh.{mesh}.{name}") for name in ("transform", "input")) for mesh in meshes):
         static = qos.TRANSFORMS_STATIC.depth
         wanted += [Wanted(t.name, t.type_name, static * t.static) for t in transform_topics.understood()]
     for mesh in meshes:
         wanted.append(Wanted(topic_names.topology(mesh), TOPOLOGY, latched=1))
-        kind = parameters.get(f"mesh.{mesh}.input") or topic_names.VERTICES
-        wanted.append(Wanted(topic_names.of_mesh(mesh, kind), POSITIONS[kind]))
+        given_as = parameters.get(f"mesh.{mesh}.input") or topic_names.VERTICES
+        kinds = topic_names.positions(given_as)
+        wanted += [Wanted(topic_names.of_mesh(mesh, kind), POSITIONS[kind]) for kind in kinds]
     # Distances and summaries whether they are asked for now or not: they may be at any time.
     return [*wanted, *(Wanted(name, type_name) for name, type_name in ANSWERS.items())]
 

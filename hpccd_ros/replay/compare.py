@@ -5,12 +5,18 @@ import numpy as np
 
 from hpccd_core.options import ACCURACIES
 from hpccd_ros.detect.layout import Layout
+from hpccd_ros.detect.rigid_step import MotionBounds
 from hpccd_ros.middleware import contact_messages
+from hpccd_ros.middleware.motion_bounds import read_bounds
 from hpccd_ros.middleware.separation_fields import read_separation
 
+NO_BOUNDS = MotionBounds()
 
-def difference(recorded, contacts, layout: Layout, any_one: bool = False) -> str | None:
-    """None where `recorded` (ContactArray) holds just what `contacts` (of the core) would be sent as.
+
+def difference(
+    recorded, contacts, layout: Layout, any_one: bool = False, bounds: MotionBounds = NO_BOUNDS
+) -> str | None:
+    """None where `recorded` (ContactArray) holds just what `contacts` (of the core) and `bounds` would be sent as.
 
     Compared bit for bit: pairs, times, their order, totals, first time and hash. Points, normals and nearest
     points are derived from these and not compared. any_one: the node stopped at the first contact found (report "any"),
@@ -23,6 +29,8 @@ def difference(recorded, contacts, layout: Layout, any_one: bool = False) -> str
         return f"topology versions {then} were recorded, now they are {now}"
     if problem := _malformed(recorded, layout):
         return f"the recorded answer is malformed: {problem}"
+    if (then := read_bounds(recorded)) != bounds:
+        return f"motion was bounded by {_bounded(then)}, now it is by {_bounded(bounds)}"
     if any_one:
         return _not_any(recorded, contacts, layout)
     count = len(recorded.kind)
@@ -48,6 +56,10 @@ def difference(recorded, contacts, layout: Layout, any_one: bool = False) -> str
     return None
 
 
+def _bounded(bounds: MotionBounds) -> str:
+    return f"{list(bounds.of_meshes)} in {bounds.parts} parts"
+
+
 def _count(recorded, now):
     return f"{recorded:,} contacts were recorded, now there are {now:,}"
 
@@ -60,6 +72,7 @@ def _malformed(message, layout) -> str | None:
             return f"{name} has {len(getattr(message, name))} entries for {count} contacts"
     try:
         read_separation(message)
+        read_bounds(message)
     except ValueError as error:
         return str(error)
     if message.accuracy not in ACCURACIES:

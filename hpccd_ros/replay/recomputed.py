@@ -9,6 +9,7 @@ from hpccd_ros.bag.decode import make_decoder
 from hpccd_ros.bag.reader import Recording, RecordingError
 from hpccd_ros.detect.core import CORE_ERRORS
 from hpccd_ros.detect.layout import Layout
+from hpccd_ros.detect.rigid_step import MotionBounds
 from hpccd_ros.detect.separation import NONE, Separation
 from hpccd_ros.detect.step_detector import StepDetector
 from hpccd_ros.frames.types import SceneFrame
@@ -16,6 +17,7 @@ from hpccd_ros.middleware import fields
 from hpccd_ros.middleware.fields import InvalidMessageError
 from hpccd_ros.middleware.separation_fields import read_separation
 from hpccd_ros.middleware.tested_features import read_features
+from hpccd_ros.params.table import MOST_PARTS
 from hpccd_ros.replay.compare import difference
 from hpccd_ros.replay.distances import DistanceCheck
 from hpccd_ros.replay.frames import PATIENCE, FrameSource, FrameWindow
@@ -41,6 +43,7 @@ class ReplayedStep:
     layout: Layout | None = None
     separation: Separation = NONE  # in force
     features: tuple[str, ...] = FEATURES  # that were tested
+    bounds: MotionBounds = MotionBounds()  # of motion by poses
     milliseconds: float = 0.0  # the core's call, wall time
     difference: str | None = None  # first difference from what was recorded
     missing: str | None = None  # why it could not be computed
@@ -196,6 +199,7 @@ class Replay:
             step.missing = f"the core refuses it: {error}"  # as in the node, which goes on with the next one
             return
         step.contacts, step.layout, step.milliseconds = found.contacts, found.layout, found.detect_ms
+        step.bounds = found.bounds
         step.separation, step.features = found.options.separation, found.options.features
 
     def _options(self, recorded):
@@ -205,7 +209,9 @@ class Replay:
             if not self._accuracy and recorded.accuracy in ACCURACIES:
                 options = dataclasses.replace(options, accuracy=recorded.accuracy)
             separation, features = self._separation_of(recorded), read_features(recorded)
-            options = dataclasses.replace(options, separation=separation, features=features)
+            # In as many parts as then: the tolerance may have been another one.
+            rigid = dataclasses.replace(options.rigid, parts=min(recorded.parts, MOST_PARTS))
+            options = dataclasses.replace(options, separation=separation, features=features, rigid=rigid)
         if self._features:
             options = dataclasses.replace(options, features=self._features)
         return dataclasses.replace(options, outputs=self._outputs)
@@ -226,7 +232,7 @@ class Replay:
             # Which one the node found depended on the timing of its threads: it must be one of all.
             self._every_contact.options = dataclasses.replace(self._detector.options, report="all", outputs=())
             found = self._every_contact.detect(step.start_frame, step.end_frame).contacts
-        step.difference = difference(step.recorded, found, step.layout, self.any_one)
+        step.difference = difference(step.recorded, found, step.layout, self.any_one, step.bounds)
 
     def _count(self, step):
         if step.missing:

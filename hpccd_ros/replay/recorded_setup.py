@@ -42,6 +42,7 @@ class ReplaySetup:
         return Options(
             accuracy or self.settings["accuracy"], backend, threads, self.settings["report"],
             separation=pair_parameters.separation(self.settings), features=scene_parameters.features(self.settings),
+            rigid=scene_parameters.rigid(self.settings),
         )  # fmt: skip
 
 
@@ -70,16 +71,17 @@ def of_recording(recording: Recording, parameter_file: str | None = None) -> Rep
     by_role = _by_role(recording, info, recorded_topics.types_by_role(meshes))
     roles = {topic: ("", role) if role in transform_topics.ALL else tuple(role.split("/")[1:])
              for role, topic in by_role.items() if role not in recorded_topics.ANSWERS}  # fmt: skip
-    if not any(kind in topic_names.POSITIONS for _, kind in roles.values()):
+    by_transforms = any(row["input"] == topic_names.BY_TRANSFORMS for row in meshes.values())
+    if not by_transforms and not any(kind in topic_names.POSITIONS for _, kind in roles.values()):
         raise RecordingError(
             f"{recording.path} holds no vertices of the meshes {', '.join(meshes)}; its topics are "
             f"{', '.join(recording.topics) or 'none'}"
         )
-    moved = [name for name, row in meshes.items() if row["transform"] == "tf"]
+    moved = [f"mesh.{name}.{key}" for name, row in meshes.items() for key in ("transform", "input") if row[key] == "tf"]
     if moved and not any(kind in transform_topics.ALL for _, kind in roles.values()):
         raise RecordingError(
-            f"{recording.path}: mesh {moved[0]} was transformed by tf (parameter mesh.{moved[0]}.transform), and the "
-            "recording holds no transforms: its positions cannot be computed again"
+            f"{recording.path}: a mesh was moved by transforms (parameter {moved[0]}), and the recording holds none: "
+            "its positions cannot be computed again"
         )
     return ReplaySetup(settings, meshes, roles, by_role.get(topic_names.CONTACTS), by_role.get(topic_names.DISTANCES),
                        _files(recording, meshes), values.unknown(given, meshes))  # fmt: skip

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 # Quaternions come rounded, often to float32 or to a few digits: within this they are taken as of unit length.
 _LENGTH_TOLERANCE = 1e-3
@@ -19,21 +20,21 @@ _LENGTH_TOLERANCE = 1e-3
 class Rigid:
     """x -> R x + shift. ``quaternion`` (4,) float64 x y z w of length 1, ``shift`` (3,) float64."""
 
-    quaternion: np.ndarray
-    shift: np.ndarray
+    quaternion: NDArray[np.float64]
+    shift: NDArray[np.float64]
 
     @classmethod
     def of(cls, shift: Sequence[float], quaternion: Sequence[float]) -> "Rigid":
         """Checked. Raises ValueError: not 3 and 4 numbers, not finite, quaternion not of length 1 within 1e-3."""
-        shift, quaternion = np.array(shift, np.float64), np.array(quaternion, np.float64)
-        if shift.shape != (3,) or quaternion.shape != (4,) or not np.isfinite([*shift, *quaternion]).all():
+        way, turn = np.array(shift, np.float64), np.array(quaternion, np.float64)
+        if way.shape != (3,) or turn.shape != (4,) or not np.isfinite([*way, *turn]).all():
             raise ValueError("needs 7 finite numbers: x y z, quaternion x y z w")
-        length = _length(quaternion)
+        length = _length(turn)
         if abs(length - 1.0) > _LENGTH_TOLERANCE:
-            raise ValueError(f"the quaternion {quaternion.tolist()} has length {length:.4g}; it must be 1")
-        return cls(quaternion / length, shift)
+            raise ValueError(f"the quaternion {turn.tolist()} has length {length:.4g}; it must be 1")
+        return cls(turn / length, way)
 
-    def apply(self, vertices: np.ndarray) -> np.ndarray:
+    def apply(self, vertices: NDArray[np.float64]) -> NDArray[np.float64]:
         """(n,3) float64. Without a rotation, coordinates are only shifted; without a shift, returned as they are."""
         if not self.quaternion[:3].any():
             return vertices + self.shift if self.shift.any() else vertices
@@ -60,7 +61,7 @@ class Rigid:
             mixed = math.sin((1 - t) * angle) * a + math.sin(t * angle) * b
         return Rigid(mixed / _length(mixed), (1 - t) * self.shift + t * other.shift)
 
-    def rotation(self) -> np.ndarray:
+    def rotation(self) -> NDArray[np.float64]:
         """The matrix, (3,3)."""
         x, y, z, w = self.quaternion
         return np.array(
@@ -75,7 +76,7 @@ class Rigid:
 IDENTITY = Rigid(np.array([0.0, 0.0, 0.0, 1.0]), np.zeros(3))
 
 
-def product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+def product(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
     """The turn of b, then that of a: a quaternion of length 1."""
     (ax, ay, az, aw), (bx, by, bz, bw) = a, b
     unscaled = np.array(
@@ -89,11 +90,12 @@ def product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return unscaled / _length(unscaled)
 
 
-def _length(quaternion: np.ndarray) -> float:
+def _length(quaternion: NDArray[np.float64]) -> float:
     return math.sqrt(sum((quaternion * quaternion).tolist()))
 
 
-def rotated(rotation: np.ndarray, points: np.ndarray) -> np.ndarray:
+def rotated(rotation: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
     """points: (3,) or (n,3), each multiplied by the matrix (3,3)."""
     x, y, z = points[..., 0:1], points[..., 1:2], points[..., 2:3]
-    return x * rotation[:, 0] + y * rotation[:, 1] + z * rotation[:, 2]
+    turned: NDArray[np.float64] = x * rotation[:, 0] + y * rotation[:, 1] + z * rotation[:, 2]
+    return turned

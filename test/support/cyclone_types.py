@@ -72,3 +72,5 @@ class ContactArray(IdlStruct, typename="hpccd::msg::dds_::ContactArray_"):
     separations: sequence[float64]
     closest: sequence[float64]
     distance: sequence[float64]
+    parts: uint32
+    motion_bounds: sequence[float64]

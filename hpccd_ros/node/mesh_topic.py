@@ -1,0 +1,103 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One topic of one mesh: its subscription, and what the middleware tells of it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+from rclpy.subscription import Subscription
+
+from hpccd_ros.frames.drops import Input, Reason, Refusal
+from hpccd_ros.frames.pipeline import FramePipeline
+from hpccd_ros.frames.rate_limit import RateLimit
+from hpccd_ros.frames.sequence import SequenceWatch
+from hpccd_ros.middleware import mesh_inputs, qos_overrides, topic_names
+from hpccd_ros.node.accounts import Accounts
+
+UNREADABLE = "a message cannot be deserialised; build its publisher with the same definition of the message"
+
+
+@dataclass(frozen=True, eq=False)
+class Reception:
+    """What all topics of a mesh have in common: who listens, and where messages go."""
+
+    node: Node
+    mesh: str
+    settings: dict[str, Any]
+    pipeline: FramePipeline
+    accounts: Accounts
+
+
+class MeshTopic:
+    """kind: the last part of the topic's name, one of mesh_inputs.TYPES."""
+
+    def __init__(self, reception: Reception, kind: str) -> None:
+        self.reception = reception
+        self.kind = kind
+        self.numbers = SequenceWatch()
+        self._limit = RateLimit(reception.settings["max_rate"])
+        self._subscription: Subscription | None = None
+
+    def subscribe(self, callback: Callable[[Any, dict[str, Any]], None], profile: QoSProfile) -> Subscription:
+        topic = topic_names.of_mesh(self.reception.mesh, self.kind)
+        self._subscription = qos_overrides.create_subscription(
+            self.reception.node,
+            mesh_inputs.TYPES[self.kind],
+            topic,
+            callback,
+            profile,
+            event_callbacks=self._events(topic),
+            raw=self.kind in topic_names.WHOLE,
+        )
+        return self._subscription
+
+    def close(self) -> None:
+        if self._subscription is not None:
+            self.reception.node.destroy_subscription(self._subscription)
+            self._subscription = None
+
+    @property
+    def name(self) -> str:
+        """Of the topic, in full."""
+        return self._subscription.topic_name
+
+    @property
+    def publishers(self) -> int:
+        """As far as is known."""
+        return self.reception.node.count_publishers(self.name)
+
+    def too_fast(self) -> str | None:
+        """In words, where a message came faster than the node looks at them."""
+        if self._limit.allows():
+            return None
+        return f"more than {self.reception.settings['max_rate']:g} messages a second (parameter max_rate)"
+
+    def refuse(self, reason: Reason, text: str, messages: int = 1) -> None:
+        self.reception.accounts.refused(Refusal(self.reception.mesh, reason, text, messages, what=self.what))
+
+    @property
+    def what(self) -> Input:
+        return mesh_inputs.INPUTS[self.kind]
+
+    def _events(self, topic: str) -> SubscriptionEventCallbacks:
+        """Count and log what the middleware reports of the subscription."""
+        connections, node = self.reception.accounts.connections, self.reception.node
+
+        def incompatible(event: Any) -> None:
+            connections[f"qos_incompatible.{topic}"] += event.total_count_change
+            node.get_logger().warning(
+                f"{topic}: a publisher offers an incompatible QoS (policy {event.last_policy_kind}) and is "
+                "not heard; see parameter input_reliability"
+            )
+
+        def lost(event: Any) -> None:
+            connections[f"message_lost.{topic}"] += event.total_count_change
+
+        def matched(event: Any) -> None:
+            if event.current_count_change > 0:
+                self.numbers.new_publisher()
+
+        return SubscriptionEventCallbacks(incompatible_qos=incompatible, message_lost=lost, matched=matched)

@@ -1,0 +1,187 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Meshes that move by poses beside a cloth: streamed as PoseStamped or by transforms, recorded and computed again."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from geometry_msgs.msg import PoseStamped, TransformStamped
+from hpccd.msg import MeshTopology
+from node_calls import set_parameter
+from waving_sheet import sheet_faces, sheet_positions
+
+from hpccd_ros import client
+from hpccd_ros.bag.reader import Recording
+from hpccd_ros.detect.core import Options
+from hpccd_ros.detect.layout import Layout
+from hpccd_ros.detect.rigid_step import RigidOptions
+from hpccd_ros.detect.scene import SceneBuilder
+from hpccd_ros.detect.step_detector import StepDetector
+from hpccd_ros.frames.types import MeshSettings, Placement, SceneFrame, Topology
+from hpccd_ros.middleware import contact_messages, fields, mesh_messages, qos
+from hpccd_ros.replay import recorded_setup
+from hpccd_ros.replay.recomputed import Replay
+from hpccd_ros.rigid.body import Body
+from hpccd_ros.rigid.transform import Rigid
+
+N = 8
+SHEET = Topology(0, N * N, sheet_faces(N))
+CORNERS = (np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * [0.4, 0.05, 0.02])
+BLADE = Topology(0, 8, np.array([
+    [0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1],
+    [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3],
+], np.uint32))  # fmt: skip
+BODY = Body.of(CORNERS.astype(np.float32))
+NAMES = ("cloth", "blade")
+TOLERANCE = 0.002
+
+
+def pose(k):
+    """A blade that turns about the middle of the cloth, by 0.8 from frame to frame, and rocks."""
+    half = 0.4 * k
+    turn = np.array([0.1 * np.sin(k), 0.1, np.sin(half), np.cos(half)])
+    return Rigid.of((0.17, 0.5, 0.05 * np.cos(k)), turn / np.linalg.norm(turn))
+
+
+def stamped(k):
+    message, at = PoseStamped(), pose(k)
+    message.header.stamp, message.header.frame_id = fields.ns_to_stamp(k), "world"
+    place, turn = message.pose.position, message.pose.orientation
+    place.x, place.y, place.z = at.shift.tolist()
+    turn.x, turn.y, turn.z, turn.w = at.quaternion.tolist()
+    return message
+
+
+def transform(k):
+    message, at = TransformStamped(child_frame_id="blade_link"), pose(k)
+    message.header.stamp, message.header.frame_id = fields.ns_to_stamp(k), "world"
+    place, turn = message.transform.translation, message.transform.rotation
+    place.x, place.y, place.z = at.shift.tolist()
+    turn.x, turn.y, turn.z, turn.w = at.quaternion.tolist()
+    return message
+
+
+def frame(k):
+    at = Rigid.of(pose(k).shift, pose(k).quaternion)  # normalised again, as what is received
+    placement = Placement(BODY, at)
+    vertices = (sheet_positions(N, k), placement.vertices)
+    return SceneFrame(k, k, "world", (SHEET, BLADE), vertices, NAMES, 0.0, (None, placement))
+
+
+def assert_answer(message, k, tolerance=TOLERANCE, most=16):
+    """The node's answer to the step that ends with frame k is that of the parts it is made of; how many contacts."""
+    meshes = (MeshSettings("cloth"), MeshSettings("blade", self_collision=False, input="pose"))
+    options = Options(backend="cpu", rigid=RigidOptions(tolerance, most))
+    expected = StepDetector(SceneBuilder(meshes), options).detect(frame(k - 1), frame(k))
+    got = contact_messages.read_contacts(message, Layout.of(NAMES, (SHEET, BLADE)))
+    for name in ("vf", "ee", "vf_toc", "ee_toc"):
+        assert np.array_equal(getattr(got, name), getattr(expected.contacts, name)), name
+    assert message.hash == expected.contacts.hash
+    arrays = client.contacts_from_message(message)
+    assert arrays.parts == expected.bounds.parts
+    assert tuple(arrays.motion_bounds.tolist()) == expected.bounds.of_meshes
+    return message.total
+
+
+def give_shape(node):
+    node.peer.topology("blade", BLADE.faces, BLADE.n_vertices)
+    node.peer.vertices("blade", CORNERS.astype(np.float32), stamp=0)
+
+
+def replayed(path):
+    with Recording(path) as recording:
+        replay = Replay(recording, recorded_setup.of_recording(recording))
+        steps = list(replay.steps())
+    assert replay.diverged == replay.unverified == 0 and replay.verified == len(steps)
+    return steps
+
+
+@pytest.mark.parametrize("by", ["pose", "tf"])
+def test_streamed_recorded_and_verified(start_node, tmp_path, by):
+    path = tmp_path / "run.mcap"
+    node = start_node({
+        "meshes": list(NAMES), "frame_id": "world", "mesh.blade.input": by, "record": str(path),
+        "mesh.blade.frame": "blade_link" if by == "tf" else "", "rigid_tolerance": TOLERANCE,
+    })  # fmt: skip
+    node.peer.topology("cloth", SHEET.faces, SHEET.n_vertices)
+    give_shape(node)
+    node.frames_status(answered=1)  # the shape
+    kind, topic = (PoseStamped, client.pose_topic("blade")) if by == "pose" else (TransformStamped, "transforms")
+    publisher = node.peer.publisher(kind, topic, qos.vertices("reliable", 100) if by == "pose" else qos.TRANSFORMS)
+    total, parts = 0, set()
+    for k in range(1, 9):
+        publisher.publish(stamped(k) if by == "pose" else transform(k))
+        node.peer.vertices("cloth", sheet_positions(N, k), stamp=k, frame_id="world")
+        node.frames_status(answered=1 + 2 * k)
+        if k > 1:
+            answer = node.contacts(k)[-1]
+            total += assert_answer(answer, k)
+            parts.add(answer.parts)
+    assert total > 100 and min(parts) > 1
+    assert set_parameter(node, "rigid_tolerance", 0.05).successful
+    publisher.publish(stamped(9) if by == "pose" else transform(9))
+    node.peer.vertices("cloth", sheet_positions(N, 9), stamp=9, frame_id="world")
+    coarse = node.contacts(9)[-1]
+    assert assert_answer(coarse, 9, 0.05) > 0 and coarse.parts < min(parts)
+    status = node.wait_until(lambda: node.peer.statuses["detection"][2].get("parts"), "parts in the status")
+    assert int(status) >= 1
+    assert node.stop() == 0
+    steps = replayed(path)
+    assert [step.bounds.parts for step in steps][-1] == coarse.parts and len(steps) == 8
+
+
+def test_what_is_wrong_with_poses_is_refused_and_said(start_node):
+    node = start_node({"meshes": ["blade"], "mesh.blade.input": "pose"})
+    publisher = node.peer.publisher(PoseStamped, client.pose_topic("blade"))
+    publisher.publish(stamped(1))
+    node.frames_status(dropped__no_shape=1)
+    give_shape(node)
+    node.frames_status(answered=1)
+    wrong = stamped(2)
+    wrong.pose.orientation.w = 3.0
+    not_finite = stamped(3)
+    not_finite.pose.position.y = float("nan")
+    far = stamped(4)
+    far.pose.position.z = 1e200
+    for message in (wrong, not_finite, far):
+        publisher.publish(message)
+    node.frames_status(dropped__malformed=2, dropped__out_of_range=1)
+    for k in (5, 6):
+        publisher.publish(stamped(k))
+    assert node.contacts(6)[-1].parts >= 1
+    assert node.process.poll() is None
+
+
+def test_transforms_alone(start_node):
+    """A robot by itself: a frame for each time that all of its links have reached."""
+    meshes = {"meshes": ["blade", "knife"], "frame_id": "world"}
+    for name in meshes["meshes"]:
+        meshes |= {f"mesh.{name}.input": "tf", f"mesh.{name}.frame": f"{name}_link"}
+    node = start_node(meshes)
+    for name in ("blade", "knife"):
+        node.peer.topology(name, BLADE.faces, BLADE.n_vertices)
+        node.peer.vertices(name, CORNERS.astype(np.float32), stamp=0)
+    node.frames_status(answered=2)
+    publisher = node.peer.publisher(TransformStamped, "transforms", qos.TRANSFORMS)
+    for k in range(1, 4):
+        for name, turned in (("blade", 1), ("knife", -1)):
+            message = transform(k * turned)
+            message.header.stamp, message.child_frame_id = fields.ns_to_stamp(k), f"{name}_link"
+            publisher.publish(message)
+        node.frames_status(answered=2 + 2 * k, received__blade=1 + k)
+    assert node.contacts(3)[-1].total > 0
+
+
+@pytest.mark.parametrize(
+    "given, text",
+    [
+        ({"mesh.blade.input": "pose", "mesh.blade.static": True}, "leave one out"),
+        ({"mesh.blade.input": "pose", "mesh.blade.transform": "pose"}, "mesh.blade.transform: pose is for vertices"),
+        ({"mesh.blade.input": "tf", "mesh.blade.frame": "link"}, "set parameter frame_id"),
+        ({"mesh.blade.input": "tf", "frame_id": "world"}, "set mesh.blade.frame"),
+        ({"rigid_tolerance": 0.0}, "rigid_tolerance"),
+        ({"rigid_parts": 0}, "rigid_parts"),
+    ],
+)
+def test_parameters_that_contradict(start_node_expecting_refusal, given, text):
+    assert text in start_node_expecting_refusal({"meshes": ["blade"], **given})
