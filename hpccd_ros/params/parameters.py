@@ -95,7 +95,7 @@ def _declare_one(node: Node, row: Row, name: str) -> Any:
         node.declare_parameter(name, value, descriptor(row), ignore_override=whole)
         value = node.get_parameter(name).value
     except ParameterUninitializedException:
-        return normalise(row, row.default)
+        value = None if given is not None else row.default  # an empty list in YAML is no value of any type
     except InvalidParameterTypeException as error:
         raise ParameterError(f"{name}: {quoting.shortened(error, 300)}; {expected(row)}") from error
     except InvalidParameterValueException as error:

@@ -16,7 +16,7 @@ class ParameterError(ValueError):
 def unusable_value(row: Row, value: Any) -> str | None:
     """Why ``value`` (of the right type; None: not set) cannot be used, or None."""
     if value is None:
-        return None
+        return None if row.default is None else f"{row.name}: has no value; {expected(row)}"
     if row.span is not None and not row.span[0] <= value <= row.span[1]:
         return f"{row.name}: {value} is outside {row.span[0]} .. {row.span[1]}"
     if row.least and 0 < value < row.least:
@@ -41,9 +41,11 @@ def normalise(row: Row, value: Any) -> Any:
     """Plain Python value. YAML and the command line cannot write an empty list of strings: [""] is one."""
     if row.kind == "string[]":
         return [entry for entry in value or [] if entry]
+    if value is None:
+        return None
     if row.kind == "float[]":
         return [float(entry) for entry in value]
-    return float(value) if row.kind == "float" and value is not None else value
+    return float(value) if row.kind == "float" else value
 
 
 def expected(row: Row) -> str:
@@ -90,8 +92,10 @@ def _checked_value(row: Row, name: str, value: Any) -> Any:
         return normalise(row, row.default)
     is_list = row.kind.endswith("[]") and isinstance(value, list)
     entries, kind = (value, row.kind[:-2]) if is_list else ([value], row.kind)
-    # Not isinstance: True is an int.
-    if not all(type(entry) in _PLAIN.get(kind, ()) for entry in entries):
+    # Not isinstance: True is an int. JSON and YAML have integers beyond those of ROS, and beyond any float.
+    if not all(type(entry) in _PLAIN.get(kind, ()) for entry in entries) or (
+        kind == "float" and not all(type(entry) is float or -(2**63) <= entry < 2**63 for entry in entries)
+    ):
         raise ParameterError(f"{name}: {value!r} is of the wrong type; {expected(row)}")
     return usable(row, name, value)
 

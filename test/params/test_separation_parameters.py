@@ -37,6 +37,7 @@ def test_markers_show_nearest_points_only_where_something_is_to_stay_apart():
         ({"minimum_separation": -1e-3}, "minimum_separation: -0.001 is outside 0.0 .."),
         ({"minimum_separation": math.nan}, "minimum_separation: nan is outside"),
         ({"minimum_separation": math.inf}, "minimum_separation: inf is outside"),
+        ({"minimum_separation": 10**400}, "is of the wrong type; expected float"),
         ({"minimum_separation": True}, "minimum_separation: True is of the wrong type; expected float"),
         ({"pair_separation": ["robot:cloth"]}, "pair_separation: 'robot:cloth' must be NAME:NAME:DISTANCE"),
         ({"pair_separation": ["robot:cloth:near"]}, "'robot:cloth:near' must be NAME:NAME:DISTANCE"),
