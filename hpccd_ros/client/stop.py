@@ -22,7 +22,7 @@ _LOOKS = 4
 
 
 class StopListener:
-    """Listens to ``topic`` in ``node``, whose executor is the user's: a SingleThreadedExecutor or MultiThreadedExecutor.
+    """Listens to ``topic`` in ``node``, whose executor is the user's: SingleThreadedExecutor or MultiThreadedExecutor.
     (rclpy's experimental EventsExecutor fails, in Jazzy, at every callback that asks when its message came.)
 
     ``stop`` and ``reason`` may be read at any time from any thread. They look at the steady clock: where the executor
