@@ -81,7 +81,7 @@ sys.exit(cli.main(sys.argv[1:]))
 
 
 def test_stop_rises_and_each_end_is_heard(tmp_path):
-    status, result, said = bench(tmp_path, *STOP, "--trials", "2", "--ends", "1")
+    status, result, said = bench(tmp_path, *STOP, "--trials", "2", "--ends", "1", "--seed", "2")
     assert status == 0, said
     rows = {row["what"]: row for row in result["rows"] if row["what"] != "cost"}
     approaches = rows.pop("approaches")
