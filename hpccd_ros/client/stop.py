@@ -22,7 +22,8 @@ _LOOKS = 4
 
 
 class StopListener:
-    """Listens to ``topic`` in ``node``, whose executor is the user's, whatever its kind.
+    """Listens to ``topic`` in ``node``, whose executor is the user's: SingleThreadedExecutor or MultiThreadedExecutor.
+    (rclpy's experimental EventsExecutor fails, in Jazzy, at every callback that asks when its message came.)
 
     ``stop`` and ``reason`` may be read at any time from any thread. They look at the steady clock: where the executor
     runs no callbacks any more, ``stop`` becomes true as well. ``stop`` is false only where a message said so, less than

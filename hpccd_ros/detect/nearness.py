@@ -20,6 +20,7 @@ class Nearness:
 
     def __init__(self, builder: SceneBuilder, options: Options, distance: float) -> None:
         self._detector = StepDetector(builder.between_meshes, _asking(options, distance))
+        self._static = [number for number, mesh in enumerate(builder.meshes) if mesh.static]
         self._apart: SceneFrame | None = None  # no edge pierces a face there
 
     def set(self, options: Options, distance: float) -> None:
@@ -32,7 +33,9 @@ class Nearness:
 
     def within(self, start: SceneFrame, end: SceneFrame) -> tuple[bool, float]:
         """(whether a pair came within the distance, that distance). Raises what the core raises."""
-        apart, self._apart = self._apart is start, None
+        # What is called static may have been put elsewhere, by no motion.
+        stays = all(start.vertices[mesh] is end.vertices[mesh] for mesh in self._static)
+        apart, self._apart = stays and self._apart is start, None
         found = self._detector.detect(start, end)
         near = len(found.contacts) > 0
         # An edge in the middle of a large face may be far from its border and corners: such meshes are 0 apart, and no

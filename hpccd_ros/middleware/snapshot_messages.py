@@ -49,7 +49,12 @@ def _fill(message, pairs, layout, found_hash, keep) -> None:
 
 
 def fill_distances(
-    message: DistanceArray, gaps: list[hc.Gap], layout: Layout, *, before: list[hc.Gap] | None = None, seconds=0.0
+    message: DistanceArray,
+    gaps: list[hc.Gap],
+    layout: Layout,
+    *,
+    before: list[hc.Gap] | None = None,
+    seconds: float = 0.0,
 ) -> None:
     """Write all but header, step, accuracy and backend. before: those of so many ``seconds`` earlier, if known."""
     count = len(gaps)

@@ -22,7 +22,7 @@ _DROPPED = {
     Reason.UNKNOWN_MESH, Reason.RATE, Reason.LATE, Reason.INCOMPLETE, Reason.RESTART, Reason.OVERLOAD,
     Reason.MIDDLEWARE, Reason.STOPPED,
 }  # fmt: skip
-_OF_INPUTS = {Cause.NEAR: DiagnosticStatus.WARN, Cause.UNANSWERED: DiagnosticStatus.WARN}
+_WARNED = {Cause.NEAR: DiagnosticStatus.WARN, Cause.UNANSWERED: DiagnosticStatus.WARN}
 
 
 class StopWatch:
@@ -108,4 +108,4 @@ class StopWatch:
         values |= {f"rises.{cause}": count for cause, count in sorted(self._state.rises.items())}
         if why is None:
             return DiagnosticStatus.OK, "false: nothing is near", values
-        return _OF_INPUTS.get(why.cause, DiagnosticStatus.ERROR), f"true: {why.text}", values
+        return _WARNED.get(why.cause, DiagnosticStatus.ERROR), f"true: {why.text}", values

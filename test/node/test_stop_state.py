@@ -105,6 +105,20 @@ def test_it_wakes_by_itself_when_the_time_is_over():
     assert state.next(began + 0.1).cause is Cause.SILENT and time.monotonic() >= began + 0.1, "a repetition"
 
 
+def test_no_other_clock_is_looked_at(state, monkeypatch):
+    """Whatever the system's time is."""
+
+    def never(*_):
+        raise AssertionError("system time")
+
+    for name in ("time", "time_ns", "perf_counter"):
+        monkeypatch.setattr(time, name, never)
+    clear(state)
+    assert cause(state) is None and state.next(0.0) is None
+    state.refused("why")
+    assert state.next(0.0).cause is Cause.REFUSED
+
+
 def test_who_waits_is_woken_and_the_last_word_is_a_reason(state):
     said = []
     clear(state)

@@ -69,6 +69,35 @@ def test_latency_above_the_limit_fails(tmp_path):
     assert status == 1 and "times as long as the echo" in result["failures"][0], said
 
 
+# Slow frames and long time-outs: nothing here depends on how busy the machine is.
+STOP = ("stop", "--rate", "2", "--stop-timeout", "2", "--margin", "60")
+ALL_NEAR = """
+import sys
+from hpccd_ros import cli
+from hpccd_ros.bench.ros import stop_scene
+stop_scene.near = lambda start, end: True
+sys.exit(cli.main(sys.argv[1:]))
+"""
+
+
+def test_stop_rises_and_each_end_is_heard(tmp_path):
+    status, result, said = bench(tmp_path, *STOP, "--trials", "2", "--ends", "1", "--seed", "2")
+    assert status == 0, said
+    rows = {row["what"]: row for row in result["rows"] if row["what"] != "cost"}
+    approaches = rows.pop("approaches")
+    assert approaches["steps"] >= 15 and approaches["rises"] >= 1 and approaches["missed"] == 0
+    assert list(rows) == ["silence", "publisher killed", "publisher held up", "node killed", "node held up"]
+    assert all(row["most_ms"] > 0 for row in rows.values()) and rows["silence"]["trials"] == 2
+    costs = [row for row in result["rows"] if row["what"] == "cost"]
+    assert [row["near"] > 0 for row in costs] == [True, False, True, False] and all(row["look_ms"] > 0 for row in costs)
+    assert "of a frame" in said
+
+
+def test_a_missed_stop_fails(tmp_path):
+    status, result, said = bench(tmp_path, *STOP, "--trials", "1", "--ends", "0", program=("-c", ALL_NEAR))
+    assert status == 1 and "steps that come near" in result["failures"][0], said
+
+
 def test_soak_of_twenty_seconds(tmp_path):
     # The node is held up six seconds after it began, and grows to its size by the twelfth, from 104 to 132 MB; from
     # then on it changes by less than 1 %.
