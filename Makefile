@@ -34,7 +34,7 @@ ENVIRONMENT := $(VENV)/.hpccd-environment$(if $(PYTHON),-$(subst /,-,$(PYTHON)))
 INSTALLED   := $(VENV)/.hpccd-installed
 
 # What the installed package is made of.
-SOURCES := $(sort $(shell find CMakeLists.txt setup.py package.xml action cmake config msg srv scripts hpccd_ros hpccd_core \
+SOURCES := $(sort $(shell find CMakeLists.txt setup.py package.xml action cmake config launch msg srv scripts hpccd_ros hpccd_core \
   \( -name __pycache__ -o -name dist -o -path hpccd_core/tests \) -prune -o -type f -print))
 
 .PHONY: help venv demo test test-core test-python test-gpu test-aarch64 sanitize fuzz lint format release-check pin clean distclean \
