@@ -24,6 +24,11 @@ ROOT = Path(__file__).resolve().parents[2]
 ONE_AT_A_TIME = {"meshes": ["cloth"], "detect_jobs": 1, "threads": 1}
 
 
+def endless():
+    """Under way until it is ended."""
+    return long_request((*MESHES, "c", "d"))
+
+
 def fields_of(definition, place):
     """Fields and constants in a part of a definition, in the order in which they are written."""
     part = definition.read_text().split("\n---\n")[place]
@@ -91,7 +96,7 @@ def test_the_result_is_the_answer_of_the_service(node, asked):
 def test_feedback_tells_stage_place_and_time(start_node):
     node = start_node({**ONE_AT_A_TIME, "detect_time_limit": 500.0})
     goals = Goals(node)
-    running, *queued = goals.send_all([long_request() for _ in range(3)])
+    running, *queued = goals.send_all([endless() for _ in range(3)])
     node.wait_until(lambda: running.stages.count("detecting") >= 3, "feedback of the goal that is computed")
     node.wait_until(lambda: all(len(goal.feedback) >= 3 for goal in queued), "feedback of those that wait")
     order = [stage for k, stage in enumerate(running.stages) if stage not in running.stages[:k]]
@@ -116,6 +121,11 @@ def assert_canceled(goal):
     assert status == CANCELED
     assert (result.success, result.message) == (False, "canceled: as the client asked")
     assert result.contacts.total == 0 and result.collision_free_step != result.collision_free_step
+
+
+def cpu_of_ended_children():
+    usage = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return usage.ru_utime + usage.ru_stime
 
 
 def cpu_seconds(process):
@@ -143,7 +153,7 @@ def test_cancelling_ends_the_computation(start_node):
 def test_cancelling_a_goal_that_waits(start_node):
     node = start_node({**ONE_AT_A_TIME, "detect_waiting": 2, "detect_time_limit": 500.0})
     goals = Goals(node)
-    running, waiting, last = goals.send_all([long_request(), long_request(), request()])
+    running, waiting, last = goals.send_all([endless(), endless(), request()])
     node.wait_until(lambda: "detecting" in running.stages, "the first goal under way")
     assert waiting.cancel() == 1
     assert_canceled(waiting)
@@ -175,7 +185,7 @@ def test_late_goals_are_aborted(node):
 def test_goals_and_requests_share_the_places(start_node):
     node = start_node({**ONE_AT_A_TIME, "detect_waiting": 1, "detect_time_limit": 500.0})
     goals = Goals(node)
-    running, waiting = goals.send_all([long_request(), request()])
+    running, waiting = goals.send_all([endless(), request()])
     service_status(node, open=2)
     assert of_service(node, request()).message.startswith("busy: 2 requests")
     status, result = goals.send(request()).ended()
@@ -201,7 +211,7 @@ def test_two_clients(node):
     """In nodes of their own: each has its results and its feedback, and cancels its own goals."""
     other = Peer(node.namespace)
     try:
-        mine = Goals(node).send(long_request())
+        mine = Goals(node).send(endless())
         theirs = Goals(node, other).send(request(2))
         status, result = theirs.ended()
         assert status == SUCCEEDED
@@ -225,7 +235,7 @@ def test_two_clients(node):
 def test_transitions_end_open_goals(start_node, transitions):
     """One that is computed, one that waits."""
     node = start_node({**ONE_AT_A_TIME, "detect_time_limit": 500.0})
-    opened = Goals(node).send_all([long_request() for _ in range(2)])
+    opened = Goals(node).send_all([endless() for _ in range(2)])
     service_status(node, open=2)
     assert all(change_state(node, transition) for transition in transitions)
     for goal in opened:
@@ -247,10 +257,9 @@ def test_signals_end_open_goals(start_node, number):
     node = start_node({"meshes": list(MESHES), "threads": 1, "accuracy": "exact", "detect_time_limit": 500.0})
     goal = Goals(node).send(long_request())
     node.wait_until(lambda: "detecting" in goal.stages, "the goal under way")
-    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    begun, before = cpu_seconds(node.process), cpu_of_ended_children()
     assert node.stop(number) == 0, node.output()
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    used = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    used = cpu_of_ended_children() - before - begun
     assert "Traceback" not in node.output()
     deadline = time.monotonic() + PATIENCE
     while not goal.reply.done() and time.monotonic() < deadline:
@@ -270,7 +279,7 @@ def test_stray_requests_to_the_action(start_node):
     unknown = CancelGoal.Request(goal_info=GoalInfo(goal_id=stranger.goal_id))
     answer = call(node, CancelGoal, "detect/_action/cancel_goal", unknown)
     assert (answer.return_code, answer.goals_canceling) == (CancelGoal.Response.ERROR_UNKNOWN_GOAL_ID, [])
-    sent = impl.SendGoalService.Request(goal=client.goal_from_request(long_request()), goal_id=stranger.goal_id)
+    sent = impl.SendGoalService.Request(goal=client.goal_from_request(endless()), goal_id=stranger.goal_id)
     accepted = [call(node, impl.SendGoalService, "detect/_action/send_goal", sent).accepted for _ in range(2)]
     assert accepted == [True, False]
     assert len(call(node, CancelGoal, "detect/_action/cancel_goal", CancelGoal.Request()).goals_canceling) == 1
