@@ -21,7 +21,7 @@ def approaches(result: Kept) -> list[str]:
         "random approaches": row["trials"],
         "steps, each judged by brute force": row["steps"],
         "steps that come near": row["near"],
-        "of these without stop within a frame": row["missed"],
+        "of these without stop": row["missed"],
         "rises of stop": row["rises"],
         "of these later than a frame": row["late"],
         "steps that do not come near, with stop": row["false"],

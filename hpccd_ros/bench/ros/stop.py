@@ -97,7 +97,7 @@ def _approaches(report, args, node, ears, children) -> None:
     with bar("approaches", args.trials) as progress:
         found = stop_trials.approaches(sender, ears, args.trials, args.rate, args.seed, progress.step)
     with bar("truth", len(found.frames) - 1) as progress:
-        judged = stop_trials.judge(found, ears, args.rate, progress.step)
+        judged = stop_trials.judge(found, ears, args.rate, args.stop_timeout, progress.step)
     report.add(
         what="approaches", trials=args.trials, steps=judged.steps, near=judged.near, rises=len(judged.rises),
         late=judged.late, missed=judged.missed, false=judged.false, frame_ms=1e3 / args.rate,

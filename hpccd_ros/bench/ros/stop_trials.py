@@ -55,11 +55,15 @@ def approaches(sender: Sender, ears: Ears, trials: int, rate: float, seed: int, 
     return out
 
 
+BEFORE_SILENCE = 0.9  # of the time-out
+
+
 @dataclass
 class Judged:
     """steps, near: of all; rises: s from the frame with which a step ends that comes near, after one that did not, to
-    stop; late: those that took longer than a frame. missed: steps that come near without stop being true within a frame
-    of their end. false: of steps that do not, those after whose frame's time stop was true."""
+    stop; late: those that took longer than a frame. missed: steps that come near without stop being true before the
+    silence of what follows would make it so. false: of steps that do not, and follow one that did not, those with stop
+    true a frame later."""
 
     steps: int
     near: int
@@ -69,8 +73,8 @@ class Judged:
     false: int
 
 
-def judge(found: Approaches, ears: Ears, rate: float, said: Callable[[], None]) -> Judged:
-    """By brute force on each step. The first frame ends none."""
+def judge(found: Approaches, ears: Ears, rate: float, timeout: float, said: Callable[[], None]) -> Judged:
+    """By brute force on each step. The first frame ends none. timeout: stop_timeout, s."""
     truth = []
     for start, end in zip(found.frames, found.frames[1:], strict=False):
         truth.append(stop_scene.near(start, end))
@@ -78,11 +82,10 @@ def judge(found: Approaches, ears: Ears, rate: float, said: Callable[[], None]) 
     out = Judged(len(truth), sum(truth), [], 0, 0, 0)
     period, before = 1 / rate, True
     for near, sent, following in zip(truth, found.sent[1:], [*found.sent[2:], float("inf")], strict=True):
-        risen = ears.rise(sent, sent + period)
-        if near and risen is None:
+        risen = ears.rise(sent)
+        if near and (risen is None or risen - sent > BEFORE_SILENCE * timeout):
             out.missed += 1
-        if near and not before:
-            risen = ears.rise(sent)
+        elif near and not before:
             out.rises.append(risen - sent)
             out.late += risen - sent > period
         # A silence follows the last frame of a trial: what is said then is another matter.
