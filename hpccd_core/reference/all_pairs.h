@@ -30,7 +30,8 @@ struct Meshes {
 // Every vertex, in a face or not.
 std::vector<Vertex> vertices_of(const Meshes& meshes);
 
-// The edges of all faces and those beside, each once, lower index first, in lexicographic order; one from a vertex to itself is none.
+// The edges of all faces and those beside, each once, lower index first, in lexicographic order; one from a vertex to
+// itself is none.
 std::vector<Edge> edges_of(const Meshes& meshes);
 
 // Box of a feature's vertices at both ends of the step. A vertex on a straight line stays in the box of its

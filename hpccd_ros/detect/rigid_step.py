@@ -30,8 +30,8 @@ class RigidOptions:
     the unit of the scene. ``most_parts``: a step is cut into no more. ``parts``: into just so many, whatever the
     tolerance; 0: as few as it asks for."""
 
-    tolerance: float = 1e-4
-    most_parts: int = 16
+    tolerance: float = 1e-3
+    most_parts: int = 64
     parts: int = 0
 
 

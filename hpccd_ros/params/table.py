@@ -135,7 +135,7 @@ DETECTION_ROWS = (
     Row(
         "rigid_tolerance",
         "float",
-        1e-4,
+        1e-3,
         "Meshes that move by poses turn, and the core knows straight lines: a step is cut into as few parts as bring "
         "the two this near to each other. Nothing is missed; what is reported comes within the separation and twice "
         "the bounds of both meshes, which each answer tells",
@@ -146,7 +146,7 @@ DETECTION_ROWS = (
     Row(
         "rigid_parts",
         "int",
-        16,
+        64,
         "Most parts of a step. Where more were needed, bounds exceed rigid_tolerance, and still nothing is missed",
         span=(1, MOST_PARTS),
         change=ALWAYS,

@@ -67,7 +67,7 @@ def frame(k):
     return SceneFrame(k, k, "world", (SHEET, BLADE), vertices, NAMES, 0.0, (None, placement))
 
 
-def assert_answer(message, k, tolerance=TOLERANCE, most=16):
+def assert_answer(message, k, tolerance=TOLERANCE, most=64):
     """The node's answer to the step that ends with frame k is that of the parts it is made of; how many contacts."""
     meshes = (MeshSettings("cloth"), MeshSettings("blade", self_collision=False, input="pose"))
     options = Options(backend="cpu", rigid=RigidOptions(tolerance, most))
