@@ -77,11 +77,11 @@ Motion falling() {
   return m;
 }
 
-Motion soup() {
-  constexpr std::uint32_t n = 100;
-  Motion m{"soup", test::soup_scene(n), {}, {}};
-  Random random(3);
-  for (std::uint32_t triangle = 0; triangle < 2 * n; ++triangle) {
+// Vertices in threes near to each other.
+Motion tossed(const char* name, std::shared_ptr<const Scene> scene, std::uint64_t seed) {
+  Motion m{name, std::move(scene), {}, {}};
+  Random random(seed);
+  for (std::uint32_t triangle = 0; triangle < m.scene->n_vertices() / 3; ++triangle) {
     const double center[3] = {2 * random.real(), 2 * random.real(), 0.5 * random.real()};
     for (int i = 0; i < 9; ++i) {
       m.start.push_back(center[i % 3] + 0.5 * random.real());
@@ -90,6 +90,8 @@ Motion soup() {
   }
   return m;
 }
+
+Motion soup() { return tossed("soup", test::soup_scene(100), 3); }
 
 // All rules of pairs of meshes, vertices in no triangle, static meshes.
 Motion swarm() { return {"swarm", test::swarm_scene(true), test::swarm_positions(1), test::swarm_positions(2)}; }
@@ -111,19 +113,7 @@ Motion whole_numbers() {
 }
 
 // Edges in no triangle.
-Motion ropes() {
-  constexpr std::uint32_t n = 210;
-  Motion m{"ropes", test::rope_scene(n), {}, {}};
-  Random random(6);
-  for (std::uint32_t triangle = 0; triangle < 2 * n; ++triangle) {
-    const double center[3] = {2 * random.real(), 2 * random.real(), 0.5 * random.real()};
-    for (int i = 0; i < 9; ++i) {
-      m.start.push_back(center[i % 3] + 0.5 * random.real());
-      m.end.push_back(m.start.back() + 0.2 * random.real());
-    }
-  }
-  return m;
-}
+Motion ropes() { return tossed("ropes", test::rope_scene(210), 6); }
 
 constexpr std::size_t n_motions = 6, n_tiers = 4;
 const std::array<Motion, n_motions>& motions() {

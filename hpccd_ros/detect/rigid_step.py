@@ -43,6 +43,10 @@ class MotionBounds:
     of_meshes: tuple[float, ...] = ()
 
 
+#: No mesh moves by poses.
+NO_BOUNDS = MotionBounds()
+
+
 def motions(
     parts: tuple[Sequence[np.ndarray], Sequence[np.ndarray]], start: SceneFrame, end: SceneFrame
 ) -> list[Motion]:

@@ -8,7 +8,7 @@ import hpccd_core as hc
 from hpccd_ros.detect.cancellation import Cancellation
 from hpccd_ros.detect.core import Options, make_detector
 from hpccd_ros.detect.layout import Layout
-from hpccd_ros.detect.rigid_step import MotionBounds, RigidStep, motions
+from hpccd_ros.detect.rigid_step import NO_BOUNDS, MotionBounds, RigidStep, motions
 from hpccd_ros.detect.scene import SceneBuilder
 from hpccd_ros.detect.separation import change_separation, count_near
 from hpccd_ros.frames.types import SceneFrame
@@ -37,7 +37,7 @@ class Detection:
     gaps: list[hc.Gap] | None = None
     gaps_backend: str = ""
     gaps_before: list[hc.Gap] | None = None
-    bounds: MotionBounds = MotionBounds()
+    bounds: MotionBounds = NO_BOUNDS
 
     @property
     def near(self) -> int:
@@ -138,6 +138,17 @@ class StepDetector:
         t0, t1 = self._builder.concatenate(start, end), self._builder.concatenate(end, end)
         began = time.perf_counter()
         contacts = detector.detect(t0, t1)
+        return self._detection(start, end, contacts, began, detector, detector.profile, detector.stats)
+
+    def _detect_rigid(self, start: SceneFrame, end: SceneFrame) -> Detection:
+        step, options = self._rigid_step, self._detector_options
+        began = time.perf_counter()
+        moving = motions((self._builder.parts(start, end), self._builder.parts(end, end)), start, end)
+        contacts, bounds = step.detect(moving, options.separation, self.options.rigid, options.report)
+        return self._detection(start, end, contacts, began, step.bent, step.profile, step.stats, bounds)
+
+    def _detection(self, start, end, contacts, began, detector, profile, stats, bounds=NO_BOUNDS) -> Detection:
+        """detector: of those asked the one whose backend and threads are told."""
         detect_ms = 1e3 * (time.perf_counter() - began)
         return Detection(
             start,
@@ -148,26 +159,7 @@ class StepDetector:
             detector.backend,
             detector.threads,
             detect_ms,
-            dict(detector.profile),
-            dict(detector.stats),
-        )
-
-    def _detect_rigid(self, start: SceneFrame, end: SceneFrame) -> Detection:
-        step, options = self._rigid_step, self._detector_options
-        began = time.perf_counter()
-        moving = motions((self._builder.parts(start, end), self._builder.parts(end, end)), start, end)
-        contacts, bounds = step.detect(moving, options.separation, self.options.rigid, options.report)
-        detect_ms = 1e3 * (time.perf_counter() - began)
-        return Detection(
-            start,
-            end,
-            contacts,
-            self._layout,
-            options,
-            step.bent.backend,
-            step.bent.threads,
-            detect_ms,
-            dict(step.profile),
-            dict(step.stats),
+            dict(profile),
+            dict(stats),
             bounds=bounds,
         )

@@ -5,12 +5,10 @@ import numpy as np
 
 from hpccd_core.options import ACCURACIES
 from hpccd_ros.detect.layout import Layout
-from hpccd_ros.detect.rigid_step import MotionBounds
+from hpccd_ros.detect.rigid_step import NO_BOUNDS, MotionBounds
 from hpccd_ros.middleware import contact_messages
 from hpccd_ros.middleware.motion_bounds import read_bounds
 from hpccd_ros.middleware.separation_fields import read_separation
-
-NO_BOUNDS = MotionBounds()
 
 
 def difference(

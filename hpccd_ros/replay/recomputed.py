@@ -9,7 +9,7 @@ from hpccd_ros.bag.decode import make_decoder
 from hpccd_ros.bag.reader import Recording, RecordingError
 from hpccd_ros.detect.core import CORE_ERRORS
 from hpccd_ros.detect.layout import Layout
-from hpccd_ros.detect.rigid_step import MotionBounds
+from hpccd_ros.detect.rigid_step import NO_BOUNDS, MotionBounds
 from hpccd_ros.detect.separation import NONE, Separation
 from hpccd_ros.detect.step_detector import StepDetector
 from hpccd_ros.frames.types import SceneFrame
@@ -43,7 +43,7 @@ class ReplayedStep:
     layout: Layout | None = None
     separation: Separation = NONE  # in force
     features: tuple[str, ...] = FEATURES  # that were tested
-    bounds: MotionBounds = MotionBounds()  # of motion by poses
+    bounds: MotionBounds = NO_BOUNDS  # of motion by poses
     milliseconds: float = 0.0  # the core's call, wall time
     difference: str | None = None  # first difference from what was recorded
     missing: str | None = None  # why it could not be computed

@@ -42,22 +42,22 @@ def pose(k):
     return Rigid.of((0.17, 0.5, 0.05 * np.cos(k)), turn / np.linalg.norm(turn))
 
 
-def stamped(k):
-    message, at = PoseStamped(), pose(k)
+def placed(message, k, place, turn):
+    at = pose(k)
     message.header.stamp, message.header.frame_id = fields.ns_to_stamp(k), "world"
-    place, turn = message.pose.position, message.pose.orientation
     place.x, place.y, place.z = at.shift.tolist()
     turn.x, turn.y, turn.z, turn.w = at.quaternion.tolist()
     return message
+
+
+def stamped(k):
+    message = PoseStamped()
+    return placed(message, k, message.pose.position, message.pose.orientation)
 
 
 def transform(k):
-    message, at = TransformStamped(child_frame_id="blade_link"), pose(k)
-    message.header.stamp, message.header.frame_id = fields.ns_to_stamp(k), "world"
-    place, turn = message.transform.translation, message.transform.rotation
-    place.x, place.y, place.z = at.shift.tolist()
-    turn.x, turn.y, turn.z, turn.w = at.quaternion.tolist()
-    return message
+    message = TransformStamped(child_frame_id="blade_link")
+    return placed(message, k, message.transform.translation, message.transform.rotation)
 
 
 def frame(k):
