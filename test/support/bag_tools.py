@@ -24,14 +24,22 @@ def typestore():
     return store
 
 
+# Fields by which messages have grown at their end, oldest first: of each step the first one, to how many bytes it is
+# aligned, and how many zeros the step is.
+LATER = (
+    ("hpccd/msg/ContactArray", b"topology_versions", 1, 4),
+    ("hpccd/msg/ContactArray", b"minimum_separation", 8, 8 + 5 * 4),
+    ("hpccd/msg/ContactArray", b"motion_bounds", 4, 8),
+    ("hpccd/msg/MeshTopology", b"uint32[] edges", 4, 4),
+    ("hpccd/msg/DistanceArray", b"approach_speed", 4, 8),
+)
+
+
 def completed(schema, data):
-    """A message recorded with this MCAP schema as one of today: fields that answers did not have then are zeros."""
-    if schema.name != "hpccd/msg/ContactArray":
-        return data
-    if b"topology_versions" not in schema.data:
-        data += bytes(4)
-    if b"minimum_separation" not in schema.data:
-        data += bytes(-(len(data) - 4) % 8) + bytes(8 + 5 * 4)
+    """A message recorded with this MCAP schema as one of today: fields that there were not then are zeros."""
+    for kind, field, alignment, size in LATER:
+        if schema.name == kind and field not in schema.data:
+            data += bytes(-(len(data) - 4) % alignment) + bytes(size)
     return data
 
 

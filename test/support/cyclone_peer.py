@@ -62,7 +62,7 @@ def main(namespace: str, source: str, target: str) -> None:
     topology = DataWriter(participant, topic("meshes/cloth/topology", types.MeshTopology), qos(1, latched=True))
     vertices = DataWriter(participant, topic("meshes/cloth/vertices", types.MeshVertices), qos(20))
     contacts = DataReader(participant, topic("contacts", types.ContactArray), qos(20))
-    topology.write(types.MeshTopology(header(0), 3, len(frames[0]), faces.ravel().tolist()))
+    topology.write(types.MeshTopology(header(0), 3, len(frames[0]), faces.ravel().tolist(), []))
     wait(lambda: vertices.get_matched_subscriptions() and contacts.get_matched_publications(), "node")
     answers = []
 

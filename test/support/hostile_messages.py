@@ -5,7 +5,7 @@ import math
 import struct
 
 import numpy as np
-from bag_tools import typestore
+from bag_tools import completed, typestore
 from hostile_kinds import KINDS, LARGE, NUMBERS, decoded, info_of, kind, set_info, topic_of
 
 
@@ -127,10 +127,10 @@ def changed_distances(rng, bag):
 @kind
 def contact_under_another_name(rng, bag):
     """A contact whose mesh and feature are others that add up to the same number in the scene."""
-    store = typestore()
-    first_mesh = info_of(bag)["parameters"]["meshes"][0]
-    topology = bag.of_topic(f"/meshes/{first_mesh}/topology")[0]
-    first = store.deserialize_cdr(topology.data, "hpccd/msg/MeshTopology").n_vertices
+    store, name = typestore(), "hpccd/msg/MeshTopology"
+    schema = next(schema for schema in bag.schemas if schema.name == name)
+    topology = bag.of_topic(f"/meshes/{info_of(bag)['parameters']['meshes'][0]}/topology")[0]
+    first = store.deserialize_cdr(completed(schema, topology.data), name).n_vertices
 
     def change(put, answer):
         mesh, features = answer.mesh_a.copy(), answer.features_a.copy()
