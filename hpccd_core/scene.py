@@ -110,4 +110,6 @@ class Scene:
         return self._core.meshes[self._number("mesh", mesh)][3]
 
     def __repr__(self) -> str:
-        return f"Scene({', '.join(self._ids)}: {self.n_vertices} vertices, {self.n_faces} faces)"
+        n_edges = sum(mesh[6] for mesh in self._core.meshes)
+        edges = f", {n_edges} edges beside" if n_edges else ""
+        return f"Scene({', '.join(self._ids)}: {self.n_vertices} vertices, {self.n_faces} faces{edges})"

@@ -223,7 +223,8 @@ PYBIND11_MODULE(_core, m) {
       .def_property_readonly("meshes", [](const Scene& s) {
         py::list l;
         for (const auto& mesh : s.meshes())
-          l.append(py::make_tuple(mesh.name, mesh.first_vertex, mesh.n_vertices, mesh.first_face, mesh.n_faces));
+          l.append(py::make_tuple(mesh.name, mesh.first_vertex, mesh.n_vertices, mesh.first_face, mesh.n_faces,
+                                  mesh.first_edge, mesh.n_edges));
         return l;
       });
 

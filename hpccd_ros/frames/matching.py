@@ -73,7 +73,8 @@ class ExactMatcher:
     def _give_up(self, stamp: int) -> list[Refusal]:
         group = self._pending.pop(stamp)
         missing = ", ".join(m for m in self._meshes if m not in group)
-        return [Refusal(mesh, Reason.INCOMPLETE, f"stamp {stamp} ns has no frame of {missing}") for mesh in group]
+        text = f"stamp {stamp} ns has no frame of {missing}; stamps must be equal (or set stamp_match: nearest)"
+        return [Refusal(mesh, Reason.INCOMPLETE, text) for mesh in group]
 
     def clear(self, reason: Reason) -> list[Refusal]:
         refusals = [Refusal(mesh, reason) for group in self._pending.values() for mesh in group]

@@ -41,6 +41,7 @@ class FramePipeline:
             self._rigid[mesh].set_shape(positions)
         elif positions is not None:
             outcome += self._assembler.add(mesh, positions)
+        outcome.static_taken = 0  # no message brought them
         return outcome
 
     def push(self, mesh: str, message: MeshFrame | PoseFrame | Topology, new_publisher: bool = False) -> Outcome:

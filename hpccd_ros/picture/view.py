@@ -60,9 +60,12 @@ def _show_in_rerun(args, steps, source, title, view):
         raise UserError(f"--output {target}: {error.strerror}") from error
     print()
     if not count:
-        raise UserError(f"{args.file}: no step {args.step if args.step is not None else ''} that can be shown")
+        raise UserError(f"{args.file}: no step{'' if args.step is None else f' {args.step}'} that can be shown{HINT}")
     if target is not None:
         print(f"{target}: {count} steps, {Path(target).stat().st_size / 1e6:.1f} MB; open it with: rerun {target}")
+
+
+HINT = "; `hpccd replay` says why"
 
 
 def _has_screen() -> bool:
@@ -71,7 +74,7 @@ def _has_screen() -> bool:
 
 def _what_is_there(history, args) -> str:
     if not history.steps:
-        return "it has none"
+        return f"it has none of all meshes{HINT}"
     first, last = min(history.steps), max(history.steps)
     if args.step is None or not first < args.step < last:
         return f"it has {first} to {last}"
@@ -89,7 +92,7 @@ def _draw_one(args, steps, target, title, view):
             chosen = step
     if chosen is None:
         there = _what_is_there(history, args)
-        raise UserError(f"{args.file}: no step {'' if args.step is None else args.step}: {there}")
+        raise UserError(f"{args.file}: no step{'' if args.step is None else f' {args.step}'} to show: {there}")
     try:
         draw_step(chosen, target, history, title=title, **view)
     except (OSError, ValueError) as error:  # ValueError: a suffix that matplotlib cannot write

@@ -14,10 +14,16 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from hpccd_core.options import FEATURES
 from hpccd_ros.bag.reader import Recording
 from hpccd_ros.base.errors import UserError
+from hpccd_ros.frames.drops import Reason
 from hpccd_ros.replay import recorded_setup
 from hpccd_ros.replay.pacing import Pace, next_wanted
 from hpccd_ros.replay.recomputed import Replay, ReplayedStep
 
+# Behind a reason for which messages were not used.
+_HINTS = {
+    Reason.NO_SHAPE: "; the recording has no shape of it on meshes/{mesh}/vertices: begin it before the shape is sent, "
+    "or give the node mesh.{mesh}.file",
+}
 COLUMNS = ("number", "step", "start_ns", "end_ns", "contacts", "vertex_face", "edge_edge", "first_toc", "separation",
            "features", "ms", "hash", "recorded_contacts", "recorded_hash", "result")  # fmt: skip
 
@@ -210,7 +216,7 @@ def _print_distances(distances) -> None:
 def _print_losses(replay) -> None:
     for what, counter in replay.source.refused.items():
         for (mesh, reason), count in sorted(counter.by_mesh_and_reason().items()):
-            print(f"  {count} {what} of {mesh} not used: {reason}")
+            print(f"  {count} {what} of {mesh} not used: {reason}{_HINTS.get(reason, '').format(mesh=mesh)}")
 
 
 def _progress_bar() -> Progress:

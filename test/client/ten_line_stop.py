@@ -7,6 +7,7 @@ client.prepare_environment()
 rclpy.init()
 node = rclpy.create_node("robot")
 listener = client.StopListener(node, stop_timeout=0.5, on_change=lambda heard: print("stop:", heard.reason or "no"))
+print("stop:", listener.reason or "no")
 while rclpy.ok():
     rclpy.spin_once(node, timeout_sec=0.01)
     speed = 0.0 if listener.stop else 1.0

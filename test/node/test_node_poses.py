@@ -191,3 +191,21 @@ def test_parameters_that_contradict(given, text):
     with pytest.raises(ParameterError, match=text):
         checked(**given)
     checked(**{"mesh.blade.input": "tf", "mesh.blade.frame": "link", "frame_id": "world"})
+
+
+def test_a_recording_that_missed_the_shape_says_what_to_do(start_node, tmp_path, hpccd):
+    path = tmp_path / "run.mcap"
+    node = start_node({"meshes": ["blade"], "mesh.blade.input": "pose"})
+    give_shape(node)
+    node.frames_status(answered=1)
+    assert set_parameter(node, "record", str(path)).successful
+    node.peer.readers = 2
+    publisher = node.peer.publisher(PoseStamped, client.pose_topic("blade"))
+    for k in range(1, 4):
+        publisher.publish(stamped(k))
+        node.frames_status(answered=1 + k)
+    assert node.stop() == 0
+    done = hpccd("replay", str(path))
+    assert done.returncode == 1 and "no_shape; the recording has no shape of it" in done.stdout, done.stdout
+    done = hpccd("view", str(path))
+    assert done.returncode == 2 and "no step to show: it has none of all meshes" in done.stderr, done.stderr
