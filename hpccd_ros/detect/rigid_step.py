@@ -89,6 +89,9 @@ class RigidStep:
             np.concatenate([motion.vertices(number, parts) for motion in moving]) for number in range(parts + 1)
         ]
         whole = self._ask(self.straight, positions[0], positions[-1]) if self.straight is not None else None
+        bounds = MotionBounds(parts, tuple(margin.sum for margin in margins))
+        if report == "any" and whole is not None and len(whole):
+            return whole, bounds
         found = []
         for start, end in pairwise(positions):
             found.append(self._ask(self.bent, start, end))
@@ -97,7 +100,7 @@ class RigidStep:
         contacts = merged(found, parts, whole)
         if report == "first":
             contacts = earliest(contacts)
-        return contacts, MotionBounds(parts, tuple(margin.sum for margin in margins))
+        return contacts, bounds
 
     def _ask(self, detector: hc.Detector, start: np.ndarray, end: np.ndarray) -> hc.Contacts:
         contacts = detector.detect(start, end)

@@ -144,7 +144,7 @@ class StepDetector:
         step, options = self._rigid_step, self._detector_options
         began = time.perf_counter()
         moving = motions((self._builder.parts(start, end), self._builder.parts(end, end)), start, end)
-        contacts, bounds = step.detect(moving, options.separation, self.options.rigid, options.report)
+        contacts, bounds = step.detect(moving, options.separation, options.rigid, options.report)
         return self._detection(start, end, contacts, began, step.bent, step.profile, step.stats, bounds)
 
     def _detection(self, start, end, contacts, began, detector, profile, stats, bounds=NO_BOUNDS) -> Detection:

@@ -17,11 +17,12 @@ Rules, in the order in which they are applied to a vertex message:
    static_positions.py).
 4. Its stamp must be later than the mesh's last. A stream that goes on from an earlier time (``restart_after``
    increasing stamps in a row, or the first message of a new publisher) is a restart: all starts anew (stamp_order.py).
+   A mesh that follows has no order of its own: its frames are asked for at stamps of another mesh that were accepted.
 5. Frames of several meshes are joined by their stamps (matching.py); static meshes keep their last positions.
 """
 
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 from hpccd_ros.base.quoting import listed
@@ -48,21 +49,25 @@ class _MeshState:
         self.positions = StaticPositions()
         self.stamps = StampOrder(settings.name)
         self.new_publisher = False  # came, and none of its frames was accepted yet
+        self.follows = False  # frames come for stamps of another mesh that were accepted
 
 
 class FrameAssembler:
     """Joins checked messages of the meshes into frames of the scene.
 
-    meshes: in the order of the scene; at least one must not be static.
+    meshes: in the order of the scene; at least one must not be static. following: names of those whose frames are asked
+    for, each for a stamp of another mesh that was accepted.
     """
 
-    def __init__(self, meshes: Sequence[MeshSettings], rules: AssemblyRules) -> None:
+    def __init__(self, meshes: Sequence[MeshSettings], rules: AssemblyRules, following: Collection[str] = ()) -> None:
         deforming = [m.name for m in meshes if not m.static]
         if not deforming:
             raise ValueError("meshes: at least one mesh must not be static, or nothing ever moves")
         if len({m.name for m in meshes}) != len(meshes):
             raise ValueError(f"meshes: names must differ, got {[m.name for m in meshes]}")
         self._meshes = {m.name: _MeshState(m, rules.max_pending) for m in meshes}
+        for name in following:
+            self._meshes[name].follows = True
         self._max_early = rules.max_pending
         self.restart_after = rules.restart_after
         self._frame = CoordinateFrame(rules.frame_id)
@@ -180,7 +185,7 @@ class FrameAssembler:
 
     def _join(self, state: _MeshState, frame: MeshFrame) -> Outcome:
         outcome = Outcome()
-        for check in (self._check_frame_id, self._check_stamp):
+        for check in (self._check_frame_id,) if state.follows else (self._check_frame_id, self._check_stamp):
             verdict = check(state, frame)
             if isinstance(verdict, Refusal):
                 outcome.refusals.append(verdict)
@@ -192,6 +197,7 @@ class FrameAssembler:
         state.stamps.accept(frame.stamp)
         state.topologies.accept(frame)
         state.new_publisher = False
+        outcome.joined.append((state.name, frame.stamp, frame.received))
         matches, refusals = self._matcher.add(state.name, frame)
         outcome.refusals += refusals
         for match in matches:

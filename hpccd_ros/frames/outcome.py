@@ -13,7 +13,7 @@ class Outcome:
 
     ``restarts``: in words, where the stream starts anew. ``static_taken``: accepted messages of static meshes, and
     shapes of those that move by poses. ``asked``: meshes that transforms move, of each frame that was asked of them: it
-    counts as a message.
+    counts as a message. ``joined``: (mesh, stamp ns, time of arrival) of frames that were accepted.
     """
 
     frames: list[SceneFrame] = field(default_factory=list)
@@ -21,6 +21,7 @@ class Outcome:
     restarts: list[str] = field(default_factory=list)
     static_taken: int = 0
     asked: list[str] = field(default_factory=list)
+    joined: list[tuple[str, int, float]] = field(default_factory=list)
 
     def __iadd__(self, other: "Outcome") -> "Outcome":
         self.frames += other.frames
@@ -28,4 +29,5 @@ class Outcome:
         self.restarts += other.restarts
         self.static_taken += other.static_taken
         self.asked += other.asked
+        self.joined += other.joined
         return self

@@ -9,7 +9,7 @@ from hpccd_ros.frames.drops import Reason, Refusal
 from hpccd_ros.frames.frame_queue import FrameQueue
 from hpccd_ros.frames.outcome import Outcome
 from hpccd_ros.frames.rigid_mesh import RigidMesh
-from hpccd_ros.frames.transform_buffer import TransformBuffer
+from hpccd_ros.frames.transform_buffer import RESTART_NS, NoTransformError, TransformBuffer
 from hpccd_ros.frames.transformer import MeshTransformer, Transformed
 from hpccd_ros.frames.types import TF, AssemblyRules, MeshFrame, MeshSettings, PoseFrame, SceneFrame, Topology
 from hpccd_ros.rigid.transform import IDENTITY
@@ -24,13 +24,14 @@ class FramePipeline:
     def __init__(self, meshes: Sequence[MeshSettings], rules: AssemblyRules) -> None:
         self._meshes = tuple(meshes)
         self._rules = rules
-        self._assembler = FrameAssembler(self._meshes, rules)
         self._queue: FrameQueue | None = None
         self._rigid = {mesh.name: RigidMesh(mesh) for mesh in self._meshes if mesh.rigid}
         self._by_transforms = [mesh for mesh in self._meshes if mesh.input == TF]
         others = (mesh.name for mesh in self._meshes if not mesh.static and mesh.input != TF)
         # Whose stamps are those of the scene's frames; None: none moves but by transforms.
         self._leader = next(others, None)
+        following = [mesh.name for mesh in self._by_transforms] if self._leader is not None else []
+        self._assembler = FrameAssembler(self._meshes, rules, following)
         self._forget_transforms()
 
     def load(self, mesh: str, topology: Topology, positions: MeshFrame | None) -> Outcome:
@@ -47,14 +48,11 @@ class FramePipeline:
     def push(self, mesh: str, message: MeshFrame | PoseFrame | Topology, new_publisher: bool = False) -> Outcome:
         """One message of ``mesh``. new_publisher: it is the first of its publisher, or the first that could be read."""
         if isinstance(message, Topology):
-            return self._assembler.set_topology(mesh, message, new_publisher)
+            return self._led(self._assembler.set_topology(mesh, message, new_publisher))
         if isinstance(message, MeshFrame) and mesh in self._rigid:
             self._rigid[mesh].set_shape(message)
             return Outcome(static_taken=1)
-        # Asked first: what waits for a transform must not come behind frames that others complete.
-        outcome = self._ask_of_transforms(message) if mesh == self._leader else Outcome()
-        outcome += self._place(mesh, message, new_publisher)
-        return outcome
+        return self._place(mesh, message, new_publisher)
 
     def retry(self) -> list[Outcome]:
         """Frames go on that waited for transforms which have come, each with an outcome of its own: a single transform
@@ -123,26 +121,44 @@ class FramePipeline:
             outcome += part
         return outcome
 
-    def _ask_of_transforms(self, like: MeshFrame | PoseFrame) -> Outcome:
-        """A frame of each mesh that transforms move, at the stamp of ``like``."""
+    def _led(self, outcome: Outcome) -> Outcome:
+        """With all that comes of accepted frames of the leader: meshes that transforms move have theirs then, too."""
+        if outcome.restarts:  # before anything is asked of the new run
+            for mesh in self._by_transforms:
+                outcome.refusals += self._transformers[mesh.name].clear(Reason.RESTART)
+            for _, stamp, _ in outcome.joined[-1:]:
+                self.transforms.forget_future(stamp)
+        joined, outcome.joined = outcome.joined, []
+        for name, stamp, received in joined:
+            if name == self._leader:
+                outcome += self._ask_of_transforms(stamp, received)
+        return outcome
+
+    def _ask_of_transforms(self, stamp: int, received: float, new_publisher: bool = False) -> Outcome:
+        """A frame of each mesh that transforms move."""
         outcome = Outcome()
         for mesh in self._by_transforms:
             outcome.asked.append(mesh.name)
-            outcome += self._place(mesh.name, PoseFrame(like.stamp, IDENTITY, mesh.frame, like.received))
+            outcome += self._place(mesh.name, PoseFrame(stamp, IDENTITY, mesh.frame, received), new_publisher)
         return outcome
 
     def _follow_transforms(self) -> Outcome:
         """Where nothing else moves: a frame for each time that all of their transforms have reached."""
-        reached = [self.transforms.latest(mesh.frame, self._rules.frame_id) for mesh in self._by_transforms]
-        stamps = [stamp for stamp in reached if stamp is not None]
-        if not stamps or min(stamps) == self._followed:
+        try:
+            reached = [self.transforms.latest(mesh.frame, self._rules.frame_id) for mesh in self._by_transforms]
+        except NoTransformError:
             return Outcome()
-        self._followed = min(stamps)
-        return self._ask_of_transforms(PoseFrame(self._followed, IDENTITY, received=time.monotonic()))
+        stamp, last = min((stamp for stamp in reached if stamp is not None), default=None), self._followed
+        if stamp is None or (last is not None and last - RESTART_NS <= stamp <= last):
+            return Outcome()
+        self._followed = stamp
+        return self._ask_of_transforms(stamp, time.monotonic(), new_publisher=last is not None and stamp < last)
 
     def _assemble(self, mesh: str, transformed: Transformed) -> list[Outcome]:
         outcomes = [Outcome(refusals=transformed.refusals)]
-        outcomes += [self._assembler.add(mesh, frame, new_publisher) for frame, new_publisher in transformed.frames]
+        outcomes += [
+            self._led(self._assembler.add(mesh, frame, new_publisher)) for frame, new_publisher in transformed.frames
+        ]
         return outcomes
 
     def _forget_transforms(self) -> None:

@@ -11,6 +11,8 @@ from hpccd_ros.base.quoting import quoted
 from hpccd_ros.rigid.transform import IDENTITY, Rigid
 
 HISTORY_NS = 10_000_000_000
+# A frame that goes back by more has begun anew; what came late may be so much earlier.
+RESTART_NS = 1_000_000_000
 MOST_FRAMES = 1000
 MOST_SAMPLES = 1000  # of one frame: 100 Hz for the whole history; about 500 MB if every frame were full
 LONGEST_NAME = 255
@@ -37,11 +39,14 @@ class _Edge:
         self.stamps: list[int] = []
         self.samples: list[Rigid] = []
 
+    def begins_anew(self, stamp: int) -> bool:
+        return bool(self.stamps) and stamp < self.stamps[-1] - RESTART_NS
+
+    def clear(self) -> None:
+        self.stamps.clear()
+        self.samples.clear()
+
     def add(self, stamp: int, rigid: Rigid) -> None:
-        if self.stamps and stamp < self.stamps[-1] - HISTORY_NS:
-            # The source was restarted at an earlier time: the old samples would be interpolated with the new ones.
-            self.stamps.clear()
-            self.samples.clear()
         at = bisect_left(self.stamps, stamp)
         if at < len(self.stamps) and self.stamps[at] == stamp:
             self.samples[at] = rigid
@@ -55,6 +60,8 @@ class _Edge:
         if self.always is not None:
             return self.always
         at = bisect_left(self.stamps, stamp)
+        if not self.stamps:
+            raise NoTransformError(f"none from {child!r} to {self.parent!r} since the clock was set back", final=False)
         if at == len(self.stamps):
             late = f"the last one from {child!r} to {self.parent!r} is of {self.stamps[-1]} ns"
             raise NoTransformError(f"{late}, before the stamp {stamp} ns", final=False)
@@ -91,8 +98,18 @@ class TransformBuffer:
         if stamp is None:
             edge.always = rigid
         else:
+            if edge.begins_anew(stamp):
+                # The clock was set back: samples from before, of any frame, would be interpolated with the new ones.
+                for each in self._edges.values():
+                    each.clear()
             edge.always = None
             edge.add(stamp, rigid)
+
+    def forget_future(self, stamp: int) -> None:
+        """The time is ``stamp`` again: samples far beyond it are from before."""
+        for edge in self._edges.values():
+            if edge.begins_anew(stamp):
+                edge.clear()
 
     def lookup(self, source: str, target: str, stamp: int) -> Rigid:
         """What takes coordinates in ``source`` to coordinates in ``target`` at ``stamp`` ns.
@@ -105,22 +122,24 @@ class TransformBuffer:
         up, down = self._ancestors(source), self._ancestors(target)
         common = next((frame for frame in up if frame in set(down)), None)
         if common is None:
-            text = f"no transform connects {quoted(source)} and {quoted(target)}"
-            raise NoTransformError(text, final=False, connected=False)
+            raise _unconnected(source, target)
         return self._to_ancestor(target, common, stamp).inverse().after(self._to_ancestor(source, common, stamp))
 
     def latest(self, source: str, target: str) -> int | None:
-        """The last stamp, ns, that `lookup` knows between the two; None: it is bound to no time, or not connected."""
+        """The last stamp, ns, that `lookup` knows between the two; None: what connects them is bound to no time.
+
+        Raises NoTransformError: unknown frame, no path, or none whose samples have all come.
+        """
         source, target = source.removeprefix("/"), target.removeprefix("/")
-        try:
-            up, down = self._ancestors(source), self._ancestors(target)
-        except NoTransformError:
-            return None
+        up, down = self._ancestors(source), self._ancestors(target)
         common = next((frame for frame in up if frame in set(down)), None)
         if common is None:
-            return None
-        edges = [self._edges[frame] for path in (up, down) for frame in path[: path.index(common)]]
-        return min((edge.stamps[-1] for edge in edges if edge.always is None), default=None)
+            raise _unconnected(source, target)
+        timed = [edge for path in (up, down) for frame in path[: path.index(common)]
+                 if (edge := self._edges[frame]).always is None]  # fmt: skip
+        if not all(edge.stamps for edge in timed):
+            raise _unconnected(source, target)
+        return min((edge.stamps[-1] for edge in timed), default=None)
 
     def _ancestors(self, frame: str) -> list[str]:
         path = [frame]
@@ -138,3 +157,8 @@ class TransformBuffer:
             rigid = edge.at(frame, stamp).after(rigid)
             frame = edge.parent
         return rigid
+
+
+def _unconnected(source: str, target: str) -> NoTransformError:
+    text = f"no transform connects {quoted(source)} and {quoted(target)}"
+    return NoTransformError(text, final=False, connected=False)

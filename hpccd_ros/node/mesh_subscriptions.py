@@ -12,15 +12,15 @@ class MeshSubscriptions:
 
     def __init__(self, reception: Reception, given_as: str) -> None:
         self._reception = reception
-        self._topics: list[MeshTopic] = []
-        self._topics.append(TopologySubscription(reception))
+        self.topics: list[MeshTopic] = []
+        self.topics.append(TopologySubscription(reception))
         self._positions = [PositionsSubscription(reception, kind) for kind in topic_names.positions(given_as)]
-        self._topics += self._positions
+        self.topics += self._positions
 
     def close(self) -> None:
-        for topic in self._topics:
+        for topic in self.topics:
             topic.close()
-        self._topics.clear()
+        self.topics.clear()
 
     def warnings(self) -> list[str]:
         """What is odd about the publishers of the mesh."""

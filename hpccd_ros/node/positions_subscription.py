@@ -21,9 +21,9 @@ class PositionsSubscription(MeshTopic):
         self._unreadable = 0  # messages counted as such since the last that was read
         settings = reception.settings
         profile = qos.vertices(settings["input_reliability"], settings["input_depth"])
-        unreadable.watch(self.subscribe(self._receive, profile), self._on_unreadable)
+        unreadable.watch(self.subscribe(self.receive, profile), self._on_unreadable)
 
-    def _receive(self, message: Any, info: dict[str, Any]) -> None:
+    def receive(self, message: Any, info: dict[str, Any]) -> None:
         received, of = time.monotonic(), self.reception
         self._count_received(info)
         if why := self.too_fast():

@@ -16,9 +16,9 @@ from hpccd_ros.node.mesh_topic import UNREADABLE, MeshTopic, Reception
 class TopologySubscription(MeshTopic):
     def __init__(self, reception: Reception) -> None:
         super().__init__(reception, topic_names.TOPOLOGY)
-        unreadable.watch(self.subscribe(self._receive, qos.TOPOLOGY_INPUT), self._on_unreadable)
+        unreadable.watch(self.subscribe(self.receive, qos.TOPOLOGY_INPUT), self._on_unreadable)
 
-    def _receive(self, message: MeshTopology, info: dict[str, Any]) -> None:
+    def receive(self, message: MeshTopology, info: dict[str, Any]) -> None:
         of = self.reception
         _, new_publisher = self.numbers.next(info["publication_sequence_number"])
         if why := self.too_fast():

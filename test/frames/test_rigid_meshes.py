@@ -17,6 +17,9 @@ CLOTH, BOX = MeshSettings("cloth"), MeshSettings("box", self_collision=False, in
 LINK, TOOL = (MeshSettings(name, frame=f"{name}_frame", input="tf") for name in ("link", "tool"))
 
 
+MS = 10**6
+
+
 def topology(version=0):
     return Topology(version, 3, FACES)
 
@@ -157,21 +160,86 @@ def test_transforms_that_hold_at_all_times_move_nothing():
 
 @pytest.mark.parametrize("meshes", [(BOX,), (CLOTH, BOX), (CLOTH, LINK), (LINK,)])
 def test_a_stream_that_begins_anew(meshes):
-    """As with vertices: after a few frames of an earlier time."""
+    """As with vertices: after a few frames of an earlier time; where transforms alone move, at once."""
     pipeline = pipeline_of(*meshes, restart_after=3)
-    pipeline.transforms.add("world", "link_frame", IDENTITY, 1)
     frames, restarts = [], 0
-    for stamp in (100, 101, *range(10, 16)):
+    for stamp in (5000, 5001, *range(10, 16)):
         outcome = Outcome()
+        pipeline.transforms.add("world", "link_frame", Rigid.of((stamp, 0, 0), (0, 0, 0, 1)), stamp * MS)
         for mesh in meshes:
-            if mesh.input == "tf":
-                pipeline.transforms.add("world", "link_frame", QUARTER, stamp)
-            else:
-                outcome += pipeline.push(mesh.name, PoseFrame(stamp, QUARTER) if mesh.rigid else cloth(stamp))
+            if mesh.input != "tf":
+                message = PoseFrame(stamp * MS, QUARTER) if mesh.rigid else cloth(stamp * MS)
+                outcome += pipeline.push(mesh.name, message)
         outcome += retried(pipeline)
-        frames += [frame.stamp for frame in outcome.frames]
+        for frame in outcome.frames:
+            frames.append(frame.stamp // MS)
+            if LINK in meshes:
+                assert frame.placements[-1].pose.shift[0] == frames[-1]
         restarts += len(outcome.restarts)
-    if meshes != (LINK,):  # which goes on from the last stamp that is known
-        assert restarts >= 1 and frames[:2] == [100, 101] and frames[-1] == 15
-    else:
-        assert frames == [100, 101]
+    assert restarts == 1 and frames[:2] == [5000, 5001] and frames[-1] == 15
+    assert frames[2] == (10 if meshes == (LINK,) else 12)
+
+
+def test_after_the_clock_was_set_back_no_transform_from_before_is_used():
+    pipeline, seen = pipeline_of(CLOTH, LINK), []
+
+    def transform(stamp, x):
+        pipeline.transforms.add("world", "link_frame", Rigid.of((x, 0, 0), (0, 0, 0, 1)), stamp * MS)
+        return retried(pipeline)
+
+    for stamp in range(0, 3000, 20):
+        transform(stamp, 0.0)
+        pipeline.push("cloth", cloth(stamp * MS))
+    for stamp in range(10, 200, 20):
+        outcome = pipeline.push("cloth", cloth(stamp * MS), stamp == 10)
+        outcome += transform(stamp, 100.0)
+        seen += [(frame.stamp // MS, frame.placements[1].pose.shift[0]) for frame in outcome.frames]
+    assert seen and all(x == 100.0 for _, x in seen) and seen[-1][0] == 190
+
+
+@pytest.mark.parametrize("restart_after", [0, 5])
+def test_refused_frames_of_the_leader_ask_nothing_of_transforms(restart_after):
+    pipeline = pipeline_of(CLOTH, LINK, restart_after=restart_after)
+    pipeline.transforms.add("world", "link_frame", QUARTER, None)
+    stamps = []
+    for stamp in (100, 200, 10**12, 300, 400, *range(210, 260, 10), 500):
+        wrong = stamp == 10**12 or 200 < stamp < 300
+        message = MeshFrame(stamp, np.zeros((4, 3)), 0) if wrong else cloth(stamp)
+        outcome = pipeline.push("cloth", message)
+        stamps += [frame.stamp for frame in outcome.frames]
+        assert outcome.asked == ([] if wrong else ["link"]) and not outcome.restarts
+        assert reasons(outcome) == ([("cloth", "wrong_vertex_count")] if wrong else [])
+    assert stamps == [100, 200, 300, 400, 500] and pipeline.waiting == 0
+
+
+def test_a_new_publisher_loses_no_frame_where_transforms_move_another_mesh():
+    pipeline = pipeline_of(CLOTH, LINK)
+    pipeline.transforms.add("world", "link_frame", QUARTER, None)
+    stamps = []
+    for stamp in (100_000, 200_000, 100, 200):
+        outcome = pipeline.push("cloth", cloth(stamp), stamp == 100)
+        stamps += [frame.stamp for frame in outcome.frames]
+        assert len(outcome.restarts) == (stamp == 100) and not outcome.refusals
+    assert stamps == [100_000, 200_000, 100, 200]
+
+
+def test_transforms_alone_wait_for_those_that_are_not_there_yet():
+    pipeline, stamps, refused = pipeline_of(LINK, TOOL, max_pending=8), [], []
+    for now in range(0, 300, 10):
+        pipeline.transforms.add("world", "link_frame", IDENTITY, now * MS)
+        if now >= 100:  # begins later, and comes late
+            pipeline.transforms.add("world", "tool_frame", IDENTITY, (now - 80) * MS)
+        outcome = retried(pipeline)
+        stamps += [frame.stamp // MS for frame in outcome.frames]
+        refused += reasons(outcome) + outcome.restarts
+    assert stamps == list(range(20, 220, 10)) and not refused
+
+
+def test_a_frame_of_the_leader_that_waited_for_its_topology_asks_too():
+    pipeline = FramePipeline((CLOTH, LINK), AssemblyRules(frame_id="world"))
+    pipeline.push("link", topology())
+    pipeline.push("link", shape())
+    pipeline.transforms.add("world", "link_frame", QUARTER, None)
+    assert pipeline.push("cloth", cloth(7)).asked == []
+    outcome = pipeline.push("cloth", topology())
+    assert outcome.asked == ["link"] and [frame.stamp for frame in outcome.frames] == [7]

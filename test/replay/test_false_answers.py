@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 import pytest
-from bag_tools import typestore
+from bag_tools import completed, typestore
 from hostile_kinds import decoded
 from in_process import hpccd
 from mcap_model import Bag
@@ -49,8 +49,10 @@ def _diverges(done, says):
 
 
 def _vertices(sound_bags):
-    message = Bag.read(sound_bags / "streams.mcap").of_topic("/meshes/cloth/topology")[0]
-    return typestore().deserialize_cdr(message.data, "hpccd/msg/MeshTopology").n_vertices
+    bag, name = Bag.read(sound_bags / "streams.mcap"), "hpccd/msg/MeshTopology"
+    schema = next(schema for schema in bag.schemas if schema.name == name)
+    data = completed(schema, bag.of_topic("/meshes/cloth/topology")[0].data)
+    return typestore().deserialize_cdr(data, name).n_vertices
 
 
 def test_the_same_number_in_the_scene_under_another_mesh(answered, sound_bags):

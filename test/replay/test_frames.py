@@ -15,6 +15,7 @@ from hpccd_ros.frames.drops import Input
 from hpccd_ros.middleware import environment
 from hpccd_ros.node.accounts import Accounts
 from hpccd_ros.node.mesh_subscriptions import MeshSubscriptions
+from hpccd_ros.node.mesh_topic import Reception
 from hpccd_ros.params import scene_parameters
 from hpccd_ros.replay import recorded_setup
 from hpccd_ros.replay.frames import FrameSource
@@ -43,14 +44,14 @@ def of_node(node, recording, setup):
         pipeline.load(mesh, *loaded)
     queue = pipeline.start(1000)
     streams = {
-        mesh: MeshSubscriptions(node, mesh, row["input"], setup.settings, pipeline, accounts)
+        mesh: MeshSubscriptions(Reception(node, mesh, setup.settings, pipeline, accounts), row["input"])
         for mesh, row in setup.meshes.items()
     }
     for message in recording.messages(list(setup.roles)):
         mesh, kind = setup.roles[message.topic]
-        receive = streams[mesh]._on_topology if kind == "topology" else streams[mesh]._on_vertices
+        (topic,) = (topic for topic in streams[mesh].topics if topic.kind == kind)
         info = {"received_timestamp": 2, "source_timestamp": 1, "publication_sequence_number": message.sequence}
-        receive(make_decoder(recording.topics[message.topic])(message), info)
+        topic.receive(make_decoder(recording.topics[message.topic])(message), info)
     for subscriptions in streams.values():
         subscriptions.close()
     return queue.frames(), {Input.VERTICES: accounts.dropped, Input.TOPOLOGY: accounts.topologies_refused}
