@@ -1,0 +1,7 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What is wrong with a robot."""
+
+
+class RobotError(ValueError):
+    """A description, a semantic description or joint positions that cannot be used; the text names element and
+    remedy."""

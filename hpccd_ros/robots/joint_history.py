@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Joint states over time: the values of all joints of a robot at a stamp between two of them.
+
+Its rules are those of transforms (frames/transform_buffer.py): the last ten seconds of each joint, interpolation, no
+extrapolation. Bounded: only joints that the robot needs are kept.
+"""
+
+import math
+from bisect import bisect_left
+from collections.abc import Sequence
+
+from hpccd_ros.base.quoting import listed, quoted
+from hpccd_ros.frames.transform_buffer import HISTORY_NS, MOST_SAMPLES
+from hpccd_ros.robots.errors import RobotError
+from hpccd_ros.robots.kinematics import Kinematics
+
+
+class NoJointStateError(LookupError):
+    """There are no values; ``final``: none will come for this stamp either."""
+
+    def __init__(self, text: str, final: bool) -> None:
+        super().__init__(text)
+        self.final = final
+
+
+class JointHistory:
+    """Each message may tell of some joints only; several publishers may share a robot."""
+
+    def __init__(self, kinematics: Kinematics) -> None:
+        self._joints = {name: _Values(name in kinematics.continuous) for name in kinematics.inputs}
+
+    def add(self, stamp: int, names: Sequence[str], positions: Sequence[float]) -> None:
+        """stamp ns. Joints of others are left out. Raises RobotError, and then nothing of it is kept."""
+        if len(names) != len(positions):
+            raise RobotError(
+                f"joint states: {len(names)} names and {len(positions)} positions; each joint needs one of both"
+            )
+        known = [(name, float(value)) for name, value in zip(names, positions, strict=True) if name in self._joints]
+        for name, value in known:
+            if not math.isfinite(value):
+                raise RobotError(f"joint states: {quoted(name)} is at {value}; positions must be finite")
+        for name, value in known:
+            self._joints[name].add(stamp, value)
+
+    def at(self, stamp: int) -> dict[str, float]:
+        """A value of each joint that the robot needs. Raises NoJointStateError."""
+        if unheard := [name for name, values in self._joints.items() if not values.stamps]:
+            raise NoJointStateError(f"no joint state has told of {listed(unheard)}", final=False)
+        early = [name for name, values in self._joints.items() if stamp < values.stamps[0]]
+        if early:
+            first = max(self._joints[name].stamps[0] for name in early)
+            raise NoJointStateError(
+                f"the first joint state kept of {listed(early)} is of {first} ns, after the stamp {stamp} ns",
+                final=True,
+            )
+        late = [name for name, values in self._joints.items() if stamp > values.stamps[-1]]
+        if late:
+            last = min(self._joints[name].stamps[-1] for name in late)
+            raise NoJointStateError(
+                f"the last joint state of {listed(late)} is of {last} ns, before the stamp {stamp} ns", final=False
+            )
+        return {name: values.at(stamp) for name, values in self._joints.items()}
+
+    def latest(self) -> int | None:
+        """The last stamp, ns, that `at` knows; None: there is none yet, or no joint that moves."""
+        if any(not values.stamps for values in self._joints.values()):
+            return None
+        return min((values.stamps[-1] for values in self._joints.values()), default=None)
+
+
+class _Values:
+    """Of one joint, in the order of their stamps."""
+
+    def __init__(self, continuous: bool) -> None:
+        self._continuous = continuous
+        self.stamps: list[int] = []
+        self._values: list[float] = []
+
+    def add(self, stamp: int, value: float) -> None:
+        if self.stamps and stamp < self.stamps[-1] - HISTORY_NS:
+            # The source was restarted at an earlier time: the old values would be interpolated with the new ones.
+            self.stamps.clear()
+            self._values.clear()
+        at = bisect_left(self.stamps, stamp)
+        if at < len(self.stamps) and self.stamps[at] == stamp:
+            self._values[at] = value
+            return
+        self.stamps.insert(at, stamp)
+        self._values.insert(at, value)
+        old = max(bisect_left(self.stamps, self.stamps[-1] - HISTORY_NS), len(self.stamps) - MOST_SAMPLES)
+        del self.stamps[:old], self._values[:old]
+
+    def at(self, stamp: int) -> float:
+        """Between the first and the last."""
+        at = bisect_left(self.stamps, stamp)
+        if self.stamps[at] == stamp:
+            return self._values[at]
+        before, after = self._values[at - 1], self._values[at]
+        change = math.remainder(after - before, 2 * math.pi) if self._continuous else after - before
+        return before + change * ((stamp - self.stamps[at - 1]) / (self.stamps[at] - self.stamps[at - 1]))

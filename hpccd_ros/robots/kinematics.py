@@ -1,0 +1,152 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Where the links of a robot are, and how they move while its joints go from values to values.
+
+Between two states each joint goes at constant speed: a continuous one the shorter way, all others straight from value
+to value, though it be more than a turn. What mimics a joint goes along with it. So a continuous joint that another
+mimics by a factor that is no whole number must come unwrapped, else the follower's value jumps with it.
+
+Where the robot's base moves in the same step, its origin is taken to go straight while it turns at constant speed by at
+most half a turn, which is how tf2 interpolates. That is the motion of two more joints before the root: one that slides,
+one that turns (rigid/joints.py then holds as it is).
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from hpccd_ros.base.quoting import listed
+from hpccd_ros.rigid import rounding
+from hpccd_ros.rigid.body import Body
+from hpccd_ros.rigid.joints import Joint, JointStep, LinkMotion
+from hpccd_ros.rigid.screw import Screw
+from hpccd_ros.rigid.transform import IDENTITY, Rigid
+from hpccd_ros.robots.errors import RobotError
+from hpccd_ros.robots.urdf import Description, RobotJoint
+
+
+@dataclass(frozen=True)
+class _Followed:
+    """The value of a joint is ``factor`` times that of ``joint``, plus ``offset``."""
+
+    joint: str
+    factor: float
+    offset: float
+
+
+class Kinematics:
+    """``inputs``: names of the joints that need a value, in the order of the tree: those that move and mimic none.
+
+    ``links``: names of all links, from the root on. `number` of a link is its place there.
+    """
+
+    def __init__(self, description: Description) -> None:
+        joints = description.joints
+        self.links = (description.root, *(joint.child for joint in joints))
+        self._numbers = {name: number for number, name in enumerate(self.links)}
+        named = {joint.name: joint for joint in joints}
+        self.continuous = frozenset(joint.name for joint in joints if joint.kind == "continuous")
+        self.inputs = tuple(joint.name for joint in joints if joint.kind != "fixed" and joint.mimic is None)
+        self._followed = tuple(None if joint.kind == "fixed" else _followed(joint, named) for joint in joints)
+        # The root's link has a joint too, which stands still. Turns are unwrapped here, for the sake of mimics.
+        self.chain = (
+            Joint.of("fixed", -1, IDENTITY),
+            *(
+                Joint.of(
+                    "revolute" if joint.turns else joint.kind, self._numbers[joint.parent], joint.origin, joint.axis
+                )
+                for joint in joints
+            ),
+        )
+
+    def number(self, link: str) -> int:
+        return self._numbers[link]
+
+    def state(self, positions: Mapping[str, float], base: Rigid = IDENTITY) -> "RobotState":
+        """positions: a finite value for each of `inputs`, radians or metres; others are not looked at. base: takes
+        coordinates of the root's link to those of the scene. Raises RobotError naming what is missing."""
+        if missing := [name for name in self.inputs if name not in positions]:
+            raise RobotError(f"positions: none for {listed(missing)}; each joint that moves and mimics none needs one")
+        inputs = {name: float(positions[name]) for name in self.inputs}
+        if wrong := [name for name, value in inputs.items() if not math.isfinite(value)]:
+            raise RobotError(f"positions: not finite for {listed(wrong)}")
+        values = [0.0] + [0.0 if f is None else f.factor * inputs[f.joint] + f.offset for f in self._followed]
+        return RobotState(self, inputs, np.array(values), base)
+
+    def step(self, start: "RobotState", end: "RobotState") -> "RobotStep":
+        """Both of this robot."""
+        ends = end.values.copy()
+        for number, followed in enumerate(self._followed, 1):
+            if followed is not None and followed.joint in self.continuous:
+                change = math.remainder(end.inputs[followed.joint] - start.inputs[followed.joint], 2 * math.pi)
+                ends[number] = start.values[number] + followed.factor * change
+        if _same(start.base, end.base):
+            return RobotStep(self, JointStep(self.chain, start.values, ends, start.base), 0)
+        ahead, goal = _base_joints(start.base, end.base)
+        root = Joint.of("fixed", 1, Rigid(start.base.quaternion, np.zeros(3)))
+        links = (Joint(j.kind, j.parent + len(ahead), j.origin, j.axis) for j in self.chain[1:])
+        joints = (*ahead, root, *links)
+        return RobotStep(self, JointStep(joints, (0.0, 0.0, *start.values), (*goal, *ends)), len(ahead))
+
+
+@dataclass(frozen=True, eq=False)
+class RobotState:
+    """Of one time. ``inputs``: of the joints that need a value; ``values``: of the joint of each link, the root's
+    first."""
+
+    kinematics: Kinematics
+    inputs: dict[str, float]
+    values: np.ndarray
+    base: Rigid
+
+    @cached_property
+    def poses(self) -> dict[str, Rigid]:
+        """Of each link: takes its coordinates to those of the scene."""
+        found = JointStep(self.kinematics.chain, self.values, self.values, self.base).poses(0.0)
+        return dict(zip(self.kinematics.links, found, strict=True))
+
+
+@dataclass(frozen=True, eq=False)
+class RobotStep:
+    """All links between two states; poses are shared by the motions of all of them."""
+
+    kinematics: Kinematics
+    joints: JointStep
+    ahead: int  # joints that move the base
+
+    def poses(self, t: float) -> dict[str, Rigid]:
+        """At the fraction t in [0, 1]."""
+        return dict(zip(self.kinematics.links, self.joints.poses(t)[self.ahead :], strict=True))
+
+    def motion(self, link: str, body: Body) -> LinkMotion:
+        """body: geometry in the link's frame."""
+        return LinkMotion(self.joints, self.ahead + self.kinematics.number(link), body)
+
+
+def _followed(joint: RobotJoint, named: Mapping[str, RobotJoint]) -> _Followed:
+    factor, offset = 1.0, 0.0
+    while joint.mimic is not None:
+        factor, offset = factor * joint.mimic.multiplier, offset + factor * joint.mimic.offset
+        joint = named[joint.mimic.joint]
+    return _Followed(joint.name, factor, offset)
+
+
+def _same(a: Rigid, b: Rigid) -> bool:
+    return np.array_equal(a.shift, b.shift) and np.array_equal(a.quaternion, b.quaternion)
+
+
+def _base_joints(start: Rigid, end: Rigid) -> tuple[tuple[Joint, Joint], tuple[float, float]]:
+    """A slide and a turn, 0 at the start, and their values at the end."""
+    origin = Rigid(IDENTITY.quaternion, start.shift)
+    way = end.shift - start.shift
+    far = rounding.length(way)
+    if far > 1e-100:
+        slide, distance = Joint.of("prismatic", -1, origin, (way / far).tolist()), math.sqrt(sum((way * way).tolist()))
+    else:
+        slide, distance = Joint.of("fixed", -1, origin), 0.0
+    screw = Screw.between(start, end)
+    if not screw.half:
+        return (slide, Joint.of("fixed", 0, IDENTITY)), (distance, 0.0)
+    return (slide, Joint.of("revolute", 0, IDENTITY, screw.axis.tolist())), (distance, screw.angle)

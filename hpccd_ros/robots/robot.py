@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A robot as the node needs it: meshes of its links, pairs that are never tested, kinematics."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hpccd_ros.frames.types import TF, MeshSettings, Placement, Topology
+from hpccd_ros.rigid.body import Body
+from hpccd_ros.rigid.joints import LinkMotion
+from hpccd_ros.robots import pairs, srdf, urdf
+from hpccd_ros.robots.errors import RobotError
+from hpccd_ros.robots.geometry import LinkMeshes, Resolver, no_files
+from hpccd_ros.robots.kinematics import Kinematics, RobotState
+
+#: How far meshes of round shapes may stand out of them, in metres.
+TOLERANCE = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class RobotMesh:
+    """Of the link ``link``: ``name`` is ROBOT/LINK. ``body``: its vertices in the link's frame, with their bounds."""
+
+    name: str
+    link: str
+    topology: Topology
+    body: Body
+
+    @property
+    def vertices(self) -> np.ndarray:
+        """(n,3) float64. Not to be written to."""
+        return self.body.vertices
+
+
+@dataclass(frozen=True, eq=False)
+class Robot:
+    """``meshes``: of the links that have geometry, in the order of the description. ``ignored_pairs``: names of meshes,
+    sorted."""
+
+    name: str
+    description: urdf.Description
+    kinematics: Kinematics
+    meshes: tuple[RobotMesh, ...]
+    ignored_pairs: tuple[tuple[str, str], ...]
+
+    @classmethod
+    def of(
+        cls,
+        urdf_text: str,
+        srdf_text: str | None = None,
+        geometry: str = "collision",
+        resolver: Resolver = no_files,
+        *,
+        name: str | None = None,
+        tolerance: float = TOLERANCE,
+    ) -> "Robot":
+        """geometry: "collision" or "visual". resolver: see geometry.py. name: before the links' in names of meshes;
+        None: as the description calls it. tolerance: how far meshes of round shapes may stand out.
+
+        Raises RobotError naming the element and the remedy.
+        """
+        description = urdf.parse(urdf_text, geometry)
+        called = description.name if name is None else name
+        if not called:
+            raise RobotError("name: the description has none; give one")
+        made = LinkMeshes(resolver, tolerance)
+        meshes = []
+        for link in description.links:
+            if (shape := made.of(link)) is not None:
+                vertices, faces = shape
+                topology = Topology(0, len(vertices), faces)
+                meshes.append(RobotMesh(f"{called}/{link.name}", link.name, topology, Body.of(vertices)))
+        if not meshes:
+            other = next(kind for kind in urdf.GEOMETRIES if kind != geometry)
+            raise RobotError(f"geometry: no link has <{geometry}>, so nothing could touch; try {other}")
+        semantics = None if srdf_text is None else srdf.parse(srdf_text, (link.name for link in description.links))
+        names = {mesh.link: mesh.name for mesh in meshes}
+        ignored = sorted(
+            (names[a], names[b]) for a, b in pairs.ignored(description, semantics) if a in names and b in names
+        )
+        return cls(called, description, Kinematics(description), tuple(meshes), tuple(ignored))
+
+    def settings(self, frame_prefix: str = "") -> tuple[MeshSettings, ...]:
+        """Of each mesh, to be moved by transforms from the frame ``frame_prefix`` + link."""
+        return tuple(
+            MeshSettings(mesh.name, self_collision=False, input=TF, frame=frame_prefix + mesh.link)
+            for mesh in self.meshes
+        )
+
+    def placements(self, state: RobotState) -> tuple[Placement, ...]:
+        """Of each mesh."""
+        return tuple(Placement(mesh.body, state.poses[mesh.link]) for mesh in self.meshes)
+
+    def motions(self, start: RobotState, end: RobotState) -> tuple[LinkMotion, ...]:
+        """Of each mesh, between two states of this robot (kinematics.py says which motion that is)."""
+        step = self.kinematics.step(start, end)
+        return tuple(step.motion(mesh.link, mesh.body) for mesh in self.meshes)

@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a link is made of, as its description says it: lengths in the unit of the description, metres."""
+
+from dataclasses import dataclass
+
+from hpccd_ros.rigid.transform import Rigid
+
+
+@dataclass(frozen=True)
+class Box:
+    """Its edges along x, y, z; the origin is its centre."""
+
+    size: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Cylinder:
+    """Along z; the origin is its centre."""
+
+    radius: float
+    length: float
+
+
+@dataclass(frozen=True)
+class Sphere:
+    radius: float
+
+
+@dataclass(frozen=True)
+class Capsule:
+    """A cylinder along z with half a sphere at each end, which its length does not count."""
+
+    radius: float
+    length: float
+
+
+@dataclass(frozen=True)
+class MeshFile:
+    """``uri``: as written; ``scale``: of x, y, z, before the origin is applied."""
+
+    uri: str
+    scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
+
+
+Shape = Box | Cylinder | Sphere | Capsule | MeshFile
+
+
+@dataclass(frozen=True, eq=False)
+class Placed:
+    """``origin`` takes coordinates of the shape to those of its link. ``line``: of the description."""
+
+    shape: Shape
+    origin: Rigid
+    line: int

@@ -1,0 +1,153 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Boxes, cylinders, spheres and capsules as closed triangle meshes that contain them.
+
+A box is itself. What is round gets a mesh around it, so that whatever touches the solid touches or enters the mesh; no
+point of the mesh stands out of the solid by more than `outstanding` says, at most the tolerance asked for.
+
+Why the mesh holds the solid. *Cylinder*: its ring is a regular polygon of n corners at the distance R from the axis;
+the sides are at R cos(pi/n) from it, which is the radius r. *Sphere*: rings of 0, 4, 8, ..., 4n, ..., 8, 4, 0 corners,
+all at the distance R from the centre, with the planes of all triangles at least at d R from it; d is computed. The
+surface surrounds the centre and comes no nearer to it than the nearest of these planes; R = r / d. *Capsule*: that
+sphere cut at its widest ring, with walls of the capsule's length between both halves. The half balls at its ends are
+held as the sphere is; each edge of the ring lies in a triangle, so it is at least at d R from the axis.
+How far it stands out: each point of these surfaces is within R of the axis, the centre, or the segment between the
+centres, and no farther along the axis than the solid, where that has flat ends: R - r.
+
+Every round R is made larger by a factor of 1 + 2**-36, more than what its own rounding and that of the places of
+corners (64 times 2**-53 of their distance from the link's origin, up to 2,000 radii) may have taken away.
+"""
+
+import math
+from functools import lru_cache
+
+import numpy as np
+
+from hpccd_ros.robots.errors import RobotError
+from hpccd_ros.robots.shapes import Box, Capsule, Cylinder, Sphere
+
+Solid = Box | Cylinder | Sphere | Capsule
+Triangles = tuple[np.ndarray, np.ndarray]
+
+FEWEST_SEGMENTS = 8  # of a ring
+MOST_SEGMENTS = 512
+_LARGER = 1.0 + 2.0**-36
+
+
+def triangles(solid: Solid, tolerance: float) -> Triangles:
+    """(vertices (n,3) float64, faces (F,3) uint32), normals outwards. tolerance: how far it may stand out.
+
+    Raises RobotError: a tolerance that is not above 0, or needs more than MOST_SEGMENTS a ring.
+    """
+    if isinstance(solid, Box):
+        return _box(solid)
+    if isinstance(solid, Cylinder):
+        return _cylinder(solid, segments(solid, tolerance))
+    return _rounded(solid, segments(solid, tolerance))
+
+
+def outstanding(solid: Solid, tolerance: float) -> float:
+    """How far the mesh of that tolerance stands out of the solid at most."""
+    if isinstance(solid, Box):
+        return 0.0
+    return solid.radius * (_LARGER / _inner(solid, segments(solid, tolerance)) - 1.0)
+
+
+def segments(solid: Cylinder | Sphere | Capsule, tolerance: float) -> int:
+    """Corners of the widest ring: the fewest, a multiple of 4, that keep the tolerance."""
+    if not tolerance > 0.0:
+        raise RobotError(f"tolerance {tolerance:g}: must be above 0")
+    for count in range(FEWEST_SEGMENTS, MOST_SEGMENTS + 1, 4):
+        if solid.radius * (_LARGER / _inner(solid, count) - 1.0) <= tolerance:
+            return count
+    raise RobotError(
+        f"tolerance {tolerance:g}: a radius of {solid.radius:g} would need more than {MOST_SEGMENTS} segments; "
+        "take a larger one"
+    )
+
+
+def _inner(solid: Cylinder | Sphere | Capsule, count: int) -> float:
+    """The radius of what a mesh of corners at the distance 1 holds."""
+    return math.cos(math.pi / count) if isinstance(solid, Cylinder) else _inner_of_sphere(count // 4)
+
+
+def _box(box: Box) -> Triangles:
+    half = np.array(box.size) / 2
+    corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * half
+    quads = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
+    return corners, np.array([t for a, b, c, d in quads for t in ((a, b, c), (a, c, d))], np.uint32)
+
+
+def _ring(count: int) -> list[tuple[float, float]]:
+    return [(math.cos(2 * math.pi * k / count), math.sin(2 * math.pi * k / count)) for k in range(count)]
+
+
+def _cylinder(cylinder: Cylinder, count: int) -> Triangles:
+    radius, top = cylinder.radius / _inner(cylinder, count) * _LARGER, cylinder.length / 2
+    ring = np.array(_ring(count)) * radius
+    ends = [np.column_stack([ring, np.full(count, z)]) for z in (-top, top)]
+    vertices = np.concatenate([*ends, [[0.0, 0.0, -top], [0.0, 0.0, top]]])
+    faces = []
+    for k in range(count):
+        n = (k + 1) % count
+        faces += [
+            (k, n, count + n),
+            (k, count + n, count + k),
+            (2 * count, n, k),
+            (2 * count + 1, count + k, count + n),
+        ]
+    return vertices, np.array(faces, np.uint32)
+
+
+def _rounded(solid: Sphere | Capsule, count: int) -> Triangles:
+    n = count // 4
+    radius = solid.radius / _inner_of_sphere(n) * _LARGER
+    upper, faces = _half_sphere(n)
+    if isinstance(solid, Sphere):
+        # Both halves share the widest ring, whose corners are the last ones.
+        inner = len(upper) - count
+        lower = upper[:inner] * [1.0, 1.0, -1.0]
+        mirrored = np.where(faces < inner, faces + len(upper), faces)[:, ::-1]
+        return np.concatenate([upper, lower]) * radius, np.concatenate([faces, mirrored]).astype(np.uint32)
+    shift = np.array([0.0, 0.0, solid.length / 2])
+    vertices = np.concatenate([upper * radius + shift, upper * [1.0, 1.0, -1.0] * radius - shift])
+    first, second = len(upper) - count, 2 * len(upper) - count
+    walls = []
+    for k in range(count):
+        m = (k + 1) % count
+        walls += [(second + k, second + m, first + m), (second + k, first + m, first + k)]
+    return vertices, np.concatenate([faces, faces[:, ::-1] + len(upper), walls]).astype(np.uint32)
+
+
+@lru_cache(maxsize=256)
+def _half_sphere(n: int) -> Triangles:
+    """Of radius 1, z not negative: the pole, then ring after ring of 4, 8, ..., 4n corners; open below."""
+    vertices = [(0.0, 0.0, 1.0)]
+    for k in range(1, n + 1):
+        angle = math.pi / 2 * k / n
+        sine, z = math.sin(angle), math.cos(angle) if k < n else 0.0
+        vertices += [(x * sine, y * sine, z) for x, y in _ring(4 * k)]
+    faces = []
+    for k in range(1, n + 1):
+        for quarter in range(4):
+            for j in range(k):
+                a, b = _corner(k, quarter * k + j), _corner(k, quarter * k + j + 1)
+                above = _corner(k - 1, quarter * (k - 1) + j)
+                faces.append((above, a, b))
+                if j + 1 < k:
+                    faces.append((above, b, _corner(k - 1, quarter * (k - 1) + j + 1)))
+    return np.array(vertices), np.array(faces, np.int64)
+
+
+def _corner(ring: int, number: int) -> int:
+    """Its place among the corners: before ring k there are 1 + 4 (1 + ... + k - 1)."""
+    return 1 + 2 * ring * (ring - 1) + number % (4 * ring) if ring else 0
+
+
+@lru_cache(maxsize=256)
+def _inner_of_sphere(n: int) -> float:
+    """From the centre to the nearest plane of a triangle, of the sphere of radius 1."""
+    vertices, faces = _half_sphere(n)
+    a, b, c = (vertices[faces[:, k]] for k in range(3))
+    normals = np.cross(b - a, c - a)
+    away = (normals * a).sum(axis=1) / np.sqrt((normals * normals).sum(axis=1))
+    return float(away.min())

@@ -1,0 +1,292 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A URDF as links and joints.
+
+Read are ``link`` with its collision or visual geometry, and ``joint``; what else there is (inertia, materials,
+transmissions, what simulators and controllers add) says nothing of shape or motion.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from hpccd_ros.base.quoting import listed, quoted
+from hpccd_ros.rigid.joints import TURNING, Joint
+from hpccd_ros.rigid.transform import IDENTITY, Rigid, product
+from hpccd_ros.robots import xml_tree
+from hpccd_ros.robots.errors import RobotError
+from hpccd_ros.robots.shapes import Box, Capsule, Cylinder, MeshFile, Placed, Sphere
+from hpccd_ros.robots.xml_tree import Element
+
+GEOMETRIES = ("collision", "visual")
+KINDS = ("revolute", "continuous", "prismatic", "fixed")
+LONGEST_NAME = 255
+DOCUMENT = "URDF"
+
+
+@dataclass(frozen=True)
+class Mimic:
+    """Its joint is at ``multiplier`` times the value of ``joint``, plus ``offset``."""
+
+    joint: str
+    multiplier: float
+    offset: float
+
+
+@dataclass(frozen=True, eq=False)
+class Link:
+    name: str
+    geometry: tuple[Placed, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class RobotJoint:
+    """``origin``: its frame in that of ``parent``; ``axis`` in its own, of length 1. ``limits``: lower, upper; None
+    where the description gives none."""
+
+    name: str
+    kind: str
+    parent: str
+    child: str
+    origin: Rigid
+    axis: tuple[float, float, float]
+    limits: tuple[float, float] | None = None
+    mimic: Mimic | None = None
+
+    @property
+    def turns(self) -> bool:
+        return self.kind in TURNING
+
+
+@dataclass(frozen=True, eq=False)
+class Description:
+    """``joints``: each after the one that moves its parent. ``links``: as in the text. ``root``: no joint moves it."""
+
+    name: str
+    root: str
+    links: tuple[Link, ...]
+    joints: tuple[RobotJoint, ...]
+
+
+def parse(text: str, geometry: str = "collision") -> Description:
+    """geometry: which of a link's is read, one of GEOMETRIES. Raises RobotError naming the element."""
+    if geometry not in GEOMETRIES:
+        raise RobotError(f"geometry: {quoted(geometry)} is not known; choose from {', '.join(GEOMETRIES)}")
+    robot = xml_tree.parse(text, DOCUMENT, "robot")
+    for child in robot.children:
+        if child.tag.startswith("xacro:"):
+            raise child.error("is of xacro; expand it first: xacro FILE > robot.urdf")
+    links: dict[str, Link] = {}
+    for element in robot.all("link"):
+        name = _name(element)
+        if name in links:
+            raise element.error("is the second link of this name; give it another one")
+        links[name] = Link(name, tuple(_placed(part) for part in element.all(geometry)))
+    if not links:
+        raise robot.error("has no <link>; give at least one")
+    joints: dict[str, RobotJoint] = {}
+    moved_by: dict[str, str] = {}  # the joint of each child
+    for element in robot.all("joint"):
+        joint = _joint(element, links)
+        if joint.name in joints:
+            raise element.error("is the second joint of this name; give it another one")
+        if joint.child in moved_by:
+            raise element.error(
+                f"has the child {quoted(joint.child)}, which joint {quoted(moved_by[joint.child])} moves already; "
+                "links must form a tree"
+            )
+        joints[joint.name] = joint
+        moved_by[joint.child] = joint.name
+    _check_mimics(robot, joints)
+    root, ordered = _tree(robot, links, joints, moved_by)
+    return Description(robot.attributes.get("name", ""), root, tuple(links.values()), ordered)
+
+
+def _name(element: Element) -> str:
+    name = element.text("name")
+    # A link's name becomes part of a mesh's, which parameters hold with colons between.
+    if len(name) > LONGEST_NAME or not name.isprintable() or ":" in name or "/" in name:
+        raise element.error(f"has a name that cannot be used: at most {LONGEST_NAME} characters, no : or /")
+    return name
+
+
+def _joint(element: Element, links: dict[str, Link]) -> RobotJoint:
+    name, kind = _name(element), element.text("type")
+    if kind in ("floating", "planar"):
+        raise element.error(
+            f"is {kind}, which no single value moves; remove it where it only says where the robot stands, and let TF "
+            "or the base's pose say that"
+        )
+    if kind not in KINDS:
+        raise element.error(f"has the type {quoted(kind)}; choose from {', '.join(KINDS)}")
+    ends = []
+    for tag in ("parent", "child"):
+        end = element.needed(tag).text("link")
+        if end not in links:
+            raise element.error(f"has the {tag} {quoted(end)}, and no link is called so; links are {listed(links)}")
+        ends.append(end)
+    if ends[0] == ends[1]:
+        raise element.error("has one link as parent and child; name two")
+    return RobotJoint(
+        name,
+        kind,
+        ends[0],
+        ends[1],
+        _origin(element),
+        _axis(element, kind),
+        _limits(element, kind),
+        _mimic(element, kind),
+    )
+
+
+def _axis(element: Element, kind: str) -> tuple[float, float, float]:
+    axis = element.one("axis")
+    given = (1.0, 0.0, 0.0) if axis is None or kind == "fixed" else _numbers(axis, "xyz", 3)
+    try:
+        x, y, z = Joint.of(kind, -1, IDENTITY, given).axis.tolist()
+    except ValueError as error:
+        raise element.error(f"has an axis that cannot be used: {error}") from error
+    return x, y, z
+
+
+def _limits(element: Element, kind: str) -> tuple[float, float] | None:
+    limit = element.one("limit")
+    if limit is None or kind not in ("revolute", "prismatic"):
+        return None
+    lower, upper = (_number(limit, name, 0.0) for name in ("lower", "upper"))
+    if lower > upper:
+        raise element.error(f"has the lower limit {lower:g} above the upper one {upper:g}; exchange them")
+    return lower, upper
+
+
+def _mimic(element: Element, kind: str) -> Mimic | None:
+    mimic = element.one("mimic")
+    if mimic is None or kind == "fixed":
+        return None
+    return Mimic(mimic.text("joint"), _number(mimic, "multiplier", 1.0), _number(mimic, "offset", 0.0))
+
+
+def _check_mimics(robot: Element, joints: dict[str, RobotJoint]) -> None:
+    for joint in joints.values():
+        passed, at = [joint.name], joint
+        while at.mimic is not None:
+            followed = joints.get(at.mimic.joint)
+            if followed is None or followed.kind == "fixed":
+                why = "no joint is called so" if followed is None else "it does not move"
+                raise robot.error(f"has the joint {quoted(at.name)}, which mimics {quoted(at.mimic.joint)}: {why}")
+            if followed.name in passed:
+                raise robot.error(f"has joints that mimic each other in a circle: {listed([*passed, followed.name])}")
+            passed.append(followed.name)
+            at = followed
+
+
+def _tree(
+    robot: Element, links: dict[str, Link], joints: dict[str, RobotJoint], moved_by: dict[str, str]
+) -> tuple[str, tuple[RobotJoint, ...]]:
+    roots = [name for name in links if name not in moved_by]
+    if len(roots) != 1:
+        what = f"several links that no joint moves ({listed(roots)})" if roots else "a circle of joints"
+        raise robot.error(f"has {what}; links must form one tree")
+    of_parent: dict[str, list[RobotJoint]] = {}
+    for joint in joints.values():
+        of_parent.setdefault(joint.parent, []).append(joint)
+    ordered: list[RobotJoint] = []
+    waiting = [roots[0]]
+    while waiting:
+        found = of_parent.get(waiting.pop(0), [])
+        ordered += found
+        waiting += [joint.child for joint in found]
+    if len(ordered) != len(joints):
+        lost = sorted(set(joints) - {joint.name for joint in ordered})
+        raise robot.error(f"has joints in a circle: {listed(lost)}; links must form one tree")
+    return roots[0], tuple(ordered)
+
+
+def _placed(element: Element) -> Placed:
+    geometry = element.needed("geometry")
+    if len(geometry.children) != 1:
+        raise geometry.error(f"has {len(geometry.children)} shapes; it needs one: {', '.join(_SHAPES)}")
+    (shape,) = geometry.children
+    if shape.tag not in _SHAPES:
+        raise shape.error(f"is no known shape; choose from {', '.join(_SHAPES)}")
+    return Placed(_SHAPES[shape.tag](shape), _origin(element), element.line)
+
+
+def _box(element: Element) -> Box:
+    return Box(_sizes(element, "size"))
+
+
+def _cylinder(element: Element) -> Cylinder:
+    return Cylinder(_size(element, "radius"), _size(element, "length"))
+
+
+def _sphere(element: Element) -> Sphere:
+    return Sphere(_size(element, "radius"))
+
+
+def _capsule(element: Element) -> Capsule:
+    return Capsule(_size(element, "radius"), _size(element, "length"))
+
+
+def _mesh(element: Element) -> MeshFile:
+    uri = element.text("filename").strip()
+    if "scale" not in element.attributes:
+        return MeshFile(uri)
+    x, y, z = _numbers(element, "scale", 3)
+    if not x * y * z:
+        raise element.error(f"has the scale {x:g} {y:g} {z:g}, which leaves no shape; no factor may be 0")
+    return MeshFile(uri, (x, y, z))
+
+
+_SHAPES = {"box": _box, "cylinder": _cylinder, "sphere": _sphere, "capsule": _capsule, "mesh": _mesh}
+
+
+def _origin(element: Element) -> Rigid:
+    """xyz, and rpy: turns about the fixed axes x, y, z in this order."""
+    origin = element.one("origin")
+    if origin is None:
+        return IDENTITY
+    shift = _numbers(origin, "xyz", 3, (0.0, 0.0, 0.0))
+    quaternion = IDENTITY.quaternion
+    for number, angle in enumerate(_numbers(origin, "rpy", 3, (0.0, 0.0, 0.0))):
+        if angle:
+            turn = np.zeros(4)
+            turn[number], turn[3] = math.sin(angle / 2), math.cos(angle / 2)
+            quaternion = product(turn, quaternion)
+    return Rigid.of(shift, quaternion.tolist())
+
+
+def _numbers(
+    element: Element, attribute: str, count: int, default: tuple[float, ...] | None = None
+) -> tuple[float, ...]:
+    text = element.attributes.get(attribute)
+    if text is None and default is not None:
+        return default
+    try:
+        found = tuple(float(word) for word in element.text(attribute).split())
+    except ValueError:
+        found = ()
+    if len(found) != count or not all(math.isfinite(number) for number in found):
+        needed = "a finite number" if count == 1 else f"{count} finite numbers with spaces between"
+        raise element.error(f"has {attribute}={quoted(text or '')}; it must be {needed}")
+    return found
+
+
+def _number(element: Element, attribute: str, default: float) -> float:
+    return _numbers(element, attribute, 1, (default,))[0]
+
+
+def _size(element: Element, attribute: str) -> float:
+    (size,) = _numbers(element, attribute, 1)
+    return _positive(element, attribute, size)
+
+
+def _sizes(element: Element, attribute: str) -> tuple[float, float, float]:
+    x, y, z = (_positive(element, attribute, size) for size in _numbers(element, attribute, 3))
+    return x, y, z
+
+
+def _positive(element: Element, attribute: str, size: float) -> float:
+    if size <= 0.0:
+        raise element.error(f"has {attribute} {size:g}; lengths must be above 0")
+    return size
