@@ -6,13 +6,13 @@ import math
 
 import numpy as np
 import pytest
+from random_urdf import matrices, random_urdf, turn
 
 from hpccd_ros.rigid.body import Body
 from hpccd_ros.rigid.transform import IDENTITY, Rigid
 from hpccd_ros.robots import urdf
 from hpccd_ros.robots.errors import RobotError
 from hpccd_ros.robots.kinematics import Kinematics
-from random_urdf import matrices, random_urdf, turn
 
 HINGE = """<robot name="hinge"><link name="a"/><link name="b"/><link name="c"/>
 <joint name="first" type="{kind}"><parent link="a"/><child link="b"/><axis xyz="0 0 1"/></joint>

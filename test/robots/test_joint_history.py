@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Values of all joints at a stamp, of messages that may each tell of some."""
+
+import math
+
+import pytest
+
+from hpccd_ros.frames.transform_buffer import HISTORY_NS, MOST_SAMPLES
+from hpccd_ros.robots import urdf
+from hpccd_ros.robots.errors import RobotError
+from hpccd_ros.robots.joint_history import JointHistory, NoJointStateError
+from hpccd_ros.robots.kinematics import Kinematics
+
+URDF = """<robot name="r"><link name="a"/><link name="b"/><link name="c"/><link name="d"/>
+<joint name="turn" type="continuous"><parent link="a"/><child link="b"/></joint>
+<joint name="slide" type="prismatic"><parent link="b"/><child link="c"/></joint>
+<joint name="also" type="prismatic"><parent link="c"/><child link="d"/><mimic joint="slide"/></joint></robot>"""
+
+
+def history():
+    return JointHistory(Kinematics(urdf.parse(URDF)))
+
+
+def test_values_are_interpolated_each_joint_between_its_own_stamps():
+    joints = history()
+    joints.add(100, ["turn", "slide"], [3.0, 1.0])
+    joints.add(200, ["turn"], [-3.0])
+    joints.add(300, ["slide", "of another robot"], [2.0, math.nan])
+    found = joints.at(150)
+    assert found["slide"] == 1.25
+    assert found["turn"] == pytest.approx(math.pi)  # the shorter way
+    assert joints.at(200) == {"turn": -3.0, "slide": 1.5}
+    assert joints.latest() == 200
+
+
+def test_order_of_arrival_does_not_matter_and_the_same_stamp_replaces():
+    joints = history()
+    for stamp, value in [(200, 9.0), (100, 0.0), (200, 1.0)]:
+        joints.add(stamp, ["slide", "turn"], [value, 0.0])
+    assert joints.at(150) == {"slide": 0.5, "turn": 0.0}
+
+
+def test_what_is_not_known_is_named_and_whether_it_may_come():
+    joints = history()
+    assert joints.latest() is None
+    joints.add(100, ["slide"], [1.0])
+    for stamp, message, final in [
+        (100, "no joint state has told of turn", False),
+        (50, "after the stamp 50 ns", True),
+        (250, "the last joint state of turn, slide is of 200 ns, before the stamp 250 ns", False),
+    ]:
+        if stamp == 50:
+            joints.add(200, ["turn", "slide"], [0.0, 0.0])
+        with pytest.raises(NoJointStateError, match=message) as refused:
+            joints.at(stamp)
+        assert refused.value.final is final
+
+
+def test_messages_that_cannot_be_used_leave_nothing_behind():
+    joints = history()
+    with pytest.raises(RobotError, match="2 names and 1 positions"):
+        joints.add(1, ["turn", "slide"], [0.0])
+    with pytest.raises(RobotError, match="'slide' is at inf; positions must be finite"):
+        joints.add(1, ["turn", "slide"], [0.0, math.inf])
+    assert joints.latest() is None
+
+
+def test_what_is_kept_is_bounded():
+    joints = history()
+    for k in range(3 * MOST_SAMPLES):
+        joints.add(k, ["slide", "turn"], [k, 0.0])
+    with pytest.raises(NoJointStateError, match=f"of {2 * MOST_SAMPLES} ns") as refused:
+        joints.at(0)
+    assert refused.value.final
+    joints.add(2 * HISTORY_NS, ["slide", "turn"], [0.0, 0.0])
+    with pytest.raises(NoJointStateError):
+        joints.at(3 * MOST_SAMPLES - 1)
+
+
+def test_a_source_that_begins_anew_at_an_earlier_time_is_followed():
+    joints = history()
+    joints.add(5 * HISTORY_NS, ["slide", "turn"], [5.0, 0.0])
+    joints.add(100, ["slide", "turn"], [1.0, 0.0])
+    assert joints.latest() == 100 and joints.at(100)["slide"] == 1.0

@@ -1,0 +1,176 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What is read of a URDF, and what is refused: by line and name, with the remedy."""
+
+import math
+
+import pytest
+
+from hpccd_ros.robots import urdf, xml_tree
+from hpccd_ros.robots.errors import RobotError
+from hpccd_ros.robots.shapes import Box, Capsule, Cylinder, MeshFile, Sphere
+
+LINKS = '<link name="a"/><link name="b"/>'
+
+
+def robot(inside, links=LINKS):
+    return f'<robot name="r">{links}{inside}</robot>'
+
+
+def joint(inside="", kind="revolute", name="j", parent="a", child="b"):
+    return f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>{inside}</joint>'
+
+
+def shape(inside, use="collision", origin=""):
+    return robot("", f'<link name="a"><{use}>{origin}<geometry>{inside}</geometry></{use}></link>')
+
+
+def test_a_joint_is_read_whole():
+    text = robot(
+        joint(
+            '<origin xyz="1 2 3" rpy="0 0 1.5707963267948966"/><axis xyz="0 0 -2"/>'
+            '<limit lower="-1.5" upper="2" effort="1" velocity="1"/><dynamics damping="1"/>'
+        )
+    )
+    found = urdf.parse(text)
+    assert (found.name, found.root, [link.name for link in found.links]) == ("r", "a", ["a", "b"])
+    (read,) = found.joints
+    assert (read.name, read.kind, read.parent, read.child, read.mimic) == ("j", "revolute", "a", "b", None)
+    assert read.axis == (0.0, 0.0, -1.0) and read.limits == (-1.5, 2.0)
+    assert read.origin.shift.tolist() == [1, 2, 3]
+    assert read.origin.quaternion.tolist() == pytest.approx([0, 0, math.sqrt(0.5), math.sqrt(0.5)])
+
+
+def test_what_is_not_written_has_its_default():
+    (read,) = urdf.parse(
+        robot(joint("<mimic joint='k'/>") + joint(name="k", child="c"), LINKS + '<link name="c"/>')
+    ).joints[:1]
+    assert read.axis == (1.0, 0.0, 0.0) and read.limits is None
+    assert (read.mimic.joint, read.mimic.multiplier, read.mimic.offset) == ("k", 1.0, 0.0)
+    assert read.origin.shift.tolist() == [0, 0, 0] and read.origin.quaternion.tolist() == [0, 0, 0, 1]
+
+
+@pytest.mark.parametrize(
+    "inside, expected",
+    [
+        ('<box size="1 2 3"/>', Box((1.0, 2.0, 3.0))),
+        ('<cylinder radius="0.5" length="2"/>', Cylinder(0.5, 2.0)),
+        ('<sphere radius="1e-2"/>', Sphere(0.01)),
+        ('<capsule radius="0.5" length="2"/>', Capsule(0.5, 2.0)),
+        (
+            '<mesh filename="package://p/a b.stl" scale="1 -1 0.001"/>',
+            MeshFile("package://p/a b.stl", (1.0, -1.0, 0.001)),
+        ),
+    ],
+)
+def test_shapes_are_read(inside, expected):
+    ((part,),) = [link.geometry for link in urdf.parse(shape(inside)).links]
+    assert part.shape == expected and part.line == 1
+
+
+def test_only_the_geometry_asked_for_is_read():
+    text = shape('<sphere radius="1"/>', "visual")
+    assert urdf.parse(text, "collision").links[0].geometry == ()
+    assert urdf.parse(text, "visual").links[0].geometry[0].shape == Sphere(1.0)
+    broken = shape("<nothing/>", "visual")
+    assert urdf.parse(broken, "collision").links[0].geometry == ()
+    with pytest.raises(RobotError, match="geometry: 'both' is not known; choose from collision, visual"):
+        urdf.parse(text, "both")
+
+
+def test_what_others_put_beside_links_is_left_alone():
+    text = robot(
+        '<transmission name="t"><joint name="j"/></transmission><ros2_control name="c"><joint name="j"/></ros2_control>'
+        '<gazebo><link name="x"/></gazebo><material name="m"/>' + joint(kind="fixed")
+    )
+    assert len(urdf.parse(text).joints) == 1
+
+
+@pytest.mark.parametrize(
+    "text, message",
+    [
+        ("", "URDF: is no XML"),
+        ("<robot>", "URDF: is no XML"),
+        ("robot_description", "URDF: is no XML"),
+        ("<sdf/>", "line 1: <sdf> is the outermost element; a URDF begins with <robot>"),
+        ("<robot/>", "<robot> has no <link>"),
+        (robot("", "<link/>"), "<link> needs the attribute name"),
+        (robot("", '<link name="a:b"/>'), r"<link name='a:b'> has a name that cannot be used"),
+        (robot("", '<link name="a"/>' * 2), "<link name='a'> is the second link of this name"),
+        (robot(joint() * 2), "<joint name='j'> is the second joint of this name"),
+        (robot(joint() + joint(name="k")), "has the child 'b', which joint 'j' moves already"),
+        (robot(""), "several links that no joint moves \\(a, b\\)"),
+        (robot(joint() + joint(name="k", parent="b", child="a")), "has a circle of joints"),
+        (
+            robot(joint(), LINKS.replace('"a"', '"c"') + '<link name="a"/>').replace(
+                "</robot>", joint(name="k", parent="b", child="a") + "</robot>"
+            ),
+            "has joints in a circle: j, k",
+        ),
+        (robot(joint(parent="x")), "<joint name='j'> has the parent 'x', and no link is called so; links are a, b"),
+        (robot(joint(child="a")), "one link as parent and child"),
+        (robot('<joint name="j" type="fixed"><child link="b"/></joint>'), "<joint name='j'> has no <parent>"),
+        (robot(joint('<parent link="a"/>')), "<parent> is the second in <joint>"),
+        (robot(joint(kind="floating")), "<joint name='j'> is floating, which no single value moves"),
+        (robot(joint(kind="planar")), "<joint name='j'> is planar"),
+        (robot(joint(kind="hinge")), "<joint name='j'> has the type 'hinge'; choose from revolute"),
+        (robot(joint('<axis xyz="0 0 0"/>')), "<joint name='j'> has an axis that cannot be used"),
+        (robot(joint('<axis xyz="0 0"/>')), "<axis> has xyz='0 0'; it must be 3 finite numbers"),
+        (robot(joint('<origin xyz="0 0 nan"/>')), "<origin> has xyz='0 0 nan'"),
+        (robot(joint('<origin rpy="0 0 ${pi}"/>')), "<origin> has rpy="),
+        (robot(joint('<limit lower="1" upper="0"/>')), "<joint name='j'> has the lower limit 1 above the upper one 0"),
+        (robot(joint('<mimic joint="x"/>')), "has the joint 'j', which mimics 'x': no joint is called so"),
+        (robot(joint('<mimic joint="j"/>')), "mimic each other in a circle: j, j"),
+        (robot(joint('<mimic joint="j" multiplier="x"/>')), "<mimic> has multiplier='x'; it must be a finite number"),
+        (shape(""), "<geometry> has 0 shapes; it needs one"),
+        (shape('<box size="1 1 1"/>' * 2), "<geometry> has 2 shapes"),
+        (shape("<torus/>"), "<torus> is no known shape; choose from box"),
+        (shape('<box size="1 -1 1"/>'), "<box> has size -1; lengths must be above 0"),
+        (shape("<sphere/>"), "<sphere> has radius=''; it must be a finite number"),
+        (shape('<mesh filename=""/>'), "<mesh> needs the attribute filename"),
+        (shape('<mesh filename="a.stl" scale="1 0 1"/>'), "<mesh> has the scale 1 0 1"),
+        ('<robot xmlns:xacro="x">\n<xacro:include filename="a"/></robot>', "line 2: .* is of xacro; expand it first"),
+    ],
+)
+def test_what_cannot_be_used_is_refused_by_name(text, message):
+    with pytest.raises(RobotError, match=message):
+        urdf.parse(text)
+
+
+BOMB = """<?xml version="1.0"?>
+<!DOCTYPE robot [<!ENTITY a "{ha}"><!ENTITY b "{many_a}"><!ENTITY c "{many_b}">]>
+<robot name="&c;"><link name="a"/></robot>""".format(ha="ha" * 100, many_a="&a;" * 1000, many_b="&b;" * 1000)
+
+
+@pytest.mark.parametrize(
+    "text, message",
+    [
+        (BOMB, "URDF, line 2: has a document type"),
+        ('<!DOCTYPE robot SYSTEM "http://example.org/a.dtd"><robot/>', "has a document type"),
+        ('<!DOCTYPE r [<!ENTITY a SYSTEM "file:///etc/passwd">]><robot name="&a;"/>', "has a document type"),
+        ("<robot name='&a;'/>", "is no XML: undefined entity"),
+        ("<robot>" + "<a>" * 100, "is more than 50 elements deep"),
+        ("<robot>" + "<a/>" * (xml_tree.MOST_ELEMENTS + 1), "is one element too many"),
+        ("<robot>" + " " * xml_tree.MOST_CHARACTERS, "16000000 are allowed"),
+        ("<robot name='\ud800'/>", "is no text"),
+        ("<robot name='\0'/>", "is no XML"),
+        ("<robot a='1' a='2'/>", "is no XML: duplicate attribute"),
+    ],
+    ids=["bomb", "network", "file", "undefined", "deep", "many", "long", "surrogate", "zero", "twice"],
+)
+def test_hostile_xml_is_refused(text, message):
+    with pytest.raises(RobotError, match=message) as refused:
+        urdf.parse(text)
+    assert len(str(refused.value)) < 1000
+
+
+def test_the_encoding_that_a_text_declares_does_not_matter():
+    text = '<?xml version="1.0" encoding="iso-8859-1"?><robot name="ä"><link name="ö"/></robot>'
+    assert urdf.parse(text).root == "ö"
+    assert urdf.parse(text.replace("iso-8859-1", "utf-16")).name == "ä"
+
+
+def test_a_chain_of_thousands_of_links_is_no_recursion():
+    count = 5000
+    links = "".join(f'<link name="l{k}"/>' for k in range(count))
+    joints = (joint(kind="fixed", name=f"j{k}", parent=f"l{k - 1}", child=f"l{k}") for k in range(1, count))
+    assert len(urdf.parse(robot("".join(joints), links)).joints) == count - 1
