@@ -31,7 +31,7 @@ def test_seven_joints_turn_and_two_fingers_slide(robot):
 
 
 def test_yourdfpy_reads_it_and_agrees(robot):
-    yourdfpy = pytest.importorskip("yourdfpy", reason="yourdfpy comes with the extra interop")
+    yourdfpy = pytest.importorskip("yourdfpy", reason="yourdfpy comes with the extra urdf_peer")
     peer = yourdfpy.URDF.load(io.BytesIO(arm.description().encode()))
     assert peer.validate() and peer.actuated_joint_names == [*arm.JOINTS, arm.FINGER]
     positions = arm.joint_positions(2.7)

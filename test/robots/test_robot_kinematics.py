@@ -46,7 +46,7 @@ def test_poses_of_random_robots_are_those_of_matrices(seed):
 
 @pytest.mark.parametrize("seed", range(15))
 def test_poses_are_those_of_yourdfpy(seed):
-    yourdfpy = pytest.importorskip("yourdfpy", reason="yourdfpy comes with the extra interop")
+    yourdfpy = pytest.importorskip("yourdfpy", reason="yourdfpy comes with the extra urdf_peer")
     rng = np.random.default_rng(100 + seed)
     text, movable = random_urdf(rng, links=10)
     peer = yourdfpy.URDF.load(io.BytesIO(text.encode()), build_scene_graph=True, load_meshes=False)
