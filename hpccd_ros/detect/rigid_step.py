@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A step in which meshes move by poses: the core knows straight lines only. No ROS.
+"""A step in which meshes move by poses or joints: the core knows straight lines only. No ROS.
 
 rigid/__init__.py says how such a step is asked, and why nothing is missed. Pairs of meshes that both go straight are
 asked in a detector of their own, once for the whole step: cloth with itself need not pay for what a robot's turns cost.
@@ -19,6 +19,7 @@ from hpccd_ros.rigid import cuts
 from hpccd_ros.rigid.merged import earliest, merged
 from hpccd_ros.rigid.motion import Linear, Motion, ScrewMotion
 from hpccd_ros.rigid.screw import Screw
+from hpccd_ros.robots.placement import LinkMotions
 
 # Of detector.stats: what calls do not add up.
 OF_THE_SCENE = ("triangles", "bytes")
@@ -52,11 +53,14 @@ def motions(
 ) -> list[Motion]:
     """Of each mesh; ``parts``: its vertices at both ends. One whose shape was given anew in between goes straight."""
     found: list[Motion] = []
+    links = LinkMotions()
     for v0, v1, p0, p1 in zip(*parts, start.placements, end.placements, strict=True):
-        if p0 is not None and p1 is not None and p0.body is p1.body:
-            found.append(ScrewMotion(p1.body, Screw.between(p0.pose, p1.pose)))
-        else:
+        if p0 is None or p1 is None or p0.body is not p1.body:
             found.append(Linear(v0, v1))
+        elif (by_joints := links.between(p0, p1)) is not None:
+            found.append(by_joints)
+        else:
+            found.append(ScrewMotion(p1.body, Screw.between(p0.pose, p1.pose)))
     return found
 
 

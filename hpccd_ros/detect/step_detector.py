@@ -21,7 +21,7 @@ class Detection:
     ``backend``, ``threads``: what was used. ``detect_ms``: wall time of the core's call. ``gaps``: the smallest
     distance of each pair of meshes at the end, where the options ask for it; ``gaps_backend``: what found them, which
     may be another one; ``gaps_before``: those at the start, where they were asked for then. ``bounds``: of motions by
-    poses.
+    poses or joints.
     """
 
     start: SceneFrame

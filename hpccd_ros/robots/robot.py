@@ -5,13 +5,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hpccd_ros.frames.types import TF, MeshSettings, Placement, Topology
+from hpccd_ros.frames.types import TF, MeshSettings, Topology
 from hpccd_ros.rigid.body import Body
 from hpccd_ros.rigid.joints import LinkMotion
 from hpccd_ros.robots import pairs, srdf, urdf
 from hpccd_ros.robots.errors import RobotError
 from hpccd_ros.robots.geometry import LinkMeshes, Resolver, no_files
 from hpccd_ros.robots.kinematics import Kinematics, RobotState
+from hpccd_ros.robots.placement import LinkPlacement
 
 #: How far meshes of round shapes may stand out of them, in metres.
 TOLERANCE = 1e-3
@@ -87,9 +88,9 @@ class Robot:
             for mesh in self.meshes
         )
 
-    def placements(self, state: RobotState) -> tuple[Placement, ...]:
-        """Of each mesh."""
-        return tuple(Placement(mesh.body, state.poses[mesh.link]) for mesh in self.meshes)
+    def placements(self, state: RobotState) -> tuple[LinkPlacement, ...]:
+        """Of each mesh, for frames of the scene: steps between these go by the joints."""
+        return tuple(LinkPlacement.of(mesh.body, mesh.link, state) for mesh in self.meshes)
 
     def motions(self, start: RobotState, end: RobotState) -> tuple[LinkMotion, ...]:
         """Of each mesh, between two states of this robot (kinematics.py says which motion that is)."""

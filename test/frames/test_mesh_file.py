@@ -78,10 +78,10 @@ def test_bad_files(tmp_path, monkeypatch):
     far.write_text("v 0 0 0\nv 1 0 0\nv 0 1e151 0\nf 1 2 3\n")
     with pytest.raises(MeshFileError, match=r"far.obj: vertex 2 is .* must lie in"):
         load_mesh(str(far))
-    for suffix, why in ((".stl", "neither a binary STL"), (".obj", "save it as UTF-8|has no triangles")):
+    for suffix, why in ((".stl", "neither a binary STL"), (".obj", "save it as UTF-8")):
         garbage = tmp_path / f"garbage{suffix}"
         garbage.write_bytes(bytes(range(128, 256)) * 8)
-        with pytest.raises(MeshFileError, match=f"garbage{suffix}: (cannot be read: )?.*({why})"):
+        with pytest.raises(MeshFileError, match=f"garbage{suffix}: (cannot be read: )?.*({why}|has no triangles)"):
             load_mesh(str(garbage))
     good = write_obj(tmp_path / "good.obj")
     real = builtins.__import__

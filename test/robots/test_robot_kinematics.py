@@ -132,7 +132,7 @@ def test_a_continuous_joint_takes_its_followers_the_shorter_way():
 
 
 @pytest.mark.parametrize("turned", [0.0, 0.4, 3.0])
-@pytest.mark.parametrize("way", [0.0, 1e-120, 0.7])
+@pytest.mark.parametrize("way", [0.0, 1e-120, 5e-4, 0.7])
 def test_a_moving_base_goes_straight_and_turns_at_constant_speed(turned, way):
     rng = np.random.default_rng(7)
     text, movable = random_urdf(rng, links=7)

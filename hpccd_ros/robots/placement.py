@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Where a link is because of the values of its robot's joints: what lets a step go by joints instead of screws."""
+
+from dataclasses import dataclass, replace
+
+from hpccd_ros.frames.types import Placement
+from hpccd_ros.rigid.body import Body
+from hpccd_ros.rigid.joints import LinkMotion
+from hpccd_ros.rigid.transform import Rigid
+from hpccd_ros.robots.kinematics import RobotState, RobotStep
+
+
+@dataclass(frozen=True, eq=False)
+class LinkPlacement(Placement):
+    """``state``: of the whole robot, one object for all its links at a time; ``pose`` is that of ``link`` in it."""
+
+    link: str
+    state: RobotState
+
+    @classmethod
+    def of(cls, body: Body, link: str, state: RobotState) -> "LinkPlacement":
+        return cls(body, state.poses[link], link, state)
+
+    def moved(self, rigid: Rigid) -> "LinkPlacement":
+        return self.of(self.body, self.link, replace(self.state, base=rigid.after(self.state.base)))
+
+
+class LinkMotions:
+    """Of all links in one step: those of a robot share what is computed of its joints."""
+
+    def __init__(self) -> None:
+        self._steps: dict[tuple[int, int], RobotStep] = {}
+
+    def between(self, start: Placement, end: Placement) -> LinkMotion | None:
+        """None: they are no places of the same link of the same robot by its joints."""
+        if not isinstance(start, LinkPlacement) or not isinstance(end, LinkPlacement):
+            return None
+        before, after = start.state, end.state
+        if before.kinematics is not after.kinematics or start.link != end.link or start.body is not end.body:
+            return None
+        key = id(before), id(after)  # both live as long as their placements do
+        if key not in self._steps:
+            self._steps[key] = before.kinematics.step(before, after)
+        return self._steps[key].motion(end.link, end.body)
