@@ -15,6 +15,9 @@ from hpccd_ros.robots.errors import RobotError
 from hpccd_ros.robots.shapes import MeshFile, Placed
 from hpccd_ros.robots.urdf import DOCUMENT, Link
 
+#: Of one robot: a few words of a description may ask for millions, or for one file a thousand times.
+MOST_TRIANGLES = 10_000_000
+
 #: The path of a mesh on this machine, of its URI as written.
 Resolver = Callable[[str], str]
 
@@ -40,6 +43,7 @@ class LinkMeshes:
         self._resolver = resolver
         self._tolerance = tolerance
         self._files: dict[str, solids.Triangles] = {}
+        self._triangles = 0
 
     def of(self, link: Link) -> solids.Triangles | None:
         """(vertices (n,3) float64, faces (F,3) uint32) of all its shapes, one after the other; None: it has none.
@@ -52,6 +56,12 @@ class LinkMeshes:
                 corners, triangles = self._of_shape(part)
             except (RobotError, MeshFileError, UserError) as error:
                 raise RobotError(f"{DOCUMENT}, line {part.line}: link {quoted(link.name)}: {error}") from error
+            self._triangles += len(triangles)
+            if self._triangles > MOST_TRIANGLES:
+                raise RobotError(
+                    f"{DOCUMENT}, line {part.line}: link {quoted(link.name)}: more than {MOST_TRIANGLES} triangles up "
+                    "to here; use simpler shapes or a larger tolerance"
+                )
             placed = part.origin.apply(corners)
             if problem := unusable_coordinates(placed):
                 raise RobotError(f"{DOCUMENT}, line {part.line}: link {quoted(link.name)}: {problem[1]}")

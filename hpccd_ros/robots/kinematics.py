@@ -26,6 +26,9 @@ from hpccd_ros.rigid.transform import IDENTITY, Rigid
 from hpccd_ros.robots.errors import RobotError
 from hpccd_ros.robots.urdf import Description, RobotJoint
 
+# Radians or metres: of larger values a double tells less than a millionth, and a step would be wild.
+LARGEST_VALUE = 1e9
+
 
 @dataclass(frozen=True)
 class _Followed:
@@ -47,6 +50,7 @@ class Kinematics:
         self.links = (description.root, *(joint.child for joint in joints))
         self._numbers = {name: number for number, name in enumerate(self.links)}
         named = {joint.name: joint for joint in joints}
+        self._names = tuple(named)
         self.continuous = frozenset(joint.name for joint in joints if joint.kind == "continuous")
         self.inputs = tuple(joint.name for joint in joints if joint.kind != "fixed" and joint.mimic is None)
         self._followed = tuple(None if joint.kind == "fixed" else _followed(joint, named) for joint in joints)
@@ -70,9 +74,11 @@ class Kinematics:
         if missing := [name for name in self.inputs if name not in positions]:
             raise RobotError(f"positions: none for {listed(missing)}; each joint that moves and mimics none needs one")
         inputs = {name: float(positions[name]) for name in self.inputs}
-        if wrong := [name for name, value in inputs.items() if not math.isfinite(value)]:
-            raise RobotError(f"positions: not finite for {listed(wrong)}")
         values = [0.0] + [0.0 if f is None else f.factor * inputs[f.joint] + f.offset for f in self._followed]
+        if wrong := [
+            name for name, value in zip(self._names, values[1:], strict=True) if not abs(value) <= LARGEST_VALUE
+        ]:
+            raise RobotError(f"positions: not finite, or beyond {LARGEST_VALUE:g}, for {listed(wrong)}")
         return RobotState(self, inputs, np.array(values), base)
 
     def step(self, start: "RobotState", end: "RobotState") -> "RobotStep":

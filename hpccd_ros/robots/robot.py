@@ -5,6 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hpccd_ros.base.quoting import quoted
+from hpccd_ros.frames.coordinates import unusable_coordinates
 from hpccd_ros.frames.types import TF, MeshSettings, Topology
 from hpccd_ros.rigid.body import Body
 from hpccd_ros.rigid.joints import LinkMotion
@@ -89,8 +91,13 @@ class Robot:
         )
 
     def placements(self, state: RobotState) -> tuple[LinkPlacement, ...]:
-        """Of each mesh, for frames of the scene: steps between these go by the joints."""
-        return tuple(LinkPlacement.of(mesh.body, mesh.link, state) for mesh in self.meshes)
+        """Of each mesh, for frames of the scene: steps between these go by the joints. Raises RobotError: the core
+        cannot take where one is."""
+        placements = tuple(LinkPlacement.of(mesh.body, mesh.link, state) for mesh in self.meshes)
+        for mesh, placement in zip(self.meshes, placements, strict=True):
+            if problem := unusable_coordinates(placement.vertices):
+                raise RobotError(f"positions: with them, of {quoted(mesh.name)} {problem[1]}")
+        return placements
 
     def motions(self, start: RobotState, end: RobotState) -> tuple[LinkMotion, ...]:
         """Of each mesh, between two states of this robot (kinematics.py says which motion that is)."""

@@ -22,6 +22,7 @@ GEOMETRIES = ("collision", "visual")
 KINDS = ("revolute", "continuous", "prismatic", "fixed")
 LONGEST_NAME = 255
 DOCUMENT = "URDF"
+MOST_LINKS = 1000  # the detection looks at each pair of them in each step
 
 
 @dataclass(frozen=True)
@@ -76,6 +77,8 @@ def parse(text: str, geometry: str = "collision") -> Description:
     for child in robot.children:
         if child.tag.startswith("xacro:"):
             raise child.error("is of xacro; expand it first: xacro FILE > robot.urdf")
+    if (count := len(robot.all("link"))) > MOST_LINKS:
+        raise robot.error(f"has {count} links; {MOST_LINKS} are allowed")
     links: dict[str, Link] = {}
     for element in robot.all("link"):
         name = _name(element)

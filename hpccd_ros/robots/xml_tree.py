@@ -61,7 +61,7 @@ def parse(text: str, document: str, root: str) -> Element:
         raise RobotError(f"{document}: has {len(text)} characters; {MOST_CHARACTERS} are allowed")
     top = _Builder(document).built(text)
     if top.tag != root:
-        raise top.error(f"is the outermost element; a {document} begins with <{root}>")
+        raise top.error(f"is the outermost element; it must be <{root}>")
     return top
 
 

@@ -56,6 +56,13 @@ def test_placements_are_the_links_at_their_poses():
     assert rod.body is robot.meshes[0].body
 
 
+def test_places_that_the_core_cannot_take_are_refused():
+    robot = Robot.of(URDF.replace('xyz="0 0 1"/></joint></robot>', 'xyz="1e200 0 0"/></joint></robot>'))
+    state = robot.kinematics.state({"turn": 0.0, "slide": 0.0, "roll": 0.0})
+    with pytest.raises(RobotError, match="of 'swing/tip' vertex 0 is .* coordinates must lie in"):
+        robot.placements(state)
+
+
 def test_the_finer_the_tolerance_the_more_triangles():
     fine, coarse = (len(Robot.of(URDF, tolerance=tolerance).meshes[1].topology.faces) for tolerance in (1e-4, 1e-2))
     assert fine > 4 * coarse

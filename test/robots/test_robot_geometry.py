@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hpccd_ros.robots import urdf
+from hpccd_ros.robots import geometry, urdf
 from hpccd_ros.robots.errors import RobotError
 from hpccd_ros.robots.geometry import LinkMeshes, beside, no_files
 
@@ -84,6 +84,14 @@ def test_what_is_wrong_with_a_file_names_the_link(uri, resolver, message):
 def test_coordinates_that_the_core_refuses_name_the_link():
     with pytest.raises(RobotError, match="link 'a': vertex 0 is"):
         made(link(('<box size="1 1 1"/>', '<origin xyz="1e300 0 0"/>')))
+
+
+def test_the_triangles_of_a_robot_are_bounded(monkeypatch):
+    monkeypatch.setattr(geometry, "MOST_TRIANGLES", 20)
+    box = ('<box size="1 1 1"/>', "")
+    assert made(link(box))
+    with pytest.raises(RobotError, match="link 'a': more than 20 triangles up to here"):
+        made(link(box, box))
 
 
 def test_without_trimesh_the_extra_is_named(tmp_path, monkeypatch):

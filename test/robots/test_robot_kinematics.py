@@ -72,8 +72,12 @@ def test_missing_and_unusable_positions_are_named():
     kinematics = made(HINGE.format(kind="revolute"))
     with pytest.raises(RobotError, match="positions: none for first"):
         kinematics.state({"second": 1.0})
-    with pytest.raises(RobotError, match="not finite for first"):
+    with pytest.raises(RobotError, match="not finite, or beyond 1e.09, for first, second"):
         kinematics.state({"first": math.nan})
+    with pytest.raises(RobotError, match="for first, second"):
+        kinematics.state({"first": -1.1e9})
+    with pytest.raises(RobotError, match="for second"):  # which is at three times that
+        kinematics.state({"first": 0.9e9})
     assert kinematics.state({"first": 1.0, "of another robot": math.nan}).inputs == {"first": 1.0}
 
 

@@ -100,5 +100,5 @@ def test_unknown_links_are_refused(inside, message):
 def test_hostile_xml_is_refused_here_too():
     with pytest.raises(RobotError, match="SRDF, line 1: has a document type"):
         srdf.parse("<!DOCTYPE r []><robot/>", "ab")
-    with pytest.raises(RobotError, match="a SRDF begins with <robot>"):
+    with pytest.raises(RobotError, match="<srdf> is the outermost element"):
         srdf.parse("<srdf/>", "ab")

@@ -91,7 +91,7 @@ def test_what_others_put_beside_links_is_left_alone():
         ("", "URDF: is no XML"),
         ("<robot>", "URDF: is no XML"),
         ("robot_description", "URDF: is no XML"),
-        ("<sdf/>", "line 1: <sdf> is the outermost element; a URDF begins with <robot>"),
+        ("<sdf/>", "line 1: <sdf> is the outermost element; it must be <robot>"),
         ("<robot/>", "<robot> has no <link>"),
         (robot("", "<link/>"), "<link> needs the attribute name"),
         (robot("", '<link name="a:b"/>'), r"<link name='a:b'> has a name that cannot be used"),
@@ -169,8 +169,10 @@ def test_the_encoding_that_a_text_declares_does_not_matter():
     assert urdf.parse(text.replace("iso-8859-1", "utf-16")).name == "ä"
 
 
-def test_a_chain_of_thousands_of_links_is_no_recursion():
-    count = 5000
+def test_a_long_chain_of_links_is_no_recursion():
+    count = urdf.MOST_LINKS
     links = "".join(f'<link name="l{k}"/>' for k in range(count))
     joints = (joint(kind="fixed", name=f"j{k}", parent=f"l{k - 1}", child=f"l{k}") for k in range(1, count))
     assert len(urdf.parse(robot("".join(joints), links)).joints) == count - 1
+    with pytest.raises(RobotError, match="has 1001 links; 1000 are allowed"):
+        urdf.parse(robot("", links + '<link name="more"/>'))
