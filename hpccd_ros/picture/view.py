@@ -92,7 +92,7 @@ def _draw_one(args, steps, target, title, view):
             chosen = step
     if chosen is None:
         there = _what_is_there(history, args)
-        raise UserError(f"{args.file}: no step{'' if args.step is None else f' {args.step}'} to show: {there}")
+        raise UserError(f"{args.file}: no step {'to show' if args.step is None else args.step}: {there}")
     try:
         draw_step(chosen, target, history, title=title, **view)
     except (OSError, ValueError) as error:  # ValueError: a suffix that matplotlib cannot write
