@@ -3,9 +3,9 @@
 
 import numpy as np
 import pytest
+from pipelines import reasons, retried
 
 from hpccd_ros.frames.drops import Input, Reason
-from hpccd_ros.frames.outcome import Outcome
 from hpccd_ros.frames.pipeline import FramePipeline
 from hpccd_ros.frames.types import AssemblyRules, MeshFrame, MeshSettings, Topology
 from hpccd_ros.rigid.transform import Rigid
@@ -32,14 +32,6 @@ def pipeline_of(*meshes, **options):
     return made
 
 
-def retried(pipeline):
-    """All that comes of it, in one."""
-    outcome = Outcome()
-    for part in pipeline.retry():
-        outcome += part
-    return outcome
-
-
 def enqueued(pipeline, outcome):
     for each in outcome.frames:
         outcome.refusals += pipeline.enqueue(each)
@@ -48,10 +40,6 @@ def enqueued(pipeline, outcome):
 
 def stamps(frames):
     return [frame.stamp for frame in frames]
-
-
-def reasons(outcome):
-    return [(refusal.mesh, str(refusal.reason)) for refusal in outcome.refusals]
 
 
 def test_a_message_of_the_only_mesh_is_a_frame():

@@ -3,6 +3,7 @@
 
 import numpy as np
 import pytest
+from pipelines import reasons, retried
 
 from hpccd_ros.frames.outcome import Outcome
 from hpccd_ros.frames.pipeline import FramePipeline
@@ -39,17 +40,6 @@ def pipeline_of(*meshes, shapes=True, **rules):
         if shapes and mesh.rigid:
             assert made.push(mesh.name, shape()).static_taken == 1
     return made
-
-
-def retried(pipeline):
-    outcome = Outcome()
-    for part in pipeline.retry():
-        outcome += part
-    return outcome
-
-
-def reasons(outcome):
-    return [(refusal.mesh, str(refusal.reason)) for refusal in outcome.refusals]
 
 
 def test_a_pose_makes_a_frame():
