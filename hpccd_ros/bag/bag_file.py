@@ -59,8 +59,7 @@ class BagFile:
             # First, so that even a file cut off later can be replayed.
             self._writer.add_metadata(HPCCD_RECORD, {"json": json.dumps(info, sort_keys=True)})
             for name, data in attachments:
-                now = time.time_ns()
-                self._writer.add_attachment(now, now, name, "application/octet-stream", data)
+                self.attach(name, data)
         except OSError:
             self.abandon()
             raise
@@ -73,6 +72,10 @@ class BagFile:
     def size(self) -> int:
         """Bytes handed to the system."""
         return self._stream.size
+
+    def attach(self, name: str, data: bytes) -> None:
+        now = time.time_ns()
+        self._writer.add_attachment(now, now, name, "application/octet-stream", data)
 
     def register(self, topic: Topic) -> None:
         """Describe a topic, before its first message."""

@@ -32,6 +32,7 @@ class Reason(StrEnum):
     WRONG_COUNT = "wrong_vertex_count"
     FRAME_ID = "frame_id"
     NO_TRANSFORM = "no_transform"  # mesh.NAME.transform asks for one that did not come
+    NO_JOINT_STATE = "no_joint_state"  # where the joints of a robot were then is not known
     RATE = "rate"  # came faster than max_rate
     BACKWARD = "stamp_backward"
     REPEATED = "stamp_repeated"
@@ -51,6 +52,7 @@ class Input(StrEnum):
     VERTICES = "vertex messages"
     TOPOLOGY = "topologies"
     TRANSFORM = "transforms"
+    JOINT_STATE = "joint states"
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,32 +6,37 @@ from collections.abc import Sequence
 
 from hpccd_ros.frames.assembler import FrameAssembler
 from hpccd_ros.frames.drops import Reason, Refusal
+from hpccd_ros.frames.follower import Follower
 from hpccd_ros.frames.frame_queue import FrameQueue
 from hpccd_ros.frames.outcome import Outcome
 from hpccd_ros.frames.rigid_mesh import RigidMesh
 from hpccd_ros.frames.transform_buffer import RESTART_NS, NoTransformError, TransformBuffer
 from hpccd_ros.frames.transformer import MeshTransformer, Transformed
-from hpccd_ros.frames.types import TF, AssemblyRules, MeshFrame, MeshSettings, PoseFrame, SceneFrame, Topology
+from hpccd_ros.frames.types import JOINTS, TF, AssemblyRules, MeshFrame, MeshSettings, PoseFrame, SceneFrame, Topology
 from hpccd_ros.rigid.transform import IDENTITY
 
 
 class FramePipeline:
     """The node and a replay push the messages of the ``meshes`` in; frames of the scene and refusals come out.
 
-    transforms: to be filled from outside, then `retry`.
+    followers: of those meshes whose ``input`` is JOINTS, each of exactly one. transforms: to be filled from outside, as
+    what the followers look at, then `retry`.
     """
 
-    def __init__(self, meshes: Sequence[MeshSettings], rules: AssemblyRules) -> None:
+    def __init__(
+        self, meshes: Sequence[MeshSettings], rules: AssemblyRules, followers: Sequence[Follower] = ()
+    ) -> None:
         self._meshes = tuple(meshes)
         self._rules = rules
+        self._followers = tuple(followers)
         self._queue: FrameQueue | None = None
         self._rigid = {mesh.name: RigidMesh(mesh) for mesh in self._meshes if mesh.rigid}
         self._by_transforms = [mesh for mesh in self._meshes if mesh.input == TF]
-        others = (mesh.name for mesh in self._meshes if not mesh.static and mesh.input != TF)
-        # Whose stamps are those of the scene's frames; None: none moves but by transforms.
+        others = (mesh.name for mesh in self._meshes if not mesh.static and mesh.input not in (TF, JOINTS))
+        # Whose stamps are those of the scene's frames; None: frames of all that moves are asked for.
         self._leader = next(others, None)
-        following = [mesh.name for mesh in self._by_transforms] if self._leader is not None else []
-        self._assembler = FrameAssembler(self._meshes, rules, following)
+        asked = [mesh.name for mesh in self._meshes if mesh.input in (TF, JOINTS)]
+        self._assembler = FrameAssembler(self._meshes, rules, asked if self._leader is not None else [])
         self._forget_transforms()
 
     def load(self, mesh: str, topology: Topology, positions: MeshFrame | None) -> Outcome:
@@ -57,12 +62,12 @@ class FramePipeline:
     def retry(self) -> list[Outcome]:
         """Frames go on that waited for transforms which have come, each with an outcome of its own: a single transform
         may let many go on."""
-        asked = [self._follow_transforms()] if self._leader is None else []
-        return asked + [
-            outcome
-            for mesh, transformer in self._transformers.items()
-            for outcome in self._assemble(mesh, transformer.retry())
-        ]
+        found = [self._ask_of_latest()] if self._leader is None else []
+        for mesh, transformer in self._transformers.items():
+            found += self._assemble(mesh, transformer.retry())
+        for follower in self._followers:
+            found += self._assemble_followed(follower)
+        return found
 
     def enqueue(self, frame: SceneFrame) -> list[Refusal]:
         """Into the queue with a frame that came up; those that had to give way are refused."""
@@ -78,6 +83,9 @@ class FramePipeline:
         outcome = Outcome()
         for transformer in self._transformers.values():
             outcome.refusals += transformer.clear(Reason.STOPPED)
+        for follower in self._followers:
+            outcome.refusals += follower.clear(Reason.STOPPED)
+            follower.forget()
         outcome.refusals += self._assembler.clear(Reason.STOPPED)
         for frame in self._queue.close() if self._queue is not None else ():
             outcome.refusals += frame.refused(Reason.STOPPED)
@@ -89,7 +97,7 @@ class FramePipeline:
     def waiting(self) -> int:
         """Messages pushed whose frame has neither come up nor been refused, and those in the queue."""
         queued = self._queue.frames() if self._queue is not None else ()
-        before = self._assembler.waiting + sum(t.waiting for t in self._transformers.values())
+        before = self._assembler.waiting + sum(w.waiting for w in (*self._transformers.values(), *self._followers))
         return before + sum(len(frame.fresh) for frame in queued)
 
     @property
@@ -109,8 +117,8 @@ class FramePipeline:
         return self._transformers[mesh].warnings()
 
     def warnings(self) -> list[str]:
-        """Positions of static meshes that are not used."""
-        return self._assembler.warnings()
+        """Positions of static meshes that are not used, and what followers wait for."""
+        return self._assembler.warnings() + [line for follower in self._followers for line in follower.warnings()]
 
     def _place(self, mesh: str, message: MeshFrame | PoseFrame, new_publisher: bool = False) -> Outcome:
         placed = self._rigid[mesh].place(message) if isinstance(message, PoseFrame) else message
@@ -122,43 +130,64 @@ class FramePipeline:
         return outcome
 
     def _led(self, outcome: Outcome) -> Outcome:
-        """With all that comes of accepted frames of the leader: meshes that transforms move have theirs then, too."""
+        """With all that comes of accepted frames of the leader: meshes whose frames are asked for have theirs then."""
         if outcome.restarts:  # before anything is asked of the new run
             for mesh in self._by_transforms:
                 outcome.refusals += self._transformers[mesh.name].clear(Reason.RESTART)
+            for follower in self._followers:
+                outcome.refusals += follower.clear(Reason.RESTART)
             for _, stamp, _ in outcome.joined[-1:]:
                 self.transforms.forget_future(stamp)
+                for follower in self._followers:
+                    follower.forget_future(stamp)
         joined, outcome.joined = outcome.joined, []
         for name, stamp, received in joined:
             if name == self._leader:
-                outcome += self._ask_of_transforms(stamp, received)
+                outcome += self._ask(stamp, received)
         return outcome
 
-    def _ask_of_transforms(self, stamp: int, received: float, new_publisher: bool = False) -> Outcome:
-        """A frame of each mesh that transforms move."""
+    def _ask(self, stamp: int, received: float, new_publisher: bool = False) -> Outcome:
+        """A frame of each mesh that transforms or joints move."""
         outcome = Outcome()
         for mesh in self._by_transforms:
             outcome.asked.append(mesh.name)
             outcome += self._place(mesh.name, PoseFrame(stamp, IDENTITY, mesh.frame, received), new_publisher)
+        for follower in self._followers:
+            outcome.asked += follower.names
+            follower.ask(stamp, received, new_publisher)
+            for part in self._assemble_followed(follower):
+                outcome += part
         return outcome
 
-    def _follow_transforms(self) -> Outcome:
-        """Where nothing else moves: a frame for each time that all of their transforms have reached."""
+    def _ask_of_latest(self) -> Outcome:
+        """Where nothing else moves: a frame for each time that all that moves them has reached."""
         try:
             reached = [self.transforms.latest(mesh.frame, self._rules.frame_id) for mesh in self._by_transforms]
+            reached += [stamp for follower in self._followers for stamp in follower.latest(self.transforms)]
         except NoTransformError:
             return Outcome()
         stamp, last = min((stamp for stamp in reached if stamp is not None), default=None), self._followed
         if stamp is None or (last is not None and last - RESTART_NS <= stamp <= last):
             return Outcome()
         self._followed = stamp
-        return self._ask_of_transforms(stamp, time.monotonic(), new_publisher=last is not None and stamp < last)
+        return self._ask(stamp, time.monotonic(), new_publisher=last is not None and stamp < last)
 
     def _assemble(self, mesh: str, transformed: Transformed) -> list[Outcome]:
         outcomes = [Outcome(refusals=transformed.refusals)]
         outcomes += [
             self._led(self._assembler.add(mesh, frame, new_publisher)) for frame, new_publisher in transformed.frames
         ]
+        return outcomes
+
+    def _assemble_followed(self, follower: Follower) -> list[Outcome]:
+        """One outcome for each time at which the follower knows its frames now."""
+        refusals, times = follower.retry(self.transforms)
+        outcomes = [Outcome(refusals=refusals)]
+        for frames in times:
+            outcome = Outcome()
+            for mesh, frame, new_publisher in frames:
+                outcome += self._led(self._assembler.add(mesh, frame, new_publisher))
+            outcomes.append(outcome)
         return outcomes
 
     def _forget_transforms(self) -> None:

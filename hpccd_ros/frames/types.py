@@ -11,8 +11,8 @@ from hpccd_ros.frames.drops import Reason, Refusal
 from hpccd_ros.rigid.body import Body
 from hpccd_ros.rigid.transform import Rigid
 
-# Values of parameter mesh.NAME.input for meshes that move by poses.
-POSE, TF = "pose", "tf"
+# Values of parameter mesh.NAME.input for meshes that move by poses; JOINTS: by the joints of their robot.
+POSE, TF, JOINTS = "pose", "tf", "joints"
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class MeshSettings:
     @property
     def rigid(self) -> bool:
         """It keeps its shape and moves by poses."""
-        return self.input in (POSE, TF)
+        return self.input in (POSE, TF, JOINTS)
 
 
 @dataclass(frozen=True)

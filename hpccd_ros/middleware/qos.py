@@ -37,6 +37,9 @@ DIAGNOSTICS = keep_last(10)
 TRANSFORMS = keep_last(100)
 TRANSFORMS_STATIC = keep_last(100, latched=True)
 
+# As robot_state_publisher offers it.
+DESCRIPTION = keep_last(1, latched=True)
+
 # A viewer wants the newest only.
 MARKERS = keep_last(1)
 
@@ -64,6 +67,11 @@ def stop(timeout: float, depth: int = 1) -> QoSProfile:
 def vertices(reliability: str, depth: int) -> QoSProfile:
     """Subscription to vertices. reliability: "reliable" or "best_effort"."""
     return keep_last(depth, reliable=reliability == "reliable")
+
+
+def joint_states(reliability: str) -> QoSProfile:
+    """Subscription to joint states, which come more often than frames. reliability: "reliable" or "best_effort"."""
+    return keep_last(100, reliable=reliability == "reliable")
 
 
 def requests(depth: int) -> QoSProfile:

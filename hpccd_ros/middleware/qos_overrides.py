@@ -64,10 +64,10 @@ def unusable_override(node: Node) -> str | None:
     return None
 
 
-def known(node: Node, meshes: Iterable[str]) -> set[str]:
-    """The names of all overrides that have an effect here."""
+def known(node: Node, subscribed: Iterable[str]) -> set[str]:
+    """The names of all overrides that have an effect here. subscribed: names of all topics that may be."""
     topics = [("publisher", topic) for topic in topic_names.PUBLISHED]
-    topics += [("subscription", topic) for topic in topic_names.subscribed(meshes)]
+    topics += [("subscription", topic) for topic in subscribed]
     return {_name(entity, node.resolve_topic_name(topic), policy) for entity, topic in topics for policy in _POLICIES}
 
 

@@ -75,22 +75,23 @@ def points(mesh: str) -> str:
     return of_mesh(mesh, POINTS)
 
 
-def subscribed(meshes: Iterable[str]) -> list[str]:
-    """All that the node may subscribe to."""
+def subscribed(meshes: Iterable[str], of_robots: Iterable[str] = ()) -> list[str]:
+    """All that the node may subscribe to. of_robots: topics of descriptions and joint states."""
     of_meshes = [of_mesh(mesh, kind) for mesh in meshes for kind in (TOPOLOGY, *POSITIONS)]
-    return [*of_meshes, TRANSFORMS, TRANSFORMS_STATIC, TF, TF_STATIC]
+    return [*of_meshes, TRANSFORMS, TRANSFORMS_STATIC, TF, TF_STATIC, *of_robots]
 
 
-def unusable_name(node: Node, meshes: Iterable[str]) -> str | None:
+def unusable_name(node: Node, subscribed: Iterable[str]) -> str | None:
     """Why a topic or service of the node cannot exist under its name here (namespace, remapping), or None."""
     for resolve, names in (
-        (node.resolve_topic_name, (*PUBLISHED, *subscribed(meshes))),
+        (node.resolve_topic_name, (*PUBLISHED, *subscribed)),
         (node.resolve_service_name, SERVICES),
     ):
         for name in names:
             try:
                 resolve(name)
-            except RuntimeError as error:  # rclpy's; the names themselves are sound: what is left is their length
+            # rclpy's. Names of meshes are sound: what is left is their length. Topics of robots may be called anything.
+            except RuntimeError as error:
                 return (
                     f"{shortened(name)}: in namespace {shortened(node.get_namespace())} and with the remappings given, "
                     f"this name cannot be used ({_reason(error)}); give a shorter mesh name, namespace or remapping"

@@ -10,14 +10,17 @@ from hpccd_ros.base.quoting import listed, shortened
 from hpccd_ros.detect.core import unusable_options
 from hpccd_ros.middleware import environment, qos_overrides, topic_names
 from hpccd_ros.node.node_recording import unrecordable
-from hpccd_ros.params import parameters, scene_parameters
+from hpccd_ros.params import parameters, robot_parameters, scene_parameters
+from hpccd_ros.params.robot_parameters import NO_ROBOTS, Robots
+from hpccd_ros.params.table import ROBOT
 from hpccd_ros.params.values import ParameterError
 
 Meshes = dict[str, dict[str, Any]]
 
 
 class Configuration:
-    """``settings``, ``meshes`` (name -> parameters mesh.NAME.*) and the detector's ``options`` as they are now.
+    """``settings``, ``meshes`` (name -> parameters mesh.NAME.*) and the detector's ``options`` as they are now;
+    ``robots``: those whose description is known.
 
     Raises ParameterError for parameters that the node cannot start with.
     """
@@ -26,11 +29,13 @@ class Configuration:
         self._node = node
         self.settings, self.meshes = parameters.declare(node)
         scene_parameters.check(self.settings, self.meshes)
-        if why := topic_names.unusable_name(node, self.meshes) or qos_overrides.unusable_override(node):
+        topics = topic_names.subscribed(self.meshes, robot_parameters.subscribed(self.settings[ROBOT]))
+        if why := topic_names.unusable_name(node, topics) or qos_overrides.unusable_override(node):
             raise ParameterError(why)
-        for name in parameters.unknown_overrides(node, qos_overrides.known(node, self.meshes)):
+        for name in parameters.unknown_overrides(node, qos_overrides.known(node, topics)):
             text = f"parameter {shortened(name)} is unknown and has no effect; see docs/parameters.md"
             node.get_logger().warning(text)
+        self.robots: Robots = NO_ROBOTS
         self.options = scene_parameters.detector_options(self.settings)
         if why := unusable_options(self.options) or unrecordable(self.settings):
             raise ParameterError(why)
@@ -47,19 +52,25 @@ class Configuration:
             return self._check(wanted, meshes)
 
         def changed() -> None:
-            self.options = scene_parameters.detector_options(self.settings)
+            self.options = scene_parameters.detector_options(self.settings, self.robots)
             on_change()
 
         parameters.watch(
             self._node, self.settings, self.meshes, configured=configured, check=check, on_change=changed
         )
 
+    def know(self, robots: Robots) -> None:
+        """From now on these are known. Raises ParameterError: a pair names a link that there is not."""
+        self.options = scene_parameters.detector_options(self.settings, robots)
+        self.robots = robots
+
     def summary(self, contacts: str) -> str:
         """For the log, in one line. contacts: name of the topic."""
-        options = self.options
+        options, robots = self.options, self.settings["robots"]
         where = f"on this host only ({environment.DISCOVERY}=SUBNET opens it)"
+        meshes = listed(self.meshes) or ("none" if robots else "none (service only)")
         return (
-            f"meshes {listed(self.meshes) or 'none (service only)'}; "
+            f"meshes {meshes}; {f'robots {listed(robots)}; ' if robots else ''}"
             f"tests {listed(options.features)}; accuracy {options.accuracy}, backend {options.backend}, "
             f"contacts on {contacts}; "
             f"discovery {where if environment.this_host_only() else 'beyond this host'}"
@@ -67,10 +78,10 @@ class Configuration:
 
     def _check(self, wanted: dict[str, Any], meshes: Meshes) -> str | None:
         try:
-            scene_parameters.check(wanted, meshes)
+            scene_parameters.check(wanted, meshes, self.robots)
+            options = scene_parameters.detector_options(wanted, self.robots)
         except ParameterError as error:
             return str(error)
         if why := unrecordable(wanted):
             return why
-        options = scene_parameters.detector_options(wanted)
         return None if options == self.options else unusable_options(options)

@@ -31,9 +31,9 @@ from hpccd_ros.node.markers import contact_markers, surface_cloud
 class ContactsPublisher:
     """Of a configured ``node``, until that is unconfigured."""
 
-    def __init__(self, node: GuardedLifecycleNode, settings: dict[str, Any], builder: SceneBuilder) -> None:
+    def __init__(self, node: GuardedLifecycleNode, settings: dict[str, Any]) -> None:
         self._settings = settings
-        self._tested_pairs = builder.tested_pairs()
+        self._tested_pairs: list[tuple[str, str]] = []
         profile = qos.contacts(settings["contacts_durability"])
         self._contacts = node.configured_publisher(ContactArray, topic_names.CONTACTS, profile)
         self._distances = node.configured_publisher(DistanceArray, topic_names.DISTANCES, qos.DISTANCES)
@@ -45,6 +45,10 @@ class ContactsPublisher:
     @property
     def topic(self) -> str:
         return self._contacts.topic_name
+
+    def begin(self, builder: SceneBuilder) -> None:
+        """Of this scene are the steps to come."""
+        self._tested_pairs = builder.tested_pairs()
 
     def publish(self, found: Detection, dropped_frames: int) -> ContactArray:
         """The message that was sent. dropped_frames: of the scene, so far."""

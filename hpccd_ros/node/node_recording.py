@@ -19,8 +19,8 @@ from hpccd_ros.bag import writer
 from hpccd_ros.bag.writer import BagWriter
 from hpccd_ros.middleware.guard import Errors, GuardedExecutor
 from hpccd_ros.params import node_parameters
-from hpccd_ros.record import recorded_topics
-from hpccd_ros.record.mesh_attachment import mesh_files
+from hpccd_ros.record import attachments, recorded_topics
+from hpccd_ros.record.described_robots import DescribedRobots
 from hpccd_ros.record.recording_info import recording_info
 from hpccd_ros.record.topic_recorder import Recorder
 
@@ -122,7 +122,7 @@ class _Running:
 
     def __init__(self, node: Node, settings: dict[str, Any], errors: Errors) -> None:
         parameters = node_parameters.of(node)
-        files, missing = mesh_files(parameters)
+        files, missing = attachments.files(parameters)
         for text in missing:
             node.get_logger().warning(text)
         wanted = recorded_topics.of_node(parameters)
@@ -148,6 +148,7 @@ class _Running:
             # As the node itself asks: whatever reaches it reaches the recording.
             functools.partial(recorded_topics.as_node_asks, recorded=node, vertices=reliability),
         )  # fmt: skip
+        DescribedRobots(self._node, self.bag, parameters, node.resolve_topic_name, node.get_logger().warning)
         self._errors = errors
         self._executor = GuardedExecutor(errors, context=node.context)
         self._executor.add_node(self._node)

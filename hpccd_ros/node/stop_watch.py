@@ -35,21 +35,19 @@ class StopWatch:
         self,
         node: GuardedLifecycleNode,
         configuration: Configuration,
-        builder: SceneBuilder,
         busy: Callable[[], bool],
     ) -> None:
         settings = configuration.settings
         self._node = node
         self._configuration = configuration
-        self._builder = builder
         self._state = StopState(settings["stop_distance"], settings["stop_timeout"], busy)
         self._nearness: Nearness | None = None
         self._nearness_ms = 0.0
         self._signal = StopSignal(node, self._state, settings["stop_timeout"])
 
-    def begin(self) -> None:
+    def begin(self, builder: SceneBuilder) -> None:
         settings = self._configuration.settings
-        self._nearness = Nearness(self._builder, self._configuration.options, settings["stop_distance"])
+        self._nearness = Nearness(builder, self._configuration.options, settings["stop_distance"])
         self._state.begin()
 
     def end(self) -> None:

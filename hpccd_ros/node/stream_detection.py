@@ -16,11 +16,11 @@ from hpccd_ros.node.configuration import Configuration
 from hpccd_ros.node.life_cycle import GuardedLifecycleNode
 from hpccd_ros.node.stop_watch import StopWatch
 from hpccd_ros.node.subscriptions import Subscriptions
-from hpccd_ros.params import scene_parameters
+from hpccd_ros.params import robot_parameters, scene_parameters
 
 
 class StreamDetection:
-    """Made when a node with meshes is configured; works between ``open`` and ``close``.
+    """Made when a node with meshes is configured and its robots are known; works between ``open`` and ``close``.
 
     Raises MeshFileError, and ValueError for a scene that cannot move.
     """
@@ -33,15 +33,17 @@ class StreamDetection:
         self._configuration = configuration
         self._builder = builder
         self._accounts = accounts
-        self._pipeline = scene_parameters.frame_pipeline(settings, meshes, settings["pending_frames"])
+        robots, most_waiting = configuration.robots, settings["pending_frames"]
+        by_joints = robot_parameters.followers(settings, robots, most_waiting)
+        self._pipeline = scene_parameters.frame_pipeline(settings, meshes, most_waiting, robots, by_joints.values())
         accounts.add(mesh_files.load(self._pipeline, meshes))
-        self._subscriptions = Subscriptions(node, settings, meshes)
+        self._subscriptions = Subscriptions(node, settings, meshes, by_joints)
         self._thread: DetectionThread | None = None
 
     def open(self, on_detection: Callable[[Detection], None], stop: StopWatch | None = None) -> None:
         """Start the detection thread, which calls ``on_detection``, and has ``stop`` look at each step; subscribe."""
         if stop is not None:
-            stop.begin()
+            stop.begin(self._builder)
             self._accounts.on_refused = stop.refused
         thread = DetectionThread(
             StepDetector(self._builder, self._configuration.options),
@@ -93,7 +95,12 @@ class StreamDetection:
 
     def warnings(self) -> list[str]:
         """What is odd about the publishers."""
-        return self._subscriptions.warnings() + self._pipeline.warnings()
+        of_links = [
+            f"{lines[0]}{f'; {len(lines) - 1} more links wait' if len(lines) > 1 else ''}"
+            for robot in self._configuration.robots.values()
+            if (lines := [line for mesh in robot.meshes for line in self._pipeline.awaited_transform(mesh.name)])
+        ]
+        return self._subscriptions.warnings() + of_links + self._pipeline.warnings()
 
     def _first(self, frame: SceneFrame, stop: StopWatch | None) -> None:
         """Called by the detection thread."""

@@ -1,44 +1,60 @@
 # SPDX-License-Identifier: Apache-2.0
 """All topics that the node listens to while it is active."""
 
+from collections.abc import Mapping
 from typing import Any
 
 from rclpy.node import Node
 
 from hpccd_ros.frames.pipeline import FramePipeline
 from hpccd_ros.node.accounts import Accounts
+from hpccd_ros.node.joint_subscriptions import JointSubscriptions
 from hpccd_ros.node.mesh_subscriptions import MeshSubscriptions
 from hpccd_ros.node.mesh_topic import Reception
 from hpccd_ros.node.transform_subscriptions import TransformSubscriptions
+from hpccd_ros.params import robot_parameters
+from hpccd_ros.params.table import ROBOT
+from hpccd_ros.robots.joint_frames import JointFrames
 
 
 class Subscriptions:
     """Nothing is subscribed before ``open``; ``close`` ends what is, should ``open`` have failed half-way too.
 
-    meshes: mesh name -> parameters mesh.NAME.*.
+    meshes: mesh name -> parameters mesh.NAME.*. by_joints: robot -> what its joint states move.
     """
 
-    def __init__(self, node: Node, settings: dict[str, Any], meshes: dict[str, dict[str, Any]]) -> None:
+    def __init__(
+        self,
+        node: Node,
+        settings: dict[str, Any],
+        meshes: dict[str, dict[str, Any]],
+        by_joints: Mapping[str, JointFrames],
+    ) -> None:
         self._node = node
         self._settings = settings
         self._meshes = meshes
+        self._by_joints = by_joints
         self._of_meshes: list[MeshSubscriptions] = []
-        self._of_transforms: list[TransformSubscriptions] = []
+        self._of_others: list[TransformSubscriptions | JointSubscriptions] = []
 
     def open(self, pipeline: FramePipeline, accounts: Accounts) -> None:
-        if any("tf" in (mesh["transform"], mesh["input"]) for mesh in self._meshes.values()):
+        of_robots = robot_parameters.need_transforms(self._settings[ROBOT])
+        if of_robots or any("tf" in (mesh["transform"], mesh["input"]) for mesh in self._meshes.values()):
             transforms = TransformSubscriptions(self._node, pipeline, accounts, self._settings["max_rate"])
-            self._of_transforms.append(transforms)
+            self._of_others.append(transforms)
+        if self._by_joints:
+            joints = JointSubscriptions(self._node, self._settings, pipeline, self._by_joints, accounts)
+            self._of_others.append(joints)
         for name, mesh in self._meshes.items():
             reception = Reception(self._node, name, self._settings, pipeline, accounts)
             self._of_meshes.append(MeshSubscriptions(reception, mesh["input"]))
 
     def close(self) -> None:
-        for subscriptions in (*self._of_meshes, *self._of_transforms):
+        for subscriptions in (*self._of_meshes, *self._of_others):
             subscriptions.close()
         self._of_meshes.clear()
-        self._of_transforms.clear()
+        self._of_others.clear()
 
     def warnings(self) -> list[str]:
         """What is odd about the publishers."""
-        return [line for mesh in self._of_meshes for line in mesh.warnings()]
+        return [line for part in (*self._of_meshes, *self._of_others) for line in part.warnings()]

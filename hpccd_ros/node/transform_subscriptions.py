@@ -32,6 +32,10 @@ class TransformSubscriptions:
             self._node.destroy_subscription(subscription)
         self._subscriptions.clear()
 
+    def warnings(self) -> list[str]:
+        """None: frames that wait for transforms say so themselves."""
+        return []
+
     def _subscribe(self, topic: TransformTopic):
         limit = RateLimit(self._max_rate)
 

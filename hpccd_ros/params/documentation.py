@@ -5,7 +5,7 @@
 """
 
 from hpccd_ros.middleware.qos_overrides import DEEPEST
-from hpccd_ros.params.table import ALWAYS, MESH_ROWS, NEVER, NODE_GROUPS, PAIR_ROWS, UNCONFIGURED, Row
+from hpccd_ros.params.table import ALWAYS, MESH_ROWS, NEVER, NODE_GROUPS, PAIR_ROWS, ROBOT_ROWS, UNCONFIGURED, Row
 from hpccd_ros.params.values import allowed
 
 _HEAD = """\
@@ -57,6 +57,7 @@ def page() -> str:
     """The whole page in Markdown."""
     groups = [(heading, "", rows) for heading, rows in NODE_GROUPS.items()]
     groups.append(("Of each mesh NAME in `meshes`", "mesh.NAME.", MESH_ROWS))
+    groups.append(("Of each robot NAME in `robots`", "robot.NAME.", ROBOT_ROWS))
     groups.append(("Of pairs of meshes, each with a NAME of your choice", "pairs.NAME.", PAIR_ROWS))
     return "\n".join([_HEAD, *(_group(*group) for group in groups), _QUALITY_OF_SERVICE.format(deepest=DEEPEST)])
 

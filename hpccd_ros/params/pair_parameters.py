@@ -1,8 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the parameters say of pairs of meshes: as lists of NAME:NAME:VALUE, and as pairs.NAME.*, side by side."""
+"""What the parameters say of pairs of meshes: as lists of NAME:NAME:VALUE, and as pairs.NAME.*, side by side.
 
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+The name of a robot stands for all of its links, the same one twice for any two of them; what is said of a link beats
+what is said of its robot. Which links a robot has is known once its description has come: ``links`` has (robot ->
+meshes of its links) of those that are known, and what is said of others says nothing yet.
+"""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
 from typing import Any
 
 from hpccd_core.options import ACCURACIES, FEATURES
@@ -14,7 +20,7 @@ from hpccd_ros.params.values import ParameterError
 
 @dataclass(frozen=True)
 class _Said:
-    """``value``: of the two meshes ``names``, said by ``parameter`` in this ``text``."""
+    """``value``: of the two meshes or robots ``names``, said by ``parameter`` in this ``text``."""
 
     parameter: str
     text: str
@@ -22,56 +28,70 @@ class _Said:
     value: Any
 
 
-def check(settings: dict[str, Any]) -> None:
-    """Raises ParameterError: an unknown mesh, tier, kind or distance, or two that contradict each other."""
-    ignored_pairs(settings)
-    pair_accuracies(settings)
-    pair_features(settings)
-    separation(settings)
+Links = Mapping[str, Sequence[str]]
+NO_LINKS: Links = {}
 
 
-def ignored_pairs(settings: dict[str, Any]) -> tuple[tuple[str, str], ...]:
-    """Parameters ``ignored_pairs`` and ``pairs.NAME.ignored`` as pairs of mesh names. Raises ParameterError."""
+def check(settings: dict[str, Any], links: Links = NO_LINKS) -> None:
+    """Raises ParameterError: an unknown mesh, link, tier, kind or distance, or two that contradict each other."""
+    ignored_pairs(settings, links)
+    pair_accuracies(settings, links)
+    pair_features(settings, links)
+    separation(settings, links)
+
+
+def ignored_pairs(
+    settings: dict[str, Any], links: Links = NO_LINKS, by_default: Iterable[tuple[str, str]] = ()
+) -> tuple[tuple[str, str], ...]:
+    """Parameters ``ignored_pairs`` and ``pairs.NAME.ignored`` as pairs of mesh names; those ``by_default`` are, too,
+    unless they say otherwise. Raises ParameterError."""
     said = []
     for text in settings["ignored_pairs"]:
         pair = tuple(text.split(":"))
-        if len(pair) != 2 or not set(pair) <= set(settings["meshes"]) or pair[0] == pair[1]:
+        if not _are_names(settings, pair) or (pair[0] == pair[1] and pair[0] not in settings["robots"]):
             raise ParameterError(
                 f"ignored_pairs: {quoted(text)} must be NAME:NAME with two different meshes out of {_names(settings)}"
             )
         said.append(_Said("ignored_pairs", text, pair, True))
     for one in _structured(settings, "ignored"):
-        if one.names[0] == one.names[1]:
+        if one.names[0] == one.names[1] and one.names[0] not in settings["robots"]:
             raise ParameterError(
                 f"{one.parameter}: both meshes of the pair are {one.names[0]}; whether a mesh is tested against "
                 f"itself is said by mesh.{one.names[0]}.self_collision"
             )
         said.append(one)
-    return tuple(one.names for one in _agreed(said) if one.value)
+    ignored = {frozenset(names): names for names in by_default}
+    for one in _spread(_agreed(said), settings, links):
+        if one.value:
+            ignored.setdefault(frozenset(one.names), one.names)
+        else:
+            ignored.pop(frozenset(one.names), None)
+    return tuple(ignored.values())
 
 
-def pair_accuracies(settings: dict[str, Any]) -> tuple[tuple[str, str, str], ...]:
+def pair_accuracies(settings: dict[str, Any], links: Links = NO_LINKS) -> tuple[tuple[str, str, str], ...]:
     """Parameters ``pair_accuracy`` and ``pairs.NAME.accuracy`` as (mesh name, mesh name, tier). Raises
     ParameterError."""
     said = []
     for text in settings["pair_accuracy"]:
         *names, tier = text.split(":")
-        if len(names) != 2 or not set(names) <= set(settings["meshes"]) or tier not in ACCURACIES:
+        if not _are_names(settings, names) or tier not in ACCURACIES:
             raise ParameterError(
                 f"pair_accuracy: {quoted(text)} must be NAME:NAME:TIER with meshes out of {_names(settings)} "
                 f"and a tier out of {', '.join(ACCURACIES)}"
             )
         said.append(_Said("pair_accuracy", text, tuple(names), tier))
-    return tuple((*one.names, one.value) for one in _agreed([*said, *_structured(settings, "accuracy")]))
+    agreed = _agreed([*said, *_structured(settings, "accuracy")])
+    return tuple((*one.names, one.value) for one in _spread(agreed, settings, links))
 
 
-def pair_features(settings: dict[str, Any]) -> tuple[tuple[str, str, tuple[str, ...]], ...]:
+def pair_features(settings: dict[str, Any], links: Links = NO_LINKS) -> tuple[tuple[str, str, tuple[str, ...]], ...]:
     """Parameters ``pair_features`` and ``pairs.NAME.features`` as (mesh name, mesh name, features); entries of the
     first about one pair add up. Raises ParameterError."""
     listed_kinds: dict[frozenset[str], tuple[list[str], tuple[str, str], set[str]]] = {}
     for text in settings["pair_features"]:
         *names, kind = text.split(":")
-        if len(names) != 2 or not set(names) <= set(settings["meshes"]) or kind not in FEATURES:
+        if not _are_names(settings, names) or kind not in FEATURES:
             raise ParameterError(
                 f"pair_features: {quoted(text)} must be NAME:NAME:KIND with meshes out of {_names(settings)} "
                 f"and a kind out of {', '.join(FEATURES)}"
@@ -81,23 +101,27 @@ def pair_features(settings: dict[str, Any]) -> tuple[tuple[str, str, tuple[str, 
         kinds.add(kind)
     said = [_Said("pair_features", ", ".join(texts), *rest) for texts, *rest in listed_kinds.values()]
     said += [_Said(o.parameter, o.text, o.names, set(o.value)) for o in _structured(settings, "features")]
-    return tuple((*one.names, tuple(name for name in FEATURES if name in one.value)) for one in _agreed(said))
+    return tuple(
+        (*one.names, tuple(name for name in FEATURES if name in one.value))
+        for one in _spread(_agreed(said), settings, links)
+    )
 
 
-def separation(settings: dict[str, Any]) -> Separation:
+def separation(settings: dict[str, Any], links: Links = NO_LINKS) -> Separation:
     """Parameters ``minimum_separation``, ``pair_separation`` and ``pairs.NAME.separation``. Raises ParameterError."""
     said = []
     for text in settings["pair_separation"]:
         *names, number = text.split(":")
         distance = _distance(number)
-        if len(names) != 2 or not set(names) <= set(settings["meshes"]) or distance is None:
+        if not _are_names(settings, names) or distance is None:
             raise ParameterError(
                 f"pair_separation: {quoted(text)} must be NAME:NAME:DISTANCE with meshes out of {_names(settings)} "
                 f"and a distance from 0 to {FARTHEST:g}"
             )
         said.append(_Said("pair_separation", text, tuple(names), distance))
     agreed = _agreed([*said, *_structured(settings, "separation")])
-    return Separation(settings["minimum_separation"], tuple((*one.names, one.value) for one in agreed))
+    spread = _spread(agreed, settings, links)
+    return Separation(settings["minimum_separation"], tuple((*one.names, one.value) for one in spread))
 
 
 def _distance(text: str) -> float | None:
@@ -112,7 +136,7 @@ def _structured(settings: dict[str, Any], key: str) -> Iterator[_Said]:
     """Of the parameters pairs.NAME.key those that say something."""
     for pair, of in settings[PAIRS].items():
         names = of["meshes"]
-        if len(names) != 2 or not set(names) <= set(settings["meshes"]):
+        if not _are_names(settings, names):
             raise ParameterError(
                 f"{PAIRS}.{pair}.meshes: {quoted(names)} must be two names out of {_names(settings)}; the same name "
                 "twice means within this mesh"
@@ -135,5 +159,42 @@ def _agreed(said: Iterable[_Said]) -> list[_Said]:
     return list(found.values())
 
 
+def _spread(agreed: Sequence[_Said], settings: dict[str, Any], links: Links) -> list[_Said]:
+    """With the links of robots in place of their names. Raises ParameterError: a robot has no such link."""
+    found: dict[frozenset[str], _Said] = {}
+    # What names robots first: what names one link or both then takes its place.
+    for one in sorted(agreed, key=lambda one: -sum(name in settings["robots"] for name in one.names)):
+        within_robot = one.names[0] == one.names[1] and one.names[0] in settings["robots"]
+        for a, b in product(*(_meshes(name, one, settings, links) for name in one.names)):
+            if not within_robot or a < b:
+                found[frozenset((a, b))] = replace(one, names=(a, b))
+    return list(found.values())
+
+
+def _meshes(name: str, said: _Said, settings: dict[str, Any], links: Links) -> Sequence[str]:
+    if name in settings["meshes"]:
+        return (name,)
+    robot = name.partition("/")[0]
+    if robot not in links:
+        return ()
+    if name == robot:
+        return links[robot]
+    if name not in links[robot]:
+        raise ParameterError(
+            f"{said.parameter}: {quoted(said.text)}: {quoted(robot)} has no link of this name with geometry; there are "
+            f"{listed(links[robot])}"
+        )
+    return (name,)
+
+
+def _are_names(settings: dict[str, Any], names: Sequence[str]) -> bool:
+    """Whether they are two, of meshes, robots or their links."""
+    return len(names) == 2 and all(
+        name in settings["meshes"] or (name.partition("/")[0] in settings["robots"] and not name.endswith("/"))
+        for name in names
+    )
+
+
 def _names(settings: dict[str, Any]) -> str:
-    return listed(settings["meshes"]) or "(none)"
+    known = [*settings["meshes"], *settings["robots"], *(f"{robot}/LINK" for robot in settings["robots"])]
+    return listed(known) or "(none)"

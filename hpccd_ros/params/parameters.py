@@ -21,15 +21,16 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from hpccd_ros.base import quoting
-from hpccd_ros.params.table import MESH_ROWS, NEVER, NODE_ROWS, PAIRS, UNCONFIGURED, Row
+from hpccd_ros.params.table import MESH_ROWS, NEVER, NODE_ROWS, PAIRS, ROBOT, UNCONFIGURED, Row
 from hpccd_ros.params.values import (
     ParameterError,
     allowed,
-    check_mesh_names,
+    check_names,
     expected,
     normalise,
     pair_names,
     pair_rows,
+    robot_rows,
     unusable_value,
     usable,
 )
@@ -67,11 +68,16 @@ def descriptor(row: Row) -> ParameterDescriptor:
 def declare(node: Node) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
     """Declare all parameters of the table; return (node settings, mesh name -> mesh settings) as `values.checked` does.
 
-    Raises ParameterError: wrong type, out of range, bad or repeated mesh name, unknown parameter of a pair.
+    Raises ParameterError: wrong type, out of range, bad or repeated name of a mesh or robot, unknown parameter of a
+    pair.
     """
     settings = {row.name: _declare_one(node, row, row.name) for row in NODE_ROWS}
     names = settings["meshes"]
-    check_mesh_names(names)
+    check_names(settings)
+    settings[ROBOT] = {
+        robot: {row.name: _declare_one(node, row, name) for row, name in robot_rows(robot)}
+        for robot in settings["robots"]
+    }
     settings[PAIRS] = {
         pair: {row.name: _declare_one(node, row, name) for row, name in pair_rows(pair)}
         for pair in pair_names(_given(node))
@@ -85,7 +91,7 @@ def declare(node: Node) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
 def _declare_one(node: Node, row: Row, name: str) -> Any:
     # An empty list has no element type, so rclpy would declare it as a byte array: declare the type instead, as of one
     # that need not be set.
-    typed = row.kind == "string[]" or row.default is None
+    typed = row.kind == "string[]" or row.default in (None, [])
     value = Parameter.Type(_TYPES[row.kind]) if typed else row.default
     given = _given(node).get(name)
     whole = given is not None and given.type_ == _INTEGERS.get(row.kind)
@@ -133,8 +139,12 @@ def watch(
     rows = {row.name: (lambda wanted, _: wanted, row) for row in NODE_ROWS}
     for mesh in meshes:
         rows |= {f"mesh.{mesh}.{row.name}": (lambda _, of, mesh=mesh: of[mesh], row) for row in MESH_ROWS}
-    for pair in settings[PAIRS]:
-        rows |= {name: (lambda wanted, _, pair=pair: wanted[PAIRS][pair], row) for row, name in pair_rows(pair)}
+    for part, named_rows in ((PAIRS, pair_rows), (ROBOT, robot_rows)):
+        for each in settings[part]:
+            rows |= {
+                name: (lambda wanted, _, part=part, each=each: wanted[part][each], row)
+                for row, name in named_rows(each)
+            }
 
     def on_set(parameters: Iterable[Parameter]) -> SetParametersResult:
         wanted, wanted_meshes = copy.deepcopy((settings, meshes))

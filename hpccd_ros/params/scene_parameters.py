@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the parameters say of the scene: meshes, what is computed of them, where positions are placed."""
 
+from collections.abc import Iterable
 from typing import Any
 
 from hpccd_core.options import FEATURES, OUTPUTS
@@ -9,23 +10,28 @@ from hpccd_ros.detect.core import Options
 from hpccd_ros.detect.rigid_step import RigidOptions
 from hpccd_ros.detect.scene import SceneBuilder
 from hpccd_ros.detect.separation import NONE
+from hpccd_ros.frames.follower import Follower
 from hpccd_ros.frames.pipeline import FramePipeline
-from hpccd_ros.frames.types import POSE, TF, AssemblyRules, MeshSettings
+from hpccd_ros.frames.types import POSE, TF, AssemblyRules, MeshFrame, MeshSettings
 from hpccd_ros.middleware.topic_names import WHOLE
-from hpccd_ros.params import pair_parameters
+from hpccd_ros.params import pair_parameters, robot_parameters
+from hpccd_ros.params.robot_parameters import NO_ROBOTS, Robots
+from hpccd_ros.params.table import ROBOT
 from hpccd_ros.params.values import ParameterError
 from hpccd_ros.rigid.transform import Rigid
 
 MeshValues = dict[str, dict[str, Any]]
 
 
-def scene_builder(settings: dict[str, Any], meshes: MeshValues) -> SceneBuilder:
+def scene_builder(settings: dict[str, Any], meshes: MeshValues, robots: Robots = NO_ROBOTS) -> SceneBuilder:
     """The scene without its topologies. Raises ParameterError: an unknown mesh, tier or kind in a pair."""
+    links = robot_parameters.links(robots)
+    by_default = [pair for name in settings[ROBOT] if name in robots for pair in robots[name].ignored_pairs]
     return SceneBuilder(
-        mesh_settings(meshes),
-        pair_parameters.ignored_pairs(settings),
-        pair_parameters.pair_accuracies(settings),
-        pair_parameters.pair_features(settings),
+        mesh_settings(meshes) + robot_parameters.mesh_settings(settings, robots),
+        pair_parameters.ignored_pairs(settings, links, by_default),
+        pair_parameters.pair_accuracies(settings, links),
+        pair_parameters.pair_features(settings, links),
     )
 
 
@@ -46,8 +52,15 @@ def mesh_settings(meshes: MeshValues) -> tuple[MeshSettings, ...]:
     )
 
 
-def frame_pipeline(settings: dict[str, Any], meshes: MeshValues, max_pending: int) -> FramePipeline:
-    """The way from messages of the meshes to frames of the scene. Raises ValueError: nothing in the scene moves."""
+def frame_pipeline(
+    settings: dict[str, Any],
+    meshes: MeshValues,
+    max_pending: int,
+    robots: Robots = NO_ROBOTS,
+    followers: Iterable[Follower] = (),
+) -> FramePipeline:
+    """The way from messages of the meshes to frames of the scene; it has the topologies of robots. followers: of robots
+    that joint states move. Raises ValueError: nothing in the scene moves."""
     nearest = settings["stamp_match"] == "nearest"
     rules = AssemblyRules(
         max_pending=max_pending,
@@ -55,12 +68,18 @@ def frame_pipeline(settings: dict[str, Any], meshes: MeshValues, max_pending: in
         tolerance=round(settings["stamp_tolerance"] * 1e9) if nearest else None,
         frame_id=settings["frame_id"],
     )
-    return FramePipeline(mesh_settings(meshes), rules)
+    of_robots = robot_parameters.mesh_settings(settings, robots)
+    pipeline = FramePipeline(mesh_settings(meshes) + of_robots, rules, tuple(followers))
+    for robot in robots.values():
+        for mesh in robot.meshes:
+            pipeline.load(mesh.name, mesh.topology, MeshFrame(0, mesh.vertices, version=mesh.topology.version))
+    return pipeline
 
 
-def detector_options(settings: dict[str, Any]) -> Options:
+def detector_options(settings: dict[str, Any], robots: Robots = NO_ROBOTS) -> Options:
     """What the node's detector computes, and how."""
-    outputs, wanted = set(settings["outputs"]), pair_parameters.separation(settings)
+    outputs = set(settings["outputs"])
+    wanted = pair_parameters.separation(settings, robot_parameters.links(robots))
     if settings["markers"]:
         outputs |= {"points", "normals"}
         if wanted != NONE:
@@ -104,16 +123,15 @@ def poses(meshes: MeshValues) -> dict[str, Rigid]:
     return found
 
 
-def check(settings: dict[str, Any], meshes: MeshValues) -> None:
-    """What the values cannot tell one by one. Raises ParameterError."""
-    pair_parameters.check(settings)
+def check(settings: dict[str, Any], meshes: MeshValues, robots: Robots = NO_ROBOTS) -> None:
+    """What the values cannot tell one by one. robots: those that are known. Raises ParameterError."""
+    pair_parameters.check(settings, robot_parameters.links(robots))
+    robot_parameters.check(settings)
     features(settings)
     poses(meshes)
-    if settings["stop_distance"] >= 0 and not scene_builder(settings, meshes).pairs:
-        raise ParameterError(
-            "stop_distance: no two different meshes are tested against each other, so nothing could ever be near; name "
-            "two in meshes of which one moves and that ignored_pairs does not name, or leave stop_distance negative"
-        )
+    # Of a robot that is not known, nobody knows which links it has.
+    if set(settings["robots"]) <= set(robots):
+        check_stop(settings, scene_builder(settings, meshes, robots))
     for name, values in meshes.items():
         if values["file"] and values["input"] in WHOLE:
             raise ParameterError(
@@ -136,6 +154,15 @@ def check(settings: dict[str, Any], meshes: MeshValues) -> None:
                 f"{quoted(settings['frame_id'])}; set "
                 f"mesh.{name}.transform to pose or tf, or the parameter frame_id"
             )
+
+
+def check_stop(settings: dict[str, Any], builder: SceneBuilder) -> None:
+    """Raises ParameterError."""
+    if settings["stop_distance"] >= 0 and not builder.pairs:
+        raise ParameterError(
+            "stop_distance: no two different meshes are tested against each other, so nothing could ever be near; name "
+            "two in meshes of which one moves and that ignored_pairs does not name, or leave stop_distance negative"
+        )
 
 
 def _check_rigid(name: str, values: dict[str, Any], settings: dict[str, Any]) -> None:

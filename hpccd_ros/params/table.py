@@ -44,6 +44,14 @@ MOST_PARTS = 1000
 
 SCENE_ROWS = (
     Row(
+        "robots",
+        "string[]",
+        [],
+        "Names of robots: each link of one that has geometry is a mesh ROBOT/LINK, behind those of `meshes`. Each name "
+        "makes the parameters robot.NAME.*",
+        change=NEVER,
+    ),
+    Row(
         "meshes",
         "string[]",
         [],
@@ -55,7 +63,8 @@ SCENE_ROWS = (
         "ignored_pairs",
         "string[]",
         [],
-        "Pairs of meshes that are never tested against each other, each as NAME:NAME",
+        "Pairs of meshes that are never tested against each other, each as NAME:NAME. A robot's name stands for all of "
+        "its links, here and in all parameters of pairs",
     ),
     Row(
         "pair_accuracy",
@@ -469,5 +478,44 @@ MESH_ROWS = (
         "Where the file's vertices, and with transform pose those of the messages, are placed: translation x y z, unit "
         "quaternion x y z w",
         unit="unit of the vertices",
+    ),
+)
+
+# Of robots: robot.NAME.* of each NAME in `robots`.
+ROBOT = "robot"
+
+ROBOT_ROWS = (
+    Row(
+        "description",
+        "string",
+        "robot_description",
+        "The URDF: the name of a topic of std_msgs/String, latched, as robot_state_publisher offers it; or a file, "
+        "whose name has a point: a path, package://PACKAGE/PATH or file:///PATH",
+    ),
+    Row("geometry", "string", "collision", "Which shapes of the links count", choices=("collision", "visual")),
+    Row("srdf", "string", "", "SRDF file: what it disables is never tested; empty: neighbouring links alone are not"),
+    Row(
+        "joint_states",
+        "string",
+        "",
+        "Topic of sensor_msgs/JointState by which the joints move; empty: links move by the transforms from "
+        "`frame_prefix` + LINK to `frame_id`",
+    ),
+    Row("frame_prefix", "string", "", "Before the names of links in transforms"),
+    Row(
+        "pose",
+        "float[]",
+        [],
+        "With `joint_states`: where the root link stands in the scene, translation x y z, unit quaternion x y z w; "
+        "empty: the transform from `frame_prefix` + ROOT to `frame_id` says it",
+        unit="unit of the vertices",
+    ),
+    Row(
+        "tolerance",
+        "float",
+        1e-3,
+        "How far the triangles of cylinders, spheres and capsules may stand out of them",
+        unit="unit of the vertices",
+        span=(1e-9, FARTHEST),
     ),
 )

@@ -6,7 +6,7 @@ from typing import Any
 
 from hpccd_ros.base import quoting
 from hpccd_ros.middleware import topic_names
-from hpccd_ros.params.table import MESH_ROWS, NODE_ROWS, PAIR_ROWS, PAIRS, Row
+from hpccd_ros.params.table import MESH_ROWS, NODE_ROWS, PAIR_ROWS, PAIRS, ROBOT, ROBOT_ROWS, Row
 
 
 class ParameterError(ValueError):
@@ -67,11 +67,16 @@ def allowed(row: Row) -> str:
 def checked(given: dict[str, Any]) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
     """(node settings, mesh name -> mesh settings) of the parameters ``given`` by full name, as a file has them.
 
-    settings["pairs"]: name of a pair -> its settings. None: not set. Raises ParameterError: wrong type, out of range,
-    bad or repeated mesh name, unknown parameter of a pair.
+    settings["pairs"]: name of a pair -> its settings; settings["robot"]: name of a robot -> its settings. None: not
+    set. Raises ParameterError: wrong type, out of range, bad or repeated name of a mesh or robot, unknown parameter of
+    a pair.
     """
     settings = {row.name: _checked_value(row, row.name, given.get(row.name)) for row in NODE_ROWS}
-    check_mesh_names(settings["meshes"])
+    check_names(settings)
+    settings[ROBOT] = {
+        robot: {row.name: _checked_value(row, name, given.get(name)) for row, name in robot_rows(robot)}
+        for robot in settings["robots"]
+    }
     settings[PAIRS] = {
         pair: {row.name: _checked_value(row, name, given.get(name)) for row, name in pair_rows(pair)}
         for pair in pair_names(given)
@@ -100,16 +105,20 @@ def _checked_value(row: Row, name: str, value: Any) -> Any:
     return usable(row, name, value)
 
 
-def check_mesh_names(names: list[str]) -> None:
-    """Raises ParameterError for one that cannot be part of a topic, or is there twice."""
-    for name in names:
-        if not topic_names.MESH_NAME.fullmatch(name):
-            raise ParameterError(
-                f"meshes: {quoting.quoted(name)} cannot be part of a topic name; use letters, digits and _, a "
-                "letter first"
-            )
-    if len(set(names)) != len(names):
-        raise ParameterError(f"meshes: names must differ, {quoting.repeated(names)} is there twice")
+def check_names(settings: dict[str, Any]) -> None:
+    """Of meshes and robots. Raises ParameterError for one that cannot be part of a topic, or is there twice."""
+    for parameter in ("meshes", "robots"):
+        names = settings[parameter]
+        for name in names:
+            if not topic_names.MESH_NAME.fullmatch(name):
+                raise ParameterError(
+                    f"{parameter}: {quoting.quoted(name)} cannot be part of a topic name; use letters, digits and _, a "
+                    "letter first"
+                )
+        if len(set(names)) != len(names):
+            raise ParameterError(f"{parameter}: names must differ, {quoting.repeated(names)} is there twice")
+    if both := sorted(set(settings["meshes"]) & set(settings["robots"])):
+        raise ParameterError(f"robots: {quoting.listed(both)} is a mesh, too (parameter meshes); call it otherwise")
 
 
 def pair_names(given: Iterable[str]) -> list[str]:
@@ -135,13 +144,19 @@ def pair_rows(pair: str) -> list[tuple[Row, str]]:
     return [(row, f"{PAIRS}.{pair}.{row.name}") for row in PAIR_ROWS]
 
 
+def robot_rows(robot: str) -> list[tuple[Row, str]]:
+    """The parameters of a robot, with their full names."""
+    return [(row, f"{ROBOT}.{robot}.{row.name}") for row in ROBOT_ROWS]
+
+
 # Of every node.
 _ROS_OWN = ("use_sim_time", "start_type_description_service")
 
 
-def unknown(given: Iterable[str], meshes: Iterable[str]) -> list[str]:
-    """Those of the names ``given`` that a node of these meshes would not have."""
+def unknown(given: Iterable[str], meshes: Iterable[str], robots: Iterable[str] = ()) -> list[str]:
+    """Those of the names ``given`` that a node of these meshes and robots would not have."""
     rows = {row.name for row in NODE_ROWS} | {f"mesh.{mesh}.{row.name}" for mesh in meshes for row in MESH_ROWS}
     of_pairs = {name for pair in pair_names(given) for _, name in pair_rows(pair)}
-    known = rows | of_pairs | set(_ROS_OWN)
+    of_robots = {name for robot in robots for _, name in robot_rows(robot)}
+    known = rows | of_pairs | of_robots | set(_ROS_OWN)
     return sorted(n for n in given if n not in known and not n.startswith("qos_overrides."))

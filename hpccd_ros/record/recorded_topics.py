@@ -8,7 +8,9 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from hpccd_ros.middleware import qos, qos_overrides, topic_names, transform_topics
 from hpccd_ros.middleware.message_types import (
     CONTACTS,
+    DESCRIPTION,
     DISTANCES,
+    JOINT_STATES,
     MARKER,
     PAIRS,
     POINTS,
@@ -17,6 +19,8 @@ from hpccd_ros.middleware.message_types import (
     TOPOLOGY,
     VERTICES,
 )
+from hpccd_ros.params import robot_parameters
+from hpccd_ros.params.robot_parameters import RobotValues
 
 # Last part of a mesh's topic -> type of its positions.
 POSITIONS = {
@@ -46,7 +50,10 @@ def of_node(parameters: dict) -> list[Wanted]:
     """The topics of a node with these parameters, inputs before outputs."""
     wanted = []
     meshes = parameters["meshes"] or []  # None: never set
-    if any("tf" in (parameters.get(f"mesh.{mesh}.{name}") for name in ("transform", "input")) for mesh in meshes):
+    robots = robot_parameters.of(parameters)
+    if robot_parameters.need_transforms(robots) or any(
+        "tf" in (parameters.get(f"mesh.{mesh}.{name}") for name in ("transform", "input")) for mesh in meshes
+    ):
         static = qos.TRANSFORMS_STATIC.depth
         wanted += [Wanted(t.name, t.type_name, static * t.static) for t in transform_topics.understood()]
     for mesh in meshes:
@@ -54,16 +61,21 @@ def of_node(parameters: dict) -> list[Wanted]:
         given_as = parameters.get(f"mesh.{mesh}.input") or topic_names.VERTICES
         kinds = topic_names.positions(given_as)
         wanted += [Wanted(topic_names.of_mesh(mesh, kind), POSITIONS[kind]) for kind in kinds]
+    described = dict.fromkeys(robot_parameters.topics(robots).values())
+    wanted += [Wanted(topic, DESCRIPTION, latched=1) for topic in described]
+    wanted += [Wanted(topic, JOINT_STATES) for topic in robot_parameters.joint_topics(robots)]
     # Distances and summaries whether they are asked for now or not: they may be at any time.
     return [*wanted, *(Wanted(name, type_name) for name, type_name in ANSWERS.items())]
 
 
-def types_by_role(meshes) -> dict[str, str]:
-    """Relative name -> type of all topics from which a node of these meshes can be computed again."""
+def types_by_role(meshes, robots: RobotValues) -> dict[str, str]:
+    """Relative name -> type of all topics from which a node of these meshes and robots can be computed again."""
     of_mesh = {topic_names.TOPOLOGY: TOPOLOGY, **POSITIONS}
     return {
         **{topic_names.of_mesh(mesh, kind): type_name for mesh in meshes for kind, type_name in of_mesh.items()},
         **{topic.name: topic.type_name for topic in transform_topics.ALL.values()},
+        **dict.fromkeys(robot_parameters.topics(robots).values(), DESCRIPTION),
+        **dict.fromkeys(robot_parameters.joint_topics(robots), JOINT_STATES),
         **ANSWERS,
     }
 
@@ -80,10 +92,10 @@ def subscription_qos(node, name: str, topic: Wanted, depth: int) -> QoSProfile:
 
 
 def as_node_asks(node, name: str, topic: Wanted, depth: int, *, recorded, vertices: ReliabilityPolicy) -> QoSProfile:
-    """For the own recording of the node `recorded`. vertices: what it asks of them; the others are reliable, unless
-    parameters of the node (qos_overrides) say otherwise.
+    """For the own recording of the node `recorded`. vertices: what it asks of them and of joint states; the others are
+    reliable, unless parameters of the node (qos_overrides) say otherwise.
     """
-    default = vertices if topic.type_name in POSITIONS.values() else ReliabilityPolicy.RELIABLE
+    default = vertices if topic.type_name in (*POSITIONS.values(), JOINT_STATES) else ReliabilityPolicy.RELIABLE
     entity = "publisher" if topic.type_name in ANSWERS.values() else "subscription"
     asked = qos_overrides.reliability(recorded, entity, name, default)
     return _profile(asked == ReliabilityPolicy.RELIABLE, topic, depth)

@@ -14,8 +14,8 @@ from hpccd_ros.base.errors import UserError
 from hpccd_ros.middleware import environment, ros_start, stop_signals, topic_names
 from hpccd_ros.middleware.message_types import message_class
 from hpccd_ros.params import node_parameters
-from hpccd_ros.record import recorded_topics
-from hpccd_ros.record.mesh_attachment import mesh_files
+from hpccd_ros.record import attachments, recorded_topics
+from hpccd_ros.record.described_robots import DescribedRobots
 from hpccd_ros.record.recorded_topics import Wanted
 from hpccd_ros.record.recording_info import recording_info
 from hpccd_ros.record.topic_recorder import Recorder
@@ -45,13 +45,13 @@ def _record_until(stop, target, args) -> int:
 
 def _record(node, target, args, stop) -> int:
     parameters = node_parameters.fetch(node, args.node, args.wait, stop)
-    if not parameters.get("meshes"):
-        raise UserError(f"the node {args.node} has no parameter `meshes`: is it an hpccd node?")
+    if not parameters.get("meshes") and not parameters.get("robots"):
+        raise UserError(f"the node {args.node} has no parameter `meshes`, nor `robots`: is it an hpccd node?")
     wanted = recorded_topics.of_node(parameters)
     wanted += [topic for topic in map(_extra, args.topic) if topic.name not in {known.name for known in wanted}]
-    files, missing = mesh_files(parameters)
+    files, missing = attachments.files(parameters)
     for text in missing:
-        print(text, file=sys.stderr, flush=True)
+        _warn(text)
     info = recording_info(args.node, parameters, wanted, node.resolve_topic_name)
     try:
         bag = BagWriter(target, info=info, attachments=files, compression=args.compression,
@@ -59,6 +59,7 @@ def _record(node, target, args, stop) -> int:
     except (ValueError, OSError) as error:
         raise UserError(str(error)) from error
     try:
+        DescribedRobots(node, bag, parameters, node.resolve_topic_name, _warn)
         recorder = Recorder(node, bag, wanted, args.depth)
         contacts = node.resolve_topic_name(topic_names.CONTACTS)
         _spin(node, recorder, bag, contacts, args, stop)
@@ -66,6 +67,10 @@ def _record(node, target, args, stop) -> int:
         bag.close()
     _report(bag, recorder)
     return 1 if bag.write_errors else 0
+
+
+def _warn(text) -> None:
+    print(text, file=sys.stderr, flush=True)
 
 
 def _spin(node, recorder, bag, contacts, args, stop):

@@ -9,9 +9,10 @@ from hpccd_ros.frames.outcome import Outcome
 from hpccd_ros.frames.sequence import SequenceWatch
 from hpccd_ros.frames.types import SceneFrame
 from hpccd_ros.frames.welding import Welding
-from hpccd_ros.middleware import mesh_inputs, topic_names, transform_topics
+from hpccd_ros.middleware import joint_messages, mesh_inputs, topic_names, transform_topics
 from hpccd_ros.middleware.fields import InvalidMessageError
-from hpccd_ros.params import scene_parameters
+from hpccd_ros.params import robot_parameters, scene_parameters
+from hpccd_ros.params.table import ROBOT
 from hpccd_ros.replay.recorded_setup import ReplaySetup
 
 # Frames for which an answer waits that was written before its own; far less than the window, which must still hold
@@ -37,7 +38,14 @@ class FrameSource:
         self._weldings = {name: Welding() for name in setup.roles}
         # Messages of several topics may have reached the recorder in another order than the node.
         pending = 4 * setup.settings["pending_frames"]
-        self._pipeline = scene_parameters.frame_pipeline(setup.settings, setup.meshes, pending)
+        by_joints = robot_parameters.followers(setup.settings, setup.robots, pending)
+        self._pipeline = scene_parameters.frame_pipeline(
+            setup.settings, setup.meshes, pending, setup.robots, by_joints.values()
+        )
+        self._by_joints = {
+            topic: [by_joints[robot] for robot in robots]
+            for topic, robots in robot_parameters.joint_topics(setup.settings[ROBOT]).items()
+        }
         for mesh, (topology, positions) in setup.files.items():
             self._pipeline.load(mesh, topology, positions)
 
@@ -50,7 +58,10 @@ class FrameSource:
         mesh, kind = self._setup.roles[message.topic]
         decoded = self._decoders[message.topic](message)
         if kind in transform_topics.ALL:
-            outcome = self._push_transforms(decoded, transform_topics.ALL[kind])
+            topic = transform_topics.ALL[kind]
+            outcome = self._retried(transform_topics.fill(self._pipeline.transforms, decoded, topic))
+        elif not mesh and kind in self._by_joints:
+            outcome = self._retried(joint_messages.fill(self._by_joints[kind], decoded, kind))
         else:
             outcome = self._push_mesh(mesh, kind, decoded, message)
         for refusal in outcome.refusals:
@@ -71,8 +82,8 @@ class FrameSource:
             new_publisher = watch.notice()
         return self._pipeline.push(mesh, checked, new_publisher)
 
-    def _push_transforms(self, decoded, topic) -> Outcome:
-        outcome = Outcome(refusals=transform_topics.fill(self._pipeline.transforms, decoded, topic))
+    def _retried(self, refusals) -> Outcome:
+        outcome = Outcome(refusals=refusals)
         for part in self._pipeline.retry():
             outcome += part
         return outcome

@@ -84,6 +84,7 @@ class Replay:
         self._every_contact = StepDetector(builder, self._options(None))
         told = recording.topics.get(setup.distances) if distances else None
         self.distances = DistanceCheck(told, StepDetector(builder, self._options(None)), accuracy)
+        self._mesh_names = setup.mesh_names
         self._window = FrameWindow(max(WINDOW, 2 * setup.settings["frame_queue"]))
         self.any_one = setup.settings["report"] == "any"  # "verified" means less then: compare.py
         self.verified = self.diverged = self.unverified = 0
@@ -217,7 +218,7 @@ class Replay:
         return dataclasses.replace(options, outputs=self._outputs)
 
     def _separation_of(self, recorded) -> Separation:
-        if list(recorded.mesh_names) != list(self._setup.meshes):
+        if list(recorded.mesh_names) != self._mesh_names:
             return NONE
         try:
             return read_separation(recorded)

@@ -13,11 +13,14 @@ from hpccd_ros.detect.scene import SceneBuilder
 from hpccd_ros.frames.mesh_file import FORMATS, MeshFileError, load_mesh, mesh_of_file
 from hpccd_ros.frames.types import MeshFrame, Topology
 from hpccd_ros.middleware import resources, topic_names, transform_topics
-from hpccd_ros.params import pair_parameters, scene_parameters, values
+from hpccd_ros.params import pair_parameters, robot_parameters, scene_parameters, values
 from hpccd_ros.params.parameter_file import read_parameters
+from hpccd_ros.params.table import ROBOT
 from hpccd_ros.params.values import ParameterError
 from hpccd_ros.record import recorded_topics
-from hpccd_ros.record.mesh_attachment import attachment_name
+from hpccd_ros.record.attachments import attachment_name
+from hpccd_ros.replay import recorded_robots
+from hpccd_ros.robots.robot import Robot
 
 
 @dataclasses.dataclass(frozen=True)
@@ -26,22 +29,30 @@ class ReplaySetup:
 
     settings: dict
     meshes: dict[str, dict]
-    # Topic name -> (mesh, "topology" or one of topic_names.POSITIONS), or ("", name in transform_topics.ALL).
+    # Topic name -> (mesh, "topology" or one of topic_names.POSITIONS), or ("", name in transform_topics.ALL, or that of
+    # joint states as the parameters have it).
     roles: dict[str, tuple[str, str]]
     contacts: str | None  # topic name; None: the recording has none
     distances: str | None  # as well
     files: dict[str, tuple[Topology, MeshFrame | None]]  # of meshes that come from a file; frame: static ones
+    robots: dict[str, Robot]
     unknown: list[str]  # parameters that the node does not have: without effect
 
     @property
     def builder(self) -> SceneBuilder:
-        return scene_parameters.scene_builder(self.settings, self.meshes)
+        return scene_parameters.scene_builder(self.settings, self.meshes, self.robots)
+
+    @property
+    def mesh_names(self) -> list[str]:
+        """In the order of the scene."""
+        return [mesh.name for mesh in self.builder.meshes]
 
     def options(self, accuracy: str, backend: str, threads: int) -> Options:
         """Detector options of the recorded node, but for what may differ without a change of the result."""
         return Options(
             accuracy or self.settings["accuracy"], backend, threads, self.settings["report"],
-            separation=pair_parameters.separation(self.settings), features=scene_parameters.features(self.settings),
+            separation=pair_parameters.separation(self.settings, robot_parameters.links(self.robots)),
+            features=scene_parameters.features(self.settings),
             rigid=scene_parameters.rigid(self.settings),
         )  # fmt: skip
 
@@ -61,30 +72,46 @@ def of_recording(recording: Recording, parameter_file: str | None = None) -> Rep
             where, refused = f"{recording.path}: the stored parameters", RecordingError
             given = _stored(recording, info)
         settings, meshes = values.checked(given)
-        if not settings["meshes"]:
-            raise ParameterError("parameter `meshes` names no mesh")
-        if all(row["static"] for row in meshes.values()):
+        if not settings["meshes"] and not settings["robots"]:
+            raise ParameterError("parameter `meshes` names no mesh, and `robots` no robot")
+        if not settings["robots"] and all(row["static"] for row in meshes.values()):
             raise ParameterError("at least one mesh must not be static, or nothing ever moves")
         scene_parameters.check(settings, meshes)
     except ParameterError as error:
         raise refused(printable(f"{where}: {error}")) from error
-    by_role = _by_role(recording, info, recorded_topics.types_by_role(meshes))
-    roles = {topic: ("", role) if role in transform_topics.ALL else tuple(role.split("/")[1:])
-             for role, topic in by_role.items() if role not in recorded_topics.ANSWERS}  # fmt: skip
+    of_robots = settings[ROBOT]
+    by_role = _by_role(recording, info, recorded_topics.types_by_role(meshes, of_robots))
+    joint_topics, described = robot_parameters.joint_topics(of_robots), robot_parameters.topics(of_robots).values()
+    roles = {topic: ("", role) if role in transform_topics.ALL or role in joint_topics else tuple(role.split("/")[1:])
+             for role, topic in by_role.items()
+             if role not in recorded_topics.ANSWERS and role not in described}  # fmt: skip
     by_transforms = any(row["input"] == topic_names.BY_TRANSFORMS for row in meshes.values())
-    if not by_transforms and not any(kind in topic_names.POSITIONS for _, kind in roles.values()):
+    if not by_transforms and not of_robots and not any(kind in topic_names.POSITIONS for _, kind in roles.values()):
         raise RecordingError(
             f"{recording.path} holds no vertices of the meshes {', '.join(meshes)}; its topics are "
             f"{', '.join(recording.topics) or 'none'}"
         )
     moved = [f"mesh.{name}.{key}" for name, row in meshes.items() for key in ("transform", "input") if row[key] == "tf"]
+    moved += [f"robot.{name}" for name in of_robots if robot_parameters.need_transforms({name: of_robots[name]})]
     if moved and not any(kind in transform_topics.ALL for _, kind in roles.values()):
         raise RecordingError(
             f"{recording.path}: a mesh was moved by transforms (parameter {moved[0]}), and the recording holds none: "
             "its positions cannot be computed again"
         )
+    for topic in joint_topics:
+        if topic not in by_role:
+            raise RecordingError(
+                f"{recording.path}: the recording has no joint states of {topic}, which moved robot "
+                f"{', '.join(joint_topics[topic])}"
+            )
+    robots = recorded_robots.of_recording(recording, of_robots, by_role)
+    try:
+        scene_parameters.check(settings, meshes, robots)
+    except ParameterError as error:
+        raise refused(printable(f"{where}: {error}")) from error
     return ReplaySetup(settings, meshes, roles, by_role.get(topic_names.CONTACTS), by_role.get(topic_names.DISTANCES),
-                       _files(recording, meshes), values.unknown(given, meshes))  # fmt: skip
+                       _files(recording, meshes), robots,
+                       values.unknown(given, meshes, settings["robots"]))  # fmt: skip
 
 
 def _stored(recording, info) -> dict:
@@ -127,10 +154,11 @@ def _by_role(recording, info, types) -> dict[str, str]:
 def _by_suffix(recording, types) -> dict[str, str]:
     """Topic -> role by what a topic's name ends in; of several topics with the same role, the first."""
     by_ending = {role.removeprefix("/"): role for role in types}
+    lengths = sorted({1 + ending.count("/") for ending in by_ending})
     found: dict[str, str] = {}
     for topic in recording.topics.values():
         words = topic.name.split("/")
-        endings = ("/".join(words[-count:]) for count in (1, 3) if len(words) > count)
+        endings = ("/".join(words[-count:]) for count in lengths if len(words) > count)
         role = next((by_ending[ending] for ending in endings if ending in by_ending), None)
         if role is not None and types[role] == topic.type_name and role not in found.values():
             found[topic.name] = role

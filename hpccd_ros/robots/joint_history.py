@@ -10,7 +10,7 @@ from bisect import bisect_left
 from collections.abc import Sequence
 
 from hpccd_ros.base.quoting import listed, quoted
-from hpccd_ros.frames.transform_buffer import HISTORY_NS, MOST_SAMPLES
+from hpccd_ros.frames.transform_buffer import HISTORY_NS, MOST_SAMPLES, RESTART_NS
 from hpccd_ros.robots.errors import RobotError
 from hpccd_ros.robots.kinematics import Kinematics
 
@@ -39,13 +39,25 @@ class JointHistory:
         for name, value in known:
             if not math.isfinite(value):
                 raise RobotError(f"joint states: {quoted(name)} is at {value}; positions must be finite")
+        if any(self._joints[name].begins_anew(stamp) for name, _ in known):
+            # The clock was set back: values from before, of any joint, would be interpolated with the new ones.
+            self.clear()
         for name, value in known:
             self._joints[name].add(stamp, value)
 
+    def clear(self) -> None:
+        for values in self._joints.values():
+            values.clear()
+
+    def forget_future(self, stamp: int) -> None:
+        """The time is ``stamp`` again: values far beyond it are from before."""
+        for values in self._joints.values():
+            if values.begins_anew(stamp):
+                values.clear()
+
     def at(self, stamp: int) -> dict[str, float]:
         """A value of each joint that the robot needs. Raises NoJointStateError."""
-        if unheard := [name for name, values in self._joints.items() if not values.stamps]:
-            raise NoJointStateError(f"no joint state has told of {listed(unheard)}", final=False)
+        self._check_heard()
         early = [name for name, values in self._joints.items() if stamp < values.stamps[0]]
         if early:
             first = max(self._joints[name].stamps[0] for name in early)
@@ -62,10 +74,13 @@ class JointHistory:
         return {name: values.at(stamp) for name, values in self._joints.items()}
 
     def latest(self) -> int | None:
-        """The last stamp, ns, that `at` knows; None: there is none yet, or no joint that moves."""
-        if any(not values.stamps for values in self._joints.values()):
-            return None
+        """The last stamp, ns, that `at` knows; None: no joint moves. Raises NoJointStateError: of some nothing came."""
+        self._check_heard()
         return min((values.stamps[-1] for values in self._joints.values()), default=None)
+
+    def _check_heard(self) -> None:
+        if unheard := [name for name, values in self._joints.items() if not values.stamps]:
+            raise NoJointStateError(f"no joint state has told of {listed(unheard)}", final=False)
 
 
 class _Values:
@@ -76,11 +91,14 @@ class _Values:
         self.stamps: list[int] = []
         self._values: list[float] = []
 
+    def begins_anew(self, stamp: int) -> bool:
+        return bool(self.stamps) and stamp < self.stamps[-1] - RESTART_NS
+
+    def clear(self) -> None:
+        self.stamps.clear()
+        self._values.clear()
+
     def add(self, stamp: int, value: float) -> None:
-        if self.stamps and stamp < self.stamps[-1] - HISTORY_NS:
-            # The source was restarted at an earlier time: the old values would be interpolated with the new ones.
-            self.stamps.clear()
-            self._values.clear()
         at = bisect_left(self.stamps, stamp)
         if at < len(self.stamps) and self.stamps[at] == stamp:
             self._values[at] = value

@@ -7,7 +7,7 @@ import numpy as np
 
 from hpccd_ros.base.quoting import quoted
 from hpccd_ros.frames.coordinates import unusable_coordinates
-from hpccd_ros.frames.types import TF, MeshSettings, Topology
+from hpccd_ros.frames.types import JOINTS, TF, MeshSettings, Topology
 from hpccd_ros.rigid.body import Body
 from hpccd_ros.rigid.joints import LinkMotion
 from hpccd_ros.robots import pairs, srdf, urdf
@@ -83,10 +83,11 @@ class Robot:
         )
         return cls(called, description, Kinematics(description), tuple(meshes), tuple(ignored))
 
-    def settings(self, frame_prefix: str = "") -> tuple[MeshSettings, ...]:
-        """Of each mesh, to be moved by transforms from the frame ``frame_prefix`` + link."""
+    def settings(self, frame_prefix: str = "", by_joints: bool = False) -> tuple[MeshSettings, ...]:
+        """Of each mesh, to be moved by joint states, or by transforms from the frame ``frame_prefix`` + link."""
+        moved = JOINTS if by_joints else TF
         return tuple(
-            MeshSettings(mesh.name, self_collision=False, input=TF, frame=frame_prefix + mesh.link)
+            MeshSettings(mesh.name, self_collision=False, input=moved, frame=frame_prefix + mesh.link)
             for mesh in self.meshes
         )
 

@@ -10,7 +10,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from hpccd_ros.params import parameters, scene_parameters, values
-from hpccd_ros.params.table import MESH_ROWS, NEVER, NODE_ROWS, PAIR_ROWS
+from hpccd_ros.params.table import MESH_ROWS, NEVER, NODE_ROWS, PAIR_ROWS, ROBOT_ROWS
 from hpccd_ros.params.values import ParameterError
 
 CONFIG = Path(__file__).resolve().parents[2] / "config"
@@ -34,7 +34,7 @@ def node_with():
     rclpy.shutdown(context=context)
 
 
-@pytest.mark.parametrize("row", [*NODE_ROWS, *MESH_ROWS, *PAIR_ROWS], ids=lambda row: row.name)
+@pytest.mark.parametrize("row", [*NODE_ROWS, *MESH_ROWS, *PAIR_ROWS, *ROBOT_ROWS], ids=lambda row: row.name)
 def test_each_row_is_sound(row):
     assert values.unusable_value(row, row.default) is None
     assert row.text and not row.text.endswith(".")
@@ -50,7 +50,7 @@ def test_each_row_is_sound(row):
 
 def test_defaults(node_with):
     settings, meshes = parameters.declare(node_with())
-    assert settings == {row.name: row.default for row in NODE_ROWS} | {"pairs": {}}
+    assert settings == {row.name: row.default for row in NODE_ROWS} | {"pairs": {}, "robot": {}}
     assert meshes == {}
 
 

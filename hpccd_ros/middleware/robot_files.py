@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A robot of its description and the files that this names, wherever they lie."""
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from hpccd_ros.detect.core import unusable_topology
+from hpccd_ros.frames.mesh_file import MeshFileError
+from hpccd_ros.middleware import resources
+from hpccd_ros.robots import urdf
+from hpccd_ros.robots.errors import RobotError
+from hpccd_ros.robots.geometry import Resolver, beside
+from hpccd_ros.robots.robot import Robot
+from hpccd_ros.robots.shapes import MeshFile
+from hpccd_ros.robots.xml_tree import MOST_CHARACTERS
+
+
+def text_of(resource: str) -> str:
+    """Of a file: a path, package:// or file://. Raises RobotError."""
+    try:
+        with open(path_of(resource), encoding="utf-8") as file:
+            return file.read(MOST_CHARACTERS + 1)  # one more than is allowed: what reads it refuses it
+    except (OSError, ValueError, MeshFileError) as error:
+        why = error.strerror if isinstance(error, OSError) else error
+        raise RobotError(f"{resource}: cannot be read: {why}") from error
+
+
+def path_of(resource: str) -> Path:
+    """Raises MeshFileError."""
+    return Path(resources.local_path(resource)).expanduser()
+
+
+def resolver(description: str | None) -> Resolver:
+    """For mesh files of a description. description: its file, from whose folder relative names start; None: it came on
+    a topic."""
+    return resources.local_path if description is None else beside(path_of(description).parent, resources.local_path)
+
+
+def robot_of(name: str, values: Mapping[str, Any], text: str, semantics: str | None, find: Resolver) -> Robot:
+    """values: parameters robot.NAME.*. text, semantics: URDF and SRDF. Raises RobotError."""
+    robot = Robot.of(text, semantics, values["geometry"], find, name=name, tolerance=values["tolerance"])
+    for mesh in robot.meshes:
+        if why := unusable_topology(mesh.topology):
+            raise RobotError(f"link {mesh.link}: {why}")
+    return robot
+
+
+def mesh_uris(text: str, geometry: str) -> Iterator[str]:
+    """Of all mesh files that a description names, each once, in its order. Raises RobotError."""
+    shapes = (part.shape for link in urdf.parse(text, geometry).links for part in link.geometry)
+    yield from dict.fromkeys(shape.uri for shape in shapes if isinstance(shape, MeshFile))

@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Subscriptions to joint states: those that come go to their robots, and frames that waited for them go on."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from rclpy.node import Node
+from rclpy.subscription import Subscription
+from sensor_msgs.msg import JointState
+
+from hpccd_ros.frames.pipeline import FramePipeline
+from hpccd_ros.frames.rate_limit import RateLimit
+from hpccd_ros.middleware import joint_messages, qos, qos_overrides
+from hpccd_ros.node.accounts import Accounts
+from hpccd_ros.node.hand_over import hand_over
+from hpccd_ros.params import robot_parameters
+from hpccd_ros.params.table import ROBOT
+from hpccd_ros.robots.joint_frames import JointFrames
+
+
+class JointSubscriptions:
+    """Subscribed from construction until ``close``. of_robots: robot -> what its joint states move."""
+
+    def __init__(
+        self,
+        node: Node,
+        settings: dict[str, Any],
+        pipeline: FramePipeline,
+        of_robots: Mapping[str, JointFrames],
+        accounts: Accounts,
+    ) -> None:
+        self._node = node
+        self._settings = settings
+        self._pipeline = pipeline
+        self._of_robots = of_robots
+        self._accounts = accounts
+        self._subscriptions = [
+            self._subscribe(topic, robots) for topic, robots in robot_parameters.joint_topics(settings[ROBOT]).items()
+        ]
+
+    def close(self) -> None:
+        for subscription in self._subscriptions:
+            self._node.destroy_subscription(subscription)
+        self._subscriptions.clear()
+
+    def warnings(self) -> list[str]:
+        """Topics that nobody publishes."""
+        silent = [s.topic_name for s in self._subscriptions if not self._node.count_publishers(s.topic_name)]
+        return [f"nobody publishes {topic}" for topic in silent]
+
+    def _subscribe(self, topic: str, robots: list[str]) -> Subscription:
+        limit = RateLimit(self._settings["max_rate"])
+        moved = [self._of_robots[robot] for robot in robots]
+
+        def receive(message: JointState) -> None:
+            if not limit.allows():
+                self._warn(
+                    topic, f"more than max_rate = {self._settings['max_rate']:g} messages a second; some are dropped"
+                )
+                return
+            for refusal in joint_messages.fill(moved, message, topic):
+                self._warn(topic, refusal.text)
+            for outcome in self._pipeline.retry():
+                hand_over(outcome, self._pipeline, self._accounts)
+
+        profile = qos.joint_states(self._settings["input_reliability"])
+        return qos_overrides.create_subscription(self._node, JointState, topic, receive, profile)
+
+    def _warn(self, topic: str, text: str) -> None:
+        self._accounts.connections["joint_states_refused"] += 1
+        self._node.get_logger().warning(f"{topic}: {text}", throttle_duration_sec=10.0)

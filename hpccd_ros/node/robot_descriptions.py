@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The robots of a configured node: those of files at once, those of topics when their description has come."""
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+from std_msgs.msg import String
+
+from hpccd_ros.base.quoting import shortened
+from hpccd_ros.middleware import qos, qos_overrides, robot_files
+from hpccd_ros.node.life_cycle import GuardedLifecycleNode
+from hpccd_ros.params import robot_parameters
+from hpccd_ros.params.table import ROBOT
+from hpccd_ros.params.values import ParameterError
+from hpccd_ros.robots.errors import RobotError
+from hpccd_ros.robots.robot import Robot
+
+# s between two scenes: reading a robot takes up to seconds, and anybody may publish descriptions.
+PERIOD = 1.0
+LONGEST = 500
+
+
+class RobotDescriptions:
+    """``robots``: name -> robot, of those that are known; a description that cannot be used leaves the one before.
+
+    on_change: called when a robot has become known, or another one. Raises ParameterError for a file that cannot be
+    used.
+    """
+
+    def __init__(self, node: GuardedLifecycleNode, settings: dict[str, Any], on_change: Callable[[], None]) -> None:
+        self._node = node
+        self._values = settings[ROBOT]
+        self._on_change = on_change
+        self._semantics: dict[str, str | None] = {}
+        self._texts: dict[str, str] = {}  # in use
+        self._waiting: dict[str, str] = {}  # came too soon after the last
+        self._refused: dict[str, str] = {}  # why the last description was
+        self._changed = -PERIOD
+        self.robots: dict[str, Robot] = {}
+        self._topics = robot_parameters.topics(settings[ROBOT])
+        for name in self._values:
+            self._read_files(name)
+        for name, topic in self._topics.items():
+            self._listen(name, topic)
+        if self._topics:
+            node.configured_timer(PERIOD, self._take_waiting)
+
+    @property
+    def complete(self) -> bool:
+        return len(self.robots) == len(self._values)
+
+    def warnings(self) -> list[str]:
+        """Which robots are not known, and which descriptions cannot be used."""
+        unheard = [
+            f"robot {name} waits for its description on {self._node.resolve_topic_name(topic)}"
+            for name, topic in self._topics.items()
+            if name not in self.robots and name not in self._refused
+        ]
+        return unheard + [f"robot {name}: {why}" for name, why in self._refused.items()]
+
+    def _read_files(self, name: str) -> None:
+        values, given = self._values[name], ""
+        try:
+            given = "srdf"
+            self._semantics[name] = robot_files.text_of(values["srdf"]) if values["srdf"] else None
+            if name in self._topics:
+                return
+            given = "description"
+            text = robot_files.text_of(values["description"])
+            self.robots[name] = self._made(name, text)
+        except RobotError as error:
+            raise ParameterError(f"{ROBOT}.{name}.{given}: {shortened(error, LONGEST)}") from error
+
+    def _made(self, name: str, text: str) -> Robot:
+        values = self._values[name]
+        file = None if name in self._topics else values["description"]
+        return robot_files.robot_of(name, values, text, self._semantics[name], robot_files.resolver(file))
+
+    def _listen(self, name: str, topic: str) -> None:
+        subscription = qos_overrides.create_subscription(
+            self._node, String, topic, lambda message: self._receive(name, message.data), qos.DESCRIPTION
+        )
+        self._node.when_unconfigured(lambda: self._node.destroy_subscription(subscription))
+
+    def _receive(self, name: str, text: str) -> None:
+        if text == self._texts.get(name):
+            self._waiting.pop(name, None)
+            return
+        self._waiting[name] = text
+        if time.monotonic() - self._changed >= PERIOD:
+            self._take_waiting()
+
+    def _take_waiting(self) -> None:
+        if not self._waiting:
+            return
+        waiting, self._waiting = self._waiting, {}
+        known = dict(self.robots)
+        for name, text in waiting.items():
+            self._take(name, text)
+        self._changed = time.monotonic()
+        if self.robots != known:
+            self._on_change()
+
+    def _take(self, name: str, text: str) -> None:
+        try:
+            self.robots[name] = self._made(name, text)
+        except RobotError as error:
+            kept = "; the one before stays in use" if name in self.robots else ""
+            self._refused[name] = f"{shortened(error, LONGEST)}{kept}"
+            self._node.get_logger().error(f"robot {name}: {self._refused[name]}")
+            return
+        self._texts[name] = text
+        self._refused.pop(name, None)

@@ -1,0 +1,127 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the parameters robot.NAME.* say: where the description comes from, and what moves the links."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from hpccd_ros.base.quoting import shortened
+from hpccd_ros.frames.types import MeshSettings
+from hpccd_ros.params.table import ROBOT
+from hpccd_ros.params.values import ParameterError, robot_rows
+from hpccd_ros.rigid.transform import Rigid
+from hpccd_ros.robots.joint_frames import JointFrames
+from hpccd_ros.robots.robot import Robot
+
+#: Those whose description is known.
+Robots = Mapping[str, Robot]
+NO_ROBOTS: Robots = {}
+#: Robot -> parameters robot.NAME.*.
+RobotValues = Mapping[str, Mapping[str, Any]]
+
+
+def of(parameters: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+    """Robot -> parameters robot.NAME.* out of all those of a node by full name; what is not set has its default."""
+    return {
+        robot: {
+            row.name: row.default if (value := parameters.get(name)) is None else value
+            for row, name in robot_rows(robot)
+        }
+        for robot in parameters.get("robots") or []
+    }
+
+
+def comes_on_topic(description: str) -> bool:
+    """Whether parameter robot.NAME.description names a topic, whose name has no point, and no file."""
+    return "." not in description
+
+
+def topics(robots: RobotValues) -> dict[str, str]:
+    """Robot -> topic of its description, of those that have theirs from one."""
+    return {name: values["description"] for name, values in robots.items() if comes_on_topic(values["description"])}
+
+
+def joint_topics(robots: RobotValues) -> dict[str, list[str]]:
+    """Topic of joint states -> robots that it moves."""
+    found: dict[str, list[str]] = {}
+    for name, values in robots.items():
+        if values["joint_states"]:
+            found.setdefault(values["joint_states"], []).append(name)
+    return found
+
+
+def subscribed(robots: RobotValues) -> list[str]:
+    """Topics of descriptions and joint states."""
+    return [*dict.fromkeys(topics(robots).values()), *joint_topics(robots)]
+
+
+def need_transforms(robots: RobotValues) -> bool:
+    """Whether transforms move one of them, or its base."""
+    return any(not (values["joint_states"] and values["pose"]) for values in robots.values())
+
+
+def check(settings: dict[str, Any]) -> None:
+    """Raises ParameterError."""
+    for name, values in settings[ROBOT].items():
+        prefix = f"{ROBOT}.{name}"
+        if not values["description"]:
+            raise ParameterError(
+                f"{prefix}.description: empty; give the name of a topic, as robot_description, or of a URDF file"
+            )
+        pose(name, values)
+        if values["pose"] and not values["joint_states"]:
+            raise ParameterError(
+                f"{prefix}.pose: is for a robot that joint states move; give {prefix}.joint_states, or leave the pose "
+                "to transforms"
+            )
+        if need_transforms({name: values}) and not settings["frame_id"]:
+            ways = "" if not values["joint_states"] else f", or give {prefix}.pose"
+            what = "the root link is" if values["joint_states"] else "links are"
+            raise ParameterError(
+                f"{prefix}: {what} placed by transforms, which need a frame to transform to; set parameter frame_id"
+                f"{ways}"
+            )
+
+
+def pose(name: str, values: Mapping[str, Any]) -> Rigid | None:
+    """robot.NAME.pose; None: not given. Raises ParameterError."""
+    numbers = values["pose"]
+    if not numbers:
+        return None
+    try:
+        if len(numbers) != 7:
+            raise ValueError(
+                f"has {len(numbers)} numbers; x y z of a translation and x y z w of a quaternion are seven"
+            )
+        return Rigid.of(numbers[:3], numbers[3:])
+    except ValueError as error:
+        raise ParameterError(f"{ROBOT}.{name}.pose: {shortened(numbers)} {error}") from error
+
+
+def links(robots: Robots) -> dict[str, tuple[str, ...]]:
+    """Robot -> names of its meshes."""
+    return {name: tuple(mesh.name for mesh in robot.meshes) for name, robot in robots.items()}
+
+
+def mesh_settings(settings: dict[str, Any], robots: Robots) -> tuple[MeshSettings, ...]:
+    """Of all links, in the order of parameter ``robots`` and of the descriptions."""
+    return tuple(
+        mesh
+        for name, values in settings[ROBOT].items()
+        if name in robots
+        for mesh in robots[name].settings(values["frame_prefix"], by_joints=bool(values["joint_states"]))
+    )
+
+
+def followers(settings: dict[str, Any], robots: Robots, most_waiting: int) -> dict[str, JointFrames]:
+    """Robot -> frames of its links, of those that joint states move."""
+    return {
+        name: JointFrames(
+            robots[name],
+            pose(name, values),
+            values["frame_prefix"] + robots[name].description.root,
+            settings["frame_id"],
+            most_waiting,
+        )
+        for name, values in settings[ROBOT].items()
+        if name in robots and values["joint_states"]
+    }

@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The files that a recording carries along: without them a replay elsewhere could not rebuild its scene."""
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from hpccd_ros.base.errors import UserError
+from hpccd_ros.frames.mesh_file import MeshFileError
+from hpccd_ros.middleware import robot_files
+from hpccd_ros.middleware.resources import local_path
+from hpccd_ros.params import robot_parameters
+from hpccd_ros.robots.errors import RobotError
+
+Files = list[tuple[str, bytes]]
+
+
+def attachment_name(mesh: str, path: str) -> str:
+    """Name of the attachment with the file `path` of a mesh; its suffix tells the format."""
+    return f"mesh/{mesh}/{Path(path).name}"
+
+
+def description_name(robot: str) -> str:
+    return f"robot/{robot}/description.urdf"
+
+
+def semantics_name(robot: str) -> str:
+    return f"robot/{robot}/semantics.srdf"
+
+
+def link_mesh_name(robot: str, number: int, uri: str) -> str:
+    """Of the mesh file that is the ``number``-th of those that the robot's description names."""
+    return f"robot/{robot}/mesh/{number}/{Path(uri).name}"
+
+
+def files(parameters: dict) -> tuple[Files, list[str]]:
+    """([(attachment name, content)] of the files that the node's parameters name, [what could not be read])."""
+    found: Files = []
+    missing: list[str] = []
+    for mesh in parameters["meshes"] or []:  # None: never set
+        if path := parameters.get(f"mesh.{mesh}.file"):
+            _read(f"mesh file {path}", attachment_name(mesh, path), path, found, missing)
+    for robot, values in robot_parameters.of(parameters).items():
+        if path := values["srdf"]:
+            _read(f"SRDF {path}", semantics_name(robot), path, found, missing)
+        path = values["description"]
+        if not robot_parameters.comes_on_topic(path):
+            _read(f"URDF {path}", description_name(robot), path, found, missing)
+            text = next((data for name, data in found if name == description_name(robot)), b"")
+            of_links, unread = link_meshes(robot, values, text.decode("utf-8", "replace")) if text else ([], [])
+            found += of_links
+            missing += unread
+    return found, missing
+
+
+def link_meshes(robot: str, values: Mapping[str, Any], text: str) -> tuple[Files, list[str]]:
+    """As `files`, of those that the description ``text`` names. values: parameters robot.NAME.*."""
+    found: Files = []
+    missing: list[str] = []
+    path = values["description"]
+    try:
+        find = robot_files.resolver(None if robot_parameters.comes_on_topic(path) else path)
+        uris: Iterable[str] = list(robot_files.mesh_uris(text, values["geometry"]))
+    except (RobotError, MeshFileError):
+        return [], []  # the node has no such robot either, and says why
+    for number, uri in enumerate(uris):
+        try:
+            file = find(uri)
+        except (MeshFileError, UserError) as error:
+            missing.append(_missing(f"mesh file {uri}", error))
+            continue
+        _read(f"mesh file {uri}", link_mesh_name(robot, number, uri), file, found, missing)
+    return found, missing
+
+
+def _read(what: str, name: str, path: str, found: Files, missing: list[str]) -> None:
+    try:
+        found.append((name, Path(local_path(path)).expanduser().read_bytes()))
+    except (OSError, MeshFileError) as error:
+        missing.append(_missing(what, error.strerror if isinstance(error, OSError) else error))
+
+
+def _missing(what: str, why: object) -> str:
+    return f"{what} is not in the recording ({why}): a replay will need it at that place"

@@ -1,0 +1,86 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The robots of a recording: their descriptions from its attachments or messages, and the mesh files that these
+name."""
+
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+from hpccd_ros.bag.decode import make_decoder
+from hpccd_ros.bag.reader import Recording, RecordingError
+from hpccd_ros.frames.mesh_file import FORMATS, MeshFileError
+from hpccd_ros.middleware import robot_files
+from hpccd_ros.params import robot_parameters
+from hpccd_ros.params.robot_parameters import RobotValues
+from hpccd_ros.record import attachments
+from hpccd_ros.robots.errors import RobotError
+from hpccd_ros.robots.geometry import Resolver
+from hpccd_ros.robots.robot import Robot
+
+
+def of_recording(recording: Recording, robots: RobotValues, topics: Mapping[str, str]) -> dict[str, Robot]:
+    """topics: of the recording, by the name that the parameters have. Raises RecordingError."""
+    found = {}
+    for name, values in robots.items():
+        try:
+            text = _description(recording, name, values, topics)
+            semantics = _semantics(recording, name, values)
+            with tempfile.TemporaryDirectory() as folder:
+                find = _resolver(recording, name, values, text, Path(folder))
+                found[name] = robot_files.robot_of(name, values, text, semantics, find)
+        except (RobotError, MeshFileError) as error:
+            raise RecordingError(f"{recording.path}: robot {name}: {error}") from error
+    return found
+
+
+def _description(recording, name: str, values: Mapping[str, Any], topics: Mapping[str, str]) -> str:
+    description = values["description"]
+    if not robot_parameters.comes_on_topic(description):
+        return _text(recording, attachments.description_name(name), description)
+    topic = topics.get(description)
+    if topic is None or not recording.topics[topic].count:
+        raise RobotError(f"its description came on {description}, of which the recording has no message")
+    decode = make_decoder(recording.topics[topic])
+    texts = dict.fromkeys(decode(message).data for message in recording.messages([topic]))
+    if len(texts) > 1:
+        raise RobotError(
+            f"its description on {description} changed while it was recorded; only the parts before and after can be "
+            "computed again: cut the recording in two"
+        )
+    return next(iter(texts))
+
+
+def _semantics(recording, name: str, values: Mapping[str, Any]) -> str | None:
+    return _text(recording, attachments.semantics_name(name), values["srdf"]) if values["srdf"] else None
+
+
+def _text(recording, attachment: str, path: str) -> str:
+    if attachment not in recording.attachments:
+        return robot_files.text_of(path)
+    try:
+        return recording.attachments[attachment].decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise RobotError(f"{attachment}: is no text: {error}") from error
+
+
+def _resolver(recording, name: str, values: Mapping[str, Any], text: str, folder: Path) -> Resolver:
+    """Of what is attached a copy in ``folder``, of all else the file itself."""
+    description = values["description"]
+    otherwise = robot_files.resolver(None if robot_parameters.comes_on_topic(description) else description)
+    names = {
+        uri: attachments.link_mesh_name(name, number, uri)
+        for number, uri in enumerate(robot_files.mesh_uris(text, values["geometry"]))
+    }
+
+    def find(uri: str) -> str:
+        data = recording.attachments.get(names.get(uri, ""))
+        if data is None:
+            return otherwise(uri)
+        # A name of our own: that of a recording may be any.
+        suffix = PurePosixPath(uri).suffix
+        copy = folder / f"mesh{suffix if suffix.lower() in FORMATS else ''}"
+        copy.write_bytes(data)
+        return str(copy)
+
+    return find

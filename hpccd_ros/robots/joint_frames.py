@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Frames of all links of a robot at the stamps of others, where joint states move it.
+
+Frames wait, in the order in which they were asked for, until joint states, and the transform of the base where one is
+needed, have passed their stamp: values are interpolated, never extrapolated.
+"""
+
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from hpccd_ros.frames.drops import Reason, Refusal
+from hpccd_ros.frames.follower import Followed
+from hpccd_ros.frames.transform_buffer import NoTransformError, TransformBuffer
+from hpccd_ros.frames.types import MeshFrame
+from hpccd_ros.rigid.transform import Rigid
+from hpccd_ros.robots.errors import RobotError
+from hpccd_ros.robots.joint_history import JointHistory, NoJointStateError
+from hpccd_ros.robots.robot import Robot
+
+
+@dataclass
+class _Asked:
+    """``awaited``: what it waits for, in words."""
+
+    stamp: int
+    received: float
+    new_publisher: bool
+    awaited: str = ""
+
+
+class JointFrames:
+    """A frames.follower.Follower. ``names``: of the meshes of ``robot``.
+
+    base: where the root link stands in the scene; None: the transform from the frame ``root`` to ``target``, that of
+    the scene, says it. most_waiting: frames of each mesh.
+    """
+
+    def __init__(self, robot: Robot, base: Rigid | None, root: str, target: str, most_waiting: int) -> None:
+        self.names: Sequence[str] = tuple(mesh.name for mesh in robot.meshes)
+        self._robot = robot
+        self._base = base
+        self._root = root
+        self._target = target
+        self._most_waiting = most_waiting
+        self._history = JointHistory(robot.kinematics)
+        self._waiting: deque[_Asked] = deque()
+
+    @property
+    def waiting(self) -> int:
+        return len(self._waiting) * len(self.names)
+
+    def add(self, stamp: int, names: Sequence[str], positions: Sequence[float]) -> None:
+        """A joint state. Raises RobotError, and then nothing of it is kept."""
+        self._history.add(stamp, names, positions)
+
+    def ask(self, stamp: int, received: float, new_publisher: bool) -> None:
+        self._waiting.append(_Asked(stamp, received, new_publisher))
+
+    def retry(self, transforms: TransformBuffer) -> Followed:
+        refusals: list[Refusal] = []
+        times: list[list[tuple[str, MeshFrame, bool]]] = []
+        while self._waiting:
+            asked = self._waiting[0]
+            try:
+                frames = self._frames(asked, transforms)
+            except (NoJointStateError, NoTransformError) as error:
+                asked.awaited = str(error)
+                too_many = len(self._waiting) > self._most_waiting
+                if not (error.final or too_many):
+                    break
+                lacking = isinstance(error, NoJointStateError)
+                refusals += self._refused(Reason.NO_JOINT_STATE if lacking else Reason.NO_TRANSFORM, asked.awaited)
+            except RobotError as error:
+                refusals += self._refused(Reason.OUT_OF_RANGE, str(error))
+            else:
+                times.append(frames)
+            self._waiting.popleft()
+        return Followed(refusals, times)
+
+    def latest(self, transforms: TransformBuffer) -> list[int | None]:
+        try:
+            of_joints = self._history.latest()
+        except NoJointStateError as error:
+            raise NoTransformError(str(error), final=False) from error
+        return [of_joints] if self._base is not None else [of_joints, transforms.latest(self._root, self._target)]
+
+    def clear(self, reason: Reason) -> list[Refusal]:
+        refusals = [Refusal(name, reason) for _ in self._waiting for name in self.names]
+        self._waiting.clear()
+        return refusals
+
+    def forget_future(self, stamp: int) -> None:
+        self._history.forget_future(stamp)
+
+    def forget(self) -> None:
+        self._history.clear()
+
+    def warnings(self) -> list[str]:
+        return [f"{self._robot.name} waits: {self._waiting[0].awaited}"] if self._waiting else []
+
+    def _frames(self, asked: _Asked, transforms: TransformBuffer) -> list[tuple[str, MeshFrame, bool]]:
+        values = self._history.at(asked.stamp)
+        base = self._base
+        if base is None:
+            base = transforms.lookup(self._root, self._target, asked.stamp)
+        # One state for all links: what a step computes of the joints is then computed once.
+        placements = self._robot.placements(self._robot.kinematics.state(values, base))
+        return [
+            (
+                name,
+                MeshFrame(
+                    asked.stamp,
+                    placement.vertices,
+                    version=0,
+                    frame_id=self._target,
+                    received=asked.received,
+                    placement=placement,
+                ),
+                asked.new_publisher,
+            )
+            for name, placement in zip(self.names, placements, strict=True)
+        ]
+
+    def _refused(self, reason: Reason, text: str) -> list[Refusal]:
+        """The text once: it is of the robot, not of a link."""
+        first, *others = self.names
+        return [Refusal(first, reason, text), *(Refusal(name, reason) for name in others)]
