@@ -6,6 +6,8 @@ import crane
 import numpy as np
 import pytest
 from geometry_msgs.msg import TransformStamped
+from lifecycle_msgs.msg import Transition
+from node_calls import change_state, set_parameter
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from waving_sheet import sheet_faces, sheet_positions
@@ -60,7 +62,7 @@ def assert_answer(message, k, by_joints=True):
 
 
 def parameters(**robot):
-    robot = {"description": "robot_description", **robot}
+    robot = {"description": "robot_description"} | robot
     return {
         "meshes": ["cloth"], "robots": ["crane"], "frame_id": "world", "rigid_tolerance": TOLERANCE,
         **{f"robot.crane.{key}": value for key, value in robot.items()},
@@ -121,3 +123,168 @@ def test_streamed_recorded_and_verified(start_node, tmp_path, by, given):
         replay = Replay(recording, recorded_setup.of_recording(recording))
         steps = list(replay.steps())
     assert replay.diverged == replay.unverified == 0 and replay.verified == len(steps) == 5
+
+
+def test_a_robot_alone_moves_at_the_times_of_its_joint_states(start_node):
+    node = start_node({**parameters(**JOINTS), "meshes": [""], "ignored_pairs": [""]})
+    describe(node, crane.URDF.replace('"reach" type="prismatic"', '"reach" type="continuous"'))
+    publisher = node.peer.publisher(JointState, "joint_states")
+    for k in range(1, 4):
+        publisher.publish(crane.joint_state(k, k))
+        node.frames_status(answered=3 * k, received=3 * k)
+    assert [message.header.stamp.nanosec for message in node.contacts(2)] == [2, 3]
+    far = crane.joint_state(4, 4)
+    far.position[0] = 1e10
+    publisher.publish(far)
+    values = node.frames_status(dropped__out_of_range=3)
+    assert "positions: not finite, or beyond 1e+09, for turn" in values["last_refusal"]
+
+
+def test_a_base_that_moves_by_transforms(start_node):
+    node = start_node(parameters(joint_states="joint_states", frame_prefix="left_"))
+    describe(node)
+    node.peer.topology("cloth", SHEET.faces, SHEET.n_vertices)
+    joints = node.peer.publisher(JointState, "joint_states")
+    tree = node.peer.publisher(TransformStamped, "transforms", qos.TRANSFORMS)
+    for k, awaited in ((1, "crane waits: no transform connects 'left_mast'"), (2, "crane waits: the last one from")):
+        joints.publish(crane.joint_state(k, k))
+        cloth(node, k)
+        node.wait_until(lambda awaited=awaited: awaited in node.peer.statuses["frames"][1], "a word of it")
+        tree.publish(next(transforms(k, "left_")))  # of the root
+        node.frames_status(answered=4 * k)
+    assert_answer(node.contacts(1)[-1], 2)
+
+
+def test_frames_wait_for_joint_states_and_take_what_lies_between_two(start_node):
+    node = start_node(parameters(**JOINTS))
+    describe(node)
+    node.peer.topology("cloth", SHEET.faces, SHEET.n_vertices)
+    joints = node.peer.publisher(JointState, "joint_states")
+    cloth(node, 10)
+    values = node.frames_status(waiting=4)
+    node.wait_until(
+        lambda: "crane waits: no joint state has told of turn, reach" in node.peer.statuses["frames"][1], "a word of it"
+    )
+    half = crane.joint_state(0, 5)
+    half.name, half.position = half.name[:1], half.position[:1]
+    joints.publish(half)
+    joints.publish(crane.joint_state(0, 5))
+    joints.publish(crane.joint_state(2, 15))
+    values = node.frames_status(answered=4, waiting=0)
+    cloth(node, 12)
+    assert node.contacts(1)[0].start.nanosec == 10
+    wrong = crane.joint_state(1, 20)
+    wrong.position = wrong.position[:1]
+    joints.publish(wrong)
+    node.frames_status(joint_states_refused=1)
+    not_finite = crane.joint_state(1, 20)
+    not_finite.position[1] = float("nan")
+    joints.publish(not_finite)
+    node.frames_status(joint_states_refused=2)
+    assert values["restarts"] == "0" and node.process.poll() is None
+
+
+def test_the_clock_is_set_back(start_node):
+    second = 1_000_000_000
+    node = start_node({**parameters(**JOINTS), "restart_after": 2})
+    describe(node)
+    node.peer.topology("cloth", SHEET.faces, SHEET.n_vertices)
+    joints = node.peer.publisher(JointState, "joint_states")
+    for k in (50, 51):
+        joints.publish(crane.joint_state(k, k * second))
+        node.peer.vertices("cloth", sheet_positions(N, k), stamp=k * second, frame_id="world")
+        node.frames_status(answered=4 * (k - 49))
+    for k in (1, 2, 3):
+        joints.publish(crane.joint_state(k, k * second))
+        node.peer.vertices("cloth", sheet_positions(N, k), stamp=k * second, frame_id="world")
+    node.frames_status(restarts=1)
+    answer = node.contacts(2)[-1]
+    assert (answer.start.sec, answer.header.stamp.sec) == (2, 3)
+    options = Options(backend="cpu", rigid=RigidOptions(TOLERANCE, 64))
+    assert answer.hash == StepDetector(BUILDER, options).detect(frame(2), frame(3)).contacts.hash
+
+
+def test_another_description_makes_another_scene(start_node):
+    node = start_node({**parameters(**JOINTS), "stop_distance": 0.01, "stop_timeout": 10.0})
+    node.wait_until(lambda: "robot crane waits for its description on" in node.peer.statuses["frames"][1], "who waits")
+    publisher = describe(node, "<robot><link name='a'/></robot>")
+    node.wait_until(
+        lambda: "robot crane: geometry: no link has <collision>" in node.peer.statuses["frames"][1], "what is wrong"
+    )
+    assert node.peer.statuses["stop"][2]["stop"] == "True"
+    publisher.publish(String(data=crane.URDF))
+    node.peer.topology("cloth", SHEET.faces, SHEET.n_vertices)
+    joints = node.peer.publisher(JointState, "joint_states")
+    for k in (1, 2):
+        joints.publish(crane.joint_state(k, k))
+        cloth(node, k)
+        node.frames_status(answered=4 * k)
+    assert_answer(node.contacts(1)[-1], 2)
+    longer = crane.URDF.replace('"0.6 0.06 0.04"', '"0.9 0.06 0.04"')
+    publisher.publish(String(data="<robot"))
+    node.wait_until(
+        lambda: "the one before stays in use" in node.peer.statuses["frames"][1], "what is wrong with the second"
+    )
+    publisher.publish(String(data=longer))
+    node.wait_until(lambda: "stays in use" not in node.peer.statuses["frames"][1], "the third description")
+    node.peer.topology("cloth", SHEET.faces, SHEET.n_vertices)
+    robot = crane.robot(longer)
+    for k in (3, 4):
+        joints.publish(crane.joint_state(k, k))
+        cloth(node, k)
+    answer = node.contacts(2)[-1]
+    placements = [robot.placements(robot.kinematics.state(crane.values(k), BASE)) for k in (3, 4)]
+    frames = [
+        SceneFrame(k, k, "world", (SHEET, *(mesh.topology for mesh in robot.meshes)),
+                   (sheet_positions(N, k), *(p.vertices for p in at)), NAMES, 0.0, (None, *at))
+        for k, at in zip((3, 4), placements, strict=True)
+    ]  # fmt: skip
+    options = Options(backend="cpu", rigid=RigidOptions(TOLERANCE, 64))
+    assert answer.hash == StepDetector(BUILDER, options).detect(*frames).contacts.hash
+
+
+def test_a_file_that_cannot_be_used_ends_the_start(start_node, tmp_path):
+    file = tmp_path / "crane.urdf"
+    for text, why in ((None, "No such file"), ("<robot/>", "has no <link>")):
+        if text is not None:
+            file.write_text(text)
+        node = start_node({**parameters(**{**JOINTS, "description": str(file)}), "autostart": False}, wait=False)
+        assert not change_state(node, Transition.TRANSITION_CONFIGURE)
+        assert "cannot configure: robot.crane.description: " in node.output() and why in node.output()
+        file.write_text(crane.URDF)  # mended while the node runs
+        for transition in (Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE):
+            assert change_state(node, transition)
+        assert node.stop() == 0
+
+
+def test_pairs_name_robots_and_links(start_node):
+    node = start_node({
+        **parameters(**JOINTS), "pair_separation": ["crane:cloth:0.01", "crane/hook:cloth:0.02"],
+        "ignored_pairs": ["crane:crane"],
+    })  # fmt: skip
+    describe(node)
+    refused = set_parameter(node, "pair_separation", ["crane/hoek:cloth:0.02"])
+    assert not refused.successful and "'crane' has no link of this name" in refused.reason, refused.reason
+    assert not set_parameter(node, "pair_separation", ["crane/:cloth:0.02"]).successful
+    node.peer.topology("cloth", SHEET.faces, SHEET.n_vertices)
+    joints = node.peer.publisher(JointState, "joint_states")
+    for k in (1, 2):
+        joints.publish(crane.joint_state(k, k))
+        cloth(node, k)
+        node.frames_status(answered=4 * k)
+    answer = node.contacts(1)[-1]
+    names = list(answer.mesh_names)
+    told = {
+        (names[a], names[b]): distance
+        for a, b, distance in zip(
+            answer.separation_mesh_a, answer.separation_mesh_b, answer.separations, strict=True
+        )
+    }
+    assert {frozenset(pair): value for pair, value in told.items()} == {
+        frozenset(("cloth", "crane/mast")): 0.01,
+        frozenset(("cloth", "crane/boom")): 0.01,
+        frozenset(("cloth", "crane/hook")): 0.02,
+    }
+    assert not {(names[a], names[b]) for a, b in zip(answer.mesh_a, answer.mesh_b, strict=True)} & {
+        ("crane/mast", "crane/hook"), ("crane/hook", "crane/mast")
+    }  # fmt: skip
