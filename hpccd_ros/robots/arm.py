@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """An arm to try and to test with: seven joints that turn, a gripper of two fingers, and a motion of it.
 
-It stands at the origin beside a table whose top is the plane z = 0. In six seconds its gripper comes down at the edge
-of a cloth, closes, drags it across the table, opens and lifts. Metres, radians, seconds; z points up. The elbow swings
-aside on the way, so that all seven joints turn. At all joints 0 the arm stands upright.
+It stands at the origin beside a table whose top is the plane z = 0. In six seconds its gripper comes down on a cloth
+near its edge, closes, raises what it holds a little, drags the cloth across the table, opens and lifts. Metres,
+radians, seconds; z points up. The elbow swings aside on the way, so that all seven joints turn. At all joints 0 the arm
+stands upright.
 """
 
 import math
@@ -20,14 +21,20 @@ DURATION = 6.0
 #: The table's top: x from, to; y from, to; at z = 0.
 TABLE = (0.30, 0.90, -0.50, 0.50)
 #: Where the fingers close and open (x, y), and how far their tips are above the table then.
-GRASP, RELEASE, CLEARANCE = (0.60, -0.15), (0.55, 0.25), 0.004
+GRASP, RELEASE, CLEARANCE = (0.60, -0.15), (0.55, 0.25), 0.001
+#: How far their tips are raised above that while they drag.
+RAISED = 0.04
+#: When they begin to close, are closed, begin to open, are open.
+CLOSING, OPENING = (1.5, 2.0), (5.0, 5.5)
+#: Of each finger's box: across the way they close, along it, down; its upper end is this far above its tip.
+FINGER_SIZE = (0.02, 0.012, 0.06)
 #: Of each finger from the middle, when open and when closed.
 OPEN, CLOSED = 0.04, 0.002
 
 _SHOULDER = 0.34  # above the table
 _UPPER = _FORE = 0.40
-_HAND, _FINGERS, _FINGER_LENGTH = 0.13, 0.06, 0.06  # from the wrist, from the hand
-_TOOL = _HAND + _FINGERS + _FINGER_LENGTH
+_HAND, _FINGERS = 0.13, 0.06  # from the wrist, from the hand
+_TOOL = _HAND + _FINGERS + FINGER_SIZE[2]
 _FLANGE = 0.08
 
 # Each link: the joint's distance from the one before, its axis, limit, and shapes: kind, sizes, centre's z.
@@ -58,7 +65,7 @@ def description(name: str = NAME) -> str:
         limits = f'<limit lower="0" upper="{OPEN}" effort="20" velocity="0.2"/>'
         mimic = f'<mimic joint="{FINGER}" multiplier="1" offset="0"/>' if side == "right" else ""
         # At 0 the inner faces are in the middle.
-        finger = ("box", (0.02, 0.012, _FINGER_LENGTH), _FINGER_LENGTH / 2, sign * 0.006)
+        finger = ("box", FINGER_SIZE, FINGER_SIZE[2] / 2, sign * FINGER_SIZE[1] / 2)
         parts.append(_link(f"finger_{side}", (finger,)))
         axis = "y" if sign > 0 else "-y"
         parts.append(_joint(f"finger_{side}", "prismatic", "hand", f"finger_{side}", _FINGERS, axis, limits + mimic))
@@ -71,16 +78,25 @@ def joint_positions(t: float) -> dict[str, float]:
     place, yaw = tip(t)
     swivel = 0.2 * (1.0 - math.cos(2.0 * math.pi * t / DURATION))
     turns = _turns(place, yaw, swivel)
-    finger = OPEN + (CLOSED - OPEN) * (_smooth(t, 1.5, 2.0) - _smooth(t, 5.0, 5.5))
-    return dict(zip(JOINTS, turns, strict=True)) | {FINGER: finger, "finger_right": finger}
+    return dict(zip(JOINTS, turns, strict=True)) | {FINGER: finger(t), "finger_right": finger(t)}
+
+
+def finger(t: float) -> float:
+    """How far the inner face of each finger is from the middle."""
+    return OPEN + (CLOSED - OPEN) * (_smooth(t, *CLOSING) - _smooth(t, *OPENING))
 
 
 def tip(t: float) -> tuple[np.ndarray, float]:
-    """Where the point between the fingers' ends is, (3,), and how far the gripper is turned about the vertical."""
-    down, drag, lift = _smooth(t, 0.0, 1.5), _smooth(t, 2.0, 5.0), _smooth(t, 5.5, DURATION)
+    """Where the point between the fingers' ends is, (3,), and how far the gripper is turned about the vertical.
+
+    Sums, products and quotients alone: the same bits on any machine, as in `finger`.
+    """
+    (closing, closed), (opening, opened) = CLOSING, OPENING
+    down, drag, lift = _smooth(t, 0.0, closing), _smooth(t, closed, opening), _smooth(t, opened, DURATION)
+    raised = RAISED * (_smooth(t, closed, closed + 0.8) - _smooth(t, opening - 0.8, opening))
     x = GRASP[0] - 0.08 * (1.0 - down) + (RELEASE[0] - GRASP[0]) * drag
     y = GRASP[1] - 0.10 * (1.0 - down) + (RELEASE[1] - GRASP[1]) * drag
-    z = CLEARANCE + 0.20 * (1.0 - down) + 0.12 * lift
+    z = CLEARANCE + 0.20 * (1.0 - down) + raised + 0.12 * lift
     return np.array([x, y, z]), 0.6 * drag - 0.3
 
 

@@ -59,8 +59,9 @@ def test_it_drags_across_the_table_with_closed_fingers():
     for t, (x, y) in ((2.0, arm.GRASP), (5.0, arm.RELEASE)):
         assert arm.tip(t)[0] == pytest.approx([x, y, arm.CLEARANCE])
         assert arm.TABLE[0] < x < arm.TABLE[1] and arm.TABLE[2] < y < arm.TABLE[3]
+    heights = [arm.tip(t)[0][2] for t in np.linspace(2.0, 5.0, 31)]
+    assert max(heights) == pytest.approx(arm.CLEARANCE + arm.RAISED) and min(heights) == arm.CLEARANCE
     for t in np.linspace(2.0, 5.0, 31):
-        assert arm.tip(t)[0][2] == arm.CLEARANCE
         assert arm.joint_positions(t)[arm.FINGER] == pytest.approx(arm.CLOSED)
     assert arm.joint_positions(0.0)[arm.FINGER] == arm.joint_positions(5.5)[arm.FINGER] == pytest.approx(arm.OPEN)
 
@@ -98,4 +99,5 @@ def test_it_touches_neither_itself_nor_the_table(robot):
         gaps = detector.distances(np.concatenate([*(p.vertices for p in placements), table]))
         named = {frozenset((gap.mesh_a, gap.mesh_b)) for gap in gaps}
         assert len(named) == len(list(combinations(robot.meshes, 2))) - len(robot.ignored_pairs) + len(robot.meshes)
-        assert min(gap.distance for gap in gaps) > 0.003, min(gaps, key=lambda gap: gap.distance)
+        # Between the fingers, and between these and the table.
+        assert min(gap.distance for gap in gaps) > 0.9 * arm.CLEARANCE, min(gaps, key=lambda gap: gap.distance)
