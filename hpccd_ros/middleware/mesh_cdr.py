@@ -14,34 +14,43 @@ import numpy as np
 
 from hpccd_ros.frames.types import NO_EDGES
 
-_LITTLE_ENDIAN = b"\x00\x01\x00\x00"
+LITTLE_ENDIAN = b"\x00\x01\x00\x00"
 
 
 def topology(
     stamp_ns: int, frame_id: str, version: int, faces: np.ndarray, n_vertices: int, edges: np.ndarray = NO_EDGES
 ) -> bytes:
     """hpccd/msg/MeshTopology; `faces` (F,3) and `edges` (E,2) unsigned integers below `n_vertices`."""
-    body = _header(stamp_ns, frame_id) + struct.pack("<II", version, n_vertices)
+    body = header(stamp_ns, frame_id) + struct.pack("<II", version, n_vertices)
     for indices in (faces, edges):
         body += struct.pack("<I", indices.size) + np.ascontiguousarray(indices, dtype="<u4").tobytes()
-    return _LITTLE_ENDIAN + body
+    return LITTLE_ENDIAN + body
 
 
 def vertices(stamp_ns: int, frame_id: str, topology_version: int, step: int, xyz: np.ndarray) -> bytes:
     """hpccd/msg/MeshVertices with `xyz` (V,3) float32 in `vertices_f32`."""
     if xyz.dtype != np.float32:
         raise TypeError(f"xyz has dtype {xyz.dtype}; it is sent as float32: convert it with astype(numpy.float32)")
-    body = _header(stamp_ns, frame_id) + struct.pack("<I", topology_version)
-    body += b"\0" * (-len(body) % 8)
+    body = aligned(header(stamp_ns, frame_id) + struct.pack("<I", topology_version), 8)
     body += struct.pack("<QI", step, xyz.size)
     # The empty vertices_f64 is its length alone; 4-byte floats leave the offset a multiple of 4, as it needs.
     return b"".join(
-        [_LITTLE_ENDIAN, body, np.ascontiguousarray(xyz, dtype="<f4").tobytes(), struct.pack("<I", 0)]
+        [LITTLE_ENDIAN, body, np.ascontiguousarray(xyz, dtype="<f4").tobytes(), struct.pack("<I", 0)]
     )
 
 
-def _header(stamp_ns: int, frame_id: str) -> bytes:
+def header(stamp_ns: int, frame_id: str) -> bytes:
+    """std_msgs/Header, and what brings the next number of 4 bytes to its place."""
     seconds, nanoseconds = divmod(stamp_ns, 1_000_000_000)
-    text = frame_id.encode() + b"\0"
-    body = struct.pack("<iII", seconds, nanoseconds, len(text)) + text
-    return body + b"\0" * (-len(body) % 4)
+    return aligned(struct.pack("<iI", seconds, nanoseconds) + text(frame_id), 4)
+
+
+def text(value: str) -> bytes:
+    """A string: how long it is, itself and a zero."""
+    encoded = value.encode() + b"\0"
+    return struct.pack("<I", len(encoded)) + encoded
+
+
+def aligned(body: bytes, size: int) -> bytes:
+    """`body`, filled up to a multiple of `size` bytes."""
+    return body + b"\0" * (-len(body) % size)
