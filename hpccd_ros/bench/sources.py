@@ -109,7 +109,7 @@ def of_scene(name: str, size: float = 1.0) -> Source:
             Mesh(mesh.name, faces, len(xyz), mesh.static, mesh.self_collision)
             for mesh, faces, xyz in zip(scene.meshes, scene.faces(k + 1), frame, strict=True)
         )
-        return Step(meshes, topology(k + 1), np.concatenate(before), np.concatenate(frame))
+        return Step(meshes, topology(k + 1), np.concatenate(before), np.concatenate(frame), scene.ignored_pairs)
 
     shown = name if size == 1 else f"{name} x {size:g}"
     return Source(shown, scene.n_frames - 1, step)

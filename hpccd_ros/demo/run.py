@@ -44,7 +44,7 @@ def main(args) -> int:
     scene = _scene(args)
     say = console.print
     say(f"[bold]scene[/]      {scene.title}\n           "
-        + ", ".join(f"{m.name} {len(m.faces):,} triangles" for m in scene.meshes)
+        + ", ".join(_parts(scene))
         + f"; {scene.n_frames} frames at {args.rate:g} a second")
     files.write_parameters(scene, folder / PARAMETERS)
     _stream(args, scene, folder, console)
@@ -62,6 +62,13 @@ def _scene(args):
         return scenes.make(args.scene, size=args.size, frames=args.frames, progress=True)
     except ValueError as error:
         raise UserError(f"{error}; `hpccd scene --list` names them") from error
+
+
+def _parts(scene):
+    for mesh in scene.sent_meshes:
+        yield f"{mesh.name} {len(mesh.faces):,} triangles"
+    for robot in scene.robots:
+        yield f"robot {robot.name} of {len(robot.meshes)} links {sum(len(m.faces) for m in robot.meshes):,} triangles"
 
 
 def _stream(args, scene, folder, console):

@@ -16,7 +16,17 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from hpccd_ros.scenes import armadillo, breaking, cloth, cloth_ball, cloth_resolved, n_body, rod_twist, small
+from hpccd_ros.scenes import (
+    arm_and_cloth,
+    armadillo,
+    breaking,
+    cloth,
+    cloth_ball,
+    cloth_resolved,
+    n_body,
+    rod_twist,
+    small,
+)
 from hpccd_ros.scenes.core import core_scene
 from hpccd_ros.scenes.scene import Frame, Mesh, Scene, Topology
 
@@ -50,6 +60,10 @@ def _n_body(triangles):
     )
 
 
+def _arm_and_cloth(name, title, size, frames, seed, progress):
+    return arm_and_cloth.make(name, title, 5_000, size, frames, seed, progress)
+
+
 def _rod_twist(name, title, size, frames, seed, progress):
     return rod_twist.make(name, title, 106_000, size, frames, seed)
 
@@ -73,6 +87,9 @@ _REGISTRY = {
     ),
     "cloth-drop": _Entry(
         "a small cloth falls on a ball that then spins, 7 K triangles", 90, _cloth_drop,
+    ),
+    "arm-and-cloth": _Entry(
+        "an arm takes a cloth between two fingers and drags it across a table, 8 K triangles", 361, _arm_and_cloth,
     ),
     "cloth-ball-like": _Entry(
         "a cloth drapes on a ball that then spins, 92 K triangles", 94, _cloth_ball,
@@ -121,7 +138,8 @@ def make(
     name      one of `names()`
     size      factor on the triangle count, 1/64 to 64, of the same motion (two-triangles has one size only)
     frames    number of frames, at least 2; None for the scene's own. More let the motion go on, fewer cut it
-              off; where the motion is a fixed path (two-triangles, folding-strip) more sample it finer
+              off; where the motion is a fixed path (two-triangles, folding-strip, arm-and-cloth) all show the
+              whole of it, more of them finer
     seed      of the random numbers, 0 to 2**32 - 1 (not of two-triangles and folding-strip)
     progress  show a progress bar on stderr while a motion is simulated (seconds, once: it is cached)
 

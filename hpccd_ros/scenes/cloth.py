@@ -44,17 +44,17 @@ class Setup:
         return self.spin * (0.5 * ramp * ramp / self.spin_ramp + (since - ramp))
 
 
-def _constraints(cells: int, spacing: float):
+def constraints(cells: int, spacing: float, shear: float = 2e-6, bend: float = 5e-5):
     """(slices a, slices b, rest length, compliance) such that no slice pair touches a vertex twice."""
     diagonal = spacing * 2.0**0.5
     # Offset between the two vertices in rows and columns; period along the coloured axis.
     for rows, columns, rest, compliance in (
         (0, 1, spacing, 0.0),
         (1, 0, spacing, 0.0),
-        (1, 1, diagonal, 2e-6),
-        (1, -1, diagonal, 2e-6),
-        (0, 2, 2 * spacing, 5e-5),
-        (2, 0, 2 * spacing, 5e-5),
+        (1, 1, diagonal, shear),
+        (1, -1, diagonal, shear),
+        (0, 2, 2 * spacing, bend),
+        (2, 0, 2 * spacing, bend),
     ):
         axis, reach = (0, rows) if rows else (1, columns)
         for colour in range(2 * reach):
@@ -79,7 +79,7 @@ def simulate(setup: Setup, frames: int, seed: int, show_progress: bool) -> np.nd
     p[2] = setup.ball_radius + setup.drop_height + 1e-3 * random_stream(seed).random_sample((n, n))
     velocity = np.zeros_like(p)
     dt = setup.frame_period / setup.steps_per_frame
-    constraints = list(_constraints(setup.cells, setup.side / setup.cells))
+    springs = list(constraints(setup.cells, setup.side / setup.cells))
     out = np.empty((frames, 3, n, n), dtype=np.float32)
     out[0] = p
     for frame in track(range(1, frames), "simulating the cloth", show_progress):
@@ -89,8 +89,8 @@ def simulate(setup: Setup, frames: int, seed: int, show_progress: bool) -> np.nd
             velocity[2] -= GRAVITY * dt
             before = p.copy()
             p += velocity * dt
-            for a, b, rest, compliance in constraints:
-                _project(p[a], p[b], rest, compliance / (dt * dt))
+            for a, b, rest, compliance in springs:
+                project(p[a], p[b], rest, compliance / (dt * dt))
             turn = setup.ball_angle(time + dt) - setup.ball_angle(time)
             _collide_ball(p, before, setup, turn)
             _collide_ground(p, before, setup)
@@ -100,7 +100,7 @@ def simulate(setup: Setup, frames: int, seed: int, show_progress: bool) -> np.nd
     return out
 
 
-def _project(a, b, rest, softness):
+def project(a, b, rest, softness):
     """One XPBD sweep of distance constraints: ends (3, ...) of unit mass, softness = compliance / dt^2."""
     d = a - b
     distance = np.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2])
@@ -109,7 +109,7 @@ def _project(a, b, rest, softness):
     b += d
 
 
-def _rub(slide, depth, friction):
+def rub(slide, depth, friction):
     """Tangential correction of Coulomb friction: slide (3,N) undone up to friction * depth."""
     size = np.sqrt(slide[0] * slide[0] + slide[1] * slide[1] + slide[2] * slide[2])
     return slide * np.minimum(1.0, friction * depth / np.maximum(size, 1e-12))
@@ -131,7 +131,7 @@ def _collide_ball(p, before, setup, turn):
     carried = np.stack([c * old[0] - s * old[1], s * old[0] + c * old[1], old[2]])  # by the ball's own turn
     slide = q - carried
     slide -= normal * (slide[0] * normal[0] + slide[1] * normal[1] + slide[2] * normal[2])
-    p[:, inside] = q - _rub(slide, depth, setup.friction)
+    p[:, inside] = q - rub(slide, depth, setup.friction)
 
 
 def _collide_ground(p, before, setup):
@@ -143,7 +143,7 @@ def _collide_ground(p, before, setup):
     q[2] = setup.ground
     slide = q - before[:, below]
     slide[2] = 0.0
-    p[:, below] = q - _rub(slide, depth, setup.friction)
+    p[:, below] = q - rub(slide, depth, setup.friction)
 
 
 def refine(grid: np.ndarray, cells: int) -> np.ndarray:

@@ -16,4 +16,6 @@ def core_scene(scene: Scene, index: int = 0):
         core.add_mesh(
             mesh.name, faces, static=mesh.static, self_collision=mesh.self_collision, n_vertices=len(vertices)
         )
+    for a, b in scene.ignored_pairs:
+        core.ignore_pair(a, b)
     return core

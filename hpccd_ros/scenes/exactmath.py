@@ -86,6 +86,13 @@ def axis_angle(axis, angle):
     return np.concatenate([c[..., None], np.asarray(axis) * s[..., None]], axis=-1)
 
 
+def product(a, b):
+    """The turns of unit quaternions `b`, then those of `a` (..., 4; w first)."""
+    w = a[..., 0] * b[..., 0] - dot(a[..., 1:], b[..., 1:])
+    v = a[..., :1] * b[..., 1:] + b[..., :1] * a[..., 1:] + cross(a[..., 1:], b[..., 1:])
+    return np.concatenate([w[..., None], v], axis=-1)
+
+
 def random_stream(seed: int) -> np.random.RandomState:
     """RandomState, whose stream of `random_sample` numpy promises never to change (NEP 19)."""
     return np.random.RandomState(seed)

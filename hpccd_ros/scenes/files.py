@@ -11,7 +11,6 @@ import yaml
 from hpccd_ros.bag.qos_yaml import INFINITE
 from hpccd_ros.bag.writer import BagWriter, Topic
 from hpccd_ros.base.version import package_version
-from hpccd_ros.middleware import message_types, topic_names
 from hpccd_ros.scenes import messages
 from hpccd_ros.scenes.progress import track
 from hpccd_ros.scenes.scene import Scene
@@ -23,7 +22,8 @@ FIRST_STAMP_NS = 1_000_000_000
 def write_mcap(
     scene: Scene, path: str | Path, rate: float, compression: str = "none", progress: bool = False
 ) -> None:
-    """Write all frames, `rate` a second, as `hpccd record` would have recorded them: topologies and vertices.
+    """Write all frames, `rate` a second, as `hpccd record` would have recorded them: topologies and vertices, of robots
+    the description and the joint states.
 
     FileExistsError where `path` exists; LookupError where the package hpccd is not installed.
     """
@@ -36,13 +36,9 @@ def write_mcap(
         "scene": scene.name,
     }
     topics = []
-    for mesh in scene.meshes:
-        for relative, kind, latched in (
-            (topic_names.topology(mesh.name), message_types.TOPOLOGY, True),
-            (topic_names.vertices(mesh.name), message_types.VERTICES, False),
-        ):
-            topics.append(Topic("/" + relative, kind, [_offered(latched)], latched))
-            info["topics"]["/" + relative] = relative
+    for topic in messages.topics(scene):
+        topics.append(Topic("/" + topic.name, topic.type_name, [_offered(topic.latched)], topic.latched))
+        info["topics"]["/" + topic.name] = topic.name
     bag = BagWriter(path, info=info, compression=compression)
     try:
         for topic in topics:
@@ -74,7 +70,7 @@ def write_npz(scene: Scene, path: str | Path, progress: bool = False) -> None:
     """Write all frames for `numpy.load`. For each mesh and each version v of its topology, from 0:
 
     MESH/v/faces (F,3) uint32, MESH/v/first_frame, and MESH/v/vertices (frames of this version, V, 3) float32;
-    beside them `meshes` (names in order), `frame_period` (s) and `scene`.
+    beside them `meshes` (names in order; those of a robot's links are ROBOT/LINK), `frame_period` (s) and `scene`.
     """
     arrays: dict[str, np.ndarray] = {
         "meshes": np.array(scene.mesh_names),

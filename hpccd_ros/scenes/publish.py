@@ -8,11 +8,12 @@ import sys
 import time
 
 import rclpy
-from hpccd.msg import MeshTopology, MeshVertices
 from rclpy.signals import SignalHandlerOptions
 
-from hpccd_ros.middleware import environment, qos, stop_signals, topic_names
+from hpccd_ros.middleware import environment, qos, stop_signals
 from hpccd_ros.middleware.listeners import await_acknowledged, await_subscribers
+from hpccd_ros.middleware.message_types import message_class
+from hpccd_ros.scenes import messages
 from hpccd_ros.scenes.answers import Answers
 from hpccd_ros.scenes.messages import Player
 from hpccd_ros.scenes.progress import track
@@ -41,8 +42,8 @@ def publish(
 ) -> int:
     """Publish all frames at `rate` Hz (over and over if `loop`); return how many. SIGINT and SIGTERM end it.
 
-    Before the first frame, waits up to `wait` seconds until every mesh's vertices have `subscribers`; before the
-    moving meshes, until these have acknowledged the static ones; before the second frame, the first.
+    Before the first frame, waits up to `wait` seconds until every mesh's vertices and every robot's joint states have
+    `subscribers`; before what moves, until these have acknowledged what does not; before the second frame, the first.
     answered: no frame before all have the one before and the node has answered its step, each awaited up to `wait`
     seconds: where the machine is too slow for `rate`, the scene plays slower and nothing is dropped.
     """
@@ -54,15 +55,17 @@ def publish(
         node = rclpy.create_node("hpccd_scene", start_parameter_services=False)
         answers = Answers(node) if answered else None
         try:
-            publishers = {}
-            for mesh in scene.mesh_names:
-                name = topic_names.topology(mesh)
-                publishers[name] = node.create_publisher(MeshTopology, name, qos.TOPOLOGY)
-                name = topic_names.vertices(mesh)
-                publishers[name] = node.create_publisher(MeshVertices, name, AWAITED if answered else STREAM)
-            listened = {topic_names.vertices(mesh): publishers[topic_names.vertices(mesh)] for mesh in scene.mesh_names}
+            publishers, listened = {}, {}
+            for topic in messages.topics(scene):
+                stream = AWAITED if answered else STREAM
+                publisher = node.create_publisher(
+                    message_class(topic.type_name), topic.name, qos.TOPOLOGY if topic.latched else stream
+                )
+                publishers[topic.name] = publisher
+                if not topic.latched:
+                    listened[topic.name] = publisher
             if await_subscribers(listened, subscribers, wait, stop) and not stop:
-                text = f"not every mesh has {subscribers} subscriber(s) yet: publishing all the same"
+                text = f"not every mesh or robot has {subscribers} subscriber(s) yet: publishing all the same"
                 print(text, file=sys.stderr, flush=True)
             if answers is not None and not answers.await_node(wait, stop) and not stop:
                 print("no node publishes contacts: publishing all the same", file=sys.stderr, flush=True)
@@ -79,19 +82,18 @@ def publish(
 
 def _play(node, scene, publishers, answers, rate, loop, wait, stop, progress) -> int:
     player = Player(scene)
-    moving = [mesh.name for mesh in scene.meshes if not mesh.static]
-    first_moving = topic_names.vertices(moving[0]) if len(moving) < len(scene.meshes) else None
+    first_moving = messages.first_moving(scene)
     begin_ns, begin = node.get_clock().now().nanoseconds, time.monotonic()
     count = 0
     for _ in itertools.count() if loop else range(1):
         for frame in track(scene.frames(), f"publishing {scene.name}", progress, scene.n_frames):
             # Stamps keep the rate exactly, whenever this process is woken.
             stamp = begin_ns + round(count * 1e9 / rate)
-            messages = list(player.messages(frame, stamp))
+            sent = list(player.messages(frame, stamp))
             _sleep_until(begin + count / rate, stop)
             if stop:
                 return count
-            for message in messages:
+            for message in sent:
                 if count == 0 and message.topic == first_moving:
                     # Nothing orders topics among one another: let the ground arrive before what falls on it.
                     arrived = await_acknowledged(publishers.values(), wait, stop)

@@ -5,8 +5,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from hpccd_ros.scenes.robot import SceneRobot
 
 
 @dataclass(frozen=True)
@@ -67,6 +71,8 @@ class Scene:
 
     `frame(k)` gives frame k, 0 <= k < n_frames, in any order; `frames()` gives all in order.
     `frame_period` is the time between frames in seconds; lengths are metres, z points up.
+    `robots` have their links among `meshes`, as NAME/LINK, and frames have the links' vertices as any mesh's.
+    `ignored_pairs`: names of meshes that are never tested against each other.
     """
 
     name: str
@@ -76,6 +82,8 @@ class Scene:
     frame_period: float
     make_frame: Callable[[int], Frame] = field(repr=False)
     make_faces: Callable[[int], dict[str, np.ndarray]] | None = field(default=None, repr=False)
+    robots: tuple[SceneRobot, ...] = ()
+    ignored_pairs: tuple[tuple[str, str], ...] = ()
 
     def frame(self, index: int) -> Frame:
         """Frame `index`; IndexError outside 0 .. n_frames - 1."""
@@ -98,6 +106,12 @@ class Scene:
     @property
     def mesh_names(self) -> list[str]:
         return [mesh.name for mesh in self.meshes]
+
+    @property
+    def sent_meshes(self) -> tuple[Mesh, ...]:
+        """Those of no robot: over ROS a robot's links come as joint states."""
+        links = {mesh.name for robot in self.robots for mesh in robot.meshes}
+        return tuple(mesh for mesh in self.meshes if mesh.name not in links)
 
     @property
     def n_triangles(self) -> int:

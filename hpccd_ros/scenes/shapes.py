@@ -108,6 +108,23 @@ def sheet(columns: int, rows: int):
     return vertices, _quads(rows, columns, wrap=False)
 
 
+def board(columns: int, rows: int):
+    """Closed box [-1,1]^2 x [-1,0], its top and bottom of columns x rows cells: 4 * (columns * rows + columns + rows)
+    faces."""
+    top, _ = sheet(columns, rows)
+    # All diagonals alike: along the rim, where shaded normals are means of faces, others would show as scallops.
+    faces = _quads(rows, columns, wrap=False, alternate=False)
+    count = len(top)
+    across, along = np.arange(columns), np.arange(rows) * (columns + 1)
+    # Once around the rim, seen from above against the clock.
+    rim = np.concatenate([across, along + columns, (count - 1) - across, (count - 1) - columns - along])
+    after = np.roll(rim, -1)
+    sides = [np.stack([rim + count, after + count, after], axis=1), np.stack([rim + count, after, rim], axis=1)]
+    below = faces[:, ::-1].astype(np.int64) + count
+    vertices = np.concatenate([top, top - (0.0, 0.0, 1.0)])
+    return vertices, np.concatenate([faces, below, *sides]).astype(np.uint32)
+
+
 def revolved(profile, around: int):
     """Surface of 2 * len(profile) * around faces that a closed `profile` (N,2: radius, y) leaves in turning round y.
 
@@ -136,7 +153,7 @@ def rod_faces(rings: int, around: int):
     return np.concatenate([sides, *ends]).astype(np.uint32)
 
 
-def _quads(rows: int, columns: int, wrap: bool):
+def _quads(rows: int, columns: int, wrap: bool, alternate: bool = True):
     """Two triangles for each cell of a grid of rows x columns cells, closed in both directions if `wrap`."""
     row, column = np.divmod(np.arange(rows * columns), columns)
     width = columns if wrap else columns + 1
@@ -144,7 +161,7 @@ def _quads(rows: int, columns: int, wrap: bool):
     a, b = row * width + column, row * width + right
     c, d = below * width + column, below * width + right
     # Alternate the diagonal, lest a folding sheet favour one direction.
-    flip = ((row + column) & 1).astype(bool)[:, None]
+    flip = ((row + column) & alternate).astype(bool)[:, None]
     first = np.where(flip, np.stack([a, b, c], axis=1), np.stack([a, b, d], axis=1))
     second = np.where(flip, np.stack([b, d, c], axis=1), np.stack([a, d, c], axis=1))
     return np.stack([first, second], axis=1).reshape(-1, 3).astype(np.uint32)

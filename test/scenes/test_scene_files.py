@@ -42,6 +42,54 @@ def test_mcap_holds_every_frame_for_independent_readers(breaking, tmp_path):
             np.testing.assert_array_equal(faces[mesh][version][1], breaking.faces(frame.index)[m])
 
 
+@pytest.fixture(scope="module")
+def arm():
+    return scenes.make("arm-and-cloth", size=0.1, frames=13)
+
+
+def test_mcap_holds_a_robot_as_its_description_and_joint_states(arm, tmp_path):
+    path = tmp_path / "arm.mcap"
+    files.write_mcap(arm, path, rate=50.0)
+    (robot,) = arm.robots
+    found = {}
+    with AnyReader([path]) as reader:
+        for connection, time, raw in reader.messages():
+            found.setdefault(connection.topic, []).append((time, reader.deserialize(raw, connection.msgtype)))
+    meshes = {f"/meshes/{mesh}/{kind}" for mesh in ("table", "cloth") for kind in ("topology", "vertices")}
+    assert set(found) == {"/robot_description", "/joint_states", *meshes}
+    assert [message.data for _, message in found["/robot_description"]] == [robot.description]
+    for frame, (time, message) in zip(arm.frames(), found["/joint_states"], strict=True):
+        assert time == 10**9 + frame.index * 20_000_000
+        assert dict(zip(message.name, message.position, strict=True)) == robot.joint_positions(frame.time)
+    with Recording(path) as recording:
+        assert recording.info["parameters"]["robots"] == ["arm"]
+        assert recording.info["topics"]["/joint_states"] == "joint_states"
+
+
+def test_npz_holds_links_under_their_names(arm, tmp_path):
+    files.write_npz(arm, tmp_path / "arm.npz")
+    with np.load(tmp_path / "arm.npz") as archive:
+        assert archive["meshes"].tolist() == arm.mesh_names
+        hand = arm.mesh_names.index("arm/hand")
+        np.testing.assert_array_equal(archive["arm/hand/0/faces"], arm.meshes[hand].faces)
+        np.testing.assert_array_equal(archive["arm/hand/0/vertices"], [frame[hand] for frame in arm.frames()])
+
+
+def test_parameter_file_names_robots_and_no_links(arm, tmp_path):
+    files.write_parameters(arm, tmp_path / "node.yaml")
+    tree = yaml.safe_load((tmp_path / "node.yaml").read_text())["/**"]["ros__parameters"]
+    assert tree == {
+        "meshes": ["table", "cloth"],
+        "mesh": {
+            "table": {"static": True, "self_collision": False},
+            "cloth": {"static": False, "self_collision": True},
+        },
+        "robots": ["arm"],
+        "robot": {"arm": {"description": "robot_description", "joint_states": "joint_states"}},
+        "frame_id": "world",
+    }
+
+
 def test_mcap_is_the_same_file_each_time_and_names_its_scene(tmp_path):
     scene = scenes.make("two-triangles")
     # Of one name, which the bag's metadata hold.

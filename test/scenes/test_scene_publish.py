@@ -12,11 +12,16 @@ import pytest
 import rclpy
 from hpccd.msg import ContactArray, MeshTopology, MeshVertices
 from rclpy.executors import SingleThreadedExecutor
-from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.serialization import deserialize_message
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
 
 import hpccd_ros
 from hpccd_ros import scenes
 from hpccd_ros.middleware import environment, topic_names
+from hpccd_ros.middleware.message_types import message_class
+from hpccd_ros.scenes import messages
 
 # Reached only by tests that fail.
 PATIENCE = 240.0
@@ -52,9 +57,10 @@ class Listener:
         self.executor.add_node(self.node)
         self.received = {}
         latched = QoSProfile(depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-        for mesh in scene.mesh_names:
-            self.listen(MeshTopology, topic_names.topology(mesh), latched)
-            self.listen(MeshVertices, topic_names.vertices(mesh), QoSProfile(depth=1000))
+        for topic in messages.topics(scene):
+            self.listen(
+                message_class(topic.type_name), topic.name, latched if topic.latched else QoSProfile(depth=1000)
+            )
 
     def listen(self, kind, topic, profile):
         self.received[topic] = []
@@ -105,8 +111,6 @@ def test_every_frame_arrives_in_another_process(listen, children):
     listener.wait(lambda: len(topologies) == 1 + len(changes), children[0])
     assert children[0].wait(PATIENCE) == 0
 
-    from rclpy.serialization import deserialize_message
-
     faces = {m.version: m for m in (deserialize_message(raw, MeshTopology) for raw in topologies)}
     assert sorted(faces) == list(range(1 + len(changes)))
     stamps = []
@@ -133,8 +137,6 @@ def test_loop_counts_versions_on_and_sigterm_ends_it(listen, children):
     children[0].send_signal(signal.SIGTERM)
     assert children[0].wait(PATIENCE) == 0
     assert "published" in children[0].communicate()[0]
-
-    from rclpy.serialization import deserialize_message
 
     decoded = [deserialize_message(raw, MeshVertices) for raw in rows[:40]]
     assert [d.step for d in decoded] == list(range(40))
@@ -198,3 +200,33 @@ def test_node_reports_the_contacts_of_a_scene(name, size, listen, children, tmp_
     assert {a.step: a.total for a in answers} == {k: len(c) for k, c in expected.items()}
     node.send_signal(signal.SIGINT)
     assert node.wait(PATIENCE) == 0
+
+
+def test_a_robot_comes_as_its_description_and_joint_states(listen, children):
+    scene = scenes.make("arm-and-cloth", size=0.1, frames=21)
+    (robot,) = scene.robots
+    listener = listen(scene, "/arm")
+    options = ("--size", 0.1, "--frames", 21, "--rate", 100, "--wait", PATIENCE)
+    children.append(start(*publish_command(scene.name, "/arm", *options)))
+    states, cloth = (listener.received[name] for name in ("joint_states", topic_names.vertices("cloth")))
+    listener.wait(lambda: len(states) == len(cloth) == 21 and listener.received["robot_description"], children[0])
+
+    names = {name for name, _ in listener.node.get_topic_names_and_types() if name.startswith("/arm/")}
+    assert {name for name in names if "/meshes/" in name} == {
+        f"/arm/meshes/{mesh}/{kind}" for mesh in ("table", "cloth") for kind in ("topology", "vertices")
+    }
+    offered = {}
+    for name in ("robot_description", "joint_states"):
+        (end,) = listener.node.get_publishers_info_by_topic(f"/arm/{name}")
+        offered[name] = end.qos_profile
+    assert offered["robot_description"].durability == DurabilityPolicy.TRANSIENT_LOCAL
+    assert {profile.reliability for profile in offered.values()} == {ReliabilityPolicy.RELIABLE}
+    assert children[0].wait(PATIENCE) == 0
+
+    (description,) = (deserialize_message(raw, String).data for raw in listener.received["robot_description"])
+    assert description == robot.description
+    stamps = [deserialize_message(raw, MeshVertices).header.stamp for raw in cloth]
+    for frame, raw, stamp in zip(scene.frames(), states, stamps, strict=True):
+        message = deserialize_message(raw, JointState)
+        assert message.header.stamp == stamp
+        assert dict(zip(message.name, message.position, strict=True)) == robot.joint_positions(frame.time)
