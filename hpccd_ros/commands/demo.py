@@ -6,6 +6,7 @@ No frame is dropped: each waits for the answer to the one before, so that a slow
   hpccd demo                                a small cloth falls on a ball that then spins
   hpccd demo --scene n-body-like-lr --rate 10
   hpccd demo --scene cloth-ball-like --rate 5 --out big
+  hpccd demo --scene arm-and-cloth --rate 60   an arm drags a cloth across a table
   hpccd demo --small                        a coarse mesh, compressed: a few hundred kilobytes
 
 Leaves DIR/demo.mcap and DIR/demo.png (a run replaces those of the run before), and the logs of the processes.

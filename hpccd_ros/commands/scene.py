@@ -4,6 +4,8 @@
   hpccd scene --list
   hpccd scene cloth-drop --publish --rate 30 --loop
                         stream meshes/cloth/... and meshes/ball/... as a simulation would
+  hpccd scene arm-and-cloth --publish --rate 60
+                        a robot beside cloth: joint_states and robot_description, too
   hpccd scene cloth-drop --params drop.yaml
                         then: hpccd_node --ros-args --params-file drop.yaml
   hpccd scene n-body-like-lr --mcap bodies.mcap
@@ -29,7 +31,7 @@ def configure(parser):
     parser.add_argument("--rate", type=float, default=30.0, metavar="HZ",
                         help="frames a second, for --publish and --mcap (default: %(default)s)")
     play = parser.add_argument_group("play over DDS")
-    play.add_argument("--publish", action="store_true", help="publish topologies and vertices")
+    play.add_argument("--publish", action="store_true", help="publish topologies and vertices, of a robot its joint states")
     play.add_argument("--loop", action="store_true", help="over and over, until Ctrl-C")
     play.add_argument("--wait", type=float, default=10.0, metavar="S",
                       help="how long to wait for a subscriber before the first frame (default: %(default)s)")
