@@ -58,27 +58,39 @@ class SceneRobot:
 
     def vertices(self, time: float) -> list[np.ndarray]:
         """(V,3) float64 of each of `meshes`."""
-        poses = self._poses(self.robot.kinematics.state(self.joint_positions(time)).values)
-        placed = []
-        for mesh, corners in zip(self.robot.meshes, self._corners, strict=True):
-            turn, shift = poses[self.robot.kinematics.number(mesh.link)]
-            placed.append(rotate(turn, corners) + shift)
-        return placed
+        corners, link, ends = self._corners
+        turns, shifts = self._poses(self.robot.kinematics.state(self.joint_positions(time)).values)
+        return np.split(rotate(turns[link], corners) + shifts[link], ends)
 
     @cached_property
-    def _corners(self) -> list[np.ndarray]:
-        return [np.rint(mesh.vertices * CORNER_STEPS) / CORNER_STEPS for mesh in self.robot.meshes]
+    def _corners(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Of all meshes in their links' frames, the number of the link of each, and where a mesh ends."""
+        meshes = self.robot.meshes
+        counts = [len(mesh.vertices) for mesh in meshes]
+        corners = np.concatenate([mesh.vertices for mesh in meshes])
+        links = np.repeat([self.robot.kinematics.number(mesh.link) for mesh in meshes], counts)
+        return np.rint(corners * CORNER_STEPS) / CORNER_STEPS, links, np.cumsum(counts)[:-1]
 
-    def _poses(self, values: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
-        """(quaternion w x y z, shift) of each link, the root's first."""
-        found: list[tuple[np.ndarray, np.ndarray]] = []
-        for joint, value in zip(self.robot.kinematics.chain, values, strict=True):
-            turn, shift = found[joint.parent] if joint.parent >= 0 else (np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3))
-            shift = shift + rotate(turn, joint.origin.shift)
-            turn = product(turn, np.roll(joint.origin.quaternion, 1))
-            if joint.turns:
-                turn = product(turn, axis_angle(joint.axis, value))
-            elif joint.kind == "prismatic":
-                shift = shift + rotate(turn, joint.axis * value)
-            found.append((turn, shift))
-        return found
+    @cached_property
+    def _chain(self) -> tuple[np.ndarray, ...]:
+        """Of the joint of each link: axis where it turns, else 0; axis where it slides, else 0; origin's quaternion
+        (w first) and shift."""
+        chain = self.robot.kinematics.chain
+        axes = np.array([joint.axis for joint in chain])
+        turning = np.array([joint.turns for joint in chain])[:, None]
+        sliding = np.array([joint.kind == "prismatic" for joint in chain])[:, None]
+        origins = np.array([np.roll(joint.origin.quaternion, 1) for joint in chain])
+        return axes * turning, axes * sliding, origins, np.array([joint.origin.shift for joint in chain])
+
+    def _poses(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Quaternions (w first) and shifts of all links, the root's first."""
+        turning, sliding, origins, shifts = self._chain
+        # Where no axis is, an angle would shorten the quaternion.
+        angles = np.where(turning.any(axis=1), values, 0.0)
+        turns = product(origins, axis_angle(turning, angles))
+        shifts = shifts + rotate(origins, sliding * values[:, None])
+        for number, joint in enumerate(self.robot.kinematics.chain):
+            if joint.parent >= 0:
+                shifts[number] = shifts[joint.parent] + rotate(turns[joint.parent], shifts[number])
+                turns[number] = product(turns[joint.parent], turns[number])
+        return turns, shifts
