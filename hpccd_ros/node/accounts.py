@@ -74,7 +74,8 @@ class Accounts:
             last |= {"parts": found.bounds.parts, "motion_bound": max(found.bounds.of_meshes)}
         if found.gaps is not None:
             last["smallest_distance"] = min((gap.distance for gap in found.gaps), default=math.inf)
-        self.metrics.detected(len(found.end.fresh), latency_ms, found.detect_ms, found.profile, last, near)
+        times = latency_ms, found.detect_ms
+        self.metrics.detected(len(found.end.fresh), *times, found.profile, last, near, _coarse(found))
 
     def unanswered(self, frame: SceneFrame, reason: Reason) -> None:
         """A frame that the detection was given and that gets no answer."""
@@ -85,3 +86,15 @@ class Accounts:
         """Why the step that ends with ``frame`` is `unanswered`."""
         self.metrics.failed(f"{type(error).__name__}: {error}")
         self.log("scene", Reason.DETECTION_FAILED, f"step that ends at {frame.stamp} ns: {error}")
+
+
+def _coarse(found: Detection) -> str:
+    """Which mesh's motion is bounded by more than the tolerance, although the step was cut as often as it may be."""
+    bounds, rigid = found.bounds, found.options.rigid
+    if bounds.parts < rigid.most_parts:
+        return ""
+    mesh, bound = max(zip(found.layout.mesh_names, bounds.of_meshes, strict=True), key=lambda one: one[1])
+    # The bound has what rounding adds, of which the tolerance says nothing.
+    if bound <= 1.01 * rigid.tolerance:
+        return ""
+    return f"{mesh} was up to {bound:.3g} beside the straight lines of {bounds.parts} parts"

@@ -21,6 +21,8 @@ class Metrics:
         self.detections = 0
         self.first_frames = 0
         self.near = 0
+        self.coarse = 0
+        self.last_coarse = ""
         self.failures = 0
         self.last_failure = ""
         self._failing = False
@@ -51,13 +53,18 @@ class Metrics:
         profile: Mapping[str, float],
         last: Mapping[str, object],
         near: int = 0,
+        coarse: str = "",
     ) -> None:
         """One step was answered. latency_ms: from the arrival of its last message to its contacts sent. near: pairs of
-        features that came nearer than their meshes' separation."""
+        features that came nearer than their meshes' separation. coarse: which mesh's motion is known less well than it
+        should be, in words."""
         with self._lock:
             self.detections += 1
             self.answered += messages
             self.near += near
+            if coarse:
+                self.coarse += 1
+                self.last_coarse = coarse
             self._failing = False
             self._latency_ms.append(latency_ms)
             self._detect_ms.append(detect_ms)
@@ -81,6 +88,8 @@ class Metrics:
                 "detections": self.detections,
                 "first_frames": self.first_frames,
                 "near": self.near,
+                "coarse": self.coarse,
+                "last_coarse": self.last_coarse,
                 "failures": self.failures,
                 "failing": self._failing,
                 "last_failure": self.last_failure,

@@ -23,6 +23,7 @@ class Reporter:
         self._time = time.monotonic()
         self._received: dict[str, int] = {}
         self._detections = 0
+        self._coarse = 0
         self._dropped = 0
         self._topologies_refused = 0
 
@@ -119,6 +120,7 @@ class Reporter:
             "first_frames": data["first_frames"],
             "failures": data["failures"],
             "near_total": data["near"],
+            "coarse": data["coarse"],
         }
         for kind in ("latency_ms", "detect_ms"):
             for name, text in percentiles(data[kind]).items():
@@ -127,8 +129,15 @@ class Reporter:
             values[f"stage_ms.{stage}"] = f"{mean:.3f}"
         values |= data["last"]
         values["last_failure"] = data["last_failure"]
+        coarse, self._coarse = data["coarse"] - self._coarse, data["coarse"]
         if data["failing"]:
             return self._status("detection", DiagnosticStatus.ERROR, f"failed: {data['last_failure']}", values)
+        if coarse:
+            text = (
+                f"{coarse} steps with a motion beyond rigid_tolerance: {data['last_coarse']}, so that more is reported "
+                "than touches; send poses or joint states more often, or raise rigid_parts or rigid_tolerance"
+            )
+            return self._status("detection", DiagnosticStatus.WARN, text, values)
         return self._status("detection", DiagnosticStatus.OK, f"{rate:.1f} detections a second ({state})", values)
 
     def _errors(self, count: int, last: str) -> DiagnosticStatus:

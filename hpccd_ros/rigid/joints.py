@@ -33,6 +33,10 @@ the step, plus max |x'''| / 2, which sees turns that cancel. In the middle, of a
 
 where i, and the second term, count where they turn, W = sum D_j w_j and W' = sum over i < j of D_i D_j w_i x w_j.
 
+**Whatever the speed.** Up to the origin of the first joint that moves nothing moves. From there no point gets farther
+than the sum of all offsets, slides and the body's radius beyond it, `_span`: curve and straight line lie in that ball,
+and deviate by at most its diameter. So a joint that jumps by a million radians has a bound as large as the robot.
+
 As with screws the points of edges and faces deviate no more than vertices do. The poses of the middle are computed:
 each length above is off by the relative error of `rounding.at_chain`, for which `_slack` stands eight times.
 """
@@ -153,7 +157,7 @@ class LinkMotion:
         return self.step.poses(cut / parts)[self.link].apply(self.body.vertices)
 
     def deviation(self, parts: int) -> float:
-        return rounding.up(self._acceleration / (8.0 * parts * parts))
+        return rounding.up(min(self._acceleration / (8.0 * parts * parts), 2.0 * self._span))
 
     def rounding(self, parts: int) -> float:
         values = sum(abs(self.step.start[k]) + abs(self.step.speed[k]) for k in self._way)
@@ -166,13 +170,28 @@ class LinkMotion:
     @cached_property
     def _reach(self) -> float:
         """From the origin of the world to the farthest point that the link may have in this step."""
-        reach = rounding.length(self.step.base.shift) + self.body.radius
-        for k in self._way:
-            joint = self.step.joints[k]
-            reach += rounding.length(joint.origin.shift)
-            if joint.kind == "prismatic":
-                reach += max(abs(self.step.start[k]), abs(self.step.end[k]))
-        return rounding.up(float(reach))
+        return rounding.up(rounding.length(self.step.base.shift) + self._beyond(self._way))
+
+    @cached_property
+    def _span(self) -> float:
+        """From the origin of the first joint that moves to the farthest point that the link may have in this step."""
+        moving = [place for place, k in enumerate(self._way) if self._moves(k)]
+        if not moving:
+            return 0.0
+        first, *others = self._way[moving[0] :]
+        return rounding.up(self._slid(first) + self._beyond(others))
+
+    def _beyond(self, joints: Sequence[int]) -> float:
+        """The body, with all offsets and slides of these joints of its way."""
+        offsets = sum(rounding.length(self.step.joints[k].origin.shift) + self._slid(k) for k in joints)
+        return self.body.radius + float(offsets)
+
+    def _slid(self, k: int) -> float:
+        slides = self.step.joints[k].kind == "prismatic"
+        return max(abs(float(self.step.start[k])), abs(float(self.step.end[k]))) if slides else 0.0
+
+    def _moves(self, k: int) -> bool:
+        return self.step.joints[k].kind != "fixed" and self.step.speed[k] != 0.0
 
     @cached_property
     def _slack(self) -> float:
@@ -182,7 +201,7 @@ class LinkMotion:
     @cached_property
     def _acceleration(self) -> float:
         """Not below max |x''| of all its points through the step."""
-        moving = [k for k in self._way if self.step.joints[k].kind != "fixed" and self.step.speed[k] != 0.0]
+        moving = [k for k in self._way if self._moves(k)]
         turning = [self.step.joints[k].turns for k in moving]
         speed = [abs(float(self.step.speed[k])) for k in moving]
         if not any(turning):

@@ -124,9 +124,16 @@ def test_streamed_recorded_and_verified(start_node, tmp_path, by):
     assert assert_answer(coarse, 9, 0.05) > 0 and coarse.parts < min(parts)
     status = node.wait_until(lambda: node.peer.statuses["detection"][2].get("parts"), "parts in the status")
     assert int(status) >= 1
+    assert set_parameter(node, "rigid_tolerance", 1e-9).successful
+    publisher.publish(stamped(10) if by == "pose" else transform(10))
+    node.peer.vertices("cloth", sheet_positions(N, 10), stamp=10, frame_id="world")
+    assert assert_answer(node.contacts(9)[-1], 10, 1e-9) > 0
+    warned = "1 steps with a motion beyond rigid_tolerance: blade was up to "
+    node.wait_until(lambda: node.peer.statuses["detection"][1].startswith(warned), warned)
+    assert node.peer.statuses["detection"][2]["coarse"] == "1"
     assert node.stop() == 0
     steps = replayed(path)
-    assert [step.bounds.parts for step in steps][-1] == coarse.parts and len(steps) == 8
+    assert [step.bounds.parts for step in steps][-2:] == [coarse.parts, 64] and len(steps) == 9
 
 
 def test_what_is_wrong_with_poses_is_refused_and_said(start_node):

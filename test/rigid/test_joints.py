@@ -127,6 +127,29 @@ def test_cut_by_the_tolerance():
     assert deviation(motion, cut.parts) <= 1e-3 < motion.deviation(cut.parts - 1)
 
 
+@pytest.mark.parametrize("jump", [1e2, 1e6, 1e9])
+def test_however_far_a_joint_jumps_the_bound_is_no_larger_than_the_robot(jump):
+    """The base stands far away, and a slide that does not move is between: neither is a reason for a larger bound."""
+    chain = arm("fixed", "revolute", "prismatic", "revolute", length=0.5)
+    step = JointStep(chain, (0, 0, 0.25, 0), (0, jump, 0.25, -jump / 3), shifted(1e6))
+    motion = LinkMotion(step, 3, Body.of(POINTS))
+    size = 0.5 + 0.5 + 0.25 + motion.body.radius
+    cut = fewest_parts([motion], 1e-3, 64)
+    assert (cut.parts, cut.enough) == (64, False)
+    bounds = [motion.deviation(parts) for parts in (1, 7, 64, 1000)]
+    assert bounds == sorted(bounds, reverse=True) and bounds[0] <= 2.0 * size * (1 + 1e-12)
+    for parts, bound in zip((1, 7, 64), bounds, strict=False):
+        true = deviation(motion, parts, 33)
+        assert true <= bound + motion.rounding(parts)
+        assert true > 0.5 * size or parts > 1
+
+
+def test_a_slide_before_the_turn_counts_where_it_goes():
+    step = JointStep(arm("prismatic", "revolute"), (0, 0), (30.0, 1e6))
+    motion = LinkMotion(step, 1, Body.of(POINTS))
+    assert deviation(motion) <= motion.deviation(1) <= 2.0 * (30.0 + 1.0 + motion.body.radius) * (1 + 1e-12)
+
+
 @pytest.mark.parametrize(
     "make, text",
     [

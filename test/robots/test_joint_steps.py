@@ -2,6 +2,7 @@
 """The detection of the node on frames whose links joints move: what screws would miss is found."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -83,3 +84,12 @@ def test_a_placement_that_a_transform_moves_takes_its_base_along(robot):
     moved = placement.moved(turn)
     assert np.abs(moved.vertices - turn.apply(placement.vertices)).max() < 1e-14
     assert np.array_equal(moved.state.base.shift, turn.shift) and moved.state.inputs == placement.state.inputs
+
+
+def test_a_joint_that_jumps_costs_no_more_parts_than_allowed_and_reaches_no_farther_than_the_robot(robot):
+    start, end = frame(robot, 1, 0.0), frame(robot, 2, 1e6)
+    far = replace(end, vertices=(end.vertices[0], PIN + [10.0, 0.0, 0.0]))
+    found = detector(robot).detect(start, end)
+    assert found.bounds.parts == 64 and 1.0 < max(found.bounds.of_meshes) < 2.5 and len(found.contacts)
+    start = replace(start, vertices=(start.vertices[0], far.vertices[1]))
+    assert not len(detector(robot).detect(start, far).contacts)
