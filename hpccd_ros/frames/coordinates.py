@@ -6,21 +6,23 @@ import numpy as np
 from hpccd_core.arguments import LARGEST_COORDINATE
 from hpccd_ros.frames.drops import Reason
 
+# Of meshes that move by poses. Between two poses a point is no farther out than twice the farther of its ends, counted
+# from the origin (rigid/screw.py: the arc bulges by half its chord at most); bounds of motion are no longer, and add up
+# with those of another mesh and a separation. All of it must be what the core takes, or a step fails in the middle.
+LARGEST_OF_POSES = LARGEST_COORDINATE / 1000
 
-def unusable_coordinates(vertices: np.ndarray) -> tuple[Reason, str] | None:
-    """Why the core cannot take these positions, (n,3), or None."""
+
+def unusable_coordinates(vertices: np.ndarray, by_poses: bool = False) -> tuple[Reason, str] | None:
+    """Why the core cannot take these positions, (n,3), or None. by_poses: nor the ways to and from them."""
+    largest = LARGEST_OF_POSES if by_poses else LARGEST_COORDINATE
     # Two reductions, as they need no array of their own; NaN passes through both and compares false.
-    if not len(vertices) or (
-        -LARGEST_COORDINATE <= float(vertices.min()) and float(vertices.max()) <= LARGEST_COORDINATE
-    ):
+    if not len(vertices) or (-largest <= float(vertices.min()) and float(vertices.max()) <= largest):
         return None
     if not (finite := np.isfinite(vertices)).all():
         return Reason.NOT_FINITE, f"{_first(vertices, ~finite)}; coordinates must be finite"
-    too_far = np.abs(vertices) > LARGEST_COORDINATE
-    return (
-        Reason.OUT_OF_RANGE,
-        f"{_first(vertices, too_far)}; coordinates must lie in [-{LARGEST_COORDINATE:g}, {LARGEST_COORDINATE:g}]",
-    )
+    of_mesh = " of a mesh that moves by poses" if by_poses else ""
+    limits = f"coordinates{of_mesh} must lie in [-{largest:g}, {largest:g}]"
+    return Reason.OUT_OF_RANGE, f"{_first(vertices, np.abs(vertices) > largest)}; {limits}"
 
 
 def _first(vertices: np.ndarray, bad: np.ndarray) -> str:

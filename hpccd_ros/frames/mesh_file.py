@@ -107,12 +107,14 @@ def mesh_of_file(
     if values["static"]:
         frame = MeshFrame(0, place(vertices, values["pose"]), version=0)
     elif values["input"] in (POSE, TF):
+        place(vertices, values["pose"], by_poses=True)  # to be refused with the file's name rather than with each pose
         frame = MeshFrame(0, vertices, version=0)
     return Topology(0, len(vertices), faces), frame
 
 
-def place(vertices: np.ndarray, pose: list[float]) -> np.ndarray:
-    """Rotate by the quaternion x y z w, then translate by x y z (pose: 3 + 4 numbers).
+def place(vertices: np.ndarray, pose: list[float], by_poses: bool = False) -> np.ndarray:
+    """Rotate by the quaternion x y z w, then translate by x y z (pose: 3 + 4 numbers). by_poses: of a mesh that
+    moves by poses.
 
     Raises MeshFileError: not 7 numbers, not finite, quaternion not of unit length within 1e-3, too far away.
     """
@@ -120,6 +122,6 @@ def place(vertices: np.ndarray, pose: list[float]) -> np.ndarray:
         placed = Rigid.of(pose[:3], pose[3:]).apply(vertices)
     except ValueError as error:
         raise MeshFileError(f"pose: {shortened(pose)} {error}") from error
-    if problem := unusable_coordinates(placed):
+    if problem := unusable_coordinates(placed, by_poses):
         raise MeshFileError(f"pose: {shortened(pose)}: placed by it, {problem[1]}")
     return placed

@@ -44,7 +44,8 @@ class FramePipeline:
         in the file."""
         outcome = self._assembler.set_topology(mesh, topology)
         if positions is not None and mesh in self._rigid:
-            self._rigid[mesh].set_shape(positions)
+            if (refusal := self._rigid[mesh].set_shape(positions)) is not None:
+                outcome.refusals.append(refusal)
         elif positions is not None:
             outcome += self._assembler.add(mesh, positions)
         outcome.static_taken = 0  # no message brought them
@@ -55,8 +56,8 @@ class FramePipeline:
         if isinstance(message, Topology):
             return self._led(self._assembler.set_topology(mesh, message, new_publisher))
         if isinstance(message, MeshFrame) and mesh in self._rigid:
-            self._rigid[mesh].set_shape(message)
-            return Outcome(static_taken=1)
+            refusal = self._rigid[mesh].set_shape(message)
+            return Outcome(refusals=[refusal]) if refusal is not None else Outcome(static_taken=1)
         return self._place(mesh, message, new_publisher)
 
     def retry(self) -> list[Outcome]:

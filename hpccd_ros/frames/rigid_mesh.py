@@ -20,13 +20,18 @@ class RigidMesh:
         self._shape: MeshFrame | None = None
         self._body: Body | None = None
 
-    def set_shape(self, shape: MeshFrame) -> None:
-        """Its vertices, before ``pose``. The same as before leave the motion from pose to pose whole."""
+    def set_shape(self, shape: MeshFrame) -> Refusal | None:
+        """Its vertices, before ``pose``. The same as before leave the motion from pose to pose whole; a shape that is
+        refused leaves the one before."""
         before = self._shape
         if before is not None and before.version == shape.version and np.array_equal(before.vertices, shape.vertices):
-            return
-        self._shape = shape
-        self._body = Body.of(self._stands.apply(shape.vertices.astype(np.float64)))
+            return None
+        vertices = self._stands.apply(shape.vertices.astype(np.float64))
+        if problem := unusable_coordinates(vertices, by_poses=True):
+            reason, text = problem
+            return Refusal(self._mesh, reason, f"placed by mesh.{self._mesh}.pose {text}")
+        self._shape, self._body = shape, Body.of(vertices)
+        return None
 
     def place(self, frame: PoseFrame) -> MeshFrame | Refusal:
         """The vertices at a pose, as though they had been sent."""
@@ -37,7 +42,7 @@ class RigidMesh:
             )
             return Refusal(self._mesh, Reason.NO_SHAPE, text)
         placement = Placement(self._body, frame.pose)
-        if problem := unusable_coordinates(placement.vertices):
+        if problem := unusable_coordinates(placement.vertices, by_poses=True):
             reason, text = problem
             where = quoted(frame.pose.shift.tolist())
             return Refusal(self._mesh, reason, f"at the pose {where} {text}")

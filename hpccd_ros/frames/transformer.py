@@ -130,7 +130,7 @@ class MeshTransformer:
         else:
             # Always double, with or without a rotation: the precision of a stream must not depend on its values.
             vertices = frame.vertices if rigid is IDENTITY else rigid.apply(frame.vertices.astype(np.float64))
-        if problem := unusable_coordinates(vertices):
+        if problem := unusable_coordinates(vertices, by_poses=placement is not None):
             reason, text = problem
             return self._refuse(reason, f"after the transform {text}", new_publisher)
         return replace(frame, vertices=vertices, frame_id=self._target, placement=placement)

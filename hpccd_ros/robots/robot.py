@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """A robot as the node needs it: meshes of its links, pairs that are never tested, kinematics."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from hpccd_ros.base.quoting import quoted
-from hpccd_ros.frames.coordinates import unusable_coordinates
+from hpccd_ros.frames.coordinates import LARGEST_OF_POSES, unusable_coordinates
 from hpccd_ros.frames.types import JOINTS, TF, MeshSettings, Topology
 from hpccd_ros.rigid.body import Body
 from hpccd_ros.rigid.joints import LinkMotion
@@ -76,6 +77,7 @@ class Robot:
         if not meshes:
             other = next(kind for kind in urdf.GEOMETRIES if kind != geometry)
             raise RobotError(f"geometry: no link has <{geometry}>, so nothing could touch; try {other}")
+        _check_reach(description, meshes)
         semantics = None if srdf_text is None else srdf.parse(srdf_text, (link.name for link in description.links))
         names = {mesh.link: mesh.name for mesh in meshes}
         ignored = sorted(
@@ -96,7 +98,7 @@ class Robot:
         cannot take where one is."""
         placements = tuple(LinkPlacement.of(mesh.body, mesh.link, state) for mesh in self.meshes)
         for mesh, placement in zip(self.meshes, placements, strict=True):
-            if problem := unusable_coordinates(placement.vertices):
+            if problem := unusable_coordinates(placement.vertices, by_poses=True):
                 raise RobotError(f"positions: with them, of {quoted(mesh.name)} {problem[1]}")
         return placements
 
@@ -104,3 +106,14 @@ class Robot:
         """Of each mesh, between two states of this robot (kinematics.py says which motion that is)."""
         step = self.kinematics.step(start, end)
         return tuple(step.motion(mesh.link, mesh.body) for mesh in self.meshes)
+
+
+def _check_reach(description: urdf.Description, meshes: list[RobotMesh]) -> None:
+    """On its way between two states that the core can take, a link may be as far away as all offsets in a row."""
+    offsets = sum(math.hypot(*joint.origin.shift.tolist()) for joint in description.joints)
+    reach = offsets + max(mesh.body.radius for mesh in meshes)
+    if not reach <= LARGEST_OF_POSES:
+        raise RobotError(
+            f"{urdf.DOCUMENT}: stretched out the robot would reach {reach:g}, and {LARGEST_OF_POSES:g} is the most; "
+            "mend the origins of joints or the sizes of links"
+        )

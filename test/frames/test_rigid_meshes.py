@@ -1,10 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """Meshes that keep their shape: a shape once, then poses, or transforms alone. No ROS."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from pipelines import reasons, retried
 
+from hpccd_ros.detect.core import Options
+from hpccd_ros.detect.scene import SceneBuilder
+from hpccd_ros.detect.separation import Separation
+from hpccd_ros.detect.step_detector import StepDetector
 from hpccd_ros.frames.outcome import Outcome
 from hpccd_ros.frames.pipeline import FramePipeline
 from hpccd_ros.frames.types import AssemblyRules, MeshFrame, MeshSettings, PoseFrame, Topology
@@ -94,6 +100,37 @@ def test_a_file_and_where_it_stands_in_the_body():
 def test_poses_too_far_away():
     outcome = pipeline_of(BOX).push("box", PoseFrame(7, Rigid.of((2e150, 0, 0), (0, 0, 0, 1))))
     assert reasons(outcome) == [("box", "out_of_range")]
+
+
+@pytest.mark.parametrize("far, taken", [(9e146, True), (1.1e147, False), (9e149, False)])
+def test_poses_whose_arcs_would_leave_what_the_core_takes_are_refused_at_once(far, taken):
+    """Whichever two come, the step between them is answered: half a turn, with a separation and a mesh as far away."""
+    half = Rigid.of((far, far, 0), (0, 0, 1, 0))
+    poses = [Rigid.of((far, far, 0), (0, 0, 0, 1)), half, Rigid.of((-far, -far, far), (1, 0, 0, 0))]
+    pipeline = pipeline_of(BOX, MeshSettings("tool", self_collision=False, input="pose"))
+    frames = []
+    for stamp, pose in enumerate(poses):
+        outcome = pipeline.push("box", PoseFrame(stamp, pose))
+        outcome += pipeline.push("tool", PoseFrame(stamp, Rigid.of(-pose.shift, pose.quaternion)))
+        assert reasons(outcome)[:1] == ([] if taken else [("box", "out_of_range")])
+        assert taken or "of a mesh that moves by poses must lie in [-1e+147, 1e+147]" in outcome.refusals[0].text
+        frames += outcome.frames
+    assert len(frames) == (3 if taken else 0)
+    builder = SceneBuilder([BOX, MeshSettings("tool", self_collision=False, input="pose")])
+    detector = StepDetector(builder, Options(backend="cpu", separation=Separation(1e149)))
+    assert all(len(detector.detect(start, end).contacts) for start, end in pairwise(frames))
+
+
+def test_a_shape_too_large_for_poses_is_refused_and_the_one_before_stays():
+    stands = MeshSettings("box", pose=(1e147, 0, 0, 0, 0, 0, 1), input="pose")
+    pipeline = pipeline_of(stands, shapes=False)
+    outcome = pipeline.push("box", MeshFrame(0, np.float64(1e147) * TRIANGLE, 0))
+    assert reasons(outcome) == [("box", "out_of_range")] and "placed by mesh.box.pose" in outcome.refusals[0].text
+    assert reasons(pipeline.push("box", PoseFrame(1, QUARTER))) == [("box", "no_shape")]
+    pipeline = pipeline_of(BOX)
+    assert reasons(pipeline.push("box", MeshFrame(0, np.float64(1e148) * TRIANGLE, 0))) == [("box", "out_of_range")]
+    (frame,) = pipeline.push("box", PoseFrame(1, QUARTER)).frames
+    np.testing.assert_allclose(frame.vertices[0], TURNED, atol=1e-15)
 
 
 def test_poses_in_another_frame_wait_for_its_transform():

@@ -57,9 +57,12 @@ def test_placements_are_the_links_at_their_poses():
 
 
 def test_places_that_the_core_cannot_take_are_refused():
-    robot = Robot.of(URDF.replace('xyz="0 0 1"/></joint></robot>', 'xyz="1e200 0 0"/></joint></robot>'))
-    state = robot.kinematics.state({"turn": 0.0, "slide": 0.0, "roll": 0.0})
-    with pytest.raises(RobotError, match="of 'swing/tip' vertex 0 is .* coordinates must lie in"):
+    for offset in ("1e200", "1e147"):
+        with pytest.raises(RobotError, match="stretched out the robot would reach 1.4"):
+            Robot.of(URDF.replace('xyz="0 0 1"/></joint></robot>', f'xyz="{offset} {offset} 0"/></joint></robot>'))
+    robot = Robot.of(URDF)
+    state = robot.kinematics.state({"turn": 0.0, "slide": 0.0, "roll": 0.0}, Rigid.of((0, 2e147, 0), (0, 0, 0, 1)))
+    with pytest.raises(RobotError, match="of 'swing/rod' vertex 0 is .* a mesh that moves by poses must lie in"):
         robot.placements(state)
 
 
