@@ -3,16 +3,23 @@
 
 The wheels hold no tf2; its rules are kept: the last ten seconds of each frame, interpolation between samples, no
 extrapolation. Bounded, as anybody may publish transforms.
+
+**A clock that is set back.** What came before is of another run, and is not mixed with what comes now. A frame that
+goes back by more than a second has begun anew, and so has all. One that goes back by less may only be late: until
+RESTART_AFTER samples in a row have increasing stamps, all before its last one. Where a mesh is known to have begun anew
+(`forget_future`) there is no doubt: of each frame what came before it went back is forgotten.
 """
 
 from bisect import bisect_left
 
 from hpccd_ros.base.quoting import quoted
+from hpccd_ros.frames.restart import IncreasingStamps
 from hpccd_ros.rigid.transform import IDENTITY, Rigid
 
 HISTORY_NS = 10_000_000_000
 # A frame that goes back by more has begun anew; what came late may be so much earlier.
 RESTART_NS = 1_000_000_000
+RESTART_AFTER = 5  # as parameter restart_after has it by default
 MOST_FRAMES = 1000
 MOST_SAMPLES = 1000  # of one frame: 100 Hz for the whole history; about 500 MB if every frame were full
 LONGEST_NAME = 255
@@ -31,30 +38,51 @@ class NoTransformError(LookupError):
 
 
 class _Edge:
-    """Where one frame was in its parent: samples in the order of their stamps; ``always``: not bound to a time."""
+    """Where one frame was in its parent: samples in the order of their stamps; ``always``: not bound to a time.
+
+    ``numbers``: of the samples, in the order in which those of all frames came. ``since``: number and stamp of the
+    first of those that came last, in increasing order, behind the newest stamp; None: the last one did not.
+    """
 
     def __init__(self, parent: str) -> None:
         self.parent = parent
         self.always: Rigid | None = None
         self.stamps: list[int] = []
         self.samples: list[Rigid] = []
+        self.numbers: list[int] = []
+        self.since: tuple[int, int] | None = None
+        self._behind = IncreasingStamps()
 
     def begins_anew(self, stamp: int) -> bool:
         return bool(self.stamps) and stamp < self.stamps[-1] - RESTART_NS
 
-    def clear(self) -> None:
-        self.stamps.clear()
-        self.samples.clear()
+    def forget_before(self, number: int) -> None:
+        """Only samples that came with this number or later stay."""
+        kept = [place for place, came in enumerate(self.numbers) if came >= number]
+        self.stamps = [self.stamps[place] for place in kept]
+        self.samples = [self.samples[place] for place in kept]
+        self.numbers = [self.numbers[place] for place in kept]
+        self.since, self._behind = None, IncreasingStamps()
 
-    def add(self, stamp: int, rigid: Rigid) -> None:
+    def add(self, stamp: int, rigid: Rigid, number: int) -> bool:
+        """Whether so many came behind the newest one that they are of another run."""
+        run = 0
+        if self.stamps and stamp < self.stamps[-1]:
+            run = self._behind.next(stamp)
+            if run == 1:
+                self.since = number, stamp
+        elif self.since is not None:
+            self.since, self._behind = None, IncreasingStamps()
         at = bisect_left(self.stamps, stamp)
         if at < len(self.stamps) and self.stamps[at] == stamp:
-            self.samples[at] = rigid
-            return
+            self.samples[at], self.numbers[at] = rigid, number
+            return run >= RESTART_AFTER
         self.stamps.insert(at, stamp)
         self.samples.insert(at, rigid)
+        self.numbers.insert(at, number)
         old = max(bisect_left(self.stamps, self.stamps[-1] - HISTORY_NS), len(self.stamps) - MOST_SAMPLES)
-        del self.stamps[:old], self.samples[:old]
+        del self.stamps[:old], self.samples[:old], self.numbers[:old]
+        return run >= RESTART_AFTER
 
     def at(self, child: str, stamp: int) -> Rigid:
         if self.always is not None:
@@ -79,6 +107,8 @@ class TransformBuffer:
 
     def __init__(self) -> None:
         self._edges: dict[str, _Edge] = {}
+        self._came = 0  # samples so far
+        self._anew: int | None = None  # the first stamp after transforms last began anew
 
     def add(self, parent: str, child: str, rigid: Rigid, stamp: int | None) -> None:
         """``rigid`` takes coordinates in ``child`` to coordinates in ``parent``; stamp ns, None: at all times.
@@ -98,18 +128,28 @@ class TransformBuffer:
         if stamp is None:
             edge.always = rigid
         else:
-            if edge.begins_anew(stamp):
-                # The clock was set back: samples from before, of any frame, would be interpolated with the new ones.
-                for each in self._edges.values():
-                    each.clear()
+            self._came += 1
             edge.always = None
-            edge.add(stamp, rigid)
+            if edge.begins_anew(stamp):
+                self._begin_anew(self._came, stamp)
+            if edge.add(stamp, rigid, self._came):
+                self._begin_anew(*edge.since)
 
     def forget_future(self, stamp: int) -> None:
-        """The time is ``stamp`` again: samples far beyond it are from before."""
+        """A mesh begins anew with ``stamp``: samples beyond it are from before, but those that have begun anew too."""
+        with_it = self._anew is not None and abs(stamp - self._anew) <= RESTART_NS
         for edge in self._edges.values():
-            if edge.begins_anew(stamp):
-                edge.clear()
+            if edge.since is not None:
+                number, self._anew = edge.since
+                edge.forget_before(number)
+            elif edge.begins_anew(stamp) or (edge.stamps and edge.stamps[-1] > stamp and not with_it):
+                edge.forget_before(self._came + 1)
+
+    def _begin_anew(self, number: int, stamp: int) -> None:
+        """What came before would be interpolated with what comes now, in this frame and across frames."""
+        for edge in self._edges.values():
+            edge.forget_before(number)
+        self._anew = stamp
 
     def lookup(self, source: str, target: str, stamp: int) -> Rigid:
         """What takes coordinates in ``source`` to coordinates in ``target`` at ``stamp`` ns.

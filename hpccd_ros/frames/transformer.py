@@ -51,6 +51,7 @@ class MeshTransformer:
         self._max_waiting = max_waiting
         self._transforms = transforms
         self._waiting: deque[_Waiting] = deque()
+        self._last: int | None = None  # stamp that was last looked up
         self._unnoticed = False  # the first frame of a new publisher was refused: the next one stands for it
         self._pose = Rigid.of(mesh.pose[:3], mesh.pose[3:]) if self._kind == "pose" else None
 
@@ -73,6 +74,9 @@ class MeshTransformer:
             if isinstance(moved, Refusal):
                 return Transformed([], [moved])
             return Transformed([(moved, self._noticed(new_publisher))], [])
+        if new_publisher and self._last is not None and frame.stamp <= self._last:
+            self._transforms.forget_future(frame.stamp)  # before it is placed by what is from before
+        self._last = frame.stamp
         self._waiting.append(_Waiting(frame, new_publisher))
         frames, refusals = self.retry()
         if len(self._waiting) > self._max_waiting:

@@ -132,6 +132,69 @@ def test_source_that_starts_anew_is_not_mixed_with_its_past():
         buffer.lookup("hand", "world", 50 * SECOND)
 
 
+MS = 10**6
+BEFORE, NOW = turn(0), turn(90)
+
+
+def after_a_short_run(*now):
+    """Transforms of half a second, then those at the milliseconds ``now``."""
+    buffer = TransformBuffer()
+    for stamp in range(0, 500, 10):
+        buffer.add("world", "hand", BEFORE, stamp * MS)
+        buffer.add("world", "foot", BEFORE, stamp * MS)
+    for stamp in now:
+        buffer.add("world", "hand", NOW, stamp * MS)
+    return buffer
+
+
+def of_now(buffer, stamp, source="hand"):
+    """Whether what is found is of the run of now; None: nothing is found."""
+    try:
+        found = buffer.lookup(source, "world", stamp * MS)
+    except NoTransformError:
+        return None
+    return np.allclose(found.quaternion, NOW.quaternion)
+
+
+def test_a_run_shorter_than_a_second_is_told_from_what_is_late_by_its_order():
+    late = after_a_short_run(100, 120, 90, 490, 200, 210, 220, 230, 500)
+    assert [of_now(late, stamp) for stamp in (0, 100, 105, 120, 300, 495)] == [False, True, False, True, False, True]
+    anew = after_a_short_run(5, 15, 25, 35, 45)
+    assert [of_now(anew, stamp) for stamp in (0, 10, 30, 45, 50, 300)] == [None, True, True, True, None, None]
+    assert of_now(anew, 100, "foot") is None, "of another frame, and from before as well"
+    anew.add("world", "foot", NOW, 20 * MS)
+    assert of_now(anew, 20, "foot")
+
+
+def test_more_samples_behind_than_are_kept():
+    buffer = TransformBuffer()
+    for stamp in range(transform_buffer.MOST_SAMPLES):
+        buffer.add("world", "hand", BEFORE, SECOND + stamp * MS // 10)
+    for stamp in range(20):
+        buffer.add("world", "hand", NOW, SECOND - 10 * MS + stamp * MS // 10)
+    assert of_now(buffer, 1050) is None and of_now(buffer, 991)
+
+
+@pytest.mark.parametrize("now", [(), (5,), (5, 15), (5, 15, 25, 35, 45), tuple(range(5, 400, 10))])
+def test_where_a_mesh_begins_anew_nothing_from_before_is_used(now):
+    buffer = after_a_short_run(*now)
+    buffer.forget_future(10 * MS)
+    buffer.forget_future(10 * MS)
+    found = [of_now(buffer, stamp) for stamp in range(0, 500, 5)]
+    assert found == [True if now and now[0] <= stamp <= now[-1] else None for stamp in range(0, 500, 5)]
+    assert of_now(buffer, 100, "foot") is None
+
+
+def test_frames_of_a_new_publisher_wait_for_transforms_of_its_run():
+    buffer = after_a_short_run()
+    gate = Gate(buffer, transform="tf")
+    assert gate.transform(frame(400 * MS)) and gate.transform(frame(10 * MS), new_publisher=True) == []
+    for stamp in (0, 8, 16):
+        buffer.add("world", "hand", NOW, stamp * MS)
+    ((placed, new),) = gate.retry()
+    assert new and np.allclose(placed.vertices, NOW.apply(POINTS)) and not gate.refusals
+
+
 class Gate:
     """A transformer to the frame "world", and what it gave back."""
 
