@@ -12,7 +12,7 @@ RESTART_AFTER samples in a row have increasing stamps, all before its last one. 
 
 from bisect import bisect_left
 
-from hpccd_ros.base.quoting import quoted
+from hpccd_ros.base.quoting import listed, quoted
 from hpccd_ros.frames.restart import IncreasingStamps
 from hpccd_ros.rigid.transform import IDENTITY, Rigid
 
@@ -103,9 +103,14 @@ class _Edge:
 
 
 class TransformBuffer:
-    """Transforms from child frames to their parents, and lookups between any two frames of the tree."""
+    """Transforms from child frames to their parents, and lookups between any two frames of the tree.
+
+    ``heard``: messages so far of each topic on which transforms may come, for whoever asks why there is none; a text
+    in place of a number: why that topic is not listened to.
+    """
 
     def __init__(self) -> None:
+        self.heard: dict[str, int | str] = {}
         self._edges: dict[str, _Edge] = {}
         self._came = 0  # samples so far
         self._anew: int | None = None  # the first stamp after transforms last began anew
@@ -181,6 +186,16 @@ class TransformBuffer:
             raise _unconnected(source, target)
         return min((edge.stamps[-1] for edge in timed), default=None)
 
+    def account(self, frame: str) -> str:
+        """In words what has been heard at all, and which frames are known; those first that are called like ``frame``
+        but for what stands before. Bounded."""
+        topics = [f"{topic} {_messages(count)}" for topic, count in self.heard.items()]
+        last = frame.rpartition("/")[2]
+        known = list(dict.fromkeys(name for child, edge in self._edges.items() for name in (child, edge.parent)))
+        alike = [name for name in known if name.rpartition("/")[2] == last]
+        frames = f"frames known: {listed(dict.fromkeys([*alike, *known])) or 'none'}"
+        return "; ".join([f"heard: {', '.join(topics)}", frames] if topics else [frames])
+
     def _ancestors(self, frame: str) -> list[str]:
         path = [frame]
         while (edge := self._edges.get(path[-1])) is not None:
@@ -197,6 +212,10 @@ class TransformBuffer:
             rigid = edge.at(frame, stamp).after(rigid)
             frame = edge.parent
         return rigid
+
+
+def _messages(count: int | str) -> str:
+    return count if isinstance(count, str) else f"{count or 'no'} messages"
 
 
 def _unconnected(source: str, target: str) -> NoTransformError:

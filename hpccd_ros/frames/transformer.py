@@ -30,11 +30,13 @@ class Transformed(NamedTuple):
 
 @dataclass
 class _Waiting:
-    """``awaited``: the transform, in words."""
+    """``awaited``: the transform, in words; ``connected``: transforms lead from one frame to the other, only not for
+    this stamp."""
 
     frame: MeshFrame
     new_publisher: bool
     awaited: str = ""
+    connected: bool = False
 
 
 class MeshTransformer:
@@ -61,7 +63,7 @@ class MeshTransformer:
 
     def warnings(self) -> list[str]:
         """What the frames that wait are waiting for."""
-        return [f"{self._mesh} waits for a transform: {self._waiting[0].awaited}"] if self._waiting else []
+        return [f"{self._mesh} waits for a transform: {self._missing(self._waiting[0])}"] if self._waiting else []
 
     def transform(self, frame: MeshFrame, new_publisher: bool = False) -> Transformed:
         """Frames that can go on now that this one has come: with ``transform: none`` always itself."""
@@ -92,7 +94,7 @@ class MeshTransformer:
             try:
                 rigid = self._transforms.lookup(item.frame.frame_id or self._frame, self._target, item.frame.stamp)
             except NoTransformError as error:
-                item.awaited = str(error)
+                item.awaited, item.connected = str(error), error.connected
                 if error.connected and not error.final:
                     break
                 self._waiting.popleft()
@@ -144,7 +146,12 @@ class MeshTransformer:
         return new_publisher
 
     def _give_up(self, item: _Waiting, why: str = "") -> Refusal:
-        return self._refuse(Reason.NO_TRANSFORM, item.awaited + why, item.new_publisher)
+        return self._refuse(Reason.NO_TRANSFORM, self._missing(item) + why, item.new_publisher)
+
+    def _missing(self, item: _Waiting) -> str:
+        if item.connected:
+            return item.awaited
+        return f"{item.awaited}; {self._transforms.account(item.frame.frame_id or self._frame)}"
 
     def _refuse(self, reason: Reason, text: str, new_publisher: bool) -> Refusal:
         self._unnoticed |= new_publisher

@@ -25,7 +25,12 @@ class TransformSubscriptions:
         self._pipeline = pipeline
         self._accounts = accounts
         self._max_rate = max_rate
-        self._subscriptions = [self._subscribe(topic) for topic in transform_topics.understood()]
+        understood = transform_topics.understood()
+        heard = pipeline.transforms.heard
+        for topic in transform_topics.ALL.values():
+            package = topic.type_name.partition("/")[0]
+            heard[self._name(topic)] = 0 if topic in understood else f"not understood ({package} is not installed)"
+        self._subscriptions = [self._subscribe(topic) for topic in understood]
 
     def close(self) -> None:
         for subscription in self._subscriptions:
@@ -38,8 +43,10 @@ class TransformSubscriptions:
 
     def _subscribe(self, topic: TransformTopic):
         limit = RateLimit(self._max_rate)
+        name, heard = self._name(topic), self._pipeline.transforms.heard
 
         def receive(message: Any) -> None:
+            heard[name] += 1
             if not limit.allows():
                 self._warn(topic, f"more than max_rate = {self._max_rate:g} messages a second; some are dropped")
                 return
@@ -51,6 +58,9 @@ class TransformSubscriptions:
         profile = qos.TRANSFORMS_STATIC if topic.static else qos.TRANSFORMS
         message = message_class(topic.type_name)
         return qos_overrides.create_subscription(self._node, message, topic.name, receive, profile)
+
+    def _name(self, topic: TransformTopic) -> str:
+        return self._node.resolve_topic_name(topic.name)
 
     def _warn(self, topic: TransformTopic, text: str) -> None:
         self._accounts.connections["transforms_refused"] += 1

@@ -109,6 +109,21 @@ def test_what_strangers_send_is_bounded(monkeypatch):
     buffer.lookup("hand", "world", 100 * SECOND + 2 * transform_buffer.MOST_SAMPLES)
 
 
+def test_the_account_of_what_was_heard_is_bounded_and_names_the_likeliest_first():
+    buffer = TransformBuffer()
+    assert buffer.account("hand") == "frames known: none"
+    for k in range(30):
+        buffer.add("world", f"link_{k}", IDENTITY, None)
+    buffer.add("world", "right/hand", IDENTITY, None)
+    buffer.heard |= {"/tf": 31, "/tf_static": 0, "/transforms": "not understood"}
+    text = buffer.account("left/hand")
+    assert text.startswith("heard: /tf 31 messages, /tf_static no messages, /transforms not understood; frames known: ")
+    assert text.endswith("known: right/hand, link_0, world, " + ", ".join(f"link_{k}" for k in range(1, 8))
+                         + " and 22 more")  # fmt: skip
+    buffer.add("w" * 255, "x" * 255, IDENTITY, None)
+    assert len(buffer.account("x")) < 2000
+
+
 @pytest.mark.parametrize("static", [False, True])
 def test_transform_of_no_time_is_refused(static):
     message = TransformStamped(child_frame_id="hand")

@@ -97,6 +97,31 @@ def test_transforms_of_geometry_msgs(start_node):
     assert "it must be 1" in node.output()
 
 
+def test_who_waits_for_a_transform_is_told_what_came(start_node):
+    """Here nobody publishes at first, and then without the prefix that the mesh's frame has."""
+    node = start_node({**SCENE, "pending_frames": 1, "mesh": {"net": {"transform": "tf", "frame": "left/hand"}}})
+    topologies(node)
+
+    def told(*texts):
+        node.wait_until(lambda: all(text in node.peer.statuses["frames"][1] for text in texts), str(texts))
+
+    send(node, 0, "left/hand")
+    told(
+        "net waits for a transform: no transform connects 'left/hand' and 'world'; heard: ",
+        "/transforms no messages",
+        "/transforms_static no messages",
+        "/tf_static ",
+        "; frames known: none",
+    )
+    publisher = node.peer.publisher(TransformStamped, "transforms", qos.TRANSFORMS)
+    for parent, child in (("world", "base"), ("base", "hand")):
+        publisher.publish(transform(parent, child, HAND, SECOND))
+    told("/transforms 2 messages", "/transforms_static no messages", "; frames known: hand, base, world")
+    send(node, 1, "left/hand")
+    values = node.frames_status(dropped__net__no_transform=1)
+    assert "/transforms 2 messages" in values["last_refusal"]
+
+
 def test_transforms_of_tf2(start_node):
     """As robot_state_publisher sends them; the package tf2_msgs is no wheel."""
     tf2 = pytest.importorskip("tf2_msgs.msg", reason="tf2_msgs is not installed: /tf is not understood")
