@@ -21,6 +21,7 @@ from hpccd_ros.middleware.guard import Errors, GuardedExecutor
 from hpccd_ros.params import node_parameters
 from hpccd_ros.record import attachments, recorded_topics
 from hpccd_ros.record.described_robots import DescribedRobots
+from hpccd_ros.record.missing_shapes import missing_shapes
 from hpccd_ros.record.recording_info import recording_info
 from hpccd_ros.record.topic_recorder import Recorder
 
@@ -149,6 +150,7 @@ class _Running:
             functools.partial(recorded_topics.as_node_asks, recorded=node, vertices=reliability),
         )  # fmt: skip
         DescribedRobots(self._node, self.bag, parameters, node.resolve_topic_name, node.get_logger().warning)
+        self._missing = functools.partial(missing_shapes, parameters, node.resolve_topic_name, self._recorder.received)
         self._errors = errors
         self._executor = GuardedExecutor(errors, context=node.context)
         self._executor.add_node(self._node)
@@ -179,7 +181,8 @@ class _Running:
         bag, values = self.bag, self._values()
         lost = f", {values['lost']} lost on the way" if values["lost"] else ""
         errors = f", {values['not_written']} NOT WRITTEN ({bag.last_error})" if bag.write_errors else ""
-        return f"recorded {bag.message_count} messages, {bag.size / 1e6:.2f} MB{lost}{errors}: {bag.path}"
+        missing = "".join(f"; {text}" for text in self._missing())
+        return f"recorded {bag.message_count} messages, {bag.size / 1e6:.2f} MB{lost}{errors}: {bag.path}{missing}"
 
     def status(self, running: bool) -> tuple[bytes, str, dict[str, object]]:
         values = self._values()
@@ -189,6 +192,8 @@ class _Running:
             return DiagnosticStatus.ERROR, f"nothing is written now: {self.bag.last_error}", values
         if values["lost"] or values["not_written"]:
             return DiagnosticStatus.WARN, "the recording is not complete", values
+        if missing := self._missing():
+            return DiagnosticStatus.WARN, "; ".join(missing), values
         return DiagnosticStatus.OK, "recording" if running else "recorded", values
 
     def _values(self) -> dict[str, object]:

@@ -16,9 +16,13 @@ from hpccd_ros.middleware.message_types import message_class
 from hpccd_ros.params import node_parameters
 from hpccd_ros.record import attachments, recorded_topics
 from hpccd_ros.record.described_robots import DescribedRobots
+from hpccd_ros.record.missing_shapes import missing_shapes
 from hpccd_ros.record.recorded_topics import Wanted
 from hpccd_ros.record.recording_info import recording_info
 from hpccd_ros.record.topic_recorder import Recorder
+
+# s. Long enough for a shape that is sent with the first pose; soon enough to begin again.
+LOOK_EVERY = 5.0
 
 
 def main(args) -> int:
@@ -62,10 +66,11 @@ def _record(node, target, args, stop) -> int:
         DescribedRobots(node, bag, parameters, node.resolve_topic_name, _warn)
         recorder = Recorder(node, bag, wanted, args.depth)
         contacts = node.resolve_topic_name(topic_names.CONTACTS)
-        _spin(node, recorder, bag, contacts, args, stop)
+        missing = lambda: missing_shapes(parameters, node.resolve_topic_name, recorder.received)  # noqa: E731
+        _spin(node, recorder, bag, contacts, args, stop, missing)
     finally:
         bag.close()
-    _report(bag, recorder)
+    _report(bag, recorder, missing())
     return 1 if bag.write_errors else 0
 
 
@@ -73,12 +78,12 @@ def _warn(text) -> None:
     print(text, file=sys.stderr, flush=True)
 
 
-def _spin(node, recorder, bag, contacts, args, stop):
+def _spin(node, recorder, bag, contacts, args, stop, missing):
     executor = SingleThreadedExecutor()
     executor.add_node(node)
     status = Status(bag, recorder, contacts)
-    started = time.monotonic()
-    ready = False
+    started = look = time.monotonic()
+    ready = warned = False
     while not stop:
         executor.spin_once(timeout_sec=0.1)
         bag.poll()
@@ -87,6 +92,12 @@ def _spin(node, recorder, bag, contacts, args, stop):
             # Read by programs that start a recorder and must not publish before it listens.
             print(f"recording {args.node} into {bag.path}: {len(recorder.topics)} topics, Ctrl-C ends", flush=True)
         status.update()
+        if not warned and time.monotonic() >= look + LOOK_EVERY:
+            look = time.monotonic()
+            for text in missing():
+                warned = True
+                status.clear()
+                print(f"so far {text}", file=sys.stderr, flush=True)
         if args.duration and time.monotonic() - started >= args.duration:
             break
         if args.frames and recorder.received[contacts] >= args.frames:
@@ -119,11 +130,13 @@ class Status:
             print("\r" + " " * 78 + "\r", end="", file=sys.stderr, flush=True)
 
 
-def _report(bag, recorder):
+def _report(bag, recorder, missing):
     for name, count in recorder.received.items():
         if count:
             lost = recorder.lost.get(name, 0)
             print(f"  {name}: {count} messages" + (f", {lost} LOST on the way here" if lost else ""))
+    for text in missing:
+        print(f"  {text}")
     files = bag.file_paths
     for path in bag.torn_files:
         print(f"  {path} ends early, without index: `hpccd doctor {path} --recover OUT.mcap`")

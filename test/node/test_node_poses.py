@@ -211,7 +211,10 @@ def test_a_recording_that_missed_the_shape_says_what_to_do(start_node, tmp_path,
     for k in range(1, 4):
         publisher.publish(stamped(k))
         node.frames_status(answered=1 + k)
+    missing = "the shape of mesh blade is not in the recording (nothing came on meshes/blade/vertices), so no replay"
+    node.wait_until(lambda: node.peer.statuses["recording"][1].startswith(missing), "the shape to be missed")
     assert node.stop() == 0
+    assert f": {path}; {missing}" in node.output()
     done = hpccd("replay", str(path))
     assert done.returncode == 1 and "no_shape; the recording has no shape of it" in done.stdout, done.stdout
     done = hpccd("view", str(path))
