@@ -35,6 +35,7 @@ def _by_step(batches, component):
         if component in batch.schema.names:
             for step, value in zip(batch.column("step").to_pylist(), batch.column(component).to_pylist(), strict=True):
                 if value is not None:
+                    assert step not in values, f"two rows of {component} at step {step}"
                     values[step] = np.array(value)
     return values
 
