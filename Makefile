@@ -11,6 +11,9 @@ VENV        ?= .venv
 JOBS        ?= $(shell nproc)
 EXTRAS      ?= test lint interop
 PYTEST_ARGS ?=
+# Half of the Python tests' time is spent waiting for timers and messages: one more than there are cores. Bounded, as each
+# starts nodes of its own.
+TEST_JOBS   ?= $(shell echo $$(($(JOBS) < 8 ? $(JOBS) + 1 : 8)))
 AARCH64_TESTS ?= *
 DEMO_ARGS   ?=
 FUZZ_ARGS   ?= --seconds 60
@@ -51,6 +54,7 @@ help: ## Show this list
 	@echo "  VENV=.venv          where the environment lies"
 	@echo "  JOBS=4              compile jobs (default: all cores)"
 	@echo "  CMAKE_ARGS=...      passed on to CMake"
+	@echo "  TEST_JOBS=1         Python tests at a time (default: one more than JOBS, at most 8)"
 	@echo "  PYTEST_ARGS=...     passed on to pytest      DEMO_ARGS=...  passed on to hpccd demo"
 	@echo "  AARCH64_TESTS='GoldenHashes.*'   which tests test-aarch64 runs (default: all of the core)"
 	@echo "  HPCCD_DATA=folder   scenes with ground truth; without it the tests that need them are skipped"
@@ -66,7 +70,7 @@ test-core: $(ENVIRONMENT) ## Only the C++ tests of the core
 	@$(call run_core_tests,build/core-tests,-DCMAKE_BUILD_TYPE=Release)
 
 test-python: venv ## Only the Python tests: core against oracles, node over DDS, recordings
-	$(BIN)/pytest $(PYTEST_ARGS)
+	$(BIN)/pytest --numprocesses $(TEST_JOBS) --dist worksteal $(PYTEST_ARGS)
 
 test-gpu: venv ## Only the tests of the GPU backends, on a machine with an NVIDIA GPU
 	@$(BIN)/python -c 'import sys, hpccd_core as hc; "gpu" in hc.backends() or sys.exit(sys.argv[1])' \

@@ -12,6 +12,9 @@ import pytest
 # A DDS domain of its own for the test run, shared with the processes that it starts. 0..101 are safe on Linux whatever
 # the ephemeral port range is.
 os.environ.setdefault("ROS_DOMAIN_ID", str(1 + os.getpid() % 100))
+# Workers of pytest-xdist inherit that of the run: each counts on from it.
+if worker := int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw")):
+    os.environ["ROS_DOMAIN_ID"] = str((int(os.environ["ROS_DOMAIN_ID"]) + worker) % 102)
 
 _numbers = itertools.count()
 

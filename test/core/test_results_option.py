@@ -104,12 +104,18 @@ class Stream:
     def __init__(self, number):
         self.ptr = number
 
+    def __repr__(self):  # names tests: without an address, the same in each process
+        return f"Stream({self.ptr})"
+
 
 class TorchStream:
     """As PyTorch's and Warp's."""
 
     def __init__(self, number):
         self.cuda_stream = number
+
+    def __repr__(self):
+        return f"TorchStream({self.cuda_stream})"
 
 
 GOOD = (None, 0, 1, 2, 94_000_000_000_000, np.int64(3), np.uint64(2**64 - 1), Stream(0), Stream(7), TorchStream(8))
