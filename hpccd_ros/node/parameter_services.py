@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""rclpy's services that set parameters, with what they lack: a check of the type that a value claims to have, and
-integers where floats are wanted."""
+"""rclpy's services that set parameters, with what they lack: a check of the type that a value claims to have, integers
+where floats are wanted, and words for names that the node does not have."""
 
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue, SetParametersResult
 from rcl_interfaces.srv import SetParameters, SetParametersAtomically
 from rclpy import parameter
 from rclpy.node import Node
+
+from hpccd_ros.params import values
 
 TYPES = {kind.value for kind in parameter.Parameter.Type}
 
@@ -24,7 +26,7 @@ def amend(node: Node) -> None:
 def _each(node, set_parameters):
     def answer(request: SetParameters.Request, response: SetParameters.Response) -> SetParameters.Response:
         for given in request.parameters:
-            if (refused := _refusal(given)) is None:
+            if (refused := _refusal(node, given)) is None:
                 one = SetParameters.Request(parameters=[_as_declared(node, given)])
                 response.results += set_parameters(one, SetParameters.Response()).results
             else:
@@ -39,7 +41,7 @@ def _all(node, set_atomically):
         request: SetParametersAtomically.Request, response: SetParametersAtomically.Response
     ) -> SetParametersAtomically.Response:
         for given in request.parameters:
-            if (refused := _refusal(given)) is not None:
+            if (refused := _refusal(node, given)) is not None:
                 response.result = refused
                 return response
         request.parameters = [_as_declared(node, given) for given in request.parameters]
@@ -48,10 +50,13 @@ def _all(node, set_atomically):
     return answer
 
 
-def _refusal(given: Parameter) -> SetParametersResult | None:
-    if given.value.type in TYPES:
+def _refusal(node: Node, given: Parameter) -> SetParametersResult | None:
+    if given.value.type not in TYPES:
+        reason = f"{given.name}: {given.value.type} is no type of rcl_interfaces/msg/ParameterType"
+    elif not node.has_parameter(given.name):
+        reason = values.undeclared(given.name)
+    else:
         return None
-    reason = f"{given.name}: {given.value.type} is no type of rcl_interfaces/msg/ParameterType"
     return SetParametersResult(successful=False, reason=reason)
 
 

@@ -149,6 +149,21 @@ def robot_rows(robot: str) -> list[tuple[Row, str]]:
     return [(row, f"{ROBOT}.{robot}.{row.name}") for row in ROBOT_ROWS]
 
 
+def undeclared(name: str) -> str:
+    """Why a parameter that a running node does not have cannot be set."""
+    try:
+        pairs = pair_names([name])
+    except ParameterError as error:
+        return str(error)
+    if pairs:
+        return (
+            f"{quoting.shortened(name)}: the node has no pair of this name, and takes such names only when it starts; "
+            f"start it with {quoting.shortened(f'{PAIRS}.{pairs[0]}.meshes')}, or name both meshes in pair_separation, "
+            "pair_accuracy, pair_features or ignored_pairs"
+        )
+    return f"{quoting.shortened(name)}: the node has no such parameter; see docs/parameters.md"
+
+
 # Of every node.
 _ROS_OWN = ("use_sim_time", "start_type_description_service")
 

@@ -61,6 +61,10 @@ def test_given_changed_and_replayed(start_node, tmp_path, hpccd):
         ("pairs.between.separation", "wide", "type"),
         ("pairs.between.accuracy", "fast", "pairs.between.accuracy: read-only while the node is configured"),
         ("pairs.between.meshes", ["cloth"], "pairs.between.meshes: read-only while the node is configured"),
+        ("pairs.new.separation", 1e-3, "start it with pairs.new.meshes, or name both meshes in pair_separation"),
+        ("pairs.new.meshes", ["cloth", "net"], "pairs.new.meshes: the node has no pair of this name"),
+        ("pairs.between.acuracy", "fast", "pairs.between.acuracy: no parameter of a pair of meshes; there are"),
+        ("mesh.nte.frame", "hand", "mesh.nte.frame: the node has no such parameter; see docs/parameters.md"),
     ):
         refused = set_parameter(node, name, value)
         assert not refused.successful and reason in refused.reason, refused.reason
