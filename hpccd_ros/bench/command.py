@@ -44,10 +44,15 @@ def configure(
     if steps is not None:
         what.add_argument("--steps", type=int, default=steps, metavar="N",
                           help="steps measured of each scene, evenly spread; 0: all (default: %(default)s)")
-    what.add_argument("--repeat", type=int, default=rounds, metavar="N",
-                      help="timed rounds after one of warm-up (default: %(default)s)")
+    repeat_option(what, rounds)
     output_options(parser)
     parser.set_defaults(default_sources=tuple(default))
+
+
+def repeat_option(parser, rounds: int, part: str = "") -> None:
+    """part: what of the benchmark is repeated, where it is not all of it."""
+    text = f"{part and f'of {part}: '}timed rounds after one of warm-up (default: %(default)s)"
+    parser.add_argument("--repeat", type=int, default=rounds, metavar="N", help=text)
 
 
 def output_options(parser: argparse.ArgumentParser) -> None:

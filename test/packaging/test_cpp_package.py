@@ -1,14 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """The C++ package, installed into an empty folder, serves a program of somebody else."""
 
+import fcntl
 import os
 import re
-import subprocess
 import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from build_tools import run
 from sources import ROOT
 
 import hpccd_core as hc
@@ -18,26 +19,15 @@ VERSION = hc.__version__
 BUILD = Path(os.environ.get("HPCCD_CPP_BUILD", ROOT / "build" / "core-tests"))
 
 
-# CMake and Ninja lie beside this Python.
-ENVIRONMENT = {**os.environ, "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"}
-
-
-def run(*command) -> str:
-    done = subprocess.run(
-        [str(part) for part in command], text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=500,
-        env=ENVIRONMENT,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stdout
-    return done.stdout
-
-
 @pytest.fixture(scope="session")
 def prefix(tmp_path_factory):
     if not (BUILD / "build.ninja").is_file():
         pytest.skip(f"the library is not built in {BUILD}: make test-core")
-    run("cmake", "--build", BUILD, "--target", "hpccd_core_shared", "hpccd_core_static")
     folder = tmp_path_factory.mktemp("prefix")
-    run("cmake", "--install", BUILD, "--prefix", folder)
+    with (BUILD / "packaging.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)  # workers of pytest-xdist come here at once, and Ninja has no lock of its own
+        run("cmake", "--build", BUILD, "--target", "hpccd_core_shared", "hpccd_core_static")
+        run("cmake", "--install", BUILD, "--prefix", folder)
     return folder
 
 

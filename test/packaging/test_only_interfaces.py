@@ -4,11 +4,11 @@
 import json
 import os
 import re
-import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+from build_tools import ENVIRONMENT, run
 from sources import ROOT
 
 WHEELS = Path(sys.prefix)
@@ -37,21 +37,12 @@ print(future.result().message, list(future.result().distances.distance))
 """
 
 
-def run(*command, environment=None):
-    done = subprocess.run(
-        [str(part) for part in command], text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=500,
-        env=environment,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stdout
-    return done.stdout
-
-
 @pytest.fixture(scope="module")
 def build(tmp_path_factory):
     build, prefix = tmp_path_factory.mktemp("build"), tmp_path_factory.mktemp("prefix")
     ros = os.environ.get("AMENT_PREFIX_PATH") or str(WHEELS)
     paths = {"AMENT_PREFIX_PATH": ros, "CMAKE_PREFIX_PATH": os.environ.get("CMAKE_PREFIX_PATH") or ros}
-    environment = {**os.environ, **paths, "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"}
+    environment = {**ENVIRONMENT, **paths}
     options = [
         "-DHPCCD_ONLY_INTERFACES=ON", f"-DCMAKE_INSTALL_PREFIX={prefix}", "-DCMAKE_EXPORT_COMPILE_COMMANDS=ON",
         f"-DPython3_EXECUTABLE={sys.executable}", f"-DPython_EXECUTABLE={sys.executable}",

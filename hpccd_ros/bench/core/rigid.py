@@ -46,8 +46,7 @@ def configure(parser):
                       help="of cost; the radius of the ball is 0.5 (default: %(default)s)")  # fmt: skip
     what.add_argument("--size", type=float, default=1.0, metavar="X",
                       help="of cost: factor on the triangles of the cloth (default: %(default)s)")  # fmt: skip
-    what.add_argument("--repeat", type=int, default=15, metavar="N",
-                      help="of cost: timed rounds after one of warm-up (default: %(default)s)")  # fmt: skip
+    command.repeat_option(what, 15, "cost")
     command.tier_option(parser, "exact")
     command.threads_option(parser)
     command.output_options(parser)

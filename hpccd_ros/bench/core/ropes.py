@@ -30,8 +30,7 @@ def configure(parser):
     what.add_argument("--segments", default="100000", metavar="N,...",
                       help="how many in a scene (default: %(default)s)")  # fmt: skip
     what.add_argument("--segments-a-rope", type=int, default=500, metavar="N", help="default: %(default)s")
-    what.add_argument("--repeat", type=int, default=15, metavar="N",
-                      help="timed rounds after one of warm-up (default: %(default)s)")  # fmt: skip
+    command.repeat_option(what, 15)
     command.tier_option(parser, "exact")
     command.threads_option(parser)
     command.output_options(parser)
