@@ -39,11 +39,13 @@ class Wanted:
     """A topic to record: `name` relative or absolute, `type_name` "pkg/msg/Name".
 
     `latched`: of a transient local topic, how many of its last messages are in force at any time; else 0.
+    `kept`: the same of a topic that is not transient local, but whose messages hold until the next one.
     """
 
     name: str
     type_name: str
     latched: int = 0
+    kept: int = 0
 
 
 def of_node(parameters: dict) -> list[Wanted]:
@@ -60,7 +62,11 @@ def of_node(parameters: dict) -> list[Wanted]:
         wanted.append(Wanted(topic_names.topology(mesh), TOPOLOGY, latched=1))
         given_as = parameters.get(f"mesh.{mesh}.input") or topic_names.VERTICES
         kinds = topic_names.positions(given_as)
-        wanted += [Wanted(topic_names.of_mesh(mesh, kind), POSITIONS[kind]) for kind in kinds]
+        once = parameters.get(f"mesh.{mesh}.static") or given_as in (topic_names.POSE, topic_names.BY_TRANSFORMS)
+        wanted += [
+            Wanted(topic_names.of_mesh(mesh, kind), POSITIONS[kind], kept=int(once and kind != topic_names.POSE))
+            for kind in kinds
+        ]
     described = dict.fromkeys(robot_parameters.topics(robots).values())
     wanted += [Wanted(topic, DESCRIPTION, latched=1) for topic in described]
     wanted += [Wanted(topic, JOINT_STATES) for topic in robot_parameters.joint_topics(robots)]

@@ -61,7 +61,8 @@ class Recorder:
             if self._end is not None and info["received_timestamp"] > self._end:
                 return
             if self.received[name] == 0:
-                self._bag.add_topic(Topic(name, topic.type_name, self._offered_qos(name), topic.latched))
+                in_force = max(topic.latched, topic.kept)
+                self._bag.add_topic(Topic(name, topic.type_name, self._offered_qos(name), in_force))
             self.received[name] += 1
             self._watch_for_loss(name, info["publication_sequence_number"])
             self._bag.write(

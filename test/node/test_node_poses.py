@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Meshes that move by poses beside a cloth: streamed as PoseStamped or by transforms, recorded and computed again."""
 
+import time
+
 import numpy as np
 import pytest
 from geometry_msgs.msg import PoseStamped, TransformStamped
@@ -156,6 +158,33 @@ def test_what_is_wrong_with_poses_is_refused_and_said(start_node):
         publisher.publish(stamped(k))
     assert node.contacts(1)[-1].parts >= 1
     assert node.process.poll() is None
+
+
+def test_each_file_of_a_split_recording_has_the_shape(start_node, tmp_path):
+    folder = tmp_path / "run"
+    given = {"meshes": ["blade", "floor"], "mesh.blade.input": "pose", "mesh.floor.static": True}
+    node = start_node({**given, "record": str(folder), "record_split_time": 0.1, "frame_queue": 8})
+    give_shape(node)
+    node.peer.topology("floor", np.array([[0, 1, 2]]), 3)
+    node.peer.vertices("floor", np.array([[-9, -9, 0], [9, -9, 0], [0, 9, 0]], np.float32), stamp=0)
+    node.frames_status(answered=2)
+    publisher = node.peer.publisher(PoseStamped, client.pose_topic("blade"))
+    for k in range(1, 9):
+        for part in (0, 1):  # a split falls between two frames here and there: never between all of them
+            publisher.publish(stamped(2 * k + part))
+        node.frames_status(answered=2 + 2 * k)
+        time.sleep(0.1)
+    assert node.stop() == 0
+    files = sorted(folder.glob("*.mcap"))
+    assert len(files) > 2 and len(replayed(folder)) == 15
+    verified = 0
+    for file in files:
+        with Recording(file) as recording:
+            replay = Replay(recording, recorded_setup.of_recording(recording))
+            list(replay.steps())
+        assert not replay.diverged and not any(counter.total for counter in replay.source.refused.values())
+        verified += replay.verified
+    assert verified > 2
 
 
 def test_transforms_alone(start_node):
