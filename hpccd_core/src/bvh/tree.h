@@ -39,6 +39,8 @@ struct alignas(64) Node {
   bool near_at_start(const Node& other, float reach) const;
   // Of one snapshot: no farther apart than `reach` along any axis and any of the slanted directions (kdop.h).
   bool near_in_snapshot(const Node& other, float reach) const;
+  // At the start, the square of the Euclidean distance of the boxes.
+  float square_of_gap(const Node& other) const;
 };
 static_assert(sizeof(Node) == 64);
 
@@ -78,6 +80,13 @@ inline bool Node::near_in_snapshot(const Node& other, float reach) const {
                       (load4(box.t1.high) + by_slanted < load4(other.box.t1.low)) |
                       (load4(other.box.t1.high) + by_slanted < load4(box.t1.low));
   return (bits4(apart) & 7) == 0;
+}
+
+inline float Node::square_of_gap(const Node& other) const {
+  const Floats4 zero{};
+  const Floats4 gap = max4(max4(load4(box.t0.low) - load4(other.box.t0.high), load4(other.box.t0.low) - load4(box.t0.high)),
+                           zero);
+  return gap[0] * gap[0] + gap[1] * gap[1] + gap[2] * gap[2];
 }
 
 // The corners of a leaf are the distinct vertices of its features: nine or ten where eight triangles hang together. All

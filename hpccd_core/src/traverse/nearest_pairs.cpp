@@ -5,6 +5,7 @@
 #include <tuple>
 
 #include "elementary/distance/proximity_test.h"
+#include "traverse/near_corners.h"
 #include "traverse/snapshot.h"
 
 namespace hpccd {
@@ -21,6 +22,7 @@ NearestPairs::NearestPairs(const MeshPairs& pairs, const Features& features, con
                            const Tree& tree)
     : pairs_(pairs),
       features_(features),
+      motion_(motion),
       tree_(tree),
       entries_(std::make_unique<Entry[]>(pairs.size())),
       least_edge_(tree.nodes.size(), Tree::none),
@@ -47,12 +49,31 @@ void NearestPairs::offer(std::uint32_t mesh_a, std::uint32_t mesh_b, const Neare
   const std::lock_guard lock(entry.lock);
   if (!pair.before(entry.best)) return;
   entry.best = pair;
-  const bool intersects = pair.kind == Kind::edge_face;
-  // Pairs at the same distance are still wanted, one of which is the first in order.
-  if (intersects) entry.piercing_edge.store(pair.first, std::memory_order_relaxed);
-  entry.limit.store(intersects ? -1 : pair.distance * (1 + 1e-14) + rounding_, std::memory_order_relaxed);
-  entry.reach.store(intersects ? 0 : reach_of(pair.distance * (1 + 1e-14) + rounding_, sums_, scale_),
-                    std::memory_order_relaxed);
+  if (pair.kind == Kind::edge_face) {
+    entry.piercing_edge.store(pair.first, std::memory_order_relaxed);
+    entry.limit.store(-1, std::memory_order_relaxed);
+    entry.reach.store(0, std::memory_order_relaxed);
+  } else {
+    // Pairs at the same distance are still wanted, one of which is the first in order.
+    limit(entry, pair.distance * (1 + 1e-14) + rounding_);
+  }
+}
+
+void NearestPairs::begin(std::uint32_t a, std::uint32_t b) {
+  Entry& entry = at(tree_.nodes[a].mesh, tree_.nodes[b].mesh);
+  if (entry.begun.exchange(true, std::memory_order_relaxed)) return;
+  const double distance = distance_of_near_corners(tree_, motion_, a, b);
+  if (!(distance < std::numeric_limits<double>::infinity())) return;
+  const std::lock_guard lock(entry.lock);
+  // The nearest pair may be computed to be farther apart than that by what the test rounds, and is to be found as if
+  // there were no limit.
+  limit(entry, distance * (1 + 1e-14) + 2 * rounding_);
+}
+
+void NearestPairs::limit(Entry& entry, double limit) {
+  if (!(limit < entry.limit.load(std::memory_order_relaxed))) return;
+  entry.limit.store(limit, std::memory_order_relaxed);
+  entry.reach.store(reach_of(limit, sums_, scale_), std::memory_order_relaxed);
 }
 
 }  // namespace hpccd

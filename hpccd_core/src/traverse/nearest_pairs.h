@@ -50,6 +50,8 @@ class NearestPairs {
   std::uint32_t least_edge(std::uint32_t a, std::uint32_t b) const { return std::min(least_edge_[a], least_edge_[b]); }
   std::uint32_t mesh_of(std::uint32_t vertex) const { return features_.mesh_of_vertex[vertex]; }
   void offer(std::uint32_t mesh_a, std::uint32_t mesh_b, const NearestPair& pair);
+  // When two meshes are met first, with these nodes: what is farther apart than two of their vertices is left out.
+  void begin(std::uint32_t a, std::uint32_t b);
   // After the search, in the order of the pairs.
   const MeshPairs& pairs() const { return pairs_; }
   const NearestPair& found(std::size_t number) const { return entries_[number].best; }
@@ -59,13 +61,16 @@ class NearestPairs {
     std::atomic<float> reach{std::numeric_limits<float>::infinity()};
     std::atomic<double> limit{1e307};  // beyond all coordinates; finite: margins are computed with it
     std::atomic<std::uint32_t> piercing_edge{0xFFFFFFFFu};  // of the pair of edge and face that comes first so far
+    std::atomic<bool> begun{false};
     SpinLock lock;
     NearestPair best;
   };
+  void limit(Entry& entry, double limit);
   Entry& at(std::uint32_t a, std::uint32_t b) const { return entries_[pairs_.number(a, b)]; }
 
   const MeshPairs& pairs_;
   const Features& features_;
+  const MotionBounds& motion_;
   const Tree& tree_;
   std::unique_ptr<Entry[]> entries_;       // by number of the pair
   std::vector<std::uint32_t> least_edge_;  // by node

@@ -96,8 +96,9 @@ struct Nothing {
   std::shared_ptr<const Scene> scene = test::two_sheets(3);
   Features features = features_of(*scene);
   MeshPairs pairs{PairRules(*scene, Accuracy::exact, SeparationTable(*scene, 0)), scene->meshes().size()};
+  MotionBounds motion;
   Tree tree;
-  NearestPairs nearest{pairs, features, MotionBounds(), tree};
+  NearestPairs nearest{pairs, features, motion, tree};
   Cancellation cancellation;
 
   std::vector<Gap> gaps() const { return collect_gaps(nearest, {}, cancellation); }

@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: Apache-2.0
+// Whether two leaves are certainly farther apart than a distance: by directions along which all their corners are.
+#pragma once
+
+#include "bvh/tree.h"
+
+namespace hpccd {
+
+// In one snapshot, in coordinates of the boxes; `reach` as reach_of() in snapshot.h has it. Boxes along the axes stand
+// off from what is slanted to them by nearly their own size: of bodies far apart 50 pairs of leaves are left by boxes
+// where 3 are by this.
+bool farther_apart(const Tree& tree, const LeafRange& a, const LeafRange& b, float reach);
+
+}  // namespace hpccd
