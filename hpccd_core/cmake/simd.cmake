@@ -2,7 +2,7 @@
 # Kernels once per instruction set; which one runs is chosen at run time (src/base/simd.cpp).
 set(hpccd_kernels
   src/base/machine_rate src/elementary/batch src/elementary/distance/distance_batch src/elementary/intersection_batch
-  src/traverse/leaf_pairs src/traverse/leaf_edge_faces)
+  src/traverse/far_pairs src/traverse/leaf_pairs src/traverse/leaf_edge_faces)
 
 # hpccd_compile_kernels(target instruction_set [option ...])
 function(hpccd_compile_kernels target set)

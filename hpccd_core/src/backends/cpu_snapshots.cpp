@@ -36,6 +36,7 @@ std::optional<std::vector<Gap>> CpuBackend::distances(Positions vertices) {
   search_.nearest =
       std::make_unique<NearestPairs>(*mesh_pairs_, shared_.features, shared_.tree.motion(), shared_.tree.tree());
   search_.leaf_pairs_in_snapshot = leaf_pairs_in_snapshot(o.simd);
+  search_.far_pairs = far_pairs(o.simd);
   search_.leaf_edge_faces = leaf_edge_faces(o.simd);
   walk_tree();
   std::vector<Gap> gaps = collect_gaps(*search_.nearest, search_.geometry, shared_.cancellation);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "traverse/leaf_hulls.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 
@@ -37,7 +38,18 @@ V middle(const Box& box) {
   return {0.5f * (box.low[0] + box.high[0]), 0.5f * (box.low[1] + box.high[1]), 0.5f * (box.low[2] + box.high[2])};
 }
 
+const Node& node_of(const Tree& tree, const LeafRange& leaf) {
+  return tree.nodes[tree.leaf_nodes[static_cast<std::size_t>(&leaf - tree.leaves.data())]];
+}
+
 }  // namespace
+
+bool far_apart(const Node& a, const Node& b, float reach) {
+  float size = 0;
+  for (const Box* box : {&a.box.t0, &b.box.t0})
+    for (int k = 0; k < 3; ++k) size = std::max(size, box->high[k] - box->low[k]);
+  return size < reach;
+}
 
 // Gilbert's walk (1966) to the point of all differences between them that is nearest to zero: each step gives a
 // direction along which they may be apart, and a difference that tells how near they are at least.
@@ -48,11 +60,7 @@ V middle(const Box& box) {
 bool farther_apart(const Tree& tree, const LeafRange& a, const LeafRange& b, float reach) {
   constexpr float rounding = 2e-6f;
   constexpr int most_steps = 6;
-  if (tree.grown) return false;
-  const auto node = [&](const LeafRange& leaf) -> const Node& {
-    return tree.nodes[tree.leaf_nodes[static_cast<std::size_t>(&leaf - tree.leaves.data())]];
-  };
-  V v = middle(node(b).box.t0) - middle(node(a).box.t0);
+  V v = middle(node_of(tree, b).box.t0) - middle(node_of(tree, a).box.t0);
   for (int step = 0; step < most_steps; ++step) {
     const float length = std::sqrt(dot(v, v));
     if (!(length > reach)) return false;  // after the first step: of two points of them

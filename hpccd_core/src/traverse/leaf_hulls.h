@@ -6,6 +6,9 @@
 
 namespace hpccd {
 
+// Whether boxes of this reach cover most of two leaves, so that looking closer pays.
+bool far_apart(const Node& a, const Node& b, float reach);
+
 // In one snapshot, in coordinates of the boxes; `reach` as reach_of() in snapshot.h has it. Boxes along the axes stand
 // off from what is slanted to them by nearly their own size: of bodies far apart 50 pairs of leaves are left by boxes
 // where 3 are by this.

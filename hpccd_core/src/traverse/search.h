@@ -13,6 +13,7 @@
 #include "elementary/intersection_batch.h"
 #include "elementary/policy.h"
 #include "traverse/drift.h"
+#include "traverse/far_pairs.h"
 #include "traverse/leaf_edge_faces.h"
 #include "traverse/leaf_pairs.h"
 #include "traverse/nearest_pairs.h"
@@ -35,6 +36,7 @@ struct Search {
   LeafPairsUntil leaf_pairs_until = nullptr;
   LeafPairsInSnapshot leaf_pairs_at_start = nullptr;
   LeafPairsInSnapshot leaf_pairs_in_snapshot = nullptr;  // of one snapshot, within `reach` or what `nearest` leaves
+  LeafPairsInSnapshot far_pairs = nullptr;               // in its place where nearest leaves are far apart
   LeafEdgeFaces leaf_edge_faces = nullptr;
   float reach = 0;
   // How they are tested, by number of the rule; edges against faces alike by all.

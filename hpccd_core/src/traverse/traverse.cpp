@@ -179,18 +179,19 @@ void test_leaves(const Tree& tree, const PairRules& rules, LeafPair pair, Worker
     worker.test_edge_faces([&](CandidateBuffer& edge_face) { search.leaf_edge_faces(tree, a, b, edge_face); });
   if (!search.leaf_pairs_in_snapshot) return;
   float reach = search.reach;
-  bool first_look = false;
+  bool first_look = false, far = false;
   if (search.nearest) {
     const double limit = search.nearest->limit(node_a.mesh, node_b.mesh);
     if (limit < 0) return;  // they intersect
     reach = search.nearest->reach(node_a.mesh, node_b.mesh);
     first_look = reach == std::numeric_limits<float>::infinity();
-    if (node_a.mesh != node_b.mesh && !first_look && farther_apart(tree, a, b, reach)) return;
+    far = node_a.mesh != node_b.mesh && !first_look && far_apart(node_a, node_b, reach) && !tree.grown;
+    if (far && farther_apart(tree, a, b, reach)) return;
   }
   // Smallest distances are of whole surfaces.
   const TestedFeatures tested = search.nearest ? TestedFeatures{} : rule.features;
   worker.test_candidates(rule, [&](CandidateBuffer& edge_edge, CandidateBuffer& vertex_face) {
-    search.leaf_pairs_in_snapshot(tree, a, b, tested, reach, edge_edge, vertex_face);
+    (far ? search.far_pairs : search.leaf_pairs_in_snapshot)(tree, a, b, tested, reach, edge_edge, vertex_face);
   });
   if (first_look) worker.flush();  // any bound is better than none
 }

@@ -39,7 +39,7 @@ void Worker::begin(Search& search) {
   elementary_seconds = 0;
   elementary_ticks = 0;
   leaf_pairs_time = {};
-  first_batches_ = search.prunes ? first_batches : 0;
+  first_batches_ = search.nearest ? ~0u : search.prunes ? first_batches : 0;
   for (auto& w : waiting_)  // what an exception left behind
     if (w) w->edge_edge.n = w->vertex_face.n = 0;
   if (edge_faces_) edge_faces_->n = 0;
