@@ -84,8 +84,8 @@ inline bool Node::near_in_snapshot(const Node& other, float reach) const {
 
 inline float Node::square_of_gap(const Node& other) const {
   const Floats4 zero{};
-  const Floats4 gap = max4(max4(load4(box.t0.low) - load4(other.box.t0.high), load4(other.box.t0.low) - load4(box.t0.high)),
-                           zero);
+  const Floats4 gap =
+      max4(max4(load4(box.t0.low) - load4(other.box.t0.high), load4(other.box.t0.low) - load4(box.t0.high)), zero);
   return gap[0] * gap[0] + gap[1] * gap[1] + gap[2] * gap[2];
 }
 

@@ -48,7 +48,10 @@ struct FeatureRows {
   HPCCD_HD std::uint32_t padded() const { return (size + lanes - 1) / lanes * lanes; }
 };
 
-// Bit j: feature j of b is not certainly farther from feature i of a than `reach`, whose square is given too: boxes
+// Below it products of squares are no normal numbers, and say nothing.
+constexpr float least_square = 1e-20f;
+
+// Bit j: feature j of b is not certainly farther from feature i of a than the root of `square`: boxes
 // lie apart along a direction, and along it the features are farther apart than their boxes.
 template <std::uint32_t n_a, std::uint32_t n_b>
 HPCCD_HD unsigned near_features(const FeatureRows<n_a>& a, std::uint32_t i, const FeatureRows<n_b>& b, float square) {
@@ -56,7 +59,8 @@ HPCCD_HD unsigned near_features(const FeatureRows<n_a>& a, std::uint32_t i, cons
   for (std::uint32_t begin = 0; begin < b.size; begin += lanes) {
     Single gap[3], length(0.0);
     for (std::uint32_t k = 0; k < 3; ++k) {
-      const Single behind = load(&b.low[k][begin]) - all(a.high[k][i]), before = all(a.low[k][i]) - load(&b.high[k][begin]);
+      const Single behind = load(&b.low[k][begin]) - all(a.high[k][i]),
+                   before = all(a.low[k][i]) - load(&b.high[k][begin]);
       gap[k] = greater(behind, Single(0.0)) - greater(before, Single(0.0));
       length = length + gap[k] * gap[k];
     }
@@ -68,7 +72,8 @@ HPCCD_HD unsigned near_features(const FeatureRows<n_a>& a, std::uint32_t i, cons
     for (std::uint32_t j = 1; j < n_b; ++j)
       nearest = lesser(nearest, place([&](std::uint32_t k) { return load(&b.corner[j][k][begin]); }));
     const Single apart = nearest - farthest;
-    const unsigned far = bits((apart > Single(0.0)) && (apart * apart > all(square) * length));
+    const unsigned far =
+        bits((length > all(least_square)) && (apart > Single(0.0)) && (apart * apart > all(square) * length));
     near |= ~far << begin;
   }
   return near & (b.size >= 32 ? ~0u : (1u << b.size) - 1);

@@ -44,10 +44,10 @@ NearestPairs::NearestPairs(const MeshPairs& pairs, const Features& features, con
   }
 }
 
-void NearestPairs::offer(std::uint32_t mesh_a, std::uint32_t mesh_b, const NearestPair& pair) {
+bool NearestPairs::offer(std::uint32_t mesh_a, std::uint32_t mesh_b, const NearestPair& pair) {
   Entry& entry = at(mesh_a, mesh_b);
   const std::lock_guard lock(entry.lock);
-  if (!pair.before(entry.best)) return;
+  if (!pair.before(entry.best)) return false;
   entry.best = pair;
   if (pair.kind == Kind::edge_face) {
     entry.piercing_edge.store(pair.first, std::memory_order_relaxed);
@@ -57,6 +57,7 @@ void NearestPairs::offer(std::uint32_t mesh_a, std::uint32_t mesh_b, const Neare
     // Pairs at the same distance are still wanted, one of which is the first in order.
     limit(entry, pair.distance * (1 + 1e-14) + rounding_);
   }
+  return true;
 }
 
 void NearestPairs::begin(std::uint32_t a, std::uint32_t b) {

@@ -49,7 +49,8 @@ class NearestPairs {
   // The lowest number of an edge in either.
   std::uint32_t least_edge(std::uint32_t a, std::uint32_t b) const { return std::min(least_edge_[a], least_edge_[b]); }
   std::uint32_t mesh_of(std::uint32_t vertex) const { return features_.mesh_of_vertex[vertex]; }
-  void offer(std::uint32_t mesh_a, std::uint32_t mesh_b, const NearestPair& pair);
+  // Whether it comes before what was found so far.
+  bool offer(std::uint32_t mesh_a, std::uint32_t mesh_b, const NearestPair& pair);
   // When two meshes are met first, with these nodes: what is farther apart than two of their vertices is left out.
   void begin(std::uint32_t a, std::uint32_t b);
   // After the search, in the order of the pairs.

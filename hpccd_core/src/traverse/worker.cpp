@@ -39,7 +39,8 @@ void Worker::begin(Search& search) {
   elementary_seconds = 0;
   elementary_ticks = 0;
   leaf_pairs_time = {};
-  first_batches_ = search.nearest ? ~0u : search.prunes ? first_batches : 0;
+  first_batches_ = search.prunes ? first_batches : 0;
+  nearest_batch_ = first_batch;
   for (auto& w : waiting_)  // what an exception left behind
     if (w) w->edge_edge.n = w->vertex_face.n = 0;
   if (edge_faces_) edge_faces_->n = 0;
@@ -70,6 +71,7 @@ void Worker::drain(CandidateBuffer& buffer, Kind kind, Rule rule, std::uint32_t 
   const auto start = std::chrono::steady_clock::now();
   const std::uint64_t start_ticks = ticks();
   std::uint32_t done = 0;
+  nearer_ = false;
   while (buffer.n - done >= keep_below && done < buffer.n) {
     const std::uint32_t n = std::min(buffer.n - done, batch_capacity);
     test(buffer.first + done, buffer.second + done, n, kind, rule);
@@ -78,6 +80,7 @@ void Worker::drain(CandidateBuffer& buffer, Kind kind, Rule rule, std::uint32_t 
   std::copy(buffer.first + done, buffer.first + buffer.n, buffer.first);
   std::copy(buffer.second + done, buffer.second + buffer.n, buffer.second);
   buffer.n -= done;
+  nearest_batch_ = nearer_ ? first_batch : std::min(2 * nearest_batch_, batch_capacity);
   elementary_ticks += ticks() - start_ticks;
   elementary_seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
@@ -163,7 +166,7 @@ std::vector<Contact>& Worker::found(Kind kind) {
 void Worker::offer(Kind kind, const Contact& pair) {
   NearestPairs& nearest = *search_->nearest;
   const auto [a, b] = meshes_of(nearest, search_->geometry, kind, pair.first, pair.second);
-  nearest.offer(a, b, {pair.toc, kind, pair.first, pair.second});
+  nearer_ |= nearest.offer(a, b, {pair.toc, kind, pair.first, pair.second});
 }
 
 void Worker::report(Kind kind, const Contact& contact) {

@@ -35,7 +35,7 @@ class alignas(128) Worker {
   void test_candidates(Rule rule, Add&& add) {
     Waiting& waiting = waiting_by(rule);
     add(waiting.edge_edge, waiting.vertex_face);
-    const std::uint32_t full = first_batches_ > 0 ? first_batch : batch_capacity;
+    const std::uint32_t full = full_batch();
     if (waiting.edge_edge.n >= full) drain(waiting.edge_edge, Kind::edge_edge, rule, full);
     if (waiting.vertex_face.n >= full) drain(waiting.vertex_face, Kind::vertex_face, rule, full);
   }
@@ -76,6 +76,9 @@ class alignas(128) Worker {
     if (!waiting) waiting = std::make_unique<Waiting>();
     return *waiting;
   }
+  std::uint32_t full_batch() const {
+    return search_->nearest ? nearest_batch_ : first_batches_ > 0 ? first_batch : batch_capacity;
+  }
   void drain(CandidateBuffer& buffer, Kind kind, Rule rule, std::uint32_t keep_below);
   void test(const std::uint32_t* first, const std::uint32_t* second, std::uint32_t n, Kind kind, Rule rule);
   const Geometry& geometry_of(const std::uint32_t* first, const std::uint32_t* second, std::uint32_t n, Kind kind);
@@ -88,6 +91,9 @@ class alignas(128) Worker {
   std::unique_ptr<CandidateBuffer> edge_faces_;
   std::unique_ptr<BatchResult> result_;
   std::uint32_t first_batches_ = 0;
+  // In the search for nearest pairs: small where the last batch had a nearer one, after which there is less to test.
+  std::uint32_t nearest_batch_ = first_batch;
+  bool nearer_ = false;
   std::vector<double> limits_;  // of the batch, in the search for nearest pairs
 };
 
