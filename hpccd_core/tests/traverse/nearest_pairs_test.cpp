@@ -147,9 +147,24 @@ TEST(NearestPairs, OfBodiesApartAndThroughEachOther) {
   }
 }
 
+// Where all boxes are within the smallest distance along each axis.
+TEST(NearestPairs, OfBodiesFarApart) {
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> real(-1, 1);
+  for (const double apart : {3.0, 20.0, 1e4}) {
+    const auto scene = triangles(4, 12, true);
+    const std::uint32_t per_mesh = scene->n_vertices() / 4;
+    std::vector<double> positions;
+    for (std::uint32_t v = 0; v < scene->n_vertices(); ++v)
+      for (const double along : {1.0, -0.9, 0.8})
+        positions.push_back(real(random) + apart * along * std::array{0, 1, -1, 3}[v / per_mesh]);
+    expect_nearest(scene, positions, false);
+  }
+}
+
 TEST(NearestPairs, TheFirstOfThoseThatAreEquallyNear) {
   // Unit squares above each other: distances of all pairs of features that are 2 apart are exact in doubles.
-  for (const double height : {2.0, 0.5}) {
+  for (const double height : {2.0, 0.5, 16.0}) {
     auto scene = std::make_shared<Scene>();
     std::vector<double> positions;
     constexpr std::uint32_t side = 4;
