@@ -11,6 +11,7 @@ namespace {
 
 constexpr std::uint32_t lanes = sizeof(Single) / sizeof(float);
 
+HPCCD_HD constexpr unsigned first_bits(std::uint32_t n) { return n >= 32 ? ~0u : (1u << n) - 1; }
 HPCCD_HD Single all(float x) { return Single(Single::Vec{} + x); }
 HPCCD_HD Single load(const float* x) {
   Single r;
@@ -74,9 +75,9 @@ HPCCD_HD unsigned near_features(const FeatureRows<n_a>& a, std::uint32_t i, cons
     const Single apart = nearest - farthest;
     const unsigned far =
         bits((length > all(least_square)) && (apart > Single(0.0)) && (apart * apart > all(square) * length));
-    near |= ~far << begin;
+    near |= (~far & first_bits(lanes)) << begin;
   }
-  return near & (b.size >= 32 ? ~0u : (1u << b.size) - 1);
+  return near & first_bits(b.size);
 }
 
 template <std::uint32_t n_a, std::uint32_t n_b>

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "bvh/tree.h"
+#include "traverse/tasks.h"
 
 namespace hpccd {
 

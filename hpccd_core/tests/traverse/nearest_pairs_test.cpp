@@ -99,6 +99,8 @@ std::vector<Gap> distances(const std::shared_ptr<const Scene>& scene, const std:
 // vertices are nearest, rounding tells the pairs apart that they are in.
 void expect_nearest(const std::shared_ptr<const Scene>& scene, const std::vector<double>& positions, bool exactly) {
   const OneByOne oracle{*scene, positions};
+  double size = 1;
+  for (const double x : positions) size = std::max(size, std::fabs(x));
   std::vector<std::pair<std::uint32_t, std::uint32_t>> enabled;
   for (std::uint32_t a = 0; a < scene->meshes().size(); ++a)
     for (std::uint32_t b = a; b < scene->meshes().size(); ++b)
@@ -115,8 +117,8 @@ void expect_nearest(const std::shared_ptr<const Scene>& scene, const std::vector
         EXPECT_EQ(gap.kind, GapKind::none);
         continue;
       }
-      EXPECT_NEAR(oracle.distance_of(gap), expected.distance, 1e-12) << "of the features named";
-      EXPECT_NEAR(gap.distance, expected.distance, 1e-12) << gap.mesh_a << " and " << gap.mesh_b;
+      EXPECT_NEAR(oracle.distance_of(gap), expected.distance, 1e-12 * size) << "of the features named";
+      EXPECT_NEAR(gap.distance, expected.distance, 1e-12 * size) << gap.mesh_a << " and " << gap.mesh_b;
       EXPECT_EQ(gap.kind == GapKind::edge_face, expected.kind == GapKind::edge_face);
       if (exactly || expected.kind == GapKind::edge_face) {
         EXPECT_EQ(gap.kind, expected.kind);
