@@ -10,8 +10,8 @@ namespace hpccd {
 bool far_apart(const Node& a, const Node& b, float reach);
 
 // In one snapshot, in coordinates of the boxes; `reach` as reach_of() in snapshot.h has it. Boxes along the axes stand
-// off from what is slanted to them by nearly their own size: of bodies far apart 50 pairs of leaves are left by boxes
-// where 3 are by this.
+// off from what is slanted to them by nearly their own size: of sixty spheres that are apart, boxes leave 182,000 pairs
+// of leaves, and this 13,000.
 bool farther_apart(const Tree& tree, const LeafRange& a, const LeafRange& b, float reach);
 
 }  // namespace hpccd
