@@ -14,7 +14,7 @@ namespace {
 // Nodes that may hold a pair that comes before what was found so far. Boxes count by their Euclidean distance: along
 // each axis alone, most of a mesh that is far away along a diagonal is within the smallest distance. Two meshes are met
 // with a bound (NearestPairs::begin), so that what is far is not looked at before what is near. Of a cloth of 6 K
-// triangles and a ball 7 m away that leaves 85 pairs of leaves of 95,000, and 1.4 ms of 280.
+// triangles and a ball 7 m away that leaves 85 pairs of leaves of 95,000, and 1.4 ms in place of 170 to 360.
 struct NearerBoxes {
   using Ends = AtLeaves;
   static constexpr bool shrink = true;
