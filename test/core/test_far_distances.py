@@ -85,12 +85,14 @@ def single_triangles(rng):
 
 
 def ropes_and_points(rng):
-    """Points are tested against faces alone: between points and ropes there is nothing."""
+    """Points are tested against faces alone: not against ropes, however near, nor against a rope that hangs
+    from a face."""
     no_faces = random_scenes.NO_FACES
     rope = [random_scenes.rope(rng, n) for n in (20, 9)]
     points = no_faces, rng.normal(0, 1, (12, 3)) + [25, -25, 25]
+    hanging = [[0, 1, 2]], np.array([[25, -25, 90], [26, -25, 90], [25, -26, 95], [25, -25, 24.0]]), [[2, 3]]
     return [
-        (no_faces, rope[0][1], rope[0][3]), (no_faces, rope[1][1] + [20, 20, 20], rope[1][3]), points,
+        (no_faces, rope[0][1], rope[0][3]), (no_faces, rope[1][1] + [20, 20, 20], rope[1][3]), points, hanging,
         body(rng, [-30, 30, 30]),
     ]  # fmt: skip
 

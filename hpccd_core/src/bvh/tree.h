@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <cstring>
 #include <memory>
 #include <span>
 #include <vector>
@@ -86,7 +87,9 @@ inline float Node::square_of_gap(const Node& other) const {
   const Floats4 zero{};
   const Floats4 gap =
       max4(max4(load4(box.t0.low) - load4(other.box.t0.high), load4(other.box.t0.low) - load4(box.t0.high)), zero);
-  return gap[0] * gap[0] + gap[1] * gap[1] + gap[2] * gap[2];
+  float along[4];
+  std::memcpy(along, &gap, sizeof along);
+  return along[0] * along[0] + along[1] * along[1] + along[2] * along[2];
 }
 
 // The corners of a leaf are the distinct vertices of its features: nine or ten where eight triangles hang together. All

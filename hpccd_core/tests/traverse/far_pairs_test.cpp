@@ -174,9 +174,10 @@ TEST(FarPairs, CornersWithoutFeaturesThatAreTestedTellNothing) {
 TEST(FarPairs, BesideTheMiddleOfTheScene) {
   auto scene = std::make_shared<Scene>();
   for (const char* name : {"a", "b"}) scene->add_mesh(name, std::vector<std::uint32_t>{0, 1, 2}, 3, {});
-  for (const double gap : {1e-8, 1e-14, 1e-18, 1e-22, 1e-30}) {
-    const double x = 1e-7;
-    const TwoMeshes m(scene, {-x, 0, 0, -x, x, 0, -gap, x, x, gap, 0, 0, x, x, 0, x, 0, x}, {0, 0, 0}, 1);
+  for (double gap = 1e-18; gap > 1e-26; gap /= 1.5) {
+    // In opposite corners of the scene, apart along the diagonal, where their boxes nearly touch.
+    const double x = 2, e = gap;
+    const TwoMeshes m(scene, {-x, -e, -e, -e, -x, -e, -e, -e, -x, x, e, e, e, x, e, e, e, x}, {0, 0, 0}, 1);
     m.each([&](const LeafRange& a, const LeafRange& b, const Node&, const Node&) {
       for (const Measured& p : m.measured(a, b)) {
         const float reach = reach_of(p.distance, m.motion.rounding, m.motion.map.scale);
