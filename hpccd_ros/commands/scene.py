@@ -31,7 +31,7 @@ def configure(parser):
     parser.add_argument("--rate", type=float, default=30.0, metavar="HZ",
                         help="frames a second, for --publish and --mcap (default: %(default)s)")
     play = parser.add_argument_group("play over DDS")
-    play.add_argument("--publish", action="store_true", help="publish topologies and vertices, of a robot its joint states")
+    play.add_argument("--publish", action="store_true", help="publish meshes, of a robot its joint states")
     play.add_argument("--loop", action="store_true", help="over and over, until Ctrl-C")
     play.add_argument("--wait", type=float, default=10.0, metavar="S",
                       help="how long to wait for a subscriber before the first frame (default: %(default)s)")

@@ -115,6 +115,7 @@ def node_parameters(scene: Scene) -> dict[str, object]:
     for robot in scene.robots:
         parameters[f"robot.{robot.name}.description"] = robot.description_topic
         parameters[f"robot.{robot.name}.joint_states"] = robot.joint_states_topic
+        parameters[f"robot.{robot.name}.pose"] = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]  # its root is the scene's frame
     known = {pair for robot in scene.robots for pair in robot.robot.ignored_pairs}
     if others := [f"{a}:{b}" for a, b in scene.ignored_pairs if (a, b) not in known]:
         parameters["ignored_pairs"] = others
