@@ -136,6 +136,12 @@ class FrameAssembler:
         state.new_publisher |= new_publisher
         return self._admit(state, frame)
 
+    def inherit(self, other: "FrameAssembler", meshes: Collection[str]) -> None:
+        """Topologies and static positions of these meshes, which both have."""
+        for name in meshes:
+            ours, theirs = self._meshes[name], other._meshes[name]
+            ours.topologies, ours.positions = theirs.topologies, theirs.positions
+
     def clear(self, reason: Reason) -> list[Refusal]:
         """Forget all frames (not topologies and static positions); what waits is refused for ``reason``."""
         refusals = self._matcher.clear(reason)

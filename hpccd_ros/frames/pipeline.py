@@ -2,7 +2,7 @@
 """The way of a checked message to frames of the scene: transform, assemble, queue. No ROS, no threads of its own."""
 
 import time
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 from hpccd_ros.frames.assembler import FrameAssembler
 from hpccd_ros.frames.drops import Reason, Refusal
@@ -50,6 +50,14 @@ class FramePipeline:
             outcome += self._assembler.add(mesh, positions)
         outcome.static_taken = 0  # no message brought them
         return outcome
+
+    def inherit(self, other: "FramePipeline", meshes: Collection[str]) -> None:
+        """What is in force at any time: transforms, and topologies, static positions and shapes of these meshes, which
+        both have. Before anything is pushed; ``other`` is to be used no more, but to be stopped."""
+        self._use_transforms(other.transforms)
+        self._assembler.inherit(other._assembler, meshes)
+        for name in set(meshes) & set(self._rigid):
+            self._rigid[name] = other._rigid[name]
 
     def push(self, mesh: str, message: MeshFrame | PoseFrame | Topology, new_publisher: bool = False) -> Outcome:
         """One message of ``mesh``. new_publisher: it is the first of its publisher, or the first that could be read."""
@@ -192,7 +200,10 @@ class FramePipeline:
         return outcomes
 
     def _forget_transforms(self) -> None:
-        self.transforms = TransformBuffer()
+        self._use_transforms(TransformBuffer())
+
+    def _use_transforms(self, transforms: TransformBuffer) -> None:
+        self.transforms = transforms
         self._followed: int | None = None  # stamp of the last frame that no leader gave
         self._transformers = {
             mesh.name: MeshTransformer(mesh, self._rules.frame_id, self._rules.max_pending, self.transforms)

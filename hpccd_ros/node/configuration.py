@@ -8,6 +8,7 @@ from rclpy.node import Node
 
 from hpccd_ros.base.quoting import listed, shortened
 from hpccd_ros.detect.core import unusable_options
+from hpccd_ros.detect.scene import SceneBuilder
 from hpccd_ros.middleware import environment, qos_overrides, topic_names
 from hpccd_ros.node.node_recording import unrecordable
 from hpccd_ros.params import parameters, robot_parameters, scene_parameters
@@ -59,10 +60,21 @@ class Configuration:
             self._node, self.settings, self.meshes, configured=configured, check=check, on_change=changed
         )
 
-    def know(self, robots: Robots) -> None:
-        """From now on these are known. Raises ParameterError: a pair names a link that there is not."""
-        self.options = scene_parameters.detector_options(self.settings, robots)
-        self.robots = robots
+    def know(self, robots: Robots) -> SceneBuilder:
+        """From now on these are known; the scene with them. Raises ParameterError, and then those before stay: a pair
+        names a link that there is not, nothing could ever be near for stop_distance."""
+        robots = dict(robots)
+        options = scene_parameters.detector_options(self.settings, robots)
+        builder = scene_parameters.scene_builder(self.settings, self.meshes, robots)
+        if len(robots) == len(self.settings["robots"]):
+            scene_parameters.check_stop(self.settings, builder)
+        self.options, self.robots = options, robots
+        return builder
+
+    def forget_robots(self) -> None:
+        """None is known."""
+        self.robots = NO_ROBOTS
+        self.options = scene_parameters.detector_options(self.settings)
 
     def summary(self, contacts: str) -> str:
         """For the log, in one line. contacts: name of the topic."""

@@ -1,6 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Subscriptions to joint states: those that come go to their robots, and frames that waited for them go on."""
+"""Subscriptions to joint states: those that come go to their robots, and frames that waited for them go on.
 
+The last ones are kept for robots that are not known yet: nothing orders a description and joint states.
+"""
+
+from collections import deque
 from collections.abc import Mapping
 from typing import Any
 
@@ -16,6 +20,10 @@ from hpccd_ros.node.hand_over import hand_over
 from hpccd_ros.params import robot_parameters
 from hpccd_ros.params.table import ROBOT
 from hpccd_ros.robots.joint_frames import JointFrames
+
+# Bound what strangers can make the node keep: messages of a topic, and joints of one.
+MOST_RECENT = 100
+LARGEST_KEPT = 1000
 
 
 class JointSubscriptions:
@@ -34,9 +42,17 @@ class JointSubscriptions:
         self._pipeline = pipeline
         self._of_robots = of_robots
         self._accounts = accounts
+        topics = robot_parameters.joint_topics(settings[ROBOT])
+        self._recent: dict[str, deque[JointState]] = {topic: deque(maxlen=MOST_RECENT) for topic in topics}
         self._subscriptions = [
-            self._subscribe(topic, robots) for topic, robots in robot_parameters.joint_topics(settings[ROBOT]).items()
+            self._subscribe(topic, robots) for topic, robots in topics.items()
         ]
+
+    def use(self, pipeline: FramePipeline, by_joints: Mapping[str, JointFrames]) -> None:
+        self._pipeline, self._of_robots = pipeline, by_joints
+        for topic, robots in robot_parameters.joint_topics(self._settings[ROBOT]).items():
+            for message in self._recent[topic]:
+                joint_messages.fill([by_joints[robot] for robot in robots if robot in by_joints], message, topic)
 
     def close(self) -> None:
         for subscription in self._subscriptions:
@@ -50,7 +66,6 @@ class JointSubscriptions:
 
     def _subscribe(self, topic: str, robots: list[str]) -> Subscription:
         limit = RateLimit(self._settings["max_rate"])
-        moved = [self._of_robots[robot] for robot in robots]
 
         def receive(message: JointState) -> None:
             if not limit.allows():
@@ -58,6 +73,9 @@ class JointSubscriptions:
                     topic, f"more than max_rate = {self._settings['max_rate']:g} messages a second; some are dropped"
                 )
                 return
+            if len(message.name) <= LARGEST_KEPT:
+                self._recent[topic].append(message)
+            moved = [self._of_robots[robot] for robot in robots if robot in self._of_robots]
             for refusal in joint_messages.fill(moved, message, topic):
                 self._warn(topic, refusal.text)
             for outcome in self._pipeline.retry():

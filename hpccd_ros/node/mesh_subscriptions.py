@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Subscriptions to one mesh: its topology, and where it is."""
 
+from hpccd_ros.frames.pipeline import FramePipeline
 from hpccd_ros.middleware import topic_names
 from hpccd_ros.node.mesh_topic import MeshTopic, Reception
 from hpccd_ros.node.positions_subscription import PositionsSubscription
@@ -16,6 +17,9 @@ class MeshSubscriptions:
         self.topics.append(TopologySubscription(reception))
         self._positions = [PositionsSubscription(reception, kind) for kind in topic_names.positions(given_as)]
         self.topics += self._positions
+
+    def use(self, pipeline: FramePipeline, by_joints: object) -> None:
+        self._reception.pipeline = pipeline
 
     def close(self) -> None:
         for topic in self.topics:

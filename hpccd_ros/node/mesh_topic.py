@@ -20,9 +20,9 @@ from hpccd_ros.node.accounts import Accounts
 UNREADABLE = "a message cannot be deserialised; build its publisher with the same definition of the message"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Reception:
-    """What all topics of a mesh have in common: who listens, and where messages go."""
+    """What all topics of a mesh have in common: who listens, and where messages go, which may change."""
 
     node: Node
     mesh: str

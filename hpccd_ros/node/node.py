@@ -21,8 +21,6 @@ from hpccd_ros.node.status_report import Reporter
 from hpccd_ros.node.stop_watch import StopWatch
 from hpccd_ros.node.stream_detection import StreamDetection
 from hpccd_ros.node.unknown_meshes import UnknownMeshWatch
-from hpccd_ros.params import scene_parameters
-from hpccd_ros.params.robot_parameters import NO_ROBOTS
 
 # s. Once in so long, the pages that a message takes anew cost little; a node that once had to hold much, because its
 # machine was busy for seconds, is not larger ever after.
@@ -34,7 +32,7 @@ class HpccdNode(GuardedLifecycleNode):
     """Streams of vertices in, contacts out. To be run by a GuardedExecutor.
 
     Configured: parameters checked, mesh files read, publishers, service and action there. Active: subscribed and
-    detecting, once all robots are known.
+    detecting, from when all robots are known.
     Raises ParameterError for parameters that it cannot start with.
     """
 
@@ -48,8 +46,8 @@ class HpccdNode(GuardedLifecycleNode):
         self._accounts = Accounts(self.get_logger().warning)
         self._reporter = Reporter(self.get_fully_qualified_name(), self._accounts)
         self._robots: RobotDescriptions | None = None
-        self._stream: StreamDetection | None = None  # none for a node without meshes, or whose robots are not known
-        self._no_stream = ""  # why, where it should be there
+        self._stream: StreamDetection | None = None  # none for a node without meshes and robots
+        self._scene_error = ""  # why robots that are known make no scene
         self._stop_watch: StopWatch | None = None
         self._unknown: UnknownMeshWatch | None = None
         self._jobs: DetectJobs | None = None
@@ -59,6 +57,7 @@ class HpccdNode(GuardedLifecycleNode):
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Read mesh files, create publishers, service, action and diagnostics."""
         settings = self._settings
+        self._contacts = ContactsPublisher(self, settings)
         try:
             self._robots = RobotDescriptions(self, settings, self._follow_robots)
             self._make_scene()
@@ -66,9 +65,8 @@ class HpccdNode(GuardedLifecycleNode):
             self.get_logger().error(f"cannot configure: {error}")
             self._release()
             return TransitionCallbackReturn.FAILURE
-        if (settings["meshes"] or settings["robots"]) and settings["stop_distance"] >= 0:
-            self._stop_watch = StopWatch(self, self._configuration, self._works)
-        self._contacts = ContactsPublisher(self, settings)
+        if self._stream is not None and settings["stop_distance"] >= 0:
+            self._stop_watch = StopWatch(self, self._configuration, self._stream.works)
         self._diagnostics = self.configured_publisher(DiagnosticArray, topic_names.DIAGNOSTICS, qos.DIAGNOSTICS)
         self._jobs = DetectJobs(self, self._configuration, self._scene_for_requests, self._accounts)
         self._service = DetectService(self, self._jobs, settings)
@@ -80,7 +78,8 @@ class HpccdNode(GuardedLifecycleNode):
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Subscribe and detect."""
         self._recording.follow(active=True)  # first: what the node hears, the recording shall have
-        self._open_stream()
+        if self._stream is not None:
+            self._stream.open(self._publish, self._stop_watch)
         self._unknown = UnknownMeshWatch(self, self._settings, self._accounts)
         self.get_logger().info(f"active: {self._configuration.summary(self._contacts.topic)}")
         return SUCCESS
@@ -115,61 +114,41 @@ class HpccdNode(GuardedLifecycleNode):
         self._end_requests()
 
     def _make_scene(self) -> None:
-        """Of the robots that are known. Raises ValueError."""
-        self._configuration.know(self._robots.robots)
-        settings, meshes, robots = self._settings, self._configuration.meshes, self._configuration.robots
-        self._stream = None
-        self._builder = scene_parameters.scene_builder(settings, meshes, robots)
+        """Of the robots that are known. Raises ValueError, and then the scene before stays."""
+        self._builder = self._configuration.know(self._robots.robots)
         self._deforming = [mesh.name for mesh in self._builder.meshes if not mesh.static]
-        if self._builder.meshes and self._robots.complete:
-            scene_parameters.check_stop(settings, self._builder)
+        self._contacts.begin(self._builder)
+        if self._stream is not None:
+            self._stream.remake(self._builder)
+        elif self._builder.meshes:
             self._stream = StreamDetection(self, self._configuration, self._builder, self._accounts)
 
     def _follow_robots(self) -> None:
         """A description has come: the scene is another one."""
-        active = self.state == "active"
-        if active:
-            self._close_stream()
         try:
             self._make_scene()
-            self._no_stream = ""
         except ValueError as error:
-            self._no_stream = f"the scene cannot be made: {error}"
-            self.get_logger().error(self._no_stream)
-        if active:
-            self._open_stream()
-
-    def _open_stream(self) -> None:
-        self._contacts.begin(self._builder)
-        if self._stream is not None:
-            self._stream.open(self._publish, self._stop_watch)
-        elif self._stop_watch is not None:
-            self._stop_watch.begin(self._builder)
-
-    def _close_stream(self) -> None:
-        if self._stop_watch is not None:
-            self._stop_watch.end()
-        if self._stream is not None:
-            self._stream.close()
-
-    def _works(self) -> bool:
-        """Whether a frame is being worked on; from any thread."""
-        stream = self._stream
-        return stream is not None and stream.works()
+            self._scene_error = f"{error}; the scene stays as it was"
+            self.get_logger().error(self._scene_error)
+            return
+        self._scene_error = ""
 
     def _stop(self) -> None:
         if self._unknown is not None:
             self._unknown.close()
             self._unknown = None
-        self._close_stream()
+        if self._stop_watch is not None:
+            self._stop_watch.end()
+        if self._stream is not None:
+            self._stream.close()
         self._recording.end()
 
     def _release(self) -> None:
         self._end_requests()
         self.unconfigure()
         self._stream = self._stop_watch = self._robots = None
-        self._no_stream = ""
-        self._configuration.know(NO_ROBOTS)
+        self._scene_error = ""
+        self._configuration.forget_robots()
 
     def _end_requests(self) -> None:
         for part in (self._jobs, self._service, self._action):
@@ -205,7 +184,7 @@ class HpccdNode(GuardedLifecycleNode):
     def _warnings(self) -> list[str]:
         parts = (self._robots, self._stream, self._unknown)
         lines = [line for part in parts if part is not None for line in part.warnings()]
-        return [self._no_stream, *lines] if self._no_stream else lines
+        return [self._scene_error, *lines] if self._scene_error else lines
 
     def _report(self) -> None:
         message = self._reporter.report(

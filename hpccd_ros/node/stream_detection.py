@@ -9,6 +9,7 @@ from hpccd_ros.detect.scene import SceneBuilder
 from hpccd_ros.detect.step_detector import Detection, StepDetector
 from hpccd_ros.detect.thread import DetectionThread
 from hpccd_ros.frames.drops import Reason
+from hpccd_ros.frames.pipeline import FramePipeline
 from hpccd_ros.frames.types import SceneFrame, Topology
 from hpccd_ros.node import mesh_files
 from hpccd_ros.node.accounts import Accounts
@@ -17,10 +18,11 @@ from hpccd_ros.node.life_cycle import GuardedLifecycleNode
 from hpccd_ros.node.stop_watch import StopWatch
 from hpccd_ros.node.subscriptions import Subscriptions
 from hpccd_ros.params import robot_parameters, scene_parameters
+from hpccd_ros.robots.joint_frames import JointFrames
 
 
 class StreamDetection:
-    """Made when a node with meshes is configured and its robots are known; works between ``open`` and ``close``.
+    """Made when a node with meshes or robots is configured; works between ``open`` and ``close``.
 
     Raises MeshFileError, and ValueError for a scene that cannot move.
     """
@@ -33,15 +35,46 @@ class StreamDetection:
         self._configuration = configuration
         self._builder = builder
         self._accounts = accounts
-        robots, most_waiting = configuration.robots, settings["pending_frames"]
-        by_joints = robot_parameters.followers(settings, robots, most_waiting)
-        self._pipeline = scene_parameters.frame_pipeline(settings, meshes, most_waiting, robots, by_joints.values())
+        self._pipeline, self._by_joints = self._made()
         accounts.add(mesh_files.load(self._pipeline, meshes))
-        self._subscriptions = Subscriptions(node, settings, meshes, by_joints)
+        self._subscriptions = Subscriptions(node, settings, meshes)
         self._thread: DetectionThread | None = None
+        self._on_detection: Callable[[Detection], None] = lambda found: None
+        self._stop: StopWatch | None = None
 
     def open(self, on_detection: Callable[[Detection], None], stop: StopWatch | None = None) -> None:
         """Start the detection thread, which calls ``on_detection``, and has ``stop`` look at each step; subscribe."""
+        self._on_detection, self._stop = on_detection, stop
+        self._start()
+        self._subscriptions.open(self._pipeline, self._by_joints, self._accounts)
+
+    def remake(self, builder: SceneBuilder) -> None:
+        """The scene is that of the robots which are known now. What waits is counted as stopped; what was given once
+        stays: topologies, static positions, shapes, transforms."""
+        works = self._thread is not None
+        if works and self._stop is not None:
+            self._stop.end()
+        before, self._builder = self._pipeline, builder
+        self._pipeline, self._by_joints = self._made()
+        self._pipeline.inherit(before, self._configuration.meshes)
+        self._accounts.add(before.stop())
+        if works:
+            self._end_thread()
+            self._start()
+        self._subscriptions.use(self._pipeline, self._by_joints)
+
+    def _made(self) -> tuple[FramePipeline, dict[str, JointFrames]]:
+        settings, robots = self._configuration.settings, self._configuration.robots
+        most_waiting = settings["pending_frames"]
+        by_joints = robot_parameters.followers(settings, robots, most_waiting)
+        meshes = self._configuration.meshes
+        return (
+            scene_parameters.frame_pipeline(settings, meshes, most_waiting, robots, by_joints.values()),
+            by_joints,
+        )
+
+    def _start(self) -> None:
+        stop = self._stop
         if stop is not None:
             stop.begin(self._builder)
             self._accounts.on_refused = stop.refused
@@ -49,18 +82,20 @@ class StreamDetection:
             StepDetector(self._builder, self._configuration.options),
             self._pipeline.start(self._configuration.settings["frame_queue"]),
             on_step=stop.look if stop is not None else lambda start, end: None,
-            on_detection=on_detection,
+            on_detection=self._on_detection,
             on_first=lambda frame: self._first(frame, stop),
             on_failure=self._failed,
         )
         thread.start()
         self._thread = thread
-        self._subscriptions.open(self._pipeline, self._accounts)
 
     def close(self) -> None:
         """Unsubscribe and end the thread; what waited is counted as stopped. Topologies and static positions stay."""
         self._subscriptions.close()
         self._accounts.add(self._pipeline.stop())
+        self._end_thread()
+
+    def _end_thread(self) -> None:
         if self._thread is not None:
             self._thread.cancel()
             self._thread.join()

@@ -20,34 +20,33 @@ from hpccd_ros.robots.joint_frames import JointFrames
 class Subscriptions:
     """Nothing is subscribed before ``open``; ``close`` ends what is, should ``open`` have failed half-way too.
 
-    meshes: mesh name -> parameters mesh.NAME.*. by_joints: robot -> what its joint states move.
+    meshes: mesh name -> parameters mesh.NAME.*.
     """
 
-    def __init__(
-        self,
-        node: Node,
-        settings: dict[str, Any],
-        meshes: dict[str, dict[str, Any]],
-        by_joints: Mapping[str, JointFrames],
-    ) -> None:
+    def __init__(self, node: Node, settings: dict[str, Any], meshes: dict[str, dict[str, Any]]) -> None:
         self._node = node
         self._settings = settings
         self._meshes = meshes
-        self._by_joints = by_joints
         self._of_meshes: list[MeshSubscriptions] = []
         self._of_others: list[TransformSubscriptions | JointSubscriptions] = []
 
-    def open(self, pipeline: FramePipeline, accounts: Accounts) -> None:
+    def open(self, pipeline: FramePipeline, by_joints: Mapping[str, JointFrames], accounts: Accounts) -> None:
+        """by_joints: robot -> what its joint states move, of those that are known."""
         of_robots = robot_parameters.need_transforms(self._settings[ROBOT])
         if of_robots or any("tf" in (mesh["transform"], mesh["input"]) for mesh in self._meshes.values()):
             transforms = TransformSubscriptions(self._node, pipeline, accounts, self._settings["max_rate"])
             self._of_others.append(transforms)
-        if self._by_joints:
-            joints = JointSubscriptions(self._node, self._settings, pipeline, self._by_joints, accounts)
+        if robot_parameters.joint_topics(self._settings[ROBOT]):
+            joints = JointSubscriptions(self._node, self._settings, pipeline, by_joints, accounts)
             self._of_others.append(joints)
         for name, mesh in self._meshes.items():
             reception = Reception(self._node, name, self._settings, pipeline, accounts)
             self._of_meshes.append(MeshSubscriptions(reception, mesh["input"]))
+
+    def use(self, pipeline: FramePipeline, by_joints: Mapping[str, JointFrames]) -> None:
+        """What comes goes there from now on."""
+        for part in (*self._of_meshes, *self._of_others):
+            part.use(pipeline, by_joints)
 
     def close(self) -> None:
         for subscriptions in (*self._of_meshes, *self._of_others):

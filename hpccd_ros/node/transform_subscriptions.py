@@ -32,6 +32,9 @@ class TransformSubscriptions:
             heard[self._name(topic)] = 0 if topic in understood else f"not understood ({package} is not installed)"
         self._subscriptions = [self._subscribe(topic) for topic in understood]
 
+    def use(self, pipeline: FramePipeline, by_joints: object) -> None:
+        self._pipeline = pipeline
+
     def close(self) -> None:
         for subscription in self._subscriptions:
             self._node.destroy_subscription(subscription)

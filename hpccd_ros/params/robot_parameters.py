@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from hpccd_ros.base.quoting import shortened
-from hpccd_ros.frames.types import MeshSettings
+from hpccd_ros.frames.types import JOINTS, MeshSettings
 from hpccd_ros.params.table import ROBOT
 from hpccd_ros.params.values import ParameterError, robot_rows
 from hpccd_ros.rigid.transform import Rigid
@@ -103,13 +103,15 @@ def links(robots: Robots) -> dict[str, tuple[str, ...]]:
 
 
 def mesh_settings(settings: dict[str, Any], robots: Robots) -> tuple[MeshSettings, ...]:
-    """Of all links, in the order of parameter ``robots`` and of the descriptions."""
-    return tuple(
-        mesh
-        for name, values in settings[ROBOT].items()
-        if name in robots
-        for mesh in robots[name].settings(values["frame_prefix"], by_joints=bool(values["joint_states"]))
-    )
+    """Of all links, in the order of parameter ``robots`` and of the descriptions. A robot that is not known is a mesh
+    of its own, of which no frame ever comes: without it no step can be answered."""
+    found: list[MeshSettings] = []
+    for name, values in settings[ROBOT].items():
+        if name in robots:
+            found += robots[name].settings(values["frame_prefix"], by_joints=bool(values["joint_states"]))
+        else:
+            found.append(MeshSettings(name, self_collision=False, input=JOINTS))
+    return tuple(found)
 
 
 def followers(settings: dict[str, Any], robots: Robots, most_waiting: int) -> dict[str, JointFrames]:

@@ -213,6 +213,7 @@ def test_another_description_makes_another_scene(start_node):
     )
     assert node.peer.statuses["stop"][2]["stop"] == "True"
     publisher.publish(String(data=crane.URDF))
+    node.wait_until(lambda: "robot crane" not in node.peer.statuses["frames"][1], "the second description")
     node.peer.topology("cloth", SHEET.faces, SHEET.n_vertices)
     joints = node.peer.publisher(JointState, "joint_states")
     for k in (1, 2):
@@ -227,7 +228,6 @@ def test_another_description_makes_another_scene(start_node):
     )
     publisher.publish(String(data=longer))
     node.wait_until(lambda: "stays in use" not in node.peer.statuses["frames"][1], "the third description")
-    node.peer.topology("cloth", SHEET.faces, SHEET.n_vertices)
     robot = crane.robot(longer)
     for k in (3, 4):
         joints.publish(crane.joint_state(k, k))
