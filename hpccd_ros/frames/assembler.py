@@ -136,11 +136,16 @@ class FrameAssembler:
         state.new_publisher |= new_publisher
         return self._admit(state, frame)
 
-    def inherit(self, other: "FrameAssembler", meshes: Collection[str]) -> None:
-        """Topologies and static positions of these meshes, which both have."""
+    def inherit(self, other: "FrameAssembler", meshes: Collection[str]) -> Outcome:
+        """Topologies and static positions of these meshes, which both have, and their frames that wait."""
+        outcome = Outcome()
         for name in meshes:
             ours, theirs = self._meshes[name], other._meshes[name]
             ours.topologies, ours.positions = theirs.topologies, theirs.positions
+            ours.early, theirs.early = theirs.early, deque()
+        for name, frame in other._matcher.take(meshes):
+            outcome += self.add(name, frame)
+        return outcome
 
     def clear(self, reason: Reason) -> list[Refusal]:
         """Forget all frames (not topologies and static positions); what waits is refused for ``reason``."""

@@ -6,6 +6,7 @@ that has reached stamp s will never fill a gap before s.
 """
 
 from collections import deque
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
@@ -32,6 +33,9 @@ class Matched(NamedTuple):
 class Matcher(Protocol):
     def add(self, mesh: str, frame: MeshFrame) -> Matched:
         """Add one frame to those that wait."""
+
+    def take(self, meshes: Collection[str]) -> list[tuple[str, MeshFrame]]:
+        """Frames of these meshes that wait and were in no match yet, by their stamps; they wait no more."""
 
     def clear(self, reason: Reason) -> list[Refusal]:
         """Drop all that waits, for ``reason``."""
@@ -75,6 +79,14 @@ class ExactMatcher:
         missing = ", ".join(m for m in self._meshes if m not in group)
         text = f"stamp {stamp} ns has no frame of {missing}; stamps must be equal (or set stamp_match: nearest)"
         return [Refusal(mesh, Reason.INCOMPLETE, text) for mesh in group]
+
+    def take(self, meshes: Collection[str]) -> list[tuple[str, MeshFrame]]:
+        return [
+            (mesh, group.pop(mesh))
+            for _, group in sorted(self._pending.items())
+            for mesh in meshes
+            if mesh in group
+        ]
 
     def clear(self, reason: Reason) -> list[Refusal]:
         refusals = [Refusal(mesh, reason) for group in self._pending.values() for mesh in group]
@@ -152,6 +164,16 @@ class NearestMatcher:
             self._used.remove(id(frame))
             return []
         return [Refusal(mesh, Reason.INCOMPLETE, f"stamp {frame.stamp} ns is the nearest of no other frame")]
+
+    def take(self, meshes: Collection[str]) -> list[tuple[str, MeshFrame]]:
+        taken = []
+        for mesh in meshes:
+            if mesh in self._queues:
+                queue = self._queues[mesh]
+                taken += [(mesh, frame) for frame in queue if id(frame) not in self._used]
+                self._used -= set(map(id, queue))
+                queue.clear()
+        return sorted(taken, key=lambda item: item[1].stamp)
 
     def clear(self, reason: Reason) -> list[Refusal]:
         refusals = [

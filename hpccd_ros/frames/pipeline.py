@@ -51,13 +51,16 @@ class FramePipeline:
         outcome.static_taken = 0  # no message brought them
         return outcome
 
-    def inherit(self, other: "FramePipeline", meshes: Collection[str]) -> None:
+    def inherit(self, other: "FramePipeline", meshes: Collection[str]) -> Outcome:
         """What is in force at any time: transforms, and topologies, static positions and shapes of these meshes, which
-        both have. Before anything is pushed; ``other`` is to be used no more, but to be stopped."""
+        both have; and their frames that wait. Before anything is pushed; ``other`` is to be used no more, but to be
+        stopped."""
         self._use_transforms(other.transforms)
-        self._assembler.inherit(other._assembler, meshes)
+        for name in meshes:
+            self._transformers[name] = other._transformers.pop(name)
         for name in set(meshes) & set(self._rigid):
             self._rigid[name] = other._rigid[name]
+        return self._led(self._assembler.inherit(other._assembler, meshes))
 
     def push(self, mesh: str, message: MeshFrame | PoseFrame | Topology, new_publisher: bool = False) -> Outcome:
         """One message of ``mesh``. new_publisher: it is the first of its publisher, or the first that could be read."""

@@ -14,6 +14,7 @@ from hpccd_ros.frames.types import SceneFrame, Topology
 from hpccd_ros.node import mesh_files
 from hpccd_ros.node.accounts import Accounts
 from hpccd_ros.node.configuration import Configuration
+from hpccd_ros.node.hand_over import hand_over
 from hpccd_ros.node.life_cycle import GuardedLifecycleNode
 from hpccd_ros.node.stop_watch import StopWatch
 from hpccd_ros.node.subscriptions import Subscriptions
@@ -49,19 +50,22 @@ class StreamDetection:
         self._subscriptions.open(self._pipeline, self._by_joints, self._accounts)
 
     def remake(self, builder: SceneBuilder) -> None:
-        """The scene is that of the robots which are known now. What waits is counted as stopped; what was given once
-        stays: topologies, static positions, shapes, transforms."""
+        """The scene is that of the robots which are known now. What was given once stays, topologies, static positions,
+        shapes, transforms, and frames of meshes that wait for others; those of robots are asked for anew."""
         works = self._thread is not None
         if works and self._stop is not None:
             self._stop.end()
         before, self._builder = self._pipeline, builder
         self._pipeline, self._by_joints = self._made()
-        self._pipeline.inherit(before, self._configuration.meshes)
+        inherited = self._pipeline.inherit(before, self._configuration.meshes)
         self._accounts.add(before.stop())
-        if works:
-            self._end_thread()
-            self._start()
+        if not works:
+            return
+        self._end_thread()
+        self._start()
         self._subscriptions.use(self._pipeline, self._by_joints)
+        for outcome in (inherited, *self._pipeline.retry()):
+            hand_over(outcome, self._pipeline, self._accounts)
 
     def _made(self) -> tuple[FramePipeline, dict[str, JointFrames]]:
         settings, robots = self._configuration.settings, self._configuration.robots

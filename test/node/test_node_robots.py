@@ -288,3 +288,17 @@ def test_pairs_name_robots_and_links(start_node):
     assert not {(names[a], names[b]) for a, b in zip(answer.mesh_a, answer.mesh_b, strict=True)} & {
         ("crane/mast", "crane/hook"), ("crane/hook", "crane/mast")
     }  # fmt: skip
+
+
+def test_frames_that_came_before_the_description_are_answered(start_node):
+    node = start_node({**parameters(**JOINTS), "frame_queue": 5})
+    node.peer.topology("cloth", SHEET.faces, SHEET.n_vertices)
+    joints = node.peer.publisher(JointState, "joint_states")
+    for k in (1, 2, 3):
+        joints.publish(crane.joint_state(k, k))
+        cloth(node, k)
+    node.frames_status(waiting=3, dropped=0)
+    describe(node)
+    for k, answer in enumerate(node.contacts(2), 2):
+        assert_answer(answer, k)
+    node.frames_status(answered=12, waiting=0, dropped=0)

@@ -12,6 +12,7 @@ import rclpy
 from detect_requests import BAD, BAD_IDS, FACES, LARGE, N, request
 from hpccd.srv import Detect
 from lifecycle_msgs.msg import Transition
+from long_step import long_request
 from node_calls import change_state
 from node_process import PATIENCE, assert_same_contacts
 from rclpy.executors import SingleThreadedExecutor
@@ -170,8 +171,8 @@ def test_every_request_of_a_burst_is_answered(start_node, many):
 def test_open_requests_are_answered_before_the_service_ends(start_node, transitions):
     """One that is computed, one that waits for its turn."""
     node = start_node({"meshes": ["cloth"], "detect_jobs": 1, "threads": 1})
-    large = request(2, n=LARGE, names=("a", "b"))
-    replies = [node.peer.client().call_async(large) for _ in range(2)]
+    long = long_request(("a", "b", "c"))  # still open when a busy machine has told of it
+    replies = [node.peer.client().call_async(long) for _ in range(2)]
     service_counts(node, open=2)
     assert all(change_state(node, transition) for transition in transitions)
     for answer in gather(node, replies):

@@ -56,6 +56,7 @@ def test_a_recorder_that_came_late_says_it_at_once_and_at_the_end(start_node, ch
     recorder = children.start("recorder", "hpccd_ros.cli", "record", "-o", str(tmp_path / "late.mcap"), "--node",
                               f"{node.namespace}/hpccd", "--wait", WAIT)  # fmt: skip
     children.wait(lambda: recorder.said("recording "), "the recorder did not hear the node", PATIENCE)
+    node.peer.readers = 2  # the recorder as well: the only pose must not overtake it
     publisher = node.peer.publisher(PoseStamped, client.pose_topic("box"))
     pose = PoseStamped()
     pose.pose.orientation.w = 1.0
