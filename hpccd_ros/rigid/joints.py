@@ -42,9 +42,10 @@ each length above is off by the relative error of `rounding.at_chain`, for which
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from types import MappingProxyType
 
 import numpy as np
 
@@ -95,11 +96,17 @@ class Joint:
 class JointStep:
     """All joints of a robot between two sets of values, one for each joint; what fixed ones have does not matter.
 
-    A continuous joint goes the shorter way. ``base``: where the robot stands, fixed through the step.
+    A continuous joint goes the shorter way. ``base``: where the robot stands, fixed through the step. known: what
+    `poses` gives for some fractions, where it was computed before.
     """
 
     def __init__(
-        self, joints: Sequence[Joint], start: Sequence[float], end: Sequence[float], base: Rigid = IDENTITY
+        self,
+        joints: Sequence[Joint],
+        start: Sequence[float],
+        end: Sequence[float],
+        base: Rigid = IDENTITY,
+        known: Mapping[float, list[Rigid]] = MappingProxyType({}),
     ) -> None:
         self.joints = tuple(joints)
         self.base = base
@@ -115,7 +122,7 @@ class JointStep:
                 change = math.remainder(self.end[number] - self.start[number], 2 * math.pi)
                 self.end[number] = self.start[number] + change
         self.speed = self.end - self.start
-        self._poses: dict[float, list[Rigid]] = {}
+        self._poses = dict(known)
 
     def poses(self, t: float) -> list[Rigid]:
         """Of each joint's link at the fraction t in [0, 1], computed once."""
@@ -147,13 +154,17 @@ class JointStep:
 
 @dataclass(frozen=True, eq=False)
 class LinkMotion:
-    """The geometry ``body`` of the link of joint number ``link``, in that joint's frame."""
+    """The geometry ``body`` of the link of joint number ``link``, in that joint's frame. ``ends``: its vertices at the
+    start and at the end, where they were computed before."""
 
     step: JointStep
     link: int
     body: Body
+    ends: tuple[np.ndarray, np.ndarray] | None = None
 
     def vertices(self, cut: int, parts: int) -> np.ndarray:
+        if self.ends is not None and cut in (0, parts):
+            return self.ends[cut > 0]
         return self.step.poses(cut / parts)[self.link].apply(self.body.vertices)
 
     def deviation(self, parts: int) -> float:

@@ -89,7 +89,12 @@ class Kinematics:
                 change = math.remainder(end.inputs[followed.joint] - start.inputs[followed.joint], 2 * math.pi)
                 ends[number] = start.values[number] + followed.factor * change
         if _same(start.base, end.base):
-            return RobotStep(self, JointStep(self.chain, start.values, ends, start.base), 0)
+            # Poses of both states are needed again, unless one is reached by another value of a joint.
+            known = {0.0: list(start.poses.values())}
+            reached = np.array_equal(ends, end.values)
+            if reached:
+                known[1.0] = list(end.poses.values())
+            return RobotStep(self, JointStep(self.chain, start.values, ends, start.base, known), 0, reached)
         ahead, goal = _base_joints(start.base, end.base)
         root = Joint.of("fixed", 1, Rigid(start.base.quaternion, np.zeros(3)))
         links = (Joint(j.kind, j.parent + len(ahead), j.origin, j.axis) for j in self.chain[1:])
@@ -121,14 +126,16 @@ class RobotStep:
     kinematics: Kinematics
     joints: JointStep
     ahead: int  # joints that move the base
+    of_states: bool = False  # poses at both ends are those of the states, to the bit
 
     def poses(self, t: float) -> dict[str, Rigid]:
         """At the fraction t in [0, 1]."""
         return dict(zip(self.kinematics.links, self.joints.poses(t)[self.ahead :], strict=True))
 
-    def motion(self, link: str, body: Body) -> LinkMotion:
-        """body: geometry in the link's frame."""
-        return LinkMotion(self.joints, self.ahead + self.kinematics.number(link), body)
+    def motion(self, link: str, body: Body, ends: tuple[np.ndarray, np.ndarray] | None = None) -> LinkMotion:
+        """body: geometry in the link's frame. ends: its vertices in both states."""
+        number = self.ahead + self.kinematics.number(link)
+        return LinkMotion(self.joints, number, body, ends if self.of_states else None)
 
 
 def _followed(joint: RobotJoint, named: Mapping[str, RobotJoint]) -> _Followed:

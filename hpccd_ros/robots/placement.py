@@ -41,4 +41,4 @@ class LinkMotions:
         key = id(before), id(after)  # both live as long as their placements do
         if key not in self._steps:
             self._steps[key] = before.kinematics.step(before, after)
-        return self._steps[key].motion(end.link, end.body)
+        return self._steps[key].motion(end.link, end.body, (start.vertices, end.vertices))
