@@ -73,7 +73,9 @@ class RigidStep:
         self, names: tuple[str, ...], rigid: Sequence[bool], bent: hc.Detector, straight: hc.Detector | None
     ) -> None:
         self.bent, self.straight = bent, straight
-        self._names, self._rigid = names, rigid
+        self._names = names
+        moved = np.array(rigid)
+        self._of_rigid = np.triu(moved[:, None] | moved, 1)  # (K, K): pairs of different meshes that are asked of bent
         self._in_force: np.ndarray | None = None  # of bent, (K, K); None: not known
         self.detectors = (bent,) if straight is None else (bent, straight)
         self.profile: Counter[str] = Counter()  # ms of the last step, by stage
@@ -116,14 +118,9 @@ class RigidStep:
         return contacts
 
     def _separate(self, asked: Separation, margins: list[cuts.Margin]) -> None:
-        wanted, rigid = asked.table(self._names), self._rigid
-        for a in range(len(margins)):
-            for b in range(a + 1, len(margins)):
-                if rigid[a] or rigid[b]:
-                    wanted[a, b] = wanted[b, a] = cuts.grown(float(wanted[a, b]), margins[a], margins[b])
-        changed = np.ones(wanted.shape, bool) if self._in_force is None else wanted != self._in_force
+        wanted = cuts.all_grown(asked.table(self._names), margins)
+        changed = self._of_rigid if self._in_force is None else self._of_rigid & (wanted != self._in_force)
         self._in_force = None  # should only a part of it be done
-        for a, b in np.argwhere(np.triu(changed, 1)).tolist():
-            if rigid[a] or rigid[b]:
-                self.bent.set_separation(self._names[a], self._names[b], float(wanted[a, b]))
+        for a, b in np.argwhere(changed).tolist():
+            self.bent.set_separation(self._names[a], self._names[b], float(wanted[a, b]))
         self._in_force = wanted

@@ -5,6 +5,9 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
 from hpccd_ros.rigid import rounding
 from hpccd_ros.rigid.motion import Motion
 
@@ -78,3 +81,11 @@ def grown(separation: float, a: Margin, b: Margin) -> float:
     """The separation at which no contact within ``separation`` is missed; what it finds is within that + 2 bounds."""
     grow = bound((a, b))
     return rounding.up(separation + grow) if grow else separation
+
+
+def all_grown(separations: NDArray[np.float64], margins: Sequence[Margin]) -> NDArray[np.float64]:
+    """(K, K): `grown`, to the bit, of each pair of different meshes; within a mesh nothing grows."""
+    sums = np.array([margin.sum for margin in margins])
+    grow = rounding.up(sums[:, None] + sums)  # a sum of two is rounded once, as by fsum
+    np.fill_diagonal(grow, 0.0)
+    return np.where(grow > 0.0, rounding.up(separations + grow), separations)

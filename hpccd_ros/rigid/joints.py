@@ -86,6 +86,11 @@ class Joint:
     def turns(self) -> bool:
         return self.kind in TURNING
 
+    @cached_property
+    def offset(self) -> float:
+        """Not below the distance of its origin from that of its parent."""
+        return rounding.length(self.origin.shift)
+
     def moved(self, value: float) -> Rigid:
         """From its own frame at 0 to that at ``value``: radians, or the unit of coordinates."""
         if self.turns:
@@ -194,7 +199,7 @@ class LinkMotion:
 
     def _beyond(self, joints: Sequence[int]) -> float:
         """The body, with all offsets and slides of these joints of its way."""
-        offsets = sum(rounding.length(self.step.joints[k].origin.shift) + self._slid(k) for k in joints)
+        offsets = sum(self.step.joints[k].offset + self._slid(k) for k in joints)
         return self.body.radius + float(offsets)
 
     def _slid(self, k: int) -> float:

@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """A step is cut into the fewest parts that keep the deviation within the tolerance."""
 
+import itertools
+
 import numpy as np
 import pytest
 from random_poses import random_screw
 
 from hpccd_ros.rigid.body import Body
-from hpccd_ros.rigid.cuts import Margin, bound, fewest_parts, grown
+from hpccd_ros.rigid.cuts import Margin, all_grown, bound, fewest_parts, grown
 from hpccd_ros.rigid.motion import Linear, ScrewMotion
 
 POINTS = np.random.default_rng(1).standard_normal((20, 3))
@@ -54,3 +56,16 @@ def test_separation_grows_by_both_sides_and_upwards():
     assert grown(0.1, *margins) >= 0.1 + bound(margins)
     resting = Margin.of(Linear(POINTS, POINTS), 5)
     assert grown(0.1, resting, resting) == 0.1
+
+
+def test_all_pairs_at_once_grow_as_each_alone():
+    random = np.random.default_rng(3)
+    deviations = random.choice([0.0, 1e-3, 7e-160, 3e5], 40) * random.random(40)
+    roundings = 1e-16 * random.random(40) ** 9
+    margins = [Margin(*pair) for pair in zip(deviations.tolist(), roundings.tolist(), strict=True)]
+    margins += [Margin(0.0, 0.0)] * 2
+    asked = random.choice([0.0, 0.01, 1e-300, 2.5], (42, 42))
+    asked = np.maximum(asked, asked.T)
+    table = all_grown(asked, margins)
+    for a, b in itertools.product(range(42), repeat=2):
+        assert table[a, b] == (grown(asked[a, b], margins[a], margins[b]) if a != b else asked[a, b])
