@@ -38,6 +38,7 @@ BENCHMARKS = {
     "step": ("core.step", "how far a step may go: first contacts, free step and trial steps beside all contacts"),
     "rigid": ("core.rigid", "meshes moved by poses and joints: found contacts against the truth, bounds, cost"),
     "ros": ("ros.node", "the node over DDS: latency beside that of an echo, sustained rate, overload"),
+    "robot": ("ros.robot", "a robot beside a cloth over DDS, moved by joint states: answers a second, latency"),
     "stop": ("ros.stop", "the topic stop over DDS: random approaches, silence, publisher and node killed"),
     "soak": ("ros.soak.command", "half an hour of mixed load on the node: memory, counts, answers"),
     "accuracy": ("core.accuracy", "the tiers: time, wrong answers, error of times; sweeps of scale and offset"),

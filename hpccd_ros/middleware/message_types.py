@@ -15,8 +15,6 @@ JOINT_STATES = "sensor_msgs/msg/JointState"
 CONTACTS = "hpccd/msg/ContactArray"
 DISTANCES = "hpccd/msg/DistanceArray"
 PAIRS = "hpccd/msg/PairSummaryArray"
-ROBOT_DESCRIPTION = "std_msgs/msg/String"
-JOINT_STATES = "sensor_msgs/msg/JointState"
 
 # A name may come from a recording: it must not lead out of the folders of messages, nor to any other module.
 _TYPE_NAME = re.compile(r"([A-Za-z][A-Za-z0-9_]*)/([a-z]+)/([A-Za-z][A-Za-z0-9_]*)")

@@ -29,7 +29,7 @@ def topics(scene: Scene) -> list[SentTopic]:
         sent.append(SentTopic(topic_names.topology(mesh.name), message_types.TOPOLOGY, True))
         sent.append(SentTopic(topic_names.vertices(mesh.name), message_types.VERTICES, False))
     for robot in scene.robots:
-        sent.append(SentTopic(robot.description_topic, message_types.ROBOT_DESCRIPTION, True))
+        sent.append(SentTopic(robot.description_topic, message_types.DESCRIPTION, True))
         sent.append(SentTopic(robot.joint_states_topic, message_types.JOINT_STATES, False))
     return sent
 

@@ -29,6 +29,6 @@ def test_joint_states_are_those_of_an_independent_writer_and_of_ros(positions):
 @pytest.mark.parametrize("text", ["", "<robot/>", '<robot name="Gerät">\n</robot>'])
 def test_a_description_is_the_text(text):
     data = robot_cdr.description(text)
-    message = STORE.deserialize_cdr(data, message_types.ROBOT_DESCRIPTION)
-    assert bytes(STORE.serialize_cdr(message, message_types.ROBOT_DESCRIPTION)) == data
+    message = STORE.deserialize_cdr(data, message_types.DESCRIPTION)
+    assert bytes(STORE.serialize_cdr(message, message_types.DESCRIPTION)) == data
     assert message.data == deserialize_message(data, String).data == text

@@ -102,7 +102,7 @@ def _measure(report, args, name, step, folder: Path) -> None:
         rclpy.try_shutdown()
     if link.wrong:
         report.failure(f"{name}: contacts of {len(link.wrong)} steps differ from the core's own")
-    latency = _latency(row, lanes, {entry[0]: entry[1:] for entry in times})
+    latency = _latency(row, lanes, {entry[0]: entry[1:5] for entry in times})
     rates = len(report.rows) - (2 if args.seconds else 0)  # they stand at the end
     report.rows[rates:rates] = [latency, {"what": "step loop", **row, **loop}]
     if loop["wrong"]:
