@@ -8,6 +8,7 @@ other processors, and a recording must be computed again to the same contacts an
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,8 +63,12 @@ class Rigid:
         return Rigid(mixed / _length(mixed), (1 - t) * self.shift + t * other.shift)
 
     def rotation(self) -> NDArray[np.float64]:
-        """The matrix, (3,3)."""
-        x, y, z, w = self.quaternion
+        """The matrix, (3,3). Not to be written to."""
+        return self._rotation
+
+    @cached_property
+    def _rotation(self) -> NDArray[np.float64]:
+        x, y, z, w = self.quaternion.tolist()  # Python's numbers: numpy takes three times as long for single ones
         return np.array(
             [
                 [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
@@ -78,7 +83,7 @@ IDENTITY = Rigid(np.array([0.0, 0.0, 0.0, 1.0]), np.zeros(3))
 
 def product(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
     """The turn of b, then that of a: a quaternion of length 1."""
-    (ax, ay, az, aw), (bx, by, bz, bw) = a, b
+    (ax, ay, az, aw), (bx, by, bz, bw) = a.tolist(), b.tolist()
     unscaled = np.array(
         [
             aw * bx + ax * bw + ay * bz - az * by,
@@ -96,6 +101,9 @@ def _length(quaternion: NDArray[np.float64]) -> float:
 
 def rotated(rotation: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
     """points: (3,) or (n,3), each multiplied by the matrix (3,3)."""
+    if points.ndim == 1:
+        x, y, z = points.tolist()
+        return np.array([x * a + y * b + z * c for a, b, c in rotation.tolist()])
     x, y, z = points[..., 0:1], points[..., 1:2], points[..., 2:3]
     turned: NDArray[np.float64] = x * rotation[:, 0] + y * rotation[:, 1] + z * rotation[:, 2]
     return turned
