@@ -51,3 +51,16 @@ def cost(result: Kept) -> list[str]:
 
 def _spread(row: dict) -> str:
     return f"{row['median']:.2f} ({row['low']:.2f} to {row['largest']:.3f})"
+
+
+def stream(result: Kept) -> list[str]:
+    """A line for each round of a robot beside a cloth over DDS."""
+    lines = [
+        [row["frames"], f"{row['rate_hz']:g}", row["answers"], row["dropped"], f"{row['answers_hz']:.1f}",
+         *(f"{text(row[f'{part}_median_ms'])} / {text(row[f'{part}_p95_ms'])}"
+           for part in ("whole", "detection", "core", "added"))]
+        for row in result.rows
+    ]  # fmt: skip
+    columns = ["frames", "a second", "answers", "dropped", "answers a second", "sent to answer, ms: median / p95",
+               "of it detection", "of it core", "all but the core"]  # fmt: skip
+    return markdown.table(columns, lines)
