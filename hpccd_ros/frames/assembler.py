@@ -73,7 +73,7 @@ class FrameAssembler:
         self._frame = CoordinateFrame(rules.frame_id)
         self._completed = 0
         self._matcher: Matcher = (
-            ExactMatcher(deforming, rules.max_pending)
+            ExactMatcher(deforming, rules.max_pending, following)
             if rules.tolerance is None
             else NearestMatcher(deforming, rules.max_pending, rules.tolerance)
         )

@@ -13,6 +13,9 @@ from typing import NamedTuple, Protocol
 from hpccd_ros.frames.drops import Reason, Refusal
 from hpccd_ros.frames.types import MeshFrame
 
+# Where nobody sends frames of what is missing, so that no stamps could be wrong.
+_MOVED = "descriptions, joint states or transforms for that stamp did not come in time: /diagnostics tells which"
+
 
 @dataclass(frozen=True, eq=False)
 class Match:
@@ -48,11 +51,12 @@ class Matcher(Protocol):
 class ExactMatcher:
     """A match is one frame of each mesh with the very same stamp.
 
-    At most ``max_pending`` stamps wait; the oldest gives way.
+    At most ``max_pending`` stamps wait; the oldest gives way. following: meshes of which nobody sends frames.
     """
 
-    def __init__(self, meshes: list[str], max_pending: int) -> None:
+    def __init__(self, meshes: list[str], max_pending: int, following: Collection[str] = ()) -> None:
         self._meshes = meshes
+        self._following = frozenset(following)
         self._max_pending = max_pending
         self._pending: dict[int, dict[str, MeshFrame]] = {}
         self._closed_up_to: int | None = None
@@ -76,8 +80,9 @@ class ExactMatcher:
 
     def _give_up(self, stamp: int) -> list[Refusal]:
         group = self._pending.pop(stamp)
-        missing = ", ".join(m for m in self._meshes if m not in group)
-        text = f"stamp {stamp} ns has no frame of {missing}; stamps must be equal (or set stamp_match: nearest)"
+        missing = [m for m in self._meshes if m not in group]
+        remedy = _MOVED if self._following.issuperset(missing) else "stamps must be equal (or set stamp_match: nearest)"
+        text = f"stamp {stamp} ns has no frame of {', '.join(missing)}; {remedy}"
         return [Refusal(mesh, Reason.INCOMPLETE, text) for mesh in group]
 
     def take(self, meshes: Collection[str]) -> list[tuple[str, MeshFrame]]:

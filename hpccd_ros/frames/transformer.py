@@ -16,6 +16,7 @@ import numpy as np
 from hpccd_ros.base.quoting import quoted
 from hpccd_ros.frames.coordinates import unusable_coordinates
 from hpccd_ros.frames.drops import Reason, Refusal
+from hpccd_ros.frames.standstill import Standstill
 from hpccd_ros.frames.transform_buffer import NoTransformError, TransformBuffer
 from hpccd_ros.frames.types import TF, MeshFrame, MeshSettings
 from hpccd_ros.rigid.transform import IDENTITY, Rigid
@@ -53,6 +54,7 @@ class MeshTransformer:
         self._max_waiting = max_waiting
         self._transforms = transforms
         self._waiting: deque[_Waiting] = deque()
+        self._standstill = Standstill()
         self._last: int | None = None  # stamp that was last looked up
         self._unnoticed = False  # the first frame of a new publisher was refused: the next one stands for it
         self._pose = Rigid.of(mesh.pose[:3], mesh.pose[3:]) if self._kind == "pose" else None
@@ -62,8 +64,9 @@ class MeshTransformer:
         return len(self._waiting)
 
     def warnings(self) -> list[str]:
-        """What the frames that wait are waiting for."""
-        return [f"{self._mesh} waits for a transform: {self._missing(self._waiting[0])}"] if self._waiting else []
+        """What the frames are waiting for, where none has gone on for a while."""
+        waits_long = self._waiting and self._standstill.long
+        return [f"{self._mesh} waits for a transform: {self._missing(self._waiting[0])}"] if waits_long else []
 
     def transform(self, frame: MeshFrame, new_publisher: bool = False) -> Transformed:
         """Frames that can go on now that this one has come: with ``transform: none`` always itself."""
@@ -111,7 +114,10 @@ class MeshTransformer:
             refusals += [self._give_up(earlier, "; a later frame was placed") for earlier in passed]
             passed.clear()
             frames.append((moved, self._noticed(item.new_publisher)))
+            self._standstill.ends()
         self._waiting.extendleft(reversed(passed))
+        if self._waiting:
+            self._standstill.waits()
         return Transformed(frames, refusals)
 
     def clear(self, reason: Reason) -> list[Refusal]:

@@ -34,7 +34,9 @@ def path_of(resource: str) -> Path:
 def resolver(description: str | None) -> Resolver:
     """For mesh files of a description. description: its file, from whose folder relative names start; None: it came on
     a topic."""
-    return resources.local_path if description is None else beside(path_of(description).parent, resources.local_path)
+    if description is None:
+        return resources.local_path
+    return beside(path_of(description).absolute().parent, resources.local_path)
 
 
 def robot_of(name: str, values: Mapping[str, Any], text: str, semantics: str | None, find: Resolver) -> Robot:

@@ -13,7 +13,7 @@ from hpccd_ros.node.life_cycle import GuardedLifecycleNode
 from hpccd_ros.params import robot_parameters
 from hpccd_ros.params.table import ROBOT
 from hpccd_ros.params.values import ParameterError
-from hpccd_ros.robots.errors import RobotError
+from hpccd_ros.robots.errors import RobotError, SemanticsError
 from hpccd_ros.robots.robot import Robot
 
 # s between two scenes: reading a robot takes up to seconds, and anybody may publish descriptions.
@@ -53,11 +53,16 @@ class RobotDescriptions:
     def warnings(self) -> list[str]:
         """Which robots are not known, and which descriptions cannot be used."""
         unheard = [
-            f"robot {name} waits for its description on {self._node.resolve_topic_name(topic)}"
+            f"robot {name} waits for its description on {self._node.resolve_topic_name(topic)}{self._why(topic)}"
             for name, topic in self._topics.items()
             if name not in self.robots and name not in self._refused
         ]
         return unheard + [f"robot {name}: {why}" for name, why in self._refused.items()]
+
+    def _why(self, topic: str) -> str:
+        if not self._node.count_publishers(topic):
+            return ", which nobody publishes"
+        return ": its publisher must be latched (reliable, transient local)"
 
     def _read_files(self, name: str) -> None:
         values, given = self._values[name], ""
@@ -70,6 +75,7 @@ class RobotDescriptions:
             text = robot_files.text_of(values["description"])
             self.robots[name] = self._made(name, text)
         except RobotError as error:
+            given = "srdf" if isinstance(error, SemanticsError) else given
             raise ParameterError(f"{ROBOT}.{name}.{given}: {shortened(error, LONGEST)}") from error
 
     def _made(self, name: str, text: str) -> Robot:

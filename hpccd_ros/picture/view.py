@@ -3,6 +3,7 @@
 
 import contextlib
 import os
+import sys
 from pathlib import Path
 
 from hpccd_ros.bag.reader import Recording
@@ -106,5 +107,6 @@ def _draw_many(args, steps, folder, title, view):
         if number % args.every == 0:
             draw_step(step, folder / f"{step.step:06}.png", title=title, **view)
             count += 1
-            print(f"\r{count} pictures in {folder}", end="", flush=True)
-    print()
+            if sys.stderr.isatty():
+                print(f"\r{count} drawn ", end="", file=sys.stderr, flush=True)
+    print(f"{folder}: {count} {'picture' if count == 1 else 'pictures'}")

@@ -5,3 +5,7 @@
 class RobotError(ValueError):
     """A description, a semantic description or joint positions that cannot be used; the text names element and
     remedy."""
+
+
+class SemanticsError(RobotError):
+    """It is the semantic description, the SRDF, that cannot be used."""

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 from hpccd_ros.frames.drops import Reason, Refusal
 from hpccd_ros.frames.follower import Followed
+from hpccd_ros.frames.standstill import Standstill
 from hpccd_ros.frames.transform_buffer import NoTransformError, TransformBuffer
 from hpccd_ros.frames.types import MeshFrame
 from hpccd_ros.rigid.transform import Rigid
@@ -45,6 +46,7 @@ class JointFrames:
         self._most_waiting = most_waiting
         self._history = JointHistory(robot.kinematics)
         self._waiting: deque[_Asked] = deque()
+        self._standstill = Standstill()
 
     @property
     def waiting(self) -> int:
@@ -75,7 +77,10 @@ class JointFrames:
                 refusals += self._refused(Reason.OUT_OF_RANGE, str(error))
             else:
                 times.append(frames)
+                self._standstill.ends()
             self._waiting.popleft()
+        if self._waiting:
+            self._standstill.waits()
         return Followed(refusals, times)
 
     def latest(self, transforms: TransformBuffer) -> list[int | None]:
@@ -97,13 +102,14 @@ class JointFrames:
         self._history.clear()
 
     def warnings(self) -> list[str]:
-        return [f"{self._robot.name} waits: {self._waiting[0].awaited}"] if self._waiting else []
+        waits_long = self._waiting and self._standstill.long
+        return [f"{self._robot.name} waits: {self._waiting[0].awaited}"] if waits_long else []
 
     def _frames(self, asked: _Asked, transforms: TransformBuffer) -> list[tuple[str, MeshFrame, bool]]:
         values = self._history.at(asked.stamp)
         base = self._base
         if base is None:
-            base = transforms.lookup(self._root, self._target, asked.stamp)
+            base = self._base_by_transforms(asked.stamp, transforms)
         # One state for all links: what a step computes of the joints is then computed once.
         placements = self._robot.placements(self._robot.kinematics.state(values, base))
         return [
@@ -121,6 +127,16 @@ class JointFrames:
             )
             for name, placement in zip(self.names, placements, strict=True)
         ]
+
+    def _base_by_transforms(self, stamp: int, transforms: TransformBuffer) -> Rigid:
+        try:
+            return transforms.lookup(self._root, self._target, stamp)
+        except NoTransformError as error:
+            if error.connected:
+                raise
+            remedy = f"publish that, or give parameter robot.{self._robot.name}.pose"
+            text = f"{error}; {remedy}; {transforms.account(self._root)}"
+            raise NoTransformError(text, error.final, connected=False) from error
 
     def _refused(self, reason: Reason, text: str) -> list[Refusal]:
         """The text once: it is of the robot, not of a link."""

@@ -28,6 +28,7 @@ class JointHistory:
 
     def __init__(self, kinematics: Kinematics) -> None:
         self._joints = {name: _Values(name in kinematics.continuous) for name in kinematics.inputs}
+        self._told = ""  # joints of the last message
 
     def add(self, stamp: int, names: Sequence[str], positions: Sequence[float]) -> None:
         """stamp ns. Joints of others are left out. Raises RobotError, and then nothing of it is kept."""
@@ -39,6 +40,7 @@ class JointHistory:
         for name, value in known:
             if not math.isfinite(value):
                 raise RobotError(f"joint states: {quoted(name)} is at {value}; positions must be finite")
+        self._told = listed(names)
         if any(self._joints[name].begins_anew(stamp) for name, _ in known):
             # The clock was set back: values from before, of any joint, would be interpolated with the new ones.
             self.clear()
@@ -68,9 +70,8 @@ class JointHistory:
         late = [name for name, values in self._joints.items() if stamp > values.stamps[-1]]
         if late:
             last = min(self._joints[name].stamps[-1] for name in late)
-            raise NoJointStateError(
-                f"the last joint state of {listed(late)} is of {last} ns, before the stamp {stamp} ns", final=False
-            )
+            text = f"the last joint state of {listed(late)} is of {last} ns, before the stamp {stamp} ns"
+            raise NoJointStateError(text if last else f"{text}; its publisher must set header.stamp", final=False)
         return {name: values.at(stamp) for name, values in self._joints.items()}
 
     def latest(self) -> int | None:
@@ -80,7 +81,8 @@ class JointHistory:
 
     def _check_heard(self) -> None:
         if unheard := [name for name, values in self._joints.items() if not values.stamps]:
-            raise NoJointStateError(f"no joint state has told of {listed(unheard)}", final=False)
+            heard = f"; the last one that came tells of {self._told}" if self._told else ""
+            raise NoJointStateError(f"no joint state has told of {listed(unheard)}{heard}", final=False)
 
 
 class _Values:

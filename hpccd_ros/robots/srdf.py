@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from hpccd_ros.base.quoting import listed, quoted
 from hpccd_ros.robots import xml_tree
+from hpccd_ros.robots.errors import RobotError, SemanticsError
 from hpccd_ros.robots.xml_tree import Element
 
 DOCUMENT = "SRDF"
@@ -22,9 +23,17 @@ class Semantics:
 
 
 def parse(text: str, links: Iterable[str]) -> Semantics:
-    """links: of the URDF. Raises RobotError naming the element: unknown links, no XML."""
-    known = set(links)
+    """links: of the URDF. Raises SemanticsError naming the element: unknown links, no XML, a URDF."""
+    try:
+        return _semantics(text, set(links))
+    except RobotError as error:
+        raise SemanticsError(str(error)) from error
+
+
+def _semantics(text: str, known: set[str]) -> Semantics:
     robot = xml_tree.parse(text, DOCUMENT, "robot")
+    for element in robot.all("joint"):
+        raise element.error("is of a URDF; name the SRDF beside it, whose pairs are <disable_collisions>")
     return Semantics(
         frozenset(_pair(element, known) for element in robot.all("disable_collisions")),
         frozenset(_pair(element, known) for element in robot.all("enable_collisions")),

@@ -57,6 +57,15 @@ def test_a_frame_comes_up_with_the_message_that_completes_it():
     assert pipeline.waiting == 0
 
 
+@pytest.mark.parametrize("moved", ["tf", "joints"])
+def test_where_nobody_sends_what_is_missing_no_stamp_is_blamed(moved):
+    link = MeshSettings("link", input=moved, frame="link_frame")
+    pipeline = pipeline_of(CLOTH, link, frame_id="world", max_pending=1)
+    outcomes = [pipeline.push("cloth", frame(stamp)) for stamp in (1, 2)]
+    (text,) = {refusal.text for outcome in outcomes for refusal in outcome.refusals if refusal.mesh == "cloth"}
+    assert text.startswith("stamp 1 ns has no frame of link; descriptions, joint states or transforms for that stamp")
+
+
 def test_refusals_say_what_they_are_of():
     pipeline = pipeline_of(CLOTH)
     (of_vertices,) = pipeline.push("cloth", frame(1, n=4)).refusals
@@ -81,7 +90,7 @@ def test_a_restart_is_told():
     assert not any(pipeline.push("cloth", frame(1)).restarts for _ in range(9))
 
 
-def test_frames_wait_for_their_transforms():
+def test_frames_wait_for_their_transforms(warned_at_once):
     pipeline = pipeline_of(IN_HAND, frame_id="world")
     assert pipeline.push("cloth", frame(1)).frames == [] and pipeline.waiting == 1
     assert "no transform connects 'hand' and 'world'" in pipeline.awaited_transform("cloth")[0]
@@ -119,7 +128,7 @@ def test_what_the_queue_has_no_room_for_comes_up_as_overload():
     assert [(queue.pop().frame.stamp) for _ in range(2)] == [1, 3]
 
 
-def test_stopped_with_all_that_waits():
+def test_stopped_with_all_that_waits(warned_at_once):
     held = MeshSettings("held", transform="tf")
     pipeline = pipeline_of(held, BALL, frame_id="world")
     pipeline.transforms.add("world", "hand", UP, None)

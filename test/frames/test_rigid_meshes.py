@@ -154,7 +154,7 @@ def test_transforms_are_asked_at_the_stamps_of_the_others():
     assert frame.stamp == 15 and set(frame.fresh) == {"cloth", "link"} and pipeline.waiting == 0
 
 
-def test_a_transform_that_does_not_come_is_told_and_gives_way():
+def test_a_transform_that_does_not_come_is_told_and_gives_way(warned_at_once):
     pipeline = pipeline_of(CLOTH, LINK, max_pending=3)
     outcome = Outcome()
     for stamp in range(1, 8):

@@ -267,7 +267,7 @@ def test_a_transform_can_push_positions_out_of_range():
         assert gate.reasons() == [Reason.OUT_OF_RANGE]
 
 
-def test_frames_wait_in_order_for_their_transforms():
+def test_frames_wait_in_order_for_their_transforms(warned_at_once):
     buffer = TransformBuffer()
     gate = Gate(buffer, transform="tf", frame="hand")
     assert gate.transform(frame(1 * SECOND)) == gate.transform(frame(2 * SECOND, "")) == [] and gate.waiting == 2
@@ -286,7 +286,7 @@ def test_frames_wait_in_order_for_their_transforms():
     assert gate.waiting == 0
 
 
-def test_a_frame_without_any_transform_holds_up_nobody():
+def test_a_frame_without_any_transform_holds_up_nobody(warned_at_once):
     buffer = TransformBuffer()
     gate = Gate(buffer, transform="tf")
     buffer.add("world", "hand", turn(0), 2 * SECOND)

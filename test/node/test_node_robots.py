@@ -257,6 +257,16 @@ def test_a_file_that_cannot_be_used_ends_the_start(start_node, tmp_path):
         assert node.stop() == 0
 
 
+def test_of_a_srdf_that_cannot_be_used_its_own_parameter_is_named(start_node, tmp_path):
+    description, semantics = tmp_path / "crane.urdf", tmp_path / "crane.srdf"
+    description.write_text(crane.URDF)
+    semantics.write_text('<robot name="crane"><disable_collisions link1="mast" link2="hok"/></robot>')
+    robot = {**JOINTS, "description": str(description), "srdf": str(semantics)}
+    node = start_node({**parameters(**robot), "autostart": False}, wait=False)
+    assert not change_state(node, Transition.TRANSITION_CONFIGURE)
+    assert "robot.crane.srdf: SRDF, line 1: <disable_collisions> names the link 'hok'" in node.output()
+
+
 def test_pairs_name_robots_and_links(start_node):
     node = start_node({
         **parameters(**JOINTS), "pair_separation": ["crane:cloth:0.01", "crane/hook:cloth:0.02"],

@@ -46,7 +46,7 @@ def test_what_is_not_known_is_named_and_whether_it_may_come():
         joints.latest()
     joints.add(100, ["slide"], [1.0])
     for stamp, message, final in [
-        (100, "no joint state has told of turn", False),
+        (100, "no joint state has told of turn; the last one that came tells of slide", False),
         (50, "after the stamp 50 ns", True),
         (250, "the last joint state of turn, slide is of 200 ns, before the stamp 250 ns", False),
     ]:
@@ -55,6 +55,13 @@ def test_what_is_not_known_is_named_and_whether_it_may_come():
         with pytest.raises(NoJointStateError, match=message) as refused:
             joints.at(stamp)
         assert refused.value.final is final
+
+
+def test_a_publisher_that_gives_no_stamps_is_told_of():
+    joints = history()
+    joints.add(0, ["turn", "slide"], [0.0, 0.0])
+    with pytest.raises(NoJointStateError, match="is of 0 ns, before .* 5 ns; its publisher must set header"):
+        joints.at(5)
 
 
 def test_messages_that_cannot_be_used_leave_nothing_behind():

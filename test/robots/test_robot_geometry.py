@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from hpccd_ros.middleware import robot_files
 from hpccd_ros.robots import geometry, urdf
 from hpccd_ros.robots.errors import RobotError
 from hpccd_ros.robots.geometry import LinkMeshes, beside, no_files
@@ -66,6 +67,15 @@ def test_relative_paths_start_beside_the_description(tmp_path):
     assert beside(tmp_path, str.upper)("/x/a.obj") == "/X/A.OBJ"
     with pytest.raises(RobotError, match="link 'a': mesh a.obj: a relative path needs the folder"):
         made(relative, str)
+
+
+@pytest.mark.parametrize("description", ["arm.urdf", "./arm.urdf", "robots/../arm.urdf"])
+def test_the_description_itself_may_have_a_relative_path(tmp_path, monkeypatch, description):
+    (tmp_path / "a.obj").write_text(OBJ)
+    (tmp_path / "robots").mkdir()
+    monkeypatch.chdir(tmp_path)
+    vertices, _ = made(link(('<mesh filename="a.obj"/>', "")), robot_files.resolver(description))
+    assert len(vertices) == 3
 
 
 @pytest.mark.parametrize(

@@ -102,3 +102,5 @@ def test_hostile_xml_is_refused_here_too():
         srdf.parse("<!DOCTYPE r []><robot/>", "ab")
     with pytest.raises(RobotError, match="<srdf> is the outermost element"):
         srdf.parse("<srdf/>", "ab")
+    with pytest.raises(RobotError, match="SRDF, line 2: <joint name='j'> is of a URDF"):
+        srdf.parse('<robot><link name="a"/>\n<joint name="j"/></robot>', "ab")
