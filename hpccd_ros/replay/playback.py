@@ -54,8 +54,9 @@ def main(args) -> int:
 def _topics(recording, args) -> list[RecordedTopic]:
     if args.all:
         return list(recording.topics.values())
-    roles = recorded_setup.of_recording(recording, args.params).roles
-    return [topic for name, topic in recording.topics.items() if name in roles]
+    setup = recorded_setup.of_recording(recording, args.params)
+    inputs = {*setup.roles, *setup.described_on}
+    return [topic for name, topic in recording.topics.items() if name in inputs]
 
 
 def _publisher(node, topic):

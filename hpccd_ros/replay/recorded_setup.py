@@ -36,6 +36,7 @@ class ReplaySetup:
     distances: str | None  # as well
     files: dict[str, tuple[Topology, MeshFrame | None]]  # of meshes that come from a file; frame: static ones
     robots: dict[str, Robot]
+    described_on: list[str]  # topic names of the descriptions that came on one
     unknown: list[str]  # parameters that the node does not have: without effect
 
     @property
@@ -110,7 +111,7 @@ def of_recording(recording: Recording, parameter_file: str | None = None) -> Rep
     except ParameterError as error:
         raise refused(printable(f"{where}: {error}")) from error
     return ReplaySetup(settings, meshes, roles, by_role.get(topic_names.CONTACTS), by_role.get(topic_names.DISTANCES),
-                       _files(recording, meshes), robots,
+                       _files(recording, meshes), robots, [by_role[role] for role in dict.fromkeys(described)],
                        values.unknown(given, meshes, settings["robots"]))  # fmt: skip
 
 

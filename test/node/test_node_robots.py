@@ -2,12 +2,16 @@
 """Robots beside a cloth: described by a file or on a topic, moved by joint states or transforms, recorded and computed
 again."""
 
+import subprocess
+import sys
+
 import crane
 import numpy as np
 import pytest
 from geometry_msgs.msg import TransformStamped
 from lifecycle_msgs.msg import Transition
 from node_calls import change_state, set_parameter
+from node_process import PATIENCE
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from waving_sheet import sheet_faces, sheet_positions
@@ -123,6 +127,27 @@ def test_streamed_recorded_and_verified(start_node, tmp_path, by, given):
         replay = Replay(recording, recorded_setup.of_recording(recording))
         steps = list(replay.steps())
     assert replay.diverged == replay.unverified == 0 and replay.verified == len(steps) == 5
+
+
+def test_played_over_dds_with_its_description(start_node, tmp_path):
+    path, steps = tmp_path / "run.mcap", 4
+    node = start_node({**parameters(**JOINTS), "record": str(path)})
+    describe(node)
+    node.peer.topology("cloth", SHEET.faces, SHEET.n_vertices)
+    joints = node.peer.publisher(JointState, "joint_states", qos.TRANSFORMS)
+    for k in range(1, steps + 1):
+        joints.publish(crane.joint_state(k, k))
+        cloth(node, k)
+        node.frames_status(answered=4 * k)
+    assert node.stop() == 0
+    names = ("robot_description", "joint_states", "meshes/cloth/topology", "meshes/cloth/vertices")
+    again = start_node(
+        {**parameters(**JOINTS), "frame_queue": 100}, remaps=[f"{name}:={node.namespace}/{name}" for name in names]
+    )
+    player = [sys.executable, "-m", "hpccd_ros.cli", "replay", str(path), "--publish", "--wait", str(PATIENCE)]
+    done = subprocess.run(player, capture_output=True, text=True, timeout=2 * PATIENCE)
+    assert done.returncode == 0, done.stderr
+    assert [m.hash for m in again.contacts(steps - 1)] == [m.hash for m in node.contacts(steps - 1)]
 
 
 def test_a_robot_alone_moves_at_the_times_of_its_joint_states(start_node):
