@@ -189,6 +189,8 @@ class Summary:
             # The word stands for all of the recording.
             verdict = " " if replay.distances.diverged else "VERIFIED:"
             print(f"{verdict} {replay.verified} answers {what} ({self._tiers()})")
+        elif replay.recorded_answers and not replay.unverified and (args.begin > 0 or args.end < float("inf")):
+            print("NOTHING VERIFIED: no step of the recording ends between --from and --to (seconds of it)")
         elif replay.recorded_answers:
             print("NOTHING VERIFIED: the recording has answers, but not the frames that they belong to")
         elif self.computed:

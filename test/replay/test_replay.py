@@ -318,6 +318,8 @@ def test_a_part_of_a_recording(hpccd, small_bag, tmp_path):
     assert done.returncode == 0 and f"VERIFIED: {len(steps)} answers" in done.stdout
     (row,) = json.loads((tmp_path / "part.json").read_text())
     assert (row["result"], row["verified"]) == ("VERIFIED", len(steps))
+    done = hpccd("replay", small_bag, "--from", "1000")
+    assert "NOTHING VERIFIED: no step of the recording ends between --from and --to" in done.stdout
 
 
 def test_one_step_at_each_enter(hpccd, small_bag):
