@@ -39,7 +39,7 @@ def page_of(path, target, *, names=None, shown=lambda number: True, **options):
     with Recording(path) as recording:
         setup = recorded_setup.of_recording(recording)
         replay = Replay(recording, setup, outputs=("points",))
-        page = RecordingPage(replay, names or setup.meshes, options.pop("title", "a title"), **options)
+        page = RecordingPage(replay, names or setup.mesh_names, options.pop("title", "a title"), **options)
         for number, step in enumerate(replay.steps()):
             page.add(step, shown(number))
         target.write_text(document(*page.described(), library.three()), encoding="utf-8")
@@ -88,6 +88,16 @@ def test_what_the_page_holds_is_what_was_recorded(hpccd, small_bag, tmp_path):
     assert page.said["notes"] == ["Each 4th step of the recording is shown (--every 4)."]
     sides = [np.subtract(mesh["high"], mesh["low"]).max() for mesh in page.said["meshes"]]
     assert [mesh["step"] for mesh in page.said["meshes"]] == pytest.approx([side / 65535 for side in sides])
+
+
+def test_links_of_robots_are_shown(hpccd, tmp_path):
+    assert hpccd("scene", "arm-and-cloth", "--size", 0.05, "--frames", 5, "--mcap", "arm.mcap").returncode == 0
+    assert hpccd("view", "arm.mcap", "--html", "arm.html").returncode == 0
+    page, steps = Page(tmp_path / "arm.html"), steps_of(tmp_path / "arm.mcap")
+    names = [mesh["name"] for mesh in page.said["meshes"]]
+    assert len(names) == 13 and names[:4] == ["table", "cloth", "arm/base", "arm/link_1"]
+    for number, step in enumerate(steps):
+        assert_shows(page, number, step)
 
 
 def test_meshes_of_several_topologies_and_meshes_at_rest(hpccd, tmp_path):

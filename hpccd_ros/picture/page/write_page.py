@@ -25,7 +25,7 @@ def write_page(args, source: Path, target: Path, title: str, view: dict) -> int:
     with Recording(source) as recording:
         setup = recorded_setup.of_recording(recording, args.params)
         replay = Replay(recording, setup, outputs=("points",), distances=False)
-        page = RecordingPage(replay, setup.meshes, title, every=every, **view)
+        page = RecordingPage(replay, setup.mesh_names, title, every=every, **view)
         for number, step in enumerate(track(replay.steps(), "steps", True, replay.recorded_answers or None)):
             page.add(step, step.step == args.step if args.step is not None else number % every == 0)
         if not page.steps:
