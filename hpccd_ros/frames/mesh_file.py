@@ -27,7 +27,7 @@ def load_mesh(path: str) -> tuple[np.ndarray, np.ndarray]:
     use. Polygons become triangle fans. DAE: see collada_file.parse. Raises MeshFileError: trimesh or pycollada missing,
     no such file, other format, no triangles.
     """
-    file = _existing(path)
+    file = existing(path)
     vertices, faces = _of_collada(file) if file.suffix.lower() == ".dae" else _by_trimesh(file)
     if len(faces) == 0:
         raise MeshFileError(f"{file}: has no triangles")
@@ -66,7 +66,8 @@ def _by_trimesh(file: Path) -> tuple[np.ndarray, np.ndarray]:
     return np.asarray(mesh.vertices, np.float64), np.asarray(mesh.faces)
 
 
-def _existing(path: str) -> Path:
+def existing(path: str) -> Path:
+    """The file, which is one of FORMATS by its name. Raises MeshFileError: it is not, or there is no such file."""
     shown = shortened(path)
     if (suffix := Path(path).suffix).lower() not in FORMATS:
         raise MeshFileError(f"{shown}: format {shortened(suffix) or '(none)'!r}; use one of {', '.join(FORMATS)}")

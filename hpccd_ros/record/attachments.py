@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import Any
 
 from hpccd_ros.base.errors import UserError
-from hpccd_ros.frames.mesh_file import MeshFileError
+from hpccd_ros.base.quoting import shortened
+from hpccd_ros.frames.mesh_file import MeshFileError, existing
 from hpccd_ros.middleware import robot_files
-from hpccd_ros.middleware.resources import local_path
 from hpccd_ros.params import robot_parameters
 from hpccd_ros.robots.errors import RobotError
 
@@ -65,18 +65,18 @@ def link_meshes(robot: str, values: Mapping[str, Any], text: str) -> tuple[Files
         return [], []  # the node has no such robot either, and says why
     for number, uri in enumerate(uris):
         try:
-            file = find(uri)
+            file = str(existing(find(uri)))  # of a stranger's description: nothing but meshes, and no devices
         except (MeshFileError, UserError) as error:
-            missing.append(_missing(f"mesh file {uri}", error))
+            missing.append(_missing(f"mesh file {shortened(uri)}", error))
             continue
-        _read(f"mesh file {uri}", link_mesh_name(robot, number, uri), file, found, missing)
+        _read(f"mesh file {shortened(uri)}", link_mesh_name(robot, number, uri), file, found, missing)
     return found, missing
 
 
 def _read(what: str, name: str, path: str, found: Files, missing: list[str]) -> None:
     try:
-        found.append((name, Path(local_path(path)).expanduser().read_bytes()))
-    except (OSError, MeshFileError) as error:
+        found.append((name, robot_files.path_of(path).read_bytes()))
+    except (OSError, RuntimeError, ValueError) as error:  # RuntimeError: ~name, and there is no such user
         missing.append(_missing(what, error.strerror if isinstance(error, OSError) else error))
 
 

@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a recording takes along of the files that a description names, which may be a stranger's."""
+
+import os
+
+import pytest
+
+from hpccd_ros.record import attachments
+
+VALUES = {"description": "robot_description", "geometry": "collision", "srdf": ""}
+
+
+def description(uri):
+    shape = f'<collision><geometry><mesh filename="{uri}"/></geometry></collision>'
+    return f'<robot name="r"><link name="a">{shape}</link></robot>'
+
+
+def test_mesh_files_are_attached(tmp_path):
+    file = tmp_path / "a.stl"
+    file.write_bytes(b"any")
+    for uri in (str(file), f"file://{file}"):
+        assert attachments.link_meshes("arm", VALUES, description(uri)) == ([("robot/arm/mesh/0/a.stl", b"any")], [])
+
+
+@pytest.mark.parametrize("uri", ["{}/secret", "{}/pipe.stl", "{}/folder.stl", "~nobody-is-called-so/a.stl",
+                                 "file://{}/%00.stl", "{}/" + 300 * "a" + ".stl"])  # fmt: skip
+def test_nothing_else_is_read(tmp_path, uri):
+    (tmp_path / "secret").write_text("not for others")
+    os.mkfifo(tmp_path / "pipe.stl")  # whoever reads it waits for ever
+    (tmp_path / "folder.stl").mkdir()
+    found, missing = attachments.link_meshes("arm", VALUES, description(uri.format(tmp_path)))
+    assert found == []
+    assert len(missing) == 1 and "is not in the recording" in missing[0]
+
+
+def test_warnings_about_what_a_stranger_wrote_are_short():
+    (text,) = attachments.link_meshes("arm", VALUES, description("/" + 100_000 * "a" + ".stl"))[1]
+    assert len(text) < 1000
+
+
+def test_a_home_folder_that_there_is_not_ends_nothing():
+    parameters = {"meshes": ["cloth"], "mesh.cloth.file": "~nobody-is-called-so/cloth.stl"}
+    found, missing = attachments.files(parameters)
+    assert found == [] and "is not in the recording" in missing[0]
