@@ -10,7 +10,8 @@ from hpccd_ros.frames.follower import Follower
 from hpccd_ros.frames.frame_queue import FrameQueue
 from hpccd_ros.frames.outcome import Outcome
 from hpccd_ros.frames.rigid_mesh import RigidMesh
-from hpccd_ros.frames.transform_buffer import RESTART_NS, NoTransformError, TransformBuffer
+from hpccd_ros.frames.samples import RESTART_NS
+from hpccd_ros.frames.transform_buffer import NoTransformError, TransformBuffer
 from hpccd_ros.frames.transformer import MeshTransformer, Transformed
 from hpccd_ros.frames.types import JOINTS, TF, AssemblyRules, MeshFrame, MeshSettings, PoseFrame, SceneFrame, Topology
 from hpccd_ros.rigid.transform import IDENTITY

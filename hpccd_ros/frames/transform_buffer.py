@@ -2,26 +2,17 @@
 """A tree of coordinate frames over time, as tf2 keeps it: what is needed to bring positions into one frame. No ROS.
 
 The wheels hold no tf2; its rules are kept: the last ten seconds of each frame, interpolation between samples, no
-extrapolation. Bounded, as anybody may publish transforms.
-
-**A clock that is set back.** What came before is of another run, and is not mixed with what comes now. A frame that
-goes back by more than a second has begun anew, and so has all. One that goes back by less may only be late: until
-RESTART_AFTER samples in a row have increasing stamps, all before its last one. Where a mesh is known to have begun anew
-(`forget_future`) there is no doubt: of each frame what came before it went back is forgotten.
+extrapolation. Bounded, as anybody may publish transforms. What becomes of it where a clock is set back, samples.py
+says.
 """
 
 from bisect import bisect_left
 
 from hpccd_ros.base.quoting import listed, quoted
-from hpccd_ros.frames.restart import IncreasingStamps
+from hpccd_ros.frames.samples import Run, Samples
 from hpccd_ros.rigid.transform import IDENTITY, Rigid
 
-HISTORY_NS = 10_000_000_000
-# A frame that goes back by more has begun anew; what came late may be so much earlier.
-RESTART_NS = 1_000_000_000
-RESTART_AFTER = 5  # as parameter restart_after has it by default
-MOST_FRAMES = 1000
-MOST_SAMPLES = 1000  # of one frame: 100 Hz for the whole history; about 500 MB if every frame were full
+MOST_FRAMES = 1000  # about 500 MB if every frame were full
 LONGEST_NAME = 255
 
 
@@ -37,52 +28,13 @@ class NoTransformError(LookupError):
         self.connected = connected
 
 
-class _Edge:
-    """Where one frame was in its parent: samples in the order of their stamps; ``always``: not bound to a time.
-
-    ``numbers``: of the samples, in the order in which those of all frames came. ``since``: number and stamp of the
-    first of those that came last, in increasing order, behind the newest stamp; None: the last one did not.
-    """
+class _Edge(Samples[Rigid]):
+    """Where one frame was in its parent; ``always``: not bound to a time."""
 
     def __init__(self, parent: str) -> None:
+        super().__init__()
         self.parent = parent
         self.always: Rigid | None = None
-        self.stamps: list[int] = []
-        self.samples: list[Rigid] = []
-        self.numbers: list[int] = []
-        self.since: tuple[int, int] | None = None
-        self._behind = IncreasingStamps()
-
-    def begins_anew(self, stamp: int) -> bool:
-        return bool(self.stamps) and stamp < self.stamps[-1] - RESTART_NS
-
-    def forget_before(self, number: int) -> None:
-        """Only samples that came with this number or later stay."""
-        kept = [place for place, came in enumerate(self.numbers) if came >= number]
-        self.stamps = [self.stamps[place] for place in kept]
-        self.samples = [self.samples[place] for place in kept]
-        self.numbers = [self.numbers[place] for place in kept]
-        self.since, self._behind = None, IncreasingStamps()
-
-    def add(self, stamp: int, rigid: Rigid, number: int) -> bool:
-        """Whether so many came behind the newest one that they are of another run."""
-        run = 0
-        if self.stamps and stamp < self.stamps[-1]:
-            run = self._behind.next(stamp)
-            if run == 1:
-                self.since = number, stamp
-        elif self.since is not None:
-            self.since, self._behind = None, IncreasingStamps()
-        at = bisect_left(self.stamps, stamp)
-        if at < len(self.stamps) and self.stamps[at] == stamp:
-            self.samples[at], self.numbers[at] = rigid, number
-            return run >= RESTART_AFTER
-        self.stamps.insert(at, stamp)
-        self.samples.insert(at, rigid)
-        self.numbers.insert(at, number)
-        old = max(bisect_left(self.stamps, self.stamps[-1] - HISTORY_NS), len(self.stamps) - MOST_SAMPLES)
-        del self.stamps[:old], self.samples[:old], self.numbers[:old]
-        return run >= RESTART_AFTER
 
     def at(self, child: str, stamp: int) -> Rigid:
         if self.always is not None:
@@ -112,8 +64,7 @@ class TransformBuffer:
     def __init__(self) -> None:
         self.heard: dict[str, int | str] = {}
         self._edges: dict[str, _Edge] = {}
-        self._came = 0  # samples so far
-        self._anew: int | None = None  # the first stamp after transforms last began anew
+        self._run = Run(self._edges.values)
 
     def add(self, parent: str, child: str, rigid: Rigid, stamp: int | None) -> None:
         """``rigid`` takes coordinates in ``child`` to coordinates in ``parent``; stamp ns, None: at all times.
@@ -133,28 +84,12 @@ class TransformBuffer:
         if stamp is None:
             edge.always = rigid
         else:
-            self._came += 1
             edge.always = None
-            if edge.begins_anew(stamp):
-                self._begin_anew(self._came, stamp)
-            if edge.add(stamp, rigid, self._came):
-                self._begin_anew(*edge.since)
+            self._run.add(stamp, [(edge, rigid)])
 
     def forget_future(self, stamp: int) -> None:
         """A mesh begins anew with ``stamp``: samples beyond it are from before, but those that have begun anew too."""
-        with_it = self._anew is not None and abs(stamp - self._anew) <= RESTART_NS
-        for edge in self._edges.values():
-            if edge.since is not None:
-                number, self._anew = edge.since
-                edge.forget_before(number)
-            elif edge.begins_anew(stamp) or (edge.stamps and edge.stamps[-1] > stamp and not with_it):
-                edge.forget_before(self._came + 1)
-
-    def _begin_anew(self, number: int, stamp: int) -> None:
-        """What came before would be interpolated with what comes now, in this frame and across frames."""
-        for edge in self._edges.values():
-            edge.forget_before(number)
-        self._anew = stamp
+        self._run.forget_future(stamp)
 
     def lookup(self, source: str, target: str, stamp: int) -> Rigid:
         """What takes coordinates in ``source`` to coordinates in ``target`` at ``stamp`` ns.

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Joint states over time: the values of all joints of a robot at a stamp between two of them.
 
-Its rules are those of transforms (frames/transform_buffer.py): the last ten seconds of each joint, interpolation, no
-extrapolation. Bounded: only joints that the robot needs are kept.
+Its rules are those of transforms: the last ten seconds of each joint, interpolation, no extrapolation, and nothing
+from before where a clock is set back (frames/samples.py). Bounded: only joints that the robot needs are kept.
 """
 
 import math
@@ -10,7 +10,7 @@ from bisect import bisect_left
 from collections.abc import Sequence
 
 from hpccd_ros.base.quoting import listed, quoted
-from hpccd_ros.frames.transform_buffer import HISTORY_NS, MOST_SAMPLES, RESTART_NS
+from hpccd_ros.frames.samples import Run, Samples
 from hpccd_ros.robots.errors import RobotError
 from hpccd_ros.robots.kinematics import Kinematics
 
@@ -29,6 +29,7 @@ class JointHistory:
     def __init__(self, kinematics: Kinematics) -> None:
         self._joints = {name: _Values(name in kinematics.continuous) for name in kinematics.inputs}
         self._told = ""  # joints of the last message
+        self._run = Run(self._joints.values)
 
     def add(self, stamp: int, names: Sequence[str], positions: Sequence[float]) -> None:
         """stamp ns. Joints of others are left out. Raises RobotError, and then nothing of it is kept."""
@@ -41,21 +42,15 @@ class JointHistory:
             if not math.isfinite(value):
                 raise RobotError(f"joint states: {quoted(name)} is at {value}; positions must be finite")
         self._told = listed(names)
-        if any(self._joints[name].begins_anew(stamp) for name, _ in known):
-            # The clock was set back: values from before, of any joint, would be interpolated with the new ones.
-            self.clear()
-        for name, value in known:
-            self._joints[name].add(stamp, value)
+        self._run.add(stamp, [(self._joints[name], value) for name, value in known])
 
     def clear(self) -> None:
-        for values in self._joints.values():
-            values.clear()
+        self._joints = {name: values.emptied() for name, values in self._joints.items()}
+        self._run = Run(self._joints.values)
 
     def forget_future(self, stamp: int) -> None:
-        """The time is ``stamp`` again: values far beyond it are from before."""
-        for values in self._joints.values():
-            if values.begins_anew(stamp):
-                values.clear()
+        """A mesh begins anew with ``stamp``: values beyond it are from before, but those that have begun anew too."""
+        self._run.forget_future(stamp)
 
     def at(self, stamp: int) -> dict[str, float]:
         """A value of each joint that the robot needs. Raises NoJointStateError."""
@@ -85,36 +80,21 @@ class JointHistory:
             raise NoJointStateError(f"no joint state has told of {listed(unheard)}{heard}", final=False)
 
 
-class _Values:
-    """Of one joint, in the order of their stamps."""
+class _Values(Samples[float]):
+    """Of one joint."""
 
     def __init__(self, continuous: bool) -> None:
+        super().__init__()
         self._continuous = continuous
-        self.stamps: list[int] = []
-        self._values: list[float] = []
 
-    def begins_anew(self, stamp: int) -> bool:
-        return bool(self.stamps) and stamp < self.stamps[-1] - RESTART_NS
-
-    def clear(self) -> None:
-        self.stamps.clear()
-        self._values.clear()
-
-    def add(self, stamp: int, value: float) -> None:
-        at = bisect_left(self.stamps, stamp)
-        if at < len(self.stamps) and self.stamps[at] == stamp:
-            self._values[at] = value
-            return
-        self.stamps.insert(at, stamp)
-        self._values.insert(at, value)
-        old = max(bisect_left(self.stamps, self.stamps[-1] - HISTORY_NS), len(self.stamps) - MOST_SAMPLES)
-        del self.stamps[:old], self._values[:old]
+    def emptied(self) -> "_Values":
+        return _Values(self._continuous)
 
     def at(self, stamp: int) -> float:
         """Between the first and the last."""
         at = bisect_left(self.stamps, stamp)
         if self.stamps[at] == stamp:
-            return self._values[at]
-        before, after = self._values[at - 1], self._values[at]
+            return self.samples[at]
+        before, after = self.samples[at - 1], self.samples[at]
         change = math.remainder(after - before, 2 * math.pi) if self._continuous else after - before
         return before + change * ((stamp - self.stamps[at - 1]) / (self.stamps[at] - self.stamps[at - 1]))

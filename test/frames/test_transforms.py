@@ -7,7 +7,7 @@ from geometry_msgs.msg import TransformStamped
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hpccd_ros.frames import transform_buffer
+from hpccd_ros.frames import samples, transform_buffer
 from hpccd_ros.frames.drops import Input, Reason
 from hpccd_ros.frames.rate_limit import RateLimit
 from hpccd_ros.frames.transform_buffer import NoTransformError, TransformBuffer
@@ -102,11 +102,11 @@ def test_what_strangers_send_is_bounded(monkeypatch):
             buffer.add(parent, child, turn(0), None)
     with pytest.raises(ValueError, match="255 characters"):
         buffer.add("world", "x" * 256, turn(0), None)
-    for k in range(3 * transform_buffer.MOST_SAMPLES):
+    for k in range(3 * samples.MOST_SAMPLES):
         buffer.add("world", "hand", turn(0), 100 * SECOND + k)
     with pytest.raises(NoTransformError, match="the first one kept"):
-        buffer.lookup("hand", "world", 100 * SECOND + 2 * transform_buffer.MOST_SAMPLES - 1)
-    buffer.lookup("hand", "world", 100 * SECOND + 2 * transform_buffer.MOST_SAMPLES)
+        buffer.lookup("hand", "world", 100 * SECOND + 2 * samples.MOST_SAMPLES - 1)
+    buffer.lookup("hand", "world", 100 * SECOND + 2 * samples.MOST_SAMPLES)
 
 
 def test_the_account_of_what_was_heard_is_bounded_and_names_the_likeliest_first():
@@ -183,7 +183,7 @@ def test_a_run_shorter_than_a_second_is_told_from_what_is_late_by_its_order():
 
 def test_more_samples_behind_than_are_kept():
     buffer = TransformBuffer()
-    for stamp in range(transform_buffer.MOST_SAMPLES):
+    for stamp in range(samples.MOST_SAMPLES):
         buffer.add("world", "hand", BEFORE, SECOND + stamp * MS // 10)
     for stamp in range(20):
         buffer.add("world", "hand", NOW, SECOND - 10 * MS + stamp * MS // 10)

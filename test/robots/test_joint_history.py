@@ -5,7 +5,7 @@ import math
 
 import pytest
 
-from hpccd_ros.frames.transform_buffer import HISTORY_NS, MOST_SAMPLES
+from hpccd_ros.frames.samples import HISTORY_NS, MOST_SAMPLES
 from hpccd_ros.robots import urdf
 from hpccd_ros.robots.errors import RobotError
 from hpccd_ros.robots.joint_history import JointHistory, NoJointStateError
@@ -91,3 +91,41 @@ def test_a_source_that_begins_anew_at_an_earlier_time_is_followed():
     joints.add(5 * HISTORY_NS, ["slide", "turn"], [5.0, 0.0])
     joints.add(100, ["slide", "turn"], [1.0, 0.0])
     assert joints.latest() == 100 and joints.at(100)["slide"] == 1.0
+
+
+MS = 10**6
+
+
+def after_a_short_run(*now):
+    """Values 0 for half a second, then 1 at the milliseconds ``now``."""
+    joints = history()
+    for stamp in range(0, 500, 10):
+        joints.add(stamp * MS, ["slide", "turn"], [0.0, 0.0])
+    for stamp in now:
+        joints.add(stamp * MS, ["slide", "turn"], [1.0, 1.0])
+    return joints
+
+
+def of_now(joints, stamp):
+    """Whether what is found is of the run of now; None: nothing is found."""
+    try:
+        found = joints.at(stamp * MS)
+    except NoJointStateError:
+        return None
+    return found == {"slide": 1.0, "turn": 1.0}
+
+
+@pytest.mark.parametrize("now", [(), (5,), (5, 15), (5, 15, 25, 35, 45), tuple(range(5, 400, 10))])
+def test_where_a_mesh_begins_anew_nothing_from_before_is_used(now):
+    joints = after_a_short_run(*now)
+    joints.forget_future(10 * MS)
+    joints.forget_future(10 * MS)
+    found = [of_now(joints, stamp) for stamp in range(0, 500, 5)]
+    assert found == [True if now and now[0] <= stamp <= now[-1] else None for stamp in range(0, 500, 5)]
+
+
+def test_a_run_shorter_than_a_second_is_told_from_what_is_late_by_its_order():
+    late = after_a_short_run(100, 120, 90, 490, 200, 210, 220, 230, 500)
+    assert [of_now(late, stamp) for stamp in (0, 100, 105, 120, 300, 495)] == [False, True, False, True, False, True]
+    anew = after_a_short_run(5, 15, 25, 35, 45)
+    assert [of_now(anew, stamp) for stamp in (0, 10, 30, 45, 50, 300)] == [None, True, True, True, None, None]
