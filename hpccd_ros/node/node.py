@@ -124,7 +124,7 @@ class HpccdNode(GuardedLifecycleNode):
             self._stream = StreamDetection(self, self._configuration, self._builder, self._accounts)
 
     def _follow_robots(self) -> None:
-        """A description has come: the scene is another one."""
+        """The scene is that of the descriptions that have come."""
         try:
             self._make_scene()
         except ValueError as error:
@@ -157,6 +157,8 @@ class HpccdNode(GuardedLifecycleNode):
         self._jobs = self._service = self._action = None
 
     def _apply_change(self) -> None:
+        if self._scene_error:
+            self._follow_robots()  # a parameter may have been at fault
         if self._stream is not None:
             self._stream.apply_change()
         if self._service is not None:

@@ -92,6 +92,7 @@ class RobotDescriptions:
     def _receive(self, name: str, text: str) -> None:
         if text == self._texts.get(name):
             self._waiting.pop(name, None)
+            self._refused.pop(name, None)
             return
         self._waiting[name] = text
         if time.monotonic() - self._changed >= PERIOD:

@@ -337,3 +337,30 @@ def test_frames_that_came_before_the_description_are_answered(start_node):
     for k, answer in enumerate(node.contacts(2), 2):
         assert_answer(answer, k)
     node.frames_status(answered=12, waiting=0, dropped=0)
+
+
+def test_a_pair_that_names_no_link_is_mended_by_its_parameter(start_node):
+    node = start_node({**parameters(**JOINTS), "pair_separation": ["crane/hoek:cloth:0.02"]})
+    describe(node)
+    node.wait_until(
+        lambda: "'crane' has no link of this name" in node.peer.statuses["frames"][1], "what is wrong with the pair"
+    )
+    assert set_parameter(node, "pair_separation", ["crane/hook:cloth:0.02"]).successful
+    node.wait_until(lambda: "no link of this name" not in node.peer.statuses["frames"][1], "the scene")
+    node.peer.topology("cloth", SHEET.faces, SHEET.n_vertices)
+    joints = node.peer.publisher(JointState, "joint_states")
+    for k in (1, 2):
+        joints.publish(crane.joint_state(k, k))
+        cloth(node, k)
+        node.frames_status(answered=4 * k)
+    assert node.contacts(1)[0].separations.tolist() == [0.02]
+
+
+def test_the_description_in_use_that_comes_again_ends_the_complaint_about_another(start_node):
+    node = start_node(parameters(**JOINTS))
+    publisher = describe(node)
+    node.wait_until(lambda: "robot crane" not in node.peer.statuses["frames"][1], "the description")
+    publisher.publish(String(data="<robot"))
+    node.wait_until(lambda: "stays in use" in node.peer.statuses["frames"][1], "what is wrong with the second")
+    publisher.publish(String(data=crane.URDF))
+    node.wait_until(lambda: "stays in use" not in node.peer.statuses["frames"][1], "the first one again")
