@@ -4,9 +4,24 @@
 from collections.abc import Iterable
 from typing import Any
 
+from sensor_msgs.msg import JointState
+
 from hpccd_ros.frames.drops import Input, Reason, Refusal
 from hpccd_ros.middleware import fields
 from hpccd_ros.robots.joint_frames import JointFrames
+
+# Bound what is kept of a message that anybody may send.
+MOST_JOINTS = 1000
+MOST_CHARACTERS = 100_000  # of their names
+
+
+def kept(message: JointState) -> JointState | None:
+    """What `fill` needs of it, for later; None: it is too large, or names and positions are not of one length."""
+    if not len(message.name) == len(message.position) <= MOST_JOINTS or sum(map(len, message.name)) > MOST_CHARACTERS:
+        return None
+    small = JointState(name=message.name, position=message.position)
+    small.header.stamp = message.header.stamp
+    return small
 
 
 def fill(robots: Iterable[JointFrames], message: Any, topic: str) -> list[Refusal]:

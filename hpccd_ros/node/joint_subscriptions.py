@@ -21,9 +21,8 @@ from hpccd_ros.params import robot_parameters
 from hpccd_ros.params.table import ROBOT
 from hpccd_ros.robots.joint_frames import JointFrames
 
-# Bound what strangers can make the node keep: messages of a topic, and joints of one.
+# Bounds what strangers can make the node keep: messages of a topic.
 MOST_RECENT = 100
-LARGEST_KEPT = 1000
 
 
 class JointSubscriptions:
@@ -73,8 +72,8 @@ class JointSubscriptions:
                     topic, f"more than max_rate = {self._settings['max_rate']:g} messages a second; some are dropped"
                 )
                 return
-            if len(message.name) <= LARGEST_KEPT:
-                self._recent[topic].append(message)
+            if (kept := joint_messages.kept(message)) is not None:
+                self._recent[topic].append(kept)
             moved = [self._of_robots[robot] for robot in robots if robot in self._of_robots]
             for refusal in joint_messages.fill(moved, message, topic):
                 self._warn(topic, refusal.text)
