@@ -160,14 +160,34 @@ def _agreed(said: Iterable[_Said]) -> list[_Said]:
 
 
 def _spread(agreed: Sequence[_Said], settings: dict[str, Any], links: Links) -> list[_Said]:
-    """With the links of robots in place of their names. Raises ParameterError: a robot has no such link."""
+    """With the links of robots in place of their names. Raises ParameterError: a robot has no such link, or two
+    that differ, each of a robot and a link, meet in a pair of which nothing else is said."""
+
+    def robots(one: _Said) -> int:
+        return sum(name in settings["robots"] for name in one.names)
+
     found: dict[frozenset[str], _Said] = {}
+    said_by: dict[frozenset[str], _Said] = {}
+    clashes: dict[frozenset[str], tuple[_Said, _Said]] = {}
     # What names robots first: what names one link or both then takes its place.
-    for one in sorted(agreed, key=lambda one: -sum(name in settings["robots"] for name in one.names)):
+    for one in sorted(agreed, key=lambda one: -robots(one)):
         within_robot = one.names[0] == one.names[1] and one.names[0] in settings["robots"]
         for a, b in product(*(_meshes(name, one, settings, links) for name in one.names)):
-            if not within_robot or a < b:
-                found[frozenset((a, b))] = replace(one, names=(a, b))
+            if within_robot and not a < b:
+                continue
+            pair = frozenset((a, b))
+            before = said_by.get(pair)
+            if before is not None and robots(before) == robots(one) and before.value != one.value:
+                clashes.setdefault(pair, (before, one))
+            elif before is not None and robots(before) > robots(one):
+                clashes.pop(pair, None)
+            said_by[pair] = one
+            found[pair] = replace(one, names=(a, b))
+    for pair, (first, one) in clashes.items():
+        raise ParameterError(
+            f"{one.parameter}: {quoted(one.text)} contradicts {quoted(first.text)} ({first.parameter}) for "
+            f"{' and '.join(sorted(pair))}; say of these two links what holds"
+        )
     return list(found.values())
 
 

@@ -5,7 +5,7 @@ import pytest
 
 from hpccd_core.options import FEATURES
 from hpccd_ros.detect.separation import Separation
-from hpccd_ros.params import scene_parameters, values
+from hpccd_ros.params import pair_parameters, scene_parameters, values
 from hpccd_ros.params.values import ParameterError
 
 
@@ -117,3 +117,25 @@ def test_bad_values_are_named(given, lists, text):
     with pytest.raises(ParameterError) as caught:
         checked(given, **lists)
     assert text in str(caught.value)
+
+
+LINKS = {"arm": ("arm/a", "arm/hand"), "left": ("left/a", "left/hand")}
+
+
+def separations(*entries):
+    settings, _ = values.checked({"meshes": ["cloth"], "robots": ["arm", "left"], "pair_separation": list(entries)})
+    found = pair_parameters.separation(settings, LINKS)
+    return {frozenset(names): distance for *names, distance in found.pairs}
+
+
+@pytest.mark.parametrize(
+    "entries", [("arm:left/hand:0.1", "arm/hand:left:0.2"), ("arm:arm/hand:0.1", "arm/a:arm:0.2")]
+)
+def test_what_is_said_of_two_links_by_their_robots_may_not_differ(entries):
+    for order in (entries, entries[::-1]):
+        with pytest.raises(ParameterError, match="contradicts 'ar.*say of these two links what holds"):
+            separations(*order)
+    pair = ("arm/hand", "left/hand") if "left" in entries[0] else ("arm/a", "arm/hand")
+    assert separations(f"{':'.join(pair)}:0.3", *entries)[frozenset(pair)] == 0.3
+    same = [entry.rpartition(":")[0] + ":0.1" for entry in entries]
+    assert separations(*same)[frozenset(pair)] == 0.1
