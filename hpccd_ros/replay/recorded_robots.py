@@ -3,7 +3,7 @@
 name."""
 
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path, PurePosixPath
 from typing import Any
 
@@ -24,31 +24,44 @@ def of_recording(recording: Recording, robots: RobotValues, topics: Mapping[str,
     found = {}
     for name, values in robots.items():
         try:
-            text = _description(recording, name, values, topics)
-            semantics = _semantics(recording, name, values)
-            with tempfile.TemporaryDirectory() as folder:
-                find = _resolver(recording, name, values, text, Path(folder))
-                found[name] = robot_files.robot_of(name, values, text, semantics, find)
+            found[name] = _robot(recording, name, values, _descriptions(recording, name, values, topics))
         except (RobotError, MeshFileError) as error:
             raise RecordingError(f"{recording.path}: robot {name}: {error}") from error
     return found
 
 
-def _description(recording, name: str, values: Mapping[str, Any], topics: Mapping[str, str]) -> str:
+def _robot(recording, name: str, values: Mapping[str, Any], texts: Sequence[str]) -> Robot:
+    """Of the only text that can be used: the node refused the others and kept to it."""
+    semantics = _semantics(recording, name, values)
+    robots: list[Robot] = []
+    refused: RobotError | MeshFileError | None = None
+    for text in texts:
+        try:
+            with tempfile.TemporaryDirectory() as folder:
+                find = _resolver(recording, name, values, text, Path(folder))
+                robots.append(robot_files.robot_of(name, values, text, semantics, find))
+        except (RobotError, MeshFileError) as error:
+            refused = error
+    if len(robots) > 1:
+        raise RobotError(
+            f"its description on {values['description']} changed while it was recorded; only the parts before and "
+            "after can be computed again: cut the recording in two"
+        )
+    if refused is not None and not robots:
+        raise refused
+    return robots[0]
+
+
+def _descriptions(recording, name: str, values: Mapping[str, Any], topics: Mapping[str, str]) -> list[str]:
+    """At least one, each once."""
     description = values["description"]
     if not robot_parameters.comes_on_topic(description):
-        return _text(recording, attachments.description_name(name), description)
+        return [_text(recording, attachments.description_name(name), description)]
     topic = topics.get(description)
     if topic is None or not recording.topics[topic].count:
         raise RobotError(f"its description came on {description}, of which the recording has no message")
     decode = make_decoder(recording.topics[topic])
-    texts = dict.fromkeys(decode(message).data for message in recording.messages([topic]))
-    if len(texts) > 1:
-        raise RobotError(
-            f"its description on {description} changed while it was recorded; only the parts before and after can be "
-            "computed again: cut the recording in two"
-        )
-    return next(iter(texts))
+    return list(dict.fromkeys(decode(message).data for message in recording.messages([topic])))
 
 
 def _semantics(recording, name: str, values: Mapping[str, Any]) -> str | None:

@@ -364,3 +364,22 @@ def test_the_description_in_use_that_comes_again_ends_the_complaint_about_anothe
     node.wait_until(lambda: "stays in use" in node.peer.statuses["frames"][1], "what is wrong with the second")
     publisher.publish(String(data=crane.URDF))
     node.wait_until(lambda: "stays in use" not in node.peer.statuses["frames"][1], "the first one again")
+
+
+def test_a_recording_with_a_description_that_was_refused_is_verified(start_node, tmp_path):
+    path = tmp_path / "run.mcap"
+    node = start_node({**parameters(**JOINTS), "record": str(path), "frame_queue": 5})
+    node.peer.topology("cloth", SHEET.faces, SHEET.n_vertices)
+    joints = node.peer.publisher(JointState, "joint_states")
+    for k in (1, 2, 3):
+        joints.publish(crane.joint_state(k, k))
+        cloth(node, k)
+    publisher = describe(node, "<robot")
+    node.wait_until(lambda: "robot crane: URDF" in node.peer.statuses["frames"][1], "what is wrong")
+    publisher.publish(String(data=crane.URDF))
+    node.contacts(2)
+    assert node.stop() == 0
+    with Recording(path) as recording:
+        replay = Replay(recording, recorded_setup.of_recording(recording))
+        steps = list(replay.steps())
+    assert replay.diverged == replay.unverified == 0 and replay.verified == len(steps) == 2
