@@ -8,6 +8,7 @@ from sensor_msgs.msg import JointState
 
 from hpccd_ros.frames.drops import Input, Reason, Refusal
 from hpccd_ros.middleware import fields
+from hpccd_ros.robots.errors import RobotError
 from hpccd_ros.robots.joint_frames import JointFrames
 
 # Bound what is kept of a message that anybody may send.
@@ -25,11 +26,20 @@ def kept(message: JointState) -> JointState | None:
 
 
 def fill(robots: Iterable[JointFrames], message: Any, topic: str) -> list[Refusal]:
-    """Give a sensor_msgs/JointState of ``topic`` to the robots that it moves; one that cannot be used is refused."""
+    """Give a sensor_msgs/JointState of ``topic`` to the robots that it moves. It is refused where one of them cannot
+    use it; the others have it all the same."""
+    problems: list[RobotError] = []
     try:
         stamp = fields.stamp_to_ns(message.header.stamp)
-        for robot in robots:
+    except ValueError as error:
+        return [_refusal(topic, error)]
+    for robot in robots:
+        try:
             robot.add(stamp, message.name, message.position)
-    except ValueError as error:  # RobotError is one
-        return [Refusal(topic, Reason.MALFORMED, str(error), what=Input.JOINT_STATE)]
-    return []
+        except RobotError as error:
+            problems.append(error)
+    return [_refusal(topic, error) for error in problems[:1]]
+
+
+def _refusal(topic: str, error: ValueError) -> Refusal:
+    return Refusal(topic, Reason.MALFORMED, str(error), what=Input.JOINT_STATE)

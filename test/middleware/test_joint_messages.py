@@ -10,8 +10,8 @@ from hpccd_ros.rigid.transform import IDENTITY
 from hpccd_ros.robots.joint_frames import JointFrames
 
 
-def frames():
-    return JointFrames(crane.robot(), IDENTITY, "mast", "world", 10)
+def frames(turn="turn"):
+    return JointFrames(crane.robot(crane.URDF.replace('"turn"', f'"{turn}"')), IDENTITY, "mast", "world", 10)
 
 
 def test_what_is_kept_fills_a_robot_as_the_message_does():
@@ -30,3 +30,14 @@ def test_what_is_too_large_or_of_no_use_is_not_kept(names, positions):
     message = JointState(name=[f"j{k}" for k in range(names)], position=[0.0] * positions)
     assert joint_messages.kept(message) is None
     assert joint_messages.kept(JointState(name=["j" * 1_000_000], position=[0.0])) is None
+
+
+@pytest.mark.parametrize("first", [True, False])
+def test_what_one_robot_cannot_use_moves_the_others(first):
+    sound, broken = frames(), frames("spin")
+    message = JointState(name=["turn", "reach", "spin"], position=[0.0, 0.0, float("nan")])
+    (refusal,) = joint_messages.fill([sound, broken] if first else [broken, sound], message, "joint_states")
+    assert "'spin' is at nan" in refusal.text
+    assert sound.latest(None) == [0]
+    with pytest.raises(LookupError, match="no joint state has told of spin, reach"):
+        broken.latest(None)
