@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The files that a recording carries along: without them a replay elsewhere could not rebuild its scene."""
 
-from collections.abc import Iterable, Mapping
+import itertools
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,9 @@ from hpccd_ros.frames.mesh_file import MeshFileError, existing
 from hpccd_ros.middleware import robot_files
 from hpccd_ros.params import robot_parameters
 from hpccd_ros.robots.errors import RobotError
+
+# Of a description: far more than robots have.
+MOST_FILES = 1000
 
 Files = list[tuple[str, bytes]]
 
@@ -60,10 +64,13 @@ def link_meshes(robot: str, values: Mapping[str, Any], text: str) -> tuple[Files
     path = values["description"]
     try:
         find = robot_files.resolver(None if robot_parameters.comes_on_topic(path) else path)
-        uris: Iterable[str] = list(robot_files.mesh_uris(text, values["geometry"]))
+        uris = list(itertools.islice(robot_files.mesh_uris(text, values["geometry"]), MOST_FILES + 1))
     except (RobotError, MeshFileError):
         return [], []  # the node has no such robot either, and says why
     for number, uri in enumerate(uris):
+        if number == MOST_FILES:
+            missing.append(f"robot {robot} names more than {MOST_FILES} mesh files: only these are in the recording")
+            break
         try:
             file = str(existing(find(uri)))  # of a stranger's description: nothing but meshes, and no devices
         except (MeshFileError, UserError) as error:

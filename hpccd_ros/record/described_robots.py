@@ -11,10 +11,13 @@ from hpccd_ros.middleware import qos
 from hpccd_ros.params import robot_parameters
 from hpccd_ros.record import attachments
 
+# Anybody may publish descriptions: bound what they can make a recorder read and keep, of one robot.
+MOST_READ = 100
+
 
 class DescribedRobots:
-    """Attaches to ``bag`` what the descriptions that `node` hears name. parameters: of the recorded node. resolve:
-    relative -> absolute topic name. warn: takes what could not be read."""
+    """Attaches to ``bag`` what descriptions name that `node` hears, of each robot the first MOST_READ. parameters: of
+    the recorded node. resolve: relative -> absolute topic name. warn: takes what could not be read."""
 
     def __init__(
         self,
@@ -26,14 +29,19 @@ class DescribedRobots:
     ) -> None:
         self._bag = bag
         self._warn = warn
-        self._told: set[str] = set()
+        self._told: set[str] = set()  # bounded, as what is read is
         for robot, values in robot_parameters.of(parameters).items():
             if robot_parameters.comes_on_topic(values["description"]):
                 topic = resolve(values["description"])
                 node.create_subscription(String, topic, self._receiver(robot, values), qos.DESCRIPTION)
 
     def _receiver(self, robot: str, values: dict) -> Callable[[String], None]:
+        read: set[int] = set()
+
         def receive(message: String) -> None:
+            if len(read) >= MOST_READ or (text := hash(message.data)) in read:
+                return
+            read.add(text)
             found, missing = attachments.link_meshes(robot, values, message.data)
             for name, data in found:
                 self._bag.attach(name, data)

@@ -81,6 +81,17 @@ def cloth(node, k):
     node.peer.vertices("cloth", sheet_positions(N, k), stamp=k, frame_id="world")
 
 
+def first_step(node):
+    """Frames 1 and 2; the publisher of joint states."""
+    node.peer.topology("cloth", SHEET.faces, SHEET.n_vertices)
+    joints = node.peer.publisher(JointState, "joint_states")
+    for k in (1, 2):
+        joints.publish(crane.joint_state(k, k))
+        cloth(node, k)
+        node.frames_status(answered=4 * k)
+    return joints
+
+
 def describe(node, text=crane.URDF):
     publisher = node.peer.publisher(String, "robot_description", qos.DESCRIPTION)
     publisher.publish(String(data=text))
@@ -239,12 +250,7 @@ def test_another_description_makes_another_scene(start_node):
     assert node.peer.statuses["stop"][2]["stop"] == "True"
     publisher.publish(String(data=crane.URDF))
     node.wait_until(lambda: "robot crane" not in node.peer.statuses["frames"][1], "the second description")
-    node.peer.topology("cloth", SHEET.faces, SHEET.n_vertices)
-    joints = node.peer.publisher(JointState, "joint_states")
-    for k in (1, 2):
-        joints.publish(crane.joint_state(k, k))
-        cloth(node, k)
-        node.frames_status(answered=4 * k)
+    joints = first_step(node)
     assert_answer(node.contacts(1)[-1], 2)
     longer = crane.URDF.replace('"0.6 0.06 0.04"', '"0.9 0.06 0.04"')
     publisher.publish(String(data="<robot"))
@@ -301,12 +307,7 @@ def test_pairs_name_robots_and_links(start_node):
     refused = set_parameter(node, "pair_separation", ["crane/hoek:cloth:0.02"])
     assert not refused.successful and "'crane' has no link of this name" in refused.reason, refused.reason
     assert not set_parameter(node, "pair_separation", ["crane/:cloth:0.02"]).successful
-    node.peer.topology("cloth", SHEET.faces, SHEET.n_vertices)
-    joints = node.peer.publisher(JointState, "joint_states")
-    for k in (1, 2):
-        joints.publish(crane.joint_state(k, k))
-        cloth(node, k)
-        node.frames_status(answered=4 * k)
+    first_step(node)
     answer = node.contacts(1)[-1]
     names = list(answer.mesh_names)
     told = {
@@ -347,12 +348,7 @@ def test_a_pair_that_names_no_link_is_mended_by_its_parameter(start_node):
     )
     assert set_parameter(node, "pair_separation", ["crane/hook:cloth:0.02"]).successful
     node.wait_until(lambda: "no link of this name" not in node.peer.statuses["frames"][1], "the scene")
-    node.peer.topology("cloth", SHEET.faces, SHEET.n_vertices)
-    joints = node.peer.publisher(JointState, "joint_states")
-    for k in (1, 2):
-        joints.publish(crane.joint_state(k, k))
-        cloth(node, k)
-        node.frames_status(answered=4 * k)
+    first_step(node)
     assert node.contacts(1)[0].separations.tolist() == [0.02]
 
 

@@ -42,3 +42,15 @@ def test_a_home_folder_that_there_is_not_ends_nothing():
     parameters = {"meshes": ["cloth"], "mesh.cloth.file": "~nobody-is-called-so/cloth.stl"}
     found, missing = attachments.files(parameters)
     assert found == [] and "is not in the recording" in missing[0]
+
+
+def test_how_many_files_a_description_names_is_bounded(tmp_path):
+    file = tmp_path / "a.stl"
+    file.write_bytes(b"any")
+    shapes = "".join(
+        f'<collision><geometry><mesh filename="{"/" * k}{file}"/></geometry></collision>'
+        for k in range(attachments.MOST_FILES + 5)
+    )
+    found, missing = attachments.link_meshes("arm", VALUES, f'<robot name="r"><link name="a">{shapes}</link></robot>')
+    assert len(found) == attachments.MOST_FILES
+    assert missing == ["robot arm names more than 1000 mesh files: only these are in the recording"]
