@@ -58,9 +58,9 @@ def stream(result: Kept) -> list[str]:
     lines = [
         [row["frames"], f"{row['rate_hz']:g}", row["answers"], row["dropped"], f"{row['answers_hz']:.1f}",
          *(f"{text(row[f'{part}_median_ms'])} / {text(row[f'{part}_p95_ms'])}"
-           for part in ("whole", "detection", "core", "added"))]
+           for part in ("whole", "detection", "core", "around", "added"))]
         for row in result.rows
     ]  # fmt: skip
     columns = ["frames", "a second", "answers", "dropped", "answers a second", "sent to answer, ms: median / p95",
-               "of it detection", "of it core", "all but the core"]  # fmt: skip
+               "of it detection", "of it core", "all but the detection", "all but the core"]  # fmt: skip
     return markdown.table(columns, lines)

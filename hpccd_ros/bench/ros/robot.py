@@ -31,7 +31,7 @@ SCENE = "arm-and-cloth"
 PATIENCE = 60.0  # s
 SETTLE = 1.0  # s, until the last answers have come
 PERCENTILES = (("median", 50), ("p95", 95), ("p99", 99))
-PARTS = ("whole", "detection", "core", "added")
+PARTS = ("whole", "detection", "core", "around", "added")
 
 
 def configure(parser):
@@ -64,7 +64,8 @@ def run(args) -> int:
         ["answers", "a second", "dropped", *columns],
         [[r["answers"], r["answers_hz"], r["dropped"], *(r[f"{p}_{k}_ms"] for p in PARTS for k, _ in PERCENTILES)]
          for r in report.rows],
-        caption="detection: with joints, bounds and cuts; core: its calls alone; added: whole less core",
+        caption="detection: with joints, bounds and cuts; core: its calls alone; around: whole less detection; added: "
+        "whole less core",
     )  # fmt: skip
     return command.end(args, report)
 
@@ -169,7 +170,7 @@ def _percentiles(sent: list[float], came: list[tuple[float, bytes]], times: dict
         raise UserError("the node answered nothing")
     whole = 1e3 * np.array([at - sent[message.step] for at, message in answers])
     detection, core = np.array([times[step][3:5] for step in steps]).T
-    of = {"whole": whole, "detection": detection, "core": core, "added": whole - core}
+    of = {"whole": whole, "detection": detection, "core": core, "around": whole - detection, "added": whole - core}
     return {
         "answers": len(steps),
         "answers_hz": (len(steps) - 1) / (came[-1][0] - came[0][0]),
