@@ -51,6 +51,7 @@ import numpy as np
 
 from hpccd_ros.rigid import rounding
 from hpccd_ros.rigid.body import Body
+from hpccd_ros.rigid.sums import dot, in_order
 from hpccd_ros.rigid.transform import IDENTITY, Rigid, rotated
 
 TURNING = ("revolute", "continuous")
@@ -77,7 +78,7 @@ class Joint:
         if kind not in KINDS:
             raise ValueError(f"kind: {kind!r} is not known; choose from {', '.join(KINDS)}")
         direction = np.array(axis, np.float64)
-        size = math.sqrt(sum((direction * direction).tolist())) if direction.shape == (3,) else 0.0
+        size = math.sqrt(dot(direction, direction)) if direction.shape == (3,) else 0.0
         if not (math.isfinite(size) and size > 1e-100):
             raise ValueError(f"axis {list(axis)}: needs three finite numbers that are not all 0")
         return cls(kind, parent, origin, direction / size)
@@ -176,7 +177,7 @@ class LinkMotion:
         return rounding.up(min(self._acceleration / (8.0 * parts * parts), 2.0 * self._span))
 
     def rounding(self, parts: int) -> float:
-        values = sum(abs(self.step.start[k]) + abs(self.step.speed[k]) for k in self._way)
+        values = in_order(abs(self.step.start[k]) + abs(self.step.speed[k]) for k in self._way)
         return rounding.at_chain(len(self._way), self._reach, float(values))
 
     @cached_property
@@ -199,7 +200,7 @@ class LinkMotion:
 
     def _beyond(self, joints: Sequence[int]) -> float:
         """The body, with all offsets and slides of these joints of its way."""
-        offsets = sum(self.step.joints[k].offset + self._slid(k) for k in joints)
+        offsets = in_order(self.step.joints[k].offset + self._slid(k) for k in joints)
         return self.body.radius + float(offsets)
 
     def _slid(self, k: int) -> float:
@@ -222,7 +223,10 @@ class LinkMotion:
         speed = [abs(float(self.step.speed[k])) for k in moving]
         if not any(turning):
             return 0.0
-        before = [sum(s for s, turns in zip(speed[:j], turning, strict=False) if turns) for j in range(len(moving))]
+        before, turned = [], 0.0
+        for s, turns in zip(speed, turning, strict=True):
+            before.append(turned)
+            turned += s if turns else 0.0
         reach = self._distances(moving, speed)
         second = third = 0.0
         for turns, d, s, g in zip(turning, speed, before, reach, strict=True):

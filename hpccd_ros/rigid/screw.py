@@ -47,6 +47,7 @@ import numpy as np
 
 from hpccd_ros.rigid import rounding
 from hpccd_ros.rigid.body import Body
+from hpccd_ros.rigid.sums import dot
 from hpccd_ros.rigid.transform import Rigid, product, rotated
 
 # Turns below it move no coordinate that a double can hold, and the square of their sine would underflow.
@@ -82,7 +83,7 @@ class Screw:
     def slide(self) -> float:
         """How far it goes along the axis; where nothing turns, how far it goes."""
         way = self.end.shift - self.start.shift
-        return _dot(way, self.axis) if self.half else math.sqrt(_dot(way, way))
+        return dot(way, self.axis) if self.half else math.sqrt(dot(way, way))
 
     @property
     def point(self) -> np.ndarray | None:
@@ -107,7 +108,7 @@ class Screw:
             return Rigid(self.start.quaternion, self.start.shift + t * way)
         h = self.half
         part = math.sin(h * t) / math.sin(h)
-        along = _dot(way, self.axis) * self.axis
+        along = dot(way, self.axis) * self.axis
         across, beside = way - along, _cross(self.axis, way)
         turned = (part * math.cos(h * (1.0 - t))) * across - (part * math.sin(h * (1.0 - t))) * beside
         turn = np.append(self.axis * math.sin(h * t), math.cos(h * t))
@@ -144,10 +145,6 @@ class Screw:
         w = self.axis
         along = w[0] * columns[0] + w[1] * columns[1] + w[2] * columns[2]
         return columns - w[:, None] * along
-
-
-def _dot(a: np.ndarray, b: np.ndarray) -> float:
-    return sum((a * b).tolist())
 
 
 def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:

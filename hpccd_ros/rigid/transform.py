@@ -13,6 +13,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from hpccd_ros.rigid.sums import dot
+
 # Quaternions come rounded, often to float32 or to a few digits: within this they are taken as of unit length.
 _LENGTH_TOLERANCE = 1e-3
 
@@ -52,7 +54,7 @@ class Rigid:
     def between(self, other: "Rigid", t: float) -> "Rigid":
         """At t in [0, 1] on the way to ``other``: shifts linearly, rotation at constant speed the shorter way."""
         a, b = self.quaternion, other.quaternion
-        cosine = sum((a * b).tolist())
+        cosine = dot(a, b)
         if cosine < 0.0:
             b, cosine = -b, -cosine
         angle = math.acos(min(cosine, 1.0))
@@ -96,7 +98,7 @@ def product(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float6
 
 
 def _length(quaternion: NDArray[np.float64]) -> float:
-    return math.sqrt(sum((quaternion * quaternion).tolist()))
+    return math.sqrt(dot(quaternion, quaternion))
 
 
 def rotated(rotation: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -22,6 +22,7 @@ from hpccd_ros.rigid import rounding
 from hpccd_ros.rigid.body import Body
 from hpccd_ros.rigid.joints import Joint, JointStep, LinkMotion
 from hpccd_ros.rigid.screw import Screw
+from hpccd_ros.rigid.sums import dot
 from hpccd_ros.rigid.transform import IDENTITY, Rigid
 from hpccd_ros.robots.errors import RobotError
 from hpccd_ros.robots.urdf import Description, RobotJoint
@@ -156,7 +157,7 @@ def _base_joints(start: Rigid, end: Rigid) -> tuple[tuple[Joint, Joint], tuple[f
     way = end.shift - start.shift
     far = rounding.length(way)
     if far > 1e-100:
-        slide, distance = Joint.of("prismatic", -1, origin, (way / far).tolist()), math.sqrt(sum((way * way).tolist()))
+        slide, distance = Joint.of("prismatic", -1, origin, (way / far).tolist()), math.sqrt(dot(way, way))
     else:
         slide, distance = Joint.of("fixed", -1, origin), 0.0
     screw = Screw.between(start, end)
