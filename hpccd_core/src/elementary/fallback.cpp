@@ -25,7 +25,9 @@ std::optional<double> tolerance_contact(const UndecidedPair& q) {
 
 template <Kind kind>
 std::optional<double> extended_or_exact(const UndecidedPair& q, FallbackCounts& counts) {
-  const extended_precision::Answer a = extended_precision::earliest_within<kind>(q.t0, q.t1, q.separation);
+  const extended_precision::Answer a =
+      q.apart_until > 0 ? extended_precision::earliest_within<kind>(q.t0, q.t1, q.separation, q.apart_until)
+                        : extended_precision::earliest_within<kind>(q.t0, q.t1, q.separation);
   if (a.none || a.contact) ++counts.extended;
   if (a.none) return std::nullopt;
   if (a.contact) return a.toc;

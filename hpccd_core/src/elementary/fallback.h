@@ -21,7 +21,8 @@ struct FallbackCounts {
 struct UndecidedPair {
   Kind kind;
   Vec3<double> t0[4], t1[4];
-  double separation;  // where the test has one
+  double separation;       // where the test has one
+  double apart_until = 0;  // farther apart than that up to here, by the test that left the pair undecided; 0: not known
 };
 
 // The time of contact, or the distance, or nothing.

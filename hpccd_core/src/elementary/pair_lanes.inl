@@ -55,7 +55,10 @@ HPCCD_HD void collect(const Outcome<R>& o, const PairList& list, const LaneNumbe
 }
 
 HPCCD_HD void report_undecided(const PairList& list, const Chosen& undecided, BatchResult& result) {
-  for (std::uint32_t i = 0; i < undecided.n; ++i) result.undecided[i] = list.at[undecided.of[i]];
+  for (std::uint32_t i = 0; i < undecided.n; ++i) {
+    result.undecided[i] = list.at[undecided.of[i]];
+    result.apart_until[i] = 0;
+  }
   result.n_undecided = undecided.n;
   result.counts.contacts += result.n_contacts;
   result.counts.undecided += result.n_undecided;

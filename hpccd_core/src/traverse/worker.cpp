@@ -117,10 +117,10 @@ void Worker::test(const std::uint32_t* first, const std::uint32_t* second, std::
   }
   if (search_->bounded()) search_->n_found += r.n_contacts + r.n_undecided;
   for (std::uint32_t i = 0; i < r.n_undecided; ++i)
-    resolve({first[r.undecided[i]], second[r.undecided[i]], kind}, rule);
+    resolve({first[r.undecided[i]], second[r.undecided[i]], kind}, rule, r.apart_until[i]);
 }
 
-void Worker::resolve(const Candidate& candidate, Rule rule) {
+void Worker::resolve(const Candidate& candidate, Rule rule, double apart_until) {
   heed_cancellation();
   const auto [a, b, kind] = candidate;
   FallbackCounts& count = fallbacks[static_cast<int>(kind)];
@@ -135,6 +135,7 @@ void Worker::resolve(const Candidate& candidate, Rule rule) {
     return;
   }
   UndecidedPair pair = undecided_pair(search_->geometry, candidate);
+  pair.apart_until = apart_until;
   if (const NearestPairs* nearest = search_->nearest.get()) {
     pair.separation = limit_of(*nearest, search_->geometry, kind, a, b);
     if (pair.separation < 0) return;

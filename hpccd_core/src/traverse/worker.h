@@ -50,8 +50,9 @@ class alignas(128) Worker {
   void test_pairs(std::span<const std::uint32_t> first, std::span<const std::uint32_t> second, Kind kind, Rule rule);
   const Search& search() const { return *search_; }
   void flush();  // tests what waits
-  // The tier's fallback on a pair that nothing else decides, and a contact found elsewhere.
-  void resolve(const Candidate& candidate, Rule rule);
+  // The tier's fallback on a pair that nothing else decides, and a contact found elsewhere. apart_until: as in
+  // UndecidedPair.
+  void resolve(const Candidate& candidate, Rule rule, double apart_until = 0);
   void report(Kind kind, const Contact& contact);
   // Ends the work where that is requested: between any two pairs of nodes, batches and fallbacks.
   void heed_cancellation() const { search_->cancellation->heed(); }

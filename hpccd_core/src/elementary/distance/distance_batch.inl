@@ -15,6 +15,8 @@ namespace hpccd::HPCCD_ISA {
 
 namespace {
 
+#include "elementary/distance/search_lanes.inl"
+
 // Of a pair, by its place in the batch and its vertices.
 HPCCD_HD double separation_at(const Geometry& g, std::uint32_t at, const std::uint32_t* v) {
   return g.separations.of_candidates ? g.separations.of_candidates[at] : g.separations.between(v[0], v[2]);
@@ -34,7 +36,7 @@ HPCCD_HD Double separations(const Geometry& g, OfLane&& of_lane) {
 template <Kind kind>
 void test_separation(const Geometry& g, const std::uint32_t* first, const std::uint32_t* second, std::uint32_t n,
                      BatchResult& result) {
-  result.n_contacts = 0;
+  result.n_contacts = result.n_undecided = 0;
   PairList list;
   list_pairs<kind>(ApartByMore{load16(g.margin.in)}, g, g.vertices, first, second, n, list);
   const auto separations_of = [&](const auto& of) {
@@ -43,31 +45,33 @@ void test_separation(const Geometry& g, const std::uint32_t* first, const std::u
 
   std::uint64_t none = 0;
   All all{list.n};
-  Chosen beside, open, undecided;
+  Chosen beside;
+  SearchLanes<kind, decltype(separations_of)> searches(g, list, separations_of, result);
   using Lanes = const Motion<Double>&;
   for_lanes<kind, Double>(g, list, all, [&](Lanes m, const LaneNumbers<All>& of) {
     append(beside, of, of.valid & ~bits(planes_stay_apart(m, separations_of(of))));
   });
   for_lanes<kind, Double>(g, list, beside, [&](Lanes m, const LaneNumbers<Chosen>& of) {
-    const Outcome<Double> o = separation_filter<kind>(m, separations_of(of));
+    const Double d = separations_of(of), s = extent(magnitudes(m));
+    const Look<kind, Double> start = look<kind>(m, s, Double(0.0));
+    const Outcome<Double> o = decided_by_ends(m, d, start, look<kind>(m, s, Double(1.0)));
     const unsigned within = bits(o.contact) & of.valid, apart = bits(o.none) & of.valid;
     for (unsigned lanes = within; lanes; lanes &= lanes - 1) {
       result.contact[result.n_contacts] = list.at[of[__builtin_ctz(lanes)]];
       result.toc[result.n_contacts] = result.delta[result.n_contacts] = 0;
       ++result.n_contacts;
     }
-    append(open, of, of.valid & ~within & ~apart);
     none += static_cast<unsigned>(__builtin_popcount(apart));
+    searches.begin(m, d, start, LaneNumbers<Chosen>{of.numbers, of.begin, of.valid & ~within & ~apart});
   });
-  for_lanes<kind, Double>(g, list, open, [&](Lanes m, const LaneNumbers<Chosen>& of) {
-    collect(separation_test<kind>(m, separations_of(of)), list, of, undecided, result);
-  });
+  searches.end();
 
   result.counts.tested += n;
   result.counts.kdop += n - list.n;
   result.counts.coplanarity += list.n - beside.n;
   result.counts.separated += none;
-  report_undecided(list, undecided, result);
+  result.counts.contacts += result.n_contacts;
+  result.counts.undecided += result.n_undecided;
 }
 
 template <Kind kind>
@@ -115,6 +119,7 @@ void test_proximity(const Geometry& g, const std::uint32_t* first, const std::ui
     none += static_cast<unsigned>(__builtin_popcount(far));
   };
   for_groups<FeaturesInSnapshot<kind>>(g, first, second, nullptr, n, test);
+  for (std::uint32_t i = 0; i < result.n_undecided; ++i) result.apart_until[i] = 0;
   result.counts.tested += n;
   result.counts.separated += none;
   result.counts.contacts += result.n_contacts;

@@ -24,16 +24,22 @@ HPCCD_HD Nearest<DoubleDouble> nearest(const Snapshot<DoubleDouble>& s) {
 
 namespace extended_precision {
 
+// apart_until: up to this time a test before has shown the features to be farther apart than d.
+template <Kind kind>
+HPCCD_HD Answer earliest_within(const Vec3<double> q_t0[4], const Vec3<double> q_t1[4], double d, double apart_until) {
+  const DoubleDouble start(apart_until);
+  const Outcome<DoubleDouble> o = separation_test<kind>(motion_of<kind>(q_t0, q_t1), DoubleDouble(d), start);
+  return {o.contact, o.none, rounded_towards_zero(o.toc)};
+}
+
+// Where that is not known, it is asked again.
 template <Kind kind>
 HPCCD_HD Answer earliest_within(const Vec3<double> q_t0[4], const Vec3<double> q_t1[4], double d) {
-  // Most of the step is known to be free from the test that came before; asked again, that costs as much as one look.
   const Motion<double> rounded = motion_by<kind, double>([&](int end, int to, int from) {
     const Vec3<double>* q = end ? q_t1 : q_t0;
     return q[to] - q[from];
   });
-  const DoubleDouble start(separation_test<kind>(rounded, d).toc);
-  const Outcome<DoubleDouble> o = separation_test<kind>(motion_of<kind>(q_t0, q_t1), DoubleDouble(d), start);
-  return {o.contact, o.none, rounded_towards_zero(o.toc)};
+  return earliest_within<kind>(q_t0, q_t1, d, separation_test<kind>(rounded, d).toc);
 }
 
 }  // namespace extended_precision

@@ -79,14 +79,19 @@ HPCCD_HD typename RealTraits<R>::Mask planes_stay_apart(const Motion<R>& m, R d)
   return in_range(size) && certainly_no_root(coplanarity(m), coplanarity_error(size).coefficient + slack);
 }
 
-// Both ends of the step: already within d, or kept apart by their directions.
+// What two looks at the ends of the step tell: already within d, or kept apart by their directions.
 template <Kind kind, class R>
-HPCCD_HD Outcome<R> separation_filter(const Motion<R>& m, R d) {
+HPCCD_HD Outcome<R> decided_by_ends(const Motion<R>& m, R d, const Look<kind, R>& start, const Look<kind, R>& end) {
   const R s = extent(magnitudes(m));
   const Margins<R> margin = margins(d, s);
   const auto usable = squares_in_range(s);
-  const Look<kind, R> start = look<kind>(m, s, R(0)), end = look<kind>(m, s, R(1));
   return {usable && is_within(start.square, margin), usable && free_between(start, end, margin.above), R(0), R(0)};
+}
+
+template <Kind kind, class R>
+HPCCD_HD Outcome<R> separation_filter(const Motion<R>& m, R d) {
+  const R s = extent(magnitudes(m));
+  return decided_by_ends(m, d, look<kind>(m, s, R(0)), look<kind>(m, s, R(1)));
 }
 
 // When the gap would be `aim` long if it went on to change as it does; the end of the step where it does not shrink.
@@ -95,51 +100,106 @@ HPCCD_HD R newton(const Look<kind, R>& at, R aim) {
   return select(at.slope < R(0), at.t + (at.length - aim) / (R(0) - at.slope), R(1));
 }
 
+// What the search for the earliest time has come to, beside what the pair itself says: it can be left after any step
+// and taken up again.
+template <class R>
+struct SearchState {
+  R from;                  // certainly farther apart than d up to here
+  R high, length_at_high;  // certainly within d here, once that is found
+  R reach;                 // so far ahead trials have succeeded lately
+  R guess;                 // by the last look that told anything, on whichever side of the answer
+  R slow;                  // trials in a row that were too late and not much earlier than the one before
+  R trial;                 // the next one
+};
+
+// A near miss by a relative 1e-15 takes 25 steps to pass.
+inline constexpr int most_search_steps = 60;
+
+// For the time up to which the features of a motion are certainly farther apart than d.
+template <Kind kind, class R>
+class SeparationSearch {
+ public:
+  using Mask = typename RealTraits<R>::Mask;
+
+  // From a look on before which they are.
+  HPCCD_HD SeparationSearch(const Motion<R>& m, R d, const Look<kind, R>& start) : SeparationSearch(m, d) {
+    from_ = start;
+    const Mask usable = squares_in_range(s_);
+    contact_ = usable && is_within(start.square, margin_);
+    running_ = usable && !contact_;
+    state_.high = R(2), state_.length_at_high = R(0), state_.reach = R(1), state_.slow = R(0);
+    state_.guess = newton(start, aim_);
+    state_.trial = lesser(greater(state_.guess, start.t + R(0.5) * radius()), R(1));
+  }
+  // Goes on from a state in which it was running.
+  HPCCD_HD SeparationSearch(const Motion<R>& m, R d, const SearchState<R>& left) : SeparationSearch(m, d) {
+    state_ = left;
+    from_ = look<kind>(m, s_, left.from);
+    contact_ = R(1) < R(0);
+    running_ = R(0) < R(1);
+  }
+
+  HPCCD_HD Mask running() const { return running_; }
+  HPCCD_HD SearchState<R> state() const {
+    SearchState<R> left = state_;
+    left.from = from_.t;
+    return left;
+  }
+  // Undecided while it runs, and where it ended without an answer; toc is then the latest time known to be free.
+  HPCCD_HD Outcome<R> outcome() const { return {contact_, none_, from_.t, R(0)}; }
+
+  HPCCD_HD void step(const Motion<R>& m) {
+    const Look<kind, R> to = look<kind>(m, s_, state_.trial);
+    const Mask within = running_ && is_within(to.square, margin_);
+    const Mask free = running_ && !within && free_between(from_, to, margin_.above);
+    const Mask blocked = !within && !free;
+    const R ahead = state_.trial - from_.t, room_before = state_.high - from_.t;
+    state_.reach = select(blocked, R(0.5) * ahead, R(3) * ahead);
+    from_ = select(free, to, from_);
+    state_.high = select(within, state_.trial, state_.high);
+    state_.length_at_high = select(within, to.length, state_.length_at_high);
+    state_.guess = select(blocked, state_.guess, newton(to, aim_));
+    none_ = none_ || (free && state_.trial >= R(1));
+    contact_ = contact_ || (running_ && state_.high - from_.t <= radius());
+    // The limits are farther apart than what happens in that time.
+    const Mask hidden = free && from_.length < aim_ + margin_.above - margin_.below &&
+                        (R(0) - from_.slope) * radius() < margin_.above - margin_.below;
+    running_ = running_ && !none_ && !contact_ && !hidden && !(blocked && ahead <= R(0.25) * radius());
+
+    const R room = state_.high - from_.t;
+    state_.slow = select(within && room > R(0.5) * room_before, state_.slow + R(1), R(0));
+    R next = state_.guess - from_.t;
+    const Mask inside = next > R(0) && next < room;
+    if (any(running_ && !inside)) {
+      const R secant = room * ((from_.length - aim_) / (from_.length - state_.length_at_high));
+      next = select(inside, next, secant);
+    }
+    next = select(state_.slow < R(5), next, R(0.5) * room);
+    next = lesser(greater(next, R(0.5) * radius()), state_.reach);
+    state_.trial = lesser(from_.t + next, R(1));
+  }
+
+ private:
+  HPCCD_HD SeparationSearch(const Motion<R>& m, R d)
+      : s_(extent(magnitudes(m))), margin_(margins(d, s_)), none_(R(1) < R(0)) {
+    // Between these two distances rounding hides the answer; trials aim as far before it.
+    aim_ = margin_.above + (margin_.above - margin_.below);
+  }
+  HPCCD_HD static R radius() { return R(separation_toc_radius); }
+
+  R s_, aim_;
+  Margins<R> margin_;
+  Look<kind, R> from_;
+  Mask contact_, running_, none_;
+  SearchState<R> state_;  // but for `from`, which is that of from_
+};
+
 // From a time on up to which the features are certainly farther apart than d. Undecided, toc is the latest such time.
 template <Kind kind, class R>
 HPCCD_HD Outcome<R> separation_test(const Motion<R>& m, R d, R start = R(0)) {
-  using Mask = typename RealTraits<R>::Mask;
-  const R s = extent(magnitudes(m)), radius(separation_toc_radius);
-  const Margins<R> margin = margins(d, s);
-  // Between these two distances rounding hides the answer; trials aim as far before it.
-  const R aim = margin.above + (margin.above - margin.below);
-  Look<kind, R> from = look<kind>(m, s, start);  // certainly farther apart than d up to here
-  Mask contact = squares_in_range(s) && is_within(from.square, margin);
-  Mask running = squares_in_range(s) && !contact, none = R(1) < R(0);
-  R high(2), length_at_high(0);  // certainly within d here, once that is found
-  R reach(1);                    // so far ahead trials have succeeded lately
-  R guess = newton(from, aim);   // by the last look that told anything, on whichever side of the answer
-  R slow(0);                     // trials in a row that were too late and not much earlier than the one before
-  R trial = lesser(greater(guess, start + R(0.5) * radius), R(1));
-  // A near miss by a relative 1e-15 takes 25 steps to pass.
-  constexpr int most_steps = 60;
-  for (int i = 0; i < most_steps && any(running); ++i) {
-    const Look<kind, R> to = look<kind>(m, s, trial);
-    const Mask within = running && is_within(to.square, margin);
-    const Mask free = running && !within && free_between(from, to, margin.above);
-    const Mask blocked = !within && !free;
-    const R ahead = trial - from.t, room_before = high - from.t;
-    reach = select(blocked, R(0.5) * ahead, R(3) * ahead);
-    from = select(free, to, from);
-    high = select(within, trial, high);
-    length_at_high = select(within, to.length, length_at_high);
-    guess = select(blocked, guess, newton(to, aim));
-    none = none || (free && trial >= R(1));
-    contact = contact || (running && high - from.t <= radius);
-    // The limits are farther apart than what happens in that time.
-    const Mask hidden = free && from.length < aim + margin.above - margin.below &&
-                        (R(0) - from.slope) * radius < margin.above - margin.below;
-    running = running && !none && !contact && !hidden && !(blocked && ahead <= R(0.25) * radius);
-
-    const R room = high - from.t, secant = room * ((from.length - aim) / (from.length - length_at_high));
-    slow = select(within && room > R(0.5) * room_before, slow + R(1), R(0));
-    R step = guess - from.t;
-    step = select(step > R(0) && step < room, step, secant);
-    step = select(slow < R(5), step, R(0.5) * room);
-    step = lesser(greater(step, R(0.5) * radius), reach);
-    trial = lesser(from.t + step, R(1));
-  }
-  return {contact, none, from.t, R(0)};
+  SeparationSearch<kind, R> search(m, d, look<kind>(m, extent(magnitudes(m)), start));
+  for (int i = 0; i < most_search_steps && any(search.running()); ++i) search.step(m);
+  return search.outcome();
 }
 
 }  // namespace hpccd
