@@ -82,6 +82,19 @@ def length(name: str, value: object) -> float:
     return number
 
 
+def lengths_of_pairs(name: str, value: object, n: int) -> NDArray[np.float64]:
+    """(n, n) numbers -> float64, C-contiguous; the core sees whether they are lengths, and symmetric."""
+    try:
+        numbers = np.asarray(value)
+    except ValueError as error:
+        raise ValueError(f"{name}: expected ({n}, {n}) numbers: {error}") from None
+    if numbers.dtype.kind not in "fiu":
+        raise TypeError(f"{name}: expected ({n}, {n}) numbers, got dtype {numbers.dtype}")
+    if numbers.shape != (n, n):
+        raise ValueError(f"{name}: expected shape ({n}, {n}), a row for each mesh of the scene, got {numbers.shape}")
+    return np.ascontiguousarray(numbers, np.float64)
+
+
 def faces(value: object) -> NDArray[np.uint32]:
     """(F, 3) integers -> (F, 3) uint32, C-contiguous."""
     return _indices("faces", value, "F", 3)

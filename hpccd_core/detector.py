@@ -291,6 +291,11 @@ class Detector(MotionQueries[OfMotion, OfStep], SnapshotQueries[OfNear, OfPierce
         a, b = (arguments.mesh_number(n, m, self._mesh_names) for n, m in (("mesh_a", mesh_a), ("mesh_b", mesh_b)))
         self._core.set_separation(a, b, arguments.length("separation", separation))
 
+    def set_separations(self, of_pairs: ArrayLike) -> None:
+        """set_separation() of all pairs at once: (K, K) numbers of K meshes in the order of the scene, symmetric; the
+        diagonal is within each."""
+        self._core.set_separations(arguments.lengths_of_pairs("of_pairs", of_pairs, len(self._mesh_names)))
+
     def cancel(self) -> None:
         """End the use of this detector, from any thread and without waiting: a call under way, those that wait for it,
         and all later ones raise hpccd_core.Cancelled (a RuntimeError), within 10 ms. What has been handed to a GPU

@@ -7,6 +7,7 @@
 #include "base/machine_rate.h"
 #include "base/simd.h"
 #include "bindings_device.h"
+#include "contacts/parts.h"
 #include "gpu/device.h"
 #include "gpu/memory_on_device.h"
 #include "hpccd/hpccd.h"
@@ -88,6 +89,21 @@ py::dict to_dict(Intersections&& c) {
   d["hash"] = c.hash;
   add_slices(d, std::move(c.slices));
   return d;
+}
+
+// Of a hpccd_core.Contacts; `kept` holds its arrays.
+ContactsOfPart part_of(const py::handle& contacts, double part, double parts, std::vector<py::array>& kept) {
+  const auto read = [&]<class Row>(const char* name, std::span<const Row>& rows, auto number) {
+    const auto array = py::cast<Array<decltype(number)>>(contacts.attr(name));
+    rows = {reinterpret_cast<const Row*>(array.data()), static_cast<std::size_t>(array.nbytes()) / sizeof(Row)};
+    kept.push_back(array);
+  };
+  ContactsOfPart of;
+  read("vf", of.vf, std::uint32_t{}), read("vf_toc", of.vf_toc, double{});
+  read("ee", of.ee, std::uint32_t{}), read("ee_toc", of.ee_toc, double{});
+  read("points", of.points, double{}), read("normals", of.normals, double{}), read("closest", of.closest, double{});
+  of.part = part, of.parts = parts;
+  return of;
 }
 
 const char* name_of(GapKind kind) {
@@ -325,6 +341,13 @@ PYBIND11_MODULE(_core, m) {
           "vertices"_a)
       .def("set_separation", &Detector::set_separation, "mesh_a"_a, "mesh_b"_a, "separation"_a,
            py::call_guard<py::gil_scoped_release>())  // may wait for a call under way
+      .def(
+          "set_separations",
+          [](Detector& d, const Array<double>& of_pairs) {
+            const std::span<const double> numbers(of_pairs.data(), static_cast<std::size_t>(of_pairs.size()));
+            unlocked([&] { d.set_separations(numbers); });
+          },
+          "of_pairs"_a)
       .def("cancel", &Detector::cancel)
       .def("profile", &Detector::profile, py::call_guard<py::gil_scoped_release>())  // may wait for a call under way
       .def("stats", &Detector::stats, py::call_guard<py::gil_scoped_release>())
@@ -355,6 +378,22 @@ PYBIND11_MODULE(_core, m) {
   m.def("test_vertex_face", &run_queries<&test_vertex_face>, "queries"_a, "accuracy"_a, "simd"_a,
         "minimum_separation"_a);
   m.def("test_edge_edge", &run_queries<&test_edge_edge>, "queries"_a, "accuracy"_a, "simd"_a, "minimum_separation"_a);
+  m.def(
+      "contacts_of_step",
+      [](const std::vector<std::tuple<py::object, double, double>>& answers) {
+        std::vector<ContactsOfPart> of_parts;
+        std::vector<py::array> kept;
+        for (const auto& [contacts, part, parts] : answers) of_parts.push_back(part_of(contacts, part, parts, kept));
+        return to_dict(unlocked([&] { return contacts_of_step(of_parts); }));
+      },
+      "answers"_a);
+  m.def(
+      "hash_of_contacts",
+      [](const py::object& contacts) {
+        std::vector<py::array> kept;
+        return hash_of_contacts(part_of(contacts, 0, 1, kept));
+      },
+      "contacts"_a);
   m.def("gpu_status", [] {
     const gpu::Status& s = gpu::status();
     py::list devices;

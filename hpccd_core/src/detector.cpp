@@ -339,6 +339,25 @@ void Detector::set_separation(std::uint32_t mesh_a, std::uint32_t mesh_b, double
   impl_->common.separations.set(mesh_a, mesh_b, separation);
 }
 
+void Detector::set_separations(std::span<const double> of_pairs) {
+  const std::size_t n = impl_->common.scene->meshes().size();
+  if (of_pairs.size() != n * n)
+    throw InvalidArgument("of_pairs: expected " + std::to_string(n) + " x " + std::to_string(n) + " numbers, got " +
+                          std::to_string(of_pairs.size()));
+  for (std::size_t a = 0; a < n; ++a)
+    for (std::size_t b = 0; b <= a; ++b) {
+      check_length("of_pairs", of_pairs[a * n + b]);
+      if (of_pairs[a * n + b] != of_pairs[b * n + a])
+        throw InvalidArgument("of_pairs: meshes " + std::to_string(b) + " and " + std::to_string(a) +
+                              " have two separations; give the same in both places");
+    }
+  const std::lock_guard lock(impl_->one_call);
+  for (std::uint32_t a = 0; a < n; ++a)
+    for (std::uint32_t b = 0; b <= a; ++b)
+      if (const double d = of_pairs[a * n + b]; d != impl_->common.separations.of(a, b))
+        impl_->common.separations.set(a, b, d);
+}
+
 void Detector::cancel() { impl_->cancellation().request(); }
 
 std::map<std::string, double> Detector::profile() const {

@@ -170,12 +170,38 @@ TEST(Detector, RefusesSeparationsThatAreNoLengths) {
     EXPECT_THROW(scene.set_separation(0, 1, bad), InvalidArgument) << bad;
     Detector detector(test::two_sheets(side), {.backend = Backend::cpu});
     EXPECT_THROW(detector.set_separation(0, 1, bad), InvalidArgument) << bad;
+    std::vector<double> of_pairs(test::sheets * test::sheets);
+    of_pairs[1] = of_pairs[test::sheets] = bad;
+    EXPECT_THROW(detector.set_separations(of_pairs), InvalidArgument) << bad;
     EXPECT_THROW(detector.proximity(test::view(still), bad), InvalidArgument) << bad;
   }
   Scene scene = *test::two_sheets(side);
   EXPECT_THROW(scene.set_separation(0, test::sheets, 0.1), InvalidArgument);
   EXPECT_THROW(scene.set_separation(test::sheets, 0, 0.1), InvalidArgument);
   EXPECT_NO_THROW(scene.set_separation(0, 1, -0.0));
+}
+
+TEST(Detector, TakesAllSeparationsAtOnceAsOneByOne) {
+  const auto start = test::sheet_positions(side, 0), end = test::sheet_positions(side, 1);
+  constexpr std::uint32_t n = test::sheets;
+  Detector at_once(test::two_sheets(side), {.backend = Backend::cpu}),
+      one_by_one(test::two_sheets(side), {.backend = Backend::cpu});
+  std::vector<double> of_pairs(n * n, 0.01);
+  for (const double d : {0.2, 0.0, 0.1}) {
+    of_pairs[1] = of_pairs[n] = d;
+    at_once.set_separations(of_pairs);
+    for (std::uint32_t a = 0; a < n; ++a)
+      for (std::uint32_t b = a; b < n; ++b) one_by_one.set_separation(a, b, of_pairs[a * n + b]);
+    EXPECT_EQ(at_once.detect(test::view(start), test::view(end)).hash,
+              one_by_one.detect(test::view(start), test::view(end)).hash)
+        << d;
+  }
+  const auto hash = at_once.detect(test::view(start), test::view(end)).hash;
+  of_pairs[1] = 0.3;
+  EXPECT_THROW(at_once.set_separations(of_pairs), InvalidArgument) << "two for one pair";
+  of_pairs[n] = 0.3;
+  EXPECT_THROW(at_once.set_separations({of_pairs.data(), n * n - 1}), InvalidArgument);
+  EXPECT_EQ(at_once.detect(test::view(start), test::view(end)).hash, hash) << "and nothing of it was kept";
 }
 
 }  // namespace

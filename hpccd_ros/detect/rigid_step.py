@@ -66,17 +66,12 @@ def motions(
 
 class RigidStep:
     """Asks two detectors about one step. bent: of the pairs of meshes of which one moves by poses; straight: of the
-    others, None where there are none. rigid: which meshes move by poses.
+    others, None where there are none. names: of all meshes.
     """
 
-    def __init__(
-        self, names: tuple[str, ...], rigid: Sequence[bool], bent: hc.Detector, straight: hc.Detector | None
-    ) -> None:
+    def __init__(self, names: tuple[str, ...], bent: hc.Detector, straight: hc.Detector | None) -> None:
         self.bent, self.straight = bent, straight
         self._names = names
-        moved = np.array(rigid)
-        self._of_rigid = np.triu(moved[:, None] | moved, 1)  # (K, K): pairs of different meshes that are asked of bent
-        self._in_force: np.ndarray | None = None  # of bent, (K, K); None: not known
         self.detectors = (bent,) if straight is None else (bent, straight)
         self.profile: Counter[str] = Counter()  # ms of the last step, by stage
         self.stats: Counter[str] = Counter()  # of the last step
@@ -90,7 +85,7 @@ class RigidStep:
         self.stats.clear()
         parts = options.parts or cuts.fewest_parts(moving, options.tolerance, options.most_parts).parts
         margins = [cuts.Margin.of(motion, parts) for motion in moving]
-        self._separate(asked, margins)
+        self.bent.set_separations(cuts.all_grown(asked.table(self._names), margins))
         positions = [
             np.concatenate([motion.vertices(number, parts) for motion in moving]) for number in range(parts + 1)
         ]
@@ -116,11 +111,3 @@ class RigidStep:
         for name, value in of_scene.items():
             self.stats[name] = max(value, detector.stats.get(name, 0))
         return contacts
-
-    def _separate(self, asked: Separation, margins: list[cuts.Margin]) -> None:
-        wanted = cuts.all_grown(asked.table(self._names), margins)
-        changed = self._of_rigid if self._in_force is None else self._of_rigid & (wanted != self._in_force)
-        self._in_force = None  # should only a part of it be done
-        for a, b in np.argwhere(changed).tolist():
-            self.bent.set_separation(self._names[a], self._names[b], float(wanted[a, b]))
-        self._in_force = wanted

@@ -103,7 +103,6 @@ class StepDetector:
         bent, others = builder.of_rigid_pairs(), builder.of_other_pairs()
         return RigidStep(
             self._names,
-            builder.rigid,
             make_detector(bent.build(topologies), options),
             make_detector(others.build(topologies), options) if others is not None else None,
         )

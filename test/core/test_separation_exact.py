@@ -232,6 +232,12 @@ def test_separations_of_pairs_of_meshes(accuracy):
         built_with_them.set_separation(a, b, d)
     other = hc.Detector(built_with_them, accuracy=accuracy, minimum_separation=0.125, backend="cpu").detect(v0, v1)
     assert other.hash == detector.detect(v0, v1).hash
+    table = np.full((5, 5), 0.125)
+    for (a, b), d in pairs.items():
+        table[a, b] = table[b, a] = d
+    at_once = hc.Detector(meshes.scene(), accuracy=accuracy, backend="cpu")
+    at_once.set_separations(table)
+    assert at_once.detect(v0, v1).hash == other.hash
 
 
 def test_a_pair_has_a_separation_where_the_detector_has_none():
@@ -342,3 +348,29 @@ def test_bad_separations_of_pairs_are_refused():
             owner.set_separation("mesh0", "nobody", 1.0)
         with pytest.raises(ValueError, match="mesh_b"):
             owner.set_separation(0, 99, 1.0)
+
+
+def test_bad_tables_of_separations_are_refused():
+    meshes = five_small_meshes(np.random.default_rng(47))
+    detector = hc.Detector(meshes.scene(), backend="cpu")
+    one_sided, not_finite, negative = np.zeros((3, 5, 5))
+    one_sided[1, 2], not_finite[3, 3], negative[0, 4] = 1.0, np.nan, -1.0
+    negative[4, 0] = -1.0
+    for bad, error, text in (
+        (one_sided, ValueError, "meshes 1 and 2 have two separations"),
+        (not_finite, ValueError, "of_pairs: must be finite"),
+        (negative, ValueError, "of_pairs: must be finite and not negative, got -1"),
+        (np.zeros((4, 4)), ValueError, r"of_pairs: expected shape \(5, 5\)"),
+        (np.zeros(25), ValueError, "of_pairs: expected shape"),
+        ("0.1", TypeError, "of_pairs: expected"),
+        ([["a"] * 5] * 5, TypeError, "of_pairs: expected"),
+        ([[0.0] * 5, [0.0]], ValueError, "of_pairs: expected"),
+        (None, TypeError, "of_pairs: expected"),
+    ):
+        with pytest.raises(error, match=text):
+            detector.set_separations(bad)
+    v0, v1 = meshes.vertices_t0, meshes.vertices_t1
+    plain = hc.Detector(meshes.scene(), backend="cpu").detect(v0, v1)
+    assert detector.detect(v0, v1).hash == plain.hash
+    detector.set_separations([[0] * 5] * 5)  # whole numbers, as lists
+    assert detector.detect(v0, v1).hash == plain.hash

@@ -1,13 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """The answers about the parts of a step are that about the step."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 import pytest
 
 import hpccd_core as hc
-from hpccd_ros.rigid.merged import contacts_hash, merged
+from hpccd_core.parts import hash_of
+from hpccd_ros.rigid.merged import merged
 
 OUTPUTS = ("points", "normals", "closest")
 
@@ -28,8 +30,9 @@ def test_hash_as_of_the_core():
     scene, start, end = soup(0)
     found = hc.Detector(scene).detect(start, end)
     assert len(found.vf) and len(found.ee)
-    assert contacts_hash(found.vf, found.vf_toc, found.ee, found.ee_toc) == found.hash
-    assert contacts_hash(found.vf[:0], found.vf_toc[:0], found.ee[:0], found.ee_toc[:0]) == hc.Contacts.none().hash
+    assert hash_of(found) == found.hash
+    assert hash_of(hc.Contacts.none()) == hc.Contacts.none().hash
+    assert hash_of(replace(found, vf_toc=found.vf_toc / 2)) != found.hash
 
 
 @pytest.mark.parametrize("separation", [0.0, 0.01])
@@ -45,7 +48,7 @@ def test_a_straight_step_in_parts_is_the_step(parts, separation):
     for name in ("vf_toc", "ee_toc", "points", "closest"):
         assert np.allclose(getattr(found, name), getattr(whole, name), rtol=0, atol=1e-9)
     assert found.first_toc == pytest.approx(whole.first_toc, abs=1e-12)
-    assert found.hash == contacts_hash(found.vf, found.vf_toc, found.ee, found.ee_toc)
+    assert found.hash == hash_of(found)
     assert len(found.normals) == len(found)
 
 
@@ -111,3 +114,5 @@ def test_errors():
         merged([hc.Contacts.none()] * 2, 1)
     with pytest.raises(ValueError, match="worlds"):
         merged([hc.Contacts.none(2)], 2)
+    with pytest.raises(ValueError, match="as a detector returned them"):
+        merged([replace(hc.Contacts.none(), vf_toc=np.zeros(1)), hc.Contacts.none()], 2)

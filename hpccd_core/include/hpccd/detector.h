@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -79,6 +80,8 @@ class HPCCD_API Detector {
 
   /// As Scene::set_separation, from the next call on, which fits its boxes to it as to any motion.
   void set_separation(std::uint32_t mesh_a, std::uint32_t mesh_b, double separation);
+  /// Of all pairs of n meshes at once: n * n numbers, row by row; those of a pair are the same in both places.
+  void set_separations(std::span<const double> of_pairs);
 
   /// From any thread, without waiting: a query under way, those that wait for it, and all later ones throw Cancelled,
   /// within 10 ms. What is on a GPU already comes to its end first.

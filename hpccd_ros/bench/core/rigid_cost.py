@@ -15,7 +15,7 @@ import hpccd_core as hc
 from hpccd_ros import scenes as generated
 from hpccd_ros.bench.report.timing import times
 from hpccd_ros.rigid.body import Body
-from hpccd_ros.rigid.cuts import Margin, bound, fewest_parts, grown
+from hpccd_ros.rigid.cuts import Margin, all_grown, bound, fewest_parts
 from hpccd_ros.rigid.joints import Joint, JointStep, LinkMotion
 from hpccd_ros.rigid.merged import merged
 from hpccd_ros.rigid.motion import Linear, Motion, ScrewMotion
@@ -114,9 +114,7 @@ def _measure(detectors, subject, turn, tolerance, rounds):
 def _moved(detectors, motions: list[Motion], tolerance):
     cut = fewest_parts(motions, tolerance, _MOST_PARTS)
     margins = [Margin.of(motion, cut.parts) for motion in motions]
-    for a, mine in enumerate(margins):
-        for b, other in enumerate(margins[:a]):
-            detectors.cut.set_separation(a, b, grown(0.0, mine, other))
+    detectors.cut.set_separations(all_grown(np.zeros((len(margins), len(margins))), margins))
     frames = [np.concatenate([m.vertices(j, cut.parts) for m in motions]) for j in range(cut.parts + 1)]
     began = time.perf_counter()
     whole = detectors.whole.detect(frames[0], frames[-1])

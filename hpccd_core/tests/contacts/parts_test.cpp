@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: Apache-2.0
+// The answers about the parts of a step against a map from pairs to what was said of them first.
+#include "contacts/parts.h"
+
+#include <gtest/gtest.h>
+
+#include <map>
+#include <random>
+
+#include "hpccd/errors.h"
+
+namespace hpccd {
+namespace {
+
+struct Said {
+  double toc;
+  std::array<double, 3> point;
+};
+template <std::size_t n>
+using Pairs = std::map<std::array<std::uint32_t, n>, Said>;
+
+// Pairs of few features, so that parts often have the same.
+template <std::size_t n>
+Pairs<n> random_pairs(std::mt19937_64& random, std::size_t most) {
+  std::uniform_real_distribution<double> real(0, 1);
+  Pairs<n> pairs;
+  for (std::size_t wanted = random() % (most + 1); pairs.size() < wanted;) {
+    std::array<std::uint32_t, n> pair;
+    for (auto& feature : pair)
+      feature = static_cast<std::uint32_t>(random() % 8) + (random() % 9 == 0 ? 0x80000000u : 0);
+    pairs[pair] = {real(random), {real(random), real(random), real(random)}};
+  }
+  return pairs;
+}
+
+struct Part {
+  Contacts contacts;
+  ContactsOfPart of(double part, double parts) const {
+    return {contacts.vf, contacts.vf_toc, contacts.ee, contacts.ee_toc, contacts.points, {}, {}, part, parts};
+  }
+};
+
+Part part_of(const Pairs<2>& vf, const Pairs<4>& ee) {
+  Part part;
+  for (const auto& [pair, said] : vf) {
+    part.contacts.vf.push_back(pair), part.contacts.vf_toc.push_back(said.toc);
+    part.contacts.points.push_back(said.point);
+  }
+  for (const auto& [pair, said] : ee) {
+    part.contacts.ee.push_back(pair), part.contacts.ee_toc.push_back(said.toc);
+    part.contacts.points.push_back(said.point);
+  }
+  return part;
+}
+
+TEST(PartsOfAStep, TellOfEachPairWhatTheFirstOfThemSays) {
+  std::mt19937_64 random(1);
+  for (const std::uint32_t parts : {1u, 2u, 3u, 4u, 5u, 9u, 64u}) {
+    for (const std::size_t most : {0u, 1u, 20u}) {
+      Pairs<2> vf;
+      Pairs<4> ee;
+      std::vector<Part> kept;
+      std::vector<ContactsOfPart> answers;
+      for (std::uint32_t k = 0; k < parts; ++k) {
+        const auto vf_of_part = random_pairs<2>(random, most);
+        const auto ee_of_part = random_pairs<4>(random, most);
+        const auto in_step = [&](Said said) {
+          said.toc = (k + said.toc) / parts;
+          return said;
+        };
+        for (const auto& [pair, said] : vf_of_part) vf.emplace(pair, in_step(said));
+        for (const auto& [pair, said] : ee_of_part) ee.emplace(pair, in_step(said));
+        kept.push_back(part_of(vf_of_part, ee_of_part));
+      }
+      for (std::uint32_t k = 0; k < parts; ++k) answers.push_back(kept[k].of(k, parts));
+      const Contacts found = contacts_of_step(answers), wanted = part_of(vf, ee).contacts;
+      EXPECT_EQ(found.vf, wanted.vf);
+      EXPECT_EQ(found.vf_toc, wanted.vf_toc);
+      EXPECT_EQ(found.ee, wanted.ee);
+      EXPECT_EQ(found.ee_toc, wanted.ee_toc);
+      EXPECT_EQ(found.points, wanted.points);
+      EXPECT_TRUE(found.normals.empty() && found.closest.empty());
+      EXPECT_EQ(found.hash,
+                hash_of_contacts(ContactsOfPart{wanted.vf, wanted.vf_toc, wanted.ee, wanted.ee_toc, {}, {}, {}}));
+      double first = std::numeric_limits<double>::infinity();
+      for (const double toc : found.vf_toc) first = std::min(first, toc);
+      for (const double toc : found.ee_toc) first = std::min(first, toc);
+      EXPECT_EQ(found.first_toc, first);
+    }
+  }
+}
+
+TEST(PartsOfAStep, RefuseContactsOfUnequalLengths) {
+  const std::vector<std::array<std::uint32_t, 2>> vf(2);
+  const std::vector<double> toc(1);
+  const std::vector<std::array<double, 3>> points(1);
+  const ContactsOfPart short_times{vf, toc, {}, {}, {}, {}, {}},
+      short_points{{vf.data(), 2}, {}, {}, {}, points, {}, {}};
+  for (const ContactsOfPart& bad : {short_times, short_points}) {
+    EXPECT_THROW(contacts_of_step({&bad, 1}), InvalidArgument);
+    EXPECT_THROW(hash_of_contacts(bad), InvalidArgument);
+  }
+}
+
+}  // namespace
+}  // namespace hpccd
