@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The compiled module (src/bindings.cpp, src/bindings_device.cpp). Names and arguments are compared with it by
+"""The compiled module (src/bindings.cpp and its neighbours). Names and arguments are compared with it by
 test/packaging/test_core_stub.py, which tells how to draw up anew what pybind11 itself says of them."""
 
 from collections.abc import Sequence
@@ -224,6 +224,35 @@ class PreparedDetection:
     def contacts(self, n_worlds: int) -> _OnDevice: ...
     def arrays(self, n_worlds: int) -> dict[str, DeviceArray | None]: ...
 
+class JointKind(_Enumeration):
+    fixed: ClassVar[JointKind]
+    turning: ClassVar[JointKind]
+    sliding: ClassVar[JointKind]
+
+class JointChain:
+    """The joints of a robot in the order of their tree; parent -1: the base. numbers (m,11): of each the quaternion
+    x y z w and the shift of its origin, its axis, and no less than the length of that shift."""
+
+    def __init__(self, kinds: Sequence[JointKind], parents: Sequence[int], numbers: NDArray[np.float64]) -> None: ...
+    def poses(
+        self, values: NDArray[np.float64], turn: NDArray[np.float64], shift: NDArray[np.float64]
+    ) -> NDArray[np.float64]: ...  # (m,7): quaternion and shift; turn, shift: where the base is
+
+class JointBounds:
+    """Of a step in which joints go at constant speed."""
+
+    def __init__(
+        self,
+        chain: JointChain,
+        start: NDArray[np.float64],
+        end: NDArray[np.float64],
+        turn: NDArray[np.float64],
+        shift: NDArray[np.float64],
+    ) -> None: ...
+    def of_link(
+        self, link: int, radius: float, girth: float, centre: NDArray[np.float64]
+    ) -> tuple[float, float, float]: ...  # acceleration, span, rounding
+
 class MemoryOnDevice:
     def __init__(self) -> None: ...
     def assign(self, pointer: int, bytes: int) -> None: ...
@@ -238,6 +267,9 @@ def test_edge_edge(
 ) -> tuple[NDArray[np.bool_], NDArray[np.float64]]: ...
 def contacts_of_step(answers: Sequence[tuple[object, float, float]]) -> _Contacts: ...
 def hash_of_contacts(contacts: object) -> int: ...
+def placed(
+    poses: NDArray[np.float64], meshes: Sequence[tuple[int, int]], vertices: NDArray[np.float64]
+) -> NDArray[np.float64]: ...  # meshes: of each the number of its pose, and where its vertices end
 def integers_on_device(numbers: Sequence[int], device: int) -> DeviceArray: ...
 def gpu_status() -> GpuStatus: ...
 def gpu_fail_after(calls: int) -> None: ...

@@ -14,7 +14,7 @@ import sys
 from pathlib import Path
 
 # Data goes this way. A room is a folder; what stands beside the folders (detector.cpp, bindings.cpp) comes last.
-ROOMS = ["base", "scene", "bvh", "elementary", "traverse", "contacts", "paper", "gpu", "hybrid", "backends"]
+ROOMS = ["base", "rigid", "scene", "bvh", "elementary", "traverse", "contacts", "paper", "gpu", "hybrid", "backends"]
 TOP = "the files beside the rooms"
 ORDER = [*ROOMS, TOP]
 PUBLIC = "hpccd"  # include/hpccd: the public interface, for all

@@ -8,6 +8,7 @@
 #include "base/simd.h"
 #include "bindings_device.h"
 #include "contacts/parts.h"
+#include "bindings_rigid.h"
 #include "gpu/device.h"
 #include "gpu/memory_on_device.h"
 #include "hpccd/hpccd.h"
@@ -252,6 +253,7 @@ PYBIND11_MODULE(_core, m) {
   py::implicitly_convertible<py::array, GivenPositions>();
   bind_device_array(m);
   bind_prepared(m);
+  bind_rigid(m);
 
   py::class_<Detector>(m, "Detector")
       .def(
