@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Meshes that move by poses or by joints, asked of a detector that knows straight lines only. numpy alone, no ROS.
+"""Meshes that move by poses or by joints, asked of a detector that knows straight lines only. numpy, the core, no ROS.
 
 What a step needs, in the order of use (an example is in test/rigid/test_bodies.py):
 

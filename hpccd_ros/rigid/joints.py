@@ -34,11 +34,14 @@ the step, plus max |x'''| / 2, which sees turns that cancel. In the middle, of a
 where i, and the second term, count where they turn, W = sum D_j w_j and W' = sum over i < j of D_i D_j w_i x w_j.
 
 **Whatever the speed.** Up to the origin of the first joint that moves nothing moves. From there no point gets farther
-than the sum of all offsets, slides and the body's radius beyond it, `_span`: curve and straight line lie in that ball,
+than the sum of all offsets, slides and the body's radius beyond it, the span: curve and straight line lie in that ball,
 and deviate by at most its diameter. So a joint that jumps by a million radians has a bound as large as the robot.
 
 As with screws the points of edges and faces deviate no more than vertices do. The poses of the middle are computed:
-each length above is off by the relative error of `rounding.at_chain`, for which `_slack` stands eight times.
+each length above is off by the relative error of `rounding.at_chain`, for which eight times that stands.
+
+The core computes what is derived here (hpccd_core/src/rigid/joint_bounds.cpp); test/rigid/joints_oracle.py is the same
+in Python, to the last bit.
 """
 
 import math
@@ -49,14 +52,15 @@ from types import MappingProxyType
 
 import numpy as np
 
+from hpccd_core.joint_chains import JointBounds, JointChain, JointKind, placed
 from hpccd_ros.rigid import rounding
 from hpccd_ros.rigid.body import Body
-from hpccd_ros.rigid.sums import dot, in_order
-from hpccd_ros.rigid.transform import IDENTITY, Rigid, rotated
+from hpccd_ros.rigid.sums import dot
+from hpccd_ros.rigid.transform import IDENTITY, Rigid
 
 TURNING = ("revolute", "continuous")
 KINDS = (*TURNING, "prismatic", "fixed")
-Vector = tuple[float, float, float]  # numpy takes longer for three numbers
+_OF_CORE = {**dict.fromkeys(TURNING, JointKind.turning), "prismatic": JointKind.sliding, "fixed": JointKind.fixed}
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,74 +92,87 @@ class Joint:
         return self.kind in TURNING
 
     @cached_property
-    def offset(self) -> float:
-        """Not below the distance of its origin from that of its parent."""
-        return rounding.length(self.origin.shift)
+    def numbers(self) -> tuple[float, ...]:
+        """As the core takes them: the last is not below the distance of its origin from that of its parent."""
+        origin = self.origin
+        return (
+            *origin.quaternion.tolist(),
+            *origin.shift.tolist(),
+            *self.axis.tolist(),
+            rounding.length(origin.shift),
+        )
 
-    def moved(self, value: float) -> Rigid:
-        """From its own frame at 0 to that at ``value``: radians, or the unit of coordinates."""
-        if self.turns:
-            return Rigid(np.append(self.axis * math.sin(value / 2), math.cos(value / 2)), np.zeros(3))
-        return Rigid(IDENTITY.quaternion, self.axis * value if self.kind == "prismatic" else np.zeros(3))
+
+class Chain:
+    """All joints of a robot, in the order of their tree. Raises ValueError: a parent does not come before its joint."""
+
+    def __init__(self, joints: Sequence[Joint]) -> None:
+        self.joints = tuple(joints)
+        for number, joint in enumerate(self.joints):
+            if not -1 <= joint.parent < number:
+                raise ValueError(
+                    f"joints: the parent of joint {number} is {joint.parent}; it must come before it, or be -1"
+                )
+        self.continuous = [number for number, joint in enumerate(self.joints) if joint.kind == "continuous"]
+        numbers = np.array([joint.numbers for joint in self.joints], np.float64).reshape(-1, 11)
+        kinds, parents = [_OF_CORE[joint.kind] for joint in self.joints], [joint.parent for joint in self.joints]
+        self.core = JointChain(kinds, parents, numbers)
+
+    def poses(self, values: np.ndarray, base: Rigid) -> np.ndarray:
+        """(m,7) float64: quaternion and shift of each joint's link. values (m,): what fixed joints have does not
+        matter."""
+        return self.core.poses(values, base.quaternion, base.shift)
+
+
+def as_rigid(poses: np.ndarray) -> list[Rigid]:
+    """poses: (m,7) as of `Chain.poses`."""
+    return [Rigid(quaternion, shift) for quaternion, shift in zip(poses[:, :4], poses[:, 4:], strict=True)]
 
 
 class JointStep:
     """All joints of a robot between two sets of values, one for each joint; what fixed ones have does not matter.
 
     A continuous joint goes the shorter way. ``base``: where the robot stands, fixed through the step. known: what
-    `poses` gives for some fractions, where it was computed before.
+    `pose_rows` gives for some fractions, where it was computed before.
     """
 
     def __init__(
         self,
-        joints: Sequence[Joint],
-        start: Sequence[float],
-        end: Sequence[float],
+        joints: Sequence[Joint] | Chain,
+        start: Sequence[float] | np.ndarray,
+        end: Sequence[float] | np.ndarray,
         base: Rigid = IDENTITY,
-        known: Mapping[float, list[Rigid]] = MappingProxyType({}),
+        known: Mapping[float, np.ndarray] = MappingProxyType({}),
     ) -> None:
-        self.joints = tuple(joints)
+        self.chain = joints if isinstance(joints, Chain) else Chain(joints)
         self.base = base
-        for number, joint in enumerate(self.joints):
-            if not -1 <= joint.parent < number:
-                raise ValueError(
-                    f"joints: the parent of joint {number} is {joint.parent}; it must come before it, or be -1"
-                )
         self.start = _values("start", start, self.joints)
         self.end = _values("end", end, self.joints)
-        for number, joint in enumerate(self.joints):
-            if joint.kind == "continuous":
-                change = math.remainder(self.end[number] - self.start[number], 2 * math.pi)
-                self.end[number] = self.start[number] + change
+        for number in self.chain.continuous:
+            change = math.remainder(self.end[number] - self.start[number], 2 * math.pi)
+            self.end[number] = self.start[number] + change
         self.speed = self.end - self.start
-        self._poses = dict(known)
+        self._rows = dict(known)
+
+    @property
+    def joints(self) -> tuple[Joint, ...]:
+        return self.chain.joints
+
+    def pose_rows(self, t: float) -> np.ndarray:
+        """(m,7) float64, as of `Chain.poses`, at the fraction t in [0, 1], computed once."""
+        if t not in self._rows:
+            values = self.end if t >= 1.0 else self.start + self.speed * t
+            self._rows[t] = self.chain.poses(values, self.base)
+        return self._rows[t]
 
     def poses(self, t: float) -> list[Rigid]:
-        """Of each joint's link at the fraction t in [0, 1], computed once."""
-        if t not in self._poses:
-            values = self.end if t >= 1.0 else self.start + self.speed * t
-            poses: list[Rigid] = []
-            for joint, value in zip(self.joints, values.tolist(), strict=True):
-                before = self.base if joint.parent < 0 else poses[joint.parent]
-                poses.append(before.after(joint.origin).after(joint.moved(value)))
-            self._poses[t] = poses
-        return self._poses[t]
+        """Of each joint's link at the fraction t in [0, 1]."""
+        return as_rigid(self.pose_rows(t))
 
     @cached_property
-    def middle(self) -> list[tuple[Vector, Vector]]:
-        """Of each joint in the middle of the step: its axis, and a point of it."""
-        return [
-            (_vector(rotated(pose.rotation(), joint.axis)), _vector(pose.shift))
-            for joint, pose in zip(self.joints, self.poses(0.5), strict=True)
-        ]
-
-    def way(self, link: int) -> list[int]:
-        """Numbers of the joints from the base to this link."""
-        numbers = []
-        while link >= 0:
-            numbers.append(link)
-            link = self.joints[link].parent
-        return numbers[::-1]
+    def bounds(self) -> JointBounds:
+        """Of all links."""
+        return JointBounds(self.chain.core, self.start, self.end, self.base.quaternion, self.base.shift)
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,140 +188,26 @@ class LinkMotion:
     def vertices(self, cut: int, parts: int) -> np.ndarray:
         if self.ends is not None and cut in (0, parts):
             return self.ends[cut > 0]
-        return self.step.poses(cut / parts)[self.link].apply(self.body.vertices)
+        vertices = self.body.vertices
+        return placed(self.step.pose_rows(cut / parts), [(self.link, len(vertices))], vertices)
 
     def deviation(self, parts: int) -> float:
-        return rounding.up(min(self._acceleration / (8.0 * parts * parts), 2.0 * self._span))
+        acceleration, span, _ = self._bounds
+        return rounding.up(min(acceleration / (8.0 * parts * parts), 2.0 * span))
 
     def rounding(self, parts: int) -> float:
-        values = in_order(abs(self.step.start[k]) + abs(self.step.speed[k]) for k in self._way)
-        return rounding.at_chain(len(self._way), self._reach, float(values))
+        return self._bounds[2]
 
     @cached_property
-    def _way(self) -> list[int]:
-        return self.step.way(self.link)
-
-    @cached_property
-    def _reach(self) -> float:
-        """From the origin of the world to the farthest point that the link may have in this step."""
-        return rounding.up(rounding.length(self.step.base.shift) + self._beyond(self._way))
-
-    @cached_property
-    def _span(self) -> float:
-        """From the origin of the first joint that moves to the farthest point that the link may have in this step."""
-        moving = [place for place, k in enumerate(self._way) if self._moves(k)]
-        if not moving:
-            return 0.0
-        first, *others = self._way[moving[0] :]
-        return rounding.up(self._slid(first) + self._beyond(others))
-
-    def _beyond(self, joints: Sequence[int]) -> float:
-        """The body, with all offsets and slides of these joints of its way."""
-        offsets = in_order(self.step.joints[k].offset + self._slid(k) for k in joints)
-        return self.body.radius + float(offsets)
-
-    def _slid(self, k: int) -> float:
-        slides = self.step.joints[k].kind == "prismatic"
-        return max(abs(float(self.step.start[k])), abs(float(self.step.end[k]))) if slides else 0.0
-
-    def _moves(self, k: int) -> bool:
-        return self.step.joints[k].kind != "fixed" and self.step.speed[k] != 0.0
-
-    @cached_property
-    def _slack(self) -> float:
-        """What a length computed from the poses of the middle may be off."""
-        return 8.0 * self.rounding(2)
-
-    @cached_property
-    def _acceleration(self) -> float:
-        """Not below max |x''| of all its points through the step."""
-        moving = [k for k in self._way if self._moves(k)]
-        turning = [self.step.joints[k].turns for k in moving]
-        speed = [abs(float(self.step.speed[k])) for k in moving]
-        if not any(turning):
-            return 0.0
-        before, turned = [], 0.0
-        for s, turns in zip(speed, turning, strict=True):
-            before.append(turned)
-            turned += s if turns else 0.0
-        reach = self._distances(moving, speed)
-        second = third = 0.0
-        for turns, d, s, g in zip(turning, speed, before, reach, strict=True):
-            second += g * (d * (2 * s + d) if turns else 2 * s * d)
-            third += g * (d * (3 * s * (s + d) + d * d) if turns else 3 * s * s * d)
-        return rounding.up(min(second, self._in_the_middle(moving) + third / 2))
-
-    def _distances(self, moving: list[int], speed: list[float]) -> list[float]:
-        """G of each moving joint."""
-        axes, centre = self.step.middle, self._centre
-        found, swept = [], 0.0
-        for k, d in zip(reversed(moving), reversed(speed), strict=True):
-            distance = 1.0
-            if self.step.joints[k].turns:
-                axis, origin = axes[k]
-                distance = _length(_cross(axis, _less(centre, origin))) + self.body.girth + self._slack + swept
-            found.append(distance)
-            swept += distance * d / 2
-        return found[::-1]
-
-    def _in_the_middle(self, moving: list[int]) -> float:
-        """Not below |x''| of any of its points at t = 1/2."""
-        axes, centre = self.step.middle, self._centre
-        of_centre = turning = of_turning = (0.0, 0.0, 0.0)
-        total = slides = 0.0
-        for k in moving:
-            axis, origin = axes[k]
-            d = float(self.step.speed[k])
-            own = _times(d, axis)
-            if self.step.joints[k].turns:
-                column = _cross(own, _less(centre, origin))
-                of_centre = _plus(of_centre, _cross(_plus(_times(2.0, turning), own), column))
-                of_turning = _plus(of_turning, _cross(turning, own))
-                turning = _plus(turning, own)
-                total += abs(d)
-            else:
-                of_centre = _plus(of_centre, _cross(_times(2.0, turning), own))
-                slides += abs(d)
-        spin = _length(of_turning) + _length(turning) ** 2
-        # An axis is off by the slack's part of the reach; each product of two of them by as much, times the turns.
-        lost = self._slack * (total * total + 2 * total * slides / max(self._reach, 1e-100))
-        return rounding.up(_length(of_centre) + spin * self.body.girth + lost)
-
-    @cached_property
-    def _centre(self) -> Vector:
-        pose = self.step.poses(0.5)[self.link]
-        return _vector(pose.apply(self.body.centre[None, :])[0])
+    def _bounds(self) -> tuple[float, float, float]:
+        """Not below max |x''| of all its points through the step; from the origin of the first joint that moves to the
+        farthest point that the link may have in it; how far a vertex at a cut is from where it should be."""
+        body = self.body
+        return self.step.bounds.of_link(self.link, body.radius, body.girth, body.centre)
 
 
-def _values(name: str, values: Sequence[float], joints: Sequence[Joint]) -> np.ndarray:
+def _values(name: str, values: Sequence[float] | np.ndarray, joints: Sequence[Joint]) -> np.ndarray:
     found = np.array(values, np.float64)
     if found.shape != (len(joints),) or not np.isfinite(found).all():
         raise ValueError(f"{name}: expected a finite number for each of the {len(joints)} joints")
     return found
-
-
-def _vector(array: np.ndarray) -> Vector:
-    x, y, z = array.tolist()
-    return x, y, z
-
-
-def _plus(a: Vector, b: Vector) -> Vector:
-    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
-
-
-def _less(a: Vector, b: Vector) -> Vector:
-    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
-
-
-def _times(k: float, a: Vector) -> Vector:
-    return k * a[0], k * a[1], k * a[2]
-
-
-def _cross(a: Vector, b: Vector) -> Vector:
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-
-
-def _length(a: Vector) -> float:
-    """Not below it."""
-    squared = a[0] * a[0] + a[1] * a[1] + a[2] * a[2]
-    return rounding.up(math.sqrt(squared)) + rounding.TINY if any(a) else 0.0

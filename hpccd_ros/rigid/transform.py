@@ -2,7 +2,8 @@
 """Rigid motions of 3D space: a unit quaternion x y z w, then a translation. No ROS.
 
 Sums are written out and sines are those of the C library: matrix products and numpy's own sines have other last bits on
-other processors, and a recording must be computed again to the same contacts anywhere.
+other processors, and a recording must be computed again to the same contacts anywhere. The core does the same for the
+joints of robots, to the last bit: hpccd_core/src/rigid/pose.h.
 """
 
 import math

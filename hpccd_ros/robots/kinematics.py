@@ -20,7 +20,7 @@ import numpy as np
 from hpccd_ros.base.quoting import listed
 from hpccd_ros.rigid import rounding
 from hpccd_ros.rigid.body import Body
-from hpccd_ros.rigid.joints import Joint, JointStep, LinkMotion
+from hpccd_ros.rigid.joints import Chain, Joint, JointStep, LinkMotion, as_rigid
 from hpccd_ros.rigid.screw import Screw
 from hpccd_ros.rigid.sums import dot
 from hpccd_ros.rigid.transform import IDENTITY, Rigid
@@ -29,6 +29,7 @@ from hpccd_ros.robots.urdf import Description, RobotJoint
 
 # Radians or metres: of larger values a double tells less than a millionth, and a step would be wild.
 LARGEST_VALUE = 1e9
+_AHEAD = 2  # joints that move a base: a slide and a turn
 
 
 @dataclass(frozen=True)
@@ -56,14 +57,14 @@ class Kinematics:
         self.inputs = tuple(joint.name for joint in joints if joint.kind != "fixed" and joint.mimic is None)
         self._followed = tuple(None if joint.kind == "fixed" else _followed(joint, named) for joint in joints)
         # The root's link has a joint too, which stands still. Turns are unwrapped here, for the sake of mimics.
-        self.chain = (
-            Joint.of("fixed", -1, IDENTITY),
-            *(
-                Joint.of(
-                    "revolute" if joint.turns else joint.kind, self._numbers[joint.parent], joint.origin, joint.axis
-                )
-                for joint in joints
-            ),
+        moved = (
+            Joint.of("revolute" if joint.turns else joint.kind, self._numbers[joint.parent], joint.origin, joint.axis)
+            for joint in joints
+        )
+        self.chain = Chain((Joint.of("fixed", -1, IDENTITY), *moved))
+        # Behind the joints that move the base, where it moves.
+        self._behind = tuple(
+            Joint(joint.kind, joint.parent + _AHEAD, joint.origin, joint.axis) for joint in self.chain.joints[1:]
         )
 
     def number(self, link: str) -> int:
@@ -91,16 +92,15 @@ class Kinematics:
                 ends[number] = start.values[number] + followed.factor * change
         if _same(start.base, end.base):
             # Poses of both states are needed again, unless one is reached by another value of a joint.
-            known = {0.0: list(start.poses.values())}
+            known = {0.0: start.pose_rows}
             reached = np.array_equal(ends, end.values)
             if reached:
-                known[1.0] = list(end.poses.values())
+                known[1.0] = end.pose_rows
             return RobotStep(self, JointStep(self.chain, start.values, ends, start.base, known), 0, reached)
         ahead, goal = _base_joints(start.base, end.base)
         root = Joint.of("fixed", 1, Rigid(start.base.quaternion, np.zeros(3)))
-        links = (Joint(j.kind, j.parent + len(ahead), j.origin, j.axis) for j in self.chain[1:])
-        joints = (*ahead, root, *links)
-        return RobotStep(self, JointStep(joints, (0.0, 0.0, *start.values), (*goal, *ends)), len(ahead))
+        joints = Chain((*ahead, root, *self._behind))
+        return RobotStep(self, JointStep(joints, (0.0, 0.0, *start.values), (*goal, *ends)), _AHEAD)
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,10 +114,14 @@ class RobotState:
     base: Rigid
 
     @cached_property
+    def pose_rows(self) -> np.ndarray:
+        """(links,7) float64: quaternion x y z w and shift of each."""
+        return self.kinematics.chain.poses(self.values + 0.0, self.base)  # -0.0 is 0.0, as on the way of a step
+
+    @cached_property
     def poses(self) -> dict[str, Rigid]:
         """Of each link: takes its coordinates to those of the scene."""
-        found = JointStep(self.kinematics.chain, self.values, self.values, self.base).poses(0.0)
-        return dict(zip(self.kinematics.links, found, strict=True))
+        return dict(zip(self.kinematics.links, as_rigid(self.pose_rows), strict=True))
 
 
 @dataclass(frozen=True, eq=False)

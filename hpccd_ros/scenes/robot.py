@@ -75,7 +75,7 @@ class SceneRobot:
     def _chain(self) -> tuple[np.ndarray, ...]:
         """Of the joint of each link: axis where it turns, else 0; axis where it slides, else 0; origin's quaternion
         (w first) and shift."""
-        chain = self.robot.kinematics.chain
+        chain = self.robot.kinematics.chain.joints
         axes = np.array([joint.axis for joint in chain])
         turning = np.array([joint.turns for joint in chain])[:, None]
         sliding = np.array([joint.kind == "prismatic" for joint in chain])[:, None]
@@ -89,7 +89,7 @@ class SceneRobot:
         angles = np.where(turning.any(axis=1), values, 0.0)
         turns = product(origins, axis_angle(turning, angles))
         shifts = shifts + rotate(origins, sliding * values[:, None])
-        for number, joint in enumerate(self.robot.kinematics.chain):
+        for number, joint in enumerate(self.robot.kinematics.chain.joints):
             if joint.parent >= 0:
                 shifts[number] = shifts[joint.parent] + rotate(turns[joint.parent], shifts[number])
                 turns[number] = product(turns[joint.parent], turns[number])

@@ -115,7 +115,8 @@ def test_links_of_a_tree():
     hand = Joint.of("revolute", -1, IDENTITY, Z)
     fingers = [Joint.of("prismatic", 0, shifted(1.0, side), (0, side, 0)) for side in (-0.1, 0.1)]
     step = JointStep([hand, *fingers], (0, 0, 0), (0.0, 0.05, 0.0), shifted(0, 0, 1))
-    assert step.way(2) == [0, 2]
+    others = JointStep([hand, *fingers], (0, 0, 0), (0.0, 9.0, 0.0), shifted(0, 0, 1))
+    assert LinkMotion(others, 2, Body.of(POINTS)).rounding(1) == LinkMotion(step, 2, Body.of(POINTS)).rounding(1)
     assert step.poses(1.0)[1].shift == pytest.approx([1.0, -0.15, 1.0])
     assert step.poses(1.0)[2].shift == pytest.approx([1.0, 0.1, 1.0])
 
