@@ -2,6 +2,10 @@
 """Where a link is because of the values of its robot's joints: what lets a step go by joints instead of screws."""
 
 from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
 
 from hpccd_ros.frames.types import Placement
 from hpccd_ros.rigid.body import Body
@@ -12,14 +16,22 @@ from hpccd_ros.robots.kinematics import RobotState, RobotStep
 
 @dataclass(frozen=True, eq=False)
 class LinkPlacement(Placement):
-    """``state``: of the whole robot, one object for all its links at a time; ``pose`` is that of ``link`` in it."""
+    """``state``: of the whole robot, one object for all its links at a time; ``pose`` is that of ``link`` in it.
+    ``computed``: the vertices, where they were computed with those of the other links."""
 
     link: str
     state: RobotState
+    computed: NDArray[np.float64] | None = None
 
     @classmethod
-    def of(cls, body: Body, link: str, state: RobotState) -> "LinkPlacement":
-        return cls(body, state.poses[link], link, state)
+    def of(
+        cls, body: Body, link: str, state: RobotState, computed: NDArray[np.float64] | None = None
+    ) -> "LinkPlacement":
+        return cls(body, state.poses[link], link, state, computed)
+
+    @cached_property
+    def vertices(self) -> NDArray[np.float64]:
+        return self.pose.apply(self.body.vertices) if self.computed is None else self.computed
 
     def moved(self, rigid: Rigid) -> "LinkPlacement":
         return self.of(self.body, self.link, replace(self.state, base=rigid.after(self.state.base)))

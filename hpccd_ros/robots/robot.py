@@ -3,6 +3,7 @@
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from hpccd_ros.robots import pairs, srdf, urdf
 from hpccd_ros.robots.errors import RobotError
 from hpccd_ros.robots.geometry import LinkMeshes, Resolver, no_files
 from hpccd_ros.robots.kinematics import Kinematics, RobotState
+from hpccd_ros.robots.link_vertices import LinkVertices
 from hpccd_ros.robots.placement import LinkPlacement
 
 #: How far meshes of round shapes may stand out of them, in metres.
@@ -85,6 +87,10 @@ class Robot:
         )
         return cls(called, description, Kinematics(description), tuple(meshes), tuple(ignored))
 
+    @cached_property
+    def _vertices(self) -> LinkVertices:
+        return LinkVertices([(self.kinematics.number(mesh.link), mesh.body) for mesh in self.meshes])
+
     def settings(self, frame_prefix: str = "", by_joints: bool = False) -> tuple[MeshSettings, ...]:
         """Of each mesh, to be moved by joint states, or by transforms from the frame ``frame_prefix`` + link."""
         moved = JOINTS if by_joints else TF
@@ -96,11 +102,16 @@ class Robot:
     def placements(self, state: RobotState) -> tuple[LinkPlacement, ...]:
         """Of each mesh, for frames of the scene: steps between these go by the joints. Raises RobotError: the core
         cannot take where one is."""
-        placements = tuple(LinkPlacement.of(mesh.body, mesh.link, state) for mesh in self.meshes)
-        for mesh, placement in zip(self.meshes, placements, strict=True):
-            if problem := unusable_coordinates(placement.vertices, by_poses=True):
-                raise RobotError(f"positions: with them, of {quoted(mesh.name)} {problem[1]}")
-        return placements
+        together = self._vertices.placed(state.pose_rows)
+        vertices = self._vertices.of_meshes(together)
+        if unusable_coordinates(together, by_poses=True):
+            for mesh, of_mesh in zip(self.meshes, vertices, strict=True):
+                if problem := unusable_coordinates(of_mesh, by_poses=True):
+                    raise RobotError(f"positions: with them, of {quoted(mesh.name)} {problem[1]}")
+        return tuple(
+            LinkPlacement.of(mesh.body, mesh.link, state, of_mesh)
+            for mesh, of_mesh in zip(self.meshes, vertices, strict=True)
+        )
 
     def motions(self, start: RobotState, end: RobotState) -> tuple[LinkMotion, ...]:
         """Of each mesh, between two states of this robot (kinematics.py says which motion that is)."""

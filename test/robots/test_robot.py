@@ -10,7 +10,7 @@ import hpccd_core as hc
 from hpccd_ros.frames.types import TF
 from hpccd_ros.rigid.cuts import Margin, fewest_parts, grown
 from hpccd_ros.rigid.motion import Linear
-from hpccd_ros.rigid.transform import Rigid
+from hpccd_ros.rigid.transform import IDENTITY, Rigid
 from hpccd_ros.robots.errors import RobotError
 from hpccd_ros.robots.robot import Robot
 
@@ -54,6 +54,15 @@ def test_placements_are_the_links_at_their_poses():
     assert bob.vertices.mean(axis=0) == pytest.approx([0.0, 0.25, 2.0])
     assert tip.vertices.mean(axis=0) == pytest.approx([0.0, 0.25, 3.0])
     assert rod.body is robot.meshes[0].body
+
+
+@pytest.mark.parametrize("base", [IDENTITY, Rigid.of([1.0, -2.0, 0.5], [0.5, -0.5, 0.5, 0.5])], ids=["origin", "far"])
+def test_vertices_placed_together_are_those_of_each_pose(base):
+    robot = Robot.of(URDF)
+    placements = robot.placements(robot.kinematics.state({"turn": 0.7, "slide": -0.25, "roll": -0.0}, base))
+    for placement, mesh in zip(placements, robot.meshes, strict=True):
+        assert placement.vertices.tobytes() == placement.pose.apply(mesh.vertices).tobytes()
+        assert placement.moved(IDENTITY).vertices.tobytes() == placement.vertices.tobytes()
 
 
 def test_places_that_the_core_cannot_take_are_refused():
