@@ -3,6 +3,8 @@
 // undecided one is known to be free.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <map>
 #include <memory>
 #include <random>
@@ -48,21 +50,36 @@ struct Pairs {
   }
 };
 
-// Of all lengths: some that the ends decide, some that take a few steps, and some that move together at the very
-// distance, so that no step tells.
+// A distance that is a few units of rounding more or less.
+double about(double d, std::mt19937_64& random) { return d * (1 + 0x1p-50 * (static_cast<double>(random() % 17) - 8)); }
+
+// Of all lengths: some that the ends decide, some that take a few steps, some that move together at the very distance,
+// so that no step tells, and some that pass each other at that distance in the middle of the step.
 Pairs pairs_of_all_lengths(Kind kind, std::uint32_t n, int seed) {
   std::mt19937_64 random(seed);
   std::uniform_real_distribution<double> real(-1, 1);
+  const auto anywhere = [&] { return V{real(random), real(random), real(random)}; };
   Pairs pairs;
   for (std::uint32_t i = 0; i < n; ++i) {
-    V t0[4], t1[4];
-    for (auto* points : {t0, t1})
-      for (int k = 0; k < 4; ++k) points[k] = {real(random), real(random), real(random)};
+    V t0[4] = {anywhere(), anywhere(), anywhere(), anywhere()},
+      t1[4] = {anywhere(), anywhere(), anywhere(), anywhere()};
     double d = std::pow(10.0, -4 * std::abs(real(random)));
-    if (random() % 3 == 0) {
+    if (const auto which = random() % 3; which == 0) {
       const V motion = t1[0] - t0[0];
       for (int k = 0; k < 4; ++k) t1[k] = t0[k] + motion;
-      d = exact::distance(kind, t0) * (1 + 0x1p-50 * (static_cast<double>(random() % 17) - 8));
+      d = about(exact::distance(kind, t0), random);
+    } else if (which == 1) {
+      // A corner at `corner`, with the rest of its feature behind it; the other feature passes before it.
+      const V corner = anywhere(), n = {1, 0, 0}, way = {0, 0.3 * real(random), 0.5 + 0.4 * std::abs(real(random))};
+      const V behind[2] = {corner + V{-1, 0.3 * real(random), 0}, corner + V{-1, 0.3 * real(random), 0.3}};
+      const bool vf = kind == Kind::vertex_face;
+      for (auto* at : {t0, t1}) {
+        const V passing = corner + d * n + (at == t0 ? -1.0 : 1.0) * way, across = V{0, way.z, -way.y};
+        const V edge[2] = {passing - across, passing + across};
+        const V of_vf[4] = {passing, corner, behind[0], behind[1]}, of_ee[4] = {edge[0], edge[1], corner, behind[0]};
+        std::copy_n(vf ? of_vf : of_ee, 4, at);
+      }
+      d = about(d, random);
     }
     pairs.add(kind, t0, t1, d);
   }
