@@ -77,8 +77,8 @@ struct BatchResult {
   std::uint32_t contact[batch_capacity];  // positions in the batch
   std::uint32_t undecided[batch_capacity];
   double toc[batch_capacity], delta[batch_capacity];
-  double apart_until[batch_capacity];  // of undecided ones: what UndecidedPair tells; edges and faces have none
   BatchCounts counts;                  // accumulates over batches
+  double apart_until[batch_capacity];  // of undecided ones: what UndecidedPair tells; edges and faces have none
 };
 
 // first/second: vertex and face, or two edges. n <= batch_capacity.
