@@ -10,6 +10,7 @@ from hpccd_ros.frames.drops import Input, Reason, Refusal
 from hpccd_ros.middleware import fields
 from hpccd_ros.robots.errors import RobotError
 from hpccd_ros.robots.joint_frames import JointFrames
+from hpccd_ros.robots.joint_history import check_lengths
 
 # Bound what is kept of a message that anybody may send.
 MOST_JOINTS = 1000
@@ -25,12 +26,22 @@ def kept(message: JointState) -> JointState | None:
     return small
 
 
+def too_large(topic: str) -> Refusal:
+    """Of a message that is not kept for a robot whose description has not come."""
+    text = (
+        f"a joint state with more than {MOST_JOINTS} names, or {MOST_CHARACTERS} characters of names, is not kept "
+        "until the description of its robot comes; publish fewer joints in one message"
+    )
+    return Refusal(topic, Reason.TOO_LARGE, text, what=Input.JOINT_STATE)
+
+
 def fill(robots: Iterable[JointFrames], message: Any, topic: str) -> list[Refusal]:
     """Give a sensor_msgs/JointState of ``topic`` to the robots that it moves. It is refused where one of them cannot
-    use it; the others have it all the same."""
+    use it, and where no robot can; the others have it all the same."""
     problems: list[RobotError] = []
     try:
         stamp = fields.stamp_to_ns(message.header.stamp)
+        check_lengths(message.name, message.position)
     except ValueError as error:
         return [_refusal(topic, error)]
     for robot in robots:

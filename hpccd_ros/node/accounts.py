@@ -13,6 +13,9 @@ from hpccd_ros.frames.types import SceneFrame
 from hpccd_ros.node.metrics import Metrics
 from hpccd_ros.node.refusal_log import RefusalLog
 
+# Of no mesh: name of their count among ``connections``.
+REFUSED_BESIDE_MESHES = {Input.TRANSFORM: "transforms_refused", Input.JOINT_STATE: "joint_states_refused"}
+
 
 class Accounts:
     """``dropped``: vertex messages. ``connections``: what the middleware tells of its topics (name -> count).
@@ -47,8 +50,10 @@ class Accounts:
 
     def refused(self, refusal: Refusal) -> None:
         """Counted, and logged where there is something to say."""
-        counter = self.topologies_refused if refusal.what is Input.TOPOLOGY else self.dropped
-        counter.count(refusal)
+        if refusal.what in REFUSED_BESIDE_MESHES:
+            self.connections[REFUSED_BESIDE_MESHES[refusal.what]] += refusal.messages
+        else:
+            (self.topologies_refused if refusal.what is Input.TOPOLOGY else self.dropped).count(refusal)
         self.on_refused(refusal)
         if refusal.text:
             self.log(refusal.mesh, refusal.reason, refusal.text)

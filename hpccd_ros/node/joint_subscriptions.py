@@ -6,12 +6,14 @@ The last ones are kept for robots that are not known yet: nothing orders a descr
 
 from collections import deque
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 from rclpy.node import Node
 from rclpy.subscription import Subscription
 from sensor_msgs.msg import JointState
 
+from hpccd_ros.frames.drops import Input, Reason, Refusal
 from hpccd_ros.frames.pipeline import FramePipeline
 from hpccd_ros.frames.rate_limit import RateLimit
 from hpccd_ros.middleware import joint_messages, qos, qos_overrides
@@ -23,6 +25,14 @@ from hpccd_ros.robots.joint_frames import JointFrames
 
 # Bounds what strangers can make the node keep: messages of a topic.
 MOST_RECENT = 100
+
+
+@dataclass
+class _Recent:
+    """``refused``: that it was is counted already."""
+
+    message: JointState
+    refused: bool
 
 
 class JointSubscriptions:
@@ -42,7 +52,7 @@ class JointSubscriptions:
         self._of_robots = of_robots
         self._accounts = accounts
         topics = robot_parameters.joint_topics(settings[ROBOT])
-        self._recent: dict[str, deque[JointState]] = {topic: deque(maxlen=MOST_RECENT) for topic in topics}
+        self._recent: dict[str, deque[_Recent]] = {topic: deque(maxlen=MOST_RECENT) for topic in topics}
         self._subscriptions = [
             self._subscribe(topic, robots) for topic, robots in topics.items()
         ]
@@ -50,8 +60,12 @@ class JointSubscriptions:
     def use(self, pipeline: FramePipeline, by_joints: Mapping[str, JointFrames]) -> None:
         self._pipeline, self._of_robots = pipeline, by_joints
         for topic, robots in robot_parameters.joint_topics(self._settings[ROBOT]).items():
-            for message in self._recent[topic]:
-                joint_messages.fill([by_joints[robot] for robot in robots if robot in by_joints], message, topic)
+            moved = [by_joints[robot] for robot in robots if robot in by_joints]
+            for recent in self._recent[topic]:
+                refusals = joint_messages.fill(moved, recent.message, topic)
+                if not recent.refused:
+                    self._refuse(refusals)
+                    recent.refused = bool(refusals)
 
     def close(self) -> None:
         for subscription in self._subscriptions:
@@ -68,21 +82,22 @@ class JointSubscriptions:
 
         def receive(message: JointState) -> None:
             if not limit.allows():
-                self._warn(
-                    topic, f"more than max_rate = {self._settings['max_rate']:g} messages a second; some are dropped"
-                )
+                text = f"more than max_rate = {self._settings['max_rate']:g} messages a second; some are dropped"
+                self._refuse([Refusal(topic, Reason.RATE, text, what=Input.JOINT_STATE)])
                 return
-            if (kept := joint_messages.kept(message)) is not None:
-                self._recent[topic].append(kept)
             moved = [self._of_robots[robot] for robot in robots if robot in self._of_robots]
-            for refusal in joint_messages.fill(moved, message, topic):
-                self._warn(topic, refusal.text)
+            refusals = joint_messages.fill(moved, message, topic)
+            if (kept := joint_messages.kept(message)) is not None:
+                self._recent[topic].append(_Recent(kept, bool(refusals)))
+            elif len(moved) < len(robots) and not refusals:
+                refusals = [joint_messages.too_large(topic)]
+            self._refuse(refusals)
             for outcome in self._pipeline.retry():
                 hand_over(outcome, self._pipeline, self._accounts)
 
         profile = qos.joint_states(self._settings["input_reliability"])
         return qos_overrides.create_subscription(self._node, JointState, topic, receive, profile)
 
-    def _warn(self, topic: str, text: str) -> None:
-        self._accounts.connections["joint_states_refused"] += 1
-        self._node.get_logger().warning(f"{topic}: {text}", throttle_duration_sec=10.0)
+    def _refuse(self, refusals: list[Refusal]) -> None:
+        for refusal in refusals:
+            self._accounts.refused(refusal)

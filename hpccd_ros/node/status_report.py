@@ -10,7 +10,7 @@ from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
 from hpccd_ros.middleware import topic_names
-from hpccd_ros.node.accounts import Accounts
+from hpccd_ros.node.accounts import REFUSED_BESIDE_MESHES, Accounts
 from hpccd_ros.node.metrics import percentiles
 
 
@@ -26,6 +26,7 @@ class Reporter:
         self._coarse = 0
         self._dropped = 0
         self._topologies_refused = 0
+        self._refused_beside = dict.fromkeys(REFUSED_BESIDE_MESHES, 0)
 
     def report(
         self,
@@ -105,6 +106,10 @@ class Reporter:
             notes.insert(0, f"{new} frames dropped")
         if new_topologies:
             notes.insert(0, f"{new_topologies} topologies refused")
+        for what, name in REFUSED_BESIDE_MESHES.items():
+            before, self._refused_beside[what] = self._refused_beside[what], accounts.connections[name]
+            if new_of_kind := self._refused_beside[what] - before:
+                notes.insert(0, f"{new_of_kind} {what} refused")
         if notes:
             return self._status("frames", DiagnosticStatus.WARN, "; ".join(notes), values)
         if not came:

@@ -5,6 +5,7 @@ from typing import Any
 
 from rclpy.node import Node
 
+from hpccd_ros.frames.drops import Input, Reason, Refusal
 from hpccd_ros.frames.pipeline import FramePipeline
 from hpccd_ros.frames.rate_limit import RateLimit
 from hpccd_ros.middleware import qos, qos_overrides, transform_topics
@@ -51,10 +52,11 @@ class TransformSubscriptions:
         def receive(message: Any) -> None:
             heard[name] += 1
             if not limit.allows():
-                self._warn(topic, f"more than max_rate = {self._max_rate:g} messages a second; some are dropped")
+                text = f"more than max_rate = {self._max_rate:g} messages a second; some are dropped"
+                self._accounts.refused(Refusal(topic.name, Reason.RATE, text, what=Input.TRANSFORM))
                 return
             for refusal in transform_topics.fill(self._pipeline.transforms, message, topic):
-                self._warn(topic, refusal.text)
+                self._accounts.refused(refusal)
             for outcome in self._pipeline.retry():
                 hand_over(outcome, self._pipeline, self._accounts)
 
@@ -64,7 +66,3 @@ class TransformSubscriptions:
 
     def _name(self, topic: TransformTopic) -> str:
         return self._node.resolve_topic_name(topic.name)
-
-    def _warn(self, topic: TransformTopic, text: str) -> None:
-        self._accounts.connections["transforms_refused"] += 1
-        self._node.get_logger().warning(f"{topic.name}: {text}", throttle_duration_sec=10.0)

@@ -23,6 +23,14 @@ class NoJointStateError(LookupError):
         self.final = final
 
 
+def check_lengths(names: Sequence[str], positions: Sequence[float]) -> None:
+    """Raises RobotError: a joint state that no robot can use."""
+    if len(names) != len(positions):
+        raise RobotError(
+            f"joint states: {len(names)} names and {len(positions)} positions; each joint needs one of both"
+        )
+
+
 class JointHistory:
     """Each message may tell of some joints only; several publishers may share a robot."""
 
@@ -33,10 +41,7 @@ class JointHistory:
 
     def add(self, stamp: int, names: Sequence[str], positions: Sequence[float]) -> None:
         """stamp ns. Joints of others are left out. Raises RobotError, and then nothing of it is kept."""
-        if len(names) != len(positions):
-            raise RobotError(
-                f"joint states: {len(names)} names and {len(positions)} positions; each joint needs one of both"
-            )
+        check_lengths(names, positions)
         known = [(name, float(value)) for name, value in zip(names, positions, strict=True) if name in self._joints]
         for name, value in known:
             if not math.isfinite(value):

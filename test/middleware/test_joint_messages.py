@@ -32,6 +32,18 @@ def test_what_is_too_large_or_of_no_use_is_not_kept(names, positions):
     assert joint_messages.kept(JointState(name=["j" * 1_000_000], position=[0.0])) is None
 
 
+def test_what_no_robot_can_use_is_refused_before_any_is_known():
+    message = crane.joint_state(1, 1)
+    assert joint_messages.fill([], message, "joint_states") == []
+    message.position = message.position[:1]
+    (refusal,) = joint_messages.fill([], message, "joint_states")
+    assert "2 names and 1 positions" in refusal.text
+    message = crane.joint_state(1, 1)
+    message.header.stamp.sec = -1
+    (refusal,) = joint_messages.fill([], message, "joint_states")
+    assert "stamp has sec -1" in refusal.text
+
+
 @pytest.mark.parametrize("first", [True, False])
 def test_what_one_robot_cannot_use_moves_the_others(first):
     sound, broken = frames(), frames("spin")

@@ -66,6 +66,18 @@ def test_drops_warn_once_and_stay_counted():
     assert level == DiagnosticStatus.STALE and values["dropped"] == "5"
 
 
+def test_what_moves_meshes_is_told_of_where_it_is_refused():
+    node = Fixture()
+    for what, key in ((Input.JOINT_STATE, "joint_states_refused"), (Input.TRANSFORM, "transforms_refused")):
+        node.accounts.refused(Refusal("topic", Reason.MALFORMED, "stamp has sec -1", what=what))
+        level, text, values = node.report()["/hpccd: frames"]
+        assert level == DiagnosticStatus.WARN and f"1 {what} refused" in text
+        assert (values[key], values["dropped"]) == ("1", "0")
+        assert values["last_refusal"] == "topic: malformed: stamp has sec -1"
+        level, text, values = node.report()["/hpccd: frames"]
+        assert level == DiagnosticStatus.STALE and values[key] == "1"
+
+
 def test_failure_is_an_error_until_the_next_success():
     node = Fixture()
     node.metrics.failed("MemoryError: 3 GB")

@@ -379,3 +379,27 @@ def test_a_recording_with_a_description_that_was_refused_is_verified(start_node,
         replay = Replay(recording, recorded_setup.of_recording(recording))
         steps = list(replay.steps())
     assert replay.diverged == replay.unverified == 0 and replay.verified == len(steps) == 2
+
+
+def test_joint_states_that_cannot_be_used_are_told_of_before_the_robot_is_known(start_node):
+    node = start_node(parameters(**JOINTS))
+    joints = node.peer.publisher(JointState, "joint_states")
+    short, endless = crane.joint_state(1, 1), crane.joint_state(1, 1)
+    short.position = short.position[:1]
+    joints.publish(short)
+    values = node.frames_status(joint_states_refused=1)
+    assert values["last_refusal"] == "joint_states: malformed: joint states: 2 names and 1 positions; each joint " \
+        "needs one of both"
+    joints.publish(JointState(name=[f"j{k}" for k in range(1001)], position=[0.0] * 1001))
+    values = node.frames_status(joint_states_refused=2)
+    assert "is not kept until the description of its robot comes" in values["last_refusal"]
+    endless.position[1] = float("inf")  # of a joint of whom, nobody knows yet
+    joints.publish(endless)
+    joints.publish(crane.joint_state(1, 1))
+    publisher = describe(node)
+    values = node.frames_status(joint_states_refused=3)
+    assert "'reach' is at inf; positions must be finite" in values["last_refusal"]
+    publisher.publish(String(data=crane.URDF.replace('"0.6 0.06 0.04"', '"0.9 0.06 0.04"')))
+    node.peer.topology("cloth", SHEET.faces, SHEET.n_vertices)
+    cloth(node, 1)
+    assert node.frames_status(answered=4)["joint_states_refused"] == "3"
