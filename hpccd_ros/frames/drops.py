@@ -36,6 +36,7 @@ class Reason(StrEnum):
     RATE = "rate"  # came faster than max_rate
     BACKWARD = "stamp_backward"
     REPEATED = "stamp_repeated"
+    AHEAD = "stamp_ahead"  # of a transform or joint state: far after those that came before and after it
     LATE = "late"  # its stamp was already answered (or given up) when it came
     INCOMPLETE = "incomplete"  # another mesh had no frame for this stamp
     STATIC_MISSING = "static_missing"  # the vertices of a static mesh have not come

@@ -5,6 +5,10 @@
 by more than a second has begun anew, and so has all. What goes back by less may only be late: until RESTART_AFTER
 samples in a row have increasing stamps, all before its last one. Where a mesh is known to have begun anew
 (`forget_future`) there is no doubt: what came before it went back is forgotten.
+
+**A stamp far ahead.** What comes more than HISTORY_NS after all before it may have a wrong stamp. It stands for its own
+time at once; what is before stays, and nothing is known of the time between, until the next sample: one that goes on
+from there confirms it, one that goes on from before makes it a stray, which is left out.
 """
 
 from bisect import bisect_left
@@ -39,6 +43,25 @@ class Samples(Generic[Value]):
     def begins_anew(self, stamp: int) -> bool:
         return bool(self.stamps) and stamp < self.stamps[-1] - RESTART_NS
 
+    @property
+    def doubtful(self) -> bool:
+        """Whether the newest sample may have a wrong stamp."""
+        return len(self.stamps) > 1 and self.stamps[-1] - self.stamps[-2] > HISTORY_NS
+
+    def in_doubt(self, stamp: int) -> bool:
+        """Whether ``stamp`` is one of which the sample after the newest will tell."""
+        return self.doubtful and self.stamps[-2] < stamp < self.stamps[-1]
+
+    def makes_stray(self, stamp: int) -> bool:
+        """Whether a sample of ``stamp`` goes on from before the newest one, which was far ahead."""
+        return self.doubtful and self.stamps[-2] - RESTART_NS <= stamp < self.stamps[-1] - RESTART_NS
+
+    def forget_newest(self, number: int) -> None:
+        """If it came with this number."""
+        if self.numbers and self.numbers[-1] == number:
+            del self.stamps[-1], self.samples[-1], self.numbers[-1]
+            self.since, self._behind = None, IncreasingStamps()
+
     def forget_before(self, number: int) -> None:
         """Only samples that came with this number or later stay."""
         kept = [place for place, came in enumerate(self.numbers) if came >= number]
@@ -63,7 +86,8 @@ class Samples(Generic[Value]):
         self.stamps.insert(at, stamp)
         self.samples.insert(at, sample)
         self.numbers.insert(at, number)
-        old = max(bisect_left(self.stamps, self.stamps[-1] - HISTORY_NS), len(self.stamps) - MOST_SAMPLES)
+        certain = self.stamps[-2 if self.doubtful else -1]
+        old = max(bisect_left(self.stamps, certain - HISTORY_NS), len(self.stamps) - MOST_SAMPLES)
         del self.stamps[:old], self.samples[:old], self.numbers[:old]
         return run >= RESTART_AFTER
 
@@ -76,14 +100,19 @@ class Run:
         self._came = 0  # messages so far
         self._anew: int | None = None  # the first stamp after it last began anew
 
-    def add(self, stamp: int, of_message: Iterable[tuple[Samples[Value], Value]]) -> None:
-        """What one message tells of some things."""
+    def add(self, stamp: int, of_message: Iterable[tuple[Samples[Value], Value]]) -> int | None:
+        """What one message tells of some things. The stamp of an earlier message that is a stray, and left out."""
         self._came += 1
+        stray = None
         for samples, value in of_message:
-            if samples.begins_anew(stamp):
+            if samples.makes_stray(stamp):
+                stray = samples.stamps[-1]
+                self._leave_out(samples.numbers[-1], stamp)
+            elif samples.begins_anew(stamp):
                 self._begin_anew(self._came, stamp)
             if samples.add(stamp, value, self._came) and samples.since is not None:
                 self._begin_anew(*samples.since)
+        return stray
 
     def forget_future(self, stamp: int) -> None:
         """A mesh begins anew with ``stamp``: samples beyond it are from before, but those that have begun anew too."""
@@ -95,8 +124,22 @@ class Run:
             elif samples.begins_anew(stamp) or (samples.stamps and samples.stamps[-1] > stamp and not with_it):
                 samples.forget_before(self._came + 1)
 
+    def _leave_out(self, number: int, stamp: int) -> None:
+        """The message of this number, all that it told; the time is ``stamp`` again."""
+        for samples in self._all():
+            samples.forget_newest(number)
+        self._anew = stamp
+
     def _begin_anew(self, number: int, stamp: int) -> None:
         """What came before would be interpolated with what comes now, of one thing and across things."""
         for samples in self._all():
             samples.forget_before(number)
         self._anew = stamp
+
+
+def stray_text(stamp: int) -> str:
+    """Of a message that was left out."""
+    return (
+        f"one of stamp {stamp} ns came more than {HISTORY_NS / 1e9:g} s ahead of those before and after it, and is "
+        "left out; its publisher must stamp by the clock of the others, in sec and nanosec"
+    )

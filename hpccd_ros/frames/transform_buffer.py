@@ -47,6 +47,10 @@ class _Edge(Samples[Rigid]):
             raise NoTransformError(f"{late}, before the stamp {stamp} ns", final=False)
         if self.stamps[at] == stamp:
             return self.samples[at]
+        if self.in_doubt(stamp):
+            ahead = f"the last one from {child!r} to {self.parent!r} is of {self.stamps[-1]} ns"
+            text = f"{ahead}, far ahead of the stamp {stamp} ns and of all before: the next one tells whether it counts"
+            raise NoTransformError(text, final=False)
         if at == 0:
             early = f"the first one kept from {child!r} to {self.parent!r} is of {self.stamps[0]} ns"
             raise NoTransformError(f"{early}, after the stamp {stamp} ns", final=True)
@@ -66,10 +70,11 @@ class TransformBuffer:
         self._edges: dict[str, _Edge] = {}
         self._run = Run(self._edges.values)
 
-    def add(self, parent: str, child: str, rigid: Rigid, stamp: int | None) -> None:
+    def add(self, parent: str, child: str, rigid: Rigid, stamp: int | None) -> int | None:
         """``rigid`` takes coordinates in ``child`` to coordinates in ``parent``; stamp ns, None: at all times.
 
-        Raises ValueError: an empty or too long name, a frame in itself, too many frames.
+        The stamp of an earlier one that was far ahead, and is forgotten. Raises ValueError: an empty or too long name,
+        a frame in itself, too many frames.
         """
         parent, child = parent.removeprefix("/"), child.removeprefix("/")
         if max(len(parent), len(child)) > LONGEST_NAME:
@@ -83,9 +88,9 @@ class TransformBuffer:
             edge = self._edges[child] = _Edge(parent)
         if stamp is None:
             edge.always = rigid
-        else:
-            edge.always = None
-            self._run.add(stamp, [(edge, rigid)])
+            return None
+        edge.always = None
+        return self._run.add(stamp, [(edge, rigid)])
 
     def forget_future(self, stamp: int) -> None:
         """A mesh begins anew with ``stamp``: samples beyond it are from before, but those that have begun anew too."""

@@ -7,6 +7,7 @@ from typing import Any
 from sensor_msgs.msg import JointState
 
 from hpccd_ros.frames.drops import Input, Reason, Refusal
+from hpccd_ros.frames.samples import stray_text
 from hpccd_ros.middleware import fields
 from hpccd_ros.robots.errors import RobotError
 from hpccd_ros.robots.joint_frames import JointFrames
@@ -37,8 +38,10 @@ def too_large(topic: str) -> Refusal:
 
 def fill(robots: Iterable[JointFrames], message: Any, topic: str) -> list[Refusal]:
     """Give a sensor_msgs/JointState of ``topic`` to the robots that it moves. It is refused where one of them cannot
-    use it, and where no robot can; the others have it all the same."""
+    use it, and where no robot can; the others have it all the same. An earlier one is refused that this one shows to
+    have been far ahead."""
     problems: list[RobotError] = []
+    stray: int | None = None
     try:
         stamp = fields.stamp_to_ns(message.header.stamp)
         check_lengths(message.name, message.position)
@@ -46,10 +49,14 @@ def fill(robots: Iterable[JointFrames], message: Any, topic: str) -> list[Refusa
         return [_refusal(topic, error)]
     for robot in robots:
         try:
-            robot.add(stamp, message.name, message.position)
+            found = robot.add(stamp, message.name, message.position)
+            stray = found if stray is None else stray
         except RobotError as error:
             problems.append(error)
-    return [_refusal(topic, error) for error in problems[:1]]
+    refusals = [_refusal(topic, error) for error in problems[:1]]
+    if stray is not None:
+        refusals.append(Refusal(topic, Reason.AHEAD, stray_text(stray), what=Input.JOINT_STATE))
+    return refusals
 
 
 def _refusal(topic: str, error: ValueError) -> Refusal:

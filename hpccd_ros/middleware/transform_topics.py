@@ -10,6 +10,7 @@ from typing import Any
 
 from hpccd_ros.base.quoting import quoted
 from hpccd_ros.frames.drops import Input, Reason, Refusal
+from hpccd_ros.frames.samples import stray_text
 from hpccd_ros.frames.transform_buffer import TransformBuffer
 from hpccd_ros.middleware import fields, topic_names
 from hpccd_ros.middleware.message_types import message_class
@@ -58,18 +59,22 @@ def fill(buffer: TransformBuffer, message: Any, topic: TransformTopic) -> list[R
     refusals = []
     for stamped in message.transforms if hasattr(message, "transforms") else [message]:
         try:
-            _add(buffer, stamped, topic.static)
+            stray = _add(buffer, stamped, topic.static)
         except ValueError as error:
             names = f"{quoted(stamped.child_frame_id)} to {quoted(stamped.header.frame_id)}"
             text = f"transform from {names}: {error}"
             refusals.append(Refusal(topic.name, Reason.MALFORMED, text, what=Input.TRANSFORM))
+            continue
+        if stray is not None:
+            text = f"transform from {quoted(stamped.child_frame_id)}: {stray_text(stray)}"
+            refusals.append(Refusal(topic.name, Reason.AHEAD, text, what=Input.TRANSFORM))
     return refusals
 
 
-def _add(buffer: TransformBuffer, stamped: Any, static: bool) -> None:
+def _add(buffer: TransformBuffer, stamped: Any, static: bool) -> int | None:
     shift, turn = stamped.transform.translation, stamped.transform.rotation
     stamp = fields.stamp_to_ns(stamped.header.stamp)
-    buffer.add(
+    return buffer.add(
         stamped.header.frame_id,
         stamped.child_frame_id,
         Rigid.of((shift.x, shift.y, shift.z), (turn.x, turn.y, turn.z, turn.w)),

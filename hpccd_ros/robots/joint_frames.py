@@ -52,9 +52,10 @@ class JointFrames:
     def waiting(self) -> int:
         return len(self._waiting) * len(self.names)
 
-    def add(self, stamp: int, names: Sequence[str], positions: Sequence[float]) -> None:
-        """A joint state. Raises RobotError, and then nothing of it is kept."""
-        self._history.add(stamp, names, positions)
+    def add(self, stamp: int, names: Sequence[str], positions: Sequence[float]) -> int | None:
+        """A joint state. The stamp of an earlier one that was far ahead, and is forgotten. Raises RobotError, and then
+        nothing of it is kept."""
+        return self._history.add(stamp, names, positions)
 
     def ask(self, stamp: int, received: float, new_publisher: bool) -> None:
         self._waiting.append(_Asked(stamp, received, new_publisher))

@@ -39,15 +39,16 @@ class JointHistory:
         self._told = ""  # joints of the last message
         self._run = Run(self._joints.values)
 
-    def add(self, stamp: int, names: Sequence[str], positions: Sequence[float]) -> None:
-        """stamp ns. Joints of others are left out. Raises RobotError, and then nothing of it is kept."""
+    def add(self, stamp: int, names: Sequence[str], positions: Sequence[float]) -> int | None:
+        """stamp ns. Joints of others are left out. The stamp of an earlier one that was far ahead, and is forgotten.
+        Raises RobotError, and then nothing of it is kept."""
         check_lengths(names, positions)
         known = [(name, float(value)) for name, value in zip(names, positions, strict=True) if name in self._joints]
         for name, value in known:
             if not math.isfinite(value):
                 raise RobotError(f"joint states: {quoted(name)} is at {value}; positions must be finite")
         self._told = listed(names)
-        self._run.add(stamp, [(self._joints[name], value) for name, value in known])
+        return self._run.add(stamp, [(self._joints[name], value) for name, value in known])
 
     def clear(self) -> None:
         self._joints = {name: values.emptied() for name, values in self._joints.items()}
@@ -72,6 +73,10 @@ class JointHistory:
             last = min(self._joints[name].stamps[-1] for name in late)
             text = f"the last joint state of {listed(late)} is of {last} ns, before the stamp {stamp} ns"
             raise NoJointStateError(text if last else f"{text}; its publisher must set header.stamp", final=False)
+        if doubtful := [name for name, values in self._joints.items() if values.in_doubt(stamp)]:
+            last = self._joints[doubtful[0]].stamps[-1]
+            text = f"the last joint state of {listed(doubtful)} is of {last} ns, far ahead of the stamp {stamp} ns"
+            raise NoJointStateError(f"{text} and of all before: the next one tells whether it counts", final=False)
         return {name: values.at(stamp) for name, values in self._joints.items()}
 
     def latest(self) -> int | None:

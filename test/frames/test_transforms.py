@@ -13,7 +13,7 @@ from hpccd_ros.frames.rate_limit import RateLimit
 from hpccd_ros.frames.transform_buffer import NoTransformError, TransformBuffer
 from hpccd_ros.frames.transformer import MeshTransformer
 from hpccd_ros.frames.types import MeshFrame, MeshSettings
-from hpccd_ros.middleware import transform_topics
+from hpccd_ros.middleware import topic_names, transform_topics
 from hpccd_ros.rigid.transform import IDENTITY, Rigid
 
 POINTS = np.array([[0.0, 0, 0], [1, 0, 0], [0, 2, 0], [0, 0, 3]])
@@ -122,6 +122,25 @@ def test_the_account_of_what_was_heard_is_bounded_and_names_the_likeliest_first(
                          + " and 22 more")  # fmt: skip
     buffer.add("w" * 255, "x" * 255, IDENTITY, None)
     assert len(buffer.account("x")) < 2000
+
+
+def test_a_transform_far_ahead_is_left_out_by_the_next_one_and_told_of():
+    topic = transform_topics.ALL[topic_names.TRANSFORMS]
+    buffer = TransformBuffer()
+    found = []
+    for second in (1, 2, 3600, 3):
+        message = TransformStamped(child_frame_id="hand")
+        message.header.frame_id, message.header.stamp.sec = "world", second
+        message.transform.translation.x = float(second)
+        found += transform_topics.fill(buffer, message, topic)
+        if second == 3600:
+            with pytest.raises(NoTransformError, match="far ahead of the stamp 2500000000 ns") as caught:
+                buffer.lookup("hand", "world", 5 * SECOND // 2)
+            assert not caught.value.final
+    (refusal,) = found
+    assert (refusal.what, refusal.reason) == (Input.TRANSFORM, Reason.AHEAD)
+    assert refusal.text.startswith("transform from 'hand': one of stamp 3600000000000 ns came more than 10 s ahead of")
+    assert buffer.lookup("hand", "world", 5 * SECOND // 2).shift[0] == 2.5
 
 
 @pytest.mark.parametrize("static", [False, True])

@@ -403,3 +403,18 @@ def test_joint_states_that_cannot_be_used_are_told_of_before_the_robot_is_known(
     node.peer.topology("cloth", SHEET.faces, SHEET.n_vertices)
     cloth(node, 1)
     assert node.frames_status(answered=4)["joint_states_refused"] == "3"
+
+
+def test_a_joint_state_stamped_far_ahead_is_left_out_and_told_of(start_node):
+    node = start_node({**parameters(**JOINTS), "frame_queue": 5})
+    describe(node)
+    joints = first_step(node)
+    joints.publish(crane.joint_state(20, 3_600_000_000_000))
+    cloth(node, 3)
+    node.frames_status(waiting=4)
+    joints.publish(crane.joint_state(4, 4))
+    joints.publish(crane.joint_state(5, 5))
+    cloth(node, 5)
+    values = node.frames_status(answered=16, dropped=0, joint_states_refused=1)
+    assert "one of stamp 3600000000000 ns came more than 10 s ahead" in values["last_refusal"]
+    assert values["last_refusal"].startswith("joint_states: stamp_ahead: ") and values["restarts"] == "0"

@@ -81,7 +81,8 @@ def test_what_is_kept_is_bounded():
     with pytest.raises(NoJointStateError, match=f"of {2 * MOST_SAMPLES} ns") as refused:
         joints.at(0)
     assert refused.value.final
-    joints.add(2 * HISTORY_NS, ["slide", "turn"], [0.0, 0.0])
+    for stamp in (2 * HISTORY_NS, 2 * HISTORY_NS + 1):
+        joints.add(stamp, ["slide", "turn"], [0.0, 0.0])
     with pytest.raises(NoJointStateError):
         joints.at(3 * MOST_SAMPLES - 1)
 
@@ -129,3 +130,33 @@ def test_a_run_shorter_than_a_second_is_told_from_what_is_late_by_its_order():
     assert [of_now(late, stamp) for stamp in (0, 100, 105, 120, 300, 495)] == [False, True, False, True, False, True]
     anew = after_a_short_run(5, 15, 25, 35, 45)
     assert [of_now(anew, stamp) for stamp in (0, 10, 30, 45, 50, 300)] == [None, True, True, True, None, None]
+
+
+FAR = 360 * HISTORY_NS
+
+
+def test_a_stamp_far_ahead_loses_nothing_of_what_comes_before_and_after():
+    joints = after_a_short_run()
+    assert joints.add(FAR, ["slide", "turn"], [9.0, 9.0]) is None
+    assert joints.at(FAR) == {"slide": 9.0, "turn": 9.0}
+    assert of_now(joints, 485) is False
+    with pytest.raises(NoJointStateError, match=f"is of {FAR} ns, far ahead of the stamp 495000000 ns") as refused:
+        joints.at(495 * MS)
+    assert not refused.value.final
+    assert joints.add(500 * MS, ["turn"], [0.0]) == FAR  # of all joints that it told of
+    assert joints.add(510 * MS, ["slide", "turn"], [0.0, 0.0]) is None
+    assert joints.at(495 * MS) == {"slide": 0.0, "turn": 0.0} and joints.latest() == 510 * MS
+    for k in range(3):  # of another clock, each beside one of this
+        assert joints.add(FAR + k, ["slide", "turn"], [9.0, 9.0]) is None
+        assert joints.add((520 + k) * MS, ["slide", "turn"], [0.0, 0.0]) == FAR + k
+    assert of_now(joints, 515) is False and joints.latest() == 522 * MS
+
+
+def test_what_goes_on_from_a_stamp_far_ahead_confirms_it():
+    joints = after_a_short_run()
+    for stamp in (FAR, FAR + 10 * MS):
+        assert joints.add(stamp, ["slide", "turn"], [1.0, 1.0]) is None
+    assert of_now(joints, FAR // MS + 5) is True
+    with pytest.raises(NoJointStateError) as refused:
+        joints.at(495 * MS)
+    assert refused.value.final
