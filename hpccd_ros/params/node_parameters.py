@@ -73,5 +73,8 @@ def _nodes(node) -> str:
 
 
 def _plain(value):
+    if value is None or isinstance(value, (bool, int, float, str)):
+        return value
     # Array parameters arrive as array.array or tuples: JSON and comparison want lists.
-    return value if value is None or isinstance(value, (bool, int, float, str)) else list(value)
+    plain = list(value)
+    return [] if plain == [""] else plain  # YAML parameters know no empty list

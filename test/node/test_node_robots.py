@@ -418,3 +418,19 @@ def test_a_joint_state_stamped_far_ahead_is_left_out_and_told_of(start_node):
     values = node.frames_status(answered=16, dropped=0, joint_states_refused=1)
     assert "one of stamp 3600000000000 ns came more than 10 s ahead" in values["last_refusal"]
     assert values["last_refusal"].startswith("joint_states: stamp_ahead: ") and values["restarts"] == "0"
+
+
+def test_a_robot_alone_is_recorded(start_node, tmp_path):
+    path = tmp_path / "run.mcap"
+    node = start_node({**parameters(**JOINTS), "meshes": [""], "ignored_pairs": [""], "record": str(path)})
+    describe(node)
+    node.wait_until(lambda: "robot crane" not in node.peer.statuses["frames"][1], "the description")
+    publisher = node.peer.publisher(JointState, "joint_states", qos.TRANSFORMS)
+    for k in range(1, 5):
+        publisher.publish(crane.joint_state(k, k))
+        node.frames_status(answered=3 * k)
+    assert node.stop() == 0
+    with Recording(path) as recording:
+        replay = Replay(recording, recorded_setup.of_recording(recording))
+        steps = list(replay.steps())
+    assert replay.diverged == replay.unverified == 0 and replay.verified == len(steps) == 3
