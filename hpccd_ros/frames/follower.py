@@ -20,13 +20,17 @@ class Followed(NamedTuple):
 
 
 class Follower(Protocol):
-    """``names``: of the meshes, in the order of the scene. ``waiting``: their frames asked for and not known yet."""
+    """``names``: of the meshes, in the order of the scene. ``waiting``: their frames asked for and not known yet.
+    ``begun``: how often the time of what moves them went back, and all that was known of it began anew."""
 
     @property
     def names(self) -> Sequence[str]: ...
 
     @property
     def waiting(self) -> int: ...
+
+    @property
+    def begun(self) -> int: ...
 
     def ask(self, stamp: int, received: float, new_publisher: bool) -> None:
         """A frame of each mesh at ``stamp`` ns; `retry` tells what comes of it."""

@@ -9,8 +9,8 @@ from hpccd_ros.frames.drops import Reason, Refusal
 from hpccd_ros.frames.follower import Follower
 from hpccd_ros.frames.frame_queue import FrameQueue
 from hpccd_ros.frames.outcome import Outcome
+from hpccd_ros.frames.reached_times import ReachedTimes
 from hpccd_ros.frames.rigid_mesh import RigidMesh
-from hpccd_ros.frames.samples import RESTART_NS
 from hpccd_ros.frames.transform_buffer import NoTransformError, TransformBuffer
 from hpccd_ros.frames.transformer import MeshTransformer, Transformed
 from hpccd_ros.frames.types import JOINTS, TF, AssemblyRules, MeshFrame, MeshSettings, PoseFrame, SceneFrame, Topology
@@ -150,9 +150,7 @@ class FramePipeline:
             for follower in self._followers:
                 outcome.refusals += follower.clear(Reason.RESTART)
             for _, stamp, _ in outcome.joined[-1:]:
-                self.transforms.forget_future(stamp)
-                for follower in self._followers:
-                    follower.forget_future(stamp)
+                self._forget_future(stamp)
         joined, outcome.joined = outcome.joined, []
         for name, stamp, received in joined:
             if name == self._leader:
@@ -179,11 +177,20 @@ class FramePipeline:
             reached += [stamp for follower in self._followers for stamp in follower.latest(self.transforms)]
         except NoTransformError:
             return Outcome()
-        stamp, last = min((stamp for stamp in reached if stamp is not None), default=None), self._followed
-        if stamp is None or (last is not None and last - RESTART_NS <= stamp <= last):
+        stamp = min((stamp for stamp in reached if stamp is not None), default=None)
+        if stamp is None or not self._reached.goes_on(stamp, self._begun(), self._assembler.restart_after):
             return Outcome()
-        self._followed = stamp
-        return self._ask(stamp, time.monotonic(), new_publisher=last is not None and stamp < last)
+        if self._reached.anew:  # before a frame is placed by what is from before
+            self._forget_future(stamp)
+        return self._ask(stamp, time.monotonic(), new_publisher=self._reached.anew)
+
+    def _begun(self) -> int:
+        return self.transforms.begun + sum(follower.begun for follower in self._followers)
+
+    def _forget_future(self, stamp: int) -> None:
+        self.transforms.forget_future(stamp)
+        for follower in self._followers:
+            follower.forget_future(stamp)
 
     def _assemble(self, mesh: str, transformed: Transformed) -> list[Outcome]:
         outcomes = [Outcome(refusals=transformed.refusals)]
@@ -208,7 +215,7 @@ class FramePipeline:
 
     def _use_transforms(self, transforms: TransformBuffer) -> None:
         self.transforms = transforms
-        self._followed: int | None = None  # stamp of the last frame that no leader gave
+        self._reached = ReachedTimes()
         self._transformers = {
             mesh.name: MeshTransformer(mesh, self._rules.frame_id, self._rules.max_pending, self.transforms)
             for mesh in self._meshes

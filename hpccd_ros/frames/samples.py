@@ -93,10 +93,14 @@ class Samples(Generic[Value]):
 
 
 class Run:
-    """Of things that share a clock. all_samples: of each of them, as they are now."""
+    """Of things that share a clock. all_samples: of each of them, as they are now.
+
+    ``begun``: how often their time went back, and all began anew.
+    """
 
     def __init__(self, all_samples: Callable[[], Iterable[Samples[Any]]]) -> None:
         self._all = all_samples
+        self.begun = 0
         self._came = 0  # messages so far
         self._anew: int | None = None  # the first stamp after it last began anew
 
@@ -135,6 +139,7 @@ class Run:
         for samples in self._all():
             samples.forget_before(number)
         self._anew = stamp
+        self.begun += 1
 
 
 def stray_text(stamp: int) -> str:

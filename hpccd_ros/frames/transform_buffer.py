@@ -92,6 +92,11 @@ class TransformBuffer:
         edge.always = None
         return self._run.add(stamp, [(edge, rigid)])
 
+    @property
+    def begun(self) -> int:
+        """How often their time went back, and all began anew."""
+        return self._run.begun
+
     def forget_future(self, stamp: int) -> None:
         """A mesh begins anew with ``stamp``: samples beyond it are from before, but those that have begun anew too."""
         self._run.forget_future(stamp)

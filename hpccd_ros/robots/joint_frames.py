@@ -52,6 +52,10 @@ class JointFrames:
     def waiting(self) -> int:
         return len(self._waiting) * len(self.names)
 
+    @property
+    def begun(self) -> int:
+        return self._history.begun
+
     def add(self, stamp: int, names: Sequence[str], positions: Sequence[float]) -> int | None:
         """A joint state. The stamp of an earlier one that was far ahead, and is forgotten. Raises RobotError, and then
         nothing of it is kept."""

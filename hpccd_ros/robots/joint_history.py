@@ -54,6 +54,11 @@ class JointHistory:
         self._joints = {name: values.emptied() for name, values in self._joints.items()}
         self._run = Run(self._joints.values)
 
+    @property
+    def begun(self) -> int:
+        """How often their time went back, and all began anew."""
+        return self._run.begun
+
     def forget_future(self, stamp: int) -> None:
         """A mesh begins anew with ``stamp``: values beyond it are from before, but those that have begun anew too."""
         self._run.forget_future(stamp)

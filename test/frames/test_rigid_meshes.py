@@ -207,6 +207,45 @@ def test_a_stream_that_begins_anew(meshes):
     assert frames[2] == (10 if meshes == (LINK,) else 12)
 
 
+@pytest.mark.parametrize("restart_after, first", [(5, 130), (2, 130), (8, 160), (0, None)])
+def test_transforms_alone_that_go_back_by_less_than_a_second_begin_anew_as_meshes_do(restart_after, first):
+    pipeline = pipeline_of(LINK, TOOL, restart_after=restart_after)
+    stamps, outcome = [], Outcome()
+    for run, times in enumerate([range(0, 900, 10), range(100, 1000, 10)]):
+        for stamp in times:
+            for child, parent in (("link", "world"), ("tool", "link_frame")):
+                pose = Rigid.of((100.0 * run, 0, 0), (0, 0, 0, 1))
+                pipeline.transforms.add(parent, f"{child}_frame", pose, stamp * MS)
+                part = retried(pipeline)
+                stamps += [frame.stamp // MS for frame in part.frames]
+                if first is not None:
+                    assert all(frame.placements[1].pose.shift[0] == 200.0 * run for frame in part.frames)
+                outcome += part
+    assert stamps[:90] == list(range(0, 900, 10))
+    assert stamps[90:] == list(range(900 if first is None else first, 1000, 10))
+    assert len(outcome.restarts) == (first is not None) and not outcome.refusals
+
+
+def test_transforms_alone_of_which_one_is_late_do_not_begin_anew():
+    pipeline, stamps = pipeline_of(LINK), []
+    for stamp in (0, 10, 20, 30, 15, 16, 17, 40, 18, 19, 21, 22, 50):
+        pipeline.transforms.add("world", "link_frame", IDENTITY, stamp * MS)
+        outcome = retried(pipeline)
+        stamps += [frame.stamp // MS for frame in outcome.frames]
+        assert not outcome.restarts
+    assert stamps == [0, 10, 20, 30, 40, 50]
+
+
+def test_a_transform_far_ahead_moves_a_scene_of_transforms_alone_there_and_back():
+    pipeline, stamps, restarts = pipeline_of(LINK), [], []
+    for stamp in (1000, 1010, 3_600_000, 1020, 1030):
+        pipeline.transforms.add("world", "link_frame", IDENTITY, stamp * MS)
+        outcome = retried(pipeline)
+        stamps += [frame.stamp // MS for frame in outcome.frames]
+        restarts += outcome.restarts
+    assert stamps == [1000, 1010, 3_600_000, 1020, 1030] and len(restarts) == 1
+
+
 def test_after_the_clock_was_set_back_no_transform_from_before_is_used():
     pipeline, seen = pipeline_of(CLOTH, LINK), []
 

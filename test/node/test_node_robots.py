@@ -434,3 +434,23 @@ def test_a_robot_alone_is_recorded(start_node, tmp_path):
         replay = Replay(recording, recorded_setup.of_recording(recording))
         steps = list(replay.steps())
     assert replay.diverged == replay.unverified == 0 and replay.verified == len(steps) == 3
+
+
+def test_a_robot_alone_goes_on_after_its_clock_was_set_back_by_less_than_a_second(start_node, tmp_path):
+    path, ms = tmp_path / "run.mcap", 1_000_000
+    given = {**parameters(**JOINTS), "meshes": [""], "ignored_pairs": [""], "record": str(path), "frame_queue": 20}
+    node = start_node(given)
+    describe(node)
+    node.wait_until(lambda: "robot crane" not in node.peer.statuses["frames"][1], "the description")
+    publisher = node.peer.publisher(JointState, "joint_states", qos.TRANSFORMS)
+    for run in range(2):
+        for k in range(1, 9):
+            publisher.publish(crane.joint_state(k + 10 * run, (100 * k + 7 * run) * ms))
+    stamps = [message.header.stamp.nanosec // ms for message in node.contacts(10)]
+    assert stamps == [*range(200, 900, 100), 607, 707, 807]
+    node.frames_status(answered=3 * 12, restarts=1, dropped=0, waiting=0)
+    assert node.stop() == 0
+    with Recording(path) as recording:
+        replay = Replay(recording, recorded_setup.of_recording(recording))
+        steps = list(replay.steps())
+    assert replay.diverged == replay.unverified == 0 and replay.verified == len(steps) == 10
