@@ -16,8 +16,9 @@ from hpccd_ros.params.values import ParameterError
 from hpccd_ros.robots.errors import RobotError, SemanticsError
 from hpccd_ros.robots.robot import Robot
 
-# s between two scenes: reading a robot takes up to seconds, and anybody may publish descriptions.
+# s without reading descriptions after some were read: that takes up to seconds, and anybody may publish them.
 PERIOD = 1.0
+LOOK = 0.25  # s between two looks at those that came too soon
 LONGEST = 500
 
 
@@ -36,7 +37,7 @@ class RobotDescriptions:
         self._texts: dict[str, str] = {}  # in use
         self._waiting: dict[str, str] = {}  # came too soon after the last
         self._refused: dict[str, str] = {}  # why the last description was
-        self._changed = -PERIOD
+        self._read = -PERIOD  # when it ended
         self.robots: dict[str, Robot] = {}
         self._topics = robot_parameters.topics(settings[ROBOT])
         for name in self._values:
@@ -44,7 +45,7 @@ class RobotDescriptions:
         for name, topic in self._topics.items():
             self._listen(name, topic)
         if self._topics:
-            node.configured_timer(PERIOD, self._take_waiting)
+            node.configured_timer(LOOK, self._take_waiting)
 
     @property
     def complete(self) -> bool:
@@ -95,19 +96,20 @@ class RobotDescriptions:
             self._refused.pop(name, None)
             return
         self._waiting[name] = text
-        if time.monotonic() - self._changed >= PERIOD:
-            self._take_waiting()
+        self._take_waiting()
 
     def _take_waiting(self) -> None:
-        if not self._waiting:
+        if not self._waiting or time.monotonic() - self._read < PERIOD:
             return
         waiting, self._waiting = self._waiting, {}
         known = dict(self.robots)
-        for name, text in waiting.items():
-            self._take(name, text)
-        self._changed = time.monotonic()
-        if self.robots != known:
-            self._on_change()
+        try:
+            for name, text in waiting.items():
+                self._take(name, text)
+            if self.robots != known:
+                self._on_change()
+        finally:
+            self._read = time.monotonic()
 
     def _take(self, name: str, text: str) -> None:
         try:
