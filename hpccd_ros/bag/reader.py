@@ -103,8 +103,8 @@ class Recording:
         stored = next((record for record in file.metadata if record.name == HPCCD_RECORD), None)
         if stored is not None and self.info is None:
             self.info = _info(path, stored)
-        if not self.attachments:
-            self.attachments = {a.name: a.data for a in file.attachments}
+        for attachment in file.attachments:  # what came to be needed later is in later files alone
+            self.attachments.setdefault(attachment.name, attachment.data)
         return file
 
     def _add_topic(self, channel, schema, count):

@@ -69,13 +69,16 @@ class BagWriter:
         if self._file is not None:
             self._guarded(lambda: self._file.register(topic))
 
-    def attach(self, name: str, data: bytes) -> None:
-        """A file that a replay needs and that was not known at the start. One of this name stays as it is."""
-        if any(name == known for known, _ in self._options["attachments"]):
-            return
+    def attach(self, name: str, data: bytes) -> bool:
+        """A file that a replay needs and that was not known at the start. One of this name stays as it is: False where
+        that has other content."""
+        for known, there in self._options["attachments"]:
+            if name == known:
+                return there == data
         self._options["attachments"].append((name, data))
         if self._file is not None:
             self._guarded(lambda: self._file.attach(name, data))
+        return True
 
     def write(self, topic_name: str, data: bytes, log_time: int, publish_time: int, sequence: int = 0) -> None:
         """Append the CDR bytes of one message; times in ns since the epoch."""

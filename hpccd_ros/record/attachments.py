@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The files that a recording carries along: without them a replay elsewhere could not rebuild its scene."""
 
+import hashlib
 import itertools
 from collections.abc import Mapping
 from pathlib import Path
@@ -32,9 +33,15 @@ def semantics_name(robot: str) -> str:
     return f"robot/{robot}/semantics.srdf"
 
 
-def link_mesh_name(robot: str, number: int, uri: str) -> str:
-    """Of the mesh file that is the ``number``-th of those that the robot's description names."""
-    return f"robot/{robot}/mesh/{number}/{Path(uri).name}"
+def link_mesh_name(robot: str, uri: str) -> str:
+    """Of a mesh file that the robot's description names."""
+    return f"robot/{robot}/mesh/{_digest(uri)}/{Path(uri).name}"
+
+
+def changed_link_mesh_name(name: str, description: str) -> str:
+    """In place of the ``name`` of a mesh file, where it was another file when an earlier description named it."""
+    folder, _, file = name.rpartition("/")
+    return f"{folder}/{_digest(description)}/{file}"
 
 
 def files(parameters: dict) -> tuple[Files, list[str]]:
@@ -76,8 +83,12 @@ def link_meshes(robot: str, values: Mapping[str, Any], text: str) -> tuple[Files
         except (MeshFileError, UserError) as error:
             missing.append(_missing(f"mesh file {shortened(uri)}", error))
             continue
-        _read(f"mesh file {shortened(uri)}", link_mesh_name(robot, number, uri), file, found, missing)
+        _read(f"mesh file {shortened(uri)}", link_mesh_name(robot, uri), file, found, missing)
     return found, missing
+
+
+def _digest(text: str) -> str:
+    return hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()[:16]
 
 
 def _read(what: str, name: str, path: str, found: Files, missing: list[str]) -> None:

@@ -44,7 +44,8 @@ class DescribedRobots:
             read.add(text)
             found, missing = attachments.link_meshes(robot, values, message.data)
             for name, data in found:
-                self._bag.attach(name, data)
+                if not self._bag.attach(name, data):
+                    self._bag.attach(attachments.changed_link_mesh_name(name, message.data), data)
             for text in missing:
                 if text not in self._told:
                     self._told.add(text)

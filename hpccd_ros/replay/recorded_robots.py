@@ -81,13 +81,11 @@ def _resolver(recording, name: str, values: Mapping[str, Any], text: str, folder
     """Of what is attached a copy in ``folder``, of all else the file itself."""
     description = values["description"]
     otherwise = robot_files.resolver(None if robot_parameters.comes_on_topic(description) else description)
-    names = {
-        uri: attachments.link_mesh_name(name, number, uri)
-        for number, uri in enumerate(robot_files.mesh_uris(text, values["geometry"]))
-    }
 
     def find(uri: str) -> str:
-        data = recording.attachments.get(names.get(uri, ""))
+        attached = attachments.link_mesh_name(name, uri)
+        changed = attachments.changed_link_mesh_name(attached, text)
+        data = recording.attachments.get(changed, recording.attachments.get(attached))
         if data is None:
             return otherwise(uri)
         # A name of our own: that of a recording may be any.

@@ -133,3 +133,19 @@ def test_a_single_file_cannot_be_split(tmp_path):
 def test_unknown_compression(tmp_path):
     with pytest.raises(ValueError, match="'bzip2' is none of none, lz4, zstd"):
         BagWriter(tmp_path / "bag.mcap", compression="bzip2")
+
+
+def test_files_that_came_to_be_needed_later_are_found_and_none_is_overwritten(tmp_path):
+    path = tmp_path / "bag"
+    writer = BagWriter(path, max_bytes=1, attachments=[("robot/arm/semantics.srdf", b"first")])
+    writer.add_topic(Topic("/text", STRING, []))
+    for number in range(3):
+        writer.write("/text", text_message("text"), 10**18 + number, 10**18 + number)
+        assert writer.attach("late", b"late") and writer.attach(f"{number}", b"any")
+        assert not writer.attach("late", b"another")
+    writer.close()
+    assert len(writer.file_paths) == 3
+    with Recording(path) as recording:
+        assert recording.attachments == {
+            "robot/arm/semantics.srdf": b"first", "late": b"late", "0": b"any", "1": b"any", "2": b"any",
+        }  # fmt: skip

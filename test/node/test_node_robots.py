@@ -454,3 +454,32 @@ def test_a_robot_alone_goes_on_after_its_clock_was_set_back_by_less_than_a_secon
         replay = Replay(recording, recorded_setup.of_recording(recording))
         steps = list(replay.steps())
     assert replay.diverged == replay.unverified == 0 and replay.verified == len(steps) == 10
+
+
+@pytest.mark.parametrize("second", ["first", "second"])
+def test_mesh_files_of_a_refused_description_do_not_take_the_place_of_those_in_use(start_node, tmp_path, second):
+    path = tmp_path / "run.mcap"
+
+    def described(folder, text):
+        file = tmp_path / folder / "boom.obj"
+        file.parent.mkdir(exist_ok=True)
+        file.write_text(text)
+        return crane.URDF.replace('<box size="0.6 0.06 0.04"/>', f'<mesh filename="{file}"/>')
+
+    node = start_node({**parameters(**JOINTS), "record": str(path), "frame_queue": 5})
+    publisher = describe(node, described("first", "no mesh"))
+    node.wait_until(lambda: "boom.obj" in node.peer.statuses["frames"][1], "what is wrong with the first")
+    boom = "v 0 0 0\nv .4 0 0\nv 0 .4 0\nv 0 0 .4\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"
+    publisher.publish(String(data=described(second, boom) + "<!-- mended -->"))
+    node.wait_until(lambda: "robot crane" not in node.peer.statuses["frames"][1], "the second")
+    node.peer.topology("cloth", SHEET.faces, SHEET.n_vertices)
+    joints = node.peer.publisher(JointState, "joint_states", qos.TRANSFORMS)
+    for k in (1, 2, 3):
+        joints.publish(crane.joint_state(k, k))
+        cloth(node, k)
+        node.frames_status(answered=4 * k)
+    assert node.stop() == 0
+    with Recording(path) as recording:
+        replay = Replay(recording, recorded_setup.of_recording(recording))
+        steps = list(replay.steps())
+    assert replay.diverged == replay.unverified == 0 and replay.verified == len(steps) == 2

@@ -2,6 +2,7 @@
 """What a recording takes along of the files that a description names, which may be a stranger's."""
 
 import os
+import re
 
 import pytest
 
@@ -19,7 +20,9 @@ def test_mesh_files_are_attached(tmp_path):
     file = tmp_path / "a.stl"
     file.write_bytes(b"any")
     for uri in (str(file), f"file://{file}"):
-        assert attachments.link_meshes("arm", VALUES, description(uri)) == ([("robot/arm/mesh/0/a.stl", b"any")], [])
+        ((name, data),), missing = attachments.link_meshes("arm", VALUES, description(uri))
+        assert re.fullmatch("robot/arm/mesh/[0-9a-f]{16}/a.stl", name) and (data, missing) == (b"any", [])
+        assert name == attachments.link_mesh_name("arm", uri)
 
 
 @pytest.mark.parametrize("uri", ["{}/secret", "{}/pipe.stl", "{}/folder.stl", "~nobody-is-called-so/a.stl",
