@@ -46,17 +46,20 @@ class Accounts:
         for mesh in outcome.asked:
             self.metrics.frame_received(mesh, None)
         for refusal in outcome.refusals:
-            self.refused(refusal)
+            self._count(refusal)
+        self.log.together(outcome.refusals)
 
     def refused(self, refusal: Refusal) -> None:
         """Counted, and logged where there is something to say."""
+        self._count(refusal)
+        self.log.together([refusal])
+
+    def _count(self, refusal: Refusal) -> None:
         if refusal.what in REFUSED_BESIDE_MESHES:
             self.connections[REFUSED_BESIDE_MESHES[refusal.what]] += refusal.messages
         else:
             (self.topologies_refused if refusal.what is Input.TOPOLOGY else self.dropped).count(refusal)
         self.on_refused(refusal)
-        if refusal.text:
-            self.log(refusal.mesh, refusal.reason, refusal.text)
 
     def answered(self, found: Detection, total: int, sent: int) -> None:
         """One step: ``total`` contacts were found, ``sent`` of them have just been published."""

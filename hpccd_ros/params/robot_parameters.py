@@ -74,12 +74,20 @@ def check(settings: dict[str, Any]) -> None:
                 "to transforms"
             )
         if need_transforms({name: values}) and not settings["frame_id"]:
-            ways = "" if not values["joint_states"] else f", or give {prefix}.pose"
-            what = "the root link is" if values["joint_states"] else "links are"
-            raise ParameterError(
-                f"{prefix}: {what} placed by transforms, which need a frame to transform to; set parameter frame_id"
-                f"{ways}"
-            )
+            raise ParameterError(_unplaced(prefix, values))
+
+
+def _unplaced(prefix: str, values: Mapping[str, Any]) -> str:
+    """That neither a pose nor a frame says where the links are, and what to give."""
+    if values["joint_states"]:
+        return (
+            f"{prefix}.pose: not given, so that transforms place the root link; give it, or set parameter frame_id, "
+            "the frame to transform to"
+        )
+    return (
+        f"{prefix}.joint_states: not given, so that transforms move the links; give the topic of its joint states and "
+        f"{prefix}.pose, where its root link stands, or set parameter frame_id, the frame to transform to"
+    )
 
 
 def pose(name: str, values: Mapping[str, Any]) -> Rigid | None:

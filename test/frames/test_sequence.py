@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Lost messages and new publishers from sequence numbers; the log of refusals."""
 
-from hpccd_ros.frames.drops import Reason
+from hpccd_ros.frames.drops import Reason, Refusal
 from hpccd_ros.frames.sequence import SequenceWatch
 from hpccd_ros.node.refusal_log import RefusalLog
 
@@ -39,3 +39,13 @@ def test_refusals_do_not_flood_the_log():
         "cloth: not_finite: vertex 4 is nan (4 more of these in between)",
     ]
     assert log.last == "cloth: not_finite: vertex 4 is nan"
+
+
+def test_what_is_refused_of_many_links_of_a_robot_is_one_line():
+    lines = []
+    log = RefusalLog(lines.append)
+    links = [Refusal(f"arm/l{k}", Reason.NO_TRANSFORM, f"no transform connects 'left_l{k}'") for k in range(30)]
+    log.together([*links, Refusal("cloth", Reason.LATE, "stamp 4"), Refusal("arm/l1", Reason.RESTART), *links[:2]])
+    log.together(links)
+    first = "arm/l0: no_transform: no transform connects 'left_l0'; as well arm/l1, arm/l2, arm/l3, arm/l4, arm/l5, "
+    assert lines == ["cloth: late: stamp 4", first + "arm/l6, arm/l7, arm/l8, arm/l9, arm/l10 and 19 more"]

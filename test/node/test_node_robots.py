@@ -483,3 +483,36 @@ def test_mesh_files_of_a_refused_description_do_not_take_the_place_of_those_in_u
         replay = Replay(recording, recorded_setup.of_recording(recording))
         steps = list(replay.steps())
     assert replay.diverged == replay.unverified == 0 and replay.verified == len(steps) == 2
+
+
+@pytest.mark.parametrize(
+    "robot, text",
+    [
+        ({}, "robot.crane.joint_states: not given, so that transforms move the links; give the topic of its joint "
+         "states and robot.crane.pose, where its root link stands, or set parameter frame_id"),
+        ({"joint_states": "joint_states"}, "robot.crane.pose: not given, so that transforms place the root link; "
+         "give it, or set parameter frame_id"),
+    ],
+    ids=["nothing", "joint states"],
+)  # fmt: skip
+def test_a_robot_of_which_nothing_says_where_it_is_ends_the_start_with_what_it_lacks(start_node, robot, text):
+    given = {"robots": ["crane"], **{f"robot.crane.{key}": value for key, value in robot.items()}}
+    node = start_node(given, wait=False)
+    assert node.process.wait(timeout=PATIENCE) != 0
+    assert text in node.output()
+
+
+def test_a_wrong_frame_prefix_is_one_line_in_the_log(start_node):
+    node = start_node({**parameters(frame_prefix="left_"), "pending_frames": 2})
+    describe(node)
+    node.wait_until(lambda: "robot crane" not in node.peer.statuses["frames"][1], "the description")
+    node.peer.topology("cloth", SHEET.faces, SHEET.n_vertices)
+    tree = node.peer.publisher(TransformStamped, "transforms", qos.TRANSFORMS)
+    for k in range(1, 7):
+        for message in transforms(k, "right_"):
+            tree.publish(message)
+        cloth(node, k)
+    node.frames_status(received=24, waiting=8)
+    (line,) = [line for line in node.output().splitlines() if "no_transform" in line]
+    assert "crane/mast: no_transform: no transform connects 'left_mast' and 'world'" in line
+    assert line.endswith("; as well crane/boom, crane/hook")
