@@ -2,7 +2,6 @@
 """A step in brief: contacts and smallest distance of each pair of meshes. No ROS."""
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,8 +20,8 @@ class PairSummary:
     distance: float
 
 
-def summarise(found: Detection, pairs: Sequence[tuple[str, str]]) -> list[PairSummary]:
-    """One for each of ``pairs``, of all contacts that were found."""
+def summarise(found: Detection) -> list[PairSummary]:
+    """One for each pair that the step's scene tests, of all contacts that were found."""
     names = found.layout.mesh_names
     counts, earliest = _by_pair(found)
     index = {name: number for number, name in enumerate(names)}
@@ -35,7 +34,7 @@ def summarise(found: Detection, pairs: Sequence[tuple[str, str]]) -> list[PairSu
             float(earliest[index[a], index[b]]),
             float(distances.get(frozenset((a, b)), math.nan)),
         )
-        for a, b in pairs
+        for a, b in found.tested_pairs
     ]
 
 

@@ -2,6 +2,7 @@
 """From the two frames of a step to its contacts. No ROS, no threads of its own."""
 
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import hpccd_core as hc
@@ -21,7 +22,7 @@ class Detection:
     ``backend``, ``threads``: what was used. ``detect_ms``: wall time of the core's call. ``gaps``: the smallest
     distance of each pair of meshes at the end, where the options ask for it; ``gaps_backend``: what found them, which
     may be another one; ``gaps_before``: those at the start, where they were asked for then. ``bounds``: of motions by
-    poses or joints.
+    poses or joints. ``tested_pairs``: of the scene, as SceneBuilder has them.
     """
 
     start: SceneFrame
@@ -38,6 +39,7 @@ class Detection:
     gaps_backend: str = ""
     gaps_before: list[hc.Gap] | None = None
     bounds: MotionBounds = NO_BOUNDS
+    tested_pairs: Sequence[tuple[str, str]] = ()
 
     @property
     def near(self) -> int:
@@ -55,6 +57,7 @@ class StepDetector:
         self.options = options
         self._builder = builder
         self._names = tuple(mesh.name for mesh in builder.meshes)
+        self._tested_pairs = tuple(builder.tested_pairs())
         self._scene: hc.Scene | None = None
         self._scene_of: SceneFrame | None = None
         self._layout: Layout | None = None
@@ -161,4 +164,5 @@ class StepDetector:
             dict(profile),
             dict(stats),
             bounds=bounds,
+            tested_pairs=self._tested_pairs,
         )

@@ -12,7 +12,6 @@ from std_msgs.msg import Header
 from visualization_msgs.msg import MarkerArray
 
 from hpccd_ros.detect.pair_summary import summarise
-from hpccd_ros.detect.scene import SceneBuilder
 from hpccd_ros.detect.step_detector import Detection
 from hpccd_ros.middleware import (
     contact_messages,
@@ -33,7 +32,6 @@ class ContactsPublisher:
 
     def __init__(self, node: GuardedLifecycleNode, settings: dict[str, Any]) -> None:
         self._settings = settings
-        self._tested_pairs: list[tuple[str, str]] = []
         profile = qos.contacts(settings["contacts_durability"])
         self._contacts = node.configured_publisher(ContactArray, topic_names.CONTACTS, profile)
         self._distances = node.configured_publisher(DistanceArray, topic_names.DISTANCES, qos.DISTANCES)
@@ -45,10 +43,6 @@ class ContactsPublisher:
     @property
     def topic(self) -> str:
         return self._contacts.topic_name
-
-    def begin(self, builder: SceneBuilder) -> None:
-        """Of this scene are the steps to come."""
-        self._tested_pairs = builder.tested_pairs()
 
     def publish(self, found: Detection, dropped_frames: int) -> ContactArray:
         """The message that was sent. dropped_frames: of the scene, so far."""
@@ -91,7 +85,7 @@ class ContactsPublisher:
         self._distances.publish(message)
 
     def _publish_pairs(self, found: Detection, header: Header) -> None:
-        pairs = [PairSummary(**vars(pair)) for pair in summarise(found, self._tested_pairs)]
+        pairs = [PairSummary(**vars(pair)) for pair in summarise(found)]
         self._pairs.publish(PairSummaryArray(header=header, step=found.end.step, pairs=pairs))
 
     def show(self, found: Detection, header: Header) -> None:

@@ -117,7 +117,6 @@ class HpccdNode(GuardedLifecycleNode):
         """Of the robots that are known. Raises ValueError, and then the scene before stays."""
         self._builder = self._configuration.know(self._robots.robots)
         self._deforming = [mesh.name for mesh in self._builder.meshes if not mesh.static]
-        self._contacts.begin(self._builder)
         if self._stream is not None:
             self._stream.remake(self._builder)
         elif self._builder.meshes:

@@ -53,7 +53,7 @@ def test_counts_and_times_are_those_of_the_contacts():
         pair = tuple(NAMES[k] for k in sorted((a, b)))
         counts[pair] = counts.get(pair, 0) + 1
         first[pair] = min(first.get(pair, math.inf), toc)
-    summaries = summarise(found, builder.tested_pairs())
+    summaries = summarise(found)
     assert sum(one.count for one in summaries) == len(found.contacts) > 0
     gaps = {frozenset((gap.mesh_a, gap.mesh_b)): gap.distance for gap in found.gaps}
     for one in summaries:
@@ -65,4 +65,11 @@ def test_counts_and_times_are_those_of_the_contacts():
 
 def test_a_distance_that_nobody_computed_is_unknown():
     builder = SceneBuilder(MESHES)
-    assert all(math.isnan(one.distance) for one in summarise(detection(builder), builder.tested_pairs()))
+    assert all(math.isnan(one.distance) for one in summarise(detection(builder)))
+
+
+def test_an_answer_of_the_scene_before_has_the_pairs_of_its_own():
+    """Another description of a robot may make another scene before the last answer is told."""
+    found = detection(SceneBuilder(MESHES, (("a", "b"),)))
+    told = {(one.mesh_a, one.mesh_b) for one in summarise(found)}
+    assert ("a", "a") in told and ("a", "room") in told and ("a", "b") not in told

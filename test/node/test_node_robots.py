@@ -6,13 +6,16 @@ import subprocess
 import sys
 
 import crane
+import holding_node
 import numpy as np
 import pytest
 from geometry_msgs.msg import TransformStamped
+from hpccd.msg import PairSummaryArray
 from lifecycle_msgs.msg import Transition
 from node_calls import change_state, set_parameter
 from node_process import PATIENCE
 from sensor_msgs.msg import JointState
+from sources import SUPPORT
 from std_msgs.msg import String
 from waving_sheet import sheet_faces, sheet_positions
 
@@ -516,3 +519,22 @@ def test_a_wrong_frame_prefix_is_one_line_in_the_log(start_node):
     (line,) = [line for line in node.output().splitlines() if "no_transform" in line]
     assert "crane/mast: no_transform: no transform connects 'left_mast' and 'world'" in line
     assert line.endswith("; as well crane/boom, crane/hook")
+
+
+def test_a_summary_that_is_told_after_the_scene_changed_has_the_links_of_its_answer(start_node):
+    node = start_node({**parameters(**JOINTS), "pair_summaries": True}, program=[str(SUPPORT / "holding_node.py")])
+    publisher, heard = describe(node), []
+    node.peer.node.create_subscription(PairSummaryArray, client.PAIRS_TOPIC, heard.append, client.PAIRS_QOS)
+    node.wait_until(lambda: node.peer.node.count_publishers(client.PAIRS_TOPIC), "publisher of pairs")
+    node.wait_until(lambda: "robot crane" not in node.peer.statuses["frames"][1], "the description")
+    node.peer.topology("cloth", SHEET.faces, SHEET.n_vertices)
+    joints = node.peer.publisher(JointState, "joint_states", qos.TRANSFORMS)
+    for k, stamp in ((1, holding_node.HANGS // 2), (2, holding_node.HANGS)):
+        joints.publish(crane.joint_state(k, stamp))
+        node.peer.vertices("cloth", sheet_positions(N, k), stamp=stamp, frame_id="world")
+        node.frames_status(received=4 * k)
+    publisher.publish(String(data=crane.URDF.replace('"boom"', '"jib"')))
+    node.wait_until(lambda: heard, "a summary")
+    assert ("cloth", "crane/boom") in {(pair.mesh_a, pair.mesh_b) for pair in heard[0].pairs}
+    assert node.contacts(1)[0].mesh_names == ["cloth", *crane.LINKS]
+    assert node.peer.statuses["errors"][2]["errors"] == "0"
