@@ -5,7 +5,10 @@ Only where a message has got fields since it was recorded, empty ones are added:
 """
 
 import itertools
+import sys
+import tempfile
 from collections import deque
+from pathlib import Path
 
 import rclpy
 import yaml
@@ -15,6 +18,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from hpccd_ros.bag.decode import completion
 from hpccd_ros.bag.reader import RecordedTopic, Recording, RecordingError
 from hpccd_ros.base.errors import UserError
+from hpccd_ros.base.quoting import listed
 from hpccd_ros.middleware import environment, qos, ros_start, stop_signals, transform_topics
 from hpccd_ros.middleware.listeners import await_acknowledged, await_subscribers
 from hpccd_ros.middleware.message_types import message_class
@@ -27,19 +31,22 @@ DEPTH = 20
 MOST_QOS = 100_000
 # Seconds that the last messages may take on their way.
 LAST = 2.0
+# Seconds of waiting from which on it is told what for.
+TOLD_AFTER = 1.0
 
 
 def main(args) -> int:
     """Play as the options of `hpccd replay --publish` say."""
-    with stop_signals.collected() as stop, Recording(args.file) as recording:
+    with stop_signals.collected() as stop, Recording(args.file) as recording, tempfile.TemporaryDirectory() as folder:
         topics = _topics(recording, args)
         environment.prepare()
+        environment.ask_often(Path(folder))  # each topic begins when its first message has arrived
         ros_start.init(["--ros-args", *args.ros_args] if args.ros_args else None)
         node = rclpy.create_node("hpccd_replay", start_parameter_services=False)
         try:
             publishers = {topic.name: _publisher(node, topic) for topic in topics}
             complete = {topic.name: completion(topic) or bytes for topic in topics}
-            lacking = await_subscribers(publishers, args.subscribers, args.wait, stop)
+            lacking = _await_subscribers(publishers, args, stop)
             if lacking and not stop:
                 raise UserError(_too_few(lacking, args.subscribers))
             count = _play(recording, publishers, complete, args, stop)
@@ -101,6 +108,29 @@ def _too_few(lacking: dict[str, int], wanted: int) -> str:
     return f"fewer than {wanted} subscribe to {names}: start them first, --wait longer, or ask for fewer --subscribers"
 
 
+def _await_subscribers(publishers, args, stop) -> dict[str, int]:
+    at_once = min(args.wait, TOLD_AFTER)
+    lacking = await_subscribers(publishers, args.subscribers, at_once, stop)
+    if not lacking or stop or args.wait == at_once:
+        return lacking
+    _tell(f"waiting for subscribers of {listed(lacking)}, {args.wait:g} s at most (--wait)")
+    return await_subscribers(publishers, args.subscribers, args.wait - at_once, stop)
+
+
+def _await_arrival(publishers, topics, args, stop) -> float:
+    """How long the last messages of these topics took to arrive, s."""
+    awaited, at_once = [publishers[topic] for topic in topics], min(args.wait, TOLD_AFTER)
+    waited = await_acknowledged(awaited, at_once, stop)
+    if waited < at_once or stop or args.wait == at_once:
+        return waited
+    _tell(f"waiting until all subscribers have the first of {listed(topics)}, {args.wait:g} s at most (--wait)")
+    return waited + await_acknowledged(awaited, args.wait - at_once, stop)
+
+
+def _tell(text: str) -> None:
+    print(text, file=sys.stderr, flush=True)
+
+
 def _play(recording, publishers, complete, args, stop) -> int:
     count, first, last_frame = 0, None, None
     pace = Pace(1.0 if args.rate is None else args.rate, stop)
@@ -119,7 +149,8 @@ def _play(recording, publishers, complete, args, stop) -> int:
         for earlier in itertools.chain.from_iterable(latched.values()):
             publishers[earlier.topic].publish(complete[earlier.topic](earlier.data))
             count += 1
-        await_acknowledged([publishers[topic] for topic in latched], args.wait, stop)
+        if latched:
+            _await_arrival(publishers, latched, args, stop)
         latched.clear()
         if args.step:
             # One frame: all messages published at about the same time, as meshes of one step are.
@@ -133,5 +164,5 @@ def _play(recording, publishers, complete, args, stop) -> int:
         count += 1
         if message.topic not in begun:
             begun.add(message.topic)
-            pace.delay(await_acknowledged([publishers[message.topic]], args.wait, stop))
+            pace.delay(_await_arrival(publishers, [message.topic], args, stop))
     return count

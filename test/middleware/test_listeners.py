@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A stream begins when its readers have its first message, not when its publisher knows of them."""
 
+import os
 import signal
 import subprocess
 import sys
@@ -26,6 +27,28 @@ node = rclpy.create_node("reader")
 hear = lambda message: print(message.data, flush=True)
 node.create_subscription(UInt32, "listeners/numbers", hear, QoSProfile(depth=10))
 rclpy.spin(node)
+"""
+
+
+# Prints how long the first messages of several topics took to be acknowledged, one after the other.
+WRITER = """
+import pathlib, sys
+from hpccd_ros.middleware import environment
+environment.prepare()
+environment.ask_often(pathlib.Path(sys.argv[1]))
+import rclpy
+from hpccd_ros.middleware.listeners import await_acknowledged, await_subscribers
+from rclpy.qos import QoSProfile
+from std_msgs.msg import UInt32
+rclpy.init()
+node = rclpy.create_node("writer")
+publishers = [node.create_publisher(UInt32, "listeners/numbers", QoSProfile(depth=10)) for k in range(4)]
+assert not await_subscribers(dict(enumerate(publishers)), 1, float(sys.argv[2]))
+waited = 0
+for k, publisher in enumerate(publishers):
+    publisher.publish(UInt32(data=k))
+    waited += await_acknowledged([publisher], float(sys.argv[2]))
+print(waited)
 """
 
 
@@ -75,3 +98,19 @@ def test_readers_that_have_not_got_it_are_waited_for(publisher, reader):
     reader.send_signal(signal.SIGCONT)
     assert await_acknowledged([publisher], PATIENCE) < PATIENCE
     assert reader.stdout.readline() == "2\n"
+
+
+def test_publishers_that_ask_often_wait_for_no_heartbeat_of_the_default(reader, tmp_path):
+    """That comes every 3 s, for each of the four topics."""
+    writer = [sys.executable, "-c", WRITER, str(tmp_path), str(PATIENCE)]
+    done = subprocess.run(writer, capture_output=True, text=True, timeout=2 * PATIENCE)
+    assert done.returncode == 0, done.stderr
+    assert float(done.stdout) < 6.0
+    assert sorted(reader.stdout.readline() for _ in range(4)) == [f"{k}\n" for k in range(4)]
+
+
+def test_a_profile_of_the_user_stays_as_it_is(tmp_path, monkeypatch):
+    monkeypatch.setenv("FASTRTPS_DEFAULT_PROFILES_FILE", str(tmp_path / "mine.xml"))
+    environment.ask_often(tmp_path)
+    assert os.environ["FASTRTPS_DEFAULT_PROFILES_FILE"] == str(tmp_path / "mine.xml")
+    assert not list(tmp_path.iterdir())

@@ -169,7 +169,11 @@ def test_recorder_without_a_node_says_so(hpccd, namespace, tmp_path):
 
 def test_player_without_listeners_says_so(hpccd, small_bag):
     done = hpccd("replay", small_bag, "--publish", "--wait", "0.5")
-    assert done.returncode == 2 and "nobody subscribes to /meshes/" in done.stderr
+    assert done.returncode == 2 and "nobody subscribes to /meshes/" in done.stderr and "waiting" not in done.stderr
+    done = hpccd("replay", small_bag, "--publish", "--wait", "1.2")
+    waits, says = done.stderr.splitlines()
+    assert waits.startswith("waiting for subscribers of /meshes/") and waits.endswith(", 1.2 s at most (--wait)")
+    assert done.returncode == 2 and "nobody subscribes to /meshes/" in says
 
 
 def test_mesh_file_travels_with_the_recording(children, namespace, tmp_path):
