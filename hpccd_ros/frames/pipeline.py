@@ -11,6 +11,7 @@ from hpccd_ros.frames.frame_queue import FrameQueue
 from hpccd_ros.frames.outcome import Outcome
 from hpccd_ros.frames.reached_times import ReachedTimes
 from hpccd_ros.frames.rigid_mesh import RigidMesh
+from hpccd_ros.frames.standstill import Standstill
 from hpccd_ros.frames.transform_buffer import NoTransformError, TransformBuffer
 from hpccd_ros.frames.transformer import MeshTransformer, Transformed
 from hpccd_ros.frames.types import JOINTS, TF, AssemblyRules, MeshFrame, MeshSettings, PoseFrame, SceneFrame, Topology
@@ -130,8 +131,10 @@ class FramePipeline:
         return self._transformers[mesh].warnings()
 
     def warnings(self) -> list[str]:
-        """Positions of static meshes that are not used, and what followers wait for."""
-        return self._assembler.warnings() + [line for follower in self._followers for line in follower.warnings()]
+        """Positions of static meshes that are not used, what followers wait for, and why there is no time of a frame
+        where transforms or joints alone move the scene."""
+        lines = self._assembler.warnings() + [line for follower in self._followers for line in follower.warnings()]
+        return lines + (self._unreached() if self._leader is None else [])
 
     def _place(self, mesh: str, message: MeshFrame | PoseFrame, new_publisher: bool = False) -> Outcome:
         placed = self._rigid[mesh].place(message) if isinstance(message, PoseFrame) else message
@@ -173,16 +176,30 @@ class FramePipeline:
     def _ask_of_latest(self) -> Outcome:
         """Where nothing else moves: a frame for each time that all that moves them has reached."""
         try:
-            reached = [self.transforms.latest(mesh.frame, self._rules.frame_id) for mesh in self._by_transforms]
-            reached += [stamp for follower in self._followers for stamp in follower.latest(self.transforms)]
+            stamp = self._latest()
         except NoTransformError:
             return Outcome()
-        stamp = min((stamp for stamp in reached if stamp is not None), default=None)
         if stamp is None or not self._reached.goes_on(stamp, self._begun(), self._assembler.restart_after):
             return Outcome()
         if self._reached.anew:  # before a frame is placed by what is from before
             self._forget_future(stamp)
         return self._ask(stamp, time.monotonic(), new_publisher=self._reached.anew)
+
+    def _latest(self) -> int | None:
+        """The time that all which moves has reached; None: nothing is bound to a time. Raises NoTransformError."""
+        reached = [self.transforms.latest(mesh.frame, self._rules.frame_id) for mesh in self._by_transforms]
+        reached += [stamp for follower in self._followers for stamp in follower.latest(self.transforms)]
+        return min((stamp for stamp in reached if stamp is not None), default=None)
+
+    def _unreached(self) -> list[str]:
+        try:
+            self._latest()
+        except NoTransformError as error:
+            self._without_time.waits()
+            account = "" if error.connected else f"; {self.transforms.account(error.source)}"
+            return [f"no frame yet: {error}{account}"] if self._without_time.long else []
+        self._without_time.ends()
+        return []
 
     def _begun(self) -> int:
         return self.transforms.begun + sum(follower.begun for follower in self._followers)
@@ -216,6 +233,7 @@ class FramePipeline:
     def _use_transforms(self, transforms: TransformBuffer) -> None:
         self.transforms = transforms
         self._reached = ReachedTimes()
+        self._without_time = Standstill()
         self._transformers = {
             mesh.name: MeshTransformer(mesh, self._rules.frame_id, self._rules.max_pending, self.transforms)
             for mesh in self._meshes

@@ -19,13 +19,15 @@ LONGEST_NAME = 255
 class NoTransformError(LookupError):
     """There is no transform; ``final``: none will come for this stamp either.
 
-    ``connected``: transforms lead from one frame to the other, only not for this stamp.
+    ``connected``: transforms lead from one frame to the other, only not for this stamp; where they do not, ``source``
+    is the first.
     """
 
-    def __init__(self, text: str, final: bool, connected: bool = True) -> None:
+    def __init__(self, text: str, final: bool, connected: bool = True, source: str = "") -> None:
         super().__init__(text)
         self.final = final
         self.connected = connected
+        self.source = source
 
 
 class _Edge(Samples[Rigid]):
@@ -146,7 +148,7 @@ class TransformBuffer:
         while (edge := self._edges.get(path[-1])) is not None:
             if edge.parent in path:
                 text = f"the frames {' -> '.join(path)} form a loop"
-                raise NoTransformError(text, final=False, connected=False)
+                raise NoTransformError(text, final=False, connected=False, source=frame)
             path.append(edge.parent)
         return path
 
@@ -165,4 +167,4 @@ def _messages(count: int | str) -> str:
 
 def _unconnected(source: str, target: str) -> NoTransformError:
     text = f"no transform connects {quoted(source)} and {quoted(target)}"
-    return NoTransformError(text, final=False, connected=False)
+    return NoTransformError(text, final=False, connected=False, source=source)

@@ -92,8 +92,14 @@ class JointFrames:
         try:
             of_joints = self._history.latest()
         except NoJointStateError as error:
-            raise NoTransformError(str(error), final=False) from error
-        return [of_joints] if self._base is not None else [of_joints, transforms.latest(self._root, self._target)]
+            raise NoTransformError(f"{self._robot.name}: {error}", final=False) from error
+        if self._base is not None:
+            return [of_joints]
+        try:
+            return [of_joints, transforms.latest(self._root, self._target)]
+        except NoTransformError as error:
+            text = f"{error}; {self._remedy}"
+            raise NoTransformError(text, error.final, error.connected, error.source) from error
 
     def clear(self, reason: Reason) -> list[Refusal]:
         refusals = [Refusal(name, reason) for _ in self._waiting for name in self.names]
@@ -139,9 +145,13 @@ class JointFrames:
         except NoTransformError as error:
             if error.connected:
                 raise
-            remedy = f"publish that, or give parameter robot.{self._robot.name}.pose"
-            text = f"{error}; {remedy}; {transforms.account(self._root)}"
+            text = f"{error}; {self._remedy}; {transforms.account(self._root)}"
             raise NoTransformError(text, error.final, connected=False) from error
+
+    @property
+    def _remedy(self) -> str:
+        """Where no transform leads to the base."""
+        return f"publish that, or give parameter robot.{self._robot.name}.pose"
 
     def _refused(self, reason: Reason, text: str) -> list[Refusal]:
         """The text once: it is of the robot, not of a link."""

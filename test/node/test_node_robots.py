@@ -408,8 +408,9 @@ def test_joint_states_that_cannot_be_used_are_told_of_before_the_robot_is_known(
     assert node.frames_status(answered=4)["joint_states_refused"] == "3"
 
 
-def test_a_joint_state_stamped_far_ahead_is_left_out_and_told_of(start_node):
-    node = start_node({**parameters(**JOINTS), "frame_queue": 5})
+def test_a_joint_state_stamped_far_ahead_is_left_out_and_told_of(start_node, tmp_path):
+    path = tmp_path / "run.mcap"
+    node = start_node({**parameters(**JOINTS), "frame_queue": 5, "record": str(path)})
     describe(node)
     joints = first_step(node)
     joints.publish(crane.joint_state(20, 3_600_000_000_000))
@@ -421,6 +422,11 @@ def test_a_joint_state_stamped_far_ahead_is_left_out_and_told_of(start_node):
     values = node.frames_status(answered=16, dropped=0, joint_states_refused=1)
     assert "one of stamp 3600000000000 ns came more than 10 s ahead" in values["last_refusal"]
     assert values["last_refusal"].startswith("joint_states: stamp_ahead: ") and values["restarts"] == "0"
+    assert node.stop() == 0
+    with Recording(path) as recording:
+        replay = Replay(recording, recorded_setup.of_recording(recording))
+        steps = list(replay.steps())
+    assert replay.diverged == replay.unverified == 0 and replay.verified == len(steps) == 3
 
 
 def test_a_robot_alone_is_recorded(start_node, tmp_path):
@@ -538,3 +544,25 @@ def test_a_summary_that_is_told_after_the_scene_changed_has_the_links_of_its_ans
     assert ("cloth", "crane/boom") in {(pair.mesh_a, pair.mesh_b) for pair in heard[0].pairs}
     assert node.contacts(1)[0].mesh_names == ["cloth", *crane.LINKS]
     assert node.peer.statuses["errors"][2]["errors"] == "0"
+
+
+@pytest.mark.parametrize("by", ["tf", "joints"])
+def test_a_robot_alone_says_what_it_waits_for(start_node, by):
+    robot = {"frame_prefix": "left_"} if by == "tf" else JOINTS
+    node = start_node({**parameters(**robot), "meshes": [""], "ignored_pairs": [""]})
+    describe(node)
+    if by == "tf":
+        tree = node.peer.publisher(TransformStamped, "transforms", qos.TRANSFORMS)
+        for message in transforms(1, "right_"):
+            tree.publish(message)
+        awaited = "no frame yet: no transform connects 'left_mast' and 'world'; heard: "
+    else:
+        joints = node.peer.publisher(JointState, "joint_states")
+        joints.publish(JointState(name=["turn"], position=[0.0]))
+        awaited = "no frame yet: crane: no joint state has told of reach; the last one that came tells of turn"
+    node.wait_until(lambda: awaited in node.peer.statuses["frames"][1], "a word of it")
+    for k in (1, 2):
+        for message in [crane.joint_state(k, k)] if by == "joints" else transforms(k, "left_"):
+            (joints if by == "joints" else tree).publish(message)
+        node.frames_status(answered=3 * k)
+    node.wait_until(lambda: "no frame yet" not in node.peer.statuses["frames"][1], "no more of it")
