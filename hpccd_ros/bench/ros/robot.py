@@ -4,6 +4,7 @@ steps are answered, and how long after the frame was sent: in all, in the detect
 
   hpccd bench robot                         1,501 frames at 250 a second: 6 s of motion
   hpccd bench robot --rate 500 --threads 1
+  hpccd bench robot --backend gpu
   hpccd bench robot --distances             with the smallest distance of each pair of meshes, beside contacts
 
 Fails where a frame is not accounted for.
@@ -23,6 +24,7 @@ import numpy as np
 from hpccd_ros import scenes
 from hpccd_ros.base.errors import UserError
 from hpccd_ros.bench import command
+from hpccd_ros.bench.core.variants import BACKENDS, usable
 from hpccd_ros.bench.report import table
 from hpccd_ros.bench.report.progress import bar
 
@@ -39,6 +41,7 @@ def configure(parser):
     what.add_argument("--rate", type=float, default=250.0, metavar="HZ", help="frames a second (default: %(default)s)")
     what.add_argument("--frames", type=int, default=1501, metavar="N", help="of the scene (default: %(default)s)")
     what.add_argument("--distances", action="store_true", help="ask for the smallest distances, too")
+    what.add_argument("--backend", default="cpu", choices=BACKENDS, help="default: %(default)s")
     command.threads_option(what)
     command.tier_option(what, default="exact")
     command.repeat_option(what, 3)
@@ -48,6 +51,9 @@ def configure(parser):
 def run(args) -> int:
     if not args.rate > 0 or args.frames < 3 or args.repeat < 1:
         raise UserError("--rate: must be above 0; --frames: at least 3; --repeat: at least 1")
+    _, refused = usable("backend", [args.backend], accuracy=args.accuracy)
+    if refused:
+        raise UserError(f"--backend {args.backend}: {refused[args.backend]}")
     os.environ.setdefault("ROS_DOMAIN_ID", str(1 + os.getpid() % 100))
     report = command.begin_report(args)
     scene = scenes.make(SCENE, frames=args.frames, progress=True)
@@ -82,8 +88,8 @@ def _measured(args, scene, folder: str) -> dict:
     from hpccd_ros.scenes.messages import node_parameters
 
     parameters = {
-        **node_parameters(scene), "threads": args.threads, "accuracy": args.accuracy, "distances": args.distances,
-        "diagnostics_period": 0.5, "frame_queue": 2,
+        **node_parameters(scene), "backend": args.backend, "threads": args.threads, "accuracy": args.accuracy,
+        "distances": args.distances, "diagnostics_period": 0.5, "frame_queue": 2,
     }  # fmt: skip
     os.environ[timed_node.VARIABLE] = str(Path(folder) / "times.json")
     environment.prepare()
@@ -117,8 +123,9 @@ def _measured(args, scene, folder: str) -> dict:
         executor.shutdown()
         node.destroy_node()
         rclpy.try_shutdown()
-    return {**_percentiles(sent, came, {entry[0]: entry[1:] for entry in times}), "dropped": dropped,
-            "unaccounted": unaccounted, "frames": args.frames, "distances": args.distances}  # fmt: skip
+    asked = {"frames": args.frames, "distances": args.distances, "backend": args.backend}
+    told = _percentiles(sent, came, {entry[0]: entry[1:] for entry in times})
+    return {**told, "dropped": dropped, "unaccounted": unaccounted, **asked}
 
 
 def _sent(node, scene, rate: float, children) -> list[float]:

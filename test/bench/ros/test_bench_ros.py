@@ -109,3 +109,28 @@ def test_soak_of_twenty_seconds(tmp_path):
     assert last["checked"] >= 1 and last["replies"] == last["requests"] >= 1
     assert last["publisher_ended"] + last["publisher_killed"] >= 2 and last["topologies"] > 10
     assert 20 < last["node_memory_mb"]["least"] <= last["node_memory_mb"]["most"] < 1000
+
+
+def test_a_robot_beside_a_cloth(tmp_path):
+    options = ("--frames", "61", "--rate", "30", "--repeat", "1", "--threads", "1", "--distances")
+    status, result, said = bench(tmp_path, "robot", *options)
+    assert status == 0, said
+    (row,) = result["rows"]
+    assert (row["frames"], row["rate_hz"], row["distances"], row["backend"]) == (61, 30, True, "cpu")
+    assert row["answers"] + row["dropped"] == 60 and row["answers"] > 30 and row["unaccounted"] == 0
+    for key in ("median_ms", "p95_ms", "p99_ms"):
+        assert 0 < row[f"core_{key}"] <= row[f"detection_{key}"] <= row[f"whole_{key}"]
+    assert row["contacts"] > 0 and row["parts"] >= 1
+    assert "arm-and-cloth at 30 frames a second" in said
+
+
+def test_a_backend_that_is_not_here_is_refused(tmp_path):
+    import hpccd_core as hc
+
+    if "gpu" in hc.backends():
+        pytest.skip("a GPU is here")
+    done = subprocess.run(
+        [sys.executable, "-m", "hpccd_ros.cli", "bench", "robot", "--backend", "gpu", "--out", str(tmp_path)],
+        cwd=ROOT, capture_output=True, text=True, timeout=100,
+    )  # fmt: skip
+    assert done.returncode == 2 and "--backend gpu: " in done.stderr and "not usable here" in done.stderr
