@@ -107,7 +107,7 @@ void bind_rigid(py::module_& m) {
                        const Doubles& shift) {
              return JointBounds(std::move(chain), numbers(start), numbers(end), pose_of(turn, shift));
            }),
-           "chain"_a, "start"_a, "end"_a, "turn"_a, "shift"_a)
+           "chain"_a.none(false), "start"_a, "end"_a, "turn"_a, "shift"_a)
       .def(
           "of_link",
           [](const JointBounds& bounds, std::size_t link, double radius, double girth, const Doubles& centre) {

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hpccd_core import InvalidArgument
-from hpccd_core.joint_chains import JointChain, JointKind, placed
+from hpccd_core.joint_chains import JointBounds, JointChain, JointKind, placed
 from hpccd_ros.rigid.body import Body
 from hpccd_ros.rigid.joints import KINDS, Chain, Joint, JointStep, LinkMotion
 from hpccd_ros.rigid.transform import IDENTITY, Rigid
@@ -152,3 +152,8 @@ def test_threads_may_share_a_step():
 def test_what_the_core_refuses(make, text):
     with pytest.raises(InvalidArgument, match=text):
         make()
+
+
+def test_bounds_of_no_chain_are_refused():
+    with pytest.raises(TypeError, match="incompatible"):
+        JointBounds(None, np.zeros(0), np.zeros(0), IDENTITY.quaternion, IDENTITY.shift)
