@@ -70,6 +70,22 @@ def test_each_pair_has_what_the_earliest_part_says():
     assert [seen[pair] for pair in mine] == [(toc, *normal) for toc, normal in said]
 
 
+def test_rows_in_any_order_are_the_same_step():
+    scene, start, end = soup(5)
+    parts = in_parts(hc.Detector(scene), start, end, 4)
+    rng = np.random.default_rng(5)
+    shuffled = []
+    for contacts in parts:
+        of_vf, of_ee = rng.permutation(len(contacts.vf)), rng.permutation(len(contacts.ee))
+        vf, vf_toc = contacts.vf[of_vf], contacts.vf_toc[of_vf]
+        ee, ee_toc = contacts.ee[of_ee], contacts.ee_toc[of_ee]
+        shuffled.append(replace(contacts, vf=vf, vf_toc=vf_toc, ee=ee, ee_toc=ee_toc))
+    found, wanted = merged(shuffled, 4), merged(parts, 4)
+    assert found.hash == wanted.hash
+    for name in ("vf", "vf_toc", "ee", "ee_toc"):
+        assert np.array_equal(getattr(found, name), getattr(wanted, name))
+
+
 def test_pairs_that_were_not_cut():
     """Self-contacts from one call, those of two meshes from parts: together what the scene has."""
     rng = np.random.default_rng(4)

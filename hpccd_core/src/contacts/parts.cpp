@@ -24,17 +24,19 @@ struct Row {
 };
 
 // Of all answers, the first of each pair. Neighbouring runs are merged until one is left: of equal rows the earlier
-// answer's stays before.
+// answer's stays before. Detectors give sorted rows; whoever picked some of them may have others.
 template <class Pairs>
 std::vector<Row> rows_of_step(std::span<const ContactsOfPart> answers, Pairs ContactsOfPart::* pairs) {
+  const auto less = [](const Row& x, const Row& y) { return x.key < y.key; };
   std::vector<Row> rows, merged;
   std::vector<std::size_t> begins;
   for (std::uint32_t k = 0; k < answers.size(); ++k) {
     begins.push_back(rows.size());
     const auto& of = answers[k].*pairs;
     for (std::uint32_t i = 0; i < of.size(); ++i) rows.push_back({key_of(of[i]), k, i});
+    const auto own = rows.begin() + static_cast<std::ptrdiff_t>(begins.back());
+    if (!std::is_sorted(own, rows.end(), less)) std::stable_sort(own, rows.end(), less);
   }
-  const auto less = [](const Row& x, const Row& y) { return x.key < y.key; };
   while (begins.size() > 1) {
     merged.resize(rows.size());
     std::vector<std::size_t> next;
