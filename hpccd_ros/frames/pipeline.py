@@ -147,11 +147,8 @@ class FramePipeline:
 
     def _led(self, outcome: Outcome) -> Outcome:
         """With all that comes of accepted frames of the leader: meshes whose frames are asked for have theirs then."""
-        if outcome.restarts:  # before anything is asked of the new run
-            for mesh in self._by_transforms:
-                outcome.refusals += self._transformers[mesh.name].clear(Reason.RESTART)
-            for follower in self._followers:
-                outcome.refusals += follower.clear(Reason.RESTART)
+        if outcome.restarts and self._leader is not None:  # before anything is asked of the new run
+            outcome.refusals += self._clear_asked()
             for _, stamp, _ in outcome.joined[-1:]:
                 self._forget_future(stamp)
         joined, outcome.joined = outcome.joined, []
@@ -181,9 +178,13 @@ class FramePipeline:
             return Outcome()
         if stamp is None or not self._reached.goes_on(stamp, self._begun(), self._assembler.restart_after):
             return Outcome()
+        outcome = Outcome()
         if self._reached.anew:  # before a frame is placed by what is from before
-            self._forget_future(stamp)
-        return self._ask(stamp, time.monotonic(), new_publisher=self._reached.anew)
+            outcome.refusals += self._clear_asked()
+            if self._reached.set_back:
+                self._forget_future(stamp)
+        outcome += self._ask(stamp, time.monotonic(), new_publisher=self._reached.anew)
+        return outcome
 
     def _latest(self) -> int | None:
         """The time that all which moves has reached; None: nothing is bound to a time. Raises NoTransformError."""
@@ -203,6 +204,13 @@ class FramePipeline:
 
     def _begun(self) -> int:
         return self.transforms.begun + sum(follower.begun for follower in self._followers)
+
+    def _clear_asked(self) -> list[Refusal]:
+        """Of a run that has ended."""
+        refusals = [
+            refusal for mesh in self._by_transforms for refusal in self._transformers[mesh.name].clear(Reason.RESTART)
+        ]
+        return refusals + [refusal for follower in self._followers for refusal in follower.clear(Reason.RESTART)]
 
     def _forget_future(self, stamp: int) -> None:
         self.transforms.forget_future(stamp)

@@ -6,14 +6,15 @@ from hpccd_ros.frames.samples import RESTART_AFTER, RESTART_NS
 
 
 class ReachedTimes:
-    """``anew``: the time that goes on is of another run than the one before.
+    """``anew``: the time that goes on is of another run than the one before. ``set_back``: because something has begun
+    anew; else only a stamp far ahead was left out, and what is known of any time stays.
 
     What goes back by more than a second has begun anew. What goes back by less is a restart as that of a mesh is: after
     ``restart_after`` increasing stamps in a row, of which whatever has begun anew had RESTART_AFTER already.
     """
 
     def __init__(self) -> None:
-        self.anew = False
+        self.anew = self.set_back = False
         self._last: int | None = None  # of the last frame
         self._begun = 0  # when that was
         self._behind = IncreasingStamps()
@@ -27,6 +28,7 @@ class ReachedTimes:
         self.anew = last is not None and stamp < last and self._is_anew(stamp, last, begun, restart_after)
         if last is not None and stamp <= last and not self.anew:
             return False
+        self.set_back = self.anew and begun != self._begun
         self._last, self._begun = stamp, begun
         self._behind, self._behind_last = IncreasingStamps(), None
         return True

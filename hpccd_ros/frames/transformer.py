@@ -48,7 +48,8 @@ class MeshTransformer:
 
     def __init__(self, mesh: MeshSettings, target: str, max_waiting: int, transforms: TransformBuffer) -> None:
         self._mesh = mesh.name
-        self._kind = "tf" if mesh.input == TF else mesh.transform
+        self._asked = mesh.input == TF  # then whoever asks has seen to what is from before
+        self._kind = "tf" if self._asked else mesh.transform
         self._frame = mesh.frame
         self._target = target
         self._max_waiting = max_waiting
@@ -79,7 +80,7 @@ class MeshTransformer:
             if isinstance(moved, Refusal):
                 return Transformed([], [moved])
             return Transformed([(moved, self._noticed(new_publisher))], [])
-        if new_publisher and self._last is not None and frame.stamp <= self._last:
+        if new_publisher and not self._asked and self._last is not None and frame.stamp <= self._last:
             self._transforms.forget_future(frame.stamp)  # before it is placed by what is from before
         self._last = frame.stamp
         self._waiting.append(_Waiting(frame, new_publisher))

@@ -246,6 +246,28 @@ def test_a_transform_far_ahead_moves_a_scene_of_transforms_alone_there_and_back(
     assert stamps == [1000, 1010, 3_600_000, 1020, 1030] and len(restarts) == 1
 
 
+@pytest.mark.parametrize("later", [1020, 0])
+def test_what_is_left_out_far_ahead_takes_nothing_that_is_known_with_it(later):
+    pipeline, seen = pipeline_of(LINK), []
+    for stamp, x in ((1000, 0.0), (1010, 1.0), (3_600_000, 2.0), (990, 3.0), (later, 4.0)):
+        pipeline.transforms.add("world", "link_frame", Rigid.of((x, 0, 0), (0, 0, 0, 1)), stamp * MS)
+        outcome = retried(pipeline)
+        assert not outcome.refusals
+        seen += [(frame.stamp // MS, frame.placements[0].pose.shift[0]) for frame in outcome.frames]
+    assert seen == [(1000, 0.0), (1010, 1.0), (3_600_000, 2.0), (1010, 1.0), (later, 4.0)]
+
+
+def test_of_what_was_far_ahead_together_each_goes_on_by_itself():
+    pipeline, stamps, refusals = pipeline_of(LINK, TOOL), [], []
+    for stamp in (10_000, 3_600_000, 10_010, 10_020):
+        for frame in ("tool", "link"):
+            pipeline.transforms.add("world", f"{frame}_frame", IDENTITY, stamp * MS)
+            outcome = retried(pipeline)
+            stamps += [frame.stamp // MS for frame in outcome.frames]
+            refusals += outcome.refusals
+    assert stamps == [10_000, 3_600_000, 10_010, 10_020] and pipeline.waiting == 0 and not refusals
+
+
 def test_after_the_clock_was_set_back_no_transform_from_before_is_used():
     pipeline, seen = pipeline_of(CLOTH, LINK), []
 
