@@ -33,8 +33,9 @@ _QUEUES_OF_PROFILE = "RMW_FASTRTPS_USE_QOS_FROM_XML"
 _SENDING = "RMW_FASTRTPS_PUBLICATION_MODE"
 _DDS_FILES = ("DEFAULT_FASTRTPS_PROFILES.xml", "DEFAULT_FASTDDS_PROFILES.xml")
 
-# In the package's folder config.
+# In the package's folder config. Users may call a profile of theirs alike: only the folder tells them apart.
 _PROFILES = ("fastdds_localhost.xml", "fastdds.xml")
+_FOLDER = ("share", "hpccd", "config")  # of any installation
 
 _NAMESPACE = "http://www.eprosima.com"
 _OFTEN = (
@@ -60,13 +61,14 @@ def ask_often(folder: Path) -> None:
     the first node is there.
     """
     profile = Path(os.environ.get(_DDS_CHOICES[0], ""))
-    if profile.name not in _PROFILES:
+    if not _ours(profile):
         return  # the user's own
     ElementTree.register_namespace("", _NAMESPACE)
     tree = ElementTree.parse(profile)
     for writer in tree.iter(f"{{{_NAMESPACE}}}data_writer"):
         writer.insert(0, ElementTree.fromstring(_OFTEN))
-    own = folder / profile.name
+    own = folder.joinpath(*_FOLDER, profile.name)  # so that `prepare` replaces it, as it does all of ours
+    own.parent.mkdir(parents=True)
     tree.write(own, encoding="utf-8", xml_declaration=True)
     os.environ[_DDS_CHOICES[0]] = str(own)
 
@@ -100,7 +102,7 @@ def _choose_dds_profile() -> None:
 
     # One of ours was inherited from a parent process, whose discovery range may have been another.
     chosen = [os.environ[name] for name in _DDS_CHOICES if os.environ.get(name)]
-    if any(Path(value).name not in _PROFILES for value in chosen) or any(Path(name).is_file() for name in _DDS_FILES):
+    if not all(_ours(Path(value)) for value in chosen) or any(Path(name).is_file() for name in _DDS_FILES):
         return
     # Nobody on the network is met unless asked for: without DDS security whoever is met may send anything.
     if not any(os.environ.get(name) for name in _DISCOVERY_CHOICES):
@@ -113,6 +115,10 @@ def _choose_dds_profile() -> None:
     os.environ["FASTRTPS_DEFAULT_PROFILES_FILE"] = str(Path(share) / "config" / profile)
     if not os.environ.get(_SENDING):
         os.environ.setdefault(_QUEUES_OF_PROFILE, "1")
+
+
+def _ours(profile: Path) -> bool:
+    return profile.name in _PROFILES and profile.parts[-4:-1] == _FOLDER
 
 
 def _keep_freed_memory() -> None:

@@ -94,9 +94,10 @@ def test_the_two_profiles_differ_in_the_interface_only():
     assert len(local) - len(both) == len(rest) == 2 and "<address>127.0.0.1</address>" in rest[1]
 
 
+@pytest.mark.parametrize("profile", ["profile.xml", "fastdds.xml"])
 @pytest.mark.parametrize("name", USER_CHOICES)
-def test_a_choice_of_the_user_in_the_environment_wins(tmp_path, name):
-    value = "UDPv4" if name == "FASTDDS_BUILTIN_TRANSPORTS" else "/some/profile.xml"
+def test_a_choice_of_the_user_in_the_environment_wins(tmp_path, name, profile):
+    value = "UDPv4" if name == "FASTDDS_BUILTIN_TRANSPORTS" else f"/some/{profile}"
     expected = value if name == CHOSEN else "none"
     assert run(PRINT_CHOICE, tmp_path, **{name: value}) == f"{expected} none"
 

@@ -109,8 +109,9 @@ def test_publishers_that_ask_often_wait_for_no_heartbeat_of_the_default(reader, 
     assert sorted(reader.stdout.readline() for _ in range(4)) == [f"{k}\n" for k in range(4)]
 
 
-def test_a_profile_of_the_user_stays_as_it_is(tmp_path, monkeypatch):
-    monkeypatch.setenv("FASTRTPS_DEFAULT_PROFILES_FILE", str(tmp_path / "mine.xml"))
+@pytest.mark.parametrize("name", ["mine.xml", "fastdds.xml"])
+def test_a_profile_of_the_user_stays_as_it_is(tmp_path, monkeypatch, name):
+    monkeypatch.setenv("FASTRTPS_DEFAULT_PROFILES_FILE", str(tmp_path / name))
     environment.ask_often(tmp_path)
-    assert os.environ["FASTRTPS_DEFAULT_PROFILES_FILE"] == str(tmp_path / "mine.xml")
+    assert os.environ["FASTRTPS_DEFAULT_PROFILES_FILE"] == str(tmp_path / name)
     assert not list(tmp_path.iterdir())
