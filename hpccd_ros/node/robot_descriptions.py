@@ -99,9 +99,11 @@ class RobotDescriptions:
         self._take_waiting()
 
     def _take_waiting(self) -> None:
-        if not self._waiting or time.monotonic() - self._read < PERIOD:
+        soon = time.monotonic() - self._read < PERIOD
+        waiting = {name: text for name, text in self._waiting.items() if not (soon and self._was_read(name))}
+        if not waiting:
             return
-        waiting, self._waiting = self._waiting, {}
+        self._waiting = {name: text for name, text in self._waiting.items() if name not in waiting}
         known = dict(self.robots)
         try:
             for name, text in waiting.items():
@@ -110,6 +112,10 @@ class RobotDescriptions:
                 self._on_change()
         finally:
             self._read = time.monotonic()
+
+    def _was_read(self, name: str) -> bool:
+        """Of a robot that waits for its first description the scene waits as well."""
+        return name in self._texts or name in self._refused
 
     def _take(self, name: str, text: str) -> None:
         try:

@@ -77,3 +77,16 @@ def test_descriptions_that_come_fast_are_read_once_a_period_and_the_last_one_is_
     assert robots.complete and not robots.warnings() and len(read) >= 4
     pauses = [start - end for end, start in zip(ended, begun[1:], strict=False)]
     assert min(pauses) >= PERIOD, pauses
+
+
+def test_robots_of_one_topic_are_known_together(place):
+    given = {"robots": ["left", "right"], "robot.left.joint_states": "joints", "robot.right.joint_states": "joints"}
+    settings, _ = values.checked(given)
+    known = []
+    robots = RobotDescriptions(place.node, settings, lambda: known.append((time.monotonic(), sorted(robots.robots))))
+    place.publisher.publish(String(data=crane.URDF))
+    deadline = time.monotonic() + PATIENCE
+    while not robots.complete:
+        assert time.monotonic() < deadline, robots.warnings()
+        place.spin(0.05)
+    assert known[-1][1] == ["left", "right"] and known[-1][0] - known[0][0] < PERIOD / 2
