@@ -50,7 +50,7 @@ TABLES = {
     "rigid-truth": (performance_rigid.truth, "rigid-2-cores"),
     "rigid-bounds": (performance_rigid.bounds, "rigid-2-cores"),
     "rigid-cost": (performance_rigid.cost, "rigid-cost-2-cores"),
-    "robot": (performance_rigid.stream, "robot-2-cores"),
+    "robot": (performance_rigid.stream, "robot-2-cores", "robot-4-of-16-cores", "robot-h100-4-of-16-cores"),
     "distance-truth": (performance_distance.on_scenes, "accuracy-distance-2-cores"),
     "distance-wrong-answers": (performance_distance.hard_queries, "accuracy-distance-2-cores"),
     "backends": (performance_gpu.backends, "gpu-h100-16-cores"),

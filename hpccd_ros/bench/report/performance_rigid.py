@@ -53,14 +53,16 @@ def _spread(row: dict) -> str:
     return f"{row['median']:.2f} ({row['low']:.2f} to {row['largest']:.3f})"
 
 
-def stream(result: Kept) -> list[str]:
+def stream(*results: Kept) -> list[str]:
     """A line for each round of a robot beside a cloth over DDS."""
     lines = [
-        [row["frames"], f"{row['rate_hz']:g}", row["answers"], row["dropped"], f"{row['answers_hz']:.1f}",
+        [result.machine["cores"], row["backend"], f"{row['rate_hz']:g}", row["answers"], row["dropped"],
+         f"{row['answers_hz']:.1f}",
          *(f"{text(row[f'{part}_median_ms'])} / {text(row[f'{part}_p95_ms'])}"
            for part in ("whole", "detection", "core", "around", "added"))]
-        for row in result.rows
+        for result in results for row in result.rows
     ]  # fmt: skip
-    columns = ["frames", "a second", "answers", "dropped", "answers a second", "sent to answer, ms: median / p95",
-               "of it detection", "of it core", "all but the detection", "all but the core"]  # fmt: skip
+    columns = ["cores", "core on", "frames a second", "answers", "dropped", "answers a second",
+               "sent to answer, ms: median / p95", "of it detection", "of it core", "all but the detection",
+               "all but the core"]  # fmt: skip
     return markdown.table(columns, lines)
