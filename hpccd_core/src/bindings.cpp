@@ -164,6 +164,14 @@ auto unlocked(Query&& query) {
   return query();
 }
 
+// For what takes less than to get the interpreter back, which may be a whole turn of another thread.
+template <class Query>
+auto unlocked_if_busy(const Detector& d, Query&& query) {
+  std::optional<py::gil_scoped_release> release;
+  if (d.busy()) release.emplace();
+  return query();
+}
+
 template <auto test>
 py::tuple run_queries(const Array<double>& queries, Accuracy accuracy, Simd simd, double separation) {
   const auto n = static_cast<std::size_t>(queries.shape(0));
@@ -341,25 +349,29 @@ PYBIND11_MODULE(_core, m) {
             return to_list(unlocked([&] { return d.distances(vertices.positions); }));
           },
           "vertices"_a)
-      .def("set_separation", &Detector::set_separation, "mesh_a"_a, "mesh_b"_a, "separation"_a,
-           py::call_guard<py::gil_scoped_release>())  // may wait for a call under way
+      .def(
+          "set_separation",
+          [](Detector& d, std::uint32_t mesh_a, std::uint32_t mesh_b, double separation) {
+            unlocked_if_busy(d, [&] { d.set_separation(mesh_a, mesh_b, separation); });
+          },
+          "mesh_a"_a, "mesh_b"_a, "separation"_a)
       .def(
           "set_separations",
           [](Detector& d, const Array<double>& of_pairs) {
             const std::span<const double> numbers(of_pairs.data(), static_cast<std::size_t>(of_pairs.size()));
-            unlocked([&] { d.set_separations(numbers); });
+            unlocked_if_busy(d, [&] { d.set_separations(numbers); });
           },
           "of_pairs"_a)
       .def("cancel", &Detector::cancel)
-      .def("profile", &Detector::profile, py::call_guard<py::gil_scoped_release>())  // may wait for a call under way
-      .def("stats", &Detector::stats, py::call_guard<py::gil_scoped_release>())
+      .def("profile", [](const Detector& d) { return unlocked_if_busy(d, [&] { return d.profile(); }); })
+      .def("stats", [](const Detector& d) { return unlocked_if_busy(d, [&] { return d.stats(); }); })
       .def_property_readonly("last_backend",
                              [](const Detector& d) {
                                const Backend b = d.last_backend();
                                return b == Backend::gpu ? "gpu" : b == Backend::hybrid ? "hybrid" : "cpu";
                              })
       .def_property_readonly("last_gpu_error",
-                             py::cpp_function(&Detector::last_gpu_error, py::call_guard<py::gil_scoped_release>()))
+                             [](const Detector& d) { return unlocked_if_busy(d, [&] { return d.last_gpu_error(); }); })
       .def_property_readonly("threads", [](const Detector& d) { return d.options().threads; })
       .def_property_readonly("simd", [](const Detector& d) { return name_of(d.options().simd); });
 

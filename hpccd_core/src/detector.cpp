@@ -381,6 +381,7 @@ std::map<std::string, std::uint64_t> Detector::stats() const {
   return stats;
 }
 
+bool Detector::busy() const { return impl_->one_call.held(); }
 const Options& Detector::options() const { return impl_->options(); }
 Backend Detector::last_backend() const { return impl_->last_backend; }
 

@@ -112,6 +112,19 @@ TEST(Detector, CallsOfSeveralThreadsTakeTurns) {
   }
 }
 
+TEST(Detector, IsBusyWhileAnotherThreadCalls) {
+  Options options;
+  options.backend = Backend::cpu, options.threads = 1;
+  Detector detector(test::two_sheets(side), options);
+  EXPECT_FALSE(detector.busy());
+  const auto start = test::sheet_positions(side, 0), end = test::sheet_positions(side, 1);
+  std::thread caller([&] { EXPECT_THROW(for (;;) detector.detect(test::view(start), test::view(end)), Cancelled); });
+  while (!detector.busy()) std::this_thread::yield();
+  detector.cancel();
+  caller.join();
+  EXPECT_FALSE(detector.busy());
+}
+
 TEST(Detector, CancelEndsTheCallUnderWayAndThoseThatWait) {
   for (const Method method : {Method::standard, Method::published, Method::naive, Method::front}) {
     Options options;

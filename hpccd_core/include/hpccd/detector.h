@@ -92,6 +92,7 @@ class HPCCD_API Detector {
   std::map<std::string, std::uint64_t> stats() const;  ///< counts of pairs, tests, contacts, bytes
   std::string last_gpu_error() const;                  ///< why a step meant for the GPU was computed on the CPU, or ""
   // These do not wait.
+  bool busy() const;               ///< whether the others would wait now, for a call of another thread
   const Options& options() const;  ///< with the number of threads and the instruction set that were chosen
   Backend last_backend() const;    ///< where the last step was computed
 

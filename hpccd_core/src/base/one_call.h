@@ -25,6 +25,8 @@ class OneCall {
     holder_.store(none, std::memory_order_release);
     holder_.notify_one();
   }
+  // Whether lock() would wait now, or throw.
+  bool held() const { return holder_.load(std::memory_order_relaxed) != none; }
   // What it protects was left in the middle of a change.
   bool abandoned() const {
     const int holder = holder_.load(std::memory_order_relaxed);

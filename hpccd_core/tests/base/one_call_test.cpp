@@ -22,11 +22,13 @@ TEST(OneCall, LetsOneInAtATime) {
     threads.emplace_back([&] {
       for (int k = 0; k < 10000; ++k) {
         const std::lock_guard turn(call);
+        EXPECT_TRUE(call.held());
         ++n;
       }
     });
   for (auto& t : threads) t.join();
   EXPECT_EQ(n, 40000);
+  EXPECT_FALSE(call.held());
   EXPECT_FALSE(call.abandoned());
 }
 
