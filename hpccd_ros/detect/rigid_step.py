@@ -9,6 +9,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from operator import is_not
 
 import numpy as np
 
@@ -75,6 +76,7 @@ class RigidStep:
         self.detectors = (bent,) if straight is None else (bent, straight)
         self.profile: Counter[str] = Counter()  # ms of the last step, by stage
         self.stats: Counter[str] = Counter()  # of the last step
+        self._last_end: tuple[list[np.ndarray], np.ndarray] = ([], np.empty((0, 3)))  # of each mesh, and of all
 
     def detect(
         self, moving: Sequence[Motion], asked: Separation, options: RigidOptions, report: str
@@ -86,9 +88,7 @@ class RigidStep:
         parts = options.parts or cuts.fewest_parts(moving, options.tolerance, options.most_parts).parts
         margins = [cuts.Margin.of(motion, parts) for motion in moving]
         self.bent.set_separations(cuts.all_grown(asked.table(self._names), margins))
-        positions = [
-            np.concatenate([motion.vertices(number, parts) for motion in moving]) for number in range(parts + 1)
-        ]
+        positions = [self._at_cut(moving, number, parts) for number in range(parts + 1)]
         whole = self._ask(self.straight, positions[0], positions[-1]) if self.straight is not None else None
         bounds = MotionBounds(parts, tuple(margin.sum for margin in margins))
         if report == "any" and whole is not None and len(whole):
@@ -103,11 +103,21 @@ class RigidStep:
             contacts = earliest(contacts)
         return contacts, bounds
 
+    def _at_cut(self, moving: Sequence[Motion], number: int, parts: int) -> np.ndarray:
+        """(V,3). Where a step goes on from the one before, its start is the end of that one."""
+        of_meshes = [motion.vertices(number, parts) for motion in moving]
+        last, positions = self._last_end
+        if number != 0 or len(last) != len(of_meshes) or any(map(is_not, last, of_meshes)):
+            positions = np.concatenate(of_meshes)
+        if number == parts:
+            self._last_end = of_meshes, positions
+        return positions
+
     def _ask(self, detector: hc.Detector, start: np.ndarray, end: np.ndarray) -> hc.Contacts:
         contacts = detector.detect(start, end)
         self.profile.update(detector.profile)
-        of_scene = {name: self.stats[name] for name in OF_THE_SCENE}
-        self.stats.update(detector.stats)
+        stats, of_scene = detector.stats, {name: self.stats[name] for name in OF_THE_SCENE}
+        self.stats.update(stats)
         for name, value in of_scene.items():
-            self.stats[name] = max(value, detector.stats.get(name, 0))
+            self.stats[name] = max(value, stats.get(name, 0))
         return contacts

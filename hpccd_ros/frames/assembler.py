@@ -23,7 +23,6 @@ Rules, in the order in which they are applied to a vertex message:
 
 from collections import deque
 from collections.abc import Collection, Sequence
-from dataclasses import replace
 
 from hpccd_ros.base.quoting import listed
 from hpccd_ros.frames.coordinate_frame import CoordinateFrame
@@ -170,7 +169,7 @@ class FrameAssembler:
             topology = state.topologies.current if state.static else state.topologies.of(frame)
         if refusal := check_frame(state.name, frame, topology):
             return Outcome(refusals=[refusal])
-        frame = replace(frame, topology=topology)
+        frame = frame.of_topology(topology)
         return self._keep_positions(state, frame) if state.static else self._join(state, frame)
 
     def _hold(self, state: _MeshState, frame: MeshFrame) -> list[Refusal]:

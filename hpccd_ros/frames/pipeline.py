@@ -78,9 +78,11 @@ class FramePipeline:
         may let many go on."""
         found = [self._ask_of_latest()] if self._leader is None else []
         for mesh, transformer in self._transformers.items():
-            found += self._assemble(mesh, transformer.retry())
+            if transformer.waiting:
+                found += self._assemble(mesh, transformer.retry())
         for follower in self._followers:
-            found += self._assemble_followed(follower)
+            if follower.waiting:
+                found += self._assemble_followed(follower)
         return found
 
     def enqueue(self, frame: SceneFrame) -> list[Refusal]:

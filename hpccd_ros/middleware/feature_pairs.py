@@ -85,6 +85,8 @@ def localise(indices: np.ndarray, offsets: np.ndarray, mesh: np.ndarray, local: 
 
     indices: (n,k); mesh: (n,), full of zeros; local: (n, at least k).
     """
+    if not len(indices):
+        return
     # By columns: numpy is four times slower on many rows of one or two.
     if len(offsets) == 2:  # one mesh: nothing to look up
         for column in range(indices.shape[1]):
