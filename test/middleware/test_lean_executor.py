@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Fewer turns, and yet nothing is left undone: what other threads and callbacks ask for, and warnings about QoS."""
 
+import contextlib
 import os
 import threading
 import time
@@ -21,23 +22,31 @@ from hpccd_ros.middleware.lean_executor import LeanExecutor
 PATIENCE = 60.0
 
 
-@pytest.fixture
-def spinning():
+@contextlib.contextmanager
+def _spun(executor_type):
     """An executor, and a node that it runs in a thread of its own."""
     environment.prepare()
     context = Context()
     rclpy.init(context=context)
     node = rclpy.create_node("lean", context=context, namespace=f"/lean{os.getpid()}")
-    executor = LeanExecutor(context=context)
+    executor = executor_type(context=context)
     executor.add_node(node)
     thread = threading.Thread(target=executor.spin, daemon=True)
     thread.start()
-    yield executor, node
-    executor.shutdown()
-    thread.join(PATIENCE)
+    try:
+        yield executor, node
+    finally:
+        executor.shutdown()
+        thread.join(PATIENCE)
+        node.destroy_node()
+        context.try_shutdown()
     assert not thread.is_alive(), "the executor has not heard of its end"
-    node.destroy_node()
-    context.try_shutdown()
+
+
+@pytest.fixture
+def spinning():
+    with _spun(LeanExecutor) as (executor, node):
+        yield executor, node
 
 
 def _wait(until):
@@ -112,20 +121,12 @@ def test_a_callback_that_waits_for_others_goes_on(spinning):
 
 def _turns(executor_type, messages=20):
     """How often it asks whether a subscription may be waited for, while so many messages come one by one."""
-    environment.prepare()
-    context = Context()
-    rclpy.init(context=context)
-    node = rclpy.create_node("turns", context=context, namespace=f"/turns{os.getpid()}")
-    executor = executor_type(context=context)
-    executor.add_node(node)
     came, asked = [], []
-    subscription = node.create_subscription(Header, "numbers", came.append, 10)
-    can_execute = executor.can_execute
-    executor.can_execute = lambda entity: (asked.append(1) if entity is subscription else None, can_execute(entity))[1]
-    publisher = node.create_publisher(Header, "numbers", 10)
-    thread = threading.Thread(target=executor.spin, daemon=True)
-    thread.start()
-    try:
+    with _spun(executor_type) as (executor, node):
+        subscription = node.create_subscription(Header, "numbers", came.append, 10)
+        can_execute = executor.can_execute
+        executor.can_execute = lambda entity: (asked.append(entity), can_execute(entity))[1]
+        publisher = node.create_publisher(Header, "numbers", 10)
         _wait(publisher.get_subscription_count)
         _asleep(executor)
         asked.clear()
@@ -133,12 +134,7 @@ def _turns(executor_type, messages=20):
             publisher.publish(Header())
             _wait(lambda count=number + 1: len(came) == count)
             time.sleep(0.02)
-        return len(asked)
-    finally:
-        executor.shutdown()
-        thread.join(PATIENCE)
-        node.destroy_node()
-        context.try_shutdown()
+        return asked.count(subscription)
 
 
 def test_a_message_takes_one_turn():
