@@ -13,6 +13,7 @@ from rclpy.context import Context
 from rclpy.event_handler import EventHandler, QoSPublisherEventType, QoSSubscriptionEventType
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.guard_condition import GuardCondition
+from rclpy.task import Task
 
 #: Seconds between looks at events that only warn; a wait that is under way when one comes is not ended by it.
 LOOK_EVERY = 0.5
@@ -33,14 +34,25 @@ class LeanExecutor(SingleThreadedExecutor):
         super().__init__(context=context)
         self._guard.destroy()
         self._guard = self._wake = _WakeOfOthers(None, None, context=self._context)
+        self._made: Task | None = None
         self._look_at = 0.0
         self._looked = False
 
     def spin_once(self, timeout_sec: float | None = None) -> None:
-        self._wake.spinning = threading.get_ident()
         if self._looked:
             self._looked, self._look_at = False, time.monotonic() + LOOK_EVERY
         super().spin_once(timeout_sec)
+
+    def wait_for_ready_callbacks(self, *args: Any, **options: Any) -> Any:
+        self._made = self._wake.unheard_of = None
+        found = super().wait_for_ready_callbacks(*args, **options)
+        if found[0] is self._made:
+            self._wake.unheard_of = threading.get_ident()
+        return found
+
+    def _make_handler(self, *args: Any) -> Task:
+        self._made = super()._make_handler(*args)
+        return self._made
 
     def can_execute(self, entity: Any) -> bool:
         if type(entity) is EventHandler and entity.event_type in WARNINGS:
@@ -51,10 +63,11 @@ class LeanExecutor(SingleThreadedExecutor):
 
 
 class _WakeOfOthers(GuardCondition):
-    """The thread that spins is awake, and looks for work before it waits."""
+    """``unheard_of``: a thread that runs what the last wait has found, and looks for work before it waits again. Of
+    what tasks bring forth it would not know: it runs them and then waits."""
 
-    spinning: int | None = None
+    unheard_of: int | None = None
 
     def trigger(self) -> None:
-        if threading.get_ident() != self.spinning:
+        if threading.get_ident() != self.unheard_of:
             super().trigger()

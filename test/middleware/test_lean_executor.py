@@ -119,6 +119,39 @@ def test_a_callback_that_waits_for_others_goes_on(spinning):
     _wait(lambda: came == ["c"])
 
 
+def test_what_a_task_brings_forth_is_done(spinning):
+    """The executor runs tasks right before it waits."""
+    executor, _ = spinning
+    brought, came = Future(executor=executor), []
+    brought.add_done_callback(lambda _: came.append("told"))
+
+    def brings():
+        brought.set_result(None)
+        executor.create_task(came.append, "task")
+
+    _asleep(executor)
+    executor.create_task(brings)
+    _wait(lambda: sorted(came) == ["task", "told"])
+
+
+def test_what_a_callback_brings_forth_after_it_waited_is_done(spinning):
+    executor, node = spinning
+    brought, came = Future(executor=executor), []
+
+    async def waits(message):
+        await brought
+        executor.create_task(came.append, "task")
+
+    node.create_subscription(Header, "waits", waits, 10)
+    publisher = node.create_publisher(Header, "waits", 10)
+    _wait(publisher.get_subscription_count)
+    publisher.publish(Header())
+    _asleep(executor)
+    brought.set_result(None)
+    executor.wake()
+    _wait(lambda: came == ["task"])
+
+
 def _turns(executor_type, messages=20):
     """How often it asks whether a subscription may be waited for, while so many messages come one by one."""
     came, asked = [], []
