@@ -36,7 +36,7 @@ class Separation:
     def table(self, names: tuple[str, ...]) -> NDArray[np.float64]:
         """(K, K): the distance in force for each pair of the K meshes."""
         index = {name: number for number, name in enumerate(names)}
-        values = np.full((len(names), len(names)), self.minimum)
+        values = np.full((len(names), len(names)), float(self.minimum))
         for mesh_a, mesh_b, distance in self.pairs:
             a, b = index[mesh_a], index[mesh_b]
             values[a, b] = values[b, a] = distance

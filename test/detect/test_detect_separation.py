@@ -137,3 +137,7 @@ def test_what_no_scene_can_have(distance):
         assert "must be finite and not negative" in separation.unusable()
         assert "separation" in unusable_options(Options(separation=separation))
     assert Separation(0.0, (("a", "b", 0.0),)).unusable() is None
+
+
+def test_a_whole_number_for_the_scene_leaves_those_of_pairs_as_they_are():
+    assert Separation(0, (("a", "b", 0.02),)).table(("a", "b")).tolist() == [[0.0, 0.02], [0.02, 0.0]]
