@@ -32,13 +32,16 @@ class NodeStatus:
 
     def __init__(self, node: Node, namespace: str):
         self.values: dict[str, dict[str, str]] = {}
+        self.texts: dict[str, str] = {}
         self.heard = 0.0
         node.create_subscription(DiagnosticArray, f"{namespace}/diagnostics", self._take, qos.DIAGNOSTICS)
 
     def _take(self, message: DiagnosticArray) -> None:
         self.heard = time.monotonic()
         for status in message.status:
-            self.values[status.name.rpartition(": ")[2]] = {v.key: v.value for v in status.values}
+            part = status.name.rpartition(": ")[2]
+            self.values[part] = {v.key: v.value for v in status.values}
+            self.texts[part] = status.message
 
     def count(self, key: str, part: str = "frames") -> int:
         """A counter; 0 where the node has not told it."""

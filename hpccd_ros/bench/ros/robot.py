@@ -112,7 +112,7 @@ def _measured(args, scene, folder: str) -> dict:
                 qos.keep_last(args.frames), raw=True,
             )  # fmt: skip
             listener.start()
-            sent = _sent(node, scene, args.rate, children)
+            sent = _sent(node, scene, args.rate, children, status)
             time.sleep(SETTLE)
             heard = status.heard
             children.wait(lambda: status.heard > heard + 0.1, "the node tells its counts", PATIENCE)
@@ -129,7 +129,7 @@ def _measured(args, scene, folder: str) -> dict:
     return {**told, "dropped": dropped, "unaccounted": unaccounted, **asked}
 
 
-def _sent(node, scene, rate: float, children) -> list[float]:
+def _sent(node, scene, rate: float, children, status) -> list[float]:
     """When each frame was, s of CLOCK_MONOTONIC."""
     from hpccd_ros.middleware import qos, topic_names
     from hpccd_ros.middleware.listeners import await_acknowledged
@@ -152,10 +152,20 @@ def _sent(node, scene, rate: float, children) -> list[float]:
     for frame in scene.frames():
         messages_of_frame = player.messages(frame, began_ns + round(frame.index * 1e9 / rate))
         frames.append([message for message in messages_of_frame if not (frames and message.topic in once)])
+    # A robot that is known only after the first frame makes another scene, which begins with the second.
+    latched = {topic.name for topic in messages.topics(scene) if topic.latched}
+    for message in frames[0]:
+        if message.topic in latched:
+            publishers[message.topic].publish(message.data)
+    frames[0] = [message for message in frames[0] if message.topic not in latched]
+    children.wait(
+        lambda: "waits for its description" not in status.texts.get("frames", "waits for its description"),
+        "the node knows the robot", PATIENCE,
+    )  # fmt: skip
     sent, begin = [], 0.0
     with bar(f"{SCENE} at {rate:g} a second", len(frames)) as progress:
         for number, frame in enumerate(frames):
-            if number < 2:  # the node knows the robot, and has its first frame, before the clock runs
+            if number < 2:  # the node has its first frame before the clock runs
                 begin = time.monotonic() + SETTLE * (1 - number) - number / rate
             if (left := begin + number / rate - time.monotonic()) > 0:
                 time.sleep(left)
