@@ -19,8 +19,10 @@ MOST_CHARACTERS = 100_000  # of their names
 
 
 def kept(message: JointState) -> JointState | None:
-    """What `fill` needs of it, for later; None: it is too large, or names and positions are not of one length."""
-    if not len(message.name) == len(message.position) <= MOST_JOINTS or sum(map(len, message.name)) > MOST_CHARACTERS:
+    """What `fill` needs of it, for later; None: it is too large, or names and positions do not go together."""
+    if len(message.name) > MOST_JOINTS or len(message.position) not in (0, len(message.name)):
+        return None
+    if sum(map(len, message.name)) > MOST_CHARACTERS:
         return None
     small = JointState(name=message.name, position=message.position)
     small.header.stamp = message.header.stamp
@@ -38,26 +40,29 @@ def too_large(topic: str) -> Refusal:
 
 def fill(robots: Iterable[JointFrames], message: Any, topic: str) -> list[Refusal]:
     """Give a sensor_msgs/JointState of ``topic`` to the robots that it moves. It is refused where one of them cannot
-    use it, and where no robot can; the others have it all the same. An earlier one is refused that this one shows to
-    have been far ahead."""
-    problems: list[RobotError] = []
+    use it, or not all of it, and where no robot can; the others have it all the same. An earlier one is refused that
+    this one shows to have been far ahead."""
+    problems: list[str] = []
     stray: int | None = None
     try:
         stamp = fields.stamp_to_ns(message.header.stamp)
         check_lengths(message.name, message.position)
     except ValueError as error:
-        return [_refusal(topic, error)]
+        return [_refusal(topic, str(error))]
     for robot in robots:
         try:
-            found = robot.add(stamp, message.name, message.position)
-            stray = found if stray is None else stray
+            added = robot.add(stamp, message.name, message.position)
         except RobotError as error:
-            problems.append(error)
-    refusals = [_refusal(topic, error) for error in problems[:1]]
+            problems.append(str(error))
+            continue
+        stray = added.stray if stray is None else stray
+        if added.unusable:
+            problems.append(added.unusable)
+    refusals = [_refusal(topic, problem) for problem in problems[:1]]
     if stray is not None:
         refusals.append(Refusal(topic, Reason.AHEAD, stray_text(stray), what=Input.JOINT_STATE))
     return refusals
 
 
-def _refusal(topic: str, error: ValueError) -> Refusal:
-    return Refusal(topic, Reason.MALFORMED, str(error), what=Input.JOINT_STATE)
+def _refusal(topic: str, problem: str) -> Refusal:
+    return Refusal(topic, Reason.MALFORMED, problem, what=Input.JOINT_STATE)

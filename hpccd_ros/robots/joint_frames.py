@@ -16,7 +16,7 @@ from hpccd_ros.frames.transform_buffer import NoTransformError, TransformBuffer
 from hpccd_ros.frames.types import MeshFrame
 from hpccd_ros.rigid.transform import Rigid
 from hpccd_ros.robots.errors import RobotError
-from hpccd_ros.robots.joint_history import JointHistory, NoJointStateError
+from hpccd_ros.robots.joint_history import Added, JointHistory, NoJointStateError
 from hpccd_ros.robots.robot import Robot
 
 
@@ -56,9 +56,8 @@ class JointFrames:
     def begun(self) -> int:
         return self._history.begun
 
-    def add(self, stamp: int, names: Sequence[str], positions: Sequence[float]) -> int | None:
-        """A joint state. The stamp of an earlier one that was far ahead, and is forgotten. Raises RobotError, and then
-        nothing of it is kept."""
+    def add(self, stamp: int, names: Sequence[str], positions: Sequence[float]) -> Added:
+        """A joint state. Raises RobotError, and then nothing of it is kept."""
         return self._history.add(stamp, names, positions)
 
     def ask(self, stamp: int, received: float, new_publisher: bool) -> None:

@@ -8,11 +8,15 @@ from before where a clock is set back (frames/samples.py). Bounded: only joints 
 import math
 from bisect import bisect_left
 from collections.abc import Sequence
+from typing import NamedTuple
 
 from hpccd_ros.base.quoting import listed, quoted
 from hpccd_ros.frames.samples import Run, Samples
 from hpccd_ros.robots.errors import RobotError
 from hpccd_ros.robots.kinematics import Kinematics
+
+# Joints that a text explains one by one.
+MOST_NAMED = 3
 
 
 class NoJointStateError(LookupError):
@@ -24,31 +28,56 @@ class NoJointStateError(LookupError):
 
 
 def check_lengths(names: Sequence[str], positions: Sequence[float]) -> None:
-    """Raises RobotError: a joint state that no robot can use."""
-    if len(names) != len(positions):
+    """Without positions a joint state is of velocities or efforts alone. Raises RobotError: no robot can use it."""
+    if len(positions) not in (0, len(names)):
         raise RobotError(
             f"joint states: {len(names)} names and {len(positions)} positions; each joint needs one of both"
         )
 
 
+class Added(NamedTuple):
+    """What a joint state led to. ``stray``: the stamp of an earlier one that was far ahead, and is forgotten.
+    ``unusable``: why positions of needed joints are left out; "": none is."""
+
+    stray: int | None = None
+    unusable: str = ""
+
+
 class JointHistory:
-    """Each message may tell of some joints only; several publishers may share a robot."""
+    """A message may hold some joints only; several publishers may share a robot."""
 
     def __init__(self, kinematics: Kinematics) -> None:
         self._joints = {name: _Values(name in kinematics.continuous) for name in kinematics.inputs}
-        self._told = ""  # joints of the last message
+        self._named = ""  # joints of the last message
+        self._unusable: dict[str, str] = {}  # joints whose last message had no usable position, and why
+        self._last: dict[str, int] = {}  # stamp of the last usable position of each joint, though it be forgotten
         self._run = Run(self._joints.values)
 
-    def add(self, stamp: int, names: Sequence[str], positions: Sequence[float]) -> int | None:
-        """stamp ns. Joints of others are left out. The stamp of an earlier one that was far ahead, and is forgotten.
-        Raises RobotError, and then nothing of it is kept."""
+    def add(self, stamp: int, names: Sequence[str], positions: Sequence[float]) -> Added:
+        """stamp ns. Joints that the robot does not need are ignored; a position that is not finite is left out, and
+        the others of the message are used. Raises RobotError, and then nothing of it is kept."""
         check_lengths(names, positions)
-        known = [(name, float(value)) for name, value in zip(names, positions, strict=True) if name in self._joints]
-        for name, value in known:
-            if not math.isfinite(value):
-                raise RobotError(f"joint states: {quoted(name)} is at {value}; positions must be finite")
-        self._told = listed(names)
-        return self._run.add(stamp, [(self._joints[name], value) for name, value in known])
+        self._named = listed(names)
+        if names and not positions:
+            self._unusable |= {name: _not_given(name, stamp) for name in names if name in self._joints}
+            return Added()
+        found, left_out = [], []
+        for name, position in zip(names, positions, strict=True):
+            if name not in self._joints:
+                continue
+            if math.isfinite(value := float(position)):
+                found.append((self._joints[name], value))
+                self._last[name] = stamp
+                self._unusable.pop(name, None)
+            else:
+                self._unusable[name] = f"{quoted(name)} is {value} in the joint state of {stamp} ns"
+                left_out.append(name)
+        stray = self._run.add(stamp, found)
+        if not left_out:
+            return Added(stray)
+        why = "; ".join(self._unusable[name] for name in left_out[:MOST_NAMED])
+        more = f" and {len(left_out) - MOST_NAMED} more" if len(left_out) > MOST_NAMED else ""
+        return Added(stray, f"{why}{more}; positions must be finite; the other joints of the message are used")
 
     def clear(self) -> None:
         self._joints = {name: values.emptied() for name, values in self._joints.items()}
@@ -70,17 +99,18 @@ class JointHistory:
         if early:
             first = max(self._joints[name].stamps[0] for name in early)
             raise NoJointStateError(
-                f"the first joint state kept of {listed(early)} is of {first} ns, after the stamp {stamp} ns",
+                f"the first position kept of {listed(early)} is of {first} ns, after the stamp {stamp} ns",
                 final=True,
             )
         late = [name for name, values in self._joints.items() if stamp > values.stamps[-1]]
         if late:
             last = min(self._joints[name].stamps[-1] for name in late)
-            text = f"the last joint state of {listed(late)} is of {last} ns, before the stamp {stamp} ns"
-            raise NoJointStateError(text if last else f"{text}; its publisher must set header.stamp", final=False)
+            text = f"the last position of {listed(late)} is of {last} ns, before the stamp {stamp} ns"
+            text = text if last else f"{text}; its publisher must set header.stamp"
+            raise NoJointStateError("; ".join([text, *self._reasons(late)]), final=False)
         if doubtful := [name for name, values in self._joints.items() if values.in_doubt(stamp)]:
             last = self._joints[doubtful[0]].stamps[-1]
-            text = f"the last joint state of {listed(doubtful)} is of {last} ns, far ahead of the stamp {stamp} ns"
+            text = f"the last position of {listed(doubtful)} is of {last} ns, far ahead of the stamp {stamp} ns"
             raise NoJointStateError(f"{text} and of all before: the next one tells whether it counts", final=False)
         return {name: values.at(stamp) for name, values in self._joints.items()}
 
@@ -90,9 +120,26 @@ class JointHistory:
         return min((values.stamps[-1] for values in self._joints.values()), default=None)
 
     def _check_heard(self) -> None:
-        if unheard := [name for name, values in self._joints.items() if not values.stamps]:
-            heard = f"; the last one that came tells of {self._told}" if self._told else ""
-            raise NoJointStateError(f"no joint state has told of {listed(unheard)}{heard}", final=False)
+        lacking = [name for name, values in self._joints.items() if not values.stamps]
+        if not lacking:
+            return
+        reasons = self._reasons(lacking)
+        known = [name for name in lacking if name in self._last and name not in self._unusable]
+        if known:
+            last = max(self._last[name] for name in known)
+            reasons.append(f"the last position of {listed(known)}, of {last} ns, is from before the clock was set back")
+        if never := [name for name in lacking if name not in self._last and name not in self._unusable]:
+            named = f"; the last one names {self._named}" if self._named else ""
+            reasons.append(f"no joint state has named {listed(never)}{named}")
+        raise NoJointStateError("; ".join(reasons), final=False)
+
+    def _reasons(self, names: Sequence[str]) -> list[str]:
+        """Why the last message of some of these joints was of no use: a few, in words."""
+        return [self._unusable[name] for name in names if name in self._unusable][:MOST_NAMED]
+
+
+def _not_given(name: str, stamp: int) -> str:
+    return f"{quoted(name)} has no position in the joint state of {stamp} ns"
 
 
 class _Values(Samples[float]):

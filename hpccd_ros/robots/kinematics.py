@@ -11,7 +11,7 @@ one that turns (rigid/joints.py then holds as it is).
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -42,26 +42,30 @@ class _Followed:
 
 
 class Kinematics:
-    """``inputs``: names of the joints that need a value, in the order of the tree: those that move and mimic none.
+    """``inputs``: names of the joints that need a value, in the order of the tree: those that move one of the links
+    ``of_links`` (None: any link) and mimic none. The other joints stand at 0 where they are given no value.
 
     ``links``: names of all links, from the root on. `number` of a link is its place there.
     """
 
-    def __init__(self, description: Description) -> None:
+    def __init__(self, description: Description, of_links: Iterable[str] | None = None) -> None:
         joints = description.joints
         self.links = (description.root, *(joint.child for joint in joints))
         self._numbers = {name: number for number, name in enumerate(self.links)}
         named = {joint.name: joint for joint in joints}
         self._names = tuple(named)
         self.continuous = frozenset(joint.name for joint in joints if joint.kind == "continuous")
-        self.inputs = tuple(joint.name for joint in joints if joint.kind != "fixed" and joint.mimic is None)
         self._followed = tuple(None if joint.kind == "fixed" else _followed(joint, named) for joint in joints)
+        moved = _moved_by(joints, self.links if of_links is None else of_links)
+        needed = {f.joint for joint, f in zip(joints, self._followed, strict=True) if f and joint.name in moved}
+        self.inputs = tuple(name for name in named if name in needed)
+        self._others = {f.joint for f in self._followed if f} - needed
         # The root's link has a joint too, which stands still. Turns are unwrapped here, for the sake of mimics.
-        moved = (
+        of_children = (
             Joint.of("revolute" if joint.turns else joint.kind, self._numbers[joint.parent], joint.origin, joint.axis)
             for joint in joints
         )
-        self.chain = Chain((Joint.of("fixed", -1, IDENTITY), *moved))
+        self.chain = Chain((Joint.of("fixed", -1, IDENTITY), *of_children))
         # Behind the joints that move the base, where it moves.
         self._behind = tuple(
             Joint(joint.kind, joint.parent + _AHEAD, joint.origin, joint.axis) for joint in self.chain.joints[1:]
@@ -71,11 +75,12 @@ class Kinematics:
         return self._numbers[link]
 
     def state(self, positions: Mapping[str, float], base: Rigid = IDENTITY) -> "RobotState":
-        """positions: a finite value for each of `inputs`, radians or metres; others are not looked at. base: takes
+        """positions: a finite value for each of `inputs`, radians or metres; names of no joint are ignored. base: takes
         coordinates of the root's link to those of the scene. Raises RobotError naming what is missing."""
         if missing := [name for name in self.inputs if name not in positions]:
             raise RobotError(f"positions: none for {listed(missing)}; each joint that moves and mimics none needs one")
         inputs = {name: float(positions[name]) for name in self.inputs}
+        inputs |= {name: float(positions.get(name, 0.0)) for name in self._others}
         values = [0.0] + [0.0 if f is None else f.factor * inputs[f.joint] + f.offset for f in self._followed]
         if wrong := [
             name for name, value in zip(self._names, values[1:], strict=True) if not abs(value) <= LARGEST_VALUE
@@ -105,8 +110,8 @@ class Kinematics:
 
 @dataclass(frozen=True, eq=False)
 class RobotState:
-    """Of one time. ``inputs``: of the joints that need a value; ``values``: of the joint of each link, the root's
-    first."""
+    """Of one time. ``inputs``: of the joints that move and mimic none; ``values``: of the joint of each link, from the
+    root on."""
 
     kinematics: Kinematics
     inputs: dict[str, float]
@@ -141,6 +146,17 @@ class RobotStep:
         """body: geometry in the link's frame. ends: its vertices in both states."""
         number = self.ahead + self.kinematics.number(link)
         return LinkMotion(self.joints, number, body, ends if self.of_states else None)
+
+
+def _moved_by(joints: Sequence[RobotJoint], links: Iterable[str]) -> set[str]:
+    """Names of the joints between the root and one of these links."""
+    above = {joint.child: joint for joint in joints}
+    found: set[str] = set()
+    for link in links:
+        while (joint := above.get(link)) is not None and joint.name not in found:
+            found.add(joint.name)
+            link = joint.parent
+    return found
 
 
 def _followed(joint: RobotJoint, named: Mapping[str, RobotJoint]) -> _Followed:

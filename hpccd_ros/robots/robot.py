@@ -85,7 +85,8 @@ class Robot:
         ignored = sorted(
             (names[a], names[b]) for a, b in pairs.ignored(description, semantics) if a in names and b in names
         )
-        return cls(called, description, Kinematics(description), tuple(meshes), tuple(ignored))
+        kinematics = Kinematics(description, (mesh.link for mesh in meshes))
+        return cls(called, description, kinematics, tuple(meshes), tuple(ignored))
 
     @cached_property
     def _vertices(self) -> LinkVertices:

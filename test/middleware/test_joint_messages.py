@@ -32,6 +32,13 @@ def test_what_is_too_large_or_of_no_use_is_not_kept(names, positions):
     assert joint_messages.kept(JointState(name=["j" * 1_000_000], position=[0.0])) is None
 
 
+def test_a_message_of_velocities_alone_is_kept_and_not_refused():
+    message = crane.joint_state(1, 1)
+    message.position, message.velocity = [], [0.0, 0.0]
+    for given in (message, joint_messages.kept(message)):
+        assert joint_messages.fill([frames()], given, "joint_states") == []
+
+
 def test_what_no_robot_can_use_is_refused_before_any_is_known():
     message = crane.joint_state(1, 1)
     assert joint_messages.fill([], message, "joint_states") == []
@@ -49,7 +56,7 @@ def test_what_one_robot_cannot_use_moves_the_others(first):
     sound, broken = frames(), frames("spin")
     message = JointState(name=["turn", "reach", "spin"], position=[0.0, 0.0, float("nan")])
     (refusal,) = joint_messages.fill([sound, broken] if first else [broken, sound], message, "joint_states")
-    assert "'spin' is at nan" in refusal.text
+    assert "'spin' is nan in the joint state of 0 ns" in refusal.text
     assert sound.latest(None) == [0]
-    with pytest.raises(LookupError, match="no joint state has told of spin, reach"):
+    with pytest.raises(LookupError, match="^crane: 'spin' is nan in the joint state of 0 ns$"):
         broken.latest(None)

@@ -202,7 +202,7 @@ def test_frames_wait_for_joint_states_and_take_what_lies_between_two(start_node)
     cloth(node, 10)
     values = node.frames_status(waiting=4)
     node.wait_until(
-        lambda: "crane waits: no joint state has told of turn, reach" in node.peer.statuses["frames"][1], "a word of it"
+        lambda: "crane waits: no joint state has named turn, reach" in node.peer.statuses["frames"][1], "a word of it"
     )
     half = crane.joint_state(0, 5)
     half.name, half.position = half.name[:1], half.position[:1]
@@ -220,6 +220,9 @@ def test_frames_wait_for_joint_states_and_take_what_lies_between_two(start_node)
     not_finite.position[1] = float("nan")
     joints.publish(not_finite)
     node.frames_status(joint_states_refused=2)
+    cloth(node, 20)  # waits for `reach`; `turn` of that message is known
+    awaited = "the last position of reach is of 15 ns, before the stamp 20 ns; 'reach' is nan in the joint state of 20"
+    node.wait_until(lambda: awaited in node.peer.statuses["frames"][1], "joint and message")
     assert values["restarts"] == "0" and node.process.poll() is None
 
 
@@ -396,12 +399,12 @@ def test_joint_states_that_cannot_be_used_are_told_of_before_the_robot_is_known(
     joints.publish(JointState(name=[f"j{k}" for k in range(1001)], position=[0.0] * 1001))
     values = node.frames_status(joint_states_refused=2)
     assert "is not kept until the description of its robot comes" in values["last_refusal"]
-    endless.position[1] = float("inf")  # of a joint of whom, nobody knows yet
+    endless.position[1] = float("inf")  # of which robot, nobody knows yet
     joints.publish(endless)
     joints.publish(crane.joint_state(1, 1))
     publisher = describe(node)
     values = node.frames_status(joint_states_refused=3)
-    assert "'reach' is at inf; positions must be finite" in values["last_refusal"]
+    assert "'reach' is inf in the joint state of 1 ns; positions must be finite" in values["last_refusal"]
     publisher.publish(String(data=crane.URDF.replace('"0.6 0.06 0.04"', '"0.9 0.06 0.04"')))
     node.peer.topology("cloth", SHEET.faces, SHEET.n_vertices)
     cloth(node, 1)
@@ -559,7 +562,7 @@ def test_a_robot_alone_says_what_it_waits_for(start_node, by):
     else:
         joints = node.peer.publisher(JointState, "joint_states")
         joints.publish(JointState(name=["turn"], position=[0.0]))
-        awaited = "no frame yet: crane: no joint state has told of reach; the last one that came tells of turn"
+        awaited = "no frame yet: crane: no joint state has named reach; the last one names turn"
     node.wait_until(lambda: awaited in node.peer.statuses["frames"][1], "a word of it")
     for k in (1, 2):
         for message in [crane.joint_state(k, k)] if by == "joints" else transforms(k, "left_"):

@@ -3,6 +3,7 @@
 
 import math
 
+import numpy as np
 import pytest
 
 from hpccd_ros.frames.samples import HISTORY_NS, MOST_SAMPLES
@@ -10,6 +11,7 @@ from hpccd_ros.robots import urdf
 from hpccd_ros.robots.errors import RobotError
 from hpccd_ros.robots.joint_history import JointHistory, NoJointStateError
 from hpccd_ros.robots.kinematics import Kinematics
+from hpccd_ros.robots.robot import Robot
 
 URDF = """<robot name="r"><link name="a"/><link name="b"/><link name="c"/><link name="d"/>
 <joint name="turn" type="continuous"><parent link="a"/><child link="b"/></joint>
@@ -42,13 +44,13 @@ def test_order_of_arrival_does_not_matter_and_the_same_stamp_replaces():
 
 def test_what_is_not_known_is_named_and_whether_it_may_come():
     joints = history()
-    with pytest.raises(NoJointStateError, match="no joint state has told of turn, slide"):
+    with pytest.raises(NoJointStateError, match="no joint state has named turn, slide$"):
         joints.latest()
     joints.add(100, ["slide"], [1.0])
     for stamp, message, final in [
-        (100, "no joint state has told of turn; the last one that came tells of slide", False),
+        (100, "no joint state has named turn; the last one names slide", False),
         (50, "after the stamp 50 ns", True),
-        (250, "the last joint state of turn, slide is of 200 ns, before the stamp 250 ns", False),
+        (250, "the last position of turn, slide is of 200 ns, before the stamp 250 ns", False),
     ]:
         if stamp == 50:
             joints.add(200, ["turn", "slide"], [0.0, 0.0])
@@ -68,10 +70,67 @@ def test_messages_that_cannot_be_used_leave_nothing_behind():
     joints = history()
     with pytest.raises(RobotError, match="2 names and 1 positions"):
         joints.add(1, ["turn", "slide"], [0.0])
-    with pytest.raises(RobotError, match="'slide' is at inf; positions must be finite"):
-        joints.add(1, ["turn", "slide"], [0.0, math.inf])
     with pytest.raises(NoJointStateError):
         joints.latest()
+
+
+def test_a_position_that_is_not_finite_leaves_the_others_of_its_message_in_use():
+    joints = history()
+    added = joints.add(100, ["turn", "slide", "also"], [1.0, math.nan, math.nan])
+    assert added.unusable.startswith("'slide' is nan in the joint state of 100 ns; positions must be finite")
+    with pytest.raises(NoJointStateError, match=r"^'slide' is nan in the joint state of 100 ns$"):
+        joints.latest()
+    assert joints.add(200, ["slide", "turn"], [2.0, 2.0]) == (None, "")
+    assert joints.add(300, ["slide", "turn"], [-math.inf, 3.0]).unusable
+    assert joints.latest() == 200 and joints.at(200) == {"turn": 2.0, "slide": 2.0}
+    with pytest.raises(NoJointStateError, match="is of 200 ns, before .* 300 ns; 'slide' is -inf in .* of 300 ns$"):
+        joints.at(300)
+    joints.add(400, ["slide"], [4.0])
+    assert joints.at(300) == {"turn": 3.0, "slide": 3.0}
+
+
+def test_a_message_of_velocities_alone_is_not_malformed():
+    joints = history()
+    assert joints.add(100, ["turn", "slide", "of another robot"], []) == (None, "")
+    with pytest.raises(NoJointStateError, match="^'turn' has no position in .* 100 ns; 'slide' has no position"):
+        joints.latest()
+    joints.add(100, ["turn", "slide"], [1.0, 1.0])
+    joints.add(200, ["turn", "slide"], [])
+    assert joints.latest() == 100
+
+
+def test_a_joint_that_was_named_before_a_restart_is_not_called_unnamed():
+    joints = history()
+    joints.add(100, ["turn", "slide"], [0.0, 0.0])
+    joints.clear()
+    joints.add(10, ["turn"], [0.0])
+    expected = "^the last position of slide, of 100 ns, is from before the clock was set back$"
+    with pytest.raises(NoJointStateError, match=expected):
+        joints.latest()
+
+
+def test_joints_that_move_no_geometry_need_no_positions():
+    """A head that carries only cameras; of the arm, what the gripper mimics counts too."""
+    box = '<collision><geometry><box size="1 1 1"/></geometry></collision>'
+    links = "".join(f'<link name="{name}">{box}</link>' for name in ("base", "arm", "finger"))
+    links += "".join(f'<link name="{name}"/>' for name in ("tip", "cam", "rotor"))
+    text = f"""<robot name="r">{links}
+      <joint name="lift" type="prismatic"><parent link="base"/><child link="arm"/></joint>
+      <joint name="grip" type="prismatic"><parent link="arm"/><child link="finger"/>
+        <mimic joint="motor" multiplier="0.5"/></joint>
+      <joint name="motor" type="continuous"><parent link="base"/><child link="rotor"/></joint>
+      <joint name="head" type="revolute"><parent link="base"/><child link="cam"/></joint>
+      <joint name="wrist" type="continuous"><parent link="finger"/><child link="tip"/></joint></robot>"""
+    robot = Robot.of(text)
+    assert set(robot.kinematics.inputs) == {"lift", "motor"}
+    joints = JointHistory(robot.kinematics)
+    unneeded = ["head", "wrist"]
+    assert joints.add(100, ["lift", "motor", *unneeded], [0.1, 0.2, math.nan, math.inf]) == (None, "")
+    without = robot.placements(robot.kinematics.state(joints.at(100)))
+    given = robot.placements(robot.kinematics.state({**joints.at(100), "head": 1.0, "wrist": 2.0}))
+    for a, b in zip(without, given, strict=True):
+        assert np.array_equal(a.vertices, b.vertices)
+    assert robot.kinematics.state({"lift": 0.0, "motor": 0.0, "head": 1.0}).values.tolist().count(1.0) == 1
 
 
 def test_what_is_kept_is_bounded():
@@ -137,25 +196,25 @@ FAR = 360 * HISTORY_NS
 
 def test_a_stamp_far_ahead_loses_nothing_of_what_comes_before_and_after():
     joints = after_a_short_run()
-    assert joints.add(FAR, ["slide", "turn"], [9.0, 9.0]) is None
+    assert joints.add(FAR, ["slide", "turn"], [9.0, 9.0]).stray is None
     assert joints.at(FAR) == {"slide": 9.0, "turn": 9.0}
     assert of_now(joints, 485) is False
     with pytest.raises(NoJointStateError, match=f"is of {FAR} ns, far ahead of the stamp 495000000 ns") as refused:
         joints.at(495 * MS)
     assert not refused.value.final
-    assert joints.add(500 * MS, ["turn"], [0.0]) == FAR  # of all joints that it told of
-    assert joints.add(510 * MS, ["slide", "turn"], [0.0, 0.0]) is None
+    assert joints.add(500 * MS, ["turn"], [0.0]).stray == FAR  # of all joints that it told of
+    assert joints.add(510 * MS, ["slide", "turn"], [0.0, 0.0]).stray is None
     assert joints.at(495 * MS) == {"slide": 0.0, "turn": 0.0} and joints.latest() == 510 * MS
     for k in range(3):  # of another clock, each beside one of this
-        assert joints.add(FAR + k, ["slide", "turn"], [9.0, 9.0]) is None
-        assert joints.add((520 + k) * MS, ["slide", "turn"], [0.0, 0.0]) == FAR + k
+        assert joints.add(FAR + k, ["slide", "turn"], [9.0, 9.0]).stray is None
+        assert joints.add((520 + k) * MS, ["slide", "turn"], [0.0, 0.0]).stray == FAR + k
     assert of_now(joints, 515) is False and joints.latest() == 522 * MS
 
 
 def test_what_goes_on_from_a_stamp_far_ahead_confirms_it():
     joints = after_a_short_run()
     for stamp in (FAR, FAR + 10 * MS):
-        assert joints.add(stamp, ["slide", "turn"], [1.0, 1.0]) is None
+        assert joints.add(stamp, ["slide", "turn"], [1.0, 1.0]).stray is None
     assert of_now(joints, FAR // MS + 5) is True
     with pytest.raises(NoJointStateError) as refused:
         joints.at(495 * MS)
