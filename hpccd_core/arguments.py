@@ -2,7 +2,7 @@
 """Checks of arguments, each with an error that names the argument and the remedy."""
 
 import operator
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any, SupportsIndex, TypeVar
 
 import numpy as np
@@ -58,15 +58,15 @@ def whole_number(name: str, value: SupportsIndex, low: int, high: int) -> int:
     return number
 
 
-def mesh_number(name: str, mesh: str | int, names: tuple[str, ...]) -> int:
-    """The number of a mesh that is given by its name or its number."""
+def mesh_number(name: str, mesh: str | int, numbers: Mapping[str, int]) -> int:
+    """The number of a mesh that is given by its name or its number. numbers: of all meshes, by name."""
     if isinstance(mesh, str):
-        if mesh not in names:
-            raise ValueError(f"{name}: no mesh is named {mesh!r}; the scene has {', '.join(names) or 'none'}")
-        return names.index(mesh)
-    if not names:
+        if mesh not in numbers:
+            raise ValueError(f"{name}: no mesh is named {mesh!r}; the scene has {', '.join(numbers) or 'none'}")
+        return numbers[mesh]
+    if not numbers:
         raise ValueError(f"{name}: the scene has no mesh yet; add_mesh comes first")
-    return whole_number(name, mesh, 0, len(names) - 1)
+    return whole_number(name, mesh, 0, len(numbers) - 1)
 
 
 def length(name: str, value: object) -> float:

@@ -206,6 +206,7 @@ class Detector(MotionQueries[OfMotion, OfStep], SnapshotQueries[OfNear, OfPierce
         self._shape = (self.n_vertices, 3) if self.worlds is None else (self.worlds, self.n_vertices, 3)
         self._rows = self.n_vertices * (self.worlds or 1)
         self._mesh_names = tuple(scene.mesh_names)
+        self._mesh_numbers = {name: number for number, name in enumerate(self._mesh_names)}
         self._core = _core.Detector(
             scene=scene._core,
             accuracy=getattr(_core.Accuracy, accuracy),
@@ -288,7 +289,7 @@ class Detector(MotionQueries[OfMotion, OfStep], SnapshotQueries[OfNear, OfPierce
         The same mesh twice: within it. 0: those that touch. A call under way ends first. The next one fits its boxes to
         the new distances as it does to any motion; before it, any number of pairs may be set.
         """
-        a, b = (arguments.mesh_number(n, m, self._mesh_names) for n, m in (("mesh_a", mesh_a), ("mesh_b", mesh_b)))
+        a, b = (arguments.mesh_number(n, m, self._mesh_numbers) for n, m in (("mesh_a", mesh_a), ("mesh_b", mesh_b)))
         self._core.set_separation(a, b, arguments.length("separation", separation))
 
     def set_separations(self, of_pairs: ArrayLike) -> None:

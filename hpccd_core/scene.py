@@ -84,7 +84,7 @@ class Scene:
         )
 
     def _number(self, name: str, mesh: str | int) -> int:
-        return arguments.mesh_number(name, mesh, tuple(self._ids))
+        return arguments.mesh_number(name, mesh, self._ids)
 
     @property
     def n_vertices(self) -> int:
