@@ -23,6 +23,7 @@ Rules, in the order in which they are applied to a vertex message:
 
 from collections import deque
 from collections.abc import Collection, Sequence
+from dataclasses import replace
 
 from hpccd_ros.base.quoting import listed
 from hpccd_ros.frames.coordinate_frame import CoordinateFrame
@@ -32,8 +33,8 @@ from hpccd_ros.frames.outcome import Outcome
 from hpccd_ros.frames.restart import Restart
 from hpccd_ros.frames.stamp_order import StampOrder
 from hpccd_ros.frames.static_positions import StaticPositions
-from hpccd_ros.frames.topology_version import TopologyHistory, check_frame, check_successor, is_early
-from hpccd_ros.frames.types import AssemblyRules, MeshFrame, MeshSettings, SceneFrame, Topology
+from hpccd_ros.frames.topology_version import TopologyHistory, check_frame, check_successor, is_early, refused_topology
+from hpccd_ros.frames.types import OUTDATED, AssemblyRules, MeshFrame, MeshSettings, Origin, SceneFrame, Topology
 
 
 class _MeshState:
@@ -46,6 +47,7 @@ class _MeshState:
         self.topologies = TopologyHistory(max_pending)
         self.early: deque[MeshFrame] = deque()  # their topology has not come
         self.positions = StaticPositions()
+        self.newest = 0.0  # arrival of the last message about where a static mesh is, whether or not it is in use
         self.stamps = StampOrder(settings.name)
         self.new_publisher = False  # came, and none of its frames was accepted yet
         self.follows = False  # frames come for stamps of another mesh that were accepted
@@ -113,9 +115,10 @@ class FrameAssembler:
             return self._unknown(mesh, Input.TOPOLOGY)
         if state.whole:
             text = f"the topology comes with the positions (parameter mesh.{mesh}.input); publish no other one"
-            return Outcome(refusals=[Refusal(mesh, Reason.TOPOLOGY_CONFLICT, text, what=Input.TOPOLOGY)])
+            return Outcome(refusals=[refused_topology(mesh, Reason.TOPOLOGY_CONFLICT, text, topology)])
         current = state.topologies.current
         if current is not None and topology.version == current.version and topology.same_content(current):
+            state.topologies.sent = topology.sent
             return Outcome()
         if current is not None and not new_publisher and (refusal := check_successor(mesh, topology, current)):
             return Outcome(refusals=[refusal])
@@ -126,6 +129,11 @@ class FrameAssembler:
         for frame in early:
             outcome += self._admit(state, frame)
         return outcome
+
+    def hear(self, mesh: str, received: float) -> None:
+        """A message came that says where ``mesh`` is. Of a static one, the positions before are outdated from now on."""
+        if (state := self._meshes.get(mesh)) is not None:
+            state.newest = received
 
     def add(self, mesh: str, frame: MeshFrame, new_publisher: bool = False) -> Outcome:
         """Add one vertex message."""
@@ -140,7 +148,7 @@ class FrameAssembler:
         outcome = Outcome()
         for name in meshes:
             ours, theirs = self._meshes[name], other._meshes[name]
-            ours.topologies, ours.positions = theirs.topologies, theirs.positions
+            ours.topologies, ours.positions, ours.newest = theirs.topologies, theirs.positions, theirs.newest
             ours.early, theirs.early = theirs.early, deque()
         for name, frame in other._matcher.take(meshes):
             outcome += self.add(name, frame)
@@ -182,7 +190,7 @@ class FrameAssembler:
             f"topology{version} has not come; publish it on "
             f"meshes/{state.name}/topology (reliable, transient local) before the vertices"
         )
-        return [Refusal(state.name, Reason.NO_TOPOLOGY, text)]
+        return [Refusal(state.name, Reason.NO_TOPOLOGY, text, sent=lost.sent)]
 
     def _keep_positions(self, state: _MeshState, frame: MeshFrame) -> Outcome:
         if refusal := self._frame.check_static(state.name, frame):
@@ -198,7 +206,7 @@ class FrameAssembler:
         for check in (self._check_frame_id,) if state.follows else (self._check_frame_id, self._check_stamp):
             verdict = check(state, frame)
             if isinstance(verdict, Refusal):
-                outcome.refusals.append(verdict)
+                outcome.refusals.append(replace(verdict, sent=frame.sent))
                 return outcome
             if isinstance(verdict, Restart):
                 outcome.restarts.append(f"{verdict.text}: taken as a restart")
@@ -227,13 +235,20 @@ class FrameAssembler:
 
     def _complete(self, match: Match) -> SceneFrame | list[Refusal]:
         frames = []
+        origins = []
         frame_id = self._frame.name
         for name, state in self._meshes.items():
-            frame = state.positions.fitting(frame_id) if state.static else match.frames[name]
-            if frame is None:
+            if not state.static:
+                frame = match.frames[name]
+                place = frame.sent
+            elif (kept := state.positions.fitting(frame_id)) is not None:
+                frame = kept.frame
+                place = kept.newest.sent if kept.newest.received >= state.newest else OUTDATED
+            else:
                 text = _no_positions(state, frame_id)
                 return [Refusal(fresh, Reason.STATIC_MISSING, text) for fresh in match.fresh]
             frames.append(frame)
+            origins.append(Origin(place, frame.shape_sent, state.topologies.sent_of(frame.topology)))
             frame_id = frame_id or frame.frame_id
         moving = [match.frames[n] for n in self._meshes if n in match.frames]
         step = next((f.step for f in moving if f.step is not None), self._completed)
@@ -247,6 +262,7 @@ class FrameAssembler:
             fresh=match.fresh,
             received=max(f.received for f in moving),
             placements=tuple(f.placement for f in frames) if any(f.placement for f in frames) else (),
+            origins=tuple(origins),
         )
 
 

@@ -48,16 +48,16 @@ class CoordinateFrame:
             self._elsewhere[mesh] = frame.frame_id, run
             if 0 < restart_after <= run.next(frame.stamp) or from_new_publisher:
                 return Restart(f"mesh {mesh} goes on in frame {quoted(frame.frame_id)} after {quoted(self.name)}")
-        return self._refuse(mesh, frame.frame_id)
+        return self._refuse(mesh, frame)
 
     def check_static(self, mesh: str, frame: MeshFrame) -> Refusal | None:
         """Positions of a static mesh may be in any frame but where one is demanded."""
         fits = not self._demanded or frame.frame_id in ("", self._demanded)
-        return None if fits else self._refuse(mesh, frame.frame_id)
+        return None if fits else self._refuse(mesh, frame)
 
-    def _refuse(self, mesh: str, frame_id: str) -> Refusal:
+    def _refuse(self, mesh: str, frame: MeshFrame) -> Refusal:
         text = (
-            f"frame_id {quoted(frame_id)}, the scene is in {quoted(self.name)} (by {self.source}); publish all meshes "
+            f"frame_id {quoted(frame.frame_id)}, the scene is in {quoted(self.name)} (by {self.source}); publish all meshes "
             "in one coordinate frame"
         )
-        return Refusal(mesh, Reason.FRAME_ID, text)
+        return Refusal(mesh, Reason.FRAME_ID, text, sent=frame.sent)

@@ -37,6 +37,7 @@ class Reason(StrEnum):
     BACKWARD = "stamp_backward"
     REPEATED = "stamp_repeated"
     AHEAD = "stamp_ahead"  # of a transform or joint state: far after those that came before and after it
+    CONTRADICTED = "contradicted"  # a joint state: another publisher tells of the same joint and says otherwise
     LATE = "late"  # its stamp was already answered (or given up) when it came
     INCOMPLETE = "incomplete"  # another mesh had no frame for this stamp
     STATIC_MISSING = "static_missing"  # the vertices of a static mesh have not come
@@ -56,11 +57,21 @@ class Input(StrEnum):
     JOINT_STATE = "joint states"
 
 
+class Aspect(StrEnum):
+    """What a refused message was to tell of its mesh."""
+
+    PLACE = "place"  # where it is
+    SHAPE = "shape"  # of a mesh that moves by poses
+    TOPOLOGY = "topology"
+    NOTHING = "nothing"  # it concerns nothing that is in use
+
+
 @dataclass(frozen=True, slots=True)
 class Refusal:
     """``messages`` of ``mesh`` (of a transform: its topic) that will not be used, and why.
 
-    ``text``: what was wrong and what to do, for the log; "": nobody can do anything about it.
+    ``text``: what was wrong and what to do, for the log; "": nobody can do anything about it. ``sent``: when the
+    message was, ns of the system clock; None: unknown.
     """
 
     mesh: str
@@ -68,6 +79,8 @@ class Refusal:
     text: str = ""
     messages: int = 1
     what: Input = Input.VERTICES
+    aspect: Aspect = Aspect.PLACE
+    sent: int | None = None
 
 
 class RefusalCounter:

@@ -14,7 +14,17 @@ from hpccd_ros.frames.rigid_mesh import RigidMesh
 from hpccd_ros.frames.standstill import Standstill
 from hpccd_ros.frames.transform_buffer import NoTransformError, TransformBuffer
 from hpccd_ros.frames.transformer import MeshTransformer, Transformed
-from hpccd_ros.frames.types import JOINTS, TF, AssemblyRules, MeshFrame, MeshSettings, PoseFrame, SceneFrame, Topology
+from hpccd_ros.frames.types import (
+    ALWAYS,
+    JOINTS,
+    TF,
+    AssemblyRules,
+    MeshFrame,
+    MeshSettings,
+    PoseFrame,
+    SceneFrame,
+    Topology,
+)
 from hpccd_ros.rigid.transform import IDENTITY
 
 
@@ -71,6 +81,7 @@ class FramePipeline:
         if isinstance(message, MeshFrame) and mesh in self._rigid:
             refusal = self._rigid[mesh].set_shape(message)
             return Outcome(refusals=[refusal]) if refusal is not None else Outcome(static_taken=1)
+        self._assembler.hear(mesh, message.received)
         return self._place(mesh, message, new_publisher)
 
     def retry(self) -> list[Outcome]:
@@ -164,7 +175,8 @@ class FramePipeline:
         outcome = Outcome()
         for mesh in self._by_transforms:
             outcome.asked.append(mesh.name)
-            outcome += self._place(mesh.name, PoseFrame(stamp, IDENTITY, mesh.frame, received), new_publisher)
+            pose = PoseFrame(stamp, IDENTITY, mesh.frame, received, sent=ALWAYS)
+            outcome += self._place(mesh.name, pose, new_publisher)
         for follower in self._followers:
             outcome.asked += follower.names
             follower.ask(stamp, received, new_publisher)

@@ -30,13 +30,15 @@ class Samples(Generic[Value]):
     """Of one thing, in the order of their stamps.
 
     ``numbers``: of the samples, in the order in which those of all things came. ``since``: number and stamp of the
-    first of those that came last, in increasing order, behind the newest stamp; None: the last one did not.
+    first of those that came last, in increasing order, behind the newest stamp; None: the last one did not. ``sent``:
+    when the messages of the samples were, ns of the system clock.
     """
 
     def __init__(self) -> None:
         self.stamps: list[int] = []
         self.samples: list[Value] = []
         self.numbers: list[int] = []
+        self.sent: list[int] = []
         self.since: tuple[int, int] | None = None
         self._behind = IncreasingStamps()
 
@@ -59,7 +61,7 @@ class Samples(Generic[Value]):
     def forget_newest(self, number: int) -> None:
         """If it came with this number."""
         if self.numbers and self.numbers[-1] == number:
-            del self.stamps[-1], self.samples[-1], self.numbers[-1]
+            del self.stamps[-1], self.samples[-1], self.numbers[-1], self.sent[-1]
             self.since, self._behind = None, IncreasingStamps()
 
     def forget_before(self, number: int) -> None:
@@ -68,9 +70,15 @@ class Samples(Generic[Value]):
         self.stamps = [self.stamps[place] for place in kept]
         self.samples = [self.samples[place] for place in kept]
         self.numbers = [self.numbers[place] for place in kept]
+        self.sent = [self.sent[place] for place in kept]
         self.since, self._behind = None, IncreasingStamps()
 
-    def add(self, stamp: int, sample: Value, number: int) -> bool:
+    def sent_at(self, stamp: int) -> int:
+        """When the older of the samples around ``stamp`` was sent, which lies between the first and the last."""
+        at = bisect_left(self.stamps, stamp)
+        return self.sent[at] if self.stamps[at] == stamp else min(self.sent[at - 1], self.sent[at])
+
+    def add(self, stamp: int, sample: Value, number: int, sent: int = 0) -> bool:
         """Whether so many came behind the newest one that they are of another run."""
         run = 0
         if self.stamps and stamp < self.stamps[-1]:
@@ -81,14 +89,15 @@ class Samples(Generic[Value]):
             self.since, self._behind = None, IncreasingStamps()
         at = bisect_left(self.stamps, stamp)
         if at < len(self.stamps) and self.stamps[at] == stamp:
-            self.samples[at], self.numbers[at] = sample, number
+            self.samples[at], self.numbers[at], self.sent[at] = sample, number, sent
             return run >= RESTART_AFTER
         self.stamps.insert(at, stamp)
         self.samples.insert(at, sample)
         self.numbers.insert(at, number)
+        self.sent.insert(at, sent)
         certain = self.stamps[-2 if self.doubtful else -1]
         old = max(bisect_left(self.stamps, certain - HISTORY_NS), len(self.stamps) - MOST_SAMPLES)
-        del self.stamps[:old], self.samples[:old], self.numbers[:old]
+        del self.stamps[:old], self.samples[:old], self.numbers[:old], self.sent[:old]
         return run >= RESTART_AFTER
 
 
@@ -104,8 +113,8 @@ class Run:
         self._came = 0  # messages so far
         self._anew: int | None = None  # the first stamp after it last began anew
 
-    def add(self, stamp: int, of_message: Iterable[tuple[Samples[Value], Value]]) -> int | None:
-        """What one message tells of some things. The stamp of an earlier message that is a stray, and left out."""
+    def add(self, stamp: int, of_message: Iterable[tuple[Samples[Value], Value]], sent: int = 0) -> int | None:
+        """What one message, sent then, tells of some things. The stamp of an earlier message that is a stray, and left out."""
         self._came += 1
         stray = None
         for samples, value in of_message:
@@ -114,7 +123,7 @@ class Run:
                 self._leave_out(samples.numbers[-1], stamp)
             elif samples.begins_anew(stamp):
                 self._begin_anew(self._came, stamp)
-            if samples.add(stamp, value, self._came) and samples.since is not None:
+            if samples.add(stamp, value, self._came, sent) and samples.since is not None:
                 self._begin_anew(*samples.since)
         return stray
 

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The positions of one static mesh, by the coordinate frame that they are in. No ROS."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from hpccd_ros.frames.types import MeshFrame
@@ -9,9 +11,16 @@ from hpccd_ros.frames.types import MeshFrame
 _MOST_FRAMES = 4
 
 
+class Kept(NamedTuple):
+    """``newest``: the last message that brought these positions, perhaps the same again; ``frame``: the first."""
+
+    frame: MeshFrame
+    newest: MeshFrame
+
+
 class StaticPositions:
     def __init__(self) -> None:
-        self._by_frame_id: dict[str, MeshFrame] = {}  # the last one kept last
+        self._by_frame_id: dict[str, Kept] = {}  # the last one kept last
 
     @property
     def frame_ids(self) -> list[str]:
@@ -20,14 +29,14 @@ class StaticPositions:
 
     def keep(self, frame: MeshFrame) -> None:
         known = self._by_frame_id.pop(frame.frame_id, None)
-        same = known is not None and np.array_equal(known.vertices, frame.vertices)
-        self._by_frame_id[frame.frame_id] = known if same else frame
+        same = known is not None and np.array_equal(known.frame.vertices, frame.vertices)
+        self._by_frame_id[frame.frame_id] = Kept(known.frame if same else frame, frame)
         if len(self._by_frame_id) > _MOST_FRAMES:
             del self._by_frame_id[next(iter(self._by_frame_id))]
 
-    def fitting(self, frame_id: str) -> MeshFrame | None:
+    def fitting(self, frame_id: str) -> Kept | None:
         """The last positions in this coordinate frame; those that name none fit all, as does an empty frame_id."""
-        fitting = [frame for name, frame in self._by_frame_id.items() if name in ("", frame_id) or not frame_id]
+        fitting = [kept for name, kept in self._by_frame_id.items() if name in ("", frame_id) or not frame_id]
         return fitting[-1] if fitting else None
 
     def clear(self) -> None:

@@ -3,8 +3,8 @@
 
 from collections import deque
 
-from hpccd_ros.frames.drops import Input, Reason, Refusal
-from hpccd_ros.frames.types import MeshFrame, Topology
+from hpccd_ros.frames.drops import Aspect, Input, Reason, Refusal
+from hpccd_ros.frames.types import UNTOLD, MeshFrame, Topology
 
 # As many as the node's subscription to topologies holds (middleware/qos.py): so many can have overtaken a frame there.
 _IN_THE_SUBSCRIPTION = 10
@@ -19,6 +19,7 @@ class TopologyHistory:
 
     def __init__(self, waiting: int) -> None:
         self.current: Topology | None = None
+        self.sent = UNTOLD  # when the last message was that was equal to the current one
         self._superseded: deque[Topology] = deque(maxlen=_IN_THE_SUBSCRIPTION + waiting)
 
     def put(self, topology: Topology) -> None:
@@ -28,6 +29,11 @@ class TopologyHistory:
         else:
             self._superseded.clear()
         self.current = topology
+        self.sent = topology.sent
+
+    def sent_of(self, topology: Topology) -> int:
+        """When it was sent, the last time."""
+        return self.sent if topology is self.current else topology.sent
 
     def of(self, frame: MeshFrame) -> Topology | None:
         """The one that the frame names, where it was in force after the last accepted frame; else the current one."""
@@ -37,6 +43,7 @@ class TopologyHistory:
     def same_as(self, carried: Topology) -> Topology:
         """The one in force where it is equal to that which a frame carries, else this one."""
         if self.current is not None and carried.version == self.current.version and carried.same_content(self.current):
+            self.sent = carried.sent
             return self.current
         return carried
 
@@ -57,11 +64,15 @@ def check_successor(mesh: str, topology: Topology, current: Topology) -> Refusal
     """None where ``topology``, of other content, can follow ``current`` from the same publisher."""
     if topology.version == current.version:
         text = f"version {topology.version} is in force with other content; count the version up with each change"
-        return Refusal(mesh, Reason.TOPOLOGY_CONFLICT, text, what=Input.TOPOLOGY)
+        return refused_topology(mesh, Reason.TOPOLOGY_CONFLICT, text, topology)
     if topology.version < current.version:
         text = f"version {topology.version} is older than {current.version}, now in force"
-        return Refusal(mesh, Reason.OLD_TOPOLOGY, text, what=Input.TOPOLOGY)
+        return refused_topology(mesh, Reason.OLD_TOPOLOGY, text, topology)
     return None
+
+
+def refused_topology(mesh: str, reason: Reason, text: str, topology: Topology) -> Refusal:
+    return Refusal(mesh, reason, text, what=Input.TOPOLOGY, aspect=Aspect.TOPOLOGY, sent=topology.sent)
 
 
 def is_early(frame: MeshFrame, topology: Topology | None) -> bool:
@@ -73,8 +84,8 @@ def check_frame(mesh: str, frame: MeshFrame, topology: Topology) -> Refusal | No
     """None where a frame that is not early belongs to ``topology``, of its history."""
     if frame.version is not None and frame.version < topology.version:
         text = f"vertices belong to topology version {frame.version}, version {topology.version} is in force"
-        return Refusal(mesh, Reason.OLD_TOPOLOGY, text)
+        return Refusal(mesh, Reason.OLD_TOPOLOGY, text, sent=frame.sent)
     if len(frame.vertices) != topology.n_vertices:
         text = f"{len(frame.vertices)} vertices, topology version {topology.version} has {topology.n_vertices}"
-        return Refusal(mesh, Reason.WRONG_COUNT, text)
+        return Refusal(mesh, Reason.WRONG_COUNT, text, sent=frame.sent)
     return None

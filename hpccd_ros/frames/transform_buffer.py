@@ -10,6 +10,7 @@ from bisect import bisect_left
 
 from hpccd_ros.base.quoting import listed, quoted
 from hpccd_ros.frames.samples import Run, Samples
+from hpccd_ros.frames.types import ALWAYS, OUTDATED, UNTOLD
 from hpccd_ros.rigid.transform import IDENTITY, Rigid
 
 MOST_FRAMES = 1000  # about 500 MB if every frame were full
@@ -31,16 +32,18 @@ class NoTransformError(LookupError):
 
 
 class _Edge(Samples[Rigid]):
-    """Where one frame was in its parent; ``always``: not bound to a time."""
+    """Where one frame was in its parent; ``always``: not bound to a time. ``outdated``: a newer one was rejected."""
 
     def __init__(self, parent: str) -> None:
         super().__init__()
         self.parent = parent
         self.always: Rigid | None = None
+        self.outdated = False
 
-    def at(self, child: str, stamp: int) -> Rigid:
+    def at(self, child: str, stamp: int) -> tuple[Rigid, int]:
+        """With the time at which it was sent."""
         if self.always is not None:
-            return self.always
+            return self.always, OUTDATED if self.outdated else ALWAYS
         at = bisect_left(self.stamps, stamp)
         if not self.stamps:
             raise NoTransformError(f"none from {child!r} to {self.parent!r} since the clock was set back", final=False)
@@ -48,7 +51,7 @@ class _Edge(Samples[Rigid]):
             late = f"the last one from {child!r} to {self.parent!r} is of {self.stamps[-1]} ns"
             raise NoTransformError(f"{late}, before the stamp {stamp} ns", final=False)
         if self.stamps[at] == stamp:
-            return self.samples[at]
+            return self.samples[at], OUTDATED if self.outdated else self.sent[at]
         if self.in_doubt(stamp):
             ahead = f"the last one from {child!r} to {self.parent!r} is of {self.stamps[-1]} ns"
             text = f"{ahead}, far ahead of the stamp {stamp} ns and of all before: the next one tells whether it counts"
@@ -57,7 +60,8 @@ class _Edge(Samples[Rigid]):
             early = f"the first one kept from {child!r} to {self.parent!r} is of {self.stamps[0]} ns"
             raise NoTransformError(f"{early}, after the stamp {stamp} ns", final=True)
         before, after = self.stamps[at - 1], self.stamps[at]
-        return self.samples[at - 1].between(self.samples[at], (stamp - before) / (after - before))
+        rigid = self.samples[at - 1].between(self.samples[at], (stamp - before) / (after - before))
+        return rigid, OUTDATED if self.outdated else min(self.sent[at - 1], self.sent[at])
 
 
 class TransformBuffer:
@@ -72,8 +76,9 @@ class TransformBuffer:
         self._edges: dict[str, _Edge] = {}
         self._run = Run(self._edges.values)
 
-    def add(self, parent: str, child: str, rigid: Rigid, stamp: int | None) -> int | None:
-        """``rigid`` takes coordinates in ``child`` to coordinates in ``parent``; stamp ns, None: at all times.
+    def add(self, parent: str, child: str, rigid: Rigid, stamp: int | None, sent: int = UNTOLD) -> int | None:
+        """``rigid`` takes coordinates in ``child`` to coordinates in ``parent``; stamp ns, None: at all times. sent:
+        when its message was.
 
         The stamp of an earlier one that was far ahead, and is forgotten. Raises ValueError: an empty or too long name,
         a frame in itself, too many frames.
@@ -88,11 +93,24 @@ class TransformBuffer:
             raise ValueError(f"frame {child!r} is one too many: {MOST_FRAMES} are known already")
         if edge is None or edge.parent != parent:
             edge = self._edges[child] = _Edge(parent)
+        edge.outdated = False
         if stamp is None:
             edge.always = rigid
             return None
         edge.always = None
-        return self._run.add(stamp, [(edge, rigid)])
+        return self._run.add(stamp, [(edge, rigid)], sent)
+
+    def rejected(self, child: str | None, static: bool) -> bool:
+        """A newer transform of ``child`` (None: of no known frame, so of any) was rejected: where it is, is not known
+        until a valid one comes. static: on a topic of static ones. Whether a known frame is concerned."""
+        if child is not None:
+            edge = self._edges.get(child.removeprefix("/"))
+            edges = [edge] if edge is not None else []
+        else:
+            edges = [edge for edge in self._edges.values() if (edge.always is not None) == static]
+        for edge in edges:
+            edge.outdated = True
+        return bool(edges)
 
     @property
     def begun(self) -> int:
@@ -108,14 +126,20 @@ class TransformBuffer:
 
         Raises NoTransformError: unknown frame, no path, or no sample around the stamp.
         """
+        return self.lookup_sent(source, target, stamp)[0]
+
+    def lookup_sent(self, source: str, target: str, stamp: int) -> tuple[Rigid, int]:
+        """As `lookup`, with the time at which the oldest transform was sent that it is made of."""
         source, target = source.removeprefix("/"), target.removeprefix("/")
         if source == target:
-            return IDENTITY
+            return IDENTITY, ALWAYS
         up, down = self._ancestors(source), self._ancestors(target)
         common = next((frame for frame in up if frame in set(down)), None)
         if common is None:
             raise _unconnected(source, target)
-        return self._to_ancestor(target, common, stamp).inverse().after(self._to_ancestor(source, common, stamp))
+        below, sent_below = self._to_ancestor(target, common, stamp)
+        above, sent_above = self._to_ancestor(source, common, stamp)
+        return below.inverse().after(above), min(sent_below, sent_above)
 
     def latest(self, source: str, target: str) -> int | None:
         """The last stamp, ns, that `lookup` knows between the two; None: what connects them is bound to no time.
@@ -152,13 +176,14 @@ class TransformBuffer:
             path.append(edge.parent)
         return path
 
-    def _to_ancestor(self, frame: str, ancestor: str, stamp: int) -> Rigid:
-        rigid = IDENTITY
+    def _to_ancestor(self, frame: str, ancestor: str, stamp: int) -> tuple[Rigid, int]:
+        rigid, sent = IDENTITY, ALWAYS
         while frame != ancestor:
             edge = self._edges[frame]
-            rigid = edge.at(frame, stamp).after(rigid)
+            step, of_step = edge.at(frame, stamp)
+            rigid, sent = step.after(rigid), min(sent, of_step)
             frame = edge.parent
-        return rigid
+        return rigid, sent
 
 
 def _messages(count: int | str) -> str:

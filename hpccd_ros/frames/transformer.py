@@ -18,7 +18,7 @@ from hpccd_ros.frames.coordinates import unusable_coordinates
 from hpccd_ros.frames.drops import Reason, Refusal
 from hpccd_ros.frames.standstill import Standstill
 from hpccd_ros.frames.transform_buffer import NoTransformError, TransformBuffer
-from hpccd_ros.frames.types import TF, MeshFrame, MeshSettings
+from hpccd_ros.frames.types import ALWAYS, TF, MeshFrame, MeshSettings
 from hpccd_ros.rigid.transform import IDENTITY, Rigid
 
 
@@ -74,7 +74,7 @@ class MeshTransformer:
         if self._kind == "none":
             return Transformed([(frame, new_publisher)], [])
         if text := self._wrong_frame_id(frame):
-            return Transformed([], [self._refuse(Reason.FRAME_ID, text, new_publisher)])
+            return Transformed([], [self._refuse(Reason.FRAME_ID, text, new_publisher, frame)])
         if self._kind == "pose":
             moved = self._moved(frame, self._pose, new_publisher)
             if isinstance(moved, Refusal):
@@ -96,7 +96,8 @@ class MeshTransformer:
         while self._waiting:
             item = self._waiting[0]
             try:
-                rigid = self._transforms.lookup(item.frame.frame_id or self._frame, self._target, item.frame.stamp)
+                source = item.frame.frame_id or self._frame
+                rigid, sent = self._transforms.lookup_sent(source, self._target, item.frame.stamp)
             except NoTransformError as error:
                 item.awaited, item.connected = str(error), error.connected
                 if error.connected and not error.final:
@@ -108,7 +109,7 @@ class MeshTransformer:
                     passed.append(item)
                 continue
             self._waiting.popleft()
-            moved = self._moved(item.frame, rigid, item.new_publisher)
+            moved = self._moved(item.frame, rigid, item.new_publisher, sent)
             if isinstance(moved, Refusal):
                 refusals.append(moved)
                 continue
@@ -136,7 +137,10 @@ class MeshTransformer:
             return f"{what}; set it, or parameter mesh.{self._mesh}.frame"
         return None
 
-    def _moved(self, frame: MeshFrame, rigid: Rigid, new_publisher: bool) -> MeshFrame | Refusal:
+    def _moved(
+        self, frame: MeshFrame, rigid: Rigid, new_publisher: bool, sent: int = ALWAYS
+    ) -> MeshFrame | Refusal:
+        """sent: when the transform was."""
         placement = frame.placement.moved(rigid) if frame.placement is not None else None
         if placement is not None:
             vertices = placement.vertices
@@ -145,21 +149,22 @@ class MeshTransformer:
             vertices = frame.vertices if rigid is IDENTITY else rigid.apply(frame.vertices.astype(np.float64))
         if problem := unusable_coordinates(vertices, by_poses=placement is not None):
             reason, text = problem
-            return self._refuse(reason, f"after the transform {text}", new_publisher)
-        return replace(frame, vertices=vertices, frame_id=self._target, placement=placement)
+            return self._refuse(reason, f"after the transform {text}", new_publisher, frame)
+        sent = min(sent, frame.sent)
+        return replace(frame, vertices=vertices, frame_id=self._target, placement=placement, sent=sent)
 
     def _noticed(self, new_publisher: bool) -> bool:
         new_publisher, self._unnoticed = new_publisher or self._unnoticed, False
         return new_publisher
 
     def _give_up(self, item: _Waiting, why: str = "") -> Refusal:
-        return self._refuse(Reason.NO_TRANSFORM, self._missing(item) + why, item.new_publisher)
+        return self._refuse(Reason.NO_TRANSFORM, self._missing(item) + why, item.new_publisher, item.frame)
 
     def _missing(self, item: _Waiting) -> str:
         if item.connected:
             return item.awaited
         return f"{item.awaited}; {self._transforms.account(item.frame.frame_id or self._frame)}"
 
-    def _refuse(self, reason: Reason, text: str, new_publisher: bool) -> Refusal:
+    def _refuse(self, reason: Reason, text: str, new_publisher: bool, frame: MeshFrame) -> Refusal:
         self._unnoticed |= new_publisher
-        return Refusal(self._mesh, reason, text)
+        return Refusal(self._mesh, reason, text, sent=None if self._asked else frame.sent)

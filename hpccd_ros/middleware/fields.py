@@ -11,7 +11,7 @@ from array import array
 import numpy as np
 from builtin_interfaces.msg import Time
 
-from hpccd_ros.frames.drops import Input, Reason, Refusal
+from hpccd_ros.frames.drops import Aspect, Input, Reason, Refusal
 
 _NS = 1_000_000_000
 _CODES = {
@@ -29,9 +29,11 @@ class InvalidMessageError(ValueError):
         super().__init__(text)
         self.reason = reason
 
-    def refusal(self, mesh: str, what: Input = Input.VERTICES) -> Refusal:
+    def refusal(
+        self, mesh: str, what: Input = Input.VERTICES, aspect: Aspect = Aspect.PLACE, sent: int | None = None
+    ) -> Refusal:
         """Of the message, as one of ``mesh``."""
-        return Refusal(mesh, self.reason, str(self), what=what)
+        return Refusal(mesh, self.reason, str(self), what=what, aspect=aspect, sent=sent)
 
 
 def stamp_to_ns(stamp: Time) -> int:

@@ -8,6 +8,7 @@ from sensor_msgs.msg import JointState
 
 from hpccd_ros.frames.drops import Input, Reason, Refusal
 from hpccd_ros.frames.samples import stray_text
+from hpccd_ros.frames.types import UNTOLD
 from hpccd_ros.middleware import fields
 from hpccd_ros.robots.errors import RobotError
 from hpccd_ros.robots.joint_frames import JointFrames
@@ -38,31 +39,38 @@ def too_large(topic: str) -> Refusal:
     return Refusal(topic, Reason.TOO_LARGE, text, what=Input.JOINT_STATE)
 
 
-def fill(robots: Iterable[JointFrames], message: Any, topic: str) -> list[Refusal]:
-    """Give a sensor_msgs/JointState of ``topic`` to the robots that it moves. It is refused where one of them cannot
-    use it, or not all of it, and where no robot can; the others have it all the same. An earlier one is refused that
-    this one shows to have been far ahead."""
+def fill(
+    robots: Iterable[JointFrames], message: Any, topic: str, sent: int = UNTOLD, publisher: int | None = None
+) -> list[Refusal]:
+    """Give a sensor_msgs/JointState of ``topic``, sent then, to the robots that it moves. It is refused where one of
+    them cannot use it, or not all of it, and where no robot can; the others have it all the same. An earlier one is
+    refused that this one shows to have been far ahead. publisher: which one of several; where they contradict each
+    other that is reported as a refusal, though the message is in use."""
     problems: list[str] = []
+    contradiction = ""
     stray: int | None = None
     try:
         stamp = fields.stamp_to_ns(message.header.stamp)
         check_lengths(message.name, message.position)
     except ValueError as error:
-        return [_refusal(topic, str(error))]
+        return [_refusal(topic, str(error), sent)]
     for robot in robots:
         try:
-            added = robot.add(stamp, message.name, message.position)
+            added = robot.add(stamp, message.name, message.position, sent, publisher)
         except RobotError as error:
             problems.append(str(error))
             continue
         stray = added.stray if stray is None else stray
+        contradiction = contradiction or added.contradiction
         if added.unusable:
             problems.append(added.unusable)
-    refusals = [_refusal(topic, problem) for problem in problems[:1]]
+    refusals = [_refusal(topic, problem, sent) for problem in problems[:1]]
+    if contradiction:
+        refusals.append(Refusal(topic, Reason.CONTRADICTED, contradiction, what=Input.JOINT_STATE, sent=sent))
     if stray is not None:
-        refusals.append(Refusal(topic, Reason.AHEAD, stray_text(stray), what=Input.JOINT_STATE))
+        refusals.append(Refusal(topic, Reason.AHEAD, stray_text(stray), what=Input.JOINT_STATE, sent=sent))
     return refusals
 
 
-def _refusal(topic: str, problem: str) -> Refusal:
-    return Refusal(topic, Reason.MALFORMED, problem, what=Input.JOINT_STATE)
+def _refusal(topic: str, problem: str, sent: int) -> Refusal:
+    return Refusal(topic, Reason.MALFORMED, problem, what=Input.JOINT_STATE, sent=sent)

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What comes on the topics of a mesh, by the last part of their names: messages -> checked topologies and frames."""
 
+from dataclasses import replace
 from typing import Any
 
 from geometry_msgs.msg import PoseStamped
@@ -39,28 +40,29 @@ def read(
     """Arrays of the frame are views of the message's bytes where it allows that.
 
     message: its CDR bytes where the kind is one of topic_names.WHOLE. limits: max_vertices, max_faces, max_edges.
-    received, only_publisher: of the frame, as in `MeshFrame`. sent: when its publisher sent it, ns, the stamp of a
-    message that has none. welding: of the markers of this mesh. Raises InvalidMessageError.
+    received, only_publisher: of the frame, as in `MeshFrame`. sent: when its publisher sent it, ns of the system clock;
+    the stamp, too, of a message that has none. welding: of the markers of this mesh. Raises InvalidMessageError.
     """
     most = limits["max_vertices"], limits["max_faces"]
     if kind == TOPOLOGY:
-        return mesh_messages.topology_from_message(message, limits)
+        return replace(mesh_messages.topology_from_message(message, limits), sent=sent)
     if kind in WHOLE:
         if kind == SHAPE:
             mesh = whole_meshes.mesh_from_shape(message, sent, *most)
         else:
             mesh = whole_meshes.mesh_from_marker(message, *most, welding or Welding())
-        version = mesh.topology.version
+        topology = replace(mesh.topology, sent=sent)
         return MeshFrame(
-            mesh.stamp, mesh.vertices, version, None, mesh.frame_id, received, only_publisher, mesh.topology
-        )
+            mesh.stamp, mesh.vertices, topology.version, None, mesh.frame_id, received, only_publisher, topology,
+            sent=sent,
+        )  # fmt: skip
     stamp, frame_id = fields.stamp_to_ns(message.header.stamp), message.header.frame_id
     if kind == POSE:
-        return PoseFrame(stamp, mesh_messages.pose_from_message(message), frame_id, received, only_publisher)
+        return PoseFrame(stamp, mesh_messages.pose_from_message(message), frame_id, received, only_publisher, sent)
     if kind == VERTICES:
         vertices = mesh_messages.vertices_from_message(message, limits["max_vertices"])
         version, step = message.topology_version, message.step
     else:
         vertices = mesh_messages.vertices_from_cloud(message, limits["max_vertices"])
         version = step = None  # a cloud tells neither
-    return MeshFrame(stamp, vertices, version, step, frame_id, received, only_publisher)
+    return MeshFrame(stamp, vertices, version, step, frame_id, received, only_publisher, sent=sent)

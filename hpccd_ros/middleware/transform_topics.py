@@ -9,9 +9,10 @@ import dataclasses
 from typing import Any
 
 from hpccd_ros.base.quoting import quoted
-from hpccd_ros.frames.drops import Input, Reason, Refusal
+from hpccd_ros.frames.drops import Aspect, Input, Reason, Refusal
 from hpccd_ros.frames.samples import stray_text
 from hpccd_ros.frames.transform_buffer import TransformBuffer
+from hpccd_ros.frames.types import UNTOLD
 from hpccd_ros.middleware import fields, topic_names
 from hpccd_ros.middleware.message_types import message_class
 from hpccd_ros.rigid.transform import Rigid
@@ -54,24 +55,26 @@ def _installed(type_name: str) -> bool:
     return True
 
 
-def fill(buffer: TransformBuffer, message: Any, topic: TransformTopic) -> list[Refusal]:
-    """Add the transforms in a message of ``topic`` to ``buffer``; those that are none are refused."""
+def fill(buffer: TransformBuffer, message: Any, topic: TransformTopic, sent: int = UNTOLD) -> list[Refusal]:
+    """Add the transforms in a message of ``topic``, sent then, to ``buffer``; those that are none are refused."""
     refusals = []
     for stamped in message.transforms if hasattr(message, "transforms") else [message]:
         try:
-            stray = _add(buffer, stamped, topic.static)
+            stray = _add(buffer, stamped, topic.static, sent)
         except ValueError as error:
             names = f"{quoted(stamped.child_frame_id)} to {quoted(stamped.header.frame_id)}"
             text = f"transform from {names}: {error}"
-            refusals.append(Refusal(topic.name, Reason.MALFORMED, text, what=Input.TRANSFORM))
+            in_use = buffer.rejected(stamped.child_frame_id, topic.static)
+            aspect = Aspect.PLACE if in_use else Aspect.NOTHING
+            refusals.append(Refusal(topic.name, Reason.MALFORMED, text, what=Input.TRANSFORM, aspect=aspect, sent=sent))
             continue
         if stray is not None:
             text = f"transform from {quoted(stamped.child_frame_id)}: {stray_text(stray)}"
-            refusals.append(Refusal(topic.name, Reason.AHEAD, text, what=Input.TRANSFORM))
+            refusals.append(Refusal(topic.name, Reason.AHEAD, text, what=Input.TRANSFORM, sent=sent))
     return refusals
 
 
-def _add(buffer: TransformBuffer, stamped: Any, static: bool) -> int | None:
+def _add(buffer: TransformBuffer, stamped: Any, static: bool, sent: int) -> int | None:
     shift, turn = stamped.transform.translation, stamped.transform.rotation
     stamp = fields.stamp_to_ns(stamped.header.stamp)
     return buffer.add(
@@ -79,4 +82,5 @@ def _add(buffer: TransformBuffer, stamped: Any, static: bool) -> int | None:
         stamped.child_frame_id,
         Rigid.of((shift.x, shift.y, shift.z), (turn.x, turn.y, turn.z, turn.w)),
         None if static else stamp,
+        sent,
     )

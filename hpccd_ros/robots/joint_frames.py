@@ -13,7 +13,7 @@ from hpccd_ros.frames.drops import Reason, Refusal
 from hpccd_ros.frames.follower import Followed
 from hpccd_ros.frames.standstill import Standstill
 from hpccd_ros.frames.transform_buffer import NoTransformError, TransformBuffer
-from hpccd_ros.frames.types import MeshFrame
+from hpccd_ros.frames.types import UNTOLD, MeshFrame
 from hpccd_ros.rigid.transform import Rigid
 from hpccd_ros.robots.errors import RobotError
 from hpccd_ros.robots.joint_history import Added, JointHistory, NoJointStateError
@@ -56,9 +56,17 @@ class JointFrames:
     def begun(self) -> int:
         return self._history.begun
 
-    def add(self, stamp: int, names: Sequence[str], positions: Sequence[float]) -> Added:
-        """A joint state. Raises RobotError, and then nothing of it is kept."""
-        return self._history.add(stamp, names, positions)
+    def add(
+        self,
+        stamp: int,
+        names: Sequence[str],
+        positions: Sequence[float],
+        sent: int = UNTOLD,
+        publisher: int | None = None,
+    ) -> Added:
+        """A joint state; sent, publisher: as of `JointHistory.add`. Raises RobotError, and then nothing of it is
+        kept."""
+        return self._history.add(stamp, names, positions, sent, publisher)
 
     def ask(self, stamp: int, received: float, new_publisher: bool) -> None:
         self._waiting.append(_Asked(stamp, received, new_publisher))
@@ -117,9 +125,10 @@ class JointFrames:
 
     def _frames(self, asked: _Asked, transforms: TransformBuffer) -> list[tuple[str, MeshFrame, bool]]:
         values = self._history.at(asked.stamp)
-        base = self._base
+        base, sent = self._base, self._history.sent_at(asked.stamp)
         if base is None:
-            base = self._base_by_transforms(asked.stamp, transforms)
+            base, of_base = self._base_by_transforms(asked.stamp, transforms)
+            sent = min(sent, of_base)
         # One state for all links: what a step computes of the joints is then computed once.
         placements = self._robot.placements(self._robot.kinematics.state(values, base))
         return [
@@ -132,15 +141,17 @@ class JointFrames:
                     frame_id=self._target,
                     received=asked.received,
                     placement=placement,
+                    sent=sent,
                 ),
                 asked.new_publisher,
             )
             for name, placement in zip(self.names, placements, strict=True)
         ]
 
-    def _base_by_transforms(self, stamp: int, transforms: TransformBuffer) -> Rigid:
+    def _base_by_transforms(self, stamp: int, transforms: TransformBuffer) -> tuple[Rigid, int]:
+        """With the time at which it was sent."""
         try:
-            return transforms.lookup(self._root, self._target, stamp)
+            return transforms.lookup_sent(self._root, self._target, stamp)
         except NoTransformError as error:
             if error.connected:
                 raise

@@ -12,7 +12,9 @@ from typing import NamedTuple
 
 from hpccd_ros.base.quoting import listed, quoted
 from hpccd_ros.frames.samples import Run, Samples
+from hpccd_ros.frames.types import ALWAYS, UNTOLD
 from hpccd_ros.robots.errors import RobotError
+from hpccd_ros.robots.joint_publishers import JointPublishers
 from hpccd_ros.robots.kinematics import Kinematics
 
 # Joints that a text explains one by one.
@@ -33,14 +35,19 @@ def check_lengths(names: Sequence[str], positions: Sequence[float]) -> None:
         raise RobotError(
             f"joint states: {len(names)} names and {len(positions)} positions; each joint needs one of both"
         )
+    if len(set(names)) < len(names):
+        twice = next(name for at, name in enumerate(names) if name in names[:at])
+        raise RobotError(f"joint states: {quoted(twice)} is named twice; name each joint once in a message")
 
 
 class Added(NamedTuple):
     """What a joint state led to. ``stray``: the stamp of an earlier one that was far ahead, and is forgotten.
-    ``unusable``: why positions of needed joints are left out; "": none is."""
+    ``unusable``: why positions of needed joints are left out; "": none is. ``contradiction``: to another publisher, in
+    words; "": there is none."""
 
     stray: int | None = None
     unusable: str = ""
+    contradiction: str = ""
 
 
 class JointHistory:
@@ -51,10 +58,18 @@ class JointHistory:
         self._named = ""  # joints of the last message
         self._unusable: dict[str, str] = {}  # joints whose last message had no usable position, and why
         self._last: dict[str, int] = {}  # stamp of the last usable position of each joint, though it be forgotten
+        self._publishers = JointPublishers(kinematics.continuous)
         self._run = Run(self._joints.values)
 
-    def add(self, stamp: int, names: Sequence[str], positions: Sequence[float]) -> Added:
-        """stamp ns. Joints that the robot does not need are ignored; a position that is not finite is left out, and
+    def add(
+        self,
+        stamp: int,
+        names: Sequence[str],
+        positions: Sequence[float],
+        sent: int = UNTOLD,
+        publisher: int | None = None,
+    ) -> Added:
+        """stamp ns. sent: when the message was. publisher: which one of several; None: there is one. Joints that the robot does not need are ignored; a position that is not finite is left out, and
         the others of the message are used. Raises RobotError, and then nothing of it is kept."""
         check_lengths(names, positions)
         self._named = listed(names)
@@ -66,18 +81,20 @@ class JointHistory:
             if name not in self._joints:
                 continue
             if math.isfinite(value := float(position)):
-                found.append((self._joints[name], value))
+                found.append((name, value))
                 self._last[name] = stamp
                 self._unusable.pop(name, None)
             else:
                 self._unusable[name] = f"{quoted(name)} is {value} in the joint state of {stamp} ns"
                 left_out.append(name)
-        stray = self._run.add(stamp, found)
+        contradiction = "" if publisher is None else self._publishers.contradiction(publisher, stamp, found)
+        stray = self._run.add(stamp, [(self._joints[name], value) for name, value in found], sent)
         if not left_out:
-            return Added(stray)
+            return Added(stray, "", contradiction)
         why = "; ".join(self._unusable[name] for name in left_out[:MOST_NAMED])
         more = f" and {len(left_out) - MOST_NAMED} more" if len(left_out) > MOST_NAMED else ""
-        return Added(stray, f"{why}{more}; positions must be finite; the other joints of the message are used")
+        unusable = f"{why}{more}; positions must be finite; the other joints of the message are used"
+        return Added(stray, unusable, contradiction)
 
     def clear(self) -> None:
         self._joints = {name: values.emptied() for name, values in self._joints.items()}
@@ -113,6 +130,10 @@ class JointHistory:
             text = f"the last position of {listed(doubtful)} is of {last} ns, far ahead of the stamp {stamp} ns"
             raise NoJointStateError(f"{text} and of all before: the next one tells whether it counts", final=False)
         return {name: values.at(stamp) for name, values in self._joints.items()}
+
+    def sent_at(self, stamp: int) -> int:
+        """When the oldest message was sent of which the values `at` this stamp are made; ALWAYS: no joint moves."""
+        return min((values.sent_at(stamp) for values in self._joints.values()), default=ALWAYS)
 
     def latest(self) -> int | None:
         """The last stamp, ns, that `at` knows; None: no joint moves. Raises NoJointStateError: of some nothing came."""
