@@ -131,7 +131,7 @@ class FrameAssembler:
         return outcome
 
     def hear(self, mesh: str, received: float) -> None:
-        """A message came that says where ``mesh`` is. Of a static one, the positions before are outdated from now on."""
+        """A message came that says where ``mesh`` is; of a static one, the positions before are outdated now."""
         if (state := self._meshes.get(mesh)) is not None:
             state.newest = received
 

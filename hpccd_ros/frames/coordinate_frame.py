@@ -57,7 +57,7 @@ class CoordinateFrame:
 
     def _refuse(self, mesh: str, frame: MeshFrame) -> Refusal:
         text = (
-            f"frame_id {quoted(frame.frame_id)}, the scene is in {quoted(self.name)} (by {self.source}); publish all meshes "
-            "in one coordinate frame"
+            f"frame_id {quoted(frame.frame_id)}, the scene is in {quoted(self.name)} (by {self.source}); publish all "
+            "meshes in one coordinate frame"
         )
         return Refusal(mesh, Reason.FRAME_ID, text, sent=frame.sent)

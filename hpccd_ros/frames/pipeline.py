@@ -135,6 +135,10 @@ class FramePipeline:
     def set_restart_after(self, count: int) -> None:
         self._assembler.restart_after = count
 
+    def moves_by_poses(self, mesh: str) -> bool:
+        """Whether vertices of ``mesh`` are its shape, and something else says where it is."""
+        return mesh in self._rigid
+
     def topology(self, mesh: str) -> Topology | None:
         """The topology in force, or None."""
         return self._assembler.topology(mesh)

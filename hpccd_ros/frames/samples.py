@@ -114,7 +114,8 @@ class Run:
         self._anew: int | None = None  # the first stamp after it last began anew
 
     def add(self, stamp: int, of_message: Iterable[tuple[Samples[Value], Value]], sent: int = 0) -> int | None:
-        """What one message, sent then, tells of some things. The stamp of an earlier message that is a stray, and left out."""
+        """What one message, sent then, tells of some things. The stamp of an earlier message that is a stray, and left
+        out."""
         self._came += 1
         stray = None
         for samples, value in of_message:

@@ -5,6 +5,7 @@ import math
 import time
 from collections import Counter
 from collections.abc import Callable
+from typing import Any
 
 from hpccd_ros.detect.step_detector import Detection
 from hpccd_ros.frames.drops import Input, Reason, Refusal, RefusalCounter
@@ -22,7 +23,8 @@ class Accounts:
 
     ``static_taken``: accepted messages of static meshes, which count as answered. ``requests``: to ~/detect, service
     and action, by how they ended. warn: takes what is to be logged. on_refused: hears of each refusal, in the thread
-    that refuses.
+    that refuses. on_heard: hears of each message of an input: its kind, its mesh or topic, and what the middleware
+    tells of it.
     """
 
     def __init__(self, warn: Callable[[str], None]) -> None:
@@ -36,6 +38,7 @@ class Accounts:
         self.restarts = 0
         self.static_taken = 0
         self.on_refused: Callable[[Refusal], None] = lambda refusal: None
+        self.on_heard: Callable[[str, str, dict[str, Any]], None] = lambda kind, name, info: None
 
     def add(self, outcome: Outcome) -> None:
         """What came of a message, but for the frames: those are counted when they are answered."""

@@ -16,12 +16,14 @@ from sensor_msgs.msg import JointState
 from hpccd_ros.frames.drops import Input, Reason, Refusal
 from hpccd_ros.frames.pipeline import FramePipeline
 from hpccd_ros.frames.rate_limit import RateLimit
-from hpccd_ros.middleware import joint_messages, qos, qos_overrides
+from hpccd_ros.middleware import joint_messages, qos, qos_overrides, unreadable
 from hpccd_ros.node.accounts import Accounts
 from hpccd_ros.node.hand_over import hand_over
+from hpccd_ros.node.mesh_topic import UNREADABLE
 from hpccd_ros.params import robot_parameters
 from hpccd_ros.params.table import ROBOT
 from hpccd_ros.robots.joint_frames import JointFrames
+from hpccd_ros.robots.joint_publishers import PublisherNumbers
 
 # Bounds what strangers can make the node keep: messages of a topic.
 MOST_RECENT = 100
@@ -29,9 +31,11 @@ MOST_RECENT = 100
 
 @dataclass
 class _Recent:
-    """``refused``: that it was is counted already."""
+    """``sent``, ``publisher``: as of `joint_messages.fill`. ``refused``: that it was is counted already."""
 
     message: JointState
+    sent: int
+    publisher: int | None
     refused: bool
 
 
@@ -62,7 +66,7 @@ class JointSubscriptions:
         for topic, robots in robot_parameters.joint_topics(self._settings[ROBOT]).items():
             moved = [by_joints[robot] for robot in robots if robot in by_joints]
             for recent in self._recent[topic]:
-                refusals = joint_messages.fill(moved, recent.message, topic)
+                refusals = joint_messages.fill(moved, recent.message, topic, recent.sent, recent.publisher)
                 if not recent.refused:
                     self._refuse(refusals)
                     recent.refused = bool(refusals)
@@ -79,16 +83,20 @@ class JointSubscriptions:
 
     def _subscribe(self, topic: str, robots: list[str]) -> Subscription:
         limit = RateLimit(self._settings["max_rate"])
+        numbers = PublisherNumbers()
 
-        def receive(message: JointState) -> None:
+        def receive(message: JointState, info: dict[str, Any]) -> None:
+            sent = info["source_timestamp"]
+            self._accounts.on_heard("joint state", topic, info)
+            publisher = numbers.of(info["publication_sequence_number"], several)
             if not limit.allows():
                 text = f"more than max_rate = {self._settings['max_rate']:g} messages a second; some are dropped"
-                self._refuse([Refusal(topic, Reason.RATE, text, what=Input.JOINT_STATE)])
+                self._refuse([Refusal(topic, Reason.RATE, text, what=Input.JOINT_STATE, sent=sent)])
                 return
             moved = [self._of_robots[robot] for robot in robots if robot in self._of_robots]
-            refusals = joint_messages.fill(moved, message, topic)
+            refusals = joint_messages.fill(moved, message, topic, sent, publisher)
             if (kept := joint_messages.kept(message)) is not None:
-                self._recent[topic].append(_Recent(kept, bool(refusals)))
+                self._recent[topic].append(_Recent(kept, sent, publisher, bool(refusals)))
             elif len(moved) < len(robots) and not refusals:
                 refusals = [joint_messages.too_large(topic)]
             self._refuse(refusals)
@@ -96,7 +104,14 @@ class JointSubscriptions:
                 hand_over(outcome, self._pipeline, self._accounts)
 
         profile = qos.joint_states(self._settings["input_reliability"])
-        return qos_overrides.create_subscription(self._node, JointState, topic, receive, profile)
+        subscription = qos_overrides.create_subscription(self._node, JointState, topic, receive, profile)
+
+        def several() -> bool:
+            return subscription.get_publisher_count() > 1
+
+        refusal = Refusal(topic, Reason.MALFORMED, f"{topic}: {UNREADABLE}", what=Input.JOINT_STATE)
+        unreadable.watch(subscription, lambda: self._refuse([refusal]))
+        return subscription
 
     def _refuse(self, refusals: list[Refusal]) -> None:
         for refusal in refusals:

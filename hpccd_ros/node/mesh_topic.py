@@ -10,7 +10,7 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 
-from hpccd_ros.frames.drops import Input, Reason, Refusal
+from hpccd_ros.frames.drops import Aspect, Input, Reason, Refusal
 from hpccd_ros.frames.pipeline import FramePipeline
 from hpccd_ros.frames.rate_limit import RateLimit
 from hpccd_ros.frames.sequence import SequenceWatch
@@ -38,6 +38,7 @@ class MeshTopic:
         self.reception = reception
         self.kind = kind
         self.numbers = SequenceWatch()
+        self.sent = 0  # when the last message was that was taken
         self._limit = RateLimit(reception.settings["max_rate"])
         self._subscription: Subscription | None = None
 
@@ -59,6 +60,11 @@ class MeshTopic:
             self.reception.node.destroy_subscription(self._subscription)
             self._subscription = None
 
+    def take(self, info: dict[str, Any]) -> None:
+        """A message is looked at."""
+        self.sent = info["source_timestamp"]
+        self.reception.accounts.on_heard(self.kind, self.reception.mesh, info)
+
     @property
     def name(self) -> str:
         """Of the topic, in full."""
@@ -76,11 +82,22 @@ class MeshTopic:
         return f"more than {self.reception.settings['max_rate']:g} messages a second (parameter max_rate)"
 
     def refuse(self, reason: Reason, text: str, messages: int = 1) -> None:
-        self.reception.accounts.refused(Refusal(self.reception.mesh, reason, text, messages, what=self.what))
+        """Of the message that was taken last, or of those that came after it and cannot be taken."""
+        self.reception.accounts.refused(
+            Refusal(self.reception.mesh, reason, text, messages, what=self.what, aspect=self.aspect, sent=self.sent)
+        )
 
     @property
     def what(self) -> Input:
         return mesh_inputs.INPUTS[self.kind]
+
+    @property
+    def aspect(self) -> Aspect:
+        """What its messages tell of the mesh."""
+        if self.what is Input.TOPOLOGY:
+            return Aspect.TOPOLOGY
+        of_shape = self.kind != topic_names.POSE and self.reception.pipeline.moves_by_poses(self.reception.mesh)
+        return Aspect.SHAPE if of_shape else Aspect.PLACE
 
     def _events(self, topic: str) -> SubscriptionEventCallbacks:
         """Count and log what the middleware reports of the subscription."""

@@ -25,6 +25,7 @@ class PositionsSubscription(MeshTopic):
 
     def receive(self, message: Any, info: dict[str, Any]) -> None:
         received, of = time.monotonic(), self.reception
+        self.take(info)
         self._count_received(info)
         if why := self.too_fast():
             self.refuse(Reason.RATE, why)
@@ -38,7 +39,7 @@ class PositionsSubscription(MeshTopic):
                 self.kind, message, of.settings, received, alone, sent=sent, welding=self._welding
             )
         except InvalidMessageError as error:
-            of.accounts.refused(error.refusal(of.mesh))
+            of.accounts.refused(error.refusal(of.mesh, aspect=self.aspect, sent=sent))
             return
         hand_over(of.pipeline.push(of.mesh, frame, self.numbers.notice()), of.pipeline, of.accounts)
 

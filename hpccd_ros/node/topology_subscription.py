@@ -20,14 +20,15 @@ class TopologySubscription(MeshTopic):
 
     def receive(self, message: MeshTopology, info: dict[str, Any]) -> None:
         of = self.reception
+        self.take(info)
         _, new_publisher = self.numbers.next(info["publication_sequence_number"])
         if why := self.too_fast():
             self.refuse(Reason.RATE, why)
             return
         try:
-            topology = mesh_inputs.read(self.kind, message, of.settings)
+            topology = mesh_inputs.read(self.kind, message, of.settings, sent=info["source_timestamp"])
         except InvalidMessageError as error:
-            of.accounts.refused(error.refusal(of.mesh, self.what))
+            of.accounts.refused(error.refusal(of.mesh, self.what, self.aspect, self.sent))
             return
         if why := unusable_topology(topology):
             self.refuse(Reason.BAD_TOPOLOGY, why)

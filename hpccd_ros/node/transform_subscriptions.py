@@ -8,11 +8,12 @@ from rclpy.node import Node
 from hpccd_ros.frames.drops import Input, Reason, Refusal
 from hpccd_ros.frames.pipeline import FramePipeline
 from hpccd_ros.frames.rate_limit import RateLimit
-from hpccd_ros.middleware import qos, qos_overrides, transform_topics
+from hpccd_ros.middleware import qos, qos_overrides, transform_topics, unreadable
 from hpccd_ros.middleware.message_types import message_class
 from hpccd_ros.middleware.transform_topics import TransformTopic
 from hpccd_ros.node.accounts import Accounts
 from hpccd_ros.node.hand_over import hand_over
+from hpccd_ros.node.mesh_topic import UNREADABLE
 
 
 class TransformSubscriptions:
@@ -49,20 +50,30 @@ class TransformSubscriptions:
         limit = RateLimit(self._max_rate)
         name, heard = self._name(topic), self._pipeline.transforms.heard
 
-        def receive(message: Any) -> None:
+        def receive(message: Any, info: dict[str, Any]) -> None:
             heard[name] += 1
+            sent = info["source_timestamp"]
+            self._accounts.on_heard("message", name, info)
             if not limit.allows():
                 text = f"more than max_rate = {self._max_rate:g} messages a second; some are dropped"
-                self._accounts.refused(Refusal(topic.name, Reason.RATE, text, what=Input.TRANSFORM))
+                self._unread(Refusal(topic.name, Reason.RATE, text, what=Input.TRANSFORM, sent=sent), topic)
                 return
-            for refusal in transform_topics.fill(self._pipeline.transforms, message, topic):
+            for refusal in transform_topics.fill(self._pipeline.transforms, message, topic, sent):
                 self._accounts.refused(refusal)
             for outcome in self._pipeline.retry():
                 hand_over(outcome, self._pipeline, self._accounts)
 
         profile = qos.TRANSFORMS_STATIC if topic.static else qos.TRANSFORMS
         message = message_class(topic.type_name)
-        return qos_overrides.create_subscription(self._node, message, topic.name, receive, profile)
+        subscription = qos_overrides.create_subscription(self._node, message, topic.name, receive, profile)
+        refusal = Refusal(topic.name, Reason.MALFORMED, f"{name}: {UNREADABLE}", what=Input.TRANSFORM)
+        unreadable.watch(subscription, lambda: self._unread(refusal, topic))
+        return subscription
+
+    def _unread(self, refusal: Refusal, topic: TransformTopic) -> None:
+        """A message whose transforms are not known."""
+        self._pipeline.transforms.rejected(None, topic.static)
+        self._accounts.refused(refusal)
 
     def _name(self, topic: TransformTopic) -> str:
         return self._node.resolve_topic_name(topic.name)

@@ -69,8 +69,9 @@ class JointHistory:
         sent: int = UNTOLD,
         publisher: int | None = None,
     ) -> Added:
-        """stamp ns. sent: when the message was. publisher: which one of several; None: there is one. Joints that the robot does not need are ignored; a position that is not finite is left out, and
-        the others of the message are used. Raises RobotError, and then nothing of it is kept."""
+        """stamp ns. sent: when the message was. publisher: which one of several; None: there is one. Joints that the
+        robot does not need are ignored; a position that is not finite is left out, and the others of the message are
+        used. Raises RobotError, and then nothing of it is kept."""
         check_lengths(names, positions)
         self._named = listed(names)
         if names and not positions:

@@ -9,7 +9,7 @@ import pytest
 from hpccd_ros.frames.samples import HISTORY_NS, MOST_SAMPLES
 from hpccd_ros.robots import urdf
 from hpccd_ros.robots.errors import RobotError
-from hpccd_ros.robots.joint_history import JointHistory, NoJointStateError
+from hpccd_ros.robots.joint_history import Added, JointHistory, NoJointStateError
 from hpccd_ros.robots.kinematics import Kinematics
 from hpccd_ros.robots.robot import Robot
 
@@ -80,7 +80,7 @@ def test_a_position_that_is_not_finite_leaves_the_others_of_its_message_in_use()
     assert added.unusable.startswith("'slide' is nan in the joint state of 100 ns; positions must be finite")
     with pytest.raises(NoJointStateError, match=r"^'slide' is nan in the joint state of 100 ns$"):
         joints.latest()
-    assert joints.add(200, ["slide", "turn"], [2.0, 2.0]) == (None, "")
+    assert joints.add(200, ["slide", "turn"], [2.0, 2.0]) == Added()
     assert joints.add(300, ["slide", "turn"], [-math.inf, 3.0]).unusable
     assert joints.latest() == 200 and joints.at(200) == {"turn": 2.0, "slide": 2.0}
     with pytest.raises(NoJointStateError, match="is of 200 ns, before .* 300 ns; 'slide' is -inf in .* of 300 ns$"):
@@ -91,7 +91,7 @@ def test_a_position_that_is_not_finite_leaves_the_others_of_its_message_in_use()
 
 def test_a_message_of_velocities_alone_is_not_malformed():
     joints = history()
-    assert joints.add(100, ["turn", "slide", "of another robot"], []) == (None, "")
+    assert joints.add(100, ["turn", "slide", "of another robot"], []) == Added()
     with pytest.raises(NoJointStateError, match="^'turn' has no position in .* 100 ns; 'slide' has no position"):
         joints.latest()
     joints.add(100, ["turn", "slide"], [1.0, 1.0])
@@ -125,7 +125,7 @@ def test_joints_that_move_no_geometry_need_no_positions():
     assert set(robot.kinematics.inputs) == {"lift", "motor"}
     joints = JointHistory(robot.kinematics)
     unneeded = ["head", "wrist"]
-    assert joints.add(100, ["lift", "motor", *unneeded], [0.1, 0.2, math.nan, math.inf]) == (None, "")
+    assert joints.add(100, ["lift", "motor", *unneeded], [0.1, 0.2, math.nan, math.inf]) == Added()
     without = robot.placements(robot.kinematics.state(joints.at(100)))
     given = robot.placements(robot.kinematics.state({**joints.at(100), "head": 1.0, "wrist": 2.0}))
     for a, b in zip(without, given, strict=True):
