@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """The core's scene of the meshes, whatever their topologies are at the time. No ROS."""
 
+from collections import defaultdict
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import combinations
 
 import numpy as np
@@ -43,15 +45,25 @@ class SceneBuilder:
     def tested_pairs(self) -> list[tuple[str, str]]:
         """Names of the meshes that are tested against each other, and of those within themselves twice; in the order of
         the scene."""
-        ignored = {frozenset(pair) for pair in self.ignored_pairs}
+        return list(self._tested_pairs)
+
+    @cached_property
+    def _tested_pairs(self) -> tuple[tuple[str, str], ...]:
+        ignored: dict[str, set[str]] = defaultdict(set)
+        for a, b in self.ignored_pairs:
+            ignored[a].add(b)
+            ignored[b].add(a)
         found = []
-        for number, a in enumerate(self.meshes):
-            if a.self_collision and not a.static:
-                found.append((a.name, a.name))
-            for b in self.meshes[number + 1 :]:
-                if not (a.static and b.static) and frozenset((a.name, b.name)) not in ignored:
-                    found.append((a.name, b.name))
-        return found
+        for number, mesh in enumerate(self.meshes):
+            if mesh.self_collision and not mesh.static:
+                found.append((mesh.name, mesh.name))
+            left_out = ignored[mesh.name]  # once: a robot of a thousand links has half a million pairs
+            found += [
+                (mesh.name, other.name)
+                for other in self.meshes[number + 1 :]
+                if other.name not in left_out and not (mesh.static and other.static)
+            ]
+        return tuple(found)
 
     @property
     def rigid(self) -> tuple[bool, ...]:
@@ -65,9 +77,11 @@ class SceneBuilder:
 
     def of_other_pairs(self) -> "SceneBuilder | None":
         """Nothing is tested but the other pairs; None where there are none."""
+        rigid = {mesh.name for mesh in self.meshes if mesh.rigid}
+        if all(a in rigid or b in rigid for a, b in self._tested_pairs):
+            return None
         meshes = tuple(replace(mesh, self_collision=mesh.self_collision and not mesh.rigid) for mesh in self.meshes)
-        left = self._without(meshes, lambda a, b: a.rigid or b.rigid)
-        return left if left.tested_pairs() else None
+        return self._without(meshes, lambda a, b: a.rigid or b.rigid)
 
     def _without(
         self, meshes: tuple[MeshSettings, ...], left_out: Callable[[MeshSettings, MeshSettings], bool]
@@ -78,12 +92,12 @@ class SceneBuilder:
 
     def among(self, names: list[str]) -> "SceneBuilder":
         """The scene of these meshes, in this order; names that it does not have are meshes of their own."""
-        known = {mesh.name: mesh for mesh in self.meshes}
+        known, wanted = {mesh.name: mesh for mesh in self.meshes}, set(names)
         return SceneBuilder(
             tuple(known.get(name, MeshSettings(name)) for name in names),
-            tuple(pair for pair in self.ignored_pairs if set(pair) <= set(names)),
-            tuple(entry for entry in self.pair_accuracies if set(entry[:2]) <= set(names)),
-            tuple(entry for entry in self.pair_features if set(entry[:2]) <= set(names)),
+            tuple(pair for pair in self.ignored_pairs if wanted.issuperset(pair)),
+            tuple(entry for entry in self.pair_accuracies if wanted.issuperset(entry[:2])),
+            tuple(entry for entry in self.pair_features if wanted.issuperset(entry[:2])),
         )
 
     @property
@@ -94,7 +108,7 @@ class SceneBuilder:
     @property
     def pairs(self) -> list[tuple[str, str]]:
         """Different meshes that are tested against each other."""
-        return [(a, b) for a, b in self.tested_pairs() if a != b]
+        return [(a, b) for a, b in self._tested_pairs if a != b]
 
     def same_scene(self, other: "SceneBuilder") -> bool:
         """Whether equal topologies make equal scenes."""

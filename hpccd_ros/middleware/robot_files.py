@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from hpccd_ros.base.quoting import shortened
 from hpccd_ros.detect.core import unusable_topology
 from hpccd_ros.frames.mesh_file import MeshFileError
 from hpccd_ros.middleware import resources
@@ -13,22 +14,34 @@ from hpccd_ros.robots.errors import RobotError
 from hpccd_ros.robots.geometry import Resolver, beside
 from hpccd_ros.robots.robot import Robot
 from hpccd_ros.robots.shapes import MeshFile
-from hpccd_ros.robots.xml_tree import MOST_CHARACTERS
+from hpccd_ros.robots.xml_tree import MOST_CHARACTERS, decoded
+
+# No character takes more.
+_MOST_BYTES = 4 * MOST_CHARACTERS
 
 
 def text_of(resource: str) -> str:
     """Of a file: a path, package:// or file://. Raises RobotError."""
     try:
-        with open(path_of(resource), encoding="utf-8") as file:
-            return file.read(MOST_CHARACTERS + 1)  # one more than is allowed: what reads it refuses it
-    except (OSError, ValueError, MeshFileError) as error:
+        with open(path_of(resource), "rb") as file:
+            data = file.read(_MOST_BYTES + 1)
+    except (OSError, ValueError) as error:
         why = error.strerror if isinstance(error, OSError) else error
-        raise RobotError(f"{resource}: cannot be read: {why}") from error
+        raise RobotError(f"{shortened(resource)}: cannot be read: {why}") from error
+    if len(data) > _MOST_BYTES:
+        raise RobotError(f"{shortened(resource)}: has more than {_MOST_BYTES} bytes; give a smaller file")
+    try:
+        return decoded(data)
+    except RobotError as error:
+        raise RobotError(f"{shortened(resource)}: {error}") from error
 
 
 def path_of(resource: str) -> Path:
     """Raises MeshFileError."""
-    return Path(resources.local_path(resource)).expanduser()
+    try:
+        return Path(resources.local_path(resource)).expanduser()
+    except RuntimeError as error:  # ~name, and there is no such user
+        raise MeshFileError(f"{shortened(resource)}: no such home folder; give the whole path") from error
 
 
 def resolver(description: str | None) -> Resolver:

@@ -37,6 +37,7 @@ class RobotDescriptions:
         self._texts: dict[str, str] = {}  # in use
         self._waiting: dict[str, str] = {}  # came too soon after the last
         self._refused: dict[str, str] = {}  # why the last description was
+        self._warned: dict[str, tuple[str, ...]] = {}  # of the last one that was not
         self._read = -PERIOD  # when it ended
         self.robots: dict[str, Robot] = {}
         self._topics = robot_parameters.topics(settings[ROBOT])
@@ -82,7 +83,12 @@ class RobotDescriptions:
     def _made(self, name: str, text: str) -> Robot:
         values = self._values[name]
         file = None if name in self._topics else values["description"]
-        return robot_files.robot_of(name, values, text, self._semantics[name], robot_files.resolver(file))
+        robot = robot_files.robot_of(name, values, text, self._semantics[name], robot_files.resolver(file))
+        for warning in robot.warnings:
+            if warning not in self._warned.get(name, ()):
+                self._node.get_logger().warning(f"robot {name}: {shortened(warning, LONGEST)}")
+        self._warned[name] = robot.warnings
+        return robot
 
     def _listen(self, name: str, topic: str) -> None:
         subscription = qos_overrides.create_subscription(

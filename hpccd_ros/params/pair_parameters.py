@@ -43,8 +43,8 @@ def check(settings: dict[str, Any], links: Links = NO_LINKS) -> None:
 def ignored_pairs(
     settings: dict[str, Any], links: Links = NO_LINKS, by_default: Iterable[tuple[str, str]] = ()
 ) -> tuple[tuple[str, str], ...]:
-    """Parameters ``ignored_pairs`` and ``pairs.NAME.ignored`` as pairs of mesh names; those ``by_default`` are, too,
-    unless they say otherwise. Raises ParameterError."""
+    """Parameters ``ignored_pairs`` and ``pairs.NAME.ignored`` as pairs of mesh names; those ``by_default``, each in the
+    order of its names, are ignored too, unless the parameters say otherwise. Raises ParameterError."""
     said = []
     for text in settings["ignored_pairs"]:
         pair = tuple(text.split(":"))
@@ -60,12 +60,13 @@ def ignored_pairs(
                 f"itself is said by mesh.{one.names[0]}.self_collision"
             )
         said.append(one)
-    ignored = {frozenset(names): names for names in by_default}
+    ignored = {pair: pair for pair in by_default}
     for one in _spread(_agreed(said), settings, links):
+        pair = min(one.names), max(one.names)
         if one.value:
-            ignored.setdefault(frozenset(one.names), one.names)
+            ignored.setdefault(pair, one.names)
         else:
-            ignored.pop(frozenset(one.names), None)
+            ignored.pop(pair, None)
     return tuple(ignored.values())
 
 

@@ -13,6 +13,7 @@ from hpccd_ros.frames.mesh_file import MeshFileError, existing
 from hpccd_ros.middleware import robot_files
 from hpccd_ros.params import robot_parameters
 from hpccd_ros.robots.errors import RobotError
+from hpccd_ros.robots.xml_tree import decoded
 
 # Of a description: far more than robots have.
 MOST_FILES = 1000
@@ -57,11 +58,19 @@ def files(parameters: dict) -> tuple[Files, list[str]]:
         path = values["description"]
         if not robot_parameters.comes_on_topic(path):
             _read(f"URDF {path}", description_name(robot), path, found, missing)
-            text = next((data for name, data in found if name == description_name(robot)), b"")
-            of_links, unread = link_meshes(robot, values, text.decode("utf-8", "replace")) if text else ([], [])
+            data = next((data for name, data in found if name == description_name(robot)), b"")
+            of_links, unread = _named_by(robot, values, data)
             found += of_links
             missing += unread
     return found, missing
+
+
+def _named_by(robot: str, values: Mapping[str, Any], data: bytes) -> tuple[Files, list[str]]:
+    """`link_meshes` of the content of a file."""
+    try:
+        return link_meshes(robot, values, decoded(data))
+    except RobotError:
+        return [], []  # the node has no such robot either, and says why
 
 
 def link_meshes(robot: str, values: Mapping[str, Any], text: str) -> tuple[Files, list[str]]:
@@ -94,7 +103,7 @@ def _digest(text: str) -> str:
 def _read(what: str, name: str, path: str, found: Files, missing: list[str]) -> None:
     try:
         found.append((name, robot_files.path_of(path).read_bytes()))
-    except (OSError, RuntimeError, ValueError) as error:  # RuntimeError: ~name, and there is no such user
+    except (OSError, ValueError) as error:
         missing.append(_missing(what, error.strerror if isinstance(error, OSError) else error))
 
 

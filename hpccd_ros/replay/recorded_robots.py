@@ -17,6 +17,7 @@ from hpccd_ros.record import attachments
 from hpccd_ros.robots.errors import RobotError
 from hpccd_ros.robots.geometry import Resolver
 from hpccd_ros.robots.robot import Robot
+from hpccd_ros.robots.xml_tree import decoded
 
 
 def of_recording(recording: Recording, robots: RobotValues, topics: Mapping[str, str]) -> dict[str, Robot]:
@@ -72,9 +73,9 @@ def _text(recording, attachment: str, path: str) -> str:
     if attachment not in recording.attachments:
         return robot_files.text_of(path)
     try:
-        return recording.attachments[attachment].decode("utf-8")
-    except UnicodeDecodeError as error:
-        raise RobotError(f"{attachment}: is no text: {error}") from error
+        return decoded(recording.attachments[attachment])
+    except RobotError as error:
+        raise RobotError(f"{attachment}: {error}") from error
 
 
 def _resolver(recording, name: str, values: Mapping[str, Any], text: str, folder: Path) -> Resolver:

@@ -5,7 +5,7 @@ Links joined by fixed joints are one body. Links of one body, and of two bodies 
 joined. Others are tested, also those that meet across a link without geometry: an SRDF says of these what may touch.
 """
 
-from itertools import combinations
+from itertools import combinations, product
 
 from hpccd_ros.robots.srdf import Pair, Semantics
 from hpccd_ros.robots.urdf import Description
@@ -23,14 +23,17 @@ def _near(description: Description) -> frozenset[Pair]:
     for joint in description.joints:  # from the root on
         if joint.kind == "fixed":
             body[joint.child] = body[joint.parent]
-    joined = {frozenset((body[joint.parent], body[joint.child])) for joint in description.joints}
-    return frozenset(
-        (a, b)
-        for a, b in combinations(sorted(body), 2)
-        if body[a] == body[b] or frozenset((body[a], body[b])) in joined
-    )
+    links_of: dict[str, list[str]] = {}
+    for link in sorted(body):
+        links_of.setdefault(body[link], []).append(link)
+    # Only pairs that are ignored are listed, not those of all links.
+    near = {pair for links in links_of.values() for pair in combinations(links, 2)}
+    for joint in description.joints:
+        if (ends := (body[joint.parent], body[joint.child])) and ends[0] != ends[1]:
+            near.update((min(pair), max(pair)) for pair in product(links_of[ends[0]], links_of[ends[1]]))
+    return frozenset(near)
 
 
 def _of_links(description: Description, links: frozenset[str]) -> frozenset[Pair]:
-    names = sorted(link.name for link in description.links)
-    return frozenset((a, b) for a, b in combinations(names, 2) if a in links or b in links)
+    names = [link.name for link in description.links]
+    return frozenset((min(a, b), max(a, b)) for a in links for b in names if a != b)

@@ -2,12 +2,14 @@
 """A robot as the node needs it: meshes of its links, pairs that are never tested, kinematics."""
 
 import math
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import chain
 
 import numpy as np
 
-from hpccd_ros.base.quoting import quoted
+from hpccd_ros.base.quoting import listed, quoted
 from hpccd_ros.frames.coordinates import LARGEST_OF_POSES, unusable_coordinates
 from hpccd_ros.frames.types import JOINTS, TF, MeshSettings, Topology
 from hpccd_ros.rigid.body import Body
@@ -21,6 +23,8 @@ from hpccd_ros.robots.placement import LinkPlacement
 
 #: How far meshes of round shapes may stand out of them, in metres.
 TOLERANCE = 1e-3
+
+_SEPARATORS = str.maketrans("/:", "__")
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,13 +45,14 @@ class RobotMesh:
 @dataclass(frozen=True, eq=False)
 class Robot:
     """``meshes``: of the links that have geometry, in the order of the description. ``ignored_pairs``: names of meshes,
-    sorted."""
+    sorted. ``warnings``: what of the descriptions was ignored or renamed, in sentences."""
 
     name: str
     description: urdf.Description
     kinematics: Kinematics
     meshes: tuple[RobotMesh, ...]
     ignored_pairs: tuple[tuple[str, str], ...]
+    warnings: tuple[str, ...] = ()
 
     @classmethod
     def of(
@@ -70,23 +75,28 @@ class Robot:
         if not called:
             raise RobotError("name: the description has none; give one")
         made = LinkMeshes(resolver, tolerance)
+        names = _mesh_names(called, (link.name for link in description.links if link.geometry))
         meshes = []
         for link in description.links:
             if (shape := made.of(link)) is not None:
                 vertices, faces = shape
                 topology = Topology(0, len(vertices), faces)
-                meshes.append(RobotMesh(f"{called}/{link.name}", link.name, topology, Body.of(vertices)))
+                meshes.append(RobotMesh(names[link.name], link.name, topology, Body.of(vertices)))
         if not meshes:
             other = next(kind for kind in urdf.GEOMETRIES if kind != geometry)
             raise RobotError(f"geometry: no link has <{geometry}>, so nothing could touch; try {other}")
         _check_reach(description, meshes)
         semantics = None if srdf_text is None else srdf.parse(srdf_text, (link.name for link in description.links))
-        names = {mesh.link: mesh.name for mesh in meshes}
-        ignored = sorted(
-            (names[a], names[b]) for a, b in pairs.ignored(description, semantics) if a in names and b in names
+        ignored = pairs.ignored(description, semantics)
+        warnings = (_renamed(called, names), semantics.ignored if semantics is not None else "")
+        return cls(
+            called,
+            description,
+            Kinematics(description, names),
+            tuple(meshes),
+            _sorted((names[a], names[b]) for a, b in ignored if a in names and b in names),
+            tuple(warning for warning in warnings if warning),
         )
-        kinematics = Kinematics(description, (mesh.link for mesh in meshes))
-        return cls(called, description, kinematics, tuple(meshes), tuple(ignored))
 
     @cached_property
     def _vertices(self) -> LinkVertices:
@@ -118,6 +128,34 @@ class Robot:
         """Of each mesh, between two states of this robot (kinematics.py says which motion that is)."""
         step = self.kinematics.step(start, end)
         return tuple(step.motion(mesh.link, mesh.body) for mesh in self.meshes)
+
+
+def _mesh_names(robot: str, links: Iterable[str]) -> dict[str, str]:
+    """Link -> name of its mesh. In names of meshes / and : separate names; in those of links they become _."""
+    names = {link: f"{robot.translate(_SEPARATORS)}/{link.translate(_SEPARATORS)}" for link in links}
+    link_of: dict[str, str] = {}
+    for link, name in names.items():
+        if (other := link_of.setdefault(name, link)) != link:
+            raise RobotError(
+                f"{urdf.DOCUMENT}: links {quoted(other)} and {quoted(link)} would both be the mesh {quoted(name)}: / "
+                "and : become _ there; rename one of them"
+            )
+    return names
+
+
+def _renamed(robot: str, names: Mapping[str, str]) -> str:
+    renamed = [f"{quoted(link)} is {name}" for link, name in names.items() if name != f"{robot}/{link}"]
+    return f"{urdf.DOCUMENT}: in names of meshes / and : become _: link {listed(renamed)}" if renamed else ""
+
+
+def _sorted(of_names: Iterable[tuple[str, str]]) -> tuple[tuple[str, str], ...]:
+    """Pairs and the names in each, sorted. By numbers: a thousand links fixed together are half a million pairs."""
+    given = list(of_names)
+    names = sorted(set(chain.from_iterable(given)))
+    number = {name: k for k, name in enumerate(names)}
+    count = len(names)
+    keys = [min(a, b) * count + max(a, b) for a, b in ((number[a], number[b]) for a, b in given)]
+    return tuple((names[key // count], names[key % count]) for key in sorted(keys))
 
 
 def _check_reach(description: urdf.Description, meshes: list[RobotMesh]) -> None:

@@ -8,7 +8,7 @@ from hpccd_ros.rigid.transform import Rigid
 
 @dataclass(frozen=True)
 class Box:
-    """Its edges along x, y, z; the origin is its centre."""
+    """Its edges along x, y, z, of which one may be of length 0; the origin is its centre."""
 
     size: tuple[float, float, float]
 

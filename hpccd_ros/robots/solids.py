@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Boxes, cylinders, spheres and capsules as closed triangle meshes that contain them.
 
-A box is itself. What is round gets a mesh around it, so that whatever touches the solid touches or enters the mesh; no
-point of the mesh stands out of the solid by more than `outstanding` says, at most the tolerance asked for.
+A box is itself; one without thickness is a rectangle. What is round gets a mesh around it, so that whatever touches the
+solid touches or enters the mesh; no point of the mesh stands out of the solid by more than `outstanding` says, at most
+the tolerance asked for.
 
 Why the mesh holds the solid. *Cylinder*: its ring is a regular polygon of n corners at the distance R from the axis;
 the sides are at R cos(pi/n) from it, which is the radius r. *Sphere*: rings of 0, 4, 8, ..., 4n, ..., 8, 4, 0 corners,
@@ -73,7 +74,11 @@ def _inner(solid: Cylinder | Sphere | Capsule, count: int) -> float:
 def _box(box: Box) -> Triangles:
     half = np.array(box.size) / 2
     corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * half
-    quads = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
+    quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    flat = np.flatnonzero(half == 0.0)
+    if len(flat) == 1:  # both sides are one: a rectangle, of two triangles
+        (side,) = quads[2 * flat[0] :: 6]
+        corners, quads = corners[list(side)] + 0.0, [(0, 1, 2, 3)]
     return corners, np.array([t for a, b, c, d in quads for t in ((a, b, c), (a, c, d))], np.uint32)
 
 

@@ -15,15 +15,18 @@ Pair = tuple[str, str]
 
 @dataclass(frozen=True)
 class Semantics:
-    """Pairs of links, in the order of their names. ``enabled``: though a link's default or neighbourhood says else."""
+    """Pairs of links, in the order of their names. ``enabled``: though a link's default or neighbourhood says else.
+    ``ignored``: which entries have no effect and why, in words; "": none."""
 
     disabled: frozenset[Pair] = frozenset()
     enabled: frozenset[Pair] = frozenset()
     disabled_links: frozenset[str] = frozenset()  # with all others, but for what is enabled
+    ignored: str = ""
 
 
 def parse(text: str, links: Iterable[str]) -> Semantics:
-    """links: of the URDF. Raises SemanticsError naming the element: unknown links, no XML, a URDF."""
+    """links: of the URDF; entries that name others are ignored, as MoveIt does. Raises SemanticsError naming the
+    element: no XML, a URDF, an entry without a name."""
     try:
         return _semantics(text, set(links))
     except RobotError as error:
@@ -34,23 +37,31 @@ def _semantics(text: str, known: set[str]) -> Semantics:
     robot = xml_tree.parse(text, DOCUMENT, "robot")
     for element in robot.all("joint"):
         raise element.error("is of a URDF; name the SRDF beside it, whose pairs are <disable_collisions>")
-    return Semantics(
-        frozenset(_pair(element, known) for element in robot.all("disable_collisions")),
-        frozenset(_pair(element, known) for element in robot.all("enable_collisions")),
-        frozenset(_link(element, "link", known) for element in robot.all("disable_default_collisions")),
+    unknown: list[str] = []
+
+    def pairs(tag: str) -> frozenset[Pair]:
+        found = _entries(robot.all(tag), ("link1", "link2"), known, unknown)
+        return frozenset((min(pair), max(pair)) for pair in found)
+
+    disabled, enabled = pairs("disable_collisions"), pairs("enable_collisions")
+    by_default = _entries(robot.all("disable_default_collisions"), ("link",), known, unknown)
+    ignored = (
+        f"{DOCUMENT}: entries that name links which the URDF does not have are ignored: {listed(unknown)}; check that "
+        "it is the SRDF of this robot"
     )
+    return Semantics(disabled, enabled, frozenset(link for (link,) in by_default), ignored if unknown else "")
 
 
-def _pair(element: Element, known: set[str]) -> Pair:
-    a, b = sorted(_link(element, attribute, known) for attribute in ("link1", "link2"))
-    return a, b
-
-
-def _link(element: Element, attribute: str, known: set[str]) -> str:
-    name = element.text(attribute)
-    if name not in known:
-        raise element.error(
-            f"names the link {quoted(name)} ({attribute}), and the URDF has none of this name; its links are "
-            f"{listed(sorted(known))}"
-        )
-    return name
+def _entries(
+    elements: Iterable[Element], attributes: tuple[str, ...], known: set[str], unknown: list[str]
+) -> list[tuple[str, ...]]:
+    """Names of the links of each element; of those that are not ``known`` a word in ``unknown`` instead."""
+    found = []
+    for element in elements:
+        names = tuple(element.text(attribute) for attribute in attributes)
+        lacking = [name for name in names if name not in known]
+        if lacking:
+            unknown.append(f"<{element.tag}> in line {element.line} names {quoted(lacking[0])}")
+        else:
+            found.append(names)
+    return found

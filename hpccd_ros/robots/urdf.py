@@ -107,9 +107,8 @@ def parse(text: str, geometry: str = "collision") -> Description:
 
 def _name(element: Element) -> str:
     name = element.text("name")
-    # A link's name becomes part of a mesh's, which parameters hold with colons between.
-    if len(name) > LONGEST_NAME or not name.isprintable() or ":" in name or "/" in name:
-        raise element.error(f"has a name that cannot be used: at most {LONGEST_NAME} characters, no : or /")
+    if len(name) > LONGEST_NAME or not name.isprintable():
+        raise element.error(f"has a name that cannot be used; give one of at most {LONGEST_NAME} printable characters")
     return name
 
 
@@ -216,7 +215,14 @@ def _placed(element: Element) -> Placed:
 
 
 def _box(element: Element) -> Box:
-    return Box(_sizes(element, "size"))
+    x, y, z = _numbers(element, "size", 3)
+    if min(x, y, z) < 0.0:
+        raise element.error(f"has size {min(x, y, z):g}; lengths must not be negative")
+    if (x, y, z).count(0.0) > 1:
+        raise element.error(
+            f"has size {x:g} {y:g} {z:g}, which leaves no surface; give two lengths above 0, or remove the shape"
+        )
+    return Box((x, y, z))
 
 
 def _cylinder(element: Element) -> Cylinder:
@@ -281,15 +287,6 @@ def _number(element: Element, attribute: str, default: float) -> float:
 
 def _size(element: Element, attribute: str) -> float:
     (size,) = _numbers(element, attribute, 1)
-    return _positive(element, attribute, size)
-
-
-def _sizes(element: Element, attribute: str) -> tuple[float, float, float]:
-    x, y, z = (_positive(element, attribute, size) for size in _numbers(element, attribute, 3))
-    return x, y, z
-
-
-def _positive(element: Element, attribute: str, size: float) -> float:
     if size <= 0.0:
-        raise element.error(f"has {attribute} {size:g}; lengths must be above 0")
+        raise element.error(f"has {attribute} {size:g}; give a length above 0, or remove the shape")
     return size

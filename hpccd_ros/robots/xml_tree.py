@@ -5,6 +5,8 @@ Nothing but the text is read: a document type, the only place where XML defines 
 refused at its first character. Size, depth and number of elements are bounded.
 """
 
+import re
+from codecs import BOM_UTF8, BOM_UTF16_BE, BOM_UTF16_LE, BOM_UTF32_BE, BOM_UTF32_LE, lookup
 from dataclasses import dataclass, field
 from xml.parsers import expat
 
@@ -14,6 +16,20 @@ from hpccd_ros.robots.errors import RobotError
 MOST_CHARACTERS = 16_000_000
 MOST_ELEMENTS = 200_000
 DEEPEST = 50
+
+# Longest first: a mark of UTF-32 begins with one of UTF-16. Without a mark, the first character of XML tells.
+_MARKS = {
+    BOM_UTF32_LE: "utf-32",
+    BOM_UTF32_BE: "utf-32",
+    BOM_UTF8: "utf-8-sig",
+    BOM_UTF16_LE: "utf-16",
+    BOM_UTF16_BE: "utf-16",
+    b"<\0": "utf-16-le",
+    b"\0<": "utf-16-be",
+}
+_DECLARED = re.compile(rb"""<\?xml[^>]*?\sencoding\s*=\s*["']([A-Za-z][A-Za-z0-9._-]{0,40})["']""")
+# What a decoder puts in place of bytes that it cannot decode.
+_LOST = "\ufffd"
 
 
 @dataclass(eq=False)
@@ -47,12 +63,35 @@ class Element:
         value = self.attributes.get(attribute, "")
         if not value.strip():
             raise self.error(f"needs the attribute {attribute}")
+        if _LOST in value:
+            raise self.error(f"has characters in {attribute} that were not sent as UTF-8; save the file as UTF-8")
         return value
 
     def error(self, problem: str) -> RobotError:
         name = self.attributes.get("name")
         called = f"<{shortened(self.tag)} name={quoted(name)}>" if name is not None else f"<{shortened(self.tag)}>"
         return RobotError(f"{self.document}, line {self.line}: {called} {problem}")
+
+
+def decoded(data: bytes) -> str:
+    """The text of an XML file: by its byte order mark, else by the encoding that it declares, else as UTF-8. Raises
+    RobotError with the remedy, not naming the file."""
+    encoding = next((name for mark, name in _MARKS.items() if data.startswith(mark)), "")
+    if not encoding:
+        declared = _DECLARED.match(data.lstrip()[:1000])
+        encoding = declared[1].decode() if declared else "utf-8"
+    try:
+        if re.match(r"utf-(16|32)", lookup(encoding).name) and b"\0" not in data:
+            encoding = "utf-8"  # declared in single bytes, so it was saved otherwise since
+        return data.decode(encoding)
+    except UnicodeDecodeError as error:
+        byte = f"byte 0x{data[error.start]:02x} in line {data[: error.start].count(10) + 1}"
+        raise RobotError(
+            f"is not {encoding.upper()} ({byte}); save it as UTF-8, or declare its encoding in the first line, as "
+            '<?xml version="1.0" encoding="ISO-8859-1"?>'
+        ) from error
+    except (LookupError, UnicodeError) as error:
+        raise RobotError(f"declares the encoding {quoted(encoding)}, which is unknown; save it as UTF-8") from error
 
 
 def parse(text: str, document: str, root: str) -> Element:
@@ -81,7 +120,10 @@ class _Builder:
         try:
             self._parser.Parse(text.encode(), True)
         except expat.ExpatError as error:
-            raise RobotError(f"{self._document}: is no XML: {error}; export it anew") from error
+            why = f"is no XML: {error}; export it again"
+            if "\0" in text[:4]:  # every second byte of most UTF-16
+                why = "is UTF-16, which was sent as if it were UTF-8; save it as UTF-8"
+            raise RobotError(f"{self._document}: {why}") from error
         except UnicodeEncodeError as error:
             raise RobotError(f"{self._document}: is no text: {error}; save it as UTF-8") from error
         assert self._root is not None  # expat demands an element

@@ -297,11 +297,31 @@ def test_a_file_that_cannot_be_used_ends_the_start(start_node, tmp_path):
 def test_of_a_srdf_that_cannot_be_used_its_own_parameter_is_named(start_node, tmp_path):
     description, semantics = tmp_path / "crane.urdf", tmp_path / "crane.srdf"
     description.write_text(crane.URDF)
-    semantics.write_text('<robot name="crane"><disable_collisions link1="mast" link2="hok"/></robot>')
+    semantics.write_text('<robot name="crane"><disable_collisions link1="mast"/></robot>')
     robot = {**JOINTS, "description": str(description), "srdf": str(semantics)}
     node = start_node({**parameters(**robot), "autostart": False}, wait=False)
     assert not change_state(node, Transition.TRANSITION_CONFIGURE)
-    assert "robot.crane.srdf: SRDF, line 1: <disable_collisions> names the link 'hok'" in node.output()
+    assert "robot.crane.srdf: SRDF, line 1: <disable_collisions> needs the attribute link2" in node.output()
+
+
+def test_what_is_ignored_or_renamed_of_a_robot_is_logged_once(start_node, tmp_path):
+    semantics = tmp_path / "crane.srdf"
+    semantics.write_text('<robot name="crane"><disable_collisions link1="mast" link2="hok"/></robot>')
+    node = start_node(parameters(**JOINTS, srdf=str(semantics)))
+    renamed = crane.URDF.replace('"hook"', '"left/hook"')
+    publisher = describe(node, renamed)
+    first_step(node)
+    assert node.contacts(1)[0].mesh_names == ["cloth", "crane/mast", "crane/boom", "crane/left_hook"]
+    publisher.publish(String(data=renamed.replace('"0.6 0.06 0.04"', '"0.9 0.06 0.04"')))
+    for k in (3, 4):
+        cloth(node, k)
+    node.wait_until(lambda: node.output().count("[WARN]") >= 2, "both warnings")
+    for text in (
+        "robot crane: SRDF: entries that name links which the URDF does not have are ignored: <disable_collisions> in "
+        "line 1 names 'hok'",
+        "robot crane: URDF: in names of meshes / and : become _: link 'left/hook' is crane/left_hook",
+    ):
+        assert node.output().count(text) == 1
 
 
 def test_pairs_name_robots_and_links(start_node):

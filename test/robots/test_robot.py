@@ -40,6 +40,49 @@ def test_the_srdf_and_a_name_of_ones_own():
     }
 
 
+def test_a_srdf_of_which_an_entry_names_no_link_of_the_robot_is_used_with_a_warning():
+    robot = Robot.of(URDF, SRDF.replace("</", '<disable_collisions link1="bob" link2="gripper_of_another"/></'))
+    assert robot.ignored_pairs == Robot.of(URDF, SRDF).ignored_pairs
+    (warning,) = robot.warnings
+    assert "are ignored: <disable_collisions> in line 1 names 'gripper_of_another'" in warning
+    assert Robot.of(URDF, SRDF).warnings == ()
+
+
+def test_slashes_and_colons_of_links_become_underscores_in_names_of_meshes():
+    text = URDF.replace('"rod"', '"left/rod:1"').replace('"base"', '"left/base:1"').replace('"turn"', '"left/turn:1"')
+    robot = Robot.of(text, SRDF.replace('"rod"', '"left/rod:1"'), name="arm")
+    assert [mesh.name for mesh in robot.meshes] == ["arm/left_rod_1", "arm/bob", "arm/tip"]
+    assert robot.ignored_pairs == (
+        ("arm/bob", "arm/left_rod_1"), ("arm/bob", "arm/tip"), ("arm/left_rod_1", "arm/tip")
+    )  # fmt: skip
+    assert robot.warnings == (
+        "URDF: in names of meshes / and : become _: link 'left/rod:1' is arm/left_rod_1",
+    )  # of the base, which has no geometry, nothing is said
+    assert robot.settings("b_")[0].frame == "b_left/rod:1"
+    assert robot.kinematics.inputs[0] == "left/turn:1"
+    with pytest.raises(RobotError, match="'left/rod' and 'left:rod' would both be the mesh 'swing/left_rod'.*rename"):
+        Robot.of(URDF.replace('"rod"', '"left/rod"').replace('"bob"', '"left:rod"'))
+
+
+def test_a_box_without_thickness_is_a_surface_that_is_touched():
+    """A ground plane, as people write it, and a ball that falls through it."""
+    ground = Robot.of(
+        '<robot name="world"><link name="ground"><collision><origin xyz="0 0 0.5"/><geometry><box size="4 6 0"/>'
+        "</geometry></collision></link></robot>"
+    )
+    ball = Robot.of(
+        '<robot name="b"><link name="l"><collision><geometry><sphere radius="1"/></geometry></collision></link></robot>'
+    )
+    (plane,), (round_one,) = ground.meshes, ball.meshes
+    scene = hc.Scene()
+    scene.add_mesh("plane", plane.topology.faces, n_vertices=plane.topology.n_vertices, self_collision=False)
+    scene.add_mesh("ball", round_one.topology.faces, self_collision=False)
+    t0, t1 = (np.concatenate([plane.vertices, round_one.vertices + [0.3, 0.2, z]]) for z in (3.5, -3.5))
+    contacts = hc.Detector(scene).detect(t0, t1)
+    assert contacts.first_toc == pytest.approx(2.0 / 7.0, abs=1e-3)
+    assert hc.Detector(scene).distances(t0)[0].distance == pytest.approx(2.0, abs=1e-3)
+
+
 def test_settings_are_those_of_meshes_that_transforms_move():
     settings = Robot.of(URDF, name="arm").settings("left_")
     assert [(s.name, s.frame, s.input, s.rigid) for s in settings][0] == ("arm/rod", "left_rod", TF, True)
@@ -86,7 +129,7 @@ def test_the_finer_the_tolerance_the_more_triangles():
         ({"geometry": "visual"}, "geometry: no link has <visual>, so nothing could touch; try collision"),
         ({"geometry": "both"}, "geometry: 'both'"),
         ({"urdf_text": URDF.replace(' name="swing"', "")}, "name: the description has none; give one"),
-        ({"srdf_text": SRDF.replace("tip", "top")}, "names the link 'top'"),
+        ({"srdf_text": SRDF.replace("link2", "link3")}, "SRDF, line 1: <disable_collisions> needs the attribute link2"),
         ({"tolerance": 0.0}, "link 'bob': tolerance 0: must be above 0"),
     ],
 )

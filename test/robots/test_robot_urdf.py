@@ -5,6 +5,7 @@ import math
 
 import pytest
 
+from hpccd_ros.middleware import robot_files
 from hpccd_ros.robots import urdf, xml_tree
 from hpccd_ros.robots.errors import RobotError
 from hpccd_ros.robots.shapes import Box, Capsule, Cylinder, MeshFile, Sphere
@@ -94,7 +95,8 @@ def test_what_others_put_beside_links_is_left_alone():
         ("<sdf/>", "line 1: <sdf> is the outermost element; it must be <robot>"),
         ("<robot/>", "<robot> has no <link>"),
         (robot("", "<link/>"), "<link> needs the attribute name"),
-        (robot("", '<link name="a:b"/>'), r"<link name='a:b'> has a name that cannot be used"),
+        (robot("", f'<link name="{"a" * 256}"/>'), "has a name that cannot be used; give one of at most 255 printable"),
+        (robot("", '<link name="a\u200bb"/>'), "has a name that cannot be used"),
         (robot("", '<link name="a"/>' * 2), "<link name='a'> is the second link of this name"),
         (robot(joint() * 2), "<joint name='j'> is the second joint of this name"),
         (robot(joint() + joint(name="k")), "has the child 'b', which joint 'j' moves already"),
@@ -124,7 +126,13 @@ def test_what_others_put_beside_links_is_left_alone():
         (shape(""), "<geometry> has 0 shapes; it needs one"),
         (shape('<box size="1 1 1"/>' * 2), "<geometry> has 2 shapes"),
         (shape("<torus/>"), "<torus> is no known shape; choose from box"),
-        (shape('<box size="1 -1 1"/>'), "<box> has size -1; lengths must be above 0"),
+        (robot(joint('<limit lower="nan" upper="1"/>')), "<limit> has lower='nan'; it must be a finite number"),
+        (shape('<box size="1 -1 1"/>'), "<box> has size -1; lengths must not be negative"),
+        (shape('<box size="1 0 0"/>'), "<box> has size 1 0 0, which leaves no surface; give two lengths above 0"),
+        (shape('<box size="nan 1 1"/>'), "<box> has size='nan 1 1'; it must be 3 finite numbers with spaces between"),
+        (shape('<sphere radius="0"/>'), "<sphere> has radius 0; give a length above 0, or remove the shape"),
+        (shape('<cylinder radius="1" length="-0.0"/>'), "<cylinder> has length -0; give a length above 0"),
+        (shape('<capsule radius="inf" length="1"/>'), "<capsule> has radius='inf'; it must be a finite number"),
         (shape("<sphere/>"), "<sphere> has radius=''; it must be a finite number"),
         (shape('<mesh filename=""/>'), "<mesh> needs the attribute filename"),
         (shape('<mesh filename="a.stl" scale="1 0 1"/>'), "<mesh> has the scale 1 0 1"),
@@ -161,6 +169,68 @@ def test_hostile_xml_is_refused(text, message):
     with pytest.raises(RobotError, match=message) as refused:
         urdf.parse(text)
     assert len(str(refused.value)) < 1000
+
+
+def of_file(tmp_path, data):
+    file = tmp_path / "robot.urdf"
+    file.write_bytes(data)
+    return robot_files.text_of(str(file))
+
+
+@pytest.mark.parametrize(
+    "declared, encoding",
+    [
+        ("", "utf-8"),
+        ("", "utf-8-sig"),
+        ("", "utf-16"),
+        ("", "utf-32"),
+        ("UTF-16", "utf-16"),
+        ("UTF-16LE", "utf-16-le"),
+        ("UTF-16", "utf-16-be"),
+        ("UTF-16", "utf-8"),  # as editors leave it that save as UTF-8
+        ("ISO-8859-1", "latin-1"),
+        ("iso-8859-15", "iso-8859-15"),
+        ("Windows-1252", "cp1252"),
+        ("Shift_JIS", "shift_jis"),
+    ],
+)
+def test_a_file_is_read_by_its_encoding(tmp_path, declared, encoding):
+    name = "腕" if encoding == "shift_jis" else "hüfte"
+    head = f'<?xml version="1.0" encoding="{declared}"?>\n' if declared else ""
+    text = of_file(tmp_path, f'{head}<robot name="r"><link name="{name}"/></robot>'.encode(encoding))
+    assert urdf.parse(text).root == name
+
+
+@pytest.mark.parametrize(
+    "data, message",
+    [
+        ("\n<robot name='ü'/>".encode("latin-1"), r"robot.urdf: is not UTF-8 \(byte 0xfc in line 2\); save it"),
+        (b"<?xml version='1.0' encoding='klingon'?><robot/>", "declares the encoding 'klingon', which is unknown"),
+        (b"<?xml version='1.0' encoding='zip'?><robot/>", "declares the encoding 'zip', which is unknown; save it"),
+        (b"<?xml version='1.0' encoding='idna'?><robot name='xn--\xff'/>", "save it as UTF-8"),
+        (b"\xff\xfe<\0r", "is not UTF-16"),
+    ],
+)
+def test_a_file_in_no_known_encoding_says_what_to_do(tmp_path, data, message):
+    with pytest.raises(RobotError, match=message):
+        of_file(tmp_path, data)
+
+
+def test_bytes_that_were_sent_as_if_they_were_utf_8_say_what_to_do():
+    """rclpy puts U+FFFD in place of bytes that are not UTF-8."""
+    latin = '<?xml version="1.0" encoding="ISO-8859-1"?>\n<!-- Müller --><robot name="r"><link name="{}"/></robot>'
+    sent = latin.format("arm").encode("latin-1").decode("utf-8", "replace")
+    assert urdf.parse(sent).root == "arm"  # lost in a comment alone
+    with pytest.raises(RobotError, match="<link name='h.fte'> has characters in name that were not sent as UTF-8"):
+        urdf.parse(latin.format("hüfte").encode("latin-1").decode("utf-8", "replace"))
+    with pytest.raises(RobotError, match="URDF: is UTF-16, which was sent as if it were UTF-8; save it as UTF-8"):
+        urdf.parse(latin.format("arm").encode("utf-16").decode("utf-8", "replace"))
+
+
+def test_names_of_links_and_joints_may_hold_what_separates_names_of_meshes():
+    links = '<link name="base/left:1"/><link name="arm:/tip"/>'
+    found = urdf.parse(robot(joint(name="left/j:1", parent="base/left:1", child="arm:/tip"), links))
+    assert (found.root, found.joints[0].name) == ("base/left:1", "left/j:1")
 
 
 def test_the_encoding_that_a_text_declares_does_not_matter():
