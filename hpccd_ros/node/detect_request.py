@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from hpccd.msg import MeshVertices
 
+from hpccd_core.options import ACCURACIES, REPORTS
 from hpccd_ros.base.quoting import listed, quoted, repeated, shortened
 from hpccd_ros.detect.cancellation import Cancellation
 from hpccd_ros.detect.core import Options, make_detector
@@ -64,8 +65,8 @@ def compute(
         start = _vertices("start", names, request.start, topologies, limits["max_vertices"])
     options = replace(
         options,
-        accuracy=request.accuracy or options.accuracy,
-        report=request.report or "all",
+        accuracy=_choice("accuracy", request.accuracy or options.accuracy, ACCURACIES),
+        report=_choice("report", request.report or "all", REPORTS),
         separation=query.separation or options.separation.among(names),
         features=query.features or options.features,
     )
@@ -90,6 +91,12 @@ def compute(
         first = request.end if query.of_snapshot else request.start
         answer.contacts.start = first[0].header.stamp
     return answer
+
+
+def _choice(field: str, value: str, choices: tuple[str, ...]) -> str:
+    if value not in choices:
+        raise RequestError(f"{field}: {quoted(value)} is not known; use one of {', '.join(choices)}")
+    return value
 
 
 def _names(request: Request, scene: NodeScene, most: int) -> list[str]:

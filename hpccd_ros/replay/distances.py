@@ -112,7 +112,7 @@ def difference(recorded, now) -> str | None:
             continue
         if len(then) != rows * per_pair:
             return f"{name} has {len(then)} entries, {rows * per_pair} belong to {rows} pairs of meshes"
-        columns[name] = then.reshape(rows, -1), new.reshape(rows, -1)
+        columns[name] = then.reshape(rows, per_pair), new.reshape(rows, per_pair)
     for row in range(rows):
         for name, (then, new) in columns.items():
             if then[row].tobytes() != new[row].tobytes():

@@ -114,6 +114,7 @@ def test_bad_requests_are_refused_with_a_reason(node, bad, text):
     assert not refused.success and text in refused.message, refused.message
     assert len(refused.contacts.toc) == 0 and len(refused.message) < 1200
     assert good.success, "the node goes on"
+    service_counts(node, answered=1, refused=1, failed=0)
 
 
 def test_busy_node_refuses_at_once(start_node):

@@ -175,6 +175,24 @@ def test_distances_that_differ_are_named(changed, near_bag, hpccd):
     assert "  7 answers are equal in every contact" in done.stdout and "VERIFIED" not in done.stdout
 
 
+def test_distances_of_a_scene_without_pairs_are_verified(near_bag, tmp_path, hpccd):
+    """There is nothing to measure, and each answer says so."""
+    path, inputs, _ = near_bag
+    with Recording(path) as recording:
+        info = recording.info
+    info["parameters"] |= {"mesh.cloth.self_collision": False, "ignored_pairs": ["ball:cloth"]}
+    _write(tmp_path / "silent.mcap", info, inputs, [])
+    with Recording(tmp_path / "silent.mcap") as recording:
+        setup = recorded_setup.of_recording(recording)
+        source = FrameSource(setup, recording.topics)
+        frames = [frame for message in recording.messages(source.topics) for frame in source.push(message)]
+    answers = list(_answers(setup, frames))
+    assert len(answers) == 7 and not any(len(distances.distance) for _, distances in answers)
+    _write(tmp_path / "x.mcap", info, inputs, answers)
+    done = hpccd("replay", "x.mcap")
+    assert done.returncode == 0 and "  7 answers about distances are equal" in done.stdout, done.stdout + done.stderr
+
+
 def test_answers_from_before_there_were_directions_are_verified(changed):
     assert _counts(_replay(changed(1, direction=[], approach_speed=[]))[0].distances) == (7, 0, 0)
 
