@@ -32,7 +32,7 @@ _ADDED = {
         _Addition(frozenset({"uint32[] topology_versions"}), bytes(4), 4),
         _Addition(
             frozenset({
-                "uint8 EDGE_FACE=2", "float64 minimum_separation", "uint32[] separation_mesh_a",
+                "float64 minimum_separation", "uint32[] separation_mesh_a",
                 "uint32[] separation_mesh_b", "float64[] separations", "float64[] closest", "float64[] distance",
             }),
             bytes(8 + 5 * 4),
@@ -78,12 +78,24 @@ def _completed(data: bytes, lacking: tuple[_Addition, ...]) -> bytes:
 
 
 def _fields(definition: str) -> dict[str, list[str]]:
-    """Name of the type, "" for the first -> its fields and constants, without comments."""
+    """Name of the type, "" for the first -> its fields in their order: what the layout of the CDR depends on.
+
+    Recorders write the rest as they like: comments, spaces, default values, constants (which the hash does not cover
+    either), and with or without package the names of types.
+    """
     own, *others = definition.split(message_definitions.SEPARATOR)
-    sections = {"": own} | {name: text for name, _, text in (other.lstrip().partition("\n") for other in others)}
-    lines = {name: (" ".join(line.partition("#")[0].split()) for line in text.splitlines())
-             for name, text in sections.items()}  # fmt: skip
-    return {name: [line for line in of_type if line] for name, of_type in lines.items()}
+    sections = {"": own} | {name.replace("/msg/", "/"): text
+                            for name, _, text in (other.lstrip().partition("\n") for other in others)}  # fmt: skip
+    return {name.rstrip(): [field for line in text.splitlines() if (field := _field(line))]
+            for name, text in sections.items()}  # fmt: skip
+
+
+def _field(line: str) -> str:
+    """Type without package, and name of the field in a line of a definition; "" where there is none."""
+    words = line.partition("#")[0].split(maxsplit=2)
+    if len(words) < 2 or "=" in words[1] or words[2:] and words[2].startswith("="):
+        return ""
+    return f"{words[0].rpartition('/')[2]} {words[1]}"
 
 
 def make_decoder(topic: RecordedTopic):

@@ -7,12 +7,20 @@ from collections.abc import Callable
 from pathlib import Path
 
 from mcap.opcode import Opcode
-from mcap.records import Channel, Chunk, Header, Message, Schema
+from mcap.records import Channel, Chunk, Header, Message, Metadata, Schema
 from mcap.writer import MCAP0_MAGIC
 
 from hpccd_ros.bag.mcap_index import Descriptions, miscounted, misplaced, read_index, undescribed
-from hpccd_ros.bag.mcap_records import DAMAGE, Place, data_section, inside, parse, within_chunk_times
-from hpccd_ros.bag.reader import RecordingError
+from hpccd_ros.bag.mcap_records import (
+    DAMAGE,
+    Place,
+    data_section,
+    inside,
+    parse,
+    unpacked_message,
+    within_chunk_times,
+)
+from hpccd_ros.bag.reader import RecordingError, stored_info
 from hpccd_ros.bag.writer import COMPRESSIONS
 
 
@@ -149,8 +157,17 @@ class _Walk:
             self._described.add(record)
         elif isinstance(record, Message):
             self._visit_message(record)
-        else:
+        elif self._is_readable(record):
             self._visit(record)
+
+    def _is_readable(self, record) -> bool:
+        try:
+            if isinstance(record, Metadata):
+                stored_info(record)
+        except ValueError as error:
+            self._note(str(error))
+            return False
+        return True
 
     def _visit_message(self, record):
         result, number = self.result, record.channel_id
@@ -164,9 +181,14 @@ class _Walk:
                 self._visit(self._described.schemas[channel.schema_id])
                 result.types[channel.topic] = self._described.schemas[channel.schema_id].name
             self._visit(channel)
+        self._counts[number] += 1
+        try:
+            record = unpacked_message(channel, record)
+        except DAMAGE as error:
+            self._note(f"a message of {channel.topic}: {_text(error)}")
+            return
         result.start = min(result.start, record.log_time) if result.message_count else record.log_time
         result.end = max(result.end, record.log_time)
-        self._counts[number] += 1
         result.counts[channel.topic] = result.counts.get(channel.topic, 0) + 1
         self._visit(record)
 

@@ -1,21 +1,40 @@
 # SPDX-License-Identifier: Apache-2.0
 """One finished MCAP file: what it holds, and its messages in the order of time, with all check sums.
 
-The index tells the topics and how many messages they have, before the data is unpacked. Where the messages are, the
-data itself tells: one that the index did not name, or named elsewhere, would be left out in silence.
+The index holds the topics and their numbers of messages, so that the data need not be unpacked for them. Recorders may
+leave any of that out; then the data is unpacked once more. The places of the messages come from the data itself: one
+that the index does not name, or names elsewhere, would be left out silently.
 """
 
 import heapq
+import operator
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Container, Iterator
 from typing import NamedTuple
 
 from mcap import records as known
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
+from mcap.summary import Summary
 
-from hpccd_ros.bag.mcap_index import Descriptions, miscounted, misplaced, read_index, undescribed
-from hpccd_ros.bag.mcap_records import Place, Raw, data_section, inside, parse, records, within_chunk_times
+from hpccd_ros.bag.mcap_index import (
+    Descriptions,
+    miscounted,
+    misplaced,
+    read_index,
+    stored_counts,
+    undescribed,
+)
+from hpccd_ros.bag.mcap_records import (
+    Place,
+    Raw,
+    data_section,
+    inside,
+    parse,
+    records,
+    unpacked_message,
+    within_chunk_times,
+)
 
 # Bytes of messages, with what Python needs for each, that may wait for earlier ones of later chunks. Recorders write
 # messages nearly in order: what waits is about a chunk.
@@ -35,7 +54,8 @@ class _Waiting(NamedTuple):
 class McapFile:
     """`stream` stays open while messages are read. Raises what is in mcap_records.DAMAGE; the methods too.
 
-    index: None where the file has none; then there are no topics either.
+    channels, schemas: by number. counts: messages by number of the channel, of channels that have some. compression: of
+    the first chunk.
     """
 
     def __init__(self, stream, size: int):
@@ -43,23 +63,31 @@ class McapFile:
         self.header: known.Header | None = None
         self.metadata: list[known.Metadata] = []
         self.attachments: list[known.Attachment] = []
+        self.compression = ""
         self._places: list[_Waiting] = []
-        self._loose = Descriptions(_complain)
+        self._loose: list[tuple[int, known.Schema | known.Channel]] = []
         places = [self._sort_in(raw) for raw in data_section(stream, size)]
-        self.index, begin = read_index(stream, size)
+        index, begin = read_index(stream, size)
         end = places[-1].at + places[-1].length
         if begin != end:
             raise McapError(f"the data ends at byte {end:,}, the footer says {begin:,}")
-        if self.index is not None and (why := misplaced(self.index, places)):
+        self._index = index or Summary()
+        if why := misplaced(self._index, places):
             raise McapError(why)
+        described = self._indexed()
+        counts = stored_counts(self._index)
+        if counts is None or any(described.lack(number) for number in counts):
+            described, counts = self._scanned()
+        else:
+            for _, record in self._loose:
+                described.add(record)
+        self.channels, self.schemas, self.counts = described.channels, described.schemas, counts
 
-    def messages(self, topics=None) -> Iterator[tuple[known.Channel, known.Message]]:
-        """In the order of log_time; `topics`: only these names."""
+    def messages(self, wanted: Container[int]) -> Iterator[tuple[known.Channel, known.Message]]:
+        """In the order of log_time. wanted: numbers of channels."""
         described = Descriptions(_complain)
-        for record in (*self.index.schemas.values(), *self.index.channels.values(), *self._loose.schemas.values(),
-                       *self._loose.channels.values()):  # fmt: skip
+        for record in (*self.schemas.values(), *self.channels.values()):
             described.add(record)
-        wanted = {n for n, c in self.index.channels.items() if topics is None or c.topic in topics}
         counts: Counter[int] = Counter()
         waiting = list(self._places)
         heapq.heapify(waiting)
@@ -68,29 +96,56 @@ class McapFile:
             _, at, _, thing = heapq.heappop(waiting)
             if isinstance(thing, known.Message):
                 held -= len(thing.data) + _OF_A_MESSAGE
-                yield self.index.channels[thing.channel_id], thing
+                yield self.channels[thing.channel_id], thing
                 continue
             for number, record in enumerate(self._records_at(thing)):
                 if not isinstance(record, known.Message):
                     described.add(record)
                     continue
-                if (why := undescribed(self.index, [record.channel_id])) is not None:
-                    raise McapError(why)
+                self._check_described(described, record)
                 counts[record.channel_id] += 1
                 if record.channel_id in wanted:
+                    record = unpacked_message(described.channels[record.channel_id], record)
                     heapq.heappush(waiting, _Waiting(record.log_time, at, number, record))
                     held += len(record.data) + _OF_A_MESSAGE
                     if held > MOST_WAITING:
                         raise McapError(f"messages of {held:,} bytes are not in the order of their times")
-        if why := miscounted(self.index, counts):
+        if why := miscounted(self._index, counts):
             raise McapError(why)
+
+    def _indexed(self) -> Descriptions:
+        described = Descriptions(_complain)
+        for record in (*self._index.schemas.values(), *self._index.channels.values()):
+            described.add(record)
+        return described
+
+    def _scanned(self) -> tuple[Descriptions, Counter[int]]:
+        """What the whole data describes, and its messages by channel."""
+        described, counts = self._indexed(), Counter()
+        parts = [*((place.at, place.thing) for place in self._places), *self._loose]
+        for _, part in sorted(parts, key=operator.itemgetter(0)):  # in the order of the file
+            for record in self._records_at(part) if isinstance(part, Place) else (part,):
+                if isinstance(record, known.Message):
+                    self._check_described(described, record)
+                    counts[record.channel_id] += 1
+                else:
+                    described.add(record)
+        return described, counts
+
+    def _check_described(self, described: Descriptions, message: known.Message) -> None:
+        number = message.channel_id
+        if why := undescribed(self._index, [number]):
+            raise McapError(why)
+        if number not in described.channels:
+            raise McapError(f"nothing describes channel {number} before its first message")
 
     def _sort_in(self, raw: Raw) -> Place:
         if (raw.opcode == Opcode.HEADER) != (self.header is None):
             raise McapError("no header at its begin" if self.header is None else "a second header")
         if raw.opcode == Opcode.CHUNK:
-            begin = parse(raw).message_start_time
-            self._places.append(_Waiting(begin, raw.at, -1, raw.place))
+            chunk = parse(raw)
+            self.compression = self.compression or chunk.compression
+            self._places.append(_Waiting(chunk.message_start_time, raw.at, -1, raw.place))
         elif raw.opcode == Opcode.MESSAGE:
             self._places.append(_Waiting(parse(raw).log_time, raw.at, -1, raw.place))
         else:
@@ -102,7 +157,7 @@ class McapFile:
             elif isinstance(record, known.Attachment):
                 self.attachments.append(record)
             elif isinstance(record, (known.Schema, known.Channel)):
-                self._loose.add(record)
+                self._loose.append((raw.at, record))
         return raw.place
 
     def _records_at(self, place: Place):

@@ -34,6 +34,11 @@ class Descriptions:
             self._complain(f"{kind} {record.id} is described twice, differently")
             into[record.id] = record
 
+    def lack(self, number: int) -> bool:
+        """Whether a channel, or the schema that it names, is missing."""
+        channel = self.channels.get(number)
+        return channel is None or (channel.schema_id != 0 and channel.schema_id not in self.schemas)
+
 
 def read_index(stream, size: int) -> tuple[Summary | None, int]:
     """(index or None, where the data must end) of a file of `size` bytes. Raises what is in mcap_records.DAMAGE."""
@@ -100,16 +105,32 @@ def misplaced(summary: Summary, data: list[Place]) -> str | None:
 
 
 def undescribed(summary: Summary, channels: Iterable[int]) -> str | None:
-    """Which of the `channels` that have messages the index lacks, or None."""
-    missing = next((number for number in channels if number not in summary.channels), None)
+    """Which of the `channels` that have messages the index lacks, or None.
+
+    An index may repeat no channels at all.
+    """
+    missing = next((number for number in channels if summary.channels and number not in summary.channels), None)
     return None if missing is None else f"the index does not describe channel {missing}"
 
 
+def stored_counts(summary: Summary) -> dict[int, int] | None:
+    """Messages by channel, of channels that have some, or None where the index does not hold these numbers."""
+    statistics = summary.statistics
+    if statistics is None or (statistics.message_count and not statistics.channel_message_counts):
+        return None
+    return {number: count for number, count in statistics.channel_message_counts.items() if count}
+
+
 def miscounted(summary: Summary, counts: dict[int, int]) -> str | None:
-    """How the statistics of the index differ from `counts`, messages by channel, or None."""
+    """How the statistics of the index differ from `counts`, messages by channel, or None.
+
+    Statistics may lack the counts by channel.
+    """
     if summary.statistics is None:
         return None
-    told = {number: count for number, count in summary.statistics.channel_message_counts.items() if count}
+    told = stored_counts(summary)
+    if told is None:
+        told = dict(counts)
     if told == dict(counts) and summary.statistics.message_count == sum(counts.values()):
         return None
     where = next((n for n in {**told, **counts} if told.get(n, 0) != counts.get(n, 0)), None)

@@ -5,6 +5,7 @@ The reader of the library `mcap` believes them: it reads on into the next record
 is there where the file ends, and unpacks whatever a chunk unpacks to.
 """
 
+import dataclasses
 import struct
 import zlib
 from collections.abc import Iterator
@@ -30,6 +31,9 @@ DAMAGE = (
 MOST_UNPACKED = 1 << 30
 # A chunk of a megabyte has 34,000 of the smallest messages. Each costs a reader ten times its bytes.
 MOST_RECORDS = 1 << 20
+
+# `ros2 bag record --compression-mode message` compresses each message by itself. No CDR begins so.
+ZSTD = b"\x28\xb5\x2f\xfd"
 
 _HEAD = struct.Struct("<BQ")
 _MESSAGE = struct.Struct("<HIQQ")
@@ -142,6 +146,20 @@ def within_chunk_times(chunk: known.Chunk, record: known.McapRecord) -> bool:
     """Whether a record of the chunk is within the times that it tells, by which chunks are put into order."""
     inner = isinstance(record, known.Message)
     return not inner or chunk.message_start_time <= record.log_time <= chunk.message_end_time
+
+
+def unpacked_message(channel: known.Channel, message: known.Message) -> known.Message:
+    """A message of ROS 2 as it was sent; one of anything else as it is stored. Raises what is in DAMAGE."""
+    if channel.message_encoding != "cdr" or not message.data.startswith(ZSTD):
+        return message
+    size = zstandard.frame_content_size(message.data)
+    if not 0 <= size <= MOST_UNPACKED:
+        raise McapError(f"a compressed message of {size:,} bytes, at most {MOST_UNPACKED:,} are taken")
+    with zstandard.ZstdDecompressor().stream_reader(message.data) as reader:
+        data = reader.read(size + 1)
+    if len(data) != size:
+        raise McapError(f"a compressed message of {size:,} bytes unpacks to {len(data):,}")
+    return dataclasses.replace(message, data=data)
 
 
 def _unpacked(chunk) -> bytes:

@@ -8,13 +8,14 @@ import json
 from collections.abc import Iterator
 from pathlib import Path
 
+from mcap.records import Metadata
 from mcap.writer import MCAP0_MAGIC
 
 from hpccd_ros.bag.mcap_file import McapFile
-from hpccd_ros.bag.mcap_records import DAMAGE
+from hpccd_ros.bag.mcap_records import DAMAGE, ZSTD
 from hpccd_ros.bag.writer import HPCCD_RECORD
 from hpccd_ros.base.errors import UserError
-from hpccd_ros.base.quoting import printable
+from hpccd_ros.base.quoting import listed, printable
 
 
 class RecordingError(UserError, ValueError):
@@ -51,6 +52,7 @@ class Recording:
     `messages` too, where damage shows only then.
 
     topics: dict topic name -> RecordedTopic.
+    skipped: topic name -> why its messages are not those of ROS 2, so that they are left out.
     info: what `hpccd record` stored beside the messages (dict), or None in a recording of another recorder.
     attachments: name -> bytes of the files that it stored, such as mesh files.
     """
@@ -60,10 +62,12 @@ class Recording:
         self.files = recording_files(self.path)
         self._stack = contextlib.ExitStack()
         self.topics: dict[str, RecordedTopic] = {}
+        self.skipped: dict[str, str] = {}
         self.info: dict | None = None
         self.attachments: dict[str, bytes] = {}
         try:
             self._opened = [self._open(file) for file in self.files]
+            self._check_usable()
         except BaseException:
             self._stack.close()
             raise
@@ -78,6 +82,12 @@ class Recording:
     def message_count(self) -> int:
         return sum(topic.count for topic in self.topics.values())
 
+    @property
+    def notes(self) -> list[str]:
+        """What a user should know of it, in sentences."""
+        skipped = listed(f"{topic} ({why})" for topic, why in self.skipped.items())
+        return [printable(f"skipped, as their messages are not those of ROS 2: {skipped}")] if skipped else []
+
     def messages(self, topics=None) -> Iterator[RecordedMessage]:
         """Messages in the order in which they were received, over all files. `topics`: only these names."""
         streams = [self._read(*opened, topics) for opened in zip(self.files, self._opened, strict=True)]
@@ -88,24 +98,30 @@ class Recording:
         with _explained(path):
             stream = self._stack.enter_context(open(path, "rb"))
             file = McapFile(stream, path.stat().st_size)
-        if file.header.profile != "ros2":
-            raise RecordingError(f"{path} has MCAP profile {file.header.profile!r}: only ros2 recordings can be used")
-        if file.index is None or file.index.statistics is None:
-            raise RecordingError(f"{path} has no summary section: rewrite it with `hpccd doctor {path} --recover OUT`")
-        for channel_id, channel in file.index.channels.items():
-            schema = file.index.schemas.get(channel.schema_id)
-            if channel.message_encoding != "cdr" or schema is None:
-                raise RecordingError(
-                    f"{path}: topic {channel.topic} has encoding {channel.message_encoding!r} and "
-                    f"{'no' if schema is None else 'a'} schema; ROS 2 recordings hold cdr with a schema"
-                )
-            self._add_topic(channel, schema, file.index.statistics.channel_message_counts.get(channel_id, 0))
-        stored = next((record for record in file.metadata if record.name == HPCCD_RECORD), None)
-        if stored is not None and self.info is None:
-            self.info = _info(path, stored)
+        for number, channel in file.channels.items():
+            schema = file.schemas.get(channel.schema_id)
+            if why := _foreign(channel, schema):
+                self.skipped.setdefault(channel.topic, why)
+            else:
+                self._add_topic(channel, schema, file.counts.get(number, 0))
+        for record in file.metadata:
+            try:
+                info = stored_info(record)
+            except ValueError as error:
+                raise RecordingError(f"{path}: {error}") from error
+            self.info = info if self.info is None else self.info
         for attachment in file.attachments:  # what came to be needed later is in later files alone
             self.attachments.setdefault(attachment.name, attachment.data)
         return file
+
+    def _check_usable(self) -> None:
+        profile = self._opened[0].header.profile
+        if not self.topics and (self.skipped or profile not in ("", "ros2")):
+            found = listed(f"{topic} ({why})" for topic, why in self.skipped.items()) or "none"
+            raise RecordingError(
+                f"{self.path} holds no messages of ROS 2 (MCAP profile {profile!r}; topics: {found}); record it with "
+                "`hpccd record` or `ros2 bag record -s mcap`"
+            )
 
     def _add_topic(self, channel, schema, count):
         known = self.topics.get(channel.topic)
@@ -124,38 +140,84 @@ class Recording:
         self.topics[topic.name] = topic
 
     def _read(self, path, file, topics):
+        wanted = {
+            number
+            for number, channel in file.channels.items()
+            if (topics is None or channel.topic in topics)
+            and not _foreign(channel, file.schemas.get(channel.schema_id))
+        }
         with _explained(path):
-            for channel, message in file.messages(topics):
+            for channel, message in file.messages(wanted):
                 yield RecordedMessage(
                     channel.topic, message.log_time, message.publish_time, message.sequence, message.data
                 )
 
 
-def _info(path, stored) -> dict:
+def _foreign(channel, schema) -> str | None:
+    """Why the messages of a channel are not those of ROS 2, or None."""
+    if channel.message_encoding != "cdr":
+        return f"encoding {channel.message_encoding!r}"
+    return None if schema is not None else "no schema"
+
+
+def stored_info(record: Metadata) -> dict | None:
+    """What `hpccd record` stored of the node; None of another record. Raises ValueError where it cannot be read."""
+    if record.name != HPCCD_RECORD:
+        return None
     try:
-        info = json.loads(stored.metadata["json"])
+        info = json.loads(record.metadata["json"])
     except (KeyError, ValueError, RecursionError) as error:
-        raise RecordingError(f"{path}: what `hpccd record` stored of the node is no JSON ({_text(error)})") from error
+        raise ValueError(f"what `hpccd record` stored of the node is no JSON ({_text(error)})") from error
     if not isinstance(info, dict):
-        raise RecordingError(f"{path}: what `hpccd record` stored of the node is no object but a {type(info).__name__}")
+        raise ValueError(f"what `hpccd record` stored of the node is no object but a {type(info).__name__}")
     return info
 
 
 def recording_files(path: Path) -> list[Path]:
     """The .mcap files of a recording, in order. Raises RecordingError where there is none, or something else."""
-    if path.is_dir():
-        files = sorted(path.glob("*.mcap"), key=_split_number)
-        if not files:
-            raise RecordingError(f"the folder {path} holds no .mcap file")
-    else:
-        files = [path]
+    files = _files_of_folder(path) if path.is_dir() else [path]
     for file in files:
         if not file.exists():
             raise RecordingError(f"{file} does not exist")
         # Of a pipe, a device or a socket nothing may ever come, and nothing can be read twice.
         if not file.is_file():
             raise RecordingError(f"{file} is no file that can be read again: copy the recording into one")
+        _check_format(file)
     return files
+
+
+def _files_of_folder(path: Path) -> list[Path]:
+    if any(not packed.with_suffix("").exists() for packed in path.glob("*.mcap.zstd")):
+        raise RecordingError(f"{path} {_PACKED}: `zstd -d {path}/*.mcap.zstd`")
+    if files := sorted(path.glob("*.mcap"), key=_split_number):
+        return files
+    if any(path.glob("*.db3*")):
+        raise RecordingError(_convert(path, path))
+    raise RecordingError(f"the folder {path} holds no .mcap file")
+
+
+_PACKED = "is compressed as whole files (`ros2 bag record --compression-mode file`); unpack it"
+
+
+def _check_format(file: Path) -> None:
+    """Raise RecordingError for other formats in which rosbag2 writes, with the command that converts."""
+    try:
+        with open(file, "rb") as stream:
+            begin = stream.read(16)
+    except OSError:
+        return  # whoever reads it says why
+    if begin.startswith(b"SQLite format 3\0"):
+        raise RecordingError(_convert(file, file.parent if (file.parent / "metadata.yaml").exists() else file))
+    if begin.startswith(ZSTD):
+        raise RecordingError(f"{file} {_PACKED}: `zstd -d {file}`")
+
+
+def _convert(path: Path, source: Path) -> str:
+    target = source.absolute().with_name(f"{source.absolute().stem}-mcap")
+    return (
+        f"{path} is not an MCAP file but an sqlite3 recording; convert it: `echo 'output_bags: [{{uri: {target}, "
+        f"storage_id: mcap, all: true}}]' > convert.yaml && ros2 bag convert -i {source} -o convert.yaml`"
+    )
 
 
 def _split_number(path: Path):

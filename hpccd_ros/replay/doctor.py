@@ -5,7 +5,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from hpccd_ros.bag.examine import Examination, examine
-from hpccd_ros.bag.reader import RecordingError, recording_files
+from hpccd_ros.bag.reader import Recording, RecordingError, recording_files
 from hpccd_ros.bag.recover import recover
 from hpccd_ros.base.errors import UserError
 from hpccd_ros.base.quoting import printable
@@ -25,6 +25,7 @@ def main(args) -> int:
     for examination in examinations:
         _tell(examination)
     if all(e.sound for e in examinations):
+        _read(args.file)
         return 0
     if not any(e.message_count for e in examinations):
         raise UserError(f"{args.file} holds no whole message: no recording, or nothing is left of it")
@@ -44,6 +45,15 @@ def _recover(source, args) -> int:
         raise RecordingError(f"the recovered file {args.recover} is not what was saved: {check.problem}")
     print(f"saved {check.message_count} messages, {_seconds(check):.3f} s: {args.recover}")
     return 0
+
+
+def _read(path) -> None:
+    """Raises RecordingError for whatever the other commands cannot use: their reader decides."""
+    with Recording(path) as recording:
+        for _ in recording.messages():
+            pass
+        for note in recording.notes:
+            print(f"  {note}")
 
 
 def _tell(found: Examination) -> None:

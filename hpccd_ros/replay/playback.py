@@ -39,6 +39,8 @@ def main(args) -> int:
     """Play as the options of `hpccd replay --publish` say."""
     with stop_signals.collected() as stop, Recording(args.file) as recording, tempfile.TemporaryDirectory() as folder:
         topics = _topics(recording, args)
+        for note in recording.notes:
+            _tell(note)
         environment.prepare()
         environment.ask_often(Path(folder))  # each topic begins when its first message has arrived
         ros_start.init(["--ros-args", *args.ros_args] if args.ros_args else None)

@@ -92,6 +92,8 @@ def main(args) -> int:
                 if not next_wanted(f"{step.at:.3f} s"):
                     break
         progress.update(bar, said="")
+    for note in recording.notes:
+        print(note, file=sys.stderr)
     for name in setup.unknown:
         print(f"parameter {name} is unknown and has no effect", file=sys.stderr)
     if args.json:
