@@ -19,6 +19,7 @@ corners (64 times 2**-53 of their distance from the link's origin, up to 2,000 r
 """
 
 import math
+from bisect import bisect_left
 from functools import lru_cache
 
 import numpy as np
@@ -32,6 +33,8 @@ Triangles = tuple[np.ndarray, np.ndarray]
 FEWEST_SEGMENTS = 8  # of a ring
 MOST_SEGMENTS = 512
 _LARGER = 1.0 + 2.0**-36
+# 1 - `_inner` lies between these over (count / 4)**2; a test checks it for each count.
+_OF_CYLINDER, _OF_SPHERE = (0.3, 0.32), (0.7, 1.1)
 
 
 def triangles(solid: Solid, tolerance: float) -> Triangles:
@@ -50,20 +53,35 @@ def outstanding(solid: Solid, tolerance: float) -> float:
     """How far the mesh of that tolerance stands out of the solid at most."""
     if isinstance(solid, Box):
         return 0.0
-    return solid.radius * (_LARGER / _inner(solid, segments(solid, tolerance)) - 1.0)
+    return _stands_out(solid, segments(solid, tolerance))
 
 
 def segments(solid: Cylinder | Sphere | Capsule, tolerance: float) -> int:
     """Corners of the widest ring: the fewest, a multiple of 4, that keep the tolerance."""
     if not tolerance > 0.0:
         raise RobotError(f"tolerance {tolerance:g}: must be above 0")
-    for count in range(FEWEST_SEGMENTS, MOST_SEGMENTS + 1, 4):
-        if solid.radius * (_LARGER / _inner(solid, count) - 1.0) <= tolerance:
-            return count
+    counts = range(FEWEST_SEGMENTS, MOST_SEGMENTS + 1, 4)
+    # More corners stand out less. Few are tried: to know how far a sphere stands out takes its whole mesh.
+    room = 1.0 - _LARGER / (1.0 + tolerance / solid.radius)  # what 1 - `_inner` may be
+    shares = _OF_CYLINDER if isinstance(solid, Cylinder) else _OF_SPHERE
+    low, high = (4.0 * math.sqrt(share / room) if room > 0.0 else math.inf for share in shares)
+    first, last = (bisect_left(counts, bound) for bound in (low, high))
+    at = bisect_left(counts, True, first, last, key=lambda count: _stands_out(solid, count) <= tolerance)
+    if at < len(counts):
+        return counts[at]
     raise RobotError(
-        f"tolerance {tolerance:g}: a radius of {solid.radius:g} would need more than {MOST_SEGMENTS} segments; "
-        "take a larger one"
+        f"tolerance {tolerance:g}: a radius of {solid.radius:g} would need more than {MOST_SEGMENTS} segments a ring; "
+        f"set the tolerance to {_two_digits_up(_stands_out(solid, MOST_SEGMENTS)):g} or more, or make the shape smaller"
     )
+
+
+def _stands_out(solid: Cylinder | Sphere | Capsule, count: int) -> float:
+    return solid.radius * (_LARGER / _inner(solid, count) - 1.0)
+
+
+def _two_digits_up(number: float) -> float:
+    step = 10.0 ** (math.floor(math.log10(number)) - 1)
+    return math.ceil(number / step) * step
 
 
 def _inner(solid: Cylinder | Sphere | Capsule, count: int) -> float:
@@ -123,7 +141,7 @@ def _rounded(solid: Sphere | Capsule, count: int) -> Triangles:
     return vertices, np.concatenate([faces, faces[:, ::-1] + len(upper), walls]).astype(np.uint32)
 
 
-@lru_cache(maxsize=256)
+@lru_cache(maxsize=4)  # up to 2.4 MB each
 def _half_sphere(n: int) -> Triangles:
     """Of radius 1, z not negative: the pole, then ring after ring of 4, 8, ..., 4n corners; open below."""
     vertices = [(0.0, 0.0, 1.0)]
@@ -133,22 +151,20 @@ def _half_sphere(n: int) -> Triangles:
         vertices += [(x * sine, y * sine, z) for x, y in _ring(4 * k)]
     faces = []
     for k in range(1, n + 1):
-        for quarter in range(4):
-            for j in range(k):
-                a, b = _corner(k, quarter * k + j), _corner(k, quarter * k + j + 1)
-                above = _corner(k - 1, quarter * (k - 1) + j)
-                faces.append((above, a, b))
-                if j + 1 < k:
-                    faces.append((above, b, _corner(k - 1, quarter * (k - 1) + j + 1)))
-    return np.array(vertices), np.array(faces, np.int64)
+        quarter, j = np.divmod(np.arange(4 * k), k)
+        a, b = _corners(k, quarter * k + j), _corners(k, quarter * k + j + 1)
+        above, beside = (_corners(k - 1, quarter * (k - 1) + j + more) for more in (0, 1))
+        both = np.stack([above, a, b, above, b, beside], axis=1).reshape(-1, 3)
+        faces.append(both[np.column_stack([np.full(4 * k, True), j + 1 < k]).ravel()])
+    return np.array(vertices), np.concatenate(faces)
 
 
-def _corner(ring: int, number: int) -> int:
-    """Its place among the corners: before ring k there are 1 + 4 (1 + ... + k - 1)."""
-    return 1 + 2 * ring * (ring - 1) + number % (4 * ring) if ring else 0
+def _corners(ring: int, numbers: np.ndarray) -> np.ndarray:
+    """Their places among the corners: before ring k there are 1 + 4 (1 + ... + k - 1)."""
+    return 1 + 2 * ring * (ring - 1) + numbers % (4 * ring) if ring else np.zeros_like(numbers)
 
 
-@lru_cache(maxsize=256)
+@lru_cache(maxsize=MOST_SEGMENTS // 4)
 def _inner_of_sphere(n: int) -> float:
     """From the centre to the nearest plane of a triangle, of the sphere of radius 1."""
     vertices, faces = _half_sphere(n)

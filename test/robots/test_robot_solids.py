@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Meshes of solids contain them, and stand out no more than they say."""
 
+import re
 from collections import Counter
 
 import numpy as np
@@ -128,3 +129,39 @@ def test_a_smaller_tolerance_takes_more_triangles():
 def test_tolerances_that_cannot_be_kept_are_refused(tolerance):
     with pytest.raises(RobotError, match="tolerance"):
         solids.triangles(Cylinder(1.0, 1.0), tolerance)
+
+
+COUNTS = range(solids.FEWEST_SEGMENTS, solids.MOST_SEGMENTS + 1, 4)
+
+
+@pytest.mark.parametrize("kind", [Cylinder, Sphere])
+def test_the_segments_are_the_fewest_that_keep_the_tolerance(kind):
+    solid = Sphere(1.0) if kind is Sphere else Cylinder(1.0, 1.0)
+    inner = [solids._inner(solid, count) for count in COUNTS]
+    assert inner == sorted(inner)
+    low, high = solids._OF_SPHERE if kind is Sphere else solids._OF_CYLINDER
+    assert all(low < (1.0 - d) * (count / 4) ** 2 < high for d, count in zip(inner, COUNTS, strict=True))
+    rng = np.random.default_rng(5)
+    for radius, share in zip(10.0 ** rng.uniform(-3, 3, 100), 10.0 ** rng.uniform(-4.2, 1, 100), strict=True):
+        solid = Sphere(radius) if kind is Sphere else Cylinder(radius, 1.0)
+        found = solids.segments(solid, radius * share)
+        keep = [count for count in COUNTS if solids._stands_out(solid, count) <= radius * share]
+        assert found == keep[0]
+
+
+@pytest.mark.parametrize("solid", [Sphere(100.0), Capsule(1e6, 1.0), Cylinder(1e12, 1.0), Sphere(1e300)], ids=str)
+def test_what_is_too_large_for_its_tolerance_says_which_tolerance_would_do(solid):
+    solids._inner_of_sphere.cache_clear()
+    with pytest.raises(RobotError, match="would need more than 512 segments a ring; set the tolerance to") as no:
+        solids.triangles(solid, 1e-3)
+    assert solids._inner_of_sphere.cache_info().misses <= 1
+    assert solids.segments(solid, float(re.search("tolerance to (.*) or more", str(no.value))[1])) >= 500
+
+
+def test_few_spheres_are_made_to_find_the_segments_of_one_and_fewer_are_kept():
+    for cache in (solids._inner_of_sphere, solids._half_sphere):
+        cache.cache_clear()
+    for number, radius in enumerate(np.geomspace(0.01, 15.0, 30), 1):
+        solids.segments(Sphere(radius), 1e-3)
+        assert solids._inner_of_sphere.cache_info().misses <= 6 * number
+    assert solids._half_sphere.cache_info().currsize <= 4
