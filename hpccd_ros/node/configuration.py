@@ -10,6 +10,7 @@ from hpccd_ros.base.quoting import listed, shortened
 from hpccd_ros.detect.core import unusable_options
 from hpccd_ros.detect.scene import SceneBuilder
 from hpccd_ros.middleware import environment, qos_overrides, topic_names
+from hpccd_ros.node import topic_types
 from hpccd_ros.node.node_recording import unrecordable
 from hpccd_ros.params import parameters, robot_parameters, scene_parameters
 from hpccd_ros.params.robot_parameters import NO_ROBOTS, Robots
@@ -31,7 +32,7 @@ class Configuration:
         self.settings, self.meshes = parameters.declare(node)
         scene_parameters.check(self.settings, self.meshes)
         topics = topic_names.subscribed(self.meshes, robot_parameters.subscribed(self.settings[ROBOT]))
-        if why := topic_names.unusable_name(node, topics) or qos_overrides.unusable_override(node):
+        if why := self._unusable_topics(self.settings, self.meshes) or qos_overrides.unusable_override(node):
             raise ParameterError(why)
         for name in parameters.unknown_overrides(node, qos_overrides.known(node, topics)):
             text = f"parameter {shortened(name)} is unknown and has no effect; see docs/parameters.md"
@@ -88,12 +89,21 @@ class Configuration:
             f"discovery {where if environment.this_host_only() else 'beyond this host'}"
         )
 
+    def _unusable_topics(self, settings: dict[str, Any], meshes: Meshes) -> str | None:
+        robots = settings[ROBOT]
+        topics = topic_names.subscribed(meshes, robot_parameters.subscribed(robots))
+        return (
+            robot_parameters.unusable_home(robots)
+            or topic_names.unusable_name(self._node, topics)
+            or topic_types.contradiction(self._node, settings, meshes)
+        )
+
     def _check(self, wanted: dict[str, Any], meshes: Meshes) -> str | None:
         try:
             scene_parameters.check(wanted, meshes, self.robots)
             options = scene_parameters.detector_options(wanted, self.robots)
         except ParameterError as error:
             return str(error)
-        if why := unrecordable(wanted):
+        if why := self._unusable_topics(wanted, meshes) or unrecordable(wanted):
             return why
         return None if options == self.options else unusable_options(options)

@@ -7,6 +7,7 @@ from typing import Any
 from rclpy.node import Node
 
 from hpccd_ros.frames.pipeline import FramePipeline
+from hpccd_ros.node import topic_types
 from hpccd_ros.node.accounts import Accounts
 from hpccd_ros.node.joint_subscriptions import JointSubscriptions
 from hpccd_ros.node.mesh_subscriptions import MeshSubscriptions
@@ -32,8 +33,7 @@ class Subscriptions:
 
     def open(self, pipeline: FramePipeline, by_joints: Mapping[str, JointFrames], accounts: Accounts) -> None:
         """by_joints: robot -> what its joint states move, of those that are known."""
-        of_robots = robot_parameters.need_transforms(self._settings[ROBOT])
-        if of_robots or any("tf" in (mesh["transform"], mesh["input"]) for mesh in self._meshes.values()):
+        if topic_types.uses_transforms(self._settings, self._meshes):
             transforms = TransformSubscriptions(self._node, pipeline, accounts, self._settings["max_rate"])
             self._of_others.append(transforms)
         if robot_parameters.joint_topics(self._settings[ROBOT]):

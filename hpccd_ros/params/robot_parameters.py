@@ -2,6 +2,7 @@
 """What the parameters robot.NAME.* say: where the description comes from, and what moves the links."""
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 from hpccd_ros.base.quoting import shortened
@@ -75,6 +76,20 @@ def check(settings: dict[str, Any]) -> None:
             )
         if need_transforms({name: values}) and not settings["frame_id"]:
             raise ParameterError(_unplaced(prefix, values))
+
+
+def unusable_home(robots: RobotValues) -> str | None:
+    """Why a file of a robot cannot be on this machine, whatever lies there, or None."""
+    for name, values in robots.items():
+        for parameter in ("description", "srdf"):
+            try:
+                Path(values[parameter]).expanduser()
+            except RuntimeError:  # ~name, and there is no such user
+                return (
+                    f"{ROBOT}.{name}.{parameter}: {shortened(values[parameter])}: no such home folder; give the whole "
+                    "path"
+                )
+    return None
 
 
 def _unplaced(prefix: str, values: Mapping[str, Any]) -> str:

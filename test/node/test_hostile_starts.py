@@ -16,6 +16,7 @@ import hpccd_ros
 ROOT = Path(hpccd_ros.__file__).resolve().parents[1]
 HEAD = "/**:\n  ros__parameters:\n"
 MESH = "    meshes: [a]\n    mesh:\n      a:\n        "
+ROBOT = "    robots: [r]\n    robot:\n      r: {pose: [0, 0, 0, 0, 0, 0, 1], "
 
 # What is in the parameter file, the exit status, and a part of the sentence (or of a warning, where the node starts).
 FILES = {
@@ -93,6 +94,25 @@ FILES = {
     "long-mesh-name": (HEAD + f"    meshes: [{'a' * 300}]\n", 2, "give a shorter mesh name"),
     "long-file-name": (HEAD + MESH + f"file: {'x' * 300}.obj\n", 1, "File name too long"),
     "nobody's-file": (HEAD + MESH + "file: ~nosuchuser/x.obj\n", 1, "~nosuchuser/x.obj: no such home folder"),
+    "nobody's-description": (
+        HEAD + ROBOT + "joint_states: js, description: ~nosuchuser/x.urdf}\n", 2,
+        "robot.r.description: ~nosuchuser/x.urdf: no such home folder",
+    ),
+    "nobody's-srdf": (
+        HEAD + ROBOT + "joint_states: js, srdf: ~nosuchuser/x.srdf}\n", 2,
+        "robot.r.srdf: ~nosuchuser/x.srdf: no such home folder",
+    ),
+    "one-topic-of-two-types": (
+        HEAD + ROBOT + "joint_states: robot_description}\n", 2,
+        "robot.r.description and robot.r.joint_states: both are the topic /robot_description, the one as "
+        "std_msgs/msg/String, the other as sensor_msgs/msg/JointState; give each a topic of its own",
+    ),
+    "joint-states-on-answers": (
+        HEAD + ROBOT + "joint_states: contacts}\n", 2, "and robot.r.joint_states: both are the topic /contacts",
+    ),
+    "joint-states-on-the-log": (
+        HEAD + ROBOT + "joint_states: /rosout}\n", 2, "/rosout and robot.r.joint_states: both are the topic /rosout",
+    ),
     "recording-without-meshes": (HEAD + "    record: FOLDER/record\n", 0, ""),
     "folder-as-file": (HEAD + MESH + "file: /\n", 1, "use one of .obj"),
 }  # fmt: skip
@@ -106,6 +126,13 @@ ARGUMENTS = {
     "remapping": (["-r", "contacts"], 2, "write -r FROM:=TO"),
     "namespace": (["-r", "__ns:=a b"], 2, "Couldn't parse remap rule"),
     "long-remapping": (["-r", f"contacts:=/{'a' * 300}"], 2, "contacts: in namespace / and with the remappings given"),
+    "remapped-together": (
+        ["-p", "meshes:=[a, b]", "-r", "meshes/a/vertices:=x", "-r", "meshes/b/topology:=/x"], 2,
+        "meshes/a/vertices and meshes/b/topology: both are the topic /x",
+    ),
+    "remapped-together-of-one-type": (
+        ["-p", "meshes:=[a, b]", "-r", "meshes/a/vertices:=x", "-r", "meshes/b/vertices:=x"], 0, "",
+    ),
     "long-remapping-of-service": (["-r", f"~/detect:=/{'a' * 300}"], 2, "~/detect: "),
     "long-namespace": (["-r", f"__ns:=/{'a' * 230}"], 2, "give another namespace"),
     "parameter": (["-p", "threads"], 2, "write -p NAME:=VALUE"),
