@@ -53,6 +53,11 @@ def reliability(node: Node, entity: str, topic: str, default: ReliabilityPolicy)
     return default if given is None else ReliabilityPolicy[given.value.upper()]
 
 
+def reliability_parameter(topic: str) -> str:
+    """The parameter that sets the reliability of a subscription to ``topic`` (resolved name)."""
+    return _name("subscription", topic, "reliability")
+
+
 def unusable_override(node: Node) -> str | None:
     """Why an override cannot be used, or None; one of no topic of the node is unknown: see `known`."""
     for name, parameter in _given(node).items():

@@ -10,15 +10,15 @@ from dataclasses import dataclass
 from typing import Any
 
 from rclpy.node import Node
-from rclpy.subscription import Subscription
 from sensor_msgs.msg import JointState
 
 from hpccd_ros.frames.drops import Input, Reason, Refusal
 from hpccd_ros.frames.pipeline import FramePipeline
 from hpccd_ros.frames.rate_limit import RateLimit
-from hpccd_ros.middleware import joint_messages, qos, qos_overrides, unreadable
+from hpccd_ros.middleware import joint_messages, qos, unreadable
 from hpccd_ros.node.accounts import Accounts
 from hpccd_ros.node.hand_over import hand_over
+from hpccd_ros.node.input_subscription import InputSubscription, unheard
 from hpccd_ros.node.mesh_topic import UNREADABLE
 from hpccd_ros.params import robot_parameters
 from hpccd_ros.params.table import ROBOT
@@ -73,15 +73,15 @@ class JointSubscriptions:
 
     def close(self) -> None:
         for subscription in self._subscriptions:
-            self._node.destroy_subscription(subscription)
+            subscription.close()
         self._subscriptions.clear()
 
     def warnings(self) -> list[str]:
-        """Topics that nobody publishes."""
-        silent = [s.topic_name for s in self._subscriptions if not self._node.count_publishers(s.topic_name)]
-        return [f"nobody publishes {topic}" for topic in silent]
+        """Topics that nobody publishes, and publishers that are not heard."""
+        silent = [subscription.topic for subscription in self._subscriptions if not subscription.publishers]
+        return [f"nobody publishes {topic}" for topic in silent] + unheard(self._subscriptions)
 
-    def _subscribe(self, topic: str, robots: list[str]) -> Subscription:
+    def _subscribe(self, topic: str, robots: list[str]) -> InputSubscription:
         limit = RateLimit(self._settings["max_rate"])
         numbers = PublisherNumbers()
 
@@ -104,13 +104,16 @@ class JointSubscriptions:
                 hand_over(outcome, self._pipeline, self._accounts)
 
         profile = qos.joint_states(self._settings["input_reliability"])
-        subscription = qos_overrides.create_subscription(self._node, JointState, topic, receive, profile)
+        subscription = InputSubscription(
+            self._node, JointState, topic, receive, profile, reliability="input_reliability",
+            counts=self._accounts.connections,
+        )  # fmt: skip
 
         def several() -> bool:
-            return subscription.get_publisher_count() > 1
+            return subscription.subscription.get_publisher_count() > 1
 
         refusal = Refusal(topic, Reason.MALFORMED, f"{topic}: {UNREADABLE}", what=Input.JOINT_STATE)
-        unreadable.watch(subscription, lambda: self._refuse([refusal]))
+        unreadable.watch(subscription.subscription, lambda: self._refuse([refusal]))
         return subscription
 
     def _refuse(self, refusals: list[Refusal]) -> None:

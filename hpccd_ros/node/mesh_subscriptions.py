@@ -30,4 +30,5 @@ class MeshSubscriptions:
         """What is odd about the publishers of the mesh."""
         found = [(topic.publishers, topic.name) for topic in self._positions]
         several = [f"{publishers} publishers on {name}" for publishers, name in found if publishers > 1]
-        return several + self._reception.pipeline.awaited_transform(self._reception.mesh)
+        unheard = [line for topic in self.topics for line in topic.warnings()]
+        return unheard + several + self._reception.pipeline.awaited_transform(self._reception.mesh)

@@ -5,7 +5,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
@@ -14,8 +13,9 @@ from hpccd_ros.frames.drops import Aspect, Input, Reason, Refusal
 from hpccd_ros.frames.pipeline import FramePipeline
 from hpccd_ros.frames.rate_limit import RateLimit
 from hpccd_ros.frames.sequence import SequenceWatch
-from hpccd_ros.middleware import mesh_inputs, qos_overrides, topic_names
+from hpccd_ros.middleware import mesh_inputs, topic_names
 from hpccd_ros.node.accounts import Accounts
+from hpccd_ros.node.input_subscription import InputSubscription
 
 UNREADABLE = "a message cannot be deserialised; build its publisher with the same definition of the message"
 
@@ -40,24 +40,26 @@ class MeshTopic:
         self.numbers = SequenceWatch()
         self.sent = 0  # when the last message was that was taken
         self._limit = RateLimit(reception.settings["max_rate"])
-        self._subscription: Subscription | None = None
+        self._subscription: InputSubscription | None = None
 
     def subscribe(self, callback: Callable[[Any, dict[str, Any]], None], profile: QoSProfile) -> Subscription:
         topic = topic_names.of_mesh(self.reception.mesh, self.kind)
-        self._subscription = qos_overrides.create_subscription(
+        self._subscription = InputSubscription(
             self.reception.node,
             mesh_inputs.TYPES[self.kind],
             topic,
             callback,
             profile,
-            event_callbacks=self._events(topic),
+            reliability="" if self.kind == topic_names.TOPOLOGY else "input_reliability",
+            counts=self.reception.accounts.connections,
+            events=self._events(topic),
             raw=self.kind in topic_names.WHOLE,
         )
-        return self._subscription
+        return self._subscription.subscription
 
     def close(self) -> None:
         if self._subscription is not None:
-            self.reception.node.destroy_subscription(self._subscription)
+            self._subscription.close()
             self._subscription = None
 
     def take(self, info: dict[str, Any]) -> None:
@@ -68,12 +70,16 @@ class MeshTopic:
     @property
     def name(self) -> str:
         """Of the topic, in full."""
-        return self._subscription.topic_name
+        return self._subscription.topic
 
     @property
     def publishers(self) -> int:
         """As far as is known."""
-        return self.reception.node.count_publishers(self.name)
+        return self._subscription.publishers
+
+    def warnings(self) -> list[str]:
+        """Which publishers are not heard."""
+        return self._subscription.warnings() if self._subscription is not None else []
 
     def too_fast(self) -> str | None:
         """In words, where a message came faster than the node looks at them."""
@@ -99,16 +105,9 @@ class MeshTopic:
         of_shape = self.kind != topic_names.POSE and self.reception.pipeline.moves_by_poses(self.reception.mesh)
         return Aspect.SHAPE if of_shape else Aspect.PLACE
 
-    def _events(self, topic: str) -> SubscriptionEventCallbacks:
-        """Count and log what the middleware reports of the subscription."""
-        connections, node = self.reception.accounts.connections, self.reception.node
-
-        def incompatible(event: Any) -> None:
-            connections[f"qos_incompatible.{topic}"] += event.total_count_change
-            node.get_logger().warning(
-                f"{topic}: a publisher offers an incompatible QoS (policy {event.last_policy_kind}) and is "
-                "not heard; see parameter input_reliability"
-            )
+    def _events(self, topic: str) -> dict[str, Callable[[Any], None]]:
+        """Count what the middleware reports of the subscription."""
+        connections = self.reception.accounts.connections
 
         def lost(event: Any) -> None:
             connections[f"message_lost.{topic}"] += event.total_count_change
@@ -117,4 +116,4 @@ class MeshTopic:
             if event.current_count_change > 0:
                 self.numbers.new_publisher()
 
-        return SubscriptionEventCallbacks(incompatible_qos=incompatible, message_lost=lost, matched=matched)
+        return {"message_lost": lost, "matched": matched}

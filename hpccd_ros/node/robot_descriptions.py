@@ -8,7 +8,8 @@ from typing import Any
 from std_msgs.msg import String
 
 from hpccd_ros.base.quoting import shortened
-from hpccd_ros.middleware import qos, qos_overrides, robot_files
+from hpccd_ros.middleware import qos, robot_files
+from hpccd_ros.node.input_subscription import InputSubscription, unheard
 from hpccd_ros.node.life_cycle import GuardedLifecycleNode
 from hpccd_ros.params import robot_parameters
 from hpccd_ros.params.table import ROBOT
@@ -41,6 +42,7 @@ class RobotDescriptions:
         self._read = -PERIOD  # when it ended
         self.robots: dict[str, Robot] = {}
         self._topics = robot_parameters.topics(settings[ROBOT])
+        self._subscriptions: dict[str, InputSubscription] = {}
         for name in self._values:
             self._read_files(name)
         for name, topic in self._topics.items():
@@ -54,12 +56,13 @@ class RobotDescriptions:
 
     def warnings(self) -> list[str]:
         """Which robots are not known, and which descriptions cannot be used."""
-        unheard = [
+        waiting = [
             f"robot {name} waits for its description on {self._node.resolve_topic_name(topic)}{self._why(topic)}"
             for name, topic in self._topics.items()
             if name not in self.robots and name not in self._refused
         ]
-        return unheard + [f"robot {name}: {why}" for name, why in self._refused.items()]
+        refused = [f"robot {name}: {why}" for name, why in self._refused.items()]
+        return waiting + unheard(self._subscriptions.values()) + refused
 
     def _why(self, topic: str) -> str:
         if not self._node.count_publishers(topic):
@@ -91,10 +94,10 @@ class RobotDescriptions:
         return robot
 
     def _listen(self, name: str, topic: str) -> None:
-        subscription = qos_overrides.create_subscription(
+        subscription = self._subscriptions[name] = InputSubscription(
             self._node, String, topic, lambda message: self._receive(name, message.data), qos.DESCRIPTION
         )
-        self._node.when_unconfigured(lambda: self._node.destroy_subscription(subscription))
+        self._node.when_unconfigured(subscription.close)
 
     def _receive(self, name: str, text: str) -> None:
         if text == self._texts.get(name):

@@ -8,11 +8,12 @@ from rclpy.node import Node
 from hpccd_ros.frames.drops import Input, Reason, Refusal
 from hpccd_ros.frames.pipeline import FramePipeline
 from hpccd_ros.frames.rate_limit import RateLimit
-from hpccd_ros.middleware import qos, qos_overrides, transform_topics, unreadable
+from hpccd_ros.middleware import qos, transform_topics, unreadable
 from hpccd_ros.middleware.message_types import message_class
 from hpccd_ros.middleware.transform_topics import TransformTopic
 from hpccd_ros.node.accounts import Accounts
 from hpccd_ros.node.hand_over import hand_over
+from hpccd_ros.node.input_subscription import InputSubscription, unheard
 from hpccd_ros.node.mesh_topic import UNREADABLE
 
 
@@ -39,14 +40,14 @@ class TransformSubscriptions:
 
     def close(self) -> None:
         for subscription in self._subscriptions:
-            self._node.destroy_subscription(subscription)
+            subscription.close()
         self._subscriptions.clear()
 
     def warnings(self) -> list[str]:
-        """None: frames that wait for transforms say so themselves."""
-        return []
+        """Publishers that are not heard; frames that wait for transforms say so themselves."""
+        return unheard(self._subscriptions)
 
-    def _subscribe(self, topic: TransformTopic):
+    def _subscribe(self, topic: TransformTopic) -> InputSubscription:
         limit = RateLimit(self._max_rate)
         name, heard = self._name(topic), self._pipeline.transforms.heard
 
@@ -65,9 +66,10 @@ class TransformSubscriptions:
 
         profile = qos.TRANSFORMS_STATIC if topic.static else qos.TRANSFORMS
         message = message_class(topic.type_name)
-        subscription = qos_overrides.create_subscription(self._node, message, topic.name, receive, profile)
+        counts = self._accounts.connections
+        subscription = InputSubscription(self._node, message, topic.name, receive, profile, counts=counts)
         refusal = Refusal(topic.name, Reason.MALFORMED, f"{name}: {UNREADABLE}", what=Input.TRANSFORM)
-        unreadable.watch(subscription, lambda: self._unread(refusal, topic))
+        unreadable.watch(subscription.subscription, lambda: self._unread(refusal, topic))
         return subscription
 
     def _unread(self, refusal: Refusal, topic: TransformTopic) -> None:

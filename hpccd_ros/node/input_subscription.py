@@ -1,0 +1,120 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A subscription of the node, and the publishers of its topic that DDS does not connect to it: they offer less than it
+asks for, so nothing of them is received."""
+
+from collections import Counter
+from collections.abc import Callable, Iterable
+from typing import Any
+
+from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+
+from hpccd_ros.base.quoting import shortened
+from hpccd_ros.middleware import qos_overrides
+
+# Publishers that one topic is reported for at a time: anybody may start some.
+MOST_REPORTED = 3
+
+
+class InputSubscription:
+    """Subscribed from construction until ``close``.
+
+    reliability: the parameter that sets it for this topic; "": only ``qos_overrides`` do. counts: gets
+    qos_incompatible.TOPIC. events: message_lost and matched, as of SubscriptionEventCallbacks.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        message: type,
+        topic: str,
+        callback: Callable,
+        profile: QoSProfile,
+        *,
+        reliability: str = "",
+        counts: Counter | None = None,
+        events: dict[str, Callable[[Any], None]] | None = None,
+        raw: bool = False,
+    ) -> None:
+        self._node = node
+        self._reliability = reliability
+        self._any_unheard = False
+
+        def incompatible(event: Any) -> None:
+            if counts is not None:
+                counts[f"qos_incompatible.{topic}"] += event.total_count_change
+            self._any_unheard = True
+            for line in self.warnings() or [f"{self.topic}: a publisher offers less than the node asks for"]:
+                node.get_logger().warning(line)
+
+        self.subscription = qos_overrides.create_subscription(
+            node,
+            message,
+            topic,
+            callback,
+            profile,
+            event_callbacks=SubscriptionEventCallbacks(incompatible_qos=incompatible, **(events or {})),
+            raw=raw,
+        )
+
+    @property
+    def topic(self) -> str:
+        """Its name, in full."""
+        return self.subscription.topic_name
+
+    @property
+    def publishers(self) -> int:
+        """As far as is known."""
+        return self._node.count_publishers(self.topic)
+
+    def close(self) -> None:
+        self._node.destroy_subscription(self.subscription)
+
+    def warnings(self) -> list[str]:
+        """One sentence for each publisher that is there and not heard."""
+        if not self._any_unheard:  # to ask for the publishers of every topic would take long
+            return []
+        found = self._node.get_publishers_info_by_topic(self.topic)
+        lines = [line for publisher in found if (line := self._unheard(publisher))]
+        self._any_unheard = bool(lines)
+        lines = list(dict.fromkeys(lines))
+        more = len(lines) - MOST_REPORTED
+        return [*lines[:MOST_REPORTED], *([f"{self.topic}: {more} more publishers as these"] if more > 0 else [])]
+
+    def _unheard(self, publisher: Any) -> str:
+        """"": it is heard."""
+        offered, asked = publisher.qos_profile, self.subscription.qos_profile
+        less = []
+        if (offered.reliability, asked.reliability) == (ReliabilityPolicy.BEST_EFFORT, ReliabilityPolicy.RELIABLE):
+            less.append(("best_effort", "reliable"))
+        if (offered.durability, asked.durability) == (DurabilityPolicy.VOLATILE, DurabilityPolicy.TRANSIENT_LOCAL):
+            less.append(("volatile", "transient_local"))
+        if not less:
+            return ""
+        offers, asks = (" and ".join(words) for words in zip(*less, strict=True))
+        remedy = f"let the publisher offer {asks}"
+        if less == [("best_effort", "reliable")]:
+            remedy = f"set {self._setting()}: best_effort, or {remedy}"
+        elif len(less) == 1:
+            remedy += " (latched), as what it sent before the node listened would be missing"
+        return (
+            f"{self.topic}: a publisher {_node_of(publisher)} offers {offers}, the node asks for {asks}, so nothing "
+            f"of it is received; {remedy}"
+        )
+
+    def _setting(self) -> str:
+        override = qos_overrides.reliability_parameter(self.topic)
+        return self._reliability if self._reliability and not self._node.has_parameter(override) else override
+
+
+def unheard(subscriptions: Iterable[InputSubscription]) -> list[str]:
+    """The warnings of all, each once."""
+    return list(dict.fromkeys(line for subscription in subscriptions for line in subscription.warnings()))
+
+
+def _node_of(publisher: Any) -> str:
+    if publisher.node_name.startswith("_"):  # _CREATED_BY_BARE_DDS_APP_, or its name is not known yet
+        return "that is no node of ROS"
+    name = f"{publisher.node_namespace.rstrip('/')}/{publisher.node_name}"
+    return f"of node {shortened(name)}"

@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Publishers that offer less than the node asks for: DDS does not connect them, and the node says what to set."""
+
+import pytest
+from geometry_msgs.msg import TransformStamped
+from hpccd.msg import MeshTopology, MeshVertices
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+
+from hpccd_ros.middleware import qos
+
+LATCHED = "let the publisher offer transient_local (latched), as what it sent before the node listened would be missing"
+# Topic -> its type, what a publisher offers (reliable, latched), and what is to be said of it.
+LESS = {
+    "meshes/cloth/topology": (MeshTopology, (True, False), f"offers volatile, the node asks for transient_local, so "
+                              f"nothing of it is received; {LATCHED}"),
+    "meshes/cloth/vertices": (MeshVertices, (False, False), "offers best_effort, the node asks for reliable, so "
+                              "nothing of it is received; set input_reliability: best_effort, or let the publisher "
+                              "offer reliable"),
+    "transforms": (TransformStamped, (False, False), "set qos_overrides.NAMESPACE/transforms.subscription.reliability: "
+                   "best_effort, or let the publisher offer reliable"),
+    "transforms_static": (TransformStamped, (True, False), LATCHED),
+    "joint_states": (JointState, (False, False), "set input_reliability: best_effort, or let the publisher offer "
+                     "reliable"),
+    "left/joint_states": (JointState, (False, False), "set "
+                          "qos_overrides.NAMESPACE/left/joint_states.subscription.reliability: best_effort, or let"),
+    "robot_description": (String, (False, False), "offers best_effort and volatile, the node asks for reliable and "
+                          "transient_local, so nothing of it is received; let the publisher offer reliable and "
+                          "transient_local"),
+}  # fmt: skip
+ROBOTS = {"robots": ["arm", "left"], "robot.arm.description": "robot_description",
+          "robot.left.description": "robot_description", "robot.arm.joint_states": "joint_states",
+          "robot.left.joint_states": "left/joint_states"}  # fmt: skip
+
+
+@pytest.fixture
+def node(start_node):
+    return start_node({
+        "meshes": ["cloth"], "mesh.cloth.transform": "tf", "frame_id": "world", **ROBOTS,
+        "qos_overrides.NAMESPACE/left/joint_states.subscription.reliability": "reliable",
+    })  # fmt: skip
+
+
+def _message(node):
+    return node.peer.statuses["frames"][1]
+
+
+def test_each_input_names_topic_offer_request_and_remedy(node):
+    publishers = []
+    for topic, (kind, (reliable, latched), _) in LESS.items():
+        profile = qos.keep_last(1, reliable=reliable, latched=latched)
+        publishers.append(node.peer.node.create_publisher(kind, topic, profile))
+    name = f"a publisher of node {node.namespace}/peer offers "
+    for topic, (_, _, words) in LESS.items():
+        said = f"{node.namespace}/{topic}: {name}"
+        words = words.replace("NAMESPACE", node.namespace)
+        node.wait_until(lambda s=said, w=words: s in _message(node) and w in _message(node), f"{said}... {words}")
+        values = node.peer.statuses["frames"][2]
+        assert values.get(f"qos_incompatible.{topic}") == "1" or topic == "robot_description", values
+        assert said in node.output() and words in node.output(), topic
+    assert _message(node).count("robot_description: a publisher") == 1, "of two robots, the same"
+    for publisher in publishers:
+        node.peer.node.destroy_publisher(publisher)
+    node.wait_until(lambda: name not in _message(node), "the end of the warnings")
+
+
+def test_a_publisher_that_offers_more_is_heard(node):
+    for topic, (kind, _, _) in LESS.items():
+        node.peer.publisher(kind, topic, qos.keep_last(1, latched=True))
+    node.frames_status()
+    assert ": a publisher " not in _message(node) and "qos_incompatible" not in str(node.peer.statuses["frames"])
