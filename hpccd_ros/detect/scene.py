@@ -2,10 +2,8 @@
 """The core's scene of the meshes, whatever their topologies are at the time. No ROS."""
 
 from collections import defaultdict
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import combinations
 
 import numpy as np
 
@@ -72,22 +70,22 @@ class SceneBuilder:
 
     def of_rigid_pairs(self) -> "SceneBuilder":
         """Nothing is tested but pairs of meshes of which one moves by poses, or both do."""
-        meshes = tuple(replace(mesh, self_collision=False) for mesh in self.meshes)
-        return self._without(meshes, lambda a, b: not (a.rigid or b.rigid))
+        return self._restricted(of_rigid=True)
 
     def of_other_pairs(self) -> "SceneBuilder | None":
         """Nothing is tested but the other pairs; None where there are none."""
-        rigid = {mesh.name for mesh in self.meshes if mesh.rigid}
-        if all(a in rigid or b in rigid for a, b in self._tested_pairs):
-            return None
-        meshes = tuple(replace(mesh, self_collision=mesh.self_collision and not mesh.rigid) for mesh in self.meshes)
-        return self._without(meshes, lambda a, b: a.rigid or b.rigid)
+        left = self._restricted(of_rigid=False)
+        return left if left._tested_pairs else None
 
-    def _without(
-        self, meshes: tuple[MeshSettings, ...], left_out: Callable[[MeshSettings, MeshSettings], bool]
-    ) -> "SceneBuilder":
-        """Without the pairs of different meshes that are to be left out."""
-        ignored = tuple((a.name, b.name) for a, b in combinations(meshes, 2) if left_out(a, b))
+    def _restricted(self, of_rigid: bool) -> "SceneBuilder":
+        """Of the tested pairs those stay of which a mesh moves by poses, or those of which none does."""
+        rigid = {mesh.name for mesh in self.meshes if mesh.rigid}
+        ignored = tuple(
+            (a, b) for a, b in self._tested_pairs if a != b and of_rigid != (a in rigid or b in rigid)
+        )
+        meshes = tuple(
+            replace(mesh, self_collision=mesh.self_collision and not (of_rigid or mesh.rigid)) for mesh in self.meshes
+        )
         return replace(self, meshes=meshes, ignored_pairs=self.ignored_pairs + ignored)
 
     def among(self, names: list[str]) -> "SceneBuilder":
