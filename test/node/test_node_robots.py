@@ -116,7 +116,8 @@ def transforms(k, prefix=""):
 @pytest.mark.parametrize("by", ["joints", "tf"])
 def test_streamed_recorded_and_verified(start_node, tmp_path, by, given):
     path, file = tmp_path / "run.mcap", tmp_path / "crane.urdf"
-    file.write_text(crane.URDF)
+    latin = crane.URDF.replace('"1.0"?>', '"1.0" encoding="ISO-8859-1"?><!-- für Köln -->')
+    file.write_bytes(latin.encode("iso-8859-1"))  # read so by node and replay
     robot = JOINTS if by == "joints" else {"frame_prefix": "left_"}
     if given == "file":
         robot = {**robot, "description": str(file)}

@@ -25,6 +25,15 @@ def test_mesh_files_are_attached(tmp_path):
         assert name == attachments.link_mesh_name("arm", uri)
 
 
+@pytest.mark.parametrize("encoding", ["utf-8", "iso-8859-1", "utf-16"])
+def test_mesh_files_of_a_description_in_another_encoding_are_attached(tmp_path, encoding):
+    (tmp_path / "hüfte.stl").write_bytes(b"any")
+    file = tmp_path / "r.urdf"
+    file.write_bytes(f'<?xml version="1.0" encoding="{encoding}"?>{description("hüfte.stl")}'.encode(encoding))
+    found, missing = attachments.files({"meshes": [], "robots": ["arm"], "robot.arm.description": str(file)})
+    assert [name.rpartition("/")[2] for name, _ in found] == ["description.urdf", "hüfte.stl"] and not missing
+
+
 @pytest.mark.parametrize("uri", ["{}/secret", "{}/pipe.stl", "{}/folder.stl", "~nobody-is-called-so/a.stl",
                                  "file://{}/%00.stl", "{}/" + 300 * "a" + ".stl"])  # fmt: skip
 def test_nothing_else_is_read(tmp_path, uri):
