@@ -5,10 +5,11 @@ import contextlib
 import dataclasses
 import heapq
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import NamedTuple
 
-from mcap.records import Metadata
+from mcap.records import Attachment, Channel, Message, Metadata, Schema
 from mcap.writer import MCAP0_MAGIC
 
 from hpccd_ros.bag.mcap_file import McapFile
@@ -42,6 +43,14 @@ class RecordedMessage:
     publish_time: int  # ns since the epoch, when it was sent
     sequence: int  # the publisher's number, 0 where the recorder did not store it
     data: bytes  # CDR, with its 4-byte header
+
+
+class StoredMessage(NamedTuple):
+    """A message with what its file holds beside it. schema: None where its channel has none."""
+
+    schema: Schema | None
+    channel: Channel
+    message: Message
 
 
 class Recording:
@@ -90,8 +99,42 @@ class Recording:
 
     def messages(self, topics=None) -> Iterator[RecordedMessage]:
         """Messages in the order in which they were received, over all files. `topics`: only these names."""
-        streams = [self._read(*opened, topics) for opened in zip(self.files, self._opened, strict=True)]
-        yield from heapq.merge(*streams, key=lambda message: message.log_time)
+
+        def wanted(schema, channel):
+            return (topics is None or channel.topic in topics) and not _foreign(channel, schema)
+
+        for _, channel, message in self._records(wanted):
+            yield RecordedMessage(
+                channel.topic, message.log_time, message.publish_time, message.sequence, message.data
+            )
+
+    def records(self) -> Iterator[StoredMessage]:
+        """As `messages`, those that are not of ROS 2 too, with what the files hold beside each."""
+        return self._records(lambda schema, channel: True)
+
+    @property
+    def metadata(self) -> list[Metadata]:
+        """Records beside the messages, of all files, equal ones once."""
+        found = [record for file in self._opened for record in file.metadata]
+        return [record for number, record in enumerate(found) if record not in found[:number]]
+
+    @property
+    def stored_attachments(self) -> list[Attachment]:
+        """The `attachments` as records."""
+        found = [record for file in self._opened for record in file.attachments]
+        return list({record.name: record for record in reversed(found)}.values())
+
+    @property
+    def profile(self) -> str:
+        return self._opened[0].header.profile
+
+    @property
+    def compression(self) -> str:
+        return self._opened[0].compression or "none"
+
+    def _records(self, wanted: Callable[[Schema | None, Channel], bool]) -> Iterator[StoredMessage]:
+        streams = [self._read(*opened, wanted) for opened in zip(self.files, self._opened, strict=True)]
+        yield from heapq.merge(*streams, key=lambda stored: stored.message.log_time)
 
     def _open(self, path) -> McapFile:
         check_ends(path)
@@ -139,18 +182,12 @@ class Recording:
             )
         self.topics[topic.name] = topic
 
-    def _read(self, path, file, topics):
-        wanted = {
-            number
-            for number, channel in file.channels.items()
-            if (topics is None or channel.topic in topics)
-            and not _foreign(channel, file.schemas.get(channel.schema_id))
-        }
+    def _read(self, path, file, wanted):
+        schemas = {number: file.schemas.get(channel.schema_id) for number, channel in file.channels.items()}
+        numbers = {number for number, channel in file.channels.items() if wanted(schemas[number], channel)}
         with _explained(path):
-            for channel, message in file.messages(wanted):
-                yield RecordedMessage(
-                    channel.topic, message.log_time, message.publish_time, message.sequence, message.data
-                )
+            for channel, message in file.messages(numbers):
+                yield StoredMessage(schemas[channel.id], channel, message)
 
 
 def _foreign(channel, schema) -> str | None:

@@ -3,10 +3,11 @@
 name."""
 
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path, PurePosixPath
 from typing import Any
 
+from hpccd_ros.bag.cut import seconds
 from hpccd_ros.bag.decode import make_decoder
 from hpccd_ros.bag.reader import Recording, RecordingError
 from hpccd_ros.frames.mesh_file import FORMATS, MeshFileError
@@ -31,38 +32,44 @@ def of_recording(recording: Recording, robots: RobotValues, topics: Mapping[str,
     return found
 
 
-def _robot(recording, name: str, values: Mapping[str, Any], texts: Sequence[str]) -> Robot:
-    """Of the only text that can be used: the node refused the others and kept to it."""
+def _robot(recording, name: str, values: Mapping[str, Any], texts: Mapping[str, int]) -> Robot:
+    """Of the only text that can be used: the node refused the others and kept to it. texts: with the time, ns, at which
+    each came first."""
     semantics = _semantics(recording, name, values)
-    robots: list[Robot] = []
+    robots: list[tuple[Robot, int]] = []
     refused: RobotError | MeshFileError | None = None
-    for text in texts:
+    for text, came in texts.items():
         try:
             with tempfile.TemporaryDirectory() as folder:
                 find = _resolver(recording, name, values, text, Path(folder))
-                robots.append(robot_files.robot_of(name, values, text, semantics, find))
+                robots.append((robot_files.robot_of(name, values, text, semantics, find), came))
         except (RobotError, MeshFileError) as error:
             refused = error
     if len(robots) > 1:
+        at = seconds(robots[1][1] - next(recording.records()).message.log_time)
         raise RobotError(
-            f"its description on {values['description']} changed while it was recorded; only the parts before and "
-            "after can be computed again: cut the recording in two"
+            f"its description on {values['description']} changed {at} s after the beginning; replay the parts before "
+            f"and after: `hpccd cut {recording.path} --to {at} -o before.mcap`, "
+            f"`hpccd cut {recording.path} --from {at} -o after.mcap`"
         )
     if refused is not None and not robots:
         raise refused
-    return robots[0]
+    return robots[0][0]
 
 
-def _descriptions(recording, name: str, values: Mapping[str, Any], topics: Mapping[str, str]) -> list[str]:
-    """At least one, each once."""
+def _descriptions(recording, name: str, values: Mapping[str, Any], topics: Mapping[str, str]) -> dict[str, int]:
+    """At least one, each with the time, ns, at which it came first."""
     description = values["description"]
     if not robot_parameters.comes_on_topic(description):
-        return [_text(recording, attachments.description_name(name), description)]
+        return {_text(recording, attachments.description_name(name), description): 0}
     topic = topics.get(description)
     if topic is None or not recording.topics[topic].count:
         raise RobotError(f"its description came on {description}, of which the recording has no message")
     decode = make_decoder(recording.topics[topic])
-    return list(dict.fromkeys(decode(message).data for message in recording.messages([topic])))
+    found: dict[str, int] = {}
+    for message in recording.messages([topic]):
+        found.setdefault(decode(message).data, message.log_time)
+    return found
 
 
 def _semantics(recording, name: str, values: Mapping[str, Any]) -> str | None:

@@ -25,7 +25,7 @@ def test_the_list_of_commands(capsys):
     with pytest.raises(SystemExit):
         cli.main(["--help"])
     shown = capsys.readouterr().out
-    for command in ("demo", "record", "replay", "view", "doctor", "scene", "bench", "info"):
+    for command in ("demo", "record", "replay", "view", "cut", "doctor", "scene", "bench", "info"):
         assert f"    {command} " in shown
 
 
@@ -62,6 +62,10 @@ def test_help_imports_neither_ros_nor_the_core():
         (["view", "x.mcap"], "x.mcap does not exist"),
         (["doctor", "x.mcap"], "x.mcap does not exist"),
         (["doctor", "x.mcap", "--compression", "lz4"], "--compression belongs to --recover"),
+        (["cut", "x.mcap", "-o", "y.mcap"], "nothing to cut: give --from TIME, --to TIME or both"),
+        (["cut", "x.mcap", "--to", "1", "-o", "y"], "-o y: must end in .mcap"),
+        (["cut", "x.mcap", "--to", "-1", "-o", "y.mcap"], "--to: '-1' is not a time; give seconds from the beginning"),
+        (["cut", "x.mcap", "--from", "1", "-o", "y.mcap"], "x.mcap does not exist"),
         (["demo", "--rate", "0"], "--rate 0.0: must be above 0"),
         (["demo", "--out", "/dev/null/out"], "--out /dev/null/out: Not a directory"),
         (["demo", "--scene", "nothing"], "unknown scene 'nothing'"),
@@ -80,7 +84,9 @@ def test_unknown_command(hpccd):
 
 
 @pytest.mark.parametrize(
-    "arguments", [["replay", "x.mcap"], ["view", "x.mcap"], ["record"], ["scene", "two-triangles", "--publish"]]
+    "arguments",
+    [["replay", "x.mcap"], ["view", "x.mcap"], ["cut", "x.mcap", "-o", "y.mcap"], ["record"],
+     ["scene", "two-triangles", "--publish"]],  # fmt: skip
 )
 def test_another_rmw_implementation_is_refused_before_rcl_ends_the_process(hpccd, monkeypatch, arguments):
     monkeypatch.setenv("RMW_IMPLEMENTATION", "rmw_nobody_cpp")

@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Cut a part out of a recording. It replays by itself: what was in force at its beginning is copied too (topologies,
+static meshes, shapes, descriptions, transforms, joint states), with the node's parameters and mesh files.
+
+  hpccd cut run.mcap --from 10 --to 20 -o part.mcap      from the tenth to the twentieth second
+  hpccd cut run.mcap --to 12.5 -o before.mcap            two parts that join without a gap: --from includes its moment,
+  hpccd cut run.mcap --from 12.5 -o after.mcap           --to does not
+  hpccd cut run.mcap --from 1700000000123456789ns -o end.mcap
+                                                         from the frame with this stamp, as `hpccd replay` prints it
+  hpccd cut run/ --from 3600 -o late.mcap                of a split recording, over all its files
+
+Times are seconds since the first message of the recording was received, or stamps of frames in nanoseconds (with the
+suffix ns, --to included). Answers to steps that began before the part are kept and cannot be verified: `hpccd replay`
+counts them. Channels of other encodings are copied unchanged.
+"""
+
+from pathlib import Path
+
+from hpccd_ros.base.errors import UserError
+
+
+def configure(parser):
+    parser.add_argument("file", metavar="FILE", help="recording: an .mcap file, or a folder of them")
+    parser.add_argument("--from", dest="begin", metavar="TIME", help="begin there (default: at the beginning)")
+    parser.add_argument("--to", dest="end", metavar="TIME", help="end there (default: at the end)")
+    parser.add_argument("-o", "--output", metavar="OUT", required=True, help="new file, NAME.mcap")
+    parser.add_argument("--compression", choices=("none", "lz4", "zstd"), help="of OUT (default: that of FILE)")
+
+
+def run(args) -> int:
+    if args.begin is None and args.end is None:
+        raise UserError("nothing to cut: give --from TIME, --to TIME or both")
+    target = Path(args.output)
+    if target.suffix != ".mcap":
+        raise UserError(f"-o {args.output}: must end in .mcap")
+    from hpccd_ros.bag.cut import Time, cut, seconds
+    from hpccd_ros.bag.reader import Recording
+    from hpccd_ros.scenes.progress import track
+
+    times = []
+    for option, text in (("--from", args.begin), ("--to", args.end)):
+        try:
+            times.append(None if text is None else Time.of(text))
+        except ValueError as error:
+            raise UserError(f"{option}: {error}") from error
+    with Recording(args.file) as recording:
+        try:
+            part = cut(recording, target, *times, args.compression,
+                       watch=lambda messages: track(messages, "cut", True, recording.message_count or None))
+        except FileExistsError as error:
+            raise UserError(f"-o {args.output}: exists; recordings are not overwritten") from error
+        except OSError as error:
+            raise UserError(f"-o {args.output}: {error.strerror}") from error
+    print(f"{args.output}: {part.count:,} messages, from {seconds(part.begin)} to {seconds(part.end)} s of {args.file}")
+    if part.in_force:
+        print(f"  {part.in_force:,} of them were received before and in force at the beginning")
+    return 0
