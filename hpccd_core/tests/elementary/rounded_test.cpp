@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Tests that begin in single precision, from rounded coordinates: never a contact less, or at another time, than in
 // double precision alone, and of the tier that ends there few wrong answers, the same with every instruction set.
+// Which of the two a step begins with depends on the backend, so no tier that promises equal results may show it.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -11,6 +12,7 @@
 
 #include "elementary/batch.h"
 #include "elementary/exact/contact.h"
+#include "elementary/fallback.h"
 #include "hpccd/hpccd.h"
 
 namespace hpccd {
@@ -50,13 +52,30 @@ struct Pairs {
     }
   }
 
-  std::optional<double> truth(Kind kind, std::uint32_t i) const {
-    Vec3<double> t0[4], t1[4];
+  UndecidedPair pair(Kind kind, std::uint32_t i) const {
+    UndecidedPair q{kind, {}, {}, 0};
     for (int v = 0; v < 4; ++v) {
       const VertexMotion& m = rows[4 * i + static_cast<std::uint32_t>(v)];
-      t0[v] = {m.t0[0], m.t0[1], m.t0[2]}, t1[v] = {m.t1[0], m.t1[1], m.t1[2]};
+      q.t0[v] = {m.t0[0], m.t0[1], m.t0[2]}, q.t1[v] = {m.t1[0], m.t1[1], m.t1[2]};
     }
-    return exact::earliest_contact(kind, t0, t1);
+    return q;
+  }
+
+  std::optional<double> truth(Kind kind, std::uint32_t i) const {
+    const UndecidedPair q = pair(kind, i);
+    return exact::earliest_contact(kind, q.t0, q.t1);
+  }
+
+  // Needles that fly: squeezed by these factors at first, then each corner goes its own way.
+  void make_needles(std::array<double, 3> squeeze, unsigned seed) {
+    std::mt19937 random(seed);
+    std::normal_distribution<double> normal;
+    for (std::size_t v = 0; v < rows.size(); ++v)
+      for (std::size_t k = 0; k < 3; ++k) {
+        rows[v].t0[k] = 0.25 * squeeze[k] * normal(random);
+        rows[v].t1[k] = rows[v].t0[k] + 0.075 * normal(random);
+        rounded[v].t0[k] = static_cast<float>(rows[v].t0[k]), rounded[v].t1[k] = static_cast<float>(rows[v].t1[k]);
+      }
   }
 };
 
@@ -122,6 +141,27 @@ TEST_P(Rounded, TellTheSameByEveryInstructionSet) {
 INSTANTIATE_TEST_SUITE_P(Lengths, Rounded,
                          testing::Combine(testing::Values(Kind::vertex_face, Kind::edge_edge),
                                           testing::Values(1e-5, 1e-3, 1e-2, 1.0), testing::Bool()));
+
+// Of these needles one pair in 700 is so near to touching that a tolerance calls it a contact, though a filter can prove
+// it apart. So each way has to ask the same filters.
+TEST(Balanced, AnswersTheSameWithAndWithoutSinglePrecision) {
+  for (const Kind kind : {Kind::vertex_face, Kind::edge_edge}) {
+    for (unsigned seed = 1; seed <= 12; ++seed) {
+      Pairs pairs(kind, 1, false, seed);
+      std::array<double, 3> squeeze{1e-6, 1e-6, 1e-6};
+      squeeze[seed % 3] = 1e-3;
+      pairs.make_needles(squeeze, seed);
+      const auto decided = [&](bool from_rounded) {
+        Answers a = ask(pairs, kind, simd_levels().back(), Accuracy::balanced, from_rounded);
+        FallbackCounts counts;
+        for (const std::uint32_t i : a.undecided)
+          if (const auto toc = decide_contact(Accuracy::balanced, pairs.pair(kind, i), counts)) a.contacts[i] = *toc;
+        return a.contacts;
+      };
+      EXPECT_EQ(decided(false), decided(true)) << seed;
+    }
+  }
+}
 
 // A thousandth wrong is what the tier may be; times are good to 1e-4.
 TEST(Fast, IsSeldomWrongWhereFeaturesAreNotTooSmall) {
