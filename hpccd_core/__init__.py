@@ -13,6 +13,8 @@ from .detector import Detector
 from .device_results import DeviceContacts, DeviceIntersections, DeviceProximity
 from .devices import backends, gpu_status
 from .elementary import test_edge_edge, test_vertex_face
+from .mesh_files.errors import MeshFileError
+from .mesh_files.load import load_mesh
 from .prepared import PreparedDetection
 from .proximity import Gap, Intersections, Proximity
 from .scene import Scene
@@ -28,12 +30,14 @@ __all__ = [
     "Gap",
     "Intersections",
     "InvalidArgument",
+    "MeshFileError",
     "PreparedDetection",
     "Proximity",
     "Scene",
     "__version__",
     "backends",
     "gpu_status",
+    "load_mesh",
     "test_edge_edge",
     "test_vertex_face",
 ]

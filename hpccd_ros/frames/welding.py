@@ -4,18 +4,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-
-def weld(points: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """(first, vertex_of): of each vertex the first of the (n,3) ``points`` that is it, and of each point its vertex.
-
-    Points are one vertex where they are equal number for number; vertices are in the order of their first points.
-    """
-    # + 0.0 makes -0.0 equal to 0.0 in the comparison.
-    _, first, inverse = np.unique(points + 0.0, axis=0, return_index=True, return_inverse=True)
-    order = np.argsort(first)
-    rank = np.empty_like(order)
-    rank[order] = np.arange(len(order))
-    return first[order], rank[inverse.reshape(-1)]
+from hpccd_core.mesh_files.welding import weld
 
 
 class Welding:

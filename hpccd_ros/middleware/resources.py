@@ -7,8 +7,8 @@ from urllib.parse import unquote
 
 from ament_index_python.packages import PackageNotFoundError, get_package_share_directory
 
+from hpccd_core import MeshFileError
 from hpccd_ros.base.quoting import quoted, shortened
-from hpccd_ros.frames.mesh_file import MeshFileError
 from hpccd_ros.middleware import environment
 
 _SCHEME = re.compile(r"([A-Za-z][A-Za-z0-9+.-]*)://(.*)", re.DOTALL)

@@ -5,9 +5,9 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from hpccd_core import MeshFileError
 from hpccd_ros.base.quoting import shortened
 from hpccd_ros.detect.core import unusable_topology
-from hpccd_ros.frames.mesh_file import MeshFileError
 from hpccd_ros.middleware import resources
 from hpccd_ros.robots import urdf
 from hpccd_ros.robots.errors import RobotError

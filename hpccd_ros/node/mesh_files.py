@@ -3,8 +3,9 @@
 
 from typing import Any
 
+from hpccd_core import MeshFileError, load_mesh
 from hpccd_ros.detect.core import unusable_topology
-from hpccd_ros.frames.mesh_file import MeshFileError, load_mesh, mesh_of_file
+from hpccd_ros.frames.mesh_file import mesh_of_file
 from hpccd_ros.frames.outcome import Outcome
 from hpccd_ros.frames.pipeline import FramePipeline
 from hpccd_ros.middleware import resources

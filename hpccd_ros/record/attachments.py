@@ -7,9 +7,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from hpccd_core import MeshFileError
+from hpccd_core.mesh_files.load import existing
 from hpccd_ros.base.errors import UserError
 from hpccd_ros.base.quoting import shortened
-from hpccd_ros.frames.mesh_file import MeshFileError, existing
 from hpccd_ros.middleware import robot_files
 from hpccd_ros.params import robot_parameters
 from hpccd_ros.robots.errors import RobotError

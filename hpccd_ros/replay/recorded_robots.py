@@ -7,10 +7,11 @@ from collections.abc import Mapping
 from pathlib import Path, PurePosixPath
 from typing import Any
 
+from hpccd_core import MeshFileError
+from hpccd_core.mesh_files.load import FORMATS
 from hpccd_ros.bag.cut import seconds
 from hpccd_ros.bag.decode import make_decoder
 from hpccd_ros.bag.reader import Recording, RecordingError
-from hpccd_ros.frames.mesh_file import FORMATS, MeshFileError
 from hpccd_ros.middleware import robot_files
 from hpccd_ros.params import robot_parameters
 from hpccd_ros.params.robot_parameters import RobotValues

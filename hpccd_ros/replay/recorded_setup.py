@@ -5,12 +5,14 @@ import dataclasses
 import tempfile
 from pathlib import Path, PurePosixPath
 
+from hpccd_core import MeshFileError, load_mesh
+from hpccd_core.mesh_files.load import FORMATS
 from hpccd_ros.bag.reader import Recording, RecordingError
 from hpccd_ros.base.errors import UserError
 from hpccd_ros.base.quoting import printable
 from hpccd_ros.detect.core import Options
 from hpccd_ros.detect.scene import SceneBuilder
-from hpccd_ros.frames.mesh_file import FORMATS, MeshFileError, load_mesh, mesh_of_file
+from hpccd_ros.frames.mesh_file import mesh_of_file
 from hpccd_ros.frames.types import MeshFrame, Topology
 from hpccd_ros.middleware import resources, topic_names, transform_topics
 from hpccd_ros.params import pair_parameters, robot_parameters, scene_parameters, values

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
+from hpccd_core import MeshFileError, load_mesh
 from hpccd_ros.base.errors import UserError
 from hpccd_ros.base.quoting import quoted, shortened
 from hpccd_ros.frames.coordinates import unusable_coordinates
-from hpccd_ros.frames.mesh_file import MeshFileError, load_mesh
 from hpccd_ros.robots import solids
 from hpccd_ros.robots.errors import RobotError
 from hpccd_ros.robots.shapes import MeshFile, Placed

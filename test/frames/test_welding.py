@@ -3,7 +3,8 @@
 
 import numpy as np
 
-from hpccd_ros.frames.welding import Welding, weld
+from hpccd_core.mesh_files.welding import weld
+from hpccd_ros.frames.welding import Welding
 
 A, B, C, D = [0.0, 0, 0], [1.0, 0, 0], [0.0, 1, 0], [1.0, 1, 0]
 SQUARE = np.array([A, B, C, D, C, B])

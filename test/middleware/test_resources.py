@@ -12,7 +12,7 @@ from sources import SOURCES
 from waving_sheet import sheet_faces, sheet_positions
 
 import hpccd_core as hc
-from hpccd_ros.frames.mesh_file import MeshFileError
+from hpccd_core import MeshFileError
 from hpccd_ros.middleware.resources import local_path
 
 N = 8

@@ -11,9 +11,9 @@ from visualization_msgs.msg import Marker
 from waving_sheet import scene_of, sheet_positions
 from whole_meshes import marker_of, shape_of
 
+from hpccd_core.mesh_files.welding import weld
 from hpccd_ros.bag.reader import Recording
 from hpccd_ros.bag.writer import BagWriter
-from hpccd_ros.frames.welding import weld
 from hpccd_ros.middleware import fields, mesh_messages, qos
 from hpccd_ros.record import recorded_topics
 from hpccd_ros.record.recording_info import recording_info

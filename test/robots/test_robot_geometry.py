@@ -104,11 +104,12 @@ def test_the_triangles_of_a_robot_are_bounded(monkeypatch):
         made(link(box, box))
 
 
-def test_without_trimesh_the_extra_is_named(tmp_path, monkeypatch):
+def test_without_pycollada_the_package_is_named(tmp_path, monkeypatch):
     import sys
 
+    (tmp_path / "a.dae").write_text("<COLLADA/>")
     (tmp_path / "a.obj").write_text(OBJ)
-    monkeypatch.setitem(sys.modules, "trimesh", None)
-    with pytest.raises(RobotError, match=r"link 'a': .* needs trimesh; install it with"):
-        made(link(('<mesh filename="a.obj"/>', "")), beside(Path(tmp_path), no_files))
-    assert made(link(('<box size="1 1 1"/>', "")))  # needs none
+    monkeypatch.setitem(sys.modules, "collada", None)
+    with pytest.raises(RobotError, match=r"link 'a': .*a\.dae: .* needs the Python package pycollada; install it with"):
+        made(link(('<mesh filename="a.dae"/>', "")), beside(Path(tmp_path), no_files))
+    assert made(link(('<mesh filename="a.obj"/>', "")), beside(Path(tmp_path), no_files))  # needs none

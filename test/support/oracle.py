@@ -16,7 +16,8 @@ from mcap_model import Bag
 from rosbags.serde import SerdeError
 
 import hpccd_core as hc
-from hpccd_ros.frames.mesh_file import load_mesh, place
+from hpccd_core import load_mesh
+from hpccd_ros.frames.mesh_file import place
 from hpccd_ros.frames.transform_buffer import NoTransformError, TransformBuffer
 from hpccd_ros.rigid.transform import Rigid
 

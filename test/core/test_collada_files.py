@@ -8,8 +8,8 @@ import zipfile
 import numpy as np
 import pytest
 
-from hpccd_ros.frames import collada_file
-from hpccd_ros.frames.mesh_file import MeshFileError, load_mesh
+from hpccd_core import MeshFileError, load_mesh
+from hpccd_core.mesh_files import collada
 
 pytest.importorskip("collada")
 
@@ -70,7 +70,7 @@ def test_the_unit_counts_and_the_axis_does_not(load, axis):
 
 @pytest.mark.parametrize("meter", ["0", "-1", "nan", "inf"])
 def test_units_that_cannot_be(load, meter):
-    with pytest.raises(MeshFileError, match=r"m\.dae: cannot be read: its unit is .* metres; it must be"):
+    with pytest.raises(MeshFileError, match=r"m\.dae: its unit is .* metres; it must be"):
         load(dae(asset=f'<unit name="none" meter="{meter}"/>'))
 
 
@@ -94,6 +94,19 @@ def test_polygons_become_fans_and_primitives_share_positions(load):
     vertices, faces = load(dae(primitives=lines + polylist + triangles([[1, 2, 4]])))
     assert np.array_equal(vertices, VERTICES)
     assert sorted(map(sorted, faces.tolist())) == [[0, 1, 2], [0, 2, 3], [1, 2, 3], [1, 2, 4]]
+
+
+def test_polygons_that_are_not_convex_are_split(load):
+    ell = np.array([[2.0, 1, 0], [1, 1, 0], [1, 2, 0], [0, 2, 0], [0, 0, 0], [2, 0, 0]])
+    source = '<input semantic="VERTEX" source="#v" offset="0"/>'
+    for polygons in (
+        f'<polylist count="1">{source}<vcount>6</vcount><p>0 1 2 3 4 5</p></polylist>',
+        f'<polygons count="1">{source}<p>0 1 2 3 4 5</p></polygons>',
+    ):
+        vertices, faces = load(dae(primitives=polygons, vertices=ell))
+        corners = vertices[faces]
+        areas = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])[:, 2] / 2
+        assert len(faces) == 4 and (areas > 0).all() and areas.sum() == 3, "a fan would have areas that cancel"
 
 
 def test_what_a_mesh_looks_like_is_no_matter(load):
@@ -131,7 +144,7 @@ ENTITIES = '<?xml version="1.0"?><!DOCTYPE x [<!ENTITY a "aaaaaaaaaa">' + "".joi
 @pytest.mark.parametrize(
     "text, why",
     [
-        ("", "no element found"),
+        ("", "is empty"),
         ("<COLLADA", "m.dae: cannot be read"),
         (b"\xff\xfe\x00", "m.dae: cannot be read"),
         (dae()[:-300], "m.dae: cannot be read"),
@@ -145,7 +158,7 @@ ENTITIES = '<?xml version="1.0"?><!DOCTYPE x [<!ENTITY a "aaaaaaaaaa">' + "".joi
         (dae(nodes='<node id="a"><instance_node url="#a"/></node>'), "m.dae"),
         (dae(more=bomb(), nodes='<node><instance_node url="#n0"/></node>'), "more than 100000 nodes; export it flat"),
         (dae(nodes='<node><instance_controller url="#c"/></node>'), "a skeleton or morph moves"),
-        (dae().replace("<scene>", "<!--").replace("</scene>", "-->"), "has no scene; export it anew"),
+        (dae().replace("<scene>", "<!--").replace("</scene>", "-->"), "has no scene; export it again"),
         (ENTITIES + "]><COLLADA>&j;</COLLADA>", "m.dae: cannot be read"),
     ],
     ids=(
@@ -160,9 +173,9 @@ def test_bad_files_are_refused(load, text, why):
 
 def test_without_pycollada_it_says_what_to_install(load, monkeypatch):
     monkeypatch.setitem(sys.modules, "collada", None)
-    with pytest.raises(MeshFileError, match=r"needs the Python package collada .*pip install '\.\[meshes\]'"):
+    with pytest.raises(MeshFileError, match=r"needs the Python package pycollada; .*pip install pycollada"):
         load(dae())
 
 
 def test_the_bound_of_nodes_is_far_from_real_files():
-    assert collada_file.MOST_NODES >= 10_000
+    assert collada.MOST_NODES >= 10_000

@@ -1,0 +1,126 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One loader for all mesh files."""
+
+import os
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arguments import LARGEST_COORDINATE
+from . import collada, contents, obj, ply, stl
+from .errors import MeshFileError, shortened
+from .welding import weld
+
+FORMATS = (".obj", ".ply", ".stl", ".dae")
+
+
+def load_mesh(path: str | os.PathLike[str]) -> tuple[NDArray[np.float64], NDArray[np.uint32]]:
+    """Read a mesh file, with its vertices numbered as in the file.
+
+    Parameters
+    ----------
+    path : str or os.PathLike
+        An OBJ, PLY, STL or COLLADA (DAE) file; the suffix of its name says which. ``~`` is the home folder.
+
+    Returns
+    -------
+    vertices : (V, 3) float64
+        Positions in the unit of the file; of DAE in metres. Vertices that no face uses are kept.
+    faces : (F, 3) uint32
+        Triangles, as three numbers of vertices each.
+
+    Raises
+    ------
+    MeshFileError
+        There is no such file, it is cut off, damaged, or no mesh at all, it holds no triangles, or reading it needs a
+        Python package that is missing. The message names the file, the problem and the remedy.
+
+    Notes
+    -----
+    Materials, groups, texture coordinates, normals and colours have no influence on the numbering. An STL file repeats
+    the corners of each triangle: equal ones become one vertex, in order of first use.
+
+    A polygon becomes the fan of its first corner where that covers the polygon and nothing else, as for every convex
+    one. Other polygons are split by ear clipping in their best plane (package ``mapbox_earcut``). Polygons without area
+    become fans; a polygon that crosses itself is an error. Faces of fewer than three corners are ignored.
+
+    Loading a large file does not hold the interpreter lock for long: other threads go on.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import hpccd_core as hc
+    >>> file = pathlib.Path(tempfile.mkdtemp()) / "square.obj"
+    >>> _ = file.write_text("v 0 0 0\\nv 1 0 0\\nv 1 1 0\\nv 0 1 0\\nf 1 2 3 4\\n")
+    >>> vertices, faces = hc.load_mesh(file)
+    >>> vertices.shape
+    (4, 3)
+    >>> faces.tolist()
+    [[0, 1, 2], [2, 3, 0]]
+    """
+    file = existing(path)
+    try:
+        vertices, faces = _parse(file.read_bytes(), file.suffix.lower())
+    except MeshFileError as error:
+        raise MeshFileError(f"{shortened(file)}: {error}") from error
+    except OSError as error:
+        raise MeshFileError(f"{shortened(file)}: cannot be read: {error.strerror}; give another file") from error
+    return vertices, faces.astype(np.uint32)
+
+
+def existing(path: str | os.PathLike[str]) -> Path:
+    """The file, whose name has one of the suffixes in FORMATS.
+
+    Raises MeshFileError: another suffix, or there is no such file.
+    """
+    shown = shortened(os.fspath(path))
+    if (suffix := Path(path).suffix).lower() not in FORMATS:
+        raise MeshFileError(f"{shown}: format {shortened(suffix) or '(none)'!r}; use one of {', '.join(FORMATS)}")
+    try:
+        file = Path(path).expanduser()
+        if file.is_file():
+            return file
+    except RuntimeError as error:  # ~name, and there is no such user
+        raise MeshFileError(f"{shown}: no such home folder; give the whole path") from error
+    except ValueError as error:  # a zero byte, before Python 3.13
+        raise MeshFileError(f"{shown}: no such file; file names hold no zero bytes") from error
+    except OSError as error:
+        raise MeshFileError(f"{shown}: {error.strerror}; give the path of a file that can be read") from error
+    raise MeshFileError(f"{shown}: no such file (relative paths start from {Path.cwd()})")
+
+
+def _parse(data: bytes, suffix: str) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    # The header of a binary STL may hold anything.
+    if not (suffix == ".stl" and stl.is_binary(data)) and (what := contents.foreign(data, suffix)):
+        raise MeshFileError(what)
+    match suffix:
+        case ".stl":
+            corners = stl.parse(data)
+            _check(corners, len(corners))
+            first, vertex_of = weld(corners)
+            return corners[first], vertex_of.reshape(-1, 3)
+        case ".dae":
+            vertices, faces = collada.parse(data)
+            _check(vertices, len(faces))
+            return vertices, faces
+        case ".obj":
+            polygons, triangles = obj.parse(data), obj.triangles
+        case _:
+            polygons, triangles = ply.parse(data), ply.triangles
+    _check(polygons.vertices, len(polygons.counts))
+    return polygons.vertices, triangles(polygons)
+
+
+def _check(vertices: NDArray[np.float64], n_faces: int) -> None:
+    """Raises MeshFileError where the core could not compute with the mesh."""
+    if not n_faces:
+        raise MeshFileError("has no triangles; export the surface, not only points or lines")
+    # Two reductions, as they need no array of their own; NaN passes through both and compares false.
+    if -LARGEST_COORDINATE <= float(vertices.min()) and float(vertices.max()) <= LARGEST_COORDINATE:
+        return
+    finite = np.isfinite(vertices).all(axis=1)
+    limits = f"lie in [-{LARGEST_COORDINATE:g}, {LARGEST_COORDINATE:g}]" if finite.all() else "be finite"
+    bad = np.abs(vertices).max(axis=1) > LARGEST_COORDINATE if finite.all() else ~finite
+    vertex = int(np.flatnonzero(bad)[0])
+    raise MeshFileError(f"vertex {vertex} is {vertices[vertex].tolist()}; coordinates must {limits}")

@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: Apache-2.0
+"""STL, binary and ASCII: triangles of which each brings its own corners."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import lines
+from .errors import MeshFileError
+
+_HEADER = 84  # bytes: 80 of any content, and the number of triangles
+_TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+
+
+def is_binary(data: bytes) -> bool:
+    """Its length is that of so many triangles as it says: binary, whatever its header looks like."""
+    return len(data) >= _HEADER and len(data) == _HEADER + _TRIANGLE.itemsize * _count(data)
+
+
+def parse(data: bytes) -> NDArray[np.float64]:
+    """(3 F, 3) the corners of F triangles, one after the other. Raises MeshFileError."""
+    if is_binary(data):
+        return _of_binary(data)
+    # Names and comments may be of any encoding, but no text holds a zero byte.
+    if b"\0" not in data and b"facet" in data[:10_000].lower():
+        return _of_text(data)
+    if len(data) < _HEADER or not _count(data):
+        raise MeshFileError("is neither a binary STL (its length does not fit its number of triangles) nor an ASCII "
+                            "STL; export it again")  # fmt: skip
+    room = (len(data) - _HEADER) // _TRIANGLE.itemsize
+    if _count(data) > room:
+        raise MeshFileError(
+            f"is neither an ASCII STL nor a whole binary STL: it says {_count(data)} triangles and holds {room}; copy "
+            "or export it again"
+        )
+    return _of_binary(data)
+
+
+def _count(data: bytes) -> int:
+    return int.from_bytes(data[_HEADER - 4 : _HEADER], "little")
+
+
+def _of_binary(data: bytes) -> NDArray[np.float64]:
+    """Without the bytes after the last triangle: some programs write their own data there."""
+    triangles = np.frombuffer(data, _TRIANGLE, count=_count(data), offset=_HEADER)
+    return triangles["corners"].astype(np.float64).reshape(-1, 3)
+
+
+def _of_text(data: bytes) -> NDArray[np.float64]:
+    """What counts are the lines vertex, and that there are three in each facet. `endsolid` may be missing; `endfacet` may
+    not: the last number before it could be cut off."""
+    found = [np.empty(0)]
+    number, facets, corners = 0, 0, 0  # corners: of the facet that began last; 3 of a whole one
+    whole = True
+    for chunk in lines.chunks(data):
+        coordinates: list[float] = []
+        for line in chunk:
+            number += 1
+            words = line.split()
+            key = words[0].lower() if words else b""
+            if key == b"vertex":
+                if len(words) != 4:
+                    raise MeshFileError(f"line {number}: {lines.shown(line)}: expected vertex and three numbers")
+                try:
+                    coordinates += [float(words[1]), float(words[2]), float(words[3])]
+                except ValueError:
+                    raise MeshFileError(f"line {number}: {lines.shown(line)}: holds what is not a number") from None
+                corners += 1
+            elif key in (b"facet", b"endfacet", b"endsolid"):
+                if corners != 3 and facets:
+                    raise MeshFileError(f"line {number}: the facet before it has {corners} vertices; it must be 3")
+                if key == b"facet":
+                    facets, corners = facets + 1, 0
+                whole = key != b"facet"
+        found.append(np.array(coordinates, np.float64))
+    points = np.concatenate(found).reshape(-1, 3)
+    if not whole or len(points) != 3 * facets:
+        raise MeshFileError(
+            f"is cut off or damaged: it has {facets} facets and {len(points)} vertices; copy or export it again"
+        )
+    return points
