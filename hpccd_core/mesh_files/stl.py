@@ -46,8 +46,8 @@ def _of_binary(data: bytes) -> NDArray[np.float64]:
 
 
 def _of_text(data: bytes) -> NDArray[np.float64]:
-    """Three lines vertex in each facet. `endsolid` may be missing; the last `endfacet` may not, because the number before
-    it could be cut off."""
+    """Three lines vertex in each facet. `endsolid` may be missing; the last `endfacet` may not, because the number
+    before it could be cut off."""
     found = [np.empty(0)]
     number, facets, corners = 0, 0, 0  # corners: of the facet that began last; 3 of a whole one
     whole = True

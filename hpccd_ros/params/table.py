@@ -453,8 +453,8 @@ MESH_ROWS = (
         "file",
         "string",
         "",
-        "Mesh file (OBJ, PLY, STL, or DAE, which needs the extra meshes) with the topology, version 0, and for a static "
-        "mesh the positions: a path, package://PACKAGE/PATH or file:///PATH",
+        "Mesh file (OBJ, PLY, STL, or DAE, which needs the extra meshes) with the topology, version 0, and for a "
+        "static mesh the positions: a path, package://PACKAGE/PATH or file:///PATH",
     ),
     Row(
         "transform",
