@@ -2,7 +2,6 @@
 """The node's topic stop as one answer, which is true wherever nobody says that it is false."""
 
 import threading
-import time
 from collections.abc import Callable
 from typing import Any
 
@@ -13,6 +12,7 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from std_msgs.msg import Bool
 
+from hpccd_ros.base.clocks import CLOCK_ERROR, Clocks, ClockWatch
 from hpccd_ros.client.topics import STOP_TIMEOUT, STOP_TOPIC, stop_qos
 
 # Of the time-out, as the node takes it too: a silence reads as true before it is over.
@@ -25,17 +25,34 @@ class StopListener:
     """Listens to ``topic`` in ``node``, whose executor is the user's: SingleThreadedExecutor or MultiThreadedExecutor.
     (rclpy's experimental EventsExecutor fails, in Jazzy, at every callback that asks when its message came.)
 
-    ``stop`` and ``reason`` may be read at any time from any thread. They look at the steady clock: where the executor
-    runs no callbacks any more, ``stop`` becomes true as well. ``stop`` is false only where a message said so, less than
-    ``stop_timeout`` seconds ago, and as many publishers are alive as there are to be. No system time and no /clock
-    matters, but for this: a message that waited too long in the queue, by the system time, does not count either.
+    ``stop`` is false only where a message said so that was sent less than ``stop_timeout`` seconds ago, and as many
+    publishers are alive as there are to be. The age of a message is the system's time minus its DDS source timestamp:
+    a process that was held up, or that came late and is given the latched message, does not take an old word for a new
+    one. It can be read at any time from any thread, and is true as well where the executor runs no callbacks any more.
+    A message from further in the future than ``clock_error``, or a jump of the system clock by more against the steady
+    clock, makes it true until the clocks have agreed for ``stop_timeout``. ``/clock`` does not matter.
 
-    stop_timeout: s, at least those of the node's parameter; with less nothing is ever heard. publishers: how many must
-    be alive on the topic. Of several, any that says true within ``stop_timeout`` makes it true; a message does not tell
-    whose it is. on_change: called by the executor with this listener after ``stop`` changed: at messages and events at
-    once, at a time-out when a timer looks, four times in each; not at all while the executor stands still.
+    Parameters
+    ----------
+    node : rclpy.node.Node
+        Whose executor takes the messages.
+    topic : str
+        Name of the topic, which the node resolves.
+    stop_timeout : float
+        Seconds, at least those of the node's parameter; with less nothing is ever heard.
+    publishers : int
+        How many must be alive on the topic. Of several, any that says true within ``stop_timeout`` makes it true; a
+        message does not tell whose it is.
+    on_change : callable, optional
+        Called by the executor with this listener after ``stop`` changed: at messages and events at once, at a time-out
+        when a timer looks, four times in each; not at all while the executor stands still.
+    clock_error : float
+        Most seconds by which the system clocks of the two machines differ.
 
-    Raises TypeError or ValueError for wrong arguments.
+    Raises
+    ------
+    TypeError, ValueError
+        For wrong arguments.
     """
 
     def __init__(
@@ -46,20 +63,28 @@ class StopListener:
         *,
         publishers: int = 1,
         on_change: "Callable[[StopListener], None] | None" = None,
+        clock_error: float = CLOCK_ERROR,
     ) -> None:
         profile: QoSProfile = stop_qos(stop_timeout)
         if isinstance(publishers, bool) or not isinstance(publishers, int):
             raise TypeError(f"publishers: expected how many, got {type(publishers).__name__}")
         if publishers < 1:
             raise ValueError(f"publishers: {publishers}; at least one must be there to say that nothing is near")
+        if isinstance(clock_error, bool) or not isinstance(clock_error, (int, float)):
+            raise TypeError(f"clock_error: expected seconds, got {type(clock_error).__name__}")
+        if not 0 <= clock_error <= 10:
+            raise ValueError(f"clock_error: {clock_error} s; give from 0 s to 10 s")
         self._node = node
         self._timeout = float(stop_timeout)
         self._publishers = publishers
         self._on_change = on_change
         self._lock = threading.Lock()
-        self._heard: float | None = None  # the last message that counts; None: none, or lost since
+        self._clocks = Clocks()
+        self._clock_error = float(clock_error)
+        self._ages = ClockWatch(self._clock_error, self._timeout)
+        self._sent: int | None = None  # when the newest message was; None: none came, or the publisher was lost since
         self._said = True  # what it said
-        self._said_true = -float("inf")  # when the last came that said true
+        self._said_true = 0  # when the newest was sent that said true
         self._alive: int | None = None  # None: DDS has not told yet
         self._lost = f"nothing was heard yet on {node.resolve_topic_name(topic)}"
         self._told = True  # to on_change
@@ -90,34 +115,38 @@ class StopListener:
         self._node.destroy_subscription(self._subscription)
 
     def _why(self) -> str | None:
-        now = time.monotonic()
         with self._lock:
-            if self._heard is None:
+            steady, system = self._clocks.steady(), self._clocks.system()
+            self._ages.look(steady, system)
+            if self._sent is None:
                 return f"{self._lost[0].upper()}{self._lost[1:]}."
-            if now - self._heard >= _IN_TIME * self._timeout:
-                return f"Nothing was heard on {self._topic} for {now - self._heard:.3g} s."
+            if clocks := self._ages.why(steady):
+                return f"{clocks[0].upper()}{clocks[1:]}."
+            age = 1e-9 * (system - self._sent)
+            if age < -self._clock_error:
+                return f"What was heard last on {self._topic} was sent {-age:.3g} s in the future."
+            if age >= _IN_TIME * self._timeout:
+                return f"Nothing was heard on {self._topic} that was sent in the last {age:.3g} s."
             if self._alive is not None and self._alive < self._publishers:
                 return f"{self._alive} of {self._publishers} publishers are alive on {self._topic}."
             if self._said:
                 return f"It was said on {self._topic}."
             several = max(self._publishers, self._alive or 0) > 1
-            if several and now - self._said_true < self._timeout:
+            if several and 1e-9 * (system - self._said_true) < self._timeout:
                 return f"One of several publishers said it on {self._topic}."
             return None
 
     def _on_message(self, message: Bool, info: dict[str, Any]) -> None:
-        # Of a queue that nobody emptied for a while, the age that the middleware tells; in system time, which may jump.
-        came = info["received_timestamp"]  # 0 where the middleware tells none
-        waited = 1e-9 * (time.time_ns() - came) if came else 0.0
-        now = time.monotonic()
+        sent = info["source_timestamp"]  # 0, and so too old, where the middleware tells none
         with self._lock:
+            steady, system = self._clocks.steady(), self._clocks.system()
+            self._ages.look(steady, system)
+            self._ages.hear(f"what was heard on {self._topic}", 1e-9 * (sent - system), steady)
+            self._said_true = min(self._said_true, system)  # a clock may have been set back
             if message.data:
-                self._said_true = now
-            self._said = message.data
-            if -self._timeout < waited < self._timeout:
-                self._heard = now - max(waited, 0.0)
-            else:
-                self._heard, self._lost = None, f"what was heard on {self._topic} waited too long to be taken"
+                self._said_true = max(self._said_true, sent)
+            if self._sent is None or sent >= self._sent or self._sent > system:
+                self._said, self._sent = message.data, sent
         self._tell()
 
     def _on_deadline(self, event: Any) -> None:
@@ -139,7 +168,7 @@ class StopListener:
 
     def _lose(self, why: str) -> None:
         with self._lock:
-            self._heard, self._lost = None, why
+            self._sent, self._lost = None, why
         self._tell()
 
     def _tell(self) -> None:

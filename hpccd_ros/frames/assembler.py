@@ -125,7 +125,7 @@ class FrameAssembler:
         state.topologies.put(topology)
         state.positions.clear()
         early, state.early = state.early, deque()
-        outcome = Outcome()
+        outcome = Outcome(unplaced=[(mesh, topology.sent)] if state.static else [])
         for frame in early:
             outcome += self._admit(state, frame)
         return outcome

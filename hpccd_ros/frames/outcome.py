@@ -13,7 +13,8 @@ class Outcome:
 
     ``restarts``: in words, where the stream starts anew. ``static_taken``: accepted messages of static meshes, and
     shapes of those that move by poses. ``asked``: meshes that transforms move, of each frame that was asked of them: it
-    counts as a message. ``joined``: (mesh, stamp ns, time of arrival) of frames that were accepted.
+    counts as a message. ``joined``: (mesh, stamp ns, time of arrival) of frames that were accepted. ``unplaced``:
+    static meshes whose positions no longer hold, and when the message was sent by which they do not.
     """
 
     frames: list[SceneFrame] = field(default_factory=list)
@@ -22,6 +23,7 @@ class Outcome:
     static_taken: int = 0
     asked: list[str] = field(default_factory=list)
     joined: list[tuple[str, int, float]] = field(default_factory=list)
+    unplaced: list[tuple[str, int]] = field(default_factory=list)
 
     def __iadd__(self, other: "Outcome") -> "Outcome":
         self.frames += other.frames
@@ -30,4 +32,5 @@ class Outcome:
         self.static_taken += other.static_taken
         self.asked += other.asked
         self.joined += other.joined
+        self.unplaced += other.unplaced
         return self

@@ -15,7 +15,7 @@ import numpy as np
 
 from hpccd_ros.base.quoting import quoted
 from hpccd_ros.frames.coordinates import unusable_coordinates
-from hpccd_ros.frames.drops import Reason, Refusal
+from hpccd_ros.frames.drops import Aspect, Reason, Refusal
 from hpccd_ros.frames.standstill import Standstill
 from hpccd_ros.frames.transform_buffer import NoTransformError, TransformBuffer
 from hpccd_ros.frames.types import ALWAYS, TF, MeshFrame, MeshSettings
@@ -158,7 +158,8 @@ class MeshTransformer:
         return new_publisher
 
     def _give_up(self, item: _Waiting, why: str = "") -> Refusal:
-        return self._refuse(Reason.NO_TRANSFORM, self._missing(item) + why, item.new_publisher, item.frame)
+        refusal = self._refuse(Reason.NO_TRANSFORM, self._missing(item) + why, item.new_publisher, item.frame)
+        return replace(refusal, aspect=Aspect.NOTHING) if self._asked else refusal  # then no message was rejected
 
     def _missing(self, item: _Waiting) -> str:
         if item.connected:

@@ -46,6 +46,8 @@ class Accounts:
             self.restarts += 1
             self._warn(text)
         self.static_taken += outcome.static_taken
+        for mesh, sent in outcome.unplaced:
+            self.on_refused(Refusal(mesh, Reason.STATIC_MISSING, sent=sent))
         for mesh in outcome.asked:
             self.metrics.frame_received(mesh, None)
         for refusal in outcome.refusals:

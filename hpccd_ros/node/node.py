@@ -59,7 +59,7 @@ class HpccdNode(GuardedLifecycleNode):
         settings = self._settings
         self._contacts = ContactsPublisher(self, settings)
         try:
-            self._robots = RobotDescriptions(self, settings, self._follow_robots)
+            self._robots = RobotDescriptions(self, settings, self._follow_robots, self._doubt_robots)
             self._make_scene()
         except ValueError as error:
             self.get_logger().error(f"cannot configure: {error}")
@@ -129,8 +129,16 @@ class HpccdNode(GuardedLifecycleNode):
         except ValueError as error:
             self._scene_error = f"{error}; the scene stays as it was"
             self.get_logger().error(self._scene_error)
+        else:
+            self._scene_error = ""
+        self._doubt_robots()
+
+    def _doubt_robots(self) -> None:
+        """Where stop is published: the robots whose last description is not in the scene."""
+        if self._stop_watch is None or self._robots is None:
             return
-        self._scene_error = ""
+        in_scene = dict.fromkeys(self._settings["robots"], self._scene_error) if self._scene_error else {}
+        self._stop_watch.robots(in_scene | self._robots.doubts())
 
     def _stop(self) -> None:
         if self._unknown is not None:

@@ -8,7 +8,7 @@ from typing import Any
 from std_msgs.msg import String
 
 from hpccd_ros.base.quoting import shortened
-from hpccd_ros.middleware import qos, robot_files
+from hpccd_ros.middleware import qos, robot_files, unreadable
 from hpccd_ros.node.input_subscription import InputSubscription, unheard
 from hpccd_ros.node.life_cycle import GuardedLifecycleNode
 from hpccd_ros.params import robot_parameters
@@ -26,12 +26,19 @@ LONGEST = 500
 class RobotDescriptions:
     """``robots``: name -> robot, of those that are known; a description that cannot be used leaves the one before.
 
-    on_change: called when a robot has become known, or another one. Raises ParameterError for a file that cannot be
-    used.
+    on_change: called when a robot has become known, or another one; on_doubt: when `doubts` has changed. Raises
+    ParameterError for a file that cannot be used.
     """
 
-    def __init__(self, node: GuardedLifecycleNode, settings: dict[str, Any], on_change: Callable[[], None]) -> None:
+    def __init__(
+        self,
+        node: GuardedLifecycleNode,
+        settings: dict[str, Any],
+        on_change: Callable[[], None],
+        on_doubt: Callable[[], None] = lambda: None,
+    ) -> None:
         self._node = node
+        self._on_doubt = on_doubt
         self._values = settings[ROBOT]
         self._on_change = on_change
         self._semantics: dict[str, str | None] = {}
@@ -39,6 +46,7 @@ class RobotDescriptions:
         self._waiting: dict[str, str] = {}  # came too soon after the last
         self._refused: dict[str, str] = {}  # why the last description was
         self._warned: dict[str, tuple[str, ...]] = {}  # of the last one that was not
+        self._reading: list[str] = []
         self._read = -PERIOD  # when it ended
         self.robots: dict[str, Robot] = {}
         self._topics = robot_parameters.topics(settings[ROBOT])
@@ -53,6 +61,11 @@ class RobotDescriptions:
     @property
     def complete(self) -> bool:
         return len(self.robots) == len(self._values)
+
+    def doubts(self) -> dict[str, str]:
+        """Robots of which a newer description has come that is not in use, and why."""
+        newer = dict.fromkeys([*self._reading, *self._waiting], "its new description is being read")
+        return newer | {name: f"its description was rejected: {why}" for name, why in self._refused.items()}
 
     def warnings(self) -> list[str]:
         """Which robots are not known, and which descriptions cannot be used."""
@@ -97,14 +110,17 @@ class RobotDescriptions:
         subscription = self._subscriptions[name] = InputSubscription(
             self._node, String, topic, lambda message: self._receive(name, message.data), qos.DESCRIPTION
         )
+        unreadable.watch(subscription.subscription, lambda: self._refuse(name, "it cannot be deserialised"))
         self._node.when_unconfigured(subscription.close)
 
     def _receive(self, name: str, text: str) -> None:
         if text == self._texts.get(name):
             self._waiting.pop(name, None)
             self._refused.pop(name, None)
+            self._on_doubt()
             return
         self._waiting[name] = text
+        self._on_doubt()
         self._take_waiting()
 
     def _take_waiting(self) -> None:
@@ -114,12 +130,15 @@ class RobotDescriptions:
             return
         self._waiting = {name: text for name, text in self._waiting.items() if name not in waiting}
         known = dict(self.robots)
+        self._reading = list(waiting)
         try:
             for name, text in waiting.items():
                 self._take(name, text)
             if self.robots != known:
                 self._on_change()
         finally:
+            self._reading = []
+            self._on_doubt()
             self._read = time.monotonic()
 
     def _was_read(self, name: str) -> bool:
@@ -130,9 +149,13 @@ class RobotDescriptions:
         try:
             self.robots[name] = self._made(name, text)
         except RobotError as error:
-            kept = "; the one before stays in use" if name in self.robots else ""
-            self._refused[name] = f"{shortened(error, LONGEST)}{kept}"
-            self._node.get_logger().error(f"robot {name}: {self._refused[name]}")
+            self._refuse(name, shortened(error, LONGEST))
             return
         self._texts[name] = text
         self._refused.pop(name, None)
+
+    def _refuse(self, name: str, why: str) -> None:
+        kept = "; the one before stays in use" if name in self.robots else ""
+        self._refused[name] = f"{why}{kept}"
+        self._node.get_logger().error(f"robot {name}: {self._refused[name]}")
+        self._on_doubt()

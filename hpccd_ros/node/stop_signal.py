@@ -47,6 +47,8 @@ class StopSignal:
         while True:
             why = self._state.next(due)
             due = time.monotonic() + self._period
+            if why is None and self._state.why() is not None:
+                continue  # held up since: it holds no more
             try:
                 self._publisher.publish(Bool(data=why is not None))
                 self._log(why)

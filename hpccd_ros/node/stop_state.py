@@ -1,15 +1,24 @@
 # SPDX-License-Identifier: Apache-2.0
 """Whether to stop, and why: what is known of the steps so far, and how old it is. No ROS.
 
-All times are those of time.monotonic(): no jump of the system's time, no pause of /clock moves them.
+The promise: `stop` is false only if, for every enabled pair, the position of each moving mesh is known from messages
+sent within the last `stop_timeout` seconds, each static mesh has a valid position, no newer message about either was
+rejected, and both stay farther apart than `stop_distance` throughout the last step.
+
+Ages are the system's time minus the DDS source timestamp; they hold to within `clock_error`, by which the clocks of the
+machines may differ.
 """
 
 import threading
-import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+
+from hpccd_ros.base.clocks import CLOCK_ERROR, Clocks, ClockWatch
+from hpccd_ros.frames.drops import Aspect, Reason, Refusal
+from hpccd_ros.frames.types import ALWAYS, OUTDATED, UNTOLD, Origin
+from hpccd_ros.node.stop_doubts import Doubt, WatchedScene, text_of
 
 # Of the time-out: said so much earlier, a silence is heard of within it.
 IN_TIME = 0.95
@@ -24,6 +33,8 @@ class Cause(StrEnum):
     REFUSED = "refused"  # a message that is wrong
     FAILED = "failed"  # a detection
     SILENT = "silent"  # no answer that is fresh
+    HELD_UP = "held_up"  # the thread that publishes stop
+    CLOCKS = "clocks"  # no age can be trusted
 
 
 @dataclass(frozen=True)
@@ -37,29 +48,49 @@ class Why:
 class StopState:
     """Told by the threads that know something; read by the one that publishes, which waits in `next`.
 
-    distance: that asked for; an answer for a smaller one does not count. timeout: s within which it is to be heard that
-    an answer holds no more, from the arrival of the frame that its step ends with. busy: whether a frame is worked on.
-    rises: how often stop became true, by cause.
+    distance: that asked for; a result for a smaller one does not count. timeout: s within which it is to be heard that
+    a result holds no more, from when the oldest message was sent that determines where a moving mesh is at the end of
+    its step. busy: whether a frame is worked on. clock_error: s. rises: how often stop became true, by cause.
     """
 
-    def __init__(self, distance: float, timeout: float, busy: Callable[[], bool] = lambda: False) -> None:
+    def __init__(
+        self,
+        distance: float,
+        timeout: float,
+        busy: Callable[[], bool] = lambda: False,
+        *,
+        clock_error: float = CLOCK_ERROR,
+        clocks: Clocks | None = None,
+    ) -> None:
         self.distance = distance
-        self._timeout = IN_TIME * timeout
+        self._held_up = timeout
+        self._timeout_ns = round(IN_TIME * 1e9 * timeout)
         self._busy = busy
+        self._clocks = clocks or Clocks()
+        self._clock_error_ns = round(1e9 * clock_error)
+        self._ages = ClockWatch(clock_error, timeout)
         self._condition = threading.Condition()
         self._active = self._closed = False
+        self._scene = WatchedScene()
         self._why: Why | None = Why(Cause.INACTIVE, "the node is not active")
+        self._doubts: dict[object, tuple[Cause, Doubt]] = {}
+        self._robots: Mapping[str, str] = {}
         self._unsaid: Why | None = None
         self._said: Why | None = None
-        self._fresh = self._doubted = 0.0  # arrival of the frame that was last found clear; when one was refused
+        self._looked: float | None = None  # when the thread that publishes did, in steady time
+        self._oldest, self._oldest_of = 0, ""  # message of the last step that was clear: when it was sent, its mesh
         self.rises: Counter[Cause] = Counter()
 
-    def begin(self) -> None:
-        """Steps will be answered from now on."""
+    def begin(self, scene: WatchedScene) -> None:
+        """Steps of this scene will be answered from now on. Doubts about its meshes stay."""
+        with self._condition:
+            self._scene = scene
+            known = set(scene.meshes)
+            self._doubts = {key: item for key, item in self._doubts.items() if known.issuperset(item[1].meshes)}
         self._tell(Cause.UNANSWERED, "no step was answered since the node was activated", active=True)
 
     def end(self, text: str = "the node is not active") -> None:
-        """What is answered from now on no longer counts."""
+        """Results from now on no longer count."""
         self._tell(Cause.INACTIVE, text, active=False)
 
     def close(self) -> None:
@@ -77,15 +108,34 @@ class StopState:
         """A frame came that ends no step: nothing is known of the motion to it."""
         self._tell(Cause.UNANSWERED, "no step was answered since the stream, or a topology, began anew")
 
-    def answered(self, near: bool, distance: float, received: float) -> None:
-        """A step, asked for this distance; received: the arrival of the frame that it ends with."""
+    def answered(self, near: bool, distance: float, origins: Sequence[Origin]) -> None:
+        """A step, asked for this distance; origins: of the meshes at its end, in the order of the scene."""
+        with self._condition:
+            if not self._active:
+                return
+            scene, now = self._scene, self._clocks.system()
+            by_name = dict(zip(scene.meshes, origins, strict=True))
+            self._doubts = {key: item for key, item in self._doubts.items() if not item[1].settled(by_name)}
+            moving = [
+                (origin.place, mesh)
+                for mesh, moves, origin in zip(scene.meshes, scene.moving, origins, strict=True)
+                if moves and origin.place != ALWAYS
+            ]
+            for sent, mesh in moving:
+                self._ages.hear(f"a message of mesh {mesh}", 1e-9 * (sent - now), self._clocks.steady())
         if near:
             self._tell(Cause.NEAR, f"meshes came within {distance:g} of each other on the last step, or touched")
             return
+        outdated = next((mesh for mesh, origin in by_name.items() if origin.place == OUTDATED), "")
+        if outdated:
+            text = f"a newer message about where mesh {outdated} is was rejected, or is not in use yet"
+            self._tell(Cause.REFUSED, text)
+            return
         with self._condition:
-            if not self._active or received <= self._doubted or distance < self.distance:
+            if distance < self.distance or scene is not self._scene or not self._active:
                 return
-            self._fresh, self._why = received, None
+            self._oldest, self._oldest_of = min(moving, default=(ALWAYS, ""))
+            self._why = None
             self._condition.notify_all()
 
     def changed(self, distance: float) -> None:
@@ -94,51 +144,123 @@ class StopState:
         if larger:
             self._tell(Cause.UNANSWERED, f"no step was answered since stop_distance became {distance:g}")
 
-    def refused(self, text: str) -> None:
-        """A message was wrong: what came before it tells nothing of now."""
-        self._tell(Cause.REFUSED, text, doubt=True)
+    def refused(self, refusal: Refusal) -> None:
+        """The meshes that the message is about are unknown until something valid of them comes."""
+        if refusal.reason is Reason.DETECTION_FAILED:
+            self.failed("the detection of the last step failed")
+            return
+        with self._condition:
+            if meshes := self._scene.concerned(refusal):
+                self._doubt(Cause.REFUSED, meshes, refusal.aspect, refusal.sent, text_of(refusal))
 
     def failed(self, text: str) -> None:
-        """A step was not answered."""
-        self._tell(Cause.FAILED, text, doubt=True)
+        """A step was not answered: frames from before tell nothing of now."""
+        with self._condition:
+            if self._active:
+                self._doubt_all(Cause.FAILED, text)
+
+    def robots(self, doubts: Mapping[str, str]) -> None:
+        """Robots of which a newer description is not in use, and why; this replaces those before."""
+        with self._condition:
+            before = self._now()
+            self._robots = dict(doubts)
+            self._rise(before)
+
+    def heard(self, what: str, info: Mapping[str, int]) -> None:
+        """A message of an input came; info: source_timestamp and received_timestamp, ns of the system clock."""
+        sent, received = info["source_timestamp"], info["received_timestamp"]
+        ahead = 1e-9 * (sent - min(received or ALWAYS, self._clocks.system()))
+        if ahead <= 0:
+            return
+        with self._condition:
+            before = self._now()
+            if self._ages.hear(what, ahead, self._clocks.steady()):
+                self._rise(before)
 
     def why(self) -> Why | None:
         """As it is now; None: no reason to stop."""
         with self._condition:
-            return self._now(time.monotonic())
+            return self._now()
 
     def next(self, until: float) -> Why | None:
-        """What to say: waits for something else than what was said last, until that time at most. Each rise is said,
-        however short."""
+        """What to say: waits for something else than what was said last, until that time, in steady time, at most. Each
+        rise is said, however short."""
         with self._condition:
             while True:
-                now = time.monotonic()
-                why = self._unsaid or self._now(now)
-                if self._unsaid or (why is None) != (self._said is None) or now >= until or self._closed:
+                steady, system = self._look()
+                why = self._unsaid or self._now()
+                if self._unsaid or (why is None) != (self._said is None) or steady >= until or self._closed:
                     break
-                wake = until if why is not None else min(until, self._fresh + self._timeout)
-                self._condition.wait(wake - now)
+                left = until - steady
+                if why is None:
+                    left = min(left, 1e-9 * (self._oldest + self._timeout_ns - system))
+                self._condition.wait(max(left, 0.0))
             if why is not None and self._said is None:
                 self.rises[why.cause] += 1
             self._unsaid, self._said = None, why
             return why
 
-    def _now(self, now: float) -> Why | None:
-        if self._why is not None or now - self._fresh < self._timeout:
-            return self._why
-        since = "a later one is worked on" if self._busy() else "no later one has"
-        return Why(Cause.SILENT, f"the last frame that was found clear came {now - self._fresh:.3g} s ago, {since}")
+    def _look(self) -> tuple[float, int]:
+        """The clocks, as the thread that publishes sees them: it looks several times in each time-out, if it can."""
+        steady, system = self._clocks.steady(), self._clocks.system()
+        before = self._now()
+        self._ages.look(steady, system)
+        gap = 0.0 if self._looked is None else steady - self._looked
+        if gap > self._held_up:
+            self._doubt_all(Cause.HELD_UP, f"the thread that publishes stop was held up for {gap:.3g} s")
+        self._looked = steady
+        # Nothing was rejected later than now: where the clock was set back, what comes now is newer.
+        for key, (cause, doubt) in self._doubts.items():
+            if doubt.sent > system:
+                self._doubts[key] = cause, Doubt(doubt.meshes, doubt.aspect, system, doubt.text)
+        self._rise(before)
+        return steady, system
 
-    def _tell(self, cause: Cause, text: str, *, active: bool | None = None, doubt: bool = False) -> None:
+    def _now(self) -> Why | None:
+        if self._why is not None:
+            return self._why
+        for cause, doubt in self._doubts.values():
+            return Why(cause, doubt.text)
+        for name, text in self._robots.items():
+            return Why(Cause.REFUSED, f"robot {name}: {text}")
+        if text := self._ages.why(self._clocks.steady()):
+            return Why(Cause.CLOCKS, text)
+        age = self._clocks.system() - self._oldest
+        if self._oldest == ALWAYS or -self._clock_error_ns <= age < self._timeout_ns:
+            return None
+        if age < 0:
+            return Why(Cause.CLOCKS, f"a message of mesh {self._oldest_of} was sent {-1e-9 * age:.3g} s in the future")
+        if self._oldest == UNTOLD:
+            return Why(Cause.SILENT, f"the middleware does not tell when messages of mesh {self._oldest_of} were sent")
+        since = "a later one is worked on" if self._busy() else "no later one has"
+        of = f"a message of mesh {self._oldest_of} that was sent {1e-9 * age:.3g} s ago"
+        return Why(Cause.SILENT, f"the last frame that was found clear came with {of}, {since}")
+
+    def _doubt_all(self, cause: Cause, text: str) -> None:
+        moving = tuple(mesh for mesh, moves in zip(self._scene.meshes, self._scene.moving, strict=True) if moves)
+        self._doubt(cause, moving, Aspect.PLACE, None, text)
+
+    def _doubt(self, cause: Cause, meshes: tuple[str, ...], aspect: Aspect, sent: int | None, text: str) -> None:
+        """sent: when the message was; None: unknown."""
+        before, now, key = self._now(), self._clocks.system(), (cause, meshes, aspect)
+        sent = now if sent is None else min(sent, now)
+        if key in self._doubts:
+            sent = max(sent, self._doubts.pop(key)[1].sent)
+        self._doubts[key] = cause, Doubt(meshes, aspect, sent, text)
+        self._rise(before)
+
+    def _tell(self, cause: Cause, text: str, *, active: bool | None = None) -> None:
         with self._condition:
             if active is not None:
                 self._active = active
             elif not self._active:
                 return
-            if doubt:
-                self._doubted = time.monotonic()
-            why = Why(cause, text)
-            if self._why is None:
-                self._unsaid = why
-            self._why = why
-            self._condition.notify_all()
+            before = self._now()
+            self._why = Why(cause, text)
+            self._rise(before)
+
+    def _rise(self, before: Why | None) -> None:
+        """Something was learned. before: why stop was true before it."""
+        if before is None and self._unsaid is None:
+            self._unsaid = self._now()
+        self._condition.notify_all()

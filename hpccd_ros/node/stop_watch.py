@@ -2,7 +2,8 @@
 """From steps, refusals and failures to the topic stop."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
 
@@ -10,25 +11,23 @@ from hpccd_core import Cancelled
 from hpccd_ros.detect.core import CORE_ERRORS
 from hpccd_ros.detect.nearness import Nearness
 from hpccd_ros.detect.scene import SceneBuilder
-from hpccd_ros.frames.drops import Input, Reason, Refusal
+from hpccd_ros.frames.drops import Refusal
 from hpccd_ros.frames.types import SceneFrame
 from hpccd_ros.node.configuration import Configuration
 from hpccd_ros.node.life_cycle import GuardedLifecycleNode
+from hpccd_ros.node.stop_doubts import WatchedScene
 from hpccd_ros.node.stop_signal import StopSignal
 from hpccd_ros.node.stop_state import Cause, StopState
+from hpccd_ros.params import robot_parameters
 
-# What was right but is not needed: a later frame covers the whole motion, or another mesh is meant.
-_DROPPED = {
-    Reason.UNKNOWN_MESH, Reason.RATE, Reason.LATE, Reason.INCOMPLETE, Reason.RESTART, Reason.OVERLOAD,
-    Reason.MIDDLEWARE, Reason.STOPPED,
-}  # fmt: skip
 _WARNED = {Cause.NEAR: DiagnosticStatus.WARN, Cause.UNANSWERED: DiagnosticStatus.WARN}
 
 
 class StopWatch:
     """Of a configured ``node`` with parameter stop_distance. busy: whether a frame is being worked on.
 
-    `begin` and `end` by the life cycle; `first` and `look` by the detection thread; `refused` by any.
+    `begin` and `end` by the life cycle; `first` and `look` by the detection thread; `refused` by any; `heard` and
+    `robots` by the executor.
     """
 
     def __init__(
@@ -40,15 +39,17 @@ class StopWatch:
         settings = configuration.settings
         self._node = node
         self._configuration = configuration
-        self._state = StopState(settings["stop_distance"], settings["stop_timeout"], busy)
+        distance, timeout = settings["stop_distance"], settings["stop_timeout"]
+        self._state = StopState(distance, timeout, busy, clock_error=settings["clock_error"])
         self._nearness: Nearness | None = None
         self._nearness_ms = 0.0
-        self._signal = StopSignal(node, self._state, settings["stop_timeout"])
+        self._signal = StopSignal(node, self._state, timeout)
 
     def begin(self, builder: SceneBuilder) -> None:
         settings = self._configuration.settings
         self._nearness = Nearness(builder, self._configuration.options, settings["stop_distance"])
-        self._state.begin()
+        links = robot_parameters.links(self._configuration.robots)
+        self._state.begin(WatchedScene.of(builder, settings, links))
 
     def end(self) -> None:
         """Before the detection thread is joined: a step that is looked at is given up."""
@@ -84,14 +85,18 @@ class StopWatch:
                 self._node.errors.caught("stop", error)
             return
         self._nearness_ms = 1e3 * (time.perf_counter() - began)
-        self._state.answered(near, distance, end.received)
+        self._state.answered(near, distance, end.origins)
 
     def refused(self, refusal: Refusal) -> None:
-        if refusal.reason is Reason.DETECTION_FAILED:
-            self._state.failed("the detection of the last step failed")
-        elif refusal.reason not in _DROPPED and refusal.what in (Input.VERTICES, Input.TOPOLOGY):
-            what = "positions" if refusal.what is Input.VERTICES else "a topology"
-            self._state.refused(f"{what} of mesh {refusal.mesh} were refused: {refusal.reason}")
+        self._state.refused(refusal)
+
+    def heard(self, kind: str, name: str, info: Mapping[str, Any]) -> None:
+        """A message of this kind; name: of its mesh or topic."""
+        self._state.heard(f"a message ({kind}) of {name}", info)
+
+    def robots(self, doubts: Mapping[str, str]) -> None:
+        """Robots of which a newer description is not in use, and why."""
+        self._state.robots(doubts)
 
     def status(self) -> tuple[bytes, str, dict[str, object]]:
         """(level, message, values) for the diagnostics."""
@@ -101,6 +106,7 @@ class StopWatch:
             "cause": why.cause if why is not None else "",
             "stop_distance": settings["stop_distance"],
             "stop_timeout": settings["stop_timeout"],
+            "clock_error": settings["clock_error"],
             "look_ms": f"{self._nearness_ms:.3f}",
         }
         values |= {f"rises.{cause}": count for cause, count in sorted(self._state.rises.items())}

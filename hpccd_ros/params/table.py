@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from hpccd_core.options import ACCURACIES, BACKENDS, FEATURES, OUTPUTS, REPORTS
+from hpccd_ros.base.clocks import CLOCK_ERROR
 from hpccd_ros.middleware.topic_names import INPUTS
 
 # When a parameter may be changed.
@@ -397,10 +398,20 @@ STOP_ROWS = (
         "stop_timeout",
         "float",
         0.5,
-        "stop is true where no step was answered that ends with a frame of the last so many seconds, in steady time; "
-        "it is repeated four times as often, with this deadline and lease of liveliness",
+        "stop is true where no step was answered whose end is known from messages sent within the last so many "
+        "seconds, the oldest of them included; it is repeated four times as often, with this deadline and lease of "
+        "liveliness",
         unit="s",
         span=(0.01, 3600.0),
+    ),
+    Row(
+        "clock_error",
+        "float",
+        CLOCK_ERROR,
+        "Most by which the system clocks of the machines differ (NTP, PTP). A message from further in the future, or "
+        "a jump of the system clock by more, makes stop true until the clocks have agreed for stop_timeout",
+        unit="s",
+        span=(0.0, 10.0),
     ),
 )
 

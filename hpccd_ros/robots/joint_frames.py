@@ -9,7 +9,7 @@ from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from hpccd_ros.frames.drops import Reason, Refusal
+from hpccd_ros.frames.drops import Aspect, Reason, Refusal
 from hpccd_ros.frames.follower import Followed
 from hpccd_ros.frames.standstill import Standstill
 from hpccd_ros.frames.transform_buffer import NoTransformError, TransformBuffer
@@ -84,9 +84,10 @@ class JointFrames:
                 if not (error.final or too_many):
                     break
                 lacking = isinstance(error, NoJointStateError)
-                refusals += self._refused(Reason.NO_JOINT_STATE if lacking else Reason.NO_TRANSFORM, asked.awaited)
+                reason = Reason.NO_JOINT_STATE if lacking else Reason.NO_TRANSFORM
+                refusals += self._refused(reason, asked.awaited, Aspect.NOTHING)  # no message was rejected
             except RobotError as error:
-                refusals += self._refused(Reason.OUT_OF_RANGE, str(error))
+                refusals += self._refused(Reason.OUT_OF_RANGE, str(error), Aspect.PLACE)
             else:
                 times.append(frames)
                 self._standstill.ends()
@@ -163,7 +164,10 @@ class JointFrames:
         """Where no transform leads to the base."""
         return f"publish that, or give parameter robot.{self._robot.name}.pose"
 
-    def _refused(self, reason: Reason, text: str) -> list[Refusal]:
+    def _refused(self, reason: Reason, text: str, aspect: Aspect) -> list[Refusal]:
         """The text once: it is of the robot, not of a link."""
         first, *others = self.names
-        return [Refusal(first, reason, text), *(Refusal(name, reason) for name in others)]
+        return [
+            Refusal(first, reason, text, aspect=aspect),
+            *(Refusal(name, reason, aspect=aspect) for name in others),
+        ]

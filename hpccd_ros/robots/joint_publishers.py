@@ -11,6 +11,7 @@ from collections import deque
 from collections.abc import Callable, Collection, Iterable
 
 from hpccd_ros.base.quoting import quoted
+from hpccd_ros.frames.samples import HISTORY_NS
 
 # Bound what strangers can make the node keep: publishers of a topic, and values of a joint of each.
 MOST_PUBLISHERS = 8
@@ -48,12 +49,14 @@ class JointPublishers:
     """What each of several publishers said last of each joint. continuous: joints whose values are angles modulo 2 pi.
 
     Two agree on a joint where a value of one lies between those of the other before and after it, or beyond them by no
-    more than these differ: joints turn back between two messages.
+    more than these differ: joints turn back between two messages. Two that contradict each other do so until they are
+    found to agree, or one has been silent for HISTORY_NS.
     """
 
     def __init__(self, continuous: Collection[str]) -> None:
         self._continuous = continuous
         self._values: dict[str, dict[int, deque[tuple[int, float]]]] = {}
+        self._contradicting: set[tuple[str, frozenset[int]]] = set()
 
     def contradiction(self, publisher: int, stamp: int, joints: Iterable[tuple[str, float]]) -> str:
         """How a message contradicts another publisher, in words; "": it does not."""
@@ -65,24 +68,33 @@ class JointPublishers:
                 ours.clear()  # its time went back
             before = ours[-1] if ours else None
             ours.append((stamp, value))
-            for other, theirs in of_joint.items():
-                if other != publisher and not found and self._contradict(name, before, ours[-1], theirs):
-                    found = (
+            for other in [other for other in of_joint if other != publisher]:
+                pair = name, frozenset((publisher, other))
+                if of_joint[other][-1][0] < stamp - HISTORY_NS:
+                    del of_joint[other]
+                    self._contradicting.discard(pair)
+                elif compared := self._compared(name, before, ours[-1], of_joint[other]):
+                    (self._contradicting.discard if all(compared) else self._contradicting.add)(pair)
+                if pair in self._contradicting:
+                    found = found or (
                         f"two publishers contradict each other on joint {quoted(name)}, one says {value:.6g} at "
                         f"{stamp} ns; let one publisher tell of each joint"
                     )
         return found
 
-    def _contradict(
+    def _compared(
         self, name: str, before: tuple[int, float] | None, at: tuple[int, float], theirs: deque[tuple[int, float]]
-    ) -> bool:
+    ) -> list[bool]:
+        """Whether they agree, once for each value that can be compared."""
+        found = []
         place = bisect_left(theirs, at[0], key=lambda item: item[0])
         if place < len(theirs) and (place > 0 or theirs[place][0] == at[0]):
             start = theirs[place] if theirs[place][0] == at[0] else theirs[place - 1]
-            if not self._between(name, start[1], theirs[place][1], at[1]):
-                return True
-        passed = [value for stamp, value in theirs if before is not None and before[0] < stamp < at[0]]
-        return any(not self._between(name, before[1], at[1], value) for value in passed)
+            found.append(self._between(name, start[1], theirs[place][1], at[1]))
+        if before is not None:
+            passed = [value for stamp, value in theirs if before[0] < stamp < at[0]]
+            found += [self._between(name, before[1], at[1], value) for value in passed]
+        return found
 
     def _between(self, name: str, start: float, end: float, value: float) -> bool:
         change, offset = end - start, value - start

@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Doubts about single meshes: a newer message was rejected, so that where the mesh is, or what it is, is unknown until
+a valid one comes. No ROS."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from hpccd_ros.detect.scene import SceneBuilder
+from hpccd_ros.frames.drops import Aspect, Input, Reason, Refusal
+from hpccd_ros.frames.types import TF, Origin
+from hpccd_ros.params import robot_parameters
+from hpccd_ros.params.table import ROBOT
+
+# What was right but gave way: to a newer message, to a frame of another mesh, or to a scene without that mesh. Where
+# joint states or transforms are missing, frames end, which their age tells.
+GAVE_WAY = {
+    Reason.UNKNOWN_MESH, Reason.LATE, Reason.INCOMPLETE, Reason.RESTART, Reason.OVERLOAD, Reason.MIDDLEWARE,
+    Reason.STOPPED,
+}  # fmt: skip
+_ASPECTS = {Aspect.PLACE: "positions", Aspect.SHAPE: "the shape", Aspect.TOPOLOGY: "the topology"}
+
+
+@dataclass(frozen=True)
+class WatchedScene:
+    """Names of the ``meshes`` of a scene, in its order; ``moving``: whether each of them moves. ``by_joints``: topic of
+    joint states -> meshes that these move; ``by_transforms``: meshes that transforms place as they move."""
+
+    meshes: tuple[str, ...] = ()
+    moving: tuple[bool, ...] = ()
+    by_joints: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    by_transforms: tuple[str, ...] = ()
+
+    @classmethod
+    def of(
+        cls, builder: SceneBuilder, settings: Mapping[str, Any], links: Mapping[str, Sequence[str]]
+    ) -> "WatchedScene":
+        """links: robot -> names of its meshes, of the robots that are known."""
+        robots = settings[ROBOT]
+        by_joints = {
+            topic: tuple(name for robot in moved for name in links.get(robot, ()))
+            for topic, moved in robot_parameters.joint_topics(robots).items()
+        }
+        based = {name for robot, values in robots.items() if not values["pose"] for name in links.get(robot, ())}
+        return cls(
+            tuple(mesh.name for mesh in builder.meshes),
+            tuple(not mesh.static for mesh in builder.meshes),
+            by_joints,
+            tuple(
+                mesh.name
+                for mesh in builder.meshes
+                if not mesh.static and (mesh.transform == "tf" or mesh.input == TF or mesh.name in based)
+            ),
+        )
+
+    def concerned(self, refusal: Refusal) -> tuple[str, ...]:
+        """Meshes that are unknown after it."""
+        if refusal.reason in GAVE_WAY or refusal.aspect is Aspect.NOTHING:
+            return ()
+        if refusal.what is Input.TRANSFORM:
+            return self.by_transforms
+        if refusal.what is Input.JOINT_STATE:
+            return self.by_joints.get(refusal.mesh, ())
+        return (refusal.mesh,) if refusal.mesh in self.meshes else ()
+
+
+@dataclass(frozen=True)
+class Doubt:
+    """``meshes`` are unknown until something of this ``aspect`` is in use, of each of them, that was sent after
+    ``sent``, ns."""
+
+    meshes: tuple[str, ...]
+    aspect: Aspect
+    sent: int
+    text: str
+
+    def settled(self, origins: Mapping[str, Origin]) -> bool:
+        """Whether a frame of these origins has it."""
+        return all(_sent(origins[mesh], self.aspect) > self.sent for mesh in self.meshes if mesh in origins)
+
+
+def text_of(refusal: Refusal) -> str:
+    """Why stop is true, a sentence without its full stop."""
+    if refusal.what is Input.JOINT_STATE and refusal.reason is Reason.CONTRADICTED:
+        return f"two publishers on {refusal.mesh} contradict each other"
+    if refusal.what in (Input.JOINT_STATE, Input.TRANSFORM):
+        return f"{refusal.what} on {refusal.mesh} were rejected: {refusal.reason}"
+    return f"{_ASPECTS[refusal.aspect]} of mesh {refusal.mesh} were refused: {refusal.reason}"
+
+
+def _sent(origin: Origin, aspect: Aspect) -> int:
+    if aspect is Aspect.PLACE:
+        return origin.place
+    return origin.shape if aspect is Aspect.SHAPE else origin.topology
