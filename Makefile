@@ -40,7 +40,7 @@ INSTALLED   := $(VENV)/.hpccd-installed
 SOURCES := $(sort $(shell find CMakeLists.txt setup.py package.xml action cmake config launch msg srv scripts hpccd_ros hpccd_core \
   \( -name __pycache__ -o -name dist -o -path hpccd_core/tests \) -prune -o -type f -print))
 
-.PHONY: help venv demo test test-core test-python test-gpu test-aarch64 sanitize fuzz lint format release-check pin clean distclean \
+.PHONY: help venv demo test test-core test-python test-long test-gpu test-aarch64 sanitize fuzz lint format release-check pin clean distclean \
   FORCE
 
 help: ## Show this list
@@ -71,6 +71,9 @@ test-core: $(ENVIRONMENT) ## Only the C++ tests of the core
 
 test-python: venv ## Only the Python tests: core against oracles, node over DDS, recordings
 	$(BIN)/pytest --numprocesses $(TEST_JOBS) --dist worksteal $(PYTEST_ARGS)
+
+test-long: venv ## Only the Python tests that take minutes, which make test skips
+	$(BIN)/pytest --long -m long --numprocesses $(TEST_JOBS) $(PYTEST_ARGS)
 
 test-gpu: venv ## Only the tests of the GPU backends, on a machine with an NVIDIA GPU
 	@$(BIN)/python -c 'import sys, hpccd_core as hc; "gpu" in hc.backends() or sys.exit(sys.argv[1])' \

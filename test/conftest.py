@@ -19,6 +19,18 @@ if worker := int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw")
 _numbers = itertools.count()
 
 
+def pytest_addoption(parser):
+    parser.addoption("--long", action="store_true", help="run the tests marked long, which take minutes")
+
+
+def pytest_collection_modifyitems(config, items):
+    if not config.getoption("--long"):
+        for item in items:
+            if item.get_closest_marker("long"):
+                item.add_marker(pytest.mark.skip(reason="takes minutes; make test-long runs it"))
+
+
+
 @pytest.fixture(scope="session")
 def data_folder():
     """Folder of scenes and queries with ground truth."""

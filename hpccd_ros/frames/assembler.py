@@ -27,7 +27,7 @@ from dataclasses import replace
 
 from hpccd_ros.base.quoting import listed
 from hpccd_ros.frames.coordinate_frame import CoordinateFrame
-from hpccd_ros.frames.drops import Input, Reason, Refusal
+from hpccd_ros.frames.drops import Aspect, Input, Reason, Refusal
 from hpccd_ros.frames.matching import ExactMatcher, Match, Matcher, NearestMatcher
 from hpccd_ros.frames.outcome import Outcome
 from hpccd_ros.frames.restart import Restart
@@ -123,11 +123,14 @@ class FrameAssembler:
         if current is not None and not new_publisher and (refusal := check_successor(mesh, topology, current)):
             return Outcome(refusals=[refusal])
         state.topologies.put(topology)
+        placed = state.positions.last_sent
         state.positions.clear()
         early, state.early = state.early, deque()
-        outcome = Outcome(unplaced=[(mesh, topology.sent)] if state.static else [])
+        outcome = Outcome()
         for frame in early:
             outcome += self._admit(state, frame)
+        if placed is not None and not state.positions.frame_ids:
+            outcome.unplaced.append((mesh, placed))
         return outcome
 
     def hear(self, mesh: str, received: float) -> None:
@@ -246,7 +249,8 @@ class FrameAssembler:
                 place = kept.newest.sent if kept.newest.received >= state.newest else OUTDATED
             else:
                 text = _no_positions(state, frame_id)
-                return [Refusal(fresh, Reason.STATIC_MISSING, text) for fresh in match.fresh]
+                missing = Reason.STATIC_MISSING
+                return [Refusal(fresh, missing, text, aspect=Aspect.NOTHING) for fresh in match.fresh]
             frames.append(frame)
             origins.append(Origin(place, frame.shape_sent, state.topologies.sent_of(frame.topology)))
             frame_id = frame_id or frame.frame_id

@@ -27,6 +27,11 @@ class StaticPositions:
         """The last one that was sent last."""
         return list(self._by_frame_id)
 
+    @property
+    def last_sent(self) -> int | None:
+        """When the last ones were; None: there are none."""
+        return max((kept.newest.sent for kept in self._by_frame_id.values()), default=None)
+
     def keep(self, frame: MeshFrame) -> None:
         known = self._by_frame_id.pop(frame.frame_id, None)
         same = known is not None and np.array_equal(known.frame.vertices, frame.vertices)

@@ -83,6 +83,8 @@ def text_of(refusal: Refusal) -> str:
     """Why stop is true, a sentence without its full stop."""
     if refusal.what is Input.JOINT_STATE and refusal.reason is Reason.CONTRADICTED:
         return f"two publishers on {refusal.mesh} contradict each other"
+    if refusal.reason is Reason.STATIC_MISSING:
+        return f"static mesh {refusal.mesh} has a new topology and no positions yet"
     if refusal.what in (Input.JOINT_STATE, Input.TRANSFORM):
         return f"{refusal.what} on {refusal.mesh} were rejected: {refusal.reason}"
     return f"{_ASPECTS[refusal.aspect]} of mesh {refusal.mesh} were refused: {refusal.reason}"

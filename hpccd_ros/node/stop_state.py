@@ -75,6 +75,7 @@ class StopState:
         self._why: Why | None = Why(Cause.INACTIVE, "the node is not active")
         self._doubts: dict[object, tuple[Cause, Doubt]] = {}
         self._robots: Mapping[str, str] = {}
+        self._outdated = ""  # mesh of which the last step that was clear had an old place
         self._unsaid: Why | None = None
         self._said: Why | None = None
         self._looked: float | None = None  # when the thread that publishes did, in steady time
@@ -126,17 +127,14 @@ class StopState:
         if near:
             self._tell(Cause.NEAR, f"meshes came within {distance:g} of each other on the last step, or touched")
             return
-        outdated = next((mesh for mesh, origin in by_name.items() if origin.place == OUTDATED), "")
-        if outdated:
-            text = f"a newer message about where mesh {outdated} is was rejected, or is not in use yet"
-            self._tell(Cause.REFUSED, text)
-            return
         with self._condition:
             if distance < self.distance or scene is not self._scene or not self._active:
                 return
+            before = self._now()
+            self._outdated = next((mesh for mesh, origin in by_name.items() if origin.place == OUTDATED), "")
             self._oldest, self._oldest_of = min(moving, default=(ALWAYS, ""))
             self._why = None
-            self._condition.notify_all()
+            self._rise(before)
 
     def changed(self, distance: float) -> None:
         """Another distance is asked for from now on."""
@@ -221,6 +219,9 @@ class StopState:
             return self._why
         for cause, doubt in self._doubts.values():
             return Why(cause, doubt.text)
+        if self._outdated:
+            text = f"a newer message about where mesh {self._outdated} is was rejected, or is not in use yet"
+            return Why(Cause.REFUSED, text)
         for name, text in self._robots.items():
             return Why(Cause.REFUSED, f"robot {name}: {text}")
         if text := self._ages.why(self._clocks.steady()):

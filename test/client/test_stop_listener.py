@@ -13,6 +13,7 @@ from rclpy.node import Node
 from std_msgs.msg import Bool
 
 from hpccd_ros import client
+from hpccd_ros.base.clocks import Clocks
 from hpccd_ros.middleware import environment, qos
 
 TIMEOUT = 1.0
@@ -154,16 +155,41 @@ def test_an_executor_that_stands_still(place):
 
 
 def test_system_time_that_jumps(place, monkeypatch):
-    """Nothing is false for it: a message that seems to have waited for an hour does not count, nor one from then."""
+    """True until both clocks have agreed again for a time-out."""
     listener = place.listener()
     place.speaker()
     place.until(lambda: not listener.stop, "false")
     now = time.time_ns
     for jump in (3600 * 10**9, -3600 * 10**9):
         monkeypatch.setattr(time, "time_ns", lambda jump=jump: now() + jump)
-        place.until(lambda: "waited too long" in listener.reason, "doubt")
+        place.until(lambda: "The system clock jumped by" in listener.reason, "doubt")
         monkeypatch.setattr(time, "time_ns", now)
         place.until(lambda: not listener.stop, "false")
+
+
+def test_an_old_word_is_old_however_late_it_is_heard(place, monkeypatch):
+    """Of a listener that came late, for which DDS kept the last word, and of a process that was held up: what counts is
+    when it was sent."""
+    speaker = place.speaker()
+    first = place.listener()
+    place.until(lambda: not first.stop, "false")
+    speaker.silent()
+    time.sleep(1.2 * TIMEOUT)
+    late = place.listener()
+    end = time.monotonic() + 0.5 * TIMEOUT
+    while time.monotonic() < end:
+        place.executor.spin_once(timeout_sec=0.01)
+        assert late.stop and first.stop
+    place.until(lambda: "that was sent in the last" in late.reason, "the latched word")
+    now = time.time_ns()
+    for sent, stop in ((0.9, False), (0.96, True), (-0.01, False)):
+        info = {"source_timestamp": now - round(sent * TIMEOUT * 1e9), "received_timestamp": now}
+        monkeypatch.setattr(late, "_clocks", Clocks(time.monotonic, lambda: now))
+        late._sent, late._alive = None, 1
+        late._on_message(Bool(data=False), info)
+        assert late.stop is stop, late.reason
+    late._on_message(Bool(data=False), {"source_timestamp": now + 50_000_000, "received_timestamp": now})
+    assert "0.05 s in the future" in late.reason
 
 
 def test_several_publishers(place):
@@ -206,6 +232,8 @@ def test_a_publisher_that_promises_less_is_never_heard(place, profile):
         (dict(publishers=0), ValueError, "publishers: 0; at least one"),
         (dict(publishers=1.5), TypeError, "publishers: expected how many, got float"),
         (dict(publishers=True), TypeError, "publishers: expected how many, got bool"),
+        (dict(clock_error="1"), TypeError, "clock_error: expected seconds, got str"),
+        (dict(clock_error=-0.1), ValueError, "clock_error: -0.1 s; give from 0 s to 10 s"),
     ],
 )
 def test_wrong_arguments(place, options, error, text):

@@ -12,7 +12,11 @@ import stop_stream
 from hand_and_table import FACES, MESHES, TABLE, hand
 from lifecycle_msgs.msg import Transition
 from node_calls import change_state, set_parameter
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
 from stop_stream import NEAR, SHORT, TIMEOUT
+
+from hpccd_ros.middleware import fields, qos
 
 
 @pytest.fixture
@@ -89,7 +93,7 @@ def test_an_edge_in_the_middle_of_a_face_stays_near(start_stream):
 
 
 @pytest.mark.parametrize("what", ["not finite", "count", "backward", "topology"])
-def test_what_is_refused_is_true_until_the_next_answer(start_stream, what):
+def test_what_is_refused_is_true_until_something_valid_of_the_mesh_comes(start_stream, what):
     stream = start_stream()
     stream.start()
     if what == "topology":
@@ -101,8 +105,127 @@ def test_what_is_refused_is_true_until_the_next_answer(start_stream, what):
     stream.status("refused", f"of mesh hand were refused: {reason.get(what, 'topology_conflict')}")
     stream.expect(True)
     stream.sent += 1
+    if what == "topology":  # which one the positions belong to, they do not say
+        stream.frame(1.0)
+        stream.answered(3)
+        assert stream.listener.stop
+        stream.topologies()
     stream.frame(1.0)
     stream.expect(False)
+
+
+def test_a_static_mesh_whose_new_place_is_refused_is_unknown(start_stream):
+    """Frames of the other mesh go on: they say nothing of it, and where it was is not where it is."""
+    stream = start_stream(mesh={"table": {"static": True}})
+    peer = stream.node.peer
+    stream.topologies()
+
+    def hands():
+        for _ in range(2):
+            stream.sent += 1
+            peer.vertices("hand", hand(2.0), stamp=stream.sent, frame_id="world")
+        stream.node.frames_status(answered=stream.sent + taken)
+
+    taken = 1
+    peer.vertices("table", TABLE, stamp=1, frame_id="world")
+    hands()
+    stream.expect(False)
+    moved = TABLE + [0, 0, 1.9]
+    for refused, cause in (
+        (lambda: peer.vertices("table", moved * math.nan, stamp=2, frame_id="world"), "not_finite"),
+        (lambda: peer.vertices("table", moved[:2], stamp=2, frame_id="world"), "wrong_vertex_count"),
+        (lambda: peer.topology("table", FACES + 9, 3, version=1), "index_range"),
+        (lambda: peer.vertices("table", moved, stamp=2, frame_id="map"), "is not in use yet"),
+    ):
+        refused()
+        if cause == "is not in use yet":
+            taken += 1
+            stream.node.frames_status(answered=stream.sent + taken)
+            hands()
+        stream.status("refused", cause)
+        stream.expect(True)
+        hands()
+        stream.status("refused", cause)
+        assert stream.listener.stop
+        peer.topology("table", FACES, 3)
+        peer.vertices("table", TABLE, stamp=2, frame_id="world")
+        taken += 1
+        stream.node.frames_status(answered=stream.sent + taken)
+        hands()
+        stream.expect(False)
+
+
+SLIDER = """<robot name="arm"><link name="base"/><link name="tip"><collision><geometry><box size="0.1 0.1 0.1"/>
+</geometry></collision></link><joint name="z" type="prismatic"><parent link="base"/><child link="tip"/>
+<axis xyz="0 0 1"/><limit lower="-9" upper="9"/></joint></robot>"""
+
+
+def test_a_robot_of_which_something_newer_is_refused_is_unknown(start_stream):
+    """A joint named twice, publishers that contradict each other, descriptions that are refused or make no scene."""
+    stream = start_stream(
+        meshes=["table"], mesh={"table": {"static": True}}, robots=["arm"], ignored_pairs=["arm:arm"],
+        pair_separation=["arm/tip:table:0.1"],
+        robot={"arm": {"joint_states": "joint_states", "pose": [0.0, 0.0, 2.0, 0.0, 0.0, 0.0, 1.0]}},
+    )  # fmt: skip
+    peer, stamp = stream.node.peer, 10**9
+    peer.topology("table", FACES, 3)
+    peer.vertices("table", TABLE, stamp=1)
+    stream.node.frames_status(answered=1)
+    describe = peer.publisher(String, "robot_description", qos.DESCRIPTION)
+    other = peer.node.create_publisher(JointState, "joint_states", 10)
+
+    def say(names=("z",), at=(0.0,), publisher=None):
+        message = JointState(name=list(names), position=list(at))
+        message.header.stamp = fields.ns_to_stamp(stamp)
+        (publisher or peer.publisher(JointState, "joint_states")).publish(message)
+
+    def until(condition, **options):
+        """Joint states go on meanwhile."""
+        nonlocal stamp
+        deadline = time.monotonic() + 60
+        while not condition():
+            assert time.monotonic() < deadline, stream.node.peer.statuses["stop"]
+            stamp += 10**7
+            say(**options)
+            stream.node.peer.executor.spin_once(timeout_sec=0.02)
+
+    def stop_is(said, text=""):
+        def heard():
+            status = peer.statuses.get("stop", (b"", "", {}))
+            return stream.heard and stream.heard[-1][1] is said and text in status[1]
+
+        return heard
+
+    def clear():
+        until(stop_is(False))
+
+    describe.publish(String(data=SLIDER))
+    clear()
+    until(stop_is(True, "joint states on joint_states were rejected: malformed"), names="zz", at=(-1.95, 0.0))
+    clear()
+    for _ in range(20):
+        stamp += 10**7
+        say()
+        say(at=(-1.0,), publisher=other)
+        peer.executor.spin_once(timeout_sec=0.02)
+    stream.status("refused", "two publishers on joint_states contradict each other")
+    until(stop_is(True, "contradict each other"))
+    peer.node.destroy_publisher(other)
+    stamp += 11 * 10**9
+    clear()
+    for wrong, why in (
+        (SLIDER.replace('name="base"/>', 'name="base"/><link name="stray"/>'), "its description was rejected"),
+        (SLIDER.replace('"tip"', '"tool"'), "the scene stays as it was"),
+    ):
+        describe.publish(String(data=wrong))
+        until(stop_is(True, why))
+        for _ in range(20):
+            stamp += 10**7
+            say()
+            peer.executor.spin_once(timeout_sec=0.02)
+        assert stop_is(True, why)()
+        describe.publish(String(data=SLIDER))
+        clear()
 
 
 def test_a_new_topology_is_true_until_a_step_with_it(start_stream):
@@ -125,7 +248,24 @@ def test_dead_input_is_true(start_stream):
     stream.expect(True)
     rose = next(at for at, said in reversed(stream.heard) if at > died and said)
     assert rose - died < SHORT + 5.0
-    stream.status("silent", "the last frame that was found clear came")
+    stream.status("silent", "the last frame that was found clear came with a message of mesh")
+
+
+def test_frames_that_waited_while_the_node_was_held_up_are_old(start_stream):
+    """The publisher has died meanwhile: what it sent before is no news."""
+    stream = start_stream(SHORT)
+    stream.topologies()
+    with stream.steady():
+        stream.expect(False)
+        stream.node.process.send_signal(signal.SIGSTOP)
+        time.sleep(0.3)
+    time.sleep(2 * SHORT)
+    before = len(stream.heard)
+    stream.node.process.send_signal(signal.SIGCONT)
+    stream.node.wait_until(lambda: len(stream.heard) > before + 6, "repetitions")
+    assert all(said for _, said in stream.heard[before:])
+    with stream.steady():
+        stream.expect(False)
 
 
 def test_the_distance_may_change_and_not_be_switched_off(start_stream):
