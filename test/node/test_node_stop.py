@@ -116,7 +116,7 @@ def test_what_is_refused_is_true_until_something_valid_of_the_mesh_comes(start_s
 
 def test_a_static_mesh_whose_new_place_is_refused_is_unknown(start_stream):
     """Frames of the other mesh go on: they say nothing of it, and where it was is not where it is."""
-    stream = start_stream(mesh={"table": {"static": True}})
+    stream = start_stream(mesh={"table": {"static": True}}, frame_queue=10)
     peer = stream.node.peer
     stream.topologies()
 

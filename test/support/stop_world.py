@@ -81,6 +81,7 @@ class World:
         self.options = configuration.options
         self.robot = Robot.of(ARM, name="arm")
         self.state = StopState(DISTANCE, TIMEOUT, clock_error=ERROR, clocks=clocks)
+        self.state.next(0.0)
         self.accounts = Accounts(lambda text: None)
         self.accounts.on_refused = self.state.refused
         self.accounts.on_heard = lambda kind, name, info: self.state.heard(f"{kind} of {name}", info)
