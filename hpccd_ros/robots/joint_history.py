@@ -55,7 +55,7 @@ class JointHistory:
 
     def __init__(self, kinematics: Kinematics) -> None:
         self._joints = {name: _Values(name in kinematics.continuous) for name in kinematics.inputs}
-        self._named = ""  # joints of the last message
+        self._named: Sequence[str] = ()  # joints of the last message
         self._unusable: dict[str, str] = {}  # joints whose last message had no usable position, and why
         self._last: dict[str, int] = {}  # stamp of the last usable position of each joint, though it be forgotten
         self._publishers = JointPublishers(kinematics.continuous)
@@ -73,7 +73,7 @@ class JointHistory:
         robot does not need are ignored; a position that is not finite is left out, and the others of the message are
         used. Raises RobotError, and then nothing of it is kept."""
         check_lengths(names, positions)
-        self._named = listed(names)
+        self._named = names
         if names and not positions:
             self._unusable |= {name: _not_given(name, stamp) for name in names if name in self._joints}
             return Added()
@@ -84,7 +84,8 @@ class JointHistory:
             if math.isfinite(value := float(position)):
                 found.append((name, value))
                 self._last[name] = stamp
-                self._unusable.pop(name, None)
+                if self._unusable:
+                    self._unusable.pop(name, None)
             else:
                 self._unusable[name] = f"{quoted(name)} is {value} in the joint state of {stamp} ns"
                 left_out.append(name)
@@ -151,7 +152,7 @@ class JointHistory:
             last = max(self._last[name] for name in known)
             reasons.append(f"the last position of {listed(known)}, of {last} ns, is from before the clock was set back")
         if never := [name for name in lacking if name not in self._last and name not in self._unusable]:
-            named = f"; the last one names {self._named}" if self._named else ""
+            named = f"; the last one names {listed(self._named)}" if self._named else ""
             reasons.append(f"no joint state has named {listed(never)}{named}")
         raise NoJointStateError("; ".join(reasons), final=False)
 
