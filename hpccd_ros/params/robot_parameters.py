@@ -79,9 +79,10 @@ def check(settings: dict[str, Any]) -> None:
 
 
 def unusable_home(robots: RobotValues) -> str | None:
-    """Why a file of a robot cannot be on this machine, whatever lies there, or None."""
+    """Which file of a robot lies in the home folder of a user that there is not, or None."""
     for name, values in robots.items():
-        for parameter in ("description", "srdf"):
+        files = ["srdf"] if comes_on_topic(values["description"]) else ["description", "srdf"]
+        for parameter in files:
             try:
                 Path(values[parameter]).expanduser()
             except RuntimeError:  # ~name, and there is no such user

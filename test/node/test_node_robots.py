@@ -289,6 +289,13 @@ def test_a_file_that_cannot_be_used_ends_the_start(start_node, tmp_path):
         node = start_node({**parameters(**{**JOINTS, "description": str(file)}), "autostart": False}, wait=False)
         assert not change_state(node, Transition.TRANSITION_CONFIGURE)
         assert "cannot configure: robot.crane.description: " in node.output() and why in node.output()
+        for parameter, value, reason in (
+            ("joint_states", "contacts", "contacts and robot.crane.joint_states: both are the topic"),
+            ("joint_states", "a b", "this name cannot be used"),
+            ("srdf", "~nosuchuser/crane.srdf", "no such home folder"),
+        ):
+            refused = set_parameter(node, f"robot.crane.{parameter}", value)
+            assert not refused.successful and reason in refused.reason, refused.reason
         file.write_text(crane.URDF)  # mended while the node runs
         for transition in (Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE):
             assert change_state(node, transition)
