@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from .worlds import PairsOfWorlds, Slices
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, eq=False)
 class Contacts(PairsOfWorlds):
     """Contacts in canonical order: vertex-face by (vertex, face), then edge-edge by (a0, a1, b0, b1).
 
@@ -25,7 +25,8 @@ class Contacts(PairsOfWorlds):
     in one plane), and where there is no direction, because at toc the face has no area, or the edges are parallel or
     points. Names do not matter: any order of corners and ends gives the same normal, edges exchanged turn it round.
     With a minimum separation a point is the midpoint of the nearest points at toc, and the normal the direction from
-    face to vertex, or from edge a to edge b; where they already touch at the start, as above.
+    face to vertex, or from edge a to edge b, when they first come within it; where they already touch at the start, as
+    above.
     closest: (N+M, 2, 3) float64, the nearest points of both sides at toc: of the vertex and the face, or of edge a and
     edge b; empty (0, 2, 3) unless "closest" is among the detector's outputs.
     first_toc: the earliest time, +inf where nothing touches.
@@ -35,6 +36,7 @@ class Contacts(PairsOfWorlds):
     int64, where the rows of each world begin, and N or M. first_tocs: (W,) float64; first_toc is the least of them.
     hash: the sum of each world's hash times 2 k + 1, modulo 2**64. world(k): the contacts of one world, as a detector
     of its own gives them. Without worlds it is as with one: offsets [0, N] and [0, M], one of first_tocs, world(0).
+    a == b: whether all of these are equal, row by row. Contacts are not hashable; `hash` may serve as a key.
     """
 
     vf: NDArray[np.uint32]

@@ -1,13 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 # What the library is made of on every machine; room by room, as data goes.
 set(hpccd_sources
-  src/base/forks.cpp src/base/machine_rate.cpp src/base/parallel.cpp src/base/simd.cpp src/base/thread_affinity.cpp
+  src/base/forks.cpp src/base/machine_rate.cpp src/base/parallel.cpp src/base/simd.cpp
+  src/base/thread_affinity.cpp
   src/rigid/c_library.cpp src/rigid/joint_bounds.cpp src/rigid/joint_chain.cpp src/rigid/placed_vertices.cpp
   src/scene/edges.cpp src/scene/features.cpp src/scene/scene.cpp src/scene/separation_table.cpp
   src/scene/static_meshes.cpp
   src/bvh/build.cpp src/bvh/motion_bounds.cpp src/bvh/refit.cpp src/bvh/split.cpp
   src/elementary/batch.cpp src/elementary/distance/distance_batch.cpp src/elementary/exact/contact.cpp
-  src/elementary/exact/distance.cpp src/elementary/exact/intersection.cpp src/elementary/exact/separation.cpp
+  src/elementary/exact/distance.cpp src/elementary/exact/gap_in_motion.cpp
+  src/elementary/exact/intersection.cpp src/elementary/exact/separation.cpp
   src/elementary/exact/wide/approach.cpp src/elementary/exact/wide/common_roots.cpp
   src/elementary/exact/wide/earliest.cpp src/elementary/exact/wide/first_time.cpp
   src/elementary/exact/wide/isolate.cpp src/elementary/exact/wide/part.cpp src/elementary/exact/wide/root.cpp

@@ -147,25 +147,84 @@ def _dot(u, v):
     return sum(x * y for x, y in zip(u, v, strict=True))
 
 
-def squared_distance_to_segment(x, start, end):
-    along, there = [e - s for s, e in zip(start, end, strict=True)], [c - s for s, c in zip(start, x, strict=True)]
+def _difference(u, v):
+    return [x - y for x, y in zip(u, v, strict=True)]
+
+
+def _from_segment(x, start, end):
+    """The vector to x from the nearest point of a segment."""
+    along, there = _difference(end, start), _difference(x, start)
     length = _dot(along, along)
     place = min(max(_dot(there, along) / length, 0), 1) if length else 0
-    rest = [c - place * d for c, d in zip(there, along, strict=True)]
-    return _dot(rest, rest)
+    return [c - place * d for c, d in zip(there, along, strict=True)]
 
 
-def squared_distance_to_triangle(x, corners):
-    border = min(squared_distance_to_segment(x, corners[i - 1], corners[i]) for i in range(3))
+def _from_triangle(x, corners):
+    border = min((_from_segment(x, corners[i - 1], corners[i]) for i in range(3)), key=lambda v: _dot(v, v))
     p, a, b = ([c - o for o, c in zip(corners[0], y, strict=True)] for y in (x, corners[1], corners[2]))
     aa, ab, bb, pa, pb = _dot(a, a), _dot(a, b), _dot(b, b), _dot(p, a), _dot(p, b)
     area = aa * bb - ab * ab
     alpha, beta = bb * pa - ab * pb, aa * pb - ab * pa
     if area == 0 or min(alpha, beta, area - alpha - beta) < 0:
         return border
-    foot = [(alpha * c + beta * d) / area for c, d in zip(a, b, strict=True)]
-    rest = [c - d for c, d in zip(p, foot, strict=True)]
+    return _difference(p, [(alpha * c + beta * d) / area for c, d in zip(a, b, strict=True)])
+
+
+def squared_distance_to_segment(x, start, end):
+    rest = _from_segment(x, start, end)
     return _dot(rest, rest)
+
+
+def squared_distance_to_triangle(x, corners):
+    rest = _from_triangle(x, corners)
+    return _dot(rest, rest)
+
+
+def positions(query, t):
+    """Of the four points at time t, in rationals."""
+    q, t = _rational(query), Fraction(t)
+    return [[(1 - t) * c + t * d for c, d in zip(q[i], q[i + 4], strict=True)] for i in range(4)]
+
+
+def gap(kind, now):
+    """The vector from face to vertex or from edge a to edge b between their nearest points; now: as of positions()."""
+    if kind == VERTEX_FACE:
+        return _from_triangle(now[0], now[1:])
+    a0, a1, b0, b1 = now
+    p, a, b = _difference(b0, a0), _difference(a1, a0), _difference(b1, b0)
+    aa, ab, bb, pa, pb = _dot(a, a), _dot(a, b), _dot(b, b), _dot(p, a), _dot(p, b)
+    area = aa * bb - ab * ab
+    on_a, on_b = bb * pa - ab * pb, ab * pa - aa * pb
+    if area and 0 <= on_a <= area and 0 <= on_b <= area:
+        return [c - (on_a * x - on_b * y) / area for c, x, y in zip(p, a, b, strict=True)]
+    ends = [_from_segment(x, a0, a1) for x in (b0, b1)]
+    ends += [[-c for c in _from_segment(x, b0, b1)] for x in (a0, a1)]
+    return min(ends, key=lambda v: _dot(v, v))
+
+
+def unit(vector):
+    largest = max(map(abs, vector))
+    direction = np.array([float(x / largest) for x in vector])
+    return direction / np.linalg.norm(direction)
+
+
+def direction_of_gap(kind, query, d, toc, touching):
+    """At the first time at which the gap is as short as d, of which toc is the time rounded down; they touch, to d, at
+    the other time."""
+
+    def within(t):
+        between = gap(kind, positions(query, t))
+        return _dot(between, between) <= Fraction(d) ** 2
+
+    low = max(Fraction(toc) - Fraction(1, 10**14), Fraction(0))
+    width = Fraction(1, 10**12)
+    while not within(high := min(low + width, Fraction(touching))):
+        assert high < touching, "never within d"
+        width *= 2
+    for _ in range(30):
+        middle = (low + high) / 2
+        low, high = (low, middle) if within(middle) else (middle, high)
+    return unit(gap(kind, positions(query, low)))
 
 
 def _moving_size(points):

@@ -6,11 +6,20 @@
 #include "elementary/exact/contact.h"
 #include "elementary/exact/distance.h"
 #include "elementary/exact/fixed_approach.h"
+#include "elementary/exact/gap_in_motion.h"
 
 namespace hpccd {
 
 struct ByIntegers {
-  exact::Nearest nearest(Kind kind, const Vec3<double> q[4]) const { return exact::nearest(kind, q); }
+  // q: where the vertices are at the time asked for.
+  exact::Nearest nearest(Kind kind, const Vec3<double> q_t0[4], const Vec3<double> q_t1[4],
+                         const Vec3<double> q[4]) const {
+    return exact::nearest(kind, q, kind == Kind::edge_edge && exact::stay_parallel(q_t0, q_t1));
+  }
+  Vec3<double> direction_of_gap(Kind kind, const Vec3<double> q_t0[4], const Vec3<double> q_t1[4], double toc,
+                                double separation) const {
+    return exact::direction_of_gap(kind, q_t0, q_t1, toc, separation);
+  }
   exact::Approach approach(Kind kind, const Vec3<double> q_t0[4], const Vec3<double> q_t1[4], double toc) const {
     return exact::approach(kind, q_t0, q_t1, toc);
   }
@@ -20,9 +29,13 @@ struct ByIntegers {
 struct LeftOpen {
   bool open = false;
 
-  HPCCD_HD exact::Nearest nearest(Kind, const Vec3<double>*) {
+  HPCCD_HD exact::Nearest nearest(Kind, const Vec3<double>*, const Vec3<double>*, const Vec3<double>*) {
     open = true;
     return {};
+  }
+  HPCCD_HD Vec3<double> direction_of_gap(Kind, const Vec3<double>*, const Vec3<double>*, double, double) {
+    open = true;
+    return {0, 0, 0};
   }
   HPCCD_HD exact::Approach approach(Kind, const Vec3<double>*, const Vec3<double>*, double) {
     open = true;
@@ -34,9 +47,13 @@ struct LeftOpen {
 struct ByFixedIntegers {
   bool open = false;
 
-  HPCCD_HD exact::Nearest nearest(Kind, const Vec3<double>*) {
+  HPCCD_HD exact::Nearest nearest(Kind, const Vec3<double>*, const Vec3<double>*, const Vec3<double>*) {
     open = true;
     return {};
+  }
+  HPCCD_HD Vec3<double> direction_of_gap(Kind, const Vec3<double>*, const Vec3<double>*, double, double) {
+    open = true;
+    return {0, 0, 0};
   }
   HPCCD_HOST_DEVICE exact::Approach approach(Kind kind, const Vec3<double> q_t0[4], const Vec3<double> q_t1[4],
                                              double toc) {

@@ -13,12 +13,16 @@ struct NearestPoints {
   double distance;
   Vec3<double> on_first, on_second;  // the vertex and the face, or edge a and edge b
   Vec3<double> direction;            // unit length: from face to vertex, or from edge a to edge b; zero at no distance
+  bool certain;                      // the direction is: not what the rounding of positions has made of a short gap
 };
 
-// Of q[0..3] as in motion.h. Where edges are parallel: in the middle of the stretch along which they are nearest.
+// At a time of the step. Where edges are parallel: in the middle of the stretch along which they are nearest.
 template <Kind kind, class Arbiter>
-HPCCD_HD NearestPoints nearest_points(const Vec3<double> q[4], Arbiter& arbiter) {
+HPCCD_HD NearestPoints nearest_points(const Vec3<double> t0[4], const Vec3<double> t1[4], double time,
+                                      Arbiter& arbiter) {
   using V = Vec3<double>;
+  V q[4];
+  for (int i = 0; i < 4; ++i) q[i] = interpolate(t0[i], t1[i], time);
   const Motion<double> m = motion_of<kind>(q, q);
   const Snapshot<double> now{m.p0, m.a0, m.b0};
   const V n = cross(now.a, now.b);
@@ -27,25 +31,24 @@ HPCCD_HD NearestPoints nearest_points(const Vec3<double> q[4], Arbiter& arbiter)
   constexpr double flat = 1e-2;
   const bool place_is_known = dot(n, n) > flat * flat * (dot(now.a, now.a) * dot(now.b, now.b));
   const NearOrFar<double> checked = proximity_test<kind>(now, 0.0);
+  // Positions are rounded by a few 2^-53 of their coordinates: longer vectors have their directions to 1e-6 or better.
+  const double size = greater(greater(largest(q[0]), largest(q[1])), greater(largest(q[2]), largest(q[3])));
+  const double long_enough = 0x1p-30 * size;
   if (!place_is_known || !checked.far) {
-    const exact::Nearest x = arbiter.nearest(kind, q);
+    const exact::Nearest x = arbiter.nearest(kind, t0, t1, q);
     const V across = kind == Kind::vertex_face ? x.on_first - x.on_second : x.on_second - x.on_first;
-    return {x.distance, x.on_first, x.on_second, x.distance > 0 ? unit(across) : V{0, 0, 0}};
+    return {x.distance, x.on_first, x.on_second, x.distance > 0 ? unit(across) : V{0, 0, 0}, x.distance > long_enough};
   }
-  const Nearest<double> found = nearest<kind>(now);
+  const detail::Place<double> place = detail::best_place<kind>(now);
+  const Nearest<double> found = detail::straightened(place, now);
   const V direction = unit(found.straight);
   const double distance = sqrt(found.square);
-  if constexpr (kind == Kind::vertex_face) return {distance, q[0], q[1] + found.x * now.a + found.y * now.b, direction};
-  return {distance, q[0] + found.x * now.a, q[2] - found.y * now.b, direction};
-}
-
-// At a time of the step.
-template <Kind kind, class Arbiter>
-HPCCD_HD NearestPoints nearest_points(const Vec3<double> t0[4], const Vec3<double> t1[4], double time,
-                                      Arbiter& arbiter) {
-  Vec3<double> q[4];
-  for (int i = 0; i < 4; ++i) q[i] = interpolate(t0[i], t1[i], time);
-  return nearest_points<kind>(q, arbiter);
+  // A gap on the inside of both features has the direction of n: of its length only the side must be certain.
+  const bool certain = distance > long_enough || (place.inside && distance > 0x1p-45 * size &&
+                                                  largest(n) > long_enough * (largest(now.a) + largest(now.b)));
+  if constexpr (kind == Kind::vertex_face)
+    return {distance, q[0], q[1] + found.x * now.a + found.y * now.b, direction, certain};
+  return {distance, q[0] + found.x * now.a, q[2] - found.y * now.b, direction, certain};
 }
 
 NearestPoints nearest_points(const UndecidedPair& pair, double time);

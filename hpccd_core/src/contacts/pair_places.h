@@ -27,20 +27,24 @@ HPCCD_HD PairPlaces pair_places(const Vec3<double> t0[4], const Vec3<double> t1[
   PairPlaces places{};
   const double time = outputs.at == AtTime::contact ? toc : 0;
   const bool separated = outputs.at == AtTime::contact && separation > 0;
+  bool point_open = outputs.points, normal_open = outputs.normals;
   if (outputs.closest || separated) {
     const NearestPoints nearest = nearest_points<kind>(t0, t1, time, arbiter);
     if (outputs.closest) places.closest[0] = nearest.on_first, places.closest[1] = nearest.on_second;
     // At no distance as in plain contact: there is no direction between the points.
-    if (separated && nearest.distance > 0) {
-      if (outputs.points) places.point = 0.5 * nearest.on_first + 0.5 * nearest.on_second;
-      if (outputs.normals) places.normal = nearest.direction;
-      return places;
+    if (separated && point_open && nearest.distance > 0) {
+      places.point = 0.5 * nearest.on_first + 0.5 * nearest.on_second;
+      point_open = false;
+    }
+    if (separated && normal_open) {
+      places.normal = nearest.certain ? nearest.direction : arbiter.direction_of_gap(kind, t0, t1, time, separation);
+      normal_open = !(largest(places.normal) > 0);
     }
   }
-  if (!outputs.points && !outputs.normals) return places;
+  if (!point_open && !normal_open) return places;
   const ContactPoint<kind> contact(t0, t1, time);
-  if (outputs.points) places.point = contact.point();
-  if (outputs.normals) places.normal = contact.normal(arbiter);
+  if (point_open) places.point = contact.point();
+  if (normal_open) places.normal = contact.normal(arbiter);
   return places;
 }
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "elementary/exact/distance.h"
 
-#include "elementary/exact/resting.h"
+#include "elementary/exact/nearest_place.h"
 #include "elementary/exact/scaled.h"
 
 namespace hpccd::exact {
@@ -63,77 +63,15 @@ bool within(const Resting<Z>& features, const Margin& d) {
   return compare.found;
 }
 
-// sqrt(num / den) 2^low, rounded.
-double root_of_ratio(const Big& num, const Big& den, int low) {
-  if (num.is_zero()) return 0;
-  // Bits of the ratio: twice those of its root, which has more than a double.
-  constexpr int bits = 124;
-  int scale = bits - (highest_bit(num) - highest_bit(den));
-  scale += scale % 2 != 0;
-  const Big ratio = scale >= 0 ? Big((num << scale) / den) : Big(num / (den << -scale));
-  const double root = std::ldexp(static_cast<double>(static_cast<std::uint64_t>(sqrt(ratio))), low - scale / 2);
-  return root > 0 ? root : std::numeric_limits<double>::denorm_min();
-}
-
-// x / y, rounded twice or so; y > 0.
-template <class X, class Y>
-double ratio(const X& x, const Y& y) {
-  int ex, ey;
-  const double fraction = magnitude_of(x, ex) / magnitude_of(y, ey);
-  return sign(x) * std::ldexp(fraction, std::max(ex - ey, -2000));
-}
-
-// p = alpha a + beta b (motion.h) for nearest points inside; else a point and a place on a segment.
-struct Place {
-  bool inside = false;
-  double alpha = 0, beta = 0;
-  int segment = 0;
-  double along = 0;  // 0 at the segment's start, 1 at its end
-};
-
-// The least of the squared distances.
-template <class Z>
-struct Least {
-  using Square = decltype(Z() * Z());
-  using Fourth = decltype(Square() * Square());
-  Fourth num{};
-  Square den{};  // of points and segments
-  bool any = false;
-  Big plane_num, plane_den;
-  Place place;
-
-  template <class N, class D>
-  bool planes(const N& num_, const D& den_, const D& alpha, const D& beta) {
-    plane_num = to_big(num_), plane_den = to_big(den_);
-    place = {true, ratio(alpha, den_), ratio(beta, den_), 0, 0};
-    return false;
-  }
-  bool line(const Fourth& n, const Square& d, const Square& along, int i) {
-    if (improve(n, d)) place = {false, 0, 0, i, ratio(along, d)};
-    return true;
-  }
-  bool points(const Square& n, int i, int end) {
-    if (improve(Fourth(n), Square(1))) place = {false, 0, 0, i, static_cast<double>(end)};
-    return true;
-  }
-  bool improve(const Fourth& n, const Square& d) {
-    if (any && sign(n * den - num * d) >= 0) return false;
-    num = n, den = d, any = true;
-    return true;
-  }
-  double distance(int low) const {
-    return place.inside ? root_of_ratio(plane_num, plane_den, low) : root_of_ratio(to_big(num), to_big(den), low);
-  }
-};
-
 Vec3<double> between(const Vec3<double>& from, const Vec3<double>& to, double t) {
   return t == 1 ? to : from + t * (to - from);
 }
 
 Nearest points_at(Kind kind, const Vec3<double> q[4], const Place& place) {
-  if (place.inside && kind == Kind::vertex_face)
+  const bool inside = place.where == Place::inside;
+  if (inside && kind == Kind::vertex_face)
     return {0, q[0], q[1] + (place.alpha * (q[2] - q[1]) + place.beta * (q[3] - q[1]))};
-  if (place.inside) return {0, between(q[0], q[1], place.alpha), between(q[2], q[3], -place.beta)};
+  if (inside) return {0, between(q[0], q[1], place.alpha), between(q[2], q[3], -place.beta)};
   const auto [point, from, to] = point_segments[kind == Kind::edge_edge][place.segment];
   const Vec3<double> foot = between(q[from], q[to], place.along);
   if (kind == Kind::vertex_face || point < 2) return {0, q[point], foot};
@@ -142,11 +80,14 @@ Nearest points_at(Kind kind, const Vec3<double> q[4], const Place& place) {
 
 // Of parallel edges that are side by side: the places on both in the middle of the common stretch.
 template <class Z>
-bool middle_of_common_stretch(const Resting<Z>& edges, double& on_a, double& on_b) {
+bool middle_of_common_stretch(const Resting<Z>& edges, bool parallel, double& on_a, double& on_b) {
   const auto [p, a, b] = edges.spanned();
-  const auto n = cross(a, b);
   const auto length = dot(a, a);
-  if (sign(dot(n, n)) != 0 || sign(length) == 0) return false;
+  if (sign(length) == 0) return false;
+  if (!parallel) {
+    const auto n = cross(a, b);
+    if (sign(dot(n, n)) != 0) return false;
+  }
   const auto b0 = dot(p, a), b1 = dot(edges.q[3] - edges.q[0], a), turn = b1 - b0;
   if (sign(turn) == 0) return false;  // b is a point
   const auto least = [](const auto& x, const auto& y) { return sign(y - x) < 0 ? y : x; };
@@ -181,12 +122,12 @@ double distance(Kind kind, const Vec3<double> q[4]) {
   });
 }
 
-Nearest nearest(Kind kind, const Vec3<double> q[4]) {
+Nearest nearest(Kind kind, const Vec3<double> q[4], bool parallel) {
   return in_integers(kind, q, [&]<class Z>(const Resting<Z>& features, int low) {
     Least<Z> least;
     features.for_nearest(least);
     double on_a = 0, on_b = 0;
-    Nearest found = kind == Kind::edge_edge && middle_of_common_stretch(features, on_a, on_b)
+    Nearest found = kind == Kind::edge_edge && middle_of_common_stretch(features, parallel, on_a, on_b)
                         ? Nearest{0, between(q[0], q[1], on_a), between(q[2], q[3], on_b)}
                         : points_at(kind, q, least.place);
     found.distance = least.distance(low);
