@@ -8,6 +8,7 @@ from typing import Any, SupportsIndex, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from . import _core
 from .options import FEATURES, OUTPUTS
 
 REALS = frozenset({np.dtype(np.float32), np.dtype(np.float64)})  # in this machine's byte order
@@ -70,29 +71,74 @@ def mesh_number(name: str, mesh: str | int, numbers: Mapping[str, int]) -> int:
 
 
 def length(name: str, value: object) -> float:
-    """The value as float, finite and not negative."""
+    """The value as float, finite and not negative. Raises ValueError where float64 cannot hold it exactly."""
+    number = real(name, value)
+    if not np.isfinite(number) or number < 0:
+        raise ValueError(f"{name}: must be finite and not negative, got {value}")
+    return number
+
+
+def real(name: str, value: Any) -> float:
+    """The value as float. Raises ValueError where float64 cannot hold it exactly."""
     if isinstance(value, bool) or not isinstance(value, (int, float, np.floating, np.integer)):
         raise TypeError(f"{name}: expected a number, got {type(value).__name__}")
     try:
         number = float(value)
     except OverflowError:
         raise ValueError(f"{name}: must lie within float64, got {_shown(value)}") from None
-    if not np.isfinite(number) or number < 0:
-        raise ValueError(f"{name}: must be finite and not negative, got {value}")
+    if np.isfinite(number) and not _holds(number, value):
+        raise _not_held(name, value)
     return number
+
+
+def reals(name: str, value: object) -> NDArray[np.float64]:
+    """Numbers of any real type -> float64, C-contiguous. Raises ValueError where float64 cannot hold one exactly."""
+    array = _array(name, value)
+    if array.dtype.kind not in "fiu":
+        raise TypeError(f"{name}: expected an array of numbers, got {_kind(value, array)}")
+    _refuse_rounded(name, value, array)
+    return _as_float64(name, array)
+
+
+def _holds(number: float, value: Any) -> bool:
+    """Whether float64 holds this finite value exactly."""
+    if isinstance(value, (int, np.integer)):
+        return int(number) == int(value)
+    return bool(type(value)(number) == value)  # a long double has more bits; the others fit
+
+
+def _not_held(name: str, value: object) -> ValueError:
+    return ValueError(f"{name}: float64 cannot hold {_shown(value)} exactly; round it first, as float() does")
+
+
+def _refuse_rounded(name: str, value: object, array: NDArray[Any]) -> None:
+    """Raises ValueError where a list held an integer that numpy has rounded for the sake of the floats beside it."""
+    if not isinstance(value, (list, tuple)) or array.dtype != np.float64 or not (np.abs(array) >= 2.0**53).any():
+        return
+    for number, given in zip(array.flat, np.asarray(value, object).flat, strict=True):
+        if isinstance(given, (int, np.integer)) and int(number) != int(given):
+            raise _not_held(name, given)
+
+
+def _as_float64(name: str, array: NDArray[Any]) -> NDArray[np.float64]:
+    """Of integers or floats of any size, C-contiguous. Raises ValueError where float64 cannot hold one exactly."""
+    numbers: NDArray[np.float64] = np.ascontiguousarray(array, np.float64)
+    if array.dtype.kind == "f":
+        rounded = np.isfinite(array) & (numbers.astype(array.dtype) != array)
+    else:
+        rounded = np.abs(numbers) >= 2.0**53  # the only ones that may be
+    for where in np.argwhere(rounded):
+        if not _holds(float(numbers[tuple(where)]), array[tuple(where)]):
+            raise _not_held(f"{name}[{', '.join(map(str, where))}]", array[tuple(where)])
+    return numbers
 
 
 def lengths_of_pairs(name: str, value: object, n: int) -> NDArray[np.float64]:
     """(n, n) numbers -> float64, C-contiguous; the core sees whether they are lengths, and symmetric."""
-    try:
-        numbers = np.asarray(value)
-    except ValueError as error:
-        raise ValueError(f"{name}: expected ({n}, {n}) numbers: {error}") from None
-    if numbers.dtype.kind not in "fiu":
-        raise TypeError(f"{name}: expected ({n}, {n}) numbers, got dtype {numbers.dtype}")
+    numbers = reals(name, value)
     if numbers.shape != (n, n):
         raise ValueError(f"{name}: expected shape ({n}, {n}), a row for each mesh of the scene, got {numbers.shape}")
-    return np.ascontiguousarray(numbers, np.float64)
+    return numbers
 
 
 def faces(value: object) -> NDArray[np.uint32]:
@@ -169,6 +215,7 @@ def _names(argument: str, value: Iterable[str], choices: tuple[str, ...]) -> tup
 def vertices(name: str, value: object, shape: tuple[int, ...]) -> NDArray[Any]:
     """(V, 3), or of many worlds (W, V, 3), float32 or float64; C-contiguous arrays are taken without a copy."""
     array = _reals(name, _array(name, value), value)
+    _refuse_rounded(name, value, array)
     if array.shape != shape:
         raise ValueError(
             f"{name}: expected shape {shape}, {'for each world ' if len(shape) > 2 else ''}one row a vertex of the "
@@ -192,10 +239,18 @@ def usable(name: str, array: NDArray[Any]) -> None:
 def queries(value: object) -> NDArray[np.float64]:
     """(Q, 8, 3) float64: four points at t=0, then the same at t=1. The core says which is not finite."""
     array = _reals("queries", _array("queries", value), value)
+    _refuse_rounded("queries", value, array)
     if array.ndim != 3 or array.shape[1:] != (8, 3):
         expected = "(Q, 8, 3), four points at t=0 and the same at t=1"
         raise ValueError(f"queries: expected shape {expected}, got {array.shape}")
-    return np.ascontiguousarray(array, np.float64)
+    return widened(array)
+
+
+def widened(array: NDArray[Any]) -> NDArray[np.float64]:
+    """float32 or float64 -> float64, C-contiguous and exact: numpy loses denormal numbers where another library has set
+    denormals-are-zero."""
+    there = np.require(array, None, ["C", "A"])
+    return there if there.dtype == np.float64 else _core.widened(there)
 
 
 def _reals(name: str, array: NDArray[Any], value: object) -> NDArray[Any]:
@@ -228,12 +283,17 @@ def _array(name: str, value: object) -> NDArray[Any]:
 
 def refuse_masked(name: str, value: object) -> None:
     """A masked array with nothing masked is as good as any; of others the mask would be lost."""
-    rows = value if isinstance(value, (list, tuple)) else (value,)
-    if any(isinstance(row, np.ma.MaskedArray) and np.ma.is_masked(row) for row in rows):
+    if _holds_masked(value):
         raise TypeError(
             f"{name}: some of its elements are masked, and every one is needed; leave the masked ones out before, or "
             "give an array in which they are filled in (numpy.ma.filled)"
         )
+
+
+def _holds_masked(value: object) -> bool:
+    if isinstance(value, (list, tuple)):
+        return any(map(_holds_masked, value))
+    return isinstance(value, np.ma.MaskedArray) and bool(np.ma.is_masked(value))
 
 
 def _kind(value: object, array: NDArray[Any]) -> str:

@@ -106,7 +106,7 @@ class MotionQueries(Generic[OfMotion, OfStep]):
         start = arguments.vertices("vertices_t0", vertices_t0, self._shape)
         end = arguments.vertices("vertices_t1", vertices_t1, self._shape)
         if start.dtype != end.dtype:  # widening a float32 is exact
-            start, end = start.astype(np.float64), end.astype(np.float64)
+            start, end = arguments.widened(start), arguments.widened(end)
         return getattr(self._core, query)(*(device_arrays.on_host(end, made_on) for end in (start, end)))
 
     def _places(

@@ -2,7 +2,7 @@
 # What the library is made of on every machine; room by room, as data goes.
 set(hpccd_sources
   src/base/forks.cpp src/base/machine_rate.cpp src/base/parallel.cpp src/base/simd.cpp
-  src/base/thread_affinity.cpp
+  src/base/standard_arithmetic.cpp src/base/thread_affinity.cpp
   src/rigid/c_library.cpp src/rigid/joint_bounds.cpp src/rigid/joint_chain.cpp src/rigid/placed_vertices.cpp
   src/scene/edges.cpp src/scene/features.cpp src/scene/scene.cpp src/scene/separation_table.cpp
   src/scene/static_meshes.cpp

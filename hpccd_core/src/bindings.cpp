@@ -6,6 +6,7 @@
 
 #include "base/machine_rate.h"
 #include "base/simd.h"
+#include "base/standard_arithmetic.h"
 #include "bindings_device.h"
 #include "bindings_rigid.h"
 #include "contacts/parts.h"
@@ -90,6 +91,13 @@ py::dict to_dict(Intersections&& c) {
   d["hash"] = c.hash;
   add_slices(d, std::move(c.slices));
   return d;
+}
+
+py::array_t<double> widened(const Array<float>& from) {
+  const StandardArithmetic arithmetic;
+  py::array_t<double> to(std::vector<py::ssize_t>(from.shape(), from.shape() + from.ndim()));
+  std::copy_n(from.data(), from.size(), to.mutable_data());
+  return to;
 }
 
 // Of a hpccd_core.Contacts; `kept` holds its arrays.
@@ -392,6 +400,7 @@ PYBIND11_MODULE(_core, m) {
   m.def("test_vertex_face", &run_queries<&test_vertex_face>, "queries"_a, "accuracy"_a, "simd"_a,
         "minimum_separation"_a);
   m.def("test_edge_edge", &run_queries<&test_edge_edge>, "queries"_a, "accuracy"_a, "simd"_a, "minimum_separation"_a);
+  m.def("widened", &widened, "array"_a);
   m.def(
       "contacts_of_step",
       [](const std::vector<std::tuple<py::object, double, double>>& answers) {

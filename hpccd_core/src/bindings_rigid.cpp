@@ -31,6 +31,18 @@ static_assert(sizeof(Vector) == 3 * sizeof(double) && sizeof(Pose) == 7 * sizeof
 
 std::span<const double> numbers(const Doubles& a) { return {a.data(), static_cast<std::size_t>(a.size())}; }
 
+// float64 as it is; other arrays and numbers where it can hold them exactly. Errors name them.
+Doubles doubles(const char* name, const py::object& given) {
+  // Of a subclass, as masked arrays are, the numbers may not be all.
+  const bool plain = Py_TYPE(given.ptr()) == py::detail::npy_api::get().PyArray_Type_;
+  if (plain && py::isinstance<py::array_t<double>>(given)) return Doubles(py::reinterpret_borrow<py::array>(given));
+  return Doubles(py::module_::import("hpccd_core.arguments").attr("reals")(name, given));
+}
+double real(const char* name, const py::object& given) {
+  if (PyFloat_Check(given.ptr())) return PyFloat_AS_DOUBLE(given.ptr());
+  return py::cast<double>(py::module_::import("hpccd_core.arguments").attr("real")(name, given));
+}
+
 template <class Row>
 std::span<const Row> rows(const char* name, const Doubles& a) {
   if (a.size() * sizeof(double) % sizeof(Row))
@@ -55,8 +67,9 @@ struct JointRow {
 };
 
 std::shared_ptr<JointChain> chain_of(const std::vector<JointKind>& kinds, const std::vector<int>& parents,
-                                     const Doubles& given) {
-  const auto joint_rows = rows<JointRow>("numbers", given);
+                                     const py::object& given) {
+  const Doubles array = doubles("numbers", given);
+  const auto joint_rows = rows<JointRow>("numbers", array);
   if (parents.size() != kinds.size() || joint_rows.size() != kinds.size())
     throw InvalidArgument("kinds, parents, numbers: expected as many of each");
   std::vector<Joint> joints;
@@ -66,19 +79,20 @@ std::shared_ptr<JointChain> chain_of(const std::vector<JointKind>& kinds, const 
   return std::make_shared<JointChain>(std::move(joints));
 }
 
-Pose pose_of(const Doubles& turn, const Doubles& shift) {
-  return {row<Quaternion>("turn", turn), row<Vector>("shift", shift)};
+Pose pose_of(const py::object& turn, const py::object& shift) {
+  return {row<Quaternion>("turn", doubles("turn", turn)), row<Vector>("shift", doubles("shift", shift))};
 }
 
-Doubles poses_of(const JointChain& chain, const Doubles& values, const Doubles& turn, const Doubles& shift) {
-  const std::vector<Pose> poses = chain.poses(numbers(values), pose_of(turn, shift));
+Doubles poses_of(const JointChain& chain, const py::object& values, const py::object& turn, const py::object& shift) {
+  const std::vector<Pose> poses = chain.poses(numbers(doubles("values", values)), pose_of(turn, shift));
   Doubles found({poses.size(), std::size_t{7}});
   std::memcpy(found.mutable_data(), poses.data(), poses.size() * sizeof(Pose));
   return found;
 }
 
-Doubles placed(const Doubles& poses, const std::vector<std::pair<std::size_t, std::size_t>>& meshes,
-               const Doubles& vertices) {
+Doubles placed(const py::object& given_poses, const std::vector<std::pair<std::size_t, std::size_t>>& meshes,
+               const py::object& given_vertices) {
+  const Doubles poses = doubles("poses", given_poses), vertices = doubles("vertices", given_vertices);
   const auto pose_rows = rows<Pose>("poses", poses);
   const auto from = rows<Vector>("vertices", vertices);
   std::vector<LinkMesh> of_links;
@@ -103,15 +117,18 @@ void bind_rigid(py::module_& m) {
       .def(py::init(&chain_of), "kinds"_a, "parents"_a, "numbers"_a)
       .def("poses", &poses_of, "values"_a, "turn"_a, "shift"_a);
   py::class_<JointBounds>(m, "JointBounds")
-      .def(py::init([](std::shared_ptr<JointChain> chain, const Doubles& start, const Doubles& end, const Doubles& turn,
-                       const Doubles& shift) {
-             return JointBounds(std::move(chain), numbers(start), numbers(end), pose_of(turn, shift));
+      .def(py::init([](std::shared_ptr<JointChain> chain, const py::object& start, const py::object& end,
+                       const py::object& turn, const py::object& shift) {
+             return JointBounds(std::move(chain), numbers(doubles("start", start)), numbers(doubles("end", end)),
+                                pose_of(turn, shift));
            }),
            "chain"_a.none(false), "start"_a, "end"_a, "turn"_a, "shift"_a)
       .def(
           "of_link",
-          [](const JointBounds& bounds, std::size_t link, double radius, double girth, const Doubles& centre) {
-            const LinkBounds found = bounds.of_link(link, {radius, girth, row<Vector>("centre", centre)});
+          [](const JointBounds& bounds, std::size_t link, const py::object& radius, const py::object& girth,
+             const py::object& centre) {
+            const LinkBounds found = bounds.of_link(
+                link, {real("radius", radius), real("girth", girth), row<Vector>("centre", doubles("centre", centre))});
             return py::make_tuple(found.acceleration, found.span, found.rounding);
           },
           "link"_a, "radius"_a, "girth"_a, "centre"_a);

@@ -12,6 +12,7 @@
 #include "backends/tuner.h"
 #include "base/length.h"
 #include "base/one_call.h"
+#include "base/standard_arithmetic.h"
 #include "checked.h"
 #include "gpu/results_to_device.h"
 #include "prepared_impl.h"
@@ -222,18 +223,28 @@ struct Detector::Impl {
 };
 
 Detector::Detector(std::shared_ptr<const Scene> scene, Options options)
-    : impl_(std::make_shared<Impl>(std::move(scene), options)) {}
+    : impl_([&] {
+        const StandardArithmetic arithmetic;
+        return std::make_shared<Impl>(std::move(scene), options);
+      }()) {}
 
 // In a child made by fork() the memory of a call that was under way is in the middle of a change: better left alone.
 Detector::~Detector() {
   if (impl_->one_call.abandoned()) impl_->left_alone = impl_;
 }
 
-Contacts Detector::detect(Positions t0, Positions t1) { return impl_->detect<false>(t0, t1).contacts; }
+Contacts Detector::detect(Positions t0, Positions t1) {
+  const StandardArithmetic arithmetic;
+  return impl_->detect<false>(t0, t1).contacts;
+}
 
-Detected Detector::detect_in_place(Positions t0, Positions t1) { return impl_->detect<true>(t0, t1); }
+Detected Detector::detect_in_place(Positions t0, Positions t1) {
+  const StandardArithmetic arithmetic;
+  return impl_->detect<true>(t0, t1);
+}
 
 DeviceResults Detector::detect_on_device(Positions t0, Positions t1) {
+  const StandardArithmetic arithmetic;
   impl_->check(t0, t1);
   return impl_->on_device(
       t0, t1, [&](GpuBackend& gpu) { return gpu.detect_on_device(t0, t1); },
@@ -242,10 +253,12 @@ DeviceResults Detector::detect_on_device(Positions t0, Positions t1) {
 }
 
 double Detector::collision_free_step(Positions t0, Positions t1) {
+  const StandardArithmetic arithmetic;
   return std::ranges::min(collision_free_steps(t0, t1));
 }
 
 std::vector<double> Detector::collision_free_steps(Positions t0, Positions t1) {
+  const StandardArithmetic arithmetic;
   impl_->check(t0, t1);
   std::vector<double> first = impl_->ask(
       t0, t1, [](DetectionBackend& backend, Positions a, Positions b, Counts&) { return backend.earliest(a, b); });
@@ -263,6 +276,7 @@ Proximity as_proximity(Contacts&& c) {
 }  // namespace
 
 Proximity Detector::proximity(Positions vertices, double distance) {
+  const StandardArithmetic arithmetic;
   impl_->require_results_on_host("proximity_on_device");
   check_length("distance", distance);
   return as_proximity(impl_->snapshot(vertices, [&](DetectionBackend& backend, Positions v, Counts& found) {
@@ -273,6 +287,7 @@ Proximity Detector::proximity(Positions vertices, double distance) {
 }
 
 Intersections Detector::intersections(Positions vertices) {
+  const StandardArithmetic arithmetic;
   impl_->require_results_on_host("intersections_on_device");
   return impl_->snapshot(vertices, [](DetectionBackend& backend, Positions v, Counts& found) {
     auto hits = backend.intersections(v);
@@ -282,6 +297,7 @@ Intersections Detector::intersections(Positions vertices) {
 }
 
 DeviceResults Detector::proximity_on_device(Positions vertices, double distance) {
+  const StandardArithmetic arithmetic;
   check_length("distance", distance);
   impl_->check("vertices", vertices);
   return impl_->on_device(
@@ -291,6 +307,7 @@ DeviceResults Detector::proximity_on_device(Positions vertices, double distance)
 }
 
 std::unique_ptr<PreparedDetection> Detector::prepare(Positions t0, Positions t1, double room) {
+  const StandardArithmetic arithmetic;
   const Options& o = options();
   if (!o.results_on_device)
     throw InvalidArgument("results_on_device: this detector brings its results to the host; set the option");
@@ -314,6 +331,7 @@ std::unique_ptr<PreparedDetection> Detector::prepare(Positions t0, Positions t1,
 }
 
 DeviceResults Detector::intersections_on_device(Positions vertices) {
+  const StandardArithmetic arithmetic;
   impl_->check("vertices", vertices);
   return impl_->on_device(
       vertices, vertices, [&](GpuBackend& gpu) { return gpu.intersections_on_device(vertices); },
@@ -322,6 +340,7 @@ DeviceResults Detector::intersections_on_device(Positions vertices) {
 }
 
 std::vector<Gap> Detector::distances(Positions vertices) {
+  const StandardArithmetic arithmetic;
   return impl_->snapshot(vertices, [](DetectionBackend& backend, Positions v, Counts& found) {
     auto gaps = backend.distances(v);
     if (gaps) found = {{"gaps", gaps->size()}};
@@ -330,6 +349,7 @@ std::vector<Gap> Detector::distances(Positions vertices) {
 }
 
 void Detector::set_separation(std::uint32_t mesh_a, std::uint32_t mesh_b, double separation) {
+  const StandardArithmetic arithmetic;
   const std::size_t n = impl_->common.scene->meshes().size();
   if (mesh_a >= n || mesh_b >= n)
     throw InvalidArgument("mesh_a, mesh_b: the scene has " + std::to_string(n) +
@@ -340,6 +360,7 @@ void Detector::set_separation(std::uint32_t mesh_a, std::uint32_t mesh_b, double
 }
 
 void Detector::set_separations(std::span<const double> of_pairs) {
+  const StandardArithmetic arithmetic;
   const std::size_t n = impl_->common.scene->meshes().size();
   if (of_pairs.size() != n * n)
     throw InvalidArgument("of_pairs: expected " + std::to_string(n) + " x " + std::to_string(n) + " numbers, got " +

@@ -443,3 +443,105 @@ def test_faces_and_queries_that_do_not_turn_into_arrays(bad):
         hc.Scene().add_mesh("mesh", bad)
     with pytest.raises(TypeError, match="^queries: "):
         hc.test_vertex_face(bad)
+
+
+LONG = np.longdouble("0.1")  # of more bits than float64 has, but where it is float64
+BEYOND_53_BITS = [2**60 - 1, np.int64(2**53 + 1), np.uint64(2**64 - 1), -(2**60) + 1]
+
+
+def lengths_asked(scene, detector):
+    """Whatever takes a length, and the name that its error must begin with."""
+    return {
+        "minimum_separation": lambda d: hc.Detector(scene, minimum_separation=d),
+        "tolerance": lambda d: hc.Detector(scene, tolerance=d),
+        "distance": lambda d: detector.proximity(VERTICES, d),
+        "separation": lambda d: detector.set_separation("cloth", "cloth", d),
+        "separation:": lambda d: scene.set_separation("cloth", "cloth", d),
+        "minimum_separation:": lambda d: hc.test_vertex_face(np.zeros((1, 8, 3)), minimum_separation=d),
+        "of_pairs": lambda d: detector.set_separations([[d]]),
+        "of_pairs[0, 0]": lambda d: detector.set_separations(np.array([[d]])),
+    }
+
+
+def test_lengths_that_float64_cannot_hold(scene, detector):
+    for name, ask in lengths_asked(scene, detector).items():
+        for bad in BEYOND_53_BITS[:3] + ([LONG] if float(LONG) != LONG else []):
+            with pytest.raises(ValueError, match="float64 cannot hold .* exactly; round it first") as raised:
+                ask(bad)
+            assert str(raised.value).startswith(name.rstrip(":"))
+        for bad in (0.5j, "0.5", None, b"1", np.array([0.5]), np.ma.masked, [0.5], True, np.complex128(1)):
+            if not name.startswith("of_pairs"):
+                with pytest.raises(TypeError, match=f"^{name.rstrip(':')}: expected a number"):
+                    ask(bad)
+        for good in (0.5, 1, 2**60, 2**200, np.float32(0.1), np.float16(0.1), np.int64(2**62), np.longdouble(0.5)):
+            if type(good) is not int or good < 2**63 or not name.startswith("of_pairs"):  # numpy has none beyond
+                ask(good)
+
+
+class Unwilling:
+    def __array__(self, *args, **kwargs):
+        raise RuntimeError("no")
+
+
+@pytest.mark.parametrize(
+    ("bad", "error", "text"),
+    [
+        (np.ma.masked_array([[1.0]], [[True]]), TypeError, "masked"),
+        ([np.ma.masked_array([1.0], [True])], TypeError, "masked"),
+        ([[np.ma.masked]], TypeError, "masked"),
+        (Unwilling(), TypeError, "Unwilling does not turn into an array"),
+        ([[1j]], TypeError, "numbers, got dtype complex128"),
+        ([["1"]], TypeError, "numbers, got dtype <U1"),
+        ([[None]], TypeError, "numbers, got dtype object"),
+        ([[True]], TypeError, "numbers, got dtype bool"),
+        ([[10**30]], TypeError, "numbers, got dtype object"),
+        ([[1.0], [1.0, 2.0]], ValueError, "same length"),
+    ],
+)
+def test_tables_that_hold_no_lengths(detector, bad, error, text):
+    with pytest.raises(error, match=f"^of_pairs: .*{text}"):
+        detector.set_separations(bad)
+
+
+@pytest.mark.parametrize("integer", BEYOND_53_BITS)
+def test_integers_among_floats_are_not_rounded(detector, integer):
+    """numpy makes floats of them all."""
+    rows = VERTICES.tolist()
+    rows[2][1] = integer
+    with pytest.raises(ValueError, match=r"^vertices_t1: float64 cannot hold -?\d+ exactly"):
+        detector.detect(VERTICES, rows)
+    with pytest.raises(ValueError, match=r"^vertices: float64 cannot hold"):
+        detector.step(tuple(map(tuple, rows)))
+    with pytest.raises(ValueError, match=r"^queries: float64 cannot hold"):
+        hc.test_edge_edge([[*rows, *rows]])
+    rows[2][1] = 2**60
+    detector.detect(VERTICES, rows)
+    with pytest.raises(TypeError, match="^vertices: .*masked"):
+        detector.step([[np.ma.masked, 1.0, 2.0]] * 4)
+
+
+def test_joints_take_what_float64_holds():
+    from hpccd_core.joint_chains import JointBounds, JointChain, JointKind, placed
+
+    joint = np.array([[0, 0, 0, 1, 0, 0, 0, 0, 0, 1, 0]], float)
+    turn, shift = np.array([0, 0, 0, 1.0]), np.zeros(3)
+    chain = JointChain([JointKind.sliding], [-1], joint)
+    bounds = JointBounds(chain, np.zeros(1), np.ones(1), turn, shift)
+    poses = chain.poses([1], turn.tolist(), shift.astype(np.float32))
+    for name, ask in {
+        "numbers": lambda x: JointChain([JointKind.sliding], [-1], np.full((1, 11), x)),
+        "values": lambda x: chain.poses(np.array([x]), turn, shift),
+        "shift": lambda x: chain.poses(np.zeros(1), turn, np.array([x, x, x])),
+        "start": lambda x: JointBounds(chain, np.array([x]), np.ones(1), turn, shift),
+        "end": lambda x: JointBounds(chain, np.ones(1), np.array([x]), turn, shift),
+        "centre": lambda x: bounds.of_link(0, 1.0, 1.0, np.array([x, x, x])),
+        "radius": lambda x: bounds.of_link(0, x, 1.0, shift),
+        "girth": lambda x: bounds.of_link(0, 1.0, x, shift),
+        "vertices": lambda x: placed(poses, [(0, 1)], np.array([[x, x, x]])),
+    }.items():
+        for bad in (1j, None, 2**60 - 1, *([LONG] if float(LONG) != LONG else [])):
+            with pytest.raises((TypeError, ValueError), match=f"^{name}[:\\[]"):
+                ask(bad)
+    masked = np.ma.masked_array([1.0], [True])
+    with pytest.raises(TypeError, match="^values: .*masked"):
+        chain.poses(masked, turn, shift)

@@ -364,7 +364,7 @@ def test_bad_tables_of_separations_are_refused():
         (np.zeros(25), ValueError, "of_pairs: expected shape"),
         ("0.1", TypeError, "of_pairs: expected"),
         ([["a"] * 5] * 5, TypeError, "of_pairs: expected"),
-        ([[0.0] * 5, [0.0]], ValueError, "of_pairs: expected"),
+        ([[0.0] * 5, [0.0]], ValueError, "of_pairs: not a rectangular array"),
         (None, TypeError, "of_pairs: expected"),
     ):
         with pytest.raises(error, match=text):

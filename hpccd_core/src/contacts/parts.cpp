@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "base/standard_arithmetic.h"
 #include "contacts/hash.h"
 #include "hpccd/errors.h"
 
@@ -80,6 +81,7 @@ std::uint64_t hash_of_contacts(const ContactsOfPart& contacts) {
 }
 
 Contacts contacts_of_step(std::span<const ContactsOfPart> answers) {
+  const StandardArithmetic arithmetic;
   for (const ContactsOfPart& answer : answers) check_rows(answer);
   const std::vector<Row> of_vf = rows_of_step(answers, &ContactsOfPart::vf);
   const std::vector<Row> of_ee = rows_of_step(answers, &ContactsOfPart::ee);

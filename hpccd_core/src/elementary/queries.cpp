@@ -9,6 +9,7 @@
 #include "base/length.h"
 #include "base/names.h"
 #include "base/simd.h"
+#include "base/standard_arithmetic.h"
 #include "bvh/coordinate_map.h"
 #include "elementary/distance/distance_batch.h"
 #include "elementary/policy.h"
@@ -49,6 +50,7 @@ void check_coordinates(std::span<const Query> queries) {
 }
 
 void test_queries(Kind kind, std::span<const Query> queries, const Options& options, bool* hit, double* toc) {
+  const StandardArithmetic arithmetic;
   const Accuracy accuracy = options.accuracy;
   const double separation = options.minimum_separation;
   check_accuracy(accuracy);

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "base/active_wait.h"
+#include "base/standard_arithmetic.h"
 
 namespace hpccd::hybrid {
 
@@ -62,6 +63,7 @@ void Communication::wait_until_idle() {
 }
 
 void Communication::work() {
+  const StandardArithmetic arithmetic;
   for (;;) {
     {
       std::unique_lock lock(mutex_);

@@ -6,6 +6,7 @@
 #include <string>
 #include <utility>
 
+#include "base/standard_arithmetic.h"
 #include "hpccd/errors.h"
 #include "rigid/c_library.h"
 #include "rigid/rounding.h"
@@ -88,10 +89,9 @@ double acceleration(const Way& way) {
 
 JointBounds::JointBounds(std::shared_ptr<const JointChain> chain, std::span<const double> start,
                          std::span<const double> end, const Pose& base)
-    : chain_(std::move(chain)),
-      start_(start.begin(), start.end()),
-      end_(end.begin(), end.end()),
-      base_far_(length(base.shift)) {
+    : chain_(std::move(chain)), start_(start.begin(), start.end()), end_(end.begin(), end.end()) {
+  const StandardArithmetic arithmetic;
+  base_far_ = length(base.shift);
   const std::size_t n = chain_->size();
   if (start.size() != n || end.size() != n)
     throw InvalidArgument("start, end: expected " + std::to_string(n) + " values each, one for each joint");
@@ -108,6 +108,7 @@ JointBounds::JointBounds(std::shared_ptr<const JointChain> chain, std::span<cons
 }
 
 LinkBounds JointBounds::of_link(std::size_t link, const Ball& ball) const {
+  const StandardArithmetic arithmetic;
   if (link >= chain_->size())
     throw InvalidArgument("link: " + std::to_string(link) + "; there are " + std::to_string(chain_->size()) +
                           " joints");

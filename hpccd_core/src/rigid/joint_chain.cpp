@@ -4,6 +4,7 @@
 #include <string>
 #include <utility>
 
+#include "base/standard_arithmetic.h"
 #include "hpccd/errors.h"
 #include "rigid/c_library.h"
 
@@ -35,6 +36,7 @@ JointChain::JointChain(std::vector<Joint> joints) : joints_(std::move(joints)) {
 }
 
 std::vector<Pose> JointChain::poses(std::span<const double> values, const Pose& base) const {
+  const StandardArithmetic arithmetic;
   if (values.size() != joints_.size())
     throw InvalidArgument("values: expected " + std::to_string(joints_.size()) + ", one for each joint, got " +
                           std::to_string(values.size()));

@@ -3,12 +3,14 @@
 
 #include <algorithm>
 
+#include "base/standard_arithmetic.h"
 #include "hpccd/errors.h"
 
 namespace hpccd::rigid {
 
 void place_vertices(std::span<const Pose> poses, std::span<const LinkMesh> meshes, std::span<const Vector> vertices,
                     std::span<Vector> placed) {
+  const StandardArithmetic arithmetic;
   std::size_t begin = 0;
   for (const LinkMesh& mesh : meshes) {
     if (mesh.link >= poses.size()) throw InvalidArgument("meshes: one is of a link that has no pose");

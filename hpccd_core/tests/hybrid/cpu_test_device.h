@@ -13,16 +13,19 @@
 
 #include "bvh/motion_bounds.h"
 #include "hybrid/test_device.h"
+#include "other_arithmetic.h"
 #include "scene/features.h"
 #include "traverse/traverse.h"
 
 namespace hpccd::test {
 
-// How the device misbehaves: throws at the n-th call of a kind, or lets nothing finish before it is told to.
+// How the device misbehaves: throws at the n-th call of a kind, or lets nothing finish before it is told to; and what
+// it has seen.
 struct DeviceFaults {
   std::atomic<int> submits_before_failure{-1};  // -1: never
   std::atomic<bool> fails_at_begin{false};
   std::atomic<bool> holds_back{false};
+  SeenArithmetic arithmetic{};  // of the communication thread
 };
 
 // A batch test that leaves everything to the fallback.
@@ -55,6 +58,7 @@ class CpuTestDevice final : public hybrid::TestDevice {
   }
 
   void begin_frame(Positions t0, Positions t1) override {
+    faults_->arithmetic = seen_arithmetic();
     if (faults_->fails_at_begin) throw std::runtime_error("asked for: at begin");
     motion_.update(t0, t1, pool_);
   }

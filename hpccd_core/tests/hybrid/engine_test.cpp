@@ -130,6 +130,17 @@ TEST(Hybrid, SameContactsForAnyThreadsDevicesAndSegments) {
   }
 }
 
+TEST(Hybrid, TheCommunicationThreadHasTheStandardArithmetic) {
+  Bench bench(1);
+  bench.update(0, 1);
+  for (const int mode : test::other_modes) {
+    const test::OtherArithmetic other(mode);
+    hybrid::Engine engine(bench.devices(1), {8, 16}, bench.pool);
+    EXPECT_TRUE(bench.with(engine).complete);
+    EXPECT_EQ(bench.faults->arithmetic, test::standard_arithmetic);
+  }
+}
+
 TEST(Hybrid, SegmentsGoToTheDevices) {
   Bench bench(2);
   bench.update(0, 1);

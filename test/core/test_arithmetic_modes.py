@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What other libraries set of a thread's floating-point arithmetic changes no answer, and stays as they set it."""
+
+import contextlib
+import ctypes
+import platform
+import struct
+
+import numpy as np
+import pytest
+import random_scenes
+
+import hpccd_core as hc
+
+pytestmark = pytest.mark.skipif(
+    platform.machine() != "x86_64" or platform.libc_ver()[0] != "glibc", reason="fenv_t is known of glibc on x86-64"
+)
+MODES = {"flush to zero": 0x8040, "upward": 0x4000, "downward": 0x2000}  # bits of MXCSR
+
+
+def _environment():
+    environment = ctypes.create_string_buffer(32)
+    assert ctypes.CDLL(None).fegetenv(environment) == 0
+    return environment
+
+
+@contextlib.contextmanager
+def arithmetic(bits):
+    before, set_ = _environment(), _environment()
+    set_[28:32] = struct.pack("<I", struct.unpack("<I", before[28:32])[0] | bits)
+    ctypes.CDLL(None).fesetenv(set_)
+    try:
+        yield
+        assert struct.unpack("<I", _environment()[28:32])[0] & 0xE040 == bits, "it stays as the caller had it"
+    finally:
+        ctypes.CDLL(None).fesetenv(before)
+
+
+def same(query, bits):
+    expected = query()
+    with arithmetic(bits):
+        found = query()
+    return found, expected
+
+
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("test", [hc.test_vertex_face, hc.test_edge_edge])
+@pytest.mark.parametrize(("dtype", "scale"), [(np.float64, 1e-310), (np.float32, 1e-40), (np.float64, 0.1)])
+def test_elementary_queries(test, mode, dtype, scale):
+    queries = (np.random.default_rng(0).integers(-9, 10, (500, 8, 3)) * scale).astype(dtype)
+    for d in (0.0, 2 * scale):
+        found, expected = same(lambda d=d: test(queries, minimum_separation=d), MODES[mode])
+        assert expected[0].any() and not expected[0].all()
+        for x, y in zip(found, expected, strict=True):
+            assert x.tobytes() == y.tobytes()
+
+
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("scale", [1.0, 2.0**-1050])
+def test_detectors(mode, scale):
+    meshes = random_scenes.many_meshes(np.random.default_rng(1))
+    start, end, d = meshes.vertices_t0 * scale, meshes.vertices_t1 * scale, 0.125 * scale
+
+    def answers():
+        detector = hc.Detector(meshes.scene(), threads=2, outputs=("points", "normals", "closest"), backend="cpu")
+        detector.set_separation(0, 1, d)
+        near, gaps = detector.proximity(start, d), detector.distances(start)
+        return detector.detect(start, end), near, gaps, detector.collision_free_step(start, end)
+
+    found, expected = same(answers, MODES[mode])
+    assert len(expected[0]) and len(expected[1]) and found == expected
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_motions_of_two_dtypes(mode):
+    scene = hc.Scene()
+    scene.add_mesh("v", n_vertices=1)
+    scene.add_mesh("f", [[0, 1, 2]])
+    end = np.array([[0, 0, -1], [-9, -9, 0], [9, -9, 0], [0, 9, 0]]) * 1e-40
+    start = (end * [1, 1, -1]).astype(np.float32)
+    detector = hc.Detector(scene, backend="cpu", outputs=("normals",))
+    found, expected = same(lambda: detector.detect(start, end), MODES[mode])
+    assert expected.vf.tolist() == [[0, 0]] and found == expected
