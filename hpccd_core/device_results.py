@@ -20,12 +20,23 @@ def _floats_on_device(numbers: list[float], device: int) -> DeviceArray:
     return integers_on_device(np.array(numbers, np.float64).view(np.int64).tolist(), device).seen_as("f")
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, eq=False)
 class _OnDevice:
     """What all of them share. slices: of many worlds, by name as in worlds.Slices."""
 
     hash: int
     slices: dict[str, DeviceArray | None] | None = dataclasses.field(repr=False)
+
+    def to_host(self) -> Any:
+        """A copy in numpy arrays."""
+        raise NotImplementedError
+
+    def __eq__(self, other: object) -> bool:
+        if type(self) is not type(other):
+            return NotImplemented
+        return self is other or bool(self.to_host() == other.to_host())
+
+    __hash__ = None  # type: ignore[assignment]
 
     def _offsets(self, kind: str, rows: DeviceArray) -> DeviceArray:
         if self.slices is None:
@@ -51,7 +62,7 @@ class _OnDevice:
         return arguments.whole_number("world", k, 0, 0 if of_worlds is None else len(of_worlds.hashes) - 1)
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, eq=False)
 class _PairsOnDevice(_OnDevice):
     vf: DeviceArray
     ee: DeviceArray
@@ -86,7 +97,7 @@ class _PairsOnDevice(_OnDevice):
         return len(self.vf) + len(self.ee)
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, eq=False)
 class DeviceContacts(_PairsOnDevice):
     """Contacts, all of them, in a GPU's memory: names, shapes, dtypes and order as in Contacts.
 
@@ -94,7 +105,8 @@ class DeviceContacts(_PairsOnDevice):
     (cupy.asarray(c.vf), torch.from_dlpack(c.vf_toc), wp.from_dlpack(...)). Their memory is used again by a later call
     only when nobody holds one of them, or what was made of one, any more. first_toc and hash are on the host.
     vf_offsets, ee_offsets, first_tocs: on the device, of one world too. world(k): rows of these arrays, in place,
-    but for points, normals and closest, which are copied there. to_host(): the same as Contacts.
+    but for points, normals and closest, which are copied there. to_host(): the same as Contacts. a == b compares
+    such copies.
     """
 
     vf_toc: DeviceArray
@@ -141,7 +153,7 @@ class DeviceContacts(_PairsOnDevice):
         return f"DeviceContacts({len(self.vf)} vertex-face, {len(self.ee)} edge-edge, first at {self.first_toc:.6g})"
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, eq=False)
 class DeviceProximity(_PairsOnDevice):
     """Proximity in a GPU's memory, as DeviceContacts is to Contacts."""
 
@@ -163,7 +175,7 @@ class DeviceProximity(_PairsOnDevice):
         return f"DeviceProximity({len(self.vf)} vertex-face, {len(self.ee)} edge-edge)"
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, eq=False)
 class DeviceIntersections(_OnDevice):
     """Intersections in a GPU's memory, as DeviceContacts is to Contacts."""
 

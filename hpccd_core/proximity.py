@@ -7,10 +7,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from .worlds import OfWorlds, PairsOfWorlds, Slices
+from .worlds import ComparedByRows, OfWorlds, PairsOfWorlds, Slices
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, eq=False)
 class Proximity(PairsOfWorlds):
     """Pairs of features within a distance of each other at one time, in the order of Contacts.
 
@@ -20,7 +20,8 @@ class Proximity(PairsOfWorlds):
     of edge a and edge b; where edges are parallel, in the middle of the stretch along which they are nearest. Empty
     (0, 2, 3) unless "closest" is among the detector's outputs.
     hash: 64-bit, the same for the same pairs and distances on any backend and any number of threads.
-    Of a detector of many worlds: vf_offsets, ee_offsets, world(k), and rows and hash, as in Contacts.
+    Of a detector of many worlds: vf_offsets, ee_offsets, world(k), and rows and hash, as in Contacts. Comparison as of
+    Contacts.
     """
 
     vf: NDArray[np.uint32]
@@ -53,7 +54,7 @@ class Proximity(PairsOfWorlds):
         return f"Proximity({len(self.vf)} vertex-face, {len(self.ee)} edge-edge)"
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, eq=False)
 class Intersections(OfWorlds):
     """Edges that pierce or touch faces at one time.
 
@@ -61,7 +62,7 @@ class Intersections(OfWorlds):
     a face that share a vertex do not count.
     hash: 64-bit, the same for the same pairs on any backend and any number of threads.
     Of a detector of W worlds: the rows of the first world, then those of the second, ... ef_offsets: (W+1,) int64,
-    where those of each world begin; world(k), and hash, as in Contacts.
+    where those of each world begin; world(k), hash, and comparison, as in Contacts.
     """
 
     ef: NDArray[np.uint32]
@@ -88,8 +89,8 @@ class Intersections(OfWorlds):
         return f"Intersections({len(self.ef)} edge-face)"
 
 
-@dataclasses.dataclass(frozen=True)
-class Gap:
+@dataclasses.dataclass(frozen=True, eq=False)
+class Gap(ComparedByRows):
     """The smallest distance of two meshes at one time, or of the features of one mesh that share no vertex.
 
     mesh_a, mesh_b: names; mesh_a was added before mesh_b, or is the same.
@@ -98,6 +99,7 @@ class Gap:
     features: scene-wide indices as in Contacts.vf, Contacts.ee or Intersections.ef; of pairs whose
     distances are the same double the first in order, vertex-face before edge-edge; of those that intersect the first.
     points: (2, 3) float64, the nearest points of both sides, in the order of the features; (0, 3) where there are none.
+    a == b: whether all of these are equal. Gaps are not hashable.
     """
 
     mesh_a: str

@@ -14,8 +14,29 @@ Row = TypeVar("Row", bound=np.generic)
 Answer = TypeVar("Answer", bound="OfWorlds")
 
 
-@dataclasses.dataclass(frozen=True)
-class Slices:
+class ComparedByRows:
+    """A dataclass whose instances are equal where all their fields are, arrays row by row, NaN like NaN.
+
+    Not hashable, as numpy arrays are not.
+    """
+
+    def __eq__(self, other: object) -> bool:
+        if type(self) is not type(other):
+            return NotImplemented
+        names = [field.name for field in dataclasses.fields(self)]  # type: ignore[arg-type]
+        return self is other or all(_equal(getattr(self, name), getattr(other, name)) for name in names)
+
+    __hash__ = None  # type: ignore[assignment]
+
+
+def _equal(a: Any, b: Any) -> bool:
+    if not (isinstance(a, np.ndarray) and isinstance(b, np.ndarray)):
+        return bool(a == b)
+    return a.dtype == b.dtype and np.array_equal(a, b, equal_nan=a.dtype.kind == "f")
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Slices(ComparedByRows):
     """Of W worlds; what an answer does not have is empty.
 
     vf, ee, ef: (W+1,) int64, where the rows of each world begin, and how many there are. hashes: (W,) uint64, of each
@@ -42,7 +63,7 @@ def answer_of(kind: Callable[..., Answer], found: Any) -> Answer:
     return kind(**found)
 
 
-class OfWorlds:
+class OfWorlds(ComparedByRows):
     """An answer that may be of many worlds. Without `slices` it is of one, whose rows are all."""
 
     slices: Slices | None

@@ -20,10 +20,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import _reference
+from ..worlds import ComparedByRows
 
 
-@dataclass(frozen=True)
-class Contacts:
+@dataclass(frozen=True, eq=False)
+class Contacts(ComparedByRows):
     """Contacts in the core's canonical order.
 
     vf: (N,2) uint32, vertex and face; ee: (M,4) uint32, a0<a1, b0<b1, (a0,a1)<(b0,b1); both scene-wide indices, sorted
@@ -36,8 +37,8 @@ class Contacts:
     ee_toc: np.ndarray
 
 
-@dataclass(frozen=True)
-class Proximity:
+@dataclass(frozen=True, eq=False)
+class Proximity(ComparedByRows):
     """Pairs as in Contacts, with their distances rounded to the nearest double."""
 
     vf: np.ndarray
