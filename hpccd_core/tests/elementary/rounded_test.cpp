@@ -142,8 +142,8 @@ INSTANTIATE_TEST_SUITE_P(Lengths, Rounded,
                          testing::Combine(testing::Values(Kind::vertex_face, Kind::edge_edge),
                                           testing::Values(1e-5, 1e-3, 1e-2, 1.0), testing::Bool()));
 
-// Of these needles one pair in 700 is so near to touching that a tolerance calls it a contact, though a filter can prove
-// it apart. So each way has to ask the same filters.
+// Of these needles one pair in 700 is so near to touching that a tolerance calls it a contact, though a filter can
+// prove it apart. So each way has to ask the same filters.
 TEST(Balanced, AnswersTheSameWithAndWithoutSinglePrecision) {
   for (const Kind kind : {Kind::vertex_face, Kind::edge_edge}) {
     for (unsigned seed = 1; seed <= 12; ++seed) {
