@@ -45,7 +45,8 @@ def load_mesh(path: str | os.PathLike[str]) -> tuple[NDArray[np.float64], NDArra
     one. Other polygons are split by ear clipping in their best plane (package ``mapbox_earcut``). Polygons without area
     become fans; a polygon that crosses itself is an error. Faces of fewer than three corners are ignored.
 
-    Loading a large file does not hold the interpreter lock for long: other threads go on.
+    Loading a large OBJ, PLY or STL file does not hold the interpreter lock for long: other threads go on. The XML of a
+    DAE file is parsed in one call, which takes 0.3 s for a million triangles.
 
     Examples
     --------
