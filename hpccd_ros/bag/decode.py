@@ -40,6 +40,14 @@ _ADDED = {
         ),
         _Addition(frozenset({"uint8 tested_features"}), clear=without_features),
         _Addition(frozenset({"uint32 parts", "float64[] motion_bounds"}), bytes(4 + 4), 4),
+        _Addition(
+            frozenset({
+                "uint64 inputs_before", "uint64 start_inputs", "string[] input_topics", "uint16[] input_topic",
+                "int64[] input_sent", "uint8[] input_flags", "uint8 report",
+            }),
+            bytes(2 * 8 + 4 * 4 + 1),
+            8,
+        ),
     ),
     "hpccd/msg/DistanceArray": (
         _Addition(frozenset({"float64[] direction", "float64[] approach_speed"}), bytes(2 * 4), 4),

@@ -160,6 +160,7 @@ class SceneFrame:
     ``step``: of the first mesh that gives one, else a running number of complete frames.
     ``fresh``: meshes whose message is used for the first time here. ``received``: of the last message needed.
     ``placements``: of meshes that move by poses, None of others; empty: none does. ``origins``: of all meshes.
+    ``inputs``: how many inputs the node had taken when the frame was complete (taken_inputs.py).
     """
 
     stamp: int
@@ -171,6 +172,12 @@ class SceneFrame:
     received: float
     placements: tuple[Placement | None, ...] = ()
     origins: tuple[Origin, ...] = ()
+    inputs: int = 0
+
+    def after_inputs(self, count: int) -> "SceneFrame":
+        frame = object.__new__(SceneFrame)
+        frame.__dict__.update(self.__dict__, inputs=count)
+        return frame
 
     def same_scene(self, other: "SceneFrame") -> bool:
         """True if a motion from one to the other exists: the same topology of every mesh, one coordinate frame."""

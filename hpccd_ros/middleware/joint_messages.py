@@ -17,6 +17,8 @@ from hpccd_ros.robots.joint_history import check_lengths
 # Bound what is kept of a message that anybody may send.
 MOST_JOINTS = 1000
 MOST_CHARACTERS = 100_000  # of their names
+# The last messages of a topic, kept for robots whose description has not come.
+MOST_RECENT = 100
 
 
 def kept(message: JointState) -> JointState | None:

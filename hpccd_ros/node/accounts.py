@@ -10,6 +10,7 @@ from typing import Any
 from hpccd_ros.detect.step_detector import Detection
 from hpccd_ros.frames.drops import Input, Reason, Refusal, RefusalCounter
 from hpccd_ros.frames.outcome import Outcome
+from hpccd_ros.frames.taken_inputs import TakenInputs
 from hpccd_ros.frames.types import SceneFrame
 from hpccd_ros.node.metrics import Metrics
 from hpccd_ros.node.refusal_log import RefusalLog
@@ -22,9 +23,9 @@ class Accounts:
     """``dropped``: vertex messages. ``connections``: what the middleware tells of its topics (name -> count).
 
     ``static_taken``: accepted messages of static meshes, which count as answered. ``requests``: to ~/detect, service
-    and action, by how they ended. warn: takes what is to be logged. on_refused: hears of each refusal, in the thread
-    that refuses. on_heard: hears of each message of an input: its kind, its mesh or topic, and what the middleware
-    tells of it.
+    and action, by how they ended. ``inputs``: what was taken since the node was configured. warn: takes what is to be
+    logged. on_refused: hears of each refusal, in the thread that refuses. on_heard: hears of each message of an input:
+    its kind, its mesh or topic, and what the middleware tells of it.
     """
 
     def __init__(self, warn: Callable[[str], None]) -> None:
@@ -37,6 +38,7 @@ class Accounts:
         self.requests = Counter(answered=0, refused=0, busy=0, timed_out=0, failed=0, stopped=0, canceled=0)
         self.restarts = 0
         self.static_taken = 0
+        self.inputs = TakenInputs()
         self.on_refused: Callable[[Refusal], None] = lambda refusal: None
         self.on_heard: Callable[[str, str, dict[str, Any]], None] = lambda kind, name, info: None
 

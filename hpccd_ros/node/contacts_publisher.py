@@ -13,9 +13,11 @@ from visualization_msgs.msg import MarkerArray
 
 from hpccd_ros.detect.pair_summary import summarise
 from hpccd_ros.detect.step_detector import Detection
+from hpccd_ros.frames.taken_inputs import TakenInputs
 from hpccd_ros.middleware import (
     contact_messages,
     fields,
+    input_fields,
     motion_bounds,
     qos,
     separation_fields,
@@ -44,8 +46,8 @@ class ContactsPublisher:
     def topic(self) -> str:
         return self._contacts.topic_name
 
-    def publish(self, found: Detection, dropped_frames: int) -> ContactArray:
-        """The message that was sent. dropped_frames: of the scene, so far."""
+    def publish(self, found: Detection, dropped_frames: int, taken: TakenInputs) -> ContactArray:
+        """The message that was sent. dropped_frames: of the scene, so far. taken: what the node has taken so far."""
         # check_fields: its arrays are taken as they are, not copied.
         message = ContactArray(
             step=found.end.step, accuracy=found.options.accuracy, backend=found.backend, check_fields=True
@@ -64,6 +66,9 @@ class ContactsPublisher:
         tested_features.fill_features(message, found.options.features)
         motion_bounds.fill_bounds(message, found.bounds)
         message.dropped_frames = dropped_frames
+        last = found.end.inputs
+        input_fields.fill_inputs(message, taken.tell(last), start=found.start.inputs, end=last)
+        input_fields.fill_report(message, found.options.report)
         self._contacts.publish(message)
         if found.gaps is not None:
             self._publish_distances(found, message.header)

@@ -17,7 +17,7 @@ def hand_over(outcome: Outcome, pipeline: FramePipeline, accounts: Accounts) -> 
     """
     accounts.add(outcome)
     for frame in outcome.frames:
-        for refusal in pipeline.enqueue(frame):
+        for refusal in pipeline.enqueue(frame.after_inputs(accounts.inputs.count)):
             accounts.refused(refusal)
     if outcome.frames:
         # Lets the detection thread have the interpreter at once, not when the executor is back in its wait: the

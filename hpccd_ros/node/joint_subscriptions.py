@@ -25,9 +25,6 @@ from hpccd_ros.params.table import ROBOT
 from hpccd_ros.robots.joint_frames import JointFrames
 from hpccd_ros.robots.joint_publishers import PublisherNumbers
 
-# Bounds what strangers can make the node keep: messages of a topic.
-MOST_RECENT = 100
-
 
 @dataclass
 class _Recent:
@@ -56,7 +53,7 @@ class JointSubscriptions:
         self._of_robots = of_robots
         self._accounts = accounts
         topics = robot_parameters.joint_topics(settings[ROBOT])
-        self._recent: dict[str, deque[_Recent]] = {topic: deque(maxlen=MOST_RECENT) for topic in topics}
+        self._recent: dict[str, deque[_Recent]] = {topic: deque(maxlen=joint_messages.MOST_RECENT) for topic in topics}
         self._subscriptions = [
             self._subscribe(topic, robots) for topic, robots in topics.items()
         ]
@@ -93,6 +90,7 @@ class JointSubscriptions:
                 text = f"more than max_rate = {self._settings['max_rate']:g} messages a second; some are dropped"
                 self._refuse([Refusal(topic, Reason.RATE, text, what=Input.JOINT_STATE, sent=sent)])
                 return
+            self._accounts.inputs.add(topic, sent)
             moved = [self._of_robots[robot] for robot in robots if robot in self._of_robots]
             refusals = joint_messages.fill(moved, message, topic, sent, publisher)
             if (kept := joint_messages.kept(message)) is not None:

@@ -13,6 +13,7 @@ from hpccd_ros.frames.drops import Aspect, Input, Reason, Refusal
 from hpccd_ros.frames.pipeline import FramePipeline
 from hpccd_ros.frames.rate_limit import RateLimit
 from hpccd_ros.frames.sequence import SequenceWatch
+from hpccd_ros.frames.taken_inputs import NEW_PUBLISHER, SEVERAL_PUBLISHERS
 from hpccd_ros.middleware import mesh_inputs, topic_names
 from hpccd_ros.node.accounts import Accounts
 from hpccd_ros.node.input_subscription import InputSubscription
@@ -41,9 +42,15 @@ class MeshTopic:
         self.sent = 0  # when the last message was that was taken
         self._limit = RateLimit(reception.settings["max_rate"])
         self._subscription: InputSubscription | None = None
+        self._topic = topic_names.of_mesh(reception.mesh, kind)
+
+    def taken(self, sent: int, new_publisher: bool, several: bool = False) -> None:
+        """A message goes on to the pipeline; sent: by its publisher, ns. several: the topic has several of them."""
+        flags = NEW_PUBLISHER * new_publisher + SEVERAL_PUBLISHERS * several
+        self.reception.accounts.inputs.add(self._topic, sent, flags)
 
     def subscribe(self, callback: Callable[[Any, dict[str, Any]], None], profile: QoSProfile) -> Subscription:
-        topic = topic_names.of_mesh(self.reception.mesh, self.kind)
+        topic = self._topic
         self._subscription = InputSubscription(
             self.reception.node,
             mesh_inputs.TYPES[self.kind],

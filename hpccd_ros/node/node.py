@@ -182,7 +182,8 @@ class HpccdNode(GuardedLifecycleNode):
 
     def _publish(self, found: Detection) -> None:
         """Called by the detection thread."""
-        message = self._contacts.publish(found, self._accounts.dropped.most_of(self._deforming))
+        dropped = self._accounts.dropped.most_of(self._deforming)
+        message = self._contacts.publish(found, dropped, self._accounts.inputs)
         self._accounts.answered(found, message.total, len(message.kind))
         self._contacts.show(found, message.header)
 

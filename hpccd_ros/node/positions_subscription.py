@@ -39,9 +39,12 @@ class PositionsSubscription(MeshTopic):
                 self.kind, message, of.settings, received, alone, sent=sent, welding=self._welding
             )
         except InvalidMessageError as error:
+            self.taken(sent, False)  # a replay reads, and refuses, it as well
             of.accounts.refused(error.refusal(of.mesh, aspect=self.aspect, sent=sent))
             return
-        hand_over(of.pipeline.push(of.mesh, frame, self.numbers.notice()), of.pipeline, of.accounts)
+        new_publisher = self.numbers.notice()
+        self.taken(sent, new_publisher, not alone)
+        hand_over(of.pipeline.push(of.mesh, frame, new_publisher), of.pipeline, of.accounts)
 
     def _count_received(self, info: dict[str, Any]) -> None:
         of = self.reception

@@ -8,6 +8,7 @@ from hpccd_ros.detect.core import CORE_ERRORS
 from hpccd_ros.detect.scene import SceneBuilder
 from hpccd_ros.detect.step_detector import Detection, StepDetector
 from hpccd_ros.detect.thread import DetectionThread
+from hpccd_ros.frames import taken_inputs
 from hpccd_ros.frames.drops import Reason
 from hpccd_ros.frames.pipeline import FramePipeline
 from hpccd_ros.frames.types import SceneFrame, Topology
@@ -36,6 +37,8 @@ class StreamDetection:
         self._configuration = configuration
         self._builder = builder
         self._accounts = accounts
+        accounts.inputs.restart()
+        self._restart_after = settings["restart_after"]
         self._pipeline, self._by_joints = self._made()
         accounts.add(mesh_files.load(self._pipeline, meshes))
         self._subscriptions = Subscriptions(node, settings, meshes)
@@ -56,6 +59,7 @@ class StreamDetection:
         if works and self._stop is not None:
             self._stop.end()
         before, self._builder = self._pipeline, builder
+        self._accounts.inputs.add(taken_inputs.robots_known(list(self._configuration.robots)), 0)
         self._pipeline, self._by_joints = self._made()
         inherited = self._pipeline.inherit(before, self._configuration.meshes)
         self._accounts.add(before.stop())
@@ -97,6 +101,7 @@ class StreamDetection:
     def close(self) -> None:
         """Unsubscribe and end the thread; what waited is counted as stopped. Topologies and static positions stay."""
         self._subscriptions.close()
+        self._accounts.inputs.add(taken_inputs.STOPPED, 0)
         self._accounts.add(self._pipeline.stop())
         self._end_thread()
 
@@ -108,7 +113,11 @@ class StreamDetection:
 
     def apply_change(self) -> None:
         """Follow the parameters, of which some may change at any time."""
-        self._pipeline.set_restart_after(self._configuration.settings["restart_after"])
+        count = self._configuration.settings["restart_after"]
+        if count != self._restart_after:
+            self._accounts.inputs.add(taken_inputs.RESTART_AFTER, count)
+            self._restart_after = count
+        self._pipeline.set_restart_after(count)
         if self._thread is not None:
             self._thread.detector.options = self._configuration.options
 

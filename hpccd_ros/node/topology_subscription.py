@@ -33,6 +33,7 @@ class TopologySubscription(MeshTopic):
         if why := unusable_topology(topology):
             self.refuse(Reason.BAD_TOPOLOGY, why)
             return
+        self.taken(info["source_timestamp"], new_publisher)
         hand_over(of.pipeline.push(of.mesh, topology, new_publisher), of.pipeline, of.accounts)
 
     def _on_unreadable(self) -> None:

@@ -59,6 +59,7 @@ class TransformSubscriptions:
                 text = f"more than max_rate = {self._max_rate:g} messages a second; some are dropped"
                 self._unread(Refusal(topic.name, Reason.RATE, text, what=Input.TRANSFORM, sent=sent), topic)
                 return
+            self._accounts.inputs.add(topic.name, sent)
             for refusal in transform_topics.fill(self._pipeline.transforms, message, topic, sent):
                 self._accounts.refused(refusal)
             for outcome in self._pipeline.retry():

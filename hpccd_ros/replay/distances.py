@@ -2,6 +2,7 @@
 """The smallest distances that the node told (topic distances), computed again."""
 
 import dataclasses
+from collections import defaultdict
 
 import numpy as np
 
@@ -11,10 +12,12 @@ from hpccd_ros.bag.reader import RecordedTopic
 from hpccd_ros.detect.core import CORE_ERRORS
 from hpccd_ros.detect.layout import Layout
 from hpccd_ros.detect.step_detector import StepDetector
+from hpccd_ros.frames.types import SceneFrame
 from hpccd_ros.middleware import fields
 from hpccd_ros.middleware.fields import InvalidMessageError
 from hpccd_ros.middleware.snapshot_messages import fill_distances
 from hpccd_ros.replay.frames import PATIENCE, FrameWindow
+from hpccd_ros.replay.input_order import OrderedAnswer
 
 # Fields of DistanceArray, and how many entries each has for a pair of meshes.
 # Not approach_speed: the snapshot before may be one that the recording does not hold.
@@ -34,10 +37,12 @@ class DistanceCheck:
 
     def __init__(self, topic: RecordedTopic | None, detector: StepDetector, accuracy: str) -> None:
         self.topics = [topic.name] if topic is not None else []
-        self._decode = make_decoder(topic) if topic is not None else None
+        self.decode = make_decoder(topic) if topic is not None else None
         self._detector = detector
         self._accuracy = accuracy
         self._waiting: list[tuple[int, object]] = []
+        self._beside: dict[OrderedAnswer, list] = defaultdict(list)
+        self._settled: dict[OrderedAnswer, tuple[SceneFrame | None, bool]] = {}
         self.verified = self.diverged = self.unverified = 0
         self._divergence = self._lack = ""
 
@@ -47,7 +52,36 @@ class DistanceCheck:
 
     def put(self, message, frames: int) -> None:
         """An answer, after so many frames: it may have been written before the last of its positions."""
-        self._waiting.append((frames, self._decode(message)))
+        self._waiting.append((frames, self.decode(message)))
+
+    def put_of(self, step: OrderedAnswer | None, message, counts: bool) -> None:
+        """An answer beside that to a step; None: there is none. counts: whether it is to be looked at."""
+        answer = self.decode(message)
+        if step is not None:
+            step.distances -= 1
+        if counts and step is None:
+            self._lacks(f"distances of step {answer.step}: the recording has no contacts of this step")
+        elif counts and step in self._settled:
+            self._look_beside(answer, step)
+        elif counts:
+            self._beside[step].append(answer)
+        if step is not None and not step.distances:
+            self._settled.pop(step, None)
+
+    def settle_of(self, step: OrderedAnswer, frame: SceneFrame | None, counts: bool) -> None:
+        """Whether there is a frame at the end of this step is known now. counts: it began within the recording."""
+        self._settled[step] = frame, counts
+        for answer in self._beside.pop(step, ()):
+            self._look_beside(answer, step)
+        if not step.distances:
+            del self._settled[step]
+
+    def _look_beside(self, answer, step: OrderedAnswer) -> None:
+        frame, counts = self._settled[step]
+        if frame is not None:
+            self._look_at(answer, step.end, frame)
+        elif counts:
+            self._lacks(f"distances at {step.end} ns: the recording does not make the frame that they are of")
 
     def settle(self, window: FrameWindow, frames: int | None = None) -> None:
         """Look at what waits, of which the frame is there or will not come any more. frames: so far; None: all."""

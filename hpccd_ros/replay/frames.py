@@ -1,12 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """From recorded messages to frames of the scene, by the node's own rules."""
 
-from collections import OrderedDict
+from collections import OrderedDict, deque
 
 from hpccd_ros.bag.decode import make_completer, make_decoder
+from hpccd_ros.base.quoting import quoted
+from hpccd_ros.frames import taken_inputs
 from hpccd_ros.frames.drops import Input, RefusalCounter
 from hpccd_ros.frames.outcome import Outcome
 from hpccd_ros.frames.sequence import SequenceWatch
+from hpccd_ros.frames.taken_inputs import NEW_PUBLISHER, SEVERAL_PUBLISHERS
 from hpccd_ros.frames.types import SceneFrame
 from hpccd_ros.frames.welding import Welding
 from hpccd_ros.middleware import joint_messages, mesh_inputs, topic_names, transform_topics
@@ -23,63 +26,123 @@ PATIENCE = 16
 class FrameSource:
     """Pushes recorded messages into a pipeline as the node has it.
 
-    refused: what could not be used and why, counted as in the node; transforms by topic.
+    ordered: they come in the order in which the node took them. refused: what could not be used and why, counted as in
+    the node; transforms by topic.
     """
 
-    def __init__(self, setup: ReplaySetup, topics):
+    def __init__(self, setup: ReplaySetup, topics, ordered: bool = False):
         self._setup = setup
+        self._settings = setup.settings
+        # Else messages of several topics may have reached the recorder in another order than the node.
+        self._patience = 1 if ordered else 4
         self.refused = {what: RefusalCounter() for what in Input}
         self._decoders = {
             name: make_completer(topics[name]) if kind in topic_names.WHOLE else make_decoder(topics[name])
             for name, (_, kind) in setup.roles.items()
             if name in topics
         }
-        self._watches = {name: SequenceWatch() for name in setup.roles}
-        self._weldings = {name: Welding() for name in setup.roles}
-        # Messages of several topics may have reached the recorder in another order than the node.
-        pending = 4 * setup.settings["pending_frames"]
-        by_joints = robot_parameters.followers(setup.settings, setup.robots, pending)
-        self._pipeline = scene_parameters.frame_pipeline(
-            setup.settings, setup.meshes, pending, setup.robots, by_joints.values()
-        )
-        self._by_joints = {
-            topic: [by_joints[robot] for robot in robots]
-            for topic, robots in robot_parameters.joint_topics(setup.settings[ROBOT]).items()
-        }
-        for mesh, (topology, positions) in setup.files.items():
-            self._pipeline.load(mesh, topology, positions)
+        self.restart(all_known=True)
 
     @property
     def topics(self) -> list[str]:
         return list(self._decoders)
 
-    def push(self, message) -> list[SceneFrame]:
-        """Frames that this recorded message completes."""
+    def listed_name(self, topic: str) -> str:
+        """As answers list a topic of the recording."""
+        mesh, kind = self._setup.roles[topic]
+        return topic_names.of_mesh(mesh, kind) if mesh else kind
+
+    def restart(self, all_known: bool) -> None:
+        """As the node is when it has just been configured. all_known: and has heard the descriptions of its robots."""
+        setup, self._settings = self._setup, self._setup.settings
+        described = robot_parameters.topics(setup.settings[ROBOT])
+        self._make([name for name in setup.robots if all_known or name not in described])
+        for mesh, (topology, positions) in setup.files.items():
+            self._pipeline.load(mesh, topology, positions)
+        self._listen()
+
+    def push(self, message, flags: int | None = None) -> list[SceneFrame]:
+        """Frames that this recorded message completes. flags: as the node listed them; None: it did not."""
         mesh, kind = self._setup.roles[message.topic]
         decoded = self._decoders[message.topic](message)
         if kind in transform_topics.ALL:
             topic = transform_topics.ALL[kind]
             outcome = self._retried(transform_topics.fill(self._pipeline.transforms, decoded, topic))
         elif not mesh and kind in self._by_joints:
+            if (kept := joint_messages.kept(decoded)) is not None:
+                self._recent[kind].append(kept)
             outcome = self._retried(joint_messages.fill(self._by_joints[kind], decoded, kind))
         else:
-            outcome = self._push_mesh(mesh, kind, decoded, message)
+            outcome = self._push_mesh(mesh, kind, decoded, message, flags)
+        return self._counted(outcome)
+
+    def happen(self, event: str, value: int) -> list[SceneFrame]:
+        """What answers list beside messages, and the frames that it completes. Raises ValueError for anything else."""
+        outcome = Outcome()
+        if event == taken_inputs.STOPPED:
+            outcome = self._pipeline.stop()
+            self._listen()
+        elif event == taken_inputs.RESTART_AFTER:
+            self._settings = {**self._settings, "restart_after": value}
+            self._pipeline.set_restart_after(value)
+        elif (names := taken_inputs.known_robots(event)) is not None and set(names) <= set(self._setup.robots):
+            outcome = self._know(names)
+        else:
+            raise ValueError(f"it lists the event {quoted(event)}, which does not belong to this recording")
+        return self._counted(outcome)
+
+    def _make(self, known: list[str]) -> None:
+        """The pipeline with these robots."""
+        settings, robots = self._settings, {name: self._setup.robots[name] for name in known}
+        pending = self._patience * settings["pending_frames"]
+        by_joints = robot_parameters.followers(settings, robots, pending)
+        self._pipeline = scene_parameters.frame_pipeline(
+            settings, self._setup.meshes, pending, robots, by_joints.values()
+        )
+        self._by_joints = {
+            topic: [by_joints[robot] for robot in moved if robot in by_joints]
+            for topic, moved in robot_parameters.joint_topics(settings[ROBOT]).items()
+        }
+
+    def _listen(self) -> None:
+        """What the node's subscriptions keep, as they are made when it is activated."""
+        self._watches = {name: SequenceWatch() for name in self._setup.roles}
+        self._weldings = {name: Welding() for name in self._setup.roles}
+        self._recent = {topic: deque(maxlen=joint_messages.MOST_RECENT) for topic in self._by_joints}
+
+    def _know(self, names: list[str]) -> Outcome:
+        """A description has come: as StreamDetection.remake does."""
+        before = self._pipeline
+        self._make(names)
+        outcome = self._pipeline.inherit(before, self._setup.meshes)
+        for topic, moved in self._by_joints.items():
+            for message in self._recent[topic]:
+                joint_messages.fill(moved, message, topic)
+        outcome.refusals += before.stop().refusals
+        outcome += self._retried([])
+        return outcome
+
+    def _counted(self, outcome: Outcome) -> list[SceneFrame]:
         for refusal in outcome.refusals:
             self.refused[refusal.what].count(refusal)
         return outcome.frames
 
-    def _push_mesh(self, mesh, kind, decoded, message) -> Outcome:
+    def _push_mesh(self, mesh, kind, decoded, message, flags) -> Outcome:
         watch = self._watches[message.topic]
         # Sequence 0: the recorder was not told the publisher's numbers.
         new_publisher = bool(message.sequence) and watch.next(message.sequence)[1]
+        several = bool((flags or 0) & SEVERAL_PUBLISHERS)
         try:
             checked = mesh_inputs.read(
-                kind, decoded, self._setup.settings, sent=message.publish_time, welding=self._weldings[message.topic]
-            )
+                kind, decoded, self._settings, 0.0, not several, sent=message.publish_time,
+                welding=self._weldings[message.topic],
+            )  # fmt: skip
         except InvalidMessageError as error:
             return Outcome(refusals=[error.refusal(mesh, mesh_inputs.INPUTS[kind])])
         if kind != "topology":
             new_publisher = watch.notice()
+        if flags is not None:
+            new_publisher = bool(flags & NEW_PUBLISHER)
         return self._pipeline.push(mesh, checked, new_publisher)
 
     def _retried(self, refusals) -> Outcome:

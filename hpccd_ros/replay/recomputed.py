@@ -2,6 +2,7 @@
 """Compute a recording again, without DDS and as fast as it goes, and compare with what the node answered."""
 
 import dataclasses
+from collections import Counter, deque
 from collections.abc import Iterator
 
 from hpccd_core.options import ACCURACIES, FEATURES
@@ -15,12 +16,14 @@ from hpccd_ros.detect.step_detector import StepDetector
 from hpccd_ros.frames.types import SceneFrame
 from hpccd_ros.middleware import fields
 from hpccd_ros.middleware.fields import InvalidMessageError
+from hpccd_ros.middleware.input_fields import read_inputs, read_report
 from hpccd_ros.middleware.separation_fields import read_separation
 from hpccd_ros.middleware.tested_features import read_features
 from hpccd_ros.params.table import MOST_PARTS
 from hpccd_ros.replay.compare import difference
 from hpccd_ros.replay.distances import DistanceCheck
 from hpccd_ros.replay.frames import PATIENCE, FrameSource, FrameWindow
+from hpccd_ros.replay.input_order import InputOrder, OrderedAnswer
 from hpccd_ros.replay.recorded_setup import ReplaySetup
 
 # Frames kept for answers that come after them; at least as many as can wait in the node.
@@ -48,10 +51,60 @@ class ReplayedStep:
     difference: str | None = None  # first difference from what was recorded
     missing: str | None = None  # why it could not be computed
     before_recording: bool = False  # it began before the recording did
+    uncertain: str = ""  # why a difference would not show that the node was wrong
+    unlisted_start: bool = False  # its start is from before the inputs that answers list
 
     @property
     def total(self) -> int:
         return len(self.contacts.vf) + len(self.contacts.ee) if self.contacts is not None else 0
+
+
+@dataclasses.dataclass(eq=False)
+class _Session:
+    """What the answers so far tell of those that follow, from when the node was configured. ``computed``: frames of one
+    were there. ``lacks_early``: inputs are missing from before the recording. ``uncertain``: later ones are, in words.
+    """
+
+    number: int = 0
+    begun: int = 0
+    computed: bool = False
+    lacks_early: bool = False
+    uncertain: str = ""
+
+    def step_of(self, known: OrderedAnswer, answer, at: float, start_frame, end_frame) -> ReplayedStep:
+        """Its frames or why they are missing."""
+        step = ReplayedStep(0, answer.step, known.start, known.end, start_frame, end_frame, answer, at)
+        step.missing = known.problem or self._lack(known)
+        if step.missing:
+            return step
+        for name, stamp, frame in (("start", known.start, start_frame), ("end", known.end, end_frame)):
+            if frame is None:
+                step.before_recording = not self.computed and (known.begun > 0 or self.lacks_early)
+                step.missing = f"what the node had taken makes no frame at its {name}, stamp {stamp} ns"
+                return step
+        if not start_frame.same_scene(end_frame):
+            step.missing = "the topology or the coordinate frame changes between its start and its end"
+            return step
+        step.uncertain = self.uncertain
+        if not self.computed and known.listed.start <= known.begun:
+            step.unlisted_start, step.uncertain = True, "the step began before the inputs that answers list"
+        self.computed = True
+        return step
+
+    def _lack(self, known: OrderedAnswer) -> str | None:
+        if known.session != self.number:
+            self.__init__(known.session, known.begun)
+        if known.begun != self.begun:
+            self.begun = known.begun
+            if self.computed:
+                self.uncertain = self.uncertain or "an answer before it is missing, and with it what the node had taken"
+        if not known.missing:
+            return None
+        if known.early and not self.computed:
+            self.lacks_early = True
+            return None
+        self.uncertain = self.uncertain or known.missing
+        return known.missing
 
 
 class Replay:
@@ -75,10 +128,11 @@ class Replay:
         self._begin, self._end = begin, end
         self._at = 0.0  # seconds into the recording, of the message read last
         self.messages_read = 0
-        self.source = FrameSource(setup, recording.topics)
         answers = recording.topics.get(setup.contacts)
         self.recorded_answers = answers.count if answers else 0
         self._decode_answer = make_decoder(answers) if answers else None
+        self._ordered = self.recorded_answers > 0 and self._lists_inputs()
+        self.source = FrameSource(setup, recording.topics, self._ordered)
         builder = setup.builder
         self._detector = StepDetector(builder, self._options(None))
         self._every_contact = StepDetector(builder, self._options(None))
@@ -87,6 +141,7 @@ class Replay:
         self._mesh_names = setup.mesh_names
         self._window = FrameWindow(max(WINDOW, 2 * setup.settings["frame_queue"]))
         self.any_one = setup.settings["report"] == "any"  # "verified" means less then: compare.py
+        self.not_taken: Counter[str] = Counter()  # by topic, messages that the node left out
         self.verified = self.diverged = self.unverified = 0
         self.frames = 0
         self.first_divergence: ReplayedStep | None = None
@@ -102,7 +157,9 @@ class Replay:
 
     def steps(self) -> Iterator[ReplayedStep]:
         """Each recorded answer, computed again; in a recording without answers, each step from frame to frame."""
-        find = self._answers if self.recorded_answers else self._successive_frames
+        find = self._successive_frames
+        if self.recorded_answers:
+            find = self._ordered_answers if self._ordered else self._answers
         number = 0
         for step in find():
             if step.at < self._begin:
@@ -114,9 +171,43 @@ class Replay:
                 self._compute(step)
             if step.missing is None:
                 self._compare(step)
+            if step.difference and step.uncertain:
+                step.missing, step.difference = f"{step.uncertain} (recomputed without it: {step.difference})", None
+                step.before_recording = step.unlisted_start
             self._count(step)
             yield step
         self.distances.settle(self._window)
+
+    def _lists_inputs(self) -> bool:
+        """Whether the answers list what the node had taken, and the recorder kept the times that they name."""
+        first = next(self._recording.messages([self._setup.contacts]))
+        try:
+            listed = read_inputs(self._decode_answer(first)) is not None
+        except ValueError:
+            listed = True
+        return listed and first.publish_time != first.log_time
+
+    def _ordered_answers(self):
+        contacts, distances = self._setup.contacts, next(iter(self.distances.topics), None)
+        decode = {contacts: self._decode_answer, distances: self.distances.decode}
+        order = InputOrder(self._recording, self.source, contacts, distances, decode)
+        self.not_taken = order.not_taken
+        answers, of_distances = iter(order.answers), iter(order.of_distances)
+        session, waiting = _Session(), deque()
+        for message in self._messages():
+            if message.topic == contacts:
+                waiting.append((next(answers), self._decode_answer(message), self._at))
+            elif message.topic == distances:
+                self.distances.put_of(next(of_distances), message, counts=self._begin <= self._at <= self._end)
+            else:
+                order.put(message)
+            order.advance()
+            self.frames = order.made
+            while waiting and waiting[0][0].answered:
+                known, answer, at = waiting.popleft()
+                step = session.step_of(known, answer, at, *order.frames(known))
+                yield step
+                self.distances.settle_of(known, step.end_frame, counts=not step.before_recording)
 
     def _answers(self):
         waiting = []
@@ -209,6 +300,7 @@ class Replay:
         if recorded is not None:
             if not self._accuracy and recorded.accuracy in ACCURACIES:
                 options = dataclasses.replace(options, accuracy=recorded.accuracy)
+            options = dataclasses.replace(options, report=read_report(recorded) or options.report)
             separation, features = self._separation_of(recorded), read_features(recorded)
             # In as many parts as then: the tolerance may have been another one.
             rigid = dataclasses.replace(options.rigid, parts=min(recorded.parts, MOST_PARTS))
@@ -228,12 +320,13 @@ class Replay:
     def _compare(self, step):
         if step.recorded is None:
             return
-        found = step.contacts
-        if self.any_one:
+        found, any_one = step.contacts, self._detector.options.report == "any"
+        self.any_one |= any_one
+        if any_one:
             # Which one the node found depended on the timing of its threads: it must be one of all.
             self._every_contact.options = dataclasses.replace(self._detector.options, report="all", outputs=())
             found = self._every_contact.detect(step.start_frame, step.end_frame).contacts
-        step.difference = difference(step.recorded, found, step.layout, self.any_one, step.bounds)
+        step.difference = difference(step.recorded, found, step.layout, any_one, step.bounds)
 
     def _count(self, step):
         if step.missing:

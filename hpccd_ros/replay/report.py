@@ -221,6 +221,9 @@ def _print_losses(replay) -> None:
     for what, counter in replay.source.refused.items():
         for (mesh, reason), count in sorted(counter.by_mesh_and_reason().items()):
             print(f"  {count} {what} of {mesh} not used: {reason}{_HINTS.get(reason, '').format(mesh=mesh)}")
+    for topic, count in sorted(replay.not_taken.items()):
+        if count:
+            print(f"  {count} messages of {topic} not taken by the node: lost on the way to it, or refused")
 
 
 def _progress_bar() -> Progress:

@@ -82,14 +82,16 @@ def test_no_other_field_has_moved():
 
 def test_recordings_from_before_tell_nothing():
     now = message_definitions.definition_text(NAME)
-    later = (" tested_features", " parts", " motion_bounds")
+    later = (" tested_features", " parts", " motion_bounds", " inputs_before", " start_inputs", " input_topics",
+             " input_topic", " input_sent", " input_flags", " report")  # fmt: skip
     then = "\n".join(line for line in now.splitlines() if not line.endswith(later))
     topic = RecordedTopic("/contacts", NAME, then, type_hash="", offered_qos="", count=1)
     message = answer(2, 2, "world")
     message.tested_features = 1  # what lay there by chance
     full = bytes(typestore().serialize_cdr(of_rosbags(typestore(), message), NAME))
-    data = full[:-8]  # without the number of parts, and the length of no bounds
-    assert completion(topic)(data) == without_features(data) + bytes(8) != full
+    later = 8 + 2 * 8 + 4 * 4 + 1  # the number of parts and the length of no bounds; no inputs
+    data = full[:-later]
+    assert completion(topic)(data) == without_features(data) + bytes(later) != full
     recorded = RecordedMessage("/contacts", 0, 0, 0, data)
     assert read_features(make_decoder(topic)(recorded)) == BOTH
     today, recorded = dataclasses.replace(topic, definition=now), dataclasses.replace(recorded, data=full)

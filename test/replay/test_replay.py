@@ -101,10 +101,12 @@ def test_answers_from_before_they_told_a_separation(small_bag, versions):
     _set("topology_versions", np.arange(versions, dtype=np.uint32) + 7)(decoded)
     now = message_definitions.definition_text(topic.type_name)
     added = ("EDGE_FACE=2", "minimum_separation", "separation_mesh_a", "separation_mesh_b", "separations", "closest",
-             "distance", "tested_features", "parts", "motion_bounds")  # fmt: skip
+             "distance", "tested_features", "parts", "motion_bounds", "inputs_before", "start_inputs", "input_topics",
+             "input_topic", "input_sent", "input_flags", "report")  # fmt: skip
     then = "\n".join(line for line in now.splitlines() if not any(line.endswith(" " + name) for name in added))
     data = bytes(store.serialize_cdr(decoded, topic.type_name))
-    end = len(data) - 2 * 4 - 5 * 4 - 8  # of the fields of then, and what aligned the next
+    inputs = 4 + 2 * 8 + 4 * 4 + 1  # the last fields, and what aligns them
+    end = len(data) - inputs - 2 * 4 - 5 * 4 - 8  # of the fields of then, and what aligned the next
     end -= 4 if versions % 2 == 0 else 0
     old = dataclasses.replace(topic, definition=then, type_hash="RIHS01_of_then")
     assert completion(old)(data[:end]) == data

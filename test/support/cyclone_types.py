@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from cyclonedds.idl import IdlStruct
 from cyclonedds.idl.annotations import final
-from cyclonedds.idl.types import float32, float64, int32, sequence, uint8, uint32, uint64
+from cyclonedds.idl.types import float32, float64, int32, int64, sequence, uint8, uint16, uint32, uint64
 
 
 @dataclass
@@ -74,3 +74,10 @@ class ContactArray(IdlStruct, typename="hpccd::msg::dds_::ContactArray_"):
     distance: sequence[float64]
     parts: uint32
     motion_bounds: sequence[float64]
+    inputs_before: uint64
+    start_inputs: uint64
+    input_topics: sequence[str]
+    input_topic: sequence[uint16]
+    input_sent: sequence[int64]
+    input_flags: sequence[uint8]
+    report: uint8

@@ -1,0 +1,311 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Recorded messages in the order in which the node took them, as its answers list it.
+
+A first pass over the recording reads the lists and settles the order. The second pass then holds back only what reached
+the recorder earlier than the node. The node did not take what no answer lists, with one exception: where the lists
+begin late, or answers are missing in between, what was sent until then is taken in the order of the recording.
+"""
+
+from array import array
+from collections import Counter, defaultdict, deque
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hpccd_ros.bag.reader import RecordedMessage, Recording
+from hpccd_ros.base.quoting import shortened
+from hpccd_ros.frames import taken_inputs
+from hpccd_ros.frames.taken_inputs import TakenInput
+from hpccd_ros.frames.types import SceneFrame
+from hpccd_ros.middleware import fields
+from hpccd_ros.middleware.input_fields import ListedInputs, read_inputs
+from hpccd_ros.replay.frames import FrameSource
+
+_LATEST = 2**63 - 1  # a recording can hold later times, a list cannot
+_NOT_LISTED = -1
+
+Key = tuple[str, int]  # of a message: the topic as the node names it, and when it was sent
+
+
+class _FrameKey(NamedTuple):
+    """``inputs``: how many the node had taken; _NOT_LISTED: only known to be before those that answers list."""
+
+    session: int
+    inputs: int
+    stamp: int
+
+
+@dataclass(eq=False)
+class OrderedAnswer:
+    """What is known of an answer before anything is computed.
+
+    ``sent``, ``start``, ``end``: ns. ``problem``: why it cannot be verified, or "". ``listed``: None: it lists nothing.
+    ``session``: how often the node had been configured before, or its process started. ``begun``: inputs of the session
+    that were taken before those that answers list without a gap up to here. ``unlisted``: what is taken before its
+    list. ``missing``: the first input of its list that the recording lacks, in words; ``early``: it lacks only such as
+    were sent before the first one of their topic in it. ``answered``: all that it lists has been pushed.
+    ``distances``: answers about those of its frame that have not been read.
+    """
+
+    sent: int
+    step: int
+    start: int = 0
+    end: int = 0
+    problem: str = ""
+    listed: ListedInputs | None = None
+    session: int = 0
+    begun: int = 0
+    unlisted: list[Key] = field(default_factory=list)
+    missing: str = ""
+    early: bool = True
+    answered: bool = False
+    distances: int = 0
+
+    @property
+    def start_keys(self) -> list[_FrameKey]:
+        if self.problem or self.listed is None:
+            return []
+        keys = [_FrameKey(self.session, self.listed.start, self.start)]
+        return keys + [_FrameKey(self.session, _NOT_LISTED, self.start)] * (self.listed.start <= self.begun)
+
+    @property
+    def end_keys(self) -> list[_FrameKey]:
+        return [] if self.problem or self.listed is None else [_FrameKey(self.session, self.listed.end, self.end)]
+
+
+class InputOrder:
+    """Reads ``recording`` once; then give it the recorded inputs (`put`), and let it push them into ``source``.
+
+    contacts: name of the topic of answers; distances: of those about distances, None: none. decode: of both, topic ->
+    decoder. ``answers``: in the order of the recording; ``of_distances``: for each answer about distances the one that
+    belongs to it, or None. ``made``: frames so far. ``not_taken``: by topic, how
+    many messages the node left out although it took later ones.
+    """
+
+    def __init__(
+        self,
+        recording: Recording,
+        source: FrameSource,
+        contacts: str,
+        distances: str | None,
+        decode: Mapping[str, Callable[[RecordedMessage], Any]],
+    ) -> None:
+        self._source = source
+        self.answers: list[OrderedAnswer] = []
+        self.made = 0
+        about_distances: list[OrderedAnswer] = []
+        sent: dict[str, array] = defaultdict(lambda: array("q"))
+        place: dict[str, array] = defaultdict(lambda: array("q"))
+        topics = [*source.topics, contacts, *([distances] if distances else [])]
+        for number, message in enumerate(recording.messages(topics)):
+            if message.topic == contacts:
+                self.answers.append(_read(decode[contacts](message), message))
+            elif message.topic == distances:
+                about_distances.append(_read_stamp(decode[distances](message), message))
+            else:
+                name, time = self._key(message)
+                sent[name].append(time)
+                place[name].append(number)
+        # The files of a split recording each begin with what is in force: of these the first counts.
+        self._recorded: dict[str, NDArray[np.int64]] = {}
+        self._place: dict[str, NDArray[np.int64]] = {}
+        for name, times in sent.items():
+            self._recorded[name], first = np.unique(np.frombuffer(times, np.int64), return_index=True)
+            self._place[name] = np.frombuffer(place[name], np.int64)[first]
+        self._settle()
+        self.of_distances = self._nearest(about_distances)
+        self._inbox: dict[Key, deque[RecordedMessage]] = {}
+        self._frames: dict[_FrameKey, SceneFrame] = {}
+        self._wanted = Counter(key for answer in self.answers for key in answer.start_keys + answer.end_keys)
+        self._way = self._push_all()
+
+    def put(self, message: RecordedMessage) -> None:
+        key = self._key(message)
+        if self._uses_left(key):
+            held = self._inbox.setdefault(key, deque())
+            if all(message.data != other.data for other in held):
+                held.append(message)
+
+    def advance(self) -> None:
+        """Push what can be pushed by now."""
+        next(self._way, None)
+
+    def frames(self, answer: OrderedAnswer) -> tuple[SceneFrame | None, SceneFrame | None]:
+        """At the start and the end of its step, where they could be made; once, after it was ``answered``."""
+        start, end = (
+            next((self._frames[key] for key in keys if key in self._frames), None)
+            for keys in (answer.start_keys, answer.end_keys)
+        )
+        for key in answer.start_keys + answer.end_keys:
+            self._wanted[key] -= 1
+            if not self._wanted[key]:
+                self._frames.pop(key, None)
+        return start, end
+
+    def _key(self, message: RecordedMessage) -> Key:
+        return self._source.listed_name(message.topic), min(message.publish_time, _LATEST)
+
+    def _settle(self) -> None:
+        """Sessions, what is taken without being listed, and how often each message is taken."""
+        runs = self._runs()
+        listed: dict[str, list[NDArray[np.int64]]] = defaultdict(list)
+        spans = []  # of each run: topic -> first and last time of what is listed
+        for run in runs:
+            times: dict[str, list[NDArray[np.int64]]] = defaultdict(list)
+            for answer in run:
+                topic, sent = np.asarray(answer.listed.topic), np.asarray(answer.listed.sent, np.int64)
+                for index, name in enumerate(answer.listed.topics):
+                    times[name].append(sent[topic == index])
+            joined = {name: np.concatenate(parts) for name, parts in times.items()}
+            spans.append({name: (part.min(), part.max()) for name, part in joined.items() if len(part)})
+            for name, part in joined.items():
+                listed[name].append(part)
+        of_all = {name: np.concatenate(parts) for name, parts in listed.items()}
+        upto: dict[str, int] = {}
+        for run, span in zip(runs, spans, strict=True):
+            first = run[0]
+            if first.begun:
+                found = []
+                for name, times in self._recorded.items():
+                    until = span[name][0] if name in span else first.sent
+                    free = (times < until) & ~np.isin(times, of_all.get(name, ()))
+                    if name in upto:
+                        free &= times > upto[name]
+                    found += [(place, name, time) for place, time in
+                              zip(self._place[name][free].tolist(), times[free].tolist(), strict=True)]  # fmt: skip
+                    upto[name] = max(upto.get(name, until), until)
+                first.unlisted = [(name, time) for _, name, time in sorted(found)]
+            for name, (_, last) in span.items():
+                upto[name] = max(upto.get(name, last), last)
+        for run in runs:
+            for name, time in run[0].unlisted:
+                listed[name].append(np.array([time]))
+        self._uses = {name: np.unique(np.concatenate(parts), return_counts=True) for name, parts in listed.items()}
+        self.not_taken: Counter[str] = Counter()
+        for name, times in self._recorded.items():
+            if len(of_all.get(name, ())):
+                left = (times < of_all[name].max()) & ~np.isin(times, self._uses[name][0])
+                self.not_taken[name] = int(left.sum())
+
+    def _runs(self) -> list[list[OrderedAnswer]]:
+        """Answers whose lists follow each other without a gap."""
+        runs: list[list[OrderedAnswer]] = []
+        session = taken = begun = 0
+        for answer in self.answers:
+            if answer.listed is None:
+                continue
+            before = answer.listed.before
+            if not runs or before != taken:
+                session += bool(runs) and before < taken
+                begun = before
+                runs.append([])
+            answer.session, answer.begun, taken = session, begun, answer.listed.end
+            runs[-1].append(answer)
+        return runs
+
+    def _nearest(self, about_distances: list[OrderedAnswer]) -> list[OrderedAnswer | None]:
+        """Of each the answer about the same frame that was sent with it."""
+        alike: dict[tuple[int, int], list[OrderedAnswer]] = defaultdict(list)
+        for answer in self.answers:
+            if not answer.problem:
+                alike[answer.step, answer.end].append(answer)
+        found = []
+        for one in about_distances:
+            beside = alike.get((one.step, one.end), ())
+            answer = min(beside, key=lambda other, sent=one.sent: abs(other.sent - sent), default=None)
+            if answer is not None:
+                answer.distances += 1
+            found.append(answer)
+        return found
+
+    def _uses_left(self, key: Key) -> int:
+        at = self._use(key)
+        return int(self._uses[key[0]][1][at]) if at is not None else 0
+
+    def _use(self, key: Key) -> int | None:
+        times = self._uses[key[0]][0] if key[0] in self._uses else ()
+        at = int(np.searchsorted(times, key[1])) if len(times) else 0
+        return at if at < len(times) and times[at] == key[1] else None
+
+    def _is_recorded(self, key: Key) -> bool:
+        times = self._recorded.get(key[0], ())
+        at = int(np.searchsorted(times, key[1])) if len(times) else 0
+        return at < len(times) and times[at] == key[1]
+
+    def _push_all(self) -> Iterator[None]:
+        """Yields where the next message has not been read yet."""
+        session = None
+        for answer in self.answers:
+            if answer.listed is not None:
+                if answer.session != session:
+                    session = answer.session
+                    self._source.restart(all_known=answer.begun > 0)
+                for key in answer.unlisted:
+                    while (message := self._take(key)) is None:
+                        yield
+                    self._made(answer, _NOT_LISTED, self._source.push(message))
+                for taken in answer.listed:
+                    if taken.topic.startswith(taken_inputs.EVENT):
+                        self._happen(answer, taken)
+                        continue
+                    key = taken.topic, taken.sent
+                    if not self._is_recorded(key):
+                        self._lack(answer, taken)
+                        continue
+                    while (message := self._take(key)) is None:
+                        yield
+                    self._made(answer, taken.number, self._source.push(message, taken.flags))
+            answer.answered = True
+
+    def _take(self, key: Key) -> RecordedMessage | None:
+        held = self._inbox.get(key)
+        if not held:
+            return None
+        at = self._use(key)
+        self._uses[key[0]][1][at] -= 1
+        if not self._uses[key[0]][1][at]:
+            del self._inbox[key]
+        return held.popleft() if len(held) > 1 else held[0]
+
+    def _made(self, answer: OrderedAnswer, inputs: int, frames: list[SceneFrame]) -> None:
+        self.made += len(frames)
+        for frame in frames:
+            if (key := _FrameKey(answer.session, inputs, frame.stamp)) in self._wanted:
+                self._frames[key] = frame
+
+    def _happen(self, answer: OrderedAnswer, taken: TakenInput) -> None:
+        try:
+            self._made(answer, taken.number, self._source.happen(taken.topic, taken.sent))
+        except ValueError as error:
+            answer.missing, answer.early = answer.missing or str(error), False
+
+    def _lack(self, answer: OrderedAnswer, taken: TakenInput) -> None:
+        times = self._recorded.get(taken.topic, ())
+        answer.early &= not len(times) or taken.sent < times[0]
+        answer.missing = answer.missing or (
+            f"it lists a message of {shortened(taken.topic)} sent at {taken.sent} ns, which the recording does not hold"
+        )
+
+
+def _read(answer: Any, message: RecordedMessage) -> OrderedAnswer:
+    found = _read_stamp(answer, message)
+    try:
+        found.listed = read_inputs(answer)
+        if found.listed is None:
+            found.problem = "it does not list what the node had taken, as the first answer of the recording does"
+        found.start = fields.stamp_to_ns(answer.start)
+    except ValueError as error:
+        found.problem = f"the answer is malformed: {error}"
+    return found
+
+
+def _read_stamp(answer: Any, message: RecordedMessage) -> OrderedAnswer:
+    found = OrderedAnswer(min(message.publish_time, _LATEST), answer.step)
+    try:
+        found.end = fields.stamp_to_ns(answer.header.stamp)
+    except ValueError as error:
+        found.problem = f"the answer is malformed: {error}"
+    return found
