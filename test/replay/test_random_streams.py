@@ -1,0 +1,38 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Every answer of a correct node is verified, in whatever order it and its recording heard the topics."""
+
+import subprocess
+import sys
+
+import pytest
+from random_streams import RandomStream, verified
+
+
+def _recorded(start_node, folder, seed, recordings, ticks):
+    stream = RandomStream(start_node, folder, seed)
+    stream.record(ticks)
+    while len(stream.recordings) < recordings:
+        stream.next_recording()
+        stream.record(ticks)
+    stream.end()
+    return [verified(path) for path in stream.recordings]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_recordings_of_random_streams_are_verified(start_node, tmp_path, seed):
+    assert min(_recorded(start_node, tmp_path, seed, recordings=2, ticks=60)) > 3
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("seed", range(100, 140))
+def test_many_recordings_on_a_busy_machine(start_node, tmp_path, seed):
+    """Two hundred."""
+    busy = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(2)]
+    try:
+        found = _recorded(start_node, tmp_path, seed, recordings=5, ticks=60)
+    finally:
+        for process in busy:
+            process.kill()
+            process.wait()
+    print(f"seed {seed}: {found} answers verified")
+    assert sum(found) > 50
