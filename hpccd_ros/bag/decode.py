@@ -43,9 +43,9 @@ _ADDED = {
         _Addition(
             frozenset({
                 "uint64 inputs_before", "uint64 start_inputs", "string[] input_topics", "uint16[] input_topic",
-                "int64[] input_sent", "uint8[] input_flags", "uint8 report",
+                "int64[] input_sent", "uint8[] input_flags", "uint32 report",
             }),
-            bytes(2 * 8 + 4 * 4 + 1),
+            bytes(2 * 8 + 4 * 4 + 4),
             8,
         ),
     ),

@@ -89,7 +89,7 @@ def test_recordings_from_before_tell_nothing():
     message = answer(2, 2, "world")
     message.tested_features = 1  # what lay there by chance
     full = bytes(typestore().serialize_cdr(of_rosbags(typestore(), message), NAME))
-    later = 8 + 2 * 8 + 4 * 4 + 1  # the number of parts and the length of no bounds; no inputs
+    later = 8 + 2 * 8 + 4 * 4 + 4  # the number of parts and the length of no bounds; no inputs
     data = full[:-later]
     assert completion(topic)(data) == without_features(data) + bytes(later) != full
     recorded = RecordedMessage("/contacts", 0, 0, 0, data)

@@ -105,7 +105,7 @@ def test_answers_from_before_they_told_a_separation(small_bag, versions):
              "input_topic", "input_sent", "input_flags", "report")  # fmt: skip
     then = "\n".join(line for line in now.splitlines() if not any(line.endswith(" " + name) for name in added))
     data = bytes(store.serialize_cdr(decoded, topic.type_name))
-    inputs = 4 + 2 * 8 + 4 * 4 + 1  # the last fields, and what aligns them
+    inputs = 4 + 2 * 8 + 4 * 4 + 4  # the last fields, and what aligns them
     end = len(data) - inputs - 2 * 4 - 5 * 4 - 8  # of the fields of then, and what aligned the next
     end -= 4 if versions % 2 == 0 else 0
     old = dataclasses.replace(topic, definition=then, type_hash="RIHS01_of_then")

@@ -30,7 +30,7 @@ LATER = (
     ("hpccd/msg/ContactArray", b"topology_versions", 1, 4),
     ("hpccd/msg/ContactArray", b"minimum_separation", 8, 8 + 5 * 4),
     ("hpccd/msg/ContactArray", b"motion_bounds", 4, 8),
-    ("hpccd/msg/ContactArray", b"inputs_before", 8, 2 * 8 + 4 * 4 + 1),
+    ("hpccd/msg/ContactArray", b"inputs_before", 8, 2 * 8 + 4 * 4 + 4),
     ("hpccd/msg/MeshTopology", b"uint32[] edges", 4, 4),
     ("hpccd/msg/DistanceArray", b"approach_speed", 4, 8),
 )

@@ -80,4 +80,4 @@ class ContactArray(IdlStruct, typename="hpccd::msg::dds_::ContactArray_"):
     input_topic: sequence[uint16]
     input_sent: sequence[int64]
     input_flags: sequence[uint8]
-    report: uint8
+    report: uint32
