@@ -43,6 +43,15 @@ def test_contacts(accuracy, report, dtype):
         assert_same(here.detect(t0, t1), expected)
 
 
+def test_answers_are_compared_on_the_host():
+    scene, t0, t1 = crumpled()
+    detector = hc.Detector(scene, backend="gpu", results="device")
+    found, again, near = detector.detect(t0, t1), detector.detect(t0, t1), detector.proximity(t0, 0.01)
+    assert found == again and found != detector.detect(t0, t0) and found != near and near == near
+    with pytest.raises(TypeError, match="unhashable"):
+        hash(found)
+
+
 def test_any_is_the_first_pair():
     scene, t0, t1 = crumpled()
     vf, ee = device_results.first_pair(hc.Detector(scene, backend="cpu").detect(t0, t1))

@@ -107,10 +107,11 @@ def test_any_queue(segments, pairs):
     assert_same(scene, t0, t1, backends=("hybrid",), minimum_separation=0.1, **options)
 
 
-def test_points_normals_and_nearest_points():
+@pytest.mark.parametrize("separation", (0.2, 1e-9, 1e-14, 1e-300))
+def test_points_normals_and_nearest_points(separation):
     scene, t0, t1 = three_meshes(8)
     scene.set_separation("mesh0", "mesh0", 0.0)
-    contacts = assert_same(scene, t0, t1, minimum_separation=0.2, outputs=("points", "normals", "closest"))
+    contacts = assert_same(scene, t0, t1, minimum_separation=separation, outputs=("points", "normals", "closest"))
     assert len(contacts.closest) == len(contacts) > 0
 
 
