@@ -155,14 +155,14 @@ class Moving {
   int low_;
 };
 
-// How long until the gap has shrunk to d, were its velocity constant; or until it is shortest.
+// How long until the gap has shrunk to d, were its velocity constant; or until it is shortest. At most a whole step.
 double time_until(const Gap& gap, double d) {
   const V& g = gap.direction;
   const V& v = gap.velocity.unit;
   const V moment = cross(g, v);
   const double shorter = d / gap.length, room = shorter * shorter - dot(moment, moment);
   const double ahead = 0 - dot(g, v) - (room > 0 ? std::sqrt(room) : 0);
-  return ahead > 0 ? ahead * gap.length / gap.velocity.length : 0;
+  return ahead > 0 ? std::min(ahead * gap.length / gap.velocity.length, 1.0) : 0;
 }
 
 }  // namespace
