@@ -70,7 +70,9 @@ class World:
         self.alive = dict.fromkeys(PLACES, True)
         self.numbers = {}
         self.inbox = {}
-        self.held = self.listener_held = 0  # for so many ticks
+        self.held = self.listener_held = self.busy = 0  # for so many ticks; busy: the executor alone
+        # By so many ticks the stamps of those who move what follows the hand are ahead of it.
+        self.lead = {mesh: int(rng.choice([0, 0, 0, 3, 8])) for mesh, kind in MOVING.items() if kind == "between"}
         self.versions = dict.fromkeys(("hand", "tool", "cart", "table"), 0)
         self.promise = Promise(MOVING, ["table"], TIMEOUT, DISTANCE, ERROR)
         self.false = self.allowed = self.looks = self.read = 0
@@ -225,7 +227,8 @@ class World:
     def place(self, mesh, bad=False):
         """A message that says where a moving mesh is now; the names of what can be wrong with one are its kinds."""
         height = float(self.rng.uniform(-0.2, 0.2) if self.rng.random() < 0.01 else self.rng.uniform(0.3, 3.0))
-        at, stamp = math.nan if bad else height, fields.ns_to_stamp(self.stamp)
+        stamp_ns = self.stamp + round(1e9 * TICK) * self.lead.get(mesh, 0)
+        at, stamp = math.nan if bad else height, fields.ns_to_stamp(stamp_ns)
         topic, known = PLACES[mesh], math.nan if bad else height
         if mesh == "hand":
             corners = CORNER + [0, 0, at]
@@ -248,7 +251,7 @@ class World:
             twice = bad and self.rng.random() < 0.5
             message = JointState(name=["z"] * (1 + twice), position=[height if twice else at] * (1 + twice))
             message.header.stamp = stamp
-        self.send(topic, mesh, message, "place", known, self.stamp)
+        self.send(topic, mesh, message, "place", known, stamp_ns)
 
     # What happens.
 
@@ -260,7 +263,8 @@ class World:
                 if self.alive[mesh]:
                     self.place(mesh, bad=self.rng.random() < 0.002)
             self.held, self.listener_held = max(self.held - 1, 0), max(self.listener_held - 1, 0)
-            if not self.held and self.promise.active:
+            self.busy = max(self.busy - 1, 0)
+            if not self.held and not self.busy and self.promise.active:
                 self.spin()
                 self.detect()
             if not self.held:
@@ -276,6 +280,13 @@ class World:
 
     def hold(self):
         self.held = int(self.rng.integers(2, 40))
+
+    def keep_busy(self):
+        """The executor takes nothing for a while, in which all publishers may end."""
+        self.busy = int(self.rng.integers(4, 14))
+        if self.rng.random() < 0.5:
+            self.tick(self.busy // 2)
+            self.alive = dict.fromkeys(self.alive, False)
 
     def hold_listener(self):
         self.listener_held = int(self.rng.integers(2, 40))
@@ -378,9 +389,9 @@ class World:
         return self.rng.choice(list(names))
 
     EVENTS = {
-        "tick": 30, "pass_silently": 1, "hold": 1, "hold_listener": 1, "late_listener": 0.5, "die": 0.7, "revive": 4,
-        "refuse": 1.5, "refine": 0.5, "mend": 6, "move_table": 1, "restart": 0.5, "jump": 0.4, "differ": 0.4,
-        "describe": 0.4, "remake": 0.3, "switch": 0.4, "fail": 0.5,
+        "tick": 30, "pass_silently": 1, "hold": 1, "keep_busy": 1, "hold_listener": 1, "late_listener": 0.5,
+        "die": 0.7, "revive": 4, "refuse": 1.5, "refine": 0.5, "mend": 6, "move_table": 1, "restart": 0.5,
+        "jump": 0.4, "differ": 0.4, "describe": 0.4, "remake": 0.3, "switch": 0.4, "fail": 0.5,
     }  # fmt: skip
 
     def step(self):
