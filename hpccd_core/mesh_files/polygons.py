@@ -107,7 +107,7 @@ def _ears(positions: NDArray[np.float64]) -> NDArray[np.intp]:
     except ModuleNotFoundError:
         raise MeshFileError(
             "is not convex, and splitting it into triangles needs the Python package mapbox_earcut; install it with: "
-            "pip install mapbox_earcut (it is in the extra 'meshes')"
+            "pip install 'mapbox_earcut~=2.1.0' (it is in the extra 'meshes')"
         ) from None
     ends = np.array([len(flat)], np.uint32)
     faces = np.asarray(earcut.triangulate_float64(flat, ends), np.intp).reshape(-1, 3)

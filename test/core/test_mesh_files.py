@@ -153,6 +153,12 @@ def test_corners_on_a_straight_side_stay(load):
         assert_covers(vertices, list(range(10)), [tuple(face) for face in faces.tolist()])
 
 
+def test_the_triangles_of_a_polygon_that_is_not_convex_stay_the_same(load):
+    """Recordings name triangles by their numbers: a version of mapbox_earcut that splits otherwise must not pass."""
+    _, faces = load("m.obj", (variants._v(ELL) + variants._f([range(6)])).encode())
+    assert faces.tolist() == [[4, 5, 0], [4, 0, 1], [4, 1, 2], [4, 2, 3]]
+
+
 def test_polygons_without_area_are_fans(load):
     flat = [[float(x), 0, 0] for x in (0, 2, 1, 3)]
     assert load("m.obj", (variants._v(flat) + variants._f([range(4)])).encode())[1].tolist() == [[0, 1, 2], [2, 3, 0]]
@@ -286,7 +292,7 @@ def test_paths_that_cannot_be(path, why):
 def test_without_earcut_it_says_what_to_install(load, monkeypatch):
     monkeypatch.setitem(sys.modules, "mapbox_earcut", None)
     assert len(load("m.obj", (variants._v() + variants._f(variants.MIXED)).encode())[1]) == 7, "convex ones need none"
-    with pytest.raises(hc.MeshFileError, match="is not convex, .*pip install mapbox_earcut"):
+    with pytest.raises(hc.MeshFileError, match="is not convex, .*pip install 'mapbox_earcut"):
         load("m.obj", (variants._v(ELL) + variants._f([range(6)])).encode())
 
 
