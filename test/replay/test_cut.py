@@ -2,6 +2,7 @@
 """`hpccd cut`: any part of a recording replays by itself, and is verified."""
 
 import dataclasses
+import functools
 import json
 import random
 import re
@@ -148,7 +149,7 @@ def test_parts_that_begin_and_end_anywhere_are_verified(whole, tmp_path):
         replay, verified = _replayed(part)
         reached += len(verified)
         # Those whose step began after the cut, and whose answer came before the end.
-        expected = [step for step in steps if 0.1 + (step - 1) / 10 > begin / SECOND and _came(whole, step) < end]
+        expected = [step for step in steps if 0.1 + (step - 1) / 10 > begin / SECOND and _came(whole)[step] < end]
         assert set(expected) <= set(verified), (begin, end, expected, verified)
         received = [m for m in raw_messages(whole) if begin <= m.log_time - BEGAN < end]
         assert found.count - found.in_force == len(received) and found.begin == begin
@@ -157,11 +158,11 @@ def test_parts_that_begin_and_end_anywhere_are_verified(whole, tmp_path):
     assert reached > 50
 
 
-def _came(path, step, _known={}):  # noqa: B006
-    if path not in _known:
-        answers = [(m.topic, m.log_time - BEGAN) for m in raw_messages(path) if m.topic == "/contacts"]
-        _known[path] = dict(zip(_replayed(path)[1], (came for _, came in answers), strict=True))
-    return _known[path][step]
+@functools.cache
+def _came(path):
+    """Step -> when its answer came, ns after the beginning."""
+    answers = [message.log_time - BEGAN for message in raw_messages(path) if message.topic == "/contacts"]
+    return dict(zip(_replayed(path)[1], answers, strict=True))
 
 
 def test_two_parts_that_join_hold_every_message_once(whole, tmp_path):
