@@ -207,18 +207,25 @@ class InputOrder:
         return runs
 
     def _nearest(self, about_distances: list[OrderedAnswer]) -> list[OrderedAnswer | None]:
-        """Of each the answer about the same frame that was sent with it."""
+        """Of each the answer about the same frame that was sent with it: none where that one is not recorded, although
+        an answer to another frame with the same stamp is."""
         alike: dict[tuple[int, int], list[OrderedAnswer]] = defaultdict(list)
         for answer in self.answers:
             if not answer.problem:
                 alike[answer.step, answer.end].append(answer)
-        found = []
-        for one in about_distances:
+        found: list[OrderedAnswer | None] = []
+        nearest: dict[OrderedAnswer, tuple[int, int]] = {}  # how far, and its number among those about distances
+        for number, one in enumerate(about_distances):
             beside = alike.get((one.step, one.end), ())
             answer = min(beside, key=lambda other, sent=one.sent: abs(other.sent - sent), default=None)
-            if answer is not None:
-                answer.distances += 1
             found.append(answer)
+            if answer is not None:
+                nearest[answer] = min(nearest.get(answer, (_LATEST, 0)), (abs(answer.sent - one.sent), number))
+        for number, answer in enumerate(found):
+            if answer is not None and nearest[answer][1] != number:
+                found[number] = None
+            elif answer is not None:
+                answer.distances += 1
         return found
 
     def _uses_left(self, key: Key) -> int:

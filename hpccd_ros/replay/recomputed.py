@@ -193,12 +193,16 @@ class Replay:
         order = InputOrder(self._recording, self.source, contacts, distances, decode)
         self.not_taken = order.not_taken
         answers, of_distances = iter(order.answers), iter(order.of_distances)
-        session, waiting = _Session(), deque()
+        session, waiting, begun = _Session(), deque(), False
         for message in self._messages():
             if message.topic == contacts:
+                begun = True
                 waiting.append((next(answers), self._decode_answer(message), self._at))
             elif message.topic == distances:
-                self.distances.put_of(next(of_distances), message, counts=self._begin <= self._at <= self._end)
+                step = next(of_distances)
+                # Without contacts, and before all others: the recording began between the two.
+                within = (begun or step is not None) and self._begin <= self._at <= self._end
+                self.distances.put_of(step, message, counts=within)
             else:
                 order.put(message)
             order.advance()

@@ -11,6 +11,7 @@ from simulated_node import RESTART, Recorded, run, write
 from std_msgs.msg import String
 from waving_sheet import sheet_faces, sheet_positions
 
+from hpccd_ros.bag.cut import Time, cut
 from hpccd_ros.bag.reader import Recording
 from hpccd_ros.frames import taken_inputs
 from hpccd_ros.frames.taken_inputs import robots_known
@@ -161,6 +162,29 @@ def test_the_order_of_the_node_is_followed(tmp_path, kind, early):
             one.message.input_topic, one.message.input_sent, one.message.input_flags = [], [], []
         replay, _ = _replay(tmp_path / "x.mcap", parameters, messages)
         assert replay.diverged + replay.unverified > 0
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_parts_are_verified(tmp_path, kind):
+    """Cut anywhere: between the contacts and the distances of one step too."""
+    parameters, heard, taken = KINDS[kind]()
+    parameters = {**parameters, "distances": True}
+    messages = run(tmp_path / "x.mcap", parameters, heard, list(taken))
+    write(tmp_path / "x.mcap", parameters, messages)
+    times = sorted({one.log_time for one in messages})
+    distances = [one.log_time for one in messages if one.topic == "distances"]
+    verified = 0
+    for number, begin in enumerate([*times[7::9], distances[len(distances) // 2]]):
+        part = tmp_path / f"{number}.mcap"
+        with Recording(tmp_path / "x.mcap") as recording:
+            cut(recording, part, Time(begin - times[0]), None)
+        with Recording(part) as recording:
+            replay = Replay(recording, recorded_setup.of_recording(recording), backend="cpu")
+            steps = list(replay.steps())
+        of_distances = replay.distances.diverged, replay.distances.unverified, replay.distances.first
+        assert (replay.diverged, replay.unverified, *of_distances) == (0, 0, 0, 0, ""), (begin - times[0], steps)
+        verified += replay.verified
+    assert verified > 2 * len(distances)
 
 
 def test_distances_belong_to_the_frame_of_their_answer(tmp_path):
