@@ -130,7 +130,7 @@ class FrameAssembler:
         for frame in early:
             outcome += self._admit(state, frame)
         if placed is not None and not state.positions.frame_ids:
-            outcome.unplaced.append((mesh, placed))
+            outcome.unplaced += ((mesh, placed),)
         return outcome
 
     def hear(self, mesh: str, received: float) -> None:

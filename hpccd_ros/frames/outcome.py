@@ -23,7 +23,7 @@ class Outcome:
     static_taken: int = 0
     asked: list[str] = field(default_factory=list)
     joined: list[tuple[str, int, float]] = field(default_factory=list)
-    unplaced: list[tuple[str, int]] = field(default_factory=list)
+    unplaced: tuple[tuple[str, int], ...] = ()
 
     def __iadd__(self, other: "Outcome") -> "Outcome":
         self.frames += other.frames

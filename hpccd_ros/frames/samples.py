@@ -75,6 +75,8 @@ class Samples(Generic[Value]):
 
     def sent_at(self, stamp: int) -> int:
         """When the older of the samples around ``stamp`` was sent, which lies between the first and the last."""
+        if self.stamps[-1] == stamp:
+            return self.sent[-1]
         at = bisect_left(self.stamps, stamp)
         return self.sent[at] if self.stamps[at] == stamp else min(self.sent[at - 1], self.sent[at])
 

@@ -87,12 +87,12 @@ def test_a_static_mesh_whose_newest_message_is_not_in_use_is_outdated():
 
 def test_positions_that_a_new_topology_makes_void():
     made = pipeline(MeshSettings("hand"), MeshSettings("table", static=True))
-    assert made.push("table", Topology(1, 3, FACES, sent=5)).unplaced == [], "there were none"
+    assert made.push("table", Topology(1, 3, FACES, sent=5)).unplaced == (), "there were none"
     made.push("table", frame(0, 10))
     made.push("table", MeshFrame(0, TRIANGLE, 1, frame_id="world", sent=20))
-    assert made.push("table", Topology(2, 3, FACES, sent=30)).unplaced == [("table", 20)]
+    assert made.push("table", Topology(2, 3, FACES, sent=30)).unplaced == (("table", 20),)
     made.push("table", MeshFrame(0, TRIANGLE, 3, frame_id="world", sent=40))
-    assert made.push("table", Topology(3, 3, FACES, sent=50)).unplaced == [], "they waited for it"
+    assert made.push("table", Topology(3, 3, FACES, sent=50)).unplaced == (), "they waited for it"
 
 
 def test_a_shape_and_a_topology_that_are_sent_again():
