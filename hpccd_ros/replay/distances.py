@@ -81,7 +81,7 @@ class DistanceCheck:
         if frame is not None:
             self._look_at(answer, step.end, frame)
         elif counts:
-            self._lacks(f"distances at {step.end} ns: the recording does not make the frame that they are of")
+            self._lacks(f"distances at {step.end} ns: the frame that they are of is not certain")
 
     def settle(self, window: FrameWindow, frames: int | None = None) -> None:
         """Look at what waits, of which the frame is there or will not come any more. frames: so far; None: all."""

@@ -284,6 +284,8 @@ class InputOrder:
                 self._frames[key] = frame
 
     def _happen(self, answer: OrderedAnswer, taken: TakenInput) -> None:
+        if taken.topic == taken_inputs.STOPPED and answer.early:
+            answer.missing = ""  # what could depend on it was forgotten
         try:
             self._made(answer, taken.number, self._source.happen(taken.topic, taken.sent))
         except ValueError as error:

@@ -13,6 +13,8 @@ from hpccd_ros.detect.layout import Layout
 from hpccd_ros.detect.rigid_step import NO_BOUNDS, MotionBounds
 from hpccd_ros.detect.separation import NONE, Separation
 from hpccd_ros.detect.step_detector import StepDetector
+from hpccd_ros.frames import taken_inputs
+from hpccd_ros.frames.samples import HISTORY_NS
 from hpccd_ros.frames.types import SceneFrame
 from hpccd_ros.middleware import fields
 from hpccd_ros.middleware.fields import InvalidMessageError
@@ -52,7 +54,7 @@ class ReplayedStep:
     missing: str | None = None  # why it could not be computed
     before_recording: bool = False  # it began before the recording did
     uncertain: str = ""  # why a difference would not show that the node was wrong
-    unlisted_start: bool = False  # its start is from before the inputs that answers list
+    depends_on_before: bool = False  # and what is uncertain is what came before the recording
 
     @property
     def total(self) -> int:
@@ -61,15 +63,20 @@ class ReplayedStep:
 
 @dataclasses.dataclass(eq=False)
 class _Session:
-    """What the answers so far tell of those that follow, from when the node was configured. ``computed``: frames of one
-    were there. ``lacks_early``: inputs are missing from before the recording. ``uncertain``: later ones are, in words.
+    """What the answers so far tell of those that follow, since the node was configured. history: transforms or joint
+    states move meshes, so that frames depend on what came some time before. ``computed``: frames of an answer were
+    there. ``lacks_early``: inputs are missing from before the recording. ``uncertain``: later ones are, in words.
+    ``first``: stamp at which the first of these answers ends. ``settled``: nothing depends on that history any more.
     """
 
+    history: bool
     number: int = 0
     begun: int = 0
     computed: bool = False
     lacks_early: bool = False
     uncertain: str = ""
+    first: int | None = None
+    settled: bool = False
 
     def step_of(self, known: OrderedAnswer, answer, at: float, start_frame, end_frame) -> ReplayedStep:
         """Its frames or why they are missing."""
@@ -77,23 +84,25 @@ class _Session:
         step.missing = known.problem or self._lack(known)
         if step.missing:
             return step
+        self._settle(known)
+        begins = not self.computed and 0 < known.listed.start <= known.begun
+        step.depends_on_before = not self.uncertain and (begins or not self.settled)
+        step.uncertain = "it may depend on what came before the recording" * step.depends_on_before or self.uncertain
         for name, stamp, frame in (("start", known.start, start_frame), ("end", known.end, end_frame)):
             if frame is None:
-                step.before_recording = not self.computed and (known.begun > 0 or self.lacks_early)
+                joined_late = not self.computed and (known.begun > 0 or self.lacks_early)
+                step.before_recording = joined_late or step.depends_on_before
                 step.missing = f"what the node had taken makes no frame at its {name}, stamp {stamp} ns"
                 return step
         if not start_frame.same_scene(end_frame):
             step.missing = "the topology or the coordinate frame changes between its start and its end"
             return step
-        step.uncertain = self.uncertain
-        if not self.computed and known.listed.start <= known.begun:
-            step.unlisted_start, step.uncertain = True, "the step began before the inputs that answers list"
         self.computed = True
         return step
 
     def _lack(self, known: OrderedAnswer) -> str | None:
         if known.session != self.number:
-            self.__init__(known.session, known.begun)
+            self.__init__(self.history, known.session, known.begun)
         if known.begun != self.begun:
             self.begun = known.begun
             if self.computed:
@@ -105,6 +114,15 @@ class _Session:
             return None
         self.uncertain = self.uncertain or known.missing
         return known.missing
+
+    def _settle(self, known: OrderedAnswer) -> None:
+        self.first = known.end if self.first is None else self.first
+        self.settled = (
+            self.settled
+            or not (self.history and (known.begun or self.lacks_early))
+            or (taken_inputs.STOPPED in known.listed.topics and not known.missing)  # then the node forgot it, too
+            or known.end > self.first + HISTORY_NS
+        )
 
 
 class Replay:
@@ -173,7 +191,7 @@ class Replay:
                 self._compare(step)
             if step.difference and step.uncertain:
                 step.missing, step.difference = f"{step.uncertain} (recomputed without it: {step.difference})", None
-                step.before_recording = step.unlisted_start
+                step.before_recording = step.depends_on_before
             self._count(step)
             yield step
         self.distances.settle(self._window)
@@ -193,7 +211,8 @@ class Replay:
         order = InputOrder(self._recording, self.source, contacts, distances, decode)
         self.not_taken = order.not_taken
         answers, of_distances = iter(order.answers), iter(order.of_distances)
-        session, waiting, begun = _Session(), deque(), False
+        session = _Session(history=any(not mesh for mesh, _ in self._setup.roles.values()))
+        waiting, begun = deque(), False
         for message in self._messages():
             if message.topic == contacts:
                 begun = True
@@ -211,7 +230,8 @@ class Replay:
                 known, answer, at = waiting.popleft()
                 step = session.step_of(known, answer, at, *order.frames(known))
                 yield step
-                self.distances.settle_of(known, step.end_frame, counts=not step.before_recording)
+                certain = not (step.missing and step.uncertain)
+                self.distances.settle_of(known, step.end_frame if certain else None, counts=not step.before_recording)
 
     def _answers(self):
         waiting = []

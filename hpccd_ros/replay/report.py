@@ -175,7 +175,8 @@ class Summary:
                   f"{self.seconds_recorded:.2f} s of motion; {args.threads or os.cpu_count()} threads")
         _print_losses(replay)
         if self.before:
-            print(f"  {self.before} answers not verified: their step began before the recording")
+            print(f"  {self.before} answers not verified: their step began before the recording, or depends on what "
+                  "came before it")
         if self.missing:
             print(f"  {replay.unverified} answers NOT VERIFIED, first step {self.missing.step} "
                   f"(ends at {self.missing.end} ns): {self.missing.missing}")

@@ -21,6 +21,7 @@ from hpccd_ros.replay import recorded_setup
 from hpccd_ros.replay.recomputed import Replay
 
 N = 4
+TABLE = ("meshes/table/topology", "meshes/table/vertices")
 QUAD = np.array([[0, 1, 2], [1, 3, 2]])
 SQUARE = np.array([[-0.4, -0.4, 0.0], [0.4, -0.4, 0.0], [-0.4, 0.4, 0.0], [0.4, 0.4, 0.0]])
 MESHES = {"meshes": ["cloth", "tool", "table"], "mesh.tool.input": "pose", "mesh.table.static": True,
@@ -330,3 +331,27 @@ def test_messages_that_the_node_did_not_take(tmp_path):
     messages = run(tmp_path / "x.mcap", parameters, heard, taken)
     replay, _ = _replay(tmp_path / "x.mcap", parameters, messages)
     assert replay.diverged == replay.unverified == 0 and replay.not_taken.total() == 2
+
+
+def test_what_transforms_and_joints_were_before_the_recording_is_not_held_against_the_node(tmp_path):
+    """It begins in the middle of a stream: for ten seconds frames may depend on what the node knew before."""
+    heard = _robot()
+    for k in range(1, 60):
+        heard += [_joints(10**9 * k // 2, k), _base(10**9 * k // 2, k)]
+    taken = [0, robots_known(["crane"]), *range(1, len(heard))][1:]
+    messages = run(tmp_path / "x.mcap", ROBOT, heard, taken)
+    answers = _answers(messages)
+    begin = answers[9].log_time
+    kept = [one for one in messages if one.log_time > begin or one.topic in ("robot_description", *TABLE)]
+
+    def counts(wrong):
+        changed = [copy.deepcopy(one) if one is answers[wrong] else one for one in kept]
+        changed[kept.index(answers[wrong])].message.hash += 1
+        replay, steps = _replay(tmp_path / "x.mcap", ROBOT, changed)
+        return _counts(replay), sum(step.before_recording for step in steps)
+
+    late = len(answers) - 10
+    (verified, diverged, unverified), before = counts(15)
+    assert (diverged, unverified) == (0, 0) and verified + before == late and verified >= late - 4
+    (verified, diverged, unverified), before = counts(45)
+    assert (diverged, unverified) == (1, 0) and verified + before == late - 1
