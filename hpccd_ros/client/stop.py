@@ -82,6 +82,8 @@ class StopListener:
         self._clocks = Clocks()
         self._clock_error = float(clock_error)
         self._ages = ClockWatch(self._clock_error, self._timeout)
+        # A word from before is not taken: whether a clock was set back since it was said, nobody here has seen.
+        self._begun = self._clocks.system()
         self._sent: int | None = None  # when the newest message was; None: none came, or the publisher was lost since
         self._said = True  # what it said
         self._said_true = 0  # when the newest was sent that said true
@@ -118,10 +120,11 @@ class StopListener:
         with self._lock:
             steady, system = self._clocks.steady(), self._clocks.system()
             self._ages.look(steady, system)
+            if clocks := self._ages.why(steady):
+                self._sent, self._lost = None, clocks  # how old it is, nobody can say any more
+                self._begun = 0
             if self._sent is None:
                 return f"{self._lost[0].upper()}{self._lost[1:]}."
-            if clocks := self._ages.why(steady):
-                return f"{clocks[0].upper()}{clocks[1:]}."
             age = 1e-9 * (system - self._sent)
             if age < -self._clock_error:
                 return f"What was heard last on {self._topic} was sent {-age:.3g} s in the future."
@@ -145,7 +148,9 @@ class StopListener:
             self._said_true = min(self._said_true, system)  # a clock may have been set back
             if message.data:
                 self._said_true = max(self._said_true, sent)
-            if self._sent is None or sent >= self._sent or self._sent > system:
+            if sent < self._begun:
+                self._lost = f"nothing was heard on {self._topic} that was sent since the listener was made"
+            elif self._sent is None or sent >= self._sent or self._sent > system:
                 self._said, self._sent = message.data, sent
         self._tell()
 

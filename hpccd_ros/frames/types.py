@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hpccd_ros.frames.drops import Reason, Refusal
+from hpccd_ros.frames.drops import Aspect, Reason, Refusal
 from hpccd_ros.rigid.body import Body
 from hpccd_ros.rigid.transform import Rigid
 
@@ -151,6 +151,9 @@ class Origin(NamedTuple):
     place: int = UNTOLD
     shape: int = UNTOLD
     topology: int = UNTOLD
+
+    def of(self, aspect: Aspect) -> int:
+        return {Aspect.PLACE: self.place, Aspect.SHAPE: self.shape, Aspect.TOPOLOGY: self.topology}[aspect]
 
 
 @dataclass(frozen=True, eq=False)

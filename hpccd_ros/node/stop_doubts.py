@@ -76,7 +76,7 @@ class Doubt:
 
     def settled(self, origins: Mapping[str, Origin]) -> bool:
         """Whether a frame of these origins has it."""
-        return all(_sent(origins[mesh], self.aspect) > self.sent for mesh in self.meshes if mesh in origins)
+        return all(origins[mesh].of(self.aspect) > self.sent for mesh in self.meshes if mesh in origins)
 
 
 def text_of(refusal: Refusal) -> str:
@@ -88,9 +88,3 @@ def text_of(refusal: Refusal) -> str:
     if refusal.what in (Input.JOINT_STATE, Input.TRANSFORM):
         return f"{refusal.what} on {refusal.mesh} were rejected: {refusal.reason}"
     return f"{_ASPECTS[refusal.aspect]} of mesh {refusal.mesh} were refused: {refusal.reason}"
-
-
-def _sent(origin: Origin, aspect: Aspect) -> int:
-    if aspect is Aspect.PLACE:
-        return origin.place
-    return origin.shape if aspect is Aspect.SHAPE else origin.topology

@@ -75,6 +75,7 @@ class StopState:
         self._why: Why | None = Why(Cause.INACTIVE, "the node is not active")
         self._doubts: dict[object, tuple[Cause, Doubt]] = {}
         self._robots: Mapping[str, str] = {}
+        self._in_use: Mapping[str, Origin] = {}
         self._outdated = ""  # mesh of which the last step that was clear had an old place
         self._unsaid: Why | None = None
         self._said: Why | None = None
@@ -115,8 +116,7 @@ class StopState:
             if not self._active:
                 return
             scene, now = self._scene, self._clocks.system()
-            by_name = dict(zip(scene.meshes, origins, strict=True))
-            self._doubts = {key: item for key, item in self._doubts.items() if not item[1].settled(by_name)}
+            by_name = self._in_use = dict(zip(scene.meshes, origins, strict=True))
             moving = [
                 (origin.place, mesh)
                 for mesh, moves, origin in zip(scene.meshes, scene.moving, origins, strict=True)
@@ -124,6 +124,8 @@ class StopState:
             ]
             for sent, mesh in moving:
                 self._ages.hear(f"a message of mesh {mesh}", 1e-9 * (sent - now), self._clocks.steady())
+            if not self._ages.why(self._clocks.steady()):  # else nobody can say which of two messages is newer
+                self._doubts = {key: item for key, item in self._doubts.items() if not item[1].settled(by_name)}
         if near:
             self._tell(Cause.NEAR, f"meshes came within {distance:g} of each other on the last step, or touched")
             return
@@ -131,6 +133,9 @@ class StopState:
             if distance < self.distance or scene is not self._scene or not self._active:
                 return
             before = self._now()
+            if text := self._ages.why(self._clocks.steady()):
+                self._tell(Cause.CLOCKS, text)
+                return
             self._outdated = next((mesh for mesh, origin in by_name.items() if origin.place == OUTDATED), "")
             self._oldest, self._oldest_of = min(moving, default=(ALWAYS, ""))
             self._why = None
@@ -203,13 +208,17 @@ class StopState:
         steady, system = self._clocks.steady(), self._clocks.system()
         before = self._now()
         self._ages.look(steady, system)
+        if self._active and self._why is None and (text := self._ages.why(steady)):
+            self._why = Why(Cause.CLOCKS, text)  # how old the last step is, nobody can say any more
         gap = 0.0 if self._looked is None else steady - self._looked
         if gap > self._held_up:
             self._doubt_all(Cause.HELD_UP, f"the thread that publishes stop was held up for {gap:.3g} s")
         self._looked = steady
-        # Nothing was rejected later than now: where the clock was set back, what comes now is newer.
+        # Where the clock was set back, frames from now on are newer than what was rejected before. Of what has no age
+        # it cannot be told: there the doubt stays until the clock has caught up.
+        moving = {mesh for mesh, moves in zip(self._scene.meshes, self._scene.moving, strict=True) if moves}
         for key, (cause, doubt) in self._doubts.items():
-            if doubt.sent > system:
+            if doubt.sent > system and doubt.aspect is Aspect.PLACE and moving.issuperset(doubt.meshes):
                 self._doubts[key] = cause, Doubt(doubt.meshes, doubt.aspect, system, doubt.text)
         self._rise(before)
         return steady, system
@@ -244,7 +253,9 @@ class StopState:
     def _doubt(self, cause: Cause, meshes: tuple[str, ...], aspect: Aspect, sent: int | None, text: str) -> None:
         """sent: when the message was; None: unknown."""
         before, now, key = self._now(), self._clocks.system(), (cause, meshes, aspect)
-        sent = now if sent is None else min(sent, now)
+        # Newer than what is in use, whatever the clocks said then and now.
+        used = [origin.of(aspect) for mesh, origin in self._in_use.items() if mesh in meshes]
+        sent = max([now if sent is None else min(sent, now), *(one for one in used if one != ALWAYS)])
         if key in self._doubts:
             sent = max(sent, self._doubts.pop(key)[1].sent)
         self._doubts[key] = cause, Doubt(meshes, aspect, sent, text)

@@ -50,10 +50,10 @@ def walk(configured, worlds, seed=0):
 
 def test_never_wrongly_false(configured):
     false, allowed, read = walk(configured, worlds=5)
-    assert false >= allowed / 3 > 20 and read > 20
+    assert false >= allowed / 3 and min(allowed, read) > 50
 
 
 @pytest.mark.long
 def test_never_wrongly_false_in_ten_thousand_events(configured):
     false, allowed, read = walk(configured, worlds=84, seed=1)
-    assert false >= allowed / 3 > 1000 and read > 1000
+    assert false >= allowed / 3 and min(allowed, read) > 1000

@@ -88,15 +88,19 @@ class World:
         self.accounts.on_refused = self.state.refused
         self.accounts.on_heard = lambda kind, name, info: self.state.heard(f"{kind} of {name}", info)
         self.subscriptions = Subscriptions(node, self.settings, self.meshes)
-        self.listener = client.StopListener(node, "stop", TIMEOUT, clock_error=ERROR)
-        self.listener._clocks = clocks
-        self.node = node
+        self.node, self.clocks = node, clocks
+        self.listener = self.listening()
         self.make()
         self.subscriptions.open(self.pipeline, self.by_joints, self.accounts)
         self.start()
         for mesh in self.versions:
             self.topology(mesh)
         self.shape("tool"), self.shape("cart"), self.table()
+
+    def listening(self):
+        made = client.StopListener(self.node, "stop", TIMEOUT, clock_error=ERROR)
+        made._clocks, made._begun = self.clocks, self.system()
+        return made
 
     def close(self):
         self.subscriptions.close()
@@ -294,8 +298,7 @@ class World:
     def late_listener(self):
         """One that comes now is given the latched word."""
         self.listener.close()
-        self.listener = client.StopListener(self.node, "stop", TIMEOUT, clock_error=ERROR)
-        self.listener._clocks = Clocks(lambda: self.now, self.system)
+        self.listener = self.listening()
         self.words = deque([self.last_word] if self.last_word else [], maxlen=10)
 
     def die(self):
