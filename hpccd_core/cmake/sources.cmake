@@ -6,7 +6,7 @@ set(hpccd_sources
   src/rigid/c_library.cpp src/rigid/joint_bounds.cpp src/rigid/joint_chain.cpp src/rigid/placed_vertices.cpp
   src/scene/edges.cpp src/scene/features.cpp src/scene/scene.cpp src/scene/separation_table.cpp
   src/scene/static_meshes.cpp
-  src/bvh/build.cpp src/bvh/motion_bounds.cpp src/bvh/refit.cpp src/bvh/split.cpp
+  src/bvh/build.cpp src/bvh/motion_bounds.cpp src/bvh/refit.cpp src/bvh/split.cpp src/bvh/squeezed_axis.cpp
   src/elementary/batch.cpp src/elementary/distance/distance_batch.cpp src/elementary/exact/contact.cpp
   src/elementary/exact/distance.cpp src/elementary/exact/gap_in_motion.cpp
   src/elementary/exact/intersection.cpp src/elementary/exact/separation.cpp
@@ -15,8 +15,10 @@ set(hpccd_sources
   src/elementary/exact/wide/isolate.cpp src/elementary/exact/wide/part.cpp src/elementary/exact/wide/root.cpp
   src/elementary/exact/wide/sign_at_root.cpp src/elementary/fallback.cpp src/elementary/intersection_batch.cpp
   src/elementary/queries.cpp
-  src/traverse/drift.cpp src/traverse/far_pairs.cpp src/traverse/leaf_edge_faces.cpp src/traverse/leaf_hulls.cpp src/traverse/leaf_pairs.cpp src/traverse/mesh_pairs.cpp
-  src/traverse/near_corners.cpp src/traverse/nearest_pairs.cpp src/traverse/pair_pool.cpp src/traverse/tasks.cpp src/traverse/traverse.cpp
+  src/traverse/drift.cpp src/traverse/far_pairs.cpp src/traverse/fine_boxes.cpp
+  src/traverse/leaf_edge_faces.cpp src/traverse/leaf_hulls.cpp src/traverse/leaf_pairs.cpp src/traverse/mesh_pairs.cpp
+  src/traverse/near_corners.cpp src/traverse/nearest_pairs.cpp src/traverse/pair_pool.cpp src/traverse/tasks.cpp
+  src/traverse/traverse.cpp
   src/traverse/worker.cpp
   src/contacts/canonical.cpp src/contacts/gaps.cpp src/contacts/intersections.cpp src/contacts/nearest_points.cpp
   src/contacts/order.cpp src/contacts/parts.cpp src/contacts/places.cpp src/contacts/worlds.cpp
@@ -30,6 +32,6 @@ set(hpccd_sources
   src/backends/gpu_contacts.cpp src/backends/gpu_earliest.cpp src/backends/gpu_places.cpp
   src/backends/gpu_prepare.cpp src/backends/gpu_undecided.cpp src/backends/gpu_worlds.cpp
   src/backends/hybrid_backend.cpp src/backends/moving_tree.cpp src/backends/near_list.cpp
-  src/backends/one_by_one.cpp src/backends/resources.cpp src/backends/short_edge.cpp src/backends/tuner.cpp
+  src/backends/one_by_one.cpp src/backends/resources.cpp src/backends/tuner.cpp
   src/backends/work_counts.cpp src/backends/world_by_world.cpp src/backends/worlds_on_cpus.cpp
   src/checked.cpp src/detector.cpp src/errors.cpp src/prepared.cpp src/version.cpp)

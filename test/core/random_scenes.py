@@ -159,6 +159,23 @@ def huge_and_tiny(rng):
     )
 
 
+def spread(rng):
+    """Bodies far apart for their size, a vertex farther than all, a face that leads there, and a body between them that
+    goes far."""
+    sheet_faces, start, end = crumpled_sheet(rng, 5)
+    by = np.array([3e8, -2e8, 1e8])
+    faces, body, moved = tetrahedron(rng)
+    escaped = np.concatenate([sheet_faces, [[0, 1, 25]]])
+    far = [[-4e9, 5e9, 6e9]]
+    return combine(
+        (escaped, np.concatenate([start, far]), np.concatenate([end, far])),
+        (faces, body, moved),
+        (sheet_faces, start + by, end + by),
+        (faces, body + by, moved + by),
+        (faces, body + [2, 2, 0], moved - [7e7, 0, 0]),
+    )
+
+
 def ropes(rng):
     """Edges in no face, among sheets, bodies and particles."""
     particles = NO_FACES, *rng.normal(0, 2, (2, 10, 3))
@@ -170,5 +187,5 @@ def lattice_ropes(rng):
 
 
 ALL = (
-    single_mesh, lattice, triangle_soup, many_meshes, lone_vertices, huge_and_tiny, ropes, lattice_ropes
+    single_mesh, lattice, triangle_soup, many_meshes, lone_vertices, huge_and_tiny, spread, ropes, lattice_ropes
 )  # fmt: skip

@@ -114,8 +114,26 @@ def tiny_beside_huge(rng):
     ]
 
 
+def far_beside_their_size(rng):
+    """So far apart that single precision has one distance for all pairs of features, and a face from one to the other."""
+    faces, start, _ = random_scenes.crumpled_sheet(rng, 5)
+    by = np.array([1e7, 0.7e7, 0.9e7])
+    bridge = np.array([[0, 1, 2]]), np.stack([start[3], start[7] + [0, 3, 0], start[11] + by])
+    return [(faces, start), (faces, start[::-1] + by), body(rng, by - [9, 8, 7]), bridge]
+
+
+def tiny_inside_a_dome(rng):
+    return [sphere(8, 1.0), (sphere(5, 1e-7)[0], sphere(5, 1e-7)[1] + [0.1, 0, 0]), body(rng, [0, 0, 1e5])]
+
+
+def with_an_escaped_vertex(rng):
+    faces, start, _ = random_scenes.crumpled_sheet(rng, 5)
+    start[12] = [1e8, 2e8, -1e8]
+    return [(faces, start), (faces, start[::-1] + [0.5, 0.5, 3]), sphere(5, 1, [3, 3, 9])]
+
+
 SCENES = (
-    far, parallel, parallel_turned, nearly_parallel, concentric, degenerate, touching, intersecting, single_triangles,
+    far, far_beside_their_size, tiny_inside_a_dome, with_an_escaped_vertex, parallel, parallel_turned, nearly_parallel, concentric, degenerate, touching, intersecting, single_triangles,
     ropes_and_points, ties, tiny_beside_huge,
 )  # fmt: skip
 

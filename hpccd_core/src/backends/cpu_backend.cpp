@@ -3,7 +3,6 @@
 
 #include <utility>
 
-#include "backends/short_edge.h"
 #include "elementary/distance/distance_batch.h"
 #include "paper/primitive_pairs.h"
 #include "scene/edge_sample.h"
@@ -52,7 +51,7 @@ void CpuBackend::see_motion(Positions t0, Positions t1, Tests tests) {
   search_.leaf_pairs_until = leaf_pairs_until(o.simd);
   search_.leaf_pairs_at_start = leaf_pairs_at_start(o.simd);
   const MotionBounds& motion = shared_.tree.motion();
-  const bool rounds = floats_suffice(short_edge(shared_.features, motion.vertices), motion.map.scale);
+  const bool rounds = floats_suffice(motion.short_edge, motion.map.scale);
   search_.geometry.rounded = rounds ? motion.rounded.data() : nullptr;
   const bool here = tests == Tests::all_here;
   search_.report = !here && o.report == Report::any ? Report::all : o.report;

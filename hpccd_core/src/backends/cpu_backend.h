@@ -61,7 +61,7 @@ class CpuBackend final : public DetectionBackend {
   std::optional<std::vector<LeafPair>> open_pairs();
   void remember_earliest();
   void see_motion(Positions t0, Positions t1, Tests tests);
-  void see_snapshot(Positions vertices);
+  void see_snapshot(Positions vertices, double distance = 0);
   void walk_tree();
   template <class Test>
   void test_each(const std::vector<LeafPair>& pairs, Test&& test);

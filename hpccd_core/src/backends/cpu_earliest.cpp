@@ -35,7 +35,7 @@ void CpuBackend::find_earliest(Positions t0, Positions t1, bool time_only) {
 }
 
 void CpuBackend::limit_reach() {
-  const double scale = shared_.tree.motion().map.scale;
+  const double scale = shared_.tree.motion().box_scale;
   search_.two_ways = static_cast<float>(2 * travel_.way * scale);
   search_.most_reach = static_cast<float>(edge_ / 4 * scale);
 }
@@ -83,10 +83,10 @@ bool CpuBackend::list_near_pairs(Positions t0) {
   if (!radius) return false;
   const double distance = listed_distance(*radius, shared_.separations.most());
   if (!std::isfinite(distance)) return false;
-  see_snapshot(t0);
+  see_snapshot(t0, distance);
   search_.geometry.separations = {distance};
   search_.leaf_pairs_in_snapshot = leaf_pairs_in_snapshot(shared_.options.simd);
-  search_.reach = reach_of(distance, shared_.tree.motion().rounding, shared_.tree.motion().map.scale);
+  search_.reach = reach_of(distance, shared_.tree.motion().box_rounding, shared_.tree.motion().box_scale);
   search_.most_found = wide ? most_listed_wide(shared_.features) : most_listed(shared_.features), search_.n_found = 0;
   walk_tree();
   if (search_.gave_up()) {

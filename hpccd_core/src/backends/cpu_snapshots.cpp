@@ -10,10 +10,10 @@ namespace hpccd {
 
 std::optional<Contacts> CpuBackend::proximity(Positions vertices, double distance) {
   const Options& o = shared_.options;
-  see_snapshot(vertices);
+  see_snapshot(vertices, distance);
   search_.geometry.separations = {distance};
   search_.leaf_pairs_in_snapshot = leaf_pairs_in_snapshot(o.simd);
-  search_.reach = reach_of(distance, shared_.tree.motion().rounding, shared_.tree.motion().map.scale);
+  search_.reach = reach_of(distance, shared_.tree.motion().box_rounding, shared_.tree.motion().box_scale);
   walk_tree();
   return collect({false, false, o.closest, AtTime::start});
 }
@@ -46,9 +46,9 @@ std::optional<std::vector<Gap>> CpuBackend::distances(Positions vertices) {
   return gaps;
 }
 
-void CpuBackend::see_snapshot(Positions vertices) {
+void CpuBackend::see_snapshot(Positions vertices, double distance) {
   const Simd simd = shared_.options.simd;
-  shared_.tree.bound(vertices);
+  shared_.tree.bound(vertices, distance);
   begin_query();
   shared_.tree.fit(shared_.profiler);
   search_.report = Report::all;

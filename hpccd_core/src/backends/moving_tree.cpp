@@ -10,9 +10,9 @@ void MovingTree::bound(Positions t0, Positions t1, std::span<const double> separ
   motion_.update(scene_, t0, t1, separations, pool_);
 }
 
-void MovingTree::bound(Positions vertices) {
+void MovingTree::bound(Positions vertices, double distance) {
   followed_ = std::exchange(fits_, false);
-  motion_.update(scene_, vertices, pool_);
+  motion_.update(scene_, vertices, pool_, distance);
 }
 
 void MovingTree::fit(Profiler& profiler) {

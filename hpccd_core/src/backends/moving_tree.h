@@ -50,12 +50,14 @@ class MovingTree {
  public:
   // All of them must outlive it.
   MovingTree(const Scene& scene, const Features& features, ThreadPool& pool)
-      : scene_(scene), features_(features), pool_(pool) {}
+      : scene_(scene), features_(features), pool_(pool) {
+    motion_.features = &features;
+  }
 
   // Bounds of a new motion. Throws InvalidArgument as MotionBounds::update does.
   void bound(Positions t0, Positions t1, std::span<const double> separations);
   // The same of one snapshot.
-  void bound(Positions vertices);
+  void bound(Positions vertices, double distance = 0);
   // A tree that fits it: refitted, or built anew where refitting has lost too much. Marked as "refit" and "build".
   void fit(Profiler& profiler);
   void build_anew();

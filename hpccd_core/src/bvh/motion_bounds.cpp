@@ -4,9 +4,14 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <iterator>
 #include <limits>
+#include <optional>
 #include <string>
+#include <type_traits>
 #include <utility>
+
+#include "scene/edge_sample.h"
 
 namespace hpccd {
 namespace {
@@ -51,9 +56,11 @@ template <class Real>
   throw InvalidArgument(std::string(name) + " changed while it was being read");
 }
 
-template <bool grown, class Real>
-void copy_motion(const Real* t0, const Real* t1, const CoordinateMap& map, double margin, std::size_t begin,
-                 std::size_t end, VertexMotion* vertices, RoundedMotion* rounded, MotionBox* boxes, VertexKdop* kdops) {
+// box_map(x, k): coordinate k of a box.
+template <bool grown, class Real, class BoxMap>
+void copy_motion(const Real* t0, const Real* t1, const CoordinateMap& map, const BoxMap& box_map, double margin,
+                 std::size_t begin, std::size_t end, VertexMotion* vertices, RoundedMotion* rounded, MotionBox* boxes,
+                 VertexKdop* kdops) {
   for (std::size_t i = begin; i < end; ++i) {
     for (int k = 0; k < 3; ++k) {
       const double a = t0[3 * i + k], b = t1[3 * i + k];
@@ -62,10 +69,16 @@ void copy_motion(const Real* t0, const Real* t1, const CoordinateMap& map, doubl
       vertices[i].t1[k] = b;
       rounded[i].t0[k] = at_t0;
       rounded[i].t1[k] = at_t1;
-      boxes[i].t0.low[k] = grown ? map(a - margin, k) : at_t0;
-      boxes[i].t0.high[k] = grown ? map(a + margin, k) : at_t0;
-      boxes[i].t1.low[k] = grown ? map(b - margin, k) : at_t1;
-      boxes[i].t1.high[k] = grown ? map(b + margin, k) : at_t1;
+      if constexpr (grown) {
+        boxes[i].t0.low[k] = box_map(a - margin, k);
+        boxes[i].t0.high[k] = box_map(a + margin, k);
+        boxes[i].t1.low[k] = box_map(b - margin, k);
+        boxes[i].t1.high[k] = box_map(b + margin, k);
+      } else {
+        constexpr bool common = std::is_same_v<BoxMap, CoordinateMap>;
+        boxes[i].t0.low[k] = boxes[i].t0.high[k] = common ? at_t0 : box_map(a, k);
+        boxes[i].t1.low[k] = boxes[i].t1.high[k] = common ? at_t1 : box_map(b, k);
+      }
     }
     kdops[i] = vertex_kdop({vertices[i].t0[0], vertices[i].t0[1], vertices[i].t0[2]},
                            {vertices[i].t1[0], vertices[i].t1[1], vertices[i].t1[2]}, map);
@@ -73,19 +86,36 @@ void copy_motion(const Real* t0, const Real* t1, const CoordinateMap& map, doubl
 }
 
 // Of one snapshot. In place of a second end, bounds along three directions more: slanted features leave far less room.
-template <class Real>
-void copy_snapshot(const Real* x, const CoordinateMap& map, std::size_t begin, std::size_t end, VertexMotion* vertices,
-                   MotionBox* boxes) {
+// slanted(x): the coordinates along them.
+template <class Real, class BoxMap, class Slanted>
+void copy_snapshot(const Real* x, const BoxMap& map, const Slanted& slanted, std::size_t begin, std::size_t end,
+                   VertexMotion* vertices, MotionBox* boxes) {
   for (std::size_t i = begin; i < end; ++i) {
     const Vec3<double> v{x[3 * i], x[3 * i + 1], x[3 * i + 2]};
     const double at[3] = {v.x, v.y, v.z};
-    const SlantedCoordinates slanted(v, map);
+    const auto slanted_at = slanted(v);
     for (int k = 0; k < 3; ++k) {
       vertices[i].t0[k] = vertices[i].t1[k] = at[k];
       boxes[i].t0.low[k] = boxes[i].t0.high[k] = map(at[k], k);
-      boxes[i].t1.low[k] = boxes[i].t1.high[k] = slanted.along[k];
+      boxes[i].t1.low[k] = boxes[i].t1.high[k] = slanted_at.along[k];
     }
   }
+}
+
+// Below this, in the coordinates of the boxes, features are spread: rounding of a reach, 1e-6, is a thirtieth of it.
+constexpr double least_spread = 3e-5;
+
+// For each plane of two axes the direction along which edges extend least, so that bars at any slant are apart as soon
+// as upright ones. `extents`: by plane and direction. The common ones stay unless another is far better: of sheets that
+// are cut into triangles along one diagonal, that would be no gain.
+std::array<SlantedDirection, 3> best_directions(const double (&extents)[3][std::size(slanted_directions)]) {
+  std::array<SlantedDirection, 3> best;
+  for (std::size_t k = 0; k < 3; ++k) {
+    double least = 0.4 * extents[k][0];
+    for (std::size_t i = 1; i < std::size(slanted_directions); ++i)
+      if (extents[k][i] < least) least = extents[k][i], best[k] = slanted_directions[i];
+  }
+  return best;
 }
 
 // By how much the boxes of a mesh grow: half the separation, of which halving a denormal number may lose one half of
@@ -152,38 +182,158 @@ void MotionBounds::update(const Real* t0, const Real* t1, std::size_t n, std::sp
   }
 
   const CoordinateMap old_map = map;
+  const std::array<SlantedDirection, 3> old_slanted = slanted_;
   if (n > 0) map = CoordinateMap::around(whole.low, whole.high);
   double most = 0;
   for (int k = 0; n > 0 && k < 3; ++k) most = std::max({most, std::fabs(whole.low[k]), std::fabs(whole.high[k])});
   rounding = 1e-15 * most;
+  look_at_edges(t0, t1);
   std::vector<double> margins(parts_.size(), 0);
   if (!separations.empty() && n > 0)
     for (std::size_t p = 0; p < parts_.size(); ++p) margins[p] = margin_for(separations[p], whole);
-  if (!resting.empty() && (!(map == old_map) || margins != margins_)) {
+  const bool same_margins = margins == margins_;
+  margins_ = std::move(margins);
+  const std::vector<SqueezedAxis> old_squeezed = std::move(squeezed);
+  squeezed.clear();
+  box_scale = map.scale, box_rounding = rounding;
+  const double fine = finest();
+  spread = fine > 0 && fine * map.scale < least_spread;
+  if (spread) squeeze(t0, t1, n, fine, whole, pool);
+  if (!resting.empty() &&
+      (!(map == old_map && slanted_ == old_slanted) || !same_margins || squeezed != old_squeezed)) {
     resting.clear();
     pieces = pieces_of(parts_, moves);
   }
-  margins_ = std::move(margins);
   grown = std::ranges::any_of(margins_, [](double margin) { return margin > 0; });
   was_snapshot_ = snapshot_;
   resize(vertices, n, pool.cancellation());
   resize(boxes, n, pool.cancellation());
   resize(kdops, n, pool.cancellation());
   if (!snapshot_) resize(rounded, n, pool.cancellation());
+  const auto squeezed_map = [this](double x, int k) { return squeezed[static_cast<std::size_t>(k)](x); };
+  struct Along {
+    float along[3];
+  };
+  const auto common_slanted = [this](const Vec3<double>& x) { return SlantedCoordinates(x, map); };
+  const auto chosen_slanted = [this](const Vec3<double>& v) {
+    const auto x = [&](int k) { return k == 0 ? v.x : k == 1 ? v.y : v.z; };
+    const auto center = [&](int k) { return map.center[k]; };
+    Along at;
+    for (int k = 0; k < 3; ++k) {
+      const SlantedDirection& d = slanted_[static_cast<std::size_t>(k)];
+      at.along[k] = squeezed.empty()
+                        ? static_cast<float>((d.along(k, x) - d.along(k, center)) * (map.scale * d.factor))
+                        : squeezed[static_cast<std::size_t>(3 + k)](d.along(k, x));
+    }
+    return at;
+  };
+  const bool common = slanted_ == std::array<SlantedDirection, 3>();
   parallel_for(pool, pieces.size(), 1, [&](std::size_t from, std::size_t to, int) {
     for (std::size_t i = from; i < to; ++i) {
       const auto [begin, end, part] = pieces[i];
-      const auto copy = [&](auto&& copied) {
-        copied(t0, t1, map, margins_[part], begin, end, vertices.data(), rounded.data(), boxes.data(), kdops.data());
+      const auto copy = [&](const auto& box_map) {
+        if (margins_[part] > 0)
+          copy_motion<true>(t0, t1, map, box_map, margins_[part], begin, end, vertices.data(), rounded.data(),
+                            boxes.data(), kdops.data());
+        else
+          copy_motion<false>(t0, t1, map, box_map, 0, begin, end, vertices.data(), rounded.data(), boxes.data(),
+                             kdops.data());
       };
-      if (snapshot_)
-        copy_snapshot(t0, map, begin, end, vertices.data(), boxes.data());
-      else if (margins_[part] > 0)
-        copy(copy_motion<true, Real>);
+      if (!snapshot_)
+        squeezed.empty() ? copy(map) : copy(squeezed_map);
+      else if (!squeezed.empty())
+        copy_snapshot(t0, squeezed_map, chosen_slanted, begin, end, vertices.data(), boxes.data());
+      else if (!common)
+        copy_snapshot(t0, map, chosen_slanted, begin, end, vertices.data(), boxes.data());
       else
-        copy(copy_motion<false, Real>);
+        copy_snapshot(t0, map, common_slanted, begin, end, vertices.data(), boxes.data());
     }
   });
+}
+
+// How short edges are, and of a snapshot how slanted.
+template <class Real>
+void MotionBounds::look_at_edges(const Real* t0, const Real* t1) {
+  short_edge = 0;
+  slanted_ = {};
+  if (!features) return;
+  const auto extent = [](const Real* a, const Real* b) {
+    double most = 0;
+    for (int k = 0; k < 3; ++k) most = std::max(most, std::fabs(double{a[k]} - double{b[k]}));
+    return most;
+  };
+  double extents[3][std::size(slanted_directions)] = {};
+  // What floats suffice for is asked of motions alone; for the rest few edges do.
+  constexpr std::size_t edges_of_a_snapshot = 16;
+  const std::size_t wanted = snapshot_ ? edges_of_a_snapshot : edges_of_a_step;
+  short_edge = hpccd::short_edge(features->edges, wanted, [&](std::uint32_t from, std::uint32_t to) {
+    const std::size_t a = 3 * std::size_t{from}, b = 3 * std::size_t{to};
+    const double length = extent(t0 + a, t0 + b);
+    if (!snapshot_) return std::min(length, extent(t1 + a, t1 + b));
+    const auto x = [&](int k) { return double{t0[a + k]} - double{t0[b + k]}; };
+    for (int k = 0; k < 3; ++k)
+      for (std::size_t i = 0; i < std::size(slanted_directions); ++i) {
+        const SlantedDirection& d = slanted_directions[i];
+        extents[k][i] += std::fabs(d.along(k, x)) * (d.factor < 1 ? 0.8944 : 0.7071);
+      }
+    return length;
+  });
+  if (snapshot_) slanted_ = best_directions(extents);
+}
+
+// How long the features are of what is finest in the scene: by its short edges, or by meshes that have so many vertices
+// that all their pairs would be more than 64 for each vertex of the scene.
+double MotionBounds::finest() const {
+  double least = short_edge > 0 ? short_edge : std::numeric_limits<double>::infinity();
+  for (std::size_t p = 0; features && p < parts_.size(); ++p) {
+    const auto n = static_cast<double>(parts_[p].end - parts_[p].begin);
+    if (n * n < 64.0 * features->n_vertices) continue;
+    double size = 0;
+    for (int k = 0; k < 3; ++k) size = std::max(size, extents_[p].high[k] - extents_[p].low[k]);
+    if (size > 0) least = std::min(least, size / std::sqrt(n));
+  }
+  return std::isfinite(least) ? least : 0;
+}
+
+// Gaps are shortened no more than makes edges as long as a thousandth of the scene. None becomes so short that features
+// at its ends could count as near.
+template <class Real>
+void MotionBounds::squeeze(const Real* t0, const Real* t1, std::size_t n, double finest, const Extent& whole,
+                           ThreadPool& pool) {
+  const double wanted = 4096 * finest, least = std::max(8 * finest, 4 * distance_);
+  const std::size_t n_axes = snapshot_ ? 6 : 3;
+  std::vector<std::optional<SqueezedAxis>> axes(n_axes);
+  parallel_for_each(pool, n_axes, [&](std::size_t axis) {
+    const int k = static_cast<int>(axis % 3);
+    std::vector<Stretch> stretches(n);
+    for (std::size_t p = 0; p < parts_.size(); ++p)
+      for (std::size_t i = parts_[p].begin; i < parts_[p].end; ++i) {
+        if (axis >= 3) {
+          const double x = slanted_[axis - 3].along(k, [&](int j) { return double{t0[3 * i + j]}; });
+          stretches[i] = {x, x};
+        } else {
+          const auto [low, high] = std::minmax(double{t0[3 * i + k]}, double{t1[3 * i + k]});
+          stretches[i] = {low - margins_[p], high + margins_[p]};
+        }
+      }
+    axes[axis].emplace(stretches, wanted, least);
+  });
+  double length = 0, whole_length = 0;
+  for (int k = 0; k < 3; ++k) {
+    length = std::max(length, axes[k]->length());
+    whole_length = std::max(whole_length, whole.high[k] - whole.low[k]);
+  }
+  if (!(length > 0 && length < whole_length / 4)) return;
+  box_scale = std::ldexp(1.0, -std::clamp(std::ilogb(length / 2), -1000, 1000));
+  // Sums of two coordinates far from zero may be too coarse, or lie apart in more places than the coordinates.
+  const bool coarse = box_scale * rounding > 1e-7;
+  for (std::size_t axis = 0; axis < n_axes; ++axis) {
+    const double scale = axis < 3 ? box_scale : box_scale * slanted_[axis - 3].factor;
+    const bool use = axis < 3 || (!coarse && axes[axis]->length() * scale <= 9);
+    axes[axis]->set_scale(use ? scale : 0);
+    squeezed.push_back(std::move(*axes[axis]));
+  }
+  if (coarse) box_rounding = 0;
 }
 
 void MotionBounds::update_all(Positions t0, Positions t1, std::span<const double> separations, ThreadPool& pool) {
@@ -206,19 +356,19 @@ void MotionBounds::update(const Scene& scene, Positions t0, Positions t1, std::s
                           ThreadPool& pool) {
   divide(scene);
   resting = statics_.unchanged(scene, t0, t1, pool);
-  largest_ = largest_coordinate, snapshot_ = false;
+  largest_ = largest_coordinate, snapshot_ = false, distance_ = 0;
   update_all(t0, t1, separations, pool);
 }
 
-void MotionBounds::update(const Scene& scene, Positions vertices, ThreadPool& pool) {
+void MotionBounds::update(const Scene& scene, Positions vertices, ThreadPool& pool, double distance) {
   divide(scene);
   resting = statics_.unchanged(scene, vertices, vertices, pool);
-  largest_ = largest_in_snapshot, snapshot_ = true;
+  largest_ = largest_in_snapshot, snapshot_ = true, distance_ = distance;
   update_all(vertices, vertices, {}, pool);
 }
 
 void MotionBounds::update(Positions t0, Positions t1, ThreadPool& pool) {
-  largest_ = largest_coordinate, snapshot_ = false;
+  largest_ = largest_coordinate, snapshot_ = false, distance_ = 0;
   parts_ = {{0, t0.n}};
   resting.clear();
   update_all(t0, t1, {}, pool);

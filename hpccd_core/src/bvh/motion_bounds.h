@@ -10,6 +10,9 @@
 #include "bvh/coordinate_map.h"
 #include "bvh/kdop.h"
 #include "bvh/motion_box.h"
+#include "bvh/slanted_direction.h"
+#include "bvh/squeezed_axis.h"
+#include "scene/features.h"
 #include "scene/static_meshes.h"
 #include "scene/vertex_motion.h"
 
@@ -28,6 +31,8 @@ struct Extent {
 };
 
 struct MotionBounds {
+  // Whose edges tell how fine the scene is. Without them it counts as coarse.
+  const Features* features = nullptr;
   std::vector<VertexMotion> vertices;
   std::vector<MotionBox> boxes;
   bool grown = false;  // some of them hold more than their vertex: half a separation around it
@@ -35,6 +40,15 @@ struct MotionBounds {
   std::vector<RoundedMotion> rounded;  // where there are k-DOPs
   bool has_kdops() const { return !snapshot_; }
   CoordinateMap map;
+  // The length of a short edge (scene/edge_sample.h): its largest extent along an axis, at the end of the motion where
+  // it is shorter.
+  double short_edge = 0;
+  // Whether features are so small beside the scene that floats hardly tell them apart. Then boxes have a map of their
+  // own if that is finer: of each axis, and of each slanted direction of a snapshot. Else they have the common one.
+  bool spread = false;
+  std::vector<SqueezedAxis> squeezed;
+  // Of the boxes: the scale of their map, and `rounding` in them.
+  double box_scale = 1, box_rounding = 0;
   // What sums of two coordinates may lose, in those of the scene: 2.2e-16 of the largest for each of two
   // vertices, 3.4e-16 where one is doubled. Far from the origin that is more than rounding to floats.
   double rounding = 0;
@@ -49,11 +63,15 @@ struct MotionBounds {
   void update(const Scene& scene, Positions vertices_t0, Positions vertices_t1, std::span<const double> separations,
               ThreadPool& pool);
   // Of one snapshot: a motion that goes nowhere, whose boxes have bounds along other directions in place of the second
-  // end (SlantedCoordinates); without k-DOPs.
-  void update(const Scene& scene, Positions vertices, ThreadPool& pool);
+  // end (SlantedDirection); without k-DOPs. `distance`: up to which features count as near, where that is known.
+  void update(const Scene& scene, Positions vertices, ThreadPool& pool, double distance = 0);
   // The same for vertices of no scene, without separations.
   void update(Positions vertices_t0, Positions vertices_t1, ThreadPool& pool);
   void sweep(ThreadPool& pool);
+  // Where its vertices are.
+  const Extent& extent_of_mesh(std::size_t mesh) const { return extents_[mesh]; }
+  // By how much its boxes have grown, in the scene's coordinates.
+  double margin_of_mesh(std::size_t mesh) const { return margins_[mesh]; }
   std::size_t bytes() const;
 
  private:
@@ -61,12 +79,18 @@ struct MotionBounds {
   template <class Real>
   void update(const Real* t0, const Real* t1, std::size_t n, std::span<const double> separations, ThreadPool& pool);
   void update_all(Positions t0, Positions t1, std::span<const double> separations, ThreadPool& pool);
+  template <class Real>
+  void look_at_edges(const Real* t0, const Real* t1);
+  double finest() const;
+  template <class Real>
+  void squeeze(const Real* t0, const Real* t1, std::size_t n, double finest, const Extent& whole, ThreadPool& pool);
 
   StaticMeshes statics_;
   std::vector<VertexRange> parts_;  // of each mesh
   std::vector<Extent> extents_;     // of each part, when it was last taken
   std::vector<double> margins_;     // of each part's boxes
-  double largest_ = largest_coordinate;
+  std::array<SlantedDirection, 3> slanted_;
+  double distance_ = 0, largest_ = largest_coordinate;
   bool snapshot_ = false, was_snapshot_ = false;
   bool complete_ = false;  // false while a call is under way, and after it has thrown
 };

@@ -83,6 +83,16 @@ MotionBox leaf_bounds(const Tree& tree, const LeafRange& leaf, const std::vector
   return box;
 }
 
+// By half a separation on each side, as boxes grow: then leaves whose k-DOPs are apart hold no two features that come
+// within the separation of each other. It is what the k-DOPs of features are compared with (KdopMargin).
+KdopMargin margin_of(const MotionBounds& motion, std::uint32_t mesh) {
+  return {motion.margin_of_mesh(mesh) + motion.rounding, motion.map.scale};
+}
+
+void grow(Kdop& kdop, const KdopMargin& by) {
+  for (int k = 0; k < 2 * n_kdop_directions; ++k) kdop.low[k] -= by.in[k], kdop.high[k] += by.in[k];
+}
+
 void join_kdops(Tree& tree, const LeafRange& leaf, const std::vector<VertexKdop>& vertex_kdops) {
   constexpr int parts = 4;
   static_assert(sizeof(VertexKdop) == parts * sizeof(Floats4));
@@ -103,6 +113,7 @@ void fit_leaf(Tree& tree, std::uint32_t number, const MotionBounds& motion) {
   Node& node = tree.nodes[tree.leaf_nodes[number]];
   node.box = leaf_bounds(tree, leaf, motion.boxes);
   if (tree.by_kdops) join_kdops(tree, leaf, motion.kdops);
+  if (tree.by_kdops && motion.grown) grow(tree.kdops[number], margin_of(motion, node.mesh));
   Block& block = tree.blocks[tree.block_of_leaf[number]];
   float bounds[n_bounds];
   std::memcpy(bounds, &node.box, sizeof bounds);
@@ -111,7 +122,8 @@ void fit_leaf(Tree& tree, std::uint32_t number, const MotionBounds& motion) {
 
 // For bounds of this kind: with separations or without, of a motion or a snapshot. True where it held such before.
 bool make_room(Tree& tree, const MotionBounds& motion, const Cancellation& cancellation) {
-  const bool with_kdops = motion.has_kdops() && !motion.grown;
+  const bool with_kdops = motion.has_kdops();
+  tree.bent = !motion.squeezed.empty();
   const bool same_rows = tree.rows && tree.grown == motion.grown;
   if (same_rows && tree.by_kdops == with_kdops) return true;
   tree.by_kdops = false;  // should there be no memory

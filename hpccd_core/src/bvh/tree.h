@@ -176,9 +176,10 @@ struct Tree {
   std::unique_ptr<CornerRow[]> rows;
   std::size_t n_groups = 0;
   bool grown = false;
+  bool bent = false;  // the hull of a feature's corners need not hold it (squeezed_axis.h)
   static constexpr std::uint32_t coordinates = 6;
-  bool by_kdops = false;    // whether there are any: not where features need not touch to count
-  std::vector<Kdop> kdops;  // by leaf
+  bool by_kdops = false;    // whether there are any: of motions
+  std::vector<Kdop> kdops;  // by leaf; they grow as boxes do
   HPCCD_HD std::uint32_t rows_per_group() const { return grown ? 2 * coordinates : coordinates; }
   HPCCD_HD CornerRow* rows_of(const LeafRange& leaf) const {
     return rows.get() + std::size_t{leaf.first_group} * rows_per_group();

@@ -2,7 +2,11 @@
 // How long the edges of a scene are, by a few of them: whoever asks looks at the same ones, so that all decide alike.
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <cstddef>
+#include <cstdint>
+#include <vector>
 
 #include "base/hd.h"
 
@@ -22,6 +26,22 @@ struct EdgeSample {
 
 // What is looked at in each step: each is a page of memory that nothing else needs then.
 inline constexpr std::size_t edges_of_a_step = 64;
+
+// The length of a short edge of the scene (EdgeSample::short_one). length(from, to): of the edge between two vertices.
+// `wanted`: edges_of_a_step at most.
+template <class Length>
+double short_edge(const std::vector<std::array<std::uint32_t, 2>>& edges, std::size_t wanted, Length&& length) {
+  const EdgeSample sample = EdgeSample::of(edges.size(), wanted);
+  if (sample.count == 0) return 0;
+  std::array<double, 2 * edges_of_a_step> lengths;
+  for (std::size_t i = 0; i < sample.count; ++i) {
+    const auto& [from, to] = edges[i * sample.stride];
+    lengths[i] = length(from, to);
+  }
+  const auto at = lengths.begin() + static_cast<std::ptrdiff_t>(sample.short_one());
+  std::nth_element(lengths.begin(), at, lengths.begin() + static_cast<std::ptrdiff_t>(sample.count));
+  return *at;
+}
 
 // Whether floats are fine enough for single precision where a quarter of the edges are no longer than this, in the
 // coordinates of the boxes. Else a scene is so large, or so fine, that too much would be wrong or left to the tests in

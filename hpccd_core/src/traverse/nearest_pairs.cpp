@@ -9,6 +9,13 @@
 #include "traverse/snapshot.h"
 
 namespace hpccd {
+namespace {
+
+// By how much the test may report a pair beyond its distance (proximity_test.h), and its margins, relative to the pair's
+// size. With less, which of two pairs is found would depend on which came first.
+constexpr double test_rounding = distance_radius + 1e-14;
+
+}  // namespace
 
 bool NearestPair::before(const NearestPair& other) const {
   const auto key = [](const NearestPair& p) {
@@ -26,12 +33,11 @@ NearestPairs::NearestPairs(const MeshPairs& pairs, const Features& features, con
       tree_(tree),
       entries_(std::make_unique<Entry[]>(pairs.size())),
       least_edge_(tree.nodes.size(), Tree::none),
-      scale_(motion.map.scale),
-      sums_(motion.rounding),
-      // By how much the test may report a pair beyond its distance (proximity_test.h), and its margins, of a pair as
-      // large as the scene: boxes lie within 2.25 of zero, so p, a and b together are below 14. With less, which of two
-      // pairs is found would depend on which came first.
-      rounding_(14 * (distance_radius + 1e-14) / motion.map.scale) {
+      fine_(motion.spread ? std::make_unique<FineBoxes>(tree, motion) : nullptr),
+      scale_(motion.box_scale),
+      sums_(motion.box_rounding),
+      // Of a pair as large as the scene: mapped coordinates lie within 2.25 of zero, so p, a and b together are below 14.
+      rounding_(14 * test_rounding / motion.map.scale) {
   for (std::size_t i = tree.nodes.size(); i-- > 0;) {  // children come after their parents
     const Node& node = tree.nodes[i];
     if (node.children) {
@@ -55,26 +61,38 @@ bool NearestPairs::offer(std::uint32_t mesh_a, std::uint32_t mesh_b, const Neare
     entry.reach.store(0, std::memory_order_relaxed);
   } else {
     // Pairs at the same distance are still wanted, one of which is the first in order.
-    limit(entry, pair.distance * (1 + 1e-14) + rounding_);
+    limit(entry, pair.distance * (1 + 1e-14) + rounding(mesh_a, mesh_b));
   }
   return true;
 }
 
 void NearestPairs::begin(std::uint32_t a, std::uint32_t b) {
-  Entry& entry = at(tree_.nodes[a].mesh, tree_.nodes[b].mesh);
+  const std::uint32_t mesh_a = tree_.nodes[a].mesh, mesh_b = tree_.nodes[b].mesh;
+  Entry& entry = at(mesh_a, mesh_b);
   if (entry.begun.exchange(true, std::memory_order_relaxed)) return;
-  const double distance = distance_of_near_corners(tree_, motion_, a, b);
+  const double distance = distance_of_near_corners(tree_, motion_, fine_.get(), a, b);
   if (!(distance < std::numeric_limits<double>::infinity())) return;
   const std::lock_guard lock(entry.lock);
   // The nearest pair may be computed to be farther apart than that by what the test rounds, and is to be found as if
   // there were no limit.
-  limit(entry, distance * (1 + 1e-14) + 2 * rounding_);
+  limit(entry, distance * (1 + 1e-14) + 2 * rounding(mesh_a, mesh_b));
+}
+
+// In a scene that is far larger than two meshes, of a pair as large as both of them.
+double NearestPairs::rounding(std::uint32_t mesh_a, std::uint32_t mesh_b) const {
+  if (!fine_) return rounding_;
+  Extent both = motion_.extent_of_mesh(mesh_a);
+  both.include(motion_.extent_of_mesh(mesh_b));
+  double size = 0;
+  for (int k = 0; k < 3; ++k) size = std::max(size, both.high[k] - both.low[k]);
+  return std::min(rounding_, 3.01 * size * test_rounding);
 }
 
 void NearestPairs::limit(Entry& entry, double limit) {
   if (!(limit < entry.limit.load(std::memory_order_relaxed))) return;
   entry.limit.store(limit, std::memory_order_relaxed);
-  entry.reach.store(reach_of(limit, sums_, scale_), std::memory_order_relaxed);
+  // A float, where fine boxes count in its place.
+  entry.reach.store(reach_of(std::min(limit, 1e30 / scale_), sums_, scale_), std::memory_order_relaxed);
 }
 
 }  // namespace hpccd

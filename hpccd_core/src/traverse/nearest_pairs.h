@@ -12,6 +12,7 @@
 #include "bvh/motion_bounds.h"
 #include "bvh/tree.h"
 #include "elementary/pair.h"
+#include "traverse/fine_boxes.h"
 #include "traverse/mesh_pairs.h"
 
 namespace hpccd {
@@ -46,6 +47,8 @@ class NearestPairs {
     if (mesh_a == mixed_meshes || mesh_b == mixed_meshes) return true;
     return least_edge(a, b) <= at(mesh_a, mesh_b).piercing_edge.load(std::memory_order_relaxed);
   }
+  // In double precision, where floats hardly tell features apart; null: they do.
+  const FineBoxes* fine() const { return fine_.get(); }
   // The lowest number of an edge in either.
   std::uint32_t least_edge(std::uint32_t a, std::uint32_t b) const { return std::min(least_edge_[a], least_edge_[b]); }
   std::uint32_t mesh_of(std::uint32_t vertex) const { return features_.mesh_of_vertex[vertex]; }
@@ -67,6 +70,7 @@ class NearestPairs {
     NearestPair best;
   };
   void limit(Entry& entry, double limit);
+  double rounding(std::uint32_t mesh_a, std::uint32_t mesh_b) const;
   Entry& at(std::uint32_t a, std::uint32_t b) const { return entries_[pairs_.number(a, b)]; }
 
   const MeshPairs& pairs_;
@@ -75,6 +79,7 @@ class NearestPairs {
   const Tree& tree_;
   std::unique_ptr<Entry[]> entries_;       // by number of the pair
   std::vector<std::uint32_t> least_edge_;  // by node
+  std::unique_ptr<FineBoxes> fine_;
   double scale_, sums_, rounding_;
 };
 

@@ -27,7 +27,10 @@ struct NearerBoxes {
       if (a.mesh == mixed_meshes || b.mesh == mixed_meshes) return true;
       if (a.mesh != b.mesh) nearest.begin(number(a), number(b)), reach = nearest.reach(a.mesh, b.mesh);
     }
-    return a.near_in_snapshot(b, reach) && a.square_of_gap(b) <= reach * reach && open({number(a), number(b)});
+    const bool apart = nearest.fine() ? nearest.fine()->farther_apart(
+                                            number(a), number(b), std::max(nearest.limit(a.mesh, b.mesh), 0.0))
+                                      : !a.near_in_snapshot(b, reach) || a.square_of_gap(b) > reach * reach;
+    return !apart && open({number(a), number(b)});
   }
   bool within(const Node&) const { return true; }
   bool open(NodePair p) const { return nearest.may_come_before(p.a, p.b); }
@@ -39,8 +42,11 @@ struct NearerBoxes {
 
  private:
   std::uint32_t number(const Node& node) const { return static_cast<std::uint32_t>(&node - tree.nodes.data()); }
-  std::pair<float, std::uint32_t> key(NodePair p) const {
-    return {p.a == p.b ? 0 : tree.nodes[p.a].square_of_gap(tree.nodes[p.b]), nearest.least_edge(p.a, p.b)};
+  std::pair<double, std::uint32_t> key(NodePair p) const {
+    const double square = p.a == p.b       ? 0
+                          : nearest.fine() ? nearest.fine()->square_of_gap(p.a, p.b)
+                                           : tree.nodes[p.a].square_of_gap(tree.nodes[p.b]);
+    return {square, nearest.least_edge(p.a, p.b)};
   }
 };
 
@@ -188,6 +194,13 @@ void test_leaves(const Tree& tree, const PairRules& rules, LeafPair pair, Worker
     if (limit < 0) return;  // they intersect
     reach = search.nearest->reach(node_a.mesh, node_b.mesh);
     first_look = reach == std::numeric_limits<float>::infinity();
+    if (const FineBoxes* fine = search.nearest->fine()) {
+      worker.test_candidates(rule, [&](CandidateBuffer& edge_edge, CandidateBuffer& vertex_face) {
+        fine->add_near(a, b, limit, edge_edge, vertex_face);
+      });
+      if (first_look) worker.flush();
+      return;
+    }
     far = node_a.mesh != node_b.mesh && !first_look && far_apart(node_a, node_b, reach) && !tree.grown;
     if (far && farther_apart(tree, a, b, reach)) return;
   }

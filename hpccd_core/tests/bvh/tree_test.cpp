@@ -133,7 +133,7 @@ struct RowsTest : TreeTest {
       std::memcpy(bounds, &tree.nodes[tree.leaf_nodes[i]].box, sizeof bounds);
       for (std::uint32_t k = 0; k < n_bounds; ++k) ASSERT_EQ(block.rows[k][i - block.first_leaf], bounds[k]);
     }
-    ASSERT_EQ(tree.by_kdops, !motion.grown && motion.has_kdops());
+    ASSERT_EQ(tree.by_kdops, motion.has_kdops());
     if (!tree.by_kdops) return;
     ASSERT_EQ(tree.kdops.size(), tree.leaves.size());
     for (std::uint32_t i = 0; i < tree.kdops.size(); ++i)

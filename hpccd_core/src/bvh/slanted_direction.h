@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+// Directions along which boxes of snapshots have bounds besides the axes.
+#pragma once
+
+namespace hpccd {
+
+// A direction in the plane of axis k and the one after it, which may take the place of their sum: a * x[k] + b * x[k+1],
+// times a power of two. As long as the sum at most, and like that rounded once.
+struct SlantedDirection {
+  double a = 1, b = 1, factor = 1;
+
+  template <class X>  // X(k): a coordinate
+  double along(int k, X&& x) const {
+    return a * x(k) + b * x((k + 1) % 3);
+  }
+  bool operator==(const SlantedDirection&) const = default;
+};
+inline constexpr SlantedDirection slanted_directions[] = {{1, 1, 1},     {1, -1, 1},   {1, 2, 0.5},
+                                                          {1, -2, 0.5}, {2, 1, 0.5}, {2, -1, 0.5}};
+
+}  // namespace hpccd

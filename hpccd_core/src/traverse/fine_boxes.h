@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+// Boxes and candidates in double precision, for smallest distances in a scene whose features are so small beside it that
+// floats hardly tell them apart (MotionBounds::spread). Two bodies of size 1 that are 1e7 apart have one distance in
+// floats, whichever of their features are looked at.
+#pragma once
+
+#include <vector>
+
+#include "bvh/motion_bounds.h"
+#include "bvh/tree.h"
+#include "traverse/leaf_pairs.h"
+
+namespace hpccd {
+
+class FineBoxes {
+ public:
+  // Both must outlive it.
+  FineBoxes(const Tree& tree, const MotionBounds& snapshot);
+
+  // The square of the distance of the boxes of two nodes, by number.
+  double square_of_gap(std::uint32_t a, std::uint32_t b) const;
+  // Whether the boxes of two nodes are certainly farther apart than a distance.
+  bool farther_apart(std::uint32_t a, std::uint32_t b, double distance) const;
+  // The pairs of features of two leaves, or of one, that have no vertex in common and are not certainly farther apart
+  // than a distance.
+  void add_near(const LeafRange& a, const LeafRange& b, double distance, CandidateBuffer& edge_edge,
+                CandidateBuffer& vertex_face) const;
+
+ private:
+  struct Bounds {
+    double low[3], high[3];
+  };
+
+  const Tree& tree_;
+  const MotionBounds& snapshot_;
+  std::vector<Bounds> nodes_;
+};
+
+}  // namespace hpccd

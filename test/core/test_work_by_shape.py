@@ -1,0 +1,113 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How much is tested does not depend on where a scene's parts are and how they are turned: counts of the work, beside
+those of an ordinary scene of the same size."""
+
+import numpy as np
+import pytest
+import random_scenes
+
+import hpccd_core as hc
+
+
+def work(detector):
+    stats = detector.stats
+    return sum(stats.get(name, 0) for name in ("node_pairs", "leaf_pairs", "vf_candidates", "ee_candidates"))
+
+
+def sheet(n, seed=0):
+    """A rough sheet of size 1 with its faces."""
+    x, y = np.meshgrid(np.linspace(0, 1, n), np.linspace(0, 1, n))
+    rough = 0.1 / n * np.random.default_rng(seed).normal(size=n * n)
+    return random_scenes.sheet(n), np.stack([x.ravel(), y.ravel(), rough], axis=1)
+
+
+def ask(query, detector, x, way=(0, 0, -0.002)):
+    if query in ("detect", "separation"):
+        detector.detect(x, x + way)
+    elif query == "free_step":
+        for _ in range(2):
+            detector.collision_free_step(x, x + way)
+    elif query == "proximity":
+        detector.proximity(x, 1e-3)
+    else:
+        getattr(detector, query)(x)
+    return work(detector)
+
+
+QUERIES = ("detect", "separation", "free_step", "proximity", "intersections", "distances")
+
+
+def cost(query, scene, x):
+    separation = 1e-3 if query == "separation" else 0.0
+    return ask(query, hc.Detector(scene, threads=1, backend="cpu", minimum_separation=separation), x)
+
+
+@pytest.mark.parametrize("query", QUERIES)
+@pytest.mark.parametrize("where", ["far vertex", "escaped corner", "two places"])
+def test_what_lies_far_away_adds_no_work(query, where):
+    n = 24
+    faces, x = sheet(n)
+
+    def at(distance):
+        scene, far = hc.Scene(), distance * np.array([[0.9, 1.0, 1.1]])
+        if where == "far vertex":
+            scene.add_mesh("sheet", faces)
+            scene.add_mesh("far", n_vertices=1)
+            return cost(query, scene, np.concatenate([x, far]))
+        if where == "escaped corner":
+            scene.add_mesh("sheet", faces)
+            return cost(query, scene, np.concatenate([x[:-1], far]))
+        for name in ("here", "there"):
+            scene.add_mesh(name, faces)
+        return cost(query, scene, np.concatenate([x, x + far]))
+
+    near, *distant = (at(distance) for distance in (10, 1e6, 1e9))
+    assert max(distant) < 3 * near
+
+
+def bars(direction, m):
+    """Vertices of m * m parallel bars beside each other, 0.05 apart."""
+    along = np.array(direction, float)
+    along *= 9 / np.linalg.norm(along)
+    w = np.cross(along, [0.3, 0.5, 0.8])
+    w /= np.linalg.norm(w)
+    z = np.cross(along, w) / 9
+    i, j = np.divmod(np.arange(m * m), m)
+    low = 0.05 * (i[:, None] * w + j[:, None] * z)
+    return np.stack([low, low + along], 1).reshape(-1, 3)
+
+
+@pytest.mark.parametrize("query", ["separation", "proximity", "distances"])
+@pytest.mark.parametrize("direction", [(6, 6, 5), (-6, 6, 5), (6, -6, 5), (5, 6, -6), (1, 2, 0.1), (6, 5, 3)])
+def test_bars_may_be_slanted(query, direction):
+    m = 36
+    scene = hc.Scene()
+    scene.add_mesh("bars", edges=np.arange(2 * m * m).reshape(-1, 2))
+    upright = cost(query, scene, bars((0, 0, 1), m))
+    assert cost(query, scene, bars(direction, m)) < 12 * upright
+
+
+@pytest.mark.parametrize("shift", [(1e7, 0.7e7, 0.9e7), (0, 0, 1e7), (3e9, 1, 1)])
+def test_distances_of_meshes_far_apart_grow_with_their_size(shift):
+    def of(n):
+        scene = hc.Scene()
+        faces, x = sheet(n)
+        x[:, 2] = 0.1 * np.sin(9 * x[:, 0])
+        for name in "ab":
+            scene.add_mesh(name, faces, self_collision=False)
+        return cost("distances", scene, np.concatenate([x, x + shift]))
+
+    assert of(48) < 8 * of(24)
+
+
+def test_distances_inside_a_dome_grow_with_its_size():
+    def of(n):
+        scene = hc.Scene()
+        u, v = np.meshgrid(np.linspace(0, np.pi, n), np.linspace(0, 2 * np.pi, n), indexing="ij")
+        dome = np.stack([np.sin(u) * np.cos(v), np.sin(u) * np.sin(v), np.cos(u)], axis=2).reshape(-1, 3)
+        faces = random_scenes.sheet(n)
+        for name in ("dome", "inside"):
+            scene.add_mesh(name, faces, self_collision=False)
+        return cost("distances", scene, np.concatenate([dome, 1e-3 * dome]))
+
+    assert of(48) < 8 * of(24)
