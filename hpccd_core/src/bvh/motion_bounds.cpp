@@ -312,8 +312,8 @@ void MotionBounds::squeeze(const Real* t0, const Real* t1, std::size_t n, double
           const double x = slanted_[axis - 3].along(k, [&](int j) { return double{t0[3 * i + j]}; });
           stretches[i] = {x, x};
         } else {
-          const auto [low, high] = std::minmax(double{t0[3 * i + k]}, double{t1[3 * i + k]});
-          stretches[i] = {low - margins_[p], high + margins_[p]};
+          const double a = t0[3 * i + k], b = t1[3 * i + k];
+          stretches[i] = {std::min(a, b) - margins_[p], std::max(a, b) + margins_[p]};
         }
       }
     axes[axis].emplace(stretches, wanted, least);

@@ -122,6 +122,14 @@ void keep_first_of_task(Worker& worker, std::size_t task, std::atomic<std::size_
   }
 }
 
+// Whether boxes leave far more pairs of features to be tested than are near: long ones that are slanted to every
+// direction of the boxes. Then hulls of leaves are worth their price.
+bool boxes_leave_much(const Worker& worker) {
+  std::uint64_t tested = 0, near = 0;
+  for (const BatchCounts& c : worker.counts) tested += c.tested, near += c.contacts + c.undecided;
+  return tested > 4096 && tested > 64 * near;
+}
+
 Contact least(const std::vector<Contact>& found) { return *std::min_element(found.begin(), found.end(), before); }
 
 void traverse_any(const Tree& tree, const PairRules& rules, Search& search, ThreadPool& pool,
@@ -204,6 +212,9 @@ void test_leaves(const Tree& tree, const PairRules& rules, LeafPair pair, Worker
     far = node_a.mesh != node_b.mesh && !first_look && far_apart(node_a, node_b, reach) && !tree.grown;
     if (far && farther_apart(tree, a, b, reach)) return;
   }
+  const bool hulls_tell = pair.first != pair.second && reach > 0 && reach < std::numeric_limits<float>::infinity() &&
+                          !tree.grown && !tree.bent;
+  if (!far && hulls_tell && boxes_leave_much(worker) && farther_apart(tree, a, b, reach)) return;
   // Smallest distances are of whole surfaces.
   const TestedFeatures tested = search.nearest ? TestedFeatures{} : rule.features;
   worker.test_candidates(rule, [&](CandidateBuffer& edge_edge, CandidateBuffer& vertex_face) {
