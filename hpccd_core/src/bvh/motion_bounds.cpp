@@ -264,8 +264,10 @@ void MotionBounds::look_at_edges(const Real* t0, const Real* t1) {
   };
   double extents[3][std::size(slanted_directions)] = {};
   // What floats suffice for is asked of motions alone; for the rest few edges do.
-  constexpr std::size_t edges_of_a_snapshot = 16;
+  // Of a small scene a look at its edges would take longer than what it could save.
+  constexpr std::size_t edges_of_a_snapshot = 16, few_edges = 256;
   const std::size_t wanted = snapshot_ ? edges_of_a_snapshot : edges_of_a_step;
+  if (snapshot_ && features->edges.size() < few_edges) return;
   short_edge = hpccd::short_edge(features->edges, wanted, [&](std::uint32_t from, std::uint32_t to) {
     const std::size_t a = 3 * std::size_t{from}, b = 3 * std::size_t{to};
     const double length = extent(t0 + a, t0 + b);
