@@ -115,7 +115,7 @@ def tiny_beside_huge(rng):
 
 
 def far_beside_their_size(rng):
-    """So far apart that single precision has one distance for all pairs of features, and a face from one to the other."""
+    """Single precision has one distance for all pairs of their features. A face leads from one to the other."""
     faces, start, _ = random_scenes.crumpled_sheet(rng, 5)
     by = np.array([1e7, 0.7e7, 0.9e7])
     bridge = np.array([[0, 1, 2]]), np.stack([start[3], start[7] + [0, 3, 0], start[11] + by])
@@ -133,8 +133,8 @@ def with_an_escaped_vertex(rng):
 
 
 SCENES = (
-    far, far_beside_their_size, tiny_inside_a_dome, with_an_escaped_vertex, parallel, parallel_turned, nearly_parallel, concentric, degenerate, touching, intersecting, single_triangles,
-    ropes_and_points, ties, tiny_beside_huge,
+    far, far_beside_their_size, tiny_inside_a_dome, with_an_escaped_vertex, parallel, parallel_turned, nearly_parallel,
+    concentric, degenerate, touching, intersecting, single_triangles, ropes_and_points, ties, tiny_beside_huge,
 )  # fmt: skip
 
 

@@ -199,8 +199,7 @@ void MotionBounds::update(const Real* t0, const Real* t1, std::size_t n, std::sp
   const double fine = finest();
   spread = fine > 0 && fine * map.scale < least_spread;
   if (spread) squeeze(t0, t1, n, fine, whole, pool);
-  if (!resting.empty() &&
-      (!(map == old_map && slanted_ == old_slanted) || !same_margins || squeezed != old_squeezed)) {
+  if (!resting.empty() && (!(map == old_map && slanted_ == old_slanted) || !same_margins || squeezed != old_squeezed)) {
     resting.clear();
     pieces = pieces_of(parts_, moves);
   }
@@ -221,9 +220,8 @@ void MotionBounds::update(const Real* t0, const Real* t1, std::size_t n, std::sp
     Along at;
     for (int k = 0; k < 3; ++k) {
       const SlantedDirection& d = slanted_[static_cast<std::size_t>(k)];
-      at.along[k] = squeezed.empty()
-                        ? static_cast<float>((d.along(k, x) - d.along(k, center)) * (map.scale * d.factor))
-                        : squeezed[static_cast<std::size_t>(3 + k)](d.along(k, x));
+      at.along[k] = squeezed.empty() ? static_cast<float>((d.along(k, x) - d.along(k, center)) * (map.scale * d.factor))
+                                     : squeezed[static_cast<std::size_t>(3 + k)](d.along(k, x));
     }
     return at;
   };

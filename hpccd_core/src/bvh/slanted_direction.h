@@ -4,8 +4,8 @@
 
 namespace hpccd {
 
-// A direction in the plane of axis k and the one after it, which may take the place of their sum: a * x[k] + b * x[k+1],
-// times a power of two. As long as the sum at most, and like that rounded once.
+// A direction in the plane of axis k and the one after it, which may take the place of their sum: a * x[k] + b *
+// x[k+1], times a power of two. As long as the sum at most, and like that rounded once.
 struct SlantedDirection {
   double a = 1, b = 1, factor = 1;
 
@@ -15,7 +15,7 @@ struct SlantedDirection {
   }
   bool operator==(const SlantedDirection&) const = default;
 };
-inline constexpr SlantedDirection slanted_directions[] = {{1, 1, 1},     {1, -1, 1},   {1, 2, 0.5},
+inline constexpr SlantedDirection slanted_directions[] = {{1, 1, 1},    {1, -1, 1},  {1, 2, 0.5},
                                                           {1, -2, 0.5}, {2, 1, 0.5}, {2, -1, 0.5}};
 
 }  // namespace hpccd

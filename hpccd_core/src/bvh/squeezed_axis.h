@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Coordinates of a scene that is far larger than its features and mostly empty: one vertex parked a million lengths
-// away, or bodies in different places of the world. Mapped as a whole (coordinate_map.h), all that is small shares a few
-// floats, and all boxes overlap. Here the wide gaps between vertices are shortened first.
+// away, or bodies in different places of the world. Mapped as a whole (coordinate_map.h), all that is small shares a
+// few floats, and all boxes overlap. Here the wide gaps between vertices are shortened first.
 //
 // Along the axis vertices keep their order, and no two of them come farther apart than they were: features whose boxes
 // are apart, or farther apart than a reach, are so in the scene. No motion crosses a gap, so mapped vertices still move

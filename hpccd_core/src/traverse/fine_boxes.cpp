@@ -45,7 +45,8 @@ struct LeafCorners {
     }
   }
   const V& farthest(const V& along) const {
-    return *std::max_element(at.begin(), at.begin() + n, [&](const V& a, const V& b) { return dot(a, along) < dot(b, along); });
+    return *std::max_element(at.begin(), at.begin() + n,
+                             [&](const V& a, const V& b) { return dot(a, along) < dot(b, along); });
   }
 };
 
@@ -143,7 +144,8 @@ FineBoxes::FineBoxes(const Tree& tree, const MotionBounds& snapshot)
   for (std::size_t i = tree.nodes.size(); i-- > 0;) {  // children come after their parents
     Bounds& box = nodes_[i] = {{infinity, infinity, infinity}, {-infinity, -infinity, -infinity}};
     const auto include = [&](const double* low, const double* high) {
-      for (int k = 0; k < 3; ++k) box.low[k] = std::min(box.low[k], low[k]), box.high[k] = std::max(box.high[k], high[k]);
+      for (int k = 0; k < 3; ++k)
+        box.low[k] = std::min(box.low[k], low[k]), box.high[k] = std::max(box.high[k], high[k]);
     };
     const Node& node = tree.nodes[i];
     if (node.children) {

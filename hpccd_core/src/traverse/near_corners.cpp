@@ -39,7 +39,8 @@ struct LeafCorners {
         vertices(tree.corners.data() + leaf.first_corner),
         features(tree.corners_of[number]) {
     for (std::uint32_t i = 0; i < leaf.n_corners(); ++i)
-      for (int k = 0; k < 3; ++k) at[i][k] = static_cast<Real>(snapshot.map.precise(snapshot.vertices[vertices[i]].t0[k], k));
+      for (int k = 0; k < 3; ++k)
+        at[i][k] = static_cast<Real>(snapshot.map.precise(snapshot.vertices[vertices[i]].t0[k], k));
   }
 };
 
@@ -77,9 +78,9 @@ double distance_of_near_corners(const Tree& tree, const MotionBounds& snapshot, 
   if (fine)
     return distance_of_corners<double>(
         tree, snapshot, near_leaves(tree, {a, b}, [&](NodePair p) { return fine->square_of_gap(p.a, p.b); }));
-  return distance_of_corners<float>(
-      tree, snapshot,
-      near_leaves(tree, {a, b}, [&](NodePair p) { return tree.nodes[p.a].square_of_gap(tree.nodes[p.b]); }));
+  return distance_of_corners<float>(tree, snapshot, near_leaves(tree, {a, b}, [&](NodePair p) {
+                                      return tree.nodes[p.a].square_of_gap(tree.nodes[p.b]);
+                                    }));
 }
 
 }  // namespace hpccd

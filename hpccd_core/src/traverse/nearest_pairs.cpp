@@ -11,8 +11,8 @@
 namespace hpccd {
 namespace {
 
-// By how much the test may report a pair beyond its distance (proximity_test.h), and its margins, relative to the pair's
-// size. With less, which of two pairs is found would depend on which came first.
+// By how much the test may report a pair beyond its distance (proximity_test.h), and its margins, relative to the
+// pair's size. With less, which of two pairs is found would depend on which came first.
 constexpr double test_rounding = distance_radius + 1e-14;
 
 }  // namespace
@@ -36,7 +36,8 @@ NearestPairs::NearestPairs(const MeshPairs& pairs, const Features& features, con
       fine_(motion.spread ? std::make_unique<FineBoxes>(tree, motion) : nullptr),
       scale_(motion.box_scale),
       sums_(motion.box_rounding),
-      // Of a pair as large as the scene: mapped coordinates lie within 2.25 of zero, so p, a and b together are below 14.
+      // Of a pair as large as the scene: mapped coordinates lie within 2.25 of zero, so p, a and b together are
+      // below 14.
       rounding_(14 * test_rounding / motion.map.scale) {
   for (std::size_t i = tree.nodes.size(); i-- > 0;) {  // children come after their parents
     const Node& node = tree.nodes[i];

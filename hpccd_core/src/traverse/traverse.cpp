@@ -27,8 +27,8 @@ struct NearerBoxes {
       if (a.mesh == mixed_meshes || b.mesh == mixed_meshes) return true;
       if (a.mesh != b.mesh) nearest.begin(number(a), number(b)), reach = nearest.reach(a.mesh, b.mesh);
     }
-    const bool apart = nearest.fine() ? nearest.fine()->farther_apart(
-                                            number(a), number(b), std::max(nearest.limit(a.mesh, b.mesh), 0.0))
+    const bool apart = nearest.fine() ? nearest.fine()->farther_apart(number(a), number(b),
+                                                                      std::max(nearest.limit(a.mesh, b.mesh), 0.0))
                                       : !a.near_in_snapshot(b, reach) || a.square_of_gap(b) > reach * reach;
     return !apart && open({number(a), number(b)});
   }
