@@ -35,4 +35,4 @@ def test_many_recordings_on_a_busy_machine(start_node, tmp_path, seed):
             process.kill()
             process.wait()
     print(f"seed {seed}: {found} answers verified")
-    assert found[0] > 3 and sum(found) > 10  # a recording begun in the middle may hold no answer to what it holds
+    assert sum(found) > 50

@@ -31,9 +31,9 @@ def parameters(rng: random.Random, scene, record) -> dict:
     meshes = {"tool": {"input": "pose"}, "table": {"static": True}}
     found = {
         "meshes": [name for name in scene if name != "crane"], "mesh": {k: v for k, v in meshes.items() if k in scene},
-        "frame_id": "world", "minimum_separation": 0.05, "frame_queue": 1000, "input_depth": 200,
-        "restart_after": rng.choice((1, 2, 5)), "distances": rng.random() < 0.5, "record": str(record),
-        "record_compression": rng.choice(("none", "zstd")), "max_contacts": 50,
+        "frame_id": "world", "minimum_separation": 0.05, "rigid_tolerance": 0.02, "frame_queue": 1000,
+        "input_depth": 200, "restart_after": rng.choice((1, 2, 5)), "distances": rng.random() < 0.5,
+        "record": str(record), "record_compression": rng.choice(("none", "zstd")), "max_contacts": 50,
     }  # fmt: skip
     if "crane" in scene:
         found |= {"robots": ["crane"], "robot": {"crane": {
@@ -68,7 +68,10 @@ class RandomStream:
                                                  ("minimum_separation", (0.02, 0.05)),
                                                  ("accuracy", ("exact", "balanced"))))  # fmt: skip
                 assert set_parameter(self._node, name, self._rng.choice(values)).successful
-        self._spin(0.5)
+        answers = -1
+        while answers != len(self._peer.received):  # those that wait for detection belong to this recording
+            answers = len(self._peer.received)
+            self._spin(0.7)
 
     def next_recording(self) -> None:
         """In the middle of the stream, or after the node was inactive."""
