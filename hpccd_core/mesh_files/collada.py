@@ -20,6 +20,7 @@ _LOOKS = ("library_images", "library_materials", "library_effects", "library_lig
           "extra")  # fmt: skip
 # Nodes of a scene, each counted as often as it is instantiated: files whose nodes instantiate each other make millions.
 MOST_NODES = 100_000
+_NOT_FINITE = "has a position that is not finite; export it again"
 
 
 def parse(data: bytes) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
@@ -49,6 +50,9 @@ def _parse(collada: Any, data: bytes) -> tuple[NDArray[np.float64], NDArray[np.i
     if root.find(".//{*}instance_controller") is not None:
         raise MeshFileError("has geometry that a skeleton or morph moves (instance_controller); export it without")
     _drop(root, _LOOKS)
+    for mesh in root.iterfind(".//{*}mesh"):
+        _check_positions(mesh)
+        _check_faces(mesh)
     document = collada.Collada(io.BytesIO(ElementTree.tostring(root)))
     unit = _unit(document)
     if document.scene is None:
@@ -75,6 +79,57 @@ def _drop(element: Any, names: tuple[str, ...]) -> None:
     for parent in element.iter():
         for child in [child for child in parent if str(child.tag).rpartition("}")[2] in names]:
             parent.remove(child)
+
+
+def _check_positions(mesh: Any) -> None:
+    """Raises MeshFileError where pycollada would read others than the file holds: it makes 0 of NaN, and takes no heed
+    of count, stride and offset."""
+    sources = {f"#{source.get('id')}": source for source in mesh.iterfind("{*}source")}
+    for given in mesh.iterfind("{*}vertices/{*}input[@semantic='POSITION']"):
+        source = sources.get(given.get("source"))
+        array = None if source is None else source.find("{*}float_array")
+        accessor = None if source is None else source.find("{*}technique_common/{*}accessor")
+        if array is None or accessor is None:
+            continue  # pycollada says so
+        numbers = _numbers(array, np.float64)
+        if not np.isfinite(numbers).all():
+            raise MeshFileError(_NOT_FINITE)
+        _check_count(array, "numbers", len(numbers))
+        if int(accessor.get("stride", 1)) != len(accessor.findall("{*}param")) or int(accessor.get("offset", 0)):
+            raise MeshFileError("has other numbers between its positions (stride or offset); export it again")
+
+
+def _check_faces(mesh: Any) -> None:
+    """Raises MeshFileError where pycollada would read others than the file holds: it leaves out holes and all but the
+    first list of triangles, keeps 32 bits of each index, and takes no heed of count."""
+    if mesh.find(".//{*}ph") is not None:
+        raise MeshFileError("has polygons with holes (ph); split them into triangles where the file was made")
+    for kind in ("triangles", "polylist", "polygons"):
+        for primitive in mesh.iterfind(f"{{*}}{kind}"):
+            lists = primitive.findall("{*}p")
+            width = 1 + max((int(given.get("offset", 0)) for given in primitive.iterfind("{*}input")), default=0)
+            size = 0
+            for numbers in (_numbers(one, np.int64) for one in lists):
+                if len(numbers) and not -(2**31) <= numbers.min() <= numbers.max() < 2**31:
+                    raise MeshFileError("names a vertex by a number that is too large; export it again")
+                size += len(numbers)
+            if kind != "polygons" and len(lists) > 1:
+                raise MeshFileError(f"has several lists (p) in one element {kind}; export it again")
+            if kind == "triangles":
+                held = size / (3 * width)
+            else:
+                held = len(lists) if kind == "polygons" else len(_numbers(primitive.find("{*}vcount"), np.int64))
+            _check_count(primitive, kind, held)
+
+
+def _numbers(element: Any, of: type) -> NDArray[Any]:
+    text = "" if element is None else element.text
+    return np.empty(0, of) if not text or text.isspace() else np.fromstring(text, of, sep=" ")
+
+
+def _check_count(element: Any, what: str, held: float) -> None:
+    if (count := element.get("count")) is not None and int(count) != held:
+        raise MeshFileError(f"says {int(count)} {what} and holds {held:g}; copy or export it again")
 
 
 def _unit(document: Any) -> float:
@@ -110,7 +165,7 @@ def _triangles(collada: Any, primitive: Any) -> NDArray[np.int64]:
     if len(corners) and not (0 <= corners.min() and corners.max() < len(positions)):
         raise MeshFileError(f"a face names a vertex beyond the {len(positions)} of its geometry; export it again")
     if not np.isfinite(positions).all():
-        raise MeshFileError("has a position that is not finite; export it again")
+        raise MeshFileError(_NOT_FINITE)
     if isinstance(primitive, collada.triangleset.TriangleSet):
         return corners.reshape(-1, 3)
     counts = np.asarray(primitive.vcounts, np.int64)

@@ -41,8 +41,11 @@ _TEXTS: tuple[tuple[bytes, str, str], ...] = (
 _OWN = {".ply": (b"ply\n", b"ply\r"), ".stl": (b"solid",), ".dae": (b"<?xml", b"<collada")}
 
 
-def foreign(data: bytes, suffix: str) -> str | None:
-    """What a file of such a name is, with the remedy, where it is obvious that it is something else."""
+def foreign(data: bytes, suffix: str, text: bool = True) -> str | None:
+    """What a file of such a name is, with the remedy, where it is obvious that it is something else.
+
+    text: it may be a text.
+    """
     # The beginning first: to strip a whole file of many megabytes copies it and keeps other threads waiting.
     if not data[:512].strip() and not data.strip():
         return "is empty; copy or export it again"
@@ -53,6 +56,8 @@ def foreign(data: bytes, suffix: str) -> str | None:
             return f"is {what}; {remedy}"
     if data[257:262] == b"ustar":
         return f"is a tar archive; {_UNPACK}"
+    if not text:
+        return None
     if suffix != ".dae" and data.startswith((b"\xff\xfe", b"\xfe\xff")):
         return "is UTF-16 text; save it as UTF-8"
     start = data[:512].removeprefix(lines.BOM).lstrip().lower()

@@ -43,7 +43,8 @@ def load_mesh(path: str | os.PathLike[str]) -> tuple[NDArray[np.float64], NDArra
 
     A polygon becomes the fan of its first corner where that covers the polygon and nothing else, as for every convex
     one. Other polygons are split by ear clipping in their best plane (package ``mapbox_earcut``). Polygons without area
-    become fans; a polygon that crosses itself is an error. Faces of fewer than three corners are ignored.
+    become fans; a polygon that crosses itself is an error where its triangles would not have its area. Faces of fewer
+    than three corners are ignored.
 
     Loading a large OBJ, PLY or STL file does not hold the interpreter lock for long: other threads go on. The XML of a
     DAE file is parsed in one call, which takes 0.3 s for a million triangles.
@@ -67,6 +68,8 @@ def load_mesh(path: str | os.PathLike[str]) -> tuple[NDArray[np.float64], NDArra
         raise MeshFileError(f"{shortened(file)}: {error}") from error
     except OSError as error:
         raise MeshFileError(f"{shortened(file)}: cannot be read: {error.strerror}; give another file") from error
+    except (ArithmeticError, LookupError, TypeError, ValueError) as error:  # damage that no check above foresaw
+        raise MeshFileError(f"{shortened(file)}: is damaged: {shortened(error)}; export it again") from error
     return vertices, faces.astype(np.uint32)
 
 
@@ -91,10 +94,13 @@ def existing(path: str | os.PathLike[str]) -> Path:
     raise MeshFileError(f"{shown}: no such file (relative paths start from {Path.cwd()})")
 
 
+@np.errstate(invalid="ignore")  # to convert a signalling NaN warns; `_check` refuses it
 def _parse(data: bytes, suffix: str) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    # The header of a binary STL may hold anything.
-    if not (suffix == ".stl" and stl.is_binary(data)) and (what := contents.foreign(data, suffix)):
-        raise MeshFileError(what)
+    # The header of a binary STL may hold anything. With bytes behind the triangles it may be an archive as well.
+    if not (suffix == ".stl" and stl.is_binary(data)):
+        text = not (suffix == ".stl" and stl.fits(data))
+        if what := contents.foreign(data, suffix, text):
+            raise MeshFileError(what)
     match suffix:
         case ".stl":
             corners = stl.parse(data)

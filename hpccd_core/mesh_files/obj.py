@@ -34,7 +34,10 @@ class _Reader:
 
         False where they are not, and nothing was read.
         """
-        words, n = b" ".join(chunk).split(), len(chunk)
+        joined, n = b" ".join(chunk), len(chunk)
+        if b"_" in joined:  # of a name, or of what Python alone takes for a number
+            return False
+        words = joined.split()
         if self._pending or len(words) != 4 * n or words[0] not in (b"v", b"f") or words[::4] != [words[0]] * n:
             return False
         is_vertices = words[0] == b"v"
@@ -66,13 +69,13 @@ class _Reader:
             words = line.split()
             if not words or words[0] not in (b"v", b"f"):
                 continue
-            if b"#" in line or b"\\" in line:
+            if b"#" in line or b"\\" in line or b"_" in line:
                 line = line.partition(b"#")[0].rstrip()
                 # Only of v and f: a comment or a name that ends with a backslash must not swallow the next vertex.
                 if line.endswith(b"\\"):
                     self._pending = line[:-1]
                     continue
-                words = line.split()
+                words = lines.words(line)
             try:
                 if words[0] == b"v":
                     _, x, y, z = words[:4]  # behind them a weight or a colour

@@ -2,6 +2,7 @@
 """PLY, ASCII and binary: positions of the element vertex, polygons of the element face."""
 
 import dataclasses
+import math
 import struct
 from collections.abc import Iterator
 from typing import Any, Literal
@@ -171,7 +172,7 @@ class _Text:
             xyz = []
             for _ in part:
                 number, line = self._next(element)
-                words = line.split()
+                words = lines.words(line)
                 places = _places(element, words, number, line) if element.has_lists() else None
                 try:
                     xyz.append([float(words[places[column] if places else column]) for column in columns])
@@ -192,7 +193,7 @@ class _Text:
             sizes: list[int] = []
             for _ in part:
                 number, line = self._next(element)
-                words = line.split()
+                words = lines.words(line)
                 place = _places(element, words, number, line)[which]
                 try:
                     indices = [_integer(word) for word in words[place + 1 : place + 1 + _integer(words[place])]]
@@ -257,9 +258,17 @@ class _Bytes:
 
     def positions(self, element: _Element) -> NDArray[np.float64]:
         rows = self._uniform(element)
-        if rows is None:
-            raise MeshFileError("its vertices have lists of different lengths; export it without them")
-        return np.stack([rows[str(column)].astype(np.float64) for column in element.columns()], axis=1)
+        columns = element.columns()
+        if rows is not None:
+            return np.stack([rows[str(column)].astype(np.float64) for column in columns], axis=1)
+        octets, start, axes = np.frombuffer(self._data, np.uint8), self._at, []
+        for column in columns:
+            self._at = start
+            offsets, _ = self._ragged(element, column)
+            item = element.properties[column].type.newbyteorder(self._order)
+            places = offsets[:, None] + np.arange(item.itemsize)
+            axes.append(octets[places].view(item)[:, 0].astype(np.float64))
+        return np.stack(axes, axis=1)
 
     def polygons(self, element: _Element, which: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         item = element.properties[which].type.newbyteorder(self._order)
@@ -313,28 +322,35 @@ class _Bytes:
         return _checked_length(np.frombuffer(self._data, of, 1, at)[0])
 
     def _ragged(self, element: _Element, which: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """(first byte, length) of the list ``which`` of each row, and moves on."""
-        steps = []  # (bytes before a list, its length, bytes of one item, is it the one)
-        before = 0
+        """(first byte, length) of the property ``which`` of each row, and moves on; a number has the length 1."""
+        steps: list[tuple[int, struct.Struct | None, int, bool]] = []
+        before = 0  # bytes of the numbers before a list, or before the property; then length, bytes of an item, wanted
         for k, one in enumerate(element.properties):
-            if one.count_type is None:
-                before += one.type.itemsize
-            else:
-                length = struct.Struct(self._order + _CODES[one.count_type.str[1:]])
-                steps.append((before, length, one.type.itemsize, k == which))
+            if one.count_type is not None:
+                counter = struct.Struct(self._order + _CODES[one.count_type.str[1:]])
+                steps.append((before, counter, one.type.itemsize, k == which))
                 before = 0
+            elif k == which:
+                steps.append((before, None, one.type.itemsize, True))
+                before = 0
+            else:
+                before += one.type.itemsize
         offsets, counts = [], []
         data, at = self._data, self._at
         try:
             for _ in range(element.count):
                 for skipped, length, size, wanted in steps:
                     at += skipped
-                    count = _checked_length(length.unpack_from(data, at)[0])
-                    at += length.size
+                    count = 1
+                    if length is not None:
+                        count = _checked_length(length.unpack_from(data, at)[0])
+                        at += length.size
                     if wanted:
                         offsets.append(at)
                         counts.append(count)
                     at += count * size
+                    if at > len(data):
+                        raise _cut_off(element)
                 at += before
         except struct.error:
             raise _cut_off(element) from None
@@ -345,7 +361,7 @@ class _Bytes:
 
 
 def _checked_length(number: float) -> int:
-    if number < 0 or number != int(number):
+    if not (math.isfinite(number) and number >= 0 and number == int(number)):
         raise MeshFileError(f"has a list of length {number}; it is damaged: copy or export it again")
     return int(number)
 

@@ -44,7 +44,8 @@ class Polygons:
         Raises
         ------
         MeshFileError
-            A polygon crosses itself, or ``mapbox_earcut`` is missing and a polygon needs it.
+            A polygon crosses itself such that its triangles have another area, or ``mapbox_earcut`` is missing and a
+            polygon needs it.
         """
         if (self.counts == 3).all():
             return self.corners.reshape(-1, 3)
@@ -109,8 +110,10 @@ def _ears(positions: NDArray[np.float64]) -> NDArray[np.intp]:
             "is not convex, and splitting it into triangles needs the Python package mapbox_earcut; install it with: "
             "pip install 'mapbox_earcut~=2.1.0' (it is in the extra 'meshes')"
         ) from None
-    ends = np.array([len(flat)], np.uint32)
-    faces = np.asarray(earcut.triangulate_float64(flat, ends), np.intp).reshape(-1, 3)
+    # Without corners that repeat the one before: how it treats them depends on the direction. They are put back below.
+    kept = np.flatnonzero((positions != np.roll(positions, 1, axis=0)).any(axis=1))
+    ends = np.array([len(kept)], np.uint32)
+    faces = kept[np.asarray(earcut.triangulate_float64(flat[kept], ends), np.intp).reshape(-1, 3)]
     if _signed_areas(flat, faces).sum() < 0:
         faces = faces[:, ::-1]
     faces = _with_all_corners(faces, len(flat))

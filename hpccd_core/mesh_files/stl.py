@@ -16,6 +16,11 @@ def is_binary(data: bytes) -> bool:
     return len(data) >= _HEADER and len(data) == _HEADER + _TRIANGLE.itemsize * _count(data)
 
 
+def fits(data: bytes) -> bool:
+    """It holds as many triangles as it says, maybe with bytes behind them. Of a text those are hundreds of millions."""
+    return len(data) >= _HEADER and 0 < _count(data) <= (len(data) - _HEADER) // _TRIANGLE.itemsize
+
+
 def parse(data: bytes) -> NDArray[np.float64]:
     """(3 F, 3) the corners of F triangles, one after the other. Raises MeshFileError."""
     if is_binary(data):
@@ -55,7 +60,7 @@ def _of_text(data: bytes) -> NDArray[np.float64]:
         coordinates: list[float] = []
         for line in chunk:
             number += 1
-            words = line.split()
+            words = lines.words(line)
             key = words[0].lower() if words else b""
             if key == b"vertex":
                 if len(words) != 4:

@@ -27,8 +27,8 @@ class StopListener:
 
     ``stop`` is false only where a message said so that was sent less than ``stop_timeout`` seconds ago, and as many
     publishers are alive as there are to be. The age of a message is the system's time minus its DDS source timestamp:
-    a process that was held up, or that came late and is given the latched message, does not take an old word for a new
-    one. It can be read at any time from any thread, and is true as well where the executor runs no callbacks any more.
+    a process that was held up, or that came late and is given the latched message, does not take an old message for a
+    new one. It can be read at any time from any thread, and is true as well where the executor runs no callbacks.
     A message from further in the future than ``clock_error``, or a jump of the system clock by more against the steady
     clock, makes it true until the clocks have agreed for ``stop_timeout``. ``/clock`` does not matter.
 

@@ -222,7 +222,8 @@ INPUT_ROWS = (
         "input_reliability",
         "string",
         "reliable",
-        "QoS of the vertex subscriptions; best_effort also accepts best-effort publishers, and may lose large messages",
+        "Reliability of the subscriptions to vertices, points, shapes, markers, poses and joint states; best_effort "
+        "also accepts best-effort publishers, and may lose large messages",
         choices=("reliable", "best_effort"),
     ),
     Row(

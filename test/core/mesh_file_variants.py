@@ -140,6 +140,10 @@ def _ply_elements():
         "float-lists": ([vertex, ("face", {"vertex_indices": ("float", "float")}, _rows(MIXED))], MIXED),
         "other-name": ([vertex, ("face", {"corners": ("uint8", "int32")}, _rows(FACES))], FACES),
         "points-and-lines": ([vertex, ("face", _LIST, _rows([[0], *FACES, [1, 2], []]))], FACES),
+        "any-lists-of-vertices": ([("vertex", {"a": "uchar", "x": "float", "near": ("uchar", "short"), "y": "float",
+                                               "more": ("int", "double"), "z": "float"},
+                                    [(9, x, [1] * (k % 3), y, [2.5] * (k % 2), z)
+                                     for k, (x, y, z) in enumerate(points)]), face], FACES),
         "lists-of-vertices": ([("vertex", {"near": ("uchar", "int"), **_XYZ}, [([1, 2], *p) for p in points]), face],
                               FACES),
     }  # fmt: skip
@@ -192,6 +196,7 @@ def _stl():
         "header-solid": stl(b"solid made by a program"),
         "header-facet": stl(b"solid x\nfacet normal 0 0 0\nouter loop\nvertex"),
         "header-of-an-archive": stl(b"PK\x03\x04"),
+        "header-of-a-pointer": stl(b"version https://git-lfs") + b"more",
         "trailing-bytes": stl() + b"colours of a program\0\xff",
         "trailing-zero": stl() + b"\0",
         "trailing-line-end": stl(b"solid") + b"\r\n",

@@ -136,6 +136,10 @@ def zipped():
     return archive.getvalue()
 
 
+SOURCE = '<input semantic="VERTEX" source="#v" offset="0"/>'
+HOLE = f'<polygons count="1">{SOURCE}<ph><p>0 1 2 3</p><h>0 1 2</h></ph></polygons>'
+TWO_LISTS = f'<triangles count="2">{SOURCE}<p>0 1 2</p><p>1 2 3</p></triangles>'
+
 ENTITIES = '<?xml version="1.0"?><!DOCTYPE x [<!ENTITY a "aaaaaaaaaa">' + "".join(
     f'<!ENTITY {b} "{f"&{a};" * 10}">' for a, b in zip("abcdefghi", "bcdefghij", strict=True)
 )
@@ -159,10 +163,18 @@ ENTITIES = '<?xml version="1.0"?><!DOCTYPE x [<!ENTITY a "aaaaaaaaaa">' + "".joi
         (dae(more=bomb(), nodes='<node><instance_node url="#n0"/></node>'), "more than 100000 nodes; export it flat"),
         (dae(nodes='<node><instance_controller url="#c"/></node>'), "a skeleton or morph moves"),
         (dae().replace("<scene>", "<!--").replace("</scene>", "-->"), "has no scene; export it again"),
+        (dae(vertices=np.where(VERTICES == 7, np.nan, VERTICES)), "a position that is not finite"),
+        (dae(primitives=HOLE + triangles()), "polygons with holes"),
+        (dae(primitives=TWO_LISTS), "several lists"),
+        (dae(primitives=triangles().replace('count="2"', 'count="3"')), "says 3 triangles and holds 2"),
+        (dae(primitives=triangles([[0, 1, 2**32 + 2]])), "a number that is too large"),
+        (dae().replace('count="18"', 'count="21"'), "says 21 numbers and holds 18"),
+        (dae().replace('stride="3"', 'stride="6"'), "has other numbers between its positions"),
         (ENTITIES + "]><COLLADA>&j;</COLLADA>", "m.dae: cannot be read"),
     ],
     ids=(
-        "empty tag bytes torn zip no-faces no-nodes index negative far reference self bomb skin no-scene entities"
+        "empty tag bytes torn zip no-faces no-nodes index negative far reference self bomb skin no-scene nan "
+        "hole lists count large-index array-count stride entities"
     ).split(),
 )
 def test_bad_files_are_refused(load, text, why):

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Mesh files as people have them: vertices are numbered as in the file, and polygons are covered exactly."""
 
+import itertools
 import os
+import struct
 import subprocess
 import sys
 import threading
@@ -17,6 +19,7 @@ from mesh_file_variants import ELL, FORMS, ply, stl, text_stl
 
 import hpccd_core as hc
 from hpccd_core.mesh_files import lines
+from hpccd_core.mesh_files.load import _parse as parse_file
 from hpccd_core.mesh_files.welding import weld
 
 pytest.importorskip("mapbox_earcut")
@@ -153,6 +156,23 @@ def test_corners_on_a_straight_side_stay(load):
         assert_covers(vertices, list(range(10)), [tuple(face) for face in faces.tolist()])
 
 
+@pytest.mark.parametrize("direction", [1, -1])
+def test_corners_that_repeat_stay(load, direction):
+    """As corners on a straight side; their triangles have no area."""
+    for doubled in range(6):
+        times = 2 + doubled % 2
+        polygon = [corner for k, corner in enumerate(ELL) for _ in range(times if k == doubled else 1)][::direction]
+        n = len(polygon)
+        for first in (0, doubled, doubled + 1):
+            turned = polygon[first:] + polygon[:first]
+            vertices, faces = load("m.obj", (variants._v(turned) + variants._f([range(n)])).encode())
+            assert_covers(vertices, list(range(n)), [tuple(face) for face in faces.tolist()])
+    # Ear clipping by itself refuses this one in one of the directions.
+    corners = [[11, -23, 14], [10, -20, 12], [8, -20, 4], [7, -14, 4], [7, -14, 4], [5, -5, 2], [4, -2, 0], [7, 4, 16]]
+    vertices, faces = load("m.obj", (variants._v(corners[::direction]) + variants._f([range(8)])).encode())
+    assert_covers(vertices, list(range(8)), [tuple(face) for face in faces.tolist()])
+
+
 def test_the_triangles_of_a_polygon_that_is_not_convex_stay_the_same(load):
     """Recordings name triangles by their numbers: a version of mapbox_earcut that splits otherwise must not pass."""
     _, faces = load("m.obj", (variants._v(ELL) + variants._f([range(6)])).encode())
@@ -171,6 +191,16 @@ _MIXED_PLY = ply("binary_big_endian", variants._ply_elements()["mixed"][0])
 _ASCII_PLY = ply("ascii", variants._ply_elements()["plain"][0])
 _OBJ = variants._PLAIN.encode()
 BOW_TIE = [[0.0, 0, 0], [1, 1, 0], [1, 0, 0], [0, 1, 0]]
+SIGNALLING = b"\x01\x00\x80\x7f"
+
+
+def length_of_list(form, length):
+    """A file whose lists of vertices have lengths of type double; that of the first triangle is this."""
+    faces = ("face", {"vertex_indices": ("double", "int")}, variants._rows(variants.MIXED))
+    data = ply(form, [variants._ply_elements()["plain"][0][0], faces])
+    return data.replace(struct.pack(f"{FORMS[form]}d", 3), struct.pack(f"{FORMS[form]}d", length))
+
+
 REFUSED = {
     **{f"lfs{suffix}": (LFS, "is a Git LFS pointer, not the mesh itself; run git lfs pull")
        for suffix in (".obj", ".ply", ".stl", ".dae")},
@@ -188,6 +218,16 @@ REFUSED = {
     "obj.ply": (_OBJ, "does not begin with ply"),
     "obj.stl": (_OBJ, "neither a binary STL"),
     "binary-stl.obj": (stl(), "has no triangles"),
+    "underscore.obj": (_OBJ + b"f 1_0 2 3\n", "line 9: .*expected a face"),
+    "underscore-alone.obj": (b"v 1_0 0 0\n" * 3 + b"f 1 2 3\n", "line 1: .*expected a vertex"),
+    "underscore.ply": (_ASCII_PLY.replace(b"3 0 1 2", b"3 0 1 0_2"), "does not hold the values that the header lists"),
+    "underscore.stl": (text_stl().replace(b"vertex 0", b"vertex 0_0", 1), "line 4: .*not a number"),
+    "signalling.ply": (_PLY.replace(struct.pack("<f", 7.0), SIGNALLING), "coordinates must be finite"),
+    "signalling.stl": (stl()[:96] + SIGNALLING + stl()[100:], "coordinates must be finite"),
+    "infinite-length.ply": (length_of_list("binary_little_endian", np.inf), "a list of length inf"),
+    "nan-length.ply": (length_of_list("binary_big_endian", np.nan), "a list of length nan"),
+    "huge-length.ply": (length_of_list("binary_little_endian", 1e300), "is cut off"),
+    "archive-with-more.stl": (stl(b"PK\x03\x04") + b"more", "is a zip archive"),
     "points.obj": (b"v 0 0 0\nv 1 0 0\n", "has no triangles"),
     "index.obj": (_OBJ + b"f 1 2 7\n", "line 9: names vertex 7, and the file has 6"),
     "zero.obj": (_OBJ + b"f 0 1 2\n", "line 9: 'f 0 1 2': expected a face"),
@@ -254,6 +294,34 @@ def test_any_torn_ply_is_read_or_refused(load, form):
             continue
         # Text may end within the last number, of a property that is no matter.
         assert form == "ascii" and np.array_equal(vertices, whole[0]) and np.array_equal(faces, whole[1])
+
+
+def test_any_changed_file_is_read_or_refused():
+    """Bytes at random, words and numbers that Python or numpy read in their own way: no other error, no warning."""
+    rng = np.random.default_rng(5)
+    odd = [b"nan", b"inf", b"1e999", b"-1", b"1_0", b"9" * 5000, b"1e30", b"", b"0x1", b"\xff", b"0.5", b"\\", b"#"]
+    floats = {"vertex_indices": ("double", "float")}
+    for (name, data, *_), _ in itertools.product(variants.VARIANTS, range(15)):
+        changed = bytearray(data)
+        if name.endswith(".ply") and rng.random() < 0.3:
+            form = list(FORMS)[rng.integers(1, 3)]
+            elements = variants._ply_elements()["mixed"][0]
+            changed = bytearray(ply(form, [elements[0], (elements[1][0], floats, elements[1][2])]))
+            at = changed.index(b"end_header") + 11 + 72 + int(rng.integers(0, 60))
+            changed[at : at + 8] = struct.pack(f"{FORMS[form]}d", rng.choice([np.nan, np.inf, -np.inf, 1e300, 0.5]))
+        elif rng.random() < 0.5:
+            for at in rng.integers(0, len(data), 3):
+                changed[at] = rng.choice([0, 0x7F, 0x80, 0xFF, rng.integers(256)])
+        else:
+            words = data.split(b" ")
+            words[rng.integers(len(words))] = odd[rng.integers(len(odd))]
+            changed = bytearray(b" ".join(words))
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            try:
+                parse_file(bytes(changed), f".{name.rpartition('.')[2]}")
+            except hc.MeshFileError:
+                pass
 
 
 def test_files_that_are_not_there(load, tmp_path, monkeypatch):
