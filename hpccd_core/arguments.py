@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Checks of arguments, each with an error that names the argument and the remedy."""
 
+import math
 import operator
+import struct
 from collections.abc import Iterable, Mapping
+from itertools import chain
 from typing import Any, SupportsIndex, TypeVar
 
 import numpy as np
@@ -13,13 +16,14 @@ from .options import FEATURES, OUTPUTS
 
 REALS = frozenset({np.dtype(np.float32), np.dtype(np.float64)})  # in this machine's byte order
 LARGEST_COORDINATE = 1e150  # largest_coordinate in src/bvh/coordinate_map.h
+DEEPEST = 8  # of nested lists: arrays of arguments have three dimensions at most, and a list may hold itself
 
 Word = TypeVar("Word", bound=str)
 
 
 def flag(name: str, value: object) -> bool:
     """The value as bool: True, False, 1 or 0. Anything else has a truth too, but "no" has the wrong one."""
-    if isinstance(value, (bool, np.bool_)) or (isinstance(value, (int, np.integer)) and value in (0, 1)):
+    if isinstance(value, (bool, np.bool_)) or (_is_integer(value) and value in (0, 1)):
         return bool(value)
     raise TypeError(f"{name}: expected True or False, got {type(value).__name__}")
 
@@ -73,21 +77,25 @@ def mesh_number(name: str, mesh: str | int, numbers: Mapping[str, int]) -> int:
 def length(name: str, value: object) -> float:
     """The value as float, finite and not negative. Raises ValueError where float64 cannot hold it exactly."""
     number = real(name, value)
-    if not np.isfinite(number) or number < 0:
-        raise ValueError(f"{name}: must be finite and not negative, got {value}")
+    (bits,) = struct.unpack("<Q", struct.pack("<d", number))  # comparisons may take a negative denormal for 0
+    if not math.isfinite(number) or bits > 1 << 63:
+        raise ValueError(f"{name}: must be finite and not negative, got {_shown(value)}")
     return number
 
 
 def real(name: str, value: Any) -> float:
     """The value as float. Raises ValueError where float64 cannot hold it exactly."""
-    if isinstance(value, bool) or not isinstance(value, (int, float, np.floating, np.integer)):
+    if isinstance(value, np.float32):
+        return float(widened(np.asarray(value)))
+    if isinstance(value, bool) or not (_is_integer(value) or isinstance(value, (float, np.floating))):
         raise TypeError(f"{name}: expected a number, got {type(value).__name__}")
     try:
-        number = float(value)
+        with np.errstate(all="ignore"):
+            number = float(value)
     except OverflowError:
-        raise ValueError(f"{name}: must lie within float64, got {_shown(value)}") from None
-    if np.isfinite(number) and not _holds(number, value):
-        raise _not_held(name, value)
+        raise _beyond(name, value) from None
+    if not _holds(number, value):
+        raise _not_held(name, value) if math.isfinite(number) else _beyond(name, value)
     return number
 
 
@@ -96,37 +104,39 @@ def reals(name: str, value: object) -> NDArray[np.float64]:
     array = _array(name, value)
     if array.dtype.kind not in "fiu":
         raise TypeError(f"{name}: expected an array of numbers, got {_kind(value, array)}")
-    _refuse_rounded(name, value, array)
     return _as_float64(name, array)
 
 
+def _is_integer(value: object) -> bool:
+    return isinstance(value, (int, np.integer)) and not isinstance(value, np.timedelta64)
+
+
 def _holds(number: float, value: Any) -> bool:
-    """Whether float64 holds this finite value exactly."""
+    """Whether this, which float() made of the value, is the same number. NaN is."""
     if isinstance(value, (int, np.integer)):
-        return int(number) == int(value)
-    return bool(type(value)(number) == value)  # a long double has more bits; the others fit
+        return math.isfinite(number) and int(number) == int(value)
+    with np.errstate(all="ignore"):  # a long double has more bits; the others fit
+        return bool(type(value)(number) == value or value != value)
 
 
 def _not_held(name: str, value: object) -> ValueError:
     return ValueError(f"{name}: float64 cannot hold {_shown(value)} exactly; round it first, as float() does")
 
 
-def _refuse_rounded(name: str, value: object, array: NDArray[Any]) -> None:
-    """Raises ValueError where a list held an integer that numpy has rounded for the sake of the floats beside it."""
-    if not isinstance(value, (list, tuple)) or array.dtype != np.float64 or not (np.abs(array) >= 2.0**53).any():
-        return
-    for number, given in zip(array.flat, np.asarray(value, object).flat, strict=True):
-        if isinstance(given, (int, np.integer)) and int(number) != int(given):
-            raise _not_held(name, given)
+def _beyond(name: str, value: object) -> ValueError:
+    return ValueError(f"{name}: must lie within float64, got {_shown(value)}")
 
 
 def _as_float64(name: str, array: NDArray[Any]) -> NDArray[np.float64]:
     """Of integers or floats of any size, C-contiguous. Raises ValueError where float64 cannot hold one exactly."""
-    numbers: NDArray[np.float64] = np.ascontiguousarray(array, np.float64)
-    if array.dtype.kind == "f":
-        rounded = np.isfinite(array) & (numbers.astype(array.dtype) != array)
-    else:
-        rounded = np.abs(numbers) >= 2.0**53  # the only ones that may be
+    if (native := array.dtype.newbyteorder("=")) in REALS:
+        return widened(array.astype(native, copy=False))
+    with np.errstate(all="ignore"):
+        numbers: NDArray[np.float64] = np.ascontiguousarray(array, np.float64).reshape(array.shape)
+        if array.dtype.kind == "f":
+            rounded = np.isfinite(array) & (numbers.astype(array.dtype) != array)
+        else:
+            rounded = np.abs(numbers) >= 2.0**53  # the only ones that may be
     for where in np.argwhere(rounded):
         if not _holds(float(numbers[tuple(where)]), array[tuple(where)]):
             raise _not_held(f"{name}[{', '.join(map(str, where))}]", array[tuple(where)])
@@ -215,7 +225,6 @@ def _names(argument: str, value: Iterable[str], choices: tuple[str, ...]) -> tup
 def vertices(name: str, value: object, shape: tuple[int, ...]) -> NDArray[Any]:
     """(V, 3), or of many worlds (W, V, 3), float32 or float64; C-contiguous arrays are taken without a copy."""
     array = _reals(name, _array(name, value), value)
-    _refuse_rounded(name, value, array)
     if array.shape != shape:
         raise ValueError(
             f"{name}: expected shape {shape}, {'for each world ' if len(shape) > 2 else ''}one row a vertex of the "
@@ -239,7 +248,6 @@ def usable(name: str, array: NDArray[Any]) -> None:
 def queries(value: object) -> NDArray[np.float64]:
     """(Q, 8, 3) float64: four points at t=0, then the same at t=1. The core says which is not finite."""
     array = _reals("queries", _array("queries", value), value)
-    _refuse_rounded("queries", value, array)
     if array.ndim != 3 or array.shape[1:] != (8, 3):
         expected = "(Q, 8, 3), four points at t=0 and the same at t=1"
         raise ValueError(f"queries: expected shape {expected}, got {array.shape}")
@@ -267,9 +275,9 @@ def _reals(name: str, array: NDArray[Any], value: object) -> NDArray[Any]:
 
 
 def _array(name: str, value: object) -> NDArray[Any]:
-    refuse_masked(name, value)
+    kinds = _kinds(name, value)
     try:
-        return np.asarray(value)
+        array = np.asarray(value)
     except ValueError as error:  # rows of different lengths
         raise ValueError(f"{name}: not a rectangular array ({error}); give every row the same length") from None
     except OverflowError as error:  # an integer among floats
@@ -277,23 +285,89 @@ def _array(name: str, value: object) -> NDArray[Any]:
     except MemoryError:
         raise
     except Exception as error:  # the object's own conversion: a PyTorch tensor that requires a gradient has none
-        kind = type(value).__name__
-        raise TypeError(f"{name}: {kind} does not turn into an array ({error}); give an array of numbers") from error
+        raise _no_array(name, value, error) from error
+    if kinds and array.dtype.kind in "fiu":
+        _keep(name, value, array, kinds)
+    return array
+
+
+def _no_array(name: str, value: object, error: Exception) -> TypeError:
+    kind = type(value).__name__
+    return TypeError(f"{name}: {kind} does not turn into an array ({error}); give an array of numbers")
 
 
 def refuse_masked(name: str, value: object) -> None:
     """A masked array with nothing masked is as good as any; of others the mask would be lost."""
-    if _holds_masked(value):
-        raise TypeError(
-            f"{name}: some of its elements are masked, and every one is needed; leave the masked ones out before, or "
-            "give an array in which they are filled in (numpy.ma.filled)"
-        )
+    _kinds(name, value)
 
 
-def _holds_masked(value: object) -> bool:
-    if isinstance(value, (list, tuple)):
-        return any(map(_holds_masked, value))
-    return isinstance(value, np.ma.MaskedArray) and bool(np.ma.is_masked(value))
+def _kinds(name: str, value: object) -> set[type]:
+    """The types of what nested lists hold, and of what the arrays in them hold; none where the value is an array."""
+    kinds: set[type] = set()
+    if type(value) is np.ndarray:
+        return kinds
+    level = [value]
+    for depth in range(DEEPEST):
+        found = set(map(type, level))  # level by level: a visit of each number by itself costs more than numpy does
+        nested = {kind for kind in found if _is_nested(kind)}
+        for array in (x for x in level if isinstance(x, np.ndarray)) if _some(found, np.ndarray) else ():
+            if isinstance(array, np.ma.MaskedArray) and np.ma.is_masked(array):
+                raise TypeError(
+                    f"{name}: some of its elements are masked, and every one is needed; leave the masked ones out "
+                    "before, or give an array in which they are filled in (numpy.ma.filled)"
+                )
+            kinds.add(array.dtype.type)
+        kinds.update(kind for kind in found - nested if not issubclass(kind, np.ndarray))
+        if not nested:
+            return kinds if depth else set()
+        lists: Any = level if nested == found else [x for x in level if type(x) in nested]
+        try:
+            level = list(chain.from_iterable(lists))
+        except MemoryError:
+            raise
+        except Exception as error:
+            raise _no_array(name, value, error) from error
+    raise ValueError(f"{name}: lists are nested more than {DEEPEST - 1} deep; give an array of numbers")
+
+
+def _is_nested(kind: type) -> bool:
+    """Whether numpy takes these for rows: sequences that are neither arrays nor hold bytes."""
+    if issubclass(kind, (list, tuple)):
+        return True
+    if issubclass(kind, (str, bytes, bytearray, memoryview, Mapping, np.generic)) or hasattr(kind, "__array__"):
+        return False
+    return hasattr(kind, "__len__") and hasattr(kind, "__getitem__")
+
+
+def _some(kinds: Iterable[type], *bases: type) -> bool:
+    return any(issubclass(kind, bases) for kind in kinds)
+
+
+def _keep(name: str, value: object, array: NDArray[Any], kinds: set[type]) -> None:
+    """Of nested lists: raises where numpy took a truth for a number, or rounded an integer for the sake of the floats
+    beside it; puts back the denormal float32 that it lost on the way to float64."""
+    if _some(kinds, bool, np.bool_):
+        raise TypeError(f"{name}: expected numbers, got True or False among them; write 1 or 0")
+    if array.dtype != np.float64:
+        return
+    if not all(issubclass(kind, (float, np.floating)) for kind in kinds):
+        with np.errstate(all="ignore"):
+            large = np.argwhere(np.abs(array) >= 2.0**53)
+        for where in large:
+            given = _at(value, where)
+            if _is_integer(given) and not _holds(float(array[tuple(where)]), given):
+                raise _not_held(name, given)
+    if not all(issubclass(kind, (float, int, np.float64, np.integer)) for kind in kinds):
+        for where in np.argwhere(array == 0):
+            if isinstance(given := _at(value, where), np.float32):
+                array[tuple(where)] = real(name, given)
+
+
+def _at(value: Any, where: Iterable[int]) -> Any:
+    """The element of nested lists and of the arrays in them."""
+    for place in where:
+        value = value[place] if _is_nested(type(value)) else np.asarray(value)[place]
+    return value if isinstance(value, (int, float, np.generic)) else np.asarray(value)[()]
 
 
 def _kind(value: object, array: NDArray[Any]) -> str:
@@ -307,4 +381,4 @@ def _shown(value: object) -> str:
     """As text that fits on a line; of a huge integer its size."""
     if isinstance(value, int) and abs(value) >= 10**20:
         return f"{'-' if value < 0 else ''}1e{(abs(value).bit_length() - 1) * 0.30103:.0f}"
-    return f"{value}"
+    return str(value)  # a format would turn long doubles into float64

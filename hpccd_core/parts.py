@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The answers about the parts of a step as one answer about the step."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -20,9 +20,11 @@ def contacts_of_step(answers: Sequence[tuple[Contacts, int, int]]) -> Contacts:
     """Each pair once, as the first of the answers tells it: (contacts, part, parts), about part number 0 to parts - 1
     of equal duration, or (contacts, 0, 1) about all of it. Times become those of the step. Order and hash as usual.
 
-    Raises TypeError: an answer is not (Contacts, integer, integer). Raises ValueError: a part that the step does not
-    have, answers of many worlds, or answers with and without the same outputs.
+    Raises TypeError: no list, or an answer is not (Contacts, integer, integer). Raises ValueError: a part that the step
+    does not have, answers of many worlds, or answers with and without the same outputs.
     """
+    if not isinstance(answers, Iterable):
+        raise TypeError(f"answers: expected a list of (contacts, part, parts), got {type(answers).__name__}")
     checked = [_checked(f"answers[{k}]", answer) for k, answer in enumerate(answers)]
     for name in ("points", "normals", "closest"):
         with_rows = [len(getattr(contacts, name)) > 0 for contacts, _, _ in checked if len(contacts)]

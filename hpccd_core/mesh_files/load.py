@@ -35,6 +35,8 @@ def load_mesh(path: str | os.PathLike[str]) -> tuple[NDArray[np.float64], NDArra
     MeshFileError
         There is no such file, it is cut off, damaged, or no mesh at all, it holds no triangles, or reading it needs a
         Python package that is missing. The message names the file, the problem and the remedy.
+    TypeError
+        path is neither a string nor an os.PathLike of one.
 
     Notes
     -----
@@ -48,6 +50,10 @@ def load_mesh(path: str | os.PathLike[str]) -> tuple[NDArray[np.float64], NDArra
 
     Loading a large OBJ, PLY or STL file does not hold the interpreter lock for long: other threads go on. The XML of a
     DAE file is parsed in one call, which takes 0.3 s for a million triangles.
+
+    Python and numpy turn text and float32 into float64 here, in the floating-point mode of the calling thread: where
+    another library has set flush-to-zero, denormals-are-zero or another rounding mode, coordinates may differ in the
+    last bit, and denormal ones become 0.
 
     Examples
     --------
@@ -76,13 +82,16 @@ def load_mesh(path: str | os.PathLike[str]) -> tuple[NDArray[np.float64], NDArra
 def existing(path: str | os.PathLike[str]) -> Path:
     """The file, whose name has one of the suffixes in FORMATS.
 
-    Raises MeshFileError: another suffix, or there is no such file.
+    Raises MeshFileError: another suffix, or there is no such file. Raises TypeError: no path.
     """
-    shown = shortened(os.fspath(path))
-    if (suffix := Path(path).suffix).lower() not in FORMATS:
+    name = os.fspath(path) if isinstance(path, os.PathLike) else path
+    if not isinstance(name, str):
+        raise TypeError(f'path: expected a string or os.PathLike, got {type(name).__name__}; write "mesh.obj"')
+    shown = shortened(name)
+    if (suffix := Path(name).suffix).lower() not in FORMATS:
         raise MeshFileError(f"{shown}: format {shortened(suffix) or '(none)'!r}; use one of {', '.join(FORMATS)}")
     try:
-        file = Path(path).expanduser()
+        file = Path(name).expanduser()
         if file.is_file():
             return file
     except RuntimeError as error:  # ~name, and there is no such user

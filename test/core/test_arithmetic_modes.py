@@ -3,6 +3,7 @@
 
 import contextlib
 import ctypes
+import dataclasses
 import platform
 import struct
 
@@ -81,3 +82,64 @@ def test_motions_of_two_dtypes(mode):
     detector = hc.Detector(scene, backend="cpu", outputs=("normals",))
     found, expected = same(lambda: detector.detect(start, end), MODES[mode])
     assert expected.vf.tolist() == [[0, 0]] and found == expected
+
+
+DENORMAL = np.float32(3e-45)
+FLAT = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], float)
+
+
+def two_triangles():
+    scene = hc.Scene()
+    scene.add_mesh("a", [[0, 1, 2]])
+    scene.add_mesh("b", [[0, 1, 2]])
+    return scene
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_lengths_of_another_type(mode):
+    """They become float64 before the core sees them."""
+    there = np.vstack([FLAT, FLAT + [0, 0, 2e-45]])
+
+    def answers():
+        of_options = hc.Detector(two_triangles(), minimum_separation=DENORMAL, backend="cpu")
+        of_scene = two_triangles()
+        of_scene.set_separation("a", "b", DENORMAL)
+        of_detector = [hc.Detector(two_triangles(), backend="cpu") for _ in range(3)]
+        of_detector[0].set_separation("a", "b", DENORMAL)
+        of_detector[1].set_separations(np.full((2, 2), DENORMAL))
+        of_detector[2].set_separations([[0.0, DENORMAL], [DENORMAL, 0.5]])
+        detectors = of_options, hc.Detector(of_scene, backend="cpu"), *of_detector
+        found = [len(d.detect(there, there)) for d in detectors] + [len(of_options.proximity(there, DENORMAL))]
+        query = [there[3] + [0.2, 0.2, 0], *FLAT]
+        return [*found, hc.test_vertex_face([query * 2], minimum_separation=DENORMAL)[0].tolist()]
+
+    found, expected = same(answers, MODES[mode])
+    assert all(expected) and found == expected
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_negative_lengths(mode):
+    def ask():
+        for d in (-5e-324, -DENORMAL):
+            with pytest.raises(ValueError, match="must be finite and not negative"):
+                hc.Detector(two_triangles(), minimum_separation=d)
+        hc.Detector(two_triangles(), minimum_separation=-0.0)
+
+    same(ask, MODES[mode])
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_equality(mode):
+    contacts = hc.Detector(two_triangles(), backend="cpu", outputs=("closest",)).detect(*[np.vstack([FLAT, FLAT])] * 2)
+    assert len(contacts)
+
+    def answers():
+        equal = []
+        for x, y in ((0.0, 5e-324), (0.0, -0.0), (np.nan, np.nan), (1.0, 2.0)):
+            pair = [dataclasses.replace(contacts, closest=np.full_like(contacts.closest, z)) for z in (x, y)]
+            times = [dataclasses.replace(contacts, first_toc=z) for z in (x, y)]
+            equal += [pair[0] == pair[1], times[0] == times[1]]
+        return equal
+
+    found, expected = same(answers, MODES[mode])
+    assert found == expected == [False, False, True, True, True, True, False, False]

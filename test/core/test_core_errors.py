@@ -1,10 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Each mistake gets an error that names the argument and says what to do; the detector goes on afterwards."""
 
+import sys
+from collections import UserList, deque
+
 import numpy as np
 import pytest
 
 import hpccd_core as hc
+from hpccd_core import arguments
+from hpccd_core.parts import contacts_of_step
 
 FACES = np.array([[0, 1, 2], [1, 3, 2]], np.uint32)
 VERTICES = np.random.default_rng(0).normal(size=(4, 3))
@@ -545,3 +550,103 @@ def test_joints_take_what_float64_holds():
     masked = np.ma.masked_array([1.0], [True])
     with pytest.raises(TypeError, match="^values: .*masked"):
         chain.poses(masked, turn, shift)
+
+
+def nested(depth):
+    rows = []
+    for _ in range(depth):
+        rows = [rows]
+    return rows
+
+
+def lists_that_hold_themselves():
+    one, two = [], []
+    one.append(one)
+    two.extend([two, two])
+    return one, two
+
+
+@pytest.mark.parametrize("bad", [nested(2000), *lists_that_hold_themselves()], ids=["deep", "itself", "twice"])
+def test_lists_without_an_end(scene, detector, bad):
+    for ask in (
+        lambda: detector.detect(bad, bad),
+        lambda: detector.set_separations(bad),
+        lambda: scene.add_mesh("x", bad),
+        lambda: hc.test_edge_edge(bad),
+    ):
+        with pytest.raises(ValueError, match="lists are nested more than 7 deep; give an array"):
+            ask()
+
+
+@pytest.mark.parametrize("scale", [1.0, 2.0**60])
+def test_the_numbers_of_a_list_are_not_visited_one_by_one(scale):
+    rows = (np.random.default_rng(0).normal(size=(1000, 3)) * scale).tolist()
+    calls = []
+    sys.setprofile(lambda frame, event, of: calls.append(event))
+    try:
+        arguments.reals("rows", rows)
+    finally:
+        sys.setprofile(None)
+    assert len(calls) < 300
+
+
+@pytest.mark.parametrize(
+    "row",
+    [
+        [np.array(2**60 - 1), 0.5, 0.0],
+        UserList([2**60 - 1, 0.5, 0.0]),
+        deque([0.5, 2**60 - 1, 0.0]),
+        np.array([0, 2**60 - 1, 0]),
+    ],
+    ids=["array", "UserList", "deque", "integers"],
+)
+def test_integers_in_other_sequences_are_not_rounded(detector, row):
+    for rows in ([[0.5] * 3, row] * 2, UserList([[0.5] * 3, row] * 2)):
+        with pytest.raises(ValueError, match="^vertices: float64 cannot hold 1152921504606846975 exactly"):
+            detector.step(rows)
+
+
+def test_masked_rows_of_other_sequences(detector):
+    with pytest.raises(TypeError, match="^vertices: .*masked"):
+        detector.step(UserList([np.ma.masked_array([1.0, 2.0, 3.0], [True, False, False])] * 4))
+
+
+@pytest.mark.parametrize("truth", [True, np.True_, np.array(False), np.array([True, True, False])])
+def test_truths_among_numbers(scene, detector, truth):
+    row = truth if np.ndim(truth) else [truth, 0, 2]
+    for ask in (
+        lambda: detector.step([row, [0.5] * 3, row, row]),
+        lambda: detector.set_separations([[row[0], 0.5]]),
+        lambda: scene.add_mesh("x", [row, [0, 1, 2]]),
+    ):
+        with pytest.raises(TypeError, match="expected numbers, got True or False among them"):
+            ask()
+
+
+def test_durations_are_no_lengths(scene):
+    with pytest.raises(TypeError, match="^minimum_separation: expected a number, got timedelta64"):
+        hc.Detector(scene, minimum_separation=np.timedelta64(1))
+    with pytest.raises(TypeError, match="static: expected True or False, got timedelta64"):
+        scene.add_mesh("x", FACES, static=np.timedelta64(1))
+
+
+@pytest.mark.skipif(np.finfo(np.longdouble).maxexp <= 1024, reason="long doubles are float64 here")
+@pytest.mark.filterwarnings("error")
+def test_long_doubles_beyond_float64(scene, detector):
+    with np.errstate(all="raise"):
+        for text in ("1e400", "1e-400", "0.1"):
+            long = np.longdouble(text)
+            beyond = "must lie within float64, got 1e\\+400" if text == "1e400" else "float64 cannot hold"
+            with pytest.raises(ValueError, match=f"^minimum_separation: {beyond}") as raised:
+                hc.Detector(scene, minimum_separation=long)
+            assert str(long) in str(raised.value)
+            with pytest.raises(ValueError, match=r"^of_pairs\[0, 0\]: float64 cannot hold") as raised:
+                detector.set_separations(np.array([[long]]))
+            assert str(long) in str(raised.value)
+        detector.set_separations(np.array([[np.longdouble(0.5)]]))
+
+
+@pytest.mark.parametrize("bad", [None, 3])
+def test_contacts_of_step_takes_a_list(bad):
+    with pytest.raises(TypeError, match=r"^answers: expected a list of \(contacts, part, parts\), got"):
+        contacts_of_step(bad)

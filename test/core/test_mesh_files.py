@@ -357,6 +357,12 @@ def test_paths_that_cannot_be(path, why):
     assert len(str(caught.value)) < 500
 
 
+@pytest.mark.parametrize("bad", [None, 3, b"mesh.obj", ["mesh.obj"]])
+def test_what_is_no_path(bad):
+    with pytest.raises(TypeError, match="^path: expected a string or os.PathLike, got"):
+        hc.load_mesh(bad)
+
+
 def test_without_earcut_it_says_what_to_install(load, monkeypatch):
     monkeypatch.setitem(sys.modules, "mapbox_earcut", None)
     assert len(load("m.obj", (variants._v() + variants._f(variants.MIXED)).encode())[1]) == 7, "convex ones need none"
