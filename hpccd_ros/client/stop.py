@@ -41,8 +41,9 @@ class StopListener:
     stop_timeout : float
         Seconds, at least those of the node's parameter; with less nothing is ever heard.
     publishers : int
-        How many must be alive on the topic. Of several, any that says true within ``stop_timeout`` makes it true; a
-        message does not tell whose it is.
+        How many must be alive on the topic. Set it to the number that there are: with fewer, one that was not heard yet
+        is not missed. Of those that were heard, any that says true within ``stop_timeout`` makes it true; a message
+        does not tell whose it is.
     on_change : callable, optional
         Called by the executor with this listener after ``stop`` changed: at messages and events at once, at a time-out
         when a timer looks, four times in each; not at all while the executor stands still.

@@ -243,7 +243,7 @@ class FrameAssembler:
         for name, state in self._meshes.items():
             if not state.static:
                 frame = match.frames[name]
-                place = frame.sent
+                place = frame.sent if frame.topology is state.topologies.current else OUTDATED
             elif (kept := state.positions.fitting(frame_id)) is not None:
                 frame = kept.frame
                 place = kept.newest.sent if kept.newest.received >= state.newest else OUTDATED

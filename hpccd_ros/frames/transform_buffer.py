@@ -74,6 +74,9 @@ class TransformBuffer:
     def __init__(self) -> None:
         self.heard: dict[str, int | str] = {}
         self._edges: dict[str, _Edge] = {}
+        # When the newest static transform was sent that was rejected: of each child, and of any.
+        self._rejected_of: dict[str, int] = {}
+        self._rejected_of_any = UNTOLD
         self._run = Run(self._edges.values)
 
     def add(self, parent: str, child: str, rigid: Rigid, stamp: int | None, sent: int = UNTOLD) -> int | None:
@@ -93,16 +96,20 @@ class TransformBuffer:
             raise ValueError(f"frame {child!r} is one too many: {MOST_FRAMES} are known already")
         if edge is None or edge.parent != parent:
             edge = self._edges[child] = _Edge(parent)
-        edge.outdated = False
         if stamp is None:
             edge.always = rigid
+            edge.outdated = UNTOLD < sent <= max(self._rejected_of.get(child, UNTOLD), self._rejected_of_any)
             return None
+        edge.outdated = False
         edge.always = None
         return self._run.add(stamp, [(edge, rigid)], sent)
 
-    def rejected(self, child: str | None, static: bool) -> bool:
+    def rejected(self, child: str | None, static: bool, sent: int = UNTOLD) -> bool:
         """A newer transform of ``child`` (None: of no known frame, so of any) was rejected: where it is, is not known
-        until a valid one comes. static: on a topic of static ones. Whether a known frame is concerned."""
+        until a valid one comes, and one that is static must have been sent later. static: on a topic of static ones.
+        Whether a known frame is concerned."""
+        if static:
+            self._keep_rejected(child, sent)
         if child is not None:
             edge = self._edges.get(child.removeprefix("/"))
             edges = [edge] if edge is not None else []
@@ -111,6 +118,14 @@ class TransformBuffer:
         for edge in edges:
             edge.outdated = True
         return bool(edges)
+
+    def _keep_rejected(self, child: str | None, sent: int) -> None:
+        """An older one may come later: nothing orders what several publishers send."""
+        name = child.removeprefix("/") if child is not None else ""
+        if child is None or (name not in self._rejected_of and len(self._rejected_of) >= MOST_FRAMES):
+            self._rejected_of_any = max(self._rejected_of_any, sent)
+        elif 0 < len(name) <= LONGEST_NAME:
+            self._rejected_of[name] = max(self._rejected_of.get(name, UNTOLD), sent)
 
     @property
     def begun(self) -> int:

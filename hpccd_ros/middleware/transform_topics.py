@@ -64,7 +64,7 @@ def fill(buffer: TransformBuffer, message: Any, topic: TransformTopic, sent: int
         except ValueError as error:
             names = f"{quoted(stamped.child_frame_id)} to {quoted(stamped.header.frame_id)}"
             text = f"transform from {names}: {error}"
-            in_use = buffer.rejected(stamped.child_frame_id, topic.static)
+            in_use = buffer.rejected(stamped.child_frame_id, topic.static, sent)
             aspect = Aspect.PLACE if in_use else Aspect.NOTHING
             refusals.append(Refusal(topic.name, Reason.MALFORMED, text, what=Input.TRANSFORM, aspect=aspect, sent=sent))
             continue

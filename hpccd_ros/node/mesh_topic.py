@@ -95,9 +95,16 @@ class MeshTopic:
         return f"more than {self.reception.settings['max_rate']:g} messages a second (parameter max_rate)"
 
     def refuse(self, reason: Reason, text: str, messages: int = 1) -> None:
-        """Of the message that was taken last, or of those that came after it and cannot be taken."""
+        """Of the message that was taken last, or of those before it."""
+        self._refuse(reason, text, messages, self.sent)
+
+    def refuse_unreadable(self) -> None:
+        """One that cannot be taken; when it was sent nobody knows."""
+        self._refuse(Reason.MALFORMED, f"{self.name}: {UNREADABLE}", 1, None)
+
+    def _refuse(self, reason: Reason, text: str, messages: int, sent: int | None) -> None:
         self.reception.accounts.refused(
-            Refusal(self.reception.mesh, reason, text, messages, what=self.what, aspect=self.aspect, sent=self.sent)
+            Refusal(self.reception.mesh, reason, text, messages, what=self.what, aspect=self.aspect, sent=sent)
         )
 
     @property

@@ -58,7 +58,8 @@ class PositionsSubscription(MeshTopic):
             return
         missing -= unreadable
         if unreadable:  # some of the same gap were, so that these are taken for unreadable too
-            self._count_unreadable(missing)
+            of.accounts.metrics.frame_received(of.mesh, None, missing)
+            self.refuse(Reason.MALFORMED, f"{self.name}: {UNREADABLE}", missing)
             return
         text = (
             f"{missing} messages did not reach the node: they came faster than it reads (parameter input_depth) or "
@@ -68,8 +69,5 @@ class PositionsSubscription(MeshTopic):
 
     def _on_unreadable(self) -> None:
         self._unreadable += 1
-        self._count_unreadable(1)
-
-    def _count_unreadable(self, messages: int) -> None:
-        self.reception.accounts.metrics.frame_received(self.reception.mesh, None, messages)
-        self.refuse(Reason.MALFORMED, f"{self.name}: {UNREADABLE}", messages)
+        self.reception.accounts.metrics.frame_received(self.reception.mesh, None, 1)
+        self.refuse_unreadable()

@@ -4,7 +4,7 @@ a valid one comes. No ROS."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 from hpccd_ros.detect.scene import SceneBuilder
 from hpccd_ros.frames.drops import Aspect, Input, Reason, Refusal
@@ -53,21 +53,34 @@ class WatchedScene:
             ),
         )
 
-    def concerned(self, refusal: Refusal) -> tuple[str, ...]:
-        """Meshes that are unknown after it."""
-        if refusal.reason in GAVE_WAY or refusal.aspect is Aspect.NOTHING:
-            return ()
-        if refusal.what is Input.TRANSFORM:
+    def concerned(self, what: Input | None, name: str) -> tuple[str, ...]:
+        """Meshes that are unknown after such an input of this mesh or topic was rejected; None: all that move."""
+        if what is None:
+            return tuple(mesh for mesh, moves in zip(self.meshes, self.moving, strict=True) if moves)
+        if what is Input.TRANSFORM:
             return self.by_transforms
-        if refusal.what is Input.JOINT_STATE:
-            return self.by_joints.get(refusal.mesh, ())
-        return (refusal.mesh,) if refusal.mesh in self.meshes else ()
+        if what is Input.JOINT_STATE:
+            return self.by_joints.get(name, ())
+        return (name,) if name in self.meshes else ()
+
+
+class Source(NamedTuple):
+    """What a doubt is about, in any scene: as of `WatchedScene.concerned`."""
+
+    what: Input | None
+    name: str
+    aspect: Aspect
+
+    @property
+    def of_mesh(self) -> bool:
+        """Of one mesh; else of a topic, or of all, which may concern a later scene though none of this."""
+        return self.what not in (None, Input.TRANSFORM, Input.JOINT_STATE)
 
 
 @dataclass(frozen=True)
 class Doubt:
     """``meshes`` are unknown until something of this ``aspect`` is in use, of each of them, that was sent after
-    ``sent``, ns."""
+    ``sent``, ns. Without meshes it waits for a scene that has some."""
 
     meshes: tuple[str, ...]
     aspect: Aspect
@@ -76,7 +89,14 @@ class Doubt:
 
     def settled(self, origins: Mapping[str, Origin]) -> bool:
         """Whether a frame of these origins has it."""
+        if not self.meshes:
+            return False
         return all(origins[mesh].of(self.aspect) > self.sent for mesh in self.meshes if mesh in origins)
+
+
+def leaves_unknown(refusal: Refusal) -> bool:
+    """Whether something newer than what is in use was rejected."""
+    return refusal.reason not in GAVE_WAY and refusal.aspect is not Aspect.NOTHING
 
 
 def text_of(refusal: Refusal) -> str:

@@ -12,13 +12,13 @@ machines may differ.
 import threading
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
 from hpccd_ros.base.clocks import CLOCK_ERROR, Clocks, ClockWatch
 from hpccd_ros.frames.drops import Aspect, Reason, Refusal
 from hpccd_ros.frames.types import ALWAYS, OUTDATED, UNTOLD, Origin
-from hpccd_ros.node.stop_doubts import Doubt, WatchedScene, text_of
+from hpccd_ros.node.stop_doubts import Doubt, Source, WatchedScene, leaves_unknown, text_of
 
 # Of the time-out: said so much earlier, a silence is heard of within it.
 IN_TIME = 0.95
@@ -73,7 +73,8 @@ class StopState:
         self._active = self._closed = False
         self._scene = WatchedScene()
         self._why: Why | None = Why(Cause.INACTIVE, "the node is not active")
-        self._doubts: dict[object, tuple[Cause, Doubt]] = {}
+        self._doubts: dict[tuple[Cause, Source], Doubt] = {}
+        self._heard: dict[str, int] = {}  # of each mesh: when the newest message was sent that came
         self._robots: Mapping[str, str] = {}
         self._in_use: Mapping[str, Origin] = {}
         self._outdated = ""  # mesh of which the last step that was clear had an old place
@@ -84,11 +85,14 @@ class StopState:
         self.rises: Counter[Cause] = Counter()
 
     def begin(self, scene: WatchedScene) -> None:
-        """Steps of this scene will be answered from now on. Doubts about its meshes stay."""
+        """Steps of this scene will be answered from now on. Doubts about what places its meshes stay."""
         with self._condition:
             self._scene = scene
-            known = set(scene.meshes)
-            self._doubts = {key: item for key, item in self._doubts.items() if known.issuperset(item[1].meshes)}
+            self._doubts = {
+                (cause, source): replace(doubt, meshes=meshes)
+                for (cause, source), doubt in self._doubts.items()
+                if (meshes := scene.concerned(source.what, source.name)) or not source.of_mesh
+            }
         self._tell(Cause.UNANSWERED, "no step was answered since the node was activated", active=True)
 
     def end(self, text: str = "the node is not active") -> None:
@@ -125,7 +129,7 @@ class StopState:
             for sent, mesh in moving:
                 self._ages.hear(f"a message of mesh {mesh}", 1e-9 * (sent - now), self._clocks.steady())
             if not self._ages.why(self._clocks.steady()):  # else nobody can say which of two messages is newer
-                self._doubts = {key: item for key, item in self._doubts.items() if not item[1].settled(by_name)}
+                self._doubts = {key: item for key, item in self._doubts.items() if not item.settled(by_name)}
         if near:
             self._tell(Cause.NEAR, f"meshes came within {distance:g} of each other on the last step, or touched")
             return
@@ -153,8 +157,9 @@ class StopState:
             self.failed("the detection of the last step failed")
             return
         with self._condition:
-            if meshes := self._scene.concerned(refusal):
-                self._doubt(Cause.REFUSED, meshes, refusal.aspect, refusal.sent, text_of(refusal))
+            if leaves_unknown(refusal):
+                source = Source(refusal.what, refusal.mesh, refusal.aspect)
+                self._doubt(Cause.REFUSED, source, refusal.sent, text_of(refusal))
 
     def failed(self, text: str) -> None:
         """A step was not answered: frames from before tell nothing of now."""
@@ -169,9 +174,11 @@ class StopState:
             self._robots = dict(doubts)
             self._rise(before)
 
-    def heard(self, what: str, info: Mapping[str, int]) -> None:
-        """A message of an input came; info: source_timestamp and received_timestamp, ns of the system clock."""
+    def heard(self, what: str, name: str, info: Mapping[str, int]) -> None:
+        """A message of an input came; name: of its mesh or topic; info: source_timestamp and received_timestamp, ns of
+        the system clock."""
         sent, received = info["source_timestamp"], info["received_timestamp"]
+        self._heard[name] = max(self._heard.get(name, 0), sent)
         ahead = 1e-9 * (sent - min(received or ALWAYS, self._clocks.system()))
         if ahead <= 0:
             return
@@ -216,18 +223,19 @@ class StopState:
         self._looked = steady
         # Where the clock was set back, frames from now on are newer than what was rejected before. Of what has no age
         # it cannot be told: there the doubt stays until the clock has caught up.
-        moving = {mesh for mesh, moves in zip(self._scene.meshes, self._scene.moving, strict=True) if moves}
-        for key, (cause, doubt) in self._doubts.items():
+        moving = set(self._scene.concerned(None, ""))
+        for key, doubt in self._doubts.items():
             if doubt.sent > system and doubt.aspect is Aspect.PLACE and moving.issuperset(doubt.meshes):
-                self._doubts[key] = cause, Doubt(doubt.meshes, doubt.aspect, system, doubt.text)
+                self._doubts[key] = replace(doubt, sent=system)
         self._rise(before)
         return steady, system
 
     def _now(self) -> Why | None:
         if self._why is not None:
             return self._why
-        for cause, doubt in self._doubts.values():
-            return Why(cause, doubt.text)
+        for (cause, _), doubt in self._doubts.items():
+            if doubt.meshes:
+                return Why(cause, doubt.text)
         if self._outdated:
             text = f"a newer message about where mesh {self._outdated} is was rejected, or is not in use yet"
             return Why(Cause.REFUSED, text)
@@ -247,18 +255,21 @@ class StopState:
         return Why(Cause.SILENT, f"the last frame that was found clear came with {of}, {since}")
 
     def _doubt_all(self, cause: Cause, text: str) -> None:
-        moving = tuple(mesh for mesh, moves in zip(self._scene.meshes, self._scene.moving, strict=True) if moves)
-        self._doubt(cause, moving, Aspect.PLACE, None, text)
+        self._doubt(cause, Source(None, "", Aspect.PLACE), None, text)
 
-    def _doubt(self, cause: Cause, meshes: tuple[str, ...], aspect: Aspect, sent: int | None, text: str) -> None:
-        """sent: when the message was; None: unknown."""
-        before, now, key = self._now(), self._clocks.system(), (cause, meshes, aspect)
-        # Newer than what is in use, whatever the clocks said then and now.
+    def _doubt(self, cause: Cause, source: Source, sent: int | None, text: str) -> None:
+        """sent: when the message was; None, UNTOLD: unknown."""
+        before, now, key = self._now(), self._clocks.system(), (cause, source)
+        meshes, aspect = self._scene.concerned(source.what, source.name), source.aspect
+        if not meshes and source.of_mesh:
+            return
+        # Newer than what is in use, or will be of what came, whatever the clocks said then and now.
         used = [origin.of(aspect) for mesh, origin in self._in_use.items() if mesh in meshes]
-        sent = max([now if sent is None else min(sent, now), *(one for one in used if one != ALWAYS)])
+        came = [one for mesh in meshes if (one := self._heard.get(mesh, 0)) > now]
+        sent = max([min(sent or now, now), *(one for one in used if one != ALWAYS), *came])
         if key in self._doubts:
-            sent = max(sent, self._doubts.pop(key)[1].sent)
-        self._doubts[key] = cause, Doubt(meshes, aspect, sent, text)
+            sent = max(sent, self._doubts.pop(key).sent)
+        self._doubts[key] = Doubt(meshes, aspect, sent, text)
         self._rise(before)
 
     def _tell(self, cause: Cause, text: str, *, active: bool | None = None) -> None:

@@ -92,7 +92,7 @@ class StopWatch:
 
     def heard(self, kind: str, name: str, info: Mapping[str, Any]) -> None:
         """A message of this kind; name: of its mesh or topic."""
-        self._state.heard(f"a message ({kind}) of {name}", info)
+        self._state.heard(f"a message ({kind}) of {name}", name, info)
 
     def robots(self, doubts: Mapping[str, str]) -> None:
         """Robots of which a newer description is not in use, and why."""

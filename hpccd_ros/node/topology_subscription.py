@@ -10,13 +10,13 @@ from hpccd_ros.frames.drops import Reason
 from hpccd_ros.middleware import mesh_inputs, qos, topic_names, unreadable
 from hpccd_ros.middleware.fields import InvalidMessageError
 from hpccd_ros.node.hand_over import hand_over
-from hpccd_ros.node.mesh_topic import UNREADABLE, MeshTopic, Reception
+from hpccd_ros.node.mesh_topic import MeshTopic, Reception
 
 
 class TopologySubscription(MeshTopic):
     def __init__(self, reception: Reception) -> None:
         super().__init__(reception, topic_names.TOPOLOGY)
-        unreadable.watch(self.subscribe(self.receive, qos.TOPOLOGY_INPUT), self._on_unreadable)
+        unreadable.watch(self.subscribe(self.receive, qos.TOPOLOGY_INPUT), self.refuse_unreadable)
 
     def receive(self, message: MeshTopology, info: dict[str, Any]) -> None:
         of = self.reception
@@ -35,6 +35,3 @@ class TopologySubscription(MeshTopic):
             return
         self.taken(info["source_timestamp"], new_publisher)
         hand_over(of.pipeline.push(of.mesh, topology, new_publisher), of.pipeline, of.accounts)
-
-    def _on_unreadable(self) -> None:
-        self.refuse(Reason.MALFORMED, f"{self.name}: {UNREADABLE}")

@@ -5,9 +5,11 @@ from typing import Any
 
 from rclpy.node import Node
 
+from hpccd_ros.base.clocks import Clocks
 from hpccd_ros.frames.drops import Input, Reason, Refusal
 from hpccd_ros.frames.pipeline import FramePipeline
 from hpccd_ros.frames.rate_limit import RateLimit
+from hpccd_ros.frames.sequence import SequenceWatch
 from hpccd_ros.middleware import qos, transform_topics, unreadable
 from hpccd_ros.middleware.message_types import message_class
 from hpccd_ros.middleware.transform_topics import TransformTopic
@@ -50,16 +52,39 @@ class TransformSubscriptions:
     def _subscribe(self, topic: TransformTopic) -> InputSubscription:
         limit = RateLimit(self._max_rate)
         name, heard = self._name(topic), self._pipeline.transforms.heard
+        numbers = SequenceWatch()
+        unreadable_since = 0  # the last that was read
+
+        def missing(number: int) -> int:
+            """Static transforms that were lost before this message, but those that are known to be unreadable."""
+            nonlocal unreadable_since
+            gap, known = numbers.next(number)[0], unreadable_since
+            unreadable_since = 0
+            # Numbers of several publishers interleave: their gaps mean nothing.
+            return gap - known if topic.static and gap > known and subscription.publishers <= 1 else 0
+
+        def on_unreadable() -> None:
+            nonlocal unreadable_since
+            unreadable_since += 1
+            self._unread(Refusal(topic.name, Reason.MALFORMED, f"{name}: {UNREADABLE}", what=Input.TRANSFORM), topic)
+
+        def matched(event: Any) -> None:
+            numbers.new_publisher()
 
         def receive(message: Any, info: dict[str, Any]) -> None:
             heard[name] += 1
             sent = info["source_timestamp"]
             self._accounts.on_heard("message", name, info)
+            lost = missing(info["publication_sequence_number"])
             if not limit.allows():
                 text = f"more than max_rate = {self._max_rate:g} messages a second; some are dropped"
                 self._unread(Refusal(topic.name, Reason.RATE, text, what=Input.TRANSFORM, sent=sent), topic)
                 return
             self._accounts.inputs.add(topic.name, sent)
+            if lost > 0:
+                text = f"{lost} messages on {name} were lost, or could not be deserialised; send them again"
+                refusal = Refusal(topic.name, Reason.MIDDLEWARE, text, lost, what=Input.TRANSFORM, sent=sent - 1)
+                self._unread(refusal, topic)
             for refusal in transform_topics.fill(self._pipeline.transforms, message, topic, sent):
                 self._accounts.refused(refusal)
             for outcome in self._pipeline.retry():
@@ -68,14 +93,16 @@ class TransformSubscriptions:
         profile = qos.TRANSFORMS_STATIC if topic.static else qos.TRANSFORMS
         message = message_class(topic.type_name)
         counts = self._accounts.connections
-        subscription = InputSubscription(self._node, message, topic.name, receive, profile, counts=counts)
-        refusal = Refusal(topic.name, Reason.MALFORMED, f"{name}: {UNREADABLE}", what=Input.TRANSFORM)
-        unreadable.watch(subscription.subscription, lambda: self._unread(refusal, topic))
+        subscription = InputSubscription(
+            self._node, message, topic.name, receive, profile, counts=counts, events={"matched": matched}
+        )
+        unreadable.watch(subscription.subscription, on_unreadable)
         return subscription
 
     def _unread(self, refusal: Refusal, topic: TransformTopic) -> None:
         """A message whose transforms are not known."""
-        self._pipeline.transforms.rejected(None, topic.static)
+        sent = refusal.sent or Clocks().system()
+        self._pipeline.transforms.rejected(None, topic.static, sent)
         self._accounts.refused(refusal)
 
     def _name(self, topic: TransformTopic) -> str:

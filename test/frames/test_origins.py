@@ -2,8 +2,10 @@
 """When the messages were sent from which a frame of the scene is known: the oldest of each mesh counts."""
 
 import numpy as np
+import pytest
 from pipelines import retried
 
+from hpccd_ros.frames import transform_buffer
 from hpccd_ros.frames.pipeline import FramePipeline
 from hpccd_ros.frames.types import (
     ALWAYS,
@@ -65,6 +67,36 @@ def test_transforms_count_and_static_ones_have_no_age():
     transforms.add("world", "tool", IDENTITY, None, sent=1030)
     assert places(made.push("cloth", MeshFrame(500, TRIANGLE, 0, frame_id="camera", sent=1040))) == [(1040, ALWAYS)]
     assert not retried(made).frames
+
+
+@pytest.mark.parametrize("child", ["camera", None])
+def test_an_older_static_transform_that_comes_after_a_rejected_one(child, monkeypatch):
+    """Nothing orders what two publishers send; whether the frame was known or not."""
+    monkeypatch.setattr(transform_buffer, "MOST_FRAMES", 2)
+    for known in (False, True):
+        made = pipeline(MeshSettings("cloth", transform="tf"))
+        if known:
+            made.transforms.add("world", "camera", IDENTITY, None, sent=1)
+        for other in ("a", "b")[: 0 if child is None else 2]:  # more than are kept
+            made.transforms.rejected(other, static=True, sent=1)
+        assert made.transforms.rejected(child, static=True, sent=100) == known
+        for stamp, sent in ((1, 99), (2, 100), (3, 101)):
+            made.transforms.add("world", "camera", IDENTITY, None, sent=sent)
+            outcome = made.push("cloth", MeshFrame(stamp, TRIANGLE, 0, frame_id="camera", sent=1000))
+            assert places(outcome) == [(1000 if sent > 100 else OUTDATED,)]
+
+
+def test_a_new_topology_that_is_not_in_use_yet():
+    """Of a mesh that moves, or moves by poses: its frames go on with the one before."""
+    made = pipeline(MeshSettings("cloth"), MeshSettings("tool", input=POSE))
+    made.push("tool", frame(0, 10))
+    made.push("tool", Topology(1, 3, FACES[:, ::-1], sent=20))
+    made.push("cloth", frame(1, 30))
+    assert places(made.push("tool", PoseFrame(1, IDENTITY, "world", sent=30))) == [(30, OUTDATED)]
+    made.push("tool", MeshFrame(0, TRIANGLE, 1, frame_id="world", sent=40))
+    made.push("cloth", Topology(1, 3, FACES[:, ::-1], sent=40))
+    made.push("cloth", frame(2, 50))
+    assert places(made.push("tool", PoseFrame(2, IDENTITY, "world", sent=50))) == [(OUTDATED, 50)]
 
 
 def test_a_static_mesh_whose_newest_message_is_not_in_use_is_outdated():

@@ -9,14 +9,17 @@ import time
 import numpy as np
 import pytest
 import stop_stream
+from geometry_msgs.msg import TransformStamped
 from hand_and_table import FACES, MESHES, TABLE, hand
+from hpccd.msg import MeshVertices
 from lifecycle_msgs.msg import Transition
 from node_calls import change_state, set_parameter
+from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from stop_stream import NEAR, SHORT, TIMEOUT
 
-from hpccd_ros.middleware import fields, qos
+from hpccd_ros.middleware import fields, mesh_messages, qos
 
 
 @pytest.fixture
@@ -153,6 +156,54 @@ def test_a_static_mesh_whose_new_place_is_refused_is_unknown(start_stream):
         stream.node.frames_status(answered=stream.sent + taken)
         hands()
         stream.expect(False)
+
+
+def test_messages_that_cannot_be_deserialised(start_stream):
+    """The first one since the node was activated, and one whose only trace is a gap before one of another frame."""
+    moved = {"transform": "tf", "frame": "mount"}
+    stream = start_stream(mesh={"table": {"static": True}, "hand": moved}, frame_id="world")
+    peer = stream.node.peer
+    static = peer.publisher(TransformStamped, "transforms_static", qos.TRANSFORMS_STATIC)
+
+    def mount(child):
+        message = TransformStamped(child_frame_id=child)
+        message.header.frame_id, message.transform.rotation.w = "world", 1.0
+        return message
+
+    def until(condition, what):
+        def sent():
+            stream.sent += 1
+            peer.vertices("hand", hand(2.0), stamp=stream.sent, frame_id="mount")
+            return condition()
+
+        stream.node.wait_until(sent, what)
+
+    def is_false():
+        return not stream.listener.stop
+
+    def is_refused(text):
+        _, message, values = peer.statuses.get("stop", (b"", "", {}))
+        return values.get("cause") == "refused" and text in message
+
+    static.publish(mount("mount"))
+    peer.vertices("table", TABLE, stamp=1, frame_id="world")
+    stream.topologies()
+    until(is_false, "false")
+    static.publish(serialize_message(mount("mount"))[:24])
+    static.publish(mount("other"))
+    until(lambda: is_refused("where mesh hand is was rejected"), "doubt of the transform")
+    static.publish(mount("mount"))
+    until(is_false, "false again")
+    assert change_state(stream.node, Transition.TRANSITION_DEACTIVATE)
+    assert change_state(stream.node, Transition.TRANSITION_ACTIVATE)
+    static.publish(mount("mount"))
+    until(is_false, "false after the node was activated again")
+    table = peer.publisher(MeshVertices, "meshes/table/vertices")
+    table.publish(serialize_message(mesh_messages.vertices_message(TABLE, 2))[:24])
+    until(lambda: is_refused("mesh table were refused: malformed"), "doubt of the table")
+    stated = stream.sent
+    until(lambda: stream.sent >= stated + 20, "frames of the hand")
+    assert is_refused("mesh table were refused: malformed") and stream.listener.stop
 
 
 SLIDER = """<robot name="arm"><link name="base"/><link name="tip"><collision><geometry><box size="0.1 0.1 0.1"/>

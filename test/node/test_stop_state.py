@@ -181,6 +181,50 @@ def test_doubts_outlive_a_scene_that_is_made_anew(state):
     assert cause(state) is None, "the link is no more in the scene"
 
 
+@pytest.mark.parametrize("links", [(), ("arm/tip",), ("arm/tip", "arm/more"), ("arm/other",)])
+def test_doubts_of_what_moves_a_robot_outlive_other_links(state, links):
+    """Whichever links a new description has, where their joints are is not known."""
+    robot = ("arm/base", "arm/tip")
+    state.begin(WatchedScene(("hand", *robot), (True,) * 3, {"joint_states": robot}))
+    sent = state.times.now
+    state.refused(Refusal("joint_states", Reason.NOT_FINITE, what=Input.JOINT_STATE, sent=sent))
+    state.times.pass_by(1)
+    for scene in ((), links):
+        state.begin(WatchedScene(("hand", *scene), (True,) * (1 + len(scene)), {"joint_states": scene}))
+        for _ in range(2):
+            state.answered(False, 0.25, [Origin(state.times.now), *[Origin(sent)] * len(scene)])
+            state.next(0.0)
+        assert cause(state) is (Cause.REFUSED if scene else None)
+    if links:
+        state.answered(False, 0.25, [Origin(state.times.now)] * (1 + len(links)))
+        assert cause(state) is None
+
+
+def test_what_came_before_settles_nothing(state):
+    """Neither one of which it is unknown when it was sent, nor where what came last was sent by a clock ahead and is
+    not in use yet."""
+    before = state.times.now
+    clear(state, table=before)
+    assert cause(state) is None
+    state.times.pass_by(1)
+    for unknown in (None, UNTOLD):
+        state.refused(Refusal("table", Reason.MALFORMED, sent=unknown))
+        clear(state, table=before)
+        assert cause(state) is Cause.REFUSED
+        clear(state, table=state.times.now + 1)
+        assert cause(state) is None
+        state.times.pass_by(1)
+    ahead = state.times.now + 5 * SECOND
+    state.heard("positions", "table", dict(source_timestamp=ahead, received_timestamp=0))
+    state.refused(Refusal("table", Reason.NOT_FINITE, sent=state.times.now))
+    for _ in range(30):
+        clear(state, table=ahead)
+        assert cause(state) in (Cause.REFUSED, Cause.CLOCKS)
+        state.times.pass_by(TIMEOUT / 10)
+    clear(state, table=state.times.now)
+    assert cause(state) is None
+
+
 def test_a_failure_is_settled_by_later_messages(state):
     clear(state)
     state.times.pass_by(1)
@@ -278,10 +322,13 @@ def test_a_clock_that_is_slewed_is_no_jump(state):
 
 def test_a_message_from_the_future(state):
     for tell in (
-        lambda ahead: state.heard("a pose", dict(source_timestamp=state.times.now + ahead, received_timestamp=0)),
+        lambda ahead: state.heard(
+            "a pose", "hand", dict(source_timestamp=state.times.now + ahead, received_timestamp=0)
+        ),
         # It waited until its time had come.
         lambda ahead: state.heard(
             "a pose",
+            "hand",
             dict(source_timestamp=state.times.now - SECOND, received_timestamp=state.times.now - SECOND - ahead),
         ),
         lambda ahead: clear(state, hand=state.times.now + ahead),
