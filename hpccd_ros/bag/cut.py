@@ -120,6 +120,7 @@ def cut(
             file.message(*stored)
             count += 1
         if not count:
+            last = max(stored.message.log_time for stored in recording.records())
             raise RecordingError(
                 f"{recording.path} has no message in this part; its messages are from 0 to {seconds(last - first)} s"
             )
@@ -155,7 +156,7 @@ def _limits(recording, first, begin, end, watch) -> tuple[int, int]:
                     "beginning need no stamp"
                 )
         start, stop = found[0] or start, found[1] or stop
-    if start >= stop:
+    if start > stop and begin is not None and end is not None:
         raise RecordingError(f"{recording.path}: the part would end before it begins; exchange --from and --to")
     return start, stop
 

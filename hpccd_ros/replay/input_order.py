@@ -199,7 +199,12 @@ class InputOrder:
                 continue
             before = answer.listed.before
             if not runs or before != taken:
-                session += bool(runs) and before < taken
+                if runs and not before:
+                    session += 1
+                elif runs and before < taken:
+                    # A node that begins anew lists from 0 on all that it takes. Either that answer was lost, or a list
+                    # is wrong; in no case did this one begin before the recording.
+                    answer.problem = answer.problem or "its list does not continue that of the answer before"
                 begun = before
                 runs.append([])
             answer.session, answer.begun, taken = session, begun, answer.listed.end

@@ -86,11 +86,11 @@ class _Session:
             return step
         self._settle(known)
         begins = not self.computed and 0 < known.listed.start <= known.begun
-        step.depends_on_before = not self.uncertain and (begins or not self.settled)
+        step.depends_on_before = self._is_first and not self.uncertain and (begins or not self.settled)
         step.uncertain = "it may depend on what came before the recording" * step.depends_on_before or self.uncertain
         for name, stamp, frame in (("start", known.start, start_frame), ("end", known.end, end_frame)):
             if frame is None:
-                joined_late = not self.computed and (known.begun > 0 or self.lacks_early)
+                joined_late = self._is_first and not self.computed and (known.begun > 0 or self.lacks_early)
                 step.before_recording = joined_late or step.depends_on_before
                 step.missing = f"what the node had taken makes no frame at its {name}, stamp {stamp} ns"
                 return step
@@ -100,17 +100,24 @@ class _Session:
         self.computed = True
         return step
 
+    @property
+    def _is_first(self) -> bool:
+        """Only what the first one took can have come before the recording."""
+        return self.number == 0
+
     def _lack(self, known: OrderedAnswer) -> str | None:
         if known.session != self.number:
-            self.__init__(self.history, known.session, known.begun)
+            self.__init__(self.history, known.session)
         if known.begun != self.begun:
             self.begun = known.begun
-            if self.computed:
+            if self.computed or not self._is_first:
                 self.uncertain = self.uncertain or "an answer before it is missing, and with it what the node had taken"
         if not known.missing:
             return None
         if known.early and not self.computed:
             self.lacks_early = True
+            if not self._is_first:
+                self.uncertain = self.uncertain or known.missing
             return None
         self.uncertain = self.uncertain or known.missing
         return known.missing

@@ -275,7 +275,11 @@ def test_the_command(whole, tmp_path, hpccd):
     assert hpccd("doctor", "part.mcap").returncode == 0
     again = hpccd("cut", whole, "--from", "1", "-o", "part.mcap")
     assert again.returncode == 2 and again.stderr == "hpccd cut: -o part.mcap: exists; recordings are not overwritten\n"
+    lasts = seconds(raw_messages(whole)[-1].log_time - BEGAN)
     for options, words in ((("--from", "99"), "has no message in this part; its messages are from 0 to "),
+                           (("--from", "9" * 23), "has no message in this part; its messages are from 0 to "),
+                           (("--to", "0"), f"in this part; its messages are from 0 to {lasts} s"),
+                           (("--from", "3", "--to", "3"), f"in this part; its messages are from 0 to {lasts}"),
                            (("--from", "3", "--to", "2"), "exchange --from and --to")):  # fmt: skip
         done = hpccd("cut", whole, *options, "-o", "none.mcap")
         assert done.returncode == 2 and words in done.stderr and done.stderr.count("\n") == 1

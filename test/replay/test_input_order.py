@@ -305,6 +305,57 @@ def test_an_answer_that_was_lost(recorded):
     assert replay.diverged == 0 and "an answer before it is missing" in steps[AT + 1].missing
 
 
+def _change_list(change):
+    def changed(message):
+        for name in ("input_topic", "input_sent", "input_flags"):
+            entries = list(getattr(message, name))
+            change(entries)
+            setattr(message, name, entries)
+
+    return changed
+
+
+def _before(value):
+    def changed(message):
+        message.inputs_before = value(message.inputs_before)
+
+    return changed
+
+
+def _begins_early(message):
+    """As if the node was configured just then, and heard what was sent before the recording."""
+    message.inputs_before, message.start_inputs, message.input_sent[0] = 0, 1, 1
+
+
+FORGED = {
+    "an entry twice": _change_list(lambda entries: entries.insert(0, entries[0])),
+    "an entry less": _change_list(lambda entries: entries.pop(0)),
+    "swapped": _change_list(lambda entries: entries.reverse()),
+    "one less before": _before(lambda before: before - 1),
+    "one more before": _before(lambda before: before + 1),
+    "nothing before": _before(lambda before: 0),
+    "begins early": _begins_early,
+}
+
+
+@pytest.mark.parametrize("forged", FORGED)
+@pytest.mark.parametrize("kind", ["shape", "base", "events"])
+def test_forged_lists_excuse_no_answer(tmp_path, kind, forged):
+    """Only what stands at the beginning of a recording can have begun before it."""
+    parameters, heard, taken = KINDS[kind]()
+    messages = run(tmp_path / "x.mcap", parameters, heard, list(taken))
+    answers = _answers(messages)
+    FORGED[forged](answers[AT].message)
+    for one in answers[AT:]:
+        one.message.hash ^= 12345
+        one.message.total += 7
+    replay, steps = _replay(tmp_path / "x.mcap", parameters, messages)
+    assert not any(step.before_recording for step in steps), [step.missing for step in steps]
+    assert replay.verified == AT and replay.diverged + replay.unverified == len(answers) - AT
+    if forged.startswith("one less"):
+        assert steps[AT].missing == "its list does not continue that of the answer before"
+
+
 def test_begun_in_the_middle(recorded):
     def change(answers, messages):
         first = answers[4].log_time - 5
