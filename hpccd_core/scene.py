@@ -103,13 +103,13 @@ class Scene:
 
     def vertex_offset(self, mesh: str | int) -> int:
         """The scene-wide index of the mesh's first vertex."""
-        return self._core.meshes[self._number("mesh", mesh)][1]
+        return self._core.first_vertex(self._number("mesh", mesh))
 
     def face_offset(self, mesh: str | int) -> int:
         """The scene-wide index of the mesh's first face."""
-        return self._core.meshes[self._number("mesh", mesh)][3]
+        return self._core.first_face(self._number("mesh", mesh))
 
     def __repr__(self) -> str:
-        n_edges = sum(mesh[6] for mesh in self._core.meshes)
+        n_edges = self._core.n_edges
         edges = f", {n_edges} edges beside" if n_edges else ""
         return f"Scene({', '.join(self._ids)}: {self.n_vertices} vertices, {self.n_faces} faces{edges})"

@@ -4,7 +4,7 @@ set(hpccd_sources
   src/base/forks.cpp src/base/machine_rate.cpp src/base/parallel.cpp src/base/simd.cpp
   src/base/standard_arithmetic.cpp src/base/thread_affinity.cpp
   src/rigid/c_library.cpp src/rigid/joint_bounds.cpp src/rigid/joint_chain.cpp src/rigid/placed_vertices.cpp
-  src/scene/edges.cpp src/scene/features.cpp src/scene/scene.cpp src/scene/separation_table.cpp
+  src/scene/edges.cpp src/scene/features.cpp src/scene/scene.cpp src/scene/separation_table.cpp src/scene/tested_pairs.cpp
   src/scene/static_meshes.cpp
   src/bvh/build.cpp src/bvh/motion_bounds.cpp src/bvh/refit.cpp src/bvh/split.cpp src/bvh/squeezed_axis.cpp
   src/elementary/batch.cpp src/elementary/distance/distance_batch.cpp src/elementary/exact/contact.cpp

@@ -253,13 +253,11 @@ PYBIND11_MODULE(_core, m) {
           "mesh_a"_a, "mesh_b"_a, "vertex_face"_a, "edge_edge"_a)
       .def_property_readonly("n_vertices", &Scene::n_vertices)
       .def_property_readonly("n_faces", [](const Scene& s) { return s.faces().size(); })
-      .def_property_readonly("meshes", [](const Scene& s) {
-        py::list l;
-        for (const auto& mesh : s.meshes())
-          l.append(py::make_tuple(mesh.name, mesh.first_vertex, mesh.n_vertices, mesh.first_face, mesh.n_faces,
-                                  mesh.first_edge, mesh.n_edges));
-        return l;
-      });
+      .def(
+          "first_vertex", [](const Scene& s, std::size_t mesh) { return s.meshes().at(mesh).first_vertex; }, "mesh"_a)
+      .def(
+          "first_face", [](const Scene& s, std::size_t mesh) { return s.meshes().at(mesh).first_face; }, "mesh"_a)
+      .def_property_readonly("n_edges", [](const Scene& s) { return s.edges().size(); });
 
   py::class_<GivenPositions>(m, "Positions")
       .def(py::init<const py::array&, GivenPositions::Stream>(), "array"_a, "made_on"_a = py::none(),

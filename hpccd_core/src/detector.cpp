@@ -356,7 +356,8 @@ void Detector::set_separation(std::uint32_t mesh_a, std::uint32_t mesh_b, double
                           " meshes; give the numbers that Scene::add_mesh() returned");
   check_length("separation", separation);
   const std::lock_guard lock(impl_->one_call);
-  impl_->common.separations.set(mesh_a, mesh_b, separation);
+  if (separation != impl_->common.separations.of(mesh_a, mesh_b))
+    impl_->common.separations.set(mesh_a, mesh_b, separation);
 }
 
 void Detector::set_separations(std::span<const double> of_pairs) {
@@ -397,7 +398,8 @@ std::map<std::string, std::uint64_t> Detector::stats() const {
   d.backends().count(d.asked, stats);
   stats.insert(d.found->begin(), d.found->end());
   stats["triangles"] = d.common.features.n_faces();
-  stats["bytes"] += d.engine->shared.tree.bytes() + d.common.features.bytes();
+  stats["bytes"] +=
+      d.engine->shared.tree.bytes() + d.common.features.bytes() + d.common.separations.bytes() + d.common.rules.bytes();
   if (d.options().worlds > 1) stats["worlds"] = d.options().worlds;
   return stats;
 }

@@ -7,6 +7,7 @@
 #include <map>
 #include <span>
 #include <string>
+#include <unordered_set>
 #include <utility>
 #include <vector>
 
@@ -34,6 +35,8 @@ struct MeshOptions {
   bool is_static = false;  ///< promised not to move; pairs of two static meshes are never tested
 };
 
+class ScenePairs;
+
 /// Meshes of triangles and of edges alone, with their topology. The vertices of all meshes are numbered one after the
 /// other, in the order added: so stand their positions in what a Detector is given, and so count the indices in its
 /// answers.
@@ -44,6 +47,8 @@ struct MeshOptions {
 /// Threads: calls that change a scene need it alone. One that no longer changes may serve any number of threads and
 /// detectors. A detector reads its scene when it is made and later: do not change it from then on.
 class HPCCD_API Scene {
+  friend class ScenePairs;  // of the library: what was set of single pairs
+
  public:
   /// Adds a mesh and returns its number.
   /// name: one that no other mesh has. faces: 3 indices a triangle into this mesh's own vertices, [0, n_vertices).
@@ -89,6 +94,7 @@ class HPCCD_API Scene {
   HPCCD_HIDDEN static Pair ordered(std::uint32_t a, std::uint32_t b) { return a < b ? Pair{a, b} : Pair{b, a}; }
   HPCCD_HIDDEN Pair known(std::uint32_t mesh_a, std::uint32_t mesh_b) const;
   std::vector<Mesh> meshes_;
+  std::unordered_set<std::string> names_;
   std::vector<std::array<std::uint32_t, 3>> faces_;
   std::vector<std::array<std::uint32_t, 2>> edges_;
   std::uint32_t n_vertices_ = 0;

@@ -47,6 +47,9 @@ void CpuBackend::see_motion(Positions t0, Positions t1, Tests tests) {
   search_.geometry.margin = {shared_.separations.most() + shared_.tree.motion().rounding,
                              shared_.tree.motion().map.scale};
   search_.block_pairs = block_pairs(o.simd);
+  search_.block_pairs_less_excess = block_pairs_less_excess(o.simd);
+  search_.leaf_pairs_less_excess = leaf_pairs_less_excess(o.simd);
+  search_.excess = Excess(shared_.tree.motion(), shared_.separations);
   search_.leaf_pairs = leaf_pairs(o.simd);
   search_.leaf_pairs_until = leaf_pairs_until(o.simd);
   search_.leaf_pairs_at_start = leaf_pairs_at_start(o.simd);
@@ -71,6 +74,7 @@ void CpuBackend::begin_query() {
   search_.geometry = {motion.vertices.data(), shared_.features.edges.data(), shared_.features.faces.data(),
                       motion.kdops.data()};
   search_.earliest = std::numeric_limits<double>::infinity();
+  search_.excess = {};
   search_.leaf_pairs = nullptr, search_.leaf_pairs_in_snapshot = nullptr, search_.leaf_edge_faces = nullptr;
   search_.nearest = nullptr;
   search_.time_only = search_.prunes = false;

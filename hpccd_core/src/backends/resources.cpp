@@ -27,15 +27,17 @@ Common::Common(std::shared_ptr<const Scene> of, const Options& wanted, int threa
 
 void Common::settle() {
   if (settled_ == separations.version()) return;
-  separations.settle();
   rules.change(separations);
+  separations.settle();
   settled_ = separations.version();
 }
 
 Separations Common::separations_now() const {
   if (separations.uniform()) return {separations.first()};
-  return {0, separations.all().data(), features.mesh_of_vertex.data(),
-          static_cast<std::uint32_t>(scene->meshes().size())};
+  const PairValues<double> pairs = separations.of_pairs();
+  Separations now{0, pairs.all, features.mesh_of_vertex.data(), pairs.n_meshes};
+  if (!pairs.all) now.of_pairs = pairs;
+  return now;
 }
 
 Resources::Resources(Common& all, ThreadPool& threads)

@@ -34,6 +34,8 @@ struct alignas(64) Node {
   std::uint32_t only_points : 1 = 0;  // no triangle and no edge in it, so nothing that another such node could touch
 
   bool overlaps(const Node& other) const;  // as MotionBox::overlaps
+  // By more than `excess` along each axis.
+  bool overlaps(const Node& other, float excess) const;
   // The same up to a time below 1, from the start on.
   bool overlap_until(const Node& other, float time) const;
   // At the start, no farther apart than `reach` along any axis.
@@ -49,6 +51,14 @@ static_assert(sizeof(Node) == 64);
 inline bool Node::overlaps(const Node& other) const {
   const auto below = [](const MotionBox& a, const MotionBox& b) {  // a before b at both ends, by axis
     return (load4(a.t0.high) < load4(b.t0.low)) & (load4(a.t1.high) < load4(b.t1.low));
+  };
+  return (bits4(below(box, other.box) | below(other.box, box)) & 7) == 0;
+}
+
+inline bool Node::overlaps(const Node& other, float excess) const {
+  const Floats4 by = {excess, excess, excess, excess};
+  const auto below = [&](const MotionBox& a, const MotionBox& b) {
+    return (load4(a.t0.high) - by < load4(b.t0.low)) & (load4(a.t1.high) - by < load4(b.t1.low));
   };
   return (bits4(below(box, other.box) | below(other.box, box)) & 7) == 0;
 }

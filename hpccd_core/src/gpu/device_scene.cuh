@@ -9,7 +9,9 @@
 #include "gpu/launch_params.cuh"
 #include "gpu/stream.h"
 #include "scene/features.h"
+#include "scene/scene_pairs.h"
 #include "scene/separation_table.h"
+#include "scene/tested_pairs.h"
 
 namespace hpccd::gpu {
 
@@ -56,7 +58,10 @@ class DeviceScene {
     any_separation_ = separations_.any();
     if (!separations_.any() || separations_.version() == uploaded_) return;
     uploaded_ = 0;  // none, should this fail
-    upload(pair_separation_, separations_.all().data(), separations_.all().size());
+    if (!separations_.uniform()) {
+      const std::vector<double> all = of_all_pairs<double>([&](u32 a, u32 b) { return separations_.of(a, b); });
+      upload(pair_separation_, all.data(), all.size());
+    }
     upload(largest_separation_, separations_.largest().data(), separations_.largest().size());
     uploaded_ = separations_.version();
   }
@@ -64,8 +69,8 @@ class DeviceScene {
   template <class T>
   void fill_separations(LaunchParams<T>& params) const {
     const bool any = query_now() == Query::separations;
-    params.separation = 0;
-    params.separations = any ? pair_separation_.data() : nullptr;
+    params.separation = any && separations_.uniform() ? separations_.first() : 0;
+    params.separations = any && !separations_.uniform() ? pair_separation_.data() : nullptr;
     params.largest_separation = any ? largest_separation_.data() : nullptr;
   }
   // Changes with all that fill_separations names.
@@ -78,21 +83,37 @@ class DeviceScene {
   }
 
  private:
+  // Devices look pairs up in a table of all of them, where they are not all the same.
+  template <class V, class OfPair>
+  std::vector<V> of_all_pairs(OfPair&& of_pair) const {
+    std::vector<V> all(std::size_t{n_meshes_} * n_meshes_);
+    for (u32 a = 0; a < n_meshes_; ++a)
+      for (u32 b = 0; b < n_meshes_; ++b) all[std::size_t{a} * n_meshes_ + b] = of_pair(a, b);
+    return all;
+  }
+  void upload_pairs(DeviceBuffer<unsigned char>& to, const std::vector<unsigned char>& all) {
+    upload(to, all.data(), all.size());
+  }
+
   void upload_rules(const Scene& scene, Accuracy accuracy) {
     default_accuracy_ = accuracy;
     n_meshes_ = static_cast<u32>(scene.meshes().size());
-    std::vector<unsigned char> enabled(std::size_t{n_meshes_} * n_meshes_), tiers(enabled.size());
-    for (u32 a = 0; a < n_meshes_; ++a)
-      for (u32 b = 0; b < n_meshes_; ++b) {
-        const std::size_t i = std::size_t{a} * n_meshes_ + b;
-        enabled[i] = scene.pair_enabled(a, b);
-        tiers[i] = static_cast<unsigned char>(scene.pair_accuracy(a, b, accuracy));
-        all_enabled_ = all_enabled_ && enabled[i];
-        one_accuracy_ = one_accuracy_ && tiers[i] == static_cast<unsigned char>(accuracy);
-        all_fast_ = all_fast_ && (!enabled[i] || tiers[i] == static_cast<unsigned char>(Accuracy::fast));
-      }
-    upload(enabled_, enabled.data(), enabled.size());
-    upload(accuracy_, tiers.data(), tiers.size());
+    const TestedPairs enabled(scene);
+    all_enabled_ = enabled.all();
+    std::size_t n_said = 0;
+    for (const auto& [pair, tier] : ScenePairs(scene).accuracy()) {
+      one_accuracy_ = one_accuracy_ && tier == accuracy;
+      if (!enabled.of(pair.first, pair.second)) continue;
+      all_fast_ = all_fast_ && tier == Accuracy::fast;
+      ++n_said;
+    }
+    if (n_said < enabled.n_pairs()) all_fast_ = all_fast_ && accuracy == Accuracy::fast;
+    if (!all_enabled_)
+      upload_pairs(enabled_, of_all_pairs<unsigned char>([&](u32 a, u32 b) { return enabled.of(a, b); }));
+    if (!one_accuracy_)
+      upload_pairs(accuracy_, of_all_pairs<unsigned char>([&](u32 a, u32 b) {
+                     return static_cast<unsigned char>(scene.pair_accuracy(a, b, accuracy));
+                   }));
   }
 
   void upload_tested(const Scene& scene, TestedFeatures otherwise) {
@@ -100,14 +121,11 @@ class DeviceScene {
       return static_cast<unsigned char>((f.vertex_face ? tests_vertex_face : 0) | (f.edge_edge ? tests_edge_edge : 0));
     };
     default_tested_ = bits(otherwise);
-    std::vector<unsigned char> tested(std::size_t{n_meshes_} * n_meshes_);
-    for (u32 a = 0; a < n_meshes_; ++a)
-      for (u32 b = 0; b < n_meshes_; ++b) {
-        const TestedFeatures f = scene.pair_features(a, b, otherwise);
-        tested[std::size_t{a} * n_meshes_ + b] = bits(f);
-        one_tested_ = one_tested_ && f == otherwise;
-      }
-    upload(tested_, tested.data(), tested.size());
+    for (const auto& [pair, features] : ScenePairs(scene).features())
+      one_tested_ = one_tested_ && features == otherwise;
+    if (!one_tested_)
+      upload_pairs(tested_, of_all_pairs<unsigned char>(
+                                [&](u32 a, u32 b) { return bits(scene.pair_features(a, b, otherwise)); }));
   }
 
   const Features& features_;

@@ -52,15 +52,14 @@ void append(std::vector<std::array<std::uint32_t, corners>>& all,
 
 std::uint32_t Scene::add_mesh(std::string name, std::span<const std::uint32_t> faces, std::uint32_t n_vertices,
                               MeshOptions options, std::span<const std::uint32_t> edges) {
-  for (const Mesh& m : meshes_)
-    if (m.name == name)
-      throw InvalidArgument("name: a mesh named '" + name + "' is already in the scene; choose another");
+  if (names_.contains(name))
+    throw InvalidArgument("name: a mesh named '" + name + "' is already in the scene; choose another");
   check_indices<3>("faces", "three vertex indices a triangle", faces, name, n_vertices);
   check_indices<2>("edges", "two vertex indices an edge", edges, name, n_vertices);
   // One index is kept free as "none".
   if (std::uint64_t{n_vertices_} + n_vertices >= 0xFFFFFFFFu)
     throw InvalidArgument("n_vertices: the scene would have more than 2^32 - 2 vertices; divide it");
-  Mesh mesh{std::move(name),
+  Mesh mesh{name,
             options,
             n_vertices_,
             n_vertices,
@@ -70,8 +69,10 @@ std::uint32_t Scene::add_mesh(std::string name, std::span<const std::uint32_t> f
             static_cast<std::uint32_t>(edges.size() / 2)};
   auto more_faces = with_room(faces_, mesh.n_faces);
   auto more_edges = with_room(edges_, mesh.n_edges);
-  meshes_.push_back(std::move(mesh));
+  if (meshes_.size() == meshes_.capacity()) meshes_.reserve(std::max<std::size_t>(4, 2 * meshes_.size()));
+  names_.insert(std::move(name));
   // From here on nothing throws: a mesh is there in full or not at all.
+  meshes_.push_back(std::move(mesh));
   append(faces_, more_faces, faces, n_vertices_);
   append(edges_, more_edges, edges, n_vertices_);
   n_vertices_ += n_vertices;

@@ -2,38 +2,65 @@
 // The minimum separation of each pair of meshes, as it is now.
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <map>
 #include <vector>
 
 #include "hpccd/hpccd.h"
+#include "scene/pair_table.h"
+#include "scene/tested_pairs.h"
 
 namespace hpccd {
 
+// What it says of all pairs is of those that are tested: the others grow no boxes.
 class SeparationTable {
  public:
   SeparationTable(const Scene& scene, double otherwise);
 
-  double of(std::uint32_t mesh_a, std::uint32_t mesh_b) const { return of_[mesh_a * n_ + mesh_b]; }
+  double of(std::uint32_t mesh_a, std::uint32_t mesh_b) const { return of_.of(mesh_a, mesh_b); }
+  // Of pairs of which nothing was said.
+  double otherwise() const { return of_.otherwise(); }
   // Many may follow each other: what says something of all pairs is as it was until settle().
   void set(std::uint32_t mesh_a, std::uint32_t mesh_b, double separation);
   void settle();
-  // Of no two states of one table the same.
+  // No two states in which a tested pair differs have the same.
   std::uint64_t version() const { return version_; }
+  // Tested pairs that were set since the last settle().
+  const std::vector<std::array<std::uint32_t, 2>>& changed() const { return changed_; }
 
-  bool any() const { return any_; }
+  bool any() const { return most_ > 0; }
   bool uniform() const { return uniform_; }
-  double first() const { return of_.empty() ? 0 : of_[0]; }
+  double first() const { return first_; }
   double most() const { return most_; }
-  const std::vector<double>& all() const { return of_; }  // n_meshes^2
+  // f(mesh_a, mesh_b, separation), mesh_a <= mesh_b, for all pairs that differ from otherwise(), and maybe others.
+  template <class Function>
+  void for_pairs(Function&& f) const {
+    for (std::uint32_t a = 0; a < largest_.size(); ++a)
+      of_.for_pairs_of(a, [&](std::uint32_t b, double d) {
+        if (a <= b) f(a, b, d);
+      });
+  }
+  PairValues<double> of_pairs() const { return of_.view(); }
   // By mesh: the largest of its pairs. Empty where no pair has a separation.
-  const std::vector<double>& largest() const { return largest_; }
+  const std::vector<double>& largest() const { return any() ? largest_ : none_; }
+  std::size_t bytes() const {
+    return of_.bytes() + tested_.bytes() + largest_.capacity() * sizeof(double) +
+           changed_.capacity() * sizeof(changed_[0]);
+  }
 
  private:
-  std::size_t n_;
+  double largest_of(std::uint32_t mesh) const;
+  void look_at_all();
+
+  TestedPairs tested_;
+  PairTable<double> of_;
+  std::map<double, std::size_t> n_with_value_;  // tested pairs
+  std::vector<std::array<std::uint32_t, 2>> changed_;
+  std::vector<double> largest_, none_;
   std::uint64_t version_ = 1;
-  std::vector<double> of_, largest_;
-  double most_ = 0;
-  bool any_ = false, uniform_ = true;
+  double most_ = 0, first_ = 0;
+  bool uniform_ = true;
 };
 
 }  // namespace hpccd

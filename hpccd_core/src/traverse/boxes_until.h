@@ -32,4 +32,13 @@ struct BoxesUntil {
   void sort(std::vector<NodePair>&, std::size_t) const {}
 };
 
+// The same where boxes of some pairs of meshes have grown by more than they ask for.
+struct BoxesUntilLessExcess : BoxesUntil {
+  bool overlap(const Node& a, const Node& b) const {
+    const float excess = search.excess.of(a, b);
+    if (part.until < 1 && part.reach >= 0) return a.near_at_start(b, part.reach - excess);
+    return a.overlaps(b, excess) && (part.until >= 1 || a.overlap_until(b, part.until));
+  }
+};
+
 }  // namespace hpccd

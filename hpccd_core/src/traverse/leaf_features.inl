@@ -76,6 +76,18 @@ struct Until {
   }
 };
 
+// Through the whole motion, where boxes of two meshes have grown by more than they ask for (traverse/excess.h): those
+// of the corners shrink again.
+struct LessExcess : BothEnds {
+  static constexpr bool grows = true;
+  static constexpr bool only_grown = true;  // where none has there is no excess
+  float excess;
+  HPCCD_HD void grow(Corners& c) const {
+    for (std::uint32_t row = 0; row < Tree::coordinates; ++row)
+      c.low[row] = c.low[row] + all_lanes(excess), c.high[row] = c.high[row] + all_lanes(-excess);
+  }
+};
+
 // At the start, where boxes may also be as far apart as `reach` (Node::near_at_start).
 struct AtStart {
   static constexpr bool grows = true;
@@ -342,5 +354,8 @@ HPCCD_HD void with_kernels(const Tree& tree, const LeafFeatures& a, const LeafFe
     else
       b.many ? f(One(), Many()) : f(One(), One());
   };
-  tree.grown ? with(std::true_type()) : with(std::false_type());
+  if constexpr (requires { When::only_grown; })
+    with(std::true_type());
+  else
+    tree.grown ? with(std::true_type()) : with(std::false_type());
 }

@@ -11,6 +11,9 @@ HPCCD_IN_EACH_SET(std::uint32_t block_pairs(const Tree&, const Block&, const Blo
                                   CandidateBuffer&);
                   void leaf_pairs_until(const Tree&, const LeafRange&, const LeafRange&, TestedFeatures, float,
                                         CandidateBuffer&, CandidateBuffer&);
+                  std::uint32_t block_pairs_less_excess(const Tree&, const Block&, const Block&, float, LeafPair*);
+                  void leaf_pairs_less_excess(const Tree&, const LeafRange&, const LeafRange&, TestedFeatures, float,
+                                              CandidateBuffer&, CandidateBuffer&);
                   void leaf_pairs_at_start(const Tree&, const LeafRange&, const LeafRange&, TestedFeatures, float,
                                            CandidateBuffer&, CandidateBuffer&);
                   void leaf_pairs_in_snapshot(const Tree&, const LeafRange&, const LeafRange&, TestedFeatures, float,
@@ -21,6 +24,10 @@ BlockPairs block_pairs(Simd simd) { return HPCCD_OF_SET(simd, block_pairs); }
 LeafPairs leaf_pairs(Simd simd) { return HPCCD_OF_SET(simd, leaf_pairs); }
 
 LeafPairsUntil leaf_pairs_until(Simd simd) { return HPCCD_OF_SET(simd, leaf_pairs_until); }
+
+BlockPairsLessExcess block_pairs_less_excess(Simd simd) { return HPCCD_OF_SET(simd, block_pairs_less_excess); }
+
+LeafPairsLessExcess leaf_pairs_less_excess(Simd simd) { return HPCCD_OF_SET(simd, leaf_pairs_less_excess); }
 
 LeafPairsInSnapshot leaf_pairs_at_start(Simd simd) { return HPCCD_OF_SET(simd, leaf_pairs_at_start); }
 

@@ -41,6 +41,15 @@ using LeafPairsUntil = void (*)(const Tree& tree, const LeafRange& a, const Leaf
 
 LeafPairsUntil leaf_pairs_until(Simd simd);
 
+// The same of two meshes whose boxes have grown by more than they ask for (traverse/excess.h).
+using BlockPairsLessExcess = std::uint32_t (*)(const Tree& tree, const Block& a, const Block& b, float excess,
+                                               LeafPair* pairs);
+using LeafPairsLessExcess = void (*)(const Tree& tree, const LeafRange& a, const LeafRange& b, TestedFeatures tested,
+                                     float excess, CandidateBuffer& edge_edge, CandidateBuffer& vertex_face);
+
+BlockPairsLessExcess block_pairs_less_excess(Simd simd);
+LeafPairsLessExcess leaf_pairs_less_excess(Simd simd);
+
 // The same of one snapshot: features whose boxes at t = 0 are no farther apart than `reach` along any axis.
 using LeafPairsInSnapshot = void (*)(const Tree& tree, const LeafRange& a, const LeafRange& b, TestedFeatures tested,
                                      float reach, CandidateBuffer& edge_edge, CandidateBuffer& vertex_face);

@@ -133,23 +133,23 @@ HPCCD_HD void pairs_of_leaves(When when, const Tree& tree, const LeafRange& a, c
   });
 }
 
-}  // namespace
-
-std::uint32_t block_pairs(const Tree& tree, const Block& a, const Block& b, LeafPair* pairs) {
+// less(bounds): a box that counts in place of another.
+template <class Less>
+HPCCD_HD std::uint32_t pairs_of_blocks(Less&& less, const Tree& tree, const Block& a, const Block& b, LeafPair* pairs) {
   const Node* nodes = tree.nodes.data();
   const Kdop* kdops = tree.by_kdops ? tree.kdops.data() : nullptr;
   const bool same = &a == &b;
   const BoxLanes boxes_b(b.rows);
   unsigned near_a = first_bits(a.n_leaves), near_b = first_bits(b.n_leaves);
   if (!same) {
-    near_a &= BoxLanes(a.rows).overlapping(bounds_of(nodes[b.node]));
-    near_b &= boxes_b.overlapping(bounds_of(nodes[a.node]));
+    near_a &= BoxLanes(a.rows).overlapping(less(bounds_of(nodes[b.node])));
+    near_b &= boxes_b.overlapping(less(bounds_of(nodes[a.node])));
   }
   std::uint32_t n = 0;
   for (unsigned left = near_a; left; left &= left - 1) {
     const auto i = static_cast<std::uint32_t>(__builtin_ctz(left));
     const std::uint32_t number = a.first_leaf + i;
-    unsigned m = boxes_b.overlapping(Bounds<Block::width>{a.rows[0] + i}) & near_b;
+    unsigned m = boxes_b.overlapping(less(Bounds<Block::width>{a.rows[0] + i})) & near_b;
     if (same) m &= ~0u << i;
     for (; m; m &= m - 1) {
       const std::uint32_t other = b.first_leaf + static_cast<std::uint32_t>(__builtin_ctz(m));
@@ -160,9 +160,30 @@ std::uint32_t block_pairs(const Tree& tree, const Block& a, const Block& b, Leaf
   return n;
 }
 
+}  // namespace
+
+std::uint32_t block_pairs(const Tree& tree, const Block& a, const Block& b, LeafPair* pairs) {
+  return pairs_of_blocks([](const auto& bounds) { return bounds; }, tree, a, b, pairs);
+}
+
+std::uint32_t block_pairs_less_excess(const Tree& tree, const Block& a, const Block& b, float excess, LeafPair* pairs) {
+  const auto less = [&](const auto& bounds) {
+    FeatureBox box;
+    for (std::uint32_t i = 0; i < n_bounds; ++i)
+      box.at[i] = side_of_bound(i) == Side::low ? bounds[i] + excess : bounds[i] - excess;
+    return box;
+  };
+  return pairs_of_blocks(less, tree, a, b, pairs);
+}
+
 void leaf_pairs(const Tree& tree, const LeafRange& a, const LeafRange& b, TestedFeatures tested,
                 CandidateBuffer& edge_edge, CandidateBuffer& vertex_face) {
   pairs_of_leaves(BothEnds(), tree, a, b, tested, edge_edge, vertex_face);
+}
+
+void leaf_pairs_less_excess(const Tree& tree, const LeafRange& a, const LeafRange& b, TestedFeatures tested,
+                            float excess, CandidateBuffer& edge_edge, CandidateBuffer& vertex_face) {
+  pairs_of_leaves(LessExcess{{}, excess}, tree, a, b, tested, edge_edge, vertex_face);
 }
 
 void leaf_pairs_until(const Tree& tree, const LeafRange& a, const LeafRange& b, TestedFeatures tested, float until,

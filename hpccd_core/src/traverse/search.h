@@ -30,6 +30,10 @@ struct PartOfMotion {
 struct Search {
   Geometry geometry;
   BlockPairs block_pairs = nullptr;
+  // Of two meshes whose boxes have grown by more than they ask for: how much, and which pairs are left then.
+  Excess excess;
+  BlockPairsLessExcess block_pairs_less_excess = nullptr;
+  LeafPairsLessExcess leaf_pairs_less_excess = nullptr;
   // Which pairs of features of two leaves; null: none.
   LeafPairs leaf_pairs = nullptr;
   // Of a part of the motion, where the earliest contacts are looked for; also by boxes at the start alone.

@@ -12,36 +12,53 @@ bool tells_times(Rule rule) {
 }  // namespace
 
 PairRules::PairRules(const Scene& scene, Accuracy accuracy, const SeparationTable& separations, TestedFeatures features)
-    : n_(scene.meshes().size()) {
-  enabled_.resize(n_ * n_);
-  accuracy_.resize(n_ * n_);
-  features_.resize(n_ * n_);
-  for (std::uint32_t a = 0; a < n_; ++a)
-    for (std::uint32_t b = 0; b < n_; ++b) {
-      enabled_[a * n_ + b] = scene.pair_enabled(a, b);
-      accuracy_[a * n_ + b] = scene.pair_accuracy(a, b, accuracy);
-      features_[a * n_ + b] = scene.pair_features(a, b, features);
-      all_enabled_ = all_enabled_ && enabled_[a * n_ + b];
+    : tested_(scene), rules_(scene.meshes().size(), {accuracy, separations.otherwise() > 0, features}) {
+  if (tested_.n_pairs() > 0) n_with_rule_[rules_.otherwise()] = tested_.n_pairs();
+  const ScenePairs said(scene);
+  const auto set_all = [&](const auto& pairs, auto&& change) {
+    for (const auto& [pair, value] : pairs) {
+      Rule rule = rules_.of(pair.first, pair.second);
+      change(rule, pair, value);
+      set(pair.first, pair.second, rule);
     }
-  change(separations);
+  };
+  set_all(said.accuracy(), [](Rule& rule, const auto&, Accuracy value) { rule.accuracy = value; });
+  set_all(said.features(), [](Rule& rule, const auto&, TestedFeatures value) { rule.features = value; });
+  separations.for_pairs([&](std::uint32_t a, std::uint32_t b, double separation) { separate(a, b, separation); });
+  look_at_all();
+}
+
+void PairRules::set(std::uint32_t a, std::uint32_t b, Rule rule) {
+  const Rule before = rules_.of(a, b);
+  if (rule == before) return;
+  if (!tested_.of(a, b)) return rules_.set(a, b, rule);
+  std::size_t& n = n_with_rule_[rule];  // may find no memory, as the next line: nothing is counted before
+  rules_.set(a, b, rule);
+  ++n;
+  const auto as_before = n_with_rule_.find(before);
+  if (--as_before->second == 0) n_with_rule_.erase(as_before);
 }
 
 void PairRules::change(const SeparationTable& separations) {
-  rules_.resize(n_ * n_);
-  bool all_default = true;
+  for (const auto& [a, b] : separations.changed()) separate(a, b, separations.of(a, b));
+  look_at_all();
+}
+
+void PairRules::separate(std::uint32_t a, std::uint32_t b, double separation) {
+  Rule rule = rules_.of(a, b);
+  rule.separated = separation > 0;
+  set(a, b, rule);
+}
+
+void PairRules::look_at_all() {
   promise_times_ = true, any_fast_ = false;
-  for (std::uint32_t a = 0; a < n_; ++a)
-    for (std::uint32_t b = 0; b < n_; ++b) {
-      const std::size_t i = a * n_ + b;
-      rules_[i] = {accuracy_[i], separations.of(a, b) > 0, features_[i]};
-      if (enabled(a, b)) {
-        promise_times_ = promise_times_ && tells_times(rules_[i]);
-        any_fast_ = any_fast_ || (rules_[i].accuracy == Accuracy::fast && !rules_[i].separated);
-      }
-      all_default = all_default && rules_[i] == rules_[0];
-    }
-  if (!rules_.empty()) default_ = rules_[0];
-  if (all_default) rules_.clear();
+  std::erase_if(n_with_rule_, [](const auto& entry) { return entry.second == 0; });
+  for (const auto& [rule, n] : n_with_rule_) {
+    promise_times_ = promise_times_ && tells_times(rule);
+    any_fast_ = any_fast_ || (rule.accuracy == Accuracy::fast && !rule.separated);
+  }
+  one_rule_.reset();
+  if (n_with_rule_.size() == 1) one_rule_ = n_with_rule_.begin()->first;
 }
 
 }  // namespace hpccd

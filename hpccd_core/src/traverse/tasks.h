@@ -3,11 +3,14 @@
 // keep every thread busy. The list depends on the tree only, never on the number of threads.
 #pragma once
 
+#include <map>
+#include <optional>
 #include <vector>
 
 #include "bvh/tree.h"
 #include "hpccd/hpccd.h"
 #include "scene/separation_table.h"
+#include "traverse/excess.h"
 
 namespace hpccd {
 
@@ -25,6 +28,10 @@ struct Rule {
   unsigned number() const { return static_cast<unsigned>(accuracy) + (separated ? 4 : 0); }
   static Rule of_number(unsigned i) { return {static_cast<Accuracy>(i % 4), i >= 4}; }
   bool operator==(const Rule&) const = default;
+  bool operator<(const Rule& other) const { return key() < other.key(); }
+
+ private:
+  unsigned key() const { return number() + (features.vertex_face ? 8 : 0) + (features.edge_edge ? 16 : 0); }
 };
 inline constexpr unsigned n_rules = 8;
 
@@ -32,32 +39,37 @@ inline constexpr unsigned n_rules = 8;
 class PairRules {
  public:
   PairRules(const Scene& scene, Accuracy accuracy, const SeparationTable& separations, TestedFeatures features = {});
+  // By what was set since the table settled last.
   void change(const SeparationTable& separations);
   // Meshes by number, or mixed_meshes: then some of their pairs may be enabled.
   bool enabled(std::uint32_t mesh_a, std::uint32_t mesh_b) const {
-    if (all_enabled_ || mesh_a == mixed_meshes || mesh_b == mixed_meshes) return true;
-    return enabled_[mesh_a * n_ + mesh_b];
+    if (tested_.all() || mesh_a == mixed_meshes || mesh_b == mixed_meshes) return true;
+    return tested_.of(mesh_a, mesh_b);
   }
   bool enabled(const Node& a, const Node& b) const {
     return enabled(a.mesh, b.mesh) && !(a.only_points && b.only_points);
   }
+  // Of an enabled pair.
   Rule rule(std::uint32_t mesh_a, std::uint32_t mesh_b) const {
-    return rules_.empty() ? default_ : rules_[mesh_a * n_ + mesh_b];
+    return one_rule_ ? *one_rule_ : rules_.of(mesh_a, mesh_b);
   }
   // Whether every pair that touches has a time of contact, to 1e-12, so that one that cannot touch until then has none.
   bool promise_times() const { return promise_times_; }
   // Whether a pair is tested for which backends answer differently: "fast", without a separation.
   bool any_fast() const { return any_fast_; }
   Rule rule(const Node& a, const Node& b) const { return rule(a.mesh, b.mesh); }
+  std::size_t bytes() const { return tested_.bytes() + rules_.bytes(); }
 
  private:
-  std::size_t n_;
-  bool all_enabled_ = true, promise_times_ = true, any_fast_ = false;
-  std::vector<char> enabled_;
-  std::vector<Accuracy> accuracy_;
-  std::vector<TestedFeatures> features_;
-  Rule default_{};
-  std::vector<Rule> rules_;  // empty where all are the default
+  void set(std::uint32_t mesh_a, std::uint32_t mesh_b, Rule rule);
+  void separate(std::uint32_t mesh_a, std::uint32_t mesh_b, double separation);
+  void look_at_all();
+
+  TestedPairs tested_;
+  PairTable<Rule> rules_;
+  std::map<Rule, std::size_t> n_with_rule_;  // enabled pairs
+  std::optional<Rule> one_rule_;             // of all of them
+  bool promise_times_ = true, any_fast_ = false;
 };
 
 // Where a walk over the tree ends.
@@ -104,8 +116,20 @@ struct MotionBoxes {
   bool within(const Node&) const { return true; }  // the same of one node
 };
 
+// The same where boxes of some pairs of meshes have grown by more than they ask for.
+struct MotionBoxesLessExcess {
+  using Ends = AtLeaves;
+  static constexpr bool shrink = false;
+  const Excess& excess;
+  bool overlap(const Node& a, const Node& b) const { return a.overlaps(b, excess.of(a, b)); }
+  bool within(const Node&) const { return true; }
+};
+
 // The same down to blocks alone, where the boxes of leaves wait in lanes.
 struct MotionBoxesOfBlocks : MotionBoxes {
+  using Ends = AtBlocks;
+};
+struct MotionBoxesOfBlocksLessExcess : MotionBoxesLessExcess {
   using Ends = AtBlocks;
 };
 

@@ -68,7 +68,8 @@ const Block& block_of(const Tree& tree, std::uint32_t node) {
   return tree.blocks[tree.block_of_leaf[tree.nodes[node].leaf]];
 }
 
-// From pairs that are worth visiting. `between` is called between two of them and may take from the stack.
+// From pairs that are worth visiting. `between` is called between two of them and may take from the stack; false ends
+// the walk.
 template <class Boxes, class Between>
 void walk(const Tree& tree, const PairRules& rules, Boxes boxes, const Cancellation& cancellation,
           std::vector<NodePair>& stack, Worker& worker, Between&& between) {
@@ -97,7 +98,11 @@ void walk(const Tree& tree, const PairRules& rules, Boxes boxes, const Cancellat
     if (is_end(tree.nodes, p, ends)) {
       if constexpr (std::is_same_v<typename Boxes::Ends, AtBlocks>) {
         LeafPair found[block_pairs_capacity];
-        const std::uint32_t n = worker.search().block_pairs(tree, block_of(tree, p.a), block_of(tree, p.b), found);
+        const Search& search = worker.search();
+        const Block &a = block_of(tree, p.a), &b = block_of(tree, p.b);
+        const float excess = search.excess.of(tree.nodes[p.a], tree.nodes[p.b]);
+        const std::uint32_t n = excess > 0 ? search.block_pairs_less_excess(tree, a, b, excess, found)
+                                           : search.block_pairs(tree, a, b, found);
         for (std::uint32_t i = 0; i < n; ++i) at_leaves(found[i]);
       } else {
         at_leaves({tree.nodes[p.a].leaf, tree.nodes[p.b].leaf});
@@ -110,15 +115,7 @@ void walk(const Tree& tree, const PairRules& rules, Boxes boxes, const Cancellat
       });
       if constexpr (Boxes::shrink) boxes.sort(stack, below);
     }
-    between();
-  }
-}
-
-// The task with the lowest number that holds a contact decides, so the answer does not depend on the threads.
-void keep_first_of_task(Worker& worker, std::size_t task, std::atomic<std::size_t>& found) {
-  if (worker.vertex_face.empty() && worker.edge_edge.empty()) return;
-  std::size_t before = found.load();
-  while (task < before && !found.compare_exchange_weak(before, task)) {
+    if (!between()) return stack.clear();
   }
 }
 
@@ -132,41 +129,44 @@ bool boxes_leave_much(const Worker& worker) {
 
 Contact least(const std::vector<Contact>& found) { return *std::min_element(found.begin(), found.end(), before); }
 
-void traverse_any(const Tree& tree, const PairRules& rules, Search& search, ThreadPool& pool,
+// One contact: vertex-face before edge-edge, of either the first in canonical order.
+void keep_least(Worker& worker) {
+  if (!worker.vertex_face.empty())
+    worker.vertex_face = {least(worker.vertex_face)}, worker.edge_edge.clear();
+  else
+    worker.edge_edge = {least(worker.edge_edge)};
+}
+
+// The task with the lowest number that holds a contact decides, and of it what the first batches find that find
+// anything: each task is walked alone, from empty batches on. So the answer does not depend on the threads.
+template <class Boxes>
+void traverse_any(const Tree& tree, const PairRules& rules, const Boxes& boxes, Search& search, ThreadPool& pool,
                   std::vector<Worker>& workers) {
   // Which contact is reported depends on the list, so it must not depend on the threads.
   constexpr std::size_t enough = 4096;
-  const std::vector<NodePair> tasks = traversal_tasks(tree, rules, MotionBoxes(), enough);
+  const std::vector<NodePair> tasks = traversal_tasks(tree, rules, boxes, enough);
   std::atomic<std::size_t> next{0}, found{tasks.size()};
   pool.run([&](int thread) {
     Worker& worker = workers[thread];
     worker.begin(search);
+    worker.best_task = tasks.size();
     std::vector<NodePair> stack;
-    std::vector<Contact> best_vf, best_ee;
-    std::size_t best = tasks.size();
     for (;;) {
       const std::size_t task = next.fetch_add(1);
-      if (task >= tasks.size() || task > found.load()) break;
+      if (task >= tasks.size() || task > found.load()) return;
+      worker.begin_task();
       stack.push_back(tasks[task]);
-      walk(tree, rules, MotionBoxes(), *search.cancellation, stack, worker, [] {});
-      worker.flush();
-      keep_first_of_task(worker, task, found);
-      if (task < best && !(worker.vertex_face.empty() && worker.edge_edge.empty())) {
-        best = task;
-        best_vf.swap(worker.vertex_face);
-        best_ee.swap(worker.edge_edge);
+      walk(tree, rules, boxes, *search.cancellation, stack, worker,
+           [&] { return !worker.has_found() && task < found.load(std::memory_order_relaxed); });
+      if (task > found.load()) return;  // all later ones are too
+      if (!worker.has_found()) worker.flush();
+      if (!worker.has_found()) continue;
+      keep_least(worker);
+      worker.best_task = task;
+      for (std::size_t before = found.load(); task < before && !found.compare_exchange_weak(before, task);) {
       }
-      worker.vertex_face.clear();
-      worker.edge_edge.clear();
+      return;  // what it would take next comes later
     }
-    if (best < tasks.size()) {
-      // One contact: the first in canonical order of the task's own.
-      if (!best_vf.empty())
-        worker.vertex_face = {least(best_vf)};
-      else
-        worker.edge_edge = {least(best_ee)};
-    }
-    worker.best_task = best;
   });
   for (Worker& w : workers)
     if (w.best_task != found.load()) w.vertex_face.clear(), w.edge_edge.clear();
@@ -183,8 +183,11 @@ void test_leaves(const Tree& tree, const PairRules& rules, LeafPair pair, Worker
   if (search.leaf_pairs) {
     const PartOfMotion part = search.part();
     worker.test_candidates(rule, [&](CandidateBuffer& edge_edge, CandidateBuffer& vertex_face) {
+      const float excess = search.excess.of(node_a, node_b);
       if (part.until < 1 && part.reach >= 0)
-        search.leaf_pairs_at_start(tree, a, b, rule.features, part.reach, edge_edge, vertex_face);
+        search.leaf_pairs_at_start(tree, a, b, rule.features, part.reach - excess, edge_edge, vertex_face);
+      else if (excess > 0)
+        search.leaf_pairs_less_excess(tree, a, b, rule.features, excess, edge_edge, vertex_face);
       else if (part.until < 1)
         search.leaf_pairs_until(tree, a, b, rule.features, part.until, edge_edge, vertex_face);
       else
@@ -245,6 +248,7 @@ void traverse_all(const Tree& tree, const PairRules& rules, const Boxes& boxes, 
     while (busy.next(stack, meanwhile))
       walk(tree, rules, boxes, *search.cancellation, stack, worker, [&] {
         if (pairs.wanted()) pairs.push_half(stack);
+        return true;
       });
     worker.flush();
   });
@@ -258,13 +262,19 @@ void traverse(const Tree& tree, const PairRules& rules, Search& search, ThreadPo
     traverse_all(tree, rules, NearerBoxes{tree, *search.nearest}, search, pool, workers);
   else if (!search.leaf_pairs)
     traverse_all(tree, rules, SnapshotBoxes{search.reach}, search, pool, workers);
+  else if (search.report == Report::any && search.excess.any())
+    traverse_any(tree, rules, MotionBoxesLessExcess{search.excess}, search, pool, workers);
   else if (search.report == Report::any)
-    traverse_any(tree, rules, search, pool, workers);
+    traverse_any(tree, rules, MotionBoxes(), search, pool, workers);
   else if (search.drift)
     traverse_all(tree, rules, UnlistedBoxes{tree, *search.drift, std::min(search.until(), 1.0f)}, search, pool,
                  workers);
+  else if (search.prunes && search.excess.any())
+    traverse_all(tree, rules, BoxesUntilLessExcess{{search}}, search, pool, workers);
   else if (search.prunes)
     traverse_all(tree, rules, BoxesUntil{search}, search, pool, workers);
+  else if (search.excess.any())
+    traverse_all(tree, rules, MotionBoxesOfBlocksLessExcess{{search.excess}}, search, pool, workers);
   else
     traverse_all(tree, rules, MotionBoxesOfBlocks(), search, pool, workers);
 }

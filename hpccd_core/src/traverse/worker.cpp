@@ -21,11 +21,6 @@ std::pair<std::uint32_t, std::uint32_t> meshes_of(const NearestPairs& nearest, c
   return {nearest.mesh_of(a), nearest.mesh_of(b)};
 }
 
-double limit_of(const NearestPairs& nearest, const Geometry& g, Kind kind, std::uint32_t first, std::uint32_t second) {
-  const auto [a, b] = meshes_of(nearest, g, kind, first, second);
-  return nearest.limit(a, b);
-}
-
 }  // namespace
 
 void Worker::begin(Search& search) {
@@ -40,11 +35,20 @@ void Worker::begin(Search& search) {
   elementary_ticks = 0;
   leaf_pairs_time = {};
   first_batches_ = search.prunes ? first_batches : 0;
-  nearest_batch_ = first_batch;
+  grows_batches_ = search.nearest || search.report == Report::any;
+  growing_batch_ = first_batch;
   for (auto& w : waiting_)  // what an exception left behind
     if (w) w->edge_edge.n = w->vertex_face.n = 0;
   if (edge_faces_) edge_faces_->n = 0;
   if (!result_) result_ = std::make_unique<BatchResult>();
+}
+
+void Worker::begin_task() {
+  vertex_face.clear();
+  edge_edge.clear();
+  growing_batch_ = first_batch;
+  for (auto& w : waiting_)
+    if (w) w->edge_edge.n = w->vertex_face.n = 0;
 }
 
 void Worker::flush() {
@@ -80,7 +84,7 @@ void Worker::drain(CandidateBuffer& buffer, Kind kind, Rule rule, std::uint32_t 
   std::copy(buffer.first + done, buffer.first + buffer.n, buffer.first);
   std::copy(buffer.second + done, buffer.second + buffer.n, buffer.second);
   buffer.n -= done;
-  nearest_batch_ = nearer_ ? first_batch : std::min(2 * nearest_batch_, batch_capacity);
+  growing_batch_ = nearer_ ? first_batch : std::min(2 * growing_batch_, batch_capacity);
   elementary_ticks += ticks() - start_ticks;
   elementary_seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
@@ -136,27 +140,37 @@ void Worker::resolve(const Candidate& candidate, Rule rule, double apart_until) 
   }
   UndecidedPair pair = undecided_pair(search_->geometry, candidate);
   pair.apart_until = apart_until;
-  if (const NearestPairs* nearest = search_->nearest.get()) {
-    pair.separation = limit_of(*nearest, search_->geometry, kind, a, b);
+  if (search_->nearest) {
+    pair.separation = limit_of(a, b, kind);
     if (pair.separation < 0) return;
   }
   if (const auto value = search_->fallback[rule.number()](rule.accuracy, pair, count)) report(kind, {a, b, *value});
 }
 
+// Of the smallest distance so far, or a separation.
+double Worker::limit_of(std::uint32_t first, std::uint32_t second, Kind kind) const {
+  if (const NearestPairs* nearest = search_->nearest.get()) {
+    const auto [a, b] = meshes_of(*nearest, search_->geometry, kind, first, second);
+    return nearest->limit(a, b);
+  }
+  std::uint32_t v[4];
+  pair_vertices(search_->geometry, kind, first, second, v);
+  return search_->geometry.separations.look_up(v[0], v[2]);
+}
+
 // With the time up to which pairs matter, and with the limit of each pair of the batch, where such are looked for.
 const Geometry& Worker::geometry_of(const std::uint32_t* first, const std::uint32_t* second, std::uint32_t n,
                                     Kind kind) {
-  if (const float until = search_->until(); until < 1) {
-    limited_ = search_->geometry;
-    limited_.until = until;
-    return limited_;
-  }
-  if (!search_->nearest) return search_->geometry;
-  limits_.resize(batch_capacity);
-  for (std::uint32_t i = 0; i < n; ++i)
-    limits_[i] = limit_of(*search_->nearest, search_->geometry, kind, first[i], second[i]);
+  const float until = search_->until();
+  const bool to_look_up = search_->geometry.separations.to_look_up();
+  if (!(until < 1) && !search_->nearest && !to_look_up) return search_->geometry;
   limited_ = search_->geometry;
-  limited_.separations.of_candidates = limits_.data();
+  if (until < 1) limited_.until = until;
+  if (search_->nearest || to_look_up) {
+    limits_.resize(batch_capacity);
+    for (std::uint32_t i = 0; i < n; ++i) limits_[i] = limit_of(first[i], second[i], kind);
+    limited_.separations.of_candidates = limits_.data();
+  }
   return limited_;
 }
 

@@ -29,6 +29,8 @@ inline constexpr std::uint32_t first_batch = 64, first_batches = 32;
 class alignas(128) Worker {
  public:
   void begin(Search& search);
+  // One of several tasks whose findings do not hang on those before: nothing waits, batches are small at first.
+  void begin_task();
   // Tests candidates by the rule, sooner or later: add(edge_edge, vertex_face) appends at most
   // CandidateBuffer::most_per_call pairs to each.
   template <class Add>
@@ -49,6 +51,7 @@ class alignas(128) Worker {
   // Tests pairs of one kind at once.
   void test_pairs(std::span<const std::uint32_t> first, std::span<const std::uint32_t> second, Kind kind, Rule rule);
   const Search& search() const { return *search_; }
+  bool has_found() const { return !vertex_face.empty() || !edge_edge.empty(); }
   void flush();  // tests what waits
   // The tier's fallback on a pair that nothing else decides, and a contact found elsewhere. apart_until: as in
   // UndecidedPair.
@@ -78,11 +81,12 @@ class alignas(128) Worker {
     return *waiting;
   }
   std::uint32_t full_batch() const {
-    return search_->nearest ? nearest_batch_ : first_batches_ > 0 ? first_batch : batch_capacity;
+    return grows_batches_ ? growing_batch_ : first_batches_ > 0 ? first_batch : batch_capacity;
   }
   void drain(CandidateBuffer& buffer, Kind kind, Rule rule, std::uint32_t keep_below);
   void test(const std::uint32_t* first, const std::uint32_t* second, std::uint32_t n, Kind kind, Rule rule);
   const Geometry& geometry_of(const std::uint32_t* first, const std::uint32_t* second, std::uint32_t n, Kind kind);
+  double limit_of(std::uint32_t first, std::uint32_t second, Kind kind) const;
   std::vector<Contact>& found(Kind kind);
   void offer(Kind kind, const Contact& pair);
   Geometry limited_;
@@ -92,10 +96,12 @@ class alignas(128) Worker {
   std::unique_ptr<CandidateBuffer> edge_faces_;
   std::unique_ptr<BatchResult> result_;
   std::uint32_t first_batches_ = 0;
-  // In the search for nearest pairs: small where the last batch had a nearer one, after which there is less to test.
-  std::uint32_t nearest_batch_ = first_batch;
+  // In the search for any contact, which ends with the first batch that has one; and for nearest pairs: small where the
+  // last batch had a nearer one, after which there is less to test.
+  bool grows_batches_ = false;
+  std::uint32_t growing_batch_ = first_batch;
   bool nearer_ = false;
-  std::vector<double> limits_;  // of the batch, in the search for nearest pairs
+  std::vector<double> limits_;  // of the batch, where they are not in a table
 };
 
 }  // namespace hpccd

@@ -103,6 +103,62 @@ TEST(SeparationTable, LargestOfEachMeshCoversAllItsPairs) {
   EXPECT_EQ(table.largest(), (std::vector<double>{0.5, 3, 3, 0.5}));
 }
 
+// Pairs that are never tested grow no boxes and forget nothing.
+TEST(SeparationTable, OfPairsThatAreNeverTestedSaysNothing) {
+  Scene scene = scene_of(3);
+  scene.add_mesh("table", std::vector<std::uint32_t>{0, 1, 2}, 3, {.is_static = true});
+  scene.add_mesh("wall", std::vector<std::uint32_t>{0, 1, 2}, 3, {.self_collision = false, .is_static = true});
+  scene.add_mesh("body", std::vector<std::uint32_t>{0, 1, 2}, 3, {.self_collision = false});
+  scene.ignore_pair(0, 1);
+  scene.set_separation(1, 0, 7);
+  SeparationTable table(scene, 0.5);
+  const std::uint64_t version = table.version();
+  table.set(3, 4, 8);
+  table.set(5, 5, 9);
+  table.settle();
+  EXPECT_EQ(table.of(0, 1), 7);
+  EXPECT_EQ(table.of(4, 3), 8);
+  EXPECT_EQ(table.most(), 0.5);
+  EXPECT_TRUE(table.uniform());
+  EXPECT_EQ(table.largest(), std::vector<double>(6, 0.5));
+  EXPECT_EQ(table.version(), version);
+}
+
+// Beyond PairTable::most_in_table meshes only what was said is kept.
+TEST(SeparationTable, OfManyMeshesSaysTheSame) {
+  constexpr std::uint32_t n = PairTable<double>::most_in_table + 20;
+  Scene scene = scene_of(n);
+  std::uint64_t random = 1;
+  const auto number = [&](std::uint64_t below) {
+    random = random * 6364136223846793005u + 1442695040888963407u;
+    return static_cast<std::uint32_t>((random >> 33) % below);
+  };
+  for (int i = 0; i < 500; ++i) scene.ignore_pair(number(n), number(n));
+  SeparationTable table(scene, 0.5);
+  std::vector<double> all(n * n, 0.5);
+  for (int round = 0; round < 4; ++round) {
+    for (int i = 0; i < 700; ++i) {
+      const std::uint32_t a = number(n), b = number(round == 1 ? 2 : n);
+      all[a * n + b] = all[b * n + a] = 0.25 * number(5);
+      table.set(a, b, all[a * n + b]);
+    }
+    table.settle();
+    double most = 0;
+    std::set<double> values;
+    for (std::uint32_t a = 0; a < n; ++a) {
+      double largest = 0;
+      for (std::uint32_t b = 0; b < n; ++b) {
+        ASSERT_EQ(table.of(a, b), all[a * n + b]) << a << " and " << b;
+        if (scene.pair_enabled(a, b)) largest = std::max(largest, all[a * n + b]), values.insert(all[a * n + b]);
+      }
+      ASSERT_EQ(table.largest()[a], largest) << a;
+      most = std::max(most, largest);
+    }
+    EXPECT_EQ(table.most(), most);
+    EXPECT_EQ(table.uniform(), values.size() == 1);
+  }
+}
+
 TEST(SeparationTable, NoTwoStatesHaveTheSameVersion) {
   const Scene scene = scene_of(2);
   SeparationTable table(scene, 0.5);

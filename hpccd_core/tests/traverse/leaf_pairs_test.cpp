@@ -61,11 +61,15 @@ struct LeafPairsTest : testing::TestWithParam<Case> {
     build(tree, *scene, features, motion, pool);
   }
 
+  float excess = 0;  // by which boxes must overlap at least
+
   template <class VerticesA, class VerticesB>
   bool are_candidates(const VerticesA& a, const VerticesB& b) const {
     MotionBox box_a, box_b;
     for (const std::uint32_t v : a) box_a.include(motion.boxes[v]);
     for (const std::uint32_t v : b) box_b.include(motion.boxes[v]);
+    for (Box* box : {&box_a.t0, &box_a.t1})
+      for (int k = 0; k < 3; ++k) box->low[k] += excess, box->high[k] -= excess;
     return box_a.overlaps(box_b) && std::ranges::find_first_of(a, b) == std::ranges::end(a);
   }
 
@@ -93,6 +97,17 @@ struct LeafPairsTest : testing::TestWithParam<Case> {
     const auto edge_edge = std::make_unique<CandidateBuffer>(), vertex_face = std::make_unique<CandidateBuffer>();
     leaf_pairs(tree, a, b, tested, *edge_edge, *vertex_face);
     return sorted({pairs_of(*edge_edge), pairs_of(*vertex_face)});
+  }
+
+  Found less_excess(LeafPairsLessExcess leaf_pairs, const LeafRange& a, const LeafRange& b) const {
+    const auto edge_edge = std::make_unique<CandidateBuffer>(), vertex_face = std::make_unique<CandidateBuffer>();
+    leaf_pairs(tree, a, b, {}, excess, *edge_edge, *vertex_face);
+    return sorted({pairs_of(*edge_edge), pairs_of(*vertex_face)});
+  }
+
+  static bool holds(const Found& all, const Found& some) {
+    return std::ranges::includes(all.edge_edge, some.edge_edge) &&
+           std::ranges::includes(all.vertex_face, some.vertex_face);
   }
 
   static Pairs pairs_of(const CandidateBuffer& buffer) {
@@ -124,6 +139,31 @@ TEST_P(LeafPairsTest, AreThoseThatOverlapAndShareNoVertex) {
     }
   EXPECT_GT(edge_edge, 1000u);
   EXPECT_GT(vertex_face, GetParam().of == Of::ropes ? 200u : 500u);
+}
+
+// Of boxes that have grown by more than was asked for: what overlaps by less is left out, and nothing else.
+TEST_P(LeafPairsTest, AreThoseThatOverlapByMoreThanTheExcess) {
+  if (GetParam().separation == 0) GTEST_SKIP() << "no box has grown";
+  constexpr float by = 0.1f, lost = 1e-5f;
+  std::size_t left_out = 0, left = 0;
+  for (std::size_t a = 0; a < tree.leaves.size(); ++a)
+    for (std::size_t b = a; b < tree.leaves.size(); ++b) {
+      const LeafRange &leaf_a = tree.leaves[a], &leaf_b = tree.leaves[b];
+      excess = 0;
+      const Found all = one_by_one(leaf_a, leaf_b);
+      excess = by - lost;
+      const Found most = one_by_one(leaf_a, leaf_b);
+      excess = by + lost;
+      const Found least = one_by_one(leaf_a, leaf_b);
+      excess = by;
+      left_out += all.edge_edge.size() - most.edge_edge.size(), left += least.edge_edge.size();
+      for (const Simd simd : simd_levels()) {
+        const Found found = less_excess(leaf_pairs_less_excess(simd), leaf_a, leaf_b);
+        ASSERT_TRUE(holds(found, least) && holds(most, found)) << a << " and " << b << ", " << name_of(simd);
+      }
+    }
+  EXPECT_GT(left_out, 100u);
+  EXPECT_GT(left, 100u);
 }
 
 struct BlockPairsTest : LeafPairsTest {
@@ -176,6 +216,30 @@ struct BlockPairsTest : LeafPairsTest {
 TEST_P(BlockPairsTest, AreTheLeavesThatOverlap) {
   ASSERT_GT(tree.blocks.size(), 2u);
   expect_leaves_that_overlap();
+}
+
+TEST_P(BlockPairsTest, AreTheLeavesThatOverlapByMoreThanTheExcess) {
+  if (GetParam().separation == 0) GTEST_SKIP() << "no box has grown";
+  constexpr float by = 0.1f, lost = 1e-5f;
+  Pairs most, least;
+  for (std::uint32_t a = 0; a < tree.leaves.size(); ++a)
+    for (std::uint32_t b = a; b < tree.leaves.size(); ++b) {
+      const Node &node_a = tree.nodes[tree.leaf_nodes[a]], &node_b = tree.nodes[tree.leaf_nodes[b]];
+      if (a != b && apart(kdop_of(a), kdop_of(b))) continue;
+      if (node_a.overlaps(node_b, by - lost)) most.push_back({a, b});
+      if (node_a.overlaps(node_b, by + lost)) least.push_back({a, b});
+    }
+  for (const Simd simd : simd_levels()) {
+    Pairs found;
+    for (std::size_t a = 0; a < tree.blocks.size(); ++a)
+      for (std::size_t b = a; b < tree.blocks.size(); ++b) {
+        LeafPair pairs[block_pairs_capacity];
+        const std::uint32_t n = block_pairs_less_excess(simd)(tree, tree.blocks[a], tree.blocks[b], by, pairs);
+        for (std::uint32_t i = 0; i < n; ++i) found.push_back(std::minmax(pairs[i].first, pairs[i].second));
+      }
+    std::ranges::sort(found);
+    EXPECT_TRUE(std::ranges::includes(found, least) && std::ranges::includes(most, found)) << name_of(simd);
+  }
 }
 
 // Boxes and k-DOPs grow with the separation: those of a motion before, with another one, say nothing.

@@ -5,6 +5,7 @@
 #include <cstdint>
 
 #include "base/hd.h"
+#include "scene/pair_table.h"
 
 namespace hpccd {
 
@@ -14,10 +15,17 @@ struct Separations {
   const std::uint32_t* mesh_of_vertex = nullptr;
   std::uint32_t n_meshes = 0;
   const double* of_candidates = nullptr;  // of a batch
+  // Of many meshes, in place of the table. A batch then brings those of its candidates: looked up in the lanes' own
+  // code, they cost every batch of distances a tenth.
+  PairValues<double> of_pairs = {};
 
   // Of two features by one vertex of each.
   HPCCD_HD double between(std::uint32_t first, std::uint32_t second) const {
     return of_meshes ? of_meshes[mesh_of_vertex[first] * n_meshes + mesh_of_vertex[second]] : uniform;
+  }
+  bool to_look_up() const { return of_pairs.keys; }
+  double look_up(std::uint32_t first, std::uint32_t second) const {
+    return to_look_up() ? of_pairs.of(mesh_of_vertex[first], mesh_of_vertex[second]) : between(first, second);
   }
 };
 

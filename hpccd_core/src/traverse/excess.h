@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+// By how much more than their own separation asks for the boxes of two meshes have grown: a mesh's boxes grow by half
+// of the largest separation of its pairs. Where two meshes are known, what overlaps by less than the excess is too far
+// apart.
+#pragma once
+
+#include <algorithm>
+
+#include "bvh/motion_bounds.h"
+#include "bvh/tree.h"
+#include "scene/separation_table.h"
+
+namespace hpccd {
+
+class Excess {
+ public:
+  // None.
+  Excess() = default;
+  // None where all pairs have one separation, and where gaps of the scene are shortened (squeezed_axis.h): there boxes
+  // have grown by less than they ask for. Both must stay as they are.
+  Excess(const MotionBounds& motion, const SeparationTable& separations) {
+    if (!motion.grown || separations.uniform() || !motion.squeezed.empty()) return;
+    motion_ = &motion, separations_ = separations.of_pairs();
+  }
+
+  bool any() const { return motion_; }
+  // In coordinates of the boxes, rounded down. These lie within 6.25 and were rounded to floats, as are they less the
+  // excess: 7.2e-7 at most. Of one mesh it is less than the box of a vertex is wide, so that a vertex that two leaves
+  // share stays near both.
+  float of(std::uint32_t mesh_a, std::uint32_t mesh_b) const {
+    if (mesh_a == mixed_meshes || mesh_b == mixed_meshes) return 0;
+    const double grown_by = motion_->margin_of_mesh(mesh_a) + motion_->margin_of_mesh(mesh_b);
+    const double beyond = grown_by - separations_.of(mesh_a, mesh_b) - motion_->rounding;
+    return static_cast<float>(std::max(beyond * motion_->map.scale * (1 - 1e-6) - 2e-6, 0.0));
+  }
+  float of(const Node& a, const Node& b) const { return any() ? of(a.mesh, b.mesh) : 0; }
+
+ private:
+  const MotionBounds* motion_ = nullptr;
+  PairValues<double> separations_;
+};
+
+}  // namespace hpccd
