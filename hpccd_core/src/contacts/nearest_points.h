@@ -31,9 +31,10 @@ HPCCD_HD NearestPoints nearest_points(const Vec3<double> t0[4], const Vec3<doubl
   constexpr double flat = 1e-2;
   const bool place_is_known = dot(n, n) > flat * flat * (dot(now.a, now.a) * dot(now.b, now.b));
   const NearOrFar<double> checked = proximity_test<kind>(now, 0.0);
-  // Positions are rounded by a few 2^-53 of their coordinates: longer vectors have their directions to 1e-6 or better.
+  // Positions are rounded by a few 2^-53 of their coordinates, and by 2^-1074 at least: longer vectors have their
+  // directions to 1e-6 or better.
   const double size = greater(greater(largest(q[0]), largest(q[1])), greater(largest(q[2]), largest(q[3])));
-  const double long_enough = 0x1p-30 * size;
+  const double long_enough = greater(0x1p-30 * size, 0x1p-1044);
   if (!place_is_known || !checked.far) {
     const exact::Nearest x = arbiter.nearest(kind, t0, t1, q);
     const V across = kind == Kind::vertex_face ? x.on_first - x.on_second : x.on_second - x.on_first;

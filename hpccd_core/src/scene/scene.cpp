@@ -3,6 +3,7 @@
 
 #include "base/length.h"
 #include "base/names.h"
+#include "base/standard_arithmetic.h"
 #include "hpccd/hpccd.h"
 #include "scene/tested_features.h"
 
@@ -95,6 +96,7 @@ void Scene::set_accuracy(std::uint32_t mesh_a, std::uint32_t mesh_b, Accuracy ac
 }
 
 void Scene::set_separation(std::uint32_t mesh_a, std::uint32_t mesh_b, double separation) {
+  const StandardArithmetic arithmetic;  // else a negative denormal may pass
   const Pair pair = known(mesh_a, mesh_b);
   check_length("separation", separation);
   separation_[pair] = separation;
