@@ -70,10 +70,17 @@ def test_degenerate_features_and_coplanar_motion(make, n):
         assert decided > left, "of a coplanarity with a double root integers of this size find no end; few have one"
 
 
-@pytest.mark.parametrize("report", ("first", "any"))
-def test_reports(report):
+def test_first_contacts():
     scene, t0, t1 = nets(np.random.default_rng(1), 64)
-    assert_same(scene, t0.astype(np.float32), t1.astype(np.float32), report=report)
+    assert_same(scene, t0.astype(np.float32), t1.astype(np.float32), report="first")
+
+
+def test_any_contact_is_the_first_of_all():
+    scene, t0, t1 = nets(np.random.default_rng(1), 64)
+    t0, t1 = t0.astype(np.float32), t1.astype(np.float32)
+    every = hc.Detector(scene, backend="gpu").detect(t0, t1)
+    one = hc.Detector(scene, backend="gpu", report="any").detect(t0, t1)
+    assert one.vf.tolist() == every.vf[:1].tolist() and one.vf_toc == every.vf_toc[:1] and len(one) == 1
 
 
 def test_earliest_time():

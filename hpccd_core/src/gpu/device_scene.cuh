@@ -55,10 +55,11 @@ class DeviceScene {
   bool all_fast() const { return all_fast_; }  // all that is tested
   // Brings the separations to the device, where they have changed; to be called before a frame of motions.
   void update_separations() {
-    any_separation_ = separations_.any();
+    any_separation_ = separations_.any(), one_separation_ = separations_.uniform();
+    separation_ = any_separation_ && one_separation_ ? separations_.first() : 0;
     if (!separations_.any() || separations_.version() == uploaded_) return;
     uploaded_ = 0;  // none, should this fail
-    if (!separations_.uniform()) {
+    if (!one_separation_) {
       const std::vector<double> all = of_all_pairs<double>([&](u32 a, u32 b) { return separations_.of(a, b); });
       upload(pair_separation_, all.data(), all.size());
     }
@@ -69,8 +70,8 @@ class DeviceScene {
   template <class T>
   void fill_separations(LaunchParams<T>& params) const {
     const bool any = query_now() == Query::separations;
-    params.separation = any && separations_.uniform() ? separations_.first() : 0;
-    params.separations = any && !separations_.uniform() ? pair_separation_.data() : nullptr;
+    params.separation = separation_;
+    params.separations = any && !one_separation_ ? pair_separation_.data() : nullptr;
     params.largest_separation = any ? largest_separation_.data() : nullptr;
   }
   // Changes with all that fill_separations names.
@@ -132,7 +133,9 @@ class DeviceScene {
   const SeparationTable& separations_;
   const u32 n_worlds_;
   std::uint64_t uploaded_ = 0;  // version of the separations there
-  bool any_separation_ = false;
+  // As of the last update: what was prepared before another change goes on with these.
+  bool any_separation_ = false, one_separation_ = true;
+  double separation_ = 0;
   DeviceBuffer<uint2> edges_;
   DeviceBuffer<u32> faces_, mesh_of_vertex_;
   DeviceBuffer<unsigned char> enabled_, accuracy_, tested_;
