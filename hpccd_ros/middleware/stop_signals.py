@@ -37,6 +37,15 @@ def watch(on_stop: Callable[[], None]) -> None:
     threading.Thread(target=wait, name="signals", daemon=True).start()
 
 
+def ignore() -> None:
+    """From now on SIGINT and SIGTERM do nothing. Call it last: the exit status is then that of the program.
+
+    Python removes its handlers early in its finalization; a second signal would then kill the process.
+    """
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.SIG_IGN)
+
+
 @contextlib.contextmanager
 def collected() -> Iterator[list[int]]:
     """Gives an empty list, which each SIGINT and SIGTERM within this block fills: for a loop that looks at it.
@@ -72,7 +81,19 @@ def spin(executor: Executor, stop: Future) -> None:
     Not spin_until_future_complete: rclpy 7.1 hangs a callback on the future at each turn, 0.4 KB for every message
     that a node receives, and never takes one off (20 MB in half an hour at 40 messages a second).
     """
-    # A task without effect ends the wait of spin_once.
-    stop.add_done_callback(lambda _: executor.create_task(lambda: None))
-    while executor.context.ok() and not stop.done():
-        executor.spin_once()
+    woken = threading.Event()
+
+    def wake(_: Future) -> None:
+        try:
+            executor.create_task(lambda: None)  # a task without effect ends the wait of spin_once
+        finally:
+            woken.set()
+
+    stop.add_done_callback(wake)
+    try:
+        while executor.context.ok() and not stop.done():
+            executor.spin_once()
+    finally:
+        # The future is done before its callbacks run: wait for the other thread, which still uses the executor.
+        if not stop.remove_done_callback(wake):
+            woken.wait()

@@ -23,9 +23,13 @@ def main() -> int:
     except UserError as error:
         print(f"hpccd: {error}", file=sys.stderr)
         return 2
+    from hpccd_ros.middleware import stop_signals
     from hpccd_ros.node import run
 
-    return run.main()
+    try:
+        return run.main()
+    finally:
+        stop_signals.ignore()
 
 
 if __name__ == "__main__":

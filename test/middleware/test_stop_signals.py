@@ -5,6 +5,7 @@ import gc
 import signal
 import sys
 import threading
+import time
 
 import pytest
 import rclpy
@@ -62,6 +63,21 @@ def test_another_thread_ends_an_idle_loop(executor):
     timer.start()
     stop_signals.spin(executor, stop)
     assert stop.done()
+
+
+def test_the_loop_ends_after_the_thread_that_ended_it_has_left_the_executor(executor):
+    stop, left = Future(), []
+    create_task = executor.create_task
+
+    def slow(task):
+        create_task(task)
+        time.sleep(0.2)
+        left.append(True)
+
+    executor.create_task(threading.Thread(target=stop.set_result, args=(None,)).start)
+    executor.create_task = slow
+    stop_signals.spin(executor, stop)
+    assert left
 
 
 def test_a_loop_that_was_ended_before_returns_at_once(executor):

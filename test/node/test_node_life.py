@@ -55,8 +55,35 @@ def test_signals_end_the_node_cleanly(start_node, number, busy):
 def test_second_signal_changes_nothing(start_node):
     node = start_node({"meshes": ["cloth"]})
     node.process.send_signal(signal.SIGTERM)
-    assert node.stop(signal.SIGINT) == 0
+    assert node.stop(signal.SIGINT) == 0, node.output()
     assert "Traceback" not in node.output()
+
+
+# Python's finalization deletes the object, as soon as what the node froze is collected again.
+SIGNAL_AT_THE_END = """
+import gc, os, pathlib, signal, sys
+from hpccd_ros.node import start
+class AtTheEnd:
+    def __del__(self, kill=os.kill, process=os.getpid(), number=signal.SIGTERM, write=os.write):
+        kill(process, number)
+        write(1, b"signal sent")
+at_the_end = AtTheEnd()
+status = start.main()
+gc.unfreeze()
+print("threads", *(file.read_text().strip() for file in pathlib.Path("/proc/self/task").glob("*/comm")), flush=True)
+sys.exit(status)
+"""
+
+
+def test_nothing_of_dds_outlives_the_node(start_node, tmp_path):
+    """A participant that is left to static destructors crashes some ends; a signal in finalization changes nothing."""
+    parameters = {"meshes": ["cloth", "net"], "stop_distance": 0.1, "record": str(tmp_path / "run.mcap")}
+    node = start_node(parameters, program=("-c", SIGNAL_AT_THE_END))
+    assert node.stop() == 0, node.output()
+    assert "signal sent" in node.output()
+    threads = next(line for line in node.output().splitlines() if line.startswith("threads ")).split()[1:]
+    # The watchdog of shared memory belongs to the process, not to a participant.
+    assert [name for name in threads if name.startswith("dds.") and name != "dds.shm.wdog"] == []
 
 
 @pytest.mark.parametrize(
