@@ -17,7 +17,8 @@ set(hpccd_sources
   src/elementary/queries.cpp
   src/traverse/drift.cpp src/traverse/far_pairs.cpp src/traverse/fine_boxes.cpp
   src/traverse/leaf_edge_faces.cpp src/traverse/leaf_hulls.cpp src/traverse/leaf_pairs.cpp src/traverse/mesh_pairs.cpp
-  src/traverse/near_corners.cpp src/traverse/nearest_pairs.cpp src/traverse/pair_pool.cpp src/traverse/tasks.cpp
+  src/traverse/less_excess.cpp src/traverse/near_corners.cpp src/traverse/nearest_pairs.cpp
+  src/traverse/pair_pool.cpp src/traverse/tasks.cpp
   src/traverse/traverse.cpp
   src/traverse/worker.cpp
   src/contacts/canonical.cpp src/contacts/gaps.cpp src/contacts/intersections.cpp src/contacts/nearest_points.cpp

@@ -49,7 +49,9 @@ class PairTable {
     if (has_all()) values_.assign(n_ * n_, otherwise);
   }
 
-  T of(std::uint32_t a, std::uint32_t b) const { return has_all() ? values_[a * n_ + b] : view().of(a, b); }
+  T of(std::uint32_t a, std::uint32_t b) const { return has_all() ? in_table(a, b) : view().of(a, b); }
+  // Only where has_all().
+  T in_table(std::uint32_t a, std::uint32_t b) const { return values_[a * n_ + b]; }
   PairValues<T> view() const {
     const auto n = static_cast<std::uint32_t>(n_);
     if (has_all()) return {values_.data(), n, 0, nullptr, nullptr, otherwise_};

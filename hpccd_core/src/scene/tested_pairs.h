@@ -15,8 +15,13 @@ class TestedPairs {
   explicit TestedPairs(const Scene& scene);
 
   bool all() const { return all_; }
+  // Whether a table of all pairs tells, or none is needed.
+  bool by_table() const { return all_ || not_ignored_.has_all(); }
+  bool in_table(std::uint32_t mesh_a, std::uint32_t mesh_b) const {
+    return all_ || not_ignored_.in_table(mesh_a, mesh_b);
+  }
   bool of(std::uint32_t mesh_a, std::uint32_t mesh_b) const {
-    if (not_ignored_.has_all()) return not_ignored_.of(mesh_a, mesh_b);
+    if (by_table()) return in_table(mesh_a, mesh_b);
     return by_meshes(mesh_a, mesh_b) && not_ignored_.of(mesh_a, mesh_b);
   }
   // Pairs of two meshes or of one, each once.

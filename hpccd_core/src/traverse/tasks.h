@@ -46,6 +46,13 @@ class PairRules {
     if (tested_.all() || mesh_a == mixed_meshes || mesh_b == mixed_meshes) return true;
     return tested_.of(mesh_a, mesh_b);
   }
+  bool all_meshes() const { return tested_.all(); }
+  bool by_table() const { return tested_.by_table(); }
+  // As enabled(), where by_table() holds.
+  bool enabled_by_table(const Node& a, const Node& b) const {
+    return (a.mesh == mixed_meshes || b.mesh == mixed_meshes || tested_.in_table(a.mesh, b.mesh)) &&
+           !(a.only_points && b.only_points);
+  }
   bool enabled(const Node& a, const Node& b) const {
     return enabled(a.mesh, b.mesh) && !(a.only_points && b.only_points);
   }
@@ -133,10 +140,31 @@ struct MotionBoxesOfBlocksLessExcess : MotionBoxesLessExcess {
   using Ends = AtBlocks;
 };
 
+// Whether features of two nodes, or of one, may have to be tested. Registers that a way through the rules needs would
+// cost every visit of those before it a third, so each is a function of its own.
+template <class Boxes>
+[[gnu::always_inline]] inline bool boxes_meet(const Boxes& boxes, const Node& a, const Node& b) {
+  return &a == &b ? boxes.within(a) : boxes.overlap(a, b);
+}
+
+template <class Boxes>
+[[gnu::noinline]] bool worth_visiting_by_hash(const PairRules& rules, const Boxes& boxes, const Node& a,
+                                              const Node& b) {
+  return rules.enabled(a, b) && boxes_meet(boxes, a, b);
+}
+
+template <class Boxes>
+[[gnu::noinline]] bool worth_visiting_by_rules(const PairRules& rules, const Boxes& boxes, const Node& a,
+                                               const Node& b) {
+  if (!rules.by_table()) return worth_visiting_by_hash(rules, boxes, a, b);
+  return rules.enabled_by_table(a, b) && boxes_meet(boxes, a, b);
+}
+
 template <class Boxes>
 bool worth_visiting(const std::vector<Node>& nodes, const PairRules& rules, const Boxes& boxes, NodePair p) {
   const Node &a = nodes[p.a], &b = nodes[p.b];
-  return rules.enabled(a, b) && (p.a == p.b ? boxes.within(a) : boxes.overlap(a, b));
+  if (!rules.all_meshes()) return worth_visiting_by_rules(rules, boxes, a, b);
+  return !(a.only_points && b.only_points) && boxes_meet(boxes, a, b);
 }
 
 // All of them worth visiting.

@@ -13,5 +13,8 @@ void test_leaves(const Tree& tree, const PairRules& rules, LeafPair pair, Worker
 // do, by independent tasks in their order, so that the answer does not depend on the threads. Leaves what was found in
 // the workers, one per thread of the pool.
 void traverse(const Tree& tree, const PairRules& rules, Search& search, ThreadPool& pool, std::vector<Worker>& workers);
+// Of a motion where search.excess.any(): less_excess.cpp.
+void traverse_less_excess(const Tree& tree, const PairRules& rules, Search& search, ThreadPool& pool,
+                          std::vector<Worker>& workers);
 
 }  // namespace hpccd

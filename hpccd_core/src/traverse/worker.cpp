@@ -37,6 +37,7 @@ void Worker::begin(Search& search) {
   first_batches_ = search.prunes ? first_batches : 0;
   grows_batches_ = search.nearest || search.report == Report::any;
   growing_batch_ = first_batch;
+  boxes_leave_much_ = false;
   for (auto& w : waiting_)  // what an exception left behind
     if (w) w->edge_edge.n = w->vertex_face.n = 0;
   if (edge_faces_) edge_faces_->n = 0;
@@ -85,6 +86,9 @@ void Worker::drain(CandidateBuffer& buffer, Kind kind, Rule rule, std::uint32_t 
   std::copy(buffer.second + done, buffer.second + buffer.n, buffer.second);
   buffer.n -= done;
   growing_batch_ = nearer_ ? first_batch : std::min(2 * growing_batch_, batch_capacity);
+  std::uint64_t tested = 0, near = 0;
+  for (const BatchCounts& c : counts) tested += c.tested, near += c.contacts + c.undecided;
+  boxes_leave_much_ = tested > 4096 && tested > 64 * near;
   elementary_ticks += ticks() - start_ticks;
   elementary_seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }

@@ -51,6 +51,9 @@ class alignas(128) Worker {
   // Tests pairs of one kind at once.
   void test_pairs(std::span<const std::uint32_t> first, std::span<const std::uint32_t> second, Kind kind, Rule rule);
   const Search& search() const { return *search_; }
+  // Whether boxes leave far more pairs of features to be tested than are near: long ones that are slanted to every
+  // direction of the boxes. Then hulls of leaves are worth their price.
+  bool boxes_leave_much() const { return boxes_leave_much_; }
   bool has_found() const { return !vertex_face.empty() || !edge_edge.empty(); }
   void flush();  // tests what waits
   // The tier's fallback on a pair that nothing else decides, and a contact found elsewhere. apart_until: as in
@@ -100,7 +103,7 @@ class alignas(128) Worker {
   // last batch had a nearer one, after which there is less to test.
   bool grows_batches_ = false;
   std::uint32_t growing_batch_ = first_batch;
-  bool nearer_ = false;
+  bool nearer_ = false, boxes_leave_much_ = false;
   std::vector<double> limits_;  // of the batch, where they are not in a table
 };
 

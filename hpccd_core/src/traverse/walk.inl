@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: Apache-2.0
+// The walk over pairs of nodes, and its two ways through them: all, or until any contact is found. Included within an
+// unnamed namespace: what boxes count decides how much of it the compiler makes one piece, and three more kinds of
+// boxes in traverse.cpp cost each of those there a tenth.
+
+const Block& block_of(const Tree& tree, std::uint32_t node) {
+  return tree.blocks[tree.block_of_leaf[tree.nodes[node].leaf]];
+}
+
+// From pairs that are worth visiting. `between` is called between two of them and may take from the stack; false ends
+// the walk.
+template <class Boxes, class Between>
+void walk(const Tree& tree, const PairRules& rules, Boxes boxes, const Cancellation& cancellation,
+          std::vector<NodePair>& stack, Worker& worker, Between&& between) {
+  const bool bounded = worker.search().bounded();
+  constexpr typename Boxes::Ends ends;
+  const auto at_leaves = [&](LeafPair leaves) {
+    const std::uint64_t before = worker.leaf_pairs++;
+    if (!worker.sink)
+      worker.leaf_pairs_time.run(before, worker.elementary_seconds, [&] { test_leaves(tree, rules, leaves, worker); });
+    else
+      for (const LeafPair left : worker.sink->push(leaves)) test_leaves(tree, rules, left, worker);
+  };
+  std::size_t stale = 0;  // so many at the bottom were put there when boxes were larger
+  while (!stack.empty()) {
+    cancellation.heed();
+    if (bounded && worker.search().gave_up()) return stack.clear();
+    const NodePair p = stack.back();
+    stack.pop_back();
+    if constexpr (Boxes::shrink) {
+      if (boxes.changed()) stale = stack.size() + 1;
+      if (stack.size() < stale) {
+        stale = stack.size();
+        if (!boxes.open(p) || !worth_visiting(tree.nodes, rules, boxes, p)) continue;
+      }
+    }
+    if (is_end(tree.nodes, p, ends)) {
+      if constexpr (std::is_same_v<typename Boxes::Ends, AtBlocks>) {
+        LeafPair found[block_pairs_capacity];
+        const Search& search = worker.search();
+        const Block &a = block_of(tree, p.a), &b = block_of(tree, p.b);
+        const float excess = search.excess.of(tree.nodes[p.a], tree.nodes[p.b]);
+        const std::uint32_t n = excess > 0 ? search.block_pairs_less_excess(tree, a, b, excess, found)
+                                           : search.block_pairs(tree, a, b, found);
+        for (std::uint32_t i = 0; i < n; ++i) at_leaves(found[i]);
+      } else {
+        at_leaves({tree.nodes[p.a].leaf, tree.nodes[p.b].leaf});
+      }
+    } else {
+      const std::size_t below = stack.size();
+      refine(tree.nodes, p, ends, [&](NodePair q) {
+        ++worker.node_pairs;
+        if (worth_visiting(tree.nodes, rules, boxes, q)) stack.push_back(q);
+      });
+      if constexpr (Boxes::shrink) boxes.sort(stack, below);
+    }
+    if (!between()) return stack.clear();
+  }
+}
+
+Contact least(const std::vector<Contact>& found) { return *std::min_element(found.begin(), found.end(), before); }
+
+// One contact: vertex-face before edge-edge, of either the first in canonical order.
+void keep_least(Worker& worker) {
+  if (!worker.vertex_face.empty())
+    worker.vertex_face = {least(worker.vertex_face)}, worker.edge_edge.clear();
+  else
+    worker.edge_edge = {least(worker.edge_edge)};
+}
+
+// The task with the lowest number that holds a contact decides, and of it what the first batches find that find
+// anything: each task is walked alone, from empty batches on. So the answer does not depend on the threads.
+template <class Boxes>
+void traverse_any(const Tree& tree, const PairRules& rules, const Boxes& boxes, Search& search, ThreadPool& pool,
+                  std::vector<Worker>& workers) {
+  // Which contact is reported depends on the list, so it must not depend on the threads.
+  constexpr std::size_t enough = 4096;
+  const std::vector<NodePair> tasks = traversal_tasks(tree, rules, boxes, enough);
+  std::atomic<std::size_t> next{0}, found{tasks.size()};
+  pool.run([&](int thread) {
+    Worker& worker = workers[thread];
+    worker.begin(search);
+    worker.best_task = tasks.size();
+    std::vector<NodePair> stack;
+    for (;;) {
+      const std::size_t task = next.fetch_add(1);
+      if (task >= tasks.size() || task > found.load()) return;
+      worker.begin_task();
+      stack.push_back(tasks[task]);
+      walk(tree, rules, boxes, *search.cancellation, stack, worker,
+           [&] { return !worker.has_found() && task < found.load(std::memory_order_relaxed); });
+      if (task > found.load()) return;  // all later ones are too
+      if (!worker.has_found()) worker.flush();
+      if (!worker.has_found()) continue;
+      keep_least(worker);
+      worker.best_task = task;
+      for (std::size_t before = found.load(); task < before && !found.compare_exchange_weak(before, task);) {
+      }
+      return;  // what it would take next comes later
+    }
+  });
+  for (Worker& w : workers)
+    if (w.best_task != found.load()) w.vertex_face.clear(), w.edge_edge.clear();
+}
+
+template <class Boxes>
+void traverse_all(const Tree& tree, const PairRules& rules, const Boxes& boxes, Search& search, ThreadPool& pool,
+                  std::vector<Worker>& workers) {
+  for (Worker& w : workers) w.begin(search);
+  // Enough for the threads to begin with; making 4096 instead took 0.9 of the 4.6 ms of a scene of 18 K triangles.
+  constexpr std::size_t enough = 64;
+  std::vector<NodePair> tasks = traversal_tasks(tree, rules, boxes, enough);
+  if constexpr (Boxes::shrink) boxes.sort(tasks, 0);  // the last is taken first
+  PairPool pairs(tree, tasks, pool.size());
+  pool.share([&](int thread) {
+    Worker& worker = workers[thread];
+    BusyThread busy(pairs, thread);
+    std::vector<NodePair> stack;
+    // What waits for a full batch is tested while there is nothing better to do; a sink's segments are for it to send.
+    const auto meanwhile = [&] {
+      if (!worker.sink) worker.flush();
+    };
+    while (busy.next(stack, meanwhile))
+      walk(tree, rules, boxes, *search.cancellation, stack, worker, [&] {
+        if (pairs.wanted()) pairs.push_half(stack);
+        return true;
+      });
+    worker.flush();
+  });
+}
