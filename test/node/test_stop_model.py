@@ -54,6 +54,8 @@ def test_never_wrongly_false(configured):
 
 
 @pytest.mark.long
-def test_never_wrongly_false_in_ten_thousand_events(configured):
-    false, allowed, read = walk(configured, worlds=84, seed=1)
-    assert false >= allowed / 3 and min(allowed, read) > 1000
+@pytest.mark.parametrize("seed", range(1, 7))
+def test_never_wrongly_false_in_ten_thousand_events(configured, seed):
+    """Ten thousand in all. Each test has a time limit, and beside the busy processes of other tests a world is slow."""
+    false, allowed, read = walk(configured, worlds=14, seed=seed)
+    assert false >= allowed / 3 and min(allowed, read) > 150
