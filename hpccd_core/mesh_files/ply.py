@@ -54,7 +54,8 @@ def parse(data: bytes) -> Polygons:
     form, elements, body = _header(data)
     names = [element.name for element in elements]
     if "vertex" not in names or not {"x", "y", "z"} <= {p.name for p in elements[names.index("vertex")].properties}:
-        raise MeshFileError("has no element vertex with the properties x, y and z")
+        raise MeshFileError("has no element vertex with the properties x, y and z; export it again")
+    _check_coordinates(elements[names.index("vertex")])
     if "face" not in names:
         strips = "; it holds triangle strips: convert it to faces" if "tristrips" in names else ""
         raise MeshFileError(f"has no triangles (no element face){strips}")
@@ -124,6 +125,15 @@ def _header(data: bytes) -> tuple[str, list[_Element], int]:
 
 def _property(name: str, item_type: str, count_type: str | None) -> _Property:
     return _Property(name, np.dtype(_TYPES[item_type]), np.dtype(_TYPES[count_type]) if count_type else None)
+
+
+def _check_coordinates(element: _Element) -> None:
+    """Raises MeshFileError where a coordinate of the vertices is a list."""
+    for column in element.columns():
+        if element.properties[column].count_type is not None:
+            name = element.properties[column].name
+            raise MeshFileError(f"its property {name} of the vertices is a list; export it again with one number for each "
+                                "coordinate")  # fmt: skip
 
 
 def _list_of_vertices(element: _Element) -> int:

@@ -149,6 +149,19 @@ def _ply_elements():
     }  # fmt: skip
 
 
+def _lists_of_coordinates():
+    """(axis, format) -> a file in which that coordinate of each vertex is a list of one number, and so its length 1."""
+    points = [tuple(p) for p in VERTICES]
+    for column, axis in enumerate("xyz"):
+        types = {**_XYZ, axis: ("uchar", "float")}
+        rows = [(*p[:column], [p[column]], *p[column + 1 :]) for p in points]
+        for form in FORMS:
+            yield (axis, form), ply(form, [("vertex", types, rows), ("face", _LIST, _rows(FACES))])
+
+
+LISTS_OF_COORDINATES = dict(_lists_of_coordinates())
+
+
 def _ply():
     for name, (elements, polygons) in _ply_elements().items():
         _, types, rows = next(element for element in elements if element[0] == "vertex")

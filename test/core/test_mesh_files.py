@@ -250,6 +250,8 @@ REFUSED = {
     "cut-header.ply": (_PLY[:60], "its header does not end"),
     "no-faces.ply": (ply("ascii", variants._ply_elements()["plain"][0][:1]), "has no triangles"),
     "no-z.ply": (_ASCII_PLY.replace(b"property float z\n", b""), "no element vertex with the properties x, y and z"),
+    **{f"list-of-{axis}-{form}.ply": (data, f"its property {axis} of the vertices is a list; export it again")
+       for (axis, form), data in variants.LISTS_OF_COORDINATES.items()},
     "strips.ply": (_ASCII_PLY.replace(b"element face", b"element tristrips"), "triangle strips: convert it to faces"),
     "type.ply": (_ASCII_PLY.replace(b"float x", b"half x"), "line 4: 'property half x': not a line of a PLY header"),
     "index.ply": (_ASCII_PLY.replace(b"3 0 1 2", b"3 0 1 6"), "face 0 names vertex 6, and the file has 6"),
