@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import _core
 from ..arguments import LARGEST_COORDINATE
 from . import collada, contents, obj, ply, stl
 from .errors import MeshFileError, shortened
@@ -21,7 +22,7 @@ def load_mesh(path: str | os.PathLike[str]) -> tuple[NDArray[np.float64], NDArra
     Parameters
     ----------
     path : str or os.PathLike
-        An OBJ, PLY, STL or COLLADA (DAE) file; the suffix of its name says which. ``~`` is the home folder.
+        An OBJ, PLY, STL or COLLADA (DAE) file, told apart by suffix. ``~`` is the home folder.
 
     Returns
     -------
@@ -33,27 +34,23 @@ def load_mesh(path: str | os.PathLike[str]) -> tuple[NDArray[np.float64], NDArra
     Raises
     ------
     MeshFileError
-        There is no such file, it is cut off, damaged, or no mesh at all, it holds no triangles, or reading it needs a
-        Python package that is missing. The message names the file, the problem and the remedy.
+        The file does not exist, is truncated, damaged or not a mesh, has no triangles, or needs a Python package that
+        is not installed. The message names the file, the problem and the remedy.
     TypeError
         path is neither a string nor an os.PathLike of one.
 
     Notes
     -----
-    Materials, groups, texture coordinates, normals and colours have no influence on the numbering. An STL file repeats
-    the corners of each triangle: equal ones become one vertex, in order of first use.
+    Materials, groups, texture coordinates, normals and colours do not affect the numbering. An STL file repeats the
+    corners of each triangle: equal corners become one vertex, in order of first use.
 
-    A polygon becomes the fan of its first corner where that covers the polygon and nothing else, as for every convex
+    A polygon becomes the fan of its first corner if the fan covers exactly the polygon, which is so for every convex
     one. Other polygons are split by ear clipping in their best plane (package ``mapbox_earcut``). Polygons without area
-    become fans; a polygon that crosses itself is an error where its triangles would not have its area. Faces of fewer
+    become fans; a polygon that crosses itself is an error if its triangles would not have its area. Faces with fewer
     than three corners are ignored.
 
-    Loading a large OBJ, PLY or STL file does not hold the interpreter lock for long: other threads go on. The XML of a
-    DAE file is parsed in one call, which takes 0.3 s for a million triangles.
-
-    Python and numpy turn text and float32 into float64 here, in the floating-point mode of the calling thread: where
-    another library has set flush-to-zero, denormals-are-zero or another rounding mode, coordinates may differ in the
-    last bit, and denormal ones become 0.
+    Loading a large OBJ, PLY or STL file does not hold the interpreter lock for long, so other threads keep running. The
+    XML of a DAE file is parsed in one call, which takes 0.3 s for a million triangles.
 
     Examples
     --------
@@ -69,20 +66,22 @@ def load_mesh(path: str | os.PathLike[str]) -> tuple[NDArray[np.float64], NDArra
     """
     file = existing(path)
     try:
-        vertices, faces = _parse(file.read_bytes(), file.suffix.lower())
+        data = file.read_bytes()
+        with _core.StandardArithmetic():  # Python and numpy round in the mode of the thread
+            vertices, faces = _parse(data, file.suffix.lower())
     except MeshFileError as error:
         raise MeshFileError(f"{shortened(file)}: {error}") from error
     except OSError as error:
         raise MeshFileError(f"{shortened(file)}: cannot be read: {error.strerror}; give another file") from error
-    except (ArithmeticError, LookupError, TypeError, ValueError) as error:  # damage that no check above foresaw
+    except (ArithmeticError, LookupError, TypeError, ValueError) as error:  # damage that no other check found
         raise MeshFileError(f"{shortened(file)}: is damaged: {shortened(error)}; export it again") from error
     return vertices, faces.astype(np.uint32)
 
 
 def existing(path: str | os.PathLike[str]) -> Path:
-    """The file, whose name has one of the suffixes in FORMATS.
+    """The file with this path, which has one of the suffixes in FORMATS.
 
-    Raises MeshFileError: another suffix, or there is no such file. Raises TypeError: no path.
+    Raises MeshFileError if the suffix is another one or the file does not exist, TypeError if it is not a path.
     """
     name = os.fspath(path) if isinstance(path, os.PathLike) else path
     if not isinstance(name, str):
@@ -103,9 +102,9 @@ def existing(path: str | os.PathLike[str]) -> Path:
     raise MeshFileError(f"{shown}: no such file (relative paths start from {Path.cwd()})")
 
 
-@np.errstate(invalid="ignore")  # to convert a signalling NaN warns; `_check` refuses it
+@np.errstate(invalid="ignore")  # converting a signalling NaN warns; `_check` rejects it
 def _parse(data: bytes, suffix: str) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    # The header of a binary STL may hold anything. With bytes behind the triangles it may be an archive as well.
+    # The header of a binary STL may contain anything. With bytes after the triangles, the file may be an archive.
     if not (suffix == ".stl" and stl.is_binary(data)):
         text = not (suffix == ".stl" and stl.fits(data))
         if what := contents.foreign(data, suffix, text):
@@ -129,10 +128,10 @@ def _parse(data: bytes, suffix: str) -> tuple[NDArray[np.float64], NDArray[np.in
 
 
 def _check(vertices: NDArray[np.float64], n_faces: int) -> None:
-    """Raises MeshFileError where the core could not compute with the mesh."""
+    """Raises MeshFileError if the core would reject the mesh."""
     if not n_faces:
         raise MeshFileError("has no triangles; export the surface, not only points or lines")
-    # Two reductions, as they need no array of their own; NaN passes through both and compares false.
+    # Two reductions, because they need no further array; NaN passes through both and compares false.
     if -LARGEST_COORDINATE <= float(vertices.min()) and float(vertices.max()) <= LARGEST_COORDINATE:
         return
     finite = np.isfinite(vertices).all(axis=1)

@@ -100,6 +100,11 @@ py::array_t<double> widened(const Array<float>& from) {
   return to;
 }
 
+// The context manager StandardArithmetic of Python code that computes by itself.
+struct ArithmeticContext {
+  std::optional<StandardArithmetic> entered;
+};
+
 // Of a hpccd_core.Contacts; `kept` holds its arrays.
 ContactsOfPart part_of(const py::handle& contacts, double part, double parts, std::vector<py::array>& kept) {
   const auto read = [&]<class Row>(const char* name, std::span<const Row>& rows, auto number) {
@@ -399,6 +404,10 @@ PYBIND11_MODULE(_core, m) {
         "minimum_separation"_a);
   m.def("test_edge_edge", &run_queries<&test_edge_edge>, "queries"_a, "accuracy"_a, "simd"_a, "minimum_separation"_a);
   m.def("widened", &widened, "array"_a);
+  py::class_<ArithmeticContext>(m, "StandardArithmetic")
+      .def(py::init())
+      .def("__enter__", [](ArithmeticContext& c) { c.entered.emplace(); })
+      .def("__exit__", [](ArithmeticContext& c, const py::args&) { c.entered.reset(); });
   m.def(
       "contacts_of_step",
       [](const std::vector<std::tuple<py::object, double, double>>& answers) {

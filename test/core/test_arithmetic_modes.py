@@ -4,9 +4,11 @@
 import contextlib
 import ctypes
 import dataclasses
+import itertools
 import platform
 import struct
 
+import mesh_file_variants as variants
 import numpy as np
 import pytest
 import random_scenes
@@ -143,3 +145,44 @@ def test_equality(mode):
 
     found, expected = same(answers, MODES[mode])
     assert found == expected == [False, False, True, True, True, True, False, False]
+
+
+def mesh_files(folder):
+    """Files of each format whose numbers have to be rounded, or are denormal."""
+    rng = np.random.default_rng(4)
+    ell = 1.1 * np.array(variants.ELL)
+    denormal = [rng.normal(size=(20, 3)) * 1e-310, [[1e-40, 3e-45, -7e-39]]]
+    vertices = np.concatenate([rng.normal(size=(60, 3)), *denormal, ell])
+    n = len(vertices)
+    faces = [[k, k + 1, k + 2] for k in range(n - 2)]
+    data = {"m.obj": (variants._v(vertices) + variants._f([*faces, range(n - 6, n)])).encode(), "m.dae": dae(vertices)}
+    for kind, form in itertools.product(("float", "double"), variants.FORMS):
+        rows = [("vertex", dict.fromkeys("xyz", kind), [tuple(p) for p in vertices])]
+        rows.append(("face", {"vertex_indices": ("uchar", "int")}, [(face,) for face in faces]))
+        data[f"{kind}-{form}.ply"] = variants.ply(form, rows)
+    corners = vertices[np.array(faces)]
+    data["m.stl"], data["text.stl"] = variants.stl(triangles=corners), variants.text_stl(triangles=corners)
+    for name, content in data.items():
+        (folder / name).write_bytes(content)
+    return [folder / name for name in data]
+
+
+def dae(vertices):
+    import test_collada_files  # skips where pycollada is missing
+
+    return test_collada_files.dae(
+        vertices=vertices,
+        asset='<unit name="inch" meter="0.0254"/>',
+        nodes='<node><rotate>1 2 3 40</rotate><instance_geometry url="#g"/></node>',
+    ).encode()
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_mesh_files(mode, tmp_path):
+    pytest.importorskip("mapbox_earcut")
+    for file in mesh_files(tmp_path):
+        found, expected = same(lambda file=file: hc.load_mesh(file), MODES[mode])
+        for x, y in zip(found, expected, strict=True):
+            assert x.tobytes() == y.tobytes(), file.name
+    with arithmetic(MODES[mode]), pytest.raises(hc.MeshFileError):
+        hc.load_mesh(tmp_path / "none.obj")
