@@ -152,6 +152,17 @@ def test_normals_of_short_gaps_at_the_start(kind):
                 assert_along(normal, exact_geometry.unit(gap), 1e-9)
 
 
+@KINDS
+def test_normals_of_denormal_gaps(kind):
+    """Positions between whole multiples of 2^-1074 are rounded to them: by as much as these gaps are long."""
+    queries = np.random.default_rng(5).integers(-20, 21, (400, 8, 3)).astype(float)
+    near = queries[TEST[kind](queries, minimum_separation=1.0)[0]]
+    assert len(near) > 30
+    for query in near:
+        _, _, expected = normal_of(kind, query, 1.0)
+        assert_along(normal_of(kind, query * 2.0**-1074, 2.0**-1074)[2], expected)
+
+
 def test_what_touches_at_the_start_has_the_normal_of_plain_contact():
     floor = [(0, 0, 0), (1, 0, 0), (0, 1, 0)]
     toc, _, normal = normal_of(VERTEX_FACE, [(0.25, 0.25, 0), *floor, (0.25, 0.25, -1), *floor], 1e-300)
