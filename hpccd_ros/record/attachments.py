@@ -9,7 +9,6 @@ from typing import Any
 
 from hpccd_core import MeshFileError
 from hpccd_core.mesh_files.load import existing
-from hpccd_ros.base.errors import UserError
 from hpccd_ros.base.quoting import shortened
 from hpccd_ros.middleware import robot_files
 from hpccd_ros.params import robot_parameters
@@ -67,7 +66,7 @@ def files(parameters: dict) -> tuple[Files, list[str]]:
 
 
 def _named_by(robot: str, values: Mapping[str, Any], data: bytes) -> tuple[Files, list[str]]:
-    """`link_meshes` of the content of a file."""
+    """`link_meshes` of the description in a file."""
     try:
         return link_meshes(robot, values, decoded(data))
     except RobotError:
@@ -90,7 +89,7 @@ def link_meshes(robot: str, values: Mapping[str, Any], text: str) -> tuple[Files
             break
         try:
             file = str(existing(find(uri)))  # of a stranger's description: nothing but meshes, and no devices
-        except (MeshFileError, UserError) as error:
+        except MeshFileError as error:
             missing.append(_missing(f"mesh file {shortened(uri)}", error))
             continue
         _read(f"mesh file {shortened(uri)}", link_mesh_name(robot, uri), file, found, missing)

@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 
 from hpccd_core import MeshFileError, load_mesh
-from hpccd_ros.base.errors import UserError
 from hpccd_ros.base.quoting import quoted, shortened
 from hpccd_ros.frames.coordinates import unusable_coordinates
 from hpccd_ros.robots import solids
@@ -54,7 +53,7 @@ class LinkMeshes:
         for part in link.geometry:
             try:
                 corners, triangles = self._of_shape(part)
-            except (RobotError, MeshFileError, UserError) as error:
+            except (RobotError, MeshFileError) as error:
                 raise RobotError(f"{DOCUMENT}, line {part.line}: link {quoted(link.name)}: {error}") from error
             self._triangles += len(triangles)
             if self._triangles > MOST_TRIANGLES:

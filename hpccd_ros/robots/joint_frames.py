@@ -13,10 +13,10 @@ from hpccd_ros.frames.drops import Aspect, Reason, Refusal
 from hpccd_ros.frames.follower import Followed
 from hpccd_ros.frames.standstill import Standstill
 from hpccd_ros.frames.transform_buffer import NoTransformError, TransformBuffer
-from hpccd_ros.frames.types import UNTOLD, MeshFrame
+from hpccd_ros.frames.types import MeshFrame
 from hpccd_ros.rigid.transform import Rigid
 from hpccd_ros.robots.errors import RobotError
-from hpccd_ros.robots.joint_history import Added, JointHistory, NoJointStateError
+from hpccd_ros.robots.joint_history import JointHistory, NoJointStateError
 from hpccd_ros.robots.robot import Robot
 
 
@@ -45,6 +45,7 @@ class JointFrames:
         self._target = target
         self._most_waiting = most_waiting
         self._history = JointHistory(robot.kinematics)
+        self.add = self._history.add  # joint states
         self._waiting: deque[_Asked] = deque()
         self._standstill = Standstill()
 
@@ -55,18 +56,6 @@ class JointFrames:
     @property
     def begun(self) -> int:
         return self._history.begun
-
-    def add(
-        self,
-        stamp: int,
-        names: Sequence[str],
-        positions: Sequence[float],
-        sent: int = UNTOLD,
-        publisher: int | None = None,
-    ) -> Added:
-        """A joint state; sent, publisher: as of `JointHistory.add`. Raises RobotError, and then nothing of it is
-        kept."""
-        return self._history.add(stamp, names, positions, sent, publisher)
 
     def ask(self, stamp: int, received: float, new_publisher: bool) -> None:
         self._waiting.append(_Asked(stamp, received, new_publisher))
