@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Search for the scenes that cost most for their size: `python -m hpccd_core.fuzz.slowest_scenes --help`."""
+"""Search for scenes that take long for their size: `python -m hpccd_core.fuzz.slowest_scenes --help`."""
 
 from __future__ import annotations
 
@@ -27,64 +27,64 @@ TURNS = ("none", "octant", "any")
 PARSER = argparse.ArgumentParser(
     prog="python -m hpccd_core.fuzz.slowest_scenes",
     formatter_class=argparse.RawDescriptionHelpFormatter,
-    description="Search for scenes that take much processor time for their size, by changing the slowest ones found.",
+    description="Search for scenes that take long for their size, by mutating the slowest ones found so far.",
     epilog="""\
-A scene is a few meshes: grids, bundles of bars, fans (triangles around one vertex), domes (spheres), single points and
-many small bodies. Each is squeezed along an axis, turned, scaled and shifted; meshes may be stacked, nested or far
-apart, rest at the separation, fall, or be one of several worlds; one vertex may be far away. All of these are numbers
-that the search changes.
+A scene has a few meshes: grids, bundles of bars, fans (triangles around one vertex), domes (spheres), single points or
+many small bodies. Each is squeezed along an axis, rotated, scaled and shifted. Meshes may be stacked, nested or far
+apart, rest at the separation, or fall; a scene may have several worlds, and one vertex far away. The search mutates
+these numbers.
 
-The cost of a scene is the processor time of one query with one thread, divided by its features (vertices, edges and
-triangles) and results, and by the same for a cloth over a ball of the same size. Ordinary scenes cost between 0.3 and
-3; from 10 on a scene is worth a look. Results count as features, so a scene is not slow because much is near; of a
-query that was cancelled (--most) they are not known.
+The cost of a scene is the CPU time of one query on one thread, divided by the number of features (vertices, edges and
+triangles) plus results, relative to a cloth over a ball of the same size. Ordinary scenes cost 0.3 to 3; a cost of 10
+or more deserves a look. Results count like features, so a scene is not slow just because it has many; for a cancelled
+query (--most) their number is unknown.
 
 Examples:
   python -m hpccd_core.fuzz.slowest_scenes --seconds 300 --query proximity
   python -m hpccd_core.fuzz.slowest_scenes --seconds 60 --save slowest.json
-  python -m hpccd_core.fuzz.slowest_scenes --again slowest.json     # measure those again
+  python -m hpccd_core.fuzz.slowest_scenes --again slowest.json     # measure the saved scenes again
 """,
 )
 PARSER.add_argument("--seconds", type=float, default=60.0, help="how long to search (default 60)")
 PARSER.add_argument("--query", choices=(*QUERIES, "all"), default="all", help="which query to slow down (default all)")
-PARSER.add_argument("--triangles", type=int, default=1500, help="about so many triangles a scene (default 1500)")
-PARSER.add_argument("--keep", type=int, default=8, help="so many scenes of each query (default 8)")
+PARSER.add_argument("--triangles", type=int, default=1500, help="triangles in each scene, about (default 1500)")
+PARSER.add_argument("--keep", type=int, default=8, help="number of slowest scenes to keep for each query (default 8)")
 PARSER.add_argument("--most", type=float, default=3.0, help="seconds after which a query is cancelled (default 3)")
-PARSER.add_argument("--seed", type=int, default=0, help="of the random numbers; times decide too, so runs differ")
-PARSER.add_argument("--save", type=Path, help="a .json file for the slowest scenes of each query")
-PARSER.add_argument("--again", type=Path, help="a .json file of --save whose scenes are measured instead of a search")
+PARSER.add_argument("--seed", type=int, default=0, help="random seed; runs still differ, because times do (default 0)")
+PARSER.add_argument("--save", type=Path, help="write the slowest scenes of each query to this .json file")
+PARSER.add_argument("--again", type=Path, help="measure the scenes of this .json file of --save; do not search")
 
 
 @dataclass
 class Part:
-    """One mesh of a scene; lengths in units of the first one's size."""
+    """One mesh of a scene. Lengths are in units of the first mesh's size."""
 
     shape: str = "grid"
     share: float = 1.0  # of the scene's triangles
     scale: float = 0.0  # log10 of its size
-    squeezed: float = 0.0  # log10 of by how much along its z axis
+    squeezed: float = 0.0  # log10 of the factor along its z axis
     turn: str = "none"
-    direction: tuple[float, float, float] = (1.0, 1.0, 1.0)  # where its z axis is turned to
+    direction: tuple[float, float, float] = (1.0, 1.0, 1.0)  # of its z axis after the rotation
     shift: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    distance: float = 0.0  # log10 of what the shift is multiplied by
-    rough: float = 0.0  # noise, beside its size
+    distance: float = 0.0  # log10 of a factor of the shift
+    rough: float = 0.0  # noise, relative to the spacing of its vertices
     self_collision: bool = True
 
 
 @dataclass
 class Shape:
-    """A scene as numbers: what the search changes."""
+    """A scene as the numbers that the search mutates."""
 
     parts: list[Part] = dataclasses.field(default_factory=lambda: [Part()])
-    far: float = 0.0  # log10 of how far away one vertex is; 0: none is
-    fall: float = -2.0  # log10 of the way that the last part goes
+    far: float = 0.0  # log10 of the distance of one vertex far away; 0: there is none
+    fall: float = -2.0  # log10 of the last part's displacement
     separation: float = -2.0  # log10 of the separation or distance
     at_rest: bool = False  # the last part lies on the others at the separation
     worlds: int = 1
 
 
 def triangles_of(part: Part, n: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Faces, edges beside theirs, and positions of size 1, of about n triangles."""
+    """Faces, further edges, and positions of size 1, of about n triangles."""
     faces, edges = np.empty((0, 3), int), np.empty((0, 2), int)
     side = max(2, round(np.sqrt(n / 2)) + 1)
     if part.shape == "grid":
@@ -92,7 +92,7 @@ def triangles_of(part: Part, n: int, rng: np.random.Generator) -> tuple[np.ndarr
         x = x / (side - 1)
     elif part.shape == "dome":
         faces, x = grid(side, side)
-        # Open at the poles and along one meridian: vertices that nearly coincide take long by themselves.
+        # Open at the poles and along one meridian: nearly coincident vertices would be slow in any scene.
         u, v = np.pi * (0.96 * x[:, 1] / (side - 1) + 0.5), 1.98 * np.pi * x[:, 0] / (side - 1)
         x = 0.5 * np.stack([np.sin(u) * np.cos(v), np.sin(u) * np.sin(v), np.cos(u)], 1)
     elif part.shape == "fan":
@@ -173,7 +173,7 @@ def _edges(faces: np.ndarray, edges: np.ndarray) -> np.ndarray:
 
 
 def asked(query: str, case: Case) -> tuple[Any, Callable[[], int]]:
-    """A detector, and what asks it once and returns the number of results."""
+    """A detector, and a function that runs the query once and returns the number of results."""
     options: dict[str, Any] = {"minimum_separation": case.separation} if query == "separation" else {}
     if case.worlds > 1:
         options["worlds"] = case.worlds
@@ -190,8 +190,8 @@ def asked(query: str, case: Case) -> tuple[Any, Callable[[], int]]:
 
 
 def seconds_of(query: str, case: Case, most: float) -> tuple[float, int]:
-    """Processor time of the second call, as the first one builds the tree, and the number of results: -1 where one of
-    them was cancelled."""
+    """CPU time of the second call, because the first one builds the tree, and the number of results, or -1 if a call
+    was cancelled."""
     detector, ask = asked(query, case)
     for _ in range(2):
         late = threading.Timer(most, detector.cancel)
@@ -210,7 +210,7 @@ def seconds_of(query: str, case: Case, most: float) -> tuple[float, int]:
 
 
 def ordinary(query: str, triangles: int) -> float:
-    """Seconds for each feature and result of a cloth over a ball."""
+    """CPU seconds per feature and result of a cloth over a ball."""
     cloth, ball = Part(share=1, rough=0.2, shift=(0, 0, 0.52)), Part(shape="dome", share=1)
     case = case_of(Shape(parts=[ball, cloth], separation=-2.0, fall=-1.5), triangles)
     seconds, results = min(seconds_of(query, case, 60) for _ in range(5))
@@ -306,7 +306,7 @@ def show(found: list[Found], console: Console) -> None:
 
 
 def _description(shape: Shape) -> str:
-    """What differs from the defaults."""
+    """The fields that differ from their defaults."""
 
     def differing(x: Any, default: Any) -> str:
         fields = [f.name for f in dataclasses.fields(x) if f.name != "parts"]

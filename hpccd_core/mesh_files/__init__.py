@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Vertices and triangles of mesh files, numbered as in the file."""
+"""Readers of mesh files: vertices and triangles, numbered as in the file."""

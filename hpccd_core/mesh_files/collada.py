@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 from .errors import MeshFileError, shortened
 from .polygons import Polygons
 
-# Libraries and instances that say how it looks or moves. Broken references in them are common, and no matter here.
+# Libraries and instances for appearance and animation. Broken references in them are common and do not matter here.
 _LOOKS = ("library_images", "library_materials", "library_effects", "library_lights", "library_cameras",
           "library_animations", "library_animation_clips", "bind_material", "instance_light", "instance_camera",
           "extra")  # fmt: skip
-# Nodes of a scene, each counted as often as it is instantiated: files whose nodes instantiate each other make millions.
+# Nodes of a scene, each counted as often as it is instantiated: nodes that instantiate each other can make millions.
 MOST_NODES = 100_000
 _NOT_FINITE = "has a position that is not finite; export it again"
 
@@ -40,7 +40,7 @@ def parse(data: bytes) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         return _parse(collada, data)
     except MeshFileError:
         raise
-    except Exception as error:  # pycollada raises whatever its parsers meet
+    except Exception as error:  # pycollada passes on any exception of its parsers
         why = shortened(" ".join(str(error).split())) or type(error).__name__
         raise MeshFileError(f"cannot be read: {why}") from error
 
@@ -48,7 +48,7 @@ def parse(data: bytes) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
 def _parse(collada: Any, data: bytes) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     root = ElementTree.fromstring(data)
     if root.find(".//{*}instance_controller") is not None:
-        raise MeshFileError("has geometry that a skeleton or morph moves (instance_controller); export it without")
+        raise MeshFileError("has geometry moved by a skeleton or morph (instance_controller); export it without that")
     _drop(root, _LOOKS)
     for mesh in root.iterfind(".//{*}mesh"):
         _check_positions(mesh)
@@ -59,9 +59,9 @@ def _parse(collada: Any, data: bytes) -> tuple[NDArray[np.float64], NDArray[np.i
         raise MeshFileError("has no scene; export it again")
     vertices, faces, count = [np.empty((0, 3))], [np.empty((0, 3), np.int64)], 0
     for geometry, matrix in _instances(collada, document.scene.nodes):
-        offsets: dict[int, int] = {}  # of arrays of positions, which primitives of a geometry may share
+        offsets: dict[int, int] = {}  # by id of the array of positions, which several primitives may share
         for primitive in geometry.primitives:
-            # Lines have no triangles; what has no corners has no positions either.
+            # Lines have no triangles; a primitive without corners has no positions either.
             if isinstance(primitive, collada.lineset.LineSet) or primitive.vertex is None:
                 continue
             positions = primitive.vertex
@@ -82,15 +82,15 @@ def _drop(element: Any, names: tuple[str, ...]) -> None:
 
 
 def _check_positions(mesh: Any) -> None:
-    """Raises MeshFileError where pycollada would read others than the file holds: it makes 0 of NaN, and takes no heed
-    of count, stride and offset."""
+    """Raises MeshFileError if pycollada would misread the positions: it turns NaN into 0, and ignores count, stride and
+    offset."""
     sources = {f"#{source.get('id')}": source for source in mesh.iterfind("{*}source")}
     for given in mesh.iterfind("{*}vertices/{*}input[@semantic='POSITION']"):
         source = sources.get(given.get("source"))
         array = None if source is None else source.find("{*}float_array")
         accessor = None if source is None else source.find("{*}technique_common/{*}accessor")
         if array is None or accessor is None:
-            continue  # pycollada says so
+            continue  # pycollada raises the error
         numbers = _numbers(array, np.float64)
         if not np.isfinite(numbers).all():
             raise MeshFileError(_NOT_FINITE)
@@ -100,8 +100,8 @@ def _check_positions(mesh: Any) -> None:
 
 
 def _check_faces(mesh: Any) -> None:
-    """Raises MeshFileError where pycollada would read others than the file holds: it leaves out holes and all but the
-    first list of triangles, keeps 32 bits of each index, and takes no heed of count."""
+    """Raises MeshFileError if pycollada would misread the faces: it ignores holes, count and all lists of triangles but
+    the first one, and keeps 32 bits of each index."""
     if mesh.find(".//{*}ph") is not None:
         raise MeshFileError("has polygons with holes (ph); split them into triangles where the file was made")
     for kind in ("triangles", "polylist", "polygons"):
@@ -129,7 +129,7 @@ def _numbers(element: Any, of: type) -> NDArray[Any]:
 
 def _check_count(element: Any, what: str, held: float) -> None:
     if (count := element.get("count")) is not None and int(count) != held:
-        raise MeshFileError(f"says {int(count)} {what} and holds {held:g}; copy or export it again")
+        raise MeshFileError(f"declares {int(count)} {what} but contains {held:g}; copy or export it again")
 
 
 def _unit(document: Any) -> float:
@@ -143,7 +143,7 @@ def _unit(document: Any) -> float:
 
 
 def _instances(collada: Any, nodes: list[Any]) -> Iterator[tuple[Any, NDArray[Any]]]:
-    """(geometry, where it is placed) for each instance, in the order of the scene."""
+    """(geometry, its transform) for each instance, in the order of the scene."""
     waiting = [(node, np.eye(4)) for node in reversed(nodes)]
     visited = 0
     while waiting:
@@ -170,6 +170,8 @@ def _triangles(collada: Any, primitive: Any) -> NDArray[np.int64]:
         return corners.reshape(-1, 3)
     counts = np.asarray(primitive.vcounts, np.int64)
     if (counts < 0).any() or counts.sum() != len(corners):
-        raise MeshFileError(f"has polygons of {counts.sum()} corners and lists {len(corners)}; export it again")
+        raise MeshFileError(
+            f"its polygons have {counts.sum()} corners but {len(corners)} are listed; copy or export it again"
+        )
     large = counts >= 3
     return Polygons(positions, corners[np.repeat(large, counts)], counts[large]).triangles()

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Files that are no mesh, or a mesh of another format than their name says: what they are instead."""
+"""Recognise files that are not a mesh, or a mesh of another format than their suffix says."""
 
 from . import lines
 
 _EXPORT = "export the mesh as OBJ, PLY, STL or DAE"
 _UNPACK = "unpack it"
 
-# (first bytes, what it is, remedy). Formats that are read name their suffix.
+# (first bytes, description, remedy). The remedy for a supported format is its suffix.
 _BEGINNINGS: tuple[tuple[bytes, str, str], ...] = (
     (b"PK\x03\x04", "a zip archive", _UNPACK),
     (b"PK\x05\x06", "an empty zip archive", "get the mesh itself"),
@@ -37,16 +37,16 @@ _TEXTS: tuple[tuple[bytes, str, str], ...] = (
     (b"off\n", "an OFF file", _EXPORT),
     (b"{", "a JSON file", _EXPORT),
 )
-# Where the beginning is what the format itself begins with.
+# Beginnings that are right for a suffix.
 _OWN = {".ply": (b"ply\n", b"ply\r"), ".stl": (b"solid",), ".dae": (b"<?xml", b"<collada")}
 
 
 def foreign(data: bytes, suffix: str, text: bool = True) -> str | None:
-    """What a file of such a name is, with the remedy, where it is obvious that it is something else.
+    """Description and remedy if a file with this suffix is obviously something else, or None.
 
-    text: it may be a text.
+    text: whether it may be a text file.
     """
-    # The beginning first: to strip a whole file of many megabytes copies it and keeps other threads waiting.
+    # The beginning first: stripping a whole file of many megabytes copies it and blocks other threads.
     if not data[:512].strip() and not data.strip():
         return "is empty; copy or export it again"
     if not data[:512].strip(b"\0") and not data.strip(b"\0"):

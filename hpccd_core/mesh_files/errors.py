@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The error of files that cannot be read as meshes."""
+"""The error for files that cannot be read as meshes."""
 
-# Of a path or of a library's message: longer ones are cut in the middle.
+# Characters of a path or of a library's message; longer ones are cut in the middle.
 LONGEST = 200
 
 
@@ -10,7 +10,7 @@ class MeshFileError(ValueError):
 
 
 def shortened(text: object) -> str:
-    """Beginning and end of a text that is longer than LONGEST, and its length."""
+    """The text; only its beginning, its length and its end if it is longer than LONGEST."""
     whole = str(text)
     if len(whole) <= LONGEST:
         return whole

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 BOM = b"\xef\xbb\xbf"
 
-# Bytes. A call that splits or converts a whole file of many megabytes would keep other threads waiting.
+# Bytes. Splitting or converting a whole file of many megabytes in one call would block other threads.
 CHUNK = 1 << 18
 
 
@@ -20,7 +20,7 @@ def chunks(data: bytes, start: int = 0) -> Iterator[list[bytes]]:
 
 
 def _after_line_end(data: bytes, start: int, end: int) -> int:
-    """Where the last line that begins before ``end`` is over."""
+    """The byte after the last line that begins before ``end``."""
     last = max(data.rfind(b"\n", start, end), data.rfind(b"\r", start, end))
     if last < 0:  # a line longer than a chunk
         ends = [at for at in (data.find(b"\n", end), data.find(b"\r", end)) if at >= 0]
@@ -29,12 +29,12 @@ def _after_line_end(data: bytes, start: int, end: int) -> int:
 
 
 def words(line: bytes) -> list[bytes]:
-    """Of a line of numbers. Python reads 1_0 as a number and no format does: such words become empty ones."""
+    """The words of a line of numbers. Words like 1_0, a number in Python but in no mesh format, become empty."""
     found = line.split()
     return [b"" if b"_" in word else word for word in found] if b"_" in line else found
 
 
 def shown(line: bytes) -> str:
-    """The beginning of a line for messages."""
+    """The beginning of a line, for error messages."""
     text = line.decode("utf-8", "backslashreplace").strip()
     return repr(text if len(text) <= 60 else text[:60] + "...")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Wavefront OBJ: the lines v and f. All others say how the mesh looks, or hold lines, points and curves."""
+"""Wavefront OBJ: the lines v and f. All others are about appearance, or are lines, points and curves."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,23 +19,23 @@ def parse(data: bytes) -> Polygons:
 
 
 class _Reader:
-    """Makes arrays chunk by chunk: to convert a list of the whole file would be one long call."""
+    """Makes arrays chunk by chunk: converting a list of the whole file would be one long call."""
 
     def __init__(self) -> None:
         self._line = 0
-        self._pending = b""  # of a line that goes on in the next one
+        self._pending = b""  # beginning of a line that continues on the next one
         self._n_vertices = 0
         self._positions = [np.empty((0, 3))]
         self._corners = [np.empty(0, np.int64)]
-        self._faces = [np.empty((3, 0), np.int64)]  # number of corners, largest of them, line
+        self._faces = [np.empty((3, 0), np.int64)]  # rows: number of corners, largest corner, line
 
     def read_alike(self, chunk: list[bytes]) -> bool:
-        """Read lines that are all vertices of three numbers, or all triangles; most of a large file are.
+        """Read lines that are all vertices of three numbers, or all triangles, as most of a large file is.
 
-        False where they are not, and nothing was read.
+        Returns False, having read nothing, if they are not.
         """
         joined, n = b" ".join(chunk), len(chunk)
-        if b"_" in joined:  # of a name, or of what Python alone takes for a number
+        if b"_" in joined:  # in a name, or in a word that only Python takes for a number
             return False
         words = joined.split()
         if self._pending or len(words) != 4 * n or words[0] not in (b"v", b"f") or words[::4] != [words[0]] * n:
@@ -53,7 +53,7 @@ class _Reader:
                 self._corners.append(corners.reshape(-1) - 1)
                 self._faces.append(np.stack([np.full(n, 3), corners.max(axis=1), numbers]))
         except (ValueError, OverflowError):
-            return False  # `read` says which line it is
+            return False  # `read` reports the line
         self._line += n
         return True
 
@@ -71,14 +71,14 @@ class _Reader:
                 continue
             if b"#" in line or b"\\" in line or b"_" in line:
                 line = line.partition(b"#")[0].rstrip()
-                # Only of v and f: a comment or a name that ends with a backslash must not swallow the next vertex.
+                # Only for v and f: a comment or a name that ends with a backslash must not swallow the next vertex.
                 if line.endswith(b"\\"):
                     self._pending = line[:-1]
                     continue
                 words = lines.words(line)
             try:
                 if words[0] == b"v":
-                    _, x, y, z = words[:4]  # behind them a weight or a colour
+                    _, x, y, z = words[:4]  # a weight or a colour may follow
                     coordinates += (float(x), float(y), float(z))
                 elif len(words) > 3:  # otherwise a point or a line
                     face = _face(words, self._n_vertices + len(coordinates) // 3)
@@ -98,7 +98,7 @@ class _Reader:
         self._faces.append(np.array(faces, np.int64).reshape(-1, 3).T)
 
     def polygons(self) -> Polygons:
-        """All that was read. Raises MeshFileError."""
+        """All polygons read. Raises MeshFileError."""
         if self._pending:
             line, self._pending = self._pending, b""
             self.read([line])
@@ -112,12 +112,12 @@ class _Reader:
 
 
 def _face(words: list[bytes], n_vertices: int) -> list[int]:
-    """Its vertices, counted from 1. Raises ValueError."""
+    """The vertices of a face, counted from 1. Raises ValueError."""
     corners = [int(word.partition(b"/")[0]) for word in words[1:]]
     if min(corners) <= 0:
         if 0 in corners:
             raise ValueError("vertices count from 1")
-        # From the last vertex above the line backwards.
+        # Negative numbers count backwards from the last vertex above the line.
         corners = [corner if corner > 0 else n_vertices + corner + 1 for corner in corners]
         if min(corners) <= 0:
             raise ValueError("no such vertex")
@@ -127,7 +127,7 @@ def _face(words: list[bytes], n_vertices: int) -> list[int]:
 
 
 def triangles(polygons: Polygons) -> NDArray[np.int64]:
-    """In the order of the file; of a file of quads alone first one triangle of each, then the other."""
+    """Triangles in the order of the file; if it has only quads, first one triangle of each, then the other."""
     faces = polygons.triangles()
     second = polygons.second_of_quads()
     if not second.any():

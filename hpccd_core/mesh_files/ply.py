@@ -28,7 +28,7 @@ _LISTS_OF_VERTICES = ("vertex_indices", "vertex_index")
 class _Property:
     name: str
     type: np.dtype[Any]
-    count_type: np.dtype[Any] | None  # of a list
+    count_type: np.dtype[Any] | None  # type of the length of a list; None: not a list
 
 
 @dataclasses.dataclass
@@ -41,7 +41,7 @@ class _Element:
         return any(p.count_type is not None for p in self.properties)
 
     def columns(self) -> list[int]:
-        """Of x, y and z among the properties."""
+        """The places of x, y and z among the properties."""
         names = [p.name for p in self.properties]
         return [names.index(axis) for axis in "xyz"]
 
@@ -81,7 +81,7 @@ def parse(data: bytes) -> Polygons:
 
 
 def triangles(polygons: Polygons) -> NDArray[np.int64]:
-    """First the triangles of the file, then one of each quad, then the other of each, then those of larger polygons."""
+    """The triangles of the file, then the first ones of quads, then the second ones, then those of larger polygons."""
     faces = polygons.triangles()
     if (polygons.counts == 3).all():
         return faces
@@ -132,12 +132,11 @@ def _check_coordinates(element: _Element) -> None:
     for column in element.columns():
         if element.properties[column].count_type is not None:
             name = element.properties[column].name
-            raise MeshFileError(f"its property {name} of the vertices is a list; export it again with one number for each "
-                                "coordinate")  # fmt: skip
+            raise MeshFileError(f"property {name} of its vertices is a list; export it again with single numbers")
 
 
 def _list_of_vertices(element: _Element) -> int:
-    """Which property of the faces it is."""
+    """The number of the property of the faces that lists their vertices."""
     lists = [k for k, p in enumerate(element.properties) if p.count_type is not None]
     named = [k for k in lists if element.properties[k].name in _LISTS_OF_VERTICES]
     if named or len(lists) == 1:
@@ -151,7 +150,7 @@ def _cut_off(element: _Element) -> MeshFileError:
 
 
 class _Text:
-    """The rows of an ASCII body: one a line. What a line holds beyond its properties is ignored."""
+    """The rows of an ASCII body, one per line. Words after the last property of a line are ignored."""
 
     def __init__(self, data: bytes, body: int) -> None:
         self._rows = self._of(data, body)
@@ -192,7 +191,7 @@ class _Text:
         together = np.concatenate(found)
         for axis, column in enumerate(columns):
             if (of := element.properties[column].type).kind == "f":
-                with np.errstate(over="ignore"):  # infinite then, which the loader refuses
+                with np.errstate(over="ignore"):  # the result is infinite, which the loader rejects
                     together[:, axis] = together[:, axis].astype(of)  # as a binary file would hold it
         return together
 
@@ -217,12 +216,12 @@ class _Text:
 
 
 def _parts(count: int) -> Iterator[range]:
-    """Of a number of rows: few at a time, so that no call converts all of them."""
+    """Ranges of rows, few at a time, so that no call converts all of them."""
     return (range(start, min(start + 10_000, count)) for start in range(0, count, 10_000))
 
 
 def _places(element: _Element, words: list[bytes], number: int, line: bytes) -> list[int]:
-    """Where in the row each property begins; of a list that is its length."""
+    """The word at which each property of the row begins; a list begins with its length."""
     places, at = [], 0
     try:
         for one in element.properties:
@@ -236,7 +235,7 @@ def _places(element: _Element, words: list[bytes], number: int, line: bytes) -> 
 
 
 def _integer(word: bytes) -> int:
-    """Some programs write the list of vertices as float."""
+    """The word as an integer. Some programs write the list of vertices as float."""
     try:
         integer = int(word)
     except ValueError:
@@ -250,7 +249,7 @@ def _integer(word: bytes) -> int:
 
 def _unusable(number: int, line: bytes) -> MeshFileError:
     return MeshFileError(
-        f"line {number}: {lines.shown(line)}: does not hold the values that the header lists; export it again"
+        f"line {number}: {lines.shown(line)}: does not have the values that the header lists; export it again"
     )
 
 
@@ -299,7 +298,7 @@ class _Bytes:
         return counts, corners
 
     def _uniform(self, element: _Element) -> NDArray[Any] | None:
-        """All rows as one structured array, and moves on; None where lists differ in length from row to row."""
+        """All rows as one structured array; moves on. None if lists differ in length from row to row."""
         fields: list[tuple[str, np.dtype[Any], tuple[int, ...]]] = []
         lengths: dict[str, int] = {}
         at = self._at
@@ -332,9 +331,10 @@ class _Bytes:
         return _checked_length(np.frombuffer(self._data, of, 1, at)[0])
 
     def _ragged(self, element: _Element, which: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """(first byte, length) of the property ``which`` of each row, and moves on; a number has the length 1."""
+        """(first byte, length) of the property ``which`` of each row; moves on. A number has length 1."""
+        # Bytes to skip, type of the length, bytes of an item, whether it is the property ``which``.
         steps: list[tuple[int, struct.Struct | None, int, bool]] = []
-        before = 0  # bytes of the numbers before a list, or before the property; then length, bytes of an item, wanted
+        before = 0  # bytes of the numbers before a list, or before the property
         for k, one in enumerate(element.properties):
             if one.count_type is not None:
                 counter = struct.Struct(self._order + _CODES[one.count_type.str[1:]])
@@ -372,12 +372,12 @@ class _Bytes:
 
 def _checked_length(number: float) -> int:
     if not (math.isfinite(number) and number >= 0 and number == int(number)):
-        raise MeshFileError(f"has a list of length {number}; it is damaged: copy or export it again")
+        raise MeshFileError(f"is damaged: it has a list of length {number}; copy or export it again")
     return int(number)
 
 
 def _integers(indices: NDArray[Any]) -> NDArray[np.int64]:
-    """Some programs write the list of vertices as float."""
+    """The indices as integers. Some programs write the list of vertices as float."""
     with np.errstate(invalid="ignore"):
         integers: NDArray[np.int64] = indices.astype(np.int64)
     if indices.dtype.kind == "f" and (integers != indices).any():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Polygons become triangles: the fan of the first corner where that is a triangulation, else ear clipping."""
+"""Triangulate polygons: by the fan of the first corner if that is a triangulation, otherwise by ear clipping."""
 
 import dataclasses
 import importlib
@@ -10,17 +10,17 @@ from numpy.typing import NDArray
 
 from .errors import MeshFileError
 
-# Rounding of the sums below, for polygons of size 1.
+# Bound on the rounding of the sums below, for polygons of size 1.
 ROUNDING = 1e-12
-# Coordinates of most files were float32 at some time: a polygon may cross itself by that much of its coordinates.
+# The coordinates of most files were float32 once: rounding may make a polygon cross itself by this relative amount.
 FLOAT32 = 1e-7
-# Ear clipping is quadratic and holds the interpreter lock: 0.03 s for so many corners, 13 s for 100,000.
+# Ear clipping is quadratic and holds the interpreter lock: 0.03 s for this number of corners, 13 s for 100,000.
 MOST_CORNERS = 8_000
 
 
 @dataclasses.dataclass(frozen=True)
 class Polygons:
-    """Polygons of a file, and the vertices that they name.
+    """The polygons of a file and its vertices.
 
     Parameters
     ----------
@@ -29,7 +29,7 @@ class Polygons:
     corners : (sum of counts,) int64
         The vertices of each polygon, one polygon after the other.
     counts : (P,) int64
-        How many corners each polygon has, at least 3.
+        The number of corners of each polygon, at least 3.
     """
 
     vertices: NDArray[np.float64]
@@ -44,8 +44,8 @@ class Polygons:
         Raises
         ------
         MeshFileError
-            A polygon crosses itself such that its triangles have another area, or ``mapbox_earcut`` is missing and a
-            polygon needs it.
+            A polygon crosses itself in such a way that its triangles have another area, or a polygon needs
+            ``mapbox_earcut`` and it is not installed.
         """
         if (self.counts == 3).all():
             return self.corners.reshape(-1, 3)
@@ -64,14 +64,14 @@ class Polygons:
         return faces
 
     def second_of_quads(self) -> NDArray[np.bool_]:
-        """Of each triangle of `triangles`: is it the second one of a polygon of four corners?"""
+        """Whether each triangle of `triangles` is the second one of a quad."""
         of_each = self.counts - 2
         second = np.zeros(int(of_each.sum()), bool)
         second[np.cumsum(of_each)[self.counts == 4] - 1] = True
         return second
 
     def _fans(self, faces: NDArray[np.int64]) -> NDArray[np.bool_]:
-        """Of each polygon: is its fan a triangulation? Also true where it has no area: then any one would do."""
+        """Whether the fan of each polygon is a triangulation. Also true for polygons without area: any one will do."""
         fine: NDArray[np.bool_] = self.counts == 3
         large = np.flatnonzero(~fine)
         of_each = (self.counts - 2)[large]
@@ -79,7 +79,7 @@ class Polygons:
         rows = faces[np.repeat(~fine, self.counts - 2)]
         first, sides = self.vertices[rows[:, 0]], self.vertices[rows[:, 1:]]
         sides = sides - first[:, None]
-        # Each polygon by its own size: products of coordinates up to 1e150 must neither overflow nor vanish.
+        # Scale each polygon by its own size: products of coordinates up to 1e150 must neither overflow nor underflow.
         size = np.maximum.reduceat(np.abs(sides).max(axis=(1, 2), initial=0.0), starts)
         sides = sides / np.repeat(np.where(size > 0, size, 1.0), of_each)[:, None, None]
         areas = np.cross(sides[:, 0], sides[:, 1])
@@ -90,7 +90,7 @@ class Polygons:
         normal = np.repeat(total / np.where(length > 0, length, 1.0)[:, None], of_each, axis=0)
         height = (areas * normal).sum(axis=1)  # twice the area of each triangle in the best plane, with its sign
         turned = np.minimum.reduceat(height, starts) < -ROUNDING
-        # Round its first corner a polygon turns by less than a full turn; more is a spiral, which overlaps itself.
+        # Seen from its first corner, a polygon winds by less than a full turn; a spiral winds further, and overlaps.
         along = (sides * normal[:, None]).sum(axis=2)
         dot = (sides[:, 0] * sides[:, 1]).sum(axis=1) - along[:, 0] * along[:, 1]
         angle = np.add.reduceat(np.arctan2(np.maximum(height, 0.0), dot), starts)
@@ -99,7 +99,7 @@ class Polygons:
 
 
 def _ears(positions: NDArray[np.float64]) -> NDArray[np.intp]:
-    """(n - 2, 3) numbers of corners: a triangulation of the polygon in its best plane, turning as the polygon does."""
+    """(n - 2, 3) corners: a triangulation of the polygon in its best plane, oriented like the polygon."""
     if len(positions) > MOST_CORNERS:
         raise MeshFileError(f"is not convex and has more than {MOST_CORNERS} corners; split it into smaller polygons")
     flat, area, noise = _in_best_plane(positions)
@@ -110,7 +110,7 @@ def _ears(positions: NDArray[np.float64]) -> NDArray[np.intp]:
             "is not convex, and splitting it into triangles needs the Python package mapbox_earcut; install it with: "
             "pip install 'mapbox_earcut~=2.1.0' (it is in the extra 'meshes')"
         ) from None
-    # Without corners that repeat the one before: how it treats them depends on the direction. They are put back below.
+    # Without corners that repeat the previous one, which it treats differently in each direction. They return below.
     kept = np.flatnonzero((positions != np.roll(positions, 1, axis=0)).any(axis=1))
     ends = np.array([len(kept)], np.uint32)
     faces = kept[np.asarray(earcut.triangulate_float64(flat[kept], ends), np.intp).reshape(-1, 3)]
@@ -123,8 +123,8 @@ def _ears(positions: NDArray[np.float64]) -> NDArray[np.intp]:
 
 
 def _in_best_plane(positions: NDArray[np.float64]) -> tuple[NDArray[np.float64], float, float]:
-    """((n, 2) coordinates in the plane of the polygon's area, scaled to size 1; twice its area; by how much sums of
-    areas may differ from that)."""
+    """((n, 2) coordinates in the plane of the polygon's area vector, scaled to size 1; twice its area; the difference
+    that rounding may make between that and a sum of areas)."""
     sides = positions - positions[0]
     size = np.abs(sides).max()
     sides = sides / size
@@ -141,14 +141,14 @@ def _in_best_plane(positions: NDArray[np.float64]) -> tuple[NDArray[np.float64],
 
 
 def _signed_areas(flat: NDArray[np.float64], faces: NDArray[np.intp]) -> NDArray[np.float64]:
-    """Twice the area of each triangle; negative of those that turn clockwise."""
+    """Twice the signed area of each triangle; negative if it is clockwise."""
     u, v = flat[faces[:, 1]] - flat[faces[:, 0]], flat[faces[:, 2]] - flat[faces[:, 0]]
     areas: NDArray[np.float64] = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
     return areas
 
 
 def _with_all_corners(faces: NDArray[np.intp], n: int) -> NDArray[np.intp]:
-    """The triangulation, in which corners on a straight side may be missing, with these too.
+    """Add corners on straight sides, which the triangulation may lack.
 
     Neighbours of the polygon use these corners: without them the surface would tear there as soon as it moves.
     """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""STL, binary and ASCII: triangles of which each brings its own corners."""
+"""STL, binary and ASCII: triangles that share no corners."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,12 +12,12 @@ _TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attrib
 
 
 def is_binary(data: bytes) -> bool:
-    """Its length is that of so many triangles as it says: binary, whatever its header looks like."""
+    """Whether its length matches its number of triangles: then it is binary, whatever its header looks like."""
     return len(data) >= _HEADER and len(data) == _HEADER + _TRIANGLE.itemsize * _count(data)
 
 
 def fits(data: bytes) -> bool:
-    """It holds as many triangles as it says, maybe with bytes behind them. Of a text those are hundreds of millions."""
+    """Whether it has room for its number of triangles. In a text file that number would be hundreds of millions."""
     return len(data) >= _HEADER and 0 < _count(data) <= (len(data) - _HEADER) // _TRIANGLE.itemsize
 
 
@@ -25,7 +25,7 @@ def parse(data: bytes) -> NDArray[np.float64]:
     """(3 F, 3) the corners of F triangles, one after the other. Raises MeshFileError."""
     if is_binary(data):
         return _of_binary(data)
-    # Names and comments may be of any encoding, but no text holds a zero byte.
+    # Names and comments may have any encoding, but no text contains a zero byte.
     if b"\0" not in data and b"facet" in data[:10_000].lower():
         return _of_text(data)
     if len(data) < _HEADER or not _count(data):
@@ -34,8 +34,8 @@ def parse(data: bytes) -> NDArray[np.float64]:
     room = (len(data) - _HEADER) // _TRIANGLE.itemsize
     if _count(data) > room:
         raise MeshFileError(
-            f"is neither an ASCII STL nor a whole binary STL: it says {_count(data)} triangles and holds {room}; copy "
-            "or export it again"
+            f"is neither an ASCII STL nor a whole binary STL: it declares {_count(data)} triangles but contains {room}"
+            "; copy or export it again"
         )
     return _of_binary(data)
 
@@ -45,16 +45,16 @@ def _count(data: bytes) -> int:
 
 
 def _of_binary(data: bytes) -> NDArray[np.float64]:
-    """Without the bytes after the last triangle: some programs write their own data there."""
+    """Ignores bytes after the last triangle: some programs write their own data there."""
     triangles = np.frombuffer(data, _TRIANGLE, count=_count(data), offset=_HEADER)
     return triangles["corners"].astype(np.float64).reshape(-1, 3)
 
 
 def _of_text(data: bytes) -> NDArray[np.float64]:
-    """Three lines vertex in each facet. `endsolid` may be missing; the last `endfacet` may not, because the number
-    before it could be cut off."""
+    """Each facet has three `vertex` lines. `endsolid` may be missing, but the last `endfacet` may not, because the
+    number before it could be cut off."""
     found = [np.empty(0)]
-    number, facets, corners = 0, 0, 0  # corners: of the facet that began last; 3 of a whole one
+    number, facets, corners = 0, 0, 0  # corners of the current facet: 3 if it is complete
     whole = True
     for chunk in lines.chunks(data):
         coordinates: list[float] = []
@@ -64,15 +64,21 @@ def _of_text(data: bytes) -> NDArray[np.float64]:
             key = words[0].lower() if words else b""
             if key == b"vertex":
                 if len(words) != 4:
-                    raise MeshFileError(f"line {number}: {lines.shown(line)}: expected vertex and three numbers")
+                    raise MeshFileError(
+                        f"line {number}: {lines.shown(line)}: expected vertex and three numbers; export it again"
+                    )
                 try:
                     coordinates += [float(words[1]), float(words[2]), float(words[3])]
                 except ValueError:
-                    raise MeshFileError(f"line {number}: {lines.shown(line)}: holds what is not a number") from None
+                    raise MeshFileError(
+                        f"line {number}: {lines.shown(line)}: contains a word that is not a number; export it again"
+                    ) from None
                 corners += 1
             elif key in (b"facet", b"endfacet", b"endsolid"):
                 if corners != 3 and facets:
-                    raise MeshFileError(f"line {number}: the facet before it has {corners} vertices; it must be 3")
+                    raise MeshFileError(
+                        f"line {number}: the facet before it has {corners} vertices, not 3; export it again"
+                    )
                 if key == b"facet":
                     facets, corners = facets + 1, 0
                 whole = key != b"facet"

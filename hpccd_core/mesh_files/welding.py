@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Points at one position become one vertex."""
+"""Join points at equal positions to vertices."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,7 @@ def weld(points: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.intp
     Parameters
     ----------
     points : (n, 3) float64
-        Points are one vertex where their coordinates are equal number for number; -0 equals 0.
+        Points with equal coordinates become one vertex; -0 equals 0.
 
     Returns
     -------
@@ -22,11 +22,11 @@ def weld(points: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.intp
 
     Notes
     -----
-    Every step that takes long runs without the interpreter lock: ``numpy.unique(axis=0)`` would hold it for seconds
-    where there are millions of points, and with it all other threads.
+    Every step that takes long runs without the interpreter lock. ``numpy.unique(axis=0)`` would hold the lock, and so
+    block all other threads, for seconds with millions of points.
     """
     bits = np.ascontiguousarray(points + 0.0).view(np.uint64)  # + 0.0 makes 0 of -0
-    order = np.lexsort(bits.T)  # stable: of equal points the first one comes first
+    order = np.lexsort(bits.T)  # stable: equal points stay in order
     ordered = bits[order]
     starts = np.ones(len(order), bool)
     starts[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)

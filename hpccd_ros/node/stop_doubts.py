@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Doubts about single meshes: a newer message was rejected, so that where the mesh is, or what it is, is unknown until
-a valid one comes. No ROS."""
+"""Doubts about single meshes: a newer message was rejected, so the mesh's position, shape or topology is unknown until
+a valid one arrives. No ROS."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -12,8 +12,8 @@ from hpccd_ros.frames.types import TF, Origin
 from hpccd_ros.params import robot_parameters
 from hpccd_ros.params.table import ROBOT
 
-# What was right but gave way: to a newer message, to a frame of another mesh, or to a scene without that mesh. Where
-# joint states or transforms are missing, frames end, which their age tells.
+# Valid messages that were replaced: by a newer message, a frame of another mesh, or a scene without that mesh. If joint
+# states or transforms are missing, there are no further frames, and the age of the last one reveals it.
 GAVE_WAY = {
     Reason.UNKNOWN_MESH, Reason.LATE, Reason.INCOMPLETE, Reason.RESTART, Reason.OVERLOAD, Reason.MIDDLEWARE,
     Reason.STOPPED,
@@ -24,7 +24,7 @@ _ASPECTS = {Aspect.PLACE: "positions", Aspect.SHAPE: "the shape", Aspect.TOPOLOG
 @dataclass(frozen=True)
 class WatchedScene:
     """Names of the ``meshes`` of a scene, in its order; ``moving``: whether each of them moves. ``by_joints``: topic of
-    joint states -> meshes that these move; ``by_transforms``: meshes that transforms place as they move."""
+    joint states -> meshes that these move; ``by_transforms``: moving meshes that transforms place."""
 
     meshes: tuple[str, ...] = ()
     moving: tuple[bool, ...] = ()
@@ -35,7 +35,7 @@ class WatchedScene:
     def of(
         cls, builder: SceneBuilder, settings: Mapping[str, Any], links: Mapping[str, Sequence[str]]
     ) -> "WatchedScene":
-        """links: robot -> names of its meshes, of the robots that are known."""
+        """links: robot -> names of its meshes, for the robots that are known."""
         robots = settings[ROBOT]
         by_joints = {
             topic: tuple(name for robot in moved for name in links.get(robot, ()))
@@ -65,7 +65,7 @@ class WatchedScene:
 
 
 class Source(NamedTuple):
-    """What a doubt is about, in any scene: as of `WatchedScene.concerned`."""
+    """The subject of a doubt in any scene: arguments of `WatchedScene.concerned`, and the aspect."""
 
     what: Input | None
     name: str
@@ -73,14 +73,14 @@ class Source(NamedTuple):
 
     @property
     def of_mesh(self) -> bool:
-        """Of one mesh; else of a topic, or of all, which may concern a later scene though none of this."""
+        """Whether it is one mesh. Otherwise it is a topic, or all meshes, and may concern a later scene only."""
         return self.what not in (None, Input.TRANSFORM, Input.JOINT_STATE)
 
 
 @dataclass(frozen=True)
 class Doubt:
-    """``meshes`` are unknown until something of this ``aspect`` is in use, of each of them, that was sent after
-    ``sent``, ns. Without meshes it waits for a scene that has some."""
+    """``meshes`` are unknown until, for each of them, a message about this ``aspect`` is in use that was sent after
+    ``sent``, ns. A doubt without meshes waits for a scene that has some."""
 
     meshes: tuple[str, ...]
     aspect: Aspect
@@ -88,7 +88,7 @@ class Doubt:
     text: str
 
     def settled(self, origins: Mapping[str, Origin]) -> bool:
-        """Whether a frame of these origins has it."""
+        """Whether a frame with these origins settles it."""
         if not self.meshes:
             return False
         return all(origins[mesh].of(self.aspect) > self.sent for mesh in self.meshes if mesh in origins)
@@ -100,11 +100,11 @@ def leaves_unknown(refusal: Refusal) -> bool:
 
 
 def text_of(refusal: Refusal) -> str:
-    """Why stop is true, a sentence without its full stop."""
+    """Why stop is true, as a sentence without its full stop."""
     if refusal.what is Input.JOINT_STATE and refusal.reason is Reason.CONTRADICTED:
         return f"two publishers on {refusal.mesh} contradict each other"
     if refusal.reason is Reason.STATIC_MISSING:
         return f"static mesh {refusal.mesh} has a new topology and no positions yet"
     if refusal.what in (Input.JOINT_STATE, Input.TRANSFORM):
-        return f"{refusal.what} on {refusal.mesh} were rejected: {refusal.reason}"
-    return f"{_ASPECTS[refusal.aspect]} of mesh {refusal.mesh} were refused: {refusal.reason}"
+        return f"{refusal.what} on {refusal.mesh} rejected: {refusal.reason}"
+    return f"{_ASPECTS[refusal.aspect]} of mesh {refusal.mesh} rejected: {refusal.reason}"

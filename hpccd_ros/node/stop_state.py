@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whether to stop, and why: what is known of the steps so far, and how old it is. No ROS.
+"""Whether to stop, and why: what is known about the steps so far, and how old it is. No ROS.
 
 The promise: `stop` is false only if, for every enabled pair, the position of each moving mesh is known from messages
 sent within the last `stop_timeout` seconds, each static mesh has a valid position, no newer message about either was
 rejected, and both stay farther apart than `stop_distance` throughout the last step.
 
-Ages are the system's time minus the DDS source timestamp; they hold to within `clock_error`, by which the clocks of the
-machines may differ.
+Ages are the system time minus the DDS source timestamp; they are accurate to within `clock_error`, by which the clocks
+of the machines may differ.
 """
 
 import threading
@@ -20,7 +20,7 @@ from hpccd_ros.frames.drops import Aspect, Reason, Refusal
 from hpccd_ros.frames.types import ALWAYS, OUTDATED, UNTOLD, Origin
 from hpccd_ros.node.stop_doubts import Doubt, Source, WatchedScene, leaves_unknown, text_of
 
-# Of the time-out: said so much earlier, a silence is heard of within it.
+# Part of the time-out after which silence makes stop true, so that listeners receive it within the time-out.
 IN_TIME = 0.95
 
 
@@ -30,11 +30,11 @@ class Cause(StrEnum):
     INACTIVE = "inactive"  # the node does not detect
     UNANSWERED = "unanswered"  # no step was answered yet
     NEAR = "near"
-    REFUSED = "refused"  # a message that is wrong
+    REFUSED = "refused"  # a message was rejected
     FAILED = "failed"  # a detection
-    SILENT = "silent"  # no answer that is fresh
-    HELD_UP = "held_up"  # the thread that publishes stop
-    CLOCKS = "clocks"  # no age can be trusted
+    SILENT = "silent"  # no recent result
+    HELD_UP = "held_up"  # the thread that publishes stop did not run
+    CLOCKS = "clocks"  # ages cannot be trusted
 
 
 @dataclass(frozen=True)
@@ -46,11 +46,12 @@ class Why:
 
 
 class StopState:
-    """Told by the threads that know something; read by the one that publishes, which waits in `next`.
+    """Updated by the threads that learn something; read by the one that publishes, which waits in `next`.
 
-    distance: that asked for; a result for a smaller one does not count. timeout: s within which it is to be heard that
-    a result holds no more, from when the oldest message was sent that determines where a moving mesh is at the end of
-    its step. busy: whether a frame is worked on. clock_error: s. rises: how often stop became true, by cause.
+    distance: that asked for; a result for a smaller one does not count. timeout: s after which listeners must have
+    received that a result is too old, from when the oldest message was sent that determines the position of a moving
+    mesh at the end of its step. busy: whether a frame is being processed. clock_error: s. rises: how often stop became
+    true, by cause.
     """
 
     def __init__(
@@ -74,18 +75,18 @@ class StopState:
         self._scene = WatchedScene()
         self._why: Why | None = Why(Cause.INACTIVE, "the node is not active")
         self._doubts: dict[tuple[Cause, Source], Doubt] = {}
-        self._heard: dict[str, int] = {}  # of each mesh: when the newest message was sent that came
+        self._heard: dict[str, int] = {}  # mesh or topic -> when the newest message received was sent
         self._robots: Mapping[str, str] = {}
         self._in_use: Mapping[str, Origin] = {}
-        self._outdated = ""  # mesh of which the last step that was clear had an old place
+        self._outdated = ""  # a mesh whose position in the last clear step was outdated
         self._unsaid: Why | None = None
         self._said: Why | None = None
-        self._looked: float | None = None  # when the thread that publishes did, in steady time
-        self._oldest, self._oldest_of = 0, ""  # message of the last step that was clear: when it was sent, its mesh
+        self._looked: float | None = None  # when the publishing thread last ran, in steady time
+        self._oldest, self._oldest_of = 0, ""  # oldest message of the last clear step: when it was sent, and its mesh
         self.rises: Counter[Cause] = Counter()
 
     def begin(self, scene: WatchedScene) -> None:
-        """Steps of this scene will be answered from now on. Doubts about what places its meshes stay."""
+        """Steps of this scene will be answered from now on. Doubts about the inputs of its meshes stay."""
         with self._condition:
             self._scene = scene
             self._doubts = {
@@ -115,7 +116,7 @@ class StopState:
         self._tell(Cause.UNANSWERED, "no step was answered since the stream, or a topology, began anew")
 
     def answered(self, near: bool, distance: float, origins: Sequence[Origin]) -> None:
-        """A step, asked for this distance; origins: of the meshes at its end, in the order of the scene."""
+        """The result of a step for this distance; origins: of the meshes at its end, in the order of the scene."""
         with self._condition:
             if not self._active:
                 return
@@ -128,7 +129,7 @@ class StopState:
             ]
             for sent, mesh in moving:
                 self._ages.hear(f"a message of mesh {mesh}", 1e-9 * (sent - now), self._clocks.steady())
-            if not self._ages.why(self._clocks.steady()):  # else nobody can say which of two messages is newer
+            if not self._ages.why(self._clocks.steady()):  # otherwise it is unknown which of two messages is newer
                 self._doubts = {key: item for key, item in self._doubts.items() if not item.settled(by_name)}
         if near:
             self._tell(Cause.NEAR, f"meshes came within {distance:g} of each other on the last step, or touched")
@@ -152,7 +153,7 @@ class StopState:
             self._tell(Cause.UNANSWERED, f"no step was answered since stop_distance became {distance:g}")
 
     def refused(self, refusal: Refusal) -> None:
-        """The meshes that the message is about are unknown until something valid of them comes."""
+        """The meshes that the message is about are unknown until a valid message about them is in use."""
         if refusal.reason is Reason.DETECTION_FAILED:
             self.failed("the detection of the last step failed")
             return
@@ -162,21 +163,21 @@ class StopState:
                 self._doubt(Cause.REFUSED, source, refusal.sent, text_of(refusal))
 
     def failed(self, text: str) -> None:
-        """A step was not answered: frames from before tell nothing of now."""
+        """A step was not answered: earlier frames say nothing about the present."""
         with self._condition:
             if self._active:
                 self._doubt_all(Cause.FAILED, text)
 
     def robots(self, doubts: Mapping[str, str]) -> None:
-        """Robots of which a newer description is not in use, and why; this replaces those before."""
+        """Robots with a newer description that is not in use, and why; this replaces the previous ones."""
         with self._condition:
             before = self._now()
             self._robots = dict(doubts)
             self._rise(before)
 
     def heard(self, what: str, name: str, info: Mapping[str, int]) -> None:
-        """A message of an input came; name: of its mesh or topic; info: source_timestamp and received_timestamp, ns of
-        the system clock."""
+        """An input message was received; name: of its mesh or topic; info: source_timestamp and received_timestamp, ns
+        of the system clock."""
         sent, received = info["source_timestamp"], info["received_timestamp"]
         self._heard[name] = max(self._heard.get(name, 0), sent)
         ahead = 1e-9 * (sent - min(received or ALWAYS, self._clocks.system()))
@@ -193,8 +194,8 @@ class StopState:
             return self._now()
 
     def next(self, until: float) -> Why | None:
-        """What to say: waits for something else than what was said last, until that time, in steady time, at most. Each
-        rise is said, however short."""
+        """The state to publish: waits until it differs from the one published last, but no longer than ``until``, in
+        steady time. Each rise is published, however short."""
         with self._condition:
             while True:
                 steady, system = self._look()
@@ -211,18 +212,18 @@ class StopState:
             return why
 
     def _look(self) -> tuple[float, int]:
-        """The clocks, as the thread that publishes sees them: it looks several times in each time-out, if it can."""
+        """The clocks, as the publishing thread reads them, several times in each time-out if it can run."""
         steady, system = self._clocks.steady(), self._clocks.system()
         before = self._now()
         self._ages.look(steady, system)
         if self._active and self._why is None and (text := self._ages.why(steady)):
-            self._why = Why(Cause.CLOCKS, text)  # how old the last step is, nobody can say any more
+            self._why = Why(Cause.CLOCKS, text)  # the age of the last step is unknown now
         gap = 0.0 if self._looked is None else steady - self._looked
         if gap > self._held_up:
-            self._doubt_all(Cause.HELD_UP, f"the thread that publishes stop was held up for {gap:.3g} s")
+            self._doubt_all(Cause.HELD_UP, f"the thread that publishes stop did not run for {gap:.3g} s")
         self._looked = steady
-        # Where the clock was set back, frames from now on are newer than what was rejected before. Of what has no age
-        # it cannot be told: there the doubt stays until the clock has caught up.
+        # If the clock was set back, later frames are newer than messages rejected before. For inputs without an age
+        # this cannot be decided: their doubt stays until the clock has caught up.
         moving = set(self._scene.concerned(None, ""))
         for key, doubt in self._doubts.items():
             if doubt.sent > system and doubt.aspect is Aspect.PLACE and moving.issuperset(doubt.meshes):
@@ -237,7 +238,7 @@ class StopState:
             if doubt.meshes:
                 return Why(cause, doubt.text)
         if self._outdated:
-            text = f"a newer message about where mesh {self._outdated} is was rejected, or is not in use yet"
+            text = f"a newer message about the position of mesh {self._outdated} was rejected, or is not in use yet"
             return Why(Cause.REFUSED, text)
         for name, text in self._robots.items():
             return Why(Cause.REFUSED, f"robot {name}: {text}")
@@ -249,21 +250,22 @@ class StopState:
         if age < 0:
             return Why(Cause.CLOCKS, f"a message of mesh {self._oldest_of} was sent {-1e-9 * age:.3g} s in the future")
         if self._oldest == UNTOLD:
-            return Why(Cause.SILENT, f"the middleware does not tell when messages of mesh {self._oldest_of} were sent")
-        since = "a later one is worked on" if self._busy() else "no later one has"
-        of = f"a message of mesh {self._oldest_of} that was sent {1e-9 * age:.3g} s ago"
-        return Why(Cause.SILENT, f"the last frame that was found clear came with {of}, {since}")
+            text = f"the middleware does not provide source timestamps for messages of mesh {self._oldest_of}"
+            return Why(Cause.SILENT, text)
+        since = "a later frame is being processed" if self._busy() else "no later frame was clear"
+        text = f"the last clear frame rests on a message of mesh {self._oldest_of} sent {1e-9 * age:.3g} s ago; {since}"
+        return Why(Cause.SILENT, text)
 
     def _doubt_all(self, cause: Cause, text: str) -> None:
         self._doubt(cause, Source(None, "", Aspect.PLACE), None, text)
 
     def _doubt(self, cause: Cause, source: Source, sent: int | None, text: str) -> None:
-        """sent: when the message was; None, UNTOLD: unknown."""
+        """sent: when the message was sent; None, UNTOLD: unknown."""
         before, now, key = self._now(), self._clocks.system(), (cause, source)
         meshes, aspect = self._scene.concerned(source.what, source.name), source.aspect
         if not meshes and source.of_mesh:
             return
-        # Newer than what is in use, or will be of what came, whatever the clocks said then and now.
+        # Later than the messages in use and those received that may still come into use, whatever the clocks said.
         used = [origin.of(aspect) for mesh, origin in self._in_use.items() if mesh in meshes]
         came = [one for mesh in meshes if (one := self._heard.get(mesh, 0)) > now]
         sent = max([min(sent or now, now), *(one for one in used if one != ALWAYS), *came])
@@ -283,7 +285,7 @@ class StopState:
             self._rise(before)
 
     def _rise(self, before: Why | None) -> None:
-        """Something was learned. before: why stop was true before it."""
+        """The state has changed. before: why stop was true before the change."""
         if before is None and self._unsaid is None:
             self._unsaid = self._now()
         self._condition.notify_all()

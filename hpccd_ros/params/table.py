@@ -399,9 +399,8 @@ STOP_ROWS = (
         "stop_timeout",
         "float",
         0.5,
-        "stop is true where no step was answered whose end is known from messages sent within the last so many "
-        "seconds, the oldest of them included; it is repeated four times as often, with this deadline and lease of "
-        "liveliness",
+        "stop is true when no result was produced for a frame of which all messages, the oldest included, were sent "
+        "within this time; stop is published four times in this time, which is also its deadline and liveliness lease",
         unit="s",
         span=(0.01, 3600.0),
     ),
@@ -409,8 +408,8 @@ STOP_ROWS = (
         "clock_error",
         "float",
         CLOCK_ERROR,
-        "Most by which the system clocks of the machines differ (NTP, PTP). A message from further in the future, or "
-        "a jump of the system clock by more, makes stop true until the clocks have agreed for stop_timeout",
+        "Largest difference between the system clocks of the machines (NTP, PTP). A message from further in the "
+        "future, or a larger jump of the system clock, makes stop true until the clocks have agreed for stop_timeout",
         unit="s",
         span=(0.0, 10.0),
     ),

@@ -168,7 +168,7 @@ ENTITIES = '<?xml version="1.0"?><!DOCTYPE x [<!ENTITY a "aaaaaaaaaa">' + "".joi
         (dae(primitives=TWO_LISTS), "several lists"),
         (dae(primitives=triangles().replace('count="2"', 'count="3"')), "says 3 triangles and holds 2"),
         (dae(primitives=triangles([[0, 1, 2**32 + 2]])), "a number that is too large"),
-        (dae().replace('count="18"', 'count="21"'), "says 21 numbers and holds 18"),
+        (dae().replace('count="18"', 'count="21"'), "declares 21 numbers but contains 18"),
         (dae().replace('stride="3"', 'stride="6"'), "has other numbers between its positions"),
         (ENTITIES + "]><COLLADA>&j;</COLLADA>", "m.dae: cannot be read"),
     ],

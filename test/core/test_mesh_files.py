@@ -250,7 +250,7 @@ REFUSED = {
     "cut-header.ply": (_PLY[:60], "its header does not end"),
     "no-faces.ply": (ply("ascii", variants._ply_elements()["plain"][0][:1]), "has no triangles"),
     "no-z.ply": (_ASCII_PLY.replace(b"property float z\n", b""), "no element vertex with the properties x, y and z"),
-    **{f"list-of-{axis}-{form}.ply": (data, f"its property {axis} of the vertices is a list; export it again")
+    **{f"list-of-{axis}-{form}.ply": (data, f"property {axis} of its vertices is a list; export it again")
        for (axis, form), data in variants.LISTS_OF_COORDINATES.items()},
     "strips.ply": (_ASCII_PLY.replace(b"element face", b"element tristrips"), "triangle strips: convert it to faces"),
     "type.ply": (_ASCII_PLY.replace(b"float x", b"half x"), "line 4: 'property half x': not a line of a PLY header"),
@@ -260,8 +260,8 @@ REFUSED = {
     "claims.ply": (_PLY.replace(b"face 2", b"face 4000000000"), "is cut off"),
     "length.ply": (_PLY.replace(b"uchar int", b"char int").replace(b"\x03\0\0\0\0\x01", b"\xfd\0\0\0\0\x01"),
                    "a list of length -3"),
-    "cut.stl": (stl()[:-1], "says 2 triangles and holds 1; copy or export it again"),
-    "count.stl": (stl(count=2**32 - 1), "says 4294967295 triangles and holds 2"),
+    "cut.stl": (stl()[:-1], "declares 2 triangles but contains 1; copy or export it again"),
+    "count.stl": (stl(count=2**32 - 1), "declares 4294967295 triangles but contains 2"),
     "none.stl": (stl(triangles=variants.TRIANGLES[:0], count=0)[:80] + b"\0\0\0\0", "zeros only|has no triangles"),
     "count-of-none.stl": (stl(count=0, header=b"x"), "neither a binary STL"),
     "cut-text.stl": (text_stl()[:-40], "is cut off or damaged|the facet before it|three numbers"),

@@ -105,7 +105,7 @@ def test_what_is_refused_is_true_until_something_valid_of_the_mesh_comes(start_s
         bad = {"not finite": np.full((3, 3), math.nan), "count": np.zeros((4, 3)), "backward": hand(1.0)}[what]
         stream.node.peer.vertices("hand", bad, stamp=stream.sent + 1 if what != "backward" else 1)
     reason = {"not finite": "not_finite", "count": "wrong_vertex_count", "backward": "stamp_backward"}
-    stream.status("refused", f"of mesh hand were refused: {reason.get(what, 'topology_conflict')}")
+    stream.status("refused", f"of mesh hand rejected: {reason.get(what, 'topology_conflict')}")
     stream.expect(True)
     stream.sent += 1
     if what == "topology":  # which one the positions belong to, they do not say
@@ -200,10 +200,10 @@ def test_messages_that_cannot_be_deserialised(start_stream):
     until(is_false, "false after the node was activated again")
     table = peer.publisher(MeshVertices, "meshes/table/vertices")
     table.publish(serialize_message(mesh_messages.vertices_message(TABLE, 2))[:24])
-    until(lambda: is_refused("mesh table were refused: malformed"), "doubt of the table")
+    until(lambda: is_refused("mesh table rejected: malformed"), "doubt of the table")
     stated = stream.sent
     until(lambda: stream.sent >= stated + 20, "frames of the hand")
-    assert is_refused("mesh table were refused: malformed") and stream.listener.stop
+    assert is_refused("mesh table rejected: malformed") and stream.listener.stop
 
 
 SLIDER = """<robot name="arm"><link name="base"/><link name="tip"><collision><geometry><box size="0.1 0.1 0.1"/>
@@ -252,7 +252,7 @@ def test_a_robot_of_which_something_newer_is_refused_is_unknown(start_stream):
 
     describe.publish(String(data=SLIDER))
     clear()
-    until(stop_is(True, "joint states on joint_states were rejected: malformed"), names="zz", at=(-1.95, 0.0))
+    until(stop_is(True, "joint states on joint_states rejected: malformed"), names="zz", at=(-1.95, 0.0))
     clear()
     for _ in range(20):
         stamp += 10**7
@@ -299,7 +299,7 @@ def test_dead_input_is_true(start_stream):
     stream.expect(True)
     rose = next(at for at, said in reversed(stream.heard) if at > died and said)
     assert rose - died < SHORT + 5.0
-    stream.status("silent", "the last frame that was found clear came with a message of mesh")
+    stream.status("silent", "the last clear frame rests on a message of mesh")
 
 
 def test_frames_that_waited_while_the_node_was_held_up_are_old(start_stream):

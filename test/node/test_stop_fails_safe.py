@@ -69,7 +69,7 @@ def test_the_publisher_dies(start_stream, source, number):
     stream.heard.clear()
     process.send_signal(number)
     within(SHORT + MARGIN, lambda: stream.listener.stop, "stop")
-    stream.status("silent", "the last frame that was found clear came")
+    stream.status("silent", "the last clear frame rests on")
     assert True in [said for _, said in stream.heard], "the node says it: it lives"
     if number == signal.SIGSTOP:
         process.send_signal(signal.SIGCONT)
@@ -118,7 +118,7 @@ def test_a_detection_that_hangs(start_stream):
         pass
     stream.sent = holding_node.HANGS - 1
     with stream.steady():
-        stream.status("silent", "a later one is worked on")
+        stream.status("silent", "a later frame is being processed")
         stream.expect(True)
         stream.expect(False)
 
