@@ -16,7 +16,7 @@ from .options import FEATURES, OUTPUTS
 
 REALS = frozenset({np.dtype(np.float32), np.dtype(np.float64)})  # in this machine's byte order
 LARGEST_COORDINATE = 1e150  # largest_coordinate in src/bvh/coordinate_map.h
-DEEPEST = 8  # of nested lists: arrays of arguments have three dimensions at most, and a list may hold itself
+DEEPEST = 8  # levels of nested lists: arguments have at most three dimensions, and a list may contain itself
 
 Word = TypeVar("Word", bound=str)
 
@@ -64,7 +64,7 @@ def whole_number(name: str, value: SupportsIndex, low: int, high: int) -> int:
 
 
 def mesh_number(name: str, mesh: str | int, numbers: Mapping[str, int]) -> int:
-    """The number of a mesh that is given by its name or its number. numbers: of all meshes, by name."""
+    """The number of a mesh given by name or number. numbers: name -> number of all meshes."""
     if isinstance(mesh, str):
         if mesh not in numbers:
             raise ValueError(f"{name}: no mesh is named {mesh!r}; the scene has {', '.join(numbers) or 'none'}")
@@ -75,7 +75,7 @@ def mesh_number(name: str, mesh: str | int, numbers: Mapping[str, int]) -> int:
 
 
 def length(name: str, value: object) -> float:
-    """The value as float, finite and not negative. Raises ValueError where float64 cannot hold it exactly."""
+    """The value as float, finite and not negative. Raises ValueError if float64 cannot hold it exactly."""
     number = real(name, value)
     (bits,) = struct.unpack("<Q", struct.pack("<d", number))  # comparisons may take a negative denormal for 0
     if not math.isfinite(number) or bits > 1 << 63:
@@ -84,7 +84,7 @@ def length(name: str, value: object) -> float:
 
 
 def real(name: str, value: Any) -> float:
-    """The value as float. Raises ValueError where float64 cannot hold it exactly."""
+    """The value as float. Raises ValueError if float64 cannot hold it exactly."""
     if isinstance(value, np.float32):
         return float(widened(np.asarray(value)))
     if isinstance(value, bool) or not (_is_integer(value) or isinstance(value, (float, np.floating))):
@@ -100,7 +100,7 @@ def real(name: str, value: Any) -> float:
 
 
 def reals(name: str, value: object) -> NDArray[np.float64]:
-    """Numbers of any real type -> float64, C-contiguous. Raises ValueError where float64 cannot hold one exactly."""
+    """Numbers of any real type -> float64, C-contiguous. Raises ValueError if float64 cannot hold one exactly."""
     array = _array(name, value)
     if array.dtype.kind not in "fiu":
         raise TypeError(f"{name}: expected an array of numbers, got {_kind(value, array)}")
@@ -112,10 +112,10 @@ def _is_integer(value: object) -> bool:
 
 
 def _holds(number: float, value: Any) -> bool:
-    """Whether this, which float() made of the value, is the same number. NaN is."""
+    """Whether ``number``, which is float(value), equals the value. NaN does."""
     if isinstance(value, (int, np.integer)):
         return math.isfinite(number) and int(number) == int(value)
-    with np.errstate(all="ignore"):  # a long double has more bits; the others fit
+    with np.errstate(all="ignore"):  # only long doubles have more bits
         return bool(type(value)(number) == value or value != value)
 
 
@@ -128,7 +128,7 @@ def _beyond(name: str, value: object) -> ValueError:
 
 
 def _as_float64(name: str, array: NDArray[Any]) -> NDArray[np.float64]:
-    """Of integers or floats of any size, C-contiguous. Raises ValueError where float64 cannot hold one exactly."""
+    """Integers or floats of any size -> float64, C-contiguous. Raises ValueError if float64 cannot hold one exactly."""
     if (native := array.dtype.newbyteorder("=")) in REALS:
         return widened(array.astype(native, copy=False))
     with np.errstate(all="ignore"):
@@ -136,7 +136,7 @@ def _as_float64(name: str, array: NDArray[Any]) -> NDArray[np.float64]:
         if array.dtype.kind == "f":
             rounded = np.isfinite(array) & (numbers.astype(array.dtype) != array)
         else:
-            rounded = np.abs(numbers) >= 2.0**53  # the only ones that may be
+            rounded = np.abs(numbers) >= 2.0**53  # smaller ones are exact
     for where in np.argwhere(rounded):
         if not _holds(float(numbers[tuple(where)]), array[tuple(where)]):
             raise _not_held(f"{name}[{', '.join(map(str, where))}]", array[tuple(where)])
@@ -255,8 +255,8 @@ def queries(value: object) -> NDArray[np.float64]:
 
 
 def widened(array: NDArray[Any]) -> NDArray[np.float64]:
-    """float32 or float64 -> float64, C-contiguous and exact: numpy loses denormal numbers where another library has set
-    denormals-are-zero."""
+    """float32 or float64 -> float64, C-contiguous and exact. numpy would turn denormal numbers into 0 if another
+    library has set denormals-are-zero."""
     there = np.require(array, None, ["C", "A"])
     return there if there.dtype == np.float64 else _core.widened(there)
 
@@ -293,7 +293,7 @@ def _array(name: str, value: object) -> NDArray[Any]:
 
 def _no_array(name: str, value: object, error: Exception) -> TypeError:
     kind = type(value).__name__
-    return TypeError(f"{name}: {kind} does not turn into an array ({error}); give an array of numbers")
+    return TypeError(f"{name}: {kind} cannot be converted to an array ({error}); give an array of numbers")
 
 
 def refuse_masked(name: str, value: object) -> None:
@@ -302,19 +302,19 @@ def refuse_masked(name: str, value: object) -> None:
 
 
 def _kinds(name: str, value: object) -> set[type]:
-    """The types of what nested lists hold, and of what the arrays in them hold; none where the value is an array."""
+    """The types of the elements of nested lists and of arrays in them; empty if the value is an array."""
     kinds: set[type] = set()
     if type(value) is np.ndarray:
         return kinds
     level = [value]
     for depth in range(DEEPEST):
-        found = set(map(type, level))  # level by level: a visit of each number by itself costs more than numpy does
+        found = set(map(type, level))  # level by level: visiting each number takes longer than numpy's conversion
         nested = {kind for kind in found if _is_nested(kind)}
         for array in (x for x in level if isinstance(x, np.ndarray)) if _some(found, np.ndarray) else ():
             if isinstance(array, np.ma.MaskedArray) and np.ma.is_masked(array):
                 raise TypeError(
-                    f"{name}: some of its elements are masked, and every one is needed; leave the masked ones out "
-                    "before, or give an array in which they are filled in (numpy.ma.filled)"
+                    f"{name}: some elements are masked, but all are needed; remove the masked ones, or give an array "
+                    "in which they are filled (numpy.ma.filled)"
                 )
             kinds.add(array.dtype.type)
         kinds.update(kind for kind in found - nested if not issubclass(kind, np.ndarray))
@@ -331,7 +331,7 @@ def _kinds(name: str, value: object) -> set[type]:
 
 
 def _is_nested(kind: type) -> bool:
-    """Whether numpy takes these for rows: sequences that are neither arrays nor hold bytes."""
+    """Whether numpy takes values of this type for rows: sequences, except arrays, strings and bytes."""
     if issubclass(kind, (list, tuple)):
         return True
     if issubclass(kind, (str, bytes, bytearray, memoryview, Mapping, np.generic)) or hasattr(kind, "__array__"):
@@ -344,8 +344,8 @@ def _some(kinds: Iterable[type], *bases: type) -> bool:
 
 
 def _keep(name: str, value: object, array: NDArray[Any], kinds: set[type]) -> None:
-    """Of nested lists: raises where numpy took a truth for a number, or rounded an integer for the sake of the floats
-    beside it; puts back the denormal float32 that it lost on the way to float64."""
+    """Check the array that numpy made of nested lists. Raises an error if numpy took a Boolean for a number, or rounded
+    an integer because of floats in the list; restores denormal float32 that numpy turned into 0."""
     if _some(kinds, bool, np.bool_):
         raise TypeError(f"{name}: expected numbers, got True or False among them; write 1 or 0")
     if array.dtype != np.float64:
@@ -364,7 +364,7 @@ def _keep(name: str, value: object, array: NDArray[Any], kinds: set[type]) -> No
 
 
 def _at(value: Any, where: Iterable[int]) -> Any:
-    """The element of nested lists and of the arrays in them."""
+    """The element at this place in nested lists and arrays."""
     for place in where:
         value = value[place] if _is_nested(type(value)) else np.asarray(value)[place]
     return value if isinstance(value, (int, float, np.generic)) else np.asarray(value)[()]
@@ -381,4 +381,4 @@ def _shown(value: object) -> str:
     """As text that fits on a line; of a huge integer its size."""
     if isinstance(value, int) and abs(value) >= 10**20:
         return f"{'-' if value < 0 else ''}1e{(abs(value).bit_length() - 1) * 0.30103:.0f}"
-    return str(value)  # a format would turn long doubles into float64
+    return str(value)  # format() would convert long doubles to float64

@@ -25,8 +25,8 @@ class Contacts(PairsOfWorlds):
     in one plane), and where there is no direction, because at toc the face has no area, or the edges are parallel or
     points. Names do not matter: any order of corners and ends gives the same normal, edges exchanged turn it round.
     With a minimum separation a point is the midpoint of the nearest points at toc, and the normal the direction from
-    face to vertex, or from edge a to edge b, when they first come within it; where they already touch at the start, as
-    above.
+    face to vertex, or from edge a to edge b, when they first come within the separation; if they already touch at the
+    start, the normal is as above.
     closest: (N+M, 2, 3) float64, the nearest points of both sides at toc: of the vertex and the face, or of edge a and
     edge b; empty (0, 2, 3) unless "closest" is among the detector's outputs.
     first_toc: the earliest time, +inf where nothing touches.
@@ -36,7 +36,7 @@ class Contacts(PairsOfWorlds):
     int64, where the rows of each world begin, and N or M. first_tocs: (W,) float64; first_toc is the least of them.
     hash: the sum of each world's hash times 2 k + 1, modulo 2**64. world(k): the contacts of one world, as a detector
     of its own gives them. Without worlds it is as with one: offsets [0, N] and [0, M], one of first_tocs, world(0).
-    a == b: whether all of these are equal, row by row. Contacts are not hashable; `hash` may serve as a key.
+    a == b: whether all fields are equal, row by row. Contacts are not hashable; use `hash` as a key.
     """
 
     vf: NDArray[np.uint32]

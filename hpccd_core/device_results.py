@@ -106,7 +106,7 @@ class DeviceContacts(_PairsOnDevice):
     only when nobody holds one of them, or what was made of one, any more. first_toc and hash are on the host.
     vf_offsets, ee_offsets, first_tocs: on the device, of one world too. world(k): rows of these arrays, in place,
     but for points, normals and closest, which are copied there. to_host(): the same as Contacts. a == b compares
-    such copies.
+    copies on the host.
     """
 
     vf_toc: DeviceArray

@@ -20,8 +20,8 @@ def contacts_of_step(answers: Sequence[tuple[Contacts, int, int]]) -> Contacts:
     """Each pair once, as the first of the answers tells it: (contacts, part, parts), about part number 0 to parts - 1
     of equal duration, or (contacts, 0, 1) about all of it. Times become those of the step. Order and hash as usual.
 
-    Raises TypeError: no list, or an answer is not (Contacts, integer, integer). Raises ValueError: a part that the step
-    does not have, answers of many worlds, or answers with and without the same outputs.
+    Raises TypeError if it is not a list, or an answer is not (Contacts, integer, integer). Raises ValueError for a part
+    that the step does not have, for answers of many worlds, and for answers with different outputs.
     """
     if not isinstance(answers, Iterable):
         raise TypeError(f"answers: expected a list of (contacts, part, parts), got {type(answers).__name__}")
@@ -29,7 +29,7 @@ def contacts_of_step(answers: Sequence[tuple[Contacts, int, int]]) -> Contacts:
     for name in ("points", "normals", "closest"):
         with_rows = [len(getattr(contacts, name)) > 0 for contacts, _, _ in checked if len(contacts)]
         if any(with_rows) and not all(with_rows):
-            raise ValueError(f"answers: some have {name} and some have none; ask all with the same outputs")
+            raise ValueError(f"answers: some have {name} and others do not; use detectors with the same outputs")
     return answer_of(Contacts, _core.contacts_of_step(checked))
 
 

@@ -20,7 +20,7 @@ class Proximity(PairsOfWorlds):
     of edge a and edge b; where edges are parallel, in the middle of the stretch along which they are nearest. Empty
     (0, 2, 3) unless "closest" is among the detector's outputs.
     hash: 64-bit, the same for the same pairs and distances on any backend and any number of threads.
-    Of a detector of many worlds: vf_offsets, ee_offsets, world(k), and rows and hash, as in Contacts. Comparison as of
+    Of a detector of many worlds: vf_offsets, ee_offsets, world(k), and rows and hash, as in Contacts. a == b as in
     Contacts.
     """
 
@@ -62,7 +62,7 @@ class Intersections(OfWorlds):
     a face that share a vertex do not count.
     hash: 64-bit, the same for the same pairs on any backend and any number of threads.
     Of a detector of W worlds: the rows of the first world, then those of the second, ... ef_offsets: (W+1,) int64,
-    where those of each world begin; world(k), hash, and comparison, as in Contacts.
+    where those of each world begin; world(k), hash and a == b as in Contacts.
     """
 
     ef: NDArray[np.uint32]
@@ -99,7 +99,7 @@ class Gap(ComparedByRows):
     features: scene-wide indices as in Contacts.vf, Contacts.ee or Intersections.ef; of pairs whose
     distances are the same double the first in order, vertex-face before edge-edge; of those that intersect the first.
     points: (2, 3) float64, the nearest points of both sides, in the order of the features; (0, 3) where there are none.
-    a == b: whether all of these are equal. Gaps are not hashable.
+    a == b: whether all fields are equal. Gaps are not hashable.
     """
 
     mesh_a: str

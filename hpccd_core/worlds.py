@@ -15,9 +15,9 @@ Answer = TypeVar("Answer", bound="OfWorlds")
 
 
 class ComparedByRows:
-    """A dataclass whose instances are equal where all their fields are, arrays row by row, NaN like NaN.
+    """Base of dataclasses that are equal if all fields are equal: arrays row by row, and NaN equals NaN.
 
-    Not hashable, as numpy arrays are not.
+    Not hashable, like numpy arrays.
     """
 
     def __eq__(self, other: object) -> bool:
@@ -38,10 +38,10 @@ def _equal(a: Any, b: Any) -> bool:
         return False
     if a.dtype not in arguments.REALS:
         return np.array_equal(a, b, equal_nan=a.dtype.kind == "f")
-    # By their bits: where another library has set denormals-are-zero, a comparison takes denormals for 0.
+    # Compare bits: if another library has set denormals-are-zero, comparisons take denormals for 0.
     bits = np.dtype(f"u{a.dtype.itemsize}")
     x, y = np.ascontiguousarray(a).view(bits), np.ascontiguousarray(b).view(bits)
-    alike = (x == y) | ((x | y) << 1 == 0) | (np.isnan(a) & np.isnan(b)).reshape(x.shape)  # 0 has a sign, too
+    alike = (x == y) | ((x | y) << 1 == 0) | (np.isnan(a) & np.isnan(b)).reshape(x.shape)  # -0 equals 0
     return bool(alike.all())
 
 

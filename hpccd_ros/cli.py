@@ -17,7 +17,7 @@ COMMANDS = {
     "record": "record the meshes and contacts of a running node into an MCAP file",
     "replay": "compute a recording again and verify its contacts, or play it over DDS",
     "view": "draw recorded frames: shaded meshes with their contacts",
-    "cut": "cut a part out of a recording, with all that it needs to replay",
+    "cut": "cut a part out of a recording that replays by itself",
     "doctor": "check a recording; save what is readable of one that was cut off",
     "scene": "generate, play or draw a deforming scene",
     "bench": "measure speed and latency on this machine",

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A new MCAP file of records of other files."""
+"""A new MCAP file with records of other files."""
 
 from pathlib import Path
 
@@ -10,10 +10,9 @@ from hpccd_ros.bag.bag_file import COMPRESSIONS
 
 
 class CopiedFile:
-    """Use as a context manager: the file is finished at its end, and removed where an exception ends it.
+    """A context manager: its end finishes the file, or removes it if there was an exception.
 
-    compression: "none", "lz4" or "zstd". Raises FileExistsError where `path` exists, ValueError for another
-    compression.
+    compression: "none", "lz4" or "zstd". Raises FileExistsError if `path` exists, ValueError for another compression.
     """
 
     def __init__(self, path: Path, *, profile: str, library: str, compression: str):
@@ -43,10 +42,10 @@ class CopiedFile:
                 self._path.unlink()
 
     def describe(self, schema: Schema | None, channel: Channel) -> int:
-        """The number of a channel here; one with the same description as another one is the same."""
+        """The number of a channel in this file; channels with equal descriptions have one number."""
         known = self._channels.get(id(channel))
         if known is None or known[0] is not channel:
-            number = 0  # no schema, in the words of the format
+            number = 0  # in MCAP: no schema
             if schema is not None:
                 number = self._once(self._writer.register_schema, schema.name, schema.encoding, schema.data)
             key = (channel.topic, channel.message_encoding, number, tuple(channel.metadata.items()))
@@ -58,7 +57,7 @@ class CopiedFile:
         self._writer.add_message(number, message.log_time, message.data, message.publish_time, message.sequence)
 
     def metadata(self, record: Metadata) -> None:
-        """All but that of rosbag2, whose counts are those of the other file."""
+        """Add a metadata record, except that of rosbag2: its counts are those of the other file."""
         if record.name != "rosbag2":
             self._writer.add_metadata(record.name, dict(record.metadata))
 

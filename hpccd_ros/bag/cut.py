@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Cut a part out of a recording, with what was in force at its beginning, so that a replay needs nothing else."""
+"""Cut a part out of a recording, including all messages in force at its beginning, so that it replays by itself."""
 
 import dataclasses
 import re
@@ -26,10 +26,11 @@ from hpccd_ros.middleware.message_types import (
     VERTICES,
 )
 
-# Of each topic the last message holds until the next one.
+# Types of topics on which a message is in force until the next one.
 _HOLDS = (TOPOLOGY, VERTICES, POINTS, SHAPE, MARKER, POSE, DESCRIPTION)
-# Each message names some frames or joints; of each of these the last message holds. Between two of them positions are
-# interpolated, for frames sent before too: so all messages of the last seconds are kept, as transform_buffer.py does.
+# Types of messages that name frames or joints; for each of these the last message is in force. Positions are
+# interpolated between two of them, also for earlier frames: so all messages of the last seconds are kept, as in
+# transform_buffer.py.
 _NAMES = {
     JOINT_STATES: lambda message: message.name,
     transform_topics.STAMPED: lambda message: [message.child_frame_id],
@@ -43,7 +44,7 @@ _TIME = re.compile(r"(?P<seconds>\d+(\.\d*)?)s?|(?P<stamp>\d+)ns")
 
 @dataclasses.dataclass(frozen=True)
 class Time:
-    """A moment of a recording. value: ns since its first message was received, or of a stamp."""
+    """A time in a recording. value: ns since its first message was received, or a stamp in ns."""
 
     value: int
     is_stamp: bool = False
@@ -53,7 +54,7 @@ class Time:
         """From "12.5", "12.5s" (seconds) or "1700000000000000000ns" (a stamp). Raises ValueError."""
         if (match := _TIME.fullmatch(text)) is None:
             raise ValueError(
-                f"{text!r} is not a time; give seconds from the beginning, as 12.5, or a stamp, as "
+                f"{text!r} is not a time; give seconds from the beginning, such as 12.5, or a stamp, such as "
                 "1700000000123456789ns"
             )
         if match["stamp"]:
@@ -63,8 +64,8 @@ class Time:
 
 @dataclasses.dataclass(frozen=True)
 class Part:
-    """What was cut out. begin, end: ns since the first message of the whole recording was received. count: messages.
-    in_force: those of them that came before."""
+    """The part that was cut out. begin, end: ns since the first message of the whole recording was received. count:
+    messages. in_force: how many of them were received before its beginning."""
 
     begin: int
     end: int
@@ -80,16 +81,16 @@ def cut(
     compression: str | None = None,
     watch: Callable[[Iterable], Iterable] = iter,
 ) -> Part:
-    """Copy what was received from `begin` (included) to `end` (excluded) into the new, finished file `target`.
+    """Copy the messages received from `begin` (included) to `end` (excluded) into the new, finished file `target`.
 
-    A stamp is that of the header of a message: `begin` is then the first message with that stamp or a later one, `end`
-    the last one with that stamp or an earlier one (included). None: without limit. compression: as of the recording if
-    None. watch: is given each pass over the messages, to show how far it is.
-    Raises RecordingError where no message is in between, FileExistsError where `target` exists.
+    If `begin` is a stamp, the part begins with the first message whose header has that stamp or a later one; if `end`
+    is a stamp, the part ends with the last message whose header has that stamp or an earlier one (included). None: no
+    limit. compression: None: that of the recording. watch: wraps each pass over the messages, to show progress.
+    Raises RecordingError if no message is in between, FileExistsError if `target` exists.
     """
     first = next((stored.message.log_time for stored in recording.records()), None)
     if first is None:
-        raise RecordingError(f"{recording.path} holds no message, so nothing can be cut out of it")
+        raise RecordingError(f"{recording.path} has no messages, so nothing can be cut out of it")
     start, stop = _limits(recording, first, begin, end, watch)
     kept = _InForce(recording)
     count = 0
@@ -109,12 +110,12 @@ def cut(
             if time >= stop:
                 break
             last = time
-            # A description in the very moment of the cut replaces the one before: a replay takes one alone.
+            # A description received at the time of the cut replaces the previous one: a replay accepts only one.
             if time < start or (time == start > first and getattr(stored.schema, "name", "") == DESCRIPTION):
                 kept.add(stored)
                 continue
             for earlier in kept.take():
-                # Received at the cut, as far as this file is concerned; sent when it was sent.
+                # In this file its receive time is that of the cut; the time at which it was sent is unchanged.
                 file.message(*earlier[:2], dataclasses.replace(earlier.message, log_time=start))
                 count += 1
             file.message(*stored)
@@ -127,17 +128,17 @@ def cut(
     check = examine(target)
     if not check.sound or check.message_count != count:
         target.unlink()
-        raise RecordingError(f"{target} is not what was cut out: {check.problem}; is its disk in order?")
+        raise RecordingError(f"{target} was not written correctly: {check.problem}; check its disk")
     return Part(start - first, min(last + 1, stop) - first, count, kept.taken)
 
 
 def seconds(nanoseconds: int) -> str:
-    """Exactly, as `Time.of` reads it."""
+    """The exact number of seconds, as `Time.of` reads it."""
     return f"{nanoseconds // 10**9}.{nanoseconds % 10**9:09}"
 
 
 def _limits(recording, first, begin, end, watch) -> tuple[int, int]:
-    """When the first message that is wanted was received, and the first one after the part. ns."""
+    """Receive times, ns: of the first message of the part, and of the first one after it."""
     start = first + begin.value if begin is not None and not begin.is_stamp else first
     stop = first + end.value if end is not None and not end.is_stamp else 2**64
     by_stamp = [time for time in (begin, end) if time is not None and time.is_stamp]
@@ -152,8 +153,8 @@ def _limits(recording, first, begin, end, watch) -> tuple[int, int]:
             if time in by_stamp and place is None:
                 way = "later" if time is begin else "earlier"
                 raise RecordingError(
-                    f"{recording.path} has no message with the stamp {time.value} ns or {way}; seconds from the "
-                    "beginning need no stamp"
+                    f"{recording.path} has no message with the stamp {time.value} ns or {way}; give another stamp, or "
+                    "seconds from the beginning"
                 )
         start, stop = found[0] or start, found[1] or stop
     if start > stop and begin is not None and end is not None:
@@ -162,7 +163,7 @@ def _limits(recording, first, begin, end, watch) -> tuple[int, int]:
 
 
 def _stamps(recording: Recording, watch) -> Iterator[tuple[int, int]]:
-    """(stamp, when it was received) of all messages that begin with a header; topologies hold for all times."""
+    """(stamp, receive time) of all messages that begin with a header, except topologies, whose stamp has no effect."""
     topics = [
         topic.name
         for topic in recording.topics.values()
@@ -175,7 +176,7 @@ def _stamps(recording: Recording, watch) -> Iterator[tuple[int, int]]:
 
 
 class _InForce:
-    """The messages from before a part that hold in it. ``taken``: how many were taken."""
+    """The messages from before a part that are in force in it. ``taken``: how many `take` has returned."""
 
     def __init__(self, recording: Recording) -> None:
         self._recording = recording
@@ -186,7 +187,7 @@ class _InForce:
         self.taken = 0
 
     def add(self, stored: StoredMessage) -> None:
-        """In the order in which they were received."""
+        """Add the next message, in the order in which they were received."""
         topic = self._recording.topics.get(stored.channel.topic)
         if topic is None or stored.schema is None or topic.type_name != stored.schema.name:
             return
@@ -200,7 +201,7 @@ class _InForce:
             self._last[topic.name, ""] = self._number, stored
 
     def take(self) -> list[StoredMessage]:
-        """All, once."""
+        """All messages in force, and forget them."""
         if not self._number:
             return []
         found = dict(self._last.values()) | {number: stored for number, _, stored in self._recent}
@@ -220,7 +221,7 @@ class _InForce:
             try:
                 self._decoders[topic.name] = make_decoder(topic)
             except RecordingError:
-                self._decoders[topic.name] = None  # of a package that is not here: no replay can use it
+                self._decoders[topic.name] = None  # its package is not installed: no replay can use the topic
         decode, message = self._decoders[topic.name], stored.message
         if decode is None:
             return [""]
@@ -228,4 +229,4 @@ class _InForce:
             recorded = RecordedMessage(topic.name, message.log_time, message.publish_time, 0, message.data)
             return _NAMES[topic.type_name](decode(recorded))
         except RecordingError:
-            return [""]  # no valid message: as in the replay
+            return [""]  # an invalid message, which a replay ignores

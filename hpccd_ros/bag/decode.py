@@ -86,10 +86,10 @@ def _completed(data: bytes, lacking: tuple[_Addition, ...]) -> bytes:
 
 
 def _fields(definition: str) -> dict[str, list[str]]:
-    """Name of the type, "" for the first -> its fields in their order: what the layout of the CDR depends on.
+    """Name of the type ("" for the first one) -> its fields in order, which determine the layout of the CDR.
 
-    Recorders write the rest as they like: comments, spaces, default values, constants (which the hash does not cover
-    either), and with or without package the names of types.
+    The rest differs between recorders: comments, spaces, default values, constants (which the hash does not cover
+    either), and whether names of types include the package.
     """
     own, *others = definition.split(message_definitions.SEPARATOR)
     sections = {"": own} | {name.replace("/msg/", "/"): text
@@ -99,7 +99,7 @@ def _fields(definition: str) -> dict[str, list[str]]:
 
 
 def _field(line: str) -> str:
-    """Type without package, and name of the field in a line of a definition; "" where there is none."""
+    """Type without package, and name of the field in a line of a definition; "": the line has no field."""
     words = line.partition("#")[0].split(maxsplit=2)
     if len(words) < 2 or "=" in words[1] or words[2:] and words[2].startswith("="):
         return ""

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """One finished MCAP file: what it holds, and its messages in the order of time, with all check sums.
 
-The index holds the topics and their numbers of messages, so that the data need not be unpacked for them. Recorders may
-leave any of that out; then the data is unpacked once more. The places of the messages come from the data itself: one
-that the index does not name, or names elsewhere, would be left out silently.
+The index has the topics and their message counts, so that the data need not be unpacked for them. Recorders may omit
+any of that; then the data is unpacked once more. The positions of the messages come from the data itself: a message
+that the index lacks, or has elsewhere, would be skipped silently.
 """
 
 import heapq
@@ -54,8 +54,8 @@ class _Waiting(NamedTuple):
 class McapFile:
     """`stream` stays open while messages are read. Raises what is in mcap_records.DAMAGE; the methods too.
 
-    channels, schemas: by number. counts: messages by number of the channel, of channels that have some. compression: of
-    the first chunk.
+    channels, schemas: by number. counts: number of a channel -> its messages, only for channels that have some.
+    compression: that of the first chunk.
     """
 
     def __init__(self, stream, size: int):
@@ -120,7 +120,7 @@ class McapFile:
         return described
 
     def _scanned(self) -> tuple[Descriptions, Counter[int]]:
-        """What the whole data describes, and its messages by channel."""
+        """The schemas and channels in the whole data, and the message counts by channel."""
         described, counts = self._indexed(), Counter()
         parts = [*((place.at, place.thing) for place in self._places), *self._loose]
         for _, part in sorted(parts, key=operator.itemgetter(0)):  # in the order of the file
@@ -137,7 +137,7 @@ class McapFile:
         if why := undescribed(self._index, [number]):
             raise McapError(why)
         if number not in described.channels:
-            raise McapError(f"nothing describes channel {number} before its first message")
+            raise McapError(f"channel {number} is not described before its first message")
 
     def _sort_in(self, raw: Raw) -> Place:
         if (raw.opcode == Opcode.HEADER) != (self.header is None):

@@ -35,7 +35,7 @@ class Descriptions:
             into[record.id] = record
 
     def lack(self, number: int) -> bool:
-        """Whether a channel, or the schema that it names, is missing."""
+        """Whether the index lacks a channel, or the schema that it names."""
         channel = self.channels.get(number)
         return channel is None or (channel.schema_id != 0 and channel.schema_id not in self.schemas)
 
@@ -105,7 +105,7 @@ def misplaced(summary: Summary, data: list[Place]) -> str | None:
 
 
 def undescribed(summary: Summary, channels: Iterable[int]) -> str | None:
-    """Which of the `channels` that have messages the index lacks, or None.
+    """The first of the `channels` with messages that the index lacks, in words, or None.
 
     An index may repeat no channels at all.
     """
@@ -114,7 +114,7 @@ def undescribed(summary: Summary, channels: Iterable[int]) -> str | None:
 
 
 def stored_counts(summary: Summary) -> dict[int, int] | None:
-    """Messages by channel, of channels that have some, or None where the index does not hold these numbers."""
+    """Message counts by channel, only for channels that have some; None: the index has no counts."""
     statistics = summary.statistics
     if statistics is None or (statistics.message_count and not statistics.channel_message_counts):
         return None
@@ -122,7 +122,7 @@ def stored_counts(summary: Summary) -> dict[int, int] | None:
 
 
 def miscounted(summary: Summary, counts: dict[int, int]) -> str | None:
-    """How the statistics of the index differ from `counts`, messages by channel, or None.
+    """How the statistics of the index differ from `counts`, the messages by channel, or None.
 
     Statistics may lack the counts by channel.
     """

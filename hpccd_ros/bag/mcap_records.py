@@ -32,7 +32,7 @@ MOST_UNPACKED = 1 << 30
 # A chunk of a megabyte has 34,000 of the smallest messages. Each costs a reader ten times its bytes.
 MOST_RECORDS = 1 << 20
 
-# `ros2 bag record --compression-mode message` compresses each message by itself. No CDR begins so.
+# First bytes of messages of `ros2 bag record --compression-mode message`. No CDR begins with them.
 ZSTD = b"\x28\xb5\x2f\xfd"
 
 _HEAD = struct.Struct("<BQ")
@@ -149,12 +149,12 @@ def within_chunk_times(chunk: known.Chunk, record: known.McapRecord) -> bool:
 
 
 def unpacked_message(channel: known.Channel, message: known.Message) -> known.Message:
-    """A message of ROS 2 as it was sent; one of anything else as it is stored. Raises what is in DAMAGE."""
+    """The data of a ROS 2 message as it was sent; other messages as they are stored. Raises the errors in DAMAGE."""
     if channel.message_encoding != "cdr" or not message.data.startswith(ZSTD):
         return message
     size = zstandard.frame_content_size(message.data)
     if not 0 <= size <= MOST_UNPACKED:
-        raise McapError(f"a compressed message of {size:,} bytes, at most {MOST_UNPACKED:,} are taken")
+        raise McapError(f"a compressed message of {size:,} bytes; the limit is {MOST_UNPACKED:,}")
     with zstandard.ZstdDecompressor().stream_reader(message.data) as reader:
         data = reader.read(size + 1)
     if len(data) != size:

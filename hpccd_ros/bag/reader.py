@@ -46,7 +46,7 @@ class RecordedMessage:
 
 
 class StoredMessage(NamedTuple):
-    """A message with what its file holds beside it. schema: None where its channel has none."""
+    """A message with its channel and schema. schema: None: the channel has none."""
 
     schema: Schema | None
     channel: Channel
@@ -57,13 +57,13 @@ class Recording:
     """A finished recording. Use as a context manager.
 
     path: an `.mcap` file or a folder of them.
-    Raises RecordingError where it does not exist, is no MCAP file, is cut off or damaged, or holds no ROS 2 messages;
-    `messages` too, where damage shows only then.
+    Raises RecordingError if it does not exist, is not an MCAP file, is truncated or damaged, or has no ROS 2 messages;
+    so does `messages` for damage that only reading reveals.
 
     topics: dict topic name -> RecordedTopic.
-    skipped: topic name -> why its messages are not those of ROS 2, so that they are left out.
-    info: what `hpccd record` stored beside the messages (dict), or None in a recording of another recorder.
-    attachments: name -> bytes of the files that it stored, such as mesh files.
+    skipped: topic name -> why its messages are not ROS 2 messages, and so are skipped.
+    info: what `hpccd record` stored about the node (dict), or None for other recorders.
+    attachments: name -> bytes of the attached files, such as mesh files.
     """
 
     def __init__(self, path):
@@ -93,9 +93,9 @@ class Recording:
 
     @property
     def notes(self) -> list[str]:
-        """What a user should know of it, in sentences."""
+        """Sentences about the recording for the user."""
         skipped = listed(f"{topic} ({why})" for topic, why in self.skipped.items())
-        return [printable(f"skipped, as their messages are not those of ROS 2: {skipped}")] if skipped else []
+        return [printable(f"skipped, because these are not ROS 2 messages: {skipped}")] if skipped else []
 
     def messages(self, topics=None) -> Iterator[RecordedMessage]:
         """Messages in the order in which they were received, over all files. `topics`: only these names."""
@@ -109,12 +109,12 @@ class Recording:
             )
 
     def records(self) -> Iterator[StoredMessage]:
-        """As `messages`, those that are not of ROS 2 too, with what the files hold beside each."""
+        """Like `messages`, but with channel and schema, and including messages that are not of ROS 2."""
         return self._records(lambda schema, channel: True)
 
     @property
     def metadata(self) -> list[Metadata]:
-        """Records beside the messages, of all files, equal ones once."""
+        """Metadata records of all files; equal ones once."""
         found = [record for file in self._opened for record in file.metadata]
         return [record for number, record in enumerate(found) if record not in found[:number]]
 
@@ -162,7 +162,7 @@ class Recording:
         if not self.topics and (self.skipped or profile not in ("", "ros2")):
             found = listed(f"{topic} ({why})" for topic, why in self.skipped.items()) or "none"
             raise RecordingError(
-                f"{self.path} holds no messages of ROS 2 (MCAP profile {profile!r}; topics: {found}); record it with "
+                f"{self.path} has no ROS 2 messages (MCAP profile {profile!r}; topics: {found}); record it with "
                 "`hpccd record` or `ros2 bag record -s mcap`"
             )
 
@@ -191,22 +191,22 @@ class Recording:
 
 
 def _foreign(channel, schema) -> str | None:
-    """Why the messages of a channel are not those of ROS 2, or None."""
+    """Why the messages of a channel are not ROS 2 messages, or None."""
     if channel.message_encoding != "cdr":
         return f"encoding {channel.message_encoding!r}"
     return None if schema is not None else "no schema"
 
 
 def stored_info(record: Metadata) -> dict | None:
-    """What `hpccd record` stored of the node; None of another record. Raises ValueError where it cannot be read."""
+    """What `hpccd record` stored about the node; None for other records. Raises ValueError if it cannot be read."""
     if record.name != HPCCD_RECORD:
         return None
     try:
         info = json.loads(record.metadata["json"])
     except (KeyError, ValueError, RecursionError) as error:
-        raise ValueError(f"what `hpccd record` stored of the node is no JSON ({_text(error)})") from error
+        raise ValueError(f"what `hpccd record` stored about the node is not JSON ({_text(error)})") from error
     if not isinstance(info, dict):
-        raise ValueError(f"what `hpccd record` stored of the node is no object but a {type(info).__name__}")
+        raise ValueError(f"what `hpccd record` stored about the node is not an object but a {type(info).__name__}")
     return info
 
 
@@ -230,19 +230,19 @@ def _files_of_folder(path: Path) -> list[Path]:
         return files
     if any(path.glob("*.db3*")):
         raise RecordingError(_convert(path, path))
-    raise RecordingError(f"the folder {path} holds no .mcap file")
+    raise RecordingError(f"the folder {path} has no .mcap file")
 
 
 _PACKED = "is compressed as whole files (`ros2 bag record --compression-mode file`); unpack it"
 
 
 def _check_format(file: Path) -> None:
-    """Raise RecordingError for other formats in which rosbag2 writes, with the command that converts."""
+    """Raise RecordingError for other formats of rosbag2, with the command that converts them."""
     try:
         with open(file, "rb") as stream:
             begin = stream.read(16)
     except OSError:
-        return  # whoever reads it says why
+        return  # reading it raises the error
     if begin.startswith(b"SQLite format 3\0"):
         raise RecordingError(_convert(file, file.parent if (file.parent / "metadata.yaml").exists() else file))
     if begin.startswith(ZSTD):

@@ -30,7 +30,7 @@ def recover(source, target, compression=None) -> Examination:
 
 
 class _Copy:
-    """Visitor that writes each record it is given into a new file."""
+    """Visitor that writes each record into a new file."""
 
     def __init__(self, file: CopiedFile):
         self._file = file

@@ -25,12 +25,12 @@ class StopListener:
     """Listens to ``topic`` in ``node``, whose executor is the user's: SingleThreadedExecutor or MultiThreadedExecutor.
     (rclpy's experimental EventsExecutor fails, in Jazzy, at every callback that asks when its message came.)
 
-    ``stop`` is false only where a message said so that was sent less than ``stop_timeout`` seconds ago, and as many
-    publishers are alive as there are to be. The age of a message is the system's time minus its DDS source timestamp:
-    a process that was held up, or that came late and is given the latched message, does not take an old message for a
-    new one. It can be read at any time from any thread, and is true as well where the executor runs no callbacks.
-    A message from further in the future than ``clock_error``, or a jump of the system clock by more against the steady
-    clock, makes it true until the clocks have agreed for ``stop_timeout``. ``/clock`` does not matter.
+    ``stop`` is false only if a message sent less than ``stop_timeout`` seconds ago said so, and at least ``publishers``
+    publishers are alive. The age of a message is the system time minus its DDS source timestamp: a process that was
+    suspended, or that started late and receives the latched message, does not accept an old message as new. ``stop``
+    can be read at any time from any thread, and also becomes true if the executor runs no callbacks. A message from
+    further in the future than ``clock_error``, or a larger jump of the system clock against the steady clock, makes it
+    true until the clocks have agreed for ``stop_timeout``. ``/clock`` does not matter.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ class StopListener:
         Called by the executor with this listener after ``stop`` changed: at messages and events at once, at a time-out
         when a timer looks, four times in each; not at all while the executor stands still.
     clock_error : float
-        Most seconds by which the system clocks of the two machines differ.
+        Largest difference between the system clocks of the two machines, in seconds.
 
     Raises
     ------
@@ -83,11 +83,11 @@ class StopListener:
         self._clocks = Clocks()
         self._clock_error = float(clock_error)
         self._ages = ClockWatch(self._clock_error, self._timeout)
-        # A word from before is not taken: whether a clock was set back since it was said, nobody here has seen.
+        # Earlier messages are not accepted: nothing here has seen whether a clock was set back since they were sent.
         self._begun = self._clocks.system()
-        self._sent: int | None = None  # when the newest message was; None: none came, or the publisher was lost since
+        self._sent: int | None = None  # when the newest message was sent; None: none, or its publisher was lost since
         self._said = True  # what it said
-        self._said_true = 0  # when the newest was sent that said true
+        self._said_true = 0  # when the newest message saying true was sent
         self._alive: int | None = None  # None: DDS has not told yet
         self._lost = f"nothing was heard yet on {node.resolve_topic_name(topic)}"
         self._told = True  # to on_change
@@ -122,15 +122,15 @@ class StopListener:
             steady, system = self._clocks.steady(), self._clocks.system()
             self._ages.look(steady, system)
             if clocks := self._ages.why(steady):
-                self._sent, self._lost = None, clocks  # how old it is, nobody can say any more
+                self._sent, self._lost = None, clocks  # its age is unknown now
                 self._begun = 0
             if self._sent is None:
                 return f"{self._lost[0].upper()}{self._lost[1:]}."
             age = 1e-9 * (system - self._sent)
             if age < -self._clock_error:
-                return f"What was heard last on {self._topic} was sent {-age:.3g} s in the future."
+                return f"The last message on {self._topic} was sent {-age:.3g} s in the future."
             if age >= _IN_TIME * self._timeout:
-                return f"Nothing was heard on {self._topic} that was sent in the last {age:.3g} s."
+                return f"No message on {self._topic} was sent in the last {age:.3g} s."
             if self._alive is not None and self._alive < self._publishers:
                 return f"{self._alive} of {self._publishers} publishers are alive on {self._topic}."
             if self._said:
@@ -141,16 +141,16 @@ class StopListener:
             return None
 
     def _on_message(self, message: Bool, info: dict[str, Any]) -> None:
-        sent = info["source_timestamp"]  # 0, and so too old, where the middleware tells none
+        sent = info["source_timestamp"]  # 0, and so too old, if the middleware provides none
         with self._lock:
             steady, system = self._clocks.steady(), self._clocks.system()
             self._ages.look(steady, system)
-            self._ages.hear(f"what was heard on {self._topic}", 1e-9 * (sent - system), steady)
+            self._ages.hear(f"a message on {self._topic}", 1e-9 * (sent - system), steady)
             self._said_true = min(self._said_true, system)  # a clock may have been set back
             if message.data:
                 self._said_true = max(self._said_true, sent)
             if sent < self._begun:
-                self._lost = f"nothing was heard on {self._topic} that was sent since the listener was made"
+                self._lost = f"no message on {self._topic} was sent since the listener was made"
             elif self._sent is None or sent >= self._sent or self._sent > system:
                 self._said, self._sent = message.data, sent
         self._tell()

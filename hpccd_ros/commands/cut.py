@@ -1,17 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Cut a part out of a recording. It replays by itself: what was in force at its beginning is copied too (topologies,
-static meshes, shapes, descriptions, transforms, joint states), with the node's parameters and mesh files.
+"""Cut a part out of a recording. The part replays by itself: all that is in force at its beginning is copied too
+(topologies, static meshes, shapes, descriptions, transforms, joint states), and the node's parameters and mesh files.
 
-  hpccd cut run.mcap --from 10 --to 20 -o part.mcap      from the tenth to the twentieth second
-  hpccd cut run.mcap --to 12.5 -o before.mcap            two parts that join without a gap: --from includes its moment,
-  hpccd cut run.mcap --from 12.5 -o after.mcap           --to does not
+  hpccd cut run.mcap --from 10 --to 20 -o part.mcap      from second 10 to second 20
+  hpccd cut run.mcap --to 12.5 -o before.mcap            two parts without a gap or overlap: messages received at
+  hpccd cut run.mcap --from 12.5 -o after.mcap           second 12.5 are in the second part only
   hpccd cut run.mcap --from 1700000000123456789ns -o end.mcap
                                                          from the frame with this stamp, as `hpccd replay` prints it
-  hpccd cut run/ --from 3600 -o late.mcap                of a split recording, over all its files
+  hpccd cut run/ --from 3600 -o late.mcap                a split recording, across all its files
 
 Times are seconds since the first message of the recording was received, or stamps of frames in nanoseconds (with the
-suffix ns, --to included). Answers to steps that began before the part are kept and cannot be verified: `hpccd replay`
-counts them. Channels of other encodings are copied unchanged.
+suffix ns; the frame at --to is included). Answers to steps that began before the part are kept but cannot be verified:
+`hpccd replay` counts them. Channels of other encodings are copied unchanged.
 """
 
 from pathlib import Path
@@ -21,8 +21,8 @@ from hpccd_ros.base.errors import UserError
 
 def configure(parser):
     parser.add_argument("file", metavar="FILE", help="recording: an .mcap file, or a folder of them")
-    parser.add_argument("--from", dest="begin", metavar="TIME", help="begin there (default: at the beginning)")
-    parser.add_argument("--to", dest="end", metavar="TIME", help="end there (default: at the end)")
+    parser.add_argument("--from", dest="begin", metavar="TIME", help="begin of the part (default: that of FILE)")
+    parser.add_argument("--to", dest="end", metavar="TIME", help="end of the part (default: that of FILE)")
     parser.add_argument("-o", "--output", metavar="OUT", required=True, help="new file, NAME.mcap")
     parser.add_argument("--compression", choices=("none", "lz4", "zstd"), help="of OUT (default: that of FILE)")
 
@@ -32,7 +32,7 @@ def run(args) -> int:
         raise UserError("nothing to cut: give --from TIME, --to TIME or both")
     target = Path(args.output)
     if target.suffix != ".mcap":
-        raise UserError(f"-o {args.output}: must end in .mcap")
+        raise UserError(f"-o {args.output}: must end in .mcap; give NAME.mcap")
     from hpccd_ros.bag.cut import Time, cut, seconds
     from hpccd_ros.bag.reader import Recording
     from hpccd_ros.scenes.progress import track
@@ -48,10 +48,10 @@ def run(args) -> int:
             part = cut(recording, target, *times, args.compression,
                        watch=lambda messages: track(messages, "cut", True, recording.message_count or None))
         except FileExistsError as error:
-            raise UserError(f"-o {args.output}: exists; recordings are not overwritten") from error
+            raise UserError(f"-o {args.output}: already exists; give another name") from error
         except OSError as error:
             raise UserError(f"-o {args.output}: {error.strerror}") from error
     print(f"{args.output}: {part.count:,} messages, from {seconds(part.begin)} to {seconds(part.end)} s of {args.file}")
     if part.in_force:
-        print(f"  {part.in_force:,} of them were received before and in force at the beginning")
+        print(f"  {part.in_force:,} of them were received earlier and were in force at its beginning")
     return 0

@@ -55,7 +55,7 @@ class SceneBuilder:
         for number, mesh in enumerate(self.meshes):
             if mesh.self_collision and not mesh.static:
                 found.append((mesh.name, mesh.name))
-            left_out = ignored[mesh.name]  # once: a robot of a thousand links has half a million pairs
+            left_out = ignored[mesh.name]  # looked up once: a robot of a thousand links has half a million pairs
             found += [
                 (mesh.name, other.name)
                 for other in self.meshes[number + 1 :]
@@ -78,7 +78,7 @@ class SceneBuilder:
         return left if left._tested_pairs else None
 
     def _restricted(self, of_rigid: bool) -> "SceneBuilder":
-        """Of the tested pairs those stay of which a mesh moves by poses, or those of which none does."""
+        """Keep only the tested pairs in which a mesh moves by poses, or only those in which none does."""
         rigid = {mesh.name for mesh in self.meshes if mesh.rigid}
         ignored = tuple(
             (a, b) for a, b in self._tested_pairs if a != b and of_rigid != (a in rigid or b in rigid)

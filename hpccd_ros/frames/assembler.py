@@ -47,7 +47,7 @@ class _MeshState:
         self.topologies = TopologyHistory(max_pending)
         self.early: deque[MeshFrame] = deque()  # their topology has not come
         self.positions = StaticPositions()
-        self.newest = 0.0  # arrival of the last message about where a static mesh is, whether or not it is in use
+        self.newest = 0.0  # arrival of the last message with the position of a static mesh, whether or not it is in use
         self.stamps = StampOrder(settings.name)
         self.new_publisher = False  # came, and none of its frames was accepted yet
         self.follows = False  # frames come for stamps of another mesh that were accepted
@@ -134,7 +134,7 @@ class FrameAssembler:
         return outcome
 
     def hear(self, mesh: str, received: float) -> None:
-        """A message came that says where ``mesh`` is; of a static one, the positions before are outdated now."""
+        """A message with the position of ``mesh`` was received; if it is static, its current positions are outdated."""
         if (state := self._meshes.get(mesh)) is not None:
             state.newest = received
 

@@ -37,7 +37,7 @@ class Reason(StrEnum):
     BACKWARD = "stamp_backward"
     REPEATED = "stamp_repeated"
     AHEAD = "stamp_ahead"  # of a transform or joint state: far after those that came before and after it
-    CONTRADICTED = "contradicted"  # a joint state: another publisher tells of the same joint and says otherwise
+    CONTRADICTED = "contradicted"  # a joint state: another publisher gives the same joint another position
     LATE = "late"  # its stamp was already answered (or given up) when it came
     INCOMPLETE = "incomplete"  # another mesh had no frame for this stamp
     STATIC_MISSING = "static_missing"  # the vertices of a static mesh have not come
@@ -58,10 +58,10 @@ class Input(StrEnum):
 
 
 class Aspect(StrEnum):
-    """What a refused message was to tell of its mesh."""
+    """The property of its mesh that a rejected message is about."""
 
-    PLACE = "place"  # where it is
-    SHAPE = "shape"  # of a mesh that moves by poses
+    PLACE = "place"  # its position
+    SHAPE = "shape"  # for meshes that move by poses
     TOPOLOGY = "topology"
     NOTHING = "nothing"  # it concerns nothing that is in use
 
@@ -70,8 +70,8 @@ class Aspect(StrEnum):
 class Refusal:
     """``messages`` of ``mesh`` (of a transform: its topic) that will not be used, and why.
 
-    ``text``: what was wrong and what to do, for the log; "": nobody can do anything about it. ``sent``: when the
-    message was, ns of the system clock; None: unknown.
+    ``text``: the problem and the remedy, for the log; "": there is no remedy. ``sent``: when the message was sent, ns
+    of the system clock; None: unknown.
     """
 
     mesh: str

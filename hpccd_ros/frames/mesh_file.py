@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The mesh of a file as a topology, and where it is static its positions, placed by a pose."""
+"""The mesh of a file as a topology, and as positions placed by a pose if the mesh is static."""
 
 from typing import Any
 

@@ -14,7 +14,7 @@ class Outcome:
     ``restarts``: in words, where the stream starts anew. ``static_taken``: accepted messages of static meshes, and
     shapes of those that move by poses. ``asked``: meshes that transforms move, of each frame that was asked of them: it
     counts as a message. ``joined``: (mesh, stamp ns, time of arrival) of frames that were accepted. ``unplaced``:
-    static meshes whose positions a new topology has made void, and when these were sent.
+    static meshes whose positions a new topology has invalidated, and when the positions were sent.
     """
 
     frames: list[SceneFrame] = field(default_factory=list)

@@ -136,7 +136,7 @@ class FramePipeline:
         self._assembler.restart_after = count
 
     def moves_by_poses(self, mesh: str) -> bool:
-        """Whether vertices of ``mesh`` are its shape, and something else says where it is."""
+        """Whether vertices of ``mesh`` are its shape, and its position comes from elsewhere."""
         return mesh in self._rigid
 
     def topology(self, mesh: str) -> Topology | None:

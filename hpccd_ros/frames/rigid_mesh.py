@@ -6,7 +6,7 @@ import numpy as np
 from hpccd_ros.base.quoting import quoted
 from hpccd_ros.frames.coordinates import unusable_coordinates
 from hpccd_ros.frames.drops import Aspect, Reason, Refusal
-from hpccd_ros.frames.types import UNTOLD, MeshFrame, MeshSettings, Placement, PoseFrame
+from hpccd_ros.frames.types import UNKNOWN_TIME, MeshFrame, MeshSettings, Placement, PoseFrame
 from hpccd_ros.rigid.body import Body
 from hpccd_ros.rigid.transform import Rigid
 
@@ -19,7 +19,7 @@ class RigidMesh:
         self._stands = Rigid.of(mesh.pose[:3], mesh.pose[3:])
         self._shape: MeshFrame | None = None
         self._body: Body | None = None
-        self._sent = UNTOLD  # when the shape was, the last time
+        self._sent = UNKNOWN_TIME  # when the shape was last sent
 
     def set_shape(self, shape: MeshFrame) -> Refusal | None:
         """Its vertices, before ``pose``. The same as before leave the motion from pose to pose whole; a shape that is

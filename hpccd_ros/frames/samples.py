@@ -27,11 +27,11 @@ Value = TypeVar("Value")
 
 
 class Samples(Generic[Value]):
-    """Of one thing, in the order of their stamps.
+    """Samples of one frame or joint, in the order of their stamps.
 
-    ``numbers``: of the samples, in the order in which those of all things came. ``since``: number and stamp of the
-    first of those that came last, in increasing order, behind the newest stamp; None: the last one did not. ``sent``:
-    when the messages of the samples were, ns of the system clock.
+    ``numbers``: of the samples, counted in order of arrival over all frames or joints. ``since``: number and stamp of
+    the first sample of the last run that arrived in increasing order but behind the newest stamp; None: the last
+    sample did not. ``sent``: when the messages of the samples were sent, ns of the system clock.
     """
 
     def __init__(self) -> None:
@@ -74,7 +74,7 @@ class Samples(Generic[Value]):
         self.since, self._behind = None, IncreasingStamps()
 
     def sent_at(self, stamp: int) -> int:
-        """When the older of the samples around ``stamp`` was sent, which lies between the first and the last."""
+        """When the older of the two samples around ``stamp``, which is between the first and the last, was sent."""
         if self.stamps[-1] == stamp:
             return self.sent[-1]
         at = bisect_left(self.stamps, stamp)
@@ -116,8 +116,8 @@ class Run:
         self._anew: int | None = None  # the first stamp after it last began anew
 
     def add(self, stamp: int, of_message: Iterable[tuple[Samples[Value], Value]], sent: int = 0) -> int | None:
-        """What one message, sent then, tells of some things. The stamp of an earlier message that is a stray, and left
-        out."""
+        """Add the values of one message, which was sent at ``sent``. Returns the stamp of an earlier message that is
+        a stray and was removed."""
         self._came += 1
         stray = None
         for samples, value in of_message:

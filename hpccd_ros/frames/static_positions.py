@@ -12,7 +12,7 @@ _MOST_FRAMES = 4
 
 
 class Kept(NamedTuple):
-    """``newest``: the last message that brought these positions, perhaps the same again; ``frame``: the first."""
+    """``frame``: the first message with these positions; ``newest``: the last one, which may be the same again."""
 
     frame: MeshFrame
     newest: MeshFrame
@@ -20,7 +20,7 @@ class Kept(NamedTuple):
 
 class StaticPositions:
     def __init__(self) -> None:
-        self._by_frame_id: dict[str, Kept] = {}  # the last one kept last
+        self._by_frame_id: dict[str, Kept] = {}  # in the order of arrival
 
     @property
     def frame_ids(self) -> list[str]:
@@ -29,7 +29,7 @@ class StaticPositions:
 
     @property
     def last_sent(self) -> int | None:
-        """When the last ones were; None: there are none."""
+        """When the last positions were sent; None: there are none."""
         return max((kept.newest.sent for kept in self._by_frame_id.values()), default=None)
 
     def keep(self, frame: MeshFrame) -> None:

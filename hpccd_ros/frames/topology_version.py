@@ -4,7 +4,7 @@
 from collections import deque
 
 from hpccd_ros.frames.drops import Aspect, Input, Reason, Refusal
-from hpccd_ros.frames.types import UNTOLD, MeshFrame, Topology
+from hpccd_ros.frames.types import UNKNOWN_TIME, MeshFrame, Topology
 
 # As many as the node's subscription to topologies holds (middleware/qos.py): so many can have overtaken a frame there.
 _IN_THE_SUBSCRIPTION = 10
@@ -19,7 +19,7 @@ class TopologyHistory:
 
     def __init__(self, waiting: int) -> None:
         self.current: Topology | None = None
-        self.sent = UNTOLD  # when the last message was that was equal to the current one
+        self.sent = UNKNOWN_TIME  # when the last message with the current topology was sent
         self._superseded: deque[Topology] = deque(maxlen=_IN_THE_SUBSCRIPTION + waiting)
 
     def put(self, topology: Topology) -> None:
@@ -32,7 +32,7 @@ class TopologyHistory:
         self.sent = topology.sent
 
     def sent_of(self, topology: Topology) -> int:
-        """When it was sent, the last time."""
+        """When it was last sent."""
         return self.sent if topology is self.current else topology.sent
 
     def of(self, frame: MeshFrame) -> Topology | None:

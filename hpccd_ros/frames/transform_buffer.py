@@ -10,7 +10,7 @@ from bisect import bisect_left
 
 from hpccd_ros.base.quoting import listed, quoted
 from hpccd_ros.frames.samples import Run, Samples
-from hpccd_ros.frames.types import ALWAYS, OUTDATED, UNTOLD
+from hpccd_ros.frames.types import ALWAYS, OUTDATED, UNKNOWN_TIME
 from hpccd_ros.rigid.transform import IDENTITY, Rigid
 
 MOST_FRAMES = 1000  # about 500 MB if every frame were full
@@ -32,7 +32,7 @@ class NoTransformError(LookupError):
 
 
 class _Edge(Samples[Rigid]):
-    """Where one frame was in its parent; ``always``: not bound to a time. ``outdated``: a newer one was rejected."""
+    """Poses of a frame in its parent; ``always``: a static one. ``outdated``: a newer transform was rejected."""
 
     def __init__(self, parent: str) -> None:
         super().__init__()
@@ -41,7 +41,7 @@ class _Edge(Samples[Rigid]):
         self.outdated = False
 
     def at(self, child: str, stamp: int) -> tuple[Rigid, int]:
-        """With the time at which it was sent."""
+        """Like `at`, with the time at which the transform was sent."""
         if self.always is not None:
             return self.always, OUTDATED if self.outdated else ALWAYS
         at = bisect_left(self.stamps, stamp)
@@ -74,17 +74,17 @@ class TransformBuffer:
     def __init__(self) -> None:
         self.heard: dict[str, int | str] = {}
         self._edges: dict[str, _Edge] = {}
-        # When the newest static transform was sent that was rejected: of each child, and of any.
+        # When the newest rejected static transform was sent: of each child, and of any child.
         self._rejected_of: dict[str, int] = {}
-        self._rejected_of_any = UNTOLD
+        self._rejected_of_any = UNKNOWN_TIME
         self._run = Run(self._edges.values)
 
-    def add(self, parent: str, child: str, rigid: Rigid, stamp: int | None, sent: int = UNTOLD) -> int | None:
+    def add(self, parent: str, child: str, rigid: Rigid, stamp: int | None, sent: int = UNKNOWN_TIME) -> int | None:
         """``rigid`` takes coordinates in ``child`` to coordinates in ``parent``; stamp ns, None: at all times. sent:
-        when its message was.
+        when its message was sent.
 
-        The stamp of an earlier one that was far ahead, and is forgotten. Raises ValueError: an empty or too long name,
-        a frame in itself, too many frames.
+        Returns the stamp of an earlier transform that was far ahead and was removed. Raises ValueError: an empty or too
+        long name, a frame in itself, too many frames.
         """
         parent, child = parent.removeprefix("/"), child.removeprefix("/")
         if max(len(parent), len(child)) > LONGEST_NAME:
@@ -98,16 +98,17 @@ class TransformBuffer:
             edge = self._edges[child] = _Edge(parent)
         if stamp is None:
             edge.always = rigid
-            edge.outdated = UNTOLD < sent <= max(self._rejected_of.get(child, UNTOLD), self._rejected_of_any)
+            rejected = max(self._rejected_of.get(child, UNKNOWN_TIME), self._rejected_of_any)
+            edge.outdated = UNKNOWN_TIME < sent <= rejected
             return None
         edge.outdated = False
         edge.always = None
         return self._run.add(stamp, [(edge, rigid)], sent)
 
-    def rejected(self, child: str | None, static: bool, sent: int = UNTOLD) -> bool:
-        """A newer transform of ``child`` (None: of no known frame, so of any) was rejected: where it is, is not known
-        until a valid one comes, and one that is static must have been sent later. static: on a topic of static ones.
-        Whether a known frame is concerned."""
+    def rejected(self, child: str | None, static: bool, sent: int = UNKNOWN_TIME) -> bool:
+        """A newer transform of ``child`` (None: the frame is unknown, so it may be any) was rejected: its pose is
+        unknown until a valid transform arrives; a static one must have been sent later. static: on a topic of static
+        transforms. Returns whether a known frame is concerned."""
         if static:
             self._keep_rejected(child, sent)
         if child is not None:
@@ -120,12 +121,12 @@ class TransformBuffer:
         return bool(edges)
 
     def _keep_rejected(self, child: str | None, sent: int) -> None:
-        """An older one may come later: nothing orders what several publishers send."""
+        """Remember a rejected static transform: an older one from another publisher may still arrive."""
         name = child.removeprefix("/") if child is not None else ""
         if child is None or (name not in self._rejected_of and len(self._rejected_of) >= MOST_FRAMES):
             self._rejected_of_any = max(self._rejected_of_any, sent)
         elif 0 < len(name) <= LONGEST_NAME:
-            self._rejected_of[name] = max(self._rejected_of.get(name, UNTOLD), sent)
+            self._rejected_of[name] = max(self._rejected_of.get(name, UNKNOWN_TIME), sent)
 
     @property
     def begun(self) -> int:
@@ -144,7 +145,7 @@ class TransformBuffer:
         return self.lookup_sent(source, target, stamp)[0]
 
     def lookup_sent(self, source: str, target: str, stamp: int) -> tuple[Rigid, int]:
-        """As `lookup`, with the time at which the oldest transform was sent that it is made of."""
+        """Like `lookup`, with the time at which the oldest transform used was sent."""
         source, target = source.removeprefix("/"), target.removeprefix("/")
         if source == target:
             return IDENTITY, ALWAYS

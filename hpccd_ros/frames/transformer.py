@@ -140,7 +140,7 @@ class MeshTransformer:
     def _moved(
         self, frame: MeshFrame, rigid: Rigid, new_publisher: bool, sent: int = ALWAYS
     ) -> MeshFrame | Refusal:
-        """sent: when the transform was."""
+        """sent: when the transform was sent."""
         placement = frame.placement.moved(rigid) if frame.placement is not None else None
         if placement is not None:
             vertices = placement.vertices

@@ -15,10 +15,10 @@ from hpccd_ros.rigid.transform import Rigid
 # Values of parameter mesh.NAME.input for meshes that move by poses; JOINTS: by the joints of their robot.
 POSE, TF, JOINTS = "pose", "tf", "joints"
 
-# Times at which messages were sent, ``sent``: the DDS source timestamp, ns of the system clock. UNTOLD: the middleware
-# gave none, so that the age is unknown. ALWAYS: the message is bound to no time (a static transform) and has no age.
-# OUTDATED: a newer message was rejected, or waits and is not in use yet.
-UNTOLD = 0
+# Times at which messages were sent, ``sent``: the DDS source timestamp, ns of the system clock. UNKNOWN_TIME: the
+# middleware gave none, so the age is unknown. ALWAYS: the message holds at all times (a static transform) and has no
+# age. OUTDATED: a newer message was rejected, or is waiting and not in use yet.
+UNKNOWN_TIME = 0
 ALWAYS = 2**63 - 1
 OUTDATED = -1
 
@@ -65,13 +65,13 @@ NO_EDGES.flags.writeable = False
 @dataclass(frozen=True, eq=False)
 class Topology:
     """Triangles of one mesh, ``faces`` (F,3) uint32, and edges beside theirs, ``edges`` (E,2) uint32; all below
-    ``n_vertices``. ``sent``: when its message was."""
+    ``n_vertices``. ``sent``: when its message was sent."""
 
     version: int
     n_vertices: int
     faces: NDArray[np.uint32]
     edges: NDArray[np.uint32] = field(default_factory=lambda: NO_EDGES)
-    sent: int = UNTOLD
+    sent: int = UNKNOWN_TIME
 
     def same_content(self, other: "Topology") -> bool:
         """Equal but for the version."""
@@ -107,7 +107,7 @@ class PoseFrame:
     frame_id: str = ""
     received: float = 0.0
     only_publisher: bool = True
-    sent: int = UNTOLD
+    sent: int = UNKNOWN_TIME
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,9 +118,9 @@ class MeshFrame:
     the one in force. ``step``: the publisher's number, None where it gives none. ``vertices`` (n,3) float32
     or float64, finite. ``received``: time.monotonic() at its arrival; ``only_publisher``: its mesh had no other one of
     vertices then. ``topology``: carried by messages of whole meshes, else set by the assembler. ``placement``: of a
-    mesh that moves by poses, which gives these vertices. ``sent``: when the oldest of the messages was sent that
-    determine where the mesh is: its own, and the transforms and joint states that were used. ``shape_sent``: of a mesh
-    that moves by poses, when its shape was.
+    mesh that moves by poses, which gives these vertices. ``sent``: when the oldest message that determines
+    the mesh's position was sent, among its own and the transforms and joint states used. ``shape_sent``: when the shape
+    of a mesh that moves by poses was sent.
     """
 
     stamp: int
@@ -132,8 +132,8 @@ class MeshFrame:
     only_publisher: bool = True
     topology: Topology | None = None
     placement: Placement | None = None
-    sent: int = UNTOLD
-    shape_sent: int = UNTOLD
+    sent: int = UNKNOWN_TIME
+    shape_sent: int = UNKNOWN_TIME
 
     def of_topology(self, topology: Topology) -> "MeshFrame":
         """Asked for each mesh of each frame of the scene: dataclasses.replace() takes four times as long."""
@@ -145,12 +145,12 @@ class MeshFrame:
 
 
 class Origin(NamedTuple):
-    """When the messages were sent from which the state of one mesh is known: ``place``, the oldest of those that say
-    where it is; ``shape``, that of a mesh that moves by poses; ``topology``, the last valid one."""
+    """When the messages that determine the state of a mesh were sent: ``place``: the oldest one about its position;
+    ``shape``: that of its shape, if it moves by poses; ``topology``: the last valid one."""
 
-    place: int = UNTOLD
-    shape: int = UNTOLD
-    topology: int = UNTOLD
+    place: int = UNKNOWN_TIME
+    shape: int = UNKNOWN_TIME
+    topology: int = UNKNOWN_TIME
 
     def of(self, aspect: Aspect) -> int:
         return {Aspect.PLACE: self.place, Aspect.SHAPE: self.shape, Aspect.TOPOLOGY: self.topology}[aspect]
@@ -163,7 +163,7 @@ class SceneFrame:
     ``step``: of the first mesh that gives one, else a running number of complete frames.
     ``fresh``: meshes whose message is used for the first time here. ``received``: of the last message needed.
     ``placements``: of meshes that move by poses, None of others; empty: none does. ``origins``: of all meshes.
-    ``inputs``: how many inputs the node had taken when the frame was complete (taken_inputs.py).
+    ``inputs``: number of inputs that the node had taken when the frame was complete (taken_inputs.py).
     """
 
     stamp: int

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a node had taken when it found an answer <-> the fields of ContactArray that list it."""
+"""The inputs that a node had taken for an answer <-> the fields of ContactArray that list them."""
 
 from array import array
 from collections.abc import Iterator, Sequence
@@ -15,7 +15,7 @@ from hpccd_ros.frames.taken_inputs import TakenInput
 class ListedInputs:
     """Iterate over the inputs that an answer lists: they are numbered without gaps, after ``before`` others.
 
-    ``start``: how many had been taken when the frame at the start of the step was complete; ``end``: at its end.
+    ``start``, ``end``: inputs taken when the frame at the start of the step, and that at its end, was complete.
     """
 
     before: int
@@ -36,8 +36,8 @@ class ListedInputs:
 
 
 def fill_inputs(message: ContactArray, taken: Sequence[TakenInput], start: int, end: int) -> None:
-    """taken: the last ones up to the number ``end``, that of the frame at the end of the step; start: of that at its
-    start."""
+    """taken: the last inputs, up to the number ``end``. start, end: inputs taken when the frame at the start of the
+    step, and that at its end, was complete."""
     index: dict[str, int] = {}
     message.inputs_before, message.start_inputs = end - len(taken), start
     message.input_topic = array("H", [index.setdefault(one.topic, len(index)) for one in taken])
@@ -47,7 +47,7 @@ def fill_inputs(message: ContactArray, taken: Sequence[TakenInput], start: int, 
 
 
 def read_inputs(message: ContactArray) -> ListedInputs | None:
-    """None: the answer is from before they were listed. Raises ValueError where the fields do not fit together."""
+    """The inputs that an answer lists; None: its node lists none. Raises ValueError if fields conflict."""
     before, topics, sent = message.inputs_before, message.input_topics, message.input_sent
     if not (before or message.start_inputs or len(message.input_topic) or len(sent) or len(message.input_flags)):
         return None
@@ -71,5 +71,5 @@ def fill_report(message: ContactArray, report: str) -> None:
 
 
 def read_report(message: ContactArray) -> str | None:
-    """None where the message does not tell."""
+    """The option ``report`` of the answer; None: unknown."""
     return REPORTS[message.report - 1] if 0 < message.report <= len(REPORTS) else None

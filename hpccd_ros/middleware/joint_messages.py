@@ -8,7 +8,7 @@ from sensor_msgs.msg import JointState
 
 from hpccd_ros.frames.drops import Input, Reason, Refusal
 from hpccd_ros.frames.samples import stray_text
-from hpccd_ros.frames.types import UNTOLD
+from hpccd_ros.frames.types import UNKNOWN_TIME
 from hpccd_ros.middleware import fields
 from hpccd_ros.robots.errors import RobotError
 from hpccd_ros.robots.joint_frames import JointFrames
@@ -17,12 +17,12 @@ from hpccd_ros.robots.joint_history import check_lengths
 # Bound what is kept of a message that anybody may send.
 MOST_JOINTS = 1000
 MOST_CHARACTERS = 100_000  # of their names
-# The last messages of a topic, kept for robots whose description has not come.
+# Last messages of a topic, kept for robots whose description has not arrived.
 MOST_RECENT = 100
 
 
 def kept(message: JointState) -> JointState | None:
-    """What `fill` needs of it, for later; None: it is too large, or names and positions do not go together."""
+    """The fields that `fill` needs later; None: it is too large, or names and positions do not match."""
     if len(message.name) > MOST_JOINTS or len(message.position) not in (0, len(message.name)):
         return None
     if sum(map(len, message.name)) > MOST_CHARACTERS:
@@ -42,12 +42,12 @@ def too_large(topic: str) -> Refusal:
 
 
 def fill(
-    robots: Iterable[JointFrames], message: Any, topic: str, sent: int = UNTOLD, publisher: int | None = None
+    robots: Iterable[JointFrames], message: Any, topic: str, sent: int = UNKNOWN_TIME, publisher: int | None = None
 ) -> list[Refusal]:
-    """Give a sensor_msgs/JointState of ``topic``, sent then, to the robots that it moves. It is refused where one of
-    them cannot use it, or not all of it, and where no robot can; the others have it all the same. An earlier one is
-    refused that this one shows to have been far ahead. publisher: which one of several; where they contradict each
-    other that is reported as a refusal, though the message is in use."""
+    """Give a sensor_msgs/JointState of ``topic``, sent at ``sent``, to the robots that it moves. Returns a refusal for
+    each robot that cannot use all of it, and if no robot can use it; other robots use it nevertheless. An earlier
+    message is refused if this one shows that it was far ahead. publisher: number of the publisher if there are several.
+    If publishers contradict each other, a refusal reports it, though the message is used."""
     problems: list[str] = []
     contradiction = ""
     stray: int | None = None

@@ -16,7 +16,7 @@ from hpccd_ros.robots.robot import Robot
 from hpccd_ros.robots.shapes import MeshFile
 from hpccd_ros.robots.xml_tree import MOST_CHARACTERS, decoded
 
-# No character takes more.
+# Characters have at most four bytes.
 _MOST_BYTES = 4 * MOST_CHARACTERS
 
 

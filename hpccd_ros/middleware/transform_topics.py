@@ -12,7 +12,7 @@ from hpccd_ros.base.quoting import quoted
 from hpccd_ros.frames.drops import Aspect, Input, Reason, Refusal
 from hpccd_ros.frames.samples import stray_text
 from hpccd_ros.frames.transform_buffer import TransformBuffer
-from hpccd_ros.frames.types import UNTOLD
+from hpccd_ros.frames.types import UNKNOWN_TIME
 from hpccd_ros.middleware import fields, topic_names
 from hpccd_ros.middleware.message_types import message_class
 from hpccd_ros.rigid.transform import Rigid
@@ -55,8 +55,8 @@ def _installed(type_name: str) -> bool:
     return True
 
 
-def fill(buffer: TransformBuffer, message: Any, topic: TransformTopic, sent: int = UNTOLD) -> list[Refusal]:
-    """Add the transforms in a message of ``topic``, sent then, to ``buffer``; those that are none are refused."""
+def fill(buffer: TransformBuffer, message: Any, topic: TransformTopic, sent: int = UNKNOWN_TIME) -> list[Refusal]:
+    """Add the transforms in a message of ``topic``, sent at ``sent``, to ``buffer``. Returns those refused."""
     refusals = []
     for stamped in message.transforms if hasattr(message, "transforms") else [message]:
         try:

@@ -23,9 +23,9 @@ class Accounts:
     """``dropped``: vertex messages. ``connections``: what the middleware tells of its topics (name -> count).
 
     ``static_taken``: accepted messages of static meshes, which count as answered. ``requests``: to ~/detect, service
-    and action, by how they ended. ``inputs``: what was taken since the node was configured. warn: takes what is to be
-    logged. on_refused: hears of each refusal, in the thread that refuses. on_heard: hears of each message of an input:
-    its kind, its mesh or topic, and what the middleware tells of it.
+    and action, by how they ended. ``inputs``: those taken since the node was configured. warn: logs a text.
+    on_refused: called with each refusal, in the thread that refuses. on_heard: called with each input message: its
+    kind, its mesh or topic, and the middleware's info about it.
     """
 
     def __init__(self, warn: Callable[[str], None]) -> None:

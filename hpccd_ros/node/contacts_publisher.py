@@ -47,7 +47,7 @@ class ContactsPublisher:
         return self._contacts.topic_name
 
     def publish(self, found: Detection, dropped_frames: int, taken: TakenInputs) -> ContactArray:
-        """The message that was sent. dropped_frames: of the scene, so far. taken: what the node has taken so far."""
+        """Returns the message sent. dropped_frames: of the scene, so far. taken: the inputs taken so far."""
         # check_fields: its arrays are taken as they are, not copied.
         message = ContactArray(
             step=found.end.step, accuracy=found.options.accuracy, backend=found.backend, check_fields=True

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A subscription of the node, and the publishers of its topic that DDS does not connect to it: they offer less than it
-asks for, so nothing of them is received."""
+"""A subscription of the node, and warnings about publishers that DDS does not connect to it because they offer less
+than it requests."""
 
 from collections import Counter
 from collections.abc import Callable, Iterable
@@ -13,15 +13,15 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from hpccd_ros.base.quoting import shortened
 from hpccd_ros.middleware import qos_overrides
 
-# Publishers that one topic is reported for at a time: anybody may start some.
+# Bounds the publishers reported for one topic at a time: anybody may start some.
 MOST_REPORTED = 3
 
 
 class InputSubscription:
     """Subscribed from construction until ``close``.
 
-    reliability: the parameter that sets it for this topic; "": only ``qos_overrides`` do. counts: gets
-    qos_incompatible.TOPIC. events: message_lost and matched, as of SubscriptionEventCallbacks.
+    reliability: the parameter that sets it for this topic; "": only ``qos_overrides`` do. counts: receives
+    qos_incompatible.TOPIC. events: message_lost and matched, as in SubscriptionEventCallbacks.
     """
 
     def __init__(
@@ -45,7 +45,7 @@ class InputSubscription:
             if counts is not None:
                 counts[f"qos_incompatible.{topic}"] += event.total_count_change
             self._any_unheard = True
-            for line in self.warnings() or [f"{self.topic}: a publisher offers less than the node asks for"]:
+            for line in self.warnings() or [f"{self.topic}: a publisher offers less than the node requests"]:
                 node.get_logger().warning(line)
 
         self.subscription = qos_overrides.create_subscription(
@@ -60,7 +60,7 @@ class InputSubscription:
 
     @property
     def topic(self) -> str:
-        """Its name, in full."""
+        """Its full name."""
         return self.subscription.topic_name
 
     @property
@@ -72,18 +72,18 @@ class InputSubscription:
         self._node.destroy_subscription(self.subscription)
 
     def warnings(self) -> list[str]:
-        """One sentence for each publisher that is there and not heard."""
-        if not self._any_unheard:  # to ask for the publishers of every topic would take long
+        """One sentence for each publisher that exists and is not connected."""
+        if not self._any_unheard:  # asking for the publishers of every topic would take long
             return []
         found = self._node.get_publishers_info_by_topic(self.topic)
         lines = [line for publisher in found if (line := self._unheard(publisher))]
         self._any_unheard = bool(lines)
         lines = list(dict.fromkeys(lines))
         more = len(lines) - MOST_REPORTED
-        return [*lines[:MOST_REPORTED], *([f"{self.topic}: {more} more publishers as these"] if more > 0 else [])]
+        return [*lines[:MOST_REPORTED], *([f"{self.topic}: {more} more such publishers"] if more > 0 else [])]
 
     def _unheard(self, publisher: Any) -> str:
-        """"": it is heard."""
+        """Why a publisher is not connected, and the remedy; "": it is."""
         offered, asked = publisher.qos_profile, self.subscription.qos_profile
         less = []
         if (offered.reliability, asked.reliability) == (ReliabilityPolicy.BEST_EFFORT, ReliabilityPolicy.RELIABLE):
@@ -97,10 +97,10 @@ class InputSubscription:
         if less == [("best_effort", "reliable")]:
             remedy = f"set {self._setting()}: best_effort, or {remedy}"
         elif len(less) == 1:
-            remedy += " (latched), as what it sent before the node listened would be missing"
+            remedy += " (latched): otherwise messages sent before the node listened would be missing"
         return (
-            f"{self.topic}: a publisher {_node_of(publisher)} offers {offers}, the node asks for {asks}, so nothing "
-            f"of it is received; {remedy}"
+            f"{self.topic}: a publisher {_node_of(publisher)} offers {offers} but the node requests {asks}, so none "
+            f"of its messages are received; {remedy}"
         )
 
     def _setting(self) -> str:
@@ -109,12 +109,12 @@ class InputSubscription:
 
 
 def unheard(subscriptions: Iterable[InputSubscription]) -> list[str]:
-    """The warnings of all, each once."""
+    """The warnings of all subscriptions, each once."""
     return list(dict.fromkeys(line for subscription in subscriptions for line in subscription.warnings()))
 
 
 def _node_of(publisher: Any) -> str:
     if publisher.node_name.startswith("_"):  # _CREATED_BY_BARE_DDS_APP_, or its name is not known yet
-        return "that is no node of ROS"
+        return "that is not a ROS node"
     name = f"{publisher.node_namespace.rstrip('/')}/{publisher.node_name}"
     return f"of node {shortened(name)}"

@@ -28,7 +28,7 @@ from hpccd_ros.robots.joint_publishers import PublisherNumbers
 
 @dataclass
 class _Recent:
-    """``sent``, ``publisher``: as of `joint_messages.fill`. ``refused``: that it was is counted already."""
+    """``sent``, ``publisher``: as in `joint_messages.fill`. ``refused``: its refusal is already counted."""
 
     message: JointState
     sent: int
@@ -74,7 +74,7 @@ class JointSubscriptions:
         self._subscriptions.clear()
 
     def warnings(self) -> list[str]:
-        """Topics that nobody publishes, and publishers that are not heard."""
+        """Topics without a publisher, and publishers that are not connected."""
         silent = [subscription.topic for subscription in self._subscriptions if not subscription.publishers]
         return [f"nobody publishes {topic}" for topic in silent] + unheard(self._subscriptions)
 

@@ -39,13 +39,13 @@ class MeshTopic:
         self.reception = reception
         self.kind = kind
         self.numbers = SequenceWatch()
-        self.sent = 0  # when the last message was that was taken
+        self.sent = 0  # when the last message taken was sent
         self._limit = RateLimit(reception.settings["max_rate"])
         self._subscription: InputSubscription | None = None
         self._topic = topic_names.of_mesh(reception.mesh, kind)
 
     def taken(self, sent: int, new_publisher: bool, several: bool = False) -> None:
-        """A message goes on to the pipeline; sent: by its publisher, ns. several: the topic has several of them."""
+        """A message goes to the pipeline; sent: source timestamp, ns. several: the topic has several publishers."""
         flags = NEW_PUBLISHER * new_publisher + SEVERAL_PUBLISHERS * several
         self.reception.accounts.inputs.add(self._topic, sent, flags)
 
@@ -70,7 +70,7 @@ class MeshTopic:
             self._subscription = None
 
     def take(self, info: dict[str, Any]) -> None:
-        """A message is looked at."""
+        """A message has been received, and its info."""
         self.sent = info["source_timestamp"]
         self.reception.accounts.on_heard(self.kind, self.reception.mesh, info)
 
@@ -85,7 +85,7 @@ class MeshTopic:
         return self._subscription.publishers
 
     def warnings(self) -> list[str]:
-        """Which publishers are not heard."""
+        """Publishers that are not connected."""
         return self._subscription.warnings() if self._subscription is not None else []
 
     def too_fast(self) -> str | None:
@@ -95,11 +95,11 @@ class MeshTopic:
         return f"more than {self.reception.settings['max_rate']:g} messages a second (parameter max_rate)"
 
     def refuse(self, reason: Reason, text: str, messages: int = 1) -> None:
-        """Of the message that was taken last, or of those before it."""
+        """Refuse the message taken last, or messages before it."""
         self._refuse(reason, text, messages, self.sent)
 
     def refuse_unreadable(self) -> None:
-        """One that cannot be taken; when it was sent nobody knows."""
+        """Refuse a message that cannot be deserialised, so that the time at which it was sent is unknown."""
         self._refuse(Reason.MALFORMED, f"{self.name}: {UNREADABLE}", 1, None)
 
     def _refuse(self, reason: Reason, text: str, messages: int, sent: int | None) -> None:
@@ -113,7 +113,7 @@ class MeshTopic:
 
     @property
     def aspect(self) -> Aspect:
-        """What its messages tell of the mesh."""
+        """The property of the mesh that its messages are about."""
         if self.what is Input.TOPOLOGY:
             return Aspect.TOPOLOGY
         of_shape = self.kind != topic_names.POSE and self.reception.pipeline.moves_by_poses(self.reception.mesh)

@@ -134,7 +134,7 @@ class HpccdNode(GuardedLifecycleNode):
         self._doubt_robots()
 
     def _doubt_robots(self) -> None:
-        """Where stop is published: the robots whose last description is not in the scene."""
+        """If stop is published, tell it the robots whose last description is not in the scene."""
         if self._stop_watch is None or self._robots is None:
             return
         in_scene = dict.fromkeys(self._settings["robots"], self._scene_error) if self._scene_error else {}

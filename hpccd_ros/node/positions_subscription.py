@@ -39,7 +39,7 @@ class PositionsSubscription(MeshTopic):
                 self.kind, message, of.settings, received, alone, sent=sent, welding=self._welding
             )
         except InvalidMessageError as error:
-            self.taken(sent, False)  # a replay reads, and refuses, it as well
+            self.taken(sent, False)  # listed, because a replay reads and refuses it too
             of.accounts.refused(error.refusal(of.mesh, aspect=self.aspect, sent=sent))
             return
         new_publisher = self.numbers.notice()

@@ -24,9 +24,9 @@ LONGEST = 500
 
 
 class RobotDescriptions:
-    """``robots``: name -> robot, of those that are known; a description that cannot be used leaves the one before.
+    """``robots``: name -> robot, for those that are known; a rejected description leaves the previous one in use.
 
-    on_change: called when a robot has become known, or another one; on_doubt: when `doubts` has changed. Raises
+    on_change: called when a robot has become known or has changed; on_doubt: when `doubts` has changed. Raises
     ParameterError for a file that cannot be used.
     """
 
@@ -63,7 +63,7 @@ class RobotDescriptions:
         return len(self.robots) == len(self._values)
 
     def doubts(self) -> dict[str, str]:
-        """Robots of which a newer description has come that is not in use, and why."""
+        """Robots with a newer description that is not in use, and why."""
         newer = dict.fromkeys([*self._reading, *self._waiting], "its new description is being read")
         return newer | {name: f"its description was rejected: {why}" for name, why in self._refused.items()}
 
@@ -155,7 +155,7 @@ class RobotDescriptions:
         self._refused.pop(name, None)
 
     def _refuse(self, name: str, why: str) -> None:
-        kept = "; the one before stays in use" if name in self.robots else ""
+        kept = "; the previous one stays in use" if name in self.robots else ""
         self._refused[name] = f"{why}{kept}"
         self._node.get_logger().error(f"robot {name}: {self._refused[name]}")
         self._on_doubt()

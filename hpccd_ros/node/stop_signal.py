@@ -48,7 +48,7 @@ class StopSignal:
             why = self._state.next(due)
             due = time.monotonic() + self._period
             if why is None and self._state.why() is not None:
-                continue  # held up since: it holds no more
+                continue  # it took too long: the state is no longer valid
             try:
                 self._publisher.publish(Bool(data=why is not None))
                 self._log(why)

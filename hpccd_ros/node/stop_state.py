@@ -17,7 +17,7 @@ from enum import StrEnum
 
 from hpccd_ros.base.clocks import CLOCK_ERROR, Clocks, ClockWatch
 from hpccd_ros.frames.drops import Aspect, Reason, Refusal
-from hpccd_ros.frames.types import ALWAYS, OUTDATED, UNTOLD, Origin
+from hpccd_ros.frames.types import ALWAYS, OUTDATED, UNKNOWN_TIME, Origin
 from hpccd_ros.node.stop_doubts import Doubt, Source, WatchedScene, leaves_unknown, text_of
 
 # Part of the time-out after which silence makes stop true, so that listeners receive it within the time-out.
@@ -249,7 +249,7 @@ class StopState:
             return None
         if age < 0:
             return Why(Cause.CLOCKS, f"a message of mesh {self._oldest_of} was sent {-1e-9 * age:.3g} s in the future")
-        if self._oldest == UNTOLD:
+        if self._oldest == UNKNOWN_TIME:
             text = f"the middleware does not provide source timestamps for messages of mesh {self._oldest_of}"
             return Why(Cause.SILENT, text)
         since = "a later frame is being processed" if self._busy() else "no later frame was clear"
@@ -260,7 +260,7 @@ class StopState:
         self._doubt(cause, Source(None, "", Aspect.PLACE), None, text)
 
     def _doubt(self, cause: Cause, source: Source, sent: int | None, text: str) -> None:
-        """sent: when the message was sent; None, UNTOLD: unknown."""
+        """sent: when the message was sent; None, UNKNOWN_TIME: unknown."""
         before, now, key = self._now(), self._clocks.system(), (cause, source)
         meshes, aspect = self._scene.concerned(source.what, source.name), source.aspect
         if not meshes and source.of_mesh:

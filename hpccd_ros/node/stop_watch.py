@@ -24,10 +24,10 @@ _WARNED = {Cause.NEAR: DiagnosticStatus.WARN, Cause.UNANSWERED: DiagnosticStatus
 
 
 class StopWatch:
-    """Of a configured ``node`` with parameter stop_distance. busy: whether a frame is being worked on.
+    """Publishes stop for a configured ``node`` with parameter stop_distance. busy: whether a frame is being processed.
 
-    `begin` and `end` by the life cycle; `first` and `look` by the detection thread; `refused` by any; `heard` and
-    `robots` by the executor.
+    The life cycle calls `begin` and `end`, the detection thread `first` and `look`, the executor `heard` and `robots`,
+    any thread `refused`.
     """
 
     def __init__(
@@ -91,11 +91,11 @@ class StopWatch:
         self._state.refused(refusal)
 
     def heard(self, kind: str, name: str, info: Mapping[str, Any]) -> None:
-        """A message of this kind; name: of its mesh or topic."""
+        """A message of this kind was received; name: of its mesh or topic."""
         self._state.heard(f"a message ({kind}) of {name}", name, info)
 
     def robots(self, doubts: Mapping[str, str]) -> None:
-        """Robots of which a newer description is not in use, and why."""
+        """Robots with a newer description that is not in use, and why."""
         self._state.robots(doubts)
 
     def status(self) -> tuple[bytes, str, dict[str, object]]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Each topic has one type: what parameters and remappings bring together on one topic must be of one type."""
+"""Check that each topic has one type: parameters and remappings may give one topic several uses."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -12,7 +12,7 @@ from hpccd_ros.params import robot_parameters
 from hpccd_ros.params.table import ROBOT
 from hpccd_ros.record.recorded_topics import ANSWERS, POSITIONS
 
-# Of the node itself, and of each node of ROS.
+# Types of the node's own topics, and of those that every ROS node has.
 _PUBLISHED = {
     **ANSWERS,
     topic_names.STOP: "std_msgs/msg/Bool",
@@ -27,14 +27,14 @@ _PUBLISHED = {
 
 
 def contradiction(node: Node, settings: dict[str, Any], meshes: dict[str, dict[str, Any]]) -> str | None:
-    """Which two uses of one topic have different types, or None. All names must be ones that can be resolved."""
+    """An error about two uses of one topic with different types, or None. All names must be resolvable."""
     first: dict[str, tuple[str, str]] = {}
     for use, topic, type_name in _uses(settings, meshes):
         resolved = node.resolve_topic_name(topic)
         other, of_other = first.setdefault(resolved, (use, type_name))
         if of_other != type_name:
             return (
-                f"{other} and {use}: both are the topic {shortened(resolved)}, the one as {of_other}, the other as "
+                f"{other} and {use}: both use the topic {shortened(resolved)}, the first as {of_other}, the second as "
                 f"{type_name}; give each a topic of its own"
             )
     return None
@@ -47,7 +47,7 @@ def uses_transforms(settings: dict[str, Any], meshes: dict[str, dict[str, Any]])
 
 
 def _uses(settings: dict[str, Any], meshes: dict[str, dict[str, Any]]) -> Iterator[tuple[str, str, str]]:
-    """(what is said to the user, name of the topic, its type)."""
+    """(the use in words, name of the topic, its type) for each use."""
     for topic, type_name in _PUBLISHED.items():
         yield topic, topic, type_name
     for mesh, values in meshes.items():

@@ -46,21 +46,21 @@ class TransformSubscriptions:
         self._subscriptions.clear()
 
     def warnings(self) -> list[str]:
-        """Publishers that are not heard; frames that wait for transforms say so themselves."""
+        """Publishers that are not connected; frames that wait for transforms are reported elsewhere."""
         return unheard(self._subscriptions)
 
     def _subscribe(self, topic: TransformTopic) -> InputSubscription:
         limit = RateLimit(self._max_rate)
         name, heard = self._name(topic), self._pipeline.transforms.heard
         numbers = SequenceWatch()
-        unreadable_since = 0  # the last that was read
+        unreadable_since = 0  # since the last message read
 
         def missing(number: int) -> int:
-            """Static transforms that were lost before this message, but those that are known to be unreadable."""
+            """Static transforms lost before this message, without those known to be unreadable."""
             nonlocal unreadable_since
             gap, known = numbers.next(number)[0], unreadable_since
             unreadable_since = 0
-            # Numbers of several publishers interleave: their gaps mean nothing.
+            # Sequence numbers of several publishers interleave: gaps mean nothing then.
             return gap - known if topic.static and gap > known and subscription.publishers <= 1 else 0
 
         def on_unreadable() -> None:
@@ -100,7 +100,7 @@ class TransformSubscriptions:
         return subscription
 
     def _unread(self, refusal: Refusal, topic: TransformTopic) -> None:
-        """A message whose transforms are not known."""
+        """Refuse a message whose transforms are unknown."""
         sent = refusal.sent or Clocks().system()
         self._pipeline.transforms.rejected(None, topic.static, sent)
         self._accounts.refused(refusal)

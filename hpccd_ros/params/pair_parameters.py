@@ -43,8 +43,8 @@ def check(settings: dict[str, Any], links: Links = NO_LINKS) -> None:
 def ignored_pairs(
     settings: dict[str, Any], links: Links = NO_LINKS, by_default: Iterable[tuple[str, str]] = ()
 ) -> tuple[tuple[str, str], ...]:
-    """Parameters ``ignored_pairs`` and ``pairs.NAME.ignored`` as pairs of mesh names; those ``by_default``, each in the
-    order of its names, are ignored too, unless the parameters say otherwise. Raises ParameterError."""
+    """Parameters ``ignored_pairs`` and ``pairs.NAME.ignored`` as pairs of mesh names. Pairs in ``by_default`` (names in
+    sorted order) are ignored too, unless the parameters say otherwise. Raises ParameterError."""
     said = []
     for text in settings["ignored_pairs"]:
         pair = tuple(text.split(":"))

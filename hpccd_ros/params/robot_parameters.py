@@ -79,7 +79,7 @@ def check(settings: dict[str, Any]) -> None:
 
 
 def unusable_home(robots: RobotValues) -> str | None:
-    """Which file of a robot lies in the home folder of a user that there is not, or None."""
+    """An error about a robot's file in the home folder of a user that does not exist, or None."""
     for name, values in robots.items():
         files = ["srdf"] if comes_on_topic(values["description"]) else ["description", "srdf"]
         for parameter in files:

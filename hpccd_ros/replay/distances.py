@@ -55,7 +55,7 @@ class DistanceCheck:
         self._waiting.append((frames, self.decode(message)))
 
     def put_of(self, step: OrderedAnswer | None, message, counts: bool) -> None:
-        """An answer beside that to a step; None: there is none. counts: whether it is to be looked at."""
+        """The recorded distances for a step; None: there are none. counts: whether they are to be verified."""
         answer = self.decode(message)
         if step is not None:
             step.distances -= 1
@@ -69,7 +69,7 @@ class DistanceCheck:
             self._settled.pop(step, None)
 
     def settle_of(self, step: OrderedAnswer, frame: SceneFrame | None, counts: bool) -> None:
-        """Whether there is a frame at the end of this step is known now. counts: it began within the recording."""
+        """It is now known whether there is a frame at the end of this step. counts: it began within the recording."""
         self._settled[step] = frame, counts
         for answer in self._beside.pop(step, ()):
             self._look_beside(answer, step)
@@ -81,7 +81,7 @@ class DistanceCheck:
         if frame is not None:
             self._look_at(answer, step.end, frame)
         elif counts:
-            self._lacks(f"distances at {step.end} ns: the frame that they are of is not certain")
+            self._lacks(f"distances at {step.end} ns: their frame is not certain")
 
     def settle(self, window: FrameWindow, frames: int | None = None) -> None:
         """Look at what waits, of which the frame is there or will not come any more. frames: so far; None: all."""

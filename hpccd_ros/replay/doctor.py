@@ -48,7 +48,7 @@ def _recover(source, args) -> int:
 
 
 def _read(path) -> None:
-    """Raises RecordingError for whatever the other commands cannot use: their reader decides."""
+    """Raises RecordingError if the reader of the other commands cannot read all of it."""
     with Recording(path) as recording:
         for _ in recording.messages():
             pass

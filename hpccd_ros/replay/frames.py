@@ -24,16 +24,16 @@ PATIENCE = 16
 
 
 class FrameSource:
-    """Pushes recorded messages into a pipeline as the node has it.
+    """Pushes recorded messages into a pipeline like that of the node.
 
-    ordered: they come in the order in which the node took them. refused: what could not be used and why, counted as in
+    ordered: they arrive in the order in which the node took them. refused: messages refused, by reason, counted as in
     the node; transforms by topic.
     """
 
     def __init__(self, setup: ReplaySetup, topics, ordered: bool = False):
         self._setup = setup
         self._settings = setup.settings
-        # Else messages of several topics may have reached the recorder in another order than the node.
+        # Otherwise the order of messages across topics may differ between recorder and node.
         self._patience = 1 if ordered else 4
         self.refused = {what: RefusalCounter() for what in Input}
         self._decoders = {
@@ -48,12 +48,12 @@ class FrameSource:
         return list(self._decoders)
 
     def listed_name(self, topic: str) -> str:
-        """As answers list a topic of the recording."""
+        """The name of a recorded topic in the lists of answers."""
         mesh, kind = self._setup.roles[topic]
         return topic_names.of_mesh(mesh, kind) if mesh else kind
 
     def restart(self, all_known: bool) -> None:
-        """As the node is when it has just been configured. all_known: and has heard the descriptions of its robots."""
+        """Reset to the state of a node that was just configured. all_known: descriptions of its robots are known."""
         setup, self._settings = self._setup, self._setup.settings
         described = robot_parameters.topics(setup.settings[ROBOT])
         self._make([name for name in setup.robots if all_known or name not in described])
@@ -62,7 +62,7 @@ class FrameSource:
         self._listen()
 
     def push(self, message, flags: int | None = None) -> list[SceneFrame]:
-        """Frames that this recorded message completes. flags: as the node listed them; None: it did not."""
+        """Frames that this recorded message completes. flags: those that the node listed; None: it listed none."""
         mesh, kind = self._setup.roles[message.topic]
         decoded = self._decoders[message.topic](message)
         if kind in transform_topics.ALL:
@@ -77,7 +77,7 @@ class FrameSource:
         return self._counted(outcome)
 
     def happen(self, event: str, value: int) -> list[SceneFrame]:
-        """What answers list beside messages, and the frames that it completes. Raises ValueError for anything else."""
+        """Apply an event listed by an answer; returns frames that it completes. Raises ValueError if it is unknown."""
         outcome = Outcome()
         if event == taken_inputs.STOPPED:
             outcome = self._pipeline.stop()
@@ -92,7 +92,7 @@ class FrameSource:
         return self._counted(outcome)
 
     def _make(self, known: list[str]) -> None:
-        """The pipeline with these robots."""
+        """A pipeline with these robots."""
         settings, robots = self._settings, {name: self._setup.robots[name] for name in known}
         pending = self._patience * settings["pending_frames"]
         by_joints = robot_parameters.followers(settings, robots, pending)
@@ -105,13 +105,13 @@ class FrameSource:
         }
 
     def _listen(self) -> None:
-        """What the node's subscriptions keep, as they are made when it is activated."""
+        """Reset the state of the node's subscriptions, which are made when it is activated."""
         self._watches = {name: SequenceWatch() for name in self._setup.roles}
         self._weldings = {name: Welding() for name in self._setup.roles}
         self._recent = {topic: deque(maxlen=joint_messages.MOST_RECENT) for topic in self._by_joints}
 
     def _know(self, names: list[str]) -> Outcome:
-        """A description has come: as StreamDetection.remake does."""
+        """A description was received: do the same as StreamDetection.remake."""
         before = self._pipeline
         self._make(names)
         outcome = self._pipeline.inherit(before, self._setup.meshes)

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Recorded messages in the order in which the node took them, as its answers list it.
+"""Recorded messages in the order in which the node took them, according to the lists in its answers.
 
-A first pass over the recording reads the lists and settles the order. The second pass then holds back only what reached
-the recorder earlier than the node. The node did not take what no answer lists, with one exception: where the lists
-begin late, or answers are missing in between, what was sent until then is taken in the order of the recording.
+A first pass over the recording reads the lists and determines the order. The second pass then holds back only messages
+that reached the recorder earlier than the node. The node did not take messages that no answer lists, with one
+exception: if the lists begin late, or answers are missing in between, messages sent until then are taken in the order
+of the recording.
 """
 
 from array import array
@@ -24,14 +25,14 @@ from hpccd_ros.middleware import fields
 from hpccd_ros.middleware.input_fields import ListedInputs, read_inputs
 from hpccd_ros.replay.frames import FrameSource
 
-_LATEST = 2**63 - 1  # a recording can hold later times, a list cannot
+_LATEST = 2**63 - 1  # recordings may have later times, lists cannot
 _NOT_LISTED = -1
 
-Key = tuple[str, int]  # of a message: the topic as the node names it, and when it was sent
+Key = tuple[str, int]  # of a message: its topic as the node names it, and when it was sent
 
 
 class _FrameKey(NamedTuple):
-    """``inputs``: how many the node had taken; _NOT_LISTED: only known to be before those that answers list."""
+    """``inputs``: number that the node had taken; _NOT_LISTED: unknown, but before those that answers list."""
 
     session: int
     inputs: int
@@ -40,14 +41,14 @@ class _FrameKey(NamedTuple):
 
 @dataclass(eq=False)
 class OrderedAnswer:
-    """What is known of an answer before anything is computed.
+    """What is known about an answer before anything is computed.
 
-    ``sent``, ``start``, ``end``: ns. ``problem``: why it cannot be verified, or "". ``listed``: None: it lists nothing.
+    ``sent``, ``start``, ``end``: ns. ``problem``: why it cannot be verified, or "". ``listed``: None: it has no list.
     ``session``: how often the node had been configured before, or its process started. ``begun``: inputs of the session
-    that were taken before those that answers list without a gap up to here. ``unlisted``: what is taken before its
-    list. ``missing``: the first input of its list that the recording lacks, in words; ``early``: it lacks only such as
-    were sent before the first one of their topic in it. ``answered``: all that it lists has been pushed.
-    ``distances``: answers about those of its frame that have not been read.
+    taken before those that answers list without a gap up to this one. ``unlisted``: messages to take before its list.
+    ``missing``: the first input of its list that the recording lacks, in words; ``early``: all that it lacks were sent
+    before the first recorded message of their topic. ``answered``: all inputs of its list have been pushed.
+    ``distances``: answers about distances for its frame that have not been read.
     """
 
     sent: int
@@ -79,10 +80,10 @@ class OrderedAnswer:
 class InputOrder:
     """Reads ``recording`` once; then give it the recorded inputs (`put`), and let it push them into ``source``.
 
-    contacts: name of the topic of answers; distances: of those about distances, None: none. decode: of both, topic ->
-    decoder. ``answers``: in the order of the recording; ``of_distances``: for each answer about distances the one that
-    belongs to it, or None. ``made``: frames so far. ``not_taken``: by topic, how
-    many messages the node left out although it took later ones.
+    contacts: name of the topic of answers; distances: of answers about distances, or None. decode: topic -> decoder,
+    for both. ``answers``: in the order of the recording; ``of_distances``: for each answer about distances the answer
+    about the same frame, or None. ``made``: frames so far. ``not_taken``: topic -> number of messages that the node did
+    not take although it took later ones.
     """
 
     def __init__(
@@ -109,7 +110,7 @@ class InputOrder:
                 name, time = self._key(message)
                 sent[name].append(time)
                 place[name].append(number)
-        # The files of a split recording each begin with what is in force: of these the first counts.
+        # Each file of a split recording begins with the messages in force: only the first copy of each counts.
         self._recorded: dict[str, NDArray[np.int64]] = {}
         self._place: dict[str, NDArray[np.int64]] = {}
         for name, times in sent.items():
@@ -130,11 +131,11 @@ class InputOrder:
                 held.append(message)
 
     def advance(self) -> None:
-        """Push what can be pushed by now."""
+        """Push all messages that can be pushed by now."""
         next(self._way, None)
 
     def frames(self, answer: OrderedAnswer) -> tuple[SceneFrame | None, SceneFrame | None]:
-        """At the start and the end of its step, where they could be made; once, after it was ``answered``."""
+        """The frames at the start and the end of its step, if they could be made. Call it once, when ``answered``."""
         start, end = (
             next((self._frames[key] for key in keys if key in self._frames), None)
             for keys in (answer.start_keys, answer.end_keys)
@@ -149,10 +150,10 @@ class InputOrder:
         return self._source.listed_name(message.topic), min(message.publish_time, _LATEST)
 
     def _settle(self) -> None:
-        """Sessions, what is taken without being listed, and how often each message is taken."""
+        """Determine sessions, messages taken without being listed, and how often each message is taken."""
         runs = self._runs()
         listed: dict[str, list[NDArray[np.int64]]] = defaultdict(list)
-        spans = []  # of each run: topic -> first and last time of what is listed
+        spans = []  # for each run: topic -> first and last time listed
         for run in runs:
             times: dict[str, list[NDArray[np.int64]]] = defaultdict(list)
             for answer in run:
@@ -191,7 +192,7 @@ class InputOrder:
                 self.not_taken[name] = int(left.sum())
 
     def _runs(self) -> list[list[OrderedAnswer]]:
-        """Answers whose lists follow each other without a gap."""
+        """Runs of answers whose lists continue each other without a gap."""
         runs: list[list[OrderedAnswer]] = []
         session = taken = begun = 0
         for answer in self.answers:
@@ -202,9 +203,9 @@ class InputOrder:
                 if runs and not before:
                     session += 1
                 elif runs and before < taken:
-                    # A node that begins anew lists from 0 on all that it takes. Either that answer was lost, or a list
-                    # is wrong; in no case did this one begin before the recording.
-                    answer.problem = answer.problem or "its list does not continue that of the answer before"
+                    # A node that was configured again begins its lists at 0. Either its first answer was lost, or a
+                    # list is wrong; in no case did this list begin before the recording.
+                    answer.problem = answer.problem or "its list does not continue that of the previous answer"
                 begun = before
                 runs.append([])
             answer.session, answer.begun, taken = session, begun, answer.listed.end
@@ -212,14 +213,14 @@ class InputOrder:
         return runs
 
     def _nearest(self, about_distances: list[OrderedAnswer]) -> list[OrderedAnswer | None]:
-        """Of each the answer about the same frame that was sent with it: none where that one is not recorded, although
-        an answer to another frame with the same stamp is."""
+        """For each answer about distances the answer about the same frame that was sent with it, or None if that is not
+        recorded, even if an answer to another frame with the same stamp is."""
         alike: dict[tuple[int, int], list[OrderedAnswer]] = defaultdict(list)
         for answer in self.answers:
             if not answer.problem:
                 alike[answer.step, answer.end].append(answer)
         found: list[OrderedAnswer | None] = []
-        nearest: dict[OrderedAnswer, tuple[int, int]] = {}  # how far, and its number among those about distances
+        nearest: dict[OrderedAnswer, tuple[int, int]] = {}  # time between both, number of distances
         for number, one in enumerate(about_distances):
             beside = alike.get((one.step, one.end), ())
             answer = min(beside, key=lambda other, sent=one.sent: abs(other.sent - sent), default=None)
@@ -248,7 +249,7 @@ class InputOrder:
         return at < len(times) and times[at] == key[1]
 
     def _push_all(self) -> Iterator[None]:
-        """Yields where the next message has not been read yet."""
+        """Yields whenever the next message has not been read yet."""
         session = None
         for answer in self.answers:
             if answer.listed is not None:
@@ -290,7 +291,7 @@ class InputOrder:
 
     def _happen(self, answer: OrderedAnswer, taken: TakenInput) -> None:
         if taken.topic == taken_inputs.STOPPED and answer.early:
-            answer.missing = ""  # what could depend on it was forgotten
+            answer.missing = ""  # all that could depend on it was forgotten
         try:
             self._made(answer, taken.number, self._source.happen(taken.topic, taken.sent))
         except ValueError as error:
@@ -300,7 +301,7 @@ class InputOrder:
         times = self._recorded.get(taken.topic, ())
         answer.early &= not len(times) or taken.sent < times[0]
         answer.missing = answer.missing or (
-            f"it lists a message of {shortened(taken.topic)} sent at {taken.sent} ns, which the recording does not hold"
+            f"it lists a message of {shortened(taken.topic)} sent at {taken.sent} ns, which the recording lacks"
         )
 
 
@@ -309,7 +310,7 @@ def _read(answer: Any, message: RecordedMessage) -> OrderedAnswer:
     try:
         found.listed = read_inputs(answer)
         if found.listed is None:
-            found.problem = "it does not list what the node had taken, as the first answer of the recording does"
+            found.problem = "it does not list the inputs taken, although the first answer of the recording does"
         found.start = fields.stamp_to_ns(answer.start)
     except ValueError as error:
         found.problem = f"the answer is malformed: {error}"

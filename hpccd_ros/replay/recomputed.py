@@ -54,7 +54,7 @@ class ReplayedStep:
     missing: str | None = None  # why it could not be computed
     before_recording: bool = False  # it began before the recording did
     uncertain: str = ""  # why a difference would not show that the node was wrong
-    depends_on_before: bool = False  # and what is uncertain is what came before the recording
+    depends_on_before: bool = False  # the uncertainty is about inputs from before the recording
 
     @property
     def total(self) -> int:
@@ -63,10 +63,10 @@ class ReplayedStep:
 
 @dataclasses.dataclass(eq=False)
 class _Session:
-    """What the answers so far tell of those that follow, since the node was configured. history: transforms or joint
-    states move meshes, so that frames depend on what came some time before. ``computed``: frames of an answer were
-    there. ``lacks_early``: inputs are missing from before the recording. ``uncertain``: later ones are, in words.
-    ``first``: stamp at which the first of these answers ends. ``settled``: nothing depends on that history any more.
+    """What the answers since the node was configured imply for later ones. history: transforms or joint states move
+    meshes, so that frames depend on earlier messages. ``computed``: the frames of an answer existed. ``lacks_early``:
+    inputs from before the recording are missing. ``uncertain``: later inputs are missing, in words. ``first``: stamp at
+    which the first of these answers ends. ``settled``: nothing depends on that history any more.
     """
 
     history: bool
@@ -79,7 +79,7 @@ class _Session:
     settled: bool = False
 
     def step_of(self, known: OrderedAnswer, answer, at: float, start_frame, end_frame) -> ReplayedStep:
-        """Its frames or why they are missing."""
+        """The frames of a step, or why they are missing."""
         step = ReplayedStep(0, answer.step, known.start, known.end, start_frame, end_frame, answer, at)
         step.missing = known.problem or self._lack(known)
         if step.missing:
@@ -92,7 +92,7 @@ class _Session:
             if frame is None:
                 joined_late = self._is_first and not self.computed and (known.begun > 0 or self.lacks_early)
                 step.before_recording = joined_late or step.depends_on_before
-                step.missing = f"what the node had taken makes no frame at its {name}, stamp {stamp} ns"
+                step.missing = f"the inputs taken make no frame at its {name}, stamp {stamp} ns"
                 return step
         if not start_frame.same_scene(end_frame):
             step.missing = "the topology or the coordinate frame changes between its start and its end"
@@ -102,7 +102,7 @@ class _Session:
 
     @property
     def _is_first(self) -> bool:
-        """Only what the first one took can have come before the recording."""
+        """Take note of missing inputs. Only inputs of the first answer can be from before the recording."""
         return self.number == 0
 
     def _lack(self, known: OrderedAnswer) -> str | None:
@@ -111,7 +111,7 @@ class _Session:
         if known.begun != self.begun:
             self.begun = known.begun
             if self.computed or not self._is_first:
-                self.uncertain = self.uncertain or "an answer before it is missing, and with it what the node had taken"
+                self.uncertain = self.uncertain or "an earlier answer is missing, and with it the inputs that it lists"
         if not known.missing:
             return None
         if known.early and not self.computed:
@@ -127,7 +127,7 @@ class _Session:
         self.settled = (
             self.settled
             or not (self.history and (known.begun or self.lacks_early))
-            or (taken_inputs.STOPPED in known.listed.topics and not known.missing)  # then the node forgot it, too
+            or (taken_inputs.STOPPED in known.listed.topics and not known.missing)  # the node forgot it, too
             or known.end > self.first + HISTORY_NS
         )
 
@@ -166,7 +166,7 @@ class Replay:
         self._mesh_names = setup.mesh_names
         self._window = FrameWindow(max(WINDOW, 2 * setup.settings["frame_queue"]))
         self.any_one = setup.settings["report"] == "any"  # "verified" means less then: compare.py
-        self.not_taken: Counter[str] = Counter()  # by topic, messages that the node left out
+        self.not_taken: Counter[str] = Counter()  # topic -> messages that the node did not take
         self.verified = self.diverged = self.unverified = 0
         self.frames = 0
         self.first_divergence: ReplayedStep | None = None
@@ -204,7 +204,7 @@ class Replay:
         self.distances.settle(self._window)
 
     def _lists_inputs(self) -> bool:
-        """Whether the answers list what the node had taken, and the recorder kept the times that they name."""
+        """Whether the answers list the inputs taken, and the recorder kept the times in these lists."""
         first = next(self._recording.messages([self._setup.contacts]))
         try:
             listed = read_inputs(self._decode_answer(first)) is not None
@@ -226,7 +226,7 @@ class Replay:
                 waiting.append((next(answers), self._decode_answer(message), self._at))
             elif message.topic == distances:
                 step = next(of_distances)
-                # Without contacts, and before all others: the recording began between the two.
+                # It has no contacts and is before all others: the recording began between the two messages.
                 within = (begun or step is not None) and self._begin <= self._at <= self._end
                 self.distances.put_of(step, message, counts=within)
             else:

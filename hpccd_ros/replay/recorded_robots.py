@@ -34,8 +34,8 @@ def of_recording(recording: Recording, robots: RobotValues, topics: Mapping[str,
 
 
 def _robot(recording, name: str, values: Mapping[str, Any], texts: Mapping[str, int]) -> Robot:
-    """Of the only text that can be used: the node refused the others and kept to it. texts: with the time, ns, at which
-    each came first."""
+    """The robot of the only text that can be used: the node rejected the others and kept this one. texts: each with the
+    time, ns, at which it was first received."""
     semantics = _semantics(recording, name, values)
     robots: list[tuple[Robot, int]] = []
     refused: RobotError | MeshFileError | None = None
@@ -50,7 +50,7 @@ def _robot(recording, name: str, values: Mapping[str, Any], texts: Mapping[str, 
         at = seconds(robots[1][1] - next(recording.records()).message.log_time)
         raise RobotError(
             f"its description on {values['description']} changed {at} s after the beginning; replay the parts before "
-            f"and after: `hpccd cut {recording.path} --to {at} -o before.mcap`, "
+            f"and after that: `hpccd cut {recording.path} --to {at} -o before.mcap`, "
             f"`hpccd cut {recording.path} --from {at} -o after.mcap`"
         )
     if refused is not None and not robots:
@@ -59,7 +59,7 @@ def _robot(recording, name: str, values: Mapping[str, Any], texts: Mapping[str, 
 
 
 def _descriptions(recording, name: str, values: Mapping[str, Any], topics: Mapping[str, str]) -> dict[str, int]:
-    """At least one, each with the time, ns, at which it came first."""
+    """The descriptions, at least one, each with the time, ns, at which it was first received."""
     description = values["description"]
     if not robot_parameters.comes_on_topic(description):
         return {_text(recording, attachments.description_name(name), description): 0}

@@ -175,8 +175,8 @@ class Summary:
                   f"{self.seconds_recorded:.2f} s of motion; {args.threads or os.cpu_count()} threads")
         _print_losses(replay)
         if self.before:
-            print(f"  {self.before} answers not verified: their step began before the recording, or depends on what "
-                  "came before it")
+            print(f"  {self.before} answers not verified: their step began before the recording, or depends on earlier "
+                  "messages")
         if self.missing:
             print(f"  {replay.unverified} answers NOT VERIFIED, first step {self.missing.step} "
                   f"(ends at {self.missing.end} ns): {self.missing.missing}")
@@ -224,7 +224,7 @@ def _print_losses(replay) -> None:
             print(f"  {count} {what} of {mesh} not used: {reason}{_HINTS.get(reason, '').format(mesh=mesh)}")
     for topic, count in sorted(replay.not_taken.items()):
         if count:
-            print(f"  {count} messages of {topic} not taken by the node: lost on the way to it, or refused")
+            print(f"  {count} messages of {topic} not taken by the node: lost on the way to it, or rejected")
 
 
 def _progress_bar() -> Progress:

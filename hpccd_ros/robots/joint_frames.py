@@ -139,7 +139,7 @@ class JointFrames:
         ]
 
     def _base_by_transforms(self, stamp: int, transforms: TransformBuffer) -> tuple[Rigid, int]:
-        """With the time at which it was sent."""
+        """The pose of the base, and the time at which its transform was sent."""
         try:
             return transforms.lookup_sent(self._root, self._target, stamp)
         except NoTransformError as error:

@@ -12,12 +12,12 @@ from typing import NamedTuple
 
 from hpccd_ros.base.quoting import listed, quoted
 from hpccd_ros.frames.samples import Run, Samples
-from hpccd_ros.frames.types import ALWAYS, UNTOLD
+from hpccd_ros.frames.types import ALWAYS, UNKNOWN_TIME
 from hpccd_ros.robots.errors import RobotError
 from hpccd_ros.robots.joint_publishers import JointPublishers
 from hpccd_ros.robots.kinematics import Kinematics
 
-# Joints that a text explains one by one.
+# Joints that a message names one by one.
 MOST_NAMED = 3
 
 
@@ -30,7 +30,7 @@ class NoJointStateError(LookupError):
 
 
 def check_lengths(names: Sequence[str], positions: Sequence[float]) -> None:
-    """Without positions a joint state is of velocities or efforts alone. Raises RobotError: no robot can use it."""
+    """Raises RobotError if no robot can use it. A joint state without positions has only velocities or efforts."""
     if len(positions) not in (0, len(names)):
         raise RobotError(
             f"joint states: {len(names)} names and {len(positions)} positions; each joint needs one of both"
@@ -41,9 +41,9 @@ def check_lengths(names: Sequence[str], positions: Sequence[float]) -> None:
 
 
 class Added(NamedTuple):
-    """What a joint state led to. ``stray``: the stamp of an earlier one that was far ahead, and is forgotten.
-    ``unusable``: why positions of needed joints are left out; "": none is. ``contradiction``: to another publisher, in
-    words; "": there is none."""
+    """The result of adding a joint state. ``stray``: the stamp of an earlier one that was far ahead and was removed.
+    ``unusable``: why positions of needed joints were ignored; "": none was. ``contradiction``: how it contradicts
+    another publisher; "": it does not."""
 
     stray: int | None = None
     unusable: str = ""
@@ -51,13 +51,13 @@ class Added(NamedTuple):
 
 
 class JointHistory:
-    """A message may hold some joints only; several publishers may share a robot."""
+    """A message may have only some of the joints, and several publishers may share a robot."""
 
     def __init__(self, kinematics: Kinematics) -> None:
         self._joints = {name: _Values(name in kinematics.continuous) for name in kinematics.inputs}
         self._named: Sequence[str] = ()  # joints of the last message
         self._unusable: dict[str, str] = {}  # joints whose last message had no usable position, and why
-        self._last: dict[str, int] = {}  # stamp of the last usable position of each joint, though it be forgotten
+        self._last: dict[str, int] = {}  # stamp of the last usable position of each joint, even if forgotten
         self._publishers = JointPublishers(kinematics.continuous)
         self._run = Run(self._joints.values)
 
@@ -66,12 +66,13 @@ class JointHistory:
         stamp: int,
         names: Sequence[str],
         positions: Sequence[float],
-        sent: int = UNTOLD,
+        sent: int = UNKNOWN_TIME,
         publisher: int | None = None,
     ) -> Added:
-        """stamp ns. sent: when the message was. publisher: which one of several; None: there is one. Joints that the
-        robot does not need are ignored; a position that is not finite is left out, and the others of the message are
-        used. Raises RobotError, and then nothing of it is kept."""
+        """Add a joint state. stamp ns. sent: when the message was sent. publisher: its number; None: there is only one.
+
+        Joints that the robot does not need, and positions that are not finite, are ignored; the others of the message
+        are used. Raises RobotError if the message is malformed; then none of it is used."""
         check_lengths(names, positions)
         self._named = names
         if names and not positions:
@@ -134,7 +135,7 @@ class JointHistory:
         return {name: values.at(stamp) for name, values in self._joints.items()}
 
     def sent_at(self, stamp: int) -> int:
-        """When the oldest message was sent of which the values `at` this stamp are made; ALWAYS: no joint moves."""
+        """When the oldest message used for the values `at` this stamp was sent; ALWAYS: no joint moves."""
         return min((values.sent_at(stamp) for values in self._joints.values()), default=ALWAYS)
 
     def latest(self) -> int | None:
@@ -157,7 +158,7 @@ class JointHistory:
         raise NoJointStateError("; ".join(reasons), final=False)
 
     def _reasons(self, names: Sequence[str]) -> list[str]:
-        """Why the last message of some of these joints was of no use: a few, in words."""
+        """Why the last message about these joints was unusable, for the first few of them."""
         return [self._unusable[name] for name in names if name in self._unusable][:MOST_NAMED]
 
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Several publishers of joint states of one robot: who sent a message, and whether two of them contradict each other.
+"""Several publishers of joint states of one robot: which one sent a message, and whether two contradict each other.
 
-Several may share a robot, each with joints of its own. Two that tell of the same joint must agree: at most one of them
-says where it is.
+Several publishers may share a robot, each with its own joints. Two publishers of the same joint must agree: otherwise
+at most one of them has its position.
 """
 
 import math
@@ -13,24 +13,24 @@ from collections.abc import Callable, Collection, Iterable
 from hpccd_ros.base.quoting import quoted
 from hpccd_ros.frames.samples import HISTORY_NS
 
-# Bound what strangers can make the node keep: publishers of a topic, and values of a joint of each.
+# Bounds on memory that untrusted publishers can use: publishers of a topic, and values of a joint for each.
 MOST_PUBLISHERS = 8
 MOST_VALUES = 32
-# Of a value: what rounding to single precision on the way makes of it.
+# Relative difference between two values that rounding to single precision can make.
 TOLERANCE = 1e-6
 
 
 class PublisherNumbers:
-    """Tells the publishers of one topic apart by the numbers that they count their messages with: DDS tells the node no
-    more. Each message goes on from the closest number below its own."""
+    """Tells the publishers of one topic apart by the sequence numbers of their messages, the only information from DDS.
+    A message belongs to the publisher with the closest number below its own."""
 
     def __init__(self) -> None:
         self._last: list[int] = []  # of each publisher
-        self._current = 0  # that of the last message
+        self._current = 0  # the publisher of the last message
 
     def of(self, number: int, several: Callable[[], bool]) -> int | None:
-        """Which publisher it is, from 0 on; None: there is one. several: whether there are, asked where the numbers do
-        not go on as those of one."""
+        """The number of the publisher, from 0; None: there is only one. several: whether there are several, called if
+        the numbers are not consecutive."""
         if self._last and number == self._last[self._current] + 1:
             self._last[self._current] = number
             return self._current if len(self._last) > 1 else None
@@ -46,11 +46,11 @@ class PublisherNumbers:
 
 
 class JointPublishers:
-    """What each of several publishers said last of each joint. continuous: joints whose values are angles modulo 2 pi.
+    """The last values of each joint from each publisher. continuous: joints whose values are angles modulo 2 pi.
 
-    Two agree on a joint where a value of one lies between those of the other before and after it, or beyond them by no
-    more than these differ: joints turn back between two messages. Two that contradict each other do so until they are
-    found to agree, or one has been silent for HISTORY_NS.
+    Two publishers agree on a joint if a value of one lies between the other's values before and after it, or beyond
+    them by no more than their difference: a joint may turn back between two messages. Two publishers contradict each
+    other until they agree again, or one has been silent for HISTORY_NS.
     """
 
     def __init__(self, continuous: Collection[str]) -> None:
@@ -59,7 +59,7 @@ class JointPublishers:
         self._contradicting: set[tuple[str, frozenset[int]]] = set()
 
     def contradiction(self, publisher: int, stamp: int, joints: Iterable[tuple[str, float]]) -> str:
-        """How a message contradicts another publisher, in words; "": it does not."""
+        """How a message contradicts another publisher; "": it does not."""
         found = ""
         for name, value in joints:
             of_joint = self._values.setdefault(name, {})
@@ -77,15 +77,15 @@ class JointPublishers:
                     (self._contradicting.discard if all(compared) else self._contradicting.add)(pair)
                 if pair in self._contradicting:
                     found = found or (
-                        f"two publishers contradict each other on joint {quoted(name)}, one says {value:.6g} at "
-                        f"{stamp} ns; let one publisher tell of each joint"
+                        f"two publishers contradict each other on joint {quoted(name)}, one sent {value:.6g} for "
+                        f"{stamp} ns; use one publisher for each joint"
                     )
         return found
 
     def _compared(
         self, name: str, before: tuple[int, float] | None, at: tuple[int, float], theirs: deque[tuple[int, float]]
     ) -> list[bool]:
-        """Whether they agree, once for each value that can be compared."""
+        """Whether two publishers agree, for each value that can be compared."""
         found = []
         place = bisect_left(theirs, at[0], key=lambda item: item[0])
         if place < len(theirs) and (place > 0 or theirs[place][0] == at[0]):

@@ -43,9 +43,9 @@ class _Followed:
 
 class Kinematics:
     """``inputs``: names of the joints that need a value, in the order of the tree: those that move one of the links
-    ``of_links`` (None: any link) and mimic none. The other joints stand at 0 where they are given no value.
+    ``of_links`` (None: any link) and mimic no other joint. Other joints without a value are at 0.
 
-    ``links``: names of all links, from the root on. `number` of a link is its place there.
+    ``links``: names of all links, from the root on. `number` of a link is its index there.
     """
 
     def __init__(self, description: Description, of_links: Iterable[str] | None = None) -> None:
@@ -75,8 +75,8 @@ class Kinematics:
         return self._numbers[link]
 
     def state(self, positions: Mapping[str, float], base: Rigid = IDENTITY) -> "RobotState":
-        """positions: a finite value for each of `inputs`, radians or metres; names of no joint are ignored. base: takes
-        coordinates of the root's link to those of the scene. Raises RobotError naming what is missing."""
+        """positions: a finite value for each of `inputs`, radians or metres; unknown names are ignored. base: takes
+        coordinates of the root link to those of the scene. Raises RobotError naming missing joints."""
         if missing := [name for name in self.inputs if name not in positions]:
             raise RobotError(f"positions: none for {listed(missing)}; each joint that moves and mimics none needs one")
         inputs = {name: float(positions[name]) for name in self.inputs}
@@ -110,8 +110,8 @@ class Kinematics:
 
 @dataclass(frozen=True, eq=False)
 class RobotState:
-    """Of one time. ``inputs``: of the joints that move and mimic none; ``values``: of the joint of each link, from the
-    root on."""
+    """Joint values at one time. ``inputs``: of the joints that move and mimic no other; ``values``: of the joint of
+    each link, from the root on."""
 
     kinematics: Kinematics
     inputs: dict[str, float]

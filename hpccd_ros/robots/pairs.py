@@ -26,7 +26,7 @@ def _near(description: Description) -> frozenset[Pair]:
     links_of: dict[str, list[str]] = {}
     for link in sorted(body):
         links_of.setdefault(body[link], []).append(link)
-    # Only pairs that are ignored are listed, not those of all links.
+    # Lists only ignored pairs, not the pairs of all links.
     near = {pair for links in links_of.values() for pair in combinations(links, 2)}
     for joint in description.joints:
         if (ends := (body[joint.parent], body[joint.child])) and ends[0] != ends[1]:

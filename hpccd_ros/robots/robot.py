@@ -45,7 +45,7 @@ class RobotMesh:
 @dataclass(frozen=True, eq=False)
 class Robot:
     """``meshes``: of the links that have geometry, in the order of the description. ``ignored_pairs``: names of meshes,
-    sorted. ``warnings``: what of the descriptions was ignored or renamed, in sentences."""
+    sorted. ``warnings``: sentences about parts of the descriptions that were ignored or renamed."""
 
     name: str
     description: urdf.Description
@@ -131,7 +131,7 @@ class Robot:
 
 
 def _mesh_names(robot: str, links: Iterable[str]) -> dict[str, str]:
-    """Link -> name of its mesh. In names of meshes / and : separate names; in those of links they become _."""
+    """Link -> name of its mesh. / and : in names of links become _, because they separate names of meshes."""
     names = {link: f"{robot.translate(_SEPARATORS)}/{link.translate(_SEPARATORS)}" for link in links}
     link_of: dict[str, str] = {}
     for link, name in names.items():
@@ -149,7 +149,7 @@ def _renamed(robot: str, names: Mapping[str, str]) -> str:
 
 
 def _sorted(of_names: Iterable[tuple[str, str]]) -> tuple[tuple[str, str], ...]:
-    """Pairs and the names in each, sorted. By numbers: a thousand links fixed together are half a million pairs."""
+    """Pairs and the names in each, sorted, by numbers: a thousand links fixed together have half a million pairs."""
     given = list(of_names)
     names = sorted(set(chain.from_iterable(given)))
     number = {name: k for k, name in enumerate(names)}

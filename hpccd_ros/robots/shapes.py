@@ -8,7 +8,7 @@ from hpccd_ros.rigid.transform import Rigid
 
 @dataclass(frozen=True)
 class Box:
-    """Its edges along x, y, z, of which one may be of length 0; the origin is its centre."""
+    """Lengths along x, y and z, one of which may be 0; the origin is the centre."""
 
     size: tuple[float, float, float]
 

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Boxes, cylinders, spheres and capsules as closed triangle meshes that contain them.
 
-A box is itself; one without thickness is a rectangle. What is round gets a mesh around it, so that whatever touches the
-solid touches or enters the mesh; no point of the mesh stands out of the solid by more than `outstanding` says, at most
-the tolerance asked for.
+A box is exact; one without thickness is a rectangle. Round shapes get a mesh around them, so that all that touches the
+solid touches or enters the mesh; no point of the mesh stands out of the solid by more than `outstanding`, at most the
+tolerance asked for.
 
 Why the mesh holds the solid. *Cylinder*: its ring is a regular polygon of n corners at the distance R from the axis;
 the sides are at R cos(pi/n) from it, which is the radius r. *Sphere*: rings of 0, 4, 8, ..., 4n, ..., 8, 4, 0 corners,
@@ -61,8 +61,8 @@ def segments(solid: Cylinder | Sphere | Capsule, tolerance: float) -> int:
     if not tolerance > 0.0:
         raise RobotError(f"tolerance {tolerance:g}: must be above 0")
     counts = range(FEWEST_SEGMENTS, MOST_SEGMENTS + 1, 4)
-    # More corners stand out less. Few are tried: to know how far a sphere stands out takes its whole mesh.
-    room = 1.0 - _LARGER / (1.0 + tolerance / solid.radius)  # what 1 - `_inner` may be
+    # With more corners a mesh stands out less. Few counts are tried, because each needs the whole mesh of a sphere.
+    room = 1.0 - _LARGER / (1.0 + tolerance / solid.radius)  # bound on 1 - `_inner`
     shares = _OF_CYLINDER if isinstance(solid, Cylinder) else _OF_SPHERE
     low, high = (4.0 * math.sqrt(share / room) if room > 0.0 else math.inf for share in shares)
     first, last = (bisect_left(counts, bound) for bound in (low, high))
@@ -70,8 +70,9 @@ def segments(solid: Cylinder | Sphere | Capsule, tolerance: float) -> int:
     if at < len(counts):
         return counts[at]
     raise RobotError(
-        f"tolerance {tolerance:g}: a radius of {solid.radius:g} would need more than {MOST_SEGMENTS} segments a ring; "
-        f"set the tolerance to {_two_digits_up(_stands_out(solid, MOST_SEGMENTS)):g} or more, or make the shape smaller"
+        f"tolerance {tolerance:g}: a radius of {solid.radius:g} would need more than {MOST_SEGMENTS} segments per "
+        f"ring; set the tolerance to {_two_digits_up(_stands_out(solid, MOST_SEGMENTS)):g} or more, or make the shape "
+        "smaller"
     )
 
 
@@ -94,7 +95,7 @@ def _box(box: Box) -> Triangles:
     corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * half
     quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
     flat = np.flatnonzero(half == 0.0)
-    if len(flat) == 1:  # both sides are one: a rectangle, of two triangles
+    if len(flat) == 1:  # both sides coincide: a rectangle of two triangles
         (side,) = quads[2 * flat[0] :: 6]
         corners, quads = corners[list(side)] + 0.0, [(0, 1, 2, 3)]
     return corners, np.array([t for a, b, c, d in quads for t in ((a, b, c), (a, c, d))], np.uint32)
@@ -160,7 +161,7 @@ def _half_sphere(n: int) -> Triangles:
 
 
 def _corners(ring: int, numbers: np.ndarray) -> np.ndarray:
-    """Their places among the corners: before ring k there are 1 + 4 (1 + ... + k - 1)."""
+    """Indices of the corners of ring k: there are 1 + 4 (1 + ... + k - 1) corners before it."""
     return 1 + 2 * ring * (ring - 1) + numbers % (4 * ring) if ring else np.zeros_like(numbers)
 
 

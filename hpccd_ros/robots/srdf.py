@@ -15,8 +15,8 @@ Pair = tuple[str, str]
 
 @dataclass(frozen=True)
 class Semantics:
-    """Pairs of links, in the order of their names. ``enabled``: though a link's default or neighbourhood says else.
-    ``ignored``: which entries have no effect and why, in words; "": none."""
+    """Pairs of links, in the order of their names. ``enabled``: even if a default or the tree ignores them.
+    ``ignored``: a sentence about entries without effect; "": there are none."""
 
     disabled: frozenset[Pair] = frozenset()
     enabled: frozenset[Pair] = frozenset()
@@ -25,8 +25,8 @@ class Semantics:
 
 
 def parse(text: str, links: Iterable[str]) -> Semantics:
-    """links: of the URDF; entries that name others are ignored, as MoveIt does. Raises SemanticsError naming the
-    element: no XML, a URDF, an entry without a name."""
+    """links: of the URDF; entries that name others are ignored, as in MoveIt. Raises SemanticsError naming the element
+    if it is not XML, is a URDF, or has an entry without a name."""
     try:
         return _semantics(text, set(links))
     except RobotError as error:
@@ -55,7 +55,7 @@ def _semantics(text: str, known: set[str]) -> Semantics:
 def _entries(
     elements: Iterable[Element], attributes: tuple[str, ...], known: set[str], unknown: list[str]
 ) -> list[tuple[str, ...]]:
-    """Names of the links of each element; of those that are not ``known`` a word in ``unknown`` instead."""
+    """The names of links in each element. Elements with a link that is not ``known`` go to ``unknown`` instead."""
     found = []
     for element in elements:
         names = tuple(element.text(attribute) for attribute in attributes)

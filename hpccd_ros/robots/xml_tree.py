@@ -17,7 +17,8 @@ MOST_CHARACTERS = 16_000_000
 MOST_ELEMENTS = 200_000
 DEEPEST = 50
 
-# Longest first: a mark of UTF-32 begins with one of UTF-16. Without a mark, the first character of XML tells.
+# Byte order marks, longest first: a mark of UTF-32 begins with one of UTF-16. Without a mark, the first character of
+# XML shows UTF-16.
 _MARKS = {
     BOM_UTF32_LE: "utf-32",
     BOM_UTF32_BE: "utf-32",
@@ -28,7 +29,7 @@ _MARKS = {
     b"\0<": "utf-16-be",
 }
 _DECLARED = re.compile(rb"""<\?xml[^>]*?\sencoding\s*=\s*["']([A-Za-z][A-Za-z0-9._-]{0,40})["']""")
-# What a decoder puts in place of bytes that it cannot decode.
+# The character that replaces bytes which a decoder cannot decode.
 _LOST = "\ufffd"
 
 
@@ -74,15 +75,15 @@ class Element:
 
 
 def decoded(data: bytes) -> str:
-    """The text of an XML file: by its byte order mark, else by the encoding that it declares, else as UTF-8. Raises
-    RobotError with the remedy, not naming the file."""
+    """The text of an XML file, decoded according to its byte order mark, or else the encoding that it declares, or else
+    as UTF-8. Raises RobotError with the remedy, without the name of the file."""
     encoding = next((name for mark, name in _MARKS.items() if data.startswith(mark)), "")
     if not encoding:
         declared = _DECLARED.match(data.lstrip()[:1000])
         encoding = declared[1].decode() if declared else "utf-8"
     try:
         if re.match(r"utf-(16|32)", lookup(encoding).name) and b"\0" not in data:
-            encoding = "utf-8"  # declared in single bytes, so it was saved otherwise since
+            encoding = "utf-8"  # no zero bytes: saved again in another encoding
         return data.decode(encoding)
     except UnicodeDecodeError as error:
         byte = f"byte 0x{data[error.start]:02x} in line {data[: error.start].count(10) + 1}"
@@ -120,8 +121,8 @@ class _Builder:
         try:
             self._parser.Parse(text.encode(), True)
         except expat.ExpatError as error:
-            why = f"is no XML: {error}; export it again"
-            if "\0" in text[:4]:  # every second byte of most UTF-16
+            why = f"is not XML: {error}; export it again"
+            if "\0" in text[:4]:  # every second byte of most UTF-16 texts
                 why = "is UTF-16, which was sent as if it were UTF-8; save it as UTF-8"
             raise RobotError(f"{self._document}: {why}") from error
         except UnicodeEncodeError as error:

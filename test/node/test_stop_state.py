@@ -8,7 +8,7 @@ import pytest
 
 from hpccd_ros.base.clocks import Clocks
 from hpccd_ros.frames.drops import Aspect, Input, Reason, Refusal
-from hpccd_ros.frames.types import ALWAYS, OUTDATED, UNTOLD, Origin
+from hpccd_ros.frames.types import ALWAYS, OUTDATED, UNKNOWN_TIME, Origin
 from hpccd_ros.node.stop_doubts import WatchedScene
 from hpccd_ros.node.stop_state import IN_TIME, Cause, StopState
 
@@ -111,9 +111,9 @@ def test_what_has_no_age_and_what_tells_none(state):
     state.next(0.0)
     state.times.pass_by(0.9 * TIMEOUT)
     assert cause(state) is None, "placed by static transforms alone"
-    clear(state, hand=UNTOLD)
+    clear(state, hand=UNKNOWN_TIME)
     assert cause(state) is Cause.SILENT and "does not tell when messages of mesh hand" in state.why().text
-    clear(state, table=UNTOLD)
+    clear(state, table=UNKNOWN_TIME)
     assert cause(state) is None, "a file: static meshes have no age"
     clear(state, table=OUTDATED)
     assert cause(state) is Cause.REFUSED and "newer message about where mesh table is" in state.why().text
@@ -207,7 +207,7 @@ def test_what_came_before_settles_nothing(state):
     clear(state, table=before)
     assert cause(state) is None
     state.times.pass_by(1)
-    for unknown in (None, UNTOLD):
+    for unknown in (None, UNKNOWN_TIME):
         state.refused(Refusal("table", Reason.MALFORMED, sent=unknown))
         clear(state, table=before)
         assert cause(state) is Cause.REFUSED
