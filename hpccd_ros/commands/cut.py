@@ -24,7 +24,8 @@ def configure(parser):
     parser.add_argument("--from", dest="begin", metavar="TIME", help="begin of the part (default: that of FILE)")
     parser.add_argument("--to", dest="end", metavar="TIME", help="end of the part (default: that of FILE)")
     parser.add_argument("-o", "--output", metavar="OUT", required=True, help="new file, NAME.mcap")
-    parser.add_argument("--compression", choices=("none", "lz4", "zstd"), help="of OUT (default: that of FILE)")
+    parser.add_argument("--compression", choices=("none", "lz4", "zstd"),
+                        help="compression of OUT (default: that of FILE)")  # fmt: skip
 
 
 def run(args) -> int:
