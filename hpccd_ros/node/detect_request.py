@@ -95,7 +95,7 @@ def compute(
 
 def _choice(field: str, value: str, choices: tuple[str, ...]) -> str:
     if value not in choices:
-        raise RequestError(f"{field}: {quoted(value)} is not valid; use one of {', '.join(choices)}")
+        raise RequestError(f"{field}: {quoted(value)} is not known; use one of {', '.join(choices)}")
     return value
 
 

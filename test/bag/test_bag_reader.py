@@ -31,7 +31,7 @@ def test_not_there(tmp_path):
 
 
 def test_folder_without_recordings(tmp_path):
-    with pytest.raises(RecordingError, match=r"holds no \.mcap file"):
+    with pytest.raises(RecordingError, match=r"has no \.mcap file"):
         Recording(tmp_path)
 
 

@@ -195,7 +195,7 @@ def test_recordings_without_a_message_of_ros_2(bag, tmp_path):
     bag.channels = bag.channels[-5:]
     bag.messages = [message for message in bag.messages if message.channel_id >= 90]
     said = _refused(bag.write(tmp_path / "x.mcap"), doctor=2)
-    assert "holds no messages of ROS 2 (MCAP profile 'ros1'; topics: /log (encoding 'json')" in said, said
+    assert "has no ROS 2 messages (MCAP profile 'ros1'; topics: /log (encoding 'json')" in said, said
 
 
 def test_messages_before_their_channel_is_described(bag, tmp_path):
@@ -228,7 +228,7 @@ def _check(path, expected, skipped=(), options=()):
     assert examined.status == 0 and ": sound" in examined.out, examined
     assert replayed.status == 0 and "VERIFIED: 7 answers" in replayed.out, replayed
     for words in (examined.out, replayed.err):
-        assert ("skipped, as their messages are not those of ROS 2" in words) == bool(skipped), words
+        assert ("skipped, because these are not ROS 2 messages" in words) == bool(skipped), words
         assert all(f"{topic} (" in words for topic in skipped), words
 
 

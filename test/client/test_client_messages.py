@@ -60,7 +60,7 @@ def test_a_topology_that_is_refused(arguments, error, text):
         (dict(vertices=VERTICES.astype(int)), TypeError, "got dtype int64"),
         (dict(vertices=VERTICES.ravel()), ValueError, r"vertices: expected shape \(n, 3\).*got \(18,\)"),
         (dict(vertices=VERTICES[:0]), ValueError, "at least one"),
-        (dict(vertices=np.ma.masked_less(VERTICES, 1)), TypeError, "vertices: some of its elements are masked"),
+        (dict(vertices=np.ma.masked_less(VERTICES, 1)), TypeError, "vertices: some elements are masked"),
         (dict(vertices=VERTICES * np.nan), ValueError, "vertices: vertex 0 is .* must be finite"),
         (dict(vertices=VERTICES * 1e150), ValueError, "vertices: .* must lie in"),
         (dict(stamp_ns=2**31 * 10**9), ValueError, "stamp_ns: must lie in"),

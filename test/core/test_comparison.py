@@ -90,7 +90,7 @@ def test_answers_that_do_not_belong_to_one_step(meshes):
     first, second = _two_parts(meshes)
     _, with_points = _two_parts(meshes, outputs=("points",))
     assert len(first) and len(second)
-    with pytest.raises(ValueError, match="answers: some have points and some have none; ask all with the same"):
+    with pytest.raises(ValueError, match="answers: some have points and others do not; use detectors with the same"):
         contacts_of_step([(first, 0, 2), (with_points, 1, 2)])
     assert len(contacts_of_step([(hc.Contacts.none(), 0, 2), (with_points, 1, 2)]).points) == len(with_points)
     with pytest.raises(TypeError, match=r"answers\[1\]: expected hpccd_core.Contacts, got Proximity"):

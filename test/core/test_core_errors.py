@@ -494,7 +494,7 @@ class Unwilling:
         (np.ma.masked_array([[1.0]], [[True]]), TypeError, "masked"),
         ([np.ma.masked_array([1.0], [True])], TypeError, "masked"),
         ([[np.ma.masked]], TypeError, "masked"),
-        (Unwilling(), TypeError, "Unwilling does not turn into an array"),
+        (Unwilling(), TypeError, "Unwilling cannot be converted to an array"),
         ([[1j]], TypeError, "numbers, got dtype complex128"),
         ([["1"]], TypeError, "numbers, got dtype <U1"),
         ([[None]], TypeError, "numbers, got dtype object"),

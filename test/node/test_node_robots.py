@@ -262,7 +262,7 @@ def test_another_description_makes_another_scene(start_node):
     longer = crane.URDF.replace('"0.6 0.06 0.04"', '"0.9 0.06 0.04"')
     publisher.publish(String(data="<robot"))
     node.wait_until(
-        lambda: "the one before stays in use" in node.peer.statuses["frames"][1], "what is wrong with the second"
+        lambda: "the previous one stays in use" in node.peer.statuses["frames"][1], "what is wrong with the second"
     )
     publisher.publish(String(data=longer))
     node.wait_until(lambda: "stays in use" not in node.peer.statuses["frames"][1], "the third description")

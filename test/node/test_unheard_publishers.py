@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Publishers that offer less than the node asks for: DDS does not connect them, and the node says what to set."""
+"""Publishers that offer less than the node requests: DDS does not connect them, and the node says what to set."""
 
 import pytest
 from geometry_msgs.msg import TransformStamped
@@ -9,13 +9,14 @@ from std_msgs.msg import String
 
 from hpccd_ros.middleware import qos
 
-LATCHED = "let the publisher offer transient_local (latched), as what it sent before the node listened would be missing"
+LATCHED = ("let the publisher offer transient_local (latched): otherwise messages sent before the node listened would "
+           "be missing")  # fmt: skip
 # Topic -> its type, what a publisher offers (reliable, latched), and what is to be said of it.
 LESS = {
-    "meshes/cloth/topology": (MeshTopology, (True, False), f"offers volatile, the node asks for transient_local, so "
-                              f"nothing of it is received; {LATCHED}"),
-    "meshes/cloth/vertices": (MeshVertices, (False, False), "offers best_effort, the node asks for reliable, so "
-                              "nothing of it is received; set input_reliability: best_effort, or let the publisher "
+    "meshes/cloth/topology": (MeshTopology, (True, False), "offers volatile but the node requests transient_local, "
+                              f"so none of its messages are received; {LATCHED}"),
+    "meshes/cloth/vertices": (MeshVertices, (False, False), "offers best_effort but the node requests reliable, so none "
+                              "of its messages are received; set input_reliability: best_effort, or let the publisher "
                               "offer reliable"),
     "transforms": (TransformStamped, (False, False), "set qos_overrides.NAMESPACE/transforms.subscription.reliability: "
                    "best_effort, or let the publisher offer reliable"),
@@ -24,9 +25,9 @@ LESS = {
                      "reliable"),
     "left/joint_states": (JointState, (False, False), "set "
                           "qos_overrides.NAMESPACE/left/joint_states.subscription.reliability: best_effort, or let"),
-    "robot_description": (String, (False, False), "offers best_effort and volatile, the node asks for reliable and "
-                          "transient_local, so nothing of it is received; let the publisher offer reliable and "
-                          "transient_local"),
+    "robot_description": (String, (False, False), "offers best_effort and volatile but the node requests reliable and "
+                          "transient_local, so none of its messages are received; let the publisher offer reliable "
+                          "and transient_local"),
 }  # fmt: skip
 ROBOTS = {"robots": ["arm", "left"], "robot.arm.description": "robot_description",
           "robot.left.description": "robot_description", "robot.arm.joint_states": "joint_states",

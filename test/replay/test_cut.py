@@ -271,10 +271,10 @@ def test_the_command(whole, tmp_path, hpccd):
     done = hpccd("cut", whole, "--from", "1", "--to", "2", "-o", "part.mcap", "--compression", "lz4")
     assert done.returncode == 0, done.stderr
     assert re.fullmatch(rf"part\.mcap: \d+ messages, from 1\.000000000 to \d\.\d+ s of {whole}\n  \d+ of them were "
-                        r"received before and in force at the beginning\n", done.stdout), done.stdout
+                        r"received earlier and were in force at its beginning\n", done.stdout), done.stdout
     assert hpccd("doctor", "part.mcap").returncode == 0
     again = hpccd("cut", whole, "--from", "1", "-o", "part.mcap")
-    assert again.returncode == 2 and again.stderr == "hpccd cut: -o part.mcap: exists; recordings are not overwritten\n"
+    assert again.returncode == 2 and again.stderr == "hpccd cut: -o part.mcap: already exists; give another name\n"
     lasts = seconds(raw_messages(whole)[-1].log_time - BEGAN)
     for options, words in ((("--from", "99"), "has no message in this part; its messages are from 0 to "),
                            (("--from", "9" * 23), "has no message in this part; its messages are from 0 to "),

@@ -256,7 +256,7 @@ def test_an_input_that_the_recording_lacks(recorded):
 
     replay, steps = recorded(change)
     assert replay.diverged == 0 and replay.unverified >= 1 and steps[AT].missing
-    assert "sent at 1000000000" in steps[AT].missing and "which the recording does not hold" in steps[AT].missing
+    assert "sent at 1000000000" in steps[AT].missing and "which the recording lacks" in steps[AT].missing
 
     def remove(answers, messages):
         messages.remove([one for one in messages if one.topic == "meshes/tool/vertices"][6])
@@ -287,7 +287,7 @@ def test_an_answer_without_its_list(recorded):
             setattr(answers[AT].message, name, [])
 
     replay, steps = recorded(change)
-    assert replay.diverged == 0 and "does not list what the node had taken" in steps[AT].missing
+    assert replay.diverged == 0 and "does not list the inputs taken" in steps[AT].missing
 
 
 def test_an_answer_that_was_lost(recorded):
@@ -302,7 +302,7 @@ def test_an_answer_that_was_lost(recorded):
 
     assert recorded(lose)[0].diverged == 0
     replay, steps = recorded(change)
-    assert replay.diverged == 0 and "an answer before it is missing" in steps[AT + 1].missing
+    assert replay.diverged == 0 and "an earlier answer is missing" in steps[AT + 1].missing
 
 
 def _change_list(change):
@@ -353,7 +353,7 @@ def test_forged_lists_excuse_no_answer(tmp_path, kind, forged):
     assert not any(step.before_recording for step in steps), [step.missing for step in steps]
     assert replay.verified == AT and replay.diverged + replay.unverified == len(answers) - AT
     if forged.startswith("one less"):
-        assert steps[AT].missing == "its list does not continue that of the answer before"
+        assert steps[AT].missing == "its list does not continue that of the previous answer"
 
 
 def test_begun_in_the_middle(recorded):

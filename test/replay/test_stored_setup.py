@@ -96,7 +96,7 @@ def test_a_setup_that_is_no_json(changed, text):
 
 @pytest.mark.parametrize("setup", [[], [1], "x", 7, None, True])
 def test_a_setup_that_is_no_object(changed, setup):
-    _refused(changed(text=json.dumps(setup)), "stored of the node is no object but a")
+    _refused(changed(text=json.dumps(setup)), "stored about the node is not an object but a")
 
 
 @pytest.mark.parametrize("value", [[1], "x", 7, True])

@@ -32,7 +32,7 @@ def test_two_that_differ_contradict_each_other_until_one_is_silent():
     publishers = JointPublishers(())
     assert said(publishers, (0, 1, 0.0), (1, 1.5, -2.0), (0, 2, 0.0)) == [False, False, True]
     assert said(publishers, (1, 2.5, -2.0), (0, 3, 0.0), (0, 3.1, 0.0), (0, 12, 0.0)) == [True] * 4
-    assert "joint 'z', one says 0 at 12500000000 ns" in publishers.contradiction(0, 12_500_000_000, [("z", 0.0)])
+    assert "joint 'z', one sent 0 for 12500000000 ns" in publishers.contradiction(0, 12_500_000_000, [("z", 0.0)])
     assert said(publishers, (0, 2.6 + HISTORY_NS / SECOND, 0.0)) == [False]
     assert said(publishers, (0, 20, 0.0), (1, 20, 1e-3)) == [False, True], "at the same time"
     assert not publishers.contradiction(0, 21 * SECOND, [("other", 5.0)]), "a joint that it alone tells of"

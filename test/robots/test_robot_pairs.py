@@ -84,7 +84,7 @@ def test_what_an_srdf_disables_is_added_and_what_it_enables_is_put_back():
     [
         ('<disable_collisions link1="a"/>', "<disable_collisions> needs the attribute link2"),
         ('<disable_default_collisions link=""/>', "<disable_default_collisions> needs the attribute link"),
-        ("<", "SRDF: is no XML"),
+        ("<", "SRDF: is not XML"),
     ],
 )
 def test_entries_without_a_name_are_refused(inside, message):

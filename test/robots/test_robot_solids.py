@@ -152,7 +152,7 @@ def test_the_segments_are_the_fewest_that_keep_the_tolerance(kind):
 @pytest.mark.parametrize("solid", [Sphere(100.0), Capsule(1e6, 1.0), Cylinder(1e12, 1.0), Sphere(1e300)], ids=str)
 def test_what_is_too_large_for_its_tolerance_says_which_tolerance_would_do(solid):
     solids._inner_of_sphere.cache_clear()
-    with pytest.raises(RobotError, match="would need more than 512 segments a ring; set the tolerance to") as no:
+    with pytest.raises(RobotError, match="would need more than 512 segments per ring; set the tolerance to") as no:
         solids.triangles(solid, 1e-3)
     assert solids._inner_of_sphere.cache_info().misses <= 1
     assert solids.segments(solid, float(re.search("tolerance to (.*) or more", str(no.value))[1])) >= 500
