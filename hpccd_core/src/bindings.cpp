@@ -100,7 +100,7 @@ py::array_t<double> widened(const Array<float>& from) {
   return to;
 }
 
-// The context manager StandardArithmetic of Python code that computes by itself.
+// The context manager StandardArithmetic, for Python code that does arithmetic itself.
 struct ArithmeticContext {
   std::optional<StandardArithmetic> entered;
 };

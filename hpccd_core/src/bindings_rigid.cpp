@@ -31,9 +31,9 @@ static_assert(sizeof(Vector) == 3 * sizeof(double) && sizeof(Pose) == 7 * sizeof
 
 std::span<const double> numbers(const Doubles& a) { return {a.data(), static_cast<std::size_t>(a.size())}; }
 
-// float64 as it is; other arrays and numbers where it can hold them exactly. Errors name them.
+// float64 arrays as they are; other arrays and numbers if float64 can hold them exactly. Errors name the argument.
 Doubles doubles(const char* name, const py::object& given) {
-  // Of a subclass, as masked arrays are, the numbers may not be all.
+  // Not for subclasses: a masked array is more than its numbers.
   const bool plain = Py_TYPE(given.ptr()) == py::detail::npy_api::get().PyArray_Type_;
   if (plain && py::isinstance<py::array_t<double>>(given)) return Doubles(py::reinterpret_borrow<py::array>(given));
   return Doubles(py::module_::import("hpccd_core.arguments").attr("reals")(name, given));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Floating-point modes of this thread that other libraries set.
+// Floating-point modes that other libraries may set in this thread.
 #pragma once
 
 #include <cfenv>
@@ -8,7 +8,7 @@
 
 namespace hpccd::test {
 
-// While it lives: denormal numbers count as zero, or results are rounded in this direction.
+// During its lifetime denormal numbers count as zero, or results are rounded in the given direction.
 class OtherArithmetic {
  public:
   static constexpr int flush_to_zero = -1;
@@ -44,7 +44,7 @@ inline constexpr int other_modes[] = {
 #endif
     FE_UPWARD, FE_DOWNWARD, FE_TOWARDZERO};
 
-// What this thread makes of numbers that tell the modes apart.
+// Results of this thread that differ between the modes.
 struct SeenArithmetic {
   bool keeps_denormals, rounds_up, rounds_down, cuts;
   bool operator==(const SeenArithmetic&) const = default;

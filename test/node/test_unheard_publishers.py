@@ -15,9 +15,9 @@ LATCHED = ("let the publisher offer transient_local (latched): otherwise message
 LESS = {
     "meshes/cloth/topology": (MeshTopology, (True, False), "offers volatile but the node requests transient_local, "
                               f"so none of its messages are received; {LATCHED}"),
-    "meshes/cloth/vertices": (MeshVertices, (False, False), "offers best_effort but the node requests reliable, so none "
-                              "of its messages are received; set input_reliability: best_effort, or let the publisher "
-                              "offer reliable"),
+    "meshes/cloth/vertices": (MeshVertices, (False, False), "offers best_effort but the node requests reliable, so "
+                              "none of its messages are received; set input_reliability: best_effort, or let the "
+                              "publisher offer reliable"),
     "transforms": (TransformStamped, (False, False), "set qos_overrides.NAMESPACE/transforms.subscription.reliability: "
                    "best_effort, or let the publisher offer reliable"),
     "transforms_static": (TransformStamped, (True, False), LATCHED),

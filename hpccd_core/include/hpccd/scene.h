@@ -47,7 +47,7 @@ class ScenePairs;
 /// Threads: calls that change a scene need it alone. One that no longer changes may serve any number of threads and
 /// detectors. A detector reads its scene when it is made and later: do not change it from then on.
 class HPCCD_API Scene {
-  friend class ScenePairs;  // of the library: what was set of single pairs
+  friend class ScenePairs;  // internal: lists the values set for single pairs
 
  public:
   /// Adds a mesh and returns its number.

@@ -135,7 +135,7 @@ void ThreadPool::work(int thread) {
   // What the run-time library keeps of a thread's exceptions is allocated when it is first asked for. Not at the first
   // throw, which may be that of a failed allocation: it would end the process.
   (void)std::current_exception();
-  const StandardArithmetic arithmetic;  // a thread begins with the mode of the one that starts it
+  const StandardArithmetic arithmetic;  // a new thread inherits the mode of the thread that starts it
   begun_.count_down();
   std::uint32_t seen = 0;
   while (!stop_) {

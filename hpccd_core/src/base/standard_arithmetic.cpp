@@ -3,7 +3,7 @@
 
 namespace hpccd {
 
-// Out of line and through memory: no compiler moves arithmetic over these calls.
+// Out of line, with memory clobbers: compilers do not move arithmetic across these calls.
 #if defined(__x86_64__)
 
 namespace {
@@ -19,7 +19,7 @@ constexpr std::uint32_t status_flags = 0x3f, standard = 0x1f80;  // all traps ma
 
 }  // namespace
 
-// Writing the register costs more than reading it.
+// The register is only written if needed, because writing costs more than reading.
 StandardArithmetic::StandardArithmetic() : before_(mode()) {
   if ((before_ & ~status_flags) != standard) set_mode(standard);
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The floating-point mode that all error bounds assume: rounding to nearest, denormal numbers kept, nothing trapped.
-// Other libraries set others for their own speed (-ffast-math sets flush-to-zero when its library is loaded), in each
-// thread that calls us.
+// The floating-point mode that all error bounds assume: rounding to nearest, denormal numbers kept, no traps.
+// Other libraries may set another mode in the threads that call this one, for their own speed (loading a library that
+// was compiled with -ffast-math sets flush-to-zero).
 #pragma once
 
 #include <cfenv>
@@ -9,7 +9,7 @@
 
 namespace hpccd {
 
-// Sets that mode in this thread while it lives, and then the mode that was there before. A few nanoseconds.
+// Sets that mode in this thread for its lifetime, then restores the previous mode. Takes a few nanoseconds.
 class StandardArithmetic {
  public:
   StandardArithmetic();

@@ -86,7 +86,7 @@ void copy_motion(const Real* t0, const Real* t1, const CoordinateMap& map, const
 }
 
 // Of one snapshot. In place of a second end, bounds along three directions more: slanted features leave far less room.
-// slanted(x): the coordinates along them.
+// slanted(x): the coordinates along these directions.
 template <class Real, class BoxMap, class Slanted>
 void copy_snapshot(const Real* x, const BoxMap& map, const Slanted& slanted, std::size_t begin, std::size_t end,
                    VertexMotion* vertices, MotionBox* boxes) {
@@ -102,12 +102,13 @@ void copy_snapshot(const Real* x, const BoxMap& map, const Slanted& slanted, std
   }
 }
 
-// Below this, in the coordinates of the boxes, features are spread: rounding of a reach, 1e-6, is a thirtieth of it.
+// Features smaller than this, in coordinates of the boxes, count as spread: the rounding of a reach, 1e-6, is a
+// thirtieth of it.
 constexpr double least_spread = 3e-5;
 
-// For each plane of two axes the direction along which edges extend least, so that bars at any slant are apart as soon
-// as upright ones. `extents`: by plane and direction. The common ones stay unless another is far better: of sheets that
-// are cut into triangles along one diagonal, that would be no gain.
+// For each plane of two axes the direction along which edges extend least, so that slanted bars are separated as well
+// as upright ones. `extents`: by plane and direction. The common directions stay unless another is far better: for
+// sheets that are cut into triangles along one diagonal, another one would gain nothing.
 std::array<SlantedDirection, 3> best_directions(const double (&extents)[3][std::size(slanted_directions)]) {
   std::array<SlantedDirection, 3> best;
   for (std::size_t k = 0; k < 3; ++k) {
@@ -187,7 +188,7 @@ void MotionBounds::update(const Real* t0, const Real* t1, std::size_t n, std::sp
   double most = 0;
   for (int k = 0; n > 0 && k < 3; ++k) most = std::max({most, std::fabs(whole.low[k]), std::fabs(whole.high[k])});
   rounding = 1e-15 * most;
-  look_at_edges(t0, t1);
+  measure_edges(t0, t1);
   std::vector<double> margins(parts_.size(), 0);
   if (!separations.empty() && n > 0)
     for (std::size_t p = 0; p < parts_.size(); ++p) margins[p] = margin_for(separations[p], whole);
@@ -249,9 +250,9 @@ void MotionBounds::update(const Real* t0, const Real* t1, std::size_t n, std::sp
   });
 }
 
-// How short edges are, and of a snapshot how slanted.
+// Measures how short edges are, and for a snapshot also how slanted.
 template <class Real>
-void MotionBounds::look_at_edges(const Real* t0, const Real* t1) {
+void MotionBounds::measure_edges(const Real* t0, const Real* t1) {
   short_edge = 0;
   slanted_ = {};
   if (!features) return;
@@ -261,8 +262,8 @@ void MotionBounds::look_at_edges(const Real* t0, const Real* t1) {
     return most;
   };
   double extents[3][std::size(slanted_directions)] = {};
-  // What floats suffice for is asked of motions alone; for the rest few edges do.
-  // Of a small scene a look at its edges would take longer than what it could save.
+  // Only motions have to decide whether floats suffice; otherwise a few edges are enough. In small scenes, measuring
+  // edges would take longer than it could save.
   constexpr std::size_t edges_of_a_snapshot = 16, few_edges = 256;
   const std::size_t wanted = snapshot_ ? edges_of_a_snapshot : edges_of_a_step;
   if (snapshot_ && features->edges.size() < few_edges) return;
@@ -281,8 +282,8 @@ void MotionBounds::look_at_edges(const Real* t0, const Real* t1) {
   if (snapshot_) slanted_ = best_directions(extents);
 }
 
-// How long the features are of what is finest in the scene: by its short edges, or by meshes that have so many vertices
-// that all their pairs would be more than 64 for each vertex of the scene.
+// The length of the finest features of the scene: from its short edges, and from meshes with so many vertices that all
+// pairs of their vertices would be more than 64 per vertex of the scene.
 double MotionBounds::finest() const {
   double least = short_edge > 0 ? short_edge : std::numeric_limits<double>::infinity();
   for (std::size_t p = 0; features && p < parts_.size(); ++p) {
@@ -295,8 +296,8 @@ double MotionBounds::finest() const {
   return std::isfinite(least) ? least : 0;
 }
 
-// Gaps are shortened no more than makes edges as long as a thousandth of the scene. None becomes so short that features
-// at its ends could count as near.
+// Shortens gaps, but not beyond the point where the finest edges are a 4,096th of the scene. No gap becomes so short
+// that features at its ends could count as near.
 template <class Real>
 void MotionBounds::squeeze(const Real* t0, const Real* t1, std::size_t n, double finest, const Extent& whole,
                            ThreadPool& pool) {
@@ -325,7 +326,7 @@ void MotionBounds::squeeze(const Real* t0, const Real* t1, std::size_t n, double
   }
   if (!(length > 0 && length < whole_length / 4)) return;
   box_scale = std::ldexp(1.0, -std::clamp(std::ilogb(length / 2), -1000, 1000));
-  // Sums of two coordinates far from zero may be too coarse, or lie apart in more places than the coordinates.
+  // Sums of two coordinates far from zero may be too coarse, or have more gaps than the coordinates.
   const bool coarse = box_scale * rounding > 1e-7;
   for (std::size_t axis = 0; axis < n_axes; ++axis) {
     const double scale = axis < 3 ? box_scale : box_scale * slanted_[axis - 3].factor;

@@ -31,7 +31,7 @@ struct Extent {
 };
 
 struct MotionBounds {
-  // Whose edges tell how fine the scene is. Without them it counts as coarse.
+  // Their edges show how fine the scene is. Without features the scene counts as coarse.
   const Features* features = nullptr;
   std::vector<VertexMotion> vertices;
   std::vector<MotionBox> boxes;
@@ -43,11 +43,12 @@ struct MotionBounds {
   // The length of a short edge (scene/edge_sample.h): its largest extent along an axis, at the end of the motion where
   // it is shorter.
   double short_edge = 0;
-  // Whether features are so small beside the scene that floats hardly tell them apart. Then boxes have a map of their
-  // own if that is finer: of each axis, and of each slanted direction of a snapshot. Else they have the common one.
+  // Whether features are so small beside the scene that floats hardly distinguish them. Then each axis, and each
+  // slanted direction of a snapshot, has a map of its own for boxes if that is finer. Otherwise boxes use the common
+  // map.
   bool spread = false;
   std::vector<SqueezedAxis> squeezed;
-  // Of the boxes: the scale of their map, and `rounding` in them.
+  // For boxes: the scale of their map, and `rounding` in their coordinates.
   double box_scale = 1, box_rounding = 0;
   // What sums of two coordinates may lose, in those of the scene: 2.2e-16 of the largest for each of two
   // vertices, 3.4e-16 where one is doubled. Far from the origin that is more than rounding to floats.
@@ -62,15 +63,16 @@ struct MotionBounds {
   // Throws InvalidArgument where a coordinate is not finite or too large, or where a static mesh moves.
   void update(const Scene& scene, Positions vertices_t0, Positions vertices_t1, std::span<const double> separations,
               ThreadPool& pool);
-  // Of one snapshot: a motion that goes nowhere, whose boxes have bounds along other directions in place of the second
-  // end (SlantedDirection); without k-DOPs. `distance`: up to which features count as near, where that is known.
+  // For one snapshot: a motion without displacement, whose boxes have bounds along other directions in place of the
+  // second end (SlantedDirection); without k-DOPs. `distance`: features count as near up to this distance, if it is
+  // known.
   void update(const Scene& scene, Positions vertices, ThreadPool& pool, double distance = 0);
   // The same for vertices of no scene, without separations.
   void update(Positions vertices_t0, Positions vertices_t1, ThreadPool& pool);
   void sweep(ThreadPool& pool);
-  // Where its vertices are.
+  // Smallest and largest coordinates of its vertices.
   const Extent& extent_of_mesh(std::size_t mesh) const { return extents_[mesh]; }
-  // By how much its boxes have grown, in the scene's coordinates.
+  // The amount by which its boxes have grown, in the scene's coordinates.
   double margin_of_mesh(std::size_t mesh) const { return margins_[mesh]; }
   std::size_t bytes() const;
 
@@ -80,7 +82,7 @@ struct MotionBounds {
   void update(const Real* t0, const Real* t1, std::size_t n, std::span<const double> separations, ThreadPool& pool);
   void update_all(Positions t0, Positions t1, std::span<const double> separations, ThreadPool& pool);
   template <class Real>
-  void look_at_edges(const Real* t0, const Real* t1);
+  void measure_edges(const Real* t0, const Real* t1);
   double finest() const;
   template <class Real>
   void squeeze(const Real* t0, const Real* t1, std::size_t n, double finest, const Extent& whole, ThreadPool& pool);

@@ -83,8 +83,8 @@ MotionBox leaf_bounds(const Tree& tree, const LeafRange& leaf, const std::vector
   return box;
 }
 
-// By half a separation on each side, as boxes grow: then leaves whose k-DOPs are apart hold no two features that come
-// within the separation of each other. It is what the k-DOPs of features are compared with (KdopMargin).
+// Grows k-DOPs by half a separation on each side, like boxes: then leaves whose k-DOPs are apart have no two features
+// that come within the separation of each other. The k-DOPs of features are compared with the same (KdopMargin).
 KdopMargin margin_of(const MotionBounds& motion, std::uint32_t mesh) {
   return {motion.margin_of_mesh(mesh) + motion.rounding, motion.map.scale};
 }

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// Directions along which boxes of snapshots have bounds besides the axes.
+// Directions besides the axes along which boxes of snapshots have bounds.
 #pragma once
 
 namespace hpccd {
 
-// A direction in the plane of axis k and the one after it, which may take the place of their sum: a * x[k] + b *
-// x[k+1], times a power of two. As long as the sum at most, and like that rounded once.
+// A direction in the plane of axis k and the next one, used in place of their sum: a * x[k] + b * x[k+1], times a power
+// of two. It is at most as long as the sum, and is rounded once, like the sum.
 struct SlantedDirection {
   double a = 1, b = 1, factor = 1;
 

@@ -8,10 +8,10 @@
 namespace hpccd {
 namespace {
 
-// The longest that a gap may stay where all of them are to leave `wanted` of a length. `gaps`: those above `least`.
+// The length to which longer gaps are shortened so that `wanted` remains of `length`. `gaps`: those above `least`.
 double longest_gap(std::vector<double>& gaps, double length, double wanted, double least) {
   std::ranges::sort(gaps, std::greater());
-  double without = length;  // the gaps that are shortened
+  double without = length;  // length without the gaps that are shortened
   for (std::size_t n = 0; n < gaps.size(); ++n) {
     without -= gaps[n];
     const double gap = (wanted - without) / static_cast<double>(n + 1);
@@ -47,7 +47,7 @@ SqueezedAxis::SqueezedAxis(std::vector<Stretch>& stretches, double wanted, doubl
   }
 }
 
-// Each operation keeps the order of numbers.
+// Monotonic: each operation keeps the order of numbers.
 float SqueezedAxis::operator()(double x) const {
   auto segment = std::ranges::upper_bound(segments_, x, {}, &Segment::low);
   if (segment != segments_.begin()) --segment;

@@ -34,7 +34,7 @@ struct alignas(64) Node {
   std::uint32_t only_points : 1 = 0;  // no triangle and no edge in it, so nothing that another such node could touch
 
   bool overlaps(const Node& other) const;  // as MotionBox::overlaps
-  // By more than `excess` along each axis.
+  // Whether they overlap by more than `excess` along each axis.
   bool overlaps(const Node& other, float excess) const;
   // The same up to a time below 1, from the start on.
   bool overlap_until(const Node& other, float time) const;
@@ -186,10 +186,10 @@ struct Tree {
   std::unique_ptr<CornerRow[]> rows;
   std::size_t n_groups = 0;
   bool grown = false;
-  bool bent = false;  // the hull of a feature's corners need not hold it (squeezed_axis.h)
+  bool bent = false;  // the hull of a feature's corners need not contain it (squeezed_axis.h)
   static constexpr std::uint32_t coordinates = 6;
-  bool by_kdops = false;    // whether there are any: of motions
-  std::vector<Kdop> kdops;  // by leaf; they grow as boxes do
+  bool by_kdops = false;    // whether there are k-DOPs: for motions only
+  std::vector<Kdop> kdops;  // by leaf; they grow like boxes
   HPCCD_HD std::uint32_t rows_per_group() const { return grown ? 2 * coordinates : coordinates; }
   HPCCD_HD CornerRow* rows_of(const LeafRange& leaf) const {
     return rows.get() + std::size_t{leaf.first_group} * rows_per_group();

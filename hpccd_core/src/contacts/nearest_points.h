@@ -13,10 +13,10 @@ struct NearestPoints {
   double distance;
   Vec3<double> on_first, on_second;  // the vertex and the face, or edge a and edge b
   Vec3<double> direction;            // unit length: from face to vertex, or from edge a to edge b; zero at no distance
-  bool certain;                      // the direction is: not what the rounding of positions has made of a short gap
+  bool certain;                      // the direction is reliable: not dominated by the rounding of positions
 };
 
-// At a time of the step. Where edges are parallel: in the middle of the stretch along which they are nearest.
+// At a time of the step. If edges are parallel: in the middle of the stretch along which they are nearest.
 template <Kind kind, class Arbiter>
 HPCCD_HD NearestPoints nearest_points(const Vec3<double> t0[4], const Vec3<double> t1[4], double time,
                                       Arbiter& arbiter) {
@@ -31,8 +31,8 @@ HPCCD_HD NearestPoints nearest_points(const Vec3<double> t0[4], const Vec3<doubl
   constexpr double flat = 1e-2;
   const bool place_is_known = dot(n, n) > flat * flat * (dot(now.a, now.a) * dot(now.b, now.b));
   const NearOrFar<double> checked = proximity_test<kind>(now, 0.0);
-  // Positions are rounded by a few 2^-53 of their coordinates, and by 2^-1074 at least: longer vectors have their
-  // directions to 1e-6 or better.
+  // Positions are rounded by a few 2^-53 of their coordinates, or by 2^-1074 if that is more: directions of vectors
+  // longer than this are accurate to 1e-6 or better.
   const double size = greater(greater(largest(q[0]), largest(q[1])), greater(largest(q[2]), largest(q[3])));
   const double long_enough = greater(0x1p-30 * size, 0x1p-1044);
   if (!place_is_known || !checked.far) {
@@ -44,7 +44,7 @@ HPCCD_HD NearestPoints nearest_points(const Vec3<double> t0[4], const Vec3<doubl
   const Nearest<double> found = detail::straightened(place, now);
   const V direction = unit(found.straight);
   const double distance = sqrt(found.square);
-  // A gap on the inside of both features has the direction of n: of its length only the side must be certain.
+  // A gap in the interior of both features has the direction of n: its length only has to be certain about the side.
   const bool certain = distance > long_enough || (place.inside && distance > 0x1p-45 * size &&
                                                   largest(n) > long_enough * (largest(now.a) + largest(now.b)));
   if constexpr (kind == Kind::vertex_face)

@@ -110,8 +110,8 @@ void test_proven(const Geometry& g, const std::uint32_t* first, const std::uint3
   } else {
     test_in_doubles<kind>(g, list, all, undecided, result);
   }
-  // So few that only they are worth it. On every way here, as what follows may have a tolerance: of needles that fly,
-  // one pair in 700 would be a contact there.
+  // For the few undecided candidates only, where it costs little. Asked on every path, because later tests may have a
+  // tolerance: for flying needles, one pair in 700 would be a contact there.
   leave_out_outside<kind, Double>(g, list, undecided, result.counts);
   report_undecided(list, undecided, result);
 }

@@ -24,9 +24,9 @@ std::optional<double> tolerance_contact(const UndecidedPair& q) {
   return a.toc;
 }
 
-// Whether the features are within d at the start. Meshes that rest or slide exactly at their separation are full of
-// such pairs, which no precision decides: integers for one moment take 0.7 us, the search over time 25 us and then
-// integers over time. Most other pairs are told apart in doubles first.
+// Whether the features are within d at the start. Meshes that rest or slide exactly at their separation have many such
+// pairs, which no floating-point precision decides: integers for one time take 0.7 us, the search over time 25 us and
+// then integers over time. Doubles decide most other pairs first.
 template <Kind kind>
 bool within_at_start(const UndecidedPair& q, FallbackCounts& counts) {
   using S = Spans<kind>;

@@ -84,7 +84,7 @@ class DeviceScene {
   }
 
  private:
-  // Devices look pairs up in a table of all of them, where they are not all the same.
+  // Devices look pairs up in a table of all pairs, unless all are the same.
   template <class V, class OfPair>
   std::vector<V> of_all_pairs(OfPair&& of_pair) const {
     std::vector<V> all(std::size_t{n_meshes_} * n_meshes_);
@@ -133,7 +133,7 @@ class DeviceScene {
   const SeparationTable& separations_;
   const u32 n_worlds_;
   std::uint64_t uploaded_ = 0;  // version of the separations there
-  // As of the last update: what was prepared before another change goes on with these.
+  // As of the last update: a detection prepared before a later change keeps using these.
   bool any_separation_ = false, one_separation_ = true;
   double separation_ = 0;
   DeviceBuffer<uint2> edges_;

@@ -28,7 +28,7 @@ struct EdgeSample {
 inline constexpr std::size_t edges_of_a_step = 64;
 
 // The length of a short edge of the scene (EdgeSample::short_one). length(from, to): of the edge between two vertices.
-// `wanted`: edges_of_a_step at most.
+// `wanted`: at most edges_of_a_step.
 template <class Length>
 double short_edge(const std::vector<std::array<std::uint32_t, 2>>& edges, std::size_t wanted, Length&& length) {
   const EdgeSample sample = EdgeSample::of(edges.size(), wanted);

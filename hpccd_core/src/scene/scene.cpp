@@ -96,7 +96,7 @@ void Scene::set_accuracy(std::uint32_t mesh_a, std::uint32_t mesh_b, Accuracy ac
 }
 
 void Scene::set_separation(std::uint32_t mesh_a, std::uint32_t mesh_b, double separation) {
-  const StandardArithmetic arithmetic;  // else a negative denormal may pass
+  const StandardArithmetic arithmetic;  // otherwise a negative denormal number might pass as 0
   const Pair pair = known(mesh_a, mesh_b);
   check_length("separation", separation);
   separation_[pair] = separation;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a scene says of single pairs of meshes, as lists: asking it of all pairs grows with the square of the meshes.
+// Lists the values that were set for single pairs of meshes: asking for all pairs takes the square of the meshes.
 #pragma once
 
 #include "hpccd/hpccd.h"

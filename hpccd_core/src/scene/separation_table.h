@@ -13,18 +13,18 @@
 
 namespace hpccd {
 
-// What it says of all pairs is of those that are tested: the others grow no boxes.
+// Statements about all pairs are about tested pairs only: the others do not grow boxes.
 class SeparationTable {
  public:
   SeparationTable(const Scene& scene, double otherwise);
 
   double of(std::uint32_t mesh_a, std::uint32_t mesh_b) const { return of_.of(mesh_a, mesh_b); }
-  // Of pairs of which nothing was said.
+  // The separation of pairs that were not set.
   double otherwise() const { return of_.otherwise(); }
   // Many may follow each other: what says something of all pairs is as it was until settle().
   void set(std::uint32_t mesh_a, std::uint32_t mesh_b, double separation);
   void settle();
-  // No two states in which a tested pair differs have the same.
+  // Differs between any two states in which a tested pair differs.
   std::uint64_t version() const { return version_; }
   // Tested pairs that were set since the last settle().
   const std::vector<std::array<std::uint32_t, 2>>& changed() const { return changed_; }
@@ -33,7 +33,8 @@ class SeparationTable {
   bool uniform() const { return uniform_; }
   double first() const { return first_; }
   double most() const { return most_; }
-  // f(mesh_a, mesh_b, separation), mesh_a <= mesh_b, for all pairs that differ from otherwise(), and maybe others.
+  // Calls f(mesh_a, mesh_b, separation), mesh_a <= mesh_b, for all pairs that differ from otherwise(), maybe for
+  // others.
   template <class Function>
   void for_pairs(Function&& f) const {
     for (std::uint32_t a = 0; a < largest_.size(); ++a)

@@ -32,7 +32,7 @@ struct BoxesUntil {
   void sort(std::vector<NodePair>&, std::size_t) const {}
 };
 
-// The same where boxes of some pairs of meshes have grown by more than they ask for.
+// The same if boxes of some pairs of meshes have grown by more than their separation requires.
 struct BoxesUntilLessExcess : BoxesUntil {
   bool overlap(const Node& a, const Node& b) const {
     const float excess = search.excess.of(a, b);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// By how much more than their own separation asks for the boxes of two meshes have grown: a mesh's boxes grow by half
-// of the largest separation of its pairs. Where two meshes are known, what overlaps by less than the excess is too far
+// The amount by which the boxes of two meshes have grown beyond half of their own separation each: a mesh's boxes grow
+// by half of the largest separation of its pairs. Boxes of these two meshes that overlap by less than it are too far
 // apart.
 #pragma once
 
@@ -16,17 +16,17 @@ class Excess {
  public:
   // None.
   Excess() = default;
-  // None where all pairs have one separation, and where gaps of the scene are shortened (squeezed_axis.h): there boxes
-  // have grown by less than they ask for. Both must stay as they are.
+  // There is none if all pairs have one separation, and if gaps of the scene are shortened (squeezed_axis.h): then
+  // boxes have grown by less than their separation. Both arguments must not change.
   Excess(const MotionBounds& motion, const SeparationTable& separations) {
     if (!motion.grown || separations.uniform() || !motion.squeezed.empty()) return;
     motion_ = &motion, separations_ = separations.of_pairs();
   }
 
   bool any() const { return motion_; }
-  // In coordinates of the boxes, rounded down. These lie within 6.25 and were rounded to floats, as are they less the
-  // excess: 7.2e-7 at most. Of one mesh it is less than the box of a vertex is wide, so that a vertex that two leaves
-  // share stays near both.
+  // In coordinates of the boxes, rounded down. Coordinates lie within 6.25 and were rounded to floats, and so are their
+  // differences from the excess: by 7.2e-7 at most. Within one mesh it is less than the width of the box of a vertex,
+  // so that a vertex shared by two leaves stays near both.
   float of(std::uint32_t mesh_a, std::uint32_t mesh_b) const {
     if (mesh_a == mixed_meshes || mesh_b == mixed_meshes) return 0;
     const double grown_by = motion_->margin_of_mesh(mesh_a) + motion_->margin_of_mesh(mesh_b);

@@ -16,7 +16,7 @@ using V = Vec3<double>;
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
-// Squares that overflow or vanish say that boxes are near.
+// If squares overflow or underflow, boxes count as near.
 template <class Box>
 double square_between(const Box& a, const Box& b) {
   double square = 0;
@@ -30,7 +30,7 @@ double square_between(const Box& a, const Box& b) {
 // Gaps, their squares and the sum are rounded.
 bool certainly_farther(double square, double distance) { return square * (1 - 1e-14) > distance * distance; }
 
-// Where the corners of a leaf are, from a point near it on.
+// Positions of the corners of a leaf, relative to a point near it.
 struct LeafCorners {
   std::array<V, CornersOf::most_corners> at;
   std::uint32_t n;
@@ -50,8 +50,8 @@ struct LeafCorners {
   }
 };
 
-// Along which two leaves are far apart (Gilbert 1966, as in leaf_hulls.cpp): a unit vector from a to b, or zero where
-// they may touch.
+// The direction along which two leaves are far apart (Gilbert 1966, as in leaf_hulls.cpp): a unit vector from a to b,
+// or zero if they may touch.
 struct Direction {
   V along{0, 0, 0};
   bool apart = false;  // by more than the distance
@@ -141,7 +141,7 @@ void add(CandidateBuffer& out, std::uint32_t first, std::uint32_t second) {
 
 FineBoxes::FineBoxes(const Tree& tree, const MotionBounds& snapshot)
     : tree_(tree), snapshot_(snapshot), nodes_(tree.nodes.size()) {
-  for (std::size_t i = tree.nodes.size(); i-- > 0;) {  // children come after their parents
+  for (std::size_t i = tree.nodes.size(); i-- > 0;) {  // children are after their parents
     Bounds& box = nodes_[i] = {{infinity, infinity, infinity}, {-infinity, -infinity, -infinity}};
     const auto include = [&](const double* low, const double* high) {
       for (int k = 0; k < 3; ++k)
@@ -171,7 +171,7 @@ void FineBoxes::add_near(const LeafRange& a, const LeafRange& b, double distance
   const bool same = &a == &b;
   const Bounds& box = nodes_[tree_.leaf_nodes[static_cast<std::size_t>(&a - tree_.leaves.data())]];
   const LeafCorners corners_a(tree_, snapshot_, a, box.low), corners_b(tree_, snapshot_, b, box.low);
-  // Differences of coordinates, products with a unit vector and their sums: each is off by 1.1e-16 of what it is.
+  // Differences of coordinates, products with a unit vector and their sums: each has a relative error of 1.1e-16.
   const double reach = distance * (1 + 1e-14) + 4e-15 * (corners_a.largest + corners_b.largest);
   const Direction direction = same ? Direction() : direction_between(corners_a, corners_b, reach);
   if (direction.apart) return;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Boxes and candidates in double precision, for smallest distances in a scene whose features are so small beside it
-// that floats hardly tell them apart (MotionBounds::spread). Two bodies of size 1 that are 1e7 apart have one distance
-// in floats, whichever of their features are looked at.
+// Boxes and candidates in double precision, for smallest distances in a scene whose features are so small that floats
+// hardly distinguish them (MotionBounds::spread). For two bodies of size 1 that are 1e7 apart, all pairs of features
+// have the same distance in floats.
 #pragma once
 
 #include <vector>

@@ -76,11 +76,11 @@ struct Until {
   }
 };
 
-// Through the whole motion, where boxes of two meshes have grown by more than they ask for (traverse/excess.h): those
-// of the corners shrink again.
+// For the whole motion, if boxes of two meshes have grown by more than their separation requires (traverse/excess.h):
+// the boxes of the corners shrink again.
 struct LessExcess : BothEnds {
   static constexpr bool grows = true;
-  static constexpr bool only_grown = true;  // where none has there is no excess
+  static constexpr bool only_grown = true;  // without grown boxes there is no excess
   float excess;
   HPCCD_HD void grow(Corners& c) const {
     for (std::uint32_t row = 0; row < Tree::coordinates; ++row)

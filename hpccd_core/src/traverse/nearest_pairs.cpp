@@ -11,8 +11,8 @@
 namespace hpccd {
 namespace {
 
-// By how much the test may report a pair beyond its distance (proximity_test.h), and its margins, relative to the
-// pair's size. With less, which of two pairs is found would depend on which came first.
+// The relative amount by which the test may report a pair beyond its distance (proximity_test.h), including its
+// margins. With less, the order of the pairs would decide which of two is found.
 constexpr double test_rounding = distance_radius + 1e-14;
 
 }  // namespace
@@ -36,8 +36,8 @@ NearestPairs::NearestPairs(const MeshPairs& pairs, const Features& features, con
       fine_(motion.spread ? std::make_unique<FineBoxes>(tree, motion) : nullptr),
       scale_(motion.box_scale),
       sums_(motion.box_rounding),
-      // Of a pair as large as the scene: mapped coordinates lie within 2.25 of zero, so p, a and b together are
-      // below 14.
+      // For a pair as large as the scene: mapped coordinates are within 2.25 of zero, so the sum of p, a and b is below
+      // 14.
       rounding_(14 * test_rounding / motion.map.scale) {
   for (std::size_t i = tree.nodes.size(); i-- > 0;) {  // children come after their parents
     const Node& node = tree.nodes[i];
@@ -79,7 +79,7 @@ void NearestPairs::begin(std::uint32_t a, std::uint32_t b) {
   limit(entry, distance * (1 + 1e-14) + 2 * rounding(mesh_a, mesh_b));
 }
 
-// In a scene that is far larger than two meshes, of a pair as large as both of them.
+// For a pair as large as its two meshes, in a scene that is far larger than both.
 double NearestPairs::rounding(std::uint32_t mesh_a, std::uint32_t mesh_b) const {
   if (!fine_) return rounding_;
   Extent both = motion_.extent_of_mesh(mesh_a);
@@ -92,7 +92,7 @@ double NearestPairs::rounding(std::uint32_t mesh_a, std::uint32_t mesh_b) const 
 void NearestPairs::limit(Entry& entry, double limit) {
   if (!(limit < entry.limit.load(std::memory_order_relaxed))) return;
   entry.limit.store(limit, std::memory_order_relaxed);
-  // A float, where fine boxes count in its place.
+  // Rounded to a float, unless fine boxes are used.
   entry.reach.store(reach_of(std::min(limit, 1e30 / scale_), sums_, scale_), std::memory_order_relaxed);
 }
 

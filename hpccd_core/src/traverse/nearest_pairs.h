@@ -47,7 +47,7 @@ class NearestPairs {
     if (mesh_a == mixed_meshes || mesh_b == mixed_meshes) return true;
     return least_edge(a, b) <= at(mesh_a, mesh_b).piercing_edge.load(std::memory_order_relaxed);
   }
-  // In double precision, where floats hardly tell features apart; null: they do.
+  // In double precision, if floats hardly distinguish features; otherwise null.
   const FineBoxes* fine() const { return fine_.get(); }
   // The lowest number of an edge in either.
   std::uint32_t least_edge(std::uint32_t a, std::uint32_t b) const { return std::min(least_edge_[a], least_edge_[b]); }

@@ -30,7 +30,7 @@ struct PartOfMotion {
 struct Search {
   Geometry geometry;
   BlockPairs block_pairs = nullptr;
-  // Of two meshes whose boxes have grown by more than they ask for: how much, and which pairs are left then.
+  // For two meshes whose boxes have grown by more than their separation requires: by how much, and the pairs left.
   Excess excess;
   BlockPairsLessExcess block_pairs_less_excess = nullptr;
   LeafPairsLessExcess leaf_pairs_less_excess = nullptr;

@@ -151,7 +151,7 @@ void Worker::resolve(const Candidate& candidate, Rule rule, double apart_until) 
   if (const auto value = search_->fallback[rule.number()](rule.accuracy, pair, count)) report(kind, {a, b, *value});
 }
 
-// Of the smallest distance so far, or a separation.
+// Bound by the smallest distance so far, or by a separation.
 double Worker::limit_of(std::uint32_t first, std::uint32_t second, Kind kind) const {
   if (const NearestPairs* nearest = search_->nearest.get()) {
     const auto [a, b] = meshes_of(*nearest, search_->geometry, kind, first, second);

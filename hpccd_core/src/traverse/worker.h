@@ -29,7 +29,7 @@ inline constexpr std::uint32_t first_batch = 64, first_batches = 32;
 class alignas(128) Worker {
  public:
   void begin(Search& search);
-  // One of several tasks whose findings do not hang on those before: nothing waits, batches are small at first.
+  // One of several tasks whose results do not depend on earlier ones: batches start empty, and are small at first.
   void begin_task();
   // Tests candidates by the rule, sooner or later: add(edge_edge, vertex_face) appends at most
   // CandidateBuffer::most_per_call pairs to each.
@@ -99,12 +99,12 @@ class alignas(128) Worker {
   std::unique_ptr<CandidateBuffer> edge_faces_;
   std::unique_ptr<BatchResult> result_;
   std::uint32_t first_batches_ = 0;
-  // In the search for any contact, which ends with the first batch that has one; and for nearest pairs: small where the
-  // last batch had a nearer one, after which there is less to test.
+  // For the search for any contact, which ends with the first batch that has one, and for nearest pairs: small if the
+  // last batch had a nearer pair, after which there is less to test.
   bool grows_batches_ = false;
   std::uint32_t growing_batch_ = first_batch;
   bool nearer_ = false, boxes_leave_much_ = false;
-  std::vector<double> limits_;  // of the batch, where they are not in a table
+  std::vector<double> limits_;  // of the candidates of a batch, if they are not in a table
 };
 
 }  // namespace hpccd

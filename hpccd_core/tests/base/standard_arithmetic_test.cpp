@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Answers do not depend on the floating-point mode of the calling thread, which is as before afterwards.
+// Results do not depend on the floating-point mode of the calling thread, which is restored afterwards.
 #include "base/standard_arithmetic.h"
 
 #include <gtest/gtest.h>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Tests that begin in single precision, from rounded coordinates: never a contact less, or at another time, than in
 // double precision alone, and of the tier that ends there few wrong answers, the same with every instruction set.
-// Which of the two a step begins with depends on the backend, so no tier that promises equal results may show it.
+// The backend decides with which of the two a step begins, so tiers that promise equal results must not depend on it.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -66,7 +66,7 @@ struct Pairs {
     return exact::earliest_contact(kind, q.t0, q.t1);
   }
 
-  // Needles that fly: squeezed by these factors at first, then each corner goes its own way.
+  // Flying needles: squeezed by these factors at first, then each corner moves independently.
   void make_needles(std::array<double, 3> squeeze, unsigned seed) {
     std::mt19937 random(seed);
     std::normal_distribution<double> normal;
@@ -142,8 +142,8 @@ INSTANTIATE_TEST_SUITE_P(Lengths, Rounded,
                          testing::Combine(testing::Values(Kind::vertex_face, Kind::edge_edge),
                                           testing::Values(1e-5, 1e-3, 1e-2, 1.0), testing::Bool()));
 
-// Of these needles one pair in 700 is so near to touching that a tolerance calls it a contact, though a filter can
-// prove it apart. So each way has to ask the same filters.
+// One pair in 700 of these needles is so close to touching that a tolerance calls it a contact, though a filter can
+// prove it apart. So every path has to ask the same filters.
 TEST(Balanced, AnswersTheSameWithAndWithoutSinglePrecision) {
   for (const Kind kind : {Kind::vertex_face, Kind::edge_edge}) {
     for (unsigned seed = 1; seed <= 12; ++seed) {

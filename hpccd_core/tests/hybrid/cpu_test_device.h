@@ -19,8 +19,8 @@
 
 namespace hpccd::test {
 
-// How the device misbehaves: throws at the n-th call of a kind, or lets nothing finish before it is told to; and what
-// it has seen.
+// How the device misbehaves: it throws at the n-th call of a kind, or finishes nothing until allowed to; and what it
+// has seen.
 struct DeviceFaults {
   std::atomic<int> submits_before_failure{-1};  // -1: never
   std::atomic<bool> fails_at_begin{false};

@@ -103,7 +103,7 @@ TEST(SeparationTable, LargestOfEachMeshCoversAllItsPairs) {
   EXPECT_EQ(table.largest(), (std::vector<double>{0.5, 3, 3, 0.5}));
 }
 
-// Pairs that are never tested grow no boxes and forget nothing.
+// Pairs that are never tested grow no boxes and invalidate nothing.
 TEST(SeparationTable, OfPairsThatAreNeverTestedSaysNothing) {
   Scene scene = scene_of(3);
   scene.add_mesh("table", std::vector<std::uint32_t>{0, 1, 2}, 3, {.is_static = true});
@@ -124,7 +124,7 @@ TEST(SeparationTable, OfPairsThatAreNeverTestedSaysNothing) {
   EXPECT_EQ(table.version(), version);
 }
 
-// Beyond PairTable::most_in_table meshes only what was said is kept.
+// Beyond PairTable::most_in_table meshes only pairs that were set are stored.
 TEST(SeparationTable, OfManyMeshesSaysTheSame) {
   constexpr std::uint32_t n = PairTable<double>::most_in_table + 20;
   Scene scene = scene_of(n);

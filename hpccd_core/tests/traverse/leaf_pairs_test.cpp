@@ -141,7 +141,7 @@ TEST_P(LeafPairsTest, AreThoseThatOverlapAndShareNoVertex) {
   EXPECT_GT(vertex_face, GetParam().of == Of::ropes ? 200u : 500u);
 }
 
-// Of boxes that have grown by more than was asked for: what overlaps by less is left out, and nothing else.
+// Boxes that have grown by more than required: exactly the pairs that overlap by less than the excess are left out.
 TEST_P(LeafPairsTest, AreThoseThatOverlapByMoreThanTheExcess) {
   if (GetParam().separation == 0) GTEST_SKIP() << "no box has grown";
   constexpr float by = 0.1f, lost = 1e-5f;
@@ -242,7 +242,7 @@ TEST_P(BlockPairsTest, AreTheLeavesThatOverlapByMoreThanTheExcess) {
   }
 }
 
-// Boxes and k-DOPs grow with the separation: those of a motion before, with another one, say nothing.
+// Boxes and k-DOPs grow with the separation: those of an earlier motion with another separation are invalid.
 TEST_P(BlockPairsTest, AreThoseOfTheLastBounds) {
   for (const double separation : {0.4, 0.0, 0.2, 0.1, 0.0}) {
     for (auto* end : {&last, &first}) {

@@ -15,8 +15,8 @@ struct Separations {
   const std::uint32_t* mesh_of_vertex = nullptr;
   std::uint32_t n_meshes = 0;
   const double* of_candidates = nullptr;  // of a batch
-  // Of many meshes, in place of the table. A batch then brings those of its candidates: looked up in the lanes' own
-  // code, they cost every batch of distances a tenth.
+  // For many meshes, in place of the table: a batch passes the separations of its candidates. Looking them up in the
+  // code of the lanes would cost every batch of distances a tenth.
   PairValues<double> of_pairs = {};
 
   // Of two features by one vertex of each.

@@ -19,7 +19,7 @@ struct Nearest {
 };
 
 // Of parallel edges side by side: the middle of the stretch that they share. Each coordinate of the points is off by a
-// few roundings of the vertices' coordinates. parallel: the edges are known to be, whatever rounding did to q.
+// few roundings of the vertices' coordinates. parallel: the edges are known to be parallel, whatever rounding did to q.
 Nearest nearest(Kind kind, const Vec3<double> q[4], bool parallel = false);
 
 }  // namespace hpccd::exact

@@ -10,7 +10,7 @@ namespace {
 
 using V = Vec3<double>;
 
-// Squares may overflow and underflow, lengths do not.
+// Squares may overflow and underflow, but lengths do not.
 struct Length {
   V unit;
   double length;
@@ -25,7 +25,7 @@ struct Length {
   }
 };
 
-// Of x 2^exponent.
+// Length and direction of x 2^exponent.
 Length length_of(const Vector<Big>& x, int exponent) {
   double fraction[3];
   int e[3], most = std::numeric_limits<int>::min();
@@ -58,19 +58,19 @@ struct BinaryTime {
 };
 
 // The gap at one time, between the parts of the features that are nearest then: point and face, two lines, point and
-// line, or two points. While the places on them stay inside the parts, it changes by `velocity` alone, and by how the
-// parts turn. Times are parts of the step.
+// line, or two points. While the nearest places stay inside these parts, it changes only by `velocity` and by the
+// rotation of the parts. Times are fractions of the step.
 struct Gap {
   double length;
   V direction;
   Length velocity;
-  bool stands_on_normal = false;  // of a face or of two lines, wherever on them: then it turns as they do
-  double turning = 0;             // of the parts, in radians, at most
-  double sliding = 0, room = 0;   // of the places, at most; and to the next border; lengths of the parts
-  double sum_of_steps = 0;        // of which the velocity is a difference
+  bool stands_on_normal = false;  // it is along the normal of a face or of two lines, and rotates with them
+  double turning = 0;             // bound on the rotation of the parts, in radians
+  double sliding = 0, room = 0;   // bound on the motion of the places, and to the next border, in lengths of the parts
+  double sum_of_steps = 0;        // sum of the lengths of the motions, of which the velocity is a difference
 };
 
-// Features that move, in units of 2^low.
+// Moving features, in units of 2^low.
 class Moving {
  public:
   Moving(Kind kind, const V q_t0[4], const V q_t1[4]) : start_{kind, {}}, step_{kind, {}} {
@@ -122,7 +122,7 @@ class Moving {
     gap.sum_of_steps = Length(vector_of(dp, low_)).length + da_.length + db_.length;
     return gap;
   }
-  // From the first feature's side to the second's, as edges have it; from the face to the vertex.
+  // From edge a to edge b, or from the face to the vertex.
   double orientation(int point) const { return start_.kind == Kind::edge_edge && point < 2 ? -1 : 1; }
 
   Gap beside_line(const Resting<Big>& now, const Place& place, int unit) const {
@@ -155,7 +155,7 @@ class Moving {
   int low_;
 };
 
-// How long until the gap has shrunk to d, were its velocity constant; or until it is shortest. At most a whole step.
+// The time until the gap has shrunk to d, or until it is shortest, if its velocity were constant. At most a whole step.
 double time_until(const Gap& gap, double d) {
   const V& g = gap.direction;
   const V& v = gap.velocity.unit;
@@ -172,7 +172,7 @@ Vec3<double> direction_of_gap(Kind kind, const V q_t0[4], const V q_t1[4], doubl
   BinaryTime t;
   t.advance(toc);
   V direction{0, 0, 0};
-  // Each turn gains 40 bits of the gap: as many as doubles have exponents, and some that curved ways take.
+  // Each iteration gains 40 bits of the gap: enough for all exponents of doubles, and more for curved paths.
   constexpr int most_turns = 60;
   for (int i = 0; i < most_turns; ++i) {
     const Gap gap = motion.gap_at(t);
@@ -180,12 +180,12 @@ Vec3<double> direction_of_gap(Kind kind, const V q_t0[4], const V q_t1[4], doubl
     direction = gap.direction;
     if (!(gap.length > d) || !(gap.velocity.length > 0)) break;
     const double rest = time_until(gap, d), turning = rest * gap.turning;
-    // What is left to go changes the direction by no more than that: where the gap stands on a face or on two lines,
-    // as these turn; else as its ends move beside its length.
+    // The remaining motion changes the direction by no more than this: if the gap is along a normal, by the rotation of
+    // the parts; otherwise by the motion of its ends relative to its length.
     constexpr double enough = 1e-9;
     const bool stays = gap.stands_on_normal && 2 * rest * gap.sliding < gap.room;
     if (turning < enough && (stays || gap.sum_of_steps * rest < enough * gap.length)) break;
-    // Never beyond the time that is sought: there the gap may open to the other side.
+    // Never beyond the time sought: after it the gap may open to the other side.
     const double error = 0x1p-40 + 2 * turning + 0x1p-48 * gap.sum_of_steps / gap.velocity.length;
     t.advance(rest * (error < 0.5 ? 1 - error : 0.5));
   }

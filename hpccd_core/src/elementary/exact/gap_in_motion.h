@@ -1,15 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// The gap between two features on their way, from the motion as it was given: positions at one time are rounded, and a
-// short gap between them is mostly rounding.
+// The gap between two moving features, computed from the motion as given: positions at one time are rounded, and a
+// short gap between rounded positions is mostly rounding.
 #pragma once
 
 #include "elementary/motion.h"
 
 namespace hpccd::exact {
 
-// The direction of the gap at the time at which the features come within d > 0 of each other, which is `toc` or later
-// by the rounding of toc: of unit length, from face to vertex or from edge a to edge b. Zero where they touch at toc.
-// q[0..3] as in motion.h, finite.
+// The unit direction of the gap, from face to vertex or from edge a to edge b, when the features come within d > 0 of
+// each other: at `toc`, or later by its rounding. Zero if they touch at toc. q[0..3] as in motion.h, finite.
 Vec3<double> direction_of_gap(Kind kind, const Vec3<double> q_t0[4], const Vec3<double> q_t1[4], double toc, double d);
 
 // Whether two edges are parallel at all times.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The nearest of the parts of two features at rest (resting.h): where it is, and how far apart they are.
+// The nearest parts of two features at rest (resting.h): their places, and their distance.
 #pragma once
 
 #include <cmath>
@@ -12,7 +12,7 @@ namespace hpccd::exact {
 // sqrt(num / den) 2^low, rounded.
 inline double root_of_ratio(const Big& num, const Big& den, int low) {
   if (num.is_zero()) return 0;
-  // Bits of the ratio: twice those of its root, which has more than a double.
+  // Bits of the ratio: twice as many as its root needs, which has more than a double.
   constexpr int bits = 124;
   int scale = bits - (highest_bit(num) - highest_bit(den));
   scale += scale % 2 != 0;
@@ -21,7 +21,7 @@ inline double root_of_ratio(const Big& num, const Big& den, int low) {
   return root > 0 ? root : std::numeric_limits<double>::denorm_min();
 }
 
-// x / y, rounded twice or so; y > 0.
+// x / y, rounded about twice; y > 0.
 template <class X, class Y>
 double ratio(const X& x, const Y& y) {
   int ex, ey;
@@ -29,7 +29,7 @@ double ratio(const X& x, const Y& y) {
   return sign(x) * std::ldexp(fraction, std::max(ex - ey, -2000));
 }
 
-// p = alpha a + beta b (motion.h) for nearest points inside; else a point and a place on a segment.
+// p = alpha a + beta b (motion.h) for nearest points inside; otherwise a point and a place on a segment.
 struct Place {
   enum { inside, on_segment, at_end } where = at_end;
   double alpha = 0, beta = 0;
@@ -37,7 +37,7 @@ struct Place {
   double along = 0;  // 0 at the segment's start, 1 at its end
 };
 
-// The least of the squared distances.
+// The smallest squared distance.
 template <class Z>
 struct Least {
   using Square = decltype(Z() * Z());
