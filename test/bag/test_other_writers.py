@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""MCAP files as other programs write them: whatever an independent reader finds in them, ours finds, and `hpccd doctor`
-and `hpccd replay` agree with it."""
+"""MCAP files as other programs write them: our reader finds everything that an independent reader finds, and
+`hpccd doctor` and `hpccd replay` agree with it."""
 
 import dataclasses
 import os
@@ -31,7 +31,7 @@ def bag(sound_bags):
 
 
 def _library(**options):
-    """As the library writes that most programs in Python use."""
+    """Write with the library that most Python programs use."""
     options = {"chunk_size": 20_000, **options}
 
     def write(bag, path):
@@ -53,7 +53,7 @@ def _library(**options):
 
 
 def _records(**changes):
-    """As other libraries may: what the format allows, and the one above has no option for."""
+    """Write what the format allows but the library above has no option for."""
     return lambda bag, path: dataclasses.replace(bag, **changes).write(path)
 
 
@@ -199,7 +199,7 @@ def test_recordings_without_a_message_of_ros_2(bag, tmp_path):
 
 
 def test_messages_before_their_channel_is_described(bag, tmp_path):
-    """Without an index nothing says what they are."""
+    """Without an index these messages are not described."""
     bag = dataclasses.replace(bag, chunk_bytes=0, summary=False)
     bag.data = lambda records: [records[0], records[-1], *records[1:-1]]
     path = bag.write(tmp_path / "x.mcap")
@@ -246,7 +246,7 @@ def _row(message):
 
 
 def _by_the_library(path):
-    """What messages of ROS 2 the library finds, record by record, in the order of time."""
+    """The ROS 2 messages that the library finds, record by record, in the order of time."""
     with open(path, "rb") as stream:
         found = [
             (channel.topic, message.log_time, message.data)

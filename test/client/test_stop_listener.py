@@ -168,8 +168,8 @@ def test_system_time_that_jumps(place, monkeypatch):
 
 
 def test_an_old_word_is_old_however_late_it_is_heard(place, monkeypatch):
-    """Of a listener that came late, for which DDS kept the last word, and of a process that was held up: what counts is
-    when it was sent."""
+    """A listener that starts late and receives the latched message, and a process that was suspended: the time at which
+    a message was sent counts."""
     speaker = place.speaker()
     first = place.listener()
     place.until(lambda: not first.stop, "false")

@@ -181,13 +181,13 @@ def squared_distance_to_triangle(x, corners):
 
 
 def positions(query, t):
-    """Of the four points at time t, in rationals."""
+    """Positions of the four points at time t, in rationals."""
     q, t = _rational(query), Fraction(t)
     return [[(1 - t) * c + t * d for c, d in zip(q[i], q[i + 4], strict=True)] for i in range(4)]
 
 
 def gap(kind, now):
-    """The vector from face to vertex or from edge a to edge b between their nearest points; now: as of positions()."""
+    """The vector from face to vertex or from edge a to edge b between their nearest points; now: from positions()."""
     if kind == VERTEX_FACE:
         return _from_triangle(now[0], now[1:])
     a0, a1, b0, b1 = now
@@ -209,8 +209,8 @@ def unit(vector):
 
 
 def direction_of_gap(kind, query, d, toc, touching):
-    """At the first time at which the gap is as short as d, of which toc is the time rounded down; they touch, to d, at
-    the other time."""
+    """The direction of the gap when it is first as short as d: at toc, or later by rounding. At `touching` they are
+    within d."""
 
     def within(t):
         between = gap(kind, positions(query, t))

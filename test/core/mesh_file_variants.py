@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Mesh files as programs write them, each with what it holds: (name of the file, bytes, vertices, polygons).
+"""Mesh files as programs write them, with their content: (name of the file, bytes, vertices, polygons).
 
-What a file holds is not read from it: it is what the file was made of.
+The content is not read from the files: the files are made from it.
 """
 
 import itertools

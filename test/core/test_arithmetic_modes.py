@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What other libraries set of a thread's floating-point arithmetic changes no answer, and stays as they set it."""
+"""The floating-point mode that another library has set in a thread changes no result, and is restored afterwards."""
 
 import contextlib
 import ctypes
@@ -99,7 +99,7 @@ def two_triangles():
 
 @pytest.mark.parametrize("mode", MODES)
 def test_lengths_of_another_type(mode):
-    """They become float64 before the core sees them."""
+    """Lengths become float64 before the core gets them."""
     there = np.vstack([FLAT, FLAT + [0, 0, 2e-45]])
 
     def answers():

@@ -110,7 +110,7 @@ def test_polygons_that_are_not_convex_are_split(load):
 
 
 def test_what_a_mesh_looks_like_is_no_matter(load):
-    """Its images, effects and materials need not be there."""
+    """Its images, effects and materials may be missing."""
     bound = (
         '<node><instance_geometry url="#g"><bind_material><technique_common>'
         '<instance_material symbol="m" target="#nowhere"/></technique_common></bind_material></instance_geometry>'
@@ -161,12 +161,12 @@ ENTITIES = '<?xml version="1.0"?><!DOCTYPE x [<!ENTITY a "aaaaaaaaaa">' + "".joi
         (dae(nodes='<node><instance_geometry url="#nowhere"/></node>'), "m.dae: cannot be read"),
         (dae(nodes='<node id="a"><instance_node url="#a"/></node>'), "m.dae"),
         (dae(more=bomb(), nodes='<node><instance_node url="#n0"/></node>'), "more than 100000 nodes; export it flat"),
-        (dae(nodes='<node><instance_controller url="#c"/></node>'), "a skeleton or morph moves"),
+        (dae(nodes='<node><instance_controller url="#c"/></node>'), "moved by a skeleton or morph"),
         (dae().replace("<scene>", "<!--").replace("</scene>", "-->"), "has no scene; export it again"),
         (dae(vertices=np.where(VERTICES == 7, np.nan, VERTICES)), "a position that is not finite"),
         (dae(primitives=HOLE + triangles()), "polygons with holes"),
         (dae(primitives=TWO_LISTS), "several lists"),
-        (dae(primitives=triangles().replace('count="2"', 'count="3"')), "says 3 triangles and holds 2"),
+        (dae(primitives=triangles().replace('count="2"', 'count="3"')), "declares 3 triangles but contains 2"),
         (dae(primitives=triangles([[0, 1, 2**32 + 2]])), "a number that is too large"),
         (dae().replace('count="18"', 'count="21"'), "declares 21 numbers but contains 18"),
         (dae().replace('stride="3"', 'stride="6"'), "has other numbers between its positions"),

@@ -29,7 +29,7 @@ def ordinary(queries):
 
 
 def squeezed(queries):
-    """Needles and slivers, and short ways."""
+    """Needles and slivers, and short motions."""
     return queries * np.random.default_rng(2).choice([1, 1e-2, 1e-4], (len(queries), 1, 3))
 
 
@@ -54,7 +54,7 @@ def test_normals_of_features_that_pass_through_each_other(kind, change):
         relative = SEPARATIONS[i % len(SEPARATIONS)]
         d = max(relative * size, 5e-324)
         if relative < 1e-10:
-            # Then the gap is as long as d just before they touch, on the insides of both, but for a chance of 1e-10.
+            # The gap is as long as d just before they touch, in the interior of both, except by a chance of 1e-10.
             expected, tolerance = exact_geometry.normal_before_contact(kind, query, at), 1e-6
         else:
             before = TEST[kind](query[None], minimum_separation=d)[1][0]
@@ -134,7 +134,7 @@ def test_normals_of_features_that_pass_beside_each_other(exponent, offset, heigh
 
 @KINDS
 def test_normals_of_short_gaps_at_the_start(kind):
-    # Rounded points would be as far off as the gap is long.
+    # The rounding of points is as large as the gap.
     rng = np.random.default_rng(2)
     for exponent in (-45, -50, -51):
         for _ in range(20):
@@ -154,7 +154,7 @@ def test_normals_of_short_gaps_at_the_start(kind):
 
 @KINDS
 def test_normals_of_denormal_gaps(kind):
-    """Positions between whole multiples of 2^-1074 are rounded to them: by as much as these gaps are long."""
+    """Positions are rounded to multiples of 2^-1074, which is as much as the length of these gaps."""
     queries = np.random.default_rng(5).integers(-20, 21, (400, 8, 3)).astype(float)
     near = queries[TEST[kind](queries, minimum_separation=1.0)[0]]
     assert len(near) > 30
@@ -171,7 +171,7 @@ def test_what_touches_at_the_start_has_the_normal_of_plain_contact():
 
 
 def side_by_side(rng, n):
-    """Edges from 0 to 4 and from 1 to 7 along one direction, that pass through each other."""
+    """Edges from 0 to 4 and from 1 to 7 along one direction that pass through each other."""
     found = []
     while len(found) < n:
         u, v = rng.integers(-5, 6, (2, 3)).astype(float)

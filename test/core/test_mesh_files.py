@@ -174,7 +174,7 @@ def test_corners_that_repeat_stay(load, direction):
 
 
 def test_the_triangles_of_a_polygon_that_is_not_convex_stay_the_same(load):
-    """Recordings name triangles by their numbers: a version of mapbox_earcut that splits otherwise must not pass."""
+    """Recordings name triangles by their numbers: a version of mapbox_earcut that splits differently must not pass."""
     _, faces = load("m.obj", (variants._v(ELL) + variants._f([range(6)])).encode())
     assert faces.tolist() == [[4, 5, 0], [4, 0, 1], [4, 1, 2], [4, 2, 3]]
 
@@ -294,7 +294,7 @@ def test_any_torn_ply_is_read_or_refused(load, form):
             vertices, faces = load("m.ply", data[:length])
         except hc.MeshFileError:
             continue
-        # Text may end within the last number, of a property that is no matter.
+        # Text may end within the last number, which belongs to a property that is ignored.
         assert form == "ascii" and np.array_equal(vertices, whole[0]) and np.array_equal(faces, whole[1])
 
 
@@ -379,7 +379,7 @@ def test_the_example_of_the_documentation_runs():
 
 
 def test_welding_lets_other_threads_go_on():
-    """The longest time for which another thread does not get to run is a small part of the whole, in CPU time."""
+    """The longest time for which another thread cannot run is a small part of the whole, in CPU time."""
     n = 400
     grid = np.stack(np.meshgrid(np.arange(n) * 0.01, np.arange(n) * 0.01, [0.5]), axis=-1).reshape(-1, 3)
     points = np.random.default_rng(3).permutation(np.repeat(grid, 6, axis=0))

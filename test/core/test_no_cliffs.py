@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a scene costs follows from what is tested in it: counted in pairs, tests and bytes, never in time."""
+"""The cost of a scene depends on what is tested in it: counted in pairs, tests and bytes, never in time."""
 
 import numpy as np
 import pytest
@@ -143,7 +143,7 @@ def contacts_of(found, scene, offsets):
 
 @pytest.mark.parametrize("slides", [False, True])
 def test_at_rest_exactly_at_the_separation(slides):
-    """Decided by one look at the start, in place of a search over time with 106 bits and then with integers."""
+    """Decided by one test at the start, in place of a search over time with 106 bits and then with integers."""
     x, faces = grid(12, 0.5)
     scene = hc.Scene()
     for name in ("a", "b"):
@@ -208,7 +208,7 @@ def test_bytes_of_many_meshes_grow_with_their_number():
 
 @pytest.mark.parametrize("n", [40, 260])
 def test_pairs_of_few_and_of_many_meshes_mean_the_same(n):
-    """Up to 256 meshes there is a table of all pairs, beyond a list of those of which something was said."""
+    """Up to 256 meshes there is a table of all pairs, beyond that a list of those that were set."""
     rng = np.random.default_rng(n)
     faces, x = tetrahedra(n, rng)
     start, end = x, x + np.repeat(rng.uniform(-0.4, 0.4, (n, 1, 3)), 4, axis=1).reshape(-1, 3)

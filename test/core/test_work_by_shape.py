@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How much is tested does not depend on where a scene's parts are and how they are turned: counts of the work, beside
-those of an ordinary scene of the same size."""
+"""The number of tests does not depend on where a scene's parts are and how they are rotated: counts of the work,
+relative to an ordinary scene of the same size."""
 
 import numpy as np
 import pytest
@@ -93,7 +93,7 @@ def test_bars_may_be_slanted(query, direction):
 
 @pytest.mark.parametrize("direction", OCTANTS)
 def test_bars_with_a_separation_may_be_slanted(direction):
-    """Beside all pairs of bars: of upright ones, whose boxes touch exactly or not at all, none is tested."""
+    """Relative to all pairs of bars: none is tested for upright ones, whose boxes touch exactly or not at all."""
     scene, x = bundle(direction)
     assert cost("separation", scene, x) < 0.15 * (len(x) / 2) ** 2 / 2
 

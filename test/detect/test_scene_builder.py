@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which pairs of meshes a scene tests. What finding them costs grows with the pairs, not with the pairs times names."""
+"""Which pairs of meshes a scene tests. Finding them takes time in proportion to pairs, not to pairs times names."""
 
 from itertools import combinations
 
@@ -51,7 +51,7 @@ def test_the_tested_pairs_are_those_of_rigid_meshes_and_the_others(seed):
 
 
 class CountedName(str):
-    """Counts how often such a name is hashed or compared: that is what looking it up costs."""
+    """Counts how often such a name is hashed or compared, which is the cost of looking it up."""
 
     looked_at = 0
 
@@ -66,7 +66,7 @@ class CountedName(str):
 
 @pytest.mark.parametrize("work", ["build", "tested_pairs", "of_rigid_pairs", "of_other_pairs", "among"])
 def test_names_are_looked_at_a_few_times_a_pair_however_many_there_are(work):
-    """Links fixed to one base: each pair is ignored. 1,000 of them took 20 s, in which nothing else went on."""
+    """Links fixed to one base: each pair is ignored. 1,000 of them took 20 s, which blocked everything else."""
 
     def cost(links):
         meshes = tuple(MeshSettings(CountedName(f"arm/{k}"), self_collision=False, input=JOINTS) for k in range(links))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""When the messages were sent from which a frame of the scene is known: the oldest of each mesh counts."""
+"""When the messages of a frame of the scene were sent: the oldest one of each mesh counts."""
 
 import numpy as np
 import pytest
@@ -71,7 +71,7 @@ def test_transforms_count_and_static_ones_have_no_age():
 
 @pytest.mark.parametrize("child", ["camera", None])
 def test_an_older_static_transform_that_comes_after_a_rejected_one(child, monkeypatch):
-    """Nothing orders what two publishers send; whether the frame was known or not."""
+    """Messages of two publishers are not ordered; whether the frame was known or not."""
     monkeypatch.setattr(transform_buffer, "MOST_FRAMES", 2)
     for known in (False, True):
         made = pipeline(MeshSettings("cloth", transform="tf"))
@@ -87,7 +87,7 @@ def test_an_older_static_transform_that_comes_after_a_rejected_one(child, monkey
 
 
 def test_a_new_topology_that_is_not_in_use_yet():
-    """Of a mesh that moves, or moves by poses: its frames go on with the one before."""
+    """For a mesh that moves, or moves by poses: its frames continue with the previous topology."""
     made = pipeline(MeshSettings("cloth"), MeshSettings("tool", input=POSE))
     made.push("tool", frame(0, 10))
     made.push("tool", Topology(1, 3, FACES[:, ::-1], sent=20))

@@ -104,14 +104,14 @@ FILES = {
     ),
     "one-topic-of-two-types": (
         HEAD + ROBOT + "joint_states: robot_description}\n", 2,
-        "robot.r.description and robot.r.joint_states: both are the topic /robot_description, the one as "
-        "std_msgs/msg/String, the other as sensor_msgs/msg/JointState; give each a topic of its own",
+        "robot.r.description and robot.r.joint_states: both use the topic /robot_description, the first as "
+        "std_msgs/msg/String, the second as sensor_msgs/msg/JointState; give each a topic of its own",
     ),
     "joint-states-on-answers": (
-        HEAD + ROBOT + "joint_states: contacts}\n", 2, "and robot.r.joint_states: both are the topic /contacts",
+        HEAD + ROBOT + "joint_states: contacts}\n", 2, "and robot.r.joint_states: both use the topic /contacts",
     ),
     "joint-states-on-the-log": (
-        HEAD + ROBOT + "joint_states: /rosout}\n", 2, "/rosout and robot.r.joint_states: both are the topic /rosout",
+        HEAD + ROBOT + "joint_states: /rosout}\n", 2, "/rosout and robot.r.joint_states: both use the topic /rosout",
     ),
     "recording-without-meshes": (HEAD + "    record: FOLDER/record\n", 0, ""),
     "folder-as-file": (HEAD + MESH + "file: /\n", 1, "use one of .obj"),
@@ -128,7 +128,7 @@ ARGUMENTS = {
     "long-remapping": (["-r", f"contacts:=/{'a' * 300}"], 2, "contacts: in namespace / and with the remappings given"),
     "remapped-together": (
         ["-p", "meshes:=[a, b]", "-r", "meshes/a/vertices:=x", "-r", "meshes/b/topology:=/x"], 2,
-        "meshes/a/vertices and meshes/b/topology: both are the topic /x",
+        "meshes/a/vertices and meshes/b/topology: both use the topic /x",
     ),
     "remapped-together-of-one-type": (
         ["-p", "meshes:=[a, b]", "-r", "meshes/a/vertices:=x", "-r", "meshes/b/vertices:=x"], 0, "",

@@ -290,7 +290,7 @@ def test_a_file_that_cannot_be_used_ends_the_start(start_node, tmp_path):
         assert not change_state(node, Transition.TRANSITION_CONFIGURE)
         assert "cannot configure: robot.crane.description: " in node.output() and why in node.output()
         for parameter, value, reason in (
-            ("joint_states", "contacts", "contacts and robot.crane.joint_states: both are the topic"),
+            ("joint_states", "contacts", "contacts and robot.crane.joint_states: both use the topic"),
             ("joint_states", "a b", "this name cannot be used"),
             ("srdf", "~nosuchuser/crane.srdf", "no such home folder"),
         ):
@@ -427,7 +427,7 @@ def test_joint_states_that_cannot_be_used_are_told_of_before_the_robot_is_known(
     joints.publish(JointState(name=[f"j{k}" for k in range(1001)], position=[0.0] * 1001))
     values = node.frames_status(joint_states_refused=2)
     assert "is not kept until the description of its robot comes" in values["last_refusal"]
-    endless.position[1] = float("inf")  # of which robot, nobody knows yet
+    endless.position[1] = float("inf")  # the robot is not known yet
     joints.publish(endless)
     joints.publish(crane.joint_state(1, 1))
     publisher = describe(node)

@@ -118,7 +118,7 @@ def test_what_is_refused_is_true_until_something_valid_of_the_mesh_comes(start_s
 
 
 def test_a_static_mesh_whose_new_place_is_refused_is_unknown(start_stream):
-    """Frames of the other mesh go on: they say nothing of it, and where it was is not where it is."""
+    """Frames of the other mesh continue, but say nothing about this one, which may have moved."""
     stream = start_stream(mesh={"table": {"static": True}}, frame_queue=10)
     peer = stream.node.peer
     stream.topologies()
@@ -191,7 +191,7 @@ def test_messages_that_cannot_be_deserialised(start_stream):
     until(is_false, "false")
     static.publish(serialize_message(mount("mount"))[:24])
     static.publish(mount("other"))
-    until(lambda: is_refused("where mesh hand is was rejected"), "doubt of the transform")
+    until(lambda: is_refused("the position of mesh hand was rejected"), "doubt of the transform")
     static.publish(mount("mount"))
     until(is_false, "false again")
     assert change_state(stream.node, Transition.TRANSITION_DEACTIVATE)
@@ -303,7 +303,7 @@ def test_dead_input_is_true(start_stream):
 
 
 def test_frames_that_waited_while_the_node_was_held_up_are_old(start_stream):
-    """The publisher has died meanwhile: what it sent before is no news."""
+    """The publisher has died in the meantime: its earlier messages are not new."""
     stream = start_stream(SHORT)
     stream.topologies()
     with stream.steady():

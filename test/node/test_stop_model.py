@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whatever happens, `stop` is false only where its promise allows it: random sequences of events beside a model."""
+"""`stop` is false only when its promise allows it, in random sequences of events that are compared with a model."""
 
 import os
 
@@ -31,7 +31,7 @@ def configured(request):
 
 
 def walk(configured, worlds, seed=0):
-    """Looks at which stop was false, at which it might have been, and at which the listener read false."""
+    """Counts of looks at which stop was false, at which it might have been, and at which the listener read false."""
     false = allowed = read = 0
     for number in range(worlds):
         world = World(*configured, np.random.default_rng([seed, number]))

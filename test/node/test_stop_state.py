@@ -20,7 +20,7 @@ SCENE = WatchedScene(
 
 
 class Times:
-    """Clocks that go on as they are told. ``now``: of the system, ns."""
+    """Clocks that the test moves on. ``now``: system time, ns."""
 
     def __init__(self):
         self.steady, self.now = 100.0, 10**18
@@ -46,7 +46,7 @@ def state(times):
 
 
 def clear(state, near=False, distance=0.25, hand=None, table=1, tip=None, **origin):
-    """A step whose last messages were sent then; None: now."""
+    """A step whose last messages were sent at these times; None: now."""
     now = state.times.now
     places = (now if hand is None else hand, table, now if tip is None else tip)
     state.answered(near, distance, [Origin(place, **origin) for place in places])
@@ -97,12 +97,12 @@ def test_nothing_counts_while_inactive(times):
 
 @pytest.mark.parametrize("old", ["hand", "tip"])
 def test_the_oldest_message_of_a_step_tells_its_age(state, old):
-    """Whichever came last, and whenever it was taken."""
+    """Whichever message was received last, and whenever it was taken."""
     clear(state, **{old: state.times.now - 9 * SECOND})
     assert cause(state) is None
     state.times.pass_by(0.6)
     assert cause(state) is Cause.SILENT
-    assert f"mesh {'arm/tip' if old == 'tip' else 'hand'} that was sent 9.6 s ago" in state.why().text
+    assert f"mesh {'arm/tip' if old == 'tip' else 'hand'} sent 9.6 s ago" in state.why().text
 
 
 def test_what_has_no_age_and_what_tells_none(state):
@@ -112,11 +112,11 @@ def test_what_has_no_age_and_what_tells_none(state):
     state.times.pass_by(0.9 * TIMEOUT)
     assert cause(state) is None, "placed by static transforms alone"
     clear(state, hand=UNKNOWN_TIME)
-    assert cause(state) is Cause.SILENT and "does not tell when messages of mesh hand" in state.why().text
+    assert cause(state) is Cause.SILENT and "no source timestamps" in state.why().text
     clear(state, table=UNKNOWN_TIME)
     assert cause(state) is None, "a file: static meshes have no age"
     clear(state, table=OUTDATED)
-    assert cause(state) is Cause.REFUSED and "newer message about where mesh table is" in state.why().text
+    assert cause(state) is Cause.REFUSED and "newer message about the position of mesh table" in state.why().text
 
 
 @pytest.mark.parametrize(
@@ -150,7 +150,7 @@ def test_a_mesh_is_unknown_until_something_valid_of_it_comes(state, refusal, set
 
 
 def test_what_was_rejected_is_older_than_what_is_in_use(state):
-    """Of a queue that is read late: the valid message that was sent after the rejected one settles it."""
+    """If a queue is read late, a valid message that was sent after the rejected one settles the doubt."""
     clear(state)
     state.times.pass_by(1)
     sent = state.times.now
@@ -183,7 +183,7 @@ def test_doubts_outlive_a_scene_that_is_made_anew(state):
 
 @pytest.mark.parametrize("links", [(), ("arm/tip",), ("arm/tip", "arm/more"), ("arm/other",)])
 def test_doubts_of_what_moves_a_robot_outlive_other_links(state, links):
-    """Whichever links a new description has, where their joints are is not known."""
+    """Whichever links a new description has, the positions of their joints are unknown."""
     robot = ("arm/base", "arm/tip")
     state.begin(WatchedScene(("hand", *robot), (True,) * 3, {"joint_states": robot}))
     sent = state.times.now
@@ -201,8 +201,7 @@ def test_doubts_of_what_moves_a_robot_outlive_other_links(state, links):
 
 
 def test_what_came_before_settles_nothing(state):
-    """Neither one of which it is unknown when it was sent, nor where what came last was sent by a clock ahead and is
-    not in use yet."""
+    """Neither a message without a known send time, nor one of a clock that is ahead and that is not in use yet."""
     before = state.times.now
     clear(state, table=before)
     assert cause(state) is None
@@ -248,8 +247,8 @@ def test_robots_whose_description_is_not_in_use(state):
 
 @pytest.mark.parametrize("jump", [0.03, -0.03, 3600.0, -3600.0])
 def test_a_jump_of_the_system_clock(state, jump):
-    """Unknown until both have agreed for one time-out; what was sent before a clock was set back is not of the future
-    for good."""
+    """Unknown until both clocks have agreed for one time-out; messages sent before a clock was set back are not in the
+    future forever."""
     clear(state)
     assert cause(state) is None
     state.times.now += round(jump * SECOND)
@@ -263,7 +262,7 @@ def test_a_jump_of_the_system_clock(state, jump):
 
 
 def test_what_was_sent_before_a_clock_was_set_back_never_seems_young(state):
-    """Nothing is sent any more: what is in use seems younger than it is, by as much as the clock was set back."""
+    """Nothing is sent any more: messages in use seem younger than they are, by as much as the clock was set back."""
     for jump in (0.4, 5.0, 30.0):
         clear(state)
         while cause(state) is not None:
@@ -280,7 +279,7 @@ def test_what_was_sent_before_a_clock_was_set_back_never_seems_young(state):
 
 @pytest.mark.parametrize("jump", [5, 3600])
 def test_doubts_and_a_clock_that_is_set_back(state, jump):
-    """What has no age is in doubt until it is sent again by a clock that has caught up; frames settle theirs before."""
+    """Inputs without an age are in doubt until sent again once the clock has caught up; frames settle theirs before."""
     clear(state, table=state.times.now)
     state.refused(Refusal("table", Reason.NOT_FINITE))
     state.refused(Refusal("hand", Reason.NOT_FINITE))
@@ -346,7 +345,7 @@ def test_a_message_from_the_future(state):
 
 
 def test_the_thread_that_publishes_was_held_up(state):
-    """Frames from before do not count, whatever their age."""
+    """Earlier frames do not count, whatever their age."""
     clear(state)
     assert cause(state) is None
     state.times.pass_by(1.1 * TIMEOUT)

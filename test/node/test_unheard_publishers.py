@@ -11,7 +11,7 @@ from hpccd_ros.middleware import qos
 
 LATCHED = ("let the publisher offer transient_local (latched): otherwise messages sent before the node listened would "
            "be missing")  # fmt: skip
-# Topic -> its type, what a publisher offers (reliable, latched), and what is to be said of it.
+# Topic -> its type, what a publisher offers (reliable, latched), and the expected warning.
 LESS = {
     "meshes/cloth/topology": (MeshTopology, (True, False), "offers volatile but the node requests transient_local, "
                               f"so none of its messages are received; {LATCHED}"),

@@ -153,7 +153,7 @@ def test_parts_that_begin_and_end_anywhere_are_verified(whole, tmp_path):
         assert set(expected) <= set(verified), (begin, end, expected, verified)
         received = [m for m in raw_messages(whole) if begin <= m.log_time - BEGAN < end]
         assert found.count - found.in_force == len(received) and found.begin == begin
-        # What came in the part is the same, and stands behind what was in force.
+        # The messages of the part are unchanged, and follow those in force.
         assert raw_messages(part)[found.in_force :] == received
     assert reached > 50
 
@@ -186,7 +186,7 @@ def test_two_parts_that_join_hold_every_message_once(whole, tmp_path):
 
 
 def test_of_joints_and_frames_that_are_told_seldom_the_last_is_kept(tmp_path):
-    """Longer than the seconds that are kept whole: reach is told once, the static transform, and the base's."""
+    """A part that begins later than the seconds kept whole: `reach` and the transforms are sent only once, before."""
     inputs = [row for row in _inputs(4) if not (row[0] == "joint_states" and row[1].name == ["reach"] and row[2] > 0.1)]
     late = [(topic, message, came + 60.0 * (came > 0.1)) for topic, message, came in inputs]
     _write(tmp_path / "x.mcap", _raw(late))
@@ -249,7 +249,7 @@ def test_what_is_no_time(text):
 
 
 def test_a_split_recording_and_channels_of_others(tmp_path, sound_bags):
-    """Of a folder one file, and what is not of ROS 2 is copied too."""
+    """A folder becomes one file, and messages that are not of ROS 2 are copied too."""
     _write(tmp_path / "run", _raw(_inputs(20)), split=0.5)
     found = _cut(tmp_path / "run", tmp_path / "part.mcap", Time.of("0.7"), Time.of("1.6"), compression="zstd")
     with Recording(tmp_path / "run") as recording:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A replay takes recorded messages in the order that the node's answers list, and accuses the node of nothing else."""
+"""A replay takes recorded messages in the order that the node's answers list, and reports no false differences."""
 
 import copy
 
@@ -67,7 +67,7 @@ def _topologies():
 
 
 def _swapped(taken, heard, topic, by):
-    """The order of the node, which takes messages of one topic so many places later than the recorder."""
+    """The order of the node, which takes messages of one topic a number of places later than the recorder."""
     later = {place: place + by + 0.5 for place in taken if isinstance(place, int) and heard[place][0] == topic}
     first = next(iter(later), None)
     later.pop(first, None)
@@ -92,7 +92,7 @@ def _static():
 
 
 def _equal_stamps():
-    """Of three runs; the answers of each are in the file before their last frame."""
+    """A recording of three runs; the answers of each are in the file before their last frame."""
     heard = _topologies()
     for n in range(1, 28):
         heard += [_pose(1 + n % 9, n), _cloth(1 + n % 9, n)]
@@ -341,7 +341,7 @@ FORGED = {
 @pytest.mark.parametrize("forged", FORGED)
 @pytest.mark.parametrize("kind", ["shape", "base", "events"])
 def test_forged_lists_excuse_no_answer(tmp_path, kind, forged):
-    """Only what stands at the beginning of a recording can have begun before it."""
+    """Only answers at the beginning of a recording can have begun before it."""
     parameters, heard, taken = KINDS[kind]()
     messages = run(tmp_path / "x.mcap", parameters, heard, list(taken))
     answers = _answers(messages)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Every answer of a correct node is verified, in whatever order it and its recording heard the topics."""
+"""Every answer of a correct node is verified, in whatever order it and its recorder received the topics."""
 
 import subprocess
 import sys

@@ -176,7 +176,7 @@ def test_distances_that_differ_are_named(changed, near_bag, hpccd):
 
 
 def test_distances_of_a_scene_without_pairs_are_verified(near_bag, tmp_path, hpccd):
-    """There is nothing to measure, and each answer says so."""
+    """There are no distances to measure, and each answer says so."""
     path, inputs, _ = near_bag
     with Recording(path) as recording:
         info = recording.info

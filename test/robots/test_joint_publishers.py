@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Several publishers of joint states: who sent a message, and whether two contradict each other."""
+"""Several publishers of joint states: which one sent a message, and whether two contradict each other."""
 
 import math
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Damaged and odd URDFs, SRDFs and parameters of robots, some hundred at random: each makes a robot that the core takes
-and that stands somewhere, or is refused with RobotError or ParameterError. Nothing else is raised."""
+"""Some hundred damaged and odd URDFs, SRDFs and parameters of robots, at random: each makes a robot that the core
+accepts, or is refused with RobotError or ParameterError. Nothing else is raised."""
 
 import random
 import re

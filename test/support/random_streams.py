@@ -55,7 +55,7 @@ class RandomStream:
         self._open()
 
     def record(self, ticks: int) -> None:
-        """So many ticks of the stream into the recording that was begun last."""
+        """A number of ticks of the stream into the recording that was begun last."""
         for tick in range(ticks):
             if self._rng.random() < 0.03 or self._k >= 70:
                 self._k = self._rng.choice((0, 0, max(0, self._k - 20)))  # a restart; by more and less than a second
@@ -127,7 +127,7 @@ class RandomStream:
             self._peer.executor.spin_once(timeout_sec=0.005)
 
     def _tick(self) -> None:
-        """What may be sent between two frames, in any order."""
+        """Messages that may be sent between two frames, in any order."""
         self._k += 1
         often = {"cloth": 0.95, "pose": 0.95, "tool": 0.4, "table": 0.3, "joints": 0.9, "base": 0.7, "topology": 0.03}
         kinds = [kind for kind, share in often.items() if self._rng.random() < share]

@@ -40,8 +40,9 @@ class Recorded:
 
 def run(path: Path, parameters: dict, heard: list[tuple[str, Any]], taken: list[int | str | tuple[str, int]],
         early: bool = False) -> list[Recorded]:  # fmt: skip
-    """What a recording of the node holds. heard: topic and message, in the order of the recorder. taken: in that of the
-    node, by their place in ``heard``; or events. early: the recorder hears answers before the last of their inputs."""
+    """The content of a recording of the node. heard: topic and message, in the order of the recorder. taken: indices
+    into ``heard`` in the order of the node, or events. early: the recorder receives answers before their last
+    inputs."""
     found = [Recorded(topic, message, BEGAN + BETWEEN * k + 7, BEGAN + BETWEEN * k) for k, (topic, message)
              in enumerate(heard)]  # fmt: skip
     write(path, parameters, found)

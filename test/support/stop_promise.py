@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The promise of `stop` as a model: from all that was sent and taken to whether it may be false. It knows nothing of
+"""The promise of `stop` as a model: from all messages sent and taken to whether it may be false. It knows nothing about
 how the node decides; times are true seconds, which no clock of the model shows."""
 
 import math
@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 
 class Taken(NamedTuple):
-    """A message that the node has taken. height: what it says of its mesh, NaN: rejected, and rightly so."""
+    """A message that the node has taken. height: of its mesh; NaN: it is invalid, and rejected."""
 
     sent: float
     stamp: int

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Random sequences of all that can happen to a node with `stop` and to those around it, beside a model of its promise.
+"""Random sequences of events for a node with `stop` and the processes around it, compared with a model of its promise.
 
-The node's own classes work, from the callbacks of its subscriptions to what it says, with clocks that are told; the
-test is their executor, their detection thread, DDS and time. Meshes move along z above a table, far beside each other.
+The node's own classes run, from the callbacks of its subscriptions to the published `stop`; the test is their executor,
+their detection thread, DDS and clocks. Meshes move along z above a table, far beside each other.
 """
 
 import math
@@ -60,8 +60,8 @@ DEPTHS = {"joint_states": 100, "transforms": 100}
 
 
 class World:
-    """node: a plain one with PARAMETERS, nobody spins it. ``false``, ``allowed``: looks at which stop was false, and at
-    which it might have been."""
+    """node: a plain one with PARAMETERS that is not spun. ``false``, ``allowed``: number of looks at which stop was
+    false, and at which it might have been."""
 
     def __init__(self, node, configuration: Configuration, rng):
         self.rng, self.now, self.stamp = rng, 1000.0, 0
@@ -70,8 +70,8 @@ class World:
         self.alive = dict.fromkeys(PLACES, True)
         self.numbers = {}
         self.inbox = {}
-        self.held = self.listener_held = self.busy = 0  # for so many ticks; busy: the executor alone
-        # By so many ticks the stamps of those who move what follows the hand are ahead of it.
+        self.held = self.listener_held = self.busy = 0  # ticks left; busy: only the executor
+        # Ticks by which the stamps of messages that move the hand's followers are ahead of it.
         self.lead = {mesh: int(rng.choice([0, 0, 0, 3, 8])) for mesh, kind in MOVING.items() if kind == "between"}
         self.versions = dict.fromkeys(("hand", "tool", "cart", "table"), 0)
         self.promise = Promise(MOVING, ["table"], TIMEOUT, DISTANCE, ERROR)
@@ -109,7 +109,7 @@ class World:
     def system(self):
         return round(1e9 * (self.now + self.offset))
 
-    # What the node does around its classes.
+    # The work of the node around its classes.
 
     def make(self):
         robots = {"arm": self.robot}
@@ -128,7 +128,7 @@ class World:
         self.promise.last = None
 
     def detect(self):
-        """What the detection thread does with the frames that wait."""
+        """The work of the detection thread on waiting frames."""
         while self.queue.frames():
             item = self.queue.pop()
             if item.first:
@@ -180,7 +180,7 @@ class World:
             assert self.listener_held or not word.data, "the listener reads false, and true was said"
             self.read += 1
 
-    # What publishers do.
+    # Publishers.
 
     def send(self, topic, mesh, message, what, height, stamp=0, new_version=None):
         """new_version: of a topology of the table, which makes positions of others void; their stamps are versions."""
@@ -229,7 +229,7 @@ class World:
         self.send("table/vertices", "table", message, "place", math.nan if bad else height, stamp=version)
 
     def place(self, mesh, bad=False):
-        """A message that says where a moving mesh is now; the names of what can be wrong with one are its kinds."""
+        """A message with the position of a moving mesh; its kinds are the names of what can be wrong with it."""
         height = float(self.rng.uniform(-0.2, 0.2) if self.rng.random() < 0.01 else self.rng.uniform(0.3, 3.0))
         stamp_ns = self.stamp + round(1e9 * TICK) * self.lead.get(mesh, 0)
         at, stamp = math.nan if bad else height, fields.ns_to_stamp(stamp_ns)
@@ -257,7 +257,7 @@ class World:
             message.header.stamp = stamp
         self.send(topic, mesh, message, "place", known, stamp_ns)
 
-    # What happens.
+    # Events.
 
     def tick(self, ticks=1):
         for _ in range(ticks):
@@ -296,7 +296,7 @@ class World:
         self.listener_held = int(self.rng.integers(2, 40))
 
     def late_listener(self):
-        """One that comes now is given the latched word."""
+        """A new listener receives the latched message."""
         self.listener.close()
         self.listener = self.listening()
         self.words = deque([self.last_word] if self.last_word else [], maxlen=10)
@@ -316,7 +316,7 @@ class World:
         ])()  # fmt: skip
 
     def mend(self):
-        """All is sent again, and well."""
+        """All inputs are sent again, and are valid."""
         for mesh in self.versions:
             self.topology(mesh)
         self.shape("tool"), self.shape("cart"), self.table()
@@ -335,7 +335,7 @@ class World:
             self.table()
 
     def restart(self):
-        """The simulation begins again, of new publishers."""
+        """The simulation begins again, with new publishers."""
         self.stamp = 0
         self.numbers = {topic: 0 for topic in self.numbers}
         self.promise.taken = type(self.promise.taken)(
@@ -356,7 +356,7 @@ class World:
         self.ahead[self.any(PLACES)] = float(self.rng.choice([0.019, 0.015, 0.3, -0.3]))
 
     def describe(self):
-        """A description that is refused; later one that is in use."""
+        """A description is rejected; later a valid one is in use."""
         bad = self.rng.random() < 0.5
         self.promise.take("arm", "description", self.now, 0, math.nan if bad else 0.0)
         self.state.robots({"arm": "its description was rejected"} if bad else {})
