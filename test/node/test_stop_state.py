@@ -112,7 +112,7 @@ def test_what_has_no_age_and_what_tells_none(state):
     state.times.pass_by(0.9 * TIMEOUT)
     assert cause(state) is None, "placed by static transforms alone"
     clear(state, hand=UNKNOWN_TIME)
-    assert cause(state) is Cause.SILENT and "no source timestamps" in state.why().text
+    assert cause(state) is Cause.SILENT and "does not provide source timestamps" in state.why().text
     clear(state, table=UNKNOWN_TIME)
     assert cause(state) is None, "a file: static meshes have no age"
     clear(state, table=OUTDATED)

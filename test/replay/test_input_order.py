@@ -268,7 +268,7 @@ def test_an_input_that_the_recording_lacks(recorded):
 @pytest.mark.parametrize(
     ("field", "value", "says"),
     [
-        ("start_inputs", 0, "makes no frame at its start"),
+        ("start_inputs", 0, "make no frame at its start"),
         ("start_inputs", 10**6, "malformed: its step began after 1000000 inputs"),
         ("input_topic", [9, 0, 1, 2], "malformed: an input is of topic 9"),
         ("input_flags", [], "malformed: it lists 4 topics, 4 times and 0 flags"),

@@ -91,7 +91,7 @@ def test_a_parameter_of_another_version_is_told_of(changed):
 
 @pytest.mark.parametrize("text", ["", "{", "[" * 100_000, '{"a":' * 5_000, "9" * 5000, "nan ", "\0"])
 def test_a_setup_that_is_no_json(changed, text):
-    _refused(changed(text=text), "stored of the node")
+    _refused(changed(text=text), "stored about the node")
 
 
 @pytest.mark.parametrize("setup", [[], [1], "x", 7, None, True])
