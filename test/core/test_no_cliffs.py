@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The cost of a scene depends on what is tested in it: counted in pairs, tests and bytes, never in time."""
 
+import resource
+from pathlib import Path
+
 import numpy as np
 import pytest
 import random_scenes
@@ -189,6 +192,10 @@ def tetrahedra(n, rng):
     return faces, (at + corners).reshape(-1, 3)
 
 
+def resident_bytes():
+    return int(Path("/proc/self/statm").read_text().split()[1]) * resource.getpagesize()
+
+
 def test_bytes_of_many_meshes_grow_with_their_number():
     taken = []
     for n in (600, 2400):
@@ -198,12 +205,15 @@ def test_bytes_of_many_meshes_grow_with_their_number():
             scene.add_mesh(f"mesh{i}", faces, self_collision=False, static=i % 7 == 0)
         for i in range(n - 1):
             scene.ignore_pair(i, i + 1)
+        before = resident_bytes()
         detector = hc.Detector(scene, threads=1, backend="cpu")
         for i in range(1, n - 2):
             detector.set_separation(i, i + 2, 0.01)
         detector.detect(x, x)
         taken.append(detector.stats["bytes"] / n)
+        grown = resident_bytes() - before
     assert taken[1] <= 1.3 * taken[0]
+    assert grown < 30e6  # a table of all pairs would take 90 MB
 
 
 @pytest.mark.parametrize("n", [40, 260])
