@@ -27,6 +27,7 @@ def test_recordings_of_random_streams_are_verified(start_node, tmp_path, seed):
 
 
 @pytest.mark.long
+@pytest.mark.timeout(1800)
 @pytest.mark.parametrize("seed", range(100, 140))
 def test_many_recordings_on_a_busy_machine(start_node, tmp_path, seed):
     """Two hundred."""
