@@ -57,7 +57,7 @@ class GuardedLifecycleNode(LifecycleNode):
         super().destroy_node()
         # rclpy 7.1 leaves the state machine alive, which holds the rcl node and so the DDS participant; after gc.freeze
         # no garbage collection frees it. Fast DDS then deleted the participant in its static destructors, while the
-        # discovery thread of rmw_fastrtps still used it: the process ended with SIGSEGV or SIGABRT, or never.
+        # discovery thread of rmw_fastrtps still used it: the process ended with SIGSEGV or SIGABRT.
         self._state_machine.destroy_when_not_in_use()
 
     def _guarded(self, callback: Transition) -> Transition:
