@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// One value for each pair of meshes. Few meshes have a table of all pairs. Many have one value for most pairs, and a
-// hash table of the others: of 8,000 bodies a table of all pairs would take 64 MB a byte.
+// One value for each pair of meshes. A scene of few meshes has a table of all pairs. One of many meshes has one value
+// for most pairs and a hash table for the others: for 8,000 bodies a table of all pairs would take 64 MB per byte.
 #pragma once
 
 #include <algorithm>
@@ -11,11 +11,11 @@
 
 namespace hpccd {
 
-// To read it, where nothing of the standard library may be used.
+// For reading it where the standard library may not be used.
 template <class T>
 struct PairValues {
   static constexpr std::uint64_t free_slot = ~std::uint64_t{0};
-  const T* all = nullptr;  // n_meshes^2; null: `otherwise`, but for what the slots hold
+  const T* all = nullptr;  // n_meshes^2; null: `otherwise`, except for pairs in the slots
   std::uint32_t n_meshes = 0;
   std::uint32_t slot_mask = 0;  // their number, a power of two, less one
   const std::uint64_t* keys = nullptr;
@@ -25,7 +25,7 @@ struct PairValues {
   HPCCD_HD static std::uint64_t key_of(std::uint32_t a, std::uint32_t b) {
     return a < b ? std::uint64_t{a} << 32 | b : std::uint64_t{b} << 32 | a;
   }
-  // The slot of a key, or the free one where it belongs.
+  // The slot of a key, or the free slot for it.
   HPCCD_HD std::uint32_t slot_of(std::uint64_t key) const {
     std::uint32_t slot = static_cast<std::uint32_t>((key * 0x9E3779B97F4A7C15u) >> 32) & slot_mask;
     while (keys[slot] != key && keys[slot] != free_slot) slot = (slot + 1) & slot_mask;
@@ -75,7 +75,8 @@ class PairTable {
     values_[slot] = value;
   }
 
-  // f(b, value) for the pairs of a mesh: all of them, or those that were ever set, where most have `otherwise`.
+  // Calls f(b, value) for the pairs of a mesh: for all pairs, or only those that were ever set if most have
+  // `otherwise`.
   bool has_all() const { return n_ <= most_in_table; }
   template <class Function>
   void for_pairs_of(std::uint32_t a, Function&& f) const {
@@ -93,7 +94,7 @@ class PairTable {
   }
 
  private:
-  // Both or, where memory ends, none: otherwise a pair would count twice.
+  // Both, or none if memory runs out: otherwise a pair would count twice.
   void add_partners(std::uint32_t a, std::uint32_t b) {
     partners_[a].push_back(b);
     if (a == b) return;

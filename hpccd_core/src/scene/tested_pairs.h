@@ -26,7 +26,7 @@ class TestedPairs {
   }
   // Pairs of two meshes or of one, each once.
   std::size_t n_pairs() const { return n_pairs_; }
-  // With how many meshes this one is tested, itself included.
+  // Number of meshes with which this one is tested, itself included.
   std::size_t n_with(std::uint32_t mesh) const { return n_with_[mesh]; }
   std::size_t bytes() const {
     return not_ignored_.bytes() + meshes_.capacity() + n_with_.capacity() * sizeof(n_with_[0]);
@@ -34,7 +34,7 @@ class TestedPairs {
 
  private:
   enum : unsigned char { is_static = 1, within = 2 };
-  // As their options have it.
+  // According to their options.
   bool by_meshes(std::uint32_t a, std::uint32_t b) const {
     return !(meshes_[a] & meshes_[b] & is_static) && (a != b || meshes_[a] & within);
   }

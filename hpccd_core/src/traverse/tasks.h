@@ -39,7 +39,7 @@ inline constexpr unsigned n_rules = 8;
 class PairRules {
  public:
   PairRules(const Scene& scene, Accuracy accuracy, const SeparationTable& separations, TestedFeatures features = {});
-  // By what was set since the table settled last.
+  // Updates the rules of pairs that were set since the table settled last.
   void change(const SeparationTable& separations);
   // Meshes by number, or mixed_meshes: then some of their pairs may be enabled.
   bool enabled(std::uint32_t mesh_a, std::uint32_t mesh_b) const {
@@ -123,7 +123,7 @@ struct MotionBoxes {
   bool within(const Node&) const { return true; }  // the same of one node
 };
 
-// The same where boxes of some pairs of meshes have grown by more than they ask for.
+// The same if boxes of some pairs of meshes have grown by more than their separation requires.
 struct MotionBoxesLessExcess {
   using Ends = AtLeaves;
   static constexpr bool shrink = false;

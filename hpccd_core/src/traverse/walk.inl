@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// The walk over pairs of nodes, and its two ways through them: all, or until any contact is found. Included within an
-// unnamed namespace: what boxes count decides how much of it the compiler makes one piece, and three more kinds of
-// boxes in traverse.cpp cost each of those there a tenth.
+// The walk over pairs of nodes, in two forms: over all of them, or until any contact is found. Included in an unnamed
+// namespace of several sources: the number of box types in a source affects how much of the walk the compiler inlines,
+// and three more of them in traverse.cpp cost each of the others a tenth.
 
 const Block& block_of(const Tree& tree, std::uint32_t node) {
   return tree.blocks[tree.block_of_leaf[tree.nodes[node].leaf]];
 }
 
-// From pairs that are worth visiting. `between` is called between two of them and may take from the stack; false ends
-// the walk.
+// Starts from pairs worth visiting. `between` is called between two pairs and may take from the stack; the walk ends if
+// it returns false.
 template <class Boxes, class Between>
 void walk(const Tree& tree, const PairRules& rules, Boxes boxes, const Cancellation& cancellation,
           std::vector<NodePair>& stack, Worker& worker, Between&& between) {
@@ -21,7 +21,7 @@ void walk(const Tree& tree, const PairRules& rules, Boxes boxes, const Cancellat
     else
       for (const LeafPair left : worker.sink->push(leaves)) test_leaves(tree, rules, left, worker);
   };
-  std::size_t stale = 0;  // so many at the bottom were put there when boxes were larger
+  std::size_t stale = 0;  // number of pairs at the bottom that were pushed when boxes were larger
   while (!stack.empty()) {
     cancellation.heed();
     if (bounded && worker.search().gave_up()) return stack.clear();
@@ -60,7 +60,7 @@ void walk(const Tree& tree, const PairRules& rules, Boxes boxes, const Cancellat
 
 Contact least(const std::vector<Contact>& found) { return *std::min_element(found.begin(), found.end(), before); }
 
-// One contact: vertex-face before edge-edge, of either the first in canonical order.
+// Keeps one contact: vertex-face before edge-edge, and the first one in canonical order.
 void keep_least(Worker& worker) {
   if (!worker.vertex_face.empty())
     worker.vertex_face = {least(worker.vertex_face)}, worker.edge_edge.clear();
@@ -68,8 +68,8 @@ void keep_least(Worker& worker) {
     worker.edge_edge = {least(worker.edge_edge)};
 }
 
-// The task with the lowest number that holds a contact decides, and of it what the first batches find that find
-// anything: each task is walked alone, from empty batches on. So the answer does not depend on the threads.
+// The task with the lowest number that has a contact decides, by the first batches of it that find one: each task is
+// walked separately, starting with empty batches. So the result does not depend on the threads.
 template <class Boxes>
 void traverse_any(const Tree& tree, const PairRules& rules, const Boxes& boxes, Search& search, ThreadPool& pool,
                   std::vector<Worker>& workers) {
@@ -89,7 +89,7 @@ void traverse_any(const Tree& tree, const PairRules& rules, const Boxes& boxes, 
       stack.push_back(tasks[task]);
       walk(tree, rules, boxes, *search.cancellation, stack, worker,
            [&] { return !worker.has_found() && task < found.load(std::memory_order_relaxed); });
-      if (task > found.load()) return;  // all later ones are too
+      if (task > found.load()) return;  // so are all later tasks
       if (!worker.has_found()) worker.flush();
       if (!worker.has_found()) continue;
       keep_least(worker);
