@@ -51,8 +51,8 @@ class alignas(128) Worker {
   // Tests pairs of one kind at once.
   void test_pairs(std::span<const std::uint32_t> first, std::span<const std::uint32_t> second, Kind kind, Rule rule);
   const Search& search() const { return *search_; }
-  // Whether boxes leave far more pairs of features to be tested than are near: long ones that are slanted to every
-  // direction of the boxes. Then hulls of leaves are worth their price.
+  // Whether boxes leave far more pairs of features to test than are near, because long features are slanted to every
+  // direction of the boxes. Then hulls of leaves are worth their cost.
   bool boxes_leave_much() const { return boxes_leave_much_; }
   bool has_found() const { return !vertex_face.empty() || !edge_edge.empty(); }
   void flush();  // tests what waits
