@@ -102,9 +102,10 @@ void copy_snapshot(const Real* x, const BoxMap& map, const Slanted& slanted, std
   }
 }
 
-// Features smaller than this, in coordinates of the boxes, count as spread: the rounding of a reach, 1e-6, is a
-// thirtieth of it.
-constexpr double least_spread = 3e-5;
+// Features smaller than this, in coordinates of the boxes, count as spread: the rounding of a reach, 1e-6, is a tenth
+// of it. For larger features, exact distances cost more than they save: with a vertex 3,000 sizes away from a grid of
+// 5,000 triangles, smallest distances took 16 ms instead of 2.5.
+constexpr double least_spread = 1e-5;
 
 // For each plane of two axes the direction along which edges extend least, so that slanted bars are separated as well
 // as upright ones. `extents`: by plane and direction. The common directions stay unless another is far better: for
