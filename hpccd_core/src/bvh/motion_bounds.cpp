@@ -283,8 +283,8 @@ void MotionBounds::measure_edges(const Real* t0, const Real* t1) {
   if (snapshot_) slanted_ = best_directions(extents);
 }
 
-// The length of the finest features of the scene: from its short edges, and from meshes with so many vertices that all
-// pairs of their vertices would be more than 64 per vertex of the scene.
+// The length of the finest features of the scene: of its short edges, and of meshes that have more than 64 pairs of
+// their vertices per vertex of the scene.
 double MotionBounds::finest() const {
   double least = short_edge > 0 ? short_edge : std::numeric_limits<double>::infinity();
   for (std::size_t p = 0; features && p < parts_.size(); ++p) {

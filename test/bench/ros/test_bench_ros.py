@@ -121,7 +121,9 @@ def test_a_robot_beside_a_cloth(tmp_path):
     assert 0 < row["answers"] <= 60 - row["dropped"] and row["unaccounted"] == 0, said
     for key in ("median_ms", "p95_ms", "p99_ms"):
         assert 0 < row[f"core_{key}"] <= row[f"detection_{key}"] <= row[f"whole_{key}"]
-    assert row["parts"] >= 1 and (row["contacts"] > 0 or row["answers"] < 60)
+    assert row["parts"] >= 1
+    if row["answers"] > 50:  # the machine kept up
+        assert row["answers"] + row["dropped"] == 60 and row["contacts"] > 0
     assert "arm-and-cloth at 10 frames a second" in said
 
 
