@@ -18,9 +18,12 @@ class SequenceWatch:
         self.before_first = 0
         self._unnoticed = False
 
-    def new_publisher(self) -> None:
-        """A publisher came: its numbers have nothing to do with those before."""
-        self._last = None
+    def matched(self, total: int, new: int) -> None:
+        """``new`` publishers were matched since the last call, ``total`` so far. Their numbers are unrelated to those
+        before. The middleware may report the first publisher after its first message: there is nothing to forget then.
+        """
+        if 0 < new and 1 < total:
+            self._last = None
 
     def next(self, number: int) -> tuple[int, bool]:
         """(messages missing before this one, whether it is the first of another publisher).

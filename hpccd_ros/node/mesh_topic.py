@@ -127,7 +127,6 @@ class MeshTopic:
             connections[f"message_lost.{topic}"] += event.total_count_change
 
         def matched(event: Any) -> None:
-            if event.current_count_change > 0:
-                self.numbers.new_publisher()
+            self.numbers.matched(event.total_count, event.total_count_change)
 
         return {"message_lost": lost, "matched": matched}

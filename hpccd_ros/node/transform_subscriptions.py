@@ -69,7 +69,7 @@ class TransformSubscriptions:
             self._unread(Refusal(topic.name, Reason.MALFORMED, f"{name}: {UNREADABLE}", what=Input.TRANSFORM), topic)
 
         def matched(event: Any) -> None:
-            numbers.new_publisher()
+            numbers.matched(event.total_count, event.total_count_change)
 
         def receive(message: Any, info: dict[str, Any]) -> None:
             heard[name] += 1

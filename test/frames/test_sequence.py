@@ -18,11 +18,20 @@ def test_a_number_that_does_not_grow_is_a_new_publisher():
 
 def test_a_publisher_that_came_is_no_loss():
     watch = SequenceWatch()
-    watch.new_publisher()
+    watch.matched(total=1, new=1)
     assert watch.next(1) == (0, False), "the first publisher of all is not another one"
-    watch.new_publisher()
+    watch.matched(total=2, new=1)
     assert watch.next(50) == (0, True)
     assert watch.before_first == 49
+    watch.matched(total=2, new=0)
+    assert watch.next(52) == (1, False), "a publisher that ended changes nothing"
+
+
+def test_a_publisher_reported_after_its_first_message_hides_no_loss():
+    watch = SequenceWatch()
+    assert watch.next(1) == (0, False)
+    watch.matched(total=1, new=1)
+    assert watch.next(3) == (1, False)
 
 
 def test_refusals_do_not_flood_the_log():

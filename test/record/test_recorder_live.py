@@ -28,10 +28,10 @@ def live(children, namespace, tmp_path):
     return Live(children, namespace, tmp_path, frames=FRAMES)
 
 
-def _record(live, path, *options, stop=signal.SIGINT, node_options=()):
+def _record(live, path, *options, stop=signal.SIGINT, node_options=(), publisher_options=()):
     node = live.node(*node_options)
     recorder = live.recorder(path, *options)
-    live.wait_for(live.publisher())
+    live.wait_for(live.publisher(*publisher_options))
     live.wait_for_answers(path, FRAMES - 1)
     recorder.process.send_signal(stop)
     live.wait_for(recorder)
@@ -92,7 +92,8 @@ def test_recorded_live_read_by_others_and_verified(live, namespace, tmp_path, st
 
 def test_split_and_compressed(live, tmp_path):
     path = tmp_path / "run"
-    _record(live, path, "--split-size", "0.04", "--compression", "zstd")
+    # Slowly, so that answers of a busy node lie in the same file as their frames.
+    _record(live, path, "--split-size", "0.04", "--compression", "zstd", publisher_options=["--rate", "8"])
     files = sorted(path.glob("*.mcap"))
     assert len(files) > 2
     with Reader(path) as reader:
