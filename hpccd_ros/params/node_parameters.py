@@ -11,6 +11,9 @@ from rclpy.parameter import parameter_value_to_python
 
 from hpccd_ros.base.errors import UserError
 
+# s. A response is lost if the node discovers the client only after it has answered.
+ASK_AGAIN = 2.0
+
 
 def of(node) -> dict:
     """{name: value} of all parameters of `node`, which lives in this process."""
@@ -46,13 +49,15 @@ def _call(node, service, name, requests, *, deadline, remote, stop):
             _spin_once(node, stop)
         results = []
         for request in requests:  # one after the other: the queue of a service holds ten
-            future = client.call_async(request)
-            patience = max(deadline, time.monotonic() + 2.0)
-            while not future.done():
+            asked, futures = time.monotonic(), [client.call_async(request)]
+            patience = max(deadline, asked + 2.0)
+            while not (answered := [future for future in futures if future.done()]):
                 if time.monotonic() > patience:
                     raise UserError(f"the node {remote} does not answer the call of {name}")
+                if time.monotonic() > asked + ASK_AGAIN * len(futures):
+                    futures.append(client.call_async(request))
                 _spin_once(node, stop)
-            results.append(future.result())
+            results.append(answered[0].result())
         return results
     finally:
         node.destroy_client(client)
