@@ -5,12 +5,12 @@ import time
 
 import numpy as np
 import pytest
+from bag_tools import replayed
 from geometry_msgs.msg import PoseStamped, TransformStamped
 from node_calls import set_parameter
 from waving_sheet import sheet_faces, sheet_positions
 
 from hpccd_ros import client
-from hpccd_ros.bag.reader import Recording
 from hpccd_ros.detect.core import Options
 from hpccd_ros.detect.layout import Layout
 from hpccd_ros.detect.rigid_step import RigidOptions
@@ -20,8 +20,6 @@ from hpccd_ros.frames.types import MeshSettings, Placement, SceneFrame, Topology
 from hpccd_ros.middleware import contact_messages, fields, qos
 from hpccd_ros.params import scene_parameters, values
 from hpccd_ros.params.values import ParameterError
-from hpccd_ros.replay import recorded_setup
-from hpccd_ros.replay.recomputed import Replay
 from hpccd_ros.rigid.body import Body
 from hpccd_ros.rigid.transform import Rigid
 
@@ -89,10 +87,8 @@ def give_shape(node):
     node.peer.vertices("blade", CORNERS.astype(np.float32), stamp=0)
 
 
-def replayed(path):
-    with Recording(path) as recording:
-        replay = Replay(recording, recorded_setup.of_recording(recording))
-        steps = list(replay.steps())
+def verified_steps(path):
+    replay, steps = replayed(path)
     assert replay.diverged == replay.unverified == 0 and replay.verified == len(steps)
     return steps
 
@@ -134,7 +130,7 @@ def test_streamed_recorded_and_verified(start_node, tmp_path, by):
     node.wait_until(lambda: node.peer.statuses["detection"][1].startswith(warned), warned)
     assert node.peer.statuses["detection"][2]["coarse"] == "1"
     assert node.stop() == 0
-    steps = replayed(path)
+    steps = verified_steps(path)
     assert [step.bounds.parts for step in steps][-2:] == [coarse.parts, 64] and len(steps) == 9
 
 
@@ -176,12 +172,10 @@ def test_each_file_of_a_split_recording_has_the_shape(start_node, tmp_path):
         time.sleep(0.1)
     assert node.stop() == 0
     files = sorted(folder.glob("*.mcap"))
-    assert len(files) > 2 and len(replayed(folder)) == 15
+    assert len(files) > 2 and len(verified_steps(folder)) == 15
     verified = 0
     for file in files:
-        with Recording(file) as recording:
-            replay = Replay(recording, recorded_setup.of_recording(recording))
-            list(replay.steps())
+        replay, _ = replayed(file)
         assert not replay.diverged and not any(counter.total for counter in replay.source.refused.values())
         verified += replay.verified
     assert verified > 2

@@ -2,6 +2,7 @@
 """Meshes that come as shape_msgs/Mesh or as markers of triangles: answered, refused, recorded and computed again."""
 
 import numpy as np
+from bag_tools import replayed
 from cloth_and_net import FACES, N
 from hpccd.msg import MeshTopology
 from node_process import assert_same_contacts
@@ -18,8 +19,6 @@ from hpccd_ros.middleware import fields, mesh_messages, qos
 from hpccd_ros.record import recorded_topics
 from hpccd_ros.record.recording_info import recording_info
 from hpccd_ros.record.topic_recorder import Recorder
-from hpccd_ros.replay import recorded_setup
-from hpccd_ros.replay.recomputed import Replay
 from hpccd_ros.rigid.transform import Rigid
 
 # As the node numbers the corners of a marker: vertices in the order of their first use.
@@ -34,13 +33,6 @@ def sheet(k, offset=0.0):
 
 def send(node, kind, message, mesh="cloth"):
     node.peer.publisher(type(message), f"meshes/{mesh}/{kind}").publish(message)
-
-
-def replayed(path):
-    with Recording(path) as recording:
-        replay = Replay(recording, recorded_setup.of_recording(recording))
-        list(replay.steps())
-        return replay
 
 
 def test_a_stream_of_markers(start_node, tmp_path, hpccd):
@@ -98,9 +90,9 @@ def test_a_stream_of_markers(start_node, tmp_path, hpccd):
     bag.close()
     assert node.stop() == 0
 
-    replay = replayed(path)
+    replay, _ = replayed(path)
     assert (replay.verified, replay.diverged, replay.unverified) == (6, 0, 0)
-    replay = replayed(late)
+    replay, _ = replayed(late)
     assert (replay.verified, replay.diverged, replay.unverified) == (2, 0, 0)
     done = hpccd("replay", path)
     assert done.returncode == 0 and "VERIFIED: 6 answers are equal" in done.stdout, done.stdout + done.stderr
@@ -133,7 +125,7 @@ def test_a_stream_of_shapes_within_a_room_of_one(start_node, tmp_path):
     values = node.frames_status(dropped__cloth__index_range=1)
     assert f"triangle 3 names vertex {N * N}, there are {N * N} vertices" in values["last_refusal"]
     assert node.stop() == 0
-    replay = replayed(path)
+    replay, _ = replayed(path)
     assert (replay.verified, replay.diverged, replay.unverified) == (3, 0, 0)
     with Recording(path) as recording:
         topic = f"{node.namespace}/meshes/cloth/shape"

@@ -6,6 +6,7 @@ import sys
 
 import numpy as np
 import pytest
+from bag_tools import replayed
 from geometry_msgs.msg import TransformStamped
 from mesh_in_a_hand import FACES, SCENE, SECOND, N, topologies, transform
 from node_process import PATIENCE, assert_same_contacts
@@ -19,7 +20,6 @@ from hpccd_ros.record import recorded_topics
 from hpccd_ros.record.recording_info import recording_info
 from hpccd_ros.record.topic_recorder import Recorder
 from hpccd_ros.replay import recorded_setup
-from hpccd_ros.replay.recomputed import Replay
 from hpccd_ros.rigid.transform import Rigid
 
 STEPS = 12
@@ -82,10 +82,8 @@ def of_tf2(node):
     )
 
 
-def replayed(path):
-    with Recording(path) as recording:
-        replay = Replay(recording, recorded_setup.of_recording(recording))
-        steps = list(replay.steps())
+def compared(path):
+    replay, steps = replayed(path)
     assert replay.diverged == 0, replay.first_divergence.difference
     return replay, steps
 
@@ -113,10 +111,10 @@ def test_verified_from_the_file(start_node, tmp_path, topics):
     assert node.stop() == 0
 
     for path in (own, other):
-        replay, steps = replayed(path)
+        replay, steps = compared(path)
         assert (replay.verified, replay.unverified) == (STEPS - 1, 0)
         assert [step.recorded.hash for step in steps] == [message.hash for message in node.peer.received]
-    alone = [replayed(file)[0].verified for file in sorted(other.glob("*.mcap"))]
+    alone = [compared(file)[0].verified for file in sorted(other.glob("*.mcap"))]
     assert len(alone) > 2 and all(alone[:-1]), "each file has the static transforms in force"
 
 

@@ -11,24 +11,15 @@ import time
 from itertools import pairwise
 
 import pytest
-from bag_tools import read_by_mcap_ros2, read_by_rosbags
+from bag_tools import read_by_mcap_ros2, read_by_rosbags, replayed
 from live import Live
 
 from hpccd_ros.bag.examine import examine
 from hpccd_ros.bag.reader import Recording
 from hpccd_ros.bag.recover import recover
-from hpccd_ros.replay import recorded_setup
-from hpccd_ros.replay.recomputed import Replay
 
 KILLS = int(os.environ.get("HPCCD_KILLS", "8"))
 FLUSH = 0.2  # s
-
-
-def replayed(path):
-    with Recording(path) as recording:
-        replay = Replay(recording, recorded_setup.of_recording(recording))
-        list(replay.steps())
-    return replay
 
 
 def wait_for_verified_answers(live, path, count):
@@ -38,7 +29,7 @@ def wait_for_verified_answers(live, path, count):
         live.wait_for_answers(path, answers)
         so_far = path.with_name(f"{path.stem}_{answers}.mcap")
         recover(path, so_far)
-        replay = replayed(so_far)
+        replay, _ = replayed(so_far)
         if replay.verified >= count:
             return
         answers = replay.recorded_answers + count
@@ -77,7 +68,7 @@ def test_killed_at_random_moments(children, namespace, tmp_path, compression):
                 sequences[message.topic].append(message.sequence)
             gaps = {topic: [(a, b) for a, b in pairwise(n) if b != a + 1] for topic, n in sequences.items()}
             assert not any(gaps.values()), gaps
-        replay = replayed(saved)
+        replay, _ = replayed(saved)
         assert replay.diverged == 0 and replay.verified > 0
         # Bound: the open chunk, closed every FLUSH seconds. On a machine left alone the rest is 0.1 s; a busy one may
         # hold any of the three processes for seconds, and no test should depend on that.

@@ -7,7 +7,7 @@ import time
 import numpy as np
 import pytest
 import rclpy
-from bag_tools import read_by_mcap_ros2, read_by_rosbags, typestore
+from bag_tools import read_by_mcap_ros2, read_by_rosbags, replayed, typestore
 from live import PATIENCE, Live
 from rclpy.executors import SingleThreadedExecutor
 from rosbags.rosbag2 import Reader
@@ -16,8 +16,6 @@ from hpccd_ros import scenes
 from hpccd_ros.bag.reader import Recording
 from hpccd_ros.middleware import environment
 from hpccd_ros.middleware.message_types import message_class
-from hpccd_ros.replay import recorded_setup
-from hpccd_ros.replay.recomputed import Replay
 
 FRAMES = 30
 OUTPUTS = 'outputs:=["points", "normals"]'
@@ -40,9 +38,7 @@ def _record(live, path, *options, stop=signal.SIGINT, node_options=(), publisher
 
 
 def _verified(path):
-    with Recording(path) as recording:
-        replay = Replay(recording, recorded_setup.of_recording(recording))
-        steps = list(replay.steps())
+    replay, steps = replayed(path)
     assert replay.diverged == replay.unverified == 0
     return steps
 
@@ -121,9 +117,7 @@ def _whole_steps(file) -> int:
 
 
 def _verified_file(file):
-    with Recording(file) as recording:
-        replay = Replay(recording, recorded_setup.of_recording(recording))
-        steps = list(replay.steps())
+    replay, steps = replayed(file)
     assert replay.diverged == 0
     return steps
 

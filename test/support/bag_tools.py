@@ -11,6 +11,8 @@ from hpccd_ros.bag import message_definitions
 from hpccd_ros.bag.decode import completion
 from hpccd_ros.bag.reader import Recording
 from hpccd_ros.bag.writer import BagWriter, Topic
+from hpccd_ros.replay import recorded_setup
+from hpccd_ros.replay.recomputed import Replay
 
 STRING = "std_msgs/msg/String"
 
@@ -66,6 +68,13 @@ def read_by_mcap_ros2(path):
 def raw_messages(path):
     with Recording(path) as recording:
         return list(recording.messages())
+
+
+def replayed(path):
+    """The replay of a whole recording, and its steps."""
+    with Recording(path) as recording:
+        replay = Replay(recording, recorded_setup.of_recording(recording))
+        return replay, list(replay.steps())
 
 
 def as_installed(recording):

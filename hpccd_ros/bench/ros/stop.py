@@ -49,8 +49,7 @@ def run(args) -> int:
     report = command.begin_report(args)
     with tempfile.TemporaryDirectory(prefix="hpccd-bench-") as folder:
         _measure(report, args, Path(folder))
-    if not report.failures:
-        _costs(report)
+    _costs(report)
     _tables(report)
     return command.end(args, report)
 
