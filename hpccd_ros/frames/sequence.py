@@ -23,7 +23,11 @@ class SequenceWatch:
         before. The middleware may report the first publisher after its first message: there is nothing to forget then.
         """
         if 0 < new and 1 < total:
-            self._last = None
+            self.forget()
+
+    def forget(self) -> None:
+        """The numbers to come have nothing to do with those before."""
+        self._last = None
 
     def next(self, number: int) -> tuple[int, bool]:
         """(messages missing before this one, whether it is the first of another publisher).

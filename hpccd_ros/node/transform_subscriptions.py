@@ -69,7 +69,9 @@ class TransformSubscriptions:
             self._unread(Refusal(topic.name, Reason.MALFORMED, f"{name}: {UNREADABLE}", what=Input.TRANSFORM), topic)
 
         def matched(event: Any) -> None:
-            numbers.matched(event.total_count, event.total_count_change)
+            # Also if one of several ended: numbers of the others follow its own. The first may be reported late.
+            if event.total_count > 1:
+                numbers.forget()
 
         def receive(message: Any, info: dict[str, Any]) -> None:
             heard[name] += 1

@@ -11,8 +11,9 @@ from rclpy.parameter import parameter_value_to_python
 
 from hpccd_ros.base.errors import UserError
 
-# s. A response is lost if the node discovers the client only after it has answered.
-ASK_AGAIN = 2.0
+# s; twice as long each time, as a slow node would be flooded. A response is lost if the node discovers the client only
+# after it has answered. Once a client has received one, no later one is lost for that reason.
+ASK_AGAIN = 1.0
 
 
 def of(node) -> dict:
@@ -54,7 +55,7 @@ def _call(node, service, name, requests, *, deadline, remote, stop):
             while not (answered := [future for future in futures if future.done()]):
                 if time.monotonic() > patience:
                     raise UserError(f"the node {remote} does not answer the call of {name}")
-                if time.monotonic() > asked + ASK_AGAIN * len(futures):
+                if not results and time.monotonic() > asked + ASK_AGAIN * (2 ** len(futures) - 1):
                     futures.append(client.call_async(request))
                 _spin_once(node, stop)
             results.append(answered[0].result())

@@ -212,6 +212,40 @@ def test_messages_that_cannot_be_deserialised(start_stream):
     assert is_refused("mesh table rejected: malformed") and stream.listener.stop
 
 
+def test_a_publisher_of_static_transforms_that_ends_is_no_loss(start_stream):
+    """The numbers of the one that stays follow those of the one that ended."""
+    stream = start_stream(mesh={"hand": {"transform": "tf", "frame": "mount"}}, frame_id="world")
+    peer, node = stream.node.peer, stream.node.peer.node
+    stays, ends = (node.create_publisher(TransformStamped, "transforms_static", qos.TRANSFORMS_STATIC) for _ in "ab")
+
+    def publish(publisher, child):
+        message = TransformStamped(child_frame_id=child)
+        message.header.frame_id, message.transform.rotation.w = "world", 1.0
+        publisher.publish(message)
+
+    def used(child):
+        """Wait until a transform is in use: a frame in its coordinates is answered."""
+        stream.sent += 1
+        peer.vertices("hand", hand(2.0), stamp=stream.sent, frame_id=child)
+        peer.vertices("table", TABLE, stamp=stream.sent, frame_id="world")
+        stream.answered()
+
+    stream.topologies()
+    stream.node.wait_until(lambda: min(p.get_subscription_count() for p in (stays, ends)) == 1, "both are heard")
+    for _ in range(3):
+        publish(stays, "other")
+    publish(stays, "mount")
+    used("mount")
+    publish(ends, "mount")
+    used("mount")
+    node.destroy_publisher(ends)
+    stream.node.wait_until(lambda: node.count_publishers(stays.topic_name) == 1, "one has ended")
+    publish(stays, "mount")
+    for _ in range(5):
+        used("mount")
+    assert stream.node.frames_status(answered=2 * stream.sent).get("transforms_refused", "0") == "0"
+
+
 SLIDER = """<robot name="arm"><link name="base"/><link name="tip"><collision><geometry><box size="0.1 0.1 0.1"/>
 </geometry></collision></link><joint name="z" type="prismatic"><parent link="base"/><child link="tip"/>
 <axis xyz="0 0 1"/><limit lower="-9" upper="9"/></joint></robot>"""
