@@ -2,6 +2,7 @@
 """Many frames in a row: memory settles, auto picks a backend, the moving scene stays equal."""
 
 import ctypes
+import os
 import resource
 
 import numpy as np
@@ -24,6 +25,7 @@ def free_device_memory():
     return free.value
 
 
+@pytest.mark.skipif("PYTEST_XDIST_WORKER" in os.environ, reason="memory of the whole device: without -n")
 @pytest.mark.parametrize("backend", ("gpu", "hybrid"))
 def test_a_thousand_frames_do_not_grow(backend):
     scene, t0, t1 = scenes.join([scenes.crumpled(np.random.default_rng(1), 40)])

@@ -219,6 +219,14 @@ def test_meshes_of_another_node_are_not_counted(streaming, start_node):
     for name in ("ball", "clot"):
         node.peer.node.create_subscription(MeshTopology, f"meshes/{name}/topology", lambda message: None, 10)
     node.peer.topology("ball", FACES, N * N)
+    publisher = node.peer.publisher(MeshVertices, "meshes/ball/vertices")  # the first node may be its first reader
+
+    def other_listens():
+        found = node.peer.node.get_subscriptions_info_by_topic(publisher.topic_name)
+        named = other.namespace in {subscription.node_namespace for subscription in found}
+        return named and publisher.get_subscription_count() >= len(found)
+
+    node.wait_until(other_listens, "the subscription of the other node")
     for k in range(3):
         node.peer.vertices("ball", sheet_positions(N, k), k)
         other.frames_status(received=k + 1, answered=k + 1)
