@@ -110,6 +110,7 @@ def test_interrupted_demo_leaves_no_process(tmp_path, demo_domain, number):
     process = subprocess.Popen(
         [sys.executable, "-m", "hpccd_ros.cli", "demo", "--size", "0.1", "--rate", "5"], cwd=tmp_path,
         stdout=subprocess.PIPE, text=True, env={**os.environ, "PYTHONPATH": SOURCES},
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # a shell's background job ignores it
     )  # fmt: skip
     for line in process.stdout:
         if line.startswith("processes"):
