@@ -28,7 +28,7 @@ node = rclpy.create_node("reader")
 hear = lambda message: print(message.data, flush=True)
 node.create_subscription(UInt32, "listeners/numbers", hear, QoSProfile(depth=10))
 while rclpy.ok():
-    # Not rclpy.spin: on a busy machine it has slept on a message that was there until a request of a service came.
+    # Not rclpy.spin: on a busy machine it sometimes misses that a message arrived, and sleeps until the next event.
     rclpy.spin_once(node, timeout_sec=0.1)
 """
 
@@ -77,7 +77,7 @@ def reader():
 
 def heard(reader):
     """The next number that the reader has heard."""
-    assert select.select([reader.stdout], [], [], PATIENCE)[0], "the reader has acknowledged what it never took"
+    assert select.select([reader.stdout], [], [], PATIENCE)[0], "the reader acknowledged a message that it did not take"
     return int(os.read(reader.stdout.fileno(), 2))
 
 
