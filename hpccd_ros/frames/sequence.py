@@ -23,11 +23,7 @@ class SequenceWatch:
         before. The middleware may report the first publisher after its first message: there is nothing to forget then.
         """
         if 0 < new and 1 < total:
-            self.forget()
-
-    def forget(self) -> None:
-        """The numbers to come have nothing to do with those before."""
-        self._last = None
+            self._last = None
 
     def next(self, number: int) -> tuple[int, bool]:
         """(messages missing before this one, whether it is the first of another publisher).
@@ -47,3 +43,38 @@ class SequenceWatch:
         next one stands for it."""
         unnoticed, self._unnoticed = self._unnoticed, False
         return unnoticed
+
+
+class InterleavedSequences:
+    """Finds lost messages on a topic of several publishers, which the middleware does not tell apart.
+
+    Each number is taken as part of the sequence with the largest number below it. If that sequence is another
+    publisher's, a loss can stay hidden, until two messages were read while there was one publisher alone.
+    """
+
+    MOST = 16  # sequences that are remembered
+
+    def __init__(self) -> None:
+        self._lasts: list[int] = []  # of each sequence, the one read last at the end
+        self._unheard = 0  # publishers reported and not read; below 0: read and not reported
+        self._alone = False
+
+    def matched(self, new: int, ended: int) -> None:
+        """``new`` publishers were reported since the last call, and the end of ``ended`` ones."""
+        self._unheard += new
+        if ended:
+            self._unheard = min(self._unheard, 0)  # a publisher may end unheard
+
+    def missing(self, number: int, alone: bool) -> int:
+        """Messages lost before this one. alone: there is one publisher now."""
+        if alone and self._alone:
+            self._lasts = self._lasts[-1:]  # the other sequences are those of publishers that ended
+        self._alone = alone
+        last = max((last for last in self._lasts if last < number), default=None)
+        if last is None or (last < number - 1 and self._unheard > 0):
+            self._unheard -= 1
+            self._lasts = [*self._lasts, number][-self.MOST :]
+            return 0
+        self._lasts.remove(last)
+        self._lasts.append(number)
+        return number - last - 1

@@ -9,7 +9,7 @@ from hpccd_ros.base.clocks import Clocks
 from hpccd_ros.frames.drops import Input, Reason, Refusal
 from hpccd_ros.frames.pipeline import FramePipeline
 from hpccd_ros.frames.rate_limit import RateLimit
-from hpccd_ros.frames.sequence import SequenceWatch
+from hpccd_ros.frames.sequence import InterleavedSequences
 from hpccd_ros.middleware import qos, transform_topics, unreadable
 from hpccd_ros.middleware.message_types import message_class
 from hpccd_ros.middleware.transform_topics import TransformTopic
@@ -52,16 +52,17 @@ class TransformSubscriptions:
     def _subscribe(self, topic: TransformTopic) -> InputSubscription:
         limit = RateLimit(self._max_rate)
         name, heard = self._name(topic), self._pipeline.transforms.heard
-        numbers = SequenceWatch()
+        numbers = InterleavedSequences()
         unreadable_since = 0  # since the last message read
 
         def missing(number: int) -> int:
             """Static transforms lost before this message, without those known to be unreadable."""
             nonlocal unreadable_since
-            gap, known = numbers.next(number)[0], unreadable_since
+            alone, known = subscription.publishers <= 1, unreadable_since
+            gap = numbers.missing(number, alone)
             unreadable_since = 0
-            # Sequence numbers of several publishers interleave: gaps mean nothing then.
-            return gap - known if topic.static and gap > known and subscription.publishers <= 1 else 0
+            # With several publishers a gap may be one between two of them.
+            return gap - known if topic.static and gap > known and alone else 0
 
         def on_unreadable() -> None:
             nonlocal unreadable_since
@@ -69,9 +70,8 @@ class TransformSubscriptions:
             self._unread(Refusal(topic.name, Reason.MALFORMED, f"{name}: {UNREADABLE}", what=Input.TRANSFORM), topic)
 
         def matched(event: Any) -> None:
-            # Also if one of several ended: numbers of the others follow its own. The first may be reported late.
-            if event.total_count > 1:
-                numbers.forget()
+            new = event.total_count_change
+            numbers.matched(new, new - event.current_count_change)
 
         def receive(message: Any, info: dict[str, Any]) -> None:
             heard[name] += 1

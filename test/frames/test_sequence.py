@@ -2,7 +2,7 @@
 """Lost messages and new publishers from sequence numbers; the log of refusals."""
 
 from hpccd_ros.frames.drops import Reason, Refusal
-from hpccd_ros.frames.sequence import SequenceWatch
+from hpccd_ros.frames.sequence import InterleavedSequences, SequenceWatch
 from hpccd_ros.node.refusal_log import RefusalLog
 
 
@@ -32,6 +32,29 @@ def test_a_publisher_reported_after_its_first_message_hides_no_loss():
     assert watch.next(1) == (0, False)
     watch.matched(total=1, new=1)
     assert watch.next(3) == (1, False)
+
+
+def interleaved(*steps):
+    """The losses that are found. steps: numbers read, "+" and "-" where a publisher is reported or its end."""
+    sequences, publishers, found = InterleavedSequences(), 0, []
+    for step in steps:
+        if step in ("+", "-"):
+            publishers += 1 if step == "+" else -1
+            sequences.matched(new=step == "+", ended=step == "-")
+        else:
+            found.append(sequences.missing(step, alone=publishers <= 1))
+    return found
+
+
+def test_sequences_of_several_publishers():
+    assert interleaved("+", 4, 5, 8) == [0, 0, 2]
+    assert interleaved(1, "+", 3) == [0, 1], "reported after its first message"
+    assert interleaved("+", 1, 2, "-", "+", 1, 2, 4) == [0, 0, 0, 0, 1]
+    assert interleaved("+", 1, 2, "-", 1, "+", 3) == [0, 0, 0, 1], "not the next one of the publisher that ended"
+    assert interleaved("+", 1, "+", 50, 2, 51, 3, "-", 52, 54) == [0, 0, 0, 0, 0, 0, 1]
+    assert interleaved("+", 2, "-", "+", 7, 9) == [0, 0, 1], "the start of another publisher was overwritten"
+    assert interleaved("+", "+", 1, 1, 2, 3, "-", 5) == [0, 0, 0, 0, 1]
+    assert interleaved("+", "+", 1, "-", 3) == [0, 1], "the one that ended was never read"
 
 
 def test_refusals_do_not_flood_the_log():

@@ -212,7 +212,8 @@ def test_messages_that_cannot_be_deserialised(start_stream):
     assert is_refused("mesh table rejected: malformed") and stream.listener.stop
 
 
-def test_a_publisher_of_static_transforms_that_ends_is_no_loss(start_stream):
+@pytest.mark.parametrize("lost", [False, True])
+def test_a_publisher_of_static_transforms_that_ends_is_no_loss_and_hides_none(start_stream, lost):
     """The numbers of the one that stays follow those of the one that ended."""
     stream = start_stream(mesh={"hand": {"transform": "tf", "frame": "mount"}}, frame_id="world")
     peer, node = stream.node.peer, stream.node.peer.node
@@ -240,10 +241,21 @@ def test_a_publisher_of_static_transforms_that_ends_is_no_loss(start_stream):
     used("mount")
     node.destroy_publisher(ends)
     stream.node.wait_until(lambda: node.count_publishers(stays.topic_name) == 1, "one has ended")
-    publish(stays, "mount")
+    if lost:
+        stream.node.process.send_signal(signal.SIGSTOP)  # so that the next two messages are taken together
+        stays.publish(serialize_message(TransformStamped(child_frame_id="mount"))[:24])
+        publish(stays, "other")
+        time.sleep(0.3)
+        stream.node.process.send_signal(signal.SIGCONT)
+    else:
+        publish(stays, "mount")
     for _ in range(5):
         used("mount")
-    assert stream.node.frames_status(answered=2 * stream.sent).get("transforms_refused", "0") == "0"
+    refused = stream.node.frames_status(answered=2 * stream.sent).get("transforms_refused", "0")
+    assert refused == ("1" if lost else "0")
+    if lost:
+        stream.status("refused", "hand")
+        assert stream.listener.stop
 
 
 SLIDER = """<robot name="arm"><link name="base"/><link name="tip"><collision><geometry><box size="0.1 0.1 0.1"/>
