@@ -4,10 +4,12 @@
 import subprocess
 import sys
 import threading
+import time
 
+import pytest
 import rclpy
 from node_process import PATIENCE
-from rcl_interfaces.srv import GetParameters
+from rcl_interfaces.srv import GetParameters, ListParameters
 from rclpy.executors import SingleThreadedExecutor
 
 from hpccd_ros.middleware import environment
@@ -24,26 +26,51 @@ print(node_parameters.fetch(node, "/served", float(sys.argv[1]))["number"])
 """
 
 
-def test_a_lost_response_is_asked_for_again():
-    """DDS loses it if the node discovers the client only after it has answered."""
+@pytest.fixture
+def served():
+    """A node with the parameter `number` that answers in a thread of its own."""
     environment.prepare()
     context = rclpy.Context()
     rclpy.init(context=context)
     node = rclpy.create_node("served", context=context)
     node.declare_parameter("number", 7)
-    (service,) = (one for one in node.services if one.srv_type is GetParameters)
-    send, lost = service.send_response, []
-    service.send_response = lambda *response: send(*response) if lost else lost.append(response)
     executor = SingleThreadedExecutor(context=context)
     executor.add_node(node)
     thread = threading.Thread(target=executor.spin)
     thread.start()
-    try:
-        asking = [sys.executable, "-c", ASKING, str(PATIENCE)]
-        done = subprocess.run(asking, capture_output=True, text=True, timeout=2 * PATIENCE)
-        assert (done.returncode, done.stdout, len(lost)) == (0, "7\n", 1), done.stderr
-    finally:
-        executor.shutdown()
-        thread.join()
-        node.destroy_node()
-        rclpy.shutdown(context=context)
+    yield node
+    executor.shutdown()
+    thread.join()
+    node.destroy_node()
+    rclpy.shutdown(context=context)
+
+
+def ask(wait):
+    command = [sys.executable, "-c", ASKING, str(wait)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=2 * PATIENCE)
+
+
+def test_a_lost_response_is_asked_for_again(served):
+    """DDS loses it if the node discovers the client only after it has answered."""
+    (service,) = (one for one in served.services if one.srv_type is GetParameters)
+    send, lost = service.send_response, []
+    service.send_response = lambda *response: send(*response) if lost else lost.append(response)
+    done = ask(PATIENCE)
+    assert (done.returncode, done.stdout, len(lost)) == (0, "7\n", 1), done.stderr
+
+
+def test_a_slow_node_has_its_time_for_each_request(served):
+    """It answers the copies of one request, sent after 1 s, before the next, for which it has 2 s at least."""
+    for service in served.services:
+        if service.srv_type in (GetParameters, ListParameters):
+            service.callback = delayed(service.callback)
+    done = ask(2.0)
+    assert (done.returncode, done.stdout) == (0, "7\n"), done.stderr
+
+
+def delayed(callback):
+    def answer(request, response):
+        time.sleep(1.2)
+        return callback(request, response)
+
+    return answer
