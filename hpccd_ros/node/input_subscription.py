@@ -116,7 +116,7 @@ def unheard(subscriptions: Iterable[InputSubscription]) -> list[str]:
 def _node_of(publisher: Any) -> str:
     if publisher.node_name == "_NODE_NAME_UNKNOWN_":  # ROS discovers nodes after their publishers
         return "whose node is not known yet"
-    if publisher.node_name.startswith("_"):  # _CREATED_BY_BARE_DDS_APP_
+    if publisher.node_name == "_CREATED_BY_BARE_DDS_APP_":
         return "that is not a ROS node"
     name = f"{publisher.node_namespace.rstrip('/')}/{publisher.node_name}"
     return f"of node {shortened(name)}"

@@ -4,6 +4,7 @@
 import pytest
 from geometry_msgs.msg import TransformStamped
 from hpccd.msg import MeshTopology, MeshVertices
+from rclpy.node import Node
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
@@ -65,6 +66,15 @@ def test_each_input_names_topic_offer_request_and_remedy(node):
     for publisher in publishers:
         node.peer.node.destroy_publisher(publisher)
     node.wait_until(lambda: name not in _message(node), "the end of the warnings")
+
+
+def test_a_node_whose_name_begins_with_an_underscore_is_named(node):
+    """As those of `ros2 topic pub` do."""
+    hidden = Node("_hidden", namespace=node.namespace, context=node.peer.context)
+    hidden.create_publisher(MeshVertices, "meshes/cloth/vertices", qos.keep_last(1, reliable=False))
+    said = f"a publisher of node {node.namespace}/_hidden offers best_effort"
+    node.wait_until(lambda: said in _message(node), said)
+    hidden.destroy_node()
 
 
 def test_a_publisher_that_offers_more_is_heard(node):
