@@ -90,15 +90,19 @@ sanitize: $(ENVIRONMENT) ## C++ tests under AddressSanitizer + UndefinedBehavior
 fuzz: venv ## Compare the core with the exact oracle on random and degenerate queries (FUZZ_ARGS=--help)
 	$(BIN)/python -m hpccd_core.fuzz $(FUZZ_ARGS)
 
-lint: $(ENVIRONMENT) ## Check style, types, and who imports or includes whom: ruff, mypy, import-linter, clang-format
+lint: $(ENVIRONMENT) ## Check style, types, layers and commit subjects: ruff, mypy, import-linter, clang-format
 	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-logo --cache-dir build/import-linter
 	$(BIN)/python scripts/check_includes.py
 	@git ls-files -z '*.h' '*.cpp' '*.inl' '*.cu' '*.cuh' | xargs -0r $(BIN)/clang-format --dry-run --Werror
+	@git log --since=2026-11-27T08:30Z --format='%h%x09%s' | awk -F'\t' 'length($$2) > 72 { \
+	  print "commit " $$1 ": the subject \"" $$2 "\" has more than 72 characters; shorten it"; long = 1 } END { exit long }'
 
-format: $(ENVIRONMENT) ## Mend the style where a tool can
+format: $(ENVIRONMENT) ## Fix the style where a tool can
 	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
 	@git ls-files -z '*.h' '*.cpp' '*.inl' '*.cu' '*.cuh' | xargs -0r $(BIN)/clang-format -i
 
 release-check: $(ENVIRONMENT) ## What must be settled before a release: placeholders, dates, versions

@@ -65,15 +65,23 @@ class CMakeBuild(build_ext):
         generator = ["-G", "Ninja", f"-DCMAKE_MAKE_PROGRAM={ninja}"] if ninja else []
         env = os.environ | {"AMENT_PREFIX_PATH": str(prefix), "CMAKE_PREFIX_PATH": str(prefix)}
         configure = [
-            cmake, "-S", str(HERE), "-B", str(build), *generator,
-            "-DCMAKE_BUILD_TYPE=Release", "-DBUILD_TESTING=OFF", "-DHPCCD_PIP=ON",
+            cmake,
+            "-S",
+            str(HERE),
+            "-B",
+            str(build),
+            *generator,
+            "-DCMAKE_BUILD_TYPE=Release",
+            "-DBUILD_TESTING=OFF",
+            "-DHPCCD_PIP=ON",
             f"-DCMAKE_PROJECT_INCLUDE={HERE / 'cmake' / 'pypi_ros.cmake'}",
             f"-DCMAKE_INSTALL_PREFIX={stage}",
             f"-DCMAKE_INSTALL_RPATH={RPATH}",
             # rosidl asks for Python3, pybind11 for Python.
-            f"-DPython3_EXECUTABLE={sys.executable}", f"-DPython_EXECUTABLE={sys.executable}",
+            f"-DPython3_EXECUTABLE={sys.executable}",
+            f"-DPython_EXECUTABLE={sys.executable}",
             *shlex.split(os.environ.get("CMAKE_ARGS", "")),
-        ]  # fmt: skip
+        ]
         subprocess.check_call(configure, env=env)
         subprocess.check_call([cmake, "--build", str(build), "--parallel", self._jobs()], env=env)
         subprocess.check_call([cmake, "--install", str(build)], env=env, stdout=subprocess.DEVNULL)
@@ -82,9 +90,11 @@ class CMakeBuild(build_ext):
         for package in PYTHON_PACKAGES_OF_CMAKE:
             if (site_packages / package).is_dir():
                 shutil.copytree(
-                    site_packages / package, Path(self.build_lib) / package, dirs_exist_ok=True,
+                    site_packages / package,
+                    Path(self.build_lib) / package,
+                    dirs_exist_ok=True,
                     ignore=shutil.ignore_patterns("__pycache__", "*.c"),
-                )  # fmt: skip
+                )
         shutil.rmtree(site_packages.parent)
         self.distribution.hpccd_stage = stage
 

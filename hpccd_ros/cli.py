@@ -94,9 +94,7 @@ def _run(argv, asked) -> int:
     subparsers = parser.add_subparsers(dest="command", metavar="<command>", required=True)
     run = None
     for name, summary in COMMANDS.items():
-        subparser = subparsers.add_parser(
-            name, help=summary, formatter_class=argparse.RawDescriptionHelpFormatter
-        )
+        subparser = subparsers.add_parser(name, help=summary, formatter_class=argparse.RawDescriptionHelpFormatter)
         if name == asked:
             module = importlib.import_module(f"hpccd_ros.commands.{name}")
             subparser.description = module.__doc__

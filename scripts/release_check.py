@@ -23,9 +23,18 @@ PLACEHOLDER = re.compile(r"\b(?:placeholder|not settled|are settled)\b", re.IGNO
 URL_KINDS = ("website", "repository", "bugtracker")
 PACKAGES = ("package.xml", "examples/cpp/package.xml")
 # Files that tell users whom to turn to.
-FOR_PEOPLE = (*PACKAGES, "CITATION.cff", "SECURITY.md", "pyproject.toml", "hpccd_core/pyproject.toml",
-              ".github/ISSUE_TEMPLATE/config.yml", "CONTRIBUTING.md", "QUALITY_DECLARATION.md", "README.md",
-              "docs/releasing.md")  # fmt: skip
+FOR_PEOPLE = (
+    *PACKAGES,
+    "CITATION.cff",
+    "SECURITY.md",
+    "pyproject.toml",
+    "hpccd_core/pyproject.toml",
+    ".github/ISSUE_TEMPLATE/config.yml",
+    "CONTRIBUTING.md",
+    "QUALITY_DECLARATION.md",
+    "README.md",
+    "docs/releasing.md",
+)
 
 
 def findings(root: Path) -> Iterator[str]:

@@ -30,7 +30,6 @@ def pytest_collection_modifyitems(config, items):
                 item.add_marker(pytest.mark.skip(reason="takes minutes; make test-long runs it"))
 
 
-
 @pytest.fixture(scope="session")
 def data_folder():
     """Folder of scenes and queries with ground truth."""
@@ -73,9 +72,14 @@ def hpccd(tmp_path):
 
     def run(*arguments, **options):
         return subprocess.run(
-            [sys.executable, "-m", "hpccd_ros.cli", *map(str, arguments)], cwd=tmp_path, text=True,
-            capture_output=True, timeout=500, env={**os.environ, "PYTHONPATH": SOURCES}, **options,
-        )  # fmt: skip
+            [sys.executable, "-m", "hpccd_ros.cli", *map(str, arguments)],
+            cwd=tmp_path,
+            text=True,
+            capture_output=True,
+            timeout=500,
+            env={**os.environ, "PYTHONPATH": SOURCES},
+            **options,
+        )
 
     return run
 

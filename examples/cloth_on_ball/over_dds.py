@@ -46,9 +46,15 @@ def started_node(scene, threads: int, recording: Path | None):
         write_parameters(scene, parameters)
         record = ["-p", f"record:={recording.resolve()}"] if recording else []
         child = children.start(
-            "node", "hpccd_ros.node", "--ros-args", "--params-file", str(parameters),
-            "-p", f"threads:={threads}", *record,
-        )  # fmt: skip
+            "node",
+            "hpccd_ros.node",
+            "--ros-args",
+            "--params-file",
+            str(parameters),
+            "-p",
+            f"threads:={threads}",
+            *record,
+        )
         yield "hpccd"
         children.check()
         if children.end(child) != 0:

@@ -58,24 +58,54 @@ def main(argv=None) -> int:
 
 def _arguments(argv):
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--frames", type=int, default=240, metavar="N",
-                        help="the start and N - 1 moves, each of 10 ms unless it is shortened (default: %(default)s)")
-    parser.add_argument("--cells", type=int, default=100, metavar="N",
-                        help="along a side of the cloth, 2 N^2 triangles (default: %(default)s)")
-    parser.add_argument("--spin", type=float, default=Setup.spin, metavar="RAD/S",
-                        help="of the ball (default: %(default)s); at 12 some moves are solved again and again")
+    parser.add_argument(
+        "--frames",
+        type=int,
+        default=240,
+        metavar="N",
+        help="the start and N - 1 moves, each of 10 ms unless it is shortened (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--cells",
+        type=int,
+        default=100,
+        metavar="N",
+        help="along a side of the cloth, 2 N^2 triangles (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--spin",
+        type=float,
+        default=Setup.spin,
+        metavar="RAD/S",
+        help="of the ball (default: %(default)s); at 12 some moves are solved again and again",
+    )
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the cloth's unevenness (default: 0)")
     parser.add_argument("--threads", type=int, default=0, metavar="N", help="of the detector; 0: all cores (default)")
-    parser.add_argument("--node", nargs="?", const="", metavar="NAME",
-                        help="ask a node over DDS: the one with this name, or, without a name, one started for this")
-    parser.add_argument("--picture", type=Path, default=Path("cloth_on_ball.png"), metavar="FILE",
-                        help="six frames (default: %(default)s); an empty name for none")
+    parser.add_argument(
+        "--node",
+        nargs="?",
+        const="",
+        metavar="NAME",
+        help="ask a node over DDS: the one with this name, or, without a name, one started for this",
+    )
+    parser.add_argument(
+        "--picture",
+        type=Path,
+        default=Path("cloth_on_ball.png"),
+        metavar="FILE",
+        help="six frames (default: %(default)s); an empty name for none",
+    )
     parser.add_argument("--mcap", type=Path, metavar="FILE", help="recording; must not exist yet")
     parser.add_argument("--npz", type=Path, metavar="FILE", help="all frames as numpy arrays; must not exist yet")
     parser.add_argument("--params", type=Path, metavar="FILE", help="write the parameters of a node for this, and end")
     args = parser.parse_args(argv)
-    for name, least, most in (("frames", 2, 100_000), ("cells", 4, 1000), ("spin", 0, 30),
-                              ("seed", 0, 2**32 - 1), ("threads", 0, 1024)):
+    for name, least, most in (
+        ("frames", 2, 100_000),
+        ("cells", 4, 1000),
+        ("spin", 0, 30),
+        ("seed", 0, 2**32 - 1),
+        ("threads", 0, 1024),
+    ):
         if not least <= getattr(args, name) <= most:
             parser.error(f"--{name} {getattr(args, name)}: from {least} to {most}")
     for path, suffix in ((args.mcap, ".mcap"), (args.npz, ".npz"), (args.params, ".yaml")):
@@ -105,8 +135,11 @@ def run(args) -> int:
         queries = _queries(args, setup, scene, meshes, stack)
         simulation = Simulation(setup, queries, args.seed)
         account = Account(simulation, queries)
-        print(f"cloth {len(meshes[0].faces):,} triangles, ball {len(meshes[1].faces):,}; "
-              f"{setup.substeps} small steps a move", flush=True)
+        print(
+            f"cloth {len(meshes[0].faces):,} triangles, ball {len(meshes[1].faces):,}; "
+            f"{setup.substeps} small steps a move",
+            flush=True,
+        )
         for index in track(range(args.frames), "simulating", True):
             begin = time.perf_counter()
             move = simulation.move() if index else None

@@ -108,9 +108,18 @@ def crossed(rng: np.random.Generator, query: np.ndarray, other: np.ndarray) -> N
 
 Change = Callable[[np.random.Generator, np.ndarray, np.ndarray], None]
 CHANGES: tuple[Change, ...] = (
-    new_exponent, next_exponent, new_value, other_mantissa, negative, one_ulp,
-    same_number, same_point, scaled_axis, flat, crossed,
-)  # fmt: skip
+    new_exponent,
+    next_exponent,
+    new_value,
+    other_mantissa,
+    negative,
+    one_ulp,
+    same_number,
+    same_point,
+    scaled_axis,
+    flat,
+    crossed,
+)
 
 
 def _place(rng: np.random.Generator, query: np.ndarray) -> tuple[int, int]:

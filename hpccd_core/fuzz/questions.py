@@ -51,10 +51,13 @@ def kinds_of(question: str) -> tuple[str, ...]:
 
 def generators_of(question: str, kind: str) -> dict[str, Callable]:
     return {
-        CONTACT: GENERATORS, SEPARATION: NEAR_GENERATORS, PROXIMITY: SNAPSHOTS,
-        INTERSECTIONS: {EDGE_FACE: EDGE_FACE_POINTS}, DISTANCES: dict.fromkeys(TOPOLOGIES, GAP_POINTS),
+        CONTACT: GENERATORS,
+        SEPARATION: NEAR_GENERATORS,
+        PROXIMITY: SNAPSHOTS,
+        INTERSECTIONS: {EDGE_FACE: EDGE_FACE_POINTS},
+        DISTANCES: dict.fromkeys(TOPOLOGIES, GAP_POINTS),
         STEP: STEP_MOTIONS,
-    }[question][kind]  # fmt: skip
+    }[question][kind]
 
 
 def generated(question: str, kind: str, generator: str, rng: np.random.Generator, size: int) -> Batch:

@@ -52,10 +52,30 @@ def ring(n: int, turns: float, flat: bool = False) -> tuple[np.ndarray, np.ndarr
 def careless() -> tuple[np.ndarray, np.ndarray]:
     """Three faces on an edge, a face twice, another turned over, faces that name a vertex twice, discs joined at one
     vertex."""
-    faces = [[0, 1, 2], [0, 1, 3], [0, 1, 4], [0, 1, 2], [1, 0, 3], [2, 2, 5], [4, 6, 7], [4, 7, 8], [4, 8, 9],
-             [6, 6, 6]]
-    points = [[0, 0, 0], [1, 0, 0], [0.5, 1, 0], [0.5, -0.5, 1], [0.5, -0.5, -1], [0.5, 2, 0.5], [1.5, -0.5, -1.5],
-              [1.5, -1.5, -1.5], [0.5, -1.5, -2], [-0.5, -1.5, -1.5]]  # fmt: skip
+    faces = [
+        [0, 1, 2],
+        [0, 1, 3],
+        [0, 1, 4],
+        [0, 1, 2],
+        [1, 0, 3],
+        [2, 2, 5],
+        [4, 6, 7],
+        [4, 7, 8],
+        [4, 8, 9],
+        [6, 6, 6],
+    ]
+    points = [
+        [0, 0, 0],
+        [1, 0, 0],
+        [0.5, 1, 0],
+        [0.5, -0.5, 1],
+        [0.5, -0.5, -1],
+        [0.5, 2, 0.5],
+        [1.5, -0.5, -1.5],
+        [1.5, -1.5, -1.5],
+        [0.5, -1.5, -2],
+        [-0.5, -1.5, -1.5],
+    ]
     return np.array(faces), np.array(points)
 
 

@@ -29,9 +29,14 @@ def true_steps(kind: str, queries: np.ndarray, distances: np.ndarray, threads: i
     scene = SMALL_SCENES[kind]
     starts, ends = _ends(queries)
     toc = reference.earliest_contacts(
-        starts, ends, scene.faces, edges_per_mesh=scene.edges, n_vertices=scene.n_vertices,
-        minimum_separation=distances, threads=threads,
-    )  # fmt: skip
+        starts,
+        ends,
+        scene.faces,
+        edges_per_mesh=scene.edges,
+        n_vertices=scene.n_vertices,
+        minimum_separation=distances,
+        threads=threads,
+    )
     return np.isfinite(toc), np.minimum(toc, 1.0)
 
 
@@ -68,12 +73,15 @@ class _Asked:
         shorter = start + SHORTER * (end - start)
         steps = [self.step(start, end, separation) for _ in range(2)]
         trials = [
-            self.step(start, shorter, separation), self._with(separation, "first").collision_free_step(start, shorter)
-        ]  # fmt: skip
+            self.step(start, shorter, separation),
+            self._with(separation, "first").collision_free_step(start, shorter),
+        ]
         fits = self._is_free(steps[0], every.first_toc) and steps[0] == steps[1] and trials[0] == trials[1]
-        return fits and is_first(first, every) and all(
-            self._agrees_alone(feature, start, end, separation, every) for feature in FEATURES
-        )  # fmt: skip
+        return (
+            fits
+            and is_first(first, every)
+            and all(self._agrees_alone(feature, start, end, separation, every) for feature in FEATURES)
+        )
 
     def _agrees_alone(
         self, feature: str, start: np.ndarray, end: np.ndarray, separation: float, every: hc.Contacts

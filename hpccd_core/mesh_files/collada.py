@@ -15,9 +15,19 @@ from .errors import MeshFileError, shortened
 from .polygons import Polygons
 
 # Libraries and instances for appearance and animation. Broken references in them are common and do not matter here.
-_LOOKS = ("library_images", "library_materials", "library_effects", "library_lights", "library_cameras",
-          "library_animations", "library_animation_clips", "bind_material", "instance_light", "instance_camera",
-          "extra")  # fmt: skip
+_LOOKS = (
+    "library_images",
+    "library_materials",
+    "library_effects",
+    "library_lights",
+    "library_cameras",
+    "library_animations",
+    "library_animation_clips",
+    "bind_material",
+    "instance_light",
+    "instance_camera",
+    "extra",
+)
 # Nodes of a scene, each counted as often as it is instantiated: nodes that instantiate each other can make millions.
 MOST_NODES = 100_000
 _NOT_FINITE = "has a position that is not finite; export it again"

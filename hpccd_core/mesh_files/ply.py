@@ -15,10 +15,25 @@ from .errors import MeshFileError
 from .polygons import Polygons
 
 _TYPES = {
-    "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1", "short": "i2", "int16": "i2", "ushort": "u2",
-    "uint16": "u2", "int": "i4", "int32": "i4", "uint": "u4", "uint32": "u4", "int64": "i8", "uint64": "u8",
-    "float": "f4", "float32": "f4", "double": "f8", "float64": "f8",
-}  # fmt: skip
+    "char": "i1",
+    "int8": "i1",
+    "uchar": "u1",
+    "uint8": "u1",
+    "short": "i2",
+    "int16": "i2",
+    "ushort": "u2",
+    "uint16": "u2",
+    "int": "i4",
+    "int32": "i4",
+    "uint": "u4",
+    "uint32": "u4",
+    "int64": "i8",
+    "uint64": "u8",
+    "float": "f4",
+    "float32": "f4",
+    "double": "f8",
+    "float64": "f8",
+}
 _BYTE_ORDERS: dict[str, Literal["=", "<", ">"]] = {"ascii": "=", "binary_little_endian": "<", "binary_big_endian": ">"}
 _CODES = {"i1": "b", "u1": "B", "i2": "h", "u2": "H", "i4": "i", "u4": "I", "i8": "q", "u8": "Q", "f4": "f", "f8": "d"}
 _LISTS_OF_VERTICES = ("vertex_indices", "vertex_index")
@@ -74,8 +89,9 @@ def parse(data: bytes) -> Polygons:
     bad = np.flatnonzero((corners < 0) | (corners >= len(vertices)))
     if bad.size:
         face = int(np.searchsorted(np.cumsum(counts), bad[0], side="right"))
-        raise MeshFileError(f"face {face} names vertex {corners[bad[0]]}, and the file has {len(vertices)}; export it "
-                            "again")  # fmt: skip
+        raise MeshFileError(
+            f"face {face} names vertex {corners[bad[0]]}, and the file has {len(vertices)}; export it again"
+        )
     large = counts >= 3  # others are points and lines
     return Polygons(vertices, corners[np.repeat(large, counts)], counts[large])
 

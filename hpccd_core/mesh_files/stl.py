@@ -29,8 +29,10 @@ def parse(data: bytes) -> NDArray[np.float64]:
     if b"\0" not in data and b"facet" in data[:10_000].lower():
         return _of_text(data)
     if len(data) < _HEADER or not _count(data):
-        raise MeshFileError("is neither a binary STL (its length does not fit its number of triangles) nor an ASCII "
-                            "STL; export it again")  # fmt: skip
+        raise MeshFileError(
+            "is neither a binary STL (its length does not fit its number of triangles) nor an ASCII "
+            "STL; export it again"
+        )
     room = (len(data) - _HEADER) // _TRIANGLE.itemsize
     if _count(data) > room:
         raise MeshFileError(

@@ -7,9 +7,23 @@ from typing import Literal
 # CDR of the fields before it, as (size of an item, whether it is a sequence); a sequence of strings is "strings".
 _HEADER = 4
 _BEFORE: tuple[str | tuple[int, bool], ...] = (
-    "stamp", "string", "stamp", (8, False), "strings", (1, True), (4, True), (4, True), (4, True), (4, True), (8, True),
-    (8, True), (8, True), (8, False), (8, False), (1, False),
-)  # fmt: skip
+    "stamp",
+    "string",
+    "stamp",
+    (8, False),
+    "strings",
+    (1, True),
+    (4, True),
+    (4, True),
+    (4, True),
+    (4, True),
+    (8, True),
+    (8, True),
+    (8, True),
+    (8, False),
+    (8, False),
+    (1, False),
+)
 
 
 def without_features(data: bytes) -> bytes:

@@ -62,9 +62,7 @@ class CopiedFile:
             self._writer.add_metadata(record.name, dict(record.metadata))
 
     def attachment(self, record: Attachment) -> None:
-        self._writer.add_attachment(
-            record.create_time, record.log_time, record.name, record.media_type, record.data
-        )
+        self._writer.add_attachment(record.create_time, record.log_time, record.name, record.media_type, record.data)
 
     def _register_channel(self, topic, encoding, schema_id, metadata):
         return self._writer.register_channel(topic, encoding, schema_id, dict(metadata))

@@ -31,20 +31,33 @@ _ADDED = {
     "hpccd/msg/ContactArray": (
         _Addition(frozenset({"uint32[] topology_versions"}), bytes(4), 4),
         _Addition(
-            frozenset({
-                "float64 minimum_separation", "uint32[] separation_mesh_a",
-                "uint32[] separation_mesh_b", "float64[] separations", "float64[] closest", "float64[] distance",
-            }),
+            frozenset(
+                {
+                    "float64 minimum_separation",
+                    "uint32[] separation_mesh_a",
+                    "uint32[] separation_mesh_b",
+                    "float64[] separations",
+                    "float64[] closest",
+                    "float64[] distance",
+                }
+            ),
             bytes(8 + 5 * 4),
             8,
         ),
         _Addition(frozenset({"uint8 tested_features"}), clear=without_features),
         _Addition(frozenset({"uint32 parts", "float64[] motion_bounds"}), bytes(4 + 4), 4),
         _Addition(
-            frozenset({
-                "uint64 inputs_before", "uint64 start_inputs", "string[] input_topics", "uint16[] input_topic",
-                "int64[] input_sent", "uint8[] input_flags", "uint32 report",
-            }),
+            frozenset(
+                {
+                    "uint64 inputs_before",
+                    "uint64 start_inputs",
+                    "string[] input_topics",
+                    "uint16[] input_topic",
+                    "int64[] input_sent",
+                    "uint8[] input_flags",
+                    "uint32 report",
+                }
+            ),
             bytes(2 * 8 + 4 * 4 + 4),
             8,
         ),
@@ -53,7 +66,7 @@ _ADDED = {
         _Addition(frozenset({"float64[] direction", "float64[] approach_speed"}), bytes(2 * 4), 4),
     ),
     "hpccd/msg/MeshTopology": (_Addition(frozenset({"uint32[] edges"}), bytes(4), 4),),
-}  # fmt: skip
+}
 
 
 def completion(topic: RecordedTopic) -> Callable[[bytes], bytes] | None:
@@ -92,10 +105,13 @@ def _fields(definition: str) -> dict[str, list[str]]:
     either), and whether names of types include the package.
     """
     own, *others = definition.split(message_definitions.SEPARATOR)
-    sections = {"": own} | {name.replace("/msg/", "/"): text
-                            for name, _, text in (other.lstrip().partition("\n") for other in others)}  # fmt: skip
-    return {name.rstrip(): [field for line in text.splitlines() if (field := _field(line))]
-            for name, text in sections.items()}  # fmt: skip
+    sections = {"": own} | {
+        name.replace("/msg/", "/"): text for name, _, text in (other.lstrip().partition("\n") for other in others)
+    }
+    return {
+        name.rstrip(): [field for line in text.splitlines() if (field := _field(line))]
+        for name, text in sections.items()
+    }
 
 
 def _field(line: str) -> str:

@@ -24,8 +24,15 @@ from mcap.writer import MCAP0_MAGIC
 # What reading torn or flipped bytes can raise: the above, decompressors (lz4: RuntimeError), text that is no UTF-8 (a
 # ValueError), a disk that does not give its bytes.
 DAMAGE = (
-    McapError, CRCValidationError, struct.error, zstandard.ZstdError, RuntimeError, ValueError, OSError, MemoryError,
-)  # fmt: skip
+    McapError,
+    CRCValidationError,
+    struct.error,
+    zstandard.ZstdError,
+    RuntimeError,
+    ValueError,
+    OSError,
+    MemoryError,
+)
 
 # Recorders close a chunk after about a megabyte, or after one message; DDS carries no message as large as this.
 MOST_UNPACKED = 1 << 30
@@ -39,12 +46,19 @@ _HEAD = struct.Struct("<BQ")
 _MESSAGE = struct.Struct("<HIQQ")
 _INDEX_HEAD, _INDEX_ENTRY = struct.Struct("<HI"), 16
 _KINDS = {
-    Opcode.HEADER: known.Header, Opcode.FOOTER: known.Footer, Opcode.SCHEMA: known.Schema,
-    Opcode.CHANNEL: known.Channel, Opcode.CHUNK: known.Chunk, Opcode.CHUNK_INDEX: known.ChunkIndex,
-    Opcode.ATTACHMENT: known.Attachment, Opcode.ATTACHMENT_INDEX: known.AttachmentIndex,
-    Opcode.STATISTICS: known.Statistics, Opcode.METADATA: known.Metadata, Opcode.METADATA_INDEX: known.MetadataIndex,
+    Opcode.HEADER: known.Header,
+    Opcode.FOOTER: known.Footer,
+    Opcode.SCHEMA: known.Schema,
+    Opcode.CHANNEL: known.Channel,
+    Opcode.CHUNK: known.Chunk,
+    Opcode.CHUNK_INDEX: known.ChunkIndex,
+    Opcode.ATTACHMENT: known.Attachment,
+    Opcode.ATTACHMENT_INDEX: known.AttachmentIndex,
+    Opcode.STATISTICS: known.Statistics,
+    Opcode.METADATA: known.Metadata,
+    Opcode.METADATA_INDEX: known.MetadataIndex,
     Opcode.DATA_END: known.DataEnd,
-}  # fmt: skip
+}
 
 
 class Place(NamedTuple):

@@ -104,9 +104,7 @@ class Recording:
             return (topics is None or channel.topic in topics) and not _foreign(channel, schema)
 
         for _, channel, message in self._records(wanted):
-            yield RecordedMessage(
-                channel.topic, message.log_time, message.publish_time, message.sequence, message.data
-            )
+            yield RecordedMessage(channel.topic, message.log_time, message.publish_time, message.sequence, message.data)
 
     def records(self) -> Iterator[StoredMessage]:
         """Like `messages`, but with channel and schema, and including messages that are not of ROS 2."""

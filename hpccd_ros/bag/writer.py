@@ -35,8 +35,19 @@ class BagWriter:
     write_errors, last_error: what the disk refused. not_written: messages by topic that are in no file.
     """
 
-    def __init__(self, path, *, info=None, attachments=(), compression="none", chunk_size=1 << 20, flush_interval=0.5,
-                 max_bytes=0, max_seconds=0.0, retry_interval=5.0):
+    def __init__(
+        self,
+        path,
+        *,
+        info=None,
+        attachments=(),
+        compression="none",
+        chunk_size=1 << 20,
+        flush_interval=0.5,
+        max_bytes=0,
+        max_seconds=0.0,
+        retry_interval=5.0,
+    ):
         self.path = Path(path)
         self.single_file = self.path.suffix == ".mcap"
         if why := unusable_options(path, compression, max_bytes, max_seconds):
@@ -46,8 +57,12 @@ class BagWriter:
         self.path.parent.mkdir(parents=True, exist_ok=True)
         if not self.single_file:
             self.path.mkdir()
-        self._options = {"info": info or {}, "attachments": list(attachments), "compression": compression,
-                         "chunk_size": chunk_size}
+        self._options = {
+            "info": info or {},
+            "attachments": list(attachments),
+            "compression": compression,
+            "chunk_size": chunk_size,
+        }
         self._flush_interval = flush_interval
         self._retry_interval = retry_interval
         self._limits = (max_bytes, int(max_seconds * 1e9))
@@ -199,7 +214,7 @@ class BagWriter:
         for topic in self._topics.values():
             self._file.register(topic)
             outlived = topic is cause and len(topic.last) == topic.latched
-            for earlier in list(topic.last)[int(outlived):]:
+            for earlier in list(topic.last)[int(outlived) :]:
                 self._file.append(topic, log_time, *earlier[1:])
 
     def _is_full(self, log_time):

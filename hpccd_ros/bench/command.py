@@ -33,17 +33,29 @@ def configure(
     """
     what = parser.add_argument_group("what is measured")
     what.add_argument(
-        "sources", nargs="*", metavar="SCENE",
+        "sources",
+        nargs="*",
+        metavar="SCENE",
         help="a generated scene (`hpccd scene --list`), the name of a file in HPCCD_DATA, `data` for all of these, or "
         f"the path of an .npz or .mcap file (default: {' '.join(default)})",
-    )  # fmt: skip
+    )
     what.add_argument("--data", metavar="DIR", help="folder of scene files (default: the variable HPCCD_DATA)")
     if size:
-        what.add_argument("--size", type=float, default=1.0, metavar="X",
-                          help="factor on the triangles of generated scenes (default: %(default)s)")
+        what.add_argument(
+            "--size",
+            type=float,
+            default=1.0,
+            metavar="X",
+            help="factor on the triangles of generated scenes (default: %(default)s)",
+        )
     if steps is not None:
-        what.add_argument("--steps", type=int, default=steps, metavar="N",
-                          help="steps measured of each scene, evenly spread; 0: all (default: %(default)s)")
+        what.add_argument(
+            "--steps",
+            type=int,
+            default=steps,
+            metavar="N",
+            help="steps measured of each scene, evenly spread; 0: all (default: %(default)s)",
+        )
     repeat_option(what, rounds)
     output_options(parser)
     parser.set_defaults(default_sources=tuple(default))
@@ -60,8 +72,12 @@ def output_options(parser: argparse.ArgumentParser) -> None:
     out = parser.add_argument_group("what is written")
     out.add_argument("--out", default="hpccd-bench", metavar="DIR", help="JSON and CSV (default: %(default)s)")
     out.add_argument("--figures", metavar="DIR", help="pictures (default: the folder of --out)")
-    out.add_argument("--label", default=f"{machine.cores()}-cores", metavar="NAME",
-                     help="end of the files' names, one for each machine (default: %(default)s)")
+    out.add_argument(
+        "--label",
+        default=f"{machine.cores()}-cores",
+        metavar="NAME",
+        help="end of the files' names, one for each machine (default: %(default)s)",
+    )
 
 
 def threads_option(parser) -> None:
@@ -69,8 +85,7 @@ def threads_option(parser) -> None:
 
 
 def tier_option(parser, default="balanced") -> None:
-    parser.add_argument("--accuracy", default=default, choices=ACCURACIES,
-                        help="tier (default: %(default)s)")  # fmt: skip
+    parser.add_argument("--accuracy", default=default, choices=ACCURACIES, help="tier (default: %(default)s)")
 
 
 def listed(option: str, text: str, choices: Sequence[str]) -> list[str]:
@@ -112,8 +127,11 @@ def begin_report(args, names: Sequence[str] = ()) -> Report:
         if count > MOST_THREADS:
             raise UserError(f"{count} threads: a detector takes at most {MOST_THREADS}; name fewer")
     _require_writable(args)
-    options = {k: v for k, v in vars(args).items() if k not in ("command", "benchmark", *PLACES)
-               and isinstance(v, (int, float, str, type(None)))}
+    options = {
+        k: v
+        for k, v in vars(args).items()
+        if k not in ("command", "benchmark", *PLACES) and isinstance(v, (int, float, str, type(None)))
+    }
     report = Report(args.benchmark, _command(args, options), {**options, "sources": list(names)})
     if getattr(args, "repeat", FEWEST_ROUNDS) < FEWEST_ROUNDS:
         report.note(f"only {args.repeat} timed rounds: take --repeat {FEWEST_ROUNDS} or more for numbers to rely on")

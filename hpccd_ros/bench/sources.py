@@ -52,8 +52,9 @@ def resolve(words: Sequence[str], data: Path | None, default: Sequence[str], siz
             found.append(_one(word, data, size))
     found = _told_apart(words or default, found)
     if not found:
-        raise UserError("nothing to measure: name a scene (see `hpccd scene --list`), an .npz or .mcap file, or set "
-                        "HPCCD_DATA")
+        raise UserError(
+            "nothing to measure: name a scene (see `hpccd scene --list`), an .npz or .mcap file, or set HPCCD_DATA"
+        )
     return found
 
 
@@ -81,8 +82,9 @@ def _one(word, data, size):
     if data and (data / f"{word}.npz").is_file():
         return of_npz(data / f"{word}.npz")
     files = ", ".join(p.stem for p in data_files(data)) or "none (HPCCD_DATA is not set)"
-    raise UserError(f"{word}: neither a file, nor a generated scene ({', '.join(scenes.names())}), nor a data file "
-                    f"({files})")
+    raise UserError(
+        f"{word}: neither a file, nor a generated scene ({', '.join(scenes.names())}), nor a data file ({files})"
+    )
 
 
 def of_scene(name: str, size: float = 1.0) -> Source:
@@ -154,9 +156,12 @@ def of_recording(path: Path) -> Source:
             for m, t in zip(builder.meshes, after.topologies, strict=True)
         )
         return Step(
-            meshes, tuple(map(id, after.topologies)), builder.concatenate(before, after),
-            builder.concatenate(after, after), builder.ignored_pairs,
-        )  # fmt: skip
+            meshes,
+            tuple(map(id, after.topologies)),
+            builder.concatenate(before, after),
+            builder.concatenate(after, after),
+            builder.ignored_pairs,
+        )
 
     return Source(path.stem, len(frames) - 1, step)
 

@@ -35,9 +35,12 @@ class Step:
         scene = hc.Scene()
         for mesh in self.meshes:
             scene.add_mesh(
-                mesh.name, mesh.faces, n_vertices=mesh.n_vertices, static=mesh.static,
+                mesh.name,
+                mesh.faces,
+                n_vertices=mesh.n_vertices,
+                static=mesh.static,
                 self_collision=mesh.self_collision,
-            )  # fmt: skip
+            )
         for a, b in self.ignored_pairs:
             scene.ignore_pair(a, b)
         return scene

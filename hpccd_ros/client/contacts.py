@@ -97,9 +97,7 @@ def contacts_from_message(message: ContactArray) -> ContactArrays:
         toc=field(message, "toc", np.float64, (0 if of_snapshot else count,)),
         **optional,
         minimum_separation=separation.minimum,
-        pair_separation={
-            (a, b) if order[a] <= order[b] else (b, a): distance for a, b, distance in separation.pairs
-        },
+        pair_separation={(a, b) if order[a] <= order[b] else (b, a): distance for a, b, distance in separation.pairs},
         features=read_features(message),
         parts=message.parts,
         motion_bounds=field(message, "motion_bounds", np.float64, (len(order) if message.parts else 0,)),

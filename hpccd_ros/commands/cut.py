@@ -24,8 +24,9 @@ def configure(parser):
     parser.add_argument("--from", dest="begin", metavar="TIME", help="begin of the part (default: that of FILE)")
     parser.add_argument("--to", dest="end", metavar="TIME", help="end of the part (default: that of FILE)")
     parser.add_argument("-o", "--output", metavar="OUT", required=True, help="new file, NAME.mcap")
-    parser.add_argument("--compression", choices=("none", "lz4", "zstd"),
-                        help="compression of OUT (default: that of FILE)")  # fmt: skip
+    parser.add_argument(
+        "--compression", choices=("none", "lz4", "zstd"), help="compression of OUT (default: that of FILE)"
+    )
 
 
 def run(args) -> int:
@@ -46,8 +47,13 @@ def run(args) -> int:
             raise UserError(f"{option}: {error}") from error
     with Recording(args.file) as recording:
         try:
-            part = cut(recording, target, *times, args.compression,
-                       watch=lambda messages: track(messages, "cut", True, recording.message_count or None))
+            part = cut(
+                recording,
+                target,
+                *times,
+                args.compression,
+                watch=lambda messages: track(messages, "cut", True, recording.message_count or None),
+            )
         except FileExistsError as error:
             raise UserError(f"-o {args.output}: already exists; give another name") from error
         except OSError as error:

@@ -18,20 +18,29 @@ from hpccd_ros.base.feature_list import feature_list
 
 
 def configure(parser):
-    parser.add_argument("--out", default="hpccd-demo", metavar="DIR",
-                        help="folder for the results (default: %(default)s)")
-    parser.add_argument("--scene", default="cloth-drop", metavar="NAME",
-                        help="see `hpccd scene --list` (default: %(default)s)")
-    parser.add_argument("--size", type=float, default=1.0, metavar="X",
-                        help="factor on the number of triangles (default: %(default)s)")
+    parser.add_argument(
+        "--out", default="hpccd-demo", metavar="DIR", help="folder for the results (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--scene", default="cloth-drop", metavar="NAME", help="see `hpccd scene --list` (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--size", type=float, default=1.0, metavar="X", help="factor on the number of triangles (default: %(default)s)"
+    )
     parser.add_argument("--frames", type=int, metavar="N", help="number of frames (default: the scene's own)")
     parser.add_argument("--rate", type=float, default=15.0, metavar="HZ", help="frames a second (default: %(default)s)")
     parser.add_argument("--accuracy", metavar="TIER", help="of the node (default: the node's own)")
-    parser.add_argument("--features", default=(), type=feature_list, metavar="KIND[,KIND]",
-                        help="what the node tests: vertex_face, edge_edge or both (default: the node's own)")
+    parser.add_argument(
+        "--features",
+        default=(),
+        type=feature_list,
+        metavar="KIND[,KIND]",
+        help="what the node tests: vertex_face, edge_edge or both (default: the node's own)",
+    )
     parser.add_argument("--threads", type=int, default=0, metavar="N", help="of the node; 0: all cores (default)")
-    parser.add_argument("--compression", choices=("none", "lz4", "zstd"), default="none",
-                        help="of the recording (default: %(default)s)")
+    parser.add_argument(
+        "--compression", choices=("none", "lz4", "zstd"), default="none", help="of the recording (default: %(default)s)"
+    )
     parser.add_argument("--small", action="store_true", help="a coarse mesh, compressed")
 
 

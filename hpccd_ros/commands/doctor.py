@@ -17,8 +17,11 @@ from hpccd_ros.base.errors import UserError
 def configure(parser):
     parser.add_argument("file", metavar="FILE", help="an .mcap file, or a folder of them")
     parser.add_argument("--recover", metavar="OUT", help="write the readable messages into this new file")
-    parser.add_argument("--compression", choices=("none", "lz4", "zstd"),
-                        help="of the recovered file (default: that of the damaged one)")
+    parser.add_argument(
+        "--compression",
+        choices=("none", "lz4", "zstd"),
+        help="of the recovered file (default: that of the damaged one)",
+    )
 
 
 def run(args) -> int:

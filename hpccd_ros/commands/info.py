@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What is installed here: versions, backends and accuracy tiers that can be used, processor, DDS settings.
 
-  hpccd info           for people; put it into bug reports
-  hpccd info --json    for programs
+hpccd info           for people; put it into bug reports
+hpccd info --json    for programs
 """
 
 

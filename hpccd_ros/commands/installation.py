@@ -14,10 +14,26 @@ import hpccd_ros
 from hpccd_ros.base.version import package_version
 from hpccd_ros.params.table import ACCURACIES
 
-PACKAGES = ("numpy", "ros-jazzy-rclpy", "mcap", "rich", "matplotlib", "trimesh", "mapbox_earcut", "pycollada",
-            "rosbags")
-SETTINGS = ("ROS_DOMAIN_ID", "ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_STATIC_PEERS", "RMW_IMPLEMENTATION",
-            "FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_BUILTIN_TRANSPORTS", "AMENT_PREFIX_PATH")  # fmt: skip
+PACKAGES = (
+    "numpy",
+    "ros-jazzy-rclpy",
+    "mcap",
+    "rich",
+    "matplotlib",
+    "trimesh",
+    "mapbox_earcut",
+    "pycollada",
+    "rosbags",
+)
+SETTINGS = (
+    "ROS_DOMAIN_ID",
+    "ROS_AUTOMATIC_DISCOVERY_RANGE",
+    "ROS_STATIC_PEERS",
+    "RMW_IMPLEMENTATION",
+    "FASTRTPS_DEFAULT_PROFILES_FILE",
+    "FASTDDS_BUILTIN_TRANSPORTS",
+    "AMENT_PREFIX_PATH",
+)
 
 
 def gather() -> dict:

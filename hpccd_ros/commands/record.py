@@ -24,21 +24,46 @@ from hpccd_ros.params.table import LEAST_SPLIT_SIZE, LEAST_SPLIT_TIME, MOST_SPLI
 def configure(parser):
     parser.add_argument("-o", "--output", metavar="PATH", help="file NAME.mcap, or folder for a split recording")
     parser.add_argument("--node", default="/hpccd", help="full name of the node to record (default: %(default)s)")
-    parser.add_argument("--topic", action="append", default=[], metavar="NAME=TYPE",
-                        help="record this topic too, for example /joints=sensor_msgs/msg/JointState; may be repeated")
-    parser.add_argument("--compression", choices=("none", "lz4", "zstd"), default="none",
-                        help="lz4: about half the writing speed; zstd: smaller, a fifth (default: %(default)s)")
-    parser.add_argument("--split-size", type=float, default=0, metavar="MB",
-                        help="new file after so many megabytes, before compression")
+    parser.add_argument(
+        "--topic",
+        action="append",
+        default=[],
+        metavar="NAME=TYPE",
+        help="record this topic too, for example /joints=sensor_msgs/msg/JointState; may be repeated",
+    )
+    parser.add_argument(
+        "--compression",
+        choices=("none", "lz4", "zstd"),
+        default="none",
+        help="lz4: about half the writing speed; zstd: smaller, a fifth (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--split-size", type=float, default=0, metavar="MB", help="new file after so many megabytes, before compression"
+    )
     parser.add_argument("--split-time", type=float, default=0, metavar="S", help="new file after so many seconds")
-    parser.add_argument("--flush", type=float, default=0.5, metavar="S",
-                        help="most seconds of messages that a kill can cost (default: %(default)s)")
-    parser.add_argument("--depth", type=int, default=50, metavar="N",
-                        help="messages a topic that may wait for the disk (default: %(default)s)")
+    parser.add_argument(
+        "--flush",
+        type=float,
+        default=0.5,
+        metavar="S",
+        help="most seconds of messages that a kill can cost (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--depth",
+        type=int,
+        default=50,
+        metavar="N",
+        help="messages a topic that may wait for the disk (default: %(default)s)",
+    )
     parser.add_argument("--duration", type=float, default=0, metavar="S", help="end after so many seconds")
     parser.add_argument("--frames", type=int, default=0, metavar="N", help="end after so many contact messages")
-    parser.add_argument("--wait", type=float, default=10, metavar="S",
-                        help="how long to wait for the node to appear (default: %(default)s)")
+    parser.add_argument(
+        "--wait",
+        type=float,
+        default=10,
+        metavar="S",
+        help="how long to wait for the node to appear (default: %(default)s)",
+    )
     parser.add_argument("--ros-args", nargs="...", default=[], help="remappings and the like, as for any ROS program")
 
 

@@ -29,19 +29,39 @@ def configure(parser):
     verify = parser.add_argument_group("verify")
     verify.add_argument("--backend", default="auto", metavar="NAME", help="auto, cpu, hybrid, gpu (default: auto)")
     verify.add_argument("--threads", type=int, default=0, metavar="N", help="0: all cores (default)")
-    verify.add_argument("--accuracy", default="", metavar="TIER",
-                        help="fast, balanced, conservative, exact (default: as recorded); another one may differ")
-    verify.add_argument("--features", default=(), type=feature_list, metavar="KIND[,KIND]",
-                        help="test vertex_face, edge_edge or both (default: as recorded); other ones differ")
-    verify.add_argument("--csv", metavar="FILE",
-                        help="write a table with one row for each step, or of many recordings one for each")
+    verify.add_argument(
+        "--accuracy",
+        default="",
+        metavar="TIER",
+        help="fast, balanced, conservative, exact (default: as recorded); another one may differ",
+    )
+    verify.add_argument(
+        "--features",
+        default=(),
+        type=feature_list,
+        metavar="KIND[,KIND]",
+        help="test vertex_face, edge_edge or both (default: as recorded); other ones differ",
+    )
+    verify.add_argument(
+        "--csv", metavar="FILE", help="write a table with one row for each step, or of many recordings one for each"
+    )
     verify.add_argument("--json", metavar="FILE", help="write what came of each recording")
     verify.add_argument("--keep-going", action="store_true", help="list every step that differs, not only the first")
     when = parser.add_argument_group("when, of one recording")
-    when.add_argument("--rate", type=float, metavar="X",
-                      help="speed, 1: as recorded, 0: without pauses (default: 0, with --publish 1)")
-    when.add_argument("--from", dest="begin", type=float, default=0.0, metavar="S",
-                      help="start so many seconds into the recording (default: %(default)s)")
+    when.add_argument(
+        "--rate",
+        type=float,
+        metavar="X",
+        help="speed, 1: as recorded, 0: without pauses (default: 0, with --publish 1)",
+    )
+    when.add_argument(
+        "--from",
+        dest="begin",
+        type=float,
+        default=0.0,
+        metavar="S",
+        help="start so many seconds into the recording (default: %(default)s)",
+    )
     when.add_argument("--to", dest="end", type=float, default=float("inf"), metavar="S", help="end there")
     when.add_argument("--step", action="store_true", help="wait for Enter at each frame")
     many = parser.add_argument_group("many recordings at once")
@@ -50,10 +70,16 @@ def configure(parser):
     play = parser.add_argument_group("play over DDS")
     play.add_argument("--publish", action="store_true", help="publish the recorded meshes instead of verifying")
     play.add_argument("--all", action="store_true", help="publish every recorded topic, contacts too")
-    play.add_argument("--wait", type=float, default=10.0, metavar="S",
-                      help="how long to wait for subscribers (default: %(default)s)")
-    play.add_argument("--subscribers", type=int, default=1, metavar="N",
-                      help="how many to wait for: 2 for a node and a recorder (default: %(default)s)")
+    play.add_argument(
+        "--wait", type=float, default=10.0, metavar="S", help="how long to wait for subscribers (default: %(default)s)"
+    )
+    play.add_argument(
+        "--subscribers",
+        type=int,
+        default=1,
+        metavar="N",
+        help="how many to wait for: 2 for a node and a recorder (default: %(default)s)",
+    )
     play.add_argument("--ros-args", nargs="...", default=[], help="remappings and the like, as for any ROS program")
 
 

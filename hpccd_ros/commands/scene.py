@@ -23,29 +23,52 @@ from hpccd_ros.base.errors import UserError
 def configure(parser):
     parser.add_argument("name", nargs="?", metavar="NAME", help="which scene, see --list")
     parser.add_argument("--list", action="store_true", help="names and titles of all scenes")
-    parser.add_argument("--size", type=float, default=1.0, metavar="X",
-                        help="factor on the number of triangles, same motion (default: %(default)s)")
+    parser.add_argument(
+        "--size",
+        type=float,
+        default=1.0,
+        metavar="X",
+        help="factor on the number of triangles, same motion (default: %(default)s)",
+    )
     parser.add_argument("--frames", type=int, metavar="N", help="number of frames (default: the scene's own)")
-    parser.add_argument("--seed", type=int, default=0, metavar="N",
-                        help="of random numbers (default: %(default)s)")
-    parser.add_argument("--rate", type=float, default=30.0, metavar="HZ",
-                        help="frames a second, for --publish and --mcap (default: %(default)s)")
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of random numbers (default: %(default)s)")
+    parser.add_argument(
+        "--rate",
+        type=float,
+        default=30.0,
+        metavar="HZ",
+        help="frames a second, for --publish and --mcap (default: %(default)s)",
+    )
     play = parser.add_argument_group("play over DDS")
     play.add_argument("--publish", action="store_true", help="publish meshes, of a robot its joint states")
     play.add_argument("--loop", action="store_true", help="over and over, until Ctrl-C")
-    play.add_argument("--wait", type=float, default=10.0, metavar="S",
-                      help="how long to wait for a subscriber before the first frame (default: %(default)s)")
-    play.add_argument("--subscribers", type=int, default=1, metavar="N",
-                      help="how many to wait for: 2 for a node and a recorder (default: %(default)s)")
-    play.add_argument("--ros-args", nargs="...", default=[],
-                      help="remappings and the like, as for any ROS program")
+    play.add_argument(
+        "--wait",
+        type=float,
+        default=10.0,
+        metavar="S",
+        help="how long to wait for a subscriber before the first frame (default: %(default)s)",
+    )
+    play.add_argument(
+        "--subscribers",
+        type=int,
+        default=1,
+        metavar="N",
+        help="how many to wait for: 2 for a node and a recorder (default: %(default)s)",
+    )
+    play.add_argument("--ros-args", nargs="...", default=[], help="remappings and the like, as for any ROS program")
     files = parser.add_argument_group("write a file (existing files are not overwritten, but for pictures)")
     files.add_argument("--mcap", metavar="FILE", help="recording of all frames")
-    files.add_argument("--compression", choices=("none", "lz4", "zstd"), default="none",
-                       help="of --mcap (default: %(default)s)")
+    files.add_argument(
+        "--compression", choices=("none", "lz4", "zstd"), default="none", help="of --mcap (default: %(default)s)"
+    )
     files.add_argument("--npz", metavar="FILE", help="all frames as numpy arrays")
-    files.add_argument("--step", type=int, metavar="K",
-                       help="with --npz: only the step from frame K-1 to K (vertices_t0, vertices_t1, faces)")
+    files.add_argument(
+        "--step",
+        type=int,
+        metavar="K",
+        help="with --npz: only the step from frame K-1 to K (vertices_t0, vertices_t1, faces)",
+    )
     files.add_argument("--params", metavar="FILE", help="parameters for a node that listens to this scene")
     files.add_argument("--png", metavar="FILE", help="picture of some frames")
     files.add_argument("--at", metavar="K,K,...", help="frames of --png (default: six over the whole scene)")
@@ -66,8 +89,11 @@ def run(args) -> int:
         scene = scenes.make(args.name, args.size, args.frames, args.seed, progress=True)
     except ValueError as error:
         raise UserError(str(error)) from error
-    print(f"{scene.name}: {scene.title}; {scene.n_triangles:,} triangles, {scene.n_vertices:,} vertices, "
-          f"{scene.n_frames} frames", flush=True)
+    print(
+        f"{scene.name}: {scene.title}; {scene.n_triangles:,} triangles, {scene.n_vertices:,} vertices, "
+        f"{scene.n_frames} frames",
+        flush=True,
+    )
     asked = [args.publish, args.mcap, args.npz, args.params, args.png]
     if not any(asked):
         for mesh in scene.meshes:
@@ -85,8 +111,9 @@ def run(args) -> int:
     if args.publish:
         from hpccd_ros.scenes.publish import publish
 
-        count = publish(scene, args.rate, args.loop, args.wait, args.ros_args, progress=True,
-                        subscribers=args.subscribers)
+        count = publish(
+            scene, args.rate, args.loop, args.wait, args.ros_args, progress=True, subscribers=args.subscribers
+        )
         print(f"published {count} frames", flush=True)
     return 0
 

@@ -19,19 +19,34 @@ from hpccd_ros.base.errors import UserError
 
 def configure(parser):
     parser.add_argument("file", metavar="FILE", help="recording: an .mcap file, or a folder of them")
-    parser.add_argument("-o", "--output", metavar="PATH",
-                        help="picture (.png, .jpg, .pdf), page (.html), Rerun recording (.rrd), or folder with --every")
+    parser.add_argument(
+        "-o",
+        "--output",
+        metavar="PATH",
+        help="picture (.png, .jpg, .pdf), page (.html), Rerun recording (.rrd), or folder with --every",
+    )
     parser.add_argument("--html", metavar="PATH", help="write a page that any browser opens, without a network")
-    parser.add_argument("--rerun", action="store_true",
-                        help="open the Rerun viewer; where there is no screen, write a Rerun recording")
+    parser.add_argument(
+        "--rerun", action="store_true", help="open the Rerun viewer; where there is no screen, write a Rerun recording"
+    )
     which = parser.add_mutually_exclusive_group()
     which.add_argument("--step", type=int, metavar="N", help="step number (default: the one with most contacts)")
-    which.add_argument("--every", type=int, metavar="K",
-                       help="each K-th step, into a folder, the page or the Rerun recording (those: default 1)")
-    parser.add_argument("--azimuth", type=float, default=-60.0, metavar="DEG",
-                        help="from where to look, around z (default: %(default)s)")
-    parser.add_argument("--elevation", type=float, default=26.0, metavar="DEG",
-                        help="and from how high (default: %(default)s)")
+    which.add_argument(
+        "--every",
+        type=int,
+        metavar="K",
+        help="each K-th step, into a folder, the page or the Rerun recording (those: default 1)",
+    )
+    parser.add_argument(
+        "--azimuth",
+        type=float,
+        default=-60.0,
+        metavar="DEG",
+        help="from where to look, around z (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--elevation", type=float, default=26.0, metavar="DEG", help="and from how high (default: %(default)s)"
+    )
     parser.add_argument("--title", help="default: the name of the file")
     parser.add_argument("--params", metavar="YAML", help="node parameters, instead of those in the recording")
 

@@ -53,11 +53,14 @@ class Children:
         log = self._folder / f"{name}.log"
         with open(log, "w", encoding="utf-8") as output:
             process = subprocess.Popen(
-                [sys.executable, "-m", *arguments], stdin=subprocess.DEVNULL, stdout=output,
+                [sys.executable, "-m", *arguments],
+                stdin=subprocess.DEVNULL,
+                stdout=output,
                 stderr=subprocess.STDOUT,
                 # Of its own session: Ctrl-C reaches the parent alone, which ends the children in order.
-                start_new_session=True, preexec_fn=_die_with_parent,
-            )  # fmt: skip
+                start_new_session=True,
+                preexec_fn=_die_with_parent,
+            )
         child = Child(name, process, log)
         self._all.append(child)
         return child

@@ -43,9 +43,11 @@ def main(args) -> int:
     console = Console(highlight=False, soft_wrap=True)
     scene = _scene(args)
     say = console.print
-    say(f"[bold]scene[/]      {scene.title}\n           "
+    say(
+        f"[bold]scene[/]      {scene.title}\n           "
         + ", ".join(_parts(scene))
-        + f"; {scene.n_frames} frames at {args.rate:g} a second")
+        + f"; {scene.n_frames} frames at {args.rate:g} a second"
+    )
     files.write_parameters(scene, folder / PARAMETERS)
     _stream(args, scene, folder, console)
     worst = _verify_and_draw(args, scene, folder, console)
@@ -78,26 +80,46 @@ def _stream(args, scene, folder, console):
     with Monitor() as monitor, Children(folder) as children:
         monitor.listen(1.0)
         if monitor.nodes_called("/hpccd"):
-            raise UserError(f"a node /hpccd runs already in DDS domain {os.environ['ROS_DOMAIN_ID']}: end it, or set "
-                            "another ROS_DOMAIN_ID")
+            raise UserError(
+                f"a node /hpccd runs already in DDS domain {os.environ['ROS_DOMAIN_ID']}: end it, or set "
+                "another ROS_DOMAIN_ID"
+            )
         node = children.start(
-            "node", "hpccd_ros.node", "--ros-args", "--params-file", str(folder / PARAMETERS),
-            "-p", f"threads:={args.threads}", "-p", "diagnostics_period:=0.25",
+            "node",
+            "hpccd_ros.node",
+            "--ros-args",
+            "--params-file",
+            str(folder / PARAMETERS),
+            "-p",
+            f"threads:={args.threads}",
+            "-p",
+            "diagnostics_period:=0.25",
             *(["-p", f"accuracy:={args.accuracy}"] if args.accuracy else []),
             *(["-p", f"features:=[{', '.join(args.features)}]"] if args.features else []),
-        )  # fmt: skip
+        )
         recorder = children.start(
-            "recorder", "hpccd_ros.cli", "record", "-o", str(folder / RECORDING), "--compression", args.compression,
+            "recorder",
+            "hpccd_ros.cli",
+            "record",
+            "-o",
+            str(folder / RECORDING),
+            "--compression",
+            args.compression,
             # Room for the whole scene: a disk that is still busy with the installation may hold the recorder up.
-            "--depth", str(scene.n_frames), "--wait", "180",
-        )  # fmt: skip
+            "--depth",
+            str(scene.n_frames),
+            "--wait",
+            "180",
+        )
         children.wait(lambda: recorder.said("recording "), "the recorder did not hear the node", 180.0)
         children.wait(monitor.hears_contacts, "the node was not heard", 180.0)
         publisher = children.start(
             "publisher", "hpccd_ros.demo.publisher", args.scene, str(args.size), str(scene.n_frames), str(args.rate)
         )
-        console.print(f"[bold]processes[/]  node {node.process.pid}, recorder {recorder.process.pid}, publisher "
-                      f"{publisher.process.pid}, over DDS (domain {os.environ['ROS_DOMAIN_ID']})")
+        console.print(
+            f"[bold]processes[/]  node {node.process.pid}, recorder {recorder.process.pid}, publisher "
+            f"{publisher.process.pid}, over DDS (domain {os.environ['ROS_DOMAIN_ID']})"
+        )
         steps = _steps(scene)
         _watch(monitor, children, publisher, steps, console)
         _await_recorded(folder / RECORDING, monitor, children)
@@ -107,8 +129,10 @@ def _stream(args, scene, folder, console):
         if monitor.answers == 0:
             raise UserError(f"the node answered nothing; see the logs in {folder}")
         core = "" if monitor.core_ms is None else f", {monitor.core_ms:.1f} ms a frame in the core (median)"
-        console.print(f"[bold]answers[/]    {monitor.answers} of {steps} steps, {monitor.dropped} frames dropped{core}"
-                      f"{_slower(monitor, scene.n_frames, args.rate)}")
+        console.print(
+            f"[bold]answers[/]    {monitor.answers} of {steps} steps, {monitor.dropped} frames dropped{core}"
+            f"{_slower(monitor, scene.n_frames, args.rate)}"
+        )
 
 
 def _steps(scene) -> int:
@@ -142,9 +166,15 @@ def _recorded_answers(path) -> int:
 def _watch(monitor, children, publisher, steps, console):
     """Show the answers as they come, until the publisher has ended and the last answer is there."""
     progress = Progress(
-        TextColumn("          "), BarColumn(bar_width=28), MofNCompleteColumn(), TextColumn("steps"),
-        TextColumn("{task.fields[said]}"), console=console, transient=True, disable=not console.is_terminal,
-    )  # fmt: skip
+        TextColumn("          "),
+        BarColumn(bar_width=28),
+        MofNCompleteColumn(),
+        TextColumn("steps"),
+        TextColumn("{task.fields[said]}"),
+        console=console,
+        transient=True,
+        disable=not console.is_terminal,
+    )
     shown = -1
     with progress:
         bar = progress.add_task("steps", total=steps, said="")
@@ -183,8 +213,10 @@ def _verify_and_draw(args, scene, folder, console):
             if worst is None or step.total > worst.total:
                 worst = step
     if replay.diverged:
-        raise UserError("computed again from the recording, the contacts differ from those that the node sent: "
-                        f"{replay.first_divergence.difference}")
+        raise UserError(
+            "computed again from the recording, the contacts differ from those that the node sent: "
+            f"{replay.first_divergence.difference}"
+        )
     console.print(f"[bold]verified[/]   {replay.verified} recorded answers, computed again from the file: all equal")
     console.print("[bold]picture[/]    rendering the frame with most contacts ...")
     draw_step(worst, folder / PICTURE, history, title=scene.title)
@@ -197,7 +229,8 @@ def _last_words(folder, console, worst):
     if shutil.which("hpccd") and "VIRTUAL_ENV" in os.environ:
         command = "hpccd"
     recording, picture = folder / RECORDING, folder / PICTURE
-    console.print(f"""
+    console.print(
+        f"""
 [bold green]done[/]       worst frame: step {worst.step}, {worst.total:,} contacts
            recording  {recording}  ({recording.stat().st_size / 1e6:.1f} MB; Foxglove and `ros2 bag play` open it)
            picture    {picture}
@@ -206,4 +239,7 @@ try next
   {command} replay {recording}            compute it again, compare every contact
   {command} view {recording} --step {worst.step}    draw a frame of your choice
   {command} scene --list                          more scenes: {command} demo --scene n-body-like-lr
-  {command} --help                                all commands""", markup=True, soft_wrap=True)
+  {command} --help                                all commands""",
+        markup=True,
+        soft_wrap=True,
+    )

@@ -80,9 +80,7 @@ class SceneBuilder:
     def _restricted(self, of_rigid: bool) -> "SceneBuilder":
         """Keep only the tested pairs in which a mesh moves by poses, or only those in which none does."""
         rigid = {mesh.name for mesh in self.meshes if mesh.rigid}
-        ignored = tuple(
-            (a, b) for a, b in self._tested_pairs if a != b and of_rigid != (a in rigid or b in rigid)
-        )
+        ignored = tuple((a, b) for a, b in self._tested_pairs if a != b and of_rigid != (a in rigid or b in rigid))
         meshes = tuple(
             replace(mesh, self_collision=mesh.self_collision and not (of_rigid or mesh.rigid)) for mesh in self.meshes
         )

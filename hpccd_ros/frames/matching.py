@@ -87,10 +87,7 @@ class ExactMatcher:
 
     def take(self, meshes: Collection[str]) -> list[tuple[str, MeshFrame]]:
         return [
-            (mesh, group.pop(mesh))
-            for _, group in sorted(self._pending.items())
-            for mesh in meshes
-            if mesh in group
+            (mesh, group.pop(mesh)) for _, group in sorted(self._pending.items()) for mesh in meshes if mesh in group
         ]
 
     def clear(self, reason: Reason) -> list[Refusal]:

@@ -12,9 +12,7 @@ from hpccd_ros.frames.types import POSE, TF, MeshFrame, Topology
 from hpccd_ros.rigid.transform import Rigid
 
 
-def mesh_of_file(
-    vertices: np.ndarray, faces: np.ndarray, values: dict[str, Any]
-) -> tuple[Topology, MeshFrame | None]:
+def mesh_of_file(vertices: np.ndarray, faces: np.ndarray, values: dict[str, Any]) -> tuple[Topology, MeshFrame | None]:
     """What `load_mesh` gave as topology version 0; of a static mesh the positions too, placed by its pose; of one that
     moves by poses the vertices as they are. values: parameters mesh.NAME.*.
 

@@ -167,8 +167,12 @@ class TransformBuffer:
         common = next((frame for frame in up if frame in set(down)), None)
         if common is None:
             raise _unconnected(source, target)
-        timed = [edge for path in (up, down) for frame in path[: path.index(common)]
-                 if (edge := self._edges[frame]).always is None]  # fmt: skip
+        timed = [
+            edge
+            for path in (up, down)
+            for frame in path[: path.index(common)]
+            if (edge := self._edges[frame]).always is None
+        ]
         if not all(edge.stamps for edge in timed):
             raise _unconnected(source, target)
         return min((edge.stamps[-1] for edge in timed), default=None)

@@ -137,9 +137,7 @@ class MeshTransformer:
             return f"{what}; set it, or parameter mesh.{self._mesh}.frame"
         return None
 
-    def _moved(
-        self, frame: MeshFrame, rigid: Rigid, new_publisher: bool, sent: int = ALWAYS
-    ) -> MeshFrame | Refusal:
+    def _moved(self, frame: MeshFrame, rigid: Rigid, new_publisher: bool, sent: int = ALWAYS) -> MeshFrame | Refusal:
         """sent: when the transform was sent."""
         placement = frame.placement.moved(rigid) if frame.placement is not None else None
         if placement is not None:

@@ -59,9 +59,7 @@ def read_inputs(message: ContactArray) -> ListedInputs | None:
     if len(sent) and max(message.input_topic) >= len(topics):
         raise ValueError(f"an input is of topic {max(message.input_topic)}, and {len(topics)} are named")
     if message.start_inputs > before + len(sent):
-        raise ValueError(
-            f"its step began after {message.start_inputs} inputs and ended after {before + len(sent)}"
-        )
+        raise ValueError(f"its step began after {message.start_inputs} inputs and ended after {before + len(sent)}")
     return ListedInputs(before, message.start_inputs, topics, message.input_topic, sent, message.input_flags)
 
 

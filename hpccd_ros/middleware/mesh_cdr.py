@@ -34,9 +34,7 @@ def vertices(stamp_ns: int, frame_id: str, topology_version: int, step: int, xyz
     body = aligned(header(stamp_ns, frame_id) + struct.pack("<I", topology_version), 8)
     body += struct.pack("<QI", step, xyz.size)
     # The empty vertices_f64 is its length alone; 4-byte floats leave the offset a multiple of 4, as it needs.
-    return b"".join(
-        [LITTLE_ENDIAN, body, np.ascontiguousarray(xyz, dtype="<f4").tobytes(), struct.pack("<I", 0)]
-    )
+    return b"".join([LITTLE_ENDIAN, body, np.ascontiguousarray(xyz, dtype="<f4").tobytes(), struct.pack("<I", 0)])
 
 
 def header(stamp_ns: int, frame_id: str) -> bytes:

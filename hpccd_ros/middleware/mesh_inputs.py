@@ -53,9 +53,16 @@ def read(
             mesh = whole_meshes.mesh_from_marker(message, *most, welding or Welding())
         topology = replace(mesh.topology, sent=sent)
         return MeshFrame(
-            mesh.stamp, mesh.vertices, topology.version, None, mesh.frame_id, received, only_publisher, topology,
+            mesh.stamp,
+            mesh.vertices,
+            topology.version,
+            None,
+            mesh.frame_id,
+            received,
+            only_publisher,
+            topology,
             sent=sent,
-        )  # fmt: skip
+        )
     stamp, frame_id = fields.stamp_to_ns(message.header.stamp), message.header.frame_id
     if kind == POSE:
         return PoseFrame(stamp, mesh_messages.pose_from_message(message), frame_id, received, only_publisher, sent)

@@ -57,9 +57,7 @@ class Configuration:
             self.options = scene_parameters.detector_options(self.settings, self.robots)
             on_change()
 
-        parameters.watch(
-            self._node, self.settings, self.meshes, configured=configured, check=check, on_change=changed
-        )
+        parameters.watch(self._node, self.settings, self.meshes, configured=configured, check=check, on_change=changed)
 
     def know(self, robots: Robots) -> SceneBuilder:
         """From now on these are known; the scene with them. Raises ParameterError, and then those before stay: a pair

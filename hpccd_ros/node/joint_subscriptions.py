@@ -54,9 +54,7 @@ class JointSubscriptions:
         self._accounts = accounts
         topics = robot_parameters.joint_topics(settings[ROBOT])
         self._recent: dict[str, deque[_Recent]] = {topic: deque(maxlen=joint_messages.MOST_RECENT) for topic in topics}
-        self._subscriptions = [
-            self._subscribe(topic, robots) for topic, robots in topics.items()
-        ]
+        self._subscriptions = [self._subscribe(topic, robots) for topic, robots in topics.items()]
 
     def use(self, pipeline: FramePipeline, by_joints: Mapping[str, JointFrames]) -> None:
         self._pipeline, self._of_robots = pipeline, by_joints
@@ -103,9 +101,14 @@ class JointSubscriptions:
 
         profile = qos.joint_states(self._settings["input_reliability"])
         subscription = InputSubscription(
-            self._node, JointState, topic, receive, profile, reliability="input_reliability",
+            self._node,
+            JointState,
+            topic,
+            receive,
+            profile,
+            reliability="input_reliability",
             counts=self._accounts.connections,
-        )  # fmt: skip
+        )
 
         def several() -> bool:
             return subscription.subscription.get_publisher_count() > 1

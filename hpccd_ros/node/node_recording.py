@@ -139,16 +139,23 @@ class _Running:
         )
         # Names are resolved by the recorded node: remappings given for it alone would not reach this one.
         self._node = rclpy.create_node(
-            f"{node.get_name()}_recording", namespace=node.get_namespace(), context=node.context,
-            use_global_arguments=False, start_parameter_services=False, enable_rosout=False,
-        )  # fmt: skip
+            f"{node.get_name()}_recording",
+            namespace=node.get_namespace(),
+            context=node.context,
+            use_global_arguments=False,
+            start_parameter_services=False,
+            enable_rosout=False,
+        )
         resolved = [dataclasses.replace(topic, name=node.resolve_topic_name(topic.name)) for topic in wanted]
         reliability = ReliabilityPolicy[settings["input_reliability"].upper()]
         self._recorder = Recorder(
-            self._node, self.bag, resolved, DEPTH,
+            self._node,
+            self.bag,
+            resolved,
+            DEPTH,
             # As the node itself asks: whatever reaches it reaches the recording.
             functools.partial(recorded_topics.as_node_asks, recorded=node, vertices=reliability),
-        )  # fmt: skip
+        )
         DescribedRobots(self._node, self.bag, parameters, node.resolve_topic_name, node.get_logger().warning)
         self._missing = functools.partial(missing_shapes, parameters, node.resolve_topic_name, self._recorder.received)
         self._errors = errors

@@ -35,9 +35,7 @@ class PositionsSubscription(MeshTopic):
         alone = here or self.publishers <= 1
         sent = info["source_timestamp"]
         try:
-            frame = mesh_inputs.read(
-                self.kind, message, of.settings, received, alone, sent=sent, welding=self._welding
-            )
+            frame = mesh_inputs.read(self.kind, message, of.settings, received, alone, sent=sent, welding=self._welding)
         except InvalidMessageError as error:
             self.taken(sent, False)  # listed, because a replay reads and refuses it too
             of.accounts.refused(error.refusal(of.mesh, aspect=self.aspect, sent=sent))

@@ -15,9 +15,14 @@ from hpccd_ros.params.table import ROBOT
 # Valid messages that were replaced: by a newer message, a frame of another mesh, or a scene without that mesh. If joint
 # states or transforms are missing, there are no further frames, and the age of the last one reveals it.
 GAVE_WAY = {
-    Reason.UNKNOWN_MESH, Reason.LATE, Reason.INCOMPLETE, Reason.RESTART, Reason.OVERLOAD, Reason.MIDDLEWARE,
+    Reason.UNKNOWN_MESH,
+    Reason.LATE,
+    Reason.INCOMPLETE,
+    Reason.RESTART,
+    Reason.OVERLOAD,
+    Reason.MIDDLEWARE,
     Reason.STOPPED,
-}  # fmt: skip
+}
 _ASPECTS = {Aspect.PLACE: "positions", Aspect.SHAPE: "the shape", Aspect.TOPOLOGY: "the topology"}
 
 

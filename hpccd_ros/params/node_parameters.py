@@ -78,8 +78,9 @@ def _spin_once(node, stop) -> None:
 
 def _nodes(node) -> str:
     own = (node.get_name(), node.get_namespace())
-    others = sorted({f"{ns.rstrip('/')}/{name}" for name, ns in node.get_node_names_and_namespaces()
-                     if (name, ns) != own})
+    others = sorted(
+        {f"{ns.rstrip('/')}/{name}" for name, ns in node.get_node_names_and_namespaces() if (name, ns) != own}
+    )
     return f" (there are: {', '.join(others)})" if others else " (no other node is running)"
 
 

@@ -235,8 +235,14 @@ INPUT_ROWS = (
     ),
     Row("max_vertices", "int", 5_000_000, "Largest mesh accepted", unit="vertices", span=(1, 1_000_000_000)),
     Row("max_faces", "int", 10_000_000, "Largest mesh accepted", unit="triangles", span=(1, 1_000_000_000)),
-    Row("max_edges", "int", 10_000_000, "Most edges beside those of the triangles", unit="edges",
-        span=(1, 1_000_000_000)),
+    Row(
+        "max_edges",
+        "int",
+        10_000_000,
+        "Most edges beside those of the triangles",
+        unit="edges",
+        span=(1, 1_000_000_000),
+    ),
     Row(
         "max_rate",
         "float",

@@ -96,8 +96,13 @@ def render(meshes, touched, size, azimuth, elevation):
     large = (size[0] * SUPERSAMPLING, size[1] * SUPERSAMPLING)
     camera = Camera(vertices, large, azimuth, elevation)
     buffers = rasterize(camera.project(vertices)[faces], large)
-    light = LIGHT @ np.array([[np.cos(np.radians(azimuth + 60)), np.sin(np.radians(azimuth + 60)), 0],
-                              [-np.sin(np.radians(azimuth + 60)), np.cos(np.radians(azimuth + 60)), 0], [0, 0, 1]])
+    light = LIGHT @ np.array(
+        [
+            [np.cos(np.radians(azimuth + 60)), np.sin(np.radians(azimuth + 60)), 0],
+            [-np.sin(np.radians(azimuth + 60)), np.cos(np.radians(azimuth + 60)), 0],
+            [0, 0, 1],
+        ]
+    )
     shaded = shade(buffers, camera, vertices, faces, colours, light)
     alpha = (buffers.triangle >= 0).astype(np.float64)[..., None]
     shaded = np.concatenate([shaded, alpha], axis=2)

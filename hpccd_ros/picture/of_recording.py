@@ -49,12 +49,17 @@ def facts(step: ReplayedStep) -> list[str]:
     found = step.contacts
     triangles, edges = (sum(len(getattr(t, kind)) for t in step.end_frame.topologies) for kind in ("faces", "edges"))
     told = [
-        f"{triangles:,} triangles" if triangles else None, f"{edges:,} lone edges" if edges else None,
-        f"{len(found.vf):,} vertex-face", f"{len(found.ee):,} edge-edge",
-        f"first at t = {found.first_toc:.4f}" if step.total else None, f"{step.milliseconds:.1f} ms",
+        f"{triangles:,} triangles" if triangles else None,
+        f"{edges:,} lone edges" if edges else None,
+        f"{len(found.vf):,} vertex-face",
+        f"{len(found.ee):,} edge-edge",
+        f"first at t = {found.first_toc:.4f}" if step.total else None,
+        f"{step.milliseconds:.1f} ms",
         f"accuracy {step.recorded.accuracy}" if step.recorded is not None else None,
-        separation_fact(step.separation), features_fact(step.features), f"hash {found.hash:016x}",
-    ]  # fmt: skip
+        separation_fact(step.separation),
+        features_fact(step.features),
+        f"hash {found.hash:016x}",
+    ]
     return [fact for fact in told if fact]
 
 

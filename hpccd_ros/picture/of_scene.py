@@ -32,9 +32,7 @@ def save(
     columns = min(3, len(indices))
     rows = -(-len(indices) // columns)
     size = (width, width * 3 // 4)
-    figure = Figure(
-        figsize=(columns * size[0] / 100, rows * (size[1] + 40) / 100), dpi=100, facecolor=BACKGROUND
-    )
+    figure = Figure(figsize=(columns * size[0] / 100, rows * (size[1] + 40) / 100), dpi=100, facecolor=BACKGROUND)
     FigureCanvasAgg(figure)
     for panel, index in enumerate(indices):
         frame = scene.frame(index)

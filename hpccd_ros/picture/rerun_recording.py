@@ -110,9 +110,10 @@ class RerunWriter:
             self._stream.log(f"contacts/{name}", rr.Points3D(points[part], colors=colours[part], radii=radius))
         self._stream.log(
             "contacts/normals",
-            rr.Arrows3D(origins=points, vectors=NORMAL_LENGTH * self._extent * normals, colors=colours,
-                        radii=0.2 * radius),
-        )  # fmt: skip
+            rr.Arrows3D(
+                origins=points, vectors=NORMAL_LENGTH * self._extent * normals, colors=colours, radii=0.2 * radius
+            ),
+        )
 
 
 def _blueprint(eye, target):
@@ -121,14 +122,21 @@ def _blueprint(eye, target):
     return rrb.Blueprint(
         rrb.Vertical(
             rrb.Spatial3DView(
-                name="meshes and contacts", origin="/", contents=["/meshes/**", "/edges/**", "/contacts/**"],
-                eye_controls=rrb.EyeControls3D(kind=rrb.Eye3DKind.Orbital, position=eye, look_target=target,
-                                               eye_up=[0, 0, 1]),
+                name="meshes and contacts",
+                origin="/",
+                contents=["/meshes/**", "/edges/**", "/contacts/**"],
+                eye_controls=rrb.EyeControls3D(
+                    kind=rrb.Eye3DKind.Orbital, position=eye, look_target=target, eye_up=[0, 0, 1]
+                ),
             ),
-            rrb.Horizontal(*(rrb.TimeSeriesView(name=name, origin=f"/curves/{name}")
-                             for name in ("contacts", "first_toc", "milliseconds"))),
+            rrb.Horizontal(
+                *(
+                    rrb.TimeSeriesView(name=name, origin=f"/curves/{name}")
+                    for name in ("contacts", "first_toc", "milliseconds")
+                )
+            ),
             row_shares=[4, 1],
         ),
         rrb.TimePanel(state="collapsed", timeline="step"),
         collapse_panels=True,
-    )  # fmt: skip
+    )

@@ -58,8 +58,15 @@ def _record(node, target, args, stop) -> int:
         _warn(text)
     info = recording_info(args.node, parameters, wanted, node.resolve_topic_name)
     try:
-        bag = BagWriter(target, info=info, attachments=files, compression=args.compression,
-                        flush_interval=args.flush, max_bytes=int(args.split_size * 1e6), max_seconds=args.split_time)
+        bag = BagWriter(
+            target,
+            info=info,
+            attachments=files,
+            compression=args.compression,
+            flush_interval=args.flush,
+            max_bytes=int(args.split_size * 1e6),
+            max_seconds=args.split_time,
+        )
     except (ValueError, OSError) as error:
         raise UserError(str(error)) from error
     try:
@@ -120,10 +127,19 @@ class Status:
         if sys.stderr.isatty() and time.monotonic() >= self._next:
             self._next += self.PERIOD
             lost = sum(self._recorder.lost.values())
-            print(f"\r{self._bag.message_count} messages, {self._recorder.received[self._contacts]} of contacts, "
-                  f"{self._bag.size / 1e6:.1f} MB, {lost} lost"
-                  + (f", {self._bag.not_written.total()} NOT WRITTEN ({self._bag.last_error})"
-                     if self._bag.failing else "") + "   ", end="", file=sys.stderr, flush=True)
+            print(
+                f"\r{self._bag.message_count} messages, {self._recorder.received[self._contacts]} of contacts, "
+                f"{self._bag.size / 1e6:.1f} MB, {lost} lost"
+                + (
+                    f", {self._bag.not_written.total()} NOT WRITTEN ({self._bag.last_error})"
+                    if self._bag.failing
+                    else ""
+                )
+                + "   ",
+                end="",
+                file=sys.stderr,
+                flush=True,
+            )
 
     def clear(self):
         if sys.stderr.isatty():
@@ -141,8 +157,10 @@ def _report(bag, recorder, missing):
     for path in bag.torn_files:
         print(f"  {path} ends early, without index: `hpccd doctor {path} --recover OUT.mcap`")
     if bag.write_errors:
-        print(f"  {bag.not_written.total()} messages NOT WRITTEN, {bag.write_errors} write errors, the last: "
-              f"{bag.last_error}")
+        print(
+            f"  {bag.not_written.total()} messages NOT WRITTEN, {bag.write_errors} write errors, the last: "
+            f"{bag.last_error}"
+        )
     where = str(files[0]) if len(files) == 1 else f"{len(files)} files in {bag.path}"
     print(f"recorded {bag.message_count} messages, {bag.size / 1e6:.2f} MB: {where}", flush=True)
 

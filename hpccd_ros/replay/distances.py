@@ -22,8 +22,15 @@ from hpccd_ros.replay.input_order import OrderedAnswer
 # Fields of DistanceArray, and how many entries each has for a pair of meshes.
 # Not approach_speed: the snapshot before may be one that the recording does not hold.
 _PER_PAIR = {
-    "mesh_a": 1, "mesh_b": 1, "kind": 1, "distance": 1, "features_a": 2, "features_b": 2, "points": 6, "direction": 3,
-}  # fmt: skip
+    "mesh_a": 1,
+    "mesh_b": 1,
+    "kind": 1,
+    "distance": 1,
+    "features_a": 2,
+    "features_b": 2,
+    "points": 6,
+    "direction": 3,
+}
 # Empty where the recording is older than the field.
 _LATER = ("direction",)
 

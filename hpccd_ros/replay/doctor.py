@@ -58,8 +58,10 @@ def _read(path) -> None:
 
 def _tell(found: Examination) -> None:
     print(f"{found.path}: {_verdict(found)}")
-    print(f"  {found.size:,} bytes, written by {printable(found.library) or '?'}, "
-          f"profile {printable(found.profile) or '?'}, {found.chunks} chunks, compression {found.compression}")
+    print(
+        f"  {found.size:,} bytes, written by {printable(found.library) or '?'}, "
+        f"profile {printable(found.profile) or '?'}, {found.chunks} chunks, compression {found.compression}"
+    )
     if found.message_count:
         begin = datetime.fromtimestamp(found.start * 1e-9, UTC).strftime("%Y-%m-%d %H:%M:%S")
         print(f"  {found.message_count} messages in {_seconds(found):.3f} s from {begin} UTC")
@@ -68,8 +70,10 @@ def _tell(found: Examination) -> None:
     if found.problem:
         print(f"  readable up to byte {found.readable:,}; the first problem: {printable(found.problem)}")
     if found.damaged_chunks:
-        print(f"  {found.damaged_chunks} damaged chunks skipped"
-              + (f", and {found.orphans} messages that only they described" if found.orphans else ""))
+        print(
+            f"  {found.damaged_chunks} damaged chunks skipped"
+            + (f", and {found.orphans} messages that only they described" if found.orphans else "")
+        )
     if not found.sound and found.message_count:
         print(f"  `hpccd doctor {found.path} --recover OUT.mcap` saves the messages above")
 

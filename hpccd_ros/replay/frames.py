@@ -134,9 +134,14 @@ class FrameSource:
         several = bool((flags or 0) & SEVERAL_PUBLISHERS)
         try:
             checked = mesh_inputs.read(
-                kind, decoded, self._settings, 0.0, not several, sent=message.publish_time,
+                kind,
+                decoded,
+                self._settings,
+                0.0,
+                not several,
+                sent=message.publish_time,
                 welding=self._weldings[message.topic],
-            )  # fmt: skip
+            )
         except InvalidMessageError as error:
             return Outcome(refusals=[error.refusal(mesh, mesh_inputs.INPUTS[kind])])
         if kind != "topology":

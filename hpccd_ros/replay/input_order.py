@@ -175,8 +175,10 @@ class InputOrder:
                     free = (times < until) & ~np.isin(times, of_all.get(name, ()))
                     if name in upto:
                         free &= times > upto[name]
-                    found += [(place, name, time) for place, time in
-                              zip(self._place[name][free].tolist(), times[free].tolist(), strict=True)]  # fmt: skip
+                    found += [
+                        (place, name, time)
+                        for place, time in zip(self._place[name][free].tolist(), times[free].tolist(), strict=True)
+                    ]
                     upto[name] = max(upto.get(name, until), until)
                 first.unlisted = [(name, time) for _, name, time in sorted(found)]
             for name, (_, last) in span.items():

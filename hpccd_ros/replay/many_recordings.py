@@ -48,9 +48,15 @@ def main(args) -> int:
         read_parameters(args.params)  # one sentence now rather than one for each recording
     paths = [str(Path(path).absolute()) for path in args.files]
     with _cluster(distributed, args, len(paths)) as (client, threads):
-        options = {"params": args.params and str(Path(args.params).absolute()), "backend": args.backend,
-                   "threads": args.threads or threads, "accuracy": args.accuracy,
-                   "features": args.features, "begin": args.begin, "end": args.end}
+        options = {
+            "params": args.params and str(Path(args.params).absolute()),
+            "backend": args.backend,
+            "threads": args.threads or threads,
+            "accuracy": args.accuracy,
+            "features": args.features,
+            "begin": args.begin,
+            "end": args.end,
+        }
         futures = [client.submit(replay_one, path, pure=False, **options) for path in paths]
         rows = _gather(distributed, futures, paths)
     _print(rows)
@@ -78,8 +84,12 @@ def _cluster(distributed, args, jobs):
     cores = len(os.sched_getaffinity(0))
     processes = min(args.jobs or cores, jobs)
     # On this machine only, and without the web page of Dask.
-    with distributed.LocalCluster(n_workers=processes, threads_per_worker=1, host="127.0.0.1",
-                                  dashboard_address=None) as cluster, distributed.Client(cluster) as client:
+    with (
+        distributed.LocalCluster(
+            n_workers=processes, threads_per_worker=1, host="127.0.0.1", dashboard_address=None
+        ) as cluster,
+        distributed.Client(cluster) as client,
+    ):
         yield client, max(1, cores // processes)
 
 
@@ -88,17 +98,26 @@ def _gather(distributed, futures, paths) -> list[dict]:
     number = {future.key: k for k, future in enumerate(futures)}
     rows = [{}] * len(futures)
     progress = Progress(
-        TextColumn("replay"), BarColumn(), MofNCompleteColumn(), TextColumn("recordings"), TimeRemainingColumn(),
-        TextColumn("{task.fields[said]}"), console=Console(stderr=True), transient=True,
+        TextColumn("replay"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("recordings"),
+        TimeRemainingColumn(),
+        TextColumn("{task.fields[said]}"),
+        console=Console(stderr=True),
+        transient=True,
         disable=not sys.stderr.isatty(),
-    )  # fmt: skip
+    )
     with progress:
         bar = progress.add_task("replay", total=len(futures), said="")
         for future in distributed.as_completed(futures):
             k = number[future.key]
             error = future.exception()
-            rows[k] = future.result() if error is None else {
-                "file": paths[k], "result": "FAILED", "why": f"{type(error).__name__}: {error}", "host": ""}
+            rows[k] = (
+                future.result()
+                if error is None
+                else {"file": paths[k], "result": "FAILED", "why": f"{type(error).__name__}: {error}", "host": ""}
+            )
             progress.update(bar, advance=1, said=f"{Path(paths[k]).name}: {rows[k]['result']}")
     return rows
 
@@ -116,8 +135,11 @@ def _print(rows) -> None:
         for row in rows:
             print(f"{row['file']}: {row['result']}" + (f": {row['why']}" if row["why"] else ""))
     good = sum(row["result"] in GOOD for row in rows)
-    print(f"{good} of {len(rows)} recordings without a difference, {sum(r.get('verified', 0) for r in rows):,} answers "
-          f"verified, {sum(r.get('diverged', 0) for r in rows):,} diverged", flush=True)
+    print(
+        f"{good} of {len(rows)} recordings without a difference, {sum(r.get('verified', 0) for r in rows):,} answers "
+        f"verified, {sum(r.get('diverged', 0) for r in rows):,} diverged",
+        flush=True,
+    )
 
 
 def _write_csv(path, rows) -> None:

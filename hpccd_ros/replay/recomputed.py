@@ -143,8 +143,20 @@ class Replay:
     messages_read: recorded messages so far, of `message_count`.
     """
 
-    def __init__(self, recording: Recording, setup: ReplaySetup, *, backend="auto", threads=0, accuracy="",
-                 features=(), outputs=(), distances=True, begin=0.0, end=float("inf")):
+    def __init__(
+        self,
+        recording: Recording,
+        setup: ReplaySetup,
+        *,
+        backend="auto",
+        threads=0,
+        accuracy="",
+        features=(),
+        outputs=(),
+        distances=True,
+        begin=0.0,
+        end=float("inf"),
+    ):
         self._recording = recording
         self._setup = setup
         self._backend, self._threads, self._accuracy = backend, threads, accuracy

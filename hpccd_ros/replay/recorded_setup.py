@@ -53,11 +53,14 @@ class ReplaySetup:
     def options(self, accuracy: str, backend: str, threads: int) -> Options:
         """Detector options of the recorded node, but for what may differ without a change of the result."""
         return Options(
-            accuracy or self.settings["accuracy"], backend, threads, self.settings["report"],
+            accuracy or self.settings["accuracy"],
+            backend,
+            threads,
+            self.settings["report"],
             separation=pair_parameters.separation(self.settings, robot_parameters.links(self.robots)),
             features=scene_parameters.features(self.settings),
             rigid=scene_parameters.rigid(self.settings),
-        )  # fmt: skip
+        )
 
 
 def of_recording(recording: Recording, parameter_file: str | None = None) -> ReplaySetup:
@@ -85,9 +88,11 @@ def of_recording(recording: Recording, parameter_file: str | None = None) -> Rep
     of_robots = settings[ROBOT]
     by_role = _by_role(recording, info, recorded_topics.types_by_role(meshes, of_robots))
     joint_topics, described = robot_parameters.joint_topics(of_robots), robot_parameters.topics(of_robots).values()
-    roles = {topic: ("", role) if role in transform_topics.ALL or role in joint_topics else tuple(role.split("/")[1:])
-             for role, topic in by_role.items()
-             if role not in recorded_topics.ANSWERS and role not in described}  # fmt: skip
+    roles = {
+        topic: ("", role) if role in transform_topics.ALL or role in joint_topics else tuple(role.split("/")[1:])
+        for role, topic in by_role.items()
+        if role not in recorded_topics.ANSWERS and role not in described
+    }
     by_transforms = any(row["input"] == topic_names.BY_TRANSFORMS for row in meshes.values())
     if not by_transforms and not of_robots and not any(kind in topic_names.POSITIONS for _, kind in roles.values()):
         raise RecordingError(
@@ -112,9 +117,17 @@ def of_recording(recording: Recording, parameter_file: str | None = None) -> Rep
         scene_parameters.check(settings, meshes, robots)
     except ParameterError as error:
         raise refused(printable(f"{where}: {error}")) from error
-    return ReplaySetup(settings, meshes, roles, by_role.get(topic_names.CONTACTS), by_role.get(topic_names.DISTANCES),
-                       _files(recording, meshes), robots, [by_role[role] for role in dict.fromkeys(described)],
-                       values.unknown(given, meshes, settings["robots"]))  # fmt: skip
+    return ReplaySetup(
+        settings,
+        meshes,
+        roles,
+        by_role.get(topic_names.CONTACTS),
+        by_role.get(topic_names.DISTANCES),
+        _files(recording, meshes),
+        robots,
+        [by_role[role] for role in dict.fromkeys(described)],
+        values.unknown(given, meshes, settings["robots"]),
+    )
 
 
 def _stored(recording, info) -> dict:

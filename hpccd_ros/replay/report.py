@@ -24,8 +24,23 @@ _HINTS = {
     Reason.NO_SHAPE: "; the recording has no shape of it on meshes/{mesh}/vertices: begin it before the shape is sent, "
     "or give the node mesh.{mesh}.file",
 }
-COLUMNS = ("number", "step", "start_ns", "end_ns", "contacts", "vertex_face", "edge_edge", "first_toc", "separation",
-           "features", "ms", "hash", "recorded_contacts", "recorded_hash", "result")  # fmt: skip
+COLUMNS = (
+    "number",
+    "step",
+    "start_ns",
+    "end_ns",
+    "contacts",
+    "vertex_face",
+    "edge_edge",
+    "first_toc",
+    "separation",
+    "features",
+    "ms",
+    "hash",
+    "recorded_contacts",
+    "recorded_hash",
+    "result",
+)
 
 
 class Table:
@@ -41,14 +56,30 @@ class Table:
 
     def add(self, step: ReplayedStep) -> None:
         found, recorded = step.contacts, step.recorded
-        self._writer.writerow([
-            step.number, step.step, step.start, step.end,
-            *([step.total, len(found.vf), len(found.ee), repr(float(found.first_toc)), step.separation.text,
-               " ".join(step.features), f"{step.milliseconds:.3f}", f"{found.hash:#018x}"]
-              if found is not None else [""] * 8),
-            *([recorded.total, f"{recorded.hash:#018x}"] if recorded is not None else [""] * 2),
-            step.missing or step.difference or ("equal" if recorded is not None else ""),
-        ])  # fmt: skip
+        self._writer.writerow(
+            [
+                step.number,
+                step.step,
+                step.start,
+                step.end,
+                *(
+                    [
+                        step.total,
+                        len(found.vf),
+                        len(found.ee),
+                        repr(float(found.first_toc)),
+                        step.separation.text,
+                        " ".join(step.features),
+                        f"{step.milliseconds:.3f}",
+                        f"{found.hash:#018x}",
+                    ]
+                    if found is not None
+                    else [""] * 8
+                ),
+                *([recorded.total, f"{recorded.hash:#018x}"] if recorded is not None else [""] * 2),
+                step.missing or step.difference or ("equal" if recorded is not None else ""),
+            ]
+        )
 
     def close(self):
         self._file.close()
@@ -70,8 +101,16 @@ def main(args) -> int:
         setup = recorded_setup.of_recording(recording, args.params)
         table = stack.enter_context(contextlib.closing(Table(args.csv))) if args.csv else None
         progress = stack.enter_context(_progress_bar())
-        replay = Replay(recording, setup, backend=args.backend, threads=args.threads, accuracy=args.accuracy,
-                        features=args.features, begin=args.begin, end=args.end)
+        replay = Replay(
+            recording,
+            setup,
+            backend=args.backend,
+            threads=args.threads,
+            accuracy=args.accuracy,
+            features=args.features,
+            begin=args.begin,
+            end=args.end,
+        )
         bar = progress.add_task("replay", total=replay.message_count, said="")
         summary = Summary()
         pace = Pace(args.rate or 0.0)
@@ -84,8 +123,9 @@ def main(args) -> int:
             if step.contacts is not None:
                 progress.update(bar, said=f"step {step.step}: {step.total:,} contacts, {step.milliseconds:.1f} ms")
             if step.difference and args.keep_going:
-                progress.console.print(f"step {step.step} (ends at {step.end} ns): {step.difference}", markup=False,
-                                       highlight=False)
+                progress.console.print(
+                    f"step {step.step} (ends at {step.end} ns): {step.difference}", markup=False, highlight=False
+                )
             if args.step:
                 progress.stop()
                 print(line(step))
@@ -158,37 +198,58 @@ class Summary:
             result = "COMPUTED" if self.computed else "NOTHING"
             why = "no recorded contacts" if self.computed else "no step of all meshes"
         return {
-            "file": str(path), "result": result, "verified": replay.verified, "diverged": replay.diverged,
-            "unverified": replay.unverified, "frames": replay.frames, "steps": self.computed,
-            "contacts": self.contacts, "core_ms": round(self.milliseconds, 3),
-            "seconds": round(time.perf_counter() - self.began, 3), "accuracy": sorted(self.accuracies),
-            "separation": sorted(self.separations), "features": sorted(self.features),
-            "distances_verified": distances.verified, "why": why,
-        }  # fmt: skip
+            "file": str(path),
+            "result": result,
+            "verified": replay.verified,
+            "diverged": replay.diverged,
+            "unverified": replay.unverified,
+            "frames": replay.frames,
+            "steps": self.computed,
+            "contacts": self.contacts,
+            "core_ms": round(self.milliseconds, 3),
+            "seconds": round(time.perf_counter() - self.began, 3),
+            "accuracy": sorted(self.accuracies),
+            "separation": sorted(self.separations),
+            "features": sorted(self.features),
+            "distances_verified": distances.verified,
+            "why": why,
+        }
 
     def print(self, args, recording, replay) -> None:
         wall = time.perf_counter() - self.began
-        print(f"{recording.path}: {replay.frames:,} frames, {self.computed:,} steps computed, "
-              f"{self.contacts:,} contacts")
+        print(
+            f"{recording.path}: {replay.frames:,} frames, {self.computed:,} steps computed, {self.contacts:,} contacts"
+        )
         if self.computed:
-            print(f"  {wall:.2f} s ({self.milliseconds / self.computed:.2f} ms a step in the core) for "
-                  f"{self.seconds_recorded:.2f} s of motion; {args.threads or os.cpu_count()} threads")
+            print(
+                f"  {wall:.2f} s ({self.milliseconds / self.computed:.2f} ms a step in the core) for "
+                f"{self.seconds_recorded:.2f} s of motion; {args.threads or os.cpu_count()} threads"
+            )
         _print_losses(replay)
         if self.before:
-            print(f"  {self.before} answers not verified: their step began before the recording, or depends on earlier "
-                  "messages")
+            print(
+                f"  {self.before} answers not verified: their step began before the recording, or depends on earlier "
+                "messages"
+            )
         if self.missing:
-            print(f"  {replay.unverified} answers NOT VERIFIED, first step {self.missing.step} "
-                  f"(ends at {self.missing.end} ns): {self.missing.missing}")
+            print(
+                f"  {replay.unverified} answers NOT VERIFIED, first step {self.missing.step} "
+                f"(ends at {self.missing.end} ns): {self.missing.missing}"
+            )
         _print_distances(replay.distances)
         if replay.diverged:
             first = replay.first_divergence
-            print(f"DIVERGED: {replay.diverged} of {replay.diverged + replay.verified} answers differ, first in step "
-                  f"{first.step}, answer {first.number} of the recording (ends at {first.end} ns):\n"
-                  f"  {first.difference}")
+            print(
+                f"DIVERGED: {replay.diverged} of {replay.diverged + replay.verified} answers differ, first in step "
+                f"{first.step}, answer {first.number} of the recording (ends at {first.end} ns):\n"
+                f"  {first.difference}"
+            )
         elif replay.verified:
-            what = "hold a contact where there is one, and one that there is" if replay.any_one else (
-                "are equal in every contact, time and hash")  # fmt: skip
+            what = (
+                "hold a contact where there is one, and one that there is"
+                if replay.any_one
+                else ("are equal in every contact, time and hash")
+            )
             # The word stands for all of the recording.
             verdict = " " if replay.distances.diverged else "VERIFIED:"
             print(f"{verdict} {replay.verified} answers {what} ({self._tiers()})")
@@ -210,8 +271,10 @@ class Summary:
 
 def _print_distances(distances) -> None:
     if distances.diverged:
-        print(f"DIVERGED: {distances.diverged} of {distances.diverged + distances.verified} answers about distances "
-              f"differ, the first:\n  {distances.first}")
+        print(
+            f"DIVERGED: {distances.diverged} of {distances.diverged + distances.verified} answers about distances "
+            f"differ, the first:\n  {distances.first}"
+        )
     elif distances.unverified:
         print(f"  {distances.unverified} answers about distances NOT VERIFIED, the first: {distances.first}")
     elif distances.verified:
@@ -229,7 +292,13 @@ def _print_losses(replay) -> None:
 
 def _progress_bar() -> Progress:
     return Progress(
-        TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TextColumn("messages"),
-        TimeRemainingColumn(), TextColumn("{task.fields[said]}"),
-        console=Console(stderr=True), transient=True, disable=not sys.stderr.isatty(),
-    )  # fmt: skip
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("messages"),
+        TimeRemainingColumn(),
+        TextColumn("{task.fields[said]}"),
+        console=Console(stderr=True),
+        transient=True,
+        disable=not sys.stderr.isatty(),
+    )

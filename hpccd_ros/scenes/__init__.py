@@ -78,46 +78,66 @@ def _resolved(kind):
 
 _REGISTRY = {
     "two-triangles": _Entry(
-        "a triangle falls through another: one vertex-face contact", 11,
+        "a triangle falls through another: one vertex-face contact",
+        11,
         lambda name, title, size, frames, seed, progress: small.two_triangles(name, title, frames),
     ),
     "folding-strip": _Entry(
-        "a strip folds like a letter and passes through itself, 3 K triangles", 61,
+        "a strip folds like a letter and passes through itself, 3 K triangles",
+        61,
         lambda name, title, size, frames, seed, progress: small.folding_strip(name, title, size, frames),
     ),
     "cloth-drop": _Entry(
-        "a small cloth falls on a ball that then spins, 7 K triangles", 90, _cloth_drop,
+        "a small cloth falls on a ball that then spins, 7 K triangles",
+        90,
+        _cloth_drop,
     ),
     "arm-and-cloth": _Entry(
-        "an arm takes a cloth between two fingers and drags it across a table, 8 K triangles", 361, _arm_and_cloth,
+        "an arm takes a cloth between two fingers and drags it across a table, 8 K triangles",
+        361,
+        _arm_and_cloth,
     ),
     "cloth-ball-like": _Entry(
-        "a cloth drapes on a ball that then spins, 92 K triangles", 94, _cloth_ball,
+        "a cloth drapes on a ball that then spins, 92 K triangles",
+        94,
+        _cloth_ball,
     ),
     "breaking-like": _Entry(
-        "a boulder shatters a hollow statue: 252 K triangles, changing topology", 60, breaking.make,
+        "a boulder shatters a hollow statue: 252 K triangles, changing topology",
+        60,
+        breaking.make,
     ),
     "n-body-like-lr": _Entry(
-        "60 rigid and deforming bodies fall into a pile, 32 K triangles", 76, _n_body(32_000),
+        "60 rigid and deforming bodies fall into a pile, 32 K triangles",
+        76,
+        _n_body(32_000),
     ),
     "n-body-like-hr": _Entry(
-        "60 rigid and deforming bodies fall into a pile, 146 K triangles", 76, _n_body(146_000),
+        "60 rigid and deforming bodies fall into a pile, 146 K triangles",
+        76,
+        _n_body(146_000),
     ),
     "rod-twist-like": _Entry(
-        "a bundle of rods is twisted until it coils up: layers close together, 106 K triangles", 260, _rod_twist,
+        "a bundle of rods is twisted until it coils up: layers close together, 106 K triangles",
+        260,
+        _rod_twist,
     ),
     "armadillo-like": _Entry(
-        "a knobbly body with limbs is drawn between two rollers, 70 K triangles", 260, _armadillo,
+        "a knobbly body with limbs is drawn between two rollers, 70 K triangles",
+        260,
+        _armadillo,
     ),
     "cloth-ball-resolved": _Entry(
-        "a cloth winds round a spinning ball and never touches: what a solver made, 35 K triangles", 220,
+        "a cloth winds round a spinning ball and never touches: what a solver made, 35 K triangles",
+        220,
         _resolved(cloth_resolved.resolved),
     ),
     "cloth-ball-trial": _Entry(
-        "the same; from each frame a long step, as a solver tries it first, with its contacts, 35 K triangles", 439,
+        "the same; from each frame a long step, as a solver tries it first, with its contacts, 35 K triangles",
+        439,
         _resolved(cloth_resolved.trial),
     ),
-}  # fmt: skip
+}
 
 
 def names() -> list[str]:
@@ -130,9 +150,7 @@ def describe() -> list[tuple[str, str, int]]:
     return [(name, entry.title, entry.frames) for name, entry in _REGISTRY.items()]
 
 
-def make(
-    name: str, size: float = 1.0, frames: int | None = None, seed: int = 0, progress: bool = False
-) -> Scene:
+def make(name: str, size: float = 1.0, frames: int | None = None, seed: int = 0, progress: bool = False) -> Scene:
     """Make a scene.
 
     name      one of `names()`

@@ -136,9 +136,7 @@ def make(
         fold = _ramp(np.float64(index / FOLDED)) * (1.0 + STIR * sincos(STIR_RATE * index)[0])
         body = _posed(rest, belongs, roots, float(fold))
         body = _squeezed(body + (0.0, 0.0, height))
-        turned = [
-            rotate(axis_angle(y_axis, -way * turn * index), roller) + way * aside for way in (-1.0, 1.0)
-        ]
+        turned = [rotate(axis_angle(y_axis, -way * turn * index), roller) + way * aside for way in (-1.0, 1.0)]
         return Frame([body, *turned], index, index * FRAME_PERIOD)
 
     meshes = (

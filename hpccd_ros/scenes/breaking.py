@@ -21,9 +21,7 @@ from hpccd_ros.scenes.scene import Frame, Mesh, Scene, Topology
 FRAME_PERIOD = 1 / 60
 PIECES = 160
 HIT_FRAME = 5
-CRACK_FRAMES = (
-    16  # the crack runs through the statue in this many frames, a new topology in each that frees a piece
-)
+CRACK_FRAMES = 16  # the crack runs through the statue in this many frames, a new topology in each that frees a piece
 GROUND = -1.215  # just below the statue
 BOULDER_RADIUS = 0.42
 BOULDER_VELOCITY = np.array([-7.0, 2.0, -1.0])
@@ -38,9 +36,7 @@ def _statue(quads: float):
     points, normals, tangents = shapes.torus_knot_curve(along, 2, 3, 0.62, 0.34)
     a = np.arange(along)[:, None] * (2 * PI / along)
     b = np.arange(around)[None, :] * (2 * PI / around)
-    bumps = (
-        0.16 * sincos(14 * a + 3 * b)[0] + 0.10 * sincos(9 * a - 2 * b)[0] + 0.06 * sincos(31 * a + 5 * b)[0]
-    )
+    bumps = 0.16 * sincos(14 * a + 3 * b)[0] + 0.10 * sincos(9 * a - 2 * b)[0] + 0.06 * sincos(31 * a + 5 * b)[0]
     radius = 0.25 * (1.0 + bumps)
     # Stand it up: the knot's axis z becomes horizontal.
     swap = [2, 0, 1]
@@ -52,12 +48,7 @@ def _statue(quads: float):
 def _boulder(triangles: float):
     vertices, faces = shapes.icosphere(max(3, round((triangles / 20) ** 0.5)))
     x, y, z = vertices[:, 0], vertices[:, 1], vertices[:, 2]
-    rough = (
-        1.0
-        + 0.06 * sincos(5 * x + 3 * y)[0]
-        + 0.05 * sincos(7 * z - 4 * x)[0]
-        + 0.02 * sincos(17 * y + 13 * z)[0]
-    )
+    rough = 1.0 + 0.06 * sincos(5 * x + 3 * y)[0] + 0.05 * sincos(7 * z - 4 * x)[0] + 0.02 * sincos(17 * y + 13 * z)[0]
     return vertices * (BOULDER_RADIUS * rough)[:, None], faces
 
 
@@ -84,16 +75,12 @@ def _simulate(frames: int, seed: int, show_progress: bool):
     centre = np.stack([np.bincount(cell, weights=middle[:, k], minlength=PIECES) for k in range(3)], axis=1)
     centre = centre / count[:, None]
     # A few spheres inside each piece's wall, and one at least: at its seed.
-    proxies = np.concatenate(
-        [seeds, middle[(random.random_sample(5 * PIECES) * len(middle)).astype(np.int64)]]
-    )
+    proxies = np.concatenate([seeds, middle[(random.random_sample(5 * PIECES) * len(middle)).astype(np.int64)]])
     owner = _nearest(proxies, seeds)
     out = centre - IMPACT
     distance = length(out)
     release = (HIT_FRAME + np.floor(distance * (CRACK_FRAMES / distance.max()))) * FRAME_PERIOD
-    start = (
-        IMPACT - BOULDER_VELOCITY * (HIT_FRAME * FRAME_PERIOD) - normalized(BOULDER_VELOCITY) * BOULDER_RADIUS
-    )
+    start = IMPACT - BOULDER_VELOCITY * (HIT_FRAME * FRAME_PERIOD) - normalized(BOULDER_VELOCITY) * BOULDER_RADIUS
     boulder = np.array([[0.0, 0.0, 0.0]])
     kick = 2.2 / (0.35 + distance)
     bodies = rigid.Bodies(
@@ -164,9 +151,7 @@ def _walls(faces, part, surface):
     cut = part[owner[forward]] != part[owner[backward]]
     here = forward[cut]
     a, b, side = a[here], b[here], part[owner[here]]
-    walls = np.concatenate(
-        [np.stack([b, a, a + surface], axis=1), np.stack([b, a + surface, b + surface], axis=1)]
-    )
+    walls = np.concatenate([np.stack([b, a, a + surface], axis=1), np.stack([b, a + surface, b + surface], axis=1)])
     return walls, np.concatenate([side, side])
 
 
@@ -193,9 +178,7 @@ def make(name: str, title: str, size: float, frames: int, seed: int, show_progre
 
     @lru_cache(maxsize=4)
     def topology(version: int):
-        return statue.broken(
-            release[:PIECES] <= changes[version] if version else np.zeros(PIECES, dtype=bool)
-        )
+        return statue.broken(release[:PIECES] <= changes[version] if version else np.zeros(PIECES, dtype=bool))
 
     def version_of(index: int) -> int:
         return int(np.searchsorted(changes, index, side="right")) - 1

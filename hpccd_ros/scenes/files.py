@@ -19,9 +19,7 @@ from hpccd_ros.scenes.scene import Scene
 FIRST_STAMP_NS = 1_000_000_000
 
 
-def write_mcap(
-    scene: Scene, path: str | Path, rate: float, compression: str = "none", progress: bool = False
-) -> None:
+def write_mcap(scene: Scene, path: str | Path, rate: float, compression: str = "none", progress: bool = False) -> None:
     """Write all frames, `rate` a second, as `hpccd record` would have recorded them: topologies and vertices, of robots
     the description and the joint states.
 

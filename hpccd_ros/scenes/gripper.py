@@ -82,11 +82,13 @@ def push_out(p, before, earlier: Gripper, now: Gripper, depth: float, friction: 
         ways = np.stack([WIDTH / 2 - depth - np.abs(u), v - depth, THICKNESS - depth - v, w - depth])
         way = np.minimum(np.minimum(ways[0], ways[1]), np.minimum(ways[2], ways[3]))
         by_end, by_inner, by_outer, by_tip = (each == way for each in ways)
-        out = np.stack([
-            np.where(by_end, np.where(u > 0.0, WIDTH / 2 - depth, depth - WIDTH / 2), u),
-            np.where(by_inner, depth, np.where(by_outer, THICKNESS - depth, v)),
-            np.where(by_tip, depth, w),
-        ])  # fmt: skip
+        out = np.stack(
+            [
+                np.where(by_end, np.where(u > 0.0, WIDTH / 2 - depth, depth - WIDTH / 2), u),
+                np.where(by_inner, depth, np.where(by_outer, THICKNESS - depth, v)),
+                np.where(by_tip, depth, w),
+            ]
+        )
         was = earlier.local(before[:, inside])
         was[1] = side * was[1] - earlier.opening
         slide = np.where(np.stack([by_end, by_inner | by_outer, by_tip]), 0.0, out - was)

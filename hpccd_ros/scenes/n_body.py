@@ -102,9 +102,7 @@ def _wobble(points, phase, time):
     return np.stack([x, y, z + 0.08 * sincos(4.0 * x - 11.0 * time + phase)[0]], axis=1)
 
 
-def make(
-    name: str, title: str, triangles: int, size: float, frames: int, seed: int, show_progress: bool
-) -> Scene:
+def make(name: str, title: str, triangles: int, size: float, frames: int, seed: int, show_progress: bool) -> Scene:
     """The scene with about `triangles` * size triangles. Every other body deforms; each half is one mesh."""
     total = triangles * size
     cells = max(4, round((0.02 * total / 2) ** 0.5))
@@ -135,9 +133,7 @@ def make(
         time = index * FRAME_PERIOD
         wobbling = [_wobble(p, 2.4 * b, time) for p, b in zip(points[1], halves[1], strict=True)]
         shaped = [np.concatenate(points[0]), np.concatenate(wobbling)]
-        moved = [
-            rigid.placed(p * s, owner, at, turned) for p, s, owner in zip(shaped, scales, owners, strict=True)
-        ]
+        moved = [rigid.placed(p * s, owner, at, turned) for p, s, owner in zip(shaped, scales, owners, strict=True)]
         return Frame([*moved, ground], index, time)
 
     meshes = (

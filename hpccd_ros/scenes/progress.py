@@ -15,6 +15,4 @@ def track(items: Iterable, description: str, show: bool, total: int | None = Non
     from rich.console import Console
     from rich.progress import track as rich_track
 
-    yield from rich_track(
-        items, description=description, total=total, console=Console(stderr=True), transient=True
-    )
+    yield from rich_track(items, description=description, total=total, console=Console(stderr=True), transient=True)

@@ -49,9 +49,7 @@ def publish(
     """
     with stop_signals.collected() as stop:
         environment.prepare()
-        rclpy.init(
-            args=["--ros-args", *ros_args] if ros_args else None, signal_handler_options=SignalHandlerOptions.NO
-        )
+        rclpy.init(args=["--ros-args", *ros_args] if ros_args else None, signal_handler_options=SignalHandlerOptions.NO)
         node = rclpy.create_node("hpccd_scene", start_parameter_services=False)
         answers = Answers(node) if answered else None
         try:

@@ -50,9 +50,7 @@ class Material:
     air_drag: float = 0.05  # 1/s
 
 
-Ground = Callable[
-    [np.ndarray], tuple[np.ndarray, np.ndarray]
-]  # points (S,3) -> height above it (S,), normals (S,3)
+Ground = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]  # points (S,3) -> height above it (S,), normals (S,3)
 
 
 def flat_ground(height: float) -> Ground:

@@ -11,12 +11,46 @@ from hpccd_ros.scenes.exactmath import PI, cross, normalized, sincos
 def icosphere(frequency: int):
     """Unit sphere of 20 * frequency**2 faces: each face of an icosahedron cut into frequency**2."""
     golden = (1 + 5**0.5) / 2
-    corners = np.array([(-1, golden, 0), (1, golden, 0), (-1, -golden, 0), (1, -golden, 0), (0, -1, golden),
-                        (0, 1, golden), (0, -1, -golden), (0, 1, -golden), (golden, 0, -1), (golden, 0, 1),
-                        (-golden, 0, -1), (-golden, 0, 1)])  # fmt: skip
-    sides = np.array([(0, 11, 5), (0, 5, 1), (0, 1, 7), (0, 7, 10), (0, 10, 11), (1, 5, 9), (5, 11, 4),
-                      (11, 10, 2), (10, 7, 6), (7, 1, 8), (3, 9, 4), (3, 4, 2), (3, 2, 6), (3, 6, 8),
-                      (3, 8, 9), (4, 9, 5), (2, 4, 11), (6, 2, 10), (8, 6, 7), (9, 8, 1)])  # fmt: skip
+    corners = np.array(
+        [
+            (-1, golden, 0),
+            (1, golden, 0),
+            (-1, -golden, 0),
+            (1, -golden, 0),
+            (0, -1, golden),
+            (0, 1, golden),
+            (0, -1, -golden),
+            (0, 1, -golden),
+            (golden, 0, -1),
+            (golden, 0, 1),
+            (-golden, 0, -1),
+            (-golden, 0, 1),
+        ]
+    )
+    sides = np.array(
+        [
+            (0, 11, 5),
+            (0, 5, 1),
+            (0, 1, 7),
+            (0, 7, 10),
+            (0, 10, 11),
+            (1, 5, 9),
+            (5, 11, 4),
+            (11, 10, 2),
+            (10, 7, 6),
+            (7, 1, 8),
+            (3, 9, 4),
+            (3, 4, 2),
+            (3, 2, 6),
+            (3, 6, 8),
+            (3, 8, 9),
+            (4, 9, 5),
+            (2, 4, 11),
+            (6, 2, 10),
+            (8, 6, 7),
+            (9, 8, 1),
+        ]
+    )
     n = frequency
     i, j = np.divmod(np.arange((n + 1) * (n + 1)), n + 1)
     inside = i + j <= n
@@ -102,9 +136,7 @@ def sheet(columns: int, rows: int):
     """Flat square [-1,1]^2 at z = 0 of 2 * columns * rows faces facing +z, vertices numbered row by row."""
     x = 2.0 * np.arange(columns + 1) / columns - 1.0
     y = 2.0 * np.arange(rows + 1) / rows - 1.0
-    vertices = np.stack(
-        [np.tile(x, rows + 1), np.repeat(y, columns + 1), np.zeros((rows + 1) * (columns + 1))], axis=1
-    )
+    vertices = np.stack([np.tile(x, rows + 1), np.repeat(y, columns + 1), np.zeros((rows + 1) * (columns + 1))], axis=1)
     return vertices, _quads(rows, columns, wrap=False)
 
 
@@ -132,9 +164,7 @@ def revolved(profile, around: int):
     """
     s, c = sincos(np.arange(around) * (2 * PI / around))
     radius, y = profile[:, 0], profile[:, 1]
-    vertices = np.stack(
-        [s[:, None] * radius[None, :], np.tile(y, (around, 1)), c[:, None] * radius[None, :]], axis=-1
-    )
+    vertices = np.stack([s[:, None] * radius[None, :], np.tile(y, (around, 1)), c[:, None] * radius[None, :]], axis=-1)
     return vertices.reshape(-1, 3), _quads(around, len(profile), wrap=True)
 
 

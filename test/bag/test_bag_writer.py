@@ -81,9 +81,19 @@ def test_a_split_takes_no_longer_for_the_files_before_it(tmp_path):
 def test_metadata_for_rosbag2(tmp_path):
     path = tmp_path / "bag.mcap"
     writer = BagWriter(path)
-    qos = [{"history": "keep_last", "depth": 3, "reliability": "reliable", "durability": "transient_local",
-            "deadline": qos_yaml.INFINITE, "lifespan": qos_yaml.INFINITE, "liveliness": "automatic",
-            "liveliness_lease_duration": qos_yaml.INFINITE, "avoid_ros_namespace_conventions": False}]  # fmt: skip
+    qos = [
+        {
+            "history": "keep_last",
+            "depth": 3,
+            "reliability": "reliable",
+            "durability": "transient_local",
+            "deadline": qos_yaml.INFINITE,
+            "lifespan": qos_yaml.INFINITE,
+            "liveliness": "automatic",
+            "liveliness_lease_duration": qos_yaml.INFINITE,
+            "avoid_ros_namespace_conventions": False,
+        }
+    ]
     writer.add_topic(Topic("/contacts", "hpccd/msg/ContactArray", qos))
     writer.close()
     with open(path, "rb") as stream:
@@ -147,5 +157,9 @@ def test_files_that_came_to_be_needed_later_are_found_and_none_is_overwritten(tm
     assert len(writer.file_paths) == 3
     with Recording(path) as recording:
         assert recording.attachments == {
-            "robot/arm/semantics.srdf": b"first", "late": b"late", "0": b"any", "1": b"any", "2": b"any",
-        }  # fmt: skip
+            "robot/arm/semantics.srdf": b"first",
+            "late": b"late",
+            "0": b"any",
+            "1": b"any",
+            "2": b"any",
+        }

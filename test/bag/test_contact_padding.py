@@ -82,8 +82,18 @@ def test_no_other_field_has_moved():
 
 def test_recordings_from_before_tell_nothing():
     now = message_definitions.definition_text(NAME)
-    later = (" tested_features", " parts", " motion_bounds", " inputs_before", " start_inputs", " input_topics",
-             " input_topic", " input_sent", " input_flags", " report")  # fmt: skip
+    later = (
+        " tested_features",
+        " parts",
+        " motion_bounds",
+        " inputs_before",
+        " start_inputs",
+        " input_topics",
+        " input_topic",
+        " input_sent",
+        " input_flags",
+        " report",
+    )
     then = "\n".join(line for line in now.splitlines() if not line.endswith(later))
     topic = RecordedTopic("/contacts", NAME, then, type_hash="", offered_qos="", count=1)
     message = answer(2, 2, "world")

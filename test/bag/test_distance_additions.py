@@ -26,11 +26,20 @@ def test_recordings_from_before_are_read(backend):
     store.register(get_types_from_msg(own, NAME))
     header = store.types["std_msgs/msg/Header"](store.types["builtin_interfaces/msg/Time"](3, 4), "world")
     old = store.types[NAME](
-        header=header, step=7, mesh_names=["a"], topology_versions=np.zeros(1, np.uint32), kind=np.ones(1, np.uint8),
-        mesh_a=np.zeros(1, np.uint32), mesh_b=np.zeros(1, np.uint32), distance=np.array([0.25]),
-        features_a=np.arange(2, dtype=np.uint32), features_b=np.arange(2, 4, dtype=np.uint32), points=np.arange(6.0),
-        accuracy="exact", backend=backend,
-    )  # fmt: skip
+        header=header,
+        step=7,
+        mesh_names=["a"],
+        topology_versions=np.zeros(1, np.uint32),
+        kind=np.ones(1, np.uint8),
+        mesh_a=np.zeros(1, np.uint32),
+        mesh_b=np.zeros(1, np.uint32),
+        distance=np.array([0.25]),
+        features_a=np.arange(2, dtype=np.uint32),
+        features_b=np.arange(2, 4, dtype=np.uint32),
+        points=np.arange(6.0),
+        accuracy="exact",
+        backend=backend,
+    )
     data = bytes(store.serialize_cdr(old, NAME))
     topic = RecordedTopic("/distances", NAME, then, type_hash="", offered_qos="", count=1)
     message = make_decoder(topic)(RecordedMessage("/distances", 0, 0, 0, data))

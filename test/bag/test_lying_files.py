@@ -55,8 +55,13 @@ def _special_files(folder):
 def test_what_is_no_file_is_refused_at_once(tmp_path):
     (tmp_path / "in").mkdir()
     for path in (*_special_files(tmp_path / "in"), tmp_path / "in"):
-        for command in (("doctor", path), ("doctor", path, "--recover", tmp_path / "out.mcap"), ("replay", path),
-                        ("replay", path, "--publish"), ("view", path)):  # fmt: skip
+        for command in (
+            ("doctor", path),
+            ("doctor", path, "--recover", tmp_path / "out.mcap"),
+            ("replay", path),
+            ("replay", path, "--publish"),
+            ("view", path),
+        ):
             if path.is_dir() and "--recover" in command:
                 continue
             done = hpccd(*command)
@@ -120,6 +125,7 @@ def _first(records, kind):
 
 def test_an_index_that_leaves_a_chunk_out(bag, tmp_path):
     """The answers in that chunk would not be verified, in silence."""
+
     def change(records):
         left_out = _first(records, ChunkIndex)
         return [record for record in records if record is not left_out]
@@ -277,6 +283,8 @@ def test_messages_far_out_of_order_do_not_fill_the_memory(bag, tmp_path, monkeyp
     for number, message in enumerate(bag.messages):
         message.log_time = min(times) if number % 4 == 0 else max(times)
     bag.chunk_bytes = 10_000
-    with Recording(bag.write(tmp_path / "x.mcap")) as recording, pytest.raises(RecordingError,
-    match="not in the order"):
+    with (
+        Recording(bag.write(tmp_path / "x.mcap")) as recording,
+        pytest.raises(RecordingError, match="not in the order"),
+    ):
         list(recording.messages())

@@ -65,8 +65,13 @@ def _without_counts(records):
     return [dataclasses.replace(r, channel_message_counts={}) if isinstance(r, Statistics) else r for r in records]
 
 
-NOTHING = {"index_types": IndexType.NONE, "repeat_channels": False, "repeat_schemas": False, "use_statistics": False,
-           "use_summary_offsets": False}  # fmt: skip
+NOTHING = {
+    "index_types": IndexType.NONE,
+    "repeat_channels": False,
+    "repeat_schemas": False,
+    "use_statistics": False,
+    "use_summary_offsets": False,
+}
 PRIVATE = raw_record(0x90, b"for one program only")
 WRITERS = {
     "usual": _library(),
@@ -92,10 +97,11 @@ WRITERS = {
     "statistics without counts": _records(index=_without_counts),
     "statistics without counts, no channels": _records(index=lambda r: _without(Channel)(_without_counts(r))),
     "private records": _records(
-        inside=lambda records: [*records, PRIVATE], data=lambda records: [*records, PRIVATE],
+        inside=lambda records: [*records, PRIVATE],
+        data=lambda records: [*records, PRIVATE],
         index=lambda records: [PRIVATE, *records],
     ),
-}  # fmt: skip
+}
 
 
 def _foreign(bag):
@@ -206,8 +212,14 @@ def test_messages_before_their_channel_is_described(bag, tmp_path):
     assert hpccd("doctor", path).status == 1 and "is damaged" in hpccd("replay", path).err
 
 
-@pytest.mark.parametrize("data", [b"\x28\xb5\x2f\xfd", zstandard.compress(b"x" * 1000)[:-4],
-                                  zstandard.ZstdCompressor(write_content_size=False).compress(b"x" * 1000)])
+@pytest.mark.parametrize(
+    "data",
+    [
+        b"\x28\xb5\x2f\xfd",
+        zstandard.compress(b"x" * 1000)[:-4],
+        zstandard.ZstdCompressor(write_content_size=False).compress(b"x" * 1000),
+    ],
+)
 def test_a_compressed_message_that_is_not_whole(bag, tmp_path, data):
     bag = bag.copy()
     bag.messages[5].data = data
@@ -265,8 +277,10 @@ def _by_rosbags(sound_bags, folder, storage, mode):
     if mode is not None:
         writer.set_compression(mode, CompressionFormat.ZSTD)
     with Recording(sound_bags / "streams.mcap") as recording, writer:
-        connections = {topic.name: writer.add_connection(topic.name, topic.type_name, typestore=store)
-                       for topic in recording.topics.values()}  # fmt: skip
+        connections = {
+            topic.name: writer.add_connection(topic.name, topic.type_name, typestore=store)
+            for topic in recording.topics.values()
+        }
         for message in as_installed(recording):
             writer.write(connections[message.topic], message.log_time, message.data)
     return folder

@@ -13,9 +13,14 @@ TRIANGLE = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
 
 def test_a_goal_has_all_that_the_request_has():
     request = client.collision_free_step_request(
-        {"a": TRIANGLE}, {"a": TRIANGLE + 1}, topologies={"a": client.topology_message([[0, 1, 2]], 3)},
-        accuracy="exact", minimum_separation=0.5, features="vertex_face", time_limit=7.0,
-    )  # fmt: skip
+        {"a": TRIANGLE},
+        {"a": TRIANGLE + 1},
+        topologies={"a": client.topology_message([[0, 1, 2]], 3)},
+        accuracy="exact",
+        minimum_separation=0.5,
+        features="vertex_face",
+        time_limit=7.0,
+    )
     goal = client.goal_from_request(request)
     names = request.get_fields_and_field_types()
     assert goal.get_fields_and_field_types() == names

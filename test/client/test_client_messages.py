@@ -83,9 +83,15 @@ def test_the_last_values_that_fit():
 def two_contacts(**changes):
     """A vertex of mesh a on a face of b, and two edges."""
     fields = dict(
-        mesh_names=["a", "b"], kind=[0, 1], mesh_a=[0, 0], mesh_b=[1, 1], features_a=[2, ContactArray.NONE, 0, 1],
-        features_b=[0, ContactArray.NONE, 1, 2], toc=[0.25, 0.5], topology_versions=[0, 0],
-    )  # fmt: skip
+        mesh_names=["a", "b"],
+        kind=[0, 1],
+        mesh_a=[0, 0],
+        mesh_b=[1, 1],
+        features_a=[2, ContactArray.NONE, 0, 1],
+        features_b=[0, ContactArray.NONE, 1, 2],
+        toc=[0.25, 0.5],
+        topology_versions=[0, 0],
+    )
     return ContactArray(**{**fields, **changes})
 
 
@@ -111,9 +117,12 @@ def test_no_contacts():
 
 def test_contacts_with_a_separation():
     message = two_contacts(
-        minimum_separation=0.1, separation_mesh_a=[1, 0], separation_mesh_b=[0, 0], separations=[0.2, 0.0],
+        minimum_separation=0.1,
+        separation_mesh_a=[1, 0],
+        separation_mesh_b=[0, 0],
+        separations=[0.2, 0.0],
         closest=[float(k) for k in range(12)],
-    )  # fmt: skip
+    )
     contacts = client.contacts_from_message(message)
     assert contacts.minimum_separation == 0.1
     assert contacts.pair_separation == {("a", "b"): 0.2, ("a", "a"): 0.0}, "names in the order of the scene"
@@ -146,9 +155,15 @@ def test_answers_of_one_snapshot():
 def three_distances(**changes):
     none = DistanceArray.NONE
     fields = dict(
-        mesh_names=["a", "b"], kind=[1, 0, 255], mesh_a=[0, 1, 1], mesh_b=[0, 0, 1], distance=[0.5, 0.25, math.inf],
-        features_a=[0, 1, 2, none, none, none], features_b=[3, 4, 0, none, none, none], points=[0.0] * 18,
-    )  # fmt: skip
+        mesh_names=["a", "b"],
+        kind=[1, 0, 255],
+        mesh_a=[0, 1, 1],
+        mesh_b=[0, 0, 1],
+        distance=[0.5, 0.25, math.inf],
+        features_a=[0, 1, 2, none, none, none],
+        features_b=[3, 4, 0, none, none, none],
+        points=[0.0] * 18,
+    )
     return DistanceArray(**{**fields, **changes})
 
 

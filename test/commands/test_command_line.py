@@ -85,8 +85,13 @@ def test_unknown_command(hpccd):
 
 @pytest.mark.parametrize(
     "arguments",
-    [["replay", "x.mcap"], ["view", "x.mcap"], ["cut", "x.mcap", "-o", "y.mcap"], ["record"],
-     ["scene", "two-triangles", "--publish"]],  # fmt: skip
+    [
+        ["replay", "x.mcap"],
+        ["view", "x.mcap"],
+        ["cut", "x.mcap", "-o", "y.mcap"],
+        ["record"],
+        ["scene", "two-triangles", "--publish"],
+    ],
 )
 def test_another_rmw_implementation_is_refused_before_rcl_ends_the_process(hpccd, monkeypatch, arguments):
     monkeypatch.setenv("RMW_IMPLEMENTATION", "rmw_nobody_cpp")

@@ -34,11 +34,13 @@ def _segment_segment(a0, a1, b0, b1):
     inner = ~flat & (s >= 0) & (s <= 1) & (t >= 0) & (t <= 1)
     ends = np.min(
         [
-            _point_segment(a0, b0, b1), _point_segment(a1, b0, b1),
-            _point_segment(b0, a0, a1), _point_segment(b1, a0, a1),
+            _point_segment(a0, b0, b1),
+            _point_segment(a1, b0, b1),
+            _point_segment(b0, a0, a1),
+            _point_segment(b1, a0, a1),
         ],
         axis=0,
-    )  # fmt: skip
+    )
     return np.where(inner, np.abs((w * normal).sum(-1)) / np.sqrt(np.where(flat, 1, area)), ends)
 
 

@@ -120,8 +120,10 @@ def fold(turned_over):
         on_half = flat[faces, 0].mean(axis=1) > 0
         faces = np.where(on_half[:, None], faces[:, ::-1], faces)
     over = np.maximum(flat[:, 0], 0)
-    start, end = (flat * np.where(half, x, 1)[:, None] ** [1, 0, 0] + over[:, None] * [0, 0, z]
-                  for x, z in ((-0.75, 0.5), (-0.75, -0.5)))
+    start, end = (
+        flat * np.where(half, x, 1)[:, None] ** [1, 0, 0] + over[:, None] * [0, 0, z]
+        for x, z in ((-0.75, 0.5), (-0.75, -0.5))
+    )
     return faces, start, end, 0.5
 
 
@@ -132,9 +134,7 @@ def book():
     a = np.arange(n - 1)
 
     def page(first):
-        return np.concatenate(
-            [np.stack([a, a + 1, a + first], 1), np.stack([a + first, a + 1, a + 1 + first], 1)]
-        )
+        return np.concatenate([np.stack([a, a + 1, a + first], 1), np.stack([a + first, a + 1, a + 1 + first], 1)])
 
     faces = np.concatenate([page(n), page(2 * n), page(3 * n)])
     away = [spine + way for way in ([2, 0.25, 0], [2, 0, 1], [1, 0.5, 2])]
@@ -151,9 +151,12 @@ def sphere(n=1):
         points /= np.linalg.norm(points, axis=1)[:, None]
         at = [[middle[tuple(sorted(e))] for e in (f[:2], f[1:], f[[0, 2]])] for f in faces]
         faces = np.array(
-            [t for (a, b, c), (ab, bc, ca) in zip(faces, at, strict=True)
-             for t in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))]
-        )  # fmt: skip
+            [
+                t
+                for (a, b, c), (ab, bc, ca) in zip(faces, at, strict=True)
+                for t in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))
+            ]
+        )
     return faces, points
 
 
@@ -188,9 +191,22 @@ def inner_vertex_that_leaves():
 SHAPES = {
     f.__name__: f
     for f in (
-        spiral_stairs, square_stairs, rolled_carpet, unrolled_carpet, half_a_turn, nearly_half_a_turn, mirrored,
-        ring_that_closes, ring_that_stays_open, discs_joined_at_a_vertex, tongue_across_a_hole, book,
-        sphere_turned_inside_out, sphere_pressed_flat, sphere_that_swells, cylinder_that_shrinks,
+        spiral_stairs,
+        square_stairs,
+        rolled_carpet,
+        unrolled_carpet,
+        half_a_turn,
+        nearly_half_a_turn,
+        mirrored,
+        ring_that_closes,
+        ring_that_stays_open,
+        discs_joined_at_a_vertex,
+        tongue_across_a_hole,
+        book,
+        sphere_turned_inside_out,
+        sphere_pressed_flat,
+        sphere_that_swells,
+        cylinder_that_shrinks,
     )
 } | {
     "stairs pressed flat": lambda: spiral_stairs(0.0),
@@ -198,4 +214,4 @@ SHAPES = {
     "ring that overlaps its start": lambda: ring_that_closes(1.25),
     "fold": lambda: fold(False),
     "fold turned over": lambda: fold(True),
-}  # fmt: skip
+}

@@ -58,7 +58,7 @@ _OBJ = {
     "curves": "deg 3\ncstype bspline\n" + _v() + "vp 0.1\nparm u 0 1\nend\n" + _f(),
     "quads": (_v() + _f(QUADS), QUADS),
     "mixed": (_v() + _f(MIXED), MIXED),
-}  # fmt: skip
+}
 
 
 def _obj():
@@ -73,8 +73,20 @@ def _obj():
 
 
 FORMS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
-_CODES = {"char": "b", "uchar": "B", "short": "h", "ushort": "H", "int": "i", "uint": "I", "int64": "q", "uint8": "B",
-          "float": "f", "float32": "f", "double": "d", "int32": "i"}  # fmt: skip
+_CODES = {
+    "char": "b",
+    "uchar": "B",
+    "short": "h",
+    "ushort": "H",
+    "int": "i",
+    "uint": "I",
+    "int64": "q",
+    "uint8": "B",
+    "float": "f",
+    "float32": "f",
+    "double": "d",
+    "int32": "i",
+}
 
 
 def ply(form, elements, end="\n", comments=()):
@@ -116,15 +128,29 @@ def _ply_elements():
     return {
         "plain": ([vertex, face], FACES),
         "double": ([("vertex", dict.fromkeys("xyz", "double"), points), face], FACES),
-        "int-positions": ([("vertex", dict.fromkeys("xyz", "int"), [tuple(map(int, p)) for p in ELL]),
-                           ("face", _LIST, _rows([range(6)]))], [list(range(6))]),
-        "colours": ([("vertex", {**_XYZ, "red": "uchar", "alpha": "uchar"}, [(*p, 1, 2) for p in points]), face],
-                    FACES),
-        "other-order": ([("vertex", {"s": "float", "z": "float", "y": "double", "x": "float"},
-                          [(9, *p[::-1]) for p in points]), face], FACES),
+        "int-positions": (
+            [
+                ("vertex", dict.fromkeys("xyz", "int"), [tuple(map(int, p)) for p in ELL]),
+                ("face", _LIST, _rows([range(6)])),
+            ],
+            [list(range(6))],
+        ),
+        "colours": (
+            [("vertex", {**_XYZ, "red": "uchar", "alpha": "uchar"}, [(*p, 1, 2) for p in points]), face],
+            FACES,
+        ),
+        "other-order": (
+            [
+                ("vertex", {"s": "float", "z": "float", "y": "double", "x": "float"}, [(9, *p[::-1]) for p in points]),
+                face,
+            ],
+            FACES,
+        ),
         "texture-of-faces": ([vertex, ("face", {**_LIST, "texcoord": ("uchar", "float")}, corners)], FACES),
-        "texture-before": ([vertex, ("face", {"texcoord": ("uchar", "float"), **_LIST}, [r[::-1] for r in corners])],
-                           FACES),
+        "texture-before": (
+            [vertex, ("face", {"texcoord": ("uchar", "float"), **_LIST}, [r[::-1] for r in corners])],
+            FACES,
+        ),
         "quads": ([vertex, ("face", _LIST, _rows(QUADS))], QUADS),
         "mixed": ([vertex, ("face", _LIST, _rows(MIXED))], MIXED),
         "mixed-and-more": ([vertex, ("face", {"a": "short", **_LIST, **more}, [(5, f, 7, 0.5) for f in MIXED])], MIXED),
@@ -140,13 +166,29 @@ def _ply_elements():
         "float-lists": ([vertex, ("face", {"vertex_indices": ("float", "float")}, _rows(MIXED))], MIXED),
         "other-name": ([vertex, ("face", {"corners": ("uint8", "int32")}, _rows(FACES))], FACES),
         "points-and-lines": ([vertex, ("face", _LIST, _rows([[0], *FACES, [1, 2], []]))], FACES),
-        "any-lists-of-vertices": ([("vertex", {"a": "uchar", "x": "float", "near": ("uchar", "short"), "y": "float",
-                                               "more": ("int", "double"), "z": "float"},
-                                    [(9, x, [1] * (k % 3), y, [2.5] * (k % 2), z)
-                                     for k, (x, y, z) in enumerate(points)]), face], FACES),
-        "lists-of-vertices": ([("vertex", {"near": ("uchar", "int"), **_XYZ}, [([1, 2], *p) for p in points]), face],
-                              FACES),
-    }  # fmt: skip
+        "any-lists-of-vertices": (
+            [
+                (
+                    "vertex",
+                    {
+                        "a": "uchar",
+                        "x": "float",
+                        "near": ("uchar", "short"),
+                        "y": "float",
+                        "more": ("int", "double"),
+                        "z": "float",
+                    },
+                    [(9, x, [1] * (k % 3), y, [2.5] * (k % 2), z) for k, (x, y, z) in enumerate(points)],
+                ),
+                face,
+            ],
+            FACES,
+        ),
+        "lists-of-vertices": (
+            [("vertex", {"near": ("uchar", "int"), **_XYZ}, [([1, 2], *p) for p in points]), face],
+            FACES,
+        ),
+    }
 
 
 def _lists_of_coordinates():

@@ -186,6 +186,4 @@ def lattice_ropes(rng):
     return combine(lattice_rope(rng), lattice_sheet(rng, 4), lattice_rope(rng, 12))
 
 
-ALL = (
-    single_mesh, lattice, triangle_soup, many_meshes, lone_vertices, huge_and_tiny, spread, ropes, lattice_ropes
-)  # fmt: skip
+ALL = (single_mesh, lattice, triangle_soup, many_meshes, lone_vertices, huge_and_tiny, spread, ropes, lattice_ropes)

@@ -87,10 +87,17 @@ def all_magnitudes(rng, n, exponents=450):
 
 REGULAR = [small_steps, pinned, scaled(480), scaled(-900), far_away]
 DEGENERATE = [
-    generators.lattice, generators.still, generators.in_plane, generators.on_line, generators.meeting_vertex_face,
-    generators.meeting_edge_edge, generators.parallel_at_root, generators.chosen_roots,
-    generators.chosen_roots_edge_edge, generators.thin,
-]  # fmt: skip
+    generators.lattice,
+    generators.still,
+    generators.in_plane,
+    generators.on_line,
+    generators.meeting_vertex_face,
+    generators.meeting_edge_edge,
+    generators.parallel_at_root,
+    generators.chosen_roots,
+    generators.chosen_roots_edge_edge,
+    generators.thin,
+]
 
 
 def contacts(kind, generate, number, accuracy="exact"):

@@ -41,11 +41,14 @@ def _read_only(array):
 
 
 LAYOUTS = [
-    np.asfortranarray, _strided, _misaligned, _read_only,
+    np.asfortranarray,
+    _strided,
+    _misaligned,
+    _read_only,
     lambda a: a.astype(">f8"),
     lambda a: a[::-1].copy()[::-1],
     lambda a: a.tolist(),
-]  # fmt: skip
+]
 
 
 @pytest.mark.parametrize("layout", LAYOUTS)

@@ -150,8 +150,10 @@ def test_a_cancelled_detector_answers_no_query():
     detector = hc.Detector(scene, backend="cpu", minimum_separation=0.1)
     detector.cancel()
     for ask in (
-        lambda: detector.detect(points, end), lambda: detector.proximity(points, 0.1),
-        lambda: detector.intersections(points), lambda: detector.distances(points),
-    ):  # fmt: skip
+        lambda: detector.detect(points, end),
+        lambda: detector.proximity(points, 0.1),
+        lambda: detector.intersections(points),
+        lambda: detector.distances(points),
+    ):
         with pytest.raises(hc.Cancelled):
             ask()

@@ -79,8 +79,10 @@ def test_distance_at_toc_and_not_before(kind):
             if is_hit and t > 0:
                 found += 1
                 square = squared_distance(kind, at_time(query, Fraction(float(t))))
-                speed = max(sum(abs(x - y) for x, y in zip(p, q, strict=True))
-                            for p, q in zip(rational(query[:4]), rational(query[4:]), strict=True))  # fmt: skip
+                speed = max(
+                    sum(abs(x - y) for x, y in zip(p, q, strict=True))
+                    for p, q in zip(rational(query[:4]), rational(query[4:]), strict=True)
+                )
                 one_rounding = Fraction(float(np.spacing(t)))
                 assert d * d <= square <= (d + 2 * speed * one_rounding) ** 2, (name, query.tolist())
             elif is_hit:

@@ -24,7 +24,10 @@ def test_small_scenes(kind):
         touches, free = true_steps(kind, queries, distances, 0)
         for query, d, touch, step in zip(queries, distances, touches, free, strict=True):
             every = reference.brute_force(
-                *np.split(query, 2), scene.faces, edges_per_mesh=scene.edges, n_vertices=scene.n_vertices,
+                *np.split(query, 2),
+                scene.faces,
+                edges_per_mesh=scene.edges,
+                n_vertices=scene.n_vertices,
                 minimum_separation=d,
             )
             expected = earliest_of_all(every)
@@ -40,9 +43,13 @@ def test_random_scenes(generate):
         rules = {"no_self_collision": [0], "ignored_pairs": [(0, len(meshes.faces) - 1)]} if seed else {}
         for separation in (0.0, 0.01):
             found = reference.earliest_contacts(
-                meshes.vertices_t0[None], meshes.vertices_t1[None], meshes.faces, **meshes.beside_faces,
-                minimum_separation=separation, **rules,
-            )  # fmt: skip
+                meshes.vertices_t0[None],
+                meshes.vertices_t1[None],
+                meshes.faces,
+                **meshes.beside_faces,
+                minimum_separation=separation,
+                **rules,
+            )
             assert found.tolist() == [earliest_of_all(meshes.truth(minimum_separation=separation, **rules))]
 
 

@@ -64,9 +64,13 @@ def run(program):
     if hard not in (resource.RLIM_INFINITY, max(hard, STACK)):
         pytest.skip(f"threads may have {hard} bytes of stack here (ulimit -Hs), fewer than {STACK}")
     done = subprocess.run(
-        [sys.executable, "-c", LIMITED + program], capture_output=True, text=True, timeout=300, check=False,
+        [sys.executable, "-c", LIMITED + program],
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
         preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_STACK, (STACK, hard)),
-    )  # fmt: skip
+    )
     assert done.returncode == 0, (done.returncode, done.stderr)
     return done.stdout.splitlines()
 

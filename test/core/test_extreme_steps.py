@@ -80,8 +80,12 @@ def test_already_touching_and_all_on_one_point(accuracy):
 def test_sliding_in_one_plane(accuracy):
     """Sheets that lie in one plane and slide into each other; on each other from the start; past each other."""
     faces, flat = random_scenes.sheet(4), np.array([[x, y, 0] for y in range(4) for x in range(4)], float)
-    for start, end, step in (([5.0, 0.5, 0], [1.0, 0.5, 0], 0.5), ([1.0, 0.5, 0], [5.0, 0, 0], 0.0),
-                             ([5.0, 9, 0], [-5.0, 9, 0], 1.0), ([3.0, 0, 0], [9.0, 0, 0], 0.0)):  # fmt: skip
+    for start, end, step in (
+        ([5.0, 0.5, 0], [1.0, 0.5, 0], 0.5),
+        ([1.0, 0.5, 0], [5.0, 0, 0], 0.0),
+        ([5.0, 9, 0], [-5.0, 9, 0], 1.0),
+        ([3.0, 0, 0], [9.0, 0, 0], 0.0),
+    ):
         meshes = random_scenes.combine((faces, flat, flat), (faces, flat + start, flat + end))
         assert assert_true(meshes, accuracy) == pytest.approx(step, abs=1e-9)
 
@@ -92,8 +96,12 @@ def test_first_contact_of_features_far_apart_in_the_tree(accuracy):
     n = 200
     x = np.arange(n, dtype=float)
     low = np.stack([x, 0 * x, 0 * x], 1)
-    faces = np.concatenate([np.stack([np.arange(n - 1), np.arange(1, n), np.arange(n - 1) + n], 1),
-                            np.stack([np.arange(n - 1) + n, np.arange(1, n), np.arange(1, n) + n], 1)])  # fmt: skip
+    faces = np.concatenate(
+        [
+            np.stack([np.arange(n - 1), np.arange(1, n), np.arange(n - 1) + n], 1),
+            np.stack([np.arange(n - 1) + n, np.arange(1, n), np.arange(1, n) + n], 1),
+        ]
+    )
     start = np.concatenate([low, low + [0, 1, 0]])
     sheet = random_scenes.combine((faces, start, start), (faces, start + [0, 0.25, 1], start + [0.25, 0.25, -1]))
     assert 0.4 < assert_true(sheet, accuracy) <= 0.5
@@ -121,8 +129,12 @@ def test_next_to_nothing(accuracy):
     triangle = np.array([[0, 1, 2]]), np.eye(3), -np.eye(3)
     points = np.empty((0, 3), int), np.zeros((5, 3)), np.ones((5, 3))
     nothing = np.empty((0, 3), int), np.empty((0, 3)), np.empty((0, 3))
-    for meshes in (random_scenes.combine(triangle), random_scenes.combine(points), random_scenes.combine(nothing),
-                   random_scenes.combine(nothing, triangle, nothing)):  # fmt: skip
+    for meshes in (
+        random_scenes.combine(triangle),
+        random_scenes.combine(points),
+        random_scenes.combine(nothing),
+        random_scenes.combine(nothing, triangle, nothing),
+    ):
         assert assert_true(meshes, accuracy) == 1.0
     assert assert_true(random_scenes.combine(points, triangle), accuracy) < 1.0
     flat = np.array([[0, 0, 0], [0, 0, 1], [3, 3, 3]]), np.eye(4, 3), np.eye(4, 3)[::-1]

@@ -92,9 +92,12 @@ def ropes_and_points(rng):
     points = no_faces, rng.normal(0, 1, (12, 3)) + [25, -25, 25]
     hanging = [[0, 1, 2]], np.array([[25, -25, 90], [26, -25, 90], [25, -26, 95], [25, -25, 24.0]]), [[2, 3]]
     return [
-        (no_faces, rope[0][1], rope[0][3]), (no_faces, rope[1][1] + [20, 20, 20], rope[1][3]), points, hanging,
+        (no_faces, rope[0][1], rope[0][3]),
+        (no_faces, rope[1][1] + [20, 20, 20], rope[1][3]),
+        points,
+        hanging,
         body(rng, [-30, 30, 30]),
-    ]  # fmt: skip
+    ]
 
 
 def ties(rng):
@@ -133,9 +136,22 @@ def with_an_escaped_vertex(rng):
 
 
 SCENES = (
-    far, far_beside_their_size, tiny_inside_a_dome, with_an_escaped_vertex, parallel, parallel_turned, nearly_parallel,
-    concentric, degenerate, touching, intersecting, single_triangles, ropes_and_points, ties, tiny_beside_huge,
-)  # fmt: skip
+    far,
+    far_beside_their_size,
+    tiny_inside_a_dome,
+    with_an_escaped_vertex,
+    parallel,
+    parallel_turned,
+    nearly_parallel,
+    concentric,
+    degenerate,
+    touching,
+    intersecting,
+    single_triangles,
+    ropes_and_points,
+    ties,
+    tiny_beside_huge,
+)
 
 
 def scene_of(generate):
@@ -144,9 +160,7 @@ def scene_of(generate):
 
 
 def told(gaps):
-    return [
-        (g.mesh_a, g.mesh_b, g.distance, g.kind, tuple(g.features), np.asarray(g.points).tolist()) for g in gaps
-    ]  # fmt: skip
+    return [(g.mesh_a, g.mesh_b, g.distance, g.kind, tuple(g.features), np.asarray(g.points).tolist()) for g in gaps]
 
 
 @pytest.mark.parametrize("generate", SCENES)
@@ -178,8 +192,10 @@ def test_every_instruction_set(generate):
 
 def test_of_equally_near_pairs_the_first_is_named():
     """Unit cubes three apart: all of their facing features are, of which a vertex and a face come first."""
-    gaps = {(g.mesh_a, g.mesh_b): g for g in hc.Detector(scene_of(ties).scene(), backend="cpu").distances(
-        scene_of(ties).vertices_t0)}  # fmt: skip
+    gaps = {
+        (g.mesh_a, g.mesh_b): g
+        for g in hc.Detector(scene_of(ties).scene(), backend="cpu").distances(scene_of(ties).vertices_t0)
+    }
     gap = gaps["mesh0", "mesh1"]
     assert (gap.distance, gap.kind) == (2.0, "vertex-face")
     assert gap.features[0] == min(v for v in range(8) if scene_of(ties).vertices_t0[v, 0] == 1)

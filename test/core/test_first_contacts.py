@@ -118,10 +118,12 @@ def test_accuracies_of_pairs_of_meshes():
 @pytest.mark.parametrize(
     "rules",
     [
-        {"static": [0, 3]}, {"no_self_collision": [0, 1, 2, 3, 4]}, {"ignored_pairs": [(0, 1), (1, 1), (2, 3)]},
+        {"static": [0, 3]},
+        {"no_self_collision": [0, 1, 2, 3, 4]},
+        {"ignored_pairs": [(0, 1), (1, 1), (2, 3)]},
         {"static": [1], "no_self_collision": [0], "ignored_pairs": [(0, 4)]},
     ],
-)  # fmt: skip
+)
 def test_what_the_scene_rules_out(rules, accuracy):
     for seed in range(2):
         meshes = apart_at_first((random_scenes.many_meshes, random_scenes.free_at_first)[seed], seed)
@@ -182,9 +184,10 @@ def test_many_contacts_at_one_time(accuracy):
     faces = random_scenes.sheet(20)
     flat = np.stack([*np.meshgrid(np.arange(20.0), np.arange(20.0)), np.zeros((20, 20))], 2).reshape(-1, 3)
     meshes = random_scenes.combine(
-        (faces, flat + [0.25, 0.5, 1], flat + [0.25, 0.5, -1]), (faces, flat, flat),
+        (faces, flat + [0.25, 0.5, 1], flat + [0.25, 0.5, -1]),
+        (faces, flat, flat),
         (np.array([[0, 1, 2]]), [[0, 0, 9.0], [9, 0, 9], [0, 9, 9]], [[0, 0, -1.0], [9, 0, -1], [0, 9, -1]]),
-    )  # fmt: skip
+    )
     answers = {assert_first(meshes.scene(), meshes, accuracy=accuracy, threads=t) for t in (1, 2, 3, 7)}
     ((n, n_first, _, step),) = answers
     assert n > n_first > 1000 and step == pytest.approx(0.5, abs=1e-6)

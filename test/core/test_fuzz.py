@@ -24,7 +24,11 @@ def n_batches(question):
 @pytest.mark.parametrize(
     ("question", "size", "rounds"),
     [
-        (CONTACT, 600, 2), (SEPARATION, 100, 1), (PROXIMITY, 40, 1), (INTERSECTIONS, 60, 1), (DISTANCES, 60, 1),
+        (CONTACT, 600, 2),
+        (SEPARATION, 100, 1),
+        (PROXIMITY, 40, 1),
+        (INTERSECTIONS, 60, 1),
+        (DISTANCES, 60, 1),
         (STEP, 60, 2),
     ],
 )
@@ -128,7 +132,6 @@ class Mistakes:
         if self.report != "first" or len(found.vf) < 2:
             return found
         return dataclasses.replace(found, vf=found.vf[1:], vf_toc=found.vf_toc[1:])
-
 
     @staticmethod
     def one_too_many(self, start, end):

@@ -202,8 +202,10 @@ def length_of_list(form, length):
 
 
 REFUSED = {
-    **{f"lfs{suffix}": (LFS, "is a Git LFS pointer, not the mesh itself; run git lfs pull")
-       for suffix in (".obj", ".ply", ".stl", ".dae")},
+    **{
+        f"lfs{suffix}": (LFS, "is a Git LFS pointer, not the mesh itself; run git lfs pull")
+        for suffix in (".obj", ".ply", ".stl", ".dae")
+    },
     **{f"web{suffix}": (HTML, r"is a web page \(HTML\)") for suffix in (".obj", ".ply", ".stl", ".dae")},
     **{f"empty{suffix}": (b" \n", "is empty") for suffix in (".obj", ".ply", ".stl", ".dae")},
     **{f"zip{suffix}": (b"PK\x03\x04\x14\0\0\0", "is a zip archive; unpack it") for suffix in (".obj", ".stl", ".dae")},
@@ -239,10 +241,17 @@ REFUSED = {
     "nan.obj": (_OBJ + b"v nan 0 0\n", "vertex 6 is .*; coordinates must be finite"),
     "far.obj": (_OBJ + b"v 0 1e151 0\n", "vertex 6 is .*; coordinates must lie in"),
     "crossing.obj": ((variants._v(BOW_TIE) + "f 1 2 3 4\n").encode(), r"polygon 0 \(of 4 corners\): crosses itself"),
-    "star.obj": (("".join(f"v {np.cos(k * 2.4 * np.pi / 3)} {np.sin(k * 2.4 * np.pi / 3)} 0\n" for k in range(5))
-                  + "f 1 2 3 4 5\n").encode(), "crosses itself"),
-    "many-corners.obj": (("".join(f"v {k % 2} {k} 0\n" for k in range(9000)) + variants._f([range(9000)])).encode(),
-                         "more than 8000 corners; split it"),
+    "star.obj": (
+        (
+            "".join(f"v {np.cos(k * 2.4 * np.pi / 3)} {np.sin(k * 2.4 * np.pi / 3)} 0\n" for k in range(5))
+            + "f 1 2 3 4 5\n"
+        ).encode(),
+        "crosses itself",
+    ),
+    "many-corners.obj": (
+        ("".join(f"v {k % 2} {k} 0\n" for k in range(9000)) + variants._f([range(9000)])).encode(),
+        "more than 8000 corners; split it",
+    ),
     "cut.ply": (_PLY[:-1], "is cut off: it ends before the last of its 2 rows of face"),
     "cut-vertices.ply": (_PLY[:-40], "is cut off: .* 6 rows of vertex"),
     "cut-mixed.ply": (_MIXED_PLY[:-1], "is cut off: .* 4 rows of face"),
@@ -250,16 +259,20 @@ REFUSED = {
     "cut-header.ply": (_PLY[:60], "its header does not end"),
     "no-faces.ply": (ply("ascii", variants._ply_elements()["plain"][0][:1]), "has no triangles"),
     "no-z.ply": (_ASCII_PLY.replace(b"property float z\n", b""), "no element vertex with the properties x, y and z"),
-    **{f"list-of-{axis}-{form}.ply": (data, f"property {axis} of its vertices is a list; export it again")
-       for (axis, form), data in variants.LISTS_OF_COORDINATES.items()},
+    **{
+        f"list-of-{axis}-{form}.ply": (data, f"property {axis} of its vertices is a list; export it again")
+        for (axis, form), data in variants.LISTS_OF_COORDINATES.items()
+    },
     "strips.ply": (_ASCII_PLY.replace(b"element face", b"element tristrips"), "triangle strips: convert it to faces"),
     "type.ply": (_ASCII_PLY.replace(b"float x", b"half x"), "line 4: 'property half x': not a line of a PLY header"),
     "index.ply": (_ASCII_PLY.replace(b"3 0 1 2", b"3 0 1 6"), "face 0 names vertex 6, and the file has 6"),
     "negative.ply": (_ASCII_PLY.replace(b"3 0 1 2", b"3 0 -1 2"), "face 0 names vertex -1"),
     "fraction.ply": (_ASCII_PLY.replace(b"3 0 1 2", b"3 0 1.5 2"), "does not have the values that the header lists"),
     "claims.ply": (_PLY.replace(b"face 2", b"face 4000000000"), "is cut off"),
-    "length.ply": (_PLY.replace(b"uchar int", b"char int").replace(b"\x03\0\0\0\0\x01", b"\xfd\0\0\0\0\x01"),
-                   "a list of length -3"),
+    "length.ply": (
+        _PLY.replace(b"uchar int", b"char int").replace(b"\x03\0\0\0\0\x01", b"\xfd\0\0\0\0\x01"),
+        "a list of length -3",
+    ),
     "cut.stl": (stl()[:-1], "declares 2 triangles but contains 1; copy or export it again"),
     "count.stl": (stl(count=2**32 - 1), "declares 4294967295 triangles but contains 2"),
     "none.stl": (stl(triangles=variants.TRIANGLES[:0], count=0)[:80] + b"\0\0\0\0", "zeros only|has no triangles"),
@@ -269,7 +282,7 @@ REFUSED = {
     "word-text.stl": (text_stl().replace(b"vertex 0 0", b"vertex 0 x", 1), "line 4: .*not a number"),
     "garbage.stl": (bytes(range(128, 256)) * 8, "neither an ASCII STL nor a whole binary STL"),
     "garbage.obj": (bytes(range(128, 256)) * 8, "has no triangles"),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", REFUSED)

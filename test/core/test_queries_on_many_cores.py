@@ -11,8 +11,17 @@ from hpccd_core.fuzz.differential import usable_simd
 
 OUTPUTS = ("points", "normals", "closest")
 ARRAYS = (
-    "vf", "vf_toc", "ee", "ee_toc", "points", "normals", "closest", "vf_distance", "ee_distance", "ef",
-)  # fmt: skip
+    "vf",
+    "vf_toc",
+    "ee",
+    "ee_toc",
+    "points",
+    "normals",
+    "closest",
+    "vf_distance",
+    "ee_distance",
+    "ef",
+)
 
 
 def as_bytes(answer):

@@ -190,8 +190,11 @@ def test_first_tocs_of_one_world_on_a_device(monkeypatch, time):
 def test_arrays_on_a_device_still_need_one(meshes):
     class OnDevice:
         __cuda_array_interface__ = {
-            "shape": meshes.vertices_t0.shape, "typestr": "<f8", "data": (4096, False), "version": 3
-        }  # fmt: skip
+            "shape": meshes.vertices_t0.shape,
+            "typestr": "<f8",
+            "data": (4096, False),
+            "version": 3,
+        }
 
     detector = hc.Detector(meshes.scene(), backend="cpu")
     with pytest.raises(ValueError, match="is in a GPU's memory, which this detector does not use; copy it"):

@@ -48,9 +48,15 @@ def test_the_full_answer_with_the_other_kind_left_out(make, accuracy):
             hashes = set()
             for method, simd, threads in itertools.product(METHODS, SIMD, (1, 3)):
                 detector = hc.Detector(
-                    scene, accuracy=accuracy, minimum_separation=separation, backend="cpu", method=method, simd=simd,
-                    threads=threads, features=features,
-                )  # fmt: skip
+                    scene,
+                    accuracy=accuracy,
+                    minimum_separation=separation,
+                    backend="cpu",
+                    method=method,
+                    simd=simd,
+                    threads=threads,
+                    features=features,
+                )
                 found = detector.detect(*motion)
                 assert_holds(found, expected)
                 hashes.add(found.hash)

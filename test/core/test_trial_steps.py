@@ -17,11 +17,15 @@ ACCURACIES = pytest.mark.parametrize("accuracy", ["fast", "balanced", "conservat
 
 # Other queries that a detector may be asked between trial steps.
 BETWEEN = (
-    lambda detector, start, end: detector.detect(start, end), lambda detector, start, end: detector.detect(end, start),
-    lambda detector, start, end: detector.step(end), lambda detector, start, end: detector.proximity(start, 0.125),
-    lambda detector, start, end: detector.distances(end), lambda detector, start, end: detector.intersections(end),
-    lambda detector, start, end: detector.collision_free_step(end, start), lambda detector, start, end: None,
-)  # fmt: skip
+    lambda detector, start, end: detector.detect(start, end),
+    lambda detector, start, end: detector.detect(end, start),
+    lambda detector, start, end: detector.step(end),
+    lambda detector, start, end: detector.proximity(start, 0.125),
+    lambda detector, start, end: detector.distances(end),
+    lambda detector, start, end: detector.intersections(end),
+    lambda detector, start, end: detector.collision_free_step(end, start),
+    lambda detector, start, end: None,
+)
 
 
 def lifted(seed):
@@ -233,8 +237,14 @@ def test_signs_of_zero_and_types_of_numbers():
     detector = hc.Detector(meshes.scene(), backend="cpu")
     v0, v1 = meshes.vertices_t0, meshes.vertices_t1
     negative = np.where(v0 == 0, -0.0, v0)
-    for start, end in ((v0, v1), (negative, v1), (v0.astype(np.float32), v1.astype(np.float32)),
-                       (v0.astype(np.float32), v1), (v0[:, ::-1][:, ::-1], v1), (v0.tolist(), v1)):  # fmt: skip
+    for start, end in (
+        (v0, v1),
+        (negative, v1),
+        (v0.astype(np.float32), v1.astype(np.float32)),
+        (v0.astype(np.float32), v1),
+        (v0[:, ::-1][:, ::-1], v1),
+        (v0.tolist(), v1),
+    ):
         assert is_half(detector.collision_free_step(start, end))
     rounded = np.nextafter(v0, 9).astype(np.float32).astype(float)
     assert is_half(detector.collision_free_step(v0, v1)) and is_half(detector.collision_free_step(rounded, v1))
@@ -353,8 +363,14 @@ def test_patches_whose_freedom_was_proven_for_another_step(name):
     scene.add_mesh("patch", faces, n_vertices=len(start))
     detector = hc.Detector(scene, backend="cpu", threads=2)
     for _ in range(2):
-        for first, last in ((start, start + 0.125 * (end - start)), (start, end), (start, start), (end, start),
-                            (0.5 * (start + end), end), (start, 2 * end - start)):  # fmt: skip
+        for first, last in (
+            (start, start + 0.125 * (end - start)),
+            (start, end),
+            (start, start),
+            (end, start),
+            (0.5 * (start + end), end),
+            (start, 2 * end - start),
+        ):
             assert detector.collision_free_step(first, last) == fresh_step(scene, first, last)
 
 

@@ -72,9 +72,18 @@ def test_of_every_kind_of_scene(generate, backend):
 
 
 @BACKENDS
-@pytest.mark.parametrize("options", [{"features": "vertex_face"}, {"features": "edge_edge"}, {"method": "published"},
-                                     {"method": "naive"}, {"method": "front"}, {"simd": "scalar"},
-                                     {"minimum_separation": 0.05}])  # fmt: skip
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"features": "vertex_face"},
+        {"features": "edge_edge"},
+        {"method": "published"},
+        {"method": "naive"},
+        {"method": "front"},
+        {"simd": "scalar"},
+        {"minimum_separation": 0.05},
+    ],
+)
 def test_with_every_option(options, backend):
     if "method" in options and backend == "gpu":
         pytest.skip("the published methods run on CPUs")
@@ -131,8 +140,10 @@ def test_everything_in_any_order(backend):
     """One detector, long-lived: each world's history is that of a detector of its own, too."""
     rng = np.random.default_rng(5)
     worlds = many_worlds.of(random_scenes.many_meshes, 6)
-    asked = {report: (worlds.detector(backend, report=report), worlds.alone(backend, report=report))
-             for report in ("all", "first")}  # fmt: skip
+    asked = {
+        report: (worlds.detector(backend, report=report), worlds.alone(backend, report=report))
+        for report in ("all", "first")
+    }
     start = worlds.start
     for call in range(60):
         together, alone = asked[("all", "first")[rng.integers(2)]]

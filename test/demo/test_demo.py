@@ -72,8 +72,11 @@ def _hold_up(pids, ended):
 def test_no_frame_is_lost_on_a_machine_that_is_too_slow(tmp_path, demo_domain):
     process = subprocess.Popen(
         [sys.executable, "-m", "hpccd_ros.cli", "demo", "--size", "0.1", "--frames", "50", "--rate", "20"],
-        cwd=tmp_path, stdout=subprocess.PIPE, text=True, env={**os.environ, "PYTHONPATH": SOURCES},
-    )  # fmt: skip
+        cwd=tmp_path,
+        stdout=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "PYTHONPATH": SOURCES},
+    )
     lines = []
     for line in process.stdout:
         lines.append(line)
@@ -108,10 +111,13 @@ def test_demo_can_be_run_again(hpccd, tmp_path, demo_domain):
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
 def test_interrupted_demo_leaves_no_process(tmp_path, demo_domain, number):
     process = subprocess.Popen(
-        [sys.executable, "-m", "hpccd_ros.cli", "demo", "--size", "0.1", "--rate", "5"], cwd=tmp_path,
-        stdout=subprocess.PIPE, text=True, env={**os.environ, "PYTHONPATH": SOURCES},
+        [sys.executable, "-m", "hpccd_ros.cli", "demo", "--size", "0.1", "--rate", "5"],
+        cwd=tmp_path,
+        stdout=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "PYTHONPATH": SOURCES},
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # a shell's background job ignores it
-    )  # fmt: skip
+    )
     for line in process.stdout:
         if line.startswith("processes"):
             break

@@ -23,8 +23,14 @@ def told():
     rclpy.init(context=context)
     node = rclpy.create_node("told", context=context, start_parameter_services=False)
     publisher = node.create_publisher(DiagnosticArray, "/diagnostics", 10)
-    frames = _status("frames", dropped=52, dropped__overload=52, dropped__cloth__overload=26,
-                     dropped__ball__overload=20, dropped__ball__late=6)  # fmt: skip
+    frames = _status(
+        "frames",
+        dropped=52,
+        dropped__overload=52,
+        dropped__cloth__overload=26,
+        dropped__ball__overload=20,
+        dropped__ball__late=6,
+    )
     detection = _status("detection", detections=63, detect_ms__p50="2.5")
     with Monitor() as monitor:
         deadline = time.monotonic() + PATIENCE

@@ -63,9 +63,7 @@ def test_a_step_knows_the_distances_at_its_start_where_they_were_asked_for():
     """Those of a frame that was no end of an answered step are not known, nor those of a step without distances."""
     builder = SceneBuilder(tuple(map(MeshSettings, "ab")))
     detector = StepDetector(builder, Options(backend="cpu", threads=1, distances=True))
-    frames = [
-        SceneFrame(k, k, "", TOPOLOGIES, (HAND + (0, 0, 1 - 0.25 * k), FLOOR), ("a",), 0.0) for k in range(5)
-    ]  # fmt: skip
+    frames = [SceneFrame(k, k, "", TOPOLOGIES, (HAND + (0, 0, 1 - 0.25 * k), FLOOR), ("a",), 0.0) for k in range(5)]
     first, second = detector.detect(*frames[:2]), detector.detect(*frames[1:3])
     assert first.gaps_before is None and second.gaps_before is first.gaps
     assert approach_speeds(second.gaps_before, second.gaps, 0.5)[1] == 0.5

@@ -21,14 +21,33 @@ from hpccd_ros.rigid.transform import Rigid
 
 N = 10
 CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * [0.3, 0.06, 0.02]
-BOX = Topology(0, 8, np.array([
-    [0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1],
-    [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3],
-], np.uint32))  # fmt: skip
+BOX = Topology(
+    0,
+    8,
+    np.array(
+        [
+            [0, 1, 3],
+            [0, 3, 2],
+            [4, 6, 7],
+            [4, 7, 5],
+            [0, 4, 5],
+            [0, 5, 1],
+            [2, 3, 7],
+            [2, 7, 6],
+            [0, 2, 6],
+            [0, 6, 4],
+            [1, 5, 7],
+            [1, 7, 3],
+        ],
+        np.uint32,
+    ),
+)
 SHEET = Topology(0, N * N, sheet_faces(N))
 BODY = Body.of(CORNERS)
-MESHES = tuple(MeshSettings(name, self_collision=name == "cloth", input=kind)
-               for name, kind in (("blade", "pose"), ("cloth", "vertices"), ("spinner", "tf")))  # fmt: skip
+MESHES = tuple(
+    MeshSettings(name, self_collision=name == "cloth", input=kind)
+    for name, kind in (("blade", "pose"), ("cloth", "vertices"), ("spinner", "tf"))
+)
 SAMPLES = 400
 OPTIONS = Options(backend="cpu", threads=1, rigid=RigidOptions(1e-3, 64))
 
@@ -94,8 +113,11 @@ def test_nothing_is_missed_and_what_the_cloth_does_by_itself_is_exact(seed):
     alone = hc.Scene()
     alone.add_mesh("cloth", SHEET.faces)
     own = hc.Detector(alone, backend="cpu").detect(start.vertices[1], end.vertices[1])
-    of_cloth = {tuple(v - len(CORNERS) for v in pair): toc for pair, toc in told(found.contacts, "ee").items()
-                if all(len(CORNERS) <= v < len(CORNERS) + N * N for v in pair)}  # fmt: skip
+    of_cloth = {
+        tuple(v - len(CORNERS) for v in pair): toc
+        for pair, toc in told(found.contacts, "ee").items()
+        if all(len(CORNERS) <= v < len(CORNERS) + N * N for v in pair)
+    }
     assert of_cloth == told(own, "ee") and len(own) > 0
 
 
@@ -163,8 +185,11 @@ def test_outputs_and_distances():
     assert found.contacts.points.shape == found.contacts.normals.shape == (n, 3)
     assert found.contacts.closest.shape == (n, 2, 3)
     assert [(gap.mesh_a, gap.mesh_b) for gap in found.gaps] == [
-        ("blade", "cloth"), ("blade", "spinner"), ("cloth", "cloth"), ("cloth", "spinner")
-    ]  # fmt: skip
+        ("blade", "cloth"),
+        ("blade", "spinner"),
+        ("cloth", "cloth"),
+        ("cloth", "spinner"),
+    ]
 
 
 def test_no_pair_but_rigid_ones():

@@ -35,10 +35,12 @@ class Run:
         self.refuse_answer_at = refuse_answer_at
         queue = FrameQueue(100)
         thread = DetectionThread(
-            StepDetector(SceneBuilder((MeshSettings("cloth"),)), Options()), queue,
-            on_detection=self._answer, on_first=self.starts.append,
+            StepDetector(SceneBuilder((MeshSettings("cloth"),)), Options()),
+            queue,
+            on_detection=self._answer,
+            on_first=self.starts.append,
             on_failure=lambda frame, error: self.failed.append((frame.stamp, str(error))),
-        )  # fmt: skip
+        )
         for item in frames:
             assert queue.put(item) == []
         thread.start()

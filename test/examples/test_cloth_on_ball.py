@@ -73,8 +73,10 @@ def running_node(*words):
     name = f"exa{os.getpid()}"
     node = subprocess.Popen(
         [sys.executable, "-m", "hpccd_ros.node", "--ros-args", *words, "-r", f"__node:={name}"],
-        cwd=Path(hpccd_ros.__file__).parents[1], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-    )  # fmt: skip
+        cwd=Path(hpccd_ros.__file__).parents[1],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
     try:
         yield name
     finally:

@@ -108,9 +108,14 @@ class Blind(InProcess):
             return found
         none = slice(0, 0)
         return dataclasses.replace(
-            found, vf=found.vf[none], vf_toc=found.vf_toc[none], ee=found.ee[none], ee_toc=found.ee_toc[none],
-            normals=found.normals[none], closest=found.closest[none],
-        )  # fmt: skip
+            found,
+            vf=found.vf[none],
+            vf_toc=found.vf_toc[none],
+            ee=found.ee[none],
+            ee_toc=found.ee_toc[none],
+            normals=found.normals[none],
+            closest=found.closest[none],
+        )
 
 
 def test_a_solver_that_misses_pairs_is_slow_but_never_touches():

@@ -25,8 +25,10 @@ def of_one(faces, t0, t1):
 def differences(found, expected):
     """Rows that are missing, and rows that are invented, by kind."""
     rows = [{kind: set(map(tuple, getattr(c, kind).tolist())) for kind in ("vf", "ee")} for c in (found, expected)]
-    return {kind: {"missing": rows[1][kind] - rows[0][kind], "invented": rows[0][kind] - rows[1][kind]}
-            for kind in ("vf", "ee")}  # fmt: skip
+    return {
+        kind: {"missing": rows[1][kind] - rows[0][kind], "invented": rows[0][kind] - rows[1][kind]}
+        for kind in ("vf", "ee")
+    }
 
 
 def assert_same(scene, t0, t1, **options):

@@ -74,6 +74,7 @@ def test_many_bodies(data_folder, distance):
     cpu, gpu = hc.Detector(scene, backend="cpu"), hc.Detector(scene, backend="gpu")
     assert gpu.proximity(t1, distance).hash == cpu.proximity(t1, distance).hash
     assert gpu.intersections(t1).hash == cpu.intersections(t1).hash
-    hashes = {hc.Detector(scene, backend=b, minimum_separation=distance).detect(t0, t1).hash
-              for b in ("cpu", "gpu", "hybrid")}  # fmt: skip
+    hashes = {
+        hc.Detector(scene, backend=b, minimum_separation=distance).detect(t0, t1).hash for b in ("cpu", "gpu", "hybrid")
+    }
     assert len(hashes) == 1

@@ -22,6 +22,10 @@ def test_clean(tool):
     frames = Path(__file__).with_name("sanitized.py")
     result = subprocess.run(
         [program, "--tool", tool, "--error-exitcode", "9", sys.executable, str(frames)],
-        env=environment, capture_output=True, text=True, timeout=500, check=False,
-    )  # fmt: skip
+        env=environment,
+        capture_output=True,
+        text=True,
+        timeout=500,
+        check=False,
+    )
     assert result.returncode == 0, result.stdout[-4000:] + result.stderr[-2000:]

@@ -74,8 +74,10 @@ def test_separations_by_pair_of_meshes():
     assert len(contacts) > len(hc.Detector(plain, backend="cpu").detect(t0, t1)) > 0
 
 
-@pytest.mark.parametrize("backend, method", (("gpu", "default"), ("hybrid", "default"), ("hybrid", "published"),
-                                             ("hybrid", "naive"), ("hybrid", "front")))  # fmt: skip
+@pytest.mark.parametrize(
+    "backend, method",
+    (("gpu", "default"), ("hybrid", "default"), ("hybrid", "published"), ("hybrid", "naive"), ("hybrid", "front")),
+)
 def test_separations_may_change_between_frames(backend, method):
     scene, t0, t1 = three_meshes(5)
     cpu, other = hc.Detector(scene, backend="cpu"), hc.Detector(scene, backend=backend, method=method)

@@ -100,9 +100,11 @@ def test_faces_that_are_segments():
 def test_rules_between_meshes():
     rng = np.random.default_rng(5)
     scene, _, vertices = scenes.join(
-        [scenes.crumpled(rng, 12) for _ in range(4)], no_self=(1,), ignored=((0, 2),),
+        [scenes.crumpled(rng, 12) for _ in range(4)],
+        no_self=(1,),
+        ignored=((0, 2),),
         accuracy=((0, 1, "balanced"), (2, 3, "fast")),
-    )  # fmt: skip
+    )
     cpu, gpu = detectors(scene)
     near = assert_near_same(cpu, gpu, vertices, 0.2)
     mesh = np.repeat(np.arange(4), 144)

@@ -120,7 +120,9 @@ def test_snapshots_between_steps(features, backend):
         elif query == 2:
             for found, expected in zip(there.distances(t1), full.distances(t1), strict=True):
                 assert (found.distance, found.kind, found.features) == (
-                    expected.distance, expected.kind, expected.features
-                )  # fmt: skip
+                    expected.distance,
+                    expected.kind,
+                    expected.features,
+                )
         else:
             assert_equal(there.detect(t0, t1), here.detect(t0, t1))

@@ -29,9 +29,16 @@ class Pair:
         self.executor.add_node(self.node)
         self.rejected = 0
         self.server = BoundedActionServer(
-            self.node, Detect, "bounded", self._execute, goals=GOALS, room=ROOM, requests=qos.requests(100),
-            rejected=self._count, forgotten=lambda result: setattr(result, "message", FORGOTTEN),
-        )  # fmt: skip
+            self.node,
+            Detect,
+            "bounded",
+            self._execute,
+            goals=GOALS,
+            room=ROOM,
+            requests=qos.requests(100),
+            rejected=self._count,
+            forgotten=lambda result: setattr(result, "message", FORGOTTEN),
+        )
         self.client = ActionClient(self.node, Detect, "bounded")
         assert self.client.wait_for_server(PATIENCE)
 

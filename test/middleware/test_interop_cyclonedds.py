@@ -33,8 +33,11 @@ def play(node, folder, faces, frames):
     np.savez(source, faces=faces, frames=frames)
     peer = subprocess.run(
         [sys.executable, str(SUPPORT / "cyclone_peer.py"), node.namespace, str(source), str(target)],
-        env={**os.environ, "CYCLONEDDS_URI": LOOPBACK}, capture_output=True, text=True, timeout=4 * PATIENCE,
-    )  # fmt: skip
+        env={**os.environ, "CYCLONEDDS_URI": LOOPBACK},
+        capture_output=True,
+        text=True,
+        timeout=4 * PATIENCE,
+    )
     assert peer.returncode == 0, peer.stdout + peer.stderr + node.output()
     return [message_of(fields) for fields in json.loads(target.read_text())]
 

@@ -183,9 +183,13 @@ def test_any_cloud_layout(data):
         offsets[axis] = at
         at += sizes[axis]
     message = cloud(
-        POINTS, kinds=kinds, offsets=offsets, step=at + gaps[3],
-        height=data.draw(st.sampled_from([1, 2, 4])), row_pad=data.draw(st.integers(0, 9)),
-    )  # fmt: skip
+        POINTS,
+        kinds=kinds,
+        offsets=offsets,
+        step=at + gaps[3],
+        height=data.draw(st.sampled_from([1, 2, 4])),
+        row_pad=data.draw(st.integers(0, 9)),
+    )
     assert np.array_equal(mesh_messages.vertices_from_cloud(message, 100), POINTS)
 
 

@@ -69,9 +69,13 @@ def start(network, arguments, **environment):
     else:
         command = ["ip", "netns", "exec", network, "sh", "-c", 'mount -t tmpfs none /dev/shm && exec "$@"', "sh"]
     return subprocess.Popen(
-        [*command, sys.executable, *arguments], env=env, cwd=root, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+        [*command, sys.executable, *arguments],
+        env=env,
+        cwd=root,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
         text=True,
-    )  # fmt: skip
+    )
 
 
 def ask(network, namespace, seconds, **environment):

@@ -75,10 +75,13 @@ def test_a_node_and_a_replay_follow_them(start_node, share, tmp_path):
     file = share / "meshes" / "floor.obj"
     file.write_text("\n".join(lines) + "\n")
     recording = tmp_path / "run.mcap"
-    node = start_node({
-        "meshes": ["cloth", "floor"], "record": str(recording),
-        "mesh": {"floor": {"file": "package://robot_parts/meshes/floor.obj", "static": True}},
-    })  # fmt: skip
+    node = start_node(
+        {
+            "meshes": ["cloth", "floor"],
+            "record": str(recording),
+            "mesh": {"floor": {"file": "package://robot_parts/meshes/floor.obj", "static": True}},
+        }
+    )
     node.peer.topology("cloth", FACES, N * N)
     for k in range(3):
         node.peer.vertices("cloth", sheet_positions(N, k), k)
@@ -93,9 +96,12 @@ def test_a_node_and_a_replay_follow_them(start_node, share, tmp_path):
     assert node.stop() == 0, node.output()
     file.unlink()  # the recording carries it along
     replay = subprocess.run(
-        [sys.executable, "-m", "hpccd_ros.cli", "replay", str(recording)], text=True, stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT, env={**os.environ, "PYTHONPATH": SOURCES},
-    )  # fmt: skip
+        [sys.executable, "-m", "hpccd_ros.cli", "replay", str(recording)],
+        text=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        env={**os.environ, "PYTHONPATH": SOURCES},
+    )
     assert replay.returncode == 0, replay.stdout
 
 

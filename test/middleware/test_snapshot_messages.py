@@ -80,8 +80,11 @@ def test_smallest_distances():
     message = DistanceArray()
     snapshot_messages.fill_distances(message, gaps, LAYOUT)
     assert list(message.kind) == [
-        DistanceArray.EDGE_EDGE, DistanceArray.VERTEX_FACE, DistanceArray.EDGE_FACE, DistanceArray.NO_PAIR,
-    ]  # fmt: skip
+        DistanceArray.EDGE_EDGE,
+        DistanceArray.VERTEX_FACE,
+        DistanceArray.EDGE_FACE,
+        DistanceArray.NO_PAIR,
+    ]
     assert list(message.distance) == [0.5, 0.25, 0.0, math.inf]
     assert list(message.mesh_a) == [0, 1, 2, 1] and list(message.mesh_b) == [0, 0, 0, 2]
     assert list(message.features_a) == [1, 2, 2, UNUSED, 0, 5, UNUSED, UNUSED]

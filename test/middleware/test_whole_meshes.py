@@ -121,7 +121,7 @@ BEYOND = VERTICES + [[0, 0, 0], [0, 0, 0], [0, 0, 0], [math.nan, 0, 0]]
         ("shape", shape(vertices=np.zeros((101, 3))), Reason.TOO_LARGE, "vertices is 101, above the limit 100"),
         ("shape", shape(triangles=np.repeat(FACES, 51, axis=0)), Reason.TOO_LARGE, "triangles is 102, above"),
     ],
-)  # fmt: skip
+)
 def test_what_is_refused(kind, message, reason, text):
     with pytest.raises(InvalidMessageError) as caught:
         read(kind, message)

@@ -27,8 +27,10 @@ def test_what_came_of_a_message():
     ]
     of_node.add(Outcome([FRAME], refusals, ["mesh cloth goes on: taken as a restart"], static_taken=2))
     assert of_node.dropped.by_mesh_and_reason() == {
-        ("cloth", "restart"): 1, ("cloth", "late"): 1, ("ball", "middleware"): 4,
-    }  # fmt: skip
+        ("cloth", "restart"): 1,
+        ("cloth", "late"): 1,
+        ("ball", "middleware"): 4,
+    }
     assert of_node.topologies_refused.by_mesh_and_reason() == {("ball", "old_topology"): 1}
     assert (of_node.restarts, of_node.static_taken, of_node.metrics.snapshot()["answered"]) == (1, 2, 0)
     assert log == [

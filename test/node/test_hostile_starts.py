@@ -95,27 +95,34 @@ FILES = {
     "long-file-name": (HEAD + MESH + f"file: {'x' * 300}.obj\n", 1, "File name too long"),
     "nobody's-file": (HEAD + MESH + "file: ~nosuchuser/x.obj\n", 1, "~nosuchuser/x.obj: no such home folder"),
     "nobody's-description": (
-        HEAD + ROBOT + "joint_states: js, description: ~nosuchuser/x.urdf}\n", 2,
+        HEAD + ROBOT + "joint_states: js, description: ~nosuchuser/x.urdf}\n",
+        2,
         "robot.r.description: ~nosuchuser/x.urdf: no such home folder",
     ),
     "nobody's-srdf": (
-        HEAD + ROBOT + "joint_states: js, srdf: ~nosuchuser/x.srdf}\n", 2,
+        HEAD + ROBOT + "joint_states: js, srdf: ~nosuchuser/x.srdf}\n",
+        2,
         "robot.r.srdf: ~nosuchuser/x.srdf: no such home folder",
     ),
     "one-topic-of-two-types": (
-        HEAD + ROBOT + "joint_states: robot_description}\n", 2,
+        HEAD + ROBOT + "joint_states: robot_description}\n",
+        2,
         "robot.r.description and robot.r.joint_states: both use the topic /robot_description, the first as "
         "std_msgs/msg/String, the second as sensor_msgs/msg/JointState; give each a topic of its own",
     ),
     "joint-states-on-answers": (
-        HEAD + ROBOT + "joint_states: contacts}\n", 2, "and robot.r.joint_states: both use the topic /contacts",
+        HEAD + ROBOT + "joint_states: contacts}\n",
+        2,
+        "and robot.r.joint_states: both use the topic /contacts",
     ),
     "joint-states-on-the-log": (
-        HEAD + ROBOT + "joint_states: /rosout}\n", 2, "/rosout and robot.r.joint_states: both use the topic /rosout",
+        HEAD + ROBOT + "joint_states: /rosout}\n",
+        2,
+        "/rosout and robot.r.joint_states: both use the topic /rosout",
     ),
     "recording-without-meshes": (HEAD + "    record: FOLDER/record\n", 0, ""),
     "folder-as-file": (HEAD + MESH + "file: /\n", 1, "use one of .obj"),
-}  # fmt: skip
+}
 
 # Arguments after --ros-args, the exit status, a part of the sentence.
 ARGUMENTS = {
@@ -127,11 +134,14 @@ ARGUMENTS = {
     "namespace": (["-r", "__ns:=a b"], 2, "Couldn't parse remap rule"),
     "long-remapping": (["-r", f"contacts:=/{'a' * 300}"], 2, "contacts: in namespace / and with the remappings given"),
     "remapped-together": (
-        ["-p", "meshes:=[a, b]", "-r", "meshes/a/vertices:=x", "-r", "meshes/b/topology:=/x"], 2,
+        ["-p", "meshes:=[a, b]", "-r", "meshes/a/vertices:=x", "-r", "meshes/b/topology:=/x"],
+        2,
         "meshes/a/vertices and meshes/b/topology: both use the topic /x",
     ),
     "remapped-together-of-one-type": (
-        ["-p", "meshes:=[a, b]", "-r", "meshes/a/vertices:=x", "-r", "meshes/b/vertices:=x"], 0, "",
+        ["-p", "meshes:=[a, b]", "-r", "meshes/a/vertices:=x", "-r", "meshes/b/vertices:=x"],
+        0,
+        "",
     ),
     "long-remapping-of-service": (["-r", f"~/detect:=/{'a' * 300}"], 2, "~/detect: "),
     "long-namespace": (["-r", f"__ns:=/{'a' * 230}"], 2, "give another namespace"),
@@ -151,7 +161,7 @@ OTHERS = {
     "help": (["--help"], 2, "unknown arguments --help: ROS arguments come after --ros-args"),
     "behind-the-end": (["--ros-args", "-p", "threads:=1", "--", "scene.yaml"], 2, "unknown arguments scene.yaml"),
     "end": (["--ros-args", "-p", "threads:=1", "--"], 0, ""),
-}  # fmt: skip
+}
 
 CASES = [*FILES, *ARGUMENTS, *OTHERS]
 

@@ -108,8 +108,9 @@ def test_by_pair_of_meshes_and_only_vertices_against_faces(start_node, tmp_path,
         replay = Replay(recording, setup)
         list(replay.steps())
     assert (replay.verified, replay.diverged, replay.unverified) == (2, 0, 0)
-    assert setup.builder.pair_features == tuple(("net", name, kinds) for name, kinds in (
-        ("cloth", EDGES_ONLY), ("net", FACES_ONLY)))  # fmt: skip
+    assert setup.builder.pair_features == tuple(
+        ("net", name, kinds) for name, kinds in (("cloth", EDGES_ONLY), ("net", FACES_ONLY))
+    )
     full = dataclasses.replace(setup, settings=setup.settings | {"pair_features": []})
     with Recording(path) as recording:
         other = Replay(recording, full)

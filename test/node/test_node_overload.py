@@ -124,9 +124,7 @@ def test_large_output_is_whole(start_node):
     for k in (2, 3):
         node.peer.vertices("cloth", FRAMES[k], stamp=k)
     message = node.contacts(1)[0]
-    expected = hc.Detector(scene_of(cloth=FACES), accuracy=TIER, outputs=("points", "normals")).detect(
-        *FRAMES[2:4]
-    )
+    expected = hc.Detector(scene_of(cloth=FACES), accuracy=TIER, outputs=("points", "normals")).detect(*FRAMES[2:4])
     assert message.total == len(expected) > 100_000
     assert np.array_equal(np.frombuffer(message.points).reshape(-1, 3), expected.points)
     assert np.array_equal(np.frombuffer(message.normals).reshape(-1, 3), expected.normals)

@@ -25,11 +25,28 @@ from hpccd_ros.rigid.transform import Rigid
 
 N = 8
 SHEET = Topology(0, N * N, sheet_faces(N))
-CORNERS = (np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * [0.4, 0.05, 0.02])
-BLADE = Topology(0, 8, np.array([
-    [0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1],
-    [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3],
-], np.uint32))  # fmt: skip
+CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * [0.4, 0.05, 0.02]
+BLADE = Topology(
+    0,
+    8,
+    np.array(
+        [
+            [0, 1, 3],
+            [0, 3, 2],
+            [4, 6, 7],
+            [4, 7, 5],
+            [0, 4, 5],
+            [0, 5, 1],
+            [2, 3, 7],
+            [2, 7, 6],
+            [0, 2, 6],
+            [0, 6, 4],
+            [1, 5, 7],
+            [1, 7, 3],
+        ],
+        np.uint32,
+    ),
+)
 BODY = Body.of(CORNERS.astype(np.float32))
 NAMES = ("cloth", "blade")
 TOLERANCE = 0.002
@@ -96,10 +113,16 @@ def verified_steps(path):
 @pytest.mark.parametrize("by", ["pose", "tf"])
 def test_streamed_recorded_and_verified(start_node, tmp_path, by):
     path = tmp_path / "run.mcap"
-    node = start_node({
-        "meshes": list(NAMES), "frame_id": "world", "mesh.blade.input": by, "record": str(path),
-        "mesh.blade.frame": "blade_link" if by == "tf" else "", "rigid_tolerance": TOLERANCE,
-    })  # fmt: skip
+    node = start_node(
+        {
+            "meshes": list(NAMES),
+            "frame_id": "world",
+            "mesh.blade.input": by,
+            "record": str(path),
+            "mesh.blade.frame": "blade_link" if by == "tf" else "",
+            "rigid_tolerance": TOLERANCE,
+        }
+    )
     node.peer.topology("cloth", SHEET.faces, SHEET.n_vertices)
     give_shape(node)
     node.frames_status(answered=1)  # the shape

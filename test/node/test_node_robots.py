@@ -71,9 +71,12 @@ def assert_answer(message, k, by_joints=True):
 def parameters(**robot):
     robot = {"description": "robot_description"} | robot
     return {
-        "meshes": ["cloth"], "robots": ["crane"], "frame_id": "world", "rigid_tolerance": TOLERANCE,
+        "meshes": ["cloth"],
+        "robots": ["crane"],
+        "frame_id": "world",
+        "rigid_tolerance": TOLERANCE,
         **{f"robot.crane.{key}": value for key, value in robot.items()},
-    }  # fmt: skip
+    }
 
 
 POSE = [*BASE.shift.tolist(), *BASE.quaternion.tolist()]
@@ -273,10 +276,18 @@ def test_another_description_makes_another_scene(start_node):
     answer = node.contacts(2)[-1]
     placements = [robot.placements(robot.kinematics.state(crane.values(k), BASE)) for k in (3, 4)]
     frames = [
-        SceneFrame(k, k, "world", (SHEET, *(mesh.topology for mesh in robot.meshes)),
-                   (sheet_positions(N, k), *(p.vertices for p in at)), NAMES, 0.0, (None, *at))
+        SceneFrame(
+            k,
+            k,
+            "world",
+            (SHEET, *(mesh.topology for mesh in robot.meshes)),
+            (sheet_positions(N, k), *(p.vertices for p in at)),
+            NAMES,
+            0.0,
+            (None, *at),
+        )
         for k, at in zip((3, 4), placements, strict=True)
-    ]  # fmt: skip
+    ]
     options = Options(backend="cpu", rigid=RigidOptions(TOLERANCE, 64))
     assert answer.hash == StepDetector(BUILDER, options).detect(*frames).contacts.hash
 
@@ -333,10 +344,13 @@ def test_what_is_ignored_or_renamed_of_a_robot_is_logged_once(start_node, tmp_pa
 
 
 def test_pairs_name_robots_and_links(start_node):
-    node = start_node({
-        **parameters(**JOINTS), "pair_separation": ["crane:cloth:0.01", "crane/hook:cloth:0.02"],
-        "ignored_pairs": ["crane:crane"],
-    })  # fmt: skip
+    node = start_node(
+        {
+            **parameters(**JOINTS),
+            "pair_separation": ["crane:cloth:0.01", "crane/hook:cloth:0.02"],
+            "ignored_pairs": ["crane:crane"],
+        }
+    )
     describe(node)
     refused = set_parameter(node, "pair_separation", ["crane/hoek:cloth:0.02"])
     assert not refused.successful and "'crane' has no link of this name" in refused.reason, refused.reason
@@ -346,9 +360,7 @@ def test_pairs_name_robots_and_links(start_node):
     names = list(answer.mesh_names)
     told = {
         (names[a], names[b]): distance
-        for a, b, distance in zip(
-            answer.separation_mesh_a, answer.separation_mesh_b, answer.separations, strict=True
-        )
+        for a, b, distance in zip(answer.separation_mesh_a, answer.separation_mesh_b, answer.separations, strict=True)
     }
     assert {frozenset(pair): value for pair, value in told.items()} == {
         frozenset(("cloth", "crane/mast")): 0.01,
@@ -356,8 +368,9 @@ def test_pairs_name_robots_and_links(start_node):
         frozenset(("cloth", "crane/hook")): 0.02,
     }
     assert not {(names[a], names[b]) for a, b in zip(answer.mesh_a, answer.mesh_b, strict=True)} & {
-        ("crane/mast", "crane/hook"), ("crane/hook", "crane/mast")
-    }  # fmt: skip
+        ("crane/mast", "crane/hook"),
+        ("crane/hook", "crane/mast"),
+    }
 
 
 def test_frames_that_came_before_the_description_are_answered(start_node):
@@ -422,8 +435,10 @@ def test_joint_states_that_cannot_be_used_are_told_of_before_the_robot_is_known(
     short.position = short.position[:1]
     joints.publish(short)
     values = node.frames_status(joint_states_refused=1)
-    assert values["last_refusal"] == "joint_states: malformed: joint states: 2 names and 1 positions; each joint " \
+    assert (
+        values["last_refusal"] == "joint_states: malformed: joint states: 2 names and 1 positions; each joint "
         "needs one of both"
+    )
     joints.publish(JointState(name=[f"j{k}" for k in range(1001)], position=[0.0] * 1001))
     values = node.frames_status(joint_states_refused=2)
     assert "is not kept until the description of its robot comes" in values["last_refusal"]
@@ -528,13 +543,18 @@ def test_mesh_files_of_a_refused_description_do_not_take_the_place_of_those_in_u
 @pytest.mark.parametrize(
     "robot, text",
     [
-        ({}, "robot.crane.joint_states: not given, so that transforms move the links; give the topic of its joint "
-         "states and robot.crane.pose, where its root link stands, or set parameter frame_id"),
-        ({"joint_states": "joint_states"}, "robot.crane.pose: not given, so that transforms place the root link; "
-         "give it, or set parameter frame_id"),
+        (
+            {},
+            "robot.crane.joint_states: not given, so that transforms move the links; give the topic of its joint "
+            "states and robot.crane.pose, where its root link stands, or set parameter frame_id",
+        ),
+        (
+            {"joint_states": "joint_states"},
+            "robot.crane.pose: not given, so that transforms place the root link; give it, or set parameter frame_id",
+        ),
     ],
     ids=["nothing", "joint states"],
-)  # fmt: skip
+)
 def test_a_robot_of_which_nothing_says_where_it_is_ends_the_start_with_what_it_lacks(start_node, robot, text):
     given = {"robots": ["crane"], **{f"robot.crane.{key}": value for key, value in robot.items()}}
     node = start_node(given, wait=False)

@@ -218,9 +218,17 @@ def service():
     node = rclpy.create_node("service", namespace=f"/kept{os.getpid()}", context=context)
     executor = SingleThreadedExecutor(context=context)
     executor.add_node(node)
-    settings = {"detect_jobs": 1, "detect_waiting": 1, "detect_time_limit": PATIENCE, "max_meshes": 4,
-                "max_vertices": 1000, "max_faces": 1000, "max_edges": 1000, "max_contacts": 0,
-                "service_introspection": "off"}  # fmt: skip
+    settings = {
+        "detect_jobs": 1,
+        "detect_waiting": 1,
+        "detect_time_limit": PATIENCE,
+        "max_meshes": 4,
+        "max_vertices": 1000,
+        "max_faces": 1000,
+        "max_edges": 1000,
+        "max_contacts": 0,
+        "service_introspection": "off",
+    }
     errors = node.errors = Errors(lambda text: None)
     configuration = SimpleNamespace(settings=settings, options=Options())
     jobs = DetectJobs(node, configuration, lambda: NodeScene(SceneBuilder(()), {}), Accounts(print))

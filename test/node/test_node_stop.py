@@ -194,8 +194,9 @@ def test_messages_that_cannot_be_deserialised(start_stream):
     static.publish(mount("other"))
     # Either the message itself is noticed, or only the gap that it leaves before the next one.
     until(
-        lambda: is_refused("transforms_static rejected: malformed")
-        or is_refused("the position of mesh hand was rejected"),
+        lambda: (
+            is_refused("transforms_static rejected: malformed") or is_refused("the position of mesh hand was rejected")
+        ),
         "doubt of the transform",
     )
     static.publish(mount("mount"))
@@ -266,10 +267,13 @@ SLIDER = """<robot name="arm"><link name="base"/><link name="tip"><collision><ge
 def test_a_robot_of_which_something_newer_is_refused_is_unknown(start_stream):
     """A joint named twice, publishers that contradict each other, descriptions that are refused or make no scene."""
     stream = start_stream(
-        meshes=["table"], mesh={"table": {"static": True}}, robots=["arm"], ignored_pairs=["arm:arm"],
+        meshes=["table"],
+        mesh={"table": {"static": True}},
+        robots=["arm"],
+        ignored_pairs=["arm:arm"],
         pair_separation=["arm/tip:table:0.1"],
         robot={"arm": {"joint_states": "joint_states", "pose": [0.0, 0.0, 2.0, 0.0, 0.0, 0.0, 1.0]}},
-    )  # fmt: skip
+    )
     peer, stamp = stream.node.peer, 10**9
     peer.topology("table", FACES, 3)
     peer.vertices("table", TABLE, stamp=1)

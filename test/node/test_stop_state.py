@@ -131,7 +131,7 @@ def test_what_has_no_age_and_what_tells_none(state):
         (Refusal("tf", Reason.MALFORMED, what=Input.TRANSFORM), dict(hand=1)),
         (Refusal("hand", Reason.RATE), dict(hand=1)),
     ],
-)  # fmt: skip
+)
 def test_a_mesh_is_unknown_until_something_valid_of_it_comes(state, refusal, settled_by):
     """Frames of other meshes, and of other aspects of it, do not settle it."""
     before = state.times.now
@@ -161,10 +161,12 @@ def test_what_was_rejected_is_older_than_what_is_in_use(state):
     clear(state, hand=sent + 1)
     assert cause(state) is None
     for given in (
-        Refusal("hand", Reason.OVERLOAD), Refusal("hand", Reason.INCOMPLETE), Refusal("other", Reason.NOT_FINITE),
+        Refusal("hand", Reason.OVERLOAD),
+        Refusal("hand", Reason.INCOMPLETE),
+        Refusal("other", Reason.NOT_FINITE),
         Refusal("tf", Reason.MALFORMED, what=Input.TRANSFORM, aspect=Aspect.NOTHING),
         Refusal("other_states", Reason.MALFORMED, what=Input.JOINT_STATE),
-    ):  # fmt: skip
+    ):
         state.refused(given)
         assert cause(state) is None, "it gave way, or concerns nothing in the scene"
 

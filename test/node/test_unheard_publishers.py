@@ -10,37 +10,69 @@ from std_msgs.msg import String
 
 from hpccd_ros.middleware import qos
 
-LATCHED = ("let the publisher offer transient_local (latched): otherwise messages sent before the node listened would "
-           "be missing")  # fmt: skip
+LATCHED = (
+    "let the publisher offer transient_local (latched): otherwise messages sent before the node listened would "
+    "be missing"
+)
 # Topic -> its type, what a publisher offers (reliable, latched), and the expected warning.
 LESS = {
-    "meshes/cloth/topology": (MeshTopology, (True, False), "offers volatile but the node requests transient_local, "
-                              f"so none of its messages are received; {LATCHED}"),
-    "meshes/cloth/vertices": (MeshVertices, (False, False), "offers best_effort but the node requests reliable, so "
-                              "none of its messages are received; set input_reliability: best_effort, or let the "
-                              "publisher offer reliable"),
-    "transforms": (TransformStamped, (False, False), "set qos_overrides.NAMESPACE/transforms.subscription.reliability: "
-                   "best_effort, or let the publisher offer reliable"),
+    "meshes/cloth/topology": (
+        MeshTopology,
+        (True, False),
+        f"offers volatile but the node requests transient_local, so none of its messages are received; {LATCHED}",
+    ),
+    "meshes/cloth/vertices": (
+        MeshVertices,
+        (False, False),
+        "offers best_effort but the node requests reliable, so "
+        "none of its messages are received; set input_reliability: best_effort, or let the "
+        "publisher offer reliable",
+    ),
+    "transforms": (
+        TransformStamped,
+        (False, False),
+        "set qos_overrides.NAMESPACE/transforms.subscription.reliability: "
+        "best_effort, or let the publisher offer reliable",
+    ),
     "transforms_static": (TransformStamped, (True, False), LATCHED),
-    "joint_states": (JointState, (False, False), "set input_reliability: best_effort, or let the publisher offer "
-                     "reliable"),
-    "left/joint_states": (JointState, (False, False), "set "
-                          "qos_overrides.NAMESPACE/left/joint_states.subscription.reliability: best_effort, or let"),
-    "robot_description": (String, (False, False), "offers best_effort and volatile but the node requests reliable and "
-                          "transient_local, so none of its messages are received; let the publisher offer reliable "
-                          "and transient_local"),
-}  # fmt: skip
-ROBOTS = {"robots": ["arm", "left"], "robot.arm.description": "robot_description",
-          "robot.left.description": "robot_description", "robot.arm.joint_states": "joint_states",
-          "robot.left.joint_states": "left/joint_states"}  # fmt: skip
+    "joint_states": (
+        JointState,
+        (False, False),
+        "set input_reliability: best_effort, or let the publisher offer reliable",
+    ),
+    "left/joint_states": (
+        JointState,
+        (False, False),
+        "set qos_overrides.NAMESPACE/left/joint_states.subscription.reliability: best_effort, or let",
+    ),
+    "robot_description": (
+        String,
+        (False, False),
+        "offers best_effort and volatile but the node requests reliable and "
+        "transient_local, so none of its messages are received; let the publisher offer reliable "
+        "and transient_local",
+    ),
+}
+ROBOTS = {
+    "robots": ["arm", "left"],
+    "robot.arm.description": "robot_description",
+    "robot.left.description": "robot_description",
+    "robot.arm.joint_states": "joint_states",
+    "robot.left.joint_states": "left/joint_states",
+}
 
 
 @pytest.fixture
 def node(start_node):
-    return start_node({
-        "meshes": ["cloth"], "mesh.cloth.transform": "tf", "frame_id": "world", **ROBOTS,
-        "qos_overrides.NAMESPACE/left/joint_states.subscription.reliability": "reliable",
-    })  # fmt: skip
+    return start_node(
+        {
+            "meshes": ["cloth"],
+            "mesh.cloth.transform": "tf",
+            "frame_id": "world",
+            **ROBOTS,
+            "qos_overrides.NAMESPACE/left/joint_states.subscription.reliability": "reliable",
+        }
+    )
 
 
 def _message(node):

@@ -86,9 +86,10 @@ def test_this_environment_holds_one():
 
 
 def test_the_version_is_that_of_the_headers():
-    assert f'#define HPCCD_VERSION "{hc.__version__}"' in (
-        ROOT / "hpccd_core" / "include" / "hpccd" / "version.h"
-    ).read_text()
+    assert (
+        f'#define HPCCD_VERSION "{hc.__version__}"'
+        in (ROOT / "hpccd_core" / "include" / "hpccd" / "version.h").read_text()
+    )
 
 
 def test_readme_of_the_core(tmp_path):

@@ -18,8 +18,12 @@ ABOVE = "The core knows nothing of the packages around it"
 def lint(folder):
     return subprocess.run(
         [sys.executable, "-c", "from importlinter.cli import lint_imports_command as main; main()", "--no-cache"],
-        cwd=folder, env={**os.environ, "PYTHONPATH": str(folder)}, text=True, capture_output=True, timeout=100,
-    )  # fmt: skip
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": str(folder)},
+        text=True,
+        capture_output=True,
+        timeout=100,
+    )
 
 
 @pytest.fixture

@@ -69,8 +69,21 @@ def test_run_time_requirements_are_there_at_build_time_with_the_same_version():
 
 def test_each_source_file_names_its_licence():
     suffixes = {
-        ".py", ".h", ".cpp", ".cu", ".sh", ".cmake", ".msg", ".srv", ".action", ".yaml", ".xml", ".js", ".css", ".html"
-    }  # fmt: skip
+        ".py",
+        ".h",
+        ".cpp",
+        ".cu",
+        ".sh",
+        ".cmake",
+        ".msg",
+        ".srv",
+        ".action",
+        ".yaml",
+        ".xml",
+        ".js",
+        ".css",
+        ".html",
+    }
     folders = ("hpccd_core", "hpccd_ros", "launch", "msg", "srv", "action", "cmake", "scripts", "config", "test")
     missing = []
     for folder in folders:

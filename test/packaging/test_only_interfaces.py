@@ -44,10 +44,13 @@ def build(tmp_path_factory):
     paths = {"AMENT_PREFIX_PATH": ros, "CMAKE_PREFIX_PATH": os.environ.get("CMAKE_PREFIX_PATH") or ros}
     environment = {**ENVIRONMENT, **paths}
     options = [
-        "-DHPCCD_ONLY_INTERFACES=ON", f"-DCMAKE_INSTALL_PREFIX={prefix}", "-DCMAKE_EXPORT_COMPILE_COMMANDS=ON",
-        f"-DPython3_EXECUTABLE={sys.executable}", f"-DPython_EXECUTABLE={sys.executable}",
+        "-DHPCCD_ONLY_INTERFACES=ON",
+        f"-DCMAKE_INSTALL_PREFIX={prefix}",
+        "-DCMAKE_EXPORT_COMPILE_COMMANDS=ON",
+        f"-DPython3_EXECUTABLE={sys.executable}",
+        f"-DPython_EXECUTABLE={sys.executable}",
         *(f"-DCMAKE_DISABLE_FIND_PACKAGE_{name}=ON" for name in PACKAGES_OF_THE_CORE),
-    ]  # fmt: skip
+    ]
     if (WHEELS / "share" / "ament_cmake_core").is_dir():
         options.append(f"-DCMAKE_PROJECT_INCLUDE={ROOT / 'cmake' / 'pypi_ros.cmake'}")
     run("cmake", "-S", ROOT, "-B", build, *options, environment=environment)

@@ -84,7 +84,7 @@ def test_what_is_settled_passes(checkout):
         ("CMakeLists.txt", r"VERSION \d+\.\d+\.\d+", "VERSION 9.9.9", r"versions differ: .*CMakeLists\.txt has 9"),
         ("hpccd_core/include/hpccd/version.h", 'VERSION ".+"', 'VERSION "9.9.9"', r"versions differ: .*version\.h has"),
     ],
-)  # fmt: skip
+)
 def test_what_is_not_settled_is_refused(checkout, name, pattern, text, told):
     settle(checkout)
     change(checkout, name, pattern, text)

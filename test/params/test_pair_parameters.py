@@ -112,7 +112,7 @@ PAIR = {"a.meshes": ["robot", "cloth"]}
             "pairs.b.separation: '0.3' contradicts pairs.a.separation: '0.2'; leave one out",
         ),
     ],
-)  # fmt: skip
+)
 def test_bad_values_are_named(given, lists, text):
     with pytest.raises(ParameterError) as caught:
         checked(given, **lists)
@@ -128,9 +128,7 @@ def separations(*entries):
     return {frozenset(names): distance for *names, distance in found.pairs}
 
 
-@pytest.mark.parametrize(
-    "entries", [("arm:left/hand:0.1", "arm/hand:left:0.2"), ("arm:arm/hand:0.1", "arm/a:arm:0.2")]
-)
+@pytest.mark.parametrize("entries", [("arm:left/hand:0.1", "arm/hand:left:0.2"), ("arm:arm/hand:0.1", "arm/a:arm:0.2")])
 def test_what_is_said_of_two_links_by_their_robots_may_not_differ(entries):
     for order in (entries, entries[::-1]):
         with pytest.raises(ParameterError, match="contradicts 'ar.*say of these two links what holds"):

@@ -181,8 +181,12 @@ def test_what_is_missing_truncated_or_different_is_said(hpccd, small_bag, tmp_pa
     assert page.said["meshes"][0]["shown"][numbers.index("32")] is not None, "its end is drawn"
     assert [step["total"] for step in page.said["steps"] if step["step"] in ("31", "32")] == [None, None]
     notes = "\n".join(page.said["notes"])
-    for part in ("2 of 87 steps could not be computed", "1 of 87 steps were recorded with other contacts",
-                 "1 of 87 steps had their recorded answer truncated", "The node had dropped 3 frames"):  # fmt: skip
+    for part in (
+        "2 of 87 steps could not be computed",
+        "1 of 87 steps were recorded with other contacts",
+        "1 of 87 steps had their recorded answer truncated",
+        "The node had dropped 3 frames",
+    ):
         assert part in notes
 
 
@@ -237,9 +241,11 @@ def test_a_trimesh_without_the_library_is_named(monkeypatch, tmp_path):
         library.three()
 
 
-@given(st.sampled_from([np.uint16, np.uint32]).flatmap(
-    lambda kind: arrays(kind, st.tuples(st.integers(1, 3), st.integers(0, 5), st.integers(1, 4)))
-))  # fmt: skip
+@given(
+    st.sampled_from([np.uint16, np.uint32]).flatmap(
+        lambda kind: arrays(kind, st.tuples(st.integers(1, 3), st.integers(0, 5), st.integers(1, 4)))
+    )
+)
 def test_packed_integers_come_back(values):
     page = Page.__new__(Page)
     page.texts = {"some": base64.b64encode(packed(values)).decode()}

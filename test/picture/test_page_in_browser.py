@@ -43,8 +43,11 @@ class Scene:
             f"{rectangle}(document.getElementById('scene').getBoundingClientRect())"
         )
         self.part = [
-            round(self.x + 0.25 * self.width), round(self.y + 2), round(0.7 * self.width), round(0.9 * self.height)
-        ]  # fmt: skip
+            round(self.x + 0.25 * self.width),
+            round(self.y + 2),
+            round(0.7 * self.width),
+            round(0.9 * self.height),
+        ]
 
     def pixels(self):
         """Those of `part`, where no text stands."""
@@ -206,6 +209,7 @@ def test_what_moves_between_topologies_is_drawn(browser, hpccd, tmp_path):
 def test_edges_are_drawn_as_lines(browser, small_bag, tmp_path):
     seen = []
     for name, edges in (("points", ()), ("rope", [k + end for k in range(91) for end in (0, 1)])):
+
         def change(_, message, decoded, edges=edges):
             if message.topic == "/meshes/ball/topology":
                 decoded.faces, decoded.edges = np.zeros(0, np.uint32), np.array(edges, np.uint32)

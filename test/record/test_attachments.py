@@ -34,8 +34,17 @@ def test_mesh_files_of_a_description_in_another_encoding_are_attached(tmp_path, 
     assert [name.rpartition("/")[2] for name, _ in found] == ["description.urdf", "hüfte.stl"] and not missing
 
 
-@pytest.mark.parametrize("uri", ["{}/secret", "{}/pipe.stl", "{}/folder.stl", "~nobody-is-called-so/a.stl",
-                                 "file://{}/%00.stl", "{}/" + 300 * "a" + ".stl"])  # fmt: skip
+@pytest.mark.parametrize(
+    "uri",
+    [
+        "{}/secret",
+        "{}/pipe.stl",
+        "{}/folder.stl",
+        "~nobody-is-called-so/a.stl",
+        "file://{}/%00.stl",
+        "{}/" + 300 * "a" + ".stl",
+    ],
+)
 def test_nothing_else_is_read(tmp_path, uri):
     (tmp_path / "secret").write_text("not for others")
     os.mkfifo(tmp_path / "pipe.stl")  # whoever reads it waits for ever

@@ -53,8 +53,17 @@ def test_a_recorder_that_came_late_says_it_at_once_and_at_the_end(start_node, ch
     node.peer.topology("box", np.array([[0, 1, 2]]), 3)
     node.peer.vertices("box", np.eye(3, dtype=np.float32), stamp=0)
     node.frames_status(answered=1)
-    recorder = children.start("recorder", "hpccd_ros.cli", "record", "-o", str(tmp_path / "late.mcap"), "--node",
-                              f"{node.namespace}/hpccd", "--wait", WAIT)  # fmt: skip
+    recorder = children.start(
+        "recorder",
+        "hpccd_ros.cli",
+        "record",
+        "-o",
+        str(tmp_path / "late.mcap"),
+        "--node",
+        f"{node.namespace}/hpccd",
+        "--wait",
+        WAIT,
+    )
     children.wait(lambda: recorder.said("recording "), "the recorder did not hear the node", PATIENCE)
     node.peer.readers = 2  # the recorder as well: the only pose must not overtake it
     publisher = node.peer.publisher(PoseStamped, client.pose_topic("box"))

@@ -75,5 +75,7 @@ def test_killed_at_random_moments(children, namespace, tmp_path, compression):
         losses.append((before - messages[-1][2]) * 1e-9)
         counts.append(len(messages))
         assert losses[-1] < FLUSH + 10.0
-    print(f"\n{len(losses)} kills, compression {compression}, flush {FLUSH} s: {min(counts)} to {max(counts)} messages "
-          f"saved, lost the last {statistics.median(losses):.3f} s (median), {max(losses):.3f} s (most)")
+    print(
+        f"\n{len(losses)} kills, compression {compression}, flush {FLUSH} s: {min(counts)} to {max(counts)} messages "
+        f"saved, lost the last {statistics.median(losses):.3f} s (median), {max(losses):.3f} s (most)"
+    )

@@ -58,10 +58,18 @@ def test_recorded_live_read_by_others_and_verified(live, namespace, tmp_path, st
     by_topic = {}
     for topic, _, _, message in messages:
         by_topic.setdefault(topic, []).append(message)
-    assert set(by_topic) == {f"{namespace}/{name}" for name in (
-        "meshes/cloth/topology", "meshes/cloth/vertices", "meshes/ball/topology", "meshes/ball/vertices", "contacts")}
+    assert set(by_topic) == {
+        f"{namespace}/{name}"
+        for name in (
+            "meshes/cloth/topology",
+            "meshes/cloth/vertices",
+            "meshes/ball/topology",
+            "meshes/ball/vertices",
+            "contacts",
+        )
+    }
     for index, mesh in enumerate(scene.meshes):
-        topology, = by_topic[f"{namespace}/meshes/{mesh.name}/topology"]
+        (topology,) = by_topic[f"{namespace}/meshes/{mesh.name}/topology"]
         assert np.array_equal(topology.faces.reshape(-1, 3), mesh.faces)
         vertices = by_topic[f"{namespace}/meshes/{mesh.name}/vertices"]
         for frame, message in zip(scene.frames(), vertices, strict=True):
@@ -136,11 +144,26 @@ def test_played_back_over_dds_gives_the_same_contacts(live, small_bag, tmp_path,
     """Recording -> player -> a fresh node -> recorder: the answers are those of the first recording."""
     again = tmp_path / "again.mcap"
     # The recording has absolute names in the root namespace: the node listens there by remapping.
-    rules = [f"{relative}:=/{relative}" for mesh in ("cloth", "ball")
-             for relative in (f"meshes/{mesh}/topology", f"meshes/{mesh}/vertices")]
+    rules = [
+        f"{relative}:=/{relative}"
+        for mesh in ("cloth", "ball")
+        for relative in (f"meshes/{mesh}/topology", f"meshes/{mesh}/vertices")
+    ]
     remaps = [word for rule in rules for word in ("-r", rule)]
-    node = children.start("node", "hpccd_ros.node", *live._remap, *remaps, "--params-file", str(live.parameters),
-                          "-p", "accuracy:=exact", "-p", "frame_queue:=1000", "-p", "input_depth:=1000")
+    node = children.start(
+        "node",
+        "hpccd_ros.node",
+        *live._remap,
+        *remaps,
+        "--params-file",
+        str(live.parameters),
+        "-p",
+        "accuracy:=exact",
+        "-p",
+        "frame_queue:=1000",
+        "-p",
+        "input_depth:=1000",
+    )
     children.wait(lambda: node.said("active: meshes"), "the node was not active", PATIENCE)
     recorder = live.recorder(again, "--ros-args", *remaps)
     live.wait_for(live.play(small_bag, "--rate", "2", "--from", "1.0"))
@@ -178,8 +201,10 @@ def test_mesh_file_travels_with_the_recording(children, namespace, tmp_path):
     trimesh.creation.box(extents=(4, 4, 0.2)).export(file)
     live = Live(children, namespace, tmp_path, frames=FRAMES)
     text = live.parameters.read_text().replace("- ball", "- ball\n    - floor")
-    text += (f"    mesh.floor.file: {file}\n    mesh.floor.static: true\n"
-             "    mesh.floor.pose: [0.0, 0.0, 0.3, 0.0, 0.0, 0.0, 1.0]\n")
+    text += (
+        f"    mesh.floor.file: {file}\n    mesh.floor.static: true\n"
+        "    mesh.floor.pose: [0.0, 0.0, 0.3, 0.0, 0.0, 0.0, 1.0]\n"
+    )
     live.parameters.write_text(text)
     path = tmp_path / "run.mcap"
     _record(live, path)

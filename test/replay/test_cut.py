@@ -38,17 +38,24 @@ BEGAN = 10**18
 LATE = SECOND // 4  # from the last input of a step to its answer: some are under way at each cut
 FRAMES = 40  # ten a second
 PARAMETERS = {
-    "meshes": ["cloth", "tool", "table"], "robots": ["crane"], "frame_id": "world", "mesh.tool.input": "pose",
-    "mesh.table.static": True, "robot.crane.description": "robot_description",
+    "meshes": ["cloth", "tool", "table"],
+    "robots": ["crane"],
+    "frame_id": "world",
+    "mesh.tool.input": "pose",
+    "mesh.table.static": True,
+    "robot.crane.description": "robot_description",
     "robot.crane.joint_states": "joint_states",
-}  # fmt: skip
+}
 TYPES = {
-    "robot_description": "std_msgs/msg/String", "joint_states": "sensor_msgs/msg/JointState",
-    "transforms": "geometry_msgs/msg/TransformStamped", "transforms_static": "geometry_msgs/msg/TransformStamped",
+    "robot_description": "std_msgs/msg/String",
+    "joint_states": "sensor_msgs/msg/JointState",
+    "transforms": "geometry_msgs/msg/TransformStamped",
+    "transforms_static": "geometry_msgs/msg/TransformStamped",
     **{f"meshes/{mesh}/topology": "hpccd/msg/MeshTopology" for mesh in ("cloth", "tool", "table")},
     **{f"meshes/{mesh}/vertices": "hpccd/msg/MeshVertices" for mesh in ("cloth", "tool", "table")},
-    "meshes/tool/pose": "geometry_msgs/msg/PoseStamped", "contacts": "hpccd/msg/ContactArray",
-}  # fmt: skip
+    "meshes/tool/pose": "geometry_msgs/msg/PoseStamped",
+    "contacts": "hpccd/msg/ContactArray",
+}
 OTHER_CRANE = crane.URDF.replace('radius="0.06"', 'radius="0.08"')
 
 
@@ -67,8 +74,11 @@ def _inputs(end=FRAMES):
 
     for k in range(end):
         at, stamp = 0.1 + k / 10, round((0.1 + k / 10) * SECOND)
-        yield "meshes/cloth/vertices", mesh_messages.vertices_message(
-            sheet_positions(N, k), stamp, step=k, frame_id="world"), at + 0.01
+        yield (
+            "meshes/cloth/vertices",
+            mesh_messages.vertices_message(sheet_positions(N, k), stamp, step=k, frame_id="world"),
+            at + 0.01,
+        )
         pose = PoseStamped()
         pose.header.stamp, pose.header.frame_id = fields.ns_to_stamp(stamp), "world"
         pose.pose.position.z, pose.pose.orientation.w = 0.02 * np.sin(k), 1.0
@@ -79,14 +89,22 @@ def _inputs(end=FRAMES):
             message.header.stamp = fields.ns_to_stamp(round(at * SECOND))
             yield "joint_states", message, at + 0.005
     for at in times(0.23):
-        yield "transforms", transform("floor", crane.ROOT, Rigid.of((0.1 * at, 0.3, 0.03), (0, 0, 0, 1)),
-                                      round(at * SECOND)), at + 0.015
+        yield (
+            "transforms",
+            transform("floor", crane.ROOT, Rigid.of((0.1 * at, 0.3, 0.03), (0, 0, 0, 1)), round(at * SECOND)),
+            at + 0.015,
+        )
 
 
 def _write(path, messages, split=0.0):
     """messages: (topic, CDR, ns when it came)."""
-    info = {"format": 1, "hpccd": "0", "node": "/hpccd", "parameters": PARAMETERS,
-            "topics": {f"/{topic}": topic for topic in TYPES}}  # fmt: skip
+    info = {
+        "format": 1,
+        "hpccd": "0",
+        "node": "/hpccd",
+        "parameters": PARAMETERS,
+        "topics": {f"/{topic}": topic for topic in TYPES},
+    }
     bag = BagWriter(path, info=info, attachments=[("mesh/x/y.obj", b"any")], max_seconds=split)
     for topic, type_name in TYPES.items():
         once = topic.endswith(("topology", "_static", "description"))
@@ -270,17 +288,22 @@ def test_a_split_recording_and_channels_of_others(tmp_path, sound_bags):
 def test_the_command(whole, tmp_path, hpccd):
     done = hpccd("cut", whole, "--from", "1", "--to", "2", "-o", "part.mcap", "--compression", "lz4")
     assert done.returncode == 0, done.stderr
-    assert re.fullmatch(rf"part\.mcap: \d+ messages, from 1\.000000000 to \d\.\d+ s of {whole}\n  \d+ of them were "
-                        r"received earlier and were in force at its beginning\n", done.stdout), done.stdout
+    assert re.fullmatch(
+        rf"part\.mcap: \d+ messages, from 1\.000000000 to \d\.\d+ s of {whole}\n  \d+ of them were "
+        r"received earlier and were in force at its beginning\n",
+        done.stdout,
+    ), done.stdout
     assert hpccd("doctor", "part.mcap").returncode == 0
     again = hpccd("cut", whole, "--from", "1", "-o", "part.mcap")
     assert again.returncode == 2 and again.stderr == "hpccd cut: -o part.mcap: already exists; give another name\n"
     lasts = seconds(raw_messages(whole)[-1].log_time - BEGAN)
-    for options, words in ((("--from", "99"), "has no message in this part; its messages are from 0 to "),
-                           (("--from", "9" * 23), "has no message in this part; its messages are from 0 to "),
-                           (("--to", "0"), f"in this part; its messages are from 0 to {lasts} s"),
-                           (("--from", "3", "--to", "3"), f"in this part; its messages are from 0 to {lasts}"),
-                           (("--from", "3", "--to", "2"), "exchange --from and --to")):  # fmt: skip
+    for options, words in (
+        (("--from", "99"), "has no message in this part; its messages are from 0 to "),
+        (("--from", "9" * 23), "has no message in this part; its messages are from 0 to "),
+        (("--to", "0"), f"in this part; its messages are from 0 to {lasts} s"),
+        (("--from", "3", "--to", "3"), f"in this part; its messages are from 0 to {lasts}"),
+        (("--from", "3", "--to", "2"), "exchange --from and --to"),
+    ):
         done = hpccd("cut", whole, *options, "-o", "none.mcap")
         assert done.returncode == 2 and words in done.stderr and done.stderr.count("\n") == 1
         assert not (tmp_path / "none.mcap").exists()

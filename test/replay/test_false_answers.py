@@ -101,6 +101,7 @@ def test_found_with_an_accuracy_that_there_is_not(answered, accuracy):
 
 def _only(rows):
     """A change that keeps these contacts of the answer."""
+
     def change(put, answer):
         for name, size in {"kind": 1, "mesh_a": 1, "mesh_b": 1, "features_a": 2, "features_b": 2, "toc": 1}.items():
             put(name, getattr(answer, name).reshape(-1, size)[rows].reshape(-1))
@@ -128,10 +129,16 @@ def test_the_core_finds_the_same_time_of_any_contact():
         t0, t1 = generator.normal(size=(2, 120, 3))
         every = hc.Detector(scene, backend="cpu").detect(t0, t1)
         any_one = hc.Detector(scene, backend="cpu", report="any").detect(t0, t1)
-        rows = {(*map(int, row), toc) for name in ("vf", "ee")
-                for row, toc in zip(getattr(every, name), getattr(every, name + "_toc"), strict=True)}  # fmt: skip
-        found = [(*map(int, row), toc) for name in ("vf", "ee")
-                 for row, toc in zip(getattr(any_one, name), getattr(any_one, name + "_toc"), strict=True)]  # fmt: skip
+        rows = {
+            (*map(int, row), toc)
+            for name in ("vf", "ee")
+            for row, toc in zip(getattr(every, name), getattr(every, name + "_toc"), strict=True)
+        }
+        found = [
+            (*map(int, row), toc)
+            for name in ("vf", "ee")
+            for row, toc in zip(getattr(any_one, name), getattr(any_one, name + "_toc"), strict=True)
+        ]
         assert found and set(found) <= rows and any_one.first_toc == min(row[-1] for row in found)
 
 
@@ -139,8 +146,12 @@ def test_the_core_finds_the_same_time_of_any_contact():
     ("change", "says"),
     [
         (lambda put, answer: put("toc", answer.toc[::-1].copy()), "now at t = "),
-        (lambda put, answer: put("features_b", np.where(np.arange(len(answer.features_b)) == 0, 0, answer.features_b)),
-         "now not found"),
+        (
+            lambda put, answer: put(
+                "features_b", np.where(np.arange(len(answer.features_b)) == 0, 0, answer.features_b)
+            ),
+            "now not found",
+        ),
         (lambda put, answer: put("total", 1), "1 contacts are told of"),
         (lambda put, answer: put("first_toc", 0.5), "first time of contact"),
         (_only([]), "0 contacts were recorded"),

@@ -24,11 +24,23 @@ N = 4
 TABLE = ("meshes/table/topology", "meshes/table/vertices")
 QUAD = np.array([[0, 1, 2], [1, 3, 2]])
 SQUARE = np.array([[-0.4, -0.4, 0.0], [0.4, -0.4, 0.0], [-0.4, 0.4, 0.0], [0.4, 0.4, 0.0]])
-MESHES = {"meshes": ["cloth", "tool", "table"], "mesh.tool.input": "pose", "mesh.table.static": True,
-          "minimum_separation": 0.05, "frame_id": "world", "restart_after": 2}  # fmt: skip
-ROBOT = {"meshes": ["table"], "mesh.table.static": True, "robots": ["crane"], "frame_id": "world",
-         "robot.crane.description": "robot_description", "robot.crane.joint_states": "joint_states",
-         "minimum_separation": 0.05}  # fmt: skip
+MESHES = {
+    "meshes": ["cloth", "tool", "table"],
+    "mesh.tool.input": "pose",
+    "mesh.table.static": True,
+    "minimum_separation": 0.05,
+    "frame_id": "world",
+    "restart_after": 2,
+}
+ROBOT = {
+    "meshes": ["table"],
+    "mesh.table.static": True,
+    "robots": ["crane"],
+    "frame_id": "world",
+    "robot.crane.description": "robot_description",
+    "robot.crane.joint_states": "joint_states",
+    "minimum_separation": 0.05,
+}
 
 
 def _cloth(stamp, n):
@@ -61,9 +73,13 @@ def _joints(stamp, n):
 
 
 def _topologies():
-    return [("meshes/cloth/topology", topology_message(sheet_faces(N), N * N)),
-            ("meshes/tool/topology", topology_message(QUAD, 4)), ("meshes/table/topology", topology_message(QUAD, 4)),
-            _square("tool", 0), _square("table", 0)]  # fmt: skip
+    return [
+        ("meshes/cloth/topology", topology_message(sheet_faces(N), N * N)),
+        ("meshes/tool/topology", topology_message(QUAD, 4)),
+        ("meshes/table/topology", topology_message(QUAD, 4)),
+        _square("tool", 0),
+        _square("table", 0),
+    ]
 
 
 def _swapped(taken, heard, topic, by):
@@ -130,8 +146,14 @@ def _events():
     return MESHES, heard, taken
 
 
-KINDS = {"shape": _shape, "static": _static, "equal stamps": _equal_stamps, "base": _moving_base,
-         "described late": _described_late, "events": _events}  # fmt: skip
+KINDS = {
+    "shape": _shape,
+    "static": _static,
+    "equal stamps": _equal_stamps,
+    "base": _moving_base,
+    "described late": _described_late,
+    "events": _events,
+}
 
 
 def _replay(path, parameters, messages):

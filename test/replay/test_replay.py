@@ -100,9 +100,25 @@ def test_answers_from_before_they_told_a_separation(small_bag, versions):
         decoded = store.deserialize_cdr(completion(topic)(message.data), topic.type_name)
     _set("topology_versions", np.arange(versions, dtype=np.uint32) + 7)(decoded)
     now = message_definitions.definition_text(topic.type_name)
-    added = ("EDGE_FACE=2", "minimum_separation", "separation_mesh_a", "separation_mesh_b", "separations", "closest",
-             "distance", "tested_features", "parts", "motion_bounds", "inputs_before", "start_inputs", "input_topics",
-             "input_topic", "input_sent", "input_flags", "report")  # fmt: skip
+    added = (
+        "EDGE_FACE=2",
+        "minimum_separation",
+        "separation_mesh_a",
+        "separation_mesh_b",
+        "separations",
+        "closest",
+        "distance",
+        "tested_features",
+        "parts",
+        "motion_bounds",
+        "inputs_before",
+        "start_inputs",
+        "input_topics",
+        "input_topic",
+        "input_sent",
+        "input_flags",
+        "report",
+    )
     then = "\n".join(line for line in now.splitlines() if not any(line.endswith(" " + name) for name in added))
     data = bytes(store.serialize_cdr(decoded, topic.type_name))
     inputs = 4 + 2 * 8 + 4 * 4 + 4  # the last fields, and what aligns them
@@ -242,8 +258,11 @@ def test_answers_before_their_frames(small_bag, tmp_path):
 
 
 def test_without_contacts_every_step_is_computed(small_bag, tmp_path):
-    rewrite(small_bag, tmp_path / "meshes.mcap",
-            lambda index, message, decoded: None if message.topic == "/contacts" else decoded)
+    rewrite(
+        small_bag,
+        tmp_path / "meshes.mcap",
+        lambda index, message, decoded: None if message.topic == "/contacts" else decoded,
+    )
     replay, steps = _replay(tmp_path / "meshes.mcap", accuracy="exact")
     _, recorded = _replay(small_bag)
     assert [s.contacts.hash for s in steps] == [s.recorded.hash for s in recorded]
@@ -286,8 +305,11 @@ def test_recording_of_another_recorder_needs_parameters(small_bag, tmp_path, hpc
 
 
 def test_wrong_scene_parameters_diverge(small_bag, tmp_path):
-    rewrite(small_bag, tmp_path / "x.mcap", info={"parameters": {"meshes": ["cloth", "ball"],
-                                                                  "ignored_pairs": ["cloth:ball"]}})
+    rewrite(
+        small_bag,
+        tmp_path / "x.mcap",
+        info={"parameters": {"meshes": ["cloth", "ball"], "ignored_pairs": ["cloth:ball"]}},
+    )
     replay, _ = _replay(tmp_path / "x.mcap")
     assert replay.diverged > 50 and "now not found" in replay.first_divergence.difference
 

@@ -17,6 +17,7 @@ from hpccd_ros.replay import many_recordings
 
 pytest.importorskip("distributed", reason="Dask is not installed: make venv EXTRAS='test cluster'")
 
+
 @pytest.fixture
 def recordings(small_bag, tmp_path):
     """good, changed (step 61), cut off, without contacts."""
@@ -63,8 +64,17 @@ def test_in_local_processes(hpccd, recordings, tmp_path):
 
 def test_on_a_cluster(hpccd, children, recordings, tmp_path):
     file = tmp_path / "scheduler.json"
-    children.start("scheduler", "distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0",
-                   "--no-dashboard", "--scheduler-file", str(file))
+    children.start(
+        "scheduler",
+        "distributed.cli.dask_scheduler",
+        "--host",
+        "127.0.0.1",
+        "--port",
+        "0",
+        "--no-dashboard",
+        "--scheduler-file",
+        str(file),
+    )
     children.wait(file.exists, "no scheduler file", PATIENCE)
     address = json.loads(file.read_text())["address"]
     alone = hpccd("replay", *recordings, "--scheduler", address)

@@ -83,8 +83,9 @@ def test_a_scene_that_cannot_move(changed):
 
 
 def test_a_parameter_of_another_version_is_told_of(changed):
-    path = changed(lambda info: info["parameters"].update({"gravity": 9.81, "use_sim_time": False,
-    "qos_overrides./x.depth": 1}))
+    path = changed(
+        lambda info: info["parameters"].update({"gravity": 9.81, "use_sim_time": False, "qos_overrides./x.depth": 1})
+    )
     done = hpccd("replay", path)
     assert done.status == 0 and done.err == "parameter gravity is unknown and has no effect\n"
 
@@ -113,8 +114,9 @@ def test_roles_are_checked_against_types(changed):
     _refused(changed(swap), "is stored as the node's", "hpccd/msg/")
 
 
-@pytest.mark.parametrize("role", ["", "/", "meshes//vertices", "meshes/cloth", "meshes/nobody/vertices",
-"meshes/ball/contacts", 5])
+@pytest.mark.parametrize(
+    "role", ["", "/", "meshes//vertices", "meshes/cloth", "meshes/nobody/vertices", "meshes/ball/contacts", 5]
+)
 def test_topics_of_no_role_are_left_alone(changed, role):
     path = changed(lambda info: info["topics"].update({"/meshes/ball/vertices": role}))
     done = hpccd("replay", path)
@@ -130,9 +132,20 @@ def test_a_role_of_two_topics(changed):
 
 @pytest.mark.parametrize(
     "name",
-    ["", "a/b", "a/b/c/d", "../../etc/passwd", "os/path/join", "os.path/msg/join", ".x/msg/Y", "\0/\0/\0", "a\nb/msg/C",
-     "nowhere_msgs/msg/Nothing", "hpccd/msg/__doc__"],
-)  # fmt: skip
+    [
+        "",
+        "a/b",
+        "a/b/c/d",
+        "../../etc/passwd",
+        "os/path/join",
+        "os.path/msg/join",
+        ".x/msg/Y",
+        "\0/\0/\0",
+        "a\nb/msg/C",
+        "nowhere_msgs/msg/Nothing",
+        "hpccd/msg/__doc__",
+    ],
+)
 def test_names_of_types_are_looked_at_before_they_are_used(changed, name):
     def edit(bag):
         for schema in bag.schemas:
@@ -157,26 +170,39 @@ def test_topics_that_cannot_be_played(changed, topic):
     def edit(bag):
         bag.channels[0].topic = topic
 
-    played = hpccd("replay", changed(edit=edit), "--publish", "--all", "--subscribers", "0", "--wait", "0", "--rate",
-    "0")
+    played = hpccd(
+        "replay", changed(edit=edit), "--publish", "--all", "--subscribers", "0", "--wait", "0", "--rate", "0"
+    )
     assert played.status == 2 and "cannot be played" in played.err, played
 
 
 @pytest.mark.parametrize(
     ("file", "says"),
     [
-        ("..", "format"), ("/", "format"), ("floor", "format"), ("/etc/passwd", "format"),
+        ("..", "format"),
+        ("/", "format"),
+        ("floor", "format"),
+        ("/etc/passwd", "format"),
         ("floor\0.obj", "no such file"),
-        ("~nobody9/x.obj", "mesh floor of the recording: "), ("a" * 300 + ".obj", "mesh floor of the recording: "),
+        ("~nobody9/x.obj", "mesh floor of the recording: "),
+        ("a" * 300 + ".obj", "mesh floor of the recording: "),
     ],
-)  # fmt: skip
+)
 def test_names_of_mesh_files(changed, file, says):
     path = changed(lambda info: info["parameters"].update({"mesh.floor.file": file}), base="everything")
     _refused(path, says)
 
 
-@pytest.mark.parametrize("data", [b"", b"v 0 0 0\n", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 99\n", b"\xff" * 100,
-                                  b"v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"])  # fmt: skip
+@pytest.mark.parametrize(
+    "data",
+    [
+        b"",
+        b"v 0 0 0\n",
+        b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 99\n",
+        b"\xff" * 100,
+        b"v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n",
+    ],
+)
 def test_contents_of_mesh_files(changed, data):
     def edit(bag):
         bag.attachments[0].data = data

@@ -71,8 +71,12 @@ def test_motions_go_by_joints_only_where_both_ends_tell_them(robot):
 
 
 def test_links_of_one_robot_share_what_is_computed_of_its_joints(robot):
-    both = Robot.of(URDF.replace('<link name="rod"/>', '<link name="rod"><collision><geometry><sphere radius="0.1"/>'
-                                 "</geometry></collision></link>"))  # fmt: skip
+    both = Robot.of(
+        URDF.replace(
+            '<link name="rod"/>',
+            '<link name="rod"><collision><geometry><sphere radius="0.1"/></geometry></collision></link>',
+        )
+    )
     start, end = frame(both, 1, 0.0), frame(both, 2, 0.3)
     first, second, _ = motions((start.vertices, end.vertices), start, end)
     assert first.step is second.step

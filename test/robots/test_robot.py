@@ -52,9 +52,7 @@ def test_slashes_and_colons_of_links_become_underscores_in_names_of_meshes():
     text = URDF.replace('"rod"', '"left/rod:1"').replace('"base"', '"left/base:1"').replace('"turn"', '"left/turn:1"')
     robot = Robot.of(text, SRDF.replace('"rod"', '"left/rod:1"'), name="arm")
     assert [mesh.name for mesh in robot.meshes] == ["arm/left_rod_1", "arm/bob", "arm/tip"]
-    assert robot.ignored_pairs == (
-        ("arm/bob", "arm/left_rod_1"), ("arm/bob", "arm/tip"), ("arm/left_rod_1", "arm/tip")
-    )  # fmt: skip
+    assert robot.ignored_pairs == (("arm/bob", "arm/left_rod_1"), ("arm/bob", "arm/tip"), ("arm/left_rod_1", "arm/tip"))
     assert robot.warnings == (
         "URDF: in names of meshes / and : become _: link 'left/rod:1' is arm/left_rod_1",
     )  # of the base, which has no geometry, nothing is said

@@ -18,10 +18,42 @@ from hpccd_ros.robots.errors import RobotError
 from hpccd_ros.robots.joint_history import JointHistory
 
 ODD = [
-    "", " ", "0", "-0.0", "-1", "1e-320", "1e300", "1e400", "nan", "inf", "1 2", "0 0 0", "1 0 1", "1 1 1 1", "1,5",
-    "a/b", "a:b", "/", ":", "base", "link_1", "joint_1", "hand", "ü", "\ufffd", "\u200b", "x" * 300, "${pi}", "fixed",
-    "floating", "continuous", "mesh.stl", "package://nowhere/a.stl", "file:///dev/null", "~nosuchuser/a.stl",
-]  # fmt: skip
+    "",
+    " ",
+    "0",
+    "-0.0",
+    "-1",
+    "1e-320",
+    "1e300",
+    "1e400",
+    "nan",
+    "inf",
+    "1 2",
+    "0 0 0",
+    "1 0 1",
+    "1 1 1 1",
+    "1,5",
+    "a/b",
+    "a:b",
+    "/",
+    ":",
+    "base",
+    "link_1",
+    "joint_1",
+    "hand",
+    "ü",
+    "\ufffd",
+    "\u200b",
+    "x" * 300,
+    "${pi}",
+    "fixed",
+    "floating",
+    "continuous",
+    "mesh.stl",
+    "package://nowhere/a.stl",
+    "file:///dev/null",
+    "~nosuchuser/a.stl",
+]
 TAGS = ["box", "sphere", "cylinder", "capsule", "mesh", "link", "joint", "limit", "mimic", "origin", "axis", "geometry"]
 SRDF = """<robot name="arm"><disable_collisions link1="base" link2="link_2" reason="Never"/>
 <enable_collisions link1="hand" link2="link_7"/><disable_default_collisions link="finger_left"/>

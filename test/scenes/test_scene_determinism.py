@@ -59,10 +59,15 @@ def test_instruction_sets_do_not_change_the_numbers(tmp_path):
         "PYTHONPATH": str(Path(hpccd_ros.__file__).parents[1]),
     }
     words = [
-        "folding-strip:1:61", "cloth-drop:1:40", "breaking-like:0.25:10", "n-body-like-lr:1:20",
-        "rod-twist-like:0.0625:241", "armadillo-like:0.0625:191", "cloth-ball-resolved:0.03125:80",
+        "folding-strip:1:61",
+        "cloth-drop:1:40",
+        "breaking-like:0.25:10",
+        "n-body-like-lr:1:20",
+        "rod-twist-like:0.0625:241",
+        "armadillo-like:0.0625:191",
+        "cloth-ball-resolved:0.03125:80",
         "arm-and-cloth:1:32",
-    ]  # fmt: skip
+    ]
     program = Path(__file__).with_name("scene_digest.py")
     result = subprocess.run(
         [sys.executable, program, *words], env=environment, capture_output=True, text=True, timeout=300
@@ -84,9 +89,14 @@ def test_more_frames_continue_the_same_motion(name):
 
 
 SEEDED = [
-    "cloth-drop", "arm-and-cloth", "breaking-like", "n-body-like-lr", "rod-twist-like", "armadillo-like",
+    "cloth-drop",
+    "arm-and-cloth",
+    "breaking-like",
+    "n-body-like-lr",
+    "rod-twist-like",
+    "armadillo-like",
     "cloth-ball-resolved",
-]  # fmt: skip
+]
 
 
 @pytest.mark.parametrize("name", SEEDED)

@@ -85,10 +85,13 @@ def test_parameter_file_names_robots_and_no_links(arm, tmp_path):
             "cloth": {"static": False, "self_collision": True},
         },
         "robots": ["arm"],
-        "robot": {"arm": {
-            "description": "robot_description", "joint_states": "joint_states",
-            "pose": [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0],
-        }},
+        "robot": {
+            "arm": {
+                "description": "robot_description",
+                "joint_states": "joint_states",
+                "pose": [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0],
+            }
+        },
         "frame_id": "world",
     }
 

@@ -178,8 +178,20 @@ def test_node_reports_the_contacts_of_a_scene(name, size, listen, children, tmp_
     answers = []
     listener.node.create_subscription(ContactArray, "contacts", answers.append, QoSProfile(depth=1000))
     # Queues as long as the scene: no frame may be dropped here, however slow the machine.
-    node = start("hpccd_ros.node", "--ros-args", "-r", "__ns:=/whole", "--params-file", parameters,
-                 "-p", f"frame_queue:={frames}", "-p", f"input_depth:={frames}", "-p", "max_contacts:=0")  # fmt: skip
+    node = start(
+        "hpccd_ros.node",
+        "--ros-args",
+        "-r",
+        "__ns:=/whole",
+        "--params-file",
+        parameters,
+        "-p",
+        f"frame_queue:={frames}",
+        "-p",
+        f"input_depth:={frames}",
+        "-p",
+        "max_contacts:=0",
+    )
     children.append(node)
     command = publish_command(name, "/whole", *options, "--rate", 20, "--wait", PATIENCE, "--subscribers", 2)
     publisher = start(*command)

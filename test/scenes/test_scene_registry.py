@@ -10,8 +10,11 @@ from hpccd_ros import scenes
 
 # Kim et al. 2009, Table 1.
 TABLE_1 = {
-    "cloth-ball-like": 92_000, "breaking-like": 252_000, "n-body-like-lr": 32_000, "n-body-like-hr": 146_000,
-}  # fmt: skip
+    "cloth-ball-like": 92_000,
+    "breaking-like": 252_000,
+    "n-body-like-lr": 32_000,
+    "n-body-like-hr": 146_000,
+}
 
 # Vertices of the scenes of incremental potential contact that these are like.
 PUBLISHED_VERTICES = {"rod-twist-like": (52_000, 54_000), "armadillo-like": (20_000, 40_000)}
@@ -69,9 +72,12 @@ def test_frames_and_meshes_fit_together(name):
 
 # Not static, but at rest in the first eight frames.
 STILL_AT_FIRST = {
-    ("two-triangles", "lower"), ("cloth-drop", "ball"), ("cloth-ball-like", "ball"), ("breaking-like", "statue"),
+    ("two-triangles", "lower"),
+    ("cloth-drop", "ball"),
+    ("cloth-ball-like", "ball"),
+    ("breaking-like", "statue"),
     ("arm-and-cloth", "arm/base"),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", scenes.names())

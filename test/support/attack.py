@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Damaged and hostile recordings through doctor, recover, replay, view and play, in a process that may be lost.
 
-  python test/support/attack.py --random 2000 --crafted 2000     counts by outcome; what failed, with its name
-  python test/support/attack.py --only crafted/bomb/3            one case, its output and its traceback
+python test/support/attack.py --random 2000 --crafted 2000     counts by outcome; what failed, with its name
+python test/support/attack.py --only crafted/bomb/3            one case, its output and its traceback
 """
 
 import argparse
@@ -40,9 +40,17 @@ MEMORY = 900
 BASES = ("streams", "everything")
 # Kinds of cases that are played over DDS too: topics, types and bytes are all that is used for it.
 PLAYED = {
-    "metadata_of_a_topic", "topic_name", "type_name", "type_of_another_topic", "payload", "payload_lengths",
-    "schema_of_no_topic", "channel_twice", "times_of_messages", "order_of_messages",
-}  # fmt: skip
+    "metadata_of_a_topic",
+    "topic_name",
+    "type_name",
+    "type_of_another_topic",
+    "payload",
+    "payload_lengths",
+    "schema_of_no_topic",
+    "channel_twice",
+    "times_of_messages",
+    "order_of_messages",
+}
 
 
 def cases(n_random: int, n_crafted: int, seed: int = 1) -> list[str]:
@@ -137,8 +145,14 @@ def run_case(name: str, folder: Path) -> dict:
     grown = _memory() - before
     if grown > MEMORY:
         problems.append(f"{grown} MB of memory")
-    return {"name": name, "outcomes": outcomes, "problems": problems, "seconds": round(time.monotonic() - began, 2),
-            "memory": grown, "told": [*sound, *replayed]}  # fmt: skip
+    return {
+        "name": name,
+        "outcomes": outcomes,
+        "problems": problems,
+        "seconds": round(time.monotonic() - began, 2),
+        "memory": grown,
+        "told": [*sound, *replayed],
+    }
 
 
 def _lies(path, row, steps, told) -> list[str]:
@@ -182,9 +196,13 @@ class Worker:
         if self._process is None:
             self._log = open(self._folder / f"worker-{time.monotonic_ns()}.log", "w+")
             self._process = subprocess.Popen(
-                [sys.executable, __file__, "--work", str(self._folder)], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-                stderr=self._log, text=True, env={**os.environ, "PYTHONPATH": SOURCES},
-            )  # fmt: skip
+                [sys.executable, __file__, "--work", str(self._folder)],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=self._log,
+                text=True,
+                env={**os.environ, "PYTHONPATH": SOURCES},
+            )
         self._process.stdin.write(name + "\n")
         self._process.stdin.flush()
         line = self._process.stdout.readline()
@@ -194,8 +212,13 @@ class Worker:
         self._log.seek(0)
         words = self._log.read()[-3000:]
         self._process = None
-        return {"name": name, "outcomes": {"process": status}, "seconds": 0, "memory": 0,
-                "problems": [f"lost the process: status {status} (hang or crash): {words}"]}  # fmt: skip
+        return {
+            "name": name,
+            "outcomes": {"process": status},
+            "seconds": 0,
+            "memory": 0,
+            "problems": [f"lost the process: status {status} (hang or crash): {words}"],
+        }
 
     def close(self):
         if self._process is not None:

@@ -16,12 +16,19 @@ from hpccd_ros.replay.recomputed import Replay
 SECOND = 1_000_000_000
 FIRST, FRAMES = 55, 8  # of the recording of the repository: its contacts are of both kinds
 SCENE = {
-    "meshes": ["cloth", "net", "floor"], "frame_id": "world", "outputs": ["points", "normals"],
-    "minimum_separation": 1e-3, "pair_separation": ["cloth:net:0.002"],
-    "mesh.floor.static": True, "mesh.floor.file": "somewhere/floor.obj", "mesh.floor.self_collision": False,
+    "meshes": ["cloth", "net", "floor"],
+    "frame_id": "world",
+    "outputs": ["points", "normals"],
+    "minimum_separation": 1e-3,
+    "pair_separation": ["cloth:net:0.002"],
+    "mesh.floor.static": True,
+    "mesh.floor.file": "somewhere/floor.obj",
+    "mesh.floor.self_collision": False,
     "mesh.floor.pose": [0.0, 0.0, -0.1, 0.0, 0.0, 0.6, 0.8],
-    "mesh.net.input": "points", "mesh.net.transform": "tf", "mesh.net.frame": "hand",
-}  # fmt: skip
+    "mesh.net.input": "points",
+    "mesh.net.transform": "tf",
+    "mesh.net.frame": "hand",
+}
 FLOOR = b"v -2 -2 0\nv 2 -2 0\nv 2 2 0.01\nv -2 2 0\nf 1 2 3 4\n"
 N = 5  # vertices along a side of a sheet
 
@@ -65,8 +72,13 @@ def _write(path, answers):
         "/contacts": ("contacts", "hpccd/msg/ContactArray"),
         "/distances": ("distances", "hpccd/msg/DistanceArray"),
     }
-    info = {"format": 1, "hpccd": "0", "node": "/hpccd", "parameters": SCENE,
-            "topics": {name: role for name, (role, _) in topics.items()}}  # fmt: skip
+    info = {
+        "format": 1,
+        "hpccd": "0",
+        "node": "/hpccd",
+        "parameters": SCENE,
+        "topics": {name: role for name, (role, _) in topics.items()},
+    }
     bag = BagWriter(path, info=info, attachments=[("mesh/floor/floor.obj", FLOOR)])
     for name, (_, type_name) in topics.items():
         bag.add_topic(Topic(name, type_name, []))
@@ -98,20 +110,36 @@ class Maker:
 
     def topology(self, faces, n_vertices):
         return self._types["hpccd/msg/MeshTopology"](
-            header=self.header(0, ""), version=0, n_vertices=n_vertices, faces=faces.astype(np.uint32).reshape(-1),
-            edges=np.empty(0, np.uint32))
+            header=self.header(0, ""),
+            version=0,
+            n_vertices=n_vertices,
+            faces=faces.astype(np.uint32).reshape(-1),
+            edges=np.empty(0, np.uint32),
+        )
 
     def vertices(self, stamp, step, xyz):
         return self._types["hpccd/msg/MeshVertices"](
-            header=self.header(stamp, "world"), topology_version=0, step=step, vertices_f32=np.zeros(0, np.float32),
-            vertices_f64=xyz.reshape(-1))
+            header=self.header(stamp, "world"),
+            topology_version=0,
+            step=step,
+            vertices_f32=np.zeros(0, np.float32),
+            vertices_f64=xyz.reshape(-1),
+        )
 
     def cloud(self, stamp, xyz):
         fields = [self._types["sensor_msgs/msg/PointField"](name, 4 * k, 7, 1) for k, name in enumerate("xyz")]
         data = np.frombuffer(xyz.astype(np.float32).tobytes(), np.uint8)
         return self._types["sensor_msgs/msg/PointCloud2"](
-            header=self.header(stamp, "hand"), height=1, width=len(xyz), fields=fields, is_bigendian=False,
-            point_step=12, row_step=12 * len(xyz), data=data, is_dense=True)
+            header=self.header(stamp, "hand"),
+            height=1,
+            width=len(xyz),
+            fields=fields,
+            is_bigendian=False,
+            point_step=12,
+            row_step=12 * len(xyz),
+            data=data,
+            is_dense=True,
+        )
 
     def transform(self, parent, child, shift, stamp):
         turn = self._types["geometry_msgs/msg/Quaternion"](0.0, 0.0, 0.6, 0.8)
@@ -130,8 +158,10 @@ def _inputs(make):
     yield "/meshes/net/topology", make.topology(faces, N * N)
     for k in range(6):
         wave = 0.05 * np.sin(7.0 * grid[:, :1] + k) + 0.03 * np.cos(5.0 * grid[:, 1:2] * k)
-        yield "/meshes/cloth/vertices", make.vertices((k + 1) * SECOND, k,
-        grid + [0, 0, 0.05 - 0.04 * k] + wave * [0, 0, 1])
+        yield (
+            "/meshes/cloth/vertices",
+            make.vertices((k + 1) * SECOND, k, grid + [0, 0, 0.05 - 0.04 * k] + wave * [0, 0, 1]),
+        )
         yield "/meshes/net/points", make.cloud((k + 1) * SECOND, grid * [1, -1, 1] - wave * [0, 0, 1])
 
 

@@ -13,8 +13,12 @@ ENVIRONMENT = {**os.environ, "PATH": f"{Path(sys.executable).parent}{os.pathsep}
 def run(*command, environment=ENVIRONMENT) -> str:
     """What it printed; a failure shows it."""
     done = subprocess.run(
-        [str(part) for part in command], text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=500,
+        [str(part) for part in command],
+        text=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        timeout=500,
         env=environment,
-    )  # fmt: skip
+    )
     assert done.returncode == 0, done.stdout
     return done.stdout

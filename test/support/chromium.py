@@ -19,10 +19,20 @@ from PIL import Image
 NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 # WebGL by the processor, no connections of its own.
 OPTIONS = (
-    "--headless=new", "--no-sandbox", "--remote-debugging-pipe", "--use-gl=angle", "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader", "--disable-dev-shm-usage", "--no-first-run", "--disable-background-networking",
-    "--disable-component-update", "--disable-sync", "--force-device-scale-factor=1", "--hide-scrollbars",
-)  # fmt: skip
+    "--headless=new",
+    "--no-sandbox",
+    "--remote-debugging-pipe",
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--disable-dev-shm-usage",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--force-device-scale-factor=1",
+    "--hide-scrollbars",
+)
 # The protocol is spoken on descriptors 3 and 4; the pipes may have these numbers themselves, the other way round.
 EXECUTE = """
 import fcntl, os, sys
@@ -59,13 +69,20 @@ class Chromium:
         to_browser, from_browser = os.pipe(), os.pipe()
         ends = (to_browser[0], from_browser[1])
         arguments = [
-            program(), *OPTIONS, *options, f"--user-data-dir={folder}", f"--window-size={size[0]},{size[1]}",
+            program(),
+            *OPTIONS,
+            *options,
+            f"--user-data-dir={folder}",
+            f"--window-size={size[0]},{size[1]}",
             "about:blank",
-        ]  # fmt: skip
+        ]
         self._process = subprocess.Popen(
-            [sys.executable, "-I", "-S", "-c", EXECUTE, *map(str, ends), *arguments], pass_fds=ends, env=_environment(),
-            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-        )  # fmt: skip
+            [sys.executable, "-I", "-S", "-c", EXECUTE, *map(str, ends), *arguments],
+            pass_fds=ends,
+            env=_environment(),
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
         for end in ends:
             os.close(end)
         self._write, self._read = to_browser[1], from_browser[0]

@@ -83,9 +83,20 @@ def length_of_a_record(rng, data):
 
 
 KINDS = (
-    flip_bits, flip_a_bit_near_an_end, overwrite, insert, delete, zero_a_block, truncate, lose_the_beginning,
-    repeat_a_piece, reorder_records, lose_a_record, large_number, length_of_a_record,
-)  # fmt: skip
+    flip_bits,
+    flip_a_bit_near_an_end,
+    overwrite,
+    insert,
+    delete,
+    zero_a_block,
+    truncate,
+    lose_the_beginning,
+    repeat_a_piece,
+    reorder_records,
+    lose_a_record,
+    large_number,
+    length_of_a_record,
+)
 
 
 def whole_records(data) -> list[bytes]:

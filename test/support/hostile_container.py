@@ -47,8 +47,9 @@ def bomb(rng, bag):
         if next(which) != target:
             return chunk
         # Without a check sum, as the format allows: nothing else would stop it.
-        return dataclasses.replace(chunk, compression=compression, data=data, uncompressed_size=says,
-        uncompressed_crc=0)
+        return dataclasses.replace(
+            chunk, compression=compression, data=data, uncompressed_size=says, uncompressed_crc=0
+        )
 
     bag.chunk = change
 
@@ -56,19 +57,23 @@ def bomb(rng, bag):
 @kind
 def chunk_lies(rng, bag):
     which, target = iter(range(1000)), rng.randrange(3)
-    name, value = rng.choice((
-        ("uncompressed_size", rng.choice(LARGE)), ("uncompressed_crc", rng.choice((0, 1))),
-        ("message_start_time", rng.choice(LARGE)),
-        ("message_end_time", rng.choice(LARGE)), ("compression", rng.choice(("", "lz4", "zstd", "LZ4", "gzip",
-        "x" * 1000))),
-        ("data", rng.choice((b"", b"\0" * 100, rng.randbytes(1000)))),
-    ))  # fmt: skip
+    name, value = rng.choice(
+        (
+            ("uncompressed_size", rng.choice(LARGE)),
+            ("uncompressed_crc", rng.choice((0, 1))),
+            ("message_start_time", rng.choice(LARGE)),
+            ("message_end_time", rng.choice(LARGE)),
+            ("compression", rng.choice(("", "lz4", "zstd", "LZ4", "gzip", "x" * 1000))),
+            ("data", rng.choice((b"", b"\0" * 100, rng.randbytes(1000)))),
+        )
+    )
     bag.chunk = lambda chunk: dataclasses.replace(chunk, **{name: value}) if next(which) == target else chunk
 
 
 @kind
 def chunk_without_check_sum(rng, bag):
     """What is flipped in it, nobody notices but by what it says."""
+
     def change(chunk):
         if chunk.compression:
             return chunk
@@ -84,20 +89,35 @@ def chunk_without_check_sum(rng, bag):
 def records_inside_a_chunk(rng, bag):
     number = rng.choice(bag.channels).id
     head = struct.pack("<HIQQ", number, 0, 10**18, 10**18)
-    strange = rng.choice((
-        raw_record(0x7F, b"x" * 10), raw_record(0xFF, b""), raw_record(0, b""), raw_record(Opcode.MESSAGE, head[:10]),
-        raw_record(Opcode.MESSAGE, b""), raw_record(Opcode.MESSAGE, head), raw_record(Opcode.MESSAGE, head, 2**63),
-        raw_record(Opcode.MESSAGE, head, 2**64 - 1), raw_record(Opcode.MESSAGE, head, 21),
-        raw_record(Opcode.CHANNEL, b"\1\0"),
-        raw_record(Opcode.CHANNEL, struct.pack("<HHI", 1, 1, 2**32 - 1)), raw_record(Opcode.SCHEMA, b""),
-        raw_record(Opcode.SCHEMA, rng.randbytes(40)),
-        as_bytes(Footer(0, 0, 0)), as_bytes(DataEnd(0)), as_bytes(Header("ros2", "x")),
-        as_bytes(Metadata("hpccd", {"json": "{}"})),
-        as_bytes(Chunk("", b"", 0, 0, 0, 0)), b"\5", b"", as_bytes(Channel(number, "/x", "cdr", {}, 1)),
-        as_bytes(Channel(99, "/x", "cdr", {}, 99)),
-        as_bytes(Schema(1, b"x", "ros2msg", "x/msg/X")), as_bytes(Message(number, 10**18, b"", 0, 0)),
-        as_bytes(Message(12345, 10**18, b"abcd", 0, 0)),
-    ))  # fmt: skip
+    strange = rng.choice(
+        (
+            raw_record(0x7F, b"x" * 10),
+            raw_record(0xFF, b""),
+            raw_record(0, b""),
+            raw_record(Opcode.MESSAGE, head[:10]),
+            raw_record(Opcode.MESSAGE, b""),
+            raw_record(Opcode.MESSAGE, head),
+            raw_record(Opcode.MESSAGE, head, 2**63),
+            raw_record(Opcode.MESSAGE, head, 2**64 - 1),
+            raw_record(Opcode.MESSAGE, head, 21),
+            raw_record(Opcode.CHANNEL, b"\1\0"),
+            raw_record(Opcode.CHANNEL, struct.pack("<HHI", 1, 1, 2**32 - 1)),
+            raw_record(Opcode.SCHEMA, b""),
+            raw_record(Opcode.SCHEMA, rng.randbytes(40)),
+            as_bytes(Footer(0, 0, 0)),
+            as_bytes(DataEnd(0)),
+            as_bytes(Header("ros2", "x")),
+            as_bytes(Metadata("hpccd", {"json": "{}"})),
+            as_bytes(Chunk("", b"", 0, 0, 0, 0)),
+            b"\5",
+            b"",
+            as_bytes(Channel(number, "/x", "cdr", {}, 1)),
+            as_bytes(Channel(99, "/x", "cdr", {}, 99)),
+            as_bytes(Schema(1, b"x", "ros2msg", "x/msg/X")),
+            as_bytes(Message(number, 10**18, b"", 0, 0)),
+            as_bytes(Message(12345, 10**18, b"abcd", 0, 0)),
+        )
+    )
     at = rng.random()
     bag.inside = lambda records: [*records[: int(at * len(records))], strange, *records[int(at * len(records)) :]]
 
@@ -105,29 +125,44 @@ def records_inside_a_chunk(rng, bag):
 @kind
 def many_records(rng, bag):
     """A great many of the smallest records: each costs a reader more than its bytes."""
-    strange = rng.choice((
-        raw_record(0x7F, b"") * 300_000, as_bytes(Message(bag.channels[0].id, 10**18, b"", 0, 0)) * 200_000,
-        b"".join(as_bytes(Channel(k, f"/t{k}", "cdr", {}, 1)) for k in range(100, 5000)),
-    ))  # fmt: skip
+    strange = rng.choice(
+        (
+            raw_record(0x7F, b"") * 300_000,
+            as_bytes(Message(bag.channels[0].id, 10**18, b"", 0, 0)) * 200_000,
+            b"".join(as_bytes(Channel(k, f"/t{k}", "cdr", {}, 1)) for k in range(100, 5000)),
+        )
+    )
     done = []
     bag.inside = lambda records: records if done else [*records, done.append(1) or strange]
 
 
 @kind
 def records_of_the_data(rng, bag):
-    strange = rng.choice((
-        raw_record(0x7F, b"x"), raw_record(0, b""), raw_record(Opcode.CHUNK, b""),
-        raw_record(Opcode.CHUNK, b"", 2**64 - 1), raw_record(0x99, b"", 2**40),
-        as_bytes(Header("ros2", "again")), as_bytes(Header("ros1", "")), as_bytes(DataEnd(0)),
-        as_bytes(Footer(0, 0, 0)), as_bytes(Footer(8, 0, 0)),
-        raw_record(Opcode.METADATA, struct.pack("<I", 2**32 - 1)),
-        raw_record(Opcode.METADATA, struct.pack("<II", 0, 2**32 - 1)),
-        raw_record(Opcode.MESSAGE_INDEX, struct.pack("<HI", 1, 2**32 - 1)), raw_record(Opcode.MESSAGE, b""),
-        raw_record(Opcode.MESSAGE, b"\1"),
-        raw_record(Opcode.STATISTICS, b""), as_bytes(Message(1, 0, b"", 0, 0)), as_bytes(Schema(0, b"", "", "")),
-        as_bytes(Channel(1, "/x", "cdr", {}, 1)),
-        raw_record(Opcode.ATTACHMENT, b"x" * 50), raw_record(Opcode.HEADER, b"\xff" * 20),
-    ))  # fmt: skip
+    strange = rng.choice(
+        (
+            raw_record(0x7F, b"x"),
+            raw_record(0, b""),
+            raw_record(Opcode.CHUNK, b""),
+            raw_record(Opcode.CHUNK, b"", 2**64 - 1),
+            raw_record(0x99, b"", 2**40),
+            as_bytes(Header("ros2", "again")),
+            as_bytes(Header("ros1", "")),
+            as_bytes(DataEnd(0)),
+            as_bytes(Footer(0, 0, 0)),
+            as_bytes(Footer(8, 0, 0)),
+            raw_record(Opcode.METADATA, struct.pack("<I", 2**32 - 1)),
+            raw_record(Opcode.METADATA, struct.pack("<II", 0, 2**32 - 1)),
+            raw_record(Opcode.MESSAGE_INDEX, struct.pack("<HI", 1, 2**32 - 1)),
+            raw_record(Opcode.MESSAGE, b""),
+            raw_record(Opcode.MESSAGE, b"\1"),
+            raw_record(Opcode.STATISTICS, b""),
+            as_bytes(Message(1, 0, b"", 0, 0)),
+            as_bytes(Schema(0, b"", "", "")),
+            as_bytes(Channel(1, "/x", "cdr", {}, 1)),
+            raw_record(Opcode.ATTACHMENT, b"x" * 50),
+            raw_record(Opcode.HEADER, b"\xff" * 20),
+        )
+    )
     at = rng.random()
 
     def change(records):
@@ -139,8 +174,9 @@ def records_of_the_data(rng, bag):
 
 @kind
 def file_without_its_header(rng, bag):
-    bag.data = rng.choice((lambda records: records[1:], lambda records: [], lambda records: records[:1],
-    lambda records: records[::-1]))
+    bag.data = rng.choice(
+        (lambda records: records[1:], lambda records: [], lambda records: records[:1], lambda records: records[::-1])
+    )
 
 
 @kind
@@ -189,6 +225,7 @@ def index_lies(rng, bag):
 @kind
 def index_of_other_topics(rng, bag):
     """The index tells other topics, types or numbers than the data."""
+
     def change(records):
         out = [dataclasses.replace(record) for record in records]
         channels = [r for r in out if isinstance(r, Channel)]
@@ -219,12 +256,15 @@ def statistics_lie(rng, bag):
             if isinstance(record, Statistics):
                 counts = dict(record.channel_message_counts)
                 counts[rng.choice(list(counts))] = rng.choice(LARGE)
-                record = rng.choice((
-                    dataclasses.replace(record, channel_message_counts=counts),
-                    dataclasses.replace(record, channel_message_counts={}),
-                    dataclasses.replace(record, message_count=rng.choice(LARGE)), None,
-                    dataclasses.replace(record, message_start_time=2**64 - 1, message_end_time=0),
-                ))  # fmt: skip
+                record = rng.choice(
+                    (
+                        dataclasses.replace(record, channel_message_counts=counts),
+                        dataclasses.replace(record, channel_message_counts={}),
+                        dataclasses.replace(record, message_count=rng.choice(LARGE)),
+                        None,
+                        dataclasses.replace(record, message_start_time=2**64 - 1, message_end_time=0),
+                    )
+                )
             out += [record] if record is not None else []
         return out
 
@@ -245,13 +285,19 @@ def places_of_the_index(rng, bag):
 
 @kind
 def strange_records_in_the_index(rng, bag):
-    strange = rng.choice((
-        raw_record(0x7F, b"x"), raw_record(Opcode.CHUNK_INDEX, b""), raw_record(Opcode.STATISTICS, b"\0" * 20),
-        raw_record(Opcode.CHANNEL, b"", 2**40),
-        as_bytes(Footer(0, 0, 0)), as_bytes(DataEnd(0)), raw_record(Opcode.CHUNK_INDEX, bytes(32) + struct.pack("<I",
-        2**32 - 1)),
-        as_bytes(Message(1, 0, b"x", 0, 0)), raw_record(Opcode.STATISTICS, bytes(42) + struct.pack("<I", 2**32 - 1)),
-    ))  # fmt: skip
+    strange = rng.choice(
+        (
+            raw_record(0x7F, b"x"),
+            raw_record(Opcode.CHUNK_INDEX, b""),
+            raw_record(Opcode.STATISTICS, b"\0" * 20),
+            raw_record(Opcode.CHANNEL, b"", 2**40),
+            as_bytes(Footer(0, 0, 0)),
+            as_bytes(DataEnd(0)),
+            raw_record(Opcode.CHUNK_INDEX, bytes(32) + struct.pack("<I", 2**32 - 1)),
+            as_bytes(Message(1, 0, b"x", 0, 0)),
+            raw_record(Opcode.STATISTICS, bytes(42) + struct.pack("<I", 2**32 - 1)),
+        )
+    )
     bag.index = lambda records: [*records, strange] if rng.random() < 0.5 else [strange, *records]
 
 
@@ -260,17 +306,27 @@ def footer_lies(rng, bag):
     def change(footer):
         name = rng.choice(("summary_start", "summary_start", "summary_offset_start", "summary_crc"))
         old = getattr(footer, name)
-        return dataclasses.replace(footer, **{name: rng.choice((*LARGE[:5], max(0, old - 1), old + 1, old + 9, 8,
-        2**32 - 1))})
+        return dataclasses.replace(
+            footer, **{name: rng.choice((*LARGE[:5], max(0, old - 1), old + 1, old + 9, 8, 2**32 - 1))}
+        )
 
     bag.footer = change
 
 
 @kind
 def end_of_the_file(rng, bag):
-    bag.end = rng.choice((
-        lambda data: data[:-8], lambda data: data + data[-8:], lambda data: data[:-37], lambda data: data + bytes(1000),
-        lambda data: data[:8], lambda data: data[:8] + data[:8], lambda data: data[:8] + data, lambda data: data + data,
-        lambda data: data[:-8] + bytes(8), lambda data: data[:8] + data[-37:],
-        lambda data: data[:8] + bytes(29) + data[-8:],
-    ))  # fmt: skip
+    bag.end = rng.choice(
+        (
+            lambda data: data[:-8],
+            lambda data: data + data[-8:],
+            lambda data: data[:-37],
+            lambda data: data + bytes(1000),
+            lambda data: data[:8],
+            lambda data: data[:8] + data[:8],
+            lambda data: data[:8] + data,
+            lambda data: data + data,
+            lambda data: data[:-8] + bytes(8),
+            lambda data: data[:8] + data[-37:],
+            lambda data: data[:8] + bytes(29) + data[-8:],
+        )
+    )

@@ -49,14 +49,34 @@ def payload_lengths(rng, bag):
 @kind
 def changed_answer(rng, bag):
     def change(put, answer):
-        name = rng.choice((
-            "kind", "mesh_a", "mesh_b", "features_a", "features_b", "toc", "points", "normals", "first_toc", "total",
-            "truncated", "hash", "accuracy", "mesh_names", "step", "tested_features",
-        ))  # fmt: skip
+        name = rng.choice(
+            (
+                "kind",
+                "mesh_a",
+                "mesh_b",
+                "features_a",
+                "features_b",
+                "toc",
+                "points",
+                "normals",
+                "first_toc",
+                "total",
+                "truncated",
+                "hash",
+                "accuracy",
+                "mesh_names",
+                "step",
+                "tested_features",
+            )
+        )
         value = getattr(answer, name)
         if name in ("first_toc", "total", "truncated", "hash", "step"):
-            put(name, {"first_toc": rng.choice((math.nan, -1.0, 0.0, math.inf)), "truncated": not value}.get(
-                name, rng.choice((0, 1, 2**63, 2**64 - 1))))  # fmt: skip
+            put(
+                name,
+                {"first_toc": rng.choice((math.nan, -1.0, 0.0, math.inf)), "truncated": not value}.get(
+                    name, rng.choice((0, 1, 2**63, 2**64 - 1))
+                ),
+            )
         elif name == "tested_features":
             put(name, rng.choice((0, 1, 2, 3, 4, 255)))
         elif name == "accuracy":
@@ -191,17 +211,28 @@ def stamps(rng, bag):
 @kind
 def steps_of_frames(rng, bag):
     topic = rng.choice((topic_of(bag, "vertices"), topic_of(bag, "contacts")))
-    decoded(bag, topic, rng, lambda put, m: put("step", rng.choice((0, 2**63 - 1, 2**63, 2**64 - 1))),
-    rng.random() < 0.5)
+    decoded(
+        bag, topic, rng, lambda put, m: put("step", rng.choice((0, 2**63 - 1, 2**63, 2**64 - 1))), rng.random() < 0.5
+    )
 
 
 @kind
 def coordinates(rng, bag):
-    values = rng.choice((
-        (math.nan,), (math.inf,), (1e308, -1e308), (3e38, -3e38), (1e-320,), (0.0,), (1e300, 0.0, 1e-300), (-0.0, 0.0),
-        (1e154,),
-        (1e30, 1.0), (1e19, -1e19, 0.0),
-    ))  # fmt: skip
+    values = rng.choice(
+        (
+            (math.nan,),
+            (math.inf,),
+            (1e308, -1e308),
+            (3e38, -3e38),
+            (1e-320,),
+            (0.0,),
+            (1e300, 0.0, 1e-300),
+            (-0.0, 0.0),
+            (1e154,),
+            (1e30, 1.0),
+            (1e19, -1e19, 0.0),
+        )
+    )
 
     def change(put, message):
         for name in ("vertices_f32", "vertices_f64"):
@@ -274,19 +305,28 @@ def cloud(rng, bag):
         return coordinates(rng, bag)
 
     def change(put, message):
-        name = rng.choice(("height", "width", "point_step", "row_step", "is_bigendian", "data", "fields", "fields",
-        "fields"))
+        name = rng.choice(
+            ("height", "width", "point_step", "row_step", "is_bigendian", "data", "fields", "fields", "fields")
+        )
         if name == "is_bigendian":
             put(name, True)
         elif name == "data":
             put(name, message.data[: rng.randrange(len(message.data))])
         elif name == "fields":
             field = rng.choice(message.fields)
-            object.__setattr__(field, *rng.choice((
-                ("name", rng.choice("xyz")), ("name", ""), ("offset", rng.choice(NUMBERS)),
-                ("offset", rng.randrange(12)),
-                ("datatype", rng.randrange(12)), ("count", rng.choice(NUMBERS)),
-            )))  # fmt: skip
+            object.__setattr__(
+                field,
+                *rng.choice(
+                    (
+                        ("name", rng.choice("xyz")),
+                        ("name", ""),
+                        ("offset", rng.choice(NUMBERS)),
+                        ("offset", rng.randrange(12)),
+                        ("datatype", rng.randrange(12)),
+                        ("count", rng.choice(NUMBERS)),
+                    )
+                ),
+            )
             if rng.random() < 0.3:
                 put("fields", rng.choice(([], message.fields[:2], message.fields * 2, message.fields[::-1])))
         else:
@@ -320,8 +360,14 @@ def times_of_messages(rng, bag):
     how = rng.randrange(7)
     for message in bag.messages if how < 5 else [rng.choice(bag.messages)]:
         message.log_time = (
-            0, 2**64 - 1, rng.choice(LARGE), 2**64 - 1 - message.log_time, rng.randrange(2**64), 0, 2**64 - 1
-        )[how]  # fmt: skip
+            0,
+            2**64 - 1,
+            rng.choice(LARGE),
+            2**64 - 1 - message.log_time,
+            rng.randrange(2**64),
+            0,
+            2**64 - 1,
+        )[how]
         message.publish_time = rng.choice((0, 2**64 - 1, message.publish_time))
 
 
@@ -359,6 +405,7 @@ def messages_of_another_topic(rng, bag):
 def outside_of_chunks(rng, bag):
     bag.chunk_bytes = 0
     bag.summary = rng.random() < 0.7
-    again = KINDS[rng.choice(("payload", "channel_twice", "order_of_messages", "messages_of_another_topic",
-    "times_of_messages"))]
+    again = KINDS[
+        rng.choice(("payload", "channel_twice", "order_of_messages", "messages_of_another_topic", "times_of_messages"))
+    ]
     return again(rng, bag)

@@ -13,14 +13,59 @@ def junk(rng):
     deep = []
     for _ in range(rng.choice((3, 400))):
         deep = [deep] if rng.random() < 0.5 else {"a": deep}
-    return rng.choice((
-        None, True, False, 0, -1, 1, 3, 2**31, 2**63, 2**64, -(2**63) - 1, 10**400, 0.0, -1.5, 0.5, math.nan, math.inf,
-        -math.inf, 1e308, "", "x", "exact", "a" * 100_000, "\0", "\ud800", "../../etc/passwd", "/", "..", "%s%n",
-        "a\nb",
-        "\x1b[31m", "cloth", "tf", "any", [], [[]], [None], [1, 2], ["a", 1], ["cloth", "cloth"], ["cloth"], {},
-        {"a": 1},
-        {"": {}}, deep, [0.0] * 7, [0, 0, 0, 0, 0, 0, 1], [math.nan] * 7, [0.0] * 100_000,
-    ))  # fmt: skip
+    return rng.choice(
+        (
+            None,
+            True,
+            False,
+            0,
+            -1,
+            1,
+            3,
+            2**31,
+            2**63,
+            2**64,
+            -(2**63) - 1,
+            10**400,
+            0.0,
+            -1.5,
+            0.5,
+            math.nan,
+            math.inf,
+            -math.inf,
+            1e308,
+            "",
+            "x",
+            "exact",
+            "a" * 100_000,
+            "\0",
+            "\ud800",
+            "../../etc/passwd",
+            "/",
+            "..",
+            "%s%n",
+            "a\nb",
+            "\x1b[31m",
+            "cloth",
+            "tf",
+            "any",
+            [],
+            [[]],
+            [None],
+            [1, 2],
+            ["a", 1],
+            ["cloth", "cloth"],
+            ["cloth"],
+            {},
+            {"a": 1},
+            {"": {}},
+            deep,
+            [0.0] * 7,
+            [0, 0, 0, 0, 0, 0, 1],
+            [math.nan] * 7,
+            [0.0] * 100_000,
+        )
+    )
 
 
 def rows():
@@ -47,9 +92,24 @@ def parameter_of_another_kind(rng, bag):
 @kind
 def parameter_that_a_replay_uses(rng, bag):
     info = info_of(bag)
-    names = ["meshes", "ignored_pairs", "pair_accuracy", "pair_features", "accuracy", "features", "report", "frame_id",
-             "frame_queue", "stamp_match", "pending_frames", "stamp_tolerance", "restart_after", "max_vertices",
-             "max_faces", "max_edges"]  # fmt: skip
+    names = [
+        "meshes",
+        "ignored_pairs",
+        "pair_accuracy",
+        "pair_features",
+        "accuracy",
+        "features",
+        "report",
+        "frame_id",
+        "frame_queue",
+        "stamp_match",
+        "pending_frames",
+        "stamp_tolerance",
+        "restart_after",
+        "max_vertices",
+        "max_faces",
+        "max_edges",
+    ]
     names += [f"mesh.{mesh}.{row.name}" for mesh in info["parameters"]["meshes"] for row in rows()[1]]
     info["parameters"][rng.choice(names)] = junk(rng)
     set_info(bag, info)
@@ -66,10 +126,9 @@ def parameter_lost(rng, bag):
 @kind
 def parameter_unknown(rng, bag):
     info = info_of(bag)
-    info["parameters"][rng.choice(("", ".", "mesh..", "mesh.cloth", "mesh.nobody.file", "qos_overrides./x",
-    "a" * 9999))] = (
-        junk(rng)
-    )
+    info["parameters"][
+        rng.choice(("", ".", "mesh..", "mesh.cloth", "mesh.nobody.file", "qos_overrides./x", "a" * 9999))
+    ] = junk(rng)
     set_info(bag, info)
 
 
@@ -86,12 +145,23 @@ def setup_of_another_kind(rng, bag):
 @kind
 def setup_is_no_json(rng, bag):
     text = bag.metadata[0].metadata["json"]
-    bag.metadata[0].metadata["json"] = rng.choice((
-        "", "{", text[: rng.randrange(len(text))], text + text, "[" * 100_000, '{"a":' * 50_000, "nan", "1e999",
-        "9" * 5000,
-        "\0", "".join(map(chr, rng.choices(range(0xD000), k=200))), text.replace(":", ";", 1),
-        '{"parameters": {"meshes": ["a"',
-    ))  # fmt: skip
+    bag.metadata[0].metadata["json"] = rng.choice(
+        (
+            "",
+            "{",
+            text[: rng.randrange(len(text))],
+            text + text,
+            "[" * 100_000,
+            '{"a":' * 50_000,
+            "nan",
+            "1e999",
+            "9" * 5000,
+            "\0",
+            "".join(map(chr, rng.choices(range(0xD000), k=200))),
+            text.replace(":", ";", 1),
+            '{"parameters": {"meshes": ["a"',
+        )
+    )
 
 
 @kind
@@ -113,12 +183,28 @@ def setup_record_changed(rng, bag):
 @kind
 def mesh_names(rng, bag):
     info = info_of(bag)
-    info["parameters"]["meshes"] = rng.choice((
-        [], [""], ["cloth"], ["cloth", "cloth"], ["cloth/../ball"], [" "], ["cloth", ""], ["1"], ["a" * 10_000],
-        ["clo\0th"],
-        [f"m{k}" for k in range(3000)], [*info["parameters"]["meshes"], "other"], info["parameters"]["meshes"][::-1],
-        ["CLOTH"], ["cloth:ball"], "cloth", {"cloth": 1}, [["cloth"]],
-    ))  # fmt: skip
+    info["parameters"]["meshes"] = rng.choice(
+        (
+            [],
+            [""],
+            ["cloth"],
+            ["cloth", "cloth"],
+            ["cloth/../ball"],
+            [" "],
+            ["cloth", ""],
+            ["1"],
+            ["a" * 10_000],
+            ["clo\0th"],
+            [f"m{k}" for k in range(3000)],
+            [*info["parameters"]["meshes"], "other"],
+            info["parameters"]["meshes"][::-1],
+            ["CLOTH"],
+            ["cloth:ball"],
+            "cloth",
+            {"cloth": 1},
+            [["cloth"]],
+        )
+    )
     set_info(bag, info)
 
 
@@ -126,11 +212,24 @@ def mesh_names(rng, bag):
 def pairs(rng, bag):
     info = info_of(bag)
     one, *_, two = info["parameters"]["meshes"]
-    info["parameters"][rng.choice(("ignored_pairs", "pair_accuracy", "pair_features"))] = [rng.choice((
-        f"{one}:{two}", f"{one}:{one}", f"{one}:{two}:fast", f"{one}:{two}:wrong", f"{one}:x", ":", "::", one,
-        f"{one}:{one}:exact", f"{one}:{two}:vertex_face",
-        f"{two}:{one}:balanced",
-    )) for _ in range(rng.choice((1, 2)))]  # fmt: skip
+    info["parameters"][rng.choice(("ignored_pairs", "pair_accuracy", "pair_features"))] = [
+        rng.choice(
+            (
+                f"{one}:{two}",
+                f"{one}:{one}",
+                f"{one}:{two}:fast",
+                f"{one}:{two}:wrong",
+                f"{one}:x",
+                ":",
+                "::",
+                one,
+                f"{one}:{one}:exact",
+                f"{one}:{two}:vertex_face",
+                f"{two}:{one}:balanced",
+            )
+        )
+        for _ in range(rng.choice((1, 2)))
+    ]
     set_info(bag, info)
 
 
@@ -151,11 +250,19 @@ def another_pose(rng, bag):
     info = info_of(bag)
     mesh = rng.choice(info["parameters"]["meshes"])
     info["parameters"][f"mesh.{mesh}.transform"] = "pose"
-    info["parameters"][f"mesh.{mesh}.pose"] = rng.choice((
-        [], [0.0] * 7, [0.0] * 6 + [1.0], [1e308] * 3 + [0.0, 0.0, 0.0, 1.0], [math.inf] * 7, [0.0] * 8,
-        [0, 0, 0, 0, 0, 0, 1],
-        ["0"] * 7, [1e-320] * 3 + [0.0, 0.0, 0.0, 1.0],
-    ))  # fmt: skip
+    info["parameters"][f"mesh.{mesh}.pose"] = rng.choice(
+        (
+            [],
+            [0.0] * 7,
+            [0.0] * 6 + [1.0],
+            [1e308] * 3 + [0.0, 0.0, 0.0, 1.0],
+            [math.inf] * 7,
+            [0.0] * 8,
+            [0, 0, 0, 0, 0, 0, 1],
+            ["0"] * 7,
+            [1e-320] * 3 + [0.0, 0.0, 0.0, 1.0],
+        )
+    )
     set_info(bag, info)
 
 
@@ -163,14 +270,20 @@ def another_pose(rng, bag):
 def another_question(rng, bag):
     """Options that the contacts depend on, or how they are compared."""
     info = info_of(bag)
-    name, values = rng.choice((
-        ("report", ("any", "first", "all")), ("accuracy", ("fast", "balanced", "conservative")),
-        ("features", ([], ["vertex_face"], ["edge_edge"], ["edges"])),
-        ("max_vertices", (1, 10)),
-        ("max_faces", (1, 10)), ("stamp_match", ("nearest",)), ("frame_id", ("elsewhere",)),
-        ("pending_frames", (1, 10_000)),
-        ("frame_queue", (100_000,)), ("restart_after", (0, 1)),
-    ))  # fmt: skip
+    name, values = rng.choice(
+        (
+            ("report", ("any", "first", "all")),
+            ("accuracy", ("fast", "balanced", "conservative")),
+            ("features", ([], ["vertex_face"], ["edge_edge"], ["edges"])),
+            ("max_vertices", (1, 10)),
+            ("max_faces", (1, 10)),
+            ("stamp_match", ("nearest",)),
+            ("frame_id", ("elsewhere",)),
+            ("pending_frames", (1, 10_000)),
+            ("frame_queue", (100_000,)),
+            ("restart_after", (0, 1)),
+        )
+    )
     info["parameters"][name] = rng.choice(values)
     set_info(bag, info)
     if name == "report" and rng.random() < 0.5:
@@ -182,13 +295,27 @@ def role_junk(rng, bag):
     info = info_of(bag)
     topic = rng.choice(sorted(info["topics"]))
     mesh = info["parameters"]["meshes"][0]
-    info["topics"][topic] = rng.choice((
-        "", "/", "meshes", "meshes/", "meshes//vertices", f"meshes/{mesh}", f"meshes/{mesh}/",
-        f"meshes/{mesh}/contacts",
-        f"meshes/{mesh}/vertices/vertices", "meshes/nobody/vertices", "contacts", "/contacts", "transforms", "/tf",
-        "a" * 9999,
-        "meshes/cloth/../ball/vertices", junk(rng),
-    ))  # fmt: skip
+    info["topics"][topic] = rng.choice(
+        (
+            "",
+            "/",
+            "meshes",
+            "meshes/",
+            "meshes//vertices",
+            f"meshes/{mesh}",
+            f"meshes/{mesh}/",
+            f"meshes/{mesh}/contacts",
+            f"meshes/{mesh}/vertices/vertices",
+            "meshes/nobody/vertices",
+            "contacts",
+            "/contacts",
+            "transforms",
+            "/tf",
+            "a" * 9999,
+            "meshes/cloth/../ball/vertices",
+            junk(rng),
+        )
+    )
     set_info(bag, info)
 
 
@@ -210,5 +337,6 @@ def roles_lost(rng, bag):
         del info["topics"][topic]
         if rng.random() < 0.5:
             info["topics"][rng.choice(("", "/nowhere", "/contacts", topic + "/x", " "))] = rng.choice(
-                ("contacts", "meshes/cloth/vertices", "transforms", "meshes/net/points"))
+                ("contacts", "meshes/cloth/vertices", "transforms", "meshes/net/points")
+            )
     set_info(bag, info)

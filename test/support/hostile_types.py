@@ -6,16 +6,39 @@ import dataclasses
 from hostile_kinds import info_of, kind, set_info
 
 TYPE_NAMES = (
-    "", "/", "//", "a", "a/b", "a/b/c/d", "hpccd/msg/", "hpccd//ContactArray", "hpccd/srv/Detect", "/msg/X",
+    "",
+    "/",
+    "//",
+    "a",
+    "a/b",
+    "a/b/c/d",
+    "hpccd/msg/",
+    "hpccd//ContactArray",
+    "hpccd/srv/Detect",
+    "/msg/X",
     "../../etc/passwd",
-    "os/path/join", "os.path/msg/join", ".hpccd/msg/X", "hpccd/msg/contactArray", "hpccd/msg/ContactArray ",
+    "os/path/join",
+    "os.path/msg/join",
+    ".hpccd/msg/X",
+    "hpccd/msg/contactArray",
+    "hpccd/msg/ContactArray ",
     "hpccd/msg/__class__",
-    "std_msgs/msg/String", "std_msgs/msg/Header", "hpccd/msg/MeshVertices", "hpccd/msg/ContactArray",
+    "std_msgs/msg/String",
+    "std_msgs/msg/Header",
+    "hpccd/msg/MeshVertices",
+    "hpccd/msg/ContactArray",
     "hpccd/msg/MeshTopology",
-    "sensor_msgs/msg/PointCloud2", "nowhere_msgs/msg/Nothing", "\0/\0/\0", "a\nb/msg/C", "hpccd/msg/" + "A" * 10_000,
+    "sensor_msgs/msg/PointCloud2",
+    "nowhere_msgs/msg/Nothing",
+    "\0/\0/\0",
+    "a\nb/msg/C",
+    "hpccd/msg/" + "A" * 10_000,
     "hpccd/ContactArray",
-    "ü/msg/Ö", "hpccd/msg/../msg/ContactArray", "hpccd::msg::ContactArray", "importlib/import_module/x",
-)  # fmt: skip
+    "ü/msg/Ö",
+    "hpccd/msg/../msg/ContactArray",
+    "hpccd::msg::ContactArray",
+    "importlib/import_module/x",
+)
 
 
 @kind
@@ -35,15 +58,25 @@ def type_of_another_topic(rng, bag):
 def type_text(rng, bag):
     schema = rng.choice(bag.schemas)
     text = schema.data
-    schema.data = rng.choice((
-        b"", rng.randbytes(100), b"hpccd/ContactArray me\n", b"string<=4294967295 x\nfloat64[4294967295] y\n",
-        b"nonsense[[[ x\n",
-        text * 50, text[:100], b"=" * 100_000, b"int32 x\n" * 100_000, b"\xff\xfe",
-    ))  # fmt: skip
+    schema.data = rng.choice(
+        (
+            b"",
+            rng.randbytes(100),
+            b"hpccd/ContactArray me\n",
+            b"string<=4294967295 x\nfloat64[4294967295] y\n",
+            b"nonsense[[[ x\n",
+            text * 50,
+            text[:100],
+            b"=" * 100_000,
+            b"int32 x\n" * 100_000,
+            b"\xff\xfe",
+        )
+    )
     schema.encoding = rng.choice(("ros2msg", "ros2msg", "ros2idl", "", "protobuf"))
     for channel in bag.channels:
-        channel.metadata["topic_type_hash"] = rng.choice(("", "RIHS01_", "x" * 100,
-        channel.metadata["topic_type_hash"]))
+        channel.metadata["topic_type_hash"] = rng.choice(
+            ("", "RIHS01_", "x" * 100, channel.metadata["topic_type_hash"])
+        )
 
 
 @kind
@@ -63,11 +96,26 @@ def schema_of_no_topic(rng, bag):
 def topic_name(rng, bag):
     channel = rng.choice(bag.channels)
     old = channel.topic
-    channel.topic = rng.choice((
-        "", "/", "contacts", "/a b", "//", "/x\0y", "/\x1b[31m", "/\n", "/ü", "/" + "a" * 70_000, old + "/",
-        rng.choice(bag.channels).topic,
-        "/a/contacts", "/meshes/cloth/vertices", "~/x", "/{a}",
-    ))  # fmt: skip
+    channel.topic = rng.choice(
+        (
+            "",
+            "/",
+            "contacts",
+            "/a b",
+            "//",
+            "/x\0y",
+            "/\x1b[31m",
+            "/\n",
+            "/ü",
+            "/" + "a" * 70_000,
+            old + "/",
+            rng.choice(bag.channels).topic,
+            "/a/contacts",
+            "/meshes/cloth/vertices",
+            "~/x",
+            "/{a}",
+        )
+    )
     if rng.random() < 0.3:
         info = info_of(bag)
         info["topics"][channel.topic] = info["topics"].pop(old)
@@ -101,13 +149,29 @@ def encoding_of_messages(rng, bag):
 @kind
 def metadata_of_a_topic(rng, bag):
     channel = rng.choice(bag.channels)
-    channel.metadata[rng.choice(("offered_qos_profiles", "offered_qos_profiles", "topic_type_hash"))] = rng.choice((
-        "", "x", "[", "- 1", "- {}", "{a: 1}", "- {reliability: 1, durability: 1}",
-        "- {reliability: [], durability: {}}", "&a [*a]",
-        "!!python/object/apply:os.system ['true']", "- reliability: reliable", "\0", "[" * 10_000, "1", "2020-13-45",
-        "- null", "RIHS01_" + "0" * 64,
-        "- {reliability: best_effort, durability: transient_local}", "a: &a [x,x]\nb: &b [*a,*a]\n",
-    ))  # fmt: skip
+    channel.metadata[rng.choice(("offered_qos_profiles", "offered_qos_profiles", "topic_type_hash"))] = rng.choice(
+        (
+            "",
+            "x",
+            "[",
+            "- 1",
+            "- {}",
+            "{a: 1}",
+            "- {reliability: 1, durability: 1}",
+            "- {reliability: [], durability: {}}",
+            "&a [*a]",
+            "!!python/object/apply:os.system ['true']",
+            "- reliability: reliable",
+            "\0",
+            "[" * 10_000,
+            "1",
+            "2020-13-45",
+            "- null",
+            "RIHS01_" + "0" * 64,
+            "- {reliability: best_effort, durability: transient_local}",
+            "a: &a [x,x]\nb: &b [*a,*a]\n",
+        )
+    )
 
 
 @kind

@@ -38,18 +38,39 @@ class Live:
     def recorder(self, path, *options: str):
         name = f"recorder-{Path(path).name}"
         child = self._children.start(
-            name, "hpccd_ros.cli", "record", "-o", str(path), "--node", f"{self._namespace}/hpccd", "--wait", WAIT,
-            "--depth", "1000", *options,
-        )  # fmt: skip
+            name,
+            "hpccd_ros.cli",
+            "record",
+            "-o",
+            str(path),
+            "--node",
+            f"{self._namespace}/hpccd",
+            "--wait",
+            WAIT,
+            "--depth",
+            "1000",
+            *options,
+        )
         self._children.wait(lambda: child.said("recording "), "the recorder did not hear the node", PATIENCE)
         return child
 
     def publisher(self, *options: str, subscribers: int = 2):
         """Start publishing the scene; --loop and the like as options."""
         return self._children.start(
-            "publisher", "hpccd_ros.cli", "scene", *self._scene, "--publish", "--rate", "40", "--subscribers",
-            str(subscribers), "--wait", WAIT, *options, *self._remap,
-        )  # fmt: skip
+            "publisher",
+            "hpccd_ros.cli",
+            "scene",
+            *self._scene,
+            "--publish",
+            "--rate",
+            "40",
+            "--subscribers",
+            str(subscribers),
+            "--wait",
+            WAIT,
+            *options,
+            *self._remap,
+        )
 
     def wait_for_answers(self, path, count: int):
         """Wait until so many contact messages are flushed to the recording `path`, a file or a folder of files.

@@ -156,25 +156,46 @@ class Bag:
         times = [message.log_time for message in self.messages] or [0]
         chunks = [place for place in places if isinstance(place[0], Chunk)]
         statistics = Statistics(
-            attachment_count=len(self.attachments), channel_count=len(self.channels),
-            channel_message_counts=dict(counts), chunk_count=len(chunks), message_count=len(self.messages),
-            message_start_time=min(times), message_end_time=max(times), metadata_count=len(self.metadata),
+            attachment_count=len(self.attachments),
+            channel_count=len(self.channels),
+            channel_message_counts=dict(counts),
+            chunk_count=len(chunks),
+            message_count=len(self.messages),
+            message_start_time=min(times),
+            message_end_time=max(times),
+            metadata_count=len(self.metadata),
             schema_count=len(self.schemas),
-        )  # fmt: skip
+        )
         records = [*self.schemas, *self.channels, statistics]
         for record, at, length in places:
             if isinstance(record, Chunk):
-                records.append(ChunkIndex(
-                    chunk_start_offset=at, chunk_length=length, message_start_time=record.message_start_time,
-                    message_end_time=record.message_end_time, message_index_offsets={}, message_index_length=0,
-                    compression=record.compression, compressed_size=len(record.data),
-                    uncompressed_size=record.uncompressed_size,
-                ))  # fmt: skip
+                records.append(
+                    ChunkIndex(
+                        chunk_start_offset=at,
+                        chunk_length=length,
+                        message_start_time=record.message_start_time,
+                        message_end_time=record.message_end_time,
+                        message_index_offsets={},
+                        message_index_length=0,
+                        compression=record.compression,
+                        compressed_size=len(record.data),
+                        uncompressed_size=record.uncompressed_size,
+                    )
+                )
             elif isinstance(record, Metadata):
                 records.append(MetadataIndex(at, length, record.name))
             elif isinstance(record, Attachment):
-                records.append(AttachmentIndex(at, length, record.log_time, record.create_time, len(record.data),
-                                               record.name, record.media_type))
+                records.append(
+                    AttachmentIndex(
+                        at,
+                        length,
+                        record.log_time,
+                        record.create_time,
+                        len(record.data),
+                        record.name,
+                        record.media_type,
+                    )
+                )
         return records
 
 

@@ -154,9 +154,7 @@ class Peer:
     def publisher(self, kind: type, topic: str, profile: QoSProfile | None = None) -> Any:
         """A publisher that the node, and who else is to hear it (``readers`` in all), are known to listen to."""
         if topic not in self._publishers:
-            self._publishers[topic] = self.node.create_publisher(
-                kind, topic, profile or qos.vertices("reliable", 100)
-            )
+            self._publishers[topic] = self.node.create_publisher(kind, topic, profile or qos.vertices("reliable", 100))
             self.await_readers(topic)
         return self._publishers[topic]
 

@@ -104,8 +104,14 @@ class Oracle:
         else:
             places = {field.name: field.offset for field in reversed(message.fields)}
             types = {field.name: {7: "<f4", 8: "<f8"}[field.datatype] for field in reversed(message.fields)}
-            point = np.dtype({"names": list("xyz"), "formats": [types[n] for n in "xyz"],
-                              "offsets": [places[n] for n in "xyz"], "itemsize": message.point_step})  # fmt: skip
+            point = np.dtype(
+                {
+                    "names": list("xyz"),
+                    "formats": [types[n] for n in "xyz"],
+                    "offsets": [places[n] for n in "xyz"],
+                    "itemsize": message.point_step,
+                }
+            )
             rows = np.frombuffer(message.data.tobytes(), point, message.width * message.height)
             flat = np.stack([rows[name] for name in "xyz"], axis=1)
         xyz = np.asarray(flat).reshape(-1, 3)
@@ -138,8 +144,13 @@ class Oracle:
             return "no such accuracy"
         scene = hc.Scene()
         for mesh, (faces, n_vertices, _) in zip(self.meshes, last, strict=True):
-            scene.add_mesh(mesh, faces, n_vertices=n_vertices, static=self._of(mesh, "static", False),
-                           self_collision=self._of(mesh, "self_collision", True))  # fmt: skip
+            scene.add_mesh(
+                mesh,
+                faces,
+                n_vertices=n_vertices,
+                static=self._of(mesh, "static", False),
+                self_collision=self._of(mesh, "self_collision", True),
+            )
         for pair in self.given.get("ignored_pairs") or []:
             scene.ignore_pair(*pair.split(":"))
         for entry in self.given.get("pair_accuracy") or []:
@@ -156,9 +167,14 @@ class Oracle:
         if len({len(part) for part in separated}) > 1:
             return "no such separation"
         try:
-            detector = hc.Detector(scene, accuracy=answer.accuracy, backend="cpu",
-            report="all" if report == "any" else report, minimum_separation=answer.minimum_separation,
-            features={1: "vertex_face", 2: "edge_edge"}.get(answer.tested_features, ("vertex_face", "edge_edge")))
+            detector = hc.Detector(
+                scene,
+                accuracy=answer.accuracy,
+                backend="cpu",
+                report="all" if report == "any" else report,
+                minimum_separation=answer.minimum_separation,
+                features={1: "vertex_face", 2: "edge_edge"}.get(answer.tested_features, ("vertex_face", "edge_edge")),
+            )
             for a, b, distance in zip(*separated, strict=True):
                 detector.set_separation(a, b, distance)
         except ValueError:
@@ -197,8 +213,9 @@ class Oracle:
         for (v, f), toc in zip(found.vf.tolist(), found.vf_toc.tolist(), strict=True):
             rows.append((0, vertex[v][0], face[f][0], (vertex[v][1], none), (face[f][1], none), toc))
         for (a, b, c, d), toc in zip(found.ee.tolist(), found.ee_toc.tolist(), strict=True):
-            rows.append((1, vertex[a][0], vertex[c][0], (vertex[a][1], vertex[b][1]), (vertex[c][1], vertex[d][1]),
-            toc))
+            rows.append(
+                (1, vertex[a][0], vertex[c][0], (vertex[a][1], vertex[b][1]), (vertex[c][1], vertex[d][1]), toc)
+            )
         return rows
 
 

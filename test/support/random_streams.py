@@ -30,14 +30,24 @@ MOST_BURST = 30  # messages of a topic that the recording holds at once are boun
 def parameters(rng: random.Random, scene, record) -> dict:
     meshes = {"tool": {"input": "pose"}, "table": {"static": True}}
     found = {
-        "meshes": [name for name in scene if name != "crane"], "mesh": {k: v for k, v in meshes.items() if k in scene},
-        "frame_id": "world", "minimum_separation": 0.05, "rigid_tolerance": 0.02, "frame_queue": 1000,
-        "input_depth": 200, "restart_after": rng.choice((1, 2, 5)), "distances": rng.random() < 0.5,
-        "record": str(record), "record_compression": rng.choice(("none", "zstd")), "max_contacts": 50,
-    }  # fmt: skip
+        "meshes": [name for name in scene if name != "crane"],
+        "mesh": {k: v for k, v in meshes.items() if k in scene},
+        "frame_id": "world",
+        "minimum_separation": 0.05,
+        "rigid_tolerance": 0.02,
+        "frame_queue": 1000,
+        "input_depth": 200,
+        "restart_after": rng.choice((1, 2, 5)),
+        "distances": rng.random() < 0.5,
+        "record": str(record),
+        "record_compression": rng.choice(("none", "zstd")),
+        "max_contacts": 50,
+    }
     if "crane" in scene:
-        found |= {"robots": ["crane"], "robot": {"crane": {
-            "description": "robot_description", "joint_states": "joint_states"}}}  # fmt: skip
+        found |= {
+            "robots": ["crane"],
+            "robot": {"crane": {"description": "robot_description", "joint_states": "joint_states"}},
+        }
     return found
 
 
@@ -64,9 +74,14 @@ class RandomStream:
             if tick % MOST_BURST == MOST_BURST - 1:
                 self._spin(0.3)
             if self._rng.random() < 0.02:
-                name, values = self._rng.choice((("restart_after", (1, 3, 5)), ("report", ("all", "first", "any")),
-                                                 ("minimum_separation", (0.02, 0.05)),
-                                                 ("accuracy", ("exact", "balanced"))))  # fmt: skip
+                name, values = self._rng.choice(
+                    (
+                        ("restart_after", (1, 3, 5)),
+                        ("report", ("all", "first", "any")),
+                        ("minimum_separation", (0.02, 0.05)),
+                        ("accuracy", ("exact", "balanced")),
+                    )
+                )
                 assert set_parameter(self._node, name, self._rng.choice(values)).successful
         answers = -1
         while answers != len(self._peer.received):  # those that wait for detection belong to this recording
@@ -170,8 +185,11 @@ def verified(path) -> int:
     with Recording(path) as recording:
         replay = Replay(recording, recorded_setup.of_recording(recording))
         steps = list(replay.steps())
-    bad = [f"{step.step}: {step.difference or step.missing}" for step in steps
-           if step.difference or (step.missing and not step.before_recording)]  # fmt: skip
+    bad = [
+        f"{step.step}: {step.difference or step.missing}"
+        for step in steps
+        if step.difference or (step.missing and not step.before_recording)
+    ]
     assert not bad and not replay.diverged and not replay.unverified, f"{path}: {len(bad)} of {len(steps)}: {bad[:3]}"
     told = replay.distances
     assert not told.diverged and not told.unverified, f"{path}: {told.first}"

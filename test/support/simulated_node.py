@@ -38,13 +38,20 @@ class Recorded:
     sent: int
 
 
-def run(path: Path, parameters: dict, heard: list[tuple[str, Any]], taken: list[int | str | tuple[str, int]],
-        early: bool = False) -> list[Recorded]:  # fmt: skip
+def run(
+    path: Path,
+    parameters: dict,
+    heard: list[tuple[str, Any]],
+    taken: list[int | str | tuple[str, int]],
+    early: bool = False,
+) -> list[Recorded]:
     """The content of a recording of the node. heard: topic and message, in the order of the recorder. taken: indices
     into ``heard`` in the order of the node, or events. early: the recorder receives answers before their last
     inputs."""
-    found = [Recorded(topic, message, BEGAN + BETWEEN * k + 7, BEGAN + BETWEEN * k) for k, (topic, message)
-             in enumerate(heard)]  # fmt: skip
+    found = [
+        Recorded(topic, message, BEGAN + BETWEEN * k + 7, BEGAN + BETWEEN * k)
+        for k, (topic, message) in enumerate(heard)
+    ]
     write(path, parameters, found)
     with Recording(path) as recording:
         setup = recorded_setup.of_recording(recording)
@@ -99,10 +106,16 @@ def _answers(found: Detection, inputs: TakenInputs, at: int, sent: int) -> list[
 def write(path: Path, parameters: dict, messages: list[Recorded]) -> Path:
     """As a recording of the node with these parameters."""
     path.unlink(missing_ok=True)
-    kinds = {one.topic: f"{type(one.message).__module__.split('.')[0]}/msg/{type(one.message).__name__}"
-             for one in messages}  # fmt: skip
-    info = {"format": 1, "hpccd": "0", "node": "/hpccd", "parameters": parameters,
-            "topics": {f"/{topic}": topic for topic in kinds}}  # fmt: skip
+    kinds = {
+        one.topic: f"{type(one.message).__module__.split('.')[0]}/msg/{type(one.message).__name__}" for one in messages
+    }
+    info = {
+        "format": 1,
+        "hpccd": "0",
+        "node": "/hpccd",
+        "parameters": parameters,
+        "topics": {f"/{topic}": topic for topic in kinds},
+    }
     bag = BagWriter(path, info=info)
     for topic, kind in kinds.items():
         bag.add_topic(Topic(f"/{topic}", kind, []))

@@ -189,9 +189,11 @@ class World:
         number = self.numbers[topic] = self.numbers.get(topic, 0) + 1
         sent = self.system() + round(1e9 * self.ahead.get(mesh, 0.0))
         info = {
-            "source_timestamp": sent, "received_timestamp": self.system(), "publication_sequence_number": number,
+            "source_timestamp": sent,
+            "received_timestamp": self.system(),
+            "publication_sequence_number": number,
             "reception_sequence_number": None,
-        }  # fmt: skip
+        }
         queue = self.inbox.setdefault(topic, deque(maxlen=DEPTHS.get(topic, 10)))
         queue.append((self.callback(topic), message, info, (mesh, what, self.now, stamp, height, new_version)))
 
@@ -308,12 +310,14 @@ class World:
         self.alive = dict.fromkeys(self.alive, True)
 
     def refuse(self):
-        self.rng.choice([
-            lambda: self.table(bad=True),
-            lambda: self.place(self.any(MOVING), bad=True),
-            lambda: self.shape(self.any(SHAPED), bad=True),
-            lambda: self.topology(self.any(self.versions), bad=True),
-        ])()  # fmt: skip
+        self.rng.choice(
+            [
+                lambda: self.table(bad=True),
+                lambda: self.place(self.any(MOVING), bad=True),
+                lambda: self.shape(self.any(SHAPED), bad=True),
+                lambda: self.topology(self.any(self.versions), bad=True),
+            ]
+        )()
 
     def mend(self):
         """All inputs are sent again, and are valid."""
@@ -392,10 +396,26 @@ class World:
         return self.rng.choice(list(names))
 
     EVENTS = {
-        "tick": 30, "pass_silently": 1, "hold": 1, "keep_busy": 1, "hold_listener": 1, "late_listener": 0.5,
-        "die": 0.7, "revive": 4, "refuse": 1.5, "refine": 0.5, "mend": 6, "move_table": 1, "restart": 0.5,
-        "jump": 0.4, "differ": 0.4, "describe": 0.4, "remake": 0.3, "switch": 0.4, "fail": 0.5,
-    }  # fmt: skip
+        "tick": 30,
+        "pass_silently": 1,
+        "hold": 1,
+        "keep_busy": 1,
+        "hold_listener": 1,
+        "late_listener": 0.5,
+        "die": 0.7,
+        "revive": 4,
+        "refuse": 1.5,
+        "refine": 0.5,
+        "mend": 6,
+        "move_table": 1,
+        "restart": 0.5,
+        "jump": 0.4,
+        "differ": 0.4,
+        "describe": 0.4,
+        "remake": 0.3,
+        "switch": 0.4,
+        "fail": 0.5,
+    }
 
     def step(self):
         """One event, then time passes."""

@@ -45,26 +45,43 @@ PARTS = ("scenes", "sweeps", "distance")
 
 # Stats of the core by who decided, in the order in which a pair meets them.
 DECIDED = {
-    "slabs": "rejected_slabs", "coplanarity": "rejected_coplanarity", "projection": "rejected_projection",
-    "roots": "rejected_roots", "proven": "proven_contacts", "tolerance": "by_tolerance", "integers": "by_integers",
-}  # fmt: skip
+    "slabs": "rejected_slabs",
+    "coplanarity": "rejected_coplanarity",
+    "projection": "rejected_projection",
+    "roots": "rejected_roots",
+    "proven": "proven_contacts",
+    "tolerance": "by_tolerance",
+    "integers": "by_integers",
+}
 
 
 def configure(parser):
     command.configure(parser, default=("data", "cloth-drop", "n-body-like-lr"), steps=2)
-    parser.add_argument("--parts", metavar="NAME,...",
-                        help=f"of {', '.join(PARTS)} (default: all; with --choose: scenes)")
-    parser.add_argument("--choose", metavar="BOUNDS",
-                        help=f"name the cheapest setting that keeps these bounds: {choice.EXAMPLE}")
+    parser.add_argument(
+        "--parts", metavar="NAME,...", help=f"of {', '.join(PARTS)} (default: all; with --choose: scenes)"
+    )
+    parser.add_argument(
+        "--choose", metavar="BOUNDS", help=f"name the cheapest setting that keeps these bounds: {choice.EXAMPLE}"
+    )
     parser.add_argument("--tiers", default=",".join(ACCURACIES), metavar="NAME,...", help="default: %(default)s")
-    parser.add_argument("--backend", metavar="NAME,...",
-                        help="of cpu, hybrid, gpu (default: cpu; with --choose: those that work here)")
+    parser.add_argument(
+        "--backend", metavar="NAME,...", help="of cpu, hybrid, gpu (default: cpu; with --choose: those that work here)"
+    )
     what = tuple(asked.name for asked in settings.ASKED)
-    parser.add_argument("--ask", default=settings.ALL, metavar="NAME,...",
-                        help=f"for which contacts scenes are asked: {', '.join(what)} (default: %(default)s)")
+    parser.add_argument(
+        "--ask",
+        default=settings.ALL,
+        metavar="NAME,...",
+        help=f"for which contacts scenes are asked: {', '.join(what)} (default: %(default)s)",
+    )
     parser.add_argument("--simd", default="auto", metavar="NAME,...", help=f"of {', '.join(SIMD)}")
-    parser.add_argument("--sweep-queries", type=int, default=2000, metavar="N",
-                        help="queries of each kind at each point of the sweeps; 0: none (default: %(default)s)")
+    parser.add_argument(
+        "--sweep-queries",
+        type=int,
+        default=2000,
+        metavar="N",
+        help="queries of each kind at each point of the sweeps; 0: none (default: %(default)s)",
+    )
     parser.add_argument("--seed", type=int, default=1, metavar="N", help="of the sweeps (default: %(default)s)")
     command.threads_option(parser)
 
@@ -108,8 +125,10 @@ def _options(tiers, backends, sets, args) -> dict[tuple[str, str, str], dict]:
     """Of the detectors that are compared, by backend, instruction set and tier."""
     return {
         (backend, simd, tier): {"backend": backend, "accuracy": tier, "threads": args.threads, "simd": simd}
-        for backend in backends for simd in (sets if backend == "cpu" else ["auto"]) for tier in tiers
-    }  # fmt: skip
+        for backend in backends
+        for simd in (sets if backend == "cpu" else ["auto"])
+        for tier in tiers
+    }
 
 
 def _measure_distance(report, tiers, backends, sets, args):
@@ -131,8 +150,9 @@ def _measure_distance(report, tiers, backends, sets, args):
 def _measure_scene(report, source, asked, compared, args):
     variants = {
         (*key, what): Variant(" ".join((*key, what.name)), {**options, **what.options})
-        for what in asked for key, options in compared.items()
-    }  # fmt: skip
+        for what in asked
+        for key, options in compared.items()
+    }
     series = measure.measure(source, [measure.CoreRunner(v) for v in variants.values()], args.repeat, args.steps)
     known = {step: _truth(source.step(step)) for step in next(iter(series.values())).by_step}
     errors_of = _errors(source, variants, known)
@@ -162,9 +182,10 @@ def _measure_scene(report, source, asked, compared, args):
             step_ms=one.sequence_ms() / len(one.by_step),
             over_balanced=one.sequence_ms() / balanced.sequence_ms() if balanced else None,
             candidates=one.candidates(),
-            decided={name: sum(stats.get(f"{kind}_{key}", 0) for kind in ("vf", "ee"))
-                     for name, key in DECIDED.items()},
-        )  # fmt: skip
+            decided={
+                name: sum(stats.get(f"{kind}_{key}", 0) for kind in ("vf", "ee")) for name, key in DECIDED.items()
+            },
+        )
 
 
 def _truth(step):
@@ -207,23 +228,56 @@ def _check(report):
 def _print_scenes(rows):
     table.show(
         "tiers on whole scenes",
-        ["scene", "backend", "simd", "accuracy", "asked", "ms a step", "/ balanced", "contacts", "missed", "invented",
-         "toc worst", "toc p99"],
         [
-            [r["scene"], r["backend"], r["simd"], r["accuracy"], r["asked"], r["step_ms"], r["over_balanced"],
-             round(r["contacts"]), r["missed"], r["invented"], r["toc_worst"], r["toc_p99"]]
+            "scene",
+            "backend",
+            "simd",
+            "accuracy",
+            "asked",
+            "ms a step",
+            "/ balanced",
+            "contacts",
+            "missed",
+            "invented",
+            "toc worst",
+            "toc p99",
+        ],
+        [
+            [
+                r["scene"],
+                r["backend"],
+                r["simd"],
+                r["accuracy"],
+                r["asked"],
+                r["step_ms"],
+                r["over_balanced"],
+                round(r["contacts"]),
+                r["missed"],
+                r["invented"],
+                r["toc_worst"],
+                r["toc_p99"],
+            ]
             for r in rows
         ],
         "missed, invented, toc: against the truth of the file, or else against the tier exact",
-    )  # fmt: skip
+    )
     table.show(
         "who decided the candidate pairs of an average step",
         ["scene", "backend", "accuracy", "candidates", *DECIDED],
-        [[r["scene"], r["backend"], r["accuracy"], round(r["candidates"]), *(round(n) for n in r["decided"].values())]
-         for r in rows if r["simd"] in ("auto", rows[0]["simd"]) and r["asked"] == rows[0]["asked"]],
+        [
+            [
+                r["scene"],
+                r["backend"],
+                r["accuracy"],
+                round(r["candidates"]),
+                *(round(n) for n in r["decided"].values()),
+            ]
+            for r in rows
+            if r["simd"] in ("auto", rows[0]["simd"]) and r["asked"] == rows[0]["asked"]
+        ],
         "slabs to roots: dropped, proven: contacts, by error bounds (fast: as single precision says); the rest: the "
         "tier's fallback",
-    )  # fmt: skip
+    )
 
 
 def _print_adversarial(rows, tiers):

@@ -20,19 +20,25 @@ def choose(report, bounds: Sequence[Bound]) -> None:
     _show(found, taken, bounds)
     wanted = ", ".join(map(str, bounds))
     if contacts == 0:
-        report.failure(f"--choose: no contact in the steps measured (asked for: {asked}), so nothing tells the "
-                       "settings apart; take --steps 0 for all steps, or record more")  # fmt: skip
+        report.failure(
+            f"--choose: no contact in the steps measured (asked for: {asked}), so nothing tells the "
+            "settings apart; take --steps 0 for all steps, or record more"
+        )
         return
     # A share smaller than one in all true contacts cannot be seen.
     unseen = [str(b) for b in bounds if b.quantity in ("misses", "inventions") and 0 < b.limit < 1 / contacts]
     if unseen:
-        report.note(f"at most {contacts:g} true contacts (asked for: {asked}): whether {', '.join(unseen)} holds shows "
-                    "in more of them only; take --steps 0 for all steps, or record more")  # fmt: skip
+        report.note(
+            f"at most {contacts:g} true contacts (asked for: {asked}): whether {', '.join(unseen)} holds shows "
+            "in more of them only; take --steps 0 for all steps, or record more"
+        )
     if taken is None:
         near = choice.nearest(found, bounds)
         broken = ", ".join(f"{b.quantity} {near.values[b.quantity]:.2g}" for b in near.broken(bounds))
-        report.failure(f"--choose: no setting keeps {wanted}; the nearest is {near.setting} with {broken}: "
-                       f"{near.setting.as_written()}")  # fmt: skip
+        report.failure(
+            f"--choose: no setting keeps {wanted}; the nearest is {near.setting} with {broken}: "
+            f"{near.setting.as_written()}"
+        )
         return
     for row in rows:
         row["chosen"] = Setting(row["accuracy"], row["backend"], row["asked"]) == taken.setting
@@ -58,10 +64,17 @@ def _show(found: Sequence[Outcome], taken: Outcome | None, bounds: Sequence[Boun
         "all settings, the cheapest first",
         ["accuracy", "backend", "asked", "ms a step", *choice.QUANTITIES, "front", "bounds"],
         [
-            [o.setting.accuracy, o.setting.backend, o.setting.asked, o.ms, *o.values.values(),
-             "*" if o in front else "", verdict(o)]
+            [
+                o.setting.accuracy,
+                o.setting.backend,
+                o.setting.asked,
+                o.ms,
+                *o.values.values(),
+                "*" if o in front else "",
+                verdict(o),
+            ]
             for o in sorted(found, key=lambda o: o.ms)
         ],
         "shares, of the worst scene, against the truth of the file or else the tier exact; front: no other setting "
         "that asks for the same is at least as good in everything",
-    )  # fmt: skip
+    )

@@ -21,8 +21,14 @@ from hpccd_ros.bench.steps import Source, Step
 
 QUESTIONS = (SEPARATION, PROXIMITY, INTERSECTIONS)
 # Keys of a file of truth: which queries it answers, and the name of their value.
-KEYS = {"s": ("separation", "toc"), "s2": ("separation", "toc"), "s3": ("separation", "toc"),
-        "p": ("proximity", "distance"), "p2": ("proximity", "distance"), "x": ("intersections", "")}  # fmt: skip
+KEYS = {
+    "s": ("separation", "toc"),
+    "s2": ("separation", "toc"),
+    "s3": ("separation", "toc"),
+    "p": ("proximity", "distance"),
+    "p2": ("proximity", "distance"),
+    "x": ("intersections", ""),
+}
 SINGLE = "queries.npz"
 
 
@@ -46,8 +52,11 @@ def on_scene(source: Source, known: dict, variants: dict[str, dict], rounds: int
     options, timed in turn."""
     step = source.step(0)
     for key, (query, value) in KEYS.items():
-        true = {kind: known[f"{key}_{kind}"] for kind in ("vf", "ee", "ef", f"vf_{value}", f"ee_{value}")
-                if f"{key}_{kind}" in known}  # fmt: skip
+        true = {
+            kind: known[f"{key}_{kind}"]
+            for kind in ("vf", "ee", "ef", f"vf_{value}", f"ee_{value}")
+            if f"{key}_{kind}" in known
+        }
         if not true:
             continue
         question = Question(query, float(known[f"{key}_d"]) if f"{key}_d" in known else None)
@@ -110,17 +119,31 @@ def show(of_scenes: list[dict], of_queries: list[dict], tiers: list[str]) -> Non
             "distance queries on whole scenes",
             ["scene", "query", "d", "backend", "simd", "accuracy", "ms", "true", "missed", "invented", "worst"],
             [
-                [r["scene"], r["query"], "" if r["distance"] is None else f"{r['distance']:g}", r["backend"],
-                 r["simd"], r["accuracy"], r["step_ms"], r["true"], r["missed"], r["invented"], r["value_worst"]]
+                [
+                    r["scene"],
+                    r["query"],
+                    "" if r["distance"] is None else f"{r['distance']:g}",
+                    r["backend"],
+                    r["simd"],
+                    r["accuracy"],
+                    r["step_ms"],
+                    r["true"],
+                    r["missed"],
+                    r["invented"],
+                    r["value_worst"],
+                ]
                 for r in of_scenes
             ],
             "worst: error of toc (the step is 1) or of the distance (the largest coordinate is 1)",
-        )  # fmt: skip
+        )
     lines = {}
     for row in of_queries:
         heads = [row[key] for key in ("query", "generator", "n", "true")]
         line = lines.setdefault((row["query"], row["generator"]), heads)
         line.append(f"{row['missed']} + {row['invented']}")
     if lines:
-        table.show("hard distance queries: missed + invented of all (rational arithmetic is the truth)",
-                   ["query", "generator", "queries", "true", *tiers], list(lines.values()))  # fmt: skip
+        table.show(
+            "hard distance queries: missed + invented of all (rational arithmetic is the truth)",
+            ["query", "generator", "queries", "true", *tiers],
+            list(lines.values()),
+        )

@@ -47,8 +47,9 @@ def adversarial(tiers: list[str], n: int, seed: int, question: str = CONTACT) ->
         for number, name in enumerate(names):
             batches = [
                 questions.generated(question, kind, name, np.random.default_rng([seed, number]), n)
-                for kind, generators in kinds.items() if name in generators
-            ]  # fmt: skip
+                for kind, generators in kinds.items()
+                if name in generators
+            ]
             rows += [{"generator": name, **row} for row in ask(batches, tiers)]
             bar.step(name)
     return rows
@@ -69,8 +70,9 @@ def ask(batches: list[Batch], tiers: list[str], known: list[questions.Answers] |
     sizes = np.concatenate([questions.size_of(batch) for batch in batches])
     for tier in tiers:
         answers = [questions.answers(batch, tier, "auto") for batch in batches]
-        parts = [np.concatenate(part) for part in zip(*((*a, *t) for a, t in zip(answers, true, strict=True)),
-                                                      strict=True)]  # fmt: skip
+        parts = [
+            np.concatenate(part) for part in zip(*((*a, *t) for a, t in zip(answers, true, strict=True)), strict=True)
+        ]
         errors = truth.of_queries(*parts, sizes)
         total = len(sizes)
         yield {

@@ -48,8 +48,10 @@ def parse(text: str) -> list[Bound]:
     for word in words:
         found = _BOUND.fullmatch(word)
         if not found:
-            raise UserError(f"--choose {word!r}: write QUANTITY<NUMBER or QUANTITY<=NUMBER, bounds with commas "
-                            f"between, as in {EXAMPLE}; quantities: {', '.join(QUANTITIES)}")  # fmt: skip
+            raise UserError(
+                f"--choose {word!r}: write QUANTITY<NUMBER or QUANTITY<=NUMBER, bounds with commas "
+                f"between, as in {EXAMPLE}; quantities: {', '.join(QUANTITIES)}"
+            )
         quantity, strict = found["quantity"], found["sign"] == "<"
         if quantity not in QUANTITIES:
             raise UserError(f"--choose {word!r}: {quantity} is not known; choose from {', '.join(QUANTITIES)}")
@@ -97,10 +99,14 @@ def outcomes(rows: Sequence[dict]) -> list[Outcome]:
         mine = of.setdefault(Setting(row["accuracy"], row["backend"], row.get("asked", ALL)), {})
         mine.setdefault(row["scene"], row)
     return [
-        Outcome(setting, sum(row["step_ms"] for row in mine.values()) / len(mine),
-                {name: max(_value(row, name) for row in mine.values()) for name in QUANTITIES})
-        for setting, mine in of.items() if mine.keys() == scenes
-    ]  # fmt: skip
+        Outcome(
+            setting,
+            sum(row["step_ms"] for row in mine.values()) / len(mine),
+            {name: max(_value(row, name) for row in mine.values()) for name in QUANTITIES},
+        )
+        for setting, mine in of.items()
+        if mine.keys() == scenes
+    ]
 
 
 def _value(row, quantity) -> float:

@@ -29,8 +29,9 @@ from hpccd_ros.bench.steps import Step
 def configure(parser):
     command.configure(parser, default=("data", *TABLE_1), steps=12)
     parser.add_argument("--backend", default="cpu", metavar="NAME,...", help="of cpu, hybrid, gpu (default: cpu)")
-    parser.add_argument("--report", default="all,first", metavar="NAME,...",
-                        help="of all, first, any (default: %(default)s)")
+    parser.add_argument(
+        "--report", default="all,first", metavar="NAME,...", help="of all, first, any (default: %(default)s)"
+    )
     command.tier_option(parser)
     command.threads_option(parser)
     parser.add_argument("--peer", choices=("ipctk",), help="run this peer on the same steps, in turn")
@@ -47,10 +48,14 @@ def run(args) -> int:
     for source in sources:
         options = {"accuracy": args.accuracy, "threads": args.threads}
         variants = [
-            Variant(f"{backend} {mode}", {**options, "backend": backend, "report": mode},
-                    Step.as_one_mesh if args.peer else None)
-            for backend in backends for mode in modes
-        ]  # fmt: skip
+            Variant(
+                f"{backend} {mode}",
+                {**options, "backend": backend, "report": mode},
+                Step.as_one_mesh if args.peer else None,
+            )
+            for backend in backends
+            for mode in modes
+        ]
         runners = [measure.CoreRunner(variant) for variant in variants]
         if args.peer:
             runners.append(PeerRunner(args.threads or cores()))
@@ -100,9 +105,11 @@ def _compare(rows, source, modes):
 def _check(report, source, series, backends, modes):
     for mode in modes:
         # "any" may answer with another contact on another backend, but not on this one.
-        groups = [[series[f"{b} {mode}"]] for b in backends] if mode == "any" else [
-            [series[f"{b} {mode}"] for b in backends]
-        ]
+        groups = (
+            [[series[f"{b} {mode}"]] for b in backends]
+            if mode == "any"
+            else [[series[f"{b} {mode}"] for b in backends]]
+        )
         for group in groups:
             for text in measure.disagreements(group):
                 report.failure(f"{source.name}: report={mode}: contacts differ between calls or backends: {text}")
@@ -112,19 +119,36 @@ def _print(report, args):
     peer = any(row["variant"] == "ipctk" for row in report.rows)
     rows = [
         [
-            row["scene"], row["variant"], row["triangles"], row["contacts"], row["average_ms"], row["median_ms"],
-            row["p95_ms"], row["first_ms"], TABLE_1_MS.get(row["scene"]),
+            row["scene"],
+            row["variant"],
+            row["triangles"],
+            row["contacts"],
+            row["average_ms"],
+            row["median_ms"],
+            row["p95_ms"],
+            row["first_ms"],
+            TABLE_1_MS.get(row["scene"]),
             *([row.get("times_faster_than_ipctk")] if peer else []),
         ]
         for row in report.rows
-    ]  # fmt: skip
+    ]
     table.show(
         f"ms a step, {args.accuracy}, {args.threads or cores()} threads (Table 1)",
-        ["scene", "variant", "triangles", "contacts", "average", "median", "p95", "first call", "2009",
-         *(["x ipctk"] if peer else [])],
+        [
+            "scene",
+            "variant",
+            "triangles",
+            "contacts",
+            "average",
+            "median",
+            "p95",
+            "first call",
+            "2009",
+            *(["x ipctk"] if peer else []),
+        ],
         rows,
         "2009: the paper's machine (4 cores, 2 GPUs) on its own scene; first call: with a new detector",
-    )  # fmt: skip
+    )
     stages = list(dict.fromkeys(s for r in report.rows for s in stages_in_order(r["stages_ms"])))
     table.show(
         "where the time goes, ms of an average step (section 6.2)",

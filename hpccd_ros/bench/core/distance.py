@@ -39,13 +39,17 @@ SEPARATIONS = "1e-5,1e-4,1e-3,1e-2"
 
 def configure(parser):
     command.configure(parser, default=("data", *SCENES), steps=2)
-    parser.add_argument("--separations", metavar="D,...",
-                        help="distances, of proximity too, in units of the scene (default: of "
-                             f"{SEPARATIONS} those up to its median edge)")
+    parser.add_argument(
+        "--separations",
+        metavar="D,...",
+        help="distances, of proximity too, in units of the scene (default: of "
+        f"{SEPARATIONS} those up to its median edge)",
+    )
     parser.add_argument("--queries", default=",".join(QUERIES), metavar="NAME,...", help="default: %(default)s")
     parser.add_argument("--backend", default="cpu", choices=BACKENDS, help="default: %(default)s")
-    parser.add_argument("--arrays", choices=("host", "device"), default="host",
-                        help="where the positions lie (default: %(default)s)")
+    parser.add_argument(
+        "--arrays", choices=("host", "device"), default="host", help="where the positions lie (default: %(default)s)"
+    )
     command.tier_option(parser, default="exact")
     command.threads_option(parser)
     parser.add_argument("--peer", choices=("ipctk",), help="ask this peer the same of the same steps, in turn")
@@ -96,8 +100,10 @@ def _up_to_the_median_edge(source, distances, report):
     step = next(step for step in map(source.step, source.spread(0)) if step is not None)
     edge = _median_edge(step)
     if beyond := [f"{d:g}" for d in distances if d > edge]:
-        report.note(f"{source.name}: d {', '.join(beyond)} left out, beyond its median edge of {edge:.2g}; "
-                    "--separations asks for any")
+        report.note(
+            f"{source.name}: d {', '.join(beyond)} left out, beyond its median edge of {edge:.2g}; "
+            "--separations asks for any"
+        )
     return [d for d in distances if d <= edge]
 
 
@@ -146,12 +152,28 @@ def _median_edge(step):
 def _print(report, args):
     table.show(
         f"distance queries, {args.accuracy}, {args.backend}, {args.threads or cores()} threads",
-        ["scene", "query", "d", "pairs", "ms", "least", "/ plain", "least", "us a pair more",
-         *(["ipctk ms", "x ipctk"] if args.peer else [])],
+        [
+            "scene",
+            "query",
+            "d",
+            "pairs",
+            "ms",
+            "least",
+            "/ plain",
+            "least",
+            "us a pair more",
+            *(["ipctk ms", "x ipctk"] if args.peer else []),
+        ],
         [
             [
-                row["scene"], row["query"], "" if row["distance"] is None else f"{row['distance']:g}",
-                round(row["pairs"]), row["step_ms"], row["least_ms"], row["over_plain"], row["least_over_plain"],
+                row["scene"],
+                row["query"],
+                "" if row["distance"] is None else f"{row['distance']:g}",
+                round(row["pairs"]),
+                row["step_ms"],
+                row["least_ms"],
+                row["over_plain"],
+                row["least_over_plain"],
                 row.get("us_a_pair_beyond"),
                 *([row.get("ipctk_ms"), row.get("times_faster_than_ipctk")] if args.peer else []),
             ]
@@ -159,4 +181,4 @@ def _print(report, args):
         ],
         "ms: an average step, the median over the rounds, then the least; pairs of distances: pairs of meshes; "
         "us a pair more: of a thread, beyond the contacts (separation: 1.5 times the contacts)",
-    )  # fmt: skip
+    )

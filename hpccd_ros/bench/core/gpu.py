@@ -45,22 +45,44 @@ OPERATIONS = {"candidates": 170, "survivors": 400, "roots": 1500}
 def configure(parser):
     command.configure(parser, default=("data",), steps=None, rounds=50)
     command.threads_option(parser)
-    parser.add_argument("--parts", default="frames,threads,segments", metavar="NAME,...",
-                        help="of frames, threads (Fig. 6), segments, device (results that stay there), large (two nets "
-                        "of millions of triangles) and worlds; the last three need PyTorch or CuPy "
-                        "(default: %(default)s)")  # fmt: skip
-    parser.add_argument("--sizes", default="224,708,1415", metavar="N,...",
-                        help="large: vertices along a side of each net (default: %(default)s: 0.2, 2 and 8 million "
-                        "triangles)")  # fmt: skip
-    parser.add_argument("--worlds", default="64,1024,4096,8192", metavar="W,...",
-                        help="worlds: how many in a call (default: %(default)s)")  # fmt: skip
+    parser.add_argument(
+        "--parts",
+        default="frames,threads,segments",
+        metavar="NAME,...",
+        help="of frames, threads (Fig. 6), segments, device (results that stay there), large (two nets "
+        "of millions of triangles) and worlds; the last three need PyTorch or CuPy "
+        "(default: %(default)s)",
+    )
+    parser.add_argument(
+        "--sizes",
+        default="224,708,1415",
+        metavar="N,...",
+        help="large: vertices along a side of each net (default: %(default)s: 0.2, 2 and 8 million triangles)",
+    )
+    parser.add_argument(
+        "--worlds",
+        default="64,1024,4096,8192",
+        metavar="W,...",
+        help="worlds: how many in a call (default: %(default)s)",
+    )
     parser.add_argument("--pcie", type=float, default=53.0, metavar="GB/s", help="host link (default: %(default)s)")
-    parser.add_argument("--memory", type=float, default=2800.0, metavar="GB/s",
-                        help="device memory (default: %(default)s, H100)")  # fmt: skip
-    parser.add_argument("--rate", type=float, default=16.0, metavar="T/s",
-                        help="10^12 double-precision operations a second, not fused (default: %(default)s, H100)")
-    parser.add_argument("--single-rate", type=float, default=29.0, metavar="T/s",
-                        help="10^12 single-precision operations a second, not fused (default: %(default)s, H100)")
+    parser.add_argument(
+        "--memory", type=float, default=2800.0, metavar="GB/s", help="device memory (default: %(default)s, H100)"
+    )
+    parser.add_argument(
+        "--rate",
+        type=float,
+        default=16.0,
+        metavar="T/s",
+        help="10^12 double-precision operations a second, not fused (default: %(default)s, H100)",
+    )
+    parser.add_argument(
+        "--single-rate",
+        type=float,
+        default=29.0,
+        metavar="T/s",
+        help="10^12 single-precision operations a second, not fused (default: %(default)s, H100)",
+    )
     parser.add_argument("--redraw", metavar="JSON", help="draw Fig. 6 from this kept result; measure nothing")
 
 
@@ -85,8 +107,10 @@ def run(args) -> int:
         report, sources = command.begin(args)
     else:
         report, sources = command.begin_report(args), []
-    report.note("floors: PCIe bytes of positions and contacts; device bytes of the lists that stages hand on; "
-                "operations counted from the source for each pair of each stage; rates are options")
+    report.note(
+        "floors: PCIe bytes of positions and contacts; device bytes of the lists that stages hand on; "
+        "operations counted from the source for each pair of each stage; rates are options"
+    )
     for source in sources:
         step = source.step(0)
         if "frames" in parts:
@@ -111,8 +135,11 @@ def run(args) -> int:
 
 def show(rows):
     """Tables of all parts but those of the hybrid."""
-    for print_, parts in ((_show_frames, ("frame",)), (gpu_device.show, ("device", "large")),
-                          (gpu_worlds.show, ("worlds",))):  # fmt: skip
+    for print_, parts in (
+        (_show_frames, ("frame",)),
+        (gpu_device.show, ("device", "large")),
+        (gpu_worlds.show, ("worlds",)),
+    ):
         if chosen := [r for r in rows if r["part"] in parts]:
             print_(chosen)
 
@@ -120,12 +147,38 @@ def show(rows):
 def _show_frames(rows):
     table.show(
         "ms a frame, host arrays in and out",
-        ["scene", "accuracy", "triangles", "contacts", "CPU", "hybrid", "GPU median", "p95", "best", "PCIe floor",
-         "memory floor", "arithmetic floor"],
-        [[r["scene"], r["accuracy"], r["triangles"], r["contacts"], r["cpu_median_ms"], r["hybrid_median_ms"],
-          r["median_ms"], r["p95_ms"], r["best_ms"], r["floor_pcie_ms"], r["floor_memory_ms"],
-          r["floor_arithmetic_ms"]] for r in rows],
-    )  # fmt: skip
+        [
+            "scene",
+            "accuracy",
+            "triangles",
+            "contacts",
+            "CPU",
+            "hybrid",
+            "GPU median",
+            "p95",
+            "best",
+            "PCIe floor",
+            "memory floor",
+            "arithmetic floor",
+        ],
+        [
+            [
+                r["scene"],
+                r["accuracy"],
+                r["triangles"],
+                r["contacts"],
+                r["cpu_median_ms"],
+                r["hybrid_median_ms"],
+                r["median_ms"],
+                r["p95_ms"],
+                r["best_ms"],
+                r["floor_pcie_ms"],
+                r["floor_memory_ms"],
+                r["floor_arithmetic_ms"],
+            ]
+            for r in rows
+        ],
+    )
     stages = list(dict.fromkeys(s for r in rows for s in r["stages_ms"]))
     table.show(
         "where the time goes, ms (gpu/...: device time, measured in calls of their own)",
@@ -163,8 +216,10 @@ def _measure(report, args, name, step, accuracy):
 
 
 def _floors(args, step, stats, contacts):
-    total = {key: sum(stats[f"{kind}_{key}"] for kind in ("vf", "ee"))
-             for key in ("candidates", "rejected_coplanarity", "rejected_projection")}  # fmt: skip
+    total = {
+        key: sum(stats[f"{kind}_{key}"] for kind in ("vf", "ee"))
+        for key in ("candidates", "rejected_coplanarity", "rejected_projection")
+    }
     survivors = total["candidates"] - total["rejected_coplanarity"]
     roots = survivors - total["rejected_projection"]
     pcie = step.vertices_t0.nbytes + step.vertices_t1.nbytes + 16 * len(contacts.vf) + 24 * len(contacts.ee)

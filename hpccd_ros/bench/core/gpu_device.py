@@ -52,9 +52,7 @@ def measure(report, args, part, name, step, accuracy):
         bytes=stats["gpu_bytes"],
         candidates=stats["vf_candidates"] + stats["ee_candidates"],
         decided=gpu_work.decided(stats),
-        stages_ms=device_stages(
-            staged, partial(staged.detect, there.vertices_t0, there.vertices_t1, stream=stream)
-        ),
+        stages_ms=device_stages(staged, partial(staged.detect, there.vertices_t0, there.vertices_t1, stream=stream)),
         floors=gpu_work.floors(args, gpu_work.counts(step, stats)),
     )
 
@@ -69,13 +67,38 @@ def measure_large(report, args, sizes):
 def show(rows):
     table.show(
         "ms a call, by where positions and results lie",
-        ["scene", "accuracy", "triangles", "contacts", "CPU", "host to host", "device to host", "device", "p95", "best",
-         "graph", "bytes a triangle"],
-        [[r["scene"], r["accuracy"], r["triangles"], r["contacts"], r["cpu_median_ms"], r["host_median_ms"],
-          r["to_host_median_ms"], r["median_ms"], r["p95_ms"], r["best_ms"], r["graph_median_ms"],
-          r["bytes"] / r["triangles"]]
-         for r in rows],
-    )  # fmt: skip
+        [
+            "scene",
+            "accuracy",
+            "triangles",
+            "contacts",
+            "CPU",
+            "host to host",
+            "device to host",
+            "device",
+            "p95",
+            "best",
+            "graph",
+            "bytes a triangle",
+        ],
+        [
+            [
+                r["scene"],
+                r["accuracy"],
+                r["triangles"],
+                r["contacts"],
+                r["cpu_median_ms"],
+                r["host_median_ms"],
+                r["to_host_median_ms"],
+                r["median_ms"],
+                r["p95_ms"],
+                r["best_ms"],
+                r["graph_median_ms"],
+                r["bytes"] / r["triangles"],
+            ]
+            for r in rows
+        ],
+    )
     show_stages(rows)
     show_decided(rows)
 
@@ -86,11 +109,13 @@ def show_stages(rows):
     table.show(
         "device time by stage in calls of their own, ms, and its floor",
         ["stage", *(head for r in rows for head in (f"{r['scene']} {r['accuracy']}", "floor"))],
-        [[stage, *(cell for r in rows for cell in (r["stages_ms"].get(stage), floor_of(r, stage)))]
-         for stage in stages],
+        [
+            [stage, *(cell for r in rows for cell in (r["stages_ms"].get(stage), floor_of(r, stage)))]
+            for stage in stages
+        ],
         "floor: bytes over --memory, operations over --rate and --single-rate, whichever takes longest "
         "(counted in hpccd_ros/bench/core/gpu_work.py)",
-    )  # fmt: skip
+    )
 
 
 def floor_of(row, stage):

@@ -18,8 +18,9 @@ def figure_6(report, args, name, step, accuracy="balanced"):
     gpus = range(len(hc.gpu_status()["devices"]) + 1)
     counts = sorted({*(1 << k for k in range(cores().bit_length()) if 1 << k <= cores()), cores()})
     runs = [("published", 1, 0)]
-    runs += [(method, n, g) for method in ("published", "default") for n in counts for g in gpus
-             if (method, n, g) != runs[0]]  # fmt: skip
+    runs += [
+        (method, n, g) for method in ("published", "default") for n in counts for g in gpus if (method, n, g) != runs[0]
+    ]
     base, expected = None, None
     with bar(f"{name}: threads and GPUs", len(runs)) as progress:
         for method, threads, n_gpus in runs:
@@ -28,8 +29,16 @@ def figure_6(report, args, name, step, accuracy="balanced"):
             measured, contacts = detector_times(detector, step, args.repeat)
             base, expected = base or measured.median, expected or contacts.hash
             _check(report, detector, contacts, expected, f"{name}, {method}, {threads} threads, {n_gpus} GPUs")
-            report.add(part="threads and GPUs", scene=name, accuracy=accuracy, method=method, threads=threads,
-                       gpus=n_gpus, **measured.as_row(), speedup=base / measured.median)  # fmt: skip
+            report.add(
+                part="threads and GPUs",
+                scene=name,
+                accuracy=accuracy,
+                method=method,
+                threads=threads,
+                gpus=n_gpus,
+                **measured.as_row(),
+                speedup=base / measured.median,
+            )
             progress.step()
 
 
@@ -41,8 +50,15 @@ def segment_sizes(report, args, name, step, accuracy="balanced"):
             options = {"method": method, "threads": threads, "hybrid_segment_pairs": pairs}
             detector = hc.Detector(step.scene(), accuracy=accuracy, backend="hybrid", **options)
             measured, _ = detector_times(detector, step, args.repeat)
-            report.add(part="segment size", scene=name, accuracy=accuracy, method=method, threads=threads,
-                       segment_pairs=pairs, **measured.as_row())  # fmt: skip
+            report.add(
+                part="segment size",
+                scene=name,
+                accuracy=accuracy,
+                method=method,
+                threads=threads,
+                segment_pairs=pairs,
+                **measured.as_row(),
+            )
             progress.step()
 
 
@@ -58,16 +74,20 @@ def show(report):
     if cells:
         table.show(
             "Fig. 6: ms, and times one CPU thread with the published method",
-            ["scene", "method", "threads", *heads], cells,
+            ["scene", "method", "threads", *heads],
+            cells,
             "the communication thread comes on top; with all cores it takes the place of the last one",
-        )  # fmt: skip
+        )
     rows = [r for r in report.rows if r.get("part") == "segment size"]
     lines = {}
     for r in rows:
         lines.setdefault((r["scene"], r["method"], r["threads"]), []).append(r["median_ms"])
     if lines:
-        table.show("section 6.2: ms by pairs in a segment", ["scene", "method", "threads", *map(str, SEGMENT_PAIRS)],
-                   [[*key, *ms] for key, ms in lines.items()])  # fmt: skip
+        table.show(
+            "section 6.2: ms by pairs in a segment",
+            ["scene", "method", "threads", *map(str, SEGMENT_PAIRS)],
+            [[*key, *ms] for key, ms in lines.items()],
+        )
 
 
 def _cell(row):

@@ -69,11 +69,19 @@ EXTENDED = 10
 TABLE = (
     Item("bounds", "position_bytes", Work(moved=1), "both ends, as they were given, once"),
     Item("bounds", "end_bytes", Work(moved=1), "both ends of a vertex beside each other, written"),
-    Item("bounds", "vertices", Work(moved=POINT + KDOP_OF_VERTEX, singles=52, doubles=12 + 12),
-         "extent_kernel: minimum and maximum of 6 coordinates; vertices_kernel: their map, 16 values of a k-DOP"),
+    Item(
+        "bounds",
+        "vertices",
+        Work(moved=POINT + KDOP_OF_VERTEX, singles=52, doubles=12 + 12),
+        "extent_kernel: minimum and maximum of 6 coordinates; vertices_kernel: their map, 16 values of a k-DOP",
+    ),
     Item("bounds", "groups", Work(moved=NUMBER), "counts of pairs of each vertex and edge, cleared"),
-    Item("refit", "vertices", Work(moved=POINT + KDOP_OF_VERTEX, singles=BOX_COMPARISONS + KDOP_COMPARISONS),
-         "refit_leaf(), leaf_kdops_kernel: each vertex in one leaf; most are corners of several"),
+    Item(
+        "refit",
+        "vertices",
+        Work(moved=POINT + KDOP_OF_VERTEX, singles=BOX_COMPARISONS + KDOP_COMPARISONS),
+        "refit_leaf(), leaf_kdops_kernel: each vertex in one leaf; most are corners of several",
+    ),
     Item("refit", "leaves", Work(moved=LEAF + BOX + KDOP), "read; box and k-DOP written"),
     Item("refit", "nodes", Work(moved=BOX + 2 * NUMBER, singles=BOX_COMPARISONS), "written, with parent and arrivals"),
     Item("traverse", "nodes", Work(moved=BOX), "all boxes once"),
@@ -83,25 +91,45 @@ TABLE = (
     Item("candidates", "leaves", Work(moved=LEAF + BOX + KDOP), "all of them once"),
     Item("candidates", "features", Work(moved=FEATURE), "edges and faces of leaves once"),
     Item("candidates", "vertices", Work(moved=POINT), "all of them once"),
-    Item("candidates", "candidates", Work(singles=BOX_COMPARISONS + FIRST_FILTER),
-         "boxes of features, the cubic, its error bound, the signs of its coefficients; what is compared before is not "
-         "counted"),
+    Item(
+        "candidates",
+        "candidates",
+        Work(singles=BOX_COMPARISONS + FIRST_FILTER),
+        "boxes of features, the cubic, its error bound, the signs of its coefficients; what is compared before is not "
+        "counted",
+    ),
     Item("candidates", "survivors", Work(moved=PAIR), "written"),
     Item("sort_survivors", "survivors", Work(moved=PAIR, singles=FIRST_FILTER + ONE_ROOT), "read; the same again"),
-    *(Item("sort_survivors", f"{kind}_one_root", Work(singles=QUICK_STEPS + INSIDE[kind]), "certainly_apart_at_root()")
-      for kind in ("vf", "ee")),
-    *(Item("sort_survivors", f"{kind}_outside", Work(singles=PROJECTION + BEYOND[kind]), "certainly_outside()")
-      for kind in ("vf", "ee")),
+    *(
+        Item(
+            "sort_survivors", f"{kind}_one_root", Work(singles=QUICK_STEPS + INSIDE[kind]), "certainly_apart_at_root()"
+        )
+        for kind in ("vf", "ee")
+    ),
+    *(
+        Item("sort_survivors", f"{kind}_outside", Work(singles=PROJECTION + BEYOND[kind]), "certainly_outside()")
+        for kind in ("vf", "ee")
+    ),
     Item("sort_survivors", "vertices", Work(moved=POINT), "all of them once"),
     Item("sort_survivors", "rooted", Work(moved=PAIR), "written, to one of two lists"),
-    *(Item(f"{roots}_root{'s' if roots == 'many' else ''}", f"{kind}_{roots}",
-           Work(moved=PAIR, doubles=ROOT + INSIDE[kind]),
-           "four steps of Newton's method, then inside(); more than one root takes more")
-      for roots in ("single", "many") for kind in ("vf", "ee")),
+    *(
+        Item(
+            f"{roots}_root{'s' if roots == 'many' else ''}",
+            f"{kind}_{roots}",
+            Work(moved=PAIR, doubles=ROOT + INSIDE[kind]),
+            "four steps of Newton's method, then inside(); more than one root takes more",
+        )
+        for roots in ("single", "many")
+        for kind in ("vf", "ee")
+    ),
     Item("single_root", "end_bytes_of_single", Work(moved=1), "vertices of so many pairs; all of them at most"),
     Item("many_roots", "end_bytes_of_many", Work(moved=1), "vertices of so many pairs; all of them at most"),
-    Item("last_resort", "undecided", Work(moved=PAIR, doubles=EXTENDED * (LOAD + CUBIC)),
-         "the cubic in twice the precision; what follows is not counted"),
+    Item(
+        "last_resort",
+        "undecided",
+        Work(moved=PAIR, doubles=EXTENDED * (LOAD + CUBIC)),
+        "the cubic in twice the precision; what follows is not counted",
+    ),
     Item("integers", "for_integers", Work(moved=PAIR), "read"),
     Item("sort", "groups", Work(moved=2 * NUMBER), "counts read, their sums written"),
     Item("sort", "contacts", Work(moved=2 * FOUND), "what was found read, and put where its feature's pairs are"),
@@ -109,7 +137,7 @@ TABLE = (
     Item("results", "vf_contacts", Work(moved=2 * NUMBER + 8), "rows written"),
     Item("results", "ee_contacts", Work(moved=4 * NUMBER + 8 + 2 * 2 * NUMBER), "ends of edges read, rows written"),
     Item("area", "nodes", Work(moved=BOX), "all boxes once"),
-)  # fmt: skip
+)
 
 
 def _both(stats, name):
@@ -125,27 +153,44 @@ def counts(step: Step, stats: dict[str, float], worlds: int = 1) -> dict[str, fl
     item = step.vertices_t0.dtype.itemsize
     ends = {4: 32, 8: 64}[item]  # GivenEnds
     found = {
-        "vertices": vertices, "leaves": leaves, "nodes": 2 * leaves - worlds,
-        "groups": vertices + edges * worlds, "features": edges + len(faces),
-        "position_bytes": 2 * 3 * item * vertices, "end_bytes": ends * vertices,
-        "node_pairs": stats["node_pairs"], "leaf_pairs": stats["leaf_pairs"],
+        "vertices": vertices,
+        "leaves": leaves,
+        "nodes": 2 * leaves - worlds,
+        "groups": vertices + edges * worlds,
+        "features": edges + len(faces),
+        "position_bytes": 2 * 3 * item * vertices,
+        "end_bytes": ends * vertices,
+        "node_pairs": stats["node_pairs"],
+        "leaf_pairs": stats["leaf_pairs"],
         "candidates": _both(stats, "candidates"),
         "survivors": _both(stats, "candidates") - _both(stats, "rejected_coplanarity"),
         "rooted": _both(stats, "single_root") + _both(stats, "many_roots"),
         "undecided": _both(stats, "undecided"),
         "for_integers": _both(stats, "by_integers"),
         "contacts": _both(stats, "contacts"),
-    }  # fmt: skip
+    }
     for kind in ("vf", "ee"):
-        of = {name: stats[f"{kind}_{name}"] for name in ("single_root", "many_roots", "undecided", "rejected_roots",
-              "proven_contacts", "rejected_projection", "contacts")}  # fmt: skip
+        of = {
+            name: stats[f"{kind}_{name}"]
+            for name in (
+                "single_root",
+                "many_roots",
+                "undecided",
+                "rejected_roots",
+                "proven_contacts",
+                "rejected_projection",
+                "contacts",
+            )
+        }
         # Single precision rejects some at their only root, which the core counts with those that doubles reject there.
         missed = of["rejected_roots"] + of["proven_contacts"] + of["undecided"] - of["single_root"] - of["many_roots"]
         found |= {
-            f"{kind}_single": of["single_root"], f"{kind}_many": of["many_roots"],
-            f"{kind}_one_root": of["single_root"] + missed, f"{kind}_contacts": of["contacts"],
+            f"{kind}_single": of["single_root"],
+            f"{kind}_many": of["many_roots"],
+            f"{kind}_one_root": of["single_root"] + missed,
+            f"{kind}_contacts": of["contacts"],
             f"{kind}_outside": of["rejected_projection"],
-        }  # fmt: skip
+        }
     for roots in ("single", "many"):
         pairs = found[f"vf_{roots}"] + found[f"ee_{roots}"]
         # A vertex may be in many pairs, and each pair has four.

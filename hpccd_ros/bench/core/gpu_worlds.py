@@ -89,9 +89,21 @@ def show(rows):
     table.show(
         "many worlds in one call, positions and results on the device, exact",
         ["query", "worlds", "triangles a world", "pairs", "CPU ms", "GPU ms", "p95", "us a world", "bytes a world"],
-        [[r["query"], r["worlds"], r["triangles"], r["pairs"], r["cpu_median_ms"], r["median_ms"], r["p95_ms"],
-          r["us_a_world"], r["bytes"] / r["worlds"]] for r in rows],
-    )  # fmt: skip
+        [
+            [
+                r["query"],
+                r["worlds"],
+                r["triangles"],
+                r["pairs"],
+                r["cpu_median_ms"],
+                r["median_ms"],
+                r["p95_ms"],
+                r["us_a_world"],
+                r["bytes"] / r["worlds"],
+            ]
+            for r in rows
+        ],
+    )
     stages = list(dict.fromkeys(s for r in rows for s in r["stages_ms"]))
     table.show(
         "device time by stage in calls of their own, ms",

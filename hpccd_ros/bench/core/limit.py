@@ -47,10 +47,11 @@ def run(args) -> int:
     every = [Rates(n) for n in threads]
     for source in sources:
         variants = {
-            rates.threads: Variant(f"{rates.threads} threads", {"accuracy": args.accuracy, "backend": "cpu",
-                                                                "threads": rates.threads})
+            rates.threads: Variant(
+                f"{rates.threads} threads", {"accuracy": args.accuracy, "backend": "cpu", "threads": rates.threads}
+            )
             for rates in every
-        }  # fmt: skip
+        }
         series = measure.measure(source, [measure.CoreRunner(v) for v in variants.values()], args.repeat, args.steps)
         with progress.bar(f"{source.name}: rates of the machine", len(every) * len(limit_work.STAGES)) as bar:
             for rates in every:
@@ -78,12 +79,18 @@ def _rows(source, series, rates, args, bar) -> list[dict]:
         told = [stage, *(part for part, whole in untimed.items() if whole == stage)]
         work = sum((limit_work.of_stage(name, count) for name in told), limit_work.Work())
         least = rates.least(work, args.accuracy == "fast")
-        rows.append({
-            "stage": ", ".join(told), "ms": ms[stage], "least_ms": least.ms, "limited_by": least.by,
-            "distance_ms": ms[stage] - least.ms, "over_least": ms[stage] / least.ms if least.ms else None,
-            "items": {item.count: count[item.count] for item in limit_work.TABLE if item.stage in told},
-            "work": vars(work),
-        })  # fmt: skip
+        rows.append(
+            {
+                "stage": ", ".join(told),
+                "ms": ms[stage],
+                "least_ms": least.ms,
+                "limited_by": least.by,
+                "distance_ms": ms[stage] - least.ms,
+                "over_least": ms[stage] / least.ms if least.ms else None,
+                "items": {item.count: count[item.count] for item in limit_work.TABLE if item.stage in told},
+                "work": vars(work),
+            }
+        )
     rows.sort(key=lambda row: -row["distance_ms"])
     least_of_all = sum(row["least_ms"] for row in rows)
     whole = ms["step"]
@@ -91,9 +98,14 @@ def _rows(source, series, rates, args, bar) -> list[dict]:
     return [
         *rows,
         {"stage": "rest", "ms": rest, "distance_ms": rest},
-        {"stage": "step", "ms": whole, "least_ms": least_of_all, "distance_ms": whole - least_of_all,
-         "over_least": whole / least_of_all if least_of_all else None},
-    ]  # fmt: skip
+        {
+            "stage": "step",
+            "ms": whole,
+            "least_ms": least_of_all,
+            "distance_ms": whole - least_of_all,
+            "over_least": whole / least_of_all if least_of_all else None,
+        },
+    ]
 
 
 def _stages(series, threads) -> dict[str, float]:
@@ -103,10 +115,15 @@ def _stages(series, threads) -> dict[str, float]:
         leaves = min(1e-6 * call.stats.get("leaf_pairs_ns", 0) / threads, call.profile["traverse"])
         kdops = min(1e-6 * call.stats.get("slabs_ns", 0) / threads, call.profile["elementary"])
         return {
-            "bounds": call.profile["bounds"], "refit": call.profile.get("refit", 0.0),
-            "nodes": call.profile["traverse"] - leaves, "leaf pairs": leaves, "k-DOPs": kdops,
-            "tests": call.profile["elementary"] - kdops, "contacts": call.profile["contacts"], "step": call.ms,
-        }  # fmt: skip
+            "bounds": call.profile["bounds"],
+            "refit": call.profile.get("refit", 0.0),
+            "nodes": call.profile["traverse"] - leaves,
+            "leaf pairs": leaves,
+            "k-DOPs": kdops,
+            "tests": call.profile["elementary"] - kdops,
+            "contacts": call.profile["contacts"],
+            "step": call.ms,
+        }
 
     return limit_work.average(
         [limit_work.average([of(call) for call in _calm(samples)]) for samples in series.by_step.values()]
@@ -124,21 +141,45 @@ def _print(rows):
     table.show(
         "what this machine does at most, a second",
         ["threads", "rate", "of data, KB", "10^9"],
-        [[r["threads"], r["rate"], r["bytes"] / 1024 or None, r["per_second"] / 1e9]
-         for r in sorted(rates, key=lambda r: (r["threads"], r["rate"], r["bytes"]))],
+        [
+            [r["threads"], r["rate"], r["bytes"] / 1024 or None, r["per_second"] / 1e9]
+            for r in sorted(rates, key=lambda r: (r["threads"], r["rate"], r["bytes"]))
+        ],
         "comparisons of floats, operations on floats and doubles, bytes",
-    )  # fmt: skip
+    )
     table.show(
         "where the time goes, ms of an average step, the farthest from its least first",
-        ["scene", "threads", "stage", "ms", "least", "times", "farther by", "limited by", "comparisons", "flops",
-         "MB once", "MB again"],
         [
-            [r["scene"], r["threads"], r["stage"], r["ms"], r.get("least_ms"), r.get("over_least"), r["distance_ms"],
-             r.get("limited_by", ""), *_millions(r.get("work"))]
-            for r in rows if r["part"] == "stage"
+            "scene",
+            "threads",
+            "stage",
+            "ms",
+            "least",
+            "times",
+            "farther by",
+            "limited by",
+            "comparisons",
+            "flops",
+            "MB once",
+            "MB again",
+        ],
+        [
+            [
+                r["scene"],
+                r["threads"],
+                r["stage"],
+                r["ms"],
+                r.get("least_ms"),
+                r.get("over_least"),
+                r["distance_ms"],
+                r.get("limited_by", ""),
+                *_millions(r.get("work")),
+            ]
+            for r in rows
+            if r["part"] == "stage"
         ],
         "comparisons and flops in millions; rest: building the hierarchy anew, and what the core did not see",
-    )  # fmt: skip
+    )
 
 
 def _millions(work):

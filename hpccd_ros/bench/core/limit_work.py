@@ -72,47 +72,93 @@ HANDED_OUT = {"vf": 2 * NUMBER + 8, "ee": 4 * NUMBER + 8}
 
 TABLE = (
     Item("bounds", "position_bytes", Work(read=1), "motion_bounds.cpp: both ends, as they were given"),
-    Item("bounds", "vertices",
-         Work(written=VERTEX_MOTION + ROUNDED_MOTION + BOX + VERTEX_KDOP, comparisons=18, flops=12 + 52),
-         "copy_motion(): 6 coordinates of 2 operations, 16 values of a k-DOP of 3 and 4 doublings; extent_of(): "
-         "minimum, maximum and range of 6 coordinates"),
-    Item("refit", "vertices",
-         Work(read=BOX + VERTEX_KDOP + NUMBER, written=COORDINATES, comparisons=BOX_COMPARISONS + KDOP_COMPARISONS),
-         "leaf_bounds(), join_kdops(): box and k-DOP joined with the leaf's, coordinates written to their lanes; most "
-         "vertices are corners of several leaves"),
+    Item(
+        "bounds",
+        "vertices",
+        Work(written=VERTEX_MOTION + ROUNDED_MOTION + BOX + VERTEX_KDOP, comparisons=18, flops=12 + 52),
+        "copy_motion(): 6 coordinates of 2 operations, 16 values of a k-DOP of 3 and 4 doublings; extent_of(): "
+        "minimum, maximum and range of 6 coordinates",
+    ),
+    Item(
+        "refit",
+        "vertices",
+        Work(read=BOX + VERTEX_KDOP + NUMBER, written=COORDINATES, comparisons=BOX_COMPARISONS + KDOP_COMPARISONS),
+        "leaf_bounds(), join_kdops(): box and k-DOP joined with the leaf's, coordinates written to their lanes; most "
+        "vertices are corners of several leaves",
+    ),
     Item("refit", "leaves", Work(written=LEAF_KDOP + BOX), "fit_leaf(): its k-DOP, and its lane of a block"),
     Item("refit", "nodes", Work(written=NODE, comparisons=BOX_COMPARISONS), "join_children()"),
     Item("nodes", "nodes", Work(read=NODE), "all of them once"),
     Item("nodes", "node_pairs", Work(touched=2 * NODE, comparisons=BOX_COMPARISONS), "Node::overlaps()"),
-    Item("nodes", "leaf_pairs", Work(touched=BOX + 2 * LEAF_KDOP, comparisons=BOX_COMPARISONS + KDOP_COMPARISONS),
-         "block_pairs(): those that are found; nobody counts what was compared for nothing"),
+    Item(
+        "nodes",
+        "leaf_pairs",
+        Work(touched=BOX + 2 * LEAF_KDOP, comparisons=BOX_COMPARISONS + KDOP_COMPARISONS),
+        "block_pairs(): those that are found; nobody counts what was compared for nothing",
+    ),
     Item("leaf pairs", "leaves", Work(read=LEAF_ROWS + LEAF_CORNERS + NODE), "rows of corners, once"),
-    Item("leaf pairs", "leaf_visits",
-         Work(touched=LEAF_ROWS + LEAF_CORNERS + NODE, comparisons=16 * BOX_COMPARISONS),
-         "leaf_features.inl: on which sides of the other leaf's box the corners lie; what is near is then compared one "
-         "by one, which nobody counts"),
+    Item(
+        "leaf pairs",
+        "leaf_visits",
+        Work(touched=LEAF_ROWS + LEAF_CORNERS + NODE, comparisons=16 * BOX_COMPARISONS),
+        "leaf_features.inl: on which sides of the other leaf's box the corners lie; what is near is then compared one "
+        "by one, which nobody counts",
+    ),
     Item("leaf pairs", "candidates", Work(touched=2 * NUMBER), "two numbers written"),
     Item("k-DOPs", "vertices", Work(read=VERTEX_KDOP), "all of them once"),
-    Item("k-DOPs", "candidates", Work(touched=4 * VERTEX_KDOP + 2 * NUMBER, comparisons=4 * 16 + 2 * 16),
-         "list_near(): four rows of 16, joined two and two by minimum and maximum, compared twice"),
+    Item(
+        "k-DOPs",
+        "candidates",
+        Work(touched=4 * VERTEX_KDOP + 2 * NUMBER, comparisons=4 * 16 + 2 * 16),
+        "list_near(): four rows of 16, joined two and two by minimum and maximum, compared twice",
+    ),
     Item("tests", "vertices", Work(read=ROUNDED_MOTION), "all of them once"),
-    Item("tests", "tested",
-         Work(touched=4 * ROUNDED_MOTION, comparisons=LOAD + MAGNITUDES + CUBIC + ERROR + 12 + ONE_ROOT),
-         "sort_out(), in single precision: the cubic, its error bound, the signs of its coefficients"),
-    *(Item("tests", f"{kind}_outside", Work(comparisons=PROJECTION + BEYOND[kind]),
-           "certainly_outside(); those that are not found outside cost as much, which nobody counts")
-      for kind in ("vf", "ee")),
-    *(Item("tests", f"{kind}_rooted", Work(comparisons=QUICK_STEPS + INSIDE[kind]),
-           "certainly_apart_at_root(); many_roots_test() does more") for kind in ("vf", "ee")),
-    *(Item("tests", f"{kind}_contacts",
-           Work(touched=VERTICES, flops=LOAD + MAGNITUDES + CUBIC + ERROR + NEWTON * NEWTON_STEPS + ROOT_END
-                + INSIDE[kind]),
-           "single_root_test(): four steps of Newton's method, then inside(); many_roots_test() does more")
-      for kind in ("vf", "ee")),
-    *(Item("contacts", f"{kind}_contacts",
-           Work(read=2 * CONTACT, written=CONTACT + HANDED_OUT[kind], comparisons=3),
-           "order.cpp: distributed, read again and handed out; a bucket of eight is sorted") for kind in ("vf", "ee")),
-)  # fmt: skip
+    Item(
+        "tests",
+        "tested",
+        Work(touched=4 * ROUNDED_MOTION, comparisons=LOAD + MAGNITUDES + CUBIC + ERROR + 12 + ONE_ROOT),
+        "sort_out(), in single precision: the cubic, its error bound, the signs of its coefficients",
+    ),
+    *(
+        Item(
+            "tests",
+            f"{kind}_outside",
+            Work(comparisons=PROJECTION + BEYOND[kind]),
+            "certainly_outside(); those that are not found outside cost as much, which nobody counts",
+        )
+        for kind in ("vf", "ee")
+    ),
+    *(
+        Item(
+            "tests",
+            f"{kind}_rooted",
+            Work(comparisons=QUICK_STEPS + INSIDE[kind]),
+            "certainly_apart_at_root(); many_roots_test() does more",
+        )
+        for kind in ("vf", "ee")
+    ),
+    *(
+        Item(
+            "tests",
+            f"{kind}_contacts",
+            Work(
+                touched=VERTICES,
+                flops=LOAD + MAGNITUDES + CUBIC + ERROR + NEWTON * NEWTON_STEPS + ROOT_END + INSIDE[kind],
+            ),
+            "single_root_test(): four steps of Newton's method, then inside(); many_roots_test() does more",
+        )
+        for kind in ("vf", "ee")
+    ),
+    *(
+        Item(
+            "contacts",
+            f"{kind}_contacts",
+            Work(read=2 * CONTACT, written=CONTACT + HANDED_OUT[kind], comparisons=3),
+            "order.cpp: distributed, read again and handed out; a bucket of eight is sorted",
+        )
+        for kind in ("vf", "ee")
+    ),
+)
 
 
 def of_stage(stage: str, counts: dict[str, float]) -> Work:
@@ -125,15 +171,17 @@ def counts(step: Step, stats: dict[str, float]) -> dict[str, float]:
     vertices, faces = (sum(n) for n in (map(_n_vertices, moving), (len(mesh.faces) for mesh in moving)))
     leaves = -(-faces // 8)  # at least: a leaf holds at most eight triangles
     found = {
-        "vertices": vertices, "leaves": leaves,
+        "vertices": vertices,
+        "leaves": leaves,
         "nodes": 2 * leaves - 1 if leaves else 0,
         "position_bytes": 2 * 3 * step.vertices_t0.dtype.itemsize * vertices,
-        "node_pairs": stats["node_pairs"], "leaf_pairs": stats["leaf_pairs"],
+        "node_pairs": stats["node_pairs"],
+        "leaf_pairs": stats["leaf_pairs"],
         # A leaf with itself is one.
         "leaf_visits": 2 * stats["leaf_pairs"] - min(leaves, stats["leaf_pairs"]),
         "candidates": _both(stats, "candidates"),
         "tested": _both(stats, "candidates") - _both(stats, "rejected_slabs"),
-    }  # fmt: skip
+    }
     for kind in ("vf", "ee"):
         after = stats[f"{kind}_candidates"] - stats[f"{kind}_rejected_slabs"]
         found[f"{kind}_outside"] = stats[f"{kind}_rejected_projection"]

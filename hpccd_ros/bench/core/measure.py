@@ -74,9 +74,12 @@ class CoreRunner:
         found = self._ask(self._detector, step)
         end = time.perf_counter()
         return Sample(
-            1e3 * (end - began), found.hash, len(found), dict(self._detector.profile),
+            1e3 * (end - began),
+            found.hash,
+            len(found),
+            dict(self._detector.profile),
             dict(self._detector.stats),
-        )  # fmt: skip
+        )
 
     def _as_wanted(self, step):
         if self._variant.change is None:

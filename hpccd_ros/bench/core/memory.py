@@ -31,8 +31,9 @@ BYTES_OF_A_PAIR = 8
 
 def configure(parser):
     command.configure(parser, default=("data", *TABLE_1), steps=None, rounds=5)
-    parser.add_argument("--methods", default="default", metavar="NAME,...",
-                        help=f"of {', '.join(METHODS)} (default: %(default)s)")  # fmt: skip
+    parser.add_argument(
+        "--methods", default="default", metavar="NAME,...", help=f"of {', '.join(METHODS)} (default: %(default)s)"
+    )
     command.tier_option(parser)
     command.threads_option(parser)
 
@@ -61,13 +62,17 @@ def _median_peak(path, args, method, bar):
     """The run whose peak is the median."""
     runs = []
     for _ in range(args.repeat):
-        options = None if method is None else {
-            "accuracy": args.accuracy, "backend": "cpu", "threads": args.threads, "method": method
-        }  # fmt: skip
+        options = (
+            None
+            if method is None
+            else {"accuracy": args.accuracy, "backend": "cpu", "threads": args.threads, "method": method}
+        )
         child = subprocess.run(
             [sys.executable, "-m", "hpccd_ros.bench.core.memory_process", str(path), json.dumps(options)],
-            capture_output=True, text=True, check=True,
-        )  # fmt: skip
+            capture_output=True,
+            text=True,
+            check=True,
+        )
         runs.append(json.loads(child.stdout))
         bar.step(f"{runs[-1]['peak_bytes'] / 2**20:.0f} MB")
     return sorted(runs, key=lambda run: run["peak_bytes"])[len(runs) // 2]
@@ -98,13 +103,32 @@ def _print(report):
         return
     table.show(
         f"peak memory of a step, {report.rows[0]['accuracy']}, {report.rows[0]['threads']} threads",
-        ["scene", "method", "triangles", "contacts", "detector MB", "bytes / triangle", "process MB",
-         "bytes / triangle", "candidate pairs", "all candidates MB"],
         [
-            [r["scene"], r["method"], r["triangles"], r["contacts"], r["detector_bytes"] / mega,
-             round(r["detector_bytes_per_triangle"]), r["process_bytes"] / mega, round(r["process_bytes_per_triangle"]),
-             r["candidates"], r["all_candidates_bytes"] / mega]
+            "scene",
+            "method",
+            "triangles",
+            "contacts",
+            "detector MB",
+            "bytes / triangle",
+            "process MB",
+            "bytes / triangle",
+            "candidate pairs",
+            "all candidates MB",
+        ],
+        [
+            [
+                r["scene"],
+                r["method"],
+                r["triangles"],
+                r["contacts"],
+                r["detector_bytes"] / mega,
+                round(r["detector_bytes_per_triangle"]),
+                r["process_bytes"] / mega,
+                round(r["process_bytes_per_triangle"]),
+                r["candidates"],
+                r["all_candidates_bytes"] / mega,
+            ]
             for r in report.rows
         ],
         "process: with result arrays, thread stacks and what building the hierarchy takes for a moment",
-    )  # fmt: skip
+    )

@@ -81,18 +81,37 @@ def _row(source, variant, series, args):
 def _print(report):
     table.show(
         f"methods and instruction sets ({report.rows[0]['accuracy']})",
-        ["scene", "variant", "threads", "median ms", "p95 ms", "time / default", "x scalar", "elementary ms",
-         "node pairs", "candidates", "same contacts"],
+        [
+            "scene",
+            "variant",
+            "threads",
+            "median ms",
+            "p95 ms",
+            "time / default",
+            "x scalar",
+            "elementary ms",
+            "node pairs",
+            "candidates",
+            "same contacts",
+        ],
         [
             [
-                r["scene"], r["variant"], r["threads"], r["median_ms"], r["p95_ms"], r["over_default"],
-                r["times_faster_than_scalar"], r["stages_ms"].get("elementary"), _whole(r["node_pairs"]),
-                _whole(r["candidates"]), r["same_contacts"],
+                r["scene"],
+                r["variant"],
+                r["threads"],
+                r["median_ms"],
+                r["p95_ms"],
+                r["over_default"],
+                r["times_faster_than_scalar"],
+                r["stages_ms"].get("elementary"),
+                _whole(r["node_pairs"]),
+                _whole(r["candidates"]),
+                r["same_contacts"],
             ]
             for r in report.rows
         ],
         "x scalar: over the scalar code with the same number of threads; counts of an average step",
-    )  # fmt: skip
+    )
 
 
 def _whole(count):

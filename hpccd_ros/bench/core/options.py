@@ -28,8 +28,13 @@ from hpccd_ros.scenes.scene import Mesh
 def configure(parser):
     command.configure(parser, default=("n-body-like-lr", "cloth-drop", "data"), steps=4)
     command.tier_option(parser, default="exact")
-    parser.add_argument("--landscape", type=int, default=200_000, metavar="N",
-                        help="triangles around the scene in the last two rows; 0: none (default: %(default)s)")
+    parser.add_argument(
+        "--landscape",
+        type=int,
+        default=200_000,
+        metavar="N",
+        help="triangles around the scene in the last two rows; 0: none (default: %(default)s)",
+    )
     command.threads_option(parser)
 
 
@@ -141,9 +146,16 @@ def _print(report):
         f"what each option saves ({report.rows[0]['accuracy']}, {report.rows[0]['threads']} threads)",
         ["scene", "option", "ms a step", "/ full", "contacts", "candidate pairs", "bounds + refit ms"],
         [
-            [r["scene"], r["option"], r["step_ms"], r["over_full"], round(r["contacts"]), round(r["candidates"]),
-             r["stages_ms"].get("bounds", 0) + r["stages_ms"].get("refit", 0)]
+            [
+                r["scene"],
+                r["option"],
+                r["step_ms"],
+                r["over_full"],
+                round(r["contacts"]),
+                round(r["candidates"]),
+                r["stages_ms"].get("bounds", 0) + r["stages_ms"].get("refit", 0),
+            ]
             for r in report.rows
         ],
         "averages over the steps of the medians over the rounds",
-    )  # fmt: skip
+    )

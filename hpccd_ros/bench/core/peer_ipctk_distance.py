@@ -34,8 +34,10 @@ class DistancePeer(PeerRunner):
 
     def _proximity(self) -> Sample:
         collisions = self._ipctk.NormalCollisions()
-        return _timed(lambda: collisions.build(self._mesh, self._end, self._distance, 0.0, self._ipctk.LBVH()),
-                      lambda built: len(collisions))  # fmt: skip
+        return _timed(
+            lambda: collisions.build(self._mesh, self._end, self._distance, 0.0, self._ipctk.LBVH()),
+            lambda built: len(collisions),
+        )
 
     def _intersections(self) -> Sample:
         return _timed(lambda: self._ipctk.has_intersections(self._mesh, self._end, self._ipctk.LBVH()), int)

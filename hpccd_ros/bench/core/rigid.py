@@ -37,15 +37,33 @@ _COUNTS = ("queries", "touching", "apart", "reported", "missed", "late", "beyond
 def configure(parser):
     what = parser.add_argument_group("what is measured")
     what.add_argument("--parts", default=",".join(PARTS), metavar="NAME,...", help="default: %(default)s")
-    what.add_argument("--queries", type=int, default=100_000, metavar="N",
-                      help="of truth, for screws and for joints each (default: %(default)s)")  # fmt: skip
+    what.add_argument(
+        "--queries",
+        type=int,
+        default=100_000,
+        metavar="N",
+        help="of truth, for screws and for joints each (default: %(default)s)",
+    )
     what.add_argument("--seed", type=int, default=1, metavar="N", help="of truth and bounds (default: %(default)s)")
-    what.add_argument("--turns", default="1,5,20", metavar="DEG,...",
-                      help="of cost: degrees of the body or of each joint (default: %(default)s)")  # fmt: skip
-    what.add_argument("--tolerances", default="1e-2,1e-3,1e-4", metavar="D,...",
-                      help="of cost; the radius of the ball is 0.5 (default: %(default)s)")  # fmt: skip
-    what.add_argument("--size", type=float, default=1.0, metavar="X",
-                      help="of cost: factor on the triangles of the cloth (default: %(default)s)")  # fmt: skip
+    what.add_argument(
+        "--turns",
+        default="1,5,20",
+        metavar="DEG,...",
+        help="of cost: degrees of the body or of each joint (default: %(default)s)",
+    )
+    what.add_argument(
+        "--tolerances",
+        default="1e-2,1e-3,1e-4",
+        metavar="D,...",
+        help="of cost; the radius of the ball is 0.5 (default: %(default)s)",
+    )
+    what.add_argument(
+        "--size",
+        type=float,
+        default=1.0,
+        metavar="X",
+        help="of cost: factor on the triangles of the cloth (default: %(default)s)",
+    )
     command.repeat_option(what, 15, "cost")
     command.tier_option(parser, "exact")
     command.threads_option(parser)
@@ -87,11 +105,14 @@ def _truth(report, args):
                     parts += float(answers.parts.sum())
                     bar.step(motion)
                 row = report.add(
-                    part="truth", motion=motion, kind=kind,
+                    part="truth",
+                    motion=motion,
+                    kind=kind,
                     **{name: sum(getattr(v, name) for v in verdicts) for name in _COUNTS},
                     worst_excess=max(v.worst_excess for v in verdicts),
-                    parts=parts / each, us_a_query=1e6 * seconds / each,
-                )  # fmt: skip
+                    parts=parts / each,
+                    us_a_query=1e6 * seconds / each,
+                )
                 for name in ("missed", "late", "beyond", "open"):
                     if row[name]:
                         report.failure(f"{motion}, {kind}: {row[name]} {name}")
@@ -117,14 +138,41 @@ def _print(report):
     if of["cost"]:
         table.show(
             "a step moved by poses beside the same on straight lines",
-            ["scene", "turn, deg", "tolerance", "parts", "bound", "straight", "moved", "/", "least: straight", "moved",
-             "/", "outside", "contacts", "moved"],
             [
-                [row["scene"], row["turn"], f"{row['tolerance']:g}", row["parts"], row["bound"], row["linear_ms"],
-                 row["moved_ms"], row["over_linear"], row["least_linear_ms"], row["least_moved_ms"],
-                 row["least_over_linear"], row["least_outside_ms"], row["linear_contacts"], row["contacts"]]
+                "scene",
+                "turn, deg",
+                "tolerance",
+                "parts",
+                "bound",
+                "straight",
+                "moved",
+                "/",
+                "least: straight",
+                "moved",
+                "/",
+                "outside",
+                "contacts",
+                "moved",
+            ],
+            [
+                [
+                    row["scene"],
+                    row["turn"],
+                    f"{row['tolerance']:g}",
+                    row["parts"],
+                    row["bound"],
+                    row["linear_ms"],
+                    row["moved_ms"],
+                    row["over_linear"],
+                    row["least_linear_ms"],
+                    row["least_moved_ms"],
+                    row["least_over_linear"],
+                    row["least_outside_ms"],
+                    row["linear_contacts"],
+                    row["contacts"],
+                ]
                 for row in of["cost"]
             ],
             "ms: medians of the rounds, in turn, then the least; outside: of the core; bound: of the pair that has the "
             "greatest",
-        )  # fmt: skip
+        )

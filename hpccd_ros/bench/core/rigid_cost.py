@@ -75,8 +75,13 @@ def rows(turns: list[float], tolerances: list[float], args) -> Iterator[dict]:
         detectors = _Detectors(*(hc.Detector(scene, **options) for scene in scenes))
         for turn in turns:
             for tolerance in tolerances:
-                yield {"scene": subject.name, "triangles": subject.triangles, "turn": turn, "tolerance": tolerance,
-                       **_measure(detectors, subject, turn, tolerance, args.repeat)}  # fmt: skip
+                yield {
+                    "scene": subject.name,
+                    "triangles": subject.triangles,
+                    "turn": turn,
+                    "tolerance": tolerance,
+                    **_measure(detectors, subject, turn, tolerance, args.repeat),
+                }
 
 
 def _measure(detectors, subject, turn, tolerance, rounds):

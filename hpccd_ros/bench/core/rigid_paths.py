@@ -90,8 +90,11 @@ class ScrewPaths:
         c = self.shifts[:, 1].astype(kind) - self.shifts[:, 0].astype(kind)
         once = _cross(axis, c)
         safe = np.where(half == 0, kind(1), half)
-        cotangent = np.where(half < 0.01, half**2 / 3 + half**4 / 45 + 2 * half**6 / 945 + half**8 / 4725,
-                             1 - half * np.cos(half) / np.sin(safe))[:, None]  # fmt: skip
+        cotangent = np.where(
+            half < 0.01,
+            half**2 / 3 + half**4 / 45 + 2 * half**6 / 945 + half**8 / 4725,
+            1 - half * np.cos(half) / np.sin(safe),
+        )[:, None]
         twist = c - half[:, None] * once + cotangent * _cross(axis, once)
         vector, scalar = q[:, 0, None, :3], q[:, 0, None, 3:]
         p = self.points.astype(kind)

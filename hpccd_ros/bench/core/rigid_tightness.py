@@ -49,8 +49,11 @@ def _turned_by(rng, paths, turn, cancel):
     """Each joint by at most so much, in radians or in lengths of a link."""
     speeds = turn * rng.uniform(-1, 1, paths.values[:, 0].shape)
     if cancel:  # all axes parallel, and the last turn takes all others back
-        paths = replace(paths, axes=np.tile([0.0, 0.0, 1.0], (*paths.turns.shape, 1)),
-                        quaternions=np.tile([0.0, 0.0, 0.0, 1.0], (*paths.turns.shape, 1)))  # fmt: skip
+        paths = replace(
+            paths,
+            axes=np.tile([0.0, 0.0, 1.0], (*paths.turns.shape, 1)),
+            quaternions=np.tile([0.0, 0.0, 0.0, 1.0], (*paths.turns.shape, 1)),
+        )
         turning = speeds * paths.turns
         last = paths.turns.shape[1] - 1 - paths.turns[:, ::-1].argmax(axis=1)
         rows = np.arange(len(last))

@@ -27,8 +27,9 @@ from hpccd_ros.bench.report.timing import times
 
 def configure(parser):
     what = parser.add_argument_group("what is measured")
-    what.add_argument("--segments", default="100000", metavar="N,...",
-                      help="how many in a scene (default: %(default)s)")  # fmt: skip
+    what.add_argument(
+        "--segments", default="100000", metavar="N,...", help="how many in a scene (default: %(default)s)"
+    )
     what.add_argument("--segments-a-rope", type=int, default=500, metavar="N", help="default: %(default)s")
     command.repeat_option(what, 15)
     command.tier_option(parser, "exact")

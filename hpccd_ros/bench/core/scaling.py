@@ -63,8 +63,9 @@ def run(args) -> int:
                 f"{method}, {n} threads",
                 {"accuracy": args.accuracy, "backend": args.backend, "threads": n, "method": method},
             )
-            for method in methods for n in counts
-        }  # fmt: skip
+            for method in methods
+            for n in counts
+        }
         runners = [measure.CoreRunner(variant) for variant in variants.values()]
         independent = _independent(args, methods, counts)
         series = measure.measure(source, [*runners, *independent.values()], args.repeat, args.steps)
@@ -139,11 +140,18 @@ def _print(report):
         ["scene", "method", "threads", "median ms", "p95 ms", "speed-up", "efficiency", "of independent", *COMPONENTS],
         [
             [
-                r["scene"], r["method"], r["threads"], r["median_ms"], r["p95_ms"], r.get("speedup"),
-                r.get("efficiency"), of_given(r), *(r.get("component_speedup", {}).get(name) for name in COMPONENTS),
+                r["scene"],
+                r["method"],
+                r["threads"],
+                r["median_ms"],
+                r["p95_ms"],
+                r.get("speedup"),
+                r.get("efficiency"),
+                of_given(r),
+                *(r.get("component_speedup", {}).get(name) for name in COMPONENTS),
             ]
             for r in report.rows
         ],
         "median and p95 over all steps and rounds; speed-up of the sequence of steps, then of its components; "
         "independent: as many detectors of one thread each at once, which share nothing: what the machine gives",
-    )  # fmt: skip
+    )

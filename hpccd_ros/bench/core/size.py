@@ -27,10 +27,19 @@ DEFAULT = ("cloth-ball-like", "n-body-like-hr")
 
 def configure(parser):
     command.configure(parser, default=DEFAULT, steps=4, size=False)
-    parser.add_argument("--sizes", default="0.25,1,4", metavar="X,...",
-                        help="factors on the triangles of each scene (default: %(default)s)")
-    parser.add_argument("--last-part", type=float, default=0.5, metavar="P",
-                        help="steps are spread over this last part of the motion, 0 to 1 (default: %(default)s)")
+    parser.add_argument(
+        "--sizes",
+        default="0.25,1,4",
+        metavar="X,...",
+        help="factors on the triangles of each scene (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--last-part",
+        type=float,
+        default=0.5,
+        metavar="P",
+        help="steps are spread over this last part of the motion, 0 to 1 (default: %(default)s)",
+    )
     parser.add_argument("--threads-list", metavar="N,...", help="default: 1 and all cores")
     command.tier_option(parser)
 
@@ -50,9 +59,7 @@ def run(args) -> int:
         for size in sizes:
             source = _last_part(of_scene(name, size), args.last_part)
             runners = [
-                measure.CoreRunner(
-                    Variant(f"{n} threads", {"accuracy": args.accuracy, "backend": "cpu", "threads": n})
-                )
+                measure.CoreRunner(Variant(f"{n} threads", {"accuracy": args.accuracy, "backend": "cpu", "threads": n}))
                 for n in threads
             ]
             series = measure.measure(source, runners, args.repeat, args.steps)
@@ -63,8 +70,11 @@ def run(args) -> int:
     slopes = [_slope(report.rows, name, n) for name in names for n in threads] if len(sizes) > 1 else []
     _print(report, slopes)
     for entry in slopes:
-        report.note("{scene}, {threads} threads: time ~ triangles^{time:.3f}, contacts ~ triangles^{contacts:.3f}"
-                    .format(**entry))  # fmt: skip
+        report.note(
+            "{scene}, {threads} threads: time ~ triangles^{time:.3f}, contacts ~ triangles^{contacts:.3f}".format(
+                **entry
+            )
+        )
     return command.end(args, report)
 
 
@@ -106,15 +116,33 @@ def _slope(rows, name, threads):
 def _print(report, slopes):
     table.show(
         f"time and memory against size ({report.rows[0]['accuracy']})",
-        ["scene", "size", "threads", "triangles", "contacts", "candidates", "ms a step", "us / 1000 triangles",
-         "bytes / triangle"],
         [
-            [r["scene"], r["size"], r["threads"], r["triangles"], round(r["contacts"]), round(r["candidates"]),
-             r["step_ms"], 1e6 * r["step_ms"] / r["triangles"], round(r["bytes_per_triangle"])]
+            "scene",
+            "size",
+            "threads",
+            "triangles",
+            "contacts",
+            "candidates",
+            "ms a step",
+            "us / 1000 triangles",
+            "bytes / triangle",
+        ],
+        [
+            [
+                r["scene"],
+                r["size"],
+                r["threads"],
+                r["triangles"],
+                round(r["contacts"]),
+                round(r["candidates"]),
+                r["step_ms"],
+                1e6 * r["step_ms"] / r["triangles"],
+                round(r["bytes_per_triangle"]),
+            ]
             for r in report.rows
         ],
         "ms a step: the average over the steps of the median over the rounds",
-    )  # fmt: skip
+    )
     if slopes:
         table.show(
             "exponents over the number of triangles (1: linear)",

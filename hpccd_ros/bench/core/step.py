@@ -36,8 +36,9 @@ PEER = peer_ipctk.PeerRunner.name
 def configure(parser):
     command.configure(parser, default=("data", *SCENES), steps=4)
     parser.add_argument("--backend", default="cpu", choices=BACKENDS, help="default: %(default)s")
-    parser.add_argument("--arrays", choices=("host", "device"), default="host",
-                        help="where the positions lie (default: %(default)s)")
+    parser.add_argument(
+        "--arrays", choices=("host", "device"), default="host", help="where the positions lie (default: %(default)s)"
+    )
     command.tier_option(parser, default="exact")
     command.threads_option(parser)
     parser.add_argument("--peer", choices=(PEER,), help="ask this peer for the earliest time of the same, in turn")
@@ -102,16 +103,32 @@ def _row(source, runner, series, args):
 def _print(report, args):
     table.show(
         f"how far a step may go, {args.accuracy}, {args.backend}, {args.threads or cores()} threads",
-        ["scene", "query", "contacts", "earliest", "ms", "least", "/ all", "least", "listing",
-         *(["ipctk ms", "x ipctk"] if args.peer else [])],
+        [
+            "scene",
+            "query",
+            "contacts",
+            "earliest",
+            "ms",
+            "least",
+            "/ all",
+            "least",
+            "listing",
+            *(["ipctk ms", "x ipctk"] if args.peer else []),
+        ],
         [
             [
-                row["scene"], row["query"], row["contacts"] if row["query"] in ("all", "first") else None,
-                row["earliest"], row["step_ms"], row["least_ms"], row["over_all"], row["least_over_all"],
+                row["scene"],
+                row["query"],
+                row["contacts"] if row["query"] in ("all", "first") else None,
+                row["earliest"],
+                row["step_ms"],
+                row["least_ms"],
+                row["over_all"],
+                row["least_over_all"],
                 row.get("listing_ms"),
                 *([row.get("ipctk_ms"), row.get("times_faster_than_ipctk")] if args.peer else []),
             ]
             for row in report.rows
         ],
         "ms: an average step, the median over the rounds, then the least; earliest: time, an average over the steps",
-    )  # fmt: skip
+    )

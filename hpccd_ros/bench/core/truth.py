@@ -55,8 +55,12 @@ def of_queries(hit, toc, true_hit, true_toc, sizes=1.0) -> Errors:
     """All (Q,): answers to queries and what is true. toc: of proximity the distances, with the sizes of the queries."""
     both = hit & true_hit
     sizes = np.broadcast_to(sizes, hit.shape)
-    return _errors(int(true_hit.sum()), int((true_hit & ~hit).sum()), int((hit & ~true_hit).sum()),
-                   (toc[both] - true_toc[both]) / sizes[both])  # fmt: skip
+    return _errors(
+        int(true_hit.sum()),
+        int((true_hit & ~hit).sum()),
+        int((hit & ~true_hit).sum()),
+        (toc[both] - true_toc[both]) / sizes[both],
+    )
 
 
 def _errors(true, missed, invented, late):

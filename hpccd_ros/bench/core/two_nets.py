@@ -33,6 +33,8 @@ def step(n: int) -> Step:
     faces = sheet(n, n)
     above, after = np.float32([0.3, 0.4, 0.2]), np.float32([0.3, 0.4, -0.1])
     return Step(
-        (Mesh("a", faces, n * n), Mesh("b", faces, n * n)), 0,
-        np.concatenate([start, start + above]), np.concatenate([end, end + after]),
-    )  # fmt: skip
+        (Mesh("a", faces, n * n), Mesh("b", faces, n * n)),
+        0,
+        np.concatenate([start, start + above]),
+        np.concatenate([end, end + after]),
+    )

@@ -63,8 +63,10 @@ def _steps(source, worlds):
 
 def _measure(report, source, worlds, args):
     steps = _steps(source, worlds)
-    start, end = (np.stack([getattr(steps[k % len(steps)], name) for k in range(worlds)])
-                  for name in ("vertices_t0", "vertices_t1"))  # fmt: skip
+    start, end = (
+        np.stack([getattr(steps[k % len(steps)], name) for k in range(worlds)])
+        for name in ("vertices_t0", "vertices_t1")
+    )
     scene, threads = steps[0].scene(), args.threads or cores()
     tier = {"backend": "cpu", "accuracy": args.accuracy}
     single = [hc.Detector(scene, threads=1, **tier)]
@@ -138,10 +140,32 @@ def _compare(report, what, found, worlds):
 def _print(report):
     table.show(
         f"many worlds, {report.rows[0]['accuracy']}, threads: {report.rows[0]['threads']}; median ms of all worlds",
-        ["scene", "triangles", "steps", "worlds", "one call", "of all threads", "1 thread", "one detector",
-         "W detectors", "bytes a world"],
-        [[r["scene"], r["triangles"], r["steps"], r["worlds"], r["one_call_ms"], r["of_all_threads"],
-          r["one_thread_ms"], r["one_detector_ms"], r.get("detectors_ms"), round(r["bytes_a_world"])]
-         for r in report.rows],
+        [
+            "scene",
+            "triangles",
+            "steps",
+            "worlds",
+            "one call",
+            "of all threads",
+            "1 thread",
+            "one detector",
+            "W detectors",
+            "bytes a world",
+        ],
+        [
+            [
+                r["scene"],
+                r["triangles"],
+                r["steps"],
+                r["worlds"],
+                r["one_call_ms"],
+                r["of_all_threads"],
+                r["one_thread_ms"],
+                r["one_detector_ms"],
+                r.get("detectors_ms"),
+                round(r["bytes_a_world"]),
+            ]
+            for r in report.rows
+        ],
         "detectors have one thread and are asked for one world at a time; of all threads: by time inside the core",
-    )  # fmt: skip
+    )

@@ -26,10 +26,17 @@ METHOD = {"default": BLUE, "published": GREEN, "naive": RED, "front": PURPLE, "i
 GPUS = (GREY, BLUE, ORANGE, GREEN, RED)
 # Stages in the order in which they run; the paper's four components (section 6.2) have four families of colour.
 STAGE = {
-    "bounds": "#9ecae1", "refit": "#4292c6", "build": "#08519c",
-    "traverse": GREEN, "elementary": ORANGE, "contacts": PURPLE, "other": GREY, "outside": "#cccccc",
-    "broad": "#c7e9c0", "narrow": "#fdd49e",
-}  # fmt: skip
+    "bounds": "#9ecae1",
+    "refit": "#4292c6",
+    "build": "#08519c",
+    "traverse": GREEN,
+    "elementary": ORANGE,
+    "contacts": PURPLE,
+    "other": GREY,
+    "outside": "#cccccc",
+    "broad": "#c7e9c0",
+    "narrow": "#fdd49e",
+}
 NODE_PART = {"in": BLUE, "hand over": SKY, "answer": ORANGE, "out": GREEN}
 # Where an error of exactly zero is drawn on a logarithmic axis.
 TOC_FLOOR, SHARE_FLOOR = 1e-17, 1e-5
@@ -121,8 +128,16 @@ def _hybrid(axis, rows):
         for mine in sorted(drawing.by([r for r in rows if r["method"] == method], "gpus"), key=lambda m: m[0]["gpus"]):
             gpus = mine[0]["gpus"]
             count = "no GPU" if gpus == 0 else "1 GPU" if gpus == 1 else f"{gpus} GPUs"
-            drawing.line(axis, mine, "threads", "speedup", linestyle=style, color=GPUS[gpus % len(GPUS)],
-                         marker=MARKERS[gpus % len(MARKERS)], label=f"{method}, {count}")  # fmt: skip
+            drawing.line(
+                axis,
+                mine,
+                "threads",
+                "speedup",
+                linestyle=style,
+                color=GPUS[gpus % len(GPUS)],
+                marker=MARKERS[gpus % len(MARKERS)],
+                label=f"{method}, {count}",
+            )
     axis.set_xscale("log", base=2)
     axis.set_yscale("log")  # the two methods are ten times apart
     axis.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
@@ -135,8 +150,14 @@ def _size(axis, rows):
         n, style = mine[0]["threads"], {"marker": MARKERS[place], "color": SERIES[place]}
         drawing.line(axis, mine, "triangles", "step_ms", label="1 thread" if n == 1 else f"{n} threads", **style)
         x = [row["triangles"] for row in mine]
-        axis.plot(x, [mine[0]["step_ms"] * t / x[0] for t in x], color="black", linewidth=0.8, linestyle=":",
-                  label=None if place else "linear")  # fmt: skip
+        axis.plot(
+            x,
+            [mine[0]["step_ms"] * t / x[0] for t in x],
+            color="black",
+            linewidth=0.8,
+            linestyle=":",
+            label=None if place else "linear",
+        )
     axis.set_xscale("log")
     axis.set_yscale("log")
     # Only what was measured: the axis's own labels run into one another on little more than a decade.
@@ -169,8 +190,13 @@ def _latency_heading(rows) -> str:
 
 
 def _tier_marker(row) -> dict:
-    return {"linestyle": "", "marker": BACKEND[row["backend"]], "color": TIER[row["accuracy"]], "markersize": 8,
-            "fillstyle": "none" if row["simd"] == "scalar" else "full"}  # fmt: skip
+    return {
+        "linestyle": "",
+        "marker": BACKEND[row["backend"]],
+        "color": TIER[row["accuracy"]],
+        "markersize": 8,
+        "fillstyle": "none" if row["simd"] == "scalar" else "full",
+    }
 
 
 def _tiers(axis, rows):
@@ -184,8 +210,13 @@ def _tiers(axis, rows):
         if row["backend"] == "cpu" and row["simd"] != "scalar":
             handles[row["accuracy"]] = point
         if row["missed"] + row["invented"]:
-            axis.annotate(f"{row['missed']} missed, {row['invented']} invented", (row["step_ms"], y),
-                          textcoords="offset points", xytext=(7, -2), fontsize=7)  # fmt: skip
+            axis.annotate(
+                f"{row['missed']} missed, {row['invented']} invented",
+                (row["step_ms"], y),
+                textcoords="offset points",
+                xytext=(7, -2),
+                fontsize=7,
+            )
     others = {"scalar code": {"simd": "scalar"}} if len({row["simd"] for row in rows}) > 1 else {}
     if len(backends := {row["backend"] for row in rows}) > 1:
         others |= {backend: {"backend": backend, "simd": "auto"} for backend in BACKEND if backend in backends}
@@ -204,8 +235,17 @@ def _sweep(axis, rows):
         tier = mine[0]["accuracy"]
         # An offset of zero is drawn one decade below the first.
         drawn = [{"at": row["at"] or 0.1, "share": max(row["wrong_share"], SHARE_FLOOR)} for row in mine]
-        drawing.line(axis, drawn, "at", "share", marker=MARKERS[place], color=TIER[tier], markersize=9 - 2 * place,
-                     linewidth=1.3, label=tier)  # fmt: skip
+        drawing.line(
+            axis,
+            drawn,
+            "at",
+            "share",
+            marker=MARKERS[place],
+            color=TIER[tier],
+            markersize=9 - 2 * place,
+            linewidth=1.3,
+            label=tier,
+        )
     axis.set_xscale("log")
     axis.set_yscale("log")
     axis.set_ylim(SHARE_FLOOR / 2, 1)
@@ -215,40 +255,137 @@ def _sweep(axis, rows):
 
 
 FIGURES = (
-    Figure("cpu", "cpu", "Time of an average step, {accuracy}, {threads} threads", _stages, kept="cpu-4-cores",
-           heading=_triangles, size=(4, 3.5, 2.6), legend="right"),
-    Figure("scaling", "scaling", "Speed-up against threads, {accuracy} (after Kim et al. 2009, Fig. 7)", _speedup,
-           rows=lambda row: "speedup" in row, kept="scaling-4-cores", overview=_speedup_of_all, legend="first"),
-    Figure("threads", "scaling", "Time of a step against threads, {accuracy} (after Kim et al. 2009, Fig. 6)", _threads,
-           rows=lambda row: row["method"] != "independent", heading=_triangles, legend="first"),
-    Figure("hybrid", "gpu", "Hybrid: speed-up by threads and GPUs, {accuracy} (Kim et al. 2009, Fig. 6)", _hybrid,
-           rows=lambda row: row["part"] == "threads and GPUs", kept="gpu-2-h200-32-cores", size=(3, 3.8, 3.4),
-           legend="first"),
-    Figure("accuracy", "accuracy", "What each tier costs and how far its times are off, {threads} threads", _tiers,
-           rows=whole_scene, kept="accuracy-4-cores", size=(3, 3.9, 3.2), legend="right",
-           heading=lambda rows: f"{rows[0]['scene']}, {rows[0]['contacts']:,.0f} contacts", right="center"),
-    Figure("accuracy-sweeps", "accuracy", "Where each tier begins to err (rational arithmetic is the truth)", _sweep,
-           rows=lambda row: row["part"] == "sweep", kept="accuracy-4-cores", panel=("queries", "sweep"),
-           heading=lambda rows: f"{rows[0]['queries']} queries", size=(2, 4.6, 2.8), legend="first"),
-    Figure("trade", "accuracy", "What each setting costs and how wrong it is", panels_trade.panel,
-           rows=lambda row: row["part"] == "scene", kept="accuracy-trade-h200-16-cores", points=panels_trade.points,
-           panel=("asked", "quantity"), heading=panels_trade.heading, size=(2, 4.6, 2.7), legend="right",
-           right="center"),
-    Figure("distance", "distance", "Distance queries, {accuracy}, {threads} threads", panels_distance.against_distance,
-           kept="distance-2-cores", heading=panels_distance.heading, size=(3, 3.5, 3.0), legend="right"),
-    Figure("accuracy-distance", "accuracy", "Where each tier errs in distance queries made to be hard",
-           panels_distance.wrong_answers, rows=lambda row: row["part"] == "hard distance", panel=("query",),
-           kept="accuracy-distance-2-cores", heading=panels_distance.queries, size=(3, 3.9, 1.7), legend="right"),
-    Figure("limit", "limit", "Where the time goes; blue: the least that this machine needs for the same work",
-           panels_limit.stages, rows=panels_limit.of_a_stage, kept="limit-2-cores", panel=("scene", "threads"),
-           heading=panels_limit.heading, size=(2, 4.4, 2.1)),
-    Figure("methods", "methods", "Methods and instruction sets, {accuracy}, {threads} threads", _variants,
-           size=(3, 3.8, 2.8)),
+    Figure(
+        "cpu",
+        "cpu",
+        "Time of an average step, {accuracy}, {threads} threads",
+        _stages,
+        kept="cpu-4-cores",
+        heading=_triangles,
+        size=(4, 3.5, 2.6),
+        legend="right",
+    ),
+    Figure(
+        "scaling",
+        "scaling",
+        "Speed-up against threads, {accuracy} (after Kim et al. 2009, Fig. 7)",
+        _speedup,
+        rows=lambda row: "speedup" in row,
+        kept="scaling-4-cores",
+        overview=_speedup_of_all,
+        legend="first",
+    ),
+    Figure(
+        "threads",
+        "scaling",
+        "Time of a step against threads, {accuracy} (after Kim et al. 2009, Fig. 6)",
+        _threads,
+        rows=lambda row: row["method"] != "independent",
+        heading=_triangles,
+        legend="first",
+    ),
+    Figure(
+        "hybrid",
+        "gpu",
+        "Hybrid: speed-up by threads and GPUs, {accuracy} (Kim et al. 2009, Fig. 6)",
+        _hybrid,
+        rows=lambda row: row["part"] == "threads and GPUs",
+        kept="gpu-2-h200-32-cores",
+        size=(3, 3.8, 3.4),
+        legend="first",
+    ),
+    Figure(
+        "accuracy",
+        "accuracy",
+        "What each tier costs and how far its times are off, {threads} threads",
+        _tiers,
+        rows=whole_scene,
+        kept="accuracy-4-cores",
+        size=(3, 3.9, 3.2),
+        legend="right",
+        heading=lambda rows: f"{rows[0]['scene']}, {rows[0]['contacts']:,.0f} contacts",
+        right="center",
+    ),
+    Figure(
+        "accuracy-sweeps",
+        "accuracy",
+        "Where each tier begins to err (rational arithmetic is the truth)",
+        _sweep,
+        rows=lambda row: row["part"] == "sweep",
+        kept="accuracy-4-cores",
+        panel=("queries", "sweep"),
+        heading=lambda rows: f"{rows[0]['queries']} queries",
+        size=(2, 4.6, 2.8),
+        legend="first",
+    ),
+    Figure(
+        "trade",
+        "accuracy",
+        "What each setting costs and how wrong it is",
+        panels_trade.panel,
+        rows=lambda row: row["part"] == "scene",
+        kept="accuracy-trade-h200-16-cores",
+        points=panels_trade.points,
+        panel=("asked", "quantity"),
+        heading=panels_trade.heading,
+        size=(2, 4.6, 2.7),
+        legend="right",
+        right="center",
+    ),
+    Figure(
+        "distance",
+        "distance",
+        "Distance queries, {accuracy}, {threads} threads",
+        panels_distance.against_distance,
+        kept="distance-2-cores",
+        heading=panels_distance.heading,
+        size=(3, 3.5, 3.0),
+        legend="right",
+    ),
+    Figure(
+        "accuracy-distance",
+        "accuracy",
+        "Where each tier errs in distance queries made to be hard",
+        panels_distance.wrong_answers,
+        rows=lambda row: row["part"] == "hard distance",
+        panel=("query",),
+        kept="accuracy-distance-2-cores",
+        heading=panels_distance.queries,
+        size=(3, 3.9, 1.7),
+        legend="right",
+    ),
+    Figure(
+        "limit",
+        "limit",
+        "Where the time goes; blue: the least that this machine needs for the same work",
+        panels_limit.stages,
+        rows=panels_limit.of_a_stage,
+        kept="limit-2-cores",
+        panel=("scene", "threads"),
+        heading=panels_limit.heading,
+        size=(2, 4.4, 2.1),
+    ),
+    Figure(
+        "methods",
+        "methods",
+        "Methods and instruction sets, {accuracy}, {threads} threads",
+        _variants,
+        size=(3, 3.8, 2.8),
+    ),
     Figure("options", "options", "What each option saves, {accuracy}, {threads} threads", _options, size=(3, 4.4, 2.9)),
     Figure("size", "size", "Time of a step against size, {accuracy}", _size, size=(3, 3.8, 3.0), legend="each"),
-    Figure("ros", "ros", "From publish to contacts: what the node adds to ROS", _latency, kept="ros-4-cores",
-           rows=lambda row: row["what"] == "latency", heading=_latency_heading, size=(2, 4.6, 2.2), legend="right"),
-)  # fmt: skip
+    Figure(
+        "ros",
+        "ros",
+        "From publish to contacts: what the node adds to ROS",
+        _latency,
+        kept="ros-4-cores",
+        rows=lambda row: row["what"] == "latency",
+        heading=_latency_heading,
+        size=(2, 4.6, 2.2),
+        legend="right",
+    ),
+)
 
 
 def draw(result, folder: Path) -> list[Path]:

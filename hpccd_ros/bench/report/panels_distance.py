@@ -9,8 +9,12 @@ from hpccd_ros.bench.report.drawing import BLUE, GREEN, ORANGE, PURPLE, RED
 BY_DISTANCE = {"separation": {"color": BLUE, "marker": "o"}, "proximity": {"color": GREEN, "marker": "s"}}
 # Without a distance: a level line.
 LEVEL = {"plain": "black", "intersections": ORANGE, "distances": PURPLE}
-LABEL = {"plain": "plain detection", "separation": "with separation d", "proximity": "proximity within d",
-         "distances": "smallest distances"}  # fmt: skip
+LABEL = {
+    "plain": "plain detection",
+    "separation": "with separation d",
+    "proximity": "proximity within d",
+    "distances": "smallest distances",
+}
 
 
 def heading(rows: list[dict]) -> str:
@@ -27,8 +31,9 @@ def against_distance(axis, rows: list[dict]) -> dict:
             label = LABEL.get(query, query)
             handles[label] = axis.axhline(row["step_ms"], color=colour, linewidth=1.5, label=label)
             if "ipctk_ms" in row:
-                handles[f"ipctk: {query}"] = axis.axhline(row["ipctk_ms"], color=colour, linewidth=1.2, linestyle="--",
-                                                          label=f"ipctk: {query}")  # fmt: skip
+                handles[f"ipctk: {query}"] = axis.axhline(
+                    row["ipctk_ms"], color=colour, linewidth=1.2, linestyle="--", label=f"ipctk: {query}"
+                )
     for query, style in BY_DISTANCE.items():
         if query not in of:
             continue

@@ -19,8 +19,13 @@ QUANTITIES = {
     "error": ("worst error of times (step = 1)", 1e-19),
 }
 SETTING = ("accuracy", "backend", "asked")
-ASKED = {"all": "all contacts", "first": "less: the earliest contact alone", "any": "less: any one contact",
-         "vertex_face": "less: vertices against faces", "edge_edge": "less: edges against edges"}  # fmt: skip
+ASKED = {
+    "all": "all contacts",
+    "first": "less: the earliest contact alone",
+    "any": "less: any one contact",
+    "vertex_face": "less: vertices against faces",
+    "edge_edge": "less: edges against edges",
+}
 
 
 def points(rows: Sequence[dict]) -> list[dict]:
@@ -36,18 +41,26 @@ def points(rows: Sequence[dict]) -> list[dict]:
             of = dict(zip(SETTING, _setting(row), strict=True)) | {"scene": row["scene"], "x": row["step_ms"] / base}
             found += [of | {"quantity": "wrong", "y": _wrong(row)}, of | {"quantity": "error", "y": row["toc_worst"]}]
     whole = [
-        mine[0] | {"scene": None, "x": math.exp(sum(math.log(p["x"]) for p in mine) / len(mine)),
-                   "y": max(p["y"] for p in mine)}
+        mine[0]
+        | {
+            "scene": None,
+            "x": math.exp(sum(math.log(p["x"]) for p in mine) / len(mine)),
+            "y": max(p["y"] for p in mine),
+        }
         for mine in drawing.by(found, "quantity", *SETTING)
-    ]  # fmt: skip
+    ]
     asked = list(dict.fromkeys(_setting(row)[2] for row in rows))
     every = sorted(found + whole, key=lambda p: (asked.index(p["asked"]), list(QUANTITIES).index(p["quantity"])))
     times = [p["x"] for p in every]
     return [
-        p | {"x_range": (min(times), max(times)), "lowest": p["asked"] == every[-1]["asked"],
-             "y_most": max(q["y"] for q in every if q["quantity"] == p["quantity"])}
+        p
+        | {
+            "x_range": (min(times), max(times)),
+            "lowest": p["asked"] == every[-1]["asked"],
+            "y_most": max(q["y"] for q in every if q["quantity"] == p["quantity"]),
+        }
         for p in every
-    ]  # fmt: skip
+    ]
 
 
 def _setting(row) -> tuple[str, str, str]:
@@ -77,9 +90,15 @@ def panel(axis, rows: Sequence[dict]) -> dict:
     low, high = axis.get_xlim()
     for p in best:
         left = p["x"] > low * (high / low) ** 0.3  # else words would stand on those of the axis
-        axis.annotate(f"{p['accuracy']}, {p['backend']}", (p["x"], _height(p, floor)), textcoords="offset points",
-                      xytext=(-6 if left else 6, -9), ha="right" if left else "left", fontsize=6.5,
-                      color="#333333")  # fmt: skip
+        axis.annotate(
+            f"{p['accuracy']}, {p['backend']}",
+            (p["x"], _height(p, floor)),
+            textcoords="offset points",
+            xytext=(-6 if left else 6, -9),
+            ha="right" if left else "left",
+            fontsize=6.5,
+            color="#333333",
+        )
     return _legend(whole)
 
 
@@ -125,9 +144,13 @@ def _legend(whole) -> dict:
     def mark(**style):
         return Line2D([], [], **{"linestyle": "", "marker": "o", "color": "grey", "markersize": 7} | style)
 
-    tiers = {tier: mark(color=colour, marker="s") for tier, colour in TIER.items()
-             if any(p["accuracy"] == tier for p in whole)}  # fmt: skip
-    backends = {name: mark(marker=marker) for name, marker in BACKEND.items()
-                if any(p["backend"] == name for p in whole)}  # fmt: skip
+    tiers = {
+        tier: mark(color=colour, marker="s")
+        for tier, colour in TIER.items()
+        if any(p["accuracy"] == tier for p in whole)
+    }
+    backends = {
+        name: mark(marker=marker) for name, marker in BACKEND.items() if any(p["backend"] == name for p in whole)
+    }
     line = Line2D([], [], color="black", linewidth=0.8)
     return tiers | backends | {"one scene": mark(markersize=2.5), "nothing cheaper\nis as good": line}

@@ -17,19 +17,44 @@ def peer(result: Kept) -> list[str]:
     rows = []
     for mine in by(result.rows, "scene"):
         every, first, peer = (next(r for r in mine if r["variant"] == v) for v in ("cpu all", "cpu first", "ipctk"))
-        rows.append([every["scene"], every["triangles"], every["contacts"], every["median_ms"], first["median_ms"],
-                     peer["median_ms"], f"{every['times_faster_than_ipctk']:.0f}"])  # fmt: skip
-    columns = ["scene", "triangles", "contacts", "hpccd, all contacts, ms", 'hpccd, `report="first"`, ms', "ipctk, ms",
-               "times faster"]  # fmt: skip
+        rows.append(
+            [
+                every["scene"],
+                every["triangles"],
+                every["contacts"],
+                every["median_ms"],
+                first["median_ms"],
+                peer["median_ms"],
+                f"{every['times_faster_than_ipctk']:.0f}",
+            ]
+        )
+    columns = [
+        "scene",
+        "triangles",
+        "contacts",
+        "hpccd, all contacts, ms",
+        'hpccd, `report="first"`, ms',
+        "ipctk, ms",
+        "times faster",
+    ]
     return markdown.table(columns, rows)
 
 
 def sequences(result: Kept) -> list[str]:
     rows = [
-        [r["scene"], r["triangles"], round(r["contacts"]), r["average_ms"], r["median_ms"], r["p95_ms"],
-         r["stages_ms"].get("build", 0.0), paper.TABLE_1_MS[r["scene"]]]
-        for r in result.rows if r["scene"] in paper.TABLE_1_MS and r["variant"] == "cpu all"
-    ]  # fmt: skip
+        [
+            r["scene"],
+            r["triangles"],
+            round(r["contacts"]),
+            r["average_ms"],
+            r["median_ms"],
+            r["p95_ms"],
+            r["stages_ms"].get("build", 0.0),
+            paper.TABLE_1_MS[r["scene"]],
+        ]
+        for r in result.rows
+        if r["scene"] in paper.TABLE_1_MS and r["variant"] == "cpu all"
+    ]
     columns = ["scene", "triangles", "contacts a step", "average ms", "median", "p95", "of it building", "2009"]
     return markdown.table(columns, rows)
 
@@ -58,10 +83,14 @@ def many_cores(*results: Kept) -> list[str]:
         return f"{found[0]:.2f}" if found else None
 
     lines = [
-        [mine[0]["scene"], *(speedup(mine, "default", n) for n in (4, 8, 16)), speedup(mine, "independent", 8),
-         *(speedup(mine, "naive", n) for n in (4, 8, 16))]
+        [
+            mine[0]["scene"],
+            *(speedup(mine, "default", n) for n in (4, 8, 16)),
+            speedup(mine, "independent", 8),
+            *(speedup(mine, "naive", n) for n in (4, 8, 16)),
+        ]
         for mine in by(rows, "scene")
-    ]  # fmt: skip
+    ]
     columns = ["scene", "4 threads", "8", "16", "8 independent detectors", "`naive`: 4", "8", "16"]
     return markdown.table(columns, lines)
 
@@ -85,11 +114,16 @@ def size(result: Kept) -> list[str]:
     for mine in by(result.rows, "scene", "threads"):
         triangles = [r["triangles"] for r in mine]
         power = {key: slope(triangles, [r[key] for r in mine]) for key in ("step_ms", "contacts")}
-        lines.append([
-            mine[0]["scene"], mine[0]["threads"], " to ".join(f"{n:,}" for n in (triangles[0], triangles[-1])),
-            " to ".join(text(mine[k]["step_ms"]) for k in (0, -1)), f"{power['step_ms']:.2f}",
-            f"{power['contacts']:.2f}",
-        ])  # fmt: skip
+        lines.append(
+            [
+                mine[0]["scene"],
+                mine[0]["threads"],
+                " to ".join(f"{n:,}" for n in (triangles[0], triangles[-1])),
+                " to ".join(text(mine[k]["step_ms"]) for k in (0, -1)),
+                f"{power['step_ms']:.2f}",
+                f"{power['contacts']:.2f}",
+            ]
+        )
     columns = ["scene", "threads", "triangles", "ms a step", "power of time", "power of contacts"]
     return markdown.table(columns, lines)
 
@@ -97,10 +131,16 @@ def size(result: Kept) -> list[str]:
 def memory(result: Kept) -> list[str]:
     mega = 2**20
     lines = [
-        [r["scene"], r["triangles"], r["contacts"], r["detector_bytes"] / mega, round(r["detector_bytes_per_triangle"]),
-         r["process_bytes"] / mega]
+        [
+            r["scene"],
+            r["triangles"],
+            r["contacts"],
+            r["detector_bytes"] / mega,
+            round(r["detector_bytes_per_triangle"]),
+            r["process_bytes"] / mega,
+        ]
         for r in result.rows
-    ]  # fmt: skip
+    ]
     return markdown.table(["scene", "triangles", "contacts", "detector, MB", "bytes a triangle", "process, MB"], lines)
 
 
@@ -111,12 +151,31 @@ def ropes(result: Kept) -> list[str]:
 
 def worlds(*results: Kept) -> list[str]:
     lines = [
-        [r["scene"], r["triangles"], r["worlds"], r["one_call_ms"], f"{r['of_all_threads']:.2f}", r["one_thread_ms"],
-         r["one_detector_ms"], r.get("detectors_ms"), round(r["bytes_a_world"])]
-        for result in results for r in result.rows
-    ]  # fmt: skip
-    columns = ["scene", "triangles", "worlds", "one call, ms", "of all threads", "1 thread, ms", "one detector",
-               "a detector each", "bytes a world"]  # fmt: skip
+        [
+            r["scene"],
+            r["triangles"],
+            r["worlds"],
+            r["one_call_ms"],
+            f"{r['of_all_threads']:.2f}",
+            r["one_thread_ms"],
+            r["one_detector_ms"],
+            r.get("detectors_ms"),
+            round(r["bytes_a_world"]),
+        ]
+        for result in results
+        for r in result.rows
+    ]
+    columns = [
+        "scene",
+        "triangles",
+        "worlds",
+        "one call, ms",
+        "of all threads",
+        "1 thread, ms",
+        "one detector",
+        "a detector each",
+        "bytes a world",
+    ]
     return markdown.table(columns, lines)
 
 
@@ -140,8 +199,14 @@ def tiers(result: Kept) -> list[str]:
         early = " early" if row["latest"] == 0 and row["toc_worst"] > 0 else ""
         return f"{text(row['step_ms'])}, {row['toc_worst']:.0e}{early}".replace("e-0", "e-").replace(", 0e+00", ", 0")
 
-    lines = [[mine[0]["scene"], *map(cell, mine), " + ".join(str(sum(r[key] for r in mine))
-              for key in ("missed", "invented"))] for mine in by(rows, "scene")]  # fmt: skip
+    lines = [
+        [
+            mine[0]["scene"],
+            *map(cell, mine),
+            " + ".join(str(sum(r[key] for r in mine)) for key in ("missed", "invented")),
+        ]
+        for mine in by(rows, "scene")
+    ]
     return markdown.table(["scene", *(f"`{r['accuracy']}`" for r in by(rows, "scene")[0]), "missed + invented"], lines)
 
 
@@ -163,7 +228,16 @@ def wrong_answers(result: Kept) -> list[str]:
 def decided(result: Kept) -> list[str]:
     rows = [r for r in result.rows if whole_scene(r) and (r["accuracy"], r["simd"]) == ("exact", "auto")]
     keys = ("slabs", "coplanarity", "projection", "roots", "proven", "integers")
-    heads = ["scene", "candidate pairs", "k-DOPs", "coplanarity", "projections", "roots",
-             "contacts by bounds", "by integers"]  # fmt: skip
-    return markdown.table(heads, [[r["scene"], round(r["candidates"]), *(round(r["decided"][k]) for k in keys)]
-                                  for r in rows])  # fmt: skip
+    heads = [
+        "scene",
+        "candidate pairs",
+        "k-DOPs",
+        "coplanarity",
+        "projections",
+        "roots",
+        "contacts by bounds",
+        "by integers",
+    ]
+    return markdown.table(
+        heads, [[r["scene"], round(r["candidates"]), *(round(r["decided"][k]) for k in keys)] for r in rows]
+    )

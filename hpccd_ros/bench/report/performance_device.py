@@ -7,9 +7,14 @@ from hpccd_ros.bench.report import markdown
 from hpccd_ros.bench.report.results import Kept
 
 ARITHMETIC = {
-    "first_filter": "single precision: signs", "sieve": "single precision: where, when", "doubles": "doubles",
-    "tolerance": "a tolerance", "extended": "twice the precision", "integers": "integers", "cpu": "left to the CPU",
-}  # fmt: skip
+    "first_filter": "single precision: signs",
+    "sieve": "single precision: where, when",
+    "doubles": "doubles",
+    "tolerance": "a tolerance",
+    "extended": "twice the precision",
+    "integers": "integers",
+    "cpu": "left to the CPU",
+}
 
 
 def _part(result: Kept, *parts: str) -> list[dict]:
@@ -18,12 +23,28 @@ def _part(result: Kept, *parts: str) -> list[dict]:
 
 def ways(result: Kept) -> list[str]:
     lines = [
-        [r["scene"], f"`{r['accuracy']}`", r["contacts"], r["host_median_ms"], r["to_host_median_ms"], r["median_ms"],
-         r["p95_ms"], r.get("graph_median_ms", "")]
+        [
+            r["scene"],
+            f"`{r['accuracy']}`",
+            r["contacts"],
+            r["host_median_ms"],
+            r["to_host_median_ms"],
+            r["median_ms"],
+            r["p95_ms"],
+            r.get("graph_median_ms", ""),
+        ]
         for r in _part(result, "device")
-    ]  # fmt: skip
-    columns = ["scene", "accuracy", "contacts", "host to host, ms", "device to host", "device to device", "p95",
-               "graph"]  # fmt: skip
+    ]
+    columns = [
+        "scene",
+        "accuracy",
+        "contacts",
+        "host to host, ms",
+        "device to host",
+        "device to device",
+        "p95",
+        "graph",
+    ]
     if not any(r.get("graph_median_ms") for r in _part(result, "device")):  # kept before graphs were measured
         columns, lines = columns[:-1], [line[:-1] for line in lines]
     return markdown.table(columns, lines)
@@ -67,20 +88,43 @@ def _name(row) -> str:
 
 def large(result: Kept) -> list[str]:
     lines = [
-        [f"{r['triangles']:,}", r["contacts"], r["cpu_median_ms"], r["host_median_ms"], r["median_ms"], r["p95_ms"],
-         r["bytes"] / r["triangles"]]
+        [
+            f"{r['triangles']:,}",
+            r["contacts"],
+            r["cpu_median_ms"],
+            r["host_median_ms"],
+            r["median_ms"],
+            r["p95_ms"],
+            r["bytes"] / r["triangles"],
+        ]
         for r in _part(result, "large")
-    ]  # fmt: skip
+    ]
     columns = ["triangles", "contacts", "CPU, ms", "GPU, host to host", "device to device", "p95", "bytes a triangle"]
     return markdown.table(columns, lines)
 
 
 def worlds(result: Kept) -> list[str]:
     lines = [
-        [f"{r['query']}, {r['triangles']:,} triangles", r["worlds"], r["pairs"] / r["worlds"], r["cpu_median_ms"],
-         r["median_ms"], r["p95_ms"], r["us_a_world"], r["bytes"] / r["worlds"] / r["triangles"]]
+        [
+            f"{r['query']}, {r['triangles']:,} triangles",
+            r["worlds"],
+            r["pairs"] / r["worlds"],
+            r["cpu_median_ms"],
+            r["median_ms"],
+            r["p95_ms"],
+            r["us_a_world"],
+            r["bytes"] / r["worlds"] / r["triangles"],
+        ]
         for r in sorted(_part(result, "worlds"), key=lambda r: (r["query"], r["worlds"]))
-    ]  # fmt: skip
-    columns = ["query of each world", "worlds", "pairs a world", "CPU, ms", "GPU, ms", "p95", "us a world",
-               "bytes a triangle"]  # fmt: skip
+    ]
+    columns = [
+        "query of each world",
+        "worlds",
+        "pairs a world",
+        "CPU, ms",
+        "GPU, ms",
+        "p95",
+        "us a world",
+        "bytes a triangle",
+    ]
     return markdown.table(columns, lines)

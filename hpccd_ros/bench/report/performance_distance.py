@@ -16,10 +16,29 @@ def by_distance(result: Kept) -> list[str]:
         plain = next(r for r in mine if r["query"] == "plain")
         of = {(r["query"], r["distance"]): r for r in mine}
         for d in sorted({r["distance"] for r in mine if r["distance"] is not None}):
-            lines.append([plain["scene"], f"{d:g}", round(plain["pairs"]), plain["step_ms"],
-                          *(cell for query in ("separation", "proximity") for cell in _cells(of.get((query, d))))])
-    columns = ["scene", "d", "contacts", "plain, ms", "separation: pairs", "ms (/ plain)", "us a pair more", "x ipctk",
-               "proximity: pairs", "ms (/ plain)", "us a pair more", "x ipctk"]  # fmt: skip
+            lines.append(
+                [
+                    plain["scene"],
+                    f"{d:g}",
+                    round(plain["pairs"]),
+                    plain["step_ms"],
+                    *(cell for query in ("separation", "proximity") for cell in _cells(of.get((query, d)))),
+                ]
+            )
+    columns = [
+        "scene",
+        "d",
+        "contacts",
+        "plain, ms",
+        "separation: pairs",
+        "ms (/ plain)",
+        "us a pair more",
+        "x ipctk",
+        "proximity: pairs",
+        "ms (/ plain)",
+        "us a pair more",
+        "x ipctk",
+    ]
     return markdown.table(columns, lines)
 
 
@@ -30,8 +49,15 @@ def of_a_snapshot(result: Kept) -> list[str]:
         of = {r["query"]: r for r in mine if r["distance"] is None}
         pairs, ms, _, faster = _cells(of.get("intersections"))
         lines.append([mine[0]["scene"], of["plain"]["step_ms"], pairs, ms, faster, *_cells(of.get("distances"))[:2]])
-    columns = ["scene", "plain, ms", "intersections", "ms (/ plain)", "x ipctk", "pairs of meshes",
-               "smallest distances: ms (/ plain)"]  # fmt: skip
+    columns = [
+        "scene",
+        "plain, ms",
+        "intersections",
+        "ms (/ plain)",
+        "x ipctk",
+        "pairs of meshes",
+        "smallest distances: ms (/ plain)",
+    ]
     return markdown.table(columns, lines)
 
 
@@ -44,10 +70,15 @@ def on_scenes(result: Kept) -> list[str]:
         return f"{row['missed']} + {row['invented']}{worst}"
 
     lines = [
-        [mine[0]["scene"], mine[0]["query"], "" if mine[0]["distance"] is None else f"{mine[0]['distance']:.5g}",
-         mine[0]["true"], *map(cell, mine)]
+        [
+            mine[0]["scene"],
+            mine[0]["query"],
+            "" if mine[0]["distance"] is None else f"{mine[0]['distance']:.5g}",
+            mine[0]["true"],
+            *map(cell, mine),
+        ]
         for mine in by(rows, "scene", "query", "distance")
-    ]  # fmt: skip
+    ]
     tiers = [f"`{r['accuracy']}`" for r in by(rows, "scene", "query", "distance")[0]]
     return markdown.table(["missed + invented", "query", "d", "pairs", *tiers], lines)
 
@@ -68,5 +99,9 @@ def _cells(row: dict | None) -> list:
     if row is None:
         return [None] * 4
     more, faster = row.get("us_a_pair_beyond"), row.get("times_faster_than_ipctk")
-    return [round(row["pairs"]), f"{text(row['step_ms'])} ({row['over_plain']:.2f})",
-            None if more is None else f"{more:.2f}", None if faster is None else f"{faster:.0f}"]  # fmt: skip
+    return [
+        round(row["pairs"]),
+        f"{text(row['step_ms'])} ({row['over_plain']:.2f})",
+        None if more is None else f"{more:.2f}",
+        None if faster is None else f"{faster:.0f}",
+    ]

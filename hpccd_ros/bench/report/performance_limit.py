@@ -26,8 +26,13 @@ def stages(result: Kept) -> list[str]:
         of = {(r["threads"], r["stage"]): r for r in mine}
         for row in (r for r in mine if r["threads"] == threads[0]):
             limits = row.get("limited_by", "")
-            lines.append([f"{row['scene']}: {row['stage']}", limits,
-                          *(cell for n in threads for cell in cells(of.get((n, row["stage"]))))])  # fmt: skip
+            lines.append(
+                [
+                    f"{row['scene']}: {row['stage']}",
+                    limits,
+                    *(cell for n in threads for cell in cells(of.get((n, row["stage"])))),
+                ]
+            )
     heads = (f"{n} thread{'s' * (n > 1)}: ms" for n in threads)
     columns = ["scene: stage", "limited by", *(head for first in heads for head in (first, "least", "times"))]
     return markdown.table(columns, lines)

@@ -14,13 +14,29 @@ def truth(result: Kept) -> list[str]:
     """A line for each kind of motion and of features."""
     rows = [row for row in result.rows if row["part"] == "truth"]
     lines = [
-        [row["motion"], FEATURES[row["kind"]],
-         *(row[name] for name in ("queries", "touching", "reported", "missed", "late", "beyond", "open", "excess")),
-         f"{row['worst_excess']:.3f}", f"{row['us_a_query']:.0f}"]
+        [
+            row["motion"],
+            FEATURES[row["kind"]],
+            *(row[name] for name in ("queries", "touching", "reported", "missed", "late", "beyond", "open", "excess")),
+            f"{row['worst_excess']:.3f}",
+            f"{row['us_a_query']:.0f}",
+        ]
         for row in rows
-    ]  # fmt: skip
-    columns = ["motion", "features", "queries", "come that near", "reported", "missed", "late",
-               "beyond twice the bound", "not proven", "in excess", "worst, of the bound", "us a query"]  # fmt: skip
+    ]
+    columns = [
+        "motion",
+        "features",
+        "queries",
+        "come that near",
+        "reported",
+        "missed",
+        "late",
+        "beyond twice the bound",
+        "not proven",
+        "in excess",
+        "worst, of the bound",
+        "us a query",
+    ]
     return markdown.table(columns, lines)
 
 
@@ -39,13 +55,36 @@ def cost(result: Kept) -> list[str]:
     """A line for each scene, turn and tolerance."""
     rows = [row for row in result.rows if row["part"] == "cost"]
     lines = [
-        [row["scene"], row["triangles"], f"{row['turn']:g}", f"{row['tolerance']:g}", row["parts"],
-         f"{row['bound']:.1e}", text(row["least_linear_ms"]), f"{text(row['least_moved_ms'])}",
-         f"{row['least_over_linear']:.2f}", text(row["least_outside_ms"]), row["linear_contacts"], row["contacts"]]
+        [
+            row["scene"],
+            row["triangles"],
+            f"{row['turn']:g}",
+            f"{row['tolerance']:g}",
+            row["parts"],
+            f"{row['bound']:.1e}",
+            text(row["least_linear_ms"]),
+            f"{text(row['least_moved_ms'])}",
+            f"{row['least_over_linear']:.2f}",
+            text(row["least_outside_ms"]),
+            row["linear_contacts"],
+            row["contacts"],
+        ]
         for row in rows
-    ]  # fmt: skip
-    columns = ["scene", "triangles", "turn, degrees", "tolerance", "parts", "bound", "straight, ms", "moved, ms",
-               "/ straight", "of it outside the core", "contacts, straight", "moved"]  # fmt: skip
+    ]
+    columns = [
+        "scene",
+        "triangles",
+        "turn, degrees",
+        "tolerance",
+        "parts",
+        "bound",
+        "straight, ms",
+        "moved, ms",
+        "/ straight",
+        "of it outside the core",
+        "contacts, straight",
+        "moved",
+    ]
     return markdown.table(columns, lines)
 
 
@@ -56,13 +95,32 @@ def _spread(row: dict) -> str:
 def stream(*results: Kept) -> list[str]:
     """A line for each round of a robot beside a cloth over DDS."""
     lines = [
-        [result.machine["cores"], row["backend"], f"{row['rate_hz']:g}", row["answers"], row["dropped"],
-         f"{row['answers_hz']:.1f}",
-         *(f"{text(row[f'{part}_median_ms'])} / {text(row[f'{part}_p95_ms'])}"
-           for part in ("whole", "detection", "core", "around", "added"))]
-        for result in results for row in result.rows
-    ]  # fmt: skip
-    columns = ["cores", "core on", "frames a second", "answers", "dropped", "answers a second",
-               "sent to answer, ms: median / p95", "of it detection", "of it core", "all but the detection",
-               "all but the core"]  # fmt: skip
+        [
+            result.machine["cores"],
+            row["backend"],
+            f"{row['rate_hz']:g}",
+            row["answers"],
+            row["dropped"],
+            f"{row['answers_hz']:.1f}",
+            *(
+                f"{text(row[f'{part}_median_ms'])} / {text(row[f'{part}_p95_ms'])}"
+                for part in ("whole", "detection", "core", "around", "added")
+            ),
+        ]
+        for result in results
+        for row in result.rows
+    ]
+    columns = [
+        "cores",
+        "core on",
+        "frames a second",
+        "answers",
+        "dropped",
+        "answers a second",
+        "sent to answer, ms: median / p95",
+        "of it detection",
+        "of it core",
+        "all but the detection",
+        "all but the core",
+    ]
     return markdown.table(columns, lines)

@@ -16,11 +16,29 @@ def steps(result: Kept) -> list[str]:
     for mine in by(result.rows, "scene"):
         of = {row["query"]: row for row in mine}
         every = of["all"]
-        lines.append([mine[0]["scene"], round(every["contacts"]), f"{every['earliest']:.4g}", every["step_ms"],
-                      *(f"{text(of[query]['step_ms'])} ({of[query]['over_all']:.2f})"
-                        for query in ("first", "step", "trial")),
-                      text(of["trial"].get("listing_ms")),
-                      *([f"{of['step']['times_faster_than_ipctk']:,.0f}"] if beside_peer else [])])  # fmt: skip
-    columns = ["scene", "contacts", "earliest at", "all, ms", "first, ms (/ all)", "`collision_free_step`, ms (/ all)",
-               "trial steps, ms (/ all)", "listing, ms", *(["step x ipctk"] if beside_peer else [])]  # fmt: skip
+        lines.append(
+            [
+                mine[0]["scene"],
+                round(every["contacts"]),
+                f"{every['earliest']:.4g}",
+                every["step_ms"],
+                *(
+                    f"{text(of[query]['step_ms'])} ({of[query]['over_all']:.2f})"
+                    for query in ("first", "step", "trial")
+                ),
+                text(of["trial"].get("listing_ms")),
+                *([f"{of['step']['times_faster_than_ipctk']:,.0f}"] if beside_peer else []),
+            ]
+        )
+    columns = [
+        "scene",
+        "contacts",
+        "earliest at",
+        "all, ms",
+        "first, ms (/ all)",
+        "`collision_free_step`, ms (/ all)",
+        "trial steps, ms (/ all)",
+        "listing, ms",
+        *(["step x ipctk"] if beside_peer else []),
+    ]
     return markdown.table(columns, lines)

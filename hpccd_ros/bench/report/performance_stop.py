@@ -36,15 +36,17 @@ def approaches(result: Kept) -> list[str]:
 def silences(result: Kept) -> list[str]:
     lines = [
         [_SILENT[r["what"]], r["trials"], *(f"{r[f'{key}_ms']:.0f}" for key in ("median", "p95", "most", "timeout"))]
-        for r in result.rows if r["what"] in _SILENT
-    ]  # fmt: skip
+        for r in result.rows
+        if r["what"] in _SILENT
+    ]
     return markdown.table(["what ended", "trials", "ms until stop: median", "p95", "most", "`stop_timeout`, ms"], lines)
 
 
 def costs(result: Kept) -> list[str]:
     lines = [
         [r["scene"], r["triangles"], f"{r['near']} of {r['steps']}", r["look_ms"], r["contacts_ms"], r["distances_ms"]]
-        for r in result.rows if r["what"] == "cost"
-    ]  # fmt: skip
+        for r in result.rows
+        if r["what"] == "cost"
+    ]
     columns = ["scene", "triangles", "steps that come near", "stop, ms", "all contacts, ms", "smallest distances, ms"]
     return markdown.table(columns, lines)

@@ -25,11 +25,18 @@ class Bar:
 def bar(description: str, total: int):
     """Context with a Bar of `total` calls on stderr."""
     progress = Progress(
-        TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(),
-        TimeRemainingColumn(), TextColumn("{task.fields[said]}"),
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TimeRemainingColumn(),
+        TextColumn("{task.fields[said]}"),
         # Redrawn by update() only: a thread that draws in between would take time from what is measured.
-        console=Console(stderr=True), transient=True, disable=not sys.stderr.isatty(), auto_refresh=False,
-    )  # fmt: skip
+        console=Console(stderr=True),
+        transient=True,
+        disable=not sys.stderr.isatty(),
+        auto_refresh=False,
+    )
     with progress:
         task = progress.add_task(description, total=total, said="")
         yield Bar(progress, task)

@@ -91,8 +91,9 @@ class Report:
         }
         as_json, as_csv = stem.with_name(stem.name + ".json"), stem.with_name(stem.name + ".csv")
         as_json.write_text(as_text(whole), encoding="utf-8")
-        flat = [_flat({"commit": self.machine["commit"], "processor": self.machine["processor"], **r})
-                for r in self.rows]
+        flat = [
+            _flat({"commit": self.machine["commit"], "processor": self.machine["processor"], **r}) for r in self.rows
+        ]
         columns = list(dict.fromkeys(key for row in flat for key in row))
         with open(as_csv, "w", newline="", encoding="utf-8") as file:
             writer = csv.DictWriter(file, columns)

@@ -35,10 +35,20 @@ def configure(parser):
     command.configure(parser, default=(LARGE, SMALL), steps=1, rounds=300)
     command.threads_option(parser)
     command.tier_option(parser, default="exact")
-    parser.add_argument("--seconds", type=float, default=20.0, metavar="S",
-                        help="length of the runs at the highest rate and at twice that; 0: none (default: %(default)s)")
-    parser.add_argument("--limit", type=float, default=2.0, metavar="X",
-                        help="most times the echo's latency, medians (default: %(default)s)")
+    parser.add_argument(
+        "--seconds",
+        type=float,
+        default=20.0,
+        metavar="S",
+        help="length of the runs at the highest rate and at twice that; 0: none (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--limit",
+        type=float,
+        default=2.0,
+        metavar="X",
+        help="most times the echo's latency, medians (default: %(default)s)",
+    )
 
 
 def run(args) -> int:
@@ -79,8 +89,14 @@ def _measure(report, args, name, step, folder: Path) -> None:
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     node = rclpy.create_node("simulator", namespace=NAMESPACE, start_parameter_services=False)
     link = Link(node, step, options)
-    row = {"scene": name, "triangles": link.triangles, "contacts": link.contacts, "accuracy": args.accuracy,
-           "mb_in": link.bytes_in / 1e6, "mb_out": link.bytes_out / 1e6}  # fmt: skip
+    row = {
+        "scene": name,
+        "triangles": link.triangles,
+        "contacts": link.contacts,
+        "accuracy": args.accuracy,
+        "mb_in": link.bytes_in / 1e6,
+        "mb_out": link.bytes_out / 1e6,
+    }
     try:
         with Children(folder) as children:
             child = node_process.start(children, folder, NAMESPACE, parameters, "hpccd_ros.bench.ros.timed_node")
@@ -166,12 +182,21 @@ def _rates(report, args, row, link, status, pid, alive, guess) -> None:
         double = run(2 * rate, args.seconds)
     for what, found in (("sustained rate", steady), ("twice that rate", double)):
         report.add(
-            what=what, **row, rate_hz=found.rate, sent=found.sent, answered=found.answered, dropped=found.dropped,
-            middleware=found.middleware, unaccounted=found.unaccounted, last_answered=found.last_answered,
+            what=what,
+            **row,
+            rate_hz=found.rate,
+            sent=found.sent,
+            answered=found.answered,
+            dropped=found.dropped,
+            middleware=found.middleware,
+            unaccounted=found.unaccounted,
+            last_answered=found.last_answered,
             **{f"{key}_ms": ms for key, ms in zip(("median", "p95", "p99"), found.latency, strict=True)},
-            memory_begin_mb=found.memory[0], memory_end_mb=found.memory[1], memory_most_mb=found.memory[2],
+            memory_begin_mb=found.memory[0],
+            memory_end_mb=found.memory[1],
+            memory_most_mb=found.memory[2],
             memory_change_percent=found.memory_change,
-        )  # fmt: skip
+        )
         if found.unaccounted:
             report.failure(f"{row['scene']}, {what}: {found.unaccounted} frames are not accounted for")
         if not found.last_answered:
@@ -185,10 +210,19 @@ def _tables(report) -> None:
     table.show(
         "publish to contacts, ms: the node less its core, and an echo of the same bytes, in turn",
         ["scene", "MB in", "MB out", "contacts", "core", "node", "p95", "p99", "echo", "p95", "p99", "node / echo"],
-        [[r["scene"], r["mb_in"], r["mb_out"], r["contacts"], r["core_median_ms"],
-          *(r[f"{who}_{key}_ms"] for who in ("node", "echo") for key in ("median", "p95", "p99")), r["ratio"]]
-         for r in latency],
-    )  # fmt: skip
+        [
+            [
+                r["scene"],
+                r["mb_in"],
+                r["mb_out"],
+                r["contacts"],
+                r["core_median_ms"],
+                *(r[f"{who}_{key}_ms"] for who in ("node", "echo") for key in ("median", "p95", "p99")),
+                r["ratio"],
+            ]
+            for r in latency
+        ],
+    )
     table.show(
         "where it goes, ms (medians)",
         ["scene", *latency[0]["parts_ms"]],
@@ -199,9 +233,35 @@ def _tables(report) -> None:
     if rates:
         table.show(
             "at a fixed rate",
-            ["scene", "run", "Hz", "sent", "answered", "dropped", "lost by DDS", "unaccounted", "latency ms", "p95",
-             "memory MB", "change %"],
-            [[r["scene"], r["what"], r["rate_hz"], r["sent"], r["answered"], r["dropped"], r["middleware"],
-              r["unaccounted"], r["median_ms"], r["p95_ms"], r["memory_end_mb"], r["memory_change_percent"]]
-             for r in rates],
-        )  # fmt: skip
+            [
+                "scene",
+                "run",
+                "Hz",
+                "sent",
+                "answered",
+                "dropped",
+                "lost by DDS",
+                "unaccounted",
+                "latency ms",
+                "p95",
+                "memory MB",
+                "change %",
+            ],
+            [
+                [
+                    r["scene"],
+                    r["what"],
+                    r["rate_hz"],
+                    r["sent"],
+                    r["answered"],
+                    r["dropped"],
+                    r["middleware"],
+                    r["unaccounted"],
+                    r["median_ms"],
+                    r["p95_ms"],
+                    r["memory_end_mb"],
+                    r["memory_change_percent"],
+                ]
+                for r in rates
+            ],
+        )

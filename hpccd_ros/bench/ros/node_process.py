@@ -22,9 +22,16 @@ def start(
     file = folder / "node.yaml"
     file.write_text(yaml.safe_dump({"/**": {"ros__parameters": parameters}}), encoding="utf-8")
     return children.start(
-        "node", module, "--ros-args", "--params-file", str(file),
-        "-r", f"__ns:={namespace}", "-r", f"/diagnostics:={namespace}/diagnostics",
-    )  # fmt: skip
+        "node",
+        module,
+        "--ros-args",
+        "--params-file",
+        str(file),
+        "-r",
+        f"__ns:={namespace}",
+        "-r",
+        f"/diagnostics:={namespace}/diagnostics",
+    )
 
 
 class NodeStatus:

@@ -69,11 +69,13 @@ def run(args) -> int:
     table.show(
         f"{SCENE} at {args.rate:g} frames a second: ms from before a frame is sent to its answer",
         ["answers", "a second", "dropped", *columns],
-        [[r["answers"], r["answers_hz"], r["dropped"], *(r[f"{p}_{k}_ms"] for p in PARTS for k, _ in PERCENTILES)]
-         for r in report.rows],
+        [
+            [r["answers"], r["answers_hz"], r["dropped"], *(r[f"{p}_{k}_ms"] for p in PARTS for k, _ in PERCENTILES)]
+            for r in report.rows
+        ],
         caption="detection: with joints, bounds and cuts; core: its calls alone; around: whole less detection; added: "
         "whole less core",
-    )  # fmt: skip
+    )
     return command.end(args, report)
 
 
@@ -89,9 +91,14 @@ def _measured(args, scene, folder: str) -> dict:
     from hpccd_ros.scenes.messages import node_parameters
 
     parameters = {
-        **node_parameters(scene), "backend": args.backend, "threads": args.threads, "accuracy": args.accuracy,
-        "distances": args.distances, "diagnostics_period": 0.5, "frame_queue": 2,
-    }  # fmt: skip
+        **node_parameters(scene),
+        "backend": args.backend,
+        "threads": args.threads,
+        "accuracy": args.accuracy,
+        "distances": args.distances,
+        "diagnostics_period": 0.5,
+        "frame_queue": 2,
+    }
     os.environ[timed_node.VARIABLE] = str(Path(folder) / "times.json")
     environment.prepare()
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
@@ -102,15 +109,16 @@ def _measured(args, scene, folder: str) -> dict:
     listener = threading.Thread(target=executor.spin, daemon=True)
     try:
         with Children(Path(folder)) as children:
-            child = node_process.start(
-                children, Path(folder), NAMESPACE, parameters, "hpccd_ros.bench.ros.timed_node"
-            )  # fmt: skip
+            child = node_process.start(children, Path(folder), NAMESPACE, parameters, "hpccd_ros.bench.ros.timed_node")
             status = node_process.NodeStatus(node, NAMESPACE)
             # Raw: to read the answers while frames are sent would delay these.
             node.create_subscription(
-                ContactArray, topic_names.CONTACTS, lambda data: came.append((time.monotonic(), data)),
-                qos.keep_last(args.frames), raw=True,
-            )  # fmt: skip
+                ContactArray,
+                topic_names.CONTACTS,
+                lambda data: came.append((time.monotonic(), data)),
+                qos.keep_last(args.frames),
+                raw=True,
+            )
             listener.start()
             sent = _sent(node, scene, args.rate, children, status)
             time.sleep(SETTLE)
@@ -160,8 +168,9 @@ def _sent(node, scene, rate: float, children, status) -> list[float]:
     frames[0] = [message for message in frames[0] if message.topic not in latched]
     children.wait(
         lambda: "waits for its description" not in status.texts.get("frames", "waits for its description"),
-        "the node knows the robot", PATIENCE,
-    )  # fmt: skip
+        "the node knows the robot",
+        PATIENCE,
+    )
     sent, begin = [], 0.0
     with bar(f"{SCENE} at {rate:g} a second", len(frames)) as progress:
         for number, frame in enumerate(frames):

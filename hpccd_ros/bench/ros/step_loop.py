@@ -78,6 +78,12 @@ def show(rows: list[dict]) -> None:
     table.show(
         "how far may I go, ms: asked of the node over DDS, and of the core in this process, in turn",
         ["scene", "MB sent", "over DDS", "p95", "p99", "in process", "p95", "p99", "DDS more", "p95", "p99"],
-        [[r["scene"], r["mb_sent"], *(r[f"{who}_{key}_ms"] for who in ("loop", "core", "more")
-                                      for key, _ in PERCENTILES)] for r in rows],
-    )  # fmt: skip
+        [
+            [
+                r["scene"],
+                r["mb_sent"],
+                *(r[f"{who}_{key}_ms"] for who in ("loop", "core", "more") for key, _ in PERCENTILES),
+            ]
+            for r in rows
+        ],
+    )

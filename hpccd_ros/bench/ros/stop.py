@@ -32,12 +32,22 @@ PERCENTILES = (("median", 50), ("p95", 95), ("p99", 99), ("most", 100))
 def configure(parser):
     what = parser.add_argument_group("what is measured")
     what.add_argument("--trials", type=int, default=1000, metavar="N", help="approaches (default: %(default)s)")
-    what.add_argument("--ends", type=int, default=20, metavar="N",
-                      help="ends of each kind of publisher and node (default: %(default)s)")  # fmt: skip
+    what.add_argument(
+        "--ends",
+        type=int,
+        default=20,
+        metavar="N",
+        help="ends of each kind of publisher and node (default: %(default)s)",
+    )
     what.add_argument("--rate", type=float, default=20.0, metavar="HZ", help="frames a second (default: %(default)s)")
     what.add_argument("--stop-timeout", type=float, default=0.5, metavar="S", help="(default: %(default)s)")
-    what.add_argument("--margin", type=float, default=0.1, metavar="S",
-                      help="most that stop may rise after the time-out (default: %(default)s)")  # fmt: skip
+    what.add_argument(
+        "--margin",
+        type=float,
+        default=0.1,
+        metavar="S",
+        help="most that stop may rise after the time-out (default: %(default)s)",
+    )
     what.add_argument("--seed", type=int, default=18, help="of the approaches (default: %(default)s)")
     command.output_options(parser)
 
@@ -64,8 +74,10 @@ def _measure(report, args, folder: Path) -> None:
     from hpccd_ros.demo.children import Children
 
     parameters = {
-        "meshes": list(stop_scene.MESHES), "stop_distance": stop_scene.DISTANCE, "stop_timeout": args.stop_timeout,
-    }  # fmt: skip
+        "meshes": list(stop_scene.MESHES),
+        "stop_distance": stop_scene.DISTANCE,
+        "stop_timeout": args.stop_timeout,
+    }
     client.prepare_environment()
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     node = rclpy.create_node("watching", namespace=NAMESPACE, start_parameter_services=False)
@@ -98,10 +110,18 @@ def _approaches(report, args, node, ears, children) -> None:
     with bar("truth", len(found.frames) - 1) as progress:
         judged = stop_trials.judge(found, ears, args.rate, args.stop_timeout, progress.step)
     report.add(
-        what="approaches", trials=args.trials, steps=judged.steps, near=judged.near, rises=len(judged.rises),
-        late=judged.late, missed=judged.missed, false=judged.false, frame_ms=1e3 / args.rate,
-        look_ms=float(status.values.get("stop", {}).get("look_ms", "nan")), **_percentiles(judged.rises),
-    )  # fmt: skip
+        what="approaches",
+        trials=args.trials,
+        steps=judged.steps,
+        near=judged.near,
+        rises=len(judged.rises),
+        late=judged.late,
+        missed=judged.missed,
+        false=judged.false,
+        frame_ms=1e3 / args.rate,
+        look_ms=float(status.values.get("stop", {}).get("look_ms", "nan")),
+        **_percentiles(judged.rises),
+    )
     if judged.missed or judged.late:
         report.failure(f"stop missed {judged.missed} steps that come near, and rose late {judged.late} times")
     _silence(report, args, "silence", found.silences)
@@ -148,8 +168,9 @@ def _costs(report) -> None:
 
 def _silence(report, args, what: str, taken: list[float]) -> None:
     beyond = max(taken) - args.stop_timeout
-    report.add(what=what, trials=len(taken), timeout_ms=1e3 * args.stop_timeout, beyond_ms=1e3 * beyond,
-               **_percentiles(taken))  # fmt: skip
+    report.add(
+        what=what, trials=len(taken), timeout_ms=1e3 * args.stop_timeout, beyond_ms=1e3 * beyond, **_percentiles(taken)
+    )
     if beyond > args.margin:
         report.failure(f"{what}: stop rose {1e3 * beyond:.0f} ms after the time-out")
 
@@ -165,18 +186,39 @@ def _tables(report) -> None:
     table.show(
         "approaches: from the frame that ends a step which comes near to stop, ms",
         ["trials", "steps", "near", "rises", "median", "p95", "p99", "most", "of a frame", "late", "missed", "false"],
-        [[first[k] for k in ("trials", "steps", "near", "rises", "median_ms", "p95_ms", "p99_ms", "most_ms", "frame_ms",
-                             "late", "missed", "false")]],
-    )  # fmt: skip
+        [
+            [
+                first[k]
+                for k in (
+                    "trials",
+                    "steps",
+                    "near",
+                    "rises",
+                    "median_ms",
+                    "p95_ms",
+                    "p99_ms",
+                    "most_ms",
+                    "frame_ms",
+                    "late",
+                    "missed",
+                    "false",
+                )
+            ]
+        ],
+    )
     table.show(
         "from the end of what went before to stop, ms",
         ["what", "trials", "median", "p95", "most", "stop_timeout", "beyond it"],
-        [[r[k] for k in ("what", "trials", "median_ms", "p95_ms", "most_ms", "timeout_ms", "beyond_ms")]
-         for r in others],
-    )  # fmt: skip
+        [
+            [r[k] for k in ("what", "trials", "median_ms", "p95_ms", "most_ms", "timeout_ms", "beyond_ms")]
+            for r in others
+        ],
+    )
     table.show(
         "what it costs, ms a step (medians)",
         ["scene", "triangles", "steps", "near", "stop", "contacts", "distances"],
-        [[r[k] for k in ("scene", "triangles", "steps", "near", "look_ms", "contacts_ms", "distances_ms")]
-         for r in costs],
-    )  # fmt: skip
+        [
+            [r[k] for k in ("scene", "triangles", "steps", "near", "look_ms", "contacts_ms", "distances_ms")]
+            for r in costs
+        ],
+    )

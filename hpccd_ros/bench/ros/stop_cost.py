@@ -47,10 +47,13 @@ def _of_source(source: Source, apart: bool) -> dict[str, Any]:
             taken["distances"].append(time.perf_counter() - began)
     ms = {what: 1e3 * float(np.median(times)) for what, times in taken.items()}
     return {
-        "what": "cost", "scene": source.name + (", moved apart" if apart else ""),
-        "triangles": sum(len(t.faces) for t in frames[0].topologies), "steps": len(frames) - 1, "near": near,
+        "what": "cost",
+        "scene": source.name + (", moved apart" if apart else ""),
+        "triangles": sum(len(t.faces) for t in frames[0].topologies),
+        "steps": len(frames) - 1,
+        "near": near,
         **{f"{what}_ms": median for what, median in ms.items()},
-    }  # fmt: skip
+    }
 
 
 def _frames(source: Source, apart: bool) -> tuple[SceneBuilder, list[SceneFrame]]:

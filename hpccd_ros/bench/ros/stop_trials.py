@@ -96,9 +96,13 @@ def judge(found: Approaches, ears: Ears, rate: float, timeout: float, said: Call
 
 
 def ended(
-    ears: Ears, process_of: Callable[[], object], number: signal.Signals, times: int, after: Callable[[], None],
+    ears: Ears,
+    process_of: Callable[[], object],
+    number: signal.Signals,
+    times: int,
+    after: Callable[[], None],
     said: Callable[[], None],
-) -> list[float]:  # fmt: skip
+) -> list[float]:
     """s from the signal to the process, while stop was false, to the rise of stop. after: brings it back."""
     random, taken = np.random.default_rng(times), []
     for _ in range(times):

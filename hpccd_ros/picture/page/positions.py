@@ -49,10 +49,15 @@ class MeshPositions:
         blobs, topologies = {}, []
         for number, motion in enumerate(self._motions):
             topology = motion.topology
-            topologies.append({
-                "version": topology.version, "vertices": topology.n_vertices, "faces": len(topology.faces),
-                "edges": len(topology.edges), "frames": len(motion.frames),
-            })  # fmt: skip
+            topologies.append(
+                {
+                    "version": topology.version,
+                    "vertices": topology.n_vertices,
+                    "faces": len(topology.faces),
+                    "edges": len(topology.edges),
+                    "frames": len(motion.frames),
+                }
+            )
             blobs[f"faces-{number}"] = packed(np.asarray(topology.faces, np.uint32).reshape(1, -1, 3))
             blobs[f"edges-{number}"] = packed(np.asarray(topology.edges, np.uint32).reshape(1, -1, 2))
             blobs[f"positions-{number}"] = packed(grid.rounded(np.stack(motion.frames)))

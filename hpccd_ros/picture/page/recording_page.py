@@ -53,16 +53,18 @@ class RecordingPage:
             return
         self._add_positions(step)
         drawn = (0, 0) if step.contacts is None else self._contacts.add(step.contacts, step.layout)
-        self._steps.append({
-            "step": str(step.step),  # a publisher may count to 2**64, more than a number of the page holds
-            "time": self._time(step),
-            "total": None if step.contacts is None else step.total,
-            "drawn": drawn,
-            "milliseconds": None if step.contacts is None else step.milliseconds,
-            "facts": [] if step.contacts is None else [shortened(fact, 100) for fact in facts(step)],
-            "notices": [shortened(notice, 400) for notice in self._notices(step, sum(drawn))],
-            "place": len(self._numbers) - 1,
-        })  # fmt: skip
+        self._steps.append(
+            {
+                "step": str(step.step),  # a publisher may count to 2**64, more than a number of the page holds
+                "time": self._time(step),
+                "total": None if step.contacts is None else step.total,
+                "drawn": drawn,
+                "milliseconds": None if step.contacts is None else step.milliseconds,
+                "facts": [] if step.contacts is None else [shortened(fact, 100) for fact in facts(step)],
+                "notices": [shortened(notice, 400) for notice in self._notices(step, sum(drawn))],
+                "place": len(self._numbers) - 1,
+            }
+        )
 
     def _add_positions(self, step):
         frame = step.end_frame
@@ -96,8 +98,10 @@ class RecordingPage:
         recorded = step.recorded
         if recorded is not None and recorded.truncated:
             self._truncated += 1
-            yield (f"The recorded answer held only the {len(recorded.kind):,} earliest of {recorded.total:,} contacts "
-                   "(max_contacts).")  # fmt: skip
+            yield (
+                f"The recorded answer held only the {len(recorded.kind):,} earliest of {recorded.total:,} contacts "
+                "(max_contacts)."
+            )
         if step.total > drawn:
             self._cut += 1
             yield f"Drawn are {drawn:,} of {step.total:,} contacts, evenly from the earliest on."
@@ -116,14 +120,17 @@ class RecordingPage:
             "title": shortened(self._title),
             "view": self._view,
             "colours": {
-                "background": BACKGROUND, "ink": INK, "faint": FAINT, "tint": TINT,
+                "background": BACKGROUND,
+                "ink": INK,
+                "faint": FAINT,
+                "tint": TINT,
                 "toc": [[float(c) for c in TOC_COLOURS(t)[:3]] for t in np.linspace(0.0, 1.0, TOC_SHADES)],
             },
             "meshes": meshes,
             "contacts": contacts,
             "steps": [self._with_gap(step, gaps) for step in self._steps],
             "notes": self._notes(sum(gaps)),
-        }  # fmt: skip
+        }
         return said, blobs
 
     def _with_gap(self, step, gaps):

@@ -36,9 +36,12 @@ class Pairs:
     def only(self, chosen: np.ndarray) -> Pairs:
         """The pairs `chosen`."""
         return Pairs(
-            self.vertex[:, chosen], self.weight[:, chosen], self.normal[:, chosen], self.compliant[chosen],
+            self.vertex[:, chosen],
+            self.weight[:, chosen],
+            self.normal[:, chosen],
+            self.compliant[chosen],
             self.of_ball[chosen],
-        )  # fmt: skip
+        )
 
     def and_those_of(self, other: Pairs) -> Pairs:
         """Both."""

@@ -40,9 +40,15 @@ class ToAir:
 
 
 def respond(
-    x: np.ndarray, before: np.ndarray, pairs: Pairs, goal: np.ndarray, setup: Setup, n_cloth: int, step: float,
+    x: np.ndarray,
+    before: np.ndarray,
+    pairs: Pairs,
+    goal: np.ndarray,
+    setup: Setup,
+    n_cloth: int,
+    step: float,
     ball: FromBall,
-) -> None:  # fmt: skip
+) -> None:
     """One sweep: moves the cloth's part of x (3,V) where the gaps of pairs would be smaller than their goal (N,).
 
     before: positions `step` seconds ago, the ball's too. A pair's push is shared with the pairs that push the same

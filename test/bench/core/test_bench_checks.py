@@ -48,9 +48,11 @@ def test_errors_against_truth():
     found.vf, found.vf_toc = np.array([[0, 1], [2, 3]], np.uint32), np.array([0.5, 0.25])
     found.ee, found.ee_toc = np.array([[0, 1, 2, 3]], np.uint32), np.array([0.75])
     true = {
-        "vf": np.array([[2, 3], [4, 5]], np.uint32), "vf_toc": np.array([0.25, 1.0]),
-        "ee": np.array([[0, 1, 2, 3]], np.uint32), "ee_toc": np.array([0.5]),
-    }  # fmt: skip
+        "vf": np.array([[2, 3], [4, 5]], np.uint32),
+        "vf_toc": np.array([0.25, 1.0]),
+        "ee": np.array([[0, 1, 2, 3]], np.uint32),
+        "ee_toc": np.array([0.5]),
+    }
     errors = truth.of_scene(found, true)
     assert (errors.true, errors.missed, errors.invented) == (3, 1, 1)
     assert errors.toc_worst == errors.latest == 0.25

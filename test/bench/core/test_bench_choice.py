@@ -76,8 +76,20 @@ def test_the_front_holds_whom_none_beats_that_asks_for_the_same():
 
 
 def test_outcomes_are_of_the_worst_scene_and_of_settings_that_all_were_tested_with():
-    row = {"accuracy": "fast", "backend": "cpu", "asked": "all", "true": 10, "reported": 8, "missed": 2, "invented": 0,
-           "latest": 0.1, "earliest": 0.2, "toc_worst": 0.2, "step_ms": 3.0, "scene": "a"}  # fmt: skip
+    row = {
+        "accuracy": "fast",
+        "backend": "cpu",
+        "asked": "all",
+        "true": 10,
+        "reported": 8,
+        "missed": 2,
+        "invented": 0,
+        "latest": 0.1,
+        "earliest": 0.2,
+        "toc_worst": 0.2,
+        "step_ms": 3.0,
+        "scene": "a",
+    }
     other = row | {"scene": "b", "missed": 0, "invented": 2, "step_ms": 1.0}
     (found,) = choice.outcomes([row, row | {"step_ms": 99.0}, other, row | {"accuracy": "exact"}])
     assert found.setting == Setting("fast", "cpu") and found.ms == 2.0
@@ -86,8 +98,12 @@ def test_outcomes_are_of_the_worst_scene_and_of_settings_that_all_were_tested_wi
 
 def test_wrong_answers_count_against_what_is_asked():
     every, first, any_, faces, _ = ASKED
-    true = {"vf": np.array([[0, 1], [2, 3]]), "vf_toc": np.array([0.25, 0.5]), "ee": np.empty((0, 4), np.uint32),
-            "ee_toc": np.empty(0)}  # fmt: skip
+    true = {
+        "vf": np.array([[0, 1], [2, 3]]),
+        "vf_toc": np.array([0.25, 0.5]),
+        "ee": np.empty((0, 4), np.uint32),
+        "ee_toc": np.empty(0),
+    }
     empty = {"ee": np.empty((0, 4), np.uint32), "ee_toc": np.empty(0)}
     late = found(vf=np.array([[2, 3]], np.uint32), vf_toc=np.array([0.625]), first_toc=0.625, **empty)
     assert errors(every, late, true) == (2, 1, 0, 0.125)
@@ -123,7 +139,7 @@ def test_an_option_of_several_words_is_written_as_a_list(monkeypatch):
     some = settings.Asked("some", {"outputs": ("points", "normals")})
     monkeypatch.setattr(settings, "ASKED", (*ASKED, some))
     python, node = Setting("exact", "cpu", "some").as_written().split("; ")
-    assert python.endswith('backend="cpu", outputs=(\'points\', \'normals\'))')
+    assert python.endswith("backend=\"cpu\", outputs=('points', 'normals'))")
     assert node.endswith(' -p outputs:="[points, normals]"')
 
 

@@ -37,8 +37,12 @@ def test_scaling(bench):
     assert status == 0
     check_files(result, folder, "scaling", "threads")
     assert [(r["method"], r["threads"]) for r in result["rows"]] == [
-        ("default", 1), ("default", 2), ("naive", 1), ("naive", 2), ("independent", 2),
-    ]  # fmt: skip
+        ("default", 1),
+        ("default", 2),
+        ("naive", 1),
+        ("naive", 2),
+        ("independent", 2),
+    ]
     assert len({r["contacts"] for r in result["rows"]}) == 1
     assert result["rows"][0]["efficiency"] == 1
     alone, at_once = result["rows"][0], result["rows"][-1]

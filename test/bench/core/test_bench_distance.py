@@ -20,9 +20,14 @@ def test_a_row_for_each_question(bench):
     status, result, folder = bench("distance", *STRIP, "--separations", "0.02,0.002", "--threads", "2")
     assert status == 0 and result["failures"] == []
     assert [(row["query"], row["distance"]) for row in result["rows"]] == [
-        ("plain", None), ("separation", 0.002), ("separation", 0.02), ("proximity", 0.002), ("proximity", 0.02),
-        ("intersections", None), ("distances", None),
-    ]  # fmt: skip
+        ("plain", None),
+        ("separation", 0.002),
+        ("separation", 0.02),
+        ("proximity", 0.002),
+        ("proximity", 0.02),
+        ("intersections", None),
+        ("distances", None),
+    ]
     plain, *separation, near, nearer, _, gaps = result["rows"]
     assert plain["over_plain"] == plain["least_over_plain"] == 1
     assert 0 < plain["pairs"] < separation[0]["pairs"] < separation[1]["pairs"], "more pairs come within more"
@@ -131,8 +136,11 @@ def test_a_snapshot_is_the_end_of_the_step():
     (gap,) = Question("distances").ask(detector, step)
     assert gap.distance == detector.distances(step.vertices_t1)[0].distance == 0
     assert [question.name for question in questions(["proximity", "distances"], [0.5, 2.0])] == [
-        "plain", "proximity 0.5", "proximity 2", "distances",
-    ]  # fmt: skip
+        "plain",
+        "proximity 0.5",
+        "proximity 2",
+        "distances",
+    ]
 
 
 @pytest.fixture
@@ -142,13 +150,22 @@ def data(tmp_path):
     step = source.step(source.n_steps - 1)
     v0, v1, faces = step.vertices_t0, step.vertices_t1, step.faces().astype(np.uint32)
     near, separated = (
-        reference.proximity(v1, 0.02, [faces]), reference.brute_force(v0, v1, [faces], minimum_separation=0.02),
-    )  # fmt: skip
+        reference.proximity(v1, 0.02, [faces]),
+        reference.brute_force(v0, v1, [faces], minimum_separation=0.02),
+    )
     truth = {
-        "p_d": 0.02, "p_vf": near.vf, "p_vf_distance": near.vf_distance, "p_ee": near.ee,
-        "p_ee_distance": near.ee_distance, "s_d": 0.02, "s_vf": separated.vf, "s_vf_toc": separated.vf_toc,
-        "s_ee": separated.ee, "s_ee_toc": separated.ee_toc, "x_ef": reference.intersections(v1, [faces]),
-    }  # fmt: skip
+        "p_d": 0.02,
+        "p_vf": near.vf,
+        "p_vf_distance": near.vf_distance,
+        "p_ee": near.ee,
+        "p_ee_distance": near.ee_distance,
+        "s_d": 0.02,
+        "s_vf": separated.vf,
+        "s_vf_toc": separated.vf_toc,
+        "s_ee": separated.ee,
+        "s_ee_toc": separated.ee_toc,
+        "x_ef": reference.intersections(v1, [faces]),
+    }
     folder = tmp_path / "data"
     (folder / "distance").mkdir(parents=True)
     np.savez(folder / "strip.npz", vertices_t0=v0, vertices_t1=v1, faces=faces)
@@ -164,9 +181,10 @@ def test_wrong_answers_of_each_tier(bench, data):
     assert status == 0 and result["failures"] == []
     rows = [row for row in result["rows"] if row["part"] == "distance"]
     assert {(row["query"], row["accuracy"]) for row in rows} == {
-        (query, tier) for query in ("separation", "proximity", "intersections")
+        (query, tier)
+        for query in ("separation", "proximity", "intersections")
         for tier in ("fast", "balanced", "conservative", "exact")
-    }  # fmt: skip
+    }
     for row in rows:
         assert row["true"] > 0 and row["scene"] == "strip" and row["step_ms"] > 0
         assert row["accuracy"] != "exact" or row["missed"] == row["invented"] == 0

@@ -18,8 +18,18 @@ from hpccd_ros.bench.core import (
     two_nets,
 )
 
-OF_A_GPU = ("by_tolerance", "by_extended", "by_integers", "single_root", "many_roots", "undecided", "proven_contacts",
-            "rejected_coplanarity", "rejected_projection", "rejected_roots")  # fmt: skip
+OF_A_GPU = (
+    "by_tolerance",
+    "by_extended",
+    "by_integers",
+    "single_root",
+    "many_roots",
+    "undecided",
+    "proven_contacts",
+    "rejected_coplanarity",
+    "rejected_projection",
+    "rejected_roots",
+)
 
 
 class CpuAsGpu(hc.Detector):
@@ -102,8 +112,11 @@ def test_generated_parts_need_no_scenes(bench, device):
     nets, *worlds = result["rows"]
     assert nets["part"] == "large" and nets["triangles"] == 4 * 11**2 and nets["contacts"] > 100
     assert [(row["query"], row["worlds"]) for row in worlds] == [
-        ("detect", 1), ("proximity", 1), ("detect", 3), ("proximity", 3),
-    ]  # fmt: skip
+        ("detect", 1),
+        ("proximity", 1),
+        ("detect", 3),
+        ("proximity", 3),
+    ]
     assert worlds[2]["floors"]["bounds"]["moved"] == pytest.approx(3 * worlds[0]["floors"]["bounds"]["moved"])
     assert worlds[2]["pairs"] / 3 > 100 and worlds[3]["pairs"] == 3 * worlds[1]["pairs"] > 0
 
@@ -113,9 +126,11 @@ def test_another_answer_fails(bench, device, monkeypatch):
     status, result, _ = bench("gpu", "--parts", "large,worlds", "--sizes", "8", "--worlds", "2", "--repeat", "5")
     assert status == 1
     assert [text.split(":")[0] for text in result["failures"]] == [
-        "large, nets 8, exact, device", "large, nets 8, exact, graph", "worlds, detect in 2",
+        "large, nets 8, exact, device",
+        "large, nets 8, exact, graph",
+        "worlds, detect in 2",
         "worlds, proximity in 2",
-    ]  # fmt: skip
+    ]
 
 
 def test_a_frame_left_to_the_cpu_fails(bench, device, monkeypatch):
@@ -132,13 +147,15 @@ def _counts(detector):
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
-        (("--parts", "frames,all"), "--parts frames,all: 'all' is not known; choose from frames, threads, segments, "
-                                    "device, large, worlds"),
+        (
+            ("--parts", "frames,all"),
+            "--parts frames,all: 'all' is not known; choose from frames, threads, segments, device, large, worlds",
+        ),
         (("--sizes", "1,8"), "--sizes 1,8: a net has at least 2 vertices along a side"),
         (("--worlds", "64,70000"), "--worlds 64,70000: a detector takes at most 65,536"),
         (("--worlds", "many"), "--worlds many: numbers with commas between"),
     ],
-)  # fmt: skip
+)
 def test_wrong_use_is_explained(bench, capsys, arguments, text):
     status, result, _ = bench("gpu", *arguments)
     assert status == 2 and result is None
@@ -163,8 +180,16 @@ def test_without_a_library_of_arrays_it_says_which(monkeypatch):
 
 
 def test_all_candidates_are_decided_by_one_arithmetic():
-    kind = {"candidates": 100, "rejected_coplanarity": 60, "single_root": 20, "many_roots": 5, "undecided": 4,
-            "by_tolerance": 0, "by_extended": 2, "by_integers": 1}  # fmt: skip
+    kind = {
+        "candidates": 100,
+        "rejected_coplanarity": 60,
+        "single_root": 20,
+        "many_roots": 5,
+        "undecided": 4,
+        "by_tolerance": 0,
+        "by_extended": 2,
+        "by_integers": 1,
+    }
     stats = {f"{k}_{name}": n for k in ("vf", "ee") for name, n in kind.items()} | {"gpu_exact_on_cpu": 2}
     found = gpu_work.decided(stats)
     assert sum(found.values()) == 200

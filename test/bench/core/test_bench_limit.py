@@ -15,10 +15,19 @@ from hpccd_ros.scenes.scene import Mesh
 
 STRIP = ("folding-strip", "--size", "0.1", "--steps", "2", "--repeat", "1")
 STATS = {
-    "node_pairs": 100, "leaf_pairs": 10, "vf_candidates": 64, "ee_candidates": 32,
-    "vf_rejected_slabs": 32, "ee_rejected_slabs": 16, "vf_rejected_coplanarity": 16, "ee_rejected_coplanarity": 8,
-    "vf_rejected_projection": 8, "ee_rejected_projection": 4, "vf_contacts": 4, "ee_contacts": 2,
-}  # fmt: skip
+    "node_pairs": 100,
+    "leaf_pairs": 10,
+    "vf_candidates": 64,
+    "ee_candidates": 32,
+    "vf_rejected_slabs": 32,
+    "ee_rejected_slabs": 16,
+    "vf_rejected_coplanarity": 16,
+    "ee_rejected_coplanarity": 8,
+    "vf_rejected_projection": 8,
+    "ee_rejected_projection": 4,
+    "vf_contacts": 4,
+    "ee_contacts": 2,
+}
 
 
 def test_a_step_without_work_is_drawn(bench):

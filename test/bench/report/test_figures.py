@@ -57,16 +57,27 @@ def test_scaling_has_a_line_for_each_method_and_each_scene():
 
 def test_hybrid_has_a_line_for_each_method_and_number_of_gpus():
     rows = [
-        {"part": "threads and GPUs", "scene": "s", "accuracy": "balanced", "method": method, "threads": threads,
-         "gpus": gpus, "speedup": threads * (1.0 + gpus) * (2 if method == "default" else 1)}
-        for method in ("published", "default") for threads in (4, 1, 2) for gpus in (1, 0)
-    ]  # fmt: skip
+        {
+            "part": "threads and GPUs",
+            "scene": "s",
+            "accuracy": "balanced",
+            "method": method,
+            "threads": threads,
+            "gpus": gpus,
+            "speedup": threads * (1.0 + gpus) * (2 if method == "default" else 1),
+        }
+        for method in ("published", "default")
+        for threads in (4, 1, 2)
+        for gpus in (1, 0)
+    ]
     result = dataclasses.replace(kept(BY_NAME["hybrid"]), rows=rows)
     (axis,) = BY_NAME["hybrid"].compose(result).axes
     assert lines(axis) == {
-        "default, no GPU": [(1, 2), (2, 4), (4, 8)], "default, 1 GPU": [(1, 4), (2, 8), (4, 16)],
-        "published, no GPU": [(1, 1), (2, 2), (4, 4)], "published, 1 GPU": [(1, 2), (2, 4), (4, 8)],
-    }  # fmt: skip
+        "default, no GPU": [(1, 2), (2, 4), (4, 8)],
+        "default, 1 GPU": [(1, 4), (2, 8), (4, 16)],
+        "published, no GPU": [(1, 1), (2, 2), (4, 4)],
+        "published, 1 GPU": [(1, 2), (2, 4), (4, 8)],
+    }
 
 
 def test_bars_of_stages_add_up_to_the_step():
@@ -80,8 +91,18 @@ def test_bars_of_stages_add_up_to_the_step():
 
 def test_wrong_contacts_stand_in_the_picture():
     methods = BY_NAME["methods"]
-    rows = [{"scene": "s", "variant": "default", "threads": 4, "accuracy": "exact", "sequence_ms": 8.0, "steps": 2,
-             "same_contacts": same} for same in (True, False)]  # fmt: skip
+    rows = [
+        {
+            "scene": "s",
+            "variant": "default",
+            "threads": 4,
+            "accuracy": "exact",
+            "sequence_ms": 8.0,
+            "steps": 2,
+            "same_contacts": same,
+        }
+        for same in (True, False)
+    ]
     (axis,) = methods.compose(dataclasses.replace(kept(BY_NAME["cpu"]), rows=rows)).axes
     assert widths(axis) == {0: [4.0], 1: [4.0]}
     assert [text.get_text().strip() for text in axis.texts] == ["4", "4  OTHER CONTACTS"]
@@ -89,25 +110,44 @@ def test_wrong_contacts_stand_in_the_picture():
 
 def test_the_trade_has_a_point_for_each_setting_and_one_for_each_scene():
     def row(scene, accuracy, asked, ms, missed, error):
-        return {"part": "scene", "scene": scene, "accuracy": accuracy, "backend": "cpu", "simd": "auto", "asked": asked,
-                "step_ms": ms, "contacts": 100, "true": 100, "reported": 100 - missed, "missed": missed, "invented": 0,
-                "toc_worst": error}  # fmt: skip
+        return {
+            "part": "scene",
+            "scene": scene,
+            "accuracy": accuracy,
+            "backend": "cpu",
+            "simd": "auto",
+            "asked": asked,
+            "step_ms": ms,
+            "contacts": 100,
+            "true": 100,
+            "reported": 100 - missed,
+            "missed": missed,
+            "invented": 0,
+            "toc_worst": error,
+        }
 
     rows = [
-        row("a", "exact", "all", 10.0, 0, 0.0), row("b", "exact", "all", 1.0, 0, 1e-15),
-        row("a", "fast", "all", 5.0, 1, 1e-5), row("b", "fast", "all", 0.5, 2, 1e-4),
-        row("a", "exact", "any", 1.0, 0, 0.0), row("b", "exact", "any", 0.1, 0, 0.0),
+        row("a", "exact", "all", 10.0, 0, 0.0),
+        row("b", "exact", "all", 1.0, 0, 1e-15),
+        row("a", "fast", "all", 5.0, 1, 1e-5),
+        row("b", "fast", "all", 0.5, 2, 1e-4),
+        row("a", "exact", "any", 1.0, 0, 0.0),
+        row("b", "exact", "any", 0.1, 0, 0.0),
         row("c", "fast", "all", 1.0, 0, 0.0),  # nothing to compare with
-    ]  # fmt: skip
+    ]
     trade = BY_NAME["trade"]
     result = dataclasses.replace(kept(trade), rows=[*rows, rows[0] | {"simd": "scalar", "step_ms": 99.0}])
-    whole = {(p["quantity"], p["accuracy"], p["asked"]): (p["x"], p["y"])
-             for p in trade.shown(result) if p["scene"] is None}  # fmt: skip
+    whole = {
+        (p["quantity"], p["accuracy"], p["asked"]): (p["x"], p["y"]) for p in trade.shown(result) if p["scene"] is None
+    }
     assert whole == {
-        ("wrong", "exact", "all"): (1, 0), ("wrong", "fast", "all"): (0.5, 0.02), ("wrong", "exact", "any"): (0.1, 0),
-        ("error", "exact", "all"): (1, 1e-15), ("error", "fast", "all"): (0.5, 1e-4),
+        ("wrong", "exact", "all"): (1, 0),
+        ("wrong", "fast", "all"): (0.5, 0.02),
+        ("wrong", "exact", "any"): (0.1, 0),
+        ("error", "exact", "all"): (1, 1e-15),
+        ("error", "fast", "all"): (0.5, 1e-4),
         ("error", "exact", "any"): (pytest.approx(0.1), 0),
-    } | {("wrong", "exact", "any"): (pytest.approx(0.1), 0)}  # fmt: skip
+    } | {("wrong", "exact", "any"): (pytest.approx(0.1), 0)}
     wrong, error, *less = trade.compose(result).axes
     assert [axis.get_title() for axis in less] == ["less: any one contact"] * 2
     for axis, heights in ((wrong, [0.02, panels_trade.QUANTITIES["wrong"][1]]), (error, [1e-4, 1e-15])):

@@ -12,8 +12,18 @@ STAGES = {"stages_ms": {"gpu/refit": 0.5, "gpu/upload": 0.25}, "floors": {"refit
 
 
 def call(part, **more):
-    return {"part": part, "accuracy": "exact", "triangles": 1000, "contacts": 50, "candidates": 1000, "bytes": 700000,
-            "cpu_median_ms": 9.0, "decided": DECIDED, **TIMES, **STAGES} | more  # fmt: skip
+    return {
+        "part": part,
+        "accuracy": "exact",
+        "triangles": 1000,
+        "contacts": 50,
+        "candidates": 1000,
+        "bytes": 700000,
+        "cpu_median_ms": 9.0,
+        "decided": DECIDED,
+        **TIMES,
+        **STAGES,
+    } | more
 
 
 @pytest.fixture
@@ -24,9 +34,19 @@ def kept():
         call("device", scene="cloth", **ways),
         call("large", scene="nets 224", **ways),
         *(call("worlds", query="detect", worlds=n, pairs=300 * n, us_a_world=n / 4) for n in (64, 1024)),
-        {"part": "worlds", "query": "proximity", "worlds": 64, "triangles": 2592, "pairs": 640, "cpu_median_ms": 5.0,
-         "us_a_world": 2.5, "bytes": 64 * 2592 * 50, "stages_ms": {"gpu/refit": 0.5}, **TIMES},
-    ]  # fmt: skip
+        {
+            "part": "worlds",
+            "query": "proximity",
+            "worlds": 64,
+            "triangles": 2592,
+            "pairs": 640,
+            "cpu_median_ms": 5.0,
+            "us_a_world": 2.5,
+            "bytes": 64 * 2592 * 50,
+            "stages_ms": {"gpu/refit": 0.5},
+            **TIMES,
+        },
+    ]
     return Kept("gpu", "hpccd bench gpu", {}, 0.0, rows)
 
 

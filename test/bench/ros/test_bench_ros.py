@@ -28,8 +28,11 @@ def bench(folder, *arguments, program=("-m", "hpccd_ros.cli")):
     """(exit status, the result as written, what was printed)."""
     done = subprocess.run(
         [sys.executable, *program, "bench", *arguments, "--out", str(folder), "--label", "test"],
-        cwd=ROOT, capture_output=True, text=True, timeout=550,
-    )  # fmt: skip
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        timeout=550,
+    )
     said = done.stdout + done.stderr
     files = list(folder.glob("*-test.json"))
     assert files, said
@@ -134,6 +137,9 @@ def test_a_backend_that_is_not_here_is_refused(tmp_path):
         pytest.skip("a GPU is here")
     done = subprocess.run(
         [sys.executable, "-m", "hpccd_ros.cli", "bench", "robot", "--backend", "gpu", "--out", str(tmp_path)],
-        cwd=ROOT, capture_output=True, text=True, timeout=100,
-    )  # fmt: skip
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        timeout=100,
+    )
     assert done.returncode == 2 and "--backend gpu: " in done.stderr and "not usable here" in done.stderr

@@ -80,13 +80,19 @@ def show(session: Session) -> None:
         caption=f"resident memory of the node: {_memory(session)[0]}",
     )
     session.report.add(
-        second=round(60 * args.minutes), sent=sent, **status.counts(), answers=load.answers, checked=load.checked,
-        topologies=load.topologies, requests=load.requests, replies=load.replies,
+        second=round(60 * args.minutes),
+        sent=sent,
+        **status.counts(),
+        answers=load.answers,
+        checked=load.checked,
+        topologies=load.topologies,
+        requests=load.requests,
+        replies=load.replies,
         **{f"publisher_{how}": number for how, number in session.ends.items()},
         wrong_sent={str(reason): n for reason, n in wrong.items()},
         topologies_wrong={str(reason): n for reason, n in topologies_wrong.items()},
         node_memory_mb=session.memory_mb(),
-    )  # fmt: skip
+    )
 
 
 def _received_of_restarted(status) -> int:

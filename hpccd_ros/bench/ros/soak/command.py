@@ -27,14 +27,30 @@ def configure(parser):
     what = parser.add_argument_group("what is done")
     what.add_argument("--minutes", type=float, default=40.0, metavar="M", help="(default: %(default)s)")
     what.add_argument("--rate", type=float, default=10.0, metavar="HZ", help="frames a second (default: %(default)s)")
-    what.add_argument("--restart-every", type=float, default=12.0, metavar="S",
-                      help="life of the publisher that is restarted, s, on average (default: %(default)s)")
-    what.add_argument("--warm-up", type=float, default=0.25, metavar="X",
-                      help="share of the time before memory counts (default: %(default)s, ten of forty minutes)")
-    what.add_argument("--memory-limit", type=float, default=1.0, metavar="PERCENT",
-                      help="largest change of resident memory (default: %(default)s)")
-    what.add_argument("--check-every", type=int, default=25, metavar="N",
-                      help="compute every Nth answer again (default: %(default)s)")
+    what.add_argument(
+        "--restart-every",
+        type=float,
+        default=12.0,
+        metavar="S",
+        help="life of the publisher that is restarted, s, on average (default: %(default)s)",
+    )
+    what.add_argument(
+        "--warm-up",
+        type=float,
+        default=0.25,
+        metavar="X",
+        help="share of the time before memory counts (default: %(default)s, ten of forty minutes)",
+    )
+    what.add_argument(
+        "--memory-limit",
+        type=float,
+        default=1.0,
+        metavar="PERCENT",
+        help="largest change of resident memory (default: %(default)s)",
+    )
+    what.add_argument(
+        "--check-every", type=int, default=25, metavar="N", help="compute every Nth answer again (default: %(default)s)"
+    )
     what.add_argument("--seed", type=int, default=0, metavar="N", help="of what is random (default: %(default)s)")
     command.output_options(parser)
 

@@ -88,9 +88,7 @@ class SoakLoad:
 
     def heard(self) -> bool:
         """Whether the node listens to every mesh and its service is there."""
-        return all(p.get_subscription_count() for p in self._publishers.values()) and (
-            self._client.service_is_ready()
-        )
+        return all(p.get_subscription_count() for p in self._publishers.values()) and (self._client.service_is_ready())
 
     def begin(self) -> None:
         """Send a first right frame: what came before the node knew of its publisher could not be accounted for."""

@@ -47,11 +47,13 @@ class WrongMessages:
         self._send(Reason.MALFORMED, message)
 
     def _values(self, xyz, faces, version, stamp) -> None:
-        reason, wrong = self._random.choice((
-            (Reason.NOT_FINITE, np.where(np.arange(len(xyz))[:, None] == 7, np.float32(np.nan), xyz)),
-            (Reason.WRONG_COUNT, xyz[:-1]),
-            (Reason.TOO_LARGE, np.zeros((MOST_VERTICES + 1, 3), np.float32)),
-        ))  # fmt: skip
+        reason, wrong = self._random.choice(
+            (
+                (Reason.NOT_FINITE, np.where(np.arange(len(xyz))[:, None] == 7, np.float32(np.nan), xyz)),
+                (Reason.WRONG_COUNT, xyz[:-1]),
+                (Reason.TOO_LARGE, np.zeros((MOST_VERTICES + 1, 3), np.float32)),
+            )
+        )
         self._send(reason, mesh_messages.vertices_message(wrong, stamp + 1, topology_version=version))
 
     def _order(self, xyz, faces, version, stamp) -> None:
@@ -63,10 +65,12 @@ class WrongMessages:
         self._send(Reason.MALFORMED, whole[: self._random.randrange(5, len(whole))])
 
     def _wrong_topology(self, xyz, faces, version, stamp) -> None:
-        reason, message = self._random.choice((
-            (Reason.INDEX_RANGE, mesh_messages.topology_message(faces, int(faces.max()), version=version + 1)),
-            (Reason.TOPOLOGY_CONFLICT, mesh_messages.topology_message(faces[1:], len(xyz), version=version)),
-            (Reason.MALFORMED, MeshTopology(version=version + 1, n_vertices=len(xyz), faces=[0, 1])),
-        ))  # fmt: skip
+        reason, message = self._random.choice(
+            (
+                (Reason.INDEX_RANGE, mesh_messages.topology_message(faces, int(faces.max()), version=version + 1)),
+                (Reason.TOPOLOGY_CONFLICT, mesh_messages.topology_message(faces[1:], len(xyz), version=version)),
+                (Reason.MALFORMED, MeshTopology(version=version + 1, n_vertices=len(xyz), faces=[0, 1])),
+            )
+        )
         self.topologies[reason] += 1
         self._topology(message)
