@@ -16,11 +16,15 @@ PYTEST_ARGS ?=
 TEST_JOBS   ?= $(shell echo $$(($(JOBS) < 8 ? $(JOBS) + 1 : 8)))
 AARCH64_TESTS ?= *
 DEMO_ARGS   ?=
+HPCCD_CUDA  ?= AUTO
 FUZZ_ARGS   ?= --seconds 60
 
 BIN := $(VENV)/bin
 export PATH := $(abspath $(BIN)):$(PATH)
 export CMAKE_BUILD_PARALLEL_LEVEL := $(JOBS)
+# Where CMake builds what is installed, the C++ tests and the C++ package: one tree for each environment.
+TREE := build/cmake$(if $(filter-out .venv,$(VENV)),-$(notdir $(VENV)))
+export HPCCD_BUILD_TREE := $(abspath $(TREE))
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 # The wheels' bootstrapper marks its environment: the mark of another environment must not reach this one.
 unexport PYTHONPATH PYTHONHOME _ROS_WHEELS_BOOTSTRAP_COMPLETE
@@ -53,6 +57,7 @@ help: ## Show this list
 	@echo "  PYTHON=python3.12   which Python for .venv: 3.11 or 3.12 (default: the first found)"
 	@echo "  VENV=.venv          where the environment lies"
 	@echo "  JOBS=4              compile jobs (default: all cores)"
+	@echo "  HPCCD_CUDA=ON       compile the GPU backends (default: where there is an NVIDIA GPU); OFF: do not"
 	@echo "  CMAKE_ARGS=...      passed on to CMake"
 	@echo "  TEST_JOBS=1         Python tests at a time (default: one more than JOBS, at most 8)"
 	@echo "  PYTEST_ARGS=...     passed on to pytest      DEMO_ARGS=...  passed on to hpccd demo"
@@ -66,8 +71,9 @@ demo: venv ## Node, publisher and recorder as processes over DDS; leaves a recor
 
 test: test-core test-python ## Pass all tests
 
-test-core: $(ENVIRONMENT) ## Only the C++ tests of the core
-	@$(call run_core_tests,build/core-tests,-DCMAKE_BUILD_TYPE=Release)
+test-core: $(if $(wildcard $(TREE)/build.ninja),$(ENVIRONMENT),venv) ## Only the C++ tests of the core
+	@. $(VENV)/build.env; flock $(VENV) cmake --build $(TREE) --target hpccd_core_tests
+	@CUDA_VISIBLE_DEVICES= ctest --test-dir $(TREE)/hpccd_core --output-on-failure --no-tests=error --parallel $(JOBS)
 
 test-python: venv ## Only the Python tests: core against oracles, node over DDS, recordings
 	$(BIN)/pytest --numprocesses $(TEST_JOBS) --dist worksteal $(PYTEST_ARGS)
@@ -77,7 +83,7 @@ test-long: venv ## Only the Python tests that take minutes, which make test skip
 
 test-gpu: venv ## Only the tests of the GPU backends, on a machine with an NVIDIA GPU
 	@$(BIN)/python -c 'import sys, hpccd_core as hc; "gpu" in hc.backends() or sys.exit(sys.argv[1])' \
-	  "hpccd: no GPU backend here. Is there an NVIDIA GPU? Without a CUDA toolkit: make venv EXTRAS='test cuda'"
+	  "hpccd: no GPU backend here (see hpccd info). Without a CUDA toolkit: make venv EXTRAS='test cuda'"
 	$(BIN)/pytest test/gpu $(PYTEST_ARGS)
 
 test-aarch64: $(ENVIRONMENT) ## The C++ tests compiled for aarch64, in an emulator (g++-aarch64-linux-gnu, qemu-user)
@@ -124,10 +130,12 @@ comma := ,
 export UBSAN_OPTIONS := halt_on_error=1:print_stacktrace=1
 
 # GoogleTest comes as source in a wheel, so that the tests need no system package and are the same everywhere.
+GTEST := -DHPCCD_BUILD_TESTS=ON -DGTest_DIR=$(CURDIR)/cmake/gtest -DHPCCD_GTEST_SOURCE=$(abspath $(VENV))/src/gtest_vendor
+
+# Tests whose compiler flags are not those of the package: in a build tree of their own.
 define run_core_tests
 mkdir -p build; . $(VENV)/build.env; \
-cmake -S hpccd_core -B $(1) -G Ninja -DHPCCD_BUILD_TESTS=ON -DHPCCD_CUDA=OFF -DGTest_DIR="$(CURDIR)/cmake/gtest" \
-  -DHPCCD_GTEST_SOURCE="$(abspath $(VENV))/src/gtest_vendor" \
+cmake -S hpccd_core -B $(1) -G Ninja $(GTEST) -DHPCCD_CUDA=OFF \
   -DPython3_EXECUTABLE="$(abspath $(BIN))/python" -DPython_EXECUTABLE="$(abspath $(BIN))/python" $(2) $${CMAKE_ARGS:-} > $(1).log 2>&1 || { cat $(1).log; exit 1; }; \
 cmake --build $(1) --target hpccd_core_tests && ctest --test-dir $(1) --output-on-failure --no-tests=error
 endef
@@ -138,11 +146,15 @@ $(ENVIRONMENT): pyproject.toml scripts/create_venv.sh scripts/requirements.py $(
 
 $(INSTALLED): $(ENVIRONMENT) $(SOURCES) build/sources.txt
 	@echo "hpccd: building, and installing into $(VENV) (a minute or two the first time)"
-	@. $(VENV)/build.env; flock $(VENV) $(BIN)/python -m pip install --quiet --no-build-isolation --no-deps .
+	@. $(VENV)/build.env; tests=; if [ -d $(VENV)/src/gtest_vendor ]; then tests='$(GTEST)'; fi; \
+	  CMAKE_ARGS="-DHPCCD_CUDA=$(HPCCD_CUDA) $$tests $${CMAKE_ARGS:-}" \
+	  flock $(VENV) $(BIN)/python -m pip install --quiet --no-build-isolation --no-deps .
+	@cat $(TREE)/hpccd_core/cuda.txt
 	@touch $@
 
-# Changes when a source file appears or disappears, which no time stamp of another file tells.
+# Changes when a source file appears or disappears, which no time stamp of another file shows, or when CMake's options do.
 build/sources.txt: FORCE
 	@mkdir -p $(@D)
-	@printf '%s\n' $(SOURCES) | cmp -s - $@ || printf '%s\n' $(SOURCES) > $@
+	@printf '%s\n' '$(HPCCD_CUDA) $(CMAKE_ARGS)' $(SOURCES) | cmp -s - $@ || \
+	  printf '%s\n' '$(HPCCD_CUDA) $(CMAKE_ARGS)' $(SOURCES) > $@
 FORCE:

@@ -54,7 +54,9 @@ class CMakeBuild(build_ext):
 
     def run(self):
         work = Path(self.build_temp).resolve()
-        build, stage, prefix = work / "cmake", work / "stage", ros_prefix()
+        # The Makefile names a tree of its own, in which it builds the C++ tests too.
+        build = Path(os.environ.get("HPCCD_BUILD_TREE") or work / "cmake").resolve()
+        stage, prefix = work / "stage", ros_prefix()
         self._forget_other_environment(build, prefix)
         shutil.rmtree(stage, ignore_errors=True)
 
@@ -63,7 +65,6 @@ class CMakeBuild(build_ext):
             raise SystemExit("hpccd: cmake not found. Remedy: pip install cmake ninja")
         ninja = tool("ninja")
         generator = ["-G", "Ninja", f"-DCMAKE_MAKE_PROGRAM={ninja}"] if ninja else []
-        env = os.environ | {"AMENT_PREFIX_PATH": str(prefix), "CMAKE_PREFIX_PATH": str(prefix)}
         configure = [
             cmake,
             "-S",
@@ -74,7 +75,11 @@ class CMakeBuild(build_ext):
             "-DCMAKE_BUILD_TYPE=Release",
             "-DBUILD_TESTING=OFF",
             "-DHPCCD_PIP=ON",
+            # CMake remembers what CMAKE_ARGS said at another time.
+            "-DHPCCD_CUDA=AUTO",
+            "-DHPCCD_BUILD_TESTS=OFF",
             f"-DCMAKE_PROJECT_INCLUDE={HERE / 'cmake' / 'pypi_ros.cmake'}",
+            f"-DHPCCD_ROS_PREFIX={prefix}",
             f"-DCMAKE_INSTALL_PREFIX={stage}",
             f"-DCMAKE_INSTALL_RPATH={RPATH}",
             # rosidl asks for Python3, pybind11 for Python.
@@ -82,9 +87,9 @@ class CMakeBuild(build_ext):
             f"-DPython_EXECUTABLE={sys.executable}",
             *shlex.split(os.environ.get("CMAKE_ARGS", "")),
         ]
-        subprocess.check_call(configure, env=env)
-        subprocess.check_call([cmake, "--build", str(build), "--parallel", self._jobs()], env=env)
-        subprocess.check_call([cmake, "--install", str(build)], env=env, stdout=subprocess.DEVNULL)
+        subprocess.check_call(configure)
+        subprocess.check_call([cmake, "--build", str(build), "--parallel", self._jobs()])
+        subprocess.check_call([cmake, "--install", str(build)], stdout=subprocess.DEVNULL)
 
         (site_packages,) = stage.glob("lib/python3*/site-packages")
         for package in PYTHON_PACKAGES_OF_CMAKE:
@@ -105,11 +110,11 @@ class CMakeBuild(build_ext):
     @staticmethod
     def _forget_other_environment(build: Path, prefix: Path) -> None:
         """CMake caches absolute paths of the ROS wheels: start afresh when these lie elsewhere now."""
-        mark = build / "hpccd_ros_prefix.txt"
-        if not (mark.is_file() and mark.read_text() == str(prefix)):
+        mark, environment = build / "hpccd_environment.txt", f"{prefix}\nPython {sys.version}\n"
+        if not (mark.is_file() and mark.read_text() == environment):
             shutil.rmtree(build, ignore_errors=True)
             build.mkdir(parents=True)
-            mark.write_text(str(prefix))
+            mark.write_text(environment)
 
 
 class StagedData(install_data):

@@ -1,6 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 # Only for ROS 2 that was installed as Python wheels; hand it over as -DCMAKE_PROJECT_INCLUDE.
-#
+# HPCCD_ROS_PREFIX: the environment that holds them, also for a later run of CMake by Ninja; else AMENT_PREFIX_PATH and
+# CMAKE_PREFIX_PATH name it.
+if(HPCCD_ROS_PREFIX)
+  set(ENV{AMENT_PREFIX_PATH} "${HPCCD_ROS_PREFIX}")
+  set(ENV{CMAKE_PREFIX_PATH} "${HPCCD_ROS_PREFIX}")
+endif()
+
 # The exported targets in those wheels list the include folder of the Python that built them, and CMake stops
 # at an imported target whose include folder is missing. Such folders are dropped after the last line of the
 # top CMakeLists.txt has run, when every imported target is known.

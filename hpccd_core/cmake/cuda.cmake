@@ -1,17 +1,46 @@
 # SPDX-License-Identifier: Apache-2.0
 # Finds nvcc and compiles the CUDA sources with it into objects. Not CMake's own CUDA language: that fails at configure
 # time where nvcc comes from wheels, and a build without CUDA must always work.
-set(HPCCD_CUDA "AUTO" CACHE STRING "CUDA backends: AUTO (where nvcc works), ON (required), OFF")
+set(HPCCD_CUDA "AUTO" CACHE STRING "CUDA backends: AUTO (where there is a GPU and nvcc works), ON (required), OFF")
 set_property(CACHE HPCCD_CUDA PROPERTY STRINGS AUTO ON OFF)
 # Machine code for Hopper; any other GPU since Turing compiles the portable code when it first runs.
 set(HPCCD_CUDA_ARCHITECTURES "90;75-virtual" CACHE STRING "e.g. 87 (Jetson Orin), 90, or 75-virtual for portable code")
+
+# hpccd_has_gpu(variable): whether this machine has an NVIDIA GPU; nvidia-smi knows it where no device file shows it (WSL).
+function(hpccd_has_gpu variable)
+  set(${variable} ON PARENT_SCOPE)
+  foreach(file nvidiactl nvidia0 nvhost-gpu nvgpu)  # the last two: Jetson
+    if(EXISTS "/dev/${file}")
+      return()
+    endif()
+  endforeach()
+  set(listed "")
+  find_program(HPCCD_NVIDIA_SMI nvidia-smi PATHS /usr/lib/wsl/lib)
+  if(HPCCD_NVIDIA_SMI)
+    execute_process(COMMAND "${HPCCD_NVIDIA_SMI}" -L OUTPUT_VARIABLE listed ERROR_QUIET)
+  endif()
+  if(NOT listed MATCHES "GPU ")
+    set(${variable} OFF PARENT_SCOPE)
+  endif()
+endfunction()
+
+# hpccd_report_cuda(line): while CMake runs, and in a file that the Makefile prints.
+function(hpccd_report_cuda line)
+  message(STATUS "${line}")
+  file(WRITE "${CMAKE_CURRENT_BINARY_DIR}/cuda.txt" "${line}\n")
+endfunction()
 
 # Sets hpccd_cuda_objects and hpccd_cuda_libraries, both empty where there is no CUDA.
 function(hpccd_find_cuda)
   set(hpccd_cuda_objects "" PARENT_SCOPE)
   set(hpccd_cuda_libraries "" PARENT_SCOPE)
   if(HPCCD_CUDA STREQUAL "OFF")
-    message(STATUS "CUDA: off")
+    hpccd_report_cuda("CUDA: off, GPU backends are not compiled (HPCCD_CUDA=OFF)")
+    return()
+  endif()
+  hpccd_has_gpu(has_gpu)
+  if(HPCCD_CUDA STREQUAL "AUTO" AND NOT has_gpu)
+    hpccd_report_cuda("CUDA: no NVIDIA GPU found, GPU backends are not compiled; HPCCD_CUDA=ON compiles them")
     return()
   endif()
 
@@ -63,21 +92,19 @@ function(hpccd_find_cuda)
     if(HPCCD_CUDA STREQUAL "ON")
       message(FATAL_ERROR "CUDA: ${problem}")
     endif()
-    message(STATUS "CUDA: none, the GPU backends are left out (${problem})")
+    hpccd_report_cuda("CUDA: GPU backends are not compiled (${problem})")
     return()
   endif()
-  message(STATUS "CUDA: ${HPCCD_NVCC}, for ${shown}")
+  hpccd_report_cuda("CUDA: ${HPCCD_NVCC}, for ${shown}")
 
-  file(GLOB headers CONFIGURE_DEPENDS "${CMAKE_CURRENT_SOURCE_DIR}/src/*/*.h" "${CMAKE_CURRENT_SOURCE_DIR}/src/*/*.cuh"
-    "${CMAKE_CURRENT_SOURCE_DIR}/include/hpccd/*.h")
   foreach(source gpu/pipeline gpu/test_lists gpu/likely_stages gpu/separation_stages gpu/integer_stages gpu/snapshot_stages gpu/places_stages gpu/places_in_integers gpu/hints gpu/device gpu/results_to_device gpu/sort hybrid/cuda_device)
     string(REPLACE "/" "_" name "${source}")
     set(object "${CMAKE_CURRENT_BINARY_DIR}/${name}.o")
     add_custom_command(OUTPUT "${object}"
       COMMAND "${HPCCD_NVCC}" ${flags} "-DHPCCD_CUDA_ARCHITECTURES_TEXT=\"${shown}\""
         -I "${CMAKE_CURRENT_SOURCE_DIR}/src" -I "${CMAKE_CURRENT_SOURCE_DIR}/include"
-        -c "${CMAKE_CURRENT_SOURCE_DIR}/src/${source}.cu" -o "${object}"
-      DEPENDS "${CMAKE_CURRENT_SOURCE_DIR}/src/${source}.cu" ${headers}
+        -MD -MF "${object}.d" -MT "${object}" -c "${CMAKE_CURRENT_SOURCE_DIR}/src/${source}.cu" -o "${object}"
+      DEPENDS "${CMAKE_CURRENT_SOURCE_DIR}/src/${source}.cu" DEPFILE "${object}.d"
       COMMENT "Building CUDA object ${source}.cu" VERBATIM)
     list(APPEND objects "${object}")
   endforeach()

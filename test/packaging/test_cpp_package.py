@@ -15,19 +15,20 @@ from sources import ROOT
 import hpccd_core as hc
 
 VERSION = hc.__version__
-# `make test-core` compiles the library there; HPCCD_CPP_BUILD names another build, such as one with CUDA.
-BUILD = Path(os.environ.get("HPCCD_CPP_BUILD", ROOT / "build" / "core-tests"))
+# The tree in which `make venv` and `make test-core` compile.
+BUILD = Path(os.environ.get("HPCCD_BUILD_TREE", ROOT / "build" / "cmake"))
 
 
 @pytest.fixture(scope="session")
 def prefix(tmp_path_factory):
     if not (BUILD / "build.ninja").is_file():
-        pytest.skip(f"the library is not built in {BUILD}: make test-core")
+        pytest.skip(f"there is no build tree in {BUILD}: make venv")
     folder = tmp_path_factory.mktemp("prefix")
     with (BUILD / "packaging.lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)  # workers of pytest-xdist come here at once, and Ninja has no lock of its own
         run("cmake", "--build", BUILD, "--target", "hpccd_core_shared", "hpccd_core_static")
-        run("cmake", "--install", BUILD, "--prefix", folder)
+        for component in ("runtime", "development"):
+            run("cmake", "--install", BUILD / "hpccd_core", "--prefix", folder, "--component", component)
     return folder
 
 

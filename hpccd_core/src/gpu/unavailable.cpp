@@ -10,7 +10,7 @@ namespace hpccd::gpu {
 
 const Status& status() {
   static const Status s{
-      false, "", {}, "this build holds no CUDA code: nvcc was not found, or HPCCD_CUDA was OFF, when it was compiled"};
+      false, "", {}, "this build has no GPU backends: build on a machine with an NVIDIA GPU and nvcc, or with HPCCD_CUDA=ON"};
   return s;
 }
 
