@@ -10,7 +10,10 @@ namespace hpccd::gpu {
 
 const Status& status() {
   static const Status s{
-      false, "", {}, "this build has no GPU backends: build on a machine with an NVIDIA GPU and nvcc, or with HPCCD_CUDA=ON"};
+      false,
+      "",
+      {},
+      "this build has no GPU backends: build on a machine with an NVIDIA GPU and nvcc, or with HPCCD_CUDA=ON"};
   return s;
 }
 
