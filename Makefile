@@ -44,7 +44,7 @@ INSTALLED   := $(VENV)/.hpccd-installed
 SOURCES := $(sort $(shell find CMakeLists.txt setup.py package.xml action cmake config launch msg srv scripts hpccd_ros hpccd_core \
   \( -name __pycache__ -o -name dist -o -path hpccd_core/tests \) -prune -o -type f -print))
 
-.PHONY: help venv demo test test-core test-python test-long test-gpu test-aarch64 sanitize fuzz lint format release-check pin clean distclean \
+.PHONY: help venv demo test test-core test-python test-long test-gpu test-aarch64 sanitize fuzz oracle lint format release-check pin clean distclean \
   FORCE
 
 help: ## Show this list
@@ -75,13 +75,13 @@ test-core: $(if $(wildcard $(TREE)/build.ninja),$(ENVIRONMENT),venv) ## Only the
 	@. $(VENV)/build.env; flock $(VENV) cmake --build $(TREE) --target hpccd_core_tests
 	@CUDA_VISIBLE_DEVICES= ctest --test-dir $(TREE)/hpccd_core --output-on-failure --no-tests=error --parallel $(JOBS)
 
-test-python: venv ## Only the Python tests: core against oracles, node over DDS, recordings
+test-python: venv oracle ## Only the Python tests: core against oracles, node over DDS, recordings
 	$(BIN)/pytest --numprocesses $(TEST_JOBS) --dist worksteal $(PYTEST_ARGS)
 
-test-long: venv ## Only the Python tests that take minutes, which make test skips
+test-long: venv oracle ## Only the Python tests that take minutes, which make test skips
 	$(BIN)/pytest --long -m long --numprocesses $(TEST_JOBS) $(PYTEST_ARGS)
 
-test-gpu: venv ## Only the tests of the GPU backends, on a machine with an NVIDIA GPU
+test-gpu: venv oracle ## Only the tests of the GPU backends, on a machine with an NVIDIA GPU
 	@$(BIN)/python -c 'import sys, hpccd_core as hc; "gpu" in hc.backends() or sys.exit(sys.argv[1])' \
 	  "hpccd: no GPU backend here (see hpccd info). Without a CUDA toolkit: make venv EXTRAS='test cuda'"
 	$(BIN)/pytest test/gpu $(PYTEST_ARGS)
@@ -93,8 +93,12 @@ sanitize: $(ENVIRONMENT) ## C++ tests under AddressSanitizer + UndefinedBehavior
 	@$(call run_core_tests,build/core-asan,-DCMAKE_BUILD_TYPE=RelWithDebInfo -DHPCCD_SANITIZE=address$(comma)undefined)
 	@$(call run_core_tests,build/core-tsan,-DCMAKE_BUILD_TYPE=RelWithDebInfo -DHPCCD_SANITIZE=thread)
 
-fuzz: venv ## Compare the core with the exact oracle on random and degenerate queries (FUZZ_ARGS=--help)
-	$(BIN)/python -m hpccd_core.fuzz $(FUZZ_ARGS)
+fuzz: venv oracle ## Compare the core with the exact oracle on random and degenerate queries (FUZZ_ARGS=--help)
+	PYTHONPATH=test:build/oracle $(BIN)/python -m fuzz $(FUZZ_ARGS)
+
+oracle: $(ENVIRONMENT) ## Build the exact oracle that tests and fuzzer compare with
+	@mkdir -p build; . $(VENV)/build.env; { cmake -S test/oracle -B build/oracle -G Ninja \
+	  -DPython_EXECUTABLE="$(abspath $(BIN))/python" && cmake --build build/oracle; } > build/oracle.log 2>&1 || { cat build/oracle.log; exit 1; }
 
 lint: $(ENVIRONMENT) ## Check style, types, layers and commit subjects: ruff, mypy, import-linter, clang-format
 	$(BIN)/ruff check .

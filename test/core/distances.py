@@ -2,8 +2,7 @@
 """Distances of features in plain floating point: another way to the same truth, good to rounding."""
 
 import numpy as np
-
-from hpccd_core.fuzz.generators import EDGE_EDGE, VERTEX_FACE
+from fuzz.generators import EDGE_EDGE, VERTEX_FACE
 
 
 def _point_segment(p, a, b):

@@ -7,8 +7,7 @@ A query is (8,3): v f0 f1 f2 or a0 a1 b0 b1 at t=0, then the same at t=1.
 from fractions import Fraction
 
 import numpy as np
-
-from hpccd_core.fuzz.generators import VERTEX_FACE
+from fuzz.generators import VERTEX_FACE
 
 
 def _rational(query):

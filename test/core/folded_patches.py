@@ -6,8 +6,7 @@ A shape is (faces, start, end, time), time None where nothing touches.
 """
 
 import numpy as np
-
-from hpccd_core.fuzz.step_scenes import grid, octahedron, ring
+from fuzz.step_scenes import grid, octahedron, ring
 
 
 def band(middles, across):

@@ -4,9 +4,9 @@
 import dataclasses
 
 import numpy as np
+import oracle
 
 import hpccd_core as hc
-from hpccd_core import reference
 
 NO_FACES, NO_EDGES = np.empty((0, 3), int), np.empty((0, 2), int)
 
@@ -37,7 +37,7 @@ class Meshes:
         return {"n_vertices": self.n_vertices, "edges_per_mesh": self.edges}
 
     def truth(self, **options):
-        return reference.brute_force(self.vertices_t0, self.vertices_t1, self.faces, **self.beside_faces, **options)
+        return oracle.brute_force(self.vertices_t0, self.vertices_t1, self.faces, **self.beside_faces, **options)
 
 
 def sheet(n):

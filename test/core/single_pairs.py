@@ -5,10 +5,10 @@ import itertools
 
 import numpy as np
 import pytest
+from fuzz import generators
+from fuzz.generators import EDGE_EDGE, VERTEX_FACE
 
 import hpccd_core as hc
-from hpccd_core.fuzz import generators
-from hpccd_core.fuzz.generators import EDGE_EDGE, VERTEX_FACE
 
 KINDS = pytest.mark.parametrize("kind", [VERTEX_FACE, EDGE_EDGE])
 TEST = {VERTEX_FACE: hc.test_vertex_face, EDGE_EDGE: hc.test_edge_edge}

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 import random_scenes
 import single_pairs
+from fuzz.generators import EDGE_EDGE, VERTEX_FACE
 from single_pairs import DEGENERATE, KINDS, REGULAR, contacts, small_steps
 
 import hpccd_core as hc
-from hpccd_core.fuzz.generators import EDGE_EDGE, VERTEX_FACE
 
 
 def point_of(start, end=None):

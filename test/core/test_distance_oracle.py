@@ -4,21 +4,20 @@
 from fractions import Fraction
 
 import numpy as np
+import oracle
 import pytest
 from exact_geometry import squared_distance_to_triangle
+from fuzz.disturbances import disturb_near
+from fuzz.generators import EDGE_EDGE, GENERATORS, VERTEX_FACE
+from fuzz.near_generators import NEAR_GENERATORS
 from single_pairs import names, renamed
 
-from hpccd_core import reference
-from hpccd_core.fuzz.disturbances import disturb_near
-from hpccd_core.fuzz.generators import EDGE_EDGE, GENERATORS, VERTEX_FACE
-from hpccd_core.fuzz.near_generators import NEAR_GENERATORS
-
 KINDS = pytest.mark.parametrize("kind", [VERTEX_FACE, EDGE_EDGE])
-CONTACT = {VERTEX_FACE: reference.vertex_face, EDGE_EDGE: reference.edge_edge}
-SEPARATION = {VERTEX_FACE: reference.separation_vertex_face, EDGE_EDGE: reference.separation_edge_edge}
-DISTANCE = {VERTEX_FACE: reference.distance_vertex_face, EDGE_EDGE: reference.distance_edge_edge}
-SQUARED = {VERTEX_FACE: reference.squared_distance_vertex_face, EDGE_EDGE: reference.squared_distance_edge_edge}
-WITHIN = {VERTEX_FACE: reference.within_vertex_face, EDGE_EDGE: reference.within_edge_edge}
+CONTACT = {VERTEX_FACE: oracle.vertex_face, EDGE_EDGE: oracle.edge_edge}
+SEPARATION = {VERTEX_FACE: oracle.separation_vertex_face, EDGE_EDGE: oracle.separation_edge_edge}
+DISTANCE = {VERTEX_FACE: oracle.distance_vertex_face, EDGE_EDGE: oracle.distance_edge_edge}
+SQUARED = {VERTEX_FACE: oracle.squared_distance_vertex_face, EDGE_EDGE: oracle.squared_distance_edge_edge}
+WITHIN = {VERTEX_FACE: oracle.within_vertex_face, EDGE_EDGE: oracle.within_edge_edge}
 
 
 def near_queries(kind, seed, n):
@@ -122,12 +121,12 @@ def test_a_single_moving_feature_sweeps_a_larger_one(kind):
 
 
 def _segment_near_triangle(start, end, corners, distance):
-    near = reference.edge_face_intersect(np.concatenate([start[:, None], end[:, None], corners], axis=1))
+    near = oracle.edge_face_intersect(np.concatenate([start[:, None], end[:, None], corners], axis=1))
     for point in (start, end):
-        near |= reference.within_vertex_face(np.concatenate([point[:, None], corners], axis=1), distance)
+        near |= oracle.within_vertex_face(np.concatenate([point[:, None], corners], axis=1), distance)
     for i in range(3):
         pair = np.stack([start, end, corners[:, i - 1], corners[:, i]], axis=1)
-        near |= reference.within_edge_edge(pair, distance)
+        near |= oracle.within_edge_edge(pair, distance)
     return near
 
 
@@ -136,9 +135,9 @@ def test_an_edge_meets_a_face_where_a_vertex_that_runs_along_it_does():
     for _, queries, _ in near_queries(VERTEX_FACE, 5, 200):
         along = queries.copy()
         along[:, 5:] = along[:, 1:4]
-        truth = reference.vertex_face(along)[0]
+        truth = oracle.vertex_face(along)[0]
         ends = np.stack([along[:, 0], along[:, 4]], axis=1)
-        assert np.array_equal(reference.edge_face_intersect(np.concatenate([ends, along[:, 1:4]], axis=1)), truth)
+        assert np.array_equal(oracle.edge_face_intersect(np.concatenate([ends, along[:, 1:4]], axis=1)), truth)
         seen |= set(truth.tolist())
     assert seen == {True, False}
 
@@ -190,16 +189,16 @@ def test_a_vertex_that_grazes():
     triangle = [[0, 0, 0], [-7, -2, 0], [-5, -9, 0]]
     start, end = np.array([3, 4, 0]) - [4, -3, 0], np.array([3, 4, 0]) + [4, -3, 0]
     query = np.array([[start, *triangle, end, *triangle]])
-    assert reference.separation_vertex_face(query, 5.0)[1].tolist() == [0.5]
-    assert reference.separation_vertex_face(query, np.nextafter(5.0, 0))[1].tolist() == [np.inf]
+    assert oracle.separation_vertex_face(query, 5.0)[1].tolist() == [0.5]
+    assert oracle.separation_vertex_face(query, np.nextafter(5.0, 0))[1].tolist() == [np.inf]
 
 
 def test_edges_that_glide_in_parallel():
     # Side by side on two lines one apart; the second comes along its own line until their ends face each other at 3/4.
     still, start, end = [[0, 0, 0], [1, 0, 0]], [[4, 1, 0], [6, 1, 0]], [[0, 1, 0], [2, 1, 0]]
     query = np.array([[*still, *start, *still, *end]], dtype=float)
-    assert reference.separation_edge_edge(query, 1.0)[1].tolist() == [0.75]
-    assert reference.separation_edge_edge(query, np.nextafter(1.0, 0))[1].tolist() == [np.inf]
+    assert oracle.separation_edge_edge(query, 1.0)[1].tolist() == [0.75]
+    assert oracle.separation_edge_edge(query, np.nextafter(1.0, 0))[1].tolist() == [np.inf]
 
 
 @pytest.mark.parametrize(
@@ -218,13 +217,13 @@ def test_edges_that_glide_in_parallel():
     ],
 )
 def test_intersections_one_sees(points, truth):
-    assert reference.edge_face_intersect(np.array([points], dtype=float))[0] == truth
+    assert oracle.edge_face_intersect(np.array([points], dtype=float))[0] == truth
 
 
 @pytest.mark.parametrize("bad", [-1.0, np.nan, np.inf, np.zeros(3)])
 def test_bad_distances_are_refused(bad):
     with pytest.raises(ValueError, match="distance"):
-        reference.separation_vertex_face(np.zeros((1, 8, 3)), bad)
+        oracle.separation_vertex_face(np.zeros((1, 8, 3)), bad)
 
 
 def test_queries_with_ground_truth(data_folder):
@@ -236,7 +235,7 @@ def test_queries_with_ground_truth(data_folder):
             within = WITHIN[kind](file[f"p_{name}_q"], file[f"p_{name}_d"])
             assert np.array_equal(within, file[f"p_{name}_hit"])
             np.testing.assert_array_max_ulp(DISTANCE[kind](file[f"p_{name}_q"]), file[f"p_{name}_distance"], 1)
-        assert np.array_equal(reference.edge_face_intersect(file["x_q"]), file["x_hit"])
+        assert np.array_equal(oracle.edge_face_intersect(file["x_q"]), file["x_hit"])
 
 
 @pytest.mark.parametrize("name", ["two-cubes", "thick-cloth"])
@@ -250,9 +249,9 @@ def test_scenes_with_ground_truth(data_folder, name):
                 continue
             d = float(file[f"{key}_d"])
             if key.startswith("s"):
-                found = reference.brute_force(v0, v1, faces, n_vertices=n_vertices, minimum_separation=d)
+                found = oracle.brute_force(v0, v1, faces, n_vertices=n_vertices, minimum_separation=d)
             else:
-                found = reference.proximity(v1, d, faces, n_vertices=n_vertices)
+                found = oracle.proximity(v1, d, faces, n_vertices=n_vertices)
             value = "toc" if key.startswith("s") else "distance"
             for pairs in ("vf", "ee"):
                 assert np.array_equal(getattr(found, pairs), file[f"{key}_{pairs}"])
@@ -260,4 +259,4 @@ def test_scenes_with_ground_truth(data_folder, name):
                 np.testing.assert_allclose(getattr(found, f"{pairs}_{value}"), truth, rtol=1e-15, atol=4e-16)
                 compared += len(truth)
         assert compared > 500
-        assert np.array_equal(reference.intersections(v1, faces, n_vertices=n_vertices), file["x_ef"])
+        assert np.array_equal(oracle.intersections(v1, faces, n_vertices=n_vertices), file["x_ef"])

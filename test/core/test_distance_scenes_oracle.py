@@ -4,10 +4,9 @@
 import itertools
 
 import numpy as np
+import oracle
 import pytest
 import random_scenes
-
-from hpccd_core import reference
 
 SEPARATIONS = {(0, 0): 0.5, (0, 1): 0.0, (1, 1): 2.0}
 RULES = {"no_self_collision": [2], "ignored_pairs": [(0, 2)]}
@@ -50,12 +49,12 @@ def test_each_pair_by_itself(generate):
     v0, v1 = meshes.vertices_t0, meshes.vertices_t1
     options = meshes.beside_faces
     pairs = {k: v for k, v in SEPARATIONS.items() if max(k) < len(meshes.faces)}
-    contacts = reference.brute_force(v0, v1, meshes.faces, minimum_separation=0.125, pair_separation=pairs, **options)
-    proximity = reference.proximity(v1, 0.75, meshes.faces, **options)
+    contacts = oracle.brute_force(v0, v1, meshes.faces, minimum_separation=0.125, pair_separation=pairs, **options)
+    proximity = oracle.proximity(v1, 0.75, meshes.faces, **options)
     vf, ee, ef = named_pairs(faces, edges, len(v0))
     for kind, (names, points, (a, b)), separation, distance in (
-        ("vf", vf, reference.separation_vertex_face, reference.distance_vertex_face),
-        ("ee", ee, reference.separation_edge_edge, reference.distance_edge_edge),
+        ("vf", vf, oracle.separation_vertex_face, oracle.distance_vertex_face),
+        ("ee", ee, oracle.separation_edge_edge, oracle.distance_edge_edge),
     ):
         margin = np.array([pairs.get((i, j), 0.125) for i, j in np.sort([mesh[a], mesh[b]], axis=0).T])
         hit, toc = separation(np.hstack([v0[points], v1[points]]), margin)
@@ -66,22 +65,22 @@ def test_each_pair_by_itself(generate):
         assert 0 < (apart <= 0.75).sum() < len(apart)
         assert np.array_equal(getattr(proximity, kind), names[apart <= 0.75])
         assert np.array_equal(getattr(proximity, f"{kind}_distance"), apart[apart <= 0.75])
-    intersect = reference.edge_face_intersect(v1[ef[1]])
+    intersect = oracle.edge_face_intersect(v1[ef[1]])
     assert 0 < intersect.sum() < len(intersect)
-    assert np.array_equal(reference.intersections(v1, meshes.faces, **options), ef[0][intersect])
+    assert np.array_equal(oracle.intersections(v1, meshes.faces, **options), ef[0][intersect])
 
 
 def test_smallest_distances_of_meshes_and_rules():
     meshes, *_ = scene_of(with_a_triangle)
     v1, options = meshes.vertices_t1, {"n_vertices": meshes.n_vertices}
-    gaps = reference.smallest_distances(v1, meshes.faces, **options, **RULES)
+    gaps = oracle.smallest_distances(v1, meshes.faces, **options, **RULES)
     named = {(g.mesh_a, g.mesh_b): g for g in gaps}
     n = len(meshes.faces)
     assert set(named) == {(a, b) for a in range(n) for b in range(a, n)} - {(2, 2), (0, 2)}
     assert (named[3, 3].distance, named[3, 3].intersect) == (np.inf, False)
     mesh = np.repeat(np.arange(n), meshes.n_vertices)
     first_faces = np.cumsum([0] + [len(f) for f in meshes.faces])
-    found = reference.intersections(v1, meshes.faces, **options, **RULES)
+    found = oracle.intersections(v1, meshes.faces, **options, **RULES)
     of_face = np.searchsorted(first_faces, found[:, 2], side="right") - 1
     touching = {tuple(sorted(pair)) for pair in zip(mesh[found[:, 0]].tolist(), of_face.tolist(), strict=True)}
     assert touching == {pair for pair, g in named.items() if g.intersect}
@@ -91,6 +90,6 @@ def test_smallest_distances_of_meshes_and_rules():
             continue
         only = {**options, "ignored_pairs": [(i, j) for i in range(n) for j in range(n) if {i, j} != {a, b}]}
         above, below = (
-            reference.proximity(v1, gap.distance * factor, meshes.faces, **only) for factor in (1 + 1e-15, 1 - 1e-15)
+            oracle.proximity(v1, gap.distance * factor, meshes.faces, **only) for factor in (1 + 1e-15, 1 - 1e-15)
         )
         assert len(above.vf) + len(above.ee) > 0 == len(below.vf) + len(below.ee)

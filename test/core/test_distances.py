@@ -2,21 +2,21 @@
 """The smallest distance of each pair of meshes against the exact oracle."""
 
 import numpy as np
+import oracle
 import pytest
 import random_scenes
+from fuzz.snapshots import EDGE_FACE_POINTS
 from scene_pairs import rows, size_of
 from test_small_scenes import small_scene
 
 import hpccd_core as hc
-from hpccd_core import reference
-from hpccd_core.fuzz.snapshots import EDGE_FACE_POINTS
 
 SCENES = pytest.mark.parametrize("generate", random_scenes.ALL)
 KINDS = ("vertex-face", "edge-edge", "edge-face")
 
 
 def truth_of(meshes, vertices, **rules):
-    gaps = reference.smallest_distances(vertices, meshes.faces, **meshes.beside_faces, **rules)
+    gaps = oracle.smallest_distances(vertices, meshes.faces, **meshes.beside_faces, **rules)
     return {(gap.mesh_a, gap.mesh_b): gap for gap in gaps}
 
 
@@ -51,24 +51,22 @@ def assert_gaps(gaps, meshes, vertices, rules, size):
         assert points.shape == (2, 3)
         if gap.kind == "edge-face":
             a0, a1, f = features
-            assert reference.edge_face_intersect(vertices[[a0, a1, *faces[f]]][None])[0]
+            assert oracle.edge_face_intersect(vertices[[a0, a1, *faces[f]]][None])[0]
             first, second = [a0, a1, a1], faces[f]
         elif gap.kind == "vertex-face":
             v, f = features
             assert v not in faces[f]
-            assert (
-                abs(reference.distance_vertex_face(vertices[[v, *faces[f]]][None])[0] - true.distance) <= 1e-12 * size
-            )
+            assert abs(oracle.distance_vertex_face(vertices[[v, *faces[f]]][None])[0] - true.distance) <= 1e-12 * size
             first, second = [v, v, v], faces[f]
         else:
             a0, a1, b0, b1 = features
-            assert abs(reference.distance_edge_edge(vertices[[features]])[0] - true.distance) <= 1e-12 * size
+            assert abs(oracle.distance_edge_edge(vertices[[features]])[0] - true.distance) <= 1e-12 * size
             first, second = [a0, a1, a1], [b0, b1, b1]
         mesh = np.repeat(np.arange(len(meshes.faces)), meshes.n_vertices)
         assert sorted((mesh[first[0]], mesh[second[0]])) == list(pair)
         assert abs(np.linalg.norm(points[0] - points[1]) - gap.distance) <= 1e-11 * size
         for point, corners in zip(points, (first, second), strict=True):
-            assert reference.distance_vertex_face(np.array([[point, *vertices[corners]]]))[0] <= 1e-11 * size
+            assert oracle.distance_vertex_face(np.array([[point, *vertices[corners]]]))[0] <= 1e-11 * size
 
 
 @SCENES
@@ -119,7 +117,7 @@ def test_where_an_edge_meets_a_face(name):
     scene.add_mesh("mesh0", [[0, 1, 1]], self_collision=False)
     scene.add_mesh("mesh1", [[0, 1, 2]], self_collision=False)
     detector = hc.Detector(scene, backend="cpu", threads=1)
-    points = points[reference.edge_face_intersect(points)]
+    points = points[oracle.edge_face_intersect(points)]
     size = np.abs(points).max(axis=(1, 2))
     normal = size > 1e-290  # smaller ones have fewer bits
     assert normal.sum() > 30
@@ -127,7 +125,7 @@ def test_where_an_edge_meets_a_face(name):
         (gap,) = detector.distances(q)
         assert (gap.kind, gap.distance, tuple(gap.features)) == ("edge-face", 0.0, (0, 1, 1))
         ends = np.array([[gap.points[0], q[0], q[1], q[1]], [gap.points[1], q[2], q[3], q[4]]])
-        assert np.isfinite(ends).all() and reference.distance_vertex_face(ends).max() <= 1e-12 * s, q.tolist()
+        assert np.isfinite(ends).all() and oracle.distance_vertex_face(ends).max() <= 1e-12 * s, q.tolist()
 
 
 def test_rules_of_scenes():

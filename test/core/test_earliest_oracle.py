@@ -3,13 +3,12 @@
 nothing."""
 
 import numpy as np
+import oracle
 import pytest
 import random_scenes
-
-from hpccd_core import reference
-from hpccd_core.fuzz.near_generators import NEAR_GENERATORS
-from hpccd_core.fuzz.questions import STEP
-from hpccd_core.fuzz.steps import SMALL_SCENES, STEP_MOTIONS, true_steps
+from fuzz.near_generators import NEAR_GENERATORS
+from fuzz.questions import STEP
+from fuzz.steps import SMALL_SCENES, STEP_MOTIONS, true_steps
 
 
 def earliest_of_all(contacts):
@@ -23,7 +22,7 @@ def test_small_scenes(kind):
         queries, distances = motions(np.random.default_rng([5, number]), 8)
         touches, free = true_steps(kind, queries, distances, 0)
         for query, d, touch, step in zip(queries, distances, touches, free, strict=True):
-            every = reference.brute_force(
+            every = oracle.brute_force(
                 *np.split(query, 2),
                 scene.faces,
                 edges_per_mesh=scene.edges,
@@ -42,7 +41,7 @@ def test_random_scenes(generate):
         meshes = generate(np.random.default_rng([50, seed]))
         rules = {"no_self_collision": [0], "ignored_pairs": [(0, len(meshes.faces) - 1)]} if seed else {}
         for separation in (0.0, 0.01):
-            found = reference.earliest_contacts(
+            found = oracle.earliest_contacts(
                 meshes.vertices_t0[None],
                 meshes.vertices_t1[None],
                 meshes.faces,
@@ -57,12 +56,12 @@ def test_random_scenes(generate):
 def test_single_pairs_that_graze(kind):
     """Nothing is proven to be apart that touches: the times of single pairs are those of the exact tests."""
     faces = [np.array([[1, 2, 3]])] if kind == "vertex-face" else [np.array([[0, 1, 1], [2, 3, 3]])]
-    ask = reference.separation_vertex_face if kind == "vertex-face" else reference.separation_edge_edge
+    ask = oracle.separation_vertex_face if kind == "vertex-face" else oracle.separation_edge_edge
     for generate in NEAR_GENERATORS[kind].values():
         queries, distances = generate(np.random.default_rng(6), 20)
         _, toc = ask(queries, distances)
         # With two edges their ends and the flat faces are pairs too, which are never earlier.
-        found = reference.earliest_contacts(
+        found = oracle.earliest_contacts(
             queries[:, :4], queries[:, 4:], faces, n_vertices=[4], minimum_separation=distances
         )
         np.testing.assert_array_equal(found, toc)
@@ -81,10 +80,10 @@ def test_single_pairs_that_graze(kind):
 def test_bad_arguments_are_refused(change, text):
     good = {"vertices_t0": np.zeros((1, 4, 3)), "vertices_t1": np.zeros((1, 4, 3))}
     with pytest.raises(ValueError, match=text):
-        reference.earliest_contacts(**good | change, faces_per_mesh=[[[1, 2, 3]]])
+        oracle.earliest_contacts(**good | change, faces_per_mesh=[[[1, 2, 3]]])
 
 
 def test_the_fuzzer_asks_about_these_scenes():
-    from hpccd_core.fuzz import questions
+    from fuzz import questions
 
     assert questions.kinds_of(STEP) == tuple(SMALL_SCENES)

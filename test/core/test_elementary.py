@@ -3,17 +3,17 @@
 
 import hypothesis.strategies as st
 import numpy as np
+import oracle
 import pytest
+from fuzz.disturbances import disturb
+from fuzz.generators import EDGE_EDGE, GENERATORS, VERTEX_FACE
 from hypothesis import example, given, settings
 from hypothesis.extra.numpy import arrays
 
 import hpccd_core as hc
-from hpccd_core import reference
-from hpccd_core.fuzz.disturbances import disturb
-from hpccd_core.fuzz.generators import EDGE_EDGE, GENERATORS, VERTEX_FACE
 
 CORE = {VERTEX_FACE: hc.test_vertex_face, EDGE_EDGE: hc.test_edge_edge}
-ORACLE = {VERTEX_FACE: reference.vertex_face, EDGE_EDGE: reference.edge_edge}
+ORACLE = {VERTEX_FACE: oracle.vertex_face, EDGE_EDGE: oracle.edge_edge}
 ACCURACIES = ("fast", "balanced", "conservative", "exact")
 KINDS = pytest.mark.parametrize("kind", [VERTEX_FACE, EDGE_EDGE])
 PROMISING = pytest.mark.parametrize("accuracy", ["exact", "conservative"])

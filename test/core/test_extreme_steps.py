@@ -2,12 +2,12 @@
 """collision_free_step where coordinates, places and meshes are at their limits."""
 
 import numpy as np
+import oracle
 import pytest
 import random_scenes
 from folded_patches import SHAPES
 
 import hpccd_core as hc
-from hpccd_core import reference
 
 TIERS = pytest.mark.parametrize("accuracy", ["exact", "conservative"])
 
@@ -15,7 +15,7 @@ TIERS = pytest.mark.parametrize("accuracy", ["exact", "conservative"])
 def assert_true(meshes, accuracy="exact", separation=0.0, **rules):
     """The step, after it was compared with the oracle's."""
     v0, v1 = meshes.vertices_t0, meshes.vertices_t1
-    toc = reference.earliest_contacts(
+    toc = oracle.earliest_contacts(
         v0[None], v1[None], meshes.faces, **meshes.beside_faces, minimum_separation=separation, **rules
     )
     true = min(float(toc[0]), 1.0)

@@ -7,10 +7,10 @@ import itertools
 import numpy as np
 import pytest
 import random_scenes
+from fuzz.differential import usable_simd
+from fuzz.steps import EARLY, is_first
 
 import hpccd_core as hc
-from hpccd_core.fuzz.differential import usable_simd
-from hpccd_core.fuzz.steps import EARLY, is_first
 
 ACCURACIES = pytest.mark.parametrize("accuracy", ["fast", "balanced", "conservative", "exact"])
 

@@ -3,12 +3,12 @@
 
 import folded_patches
 import numpy as np
+import oracle
 import pytest
 from folded_patches import SHAPES
+from fuzz.steps import is_first
 
 import hpccd_core as hc
-from hpccd_core import reference
-from hpccd_core.fuzz.steps import is_first
 
 NAMES = pytest.mark.parametrize("name", SHAPES)
 FREE = 1.0
@@ -21,7 +21,7 @@ def scene_of(faces, n_vertices):
 
 
 def true_step(faces, start, end, separation=0.0):
-    found = reference.earliest_contacts(
+    found = oracle.earliest_contacts(
         start[None], end[None], [faces], n_vertices=[len(start)], minimum_separation=separation
     )
     return min(float(found[0]), FREE)

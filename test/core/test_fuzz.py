@@ -6,12 +6,12 @@ import itertools
 
 import numpy as np
 import pytest
+from fuzz import __main__ as command
+from fuzz import differential, questions, slowest
+from fuzz.generators import GENERATORS, VERTEX_FACE
+from fuzz.questions import CONTACT, DISTANCES, INTERSECTIONS, PROXIMITY, SEPARATION, STEP
 
 import hpccd_core as hc
-from hpccd_core.fuzz import __main__ as command
-from hpccd_core.fuzz import differential, questions, slowest
-from hpccd_core.fuzz.generators import GENERATORS, VERTEX_FACE
-from hpccd_core.fuzz.questions import CONTACT, DISTANCES, INTERSECTIONS, PROXIMITY, SEPARATION, STEP
 
 ACCURACIES = ("fast", "balanced", "conservative", "exact")
 TURNS = sum(map(len, GENERATORS.values()))

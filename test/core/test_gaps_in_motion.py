@@ -7,10 +7,10 @@ import exact_geometry
 import numpy as np
 import pytest
 import single_pairs
+from fuzz.generators import EDGE_EDGE, VERTEX_FACE
 from single_pairs import KINDS, TEST
 
 import hpccd_core as hc
-from hpccd_core.fuzz.generators import EDGE_EDGE, VERTEX_FACE
 
 SEPARATIONS = [1e-300, 1e-60, 1e-18, 1e-15, 1e-14, 1e-12, 1e-9, 1e-6, 1e-3]
 

@@ -2,14 +2,14 @@
 """Edges that pierce or touch faces, in one snapshot: against the exact oracle, and by what must hold anyway."""
 
 import numpy as np
+import oracle
 import pytest
 import random_scenes
+from fuzz.snapshots import EDGE_FACE_POINTS
 from scene_pairs import renamed, rows
 from test_small_scenes import small_scene
 
 import hpccd_core as hc
-from hpccd_core import reference
-from hpccd_core.fuzz.snapshots import EDGE_FACE_POINTS
 
 ACCURACIES = pytest.mark.parametrize("accuracy", ["exact", "conservative"])
 SCENES = pytest.mark.parametrize("generate", random_scenes.ALL)
@@ -20,7 +20,7 @@ def detector_of(meshes, rules=None, **options):
 
 
 def truth_of(meshes, **rules):
-    return reference.intersections(meshes.vertices_t1, meshes.faces, **meshes.beside_faces, **rules)
+    return oracle.intersections(meshes.vertices_t1, meshes.faces, **meshes.beside_faces, **rules)
 
 
 def assert_edges(found, truth):
@@ -50,7 +50,7 @@ def test_scenes(generate, accuracy):
 def test_single_pairs_as_scenes(name):
     """An edge and a face, each a mesh, at all scales; what the fuzzer makes many more of."""
     points = EDGE_FACE_POINTS[name](np.random.default_rng(72), 150)
-    truth = reference.edge_face_intersect(points)
+    truth = oracle.edge_face_intersect(points)
     assert truth.any()
     scene = hc.Scene()
     scene.add_mesh("edge", [[0, 1, 1]])

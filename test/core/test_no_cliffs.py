@@ -5,11 +5,11 @@ import resource
 from pathlib import Path
 
 import numpy as np
+import oracle
 import pytest
 import random_scenes
 
 import hpccd_core as hc
-from hpccd_core import reference
 
 
 def grid(n, spacing):
@@ -237,7 +237,7 @@ def test_pairs_of_few_and_of_many_meshes_mean_the_same(n):
     detector = hc.Detector(scene, minimum_separation=0.01, backend="cpu")
 
     def check(pairs):
-        truth = reference.brute_force(
+        truth = oracle.brute_force(
             start,
             end,
             [faces] * n,

@@ -4,16 +4,16 @@
 import dataclasses
 
 import numpy as np
+import oracle
 import pytest
 import random_scenes
+from fuzz.generators import EDGE_EDGE, VERTEX_FACE
+from fuzz.near_generators import DISTANCE as DISTANCE_OF
+from fuzz.near_generators import NEAR_GENERATORS
 from scene_pairs import assert_pairs, renamed, rows, size_of
 from test_small_scenes import small_scene
 
 import hpccd_core as hc
-from hpccd_core import reference
-from hpccd_core.fuzz.generators import EDGE_EDGE, VERTEX_FACE
-from hpccd_core.fuzz.near_generators import DISTANCE as DISTANCE_OF
-from hpccd_core.fuzz.near_generators import NEAR_GENERATORS
 
 ACCURACIES = pytest.mark.parametrize("accuracy", ["exact", "conservative"])
 SCENES = pytest.mark.parametrize("generate", random_scenes.ALL)
@@ -25,7 +25,7 @@ def detector_of(meshes, rules=None, **options):
 
 
 def truth_of(meshes, distance, **rules):
-    return reference.proximity(meshes.vertices_t1, distance, meshes.faces, **meshes.beside_faces, **rules)
+    return oracle.proximity(meshes.vertices_t1, distance, meshes.faces, **meshes.beside_faces, **rules)
 
 
 @SCENES
@@ -189,7 +189,7 @@ def test_nearest_points_lie_on_their_features_and_are_as_near_as_told(generate):
     corners_second = np.concatenate([v1[faces[near.vf[:, 1]]], v1[near.ee[:, [2, 3, 3]]]])
     for side, corners in ((0, corners_first), (1, corners_second)):
         points = np.concatenate([near.closest[:, side, None], corners], axis=1)
-        assert reference.distance_vertex_face(points).max() <= 1e-12 * size
+        assert oracle.distance_vertex_face(points).max() <= 1e-12 * size
     assert np.array_equal(near.closest[:n, 0], v1[near.vf[:, 0]]), "the vertex itself"
 
 

@@ -5,9 +5,9 @@ number of threads, on a new detector and on one that has answered other queries 
 import numpy as np
 import pytest
 import random_scenes
+from fuzz.differential import usable_simd
 
 import hpccd_core as hc
-from hpccd_core.fuzz.differential import usable_simd
 
 OUTPUTS = ("points", "normals", "closest")
 ARRAYS = (

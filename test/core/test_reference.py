@@ -4,13 +4,12 @@
 from fractions import Fraction
 
 import numpy as np
+import oracle
 import pytest
 from distances import distance_at
+from fuzz.generators import EDGE_EDGE, GENERATORS, VERTEX_FACE
 
-from hpccd_core import reference
-from hpccd_core.fuzz.generators import EDGE_EDGE, GENERATORS, VERTEX_FACE
-
-ORACLE = {VERTEX_FACE: reference.vertex_face, EDGE_EDGE: reference.edge_edge}
+ORACLE = {VERTEX_FACE: oracle.vertex_face, EDGE_EDGE: oracle.edge_edge}
 # Their coordinates are small integers: features that do not touch stay far apart compared with rounding.
 INTEGER_GENERATORS = ("lattice", "still", "on_line", "parallel_at_root", "thin", "meeting", "chosen_roots")
 
@@ -45,7 +44,7 @@ def test_toc_is_rounded_down():
     # The vertex falls from height n to n - d through a still triangle: contact at n/d.
     for n, d in ((1, 3), (2, 3), (1, 10), (7, 11), (3, 4), (1, 1), (0, 5)):
         triangle = [[-1, -1, 0], [2, -1, 0], [-1, 2, 0]]
-        hit, toc = reference.vertex_face(np.array([[[0, 0, n], *triangle, [0, 0, n - d], *triangle]]))
+        hit, toc = oracle.vertex_face(np.array([[[0, 0, n], *triangle, [0, 0, n - d], *triangle]]))
         assert hit[0]
         assert Fraction(toc[0]) <= Fraction(n, d) < Fraction(np.nextafter(toc[0], 2))
 
@@ -77,4 +76,4 @@ def test_sample_of_published_contacts(data_folder, scene):
 @pytest.mark.parametrize("bad", [np.zeros((3, 8)), np.zeros((1, 4, 3)), np.full((1, 8, 3), np.nan)])
 def test_bad_queries_are_refused(bad):
     with pytest.raises(ValueError, match="queries"):
-        reference.vertex_face(bad)
+        oracle.vertex_face(bad)

@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 import random_scenes
 from distances import distance_at
+from fuzz.generators import EDGE_EDGE, GENERATORS, VERTEX_FACE
 
 import hpccd_core as hc
-from hpccd_core.fuzz.generators import EDGE_EDGE, GENERATORS, VERTEX_FACE
 
 CORE = {VERTEX_FACE: hc.test_vertex_face, EDGE_EDGE: hc.test_edge_edge}
 KINDS = pytest.mark.parametrize("kind", [VERTEX_FACE, EDGE_EDGE])

@@ -2,20 +2,20 @@
 """Detection with a minimum separation against the exact oracle: single pairs, and scenes."""
 
 import numpy as np
+import oracle
 import pytest
 import random_scenes
+from fuzz.disturbances import rotate
+from fuzz.generators import EDGE_EDGE, GENERATORS, VERTEX_FACE
+from fuzz.near_generators import NEAR_GENERATORS
 from scene_pairs import assert_pairs, renamed, rows
 from single_pairs import names
 from single_pairs import renamed as query_renamed
 
 import hpccd_core as hc
-from hpccd_core import reference
-from hpccd_core.fuzz.disturbances import rotate
-from hpccd_core.fuzz.generators import EDGE_EDGE, GENERATORS, VERTEX_FACE
-from hpccd_core.fuzz.near_generators import NEAR_GENERATORS
 
 TEST = {VERTEX_FACE: hc.test_vertex_face, EDGE_EDGE: hc.test_edge_edge}
-ORACLE = {VERTEX_FACE: reference.separation_vertex_face, EDGE_EDGE: reference.separation_edge_edge}
+ORACLE = {VERTEX_FACE: oracle.separation_vertex_face, EDGE_EDGE: oracle.separation_edge_edge}
 KINDS = pytest.mark.parametrize("kind", [VERTEX_FACE, EDGE_EDGE])
 ACCURACIES = pytest.mark.parametrize("accuracy", ["exact", "conservative"])
 EXACT_DISTANCES = [
@@ -97,7 +97,7 @@ def test_small_numbers(kind, simd):
 
 @KINDS
 def test_instruction_sets_agree_to_the_bit(kind):
-    from hpccd_core.fuzz.differential import usable_simd
+    from fuzz.differential import usable_simd
 
     for accuracy in ("exact", "conservative", "balanced", "fast"):
         for name, generate in list(NEAR_GENERATORS[kind].items())[::3]:

@@ -6,16 +6,16 @@ features are near nor that they are not.
 """
 
 import numpy as np
+import oracle
 import pytest
+from fuzz.generators import EDGE_EDGE, VERTEX_FACE
 
 import hpccd_core as hc
-from hpccd_core import reference
-from hpccd_core.fuzz.generators import EDGE_EDGE, VERTEX_FACE
 
 KINDS = pytest.mark.parametrize("kind", [VERTEX_FACE, EDGE_EDGE])
-DISTANCE = {VERTEX_FACE: reference.distance_vertex_face, EDGE_EDGE: reference.distance_edge_edge}
-WITHIN = {VERTEX_FACE: reference.within_vertex_face, EDGE_EDGE: reference.within_edge_edge}
-SEPARATION = {VERTEX_FACE: reference.separation_vertex_face, EDGE_EDGE: reference.separation_edge_edge}
+DISTANCE = {VERTEX_FACE: oracle.distance_vertex_face, EDGE_EDGE: oracle.distance_edge_edge}
+WITHIN = {VERTEX_FACE: oracle.within_vertex_face, EDGE_EDGE: oracle.within_edge_edge}
+SEPARATION = {VERTEX_FACE: oracle.separation_vertex_face, EDGE_EDGE: oracle.separation_edge_edge}
 TEST = {VERTEX_FACE: hc.test_vertex_face, EDGE_EDGE: hc.test_edge_edge}
 # Parts of the true distance. Only at 1 is the answer yes, or a matter of the last bit.
 PARTS = (0.3, 0.6, 0.9, 1 - 1e-9, 1 - 2**-52, 1.0)

@@ -1,21 +1,20 @@
 # SPDX-License-Identifier: Apache-2.0
 """Coordinates of all magnitudes at once: exact answers in less than a millisecond each.
 
-slowest_queries.npz holds the worst that hours of `python -m hpccd_core.fuzz.slowest` and an attack by hand found.
+slowest_queries.npz holds the worst that hours of `python -m fuzz.slowest` and an attack by hand found.
 """
 
 import time
 from pathlib import Path
 
 import numpy as np
+import oracle
 import pytest
 import single_pairs
+from fuzz.generators import EDGE_EDGE, VERTEX_FACE
 from single_pairs import KINDS, TEST
 
-from hpccd_core import reference
-from hpccd_core.fuzz.generators import EDGE_EDGE, VERTEX_FACE
-
-ORACLE = {VERTEX_FACE: reference.vertex_face, EDGE_EDGE: reference.edge_edge}
+ORACLE = {VERTEX_FACE: oracle.vertex_face, EDGE_EDGE: oracle.edge_edge}
 
 # They take half a millisecond; before they were hunted down, 30 to 200. Processor time, so that a busy machine does not
 # count, and ten times what is promised, so that a slow one does not.

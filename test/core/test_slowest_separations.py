@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Separation of coordinates of all magnitudes: exact answers, and no cliff.
 
-slowest_separations.npz holds the slowest of two short searches by `python -m hpccd_core.fuzz.slowest`, one of them with
+slowest_separations.npz holds the slowest of two short searches by `python -m fuzz.slowest`, one of them with
 exponents at most 200 apart.
 """
 
@@ -9,13 +9,12 @@ import time
 from pathlib import Path
 
 import numpy as np
+import oracle
 import pytest
+from fuzz.generators import EDGE_EDGE, VERTEX_FACE
 from single_pairs import KINDS, TEST
 
-from hpccd_core import reference
-from hpccd_core.fuzz.generators import EDGE_EDGE, VERTEX_FACE
-
-ORACLE = {VERTEX_FACE: reference.separation_vertex_face, EDGE_EDGE: reference.separation_edge_edge}
+ORACLE = {VERTEX_FACE: oracle.separation_vertex_face, EDGE_EDGE: oracle.separation_edge_edge}
 # Ten times what is promised, so that a slow machine does not fail; processor time, so that a busy one does not.
 LIMITS = pytest.mark.parametrize(("span", "limit"), [("span 200", 10e-3), ("any", 200e-3)])
 

@@ -6,9 +6,9 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import oracle
 import pytest
 
-from hpccd_core import reference
 from hpccd_ros.scenes.resolved.motion import Simulation, Stuck
 from hpccd_ros.scenes.resolved.queries import InProcess
 from hpccd_ros.scenes.resolved.setup import Setup
@@ -59,16 +59,16 @@ def test_no_move_touches_anything(wound):
     """By the exact oracle, which shares nothing with the detector that the solver asked."""
     _, positions, _ = wound
     for start, end in zip(positions[20:], positions[21:], strict=False):
-        contacts = reference.brute_force(start, end, faces_of(SETUP), no_self_collision=[1])
+        contacts = oracle.brute_force(start, end, faces_of(SETUP), no_self_collision=[1])
         assert len(contacts.vf) == len(contacts.ee) == 0
-    assert len(reference.intersections(positions[-1], faces_of(SETUP), no_self_collision=[1])) == 0
+    assert len(oracle.intersections(positions[-1], faces_of(SETUP), no_self_collision=[1])) == 0
 
 
 def test_what_is_unresolved_would_touch(wound):
     """Else the test above would test nothing."""
     simulation, positions, _ = wound
     end = simulation.trial(10 * SETUP.period)
-    contacts = reference.brute_force(positions[-1], end, faces_of(SETUP), no_self_collision=[1])
+    contacts = oracle.brute_force(positions[-1], end, faces_of(SETUP), no_self_collision=[1])
     assert len(contacts.vf) > 10
 
 
@@ -130,7 +130,7 @@ def test_a_solver_that_misses_pairs_is_slow_but_never_touches():
     assert sum(part < 1.0 for part in parts) >= 6
     assert simulation.time > 0.8 * MOVES * SETUP.period, "it goes on"
     for start, end in zip(positions, positions[1:], strict=False):
-        contacts = reference.brute_force(start, end, faces_of(SETUP), no_self_collision=[1])
+        contacts = oracle.brute_force(start, end, faces_of(SETUP), no_self_collision=[1])
         assert len(contacts.vf) == len(contacts.ee) == 0
 
 

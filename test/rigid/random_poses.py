@@ -2,8 +2,8 @@
 """Poses, and the true way between them in 64 bits."""
 
 import numpy as np
+from oracle.rigid_paths import ScrewPaths
 
-from hpccd_ros.bench.core.rigid_paths import ScrewPaths
 from hpccd_ros.rigid.screw import Screw
 from hpccd_ros.rigid.transform import Rigid
 

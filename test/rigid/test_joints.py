@@ -5,8 +5,8 @@ import math
 
 import numpy as np
 import pytest
+from oracle.rigid_queries import random_motion, random_paths
 
-from hpccd_ros.bench.core.rigid_queries import random_motion, random_paths
 from hpccd_ros.rigid.body import Body
 from hpccd_ros.rigid.cuts import fewest_parts
 from hpccd_ros.rigid.joints import Joint, JointStep, LinkMotion

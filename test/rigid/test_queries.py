@@ -6,10 +6,9 @@
 
 import numpy as np
 import pytest
-
-from hpccd_ros.bench.core import rigid_answers
-from hpccd_ros.bench.core.rigid_answers import ask, judge
-from hpccd_ros.bench.core.rigid_queries import KINDS, MOTIONS, random_queries
+from oracle import rigid_answers
+from oracle.rigid_answers import ask, judge
+from oracle.rigid_queries import KINDS, MOTIONS, random_queries
 
 
 @pytest.mark.parametrize("kind", KINDS)

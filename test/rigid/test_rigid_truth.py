@@ -3,10 +3,9 @@
 
 import numpy as np
 import pytest
+from oracle.rigid_paths import ScrewPaths
+from oracle.rigid_truth import BEYOND, OPEN, WITHIN, Pairs, comes_within
 from random_poses import quaternion
-
-from hpccd_ros.bench.core.rigid_paths import ScrewPaths
-from hpccd_ros.bench.core.rigid_truth import BEYOND, OPEN, WITHIN, Pairs, comes_within
 
 
 def paths(points, start, end, shifts):
@@ -52,7 +51,7 @@ def test_edges_that_pass_each_other():
 
 
 def test_velocities_are_the_slopes_of_positions_and_accelerations_bound_theirs():
-    from hpccd_ros.bench.core.rigid_queries import random_queries
+    from oracle.rigid_queries import random_queries
 
     for motion in ("screws", "joints"):
         queries = random_queries(np.random.default_rng(1), 200, "ee", motion)

@@ -5,9 +5,9 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from oracle.rigid_queries import random_motion, random_paths
 from random_poses import random_screw, true_vertices
 
-from hpccd_ros.bench.core.rigid_queries import random_motion, random_paths
 from hpccd_ros.rigid.body import Body
 from hpccd_ros.rigid.motion import Linear, ScrewMotion
 

@@ -26,7 +26,7 @@ import base_bags
 import damage
 import hostile
 import matplotlib
-import oracle
+import recording_oracle
 from in_process import hpccd
 from mcap_model import Bag
 from sources import SOURCES
@@ -157,7 +157,7 @@ def run_case(name: str, folder: Path) -> dict:
 
 def _lies(path, row, steps, told) -> list[str]:
     try:
-        reader = oracle.Oracle(path)
+        reader = recording_oracle.Oracle(path)
         whys = reader.untruths()
     except Exception:
         return [f"replay: verified what the oracle cannot read: {traceback.format_exc()}"]

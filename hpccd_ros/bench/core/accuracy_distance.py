@@ -8,10 +8,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
+from fuzz import questions
+from fuzz.questions import INTERSECTIONS, PROXIMITY, SEPARATION, Batch
+from fuzz.snapshots import EDGE_FACE
 
-from hpccd_core.fuzz import questions
-from hpccd_core.fuzz.questions import INTERSECTIONS, PROXIMITY, SEPARATION, Batch
-from hpccd_core.fuzz.snapshots import EDGE_FACE
 from hpccd_ros.base.errors import UserError
 from hpccd_ros.bench.core import accuracy_sweep, measure, truth
 from hpccd_ros.bench.core.distance_queries import Question

@@ -1,16 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """Where each tier begins to err: elementary queries at growing scale, at growing distance from the origin, and made to
-be hard, each compared with the exact oracle of hpccd_core.reference on the very coordinates that the tier gets."""
+be hard, each compared with the exact oracle of test/oracle on the very coordinates that the tier gets."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
 import numpy as np
+from fuzz import questions
+from fuzz.generators import GENERATORS
+from fuzz.questions import CONTACT, Batch
 
-from hpccd_core.fuzz import questions
-from hpccd_core.fuzz.generators import GENERATORS
-from hpccd_core.fuzz.questions import CONTACT, Batch
 from hpccd_ros.bench.core import truth
 from hpccd_ros.bench.report import progress
 

@@ -21,12 +21,13 @@ vertices of rigid meshes on straight lines, their positions given. On a machine 
 from __future__ import annotations
 
 import numpy as np
+from oracle import rigid_tightness
+from oracle.rigid_answers import Verdict, ask, judge
+from oracle.rigid_queries import KINDS, MOTIONS, random_queries
 
 from hpccd_ros.base.errors import UserError
 from hpccd_ros.bench import command
-from hpccd_ros.bench.core import rigid_cost, rigid_tightness
-from hpccd_ros.bench.core.rigid_answers import Verdict, ask, judge
-from hpccd_ros.bench.core.rigid_queries import KINDS, MOTIONS, random_queries
+from hpccd_ros.bench.core import rigid_cost
 from hpccd_ros.bench.report import progress, table
 
 PARTS = ("truth", "bounds", "cost")

@@ -6,9 +6,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+import oracle
 from numpy.typing import NDArray
 
-from hpccd_core import reference
 from hpccd_ros.scenes import shapes
 
 MESHES = ("ball", "sheet")
@@ -50,5 +50,5 @@ def near(start: Frame, end: Frame) -> bool:
     """Whether the meshes come within the distance at some time of the step, or intersect at its end."""
     scene = {"no_self_collision": (0, 1), "threads": 1}
     v0, v1 = (np.concatenate(frame) for frame in (start, end))
-    found = reference.brute_force(v0, v1, FACES, minimum_separation=DISTANCE, **scene)
-    return bool(len(found.vf) or len(found.ee) or len(reference.intersections(v1, FACES, **scene)))
+    found = oracle.brute_force(v0, v1, FACES, minimum_separation=DISTANCE, **scene)
+    return bool(len(found.vf) or len(found.ee) or len(oracle.intersections(v1, FACES, **scene)))

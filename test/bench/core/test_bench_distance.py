@@ -4,10 +4,10 @@
 import sys
 
 import numpy as np
+import oracle
 import pytest
 from sources import ROOT
 
-from hpccd_core import reference
 from hpccd_ros.bench.core.distance_queries import ALLOWED, Allowance, Question, questions
 from hpccd_ros.bench.report import figures, performance_distance
 from hpccd_ros.bench.report.results import Kept
@@ -150,8 +150,8 @@ def data(tmp_path):
     step = source.step(source.n_steps - 1)
     v0, v1, faces = step.vertices_t0, step.vertices_t1, step.faces().astype(np.uint32)
     near, separated = (
-        reference.proximity(v1, 0.02, [faces]),
-        reference.brute_force(v0, v1, [faces], minimum_separation=0.02),
+        oracle.proximity(v1, 0.02, [faces]),
+        oracle.brute_force(v0, v1, [faces], minimum_separation=0.02),
     )
     truth = {
         "p_d": 0.02,
@@ -164,7 +164,7 @@ def data(tmp_path):
         "s_vf_toc": separated.vf_toc,
         "s_ee": separated.ee,
         "s_ee_toc": separated.ee_toc,
-        "x_ef": reference.intersections(v1, [faces]),
+        "x_ef": oracle.intersections(v1, [faces]),
     }
     folder = tmp_path / "data"
     (folder / "distance").mkdir(parents=True)

@@ -2,8 +2,8 @@
 """`hpccd bench rigid`."""
 
 import pytest
+from oracle import rigid_answers
 
-from hpccd_ros.bench.core import rigid_answers
 from hpccd_ros.bench.report import performance_rigid
 from hpccd_ros.bench.report.results import Kept
 

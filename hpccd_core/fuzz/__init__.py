@@ -1,2 +1,0 @@
-# SPDX-License-Identifier: Apache-2.0
-"""Differential fuzzing of the core's queries against the exact oracle: `python -m hpccd_core.fuzz --help`."""

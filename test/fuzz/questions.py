@@ -1,0 +1,153 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the core and the oracle are asked: contact, separation, proximity, intersections of single pairs; distances of
+the meshes of small scenes, and how far these may go."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import oracle
+
+import hpccd_core as hc
+
+from .disturbances import disturb, disturb_near
+from .gaps import GAP_POINTS, TOPOLOGIES, core_gaps, true_gaps
+from .generators import EDGE_EDGE, GENERATORS, VERTEX_FACE
+from .near_generators import NEAR_GENERATORS
+from .snapshots import EDGE_FACE, EDGE_FACE_POINTS, SNAPSHOTS
+from .steps import STEP_MOTIONS, core_steps, true_steps
+
+CONTACT, SEPARATION, PROXIMITY, INTERSECTIONS = "contact", "separation", "proximity", "intersections"
+DISTANCES, STEP = "distances", "step"
+OF_SCENES = (DISTANCES, STEP)
+PAIRS_OF_A_SCENE = 10  # so many fewer scenes than single pairs are in a batch: each asks about dozens of pairs
+
+# hit (Q,) bool; value (Q,) float64: time, distance, or 0. Of distances (Q,N): several answers for each scene.
+Answers = tuple[np.ndarray, np.ndarray]
+
+
+@dataclass(frozen=True)
+class Batch:
+    """Queries of one kind from one generator, (Q,N,3). distances: (Q,); zero where the question has none."""
+
+    question: str
+    kind: str
+    generator: str
+    queries: np.ndarray
+    distances: np.ndarray
+
+    def part(self, chosen: np.ndarray) -> Batch:
+        return Batch(self.question, self.kind, self.generator, self.queries[chosen], self.distances[chosen])
+
+
+def kinds_of(question: str) -> tuple[str, ...]:
+    if question in OF_SCENES:
+        return tuple(TOPOLOGIES if question == DISTANCES else STEP_MOTIONS)
+    return (EDGE_FACE,) if question == INTERSECTIONS else (VERTEX_FACE, EDGE_EDGE)
+
+
+def generators_of(question: str, kind: str) -> dict[str, Callable]:
+    return {
+        CONTACT: GENERATORS,
+        SEPARATION: NEAR_GENERATORS,
+        PROXIMITY: SNAPSHOTS,
+        INTERSECTIONS: {EDGE_FACE: EDGE_FACE_POINTS},
+        DISTANCES: dict.fromkeys(TOPOLOGIES, GAP_POINTS),
+        STEP: STEP_MOTIONS,
+    }[question][kind]
+
+
+def generated(question: str, kind: str, generator: str, rng: np.random.Generator, size: int) -> Batch:
+    size = max(1, size // PAIRS_OF_A_SCENE) if question in OF_SCENES else size
+    made = generators_of(question, kind)[generator](rng, size)
+    if question == CONTACT:
+        made = disturb(rng, made, kind)
+    elif question == SEPARATION:
+        made = disturb_near(rng, *made, kind)
+    queries, distances = made if isinstance(made, tuple) else (made, np.zeros(size))
+    return Batch(question, kind, generator, queries, distances)
+
+
+def truth(batch: Batch, threads: int = 0) -> Answers:
+    """What the oracle says, on so many threads."""
+    if batch.question == DISTANCES:
+        return true_gaps(batch.kind, batch.queries)
+    if batch.question == STEP:
+        return true_steps(batch.kind, batch.queries, batch.distances, threads)
+    vertex_face = batch.kind == VERTEX_FACE
+    if batch.question == CONTACT:
+        return (oracle.vertex_face if vertex_face else oracle.edge_edge)(batch.queries, threads)
+    if batch.question == SEPARATION:
+        separation = oracle.separation_vertex_face if vertex_face else oracle.separation_edge_edge
+        return separation(batch.queries, batch.distances, threads)
+    if batch.question == PROXIMITY:
+        within = oracle.within_vertex_face if vertex_face else oracle.within_edge_edge
+        distance = oracle.distance_vertex_face if vertex_face else oracle.distance_edge_edge
+        return within(batch.queries, batch.distances, threads), distance(batch.queries, threads)
+    return oracle.edge_face_intersect(batch.queries, threads), np.zeros(len(batch.queries))
+
+
+def answers(batch: Batch, accuracy: str, simd: str) -> Answers:
+    """What the core says."""
+    if batch.question in (CONTACT, SEPARATION):
+        return _times(batch, accuracy, simd)
+    if batch.question == DISTANCES:
+        return core_gaps(batch.kind, batch.queries, accuracy, simd)
+    if batch.question == STEP:
+        return core_steps(batch.kind, batch.queries, batch.distances, accuracy, simd)
+    return _of_snapshots(batch, accuracy, simd)
+
+
+def size_of(batch: Batch) -> np.ndarray:
+    """What an error of a value is measured by: a step, or the largest coordinate."""
+    if batch.question not in (PROXIMITY, DISTANCES):
+        return np.ones(len(batch.queries))
+    return np.maximum(np.abs(batch.queries).max(axis=(1, 2)), np.finfo(float).tiny)
+
+
+CORE = {VERTEX_FACE: hc.test_vertex_face, EDGE_EDGE: hc.test_edge_edge}
+
+
+def _times(batch: Batch, accuracy: str, simd: str) -> Answers:
+    test = CORE[batch.kind]
+    if batch.question == CONTACT:
+        return test(batch.queries, accuracy=accuracy, simd=simd)
+    hit, toc = np.zeros(len(batch.queries), bool), np.full(len(batch.queries), np.inf)
+    distances, which = np.unique(batch.distances, return_inverse=True)
+    for rows in np.split(np.argsort(which, kind="stable"), np.cumsum(np.bincount(which))[:-1]):
+        d = float(distances[which[rows[0]]])
+        hit[rows], toc[rows] = test(batch.queries[rows], accuracy=accuracy, simd=simd, minimum_separation=d)
+    return hit, toc
+
+
+def _of_snapshots(batch: Batch, accuracy: str, simd: str) -> Answers:
+    detector = detector_of_pair(batch.kind, accuracy, simd)
+    hit, value = np.zeros(len(batch.queries), bool), np.full(len(batch.queries), np.inf)
+    for i, (points, distance) in enumerate(zip(batch.queries, batch.distances, strict=True)):
+        if batch.question == INTERSECTIONS:
+            found = (detector.intersections(points).ef == (0, 1, 1)).all(axis=1)
+            hit[i], value[i] = found.any(), 0.0
+            continue
+        near = detector.proximity(points, float(distance))
+        pairs, pair = (near.vf, (0, 0)) if batch.kind == VERTEX_FACE else (near.ee, (0, 1, 2, 3))
+        at = np.flatnonzero((pairs == pair).all(axis=1))
+        if len(at):
+            hit[i] = True
+            value[i] = (near.vf_distance if batch.kind == VERTEX_FACE else near.ee_distance)[at[0]]
+    return hit, value
+
+
+@functools.cache
+def detector_of_pair(kind: str, accuracy: str, simd: str) -> hc.Detector:
+    """For the points of one pair: a vertex and a face, or two edges, in one mesh; an edge and a face in two."""
+    scene = hc.Scene()
+    if kind == EDGE_FACE:
+        scene.add_mesh("edge", [[0, 1, 1]], n_vertices=2)
+        scene.add_mesh("face", [[0, 1, 2]], n_vertices=3)
+    else:
+        # A face that names a vertex twice is an edge.
+        scene.add_mesh("pair", [[1, 2, 3]] if kind == VERTEX_FACE else [[0, 1, 1], [2, 3, 3]], n_vertices=4)
+    return hc.Detector(scene, accuracy=accuracy, simd=simd, backend="cpu", threads=1)

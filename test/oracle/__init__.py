@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Slow oracles that the core is compared with: exact elementary tests and brute force over all pairs.
+
+Everything is decided in integer arithmetic of any size on the coordinates as given; nothing is shared with the core's
+own arithmetic or traversal. Meaning of a contact as in Kim et al. 2009, section 3.1: vertices move on straight lines,
+features are closed, touching counts, `toc` is the earliest time in [0,1]. Distances are Euclidean, `<=` throughout.
+"""
+
+try:
+    import _oracle  # noqa: F401
+except ModuleNotFoundError as error:
+    raise ImportError(
+        "oracle: build/oracle holds no compiled module; run `make test-python` or `make oracle`"
+    ) from error
+
+from .elementary import (
+    distance_edge_edge,
+    distance_vertex_face,
+    edge_edge,
+    edge_face_intersect,
+    separation_edge_edge,
+    separation_vertex_face,
+    squared_distance_edge_edge,
+    squared_distance_vertex_face,
+    vertex_face,
+    within_edge_edge,
+    within_vertex_face,
+)
+from .scenes import (
+    Contacts,
+    Gap,
+    Proximity,
+    brute_force,
+    earliest_contacts,
+    intersections,
+    proximity,
+    smallest_distances,
+)
+
+__all__ = [
+    "Contacts",
+    "Gap",
+    "Proximity",
+    "brute_force",
+    "distance_edge_edge",
+    "distance_vertex_face",
+    "earliest_contacts",
+    "edge_edge",
+    "edge_face_intersect",
+    "intersections",
+    "proximity",
+    "separation_edge_edge",
+    "separation_vertex_face",
+    "smallest_distances",
+    "squared_distance_edge_edge",
+    "squared_distance_vertex_face",
+    "vertex_face",
+    "within_edge_edge",
+    "within_vertex_face",
+]
