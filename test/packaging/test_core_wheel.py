@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """The core as a distribution of its own, hpccd-core, beside the one with the ROS node."""
 
+import re
 import subprocess
 import sys
 import tomllib
+from pathlib import Path
 
 import pytest
 from sources import ROOT
@@ -32,6 +34,33 @@ def test_nothing_but_numpy_is_imported():
     done = subprocess.run([sys.executable, "-c", code], text=True, capture_output=True, timeout=100, cwd="/")
     assert done.returncode == 0, done.stderr
     assert done.stdout.strip() == ""
+
+
+def laboratory(names):
+    """The names among them of files that belong to tests, oracles or fuzzers."""
+    return [name for name in names if re.search(r"(^|/)_?(oracle|reference|fuzz|tests?)([/.]|$)", name)]
+
+
+def test_no_oracle_fuzzer_or_test_is_installed():
+    site_packages = Path(hc._core.__file__).parents[1]
+    packages = [site_packages / name for name in ("hpccd_core", "hpccd_ros") if (site_packages / name).is_dir()]
+    names = [str(path.relative_to(site_packages)) for package in packages for path in package.rglob("*")]
+    assert "hpccd_core/detector.py" in names
+    assert not laboratory(names)
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "hpccd_core/fuzz/__init__.py",
+        "hpccd_core/_reference.cpython-311-x86_64-linux-gnu.so",
+        "hpccd_ros/oracle/scenes.py",
+        "_oracle.cpython-311-x86_64-linux-gnu.so",
+        "hpccd_core/tests/paper/front_test.cpp",
+    ],
+)
+def test_an_installed_oracle_is_seen(name):
+    assert laboratory([name, "hpccd_core/detector.py"]) == [name]
 
 
 @pytest.fixture

@@ -13,6 +13,7 @@ pytest.importorskip("importlinter", reason="import-linter comes with the extra l
 
 FLOORS = "Each package imports only what stands below it"
 ABOVE = "The core knows nothing of the packages around it"
+LABORATORY = "The packages never import the oracles, fuzzers and benchmarks of test/"
 
 
 def lint(folder):
@@ -46,6 +47,9 @@ def test_contracts_are_kept():
         ("hpccd_ros/node/node.py", "from hpccd_ros.replay import compare", FLOORS),
         ("hpccd_ros/detect/layout.py", "import rclpy", "The core, frames and their detection know nothing of ROS"),
         ("hpccd_core/scene.py", "from hpccd_ros.base import quoting", ABOVE),
+        ("hpccd_core/scene.py", "import oracle", LABORATORY),
+        ("hpccd_ros/detect/layout.py", "from fuzz import questions", LABORATORY),
+        ("hpccd_ros/scenes/scene.py", "import bench", LABORATORY),
     ],
 )
 def test_an_import_that_runs_up_is_seen(copy, module, statement, broken):
