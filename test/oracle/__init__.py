@@ -10,7 +10,7 @@ try:
     import _oracle  # noqa: F401
 except ModuleNotFoundError as error:
     raise ImportError(
-        "oracle: build/oracle holds no compiled module; run `make test-python` or `make oracle`"
+        "oracle: the module _oracle is not on Python's path; build it with `make oracle`, and name build/oracle in PYTHONPATH"
     ) from error
 
 from .elementary import (
