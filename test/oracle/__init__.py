@@ -10,7 +10,7 @@ try:
     import _oracle  # noqa: F401
 except ModuleNotFoundError as error:
     raise ImportError(
-        "oracle: the module _oracle is not on Python's path; build it with `make oracle`, and name build/oracle in PYTHONPATH"
+        "oracle: _oracle is not on Python's path; run `make oracle`, and add build/oracle to PYTHONPATH"
     ) from error
 
 from .elementary import (
