@@ -18,6 +18,7 @@ AARCH64_TESTS ?= *
 DEMO_ARGS   ?=
 HPCCD_CUDA  ?= AUTO
 FUZZ_ARGS   ?= --seconds 60
+BENCH_ARGS  ?= --help
 
 BIN := $(VENV)/bin
 export PATH := $(abspath $(BIN)):$(PATH)
@@ -44,7 +45,7 @@ INSTALLED   := $(VENV)/.hpccd-installed
 SOURCES := $(sort $(shell find CMakeLists.txt setup.py package.xml action cmake config launch msg srv scripts hpccd_ros hpccd_core \
   \( -name __pycache__ -o -name dist -o -path hpccd_core/tests \) -prune -o -type f -print))
 
-.PHONY: help venv demo test test-core test-python test-long test-gpu test-aarch64 sanitize fuzz oracle lint format release-check pin clean distclean \
+.PHONY: help venv demo bench test test-core test-python test-long test-gpu test-aarch64 sanitize fuzz oracle lint format release-check pin clean distclean \
   FORCE
 
 help: ## Show this list
@@ -92,6 +93,9 @@ test-aarch64: $(ENVIRONMENT) ## The C++ tests compiled for aarch64, in an emulat
 sanitize: $(ENVIRONMENT) ## C++ tests under AddressSanitizer + UndefinedBehaviorSanitizer, then ThreadSanitizer
 	@$(call run_core_tests,build/core-asan,-DCMAKE_BUILD_TYPE=RelWithDebInfo -DHPCCD_SANITIZE=address$(comma)undefined)
 	@$(call run_core_tests,build/core-tsan,-DCMAKE_BUILD_TYPE=RelWithDebInfo -DHPCCD_SANITIZE=thread)
+
+bench: venv oracle ## Measure one subject (BENCH_ARGS="scaling"; without it, a list of them)
+	PYTHONPATH=test $(BIN)/python -m bench $(BENCH_ARGS)
 
 fuzz: venv oracle ## Compare the core with the exact oracle on random and degenerate queries (FUZZ_ARGS=--help)
 	PYTHONPATH=test:build/oracle $(BIN)/python -m fuzz $(FUZZ_ARGS)

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Benchmarks: what is measured of the core and of the node, and how it is written down and drawn."""
+"""Time and accuracy of the core on a recording, a mesh or a generated scene."""

@@ -1,22 +1,84 @@
 # SPDX-License-Identifier: Apache-2.0
-"""From a word on the command line to steps: a generated scene, a file with one step, a recording."""
+"""Motion steps to measure: of a generated scene, a recording, a mesh file, or a file with one step."""
 
 from __future__ import annotations
 
 import dataclasses
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
 
+import hpccd_core as hc
 from hpccd_ros.base.errors import UserError
-from hpccd_ros.bench.steps import Source, Step
 from hpccd_ros.scenes.scene import Mesh
 
-# Of Table 1, in its order: generated scenes of the same size and character.
+# Table 1 of Kim et al. 2009, in its order: generated scenes of the same size and character.
 TABLE_1 = ("cloth-ball-like", "breaking-like", "n-body-like-lr", "n-body-like-hr")
+MESH_FILES = (".obj", ".ply", ".stl", ".dae")
+MESH_STEPS = 32  # of a mesh file
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Step:
+    """Motion of all meshes from vertices_t0 to vertices_t1, each (V,3), meshes one after the other.
+
+    topology   equal for steps between which no mesh changes its faces
+    truth      {"vf", "vf_toc", "ee", "ee_toc"} as in hpccd_core.Contacts where it is known, else None
+    """
+
+    meshes: tuple[Mesh, ...]
+    topology: object
+    vertices_t0: np.ndarray
+    vertices_t1: np.ndarray
+    ignored_pairs: tuple[tuple[str, str], ...] = ()
+    truth: dict[str, np.ndarray] | None = None
+
+    @property
+    def triangles(self) -> int:
+        return sum(len(mesh.faces) for mesh in self.meshes)
+
+    def scene(self) -> hc.Scene:
+        scene = hc.Scene()
+        for mesh in self.meshes:
+            scene.add_mesh(
+                mesh.name,
+                mesh.faces,
+                n_vertices=mesh.n_vertices,
+                static=mesh.static,
+                self_collision=mesh.self_collision,
+            )
+        for a, b in self.ignored_pairs:
+            scene.ignore_pair(a, b)
+        return scene
+
+    def faces(self) -> np.ndarray:
+        """Faces of all meshes (F,3) int64, scene-wide indices."""
+        offsets = np.cumsum([0] + [mesh.n_vertices for mesh in self.meshes])
+        return np.concatenate([m.faces.astype(np.int64) + o for m, o in zip(self.meshes, offsets, strict=False)])
+
+    def as_one_mesh(self) -> Step:
+        """The same triangles, everything tested against everything: what a peer without such options tests."""
+        whole = Mesh("all", self.faces().astype(np.uint32), len(self.vertices_t0))
+        return dataclasses.replace(self, meshes=(whole,), ignored_pairs=(), truth=None)
+
+
+@dataclasses.dataclass(frozen=True)
+class Source:
+    """A named sequence of steps. `step(k)`, 0 <= k < n_steps, in any order; None where step k has no motion that
+    could be tested (a topology that changes without saying where its new vertices came from)."""
+
+    name: str
+    n_steps: int
+    step: Callable[[int], Step | None]
+
+    def spread(self, count: int) -> list[int]:
+        """`count` steps evenly spread over the sequence, its last among them; all where count is 0."""
+        if count <= 0 or count >= self.n_steps:
+            return list(range(self.n_steps))
+        return sorted({round((k + 1) * self.n_steps / count) - 1 for k in range(count)})
 
 
 def data_folder(folder: str | None) -> Path | None:
@@ -37,8 +99,8 @@ def data_files(folder: Path | None) -> list[Path]:
 def resolve(words: Sequence[str], data: Path | None, default: Sequence[str], size: float = 1.0) -> list[Source]:
     """Sources by name; `default` where no words are given.
 
-    A word is "data" (every step file of the data folder), the name of one of them, a path of an .npz or .mcap file
-    (or of a folder of the latter), or the name of a generated scene, made with `size`.
+    A word is "data" (every step file of the data folder), the name of one of them, the path of a recording (.mcap or
+    its folder), of a mesh file or of an .npz file with one step, or the name of a generated scene, made with `size`.
     """
     found = []
     for word in words or default:
@@ -53,7 +115,7 @@ def resolve(words: Sequence[str], data: Path | None, default: Sequence[str], siz
     found = _told_apart(words or default, found)
     if not found:
         raise UserError(
-            "nothing to measure: name a scene (see `hpccd scene --list`), an .npz or .mcap file, or set HPCCD_DATA"
+            "nothing to measure: name a scene (see `hpccd scene --list`), a recording or a mesh file, or set HPCCD_DATA"
         )
     return found
 
@@ -77,6 +139,8 @@ def _one(word, data, size):
     path = Path(word)
     if path.suffix == ".npz" and path.is_file():
         return of_npz(path)
+    if path.suffix.lower() in MESH_FILES and path.is_file():
+        return of_mesh(path)
     if path.exists():
         return of_recording(path)
     if data and (data / f"{word}.npz").is_file():
@@ -131,6 +195,30 @@ def of_npz(path: Path) -> Source:
     known = truth if len(truth) == 4 else None
     step = Step((mesh,), 0, arrays["vertices_t0"], arrays["vertices_t1"], truth=known)
     return Source(path.stem, 1, lambda k: step)
+
+
+def of_mesh(path: Path) -> Source:
+    """A mesh file and a copy of it, which starts beside the mesh, moves through it along x and turns about x by a
+    quarter on the way."""
+    try:
+        xyz, faces = hc.load_mesh(path)
+    except hc.MeshFileError as error:
+        raise UserError(str(error)) from error
+    meshes = tuple(Mesh(name, faces, len(xyz)) for name in ("mesh", "copy"))
+    low, high = xyz.min(axis=0), xyz.max(axis=0)
+
+    def copy(part):
+        turn = 0.5 * np.pi * part
+        turned = (xyz - (low + high) / 2) @ np.array(
+            [[1, 0, 0], [0, np.cos(turn), np.sin(turn)], [0, -np.sin(turn), np.cos(turn)]]
+        )
+        return turned + (low + high) / 2 + [1.05 * (high[0] - low[0]) * (1 - 2 * part), 0, 0]
+
+    def step(k):
+        ends = (np.concatenate([xyz, copy(n / MESH_STEPS)]) for n in (k, k + 1))
+        return Step(meshes, 0, *ends)
+
+    return Source(path.stem, MESH_STEPS, step)
 
 
 def of_recording(path: Path) -> Source:

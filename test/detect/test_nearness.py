@@ -3,9 +3,9 @@
 
 import numpy as np
 import pytest
+import stop_scene
 from hand_and_table import FACES, MESHES, TABLE, hand
 
-from hpccd_ros.bench.ros import stop_scene
 from hpccd_ros.detect.core import Options
 from hpccd_ros.detect.nearness import Nearness
 from hpccd_ros.detect.scene import SceneBuilder

@@ -1,41 +1,38 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`hpccd bench ...`: each command runs, checks what it promises to check, and writes what it says."""
+"""`python -m bench ...`: each command runs, checks what it promises to check, and writes what it says."""
 
 import collections
-import csv
 
 import pytest
-from sources import ROOT
 
 import hpccd_core as hc
-from hpccd_ros import cli
 
 STRIP = ("folding-strip", "--size", "0.1", "--steps", "2", "--repeat", "1")
 
 
-def check_files(result, folder, *figures):
-    """Rows as JSON and as CSV, and these pictures (what they show: report/test_figures.py)."""
+def check_files(result):
+    """Rows, and no failed check."""
     assert result["failures"] == []
     assert result["machine"]["commit"] and result["machine"]["cores"] >= 1
-    with open(folder / f"{result['benchmark']}-test.csv", newline="", encoding="utf-8") as file:
-        assert len(list(csv.DictReader(file))) == len(result["rows"]) > 0
-    assert {path.stem for path in folder.glob("*.png")} == set(figures)
+    assert len(result["rows"]) > 0
 
 
 def test_cpu(bench):
     status, result, folder = bench("cpu", *STRIP, "--report", "all,first,any")
     assert status == 0
-    check_files(result, folder, "cpu")
+    check_files(result)
     every, first, any_ = result["rows"]
     assert every["contacts"] >= first["contacts"] >= any_["contacts"]
     assert every["stages_ms"]["total"] > 0 and every["candidates"] > every["contacts"]
-    assert result["command"] == "hpccd bench cpu folding-strip --size 0.1 --steps 2 --repeat 1 --report all,first,any"
+    assert (
+        result["command"] == "python -m bench cpu folding-strip --size 0.1 --steps 2 --repeat 1 --report all,first,any"
+    )
 
 
 def test_scaling(bench):
     status, result, folder = bench("scaling", *STRIP, "--threads-list", "1,2", "--methods", "default,naive")
     assert status == 0
-    check_files(result, folder, "scaling", "threads")
+    check_files(result)
     assert [(r["method"], r["threads"]) for r in result["rows"]] == [
         ("default", 1),
         ("default", 2),
@@ -58,7 +55,7 @@ def test_nothing_to_hold_independent_detectors_against(bench):
 def test_methods(bench):
     status, result, folder = bench("methods", *STRIP, "--threads", "2")
     assert status == 0
-    check_files(result, folder, "methods")
+    check_files(result)
     assert all(row["same_contacts"] for row in result["rows"])
     assert {"default", "published", "naive", "front", "scalar"} <= {row["variant"] for row in result["rows"]}
 
@@ -67,7 +64,7 @@ def test_size(bench):
     few = ("--steps", "2", "--repeat", "1", "--threads-list", "1,2")
     status, result, folder = bench("size", "folding-strip", "--sizes", "0.1,0.4", *few)
     assert status == 0
-    check_files(result, folder, "size")
+    check_files(result)
     small, _, large, _ = result["rows"]
     assert 3 < large["triangles"] / small["triangles"] < 5
     assert large["bytes_per_triangle"] > 50
@@ -77,7 +74,7 @@ def test_size(bench):
 def test_memory(bench):
     status, result, folder = bench("memory", "folding-strip", "--repeat", "1", "--methods", "default,front")
     assert status == 0
-    check_files(result, folder)
+    check_files(result)
     default, front = result["rows"]
     assert 0 < default["detector_bytes"] < front["detector_bytes"], "the front keeps pairs of nodes"
     assert default["process_bytes"] > default["detector_bytes"] / 2
@@ -87,7 +84,7 @@ def test_memory(bench):
 def test_worlds(bench):
     status, result, folder = bench("worlds", "two-triangles", "--worlds", "3,12", "--repeat", "1", "--threads", "2")
     assert status == 0
-    check_files(result, folder)
+    check_files(result)
     few, many = result["rows"]
     assert (few["worlds"], many["worlds"]) == (3, 12) and few["threads"] == 2
     assert many["contacts"] > few["contacts"]
@@ -118,15 +115,12 @@ def test_nothing_is_measured_where_a_later_scene_will_not_do(bench, capsys, monk
     assert "breaking-like x 0.02: its topology changes" in capsys.readouterr().err
 
 
-def test_accuracy(bench):
-    few = ("--parts", "scenes,sweeps", "--sweep-queries", "40", "--simd", "auto,scalar")
-    status, result, folder = bench("accuracy", *STRIP, *few)
+def test_wrong_answers(bench):
+    few = ("--parts", "sweeps", "--sweep-queries", "40")
+    status, result, folder = bench("accuracy", *few)
     assert status == 0
-    check_files(result, folder, "accuracy", "accuracy-sweeps", "trade")
-    parts = {name: [r for r in result["rows"] if r["part"] == name] for name in ("scene", "adversarial", "sweep")}
-    assert len(parts["scene"]) == 4 * 2
-    for row in parts["scene"]:
-        assert sum(row["decided"].values()) == pytest.approx(row["candidates"]), "each pair is decided once"
+    check_files(result)
+    parts = {name: [r for r in result["rows"] if r["part"] == name] for name in ("adversarial", "sweep")}
     hard = {tier: [r for r in parts["adversarial"] if r["accuracy"] == tier] for tier in ("balanced", "exact")}
     assert all(r["missed"] == r["invented"] == 0 for r in hard["exact"])
     assert any(r["missed"] + r["invented"] > 0 for r in hard["balanced"]), "these queries are not hard"
@@ -138,7 +132,7 @@ def test_options(bench):
     few = ("--size", "0.02", "--steps", "1", "--repeat", "1", "--landscape", "200")
     status, result, folder = bench("options", "n-body-like-lr", *few)
     assert status == 0
-    check_files(result, folder, "options")
+    check_files(result)
     rows = {row["option"]: row for row in result["rows"]}
     full = rows["full"]
     assert full["over_full"] == 1
@@ -160,38 +154,15 @@ def test_options(bench):
         (("scaling", *STRIP, "--threads-list", "0"), "--threads-list"),
         (("size", "folding-strip", "--sizes", "one"), "--sizes"),
         (("size", "cloth-ball"), "generated"),
-        (("accuracy", *STRIP, "--tiers", "best"), "best"),
+        (("accuracy", "--tiers", "best"), "best"),
         (("memory", "folding-strip", "--methods", ","), "--methods"),
         (("worlds", "breaking-like", "--size", "0.02", "--worlds", "8"), "topology changes"),
         (("worlds", "two-triangles", "--worlds", "65537"), "at most 65,536"),
-        (("accuracy", *STRIP, "--threads", "100000"), "at most 1024"),
+        (("accuracy", "--threads", "100000"), "at most 1024"),
         (("limit", *STRIP, "--threads-list", "1,100000"), "at most 1024"),
-        (("limit", *STRIP, "--figures", "/proc/no-folder"), "--figures"),
     ],
 )
 def test_wrong_use_is_explained(bench, capsys, arguments, text):
     status, result, _ = bench(*arguments)
     assert status == 2 and result is None
     assert text in capsys.readouterr().err
-
-
-def test_where_nothing_can_be_written_nothing_is_measured(tmp_path, capsys):
-    (tmp_path / "file").touch()
-    for option, text in (("--label", "a/b"), ("--out", str(tmp_path / "file" / "folder"))):
-        assert cli.main(["bench", "cpu", *STRIP, "--out", str(tmp_path / "new"), option, text]) == 2
-        assert f"{option} {text}" in capsys.readouterr().err
-
-
-def test_gpu_redraws_a_kept_result(bench, tmp_path):
-    """The measuring needs a GPU (test/gpu has the backends); the picture of what was measured does not."""
-    assert bench("gpu", "--redraw", str(ROOT / "hpccd_core/bench/results/gpu-2-h200-32-cores.json"))[0] == 0
-    assert (tmp_path / "hybrid.png").read_bytes().startswith(b"\x89PNG")
-
-
-def test_gpu_redraw_refuses_what_is_no_result(bench, tmp_path, capsys):
-    frames = '{"benchmark": "gpu", "command": "", "machine": {}, "other_processes_share": 0, "rows": []}'
-    wrong = {"text.json": "no json", "cpu.json": '{"benchmark": "cpu"}', "empty.json": "{}", "frames.json": frames}
-    for name, text in wrong.items():
-        (tmp_path / name).write_text(text)
-        assert bench("gpu", "--redraw", str(tmp_path / name))[0] != 0
-        assert name in capsys.readouterr().err

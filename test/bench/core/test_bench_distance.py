@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`hpccd bench distance`, and the part of `hpccd bench accuracy` about distance queries."""
+"""`python -m bench distance`, and the part of `hpccd bench accuracy` about distance queries."""
 
 import sys
 
@@ -8,9 +8,9 @@ import oracle
 import pytest
 from sources import ROOT
 
-from hpccd_ros.bench.core.distance_queries import ALLOWED, Allowance, Question, questions
-from hpccd_ros.bench.report import figures, performance_distance
-from hpccd_ros.bench.report.results import Kept
+from bench.core.distance_queries import ALLOWED, Allowance, Question, questions
+from bench.report import performance_distance
+from bench.report.results import Kept
 from hpccd_ros.bench.sources import of_scene
 
 STRIP = ("folding-strip", "--size", "0.1", "--steps", "2", "--repeat", "1")
@@ -35,10 +35,9 @@ def test_a_row_for_each_question(bench):
     for row in result["rows"]:
         assert 0 < row["least_ms"] <= row["step_ms"] and row["stages_ms"]["total"] > 0
         assert row["over_plain"] == pytest.approx(row["step_ms"] / plain["step_ms"], rel=1e-4)
-    assert {path.stem for path in folder.glob("*.png")} == {"distance"}
 
 
-def test_its_table_and_picture_show_its_numbers(bench):
+def test_its_table_shows_its_numbers(bench):
     _, _, folder = bench("distance", *STRIP, "--separations", "0.02,0.002")
     result = Kept.read(folder / "distance-test.json", "distance")
     of = {(row["query"], row["distance"]): row for row in result.rows}
@@ -48,27 +47,6 @@ def test_its_table_and_picture_show_its_numbers(bench):
     assert f"({of['proximity', 0.002]['over_plain']:.2f})" in first[9]
     snapshot = performance_distance.of_a_snapshot(result)[2].split(" | ")
     assert snapshot[2] == f"{round(of['intersections', None]['pairs']):,}"
-    (axis,) = next(f for f in figures.FIGURES if f.name == "distance").compose(result).axes
-    drawn = {line.get_label(): list(line.get_ydata()) for line in axis.get_lines()}
-    assert drawn["with separation d"] == [of["separation", d]["step_ms"] for d in (0.002, 0.02)]
-    assert drawn["plain detection"] == [of["plain", None]["step_ms"]] * 2
-
-
-def test_the_title_of_one_panel_leaves_the_legend_alone(bench):
-    _, _, folder = bench("distance", *STRIP, "--separations", "0.02,0.002")
-    figure = next(f for f in figures.FIGURES if f.name == "distance")
-    page = figure.compose(Kept.read(folder / "distance-test.json", "distance"))
-    page.canvas.draw()
-    (legend,) = page.legends
-    assert not legend.get_window_extent().overlaps(page._suptitle.get_window_extent())
-    assert legend.get_window_extent().x0 > page.axes[0].get_window_extent().x1
-
-
-def test_level_lines_alone_have_no_axis_of_distances(bench):
-    _, _, folder = bench("distance", *STRIP, "--queries", "intersections,distances")
-    figure = next(f for f in figures.FIGURES if f.name == "distance")
-    (axis,) = figure.compose(Kept.read(folder / "distance-test.json", "distance")).axes
-    assert not axis.get_xlabel() and not len(axis.get_xticks())
 
 
 def test_distances_beyond_the_edges_are_left_out_where_none_is_given(bench):
@@ -191,17 +169,10 @@ def test_wrong_answers_of_each_tier(bench, data):
     hard = [row for row in result["rows"] if row["part"] == "hard distance"]
     assert {row["query"] for row in hard} == {"separation", "proximity", "intersections"}
     assert all(0 < sum(r["true"] for r in hard if r["query"] == q) for q in {row["query"] for row in hard})
-    assert {path.stem for path in folder.glob("*.png")} == {"accuracy-distance"}
     kept = Kept.read(folder / "accuracy-test.json", "accuracy")
     scenes, queries = performance_distance.on_scenes(kept), performance_distance.hard_queries(kept)
     assert len(scenes) == len(queries) == 2 + 3
     assert scenes[2].startswith("| strip | separation | 0.02 |")
-    panels = next(f for f in figures.FIGURES if f.name == "accuracy-distance").compose(kept).axes
-    for axis, query in zip(panels, ("separation", "proximity", "intersections"), strict=True):
-        wrong = [[r["missed"] + r["invented"], r["n"]] for r in hard if (r["query"], r["accuracy"]) == (query, "fast")]
-        missed, invented = [bar for bar in axis.patches if round(bar.get_y() + 0.35) == 0]
-        total = missed.get_width() + invented.get_width()
-        assert total == pytest.approx(100 * sum(w for w, _ in wrong) / sum(n for _, n in wrong))
 
 
 @pytest.mark.parametrize("key", ["s_vf", "p_ee", "x_ef"])
@@ -225,8 +196,8 @@ def test_without_truth_the_scenes_are_left_out_and_named(bench, monkeypatch):
 
 
 def test_the_default_scenes_are_there():
+    from bench.core.distance import SCENES
     from hpccd_ros import scenes
-    from hpccd_ros.bench.core.distance import SCENES
 
     assert set(SCENES) <= set(scenes.names())
     assert all(f"`{scene}`" in (ROOT / "docs" / "scenes.md").read_text() for scene in SCENES)

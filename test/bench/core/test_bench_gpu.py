@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`hpccd bench gpu` without a GPU: what it refuses, what it checks and keeps. The CPU stands for the device."""
+"""`python -m bench gpu` without a GPU: what it refuses, what it checks and keeps. The CPU stands for the device."""
 
 import types
 
@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import hpccd_core as hc
-from hpccd_ros.bench.core import (
+from bench.core import (
     device_arrays,
     gpu,
     gpu_device,

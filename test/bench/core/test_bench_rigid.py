@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`hpccd bench rigid`."""
+"""`python -m bench rigid`."""
 
 import pytest
 from oracle import rigid_answers
 
-from hpccd_ros.bench.report import performance_rigid
-from hpccd_ros.bench.report.results import Kept
+from bench.report import performance_rigid
+from bench.report.results import Kept
 
 
 def cells(line):

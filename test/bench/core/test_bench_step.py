@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`hpccd bench step`."""
+"""`python -m bench step`."""
 
 import dataclasses
 import sys
@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import hpccd_core as hc
-from hpccd_ros.bench.core import step_queries
-from hpccd_ros.bench.core.step_queries import StepRunner, contradictions, elsewhere, trials
-from hpccd_ros.bench.report import performance_step
-from hpccd_ros.bench.report.results import Kept
+from bench.core import step_queries
+from bench.core.step_queries import StepRunner, contradictions, elsewhere, trials
+from bench.report import performance_step
+from bench.report.results import Kept
 from hpccd_ros.bench.sources import of_scene
 
 STRIP = ("folding-strip", "--size", "0.1", "--steps", "2", "--repeat", "1")

@@ -1,35 +1,27 @@
 # SPDX-License-Identifier: Apache-2.0
 """docs/performance.md is what the kept results say, and shows all of them."""
 
-import re
 import shutil
 
 import pytest
 from sources import ROOT
 
+from bench.report import performance
 from hpccd_ros.base.errors import UserError
-from hpccd_ros.bench.report import figures, performance
 
-RESULTS = ROOT / "hpccd_core" / "bench" / "results"
+RESULTS = ROOT / "test" / "bench" / "results"
 PAGE = ROOT / "docs" / "performance.md"
 
 
 def test_tables_are_those_of_the_kept_results():
     text = PAGE.read_text(encoding="utf-8")
-    assert text == performance.page(text, RESULTS), "python -m hpccd_ros.bench.report"
+    assert text == performance.page(text, RESULTS), "python -m bench.report"
 
 
-def test_every_table_and_every_picture_is_on_a_page():
+def test_every_table_is_on_the_page_and_every_result_in_a_table():
     text = PAGE.read_text(encoding="utf-8")
     assert sorted(found["name"] for found in performance.TABLE.finditer(text)) == sorted(performance.TABLES)
-    drawn = [figure.name for figure in figures.FIGURES if figure.kept]
-    text += (PAGE.parent / "accuracy.md").read_text(encoding="utf-8")
-    assert sorted(re.findall(r"\]\(figures/(.*)\.png\)", text)) == sorted(drawn)
-
-
-def test_no_result_is_kept_for_nothing():
-    used = {name for _, *names in performance.TABLES.values() for name in names}
-    used |= {figure.kept for figure in figures.FIGURES if figure.kept}
+    used = {name for _, *names in performance.TABLES.values() for name in names} | {performance.TRADE}
     assert used == {path.stem for path in RESULTS.glob("*")}
 
 
@@ -51,7 +43,7 @@ def test_another_number_makes_another_page(tmp_path):
 
 def test_where_the_numbers_come_from():
     made = performance.page("<!-- soak -->\nold\n<!-- end -->", RESULTS)
-    assert "old" not in made and "`hpccd bench soak --minutes 30" in made
+    assert "old" not in made and "`python -m bench soak --minutes 30" in made
     assert "4 cores of which other processes took 56 %; commit 134dcf2, 2026-11-21" in made
 
 

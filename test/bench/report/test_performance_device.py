@@ -3,8 +3,8 @@
 
 import pytest
 
-from hpccd_ros.bench.report import performance_device
-from hpccd_ros.bench.report.results import Kept
+from bench.report import performance_device
+from bench.report.results import Kept
 
 DECIDED = {"first_filter": 600, "sieve": 300, "doubles": 90, "tolerance": 0, "extended": 8, "integers": 2, "cpu": 0}
 TIMES = {"calls": 9, "average_ms": 0.9, "median_ms": 0.8, "p95_ms": 1.1, "best_ms": 0.7}

@@ -1,0 +1,183 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The time of each tier, and its missed and spurious contacts and errors of times.
+
+  hpccd bench accuracy run.mcap --steps 0     every step of a recording
+  hpccd bench accuracy run.mcap --choose "misses<1e-4, late<1e-3"
+                                              the cheapest setting that is accurate enough for this recording
+  hpccd bench accuracy run.mcap --picture trade.png
+
+Recordings are asked for plain contacts; separations that were set in the node are left out. The truth is that of the
+file; for scenes without it, the tier "exact", which the tests compare with rational arithmetic.
+
+--choose tests tiers, backends and the reports of --ask, prints all settings and names the cheapest one within the
+bounds, as it is written in a program or for the node. These may be bounded, as shares, the worst scene counting:
+
+  misses      of the true contacts, those missed            late   how much later a time is than true (step = 1)
+  inventions  of the reported contacts, the spurious ones   early  how much earlier
+                                                            error  the larger of both
+
+Of settings that are equally fast to 5 % it takes the more accurate one. To ask for less than all contacts (--ask) is a
+choice of the model: errors then count against what is asked. Name several where each of them would do.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from hpccd_core.options import ACCURACIES, SIMD
+from hpccd_ros.base.errors import UserError
+from hpccd_ros.bench import choice, command, measure, settings
+from hpccd_ros.bench.report import Report, cores, show
+
+# Stats of the core by the stage that decided a pair, in the order in which a pair meets them.
+DECIDED = {
+    "slabs": "rejected_slabs",
+    "coplanarity": "rejected_coplanarity",
+    "projection": "rejected_projection",
+    "roots": "rejected_roots",
+    "proven": "proven_contacts",
+    "tolerance": "by_tolerance",
+    "integers": "by_integers",
+}
+COLUMNS = {
+    "scene": "scene",
+    "backend": "backend",
+    "simd": "simd",
+    "accuracy": "accuracy",
+    "asked": "asked",
+    "ms a step": "step_ms",
+    "/ balanced": "over_balanced",
+    "contacts": "contacts",
+    "missed": "missed",
+    "spurious": "invented",
+    "toc worst": "toc_worst",
+    "toc p99": "toc_p99",
+}
+
+
+def configure(parser):
+    command.configure(parser, default=("data", "cloth-drop", "n-body-like-lr"), steps=2)
+    what = ", ".join(asked.name for asked in settings.ASKED)
+    add = parser.add_argument
+    add("--choose", metavar="BOUNDS", help=f"name the cheapest setting within these bounds: {choice.EXAMPLE}")
+    add("--tiers", default=",".join(ACCURACIES), metavar="NAME,...", help="default: %(default)s")
+    add("--backend", metavar="NAME,...", help="of cpu, hybrid, gpu (default: cpu; with --choose: those that work here)")
+    add("--ask", default=settings.ALL, metavar="NAME,...", help=f"contacts to ask for: {what} (default: all)")
+    add("--simd", default="auto", metavar="NAME,...", help=f"of {', '.join(SIMD)}")
+    add("--picture", metavar="FILE", help="draw time against errors into a .png file")
+
+
+def run(args) -> Report:
+    bounds = choice.parse(args.choose) if args.choose is not None else []
+    asked = settings.asked(command.listed("--ask", args.ask, [a.name for a in settings.ASKED]))
+    tiers = command.listed("--tiers", args.tiers, ACCURACIES)
+    every = measure.BACKENDS
+    names = command.listed("--backend", args.backend, every) if args.backend else every if bounds else ["cpu"]
+    backends, refused = measure.usable("backend", names)
+    if not backends:
+        raise UserError(f"--backend {args.backend}: none of these works here; see `hpccd info`")
+    sets, refused_sets = measure.usable("simd", command.listed("--simd", args.simd, SIMD))
+    report, found = command.begin(args)
+    report.note(measure.NOTE)
+    if args.backend:
+        command.skipped(report, "backend", refused)
+    command.skipped(report, "instruction set", refused_sets)
+    for source in found:
+        variants = {}
+        for what in asked:
+            for backend in backends:
+                for simd in sets if backend == "cpu" else ["auto"]:
+                    for tier in tiers:
+                        name = f"{backend} {simd} {tier} {what.name}"
+                        options = {"backend": backend, "accuracy": tier, "threads": args.threads, "simd": simd}
+                        variants[name] = measure.Runner(name, {**options, **what.options}), what
+        _measure(report, source, variants, args)
+    check(report)
+    show(
+        "tiers",
+        list(COLUMNS),
+        [[row[key] for key in COLUMNS.values()] for row in report.rows],
+        "missed, spurious, toc: against the truth of the file, or else against the tier exact",
+    )
+    if bounds:
+        choice.choose(report, bounds)
+    if args.picture:
+        draw(report.rows, Path(args.picture))
+    return report
+
+
+def _measure(report, source, variants, args):
+    series = measure.measure(source, [runner for runner, _ in variants.values()], args.repeat, args.steps)
+    known = {step: _truth(source.step(step)) for step in next(iter(series.values())).by_step}
+    for name, (runner, what) in variants.items():
+        one, (backend, simd, tier, _) = series[name], name.split(maxsplit=3)
+        steps = {number: source.step(number) for number in known}
+        errors = [what.errors(measure.detect(runner.detector(steps[k]), steps[k]), true) for k, true in known.items()]
+        balanced = series.get(f"{backend} {simd} balanced {what.name}")
+        stats, row = one.stats(), one.row()
+        report.add(
+            part="scene",
+            scene=source.name,
+            backend=backend,
+            simd=simd,
+            accuracy=tier,
+            asked=what.name,
+            threads=args.threads or cores(),
+            truth="file" if next(iter(steps.values())).truth else "exact tier",
+            reported=sum(sample[0].contacts for sample in one.by_step.values()),
+            **{key: sum(getattr(e, key) for e in errors) for key in ("true", "missed", "invented")},
+            **{key: max(getattr(e, key) for e in errors) for key in ("toc_worst", "toc_p99", "latest", "earliest")},
+            over_balanced=row["step_ms"] / balanced.times()["step_ms"] if balanced else None,
+            decided={key: stats.get(f"vf_{of}", 0) + stats.get(f"ee_{of}", 0) for key, of in DECIDED.items()},
+            **row,
+        )
+
+
+def _truth(step):
+    if step.truth:
+        return step.truth
+    exact = measure.Runner("truth", {"accuracy": "exact", "backend": "cpu"}).detector(step)
+    found = measure.detect(exact, step)
+    return {key: getattr(found, key) for key in ("vf", "vf_toc", "ee", "ee_toc")}
+
+
+def check(report: Report) -> None:
+    """The promises of the tiers, on all steps that were measured."""
+    for r in report.rows:
+        text = (
+            f"{r['scene']}: {r['accuracy']}: missed {r['missed']}, spurious {r['invented']}, off by {r['toc_worst']:g}"
+        )
+        if r["accuracy"] == "exact" and (r["missed"] or r["invented"] or r["toc_worst"] > 1e-12):
+            report.failure(text)
+        if r["accuracy"] == "conservative" and (r["missed"] or r["latest"] > 0):
+            report.failure(f"{text}, latest by {r['latest']:g}")
+
+
+def draw(rows: list[dict], path: Path) -> None:
+    """Time of each setting against its share of wrong contacts and its worst error of times; a setting without errors
+    stands at the lower border. Full marks: all contacts; hollow ones: less was asked for."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    page = Figure(figsize=(10, 4), layout="constrained")
+    FigureCanvasAgg(page)
+    panels = (
+        ("missed and spurious contacts, share", 1e-7, lambda o: o.wrong),
+        ("worst error of times (step = 1)", 1e-17, lambda o: o.values["error"]),
+    )
+    marks = {}
+    for axis, (label, floor, value) in zip(page.subplots(1, 2), panels, strict=True):
+        for o in choice.outcomes(rows):
+            setting, colour = o.setting, f"C{ACCURACIES.index(o.setting.accuracy)}"
+            mark = "osD"[measure.BACKENDS.index(setting.backend)]
+            inside = colour if setting.asked == settings.ALL else "none"
+            point = axis.loglog(o.ms, max(value(o), floor), mark, color=colour, markerfacecolor=inside, alpha=0.8)
+            if setting.asked == settings.ALL:
+                marks[f"{setting.accuracy}, {setting.backend}"] = point[0]
+        axis.set_xlabel("ms a step")
+        axis.set_ylabel(label)
+    page.legend(marks.values(), marks, loc="outside right center", fontsize=8)
+    try:
+        page.savefig(path, dpi=150)
+    except (OSError, ValueError) as error:
+        raise UserError(f"--picture {path}: cannot be written: {error}") from error

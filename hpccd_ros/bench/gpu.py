@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: Apache-2.0
+"""ms a step on the CPU, on the hybrid backend and on the GPU, with arrays of the host and, where PyTorch or CuPy is
+installed, with positions and contacts that stay on the device. Needs an NVIDIA GPU.
+
+  hpccd bench gpu run.mcap --steps 8        a recording
+  hpccd bench gpu data                      the scene files of HPCCD_DATA, balanced and exact
+
+Fails where contacts differ from the CPU's, or where a device left a step to the CPU.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import importlib
+
+import numpy as np
+
+import hpccd_core as hc
+from hpccd_ros.base.errors import UserError
+from hpccd_ros.bench import command, measure
+from hpccd_ros.bench.report import Report, cores, show
+
+
+def configure(parser):
+    command.configure(parser, default=("data",), steps=4, rounds=20)
+    parser.add_argument("--tiers", default="balanced,exact", metavar="NAME,...", help="default: %(default)s")
+
+
+def to_device():
+    """A function that copies an array to the device; None where neither PyTorch nor CuPy is installed."""
+    for name, copy in (
+        ("torch", lambda torch, xyz: torch.from_numpy(np.ascontiguousarray(xyz)).cuda()),
+        ("cupy", lambda cupy, xyz: cupy.asarray(xyz)),
+    ):
+        try:
+            library = importlib.import_module(name)
+        except ImportError:
+            continue
+        return lambda xyz, library=library, copy=copy: copy(library, xyz)
+    return None
+
+
+def run(args) -> Report:
+    tiers = command.listed("--tiers", args.tiers, ("fast", "balanced", "conservative", "exact"))
+    if "gpu" not in hc.backends():
+        raise UserError(f"no usable GPU: {hc.gpu_status()['reason']}")
+    report, found = command.begin(args)
+    report.note(measure.NOTE)
+    move = to_device()
+    if move is None:
+        report.note("positions on the device are not measured: neither torch nor cupy is installed")
+    else:
+
+        def moved(step):
+            return dataclasses.replace(step, vertices_t0=move(step.vertices_t0), vertices_t1=move(step.vertices_t1))
+
+    for source in found:
+        for tier in tiers:
+            options = {"accuracy": tier, "threads": args.threads}
+            ways = {name: measure.Runner(name, {**options, "backend": name}) for name in ("cpu", "hybrid", "gpu")}
+            if move is not None:
+                on_device = {**options, "backend": "gpu", "results": "device"}
+                ways["device"] = measure.Runner("device", on_device, change=moved)
+            series = measure.measure(source, list(ways.values()), args.repeat, args.steps)
+            if tier != "fast":
+                for text in measure.disagreements(series):
+                    report.failure(f"{source.name}, {tier}: contacts differ between backends: {text}")
+            triangles = next(s for s in map(source.step, source.spread(0)) if s is not None).triangles
+            for name, one in series.items():
+                if one.stats().get("gpu_fallbacks"):
+                    report.failure(f"{source.name}, {tier}, {name}: steps were left to the CPU")
+                threads = args.threads or cores()
+                asked = {"way": name, "accuracy": tier, "threads": threads, "triangles": triangles}
+                report.add(scene=source.name, **asked, **one.row())
+    columns = ("scene", "accuracy", "way", "triangles", "contacts", "median_ms", "p95_ms", "best_ms", "first_ms")
+    show(
+        "ms a step, transfers included",
+        [head.removesuffix("_ms") for head in columns],
+        [[row[key] for key in columns] for row in report.rows],
+        "device: positions and contacts stay on the GPU; the others: arrays of the host in and out",
+    )
+    return report

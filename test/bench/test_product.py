@@ -1,0 +1,133 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`hpccd bench ...`: what a user measures, and the messages for wrong options."""
+
+import collections
+
+import numpy as np
+import pytest
+from sources import ROOT
+
+import hpccd_core as hc
+from hpccd_ros.bench import accuracy, sources
+from hpccd_ros.bench.report import Report
+
+STRIP = ("folding-strip", "--size", "0.1", "--steps", "2", "--repeat", "1")
+SCHEMA = {
+    "benchmark": str,
+    "command": str,
+    "machine": dict,
+    "arguments": dict,
+    "other_processes_share": float,
+    "notes": list,
+    "failures": list,
+    "rows": list,
+}
+
+
+def test_cpu(product):
+    status, result, _ = product("cpu", *STRIP, "--report", "all,first,any")
+    assert status == 0 and result["failures"] == []
+    assert {key: type(value) for key, value in result.items()} == SCHEMA
+    every, first, any_ = result["rows"]
+    assert every["contacts"] >= first["contacts"] >= any_["contacts"]
+    assert every["stages_ms"]["total"] > 0 and every["candidates"] > every["contacts"]
+    assert result["command"] == "hpccd bench cpu folding-strip --size 0.1 --steps 2 --repeat 1 --report all,first,any"
+    assert result["machine"]["commit"] and result["machine"]["cores"] >= 1
+
+
+def test_a_recording_and_a_mesh_file(product, tmp_path):
+    (tmp_path / "part.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n")
+    recording = str(ROOT / "bags" / "cloth-drop-small.mcap")
+    few = ("--steps", "0", "--repeat", "1", "--report", "all")
+    status, result, _ = product("cpu", recording, str(tmp_path / "part.obj"), *few)
+    assert status == 0
+    recorded, mesh = result["rows"]
+    assert recorded["scene"] == "cloth-drop-small" and recorded["contacts"] > 0
+    assert (mesh["scene"], mesh["triangles"], mesh["steps"]) == ("part", 8, sources.MESH_STEPS)
+    assert mesh["contacts"] > 0, "the copy moves through the mesh"
+
+
+def test_tiers(product):
+    status, result, _ = product("accuracy", *STRIP, "--simd", "auto,scalar")
+    assert status == 0 and len(result["rows"]) == 4 * 2
+    for row in result["rows"]:
+        assert sum(row["decided"].values()) == pytest.approx(row["candidates"]), "each pair is decided once"
+
+
+@pytest.mark.parametrize(
+    ("change", "failures"),
+    [
+        ({"accuracy": "exact"}, 0),
+        ({"accuracy": "exact", "invented": 1}, 1),
+        ({"accuracy": "exact", "toc_worst": 1e-11}, 1),
+        ({"accuracy": "conservative", "invented": 3}, 0),
+        ({"accuracy": "conservative", "latest": 1e-15}, 1),
+        ({"accuracy": "balanced", "missed": 5}, 0),
+    ],
+)
+def test_a_broken_promise_fails(change, failures):
+    report = Report("accuracy", "hpccd bench accuracy", {})
+    report.add(**{"scene": "s", "missed": 0, "invented": 0, "toc_worst": 0.0, "latest": 0.0, **change})
+    accuracy.check(report)
+    assert len(report.failures) == failures
+
+
+def test_other_contacts_fail(product, monkeypatch):
+    detect, seen = hc.Detector.detect, collections.Counter()
+
+    def nothing_in_the_second_round(self, start, end):
+        seen[end.tobytes()] += 1
+        return detect(self, start, end if seen[end.tobytes()] < 3 else start)
+
+    monkeypatch.setattr(hc.Detector, "detect", nothing_in_the_second_round)
+    status, result, _ = product("cpu", *STRIP[:3], "--steps", "0", "--repeat", "2", "--report", "all")
+    assert status == 1 and "contacts differ between calls" in result["failures"][0]
+
+
+def test_files_of_one_name_are_told_apart(tmp_path):
+    """Results are kept by name: of two the second would count for nothing."""
+    x = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], float)
+    paths = [tmp_path / folder / "run.npz" for folder in ("a", "b")]
+    for path in paths:
+        path.parent.mkdir()
+        np.savez(path, vertices_t0=x, vertices_t1=x + 1, faces=np.array([[0, 1, 2]]))
+    names = [source.name for source in sources.resolve([*map(str, paths), "folding-strip"], None, ())]
+    assert names == [str(tmp_path / "a" / "run"), str(tmp_path / "b" / "run"), "folding-strip"]
+    assert [source.name for source in sources.resolve([str(paths[0])], None, ())] == ["run"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (("cpu", "no-such-scene"), "no-such-scene: neither a file"),
+        (("cpu", *STRIP[:-1], "0"), "--repeat 0: at least one round"),
+        (("cpu", *STRIP, "--report", "all,last"), "'last' is not known; choose from all, first, any"),
+        (("cpu", *STRIP, "--steps", "-1"), "--steps -1: must not be negative"),
+        (("accuracy", *STRIP, "--tiers", "best"), "'best' is not known"),
+        (("accuracy", *STRIP, "--threads", "100000"), "at most 1024"),
+        (("cpu", "empty.obj"), "empty.obj"),
+    ],
+)
+def test_wrong_options_are_explained(product, capsys, tmp_path, monkeypatch, arguments, text):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "empty.obj").write_text("")
+    status, result, _ = product(*arguments)
+    assert status == 2 and result is None
+    assert text in capsys.readouterr().err
+
+
+def test_nothing_is_measured_where_the_result_cannot_be_written(tmp_path, capsys):
+    from hpccd_ros import cli
+
+    (tmp_path / "file").touch()
+    for option, text in (("--label", "a/b"), ("--out", str(tmp_path / "file" / "folder"))):
+        assert cli.main(["bench", "cpu", *STRIP, "--out", str(tmp_path / "new"), option, text]) == 2
+        assert f"{option} {text}" in capsys.readouterr().err
+
+
+@pytest.mark.skipif("gpu" in hc.backends(), reason="a GPU works here")
+def test_a_machine_without_a_gpu_is_explained(product, capsys):
+    assert product("gpu", *STRIP)[0] == 2
+    assert "no usable GPU" in capsys.readouterr().err
+    assert product("accuracy", *STRIP, "--backend", "gpu")[0] == 2
+    assert "--backend gpu: none of these works here" in capsys.readouterr().err
