@@ -104,9 +104,9 @@ def _run(argv, asked) -> int:
     if hasattr(sys.stdout, "reconfigure"):
         sys.stdout.reconfigure(errors="backslashreplace")  # names of files and topics may be no text of the terminal's
     if asked in NEED_ROS or getattr(args, "publish", False):
-        from hpccd_ros.middleware import rmw
+        from hpccd_ros.middleware import environment
 
-        rmw.check()  # before ROS is loaded
+        environment.check_rmw()  # before ROS is loaded
     return run(args) or 0
 
 

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from hpccd_ros.client.arrays import field, meshes_of
 from hpccd_ros.detect.layout import Layout
 from hpccd_ros.detect.separation import Separation
-from hpccd_ros.middleware import contact_messages, separation_fields
+from hpccd_ros.middleware import answer_fields, contact_messages
+from hpccd_ros.middleware.answer_fields import read_features
 from hpccd_ros.middleware.contact_messages import SceneContacts
-from hpccd_ros.middleware.tested_features import read_features
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,7 +107,7 @@ def contacts_from_message(message: ContactArray) -> ContactArrays:
 def _separation_of(message: ContactArray) -> Separation:
     """The separation in force. Raises ValueError where the fields that tell it do not fit together."""
     try:
-        return separation_fields.read_separation(message)
+        return answer_fields.read_separation(message)
     except ValueError as error:
         raise ValueError(f"message: {error}") from None
 

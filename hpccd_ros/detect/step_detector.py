@@ -6,8 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import hpccd_core as hc
-from hpccd_ros.detect.cancellation import Cancellation
-from hpccd_ros.detect.core import Options, make_detector
+from hpccd_ros.detect.core import Cancellation, Options, make_detector
 from hpccd_ros.detect.layout import Layout
 from hpccd_ros.detect.rigid_step import NO_BOUNDS, MotionBounds, RigidStep, motions
 from hpccd_ros.detect.scene import SceneBuilder

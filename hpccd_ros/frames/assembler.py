@@ -13,10 +13,9 @@ Rules, in the order in which they are applied to a vertex message:
    first message nor a simulation that has ended may bind those that follow: at once if it comes from a new publisher
    that is its mesh's only one; else after ``restart_after`` increasing stamps in a row, if no mesh sends in the
    scene's frame meanwhile, as two meshes in different frames would take turns. Static meshes do not determine the
-   frame: their positions are kept by frame_id, and used where it is the scene's (coordinate_frame.py,
-   static_positions.py).
+   frame: their positions are kept by frame_id, and used where it is the scene's (restart.py).
 4. Its stamp must be later than the mesh's last. A stream that goes on from an earlier time (``restart_after``
-   increasing stamps in a row, or the first message of a new publisher) is a restart: all starts anew (stamp_order.py).
+   increasing stamps in a row, or the first message of a new publisher) is a restart: all starts anew (restart.py).
    A mesh that follows has no order of its own: its frames are asked for at stamps of another mesh that were accepted.
 5. Frames of several meshes are joined by their stamps (matching.py); static meshes keep their last positions.
 """
@@ -24,17 +23,25 @@ Rules, in the order in which they are applied to a vertex message:
 from collections import deque
 from collections.abc import Collection, Sequence
 from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
 
 from hpccd_ros.base.quoting import listed
-from hpccd_ros.frames.coordinate_frame import CoordinateFrame
 from hpccd_ros.frames.drops import Aspect, Input, Reason, Refusal
 from hpccd_ros.frames.matching import ExactMatcher, Match, Matcher, NearestMatcher
-from hpccd_ros.frames.outcome import Outcome
-from hpccd_ros.frames.restart import Restart
-from hpccd_ros.frames.stamp_order import StampOrder
-from hpccd_ros.frames.static_positions import StaticPositions
+from hpccd_ros.frames.restart import CoordinateFrame, Restart, StampOrder
 from hpccd_ros.frames.topology_version import TopologyHistory, check_frame, check_successor, is_early, refused_topology
-from hpccd_ros.frames.types import OUTDATED, AssemblyRules, MeshFrame, MeshSettings, Origin, SceneFrame, Topology
+from hpccd_ros.frames.types import (
+    OUTDATED,
+    AssemblyRules,
+    MeshFrame,
+    MeshSettings,
+    Origin,
+    Outcome,
+    SceneFrame,
+    Topology,
+)
 
 
 class _MeshState:
@@ -277,3 +284,44 @@ def _no_positions(state: _MeshState, frame_id: str) -> str:
         f"static mesh {state.name} has no positions{there} yet; "
         f"publish them once or give a file (parameter mesh.{state.name}.file)"
     )
+
+
+# Bounds what strangers can make the node keep.
+_MOST_FRAMES = 4
+
+
+class Kept(NamedTuple):
+    """``frame``: the first message with these positions; ``newest``: the last one, which may be the same again."""
+
+    frame: MeshFrame
+    newest: MeshFrame
+
+
+class StaticPositions:
+    def __init__(self) -> None:
+        self._by_frame_id: dict[str, Kept] = {}  # in the order of arrival
+
+    @property
+    def frame_ids(self) -> list[str]:
+        """The last one that was sent last."""
+        return list(self._by_frame_id)
+
+    @property
+    def last_sent(self) -> int | None:
+        """When the last positions were sent; None: there are none."""
+        return max((kept.newest.sent for kept in self._by_frame_id.values()), default=None)
+
+    def keep(self, frame: MeshFrame) -> None:
+        known = self._by_frame_id.pop(frame.frame_id, None)
+        same = known is not None and np.array_equal(known.frame.vertices, frame.vertices)
+        self._by_frame_id[frame.frame_id] = Kept(known.frame if same else frame, frame)
+        if len(self._by_frame_id) > _MOST_FRAMES:
+            del self._by_frame_id[next(iter(self._by_frame_id))]
+
+    def fitting(self, frame_id: str) -> Kept | None:
+        """The last positions in this coordinate frame; those that name none fit all, as does an empty frame_id."""
+        fitting = [kept for name, kept in self._by_frame_id.items() if name in ("", frame_id) or not frame_id]
+        return fitting[-1] if fitting else None
+
+    def clear(self) -> None:
+        self._by_frame_id.clear()

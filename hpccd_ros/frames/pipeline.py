@@ -6,10 +6,8 @@ from collections.abc import Collection, Sequence
 
 from hpccd_ros.frames.assembler import FrameAssembler
 from hpccd_ros.frames.drops import Reason, Refusal
-from hpccd_ros.frames.follower import Follower
+from hpccd_ros.frames.follower import Follower, ReachedTimes
 from hpccd_ros.frames.frame_queue import FrameQueue
-from hpccd_ros.frames.outcome import Outcome
-from hpccd_ros.frames.reached_times import ReachedTimes
 from hpccd_ros.frames.rigid_mesh import RigidMesh
 from hpccd_ros.frames.standstill import Standstill
 from hpccd_ros.frames.transform_buffer import NoTransformError, TransformBuffer
@@ -21,6 +19,7 @@ from hpccd_ros.frames.types import (
     AssemblyRules,
     MeshFrame,
     MeshSettings,
+    Outcome,
     PoseFrame,
     SceneFrame,
     Topology,

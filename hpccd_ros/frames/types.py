@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the node knows of a message once it is checked: plain records of numpy arrays, no ROS."""
+"""What the node knows of a message once it is checked, and what comes of it: plain records of numpy arrays, no ROS."""
 
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -190,3 +190,32 @@ class SceneFrame:
     def refused(self, reason: Reason) -> list[Refusal]:
         """One refusal for each message that is used nowhere else."""
         return [Refusal(mesh, reason) for mesh in self.fresh]
+
+
+@dataclass(eq=False, slots=True)
+class Outcome:
+    """``frames`` of the scene that a message completes (usually none or one), ``refusals``: what will not be used.
+
+    ``restarts``: in words, where the stream starts anew. ``static_taken``: accepted messages of static meshes, and
+    shapes of those that move by poses. ``asked``: meshes that transforms move, of each frame that was asked of them: it
+    counts as a message. ``joined``: (mesh, stamp ns, time of arrival) of frames that were accepted. ``unplaced``:
+    static meshes whose positions a new topology has invalidated, and when the positions were sent.
+    """
+
+    frames: list[SceneFrame] = field(default_factory=list)
+    refusals: list[Refusal] = field(default_factory=list)
+    restarts: list[str] = field(default_factory=list)
+    static_taken: int = 0
+    asked: list[str] = field(default_factory=list)
+    joined: list[tuple[str, int, float]] = field(default_factory=list)
+    unplaced: tuple[tuple[str, int], ...] = ()
+
+    def __iadd__(self, other: "Outcome") -> "Outcome":
+        self.frames += other.frames
+        self.refusals += other.refusals
+        self.restarts += other.restarts
+        self.static_taken += other.static_taken
+        self.asked += other.asked
+        self.joined += other.joined
+        self.unplaced += other.unplaced
+        return self

@@ -10,6 +10,9 @@ import sys
 from pathlib import Path
 from xml.etree import ElementTree
 
+from hpccd_ros.base import quoting
+from hpccd_ros.base.errors import UserError
+
 # glibc's mallopt parameters (malloc.h), the environment variable of each, and our value.
 # Keeping freed megabytes instead of returning them to the kernel saves the page faults of the next message:
 # measured 17 -> 6 ms one way for 5 MB between two rclpy processes. Kept in an arena for each thread, it would add
@@ -46,6 +49,9 @@ _OFTEN = (
 DISCOVERY = "ROS_AUTOMATIC_DISCOVERY_RANGE"
 _BEYOND_THIS_HOST = ("SUBNET", "SYSTEM_DEFAULT", "", None)
 _DISCOVERY_CHOICES = (DISCOVERY, "ROS_STATIC_PEERS", "ROS_LOCALHOST_ONLY")
+
+# The RMW implementation that the user asks for.
+RMW = "RMW_IMPLEMENTATION"
 
 
 def prepare() -> None:
@@ -95,6 +101,25 @@ def find_shares_of_wheels() -> None:
     # The ROS wheels never set AMENT_PREFIX_PATH; a sourced ROS installation or colcon workspace does.
     if not os.environ.get("AMENT_PREFIX_PATH") and (Path(sys.prefix) / "share" / "ament_index").is_dir():
         os.environ["AMENT_PREFIX_PATH"] = sys.prefix
+
+
+def check_rmw() -> None:
+    """Call before rclpy is imported, which ends the process, status 102, if the RMW implementation that the user asks
+    for is not installed. Raises UserError instead."""
+    asked = os.environ.get(RMW)
+    if not asked:
+        return
+    from ament_index_python.packages import PackageNotFoundError, get_package_prefix
+
+    find_shares_of_wheels()
+    if not os.environ.get("AMENT_PREFIX_PATH"):
+        return  # nobody says what is installed
+    try:
+        get_package_prefix(asked)
+    except (PackageNotFoundError, ValueError) as error:  # ValueError: no name of a package
+        raise UserError(
+            f"{RMW}: {quoting.quoted(asked)} is not installed here; unset it, or set it to rmw_fastrtps_cpp"
+        ) from error
 
 
 def _choose_dds_profile() -> None:

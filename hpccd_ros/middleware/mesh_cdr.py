@@ -1,14 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""MeshTopology and MeshVertices as CDR bytes, exactly as long as the message is.
+"""MeshTopology, MeshVertices, and for robots String and JointState, as CDR bytes exactly as long as the message is.
 
 `rclpy.serialization.serialize_message` appends uninitialised bytes, which strict readers refuse and by which
-recordings of the same frames differ. These two messages are flat, so they are written here; the same bytes go
+recordings of the same frames differ. These messages are flat, so they are written here; the same bytes go
 over DDS (`publish` takes bytes) and into files.
 """
 
 from __future__ import annotations
 
 import struct
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -52,3 +53,20 @@ def text(value: str) -> bytes:
 def aligned(body: bytes, size: int) -> bytes:
     """`body`, filled up to a multiple of `size` bytes."""
     return body + b"\0" * (-len(body) % size)
+
+
+def description(urdf: str) -> bytes:
+    """std_msgs/String."""
+    return LITTLE_ENDIAN + text(urdf)
+
+
+def joint_states(stamp_ns: int, positions: Mapping[str, float]) -> bytes:
+    """sensor_msgs/JointState with names and positions; without velocities, efforts and, as by custom, a frame."""
+    body = header(stamp_ns, "") + struct.pack("<I", len(positions))
+    for name in positions:
+        body = aligned(body + text(name), 4)
+    body += struct.pack("<I", len(positions))
+    if positions:
+        body = aligned(body, 8) + struct.pack(f"<{len(positions)}d", *positions.values())
+    # Two empty sequences are their lengths alone.
+    return LITTLE_ENDIAN + body + struct.pack("<II", 0, 0)

@@ -16,7 +16,6 @@ from rclpy.utilities import remove_ros_args
 
 from hpccd_ros.base.errors import UserError
 from hpccd_ros.base.quoting import LONGEST_MESSAGE, listed, shortened
-from hpccd_ros.middleware import dds_security
 
 # Exit status of the node.
 NOT_CONFIGURED, WRONG_PARAMETERS, NO_SECURITY = 1, 2, 3
@@ -67,7 +66,7 @@ def start_failure(error: Exception) -> tuple[int, str] | None:
 
     error: raised by `init` or the creation of a node.
     """
-    if why := dds_security.unmet_demand(error):
+    if why := unmet_demand(error):
         return NO_SECURITY, why
     if isinstance(error, UserError):
         return WRONG_PARAMETERS, str(error)
@@ -105,3 +104,24 @@ def _no_log_file() -> str | None:
         return f"{shortened(error.object)[1:]}: the name of the folder is not UTF-8"
     except OSError as error:
         return f"{folder}: {error.strerror}"
+
+
+def unmet_demand(error: Exception) -> str | None:
+    """Why nothing is started, and what to do; None where security is not demanded or the error is another one.
+
+    error: raised by rclpy.init or the creation of a node. With ROS_SECURITY_ENABLE=true rcl ends there both if keys are
+    missing (ROS_SECURITY_STRATEGY=Enforce) and if the DDS implementation has no security plugins (any strategy).
+    """
+    if os.environ.get("ROS_SECURITY_ENABLE") != "true" or type(error).__name__ not in ("RCLError", "NodeError"):
+        return None
+    text = " ".join(str(error).split())
+    why = f"DDS security is demanded (ROS_SECURITY_ENABLE=true) and cannot be had, so nothing is started: {text}"
+    if "security libraries" in text:
+        return (
+            f"{why}. The Fast DDS of the Python wheels is built without security; use a ROS 2 installation whose DDS "
+            "has it, or unset ROS_SECURITY_ENABLE to run without protection"
+        )
+    return (
+        f"{why}. Create a keystore with an enclave for the node from config/security/policy.xml (docs/security.md) "
+        "and name them with ROS_SECURITY_KEYSTORE and --ros-args --enclave"
+    )

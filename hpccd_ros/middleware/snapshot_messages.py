@@ -8,10 +8,9 @@ import numpy as np
 from hpccd.msg import ContactArray, DistanceArray
 
 import hpccd_core as hc
-from hpccd_ros.detect.approach import approach_speeds, directions
 from hpccd_ros.detect.layout import Layout
-from hpccd_ros.middleware.contact_messages import fill_names, lowest
-from hpccd_ros.middleware.feature_pairs import FeaturePairs, fill_pairs
+from hpccd_ros.detect.pair_summary import approach_speeds, directions
+from hpccd_ros.middleware.contact_messages import FeaturePairs, fill_names, fill_pairs, lowest
 from hpccd_ros.middleware.fields import to_field
 
 KINDS = {

@@ -1,19 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
-"""All that the node counts, from its start to its end. No ROS."""
+"""All that the node counts, from its start to its end, and the log of what it refuses. No ROS."""
 
 import math
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
+from hpccd_ros.base.quoting import listed, shortened
 from hpccd_ros.detect.step_detector import Detection
 from hpccd_ros.frames.drops import Input, Reason, Refusal, RefusalCounter
-from hpccd_ros.frames.outcome import Outcome
 from hpccd_ros.frames.taken_inputs import TakenInputs
-from hpccd_ros.frames.types import SceneFrame
+from hpccd_ros.frames.types import Outcome, SceneFrame
 from hpccd_ros.node.metrics import Metrics
-from hpccd_ros.node.refusal_log import RefusalLog
 
 # Of no mesh: name of their count among ``connections``.
 REFUSED_BESIDE_MESHES = {Input.TRANSFORM: "transforms_refused", Input.JOINT_STATE: "joint_states_refused"}
@@ -113,3 +112,52 @@ def _coarse(found: Detection) -> str:
     if bound <= 1.01 * rigid.tolerance:
         return ""
     return f"{mesh} was up to {bound:.3g} beside the straight lines of {bounds.parts} parts"
+
+
+# Texts quote what publishers sent (frame names, field names), which may be of any length.
+_LONGEST = 500
+
+
+class RefusalLog:
+    """Hands on the first text of each (mesh, reason), then one every ``period`` s. Links of a robot are as one mesh."""
+
+    def __init__(
+        self, warn: Callable[[str], None], period: float = 10.0, clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        self._warn = warn
+        self._period = period
+        self._clock = clock
+        self._silent: dict[tuple[str, Reason], tuple[float, int]] = {}
+        self.last = ""
+
+    def __call__(self, mesh: str, reason: Reason, text: str) -> None:
+        self._tell(mesh, mesh, reason, shortened(text, _LONGEST))
+
+    def together(self, refusals: Iterable[Refusal]) -> None:
+        """Those that have a text. Of what several links of a robot were refused for, the text of the first is told."""
+        alike: dict[tuple[str, Reason], list[Refusal]] = {}
+        for refusal in refusals:
+            if refusal.text and (robot := _robot(refusal)):
+                alike.setdefault((robot, refusal.reason), []).append(refusal)
+            elif refusal.text:
+                self(refusal.mesh, refusal.reason, refusal.text)
+        for (robot, reason), (first, *others) in alike.items():
+            names = dict.fromkeys(other.mesh for other in others if other.mesh != first.mesh)
+            more = f"; as well {listed(names)}" if names else ""
+            self._tell(robot, first.mesh, reason, shortened(first.text, _LONGEST) + more)
+
+    def _tell(self, whose: str, mesh: str, reason: Reason, text: str) -> None:
+        self.last = f"{mesh}: {reason}: {text}"
+        now = self._clock()
+        since, count = self._silent.get((whose, reason), (-float("inf"), 0))
+        if now - since < self._period:
+            self._silent[whose, reason] = since, count + 1
+            return
+        self._silent[whose, reason] = now, 0
+        self._warn(self.last + (f" ({count} more of these in between)" if count else ""))
+
+
+def _robot(refusal: Refusal) -> str:
+    """Of which the mesh is a link; "": of none."""
+    robot, slash, _ = refusal.mesh.partition("/")
+    return robot if slash and refusal.what is Input.VERTICES else ""

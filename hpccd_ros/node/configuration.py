@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The parameters of a node: declared and checked when it starts, followed as they change."""
+"""The parameters of a node: declared and checked when it starts, followed as they change. Parameters and remappings may
+give one topic several uses, which must agree in its type."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 from rclpy.node import Node
@@ -9,13 +10,13 @@ from rclpy.node import Node
 from hpccd_ros.base.quoting import listed, shortened
 from hpccd_ros.detect.core import unusable_options
 from hpccd_ros.detect.scene import SceneBuilder
-from hpccd_ros.middleware import environment, qos_overrides, topic_names
-from hpccd_ros.node import topic_types
+from hpccd_ros.middleware import environment, message_types, qos_overrides, topic_names, transform_topics
 from hpccd_ros.node.node_recording import unrecordable
 from hpccd_ros.params import parameters, robot_parameters, scene_parameters
 from hpccd_ros.params.robot_parameters import NO_ROBOTS, Robots
 from hpccd_ros.params.table import ROBOT
 from hpccd_ros.params.values import ParameterError
+from hpccd_ros.record.recorded_topics import ANSWERS, POSITIONS
 
 Meshes = dict[str, dict[str, Any]]
 
@@ -93,7 +94,7 @@ class Configuration:
         return (
             robot_parameters.unusable_home(robots)
             or topic_names.unusable_name(self._node, topics)
-            or topic_types.contradiction(self._node, settings, meshes)
+            or contradiction(self._node, settings, meshes)
         )
 
     def _check(self, wanted: dict[str, Any], meshes: Meshes) -> str | None:
@@ -105,3 +106,55 @@ class Configuration:
         if why := self._unusable_topics(wanted, meshes) or unrecordable(wanted):
             return why
         return None if options == self.options else unusable_options(options)
+
+
+# Types of the node's own topics, and of those that every ROS node has.
+_PUBLISHED = {
+    **ANSWERS,
+    topic_names.STOP: "std_msgs/msg/Bool",
+    topic_names.MARKERS: "visualization_msgs/msg/MarkerArray",
+    topic_names.SURFACE: message_types.POINTS,
+    topic_names.DIAGNOSTICS: "diagnostic_msgs/msg/DiagnosticArray",
+    "~/transition_event": "lifecycle_msgs/msg/TransitionEvent",
+    "/rosout": "rcl_interfaces/msg/Log",
+    "/parameter_events": "rcl_interfaces/msg/ParameterEvent",
+    "/clock": "rosgraph_msgs/msg/Clock",
+}
+
+
+def contradiction(node: Node, settings: dict[str, Any], meshes: dict[str, dict[str, Any]]) -> str | None:
+    """An error about two uses of one topic with different types, or None. All names must be resolvable."""
+    first: dict[str, tuple[str, str]] = {}
+    for use, topic, type_name in _uses(settings, meshes):
+        resolved = node.resolve_topic_name(topic)
+        other, of_other = first.setdefault(resolved, (use, type_name))
+        if of_other != type_name:
+            return (
+                f"{other} and {use}: both use the topic {shortened(resolved)}, the first as {of_other}, the second as "
+                f"{type_name}; give each a topic of its own"
+            )
+    return None
+
+
+def uses_transforms(settings: dict[str, Any], meshes: dict[str, dict[str, Any]]) -> bool:
+    """Whether transforms move a robot or a mesh."""
+    of_meshes = any("tf" in (mesh["transform"], mesh["input"]) for mesh in meshes.values())
+    return of_meshes or robot_parameters.need_transforms(settings[ROBOT])
+
+
+def _uses(settings: dict[str, Any], meshes: dict[str, dict[str, Any]]) -> Iterator[tuple[str, str, str]]:
+    """(the use in words, name of the topic, its type) for each use."""
+    for topic, type_name in _PUBLISHED.items():
+        yield topic, topic, type_name
+    for mesh, values in meshes.items():
+        yield topic_names.topology(mesh), topic_names.topology(mesh), message_types.TOPOLOGY
+        for kind in topic_names.positions(values["input"]):
+            topic = topic_names.of_mesh(mesh, kind)
+            yield topic, topic, POSITIONS[kind]
+    if uses_transforms(settings, meshes):
+        for transforms in transform_topics.understood():
+            yield transforms.name, transforms.name, transforms.type_name
+    for robot, topic in robot_parameters.topics(settings[ROBOT]).items():
+        yield f"{ROBOT}.{robot}.description", topic, message_types.DESCRIPTION
+    for topic, robots in robot_parameters.joint_topics(settings[ROBOT]).items():
+        yield f"{ROBOT}.{robots[0]}.joint_states", topic, message_types.JOINT_STATES

@@ -13,10 +13,9 @@ from rclpy.clock import Clock, ClockType
 
 from hpccd_ros.middleware import qos, topic_names
 from hpccd_ros.middleware.action_server import KEPT, BoundedActionServer
-from hpccd_ros.node.detect_jobs import DetectJobs
+from hpccd_ros.node.detect_jobs import DetectJobs, Ticket
 from hpccd_ros.node.detect_query import WAITING
 from hpccd_ros.node.detect_service import DELIVERY, FAREWELL, ROOM_TO_REFUSE
-from hpccd_ros.node.detect_ticket import Ticket
 from hpccd_ros.node.life_cycle import GuardedLifecycleNode
 
 # s between two pieces of feedback of a goal.

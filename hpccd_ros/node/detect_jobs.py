@@ -3,6 +3,7 @@
 
 import math
 import threading
+import time
 from collections.abc import Callable
 from concurrent.futures import Future as JobFuture
 from concurrent.futures import ThreadPoolExecutor
@@ -13,14 +14,13 @@ from rclpy.clock import Clock, ClockType
 from rclpy.task import Future
 
 from hpccd_ros.base.quoting import LONGEST_MESSAGE, shortened
-from hpccd_ros.detect.core import CORE_ERRORS
+from hpccd_ros.detect.core import CORE_ERRORS, Cancellation
 from hpccd_ros.detect.kept_detectors import KeptDetectors
 from hpccd_ros.middleware import topic_names
 from hpccd_ros.node.accounts import Accounts
 from hpccd_ros.node.configuration import Configuration
 from hpccd_ros.node.detect_query import Answer, Request, RequestError, Response
 from hpccd_ros.node.detect_request import NodeScene, compute
-from hpccd_ros.node.detect_ticket import Ticket
 from hpccd_ros.node.life_cycle import GuardedLifecycleNode
 
 # s, the longest time limit: rclpy's timers count nanoseconds in 64 bits, 292 years.
@@ -30,6 +30,39 @@ _LESS = {"contacts": "ask for less (report first), or ", "proximity": "ask for a
 STOPPED = "stopped: the node was shut down or cleaned up before the answer was ready; ask again when it is active"
 
 R = TypeVar("R", bound=Response)
+
+
+class Ticket:
+    """``stage``: what is done for it now. ``ended``: how it ended, a name in Accounts.requests; "" before.
+
+    on_place: called when it has found a place among those that are computed or wait.
+    """
+
+    def __init__(self, stage: str, on_place: Callable[[], None] = lambda: None) -> None:
+        self.stage = stage
+        self.on_place = on_place
+        self.ended = ""
+        self.time_limit = math.nan
+        self.given_up: tuple[str, str] | None = None  # how it is to end, and the reason in words
+        self.settle: Callable[[], None] = lambda: None  # whoever waits for its answer waits no longer
+        self.cancellation = Cancellation()
+        self._since = time.monotonic()
+
+    @property
+    def seconds(self) -> float:
+        """Since it came."""
+        return time.monotonic() - self._since
+
+    def enter(self, stage: str) -> None:
+        """From the thread that computes."""
+        self.stage = stage
+
+    def give_up(self, ended: str, why: str) -> None:
+        """It is answered with ``why``, now, unless it was given up before. From the executor's thread."""
+        if self.given_up is None:
+            self.given_up = ended, why
+            self.cancellation.cancel()
+            self.settle()
 
 
 class DetectJobs:

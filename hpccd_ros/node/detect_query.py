@@ -16,7 +16,7 @@ from hpccd_ros.base.quoting import quoted, shortened
 from hpccd_ros.detect.core import Options
 from hpccd_ros.detect.layout import Layout
 from hpccd_ros.detect.separation import NONE, Separation
-from hpccd_ros.middleware import contact_messages, separation_fields, snapshot_messages, tested_features
+from hpccd_ros.middleware import answer_fields, contact_messages, snapshot_messages
 
 # Of the service and of the action: the same fields.
 Request = Detect.Request | DetectAction.Goal
@@ -126,8 +126,8 @@ def _contacts(asked: Asked, query: Query) -> Answer:
     contact_messages.fill_contacts(
         message, found, asked.layout, max_contacts=asked.max_contacts, outputs=asked.options.outputs
     )
-    separation_fields.fill_separation(message, asked.options.separation)
-    tested_features.fill_features(message, asked.options.features)
+    answer_fields.fill_separation(message, asked.options.separation)
+    answer_fields.fill_features(message, asked.options.features)
     return Answer(f"{message.total} contacts", contacts=message)
 
 
@@ -143,7 +143,7 @@ def _proximity(asked: Asked, query: Query) -> Answer:
     snapshot_messages.fill_proximity(
         message, near, asked.layout, max_contacts=asked.max_contacts, outputs=asked.options.outputs
     )
-    tested_features.fill_features(message, asked.options.features)
+    answer_fields.fill_features(message, asked.options.features)
     return Answer(f"{message.total} pairs within {query.distance:g}", contacts=message)
 
 

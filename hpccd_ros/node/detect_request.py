@@ -11,8 +11,7 @@ from hpccd.msg import MeshVertices
 
 from hpccd_core.options import ACCURACIES, REPORTS
 from hpccd_ros.base.quoting import listed, quoted, repeated, shortened
-from hpccd_ros.detect.cancellation import Cancellation
-from hpccd_ros.detect.core import Options, make_detector
+from hpccd_ros.detect.core import Cancellation, Options, make_detector
 from hpccd_ros.detect.kept_detectors import DetectorOf, KeptDetectors
 from hpccd_ros.detect.layout import Layout
 from hpccd_ros.detect.scene import SceneBuilder

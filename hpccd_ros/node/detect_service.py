@@ -10,9 +10,8 @@ from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.service_introspection import ServiceIntrospectionState
 
 from hpccd_ros.middleware import qos, topic_names
-from hpccd_ros.node.detect_jobs import STOPPED, DetectJobs
+from hpccd_ros.node.detect_jobs import STOPPED, DetectJobs, Ticket
 from hpccd_ros.node.detect_query import WAITING
-from hpccd_ros.node.detect_ticket import Ticket
 from hpccd_ros.node.life_cycle import GuardedLifecycleNode
 
 # Requests that may lie in the queue of the service beside those that find a place: a burst of them is answered "busy"

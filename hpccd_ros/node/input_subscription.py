@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A subscription of the node, and warnings about publishers that DDS does not connect to it because they offer less
-than it requests."""
+"""A subscription of the node, warnings about publishers that DDS does not connect to it because they offer less than it
+requests, and the hand-over of frames to the detection thread."""
 
+import time
 from collections import Counter
 from collections.abc import Callable, Iterable
 from typing import Any
@@ -11,7 +12,10 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
 from hpccd_ros.base.quoting import shortened
+from hpccd_ros.frames.pipeline import FramePipeline
+from hpccd_ros.frames.types import Outcome
 from hpccd_ros.middleware import qos_overrides
+from hpccd_ros.node.accounts import Accounts
 
 # Bounds the publishers reported for one topic at a time: anybody may start some.
 MOST_REPORTED = 3
@@ -120,3 +124,21 @@ def _node_of(publisher: Any) -> str:
         return "that is not a ROS node"
     name = f"{publisher.node_namespace.rstrip('/')}/{publisher.node_name}"
     return f"of node {shortened(name)}"
+
+
+_YIELD = 2e-5  # s; what counts is that it is not 0
+
+
+def hand_over(outcome: Outcome, pipeline: FramePipeline, accounts: Accounts) -> None:
+    """What came of a message enters the books; then the detection thread is let in where there is a frame for it.
+
+    In this order: the answer to a frame tells how many were dropped before it.
+    """
+    accounts.add(outcome)
+    for frame in outcome.frames:
+        for refusal in pipeline.enqueue(frame.after_inputs(accounts.inputs.count)):
+            accounts.refused(refusal)
+    if outcome.frames:
+        # Lets the detection thread have the interpreter at once, not when the executor is back in its wait: the
+        # hand-over takes 0.03 instead of 0.35 ms. Before the next outcome, whose frame may push this one out.
+        time.sleep(_YIELD)

@@ -16,10 +16,10 @@ def main() -> int:
         # Nothing is there yet that would have to be ended; an exception may be caught in the middle of an import.
         signal.signal(number, lambda number, frame: os._exit(0))
     from hpccd_ros.base.errors import UserError
-    from hpccd_ros.middleware import rmw
+    from hpccd_ros.middleware import environment
 
     try:
-        rmw.check()  # before ROS is loaded
+        environment.check_rmw()  # before ROS is loaded
     except UserError as error:
         print(f"hpccd: {error}", file=sys.stderr)
         return 2

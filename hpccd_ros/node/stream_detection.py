@@ -1,25 +1,32 @@
 # SPDX-License-Identifier: Apache-2.0
 """From the topics of the meshes to detections: subscriptions, pipeline and detection thread, wired together."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from typing import Any
 
-from hpccd_core import Cancelled
-from hpccd_ros.detect.core import CORE_ERRORS
+from rclpy.node import Node
+
+from hpccd_core import Cancelled, MeshFileError, load_mesh
+from hpccd_ros.detect.core import CORE_ERRORS, unusable_topology
 from hpccd_ros.detect.scene import SceneBuilder
 from hpccd_ros.detect.step_detector import Detection, StepDetector
 from hpccd_ros.detect.thread import DetectionThread
 from hpccd_ros.frames import taken_inputs
 from hpccd_ros.frames.drops import Reason
+from hpccd_ros.frames.mesh_file import mesh_of_file
 from hpccd_ros.frames.pipeline import FramePipeline
-from hpccd_ros.frames.types import SceneFrame, Topology
-from hpccd_ros.node import mesh_files
+from hpccd_ros.frames.types import Outcome, SceneFrame, Topology
+from hpccd_ros.middleware import resources
+from hpccd_ros.node import configuration
 from hpccd_ros.node.accounts import Accounts
 from hpccd_ros.node.configuration import Configuration
-from hpccd_ros.node.hand_over import hand_over
+from hpccd_ros.node.input_subscription import hand_over
 from hpccd_ros.node.life_cycle import GuardedLifecycleNode
+from hpccd_ros.node.mesh_subscriptions import MeshSubscriptions, Reception
+from hpccd_ros.node.motion_subscriptions import JointSubscriptions, TransformSubscriptions
 from hpccd_ros.node.stop_watch import StopWatch
-from hpccd_ros.node.subscriptions import Subscriptions
 from hpccd_ros.params import robot_parameters, scene_parameters
+from hpccd_ros.params.table import ROBOT
 from hpccd_ros.robots.joint_frames import JointFrames
 
 
@@ -40,7 +47,7 @@ class StreamDetection:
         accounts.inputs.restart()
         self._restart_after = settings["restart_after"]
         self._pipeline, self._by_joints = self._made()
-        accounts.add(mesh_files.load(self._pipeline, meshes))
+        accounts.add(_load_files(self._pipeline, meshes))
         self._subscriptions = Subscriptions(node, settings, meshes)
         self._thread: DetectionThread | None = None
         self._on_detection: Callable[[Detection], None] = lambda found: None
@@ -166,3 +173,57 @@ class StreamDetection:
         if not isinstance(error, CORE_ERRORS):
             self._node.errors.caught("detection", error)
         self._accounts.failed(frame, error)
+
+
+class Subscriptions:
+    """Nothing is subscribed before ``open``; ``close`` ends what is, should ``open`` have failed half-way too.
+
+    meshes: mesh name -> parameters mesh.NAME.*.
+    """
+
+    def __init__(self, node: Node, settings: dict[str, Any], meshes: dict[str, dict[str, Any]]) -> None:
+        self._node = node
+        self._settings = settings
+        self._meshes = meshes
+        self._of_meshes: list[MeshSubscriptions] = []
+        self._of_others: list[TransformSubscriptions | JointSubscriptions] = []
+
+    def open(self, pipeline: FramePipeline, by_joints: Mapping[str, JointFrames], accounts: Accounts) -> None:
+        """by_joints: robot -> what its joint states move, of those that are known."""
+        if configuration.uses_transforms(self._settings, self._meshes):
+            transforms = TransformSubscriptions(self._node, pipeline, accounts, self._settings["max_rate"])
+            self._of_others.append(transforms)
+        if robot_parameters.joint_topics(self._settings[ROBOT]):
+            joints = JointSubscriptions(self._node, self._settings, pipeline, by_joints, accounts)
+            self._of_others.append(joints)
+        for name, mesh in self._meshes.items():
+            reception = Reception(self._node, name, self._settings, pipeline, accounts)
+            self._of_meshes.append(MeshSubscriptions(reception, mesh["input"]))
+
+    def use(self, pipeline: FramePipeline, by_joints: Mapping[str, JointFrames]) -> None:
+        """What comes goes there from now on."""
+        for part in (*self._of_meshes, *self._of_others):
+            part.use(pipeline, by_joints)
+
+    def close(self) -> None:
+        for subscriptions in (*self._of_meshes, *self._of_others):
+            subscriptions.close()
+        self._of_meshes.clear()
+        self._of_others.clear()
+
+    def warnings(self) -> list[str]:
+        """What is odd about the publishers."""
+        return [line for part in (*self._of_meshes, *self._of_others) for line in part.warnings()]
+
+
+def _load_files(pipeline: FramePipeline, meshes: dict[str, dict[str, Any]]) -> Outcome:
+    """Read them into the pipeline. meshes: name -> parameters mesh.NAME.*. Raises MeshFileError."""
+    outcome = Outcome()
+    for name, mesh in meshes.items():
+        if mesh["file"]:
+            vertices, faces = load_mesh(resources.local_path(mesh["file"]))
+            topology, positions = mesh_of_file(vertices, faces, mesh)
+            if why := unusable_topology(topology):
+                raise MeshFileError(f"mesh.{name}.file {mesh['file']}: {why}")
+            outcome += pipeline.load(name, topology, positions)
+    return outcome

@@ -7,8 +7,7 @@ from hpccd_core.options import ACCURACIES
 from hpccd_ros.detect.layout import Layout
 from hpccd_ros.detect.rigid_step import NO_BOUNDS, MotionBounds
 from hpccd_ros.middleware import contact_messages
-from hpccd_ros.middleware.motion_bounds import read_bounds
-from hpccd_ros.middleware.separation_fields import read_separation
+from hpccd_ros.middleware.answer_fields import read_bounds, read_separation
 
 
 def difference(

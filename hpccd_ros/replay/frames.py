@@ -6,11 +6,10 @@ from collections import OrderedDict, deque
 from hpccd_ros.bag.decode import make_completer, make_decoder
 from hpccd_ros.base.quoting import quoted
 from hpccd_ros.frames import taken_inputs
+from hpccd_ros.frames.arrivals import SequenceWatch
 from hpccd_ros.frames.drops import Input, RefusalCounter
-from hpccd_ros.frames.outcome import Outcome
-from hpccd_ros.frames.sequence import SequenceWatch
 from hpccd_ros.frames.taken_inputs import NEW_PUBLISHER, SEVERAL_PUBLISHERS
-from hpccd_ros.frames.types import SceneFrame
+from hpccd_ros.frames.types import Outcome, SceneFrame
 from hpccd_ros.frames.welding import Welding
 from hpccd_ros.middleware import joint_messages, mesh_inputs, topic_names, transform_topics
 from hpccd_ros.middleware.fields import InvalidMessageError

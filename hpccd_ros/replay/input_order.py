@@ -22,7 +22,7 @@ from hpccd_ros.frames import taken_inputs
 from hpccd_ros.frames.taken_inputs import TakenInput
 from hpccd_ros.frames.types import SceneFrame
 from hpccd_ros.middleware import fields
-from hpccd_ros.middleware.input_fields import ListedInputs, read_inputs
+from hpccd_ros.middleware.answer_fields import ListedInputs, read_inputs
 from hpccd_ros.replay.frames import FrameSource
 
 _LATEST = 2**63 - 1  # recordings may have later times, lists cannot

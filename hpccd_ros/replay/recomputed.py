@@ -17,10 +17,8 @@ from hpccd_ros.frames import taken_inputs
 from hpccd_ros.frames.samples import HISTORY_NS
 from hpccd_ros.frames.types import SceneFrame
 from hpccd_ros.middleware import fields
+from hpccd_ros.middleware.answer_fields import read_features, read_inputs, read_report, read_separation
 from hpccd_ros.middleware.fields import InvalidMessageError
-from hpccd_ros.middleware.input_fields import read_inputs, read_report
-from hpccd_ros.middleware.separation_fields import read_separation
-from hpccd_ros.middleware.tested_features import read_features
 from hpccd_ros.params.table import MOST_PARTS
 from hpccd_ros.replay.compare import difference
 from hpccd_ros.replay.distances import DistanceCheck

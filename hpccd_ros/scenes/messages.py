@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from hpccd_ros.middleware import mesh_cdr, message_types, robot_cdr, topic_names
+from hpccd_ros.middleware import mesh_cdr, message_types, topic_names
 from hpccd_ros.scenes.scene import Frame, Scene
 
 # Of all that a scene sends.
@@ -85,10 +85,10 @@ class Player:
             yield Message(topic_names.topology(mesh.name), stamp_ns, data)
         if self._step == 0:
             for robot in self._scene.robots:
-                yield Message(robot.description_topic, stamp_ns, robot_cdr.description(robot.description))
+                yield Message(robot.description_topic, stamp_ns, mesh_cdr.description(robot.description))
         yield from self._vertices(frame, stamp_ns, static=True)
         for robot in self._scene.robots:
-            data = robot_cdr.joint_states(stamp_ns, robot.joint_positions(frame.time))
+            data = mesh_cdr.joint_states(stamp_ns, robot.joint_positions(frame.time))
             yield Message(robot.joint_states_topic, stamp_ns, data)
         yield from self._vertices(frame, stamp_ns, static=False)
         self._step += 1

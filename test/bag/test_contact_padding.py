@@ -14,7 +14,7 @@ from hpccd_ros.bag import message_definitions
 from hpccd_ros.bag.contact_padding import without_features
 from hpccd_ros.bag.decode import completion, make_decoder
 from hpccd_ros.bag.reader import RecordedMessage, RecordedTopic
-from hpccd_ros.middleware.tested_features import fill_features, read_features
+from hpccd_ros.middleware.answer_fields import fill_features, read_features
 
 BOTH = ("vertex_face", "edge_edge")
 NAME = "hpccd/msg/ContactArray"

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import hpccd_core as hc
-from hpccd_ros.detect.approach import approach_speeds, directions
 from hpccd_ros.detect.core import Options
+from hpccd_ros.detect.pair_summary import approach_speeds, directions
 from hpccd_ros.detect.scene import SceneBuilder
 from hpccd_ros.detect.step_detector import StepDetector
 from hpccd_ros.frames.types import MeshSettings, SceneFrame, Topology

@@ -9,8 +9,7 @@ import pytest
 from waving_sheet import sheet_faces, sheet_positions
 
 import hpccd_core as hc
-from hpccd_ros.detect.cancellation import Cancellation
-from hpccd_ros.detect.core import Options, make_detector
+from hpccd_ros.detect.core import Cancellation, Options, make_detector
 from hpccd_ros.detect.kept_detectors import DetectorOf, KeptDetectors
 from hpccd_ros.detect.scene import SceneBuilder
 from hpccd_ros.detect.separation import Separation

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Lost messages and new publishers from sequence numbers; the log of refusals."""
 
+from hpccd_ros.frames.arrivals import InterleavedSequences, SequenceWatch
 from hpccd_ros.frames.drops import Reason, Refusal
-from hpccd_ros.frames.sequence import InterleavedSequences, SequenceWatch
-from hpccd_ros.node.refusal_log import RefusalLog
+from hpccd_ros.node.accounts import RefusalLog
 
 
 def test_gaps_are_losses():

@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hpccd_ros.frames import samples, transform_buffer
+from hpccd_ros.frames.arrivals import RateLimit
 from hpccd_ros.frames.drops import Input, Reason
-from hpccd_ros.frames.rate_limit import RateLimit
 from hpccd_ros.frames.transform_buffer import NoTransformError, TransformBuffer
 from hpccd_ros.frames.transformer import MeshTransformer
 from hpccd_ros.frames.types import MeshFrame, MeshSettings

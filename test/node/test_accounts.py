@@ -4,8 +4,7 @@
 import numpy as np
 
 from hpccd_ros.frames.drops import Input, Reason, Refusal
-from hpccd_ros.frames.outcome import Outcome
-from hpccd_ros.frames.types import SceneFrame, Topology
+from hpccd_ros.frames.types import Outcome, SceneFrame, Topology
 from hpccd_ros.node.accounts import Accounts
 
 TOPOLOGY = Topology(0, 3, np.array([[0, 1, 2]], np.uint32))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Between the executor and the detection thread: what is in the books when a frame gets into the queue. No ROS."""
+"""Between the executor and the detection thread: what is in the books when a frame gets into the queue."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ from hpccd_ros.frames.drops import Reason
 from hpccd_ros.frames.pipeline import FramePipeline
 from hpccd_ros.frames.types import AssemblyRules, MeshFrame, MeshSettings, Topology
 from hpccd_ros.node.accounts import Accounts
-from hpccd_ros.node.hand_over import hand_over
+from hpccd_ros.node.input_subscription import hand_over
 
 MESHES = (MeshSettings("cloth"), MeshSettings("ball"))
 

@@ -7,8 +7,7 @@ from waving_sheet import scene_of, sheet_faces, sheet_positions
 
 import hpccd_core as hc
 from hpccd_ros import client
-from hpccd_ros.detect.cancellation import Cancellation
-from hpccd_ros.detect.core import Options
+from hpccd_ros.detect.core import Cancellation, Options
 from hpccd_ros.detect.kept_detectors import KeptDetectors
 from hpccd_ros.detect.scene import SceneBuilder
 from hpccd_ros.frames.types import MeshSettings, Topology

@@ -27,7 +27,7 @@ from waving_sheet import sheet_faces, sheet_positions
 from hpccd_ros.bag.cut import Time, cut, seconds
 from hpccd_ros.bag.reader import Recording, RecordingError
 from hpccd_ros.bag.writer import BagWriter, Topic
-from hpccd_ros.middleware import contact_messages, fields, mesh_messages, motion_bounds
+from hpccd_ros.middleware import answer_fields, contact_messages, fields, mesh_messages
 from hpccd_ros.replay import recorded_setup
 from hpccd_ros.replay.recomputed import Replay
 from hpccd_ros.rigid.transform import Rigid
@@ -127,7 +127,7 @@ def _answers(path):
             message = ContactArray(step=step.step, accuracy="exact", backend="cpu")
             message.header.stamp, message.start = fields.ns_to_stamp(step.end), fields.ns_to_stamp(step.start)
             contact_messages.fill_contacts(message, step.contacts, step.layout)
-            motion_bounds.fill_bounds(message, step.bounds)
+            answer_fields.fill_bounds(message, step.bounds)
             yield "contacts", serialize_message(message), first + round(step.at * SECOND) + LATE
 
 

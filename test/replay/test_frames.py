@@ -14,8 +14,7 @@ from hpccd_ros.bag.reader import Recording
 from hpccd_ros.frames.drops import Input
 from hpccd_ros.middleware import environment
 from hpccd_ros.node.accounts import Accounts
-from hpccd_ros.node.mesh_subscriptions import MeshSubscriptions
-from hpccd_ros.node.mesh_topic import Reception
+from hpccd_ros.node.mesh_subscriptions import MeshSubscriptions, Reception
 from hpccd_ros.params import scene_parameters
 from hpccd_ros.replay import recorded_setup
 from hpccd_ros.replay.frames import FrameSource

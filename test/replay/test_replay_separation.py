@@ -18,7 +18,7 @@ from hpccd_ros.bag.writer import BagWriter, Topic
 from hpccd_ros.detect.layout import Layout
 from hpccd_ros.detect.separation import NONE, Separation
 from hpccd_ros.detect.step_detector import StepDetector
-from hpccd_ros.middleware import contact_messages, fields, separation_fields, snapshot_messages
+from hpccd_ros.middleware import answer_fields, contact_messages, fields, snapshot_messages
 from hpccd_ros.replay import recorded_setup
 from hpccd_ros.replay.frames import FrameSource
 from hpccd_ros.replay.recomputed import Replay
@@ -61,7 +61,7 @@ def _answers(setup, frames):
         message = ContactArray(step=last.step, accuracy="exact", backend="cpu")
         message.header.stamp, message.start = fields.ns_to_stamp(last.stamp), fields.ns_to_stamp(first.stamp)
         contact_messages.fill_contacts(message, found.contacts, layout)
-        separation_fields.fill_separation(message, separation)
+        answer_fields.fill_separation(message, separation)
         distances = DistanceArray(step=last.step, accuracy="exact", backend="cpu", header=message.header)
         snapshot_messages.fill_distances(distances, found.gaps, layout)
         yield message, distances

@@ -9,7 +9,7 @@ from sources import ROOT
 from hpccd_ros.bag.reader import Recording
 from hpccd_ros.bag.writer import BagWriter, Topic
 from hpccd_ros.detect.step_detector import StepDetector
-from hpccd_ros.middleware import contact_messages, separation_fields, snapshot_messages
+from hpccd_ros.middleware import answer_fields, contact_messages, snapshot_messages
 from hpccd_ros.replay import recorded_setup
 from hpccd_ros.replay.recomputed import Replay
 
@@ -186,7 +186,7 @@ def _answers(path):
         for step in Replay(recording, setup, outputs=("points", "normals"), backend="cpu").steps():
             contacts = ContactArray(step=step.step, accuracy="exact", backend="cpu")
             contact_messages.fill_contacts(contacts, step.contacts, step.layout)
-            separation_fields.fill_separation(contacts, step.separation)
+            answer_fields.fill_separation(contacts, step.separation)
             distances = DistanceArray(step=step.step, accuracy="exact", backend="cpu")
             snapshot_messages.fill_distances(distances, detector.distances(step.end_frame), step.layout)
             header = make.header(step.end, "world")

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What comes of a pipeline, put together."""
 
-from hpccd_ros.frames.outcome import Outcome
+from hpccd_ros.frames.types import Outcome
 
 
 def retried(pipeline):

@@ -12,15 +12,7 @@ from hpccd_ros.bag.reader import Recording
 from hpccd_ros.bag.writer import BagWriter, Topic
 from hpccd_ros.detect.step_detector import Detection, StepDetector
 from hpccd_ros.frames.taken_inputs import TakenInputs
-from hpccd_ros.middleware import (
-    contact_messages,
-    fields,
-    input_fields,
-    motion_bounds,
-    separation_fields,
-    snapshot_messages,
-    tested_features,
-)
+from hpccd_ros.middleware import answer_fields, contact_messages, fields, snapshot_messages
 from hpccd_ros.replay import recorded_setup
 from hpccd_ros.replay.frames import FrameSource
 
@@ -89,12 +81,12 @@ def _answers(found: Detection, inputs: TakenInputs, at: int, sent: int) -> list[
     message.header.stamp, message.header.frame_id = fields.ns_to_stamp(found.end.stamp), found.end.frame_id
     message.start = fields.ns_to_stamp(found.start.stamp)
     contact_messages.fill_contacts(message, found.contacts, found.layout, max_contacts=0, outputs=())
-    separation_fields.fill_separation(message, found.options.separation)
-    tested_features.fill_features(message, found.options.features)
-    motion_bounds.fill_bounds(message, found.bounds)
+    answer_fields.fill_separation(message, found.options.separation)
+    answer_fields.fill_features(message, found.options.features)
+    answer_fields.fill_bounds(message, found.bounds)
     end = found.end.inputs
-    input_fields.fill_inputs(message, inputs.tell(end), start=found.start.inputs, end=end)
-    input_fields.fill_report(message, found.options.report)
+    answer_fields.fill_inputs(message, inputs.tell(end), start=found.start.inputs, end=end)
+    answer_fields.fill_report(message, found.options.report)
     answers = [Recorded("contacts", message, at, sent)]
     if found.gaps is not None:
         beside = DistanceArray(header=message.header, step=found.end.step, accuracy=found.options.accuracy)

@@ -21,10 +21,10 @@ from hpccd_ros.frames.drops import Reason, Refusal
 from hpccd_ros.middleware import fields, mesh_messages
 from hpccd_ros.node.accounts import Accounts
 from hpccd_ros.node.configuration import Configuration
-from hpccd_ros.node.hand_over import hand_over
+from hpccd_ros.node.input_subscription import hand_over
 from hpccd_ros.node.stop_doubts import WatchedScene
 from hpccd_ros.node.stop_state import StopState
-from hpccd_ros.node.subscriptions import Subscriptions
+from hpccd_ros.node.stream_detection import Subscriptions
 from hpccd_ros.params import robot_parameters, scene_parameters
 from hpccd_ros.robots.robot import Robot
 

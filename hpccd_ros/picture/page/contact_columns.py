@@ -5,7 +5,7 @@ import numpy as np
 from hpccd.msg import ContactArray
 
 from hpccd_ros.detect.layout import Layout
-from hpccd_ros.middleware.feature_pairs import FeaturePairs, fill_pairs
+from hpccd_ros.middleware.contact_messages import FeaturePairs, fill_pairs
 from hpccd_ros.picture.page.packing import Grid, packed
 
 # Drawn of one step: more could not be told apart, and would be most of the page.

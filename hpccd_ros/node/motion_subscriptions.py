@@ -1,0 +1,217 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Subscriptions to joint states and transforms: they go to their robots and into the pipeline, and frames that waited
+for them go on.
+
+The last joint states are kept for robots that are not known yet: nothing orders a description and joint states.
+"""
+
+from collections import deque
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from rclpy.node import Node
+from sensor_msgs.msg import JointState
+
+from hpccd_ros.base.clocks import Clocks
+from hpccd_ros.frames.arrivals import InterleavedSequences, RateLimit
+from hpccd_ros.frames.drops import Input, Reason, Refusal
+from hpccd_ros.frames.pipeline import FramePipeline
+from hpccd_ros.middleware import joint_messages, qos, transform_topics, unreadable
+from hpccd_ros.middleware.message_types import message_class
+from hpccd_ros.middleware.transform_topics import TransformTopic
+from hpccd_ros.node.accounts import Accounts
+from hpccd_ros.node.input_subscription import InputSubscription, hand_over, unheard
+from hpccd_ros.node.mesh_subscriptions import UNREADABLE
+from hpccd_ros.params import robot_parameters
+from hpccd_ros.params.table import ROBOT
+from hpccd_ros.robots.joint_frames import JointFrames
+from hpccd_ros.robots.joint_publishers import PublisherNumbers
+
+
+@dataclass
+class _Recent:
+    """``sent``, ``publisher``: as in `joint_messages.fill`. ``refused``: its refusal is already counted."""
+
+    message: JointState
+    sent: int
+    publisher: int | None
+    refused: bool
+
+
+class JointSubscriptions:
+    """Subscribed from construction until ``close``. of_robots: robot -> what its joint states move."""
+
+    def __init__(
+        self,
+        node: Node,
+        settings: dict[str, Any],
+        pipeline: FramePipeline,
+        of_robots: Mapping[str, JointFrames],
+        accounts: Accounts,
+    ) -> None:
+        self._node = node
+        self._settings = settings
+        self._pipeline = pipeline
+        self._of_robots = of_robots
+        self._accounts = accounts
+        topics = robot_parameters.joint_topics(settings[ROBOT])
+        self._recent: dict[str, deque[_Recent]] = {topic: deque(maxlen=joint_messages.MOST_RECENT) for topic in topics}
+        self._subscriptions = [self._subscribe(topic, robots) for topic, robots in topics.items()]
+
+    def use(self, pipeline: FramePipeline, by_joints: Mapping[str, JointFrames]) -> None:
+        self._pipeline, self._of_robots = pipeline, by_joints
+        for topic, robots in robot_parameters.joint_topics(self._settings[ROBOT]).items():
+            moved = [by_joints[robot] for robot in robots if robot in by_joints]
+            for recent in self._recent[topic]:
+                refusals = joint_messages.fill(moved, recent.message, topic, recent.sent, recent.publisher)
+                if not recent.refused:
+                    self._refuse(refusals)
+                    recent.refused = bool(refusals)
+
+    def close(self) -> None:
+        for subscription in self._subscriptions:
+            subscription.close()
+        self._subscriptions.clear()
+
+    def warnings(self) -> list[str]:
+        """Topics without a publisher, and publishers that are not connected."""
+        silent = [subscription.topic for subscription in self._subscriptions if not subscription.publishers]
+        return [f"nobody publishes {topic}" for topic in silent] + unheard(self._subscriptions)
+
+    def _subscribe(self, topic: str, robots: list[str]) -> InputSubscription:
+        limit = RateLimit(self._settings["max_rate"])
+        numbers = PublisherNumbers()
+
+        def receive(message: JointState, info: dict[str, Any]) -> None:
+            sent = info["source_timestamp"]
+            self._accounts.on_heard("joint state", topic, info)
+            publisher = numbers.of(info["publication_sequence_number"], several)
+            if not limit.allows():
+                text = f"more than max_rate = {self._settings['max_rate']:g} messages a second; some are dropped"
+                self._refuse([Refusal(topic, Reason.RATE, text, what=Input.JOINT_STATE, sent=sent)])
+                return
+            self._accounts.inputs.add(topic, sent)
+            moved = [self._of_robots[robot] for robot in robots if robot in self._of_robots]
+            refusals = joint_messages.fill(moved, message, topic, sent, publisher)
+            if (kept := joint_messages.kept(message)) is not None:
+                self._recent[topic].append(_Recent(kept, sent, publisher, bool(refusals)))
+            elif len(moved) < len(robots) and not refusals:
+                refusals = [joint_messages.too_large(topic)]
+            self._refuse(refusals)
+            for outcome in self._pipeline.retry():
+                hand_over(outcome, self._pipeline, self._accounts)
+
+        profile = qos.joint_states(self._settings["input_reliability"])
+        subscription = InputSubscription(
+            self._node,
+            JointState,
+            topic,
+            receive,
+            profile,
+            reliability="input_reliability",
+            counts=self._accounts.connections,
+        )
+
+        def several() -> bool:
+            return subscription.subscription.get_publisher_count() > 1
+
+        refusal = Refusal(topic, Reason.MALFORMED, f"{topic}: {UNREADABLE}", what=Input.JOINT_STATE)
+        unreadable.watch(subscription.subscription, lambda: self._refuse([refusal]))
+        return subscription
+
+    def _refuse(self, refusals: list[Refusal]) -> None:
+        for refusal in refusals:
+            self._accounts.refused(refusal)
+
+
+class TransformSubscriptions:
+    """Subscribed from construction until ``close``.
+
+    max_rate: most messages a second that are looked at of each topic.
+    """
+
+    def __init__(self, node: Node, pipeline: FramePipeline, accounts: Accounts, max_rate: float) -> None:
+        self._node = node
+        self._pipeline = pipeline
+        self._accounts = accounts
+        self._max_rate = max_rate
+        understood = transform_topics.understood()
+        heard = pipeline.transforms.heard
+        for topic in transform_topics.ALL.values():
+            package = topic.type_name.partition("/")[0]
+            heard[self._name(topic)] = 0 if topic in understood else f"not understood ({package} is not installed)"
+        self._subscriptions = [self._subscribe(topic) for topic in understood]
+
+    def use(self, pipeline: FramePipeline, by_joints: object) -> None:
+        self._pipeline = pipeline
+
+    def close(self) -> None:
+        for subscription in self._subscriptions:
+            subscription.close()
+        self._subscriptions.clear()
+
+    def warnings(self) -> list[str]:
+        """Publishers that are not connected; frames that wait for transforms are reported elsewhere."""
+        return unheard(self._subscriptions)
+
+    def _subscribe(self, topic: TransformTopic) -> InputSubscription:
+        limit = RateLimit(self._max_rate)
+        name, heard = self._name(topic), self._pipeline.transforms.heard
+        numbers = InterleavedSequences()
+        unreadable_since = 0  # since the last message read
+
+        def missing(number: int) -> int:
+            """Static transforms lost before this message, without those known to be unreadable."""
+            nonlocal unreadable_since
+            alone, known = subscription.publishers <= 1, unreadable_since
+            gap = numbers.missing(number, alone)
+            unreadable_since = 0
+            # With several publishers a gap may be one between two of them.
+            return gap - known if topic.static and gap > known and alone else 0
+
+        def on_unreadable() -> None:
+            nonlocal unreadable_since
+            unreadable_since += 1
+            self._unread(Refusal(topic.name, Reason.MALFORMED, f"{name}: {UNREADABLE}", what=Input.TRANSFORM), topic)
+
+        def matched(event: Any) -> None:
+            new = event.total_count_change
+            numbers.matched(new, new - event.current_count_change)
+
+        def receive(message: Any, info: dict[str, Any]) -> None:
+            heard[name] += 1
+            sent = info["source_timestamp"]
+            self._accounts.on_heard("message", name, info)
+            lost = missing(info["publication_sequence_number"])
+            if not limit.allows():
+                text = f"more than max_rate = {self._max_rate:g} messages a second; some are dropped"
+                self._unread(Refusal(topic.name, Reason.RATE, text, what=Input.TRANSFORM, sent=sent), topic)
+                return
+            self._accounts.inputs.add(topic.name, sent)
+            if lost > 0:
+                text = f"{lost} messages on {name} were lost, or could not be deserialised; send them again"
+                refusal = Refusal(topic.name, Reason.MIDDLEWARE, text, lost, what=Input.TRANSFORM, sent=sent - 1)
+                self._unread(refusal, topic)
+            for refusal in transform_topics.fill(self._pipeline.transforms, message, topic, sent):
+                self._accounts.refused(refusal)
+            for outcome in self._pipeline.retry():
+                hand_over(outcome, self._pipeline, self._accounts)
+
+        profile = qos.TRANSFORMS_STATIC if topic.static else qos.TRANSFORMS
+        message = message_class(topic.type_name)
+        counts = self._accounts.connections
+        subscription = InputSubscription(
+            self._node, message, topic.name, receive, profile, counts=counts, events={"matched": matched}
+        )
+        unreadable.watch(subscription.subscription, on_unreadable)
+        return subscription
+
+    def _unread(self, refusal: Refusal, topic: TransformTopic) -> None:
+        """Refuse a message whose transforms are unknown."""
+        sent = refusal.sent or Clocks().system()
+        self._pipeline.transforms.rejected(None, topic.static, sent)
+        self._accounts.refused(refusal)
+
+    def _name(self, topic: TransformTopic) -> str:
+        return self._node.resolve_topic_name(topic.name)
