@@ -11,12 +11,17 @@ a fraction of its step, from 0 (its start) to 1 (its end).
     'meshes/cloth/vertices'
 """
 
-from hpccd_ros.client.contacts import ContactArrays, contacts_from_message, scene_contacts
+from hpccd_ros.client.contacts import ContactArrays, contacts_from_message, pair_summary, scene_contacts
 from hpccd_ros.client.distances import DistanceArrays, distances_from_message
-from hpccd_ros.client.goals import goal_from_request
-from hpccd_ros.client.meshes import topology_from_message, topology_message, vertices_from_message, vertices_message
-from hpccd_ros.client.pairs import pair_summary
-from hpccd_ros.client.steps import collision_free_step_from_response, collision_free_step_request
+from hpccd_ros.client.meshes import (
+    mesh_from_marker,
+    mesh_from_shape,
+    topology_from_message,
+    topology_message,
+    vertices_from_message,
+    vertices_message,
+)
+from hpccd_ros.client.steps import collision_free_step_from_response, collision_free_step_request, goal_from_request
 from hpccd_ros.client.stop import StopListener
 from hpccd_ros.client.topics import (
     CONTACTS_QOS,
@@ -37,7 +42,6 @@ from hpccd_ros.client.topics import (
     topology_topic,
     vertices_topic,
 )
-from hpccd_ros.client.whole_meshes import mesh_from_marker, mesh_from_shape
 from hpccd_ros.detect.layout import Layout
 from hpccd_ros.frames.types import Topology
 from hpccd_ros.frames.welding import Welding

@@ -1,18 +1,35 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The contacts of a step: the node's message to numpy arrays, numbered within each mesh or across the scene."""
+"""The contacts of a step: the node's message to numpy arrays, numbered within each mesh or across the scene; and pairs
+of meshes in brief."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from hpccd.msg import ContactArray
+from hpccd.msg import ContactArray, PairSummary, PairSummaryArray
 from numpy.typing import NDArray
 
-from hpccd_ros.client.arrays import field, meshes_of
 from hpccd_ros.detect.layout import Layout
 from hpccd_ros.detect.separation import Separation
 from hpccd_ros.middleware import answer_fields, contact_messages
 from hpccd_ros.middleware.answer_fields import read_features
 from hpccd_ros.middleware.contact_messages import SceneContacts
+
+
+def field(message: Any, name: str, dtype: type[Any], shape: tuple[int, ...]) -> NDArray[Any]:
+    """A view of the field. Raises ValueError where it has another number of values."""
+    flat = np.frombuffer(getattr(message, name), dtype)
+    if flat.size != np.prod(shape):
+        raise ValueError(f"message: {name} has {flat.size} values, {np.prod(shape)} were expected for shape {shape}")
+    return flat.reshape(shape)
+
+
+def meshes_of(message: Any, name: str, count: int) -> NDArray[np.uint32]:
+    """A field of ``count`` indices into mesh_names. Raises ValueError where one is beyond these."""
+    meshes = field(message, name, np.uint32, (count,))
+    if (meshes >= len(message.mesh_names)).any():
+        raise ValueError(f"message: {name} names a mesh beyond the {len(message.mesh_names)} of mesh_names")
+    return meshes
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,3 +146,15 @@ def scene_contacts(message: ContactArray, layout: Layout) -> SceneContacts:
             f"{', '.join(contacts.mesh_names)}; make it of these, in this order"
         )
     return contact_messages.read_contacts(message, layout)
+
+
+def pair_summary(message: PairSummaryArray, mesh_a: str, mesh_b: str) -> PairSummary:
+    """That of two meshes, whichever comes first; of one mesh: its name twice.
+
+    Raises ValueError where they are not tested against each other, or there are no such meshes.
+    """
+    for pair in message.pairs:
+        if {pair.mesh_a, pair.mesh_b} == {mesh_a, mesh_b}:
+            return pair
+    there = ", ".join(f"{pair.mesh_a} and {pair.mesh_b}" for pair in message.pairs) or "none"
+    raise ValueError(f"mesh_a, mesh_b: {mesh_a!r} and {mesh_b!r} are no pair that is tested; there are {there}")

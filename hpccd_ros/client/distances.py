@@ -8,7 +8,7 @@ import numpy as np
 from hpccd.msg import DistanceArray
 from numpy.typing import NDArray
 
-from hpccd_ros.client.arrays import field, meshes_of
+from hpccd_ros.client.contacts import field, meshes_of
 
 
 @dataclass(frozen=True, eq=False)

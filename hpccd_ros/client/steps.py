@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How far a motion may go: a request to ``~/detect`` from numpy arrays, and the number in its answer."""
+"""How far a motion may go: a request to ``~/detect`` from numpy arrays, and the number in its answer; any request as a
+goal of the action of that name."""
 
 from collections.abc import Iterable, Mapping
 from typing import Any
@@ -102,3 +103,14 @@ def _snapshot(
         except (TypeError, ValueError) as error:
             raise type(error)(f"{argument}[{name!r}]: {error}") from None
     return messages
+
+
+def goal_from_request(request: Detect.Request) -> DetectAction.Goal:
+    """The goal that asks for the same; what it refers to is the request's own.
+
+    Its result has the fields of the service's response: functions of this package that read one read the other.
+    Raises TypeError for what is no request.
+    """
+    if not isinstance(request, Detect.Request):
+        raise TypeError(f"request: expected hpccd.srv.Detect.Request, got {type(request).__name__}")
+    return DetectAction.Goal(**{name: getattr(request, name) for name in request.get_fields_and_field_types()})

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The core's detector: its options, what it cannot work with, in its own words, and how another thread ends it. No ROS."""
+"""The core's detector: its options, what it cannot work with, and how another thread ends it. No ROS."""
 
 import threading
 from dataclasses import dataclass, replace

@@ -20,10 +20,8 @@ from hpccd_ros.bag.writer import BagWriter
 from hpccd_ros.middleware.guard import Errors, GuardedExecutor
 from hpccd_ros.params import node_parameters
 from hpccd_ros.record import attachments, recorded_topics
-from hpccd_ros.record.described_robots import DescribedRobots
-from hpccd_ros.record.missing_shapes import missing_shapes
-from hpccd_ros.record.recording_info import recording_info
-from hpccd_ros.record.topic_recorder import Recorder
+from hpccd_ros.record.recorded_topics import missing_shapes, recording_info
+from hpccd_ros.record.topic_recorder import DescribedRobots, Recorder
 
 # Messages of a topic that may wait for the disk before they are lost (and counted): bounds the memory.
 DEPTH = 50

@@ -11,8 +11,7 @@ from matplotlib.figure import Figure
 
 from hpccd_ros.picture.camera import Camera
 from hpccd_ros.picture.raster import rasterize
-from hpccd_ros.picture.shading import shade
-from hpccd_ros.picture.tubes import RADIUS, tubes
+from hpccd_ros.picture.shading import RADIUS, shade, tubes
 
 BACKGROUND = "#10141c"
 INK = "#e8ecf4"

@@ -6,8 +6,7 @@ import numpy as np
 from hpccd_ros.base import extras
 from hpccd_ros.picture.contacts import TOC_COLOURS, scene_indices, srgb, vertex_colours
 from hpccd_ros.picture.of_recording import meshes_in_the_middle, touched
-from hpccd_ros.picture.shading import vertex_normals
-from hpccd_ros.picture.tubes import RADIUS
+from hpccd_ros.picture.shading import RADIUS, vertex_normals
 from hpccd_ros.replay.recomputed import ReplayedStep
 
 # Parts of the largest extent of the first step's scene.

@@ -9,7 +9,7 @@ from pathlib import Path
 from hpccd_ros.bag.reader import Recording
 from hpccd_ros.base.errors import UserError
 from hpccd_ros.picture.of_recording import History, draw_step
-from hpccd_ros.picture.page import write_page
+from hpccd_ros.picture.page.recording_page import write_page
 from hpccd_ros.picture.rerun_recording import RerunWriter, need_rerun
 from hpccd_ros.replay import recorded_setup
 from hpccd_ros.replay.recomputed import Replay
@@ -25,7 +25,7 @@ def main(args) -> int:
         need_rerun()  # before anything is computed
     page = args.html or (args.output if str(args.output).endswith(".html") else None)
     if page is not None:
-        return write_page.write_page(args, source, Path(page), title, view)
+        return write_page(args, source, Path(page), title, view)
     outputs = ("points", "normals") if in_rerun else ("points",)
     with Recording(source) as recording:
         setup = recorded_setup.of_recording(recording, args.params)

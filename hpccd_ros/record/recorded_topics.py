@@ -1,10 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which topics a recording of a node holds, and the quality of service to ask of each."""
+"""Which topics a recording of a node holds, the quality of service to ask of each, and what the recording says of the
+node: a replay needs nothing else. A shape that was sent before the recording began cannot be computed again."""
 
 import dataclasses
+from collections.abc import Callable, Mapping
 
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 
+from hpccd_ros.base.version import package_version
+from hpccd_ros.frames.types import TF
 from hpccd_ros.middleware import qos, qos_overrides, topic_names, transform_topics
 from hpccd_ros.middleware.message_types import (
     CONTACTS,
@@ -109,3 +113,54 @@ def as_node_asks(node, name: str, topic: Wanted, depth: int, *, recorded, vertic
 
 def _profile(reliable: bool, topic: Wanted, depth: int) -> QoSProfile:
     return qos.keep_last(max(depth, topic.latched), reliable=reliable, latched=topic.latched > 0)
+
+
+def recording_info(node: str, parameters: dict, wanted: list[Wanted], resolve: Callable[[str], str]) -> dict:
+    """JSON-able. node: full name; parameters: {full name: value}; resolve: relative -> remapped absolute topic name."""
+    return {
+        "format": 1,
+        "hpccd": package_version(),
+        "node": node,
+        "parameters": parameters,
+        # The role of each topic, whatever it was remapped to.
+        "topics": {resolve(topic.name): topic.name for topic in wanted},
+    }
+
+
+def missing_shapes(parameters: dict, resolve: Callable[[str], str], received: Mapping[str, int]) -> list[str]:
+    """One sentence for each mesh that has moved, or was needed for an answer, and whose shape is not there.
+
+    parameters: of the recorded node, {full name: value}. resolve: relative -> absolute name of a topic. received:
+    messages so far, by absolute name.
+    """
+
+    def came(topic: str) -> bool:
+        return received.get(resolve(topic), 0) > 0
+
+    return [
+        f"the shape of mesh {mesh} is not in the recording (nothing came on {' and '.join(missing)}), so no replay can "
+        f"compute its steps; begin the recording before it is sent, send it again, or give the node mesh.{mesh}.file"
+        for mesh in parameters["meshes"] or []  # None: never set
+        if (missing := _missing(mesh, parameters, came))
+    ]
+
+
+def _missing(mesh: str, parameters: dict, came: Callable[[str], bool]) -> list[str]:
+    """Topics of ``mesh`` on which its shape should have come."""
+    given_as = parameters.get(f"mesh.{mesh}.input") or topic_names.VERTICES
+    if parameters.get(f"mesh.{mesh}.file") or given_as in topic_names.WHOLE:
+        return []
+    topology, *positions = (
+        topic_names.of_mesh(mesh, kind) for kind in (topic_names.TOPOLOGY, *topic_names.positions(given_as))
+    )
+    once = [topology]
+    if parameters.get(f"mesh.{mesh}.static"):
+        once, needed_by = [topology, *positions], [topic_names.CONTACTS]
+    elif given_as == TF:
+        once, needed_by = [topology, *positions], list(transform_topics.ALL)
+    elif given_as == POSE:
+        poses, *shape = positions
+        once, needed_by = [topology, *shape], [poses]
+    else:
+        needed_by = positions
+    return [topic for topic in once if not came(topic)] if any(map(came, needed_by)) else []

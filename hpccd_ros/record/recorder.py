@@ -15,11 +15,8 @@ from hpccd_ros.middleware import environment, ros_start, stop_signals, topic_nam
 from hpccd_ros.middleware.message_types import message_class
 from hpccd_ros.params import node_parameters
 from hpccd_ros.record import attachments, recorded_topics
-from hpccd_ros.record.described_robots import DescribedRobots
-from hpccd_ros.record.missing_shapes import missing_shapes
-from hpccd_ros.record.recorded_topics import Wanted
-from hpccd_ros.record.recording_info import recording_info
-from hpccd_ros.record.topic_recorder import Recorder
+from hpccd_ros.record.recorded_topics import Wanted, missing_shapes, recording_info
+from hpccd_ros.record.topic_recorder import DescribedRobots, Recorder
 
 # s. Long enough for a shape that is sent with the first pose; soon enough to begin again.
 LOOK_EVERY = 5.0

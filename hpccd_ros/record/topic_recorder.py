@@ -1,12 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Write the messages of topics into a recording: raw subscriptions, so that it holds the very bytes that were sent."""
+"""Write the messages of topics into a recording, by raw subscriptions, so that it holds the bytes that were sent; and the
+mesh files of robots whose description comes on a topic: which they need is known only then."""
 
 import time
+from collections.abc import Callable
+
+from rclpy.node import Node
+from std_msgs.msg import String
 
 from hpccd_ros.bag import qos_yaml
 from hpccd_ros.bag.writer import BagWriter, Topic
+from hpccd_ros.middleware import qos
 from hpccd_ros.middleware.message_types import message_class
-from hpccd_ros.record import recorded_topics
+from hpccd_ros.params import robot_parameters
+from hpccd_ros.record import attachments, recorded_topics
 from hpccd_ros.record.recorded_topics import Wanted
 
 
@@ -81,3 +88,46 @@ class Recorder:
         self._sequence[name] = sequence
         if last is not None and sequence > last + 1 and self.publishers(name) == 1:
             self.lost[name] = self.lost.get(name, 0) + sequence - last - 1
+
+
+# Anybody may publish descriptions: bound what they can make a recorder read and keep, of one robot.
+MOST_READ = 100
+
+
+class DescribedRobots:
+    """Attaches to ``bag`` what descriptions name that `node` hears, of each robot the first MOST_READ. parameters: of
+    the recorded node. resolve: relative -> absolute topic name. warn: takes what could not be read."""
+
+    def __init__(
+        self,
+        node: Node,
+        bag: BagWriter,
+        parameters: dict,
+        resolve: Callable[[str], str],
+        warn: Callable[[str], object],
+    ) -> None:
+        self._bag = bag
+        self._warn = warn
+        self._told: set[str] = set()  # bounded, as what is read is
+        for robot, values in robot_parameters.of(parameters).items():
+            if robot_parameters.comes_on_topic(values["description"]):
+                topic = resolve(values["description"])
+                node.create_subscription(String, topic, self._receiver(robot, values), qos.DESCRIPTION)
+
+    def _receiver(self, robot: str, values: dict) -> Callable[[String], None]:
+        read: set[int] = set()
+
+        def receive(message: String) -> None:
+            if len(read) >= MOST_READ or (text := hash(message.data)) in read:
+                return
+            read.add(text)
+            found, missing = attachments.link_meshes(robot, values, message.data)
+            for name, data in found:
+                if not self._bag.attach(name, data):
+                    self._bag.attach(attachments.changed_link_mesh_name(name, message.data), data)
+            for text in missing:
+                if text not in self._told:
+                    self._told.add(text)
+                    self._warn(text)
+
+        return receive

@@ -55,7 +55,7 @@ import numpy as np
 from hpccd_core.joint_chains import JointBounds, JointChain, JointKind, placed
 from hpccd_ros.rigid import rounding
 from hpccd_ros.rigid.body import Body
-from hpccd_ros.rigid.sums import dot
+from hpccd_ros.rigid.rounding import dot
 from hpccd_ros.rigid.transform import IDENTITY, Rigid
 
 TURNING = ("revolute", "continuous")

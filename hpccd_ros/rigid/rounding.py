@@ -49,7 +49,10 @@ given (float32 becomes float64 without rounding).
   The sum is (110 m + 184) u E and 4 u E for each unit of |q_0| + |q_1 - q_0|; the bound says 128 m + 256.
 """
 
+from collections.abc import Iterable
+
 import numpy as np
+from numpy.typing import NDArray
 
 U = 2.0**-53
 _UP = 1.0 + 2.0**-48  # more than what the sums and products of a bound itself may have lost
@@ -92,3 +95,16 @@ def linear(way: float, far: float) -> float:
 def at_chain(joints: int, reach: float, values: float) -> float:
     """values: sum over all joints of |q_0| + |q_1 - q_0|; reach: from the world's origin, base included."""
     return up(U * reach * (128.0 * joints + 256.0 + 4.0 * values) + TINY)
+
+
+def in_order(values: Iterable[float]) -> float:
+    """One after the other, from 0.0 on, each rounded."""
+    total = 0.0
+    for value in values:
+        total += value
+    return total
+
+
+def dot(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
+    """Of two vectors of the same few numbers."""
+    return in_order((a * b).tolist())

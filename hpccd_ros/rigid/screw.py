@@ -47,7 +47,7 @@ import numpy as np
 
 from hpccd_ros.rigid import rounding
 from hpccd_ros.rigid.body import Body
-from hpccd_ros.rigid.sums import dot
+from hpccd_ros.rigid.rounding import dot
 from hpccd_ros.rigid.transform import Rigid, product, rotated
 
 # Turns below it move no coordinate that a double can hold, and the square of their sine would underflow.

@@ -21,8 +21,8 @@ from hpccd_ros.base.quoting import listed
 from hpccd_ros.rigid import rounding
 from hpccd_ros.rigid.body import Body
 from hpccd_ros.rigid.joints import Chain, Joint, JointStep, LinkMotion, as_rigid
+from hpccd_ros.rigid.rounding import dot
 from hpccd_ros.rigid.screw import Screw
-from hpccd_ros.rigid.sums import dot
 from hpccd_ros.rigid.transform import IDENTITY, Rigid
 from hpccd_ros.robots.errors import RobotError
 from hpccd_ros.robots.urdf import Description, RobotJoint

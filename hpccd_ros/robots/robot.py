@@ -2,24 +2,43 @@
 """A robot as the node needs it: meshes of its links, pairs that are never tested, kinematics."""
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import chain
 
 import numpy as np
 
+from hpccd_core.joint_chains import placed
 from hpccd_ros.base.quoting import listed, quoted
 from hpccd_ros.frames.coordinates import LARGEST_OF_POSES, unusable_coordinates
 from hpccd_ros.frames.types import JOINTS, TF, MeshSettings, Topology
 from hpccd_ros.rigid.body import Body
 from hpccd_ros.rigid.joints import LinkMotion
-from hpccd_ros.robots import pairs, srdf, urdf
+from hpccd_ros.robots import srdf, urdf
 from hpccd_ros.robots.errors import RobotError
 from hpccd_ros.robots.geometry import LinkMeshes, Resolver, no_files
 from hpccd_ros.robots.kinematics import Kinematics, RobotState
-from hpccd_ros.robots.link_vertices import LinkVertices
 from hpccd_ros.robots.placement import LinkPlacement
+
+
+class LinkVertices:
+    """bodies: of each mesh the number of its link, and its geometry in that link's frame."""
+
+    def __init__(self, bodies: Sequence[tuple[int, Body]]) -> None:
+        ends = np.cumsum([len(body.vertices) for _, body in bodies]).tolist()
+        self._vertices = np.concatenate([body.vertices for _, body in bodies])
+        self._meshes = [(link, end) for (link, _), end in zip(bodies, ends, strict=True)]
+        self._rows = [slice(begin, end) for begin, end in zip([0, *ends], ends, strict=False)]
+
+    def placed(self, poses: np.ndarray) -> np.ndarray:
+        """(V,3) float64, as Rigid.apply gives them. poses (links,7): quaternion and shift."""
+        return placed(poses, self._meshes, self._vertices)
+
+    def of_meshes(self, vertices: np.ndarray) -> list[np.ndarray]:
+        """Views: of each mesh its own. vertices: (V,3) of all."""
+        return [vertices[rows] for rows in self._rows]
+
 
 #: How far meshes of round shapes may stand out of them, in metres.
 TOLERANCE = 1e-3
@@ -87,7 +106,7 @@ class Robot:
             raise RobotError(f"geometry: no link has <{geometry}>, so nothing could touch; try {other}")
         _check_reach(description, meshes)
         semantics = None if srdf_text is None else srdf.parse(srdf_text, (link.name for link in description.links))
-        ignored = pairs.ignored(description, semantics)
+        ignored = srdf.ignored(description, semantics)
         warnings = (_renamed(called, names), semantics.ignored if semantics is not None else "")
         return cls(
             called,

@@ -27,8 +27,7 @@ from hpccd_ros.scenes import (
     rod_twist,
     small,
 )
-from hpccd_ros.scenes.core import core_scene
-from hpccd_ros.scenes.scene import Frame, Mesh, Scene, Topology
+from hpccd_ros.scenes.scene import Frame, Mesh, Scene, Topology, core_scene
 
 __all__ = ["Frame", "Mesh", "Scene", "Topology", "core_scene", "describe", "make", "names"]
 

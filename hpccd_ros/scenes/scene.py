@@ -122,3 +122,18 @@ class Scene:
     def n_vertices(self) -> int:
         """Vertices of all meshes in frame 0."""
         return sum(mesh.n_vertices for mesh in self.meshes)
+
+
+def core_scene(scene: Scene, index: int = 0):
+    """An `hpccd_core.Scene` with the meshes of `scene` in order, as they are in frame `index`."""
+    import hpccd_core
+
+    core = hpccd_core.Scene()
+    frame = scene.frame(index)
+    for mesh, faces, vertices in zip(scene.meshes, scene.faces(index), frame, strict=True):
+        core.add_mesh(
+            mesh.name, faces, static=mesh.static, self_collision=mesh.self_collision, n_vertices=len(vertices)
+        )
+    for a, b in scene.ignored_pairs:
+        core.ignore_pair(a, b)
+    return core

@@ -3,6 +3,7 @@
 
 import base64
 import hashlib
+import importlib.resources
 import sys
 import zipfile
 
@@ -17,10 +18,9 @@ from page_parts import Page
 from hpccd_ros.bag.reader import Recording
 from hpccd_ros.base.errors import UserError
 from hpccd_ros.frames.types import Topology
-from hpccd_ros.picture.page import contact_columns, library, recording_page
-from hpccd_ros.picture.page.document import document
-from hpccd_ros.picture.page.packing import Grid, packed
-from hpccd_ros.picture.page.positions import MeshPositions
+from hpccd_ros.picture.page import packing, recording_page
+from hpccd_ros.picture.page.document import document, three
+from hpccd_ros.picture.page.packing import Grid, MeshPositions, packed
 from hpccd_ros.picture.page.recording_page import RecordingPage
 from hpccd_ros.replay import recorded_setup
 from hpccd_ros.replay.recomputed import Replay
@@ -42,7 +42,7 @@ def page_of(path, target, *, names=None, shown=lambda number: True, **options):
         page = RecordingPage(replay, names or setup.mesh_names, options.pop("title", "a title"), **options)
         for number, step in enumerate(replay.steps()):
             page.add(step, shown(number))
-        target.write_text(document(*page.described(), library.three()), encoding="utf-8")
+        target.write_text(document(*page.described(), three()), encoding="utf-8")
     return Page(target)
 
 
@@ -191,7 +191,7 @@ def test_what_is_missing_truncated_or_different_is_said(hpccd, small_bag, tmp_pa
 
 
 def test_of_many_contacts_some_are_drawn_over_the_whole_step(small_bag, tmp_path, monkeypatch):
-    monkeypatch.setattr(contact_columns, "MOST", 50)
+    monkeypatch.setattr(packing, "MOST", 50)
     page = page_of(small_bag, tmp_path / "few.html", shown=lambda number: number in (3, 79))
     few, many = page.said["steps"]
     assert few["notices"] == [] and sum(few["drawn"]) == few["total"]
@@ -226,19 +226,19 @@ def test_steps_and_places_that_are_not_there(hpccd, small_bag, tmp_path):
 def test_missing_trimesh_names_the_extra(monkeypatch):
     monkeypatch.setitem(sys.modules, "trimesh", None)  # as if it were not installed
     with pytest.raises(UserError, match=r"needs the Python package trimesh .* extra 'page'"):
-        library.three()
+        three()
 
 
 def test_a_trimesh_without_the_library_is_named(monkeypatch, tmp_path):
-    monkeypatch.setattr(library.importlib.resources, "files", lambda package: tmp_path)
+    monkeypatch.setattr(importlib.resources, "files", lambda package: tmp_path)
     with pytest.raises(UserError, match=r"three\.js that trimesh carries: trimesh [\d.]+: .*No such file"):
-        library.three()
+        three()
     folder = tmp_path / "resources" / "templates"
     folder.mkdir(parents=True)
     with zipfile.ZipFile(folder / "viewer.zip", "w") as archive:
         archive.writestr("viewer.html.template", "<script>another viewer</script>")
     with pytest.raises(UserError, match=r"trimesh [\d.]+ has none"):
-        library.three()
+        three()
 
 
 @given(

@@ -10,8 +10,7 @@ from hpccd_ros.picture import contacts
 from hpccd_ros.picture.camera import Camera
 from hpccd_ros.picture.of_recording import separation_fact
 from hpccd_ros.picture.raster import rasterize
-from hpccd_ros.picture.shading import blur, vertex_normals
-from hpccd_ros.picture.tubes import tubes
+from hpccd_ros.picture.shading import blur, tubes, vertex_normals
 
 
 def _nearest_by_hand(corners, x, y):

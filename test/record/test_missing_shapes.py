@@ -9,7 +9,7 @@ from geometry_msgs.msg import PoseStamped
 from live import PATIENCE, WAIT
 
 from hpccd_ros import client
-from hpccd_ros.record.missing_shapes import missing_shapes
+from hpccd_ros.record.recorded_topics import missing_shapes
 
 TOPOLOGY, VERTICES, POSE = (f"meshes/box/{kind}" for kind in ("topology", "vertices", "pose"))
 EITHER = [TOPOLOGY, VERTICES]

@@ -17,7 +17,7 @@ from hpccd_ros.bag.writer import BagWriter, Topic
 from hpccd_ros.frames.transform_buffer import TransformBuffer
 from hpccd_ros.middleware import qos
 from hpccd_ros.record import recorded_topics
-from hpccd_ros.record.recording_info import recording_info
+from hpccd_ros.record.recorded_topics import recording_info
 from hpccd_ros.record.topic_recorder import Recorder
 from hpccd_ros.replay import recorded_setup
 from hpccd_ros.rigid.transform import Rigid

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from hpccd_ros.rigid import rounding
-from hpccd_ros.rigid.sums import in_order
+from hpccd_ros.rigid.rounding import in_order
 from hpccd_ros.rigid.transform import IDENTITY, Rigid, rotated
 
 

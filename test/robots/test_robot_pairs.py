@@ -6,7 +6,7 @@ from itertools import combinations
 import pytest
 from random_urdf import random_urdf
 
-from hpccd_ros.robots import pairs, srdf, urdf
+from hpccd_ros.robots import srdf, urdf
 from hpccd_ros.robots.errors import RobotError
 
 #        a -revolute- b -fixed- c -prismatic- d -revolute- e;  b -fixed- f
@@ -37,7 +37,7 @@ def semantics(inside):
 
 def test_neighbours_are_ignored_and_links_that_are_fixed_count_as_one():
     # bodies: a | b c f | d | e
-    assert words(pairs.ignored(robot())) == ["ab", "ac", "af", "bc", "bd", "bf", "cd", "cf", "de", "df"]
+    assert words(srdf.ignored(robot())) == ["ab", "ac", "af", "bc", "bd", "bf", "cd", "cf", "de", "df"]
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -62,21 +62,21 @@ def test_neighbours_of_random_robots(seed):
         return costs[b]
 
     names = sorted(link.name for link in description.links)
-    assert pairs.ignored(description) == {(a, b) for a, b in combinations(names, 2) if least(a, b) <= 1}
+    assert srdf.ignored(description) == {(a, b) for a, b in combinations(names, 2) if least(a, b) <= 1}
 
 
 def test_what_an_srdf_disables_is_added_and_what_it_enables_is_put_back():
-    default = set(words(pairs.ignored(robot())))
+    default = set(words(srdf.ignored(robot())))
     disabled = semantics('<disable_collisions link1="e" link2="a" reason="Never"/><group name="g"/>')
-    assert set(words(pairs.ignored(robot(), disabled))) == default | {"ae"}
+    assert set(words(srdf.ignored(robot(), disabled))) == default | {"ae"}
     enabled = semantics('<enable_collisions link1="d" link2="c"/>')
-    assert set(words(pairs.ignored(robot(), enabled))) == default - {"cd"}
+    assert set(words(srdf.ignored(robot(), enabled))) == default - {"cd"}
     of_link = semantics('<disable_default_collisions link="e"/><enable_collisions link1="e" link2="b"/>')
-    assert set(words(pairs.ignored(robot(), of_link))) == default | {"ae", "ce", "ef"}
+    assert set(words(srdf.ignored(robot(), of_link))) == default | {"ae", "ce", "ef"}
     both = semantics('<enable_collisions link1="a" link2="b"/><disable_collisions link1="a" link2="b"/>')
-    assert "ab" in words(pairs.ignored(robot(), both))
+    assert "ab" in words(srdf.ignored(robot(), both))
     itself = semantics('<disable_collisions link1="a" link2="a"/>')
-    assert set(words(pairs.ignored(robot(), itself))) == default
+    assert set(words(srdf.ignored(robot(), itself))) == default
 
 
 @pytest.mark.parametrize(

@@ -1,10 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Arrays of integers as short byte strings, which `assets/unpack.js` reads."""
+"""Positions and contacts of all steps as arrays of integers in short byte strings, which `assets/unpack.js` reads."""
 
+import dataclasses
 import zlib
 
 import numpy as np
+from hpccd.msg import ContactArray
 from numpy.typing import NDArray
+
+from hpccd_ros.detect.layout import Layout
+from hpccd_ros.frames.types import Topology
+from hpccd_ros.middleware.contact_messages import FeaturePairs, fill_pairs
 
 # Of zlib: 9 takes twice as long for 1 % less.
 LEVEL = 7
@@ -49,3 +55,101 @@ class Grid:
     def described(self) -> dict:
         """For the page."""
         return {"low": self.low.tolist(), "high": self.high.tolist(), "step": self.step}
+
+
+@dataclasses.dataclass
+class _Motion:
+    """A topology and its frames (V,3)."""
+
+    topology: Topology
+    frames: list[np.ndarray]
+
+
+class MeshPositions:
+    """Positions of one mesh at the steps of a page. bytes: what they take in the page before they are compressed."""
+
+    def __init__(self, name: str):
+        self.name = name
+        self.bytes = 0
+        self._motions: list[_Motion] = []
+        self._shown: list[tuple[int, int] | None] = []
+
+    def add(self, topology: Topology, vertices: np.ndarray) -> None:
+        """At the next step. Where nothing has moved, as in static meshes, nothing is stored."""
+        if not self._motions or self._motions[-1].topology is not topology:
+            self._motions.append(_Motion(topology, []))
+        frames = self._motions[-1].frames
+        if not frames or not np.array_equal(frames[-1], vertices):
+            frames.append(vertices)
+            self.bytes += 2 * vertices.size
+        self._shown.append((len(self._motions) - 1, len(frames) - 1))
+
+    def add_nothing(self) -> None:
+        """The next step has no frame."""
+        self._shown.append(None)
+
+    def described(self) -> tuple[dict, dict[str, bytes]]:
+        """(what the page says of it, {"faces-T", "edges-T", "positions-T": bytes} of each topology T)."""
+        frames = [frame for motion in self._motions for frame in motion.frames if len(frame)]
+        low = np.min([frame.min(axis=0) for frame in frames], axis=0) if frames else np.zeros(3)
+        high = np.max([frame.max(axis=0) for frame in frames], axis=0) if frames else np.zeros(3)
+        grid = Grid(low, high)
+        blobs, topologies = {}, []
+        for number, motion in enumerate(self._motions):
+            topology = motion.topology
+            topologies.append(
+                {
+                    "version": topology.version,
+                    "vertices": topology.n_vertices,
+                    "faces": len(topology.faces),
+                    "edges": len(topology.edges),
+                    "frames": len(motion.frames),
+                }
+            )
+            blobs[f"faces-{number}"] = packed(np.asarray(topology.faces, np.uint32).reshape(1, -1, 3))
+            blobs[f"edges-{number}"] = packed(np.asarray(topology.edges, np.uint32).reshape(1, -1, 2))
+            blobs[f"positions-{number}"] = packed(grid.rounded(np.stack(motion.frames)))
+        return {"name": self.name, **grid.described(), "topologies": topologies, "shown": self._shown}, blobs
+
+
+# Drawn of one step: more could not be told apart, and would be most of the page.
+MOST = 20_000
+# Of times of contact, which are 0..1.
+TIMES = 65535
+
+
+class ContactColumns:
+    """Of each step the vertex-face contacts, then the edge-edge ones, with meshes and features as in ContactArray."""
+
+    def __init__(self):
+        self._meshes = [np.empty((0, 2), np.uint32)]
+        self._features = [np.empty((0, 4), np.uint32)]
+        self._toc, self._points = [np.empty(0)], [np.empty((0, 3))]
+
+    def add(self, contacts, layout: Layout) -> tuple[int, int]:
+        """How many vertex-face and edge-edge contacts of this step are drawn: at most MOST, evenly by time."""
+        toc = np.concatenate([contacts.vf_toc, contacts.ee_toc])
+        by_time = np.argsort(toc, kind="stable")
+        kept = np.sort(by_time if len(toc) <= MOST else by_time[np.arange(MOST) * len(toc) // MOST])
+        pairs = FeaturePairs.of(vf=contacts.vf, ee=contacts.ee).keep(kept)
+        told = ContactArray()
+        fill_pairs(told, pairs, layout)
+        self._meshes.append(np.stack([told.mesh_a, told.mesh_b], axis=1).astype(np.uint32))
+        sides = [np.asarray(side, np.uint32).reshape(-1, 2) for side in (told.features_a, told.features_b)]
+        self._features.append(np.concatenate(sides, axis=1))
+        self._toc.append(toc[kept])
+        self._points.append(np.asarray(contacts.points).reshape(-1, 3)[kept])
+        return len(pairs.vf), len(pairs.ee)
+
+    def described(self) -> tuple[dict, dict[str, bytes]]:
+        """(what the page says of them, {column: bytes})."""
+        toc, points = np.concatenate(self._toc), np.concatenate(self._points)
+        grid = Grid(points.min(axis=0), points.max(axis=0)) if len(points) else Grid(np.zeros(3), np.zeros(3))
+        blobs = {
+            "meshes": packed(np.concatenate(self._meshes)[None]),
+            "features": packed(np.concatenate(self._features)[None]),
+            # One row: times are in no order that would make differences small.
+            "toc": packed(np.rint(toc * TIMES).astype(np.uint16).reshape(1, 1, -1)),
+            "points": packed(grid.rounded(points)[None]),
+        }
+        return {**grid.described(), "count": len(toc), "times": TIMES}, blobs

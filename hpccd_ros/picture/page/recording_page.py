@@ -3,16 +3,20 @@
 
 import itertools
 from collections import Counter
+from pathlib import Path
 
 import numpy as np
 
+from hpccd_ros.bag.reader import Recording
 from hpccd_ros.base.errors import UserError
 from hpccd_ros.base.quoting import shortened
 from hpccd_ros.picture.contacts import BACKGROUND, FAINT, INK, MESH_COLOURS, TINT, TOC_COLOURS
 from hpccd_ros.picture.of_recording import facts
-from hpccd_ros.picture.page.contact_columns import MOST, ContactColumns
-from hpccd_ros.picture.page.positions import MeshPositions
+from hpccd_ros.picture.page.document import document, three
+from hpccd_ros.picture.page.packing import MOST, ContactColumns, MeshPositions
+from hpccd_ros.replay import recorded_setup
 from hpccd_ros.replay.recomputed import Replay, ReplayedStep
+from hpccd_ros.scenes.progress import track
 
 # Bytes of positions that a browser is asked to hold.
 MOST_POSITIONS = 1 << 29
@@ -175,3 +179,32 @@ def _count(number: int, what: str) -> str:
 def _ordinal(number: int) -> str:
     ending = "th" if number % 100 in (11, 12, 13) else {1: "st", 2: "nd", 3: "rd"}.get(number % 10, "th")
     return f"{number}{ending}"
+
+
+# Bytes of a file that a browser takes long to open.
+LARGE = 50_000_000
+
+
+def write_page(args, source: Path, target: Path, title: str, view: dict) -> int:
+    """As the options of `hpccd view` say. view: azimuth, elevation."""
+    library = three()  # before anything is computed, as the folder
+    if not target.parent.is_dir():
+        raise UserError(f"--html {target}: there is no folder {target.parent}")
+    every = args.every or 1
+    with Recording(source) as recording:
+        setup = recorded_setup.of_recording(recording, args.params)
+        replay = Replay(recording, setup, outputs=("points",), distances=False)
+        page = RecordingPage(replay, setup.mesh_names, title, every=every, **view)
+        for number, step in enumerate(track(replay.steps(), "steps", True, replay.recorded_answers or None)):
+            page.add(step, step.step == args.step if args.step is not None else number % every == 0)
+        if not page.steps:
+            raise UserError(f"{source}: no step{'' if args.step is None else f' {args.step}'} that can be shown")
+        text = document(*page.described(), library)
+    try:
+        target.write_text(text, encoding="utf-8", newline="\n")
+    except OSError as error:
+        raise UserError(f"--html {target}: {error.strerror}") from error
+    size = target.stat().st_size
+    advice = f"; --every {2 * every} makes it smaller" if size > LARGE and args.step is None else ""
+    print(f"{target}: {page.steps} step{'' if page.steps == 1 else 's'}, {size / 1e6:.1f} MB{advice}")
+    return 0
