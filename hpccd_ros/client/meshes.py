@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Faces and positions of a mesh: numpy arrays to messages, and back; those that come as shape_msgs/Mesh or as markers of
-triangles are numbered as by the node, whose contacts name their vertices and faces."""
+"""Faces and positions of a mesh: numpy arrays to messages, and back; those of shape_msgs/Mesh and of markers are
+numbered as by the node, whose contacts name their vertices and faces."""
 
 from typing import Any
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Write the messages of topics into a recording, by raw subscriptions, so that it holds the bytes that were sent; and the
-mesh files of robots whose description comes on a topic: which they need is known only then."""
+"""Write the messages of topics into a recording, by raw subscriptions, so that it holds the bytes that were sent; and
+the mesh files of robots whose description comes on a topic: which they need is known only then."""
 
 import time
 from collections.abc import Callable
