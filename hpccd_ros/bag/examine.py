@@ -11,15 +11,7 @@ from mcap.records import Channel, Chunk, Header, Message, Metadata, Schema
 from mcap.writer import MCAP0_MAGIC
 
 from hpccd_ros.bag.mcap_index import Descriptions, miscounted, misplaced, read_index, undescribed
-from hpccd_ros.bag.mcap_records import (
-    DAMAGE,
-    Place,
-    data_section,
-    inside,
-    parse,
-    unpacked_message,
-    within_chunk_times,
-)
+from hpccd_ros.bag.mcap_records import DAMAGE, Place, data_section, inside, parse, unpacked_message, within_chunk_times
 from hpccd_ros.bag.reader import RecordingError, stored_info
 from hpccd_ros.bag.writer import COMPRESSIONS
 

@@ -17,14 +17,7 @@ from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.summary import Summary
 
-from hpccd_ros.bag.mcap_index import (
-    Descriptions,
-    miscounted,
-    misplaced,
-    read_index,
-    stored_counts,
-    undescribed,
-)
+from hpccd_ros.bag.mcap_index import Descriptions, miscounted, misplaced, read_index, stored_counts, undescribed
 from hpccd_ros.bag.mcap_records import (
     Place,
     Raw,

@@ -7,7 +7,7 @@ import time
 from collections import Counter
 from pathlib import Path
 
-from hpccd_ros.bag import bag_metadata, message_definitions, qos_yaml
+from hpccd_ros.bag import message_definitions, qos_yaml
 from hpccd_ros.bag.bag_file import COMPRESSIONS, HPCCD_RECORD, BagFile, Topic
 
 __all__ = ["COMPRESSIONS", "HPCCD_RECORD", "BagWriter", "Topic"]
@@ -185,7 +185,7 @@ class BagWriter:
         self._flushed = time.monotonic()
 
     def _close_file(self):
-        self._file.finish(bag_metadata.of_bag([self._file], list(self._topics.values())))
+        self._file.finish(metadata_of_bag([self._file], list(self._topics.values())))
         self._file = None
         if not self.single_file:
             self._list_files()
@@ -195,10 +195,10 @@ class BagWriter:
         # Those before are rendered already: with all of them anew, each split takes longer than the one before, and the
         # messages of a stream that goes on meanwhile are lost.
         for file in finished[len(self._listed) :]:
-            parts = ([file.path.name], [bag_metadata.of_file(file)])
+            parts = ([file.path.name], [metadata_of_file(file)])
             self._listed.append(tuple(textwrap.indent(qos_yaml.to_yaml(part), "  ") for part in parts))
         names, files = ("".join(parts) for parts in zip(*self._listed, strict=True))
-        bag = {"rosbag2_bagfile_information": bag_metadata.without_files(finished, list(self._topics.values()))}
+        bag = {"rosbag2_bagfile_information": metadata_without_files(finished, list(self._topics.values()))}
         lists = f"  relative_file_paths:\n{names}  files:\n{files}"
         draft = self.path / "metadata.yaml.part"
         draft.write_text(qos_yaml.to_yaml(bag) + lists, encoding="utf-8")
@@ -245,3 +245,56 @@ def free_path(path: Path) -> Path:
         number += 1
         candidate = path.with_name(f"{path.stem}-{number}{path.suffix}")
     return candidate
+
+
+def metadata_of_bag(files: list[BagFile], topics: list[Topic]) -> dict:
+    """All of it, of the given files."""
+    return metadata_without_files(files, topics) | {
+        "relative_file_paths": [f.path.name for f in files],
+        "files": [metadata_of_file(f) for f in files],
+    }
+
+
+def metadata_of_file(file: BagFile) -> dict:
+    """What it says of one file."""
+    return {
+        "path": file.path.name,
+        "starting_time": {"nanoseconds_since_epoch": file.start},
+        "duration": {"nanoseconds": file.end - file.start},
+        "message_count": file.message_count,
+    }
+
+
+def metadata_without_files(files: list[BagFile], topics: list[Topic]) -> dict:
+    """All but its two lists of files."""
+    used = [f for f in files if f.message_count]
+    start = min((f.start for f in used), default=0)
+    end = max((f.end for f in used), default=0)
+    counts: Counter[str] = Counter()
+    for file in files:
+        counts.update(file.counts)
+    return {
+        "version": 9,
+        "storage_identifier": "mcap",
+        "duration": {"nanoseconds": end - start},
+        "starting_time": {"nanoseconds_since_epoch": start},
+        "message_count": counts.total(),
+        "topics_with_message_count": [
+            {
+                "topic_metadata": {
+                    "name": topic.name,
+                    "type": topic.type_name,
+                    "serialization_format": "cdr",
+                    "offered_qos_profiles": topic.qos,
+                    "type_description_hash": message_definitions.type_hash(topic.type_name),
+                },
+                "message_count": counts[topic.name],
+            }
+            for topic in topics
+        ],
+        # MCAP compresses its own chunks; these two keys are about compression around the file.
+        "compression_format": "",
+        "compression_mode": "",
+        "custom_data": None,
+        "ros_distro": "jazzy",
+    }

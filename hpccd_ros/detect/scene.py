@@ -11,9 +11,9 @@ import hpccd_core as hc
 from hpccd_ros.frames.types import MeshSettings, SceneFrame, Topology
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class SceneBuilder:
-    """Makes core scenes of the same meshes with changing topologies."""
+    """Makes core scenes of the same meshes with changing topologies; equal builders make equal scenes of them."""
 
     meshes: tuple[MeshSettings, ...]
     ignored_pairs: tuple[tuple[str, str], ...] = ()
@@ -40,13 +40,10 @@ class SceneBuilder:
             scene.set_features(a, b, features)
         return scene
 
-    def tested_pairs(self) -> list[tuple[str, str]]:
+    @cached_property
+    def tested_pairs(self) -> tuple[tuple[str, str], ...]:
         """Names of the meshes that are tested against each other, and of those within themselves twice; in the order of
         the scene."""
-        return list(self._tested_pairs)
-
-    @cached_property
-    def _tested_pairs(self) -> tuple[tuple[str, str], ...]:
         ignored: dict[str, set[str]] = defaultdict(set)
         for a, b in self.ignored_pairs:
             ignored[a].add(b)
@@ -75,12 +72,12 @@ class SceneBuilder:
     def of_other_pairs(self) -> "SceneBuilder | None":
         """Nothing is tested but the other pairs; None where there are none."""
         left = self._restricted(of_rigid=False)
-        return left if left._tested_pairs else None
+        return left if left.tested_pairs else None
 
     def _restricted(self, of_rigid: bool) -> "SceneBuilder":
         """Keep only the tested pairs in which a mesh moves by poses, or only those in which none does."""
         rigid = {mesh.name for mesh in self.meshes if mesh.rigid}
-        ignored = tuple((a, b) for a, b in self._tested_pairs if a != b and of_rigid != (a in rigid or b in rigid))
+        ignored = tuple((a, b) for a, b in self.tested_pairs if a != b and of_rigid != (a in rigid or b in rigid))
         meshes = tuple(
             replace(mesh, self_collision=mesh.self_collision and not (of_rigid or mesh.rigid)) for mesh in self.meshes
         )
@@ -104,16 +101,7 @@ class SceneBuilder:
     @property
     def pairs(self) -> list[tuple[str, str]]:
         """Different meshes that are tested against each other."""
-        return [(a, b) for a, b in self._tested_pairs if a != b]
-
-    def same_scene(self, other: "SceneBuilder") -> bool:
-        """Whether equal topologies make equal scenes."""
-        return (self.meshes, self.ignored_pairs, self.pair_accuracies, self.pair_features) == (
-            other.meshes,
-            other.ignored_pairs,
-            other.pair_accuracies,
-            other.pair_features,
-        )
+        return [(a, b) for a, b in self.tested_pairs if a != b]
 
     def parts(self, frame: SceneFrame, static_of: SceneFrame) -> list[np.ndarray]:
         """Positions of each mesh; those of static meshes from ``static_of``."""

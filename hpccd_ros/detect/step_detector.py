@@ -56,7 +56,6 @@ class StepDetector:
         self.options = options
         self._builder = builder
         self._names = tuple(mesh.name for mesh in builder.meshes)
-        self._tested_pairs = tuple(builder.tested_pairs())
         self._scene: hc.Scene | None = None
         self._scene_of: SceneFrame | None = None
         self._layout: Layout | None = None
@@ -163,5 +162,5 @@ class StepDetector:
             dict(profile),
             dict(stats),
             bounds=bounds,
-            tested_pairs=self._tested_pairs,
+            tested_pairs=self._builder.tested_pairs,
         )

@@ -25,11 +25,7 @@ _MALLOC = (
 )
 
 # Any of these says that the user has chosen a transport or a profile: ours would override it.
-_DDS_CHOICES = (
-    "FASTRTPS_DEFAULT_PROFILES_FILE",
-    "FASTDDS_DEFAULT_PROFILES_FILE",
-    "FASTDDS_BUILTIN_TRANSPORTS",
-)
+_DDS_CHOICES = ("FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE", "FASTDDS_BUILTIN_TRANSPORTS")
 # Makes ROS leave to the profile how queues keep their memory, and with it how messages are sent: what a user says of
 # either wins.
 _QUEUES_OF_PROFILE = "RMW_FASTRTPS_USE_QOS_FROM_XML"

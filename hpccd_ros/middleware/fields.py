@@ -14,12 +14,7 @@ from builtin_interfaces.msg import Time
 from hpccd_ros.frames.drops import Aspect, Input, Reason, Refusal
 
 _NS = 1_000_000_000
-_CODES = {
-    np.dtype(np.float32): "f",
-    np.dtype(np.float64): "d",
-    np.dtype(np.uint32): "I",
-    np.dtype(np.uint8): "B",
-}
+_CODES = {np.dtype(np.float32): "f", np.dtype(np.float64): "d", np.dtype(np.uint32): "I", np.dtype(np.uint8): "B"}
 
 
 class InvalidMessageError(ValueError):

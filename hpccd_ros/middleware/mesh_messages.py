@@ -72,8 +72,7 @@ def vertices_from_cloud(cloud: PointCloud2, max_vertices: int) -> np.ndarray:
     """
     if cloud.is_bigendian:
         raise InvalidMessageError(
-            Reason.BIG_ENDIAN,
-            "big-endian clouds are not supported; swap the bytes and set is_bigendian to false",
+            Reason.BIG_ENDIAN, "big-endian clouds are not supported; swap the bytes and set is_bigendian to false"
         )
     offsets, types = zip(*(_cloud_field(cloud, axis) for axis in "xyz"), strict=True)
     count = cloud.width * cloud.height
@@ -123,8 +122,7 @@ def _cloud_field(cloud: PointCloud2, axis: str) -> tuple[int, np.dtype]:
     field = next((f for f in cloud.fields if f.name == axis), None)
     if field is None:
         raise InvalidMessageError(
-            Reason.MALFORMED,
-            f"no field {axis!r}; the cloud has {listed(f.name for f in cloud.fields) or 'none'}",
+            Reason.MALFORMED, f"no field {axis!r}; the cloud has {listed(f.name for f in cloud.fields) or 'none'}"
         )
     if field.datatype not in _FIELD_TYPES or field.count > 1:
         raise InvalidMessageError(

@@ -22,10 +22,7 @@ from hpccd_ros.middleware import topic_names
 PREFIX = "qos_overrides."
 # A history of more would hold more messages than a node has memory for.
 DEEPEST = 100_000
-_CHOICES = {
-    "history": ("keep_last", "keep_all"),
-    "reliability": ("reliable", "best_effort"),
-}
+_CHOICES = {"history": ("keep_last", "keep_all"), "reliability": ("reliable", "best_effort")}
 _POLICIES = {"history": QoSPolicyKind.HISTORY, "depth": QoSPolicyKind.DEPTH, "reliability": QoSPolicyKind.RELIABILITY}
 
 

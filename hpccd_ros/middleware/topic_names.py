@@ -83,10 +83,7 @@ def subscribed(meshes: Iterable[str], of_robots: Iterable[str] = ()) -> list[str
 
 def unusable_name(node: Node, subscribed: Iterable[str]) -> str | None:
     """Why a topic or service of the node cannot exist under its name here (namespace, remapping), or None."""
-    for resolve, names in (
-        (node.resolve_topic_name, (*PUBLISHED, *subscribed)),
-        (node.resolve_service_name, SERVICES),
-    ):
+    for resolve, names in ((node.resolve_topic_name, (*PUBLISHED, *subscribed)), (node.resolve_service_name, SERVICES)):
         for name in names:
             try:
                 resolve(name)

@@ -13,7 +13,7 @@ from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
 
 from hpccd_ros.middleware import qos_overrides
-from hpccd_ros.middleware.guard import Errors
+from hpccd_ros.middleware.executors import Errors
 
 Transition = Callable[[LifecycleState], TransitionCallbackReturn]
 

@@ -51,14 +51,7 @@ def contact_markers(
         )
     ]
     normal = _marker(
-        2,
-        "normals",
-        Marker.LINE_LIST,
-        stamp,
-        frame_id,
-        0.2 * size,
-        ColorRGBA(r=0.3, g=0.3, b=0.3, a=1.0),
-        lines,
+        2, "normals", Marker.LINE_LIST, stamp, frame_id, 0.2 * size, ColorRGBA(r=0.3, g=0.3, b=0.3, a=1.0), lines
     )
     gaps = (closest[chosen] if len(closest) else closest).reshape(-1, 3)
     near = _marker(3, "near", Marker.LINE_LIST, stamp, frame_id, 0.2 * size, _NEAR, gaps)

@@ -17,7 +17,7 @@ from hpccd_ros.frames.drops import Aspect, Input, Reason, Refusal
 from hpccd_ros.frames.pipeline import FramePipeline
 from hpccd_ros.frames.taken_inputs import NEW_PUBLISHER, SEVERAL_PUBLISHERS
 from hpccd_ros.frames.welding import Welding
-from hpccd_ros.middleware import mesh_inputs, qos, topic_names, unreadable
+from hpccd_ros.middleware import executors, mesh_inputs, qos, topic_names
 from hpccd_ros.middleware.fields import InvalidMessageError
 from hpccd_ros.node.accounts import Accounts
 from hpccd_ros.node.input_subscription import InputSubscription, hand_over
@@ -139,7 +139,7 @@ class MeshTopic:
 class TopologySubscription(MeshTopic):
     def __init__(self, reception: Reception) -> None:
         super().__init__(reception, topic_names.TOPOLOGY)
-        unreadable.watch(self.subscribe(self.receive, qos.TOPOLOGY_INPUT), self.refuse_unreadable)
+        executors.watch_unreadable(self.subscribe(self.receive, qos.TOPOLOGY_INPUT), self.refuse_unreadable)
 
     def receive(self, message: MeshTopology, info: dict[str, Any]) -> None:
         of = self.reception
@@ -169,7 +169,7 @@ class PositionsSubscription(MeshTopic):
         self._unreadable = 0  # messages counted as such since the last that was read
         settings = reception.settings
         profile = qos.vertices(settings["input_reliability"], settings["input_depth"])
-        unreadable.watch(self.subscribe(self.receive, profile), self._on_unreadable)
+        executors.watch_unreadable(self.subscribe(self.receive, profile), self._on_unreadable)
 
     def receive(self, message: Any, info: dict[str, Any]) -> None:
         received, of = time.monotonic(), self.reception

@@ -17,7 +17,7 @@ from hpccd_ros.base.clocks import Clocks
 from hpccd_ros.frames.arrivals import InterleavedSequences, RateLimit
 from hpccd_ros.frames.drops import Input, Reason, Refusal
 from hpccd_ros.frames.pipeline import FramePipeline
-from hpccd_ros.middleware import joint_messages, qos, transform_topics, unreadable
+from hpccd_ros.middleware import executors, joint_messages, qos, transform_topics
 from hpccd_ros.middleware.message_types import message_class
 from hpccd_ros.middleware.transform_topics import TransformTopic
 from hpccd_ros.node.accounts import Accounts
@@ -117,7 +117,7 @@ class JointSubscriptions:
             return subscription.subscription.get_publisher_count() > 1
 
         refusal = Refusal(topic, Reason.MALFORMED, f"{topic}: {UNREADABLE}", what=Input.JOINT_STATE)
-        unreadable.watch(subscription.subscription, lambda: self._refuse([refusal]))
+        executors.watch_unreadable(subscription.subscription, lambda: self._refuse([refusal]))
         return subscription
 
     def _refuse(self, refusals: list[Refusal]) -> None:
@@ -204,7 +204,7 @@ class TransformSubscriptions:
         subscription = InputSubscription(
             self._node, message, topic.name, receive, profile, counts=counts, events={"matched": matched}
         )
-        unreadable.watch(subscription.subscription, on_unreadable)
+        executors.watch_unreadable(subscription.subscription, on_unreadable)
         return subscription
 
     def _unread(self, refusal: Refusal, topic: TransformTopic) -> None:

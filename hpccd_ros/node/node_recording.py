@@ -17,7 +17,7 @@ from rclpy.qos import ReliabilityPolicy
 
 from hpccd_ros.bag import writer
 from hpccd_ros.bag.writer import BagWriter
-from hpccd_ros.middleware.guard import Errors, GuardedExecutor
+from hpccd_ros.middleware.executors import Errors, GuardedExecutor
 from hpccd_ros.params import node_parameters
 from hpccd_ros.record import attachments, recorded_topics
 from hpccd_ros.record.recorded_topics import missing_shapes, recording_info

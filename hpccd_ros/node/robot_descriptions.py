@@ -8,7 +8,7 @@ from typing import Any
 from std_msgs.msg import String
 
 from hpccd_ros.base.quoting import shortened
-from hpccd_ros.middleware import qos, robot_files, unreadable
+from hpccd_ros.middleware import executors, qos, robot_files
 from hpccd_ros.node.input_subscription import InputSubscription, unheard
 from hpccd_ros.node.life_cycle import GuardedLifecycleNode
 from hpccd_ros.params import robot_parameters
@@ -110,7 +110,7 @@ class RobotDescriptions:
         subscription = self._subscriptions[name] = InputSubscription(
             self._node, String, topic, lambda message: self._receive(name, message.data), qos.DESCRIPTION
         )
-        unreadable.watch(subscription.subscription, lambda: self._refuse(name, "it cannot be deserialised"))
+        executors.watch_unreadable(subscription.subscription, lambda: self._refuse(name, "it cannot be deserialised"))
         self._node.when_unconfigured(subscription.close)
 
     def _receive(self, name: str, text: str) -> None:

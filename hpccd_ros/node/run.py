@@ -10,9 +10,7 @@ from rclpy.lifecycle import TransitionCallbackReturn
 from rclpy.task import Future
 
 from hpccd_ros.middleware import environment, ros_start, stop_signals
-from hpccd_ros.middleware.guard import GuardedExecutor
-from hpccd_ros.middleware.lean_executor import LeanExecutor
-from hpccd_ros.middleware.unreadable import UnreadableExecutor
+from hpccd_ros.middleware.executors import GuardedExecutor, LeanExecutor, UnreadableExecutor
 from hpccd_ros.node.node import HpccdNode
 from hpccd_ros.params.values import ParameterError
 

@@ -96,11 +96,7 @@ class Reporter:
         for stage, text in percentiles(data["transport_ms"]).items():
             values[f"transport_ms.{stage}"] = text
         values["last_refusal"] = accounts.log.last
-        self._received, self._dropped, self._topologies_refused = (
-            data["received"],
-            dropped,
-            topologies_refused,
-        )
+        self._received, self._dropped, self._topologies_refused = (data["received"], dropped, topologies_refused)
         notes = list(warnings)
         if new:
             notes.insert(0, f"{new} frames dropped")

@@ -92,12 +92,7 @@ class StopWatch:
     any thread `refused`.
     """
 
-    def __init__(
-        self,
-        node: GuardedLifecycleNode,
-        configuration: Configuration,
-        busy: Callable[[], bool],
-    ) -> None:
+    def __init__(self, node: GuardedLifecycleNode, configuration: Configuration, busy: Callable[[], bool]) -> None:
         settings = configuration.settings
         self._node = node
         self._configuration = configuration

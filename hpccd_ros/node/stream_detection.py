@@ -13,8 +13,8 @@ from hpccd_ros.detect.step_detector import Detection, StepDetector
 from hpccd_ros.detect.thread import DetectionThread
 from hpccd_ros.frames import taken_inputs
 from hpccd_ros.frames.drops import Reason
-from hpccd_ros.frames.mesh_file import mesh_of_file
 from hpccd_ros.frames.pipeline import FramePipeline
+from hpccd_ros.frames.rigid_mesh import mesh_of_file
 from hpccd_ros.frames.types import Outcome, SceneFrame, Topology
 from hpccd_ros.middleware import resources
 from hpccd_ros.node import configuration
@@ -83,10 +83,7 @@ class StreamDetection:
         most_waiting = settings["pending_frames"]
         by_joints = robot_parameters.followers(settings, robots, most_waiting)
         meshes = self._configuration.meshes
-        return (
-            scene_parameters.frame_pipeline(settings, meshes, most_waiting, robots, by_joints.values()),
-            by_joints,
-        )
+        return (scene_parameters.frame_pipeline(settings, meshes, most_waiting, robots, by_joints.values()), by_joints)
 
     def _start(self) -> None:
         stop = self._stop

@@ -313,23 +313,8 @@ OUTPUT_ROWS = (
         "For viewers: publish contact points and normals on markers, and the vertices on surface",
         change=ALWAYS,
     ),
-    Row(
-        "markers_max",
-        "int",
-        2000,
-        "Most contacts drawn; evenly thinned out",
-        span=(1, 1_000_000),
-        change=ALWAYS,
-    ),
-    Row(
-        "markers_rate",
-        "float",
-        10.0,
-        "Most marker messages a second",
-        unit="Hz",
-        span=(0.001, 1000.0),
-        change=ALWAYS,
-    ),
+    Row("markers_max", "int", 2000, "Most contacts drawn; evenly thinned out", span=(1, 1_000_000), change=ALWAYS),
+    Row("markers_rate", "float", 10.0, "Most marker messages a second", unit="Hz", span=(0.001, 1000.0), change=ALWAYS),
     Row(
         "markers_size",
         "float",
@@ -351,12 +336,7 @@ RECORDING_ROWS = (
         change=ALWAYS,
     ),
     Row(
-        "record_compression",
-        "string",
-        "none",
-        "Of the next recording",
-        choices=("none", "lz4", "zstd"),
-        change=ALWAYS,
+        "record_compression", "string", "none", "Of the next recording", choices=("none", "lz4", "zstd"), change=ALWAYS
     ),
     Row(
         "record_split_size",

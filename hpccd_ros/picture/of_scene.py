@@ -43,9 +43,7 @@ def save(
         axes.imshow(image)
         axes.set_axis_off()
         axes.set_title(
-            f"{scene.name}, frame {index}: {sum(map(len, scene.faces(index))):,} triangles",
-            color=INK,
-            fontsize=10,
+            f"{scene.name}, frame {index}: {sum(map(len, scene.faces(index))):,} triangles", color=INK, fontsize=10
         )
     figure.tight_layout()
     figure.savefig(Path(path), facecolor=BACKGROUND)

@@ -158,7 +158,7 @@ def _missing(mesh: str, parameters: dict, came: Callable[[str], bool]) -> list[s
         once, needed_by = [topology, *positions], [topic_names.CONTACTS]
     elif given_as == TF:
         once, needed_by = [topology, *positions], list(transform_topics.ALL)
-    elif given_as == POSE:
+    elif given_as == topic_names.POSE:
         poses, *shape = positions
         once, needed_by = [topology, *shape], [poses]
     else:

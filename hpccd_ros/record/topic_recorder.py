@@ -99,12 +99,7 @@ class DescribedRobots:
     the recorded node. resolve: relative -> absolute topic name. warn: takes what could not be read."""
 
     def __init__(
-        self,
-        node: Node,
-        bag: BagWriter,
-        parameters: dict,
-        resolve: Callable[[str], str],
-        warn: Callable[[str], object],
+        self, node: Node, bag: BagWriter, parameters: dict, resolve: Callable[[str], str], warn: Callable[[str], object]
     ) -> None:
         self._bag = bag
         self._warn = warn

@@ -12,7 +12,7 @@ from hpccd_ros.base.errors import UserError
 from hpccd_ros.base.quoting import printable
 from hpccd_ros.detect.core import Options
 from hpccd_ros.detect.scene import SceneBuilder
-from hpccd_ros.frames.mesh_file import mesh_of_file
+from hpccd_ros.frames.rigid_mesh import mesh_of_file
 from hpccd_ros.frames.types import MeshFrame, Topology
 from hpccd_ros.middleware import resources, topic_names, transform_topics
 from hpccd_ros.params import pair_parameters, robot_parameters, scene_parameters, values

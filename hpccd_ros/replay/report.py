@@ -22,7 +22,7 @@ from hpccd_ros.replay.recomputed import Replay, ReplayedStep
 # Behind a reason for which messages were not used.
 _HINTS = {
     Reason.NO_SHAPE: "; the recording has no shape of it on meshes/{mesh}/vertices: begin it before the shape is sent, "
-    "or give the node mesh.{mesh}.file",
+    "or give the node mesh.{mesh}.file"
 }
 COLUMNS = (
     "number",

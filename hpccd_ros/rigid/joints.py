@@ -95,12 +95,7 @@ class Joint:
     def numbers(self) -> tuple[float, ...]:
         """As the core takes them: the last is not below the distance of its origin from that of its parent."""
         origin = self.origin
-        return (
-            *origin.quaternion.tolist(),
-            *origin.shift.tolist(),
-            *self.axis.tolist(),
-            rounding.length(origin.shift),
-        )
+        return (*origin.quaternion.tolist(), *origin.shift.tolist(), *self.axis.tolist(), rounding.length(origin.shift))
 
 
 class Chain:

@@ -141,11 +141,9 @@ def _link(name: str, shapes: tuple) -> str:
     lines = [f'  <link name="{name}">']
     for use in ("visual", "collision"):
         for kind, sizes, z, *y in shapes:
-            size = {
-                "box": 'size="{} {} {}"',
-                "cylinder": 'radius="{}" length="{}"',
-                "sphere": 'radius="{}"',
-            }[kind].format(*sizes)
+            size = {"box": 'size="{} {} {}"', "cylinder": 'radius="{}" length="{}"', "sphere": 'radius="{}"'}[
+                kind
+            ].format(*sizes)
             origin = f'<origin xyz="0 {y[0] if y else 0} {z}" rpy="0 0 0"/>'
             lines.append(f"    <{use}>{origin}<geometry><{kind} {size}/></geometry></{use}>")
     return "\n".join([*lines, "  </link>"])

@@ -156,7 +156,4 @@ class JointFrames:
     def _refused(self, reason: Reason, text: str, aspect: Aspect) -> list[Refusal]:
         """The text once: it is of the robot, not of a link."""
         first, *others = self.names
-        return [
-            Refusal(first, reason, text, aspect=aspect),
-            *(Refusal(name, reason, aspect=aspect) for name in others),
-        ]
+        return [Refusal(first, reason, text, aspect=aspect), *(Refusal(name, reason, aspect=aspect) for name in others)]

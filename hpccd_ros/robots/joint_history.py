@@ -119,8 +119,7 @@ class JointHistory:
         if early:
             first = max(self._joints[name].stamps[0] for name in early)
             raise NoJointStateError(
-                f"the first position kept of {listed(early)} is of {first} ns, after the stamp {stamp} ns",
-                final=True,
+                f"the first position kept of {listed(early)} is of {first} ns, after the stamp {stamp} ns", final=True
             )
         late = [name for name, values in self._joints.items() if stamp > values.stamps[-1]]
         if late:

@@ -86,46 +86,20 @@ _REGISTRY = {
         61,
         lambda name, title, size, frames, seed, progress: small.folding_strip(name, title, size, frames),
     ),
-    "cloth-drop": _Entry(
-        "a small cloth falls on a ball that then spins, 7 K triangles",
-        90,
-        _cloth_drop,
-    ),
+    "cloth-drop": _Entry("a small cloth falls on a ball that then spins, 7 K triangles", 90, _cloth_drop),
     "arm-and-cloth": _Entry(
-        "an arm takes a cloth between two fingers and drags it across a table, 8 K triangles",
-        361,
-        _arm_and_cloth,
+        "an arm takes a cloth between two fingers and drags it across a table, 8 K triangles", 361, _arm_and_cloth
     ),
-    "cloth-ball-like": _Entry(
-        "a cloth drapes on a ball that then spins, 92 K triangles",
-        94,
-        _cloth_ball,
-    ),
+    "cloth-ball-like": _Entry("a cloth drapes on a ball that then spins, 92 K triangles", 94, _cloth_ball),
     "breaking-like": _Entry(
-        "a boulder shatters a hollow statue: 252 K triangles, changing topology",
-        60,
-        breaking.make,
+        "a boulder shatters a hollow statue: 252 K triangles, changing topology", 60, breaking.make
     ),
-    "n-body-like-lr": _Entry(
-        "60 rigid and deforming bodies fall into a pile, 32 K triangles",
-        76,
-        _n_body(32_000),
-    ),
-    "n-body-like-hr": _Entry(
-        "60 rigid and deforming bodies fall into a pile, 146 K triangles",
-        76,
-        _n_body(146_000),
-    ),
+    "n-body-like-lr": _Entry("60 rigid and deforming bodies fall into a pile, 32 K triangles", 76, _n_body(32_000)),
+    "n-body-like-hr": _Entry("60 rigid and deforming bodies fall into a pile, 146 K triangles", 76, _n_body(146_000)),
     "rod-twist-like": _Entry(
-        "a bundle of rods is twisted until it coils up: layers close together, 106 K triangles",
-        260,
-        _rod_twist,
+        "a bundle of rods is twisted until it coils up: layers close together, 106 K triangles", 260, _rod_twist
     ),
-    "armadillo-like": _Entry(
-        "a knobbly body with limbs is drawn between two rollers, 70 K triangles",
-        260,
-        _armadillo,
-    ),
+    "armadillo-like": _Entry("a knobbly body with limbs is drawn between two rollers, 70 K triangles", 260, _armadillo),
     "cloth-ball-resolved": _Entry(
         "a cloth winds round a spinning ball and never touches: what a solver made, 35 K triangles",
         220,

@@ -135,11 +135,7 @@ class Statue:
         corners, parts = np.concatenate([outer, inner, walls]), np.concatenate([part, part, wall_part])
         key = (parts[:, None] + 1) * len(self.points) + corners
         unique, faces = np.unique(key, return_inverse=True)
-        return (
-            faces.reshape(-1, 3).astype(np.uint32),
-            unique % len(self.points),
-            unique // len(self.points) - 1,
-        )
+        return (faces.reshape(-1, 3).astype(np.uint32), unique % len(self.points), unique // len(self.points) - 1)
 
 
 def _walls(faces, part, surface):

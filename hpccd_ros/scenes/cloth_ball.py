@@ -29,10 +29,7 @@ def make(
     @lru_cache(maxsize=1)
     def grids():
         return cache.cached(
-            name,
-            (setup, frames, seed),
-            [cloth],
-            lambda: {"grids": cloth.simulate(setup, frames, seed, show_progress)},
+            name, (setup, frames, seed), [cloth], lambda: {"grids": cloth.simulate(setup, frames, seed, show_progress)}
         )["grids"]
 
     ball, ball_faces = shapes.icosphere(max(2, round((ball_triangles * size / 20) ** 0.5)))

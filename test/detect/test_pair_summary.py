@@ -35,8 +35,8 @@ def detection(builder, **options):
 def test_the_pairs_that_are_tested_are_those_of_the_core(ignored):
     builder = SceneBuilder(MESHES, ignored)
     gaps = detection(builder, distances=True).gaps
-    assert [{a, b} for a, b in builder.tested_pairs()] == [{gap.mesh_a, gap.mesh_b} for gap in gaps]
-    order = [NAMES.index(a) * len(NAMES) + NAMES.index(b) for a, b in builder.tested_pairs()]
+    assert [{a, b} for a, b in builder.tested_pairs] == [{gap.mesh_a, gap.mesh_b} for gap in gaps]
+    order = [NAMES.index(a) * len(NAMES) + NAMES.index(b) for a, b in builder.tested_pairs]
     assert order == sorted(order)
 
 

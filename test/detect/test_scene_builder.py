@@ -40,7 +40,7 @@ def test_the_tested_pairs_are_those_of_rigid_meshes_and_the_others(seed):
         if rng.random() < 0.3
     )
     builder = SceneBuilder(meshes, ignored)
-    pairs = builder.tested_pairs()
+    pairs = builder.tested_pairs
     assert pairs == sorted(pairs) and set(pairs) == pairs_by_definition(builder)
     rigid = {mesh.name for mesh in meshes if mesh.rigid}
     others = {pair for pair in pairs if not rigid & set(pair)}

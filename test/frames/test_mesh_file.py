@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from hpccd_core import MeshFileError
-from hpccd_ros.frames.mesh_file import place
+from hpccd_ros.frames.rigid_mesh import place
 
 VERTICES = np.array([[2, 0, 0], [0, 1, 0], [1, 5, 0.125], [7, 7, 7], [2, 0, 0], [-0.0, 0, 3]], np.float64)
 

@@ -16,8 +16,8 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.task import Future
 from std_msgs.msg import Header
 
-from hpccd_ros.middleware import environment, lean_executor
-from hpccd_ros.middleware.lean_executor import LeanExecutor
+from hpccd_ros.middleware import environment, executors
+from hpccd_ros.middleware.executors import LeanExecutor
 
 PATIENCE = 60.0
 
@@ -184,7 +184,7 @@ def test_incompatible_qos_is_told(spinning, capfd, talk):
         node.create_timer(0.004, lambda: None, clock=steady)
     best_effort = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
     node.create_subscription(Header, "odd", lambda message: None, 10)
-    time.sleep(2 * lean_executor.LOOK_EVERY)
+    time.sleep(2 * executors.LOOK_EVERY)
     node.create_publisher(Header, "odd", best_effort)
     told, deadline = "", time.monotonic() + PATIENCE
     while not ("offering incompatible QoS" in told and "requesting incompatible QoS" in told):

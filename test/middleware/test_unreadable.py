@@ -11,7 +11,7 @@ from rclpy.duration import Duration
 from std_msgs.msg import Header
 
 from hpccd_ros.middleware import environment
-from hpccd_ros.middleware.unreadable import UnreadableExecutor, watch
+from hpccd_ros.middleware.executors import UnreadableExecutor, watch_unreadable
 
 PATIENCE = 60.0
 UNREADABLE = b"\0\1\0\0" + b"\xff" * 50
@@ -52,7 +52,7 @@ def _spin(executor, until):
 def test_what_cannot_be_deserialised(spinning):
     executor, node = spinning
     told = []
-    watch(node.create_subscription(Header, "first", lambda message: None, 10), lambda: told.append("first"))
+    watch_unreadable(node.create_subscription(Header, "first", lambda message: None, 10), lambda: told.append("first"))
     _send(node, "first", UNREADABLE)
     _spin(executor, lambda: told)
 
@@ -68,7 +68,7 @@ def test_a_subscription_that_ends_while_a_message_waits_had_none(spinning):
 
     node.create_subscription(Header, "first", end_the_other, 10)
     second = node.create_subscription(Header, "second", heard.append, 10)
-    watch(second, lambda: told.append("second"))
+    watch_unreadable(second, lambda: told.append("second"))
     for topic in ("second", "first"):
         _send(node, topic, Header())
     _spin(executor, lambda: heard)

@@ -18,7 +18,7 @@ from std_msgs.msg import UInt32
 from waving_sheet import sheet_faces, sheet_positions
 
 from hpccd_ros.middleware import environment
-from hpccd_ros.middleware.guard import MOST_IN_A_ROW, Errors, GuardedExecutor
+from hpccd_ros.middleware.executors import MOST_IN_A_ROW, Errors, GuardedExecutor
 
 N = 8
 

@@ -22,7 +22,7 @@ import hpccd_core as hc
 from hpccd_ros.detect.core import Options
 from hpccd_ros.detect.scene import SceneBuilder
 from hpccd_ros.middleware import fields
-from hpccd_ros.middleware.guard import Errors
+from hpccd_ros.middleware.executors import Errors
 from hpccd_ros.node.accounts import Accounts
 from hpccd_ros.node.detect_jobs import DetectJobs
 from hpccd_ros.node.detect_request import NodeScene

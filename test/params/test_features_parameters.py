@@ -25,7 +25,7 @@ def test_what_the_core_is_told():
     builder = scene_parameters.scene_builder(settings, meshes)
     assert builder.pair_features == (("robot", "cloth", ("vertex_face",)), ("cloth", "cloth", FEATURES))
     assert builder.among(["cloth"]).pair_features == (("cloth", "cloth", FEATURES),)
-    assert not builder.same_scene(scene_parameters.scene_builder(*checked()))
+    assert builder != scene_parameters.scene_builder(*checked())
     turned = scene_parameters.detector_options(checked(features=["edge_edge", "vertex_face"])[0])
     assert turned.features == FEATURES
 

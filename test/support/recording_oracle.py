@@ -17,7 +17,7 @@ from rosbags.serde import SerdeError
 
 import hpccd_core as hc
 from hpccd_core import load_mesh
-from hpccd_ros.frames.mesh_file import place
+from hpccd_ros.frames.rigid_mesh import place
 from hpccd_ros.frames.transform_buffer import NoTransformError, TransformBuffer
 from hpccd_ros.rigid.transform import Rigid
 
