@@ -14,7 +14,7 @@ from operator import is_not
 import numpy as np
 
 import hpccd_core as hc
-from hpccd_ros.detect.separation import Separation
+from hpccd_ros.detect.separation import MotionBounds, Separation
 from hpccd_ros.frames.types import SceneFrame
 from hpccd_ros.rigid import cuts
 from hpccd_ros.rigid.merged import earliest, merged
@@ -35,18 +35,6 @@ class RigidOptions:
     tolerance: float = 1e-3
     most_parts: int = 64
     parts: int = 0
-
-
-@dataclass(frozen=True)
-class MotionBounds:
-    """``parts``: into how many the step was cut. ``of_meshes``: how far each mesh may have been from its motion."""
-
-    parts: int = 0
-    of_meshes: tuple[float, ...] = ()
-
-
-#: No mesh moves by poses.
-NO_BOUNDS = MotionBounds()
 
 
 def motions(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How far apart the meshes of a scene are to stay. No ROS."""
+"""How far apart the meshes of a scene are to stay, and how far each may be from its motion. No ROS."""
 
 import math
 from collections.abc import Collection
@@ -57,6 +57,18 @@ def _number(distance: float) -> str:
 
 #: Contacts touch.
 NONE = Separation()
+
+
+@dataclass(frozen=True)
+class MotionBounds:
+    """``parts``: into how many the step was cut. ``of_meshes``: how far each mesh may have been from its motion."""
+
+    parts: int = 0
+    of_meshes: tuple[float, ...] = ()
+
+
+#: No mesh moves by poses.
+NO_BOUNDS = MotionBounds()
 
 
 def change_separation(detector: hc.Detector, names: tuple[str, ...], old: Separation, new: Separation) -> None:

@@ -8,9 +8,9 @@ from dataclasses import dataclass, field, replace
 import hpccd_core as hc
 from hpccd_ros.detect.core import Cancellation, Options, make_detector
 from hpccd_ros.detect.layout import Layout
-from hpccd_ros.detect.rigid_step import NO_BOUNDS, MotionBounds, RigidStep, motions
+from hpccd_ros.detect.rigid_step import RigidStep, motions
 from hpccd_ros.detect.scene import SceneBuilder
-from hpccd_ros.detect.separation import change_separation, count_near
+from hpccd_ros.detect.separation import NO_BOUNDS, MotionBounds, change_separation, count_near
 from hpccd_ros.frames.types import SceneFrame
 
 

@@ -9,8 +9,7 @@ import numpy as np
 from hpccd.msg import ContactArray
 
 from hpccd_core.options import FEATURES, REPORTS
-from hpccd_ros.detect.rigid_step import MotionBounds
-from hpccd_ros.detect.separation import Separation
+from hpccd_ros.detect.separation import MotionBounds, Separation
 from hpccd_ros.frames.taken_inputs import TakenInput
 
 

@@ -5,7 +5,7 @@ import numpy as np
 
 from hpccd_core.options import ACCURACIES
 from hpccd_ros.detect.layout import Layout
-from hpccd_ros.detect.rigid_step import NO_BOUNDS, MotionBounds
+from hpccd_ros.detect.separation import NO_BOUNDS, MotionBounds
 from hpccd_ros.middleware import contact_messages
 from hpccd_ros.middleware.answer_fields import read_bounds, read_separation
 

@@ -10,8 +10,7 @@ from hpccd_ros.bag.decode import make_decoder
 from hpccd_ros.bag.reader import Recording, RecordingError
 from hpccd_ros.detect.core import CORE_ERRORS
 from hpccd_ros.detect.layout import Layout
-from hpccd_ros.detect.rigid_step import NO_BOUNDS, MotionBounds
-from hpccd_ros.detect.separation import NONE, Separation
+from hpccd_ros.detect.separation import NO_BOUNDS, NONE, MotionBounds, Separation
 from hpccd_ros.detect.step_detector import StepDetector
 from hpccd_ros.frames import taken_inputs
 from hpccd_ros.frames.samples import HISTORY_NS

@@ -41,7 +41,7 @@ def test_the_tested_pairs_are_those_of_rigid_meshes_and_the_others(seed):
     )
     builder = SceneBuilder(meshes, ignored)
     pairs = builder.tested_pairs
-    assert pairs == sorted(pairs) and set(pairs) == pairs_by_definition(builder)
+    assert list(pairs) == sorted(pairs) and set(pairs) == pairs_by_definition(builder)
     rigid = {mesh.name for mesh in meshes if mesh.rigid}
     others = {pair for pair in pairs if not rigid & set(pair)}
     left = builder.of_other_pairs()
@@ -74,7 +74,9 @@ def test_names_are_looked_at_a_few_times_a_pair_however_many_there_are(work):
         builder = SceneBuilder((MeshSettings(CountedName("cloth")), *meshes), ignored)
         arguments = {"build": [(FACE,) * (links + 1)], "among": [[mesh.name for mesh in builder.meshes]]}
         CountedName.looked_at = 0
-        getattr(builder, work)(*arguments.get(work, []))
+        found = getattr(builder, work)
+        if callable(found):
+            found(*arguments.get(work, []))
         return CountedName.looked_at / len(ignored)
 
     assert cost(80) < 1.2 * cost(20) and cost(80) < 15
