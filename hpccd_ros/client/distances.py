@@ -25,7 +25,7 @@ class DistanceArrays:
     points: (P, 2, 3) float64, the nearest points of both sides, in the unit of the scene.
     direction: (P, 3) float64, unit vector from the nearest point of mesh_a to that of mesh_b; 0 where it is not known.
     approach_speed: (P,) float64, by how much the distance became smaller in a second, on the mean of the time since the
-    snapshot before; > 0: nearing; NaN where it is not known. Recordings from before the message had both tell neither.
+    snapshot before; > 0: nearing; NaN where it is not known.
     All that the message has are views of it, which they keep alive.
     """
 

@@ -22,7 +22,7 @@ def difference(
     """
     total = len(contacts.vf) + len(contacts.ee)
     then, now = list(recorded.topology_versions), list(layout.topology_versions)
-    if then and then != now:  # recordings from before there were any hold none
+    if then != now:
         return f"topology versions {then} were recorded, now they are {now}"
     if problem := _malformed(recorded, layout):
         return f"the recorded answer is malformed: {problem}"

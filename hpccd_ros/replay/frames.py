@@ -3,7 +3,7 @@
 
 from collections import OrderedDict, deque
 
-from hpccd_ros.bag.decode import make_completer, make_decoder
+from hpccd_ros.bag.decode import checked_type, make_decoder
 from hpccd_ros.base.quoting import quoted
 from hpccd_ros.frames import taken_inputs
 from hpccd_ros.frames.arrivals import SequenceWatch
@@ -36,7 +36,7 @@ class FrameSource:
         self._patience = 1 if ordered else 4
         self.refused = {what: RefusalCounter() for what in Input}
         self._decoders = {
-            name: make_completer(topics[name]) if kind in topic_names.WHOLE else make_decoder(topics[name])
+            name: _checked_bytes(topics[name]) if kind in topic_names.WHOLE else make_decoder(topics[name])
             for name, (_, kind) in setup.roles.items()
             if name in topics
         }
@@ -174,3 +174,9 @@ class FrameWindow:
 
     def get(self, stamp: int) -> SceneFrame | None:
         return self._frames.get(stamp)
+
+
+def _checked_bytes(topic):
+    """Function (RecordedMessage -> its CDR) for a topic whose CDR is read without ROS."""
+    checked_type(topic)
+    return lambda message: message.data

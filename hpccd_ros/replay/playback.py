@@ -15,7 +15,6 @@ import yaml
 from rclpy.exceptions import NameValidationException
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
-from hpccd_ros.bag.decode import completion
 from hpccd_ros.bag.reader import RecordedTopic, Recording, RecordingError
 from hpccd_ros.base.errors import UserError
 from hpccd_ros.base.quoting import listed
@@ -47,11 +46,10 @@ def main(args) -> int:
         node = rclpy.create_node("hpccd_replay", start_parameter_services=False)
         try:
             publishers = {topic.name: _publisher(node, topic) for topic in topics}
-            complete = {topic.name: completion(topic) or bytes for topic in topics}
             lacking = _await_subscribers(publishers, args, stop)
             if lacking and not stop:
                 raise UserError(_too_few(lacking, args.subscribers))
-            count = _play(recording, publishers, complete, args, stop)
+            count = _play(recording, publishers, args, stop)
             await_acknowledged(publishers.values(), LAST)
         finally:
             node.destroy_node()
@@ -133,7 +131,7 @@ def _tell(text: str) -> None:
     print(text, file=sys.stderr, flush=True)
 
 
-def _play(recording, publishers, complete, args, stop) -> int:
+def _play(recording, publishers, args, stop) -> int:
     count, first, last_frame = 0, None, None
     pace = Pace(1.0 if args.rate is None else args.rate, stop)
     latched, begun = {}, set()
@@ -149,7 +147,7 @@ def _play(recording, publishers, complete, args, stop) -> int:
         if stop or at > args.end:
             break
         for earlier in itertools.chain.from_iterable(latched.values()):
-            publishers[earlier.topic].publish(complete[earlier.topic](earlier.data))
+            publishers[earlier.topic].publish(earlier.data)
             count += 1
         if latched:
             _await_arrival(publishers, latched, args, stop)
@@ -162,7 +160,7 @@ def _play(recording, publishers, complete, args, stop) -> int:
             last_frame = message.log_time
         else:
             pace.wait(at)
-        publishers[message.topic].publish(complete[message.topic](message.data))
+        publishers[message.topic].publish(message.data)
         count += 1
         if message.topic not in begun:
             begun.add(message.topic)

@@ -10,7 +10,7 @@ import sys
 
 import pytest
 import zstandard
-from bag_tools import as_installed, typestore
+from bag_tools import typestore
 from in_process import hpccd
 from mcap.reader import NonSeekingReader
 from mcap.records import Channel, Schema, Statistics
@@ -281,6 +281,6 @@ def _by_rosbags(sound_bags, folder, storage, mode):
             topic.name: writer.add_connection(topic.name, topic.type_name, typestore=store)
             for topic in recording.topics.values()
         }
-        for message in as_installed(recording):
+        for message in recording.messages():
             writer.write(connections[message.topic], message.log_time, message.data)
     return folder

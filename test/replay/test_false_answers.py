@@ -7,12 +7,13 @@ import math
 
 import numpy as np
 import pytest
-from bag_tools import completed, typestore
+from bag_tools import typestore
 from hostile_kinds import decoded
 from in_process import hpccd
 from mcap_model import Bag
 
 import hpccd_core as hc
+from hpccd_core.options import REPORTS
 from hpccd_ros.picture import view
 
 ANSWER = 3
@@ -27,6 +28,9 @@ def answered(sound_bags, tmp_path):
         info = json.loads(bag.metadata[0].metadata["json"])
         info["parameters"] |= parameters
         bag.metadata[0].metadata["json"] = json.dumps(info)
+        if "report" in parameters:
+            number = 1 + REPORTS.index(parameters["report"])
+            decoded(bag, "/contacts", _First(), lambda put, answer: put("report", number), all_of_them=True)
         target = bag.of_topic("/contacts")[ANSWER]
         others, bag.messages = bag.messages, [target]
         decoded(bag, "/contacts", _First(), change)
@@ -50,8 +54,7 @@ def _diverges(done, says):
 
 def _vertices(sound_bags):
     bag, name = Bag.read(sound_bags / "streams.mcap"), "hpccd/msg/MeshTopology"
-    schema = next(schema for schema in bag.schemas if schema.name == name)
-    data = completed(schema, bag.of_topic("/meshes/cloth/topology")[0].data)
+    data = bag.of_topic("/meshes/cloth/topology")[0].data
     return typestore().deserialize_cdr(data, name).n_vertices
 
 

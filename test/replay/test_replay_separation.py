@@ -7,7 +7,6 @@ import json
 
 import numpy as np
 import pytest
-from bag_tools import as_installed
 from builtin_interfaces.msg import Time
 from hpccd.msg import ContactArray, DistanceArray
 from rclpy.serialization import serialize_message
@@ -39,7 +38,7 @@ def near_bag(tmp_path_factory):
     with Recording(ROOT / "bags" / "cloth-drop-small.mcap") as recording:
         setup = recorded_setup.of_recording(recording)
         source, frames, inputs = FrameSource(setup, recording.topics), [], []
-        for message in as_installed(recording):
+        for message in recording.messages():
             if message.topic == "/contacts":
                 continue
             completed = source.push(message)

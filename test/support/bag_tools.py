@@ -1,14 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Read recordings with independent readers, and write changed copies of them."""
 
-import dataclasses
 from pathlib import Path
 
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from hpccd_ros.bag import message_definitions
-from hpccd_ros.bag.decode import completion
 from hpccd_ros.bag.reader import Recording
 from hpccd_ros.bag.writer import BagWriter, Topic
 from hpccd_ros.replay import recorded_setup
@@ -24,26 +22,6 @@ def typestore():
         text = message_definitions.definition_text(f"hpccd/msg/{name}").split(message_definitions.SEPARATOR)[0]
         store.register(get_types_from_msg(text, f"hpccd/msg/{name}"))
     return store
-
-
-# Fields by which messages have grown at their end, oldest first: of each step the first one, to how many bytes it is
-# aligned, and how many zeros the step is.
-LATER = (
-    ("hpccd/msg/ContactArray", b"topology_versions", 1, 4),
-    ("hpccd/msg/ContactArray", b"minimum_separation", 8, 8 + 5 * 4),
-    ("hpccd/msg/ContactArray", b"motion_bounds", 4, 8),
-    ("hpccd/msg/ContactArray", b"inputs_before", 8, 2 * 8 + 4 * 4 + 4),
-    ("hpccd/msg/MeshTopology", b"uint32[] edges", 4, 4),
-    ("hpccd/msg/DistanceArray", b"approach_speed", 4, 8),
-)
-
-
-def completed(schema, data):
-    """A message recorded with this MCAP schema as one of today: fields that there were not then are zeros."""
-    for kind, field, alignment, size in LATER:
-        if schema.name == kind and field not in schema.data:
-            data += bytes(-(len(data) - 4) % alignment) + bytes(size)
-    return data
 
 
 def read_by_rosbags(path):
@@ -77,13 +55,6 @@ def replayed(path):
         return replay, list(replay.steps())
 
 
-def as_installed(recording):
-    """Messages of a recording that may be older than the package, with the fields that their types have got since."""
-    complete = {topic.name: completion(topic) for topic in recording.topics.values()}
-    for message in recording.messages():
-        yield dataclasses.replace(message, data=complete[message.topic](message.data))
-
-
 def rewrite(source, target, change=lambda index, message, decoded: decoded, info=...):
     """Copy a recording; `change(index, message, decoded)` gives the decoded message to write, or None to leave it out.
 
@@ -95,7 +66,7 @@ def rewrite(source, target, change=lambda index, message, decoded: decoded, info
         writer = BagWriter(target, info=recording.info if info is ... else info)
         for topic in recording.topics.values():
             writer.add_topic(Topic(topic.name, topic.type_name, []))
-        for message in as_installed(recording):
+        for message in recording.messages():
             type_name = recording.topics[message.topic].type_name
             index = counts[message.topic] = counts.get(message.topic, -1) + 1
             decoded = store.deserialize_cdr(message.data, type_name)

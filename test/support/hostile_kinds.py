@@ -6,7 +6,7 @@ Each kind is a function of a random generator and a `Bag`, in which it changes o
 
 import json
 
-from bag_tools import completed, typestore
+from bag_tools import typestore
 
 KINDS = {}
 NUMBERS = (0, 1, 2, 7, 255, 2**16 - 1, 2**31 - 1, 2**31, 2**32 - 1)
@@ -33,11 +33,9 @@ def decoded(bag, topic, rng, change, all_of_them=False):
     schema = next(schema for schema in bag.schemas if schema.id == channel.schema_id)
     messages = bag.of_topic(topic)
     for message in messages if all_of_them else [rng.choice(messages)]:
-        whole = completed(schema, message.data)
-        tail = whole[len(message.data) :]
-        thing = store.deserialize_cdr(whole, schema.name)
+        thing = store.deserialize_cdr(message.data, schema.name)
         change(lambda name, value, thing=thing: object.__setattr__(thing, name, value), thing)
-        message.data = bytes(store.serialize_cdr(thing, schema.name)).removesuffix(tail)
+        message.data = bytes(store.serialize_cdr(thing, schema.name))
 
 
 def topic_of(bag, *ends):

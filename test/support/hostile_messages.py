@@ -5,7 +5,7 @@ import math
 import struct
 
 import numpy as np
-from bag_tools import completed, typestore
+from bag_tools import typestore
 from hostile_kinds import KINDS, LARGE, NUMBERS, decoded, info_of, kind, set_info, topic_of
 
 
@@ -148,9 +148,8 @@ def changed_distances(rng, bag):
 def contact_under_another_name(rng, bag):
     """A contact whose mesh and feature are others that add up to the same number in the scene."""
     store, name = typestore(), "hpccd/msg/MeshTopology"
-    schema = next(schema for schema in bag.schemas if schema.name == name)
     topology = bag.of_topic(f"/meshes/{info_of(bag)['parameters']['meshes'][0]}/topology")[0]
-    first = store.deserialize_cdr(completed(schema, topology.data), name).n_vertices
+    first = store.deserialize_cdr(topology.data, name).n_vertices
 
     def change(put, answer):
         mesh, features = answer.mesh_a.copy(), answer.features_a.copy()

@@ -10,7 +10,7 @@ from collections import defaultdict
 from pathlib import Path
 
 import numpy as np
-from bag_tools import completed, typestore
+from bag_tools import typestore
 from base_bags import SECOND
 from mcap_model import Bag
 from rosbags.serde import SerdeError
@@ -45,11 +45,7 @@ class Oracle:
             channel = channels[message.channel_id]
             if channel.topic in roles:
                 schema = schemas[channel.schema_id]
-                data = completed(schema, message.data)
-                found = _decode(store, data, schema.name)
-                if schema.name == "hpccd/msg/ContactArray" and b"tested_features" not in schema.data:
-                    found.tested_features = 0  # of what then was no field
-                self.found[str(roles[channel.topic])].append(found)
+                self.found[str(roles[channel.topic])].append(_decode(store, message.data, schema.name))
         self.answers = self.found["contacts"]
         self.transforms = TransformBuffer()
         for role in ("transforms_static", "transforms"):
