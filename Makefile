@@ -153,7 +153,7 @@ $(ENVIRONMENT): pyproject.toml scripts/create_venv.sh scripts/requirements.py $(
 	@touch $@
 
 $(INSTALLED): $(ENVIRONMENT) $(SOURCES) build/sources.txt
-	@echo "hpccd: building, and installing into $(VENV) (a minute or two the first time)"
+	@echo "hpccd: building, and installing into $(VENV) (several minutes the first time)"
 	@. $(VENV)/build.env; tests=; if [ -d $(VENV)/src/gtest_vendor ]; then tests='$(GTEST)'; fi; \
 	  CMAKE_ARGS="-DHPCCD_CUDA=$(HPCCD_CUDA) $$tests $${CMAKE_ARGS:-}" \
 	  flock $(VENV) $(BIN)/python -m pip install --quiet --no-build-isolation --no-deps .

@@ -164,6 +164,7 @@ def test_whatever_was_made_of_them_holds_their_memory(how):
         np.testing.assert_array_equal(held.get(), expected.ee_toc[1:] if how == "slice" else expected.ee_toc)
 
 
+@pytest.mark.skipif("PYTEST_XDIST_WORKER" in os.environ, reason="memory of the whole device: without -n")
 def test_memory_of_dropped_answers_is_taken_again():
     scene, t0, t1 = crumpled()
     detector = settled(scene, t0, t1)
