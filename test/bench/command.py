@@ -9,11 +9,10 @@ import shlex
 from collections.abc import Sequence
 from pathlib import Path
 
-from bench.report import machine
-from bench.report.results import Report
 from hpccd_core.options import ACCURACIES
 from hpccd_ros.base.errors import UserError
 from hpccd_ros.bench import sources
+from hpccd_ros.bench.report import Report, cores
 from hpccd_ros.bench.sources import Source
 
 MOST_THREADS = 1024  # of a detector
@@ -73,7 +72,7 @@ def output_options(parser: argparse.ArgumentParser) -> None:
     out.add_argument("--out", default="hpccd-bench", metavar="DIR", help="JSON (default: %(default)s)")
     out.add_argument(
         "--label",
-        default=f"{machine.cores()}-cores",
+        default=f"{cores()}-cores",
         metavar="NAME",
         help="end of the files' names, one for each machine (default: %(default)s)",
     )
@@ -166,15 +165,7 @@ def _command(args, options: dict) -> str:
 
 def end(args, report: Report) -> int:
     """Write and name the file. Exit status 1 where a check failed."""
-    report.finish()
-    written = report.write(Path(args.out), args.label)
-    for note in report.notes:
-        print(f"note: {note}")
-    for failure in report.failures:
-        print(f"FAILED: {failure}")
-    print(f"measured on {machine.short(report.machine)}")
-    print("wrote " + ", ".join(map(str, written)))
-    return 1 if report.failures else 0
+    return report.end(Path(args.out), args.label)
 
 
 def skipped(report: Report, what: str, refused: dict[str, str]) -> None:

@@ -15,10 +15,10 @@ from __future__ import annotations
 from bench import command
 from bench.core import accuracy_distance, accuracy_sweep, measure
 from bench.core.variants import BACKENDS, usable
-from bench.report import table
-from bench.report.machine import cores
 from hpccd_core.options import ACCURACIES, SIMD
 from hpccd_ros.base.errors import UserError
+from hpccd_ros.bench import report as tables
+from hpccd_ros.bench.report import cores
 from hpccd_ros.bench.sources import data_folder
 
 PARTS = ("sweeps", "distance")
@@ -109,7 +109,7 @@ def _check(report):
 
 
 def _print_adversarial(rows, tiers):
-    table.show(
+    tables.show(
         "hard queries: missed + invented of all (rational arithmetic is the truth)",
         ["generator", "queries", "contacts", *tiers],
         [
@@ -124,7 +124,7 @@ def _print_first_errors(rows, tiers):
     """For each sweep the share of wrong answers at the ends and in the middle."""
     for name in ("scale", "offset"):
         mine = [r for r in rows if r["sweep"] == name]
-        table.show(
+        tables.show(
             f"share of wrong answers against {name}",
             [name, "queries", *tiers],
             [

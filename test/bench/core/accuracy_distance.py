@@ -14,8 +14,8 @@ from fuzz.snapshots import EDGE_FACE
 
 from bench.core import accuracy_sweep, measure
 from bench.core.distance_queries import Question
-from bench.report import table
 from hpccd_ros.base.errors import UserError
+from hpccd_ros.bench import report as tables
 from hpccd_ros.bench import truth
 from hpccd_ros.bench.sources import Source, Step, of_npz
 
@@ -115,7 +115,7 @@ def _size(step: Step) -> float:
 
 def show(of_scenes: list[dict], of_queries: list[dict], tiers: list[str]) -> None:
     if of_scenes:
-        table.show(
+        tables.show(
             "distance queries on whole scenes",
             ["scene", "query", "d", "backend", "simd", "accuracy", "ms", "true", "missed", "invented", "worst"],
             [
@@ -142,7 +142,7 @@ def show(of_scenes: list[dict], of_queries: list[dict], tiers: list[str]) -> Non
         line = lines.setdefault((row["query"], row["generator"]), heads)
         line.append(f"{row['missed']} + {row['invented']}")
     if lines:
-        table.show(
+        tables.show(
             "hard distance queries: missed + invented of all (rational arithmetic is the truth)",
             ["query", "generator", "queries", "true", *tiers],
             list(lines.values()),

@@ -18,9 +18,9 @@ from bench.core import measure
 from bench.core.peer_ipctk import NOTE as PEER_NOTE
 from bench.core.peer_ipctk import PeerRunner
 from bench.core.variants import BACKENDS, Variant, usable
-from bench.report import table
-from bench.report.machine import cores
 from bench.report.paper import TABLE_1_MS
+from hpccd_ros.bench import report as tables
+from hpccd_ros.bench.report import cores
 from hpccd_ros.bench.sources import TABLE_1, Step
 
 
@@ -130,7 +130,7 @@ def _print(report, args):
         ]
         for row in report.rows
     ]
-    table.show(
+    tables.show(
         f"ms a step, {args.accuracy}, {args.threads or cores()} threads (Table 1)",
         [
             "scene",
@@ -148,7 +148,7 @@ def _print(report, args):
         "2009: the paper's machine (4 cores, 2 GPUs) on its own scene; first call: with a new detector",
     )
     stages = list(dict.fromkeys(s for r in report.rows for s in r["stages_ms"]))
-    table.show(
+    tables.show(
         "where the time goes, ms of an average step (section 6.2)",
         ["scene", "variant", *stages],
         [[r["scene"], r["variant"], *(r["stages_ms"].get(s) for s in stages)] for r in report.rows],

@@ -28,9 +28,9 @@ from bench.core.device_arrays import to_device
 from bench.core.distance_queries import ALLOWED, PLAIN, QUERIES, questions
 from bench.core.peer_ipctk_distance import DistancePeer
 from bench.core.variants import BACKENDS, usable
-from bench.report import table
-from bench.report.machine import cores
 from hpccd_ros.base.errors import UserError
+from hpccd_ros.bench import report as tables
+from hpccd_ros.bench.report import cores
 from hpccd_ros.bench.sources import Step
 
 SCENES = ("rod-twist-like", "armadillo-like")
@@ -150,7 +150,7 @@ def _median_edge(step):
 
 
 def _print(report, args):
-    table.show(
+    tables.show(
         f"distance queries, {args.accuracy}, {args.backend}, {args.threads or cores()} threads",
         [
             "scene",

@@ -25,9 +25,9 @@ from bench import command
 from bench.core import gpu_device, gpu_hybrid, gpu_worlds
 from bench.core.device_arrays import library
 from bench.core.gpu_times import StagesDetector, check, detector_times, device_stages
-from bench.report import table
 from hpccd_core._core import MOST_WORLDS
 from hpccd_ros.base.errors import UserError
+from hpccd_ros.bench import report as tables
 
 OF_SCENES = ("frames", "threads", "segments", "device")
 GENERATED = ("large", "worlds")  # whatever scenes are named
@@ -134,7 +134,7 @@ def show(rows):
 
 
 def _show_frames(rows):
-    table.show(
+    tables.show(
         "ms a frame, host arrays in and out",
         [
             "scene",
@@ -169,7 +169,7 @@ def _show_frames(rows):
         ],
     )
     stages = list(dict.fromkeys(s for r in rows for s in r["stages_ms"]))
-    table.show(
+    tables.show(
         "where the time goes, ms (gpu/...: device time, measured in calls of their own)",
         ["stage", *(f"{r['scene']} {r['accuracy']}" for r in rows)],
         [[stage, *(r["stages_ms"].get(stage) for r in rows)] for stage in stages],

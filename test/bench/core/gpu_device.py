@@ -10,7 +10,7 @@ import hpccd_core as hc
 from bench.core import gpu_work, two_nets
 from bench.core.device_arrays import library
 from bench.core.gpu_times import StagesDetector, call_times, check, detector_times, device_stages
-from bench.report import table
+from hpccd_ros.bench import report as tables
 
 
 def measure(report, args, part, name, step, accuracy):
@@ -65,7 +65,7 @@ def measure_large(report, args, sizes):
 
 
 def show(rows):
-    table.show(
+    tables.show(
         "ms a call, by where positions and results lie",
         [
             "scene",
@@ -106,7 +106,7 @@ def show(rows):
 def show_stages(rows):
     """Device time beside the floor of each stage."""
     stages = list(dict.fromkeys(s for r in rows for s in r["stages_ms"]))
-    table.show(
+    tables.show(
         "device time by stage in calls of their own, ms, and its floor",
         ["stage", *(head for r in rows for head in (f"{r['scene']} {r['accuracy']}", "floor"))],
         [
@@ -126,7 +126,7 @@ def floor_of(row, stage):
 
 def show_decided(rows):
     names = list(rows[0]["decided"])
-    table.show(
+    tables.show(
         "which arithmetic decided the candidate pairs",
         ["scene", "accuracy", "candidates", *(name.replace("_", " ") for name in names)],
         [[r["scene"], r["accuracy"], r["candidates"], *(r["decided"][name] for name in names)] for r in rows],

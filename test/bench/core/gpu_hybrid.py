@@ -5,9 +5,9 @@ from __future__ import annotations
 
 import hpccd_core as hc
 from bench.core.gpu_times import detector_times
-from bench.report import table
-from bench.report.machine import cores
 from bench.report.progress import bar
+from hpccd_ros.bench import report as tables
+from hpccd_ros.bench.report import cores
 
 SEGMENT_PAIRS = (128, 256, 512, 1024, 2048, 4096, 8192, 16384)
 
@@ -72,7 +72,7 @@ def show(report):
     cells = [[*key, *(value for g in gpus for value in _cell(found.get(g)))] for key, found in lines.items()]
     heads = [head for g in gpus for head in (f"{g} GPUs: ms", "times")]
     if cells:
-        table.show(
+        tables.show(
             "Fig. 6: ms, and times one CPU thread with the published method",
             ["scene", "method", "threads", *heads],
             cells,
@@ -83,7 +83,7 @@ def show(report):
     for r in rows:
         lines.setdefault((r["scene"], r["method"], r["threads"]), []).append(r["median_ms"])
     if lines:
-        table.show(
+        tables.show(
             "section 6.2: ms by pairs in a segment",
             ["scene", "method", "threads", *map(str, SEGMENT_PAIRS)],
             [[*key, *ms] for key, ms in lines.items()],

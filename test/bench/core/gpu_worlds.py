@@ -13,7 +13,7 @@ import hpccd_core as hc
 from bench.core import gpu_work, many_garments
 from bench.core.device_arrays import library
 from bench.core.gpu_times import StagesDetector, call_times, check, device_stages
-from bench.report import table
+from hpccd_ros.bench import report as tables
 from hpccd_ros.bench.sources import Step
 from hpccd_ros.scenes.scene import Mesh
 
@@ -86,7 +86,7 @@ def _hashes(found):
 
 
 def show(rows):
-    table.show(
+    tables.show(
         "many worlds in one call, positions and results on the device, exact",
         ["query", "worlds", "triangles a world", "pairs", "CPU ms", "GPU ms", "p95", "us a world", "bytes a world"],
         [
@@ -105,7 +105,7 @@ def show(rows):
         ],
     )
     stages = list(dict.fromkeys(s for r in rows for s in r["stages_ms"]))
-    table.show(
+    tables.show(
         "device time by stage in calls of their own, ms",
         ["stage", *(f"{r['query']} {r['worlds']}" for r in rows)],
         [[stage, *(r["stages_ms"].get(stage) for r in rows)] for stage in stages],

@@ -27,8 +27,9 @@ from bench import command
 from bench.core import limit_work, measure
 from bench.core.limit_rates import Rates
 from bench.core.variants import Variant
-from bench.report import progress, table
-from bench.report.machine import cores
+from bench.report import progress
+from hpccd_ros.bench import report as tables
+from hpccd_ros.bench.report import cores
 
 # Parts of stages that some builds or methods do not time, or of which too few came to be timed: told with the whole.
 PARTS = {"leaf pairs": "nodes", "k-DOPs": "tests"}
@@ -138,7 +139,7 @@ def _calm(samples):
 
 def _print(rows):
     rates = [r for r in rows if r["part"] == "rate"]
-    table.show(
+    tables.show(
         "what this machine does at most, a second",
         ["threads", "rate", "of data, KB", "10^9"],
         [
@@ -147,7 +148,7 @@ def _print(rows):
         ],
         "comparisons of floats, operations on floats and doubles, bytes",
     )
-    table.show(
+    tables.show(
         "where the time goes, ms of an average step, the farthest from its least first",
         [
             "scene",

@@ -21,9 +21,10 @@ import numpy as np
 
 from bench import command
 from bench.core.variants import usable
-from bench.report import progress, table
-from bench.report.machine import cores
+from bench.report import progress
 from hpccd_core.options import METHODS
+from hpccd_ros.bench import report as tables
+from hpccd_ros.bench.report import cores
 from hpccd_ros.bench.sources import TABLE_1
 
 BYTES_OF_A_PAIR = 8
@@ -101,7 +102,7 @@ def _print(report):
     mega = 2**20
     if not report.rows:
         return
-    table.show(
+    tables.show(
         f"peak memory of a step, {report.rows[0]['accuracy']}, {report.rows[0]['threads']} threads",
         [
             "scene",

@@ -14,10 +14,10 @@ from __future__ import annotations
 from bench import command
 from bench.core import measure
 from bench.core.variants import Variant, usable
-from bench.report import table
-from bench.report.machine import cores
 from hpccd_core import _core
 from hpccd_core.options import METHODS, SIMD
+from hpccd_ros.bench import report as tables
+from hpccd_ros.bench.report import cores
 
 
 def configure(parser):
@@ -79,7 +79,7 @@ def _row(source, variant, series, args):
 
 
 def _print(report):
-    table.show(
+    tables.show(
         f"methods and instruction sets ({report.rows[0]['accuracy']})",
         [
             "scene",

@@ -19,8 +19,8 @@ import numpy as np
 from bench import command
 from bench.core import measure
 from bench.core.variants import Variant
-from bench.report import table
-from bench.report.machine import cores
+from hpccd_ros.bench import report as tables
+from hpccd_ros.bench.report import cores
 from hpccd_ros.bench.sources import Step
 from hpccd_ros.scenes.scene import Mesh
 
@@ -142,7 +142,7 @@ def _row(source, variant, series, full, args):
 
 
 def _print(report):
-    table.show(
+    tables.show(
         f"what each option saves ({report.rows[0]['accuracy']}, {report.rows[0]['threads']} threads)",
         ["scene", "option", "ms a step", "/ full", "contacts", "candidate pairs", "bounds + refit ms"],
         [

@@ -27,8 +27,9 @@ from oracle.rigid_queries import KINDS, MOTIONS, random_queries
 
 from bench import command
 from bench.core import rigid_cost
-from bench.report import progress, table
+from bench.report import progress
 from hpccd_ros.base.errors import UserError
+from hpccd_ros.bench import report as tables
 
 PARTS = ("truth", "bounds", "cost")
 _BATCH = 1000  # queries at a time: bounds memory
@@ -123,7 +124,7 @@ def _print(report):
     of = {part: [row for row in report.rows if row["part"] == part] for part in PARTS}
     if of["truth"]:
         shown = ("motion", "kind", *(name for name in _COUNTS if name != "apart"), "worst_excess")
-        table.show(
+        tables.show(
             "random motions against the truth",
             [{"excess": "in excess", "worst_excess": "worst"}.get(name, name) for name in shown],
             [[row[name] for name in shown] for row in of["truth"]],
@@ -131,13 +132,13 @@ def _print(report):
             "of at most 2",
         )
     if of["bounds"]:
-        table.show(
+        tables.show(
             "true deviation over the bound",
             ["motion", "turn, rad", "median", "5 %", "largest"],
             [[row["motion"], row["turn"], row["median"], row["low"], row["largest"]] for row in of["bounds"]],
         )
     if of["cost"]:
-        table.show(
+        tables.show(
             "a step moved by poses beside the same on straight lines",
             [
                 "scene",

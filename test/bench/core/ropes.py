@@ -19,10 +19,11 @@ import numpy as np
 import hpccd_core as hc
 from bench import command
 from bench.core import two_nets
-from bench.report import progress, table
-from bench.report.machine import cores
+from bench.report import progress
 from bench.report.timing import times
 from hpccd_ros.base.errors import UserError
+from hpccd_ros.bench import report as tables
+from hpccd_ros.bench.report import cores
 
 
 def configure(parser):
@@ -107,7 +108,7 @@ def _n_edges(step) -> int:
 
 
 def _print(report):
-    table.show(
+    tables.show(
         f"ropes, {report.rows[0]['accuracy']}, threads: {report.rows[0]['threads']}",
         ["as", "edges", "triangles", "contacts", "ms a step", "MB"],
         [[r["way"], r["edges"], r["triangles"], r["contacts"], r["ms"], r["bytes"] / 1e6] for r in report.rows],

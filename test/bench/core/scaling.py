@@ -19,10 +19,10 @@ from bench.core import measure
 from bench.core.independent import METHOD as INDEPENDENT
 from bench.core.independent import IndependentRunner
 from bench.core.variants import Variant, usable
-from bench.report import table
-from bench.report.machine import cores
 from hpccd_core.options import METHODS
 from hpccd_ros.base.errors import UserError
+from hpccd_ros.bench import report as tables
+from hpccd_ros.bench.report import cores
 from hpccd_ros.bench.sources import TABLE_1
 
 # The components of section 6.2, by the stages of Detector.profile.
@@ -135,7 +135,7 @@ def _print(report):
         most = given.get((row["scene"], row["threads"]))
         return row["speedup"] / most if most else None
 
-    table.show(
+    tables.show(
         f"speed-up over one thread ({report.rows[0]['accuracy']})",
         ["scene", "method", "threads", "median ms", "p95 ms", "speed-up", "efficiency", "of independent", *COMPONENTS],
         [

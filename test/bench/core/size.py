@@ -15,11 +15,11 @@ import dataclasses
 from bench import command
 from bench.core import measure
 from bench.core.variants import Variant
-from bench.report import table
-from bench.report.machine import cores
 from bench.report.timing import slope
 from hpccd_ros import scenes
 from hpccd_ros.base.errors import UserError
+from hpccd_ros.bench import report as tables
+from hpccd_ros.bench.report import cores
 from hpccd_ros.bench.sources import of_scene
 
 DEFAULT = ("cloth-ball-like", "n-body-like-hr")
@@ -114,7 +114,7 @@ def _slope(rows, name, threads):
 
 
 def _print(report, slopes):
-    table.show(
+    tables.show(
         f"time and memory against size ({report.rows[0]['accuracy']})",
         [
             "scene",
@@ -144,7 +144,7 @@ def _print(report, slopes):
         "ms a step: the average over the steps of the median over the rounds",
     )
     if slopes:
-        table.show(
+        tables.show(
             "exponents over the number of triangles (1: linear)",
             ["scene", "threads", "time", "contacts", "candidates"],
             [[s["scene"], s["threads"], s["time"], s["contacts"], s["candidates"]] for s in slopes],

@@ -24,9 +24,9 @@ from bench.core import measure, peer_ipctk
 from bench.core.device_arrays import to_device
 from bench.core.step_queries import ALL, QUERIES, StepRunner, contradictions
 from bench.core.variants import BACKENDS, usable
-from bench.report import table
-from bench.report.machine import cores
 from hpccd_ros.base.errors import UserError
+from hpccd_ros.bench import report as tables
+from hpccd_ros.bench.report import cores
 from hpccd_ros.bench.sources import Step
 
 SCENES = ("rod-twist-like", "n-body-like-lr")
@@ -101,7 +101,7 @@ def _row(source, runner, series, args):
 
 
 def _print(report, args):
-    table.show(
+    tables.show(
         f"how far a step may go, {args.accuracy}, {args.backend}, {args.threads or cores()} threads",
         [
             "scene",

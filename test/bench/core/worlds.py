@@ -22,11 +22,12 @@ import numpy as np
 
 import hpccd_core as hc
 from bench import command
-from bench.report import progress, table
-from bench.report.machine import cores
+from bench.report import progress
 from bench.report.timing import times
 from hpccd_core._core import MOST_WORLDS
 from hpccd_ros.base.errors import UserError
+from hpccd_ros.bench import report as tables
+from hpccd_ros.bench.report import cores
 
 MOST_DETECTORS = 1024  # of 2 MB each for cloth-drop
 ROWS = ("vf", "vf_toc", "ee", "ee_toc")
@@ -138,7 +139,7 @@ def _compare(report, what, found, worlds):
 
 
 def _print(report):
-    table.show(
+    tables.show(
         f"many worlds, {report.rows[0]['accuracy']}, threads: {report.rows[0]['threads']}; median ms of all worlds",
         [
             "scene",

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from bench.report.results import Kept, whole_scene
-from bench.report.table import text
+from hpccd_ros.bench.report import text
 
 RESULTS = "../test/bench/results"  # from docs/
 

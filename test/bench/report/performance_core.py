@@ -5,8 +5,8 @@ from __future__ import annotations
 
 from bench.report import markdown, paper
 from bench.report.results import Kept, by, whole_scene
-from bench.report.table import text
 from bench.report.timing import slope
+from hpccd_ros.bench.report import text
 
 # Of the methods, in the order of the columns.
 METHODS = ("default", "published", "naive", "front", "independent")

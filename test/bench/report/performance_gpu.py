@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from bench.report import markdown
 from bench.report.results import Kept, by, whole_scene
-from bench.report.table import text
+from hpccd_ros.bench.report import text
 
 
 def _part(result: Kept, part: str) -> list[dict]:

@@ -23,9 +23,9 @@ from pathlib import Path
 import numpy as np
 
 from bench import command
-from bench.report import table
 from bench.report.progress import bar
 from hpccd_ros.base.errors import UserError
+from hpccd_ros.bench import report as tables
 from hpccd_ros.bench import sources
 
 NAMESPACE = "/bench"
@@ -208,7 +208,7 @@ def _tables(report) -> None:
     from bench.ros import step_loop
 
     latency = [row for row in report.rows if row["what"] == "latency"]
-    table.show(
+    tables.show(
         "publish to contacts, ms: the node less its core, and an echo of the same bytes, in turn",
         ["scene", "MB in", "MB out", "contacts", "core", "node", "p95", "p99", "echo", "p95", "p99", "node / echo"],
         [
@@ -224,7 +224,7 @@ def _tables(report) -> None:
             for r in latency
         ],
     )
-    table.show(
+    tables.show(
         "where it goes, ms (medians)",
         ["scene", *latency[0]["parts_ms"]],
         [[r["scene"], *r["parts_ms"].values()] for r in latency],
@@ -232,7 +232,7 @@ def _tables(report) -> None:
     step_loop.show([row for row in report.rows if row["what"] == "step loop"])
     rates = [row for row in report.rows if "rate_hz" in row]
     if rates:
-        table.show(
+        tables.show(
             "at a fixed rate",
             [
                 "scene",

@@ -24,10 +24,10 @@ import numpy as np
 
 from bench import command
 from bench.core.variants import BACKENDS, usable
-from bench.report import table
 from bench.report.progress import bar
 from hpccd_ros import scenes
 from hpccd_ros.base.errors import UserError
+from hpccd_ros.bench import report as tables
 
 NAMESPACE = "/bench_robot"
 SCENE = "arm-and-cloth"
@@ -66,7 +66,7 @@ def run(args) -> int:
         if row["unaccounted"]:
             report.failure(f"{row['unaccounted']} frames are not accounted for")
     columns = [f"{part} {key}" for part in PARTS for key, _ in PERCENTILES]
-    table.show(
+    tables.show(
         f"{SCENE} at {args.rate:g} frames a second: ms from before a frame is sent to its answer",
         ["answers", "a second", "dropped", *columns],
         [

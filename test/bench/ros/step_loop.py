@@ -14,10 +14,10 @@ from hpccd.srv import Detect
 from numpy.typing import NDArray
 from rclpy.node import Node
 
-from bench.report import table
 from bench.report.progress import bar
 from bench.ros.link import MESH, Link
 from hpccd_ros import client
+from hpccd_ros.bench import report as tables
 
 TRIALS = (1.0, 0.5, 0.25, 0.75)  # parts of the motion
 PERCENTILES = (("median", 50), ("p95", 95), ("p99", 99))
@@ -75,7 +75,7 @@ def measure(node: Node, link: Link, scene: str, rounds: int, alive: Callable[[],
 
 
 def show(rows: list[dict]) -> None:
-    table.show(
+    tables.show(
         "how far may I go, ms: asked of the node over DDS, and of the core in this process, in turn",
         ["scene", "MB sent", "over DDS", "p95", "p99", "in process", "p95", "p99", "DDS more", "p95", "p99"],
         [

@@ -21,9 +21,9 @@ from pathlib import Path
 import numpy as np
 
 from bench import command
-from bench.report import table
 from bench.report.progress import bar
 from hpccd_ros.base.errors import UserError
+from hpccd_ros.bench import report as tables
 
 NAMESPACE = "/bench_stop"
 PERCENTILES = (("median", 50), ("p95", 95), ("p99", 99), ("most", 100))
@@ -184,7 +184,7 @@ def _percentiles(seconds: list[float]) -> dict[str, float]:
 def _tables(report) -> None:
     costs = [row for row in report.rows if row["what"] == "cost"]
     first, *others = [row for row in report.rows if row["what"] != "cost"]
-    table.show(
+    tables.show(
         "approaches: from the frame that ends a step which comes near to stop, ms",
         ["trials", "steps", "near", "rises", "median", "p95", "p99", "most", "of a frame", "late", "missed", "false"],
         [
@@ -207,7 +207,7 @@ def _tables(report) -> None:
             ]
         ],
     )
-    table.show(
+    tables.show(
         "from the end of what went before to stop, ms",
         ["what", "trials", "median", "p95", "most", "stop_timeout", "beyond it"],
         [
@@ -215,7 +215,7 @@ def _tables(report) -> None:
             for r in others
         ],
     )
-    table.show(
+    tables.show(
         "what it costs, ms a step (medians)",
         ["scene", "triangles", "steps", "near", "stop", "contacts", "distances"],
         [

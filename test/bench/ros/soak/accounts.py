@@ -3,9 +3,9 @@
 
 from __future__ import annotations
 
-from bench.report import table
 from bench.ros.soak.restarted_publisher import MESH as RESTARTED
 from bench.ros.soak.session import Session
+from hpccd_ros.bench import report as tables
 from hpccd_ros.frames.drops import Reason
 
 
@@ -60,7 +60,7 @@ def show(session: Session) -> None:
     sent = sum(load.sent.values()) + session.sent_by_restarted
     wrong, topologies_wrong = load.wrong_messages.sent, load.wrong_messages.topologies
     not_received = session.sent_by_restarted - _received_of_restarted(status)
-    table.show(
+    tables.show(
         f"soak: {args.minutes:g} minutes at {args.rate:g} frames a second",
         ["what", "count"],
         [

@@ -18,11 +18,11 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 
 from bench.report.progress import bar
-from bench.report.results import Report
 from bench.ros import node_process
 from bench.ros.soak import load
 from hpccd_ros import scenes
 from hpccd_ros.base.errors import UserError
+from hpccd_ros.bench.report import Report
 from hpccd_ros.demo.children import Children
 from hpccd_ros.middleware import environment
 
