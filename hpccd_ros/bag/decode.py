@@ -71,7 +71,8 @@ def checked_type(topic: RecordedTopic):
     try:
         cls, same = message_class(topic.type_name), _has_installed_layout(topic)
     except LookupError as error:
-        raise RecordingError(f"topic {topic.name} cannot be decoded: {error}") from error
+        remedy = "install the package that defines it, or record without this topic"
+        raise RecordingError(f"topic {topic.name} cannot be decoded: {error}; {remedy}") from error
     if not same:
         raise RecordingError(
             f"topic {topic.name} was recorded with another definition of {topic.type_name} "

@@ -64,7 +64,7 @@ def configure(parser):
     add("--backend", metavar="NAME,...", help="of cpu, hybrid, gpu (default: cpu; with --choose: those that work here)")
     add("--ask", default=settings.ALL, metavar="NAME,...", help=f"contacts to ask for: {what} (default: all)")
     add("--simd", default="auto", metavar="NAME,...", help=f"of {', '.join(SIMD)}")
-    add("--picture", metavar="FILE", help="draw time against errors into a .png file")
+    add("--picture", metavar="FILE", help="draw time against errors into a .png, .pdf or .svg file")
 
 
 def run(args) -> Report:
@@ -77,6 +77,12 @@ def run(args) -> Report:
     if not backends:
         raise UserError(f"--backend {args.backend}: none of these works here; see `hpccd info`")
     sets, refused_sets = measure.usable("simd", command.listed("--simd", args.simd, SIMD))
+    if not sets:
+        raise UserError(f"--simd {args.simd}: none of these works here; see `hpccd info`")
+    if args.picture is not None:
+        if Path(args.picture).suffix not in (".png", ".pdf", ".svg"):
+            raise UserError(f"--picture {args.picture}: name a .png, .pdf or .svg file")
+        command.require_writable("--picture", Path(args.picture))
     report, found = command.begin(args)
     report.note(measure.NOTE)
     if args.backend:
@@ -101,7 +107,7 @@ def run(args) -> Report:
     )
     if bounds:
         choice.choose(report, bounds)
-    if args.picture:
+    if args.picture is not None:
         draw(report.rows, Path(args.picture))
     return report
 

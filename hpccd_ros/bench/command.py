@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import argparse
-import os
 import shlex
 from collections.abc import Sequence
 from pathlib import Path
@@ -69,6 +68,8 @@ def begin(args) -> tuple[Report, list[sources.Source]]:
             raise UserError(f"--{name} {getattr(args, name)}: must not be negative")
     if args.threads > MOST_THREADS:
         raise UserError(f"--threads {args.threads}: a detector takes at most {MOST_THREADS}; name fewer")
+    if not args.label or not args.label.isprintable():
+        raise UserError(f"--label {args.label!r}: ends the name of a file; write it with printable characters")
     if Path(args.label).name != args.label:
         raise UserError(f"--label {args.label}: ends the name of a file; write it without folders")
     try:
@@ -76,8 +77,7 @@ def begin(args) -> tuple[Report, list[sources.Source]]:
     except OSError as error:
         why = f"no folder can be made there ({error.strerror})"
         raise UserError(f"--out {args.out}: {why}; name another") from error
-    if not os.access(args.out, os.W_OK):
-        raise UserError(f"--out {args.out}: must not be written; name another folder")
+    require_writable("--out", Path(args.out) / f"{args.benchmark}-{args.label}.json")
     found = sources.resolve(args.sources, sources.data_folder(args.data), args.default_sources, args.size)
     options = {k: v for k, v in vars(args).items() if k not in PLACES and isinstance(v, (int, float, str, type(None)))}
     words = ["hpccd bench", args.benchmark, *(Path(source).name for source in args.sources)]
@@ -88,6 +88,18 @@ def begin(args) -> tuple[Report, list[sources.Source]]:
     if args.repeat < FEWEST_ROUNDS:
         report.note(f"only {args.repeat} timed rounds: take --repeat {FEWEST_ROUNDS} or more for numbers to rely on")
     return report, found
+
+
+def require_writable(option: str, path: Path) -> None:
+    """Before anything is measured: what cannot be written would be lost."""
+    try:
+        new = not path.exists()
+        with path.open("a"):
+            pass
+        if new:
+            path.unlink()
+    except OSError as error:
+        raise UserError(f"{option}: {path} cannot be written ({error.strerror}); name another") from error
 
 
 def skipped(report: Report, what: str, refused: dict[str, str]) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import dataclasses
 import os
+import zipfile
 from collections.abc import Callable, Sequence
 from functools import lru_cache
 from pathlib import Path
@@ -19,6 +20,11 @@ from hpccd_ros.scenes.scene import Mesh
 TABLE_1 = ("cloth-ball-like", "breaking-like", "n-body-like-lr", "n-body-like-hr")
 MESH_FILES = (".obj", ".ply", ".stl", ".dae")
 MESH_STEPS = 32  # of a mesh file
+STEP = {"vertices_t0", "vertices_t1", "faces"}  # of an .npz file
+TRUTH = {"vf": (2,), "ee": (4,), "vf_toc": (), "ee_toc": ()}  # and of its contacts, each row
+TRUTH_SHAPES = "vf (N,2), vf_toc (N,), ee (M,4), ee_toc (M,)"
+# BadZipFile: cut off. TypeError: an array alone, which is no archive.
+UNREADABLE = (OSError, ValueError, TypeError, EOFError, zipfile.BadZipFile)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -137,6 +143,10 @@ def _one(word, data, size):
     if word in scenes.names():
         return of_scene(word, size)
     path = Path(word)
+    try:
+        path.exists()
+    except OSError as error:  # a name that is too long
+        raise UserError(f"{word[:40]}...: {error.strerror}; name a file or a scene") from error
     if path.suffix == ".npz" and path.is_file():
         return of_npz(path)
     if path.suffix.lower() in MESH_FILES and path.is_file():
@@ -186,14 +196,26 @@ def of_npz(path: Path) -> Source:
     try:
         with np.load(path, allow_pickle=False) as archive:
             arrays = {key: archive[key] for key in archive.files}
-    except (OSError, ValueError) as error:
-        raise UserError(f"{path}: cannot be read: {error}") from error
-    if not {"vertices_t0", "vertices_t1", "faces"} <= arrays.keys():
-        raise UserError(f"{path}: holds {', '.join(arrays)}; a step has vertices_t0, vertices_t1 and faces")
-    truth = {key: arrays[key] for key in ("vf", "vf_toc", "ee", "ee_toc") if key in arrays}
-    mesh = Mesh("scene", arrays["faces"], len(arrays["vertices_t0"]))
-    known = truth if len(truth) == 4 else None
-    step = Step((mesh,), 0, arrays["vertices_t0"], arrays["vertices_t1"], truth=known)
+    except UNREADABLE as error:
+        raise UserError(f"{path}: not an .npz file of numbers ({error}); write it with numpy.savez") from error
+    if not STEP <= arrays.keys():
+        raise UserError(f"{path}: holds {', '.join(arrays)}; a step has {', '.join(sorted(STEP))}")
+    t0, t1, faces = arrays["vertices_t0"], arrays["vertices_t1"], arrays["faces"]
+    try:
+        scene = hc.Scene()
+        scene.add_mesh("scene", faces, n_vertices=len(t0))
+        hc.Detector(scene, backend="cpu", threads=1, report="any").detect(t0, t1)
+    except (TypeError, ValueError) as error:
+        raise UserError(f"{path}: not a step: {error}") from error
+    if not len(faces):
+        raise UserError(f"{path}: there are no faces to measure")
+    known = None
+    if TRUTH.keys() <= arrays.keys():
+        known = {key: arrays[key] for key in TRUTH}
+        for key, width in TRUTH.items():
+            if known[key].shape != (*known[key[:2]].shape[:1], *width) or known[key].dtype.kind not in "iuf":
+                raise UserError(f"{path}: {key} has shape {known[key].shape}; contacts are {TRUTH_SHAPES}")
+    step = Step((Mesh("scene", faces, len(t0)),), 0, t0, t1, truth=known)
     return Source(path.stem, 1, lambda k: step)
 
 
@@ -255,5 +277,9 @@ def of_recording(path: Path) -> Source:
 
 
 def _holds_step(path):
-    with np.load(path, allow_pickle=False) as archive:
-        return {"vertices_t0", "vertices_t1", "faces"} <= set(archive.files)
+    """Whether it is the file of a step; one that cannot be read is taken for one, so that its error is not lost."""
+    try:
+        with np.load(path, allow_pickle=False) as archive:
+            return STEP <= set(archive.files)
+    except UNREADABLE:
+        return True

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Play recorded messages over DDS: the very bytes, with the recorded quality of service, in their rhythm.
 
-Only where a message has got fields since it was recorded, empty ones are added: its readers expect them.
+A topic that was recorded with another definition of its type is refused: readers would misread its bytes.
 """
 
 import itertools
@@ -15,12 +15,12 @@ import yaml
 from rclpy.exceptions import NameValidationException
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
+from hpccd_ros.bag.decode import checked_type
 from hpccd_ros.bag.reader import RecordedTopic, Recording, RecordingError
 from hpccd_ros.base.errors import UserError
 from hpccd_ros.base.quoting import listed
 from hpccd_ros.middleware import environment, qos, ros_start, stop_signals, transform_topics
 from hpccd_ros.middleware.listeners import await_acknowledged, await_subscribers
-from hpccd_ros.middleware.message_types import message_class
 from hpccd_ros.replay import recorded_setup
 from hpccd_ros.replay.pacing import Pace, next_wanted
 
@@ -68,7 +68,7 @@ def _topics(recording, args) -> list[RecordedTopic]:
 
 def _publisher(node, topic):
     try:
-        return node.create_publisher(message_class(topic.type_name), topic.name, _qos(topic))
+        return node.create_publisher(checked_type(topic), topic.name, _qos(topic))
     # ValueError: no name of a topic. RuntimeError, as RCLError is: that of another one already, once it is resolved.
     except (LookupError, NameValidationException, ValueError, RuntimeError) as error:
         raise RecordingError(f"topic {topic.name} cannot be played: {error}") from error

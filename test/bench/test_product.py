@@ -8,6 +8,7 @@ import pytest
 from sources import ROOT
 
 import hpccd_core as hc
+from hpccd_ros import cli
 from hpccd_ros.bench import accuracy, sources
 from hpccd_ros.bench.report import Report
 
@@ -131,3 +132,73 @@ def test_a_machine_without_a_gpu_is_explained(product, capsys):
     assert "no usable GPU" in capsys.readouterr().err
     assert product("accuracy", *STRIP, "--backend", "gpu")[0] == 2
     assert "--backend gpu: none of these works here" in capsys.readouterr().err
+
+
+STEP = {"vertices_t0": np.eye(3), "vertices_t1": np.eye(3) + 1, "faces": np.array([[0, 1, 2]])}
+NO_CONTACTS = {"vf": np.zeros((0, 2)), "ee": np.zeros((0, 4)), "vf_toc": np.zeros(0), "ee_toc": np.zeros(0)}
+
+
+@pytest.mark.parametrize(
+    ("arrays", "says"),
+    [
+        ({"faces": np.array([[0, 1, 7]])}, "not a step"),
+        ({"faces": np.array([[0.0, 1.0, 2.0]])}, "not a step"),
+        ({"faces": np.zeros((0, 3), np.uint32)}, "no faces"),
+        ({"vertices_t1": np.eye(4)}, "not a step"),
+        ({"vertices_t0": np.full((3, 3), np.nan)}, "not a step"),
+        ({"vertices_t0": np.array("abc")}, "not a step"),
+        ({**NO_CONTACTS, "vf": np.zeros((2, 3))}, "vf has shape (2, 3)"),
+        ({**NO_CONTACTS, "ee_toc": np.zeros(3)}, "ee_toc has shape (3,)"),
+        ({**NO_CONTACTS, "vf": np.array(1)}, "vf has shape ()"),
+    ],
+)
+def test_files_that_hold_no_step(product, tmp_path, capfd, arrays, says):
+    np.savez(tmp_path / "bad.npz", **{**STEP, **arrays})
+    status, _, _ = product("accuracy", str(tmp_path / "bad.npz"), "--repeat", "1")
+    assert status == 2 and says in capfd.readouterr().err
+
+
+@pytest.mark.parametrize("kind", ["cut off", "an array alone", "text"])
+def test_files_that_cannot_be_read(product, tmp_path, capfd, kind):
+    folder = tmp_path / "data"
+    folder.mkdir()
+    path = folder / "bad.npz"
+    if kind == "an array alone":
+        with path.open("wb") as file:
+            np.save(file, np.eye(3))
+    else:
+        np.savez(path, **STEP)
+        path.write_bytes(path.read_bytes()[:200] if kind == "cut off" else b"no step")
+    for words in ([str(path)], ["data", "--data", str(folder)]):
+        status, _, _ = product("cpu", *words, "--repeat", "1")
+        assert status == 2 and "bad.npz: not an .npz file of numbers" in capfd.readouterr().err
+    status, _, _ = product("cpu", "nosuchscene", "--data", str(folder))
+    assert status == 2 and "nosuchscene: neither a file" in capfd.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["--picture", "/proc/no/x.png"], "--picture: /proc/no/x.png cannot be written"),
+        (["--picture", "x.bogus"], "name a .png"),
+        (["--picture", ""], "name a .png"),
+        (["--label", ""], "--label"),
+        (["--label", "a\nb"], "--label"),
+        (["--label", "x" * 300], "cannot be written"),
+    ],
+)
+def test_what_cannot_be_written_is_refused_before_anything_is_measured(tmp_path, capfd, monkeypatch, words, says):
+    monkeypatch.setattr(accuracy.measure, "measure", lambda *_: pytest.fail("measured"))
+    status = cli.main(["bench", "accuracy", *STRIP, "--out", str(tmp_path), *words])
+    assert status == 2 and says in capfd.readouterr().err
+
+
+def test_a_name_too_long_for_a_file(product, capfd):
+    status, _, _ = product("accuracy", "y" * 300)
+    assert status == 2 and "name a file or a scene" in capfd.readouterr().err
+
+
+def test_no_usable_instruction_set(product, capfd):
+    other = next(simd for simd in ("neon", "avx2") if simd not in hc._core.simd_levels())
+    status, _, _ = product("accuracy", *STRIP, "--simd", other)
+    assert status == 2 and f"--simd {other}: none of these works here" in capfd.readouterr().err

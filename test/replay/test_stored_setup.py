@@ -156,6 +156,25 @@ def test_names_of_types_are_looked_at_before_they_are_used(changed, name):
     assert played.status == 2 and "/contacts cannot be played" in played.err, played
 
 
+@pytest.mark.parametrize("fewer", [True, False], ids=["a field less", "a field of another name"])
+def test_recordings_with_another_definition_are_not_played(changed, fewer):
+    """Their bytes would be read as other values, or as none."""
+
+    def edit(bag):
+        for schema in bag.schemas:
+            if schema.name == "hpccd/msg/MeshTopology":
+                text = schema.data.decode()
+                other = text.replace("uint32[] edges", "") if fewer else text.replace("uint32 version", "uint32 other")
+                assert other != text
+                schema.data = other.encode()
+                channels = [channel for channel in bag.channels if channel.schema_id == schema.id]
+                for channel in channels:
+                    channel.metadata.pop("topic_type_hash", None)
+
+    played = hpccd("replay", changed(edit=edit), "--publish", "--subscribers", "0", "--wait", "0", "--rate", "0")
+    assert played.status == 2 and "another definition of hpccd/msg/MeshTopology" in played.err, played
+
+
 @pytest.mark.parametrize("qos", ["[", "x", "- 1", "{a: 1}", "2020-13-45", "[" * 10_000, "- null"])
 def test_quality_of_service_that_is_none(changed, qos):
     def edit(bag):
