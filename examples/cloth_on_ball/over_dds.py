@@ -8,6 +8,7 @@ import time
 from pathlib import Path
 
 import rclpy
+from cloth_solver.queries import Queries
 from hpccd.msg import ContactArray, MeshTopology, MeshVertices
 from hpccd.srv import Detect
 from rclpy.executors import SingleThreadedExecutor
@@ -19,7 +20,6 @@ from hpccd_ros.base.errors import UserError
 from hpccd_ros.demo.children import Children
 from hpccd_ros.middleware.fields import stamp_to_ns
 from hpccd_ros.scenes import files
-from hpccd_ros.scenes.resolved.queries import Queries
 
 # s for the node to be there, or to answer.
 PATIENCE = 60.0

@@ -3,8 +3,8 @@
 """A square cloth falls on a spinning ball, and never touches it or itself.
 
 A simulator that asks hpccd three questions: what comes near on the way (constraints of the solver), how much of a
-solved move is free (no move is made beyond that), and, to check, whether anything intersects. The physics is in
-hpccd_ros/scenes/resolved; docs/simulators.md tells how it works.
+solved move is free (no move is made beyond that), and, to check, whether anything intersects. The physics is in the
+package cloth_solver beside this file; docs/simulators.md explains how it works.
 
   python examples/cloth_on_ball/run.py
                         in this process; a minute or two, with a picture in cloth_on_ball.png
@@ -32,12 +32,12 @@ from pathlib import Path
 
 import numpy as np
 from account import Account
+from cloth_solver.motion import Simulation, Stuck
+from cloth_solver.queries import InProcess
+from cloth_solver.setup import Setup
 
 from hpccd_ros.base.errors import UserError
 from hpccd_ros.scenes.progress import track
-from hpccd_ros.scenes.resolved.motion import Simulation, Stuck
-from hpccd_ros.scenes.resolved.queries import InProcess
-from hpccd_ros.scenes.resolved.setup import Setup
 from hpccd_ros.scenes.scene import Frame, Mesh, Scene
 
 

@@ -22,7 +22,6 @@ from hpccd_ros.scenes import (
     breaking,
     cloth,
     cloth_ball,
-    cloth_resolved,
     n_body,
     rod_twist,
     small,
@@ -71,10 +70,6 @@ def _armadillo(name, title, size, frames, seed, progress):
     return armadillo.make(name, title, 50_000, 10_000, size, frames, seed)
 
 
-def _resolved(kind):
-    return lambda name, title, size, frames, seed, progress: kind(name, title, 32_768, size, frames, seed, progress)
-
-
 _REGISTRY = {
     "two-triangles": _Entry(
         "a triangle falls through another: one vertex-face contact",
@@ -100,16 +95,6 @@ _REGISTRY = {
         "a bundle of rods is twisted until it coils up: layers close together, 106 K triangles", 260, _rod_twist
     ),
     "armadillo-like": _Entry("a knobbly body with limbs is drawn between two rollers, 70 K triangles", 260, _armadillo),
-    "cloth-ball-resolved": _Entry(
-        "a cloth winds round a spinning ball and never touches: what a solver made, 35 K triangles",
-        220,
-        _resolved(cloth_resolved.resolved),
-    ),
-    "cloth-ball-trial": _Entry(
-        "the same; from each frame a long step, as a solver tries it first, with its contacts, 35 K triangles",
-        439,
-        _resolved(cloth_resolved.trial),
-    ),
 }
 
 

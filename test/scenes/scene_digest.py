@@ -4,6 +4,17 @@
 import hashlib
 import sys
 
+import solved_cloth
+
+from hpccd_ros import scenes
+
+
+def make(word: str, seed: int = 0):
+    """The scene NAME:SIZE:FRAMES, of the product or of the example's solver."""
+    name, size, frames = word.split(":")
+    kind = solved_cloth if name in solved_cloth.FRAMES else scenes
+    return kind.make(name, float(size), int(frames), seed)
+
 
 def digest(scene) -> str:
     """Hash of the faces, vertices and topology changes of all frames."""
@@ -20,8 +31,5 @@ def digest(scene) -> str:
 
 
 if __name__ == "__main__":
-    from hpccd_ros import scenes
-
     for word in sys.argv[1:]:
-        name, size, frames = word.split(":")
-        print(digest(scenes.make(name, float(size), int(frames))))
+        print(digest(make(word)))

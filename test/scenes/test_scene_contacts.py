@@ -3,6 +3,7 @@
 
 import numpy as np
 import pytest
+import solved_cloth
 
 import hpccd_core
 from hpccd_ros import scenes
@@ -96,7 +97,7 @@ def test_breaking_pieces_collide():
 
 
 def test_resolved_cloth_never_touches_and_is_near():
-    scene = scenes.make("cloth-ball-resolved", size=0.0625)
+    scene = solved_cloth.make("cloth-ball-resolved", size=0.0625)
     steps = range(1, len(scene), 3)
     assert not any(counts(contacts_of_steps(scene, steps)).values())
     detector = hpccd_core.Detector(scenes.core_scene(scene))
@@ -107,7 +108,7 @@ def test_resolved_cloth_never_touches_and_is_near():
 
 
 def test_trials_start_where_resolved_steps_do_and_touch():
-    resolved, trial = (scenes.make(f"cloth-ball-{kind}", size=0.0625) for kind in ("resolved", "trial"))
+    resolved, trial = (solved_cloth.make(f"cloth-ball-{kind}", size=0.0625) for kind in ("resolved", "trial"))
     for k in (0, 120, 218):
         np.testing.assert_array_equal(resolved.frame(k).stacked(), trial.frame(2 * k).stacked())
         assert trial.frame(2 * k).time == resolved.frame(k).time < trial.frame(2 * k + 1).time

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scene_digest import digest
+from scene_digest import digest, make
 
 import hpccd_ros
 from hpccd_ros import scenes
@@ -36,11 +36,6 @@ GOLDEN = {
 }
 
 
-def make(word):
-    name, size, frames = word.split(":")
-    return scenes.make(name, float(size), int(frames))
-
-
 @pytest.mark.parametrize("word", GOLDEN)
 def test_golden_hash(word):
     assert digest(make(word)) == GOLDEN[word]
@@ -56,7 +51,7 @@ def test_instruction_sets_do_not_change_the_numbers(tmp_path):
         "XDG_CACHE_HOME": str(tmp_path),
         "NPY_DISABLE_CPU_FEATURES": " ".join(features),
         "GLIBC_TUNABLES": "glibc.cpu.hwcaps=-AVX512F,-AVX2,-FMA,-FMA4",
-        "PYTHONPATH": str(Path(hpccd_ros.__file__).parents[1]),
+        "PYTHONPATH": os.pathsep.join([str(Path(hpccd_ros.__file__).parents[1]), *sys.path]),
     }
     words = [
         "folding-strip:1:61",
@@ -101,7 +96,7 @@ SEEDED = [
 
 @pytest.mark.parametrize("name", SEEDED)
 def test_seed_changes_the_motion(name):
-    a, b = (scenes.make(name, size=0.25, frames=12, seed=seed).frame(11).stacked() for seed in (0, 1))
+    a, b = (make(f"{name}:0.25:12", seed).frame(11).stacked() for seed in (0, 1))
     assert a.shape != b.shape or np.abs(a - b).max() > 1e-4
 
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hpccd_ros.scenes.resolved.response import FromBall, ToAir
-from hpccd_ros.scenes.resolved.setup import Setup
-from hpccd_ros.scenes.resolved.springs import Springs
+from cloth_solver.response import FromBall, ToAir
+from cloth_solver.setup import Setup
+from cloth_solver.springs import Springs
 
 
 @dataclass(frozen=True)

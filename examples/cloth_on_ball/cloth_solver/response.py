@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hpccd_ros.scenes.resolved.pairs import Pairs
-from hpccd_ros.scenes.resolved.setup import Setup
+from cloth_solver.pairs import Pairs
+from cloth_solver.setup import Setup
 
 # m/s at which surfaces that lie at their thickness are drawn apart, and faster the nearer they lie: at once would be an
 # explosion.

@@ -10,7 +10,7 @@ from typing import Protocol
 
 import numpy as np
 
-from hpccd_ros.scenes.resolved.setup import Setup
+from cloth_solver.setup import Setup
 
 
 class Near(Protocol):

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hpccd_ros.scenes.resolved.setup import Setup
+from cloth_solver.setup import Setup
 
 
 class Springs:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a simulator has and asks: a cloth on a spinning ball that never touches, and the steps that would.
+"""Scenes of a cloth on a spinning ball, made by the solver of examples/cloth_on_ball.
 
-Made by the solver of examples/cloth_on_ball. A frame is a move that was proven free, so the straight way from each
-frame to the next has no contact, and keeps the solver's clearance.
+cloth-ball-resolved   the solver's own steps: each is free of contacts and keeps the solver's clearance
+cloth-ball-trial      the same states, and from each a long unresolved step, with its contacts
 """
 
 from __future__ import annotations
@@ -10,36 +10,40 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
+from cloth_solver import motion, pairs, queries, response, setup, springs
 
 from hpccd_ros.scenes import cache, shapes
 from hpccd_ros.scenes.progress import track
-from hpccd_ros.scenes.resolved import motion, pairs, queries, response, setup, springs
 from hpccd_ros.scenes.scene import Frame, Mesh, Scene
 
 # s; four moves of the solver in one, or nothing would be hit: layers at rest are its thickness apart.
 TRIAL = 0.04
 
-# What the numbers depend on.
+TRIANGLES = 32_768  # at size 1
+FRAMES = {"cloth-ball-resolved": 220, "cloth-ball-trial": 439}
+
+# Modules that the numbers depend on.
 SOURCES = [motion, pairs, queries, response, setup, springs, shapes]
 
 
-def resolved(name, title, triangles: int, size: float, frames: int, seed: int, progress: bool) -> Scene:
-    """Frame k is where move k ended."""
-    chosen = _setup(triangles, size)
-    moves = _moves(chosen, frames - 1, seed, progress)
-    return _scene(name, title, chosen, frames, lambda k: (moves()["positions"][k], moves()["times"][k]))
+def make(name: str, size: float = 1.0, frames: int | None = None, seed: int = 0, progress: bool = False) -> Scene:
+    """A scene of FRAMES, with the arguments of hpccd_ros.scenes.make.
 
-
-def trial(name, title, triangles: int, size: float, frames: int, seed: int, progress: bool) -> Scene:
-    """Frame 2 k is where move k ended; frame 2 k + 1 where a step of TRIAL seconds from there would end unresolved."""
-    chosen = _setup(triangles, size)
+    Frame k of cloth-ball-resolved is where move k ended. Frame 2 k of cloth-ball-trial is the same; frame 2 k + 1 is
+    where a step of TRIAL seconds from there would end unresolved.
+    """
+    frames = FRAMES[name] if frames is None else frames
+    chosen = _setup(TRIANGLES, size)
+    if name == "cloth-ball-resolved":
+        moves = _moves(chosen, frames - 1, seed, progress)
+        return _scene(name, chosen, frames, lambda k: (moves()["positions"][k], moves()["times"][k]))
     moves = _moves(chosen, frames // 2, seed, progress)
 
     def at(index: int):
         move, tried = divmod(index, 2)
         return moves()["trials" if tried else "positions"][move], moves()["times"][move] + tried * TRIAL
 
-    return _scene(name, title, chosen, frames, at)
+    return _scene(name, chosen, frames, at)
 
 
 def _setup(triangles, size):
@@ -69,7 +73,7 @@ def _simulate(chosen, count, seed, progress) -> dict[str, np.ndarray]:
     return {"positions": positions, "trials": trials, "times": times}
 
 
-def _scene(name, title, chosen, frames, at) -> Scene:
+def _scene(name, chosen, frames, at) -> Scene:
     cloth, cloth_faces = chosen.cloth(0)
     ball, ball_faces = chosen.ball()
 
@@ -81,4 +85,4 @@ def _scene(name, title, chosen, frames, at) -> Scene:
         Mesh("cloth", cloth_faces, len(cloth)),
         Mesh("ball", ball_faces, len(ball), self_collision=False),
     )
-    return Scene(name, title, meshes, frames, chosen.period, frame)
+    return Scene(name, name, meshes, frames, chosen.period, frame)

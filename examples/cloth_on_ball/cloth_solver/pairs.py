@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cloth_solver.queries import Near
+from cloth_solver.setup import Setup
 from hpccd_ros.scenes.exactmath import cross, dot
-from hpccd_ros.scenes.resolved.queries import Near
-from hpccd_ros.scenes.resolved.setup import Setup
 
 
 @dataclass(frozen=True)

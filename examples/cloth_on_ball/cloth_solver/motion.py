@@ -12,12 +12,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hpccd_ros.scenes.resolved.ledger import Ledger
-from hpccd_ros.scenes.resolved.pairs import Pairs
-from hpccd_ros.scenes.resolved.queries import Queries
-from hpccd_ros.scenes.resolved.response import FromBall, ToAir, goals, respond
-from hpccd_ros.scenes.resolved.setup import Setup
-from hpccd_ros.scenes.resolved.springs import Springs
+from cloth_solver.ledger import Ledger
+from cloth_solver.pairs import Pairs
+from cloth_solver.queries import Queries
+from cloth_solver.response import FromBall, ToAir, goals, respond
+from cloth_solver.setup import Setup
+from cloth_solver.springs import Springs
 
 # Of a move that is not free: so much of the free part is made. The rest is room for the next one.
 CAUTION = 0.9
