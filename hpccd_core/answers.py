@@ -36,7 +36,6 @@ class Options(TypedDict, total=False):
     outputs: "Output | Iterable[Output]"
     simd: Simd
     minimum_separation: float
-    tolerance: float
     method: Method
     restructure: bool
     hybrid_segments: int

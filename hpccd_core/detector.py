@@ -75,7 +75,7 @@ class Detector(MotionQueries[OfMotion, OfStep], SnapshotQueries[OfNear, OfPierce
     the step, and the earliest such time; 0: those that touch. scene.set_separation and set_separation() say it for a
     pair of meshes. Neighbours that share no vertex count like all others: keep it below the shortest edge. "exact":
     as rational arithmetic would decide, times within 1e-12; "conservative": the same, no time late; "balanced", "fast":
-    computed as "exact". tolerance: no longer of any effect: no pair beyond the separation is reported.
+    computed as "exact". No tier reports a pair beyond the separation.
     features: what is tested at all: "vertex_face", "edge_edge" or both (default). What is left out costs nothing; what
     is left is found as ever. scene.set_features says it for a pair of meshes. It counts for detect(), step(),
     collision_free_step() and proximity(); intersections() and distances() look at whole surfaces.
@@ -162,7 +162,6 @@ class Detector(MotionQueries[OfMotion, OfStep], SnapshotQueries[OfNear, OfPierce
         outputs: Output | Iterable[Output] = (),
         simd: Simd = "auto",
         minimum_separation: float = 0.0,
-        tolerance: float = 1e-6,
         method: Method = "default",
         restructure: bool = True,
         hybrid_segments: int = 128,
@@ -200,7 +199,6 @@ class Detector(MotionQueries[OfMotion, OfStep], SnapshotQueries[OfNear, OfPierce
         if gpus > (here := len(gpu_status()["devices"])) and backend in ("hybrid", "auto"):
             raise ValueError(f"gpus: {gpus} were asked for, {here} are usable here; give at most {here}, or 0 for all")
         minimum_separation = arguments.length("minimum_separation", minimum_separation)
-        arguments.length("tolerance", tolerance)
         self.worlds = None if worlds is None else arguments.whole_number("worlds", worlds, 1, _core.MOST_WORLDS)
         self.n_vertices = scene.n_vertices
         self._shape = (self.n_vertices, 3) if self.worlds is None else (self.worlds, self.n_vertices, 3)

@@ -16,16 +16,14 @@ def test_vertex_face(
     *,
     simd: Simd = "auto",
     minimum_separation: float = 0.0,
-    tolerance: float = 1e-6,
 ) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
     """Whether and when moving vertices touch moving triangles.
 
     queries: (Q, 8, 3) float32 or float64, rows v f0 f1 f2 at t=0, then the same at t=1. accuracy: as for Detector.
     simd: "auto", "scalar", "avx2", "avx512" (x86-64) or "neon" (aarch64); the result is the same.
-    minimum_separation, tolerance: as for Detector. Returns hit (Q,) bool and toc (Q,) float64, +inf where there is no
-    contact.
+    minimum_separation: as for Detector. Returns hit (Q,) bool and toc (Q,) float64, +inf where there is no contact.
     """
-    return _test(_core.test_vertex_face, queries, accuracy, simd, minimum_separation, tolerance)
+    return _test(_core.test_vertex_face, queries, accuracy, simd, minimum_separation)
 
 
 def test_edge_edge(
@@ -34,10 +32,9 @@ def test_edge_edge(
     *,
     simd: Simd = "auto",
     minimum_separation: float = 0.0,
-    tolerance: float = 1e-6,
 ) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
     """Whether and when moving edges touch. Rows a0 a1 b0 b1 at t=0, then the same at t=1; else as test_vertex_face."""
-    return _test(_core.test_edge_edge, queries, accuracy, simd, minimum_separation, tolerance)
+    return _test(_core.test_edge_edge, queries, accuracy, simd, minimum_separation)
 
 
 def _test(
@@ -46,13 +43,11 @@ def _test(
     accuracy: Accuracy,
     simd: Simd,
     minimum_separation: float,
-    tolerance: float,
 ) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
     arguments.choice("accuracy", accuracy, ACCURACIES)
     arguments.choice("simd", simd, SIMD)
     checked = arguments.queries(queries)
     separation = arguments.length("minimum_separation", minimum_separation)
-    arguments.length("tolerance", tolerance)
     return function(checked, getattr(_core.Accuracy, accuracy), getattr(_core.Simd, simd), separation)
 
 

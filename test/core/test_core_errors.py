@@ -192,9 +192,6 @@ def test_offset_of_an_unknown_mesh(scene):
         pytest.param("minimum_separation", -(10**5000), ValueError, id="minimum_separation-negative"),
         ("minimum_separation", "1", TypeError),
         ("minimum_separation", 1j, TypeError),
-        pytest.param("tolerance", 10**400, ValueError, id="tolerance-huge"),
-        ("tolerance", -1e-6, ValueError),
-        ("tolerance", np.nan, ValueError),
     ],
 )
 def test_options_of_a_detector(scene, option, value, error):
@@ -458,7 +455,6 @@ def lengths_asked(scene, detector):
     """Whatever takes a length, and the name that its error must begin with."""
     return {
         "minimum_separation": lambda d: hc.Detector(scene, minimum_separation=d),
-        "tolerance": lambda d: hc.Detector(scene, tolerance=d),
         "distance": lambda d: detector.proximity(VERTICES, d),
         "separation": lambda d: detector.set_separation("cloth", "cloth", d),
         "separation:": lambda d: scene.set_separation("cloth", "cloth", d),

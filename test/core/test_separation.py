@@ -42,15 +42,6 @@ def test_guarantee(kind, generator, separation, scale, offset, accuracy):
     assert not (hit & beyond).any(), "invented"
 
 
-@KINDS
-def test_no_separation_gives_exactly_the_contacts(kind):
-    queries = GENERATORS[kind]["lattice"](np.random.default_rng(2), 500)
-    plain = CORE[kind](queries, "conservative")
-    for tolerance in (1e-12, 1e-3, 1.0):
-        for a, b in zip(plain, CORE[kind](queries, "conservative", tolerance=tolerance), strict=True):
-            assert np.array_equal(a, b)
-
-
 @pytest.mark.parametrize("units", (1, 2, 3, 5))
 def test_separations_of_the_least_numbers_there_are(units):
     """Half of such a number may be none. A vertex above a triangle, so far that the floor of half is too little."""
@@ -92,7 +83,6 @@ def test_separation_of_a_scene():
         ({"minimum_separation": -1.0}, ValueError, "minimum_separation.*negative"),
         ({"minimum_separation": np.nan}, ValueError, "minimum_separation.*finite"),
         ({"minimum_separation": "1"}, TypeError, "minimum_separation.*number"),
-        ({"tolerance": np.inf}, ValueError, "tolerance.*finite"),
     ],
 )
 def test_bad_separation(options, error, text):
@@ -101,28 +91,3 @@ def test_bad_separation(options, error, text):
         hc.Detector(hc.Scene(), **options)
     with pytest.raises(error, match=text):
         hc.test_vertex_face(np.zeros((1, 8, 3)), **options)
-
-
-@pytest.mark.parametrize("separation", [0.0, 0.3])
-@pytest.mark.parametrize("accuracy", ["fast", "balanced", "conservative", "exact"])
-def test_a_tolerance_means_nothing(accuracy, separation):
-    meshes = random_scenes.single_mesh(np.random.default_rng(5))
-    found = [
-        hc.Detector(meshes.scene(), accuracy=accuracy, minimum_separation=separation, **options).detect(
-            meshes.vertices_t0, meshes.vertices_t1
-        )
-        for options in ({}, {"tolerance": 0}, {"tolerance": 0.0}, {"tolerance": 0.25}, {"tolerance": 1e9})
-    ]
-    assert len(found[0]) and {contacts.hash for contacts in found} == {found[0].hash}
-
-
-@KINDS
-@pytest.mark.parametrize("accuracy", ["fast", "balanced", "conservative", "exact"])
-def test_a_tolerance_means_nothing_to_single_pairs(kind, accuracy):
-    queries = GENERATORS[kind]["lattice"](np.random.default_rng(6), 300)
-    given = {"accuracy": accuracy, "minimum_separation": 0.5}
-    hit, toc = CORE[kind](queries, **given)
-    assert hit.any() and not hit.all()
-    for tolerance in (0, 1e-3, 1.0):
-        other_hit, other_toc = CORE[kind](queries, **given, tolerance=tolerance)
-        assert hit.tobytes() == other_hit.tobytes() and toc.tobytes() == other_toc.tobytes()
