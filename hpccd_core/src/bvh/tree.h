@@ -15,10 +15,9 @@
 #include "bvh/motion_bounds.h"
 #include "bvh/motion_box.h"
 #include "scene/features.h"
+#include "scene/pair_rules.h"
 
 namespace hpccd {
-
-inline constexpr std::uint32_t mixed_meshes = 0xFFFFFFFFu;
 
 // A reach along the axes, along the slanted directions of a snapshot: they are longer by the root of two, and their
 // coordinates twice as large, with roundings to match.

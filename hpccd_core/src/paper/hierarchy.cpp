@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <numeric>
 
-#include "bvh/tree.h"
+#include "scene/pair_rules.h"
 
 namespace hpccd::paper {
 namespace {

@@ -11,7 +11,7 @@
 #include "base/profiler.h"
 #include "bvh/box.h"
 #include "scene/features.h"
-#include "traverse/tasks.h"
+#include "scene/pair_rules.h"
 #include "traverse/worker.h"
 
 namespace hpccd::paper {

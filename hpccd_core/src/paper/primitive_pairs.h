@@ -7,8 +7,8 @@
 
 #include "bvh/box.h"
 #include "scene/features.h"
+#include "scene/pair_rules.h"
 #include "traverse/leaf_pairs.h"
-#include "traverse/tasks.h"
 #include "traverse/worker.h"
 
 namespace hpccd::paper {

@@ -5,7 +5,7 @@
 
 #include "paper/hierarchy.h"
 #include "paper/primitive_pairs.h"
-#include "traverse/tasks.h"
+#include "scene/pair_rules.h"
 #include "traverse/worker.h"
 
 namespace hpccd::paper {

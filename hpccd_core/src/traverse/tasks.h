@@ -3,80 +3,16 @@
 // keep every thread busy. The list depends on the tree only, never on the number of threads.
 #pragma once
 
-#include <map>
-#include <optional>
 #include <vector>
 
 #include "bvh/tree.h"
-#include "hpccd/hpccd.h"
-#include "scene/separation_table.h"
+#include "scene/pair_rules.h"
 #include "traverse/excess.h"
 
 namespace hpccd {
 
 struct NodePair {
   std::uint32_t a, b;  // a == b: pairs within the subtree
-};
-
-// How the candidates of a pair of meshes are tested.
-struct Rule {
-  Accuracy accuracy;
-  bool separated;  // for a minimum separation above 0
-  TestedFeatures features = {};
-
-  // Of the test: it does not ask which candidates there are.
-  unsigned number() const { return static_cast<unsigned>(accuracy) + (separated ? 4 : 0); }
-  static Rule of_number(unsigned i) { return {static_cast<Accuracy>(i % 4), i >= 4}; }
-  bool operator==(const Rule&) const = default;
-  bool operator<(const Rule& other) const { return key() < other.key(); }
-
- private:
-  unsigned key() const { return number() + (features.vertex_face ? 8 : 0) + (features.edge_edge ? 16 : 0); }
-};
-inline constexpr unsigned n_rules = 8;
-
-// What the scene says of two meshes, looked up once per call.
-class PairRules {
- public:
-  PairRules(const Scene& scene, Accuracy accuracy, const SeparationTable& separations, TestedFeatures features = {});
-  // Updates the rules of pairs that were set since the table settled last.
-  void change(const SeparationTable& separations);
-  // Meshes by number, or mixed_meshes: then some of their pairs may be enabled.
-  bool enabled(std::uint32_t mesh_a, std::uint32_t mesh_b) const {
-    if (tested_.all() || mesh_a == mixed_meshes || mesh_b == mixed_meshes) return true;
-    return tested_.of(mesh_a, mesh_b);
-  }
-  bool all_meshes() const { return tested_.all(); }
-  bool by_table() const { return tested_.by_table(); }
-  // As enabled(), where by_table() holds.
-  bool enabled_by_table(const Node& a, const Node& b) const {
-    return (a.mesh == mixed_meshes || b.mesh == mixed_meshes || tested_.in_table(a.mesh, b.mesh)) &&
-           !(a.only_points && b.only_points);
-  }
-  bool enabled(const Node& a, const Node& b) const {
-    return enabled(a.mesh, b.mesh) && !(a.only_points && b.only_points);
-  }
-  // Of an enabled pair.
-  Rule rule(std::uint32_t mesh_a, std::uint32_t mesh_b) const {
-    return one_rule_ ? *one_rule_ : rules_.of(mesh_a, mesh_b);
-  }
-  // Whether every pair that touches has a time of contact, to 1e-12, so that one that cannot touch until then has none.
-  bool promise_times() const { return promise_times_; }
-  // Whether a pair is tested for which backends answer differently: "fast", without a separation.
-  bool any_fast() const { return any_fast_; }
-  Rule rule(const Node& a, const Node& b) const { return rule(a.mesh, b.mesh); }
-  std::size_t bytes() const { return tested_.bytes() + rules_.bytes(); }
-
- private:
-  void set(std::uint32_t mesh_a, std::uint32_t mesh_b, Rule rule);
-  void separate(std::uint32_t mesh_a, std::uint32_t mesh_b, double separation);
-  void look_at_all();
-
-  TestedPairs tested_;
-  PairTable<Rule> rules_;
-  std::map<Rule, std::size_t> n_with_rule_;  // enabled pairs
-  std::optional<Rule> one_rule_;             // of all of them
-  bool promise_times_ = true, any_fast_ = false;
 };
 
 // Where a walk over the tree ends.
@@ -150,21 +86,21 @@ template <class Boxes>
 template <class Boxes>
 [[gnu::noinline]] bool worth_visiting_by_hash(const PairRules& rules, const Boxes& boxes, const Node& a,
                                               const Node& b) {
-  return rules.enabled(a, b) && boxes_meet(boxes, a, b);
+  return rules.enabled(a.mesh, b.mesh) && boxes_meet(boxes, a, b);
 }
 
 template <class Boxes>
 [[gnu::noinline]] bool worth_visiting_by_rules(const PairRules& rules, const Boxes& boxes, const Node& a,
                                                const Node& b) {
   if (!rules.by_table()) return worth_visiting_by_hash(rules, boxes, a, b);
-  return rules.enabled_by_table(a, b) && boxes_meet(boxes, a, b);
+  return rules.enabled_by_table(a.mesh, b.mesh) && boxes_meet(boxes, a, b);
 }
 
 template <class Boxes>
 bool worth_visiting(const std::vector<Node>& nodes, const PairRules& rules, const Boxes& boxes, NodePair p) {
   const Node &a = nodes[p.a], &b = nodes[p.b];
-  if (!rules.all_meshes()) return worth_visiting_by_rules(rules, boxes, a, b);
-  return !(a.only_points && b.only_points) && boxes_meet(boxes, a, b);
+  if (a.only_points && b.only_points) return false;
+  return rules.all_meshes() ? boxes_meet(boxes, a, b) : worth_visiting_by_rules(rules, boxes, a, b);
 }
 
 // All of them worth visiting.

@@ -73,7 +73,7 @@ void test_leaves(const Tree& tree, const PairRules& rules, LeafPair pair, Worker
   const Node &node_a = node(pair.first), &node_b = node(pair.second);
   const LeafRange &a = tree.leaves[pair.first], &b = tree.leaves[pair.second];
   const Search& search = worker.search();
-  const Rule rule = rules.rule(node_a, node_b);
+  const Rule rule = rules.rule(node_a.mesh, node_b.mesh);
   if (search.leaf_pairs) {
     const PartOfMotion part = search.part();
     worker.test_candidates(rule, [&](CandidateBuffer& edge_edge, CandidateBuffer& vertex_face) {

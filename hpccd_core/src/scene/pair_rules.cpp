@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "traverse/tasks.h"
+#include "scene/pair_rules.h"
 
 namespace hpccd {
 namespace {
