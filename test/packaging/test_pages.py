@@ -146,21 +146,26 @@ def output_of(program, folder):
     return done.stdout
 
 
-def test_walk_of_a_message_has_ten_stops_that_exist():
+@pytest.mark.parametrize(
+    "heading, folder",
+    [("### Call path of `detect()`", ROOT / "hpccd_core"), ("## Call path of a vertex message", ROOT / "hpccd_ros")],
+)
+def test_call_path_has_at_most_ten_stops_that_exist(heading, folder):
     text = (ROOT / "docs" / "architecture.md").read_text()
-    walk = text.partition("## The walk of a message\n")[2].partition("\n## ")[0]
-    stops = re.findall(r"^\d+\. `([\w/]+\.py):(\w+)`", walk, re.MULTILINE)
-    assert 0 < len(stops) <= 10 and len(set(stops)) == len(stops) == len(re.findall(r"^\d+\. ", walk, re.MULTILINE))
+    path = text.partition(f"{heading}\n")[2].partition("\n#")[0]
+    stops = re.findall(r"^\d+\. `([\w/]+\.(?:py|cpp)):(\w+)`", path, re.MULTILINE)
+    assert 0 < len(stops) <= 10 and len(set(stops)) == len(stops) == len(re.findall(r"^\d+\. ", path, re.MULTILINE))
     for file, function in stops:
-        assert f"def {function}(" in (ROOT / "hpccd_ros" / file).read_text(), (file, function)
+        definition = rf"def {function}\(" if file.endswith(".py") else rf"\b{function}\("
+        assert re.search(definition, (folder / file).read_text()), (file, function)
 
 
 @pytest.mark.parametrize(
     "heading, folder",
-    [("The rooms of hpccd_core", CORE), ("The floors of hpccd_ros", ROOT / "hpccd_ros")],
+    [("The layers of hpccd_core", CORE), ("The layers of hpccd_ros", ROOT / "hpccd_ros")],
 )
-def test_architecture_names_every_room_once(heading, folder):
+def test_architecture_names_every_module_once(heading, folder):
     text = (ROOT / "docs" / "architecture.md").read_text()
     section = text.partition(f"## {heading}\n")[2].partition("\n#")[0]
-    rooms = [path.name for path in folder.iterdir() if path.is_dir() and path.name != "__pycache__"]
-    assert sorted(re.findall(r"^\| `(\w+)` \|", section, re.MULTILINE)) == sorted(rooms)
+    modules = [path.name for path in folder.iterdir() if path.is_dir() and path.name != "__pycache__"]
+    assert sorted(re.findall(r"^\| `(\w+)` \|", section, re.MULTILINE)) == sorted(modules)
