@@ -92,14 +92,14 @@ def misplaced(summary: Summary, data: list[Place]) -> str | None:
 
     An index may name none of a kind at all.
     """
-    for opcode, name, told in (
+    for opcode, name, indexed in (
         (Opcode.CHUNK, "chunk", [(i.chunk_start_offset, i.chunk_length) for i in summary.chunk_indexes]),
         (Opcode.ATTACHMENT, "attachment", [(i.offset, i.length) for i in summary.attachment_indexes]),
         (Opcode.METADATA, "metadata record", [(i.offset, i.length) for i in summary.metadata_indexes]),
     ):
         there = [(place.at, place.length) for place in data if place.opcode == opcode]
-        if told and sorted(told) != there:
-            wrong = sorted(set(told).symmetric_difference(there)) or told
+        if indexed and sorted(indexed) != there:
+            wrong = sorted(set(indexed).symmetric_difference(there)) or indexed
             return f"the index is wrong about the {name} at byte {wrong[0][0]:,}"
     return None
 
@@ -128,12 +128,14 @@ def miscounted(summary: Summary, counts: dict[int, int]) -> str | None:
     """
     if summary.statistics is None:
         return None
-    told = stored_counts(summary)
-    if told is None:
-        told = dict(counts)
-    if told == dict(counts) and summary.statistics.message_count == sum(counts.values()):
+    indexed = stored_counts(summary)
+    if indexed is None:
+        indexed = dict(counts)
+    if indexed == dict(counts) and summary.statistics.message_count == sum(counts.values()):
         return None
-    where = next((n for n in {**told, **counts} if told.get(n, 0) != counts.get(n, 0)), None)
+    where = next((n for n in {**indexed, **counts} if indexed.get(n, 0) != counts.get(n, 0)), None)
     if where is None:
         return f"the index tells of {summary.statistics.message_count:,} messages, there are {sum(counts.values()):,}"
-    return f"the index tells of {told.get(where, 0):,} messages of channel {where}, there are {counts.get(where, 0):,}"
+    return (
+        f"the index tells of {indexed.get(where, 0):,} messages of channel {where}, there are {counts.get(where, 0):,}"
+    )

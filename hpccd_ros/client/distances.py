@@ -64,7 +64,7 @@ def distances_from_message(message: DistanceArray) -> DistanceArrays:
     Raises ValueError where the arrays of the message do not fit together, which those of the node always do.
     """
     count = len(message.distance)
-    told = len(message.direction) or len(message.approach_speed)
+    n_directed = len(message.direction) or len(message.approach_speed)
     return DistanceArrays(
         tuple(message.mesh_names),
         distance=field(message, "distance", np.float64, (count,)),
@@ -74,6 +74,6 @@ def distances_from_message(message: DistanceArray) -> DistanceArrays:
         features_a=field(message, "features_a", np.uint32, (count, 2)),
         features_b=field(message, "features_b", np.uint32, (count, 2)),
         points=field(message, "points", np.float64, (count, 2, 3)),
-        direction=field(message, "direction", np.float64, (count, 3)) if told else np.zeros((count, 3)),
-        approach_speed=field(message, "approach_speed", np.float64, (count,)) if told else np.full(count, np.nan),
+        direction=field(message, "direction", np.float64, (count, 3)) if n_directed else np.zeros((count, 3)),
+        approach_speed=field(message, "approach_speed", np.float64, (count,)) if n_directed else np.full(count, np.nan),
     )

@@ -86,11 +86,11 @@ class StopListener:
         # Earlier messages are not accepted: nothing here has seen whether a clock was set back since they were sent.
         self._begun = self._clocks.system()
         self._sent: int | None = None  # when the newest message was sent; None: none, or its publisher was lost since
-        self._said = True  # what it said
-        self._said_true = 0  # when the newest message saying true was sent
+        self._value = True  # of that message
+        self._sent_true = 0  # when the newest message with true was sent
         self._alive: int | None = None  # None: DDS has not told yet
         self._lost = f"nothing was heard yet on {node.resolve_topic_name(topic)}"
-        self._told = True  # to on_change
+        self._notified = True  # to on_change
         events = SubscriptionEventCallbacks(
             deadline=self._on_deadline, liveliness=self._on_liveliness, incompatible_qos=self._on_incompatible
         )
@@ -98,7 +98,7 @@ class StopListener:
         self._subscription = node.create_subscription(Bool, topic, on_message, profile, event_callbacks=events)
         self._topic: str = self._subscription.topic_name
         self._timer = node.create_timer(
-            self._timeout / _LOOKS, self._tell, clock=Clock(clock_type=ClockType.STEADY_TIME)
+            self._timeout / _LOOKS, self._notify, clock=Clock(clock_type=ClockType.STEADY_TIME)
         )
 
     @property
@@ -133,10 +133,10 @@ class StopListener:
                 return f"No message on {self._topic} was sent in the last {age:.3g} s."
             if self._alive is not None and self._alive < self._publishers:
                 return f"{self._alive} of {self._publishers} publishers are alive on {self._topic}."
-            if self._said:
+            if self._value:
                 return f"It was said on {self._topic}."
             several = max(self._publishers, self._alive or 0) > 1
-            if several and 1e-9 * (system - self._said_true) < self._timeout:
+            if several and 1e-9 * (system - self._sent_true) < self._timeout:
                 return f"One of several publishers said it on {self._topic}."
             return None
 
@@ -146,14 +146,14 @@ class StopListener:
             steady, system = self._clocks.steady(), self._clocks.system()
             self._ages.look(steady, system)
             self._ages.hear(f"a message on {self._topic}", 1e-9 * (sent - system), steady)
-            self._said_true = min(self._said_true, system)  # a clock may have been set back
+            self._sent_true = min(self._sent_true, system)  # a clock may have been set back
             if message.data:
-                self._said_true = max(self._said_true, sent)
+                self._sent_true = max(self._sent_true, sent)
             if sent < self._begun:
                 self._lost = f"no message on {self._topic} was sent since the listener was made"
             elif self._sent is None or sent >= self._sent or self._sent > system:
-                self._said, self._sent = message.data, sent
-        self._tell()
+                self._value, self._sent = message.data, sent
+        self._notify()
 
     def _on_deadline(self, event: Any) -> None:
         self._lose(f"nothing was heard on {self._topic} for {self._timeout:g} s")
@@ -164,7 +164,7 @@ class StopListener:
         if event.alive_count < self._publishers:
             self._lose(f"{event.alive_count} of {self._publishers} publishers are alive on {self._topic}")
         else:
-            self._tell()
+            self._notify()
 
     def _on_incompatible(self, event: Any) -> None:
         self._lose(
@@ -175,11 +175,11 @@ class StopListener:
     def _lose(self, why: str) -> None:
         with self._lock:
             self._sent, self._lost = None, why
-        self._tell()
+        self._notify()
 
-    def _tell(self) -> None:
+    def _notify(self) -> None:
         stop = self.stop
         with self._lock:
-            changed, self._told = stop != self._told, stop
+            changed, self._notified = stop != self._notified, stop
         if changed and self._on_change is not None:
             self._on_change(self)

@@ -24,7 +24,7 @@ class Child:
     def running(self) -> bool:
         return self.process.poll() is None
 
-    def said(self, text: str) -> bool:
+    def has_printed(self, text: str) -> bool:
         """Whether its output contains `text` by now."""
         return text in self.log.read_text(encoding="utf-8", errors="replace")
 

@@ -17,9 +17,10 @@ from hpccd_ros.middleware import environment, stop_signals, topic_names
 class Monitor:
     """Listens to `contacts` and to the diagnostics of the node.
 
-    answers: steps that the node has answered so far. step, contacts, first_toc: of the last one heard. most: largest
+    answers: steps that the node has answered so far. step, contacts, first_toc: of the last one received. most: largest
     number of contacts and its step. dropped: frames dropped by the node. core_ms: median of the core's time for a
-    frame, None until the node has told it. heard_first, heard: when the first and the last answer came (monotonic, s).
+    frame, None until the node has reported it. first_received, last_received: when the first and the last result was
+    received (monotonic, s).
     """
 
     def __init__(self):
@@ -39,7 +40,7 @@ class Monitor:
         self.first_toc = float("inf")
         self.most = (0, 0)
         self.core_ms: float | None = None
-        self.heard_first = self.heard = time.monotonic()
+        self.first_received = self.last_received = time.monotonic()
 
     def __enter__(self):
         return self
@@ -53,7 +54,7 @@ class Monitor:
         """Whether a node with this full name is in the network."""
         return any(f"{ns.rstrip('/')}/{n}" == name for n, ns in self._node.get_node_names_and_namespaces())
 
-    def hears_contacts(self) -> bool:
+    def receives_contacts(self) -> bool:
         """Whether a publisher of contacts is connected to this listener."""
         return self._contacts.get_publisher_count() > 0
 
@@ -83,9 +84,9 @@ class Monitor:
 
     def _count(self, answers):
         if answers > self.answers:
-            self.heard = time.monotonic()
+            self.last_received = time.monotonic()
             if self.answers == 0:
-                self.heard_first = self.heard
+                self.first_received = self.last_received
             self.answers = answers
 
 

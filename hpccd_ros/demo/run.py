@@ -111,8 +111,8 @@ def _stream(args, scene, folder, console):
             "--wait",
             "180",
         )
-        children.wait(lambda: recorder.said("recording "), "the recorder did not hear the node", 180.0)
-        children.wait(monitor.hears_contacts, "the node was not heard", 180.0)
+        children.wait(lambda: recorder.has_printed("recording "), "the recorder did not hear the node", 180.0)
+        children.wait(monitor.receives_contacts, "the node was not heard", 180.0)
         publisher = children.start(
             "publisher", "hpccd_ros.demo.publisher", args.scene, str(args.size), str(scene.n_frames), str(args.rate)
         )
@@ -144,7 +144,7 @@ def _steps(scene) -> int:
 
 def _slower(monitor, frames, rate) -> str:
     """What to say where the scene has played slower than at `rate`."""
-    took = monitor.heard - monitor.heard_first
+    took = monitor.last_received - monitor.first_received
     planned = (frames - 2) / rate  # from the first answer to the last
     if took < 1.25 * planned + 1.0:
         return ""
@@ -170,28 +170,28 @@ def _watch(monitor, children, publisher, steps, console):
         BarColumn(bar_width=28),
         MofNCompleteColumn(),
         TextColumn("steps"),
-        TextColumn("{task.fields[said]}"),
+        TextColumn("{task.fields[status]}"),
         console=console,
         transient=True,
         disable=not console.is_terminal,
     )
     shown = -1
     with progress:
-        bar = progress.add_task("steps", total=steps, said="")
+        bar = progress.add_task("steps", total=steps, status="")
         while publisher.running or (monitor.answers < steps and not _silent(monitor)):
             monitor.listen(0.1)
             children.check()
-            said = _state(monitor)
-            progress.update(bar, completed=monitor.answers, said=said)
+            status = _state(monitor)
+            progress.update(bar, completed=monitor.answers, status=status)
             if not console.is_terminal and monitor.answers // 10 > shown:
                 shown = monitor.answers // 10
-                console.print(f"           frame {monitor.step:4}: {said}")
+                console.print(f"           frame {monitor.step:4}: {status}")
     children.check()
 
 
 def _silent(monitor) -> bool:
     """Whether no more answers are to be expected; on a busy machine the first may be late."""
-    return time.monotonic() - monitor.heard >= (3.0 if monitor.answers else 60.0)
+    return time.monotonic() - monitor.last_received >= (3.0 if monitor.answers else 60.0)
 
 
 def _state(monitor) -> str:

@@ -82,14 +82,14 @@ class InterleavedSequences:
 
     def __init__(self) -> None:
         self._lasts: list[int] = []  # of each sequence, the one read last at the end
-        self._unheard = 0  # publishers reported and not read; below 0: read and not reported
+        self._unread = 0  # publishers reported and not read; below 0: read and not reported
         self._alone = False
 
     def matched(self, new: int, ended: int) -> None:
         """``new`` publishers were reported since the last call, and the end of ``ended`` ones."""
-        self._unheard += new
+        self._unread += new
         if ended:
-            self._unheard = min(self._unheard, 0)  # a publisher may end unheard
+            self._unread = min(self._unread, 0)  # a publisher may end unheard
 
     def missing(self, number: int, alone: bool) -> int:
         """Messages lost before this one. alone: there is one publisher now."""
@@ -97,8 +97,8 @@ class InterleavedSequences:
             self._lasts = self._lasts[-1:]  # the other sequences are those of publishers that ended
         self._alone = alone
         last = max((last for last in self._lasts if last < number), default=None)
-        if last is None or (last < number - 1 and self._unheard > 0):
-            self._unheard -= 1
+        if last is None or (last < number - 1 and self._unread > 0):
+            self._unread -= 1
             self._lasts = [*self._lasts, number][-self.MOST :]
             return 0
         self._lasts.remove(last)

@@ -58,15 +58,17 @@ class Follower(Protocol):
 
 
 class ReachedTimes:
-    """``anew``: the time that goes on is of another run than the one before. ``set_back``: because something has begun
-    anew; else only a stamp far ahead was left out, and what is known of any time stays.
+    """Which stamps are reached by all inputs.
 
-    What goes back by more than a second has begun anew. What goes back by less is a restart as that of a mesh is: after
-    ``restart_after`` increasing stamps in a row, of which whatever has begun anew had RESTART_AFTER already.
+    ``restarted``: the last stamp belongs to a new run. ``set_back``: an input restarted; otherwise only a stamp far
+    ahead was dropped, and samples of all times stay valid.
+
+    Stamps that go back by more than a second are a restart. Smaller steps back are a restart after ``restart_after``
+    increasing stamps in a row, as for meshes; an input that restarted has had RESTART_AFTER of them already.
     """
 
     def __init__(self) -> None:
-        self.anew = self.set_back = False
+        self.restarted = self.set_back = False
         self._last: int | None = None  # of the last frame
         self._begun = 0  # when that was
         self._behind = IncreasingStamps()
@@ -74,18 +76,17 @@ class ReachedTimes:
         self._behind_last: int | None = None  # the stamp behind it that was looked at last
 
     def goes_on(self, stamp: int, begun: int, restart_after: int) -> bool:
-        """Whether there is a frame at ``stamp`` ns, which all have reached now. begun: how often one of them began
-        anew."""
+        """Whether there is a frame at ``stamp`` ns, which all inputs have reached. begun: restarts of inputs so far."""
         last = self._last
-        self.anew = last is not None and stamp < last and self._is_anew(stamp, last, begun, restart_after)
-        if last is not None and stamp <= last and not self.anew:
+        self.restarted = last is not None and stamp < last and self._restarted(stamp, last, begun, restart_after)
+        if last is not None and stamp <= last and not self.restarted:
             return False
-        self.set_back = self.anew and begun != self._begun
+        self.set_back = self.restarted and begun != self._begun
         self._last, self._begun = stamp, begun
         self._behind, self._behind_last = IncreasingStamps(), None
         return True
 
-    def _is_anew(self, stamp: int, last: int, begun: int, restart_after: int) -> bool:
+    def _restarted(self, stamp: int, last: int, begun: int, restart_after: int) -> bool:
         if stamp < last - RESTART_NS:
             return True
         if begun == self._begun or not restart_after:

@@ -196,11 +196,11 @@ class FramePipeline:
         if stamp is None or not self._reached.goes_on(stamp, self._begun(), self._assembler.restart_after):
             return Outcome()
         outcome = Outcome()
-        if self._reached.anew:  # before a frame is placed by what is from before
+        if self._reached.restarted:  # before a frame is placed by what is from before
             outcome.refusals += self._clear_asked()
             if self._reached.set_back:
                 self._forget_future(stamp)
-        outcome += self._ask(stamp, time.monotonic(), new_publisher=self._reached.anew)
+        outcome += self._ask(stamp, time.monotonic(), new_publisher=self._reached.restarted)
         return outcome
 
     def _latest(self) -> int | None:

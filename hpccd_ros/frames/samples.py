@@ -42,7 +42,7 @@ class Samples(Generic[Value]):
         self.since: tuple[int, int] | None = None
         self._behind = IncreasingStamps()
 
-    def begins_anew(self, stamp: int) -> bool:
+    def restarts(self, stamp: int) -> bool:
         return bool(self.stamps) and stamp < self.stamps[-1] - RESTART_NS
 
     @property
@@ -113,7 +113,7 @@ class Run:
         self._all = all_samples
         self.begun = 0
         self._came = 0  # messages so far
-        self._anew: int | None = None  # the first stamp after it last began anew
+        self._first_after_restart: int | None = None  # the first stamp after it last began anew
 
     def add(self, stamp: int, of_message: Iterable[tuple[Samples[Value], Value]], sent: int = 0) -> int | None:
         """Add the values of one message, which was sent at ``sent``. Returns the stamp of an earlier message that is
@@ -124,33 +124,33 @@ class Run:
             if samples.makes_stray(stamp):
                 stray = samples.stamps[-1]
                 self._leave_out(samples.numbers[-1], stamp)
-            elif samples.begins_anew(stamp):
-                self._begin_anew(self._came, stamp)
+            elif samples.restarts(stamp):
+                self._restart(self._came, stamp)
             if samples.add(stamp, value, self._came, sent) and samples.since is not None:
-                self._begin_anew(*samples.since)
+                self._restart(*samples.since)
         return stray
 
     def forget_future(self, stamp: int) -> None:
         """A mesh begins anew with ``stamp``: samples beyond it are from before, but those that have begun anew too."""
-        with_it = self._anew is not None and abs(stamp - self._anew) <= RESTART_NS
+        with_it = self._first_after_restart is not None and abs(stamp - self._first_after_restart) <= RESTART_NS
         for samples in self._all():
             if samples.since is not None:
-                number, self._anew = samples.since
+                number, self._first_after_restart = samples.since
                 samples.forget_before(number)
-            elif samples.begins_anew(stamp) or (samples.stamps and samples.stamps[-1] > stamp and not with_it):
+            elif samples.restarts(stamp) or (samples.stamps and samples.stamps[-1] > stamp and not with_it):
                 samples.forget_before(self._came + 1)
 
     def _leave_out(self, number: int, stamp: int) -> None:
         """The message of this number, all that it told; the time is ``stamp`` again."""
         for samples in self._all():
             samples.forget_newest(number)
-        self._anew = stamp
+        self._first_after_restart = stamp
 
-    def _begin_anew(self, number: int, stamp: int) -> None:
+    def _restart(self, number: int, stamp: int) -> None:
         """What came before would be interpolated with what comes now, of one thing and across things."""
         for samples in self._all():
             samples.forget_before(number)
-        self._anew = stamp
+        self._first_after_restart = stamp
         self.begun += 1
 
 

@@ -60,7 +60,7 @@ class TakenInputs:
             self.count += 1
             self._unreported.append(TakenInput(self.count, topic, sent, flags))
 
-    def tell(self, last: int) -> list[TakenInput]:
+    def pop_until(self, last: int) -> list[TakenInput]:
         """The inputs up to the number ``last`` that were not reported before, without gaps."""
         reported = []
         with self._lock:

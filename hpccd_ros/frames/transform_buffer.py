@@ -67,12 +67,12 @@ class _Edge(Samples[Rigid]):
 class TransformBuffer:
     """Transforms from child frames to their parents, and lookups between any two frames of the tree.
 
-    ``heard``: messages so far of each topic on which transforms may come, for whoever asks why there is none; a text
-    in place of a number: why that topic is not listened to.
+    ``received``: number of messages so far of each topic that may carry transforms, for the warnings; a text in place
+    of a number: why the node does not subscribe to that topic.
     """
 
     def __init__(self) -> None:
-        self.heard: dict[str, int | str] = {}
+        self.received: dict[str, int | str] = {}
         self._edges: dict[str, _Edge] = {}
         # When the newest rejected static transform was sent: of each child, and of any child.
         self._rejected_of: dict[str, int] = {}
@@ -180,12 +180,12 @@ class TransformBuffer:
     def account(self, frame: str) -> str:
         """In words what has been heard at all, and which frames are known; those first that are called like ``frame``
         but for what stands before. Bounded."""
-        topics = [f"{topic} {_messages(count)}" for topic, count in self.heard.items()]
+        topics = [f"{topic} {_messages(count)}" for topic, count in self.received.items()]
         last = frame.rpartition("/")[2]
         known = list(dict.fromkeys(name for child, edge in self._edges.items() for name in (child, edge.parent)))
         alike = [name for name in known if name.rpartition("/")[2] == last]
         frames = f"frames known: {listed(dict.fromkeys([*alike, *known])) or 'none'}"
-        return "; ".join([f"heard: {', '.join(topics)}", frames] if topics else [frames])
+        return "; ".join([f"received: {', '.join(topics)}", frames] if topics else [frames])
 
     def _ancestors(self, frame: str) -> list[str]:
         path = [frame]

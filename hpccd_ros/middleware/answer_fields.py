@@ -51,8 +51,8 @@ def fill_features(message: ContactArray, features: tuple[str, ...]) -> None:
 
 def read_features(message: ContactArray) -> tuple[str, ...]:
     """In the order of FEATURES; both where the message does not tell."""
-    told = tuple(name for name in FEATURES if message.tested_features & _BITS[name])
-    return told if 0 < message.tested_features <= sum(_BITS.values()) else FEATURES
+    tested = tuple(name for name in FEATURES if message.tested_features & _BITS[name])
+    return tested if 0 < message.tested_features <= sum(_BITS.values()) else FEATURES
 
 
 def fill_bounds(message: ContactArray, bounds: MotionBounds) -> None:

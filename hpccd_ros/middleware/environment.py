@@ -57,10 +57,11 @@ def prepare() -> None:
     _keep_freed_memory()
 
 
-def ask_often(folder: Path) -> None:
-    """After `prepare`, before `rclpy.init()`: reliable publishers of this process ask ten times a second what has
-    arrived, not every 3 s. For those that wait for it (listeners.py). folder: for the profile that says so; until
-    the first node is there.
+def shorten_heartbeats(folder: Path) -> None:
+    """Send heartbeats of reliable publishers ten times a second, not every 3 s, for programs that wait for
+    acknowledgements (listeners.py). Call it after `prepare` and before `rclpy.init()`.
+
+    folder: holds the DDS profile; needed until the first node exists.
     """
     profile = Path(os.environ.get(_DDS_CHOICES[0], ""))
     if not _ours(profile):

@@ -23,7 +23,7 @@ class Accounts:
 
     ``static_taken``: accepted messages of static meshes, which count as answered. ``requests``: to ~/detect, service
     and action, by how they ended. ``inputs``: those taken since the node was configured. warn: logs a text.
-    on_refused: called with each refusal, in the thread that refuses. on_heard: called with each input message: its
+    on_refused: called with each refusal, in the thread that refuses. on_received: called with each input message: its
     kind, its mesh or topic, and the middleware's info about it.
     """
 
@@ -39,7 +39,7 @@ class Accounts:
         self.static_taken = 0
         self.inputs = TakenInputs()
         self.on_refused: Callable[[Refusal], None] = lambda refusal: None
-        self.on_heard: Callable[[str, str, dict[str, Any]], None] = lambda kind, name, info: None
+        self.on_received: Callable[[str, str, dict[str, Any]], None] = lambda kind, name, info: None
 
     def add(self, outcome: Outcome) -> None:
         """What came of a message, but for the frames: those are counted when they are answered."""
@@ -131,7 +131,7 @@ class RefusalLog:
         self.last = ""
 
     def __call__(self, mesh: str, reason: Reason, text: str) -> None:
-        self._tell(mesh, mesh, reason, shortened(text, _LONGEST))
+        self._log(mesh, mesh, reason, shortened(text, _LONGEST))
 
     def together(self, refusals: Iterable[Refusal]) -> None:
         """Those that have a text. Of what several links of a robot were refused for, the text of the first is told."""
@@ -144,9 +144,9 @@ class RefusalLog:
         for (robot, reason), (first, *others) in alike.items():
             names = dict.fromkeys(other.mesh for other in others if other.mesh != first.mesh)
             more = f"; as well {listed(names)}" if names else ""
-            self._tell(robot, first.mesh, reason, shortened(first.text, _LONGEST) + more)
+            self._log(robot, first.mesh, reason, shortened(first.text, _LONGEST) + more)
 
-    def _tell(self, whose: str, mesh: str, reason: Reason, text: str) -> None:
+    def _log(self, whose: str, mesh: str, reason: Reason, text: str) -> None:
         self.last = f"{mesh}: {reason}: {text}"
         now = self._clock()
         since, count = self._silent.get((whose, reason), (-float("inf"), 0))

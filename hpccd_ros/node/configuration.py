@@ -60,7 +60,7 @@ class Configuration:
 
         parameters.watch(self._node, self.settings, self.meshes, configured=configured, check=check, on_change=changed)
 
-    def know(self, robots: Robots) -> SceneBuilder:
+    def with_robots(self, robots: Robots) -> SceneBuilder:
         """From now on these are known; the scene with them. Raises ParameterError, and then those before stay: a pair
         names a link that there is not, nothing could ever be near for stop_distance."""
         robots = dict(robots)

@@ -57,7 +57,7 @@ class ContactsPublisher:
         answer_fields.fill_bounds(message, found.bounds)
         message.dropped_frames = dropped_frames
         last = found.end.inputs
-        answer_fields.fill_inputs(message, taken.tell(last), start=found.start.inputs, end=last)
+        answer_fields.fill_inputs(message, taken.pop_until(last), start=found.start.inputs, end=last)
         answer_fields.fill_report(message, found.options.report)
         self._contacts.publish(message)
         if found.gaps is not None:

@@ -59,7 +59,9 @@ class DetectAction:
             callback_group=group,
         )
         steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self._timer = node.create_timer(PERIOD, self._tell, callback_group=group, clock=steady, autostart=False)
+        self._timer = node.create_timer(
+            PERIOD, self._send_feedback, callback_group=group, clock=steady, autostart=False
+        )
 
     def stop(self) -> None:
         """The goals that are open are aborted at the executor's next turn."""
@@ -106,11 +108,11 @@ class DetectAction:
             goal.abort()
         return result
 
-    def _tell(self) -> None:
+    def _send_feedback(self) -> None:
         places = self._jobs.places()
         for name in tuple(itertools.islice(self._open, MOST_TOLD)):
-            self._open[name] = told = self._open.pop(name)  # to the end: the others are next
-            self._feedback(*told, places)
+            self._open[name] = oldest = self._open.pop(name)  # to the end: the others are next
+            self._feedback(*oldest, places)
 
     def _feedback(self, goal: ServerGoalHandle, ticket: Ticket, places: dict[Ticket, int]) -> None:
         feedback = Detect.Feedback(seconds=ticket.seconds, time_limit=ticket.time_limit)

@@ -43,12 +43,12 @@ class InputSubscription:
     ) -> None:
         self._node = node
         self._reliability = reliability
-        self._any_unheard = False
+        self._any_unconnected = False
 
         def incompatible(event: Any) -> None:
             if counts is not None:
                 counts[f"qos_incompatible.{topic}"] += event.total_count_change
-            self._any_unheard = True
+            self._any_unconnected = True
             for line in self.warnings() or [f"{self.topic}: a publisher offers less than the node requests"]:
                 node.get_logger().warning(line)
 
@@ -77,16 +77,16 @@ class InputSubscription:
 
     def warnings(self) -> list[str]:
         """One sentence for each publisher that exists and is not connected."""
-        if not self._any_unheard:  # asking for the publishers of every topic would take long
+        if not self._any_unconnected:  # asking for the publishers of every topic would take long
             return []
         found = self._node.get_publishers_info_by_topic(self.topic)
-        lines = [line for publisher in found if (line := self._unheard(publisher))]
-        self._any_unheard = bool(lines)
+        lines = [line for publisher in found if (line := self._why_unconnected(publisher))]
+        self._any_unconnected = bool(lines)
         lines = list(dict.fromkeys(lines))
         more = len(lines) - MOST_REPORTED
         return [*lines[:MOST_REPORTED], *([f"{self.topic}: {more} more such publishers"] if more > 0 else [])]
 
-    def _unheard(self, publisher: Any) -> str:
+    def _why_unconnected(self, publisher: Any) -> str:
         """Why a publisher is not connected, and the remedy; "": it is."""
         offered, asked = publisher.qos_profile, self.subscription.qos_profile
         less = []
@@ -112,7 +112,7 @@ class InputSubscription:
         return self._reliability if self._reliability and not self._node.has_parameter(override) else override
 
 
-def unheard(subscriptions: Iterable[InputSubscription]) -> list[str]:
+def unconnected(subscriptions: Iterable[InputSubscription]) -> list[str]:
     """The warnings of all subscriptions, each once."""
     return list(dict.fromkeys(line for subscription in subscriptions for line in subscription.warnings()))
 

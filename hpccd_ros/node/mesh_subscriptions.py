@@ -76,7 +76,7 @@ class MeshTopic:
     def take(self, info: dict[str, Any]) -> None:
         """A message has been received, and its info."""
         self.sent = info["source_timestamp"]
-        self.reception.accounts.on_heard(self.kind, self.reception.mesh, info)
+        self.reception.accounts.on_received(self.kind, self.reception.mesh, info)
 
     @property
     def name(self) -> str:
@@ -241,5 +241,5 @@ class MeshSubscriptions:
         """What is odd about the publishers of the mesh."""
         found = [(topic.publishers, topic.name) for topic in self._positions]
         several = [f"{publishers} publishers on {name}" for publishers, name in found if publishers > 1]
-        unheard = [line for topic in self.topics for line in topic.warnings()]
-        return unheard + several + self._reception.pipeline.awaited_transform(self._reception.mesh)
+        unconnected = [line for topic in self.topics for line in topic.warnings()]
+        return unconnected + several + self._reception.pipeline.awaited_transform(self._reception.mesh)

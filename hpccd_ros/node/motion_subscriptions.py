@@ -21,7 +21,7 @@ from hpccd_ros.middleware import executors, joint_messages, qos, transform_topic
 from hpccd_ros.middleware.message_types import message_class
 from hpccd_ros.middleware.transform_topics import TransformTopic
 from hpccd_ros.node.accounts import Accounts
-from hpccd_ros.node.input_subscription import InputSubscription, hand_over, unheard
+from hpccd_ros.node.input_subscription import InputSubscription, hand_over, unconnected
 from hpccd_ros.node.mesh_subscriptions import UNREADABLE
 from hpccd_ros.params import robot_parameters
 from hpccd_ros.params.table import ROBOT
@@ -77,7 +77,7 @@ class JointSubscriptions:
     def warnings(self) -> list[str]:
         """Topics without a publisher, and publishers that are not connected."""
         silent = [subscription.topic for subscription in self._subscriptions if not subscription.publishers]
-        return [f"nobody publishes {topic}" for topic in silent] + unheard(self._subscriptions)
+        return [f"nobody publishes {topic}" for topic in silent] + unconnected(self._subscriptions)
 
     def _subscribe(self, topic: str, robots: list[str]) -> InputSubscription:
         limit = RateLimit(self._settings["max_rate"])
@@ -85,7 +85,7 @@ class JointSubscriptions:
 
         def receive(message: JointState, info: dict[str, Any]) -> None:
             sent = info["source_timestamp"]
-            self._accounts.on_heard("joint state", topic, info)
+            self._accounts.on_received("joint state", topic, info)
             publisher = numbers.of(info["publication_sequence_number"], several)
             if not limit.allows():
                 text = f"more than max_rate = {self._settings['max_rate']:g} messages a second; some are dropped"
@@ -137,10 +137,10 @@ class TransformSubscriptions:
         self._accounts = accounts
         self._max_rate = max_rate
         understood = transform_topics.understood()
-        heard = pipeline.transforms.heard
+        received = pipeline.transforms.received
         for topic in transform_topics.ALL.values():
             package = topic.type_name.partition("/")[0]
-            heard[self._name(topic)] = 0 if topic in understood else f"not understood ({package} is not installed)"
+            received[self._name(topic)] = 0 if topic in understood else f"not understood ({package} is not installed)"
         self._subscriptions = [self._subscribe(topic) for topic in understood]
 
     def use(self, pipeline: FramePipeline, by_joints: object) -> None:
@@ -153,11 +153,11 @@ class TransformSubscriptions:
 
     def warnings(self) -> list[str]:
         """Publishers that are not connected; frames that wait for transforms are reported elsewhere."""
-        return unheard(self._subscriptions)
+        return unconnected(self._subscriptions)
 
     def _subscribe(self, topic: TransformTopic) -> InputSubscription:
         limit = RateLimit(self._max_rate)
-        name, heard = self._name(topic), self._pipeline.transforms.heard
+        name, received = self._name(topic), self._pipeline.transforms.received
         numbers = InterleavedSequences()
         unreadable_since = 0  # since the last message read
 
@@ -180,9 +180,9 @@ class TransformSubscriptions:
             numbers.matched(new, new - event.current_count_change)
 
         def receive(message: Any, info: dict[str, Any]) -> None:
-            heard[name] += 1
+            received[name] += 1
             sent = info["source_timestamp"]
-            self._accounts.on_heard("message", name, info)
+            self._accounts.on_received("message", name, info)
             lost = missing(info["publication_sequence_number"])
             if not limit.allows():
                 text = f"more than max_rate = {self._max_rate:g} messages a second; some are dropped"

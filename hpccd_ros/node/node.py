@@ -38,7 +38,7 @@ class HpccdNode(GuardedLifecycleNode):
 
     def __init__(self) -> None:
         super().__init__("hpccd")
-        parameter_services.amend(self)
+        parameter_services.replace_callbacks(self)
         self._configuration = Configuration(self)
         self._settings = self._configuration.settings
         self._recording = NodeRecording(self, self._settings, self.errors)
@@ -115,7 +115,7 @@ class HpccdNode(GuardedLifecycleNode):
 
     def _make_scene(self) -> None:
         """Of the robots that are known. Raises ValueError, and then the scene before stays."""
-        self._builder = self._configuration.know(self._robots.robots)
+        self._builder = self._configuration.with_robots(self._robots.robots)
         self._deforming = [mesh.name for mesh in self._builder.meshes if not mesh.static]
         if self._stream is not None:
             self._stream.remake(self._builder)

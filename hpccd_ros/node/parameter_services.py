@@ -12,7 +12,7 @@ from hpccd_ros.params import values
 TYPES = {kind.value for kind in parameter.Parameter.Type}
 
 
-def amend(node: Node) -> None:
+def replace_callbacks(node: Node) -> None:
     """Values of a type that does not exist are refused with a reason; rclpy 7.1 raises, and nobody is answered.
     Integers become floats where the parameter is one: `ros2 param set` takes a number without a point for an integer.
     """

@@ -9,7 +9,7 @@ from std_msgs.msg import String
 
 from hpccd_ros.base.quoting import shortened
 from hpccd_ros.middleware import executors, qos, robot_files
-from hpccd_ros.node.input_subscription import InputSubscription, unheard
+from hpccd_ros.node.input_subscription import InputSubscription, unconnected
 from hpccd_ros.node.life_cycle import GuardedLifecycleNode
 from hpccd_ros.params import robot_parameters
 from hpccd_ros.params.table import ROBOT
@@ -75,7 +75,7 @@ class RobotDescriptions:
             if name not in self.robots and name not in self._refused
         ]
         refused = [f"robot {name}: {why}" for name, why in self._refused.items()]
-        return waiting + unheard(self._subscriptions.values()) + refused
+        return waiting + unconnected(self._subscriptions.values()) + refused
 
     def _why(self, topic: str) -> str:
         if not self._node.count_publishers(topic):

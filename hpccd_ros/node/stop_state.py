@@ -75,12 +75,12 @@ class StopState:
         self._scene = WatchedScene()
         self._why: Why | None = Why(Cause.INACTIVE, "the node is not active")
         self._doubts: dict[tuple[Cause, Source], Doubt] = {}
-        self._heard: dict[str, int] = {}  # mesh or topic -> when the newest message received was sent
+        self._newest: dict[str, int] = {}  # mesh or topic -> when the newest message received was sent
         self._robots: Mapping[str, str] = {}
         self._in_use: Mapping[str, Origin] = {}
         self._outdated = ""  # a mesh whose position in the last clear step was outdated
-        self._unsaid: Why | None = None
-        self._said: Why | None = None
+        self._unpublished: Why | None = None
+        self._published: Why | None = None
         self._looked: float | None = None  # when the publishing thread last ran, in steady time
         self._oldest, self._oldest_of = 0, ""  # oldest message of the last clear step: when it was sent, and its mesh
         self.rises: Counter[Cause] = Counter()
@@ -94,11 +94,11 @@ class StopState:
                 for (cause, source), doubt in self._doubts.items()
                 if (meshes := scene.concerned(source.what, source.name)) or not source.of_mesh
             }
-        self._tell(Cause.UNANSWERED, "no step was answered since the node was activated", active=True)
+        self._set_cause(Cause.UNANSWERED, "no step was answered since the node was activated", active=True)
 
     def end(self, text: str = "the node is not active") -> None:
         """Results from now on no longer count."""
-        self._tell(Cause.INACTIVE, text, active=False)
+        self._set_cause(Cause.INACTIVE, text, active=False)
 
     def close(self) -> None:
         """For good: `next` returns at once, with a reason."""
@@ -113,7 +113,7 @@ class StopState:
 
     def first(self) -> None:
         """A frame came that ends no step: nothing is known of the motion to it."""
-        self._tell(Cause.UNANSWERED, "no step was answered since the stream, or a topology, began anew")
+        self._set_cause(Cause.UNANSWERED, "no step was answered since the stream, or a topology, began anew")
 
     def answered(self, near: bool, distance: float, origins: Sequence[Origin]) -> None:
         """The result of a step for this distance; origins: of the meshes at its end, in the order of the scene."""
@@ -132,14 +132,14 @@ class StopState:
             if not self._ages.why(self._clocks.steady()):  # otherwise it is unknown which of two messages is newer
                 self._doubts = {key: item for key, item in self._doubts.items() if not item.settled(by_name)}
         if near:
-            self._tell(Cause.NEAR, f"meshes came within {distance:g} of each other on the last step, or touched")
+            self._set_cause(Cause.NEAR, f"meshes came within {distance:g} of each other on the last step, or touched")
             return
         with self._condition:
             if distance < self.distance or scene is not self._scene or not self._active:
                 return
             before = self._now()
             if text := self._ages.why(self._clocks.steady()):
-                self._tell(Cause.CLOCKS, text)
+                self._set_cause(Cause.CLOCKS, text)
                 return
             self._outdated = next((mesh for mesh, origin in by_name.items() if origin.place == OUTDATED), "")
             self._oldest, self._oldest_of = min(moving, default=(ALWAYS, ""))
@@ -150,7 +150,7 @@ class StopState:
         """Another distance is asked for from now on."""
         larger, self.distance = distance > self.distance, distance
         if larger:
-            self._tell(Cause.UNANSWERED, f"no step was answered since stop_distance became {distance:g}")
+            self._set_cause(Cause.UNANSWERED, f"no step was answered since stop_distance became {distance:g}")
 
     def refused(self, refusal: Refusal) -> None:
         """The meshes that the message is about are unknown until a valid message about them is in use."""
@@ -175,11 +175,11 @@ class StopState:
             self._robots = dict(doubts)
             self._rise(before)
 
-    def heard(self, what: str, name: str, info: Mapping[str, int]) -> None:
+    def received(self, what: str, name: str, info: Mapping[str, int]) -> None:
         """An input message was received; name: of its mesh or topic; info: source_timestamp and received_timestamp, ns
         of the system clock."""
         sent, received = info["source_timestamp"], info["received_timestamp"]
-        self._heard[name] = max(self._heard.get(name, 0), sent)
+        self._newest[name] = max(self._newest.get(name, 0), sent)
         ahead = 1e-9 * (sent - min(received or ALWAYS, self._clocks.system()))
         if ahead <= 0:
             return
@@ -198,20 +198,20 @@ class StopState:
         steady time. Each rise is published, however short."""
         with self._condition:
             while True:
-                steady, system = self._look()
-                why = self._unsaid or self._now()
-                if self._unsaid or (why is None) != (self._said is None) or steady >= until or self._closed:
+                steady, system = self._read_clocks()
+                why = self._unpublished or self._now()
+                if self._unpublished or (why is None) != (self._published is None) or steady >= until or self._closed:
                     break
                 left = until - steady
                 if why is None:
                     left = min(left, 1e-9 * (self._oldest + self._timeout_ns - system))
                 self._condition.wait(max(left, 0.0))
-            if why is not None and self._said is None:
+            if why is not None and self._published is None:
                 self.rises[why.cause] += 1
-            self._unsaid, self._said = None, why
+            self._unpublished, self._published = None, why
             return why
 
-    def _look(self) -> tuple[float, int]:
+    def _read_clocks(self) -> tuple[float, int]:
         """The clocks, as the publishing thread reads them, several times in each time-out if it can run."""
         steady, system = self._clocks.steady(), self._clocks.system()
         before = self._now()
@@ -267,14 +267,14 @@ class StopState:
             return
         # Later than the messages in use and those received that may still come into use, whatever the clocks said.
         used = [origin.of(aspect) for mesh, origin in self._in_use.items() if mesh in meshes]
-        came = [one for mesh in meshes if (one := self._heard.get(mesh, 0)) > now]
+        came = [one for mesh in meshes if (one := self._newest.get(mesh, 0)) > now]
         sent = max([min(sent or now, now), *(one for one in used if one != ALWAYS), *came])
         if key in self._doubts:
             sent = max(sent, self._doubts.pop(key).sent)
         self._doubts[key] = Doubt(meshes, aspect, sent, text)
         self._rise(before)
 
-    def _tell(self, cause: Cause, text: str, *, active: bool | None = None) -> None:
+    def _set_cause(self, cause: Cause, text: str, *, active: bool | None = None) -> None:
         with self._condition:
             if active is not None:
                 self._active = active
@@ -286,6 +286,6 @@ class StopState:
 
     def _rise(self, before: Why | None) -> None:
         """The state has changed. before: why stop was true before the change."""
-        if before is None and self._unsaid is None:
-            self._unsaid = self._now()
+        if before is None and self._unpublished is None:
+            self._unpublished = self._now()
         self._condition.notify_all()

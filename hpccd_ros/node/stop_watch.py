@@ -88,8 +88,8 @@ _WARNED = {Cause.NEAR: DiagnosticStatus.WARN, Cause.UNANSWERED: DiagnosticStatus
 class StopWatch:
     """Publishes stop for a configured ``node`` with parameter stop_distance. busy: whether a frame is being processed.
 
-    The life cycle calls `begin` and `end`, the detection thread `first` and `look`, the executor `heard` and `robots`,
-    any thread `refused`.
+    The life cycle calls `begin` and `end`, the detection thread `first` and `look`, the executor `received` and
+    `robots`, any thread `refused`.
     """
 
     def __init__(self, node: GuardedLifecycleNode, configuration: Configuration, busy: Callable[[], bool]) -> None:
@@ -147,9 +147,9 @@ class StopWatch:
     def refused(self, refusal: Refusal) -> None:
         self._state.refused(refusal)
 
-    def heard(self, kind: str, name: str, info: Mapping[str, Any]) -> None:
+    def received(self, kind: str, name: str, info: Mapping[str, Any]) -> None:
         """A message of this kind was received; name: of its mesh or topic."""
-        self._state.heard(f"a message ({kind}) of {name}", name, info)
+        self._state.received(f"a message ({kind}) of {name}", name, info)
 
     def robots(self, doubts: Mapping[str, str]) -> None:
         """Robots with a newer description that is not in use, and why."""

@@ -90,7 +90,7 @@ class StreamDetection:
         if stop is not None:
             stop.begin(self._builder)
             self._accounts.on_refused = stop.refused
-            self._accounts.on_heard = stop.heard
+            self._accounts.on_received = stop.received
         thread = DetectionThread(
             StepDetector(self._builder, self._configuration.options),
             self._pipeline.start(self._configuration.settings["frame_queue"]),

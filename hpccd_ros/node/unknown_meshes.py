@@ -58,7 +58,7 @@ class UnknownMeshWatch:
         self._names: set[str] = set()
         self._prefix = node.resolve_topic_name(f"{topic_names.MESHES}x").removesuffix("x")
         # Steady time: simulated time may stand still.
-        self._timer = node.create_timer(1.0, self._look, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self._timer = node.create_timer(1.0, self._check, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def close(self) -> None:
         self._node.destroy_timer(self._timer)
@@ -74,7 +74,7 @@ class UnknownMeshWatch:
             lines.append(f"{more} more topics belong to no mesh and are not {what} ({_MOST_TOPICS} are), as {first}")
         return lines
 
-    def _look(self) -> None:
+    def _check(self) -> None:
         unknown = self._unknown()
         for topic in [topic for topic in self._topics if topic not in unknown]:
             self._release(topic)

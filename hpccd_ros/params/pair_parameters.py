@@ -19,7 +19,7 @@ from hpccd_ros.params.values import ParameterError
 
 
 @dataclass(frozen=True)
-class _Said:
+class _PairSetting:
     """``value``: of the two meshes or robots ``names``, said by ``parameter`` in this ``text``."""
 
     parameter: str
@@ -45,23 +45,23 @@ def ignored_pairs(
 ) -> tuple[tuple[str, str], ...]:
     """Parameters ``ignored_pairs`` and ``pairs.NAME.ignored`` as pairs of mesh names. Pairs in ``by_default`` (names in
     sorted order) are ignored too, unless the parameters say otherwise. Raises ParameterError."""
-    said = []
+    given = []
     for text in settings["ignored_pairs"]:
         pair = tuple(text.split(":"))
         if not _are_names(settings, pair) or (pair[0] == pair[1] and pair[0] not in settings["robots"]):
             raise ParameterError(
                 f"ignored_pairs: {quoted(text)} must be NAME:NAME with two different meshes out of {_names(settings)}"
             )
-        said.append(_Said("ignored_pairs", text, pair, True))
+        given.append(_PairSetting("ignored_pairs", text, pair, True))
     for one in _structured(settings, "ignored"):
         if one.names[0] == one.names[1] and one.names[0] not in settings["robots"]:
             raise ParameterError(
                 f"{one.parameter}: both meshes of the pair are {one.names[0]}; whether a mesh is tested against "
                 f"itself is said by mesh.{one.names[0]}.self_collision"
             )
-        said.append(one)
+        given.append(one)
     ignored = {pair: pair for pair in by_default}
-    for one in _spread(_agreed(said), settings, links):
+    for one in _spread(_agreed(given), settings, links):
         pair = min(one.names), max(one.names)
         if one.value:
             ignored.setdefault(pair, one.names)
@@ -73,7 +73,7 @@ def ignored_pairs(
 def pair_accuracies(settings: dict[str, Any], links: Links = NO_LINKS) -> tuple[tuple[str, str, str], ...]:
     """Parameters ``pair_accuracy`` and ``pairs.NAME.accuracy`` as (mesh name, mesh name, tier). Raises
     ParameterError."""
-    said = []
+    given = []
     for text in settings["pair_accuracy"]:
         *names, tier = text.split(":")
         if not _are_names(settings, names) or tier not in ACCURACIES:
@@ -81,8 +81,8 @@ def pair_accuracies(settings: dict[str, Any], links: Links = NO_LINKS) -> tuple[
                 f"pair_accuracy: {quoted(text)} must be NAME:NAME:TIER with meshes out of {_names(settings)} "
                 f"and a tier out of {', '.join(ACCURACIES)}"
             )
-        said.append(_Said("pair_accuracy", text, tuple(names), tier))
-    agreed = _agreed([*said, *_structured(settings, "accuracy")])
+        given.append(_PairSetting("pair_accuracy", text, tuple(names), tier))
+    agreed = _agreed([*given, *_structured(settings, "accuracy")])
     return tuple((*one.names, one.value) for one in _spread(agreed, settings, links))
 
 
@@ -100,17 +100,17 @@ def pair_features(settings: dict[str, Any], links: Links = NO_LINKS) -> tuple[tu
         texts, _, kinds = listed_kinds.setdefault(frozenset(names), ([], tuple(names), set()))
         texts.append(text)
         kinds.add(kind)
-    said = [_Said("pair_features", ", ".join(texts), *rest) for texts, *rest in listed_kinds.values()]
-    said += [_Said(o.parameter, o.text, o.names, set(o.value)) for o in _structured(settings, "features")]
+    given = [_PairSetting("pair_features", ", ".join(texts), *rest) for texts, *rest in listed_kinds.values()]
+    given += [_PairSetting(o.parameter, o.text, o.names, set(o.value)) for o in _structured(settings, "features")]
     return tuple(
         (*one.names, tuple(name for name in FEATURES if name in one.value))
-        for one in _spread(_agreed(said), settings, links)
+        for one in _spread(_agreed(given), settings, links)
     )
 
 
 def separation(settings: dict[str, Any], links: Links = NO_LINKS) -> Separation:
     """Parameters ``minimum_separation``, ``pair_separation`` and ``pairs.NAME.separation``. Raises ParameterError."""
-    said = []
+    given = []
     for text in settings["pair_separation"]:
         *names, number = text.split(":")
         distance = _distance(number)
@@ -119,8 +119,8 @@ def separation(settings: dict[str, Any], links: Links = NO_LINKS) -> Separation:
                 f"pair_separation: {quoted(text)} must be NAME:NAME:DISTANCE with meshes out of {_names(settings)} "
                 f"and a distance from 0 to {FARTHEST:g}"
             )
-        said.append(_Said("pair_separation", text, tuple(names), distance))
-    agreed = _agreed([*said, *_structured(settings, "separation")])
+        given.append(_PairSetting("pair_separation", text, tuple(names), distance))
+    agreed = _agreed([*given, *_structured(settings, "separation")])
     spread = _spread(agreed, settings, links)
     return Separation(settings["minimum_separation"], tuple((*one.names, one.value) for one in spread))
 
@@ -133,7 +133,7 @@ def _distance(text: str) -> float | None:
     return number if 0 <= number <= FARTHEST else None
 
 
-def _structured(settings: dict[str, Any], key: str) -> Iterator[_Said]:
+def _structured(settings: dict[str, Any], key: str) -> Iterator[_PairSetting]:
     """Of the parameters pairs.NAME.key those that say something."""
     for pair, of in settings[PAIRS].items():
         names = of["meshes"]
@@ -144,13 +144,13 @@ def _structured(settings: dict[str, Any], key: str) -> Iterator[_Said]:
             )
         value = of[key]
         if value is not None and value not in ("", []):
-            yield _Said(f"{PAIRS}.{pair}.{key}", str(value), tuple(names), value)
+            yield _PairSetting(f"{PAIRS}.{pair}.{key}", str(value), tuple(names), value)
 
 
-def _agreed(said: Iterable[_Said]) -> list[_Said]:
+def _agreed(given: Iterable[_PairSetting]) -> list[_PairSetting]:
     """One for each pair of meshes. Raises ParameterError where two differ."""
-    found: dict[frozenset[str], _Said] = {}
-    for one in said:
+    found: dict[frozenset[str], _PairSetting] = {}
+    for one in given:
         first = found.setdefault(frozenset(one.names), one)
         if first.value != one.value:
             place = "" if first.parameter == one.parameter else f"{first.parameter}: "
@@ -160,16 +160,16 @@ def _agreed(said: Iterable[_Said]) -> list[_Said]:
     return list(found.values())
 
 
-def _spread(agreed: Sequence[_Said], settings: dict[str, Any], links: Links) -> list[_Said]:
+def _spread(agreed: Sequence[_PairSetting], settings: dict[str, Any], links: Links) -> list[_PairSetting]:
     """With the links of robots in place of their names. Raises ParameterError: a robot has no such link, or two
     that differ, each of a robot and a link, meet in a pair of which nothing else is said."""
 
-    def robots(one: _Said) -> int:
+    def robots(one: _PairSetting) -> int:
         return sum(name in settings["robots"] for name in one.names)
 
-    found: dict[frozenset[str], _Said] = {}
-    said_by: dict[frozenset[str], _Said] = {}
-    clashes: dict[frozenset[str], tuple[_Said, _Said]] = {}
+    found: dict[frozenset[str], _PairSetting] = {}
+    given_by: dict[frozenset[str], _PairSetting] = {}
+    clashes: dict[frozenset[str], tuple[_PairSetting, _PairSetting]] = {}
     # What names robots first: what names one link or both then takes its place.
     for one in sorted(agreed, key=lambda one: -robots(one)):
         within_robot = one.names[0] == one.names[1] and one.names[0] in settings["robots"]
@@ -177,12 +177,12 @@ def _spread(agreed: Sequence[_Said], settings: dict[str, Any], links: Links) -> 
             if within_robot and not a < b:
                 continue
             pair = frozenset((a, b))
-            before = said_by.get(pair)
+            before = given_by.get(pair)
             if before is not None and robots(before) == robots(one) and before.value != one.value:
                 clashes.setdefault(pair, (before, one))
             elif before is not None and robots(before) > robots(one):
                 clashes.pop(pair, None)
-            said_by[pair] = one
+            given_by[pair] = one
             found[pair] = replace(one, names=(a, b))
     for pair, (first, one) in clashes.items():
         raise ParameterError(
@@ -192,7 +192,7 @@ def _spread(agreed: Sequence[_Said], settings: dict[str, Any], links: Links) -> 
     return list(found.values())
 
 
-def _meshes(name: str, said: _Said, settings: dict[str, Any], links: Links) -> Sequence[str]:
+def _meshes(name: str, given: _PairSetting, settings: dict[str, Any], links: Links) -> Sequence[str]:
     if name in settings["meshes"]:
         return (name,)
     robot = name.partition("/")[0]
@@ -202,8 +202,8 @@ def _meshes(name: str, said: _Said, settings: dict[str, Any], links: Links) -> S
         return links[robot]
     if name not in links[robot]:
         raise ParameterError(
-            f"{said.parameter}: {quoted(said.text)}: {quoted(robot)} has no link of this name with geometry; there are "
-            f"{listed(links[robot])}"
+            f"{given.parameter}: {quoted(given.text)}: {quoted(robot)} has no link of this name with geometry; "
+            f"there are {listed(links[robot])}"
         )
     return (name,)
 

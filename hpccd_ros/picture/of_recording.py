@@ -48,7 +48,7 @@ def facts(step: ReplayedStep) -> list[str]:
     """What a line beneath the title says of a step that was computed."""
     found = step.contacts
     triangles, edges = (sum(len(getattr(t, kind)) for t in step.end_frame.topologies) for kind in ("faces", "edges"))
-    told = [
+    lines = [
         f"{triangles:,} triangles" if triangles else None,
         f"{edges:,} lone edges" if edges else None,
         f"{len(found.vf):,} vertex-face",
@@ -60,7 +60,7 @@ def facts(step: ReplayedStep) -> list[str]:
         features_fact(step.features),
         f"hash {found.hash:016x}",
     ]
-    return [fact for fact in told if fact]
+    return [fact for fact in lines if fact]
 
 
 def separation_fact(separation: Separation) -> str | None:

@@ -81,15 +81,15 @@ class RerunWriter:
         self._stream.send_blueprint(_blueprint(middle + EYE_DISTANCE * self._extent * np.array(towards), middle))
 
     def _add_mesh(self, name, vertices, faces, colours):
-        anew = self._faces.get(name) is not faces  # triangles once, and after each change of topology
+        changed = self._faces.get(name) is not faces  # triangles once, and after each change of topology
         self._faces[name] = faces
         # One row a time: which of two holds, readers that do not look at the order of rows could not tell.
         fields = self._rr.Mesh3D.from_fields(
-            clear_unset=anew,
+            clear_unset=changed,
             vertex_positions=vertices,
             vertex_normals=vertex_normals(vertices, faces),
             vertex_colors=colours,
-            **({"triangle_indices": faces} if anew else {}),
+            **({"triangle_indices": faces} if changed else {}),
         )
         self._stream.log(f"meshes/{name}", fields)
 

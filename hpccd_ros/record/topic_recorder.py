@@ -103,7 +103,7 @@ class DescribedRobots:
     ) -> None:
         self._bag = bag
         self._warn = warn
-        self._told: set[str] = set()  # bounded, as what is read is
+        self._logged: set[str] = set()  # bounded, as what is read is
         for robot, values in robot_parameters.of(parameters).items():
             if robot_parameters.comes_on_topic(values["description"]):
                 topic = resolve(values["description"])
@@ -121,8 +121,8 @@ class DescribedRobots:
                 if not self._bag.attach(name, data):
                     self._bag.attach(attachments.changed_link_mesh_name(name, message.data), data)
             for text in missing:
-                if text not in self._told:
-                    self._told.add(text)
+                if text not in self._logged:
+                    self._logged.add(text)
                     self._warn(text)
 
         return receive

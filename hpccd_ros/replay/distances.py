@@ -141,9 +141,9 @@ def difference(recorded, now) -> str | None:
         if list(getattr(recorded, name)) != list(getattr(now, name)):
             return f"{name} {list(getattr(recorded, name))} were recorded, now they are {list(getattr(now, name))}"
     rows = len(now.distance)
-    if (told := len(recorded.distance)) != rows:
+    if (count := len(recorded.distance)) != rows:
         return (
-            f"{told} pairs of meshes were recorded, now there are {rows}; are the parameters those of the node "
+            f"{count} pairs of meshes were recorded, now there are {rows}; are the parameters those of the node "
             "(mesh.NAME.static, mesh.NAME.self_collision, ignored_pairs)?"
         )
     columns = {}

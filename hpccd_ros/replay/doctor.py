@@ -23,7 +23,7 @@ def main(args) -> int:
         return _recover(files[0], args)
     examinations = [examine(path) for path in files]
     for examination in examinations:
-        _tell(examination)
+        _print_examination(examination)
     if all(e.sound for e in examinations):
         _read(args.file)
         return 0
@@ -39,7 +39,7 @@ def _recover(source, args) -> int:
         raise UserError(f"--recover {args.recover}: exists; recordings are not overwritten") from error
     except OSError as error:
         raise UserError(f"--recover {args.recover}: {error.strerror}") from error
-    _tell(found)
+    _print_examination(found)
     check = examine(args.recover)
     if not check.sound or check.message_count != found.message_count:
         raise RecordingError(f"the recovered file {args.recover} is not what was saved: {check.problem}")
@@ -56,7 +56,7 @@ def _read(path) -> None:
             print(f"  {note}")
 
 
-def _tell(found: Examination) -> None:
+def _print_examination(found: Examination) -> None:
     print(f"{found.path}: {_verdict(found)}")
     print(
         f"  {found.size:,} bytes, written by {printable(found.library) or '?'}, "

@@ -85,7 +85,7 @@ class FrameSource:
             self._settings = {**self._settings, "restart_after": value}
             self._pipeline.set_restart_after(value)
         elif (names := taken_inputs.known_robots(event)) is not None and set(names) <= set(self._setup.robots):
-            outcome = self._know(names)
+            outcome = self._set_robots(names)
         else:
             raise ValueError(f"it lists the event {quoted(event)}, which does not belong to this recording")
         return self._counted(outcome)
@@ -109,7 +109,7 @@ class FrameSource:
         self._weldings = {name: Welding() for name in self._setup.roles}
         self._recent = {topic: deque(maxlen=joint_messages.MOST_RECENT) for topic in self._by_joints}
 
-    def _know(self, names: list[str]) -> Outcome:
+    def _set_robots(self, names: list[str]) -> Outcome:
         """A description was received: do the same as StreamDetection.remake."""
         before = self._pipeline
         self._make(names)

@@ -103,13 +103,13 @@ def _gather(distributed, futures, paths) -> list[dict]:
         MofNCompleteColumn(),
         TextColumn("recordings"),
         TimeRemainingColumn(),
-        TextColumn("{task.fields[said]}"),
+        TextColumn("{task.fields[line]}"),
         console=Console(stderr=True),
         transient=True,
         disable=not sys.stderr.isatty(),
     )
     with progress:
-        bar = progress.add_task("replay", total=len(futures), said="")
+        bar = progress.add_task("replay", total=len(futures), line="")
         for future in distributed.as_completed(futures):
             k = number[future.key]
             error = future.exception()
@@ -118,7 +118,7 @@ def _gather(distributed, futures, paths) -> list[dict]:
                 if error is None
                 else {"file": paths[k], "result": "FAILED", "why": f"{type(error).__name__}: {error}", "host": ""}
             )
-            progress.update(bar, advance=1, said=f"{Path(paths[k]).name}: {rows[k]['result']}")
+            progress.update(bar, advance=1, line=f"{Path(paths[k]).name}: {rows[k]['result']}")
     return rows
 
 

@@ -39,9 +39,9 @@ def main(args) -> int:
     with stop_signals.collected() as stop, Recording(args.file) as recording, tempfile.TemporaryDirectory() as folder:
         topics = _topics(recording, args)
         for note in recording.notes:
-            _tell(note)
+            _print_status(note)
         environment.prepare()
-        environment.ask_often(Path(folder))  # each topic begins when its first message has arrived
+        environment.shorten_heartbeats(Path(folder))  # each topic begins when its first message has arrived
         ros_start.init(["--ros-args", *args.ros_args] if args.ros_args else None)
         node = rclpy.create_node("hpccd_replay", start_parameter_services=False)
         try:
@@ -113,7 +113,7 @@ def _await_subscribers(publishers, args, stop) -> dict[str, int]:
     lacking = await_subscribers(publishers, args.subscribers, at_once, stop)
     if not lacking or stop or args.wait == at_once:
         return lacking
-    _tell(f"waiting for subscribers of {listed(lacking)}, {args.wait:g} s at most (--wait)")
+    _print_status(f"waiting for subscribers of {listed(lacking)}, {args.wait:g} s at most (--wait)")
     return await_subscribers(publishers, args.subscribers, args.wait - at_once, stop)
 
 
@@ -123,11 +123,11 @@ def _await_arrival(publishers, topics, args, stop) -> float:
     waited = await_acknowledged(awaited, at_once, stop)
     if waited < at_once or stop or args.wait == at_once:
         return waited
-    _tell(f"waiting until all subscribers have the first of {listed(topics)}, {args.wait:g} s at most (--wait)")
+    _print_status(f"waiting until all subscribers have the first of {listed(topics)}, {args.wait:g} s at most (--wait)")
     return waited + await_acknowledged(awaited, args.wait - at_once, stop)
 
 
-def _tell(text: str) -> None:
+def _print_status(text: str) -> None:
     print(text, file=sys.stderr, flush=True)
 
 

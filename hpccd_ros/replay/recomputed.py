@@ -170,8 +170,8 @@ class Replay:
         builder = setup.builder
         self._detector = StepDetector(builder, self._options(None))
         self._every_contact = StepDetector(builder, self._options(None))
-        told = recording.topics.get(setup.distances) if distances else None
-        self.distances = DistanceCheck(told, StepDetector(builder, self._options(None)), accuracy)
+        distance_topic = recording.topics.get(setup.distances) if distances else None
+        self.distances = DistanceCheck(distance_topic, StepDetector(builder, self._options(None)), accuracy)
         self._mesh_names = setup.mesh_names
         self._window = FrameWindow(max(WINDOW, 2 * setup.settings["frame_queue"]))
         self.any_one = setup.settings["report"] == "any"  # "verified" means less then: compare.py

@@ -111,7 +111,7 @@ def main(args) -> int:
             begin=args.begin,
             end=args.end,
         )
-        bar = progress.add_task("replay", total=replay.message_count, said="")
+        bar = progress.add_task("replay", total=replay.message_count, line="")
         summary = Summary()
         pace = Pace(args.rate or 0.0)
         for step in replay.steps():
@@ -121,7 +121,7 @@ def main(args) -> int:
                 table.add(step)
             progress.update(bar, completed=replay.messages_read)
             if step.contacts is not None:
-                progress.update(bar, said=f"step {step.step}: {step.total:,} contacts, {step.milliseconds:.1f} ms")
+                progress.update(bar, line=f"step {step.step}: {step.total:,} contacts, {step.milliseconds:.1f} ms")
             if step.difference and args.keep_going:
                 progress.console.print(
                     f"step {step.step} (ends at {step.end} ns): {step.difference}", markup=False, highlight=False
@@ -131,7 +131,7 @@ def main(args) -> int:
                 print(line(step))
                 if not next_wanted(f"{step.at:.3f} s"):
                     break
-        progress.update(bar, said="")
+        progress.update(bar, line="")
     for note in recording.notes:
         print(note, file=sys.stderr)
     for name in setup.unknown:
@@ -297,7 +297,7 @@ def _progress_bar() -> Progress:
         MofNCompleteColumn(),
         TextColumn("messages"),
         TimeRemainingColumn(),
-        TextColumn("{task.fields[said]}"),
+        TextColumn("{task.fields[line]}"),
         console=Console(stderr=True),
         transient=True,
         disable=not sys.stderr.isatty(),

@@ -114,7 +114,7 @@ class JointHistory:
 
     def at(self, stamp: int) -> dict[str, float]:
         """A value of each joint that the robot needs. Raises NoJointStateError."""
-        self._check_heard()
+        self._check_received()
         early = [name for name, values in self._joints.items() if stamp < values.stamps[0]]
         if early:
             first = max(self._joints[name].stamps[0] for name in early)
@@ -139,10 +139,10 @@ class JointHistory:
 
     def latest(self) -> int | None:
         """The last stamp, ns, that `at` knows; None: no joint moves. Raises NoJointStateError: of some nothing came."""
-        self._check_heard()
+        self._check_received()
         return min((values.stamps[-1] for values in self._joints.values()), default=None)
 
-    def _check_heard(self) -> None:
+    def _check_received(self) -> None:
         lacking = [name for name, values in self._joints.items() if not values.stamps]
         if not lacking:
             return

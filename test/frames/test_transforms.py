@@ -115,9 +115,11 @@ def test_the_account_of_what_was_heard_is_bounded_and_names_the_likeliest_first(
     for k in range(30):
         buffer.add("world", f"link_{k}", IDENTITY, None)
     buffer.add("world", "right/hand", IDENTITY, None)
-    buffer.heard |= {"/tf": 31, "/tf_static": 0, "/transforms": "not understood"}
+    buffer.received |= {"/tf": 31, "/tf_static": 0, "/transforms": "not understood"}
     text = buffer.account("left/hand")
-    assert text.startswith("heard: /tf 31 messages, /tf_static no messages, /transforms not understood; frames known: ")
+    assert text.startswith(
+        "received: /tf 31 messages, /tf_static no messages, /transforms not understood; frames known: "
+    )
     assert text.endswith(
         "known: right/hand, link_0, world, " + ", ".join(f"link_{k}" for k in range(1, 8)) + " and 22 more"
     )

@@ -38,7 +38,7 @@ WRITER = """
 import pathlib, sys
 from hpccd_ros.middleware import environment
 environment.prepare()
-environment.ask_often(pathlib.Path(sys.argv[1]))
+environment.shorten_heartbeats(pathlib.Path(sys.argv[1]))
 import rclpy
 from hpccd_ros.middleware.listeners import await_acknowledged, await_subscribers
 from rclpy.qos import QoSProfile
@@ -109,7 +109,7 @@ def test_readers_that_have_not_got_it_are_waited_for(publisher, reader):
     assert heard(reader) == 2
 
 
-def test_publishers_that_ask_often_wait_for_no_heartbeat_of_the_default(reader, tmp_path):
+def test_publishers_with_short_heartbeats_wait_for_no_default_one(reader, tmp_path):
     """That comes every 3 s, for each of the four topics."""
     writer = [sys.executable, "-c", WRITER, str(tmp_path), str(PATIENCE)]
     done = subprocess.run(writer, capture_output=True, text=True, timeout=2 * PATIENCE)
@@ -121,6 +121,6 @@ def test_publishers_that_ask_often_wait_for_no_heartbeat_of_the_default(reader, 
 @pytest.mark.parametrize("name", ["mine.xml", "fastdds.xml"])
 def test_a_profile_of_the_user_stays_as_it_is(tmp_path, monkeypatch, name):
     monkeypatch.setenv("FASTRTPS_DEFAULT_PROFILES_FILE", str(tmp_path / name))
-    environment.ask_often(tmp_path)
+    environment.shorten_heartbeats(tmp_path)
     assert os.environ["FASTRTPS_DEFAULT_PROFILES_FILE"] == str(tmp_path / name)
     assert not list(tmp_path.iterdir())

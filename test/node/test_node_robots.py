@@ -606,7 +606,7 @@ def test_a_robot_alone_says_what_it_waits_for(start_node, by):
         tree = node.peer.publisher(TransformStamped, "transforms", qos.TRANSFORMS)
         for message in transforms(1, "right_"):
             tree.publish(message)
-        awaited = "no frame yet: no transform connects 'left_mast' and 'world'; heard: "
+        awaited = "no frame yet: no transform connects 'left_mast' and 'world'; received: "
     else:
         joints = node.peer.publisher(JointState, "joint_states")
         joints.publish(JointState(name=["turn"], position=[0.0]))

@@ -107,7 +107,7 @@ def test_who_waits_for_a_transform_is_told_what_came(start_node):
 
     send(node, 0, "left/hand")
     told(
-        "net waits for a transform: no transform connects 'left/hand' and 'world'; heard: ",
+        "net waits for a transform: no transform connects 'left/hand' and 'world'; received: ",
         "/transforms no messages",
         "/transforms_static no messages",
         "/tf_static ",

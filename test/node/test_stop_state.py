@@ -216,7 +216,7 @@ def test_what_came_before_settles_nothing(state):
         assert cause(state) is None
         state.times.pass_by(1)
     ahead = state.times.now + 5 * SECOND
-    state.heard("positions", "table", dict(source_timestamp=ahead, received_timestamp=0))
+    state.received("positions", "table", dict(source_timestamp=ahead, received_timestamp=0))
     state.refused(Refusal("table", Reason.NOT_FINITE, sent=state.times.now))
     for _ in range(30):
         clear(state, table=ahead)
@@ -323,11 +323,11 @@ def test_a_clock_that_is_slewed_is_no_jump(state):
 
 def test_a_message_from_the_future(state):
     for tell in (
-        lambda ahead: state.heard(
+        lambda ahead: state.received(
             "a pose", "hand", dict(source_timestamp=state.times.now + ahead, received_timestamp=0)
         ),
         # It waited until its time had come.
-        lambda ahead: state.heard(
+        lambda ahead: state.received(
             "a pose",
             "hand",
             dict(source_timestamp=state.times.now - SECOND, received_timestamp=state.times.now - SECOND - ahead),

@@ -64,7 +64,7 @@ def test_a_recorder_that_came_late_says_it_at_once_and_at_the_end(start_node, ch
         "--wait",
         WAIT,
     )
-    children.wait(lambda: recorder.said("recording "), "the recorder did not hear the node", PATIENCE)
+    children.wait(lambda: recorder.has_printed("recording "), "the recorder did not hear the node", PATIENCE)
     node.peer.readers = 2  # the recorder as well: the only pose must not overtake it
     publisher = node.peer.publisher(PoseStamped, client.pose_topic("box"))
     pose = PoseStamped()
@@ -72,7 +72,7 @@ def test_a_recorder_that_came_late_says_it_at_once_and_at_the_end(start_node, ch
     pose.header.stamp.sec = 1
     publisher.publish(pose)
     text = "the shape of mesh box is not in the recording (nothing came on meshes/box/vertices), so no replay can"
-    children.wait(lambda: recorder.said(f"so far {text}"), "the recorder did not miss the shape", PATIENCE)
+    children.wait(lambda: recorder.has_printed(f"so far {text}"), "the recorder did not miss the shape", PATIENCE)
     recorder.process.send_signal(signal.SIGINT)
     children.wait(lambda: not recorder.running, "the recorder did not end", PATIENCE)
-    assert recorder.said(f"  {text}") and recorder.process.returncode == 0
+    assert recorder.has_printed(f"  {text}") and recorder.process.returncode == 0

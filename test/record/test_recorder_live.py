@@ -47,7 +47,7 @@ def _verified(path):
 def test_recorded_live_read_by_others_and_verified(live, namespace, tmp_path, stop):
     path = tmp_path / "run.mcap"
     recorder = _record(live, path, stop=stop, node_options=(OUTPUTS,))
-    assert "LOST" not in recorder.last_words() and recorder.said("recorded ")
+    assert "LOST" not in recorder.last_words() and recorder.has_printed("recorded ")
 
     steps = _verified(path)
     assert [step.step for step in steps] == list(range(1, FRAMES)), "every step is recorded and verified"
@@ -164,7 +164,7 @@ def test_played_back_over_dds_gives_the_same_contacts(live, small_bag, tmp_path,
         "-p",
         "input_depth:=1000",
     )
-    children.wait(lambda: node.said("active: meshes"), "the node was not active", PATIENCE)
+    children.wait(lambda: node.has_printed("active: meshes"), "the node was not active", PATIENCE)
     recorder = live.recorder(again, "--ros-args", *remaps)
     live.wait_for(live.play(small_bag, "--rate", "2", "--from", "1.0"))
     live.wait_for_answers(again, _frames_from(small_bag, 1.0) - 1)

@@ -80,7 +80,7 @@ def test_on_a_cluster(hpccd, children, recordings, tmp_path):
     alone = hpccd("replay", *recordings, "--scheduler", address)
     assert alone.returncode == 2 and "without workers" in alone.stderr
     worker = children.start("worker", "distributed.cli.dask_worker", address, "--nthreads", "1", "--no-dashboard")
-    children.wait(lambda: worker.said("Registered to"), "the worker did not register", PATIENCE)
+    children.wait(lambda: worker.has_printed("Registered to"), "the worker did not register", PATIENCE)
     _check(hpccd("replay", *recordings, "--scheduler", address, "--json", "all.json"), tmp_path)
 
 

@@ -32,7 +32,7 @@ class Live:
         child = self._children.start(
             "node", "hpccd_ros.node", *self._remap, "--params-file", str(self.parameters), *extra
         )
-        self._children.wait(lambda: child.said("active: meshes"), "the node was not active", PATIENCE)
+        self._children.wait(lambda: child.has_printed("active: meshes"), "the node was not active", PATIENCE)
         return child
 
     def recorder(self, path, *options: str):
@@ -51,7 +51,7 @@ class Live:
             "1000",
             *options,
         )
-        self._children.wait(lambda: child.said("recording "), "the recorder did not hear the node", PATIENCE)
+        self._children.wait(lambda: child.has_printed("recording "), "the recorder did not hear the node", PATIENCE)
         return child
 
     def publisher(self, *options: str, subscribers: int = 2):

@@ -85,7 +85,7 @@ def _answers(found: Detection, inputs: TakenInputs, at: int, sent: int) -> list[
     answer_fields.fill_features(message, found.options.features)
     answer_fields.fill_bounds(message, found.bounds)
     end = found.end.inputs
-    answer_fields.fill_inputs(message, inputs.tell(end), start=found.start.inputs, end=end)
+    answer_fields.fill_inputs(message, inputs.pop_until(end), start=found.start.inputs, end=end)
     answer_fields.fill_report(message, found.options.report)
     answers = [Recorded("contacts", message, at, sent)]
     if found.gaps is not None:

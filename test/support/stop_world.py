@@ -86,7 +86,7 @@ class World:
         self.state.next(0.0)
         self.accounts = Accounts(lambda text: None)
         self.accounts.on_refused = self.state.refused
-        self.accounts.on_heard = lambda kind, name, info: self.state.heard(f"{kind} of {name}", name, info)
+        self.accounts.on_received = lambda kind, name, info: self.state.received(f"{kind} of {name}", name, info)
         self.subscriptions = Subscriptions(node, self.settings, self.meshes)
         self.node, self.clocks = node, clocks
         self.listener = self.listening()

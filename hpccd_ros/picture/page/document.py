@@ -52,13 +52,13 @@ SCRIPTS = ("unpack", "recording", "camera", "surfaces", "contacts", "chart", "ti
 _ESCAPES = {ord(c): f"\\u{ord(c):04x}" for c in "<>&"}
 
 
-def document(said: dict, blobs: dict[str, bytes], library: Library) -> str:
+def document(description: dict, blobs: dict[str, bytes], library: Library) -> str:
     """The page of what RecordingPage.described() gives.
 
     All that comes from the recording is in the JSON of one element and in base64; the viewer shows it as text. The page
     forbids itself every address and every script but its own two.
     """
-    said = {**said, "library": {"revision": library.revision, "source": library.source}}
+    description = {**description, "library": {"revision": library.revision, "source": library.source}}
     viewer = "\n".join(_asset(f"{name}.js") for name in SCRIPTS)
     for script in (library.script, viewer):
         if "</script" in script.lower() or "<!--" in script:
@@ -71,7 +71,7 @@ def document(said: dict, blobs: dict[str, bytes], library: Library) -> str:
         hashes=" ".join(map(_hash, (library.script, viewer))),
         style=_asset("style.css"),
         licence=html.escape(_asset("three_licence.txt")),
-        content=json.dumps(said, allow_nan=False, separators=(",", ":")).translate(_ESCAPES),
+        content=json.dumps(description, allow_nan=False, separators=(",", ":")).translate(_ESCAPES),
         data=data,
         library=library.script,
         viewer=viewer,

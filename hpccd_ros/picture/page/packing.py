@@ -132,10 +132,10 @@ class ContactColumns:
         by_time = np.argsort(toc, kind="stable")
         kept = np.sort(by_time if len(toc) <= MOST else by_time[np.arange(MOST) * len(toc) // MOST])
         pairs = FeaturePairs.of(vf=contacts.vf, ee=contacts.ee).keep(kept)
-        told = ContactArray()
-        fill_pairs(told, pairs, layout)
-        self._meshes.append(np.stack([told.mesh_a, told.mesh_b], axis=1).astype(np.uint32))
-        sides = [np.asarray(side, np.uint32).reshape(-1, 2) for side in (told.features_a, told.features_b)]
+        message = ContactArray()
+        fill_pairs(message, pairs, layout)
+        self._meshes.append(np.stack([message.mesh_a, message.mesh_b], axis=1).astype(np.uint32))
+        sides = [np.asarray(side, np.uint32).reshape(-1, 2) for side in (message.features_a, message.features_b)]
         self._features.append(np.concatenate(sides, axis=1))
         self._toc.append(toc[kept])
         self._points.append(np.asarray(contacts.points).reshape(-1, 3)[kept])

@@ -114,13 +114,13 @@ class RecordingPage:
         """(what the page says, as JSON can hold it, {name: bytes} of what it draws)."""
         meshes, blobs = [], {}
         for number, mesh in enumerate(self._meshes):
-            said, of_mesh = mesh.described()
-            meshes.append({**said, "colour": MESH_COLOURS[number % len(MESH_COLOURS)]})
+            description, of_mesh = mesh.described()
+            meshes.append({**description, "colour": MESH_COLOURS[number % len(MESH_COLOURS)]})
             blobs |= {f"mesh-{number}-{name}": data for name, data in of_mesh.items()}
         gaps = _gaps(self._numbers)
         contacts, columns = self._contacts.described()
         blobs |= {f"contacts-{name}": data for name, data in columns.items()}
-        said = {
+        description = {
             "title": shortened(self._title),
             "view": self._view,
             "colours": {
@@ -135,7 +135,7 @@ class RecordingPage:
             "steps": [self._with_gap(step, gaps) for step in self._steps],
             "notes": self._notes(sum(gaps)),
         }
-        return said, blobs
+        return description, blobs
 
     def _with_gap(self, step, gaps):
         missing = gaps[step["place"]]
