@@ -63,6 +63,9 @@ class Rate(_Enumeration):
     read: ClassVar[Rate]
     copy: ClassVar[Rate]
 
+class TestedFeatures:
+    def __init__(self, vertex_face: bool, edge_edge: bool) -> None: ...
+
 class Scene:
     def __init__(self) -> None: ...
     def add_mesh(
@@ -77,7 +80,7 @@ class Scene:
     def ignore_pair(self, mesh_a: int, mesh_b: int) -> None: ...
     def set_accuracy(self, mesh_a: int, mesh_b: int, accuracy: Accuracy) -> None: ...
     def set_separation(self, mesh_a: int, mesh_b: int, separation: float) -> None: ...
-    def set_features(self, mesh_a: int, mesh_b: int, vertex_face: bool, edge_edge: bool) -> None: ...
+    def set_features(self, mesh_a: int, mesh_b: int, features: TestedFeatures) -> None: ...
     @property
     def n_vertices(self) -> int: ...
     @property
@@ -173,30 +176,29 @@ class _OnDevice(TypedDict):  # of every query; what it does not have is empty
     hash: int
     slices: _SlicesOnDevice | None
 
+class Options:
+    accuracy: Accuracy
+    backend: Backend
+    report: Report
+    simd: Simd
+    threads: int
+    points: bool
+    normals: bool
+    closest: bool
+    minimum_separation: float
+    method: Method
+    restructure: bool
+    hybrid_segments: int
+    hybrid_segment_pairs: int
+    gpus: int
+    gpu_stages: bool
+    features: TestedFeatures
+    results_on_device: bool
+    worlds: int
+    def __init__(self) -> None: ...
+
 class Detector:
-    def __init__(
-        self,
-        scene: Scene,
-        accuracy: Accuracy,
-        backend: Backend,
-        report: Report,
-        simd: Simd,
-        threads: int,
-        points: bool,
-        normals: bool,
-        closest: bool,
-        minimum_separation: float,
-        method: Method,
-        restructure: bool,
-        hybrid_segments: int,
-        hybrid_segment_pairs: int,
-        gpus: int,
-        gpu_stages: bool,
-        vertex_face: bool,
-        edge_edge: bool,
-        results_on_device: bool,
-        worlds: int,
-    ) -> None: ...
+    def __init__(self, scene: Scene, options: Options) -> None: ...
     def detect(self, vertices_t0: _Given, vertices_t1: _Given) -> _Contacts: ...
     def detect_on_device(self, vertices_t0: _Given, vertices_t1: _Given) -> _OnDevice: ...
     def prepare(self, vertices_t0: _Given, vertices_t1: _Given, room: float) -> PreparedDetection: ...

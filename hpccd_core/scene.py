@@ -75,13 +75,9 @@ class Scene:
         features: "vertex_face", "edge_edge" or both; the same mesh twice: within it. What is left out costs nothing.
         Intersections and smallest distances look at whole surfaces all the same. To test nothing: ignore_pair.
         """
-        tested = arguments.feature_names(features)
-        self._core.set_features(
-            self._number("mesh_a", mesh_a),
-            self._number("mesh_b", mesh_b),
-            vertex_face="vertex_face" in tested,
-            edge_edge="edge_edge" in tested,
-        )
+        names = arguments.feature_names(features)
+        tested = _core.TestedFeatures("vertex_face" in names, "edge_edge" in names)
+        self._core.set_features(self._number("mesh_a", mesh_a), self._number("mesh_b", mesh_b), tested)
 
     def _number(self, name: str, mesh: str | int) -> int:
         return arguments.mesh_number(name, mesh, self._ids)

@@ -237,6 +237,7 @@ PYBIND11_MODULE(_core, m) {
       .value("read", Rate::read)
       .value("copy", Rate::copy);
 
+  py::class_<TestedFeatures>(m, "TestedFeatures").def(py::init<bool, bool>(), "vertex_face"_a, "edge_edge"_a);
   py::class_<Scene, std::shared_ptr<Scene>>(m, "Scene")
       .def(py::init<>())
       .def(
@@ -250,12 +251,7 @@ PYBIND11_MODULE(_core, m) {
       .def("ignore_pair", &Scene::ignore_pair, "mesh_a"_a, "mesh_b"_a)
       .def("set_accuracy", &Scene::set_accuracy, "mesh_a"_a, "mesh_b"_a, "accuracy"_a)
       .def("set_separation", &Scene::set_separation, "mesh_a"_a, "mesh_b"_a, "separation"_a)
-      .def(
-          "set_features",
-          [](Scene& s, std::uint32_t mesh_a, std::uint32_t mesh_b, bool vertex_face, bool edge_edge) {
-            s.set_features(mesh_a, mesh_b, {vertex_face, edge_edge});
-          },
-          "mesh_a"_a, "mesh_b"_a, "vertex_face"_a, "edge_edge"_a)
+      .def("set_features", &Scene::set_features, "mesh_a"_a, "mesh_b"_a, "features"_a)
       .def_property_readonly("n_vertices", &Scene::n_vertices)
       .def_property_readonly("n_faces", [](const Scene& s) { return s.faces().size(); })
       .def(
@@ -274,35 +270,33 @@ PYBIND11_MODULE(_core, m) {
   bind_prepared(m);
   bind_rigid(m);
 
+  py::class_<Options>(m, "Options")
+      .def(py::init<>())
+      .def_readwrite("accuracy", &Options::accuracy)
+      .def_readwrite("backend", &Options::backend)
+      .def_readwrite("report", &Options::report)
+      .def_readwrite("simd", &Options::simd)
+      .def_readwrite("threads", &Options::threads)
+      .def_readwrite("points", &Options::points)
+      .def_readwrite("normals", &Options::normals)
+      .def_readwrite("closest", &Options::closest)
+      .def_readwrite("minimum_separation", &Options::minimum_separation)
+      .def_readwrite("method", &Options::method)
+      .def_readwrite("restructure", &Options::restructure)
+      .def_readwrite("hybrid_segments", &Options::hybrid_segments)
+      .def_readwrite("hybrid_segment_pairs", &Options::hybrid_segment_pairs)
+      .def_readwrite("gpus", &Options::gpus)
+      .def_readwrite("gpu_stages", &Options::gpu_stages)
+      .def_readwrite("features", &Options::features)
+      .def_readwrite("results_on_device", &Options::results_on_device)
+      .def_readwrite("worlds", &Options::worlds);
+
   py::class_<Detector>(m, "Detector")
-      .def(
-          py::init([](std::shared_ptr<Scene> scene, Accuracy accuracy, Backend backend, Report report, Simd simd,
-                      int threads, bool points, bool normals, bool closest, double separation, Method method,
-                      bool restructure, std::size_t hybrid_segments, std::size_t hybrid_segment_pairs, int gpus,
-                      bool gpu_stages, bool vertex_face, bool edge_edge, bool results_on_device, std::uint32_t worlds) {
-            // A copy: what is added to the caller's scene later does not reach this detector.
-            return std::make_unique<Detector>(std::make_shared<const Scene>(*scene), Options{accuracy,
-                                                                                             backend,
-                                                                                             report,
-                                                                                             simd,
-                                                                                             threads,
-                                                                                             points,
-                                                                                             normals,
-                                                                                             closest,
-                                                                                             separation,
-                                                                                             method,
-                                                                                             restructure,
-                                                                                             hybrid_segments,
-                                                                                             hybrid_segment_pairs,
-                                                                                             gpus,
-                                                                                             gpu_stages,
-                                                                                             {vertex_face, edge_edge},
-                                                                                             results_on_device,
-                                                                                             worlds});
-          }),
-          "scene"_a, "accuracy"_a, "backend"_a, "report"_a, "simd"_a, "threads"_a, "points"_a, "normals"_a, "closest"_a,
-          "minimum_separation"_a, "method"_a, "restructure"_a, "hybrid_segments"_a, "hybrid_segment_pairs"_a, "gpus"_a,
-          "gpu_stages"_a, "vertex_face"_a, "edge_edge"_a, "results_on_device"_a, "worlds"_a)
+      // A copy: what is added to the caller's scene later does not reach this detector.
+      .def(py::init([](const Scene& scene, const Options& options) {
+             return std::make_unique<Detector>(std::make_shared<const Scene>(scene), options);
+           }),
+           "scene"_a, "options"_a)
       .def(
           "detect",
           [](Detector& d, const GivenPositions& t0, const GivenPositions& t1) {
