@@ -1,14 +1,106 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "backends/cpu_backend.h"
 
+#include <algorithm>
+#include <cmath>
 #include <utility>
 
+#include "contacts/gaps.h"
+#include "contacts/intersections.h"
 #include "elementary/distance/distance_batch.h"
 #include "paper/primitive_pairs.h"
 #include "scene/edge_sample.h"
+#include "traverse/snapshot.h"
 #include "traverse/traverse.h"
 
 namespace hpccd {
+namespace {
+
+// By leaf. A search of the whole tree comes to about eight; more than two, with their boxes and the list, cost as much.
+constexpr std::size_t most_open = 2;
+
+// Keeps the pairs of leaves of a search that finds so many at most, instead of testing them; for as long as it lives.
+class OpenPairs {
+ public:
+  OpenPairs(Search& search, std::vector<Worker>& workers, std::size_t most)
+      : search_(search), workers_(workers), sinks_(workers.size(), Sink(search)) {
+    search.most_found = most, search.n_found = 0;
+    for (std::size_t i = 0; i < workers.size(); ++i) workers[i].sink = &sinks_[i];
+  }
+  ~OpenPairs() {
+    for (Worker& w : workers_) w.sink = nullptr;
+    search_.most_found = std::numeric_limits<std::size_t>::max();
+  }
+  OpenPairs(const OpenPairs&) = delete;
+  OpenPairs& operator=(const OpenPairs&) = delete;
+
+  std::vector<LeafPair> all() const {
+    std::vector<LeafPair> pairs;
+    for (const Sink& s : sinks_) pairs.insert(pairs.end(), s.pairs.begin(), s.pairs.end());
+    return pairs;
+  }
+
+ private:
+  class Sink final : public PairSink {
+   public:
+    explicit Sink(Search& search) : search_(search) {}
+    std::span<const LeafPair> push(LeafPair pair) override {
+      ++search_.n_found;
+      pairs.push_back(pair);
+      return {};
+    }
+    void flush() override {}
+    std::vector<LeafPair> pairs;
+
+   private:
+    Search& search_;
+  };
+
+  Search& search_;
+  std::vector<Worker>& workers_;
+  std::vector<Sink> sinks_;
+};
+
+std::vector<std::uint32_t> leaves_of(const std::vector<LeafPair>& pairs, std::size_t n_leaves) {
+  std::vector<char> seen(n_leaves, false);
+  std::vector<std::uint32_t> leaves;
+  for (const LeafPair p : pairs)
+    for (const std::uint32_t leaf : {p.first, p.second})
+      if (!std::exchange(seen[leaf], true)) leaves.push_back(leaf);
+  return leaves;
+}
+
+struct FoundContacts {
+  std::vector<Contact> vertex_face, edge_edge;
+};
+
+FoundContacts take_found(std::vector<Worker>& workers) {
+  FoundContacts found;
+  for (Worker& w : workers)
+    for (auto [from, to] : {std::pair(&w.vertex_face, &found.vertex_face), std::pair(&w.edge_edge, &found.edge_edge)}) {
+      to->insert(to->end(), from->begin(), from->end());
+      from->clear();
+    }
+  return found;
+}
+
+// The earliest of two looks, each once: what is listed may lie in leaves that were left open.
+void join_found(FoundContacts found, double earliest, std::vector<Worker>& workers) {
+  const FoundContacts others = take_found(workers);
+  const auto join = [&](std::vector<Contact>& list, const std::vector<Contact>& more) {
+    list.insert(list.end(), more.begin(), more.end());
+    std::erase_if(list, [&](const Contact& c) { return c.toc > earliest; });
+    const auto key = [](const Contact& c) { return std::pair(c.first, c.second); };
+    std::ranges::sort(list, {}, key);
+    const auto twice = std::ranges::unique(list, {}, key);
+    list.erase(twice.begin(), twice.end());
+  };
+  join(found.vertex_face, others.vertex_face), join(found.edge_edge, others.edge_edge);
+  workers.front().vertex_face = std::move(found.vertex_face);
+  workers.front().edge_edge = std::move(found.edge_edge);
+}
+
+}  // namespace
 
 CpuBackend::CpuBackend(Resources& shared)
     : shared_(shared),
@@ -166,19 +258,235 @@ void CpuBackend::begin_worlds() { counts_of_worlds_.emplace(); }
 void CpuBackend::begin_world(WorldMemory& memory, TreeBudget& trees) {
   // Of several contacts any may be the one that is found, but the same one as by a detector of this world alone.
   shared_.tree.begin_world(memory.tree, trees, shared_.options.report == Report::any);
-  exchange(memory);
+  std::swap(near_, memory.near);
 }
 
 void CpuBackend::end_world(WorldMemory& memory) {
   *counts_of_worlds_ += last_counts();
-  exchange(memory);
+  std::swap(near_, memory.near);
   shared_.tree.end_world();
 }
 
-void CpuBackend::exchange(WorldMemory& memory) {
-  std::swap(near_, memory.near);
-  std::swap(near_separations_, memory.near_separations);
-  std::swap(edge_, memory.edge);
+// Queries of one snapshot: what each of them lets the common traversal look at.
+
+std::optional<Contacts> CpuBackend::proximity(Positions vertices, double distance) {
+  see_near(vertices, distance);
+  walk_tree();
+  return collect({false, false, shared_.options.closest, AtTime::start});
+}
+
+std::optional<Intersections> CpuBackend::intersections(Positions vertices) {
+  see_snapshot(vertices);
+  search_.leaf_edge_faces = leaf_edge_faces(shared_.options.simd);
+  search_.reach = 0;
+  walk_tree();
+  Intersections found = collect_intersections(workers_, search_.geometry, order_, shared_.pool);
+  shared_.profiler.mark("contacts");
+  shared_.cancellation.heed();
+  return found;
+}
+
+std::optional<std::vector<Gap>> CpuBackend::distances(Positions vertices) {
+  const Options& o = shared_.options;
+  see_snapshot(vertices);
+  if (!mesh_pairs_) mesh_pairs_.emplace(shared_.rules, shared_.scene->meshes().size());
+  search_.nearest =
+      std::make_unique<NearestPairs>(*mesh_pairs_, shared_.features, shared_.tree.motion(), shared_.tree.tree());
+  search_.leaf_pairs_in_snapshot = leaf_pairs_in_snapshot(o.simd);
+  search_.far_pairs = far_pairs(o.simd);
+  search_.leaf_edge_faces = leaf_edge_faces(o.simd);
+  walk_tree();
+  std::vector<Gap> gaps = collect_gaps(*search_.nearest, search_.geometry, shared_.cancellation);
+  search_.nearest = nullptr;
+  shared_.profiler.mark("contacts");
+  shared_.cancellation.heed();
+  return gaps;
+}
+
+// Pairs of features within a distance.
+void CpuBackend::see_near(Positions vertices, double distance) {
+  see_snapshot(vertices, distance);
+  search_.geometry.separations = {distance};
+  search_.leaf_pairs_in_snapshot = leaf_pairs_in_snapshot(shared_.options.simd);
+  search_.reach = reach_of(distance, shared_.tree.motion().box_rounding, shared_.tree.motion().box_scale);
+}
+
+void CpuBackend::see_snapshot(Positions vertices, double distance) {
+  const Simd simd = shared_.options.simd;
+  shared_.tree.bound(vertices, distance);
+  begin_query();
+  shared_.tree.fit(shared_.profiler);
+  search_.report = Report::all;
+  for (unsigned i = 0; i < n_rules; ++i)
+    search_.batch_test[i] = proximity_batch(simd), search_.fallback[i] = decide_proximity;
+  search_.intersection_batch = intersection_batch(simd);
+}
+
+// The earliest contacts. Pairs known to be near give the best time so far at once, and often the answer; else the tree
+// is searched for what may touch before.
+
+std::optional<std::vector<double>> CpuBackend::earliest(Positions t0, Positions t1) {
+  find_earliest(t0, t1, true);
+  shared_.cancellation.heed();
+  return std::vector<double>{search_.earliest};
+}
+
+// Leaves what it found in the workers.
+void CpuBackend::find_earliest(Positions t0, Positions t1, bool time_only) {
+  begin_earliest(t0, t1, time_only);
+  if (search_.prunes) {
+    if (known_from_near_pairs() || known_from_the_unlisted(time_only)) return;
+    if (near_.radius().known() && near_.radius().failed(travel_))
+      near_.begin_at(shared_.tree.motion().vertices, shared_.pool);
+    if (!near_.radius().known() && list_near_pairs(t0)) {
+      begin_earliest(t0, t1, time_only);
+      if (known_from_near_pairs() || known_from_the_unlisted(time_only)) return;
+    }
+    limit_reach();
+  }
+  shared_.tree.fit(shared_.profiler);
+  walk_tree();
+  if (search_.prunes) remember_earliest();
+}
+
+void CpuBackend::limit_reach() {
+  const double scale = shared_.tree.motion().box_scale;
+  search_.two_ways = static_cast<float>(2 * travel_.way * scale);
+  search_.most_reach = static_cast<float>(near_.radius().edge / 4 * scale);
+}
+
+void CpuBackend::begin_earliest(Positions t0, Positions t1, bool time_only) {
+  see_motion(t0, t1, Tests::all_here);
+  search_.report = Report::first;
+  search_.time_only = time_only;
+  search_.prunes = shared_.rules.promise_times();
+}
+
+// Tests the pairs that are near, and says whether that was enough. The best time so far is known then in any case.
+bool CpuBackend::known_from_near_pairs() {
+  if (const std::uint64_t now = shared_.separations.version(); near_.radius().separations != now)
+    near_ = {}, near_.radius().separations = now, drift_of_.reset();
+  test_groups(near_.hints);
+  if (!search_.over()) test_groups(near_.groups());
+  mark_traversal();
+  if (search_.over()) return true;
+  travel_ = near_.see(shared_.tree.motion().vertices, shared_.pool);
+  return near_.radius().answers(search_.earliest, travel_);
+}
+
+// Leaves what it found in the workers, and nothing else.
+void CpuBackend::test_groups(const std::vector<NearList::Group>& groups) {
+  for (Worker& w : workers_) w.begin(search_);
+  for (const NearList::Group& group : groups) {
+    constexpr std::size_t grain = 256;  // 10 us, as long as it takes to wake a thread
+    parallel_for(shared_.pool, group.first.size(), grain, [&](std::size_t begin, std::size_t end, int thread) {
+      const std::span first(group.first), second(group.second);
+      workers_[static_cast<std::size_t>(thread)].test_pairs(first.subspan(begin, end - begin),
+                                                            second.subspan(begin, end - begin), group.kind, group.rule);
+    });
+  }
+}
+
+// Lists all pairs that the motion can bring together up to the best time so far, where these are few and asked for
+// again. True: it looked, found few or not, and the motion is to be seen again.
+bool CpuBackend::list_near_pairs(Positions t0) {
+  NearRadius& list = near_.radius();
+  list.edge = typical_length(shared_.features, shared_.tree.motion().vertices);
+  if (!list.next_would_pay(travel_)) return false;
+  std::optional<double> radius = list.next(travel_, search_.earliest);
+  const bool wide = !radius && list.edge > 0 && list.wider_would_pay();
+  if (wide) radius = wide_radius();
+  const std::optional<double> distance = listed_distance(radius, shared_.separations.most());
+  if (!distance) return false;
+  see_near(t0, *distance);
+  search_.most_found = wide ? most_listed_wide(shared_.features) : most_listed(shared_.features), search_.n_found = 0;
+  walk_tree();
+  if (search_.gave_up()) {
+    wide ? list.gave_up_wider() : list.gave_up();
+    return true;
+  }
+  Grouping near(shared_.features, shared_.rules);
+  for (const Worker& w : workers_) {
+    for (const Contact& c : w.vertex_face) near.add({c.first, c.second, Kind::vertex_face});
+    for (const Contact& c : w.edge_edge) near.add({c.first, c.second, Kind::edge_edge});
+  }
+  near_.keep(std::move(near.groups), *radius, shared_.tree.motion().vertices, shared_.pool);
+  shared_.profiler.mark("near_pairs");
+  return true;
+}
+
+// Some of the earliest contacts: they give the next motion its first bound.
+void CpuBackend::remember_earliest() {
+  constexpr std::size_t enough = 64;
+  Grouping near(shared_.features, shared_.rules);
+  std::size_t n = 0;
+  for (const Worker& w : workers_)
+    for (const auto& [list, kind] :
+         {std::pair(&w.vertex_face, Kind::vertex_face), std::pair(&w.edge_edge, Kind::edge_edge)})
+      for (const Contact& c : *list)
+        if (c.toc <= search_.earliest && n++ < enough) near.add({c.first, c.second, kind});
+  near_.hints = std::move(near.groups);
+}
+
+// What a list of near pairs leaves open where the motion goes farther than it reaches: pairs of leaves that go apart by
+// more. On meshes that hang together these are few, and only their boxes are looked at.
+
+// After the pairs of the list: what it leaves open. False where that is too much, where there is no list, or no tree to
+// look with: a world takes its list along to whatever thread's tree is there.
+bool CpuBackend::known_from_the_unlisted(bool time_only) {
+  if (!shared_.tree.built()) return false;
+  if (!near_.radius().known() || near_.snapshot().size() != shared_.tree.motion().vertices.size()) return false;
+  see_drift();
+  drift_.listed_within(near_.radius().listed(), shared_.separations.most());
+  FoundContacts found = take_found(workers_);
+  const std::optional<std::vector<LeafPair>> open = open_pairs();
+  shared_.profiler.mark("near_pairs");
+  if (!open) return false;
+  near_.radius().helped();
+  if (!open->empty()) {
+    shared_.tree.fit_leaves(leaves_of(*open, shared_.tree.tree().leaves.size()));
+    shared_.profiler.mark("refit");
+    limit_reach();
+    test_leaves_of_tree(*open);
+  }
+  if (!time_only) join_found(std::move(found), search_.earliest, workers_);
+  mark_traversal();
+  return true;
+}
+
+// The radius of a list that leaves little open of this motion.
+std::optional<double> CpuBackend::wide_radius() {
+  near_.begin_at(shared_.tree.motion().vertices, shared_.pool);
+  see_drift();
+  constexpr double longest = 0.6;  // of an edge; at 0.7 all neighbours of a regular mesh are near
+  const std::size_t n_leaves = shared_.tree.tree().leaves.size();
+  for (const double part : {0.25, 0.4, longest}) {
+    drift_.listed_within(part * near_.radius().edge, shared_.separations.most());
+    const std::optional<std::vector<LeafPair>> open = open_pairs();
+    if (open && open->size() <= (part < longest ? n_leaves / 2 : n_leaves)) return part * near_.radius().edge / 2;
+  }
+  near_.radius().gave_up_wider();
+  return std::nullopt;
+}
+
+void CpuBackend::see_drift() {
+  const Tree& tree = shared_.tree.tree();
+  if (const std::pair now(near_.number(), shared_.tree.number()); drift_of_ != now) {
+    drift_of_.reset();  // should this be cancelled
+    drift_.begin(tree, near_.snapshot(), shared_.pool);
+    drift_of_ = now;
+  }
+  drift_.fit(tree, shared_.tree.motion().vertices, near_.snapshot(), shared_.pool);
+}
+
+// Pairs of leaves that may touch and are not all listed; nothing where there are too many.
+std::optional<std::vector<LeafPair>> CpuBackend::open_pairs() {
+  const OpenPairs open(search_, workers_, most_open * shared_.tree.tree().leaves.size());
+  search_.drift = &drift_;
+  hpccd::traverse(shared_.tree.tree(), shared_.rules, search_, shared_.pool, workers_);
+  search_.drift = nullptr;
+  if (search_.gave_up()) return std::nullopt;
+  return open.all();
 }
 
 }  // namespace hpccd

@@ -61,13 +61,13 @@ class CpuBackend final : public DetectionBackend {
   std::optional<std::vector<LeafPair>> open_pairs();
   void remember_earliest();
   void see_motion(Positions t0, Positions t1, Tests tests);
+  void see_near(Positions vertices, double distance);
   void see_snapshot(Positions vertices, double distance = 0);
   void walk_tree();
   template <class Test>
   void test_each(const std::vector<LeafPair>& pairs, Test&& test);
   void mark_traversal();
   WorkCounts last_counts() const;
-  void exchange(WorldMemory& memory);
   Contacts collect(Outputs outputs);
 
   Resources& shared_;
@@ -78,10 +78,8 @@ class CpuBackend final : public DetectionBackend {
   Search search_{};
   ContactOrder order_;
   NearList near_;                        // for the earliest contacts of motions that begin alike
-  std::uint64_t near_separations_ = 0;   // the version of the separations that it is for
   Drift drift_;                          // from where it was made
   Travel travel_;                        // of the motion, as the list sees it
-  double edge_ = 0;                      // a typical length
   std::optional<MeshPairs> mesh_pairs_;  // from the first search for smallest distances on
   // What the drift begins at: the numbers of that snapshot and of the tree.
   std::optional<std::pair<std::uint64_t, std::uint64_t>> drift_of_;

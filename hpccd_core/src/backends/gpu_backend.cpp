@@ -5,10 +5,10 @@
 #include <atomic>
 #include <cmath>
 #include <limits>
+#include <utility>
 
-#include "backends/gpu_undecided.h"
-#include "backends/gpu_worlds.h"
 #include "backends/world_positions.h"
+#include "contacts/places.h"
 #include "elementary/apart_until.h"
 #include "elementary/exact/intersection.h"
 #include "gpu/download.h"
@@ -16,7 +16,6 @@
 #include "scene/static_meshes.h"
 
 namespace hpccd {
-
 namespace {
 
 // The same for boxes grown by nearly the same, of which a tree is worn out alike: within an eighth of a factor of two
@@ -29,6 +28,8 @@ bool stays_apart(const UndecidedPair& pair, double until) {
   return pair.kind == Kind::edge_edge ? apart_until<Kind::edge_edge>(pair.t0, pair.t1, until, pair.separation)
                                       : apart_until<Kind::vertex_face>(pair.t0, pair.t1, until, pair.separation);
 }
+
+bool any(Outputs outputs) { return outputs.points || outputs.normals || outputs.closest; }
 
 }  // namespace
 
@@ -302,7 +303,7 @@ void GpuBackend::prepare(Boxes boxes, Bound&& bound) {
   has_tree_ = false;  // should this fail
   in_world(0, bound);
   shared_.tree.build_anew();
-  edge_ = typical_length(shared_.features, shared_.tree.motion().vertices);
+  near_.edge = typical_length(shared_.features, shared_.tree.motion().vertices);
   pipeline_->set_tree(shared_.tree.tree());
   area_when_built_.clear();  // known when the device has refitted it
   has_tree_ = true;
@@ -363,6 +364,153 @@ void GpuBackend::count(std::map<std::string, std::uint64_t>& stats) const {
 void GpuBackend::add_stages(std::map<std::string, double>& stages) const {
   if (!pipeline_) return;
   for (const auto& [name, ms] : pipeline_->stages()) stages["gpu/" + name] = ms;
+}
+
+// The earliest contact, as CpuBackend finds it: from pairs known to be near, which stay on the device. Where these do
+// not suffice, from all pairs: a frame without its results, whose boxes reach up to the best time so far.
+
+using Pairs = gpu::Pipeline::Pairs;
+
+double GpuBackend::earliest_time(Positions t0, Positions t1) {
+  const bool prunes = shared_.rules.promise_times();
+  prepare_motion(t0, t1, prunes);
+  if (!prunes) return run_for_earliest(t0, t1, Pairs::all, std::nullopt);
+  if (const std::uint64_t now = shared_.separations.version(); near_.separations != now)
+    near_.forget(), near_.separations = now;
+  constexpr double none = std::numeric_limits<double>::infinity();
+  double time = none;
+  if (near_.known()) {
+    time = run_for_earliest(t0, t1, Pairs::near_list, none);
+    if (time <= 0 || near_.answers(time, travel_of_frame())) return time;
+    near_.forget();
+  }
+  time = std::min(time, run_for_earliest(t0, t1, Pairs::all, time));
+  pipeline_->choose_hints(time);
+  const Travel travel = travel_of_frame();
+  if (time <= 0 || !list_near_pairs(t0, time, travel)) pipeline_->forget_near();
+  return time;
+}
+
+// Where a world is alone its search is pruned: the times are the same.
+std::vector<double> GpuBackend::earliest_times(Positions t0, Positions t1) {
+  prepare_motion(t0, t1, false);
+  require_good(pipeline_->run_for_earliest(t0, t1, Pairs::all, std::nullopt, shared_.pool), t0, t1);
+  std::vector<double> times = pipeline_->earliest_of_worlds();
+  decide_motion(t0, t1, std::nullopt);
+  for (const auto* list : {&decided_.vertex_face, &decided_.edge_edge})
+    for (const Contact& c : *list) {
+      const Kind kind = list == &decided_.edge_edge ? Kind::edge_edge : Kind::vertex_face;
+      double& time = times[world_of({c.first, c.second, kind})];
+      time = std::min(time, c.toc);
+    }
+  return times;
+}
+
+double GpuBackend::run_for_earliest(Positions t0, Positions t1, Pairs pairs, gpu::Pipeline::Best best) {
+  require_good(pipeline_->run_for_earliest(t0, t1, pairs, best, shared_.pool), t0, t1);
+  double time = pipeline_->earliest().time;
+  if (time <= 0) return time;
+  decide_motion(t0, t1, best ? std::min({time + same_time, *best + same_time, 1.0}) : 1.0);
+  for (const auto* list : {&decided_.vertex_face, &decided_.edge_edge})
+    for (const Contact& c : *list) time = std::min(time, c.toc);
+  return time;
+}
+
+// For the motions to come, where these may begin as this one does.
+bool GpuBackend::list_near_pairs(Positions t0, double time, const Travel& travel) {
+  if (!near_.next_would_pay(travel)) return false;
+  const std::optional<double> radius = near_.next(travel, time);
+  const std::optional<double> distance = listed_distance(radius, shared_.separations.most());
+  if (!distance) return false;
+  prepare_snapshot(gpu::Query::proximity, t0, *distance);
+  require_good(pipeline_->list_near(t0, *distance, most_listed(shared_.features), shared_.pool), t0, t0);
+  if (pipeline_->gave_up_listing())
+    near_.gave_up();
+  else
+    near_.set(*radius, true);
+  return !pipeline_->gave_up_listing();
+}
+
+Travel GpuBackend::travel_of_frame() const {
+  const gpu::EarliestTime frame = pipeline_->earliest();
+  return Travel::along_axes(frame.away, frame.way);
+}
+
+// Points, normals and nearest points of what was found.
+
+// By the device, but for the rows that only integers can tell: those by the CPU.
+DeviceResults GpuBackend::with_places(gpu::FrameResult found, Outputs outputs, const Separations& separations,
+                                      Positions t0, Positions t1) {
+  if (!any(outputs) || found.n_vf + found.n_ee == 0) return on_device(found);
+  const auto open = pipeline_->find_places(found, outputs);
+  if (!open) {
+    DeviceResults all = on_device(found);
+    add_places(all, outputs, separations, t0, t1);
+    return all;
+  }
+  std::vector<PairPlaces> places(open->size());
+  constexpr std::size_t rows_a_piece = 8;  // as of pairs that are left to the CPU
+  parallel_for(shared_.pool, places.size(), rows_a_piece, [&](std::size_t begin, std::size_t end, int) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const gpu::OpenRow& row = (*open)[i];
+      UndecidedPair pair{row.row < found.n_vf ? Kind::vertex_face : Kind::edge_edge, {}, {}, row.separation};
+      std::ranges::copy(row.t0, pair.t0);
+      std::ranges::copy(row.t1, pair.t1);
+      places[i] = pair_places(pair, row.toc, outputs);
+    }
+  });
+  pipeline_->put_places(places);
+  places_on_cpu_ = places.size();
+  shared_.profiler.mark("places");
+  return on_device(found);
+}
+
+void GpuBackend::add_places(Contacts& found, Outputs outputs, const Separations& separations, Positions t0,
+                            Positions t1) {
+  if (!any(outputs)) return;
+  const bool snapshot = t0.data == t1.data;
+  t0 = on_host(t0, 0), t1 = snapshot ? t0 : on_host(t1, 1);
+  if (n_worlds() == 1)
+    hpccd::add_places(found, outputs, shared_.features, separations, t0, t1, shared_.pool);
+  else
+    add_places_of_worlds(found, outputs, shared_.features, separations, t0, t1, shared_.pool);
+}
+
+// All by the CPU.
+void GpuBackend::add_places(DeviceResults& found, Outputs outputs, const Separations& separations, Positions t0,
+                            Positions t1) {
+  places_on_cpu_ = found.n_vf + found.n_ee;
+  const auto fetch = [](auto& to, const auto* from, std::size_t n) {
+    to.resize(n);
+    gpu::download(from, to.data(), n * sizeof to[0]);
+  };
+  Contacts c;
+  fetch(c.vf, found.vf, found.n_vf), fetch(c.vf_toc, found.values, found.n_vf);
+  fetch(c.ee, found.ee, found.n_ee), fetch(c.ee_toc, found.values + found.n_vf, found.n_ee);
+  if (n_worlds() > 1) {
+    fetch(c.slices.vf, found.vf_offsets, n_worlds() + 1);
+    fetch(c.slices.ee, found.ee_offsets, n_worlds() + 1);
+  }
+  add_places(c, outputs, separations, t0, t1);
+  gpu::add_places(found, c);
+  shared_.profiler.mark("places");
+}
+
+// Frames whose work is known beforehand (hpccd/prepared.h).
+
+GpuBackend::Prepared GpuBackend::prepare(Positions t0, Positions t1, double room) {
+  Options options = shared_.options;
+  options.gpu_stages = false;  // nobody asks, and marks would pile up
+  Prepared p;
+  p.pipeline = gpu::Pipeline::create(*shared_.scene, shared_.features, options, shared_.separations,
+                                     gpu::status().devices.at(0).number);
+  shared_.tree.bound(on_host(of_world(t0, 0), 0), on_host(of_world(t1, 0), 1), {});
+  shared_.tree.build_anew();
+  p.pipeline->set_tree(shared_.tree.tree());
+  require_good(p.pipeline->run(t0, t1, std::nullopt, shared_.pool), t0, t1);
+  p.pipeline->finish();
+  p.results = p.pipeline->prepare(t0, t1, room);
+  return p;
 }
 
 }  // namespace hpccd

@@ -10,7 +10,6 @@
 
 #include "backends/backend.h"
 #include "backends/gpu_contacts.h"
-#include "backends/gpu_undecided.h"
 #include "backends/near_list.h"
 #include "backends/resources.h"
 #include "backends/world_positions.h"
@@ -112,10 +111,8 @@ class GpuBackend final : public DetectionBackend {
   std::map<Boxes, double> area_when_built_;
   Boxes last_boxes_;
   DecidedContacts decided_;
-  NearRadius near_;                     // of the pipeline's near list
-  std::uint64_t near_separations_ = 0;  // the version of the separations that it is for
-  double edge_ = 0;                     // a typical length, when the tree was built
-  std::uint64_t places_on_cpu_ = 0;     // rows whose places the CPU computed for results on the device
+  NearRadius near_;                  // of the pipeline's near list; its edge as of when the tree was built
+  std::uint64_t places_on_cpu_ = 0;  // rows whose places the CPU computed for results on the device
   std::vector<unsigned char> downloaded_[2];
 };
 

@@ -4,8 +4,10 @@
 #include <algorithm>
 #include <functional>
 
-#include "backends/gpu_undecided.h"
+#include "backends/world_positions.h"
 #include "contacts/hash.h"
+#include "elementary/batch.h"
+#include "elementary/intersection_batch.h"
 #include "traverse/worker.h"
 
 namespace hpccd {
@@ -39,6 +41,16 @@ std::vector<std::size_t> places(const Row* among, std::size_t n, std::size_t n_r
   return at;
 }
 
+Vec3<double> position(Positions p, std::uint32_t vertex) {
+  const std::size_t i = 3 * std::size_t{vertex};
+  if (p.is_double) {
+    const auto* x = static_cast<const double*>(p.data) + i;
+    return {x[0], x[1], x[2]};
+  }
+  const auto* x = static_cast<const float*>(p.data) + i;
+  return {x[0], x[1], x[2]};
+}
+
 std::uint64_t hash_of_row(const VertexFace& row, double toc) { return hash_of(Kind::vertex_face, row[0], row[1], toc); }
 std::uint64_t hash_of_row(const EdgeEdge& row, double toc) {
   return hash_of(Kind::edge_edge, pack(row[0], row[1]), pack(row[2], row[3]), toc);
@@ -57,6 +69,13 @@ void keep_until(std::vector<Row>& rows, std::vector<double>& toc, double last, s
     if (toc[i] <= last) rows[n] = rows[i], toc[n++] = toc[i];
   rows.resize(n);
   toc.resize(n);
+}
+
+Geometry topology(const Features& features) { return {nullptr, features.edges.data(), features.faces.data()}; }
+
+template <class X>
+std::vector<X> copied(const X* from, std::size_t n) {
+  return {from, from + n};
 }
 
 }  // namespace
@@ -158,6 +177,83 @@ void add_places(Contacts& c, Outputs outputs, const Features& features, const Se
                    geometry, outputs);
     }
   });
+}
+
+UndecidedPair undecided_pair(const Features& features, const Separations& separations, const Candidate& pair,
+                             Positions t0, Positions t1) {
+  std::uint32_t v[4];
+  pair_vertices(topology(features), pair.kind, pair.first, pair.second, v);
+  UndecidedPair q{pair.kind, {}, {}, separations.look_up(v[0], v[2])};
+  for (int k = 0; k < 4; ++k) q.t0[k] = position(t0, v[k]), q.t1[k] = position(t1, v[k]);
+  return q;
+}
+
+void edge_face_positions(const Features& features, const Candidate& pair, Positions vertices, Vec3<double> q[5]) {
+  std::uint32_t v[5];
+  edge_face_vertices(topology(features), pair.first, pair.second, v);
+  for (int k = 0; k < 5; ++k) q[k] = position(vertices, v[k]);
+}
+
+DecidedContacts decided_contacts(const std::vector<Candidate>& pairs,
+                                 const std::vector<std::optional<double>>& values) {
+  DecidedContacts decided;
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    if (!values[i]) continue;
+    auto& list = pairs[i].kind == Kind::vertex_face ? decided.vertex_face : decided.edge_edge;
+    list.push_back({pairs[i].first, pairs[i].second, *values[i]});
+  }
+  for (auto* list : {&decided.vertex_face, &decided.edge_edge}) std::sort(list->begin(), list->end(), before);
+  return decided;
+}
+
+Contacts contacts_of(const gpu::FrameResult& f, std::size_t n_worlds, ThreadPool& pool) {
+  Contacts c;
+  const std::function<void()> parts[] = {
+      [&] { c.ee = copied(f.ee, f.n_ee); }, [&] { c.ee_toc = copied(f.toc + f.n_vf, f.n_ee); },
+      [&] { c.vf = copied(f.vf, f.n_vf); }, [&] { c.vf_toc = copied(f.toc, f.n_vf); }};
+  parallel_for(pool, std::size(parts), 1, [&](std::size_t begin, std::size_t end, int) {
+    for (std::size_t i = begin; i < end; ++i) parts[i]();
+  });
+  c.slices.vf = copied(f.vf_offsets, n_worlds + 1), c.slices.ee = copied(f.ee_offsets, n_worlds + 1);
+  c.slices.hashes = copied(f.hashes, n_worlds);
+  c.hash = f.hash;
+  c.first_tocs = copied(f.first_tocs, n_worlds);
+  c.first_toc = f.first_toc;
+  return c;
+}
+
+Intersections intersections_of(const gpu::FrameResult& f, std::size_t n_worlds) {
+  Intersections found;
+  found.ef = copied(f.ef, f.n_ef);
+  found.slices.ef = copied(f.ef_offsets, n_worlds + 1);
+  found.slices.hashes = copied(f.hashes, n_worlds);
+  found.hash = f.hash;
+  return found;
+}
+
+void add_places_of_worlds(Contacts& all, Outputs outputs, const Features& features, const Separations& separations,
+                          Positions t0, Positions t1, ThreadPool& pool) {
+  const std::size_t n = all.vf.size();
+  const auto each = [&](auto&& f) {
+    if (outputs.points) f(&Contacts::points);
+    if (outputs.normals) f(&Contacts::normals);
+    if (outputs.closest) f(&Contacts::closest);
+  };
+  each([&](auto list) { (all.*list).resize(n + all.ee.size()); });
+  for (std::size_t k = 0; k + 1 < all.slices.vf.size(); ++k) {
+    const std::size_t vf = all.slices.vf[k], ee = all.slices.ee[k];
+    const std::size_t n_vf = all.slices.vf[k + 1] - vf, n_ee = all.slices.ee[k + 1] - ee;
+    Contacts one;
+    one.vf = copied(all.vf.data() + vf, n_vf), one.vf_toc = copied(all.vf_toc.data() + vf, n_vf);
+    one.ee = copied(all.ee.data() + ee, n_ee), one.ee_toc = copied(all.ee_toc.data() + ee, n_ee);
+    add_places(one, outputs, features, separations, of_world(t0, features.n_vertices, k),
+               of_world(t1, features.n_vertices, k), pool);
+    each([&](auto list) {
+      std::copy_n((one.*list).begin(), n_vf, (all.*list).begin() + static_cast<std::ptrdiff_t>(vf));
+      std::copy_n((one.*list).begin() + static_cast<std::ptrdiff_t>(n_vf), n_ee,
+                  (all.*list).begin() + static_cast<std::ptrdiff_t>(n + ee));
+    });
+  }
 }
 
 }  // namespace hpccd

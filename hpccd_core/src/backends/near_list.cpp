@@ -32,15 +32,16 @@ Travel Travel::along_axes(double away, double way) {
   return {length(away), length(way)};
 }
 
-std::optional<double> radius_for(const Travel& travel, double time, double edge) {
+std::optional<double> NearRadius::next(const Travel& travel, double time) const {
   constexpr double longest_way = 1.0 / 8;  // of an edge
   const double way = travel.way * std::min(time + same_time, 1.0);
   if (!(way <= longest_way * edge)) return std::nullopt;
-  return std::max(2 * way, NearRadius::least_radius * edge);
+  return std::max(2 * way, least_radius * edge);
 }
 
-double listed_distance(double radius, double largest_separation) {
-  return (largest_separation + 2 * radius) * (1 + 1e-9);
+std::optional<double> listed_distance(std::optional<double> radius, double largest_separation) {
+  const double distance = radius ? (largest_separation + 2 * *radius) * (1 + 1e-9) : 0;
+  return radius && std::isfinite(distance) ? std::optional(distance) : std::nullopt;
 }
 
 namespace {

@@ -31,9 +31,12 @@ struct Travel {
   static constexpr double least = std::numeric_limits<double>::denorm_min();
 };
 
-// Up to when a list answers, and whether the next is worth its price.
+// What the searches for the earliest contact remember of their list, on CPUs and on a device: up to when it answers,
+// and whether the next is worth its cost.
 class NearRadius {
  public:
+  double edge = 0;                // a typical length of the scene
+  std::uint64_t separations = 0;  // the version of the separations that the list is for
   // Of all pairs within listed_distance() of each other. for_later: the motion that it was made for has its answer.
   void set(double radius, bool for_later = false) { radius_ = radius, answers_ = for_later, failures_ = 0; }
   void forget() { radius_ = -1; }
@@ -53,8 +56,8 @@ class NearRadius {
     return complete;
   }
   // A list costs about what a search costs, so it pays where motions begin where one began before: where this one does,
-  // or the last list has answered more than the motion that it was made for. Edge: a typical length.
-  bool next_would_pay(const Travel& travel, double edge) {
+  // or the last list has answered more than the motion that it was made for.
+  bool next_would_pay(const Travel& travel) {
     const bool again = travel.away <= least_radius * edge / 2;
     if (!again) wider_rests_ = 0, last_rests_ = 1;
     if (rests_ > 0) return --rests_, false;
@@ -64,10 +67,13 @@ class NearRadius {
   // says little of the next: a short rest, and longer ones after more of them from the same start.
   bool wider_would_pay() { return wider_rests_ == 0 || --wider_rests_ == 0; }
   void gave_up_wider() { wider_rests_ = last_rests_ = std::min(2 * last_rests_, rests); }
-
-  static constexpr double least_radius = 1.0 / 64;  // of an edge
+  // The radius of a list that is to answer up to a time, with room for motions that go farther or begin elsewhere.
+  // Nothing where the motion goes so far that it could bring neighbours of a mesh together, of which there are more
+  // than of all other pairs.
+  std::optional<double> next(const Travel& travel, double time) const;
 
  private:
+  static constexpr double least_radius = 1.0 / 64;  // of an edge
   static constexpr int most_failures = 3;
   static constexpr int rests = 64;  // so many motions before another try, whose price is that of a few searches
 
@@ -75,12 +81,8 @@ class NearRadius {
   int answers_ = 0, rests_ = 0, wider_rests_ = 0, last_rests_ = 1, failures_ = 0;
 };
 
-// The radius of a list that is to answer up to a time, with room for motions that go farther or begin elsewhere.
-// Nothing where the motion goes so far that it could bring neighbours of a mesh together, of which there are more than
-// of all other pairs. Edge: a typical length.
-std::optional<double> radius_for(const Travel& travel, double time, double edge);
-// How far apart the pairs of such a list may be at most.
-double listed_distance(double radius, double largest_separation);
+// How far apart the pairs of a list may be at most; nothing where no number is that large.
+std::optional<double> listed_distance(std::optional<double> radius, double largest_separation);
 // How many they may be at most. More are looked at in more time than a search takes, and may be all pairs of a mesh:
 // where others have a separation that is larger than it, or edges that are.
 std::size_t most_listed(const Features& features);

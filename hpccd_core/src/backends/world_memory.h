@@ -10,9 +10,7 @@ namespace hpccd {
 struct WorldMemory {
   OwnTree tree;
   NearList near;
-  std::uint64_t near_separations = 0;  // the version of the separations that it is for
-  double edge = 0;                     // a typical length
-  double seconds = 0;                  // that its last call took
+  double seconds = 0;  // that its last call took
 
   std::size_t bytes() const { return sizeof *this + near.bytes() + (tree.kept ? tree.kept->tree.bytes() : 0); }
 };

@@ -78,14 +78,15 @@ TEST(NearRadius, AnswersAsFarAsItReaches) {
 
 TEST(NearRadius, PaysWhereStartsComeAgain) {
   NearRadius radius;
-  EXPECT_TRUE(radius.next_would_pay({0, 5}, 1));  // where the last motion began
-  EXPECT_FALSE(radius.next_would_pay({0.1, 5}, 1));
-  EXPECT_FALSE(radius.next_would_pay({inf, 5}, 1));
+  radius.edge = 1;
+  EXPECT_TRUE(radius.next_would_pay({0, 5}));  // where the last motion began
+  EXPECT_FALSE(radius.next_would_pay({0.1, 5}));
+  EXPECT_FALSE(radius.next_would_pay({inf, 5}));
   radius.set(1);
   EXPECT_TRUE(radius.answers(1, {0, 0.1}));  // what it was made for
-  EXPECT_FALSE(radius.next_would_pay({0.1, 5}, 1));
+  EXPECT_FALSE(radius.next_would_pay({0.1, 5}));
   EXPECT_TRUE(radius.answers(1, {0, 0.1}));
-  EXPECT_TRUE(radius.next_would_pay({0.1, 5}, 1));
+  EXPECT_TRUE(radius.next_would_pay({0.1, 5}));
 }
 
 TEST(NearRadius, IsKeptWhereSomeMotionsGoTooFar) {
@@ -105,21 +106,26 @@ TEST(NearRadius, IsKeptWhereSomeMotionsGoTooFar) {
 
 TEST(NearRadius, RestsLongerTheMoreWiderOnesWereGivenUpFromOneStart) {
   NearRadius radius;
+  radius.edge = 1;
   int calls = 0, tries = 0;
   for (; calls < 200; ++calls)
-    if (radius.next_would_pay({0, 5}, 1) && radius.wider_would_pay()) ++tries, radius.gave_up_wider();
+    if (radius.next_would_pay({0, 5}) && radius.wider_would_pay()) ++tries, radius.gave_up_wider();
   EXPECT_TRUE(tries > 4 && tries < 12) << tries;
-  EXPECT_FALSE(radius.next_would_pay({1, 5}, 1));  // another start
+  EXPECT_FALSE(radius.next_would_pay({1, 5}));  // another start
   EXPECT_TRUE(radius.wider_would_pay());
 }
 
 TEST(NearRadius, IsAtLeastTheWayAndNoneWhereNeighboursCouldMeet) {
-  EXPECT_GE(radius_for({0, 1}, 0.1, 1).value(), 0.1);
-  EXPECT_GT(radius_for({0, 0}, 1, 1).value(), 0);
-  EXPECT_FALSE(radius_for({0, 1}, 0.2, 1));
-  EXPECT_FALSE(radius_for({0, 1}, inf, 1));
-  EXPECT_FALSE(radius_for({0, inf}, 0.1, 1));
-  EXPECT_GT(listed_distance(0.5, 0.25), 1.25);
+  NearRadius radius;
+  radius.edge = 1;
+  EXPECT_GE(radius.next({0, 1}, 0.1).value(), 0.1);
+  EXPECT_GT(radius.next({0, 0}, 1).value(), 0);
+  EXPECT_FALSE(radius.next({0, 1}, 0.2));
+  EXPECT_FALSE(radius.next({0, 1}, inf));
+  EXPECT_FALSE(radius.next({0, inf}, 0.1));
+  EXPECT_GT(listed_distance(0.5, 0.25).value(), 1.25);
+  EXPECT_FALSE(listed_distance(std::nullopt, 0.25));
+  EXPECT_FALSE(listed_distance(inf, 0.25));
 }
 
 }  // namespace
