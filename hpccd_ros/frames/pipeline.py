@@ -6,11 +6,11 @@ from collections.abc import Collection, Sequence
 
 from hpccd_ros.frames.assembler import FrameAssembler
 from hpccd_ros.frames.drops import Reason, Refusal
-from hpccd_ros.frames.follower import Follower, ReachedTimes
+from hpccd_ros.frames.follower import Follower
 from hpccd_ros.frames.frame_queue import FrameQueue
+from hpccd_ros.frames.requested_times import RequestedTimes
 from hpccd_ros.frames.rigid_mesh import RigidMesh
-from hpccd_ros.frames.standstill import Standstill
-from hpccd_ros.frames.transform_buffer import NoTransformError, TransformBuffer
+from hpccd_ros.frames.transform_buffer import TransformBuffer
 from hpccd_ros.frames.transformer import MeshTransformer, Transformed
 from hpccd_ros.frames.types import (
     ALWAYS,
@@ -39,16 +39,16 @@ class FramePipeline:
     ) -> None:
         self._meshes = tuple(meshes)
         self._rules = rules
-        self._followers = tuple(followers)
         self._queue: FrameQueue | None = None
         self._rigid = {mesh.name: RigidMesh(mesh) for mesh in self._meshes if mesh.rigid}
-        self._by_transforms = [mesh for mesh in self._meshes if mesh.input == TF]
         others = (mesh.name for mesh in self._meshes if not mesh.static and mesh.input not in (TF, JOINTS))
         # Whose stamps are those of the scene's frames; None: frames of all that moves are asked for.
         self._leader = next(others, None)
         asked = [mesh.name for mesh in self._meshes if mesh.input in (TF, JOINTS)]
         self._assembler = FrameAssembler(self._meshes, rules, asked if self._leader is not None else [])
-        self._forget_transforms()
+        by_transforms = [mesh for mesh in self._meshes if mesh.input == TF]
+        self._requested = RequestedTimes(by_transforms, tuple(followers), rules.frame_id)
+        self._use_transforms(TransformBuffer())
 
     def load(self, mesh: str, topology: Topology, positions: MeshFrame | None) -> Outcome:
         """A mesh from a file. positions: of a static one, in the scene's frame already; of one that moves by poses, as
@@ -86,11 +86,11 @@ class FramePipeline:
     def retry(self) -> list[Outcome]:
         """Frames go on that waited for transforms which have come, each with an outcome of its own: a single transform
         may let many go on."""
-        found = [self._ask_of_latest()] if self._leader is None else []
+        found = [self._ask_for_latest()] if self._leader is None else []
         for mesh, transformer in self._transformers.items():
             if transformer.waiting:
                 found += self._assemble(mesh, transformer.retry())
-        for follower in self._followers:
+        for follower in self._requested.followers:
             if follower.waiting:
                 found += self._assemble_followed(follower)
         return found
@@ -109,22 +109,27 @@ class FramePipeline:
         outcome = Outcome()
         for transformer in self._transformers.values():
             outcome.refusals += transformer.clear(Reason.STOPPED)
-        for follower in self._followers:
+        for follower in self._requested.followers:
             outcome.refusals += follower.clear(Reason.STOPPED)
             follower.forget()
         outcome.refusals += self._assembler.clear(Reason.STOPPED)
         for frame in self._queue.close() if self._queue is not None else ():
             outcome.refusals += frame.refused(Reason.STOPPED)
         self._queue = None
-        self._forget_transforms()
+        self._use_transforms(TransformBuffer())
         return outcome
 
     @property
     def waiting(self) -> int:
         """Messages pushed whose frame has neither come up nor been refused, and those in the queue."""
         queued = self._queue.frames() if self._queue is not None else ()
-        before = self._assembler.waiting + sum(w.waiting for w in (*self._transformers.values(), *self._followers))
+        places = (*self._transformers.values(), *self._requested.followers)
+        before = self._assembler.waiting + sum(place.waiting for place in places)
         return before + sum(len(frame.fresh) for frame in queued)
+
+    @property
+    def transforms(self) -> TransformBuffer:
+        return self._requested.transforms
 
     @property
     def coordinate_frame(self) -> tuple[str, str]:
@@ -149,8 +154,9 @@ class FramePipeline:
     def warnings(self) -> list[str]:
         """Positions of static meshes that are not used, what followers wait for, and why there is no time of a frame
         where transforms or joints alone move the scene."""
-        lines = self._assembler.warnings() + [line for follower in self._followers for line in follower.warnings()]
-        return lines + (self._unreached() if self._leader is None else [])
+        lines = self._assembler.warnings()
+        lines += [line for follower in self._requested.followers for line in follower.warnings()]
+        return lines + (self._requested.warnings() if self._leader is None else [])
 
     def _place(self, mesh: str, message: MeshFrame | PoseFrame, new_publisher: bool = False) -> Outcome:
         placed = self._rigid[mesh].place(message) if isinstance(message, PoseFrame) else message
@@ -164,9 +170,9 @@ class FramePipeline:
     def _led(self, outcome: Outcome) -> Outcome:
         """With all that comes of accepted frames of the leader: meshes whose frames are asked for have theirs then."""
         if outcome.restarts and self._leader is not None:  # before anything is asked of the new run
-            outcome.refusals += self._clear_asked()
+            outcome.refusals += self._clear_requested()
             for _, stamp, _ in outcome.joined[-1:]:
-                self._forget_future(stamp)
+                self._requested.forget_future(stamp)
         joined, outcome.joined = outcome.joined, []
         for name, stamp, received in joined:
             if name == self._leader:
@@ -176,63 +182,38 @@ class FramePipeline:
     def _ask(self, stamp: int, received: float, new_publisher: bool = False) -> Outcome:
         """A frame of each mesh that transforms or joints move."""
         outcome = Outcome()
-        for mesh in self._by_transforms:
+        for mesh in self._requested.by_transforms:
             outcome.asked.append(mesh.name)
             pose = PoseFrame(stamp, IDENTITY, mesh.frame, received, sent=ALWAYS)
             outcome += self._place(mesh.name, pose, new_publisher)
-        for follower in self._followers:
+        for follower in self._requested.followers:
             outcome.asked += follower.names
             follower.ask(stamp, received, new_publisher)
             for part in self._assemble_followed(follower):
                 outcome += part
         return outcome
 
-    def _ask_of_latest(self) -> Outcome:
-        """Where nothing else moves: a frame for each time that all that moves them has reached."""
-        try:
-            stamp = self._latest()
-        except NoTransformError:
-            return Outcome()
-        if stamp is None or not self._reached.goes_on(stamp, self._begun(), self._assembler.restart_after):
+    def _ask_for_latest(self) -> Outcome:
+        """Where nothing else moves: a frame for each time that all inputs have reached."""
+        requested = self._requested
+        if (stamp := requested.next(self._assembler.restart_after)) is None:
             return Outcome()
         outcome = Outcome()
-        if self._reached.restarted:  # before a frame is placed by what is from before
-            outcome.refusals += self._clear_asked()
-            if self._reached.set_back:
-                self._forget_future(stamp)
-        outcome += self._ask(stamp, time.monotonic(), new_publisher=self._reached.restarted)
+        if requested.reached.restarted:  # before a frame is placed by samples of the run before
+            outcome.refusals += self._clear_requested()
+            if requested.reached.set_back:
+                requested.forget_future(stamp)
+        outcome += self._ask(stamp, time.monotonic(), new_publisher=requested.reached.restarted)
         return outcome
 
-    def _latest(self) -> int | None:
-        """The time that all which moves has reached; None: nothing is bound to a time. Raises NoTransformError."""
-        reached = [self.transforms.latest(mesh.frame, self._rules.frame_id) for mesh in self._by_transforms]
-        reached += [stamp for follower in self._followers for stamp in follower.latest(self.transforms)]
-        return min((stamp for stamp in reached if stamp is not None), default=None)
-
-    def _unreached(self) -> list[str]:
-        try:
-            self._latest()
-        except NoTransformError as error:
-            self._without_time.waits()
-            account = "" if error.connected else f"; {self.transforms.account(error.source)}"
-            return [f"no frame yet: {error}{account}"] if self._without_time.long else []
-        self._without_time.ends()
-        return []
-
-    def _begun(self) -> int:
-        return self.transforms.begun + sum(follower.begun for follower in self._followers)
-
-    def _clear_asked(self) -> list[Refusal]:
-        """Of a run that has ended."""
-        refusals = [
-            refusal for mesh in self._by_transforms for refusal in self._transformers[mesh.name].clear(Reason.RESTART)
-        ]
-        return refusals + [refusal for follower in self._followers for refusal in follower.clear(Reason.RESTART)]
-
-    def _forget_future(self, stamp: int) -> None:
-        self.transforms.forget_future(stamp)
-        for follower in self._followers:
-            follower.forget_future(stamp)
+    def _clear_requested(self) -> list[Refusal]:
+        """Drop frames that were requested in a run that has ended."""
+        refusals = []
+        for mesh in self._requested.by_transforms:
+            refusals += self._transformers[mesh.name].clear(Reason.RESTART)
+        for follower in self._requested.followers:
+            refusals += follower.clear(Reason.RESTART)
+        return refusals
 
     def _assemble(self, mesh: str, transformed: Transformed) -> list[Outcome]:
         outcomes = [Outcome(refusals=transformed.refusals)]
@@ -252,14 +233,9 @@ class FramePipeline:
             outcomes.append(outcome)
         return outcomes
 
-    def _forget_transforms(self) -> None:
-        self._use_transforms(TransformBuffer())
-
     def _use_transforms(self, transforms: TransformBuffer) -> None:
-        self.transforms = transforms
-        self._reached = ReachedTimes()
-        self._without_time = Standstill()
+        self._requested.use(transforms)
         self._transformers = {
-            mesh.name: MeshTransformer(mesh, self._rules.frame_id, self._rules.max_pending, self.transforms)
+            mesh.name: MeshTransformer(mesh, self._rules.frame_id, self._rules.max_pending, transforms)
             for mesh in self._meshes
         }
