@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import argparse
 import shlex
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from hpccd_core.options import ACCURACIES
@@ -15,11 +15,12 @@ from hpccd_ros.bench import sources
 from hpccd_ros.bench.report import Report
 
 MOST_THREADS = 1024  # of a detector
+MOST_ROUNDS = 100_000
 FEWEST_ROUNDS = 5  # below that a median means little, and the result says so
 PLACES = ("command", "benchmark", "out", "data", "label", "picture")  # paths of this machine are not kept
 
 
-def configure(parser: argparse.ArgumentParser, default: Sequence[str], steps: int, rounds: int = 5) -> None:
+def configure(parser: argparse.ArgumentParser, default: Sequence[str], steps: int, repeat: int = 5) -> None:
     add = parser.add_argument
     add(
         "sources",
@@ -37,7 +38,7 @@ def configure(parser: argparse.ArgumentParser, default: Sequence[str], steps: in
         metavar="N",
         help="steps measured of each scene, evenly spread; 0: all (default: %(default)s)",
     )
-    add("--repeat", type=int, default=rounds, metavar="N", help="timed rounds after a warm-up (default: %(default)s)")
+    add("--repeat", type=int, default=repeat, metavar="N", help="timed rounds after a warm-up (default: %(default)s)")
     add("--threads", type=int, default=0, metavar="N", help="0: all cores (default)")
     add("--out", default="hpccd-bench", metavar="DIR", help="folder of the JSON file (default: %(default)s)")
     add("--label", default=f"{output.cores()}-cores", metavar="NAME", help="end of its name (default: %(default)s)")
@@ -59,10 +60,10 @@ def listed(option: str, text: str, choices: Sequence[str]) -> list[str]:
     return words
 
 
-def begin(args) -> tuple[Report, list[sources.Source]]:
+def begin(args, resolve: Callable = sources.resolve) -> tuple[Report, list[sources.Source]]:
     """The report to fill and the sources that were asked for; UserError for wrong options, before anything is timed."""
-    if args.repeat < 1:
-        raise UserError(f"--repeat {args.repeat}: at least one round must be timed")
+    if not 1 <= args.repeat <= MOST_ROUNDS:
+        raise UserError(f"--repeat {args.repeat}: time from 1 to {MOST_ROUNDS:,} rounds")
     for name in ("steps", "threads"):
         if getattr(args, name) < 0:
             raise UserError(f"--{name} {getattr(args, name)}: must not be negative")
@@ -78,7 +79,7 @@ def begin(args) -> tuple[Report, list[sources.Source]]:
         why = f"no folder can be made there ({error.strerror})"
         raise UserError(f"--out {args.out}: {why}; name another") from error
     require_writable("--out", Path(args.out) / f"{args.benchmark}-{args.label}.json")
-    found = sources.resolve(args.sources, sources.data_folder(args.data), args.default_sources, args.size)
+    found = resolve(args.sources, sources.data_folder(args.data), args.default_sources, args.size)
     options = {k: v for k, v in vars(args).items() if k not in PLACES and isinstance(v, (int, float, str, type(None)))}
     words = ["hpccd bench", args.benchmark, *(Path(source).name for source in args.sources)]
     for name, value in options.items():

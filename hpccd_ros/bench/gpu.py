@@ -22,7 +22,7 @@ from hpccd_ros.bench.report import Report, cores, show
 
 
 def configure(parser):
-    command.configure(parser, default=("data",), steps=4, rounds=20)
+    command.configure(parser, default=("data",), steps=4, repeat=20)
     parser.add_argument("--tiers", default="balanced,exact", metavar="NAME,...", help="default: %(default)s")
 
 

@@ -161,12 +161,12 @@ def _one(word, data, size):
     )
 
 
-def of_scene(name: str, size: float = 1.0) -> Source:
-    """A scene that hpccd_ros.scenes generates."""
+def of_scene(name: str, size: float = 1.0, make: Callable | None = None) -> Source:
+    """A generated scene. make: by default hpccd_ros.scenes.make."""
     from hpccd_ros import scenes
 
     try:
-        scene = scenes.make(name, size, progress=True)
+        scene = (make or scenes.make)(name, size, progress=True)
     except ValueError as error:
         raise UserError(str(error)) from error
     changes: dict[int, int] = {}

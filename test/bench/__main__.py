@@ -18,35 +18,35 @@ from hpccd_ros.base.errors import UserError
 
 # The module of each, in this package, and what it measures.
 SUBJECTS = {
-    "cpu": ("core.cpu", "ms a frame of each scene (Table 1), its components, and a peer beside it"),
-    "gpu": ("core.gpu", "the GPU backend: ms a frame, with transfers and without, many worlds, stages, floors"),
-    "scaling": ("core.scaling", "speed-up over one thread against threads (Fig. 6 and 7), for each method"),
-    "methods": ("core.methods", "the methods and instruction sets compared: time, and equality of the results"),
-    "size": ("core.size", "how time and memory grow with the number of triangles"),
-    "worlds": ("core.worlds", "many worlds in one call on CPUs, beside detectors that are asked one world at a time"),
-    "ropes": ("core.ropes", "ropes as edges, beside thin triangles and beside cloth with as many edges"),
-    "memory": ("core.memory", "peak memory and bytes per triangle"),
-    "limit": ("core.limit", "where the time of a step goes, beside the least that this machine needs for the work"),
-    "options": ("core.options", "what each way to model less saves"),
-    "distance": ("core.distance", "separation, proximity, intersections, smallest distances beside plain detection"),
-    "step": ("core.step", "how far a step may go: first contacts, free step and trial steps beside all contacts"),
-    "rigid": ("core.rigid", "meshes moved by poses and joints: found contacts against the truth, bounds, cost"),
-    "ros": ("ros.node", "the node over DDS: latency beside that of an echo, sustained rate, overload"),
+    "peer": ("peer", "all and first contacts beside ipctk"),
+    "scaling": ("scaling", "speed-up over one thread against threads (Fig. 6 and 7), for each method"),
+    "methods": ("methods", "the methods and instruction sets compared: time, and equality of the results"),
+    "size": ("size", "how time and memory grow with the number of triangles"),
+    "memory": ("memory", "peak memory and bytes per triangle"),
+    "worlds": ("worlds", "many worlds in one call on CPUs, beside detectors that are asked one world at a time"),
+    "ropes": ("ropes", "ropes as edges, beside thin triangles and beside cloth with as many edges"),
+    "options": ("options", "the time that each way to model less saves"),
+    "distance": ("distance", "separation, proximity, intersections, smallest distances beside plain detection"),
+    "step": ("step", "how far a step may go: first contacts, free step and trial steps beside all contacts"),
+    "accuracy": ("accuracy", "hard elementary and distance queries: false negatives and positives of each tier"),
+    "gpu": ("gpu", "the GPU backend: ms a frame, with transfers and without, many worlds, stages, floors"),
+    "rigid": ("rigid", "meshes moved by poses and joints: found contacts against the truth, bounds, cost"),
+    "ros": ("ros.latency", "the node over DDS: latency beside that of an echo, sustained rate, overload"),
     "robot": ("ros.robot", "a robot beside a cloth over DDS, moved by joint states: answers a second, latency"),
     "stop": ("ros.stop", "the topic stop over DDS: random approaches, silence, publisher and node killed"),
     "soak": ("ros.soak.command", "half an hour of mixed load on the node: memory, counts, answers"),
-    "accuracy": ("core.accuracy", "hard elementary and distance queries: missed and spurious contacts of each tier"),
 }
 
 
 # What subjects and the processes that they start import.
 TEST = Path(__file__).resolve().parents[1]
-FOLDERS = [str(folder) for folder in (TEST, TEST / "support", TEST.parent / "build" / "oracle")]
+FOLDERS = [TEST, TEST / "support", TEST.parent / "build" / "oracle", TEST.parent / "examples" / "cloth_on_ball"]
 
 
 def main(words: list[str]) -> int:
-    sys.path += [folder for folder in FOLDERS if folder not in sys.path]
-    os.environ["PYTHONPATH"] = os.pathsep.join(FOLDERS)
+    folders = [str(folder) for folder in FOLDERS]
+    sys.path += [folder for folder in folders if folder not in sys.path]
+    os.environ["PYTHONPATH"] = os.pathsep.join(folders)
     parser = argparse.ArgumentParser("python -m bench", description=__doc__)
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
     subparsers = parser.add_subparsers(dest="benchmark", metavar="<subject>", required=True)
@@ -58,7 +58,7 @@ def main(words: list[str]) -> int:
         subparser.set_defaults(run_benchmark=module.run, parser=subparser)
     args = parser.parse_args(words)
     try:
-        return args.run_benchmark(args)
+        return args.run_benchmark(args).end(Path(args.out), args.label)
     except UserError as error:
         print(f"bench: {error}", file=sys.stderr)
         return 2

@@ -101,7 +101,8 @@ def test_files_of_one_name_are_told_apart(tmp_path):
     ("arguments", "text"),
     [
         (("cpu", "no-such-scene"), "no-such-scene: neither a file"),
-        (("cpu", *STRIP[:-1], "0"), "--repeat 0: at least one round"),
+        (("cpu", *STRIP[:-1], "0"), "--repeat 0: time from 1 to 100,000"),
+        (("cpu", *STRIP[:-1], "1000000"), "--repeat 1000000: time from 1 to 100,000"),
         (("cpu", *STRIP, "--report", "all,last"), "'last' is not known; choose from all, first, any"),
         (("cpu", *STRIP, "--steps", "-1"), "--steps -1: must not be negative"),
         (("accuracy", *STRIP, "--tiers", "best"), "'best' is not known"),

@@ -89,12 +89,12 @@ def _settle(link: Link, status: NodeStatus, alive: Callable[[], None]) -> None:
             last = counts
 
 
-def sustained(run: Callable[[float, float], Trial], guess: float, said: Callable[[str], None]) -> float:
+def sustained(run: Callable[[float, float], Trial], guess: float, done: Callable[[], None]) -> float:
     """The highest rate of a ladder, by factors of 1.1 around `guess`, at which a trial drops no frame."""
 
     def clean(rate: float) -> bool:
         found = run(rate, TRIAL)
-        said(f"{rate:.4g} Hz: {found.dropped + found.middleware} dropped")
+        done()
         return found.dropped == found.middleware == 0
 
     rate = guess

@@ -22,9 +22,8 @@ from pathlib import Path
 
 import numpy as np
 
-from bench import command
-from bench.core.variants import BACKENDS, usable
-from bench.report.progress import bar
+from bench import lab
+from bench.lab import BACKENDS, bar, usable
 from hpccd_ros import scenes
 from hpccd_ros.base.errors import UserError
 from hpccd_ros.bench import report as tables
@@ -43,20 +42,18 @@ def configure(parser):
     what.add_argument("--frames", type=int, default=1501, metavar="N", help="of the scene (default: %(default)s)")
     what.add_argument("--distances", action="store_true", help="ask for the smallest distances, too")
     what.add_argument("--backend", default="cpu", choices=BACKENDS, help="default: %(default)s")
-    command.threads_option(what)
-    command.tier_option(what, default="exact")
-    command.repeat_option(what, 3)
-    command.output_options(parser)
+    lab.tier_option(what, default="exact")
+    lab.configure(parser, rounds=3)
 
 
-def run(args) -> int:
+def run(args) -> lab.Report:
     if not args.rate > 0 or args.frames < 3 or args.repeat < 1:
         raise UserError("--rate: must be above 0; --frames: at least 3; --repeat: at least 1")
     _, refused = usable("backend", [args.backend], accuracy=args.accuracy)
     if refused:
         raise UserError(f"--backend {args.backend}: {refused[args.backend]}")
     os.environ.setdefault("ROS_DOMAIN_ID", str(1 + os.getpid() % 100))
-    report = command.begin_report(args)
+    report = lab.begin(args)[0]
     scene = scenes.make(SCENE, frames=args.frames, progress=True)
     for number in range(args.repeat):
         with tempfile.TemporaryDirectory(prefix="hpccd-bench-") as folder:
@@ -76,7 +73,7 @@ def run(args) -> int:
         caption="detection: with joints, bounds and cuts; core: its calls alone; around: whole less detection; added: "
         "whole less core",
     )
-    return command.end(args, report)
+    return report
 
 
 def _measured(args, scene, folder: str) -> dict:
@@ -172,7 +169,7 @@ def _sent(node, scene, rate: float, children, status) -> list[float]:
         PATIENCE,
     )
     sent, begin = [], 0.0
-    with bar(f"{SCENE} at {rate:g} a second", len(frames)) as progress:
+    with bar(f"{SCENE} at {rate:g} a second", len(frames)) as done:
         for number, frame in enumerate(frames):
             if number < 2:  # the node has its first frame before the clock runs
                 begin = time.monotonic() + SETTLE * (1 - number) - number / rate
@@ -184,7 +181,7 @@ def _sent(node, scene, rate: float, children, status) -> list[float]:
             if number == 0:
                 await_acknowledged(publishers.values(), PATIENCE)
                 time.sleep(SETTLE)
-            progress.step()
+            done()
     return sent
 
 

@@ -14,7 +14,7 @@ from hpccd.srv import Detect
 from numpy.typing import NDArray
 from rclpy.node import Node
 
-from bench.report.progress import bar
+from bench.lab import bar
 from bench.ros.link import MESH, Link
 from hpccd_ros import client
 from hpccd_ros.bench import report as tables
@@ -62,11 +62,11 @@ def measure(node: Node, link: Link, scene: str, rounds: int, alive: Callable[[],
     loop = StepLoop(node, link, alive)
     for _ in range(2 * len(TRIALS)):
         loop.round()
-    with bar(f"{scene}: how far", rounds) as progress:
+    with bar(f"{scene}: how far", rounds) as done:
         found = []
         for _ in range(rounds):
             found.append(loop.round())
-            progress.step()
+            done()
     whole, request, core, step = np.array(found).T
     out: dict[str, float | int] = {"rounds": rounds, "mb_sent": 2 * link.bytes_in / 1e6, "wrong": loop.wrong}
     for who, ms in (("loop", whole), ("core", core), ("more", whole - core)):

@@ -20,8 +20,8 @@ from pathlib import Path
 
 import numpy as np
 
-from bench import command
-from bench.report.progress import bar
+from bench import lab
+from bench.lab import bar
 from hpccd_ros.base.errors import UserError
 from hpccd_ros.bench import report as tables
 
@@ -49,19 +49,19 @@ def configure(parser):
         help="most that stop may rise after the time-out (default: %(default)s)",
     )
     what.add_argument("--seed", type=int, default=18, help="of the approaches (default: %(default)s)")
-    command.output_options(parser)
+    lab.configure(parser)
 
 
-def run(args) -> int:
+def run(args) -> lab.Report:
     if args.trials < 1 or args.ends < 0 or not args.rate > 0 or not args.stop_timeout > 2 / args.rate:
         raise UserError("--trials, --rate: must be above 0; --ends: not negative; --stop-timeout: above two frames")
     os.environ.setdefault("ROS_DOMAIN_ID", str(1 + os.getpid() % 100))
-    report = command.begin_report(args)
+    report = lab.begin(args)[0]
     with tempfile.TemporaryDirectory(prefix="hpccd-bench-") as folder:
         _measure(report, args, Path(folder))
     _costs(report)
     _tables(report)
-    return command.end(args, report)
+    return report
 
 
 def _measure(report, args, folder: Path) -> None:
@@ -106,10 +106,10 @@ def _approaches(report, args, node, ears, children) -> None:
     sender = Sender(node)
     children.wait(sender.heard, "the node listens", PATIENCE)
     sender.topologies()
-    with bar("approaches", args.trials) as progress:
-        found = stop_trials.approaches(sender, ears, args.trials, args.rate, args.seed, progress.step)
-    with bar("truth", len(found.frames) - 1) as progress:
-        judged = stop_trials.judge(found, ears, args.rate, args.stop_timeout, progress.step)
+    with bar("approaches", args.trials) as done:
+        found = stop_trials.approaches(sender, ears, args.trials, args.rate, args.seed, done)
+    with bar("truth", len(found.frames) - 1) as done:
+        judged = stop_trials.judge(found, ears, args.rate, args.stop_timeout, done)
     report.add(
         what="approaches",
         trials=args.trials,
@@ -154,16 +154,16 @@ def _ends(report, args, ears, children, child, start) -> None:
         ("node killed", nodes, signal.SIGKILL, partial(anew, nodes, start)),
         ("node held up", nodes, signal.SIGSTOP, partial(goes_on, nodes)),
     ):
-        with bar(what, args.ends) as progress:
-            taken = stop_trials.ended(ears, lambda kept=kept: kept[0].process, number, args.ends, after, progress.step)
+        with bar(what, args.ends) as done:
+            taken = stop_trials.ended(ears, lambda kept=kept: kept[0].process, number, args.ends, after, done)
         _silence(report, args, what, taken)
 
 
 def _costs(report) -> None:
     from bench.ros import stop_cost
 
-    with bar("cost", len(stop_cost.SCENES)) as progress:
-        for row in stop_cost.rows(progress.step):
+    with bar("cost", len(stop_cost.SCENES)) as done:
+        for row in stop_cost.rows(done):
             report.add(**row)
 
 

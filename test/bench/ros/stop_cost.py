@@ -21,13 +21,13 @@ SCENES = ("cloth-drop", "cloth-ball-like")
 DISTANCES_EACH = 30  # steps
 
 
-def rows(said: Callable[[], None]) -> Iterator[dict[str, Any]]:
+def rows(done: Callable[[], None]) -> Iterator[dict[str, Any]]:
     """Of each scene two, for a distance of a median edge: as it is, near in nearly all steps; and with its first mesh
     moved so far up that nothing is near."""
     for source in sources.resolve(SCENES, None, SCENES):
         for apart in (False, True):
             yield _of_source(source, apart)
-        said()
+        done()
 
 
 def _of_source(source: Source, apart: bool) -> dict[str, Any]:

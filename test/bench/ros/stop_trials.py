@@ -25,7 +25,7 @@ class Approaches:
     waited: int = 0
 
 
-def approaches(sender: Sender, ears: Ears, trials: int, rate: float, seed: int, said: Callable[[], None]) -> Approaches:
+def approaches(sender: Sender, ears: Ears, trials: int, rate: float, seed: int, done: Callable[[], None]) -> Approaches:
     """Frames at a fixed rate; after each trial none, until stop is true."""
     random, out, stamp = np.random.default_rng(seed), Approaches(), 0
 
@@ -51,7 +51,7 @@ def approaches(sender: Sender, ears: Ears, trials: int, rate: float, seed: int, 
         time.sleep(1 / rate)
         last = out.sent[-1]
         out.silences.append(ears.until(True) - last)
-        said()
+        done()
     return out
 
 
@@ -73,12 +73,12 @@ class Judged:
     false: int
 
 
-def judge(found: Approaches, ears: Ears, rate: float, timeout: float, said: Callable[[], None]) -> Judged:
+def judge(found: Approaches, ears: Ears, rate: float, timeout: float, done: Callable[[], None]) -> Judged:
     """By brute force on each step. The first frame ends none. timeout: stop_timeout, s."""
     truth = []
     for start, end in zip(found.frames, found.frames[1:], strict=False):
         truth.append(stop_scene.near(start, end))
-        said()
+        done()
     out = Judged(len(truth), sum(truth), [], 0, 0, 0)
     period, before = 1 / rate, True
     for near, sent, following in zip(truth, found.sent[1:], [*found.sent[2:], float("inf")], strict=True):
@@ -101,7 +101,7 @@ def ended(
     number: signal.Signals,
     times: int,
     after: Callable[[], None],
-    said: Callable[[], None],
+    done: Callable[[], None],
 ) -> list[float]:
     """s from the signal to the process, while stop was false, to the rise of stop. after: brings it back."""
     random, taken = np.random.default_rng(times), []
@@ -113,5 +113,5 @@ def ended(
         process_of().send_signal(number)
         taken.append(ears.until(True) - began)
         after()
-        said()
+        done()
     return taken

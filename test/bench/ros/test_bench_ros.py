@@ -31,7 +31,7 @@ def bench(folder, *arguments, program=("-m", "bench")):
     done = subprocess.run(
         [sys.executable, *program, *arguments, "--out", str(folder), "--label", "test"],
         cwd=ROOT,
-        env={**os.environ, "PYTHONPATH": os.pathsep.join(FOLDERS)},
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(map(str, FOLDERS))},
         capture_output=True,
         text=True,
         timeout=550,
@@ -140,7 +140,7 @@ def test_a_backend_that_is_not_here_is_refused(tmp_path):
     done = subprocess.run(
         [sys.executable, "-m", "bench", "robot", "--backend", "gpu", "--out", str(tmp_path)],
         cwd=ROOT,
-        env={**os.environ, "PYTHONPATH": os.pathsep.join(FOLDERS)},
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(map(str, FOLDERS))},
         capture_output=True,
         text=True,
         timeout=100,

@@ -19,7 +19,7 @@ import os
 import tempfile
 from pathlib import Path
 
-from bench import command
+from bench import lab
 from hpccd_ros.base.errors import UserError
 
 
@@ -52,10 +52,10 @@ def configure(parser):
         "--check-every", type=int, default=25, metavar="N", help="compute every Nth answer again (default: %(default)s)"
     )
     what.add_argument("--seed", type=int, default=0, metavar="N", help="of what is random (default: %(default)s)")
-    command.output_options(parser)
+    lab.configure(parser)
 
 
-def run(args) -> int:
+def run(args) -> lab.Report:
     for name in ("minutes", "rate", "restart_every", "memory_limit", "check_every"):
         if not getattr(args, name) > 0:
             raise UserError(f"--{name.replace('_', '-')} {getattr(args, name)}: must be above 0")
@@ -67,10 +67,10 @@ def run(args) -> int:
     from bench.ros.soak import accounts
     from bench.ros.soak.session import Session
 
-    report = command.begin_report(args)
+    report = lab.begin(args)[0]
     with tempfile.TemporaryDirectory(prefix="hpccd-soak-") as folder:
         session = Session(args, report, Path(folder))
         session.run()
         accounts.check(session)
         accounts.show(session)
-    return command.end(args, report)
+    return report

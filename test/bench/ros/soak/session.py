@@ -17,7 +17,7 @@ import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 
-from bench.report.progress import bar
+from bench.lab import bar
 from bench.ros import node_process
 from bench.ros.soak import load
 from hpccd_ros import scenes
@@ -124,7 +124,7 @@ class Session:
         sample_at = row_at = begin
         hold_at = begin + seconds * self.args.warm_up / 2
         release_at = hold_at + HELD_UP_FRAMES / rate
-        with bar("soak", round(seconds)) as progress:
+        with bar("soak", round(seconds)) as done:
             while (now := time.monotonic()) - begin < seconds:
                 self._alive()
                 left = tick / rate - time.time()
@@ -148,7 +148,7 @@ class Session:
                 if now >= sample_at:
                     sample_at += 1.0
                     self._samples.append((now - begin, node_process.resident_mb(self._node.process.pid)))
-                    progress.step(f"{self._samples[-1][1]:.1f} MB, {self.load.answers:,} answers")
+                    done()
                 if now >= row_at:
                     row_at += max(1.0, seconds / ROWS)
                     self._row(now - begin)

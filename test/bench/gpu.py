@@ -1,0 +1,264 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The GPU and hybrid backends beside the CPU, and positions and results that stay on the device.
+
+  python -m bench gpu data                      the scene files of HPCCD_DATA, all parts
+  python -m bench gpu cloth-ball --repeat 100 --parts frames
+  python -m bench gpu --parts worlds --worlds 64,1024 --repeat 20
+
+  frames    ms a frame from host to host, and device time by stage (in calls of their own)
+  threads   Fig. 6 of Kim et al. 2009: threads by GPUs, default and published method
+  device    from the device to the host, on the device, and in a CUDA graph (PyTorch or CuPy)
+  large     the same of two nets that meet nearly edge on edge (--sizes)
+  worlds    contacts of a folded garment, and near pairs in a folded sheet, many times in one call (--worlds)
+
+Fails where results differ from the CPU's, or where a device left a frame to the CPU.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from collections.abc import Callable
+from functools import partial
+
+import numpy as np
+
+import hpccd_core as hc
+from bench import lab, shapes
+from bench.device import library
+from hpccd_core._core import MOST_WORLDS
+from hpccd_ros.bench.sources import Step
+from hpccd_ros.scenes.scene import Mesh
+
+OF_SCENES = ("frames", "threads", "device")
+PARTS = (*OF_SCENES, "large", "worlds")
+TIERS = ("balanced", "exact")
+NEAR = 0.35  # of proximity in folded sheets, whose vertices are 1 apart
+FEWEST, SECONDS = 5, 1.0  # rounds of each way: at least so many, and no more once this time has passed
+WARM_UP = 8  # the lists on the devices reach their size
+COLUMNS = {
+    "part": "part",
+    "scene": "scene",
+    "accuracy": "accuracy",
+    "triangles": "triangles",
+    "contacts": "contacts",
+    "CPU, ms": "cpu_median_ms",
+    "hybrid": "hybrid_median_ms",
+    "host to host": "host_median_ms",
+    "device to host": "to_host_median_ms",
+    "this way": "median_ms",
+    "p95": "p95_ms",
+    "graph": "graph_median_ms",
+}
+WORLDS = {
+    "query": "query",
+    "worlds": "worlds",
+    "triangles": "triangles",
+    "pairs": "pairs",
+    "CPU, ms": "cpu_median_ms",
+    "GPU, ms": "median_ms",
+    "us a world": "us_a_world",
+}
+THREADS = {key: key for key in ("scene", "method", "threads", "gpus", "median_ms", "speedup")}
+
+
+def configure(parser):
+    lab.configure(parser, ("data",), rounds=50)
+    add = parser.add_argument
+    add("--parts", default=",".join(PARTS), metavar="NAME,...", help="default: %(default)s")
+    add("--sizes", default="224,708,1415", metavar="N,...", help="vertices along a side of each net")
+    add("--worlds", default="64,1024,4096,8192", metavar="W,...", help="how many in a call (default: %(default)s)")
+
+
+def run(args) -> lab.Report:
+    parts = lab.listed("--parts", args.parts, PARTS)
+    sizes, worlds = (lab.numbers(f"--{name}", getattr(args, name), int) for name in ("sizes", "worlds"))
+    if sizes[0] < 2:
+        raise lab.UserError(f"--sizes {args.sizes}: a net has at least 2 vertices along a side")
+    if worlds[-1] > MOST_WORLDS:
+        raise lab.UserError(f"--worlds {args.worlds}: a detector takes at most {MOST_WORLDS:,}; name fewer")
+    if "gpu" not in hc.backends():
+        raise lab.UserError(f"no usable GPU: {hc.gpu_status()['reason']}")
+    if set(parts) & {"device", "large", "worlds"}:
+        library("--parts device, large or worlds")
+    if not set(parts) & set(OF_SCENES):
+        args.default_sources = ()
+    result, sources = lab.begin(args)
+    for source in sources:
+        for part, measure in (("frames", _frame), ("device", _on_device)):
+            for accuracy in TIERS if part in parts else ():
+                measure(result, args, part, source.name, source.step(0), accuracy)
+        if "threads" in parts:
+            _threads(result, args, source.name, source.step(0))
+    for n in sizes if "large" in parts else ():
+        _on_device(result, args, "large", f"nets {n}", shapes.two_nets(n), "exact")
+    for count in worlds if "worlds" in parts else ():
+        _worlds(result, args, count)
+    for title, columns, of in (
+        ("ms a call", COLUMNS, ("frames", "device", "large")),
+        ("Fig. 6: ms, and times one CPU thread with the published method", THREADS, ("threads",)),
+        ("many worlds in one call, positions and results on the device", WORLDS, ("worlds",)),
+    ):
+        if rows := [row for row in result.rows if row["part"] in of]:
+            lab.show(title, columns, rows)
+    return result
+
+
+class StagesDetector(hc.Detector):
+    """Its profile has device time by stage; events cost time themselves, so its calls are not those that count."""
+
+    _gpu_stages = True
+
+
+def call_times(ask: Callable, repeat: int):
+    """(times of ask(), its last answer) after a warm-up; rounds end early where they take long."""
+    began = time.perf_counter()
+    for _ in range(WARM_UP):
+        found = ask()
+        if time.perf_counter() - began > SECONDS:
+            break
+    ms = []
+    began = time.perf_counter()
+    while len(ms) < repeat and (len(ms) < FEWEST or time.perf_counter() - began < SECONDS):
+        start = time.perf_counter()
+        found = ask()
+        ms.append(1e3 * (time.perf_counter() - start))
+    return lab.times(ms), found
+
+
+def detector_times(detector, step, repeat):
+    return call_times(lambda: detector.detect(step.vertices_t0, step.vertices_t1), repeat)
+
+
+def _stages(detector: StagesDetector, ask: Callable) -> dict[str, float]:
+    """Device ms by stage, the median over calls after a warm-up."""
+    calls = []
+    for _ in range(2 * WARM_UP):
+        ask()
+        calls.append({name: ms for name, ms in detector.profile.items() if name.startswith("gpu/")})
+    of = calls[WARM_UP:]
+    return {name: lab.times([call.get(name, 0.0) for call in of])["median_ms"] for name in of[-1]}
+
+
+def _check(result, what: str, detector, same: bool) -> None:
+    if not same:
+        result.failure(f"{what}: results of GPU and CPU differ")
+    if detector.stats.get("gpu_fallbacks"):
+        result.failure(f"{what}: frames left to the CPU: {detector.last_gpu_error}")
+
+
+def _frame(result, args, part, name, step, accuracy):
+    options, scene, took, expected = {"accuracy": accuracy, "threads": args.threads}, step.scene(), {}, None
+    for backend in ("cpu", "hybrid", "gpu"):
+        detector = hc.Detector(scene, backend=backend, **options)
+        took[backend], found = detector_times(detector, step, args.repeat)
+        expected = expected or found.hash
+        _check(result, f"{name}, {accuracy}, {backend}", detector, found.hash == expected)
+    staged = StagesDetector(scene, backend="gpu", **options)
+    result.add(
+        part=part,
+        scene=name,
+        accuracy=accuracy,
+        triangles=step.triangles,
+        contacts=len(found),
+        cpu_median_ms=took["cpu"]["median_ms"],
+        hybrid_median_ms=took["hybrid"]["median_ms"],
+        **took["gpu"],
+        stages_ms=detector.profile | _stages(staged, lambda: staged.detect(step.vertices_t0, step.vertices_t1)),
+    )
+
+
+def _on_device(result, args, part, name, step, accuracy):
+    """One step from host to host, from the device to the host, on the device, and in a graph."""
+    what = f"{part}, {name}, {accuracy}"
+    options, scene = {"accuracy": accuracy, "threads": args.threads}, step.scene()
+    arrays = library(f"--parts {part}")
+    moved = {end: arrays.array(getattr(step, end)) for end in ("vertices_t0", "vertices_t1")}
+    there, stream = dataclasses.replace(step, **moved), arrays.stream()
+    on_cpu, expected = detector_times(hc.Detector(scene, backend="cpu", **options), step, args.repeat)
+    ways = {}
+    for way, given in (("host", step), ("to_host", there)):
+        detector = hc.Detector(scene, backend="gpu", **options)
+        ways[way], found = detector_times(detector, given, args.repeat)
+        _check(result, f"{what}, {way}", detector, found.hash == expected.hash)
+    detector = hc.Detector(scene, backend="gpu", results="device", **options)
+    ends = there.vertices_t0, there.vertices_t1
+    on_device, found = call_times(lambda: detector.detect(*ends, stream=stream), args.repeat)
+    _check(result, f"{what}, device", detector, found.hash == expected.hash == found.to_host().hash)
+    held = detector.stats["gpu_bytes"]
+    prepared = detector.prepare(*ends)
+    in_graph, _ = call_times(arrays.graph(prepared.enqueue, stream), args.repeat)
+    if prepared.contacts().hash != expected.hash:
+        result.failure(f"{what}, graph: results of GPU and CPU differ")
+    detector = prepared = found = None  # lists of millions of pairs, which the next one needs too
+    staged = StagesDetector(scene, backend="gpu", results="device", **options)
+    result.add(
+        part=part,
+        scene=name,
+        accuracy=accuracy,
+        triangles=step.triangles,
+        contacts=len(expected),
+        cpu_median_ms=on_cpu["median_ms"],
+        host_median_ms=ways["host"]["median_ms"],
+        to_host_median_ms=ways["to_host"]["median_ms"],
+        **on_device,
+        graph_median_ms=in_graph["median_ms"],
+        bytes=held,
+        stages_ms=_stages(staged, lambda: staged.detect(*ends, stream=stream)),
+    )
+
+
+def _threads(result, args, name, step):
+    """Over one CPU thread with the published method."""
+    gpus = range(len(hc.gpu_status()["devices"]) + 1)
+    counts = sorted({*(1 << k for k in range(lab.cores().bit_length()) if 1 << k <= lab.cores()), lab.cores()})
+    every = [(method, n, g) for method in ("published", "default") for n in counts for g in gpus]
+    runs = dict.fromkeys([("published", 1, 0), *every])
+    base = expected = None
+    for method, threads, n_gpus in runs:
+        where = {"backend": "hybrid", "gpus": n_gpus} if n_gpus else {"backend": "cpu"}
+        detector = hc.Detector(step.scene(), accuracy="balanced", method=method, threads=threads, **where)
+        took, contacts = detector_times(detector, step, args.repeat)
+        base, expected = base or took["median_ms"], expected or contacts.hash
+        _check(result, f"{name}, {method}, {threads} threads, {n_gpus} GPUs", detector, contacts.hash == expected)
+        run = {"method": method, "threads": threads, "gpus": n_gpus, "speedup": base / took["median_ms"]}
+        result.add(part="threads", scene=name, **run, **took)
+
+
+def _worlds(result, args, worlds):
+    start, end = shapes.motions(worlds)
+    faces, xyz = shapes.folded_sheet()
+    garment = Step((Mesh("garment", shapes.garment(), start.shape[1]),), 0, start[0], end[0])
+    sheet = Step((Mesh("sheet", faces, len(xyz)),), 0, xyz, xyz)
+    motions, folded = (start, end), (np.repeat(xyz[None], worlds, axis=0),)
+    _world_query(result, args, worlds, "detect", garment, motions, lambda d, a, **o: d.detect(*a, **o))
+    _world_query(result, args, worlds, "proximity", sheet, folded, lambda d, a, **o: d.proximity(*a, NEAR, **o))
+
+
+def _world_query(result, args, worlds, query, of_world, given, ask):
+    arrays, scene, options = library("--parts worlds"), of_world.scene(), {"worlds": worlds, "threads": args.threads}
+    cpu, expected = call_times(partial(ask, hc.Detector(scene, backend="cpu", **options), given), args.repeat)
+    there, stream = tuple(map(arrays.array, given)), arrays.stream()
+    detector = hc.Detector(scene, backend="gpu", results="device", **options)
+    on_device, found = call_times(partial(ask, detector, there, stream=stream), args.repeat)
+    same = found.hash == expected.hash and np.array_equal(_hashes(found.to_host()), _hashes(expected))
+    _check(result, f"worlds, {query} in {worlds:,}", detector, same)
+    held = detector.stats["gpu_bytes"]
+    detector = found = None  # lists of millions of pairs, which the next one needs too
+    staged = StagesDetector(scene, backend="gpu", results="device", **options)
+    result.add(
+        part="worlds",
+        query=query,
+        worlds=worlds,
+        triangles=of_world.triangles,
+        pairs=len(expected),
+        cpu_median_ms=cpu["median_ms"],
+        **on_device,
+        us_a_world=1e3 * on_device["median_ms"] / worlds,
+        bytes=held,
+        stages_ms=_stages(staged, partial(ask, staged, there, stream=stream)),
+    )
+
+
+def _hashes(found):
+    return [found.hash] if found.slices is None else found.slices.hashes

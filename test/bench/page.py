@@ -1,0 +1,376 @@
+# SPDX-License-Identifier: Apache-2.0
+"""docs/performance.md: its text is written by hand, its tables are made from the kept results: `python -m bench.page`.
+
+A table is between `<!-- NAME -->` and `<!-- end -->`, under the command, machine and commit of each of its results.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import re
+import sys
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+from bench import lab
+from hpccd_ros.bench import accuracy
+from hpccd_ros.bench.report import text
+
+ROOT = Path(__file__).resolve().parents[2]
+RESULTS, PAGE = ROOT / "test" / "bench" / "results", ROOT / "docs" / "performance.md"
+TRADE = "accuracy-trade-h200-16-cores"  # drawn in docs/figures/trade.png
+TABLE = re.compile(r"(<!-- (?P<name>[a-z-]+) -->\n).*?(<!-- end -->)", re.DOTALL)
+TIERS = ("fast", "balanced", "conservative", "exact")
+
+
+@dataclasses.dataclass(frozen=True)
+class Table:
+    """columns: as for lab.show. rows: of the rows of all results, those of the table."""
+
+    results: tuple[str, ...]
+    columns: lab.Columns
+    rows: Callable[[list[dict]], Iterable[dict]] = lambda rows: rows
+
+
+def only(**wanted) -> Callable[[list[dict]], list[dict]]:
+    return lambda rows: [row for row in rows if all(row.get(key) == value for key, value in wanted.items())]
+
+
+def by(*keys: str) -> Callable[[list[dict]], list[dict]]:
+    """One row for each value of the first key: its first row, and under the values of the other keys the others."""
+
+    def pivot(rows):
+        lines: dict = {}
+        for row in rows:
+            line = lines.setdefault(row[keys[0]], dict(row))
+            line[tuple(row[key] for key in keys[1:])] = row
+        return lines.values()
+
+    return pivot
+
+
+def cell(*place, shown: Callable[[dict], object]) -> Callable[[dict], object]:
+    """A column of `by`: what `shown` makes of the row at this place, or nothing."""
+    return lambda row: shown(row[place]) if place in row else None
+
+
+def over(key: str, ratio: str) -> Callable[[dict], str]:
+    return lambda row: f"{text(row[key])} ({row[ratio]:.2f})"
+
+
+def joined(*keys: str, digits: int = 1, between: str = ", ") -> Callable[[dict], str]:
+    return lambda row: between.join(f"{row[key]:.{digits}f}" for key in keys)
+
+
+def wrong(rows: list[dict]) -> str:
+    return " + ".join(f"{sum(row[key] for row in rows):,}" for key in ("missed", "invented"))
+
+
+def _counts(*columns: tuple[str, Callable[[dict], object]]) -> Callable[[list[dict]], list[dict]]:
+    """The columns of the last row as lines."""
+    return lambda rows: [{"what": what, "count": of(rows[-1])} for what, of in columns]
+
+
+def _scaling(row: dict) -> str:
+    return f"{row['speedup']:.2f} ({text(row['median_ms'])} ms)"
+
+
+def _tier(row: dict) -> str:
+    early = " early" if row["latest"] == 0 and row["toc_worst"] > 0 else ""
+    return f"{text(row['step_ms'])}, {row['toc_worst']:.0e}{early}".replace("e-0", "e-").replace(", 0e+00", ", 0")
+
+
+def _whole_scenes(rows: list[dict]) -> list[dict]:
+    rows = only(part="scene", simd="auto")(rows)
+    return [{**line, "wrong": wrong(only(scene=line["scene"])(rows))} for line in by("scene", "accuracy")(rows)]
+
+
+def _wrong_answers(rows: list[dict]) -> list[dict]:
+    kinds = {
+        "ordinary, scale 1e-150 to 1e148, offset to 1e12": only(queries="ordinary"),
+        "degenerate, the same": only(queries="degenerate"),
+        "hard, as `make fuzz` makes them": only(part="adversarial"),
+        **{f"{q}, hard": only(part="hard distance", query=q) for q in ("separation", "proximity", "intersections")},
+    }
+    lines = []
+    for kind, belongs in kinds.items():
+        mine = {tier: only(accuracy=tier)(belongs(rows)) for tier in TIERS}
+        lines.append(
+            {"kind": kind, "of": sum(row["n"] for row in mine["exact"]), **{t: wrong(r) for t, r in mine.items()}}
+        )
+    return lines
+
+
+def _robots(rows: list[dict]) -> list[dict]:
+    """The round with the median latency of each machine and backend."""
+    groups: dict = {}
+    for row in rows:
+        groups.setdefault((row["result"], row["backend"]), []).append(row)
+    return [sorted(group, key=lambda r: r["whole_median_ms"])[len(group) // 2] for group in groups.values()]
+
+
+STEP = {name: cell(name, shown=over("step_ms", "over_base")) for name in ("first", "step", "trial")}
+DEVICE = {"CPU, ms": "cpu_median_ms", "host to host": "host_median_ms"}
+TABLES = {
+    "peer": Table(
+        ("cpu-4-cores",),
+        {
+            "scene": "scene",
+            "triangles": "triangles",
+            "contacts": lab.whole("contacts"),
+            "hpccd, all contacts, ms": "median_ms",
+            '`report="first"`, ms': cell("cpu first", shown=lambda row: row["median_ms"]),
+            "ipctk, ms": cell("ipctk", shown=lambda row: row["median_ms"]),
+            "times faster": lambda row: f"{row['times_faster_than_ipctk']:.0f}",
+        },
+        by("scene", "variant"),
+    ),
+    "scaling": Table(
+        ("scaling-4-cores",),
+        {"scene": "scene"}
+        | {f"`{m}`": cell(m, 4, shown=_scaling) for m in ("default", "published", "naive", "front")}
+        | {"independent detectors": cell("independent", 4, shown=lambda row: f"{row['speedup']:.2f}")},
+        by("scene", "method", "threads"),
+    ),
+    "methods": Table(
+        ("methods-4-cores",),
+        {"scene": "scene"}
+        | {
+            name: cell(variant, shown=lambda row: row["step_ms"])
+            for name, variant in {
+                "`default`": "default",
+                "`published`": "published",
+                "`naive`": "naive",
+                "`front`": "front",
+                "AVX2 only": "avx2",
+                "scalar only": "scalar",
+            }.items()
+        },
+        by("scene", "variant"),
+    ),
+    "memory": Table(
+        ("memory-2-cores",),
+        {
+            "scene": "scene",
+            "triangles": "triangles",
+            "contacts": "contacts",
+            "detector, MB": lambda row: row["detector_bytes"] / 2**20,
+            "bytes a triangle": lab.whole("detector_bytes_per_triangle"),
+            "process, MB": lambda row: row["process_bytes"] / 2**20,
+        },
+    ),
+    "ropes": Table(
+        ("ropes-2-cores",),
+        {
+            "as": "way",
+            "edges": "edges",
+            "triangles": "triangles",
+            "contacts": "contacts",
+            "ms a step": "ms",
+            "detector, MB": lambda row: row["bytes"] / 1e6,
+        },
+    ),
+    "worlds-on-cpus": Table(
+        ("worlds-2-cores", "worlds-16-cores"),
+        {
+            "scene": "scene",
+            "triangles": "triangles",
+            "threads": "threads",
+            "worlds": "worlds",
+            "one call, ms": "one_call_ms",
+            "of all threads": lambda row: f"{row['of_all_threads']:.2f}",
+            "one detector": "one_detector_ms",
+            "a detector each": "detectors_ms",
+            "bytes a world": lab.whole("bytes_a_world"),
+        },
+    ),
+    "distances": Table(
+        ("distance-2-cores",),
+        {"scene": "scene", "contacts": lab.whole("pairs"), "plain, ms": "step_ms"}
+        | {
+            f"{query} {part}": cell(query, d, shown=shown)
+            for query, d in (("separation", 0.001), ("proximity", 0.001), ("intersections", None), ("distances", None))
+            for part, shown in (("pairs", lab.whole("pairs")), ("ms (/ plain)", over("step_ms", "over_plain")))
+        },
+        by("scene", "query", "distance"),
+    ),
+    "steps": Table(
+        ("step-2-cores",),
+        {
+            "scene": "scene",
+            "contacts": lab.whole("contacts"),
+            "earliest at": lambda row: f"{row['earliest']:.4g}",
+            "all, ms": "step_ms",
+            "first (/ all)": STEP["first"],
+            "`collision_free_step` (/ all)": STEP["step"],
+            "trial steps (/ all)": STEP["trial"],
+            "step x ipctk": cell("step", shown=lambda row: f"{row['times_faster_than_ipctk']:,.0f}"),
+        },
+        by("scene", "query"),
+    ),
+    "rigid-cost": Table(
+        ("rigid-cost-2-cores",),
+        {
+            "scene": "scene",
+            "triangles": "triangles",
+            "turn, degrees": lambda row: f"{row['turn']:g}",
+            "parts": "parts",
+            "bound": lambda row: f"{row['bound']:.1e}",
+            "straight, ms": "least_linear_ms",
+            "moved, ms": "least_moved_ms",
+            "/ straight": lambda row: f"{row['least_over_linear']:.2f}",
+        },
+        only(part="cost", tolerance=0.001),
+    ),
+    "robot": Table(
+        ("robot-2-cores", "robot-4-of-16-cores", "robot-h100-4-of-16-cores"),
+        {
+            "cores": "cores",
+            "core on": "backend",
+            "answers": "answers",
+            "dropped": "dropped",
+            "answers a second": lambda row: f"{row['answers_hz']:.1f}",
+        }
+        | {
+            f"{name}, ms: median / p95": joined(f"{part}_median_ms", f"{part}_p95_ms", digits=2, between=" / ")
+            for name, part in (("sent to answer", "whole"), ("detection", "detection"), ("core", "core"))
+        },
+        _robots,
+    ),
+    "tiers": Table(
+        ("accuracy-4-cores",),
+        {"scene": "scene"} | {f"`{t}`": cell(t, shown=_tier) for t in TIERS} | {"missed + spurious": "wrong"},
+        _whole_scenes,
+    ),
+    "wrong-answers": Table(
+        ("accuracy-4-cores", "accuracy-distance-2-cores"),
+        {"queries: missed + spurious": "kind", "of": "of"} | {f"`{tier}`": tier for tier in TIERS},
+        _wrong_answers,
+    ),
+    "options": Table(
+        ("options-2-cores",),
+        {"option": "option"}
+        | {
+            scene: cell(
+                scene, shown=lambda r: text(r["step_ms"]) + " ms" if r["option"] == "full" else f"{r['over_base']:.2f}"
+            )
+            for scene in ("cloth-ball", "cloth-funnel", "n-body", "n-body-like-lr", "cloth-drop")
+        },
+        by("option", "scene"),
+    ),
+    "device-results": Table(
+        ("gpu-device-h100",),
+        {
+            "scene": "scene",
+            "accuracy": lambda row: f"`{row['accuracy']}`",
+            "triangles": "triangles",
+            "contacts": "contacts",
+            **DEVICE,
+            "device to host": "to_host_median_ms",
+            "device to device": "median_ms",
+            "graph": "graph_median_ms",
+            "bytes a triangle": lambda row: row["bytes"] / row["triangles"],
+        },
+        lambda rows: [row for row in rows if row["part"] in ("device", "large")],
+    ),
+    "latency": Table(
+        ("ros-4-cores",),
+        {
+            "scene": "scene",
+            "MB in, out": lambda row: f"{row['mb_in']:.2g}, {row['mb_out']:.2g}",
+            "contacts": "contacts",
+            "core, ms": "core_median_ms",
+            "node without its core, ms: median, p95, p99": joined("node_median_ms", "node_p95_ms", "node_p99_ms"),
+            "echo, ms: median, p95, p99": joined("echo_median_ms", "echo_p95_ms", "echo_p99_ms"),
+            "node / echo": lambda row: f"{row['ratio']:.2f}",
+        },
+        only(what="latency"),
+    ),
+    "step-loop": Table(
+        ("ros-2-cores",),
+        {"scene": "scene", "triangles": "triangles", "MB sent": lambda row: f"{row['mb_sent']:.2g}"}
+        | {
+            f"{name}, ms: median, p95, p99": joined(*(f"{of}_{p}_ms" for p in ("median", "p95", "p99")), digits=2)
+            for name, of in (("over DDS", "loop"), ("in process", "core"), ("difference", "more"))
+        },
+        only(what="step loop"),
+    ),
+    "stop": Table(
+        ("stop-2-cores",),
+        {"what": "what", "count": "count"},
+        lambda rows: _counts(
+            ("random approaches", lambda row: row["trials"]),
+            ("steps, each decided by brute force", lambda row: row["steps"]),
+            ("steps that come closer than stop_distance", lambda row: row["near"]),
+            ("of these without stop", lambda row: row["missed"]),
+            ("rises of stop", lambda row: row["rises"]),
+            ("of these later than a frame", lambda row: row["late"]),
+            ("other steps with stop", lambda row: row["false"]),
+            ("ms from the frame to stop: median, p95, p99, most", joined("median_ms", "p95_ms", "p99_ms", "most_ms")),
+        )(only(what="approaches")(rows)),
+    ),
+    "soak": Table(
+        ("soak-4-cores",),
+        {"what": "what", "count": "count"},
+        _counts(
+            ("vertex messages sent", lambda row: row["sent"]),
+            ("lost by DDS, and counted", lambda row: row["middleware"]),
+            ("answered", lambda row: row["answered"]),
+            ("dropped, and counted", lambda row: row["dropped"]),
+            ("changes of topology", lambda row: row["topologies"]),
+            ("answers computed again, all equal", lambda row: row["checked"]),
+            ("requests to `~/detect`, all answered", lambda row: row["requests"]),
+            ("wrong vertex messages sent", lambda row: sum(row["wrong_sent"].values())),
+            ("ends of a publisher, SIGTERM and SIGKILL", joined("publisher_ended", "publisher_killed", digits=0)),
+        ),
+    ),
+}
+
+
+def read(results: Path, name: str) -> dict:
+    return json.loads((results / f"{name}.json").read_text(encoding="utf-8"))
+
+
+def made(table: Table, results: Path) -> str:
+    """Sources and lines of the table in Markdown."""
+    lines, rows = [], []
+    for name in table.results:
+        kept = read(results, name)
+        lines.append(f"{_source(name, kept)}  ")
+        rows += [{**row, "result": name, "cores": kept["machine"]["cores"]} for row in kept["rows"]]
+    cells = lab.cells(table.columns, table.rows(rows))
+    right = [not isinstance(value, str) for value in cells[0]]
+    grid = [list(table.columns), ["---:" if number else "---" for number in right]]
+    grid += [["" if value is None else _shown(value) for value in row] for row in cells]
+    lines[-1] = lines[-1].rstrip()
+    return "\n".join([*lines, "", *(f"| {' | '.join(row)} |" for row in grid)])
+
+
+def _shown(value) -> str:
+    small = isinstance(value, float) and 1e-4 <= abs(value) < 0.01
+    return f"{value:.2g}" if small else text(value)
+
+
+def _source(name: str, kept: dict) -> str:
+    machine, others = kept["machine"], kept["other_processes_share"]
+    gpus = ", ".join(f"{machine['gpus'].count(gpu)} x {gpu}" for gpu in dict.fromkeys(machine["gpus"]))
+    where = f"{machine['processor']}, {machine['cores']} cores{', ' if gpus else ''}{gpus}"
+    busy = f", others took {100 * others:.0f} %" if others > 0.05 else ""
+    commit = f"commit {machine['commit'][:7]}, {machine['date'].split()[0]}"
+    return f"`{kept['command']}`; {where}{busy}; {commit}; [JSON](../test/bench/results/{name}.json)"
+
+
+def page(old: str, results: Path = RESULTS) -> str:
+    """`old` with its tables made again. KeyError for a table that is not known."""
+    return TABLE.sub(lambda m: f"{m[1]}{made(TABLES[m['name']], results)}\n{m[3]}", old)
+
+
+def main() -> int:
+    PAGE.write_text(page(PAGE.read_text(encoding="utf-8")), encoding="utf-8")
+    accuracy.draw(read(RESULTS, TRADE)["rows"], PAGE.parent / "figures" / "trade.png")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,284 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`python -m bench ...` at tiny sizes: each subject runs, and fails where what it compares differs."""
+
+import collections
+import sys
+
+import numpy as np
+import oracle
+import pytest
+from oracle import rigid_answers
+
+import hpccd_core as hc
+from bench import distance, page, step
+from hpccd_ros.bench import measure
+from hpccd_ros.bench.sources import of_scene
+
+ONE = ("--repeat", "1")
+STRIP = ("folding-strip", "--size", "0.1", "--steps", "2", *ONE)
+SUBJECTS = {
+    "scaling": (*STRIP, "--threads-list", "1,2", "--methods", "default,naive"),
+    "methods": STRIP,
+    "size": ("folding-strip", "--sizes", "0.1,0.4", "--steps", "2", "--threads-list", "1,2", *ONE),
+    "memory": ("folding-strip", "--methods", "default,front", *ONE),
+    "worlds": ("two-triangles", "--worlds", "3,12", "--threads", "2", *ONE),
+    "ropes": ("--segments", "1000", "--segments-a-rope", "100", *ONE),
+    "options": ("n-body-like-lr", "--size", "0.02", "--steps", "1", "--landscape", "200", *ONE),
+    "distance": (*STRIP, "--separations", "0.02,0.002"),
+    "step": STRIP,
+    "accuracy": ("--parts", "sweeps", "--sweep-queries", "40"),
+    "rigid": ("--parts", "truth,bounds", "--queries", "200"),
+}
+
+
+@pytest.fixture
+def rows(bench, request):
+    """Rows of the subject that the test names, which must not fail."""
+    name = request.param
+    status, result, _ = bench(name, *SUBJECTS[name])
+    assert status == 0 and result["failures"] == [] and result["command"].startswith(f"python -m bench {name}")
+    return result["rows"]
+
+
+def of(name):
+    return pytest.mark.parametrize("rows", [name], indirect=True)
+
+
+@of("scaling")
+def test_scaling(rows):
+    assert [(row["method"], row["threads"]) for row in rows] == [
+        *(("default", 1), ("default", 2), ("naive", 1), ("naive", 2)),
+        ("independent", 2),
+    ]
+    assert len({row["contacts"] for row in rows}) == 1 and rows[0]["speedup"] == 1
+    assert rows[-1]["speedup"] == pytest.approx(2 * rows[0]["step_ms"] / rows[-1]["step_ms"], rel=1e-3)
+
+
+@of("methods")
+def test_methods(rows):
+    assert {"default", "published", "naive", "front", "scalar"} <= {row["variant"] for row in rows}
+
+
+@of("size")
+def test_size(rows):
+    small, _, large, _ = rows
+    assert 3 < large["triangles"] / small["triangles"] < 5 and large["bytes"] > small["bytes"]
+
+
+@of("memory")
+def test_memory(rows):
+    default, front = rows
+    assert 0 < default["detector_bytes"] < front["detector_bytes"], "the front keeps pairs of nodes"
+    assert default["process_bytes"] > default["detector_bytes"] / 2
+
+
+@of("worlds")
+def test_worlds(rows):
+    few, many = rows
+    assert (few["worlds"], few["steps"], many["worlds"], many["steps"]) == (3, 3, 12, 10)
+    assert many["contacts"] > few["contacts"] and few["of_all_threads"] > 0 and many["bytes_a_world"] > 100
+
+
+@of("ropes")
+def test_ropes(rows):
+    assert [row["way"] for row in rows] == ["edges", "thin triangles", "cloth"]
+    assert rows[0]["contacts"] == rows[1]["contacts"] > 0 and rows[0]["triangles"] == 0
+
+
+@of("options")
+def test_options(rows):
+    by = {row["option"]: row for row in rows}
+    full = by["full"]
+    for less in ("no self-collision", "largest mesh ignored by all"):
+        assert by[less]["candidates"] < full["candidates"]
+    faces, edges = by["vertex-face only"], by["edge-edge only"]
+    for key in ("contacts", "candidates"):
+        assert faces[key] + edges[key] == full[key]
+    around, static = by["landscape around it"], by["the same, static"]
+    assert static["contacts"] == around["contacts"] == full["contacts"] and static["candidates"] < around["candidates"]
+
+
+@of("distance")
+def test_distance(rows):
+    assert [(row["query"], row["distance"]) for row in rows] == [
+        *(("plain", None), ("separation", 0.002), ("separation", 0.02), ("proximity", 0.002), ("proximity", 0.02)),
+        *(("intersections", None), ("distances", None)),
+    ]
+    plain, small, large, near, nearer, _, gaps = rows
+    assert 0 < plain["pairs"] < small["pairs"] < large["pairs"] and near["pairs"] < nearer["pairs"]
+    assert gaps["pairs"] == plain["over_plain"] == 1
+
+
+@of("step")
+def test_step(rows):
+    every, first, free, trial = rows
+    assert every["contacts"] >= first["contacts"] > 0 and trial["listing_ms"] > 0
+    assert 0 <= free["earliest"] <= every["earliest"] == first["earliest"] <= 1
+
+
+@of("accuracy")
+def test_wrong_answers(rows):
+    hard = {tier: [r for r in rows if r["part"] == "adversarial" and r["accuracy"] == tier] for tier in page.TIERS}
+    assert all(row["missed"] == row["invented"] == 0 for row in hard["exact"])
+    assert any(row["missed"] + row["invented"] for row in hard["balanced"]), "these queries are not hard"
+
+
+@of("rigid")
+def test_rigid(rows):
+    for row in rows:
+        if row["part"] == "truth":
+            assert row["touching"] > 10 and row["missed"] == row["late"] == row["beyond"] == row["open"] == 0
+        else:
+            assert 0 < row["low"] <= row["median"] <= row["largest"] <= 1
+
+
+def test_cost_of_poses_and_joints(bench):
+    few = ("--parts", "cost", "--size", "0.02", "--turns", "1,20", "--tolerances", "1e-3", "--threads", "1", *ONE)
+    status, result, _ = bench("rigid", *few)
+    ball, fast = (row for row in result["rows"] if row["scene"] == "spinning ball")
+    assert status == 0 and (ball["parts"], fast["parts"]) == (1, 3) and ball["contacts"] > 0
+
+
+def test_solved_cloth_is_a_source(bench):
+    status, result, _ = bench("step", "cloth-ball-trial", "--size", "0.03", "--steps", "1", *ONE)
+    assert status == 0 and result["rows"][0]["contacts"] > 0
+
+
+def test_worlds_whose_answers_differ_fail(bench, monkeypatch):
+    detect, calls = hc.Detector.detect, collections.Counter()
+
+    def from_the_second_call_on(self, *args, **options):
+        calls[id(self)] += 1
+        return detect(self, args[0], args[0] if self.worlds and calls[id(self)] > 1 else args[1], **options)
+
+    monkeypatch.setattr(hc.Detector, "detect", from_the_second_call_on)
+    status, result, _ = bench("worlds", "two-triangles", "--worlds", "12", "--repeat", "2", "--threads", "1")
+    assert status == 1 and any("one_thread: contacts of world" in text for text in result["failures"])
+
+
+def test_missed_motions_of_poses_fail(bench, monkeypatch):
+    monkeypatch.setattr(rigid_answers, "grown", lambda d, a, b: d)
+    status, result, _ = bench("rigid", "--parts", "truth", "--queries", "400")
+    assert status == 1 and any("missed" in text for text in result["failures"])
+
+
+def test_steps_that_contradict_each_other_are_seen():
+    source = of_scene("folding-strip", 0.1)
+    last = source.step(source.n_steps - 1)
+    runners = [step.StepRunner(query, {"backend": "cpu", "threads": 1}) for query in step.QUERIES]
+    starts = {runner.name: [] for runner in runners}
+    for runner in runners:
+        for _ in range(4):
+            runner.run(last)
+            starts[runner.name].append(runner.prepared(last).vertices_t0.tobytes())
+    assert step.contradictions(runners, "exact") == [] and len(set(starts["trial"])) == 1
+    every, first, free, trial = runners
+    place = next(iter(every.earliest))
+    free.earliest[place] = every.earliest[place] + 1e-15
+    first.earliest[place] = every.earliest[place] - 1e-15
+    trial.hashes[place].add(1)
+    assert [text.split(":")[0] for text in step.contradictions(runners, "exact")] == ["trial", "first", "step"]
+
+
+@pytest.mark.parametrize("key", ["", "s_vf", "p_ee", "x_ef"])
+def test_distance_queries_against_the_truth(bench, tmp_path, key):
+    """A truth that lacks a pair of this kind fails."""
+    source = of_scene("folding-strip", 0.05)
+    last = source.step(source.n_steps - 1)
+    v0, v1, faces = last.vertices_t0, last.vertices_t1, last.faces().astype(np.uint32)
+    near, apart = oracle.proximity(v1, 0.02, [faces]), oracle.brute_force(v0, v1, [faces], minimum_separation=0.02)
+    truth = {"p_d": 0.02, "s_d": 0.02, "x_ef": oracle.intersections(v1, [faces])}
+    truth |= {f"p_{name}": getattr(near, name) for name in ("vf", "vf_distance", "ee", "ee_distance")}
+    truth |= {f"s_{name}": getattr(apart, name) for name in ("vf", "vf_toc", "ee", "ee_toc")}
+    truth |= {name: rows[1:] for name, rows in truth.items() if key and name.startswith(key)}
+    (tmp_path / "distance").mkdir()
+    np.savez(tmp_path / "strip.npz", vertices_t0=v0, vertices_t1=v1, faces=faces)
+    np.savez(tmp_path / "distance" / "strip-distance.npz", **truth)
+    few = ("--parts", "distance", "--sweep-queries", "0", "--data", str(tmp_path), *ONE)
+    status, result, _ = bench("accuracy", *few)
+    assert status == (1 if key else 0)
+    assert not key or any("exact: missed 0, invented 1" in text for text in result["failures"])
+
+
+def test_time_of_each_further_pair(monkeypatch):
+    plain = {"step_ms": 10.0, "pairs": 10_000}
+    for pairs, ms, us in ((15_000, 30.0, None), (20_000, 30.0, 4.0), (20_000, 15.0, 0.0)):
+        assert distance.us_a_pair_beyond("separation", {"step_ms": ms, "pairs": pairs}, plain, threads=2) == us
+
+
+def test_a_short_step_of_a_file_is_timed_more_often():
+    class Takes:
+        carries_state = True
+
+        def __init__(self, ms):
+            self.name, self.ms = f"{ms} ms", ms
+
+        def run(self, step):
+            return measure.Sample(self.ms, 0, 0, {}, {})
+
+    source = of_scene("folding-strip", 0.1)
+    one = type(source)("one", 1, lambda k: source.step(source.n_steps - 1))
+    series = measure.measure(one, [Takes(2.0), Takes(50.0)], rounds=3)
+    assert [len(of.by_step[0]) for of in series.values()] == [3 * measure.TURN_MS / 2.0, 3]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (("scaling", *STRIP, "--threads-list", "0"), "--threads-list"),
+        (("scaling", *STRIP, "--threads-list", "1,100000"), "at most 1024"),
+        (("size", "folding-strip", "--sizes", "one"), "--sizes"),
+        (("size", "cloth-ball"), "generated"),
+        (("ropes", "cloth-drop"), "makes its own scenes"),
+        (("memory", "folding-strip", "--methods", ","), "--methods"),
+        (("worlds", "breaking-like", "--size", "0.02", "--worlds", "8"), "topology changes"),
+        (("worlds", "two-triangles", "--worlds", "65537"), "at most 65,536"),
+        (("distance", *STRIP, "--separations", "1e-3,-1"), "--separations"),
+        (("distance", *STRIP, "--arrays", "device"), "needs --backend gpu"),
+        (("gpu", "--parts", "frames,all"), "'all' is not known"),
+        (("gpu", "--sizes", "1,8"), "at least 2 vertices"),
+    ],
+)
+def test_wrong_use_is_explained(bench, capsys, arguments, text):
+    status, result, _ = bench(*arguments)
+    assert status == 2 and result is None and text in capsys.readouterr().err
+
+
+def test_a_peer_that_is_not_installed_is_named(bench, capsys, monkeypatch):
+    monkeypatch.setitem(sys.modules, "ipctk", None)  # as Python notes a module that cannot be imported
+    assert bench("peer", *STRIP)[0] == 2
+    assert "pip install" in capsys.readouterr().err
+
+
+def test_a_peer_beside_it(bench):
+    pytest.importorskip("ipctk", reason="ipctk is not installed: an optional extra (pip install 'hpccd[bench]')")
+    for words in (("peer", *STRIP), ("step", *STRIP, "--peer", "ipctk"), ("distance", *STRIP, "--peer", "ipctk")):
+        status, result, _ = bench(*words)
+        assert status == 0 and any(row.get("times_faster_than_ipctk", 0) > 0 for row in result["rows"])
+
+
+@pytest.mark.skipif("gpu" not in hc.backends(), reason="no usable GPU")
+def test_gpu(bench):
+    few = ("folding-strip", "--size", "0.1", "--repeat", "5", "--sizes", "12", "--worlds", "1,3", "--threads", "2")
+    parts = [part for part in ("frames", "threads")]
+    status, result, _ = bench("gpu", *few, "--parts", ",".join(parts))
+    assert status == 0 and result["failures"] == [] and {row["part"] for row in result["rows"]} == set(parts)
+    pytest.importorskip("torch", reason="PyTorch is not installed: positions on the device are not measured")
+    status, result, _ = bench("gpu", *few, "--parts", "device,large,worlds")
+    assert status == 0 and result["failures"] == []
+    detect = [row for row in result["rows"] if row.get("query") == "detect"]
+    assert [row["worlds"] for row in detect] == [1, 3] and min(row["pairs"] for row in detect) > 0
+
+
+def test_the_page_shows_the_kept_results():
+    text = page.PAGE.read_text(encoding="utf-8")
+    assert text == page.page(text), "PYTHONPATH=test python -m bench.page"
+    assert [found["name"] for found in page.TABLE.finditer(text)] == list(dict.fromkeys(page.TABLES))
+    assert all(f"results/{path.name}" in text for path in page.RESULTS.glob("*.json"))
+    assert len(text.splitlines()) <= 400
+    for path in page.RESULTS.glob("*.json"):
+        kept = page.read(page.RESULTS, path.stem)
+        assert (
+            kept["command"].startswith(("hpccd bench ", "python -m bench ")) and kept["rows"] and not kept["failures"]
+        )
+        assert "+changes" not in kept["machine"]["commit"], "measured on sources that are in no commit"
