@@ -273,7 +273,7 @@ class Detector(MotionQueries[OfMotion, OfStep], SnapshotQueries[OfNear, OfPierce
         # waiting than this one.
         start = place if last is None else last._replace(made_on=stream)
         with _names_of_a_step():
-            contacts = self._contacts(self._of_places(self._asked("detect"), start, place))
+            contacts = self._contacts(self._of_places("detect", start, place))
         self._last_on_device.keep(place, self._rows)
         if last is not None:
             return contacts

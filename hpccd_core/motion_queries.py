@@ -42,7 +42,7 @@ class MotionQueries(Generic[OfMotion, OfStep]):
         notices: a number that was never a stream may crash in CUDA.
         With results="device" the answer is a DeviceContacts.
         """
-        found = self._of_motion(self._asked("detect"), vertices_t0, vertices_t1, stream)
+        found = self._of_motion("detect", vertices_t0, vertices_t1, stream)
         return cast(OfMotion, self._contacts(found))
 
     def collision_free_step(
@@ -89,9 +89,6 @@ class MotionQueries(Generic[OfMotion, OfStep]):
         ends = self._places(vertices_t0, vertices_t1, device_arrays.stream_number(stream))
         prepared = self._core.prepare(*self._for_core(*ends), room)
         return PreparedDetection(prepared, self.worlds, (vertices_t0, vertices_t1))
-
-    def _asked(self, query: str) -> str:
-        return f"{query}_on_device" if self.results == "device" else query
 
     def _contacts(self, found: Any) -> Any:
         return device_results.contacts_of(found) if self.results == "device" else answer_of(Contacts, found)

@@ -34,10 +34,9 @@ class SnapshotQueries(Generic[OfNear, OfPierced, OfNearest]):
         detect(). With results="device" the answer is a DeviceProximity.
         """
         distance = arguments.length("distance", distance)
-        if self.results == "device":
-            on_device = device_results.proximity_of(self._ask("proximity_on_device", vertices, stream, distance))
-            return cast(OfNear, on_device)
-        return cast(OfNear, answer_of(Proximity, self._ask("proximity", vertices, stream, distance)))
+        found = self._ask("proximity", vertices, stream, distance)
+        on_device = self.results == "device"
+        return cast(OfNear, device_results.proximity_of(found) if on_device else answer_of(Proximity, found))
 
     def intersections(self, vertices: ArrayLike | DeviceArrayLike, stream: object = None) -> OfPierced:
         """All edges that pierce or touch a face with which they share no vertex, coplanar ones included.
@@ -46,10 +45,9 @@ class SnapshotQueries(Generic[OfNear, OfPierced, OfNearest]):
         rational arithmetic would, at every accuracy. stream: as for detect(). With results="device" the answer is a
         DeviceIntersections.
         """
-        if self.results == "device":
-            on_device = device_results.intersections_of(self._ask("intersections_on_device", vertices, stream))
-            return cast(OfPierced, on_device)
-        return cast(OfPierced, answer_of(Intersections, self._ask("intersections", vertices, stream)))
+        found = self._ask("intersections", vertices, stream)
+        on_device = self.results == "device"
+        return cast(OfPierced, device_results.intersections_of(found) if on_device else answer_of(Intersections, found))
 
     def distances(self, vertices: ArrayLike | DeviceArrayLike, stream: object = None) -> OfNearest:
         """The smallest distance of each pair of meshes that the scene enables, within a mesh too.

@@ -171,10 +171,18 @@ py::dict in_place(const DeviceResults& r) {
   return d;
 }
 
+py::dict to_dict(Detected&& d) { return d.in_place ? in_place(*d.in_place) : to_dict(std::move(d.contacts)); }
+
 template <class Query>
 auto unlocked(Query&& query) {
   py::gil_scoped_release release;
   return query();
+}
+
+// The result of a query, with its rows where the detector's options want them.
+template <class OnDevice, class OnHost>
+py::dict rows_where_asked(const Detector& d, OnDevice&& on_device, OnHost&& on_host) {
+  return d.options().results_on_device ? to_dict(unlocked(on_device), d.options().worlds) : to_dict(unlocked(on_host));
 }
 
 // For what takes less than to get the interpreter back, which may be a whole turn of another thread.
@@ -300,15 +308,9 @@ PYBIND11_MODULE(_core, m) {
       .def(
           "detect",
           [](Detector& d, const GivenPositions& t0, const GivenPositions& t1) {
-            Detected found = unlocked([&] { return d.detect_in_place(t0.positions, t1.positions); });
-            return found.in_place ? in_place(*found.in_place) : to_dict(std::move(found.contacts));
-          },
-          "vertices_t0"_a, "vertices_t1"_a)
-      .def(
-          "detect_on_device",
-          [](Detector& d, const GivenPositions& t0, const GivenPositions& t1) {
-            return to_dict(unlocked([&] { return d.detect_on_device(t0.positions, t1.positions); }),
-                           d.options().worlds);
+            return rows_where_asked(
+                d, [&] { return d.detect_on_device(t0.positions, t1.positions); },
+                [&] { return d.detect_in_place(t0.positions, t1.positions); });
           },
           "vertices_t0"_a, "vertices_t1"_a)
       .def(
@@ -326,26 +328,17 @@ PYBIND11_MODULE(_core, m) {
       .def(
           "proximity",
           [](Detector& d, const GivenPositions& vertices, double distance) {
-            return to_dict(unlocked([&] { return d.proximity(vertices.positions, distance); }));
-          },
-          "vertices"_a, "distance"_a)
-      .def(
-          "proximity_on_device",
-          [](Detector& d, const GivenPositions& vertices, double distance) {
-            return to_dict(unlocked([&] { return d.proximity_on_device(vertices.positions, distance); }),
-                           d.options().worlds);
+            return rows_where_asked(
+                d, [&] { return d.proximity_on_device(vertices.positions, distance); },
+                [&] { return d.proximity(vertices.positions, distance); });
           },
           "vertices"_a, "distance"_a)
       .def(
           "intersections",
           [](Detector& d, const GivenPositions& vertices) {
-            return to_dict(unlocked([&] { return d.intersections(vertices.positions); }));
-          },
-          "vertices"_a)
-      .def(
-          "intersections_on_device",
-          [](Detector& d, const GivenPositions& vertices) {
-            return to_dict(unlocked([&] { return d.intersections_on_device(vertices.positions); }), d.options().worlds);
+            return rows_where_asked(
+                d, [&] { return d.intersections_on_device(vertices.positions); },
+                [&] { return d.intersections(vertices.positions); });
           },
           "vertices"_a)
       .def(
