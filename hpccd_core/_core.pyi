@@ -56,13 +56,6 @@ class Simd(_Enumeration):
     avx512: ClassVar[Simd]
     neon: ClassVar[Simd]
 
-class Rate(_Enumeration):
-    comparisons: ClassVar[Rate]
-    floats: ClassVar[Rate]
-    doubles: ClassVar[Rate]
-    read: ClassVar[Rate]
-    copy: ClassVar[Rate]
-
 class TestedFeatures:
     def __init__(self, vertex_face: bool, edge_edge: bool) -> None: ...
 
@@ -281,5 +274,4 @@ def placed(
 def integers_on_device(numbers: Sequence[int], device: int) -> DeviceArray: ...
 def gpu_status() -> GpuStatus: ...
 def gpu_fail_after(calls: int) -> None: ...
-def machine_rate(rate: Rate, simd: Simd, threads: int, bytes: int) -> float: ...
 def simd_levels() -> list[str]: ...

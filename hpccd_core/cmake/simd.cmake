@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 # Kernels once per instruction set; which one runs is chosen at run time (src/base/simd.cpp).
 set(hpccd_kernels
-  src/base/machine_rate src/elementary/batch src/elementary/distance/distance_batch src/elementary/intersection_batch
+  src/elementary/batch src/elementary/distance/distance_batch src/elementary/intersection_batch
   src/traverse/far_pairs src/traverse/leaf_pairs src/traverse/leaf_edge_faces)
 
 # hpccd_compile_kernels(target instruction_set [option ...])

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-# What the library is made of on every machine; room by room, as data goes.
+# Sources of the library on every machine, module by module, as data flows.
 set(hpccd_sources
-  src/base/forks.cpp src/base/machine_rate.cpp src/base/parallel.cpp src/base/simd.cpp
+  src/base/forks.cpp src/base/parallel.cpp src/base/simd.cpp
   src/base/standard_arithmetic.cpp src/base/thread_affinity.cpp
   src/rigid/c_library.cpp src/rigid/joint_bounds.cpp src/rigid/joint_chain.cpp src/rigid/placed_vertices.cpp
   src/scene/edges.cpp src/scene/features.cpp src/scene/pair_rules.cpp src/scene/scene.cpp src/scene/separation_table.cpp

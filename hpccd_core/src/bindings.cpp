@@ -4,7 +4,6 @@
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 
-#include "base/machine_rate.h"
 #include "base/simd.h"
 #include "base/standard_arithmetic.h"
 #include "bindings_device.h"
@@ -238,12 +237,6 @@ PYBIND11_MODULE(_core, m) {
       .value("avx2", Simd::avx2)
       .value("avx512", Simd::avx512)
       .value("neon", Simd::neon);
-  py::enum_<Rate>(m, "Rate")
-      .value("comparisons", Rate::comparisons)
-      .value("floats", Rate::floats)
-      .value("doubles", Rate::doubles)
-      .value("read", Rate::read)
-      .value("copy", Rate::copy);
 
   py::class_<TestedFeatures>(m, "TestedFeatures").def(py::init<bool, bool>(), "vertex_face"_a, "edge_edge"_a);
   py::class_<Scene, std::shared_ptr<Scene>>(m, "Scene")
@@ -420,8 +413,6 @@ PYBIND11_MODULE(_core, m) {
     return py::dict("compiled"_a = s.compiled, "toolkit"_a = s.toolkit, "devices"_a = devices, "reason"_a = s.reason);
   });
   m.def("gpu_fail_after", &gpu::fail_after, "calls"_a);  // for tests
-  m.def("machine_rate", &machine_rate, "rate"_a, "simd"_a, "threads"_a, "bytes"_a,
-        py::call_guard<py::gil_scoped_release>());  // for benchmarks
   m.def("simd_levels", [] {
     std::vector<std::string> names;
     for (Simd s : simd_levels()) names.push_back(name_of(s));

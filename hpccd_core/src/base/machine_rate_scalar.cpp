@@ -1,4 +1,0 @@
-// SPDX-License-Identifier: Apache-2.0
-#include "base/simd/scalar.h"
-// After it: written against the instruction set.
-#include "base/machine_rate.inl"
