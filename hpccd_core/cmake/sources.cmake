@@ -22,7 +22,7 @@ set(hpccd_sources
   src/traverse/traverse.cpp src/traverse/worker.cpp
   src/contacts/canonical.cpp src/contacts/gaps.cpp src/contacts/intersections.cpp src/contacts/nearest_points.cpp
   src/contacts/order.cpp src/contacts/parts.cpp src/contacts/places.cpp src/contacts/worlds.cpp
-  src/paper/ancestry.cpp src/paper/build.cpp src/paper/front.cpp src/paper/front_based.cpp src/paper/hierarchy.cpp
+  src/paper/build.cpp src/paper/front.cpp src/paper/front_based.cpp src/paper/hierarchy.cpp
   src/paper/high_level.cpp src/paper/method.cpp src/paper/naive.cpp src/paper/primitive_pairs.cpp
   src/paper/published.cpp src/paper/refit.cpp src/paper/scheduling.cpp src/paper/shared_pairs.cpp
   src/paper/task_units.cpp src/paper/upkeep.cpp

@@ -2,14 +2,41 @@
 // bvh/motion_bounds.cpp on the device: extent of the scene, then both ends and the box of each vertex. Same arithmetic.
 #pragma once
 
+#include "bvh/coordinate_map.h"
 #include "bvh/kdop.h"
 #include "bvh/tree.h"
 #include "gpu/best_time.cuh"
-#include "gpu/extent.cuh"
+#include "gpu/launch_params.cuh"
 #include "gpu/reach.h"
 #include "scene/edge_sample.h"
 
 namespace hpccd::gpu {
+
+// How far a world reaches in a frame, as its counters have it, and the map of its coordinates that follows.
+
+// Bits of a double whose order as integers is the order of the numbers.
+__device__ inline u64 ordered_bits(double x) {
+  const u64 b = static_cast<u64>(__double_as_longlong(x));
+  return b >> 63 ? ~b : b | (u64{1} << 63);
+}
+__device__ inline double from_ordered_bits(u64 b) {
+  return __longlong_as_double(static_cast<long long>(b >> 63 ? b & ~(u64{1} << 63) : ~b));
+}
+
+struct SceneExtent {
+  double low[3], high[3];
+
+  __device__ explicit SceneExtent(const WorldCounters& c) {
+    for (int k = 0; k < 3; ++k)
+      low[k] = from_ordered_bits(~c.extent_low[k]), high[k] = from_ordered_bits(c.extent_high[k]);
+  }
+  __device__ CoordinateMap map() const { return CoordinateMap::around(low, high); }
+  __device__ double largest() const {
+    double x = 0;
+    for (int k = 0; k < 3; ++k) x = greater(x, greater(magnitude(low[k]), magnitude(high[k])));
+    return x;
+  }
+};
 
 // The same number of blocks for each world.
 template <class T>

@@ -140,7 +140,7 @@ struct LaunchParams {
   u64* undecided;  // keys
   u64 undecided_capacity;
   u64* open_in_integers[integer_sizes];  // keys that need integers of one limb a coordinate, of two
-  double* answers;                       // to those of the size at work (integers.cuh)
+  double* answers;                       // to those of the size at work (integer_stages.cu)
   u64 open_capacity;                     // of each
   bool integers_on_device;               // else these go to the CPU as well
   u64* to_host;                          // keys that need the CPU's exact arithmetic

@@ -135,7 +135,7 @@ class TestLists {
   static constexpr std::size_t most_listed = std::size_t{1} << 26;
   u32 n_segments_ = 1;
 
-  // Full of answers that are awaited (integers.cuh); done when this returns, whatever stream the kernels are on.
+  // Full of answers that are awaited (integer_stages.cu); done when this returns, whatever stream the kernels are on.
   void reserve_answers(std::size_t n) {
     if (n <= answers_.size()) return;
     answers_.reserve(n);

@@ -5,6 +5,17 @@
 #include <utility>
 
 namespace hpccd::paper {
+
+Ancestry::Ancestry(const Hierarchy& h) : parent_(h.nodes.size()), depth_(h.nodes.size()) {
+  // Depth-first order: parents come before their children.
+  for (NodeIndex n = 0; n < h.nodes.size(); ++n) {
+    if (!h.nodes[n].is_split) continue;
+    for (NodeIndex child : {Hierarchy::left(n), h.right(n)}) {
+      parent_[child] = n;
+      depth_[child] = static_cast<std::uint16_t>(depth_[n] + 1);
+    }
+  }
+}
 namespace {
 
 // 64 KiB: enough pairs that handing a segment to a thread costs nothing, few enough to deal out evenly.

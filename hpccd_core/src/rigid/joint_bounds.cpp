@@ -9,11 +9,27 @@
 #include "base/standard_arithmetic.h"
 #include "hpccd/errors.h"
 #include "rigid/c_library.h"
-#include "rigid/rounding.h"
+#include "rigid/pose.h"
 
 namespace hpccd::rigid {
 
 namespace {
+
+// Bounds of rounding: those of hpccd_ros/rigid/rounding.py, which derives them, to the last bit.
+
+constexpr double unit = 0x1p-53;
+constexpr double tiny = 1e-150;  // lengths below it come from squares that underflow
+
+// Not below the number that a few operations on floats meant; 0 stays 0.
+double up(double bound) { return bound * (1.0 + 0x1p-48); }
+
+// Not below the length; 0 of zeros.
+double length(const Vector& v) { return any(v) ? up(std::sqrt(dot(v, v))) + tiny : 0.0; }
+
+// values: sum over all joints of |q_0| + |q_1 - q_0|; reach: from the world's origin, base included.
+double rounding_at_chain(double joints, double reach, double values) {
+  return up(unit * reach * (128.0 * joints + 256.0 + 4.0 * values) + tiny);
+}
 
 // A joint that moves, on the way to a link. arm: from a point of its axis to the centre of the link.
 struct Moving {
