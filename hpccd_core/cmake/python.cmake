@@ -9,8 +9,9 @@ endif()
 set(PYBIND11_FINDPYTHON ON)
 find_package(pybind11 CONFIG REQUIRED)
 pybind11_add_module(_core src/bindings.cpp src/bindings_device.cpp src/bindings_rigid.cpp)
+set_target_properties(_core PROPERTIES UNITY_BUILD ON)
 target_include_directories(_core PRIVATE src)
-target_compile_options(_core PRIVATE -ffp-contract=off -Wall -Wextra)
+target_compile_options(_core PRIVATE -ffp-contract=off -Wall -Wextra $<$<CONFIG:Release>:-O2>)
 target_link_libraries(_core PRIVATE hpccd_core_static)
 
 # Where a toolchain links the C++ library into the module, its symbols stay inside: shared with a module that is loaded

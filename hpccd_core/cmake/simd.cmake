@@ -19,9 +19,9 @@ function(hpccd_compile_all_kernels target)
     # g++ 12 warns of _mm512_undefined_pd() in its own header (GCC bug 105593), and of subscript 1 of an array of two.
     hpccd_compile_kernels(${target} avx512 -mavx512f -mavx512dq -mavx512bw -mavx512vl -mbmi
       -mprefer-vector-width=512 -Wno-psabi -Wno-maybe-uninitialized -Wno-uninitialized -Wno-array-bounds)
-    target_compile_definitions(${target} PRIVATE HPCCD_X86)
+    target_compile_definitions(${target} PUBLIC HPCCD_X86)
   elseif(CMAKE_SYSTEM_PROCESSOR MATCHES "aarch64|AARCH64|arm64|ARM64")
     hpccd_compile_kernels(${target} neon)
-    target_compile_definitions(${target} PRIVATE HPCCD_ARM64)
+    target_compile_definitions(${target} PUBLIC HPCCD_ARM64)
   endif()
 endfunction()

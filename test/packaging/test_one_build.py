@@ -39,8 +39,11 @@ def test_no_source_is_compiled_twice():
         pytest.skip(f"there is no build tree in {BUILD}: make venv")
     objects = defaultdict(set)
     for step in json.loads(run("ninja", "-C", BUILD, "-t", "compdb")):
-        if step["output"].endswith(".o"):
-            objects[str(Path(step["directory"], step["file"]).resolve())].add(step["output"])
+        if step["output"].endswith(".o") and step["file"].endswith((".c", ".cc", ".cpp", ".cxx")):
+            file = Path(step["directory"], step["file"]).resolve()
+            together = re.findall(r'#include "(.*)"', file.read_text()) if "Unity" in file.parts else [str(file)]
+            for source in together:
+                objects[source].add(step["output"])
     for file in ("src/detector.cpp", "src/bindings.cpp", "tests/detector_test.cpp"):
         assert str(CORE / file) in objects
     assert {source: several for source, several in objects.items() if len(several) > 1} == {}

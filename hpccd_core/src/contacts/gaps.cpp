@@ -18,7 +18,7 @@ namespace {
 
 using V = Vec3<double>;
 
-std::array<double, 3> row(const V& v) { return {v.x, v.y, v.z}; }
+std::array<double, 3> point_of(const V& v) { return {v.x, v.y, v.z}; }
 
 // b - a without rounding, times 2^-exponent.
 Vec3<DoubleDouble> spanned(const V& a, const V& b, int exponent) {
@@ -73,7 +73,7 @@ Gap gap_of(std::uint32_t mesh_a, std::uint32_t mesh_b, const NearestPair& found,
     V q[5];
     edge_face_positions(g, found.first, found.second, q);
     const exact::Nearest meet = meeting_place(q);
-    gap.points = {row(meet.on_first), row(meet.on_second)};
+    gap.points = {point_of(meet.on_first), point_of(meet.on_second)};
     return gap;
   }
   if (found.kind == Kind::vertex_face) {
@@ -85,7 +85,7 @@ Gap gap_of(std::uint32_t mesh_a, std::uint32_t mesh_b, const NearestPair& found,
     gap.features = {a[0], a[1], b[0], b[1]};
   }
   const NearestPoints points = nearest_points(undecided_pair(g, {found.first, found.second, found.kind}), 0);
-  gap.points = {row(points.on_first), row(points.on_second)};
+  gap.points = {point_of(points.on_first), point_of(points.on_second)};
   return gap;
 }
 
