@@ -51,8 +51,8 @@ void WorkCounts::write(std::map<std::string, std::uint64_t>& stats) const {
     stats[kind + "_proven_contacts"] += c.contacts;
     stats[kind + "_undecided"] += c.undecided;
     stats[kind + "_by_integers"] += fallbacks[k].integers;
-    if (k == 2) continue;                       // an edge and a face have neither k-DOPs nor another fallback
-    stats[kind + "_rejected_slabs"] += c.kdop;  // users read it under its first name
+    if (k == 2) continue;  // an edge and a face have neither k-DOPs nor another fallback
+    stats[kind + "_rejected_kdop"] += c.kdop;
     stats[kind + "_by_tolerance"] += fallbacks[k].tolerance;
     stats[kind + "_by_extended"] += fallbacks[k].extended;
   }
