@@ -70,7 +70,10 @@ def assert_gaps(gaps, meshes, vertices, rules, size):
 
 
 @SCENES
-@pytest.mark.parametrize("accuracy", ["exact", "conservative", "balanced", "fast"])
+@pytest.mark.parametrize(
+    "accuracy",
+    ["exact", "fast", *(pytest.param(tier, marks=pytest.mark.long) for tier in ("conservative", "balanced"))],
+)
 def test_scenes(generate, accuracy):
     meshes = generate(np.random.default_rng(81))
     for vertices in (meshes.vertices_t1, meshes.vertices_t0):

@@ -99,7 +99,7 @@ def test_points_and_minimum_separation(method):
     np.testing.assert_array_equal(found.closest, expected.closest)
 
 
-@pytest.mark.parametrize("name", ["cloth-funnel", "cloth-ball"])
+@pytest.mark.parametrize("name", ["cloth-funnel", pytest.param("cloth-ball", marks=pytest.mark.long)])
 def test_published_scenes(data_folder, name):
     with np.load(data_folder / f"{name}.npz") as truth:
         scene = hc.Scene()

@@ -22,7 +22,9 @@ def _longest_motion(queries):
 @pytest.mark.parametrize("generator", ["generic", "meeting", "lattice", "thin"])
 @pytest.mark.parametrize("separation", [1e-3, 0.05])
 @pytest.mark.parametrize(("scale", "offset"), [(1.0, 0.0), (2.0**60, 0.0), (2.0**-60, 0.0), (1.0, 2.0**30)])
-@pytest.mark.parametrize("accuracy", ["fast", "balanced", "conservative", "exact"])
+@pytest.mark.parametrize(
+    "accuracy", ["fast", pytest.param("balanced", marks=pytest.mark.long), "conservative", "exact"]
+)
 def test_guarantee(kind, generator, separation, scale, offset, accuracy):
     queries = GENERATORS[kind][generator](np.random.default_rng(1), 250)
     if generator == "generic":  # a multiple of 2^-20 stays exact when shifted

@@ -66,7 +66,7 @@ def test_nearest_place_on_the_border_of_a_sliver():
 
 @KINDS
 @pytest.mark.parametrize("part", PARTS)
-@pytest.mark.parametrize("accuracy", ["exact", "conservative"])
+@pytest.mark.parametrize("accuracy", ["exact", pytest.param("conservative", marks=pytest.mark.long)])
 def test_proximity(kind, part, accuracy):
     points, distance = samples(kind, 3000, part)
     scene = hc.Scene()

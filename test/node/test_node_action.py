@@ -16,7 +16,7 @@ from hpccd.srv import Detect
 from lifecycle_msgs.msg import Transition
 from long_step import MESHES, long_request, step_needs_more_than
 from node_calls import call, change_state
-from node_process import PATIENCE, Peer
+from node_process import MODULE, PATIENCE, Peer
 
 from hpccd_ros import client
 
@@ -254,7 +254,8 @@ def test_transitions_end_open_goals(start_node, transitions):
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=["SIGINT", "SIGTERM"])
 def test_signals_end_open_goals(start_node, number):
-    node = start_node({"meshes": list(MESHES), "threads": 1, "accuracy": "exact", "detect_time_limit": 500.0})
+    parameters = {"meshes": list(MESHES), "threads": 1, "accuracy": "exact", "detect_time_limit": 500.0}
+    node = start_node(parameters, program=MODULE)  # a child of this process: its time is counted
     goal = Goals(node).send(long_request())
     node.wait_until(lambda: "detecting" in goal.stages, "the goal under way")
     begun, before = cpu_seconds(node.process), cpu_of_ended_children()

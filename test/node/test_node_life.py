@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Start, life cycle, run-time parameters, signals: how the node begins and ends."""
 
+import functools
 import signal
 import threading
 
@@ -9,13 +10,20 @@ import pytest
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 from node_calls import N, call, change_state, set_parameter, state, stream
-from node_process import PATIENCE, assert_same_contacts
+from node_process import MODULE, PATIENCE, assert_same_contacts
 from rcl_interfaces.srv import SetParameters, SetParametersAtomically
 from rclpy.parameter import Parameter
 from waving_sheet import scene_of, sheet_faces, sheet_positions
 
 import hpccd_core as hc
 from hpccd_ros.middleware import fields
+
+
+@pytest.fixture
+def start_node(start_node):
+    """A Python of its own for each node: how it begins and ends is what is tested."""
+    return functools.partial(start_node, program=MODULE)
+
 
 FACES = sheet_faces(N)
 

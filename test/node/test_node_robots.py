@@ -352,11 +352,11 @@ def test_pairs_name_robots_and_links(start_node):
         }
     )
     describe(node)
+    first_step(node)
+    answer = node.contacts(1)[-1]  # the description is in use
     refused = set_parameter(node, "pair_separation", ["crane/hoek:cloth:0.02"])
     assert not refused.successful and "'crane' has no link of this name" in refused.reason, refused.reason
     assert not set_parameter(node, "pair_separation", ["crane/:cloth:0.02"]).successful
-    first_step(node)
-    answer = node.contacts(1)[-1]
     names = list(answer.mesh_names)
     told = {
         (names[a], names[b]): distance

@@ -37,8 +37,8 @@ def test_nothing_but_numpy_is_imported():
 
 
 def laboratory(names):
-    """The names among them of files that belong to tests, oracles or fuzzers."""
-    return [name for name in names if re.search(r"(^|/)_?(oracle|reference|fuzz|tests?)([/.]|$)", name)]
+    """The names among them of files of tests, oracles, fuzzers or benchmarks (hpccd_ros/bench is shipped)."""
+    return [name for name in names if re.search(r"(^|/)_?(oracle|reference|fuzz|tests?)([/.]|$)|^bench/", name)]
 
 
 def test_no_oracle_fuzzer_or_test_is_installed():
@@ -57,6 +57,7 @@ def test_no_oracle_fuzzer_or_test_is_installed():
         "hpccd_ros/oracle/scenes.py",
         "_oracle.cpython-311-x86_64-linux-gnu.so",
         "hpccd_core/tests/paper/front_test.cpp",
+        "bench/scaling.py",
     ],
 )
 def test_an_installed_oracle_is_seen(name):

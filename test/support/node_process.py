@@ -17,6 +17,7 @@ import yaml
 from diagnostic_msgs.msg import DiagnosticArray
 from hpccd.msg import ContactArray, MeshTopology, MeshVertices
 from hpccd.srv import Detect
+from node_server import ForkedNode
 from rclpy.duration import Duration
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
@@ -31,6 +32,7 @@ from hpccd_ros.middleware import contact_messages, environment, fields, mesh_mes
 PATIENCE = 240.0
 # Seconds for a node to end by itself when a test is over.
 ORDERLY = 20.0
+MODULE = ("-m", "hpccd_ros.node")
 
 _numbers = itertools.count()
 
@@ -39,8 +41,8 @@ class NodeProcess:
     """``python -m hpccd_ros.node`` in a namespace of its own, and a peer in this process.
 
     parameters: nested as in YAML, meshes included; NAMESPACE in them stands for that of the node. profiles: parameter
-    files, read after the parameters. remaps: further ``from:=to`` rules. program: what Python runs in place of the
-    node's module.
+    files, read after the parameters. remaps: further ``from:=to`` rules. program: arguments of a Python started for it,
+    MODULE for the node itself; by default the node is a fork of node_server.py.
     """
 
     def __init__(
@@ -51,7 +53,7 @@ class NodeProcess:
         profiles: tuple[Path, ...] = (),
         remaps: tuple[str, ...] = (),
         wait: bool = True,
-        program: tuple[str, ...] | list[str] = ("-m", "hpccd_ros.node"),
+        program: tuple[str, ...] | list[str] | None = None,
     ):
         self.namespace = f"/t{os.getpid()}_{next(_numbers)}"
         values = {"diagnostics_period": 0.1, **parameters}
@@ -59,15 +61,20 @@ class NodeProcess:
         text = yaml.safe_dump({"/**": {"ros__parameters": values}})
         file.write_text(text.replace("NAMESPACE", self.namespace))
         rules = (f"__ns:={self.namespace}", f"/diagnostics:={self.namespace}/diagnostics", *remaps)
-        command = [sys.executable, *program, "--ros-args", "--params-file", str(file)]
+        arguments = ["--ros-args", "--params-file", str(file)]
         for profile in profiles:
-            command += ["--params-file", str(profile)]
+            arguments += ["--params-file", str(profile)]
         for rule in rules:
-            command += ["-r", rule]
+            arguments += ["-r", rule]
         self._output = (folder / f"output{self.namespace[1:]}.txt").open("w+")
-        # The module is found from the current folder: the node under test is the one that is imported here.
-        root = Path(hpccd_ros.__file__).resolve().parents[1]
-        self.process = subprocess.Popen(command, cwd=root, stdout=self._output, stderr=subprocess.STDOUT)
+        self.process: subprocess.Popen | ForkedNode
+        if program is None:
+            self.process = ForkedNode(arguments, Path(self._output.name))
+        else:
+            # The module is found from the current folder: the node under test is the one that is imported here.
+            root = Path(hpccd_ros.__file__).resolve().parents[1]
+            command = [sys.executable, *program, *arguments]
+            self.process = subprocess.Popen(command, cwd=root, stdout=self._output, stderr=subprocess.STDOUT)
         self.peer = Peer(self.namespace)
         if parameters.get("record"):
             self.peer.readers = 2  # the recording of the node has subscriptions of its own

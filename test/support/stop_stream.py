@@ -98,7 +98,7 @@ class StopStream:
 
 
 @contextlib.contextmanager
-def started(start_node, timeout=TIMEOUT, *, program=("-m", "hpccd_ros.node"), remaps=(), **parameters):
+def started(start_node, timeout=TIMEOUT, *, program=None, remaps=(), **parameters):
     """With a node that `start_node` starts."""
     given = {"meshes": list(MESHES), "stop_distance": NEAR, "stop_timeout": timeout, **parameters}
     stream = StopStream(start_node(given, program=program, remaps=remaps), timeout)
