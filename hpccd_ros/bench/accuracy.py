@@ -31,7 +31,7 @@ from hpccd_ros.bench.report import Report, cores, show
 
 # Stats of the core by the stage that decided a pair, in the order in which a pair meets them.
 DECIDED = {
-    "slabs": "rejected_kdop",
+    "kdop": "rejected_kdop",
     "coplanarity": "rejected_coplanarity",
     "projection": "rejected_projection",
     "roots": "rejected_roots",

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Kernels in which warps wait for each other come out of their branches whole (gpu/own_item.cuh)."""
+"""Kernels in which warps wait for each other come out of their branches whole (gpu/item_of_thread.cuh)."""
 
 import re
 import shutil

@@ -122,7 +122,7 @@ std::optional<Detection> CpuBackend::detect(Positions t0, Positions t1) {
 
 void CpuBackend::update(Positions t0, Positions t1, Tests tests) {
   Profiler& profiler = shared_.profiler;
-  see_motion(t0, t1, tests);
+  begin_motion(t0, t1, tests);
   if (method_) {
     swept_ = &shared_.tree.swept();
     method_->update(*swept_, profiler);
@@ -131,7 +131,7 @@ void CpuBackend::update(Positions t0, Positions t1, Tests tests) {
   }
 }
 
-void CpuBackend::see_motion(Positions t0, Positions t1, Tests tests) {
+void CpuBackend::begin_motion(Positions t0, Positions t1, Tests tests) {
   const Options& o = shared_.options;
   shared_.tree.bound(t0, t1, shared_.separations.largest());
   begin_query();
@@ -276,7 +276,7 @@ std::optional<Contacts> CpuBackend::proximity(Positions vertices, double distanc
 }
 
 std::optional<Intersections> CpuBackend::intersections(Positions vertices) {
-  see_snapshot(vertices);
+  begin_snapshot(vertices);
   search_.leaf_edge_faces = leaf_edge_faces(shared_.options.simd);
   search_.reach = 0;
   walk_tree();
@@ -288,7 +288,7 @@ std::optional<Intersections> CpuBackend::intersections(Positions vertices) {
 
 std::optional<std::vector<Gap>> CpuBackend::distances(Positions vertices) {
   const Options& o = shared_.options;
-  see_snapshot(vertices);
+  begin_snapshot(vertices);
   if (!mesh_pairs_) mesh_pairs_.emplace(shared_.rules, shared_.scene->meshes().size());
   search_.nearest =
       std::make_unique<NearestPairs>(*mesh_pairs_, shared_.features, shared_.tree.motion(), shared_.tree.tree());
@@ -305,13 +305,13 @@ std::optional<std::vector<Gap>> CpuBackend::distances(Positions vertices) {
 
 // Pairs of features within a distance.
 void CpuBackend::see_near(Positions vertices, double distance) {
-  see_snapshot(vertices, distance);
+  begin_snapshot(vertices, distance);
   search_.geometry.separations = {distance};
   search_.leaf_pairs_in_snapshot = leaf_pairs_in_snapshot(shared_.options.simd);
   search_.reach = reach_of(distance, shared_.tree.motion().box_rounding, shared_.tree.motion().box_scale);
 }
 
-void CpuBackend::see_snapshot(Positions vertices, double distance) {
+void CpuBackend::begin_snapshot(Positions vertices, double distance) {
   const Simd simd = shared_.options.simd;
   shared_.tree.bound(vertices, distance);
   begin_query();
@@ -335,35 +335,35 @@ std::optional<std::vector<double>> CpuBackend::earliest(Positions t0, Positions 
 void CpuBackend::find_earliest(Positions t0, Positions t1, bool time_only) {
   begin_earliest(t0, t1, time_only);
   if (search_.prunes) {
-    if (known_from_near_pairs() || known_from_the_unlisted(time_only)) return;
+    if (answer_from_near_pairs() || answer_from_unlisted_pairs(time_only)) return;
     if (near_.radius().known() && near_.radius().failed(travel_))
       near_.begin_at(shared_.tree.motion().vertices, shared_.pool);
     if (!near_.radius().known() && list_near_pairs(t0)) {
       begin_earliest(t0, t1, time_only);
-      if (known_from_near_pairs() || known_from_the_unlisted(time_only)) return;
+      if (answer_from_near_pairs() || answer_from_unlisted_pairs(time_only)) return;
     }
-    limit_reach();
+    limit_boxes();
   }
   shared_.tree.fit(shared_.profiler);
   walk_tree();
   if (search_.prunes) remember_earliest();
 }
 
-void CpuBackend::limit_reach() {
+void CpuBackend::limit_boxes() {
   const double scale = shared_.tree.motion().box_scale;
   search_.two_ways = static_cast<float>(2 * travel_.way * scale);
   search_.most_reach = static_cast<float>(near_.radius().edge / 4 * scale);
 }
 
 void CpuBackend::begin_earliest(Positions t0, Positions t1, bool time_only) {
-  see_motion(t0, t1, Tests::all_here);
+  begin_motion(t0, t1, Tests::all_here);
   search_.report = Report::first;
   search_.time_only = time_only;
   search_.prunes = shared_.rules.promise_times();
 }
 
 // Tests the pairs that are near, and says whether that was enough. The best time so far is known then in any case.
-bool CpuBackend::known_from_near_pairs() {
+bool CpuBackend::answer_from_near_pairs() {
   if (const std::uint64_t now = shared_.separations.version(); near_.radius().separations != now)
     near_ = {}, near_.radius().separations = now, drift_of_.reset();
   test_groups(near_.hints);
@@ -433,10 +433,10 @@ void CpuBackend::remember_earliest() {
 
 // After the pairs of the list: what it leaves open. False where that is too much, where there is no list, or no tree to
 // look with: a world takes its list along to whatever thread's tree is there.
-bool CpuBackend::known_from_the_unlisted(bool time_only) {
+bool CpuBackend::answer_from_unlisted_pairs(bool time_only) {
   if (!shared_.tree.built()) return false;
   if (!near_.radius().known() || near_.snapshot().size() != shared_.tree.motion().vertices.size()) return false;
-  see_drift();
+  update_drift();
   drift_.listed_within(near_.radius().listed(), shared_.separations.most());
   FoundContacts found = take_found(workers_);
   const std::optional<std::vector<LeafPair>> open = open_pairs();
@@ -446,7 +446,7 @@ bool CpuBackend::known_from_the_unlisted(bool time_only) {
   if (!open->empty()) {
     shared_.tree.fit_leaves(leaves_of(*open, shared_.tree.tree().leaves.size()));
     shared_.profiler.mark("refit");
-    limit_reach();
+    limit_boxes();
     test_leaves_of_tree(*open);
   }
   if (!time_only) join_found(std::move(found), search_.earliest, workers_);
@@ -457,7 +457,7 @@ bool CpuBackend::known_from_the_unlisted(bool time_only) {
 // The radius of a list that leaves little open of this motion.
 std::optional<double> CpuBackend::wide_radius() {
   near_.begin_at(shared_.tree.motion().vertices, shared_.pool);
-  see_drift();
+  update_drift();
   constexpr double longest = 0.6;  // of an edge; at 0.7 all neighbours of a regular mesh are near
   const std::size_t n_leaves = shared_.tree.tree().leaves.size();
   for (const double part : {0.25, 0.4, longest}) {
@@ -469,7 +469,7 @@ std::optional<double> CpuBackend::wide_radius() {
   return std::nullopt;
 }
 
-void CpuBackend::see_drift() {
+void CpuBackend::update_drift() {
   const Tree& tree = shared_.tree.tree();
   if (const std::pair now(near_.number(), shared_.tree.number()); drift_of_ != now) {
     drift_of_.reset();  // should this be cancelled

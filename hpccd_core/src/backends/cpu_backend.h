@@ -51,18 +51,18 @@ class CpuBackend final : public DetectionBackend {
   void begin_query();
   void find_earliest(Positions t0, Positions t1, bool time_only);
   void begin_earliest(Positions t0, Positions t1, bool time_only);
-  bool known_from_near_pairs();
+  bool answer_from_near_pairs();
   bool list_near_pairs(Positions t0);
   void test_groups(const std::vector<NearList::Group>& groups);
-  void limit_reach();
-  bool known_from_the_unlisted(bool time_only);
+  void limit_boxes();
+  bool answer_from_unlisted_pairs(bool time_only);
   std::optional<double> wide_radius();
-  void see_drift();
+  void update_drift();
   std::optional<std::vector<LeafPair>> open_pairs();
   void remember_earliest();
-  void see_motion(Positions t0, Positions t1, Tests tests);
+  void begin_motion(Positions t0, Positions t1, Tests tests);
   void see_near(Positions vertices, double distance);
-  void see_snapshot(Positions vertices, double distance = 0);
+  void begin_snapshot(Positions vertices, double distance = 0);
   void walk_tree();
   template <class Test>
   void test_each(const std::vector<LeafPair>& pairs, Test&& test);

@@ -18,14 +18,14 @@ void WorkCounts::add(const std::vector<Worker>& workers) {
     for (int k = 0; k < 3; ++k) {
       batches[k] += w.counts[k];
       add_fallbacks(fallbacks[k], w.fallbacks[k]);
-      slabs_seconds += a_tick * static_cast<double>(w.counts[k].kdop_ticks);
+      kdop_seconds += a_tick * static_cast<double>(w.counts[k].kdop_ticks);
     }
   }
 }
 
 WorkCounts& WorkCounts::operator+=(const WorkCounts& c) {
   node_pairs += c.node_pairs, leaf_pairs += c.leaf_pairs, near_pairs += c.near_pairs;
-  leaf_pairs_seconds += c.leaf_pairs_seconds, slabs_seconds += c.slabs_seconds;
+  leaf_pairs_seconds += c.leaf_pairs_seconds, kdop_seconds += c.kdop_seconds;
   for (int k = 0; k < 3; ++k) {
     batches[k] += c.batches[k];
     add_fallbacks(fallbacks[k], c.fallbacks[k]);
@@ -60,7 +60,7 @@ void WorkCounts::write(std::map<std::string, std::uint64_t>& stats) const {
   if (!timed) return;
   constexpr double ns = 1e9;
   stats["leaf_pairs_ns"] += static_cast<std::uint64_t>(ns * leaf_pairs_seconds);
-  stats["slabs_ns"] += static_cast<std::uint64_t>(ns * slabs_seconds);
+  stats["kdop_ns"] += static_cast<std::uint64_t>(ns * kdop_seconds);
 }
 
 }  // namespace hpccd

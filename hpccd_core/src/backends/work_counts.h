@@ -15,7 +15,7 @@ struct WorkCounts {
   std::uint64_t node_pairs = 0, leaf_pairs = 0, near_pairs = 0;
   BatchCounts batches[3];  // by kind
   FallbackCounts fallbacks[3];
-  double leaf_pairs_seconds = 0, slabs_seconds = 0;
+  double leaf_pairs_seconds = 0, kdop_seconds = 0;
   // What the query looked at, by kind; whether for the earliest contacts; and whether it took the time of its parts.
   bool asked[3] = {}, earliest = false, timed = false;
 

@@ -55,7 +55,7 @@ __global__ __launch_bounds__(32) void hints_kernel(const __grid_constant__ Launc
     const double time = !valid   ? INFINITY
                         : k == 0 ? time_of<query, Kind::vertex_face>(params, pair)
                                  : time_of<query, Kind::edge_edge>(params, pair);
-    // Lane by lane: a warp may come out of this in parts (own_item.cuh).
+    // Lane by lane: a warp may come out of this in parts (item_of_thread.cuh).
     if (time < INFINITY) atomicMax(&params.counters->soonest, ~bits_of(time));
   });
 }

@@ -5,7 +5,7 @@
 #include "elementary/exact/earliest.h"
 #include "elementary/exact/given_motion.h"
 #include "gpu/best_time.cuh"
-#include "gpu/own_item.cuh"
+#include "gpu/item_of_thread.cuh"
 #include "gpu/pair_ends.cuh"
 #include "gpu/stages.cuh"
 
@@ -33,7 +33,7 @@ template <int limbs, class T>
 __global__ __launch_bounds__(128) void integers_kernel(const __grid_constant__ LaunchParams<T> params,
                                                        u32 resident_warps) {
   const u64 n = length(params.counters->open_in_integers[limbs - 1], params.open_capacity);
-  const u64 i = own_item(n, resident_warps);
+  const u64 i = item_of_thread(n, resident_warps);
   if (i >= n) return;
   const Candidate pair = params.keys.pair_of(params.open_in_integers[limbs - 1][i]);
   const exact::Answer answer =

@@ -81,7 +81,7 @@ class DevicePipeline : public Pipeline {
   EarliestTime earliest() const override;
   std::vector<double> earliest_of_worlds() override;
   bool list_near(Positions vertices, double distance, std::size_t most, ThreadPool& pool) override {
-    if (for_earliest()) told_ = *host_counters_.data();
+    if (for_earliest()) last_counters_ = *host_counters_.data();
     begin();
     goal_ = Goal::near_list;
     most_near_ = most, gave_up_listing_ = false;
@@ -171,7 +171,7 @@ class DevicePipeline : public Pipeline {
   PlacesOut places_out_{};
   DeviceBuffer<Counters> counters_;
   PinnedBuffer<Counters> host_counters_;
-  Counters told_{};  // of the frame before the one that lists for those to come: what stats() tells
+  Counters last_counters_{};  // of the frame before the one that lists for those to come: what stats() tells
 
   // What a frame is for: contacts as the caller sees them, or less.
   enum class Goal : unsigned char { results, earliest, earliest_of_near, near_list };
@@ -190,7 +190,7 @@ class DevicePipeline : public Pipeline {
   std::vector<Candidate> undecided_;
   // Of a prepared frame: the caller's positions.
   const void *prepared_t0_ = nullptr, *prepared_t1_ = nullptr;
-  std::shared_ptr<DeviceBuffer<PreparedCounts>> told_of_prepared_;
+  std::shared_ptr<DeviceBuffer<PreparedCounts>> prepared_counts_;
 };
 
 template <class T>
@@ -353,17 +353,17 @@ PreparedResults DevicePipeline::prepare(Positions t0, Positions t1, double room)
   lists_.reserve(sizes);
   leaf_pairs_.reserve(roomy(c.leaf_pairs));
   contacts_.reserve(roomy(c.found_all));
-  told_of_prepared_ = std::make_shared<DeviceBuffer<PreparedCounts>>();
-  told_of_prepared_->reserve(1);
+  prepared_counts_ = std::make_shared<DeviceBuffer<PreparedCounts>>();
+  prepared_counts_->reserve(1);
   const ResultPlaces to = contacts_.reserve_rows(roomy(c.rows[0]), roomy(c.rows[1]));
   enqueue(stream_);  // what is loaded, or looked up, when it is first used cannot be captured
   check(cudaStreamSynchronize(stream_), "cudaStreamSynchronize");
   const FrameResult r = contacts_.result(query_, c);
   PreparedResults p;
   using Owner = std::shared_ptr<const void>;
-  p.memory = std::make_shared<std::pair<Owner, Owner>>(r.memory, told_of_prepared_), p.device = device_;
+  p.memory = std::make_shared<std::pair<Owner, Owner>>(r.memory, prepared_counts_), p.device = device_;
   p.room_vf = to.most_vf, p.room_ee = to.most_ee;
-  p.vf = r.vf, p.ee = r.ee, p.tocs = r.toc, p.counts = told_of_prepared_->data();
+  p.vf = r.vf, p.ee = r.ee, p.tocs = r.toc, p.counts = prepared_counts_->data();
   p.vf_offsets = r.vf_offsets, p.ee_offsets = r.ee_offsets, p.hashes = r.hashes, p.first_tocs = r.first_tocs;
   return p;
 }
@@ -400,7 +400,7 @@ void DevicePipeline::enqueue_frame() {
       {leaf_pairs_.size(), std::min(s.survivors[0], s.survivors[1]), std::min(s.single[0], s.single[1]),
        std::min(s.many[0], s.many[1]), std::min(s.separated[0], s.separated[1]), s.undecided, s.open,
        contacts_.capacity()},
-      to, told_of_prepared_->data());
+      to, prepared_counts_->data());
   check_launch("tell_kernel");
 }
 
@@ -505,7 +505,7 @@ bool DevicePipeline::grow_overflowed() {
 }
 
 std::map<std::string, std::uint64_t> DevicePipeline::stats() const {
-  const Counters& c = goal_ == Goal::near_list ? told_ : *host_counters_.data();
+  const Counters& c = goal_ == Goal::near_list ? last_counters_ : *host_counters_.data();
   std::map<std::string, std::uint64_t> s;
   const bool edges_and_faces = query_ == Query::intersections;  // in the place of the first kind
   const char* kinds[2] = {edges_and_faces ? "ef" : "vf", "ee"};

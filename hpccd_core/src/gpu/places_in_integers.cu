@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Normals of the rows that doubles are not sure of, in the CPU's integers of one and two limbs.
-#include "gpu/own_item.cuh"
+#include "gpu/item_of_thread.cuh"
 #include "gpu/pair_lists.cuh"
 #include "gpu/write_places.cuh"
 
@@ -12,7 +12,7 @@ constexpr u64 written = ~u64{0};
 
 __global__ __launch_bounds__(128) void places_in_integers_kernel(const __grid_constant__ PlacesTask task,
                                                                  u32 resident_warps) {
-  const u64 n = length(task.n_open[0], task.open_capacity), i = own_item(n, resident_warps);
+  const u64 n = length(task.n_open[0], task.open_capacity), i = item_of_thread(n, resident_warps);
   if (i < n && find_places<ByFixedIntegers>(task, task.open[i])) task.open[i].row = written;
 }
 

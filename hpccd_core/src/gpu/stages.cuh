@@ -25,7 +25,7 @@ struct Stages {
     kernel<<<dim3(static_cast<unsigned>(blocks * multiprocessors), rows), threads, 0, stream>>>(params);
     check_launch(name);
   }
-  // A thread an item of up to `most`; its last argument is how many warps are at work at a time (own_item.cuh).
+  // A thread an item of up to `most`; its last argument is how many warps are at work at a time (item_of_thread.cuh).
   template <class Kernel, class Task>
   void one_item_each(Kernel kernel, unsigned threads, u64 most, const char* name, const Task& task) const {
     if (most == 0) return;

@@ -82,7 +82,7 @@ void TestLists::launch(Query query, From from, LaunchParams<T>& params, int mult
   }
   stages.persistent(query == Query::separations ? fallback_kernel<true, T> : fallback_kernel<false, T>, 32, params,
                     "fallback_kernel");
-  timer.mark("last_resort", stream);  // the fallbacks' first name, under which kept results have it
+  timer.mark("fallbacks", stream);
   if (params.integers_on_device) launch_integers(params, stages);
 }
 

@@ -14,7 +14,7 @@ bool tells_times(Rule rule) {
 PairRules::PairRules(const Scene& scene, Accuracy accuracy, const SeparationTable& separations, TestedFeatures features)
     : tested_(scene), rules_(scene.meshes().size(), {accuracy, separations.otherwise() > 0, features}) {
   if (tested_.n_pairs() > 0) n_with_rule_[rules_.otherwise()] = tested_.n_pairs();
-  const ScenePairs said(scene);
+  const ScenePairs given(scene);
   const auto set_all = [&](const auto& pairs, auto&& change) {
     for (const auto& [pair, value] : pairs) {
       Rule rule = rules_.of(pair.first, pair.second);
@@ -22,8 +22,8 @@ PairRules::PairRules(const Scene& scene, Accuracy accuracy, const SeparationTabl
       set(pair.first, pair.second, rule);
     }
   };
-  set_all(said.accuracy(), [](Rule& rule, const auto&, Accuracy value) { rule.accuracy = value; });
-  set_all(said.features(), [](Rule& rule, const auto&, TestedFeatures value) { rule.features = value; });
+  set_all(given.accuracy(), [](Rule& rule, const auto&, Accuracy value) { rule.accuracy = value; });
+  set_all(given.features(), [](Rule& rule, const auto&, TestedFeatures value) { rule.features = value; });
   separations.for_pairs([&](std::uint32_t a, std::uint32_t b, double separation) { separate(a, b, separation); });
   look_at_all();
 }

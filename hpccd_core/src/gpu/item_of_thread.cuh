@@ -11,7 +11,7 @@ namespace hpccd::gpu {
 
 // Which of n items is the thread's, if below n. Few are spread over so many warps, as a warp goes the ways of all its
 // items; of many, neighbours go similar ways.
-__device__ inline u64 own_item(u64 n, u32 resident_warps) {
+__device__ inline u64 item_of_thread(u64 n, u32 resident_warps) {
   const u64 warp = (static_cast<u64>(blockIdx.x) * blockDim.x + threadIdx.x) / 32;
   if (n > u64{8} * resident_warps) return warp * 32 + lane_number();
   return warp < resident_warps ? lane_number() * u64{resident_warps} + warp : n;
