@@ -35,7 +35,7 @@ def wait_for_verified_answers(live, path, count):
         answers = replay.recorded_answers + count
 
 
-@pytest.mark.parametrize("compression", ["none", "zstd"])
+@pytest.mark.parametrize("compression", [pytest.param("none", marks=pytest.mark.long), "zstd"])
 @pytest.mark.timeout(600 + 10 * KILLS)
 def test_killed_at_random_moments(children, namespace, tmp_path, compression):
     live = Live(children, namespace, tmp_path, frames=90)

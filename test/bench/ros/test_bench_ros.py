@@ -85,6 +85,7 @@ sys.exit(bench.main(sys.argv[1:]))
 """
 
 
+@pytest.mark.long
 def test_stop_rises_and_each_end_is_heard(tmp_path):
     status, result, said = bench(tmp_path, *STOP, "--trials", "2", "--ends", "1", "--seed", "2")
     rows = {row["what"]: row for row in result["rows"] if row["what"] != "cost"}
@@ -103,6 +104,7 @@ def test_a_missed_stop_fails(tmp_path):
     assert status == 1 and "steps that come near" in result["failures"][0], said
 
 
+@pytest.mark.long
 def test_soak_of_twenty_seconds(tmp_path):
     # The node is held up six seconds after it began, and grows to its size by the twelfth, from 104 to 132 MB; from
     # then on it changes by less than 1 %.
