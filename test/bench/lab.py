@@ -40,12 +40,9 @@ def _resolve(words, data, default, size) -> list[sources.Source]:
         raise UserError(f"{words[0]}: this subject makes its own scenes; leave the name out")
     if not default or not set(words) & solved_cloth.FRAMES.keys():
         return sources.resolve(words, data, default, size) if default else []
-    found = []
-    for word in words:
-        solved = word in solved_cloth.FRAMES
-        one = [sources.of_scene(word, size, solved_cloth.make)] if solved else sources.resolve([word], data, (), size)
-        found += one
-    return found
+    solved = [sources.of_scene(word, size, solved_cloth.make) for word in words if word in solved_cloth.FRAMES]
+    others = [word for word in words if word not in solved_cloth.FRAMES]
+    return solved + (sources.resolve(others, data, (), size) if others else [])
 
 
 def backend_options(parser) -> None:
@@ -61,7 +58,7 @@ def numbers(option: str, text: str, kind: type) -> list:
         found = sorted({kind(word) for word in text.split(",")})
     except ValueError as error:
         raise UserError(f"{option} {text}: numbers with commas between, for example 1,4") from error
-    if not 0 < found[0] <= found[-1] < float("inf"):
+    if not all(0 < value < float("inf") for value in found):
         raise UserError(f"{option} {text}: each number must be above 0 and finite")
     return found
 

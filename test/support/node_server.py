@@ -7,12 +7,14 @@ in the static destructors of DDS. Tests of how a node begins and ends start a Py
 """
 
 import atexit
+import contextlib
 import json
 import os
 import select
 import signal
 import subprocess
 import sys
+import threading
 import time
 import traceback
 from pathlib import Path
@@ -20,6 +22,7 @@ from pathlib import Path
 import hpccd_ros
 
 ROOT = Path(hpccd_ros.__file__).resolve().parents[1]
+ENDING = {signal.SIGINT, signal.SIGTERM}
 
 
 class ForkedNode:
@@ -29,12 +32,15 @@ class ForkedNode:
 
     def __init__(self, arguments: list[str], output: Path) -> None:
         self._status = Path(f"{output}.status")
+        self._status.unlink(missing_ok=True)
         request = {"arguments": arguments, "output": str(output), "environment": dict(os.environ)}
         self.pid = int(_ask(json.dumps(request)))
 
     def poll(self) -> int | None:
         if self.returncode is None and self._status.exists():
             self.returncode = int(self._status.read_text())
+        if self.returncode is None and _server is not None and _server.poll() is not None:
+            raise RuntimeError(f"the process that starts nodes ended ({_server.returncode}): the status is unknown")
         return self.returncode
 
     def wait(self, timeout: float | None = None) -> int:
@@ -47,27 +53,35 @@ class ForkedNode:
 
     def send_signal(self, number: int) -> None:
         if self.poll() is None:
-            os.kill(self.pid, number)
+            with contextlib.suppress(ProcessLookupError):  # it has ended meanwhile
+                os.kill(self.pid, number)
 
     def kill(self) -> None:
         self.send_signal(signal.SIGKILL)
 
 
 _server: subprocess.Popen | None = None
+_one_at_a_time = threading.Lock()
 
 
 def _ask(request: str) -> str:
     global _server
-    if _server is None or _server.poll() is not None:
-        command = [sys.executable, str(Path(__file__).resolve())]
-        environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-        _server = subprocess.Popen(
-            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, cwd=ROOT, env=environment
-        )
-        atexit.register(_server.stdin.close)  # it ends with its input
-    _server.stdin.write(request + "\n")
-    _server.stdin.flush()
-    return _server.stdout.readline()
+    with _one_at_a_time:
+        if _server is None or _server.poll() is not None:
+            path = os.pathsep.join([str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])])
+            _server = subprocess.Popen(
+                [sys.executable, str(Path(__file__).resolve())],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                text=True,
+                cwd=ROOT,
+                env={**os.environ, "PYTHONPATH": path},
+                start_new_session=True,  # Ctrl-C at pytest is not for it
+            )
+            atexit.register(_server.stdin.close)  # it ends with its input
+        _server.stdin.write(request + "\n")
+        _server.stdin.flush()
+        return _server.stdout.readline()
 
 
 def _serve() -> dict | None:
@@ -85,9 +99,11 @@ def _serve() -> dict | None:
             for pid in tuple(waiting):
                 ended, status = os.waitpid(pid, os.WNOHANG)
                 if ended:
-                    part = Path(f"{waiting[pid]}.part")
-                    part.write_text(str(os.waitstatus_to_exitcode(status)))
-                    part.rename(waiting.pop(pid))
+                    file = waiting.pop(pid)
+                    with contextlib.suppress(OSError):  # the folder of a test that is over may be gone
+                        part = Path(f"{file}.part")
+                        part.write_text(str(os.waitstatus_to_exitcode(status)))
+                        part.rename(file)
         if 0 in ready:
             if not (more := os.read(0, 1 << 16)):
                 return None
@@ -95,11 +111,17 @@ def _serve() -> dict | None:
             *lines, text = text.split(b"\n")
             for line in lines:
                 request = json.loads(line)
+                # Until its own handlers are set a signal waits: Python's would end in a traceback.
+                signal.pthread_sigmask(signal.SIG_BLOCK, ENDING)
                 if (pid := os.fork()) == 0:
                     signal.set_wakeup_fd(-1)
                     signal.signal(signal.SIGCHLD, signal.SIG_DFL)
+                    for number in ENDING:  # as start.main does
+                        signal.signal(number, lambda number, frame: os._exit(0))
+                    signal.pthread_sigmask(signal.SIG_UNBLOCK, ENDING)
                     os.close(wake), os.close(woken)
                     return request
+                signal.pthread_sigmask(signal.SIG_UNBLOCK, ENDING)
                 waiting[pid] = Path(f"{request['output']}.status")
                 os.write(1, f"{pid}\n".encode())
 

@@ -12,6 +12,7 @@ from functools import lru_cache
 import numpy as np
 from cloth_solver import motion, pairs, queries, response, setup, springs
 
+from hpccd_ros import scenes
 from hpccd_ros.scenes import cache, shapes
 from hpccd_ros.scenes.progress import track
 from hpccd_ros.scenes.scene import Frame, Mesh, Scene
@@ -32,6 +33,8 @@ def make(name: str, size: float = 1.0, frames: int | None = None, seed: int = 0,
     Frame k of cloth-ball-resolved is where move k ended. Frame 2 k of cloth-ball-trial is the same; frame 2 k + 1 is
     where a step of TRIAL seconds from there would end unresolved.
     """
+    if not scenes.MIN_SIZE <= size <= scenes.MAX_SIZE:
+        raise ValueError(f"size {size!r} is outside {scenes.MIN_SIZE} to {scenes.MAX_SIZE:g}")
     frames = FRAMES[name] if frames is None else frames
     chosen = _setup(TRIANGLES, size)
     if name == "cloth-ball-resolved":
