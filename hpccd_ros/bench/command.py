@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import argparse
 import shlex
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
 
 from hpccd_core.options import ACCURACIES
@@ -20,8 +20,20 @@ FEWEST_ROUNDS = 5  # below that a median means little, and the result says so
 PLACES = ("command", "benchmark", "out", "data", "label", "picture")  # paths of this machine are not kept
 
 
-def configure(parser: argparse.ArgumentParser, default: Sequence[str], steps: int, repeat: int = 5) -> None:
-    add = parser.add_argument
+def configure(
+    parser: argparse.ArgumentParser,
+    default: Sequence[str],
+    steps: int,
+    repeat: int = 5,
+    leave_out: Collection[str] = (),
+) -> None:
+    """leave_out: options that the benchmark does not use; they have their defaults."""
+    parser.set_defaults(data=None, size=1.0, steps=steps, repeat=repeat, threads=0, default_sources=tuple(default))
+
+    def add(name, **options):
+        if name.removeprefix("--") not in leave_out:
+            parser.add_argument(name, **options)
+
     add(
         "sources",
         nargs="*",
@@ -42,7 +54,6 @@ def configure(parser: argparse.ArgumentParser, default: Sequence[str], steps: in
     add("--threads", type=int, default=0, metavar="N", help="0: all cores (default)")
     add("--out", default="hpccd-bench", metavar="DIR", help="folder of the JSON file (default: %(default)s)")
     add("--label", default=f"{output.cores()}-cores", metavar="NAME", help="end of its name (default: %(default)s)")
-    parser.set_defaults(default_sources=tuple(default))
 
 
 def tier_option(parser, default: str = "balanced") -> None:
@@ -80,6 +91,9 @@ def begin(args, resolve: Callable = sources.resolve) -> tuple[Report, list[sourc
         raise UserError(f"--out {args.out}: {why}; name another") from error
     require_writable("--out", Path(args.out) / f"{args.benchmark}-{args.label}.json")
     found = resolve(args.sources, sources.data_folder(args.data), args.default_sources, args.size)
+    for source in found:
+        if all(source.step(k) is None for k in source.spread(args.steps)):
+            raise UserError(f"{source.name}: none of its measured steps keeps its topology; take more with --steps")
     options = {k: v for k, v in vars(args).items() if k not in PLACES and isinstance(v, (int, float, str, type(None)))}
     words = ["hpccd bench", args.benchmark, *(Path(source).name for source in args.sources)]
     for name, value in options.items():

@@ -50,7 +50,7 @@ def run(args) -> Report:
             for group in [{name: one} for name, one in of_mode.items()] if mode == "any" else [of_mode]:
                 for text in measure.disagreements(group):
                     report.failure(f"{source.name}: report={mode}: contacts differ between calls or backends: {text}")
-        triangles = next(s for s in map(source.step, source.spread(0)) if s is not None).triangles
+        triangles = source.first().triangles
         for name, one in series.items():
             backend, mode = name.split()
             asked = {"backend": backend, "report": mode, "accuracy": args.accuracy, "threads": args.threads or cores()}

@@ -65,7 +65,7 @@ def run(args) -> Report:
             if tier != "fast":
                 for text in measure.disagreements(series):
                     report.failure(f"{source.name}, {tier}: contacts differ between backends: {text}")
-            triangles = next(s for s in map(source.step, source.spread(0)) if s is not None).triangles
+            triangles = source.first().triangles
             for name, one in series.items():
                 if one.stats().get("gpu_fallbacks"):
                     report.failure(f"{source.name}, {tier}, {name}: steps were left to the CPU")

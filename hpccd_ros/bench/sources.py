@@ -80,6 +80,10 @@ class Source:
     n_steps: int
     step: Callable[[int], Step | None]
 
+    def first(self) -> Step:
+        """The first step with a motion."""
+        return next(step for step in map(self.step, range(self.n_steps)) if step is not None)
+
     def spread(self, count: int) -> list[int]:
         """`count` steps evenly spread over the sequence, its last among them; all where count is 0."""
         if count <= 0 or count >= self.n_steps:

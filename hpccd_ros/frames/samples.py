@@ -113,7 +113,7 @@ class Run:
         self._all = all_samples
         self.begun = 0
         self._came = 0  # messages so far
-        self._first_after_restart: int | None = None  # the first stamp after it last began anew
+        self._first_after_restart: int | None = None  # the first stamp of the current run
 
     def add(self, stamp: int, of_message: Iterable[tuple[Samples[Value], Value]], sent: int = 0) -> int | None:
         """Add the values of one message, which was sent at ``sent``. Returns the stamp of an earlier message that is

@@ -113,7 +113,7 @@ class StopState:
 
     def first(self) -> None:
         """A frame came that ends no step: nothing is known of the motion to it."""
-        self._set_cause(Cause.UNANSWERED, "no step was answered since the stream, or a topology, began anew")
+        self._set_cause(Cause.UNANSWERED, "no step was answered since the stream, or a topology, restarted")
 
     def answered(self, near: bool, distance: float, origins: Sequence[Origin]) -> None:
         """The result of a step for this distance; origins: of the meshes at its end, in the order of the scene."""

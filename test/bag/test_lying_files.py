@@ -165,7 +165,7 @@ def test_an_index_that_tells_of_fewer_messages(bag, tmp_path):
         return records
 
     bag.index = _indexed(change)
-    _called_damaged(bag.write(tmp_path / "x.mcap"), "the index tells of 0 messages of channel 5, there are 7")
+    _called_damaged(bag.write(tmp_path / "x.mcap"), "the index lists 0 messages of channel 5, the file holds 7")
 
 
 def test_a_footer_that_points_elsewhere(bag, tmp_path):

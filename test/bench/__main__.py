@@ -29,12 +29,12 @@ SUBJECTS = {
     "distance": ("distance", "separation, proximity, intersections, smallest distances beside plain detection"),
     "step": ("step", "how far a step may go: first contacts, free step and trial steps beside all contacts"),
     "accuracy": ("accuracy", "hard elementary and distance queries: false negatives and positives of each tier"),
-    "gpu": ("gpu", "the GPU backend: ms a frame, with transfers and without, many worlds, stages, floors"),
+    "gpu": ("gpu", "the GPU backend: ms a frame, with transfers and without, many worlds, stages"),
     "rigid": ("rigid", "meshes moved by poses and joints: found contacts against the truth, bounds, cost"),
     "ros": ("ros.latency", "the node over DDS: latency beside that of an echo, sustained rate, overload"),
     "robot": ("ros.robot", "a robot beside a cloth over DDS, moved by joint states: answers a second, latency"),
     "stop": ("ros.stop", "the topic stop over DDS: random approaches, silence, publisher and node killed"),
-    "soak": ("ros.soak.command", "half an hour of mixed load on the node: memory, counts, answers"),
+    "soak": ("ros.soak.command", "forty minutes of mixed load on the node: memory, counts, answers"),
 }
 
 
@@ -52,7 +52,15 @@ def main(words: list[str]) -> int:
     subparsers = parser.add_subparsers(dest="benchmark", metavar="<subject>", required=True)
     for name, (place, summary) in SUBJECTS.items():
         subparser = subparsers.add_parser(name, help=summary, formatter_class=argparse.RawDescriptionHelpFormatter)
-        module = importlib.import_module(f"bench.{place}")
+        if name not in words:
+            continue
+        try:
+            module = importlib.import_module(f"bench.{place}")
+        except ImportError as error:
+            if "_oracle" not in str(error):
+                raise
+            print(f"bench: {name} compares with the oracles, which are not built; run `make oracle`", file=sys.stderr)
+            return 2
         subparser.description = module.__doc__
         module.configure(subparser)
         subparser.set_defaults(run_benchmark=module.run, parser=subparser)
@@ -62,6 +70,9 @@ def main(words: list[str]) -> int:
     except UserError as error:
         print(f"bench: {error}", file=sys.stderr)
         return 2
+    except KeyboardInterrupt:
+        print("bench: interrupted", file=sys.stderr)
+        return 130
 
 
 if __name__ == "__main__":

@@ -37,7 +37,7 @@ def configure(parser):
         help="queries of each kind at each point of the sweeps; 0: none (default: %(default)s)",
     )
     parser.add_argument("--seed", type=int, default=1, metavar="N", help="of the sweeps (default: %(default)s)")
-    lab.configure(parser, rounds=5)
+    lab.configure(parser, leave_out=("size",))
 
 
 def run(args) -> lab.Report:

@@ -62,7 +62,7 @@ class Question:
 
     @property
     def name(self) -> str:
-        return self.query if self.distance is None else f"{self.query} {self.distance:g}"
+        return self.query if self.distance is None else f"{self.query} {self.distance!r}"
 
     def runner(self, options: dict, change=None, name: str | None = None) -> Runner:
         own = {"minimum_separation": self.distance} if self.query == "separation" else {}
@@ -96,7 +96,7 @@ def run(args) -> lab.Report:
     options = {"accuracy": args.accuracy, "backend": args.backend, "threads": args.threads}
     change = Step.as_one_mesh if args.peer else to_device if args.arrays == "device" else None
     for source in sources:
-        edge = median_edge(next(step for step in map(source.step, source.spread(0)) if step is not None))
+        edge = median_edge(source.first())
         chosen = [d for d in distances if d <= edge or args.separations is not None]
         if beyond := [f"{d:g}" for d in distances if d not in chosen]:
             result.note(f"{source.name}: d {', '.join(beyond)} left out, beyond its median edge of {edge:.2g}")

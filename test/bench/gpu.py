@@ -34,7 +34,7 @@ OF_SCENES = ("frames", "threads", "device")
 PARTS = (*OF_SCENES, "large", "worlds")
 TIERS = ("balanced", "exact")
 NEAR = 0.35  # of proximity in folded sheets, whose vertices are 1 apart
-FEWEST, SECONDS = 5, 1.0  # rounds of each way: at least so many, and no more once this time has passed
+FEWEST, SECONDS = 5, 1.0  # rounds of each way: at least FEWEST, and no more once SECONDS have passed
 WARM_UP = 8  # the lists on the devices reach their size
 COLUMNS = {
     "part": "part",

@@ -21,12 +21,23 @@ __all__ += ["usable"]
 Columns = dict[str, str | Callable[[dict], object]]
 
 
-def configure(parser: argparse.ArgumentParser, default: Sequence[str] = (), steps: int = 0, rounds: int = 5) -> None:
-    command.configure(parser, default, steps, rounds)
+def configure(
+    parser: argparse.ArgumentParser,
+    default: Sequence[str] = (),
+    steps: int | None = None,
+    rounds: int = 5,
+    leave_out=(),
+) -> None:
+    """steps: None where the subject does not use --steps. leave_out: further options that it does not use."""
+    unused = {*leave_out, *(["steps"] if steps is None else [])}
+    command.configure(parser, default, steps or 0, rounds, unused)
 
 
 def begin(args) -> tuple[Report, list[sources.Source]]:
     """The report to fill and the sources that were asked for; UserError for wrong options, before anything is timed."""
+    for name, value in vars(args).items():
+        if isinstance(value, (int, float)) and not 0 <= value < float("inf"):
+            raise UserError(f"--{name.replace('_', '-')} {value}: must be a finite number, not below 0")
     result, found = command.begin(args, _resolve)
     result.command = result.command.replace("hpccd bench", "python -m bench", 1)
     return result, found

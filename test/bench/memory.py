@@ -27,9 +27,9 @@ COLUMNS = {
     "method": "method",
     "triangles": "triangles",
     "contacts": "contacts",
-    "detector, MB": lambda row: row["detector_bytes"] / 2**20,
+    "detector, MiB": lambda row: row["detector_bytes"] / 2**20,
     "bytes a triangle": lab.whole("detector_bytes_per_triangle"),
-    "process, MB": lambda row: row["process_bytes"] / 2**20,
+    "process, MiB": lambda row: row["process_bytes"] / 2**20,
 }
 
 

@@ -41,7 +41,7 @@ def configure(parser):
 def run(args) -> lab.Report:
     result, sources = lab.begin(args)
     for source in sources:
-        runners = _runners(source.step(source.spread(1)[0]), args)
+        runners = _runners(source.first(), args)
         asked = {runner.name: {"option": runner.name} for runner in runners}
         lab.compare(result, args, source, runners, "full", asked, check=False)
     lab.show(f"the time that each option saves ({args.accuracy})", COLUMNS, result.rows)

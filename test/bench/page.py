@@ -155,9 +155,9 @@ TABLES = {
             "scene": "scene",
             "triangles": "triangles",
             "contacts": "contacts",
-            "detector, MB": lambda row: row["detector_bytes"] / 2**20,
+            "detector, MiB": lambda row: row["detector_bytes"] / 2**20,
             "bytes a triangle": lab.whole("detector_bytes_per_triangle"),
-            "process, MB": lambda row: row["process_bytes"] / 2**20,
+            "process, MiB": lambda row: row["process_bytes"] / 2**20,
         },
     ),
     "ropes": Table(
@@ -168,7 +168,7 @@ TABLES = {
             "triangles": "triangles",
             "contacts": "contacts",
             "ms a step": "ms",
-            "detector, MB": lambda row: row["bytes"] / 1e6,
+            "detector, MiB": lambda row: row["bytes"] / 2**20,
         },
     ),
     "worlds-on-cpus": Table(

@@ -58,7 +58,7 @@ def configure(parser):
         help="of cost; the radius of the ball is 0.5 (default: %(default)s)",
     )
     lab.tier_option(parser, "exact")
-    lab.configure(parser, rounds=15)
+    lab.configure(parser, rounds=15, leave_out=("data",))
 
 
 def run(args) -> lab.Report:

@@ -20,12 +20,12 @@ COLUMNS = {
     "triangles": "triangles",
     "contacts": "contacts",
     "ms a step": "ms",
-    "MB": lambda row: row["bytes"] / 1e6,
+    "MiB": lambda row: row["bytes"] / 2**20,
 }
 
 
 def configure(parser):
-    lab.configure(parser, rounds=15)
+    lab.configure(parser, rounds=15, leave_out=("data", "size"))
     parser.add_argument("--segments", default="100000", metavar="N,...", help="of a scene (default: %(default)s)")
     parser.add_argument("--segments-a-rope", type=int, default=500, metavar="N", help="default: %(default)s")
     lab.tier_option(parser, "exact")

@@ -33,7 +33,7 @@ COLUMNS = {
 
 
 def configure(parser):
-    lab.configure(parser, ("data", *TABLE_1), steps=6)
+    lab.configure(parser, ("data", *TABLE_1), steps=6, leave_out=("threads",))
     parser.add_argument("--methods", default=",".join(METHODS), metavar="NAME,...", help="default: %(default)s")
     parser.add_argument("--threads-list", metavar="N,...", help="default: 1, 2, 4, ... and all cores")
     lab.tier_option(parser)

@@ -30,7 +30,7 @@ COLUMNS = {
 
 
 def configure(parser):
-    lab.configure(parser, ("cloth-ball-like", "n-body-like-hr"), steps=4)
+    lab.configure(parser, ("cloth-ball-like", "n-body-like-hr"), steps=4, leave_out=("size", "threads"))
     parser.add_argument("--sizes", default="0.25,1,4", metavar="X,...", help="factors (default: %(default)s)")
     parser.add_argument("--threads-list", metavar="N,...", help="default: 1 and all cores")
     lab.tier_option(parser)

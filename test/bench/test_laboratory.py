@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """`python -m bench ...` at tiny sizes: each subject runs, and fails where what it compares differs."""
 
+import argparse
 import collections
 import sys
 
@@ -11,7 +12,8 @@ from oracle import rigid_answers
 
 import hpccd_core as hc
 from bench import distance, page, step
-from hpccd_ros.bench import measure
+from hpccd_ros.base.errors import UserError
+from hpccd_ros.bench import command, measure, sources
 from hpccd_ros.bench.sources import of_scene
 
 ONE = ("--repeat", "1")
@@ -236,12 +238,38 @@ def test_a_short_step_of_a_file_is_timed_more_often():
         (("distance", *STRIP, "--separations", "1e-3,-1"), "--separations"),
         (("distance", *STRIP, "--arrays", "device"), "needs --backend gpu"),
         (("gpu", "--parts", "frames,all"), "'all' is not known"),
+        (("ros", "--seconds", "nan"), "--seconds nan: must be a finite number"),
+        (("soak", "--rate", "inf"), "--rate inf: must be a finite number"),
+        (("rigid", "--turns", "0.5,nan,3"), "--turns"),
+        (("accuracy", "--seed", "-1"), "--seed -1: must be a finite number"),
+        (("stop", "--margin", "nan"), "--margin nan: must be a finite number"),
+        (("step", "cloth-ball-trial", "--size", "65"), "is outside"),
         (("gpu", "--sizes", "1,8"), "at least 2 vertices"),
     ],
 )
 def test_wrong_use_is_explained(bench, capsys, arguments, text):
     status, result, _ = bench(*arguments)
     assert status == 2 and result is None and text in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("words", [("memory", "--steps", "2"), ("gpu", "--steps", "2"), ("soak", "--threads", "1")])
+def test_an_option_that_a_subject_does_not_use_is_refused(bench, capsys, words):
+    with pytest.raises(SystemExit):
+        bench(*words)
+    assert f"unrecognized arguments: {words[1]}" in capsys.readouterr().err
+
+
+def test_steps_without_a_motion_are_refused_first(tmp_path):
+    none = sources.Source("none", 3, lambda k: None)
+    parser = argparse.ArgumentParser()
+    command.configure(parser, ("none",), steps=2)
+    parser.set_defaults(benchmark="none", parser=parser, out=str(tmp_path))
+    with pytest.raises(UserError, match="none: none of its measured steps keeps its topology"):
+        command.begin(parser.parse_args([]), lambda *_: [none])
+
+
+def test_close_distances_are_two_questions():
+    assert distance.Question("proximity", 0.01).name != distance.Question("proximity", 0.0100000001).name
 
 
 def test_a_peer_that_is_not_installed_is_named(bench, capsys, monkeypatch):

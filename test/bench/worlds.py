@@ -53,7 +53,7 @@ def run(args) -> lab.Report:
 
 
 def _steps(source, worlds):
-    """At most so many, spread over the motion. UserError where they do not share their topology."""
+    """At most `worlds` of them, spread over the motion. UserError where they do not share their topology."""
     steps = [source.step(k) for k in source.spread(worlds)]
     if any(step is None or step.topology != steps[0].topology for step in steps):
         raise lab.UserError(f"{source.name}: its topology changes, but worlds share theirs; name another scene")

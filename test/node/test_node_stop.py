@@ -39,7 +39,7 @@ def test_true_while_anything_is_near(start_stream):
     stream.status("unanswered", "no step was answered since the node was activated")
     stream.topologies()
     stream.frame(2.0)
-    stream.status("unanswered", "no step was answered since the stream, or a topology, began anew")
+    stream.status("unanswered", "no step was answered since the stream, or a topology, restarted")
     stream.frame(1.0)
     stream.expect(False)
     assert stream.status("")["stop"] == "False"

@@ -19,7 +19,7 @@ namespace {
 // By leaf. A search of the whole tree comes to about eight; more than two, with their boxes and the list, cost as much.
 constexpr std::size_t most_open = 2;
 
-// Keeps the pairs of leaves of a search that finds so many at most, instead of testing them; for as long as it lives.
+// While it lives, a search keeps the pairs of leaves that it finds, up to a number, instead of testing them.
 class OpenPairs {
  public:
   OpenPairs(Search& search, std::vector<Worker>& workers, std::size_t most)

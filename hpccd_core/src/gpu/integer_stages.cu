@@ -13,7 +13,7 @@ namespace hpccd::gpu {
 
 namespace {
 
-// In integers of so many limbs.
+// In integers of `limbs` limbs.
 template <int limbs>
 __device__ exact::Answer decide_in_integers(Kind kind, const PairEnds& q) {
   using Z = exact::Integer<limbs>;

@@ -43,7 +43,7 @@ def configure(parser):
     what.add_argument("--distances", action="store_true", help="ask for the smallest distances, too")
     what.add_argument("--backend", default="cpu", choices=BACKENDS, help="default: %(default)s")
     lab.tier_option(what, default="exact")
-    lab.configure(parser, rounds=3)
+    lab.configure(parser, rounds=3, leave_out=("data", "size"))
 
 
 def run(args) -> lab.Report:

@@ -49,7 +49,7 @@ def configure(parser):
         help="most that stop may rise after the time-out (default: %(default)s)",
     )
     what.add_argument("--seed", type=int, default=18, help="of the approaches (default: %(default)s)")
-    lab.configure(parser)
+    lab.configure(parser, leave_out=("data", "size", "threads", "repeat"))
 
 
 def run(args) -> lab.Report:
@@ -139,7 +139,7 @@ def _ends(report, args, ears, children, child, start) -> None:
 
     sources: list[Child] = [begin_source()]
 
-    def anew(kept: list[Child], begin) -> None:
+    def replace(kept: list[Child], begin) -> None:
         kept[0].process.wait()
         children.forget(kept[0])
         kept[0] = begin()
@@ -149,9 +149,9 @@ def _ends(report, args, ears, children, child, start) -> None:
         kept[0].process.send_signal(signal.SIGCONT)
 
     for what, kept, number, after in (
-        ("publisher killed", sources, signal.SIGKILL, partial(anew, sources, begin_source)),
+        ("publisher killed", sources, signal.SIGKILL, partial(replace, sources, begin_source)),
         ("publisher held up", sources, signal.SIGSTOP, partial(goes_on, sources)),
-        ("node killed", nodes, signal.SIGKILL, partial(anew, nodes, start)),
+        ("node killed", nodes, signal.SIGKILL, partial(replace, nodes, start)),
         ("node held up", nodes, signal.SIGSTOP, partial(goes_on, nodes)),
     ):
         with bar(what, args.ends) as done:

@@ -4,7 +4,7 @@ changes of topology in every run, one from a publisher that is ended or killed a
 ten kinds; a misspelt mesh; right and wrong requests to ~/detect. Every 25th answer (--check-every) is computed again.
 
   python -m bench soak                          forty minutes, about a tenth of the machine
-  python -m bench soak --minutes 1 --rate 30
+  python -m bench soak --minutes 1 --rate 30 --memory-limit 10
 
 In the warm-up the node is held up (SIGSTOP) until what waits for it is as much as it can be, in its queues and in the
 shared memory of the publisher: what it takes for that counts as its own from then on, whenever it comes.
@@ -52,7 +52,7 @@ def configure(parser):
         "--check-every", type=int, default=25, metavar="N", help="compute every Nth answer again (default: %(default)s)"
     )
     what.add_argument("--seed", type=int, default=0, metavar="N", help="of what is random (default: %(default)s)")
-    lab.configure(parser)
+    lab.configure(parser, leave_out=("data", "size", "threads", "repeat"))
 
 
 def run(args) -> lab.Report:
