@@ -160,10 +160,11 @@ def choose(report, bounds: Sequence[Bound]) -> None:
     taken = cheapest(found, bounds) if contacts > 0 else None
     _show(found, taken, bounds)
     wanted = ", ".join(map(str, bounds))
+    more = "record more" if report.arguments.get("steps") == 0 else "take --steps 0 for all steps, or record more"
     if contacts == 0:
         report.failure(
             f"--choose: no contact in the steps measured (asked for: {asked}), so nothing tells the "
-            "settings apart; take --steps 0 for all steps, or record more"
+            f"settings apart; {more}"
         )
         return
     # A share smaller than one in all true contacts cannot be seen.
@@ -171,7 +172,7 @@ def choose(report, bounds: Sequence[Bound]) -> None:
     if unseen:
         report.note(
             f"at most {contacts:g} true contacts (asked for: {asked}): whether {', '.join(unseen)} holds shows "
-            "in more of them only; take --steps 0 for all steps, or record more"
+            f"in more of them only; {more}"
         )
     if taken is None:
         near = nearest(found, bounds)

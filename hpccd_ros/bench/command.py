@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import shlex
 from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
@@ -105,14 +106,24 @@ def begin(args, resolve: Callable = sources.resolve) -> tuple[Report, list[sourc
     return report, found
 
 
+def measured(args) -> int:
+    """Run the benchmark, and write its result; the exit status."""
+    try:
+        return args.run_benchmark(args).end(Path(args.out), args.label)
+    except MemoryError as error:
+        why = f"does not fit into memory{f' ({error})' if str(error) else ''}"
+        raise UserError(f"{args.benchmark}: {why}; measure something smaller") from error
+
+
 def require_writable(option: str, path: Path) -> None:
     """Before anything is measured: what cannot be written would be lost."""
+    target = Path(os.path.realpath(path))  # a link that leads nowhere yet stays
     try:
-        new = not path.exists()
-        with path.open("a"):
+        new = not target.exists()
+        with target.open("a"):
             pass
         if new:
-            path.unlink()
+            target.unlink()
     except OSError as error:
         raise UserError(f"{option}: {path} cannot be written ({error.strerror}); name another") from error
 

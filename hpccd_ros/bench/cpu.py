@@ -23,7 +23,7 @@ COLUMNS = ("scene", "variant", "triangles", "contacts", "average_ms", "median_ms
 def configure(parser):
     command.configure(parser, default=("data", *TABLE_1), steps=12)
     parser.add_argument("--backend", default="cpu", metavar="NAME,...", help="of cpu, hybrid, gpu (default: cpu)")
-    parser.add_argument("--report", default="all,first", metavar="NAME,...", help="of all, first, any (default: both)")
+    parser.add_argument("--report", default="all,first", metavar="NAME,...", help="of all, first, any (default: all,first)")
     command.tier_option(parser)
 
 

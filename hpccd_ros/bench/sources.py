@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import dataclasses
+import difflib
 import os
 import zipfile
 from collections.abc import Callable, Sequence
@@ -159,9 +160,11 @@ def _one(word, data, size):
         return of_recording(path)
     if data and (data / f"{word}.npz").is_file():
         return of_npz(data / f"{word}.npz")
-    files = ", ".join(p.stem for p in data_files(data)) or "none (HPCCD_DATA is not set)"
+    files = [path.stem for path in data_files(data)]
+    near = difflib.get_close_matches(word, [*scenes.names(), *files], n=1)
     raise UserError(
-        f"{word}: neither a file, nor a generated scene ({', '.join(scenes.names())}), nor a data file ({files})"
+        f"{word}: neither a file, nor a generated scene ({', '.join(scenes.names())}), nor a data file "
+        f"({', '.join(files) or 'none (HPCCD_DATA is not set)'}){f'; did you mean {near[0]}?' if near else ''}"
     )
 
 

@@ -12,7 +12,6 @@ Close other programs first: the result says how busy they were.
 
 import argparse
 import importlib
-from pathlib import Path
 
 BENCHMARKS = {
     "cpu": "ms a step of each scene and its stages",
@@ -32,4 +31,6 @@ def configure(parser):
 
 
 def run(args) -> int:
-    return args.run_benchmark(args).end(Path(args.out), args.label)
+    from hpccd_ros.bench import command
+
+    return command.measured(args)

@@ -15,6 +15,7 @@ import sys
 from pathlib import Path
 
 from hpccd_ros.base.errors import UserError
+from hpccd_ros.bench import command
 
 # The module of each, in this package, and what it measures.
 SUBJECTS = {
@@ -66,7 +67,7 @@ def main(words: list[str]) -> int:
         subparser.set_defaults(run_benchmark=module.run, parser=subparser)
     args = parser.parse_args(words)
     try:
-        return args.run_benchmark(args).end(Path(args.out), args.label)
+        return command.measured(args)
     except UserError as error:
         print(f"bench: {error}", file=sys.stderr)
         return 2

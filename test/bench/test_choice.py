@@ -164,11 +164,14 @@ def test_where_none_keeps_the_bounds_the_nearest_is_named(product, capsys, monke
     assert "no setting keeps error<1e-20; the nearest is" in said and "-p accuracy:=" in said
 
 
-def test_where_nothing_touches_nothing_is_chosen(product):
-    status, result, _ = product("accuracy", "two-triangles", "--steps", "1", "--repeat", "1", "--choose", "misses<1e-4")
-    assert status == 1 and not any(row.get("chosen") for row in result["rows"])
-    (said,) = result["failures"]
-    assert "no contact in the steps measured" in said and "--steps 0" in said
+def test_where_nothing_touches_nothing_is_chosen(product, tmp_path):
+    np.savez(tmp_path / "alone.npz", vertices_t0=np.eye(3), vertices_t1=np.eye(3) + 1, faces=np.array([[0, 1, 2]]))
+    for steps in ("1", "0"):
+        words = (str(tmp_path / "alone.npz"), "--steps", steps, "--repeat", "1", "--choose", "misses<1e-4")
+        status, result, _ = product("accuracy", *words)
+        assert status == 1 and not any(row.get("chosen") for row in result["rows"])
+        (said,) = result["failures"]
+        assert "no contact in the steps measured" in said and ("--steps 0" in said) == (steps == "1")
 
 
 def test_what_too_few_contacts_cannot_show_is_said(product):

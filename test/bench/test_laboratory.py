@@ -232,6 +232,7 @@ def test_a_short_step_of_a_file_is_timed_more_often():
         (("size", "folding-strip", "--sizes", "one"), "--sizes"),
         (("size", "cloth-ball"), "generated"),
         (("ropes", "cloth-drop"), "makes its own scenes"),
+        (("ropes", "--segments", "100000000000000"), "ropes: does not fit into memory"),
         (("memory", "folding-strip", "--methods", ","), "--methods"),
         (("worlds", "breaking-like", "--size", "0.02", "--worlds", "8"), "topology changes"),
         (("worlds", "two-triangles", "--worlds", "65537"), "at most 65,536"),

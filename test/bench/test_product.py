@@ -101,6 +101,7 @@ def test_files_of_one_name_are_told_apart(tmp_path):
     ("arguments", "text"),
     [
         (("cpu", "no-such-scene"), "no-such-scene: neither a file"),
+        (("cpu", "cloth-dorp"), "did you mean cloth-drop?"),
         (("cpu", *STRIP[:-1], "0"), "--repeat 0: time from 1 to 100,000"),
         (("cpu", *STRIP[:-1], "1000000"), "--repeat 1000000: time from 1 to 100,000"),
         (("cpu", *STRIP, "--report", "all,last"), "'last' is not known; choose from all, first, any"),
@@ -192,6 +193,15 @@ def test_what_cannot_be_written_is_refused_before_anything_is_measured(tmp_path,
     monkeypatch.setattr(accuracy.measure, "measure", lambda *_: pytest.fail("measured"))
     status = cli.main(["bench", "accuracy", *STRIP, "--out", str(tmp_path), *words])
     assert status == 2 and says in capfd.readouterr().err
+
+
+def test_a_link_that_leads_nowhere_stays(product, tmp_path):
+    for name in ("cpu-test.json", "trade.png"):
+        (tmp_path / name).symlink_to(tmp_path / "nowhere")
+    assert product("cpu", "no-such-scene")[0] == 2
+    assert product("accuracy", "no-such-scene", "--picture", str(tmp_path / "trade.png"))[0] == 2
+    assert (tmp_path / "cpu-test.json").is_symlink() and (tmp_path / "trade.png").is_symlink()
+    assert not (tmp_path / "nowhere").exists()
 
 
 def test_a_name_too_long_for_a_file(product, capfd):
