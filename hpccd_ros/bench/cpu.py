@@ -22,8 +22,9 @@ COLUMNS = ("scene", "variant", "triangles", "contacts", "average_ms", "median_ms
 
 def configure(parser):
     command.configure(parser, default=("data", *TABLE_1), steps=12)
-    parser.add_argument("--backend", default="cpu", metavar="NAME,...", help="of cpu, hybrid, gpu (default: cpu)")
-    parser.add_argument("--report", default="all,first", metavar="NAME,...", help="of all, first, any (default: all,first)")
+    add = parser.add_argument
+    add("--backend", default="cpu", metavar="NAME,...", help="of cpu, hybrid, gpu (default: cpu)")
+    add("--report", default="all,first", metavar="NAME,...", help="of all, first, any (default: %(default)s)")
     command.tier_option(parser)
 
 
