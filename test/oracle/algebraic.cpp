@@ -17,23 +17,23 @@ Integer scaled_value(const Polynomial& p, const Integer& n, unsigned k) {
   return value;
 }
 
+// Coefficients of p(x + n), given those of p.
+void shift(std::vector<Integer>& p, const Integer& n) {
+  for (std::size_t i = 0; i + 1 < p.size(); ++i)
+    for (std::size_t j = p.size() - 1; j-- > i;) p[j] += n * p[j + 1];
+}
+
 // Signs of the Bernstein coefficients of p on [n/2^k, (n+1)/2^k].
 std::vector<int> bernstein_signs(const Polynomial& p, const Integer& n, unsigned k) {
   const int d = p.degree();
-  Polynomial local;  // p as a polynomial in s, t = (n+s)/2^k, times 2^(k d)
-  for (int i = d; i >= 0; --i)
-    local = local * Polynomial({n, Integer(1)}) + Polynomial({p[i] << (k * static_cast<unsigned>(d - i))});
-  // binomial(d,j) times the j-th coefficient is sum_i binomial(d-i, j-i) local[i]: repeated partial sums.
-  std::vector<Integer> b(static_cast<std::size_t>(d + 1));
-  for (int i = 0; i <= local.degree(); ++i) {
-    Integer binomial = 1;
-    for (int j = i; j <= d; ++j) {
-      b[static_cast<std::size_t>(j)] += binomial * local[i];
-      binomial = binomial * (d - j) / (j - i + 1);
-    }
-  }
+  std::vector<Integer> b;  // of p as a polynomial in s, t = (n+s)/2^k, times 2^(k d)
+  for (int i = 0; i <= d; ++i) b.push_back(p[i] << (k * static_cast<unsigned>(d - i)));
+  if (n != 0) shift(b, n);
+  // binomial(d,j) times the j-th coefficient is sum_i binomial(d-i, j-i) b[i].
+  std::reverse(b.begin(), b.end());
+  shift(b, 1);
   std::vector<int> signs;
-  for (const Integer& x : b) signs.push_back(sign(x));
+  for (int j = 0; j <= d; ++j) signs.push_back(sign(b[static_cast<std::size_t>(d - j)]));
   return signs;
 }
 
@@ -50,20 +50,30 @@ int variations(const std::vector<int>& signs) {
   return count;
 }
 
-// Roots in the open interval (n/2^k, (n+1)/2^k) by Descartes' rule: no variation of sign, no root; one, one
+// Adds the roots in the open interval (n/2^k, (n+1)/2^k) by Descartes' rule: no variation of sign, no root; one, one
+// simple root. False where that takes intervals shorter than 2^-deepest, which they are for ever around a multiple
 // root.
-void isolate(const Polynomial& p, const Integer& n, unsigned k, std::vector<Root>& roots) {
+bool isolate(const Polynomial& p, const Integer& n, unsigned k, unsigned deepest, std::vector<Root>& roots) {
   const std::vector<int> signs = bernstein_signs(p, n, k);
   const int count = variations(signs);
-  if (count == 0) return;
+  if (count == 0) return true;
   if (count == 1 && signs.front() != 0 && signs.back() != 0) {
     roots.push_back(Root::between(p, n, k));
-    return;
+    return true;
   }
+  if (k == deepest) return false;
   const Integer left = 2 * n, middle = left + 1;
-  isolate(p, left, k + 1, roots);
+  if (!isolate(p, left, k + 1, deepest, roots)) return false;
   if (scaled_value(p, middle, k + 1) == 0) roots.push_back(Root::exactly(middle, k + 1));
-  isolate(p, middle, k + 1, roots);
+  return isolate(p, middle, k + 1, deepest, roots);
+}
+
+// As roots_in_unit_interval; false where two roots are one or closer than 2^-deepest.
+bool find_roots(const Polynomial& p, unsigned deepest, std::vector<Root>& roots) {
+  if (scaled_value(p, 0, 0) == 0) roots.push_back(Root::exactly(0, 0));
+  if (!isolate(p, 0, 0, deepest, roots)) return false;
+  if (scaled_value(p, 1, 0) == 0) roots.push_back(Root::exactly(1, 0));
+  return true;
 }
 
 // The largest double not greater than n/2^k, n >= 0.
@@ -147,12 +157,10 @@ double Root::rounded_down() {
 }
 
 std::vector<Root> roots_in_unit_interval(const Polynomial& p) {
-  if (all_alike(bernstein_signs(p, 0, 0))) return {};
-  const Polynomial q = square_free_part(p);
   std::vector<Root> roots;
-  if (scaled_value(q, 0, 0) == 0) roots.push_back(Root::exactly(0, 0));
-  isolate(q, 0, 0, roots);
-  if (scaled_value(q, 1, 0) == 0) roots.push_back(Root::exactly(1, 0));
+  if (find_roots(p, 32, roots)) return roots;
+  roots.clear();
+  find_roots(square_free_part(p), std::numeric_limits<unsigned>::max(), roots);
   return roots;
 }
 

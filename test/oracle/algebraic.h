@@ -8,8 +8,8 @@
 
 namespace oracle {
 
-// A root of a square-free polynomial: either exactly n/2^k, or the only one in the open interval
-// (n/2^k, (n+1)/2^k), at whose ends the polynomial does not vanish.
+// A root of a polynomial: either exactly n/2^k, or the only one in the open interval (n/2^k, (n+1)/2^k), simple there,
+// at whose ends the polynomial does not vanish.
 class Root {
  public:
   static Root exactly(Integer n, unsigned k) { return Root({}, std::move(n), k, true); }

@@ -14,6 +14,8 @@
 namespace oracle {
 namespace {
 
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
 // The points of a pair's vertices, once for each set of positions.
 template <class Query, class A, class B>
 Query points_of(const A& a, const B& b, std::initializer_list<const std::vector<Point>*> positions) {
@@ -78,7 +80,7 @@ Pairs proximity(const Meshes& meshes, const std::vector<Point>& positions, doubl
   const auto faces = with_boxes(meshes.faces, positions, positions);
   const auto near = [&](const auto& a, const auto& b, auto within, auto exactly) -> std::optional<double> {
     const auto points = points_of<Points>(a, b, {&positions});
-    if (!within(points, distance)) return {};
+    if (distance < infinity && !within(points, distance)) return {};
     return exactly(points);
   };
   const auto vf = all_pairs(meshes, vertices, faces, reach, threads, [&](const Vertex& v, const Face& f) {
@@ -103,7 +105,6 @@ std::vector<std::array<std::uint32_t, 3>> intersections(const Meshes& meshes, co
 }
 
 std::vector<Gap> smallest_distances(const Meshes& meshes, const std::vector<Point>& positions, unsigned threads) {
-  constexpr double infinity = std::numeric_limits<double>::infinity();
   std::vector<Gap> gaps;
   std::map<std::array<std::uint32_t, 2>, std::size_t> place;
   for (std::uint32_t a = 0; a < meshes.tested.size(); ++a)
@@ -117,7 +118,7 @@ std::vector<Gap> smallest_distances(const Meshes& meshes, const std::vector<Poin
     return gaps[place.at({a, b})];
   };
   // Rounding keeps the order: the smallest of the rounded distances is the smallest distance, rounded.
-  const Pairs all = proximity(meshes, positions, std::numeric_limits<double>::max(), threads);
+  const Pairs all = proximity(meshes, positions, infinity, threads);
   for (std::size_t i = 0; i < all.vf.size(); ++i) {
     Gap& gap = gap_of(all.vf[i][0], meshes.faces[all.vf[i][1]][0]);
     gap.distance = std::min(gap.distance, all.vf_value[i]);

@@ -2,6 +2,7 @@
 // Polynomials in one variable with integer coefficients of any size.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <utility>
 #include <vector>
@@ -28,14 +29,21 @@ class Polynomial {
   std::vector<Integer> c_;
 };
 
-inline Polynomial operator+(const Polynomial& a, const Polynomial& b) {
-  const Polynomial& longer = a.degree() >= b.degree() ? a : b;
-  const Polynomial& shorter = a.degree() >= b.degree() ? b : a;
-  std::vector<Integer> sum;
-  for (int i = 0; i <= longer.degree(); ++i)
-    sum.push_back(i <= shorter.degree() ? Integer(longer[i] + shorter[i]) : longer[i]);
+// a + b or, for a negative sign, a - b.
+inline Polynomial combined(const Polynomial& a, const Polynomial& b, int sign) {
+  std::vector<Integer> sum(static_cast<std::size_t>(std::max(a.degree(), b.degree()) + 1));
+  for (int i = 0; i <= a.degree(); ++i) sum[static_cast<std::size_t>(i)] = a[i];
+  for (int i = 0; i <= b.degree(); ++i) {
+    if (sign < 0)
+      sum[static_cast<std::size_t>(i)] -= b[i];
+    else
+      sum[static_cast<std::size_t>(i)] += b[i];
+  }
   return Polynomial(std::move(sum));
 }
+
+inline Polynomial operator+(const Polynomial& a, const Polynomial& b) { return combined(a, b, 1); }
+inline Polynomial operator-(const Polynomial& a, const Polynomial& b) { return combined(a, b, -1); }
 
 inline Polynomial operator*(const Polynomial& a, const Polynomial& b) {
   if (a.is_zero() || b.is_zero()) return {};
@@ -44,8 +52,6 @@ inline Polynomial operator*(const Polynomial& a, const Polynomial& b) {
     for (int j = 0; j <= b.degree(); ++j) product[static_cast<std::size_t>(i + j)] += a[i] * b[j];
   return Polynomial(std::move(product));
 }
-
-inline Polynomial operator-(const Polynomial& a, const Polynomial& b) { return a + Polynomial({Integer(-1)}) * b; }
 
 inline Polynomial derivative(const Polynomial& p) {
   std::vector<Integer> d;
