@@ -17,25 +17,25 @@ from pathlib import Path
 from hpccd_ros.base.errors import UserError
 from hpccd_ros.bench import command
 
-# The module of each, in this package, and what it measures.
+# Each is a module of this package; what it measures.
 SUBJECTS = {
-    "peer": ("peer", "all and first contacts beside ipctk"),
-    "scaling": ("scaling", "speed-up over one thread against threads (Fig. 6 and 7), for each method"),
-    "methods": ("methods", "the methods and instruction sets compared: time, and equality of the results"),
-    "size": ("size", "how time and memory grow with the number of triangles"),
-    "memory": ("memory", "peak memory and bytes per triangle"),
-    "worlds": ("worlds", "many worlds in one call on CPUs, beside detectors that are asked one world at a time"),
-    "ropes": ("ropes", "ropes as edges, beside thin triangles and beside cloth with as many edges"),
-    "options": ("options", "the time that each way to model less saves"),
-    "distance": ("distance", "separation, proximity, intersections, smallest distances beside plain detection"),
-    "step": ("step", "how far a step may go: first contacts, free step and trial steps beside all contacts"),
-    "accuracy": ("accuracy", "hard elementary and distance queries: false negatives and positives of each tier"),
-    "gpu": ("gpu", "the GPU backend: ms a frame, with transfers and without, many worlds, stages"),
-    "rigid": ("rigid", "meshes moved by poses and joints: found contacts against the truth, bounds, cost"),
-    "ros": ("ros.latency", "the node over DDS: latency beside that of an echo, sustained rate, overload"),
-    "robot": ("ros.robot", "a robot beside a cloth over DDS, moved by joint states: answers a second, latency"),
-    "stop": ("ros.stop", "the topic stop over DDS: random approaches, silence, publisher and node killed"),
-    "soak": ("ros.soak.command", "forty minutes of mixed load on the node: memory, counts, answers"),
+    "peer": "all and first contacts beside ipctk",
+    "scaling": "speed-up over one thread against threads (Fig. 6 and 7), for each method",
+    "methods": "the methods and instruction sets compared: time, and equality of the results",
+    "size": "how time and memory grow with the number of triangles",
+    "memory": "peak memory and bytes per triangle",
+    "worlds": "many worlds in one call on CPUs, beside detectors that are asked one world at a time",
+    "ropes": "ropes as edges, beside thin triangles and beside cloth with as many edges",
+    "options": "the time that each way to model less saves",
+    "distance": "separation, proximity, intersections, smallest distances beside plain detection",
+    "step": "how far a step may go: first contacts, free step and trial steps beside all contacts",
+    "accuracy": "hard elementary and distance queries: false negatives and positives of each tier",
+    "gpu": "the GPU backend: ms a frame, with transfers and without, many worlds, stages",
+    "rigid": "meshes moved by poses and joints: found contacts against the truth, bounds, cost",
+    "ros": "the node over DDS: latency beside that of an echo, sustained rate, overload",
+    "robot": "a robot beside a cloth over DDS, moved by joint states: answers a second, latency",
+    "stop": "the topic stop over DDS: random approaches, silence, publisher and node killed",
+    "soak": "forty minutes of mixed load on the node: memory, counts, answers",
 }
 
 
@@ -51,12 +51,12 @@ def main(words: list[str]) -> int:
     parser = argparse.ArgumentParser("python -m bench", description=__doc__)
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
     subparsers = parser.add_subparsers(dest="benchmark", metavar="<subject>", required=True)
-    for name, (place, summary) in SUBJECTS.items():
+    for name, summary in SUBJECTS.items():
         subparser = subparsers.add_parser(name, help=summary, formatter_class=argparse.RawDescriptionHelpFormatter)
         if name not in words:
             continue
         try:
-            module = importlib.import_module(f"bench.{place}")
+            module = importlib.import_module(f"bench.{name}")
         except ImportError as error:
             if "_oracle" not in str(error):
                 raise
