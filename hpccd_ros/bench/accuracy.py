@@ -26,7 +26,7 @@ from pathlib import Path
 
 from hpccd_core.options import ACCURACIES, SIMD
 from hpccd_ros.base.errors import UserError
-from hpccd_ros.bench import choice, command, measure, settings
+from hpccd_ros.bench import choice, command, measure
 from hpccd_ros.bench.report import Report, cores, show
 
 # Stats of the core by the stage that decided a pair, in the order in which a pair meets them.
@@ -39,46 +39,31 @@ DECIDED = {
     "tolerance": "by_tolerance",
     "integers": "by_integers",
 }
-COLUMNS = {
-    "scene": "scene",
-    "backend": "backend",
-    "simd": "simd",
-    "accuracy": "accuracy",
-    "asked": "asked",
-    "ms a step": "step_ms",
-    "/ balanced": "over_balanced",
-    "contacts": "contacts",
-    "missed": "missed",
-    "spurious": "invented",
-    "toc worst": "toc_worst",
-    "toc p99": "toc_p99",
-}
+COLUMNS = {key: key for key in ("scene", "backend", "simd", "accuracy", "asked")}
+COLUMNS |= {"ms a step": "step_ms", "/ balanced": "over_balanced", "contacts": "contacts", "missed": "missed"}
+COLUMNS |= {"spurious": "invented", "toc worst": "toc_worst", "toc p99": "toc_p99"}
 
 
 def configure(parser):
     command.configure(parser, default=("data", "cloth-drop", "n-body-like-lr"), steps=2)
-    what = ", ".join(asked.name for asked in settings.ASKED)
+    what = ", ".join(asked.name for asked in choice.ASKED)
     add = parser.add_argument
     add("--choose", metavar="BOUNDS", help=f"name the cheapest setting within these bounds: {choice.EXAMPLE}")
     add("--tiers", default=",".join(ACCURACIES), metavar="NAME,...", help="default: %(default)s")
     add("--backend", metavar="NAME,...", help="of cpu, hybrid, gpu (default: cpu; with --choose: those that work here)")
-    add("--ask", default=settings.ALL, metavar="NAME,...", help=f"contacts to ask for: {what} (default: all)")
+    add("--ask", default=choice.ALL, metavar="NAME,...", help=f"contacts to ask for: {what} (default: all)")
     add("--simd", default="auto", metavar="NAME,...", help=f"of {', '.join(SIMD)}")
     add("--picture", metavar="FILE", help="draw time against errors into a .png, .pdf or .svg file")
 
 
 def run(args) -> Report:
     bounds = choice.parse(args.choose) if args.choose is not None else []
-    asked = settings.asked(command.listed("--ask", args.ask, [a.name for a in settings.ASKED]))
+    names = command.listed("--ask", args.ask, [a.name for a in choice.ASKED])
+    asked = [a for a in choice.ASKED if a.name in names]
     tiers = command.listed("--tiers", args.tiers, ACCURACIES)
-    every = measure.BACKENDS
-    names = command.listed("--backend", args.backend, every) if args.backend else every if bounds else ["cpu"]
-    backends, refused = measure.usable("backend", names)
-    if not backends:
-        raise UserError(f"--backend {args.backend}: none of these works here; see `hpccd info`")
-    sets, refused_sets = measure.usable("simd", command.listed("--simd", args.simd, SIMD))
-    if not sets:
-        raise UserError(f"--simd {args.simd}: none of these works here; see `hpccd info`")
+    which = args.backend or (",".join(measure.BACKENDS) if bounds else "cpu")
+    backends, refused = command.usable("backend", which, measure.BACKENDS)
+    sets, refused_sets = command.usable("simd", args.simd, SIMD)
     if args.picture is not None:
         if Path(args.picture).suffix not in (".png", ".pdf", ".svg"):
             raise UserError(f"--picture {args.picture}: name a .png, .pdf or .svg file")
@@ -89,22 +74,17 @@ def run(args) -> Report:
         command.skipped(report, "backend", refused)
     command.skipped(report, "instruction set", refused_sets)
     for source in found:
-        variants = {}
-        for what in asked:
-            for backend in backends:
-                for simd in sets if backend == "cpu" else ["auto"]:
-                    for tier in tiers:
-                        name = f"{backend} {simd} {tier} {what.name}"
-                        options = {"backend": backend, "accuracy": tier, "threads": args.threads, "simd": simd}
-                        variants[name] = measure.Runner(name, {**options, **what.options}), what
+        variants = {
+            (backend, simd, tier, what.name): what
+            for what in asked
+            for backend in backends
+            for simd in (sets if backend == "cpu" else ["auto"])
+            for tier in tiers
+        }
         _measure(report, source, variants, args)
     check(report)
-    show(
-        "tiers",
-        list(COLUMNS),
-        [[row[key] for key in COLUMNS.values()] for row in report.rows],
-        "missed, spurious, toc: against the truth of the file, or else against the tier exact",
-    )
+    caption = "missed, spurious, toc: against the truth of the file, or else against the tier exact"
+    show("tiers", COLUMNS, report.rows, caption)
     if bounds:
         choice.choose(report, bounds)
     if args.picture is not None:
@@ -113,21 +93,21 @@ def run(args) -> Report:
 
 
 def _measure(report, source, variants, args):
-    series = measure.measure(source, [runner for runner, _ in variants.values()], args.repeat, args.steps)
-    known = {step: _truth(source.step(step)) for step in next(iter(series.values())).by_step}
-    for name, (runner, what) in variants.items():
-        one, (backend, simd, tier, _) = series[name], name.split(maxsplit=3)
-        steps = {number: source.step(number) for number in known}
+    runners = {}
+    for variant, what in variants.items():
+        options = dict(zip(("backend", "simd", "accuracy"), variant, strict=False)) | {"threads": args.threads}
+        runners[variant] = measure.Runner(variant, {**options, **what.options})
+    series = measure.measure(source, list(runners.values()), args.repeat, args.steps)
+    steps = {number: source.step(number) for number in next(iter(series.values())).by_step}
+    known = {number: step.truth or _exact(step) for number, step in steps.items()}
+    for (backend, simd, tier, name), what in variants.items():
+        one, runner = series[backend, simd, tier, name], runners[backend, simd, tier, name]
         errors = [what.errors(measure.detect(runner.detector(steps[k]), steps[k]), true) for k, true in known.items()]
-        balanced = series.get(f"{backend} {simd} balanced {what.name}")
+        balanced = series.get((backend, simd, "balanced", name))
         stats, row = one.stats(), one.row()
         report.add(
             part="scene",
-            scene=source.name,
-            backend=backend,
-            simd=simd,
-            accuracy=tier,
-            asked=what.name,
+            **{"scene": source.name, "backend": backend, "simd": simd, "accuracy": tier, "asked": name},
             threads=args.threads or cores(),
             truth="file" if next(iter(steps.values())).truth else "exact tier",
             reported=sum(sample[0].contacts for sample in one.by_step.values()),
@@ -139,20 +119,16 @@ def _measure(report, source, variants, args):
         )
 
 
-def _truth(step):
-    if step.truth:
-        return step.truth
-    exact = measure.Runner("truth", {"accuracy": "exact", "backend": "cpu"}).detector(step)
-    found = measure.detect(exact, step)
+def _exact(step):
+    found = measure.detect(measure.Runner("truth", {"accuracy": "exact", "backend": "cpu"}).detector(step), step)
     return {key: getattr(found, key) for key in ("vf", "vf_toc", "ee", "ee_toc")}
 
 
 def check(report: Report) -> None:
     """The promises of the tiers, on all steps that were measured."""
     for r in report.rows:
-        text = (
-            f"{r['scene']}: {r['accuracy']}: missed {r['missed']}, spurious {r['invented']}, off by {r['toc_worst']:g}"
-        )
+        what = f"missed {r['missed']}, spurious {r['invented']}, off by {r['toc_worst']:g}"
+        text = f"{r['scene']}: {r['accuracy']}: {what}"
         if r["accuracy"] == "exact" and (r["missed"] or r["invented"] or r["toc_worst"] > 1e-12):
             report.failure(text)
         if r["accuracy"] == "conservative" and (r["missed"] or r["latest"] > 0):
@@ -176,9 +152,9 @@ def draw(rows: list[dict], path: Path) -> None:
         for o in choice.outcomes(rows):
             setting, colour = o.setting, f"C{ACCURACIES.index(o.setting.accuracy)}"
             mark = "osD"[measure.BACKENDS.index(setting.backend)]
-            inside = colour if setting.asked == settings.ALL else "none"
+            inside = colour if setting.asked == choice.ALL else "none"
             point = axis.loglog(o.ms, max(value(o), floor), mark, color=colour, markerfacecolor=inside, alpha=0.8)
-            if setting.asked == settings.ALL:
+            if setting.asked == choice.ALL:
                 marks[f"{setting.accuracy}, {setting.backend}"] = point[0]
         axis.set_xlabel("ms a step")
         axis.set_ylabel(label)

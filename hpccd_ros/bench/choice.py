@@ -1,29 +1,81 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The cheapest setting that keeps bounds on wrong answers and on the error of times."""
+"""What a user may set, what each way to ask less of a step has to find, and the cheapest setting that keeps bounds.
+
+Options have the names of hpccd_core.Detector, which are those of the node's parameters too.
+"""
 
 from __future__ import annotations
 
 import dataclasses
 import math
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 from hpccd_ros.base.errors import UserError
 from hpccd_ros.bench import report as output
-from hpccd_ros.bench.settings import ALL, Setting
+from hpccd_ros.bench import truth
 
-# What may be bounded. Of several scenes the worst counts.
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Asked:
+    """What is asked of a step. Wrong answers count against this, not against all contacts: to ask for less is a choice
+    of the modelling. kinds: of contacts. one: "" for all of them, or one of them: "earliest", "any"."""
+
+    name: str
+    options: dict = dataclasses.field(default_factory=dict)
+    kinds: tuple[str, ...] = ("vf", "ee")
+    one: str = ""
+
+    def errors(self, found, true: dict) -> truth.Errors:
+        """found: hpccd_core.Contacts; true: all contacts of the step."""
+        wanted = {key: values for key, values in true.items() if key.split("_")[0] in self.kinds}
+        return truth.of_one(found, wanted, self.one == "earliest") if self.one else truth.of_scene(found, wanted)
+
+
+# A further option that asks for less is a line here. Its values are words, or tuples of words.
+ASKED = (
+    Asked("all"),
+    Asked("first", {"report": "first"}, one="earliest"),
+    Asked("any", {"report": "any"}, one="any"),
+    Asked("vertex_face", {"features": ("vertex_face",)}, kinds=("vf",)),
+    Asked("edge_edge", {"features": ("edge_edge",)}, kinds=("ee",)),
+)
+ALL = ASKED[0].name
+# What may be bounded, as --help explains. Of several scenes the worst counts.
 QUANTITIES = {
-    "misses": "share of the true contacts that are missed",
-    "inventions": "share of the reported contacts that are not true",
-    "late": "by how much a time is later than the true one, share of the step",
-    "early": "by how much it is earlier",
-    "error": "the larger of both",
+    "misses": lambda row: row["missed"] / max(1, row["true"]),
+    "inventions": lambda row: row["invented"] / max(1, row["reported"]),
+    "late": lambda row: row["latest"],
+    "early": lambda row: row["earliest"],
+    "error": lambda row: row["toc_worst"],
 }
 EXAMPLE = '--choose "misses<1e-4, late<1e-3"'
 # Settings that are as near are equally fast as far as the clock can tell: the more accurate one is taken.
 AS_FAST = 1.05
 _BOUND = re.compile(r"(?P<quantity>[a-z]+)\s*(?P<sign><=?)\s*(?P<limit>[^<=>\s]+)")
+
+
+@dataclasses.dataclass(frozen=True)
+class Setting:
+    """A tier, a backend, and what is asked."""
+
+    accuracy: str
+    backend: str
+    asked: str = ALL
+
+    def __str__(self):
+        return f"{self.accuracy} on {self.backend}" + ("" if self.asked == ALL else f", {self.asked}")
+
+    def as_written(self) -> str:
+        """In Python and as parameters of the node."""
+        asked = next(a.options for a in ASKED if a.name == self.asked)
+        options = {"accuracy": self.accuracy, "backend": self.backend, **asked}
+        python, node = [], []
+        for name, value in options.items():
+            word = isinstance(value, str)
+            python.append(f'{name}="{value}"' if word else f"{name}={value!r}")
+            node.append(f"-p {name}:={value}" if word else f'-p {name}:="[{", ".join(value)}]"')
+        return f"hc.Detector(scene, {', '.join(python)}); hpccd_node --ros-args {' '.join(node)}"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -44,7 +96,7 @@ def parse(text: str) -> list[Bound]:
     words = [word.strip() for word in text.split(",") if word.strip()]
     if not words:
         raise UserError(f"--choose: name at least one bound, as in {EXAMPLE}")
-    bounds: list[Bound] = []
+    bounds: dict[str, Bound] = {}
     for word in words:
         found = _BOUND.fullmatch(word)
         if not found:
@@ -52,26 +104,21 @@ def parse(text: str) -> list[Bound]:
                 f"--choose {word!r}: write QUANTITY<NUMBER or QUANTITY<=NUMBER, bounds with commas "
                 f"between, as in {EXAMPLE}; quantities: {', '.join(QUANTITIES)}"
             )
-        quantity, strict = found["quantity"], found["sign"] == "<"
+        quantity, sign, number = found.groups()
         if quantity not in QUANTITIES:
             raise UserError(f"--choose {word!r}: {quantity} is not known; choose from {', '.join(QUANTITIES)}")
-        if any(bound.quantity == quantity for bound in bounds):
+        if quantity in bounds:
             raise UserError(f"--choose: {quantity} is bounded twice; keep one of both")
-        limit = _number(word, found["limit"])
-        if strict and limit == 0:
+        try:
+            limit = float(number)
+        except ValueError:
+            raise UserError(f"--choose {word!r}: {number} is not a number; write a share such as 1e-4") from None
+        if not (math.isfinite(limit) and limit >= 0):
+            raise UserError(f"--choose {word!r}: {number} bounds nothing; write a share such as 1e-4")
+        if sign == "<" and limit == 0:
             raise UserError(f"--choose {word!r}: nothing is below 0; write {quantity}<=0 for none at all")
-        bounds.append(Bound(quantity, limit, strict))
-    return bounds
-
-
-def _number(word, text) -> float:
-    try:
-        limit = float(text)
-    except ValueError:
-        raise UserError(f"--choose {word!r}: {text} is not a number; write a share such as 1e-4") from None
-    if not (math.isfinite(limit) and limit >= 0):
-        raise UserError(f"--choose {word!r}: {text} bounds nothing; write a share such as 1e-4")
-    return limit
+        bounds[quantity] = Bound(quantity, limit, sign == "<")
+    return list(bounds.values())
 
 
 @dataclasses.dataclass(frozen=True)
@@ -93,53 +140,38 @@ class Outcome:
 def outcomes(rows: Sequence[dict]) -> list[Outcome]:
     """Of the rows of `hpccd bench accuracy` about whole scenes: one for each setting that every scene was tested with,
     with the first of several instruction sets."""
-    scenes = {row["scene"] for row in rows}
     of: dict[Setting, dict[str, dict]] = {}
     for row in rows:
-        mine = of.setdefault(Setting(row["accuracy"], row["backend"], row.get("asked", ALL)), {})
-        mine.setdefault(row["scene"], row)
+        of.setdefault(Setting(row["accuracy"], row["backend"], row.get("asked", ALL)), {}).setdefault(row["scene"], row)
+    found = {setting: mine.values() for setting, mine in of.items() if mine.keys() == {row["scene"] for row in rows}}
     return [
         Outcome(
             setting,
-            sum(row["step_ms"] for row in mine.values()) / len(mine),
-            {name: max(_value(row, name) for row in mine.values()) for name in QUANTITIES},
+            sum(row["step_ms"] for row in mine) / len(mine),
+            {name: max(map(value, mine)) for name, value in QUANTITIES.items()},
         )
-        for setting, mine in of.items()
-        if mine.keys() == scenes
+        for setting, mine in found.items()
     ]
-
-
-def _value(row, quantity) -> float:
-    if quantity == "misses":
-        return row["missed"] / max(1, row["true"])
-    if quantity == "inventions":
-        return row["invented"] / max(1, row["reported"])
-    return row[{"late": "latest", "early": "earliest", "error": "toc_worst"}[quantity]]
 
 
 def front(found: Sequence[Outcome]) -> list[Outcome]:
     """Those that no other one which asks for the same beats in time, in wrong answers and in the error of times."""
-    asked = dict.fromkeys(o.setting.asked for o in found)
-    alike = ([o for o in found if o.setting.asked == what] for what in asked)
-    return [o for mine in alike for o in unbeaten(mine, lambda o: (o.ms, o.wrong, o.values["error"]))]
 
+    def values(o: Outcome) -> tuple[float, ...]:
+        return o.ms, o.wrong, o.values["error"]
 
-def unbeaten(things: Sequence, values: Callable) -> list:
-    """Those that no other one beats: none is as small in all values and smaller in one."""
+    def beats(a: Outcome, b: Outcome) -> bool:
+        alike = a.setting.asked == b.setting.asked and values(a) != values(b)
+        return alike and all(x <= y for x, y in zip(values(a), values(b), strict=True))
 
-    def beats(a, b) -> bool:
-        return a != b and all(x <= y for x, y in zip(a, b, strict=True))
-
-    return [thing for thing in things if not any(beats(values(other), values(thing)) for other in things)]
+    return [o for o in found if not any(beats(other, o) for other in found)]
 
 
 def cheapest(found: Sequence[Outcome], bounds: Sequence[Bound]) -> Outcome | None:
     """None where no setting keeps all bounds."""
     keep = [o for o in found if not o.broken(bounds)]
-    if not keep:
-        return None
-    fastest = min(o.ms for o in keep)
-    return min((o for o in keep if o.ms <= AS_FAST * fastest), key=lambda o: (o.wrong, o.values["error"], o.ms))
+    fast = [o for o in keep if o.ms <= AS_FAST * min(o.ms for o in keep)]
+    return min(fast, key=lambda o: (o.wrong, o.values["error"], o.ms), default=None)
 
 
 def nearest(found: Sequence[Outcome], bounds: Sequence[Bound]) -> Outcome:
@@ -154,18 +186,20 @@ def nearest(found: Sequence[Outcome], bounds: Sequence[Bound]) -> Outcome:
 
 def choose(report, bounds: Sequence[Bound]) -> None:
     """Prints, and marks the rows of the chosen setting in the report, which fails where none keeps the bounds."""
-    rows = [row for row in report.rows if row["part"] == "scene"]
+    rows = report.rows
     found = outcomes(rows)
-    asked, contacts = _most_contacts(rows)
+    # What was asked for with the fewest true contacts in the scene that has most of them, and how many.
+    most: dict[str, float] = {}
+    for row in rows:
+        most[row["asked"]] = max(most.get(row["asked"], 0), row["true"])
+    asked, contacts = min(most.items(), key=lambda item: item[1])
     taken = cheapest(found, bounds) if contacts > 0 else None
     _show(found, taken, bounds)
     wanted = ", ".join(map(str, bounds))
     more = "record more" if report.arguments.get("steps") == 0 else "take --steps 0 for all steps, or record more"
     if contacts == 0:
-        report.failure(
-            f"--choose: no contact in the steps measured (asked for: {asked}), so nothing tells the "
-            f"settings apart; {more}"
-        )
+        nothing = f"no contact in the steps measured (asked for: {asked}), so nothing tells the settings apart"
+        report.failure(f"--choose: {nothing}; {more}")
         return
     # A share smaller than one in all true contacts cannot be seen.
     unseen = [str(b) for b in bounds if b.quantity in ("misses", "inventions") and 0 < b.limit < 1 / contacts]
@@ -177,46 +211,25 @@ def choose(report, bounds: Sequence[Bound]) -> None:
     if taken is None:
         near = nearest(found, bounds)
         broken = ", ".join(f"{b.quantity} {near.values[b.quantity]:.2g}" for b in near.broken(bounds))
-        report.failure(
-            f"--choose: no setting keeps {wanted}; the nearest is {near.setting} with {broken}: "
-            f"{near.setting.as_written()}"
-        )
+        it = f"{near.setting} with {broken}: {near.setting.as_written()}"
+        report.failure(f"--choose: no setting keeps {wanted}; the nearest is {it}")
         return
     for row in rows:
         row["chosen"] = Setting(row["accuracy"], row["backend"], row["asked"]) == taken.setting
     print(f"{wanted}: {taken.setting.as_written()}")
 
 
-def _most_contacts(rows) -> tuple[str, float]:
-    """What was asked for with the fewest true contacts in the scene that has most of them, and how many."""
-    most: dict[str, float] = {}
-    for row in rows:
-        most[row["asked"]] = max(most.get(row["asked"], 0), row["true"])
-    return min(most.items(), key=lambda item: item[1])
-
-
 def _show(found: Sequence[Outcome], taken: Outcome | None, bounds: Sequence[Bound]) -> None:
-    unbeaten_ones = front(found)
-
-    def verdict(o: Outcome) -> str:
+    unbeaten, rows = front(found), []
+    for o in sorted(found, key=lambda o: o.ms):
         broken = ", ".join(map(str, o.broken(bounds)))
-        return "chosen" if o is taken else f"breaks {broken}" if broken else "keeps them"
-
+        verdict = "chosen" if o is taken else f"breaks {broken}" if broken else "keeps them"
+        setting = {**dataclasses.asdict(o.setting), "ms a step": o.ms, **o.values}
+        rows.append({**setting, "front": "*" if o in unbeaten else "", "bounds": verdict})
     output.show(
         "all settings, the cheapest first",
-        ["accuracy", "backend", "asked", "ms a step", *QUANTITIES, "front", "bounds"],
-        [
-            [
-                o.setting.accuracy,
-                o.setting.backend,
-                o.setting.asked,
-                o.ms,
-                *o.values.values(),
-                "*" if o in unbeaten_ones else "",
-                verdict(o),
-            ]
-            for o in sorted(found, key=lambda o: o.ms)
-        ],
+        {key: key for key in rows[0]},
+        rows,
         "shares, of the worst scene, against the truth of the file or else the tier exact; front: no other setting "
         "that asks for the same is at least as good in everything",
     )

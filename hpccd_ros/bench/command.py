@@ -11,8 +11,8 @@ from pathlib import Path
 
 from hpccd_core.options import ACCURACIES
 from hpccd_ros.base.errors import UserError
+from hpccd_ros.bench import measure, sources
 from hpccd_ros.bench import report as output
-from hpccd_ros.bench import sources
 from hpccd_ros.bench.report import Report
 
 MOST_THREADS = 1024  # of a detector
@@ -44,13 +44,8 @@ def configure(
     )
     add("--data", metavar="DIR", help="folder of scene files (default: the variable HPCCD_DATA)")
     add("--size", type=float, default=1.0, metavar="X", help="factor on the triangles of generated scenes (default: 1)")
-    add(
-        "--steps",
-        type=int,
-        default=steps,
-        metavar="N",
-        help="steps measured of each scene, evenly spread; 0: all (default: %(default)s)",
-    )
+    spread = "steps measured of each scene, evenly spread; 0: all (default: %(default)s)"
+    add("--steps", type=int, default=steps, metavar="N", help=spread)
     add("--repeat", type=int, default=repeat, metavar="N", help="timed rounds after a warm-up (default: %(default)s)")
     add("--threads", type=int, default=0, metavar="N", help="0: all cores (default)")
     add("--out", default="hpccd-bench", metavar="DIR", help="folder of the JSON file (default: %(default)s)")
@@ -70,6 +65,14 @@ def listed(option: str, text: str, choices: Sequence[str]) -> list[str]:
     if not words:
         raise UserError(f"{option}: name at least one of {', '.join(choices)}")
     return words
+
+
+def usable(name: str, text: str, choices: Sequence[str], **others) -> tuple[list[str], dict[str, str]]:
+    """The values of --NAME that work here, and why the others do not; UserError where none does."""
+    found, refused = measure.usable(name, listed(f"--{name}", text, choices), **others)
+    if not found:
+        raise UserError(f"--{name} {text}: none of these works here; see `hpccd info`")
+    return found, refused
 
 
 def begin(args, resolve: Callable = sources.resolve) -> tuple[Report, list[sources.Source]]:

@@ -12,12 +12,12 @@ An average step is the load of a simulation; plan an interactive one for the 95t
 
 from __future__ import annotations
 
-from hpccd_ros.base.errors import UserError
 from hpccd_ros.bench import command, measure
 from hpccd_ros.bench.report import Report, cores, show
 from hpccd_ros.bench.sources import TABLE_1
 
-COLUMNS = ("scene", "variant", "triangles", "contacts", "average_ms", "median_ms", "p95_ms", "first_ms")
+COLUMNS = {key.removesuffix("_ms"): key for key in ("scene", "variant", "triangles", "contacts")}
+COLUMNS |= {key.removesuffix("_ms"): key for key in ("average_ms", "median_ms", "p95_ms", "first_ms")}
 
 
 def configure(parser):
@@ -30,42 +30,28 @@ def configure(parser):
 
 def run(args) -> Report:
     modes = command.listed("--report", args.report, ("all", "first", "any"))
-    names = command.listed("--backend", args.backend, measure.BACKENDS)
-    backends, refused = measure.usable("backend", names, accuracy=args.accuracy)
-    if not backends:
-        raise UserError(f"--backend {args.backend}: none of these works here; see `hpccd info`")
+    backends, refused = command.usable("backend", args.backend, measure.BACKENDS, accuracy=args.accuracy)
     report, found = command.begin(args)
     report.note(measure.NOTE)
     command.skipped(report, "backend", refused)
+    options, threads = {"accuracy": args.accuracy, "threads": args.threads}, args.threads or cores()
+    asked = {f"{backend} {mode}": {"backend": backend, "report": mode} for backend in backends for mode in modes}
     for source in found:
-        options = {"accuracy": args.accuracy, "threads": args.threads}
-        runners = [
-            measure.Runner(f"{backend} {mode}", {**options, "backend": backend, "report": mode})
-            for backend in backends
-            for mode in modes
-        ]
+        runners = [measure.Runner(name, options | of) for name, of in asked.items()]
         series = measure.measure(source, runners, args.repeat, args.steps)
         for mode in modes:
-            of_mode = {f"{b} {mode}": series[f"{b} {mode}"] for b in backends}
+            of_mode = {name: one for name, one in series.items() if asked[name]["report"] == mode}
             # "any" may find another contact on another backend, but not on the same one.
             for group in [{name: one} for name, one in of_mode.items()] if mode == "any" else [of_mode]:
                 for text in measure.disagreements(group):
                     report.failure(f"{source.name}: report={mode}: contacts differ between calls or backends: {text}")
         triangles = source.first().triangles
         for name, one in series.items():
-            backend, mode = name.split()
-            asked = {"backend": backend, "report": mode, "accuracy": args.accuracy, "threads": args.threads or cores()}
-            report.add(scene=source.name, variant=name, **asked, triangles=triangles, **one.row())
-    show(
-        f"ms a step, {args.accuracy}, {args.threads or cores()} threads",
-        [head.removesuffix("_ms") for head in COLUMNS],
-        [[row[key] for key in COLUMNS] for row in report.rows],
-        "contacts: of an average step; first: the first call of a new detector",
-    )
-    stages = list(dict.fromkeys(stage for row in report.rows for stage in row["stages_ms"] if stage != "total"))
-    show(
-        "where the time goes, ms of an average step",
-        ["scene", "variant", *stages],
-        [[r["scene"], r["variant"], *(r["stages_ms"].get(s) for s in stages)] for r in report.rows],
-    )
+            of = {**asked[name], **options, "threads": threads, "triangles": triangles}
+            report.add(scene=source.name, variant=name, **of, **one.row())
+    caption = "contacts: of an average step; first: the first call of a new detector"
+    show(f"ms a step, {args.accuracy}, {threads} threads", COLUMNS, report.rows, caption)
+    stages = dict.fromkeys(stage for row in report.rows for stage in row["stages_ms"] if stage != "total")
+    columns = {stage: lambda row, stage=stage: row["stages_ms"].get(stage) for stage in stages}
+    show("where the time goes, ms of an average step", {"scene": "scene", "variant": "variant", **columns}, report.rows)
     return report

@@ -16,9 +16,17 @@ import importlib
 import numpy as np
 
 import hpccd_core as hc
+from hpccd_core.options import ACCURACIES
 from hpccd_ros.base.errors import UserError
 from hpccd_ros.bench import command, measure
 from hpccd_ros.bench.report import Report, cores, show
+
+COLUMNS = {key: key for key in ("scene", "accuracy", "way", "triangles", "contacts")}
+COLUMNS |= {key: f"{key}_ms" for key in ("median", "p95", "best", "first")}
+LIBRARIES = {
+    "torch": lambda torch, xyz: torch.from_numpy(np.ascontiguousarray(xyz)).cuda(),
+    "cupy": lambda cupy, xyz: cupy.asarray(xyz),
+}
 
 
 def configure(parser):
@@ -27,41 +35,34 @@ def configure(parser):
 
 
 def to_device():
-    """A function that copies an array to the device; None where neither PyTorch nor CuPy is installed."""
-    for name, copy in (
-        ("torch", lambda torch, xyz: torch.from_numpy(np.ascontiguousarray(xyz)).cuda()),
-        ("cupy", lambda cupy, xyz: cupy.asarray(xyz)),
-    ):
+    """A function that copies a step to the device; None where neither PyTorch nor CuPy is installed."""
+    for name, copy in LIBRARIES.items():
         try:
             library = importlib.import_module(name)
         except ImportError:
             continue
-        return lambda xyz, library=library, copy=copy: copy(library, xyz)
+        ends = ("vertices_t0", "vertices_t1")
+        return lambda step: dataclasses.replace(step, **{end: copy(library, getattr(step, end)) for end in ends})
     return None
 
 
 def run(args) -> Report:
-    tiers = command.listed("--tiers", args.tiers, ("fast", "balanced", "conservative", "exact"))
+    tiers = command.listed("--tiers", args.tiers, ACCURACIES)
     if "gpu" not in hc.backends():
         raise UserError(f"no usable GPU: {hc.gpu_status()['reason']}")
     report, found = command.begin(args)
     report.note(measure.NOTE)
-    move = to_device()
-    if move is None:
+    moved = to_device()
+    if moved is None:
         report.note("positions on the device are not measured: neither torch nor cupy is installed")
-    else:
-
-        def moved(step):
-            return dataclasses.replace(step, vertices_t0=move(step.vertices_t0), vertices_t1=move(step.vertices_t1))
-
     for source in found:
         for tier in tiers:
             options = {"accuracy": tier, "threads": args.threads}
-            ways = {name: measure.Runner(name, {**options, "backend": name}) for name in ("cpu", "hybrid", "gpu")}
-            if move is not None:
+            runners = [measure.Runner(name, {**options, "backend": name}) for name in measure.BACKENDS]
+            if moved is not None:
                 on_device = {**options, "backend": "gpu", "results": "device"}
-                ways["device"] = measure.Runner("device", on_device, change=moved)
-            series = measure.measure(source, list(ways.values()), args.repeat, args.steps)
+                runners.append(measure.Runner("device", on_device, change=moved))
+            series = measure.measure(source, runners, args.repeat, args.steps)
             if tier != "fast":
                 for text in measure.disagreements(series):
                     report.failure(f"{source.name}, {tier}: contacts differ between backends: {text}")
@@ -72,11 +73,6 @@ def run(args) -> Report:
                 threads = args.threads or cores()
                 asked = {"way": name, "accuracy": tier, "threads": threads, "triangles": triangles}
                 report.add(scene=source.name, **asked, **one.row())
-    columns = ("scene", "accuracy", "way", "triangles", "contacts", "median_ms", "p95_ms", "best_ms", "first_ms")
-    show(
-        "ms a step, transfers included",
-        [head.removesuffix("_ms") for head in columns],
-        [[row[key] for key in columns] for row in report.rows],
-        "device: positions and contacts stay on the GPU; the others: arrays of the host in and out",
-    )
+    caption = "device: positions and contacts stay on the GPU; the others: arrays of the host in and out"
+    show("ms a step, transfers included", COLUMNS, report.rows, caption)
     return report

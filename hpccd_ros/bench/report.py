@@ -10,7 +10,7 @@ import platform
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +19,9 @@ from rich.table import Table
 
 import hpccd_core as hc
 from hpccd_ros.base.version import package_version
+
+# Head of a column -> key of a row, or a function of the row.
+Columns = dict[str, str | Callable[[dict], object]]
 
 
 class Report:
@@ -87,8 +90,13 @@ def _plain(value):
     return value
 
 
-def show(title: str, columns: Sequence[str], rows: Sequence[Sequence], caption: str = "") -> None:
+def cells(columns: Columns, rows: Iterable[dict]) -> list[list]:
+    return [[of(row) if callable(of) else row.get(of) for of in columns.values()] for row in rows]
+
+
+def show(title: str, columns: Columns | Sequence[str], rows: Iterable, caption: str = "") -> None:
     """Print a table; text to the left, numbers to the right; None as a dash."""
+    rows = cells(columns, rows) if isinstance(columns, dict) else rows
     table = Table(title=title, caption=caption or None, title_justify="left", caption_justify="left")
     for place, name in enumerate(columns):
         numbers = all(not isinstance(row[place], str) for row in rows)

@@ -36,7 +36,7 @@ def of_scene(found, truth: dict[str, np.ndarray], value: str = "toc", size: floa
         invented += len(there) - len(common)
         if f"{kind}_{value}" in truth:
             off.append((getattr(found, f"{kind}_{value}")[i] - truth[f"{kind}_{value}"][j]) / size)
-    return _errors(sum(len(truth[kind]) for kind in kinds), missed, invented, np.concatenate(off))
+    return errors(sum(len(truth[kind]) for kind in kinds), missed, invented, np.concatenate(off))
 
 
 def of_one(found, truth: dict[str, np.ndarray], earliest: bool) -> Errors:
@@ -48,22 +48,10 @@ def of_one(found, truth: dict[str, np.ndarray], earliest: bool) -> Errors:
     if not earliest:
         return dataclasses.replace(of_named, true=there, missed=missed)
     late = np.array([found.first_toc - true.min()] if there and not missed else [])
-    return _errors(there, missed, of_named.invented, late)
+    return errors(there, missed, of_named.invented, late)
 
 
-def of_queries(hit, toc, true_hit, true_toc, sizes=1.0) -> Errors:
-    """All (Q,): answers to queries and what is true. toc: of proximity the distances, with the sizes of the queries."""
-    both = hit & true_hit
-    sizes = np.broadcast_to(sizes, hit.shape)
-    return _errors(
-        int(true_hit.sum()),
-        int((true_hit & ~hit).sum()),
-        int((hit & ~true_hit).sum()),
-        (toc[both] - true_toc[both]) / sizes[both],
-    )
-
-
-def _errors(true, missed, invented, late):
+def errors(true, missed, invented, late):
     off = np.abs(late)
     worst, p99 = (float(off.max()), float(np.percentile(off, 99))) if len(off) else (0.0, 0.0)
     latest, earliest = float(late.max(initial=0.0)), float((-late).max(initial=0.0))
@@ -71,6 +59,5 @@ def _errors(true, missed, invented, late):
 
 
 def _keys(pairs):
-    """Each row as one value that can be compared."""
     rows = np.ascontiguousarray(pairs, np.uint32)
     return rows.view([("", np.uint32)] * rows.shape[1]).ravel()

@@ -73,7 +73,9 @@ def ask(batches: list[Batch], tiers: list[str], known: list[questions.Answers] |
         parts = [
             np.concatenate(part) for part in zip(*((*a, *t) for a, t in zip(answers, true, strict=True)), strict=True)
         ]
-        errors = truth.of_queries(*parts, sizes)
+        hit, toc, true_hit, true_toc = parts
+        both, wrong = hit & true_hit, ((true_hit, true_hit & ~hit, hit & ~true_hit))
+        errors = truth.errors(*(int(of.sum()) for of in wrong), (toc[both] - true_toc[both]) / sizes[both])
         total = len(sizes)
         yield {
             "accuracy": tier,

@@ -10,15 +10,13 @@ from collections.abc import Callable, Iterable, Sequence
 import numpy as np
 
 from hpccd_ros.base.errors import UserError
-from hpccd_ros.bench import command, measure, report, sources
+from hpccd_ros.bench import command, measure, sources
 from hpccd_ros.bench.command import listed, skipped, tier_option
 from hpccd_ros.bench.measure import BACKENDS, bar, times, usable
-from hpccd_ros.bench.report import Report, cores
+from hpccd_ros.bench.report import Columns, Report, cells, cores, show
 
 __all__ = ["BACKENDS", "Report", "UserError", "bar", "begin", "cores", "listed", "skipped", "tier_option", "times"]
-__all__ += ["usable"]
-# Head of a column -> key of a row, or a function of the row.
-Columns = dict[str, str | Callable[[dict], object]]
+__all__ += ["usable", "Columns", "cells", "show"]
 
 
 def configure(
@@ -112,15 +110,6 @@ def compare(
         row |= {"over_base": row["step_ms"] / first["step_ms"], "least_over_base": row["least_ms"] / first["least_ms"]}
         rows.append(result.add(**row))
     return rows
-
-
-def show(title: str, columns: Columns, rows: Iterable[dict], caption: str = "") -> None:
-    """Print the rows as a table."""
-    report.show(title, list(columns), cells(columns, rows), caption)
-
-
-def cells(columns: Columns, rows: Iterable[dict]) -> list[list]:
-    return [[of(row) if callable(of) else row.get(of) for of in columns.values()] for row in rows]
 
 
 def whole(key: str) -> Callable[[dict], int | None]:

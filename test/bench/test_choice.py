@@ -8,9 +8,8 @@ import pytest
 from sources import ROOT
 
 from hpccd_ros.base.errors import UserError
-from hpccd_ros.bench import choice, settings
-from hpccd_ros.bench.choice import Outcome
-from hpccd_ros.bench.settings import ASKED, Setting
+from hpccd_ros.bench import choice
+from hpccd_ros.bench.choice import ASKED, Asked, Outcome, Setting
 
 STRIP = ("folding-strip", "--size", "0.1", "--steps", "2", "--repeat", "1")
 NONE = dict.fromkeys(choice.QUANTITIES, 0.0)
@@ -111,7 +110,7 @@ def test_wrong_answers_count_against_what_is_asked():
     assert errors(any_, late, true) == (1, 0, 0, 0.125)
     none = found(vf=np.empty((0, 2), np.uint32), vf_toc=np.empty(0), first_toc=np.inf, **empty)
     assert errors(first, none, true) == errors(any_, none, true) == (1, 1, 0, 0.0)
-    one_kind = settings.Asked("ee", kinds=("ee",))
+    one_kind = Asked("ee", kinds=("ee",))
     assert errors(one_kind, none, true) == (0, 0, 0, 0.0)
     assert errors(faces, late, true) == (2, 1, 0, 0.125)
 
@@ -136,8 +135,8 @@ def test_a_setting_is_written_for_python_and_for_the_node():
 
 
 def test_an_option_of_several_words_is_written_as_a_list(monkeypatch):
-    some = settings.Asked("some", {"outputs": ("points", "normals")})
-    monkeypatch.setattr(settings, "ASKED", (*ASKED, some))
+    some = Asked("some", {"outputs": ("points", "normals")})
+    monkeypatch.setattr(choice, "ASKED", (*ASKED, some))
     python, node = Setting("exact", "cpu", "some").as_written().split("; ")
     assert python.endswith("backend=\"cpu\", outputs=('points', 'normals'))")
     assert node.endswith(' -p outputs:="[points, normals]"')
