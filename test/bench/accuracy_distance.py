@@ -21,14 +21,8 @@ from hpccd_ros.bench.sources import Source, Step, of_npz
 
 QUESTIONS = (SEPARATION, PROXIMITY, INTERSECTIONS)
 # Keys of a file of truth: which queries it answers, and the name of their value.
-KEYS = {
-    "s": ("separation", "toc"),
-    "s2": ("separation", "toc"),
-    "s3": ("separation", "toc"),
-    "p": ("proximity", "distance"),
-    "p2": ("proximity", "distance"),
-    "x": ("intersections", ""),
-}
+KEYS = dict.fromkeys(("s", "s2", "s3"), ("separation", "toc"))
+KEYS |= dict.fromkeys(("p", "p2"), ("proximity", "distance")) | {"x": ("intersections", "")}
 SINGLE = "queries.npz"
 
 
@@ -52,11 +46,8 @@ def on_scene(source: Source, known: dict, variants: dict[str, dict], rounds: int
     options, timed in turn."""
     step = source.step(0)
     for key, (query, value) in KEYS.items():
-        true = {
-            kind: known[f"{key}_{kind}"]
-            for kind in ("vf", "ee", "ef", f"vf_{value}", f"ee_{value}")
-            if f"{key}_{kind}" in known
-        }
+        kinds = ("vf", "ee", "ef", f"vf_{value}", f"ee_{value}")
+        true = {kind: known[f"{key}_{kind}"] for kind in kinds if f"{key}_{kind}" in known}
         if not true:
             continue
         question = Question(query, float(known[f"{key}_d"]) if f"{key}_d" in known else None)
@@ -66,16 +57,9 @@ def on_scene(source: Source, known: dict, variants: dict[str, dict], rounds: int
             found = question.ask(variant.detector(step), step)
             errors = truth.of_scene(found, true, value, _size(step) if query == "proximity" else 1.0)
             yield {
-                "scene": source.name,
-                "query": query,
-                "distance": question.distance,
-                "variant": name,
-                "triangles": step.triangles,
-                "true": errors.true,
-                "missed": errors.missed,
-                "invented": errors.invented,
-                "value_worst": errors.toc_worst,
-                "latest": errors.latest,
+                **{"scene": source.name, "query": query, "distance": question.distance, "variant": name},
+                **{"triangles": step.triangles, "true": errors.true, "missed": errors.missed},
+                **{"invented": errors.invented, "value_worst": errors.toc_worst, "latest": errors.latest},
                 **series[name].times(),
             }
 
@@ -114,35 +98,17 @@ def _size(step: Step) -> float:
 
 def show(of_scenes: list[dict], of_queries: list[dict], tiers: list[str]) -> None:
     if of_scenes:
-        tables.show(
-            "distance queries on whole scenes",
-            ["scene", "query", "d", "backend", "simd", "accuracy", "ms", "true", "missed", "invented", "worst"],
-            [
-                [
-                    r["scene"],
-                    r["query"],
-                    "" if r["distance"] is None else f"{r['distance']:g}",
-                    r["backend"],
-                    r["simd"],
-                    r["accuracy"],
-                    r["step_ms"],
-                    r["true"],
-                    r["missed"],
-                    r["invented"],
-                    r["value_worst"],
-                ]
-                for r in of_scenes
-            ],
-            "worst: error of toc (the step is 1) or of the distance (the largest coordinate is 1)",
-        )
-    lines = {}
+        columns = {"scene": "scene", "query": "query"}
+        columns["d"] = lambda row: "" if row["distance"] is None else f"{row['distance']:g}"
+        columns |= {key: key for key in ("backend", "simd", "accuracy")} | {"ms": "step_ms"}
+        columns |= {key: key for key in ("true", "missed", "invented")} | {"worst": "value_worst"}
+        worst = "worst: error of toc (the step is 1) or of the distance (the largest coordinate is 1)"
+        tables.show("distance queries on whole scenes", columns, of_scenes, worst)
+    lines: dict = {}
     for row in of_queries:
-        heads = [row[key] for key in ("query", "generator", "n", "true")]
-        line = lines.setdefault((row["query"], row["generator"]), heads)
-        line.append(f"{row['missed']} + {row['invented']}")
+        line = lines.setdefault((row["query"], row["generator"]), dict(row))
+        line[row["accuracy"]] = f"{row['missed']} + {row['invented']}"
     if lines:
-        tables.show(
-            "hard distance queries: missed + invented of all (rational arithmetic is the truth)",
-            ["query", "generator", "queries", "true", *tiers],
-            list(lines.values()),
-        )
+        columns = {"query": "query", "generator": "generator", "queries": "n", "true": "true"}
+        title = "hard distance queries: missed + invented of all (rational arithmetic is the truth)"
+        tables.show(title, columns | {tier: tier for tier in tiers}, lines.values())

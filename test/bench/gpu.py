@@ -148,64 +148,62 @@ def _check(result, what: str, detector, same: bool) -> None:
 
 
 def _frame(result, args, part, name, step, accuracy):
-    options, scene, took, expected = {"accuracy": accuracy, "threads": args.threads}, step.scene(), {}, None
+    of, took = _Step(result, args, part, name, step, accuracy), {}
     for backend in ("cpu", "hybrid", "gpu"):
-        detector = hc.Detector(scene, backend=backend, **options)
-        took[backend], found = detector_times(detector, step, args.repeat)
-        expected = expected or found.hash
-        _check(result, f"{name}, {accuracy}, {backend}", detector, found.hash == expected)
-    staged = StagesDetector(scene, backend="gpu", **options)
-    result.add(
-        part=part,
-        scene=name,
-        accuracy=accuracy,
-        triangles=step.triangles,
-        contacts=len(found),
-        cpu_median_ms=took["cpu"]["median_ms"],
-        hybrid_median_ms=took["hybrid"]["median_ms"],
-        **took["gpu"],
-        stages_ms=detector.profile | _stages(staged, lambda: staged.detect(step.vertices_t0, step.vertices_t1)),
-    )
+        took[backend] = of.timed(backend, step, backend)
+    staged = StagesDetector(of.scene, backend="gpu", **of.options)
+    stages = _stages(staged, lambda: staged.detect(step.vertices_t0, step.vertices_t1))
+    of.add(hybrid_median_ms=took["hybrid"]["median_ms"], **took["gpu"], stages_ms=of.profile | stages)
 
 
 def _on_device(result, args, part, name, step, accuracy):
     """One step from host to host, from the device to the host, on the device, and in a graph."""
-    what = f"{part}, {name}, {accuracy}"
-    options, scene = {"accuracy": accuracy, "threads": args.threads}, step.scene()
-    arrays = library(f"--parts {part}")
+    of, arrays = _Step(result, args, part, name, step, accuracy), library(f"--parts {part}")
     moved = {end: arrays.array(getattr(step, end)) for end in ("vertices_t0", "vertices_t1")}
     there, stream = dataclasses.replace(step, **moved), arrays.stream()
-    on_cpu, expected = detector_times(hc.Detector(scene, backend="cpu", **options), step, args.repeat)
-    ways = {}
-    for way, given in (("host", step), ("to_host", there)):
-        detector = hc.Detector(scene, backend="gpu", **options)
-        ways[way], found = detector_times(detector, given, args.repeat)
-        _check(result, f"{what}, {way}", detector, found.hash == expected.hash)
-    detector = hc.Detector(scene, backend="gpu", results="device", **options)
+    of.timed("cpu", step, "cpu")
+    ways = {way: of.timed("gpu", given, way) for way, given in (("host", step), ("to_host", there))}
+    detector = hc.Detector(of.scene, backend="gpu", results="device", **of.options)
     ends = there.vertices_t0, there.vertices_t1
     on_device, found = call_times(lambda: detector.detect(*ends, stream=stream), args.repeat)
-    _check(result, f"{what}, device", detector, found.hash == expected.hash == found.to_host().hash)
+    _check(result, f"{of.what}, device", detector, found.hash == of.expected == found.to_host().hash)
     held = detector.stats["gpu_bytes"]
     prepared = detector.prepare(*ends)
     in_graph, _ = call_times(arrays.graph(prepared.enqueue, stream), args.repeat)
-    if prepared.contacts().hash != expected.hash:
-        result.failure(f"{what}, graph: results of GPU and CPU differ")
+    if prepared.contacts().hash != of.expected:
+        result.failure(f"{of.what}, graph: results of GPU and CPU differ")
     detector = prepared = found = None  # lists of millions of pairs, which the next one needs too
-    staged = StagesDetector(scene, backend="gpu", results="device", **options)
-    result.add(
-        part=part,
-        scene=name,
-        accuracy=accuracy,
-        triangles=step.triangles,
-        contacts=len(expected),
-        cpu_median_ms=on_cpu["median_ms"],
-        host_median_ms=ways["host"]["median_ms"],
-        to_host_median_ms=ways["to_host"]["median_ms"],
+    staged = StagesDetector(of.scene, backend="gpu", results="device", **of.options)
+    of.add(
+        **{f"{way}_median_ms": took["median_ms"] for way, took in ways.items()},
         **on_device,
         graph_median_ms=in_graph["median_ms"],
         bytes=held,
         stages_ms=_stages(staged, lambda: staged.detect(*ends, stream=stream)),
     )
+
+
+class _Step:
+    """A step of a scene and its row: every way is held against the first one that was timed, on the CPU."""
+
+    def __init__(self, result, args, part, name, step, accuracy):
+        self._result, self._repeat, self.expected = result, args.repeat, None
+        self.what, self.scene = f"{part}, {name}, {accuracy}", step.scene()
+        self.options = {"accuracy": accuracy, "threads": args.threads}
+        self._row = {"part": part, "scene": name, "accuracy": accuracy, "triangles": step.triangles}
+
+    def timed(self, backend: str, step, way: str) -> dict:
+        detector = hc.Detector(self.scene, backend=backend, **self.options)
+        took, found = detector_times(detector, step, self._repeat)
+        if self.expected is None:
+            self.expected = found.hash
+            self._row |= {"contacts": len(found), "cpu_median_ms": took["median_ms"]}
+        _check(self._result, f"{self.what}, {way}", detector, found.hash == self.expected)
+        self.profile = detector.profile
+        return took
+
+    def add(self, **more) -> None:
+        self._result.add(**self._row, **more)
 
 
 def _threads(result, args, name, step):

@@ -22,6 +22,7 @@ RESULTS, PAGE = ROOT / "test" / "bench" / "results", ROOT / "docs" / "performanc
 TRADE = "accuracy-trade-h200-16-cores"  # drawn in docs/figures/trade.png
 TABLE = re.compile(r"(<!-- (?P<name>[a-z-]+) -->\n).*?(<!-- end -->)", re.DOTALL)
 TIERS = ("fast", "balanced", "conservative", "exact")
+STOPS, LEAST = ("median", "p95", "p99", "most"), "least_over_linear"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -67,9 +68,11 @@ def wrong(rows: list[dict]) -> str:
     return " + ".join(f"{sum(row[key] for row in rows):,}" for key in ("missed", "invented"))
 
 
-def _counts(*columns: tuple[str, Callable[[dict], object]]) -> Callable[[list[dict]], list[dict]]:
+def _counts(columns: lab.Columns) -> Callable[[list[dict]], list[dict]]:
     """The columns of the last row as lines."""
-    return lambda rows: [{"what": what, "count": of(rows[-1])} for what, of in columns]
+    return lambda rows: [
+        {"what": what, "count": count} for what, count in zip(columns, lab.cells(columns, rows[-1:])[0], strict=True)
+    ]
 
 
 def _scaling(row: dict) -> str:
@@ -110,26 +113,46 @@ def _robots(rows: list[dict]) -> list[dict]:
     return [sorted(group, key=lambda r: r["whole_median_ms"])[len(group) // 2] for group in groups.values()]
 
 
-STEP = {name: cell(name, shown=over("step_ms", "over_base")) for name in ("first", "step", "trial")}
-DEVICE = {"CPU, ms": "cpu_median_ms", "host to host": "host_median_ms"}
+def _same(*keys: str) -> lab.Columns:
+    return {key: key for key in keys}
+
+
+def _whole(**heads: str) -> lab.Columns:
+    return {head.replace("_", " "): lab.whole(key) for head, key in heads.items()}
+
+
+def _to(digits: int, **heads: str) -> lab.Columns:
+    return {head.replace("_", " "): joined(key, digits=digits) for head, key in heads.items()}
+
+
+def _mib(**heads: str) -> lab.Columns:
+    return {f"{head}, MiB": lambda row, key=key: row[key] / 2**20 for head, key in heads.items()}
+
+
+def _triples(digits: int, **heads: str) -> lab.Columns:
+    """median, p95, p99 of each."""
+    keys = {head: [f"{of}_{p}_ms" for p in ("median", "p95", "p99")] for head, of in heads.items()}
+    return {f"{head.replace('_', ' ')}, ms: median, p95, p99": joined(*of, digits=digits) for head, of in keys.items()}
+
+
+SIZE = _same("scene", "triangles", "contacts")
+OVER_ALL = {"first": "first (/ all)", "step": "`collision_free_step` (/ all)", "trial": "trial steps (/ all)"}
+METHODS = {f"`{name}`": name for name in ("default", "published", "naive", "front")}
 TABLES = {
     "peer": Table(
         ("cpu-4-cores",),
-        {
-            "scene": "scene",
-            "triangles": "triangles",
-            "contacts": lab.whole("contacts"),
-            "hpccd, all contacts, ms": "median_ms",
-            '`report="first"`, ms': cell("cpu first", shown=lambda row: row["median_ms"]),
-            "ipctk, ms": cell("ipctk", shown=lambda row: row["median_ms"]),
-            "times faster": lambda row: f"{row['times_faster_than_ipctk']:.0f}",
-        },
+        SIZE
+        | _whole(contacts="contacts")
+        | {"hpccd, all contacts, ms": "median_ms"}
+        | {'`report="first"`, ms': cell("cpu first", shown=lambda row: row["median_ms"])}
+        | {"ipctk, ms": cell("ipctk", shown=lambda row: row["median_ms"])}
+        | _to(0, times_faster="times_faster_than_ipctk"),
         by("scene", "variant"),
     ),
     "scaling": Table(
         ("scaling-4-cores",),
         {"scene": "scene"}
-        | {f"`{m}`": cell(m, 4, shown=_scaling) for m in ("default", "published", "naive", "front")}
+        | {head: cell(method, 4, shown=_scaling) for head, method in METHODS.items()}
         | {"independent detectors": cell("independent", 4, shown=lambda row: f"{row['speedup']:.2f}")},
         by("scene", "method", "threads"),
     ),
@@ -137,53 +160,29 @@ TABLES = {
         ("methods-4-cores",),
         {"scene": "scene"}
         | {
-            name: cell(variant, shown=lambda row: row["step_ms"])
-            for name, variant in {
-                "`default`": "default",
-                "`published`": "published",
-                "`naive`": "naive",
-                "`front`": "front",
-                "AVX2 only": "avx2",
-                "scalar only": "scalar",
-            }.items()
+            head: cell(variant, shown=lambda row: row["step_ms"])
+            for head, variant in (METHODS | {"AVX2 only": "avx2", "scalar only": "scalar"}).items()
         },
         by("scene", "variant"),
     ),
     "memory": Table(
         ("memory-2-cores",),
-        {
-            "scene": "scene",
-            "triangles": "triangles",
-            "contacts": "contacts",
-            "detector, MiB": lambda row: row["detector_bytes"] / 2**20,
-            "bytes a triangle": lab.whole("detector_bytes_per_triangle"),
-            "process, MiB": lambda row: row["process_bytes"] / 2**20,
-        },
+        SIZE
+        | _mib(detector="detector_bytes")
+        | _whole(bytes_a_triangle="detector_bytes_per_triangle")
+        | _mib(process="process_bytes"),
     ),
     "ropes": Table(
         ("ropes-2-cores",),
-        {
-            "as": "way",
-            "edges": "edges",
-            "triangles": "triangles",
-            "contacts": "contacts",
-            "ms a step": "ms",
-            "detector, MiB": lambda row: row["bytes"] / 2**20,
-        },
+        {"as": "way"} | _same("edges", "triangles", "contacts") | {"ms a step": "ms"} | _mib(detector="bytes"),
     ),
     "worlds-on-cpus": Table(
         ("worlds-2-cores", "worlds-16-cores"),
-        {
-            "scene": "scene",
-            "triangles": "triangles",
-            "threads": "threads",
-            "worlds": "worlds",
-            "one call, ms": "one_call_ms",
-            "of all threads": lambda row: f"{row['of_all_threads']:.2f}",
-            "one detector": "one_detector_ms",
-            "a detector each": "detectors_ms",
-            "bytes a world": lab.whole("bytes_a_world"),
-        },
+        _same("scene", "triangles", "threads", "worlds")
+        | {"one call, ms": "one_call_ms"}
+        | _to(2, of_all_threads="of_all_threads")
+        | {"one detector": "one_detector_ms", "a detector each": "detectors_ms"}
+        | _whole(bytes_a_world="bytes_a_world"),
     ),
     "distances": Table(
         ("distance-2-cores",),
@@ -197,41 +196,27 @@ TABLES = {
     ),
     "steps": Table(
         ("step-2-cores",),
-        {
-            "scene": "scene",
-            "contacts": lab.whole("contacts"),
-            "earliest at": lambda row: f"{row['earliest']:.4g}",
-            "all, ms": "step_ms",
-            "first (/ all)": STEP["first"],
-            "`collision_free_step` (/ all)": STEP["step"],
-            "trial steps (/ all)": STEP["trial"],
-            "step x ipctk": cell("step", shown=lambda row: f"{row['times_faster_than_ipctk']:,.0f}"),
-        },
+        {"scene": "scene", "contacts": lab.whole("contacts")}
+        | {"earliest at": lambda row: f"{row['earliest']:.4g}", "all, ms": "step_ms"}
+        | {head: cell(query, shown=over("step_ms", "over_base")) for query, head in OVER_ALL.items()}
+        | {"step x ipctk": cell("step", shown=lambda row: f"{row['times_faster_than_ipctk']:,.0f}")},
         by("scene", "query"),
     ),
     "rigid-cost": Table(
         ("rigid-cost-2-cores",),
-        {
-            "scene": "scene",
-            "triangles": "triangles",
+        _same("scene", "triangles")
+        | {
             "turn, degrees": lambda row: f"{row['turn']:g}",
             "parts": "parts",
             "bound": lambda row: f"{row['bound']:.1e}",
-            "straight, ms": "least_linear_ms",
-            "moved, ms": "least_moved_ms",
-            "/ straight": lambda row: f"{row['least_over_linear']:.2f}",
-        },
+        }
+        | {"straight, ms": "least_linear_ms", "moved, ms": "least_moved_ms", "/ straight": joined(LEAST, digits=2)},
         only(part="cost", tolerance=0.001),
     ),
     "robot": Table(
         ("robot-2-cores", "robot-4-of-16-cores", "robot-h100-4-of-16-cores"),
-        {
-            "cores": "cores",
-            "core on": "backend",
-            "answers": "answers",
-            "dropped": "dropped",
-            "answers a second": lambda row: f"{row['answers_hz']:.1f}",
-        }
+        {"cores": "cores", "core on": "backend", "answers": "answers", "dropped": "dropped"}
+        | _to(1, answers_a_second="answers_hz")
         | {
             f"{name}, ms: median / p95": joined(f"{part}_median_ms", f"{part}_p95_ms", digits=2, between=" / ")
             for name, part in (("sent to answer", "whole"), ("detection", "detection"), ("core", "core"))
@@ -261,68 +246,59 @@ TABLES = {
     ),
     "device-results": Table(
         ("gpu-device-h100",),
-        {
-            "scene": "scene",
-            "accuracy": lambda row: f"`{row['accuracy']}`",
-            "triangles": "triangles",
-            "contacts": "contacts",
-            **DEVICE,
-            "device to host": "to_host_median_ms",
-            "device to device": "median_ms",
-            "graph": "graph_median_ms",
-            "bytes a triangle": lambda row: row["bytes"] / row["triangles"],
-        },
+        {"scene": "scene", "accuracy": lambda row: f"`{row['accuracy']}`"}
+        | _same("triangles", "contacts")
+        | {"CPU, ms": "cpu_median_ms", "host to host": "host_median_ms", "device to host": "to_host_median_ms"}
+        | {"device to device": "median_ms", "graph": "graph_median_ms"}
+        | {"bytes a triangle": lambda row: row["bytes"] / row["triangles"]},
         lambda rows: [row for row in rows if row["part"] in ("device", "large")],
     ),
     "latency": Table(
         ("ros-4-cores",),
-        {
-            "scene": "scene",
-            "MB in, out": lambda row: f"{row['mb_in']:.2g}, {row['mb_out']:.2g}",
-            "contacts": "contacts",
-            "core, ms": "core_median_ms",
-            "node without its core, ms: median, p95, p99": joined("node_median_ms", "node_p95_ms", "node_p99_ms"),
-            "echo, ms: median, p95, p99": joined("echo_median_ms", "echo_p95_ms", "echo_p99_ms"),
-            "node / echo": lambda row: f"{row['ratio']:.2f}",
-        },
+        {"scene": "scene", "MB in, out": lambda row: f"{row['mb_in']:.2g}, {row['mb_out']:.2g}"}
+        | {"contacts": "contacts", "core, ms": "core_median_ms"}
+        | _triples(1, node_without_its_core="node", echo="echo")
+        | {"node / echo": joined("ratio", digits=2)},
         only(what="latency"),
     ),
     "step-loop": Table(
         ("ros-2-cores",),
-        {"scene": "scene", "triangles": "triangles", "MB sent": lambda row: f"{row['mb_sent']:.2g}"}
-        | {
-            f"{name}, ms: median, p95, p99": joined(*(f"{of}_{p}_ms" for p in ("median", "p95", "p99")), digits=2)
-            for name, of in (("over DDS", "loop"), ("in process", "core"), ("difference", "more"))
-        },
+        _same("scene", "triangles")
+        | {"MB sent": lambda row: f"{row['mb_sent']:.2g}"}
+        | _triples(2, over_DDS="loop", in_process="core", difference="more"),
         only(what="step loop"),
     ),
     "stop": Table(
         ("stop-2-cores",),
-        {"what": "what", "count": "count"},
+        _same("what", "count"),
         lambda rows: _counts(
-            ("random approaches", lambda row: row["trials"]),
-            ("steps, each decided by brute force", lambda row: row["steps"]),
-            ("steps that come closer than stop_distance", lambda row: row["near"]),
-            ("of these without stop", lambda row: row["missed"]),
-            ("rises of stop", lambda row: row["rises"]),
-            ("of these later than a frame", lambda row: row["late"]),
-            ("other steps with stop", lambda row: row["false"]),
-            ("ms from the frame to stop: median, p95, p99, most", joined("median_ms", "p95_ms", "p99_ms", "most_ms")),
+            {
+                "random approaches": "trials",
+                "steps, each decided by brute force": "steps",
+                "steps that come closer than stop_distance": "near",
+                "of these without stop": "missed",
+                "rises of stop": "rises",
+                "of these later than a frame": "late",
+                "other steps with stop": "false",
+                "ms from the frame to stop: median, p95, p99, most": joined(*(f"{p}_ms" for p in STOPS)),
+            }
         )(only(what="approaches")(rows)),
     ),
     "soak": Table(
         ("soak-4-cores",),
-        {"what": "what", "count": "count"},
+        _same("what", "count"),
         _counts(
-            ("vertex messages sent", lambda row: row["sent"]),
-            ("lost by DDS, and counted", lambda row: row["middleware"]),
-            ("answered", lambda row: row["answered"]),
-            ("dropped, and counted", lambda row: row["dropped"]),
-            ("changes of topology", lambda row: row["topologies"]),
-            ("answers computed again, all equal", lambda row: row["checked"]),
-            ("requests to `~/detect`, all answered", lambda row: row["requests"]),
-            ("wrong vertex messages sent", lambda row: sum(row["wrong_sent"].values())),
-            ("ends of a publisher, SIGTERM and SIGKILL", joined("publisher_ended", "publisher_killed", digits=0)),
+            {
+                "vertex messages sent": "sent",
+                "lost by DDS, and counted": "middleware",
+                "answered": "answered",
+                "dropped, and counted": "dropped",
+                "changes of topology": "topologies",
+                "answers computed again, all equal": "checked",
+                "requests to `~/detect`, all answered": "requests",
+                "wrong vertex messages sent": lambda row: sum(row["wrong_sent"].values()),
+                "ends of a publisher, SIGTERM and SIGKILL": joined("publisher_ended", "publisher_killed", digits=0),
+            }
         ),
     ),
 }

@@ -27,36 +27,48 @@ from oracle.rigid_queries import KINDS, MOTIONS, random_queries
 
 from bench import lab, rigid_cost
 from hpccd_ros.base.errors import UserError
-from hpccd_ros.bench import report as tables
 
 PARTS = ("truth", "bounds", "cost")
 _BATCH = 1000  # queries at a time: bounds memory
 _COUNTS = ("queries", "touching", "apart", "reported", "missed", "late", "beyond", "open", "excess")
 
 
+_COST = {"scene": "scene", "turn, deg": "turn", "tolerance": lambda row: f"{row['tolerance']:g}", "parts": "parts"}
+_COST |= {"bound": "bound", "straight": "linear_ms", "moved": "moved_ms", "/": "over_linear"}
+_COST |= {"least: straight": "least_linear_ms", "least: moved": "least_moved_ms", "least: /": "least_over_linear"}
+_COST |= {"outside": "least_outside_ms", "contacts": "linear_contacts", "moved contacts": "contacts"}
+TABLES = {
+    "truth": (
+        "random motions against the truth",
+        {key: key for key in ("motion", "kind", *_COUNTS) if key not in ("apart", "excess")}
+        | {"in excess": "excess", "worst": "worst_excess"},
+        "touching: proven to come within the distance, which at 0 cannot be proven; worst: excess over the bound, "
+        "of at most 2",
+    ),
+    "bounds": (
+        "true deviation over the bound",
+        {"motion": "motion", "turn, rad": "turn", "median": "median", "5 %": "low", "largest": "largest"},
+        "",
+    ),
+    "cost": (
+        "a step moved by poses beside the same on straight lines",
+        _COST,
+        "ms: medians of the rounds, in turn, then the least; outside: of the core; bound: of the pair that has the "
+        "greatest",
+    ),
+}
+
+
 def configure(parser):
-    what = parser.add_argument_group("what is measured")
-    what.add_argument("--parts", default=",".join(PARTS), metavar="NAME,...", help="default: %(default)s")
-    what.add_argument(
-        "--queries",
-        type=int,
-        default=100_000,
-        metavar="N",
-        help="of truth, for screws and for joints each (default: %(default)s)",
-    )
-    what.add_argument("--seed", type=int, default=1, metavar="N", help="of truth and bounds (default: %(default)s)")
-    what.add_argument(
-        "--turns",
-        default="1,5,20",
-        metavar="DEG,...",
-        help="of cost: degrees of the body or of each joint (default: %(default)s)",
-    )
-    what.add_argument(
-        "--tolerances",
-        default="1e-2,1e-3,1e-4",
-        metavar="D,...",
-        help="of cost; the radius of the ball is 0.5 (default: %(default)s)",
-    )
+    add = parser.add_argument_group("what is measured").add_argument
+    queries = "of truth, for screws and for joints each (default: %(default)s)"
+    turns = "of cost: degrees of the body or of each joint (default: %(default)s)"
+    tolerances = "of cost; the radius of the ball is 0.5 (default: %(default)s)"
+    add("--parts", default=",".join(PARTS), metavar="NAME,...", help="default: %(default)s")
+    add("--queries", type=int, default=100_000, metavar="N", help=queries)
+    add("--seed", type=int, default=1, metavar="N", help="of truth and bounds (default: %(default)s)")
+    add("--turns", default="1,5,20", metavar="DEG,...", help=turns)
+    add("--tolerances", default="1e-2,1e-3,1e-4", metavar="D,...", help=tolerances)
     lab.tier_option(parser, "exact")
     lab.configure(parser, rounds=15, leave_out=("data",))
 
@@ -111,59 +123,6 @@ def _truth(report, args):
 
 def _print(report):
     of = {part: [row for row in report.rows if row["part"] == part] for part in PARTS}
-    if of["truth"]:
-        shown = ("motion", "kind", *(name for name in _COUNTS if name != "apart"), "worst_excess")
-        tables.show(
-            "random motions against the truth",
-            [{"excess": "in excess", "worst_excess": "worst"}.get(name, name) for name in shown],
-            [[row[name] for name in shown] for row in of["truth"]],
-            "touching: proven to come within the distance, which at 0 cannot be proven; worst: excess over the bound, "
-            "of at most 2",
-        )
-    if of["bounds"]:
-        tables.show(
-            "true deviation over the bound",
-            ["motion", "turn, rad", "median", "5 %", "largest"],
-            [[row["motion"], row["turn"], row["median"], row["low"], row["largest"]] for row in of["bounds"]],
-        )
-    if of["cost"]:
-        tables.show(
-            "a step moved by poses beside the same on straight lines",
-            [
-                "scene",
-                "turn, deg",
-                "tolerance",
-                "parts",
-                "bound",
-                "straight",
-                "moved",
-                "/",
-                "least: straight",
-                "moved",
-                "/",
-                "outside",
-                "contacts",
-                "moved",
-            ],
-            [
-                [
-                    row["scene"],
-                    row["turn"],
-                    f"{row['tolerance']:g}",
-                    row["parts"],
-                    row["bound"],
-                    row["linear_ms"],
-                    row["moved_ms"],
-                    row["over_linear"],
-                    row["least_linear_ms"],
-                    row["least_moved_ms"],
-                    row["least_over_linear"],
-                    row["least_outside_ms"],
-                    row["linear_contacts"],
-                    row["contacts"],
-                ]
-                for row in of["cost"]
-            ],
-            "ms: medians of the rounds, in turn, then the least; outside: of the core; bound: of the pair that has the "
-            "greatest",
-        )
+    for part, (title, columns, caption) in TABLES.items():
+        if of[part]:
+            lab.show(title, columns, of[part], caption)
