@@ -15,6 +15,10 @@ SCENES = pytest.mark.parametrize("generate", random_scenes.ALL)
 KINDS = ("vertex-face", "edge-edge", "edge-face")
 
 
+def told(gaps):
+    return [(g.mesh_a, g.mesh_b, g.distance, g.kind, tuple(g.features), np.asarray(g.points).tolist()) for g in gaps]
+
+
 def truth_of(meshes, vertices, **rules):
     gaps = oracle.smallest_distances(vertices, meshes.faces, **meshes.beside_faces, **rules)
     return {(gap.mesh_a, gap.mesh_b): gap for gap in gaps}
@@ -82,8 +86,8 @@ def test_scenes(generate, accuracy):
             detector = hc.Detector(meshes.scene(), accuracy=accuracy, threads=threads, simd=simd, backend="cpu")
             for _ in range(2):
                 gaps = detector.distances(vertices)
-                answers.append([(g.mesh_a, g.mesh_b, g.distance, g.kind, tuple(g.features)) for g in gaps])
-            assert_gaps(gaps, meshes, vertices, {}, size_of(vertices))
+                answers.append(told(gaps))
+        assert_gaps(gaps, meshes, vertices, {}, size_of(vertices))
         assert all(answer == answers[0] for answer in answers)
 
 

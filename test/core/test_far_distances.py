@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import random_scenes
 from scene_pairs import size_of
-from test_distances import assert_gaps
+from test_distances import assert_gaps, told
 
 import hpccd_core as hc
 from hpccd_core import _core
@@ -157,10 +157,6 @@ SCENES = (
 def scene_of(generate):
     rng = np.random.default_rng(7)
     return random_scenes.combine(*[(m[0], m[1], m[1], *m[2:]) for m in generate(rng)])
-
-
-def told(gaps):
-    return [(g.mesh_a, g.mesh_b, g.distance, g.kind, tuple(g.features), np.asarray(g.points).tolist()) for g in gaps]
 
 
 @pytest.mark.parametrize("generate", SCENES)

@@ -30,6 +30,10 @@ def true_step(faces, start, end, separation=0.0):
 def assert_steps(faces, start, end, separation=0.0):
     """As both tiers promise; also from where the step ends, and a step that ends just before or behind the contact."""
     true = true_step(faces, start, end, separation)
+    stops = []
+    if 0 < true < FREE:
+        stops = [start + part * (end - start) for part in (true - 1e-6, min(1.0, true + 1e-6))]
+    shorter_steps = [(stop, true_step(faces, start, stop, separation)) for stop in stops]
     scene = scene_of(faces, len(start))
     for accuracy in ("exact", "conservative"):
         options = {"accuracy": accuracy, "minimum_separation": separation, "backend": "cpu", "threads": 2}
@@ -38,11 +42,8 @@ def assert_steps(faces, start, end, separation=0.0):
         assert true - 1e-9 <= step <= true, accuracy
         assert first.collision_free_step(start, end) == step
         assert is_first(first.detect(start, end), every.detect(start, end))
-        if 0 < true < FREE:
-            before, behind = (start + part * (end - start) for part in (true - 1e-6, min(1.0, true + 1e-6)))
-            for stop in (before, behind):
-                shorter = true_step(faces, start, stop, separation)
-                assert shorter - 1e-9 <= every.collision_free_step(start, stop) <= shorter
+        for stop, shorter in shorter_steps:
+            assert shorter - 1e-9 <= every.collision_free_step(start, stop) <= shorter
     return true
 
 

@@ -48,8 +48,8 @@ import numpy as np
 import hpccd_core as hc
 
 scene = hc.Scene()
-scene.add_mesh("soup", np.arange(9000).reshape(-1, 3))
-start, end = np.random.default_rng(1).standard_normal((2, 9000, 3))
+scene.add_mesh("soup", np.arange(4500).reshape(-1, 3))
+start, end = np.random.default_rng(1).standard_normal((2, 4500, 3))
 detectors = [hc.Detector(scene, backend="cpu", threads=threads) for threads in (1, 2)]
 going = True
 begun = [threading.Event() for _ in detectors]

@@ -7,7 +7,7 @@ import pytest
 import hpccd_core as hc
 
 METHODS = ("published", "naive", "front")
-THREADS = (1, 2, 3, 4, 8, 16)
+THREADS = (1, 2, 5, 16)
 
 
 def sheet(side):

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Minimum separation: what comes within it is reported in time, what stays beyond it is not."""
 
+import functools
+
 import numpy as np
 import pytest
 import random_scenes
@@ -14,8 +16,14 @@ KINDS = pytest.mark.parametrize("kind", [VERTEX_FACE, EDGE_EDGE])
 TIMES = np.linspace(0, 1, 801)
 
 
-def _longest_motion(queries):
-    return np.linalg.norm(queries[:, 4:] - queries[:, :4], axis=2).max(axis=1)
+@functools.cache
+def _sampled(kind, generator):
+    """Queries, their distances at TIMES, and how far the fastest vertex of each moves."""
+    queries = GENERATORS[kind][generator](np.random.default_rng(1), 250)
+    if generator == "generic":  # a multiple of 2^-20 stays exact when shifted
+        queries = np.round(queries * 2**20) / 2**20
+    distance = distance_at(kind, queries, TIMES[:, None] + np.zeros(len(queries)))
+    return queries, distance, np.linalg.norm(queries[:, 4:] - queries[:, :4], axis=2).max(axis=1)
 
 
 @KINDS
@@ -26,19 +34,16 @@ def _longest_motion(queries):
     "accuracy", ["fast", pytest.param("balanced", marks=pytest.mark.long), "conservative", "exact"]
 )
 def test_guarantee(kind, generator, separation, scale, offset, accuracy):
-    queries = GENERATORS[kind][generator](np.random.default_rng(1), 250)
-    if generator == "generic":  # a multiple of 2^-20 stays exact when shifted
-        queries = np.round(queries * 2**20) / 2**20
+    queries, distance, longest_motion = _sampled(kind, generator)
     given = scale * (queries + offset)
     hit, toc = CORE[kind](given, accuracy, minimum_separation=scale * separation)
 
-    distance = distance_at(kind, queries, TIMES[:, None] + np.zeros(len(queries)))
     within = distance <= separation * (1 - 1e-6)
     first = np.where(within.any(axis=0), TIMES[within.argmax(axis=0)], np.inf)
     assert hit[within.any(axis=0)].all(), "missed"
     assert (np.where(hit, toc, np.inf) <= first).all(), "late"
     # Between two samples neither feature moves further than its fastest vertex.
-    between = 2 * _longest_motion(queries) * (TIMES[1] - TIMES[0])
+    between = 2 * longest_motion * (TIMES[1] - TIMES[0])
     beyond = distance.min(axis=0) - between > separation
     assert within.any() and beyond.any()
     assert not (hit & beyond).any(), "invented"

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Detection with a minimum separation against the exact oracle: single pairs, and scenes."""
 
+import itertools
+
 import numpy as np
 import oracle
 import pytest
@@ -84,15 +86,14 @@ def test_missing_by_a_hair_is_no_contact(kind, name):
 
 
 @KINDS
-@pytest.mark.parametrize("simd", ["scalar", "auto"])
-def test_small_numbers(kind, simd):
+def test_small_numbers(kind):
     """Degenerate features of all sorts at a few distances, many queries in a call."""
     for name in GENERATORS[kind]:
         every, _ = NEAR_GENERATORS[kind][f"{name}, small numbers"](np.random.default_rng(2), 100)
         for d, n in ((2.0**-1074, 4), (1e-30, 20), (0.5, 100), (1.0, 100), (3.0, 100), (1e100, 50)):
             queries = every[:n]
             truth = ORACLE[kind](queries, d)
-            for accuracy in ("exact", "conservative"):
+            for accuracy, simd in itertools.product(("exact", "conservative"), ("scalar", "auto")):
                 found = TEST[kind](queries, accuracy, simd=simd, minimum_separation=d)
                 assert_kept(accuracy, found, truth)
 

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the scene rules out stays out where the whole hierarchy is one block of triangles, or hardly more."""
 
+import functools
+
 import numpy as np
 import pytest
 import random_scenes
@@ -36,14 +38,18 @@ def small_scene(rng):
     return random_scenes.combine(*meshes), rules
 
 
+@functools.cache
+def many_small_scenes():
+    rng = np.random.default_rng(7)
+    scenes = [small_scene(rng) for _ in range(60)]
+    return [(meshes, rules, meshes.truth(threads=1, **rules)) for meshes, rules in scenes]
+
+
 @pytest.mark.parametrize(("method", "report"), WAYS)
 @pytest.mark.parametrize("threads", [1, 3])
 def test_rules_of_small_scenes(method, report, threads):
-    rng = np.random.default_rng(7)
     n_found = 0
-    for _ in range(60):
-        meshes, rules = small_scene(rng)
-        truth = meshes.truth(threads=1, **rules)
+    for meshes, rules, truth in many_small_scenes():
         detector = hc.Detector(meshes.scene(**rules), method=method, report=report, threads=threads, backend="cpu")
         for _ in range(2):  # on a hierarchy that is built, and on the same one refitted
             found = detector.detect(meshes.vertices_t0, meshes.vertices_t1)
