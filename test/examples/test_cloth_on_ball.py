@@ -40,10 +40,9 @@ def check_same_frames(one, other):
 
 
 def test_in_one_process(tmp_path, capsys):
-    said = run(tmp_path, "--cells", "16", "--frames", "12", "--mcap", "a.mcap", "--picture", "a.png")
+    said = run(tmp_path, "--cells", "16", "--frames", "12", "--mcap", "a.mcap", "--picture", "")
     assert "intersections  0 in all 12 frames" in said
     assert re.search(r"plausible +yes", said) and re.search(r"\d+ % of it in hpccd", said)
-    assert (tmp_path / "a.png").read_bytes().startswith(b"\x89PNG")
     assert cli.main(["replay", str(tmp_path / "a.mcap")]) == 0
     assert "11 steps computed, 0 contacts" in capsys.readouterr().out
 
@@ -108,6 +107,11 @@ def test_a_node_that_leaves_out_what_the_solver_needs(tmp_path, words):
 )
 def test_where_the_ball_gives_next_to_no_spin(tmp_path, words):
     assert re.search(r"plausible +yes", run(tmp_path, "--cells", "16", "--picture", "", *words))
+
+
+def test_a_picture(tmp_path):
+    run(tmp_path, "--cells", "16", "--frames", "2", "--picture", "a.png")  # a panel for each frame, of six at most
+    assert (tmp_path / "a.png").read_bytes().startswith(b"\x89PNG")
 
 
 def test_a_cloth_that_is_stuck_ends_with_one_sentence(tmp_path):

@@ -97,9 +97,7 @@ class _Asked:
     def _with(self, separation: float, report: str, features: tuple[str, ...] = FEATURES) -> hc.Detector:
         detector, now = self._of(report, features)
         if now != [separation]:
-            for a in range(self._n_meshes):
-                for b in range(a, self._n_meshes):
-                    detector.set_separation(a, b, separation)
+            detector.set_separations(np.full((self._n_meshes, self._n_meshes), separation))
             now[:] = [separation]
         return detector
 

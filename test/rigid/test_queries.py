@@ -14,7 +14,7 @@ from oracle.rigid_queries import KINDS, MOTIONS, random_queries
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("motion", MOTIONS)
 def test_answers_against_the_truth(motion, kind):
-    queries = random_queries(np.random.default_rng(11), 1000, kind, motion)
+    queries = random_queries(np.random.default_rng(11), 500, kind, motion)
     verdict = judge(queries, ask(queries))
     assert verdict.right, verdict
     assert min(verdict.touching, verdict.apart, verdict.excess) > 100
@@ -24,5 +24,5 @@ def test_answers_against_the_truth(motion, kind):
 def test_a_bound_that_is_too_small_is_found_out(monkeypatch):
     """With a tenth of it left out some are missed: the queries come so near."""
     monkeypatch.setattr(rigid_answers, "grown", lambda d, a, b: d + 0.9 * (a.sum + b.sum))
-    queries = random_queries(np.random.default_rng(12), 1000, "vf", "screws")
+    queries = random_queries(np.random.default_rng(12), 500, "vf", "screws")
     assert judge(queries, ask(queries)).missed > 0

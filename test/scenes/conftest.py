@@ -8,8 +8,9 @@ import pytest
 
 @pytest.fixture(scope="session", autouse=True)
 def scene_cache(tmp_path_factory):
-    """The cache folder of this session: each motion is simulated once."""
-    folder = tmp_path_factory.mktemp("cache")
+    """The cache folder of this session, of all workers of pytest-xdist: each motion is simulated once."""
+    folder = tmp_path_factory.getbasetemp()
+    folder = (folder.parent if "PYTEST_XDIST_WORKER" in os.environ else folder) / "scene-cache"
     before = os.environ.get("XDG_CACHE_HOME")
     os.environ["XDG_CACHE_HOME"] = str(folder)
     yield folder / "hpccd" / "scenes"

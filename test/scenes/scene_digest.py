@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Hash of all that a scene gives. As a program: print those of NAME:SIZE:FRAMES arguments."""
+"""Hash of all that a scene gives. As a program: print those of NAME:SIZE:FRAMES[:SEED] arguments."""
 
 import hashlib
 import sys
@@ -9,11 +9,11 @@ import solved_cloth
 from hpccd_ros import scenes
 
 
-def make(word: str, seed: int = 0):
-    """The scene NAME:SIZE:FRAMES, of the product or of the example's solver."""
-    name, size, frames = word.split(":")
+def make(word: str):
+    """The scene NAME:SIZE:FRAMES[:SEED], of the product or of the example's solver."""
+    name, size, frames, seed = (*word.split(":"), "0")[:4]
     kind = solved_cloth if name in solved_cloth.FRAMES else scenes
-    return kind.make(name, float(size), int(frames), seed)
+    return kind.make(name, float(size), int(frames), int(seed))
 
 
 def digest(scene) -> str:

@@ -56,7 +56,7 @@ def brute_force(mesh_a, a, mesh_b, b):
     )
 
 
-@pytest.mark.parametrize("index", [0, 60, 110, 240, 360])
+@pytest.mark.parametrize("index", [0, 110, 360, *(pytest.param(index, marks=pytest.mark.long) for index in (60, 240))])
 def test_all_pairs(index):
     """From far above the table, through the grip, to the end; where meshes pierce each other the distance is 0."""
     scene = scenes.make("arm-and-cloth", size=1 / 16)
