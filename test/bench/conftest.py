@@ -20,7 +20,7 @@ def scene_cache(tmp_path_factory):
 
 
 def _run(main, folder, name, *arguments):
-    status = main([name, *arguments, "--out", str(folder), "--label", "test"])
+    status = main([name, "--out", str(folder), "--label", "test", *arguments])
     path = folder / f"{name}-test.json"
     return status, json.loads(path.read_text()) if path.exists() else None, folder
 

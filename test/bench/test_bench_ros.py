@@ -9,37 +9,30 @@ from pathlib import Path
 
 import pytest
 
+import hpccd_core as hc
 import hpccd_ros
 from bench.__main__ import FOLDERS
 
 ROOT = Path(hpccd_ros.__file__).resolve().parents[1]
+# The benchmark in a process whose core gives other steps than that of the node, and in one to which all is near.
+PROGRAM = "import sys; from bench import __main__ as bench; {}; sys.exit(bench.main(sys.argv[1:]))"
+OTHER_STEPS = (
+    "import hpccd_core as hc; right = hc.Detector.collision_free_step; "
+    "hc.Detector.collision_free_step = lambda *motion: right(*motion) + 1"
+)
+ALL_NEAR = "import stop_scene; stop_scene.near = lambda start, end: True"
+# Slow frames and long time-outs: nothing here depends on how busy the machine is.
+STOP = ("stop", "--rate", "2", "--stop-timeout", "2", "--margin", "60")
 
 
-# The benchmark in a process whose core gives other steps than that of the node.
-OTHER_STEPS = """
-import sys
-import hpccd_core as hc
-from bench import __main__ as bench
-right = hc.Detector.collision_free_step
-hc.Detector.collision_free_step = lambda *motion: right(*motion) + 1
-sys.exit(bench.main(sys.argv[1:]))
-"""
-
-
-def bench(folder, *arguments, program=("-m", "bench")):
+def bench(folder, *arguments, change=None):
     """(exit status, the result as written, what was printed)."""
-    done = subprocess.run(
-        [sys.executable, *program, *arguments, "--out", str(folder), "--label", "test"],
-        cwd=ROOT,
-        env={**os.environ, "PYTHONPATH": os.pathsep.join(map(str, FOLDERS))},
-        capture_output=True,
-        text=True,
-        timeout=550,
-    )
-    said = done.stdout + done.stderr
-    files = list(folder.glob("*-test.json"))
-    assert files, said
-    return done.returncode, json.loads(files[0].read_text()), said
+    program = ("-c", PROGRAM.format(change)) if change else ("-m", "bench")
+    words = [sys.executable, *program, *arguments, "--out", str(folder), "--label", "test"]
+    folders = {"PYTHONPATH": os.pathsep.join(map(str, FOLDERS))}
+    done = subprocess.run(words, cwd=ROOT, env=os.environ | folders, capture_output=True, text=True, timeout=550)
+    said, files = done.stdout + done.stderr, list(folder.glob("*-test.json"))
+    return done.returncode, json.loads(files[0].read_text()) if files else None, said
 
 
 def test_latency_beside_the_echo_and_the_loop_beside_the_core(tmp_path):
@@ -63,7 +56,7 @@ def test_latency_beside_the_echo_and_the_loop_beside_the_core(tmp_path):
 
 def test_a_wrong_step_fails(tmp_path):
     options = ("cloth-drop", "--size", "0.1", "--repeat", "5", "--seconds", "0", "--limit", "1e9")
-    status, result, said = bench(tmp_path, "ros", *options, program=("-c", OTHER_STEPS))
+    status, result, said = bench(tmp_path, "ros", *options, change=OTHER_STEPS)
     # Those of the warm-up, from both ends of the motion, count too.
     assert status == 1 and "13 collision-free steps of ~/detect differ from the core's" in result["failures"][0], said
 
@@ -72,17 +65,6 @@ def test_latency_above_the_limit_fails(tmp_path):
     options = ("two-triangles", "--repeat", "5", "--seconds", "0", "--limit", "1e-9")
     status, result, said = bench(tmp_path, "ros", *options)
     assert status == 1 and "times as long as the echo" in result["failures"][0], said
-
-
-# Slow frames and long time-outs: nothing here depends on how busy the machine is.
-STOP = ("stop", "--rate", "2", "--stop-timeout", "2", "--margin", "60")
-ALL_NEAR = """
-import sys
-from bench import __main__ as bench
-import stop_scene
-stop_scene.near = lambda start, end: True
-sys.exit(bench.main(sys.argv[1:]))
-"""
 
 
 @pytest.mark.long
@@ -100,7 +82,7 @@ def test_stop_rises_and_each_end_is_heard(tmp_path):
 
 
 def test_a_missed_stop_fails(tmp_path):
-    status, result, said = bench(tmp_path, *STOP, "--trials", "1", "--ends", "0", program=("-c", ALL_NEAR))
+    status, result, said = bench(tmp_path, *STOP, "--trials", "1", "--ends", "0", change=ALL_NEAR)
     assert status == 1 and "steps that come near" in result["failures"][0], said
 
 
@@ -135,16 +117,7 @@ def test_a_robot_beside_a_cloth(tmp_path):
 
 
 def test_a_backend_that_is_not_here_is_refused(tmp_path):
-    import hpccd_core as hc
-
     if "gpu" in hc.backends():
         pytest.skip("a GPU is here")
-    done = subprocess.run(
-        [sys.executable, "-m", "bench", "robot", "--backend", "gpu", "--out", str(tmp_path)],
-        cwd=ROOT,
-        env={**os.environ, "PYTHONPATH": os.pathsep.join(map(str, FOLDERS))},
-        capture_output=True,
-        text=True,
-        timeout=100,
-    )
-    assert done.returncode == 2 and "--backend gpu: " in done.stderr and "not usable here" in done.stderr
+    status, _, said = bench(tmp_path, "robot", "--backend", "gpu")
+    assert status == 2 and "--backend gpu: " in said and "not usable here" in said

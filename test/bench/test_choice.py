@@ -12,11 +12,10 @@ from hpccd_ros.bench import choice
 from hpccd_ros.bench.choice import ASKED, Asked, Outcome, Setting
 
 STRIP = ("folding-strip", "--size", "0.1", "--steps", "2", "--repeat", "1")
-NONE = dict.fromkeys(choice.QUANTITIES, 0.0)
 
 
 def outcome(accuracy, ms, asked="all", **values):
-    return Outcome(Setting(accuracy, "cpu", asked), ms, NONE | values)
+    return Outcome(Setting(accuracy, "cpu", asked), ms, dict.fromkeys(choice.QUANTITIES, 0.0) | values)
 
 
 def test_bounds_are_read():
@@ -26,39 +25,35 @@ def test_bounds_are_read():
     assert bounds[1].keeps(0.0) and not bounds[1].keeps(1e-300)
 
 
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ("", "name at least one bound"),
-        ("misses", "write QUANTITY<NUMBER"),
-        ("misses>1e-4", "write QUANTITY<NUMBER"),
-        ("misses=0", "QUANTITY<=NUMBER"),
-        ("misses<1e-4; late<1", "with commas between"),
-        ("mises<1e-4", "choose from misses, inventions, late, early, error"),
-        ("misses<few", "few is not a number"),
-        ("late<nan", "bounds nothing"),
-        ("late<-1", "bounds nothing"),
-        ("late<0", "write late<=0"),
-        ("late<1, late<2", "bounded twice"),
-    ],
-)
-def test_what_is_no_bound_is_explained(text, said):
+NO_BOUNDS = {
+    "": "name at least one bound",
+    "misses": "write QUANTITY<NUMBER",
+    "misses>1e-4": "write QUANTITY<NUMBER",
+    "misses=0": "QUANTITY<=NUMBER",
+    "misses<1e-4; late<1": "with commas between",
+    "mises<1e-4": "choose from misses, inventions, late, early, error",
+    "misses<few": "few is not a number",
+    "late<nan": "bounds nothing",
+    "late<-1": "bounds nothing",
+    "late<0": "write late<=0",
+    "late<1, late<2": "bounded twice",
+}
+
+
+@pytest.mark.parametrize("text", NO_BOUNDS)
+def test_what_is_no_bound_is_explained(text):
     with pytest.raises(UserError, match="--choose") as raised:
         choice.parse(text)
-    assert said in str(raised.value)
+    assert NO_BOUNDS[text] in str(raised.value)
 
 
 def test_the_cheapest_that_keeps_all_bounds_is_taken():
     fast, balanced, exact = outcome("fast", 1, misses=1e-3), outcome("balanced", 2, late=1e-14), outcome("exact", 3)
-    every = [exact, fast, balanced]
-    assert choice.cheapest(every, choice.parse("misses<1e-2")) is fast
-    assert choice.cheapest(every, choice.parse("misses<1e-3")) is balanced
-    assert choice.cheapest(every, choice.parse("misses<1e-3, late<=0")) is exact
-
-
-def test_of_equally_fast_ones_the_more_accurate_is_taken():
-    every = [outcome("balanced", 2.0, error=1e-14), outcome("exact", 2.0 * choice.AS_FAST), outcome("exact", 2.2)]
-    assert choice.cheapest(every, choice.parse("misses<1e-3")) is every[1]
+    for bounds, taken in {"misses<1e-2": fast, "misses<1e-3": balanced, "misses<1e-3, late<=0": exact}.items():
+        assert choice.cheapest([exact, fast, balanced], choice.parse(bounds)) is taken
+    # Of equally fast ones the more accurate one.
+    alike = [outcome("balanced", 2.0, error=1e-14), outcome("exact", 2.0 * choice.AS_FAST), outcome("exact", 2.2)]
+    assert choice.cheapest(alike, choice.parse("misses<1e-3")) is alike[1]
 
 
 def test_the_nearest_goes_beyond_its_worst_bound_the_least():
@@ -75,68 +70,51 @@ def test_the_front_holds_whom_none_beats_that_asks_for_the_same():
 
 
 def test_outcomes_are_of_the_worst_scene_and_of_settings_that_all_were_tested_with():
-    row = {
-        "accuracy": "fast",
-        "backend": "cpu",
-        "asked": "all",
-        "true": 10,
-        "reported": 8,
-        "missed": 2,
-        "invented": 0,
-        "latest": 0.1,
-        "earliest": 0.2,
-        "toc_worst": 0.2,
-        "step_ms": 3.0,
-        "scene": "a",
-    }
+    row = {"accuracy": "fast", "backend": "cpu", "asked": "all", "true": 10, "reported": 8, "missed": 2, "invented": 0}
+    row |= {"latest": 0.1, "earliest": 0.2, "toc_worst": 0.2, "step_ms": 3.0, "scene": "a"}
     other = row | {"scene": "b", "missed": 0, "invented": 2, "step_ms": 1.0}
     (found,) = choice.outcomes([row, row | {"step_ms": 99.0}, other, row | {"accuracy": "exact"}])
     assert found.setting == Setting("fast", "cpu") and found.ms == 2.0
     assert found.values == {"misses": 0.2, "inventions": 0.25, "late": 0.1, "early": 0.2, "error": 0.2}
 
 
+class Found:
+    """What a detector would report."""
+
+    def __init__(self, vf, toc):
+        self.vf, self.vf_toc = np.array(vf, np.uint32).reshape(-1, 2), np.array(toc)
+        self.ee, self.ee_toc = np.empty((0, 4), np.uint32), np.empty(0)
+        self.first_toc = min(toc, default=np.inf)
+
+    def __len__(self):
+        return len(self.vf)
+
+
 def test_wrong_answers_count_against_what_is_asked():
-    every, first, any_, faces, _ = ASKED
-    true = {
-        "vf": np.array([[0, 1], [2, 3]]),
-        "vf_toc": np.array([0.25, 0.5]),
-        "ee": np.empty((0, 4), np.uint32),
-        "ee_toc": np.empty(0),
-    }
-    empty = {"ee": np.empty((0, 4), np.uint32), "ee_toc": np.empty(0)}
-    late = found(vf=np.array([[2, 3]], np.uint32), vf_toc=np.array([0.625]), first_toc=0.625, **empty)
-    assert errors(every, late, true) == (2, 1, 0, 0.125)
-    assert errors(first, late, true) == (1, 0, 0, 0.375)
-    assert errors(any_, late, true) == (1, 0, 0, 0.125)
-    none = found(vf=np.empty((0, 2), np.uint32), vf_toc=np.empty(0), first_toc=np.inf, **empty)
-    assert errors(first, none, true) == errors(any_, none, true) == (1, 1, 0, 0.0)
-    one_kind = Asked("ee", kinds=("ee",))
-    assert errors(one_kind, none, true) == (0, 0, 0, 0.0)
-    assert errors(faces, late, true) == (2, 1, 0, 0.125)
+    every, first, any_, faces, edges = ASKED
+    true = vars(Found([[0, 1], [2, 3]], [0.25, 0.5]))
+    true = {key: true[key] for key in ("vf", "vf_toc", "ee", "ee_toc")}
+    late, none = Found([[2, 3]], [0.625]), Found([], [])
+    for asked, found, expected in (
+        (every, late, (2, 1, 0, 0.125)),
+        (first, late, (1, 0, 0, 0.375)),
+        (any_, late, (1, 0, 0, 0.125)),
+        (first, none, (1, 1, 0, 0.0)),
+        (any_, none, (1, 1, 0, 0.0)),
+        (edges, none, (0, 0, 0, 0.0)),
+        (faces, late, (2, 1, 0, 0.125)),
+    ):
+        errors = asked.errors(found, true)
+        assert (errors.true, errors.missed, errors.invented, errors.latest) == expected
 
 
-def found(**values):
-    of = type("Found", (), values)
-    of.__len__ = lambda self: len(self.vf) + len(self.ee)
-    return of()
-
-
-def errors(asked, of, true):
-    e = asked.errors(of, true)
-    return e.true, e.missed, e.invented, e.latest
-
-
-def test_a_setting_is_written_for_python_and_for_the_node():
-    setting = Setting("balanced", "cpu", "first")
-    python, node = setting.as_written().split("; ")
+def test_a_setting_is_written_for_python_and_for_the_node(monkeypatch):
+    python, node = Setting("balanced", "cpu", "first").as_written().split("; ")
     asked = eval(python, {"hc": SimpleNamespace(Detector=lambda scene, **options: options), "scene": None})
     assert asked == {"accuracy": "balanced", "backend": "cpu", "report": "first"}
     assert node == "hpccd_node --ros-args -p accuracy:=balanced -p backend:=cpu -p report:=first"
-
-
-def test_an_option_of_several_words_is_written_as_a_list(monkeypatch):
-    some = Asked("some", {"outputs": ("points", "normals")})
-    monkeypatch.setattr(choice, "ASKED", (*ASKED, some))
+    # An option of several words is a list.
+    monkeypatch.setattr(choice, "ASKED", (*ASKED, Asked("some", {"outputs": ("points", "normals")})))
     python, node = Setting("exact", "cpu", "some").as_written().split("; ")
     assert python.endswith("backend=\"cpu\", outputs=('points', 'normals'))")
     assert node.endswith(' -p outputs:="[points, normals]"')
@@ -146,16 +124,15 @@ def test_a_recording_is_a_scene_to_choose_for(product, capsys):
     recording = str(ROOT / "bags" / "cloth-drop-small.mcap")
     few = ("--steps", "2", "--repeat", "1", "--ask", "all,first", "--choose", "misses<=0, late<1e-9")
     status, result, _ = product("accuracy", recording, *few)
-    assert status == 0 and result["failures"] == []
-    assert "--choose 'misses<=0, late<1e-9'" in result["command"]
-    rows = result["rows"]
-    assert {row["part"] for row in rows} == {"scene"} and {row["asked"] for row in rows} == {"all", "first"}
-    (chosen,) = (row for row in rows if row["chosen"])
+    assert status == 0 and result["failures"] == [] and "--choose 'misses<=0, late<1e-9'" in result["command"]
+    assert {row["part"] for row in result["rows"]} == {"scene"}
+    assert {row["asked"] for row in result["rows"]} == {"all", "first"}
+    (chosen,) = (row for row in result["rows"] if row["chosen"])
     assert chosen["missed"] == 0 and chosen["latest"] < 1e-9
     assert f'accuracy="{chosen["accuracy"]}"' in capsys.readouterr().out
 
 
-def test_where_none_keeps_the_bounds_the_nearest_is_named(product, capsys, monkeypatch):
+def test_where_none_keeps_the_bounds_the_nearest_is_named(product, monkeypatch):
     monkeypatch.setattr(Outcome, "broken", lambda self, bounds: list(bounds))
     status, result, _ = product("accuracy", *STRIP, "--choose", "error<1e-20")
     assert status == 1
@@ -173,15 +150,9 @@ def test_where_nothing_touches_nothing_is_chosen(product, tmp_path):
         assert "no contact in the steps measured" in said and ("--steps 0" in said) == (steps == "1")
 
 
-def test_what_too_few_contacts_cannot_show_is_said(product):
-    status, result, _ = product("accuracy", *STRIP, "--tiers", "exact", "--choose", "misses<1e-9, late<1e-3")
-    assert status == 0
+def test_what_too_few_contacts_cannot_show_is_said_and_the_trade_is_drawn(product, tmp_path):
+    words = ("--tiers", "fast,exact", "--choose", "misses<1e-9, late<1e-3", "--picture", str(tmp_path / "trade.png"))
+    status, result, _ = product("accuracy", *STRIP, *words)
+    assert status == 0 and (tmp_path / "trade.png").read_bytes().startswith(b"\x89PNG")
     (said,) = (note for note in result["notes"] if "true contacts" in note)
     assert "misses<1e-09" in said and "late" not in said
-
-
-def test_a_picture_of_the_trade(product, tmp_path, capsys):
-    status, _, _ = product("accuracy", *STRIP, "--tiers", "fast,exact", "--picture", str(tmp_path / "trade.png"))
-    assert status == 0 and (tmp_path / "trade.png").read_bytes().startswith(b"\x89PNG")
-    assert product("accuracy", *STRIP, "--tiers", "exact", "--picture", str(tmp_path / "no" / "trade.png"))[0] == 2
-    assert "--picture" in capsys.readouterr().err

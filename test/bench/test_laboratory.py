@@ -18,10 +18,11 @@ from hpccd_ros.bench.sources import of_scene
 
 ONE = ("--repeat", "1")
 STRIP = ("folding-strip", "--size", "0.1", "--steps", "2", *ONE)
+FEW_STEPS = ("--sizes", "0.1,0.4", "--steps", "2", "--threads-list", "1,2", *ONE)
 SUBJECTS = {
     "scaling": (*STRIP, "--threads-list", "1,2", "--methods", "default,naive"),
     "methods": STRIP,
-    "size": ("folding-strip", "--sizes", "0.1,0.4", "--steps", "2", "--threads-list", "1,2", *ONE),
+    "size": ("folding-strip", *FEW_STEPS),
     "memory": ("folding-strip", "--methods", "default,front", *ONE),
     "worlds": ("two-triangles", "--worlds", "3,12", "--threads", "2", *ONE),
     "ropes": ("--segments", "1000", "--segments-a-rope", "100", *ONE),
@@ -33,105 +34,84 @@ SUBJECTS = {
 }
 
 
-@pytest.fixture
-def rows(bench, request):
-    """Rows of the subject that the test names, which must not fail."""
-    name = request.param
-    status, result, _ = bench(name, *SUBJECTS[name])
-    assert status == 0 and result["failures"] == [] and result["command"].startswith(f"python -m bench {name}")
-    return result["rows"]
-
-
-def of(name):
-    return pytest.mark.parametrize("rows", [name], indirect=True)
-
-
-@of("scaling")
-def test_scaling(rows):
-    assert [(row["method"], row["threads"]) for row in rows] == [
-        *(("default", 1), ("default", 2), ("naive", 1), ("naive", 2)),
-        ("independent", 2),
-    ]
+def check_scaling(rows):
+    ways = [(method, threads) for method in ("default", "naive") for threads in (1, 2)]
+    assert [(row["method"], row["threads"]) for row in rows] == [*ways, ("independent", 2)]
     assert len({row["contacts"] for row in rows}) == 1 and rows[0]["speedup"] == 1
     assert rows[-1]["speedup"] == pytest.approx(2 * rows[0]["step_ms"] / rows[-1]["step_ms"], rel=1e-3)
 
 
-@of("methods")
-def test_methods(rows):
+def check_methods(rows):
     assert {"default", "published", "naive", "front", "scalar"} <= {row["variant"] for row in rows}
 
 
-@of("size")
-def test_size(rows):
+def check_size(rows):
     small, _, large, _ = rows
     assert 3 < large["triangles"] / small["triangles"] < 5 and large["bytes"] > small["bytes"]
 
 
-@of("memory")
-def test_memory(rows):
+def check_memory(rows):
     default, front = rows
     assert 0 < default["detector_bytes"] < front["detector_bytes"], "the front keeps pairs of nodes"
     assert default["process_bytes"] > default["detector_bytes"] / 2
 
 
-@of("worlds")
-def test_worlds(rows):
+def check_worlds(rows):
     few, many = rows
     assert (few["worlds"], few["steps"], many["worlds"], many["steps"]) == (3, 3, 12, 10)
     assert many["contacts"] > few["contacts"] and few["of_all_threads"] > 0 and many["bytes_a_world"] > 100
 
 
-@of("ropes")
-def test_ropes(rows):
+def check_ropes(rows):
     assert [row["way"] for row in rows] == ["edges", "thin triangles", "cloth"]
     assert rows[0]["contacts"] == rows[1]["contacts"] > 0 and rows[0]["triangles"] == 0
 
 
-@of("options")
-def test_options(rows):
+def check_options(rows):
     by = {row["option"]: row for row in rows}
-    full = by["full"]
+    full, faces, edges = by["full"], by["vertex-face only"], by["edge-edge only"]
     for less in ("no self-collision", "largest mesh ignored by all"):
         assert by[less]["candidates"] < full["candidates"]
-    faces, edges = by["vertex-face only"], by["edge-edge only"]
     for key in ("contacts", "candidates"):
         assert faces[key] + edges[key] == full[key]
     around, static = by["landscape around it"], by["the same, static"]
     assert static["contacts"] == around["contacts"] == full["contacts"] and static["candidates"] < around["candidates"]
 
 
-@of("distance")
-def test_distance(rows):
-    assert [(row["query"], row["distance"]) for row in rows] == [
-        *(("plain", None), ("separation", 0.002), ("separation", 0.02), ("proximity", 0.002), ("proximity", 0.02)),
-        *(("intersections", None), ("distances", None)),
-    ]
+def check_distance(rows):
+    asked = [("plain", None), *((query, d) for query in ("separation", "proximity") for d in (0.002, 0.02))]
+    asked += [("intersections", None), ("distances", None)]
+    assert [(row["query"], row["distance"]) for row in rows] == asked
     plain, small, large, near, nearer, _, gaps = rows
     assert 0 < plain["pairs"] < small["pairs"] < large["pairs"] and near["pairs"] < nearer["pairs"]
     assert gaps["pairs"] == plain["over_plain"] == 1
 
 
-@of("step")
-def test_step(rows):
+def check_step(rows):
     every, first, free, trial = rows
     assert every["contacts"] >= first["contacts"] > 0 and trial["listing_ms"] > 0
     assert 0 <= free["earliest"] <= every["earliest"] == first["earliest"] <= 1
 
 
-@of("accuracy")
-def test_wrong_answers(rows):
+def check_accuracy(rows):
     hard = {tier: [r for r in rows if r["part"] == "adversarial" and r["accuracy"] == tier] for tier in page.TIERS}
     assert all(row["missed"] == row["invented"] == 0 for row in hard["exact"])
     assert any(row["missed"] + row["invented"] for row in hard["balanced"]), "these queries are not hard"
 
 
-@of("rigid")
-def test_rigid(rows):
+def check_rigid(rows):
     for row in rows:
         if row["part"] == "truth":
             assert row["touching"] > 10 and row["missed"] == row["late"] == row["beyond"] == row["open"] == 0
         else:
             assert 0 < row["low"] <= row["median"] <= row["largest"] <= 1
+
+
+@pytest.mark.parametrize("name", SUBJECTS)
+def test_subject(bench, name):
+    status, result, _ = bench(name, *SUBJECTS[name])
+    assert status == 0 and result["failures"] == [] and result["command"].startswith(f"python -m bench {name}")
+    globals()[f"check_{name}"](result["rows"])
 
 
 def test_cost_of_poses_and_joints(bench):
@@ -253,11 +233,11 @@ def test_wrong_use_is_explained(bench, capsys, arguments, text):
     assert status == 2 and result is None and text in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("words", [("memory", "--steps", "2"), ("gpu", "--steps", "2"), ("soak", "--threads", "1")])
-def test_an_option_that_a_subject_does_not_use_is_refused(bench, capsys, words):
-    with pytest.raises(SystemExit):
-        bench(*words)
-    assert f"unrecognized arguments: {words[1]}" in capsys.readouterr().err
+def test_an_option_that_a_subject_does_not_use_is_refused(bench, capsys):
+    for subject, option in (("memory", "--steps"), ("gpu", "--steps"), ("soak", "--threads")):
+        with pytest.raises(SystemExit):
+            bench(subject, option, "2")
+        assert f"unrecognized arguments: {option}" in capsys.readouterr().err
 
 
 def test_steps_without_a_motion_are_refused_first(tmp_path):
@@ -289,9 +269,8 @@ def test_a_peer_beside_it(bench):
 @pytest.mark.skipif("gpu" not in hc.backends(), reason="no usable GPU")
 def test_gpu(bench):
     few = ("folding-strip", "--size", "0.1", "--repeat", "5", "--sizes", "12", "--worlds", "1,3", "--threads", "2")
-    parts = [part for part in ("frames", "threads")]
-    status, result, _ = bench("gpu", *few, "--parts", ",".join(parts))
-    assert status == 0 and result["failures"] == [] and {row["part"] for row in result["rows"]} == set(parts)
+    status, result, _ = bench("gpu", *few, "--parts", "frames,threads")
+    assert status == 0 and result["failures"] == [] and {r["part"] for r in result["rows"]} == {"frames", "threads"}
     pytest.importorskip("torch", reason="PyTorch is not installed: positions on the device are not measured")
     status, result, _ = bench("gpu", *few, "--parts", "device,large,worlds")
     assert status == 0 and result["failures"] == []
@@ -307,7 +286,6 @@ def test_the_page_shows_the_kept_results():
     assert len(text.splitlines()) <= 400
     for path in page.RESULTS.glob("*.json"):
         kept = page.read(page.RESULTS, path.stem)
-        assert (
-            kept["command"].startswith(("hpccd bench ", "python -m bench ")) and kept["rows"] and not kept["failures"]
-        )
+        assert kept["command"].startswith(("hpccd bench ", "python -m bench ")), path
+        assert kept["rows"] and not kept["failures"], path
         assert "+changes" not in kept["machine"]["commit"], "measured on sources that are in no commit"

@@ -8,21 +8,12 @@ import pytest
 from sources import ROOT
 
 import hpccd_core as hc
-from hpccd_ros import cli
 from hpccd_ros.bench import accuracy, sources
 from hpccd_ros.bench.report import Report
 
 STRIP = ("folding-strip", "--size", "0.1", "--steps", "2", "--repeat", "1")
-SCHEMA = {
-    "benchmark": str,
-    "command": str,
-    "machine": dict,
-    "arguments": dict,
-    "other_processes_share": float,
-    "notes": list,
-    "failures": list,
-    "rows": list,
-}
+SCHEMA = {"benchmark": str, "command": str, "machine": dict, "arguments": dict, "other_processes_share": float}
+SCHEMA |= {"notes": list, "failures": list, "rows": list}
 
 
 def test_cpu(product):
@@ -41,9 +32,8 @@ def test_a_recording_and_a_mesh_file(product, tmp_path):
     recording = str(ROOT / "bags" / "cloth-drop-small.mcap")
     few = ("--steps", "4", "--repeat", "1", "--report", "all")
     status, result, _ = product("cpu", recording, str(tmp_path / "part.obj"), *few)
-    assert status == 0
     recorded, mesh = result["rows"]
-    assert recorded["scene"] == "cloth-drop-small" and recorded["contacts"] > 0
+    assert status == 0 and recorded["scene"] == "cloth-drop-small" and recorded["contacts"] > 0
     assert (mesh["scene"], mesh["triangles"], mesh["steps"]) == ("part", 8, 4)
     assert mesh["contacts"] > 0, "the copy moves through the mesh"
 
@@ -56,19 +46,20 @@ def test_tiers(product):
 
 
 @pytest.mark.parametrize(
-    ("change", "failures"),
+    ("tier", "change", "failures"),
     [
-        ({"accuracy": "exact"}, 0),
-        ({"accuracy": "exact", "invented": 1}, 1),
-        ({"accuracy": "exact", "toc_worst": 1e-11}, 1),
-        ({"accuracy": "conservative", "invented": 3}, 0),
-        ({"accuracy": "conservative", "latest": 1e-15}, 1),
-        ({"accuracy": "balanced", "missed": 5}, 0),
+        ("exact", {}, 0),
+        ("exact", {"invented": 1}, 1),
+        ("exact", {"toc_worst": 1e-11}, 1),
+        ("conservative", {"invented": 3}, 0),
+        ("conservative", {"latest": 1e-15}, 1),
+        ("balanced", {"missed": 5}, 0),
     ],
 )
-def test_a_broken_promise_fails(change, failures):
+def test_a_broken_promise_fails(tier, change, failures):
     report = Report("accuracy", "hpccd bench accuracy", {})
-    report.add(**{"scene": "s", "missed": 0, "invented": 0, "toc_worst": 0.0, "latest": 0.0, **change})
+    row = {"scene": "s", "accuracy": tier, "missed": 0, "invented": 0, "toc_worst": 0.0, "latest": 0.0}
+    report.add(**row | change)
     accuracy.check(report)
     assert len(report.failures) == failures
 
@@ -81,20 +72,23 @@ def test_other_contacts_fail(product, monkeypatch):
         return detect(self, start, end if seen[end.tobytes()] < 3 else start)
 
     monkeypatch.setattr(hc.Detector, "detect", nothing_in_the_second_round)
-    status, result, _ = product("cpu", *STRIP[:3], "--steps", "0", "--repeat", "2", "--report", "all")
+    few = ("--steps", "1", "--repeat", "2", "--report", "all")
+    status, result, _ = product("cpu", *STRIP[:3], *few)
     assert status == 1 and "contacts differ between calls" in result["failures"][0]
 
 
 def test_files_of_one_name_are_told_apart(tmp_path):
     """Results are kept by name: of two the second would count for nothing."""
-    x = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], float)
     paths = [tmp_path / folder / "run.npz" for folder in ("a", "b")]
     for path in paths:
         path.parent.mkdir()
-        np.savez(path, vertices_t0=x, vertices_t1=x + 1, faces=np.array([[0, 1, 2]]))
+        np.savez(path, **STEP)
     names = [source.name for source in sources.resolve([*map(str, paths), "folding-strip"], None, ())]
     assert names == [str(tmp_path / "a" / "run"), str(tmp_path / "b" / "run"), "folding-strip"]
     assert [source.name for source in sources.resolve([str(paths[0])], None, ())] == ["run"]
+
+
+OTHER = next(simd for simd in ("neon", "avx2") if simd not in hc._core.simd_levels())
 
 
 @pytest.mark.parametrize(
@@ -108,10 +102,23 @@ def test_files_of_one_name_are_told_apart(tmp_path):
         (("cpu", *STRIP, "--steps", "-1"), "--steps -1: must not be negative"),
         (("accuracy", *STRIP, "--tiers", "best"), "'best' is not known"),
         (("accuracy", *STRIP, "--threads", "100000"), "at most 1024"),
+        (("accuracy", *STRIP, "--simd", OTHER), f"--simd {OTHER}: none of these works here"),
+        (("accuracy", "y" * 300), "name a file or a scene"),
         (("cpu", "empty.obj"), "empty.obj"),
+        # What cannot be written is refused before anything is measured.
+        (("cpu", *STRIP, "--label", "a/b"), "--label a/b"),
+        (("cpu", *STRIP, "--out", "empty.obj/folder"), "--out empty.obj/folder"),
+        (("accuracy", *STRIP, "--picture", "/proc/no/x.png"), "--picture: /proc/no/x.png cannot be written"),
+        (("accuracy", *STRIP, "--picture", "no/trade.png"), "--picture: no/trade.png cannot be written"),
+        (("accuracy", *STRIP, "--picture", "x.bogus"), "name a .png"),
+        (("accuracy", *STRIP, "--picture", ""), "name a .png"),
+        (("accuracy", *STRIP, "--label", ""), "--label"),
+        (("accuracy", *STRIP, "--label", "a\nb"), "--label"),
+        (("accuracy", *STRIP, "--label", "x" * 300), "cannot be written"),
     ],
 )
 def test_wrong_options_are_explained(product, capsys, tmp_path, monkeypatch, arguments, text):
+    monkeypatch.setattr(accuracy.measure, "measure", lambda *_: pytest.fail("measured"))
     monkeypatch.chdir(tmp_path)
     (tmp_path / "empty.obj").write_text("")
     status, result, _ = product(*arguments)
@@ -119,13 +126,13 @@ def test_wrong_options_are_explained(product, capsys, tmp_path, monkeypatch, arg
     assert text in capsys.readouterr().err
 
 
-def test_nothing_is_measured_where_the_result_cannot_be_written(tmp_path, capsys):
-    from hpccd_ros import cli
-
-    (tmp_path / "file").touch()
-    for option, text in (("--label", "a/b"), ("--out", str(tmp_path / "file" / "folder"))):
-        assert cli.main(["bench", "cpu", *STRIP, "--out", str(tmp_path / "new"), option, text]) == 2
-        assert f"{option} {text}" in capsys.readouterr().err
+def test_a_link_that_leads_nowhere_stays(product, tmp_path):
+    for name in ("cpu-test.json", "trade.png"):
+        (tmp_path / name).symlink_to(tmp_path / "nowhere")
+    assert product("cpu", "no-such-scene")[0] == 2
+    assert product("accuracy", "no-such-scene", "--picture", str(tmp_path / "trade.png"))[0] == 2
+    assert (tmp_path / "cpu-test.json").is_symlink() and (tmp_path / "trade.png").is_symlink()
+    assert not (tmp_path / "nowhere").exists()
 
 
 @pytest.mark.skipif("gpu" in hc.backends(), reason="a GPU works here")
@@ -162,9 +169,8 @@ def test_files_that_hold_no_step(product, tmp_path, capfd, arrays, says):
 
 @pytest.mark.parametrize("kind", ["cut off", "an array alone", "text"])
 def test_files_that_cannot_be_read(product, tmp_path, capfd, kind):
-    folder = tmp_path / "data"
+    folder, path = tmp_path / "data", tmp_path / "data" / "bad.npz"
     folder.mkdir()
-    path = folder / "bad.npz"
     if kind == "an array alone":
         with path.open("wb") as file:
             np.save(file, np.eye(3))
@@ -172,44 +178,7 @@ def test_files_that_cannot_be_read(product, tmp_path, capfd, kind):
         np.savez(path, **STEP)
         path.write_bytes(path.read_bytes()[:200] if kind == "cut off" else b"no step")
     for words in ([str(path)], ["data", "--data", str(folder)]):
-        status, _, _ = product("cpu", *words, "--repeat", "1")
-        assert status == 2 and "bad.npz: not an .npz file of numbers" in capfd.readouterr().err
-    status, _, _ = product("cpu", "nosuchscene", "--data", str(folder))
-    assert status == 2 and "nosuchscene: neither a file" in capfd.readouterr().err
-
-
-@pytest.mark.parametrize(
-    ("words", "says"),
-    [
-        (["--picture", "/proc/no/x.png"], "--picture: /proc/no/x.png cannot be written"),
-        (["--picture", "x.bogus"], "name a .png"),
-        (["--picture", ""], "name a .png"),
-        (["--label", ""], "--label"),
-        (["--label", "a\nb"], "--label"),
-        (["--label", "x" * 300], "cannot be written"),
-    ],
-)
-def test_what_cannot_be_written_is_refused_before_anything_is_measured(tmp_path, capfd, monkeypatch, words, says):
-    monkeypatch.setattr(accuracy.measure, "measure", lambda *_: pytest.fail("measured"))
-    status = cli.main(["bench", "accuracy", *STRIP, "--out", str(tmp_path), *words])
-    assert status == 2 and says in capfd.readouterr().err
-
-
-def test_a_link_that_leads_nowhere_stays(product, tmp_path):
-    for name in ("cpu-test.json", "trade.png"):
-        (tmp_path / name).symlink_to(tmp_path / "nowhere")
-    assert product("cpu", "no-such-scene")[0] == 2
-    assert product("accuracy", "no-such-scene", "--picture", str(tmp_path / "trade.png"))[0] == 2
-    assert (tmp_path / "cpu-test.json").is_symlink() and (tmp_path / "trade.png").is_symlink()
-    assert not (tmp_path / "nowhere").exists()
-
-
-def test_a_name_too_long_for_a_file(product, capfd):
-    status, _, _ = product("accuracy", "y" * 300)
-    assert status == 2 and "name a file or a scene" in capfd.readouterr().err
-
-
-def test_no_usable_instruction_set(product, capfd):
-    other = next(simd for simd in ("neon", "avx2") if simd not in hc._core.simd_levels())
-    status, _, _ = product("accuracy", *STRIP, "--simd", other)
-    assert status == 2 and f"--simd {other}: none of these works here" in capfd.readouterr().err
+        assert product("cpu", *words, "--repeat", "1")[0] == 2
+        assert "bad.npz: not an .npz file of numbers" in capfd.readouterr().err
+    assert product("cpu", "nosuchscene", "--data", str(folder))[0] == 2
+    assert "nosuchscene: neither a file" in capfd.readouterr().err
