@@ -91,8 +91,7 @@ def begin(args, resolve: Callable = sources.resolve) -> tuple[Report, list[sourc
     try:
         Path(args.out).mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        why = f"no folder can be made there ({error.strerror})"
-        raise UserError(f"--out {args.out}: {why}; name another") from error
+        raise UserError(f"--out {args.out}: no folder can be made there ({error.strerror}); name another") from error
     require_writable("--out", Path(args.out) / f"{args.benchmark}-{args.label}.json")
     found = resolve(args.sources, sources.data_folder(args.data), args.default_sources, args.size)
     for source in found:

@@ -111,17 +111,12 @@ def text(value) -> str:
     """A number with three or more significant digits, counts in full."""
     if value is None:
         return "-"
-    if isinstance(value, (str, bool)):
+    if isinstance(value, (str, bool)) or not math.isfinite(value):
         return str(value)
-    if float(value).is_integer() and abs(value) < 1e15:
-        return f"{int(value):,}"
-    if not math.isfinite(value):
-        return str(value)
-    if abs(value) >= 1000:
-        return f"{value:,.0f}"
-    if abs(value) >= 0.01:
-        return f"{value:.3g}" if abs(value) < 100 else f"{value:.1f}"
-    return f"{value:.1e}"
+    size = abs(value)
+    if float(value).is_integer() and size < 1e15 or size >= 1000:
+        return f"{value + 0.0:,.0f}"
+    return f"{value:.1f}" if size >= 100 else f"{value:.3g}" if size >= 0.01 else f"{value:.1e}"
 
 
 def cores() -> int:

@@ -50,13 +50,8 @@ class Step:
     def scene(self) -> hc.Scene:
         scene = hc.Scene()
         for mesh in self.meshes:
-            scene.add_mesh(
-                mesh.name,
-                mesh.faces,
-                n_vertices=mesh.n_vertices,
-                static=mesh.static,
-                self_collision=mesh.self_collision,
-            )
+            how = {"n_vertices": mesh.n_vertices, "static": mesh.static, "self_collision": mesh.self_collision}
+            scene.add_mesh(mesh.name, mesh.faces, **how)
         for a, b in self.ignored_pairs:
             scene.ignore_pair(a, b)
         return scene
@@ -113,32 +108,21 @@ def resolve(words: Sequence[str], data: Path | None, default: Sequence[str], siz
     A word is "data" (every step file of the data folder), the name of one of them, the path of a recording (.mcap or
     its folder), of a mesh file or of an .npz file with one step, or the name of a generated scene, made with `size`.
     """
-    found = []
+    if data is None and "data" in words:
+        raise UserError("data: set HPCCD_DATA, or give the folder with --data DIR")
+    found: list[tuple[str, Source]] = []
     for word in words or default:
-        if word == "data":
-            if data is None:
-                if words:
-                    raise UserError("data: set HPCCD_DATA, or give the folder with --data DIR")
-                continue
-            found += [of_npz(path) for path in data_files(data)]
-        else:
-            found.append(_one(word, data, size))
-    found = _told_apart(words or default, found)
+        all_files = [(str(path), of_npz(path)) for path in data_files(data)] if word == "data" else None
+        found += [(word, _one(word, data, size))] if all_files is None else all_files
     if not found:
         raise UserError(
             "nothing to measure: name a scene (see `hpccd scene --list`), a recording or a mesh file, or set HPCCD_DATA"
         )
-    return found
-
-
-def _told_apart(words, found):
-    """Files of one name in several folders get names of their own: results are kept by name."""
-    names = [source.name for source in found]
-    if len(words) != len(found) or len(set(names)) == len(names):
-        return found
+    # Files of one name in several folders get names of their own: results are kept by name.
+    names = [source.name for _, source in found]
     return [
         dataclasses.replace(source, name=str(Path(word).with_suffix(""))) if names.count(source.name) > 1 else source
-        for word, source in zip(words, found, strict=True)
+        for word, source in found
     ]
 
 
@@ -237,10 +221,8 @@ def of_mesh(path: Path) -> Source:
     low, high = xyz.min(axis=0), xyz.max(axis=0)
 
     def copy(part):
-        turn = 0.5 * np.pi * part
-        turned = (xyz - (low + high) / 2) @ np.array(
-            [[1, 0, 0], [0, np.cos(turn), np.sin(turn)], [0, -np.sin(turn), np.cos(turn)]]
-        )
+        cos, sin = np.cos(0.5 * np.pi * part), np.sin(0.5 * np.pi * part)
+        turned = (xyz - (low + high) / 2) @ np.array([[1, 0, 0], [0, cos, sin], [0, -sin, cos]])
         return turned + (low + high) / 2 + [1.05 * (high[0] - low[0]) * (1 - 2 * part), 0, 0]
 
     def step(k):
@@ -272,13 +254,8 @@ def of_recording(path: Path) -> Source:
             Mesh(m.name, t.faces, t.n_vertices, m.static, m.self_collision)
             for m, t in zip(builder.meshes, after.topologies, strict=True)
         )
-        return Step(
-            meshes,
-            tuple(map(id, after.topologies)),
-            builder.concatenate(before, after),
-            builder.concatenate(after, after),
-            builder.ignored_pairs,
-        )
+        ends = builder.concatenate(before, after), builder.concatenate(after, after)
+        return Step(meshes, tuple(map(id, after.topologies)), *ends, builder.ignored_pairs)
 
     return Source(path.stem, len(frames) - 1, step)
 
