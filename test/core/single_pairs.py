@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """One vertex and face, or two edges, as a scene of their own; the same under other names; and many that touch."""
 
+import functools
 import itertools
 
 import numpy as np
@@ -100,6 +101,13 @@ DEGENERATE = [
 ]
 
 
-def contacts(kind, generate, number, accuracy="exact"):
+@functools.cache
+def _contacts(kind, generate, accuracy):
     queries = generate(np.random.default_rng(5), 800 if generate in DEGENERATE else 15000)
-    return queries[TEST[kind](queries, accuracy)[0]][:number]
+    queries = queries[TEST[kind](queries, accuracy)[0]]
+    queries.setflags(write=False)  # all callers have the same
+    return queries
+
+
+def contacts(kind, generate, number, accuracy="exact"):
+    return _contacts(kind, generate, accuracy)[:number]

@@ -166,7 +166,7 @@ def test_distances(generate, scale):
     vertices = meshes.vertices_t0 * scale
     answers = []
     for accuracy in TIERS:
-        for threads in (1, 2, 7):
+        for threads in (1, 7):
             detector = hc.Detector(meshes.scene(), accuracy=accuracy, threads=threads, backend="cpu")
             gaps = detector.distances(vertices)
             answers.append(told(gaps))

@@ -15,8 +15,8 @@ import numpy as np
 import hpccd_core as hc
 
 scene = hc.Scene()
-scene.add_mesh("soup", np.arange(3000).reshape(-1, 3))
-start, end = np.random.default_rng(1).standard_normal((2, 3000, 3))
+scene.add_mesh("soup", np.arange(1500).reshape(-1, 3))
+start, end = np.random.default_rng(1).standard_normal((2, 1500, 3))
 alone, several = (hc.Detector(scene, backend="cpu", threads=threads) for threads in (1, 8))
 expected = several.detect(start, end).hash
 

@@ -164,7 +164,7 @@ def test_wrong_steps_are_seen_saved_and_replayed(mistake, tmp_path, monkeypatch,
     with monkeypatch.context() as patch:
         patch.setattr(questions, "truth", truth_once)
         patch.setattr(hc.Detector, method, getattr(Mistakes, mistake))
-        arguments = ["--count", "400", "--batch", "60", "--simd", "auto", "--accuracy", "exact,conservative"]
+        arguments = ["--count", "300", "--batch", "30", "--simd", "auto", "--accuracy", "exact,conservative"]
         assert command.main([*arguments, "--question", STEP, "--save", str(saved)]) == 1
     with np.load(saved) as file:
         assert {key.split("|")[1] for key in file.files} == {"exact", "conservative"}

@@ -17,7 +17,7 @@ INTEGER_GENERATORS = ("lattice", "still", "on_line", "parallel_at_root", "thin",
 @pytest.mark.parametrize("kind", GENERATORS)
 @pytest.mark.parametrize("generator", INTEGER_GENERATORS)
 def test_distance_is_zero_at_toc_and_not_before(kind, generator):
-    queries = GENERATORS[kind][generator](np.random.default_rng(11), 3000)
+    queries = GENERATORS[kind][generator](np.random.default_rng(11), 800)
     hit, toc = ORACLE[kind](queries)
     assert hit.any() and not hit.all()
     assert distance_at(kind, queries, np.where(hit, toc, 0))[hit].max() < 1e-12
