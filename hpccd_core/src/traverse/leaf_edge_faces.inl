@@ -11,8 +11,9 @@ namespace {
 
 // These edges of a against these faces of b: one by one the faces, of which a leaf has fewer.
 template <class A, class B>
-HPCCD_HD void edges_against_faces(const LeafFeatures& a, const LeafFeatures& b, const typename A::Lanes& lanes_a,
-                                  const Sharing& shared, unsigned edges_a, unsigned faces_b, CandidateBuffer& out) {
+[[gnu::noinline]] void edges_against_faces(const LeafFeatures& a, const LeafFeatures& b,
+                                           const typename A::Lanes& lanes_a, const Sharing& shared, unsigned edges_a,
+                                           unsigned faces_b, CandidateBuffer& out) {
   if (!edges_a || !faces_b) return;
   const FeatureBoxes<B, 3> boxes(b);
   CandidateRows rows;
@@ -40,10 +41,11 @@ void leaf_edge_faces(const Tree& tree, const LeafRange& a, const LeafRange& b, C
     const typename A::Outcodes near_a({}, leaf_a, lanes_a, bounds_of(node_b));
     const unsigned edges_a = near_a.edges(leaf_a), faces_a = near_a.faces(leaf_a);
     Sharing a_with_b, b_with_a;
-    if (&a == &b) {
-      find_own(leaf_a, a_with_b);
-      return edges_against_faces<A, A>(leaf_a, leaf_a, lanes_a, a_with_b, edges_a, faces_a, edge_face);
-    }
+    if constexpr (std::is_same_v<A, B>)  // else the leaves are two
+      if (&a == &b) {
+        find_own(leaf_a, a_with_b);
+        return edges_against_faces<A, A>(leaf_a, leaf_a, lanes_a, a_with_b, edges_a, faces_a, edge_face);
+      }
     const typename B::Lanes lanes_b({}, leaf_b);
     const typename B::Outcodes near_b({}, leaf_b, lanes_b, bounds_of(node_a));
     if (node_a.mesh == node_b.mesh)
