@@ -4,7 +4,7 @@
 
 #include "base/parallel.h"
 #include "contacts/order.h"
-#include "contacts/places.h"
+#include "contacts/outputs.h"
 #include "elementary/batch.h"
 #include "traverse/worker.h"
 

@@ -4,21 +4,9 @@
 
 #include "contacts/contact_point.h"
 #include "contacts/nearest_points.h"
+#include "contacts/outputs.h"
 
 namespace hpccd {
-
-// When the features are looked at for points and directions.
-enum class AtTime : bool { contact, start };
-
-struct Outputs {
-  bool points, normals, closest;
-  AtTime at;
-};
-
-struct PairPlaces {
-  Vec3<double> point, normal;
-  Vec3<double> closest[2];  // on the first feature, on the second
-};
 
 // Vertices as in motion.h. What nobody asked for is zero.
 template <Kind kind, class Arbiter>

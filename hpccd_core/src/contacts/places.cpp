@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "contacts/places.h"
 
-#include "elementary/undecided.h"
+#include "contacts/pair_places.h"
 
 namespace hpccd {
 namespace {

@@ -2,9 +2,10 @@
 // Points, normals and nearest points of a contact, as far as they were asked for.
 #pragma once
 
-#include "contacts/pair_places.h"
+#include "contacts/outputs.h"
 #include "elementary/batch.h"
 #include "elementary/pair.h"
+#include "elementary/undecided.h"
 
 namespace hpccd {
 

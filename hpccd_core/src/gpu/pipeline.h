@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "bvh/tree.h"
-#include "contacts/pair_places.h"
+#include "contacts/outputs.h"
 #include "elementary/pair.h"
 #include "gpu/places.h"
 #include "gpu/query.h"
