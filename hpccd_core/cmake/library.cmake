@@ -9,6 +9,9 @@ list(REMOVE_ITEM cold ${hot})
 add_library(hpccd_core_hot OBJECT ${hot})
 add_library(hpccd_core_cold OBJECT ${cold})
 hpccd_compile_all_kernels(hpccd_core_hot)
+# The standard headers cost a source of the hot part half of its time; precompiled they change nothing in its object.
+target_precompile_headers(hpccd_core_hot PRIVATE <algorithm> <array> <atomic> <chrono> <cmath> <cstdint> <cstring>
+  <functional> <limits> <map> <memory> <mutex> <optional> <span> <stdexcept> <string> <thread> <utility> <vector>)
 foreach(part hpccd_core_hot hpccd_core_cold)
   target_include_directories(${part} PRIVATE include src)
   target_include_directories(${part} SYSTEM PRIVATE ${BOOST_INCLUDE})

@@ -8,7 +8,9 @@ if(pybind11_dir)
 endif()
 set(PYBIND11_FINDPYTHON ON)
 find_package(pybind11 CONFIG REQUIRED)
-pybind11_add_module(_core src/bindings.cpp src/bindings_device.cpp src/bindings_rigid.cpp)
+# No link-time optimization: there is nothing hot in the bindings, and it took a third of their time.
+pybind11_add_module(_core NO_EXTRAS src/bindings.cpp src/bindings_device.cpp src/bindings_rigid.cpp)
+pybind11_strip(_core)
 set_target_properties(_core PROPERTIES UNITY_BUILD ON)
 target_include_directories(_core PRIVATE src)
 target_compile_options(_core PRIVATE -ffp-contract=off -Wall -Wextra $<$<CONFIG:Release>:-O2>)
@@ -25,5 +27,5 @@ if(DEFINED HPCCD_PYTHON_DIR)
   install(DIRECTORY "${CMAKE_CURRENT_SOURCE_DIR}/" DESTINATION "${HPCCD_PYTHON_DIR}/hpccd_core" COMPONENT python
     FILES_MATCHING PATTERN "*.py" PATTERN "*.pyi" PATTERN "py.typed"
     PATTERN "__pycache__" EXCLUDE PATTERN "include" EXCLUDE PATTERN "src" EXCLUDE PATTERN "tests" EXCLUDE
-    PATTERN "cmake" EXCLUDE PATTERN "bench" EXCLUDE)
+    PATTERN "cmake" EXCLUDE)
 endif()

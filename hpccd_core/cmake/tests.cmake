@@ -14,6 +14,8 @@ target_link_libraries(hpccd_core_tests PRIVATE hpccd_core_static GTest::gtest_ma
 target_compile_options(hpccd_core_tests PRIVATE -ffp-contract=off -O1)
 target_include_directories(hpccd_core_tests PRIVATE tests src)
 target_include_directories(hpccd_core_tests SYSTEM PRIVATE ${BOOST_INCLUDE})
+target_precompile_headers(hpccd_core_tests PRIVATE <gtest/gtest.h> <algorithm> <cmath> <cstdint> <functional> <limits>
+  <map> <memory> <optional> <random> <string> <thread> <vector>)
 include(GoogleTest)
 gtest_discover_tests(hpccd_core_tests)
 
