@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Random pairs of features under random screws and joint motions: none missed, none late, none beyond twice the bound.
 
-`hpccd bench rigid` asks a hundred thousand of each.
+`make bench BENCH_ARGS=rigid` asks a hundred thousand of each.
 """
 
 import numpy as np
