@@ -112,8 +112,10 @@ def resolve(words: Sequence[str], data: Path | None, default: Sequence[str], siz
         raise UserError("data: set HPCCD_DATA, or give the folder with --data DIR")
     found: list[tuple[str, Source]] = []
     for word in words or default:
-        all_files = [(str(path), of_npz(path)) for path in data_files(data)] if word == "data" else None
-        found += [(word, _one(word, data, size))] if all_files is None else all_files
+        if word == "data":
+            found += [(str(path), of_npz(path)) for path in data_files(data)]
+        else:
+            found.append((word, _one(word, data, size)))
     if not found:
         raise UserError(
             "nothing to measure: name a scene (see `hpccd scene --list`), a recording or a mesh file, or set HPCCD_DATA"
