@@ -15,11 +15,10 @@ set(hpccd_sources
   src/elementary/exact/wide/isolate.cpp src/elementary/exact/wide/part.cpp src/elementary/exact/wide/root.cpp
   src/elementary/exact/wide/sign_at_root.cpp src/elementary/fallback.cpp src/elementary/intersection_batch.cpp
   src/elementary/queries.cpp
-  src/traverse/drift.cpp src/traverse/far_pairs.cpp src/traverse/fine_boxes.cpp
+  src/traverse/contact_search.cpp src/traverse/drift.cpp src/traverse/far_pairs.cpp src/traverse/fine_boxes.cpp
   src/traverse/leaf_edge_faces.cpp src/traverse/leaf_hulls.cpp src/traverse/leaf_pairs.cpp src/traverse/mesh_pairs.cpp
   src/traverse/less_excess.cpp src/traverse/near_corners.cpp src/traverse/nearest_pairs.cpp
-  src/traverse/pair_pool.cpp
-  src/traverse/traverse.cpp src/traverse/worker.cpp
+  src/traverse/pair_pool.cpp src/traverse/snapshot_search.cpp src/traverse/worker.cpp
   src/contacts/canonical.cpp src/contacts/gaps.cpp src/contacts/intersections.cpp src/contacts/nearest_points.cpp
   src/contacts/order.cpp src/contacts/parts.cpp src/contacts/places.cpp src/contacts/worlds.cpp
   src/paper/build.cpp src/paper/front.cpp src/paper/front_based.cpp src/paper/hierarchy.cpp

@@ -7,11 +7,9 @@
 
 #include "contacts/gaps.h"
 #include "contacts/intersections.h"
-#include "elementary/distance/distance_batch.h"
 #include "paper/primitive_pairs.h"
 #include "scene/edge_sample.h"
-#include "traverse/snapshot.h"
-#include "traverse/traverse.h"
+#include "traverse/leaf_hulls.h"
 
 namespace hpccd {
 namespace {
@@ -107,7 +105,6 @@ CpuBackend::CpuBackend(Resources& shared)
       method_(paper::engine_of(shared.options, {shared.features, shared.rules, shared.pool})),
       workers_(static_cast<std::size_t>(shared.pool.size())) {
   one_thread_.heed(shared.cancellation);
-  search_.cancellation = &shared.cancellation;
 }
 
 std::optional<Detection> CpuBackend::detect(Positions t0, Positions t1) {
@@ -134,54 +131,36 @@ void CpuBackend::update(Positions t0, Positions t1, Tests tests) {
 void CpuBackend::begin_motion(Positions t0, Positions t1, Tests tests) {
   const Options& o = shared_.options;
   shared_.tree.bound(t0, t1, shared_.separations.largest());
-  begin_query();
-  search_.geometry.separations = shared_.separations_now();
-  search_.geometry.margin = {shared_.separations.most() + shared_.tree.motion().rounding,
-                             shared_.tree.motion().map.scale};
-  search_.block_pairs = block_pairs(o.simd);
-  search_.block_pairs_less_excess = block_pairs_less_excess(o.simd);
-  search_.leaf_pairs_less_excess = leaf_pairs_less_excess(o.simd);
-  search_.excess = Excess(shared_.tree.motion(), shared_.separations);
-  search_.leaf_pairs = leaf_pairs(o.simd);
-  search_.leaf_pairs_until = leaf_pairs_until(o.simd);
-  search_.leaf_pairs_at_start = leaf_pairs_at_start(o.simd);
-  const MotionBounds& motion = shared_.tree.motion();
-  const bool rounds = floats_suffice(motion.short_edge, motion.map.scale);
-  search_.geometry.rounded = rounds ? motion.rounded.data() : nullptr;
-  const bool here = tests == Tests::all_here;
-  search_.report = !here && o.report == Report::any ? Report::all : o.report;
-  for (unsigned i = 0; i < n_rules; ++i) {
-    const Rule rule = Rule::of_number(i);
-    const bool as_balanced = rule.accuracy == Accuracy::fast && !(here && rounds);
-    search_.batch_test[i] = rule.separated ? separation_batch(o.simd)
-                                           : batch_test(o.simd, as_balanced ? Accuracy::balanced : rule.accuracy);
-    search_.fallback[i] = rule.separated ? decide_separation : decide_contact;
-  }
-}
-
-// With new bounds, nothing is looked at yet.
-void CpuBackend::begin_query() {
   shared_.profiler.mark("bounds");
   const MotionBounds& motion = shared_.tree.motion();
-  search_.geometry = {motion.vertices.data(), shared_.features.edges.data(), shared_.features.faces.data(),
-                      motion.kdops.data()};
-  search_.earliest = std::numeric_limits<double>::infinity();
-  search_.excess = {};
-  search_.leaf_pairs = nullptr, search_.leaf_pairs_in_snapshot = nullptr, search_.leaf_edge_faces = nullptr;
-  search_.nearest = nullptr;
-  search_.time_only = search_.prunes = false;
-  search_.drift = nullptr;
-  search_.most_found = std::numeric_limits<std::size_t>::max();
+  const bool rounds = floats_suffice(motion.short_edge, motion.map.scale), here = tests == Tests::all_here;
+  search_.emplace(shared_.tree.tree(), shared_.rules, o.simd, here && rounds);
+  begin(*search_);
+  search_->geometry.separations = shared_.separations_now();
+  search_->geometry.margin = {shared_.separations.most() + motion.rounding, motion.map.scale};
+  search_->geometry.rounded = rounds ? motion.rounded.data() : nullptr;
+  search_->excess = Excess(motion, shared_.separations);
+  search_->report = !here && o.report == Report::any ? Report::all : o.report;
+  counts_ = {};
+  counts_.asked[0] = counts_.asked[1] = true;
+  counts_.earliest = search_->report == Report::first, counts_.timed = walks_tree();
+}
+
+void CpuBackend::begin(Search& search) const {
+  const MotionBounds& motion = shared_.tree.motion();
+  search.geometry = {motion.vertices.data(), shared_.features.edges.data(), shared_.features.faces.data(),
+                     motion.kdops.data()};
+  search.cancellation = &shared_.cancellation;
 }
 
 void CpuBackend::traverse() {
-  if (!method_) return walk_tree();
-  method_->traverse(*swept_, search_, workers_);
+  if (!method_) return walk_tree(*search_);
+  method_->traverse(*swept_, *search_, workers_);
   mark_traversal();
 }
 
-void CpuBackend::walk_tree() {
-  hpccd::traverse(shared_.tree.tree(), shared_.rules, search_, shared_.pool, workers_);
+void CpuBackend::walk_tree(Search& search) {
+  search.traverse(shared_.pool, workers_);
   mark_traversal();
 }
 
@@ -200,8 +179,7 @@ void CpuBackend::test(const std::vector<LeafPair>& pairs) {
 }
 
 void CpuBackend::test_leaves_of_tree(const std::vector<LeafPair>& pairs) {
-  test_each(pairs,
-            [&](LeafPair pair, Worker& worker) { test_leaves(shared_.tree.tree(), shared_.rules, pair, worker); });
+  test_each(pairs, [&](LeafPair pair, Worker& worker) { search_->test_leaves(pair, worker); });
 }
 
 template <class Test>
@@ -215,16 +193,16 @@ void CpuBackend::test_each(const std::vector<LeafPair>& pairs, Test&& test) {
 
 Contacts CpuBackend::collect() {
   const Options& o = shared_.options;
-  return collect({o.points, o.normals, o.closest, AtTime::contact});
+  return collect(*search_, {o.points, o.normals, o.closest, AtTime::contact});
 }
 
-Contacts CpuBackend::collect(Outputs outputs) {
+Contacts CpuBackend::collect(const Search& search, Outputs outputs) {
   // Handing out the work (five jobs) takes as long as the work on so many.
   constexpr std::size_t few = 1024;
   std::size_t n = 0;
   for (const Worker& w : workers_) n += w.vertex_face.size() + w.edge_edge.size();
   contacts_ = {};
-  collect_contacts(workers_, search_.geometry, search_.report, outputs, order_, n < few ? one_thread_ : shared_.pool,
+  collect_contacts(workers_, search.geometry, search.report, outputs, order_, n < few ? one_thread_ : shared_.pool,
                    contacts_);
   shared_.profiler.mark("contacts");
   shared_.cancellation.heed();  // whoever cancelled a call shall not have to look at its answer
@@ -232,13 +210,9 @@ Contacts CpuBackend::collect(Outputs outputs) {
 }
 
 WorkCounts CpuBackend::last_counts() const {
-  WorkCounts counts;
+  WorkCounts counts = counts_;
   counts.add(workers_);
   counts.near_pairs = near_.size();
-  counts.asked[0] = counts.asked[1] = search_.leaf_pairs || search_.leaf_pairs_in_snapshot;
-  counts.asked[2] = search_.leaf_edge_faces != nullptr;
-  counts.earliest = search_.report == Report::first;
-  counts.timed = search_.leaf_pairs && walks_tree();
   return counts;
 }
 
@@ -267,59 +241,55 @@ void CpuBackend::end_world(WorldMemory& memory) {
   shared_.tree.end_world();
 }
 
-// Queries of one snapshot: what each of them lets the common traversal look at.
+// Queries of one snapshot.
 
 std::optional<Contacts> CpuBackend::proximity(Positions vertices, double distance) {
-  see_near(vertices, distance);
-  walk_tree();
-  return collect({false, false, shared_.options.closest, AtTime::start});
+  ProximitySearch search(shared_.tree.tree(), shared_.rules, shared_.options.simd);
+  begin_proximity(vertices, distance, search);
+  counts_.asked[0] = counts_.asked[1] = true;
+  walk_tree(search);
+  return collect(search, {false, false, shared_.options.closest, AtTime::start});
 }
 
 std::optional<Intersections> CpuBackend::intersections(Positions vertices) {
-  begin_snapshot(vertices);
-  search_.leaf_edge_faces = leaf_edge_faces(shared_.options.simd);
-  search_.reach = 0;
-  walk_tree();
-  Intersections found = collect_intersections(workers_, search_.geometry, order_, shared_.pool);
+  fit_snapshot(vertices);
+  IntersectionSearch search(shared_.tree.tree(), shared_.rules, shared_.options.simd);
+  begin(search);
+  counts_.asked[2] = true;
+  walk_tree(search);
+  Intersections found = collect_intersections(workers_, search.geometry, order_, shared_.pool);
   shared_.profiler.mark("contacts");
   shared_.cancellation.heed();
   return found;
 }
 
 std::optional<std::vector<Gap>> CpuBackend::distances(Positions vertices) {
-  const Options& o = shared_.options;
-  begin_snapshot(vertices);
+  fit_snapshot(vertices);
   if (!mesh_pairs_) mesh_pairs_.emplace(shared_.rules, shared_.scene->meshes().size());
-  search_.nearest =
-      std::make_unique<NearestPairs>(*mesh_pairs_, shared_.features, shared_.tree.motion(), shared_.tree.tree());
-  search_.leaf_pairs_in_snapshot = leaf_pairs_in_snapshot(o.simd);
-  search_.far_pairs = far_pairs(o.simd);
-  search_.leaf_edge_faces = leaf_edge_faces(o.simd);
-  walk_tree();
-  std::vector<Gap> gaps = collect_gaps(*search_.nearest, search_.geometry, shared_.cancellation);
-  search_.nearest = nullptr;
+  NearestPairs nearest(*mesh_pairs_, shared_.features, shared_.tree.motion(), shared_.tree.tree());
+  DistanceSearch search(shared_.tree.tree(), shared_.rules, shared_.options.simd, nearest);
+  begin(search);
+  counts_.asked[0] = counts_.asked[1] = counts_.asked[2] = true;
+  walk_tree(search);
+  std::vector<Gap> gaps = collect_gaps(nearest, search.geometry, shared_.cancellation);
   shared_.profiler.mark("contacts");
   shared_.cancellation.heed();
   return gaps;
 }
 
 // Pairs of features within a distance.
-void CpuBackend::see_near(Positions vertices, double distance) {
-  begin_snapshot(vertices, distance);
-  search_.geometry.separations = {distance};
-  search_.leaf_pairs_in_snapshot = leaf_pairs_in_snapshot(shared_.options.simd);
-  search_.reach = reach_of(distance, shared_.tree.motion().box_rounding, shared_.tree.motion().box_scale);
+void CpuBackend::begin_proximity(Positions vertices, double distance, ProximitySearch& search) {
+  fit_snapshot(vertices, distance);
+  begin(search);
+  search.geometry.separations = {distance};
+  search.reach = reach_of(distance, shared_.tree.motion().box_rounding, shared_.tree.motion().box_scale);
 }
 
-void CpuBackend::begin_snapshot(Positions vertices, double distance) {
-  const Simd simd = shared_.options.simd;
+void CpuBackend::fit_snapshot(Positions vertices, double distance) {
   shared_.tree.bound(vertices, distance);
-  begin_query();
+  shared_.profiler.mark("bounds");
   shared_.tree.fit(shared_.profiler);
-  search_.report = Report::all;
-  for (unsigned i = 0; i < n_rules; ++i)
-    search_.batch_test[i] = proximity_batch(simd), search_.fallback[i] = decide_proximity;
-  search_.intersection_batch = intersection_batch(simd);
+  counts_ = {};
 }
 
 // The earliest contacts. Pairs known to be near give the best time so far at once, and often the answer; else the tree
@@ -328,13 +298,13 @@ void CpuBackend::begin_snapshot(Positions vertices, double distance) {
 std::optional<std::vector<double>> CpuBackend::earliest(Positions t0, Positions t1) {
   find_earliest(t0, t1, true);
   shared_.cancellation.heed();
-  return std::vector<double>{search_.earliest};
+  return std::vector<double>{search_->earliest};
 }
 
 // Leaves what it found in the workers.
 void CpuBackend::find_earliest(Positions t0, Positions t1, bool time_only) {
   begin_earliest(t0, t1, time_only);
-  if (search_.prunes) {
+  if (search_->prunes) {
     if (answer_from_near_pairs() || answer_from_unlisted_pairs(time_only)) return;
     if (near_.radius().known() && near_.radius().failed(travel_))
       near_.begin_at(shared_.tree.motion().vertices, shared_.pool);
@@ -345,21 +315,21 @@ void CpuBackend::find_earliest(Positions t0, Positions t1, bool time_only) {
     limit_boxes();
   }
   shared_.tree.fit(shared_.profiler);
-  walk_tree();
-  if (search_.prunes) remember_earliest();
+  walk_tree(*search_);
+  if (search_->prunes) remember_earliest();
 }
 
 void CpuBackend::limit_boxes() {
   const double scale = shared_.tree.motion().box_scale;
-  search_.two_ways = static_cast<float>(2 * travel_.way * scale);
-  search_.most_reach = static_cast<float>(near_.radius().edge / 4 * scale);
+  search_->two_ways = static_cast<float>(2 * travel_.way * scale);
+  search_->most_reach = static_cast<float>(near_.radius().edge / 4 * scale);
 }
 
 void CpuBackend::begin_earliest(Positions t0, Positions t1, bool time_only) {
   begin_motion(t0, t1, Tests::all_here);
-  search_.report = Report::first;
-  search_.time_only = time_only;
-  search_.prunes = shared_.rules.promise_times();
+  search_->report = Report::first, counts_.earliest = true;
+  search_->time_only = time_only;
+  search_->prunes = shared_.rules.promise_times();
 }
 
 // Tests the pairs that are near, and says whether that was enough. The best time so far is known then in any case.
@@ -367,16 +337,16 @@ bool CpuBackend::answer_from_near_pairs() {
   if (const std::uint64_t now = shared_.separations.version(); near_.radius().separations != now)
     near_ = {}, near_.radius().separations = now, drift_of_.reset();
   test_groups(near_.hints);
-  if (!search_.over()) test_groups(near_.groups());
+  if (!search_->over()) test_groups(near_.groups());
   mark_traversal();
-  if (search_.over()) return true;
+  if (search_->over()) return true;
   travel_ = near_.see(shared_.tree.motion().vertices, shared_.pool);
-  return near_.radius().answers(search_.earliest, travel_);
+  return near_.radius().answers(search_->earliest, travel_);
 }
 
 // Leaves what it found in the workers, and nothing else.
 void CpuBackend::test_groups(const std::vector<NearList::Group>& groups) {
-  for (Worker& w : workers_) w.begin(search_);
+  for (Worker& w : workers_) w.begin(*search_);
   for (const NearList::Group& group : groups) {
     constexpr std::size_t grain = 256;  // 10 us, as long as it takes to wake a thread
     parallel_for(shared_.pool, group.first.size(), grain, [&](std::size_t begin, std::size_t end, int thread) {
@@ -393,15 +363,16 @@ bool CpuBackend::list_near_pairs(Positions t0) {
   NearRadius& list = near_.radius();
   list.edge = typical_length(shared_.features, shared_.tree.motion().vertices);
   if (!list.next_would_pay(travel_)) return false;
-  std::optional<double> radius = list.next(travel_, search_.earliest);
+  std::optional<double> radius = list.next(travel_, search_->earliest);
   const bool wide = !radius && list.edge > 0 && list.wider_would_pay();
   if (wide) radius = wide_radius();
   const std::optional<double> distance = listed_distance(radius, shared_.separations.most());
   if (!distance) return false;
-  see_near(t0, *distance);
-  search_.most_found = wide ? most_listed_wide(shared_.features) : most_listed(shared_.features), search_.n_found = 0;
-  walk_tree();
-  if (search_.gave_up()) {
+  ProximitySearch search(shared_.tree.tree(), shared_.rules, shared_.options.simd);
+  begin_proximity(t0, *distance, search);
+  search.most_found = wide ? most_listed_wide(shared_.features) : most_listed(shared_.features);
+  walk_tree(search);
+  if (search.gave_up()) {
     wide ? list.gave_up_wider() : list.gave_up();
     return true;
   }
@@ -424,7 +395,7 @@ void CpuBackend::remember_earliest() {
     for (const auto& [list, kind] :
          {std::pair(&w.vertex_face, Kind::vertex_face), std::pair(&w.edge_edge, Kind::edge_edge)})
       for (const Contact& c : *list)
-        if (c.toc <= search_.earliest && n++ < enough) near.add({c.first, c.second, kind});
+        if (c.toc <= search_->earliest && n++ < enough) near.add({c.first, c.second, kind});
   near_.hints = std::move(near.groups);
 }
 
@@ -449,7 +420,7 @@ bool CpuBackend::answer_from_unlisted_pairs(bool time_only) {
     limit_boxes();
     test_leaves_of_tree(*open);
   }
-  if (!time_only) join_found(std::move(found), search_.earliest, workers_);
+  if (!time_only) join_found(std::move(found), search_->earliest, workers_);
   mark_traversal();
   return true;
 }
@@ -481,11 +452,9 @@ void CpuBackend::update_drift() {
 
 // Pairs of leaves that may touch and are not all listed; nothing where there are too many.
 std::optional<std::vector<LeafPair>> CpuBackend::open_pairs() {
-  const OpenPairs open(search_, workers_, most_open * shared_.tree.tree().leaves.size());
-  search_.drift = &drift_;
-  hpccd::traverse(shared_.tree.tree(), shared_.rules, search_, shared_.pool, workers_);
-  search_.drift = nullptr;
-  if (search_.gave_up()) return std::nullopt;
+  const OpenPairs open(*search_, workers_, most_open * shared_.tree.tree().leaves.size());
+  search_->traverse_unlisted(drift_, shared_.pool, workers_);
+  if (search_->gave_up()) return std::nullopt;
   return open.all();
 }
 

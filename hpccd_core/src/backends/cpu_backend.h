@@ -48,7 +48,7 @@ class CpuBackend final : public DetectionBackend {
   std::vector<Worker>& workers() { return workers_; }
 
  private:
-  void begin_query();
+  void begin(Search& search) const;
   void find_earliest(Positions t0, Positions t1, bool time_only);
   void begin_earliest(Positions t0, Positions t1, bool time_only);
   bool answer_from_near_pairs();
@@ -61,21 +61,22 @@ class CpuBackend final : public DetectionBackend {
   std::optional<std::vector<LeafPair>> open_pairs();
   void remember_earliest();
   void begin_motion(Positions t0, Positions t1, Tests tests);
-  void see_near(Positions vertices, double distance);
-  void begin_snapshot(Positions vertices, double distance = 0);
-  void walk_tree();
+  void begin_proximity(Positions vertices, double distance, ProximitySearch& search);
+  void fit_snapshot(Positions vertices, double distance = 0);
+  void walk_tree(Search& search);
   template <class Test>
   void test_each(const std::vector<LeafPair>& pairs, Test&& test);
   void mark_traversal();
   WorkCounts last_counts() const;
-  Contacts collect(Outputs outputs);
+  Contacts collect(const Search& search, Outputs outputs);
 
   Resources& shared_;
   ThreadPool one_thread_{1};
   std::unique_ptr<paper::MethodEngine> method_;  // published; none for the default traversal
   const std::vector<Box>* swept_ = nullptr;      // for a published method
   std::vector<Worker> workers_;
-  Search search_{};
+  std::optional<ContactSearch> search_;  // of the last motion
+  WorkCounts counts_;                    // what the last query counts, without its numbers
   ContactOrder order_;
   NearList near_;                        // for the earliest contacts of motions that begin alike
   Drift drift_;                          // from where it was made

@@ -172,6 +172,7 @@ struct Tree {
   std::vector<std::uint32_t> leaf_nodes;
   std::vector<Block> blocks;
   std::vector<std::uint32_t> block_of_leaf;
+  const Node& node_of_leaf(std::uint32_t leaf) const { return nodes[leaf_nodes[leaf]]; }
   // Whether a node is a block's, or below one.
   static bool in_block(const Node& node) {
     return node.mesh != mixed_meshes && node.primitives <= Block::width * leaf_size;

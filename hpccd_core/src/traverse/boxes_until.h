@@ -12,7 +12,7 @@ namespace hpccd {
 struct BoxesUntil {
   using Ends = AtLeaves;
   static constexpr bool shrink = true;
-  const Search& search;
+  const ContactSearch& search;
   // When it was looked at last.
   double best = search.earliest.load(std::memory_order_relaxed);
   PartOfMotion part = search.part();

@@ -4,7 +4,7 @@
 
 #include "traverse/boxes_until.h"
 #include "traverse/pair_pool.h"
-#include "traverse/traverse.h"
+#include "traverse/worker.h"
 
 namespace hpccd {
 namespace {
@@ -13,14 +13,13 @@ namespace {
 
 }  // namespace
 
-void traverse_less_excess(const Tree& tree, const PairRules& rules, Search& search, ThreadPool& pool,
-                          std::vector<Worker>& workers) {
-  if (search.report == Report::any)
-    traverse_any(tree, rules, MotionBoxesLessExcess{search.excess}, search, pool, workers);
-  else if (search.prunes)
-    traverse_all(tree, rules, BoxesUntilLessExcess{{search}}, search, pool, workers);
+void ContactSearch::traverse_less_excess(ThreadPool& pool, std::vector<Worker>& workers) {
+  if (report == Report::any)
+    traverse_any(MotionBoxesLessExcess{excess}, *this, pool, workers);
+  else if (prunes)
+    traverse_all(BoxesUntilLessExcess{{*this}}, *this, pool, workers);
   else
-    traverse_all(tree, rules, MotionBoxesOfBlocksLessExcess{{search.excess}}, search, pool, workers);
+    traverse_all(MotionBoxesOfBlocksLessExcess{{excess}}, *this, pool, workers);
 }
 
 }  // namespace hpccd

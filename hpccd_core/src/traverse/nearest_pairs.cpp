@@ -5,8 +5,8 @@
 #include <tuple>
 
 #include "elementary/distance/proximity_test.h"
+#include "traverse/leaf_hulls.h"
 #include "traverse/near_corners.h"
-#include "traverse/snapshot.h"
 
 namespace hpccd {
 namespace {

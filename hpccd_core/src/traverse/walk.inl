@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The walk over pairs of nodes, in two forms: over all of them, or until any contact is found. Included in an unnamed
 // namespace of several sources: the number of box types in a source affects how much of the walk the compiler inlines,
-// and three more of them in traverse.cpp cost each of the others a tenth.
+// and three more of them in one source cost each of the others a tenth.
 
 const Block& block_of(const Tree& tree, std::uint32_t node) {
   return tree.blocks[tree.block_of_leaf[tree.nodes[node].leaf]];
@@ -9,22 +9,24 @@ const Block& block_of(const Tree& tree, std::uint32_t node) {
 
 // Starts from pairs worth visiting. `between` is called between two pairs and may take from the stack; the walk ends if
 // it returns false.
-template <class Boxes, class Between>
-void walk(const Tree& tree, const PairRules& rules, Boxes boxes, const Cancellation& cancellation,
-          std::vector<NodePair>& stack, Worker& worker, Between&& between) {
-  const bool bounded = worker.search().bounded();
+template <class Boxes, class Query, class Between>
+void walk(Boxes boxes, const Query& search, std::vector<NodePair>& stack, Worker& worker, Between&& between) {
+  const Tree& tree = search.tree;
+  const PairRules& rules = search.rules;
+  const Cancellation& cancellation = *search.cancellation;
+  const bool bounded = search.bounded();
   constexpr typename Boxes::Ends ends;
   const auto at_leaves = [&](LeafPair leaves) {
     const std::uint64_t before = worker.leaf_pairs++;
     if (!worker.sink)
-      worker.leaf_pairs_time.run(before, worker.elementary_seconds, [&] { test_leaves(tree, rules, leaves, worker); });
+      worker.leaf_pairs_time.run(before, worker.elementary_seconds, [&] { search.test_leaves(leaves, worker); });
     else
-      for (const LeafPair left : worker.sink->push(leaves)) test_leaves(tree, rules, left, worker);
+      for (const LeafPair left : worker.sink->push(leaves)) search.test_leaves(left, worker);
   };
   std::size_t stale = 0;  // number of pairs at the bottom that were pushed when boxes were larger
   while (!stack.empty()) {
     cancellation.heed();
-    if (bounded && worker.search().gave_up()) return stack.clear();
+    if (bounded && search.gave_up()) return stack.clear();
     const NodePair p = stack.back();
     stack.pop_back();
     if constexpr (Boxes::shrink) {
@@ -37,7 +39,6 @@ void walk(const Tree& tree, const PairRules& rules, Boxes boxes, const Cancellat
     if (is_end(tree.nodes, p, ends)) {
       if constexpr (std::is_same_v<typename Boxes::Ends, AtBlocks>) {
         LeafPair found[block_pairs_capacity];
-        const Search& search = worker.search();
         const Block &a = block_of(tree, p.a), &b = block_of(tree, p.b);
         const float excess = search.excess.of(tree.nodes[p.a], tree.nodes[p.b]);
         const std::uint32_t n = excess > 0 ? search.block_pairs_less_excess(tree, a, b, excess, found)
@@ -70,12 +71,11 @@ void keep_least(Worker& worker) {
 
 // The task with the lowest number that has a contact decides, by the first batches of it that find one: each task is
 // walked separately, starting with empty batches. So the result does not depend on the threads.
-template <class Boxes>
-void traverse_any(const Tree& tree, const PairRules& rules, const Boxes& boxes, Search& search, ThreadPool& pool,
-                  std::vector<Worker>& workers) {
+template <class Boxes, class Query>
+void traverse_any(const Boxes& boxes, Query& search, ThreadPool& pool, std::vector<Worker>& workers) {
   // Which contact is reported depends on the list, so it must not depend on the threads.
   constexpr std::size_t enough = 4096;
-  const std::vector<NodePair> tasks = traversal_tasks(tree, rules, boxes, enough);
+  const std::vector<NodePair> tasks = traversal_tasks(search.tree, search.rules, boxes, enough);
   std::atomic<std::size_t> next{0}, found{tasks.size()};
   pool.run([&](int thread) {
     Worker& worker = workers[thread];
@@ -87,7 +87,7 @@ void traverse_any(const Tree& tree, const PairRules& rules, const Boxes& boxes, 
       if (task >= tasks.size() || task > found.load()) return;
       worker.begin_task();
       stack.push_back(tasks[task]);
-      walk(tree, rules, boxes, *search.cancellation, stack, worker,
+      walk(boxes, search, stack, worker,
            [&] { return !worker.has_found() && task < found.load(std::memory_order_relaxed); });
       if (task > found.load()) return;  // so are all later tasks
       if (!worker.has_found()) worker.flush();
@@ -103,15 +103,14 @@ void traverse_any(const Tree& tree, const PairRules& rules, const Boxes& boxes, 
     if (w.best_task != found.load()) w.vertex_face.clear(), w.edge_edge.clear();
 }
 
-template <class Boxes>
-void traverse_all(const Tree& tree, const PairRules& rules, const Boxes& boxes, Search& search, ThreadPool& pool,
-                  std::vector<Worker>& workers) {
+template <class Boxes, class Query>
+void traverse_all(const Boxes& boxes, Query& search, ThreadPool& pool, std::vector<Worker>& workers) {
   for (Worker& w : workers) w.begin(search);
   // Enough for the threads to begin with; making 4096 instead took 0.9 of the 4.6 ms of a scene of 18 K triangles.
   constexpr std::size_t enough = 64;
-  std::vector<NodePair> tasks = traversal_tasks(tree, rules, boxes, enough);
+  std::vector<NodePair> tasks = traversal_tasks(search.tree, search.rules, boxes, enough);
   if constexpr (Boxes::shrink) boxes.sort(tasks, 0);  // the last is taken first
-  PairPool pairs(tree, tasks, pool.size());
+  PairPool pairs(search.tree, tasks, pool.size());
   pool.share([&](int thread) {
     Worker& worker = workers[thread];
     BusyThread busy(pairs, thread);
@@ -121,7 +120,7 @@ void traverse_all(const Tree& tree, const PairRules& rules, const Boxes& boxes, 
       if (!worker.sink) worker.flush();
     };
     while (busy.next(stack, meanwhile))
-      walk(tree, rules, boxes, *search.cancellation, stack, worker, [&] {
+      walk(boxes, search, stack, worker, [&] {
         if (pairs.wanted()) pairs.push_half(stack);
         return true;
       });

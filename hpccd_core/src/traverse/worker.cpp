@@ -11,17 +11,6 @@
 #include "elementary/undecided.h"
 
 namespace hpccd {
-namespace {
-
-// One vertex of each feature tells their meshes.
-std::pair<std::uint32_t, std::uint32_t> meshes_of(const NearestPairs& nearest, const Geometry& g, Kind kind,
-                                                  std::uint32_t first, std::uint32_t second) {
-  const std::uint32_t a = kind == Kind::vertex_face ? first : g.edges[first][0];
-  const std::uint32_t b = kind == Kind::edge_edge ? g.edges[second][0] : g.faces[second][0];
-  return {nearest.mesh_of(a), nearest.mesh_of(b)};
-}
-
-}  // namespace
 
 void Worker::begin(Search& search) {
   search_ = &search;
@@ -35,7 +24,7 @@ void Worker::begin(Search& search) {
   elementary_ticks = 0;
   leaf_pairs_time = {};
   first_batches_ = search.prunes ? first_batches : 0;
-  grows_batches_ = search.nearest || search.report == Report::any;
+  grows_batches_ = search.limits_fall || search.report == Report::any;
   growing_batch_ = first_batch;
   boxes_leave_much_ = false;
   for (auto& w : waiting_)  // what an exception left behind
@@ -144,35 +133,24 @@ void Worker::resolve(const Candidate& candidate, Rule rule, double apart_until) 
   }
   UndecidedPair pair = undecided_pair(search_->geometry, candidate);
   pair.apart_until = apart_until;
-  if (search_->nearest) {
-    pair.separation = limit_of(a, b, kind);
+  if (search_->limits_fall) {
+    pair.separation = search_->limit_of(kind, a, b);
     if (pair.separation < 0) return;
   }
   if (const auto value = search_->fallback[rule.number()](rule.accuracy, pair, count)) report(kind, {a, b, *value});
-}
-
-// Bound by the smallest distance so far, or by a separation.
-double Worker::limit_of(std::uint32_t first, std::uint32_t second, Kind kind) const {
-  if (const NearestPairs* nearest = search_->nearest.get()) {
-    const auto [a, b] = meshes_of(*nearest, search_->geometry, kind, first, second);
-    return nearest->limit(a, b);
-  }
-  std::uint32_t v[4];
-  pair_vertices(search_->geometry, kind, first, second, v);
-  return search_->geometry.separations.look_up(v[0], v[2]);
 }
 
 // With the time up to which pairs matter, and with the limit of each pair of the batch, where such are looked for.
 const Geometry& Worker::geometry_of(const std::uint32_t* first, const std::uint32_t* second, std::uint32_t n,
                                     Kind kind) {
   const float until = search_->until();
-  const bool to_look_up = search_->geometry.separations.to_look_up();
-  if (!(until < 1) && !search_->nearest && !to_look_up) return search_->geometry;
+  const bool limits_each = search_->limits_fall || search_->geometry.separations.to_look_up();
+  if (!(until < 1) && !limits_each) return search_->geometry;
   limited_ = search_->geometry;
   if (until < 1) limited_.until = until;
-  if (search_->nearest || to_look_up) {
+  if (limits_each) {
     limits_.resize(batch_capacity);
-    for (std::uint32_t i = 0; i < n; ++i) limits_[i] = limit_of(first[i], second[i], kind);
+    for (std::uint32_t i = 0; i < n; ++i) limits_[i] = search_->limit_of(kind, first[i], second[i]);
     limited_.separations.of_candidates = limits_.data();
   }
   return limited_;
@@ -182,22 +160,6 @@ std::vector<Contact>& Worker::found(Kind kind) {
   return kind == Kind::vertex_face ? vertex_face : kind == Kind::edge_edge ? edge_edge : edge_face;
 }
 
-void Worker::offer(Kind kind, const Contact& pair) {
-  NearestPairs& nearest = *search_->nearest;
-  const auto [a, b] = meshes_of(nearest, search_->geometry, kind, pair.first, pair.second);
-  nearer_ |= nearest.offer(a, b, {pair.toc, kind, pair.first, pair.second});
-}
-
-void Worker::report(Kind kind, const Contact& contact) {
-  if (search_->nearest) return offer(kind, contact);
-  if (search_->report == Report::first) {
-    double best = search_->earliest.load(std::memory_order_relaxed);
-    if (contact.toc > best) return;
-    while (contact.toc < best &&
-           !search_->earliest.compare_exchange_weak(best, contact.toc, std::memory_order_relaxed)) {
-    }
-  }
-  found(kind).push_back(contact);
-}
+void Worker::report(Kind kind, const Contact& contact) { nearer_ |= search_->take(kind, contact, found(kind)); }
 
 }  // namespace hpccd

@@ -89,9 +89,7 @@ class alignas(128) Worker {
   void drain(CandidateBuffer& buffer, Kind kind, Rule rule, std::uint32_t keep_below);
   void test(const std::uint32_t* first, const std::uint32_t* second, std::uint32_t n, Kind kind, Rule rule);
   const Geometry& geometry_of(const std::uint32_t* first, const std::uint32_t* second, std::uint32_t n, Kind kind);
-  double limit_of(std::uint32_t first, std::uint32_t second, Kind kind) const;
   std::vector<Contact>& found(Kind kind);
-  void offer(Kind kind, const Contact& pair);
   Geometry limited_;
 
   Search* search_ = nullptr;

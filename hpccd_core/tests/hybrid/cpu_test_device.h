@@ -15,7 +15,7 @@
 #include "hybrid/test_device.h"
 #include "other_arithmetic.h"
 #include "scene/features.h"
-#include "traverse/traverse.h"
+#include "traverse/worker.h"
 
 namespace hpccd::test {
 
@@ -132,18 +132,14 @@ class CpuTestDevice final : public hybrid::TestDevice {
     }
   }
   hybrid::Output perform(const Job& job) {
-    Search search;
+    ContactSearch search(tree_, rules_, Simd::scalar);
     for (auto& test : search.batch_test) test = test_;
-    for (auto& fallback : search.fallback) fallback = separation_ > 0 ? decide_separation : decide_contact;
-    search.block_pairs = block_pairs(Simd::scalar);
-    search.leaf_pairs = leaf_pairs(Simd::scalar);
-    search.report = Report::all;
     search.geometry = {motion_.vertices.data(), features_.edges.data(), features_.faces.data(), nullptr};
     search.geometry.separations = {separation_};
     Worker worker;
     worker.begin(search);
     for (const hybrid::Piece& piece : job.pieces)
-      for (std::size_t i = 0; i < piece.n; ++i) test_leaves(tree_, rules_, piece.pairs[i], worker);
+      for (std::size_t i = 0; i < piece.n; ++i) search.test_leaves(piece.pairs[i], worker);
     worker.flush();
     hybrid::Output output;
     output.vertex_face = worker.vertex_face;

@@ -9,7 +9,6 @@
 #include "equal_contacts.h"
 #include "grid_scene.h"
 #include "hybrid/cpu_test_device.h"
-#include "traverse/traverse.h"
 
 namespace hpccd {
 namespace {
@@ -27,11 +26,6 @@ struct Bench {
         pool(threads),
         workers(static_cast<std::size_t>(threads)) {
     for (auto& test : search.batch_test) test = batch_test;
-    for (unsigned i = 0; i < n_rules; ++i)
-      search.fallback[i] = Rule::of_number(i).separated ? decide_separation : decide_contact;
-    search.block_pairs = block_pairs(Simd::scalar);
-    search.leaf_pairs = leaf_pairs(Simd::scalar);
-    search.report = Report::all;
   }
 
   void update(double from, double to) {
@@ -40,7 +34,6 @@ struct Bench {
     build(tree, *scene, features, motion, pool);
     search.geometry = {motion.vertices.data(), features.edges.data(), features.faces.data(), nullptr};
     search.geometry.separations = {separations.first()};
-    search.earliest = std::numeric_limits<double>::infinity();
   }
 
   Contacts collect() {
@@ -51,7 +44,7 @@ struct Bench {
   }
 
   Contacts on_cpu() {
-    traverse(tree, rules, search, pool, workers);
+    search.traverse(pool, workers);
     return collect();
   }
 
@@ -66,13 +59,13 @@ struct Bench {
     hybrid::FrameGuard frame(engine, workers);
     engine.begin_traversal({&tree.leaves, &tree.face_of_slot, &tree.edge_of_slot, &tree.vertex_of_slot, version},
                            workers);
-    traverse(tree, rules, search, pool, workers);
+    search.traverse(pool, workers);
     Profiler profiler;
     profiler.begin();
     Result r;
     const hybrid::Finished finished = frame.finish(profiler);
     r.complete = finished.complete;
-    for (const LeafPair pair : finished.untested) test_leaves(tree, rules, pair, workers[0]);
+    for (const LeafPair pair : finished.untested) search.test_leaves(pair, workers[0]);
     workers[0].flush();
     engine.count(r.stats);
     r.contacts = collect();
@@ -105,9 +98,9 @@ struct Bench {
   PairRules rules;
   ThreadPool pool;
   std::vector<Worker> workers;
-  Search search;
   MotionBounds motion;
   Tree tree;
+  ContactSearch search{tree, rules, Simd::scalar};
   ContactOrder order;
   std::vector<double> start, end;
   std::shared_ptr<test::DeviceFaults> faults = std::make_shared<test::DeviceFaults>();

@@ -13,7 +13,8 @@ using PairSet = std::set<std::pair<NodeIndex, NodeIndex>>;
 struct FrontTest : PaperTest {
   Hierarchy h;
   Ancestry ancestry;
-  Search search;
+  Tree tree;
+  ContactSearch search{tree, rules, Simd::scalar};
   Worker worker;
   FrontCounts counts;
 
@@ -21,9 +22,6 @@ struct FrontTest : PaperTest {
     move_to(0);
     build(h, features, motion.swept, pool);
     ancestry = Ancestry(h);
-    for (int a = 0; a < 4; ++a)
-      search.batch_test[a] = batch_test(Simd::scalar, static_cast<Accuracy>(a)), search.fallback[a] = decide_contact;
-    search.report = Report::all;
   }
 
   Scenery scenery() const { return {h, features, rules, motion.swept}; }

@@ -15,7 +15,6 @@
 #include "soup_scene.h"
 #include "traverse/leaf_hulls.h"
 #include "traverse/near_corners.h"
-#include "traverse/snapshot.h"
 
 namespace hpccd {
 namespace {

@@ -126,7 +126,8 @@ TEST_P(LeafPairsInPart, AtTheStartBoxesGrowByTheWay) {
   double way = 0;
   for (const VertexMotion& v : motion.vertices)
     for (int k = 0; k < 3; ++k) way = std::max(way, std::fabs(v.t1[k] - v.t0[k]));
-  Search search;
+  const PairRules rules(*scene, Accuracy::exact, SeparationTable(*scene, 0));
+  ContactSearch search(tree, rules, Simd::scalar);
   search.prunes = true;
   search.two_ways = static_cast<float>(2 * way * motion.map.scale);
   search.most_reach = INFINITY;
