@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Whatever a node is asked, in whatever state and order, while frames stream: it answers, goes on and has counted all.
 
-A minute of it; HPCCD_MONKEY_CALLS=10000 makes so many calls instead, HPCCD_MONKEY_SEED=2 others.
+Ten seconds of it, a minute with --long; HPCCD_MONKEY_CALLS=10000: so many calls instead; HPCCD_MONKEY_SEED=2: others.
 """
 
 import math
@@ -25,7 +25,7 @@ from waving_sheet import scene_of, sheet_faces, sheet_positions
 
 from hpccd_ros.middleware import mesh_messages
 
-SECONDS = 60.0
+SECONDS = (10.0, pytest.param(60.0, marks=pytest.mark.long))
 CALLS = int(os.environ.get("HPCCD_MONKEY_CALLS", "0"))
 SEED = int(os.environ.get("HPCCD_MONKEY_SEED", "1"))
 MESHES = ["cloth", "net"]
@@ -153,9 +153,9 @@ def change_randomly(caller, monkey, state):
     return after
 
 
-def play(node, caller, monkey):
+def play(node, caller, monkey, seconds):
     """The random part; how many calls it made."""
-    end = time.monotonic() + SECONDS
+    end = time.monotonic() + seconds
     state, names = "active", sorted(caller.kinds)
     weights = [{"set_parameters": 8, "detect": 8, "change_state": 4}.get(name, 1) for name in names]
     while sum(caller.asked.values()) < CALLS if CALLS else time.monotonic() < end:
@@ -199,15 +199,16 @@ def bring_to_order(node, caller, monkey):
         node.peer.topology(mesh, FACES, N * N, version=VERSION)
 
 
-@pytest.mark.timeout(SECONDS + 2 * PATIENCE + 0.1 * CALLS)
-def test_anything_in_any_order(start_node, tmp_path):
+@pytest.mark.timeout(60.0 + 2 * PATIENCE + 0.1 * CALLS)
+@pytest.mark.parametrize("seconds", SECONDS)
+def test_anything_in_any_order(start_node, tmp_path, seconds):
     node = start_node(START)
     monkey = Monkey(SEED, tmp_path, MESHES, N)
     caller = Caller(node)
     streamer = Streamer(node.namespace, Monkey(-SEED, tmp_path, MESHES, N))
     streamer.start()
     try:
-        calls = play(node, caller, monkey)
+        calls = play(node, caller, monkey, seconds)
     finally:
         streamer.end.set()
         streamer.join(PATIENCE)
