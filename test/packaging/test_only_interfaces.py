@@ -38,7 +38,8 @@ print(future.result().message, list(future.result().distances.distance))
 
 
 @pytest.fixture(scope="module")
-def build(tmp_path_factory):
+def configured(tmp_path_factory):
+    """Folders of the build and of what it installs, and its environment."""
     build, prefix = tmp_path_factory.mktemp("build"), tmp_path_factory.mktemp("prefix")
     ros = os.environ.get("AMENT_PREFIX_PATH") or str(WHEELS)
     paths = {"AMENT_PREFIX_PATH": ros, "CMAKE_PREFIX_PATH": os.environ.get("CMAKE_PREFIX_PATH") or ros}
@@ -54,18 +55,28 @@ def build(tmp_path_factory):
     if (WHEELS / "share" / "ament_cmake_core").is_dir():
         options.append(f"-DCMAKE_PROJECT_INCLUDE={ROOT / 'cmake' / 'pypi_ros.cmake'}")
     run("cmake", "-S", ROOT, "-B", build, *options, environment=environment)
+    return build, prefix, environment
+
+
+@pytest.fixture(scope="module")
+def prefix(configured):
+    build, prefix, environment = configured
     run("cmake", "--build", build, "--parallel", len(os.sched_getaffinity(0)), environment=environment)
     run("cmake", "--install", build, environment=environment)
-    return build, prefix
+    return prefix
 
 
-def test_nothing_of_the_core_is_built_or_installed(build):
-    folder, prefix = build
+def test_nothing_of_the_core_is_looked_for_or_built(configured):
+    folder, _, _ = configured
     commands = [entry["command"] for entry in json.loads((folder / "compile_commands.json").read_text())]
     assert len(commands) > 50 and not any("hpccd_core" in command.partition(" -c ")[2] for command in commands)
     assert not any(re.search(r"-std=\S*\+\+(2[0-9a-z])", command) for command in commands), "C++17 is enough"
     cache = (folder / "CMakeCache.txt").read_text()
     assert "HPCCD_ONLY_INTERFACES" in cache and not any(f"\n{name}:" in cache for name in REMEMBERED)
+
+
+@pytest.mark.long
+def test_the_definitions_alone_are_installed(prefix):
     files = {str(file.relative_to(prefix)) for file in prefix.rglob("*") if file.is_file()}
     assert not any("hpccd_core" in file or "hpccd_ros" in file for file in files)
     definitions = {f"{kind}/{file.name}" for kind in ("msg", "srv", "action") for file in (ROOT / kind).iterdir()}
@@ -73,8 +84,8 @@ def test_nothing_of_the_core_is_built_or_installed(build):
         assert f"share/hpccd/{name}" in files
 
 
-def test_the_messages_serve_to_ask_a_node(build, start_node):
-    _, prefix = build
+@pytest.mark.long
+def test_the_messages_serve_to_ask_a_node(prefix, start_node):
     node = start_node({"meshes": ["cloth"]})
     (packages,) = prefix.glob("lib/python3*/site-packages")
     libraries = os.pathsep.join(filter(None, (str(prefix / "lib"), os.environ.get("LD_LIBRARY_PATH"))))
