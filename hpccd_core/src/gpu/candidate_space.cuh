@@ -3,6 +3,7 @@
 #pragma once
 
 #include "bvh/tree.h"
+#include "gpu/feature_pair.cuh"
 #include "gpu/launch_params.cuh"
 
 namespace hpccd::gpu {

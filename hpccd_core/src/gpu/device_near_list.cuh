@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "gpu/best_time.cuh"
+#include "gpu/feature_pair.cuh"
 #include "gpu/pair_lists.cuh"
 #include "gpu/stream.h"
 

@@ -7,7 +7,7 @@
 #include "elementary/filtered_test.h"
 #include "elementary/tolerance_test.h"
 #include "gpu/best_time.cuh"
-#include "gpu/pair_ends.cuh"
+#include "gpu/feature_pair.cuh"
 
 namespace hpccd::gpu {
 

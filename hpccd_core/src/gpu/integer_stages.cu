@@ -5,8 +5,8 @@
 #include "elementary/exact/earliest.h"
 #include "elementary/exact/given_motion.h"
 #include "gpu/best_time.cuh"
+#include "gpu/feature_pair.cuh"
 #include "gpu/item_of_thread.cuh"
-#include "gpu/pair_ends.cuh"
 #include "gpu/stages.cuh"
 
 namespace hpccd::gpu {

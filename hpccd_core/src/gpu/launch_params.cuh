@@ -6,7 +6,7 @@
 
 #include "base/hd.h"
 #include "bvh/kdop.h"
-#include "elementary/pair_vertices.h"
+#include "elementary/pair.h"
 #include "gpu/counters.cuh"
 #include "gpu/device_box.cuh"
 #include "gpu/pair_keys.h"
@@ -14,7 +14,6 @@
 
 namespace hpccd::gpu {
 
-inline constexpr u32 all_lanes = 0xFFFFFFFFu;
 inline constexpr u32 no_mesh = 0xFFFFFFFFu;
 // Features are numbered in 31 bits, so that the kind of a pair fits beside them.
 inline constexpr u32 kind_bit = 0x80000000u;
@@ -164,99 +163,6 @@ __device__ inline u32 world_of(const LaunchParams<T>& params, Kind kind, u32 fir
   return kind == Kind::edge_edge ? params.by_edges(first) : params.by_vertices(first);
 }
 
-__device__ inline u32 lane_number() { return threadIdx.x & 31; }
-
-// A place for each lane with `wants`, by one atomic a warp. All lanes must call.
-__device__ inline u64 warp_append(u64* counter, bool wants) {
-  const u32 mask = __ballot_sync(all_lanes, wants);
-  if (!mask) return 0;
-  const u32 lane = lane_number(), leader = __ffs(mask) - 1;
-  u64 base = 0;
-  if (lane == leader) base = atomicAdd(counter, static_cast<u64>(__popc(mask)));
-  base = __shfl_sync(all_lanes, base, leader);
-  return base + __popc(mask & ((1u << lane) - 1));
-}
-
-// One vertex at both ends, widened.
-struct Ends {
-  Vec3<double> t0, t1;
-};
-
-__device__ inline Ends load_ends(const GivenEnds<float>* vertices, u32 v) {
-  const float4 a = __ldg(&vertices[v].t0), b = __ldg(&vertices[v].t1);
-  return {{a.x, a.y, a.z}, {b.x, b.y, b.z}};
-}
-
-__device__ inline Ends load_ends(const GivenEnds<double>* vertices, u32 v) {
-  const double2 a = __ldg(&vertices[v].t0[0]), b = __ldg(&vertices[v].t0[1]), c = __ldg(&vertices[v].t1[0]),
-                d = __ldg(&vertices[v].t1[1]);
-  return {{a.x, a.y, b.x}, {c.x, c.y, d.x}};
-}
-
-// v as pair_vertices gives them.
-template <Kind kind, class T>
-__device__ inline Motion<double> load_motion(const GivenEnds<T>* vertices, uint4 v) {
-  const Ends q0 = load_ends(vertices, v.x), q1 = load_ends(vertices, v.y), q2 = load_ends(vertices, v.z),
-             q3 = load_ends(vertices, v.w);
-  const Vec3<double> t0[4] = {q0.t0, q1.t0, q2.t0, q3.t0}, t1[4] = {q0.t1, q1.t1, q2.t1, q3.t1};
-  return motion_of<kind>(t0, t1);
-}
-
-// One vertex at both ends, as floats in the coordinates of the boxes: what the CPU keeps as RoundedMotion.
-struct RoundedEnds {
-  Vec3<float> t0, t1;
-};
-
-__device__ inline RoundedEnds load_rounded_ends(const DevicePoint* points, u32 v) {
-  const float4* at = reinterpret_cast<const float4*>(points + v);
-  const float4 a = __ldg(at), b = __ldg(at + 1);
-  return {{a.x, a.y, a.z}, {b.x, b.y, b.z}};
-}
-
-template <Kind kind>
-__device__ inline Motion<float> load_rounded_motion(const DevicePoint* points, uint4 v) {
-  const RoundedEnds q0 = load_rounded_ends(points, v.x), q1 = load_rounded_ends(points, v.y),
-                    q2 = load_rounded_ends(points, v.z), q3 = load_rounded_ends(points, v.w);
-  const Vec3<float> t0[4] = {q0.t0, q1.t0, q2.t0, q3.t0}, t1[4] = {q0.t1, q1.t1, q2.t1, q3.t1};
-  return motion_of<kind>(t0, t1);
-}
-
-// Of an edge or of a face.
-struct VertexNumbers {
-  u32 v[3];
-  __device__ u32 operator[](int i) const { return v[i]; }
-};
-
-// Of a pair, numbered through all worlds.
-template <Kind kind, class T>
-__device__ inline uint4 vertices_of(const LaunchParams<T>& params, u32 first, u32 second) {
-  const u32 world = world_of(params, kind, first), base = world * params.n_vertices;
-  // Through the cache for what no kernel writes.
-  const auto edge = [&](u32 e) {
-    const uint2 v = __ldg(params.edges + e);
-    return VertexNumbers{{v.x + base, v.y + base}};
-  };
-  const auto face = [&](u32 i) {
-    const u32* v = params.faces + 3 * static_cast<u64>(i);
-    return VertexNumbers{{__ldg(v) + base, __ldg(v + 1) + base, __ldg(v + 2) + base}};
-  };
-  u32 v[4];
-  pair_vertices<kind>(kind == Kind::edge_edge ? first - world * params.n_edges : first, second, edge, face, v);
-  return {v[0], v[1], v[2], v[3]};
-}
-
-template <class T>
-__device__ inline u32 mesh_of(const LaunchParams<T>& params, u32 vertex) {
-  return params.mesh_of_vertex[vertex - params.by_vertices(vertex) * params.n_vertices];
-}
-
-template <class T>
-__device__ inline Accuracy accuracy_of(const LaunchParams<T>& params, uint4 v) {
-  if (!params.accuracy) return params.default_accuracy;
-  // The second vertex belongs to the first edge or to the face, the third to the other edge or the face.
-  return static_cast<Accuracy>(params.accuracy[mesh_of(params, v.x) * params.n_meshes + mesh_of(params, v.z)]);
-}
-
 // Of a pair of leaves: the first one is numbered through all worlds.
 template <class T>
 __device__ inline u32 world_of_leaves(const LaunchParams<T>& params, uint2 leaves) {
@@ -269,19 +175,6 @@ __device__ inline u32 tested_features(const LaunchParams<T>& params, const Devic
   if (!params.features) return params.default_features;
   const auto mesh = [&](const DeviceLeaf& l) { return params.mesh_of_vertex[params.corners[l.first_corner]]; };
   return params.features[mesh(a) * params.n_meshes + mesh(b)];
-}
-
-template <class T>
-__device__ inline Accuracy reported_as(const LaunchParams<T>& params, uint4 v) {
-  const Accuracy accuracy = accuracy_of(params, v);
-  return params.time_only && accuracy == Accuracy::exact ? Accuracy::conservative : accuracy;
-}
-
-// Of two features by one vertex of each.
-template <class T>
-__device__ inline double separation_of(const LaunchParams<T>& params, u32 first, u32 second) {
-  if (!params.separations) return params.separation;
-  return params.separations[mesh_of(params, first) * params.n_meshes + mesh_of(params, second)];
 }
 
 }  // namespace hpccd::gpu

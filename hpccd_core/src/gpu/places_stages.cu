@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Points, normals and nearest points with the CPU's bits, a thread a row.
-#include "gpu/pair_ends.cuh"
+#include "gpu/feature_pair.cuh"
 #include "gpu/pair_lists.cuh"
 #include "gpu/write_places.cuh"
 

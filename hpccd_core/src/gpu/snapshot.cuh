@@ -6,6 +6,7 @@
 #include "elementary/coincidence.h"
 #include "elementary/distance/proximity_test.h"
 #include "elementary/intersection_filter.h"
+#include "gpu/feature_pair.cuh"
 #include "gpu/pair_lists.cuh"
 
 namespace hpccd::gpu {
