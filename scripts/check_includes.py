@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Checks that the includes of the C++ core run one way: each room includes only itself and those before it.
+"""Checks that the includes of the C++ core run one way: each folder includes only itself and those before it.
 
 usage: check_includes.py [FOLDER]    (default: hpccd_core/src)
 
@@ -13,17 +13,17 @@ import re
 import sys
 from pathlib import Path
 
-# Data goes this way. A room is a folder; what stands beside the folders (detector.cpp, bindings.cpp) comes last.
-ROOMS = ["base", "rigid", "scene", "bvh", "elementary", "traverse", "contacts", "paper", "gpu", "hybrid", "backends"]
-TOP = "the files beside the rooms"
-ORDER = [*ROOMS, TOP]
+# Data goes this way. What stands beside the folders (detector.cpp, bindings.cpp) comes last.
+FOLDERS = ["base", "rigid", "scene", "bvh", "elementary", "traverse", "contacts", "paper", "gpu", "hybrid", "backends"]
+TOP = "the files beside the folders"
+ORDER = [*FOLDERS, TOP]
 PUBLIC = "hpccd"  # include/hpccd: the public interface, for all
 
 SUFFIXES = {".h", ".cpp", ".inl", ".cu", ".cuh"}
 INCLUDE = re.compile(r'\s*#\s*include\s*"([^"]+)"')
 
 
-def room_of(path: Path) -> str:
+def folder_of(path: Path) -> str:
     return path.parts[0] if len(path.parts) > 1 else TOP
 
 
@@ -31,23 +31,23 @@ def problems(source: Path) -> list[str]:
     """Every include below `source` that runs up, and every folder that has no place in the order."""
     found = []
     for file in sorted(f for f in source.rglob("*") if f.suffix in SUFFIXES):
-        room = room_of(file.relative_to(source))
-        if room not in ORDER:
-            found.append(f"{file}: the folder {room}/ has no place in the order; give it one in ROOMS of {__file__}")
+        folder = folder_of(file.relative_to(source))
+        if folder not in ORDER:
+            found.append(f"{file}: the folder {folder}/ has no place in the order: add it to FOLDERS of {__file__}")
             continue
         for number, line in enumerate(file.read_text(encoding="utf-8").splitlines(), start=1):
             match = INCLUDE.match(line)
             if not match:
                 continue
-            target = room_of(Path(match[1]))
+            target = folder_of(Path(match[1]))
             if target == PUBLIC:
                 continue
             if target not in ORDER:
-                found.append(f'{file}:{number}: includes "{match[1]}", which is in none of the rooms')
-            elif ORDER.index(target) > ORDER.index(room):
+                found.append(f'{file}:{number}: includes "{match[1]}", which is in none of the folders')
+            elif ORDER.index(target) > ORDER.index(folder):
                 found.append(
-                    f'{file}:{number}: {room} -> {target}: includes "{match[1]}", but {target} comes after {room}; '
-                    f"move what is needed into {room} or before it"
+                    f'{file}:{number}: {folder} -> {target}: includes "{match[1]}", but {target} comes after {folder}; '
+                    f"move what is needed into {folder} or before it"
                 )
     return found
 
@@ -61,7 +61,7 @@ def main(arguments: list[str]) -> int:
     for problem in found:
         print(problem)
     if found:
-        print(f"{len(found)} wrong; includes go from right to left in: {' '.join(ROOMS)}, then {TOP}")
+        print(f"{len(found)} wrong; includes go from right to left in: {' '.join(FOLDERS)}, then {TOP}")
     return 1 if found else 0
 
 

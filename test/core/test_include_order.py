@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The rooms of the C++ core include only what stands before them; the script that says so sees what is planted."""
+"""The folders of the C++ core include only what stands before them; the script that says so sees what is planted."""
 
 import subprocess
 import sys
@@ -38,13 +38,13 @@ def test_an_include_that_runs_up_is_named(tmp_path):
 def test_files_beside_the_rooms_come_last(tmp_path):
     assert plant(tmp_path, detector='#include "gpu/frames.h"\n').returncode == 0
     result = plant(tmp_path, gpu__frames='#include "detector.h"\n')
-    assert result.returncode == 1 and "frames.h:1: gpu -> the files beside the rooms" in result.stdout
+    assert result.returncode == 1 and "frames.h:1: gpu -> the files beside the folders" in result.stdout
 
 
 def test_a_new_folder_needs_a_place(tmp_path):
     result = plant(tmp_path, attic__a="", base__b='#include "attic/a.h"\n')
     assert result.returncode == 1
-    assert "the folder attic/ has no place in the order" in result.stdout and "none of the rooms" in result.stdout
+    assert "the folder attic/ has no place in the order" in result.stdout and "none of the folders" in result.stdout
 
 
 def test_a_wrong_folder_is_an_error_of_its_own(tmp_path):
